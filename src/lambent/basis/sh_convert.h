@@ -1,0 +1,30 @@
+#pragma once
+// Named converters from our spherical harmonics (sh.h: radiance, Condon-Shortley sign) to what other systems store. All keep
+// the index l(l+1)+m and raw z as the pole, so they only scale and flip coefficients; docs/conventions.md has the table.
+#include <lambent/core/vec.h>
+
+#include <optional>
+#include <span>
+#include <string>
+#include <vector>
+
+namespace lambent {
+
+enum class ShConvention {
+  lambent,    // also Sloan, DirectXMath, Filament radiance, pbrt, Unreal, Babylon: radiance, Condon-Shortley
+  three,      // three.js LightProbe: radiance, no Condon-Shortley
+  unity,      // Unity SphericalHarmonicsL2, Filament --sh-shader: irradiance x basis constant / pi, no signs; order 3
+  godot,      // Godot probes: L / pi, no Condon-Shortley
+  gltf_ibl,   // EXT_lights_image_based: irradiance A.L, Condon-Shortley; order 3
+};
+
+std::optional<ShConvention> parse_sh_convention(const std::string& name);
+
+// Converts n^2 coefficients, n >= 1; conventions of order 3 keep the first 9 (fewer if there are fewer).
+std::vector<Vec3> convert_sh(std::span<const Vec3> light, ShConvention to);
+
+// The function mirrored in x or in z (left-handed systems): negates coefficients of odd parity in that axis. Any order.
+std::vector<Vec3> mirror_sh_x(std::span<const Vec3> light);
+std::vector<Vec3> mirror_sh_z(std::span<const Vec3> light);
+
+}  // namespace lambent

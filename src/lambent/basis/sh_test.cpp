@@ -1,0 +1,181 @@
+#include <lambent/basis/sh.h>
+#include <lambent/basis/sh_convert.h>
+#include <lambent/core/random.h>
+#include <lambent/core/sampling.h>
+
+#include <gtest/gtest.h>
+
+namespace lambent {
+namespace {
+
+// Float rounding over sums of up to 256 terms of size ~1.
+constexpr double float_rounding = 2e-5;
+
+Mat3 skew_rotation(uint64_t seed) {
+  Random random(seed);
+  return rotation_from_yaw_pitch_roll({360 * random.next(), 180 * random.next() - 90, 360 * random.next()});
+}
+
+std::vector<float> asymmetric_coefficients(int order, uint64_t seed = 7) {
+  Random random(seed);
+  std::vector<float> c(size_t(sh_count(order)));
+  for (float& x : c) x = 2 * random.next() - 1;
+  return c;
+}
+
+TEST(Sh, LowBandsAreTheKnownPolynomials) {
+  glm::dvec3 d = glm::normalize(glm::dvec3(0.3, -0.7, 0.55));
+  double y[9];
+  evaluate_sh(3, d, y);
+  const double k0 = 0.28209479177387814, k1 = 0.48860251190291992, k2 = 1.0925484305920792, k20 = 0.31539156525252005,
+               k22 = 0.54627421529603959;
+  const double expected[9] = {k0, -k1 * d.y, k1 * d.z, -k1 * d.x, k2 * d.x * d.y, -k2 * d.y * d.z,
+                              k20 * (3 * d.z * d.z - 1), -k2 * d.x * d.z, k22 * (d.x * d.x - d.y * d.y)};
+  for (int i = 0; i < 9; ++i) EXPECT_NEAR(y[i], expected[i], 1e-14) << i;
+}
+
+TEST(Sh, IsOrthonormalAtEveryOrder) {
+  const int order = max_sh_order, n = sh_count(order);
+  // Project every harmonic in one pass: the result must be the identity.
+  for (int i : {0, 1, 3, 6, 35, 36, 77, 143, 144, 200, n - 1}) {
+    std::vector<double> y(static_cast<size_t>(n));
+    auto c = project_sh(order, [&](glm::dvec3 d) { return evaluate_sh(order, d, y), y[size_t(i)]; }, 2 * order);
+    for (int j = 0; j < n; ++j) EXPECT_NEAR(c[size_t(j)], i == j ? 1 : 0, 1e-12) << i << " " << j;
+  }
+}
+
+TEST(Sh, SatisfiesTheAdditionTheorem) {
+  Vec3 a = glm::normalize(Vec3(1, 2, -0.5f));
+  float y[sh_count(max_sh_order)];
+  evaluate_sh(max_sh_order, a, y);
+  for (int l = 0; l < max_sh_order; ++l) {
+    double sum = 0;
+    for (int m = -l; m <= l; ++m) sum += double(y[sh_index(l, m)]) * y[sh_index(l, m)];
+    EXPECT_NEAR(sum, (2 * l + 1) / (4 * pi), (2 * l + 1) * float_rounding);
+  }
+}
+
+TEST(Sh, ProjectsAndReconstructsABandLimitedFunction) {
+  for (int order = 1; order <= max_sh_order; ++order) {
+    auto c = asymmetric_coefficients(order);
+    auto back = project_sh(order, [&](glm::dvec3 d) { return reconstruct_sh(c, Vec3(d)); }, 2 * order);
+    for (size_t i = 0; i < c.size(); ++i) EXPECT_NEAR(back[i], c[i], 10 * float_rounding);
+  }
+}
+
+TEST(Sh, RotationAgreesWithResampling) {
+  for (int order : {1, 2, 3, 6, 9, 12, 16})
+    for (uint64_t seed = 1; seed <= 5; ++seed) {
+      Mat3 R = skew_rotation(seed);
+      auto c = asymmetric_coefficients(order, seed);
+      std::vector<float> turned(c.size());
+      rotate_sh(make_sh_rotation(order, R), c, turned);
+      for (int k = 0; k < 20; ++k) {
+        Vec3 s = square_to_sphere(sobol_owen(uint32_t(k), 3));
+        EXPECT_NEAR(reconstruct_sh(turned, s), reconstruct_sh(c, glm::transpose(R) * s), order * order * float_rounding);
+      }
+    }
+}
+
+TEST(Sh, ZyzRotatorAgreesWithDenseBlocks) {
+  for (int order : {1, 4, 6, 12, 16}) {
+    float a = 0.7f, b = 1.9f, g = -2.3f;
+    auto Rz = [](float t) { return Mat3(Vec3(std::cos(t), std::sin(t), 0), Vec3(-std::sin(t), std::cos(t), 0), Vec3(0, 0, 1)); };
+    auto Ry = [](float t) { return Mat3(Vec3(std::cos(t), 0, -std::sin(t)), Vec3(0, 1, 0), Vec3(std::sin(t), 0, std::cos(t))); };
+    auto c = asymmetric_coefficients(order);
+    std::vector<float> expected(c.size());
+    rotate_sh(make_sh_rotation(order, Rz(a) * Ry(b) * Rz(g)), c, expected);
+    ShZyzRotator(order).rotate(a, b, g, c);
+    for (size_t i = 0; i < c.size(); ++i) EXPECT_NEAR(c[i], expected[i], 2 * order * float_rounding);
+  }
+}
+
+TEST(Sh, RotatesLinearBandAsAVector) {
+  // The linear part of a function points along (-f11, -f1-1, f10).
+  Mat3 R = skew_rotation(11);
+  Vec3 v = glm::normalize(Vec3(0.2f, -0.9f, 0.4f)), w = R * v;
+  std::vector<float> c{0, -v.y, v.z, -v.x}, turned(4);
+  rotate_sh(make_sh_rotation(2, R), c, turned);
+  EXPECT_NEAR(-turned[3], w.x, 1e-6);
+  EXPECT_NEAR(-turned[1], w.y, 1e-6);
+  EXPECT_NEAR(turned[2], w.z, 1e-6);
+}
+
+TEST(Sh, ClampedCosineMatchesQuadrature) {
+  const double known[] = {std::numbers::pi, 2 * std::numbers::pi / 3, std::numbers::pi / 4, 0, -std::numbers::pi / 24, 0,
+                          std::numbers::pi / 64};
+  for (int l = 0; l < 7; ++l) EXPECT_NEAR(clamped_cosine(l), known[l], 1e-14);
+  // The kink at the horizon limits the quadrature: 400 nodes leave about 1e-4.
+  auto c = project_sh(12, [](glm::dvec3 d) { return std::max(0.0, d.z); }, 400);
+  for (int l = 0; l < 12; ++l)
+    EXPECT_NEAR(c[size_t(sh_index(l, 0))], clamped_cosine(l) * std::sqrt((2 * l + 1) / (4 * std::numbers::pi)), 1e-4) << l;
+}
+
+TEST(ShWindow, FixedWindowsFallFromOne) {
+  for (ShWindow kind : {ShWindow::hann, ShWindow::lanczos}) {
+    auto w = sh_window(kind, 6);
+    EXPECT_EQ(w[0], 1.0f);
+    for (size_t l = 1; l < w.size(); ++l) {
+      EXPECT_LT(w[l], w[l - 1]);
+      EXPECT_GT(w[l], 0);
+    }
+  }
+  EXPECT_NEAR(sh_window(ShWindow::hann, 6)[3], 0.5f, 1e-6);
+  EXPECT_NEAR(sh_window(ShWindow::lanczos, 6)[3], 2 / pi, 1e-6);
+}
+
+TEST(ShWindow, AutomaticLiftsNegativeIrradianceAndLeavesSmoothLightAlone) {
+  // A delta light's order-6 irradiance dips below zero.
+  Vec3 sun = glm::normalize(Vec3(0.4f, 0.8f, -0.2f));
+  std::vector<float> y(36);
+  evaluate_sh(6, sun, y);
+  std::vector<Vec3> light;
+  for (float v : y) light.push_back(Vec3(v, 0.8f * v, 0.5f * v));
+  auto irradiance_min = [](std::span<const Vec3> c) {
+    float lowest = INFINITY;
+    std::vector<Vec3> e(c.begin(), c.end());
+    for (size_t i = 0; i < e.size(); ++i) e[i] *= float(clamped_cosine(sh_band(int(i))));
+    for (uint32_t k = 0; k < 4000; ++k) lowest = std::min(lowest, luminance(reconstruct_sh(e, square_to_sphere(sobol_owen(k, 1)))));
+    return lowest;
+  };
+  ASSERT_LT(irradiance_min(light), -0.01f);
+  auto w = apply_sh_window(ShWindow::automatic, light);
+  EXPECT_GT(irradiance_min(light), -1e-3f);
+  EXPECT_GT(w[1], 0.5f);  // no stronger than it has to be
+
+  std::vector<Vec3> smooth(36, Vec3(0.0f));
+  smooth[0] = Vec3(1), smooth[2] = Vec3(0.2f);
+  for (float f : apply_sh_window(ShWindow::automatic, smooth)) EXPECT_EQ(f, 1.0f);
+}
+
+TEST(ShConvert, ScalesAsTheTablesSay) {
+  std::vector<Vec3> light(9, Vec3(1.0f));
+  auto three = convert_sh(light, ShConvention::three);
+  const float sign[9] = {1, -1, 1, -1, 1, -1, 1, -1, 1};
+  for (size_t i = 0; i < 9; ++i) EXPECT_EQ(three[i].x, sign[i]) << i;
+  auto unity = convert_sh(light, ShConvention::unity);
+  const float unity_scale[9] = {0.282095f, 0.325735f, 0.325735f, 0.325735f, 0.273137f, 0.273137f, 0.078848f, 0.273137f, 0.136569f};
+  for (size_t i = 0; i < 9; ++i) EXPECT_NEAR(unity[i].x, sign[i] * unity_scale[i], 2e-6) << i;
+  // Constant white radiance 1 has the single coefficient sqrt(4 pi); Unity's first coefficient is then 1.
+  EXPECT_NEAR(convert_sh(std::vector<Vec3>{Vec3(std::sqrt(4 * pi))}, ShConvention::unity)[0].x, 1.0f, 1e-6);
+  EXPECT_NEAR(convert_sh(light, ShConvention::godot)[2].x, 1 / pi, 1e-6);
+  EXPECT_NEAR(convert_sh(light, ShConvention::gltf_ibl)[6].x, pi / 4, 1e-6);
+}
+
+TEST(ShConvert, MirrorsFunctions) {
+  for (int order : {3, 8}) {
+    auto c = asymmetric_coefficients(order);
+    std::vector<Vec3> light;
+    for (float x : c) light.push_back(Vec3(x));
+    auto mx = mirror_sh_x(light), mz = mirror_sh_z(light);
+    for (uint32_t k = 0; k < 20; ++k) {
+      Vec3 s = square_to_sphere(sobol_owen(k, 5));
+      float tolerance = float(order * order * float_rounding);
+      EXPECT_NEAR(reconstruct_sh(mx, s).x, reconstruct_sh(light, Vec3(-s.x, s.y, s.z)).x, tolerance);
+      EXPECT_NEAR(reconstruct_sh(mz, s).x, reconstruct_sh(light, Vec3(s.x, s.y, -s.z)).x, tolerance);
+    }
+  }
+}
+
+}  // namespace
+}  // namespace lambent
