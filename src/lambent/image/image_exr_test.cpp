@@ -1,0 +1,354 @@
+#include <lambent/core/file.h>
+#include <lambent/core/random.h>
+#include <lambent/image/image.h>
+
+#include <ImfArray.h>
+#include <ImfChannelList.h>
+#include <ImfChromaticitiesAttribute.h>
+#include <ImfFrameBuffer.h>
+#include <ImfHeader.h>
+#include <ImfIO.h>
+#include <ImfOutputFile.h>
+#include <ImfPartType.h>
+#include <ImfStandardAttributes.h>
+#include <ImfTiledOutputFile.h>
+#include <gtest/gtest.h>
+#include <unistd.h>
+
+#include <cstring>
+#include <filesystem>
+#include <functional>
+
+namespace lambent {
+namespace {
+
+using Bytes = std::vector<uint8_t>;
+
+struct Output : Imf::OStream {
+  Bytes bytes;
+  size_t at = 0;
+  Output() : OStream("test") {}
+  void write(const char data[], int count) override {
+    bytes.resize(std::max(bytes.size(), at + size_t(count)));
+    std::memcpy(bytes.data() + at, data, size_t(count));
+    at += size_t(count);
+  }
+  uint64_t tellp() override { return at; }
+  void seekp(uint64_t position) override { at = position; }
+};
+
+// An OpenEXR file with any header and channels; value(channel, x, y) counts from the data window's corner.
+struct Maker {
+  Imf::Header header;
+  std::vector<std::pair<std::string, Imf::Channel>> channels;
+  std::function<float(size_t channel, int x, int y)> value;
+  bool tiled = false;
+
+  Maker(int width, int height, std::initializer_list<const char*> names, Imf::PixelType type = Imf::FLOAT)
+      : header(width, height) {
+    for (const char* name : names) channels.emplace_back(name, Imf::Channel(type));
+    value = [](size_t c, int x, int y) { return 0.25f * float(c) + float(x) + 16 * float(y); };
+  }
+  Bytes bytes() {
+    Imath::Box2i window = header.dataWindow();
+    int width = window.max.x - window.min.x + 1, height = window.max.y - window.min.y + 1;
+    std::vector<std::vector<char>> planes;
+    Imf::FrameBuffer slices;
+    for (size_t c = 0; c < channels.size(); ++c) {
+      auto& [name, channel] = channels[c];
+      header.channels().insert(name, channel);
+      size_t size = channel.type == Imf::HALF ? 2 : 4, columns = size_t(width / channel.xSampling);
+      std::vector<char>& plane = planes.emplace_back(size * size_t(width) * size_t(height));
+      for (int y = 0; y < height / channel.ySampling; ++y)
+        for (int x = 0; x < width / channel.xSampling; ++x) {
+          char* p = plane.data() + (size_t(y) * columns + size_t(x)) * size;
+          float v = value(c, x, y);
+          half h(v);
+          uint32_t u = uint32_t(v);
+          std::memcpy(p,
+                      channel.type == Imf::HALF   ? static_cast<void*>(&h)
+                      : channel.type == Imf::UINT ? static_cast<void*>(&u)
+                                                  : &v,
+                      size);
+        }
+    }
+    for (size_t c = 0; c < channels.size(); ++c) {
+      const Imf::Channel& channel = channels[c].second;
+      size_t size = channel.type == Imf::HALF ? 2 : 4, columns = size_t(width / channel.xSampling);
+      slices.insert(channels[c].first, Imf::Slice::Make(channel.type, planes[c].data(), window, size, size * columns,
+                                                        channel.xSampling, channel.ySampling));
+    }
+    Output out;
+    if (tiled) {
+      header.setTileDescription(Imf::TileDescription(4, 3, Imf::ONE_LEVEL));
+      Imf::TiledOutputFile file(out, header, 0);
+      file.setFrameBuffer(slices);
+      file.writeTiles(0, file.numXTiles() - 1, 0, file.numYTiles() - 1);
+    } else {
+      Imf::OutputFile file(out, header, 0);
+      file.setFrameBuffer(slices);
+      file.writePixels(height);
+    }
+    return std::move(out.bytes);
+  }
+};
+
+Bytes encoded(const Image& image) {
+  auto bytes = encode_exr(image, "a.exr");
+  EXPECT_TRUE(bytes);
+  return *bytes;
+}
+
+TEST(Exr, HalfRoundTripIsExact) {
+  Image image(5, 3);
+  Random random(7);
+  for (Vec3& c : image.rgb)
+    for (int k = 0; k < 3; ++k) c[k] = float(half(1000 * random.next() - 100));
+  image.rgb[3] = {65504, -65504, 0x1p-24f};
+  image.alpha.assign(15, 0.25f);
+  image.alpha[7] = 1;
+  auto back = load_image(encoded(image), "a.exr");
+  ASSERT_TRUE(back) << back.error().text();
+  EXPECT_EQ(back->width, 5);
+  EXPECT_EQ(back->rgb, image.rgb);
+  EXPECT_EQ(back->alpha, image.alpha);
+  image.alpha.clear();
+  back = load_image(encoded(image), "a.exr");
+  ASSERT_TRUE(back);
+  EXPECT_TRUE(back->alpha.empty());
+}
+
+TEST(Exr, BeyondHalfIsClampedAndNotANumberKept) {
+  Image image(2, 1);
+  image.rgb = {Vec3(1e6f, -1e9f, 65505), Vec3(NAN, INFINITY, -INFINITY)};
+  auto back = load_image(encoded(image), "a.exr");
+  ASSERT_TRUE(back);
+  EXPECT_EQ(back->rgb[0], Vec3(65504, -65504, 65504));
+  EXPECT_TRUE(std::isnan(back->rgb[1].x));
+  EXPECT_EQ(back->rgb[1].y, INFINITY);
+  EXPECT_EQ(back->rgb[1].z, -INFINITY);
+}
+
+TEST(Exr, SaveWritesTheSameBytesTwice) {
+  Image image(9, 4);
+  for (size_t i = 0; i < image.rgb.size(); ++i) image.rgb[i] = Vec3(float(i), 1, 2);
+  std::string path = testing::TempDir() + "/lambent_exr_" + std::to_string(::getpid()) + ".exr";
+  ASSERT_TRUE(save_image(path, image, 3));
+  auto bytes = read_file(path);
+  ASSERT_TRUE(bytes);
+  EXPECT_EQ(*bytes, encoded(image));
+  auto back = load_image(path);
+  ASSERT_TRUE(back);
+  EXPECT_EQ(back->rgb, image.rgb);  // the exposure does not touch an EXR
+  std::filesystem::remove(path);
+}
+
+void expect_window(const Image& image, int channels) {
+  for (int y = 0; y < image.height; ++y)
+    for (int x = 0; x < image.width; ++x)
+      for (int c = 0; c < channels; ++c)
+        ASSERT_EQ(image.at(x, y)[c], 0.25f * float(c) + float(x) + 16 * float(y)) << x << " " << y;
+}
+
+TEST(Exr, EveryLosslessCompressionFloatHalfAndWhole) {
+  for (auto compression :
+       {Imf::NO_COMPRESSION, Imf::RLE_COMPRESSION, Imf::ZIPS_COMPRESSION, Imf::ZIP_COMPRESSION, Imf::PIZ_COMPRESSION})
+    for (bool tiled : {false, true})
+      for (auto type : {Imf::FLOAT, Imf::HALF}) {
+        Maker maker(10, 7, {"R", "G", "B"}, type);
+        maker.header.compression() = compression, maker.tiled = tiled;
+        auto image = load_image(maker.bytes(), "a.exr");
+        ASSERT_TRUE(image) << image.error().text();
+        ASSERT_EQ(image->width, 10);
+        ASSERT_EQ(image->height, 7);
+        expect_window(*image, 3);
+      }
+  Maker whole(4, 4, {"R", "G", "B"}, Imf::UINT);
+  whole.value = [](size_t c, int x, int y) { return float(100 * int(c) + 10 * y + x); };
+  auto image = load_image(whole.bytes(), "a.exr");
+  ASSERT_TRUE(image);
+  EXPECT_EQ(image->at(3, 2), Vec3(23, 123, 223));
+}
+
+TEST(Exr, LossyCompressionsRead) {
+  for (auto compression :
+       {Imf::PXR24_COMPRESSION, Imf::B44_COMPRESSION, Imf::B44A_COMPRESSION, Imf::DWAA_COMPRESSION, Imf::DWAB_COMPRESSION}) {
+    Maker maker(32, 20, {"R", "G", "B"}, Imf::HALF);
+    maker.header.compression() = compression;
+    maker.value = [](size_t, int, int) { return 0.5f; };
+    auto image = load_image(maker.bytes(), "a.exr");
+    ASSERT_TRUE(image) << image.error().text();
+    constexpr float loss = 0.01f;  // far above what any of them does to a constant
+    EXPECT_NEAR(image->at(17, 11).y, 0.5f, loss);
+  }
+}
+
+TEST(Exr, DataWindowIsThePicture) {
+  Maker maker(100, 100, {"R", "G", "B"});
+  maker.header.dataWindow() = Imath::Box2i({-7, 20}, {-2, 24});
+  auto image = load_image(maker.bytes(), "a.exr");
+  ASSERT_TRUE(image) << image.error().text();
+  EXPECT_EQ(image->width, 6);
+  EXPECT_EQ(image->height, 5);
+  expect_window(*image, 3);
+}
+
+TEST(Exr, SubsetsOfChannels) {
+  auto grey = load_image(Maker(3, 2, {"Y"}).bytes(), "a.exr");
+  ASSERT_TRUE(grey);
+  EXPECT_EQ(grey->at(2, 1), Vec3(18));
+  auto green = load_image(Maker(3, 2, {"G"}).bytes(), "a.exr");
+  ASSERT_TRUE(green);
+  EXPECT_EQ(green->at(2, 1), Vec3(0, 18, 0));
+  Maker depth(3, 2, {"R", "Z"});
+  depth.channels[1].second.xSampling = 3, depth.channels[1].second.ySampling = 2;  // not asked for, so it may be anything
+  auto red = load_image(depth.bytes(), "a.exr");
+  ASSERT_TRUE(red) << red.error().text();
+  EXPECT_EQ(red->at(2, 1), Vec3(18, 0, 0));
+}
+
+TEST(Exr, WhatIsNotReadIsNamed) {
+  auto message = [](const Bytes& bytes) {
+    auto image = load_image(bytes, "a.exr");
+    return image ? std::string("read") : image.error().text();
+  };
+  EXPECT_EQ(message(Maker(2, 2, {"Z"}).bytes()), "a.exr: no channel named R, G, B or Y");
+  EXPECT_EQ(message(Maker(2, 2, {"layer.R", "layer.G"}).bytes()), "a.exr: no channel named R, G, B or Y");
+  Maker chroma(2, 2, {"Y", "RY", "BY"});
+  for (size_t c : {1, 2}) chroma.channels[c].second.xSampling = chroma.channels[c].second.ySampling = 2;
+  EXPECT_EQ(message(chroma.bytes()), "a.exr: luminance/chroma pixels are not read, only R, G, B or Y alone");
+  Maker coarse(2, 2, {"R", "G"});
+  coarse.channels[1].second.xSampling = 2;
+  EXPECT_EQ(message(coarse.bytes()), "a.exr: channel G is subsampled");
+  Bytes bytes = Maker(2, 2, {"R"}).bytes();
+  bytes[5] |= 0x08;
+  EXPECT_EQ(message(bytes), "a.exr: deep pixels are not read");
+  bytes[5] = 0x10;
+  EXPECT_EQ(message(bytes), "a.exr: files of several parts are not read");
+  bytes[5] = 0, bytes[4] = 1;
+  EXPECT_EQ(message(bytes), "a.exr: OpenEXR version is not 2");
+  Maker deep(2, 2, {"R"});
+  deep.header.setType(Imf::SCANLINEIMAGE);
+  bytes = deep.bytes();
+  const std::string kind = "scanlineimage", other = "deepscanlines";
+  auto at = std::search(bytes.begin(), bytes.end(), kind.begin(), kind.end());
+  ASSERT_NE(at, bytes.end());
+  std::copy(other.begin(), other.end(), at);
+  EXPECT_EQ(message(bytes), "a.exr: deep pixels are not read");
+}
+
+// Puts a data window of the given size into a file that holds a few pixels only.
+std::string message_for_window(int x0, int y0, int x1, int y1) {
+  Bytes bytes = Maker(2, 2, {"R", "G", "B"}).bytes();
+  const std::string name("dataWindow\0box2i\0", 17);
+  auto at = std::search(bytes.begin(), bytes.end(), name.begin(), name.end());
+  int window[] = {x0, y0, x1, y1};
+  std::memcpy(&*at + name.size() + 4, window, sizeof window);
+  auto image = load_image(bytes, "a.exr");
+  return image ? "read" : image.error().text();
+}
+
+TEST(Exr, SizesThatCannotBeAreRefusedBeforeAllocating) {
+  EXPECT_EQ(message_for_window(0, 0, 1, 1), "read");
+  EXPECT_EQ(message_for_window(0, 0, 65535, 65535), "a.exr: image of 65536 x 65536 is larger than 2^28 pixels");
+  EXPECT_EQ(message_for_window(0, 0, 16383, 16383), "a.exr: image of 16384 x 16384 does not fit its few bytes");
+  EXPECT_EQ(message_for_window(0, 0, 0, (1 << 21) - 1), "a.exr: truncated: fewer bytes than the table of rows needs");
+  const std::string bad = "a.exr: bad attribute \"dataWindow\" in the header";
+  EXPECT_EQ(message_for_window(0, 0, -1, 5), bad);
+  EXPECT_EQ(message_for_window(0, 7, 5, 5), bad);
+  EXPECT_EQ(message_for_window(-2147483647 - 1, 0, 2147483647, 0), bad);
+  EXPECT_EQ(message_for_window(0, 2147483646, 0, 2147483647), bad);
+}
+
+TEST(Exr, EveryTruncationIsAnError) {
+  for (bool tiled : {false, true}) {
+    Maker maker(6, 5, {"R", "G", "B", "A"}, Imf::HALF);
+    maker.tiled = tiled;
+    Bytes bytes = maker.bytes();
+    ASSERT_TRUE(load_image(bytes, "a.exr"));
+    for (size_t size = 0; size < bytes.size(); ++size) {
+      auto image = load_image(std::span(bytes).first(size), "a.exr");
+      ASSERT_FALSE(image) << size << " of " << bytes.size();
+      std::string text = image.error().text();
+      EXPECT_TRUE(text.find('\n') == text.npos && text.back() != '.' && text.find("a.exr", 5) == text.npos) << text;
+    }
+  }
+}
+
+TEST(Exr, EveryFlippedByteIsSafe) {
+  for (auto compression : {Imf::ZIP_COMPRESSION, Imf::PIZ_COMPRESSION, Imf::B44_COMPRESSION, Imf::DWAA_COMPRESSION}) {
+    Maker maker(6, 5, {"R", "G", "B"}, Imf::HALF);
+    maker.header.compression() = compression;
+    Bytes bytes = maker.bytes();
+    for (size_t i = 0; i < bytes.size(); ++i) {
+      Bytes broken = bytes;
+      broken[i] ^= 0xff;
+      auto image = load_image(broken, "a.exr");
+      if (image) {
+        EXPECT_EQ(image->rgb.size(), size_t(image->width) * size_t(image->height));
+      }
+    }
+  }
+}
+
+// --- Chromaticities
+
+void expect_matrix(const Mat3& m, const float (&rows)[3][3], float tolerance) {
+  for (int r = 0; r < 3; ++r)
+    for (int c = 0; c < 3; ++c) EXPECT_NEAR(m[c][r], rows[r][c], tolerance) << r << " " << c;
+}
+
+TEST(Primaries, PublishedMatrices) {
+  constexpr float four_digits = 1e-4f, five_digits = 2e-5f;
+  auto rec2020 = rec709_from_primaries({0.708f, 0.292f}, {0.170f, 0.797f}, {0.131f, 0.046f}, {0.3127f, 0.3290f});
+  ASSERT_TRUE(rec2020);
+  // ITU-R BT.2087, equation for BT.2020 to BT.709.
+  expect_matrix(*rec2020, {{1.6605f, -0.5876f, -0.0728f}, {-0.1246f, 1.1329f, -0.0083f}, {-0.0182f, -0.1006f, 1.1187f}},
+                four_digits);
+  // ACEScg, whose white is not D65, by the Academy's Bradford-adapted matrix.
+  auto acescg = rec709_from_primaries({0.713f, 0.293f}, {0.165f, 0.830f}, {0.128f, 0.044f}, {0.32168f, 0.33767f});
+  ASSERT_TRUE(acescg);
+  expect_matrix(*acescg, {{1.70505f, -0.62179f, -0.08326f}, {-0.13026f, 1.14080f, -0.01055f}, {-0.02400f, -0.12897f, 1.15297f}},
+                five_digits);
+  auto same = rec709_from_primaries({0.64f, 0.33f}, {0.30f, 0.60f}, {0.15f, 0.06f}, {0.3127f, 0.3290f});
+  ASSERT_TRUE(same);
+  expect_matrix(*same, {{1, 0, 0}, {0, 1, 0}, {0, 0, 1}}, 1e-6f);
+}
+
+TEST(Primaries, WhiteStaysWhiteAndNonsenseIsRefused) {
+  auto m = rec709_from_primaries({0.7f, 0.28f}, {0.2f, 0.7f}, {0.14f, 0.05f}, {0.3457f, 0.3585f});
+  ASSERT_TRUE(m);
+  constexpr float rounding = 1e-6f;
+  for (int c = 0; c < 3; ++c) EXPECT_NEAR((*m * Vec3(1))[c], 1, rounding);
+  EXPECT_FALSE(rec709_from_primaries({0.1f, 0.1f}, {0.2f, 0.2f}, {0.3f, 0.3f}, {0.3127f, 0.3290f}));
+  EXPECT_FALSE(rec709_from_primaries({0.64f, 0.33f}, {0.30f, 0.60f}, {0.15f, 0.06f}, {0.3f, 0}));
+  EXPECT_FALSE(rec709_from_primaries({NAN, 0.33f}, {0.30f, 0.60f}, {0.15f, 0.06f}, {0.3127f, 0.3290f}));
+}
+
+TEST(Primaries, FilesAreConverted) {
+  Maker maker(2, 1, {"R", "G", "B"});
+  maker.value = [](size_t c, int x, int) { return x == 0 ? (c == 0 ? 1.0f : 0.0f) : 3.0f; };
+  Imf::addChromaticities(maker.header,
+                         Imf::Chromaticities({0.708f, 0.292f}, {0.170f, 0.797f}, {0.131f, 0.046f}, {0.3127f, 0.3290f}));
+  auto image = load_image(maker.bytes(), "a.exr");
+  ASSERT_TRUE(image);
+  constexpr float four_digits = 1e-4f;
+  const float red[] = {1.6605f, -0.1246f, -0.0182f};
+  for (int c = 0; c < 3; ++c) {
+    EXPECT_NEAR(image->rgb[0][c], red[c], four_digits);
+    EXPECT_NEAR(image->rgb[1][c], 3, four_digits);
+  }
+  // Rec. 709 itself, printed with a rounding error or as ICC profiles adapt it to D50, changes nothing at all.
+  for (auto chromaticities :
+       {Imf::Chromaticities({0.64001f, 0.33f}, {0.30f, 0.60f}, {0.15f, 0.06f}, {0.31271f, 0.32902f}),
+        Imf::Chromaticities({0.6484f, 0.3309f}, {0.3212f, 0.5979f}, {0.1559f, 0.0660f}, {0.3457f, 0.3585f})}) {
+    Maker same(2, 1, {"R", "G", "B"});
+    Imf::addChromaticities(same.header, chromaticities);
+    image = load_image(same.bytes(), "a.exr");
+    ASSERT_TRUE(image);
+    expect_window(*image, 3);
+  }
+}
+
+}  // namespace
+}  // namespace lambent
