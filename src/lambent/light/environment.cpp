@@ -1,0 +1,187 @@
+#include <lambent/core/check.h>
+#include <lambent/core/file.h>
+#include <lambent/core/parallel.h>
+#include <lambent/light/environment.h>
+#include <lambent/light/sky.h>
+
+#include <charconv>
+#include <filesystem>
+
+namespace lambent {
+namespace {
+
+constexpr double pi_d = std::numbers::pi;
+
+// Index of the cell of [0, 1] that x falls in; also for x at the ends or beyond, and NaN.
+int cell(float x, int count) {
+  float scaled = x * float(count);
+  return scaled > 0 ? int(std::min(scaled, float(count - 1))) : 0;
+}
+
+// Integral of the direction over a texel, without the factor of the azimuth: (equatorial, vertical) for rows y.
+glm::dvec2 row_moments(int y, int height) {
+  double top = pi_d * y / height, bottom = pi_d * (y + 1) / height;
+  auto equatorial = [](double t) { return 0.5 * (t - std::sin(t) * std::cos(t)); };  // of sin^2
+  return {equatorial(bottom) - equatorial(top), 0.5 * (std::cos(top) * std::cos(top) - std::cos(bottom) * std::cos(bottom))};
+}
+
+Result<Environment> parse_uniform(const std::string& spec, const std::string& values) {
+  Vec3 color;
+  int count = 0;
+  const char *at = values.data(), *end = at + values.size();
+  for (;;) {
+    auto [stop, code] = std::from_chars(at, end, color[count]);
+    if (code != std::errc() || !(color[count] >= 0) || !std::isfinite(color[count]))
+      return Error{spec, "not a non-negative number"};
+    at = stop, ++count;
+    if (at == end || count == 3) break;
+    if (*at++ != ',') return Error{spec, "numbers are separated by commas"};
+  }
+  if (at != end || count == 2) return Error{spec, "one or three numbers are wanted"};
+  if (count == 1) color = Vec3(color.x);
+  // Fine enough for sums over texel centres to be exact in practice.
+  return make_environment("uniform", 256, 128, [color](Vec3) { return color; });
+}
+
+}  // namespace
+
+Result<Environment> load_environment(const std::string& spec) {
+  if (spec.starts_with("uniform:")) return parse_uniform(spec, spec.substr(8));
+  if (spec.starts_with("sky:")) {
+    auto options = parse_sky(spec.substr(4));
+    if (!options) return options.error();
+    return make_sky(*options);
+  }
+  auto file = MappedFile::open(spec);
+  if (!file) return file.error();
+  ImageFormat format = image_format(file->bytes());
+  if (format == ImageFormat::png || format == ImageFormat::jpeg)
+    return Error{spec, "an environment needs high dynamic range: .hdr or .exr"};
+  auto image = load_image(file->bytes(), spec);
+  if (!image) return image.error();
+  return environment_from_image(std::filesystem::path(spec).stem().string(), std::move(*image));
+}
+
+Environment environment_from_image(std::string name, Image image) {
+  LAMBENT_CHECK(image.width > 0 && image.height > 0);
+  Environment env;
+  env.name = std::move(name), env.image = std::move(image), env.image.alpha.clear();
+  size_t negative = 0, infinite = 0;
+  for (Vec3& c : env.image.rgb) {
+    bool below = false, beyond = false;
+    for (int k = 0; k < 3; ++k) {
+      beyond |= !std::isfinite(c[k]), below |= c[k] < 0 && std::isfinite(c[k]);
+      if (!std::isfinite(c[k]) || c[k] < 0) c[k] = 0;
+    }
+    infinite += beyond, negative += below && !beyond;
+  }
+  if (negative + infinite > 0) {
+    size_t total = negative + infinite;
+    std::string text = std::to_string(total) + (total == 1 ? " pixel" : " pixels") + " clamped to 0: ";
+    if (negative > 0) text += std::to_string(negative) + " with a negative channel";
+    if (negative > 0 && infinite > 0) text += ", ";
+    if (infinite > 0) text += std::to_string(infinite) + " with a channel that is not finite";
+    env.warnings.push_back(std::move(text));
+  }
+  if (env.image.width != 2 * int64_t(env.image.height))
+    env.warnings.push_back("map of " + std::to_string(env.image.width) + " x " + std::to_string(env.image.height) +
+                           " is not twice as wide as high: stretched over the whole sphere");
+  return env;
+}
+
+Vec3 latlong_direction(Vec2 uv) {
+  double phi = 2 * pi_d * (double(uv.x) - 0.5), theta = pi_d * double(uv.y), s = std::sin(theta);
+  return Vec3(s * std::cos(phi), std::cos(theta), s * std::sin(phi));
+}
+
+Vec3 texel_direction(int x, int y, int width, int height) {
+  double phi = 2 * pi_d * ((x + 0.5) / width - 0.5), theta = pi_d * (y + 0.5) / height, s = std::sin(theta);
+  return Vec3(s * std::cos(phi), std::cos(theta), s * std::sin(phi));
+}
+
+Vec2 latlong_uv(Vec3 d) {
+  // The angle from +Y by atan2: as acos(y) for unit vectors, but exact near the poles and fearless of |y| > 1.
+  float u = 0.5f + std::atan2(d.z, d.x) / (2 * pi), v = std::atan2(std::hypot(d.x, d.z), d.y) / pi;
+  if (!is_finite(d) || d == Vec3(0)) return Vec2(0.5f);
+  return {std::clamp(u, 0.0f, 1.0f), std::clamp(v, 0.0f, 1.0f)};
+}
+
+double texel_solid_angle(int y, int width, int height) {
+  // cos a - cos b = 2 sin((a + b) / 2) sin((b - a) / 2), without cancellation near the poles
+  return 2 * pi_d / width * 2 * std::sin(pi_d * (y + 0.5) / height) * std::sin(0.5 * pi_d / height);
+}
+
+Vec3 radiance(const Environment& env, Vec3 d) {
+  Vec2 uv = latlong_uv(d);
+  return env.image.at(cell(uv.x, env.image.width), cell(uv.y, env.image.height));
+}
+
+Vec3 radiance_bilinear(const Environment& env, Vec3 d) {
+  const Image& image = env.image;
+  Vec2 uv = latlong_uv(d);
+  float x = uv.x * float(image.width) - 0.5f, y = uv.y * float(image.height) - 0.5f;
+  float fx = std::floor(x), fy = std::floor(y);
+  float wx = x - fx, wy = y - fy;
+  int x0 = int(fx) < 0 ? image.width - 1 : std::min(int(fx), image.width - 1), x1 = (x0 + 1) % image.width;
+  int y0 = std::clamp(int(fy), 0, image.height - 1), y1 = std::clamp(int(fy) + 1, 0, image.height - 1);
+  Vec3 top = image.at(x0, y0) * (1 - wx) + image.at(x1, y0) * wx, bottom = image.at(x0, y1) * (1 - wx) + image.at(x1, y1) * wx;
+  return top * (1 - wy) + bottom * wy;
+}
+
+Environment rotated(const Environment& env, const Mat3& R, int supersample) {
+  LAMBENT_CHECK(supersample >= 1);
+  Environment out;
+  int width = env.image.width, height = env.image.height;
+  out.name = env.name, out.warnings = env.warnings, out.image = Image(width, height);
+  Mat3 inverse = glm::transpose(R);
+  parallel_for(size_t(height), 4, [&](size_t begin, size_t end) {
+    for (size_t row = begin; row < end; ++row) {
+      double top = std::cos(pi_d * double(row) / height), bottom = std::cos(pi_d * double(row + 1) / height);
+      for (int x = 0; x < width; ++x) {
+        glm::dvec3 sum(0);
+        for (int j = 0; j < supersample; ++j) {
+          double c = top + (bottom - top) * (j + 0.5) / supersample, s = std::sqrt(std::max(0.0, 1 - c * c));
+          for (int i = 0; i < supersample; ++i) {
+            double phi = 2 * pi_d * ((x + (i + 0.5) / supersample) / width - 0.5);
+            sum += glm::dvec3(radiance(env, inverse * Vec3(s * std::cos(phi), c, s * std::sin(phi))));
+          }
+        }
+        out.image.at(x, int(row)) = Vec3(sum / double(supersample * supersample));
+      }
+    }
+  });
+  return out;
+}
+
+Environment make_environment(std::string name, int width, int height, const std::function<Vec3(Vec3)>& f) {
+  LAMBENT_CHECK(width > 0 && height > 0);
+  Environment env;
+  env.name = std::move(name), env.image = Image(width, height);
+  for (int y = 0; y < height; ++y)
+    for (int x = 0; x < width; ++x) env.image.at(x, y) = f(texel_direction(x, y, width, height));
+  return env;
+}
+
+Vec3 irradiance(const Environment& env, Vec3 n) {
+  int width = env.image.width, height = env.image.height;
+  // Integral of cos(phi) or sin(phi) over a column: its centre's value times this.
+  double column = 2 * std::sin(pi_d / width);
+  std::vector<glm::dvec2> columns;
+  for (int x = 0; x < width; ++x) {
+    double phi = 2 * pi_d * ((x + 0.5) / width - 0.5);
+    columns.push_back(column * glm::dvec2(std::cos(phi), std::sin(phi)));
+  }
+  glm::dvec3 sum(0);
+  for (int y = 0; y < height; ++y) {
+    glm::dvec2 moments = row_moments(y, height);
+    double vertical = 2 * pi_d / width * moments.y * double(n.y);
+    for (int x = 0; x < width; ++x) {
+      const glm::dvec2& c = columns[size_t(x)];
+      double cosine = vertical + moments.x * (double(n.x) * c.x + double(n.z) * c.y);
+      if (cosine > 0) sum += cosine * glm::dvec3(env.image.at(x, y));
+    }
+  }
+  return Vec3(sum);
+}
+
+}  // namespace lambent
