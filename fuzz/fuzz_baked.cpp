@@ -1,0 +1,29 @@
+// The baked-file reader on hostile bytes: whatever it accepts must be safe to relight.
+#include <lambent/baked/baked_file.h>
+#include <lambent/relight/relight.h>
+
+#include <sys/mman.h>
+#include <unistd.h>
+
+#include <string>
+
+extern "C" int LLVMFuzzerTestOneInput(const uint8_t* data, size_t size) {
+  // The reader maps files: hand it one in memory.
+  static const int memory = ::memfd_create("baked", 0);
+  static const std::string path = "/proc/self/fd/" + std::to_string(memory);
+  if (::ftruncate(memory, 0) != 0 || ::pwrite(memory, data, size, 0) != ssize_t(size)) return 0;
+  auto file = lambent::MappedFile::open(path);
+  if (!file) return 0;
+  auto baked = lambent::load_baked(*file, "fuzz.glb");
+  if (!baked) return 0;
+  const std::vector<lambent::Vec3> light(baked->transfer.coefficients(), lambent::Vec3(0.5f));
+  lambent::Relit relit;
+  lambent::relight(baked->transfer, light, relit);
+  float sum = 0;
+  for (const auto* map : {&baked->front, &baked->back})
+    for (uint32_t r : *map)
+      if (r != lambent::none) sum += relit.at(r).x;
+  volatile float used = sum;
+  (void)used;
+  return 0;
+}

@@ -1,0 +1,208 @@
+#include <lambent/scene/clean.h>
+#include <lambent/scene/procedural.h>
+
+#include <gtest/gtest.h>
+
+#include "test_meshes.h"
+
+namespace lambent {
+namespace {
+
+using test::bare_cube;
+using test::broken_invariant;
+
+TEST(MakeNormals, SplitsACubeIntoFaces) {
+  for (bool flat : {false, true}) {
+    Scene s = bare_cube();
+    make_normals(s, 0, flat);
+    EXPECT_EQ(broken_invariant(s), "");
+    EXPECT_EQ(s.positions.size(), 24u);  // four corners a face
+    EXPECT_EQ(s.triangles.size(), 12u);
+    for (const Triangle& t : s.triangles)
+      for (uint32_t v : t.v) EXPECT_EQ(s.normals[v], glm::normalize(area_normal(s, t)));
+    ASSERT_EQ(s.parts[0].source.size(), 24u);
+    EXPECT_TRUE(s.parts[0].changed);
+    Scene before = bare_cube();
+    for (uint32_t v = 0; v < 24; ++v) {
+      EXPECT_EQ(s.positions[v], before.positions[s.parts[0].source[v]]);
+    }
+    for (uint32_t v = 0; v < 8; ++v) EXPECT_EQ(s.parts[0].source[v], v);
+  }
+}
+
+TEST(MakeNormals, SmoothSphereIsNearlyRadial) {
+  // Facets of a level-4 icosphere subtend about 4 degrees; angle-weighted means of nearly regular fans err far less.
+  constexpr float least_cosine = 0.9999f;
+  Scene s = make_sphere(2.5f, 4, Vec3(0.5f));
+  size_t count = s.positions.size();
+  s.normals.assign(count, Vec3(0));
+  make_normals(s, 0, false);
+  EXPECT_EQ(s.positions.size(), count);
+  for (size_t v = 0; v < count; ++v) EXPECT_GT(glm::dot(s.normals[v], glm::normalize(s.positions[v])), least_cosine);
+}
+
+TEST(MakeNormals, JoinsSeamsAndIsTheSameWithoutIndices) {
+  constexpr float rounding = 1e-6f;
+  Scene shared = make_sphere(1, 3, Vec3(0.5f)), loose = shared;
+  loose.positions.clear();
+  for (Triangle& t : loose.triangles) {
+    for (uint32_t& v : t.v) {
+      loose.positions.push_back(shared.positions[v]);
+      v = uint32_t(loose.positions.size() - 1);
+    }
+  }
+  loose.normals.assign(loose.positions.size(), Vec3(0));
+  loose.parts[0].vertex_count = uint32_t(loose.positions.size());
+  make_normals(shared, 0, false), make_normals(loose, 0, false);
+  EXPECT_EQ(broken_invariant(loose), "");
+  ASSERT_EQ(loose.positions.size(), 3 * loose.triangles.size());
+  for (size_t t = 0; t < shared.triangles.size(); ++t) {
+    for (int k = 0; k < 3; ++k) {
+      EXPECT_LT(glm::distance(shared.normals[shared.triangles[t].v[k]], loose.normals[loose.triangles[t].v[k]]), rounding);
+    }
+  }
+}
+
+TEST(MakeNormals, WeightsByCornerAngle) {
+  // A cube's corner, smoothed by hand: each face counts pi/2 however it is triangulated, so the mean is the diagonal.
+  constexpr float rounding = 1e-6f;
+  Scene s = bare_cube();
+  s.normals.assign(8, Vec3(0));
+  repair_normals(s);
+  for (int v = 0; v < 8; ++v) EXPECT_LT(glm::distance(s.normals[size_t(v)], glm::normalize(s.positions[size_t(v)])), rounding);
+}
+
+TEST(MakeNormals, ManyFacesOnOneEdge) {
+  // Sheets about the y axis, all wound alike. Neighbours 30 degrees apart join into one group; 120 apart they do not.
+  for (auto [sheets, groups] : {std::pair{12u, 1u}, std::pair{3u, 3u}}) {
+    Scene s;
+    s.materials.resize(1);
+    s.positions = {{0, 0, 0}, {0, 1, 0}};
+    for (uint32_t k = 0; k < sheets; ++k) {
+      float turn = 2 * pi * float(k) / float(sheets);
+      s.positions.push_back({std::cos(turn), 0, std::sin(turn)});
+      s.triangles.push_back({{0, 1, 2 + k}, 0, true});
+    }
+    s.parts.emplace_back();
+    s.parts[0].vertex_count = uint32_t(s.positions.size()), s.parts[0].triangle_count = sheets;
+    size_t before = s.positions.size();
+    make_normals(s, 0, false);
+    EXPECT_EQ(broken_invariant(s), "");
+    EXPECT_EQ(s.positions.size(), before + 2 * (groups - 1));
+  }
+}
+
+TEST(MakeNormals, MovesLaterParts) {
+  Scene s = bare_cube();
+  Scene ball = make_sphere(0.5f, 1, Vec3(0.5f));
+  test::append(s, ball);
+  test::append(s, bare_cube());
+  s.colors.resize(s.positions.size());
+  s.texcoords[1].resize(s.positions.size());
+  for (size_t v = 0; v < s.positions.size(); ++v) s.colors[v] = s.positions[v], s.texcoords[1][v] = Vec2(s.positions[v]);
+  const size_t bare[] = {0, 2};
+  make_normals(s, bare, false);
+  EXPECT_EQ(broken_invariant(s), "");
+  EXPECT_EQ(s.positions.size(), 24 + ball.positions.size() + 24);
+  EXPECT_EQ(s.colors, s.positions);  // attributes went with their vertices
+  for (size_t v = 0; v < s.positions.size(); ++v) EXPECT_EQ(s.texcoords[1][v], Vec2(s.positions[v]));
+  for (size_t v = 0; v < ball.positions.size(); ++v) {
+    EXPECT_EQ(s.positions[24 + v], ball.positions[v]);
+    EXPECT_EQ(s.normals[24 + v], ball.normals[v]);
+  }
+  EXPECT_FALSE(s.parts[1].changed);
+  EXPECT_TRUE(s.parts[2].changed);
+}
+
+TEST(MakeNormals, TrianglesWithoutAreaCountForNothing) {
+  Scene s = make_quad({0, 0, 0}, {1, 0, 0}, {0, 1, 0}, 1, 1, Vec3(0.5f));
+  s.positions.push_back({2, 0, 0}), s.normals.push_back(Vec3(0));
+  s.parts[0].vertex_count = 5;
+  s.triangles.push_back({{0, 1, 4}, 0, false});  // three points of a line
+  s.parts[0].triangle_count = 3;
+  make_normals(s, 0, false);
+  EXPECT_EQ(broken_invariant(s), "");
+  EXPECT_EQ(s.positions.size(), 5u);
+  for (size_t v = 0; v < 4; ++v) EXPECT_EQ(s.normals[v], Vec3(0, 0, 1));
+  EXPECT_EQ(s.normals[4], Vec3(0, 1, 0));
+}
+
+TEST(RepairNormals, ReplacesTheBrokenAndScalesTheRest) {
+  Scene s = make_quad({0, 0, 0}, {1, 0, 0}, {0, 1, 0}, 2, 2, Vec3(0.5f));
+  const Vec3 tilted = glm::normalize(Vec3(0.1f, 0.2f, 1));
+  s.normals[0] = Vec3(0), s.normals[1] = Vec3(NAN, 0, 1), s.normals[2] = Vec3(1e-40f, 0, 0), s.normals[3] = Vec3(INFINITY, 0, 0);
+  s.normals[4] = 3.0f * tilted, s.normals[5] = tilted;
+  repair_normals(s);
+  for (size_t v : {0, 1, 2, 3}) EXPECT_EQ(s.normals[v], Vec3(0, 0, 1));
+  constexpr float rounding = 1e-6f;
+  EXPECT_LT(glm::distance(s.normals[4], tilted), rounding);
+  EXPECT_EQ(s.normals[5], tilted);  // unit already: kept bit for bit
+  EXPECT_TRUE(s.parts[0].changed);
+  EXPECT_EQ(s.parts[0].source.size(), 9u);
+}
+
+TEST(MergeDuplicates, DropsRepeatsAndMarksOpposites) {
+  Scene s = make_quad({0, 0, 0}, {1, 0, 0}, {0, 1, 0}, 1, 1, Vec3(0.5f));
+  Scene repeat = s, back = s, other = make_quad({5, 0, 0}, {1, 0, 0}, {0, 1, 0}, 1, 1, Vec3(0.5f));
+  for (Triangle& t : repeat.triangles) std::rotate(t.v, t.v + 1, t.v + 3);  // the same triangle, begun elsewhere
+  for (Triangle& t : back.triangles) std::swap(t.v[0], t.v[1]);
+  back.triangles.pop_back(), back.parts[0].triangle_count = 1;
+  test::append(s, repeat), test::append(s, other), test::append(s, back);
+  merge_duplicate_triangles(s);
+  EXPECT_EQ(broken_invariant(s), "");
+  ASSERT_EQ(s.triangles.size(), 5u);
+  EXPECT_EQ(s.parts[1].triangle_count, 0u);
+  EXPECT_TRUE(s.parts[1].changed);
+  EXPECT_EQ(s.parts[1].source.size(), 4u);
+  EXPECT_FALSE(s.parts[0].changed);
+  EXPECT_TRUE(s.triangles[0].two_sided);   // has the opposite
+  EXPECT_FALSE(s.triangles[1].two_sided);  // has not
+  EXPECT_FALSE(s.triangles[2].two_sided);
+  EXPECT_TRUE(s.triangles[4].two_sided);
+}
+
+TEST(InferSidedness, ClosedAndOutwardIsOneSided) {
+  Scene cube = bare_cube();
+  infer_sidedness(cube);
+  EXPECT_EQ(test::two_sided_count(cube), 0u);
+
+  Scene inward = bare_cube();
+  for (Triangle& t : inward.triangles) std::swap(t.v[1], t.v[2]);
+  infer_sidedness(inward);
+  EXPECT_EQ(test::two_sided_count(inward), 12u);
+
+  Scene open = bare_cube();
+  open.triangles.pop_back(), open.parts[0].triangle_count = 11;
+  infer_sidedness(open);
+  EXPECT_EQ(test::two_sided_count(open), 11u);
+
+  Scene quad = make_quad({0, 0, 0}, {1, 0, 0}, {0, 1, 0}, 3, 3, Vec3(0.5f));
+  infer_sidedness(quad);
+  EXPECT_EQ(test::two_sided_count(quad), quad.triangles.size());
+}
+
+TEST(InferSidedness, LooksAtComponentsAndJoinsSeams) {
+  Scene s;
+  add_box(s, add_material(s, "a", Vec3(0.5f)), "six loose faces", {10, 0, 0}, {11, 1, 1}, 3);
+  add_quad(s, 0, "open", {0, 0, 0}, {1, 0, 0}, {0, 1, 0}, 1, 1);
+  infer_sidedness(s);
+  for (const Triangle& t : s.triangles) EXPECT_EQ(t.two_sided, t.part == 1);
+}
+
+TEST(InferSidedness, FlatDoubledSheetHoldsNoVolume) {
+  Scene s = make_quad({0.1f, 0.2f, 0.3f}, {1, 0.7f, 0}, {0, 1, 0.9f}, 5, 5, Vec3(0.5f)), back = s;
+  for (Triangle& t : back.triangles) std::swap(t.v[0], t.v[1]);
+  test::append(s, back);
+  infer_sidedness(s);
+  EXPECT_EQ(test::two_sided_count(s), s.triangles.size());
+}
+
+TEST(NumberPositions, JoinsEqualOnesInOrder) {
+  const Vec3 p[] = {{1, 2, 3}, {0, 0, 0}, {1, 2, 3}, {-0.0f, 0, -0.0f}, {1, 2, 3.0000002f}};
+  PositionIds ids = number_positions(p);
+  EXPECT_EQ(ids.count, 3u);
+  EXPECT_EQ(ids.ids, (std::vector<uint32_t>{0, 1, 0, 1, 2}));
+}
+
+}  // namespace
+}  // namespace lambent

@@ -1,0 +1,196 @@
+// glTF 2.0 specification (ISO/IEC 12113), sections 3.8 and 3.9; KHR_texture_transform, KHR_materials_emissive_strength,
+// KHR_materials_pbrSpecularGlossiness.
+#include <lambent/scene/gltf_materials.h>
+
+#include <lambent/scene/gltf_container.h>
+#include <lambent/scene/textures.h>
+
+#include <map>
+#include <tuple>
+
+namespace lambent {
+
+using Json = nlohmann::json;
+
+namespace {
+
+const Json* read_extension(GltfCheck& check, const Json& parent, const char* name, const GltfWhere& where) {
+  const Json* extensions = check.object(parent, "extensions", where);
+  return extensions ? check.object(*extensions, name, where) : nullptr;
+}
+
+// `key` names a texture reference, a textureInfo of the specification.
+void read_texture_reference(GltfCheck& check, const Json& parent, const char* key, size_t texture_count, const GltfWhere& where,
+                            GltfMaterial& out) {
+  const Json* info = check.object(parent, key, where);
+  if (!info) return;
+  out.texture = check.index(*info, "index", texture_count, where);
+  if (check.ok() && !out.texture) check.fail(where, std::string(key) + " names no texture");
+  out.texcoord_set = check.integer(*info, "texCoord", 0, UINT32_MAX, where);
+  const Json* transform = read_extension(check, *info, "KHR_texture_transform", where);
+  if (!transform) return;
+  out.texcoord_set = check.integer(*transform, "texCoord", out.texcoord_set, UINT32_MAX, where);
+  double offset[2] = {0, 0}, scale[2] = {1, 1};
+  check.numbers(*transform, "offset", offset, where);
+  check.numbers(*transform, "scale", scale, where);
+  double angle = check.number(*transform, "rotation", 0, where), c = std::cos(angle), s = std::sin(angle);
+  // Counter-clockwise as seen with v pointing down.
+  out.material.uv_transform = {float(c * scale[0]),  float(s * scale[1]), float(offset[0]),
+                               float(-s * scale[0]), float(c * scale[1]), float(offset[1])};
+}
+
+Vec3 read_color(GltfCheck& check, const Json& parent, const char* key, const GltfWhere& where) {
+  double rgba[4] = {1, 1, 1, 1};
+  check.numbers(parent, key, rgba, where);
+  return {float(std::clamp(rgba[0], 0.0, 1.0)), float(std::clamp(rgba[1], 0.0, 1.0)), float(std::clamp(rgba[2], 0.0, 1.0))};
+}
+
+float read_share(GltfCheck& check, const Json& parent, const char* key, const GltfWhere& where) {
+  return float(std::clamp(check.number(parent, key, 1, where), 0.0, 1.0));
+}
+
+GltfMaterial read_material(GltfCheck& check, const Json& json, size_t texture_count, const GltfWhere& where) {
+  GltfMaterial out;
+  Material& m = out.material;
+  m.name = check.text(json, "name", where);
+  m.double_sided = check.boolean(json, "doubleSided", false, where);
+  std::string alpha = check.text(json, "alphaMode", where);
+  out.opaque = alpha.empty() || alpha == "OPAQUE";
+  if (const Json* gloss = read_extension(check, json, "KHR_materials_pbrSpecularGlossiness", where)) {
+    m.base_color = read_color(check, *gloss, "diffuseFactor", where);
+    m.metallic = 0.0f;
+    m.roughness = 1.0f - read_share(check, *gloss, "glossinessFactor", where);
+    read_texture_reference(check, *gloss, "diffuseTexture", texture_count, where, out);
+  } else if (const Json* pbr = check.object(json, "pbrMetallicRoughness", where)) {
+    m.base_color = read_color(check, *pbr, "baseColorFactor", where);
+    m.metallic = read_share(check, *pbr, "metallicFactor", where);
+    m.roughness = read_share(check, *pbr, "roughnessFactor", where);
+    read_texture_reference(check, *pbr, "baseColorTexture", texture_count, where, out);
+  }
+  double factor[3] = {0, 0, 0}, strength = 1;
+  check.numbers(json, "emissiveFactor", factor, where);
+  if (const Json* extension = read_extension(check, json, "KHR_materials_emissive_strength", where)) {
+    strength = check.number(*extension, "emissiveStrength", 1, where);
+  }
+  out.emissive_texture = check.object(json, "emissiveTexture", where) != nullptr;
+  constexpr double brightest = 1e30;  // keeps the float finite
+  for (int c = 0; c < 3; ++c) {
+    m.emissive[c] = out.emissive_texture ? 0.0f : float(std::clamp(factor[c] * strength, 0.0, brightest));
+  }
+  return out;
+}
+
+Wrap read_wrap(GltfCheck& check, const Json& sampler, const char* key, const GltfWhere& where) {
+  constexpr uint64_t repeat = 10497, clamp = 33071, mirror = 33648;
+  uint64_t mode = check.integer(sampler, key, repeat, 1 << 16, where);
+  if (mode != repeat && mode != clamp && mode != mirror) check.fail(where, std::string(key) + " does not exist");
+  return mode == clamp ? Wrap::clamp : mode == mirror ? Wrap::mirror : Wrap::repeat;
+}
+
+std::span<const uint8_t> image_bytes(GltfCheck& check, const GltfDocument& document, size_t image, const GltfWhere& where) {
+  const Json& json = gltf_item(document.json, "images", image);
+  auto view = check.index(json, "bufferView", gltf_count(document.json, "bufferViews"), where);
+  if (!check.ok()) return {};
+  return view ? read_buffer_view(check, document, *view, nullptr) : document.images[image];
+}
+
+// Decoded images: those of the same bytes and wrap modes are one texture.
+class TextureReader {
+ public:
+  TextureReader(GltfCheck& check, GltfDocument& document, const std::vector<std::string>& image_problems, Scene& scene)
+      : check_(check), document_(document), problems_(image_problems), scene_(scene) {}
+
+  // The number in scene.textures of a glTF texture, -1 on failure.
+  int read(size_t index) {
+    GltfWhere where{"texture", index};
+    const Json& texture = gltf_item(document_.json, "textures", index);
+    Wrap wrap_s = Wrap::repeat, wrap_t = Wrap::repeat;
+    if (auto sampler = check_.index(texture, "sampler", gltf_count(document_.json, "samplers"), where)) {
+      const Json& json = gltf_item(document_.json, "samplers", *sampler);
+      wrap_s = read_wrap(check_, json, "wrapS", {"sampler", *sampler});
+      wrap_t = read_wrap(check_, json, "wrapT", {"sampler", *sampler});
+    }
+    auto image = check_.index(texture, "source", gltf_count(document_.json, "images"), where);
+    if (check_.ok() && !image) check_.fail(where, "has no PNG or JPEG image");
+    if (!check_.ok()) return -1;
+
+    GltfWhere image_where{"image", *image};
+    if (!problems_[*image].empty()) check_.fail(image_where, problems_[*image]);
+    std::span<const uint8_t> bytes = image_bytes(check_, document_, *image, image_where);
+    const Json& json = gltf_item(document_.json, "images", *image);
+    std::string name = check_.text(json, "name", image_where), uri = check_.text(json, "uri", image_where);
+    if (name.empty()) name = uri;
+    if (!check_.ok()) return -1;
+
+    auto [place, is_new] = known_.try_emplace({bytes.data(), bytes.size(), wrap_s, wrap_t}, int(scene_.textures.size()));
+    if (!is_new) return place->second;
+    Texture decoded;
+    auto twin = decoded_.find({bytes.data(), bytes.size()});
+    if (twin != decoded_.end()) {
+      decoded = scene_.textures[size_t(twin->second)];
+    } else if (auto result = decode_texture(bytes, "", decoded); !result) {
+      check_.fail(image_where, (name.empty() ? "" : in_quotes(name) + " ") + result.error().message);
+      return -1;
+    }
+    pixels_ += uint64_t(decoded.width) * uint64_t(decoded.height);
+    if (pixels_ > max_pixels) {
+      check_.fail(image_where, "the scene's base colour images have more than " + std::to_string(max_pixels) + " pixels");
+      return -1;
+    }
+    decoded_.try_emplace({bytes.data(), bytes.size()}, place->second);
+    decoded.name = name, decoded.wrap_s = wrap_s, decoded.wrap_t = wrap_t;
+    scene_.textures.push_back(std::move(decoded));
+    document_.textures.push_back(int(index));
+    return place->second;
+  }
+
+ private:
+  static constexpr uint64_t max_pixels = uint64_t{1} << 30;
+  using Bytes = std::pair<const uint8_t*, size_t>;
+  GltfCheck& check_;
+  GltfDocument& document_;
+  const std::vector<std::string>& problems_;
+  Scene& scene_;
+  std::map<std::tuple<const uint8_t*, size_t, Wrap, Wrap>, int> known_;
+  std::map<Bytes, int> decoded_;
+  uint64_t pixels_ = 0;
+};
+
+void warn_count(Scene& scene, size_t count, const char* one, const char* many) {
+  if (count) scene.warnings.push_back(std::to_string(count) + (count == 1 ? one : many));
+}
+
+}  // namespace
+
+std::vector<GltfMaterial> read_materials(GltfCheck& check, const GltfDocument& document) {
+  std::vector<GltfMaterial> materials;
+  const size_t count = gltf_count(document.json, "materials"), textures = gltf_count(document.json, "textures");
+  for (size_t i = 0; i < count && check.ok(); ++i) {
+    materials.push_back(read_material(check, gltf_item(document.json, "materials", i), textures, {"material", i}));
+  }
+  return materials;
+}
+
+bool read_textures(GltfCheck& check, GltfDocument& document, const std::vector<GltfMaterial>& materials,
+                   const std::vector<bool>& used, const std::vector<std::string>& image_problems, Scene& scene) {
+  TextureReader reader(check, document, image_problems, scene);
+  size_t translucent = 0, glowing = 0;
+  for (size_t i = 0; i < materials.size(); ++i) {
+    if (!used[i]) continue;
+    translucent += !materials[i].opaque, glowing += materials[i].emissive_texture;
+    if (!materials[i].texture) continue;
+    if (materials[i].texcoord_set > 1) {
+      return check.fail({"material", i}, "its base colour reads TEXCOORD_" + std::to_string(materials[i].texcoord_set) +
+                                             "; only sets 0 and 1 are supported");
+    }
+    scene.materials[i].texcoord_set = int(materials[i].texcoord_set);
+    scene.materials[i].base_color_texture = reader.read(*materials[i].texture);
+    if (!check.ok()) return false;
+  }
+  warn_count(scene, translucent, " material with alpha is treated as opaque", " materials with alpha are treated as opaque");
+  warn_count(scene, glowing, " material has an emissive texture, which is not read",
+             " materials have emissive textures, which are not read");
+  return true;
+}
+
+}  // namespace lambent

@@ -1,0 +1,42 @@
+#pragma once
+// Building and writing of a GLB: JSON, and binary data that is gathered by reference.
+#include <lambent/scene/gltf_read.h>
+
+namespace lambent {
+
+class GlbWriter {
+ public:
+  using Json = nlohmann::json;
+  Json json = Json::object();
+
+  // A top-level array, made where absent; and the number of an item appended to it.
+  Json& list(const char* key);
+  size_t push(const char* key, Json item);
+  void use_extension(const char* name);
+
+  // Places bytes, which must outlive write(), in the binary chunk, at a multiple of `alignment` in the file; gives their offset.
+  size_t append(std::span<const uint8_t> bytes, size_t alignment);
+  // The same for bytes that the writer keeps.
+  std::span<const uint8_t> keep(std::vector<uint8_t> bytes);
+  size_t add_view(std::span<const uint8_t> bytes, size_t alignment);
+
+  // Accessors of fresh vertex data and indices.
+  size_t add_vectors(std::span<const float> values, int components, bool with_bounds);
+  size_t add_indices(std::span<const uint32_t> indices);
+  // Elements source[0], source[1], ... of an accessor, in its own type; `json` is its description in the document.
+  size_t add_copy(const GltfAccessor& from, const Json& json, std::span<const uint32_t> source);
+
+  size_t size() const { return size_; }  // of the binary chunk
+  Result<void> write(const std::string& path) const;
+
+ private:
+  struct Piece {
+    size_t offset;
+    std::span<const uint8_t> bytes;
+  };
+  std::vector<Piece> pieces_;
+  std::deque<std::vector<uint8_t>> kept_;
+  size_t size_ = 0, alignment_ = 64;
+};
+
+}  // namespace lambent

@@ -1,0 +1,452 @@
+// glTF 2.0 specification (ISO/IEC 12113): the writer. KHR_texture_transform, KHR_materials_emissive_strength.
+#include <lambent/core/check.h>
+#include <lambent/scene/gltf.h>
+#include <lambent/scene/gltf_write.h>
+#include <lambent/scene/textures.h>
+
+#include <map>
+#include <numeric>
+
+namespace lambent {
+
+using Json = nlohmann::json;
+
+namespace {
+
+Json json_of(Vec3 v) { return Json::array({v.x, v.y, v.z}); }
+
+// A member of JSON that nobody may have checked; nullopt where it is no integer in [0, limit).
+std::optional<size_t> whole_number(const Json& parent, const char* key, size_t limit) {
+  GltfCheck check("");
+  return parent.is_object() ? check.index(parent, key, limit, {}) : std::nullopt;
+}
+
+float finite_or(float x, float fallback) { return std::isfinite(x) ? x : fallback; }
+
+// Materials and textures that the document does not have.
+class MaterialWriter {
+ public:
+  MaterialWriter(GlbWriter& out, const Scene& scene, const std::string& path) : out_(out), scene_(scene), path_(path) {}
+
+  // The glTF number of a scene's material, in a one-sided and a two-sided edition.
+  Result<size_t> add(uint32_t index, bool two_sided) {
+    auto known = materials_.find({index, two_sided});
+    if (known != materials_.end()) return known->second;
+    const Material& m = scene_.materials[index];
+    Vec3 base = glm::clamp(Vec3(finite_or(m.base_color.x, 0), finite_or(m.base_color.y, 0), finite_or(m.base_color.z, 0)),
+                           Vec3(0.0f), Vec3(1.0f));
+    Json pbr = {{"baseColorFactor", Json::array({base.x, base.y, base.z, 1.0f})},
+                {"metallicFactor", std::clamp(finite_or(m.metallic, 1), 0.0f, 1.0f)},
+                {"roughnessFactor", std::clamp(finite_or(m.roughness, 1), 0.0f, 1.0f)}};
+    if (m.base_color_texture >= 0) {
+      auto texture = add_texture(size_t(m.base_color_texture));
+      if (!texture) return texture.error();
+      pbr["baseColorTexture"] = texture_reference(m, *texture);
+    }
+    Json json = {{"pbrMetallicRoughness", std::move(pbr)}, {"doubleSided", two_sided}};
+    if (!m.name.empty()) json["name"] = m.name;
+    add_emission(json, m.emissive);
+    return materials_[{index, two_sided}] = out_.push("materials", std::move(json));
+  }
+
+ private:
+  void add_emission(Json& json, Vec3 emissive) {
+    float brightest = std::max({emissive.x, emissive.y, emissive.z});
+    if (!is_finite(emissive) || !(brightest > 0)) return;
+    emissive = glm::max(emissive, Vec3(0.0f));
+    if (brightest > 1) {
+      float strength = std::exp2(std::ceil(std::log2(brightest)));  // a power of two divides without rounding
+      emissive /= strength;
+      json["extensions"]["KHR_materials_emissive_strength"]["emissiveStrength"] = strength;
+      out_.use_extension("KHR_materials_emissive_strength");
+    }
+    json["emissiveFactor"] = json_of(emissive);
+  }
+
+  Json texture_reference(const Material& m, size_t texture) {
+    Json info = {{"index", texture}, {"texCoord", m.texcoord_set}};
+    const std::array<float, 6>& t = m.uv_transform;
+    if (t != Material{}.uv_transform) {
+      // uv' = rotation(angle) diag(scale) uv + offset; there is no shear to express.
+      double scale_u = std::hypot(t[0], t[3]), angle = std::atan2(-double(t[3]), t[0]);
+      double scale_v = t[1] * std::sin(angle) + t[4] * std::cos(angle);
+      info["extensions"]["KHR_texture_transform"] = {
+          {"offset", {t[2], t[5]}}, {"rotation", angle}, {"scale", {scale_u, scale_v}}};
+      out_.use_extension("KHR_texture_transform");
+    }
+    return info;
+  }
+
+  Result<size_t> add_texture(size_t index) {
+    if (scene_.document && index < scene_.document->textures.size()) return size_t(scene_.document->textures[index]);
+    auto known = textures_.find(index);
+    if (known != textures_.end()) return known->second;
+    const Texture& texture = scene_.textures[index];
+    if (texture.encoded.empty()) return Error{path_, "texture \"" + texture.name + "\" has no encoded image to write"};
+    auto [image, is_new] = images_.try_emplace(content_hash(texture.encoded), 0);
+    if (is_new) {
+      Json json = {{"bufferView", out_.add_view(texture.encoded, 4)}, {"mimeType", texture.mime_type}};
+      if (!texture.name.empty()) json["name"] = texture.name;
+      image->second = out_.push("images", std::move(json));
+    }
+    Json sampler = {{"wrapS", wrap_number(texture.wrap_s)}, {"wrapT", wrap_number(texture.wrap_t)}};
+    Json& samplers = out_.list("samplers");
+    size_t s = size_t(std::find(samplers.begin(), samplers.end(), sampler) - samplers.begin());
+    if (s == samplers.size()) samplers.push_back(sampler);
+    return textures_[index] = out_.push("textures", {{"source", image->second}, {"sampler", s}});
+  }
+
+  static int wrap_number(Wrap wrap) { return wrap == Wrap::clamp ? 33071 : wrap == Wrap::mirror ? 33648 : 10497; }
+
+  GlbWriter& out_;
+  const Scene& scene_;
+  const std::string& path_;
+  std::map<std::pair<uint32_t, bool>, size_t> materials_;
+  std::map<size_t, size_t> textures_;
+  std::map<std::string, size_t> images_;
+};
+
+glm::dmat3 linear_part(const glm::dmat4& m) { return glm::dmat3(m); }
+
+// Takes a unit normal of the world back into the frame that `m` leads out of.
+Vec3 local_normal(const glm::dmat4& m, Vec3 world) {
+  glm::dvec3 n = glm::transpose(linear_part(m)) * glm::dvec3(world);
+  double length = glm::length(n);
+  return length > 0 && std::isfinite(length) ? Vec3(n / length) : world;
+}
+
+std::span<const float> floats(const std::vector<Vec3>& v) { return {v.empty() ? nullptr : &v[0].x, v.size() * 3}; }
+std::span<const float> floats(const std::vector<Vec2>& v) { return {v.empty() ? nullptr : &v[0].x, v.size() * 2}; }
+
+size_t add_triangles(GlbWriter& out, const Scene& scene, const Part& part, bool mirrored) {
+  std::vector<uint32_t> indices;
+  indices.reserve(size_t(part.triangle_count) * 3);
+  for (size_t t = 0; t < part.triangle_count; ++t) {
+    const uint32_t* v = scene.triangles[part.first_triangle + t].v;
+    for (int k : {0, mirrored ? 2 : 1, mirrored ? 1 : 2}) indices.push_back(v[k] - part.first_vertex);
+  }
+  if (indices.empty()) indices.assign(3, 0);  // accessors may not be empty; a point is drawn by nobody
+  return out.add_indices(indices);
+}
+
+// Replaces the geometry of `primitive` by the part's as it stands in the world, in the frame that `frame` leads out of.
+// Attributes are written where they say something, or where the primitive had them before.
+void write_geometry(GlbWriter& out, const Scene& scene, const Part& part, const glm::dmat4& frame, Json& primitive) {
+  const Json before = primitive.contains("attributes") ? primitive["attributes"] : Json::object();
+  const glm::dmat4 inverse = glm::inverse(frame);
+  const bool is_identity = frame == glm::dmat4(1.0);
+  const size_t first = part.first_vertex, count = part.vertex_count;
+  std::vector<Vec3> positions(scene.positions.begin() + first, scene.positions.begin() + first + count);
+  std::vector<Vec3> normals(scene.normals.begin() + first, scene.normals.begin() + first + count);
+  if (!is_identity) {
+    for (Vec3& p : positions) p = Vec3(glm::dvec3(inverse * glm::dvec4(p, 1)));
+    for (Vec3& n : normals) n = local_normal(frame, n);
+  }
+  Json attributes = {{"POSITION", out.add_vectors(floats(positions), 3, true)},
+                     {"NORMAL", out.add_vectors(floats(normals), 3, false)}};
+  for (size_t set = 0; set < 2; ++set) {
+    if (scene.texcoords[set].empty()) continue;
+    const std::vector<Vec2> uv(scene.texcoords[set].begin() + first, scene.texcoords[set].begin() + first + count);
+    const std::string name = "TEXCOORD_" + std::to_string(set);
+    bool says = std::any_of(uv.begin(), uv.end(), [](Vec2 t) { return t != Vec2(0.0f); });
+    if (says || before.contains(name)) attributes[name] = out.add_vectors(floats(uv), 2, false);
+  }
+  if (!scene.colors.empty()) {
+    const std::vector<Vec3> colors(scene.colors.begin() + first, scene.colors.begin() + first + count);
+    bool says = std::any_of(colors.begin(), colors.end(), [](Vec3 c) { return c != Vec3(1.0f); });
+    if (says || before.contains("COLOR_0")) attributes["COLOR_0"] = out.add_vectors(floats(colors), 3, false);
+  }
+  primitive["attributes"] = std::move(attributes);
+  primitive["indices"] = add_triangles(out, scene, part, glm::determinant(linear_part(frame)) < 0);
+  primitive.erase("mode");
+}
+
+// The document part of the output: rewrites what changed in a copy of the document.
+class DocumentWriter {
+ public:
+  DocumentWriter(GlbWriter& out, const Scene& scene, GltfPlaces& places)
+      : out_(out), scene_(scene), document_(*scene.document), places_(places) {}
+
+  void embed_buffers() {
+    std::vector<size_t> starts;
+    for (std::span<const uint8_t> buffer : document_.buffers) starts.push_back(out_.append(buffer, buffer_alignment));
+    auto move = [&](Json& view) {
+      auto buffer = whole_number(view, "buffer", starts.size());
+      if (!buffer) return;
+      size_t offset = whole_number(view, "byteOffset", UINT32_MAX).value_or(0);
+      view["buffer"] = 0, view["byteOffset"] = starts[*buffer] + offset;
+    };
+    if (!out_.json.contains("bufferViews")) return;
+    for (Json& view : out_.list("bufferViews")) {
+      move(view);
+      auto extensions = view.find("extensions");  // compressed views have bytes of their own
+      if (extensions != view.end() && extensions->is_object()) {
+        for (Json& extension : *extensions) move(extension);
+      }
+    }
+  }
+
+  void embed_images() {
+    std::map<std::pair<const uint8_t*, size_t>, size_t> views;
+    for (size_t i = 0; i < document_.images.size(); ++i) {
+      std::span<const uint8_t> bytes = document_.images[i];
+      if (bytes.empty()) continue;
+      Json& image = out_.json["images"][i];
+      std::string type = image_mime_type(bytes);
+      auto told = image.find("mimeType");
+      if (type.empty() && told != image.end() && told->is_string()) type = told->get<std::string>();
+      if (type.empty()) type = "image/" + file_extension(image.value("uri", std::string()));
+      auto [view, is_new] = views.try_emplace({bytes.data(), bytes.size()}, 0);
+      if (is_new) view->second = out_.add_view(bytes, 4);
+      image.erase("uri");
+      image["mimeType"] = type, image["bufferView"] = view->second;
+    }
+  }
+
+  void rewrite_changed_parts() {
+    std::map<int, std::vector<size_t>> nodes;
+    bool any = false;
+    for (size_t p = 0; p < scene_.parts.size(); ++p) {
+      const Part& part = scene_.parts[p];
+      if (part.node < 0) continue;
+      nodes[part.node].push_back(p);
+      any = any || part.changed;
+    }
+    if (!any) return;
+    GltfCheck check("");
+    LAMBENT_CHECK(read_pose(check, document_, pose_));
+    users_.assign(gltf_count(document_.json, "meshes"), 0);
+    for (size_t n = 0; n < gltf_count(document_.json, "nodes"); ++n) {
+      if (auto mesh = mesh_of(n)) ++users_[*mesh];
+    }
+    for (const auto& [node, parts] : nodes) {
+      if (std::any_of(parts.begin(), parts.end(), [&](size_t p) { return scene_.parts[p].changed; })) {
+        rewrite_node(size_t(node), parts);
+      }
+    }
+  }
+
+ private:
+  static constexpr size_t buffer_alignment = 64;
+
+  std::optional<size_t> mesh_of(size_t node) const {
+    return whole_number(gltf_item(document_.json, "nodes", node), "mesh", gltf_count(document_.json, "meshes"));
+  }
+
+  void rewrite_node(size_t node, const std::vector<size_t>& parts) {
+    const std::optional<size_t> mesh_index = mesh_of(node);
+    LAMBENT_CHECK(mesh_index);
+    Json mesh = gltf_item(document_.json, "meshes", *mesh_index);
+    const bool new_vertices = std::any_of(parts.begin(), parts.end(), [&](size_t p) {
+      return scene_.parts[p].changed && scene_.parts[p].source.empty();
+    });
+    const bool skinned = gltf_item(document_.json, "nodes", node).contains("skin");
+    const bool morphs = std::any_of(mesh["primitives"].begin(), mesh["primitives"].end(), [](const Json& p) {
+      return p.contains("targets") && !p["targets"].empty();
+    });
+    // Vertices that are not the document's have no joints or morph targets to move by: the whole node gets its rest pose.
+    const glm::dmat4& world = pose_.world[node];
+    const double determinant = glm::determinant(linear_part(world));
+    const bool singular = determinant == 0 || !std::isfinite(1 / determinant);
+    const bool still = new_vertices && (skinned || morphs || singular);
+    const bool apart = new_vertices && (skinned || singular);  // then it stands in the world, on a node of its own
+    for (size_t p : parts) {
+      const Part& part = scene_.parts[p];
+      if (!part.changed && !still) continue;
+      Json& primitive = mesh["primitives"][size_t(part.primitive)];
+      auto extensions = primitive.find("extensions");
+      if (extensions != primitive.end() && extensions->is_object()) extensions->erase("KHR_draco_mesh_compression");
+      if (still || part.source.empty()) {
+        write_geometry(out_, scene_, part, apart ? glm::dmat4(1.0) : world, primitive);
+      } else {
+        copy_geometry(node, part, primitive);
+      }
+    }
+    if (still && morphs) {
+      for (Json& primitive : mesh["primitives"]) primitive.erase("targets");
+      mesh.erase("weights");
+      drop_weight_animations(node);
+    }
+    place_mesh(node, *mesh_index, std::move(mesh), apart, still, parts);
+  }
+
+  void place_mesh(size_t node, size_t mesh_index, Json mesh, bool apart, bool still, const std::vector<size_t>& parts) {
+    if (users_[mesh_index] == 1) {
+      out_.list("meshes")[mesh_index] = std::move(mesh);
+    } else {
+      --users_[mesh_index];
+      mesh_index = out_.push("meshes", std::move(mesh));
+    }
+    Json& json = out_.list("nodes")[node];
+    if (still) json.erase("weights");
+    if (!apart) {
+      json["mesh"] = mesh_index;
+      return;
+    }
+    Json fresh = {{"mesh", mesh_index}};
+    if (json.contains("name")) fresh["name"] = json["name"];
+    json.erase("mesh"), json.erase("skin");
+    int number = int(add_root(out_, std::move(fresh)));
+    for (size_t p : parts) places_.part_nodes[p] = number;
+  }
+
+  // Replaces the geometry of `primitive` by copies of its own vertices, element by element; only normals may be new.
+  void copy_geometry(size_t node, const Part& part, Json& primitive) {
+    LAMBENT_CHECK(part.source.size() == part.vertex_count);
+    GltfCheck check("");
+    const Json before = primitive["attributes"];
+    auto accessor = [&](const Json& holder, const char* key) {
+      size_t index = holder[key].get<size_t>();
+      return std::pair(read_accessor(check, document_, index), &gltf_item(document_.json, "accessors", index));
+    };
+    const size_t old_count = accessor(before, "POSITION").first.count;
+    for (uint32_t s : part.source) LAMBENT_CHECK(s < old_count);
+    GltfPlacement placement;
+    LAMBENT_CHECK(read_placement(check, document_, pose_, node, primitive, old_count, {}, placement));
+    const bool had_normals = before.contains("NORMAL");
+    // Where the document has no normals, what it says about tangents is void too.
+    auto is_void = [&](const std::string& name) { return !had_normals && (name == "NORMAL" || name == "TANGENT"); };
+
+    const GltfAccessor old_normals = had_normals ? accessor(before, "NORMAL").first : GltfAccessor{};
+    Json attributes = {{"NORMAL", copy_normals(part, placement, old_normals)}};
+    for (auto item = before.begin(); item != before.end(); ++item) {
+      if (item.key() == "NORMAL" || is_void(item.key())) continue;
+      auto [from, description] = accessor(before, item.key().c_str());
+      attributes[item.key()] = out_.add_copy(from, *description, part.source);
+    }
+    if (primitive.contains("targets")) {
+      for (Json& target : primitive["targets"]) {
+        Json copies = Json::object();
+        for (auto item = target.begin(); item != target.end(); ++item) {
+          if (is_void(item.key())) continue;
+          auto [from, description] = accessor(target, item.key().c_str());
+          copies[item.key()] = out_.add_copy(from, *description, part.source);
+        }
+        target = std::move(copies);
+      }
+    }
+    LAMBENT_CHECK(check.ok());
+    primitive["attributes"] = std::move(attributes);
+    primitive["indices"] = add_triangles(out_, scene_, part, placement.mirrored);
+    primitive.erase("mode");
+  }
+
+  // The document's normals where it has usable ones, else the scene's brought back to the part's own frame.
+  size_t copy_normals(const Part& part, const GltfPlacement& placement, const GltfAccessor& before) {
+    std::vector<Vec3> normals(part.vertex_count);
+    for (size_t i = 0; i < normals.size(); ++i) {
+      normals[i] = before.count ? Vec3(before.read3(part.source[i])) : Vec3(0.0f);
+      if (!(glm::dot(normals[i], normals[i]) > 0) || !is_finite(normals[i])) {
+        normals[i] = local_normal(placement.at(part.source[i]), scene_.normals[part.first_vertex + i]);
+      }
+    }
+    return out_.add_vectors(floats(normals), 3, false);
+  }
+
+  // Animations may not move weights of a node that has no morph targets.
+  void drop_weight_animations(size_t node) {
+    if (!out_.json.contains("animations")) return;
+    Json kept = Json::array();
+    for (Json& animation : out_.list("animations")) {
+      if (animation.contains("channels") && animation["channels"].is_array()) {
+        Json channels = Json::array();
+        for (const Json& channel : animation["channels"]) {
+          const Json target = channel.is_object() ? channel.value("target", Json()) : Json();
+          bool drops = target.is_object() && target.value("node", Json()) == node && target.value("path", Json()) == "weights";
+          if (!drops) channels.push_back(channel);
+        }
+        animation["channels"] = channels;
+        if (channels.empty()) continue;
+      }
+      kept.push_back(animation);
+    }
+    if (kept.empty()) {
+      out_.json.erase("animations");
+    } else {
+      out_.json["animations"] = std::move(kept);
+    }
+  }
+
+ public:
+  // Adds a node to the default scene, or, where there are no scenes, to the nodes, all of which then are shown.
+  static size_t add_root(GlbWriter& out, Json node) {
+    size_t number = out.push("nodes", std::move(node));
+    if (!out.json.contains("scenes") || out.json["scenes"].empty()) return number;
+    size_t scene = out.json.contains("scene") ? out.json["scene"].get<size_t>() : 0;
+    Json& roots = out.json["scenes"][scene]["nodes"];
+    if (!roots.is_array()) roots = Json::array();
+    roots.push_back(number);
+    return number;
+  }
+
+ private:
+  GlbWriter& out_;
+  const Scene& scene_;
+  const GltfDocument& document_;
+  GltfPlaces& places_;
+  GltfPose pose_;
+  std::vector<size_t> users_;  // nodes that show each mesh of the document
+};
+
+}  // namespace
+
+Result<void> save_glb(const std::string& path, const Scene& scene, std::span<const GltfBlob> blobs,
+                      const std::function<void(Json& document, const GltfPlaces& places)>& extend) {
+  GlbWriter out;
+  GltfPlaces places;
+  for (const Part& part : scene.parts) {
+    LAMBENT_CHECK(part.node < 0 || scene.document);
+    places.part_nodes.push_back(part.node), places.part_primitives.push_back(part.primitive);
+  }
+  size_t document_materials = 0;
+  if (scene.document) {
+    out.json = scene.document->json;
+    document_materials = gltf_count(out.json, "materials");
+    DocumentWriter document(out, scene, places);
+    document.embed_buffers();
+    document.embed_images();
+    document.rewrite_changed_parts();
+  } else {
+    out.json["asset"] = {{"version", "2.0"}, {"generator", "lambent"}};
+    out.json["scene"] = 0;
+    out.push("scenes", {{"nodes", Json::array()}});
+  }
+
+  MaterialWriter materials(out, scene, path);
+  for (size_t p = 0; p < scene.parts.size(); ++p) {
+    const Part& part = scene.parts[p];
+    if (part.node >= 0 || part.vertex_count == 0) continue;
+    Json primitive = Json::object();
+    write_geometry(out, scene, part, glm::dmat4(1.0), primitive);
+    if (part.material < document_materials) {
+      primitive["material"] = part.material;
+    } else {
+      auto first = scene.triangles.begin() + part.first_triangle;
+      bool two_sided = std::any_of(first, first + part.triangle_count, [](const Triangle& t) { return t.two_sided; });
+      auto material = materials.add(part.material, two_sided);
+      if (!material) return material.error();
+      primitive["material"] = *material;
+    }
+    Json mesh = {{"primitives", Json::array({std::move(primitive)})}}, node = Json::object();
+    if (!part.name.empty()) mesh["name"] = part.name, node["name"] = part.name;
+    node["mesh"] = out.push("meshes", std::move(mesh));
+    places.part_nodes[p] = int(DocumentWriter::add_root(out, std::move(node)));
+    places.part_primitives[p] = 0;
+  }
+
+  places.first_view = int(gltf_count(out.json, "bufferViews"));
+  for (const GltfBlob& blob : blobs) out.add_view(blob.bytes, blob.alignment);
+  // All binary data is in place: one buffer, which keeps what a lone original had to say about itself.
+  if (out.size() > 0) {
+    Json buffer = gltf_count(out.json, "buffers") == 1 ? out.json["buffers"][0] : Json::object();
+    buffer.erase("uri");
+    buffer["byteLength"] = out.size();
+    out.json["buffers"] = Json::array({std::move(buffer)});
+  } else {
+    out.json.erase("buffers");
+  }
+  if (extend) extend(out.json, places);
+  return out.write(path);
+}
+
+}  // namespace lambent

@@ -1,0 +1,104 @@
+#pragma once
+// ONE scene of plain structs and indices, flattened to world space in the rest pose. Loaders fill it, everything reads it.
+#include <lambent/core/result.h>
+#include <lambent/core/vec.h>
+
+#include <array>
+#include <cstdint>
+#include <memory>
+#include <string>
+#include <vector>
+
+namespace lambent {
+
+inline constexpr uint32_t none = 0xffffffffu;
+
+enum class Wrap : uint8_t { repeat, clamp, mirror };
+
+// A colour texture: kept encoded (PNG or JPEG) to be written back as it came, and decoded to sRGB bytes for look-ups.
+struct Texture {
+  std::string name;
+  std::string mime_type;         // "image/png" or "image/jpeg"
+  std::vector<uint8_t> encoded;  // may be empty for a scene whose document already holds the bytes
+  int width = 0, height = 0;
+  std::vector<uint8_t> rgb;  // width * height * 3, first row is v = 0 (glTF: the image's top row), sRGB-encoded
+  Wrap wrap_s = Wrap::repeat, wrap_t = Wrap::repeat;
+};
+
+// glTF metallic-roughness. The diffuse pipeline reads base colour alone.
+struct Material {
+  std::string name;
+  Vec3 base_color{1.0f};        // linear, [0, 1]
+  int base_color_texture = -1;  // into Scene::textures
+  int texcoord_set = 0;         // 0 or 1
+  // KHR_texture_transform of the base colour: uv' = (uv_matrix rows) * (u, v, 1).
+  std::array<float, 6> uv_transform{1, 0, 0, 0, 1, 0};
+  float metallic = 1.0f, roughness = 1.0f;
+  Vec3 emissive{0.0f};       // radiance, linear
+  bool double_sided = true;  // false: seen from the front only; its back is black to light and absent to cameras
+};
+
+struct Triangle {
+  uint32_t v[3];  // vertex indices, counter-clockwise seen from the front
+  uint32_t part;
+  bool two_sided;
+};
+
+// A run of vertices and triangles that share a material: one primitive of one node.
+struct Part {
+  std::string name;
+  uint32_t material = 0;
+  uint32_t first_vertex = 0, vertex_count = 0;
+  uint32_t first_triangle = 0, triangle_count = 0;
+  // Where it came from in Scene::document; -1 for parts that the document does not have (OBJ, PLY, ground, made scenes).
+  int node = -1, primitive = -1;
+  // True once its vertices or triangles differ from the document's, so that the writer must write them anew.
+  bool changed = false;
+  // For changed parts whose vertices are copies of the document's (split for normals): vertex i copies document vertex
+  // source[i]. Empty when there is no such map.
+  std::vector<uint32_t> source;
+};
+
+struct GltfDocument;  // gltf.h: the JSON and binary of a glTF input, kept so that nothing of it is lost
+
+struct Scene {
+  std::string path;  // for messages and provenance; may be empty
+  std::string hash;  // content_hash of the input file's bytes; may be empty
+
+  std::vector<Vec3> positions;              // world space, metres
+  std::vector<Vec3> normals;                // unit, as many as positions
+  std::array<std::vector<Vec2>, 2> texcoords;  // each empty, or as many as positions
+  std::vector<Vec3> colors;                 // linear vertex colours: empty, or as many as positions
+
+  std::vector<Triangle> triangles;
+  std::vector<Part> parts;          // in order of their runs, covering all vertices and triangles
+  std::vector<Material> materials;  // at least one
+  std::vector<Texture> textures;
+
+  std::shared_ptr<const GltfDocument> document;  // null unless the input was glTF
+  std::vector<std::string> warnings;             // one line each, in the order found
+};
+
+Bounds bounds(const Scene& scene);  // of the vertices that triangles use
+
+// Cross product of two edges: twice the area along the geometric normal.
+inline Vec3 area_normal(const Scene& s, const Triangle& t) {
+  return glm::cross(s.positions[t.v[1]] - s.positions[t.v[0]], s.positions[t.v[2]] - s.positions[t.v[0]]);
+}
+
+// Barycentric interpolation at weight (1-u-v, u, v) of the triangle's corners.
+template <class T>
+T interpolate(const std::vector<T>& values, const Triangle& t, float u, float v) {
+  return (1 - u - v) * values[t.v[0]] + u * values[t.v[1]] + v * values[t.v[2]];
+}
+
+// Linear base colour (factor x texture x vertex colour) at a point of a triangle, clamped to [0, 1]; bilinear texture look-up.
+Vec3 albedo(const Scene& scene, const Triangle& triangle, float u, float v);
+
+// Bilinear look-up at texture coordinates (u, v), decoded to linear.
+Vec3 sample_texture(const Texture& texture, Vec2 uv);
+
+float srgb_to_linear(float encoded);
+float linear_to_srgb(float linear);
+
+}  // namespace lambent
