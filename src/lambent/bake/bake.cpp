@@ -1,0 +1,250 @@
+// Follows: general-prt. T0 holds direct light with shadows; X_{k+1} = T0 + B X_k sums the Neumann series term by term, so X_k is
+// the transfer of up to k bounces. It is also the radiosity equation's Jacobi step.
+#include <lambent/bake/bake.h>
+#include <lambent/bake/gather.h>
+#include <lambent/bake/kernels.h>
+#include <lambent/core/parallel.h>
+
+#include <atomic>
+#include <chrono>
+
+namespace lambent {
+namespace {
+
+double seconds_since(std::chrono::steady_clock::time_point start) {
+  return std::chrono::duration<double>(std::chrono::steady_clock::now() - start).count();
+}
+
+size_t row_width(size_t coefficients, int channels) { return pad_lanes(coefficients * size_t(channels)); }
+
+size_t checked_count(size_t receivers) { return (receivers + check_every - 1) / check_every; }
+
+// Solution vectors: T0, X and the next X; T0 of half the rays at the checked receivers.
+size_t solution_bytes(size_t receivers, size_t coefficients, int channels) {
+  return 4 * (receivers * (coefficients + 2 * row_width(coefficients, channels)) + checked_count(receivers) * coefficients);
+}
+
+// Direction tables, corner maps and the scratch of every thread; an upper estimate.
+size_t table_bytes(size_t triangles, size_t coefficients, size_t samples) {
+  return 8 * pad_lanes(samples) * 4 * (coefficients + 3) + 24 * triangles + size_t(thread_count()) * samples * 200;
+}
+
+// Luminance-free measure of how far `part` of the rays is from all of them.
+struct ErrorSum {
+  double difference = 0, total = 0;
+  void add(const float* half, const float* full, size_t n) {
+    for (size_t k = 0; k < n; ++k) {
+      difference += double(half[k] - full[k]) * (half[k] - full[k]);
+      total += double(full[k]) * full[k];
+    }
+  }
+  double relative() const { return total > 0 ? std::sqrt(difference / total) : 0.0; }
+};
+
+struct Baker {
+  const Scene& scene;
+  const Receivers& receivers;
+  const BakeOptions& options;
+  const GatherSetup setup;
+  Progress* progress;
+  BakeReport& report;
+
+  size_t n() const { return receivers.count(); }
+  size_t coefficients() const { return setup.coefficients(); }
+  bool has_halves() const { return setup.sets.half < size_t(setup.sets.samples); }
+
+  Result<Transfer> unshadowed() {
+    WritableTransfer out = make_transfer(options.order, 1, n(), options.precision);
+    parallel_for(n(), gather_block, [&](size_t begin, size_t end) {
+      std::vector<float> row(coefficients());
+      for (size_t r = begin; r < end; ++r) {
+        // An open plane: the clamped cosine, convolved (pi, 2 pi/3, pi/4, ...), over pi.
+        evaluate_sh(options.order, receivers.normals[r], row);
+        for (size_t k = 0; k < row.size(); ++k) row[k] *= float(clamped_cosine(sh_band(int(k))) / std::numbers::pi);
+        store_receiver(out, r, row);
+      }
+    });
+    report.error = 0;
+    return std::move(out.transfer);
+  }
+
+  Result<Transfer> direct() {
+    const auto start = std::chrono::steady_clock::now();
+    WritableTransfer out = make_transfer(options.order, 1, n(), options.precision);
+    std::vector<uint8_t> buried(n());
+    std::vector<ErrorSum> errors((n() + gather_block - 1) / gather_block);
+    {
+      ProgressStage stage(progress, "tracing", n());
+      parallel_for(n(), gather_block, [&](size_t begin, size_t end) {
+        if (stage.cancelled()) return;
+        std::vector<float> rows((end - begin) * coefficients()), half_rows(checked_count(end - begin) * coefficients());
+        trace_sky(setup, begin, end - begin, {rows.data(), half_rows.data(), buried.data() + begin});
+        for (size_t r = begin; r < end; ++r) {
+          const float* row = rows.data() + (r - begin) * coefficients();
+          store_receiver(out, r, {row, coefficients()});
+          if (r % check_every == 0 && !buried[r])
+            errors[begin / gather_block].add(half_rows.data() + (r - begin) / check_every * coefficients(), row, coefficients());
+        }
+        stage.advance(end - begin);
+      });
+      if (stage.cancelled()) return Error{"", "cancelled"};
+    }
+    for (const FillStep& step : make_fill_steps(setup.corners, buried)) {
+      std::vector<float> mean(coefficients());
+      for (uint32_t s : step.sources) {
+        const std::vector<float> value = load_receiver(out.transfer, s);
+        for (size_t k = 0; k < mean.size(); ++k) mean[k] += value[k] / float(step.sources.size());
+      }
+      store_receiver(out, step.receiver, mean);
+    }
+    finish_report(buried, errors, start);
+    report.rays = n() * size_t(options.samples);
+    return std::move(out.transfer);
+  }
+
+  Result<Transfer> bounced() {
+    auto start = std::chrono::steady_clock::now();
+    const size_t C = coefficients(), channels = size_t(setup.channels), width = row_width(C, setup.channels);
+    const size_t blocks = (n() + gather_block - 1) / gather_block;
+    std::vector<float> T0(n() * C), T0_half(checked_count(n()) * C);
+    std::vector<uint8_t> buried(n());
+    std::vector<GatherBlock> kept(blocks);
+    std::vector<uint8_t> is_kept(blocks, 0);
+    const size_t fixed = solution_bytes(n(), C, setup.channels) + table_bytes(scene.triangles.size(), C, size_t(options.samples));
+    const size_t budget = options.memory > fixed ? options.memory - fixed : 0;
+    std::atomic<size_t> used{0};
+
+    auto sky_of = [&](size_t begin) {
+      return GatherSky{T0.data() + begin * C, T0_half.data() + begin / check_every * C, buried.data() + begin};
+    };
+    {
+      ProgressStage stage(progress, "tracing", n());
+      parallel_for(n(), gather_block, [&](size_t begin, size_t end) {
+        if (stage.cancelled()) return;
+        GatherBlock block;
+        const GatherSky sky = sky_of(begin);
+        trace_gather(setup, begin, end - begin, &block, &sky);
+        // Which blocks are kept depends on the scheduling, the result does not: the others are traced again, alike.
+        const size_t bytes = block.rows.bytes() + block.half_rows.bytes() + sizeof(GatherBlock);
+        if (used.fetch_add(bytes) + bytes <= budget) {
+          kept[begin / gather_block] = {exact_copy(block.rows), exact_copy(block.half_rows)};
+          is_kept[begin / gather_block] = 1;
+        } else {
+          used.fetch_sub(bytes);
+        }
+        stage.advance(end - begin);
+      });
+      if (stage.cancelled()) return Error{"", "cancelled"};
+    }
+    report.rays = n() * size_t(options.samples);
+    report.operator_bytes = used;
+    const size_t kept_count = size_t(std::count(is_kept.begin(), is_kept.end(), uint8_t(1)));
+    report.operator_kept = double(kept_count) / double(blocks);
+    const auto fill = make_fill_steps(setup.corners, buried);
+    fill_buried(fill, T0.data(), C, C);
+    report.trace_seconds = seconds_since(start);
+    start = std::chrono::steady_clock::now();
+
+    // X = T0, the same in every channel, [receiver][coefficient][channel].
+    AlignedVector<float> X(n() * width, 0.0f), next(n() * width, 0.0f);
+    auto add_T0 = [&](const float* t, float* x) {
+      for (size_t k = 0; k < C; ++k)
+        for (size_t c = 0; c < channels; ++c) x[k * channels + c] += t[k];
+    };
+    parallel_for(n(), gather_block, [&](size_t begin, size_t end) {
+      for (size_t r = begin; r < end; ++r) add_T0(T0.data() + r * C, X.data() + r * width);
+    });
+
+    std::vector<ErrorSum> errors(blocks);
+    for (int bounce = 1; bounce <= options.bounces; ++bounce) {
+      const bool last = bounce == options.bounces;
+      ProgressStage stage(progress, "bounce " + std::to_string(bounce), n());
+      parallel_for(n(), gather_block, [&](size_t begin, size_t end) {
+        if (stage.cancelled()) return;
+        const size_t b = begin / gather_block;
+        GatherBlock again;
+        if (!is_kept[b]) trace_gather(setup, begin, end - begin, &again, nullptr);
+        const GatherBlock& block = is_kept[b] ? kept[b] : again;
+        multiply_rows(block.rows, setup.channels, X.data(), width, setup.row_scale(size_t(options.samples)), next.data() + begin * width);
+        for (size_t r = begin; r < end; ++r) add_T0(T0.data() + r * C, next.data() + r * width);
+        if (last && has_halves()) {
+          AlignedVector<float> half(block.half_rows.ends.size() * width);
+          multiply_rows(block.half_rows, setup.channels, X.data(), width, setup.row_scale(setup.sets.half), half.data());
+          for (size_t r = begin, i = 0; r < end; r += check_every, ++i) {
+            add_T0(T0_half.data() + r / check_every * C, half.data() + i * width);
+            if (!buried[r]) errors[b].add(half.data() + i * width, next.data() + r * width, width);
+          }
+        }
+        stage.advance(end - begin);
+      });
+      if (stage.cancelled()) return Error{"", "cancelled"};
+      report.rays += size_t(double(n()) * (1 - report.operator_kept) + 0.5) * size_t(options.samples);
+      fill_buried(fill, next.data(), width, width);
+      std::swap(X, next);
+    }
+
+    WritableTransfer out = make_transfer(options.order, setup.channels, n(), options.precision);
+    parallel_for(n(), gather_block, [&](size_t begin, size_t end) {
+      std::vector<float> row(C * channels);
+      for (size_t r = begin; r < end; ++r) {
+        for (size_t c = 0; c < channels; ++c)
+          for (size_t k = 0; k < C; ++k) row[c * C + k] = X[r * width + k * channels + c];
+        store_receiver(out, r, row);
+      }
+    });
+    report.bounce_seconds = seconds_since(start);
+    report.working_memory = fixed + used;
+    const double trace_seconds = report.trace_seconds;
+    finish_report(buried, errors, start);
+    report.trace_seconds = trace_seconds;
+    return std::move(out.transfer);
+  }
+
+  static SparseRows exact_copy(const SparseRows& rows) { return rows; }  // a copied vector has no spare capacity
+
+  void finish_report(const std::vector<uint8_t>& buried, const std::vector<ErrorSum>& errors, std::chrono::steady_clock::time_point start) {
+    for (uint8_t b : buried) report.buried += b;
+    report.trace_seconds = seconds_since(start);
+    ErrorSum all;
+    for (const ErrorSum& e : errors) all.difference += e.difference, all.total += e.total;
+    report.error = has_halves() ? all.relative() : -1;
+  }
+};
+
+Result<void> check_options(const BakeOptions& o) {
+  if (o.order < 1 || o.order > max_sh_order)
+    return Error{"order", "must lie between 1 and " + std::to_string(max_sh_order) + ", not " + std::to_string(o.order)};
+  if (o.samples < 1 || o.samples > 1 << 20) return Error{"samples", "must lie between 1 and 1048576, not " + std::to_string(o.samples)};
+  if (o.bounces < 0 || o.bounces > 64) return Error{"bounces", "must lie between 0 and 64, not " + std::to_string(o.bounces)};
+  return {};
+}
+
+}  // namespace
+
+size_t least_memory(size_t receivers, bool coloured, const BakeOptions& options) {
+  const size_t coefficients = size_t(sh_count(options.order));
+  const size_t tables = table_bytes(0, coefficients, size_t(options.samples));
+  if (!options.shadows) return 0;
+  return tables + (options.bounces > 0 ? solution_bytes(receivers, coefficients, coloured ? 3 : 1) : 0);
+}
+
+Result<Transfer> bake(const Scene& scene, const Tracer& tracer, const Receivers& receivers, const BakeOptions& options,
+                      BakeReport* report, Progress* progress) {
+  if (auto ok = check_options(options); !ok) return ok.error();
+  if (receivers.count() == 0) return Error{scene.path, "nothing to bake: no triangle has an area"};
+  BakeReport unwanted;
+  BakeReport& r = report ? *report : unwanted;
+  r = {};
+  Baker baker{scene, receivers, options,
+              make_gather_setup(scene, tracer, receivers, options.order, options.shadows ? options.samples : 1, options.seed), progress, r};
+  const size_t least = least_memory(receivers.count(), baker.setup.channels == 3, options);
+  if (options.memory < least)
+    return Error{scene.path, "baking needs at least " + std::to_string(least) + " bytes of working memory, and was allowed " +
+                                 std::to_string(options.memory)};
+  auto result = !options.shadows ? baker.unshadowed() : options.bounces > 0 ? baker.bounced() : baker.direct();
+  if (!result) return result;
+  r.receivers = receivers.count(), r.bytes = result->bytes();
+  return result;
+}
+
+}  // namespace lambent

@@ -1,0 +1,44 @@
+#pragma once
+// Scene -> Transfer: diffuse light transport, direct and bounced.
+#include <lambent/core/progress.h>
+#include <lambent/receivers/receivers.h>
+#include <lambent/scene/scene.h>
+#include <lambent/trace/tracer.h>
+#include <lambent/transfer/transfer.h>
+
+#include <cstdint>
+
+namespace lambent {
+
+struct BakeOptions {
+  int order = 6;                               // SH bands of the light, [1, 16]: order^2 coefficients
+  int samples = 1024;                          // rays a receiver, [1, 2^20]; error falls a little faster than 1/sqrt
+  int bounces = 3;                             // reflections between surfaces, [0, 64]
+  bool shadows = true;                         // false: light everywhere as if nothing stood in its way, and no bounces
+  size_t memory = size_t{4} << 30;             // bytes of working memory beyond scene and result; less means rays traced again
+  uint32_t seed = 1;                           // of the ray directions
+  Precision precision = Precision::half;       // of the stored transfer
+};
+
+struct BakeReport {
+  size_t receivers = 0, buried = 0;  // buried: inside something, filled from their neighbours
+  size_t rays = 0;                   // traced in all
+  size_t bytes = 0;                  // of the transfer
+  size_t operator_bytes = 0;         // of the hit rows kept
+  double operator_kept = 1;          // fraction of the hit rows kept in memory; the rest was traced again for each bounce
+  size_t working_memory = 0;         // bytes, what the stages below allocated at their peak
+  double trace_seconds = 0, bounce_seconds = 0;
+  // Estimated relative RMS error of the transfer vectors, from half-sample gathers at one receiver in 16:
+  // sqrt(sum |half - full|^2 / sum |full|^2). Halves of one low-discrepancy set lean to either side of it, so this
+  // overestimates a little. Negative if too few samples to tell.
+  double error = -1;
+};
+
+// Least working memory (BakeOptions::memory) with which such a bake can run.
+size_t least_memory(size_t receivers, bool coloured, const BakeOptions& options);
+
+// Errors: options out of range; memory too small (says what is needed); cancelled.
+Result<Transfer> bake(const Scene& scene, const Tracer& tracer, const Receivers& receivers, const BakeOptions& options,
+                      BakeReport* report = nullptr, Progress* progress = nullptr);
+
+}  // namespace lambent

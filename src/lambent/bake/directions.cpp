@@ -1,0 +1,64 @@
+#include <lambent/bake/directions.h>
+#include <lambent/bake/kernels.h>
+#include <lambent/core/random.h>
+#include <lambent/core/sampling.h>
+
+#include <algorithm>
+
+namespace lambent {
+namespace {
+
+uint32_t morton2(Vec2 u) {
+  auto spread = [](float x) {
+    uint32_t v = uint32_t(x * 65536.0f);
+    v = (v | v << 8) & 0x00ff00ffu;
+    v = (v | v << 4) & 0x0f0f0f0fu;
+    v = (v | v << 2) & 0x33333333u;
+    return (v | v << 1) & 0x55555555u;
+  };
+  return spread(u.x) | spread(u.y) << 1;
+}
+
+}  // namespace
+
+DirectionSets make_direction_sets(int order, int samples, int sets, uint32_t seed) {
+  DirectionSets s{order, samples, sets, pad_lanes(size_t(samples)), 0, {}, {}, {}};
+  const size_t n = size_t(samples), coefficients = size_t(sh_count(order));
+  s.half = n >= 2 * lane_multiple ? pad_lanes(n / 2) : n;
+  s.x.assign(s.stride * size_t(sets), 0), s.y = s.x, s.z.assign(s.stride * size_t(sets), 1);
+  s.table.assign(s.stride * size_t(sets) * coefficients, 0);
+  std::vector<Vec2> points(n);
+  float y[sh_count(max_sh_order)];
+  for (int set = 0; set < sets; ++set) {
+    const uint32_t key = uint32_t(hash64(seed, uint64_t(set)));
+    for (size_t i = 0; i < n; ++i) points[i] = sobol_owen(uint32_t(i), key);
+    auto along_curve = [](Vec2 a, Vec2 b) { return morton2(a) < morton2(b); };
+    std::sort(points.begin(), points.begin() + ptrdiff_t(s.half), along_curve);
+    std::sort(points.begin() + ptrdiff_t(s.half), points.end(), along_curve);
+    const size_t base = size_t(set) * s.stride;
+    for (size_t i = 0; i < n; ++i) {
+      const Vec3 d = square_to_cosine_hemisphere(points[i]);
+      s.x[base + i] = d.x, s.y[base + i] = d.y, s.z[base + i] = d.z;
+      evaluate_sh(order, d, y);
+      for (size_t k = 0; k < coefficients; ++k) s.table[(size_t(set) * coefficients + k) * s.stride + i] = y[k];
+    }
+  }
+  return s;
+}
+
+DirectionChoice choose_directions(const DirectionSets& sets, Vec3 n, uint32_t seed, size_t receiver) {
+  const uint64_t bits = hash64(hash64(seed, 0x5e7), receiver);
+  DirectionChoice choice;
+  choice.set = int(bits % uint64_t(sets.sets));
+  // The rotation is built from the same angles that turn the harmonics, so both agree to rounding.
+  const float sin_b = std::sqrt(n.x * n.x + n.y * n.y);
+  choice.a = sin_b > 0 ? std::atan2(n.y, n.x) : 0.0f;
+  choice.b = std::atan2(sin_b, n.z);
+  choice.c = 2 * pi * to_unit_float(uint32_t(bits >> 32));
+  auto turn_z = [](float t) { return Mat3(Vec3(std::cos(t), std::sin(t), 0), Vec3(-std::sin(t), std::cos(t), 0), Vec3(0, 0, 1)); };
+  const Mat3 turn_y(Vec3(std::cos(choice.b), 0, -std::sin(choice.b)), Vec3(0, 1, 0), Vec3(std::sin(choice.b), 0, std::cos(choice.b)));
+  choice.rotation = turn_z(choice.a) * turn_y * turn_z(choice.c);
+  return choice;
+}
+
+}  // namespace lambent

@@ -1,0 +1,31 @@
+#pragma once
+// Directions and their basis values, made once and shared by all receivers: a few cosine-distributed sets about +z. A receiver
+// takes one set, turned into its frame by a rotation of its own; sums over its visible directions are formed in the set's frame
+// and turned back as spherical harmonics.
+#include <lambent/basis/sh.h>
+#include <lambent/trace/tracer.h>
+
+#include <vector>
+
+namespace lambent {
+
+struct DirectionSets {
+  int order = 0, samples = 0, sets = 0;
+  size_t stride = 0;           // samples padded to whole vectors
+  size_t half = 0;             // directions [0, half) and [half, samples) are two sets in their own right; half = samples: no split
+  std::vector<float> x, y, z;  // [set][stride]
+  std::vector<float> table;    // [set][coefficient][stride]: harmonics at each direction, 0 in the padding
+};
+
+// Sobol' points, Owen-scrambled anew for every set, sorted within each half along a space-filling curve.
+DirectionSets make_direction_sets(int order, int samples, int sets, uint32_t seed);
+
+// A receiver's draw: which set, and the rotation Rz(a) Ry(b) Rz(c) that takes +z to its normal with a random spin c.
+struct DirectionChoice {
+  int set;
+  float a, b, c;
+  Mat3 rotation;
+};
+DirectionChoice choose_directions(const DirectionSets& sets, Vec3 normal, uint32_t seed, size_t receiver);
+
+}  // namespace lambent

@@ -1,0 +1,76 @@
+#pragma once
+// The gather operator. Every receiver sends its rays once; a ray that leaves the scene adds to the receiver's SKY ROW (its
+// direct transfer T0), one that meets a surface adds to its HIT ROW: receivers there, times interpolation weight, times albedo.
+// The hit rows are a sparse matrix B, and a bounce is a product: T_{k+1} = B T_k (general-prt, "Transfer Matrix for Bounce
+// k+1", one-row case), with no further ray. Any number of columns: the same B carries radiosity (alpha = e + B alpha).
+#include <lambent/bake/directions.h>
+#include <lambent/core/aligned.h>
+#include <lambent/receivers/receivers.h>
+#include <lambent/trace/tracer.h>
+
+#include <vector>
+
+namespace lambent {
+
+// Receivers whose half-sample rows are kept too, to estimate the error: one in this many.
+inline constexpr size_t check_every = 16;
+// Receivers traced and multiplied as one piece of work.
+inline constexpr size_t gather_block = 128;
+
+// Rows of a sparse matrix, one after another. Weights are halves, `channels` an entry.
+struct SparseRows {
+  std::vector<uint32_t> ends;  // of each row, in entries
+  std::vector<uint32_t> columns;
+  std::vector<uint16_t> weights;
+  size_t bytes() const { return (ends.size() + columns.size()) * 4 + weights.size() * 2; }
+};
+
+struct GatherBlock {
+  SparseRows rows;       // of receivers [first, first + count)
+  SparseRows half_rows;  // the same by the first half of the rays alone, for receivers divisible by check_every
+};
+
+struct GatherSetup {
+  const Scene& scene;
+  const Tracer& tracer;
+  const Receivers& receivers;
+  CornerReceivers corners;
+  DirectionSets sets;
+  uint32_t seed;
+  int channels;         // of weights: 1 if all albedo is grey, else 3
+  float weight_unit;    // stored weight = sum of albedo x interpolation weight over rays, x weight_unit
+  std::vector<Vec3> part_albedo;  // of parts with one albedo all over
+  std::vector<uint8_t> part_varies;
+
+  size_t coefficients() const { return size_t(sh_count(sets.order)); }
+  // What a stored weight has to be multiplied by, given how many rays the row averages.
+  float row_scale(size_t rays) const { return 1.0f / (weight_unit * float(rays)); }
+};
+
+GatherSetup make_gather_setup(const Scene& scene, const Tracer& tracer, const Receivers& receivers, int order, int samples, uint32_t seed);
+
+// What tracing receivers [first, first + count) yields beside the hit rows. Spans are indexed from `first`.
+struct GatherSky {
+  float* rows;       // [receiver][coefficient]: T0
+  float* half_rows;  // [checked receiver][coefficient]: T0 by the first half of the rays
+  uint8_t* buried;   // 1: most rays met the back of a one-sided surface; the receiver lies inside something
+};
+
+// Traces closest hits. Either of `block` and `sky` may be null.
+void trace_gather(const GatherSetup& setup, size_t first, size_t count, GatherBlock* block, const GatherSky* sky);
+
+// Traces occlusion only: the sky rows, without hit rows.
+void trace_sky(const GatherSetup& setup, size_t first, size_t count, const GatherSky& sky);
+
+// y[row] = scale * (row of B) x, for consecutive rows; x and y are [receiver][column x channel], `width` padded floats a row.
+void multiply_rows(const SparseRows& rows, int channels, const float* x, size_t width, float scale, float* y);
+
+// Values of buried receivers are taken from their neighbours along the mesh.
+struct FillStep {
+  uint32_t receiver;
+  std::vector<uint32_t> sources;  // not buried, or filled by an earlier step
+};
+std::vector<FillStep> make_fill_steps(const CornerReceivers& corners, const std::vector<uint8_t>& buried);
+void fill_buried(const std::vector<FillStep>& steps, float* values, size_t stride, size_t width);
+
+}  // namespace lambent

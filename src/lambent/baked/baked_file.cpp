@@ -1,0 +1,190 @@
+#include <lambent/baked/baked_file.h>
+#include <lambent/basis/sh.h>
+#include <lambent/core/check.h>
+#include <lambent/scene/gltf.h>
+#include <lambent/scene/load.h>
+
+#include <bit>
+#include <cstring>
+#include <filesystem>
+#include <map>
+
+namespace lambent {
+namespace {
+
+static_assert(std::endian::native == std::endian::little, "the file and its in-place reader are little-endian");
+
+using nlohmann::json;
+const char* const extension_name = "LAMBENT_transfer";
+
+template <class T>
+std::span<const uint8_t> bytes_of(std::span<const T> values) {
+  return {reinterpret_cast<const uint8_t*>(values.data()), values.size_bytes()};
+}
+
+// A non-negative integer member, at most `limit`.
+Result<size_t> read_count(const json& object, const char* key, size_t limit, const std::string& where) {
+  const auto it = object.is_object() ? object.find(key) : object.end();
+  if (!object.is_object() || it == object.end() || !it->is_number_unsigned() || it->get<uint64_t>() > limit)
+    return Error{where, std::string("\"") + key + "\" is missing or out of range"};
+  return it->get<size_t>();
+}
+
+// The bytes of a buffer view of the (single) binary chunk.
+Result<std::span<const uint8_t>> view_bytes(const GltfChunks& chunks, size_t index, const std::string& where) {
+  const json& document = chunks.json;
+  const std::string place = where + ": buffer view " + std::to_string(index);
+  if (!document.contains("bufferViews") || !document["bufferViews"].is_array() || index >= document["bufferViews"].size())
+    return Error{place, "does not exist"};
+  const json& view = document["bufferViews"][index];
+  auto buffer = read_count(view, "buffer", 0, place);
+  if (!buffer) return buffer.error();
+  size_t offset = 0;
+  if (view.contains("byteOffset")) {
+    auto given = read_count(view, "byteOffset", chunks.binary.size(), place);
+    if (!given) return given.error();
+    offset = *given;
+  }
+  auto length = read_count(view, "byteLength", chunks.binary.size() - offset, place);
+  if (!length) return length.error();
+  return chunks.binary.subspan(offset, *length);
+}
+
+Result<std::vector<uint32_t>> read_map(const GltfChunks& chunks, const json& part, const char* key, const Part& target,
+                                       size_t receivers, const std::string& where) {
+  auto index = read_count(part, key, 0x7fffffff, where);
+  if (!index) return index.error();
+  auto bytes = view_bytes(chunks, *index, where);
+  if (!bytes) return bytes.error();
+  std::vector<uint32_t> map(target.vertex_count);
+  if (bytes->size() != map.size() * 4) return Error{where, std::string("\"") + key + "\" does not have one entry a vertex"};
+  if (!map.empty()) std::memcpy(map.data(), bytes->data(), bytes->size());
+  for (uint32_t r : map)
+    if (r != none && r >= receivers) return Error{where, "receiver " + std::to_string(r) + " is out of range"};
+  return map;
+}
+
+}  // namespace
+
+Result<void> save_baked(const std::string& path, const Scene& scene, const Receivers& receivers, const Transfer& transfer,
+                        const std::string& provenance) {
+  std::vector<GltfBlob> blobs{{transfer.data, 64}};
+  for (const auto* map : {&receivers.front, &receivers.back})
+    if (!map->empty())
+      for (const Part& part : scene.parts)
+        blobs.push_back({bytes_of(std::span<const uint32_t>(*map).subspan(part.first_vertex, part.vertex_count)), 4});
+  return save_glb(path, scene, blobs, [&](json& document, const GltfPlaces& places) {
+    json extension;
+    extension["version"] = baked_file_version;
+    extension["transfer"] = {{"kind", "diffuse"},
+                             {"basis", "sh"},
+                             {"order", transfer.order},
+                             {"channels", transfer.channels},
+                             {"precision", transfer.precision == Precision::half ? "half" : "single"},
+                             {"receivers", transfer.receivers},
+                             {"bufferView", places.first_view}};
+    json parts = json::array();
+    for (size_t i = 0; i < scene.parts.size(); ++i) {
+      json part{{"node", places.part_nodes[i]}, {"primitive", places.part_primitives[i]}, {"front", places.first_view + 1 + int(i)}};
+      if (!receivers.back.empty()) part["back"] = places.first_view + 1 + int(scene.parts.size() + i);
+      parts.push_back(std::move(part));
+    }
+    extension["parts"] = std::move(parts);
+    extension["provenance"] = json::parse(provenance, nullptr, false);
+    LAMBENT_CHECK(!extension["provenance"].is_discarded());
+    document["extensions"][extension_name] = std::move(extension);
+    json& used = document["extensionsUsed"];
+    if (!used.is_array()) used = json::array();
+    if (std::find(used.begin(), used.end(), extension_name) == used.end()) used.push_back(extension_name);
+  });
+}
+
+Result<Baked> load_baked(const std::string& path) {
+  auto file = MappedFile::open(path);
+  if (!file) return file.error();
+  return load_baked(*file, path);
+}
+
+Result<Baked> load_baked(const MappedFile& file, const std::string& path) {
+  if (file.bytes().empty()) return Error{path, "is empty"};
+  auto chunks = split_gltf(file.bytes(), path);
+  if (!chunks) return chunks.error();
+  const json& document = chunks->json;
+  const auto extensions = document.find("extensions");
+  if (extensions == document.end() || !extensions->is_object() || !extensions->contains(extension_name))
+    return Error{path, "is not a baked file: it has no LAMBENT_transfer extension (make one with `lambent bake`)"};
+  const json& extension = (*extensions)[extension_name];
+  const std::string where = path + ": " + extension_name;
+  auto version = read_count(extension, "version", 0x7fffffff, where);
+  if (!version) return version.error();
+  if (*version != size_t(baked_file_version))
+    return Error{path, "was baked with file version " + std::to_string(*version) + "; this program reads version " +
+                           std::to_string(baked_file_version)};
+
+  Baked baked;
+  const auto t = extension.find("transfer");
+  if (t == extension.end() || !t->is_object()) return Error{where, "\"transfer\" is missing"};
+  auto text = [&](const char* key) { return t->contains(key) && (*t)[key].is_string() ? (*t)[key].get<std::string>() : ""; };
+  if (text("kind") != "diffuse") return Error{where, "transfer of kind \"" + text("kind") + "\" is not known to this program"};
+  if (text("basis") != "sh") return Error{where, "light basis \"" + text("basis") + "\" is not known to this program"};
+  if (text("precision") != "half" && text("precision") != "single") return Error{where, "\"precision\" must be half or single"};
+  auto order = read_count(*t, "order", size_t(max_sh_order), where);
+  auto channels = read_count(*t, "channels", 3, where);
+  auto receivers = read_count(*t, "receivers", 0xfffffffe, where);
+  auto view = read_count(*t, "bufferView", 0x7fffffff, where);
+  for (const auto* count : {&order, &channels, &receivers, &view})
+    if (!*count) return count->error();
+  if (*order < 1 || (*channels != 1 && *channels != 3)) return Error{where, "\"order\" or \"channels\" is out of range"};
+  baked.transfer.order = int(*order), baked.transfer.channels = int(*channels), baked.transfer.receivers = *receivers;
+  baked.transfer.precision = text("precision") == "half" ? Precision::half : Precision::single;
+  auto data = view_bytes(*chunks, *view, where);
+  if (!data) return data.error();
+  if (data->size() != baked.transfer.bytes())
+    return Error{where, "the transfer holds " + std::to_string(data->size()) + " bytes where its header makes " +
+                            std::to_string(baked.transfer.bytes())};
+  if (reinterpret_cast<uintptr_t>(data->data()) % baked.transfer.value_bytes()) return Error{where, "the transfer is not aligned"};
+  baked.transfer.data = *data;
+  baked.transfer.storage = std::make_shared<MappedFile>(file);
+
+  const std::string folder = std::filesystem::path(path).parent_path().string();
+  auto scene = load_gltf(file, path, folder.empty() ? "." : folder);
+  if (!scene) return scene.error();
+  baked.scene = std::move(*scene);
+  baked.front.assign(baked.scene.positions.size(), none);
+  const auto parts = extension.find("parts");
+  if (parts == extension.end() || !parts->is_array()) return Error{where, "\"parts\" is missing"};
+  std::map<std::pair<size_t, size_t>, const json*> by_place;
+  for (const json& part : *parts) {
+    auto node = read_count(part, "node", 0x7fffffff, where), primitive = read_count(part, "primitive", 0x7fffffff, where);
+    if (!node) return node.error();
+    if (!primitive) return primitive.error();
+    by_place[{*node, *primitive}] = &part;
+  }
+  for (const Part& part : baked.scene.parts) {
+    const auto entry = by_place.find({size_t(part.node), size_t(part.primitive)});
+    const std::string place = where + ": node " + std::to_string(part.node) + ", primitive " + std::to_string(part.primitive);
+    if (entry == by_place.end()) return Error{place, "has no receivers"};
+    for (const char* side : {"front", "back"}) {
+      const bool is_back = side[0] == 'b';
+      if (is_back && !entry->second->contains("back")) continue;
+      auto map = read_map(*chunks, *entry->second, side, part, *receivers, place);
+      if (!map) return map.error();
+      if (is_back && baked.back.empty()) baked.back.assign(baked.scene.positions.size(), none);
+      std::copy(map->begin(), map->end(), (is_back ? baked.back : baked.front).begin() + part.first_vertex);
+    }
+  }
+  const auto provenance = extension.find("provenance");
+  baked.provenance = provenance == extension.end() ? "{}" : provenance->dump(-1, ' ', false, json::error_handler_t::replace);
+  return baked;
+}
+
+bool is_baked(const std::string& path) {
+  auto file = MappedFile::open(path);
+  if (!file || file->bytes().empty()) return false;
+  auto chunks = split_gltf(file->bytes(), path);
+  if (!chunks) return false;
+  const auto extensions = chunks->json.find("extensions");
+  return extensions != chunks->json.end() && extensions->is_object() && extensions->contains(extension_name);
+}
+
+}  // namespace lambent

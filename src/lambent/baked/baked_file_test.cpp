@@ -1,0 +1,130 @@
+#include <lambent/baked/baked_file.h>
+#include <lambent/core/file.h>
+#include <lambent/core/random.h>
+#include <lambent/scene/procedural.h>
+
+#include <gtest/gtest.h>
+
+#include <cstring>
+#include <filesystem>
+
+namespace lambent {
+namespace {
+
+struct TemporaryFile {
+  std::string path;
+  explicit TemporaryFile(const std::string& name)
+      : path((std::filesystem::temp_directory_path() / ("lambent_" + std::to_string(::getpid()) + "_" + name)).string()) {}
+  ~TemporaryFile() { std::filesystem::remove(path); }
+};
+
+struct Small {
+  Scene scene;
+  Receivers receivers;
+  WritableTransfer transfer;
+};
+
+Small small_bake(int channels, Precision precision) {
+  Small s;
+  const uint32_t m = add_material(s.scene, "grey", Vec3(0.5f));
+  add_box(s.scene, m, "box", Vec3(-1), Vec3(1), 2);
+  add_quad(s.scene, add_material(s.scene, "sheet", Vec3(0.2f, 0.5f, 0.7f)), "sheet", Vec3(2, 0, 0), Vec3(0, 0, 1), Vec3(1, 0, 0), 1, 1);
+  s.scene.materials.back().double_sided = true;
+  for (Triangle& t : s.scene.triangles) t.two_sided = t.part == 1;
+  s.receivers = make_vertex_receivers(s.scene);
+  s.transfer = make_transfer(3, channels, s.receivers.count(), precision);
+  Random random(2);
+  std::vector<float> row(size_t(9 * channels));
+  for (size_t r = 0; r < s.receivers.count(); ++r) {
+    for (float& v : row) v = random.next();
+    store_receiver(s.transfer, r, row);
+  }
+  return s;
+}
+
+TEST(BakedFile, ComesBackAsItWas) {
+  for (Precision precision : {Precision::half, Precision::single})
+    for (int channels : {1, 3}) {
+      const TemporaryFile file("round_trip.glb");
+      const Small s = small_bake(channels, precision);
+      ASSERT_TRUE(save_baked(file.path, s.scene, s.receivers, s.transfer.transfer, R"({"options":{"order":3}})"));
+      EXPECT_TRUE(is_baked(file.path));
+      auto back = load_baked(file.path);
+      ASSERT_TRUE(back) << back.error().text();
+      EXPECT_EQ(back->scene.positions, s.scene.positions);
+      EXPECT_EQ(back->scene.normals, s.scene.normals);
+      EXPECT_EQ(back->scene.triangles.size(), s.scene.triangles.size());
+      EXPECT_EQ(back->front, s.receivers.front);
+      EXPECT_EQ(back->back, s.receivers.back);
+      EXPECT_EQ(back->transfer.order, 3);
+      EXPECT_EQ(back->transfer.channels, channels);
+      EXPECT_EQ(back->transfer.precision, precision);
+      EXPECT_TRUE(std::equal(back->transfer.data.begin(), back->transfer.data.end(), s.transfer.transfer.data.begin(), s.transfer.transfer.data.end()));
+      EXPECT_EQ(back->provenance, R"({"options":{"order":3}})");
+      EXPECT_EQ(reinterpret_cast<uintptr_t>(back->transfer.data.data()) % 64, 0u);  // in place, fit for SIMD
+    }
+}
+
+TEST(BakedFile, IsTheSameBytesEveryTime) {
+  const TemporaryFile a("a.glb"), b("b.glb");
+  const Small s = small_bake(3, Precision::half);
+  ASSERT_TRUE(save_baked(a.path, s.scene, s.receivers, s.transfer.transfer, "{}"));
+  ASSERT_TRUE(save_baked(b.path, s.scene, s.receivers, s.transfer.transfer, "{}"));
+  EXPECT_EQ(*read_file(a.path), *read_file(b.path));
+}
+
+TEST(BakedFile, RefusesEveryTruncation) {
+  const TemporaryFile whole("whole.glb"), cut("cut.glb");
+  const Small s = small_bake(1, Precision::half);
+  ASSERT_TRUE(save_baked(whole.path, s.scene, s.receivers, s.transfer.transfer, "{}"));
+  const std::vector<uint8_t> bytes = *read_file(whole.path);
+  // Every length at the front, where the headers are; then every 61st.
+  for (size_t length = 0; length < bytes.size(); length += length < 256 ? 1 : 61) {
+    const std::span<const uint8_t> piece(bytes.data(), length);
+    ASSERT_TRUE(write_file_atomically(cut.path, {&piece, 1}));
+    EXPECT_FALSE(load_baked(cut.path)) << length;
+  }
+}
+
+// Replaces text in the JSON chunk by text of the same length.
+std::vector<uint8_t> edited(std::vector<uint8_t> bytes, const std::string& from, const std::string& to) {
+  EXPECT_EQ(from.size(), to.size());
+  const auto at = std::search(bytes.begin(), bytes.end(), from.begin(), from.end());
+  EXPECT_NE(at, bytes.end()) << from;
+  if (at != bytes.end()) std::copy(to.begin(), to.end(), at);
+  return bytes;
+}
+
+TEST(BakedFile, RefusesHeadersThatLie) {
+  const TemporaryFile whole("lie.glb"), lying("lying.glb");
+  const Small s = small_bake(1, Precision::half);
+  ASSERT_TRUE(save_baked(whole.path, s.scene, s.receivers, s.transfer.transfer, "{}"));
+  const std::vector<uint8_t> bytes = *read_file(whole.path);
+  const std::string receivers = "\"receivers\":" + std::to_string(s.receivers.count());
+  const std::pair<std::string, std::string> lies[] = {{"\"version\":1}", "\"version\":2}"},
+                                                      {"\"order\":3", "\"order\":4"},
+                                                      {"\"order\":3", "\"order\":0"},
+                                                      {"\"channels\":1", "\"channels\":2"},
+                                                      {"\"channels\":1", "\"channels\":3"},
+                                                      {receivers, receivers.substr(0, receivers.size() - 1) + (receivers.back() == '0' ? "1" : "0")},
+                                                      {"\"kind\":\"diffuse\"", "\"kind\":\"unknown\""},
+                                                      {"\"precision\":\"half\"", "\"precision\":\"hal?\""}};
+  for (const auto& [from, to] : lies) {
+    const auto changed = edited(bytes, from, to);
+    const std::span<const uint8_t> piece(changed);
+    ASSERT_TRUE(write_file_atomically(lying.path, {&piece, 1}));
+    auto result = load_baked(lying.path);
+    ASSERT_FALSE(result) << to;
+    EXPECT_EQ(result.error().text().find('\n'), std::string::npos);
+    EXPECT_NE(result.error().text().find(lying.path), std::string::npos);
+  }
+}
+
+TEST(BakedFile, RefusesOtherThings) {
+  EXPECT_FALSE(load_baked("/nonexistent/x.glb"));
+  EXPECT_FALSE(load_baked("/tmp"));
+  EXPECT_FALSE(is_baked("/nonexistent/x.glb"));
+}
+
+}  // namespace
+}  // namespace lambent

@@ -1,0 +1,58 @@
+#include <lambent/core/parallel.h>
+#include <lambent/core/random.h>
+#include <lambent/core/sampling.h>
+#include <lambent/render/render.h>
+
+namespace lambent {
+namespace {
+
+// The first surface that shows itself to the camera.
+Hit first_visible(const Scene& scene, const Tracer& tracer, Vec3 eye, Vec3 direction) {
+  float from = 0;
+  for (int skipped = 0; skipped < 64; ++skipped) {
+    const Hit hit = tracer.closest(eye, direction, from);
+    if (hit.triangle == none || hit.front || scene.triangles[hit.triangle].two_sided) return hit;
+    from = std::nextafter(hit.distance * (1 + 1e-6f), INFINITY);
+  }
+  return {};
+}
+
+}  // namespace
+
+Result<Image> render(const Scene& scene, const Tracer& tracer, const CornerReceivers& corners, const Relit& relit,
+                     const Camera& camera, const RenderOptions& options, Progress* progress) {
+  Image image(options.width, options.height);
+  if (!options.background) image.alpha.assign(image.rgb.size(), 0.0f);
+  const CameraRays rays(camera, options.width, options.height);
+  ProgressStage stage(progress, "rendering", size_t(options.height));
+  parallel_for(size_t(options.height), 1, [&](size_t begin, size_t end) {
+    if (stage.cancelled()) return;
+    for (int y = int(begin); y < int(end); ++y)
+      for (int x = 0; x < options.width; ++x) {
+        Vec3 sum(0.0f);
+        int covered = 0;
+        const uint32_t key = uint32_t(hash64(uint64_t(y) << 32 | uint64_t(x), 0xf11));
+        for (int s = 0; s < options.samples; ++s) {
+          const Vec2 jitter = sobol_owen(uint32_t(s), key);
+          const Vec3 direction = rays.direction(float(x) + jitter.x, float(y) + jitter.y);
+          const Hit hit = first_visible(scene, tracer, rays.eye, direction);
+          if (hit.triangle == none) {
+            if (options.background) sum += radiance_bilinear(*options.background, direction);
+            continue;
+          }
+          ++covered;
+          const auto* corner = corners.find(hit.triangle, hit.front);
+          if (!corner) continue;
+          const Vec3 white = (1 - hit.u - hit.v) * relit.at((*corner)[0]) + hit.u * relit.at((*corner)[1]) + hit.v * relit.at((*corner)[2]);
+          sum += options.albedo ? albedo(scene, scene.triangles[hit.triangle], hit.u, hit.v) * white : white;
+        }
+        image.at(x, y) = sum / float(options.samples);
+        if (!options.background) image.alpha[size_t(y) * size_t(options.width) + size_t(x)] = float(covered) / float(options.samples);
+      }
+    stage.advance(end - begin);
+  });
+  if (stage.cancelled()) return Error{"", "cancelled"};
+  return image;
+}
+
+}  // namespace lambent

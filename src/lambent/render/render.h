@@ -1,0 +1,24 @@
+#pragma once
+// Relit receivers -> picture: primary rays, interpolation between receivers, albedo at the pixel.
+#include <lambent/core/camera.h>
+#include <lambent/core/progress.h>
+#include <lambent/image/image.h>
+#include <lambent/light/environment.h>
+#include <lambent/receivers/receivers.h>
+#include <lambent/relight/relight.h>
+#include <lambent/trace/tracer.h>
+
+namespace lambent {
+
+struct RenderOptions {
+  int width = 512, height = 512;  // pixels
+  int samples = 16;               // rays a pixel, [1, 4096], box filter
+  const Environment* background = nullptr;  // null: black, and the image has alpha (coverage)
+  bool albedo = true;             // false: as if everything were white
+};
+
+// One-sided triangles are absent from behind, as in any glTF viewer. Errors: cancelled.
+Result<Image> render(const Scene& scene, const Tracer& tracer, const CornerReceivers& corners, const Relit& relit,
+                     const Camera& camera, const RenderOptions& options, Progress* progress = nullptr);
+
+}  // namespace lambent
