@@ -1,0 +1,119 @@
+// Path tracing with next-event estimation: J. Kajiya, "The rendering equation", 1986; multiple importance sampling by the
+// power heuristic: E. Veach and L. Guibas, "Optimally combining sampling techniques", 1995. Padded Sobol' pairs in shuffled
+// order: B. Burley, "Practical hash-based Owen scrambling", 2020, section 5; the hash: N. Vegdahl, "Building a better LK hash", 2021.
+#include <lambent/core/random.h>
+#include <lambent/core/sampling.h>
+#include <lambent/reference/integrator.h>
+
+#include <bit>
+
+namespace lambent::reference {
+namespace {
+
+// The one place that says how a surface reflects.
+Brdf get_brdf(const Scene& scene, const Triangle& triangle, float u, float v) {
+  return Lambert{albedo(scene, triangle, u, v)};
+}
+
+// Power heuristic, exponent 2, from the ratio so that large densities do not overflow.
+float mis_weight(float pdf, float other) {
+  float ratio = other / pdf;
+  return 1 / (1 + ratio * ratio);
+}
+
+uint32_t reverse_bits(uint32_t x) {
+  x = (x << 16) | (x >> 16);
+  x = ((x & 0x00ff00ffu) << 8) | ((x & 0xff00ff00u) >> 8);
+  x = ((x & 0x0f0f0f0fu) << 4) | ((x & 0xf0f0f0f0u) >> 4);
+  x = ((x & 0x33333333u) << 2) | ((x & 0xccccccccu) >> 2);
+  return ((x & 0x55555555u) << 1) | ((x & 0xaaaaaaaau) >> 1);
+}
+
+// Flips every bit by a hash of the bits above it: the lowest k bits of the result permute those of x within each aligned run of
+// 2^k numbers, so runs of a power of two stay together.
+uint32_t shuffled(uint32_t x, uint32_t seed) {
+  x = reverse_bits(x);
+  x ^= x * 0x3d20adeau;
+  x += seed;
+  x *= (seed >> 16) | 1;
+  x ^= x * 0x05526c56u;
+  x ^= x * 0x53a22864u;
+  return reverse_bits(x);
+}
+
+bool black(Vec3 c) { return c.x == 0 && c.y == 0 && c.z == 0; }
+
+}  // namespace
+
+PathSamples::PathSamples(uint64_t key, uint32_t index, uint32_t count)
+    : key(key), index(index), mask(std::bit_ceil(std::max(count, 1u)) - 1) {}
+
+Vec2 PathSamples::pair(uint32_t dimension) const {
+  uint64_t seed = hash64(key, dimension);
+  return sobol_owen(shuffled(index, uint32_t(seed)) & mask, uint32_t(seed >> 32));
+}
+
+Result<Integrator> make_integrator(const Scene& scene, const Environment& env, int bounces, Strategy strategy) {
+  if (env.image.width < 1 || env.image.height < 1) return Error{env.name, "the environment is empty"};
+  Result<Intersector> intersector = Intersector::make(scene);
+  if (!intersector) return intersector.error();
+  return Integrator{&scene, &env, *intersector, make_environment_sampler(env), bounces, strategy};
+}
+
+bool make_vertex(const Scene& scene, const Hit& hit, Vec3 d, PathVertex& vertex) {
+  const Triangle& triangle = scene.triangles[hit.triangle];
+  SurfacePoint s = surface_point(scene, hit);
+  bool front = glm::dot(s.ng, d) < 0;
+  if (!front && !triangle.two_sided) return false;
+  vertex.ng = front ? s.ng : -s.ng;
+  vertex.position = s.position + vertex.ng * s.offset;
+  Vec3 n = normalize_or(interpolate(scene.normals, triangle, hit.u, hit.v), vertex.ng);
+  if (glm::dot(n, vertex.ng) < 0) n = -n;
+  vertex.frame = frame_about(n);
+  // Near silhouettes the shading normal can turn away from the eye while the surface does not: lift wo to its horizon, so
+  // that such places are not black.
+  vertex.wo = -d * vertex.frame;
+  constexpr float lowest = 1e-4f;
+  if (vertex.wo.z < lowest) vertex.wo = glm::normalize(Vec3(vertex.wo.x, vertex.wo.y, lowest));
+  vertex.brdf = get_brdf(scene, triangle, hit.u, hit.v);
+  return true;
+}
+
+PathVertex white_vertex(Vec3 origin, Vec3 n) { return {origin, n, frame_about(n), Vec3(0, 0, 1), Lambert{Vec3(1)}}; }
+
+Vec3 exit_radiance_estimate(const Integrator& integrator, PathVertex vertex, const PathSamples& samples) {
+  const Strategy strategy = integrator.strategy;
+  Vec3 sum(0), throughput(1);
+  for (int depth = 0;; ++depth) {
+    const Vec3 wo = vertex.wo;
+    if (strategy != Strategy::brdf_only) {
+      EnvironmentSample light = sample_environment(integrator.sampler, samples.pair(uint32_t(2 * depth + 1)));
+      if (light.pdf > 0 && glm::dot(vertex.ng, light.direction) > 0) {
+        Vec3 wi = light.direction * vertex.frame;
+        Vec3 f = evaluate(vertex.brdf, wi, wo);
+        if (!black(f) && !integrator.intersector.occluded(vertex.position, light.direction)) {
+          float weight = strategy == Strategy::combined ? mis_weight(light.pdf, pdf(vertex.brdf, wi, wo)) : 1.0f;
+          sum += throughput * f * light.radiance * (wi.z * weight / light.pdf);
+        }
+      }
+    }
+    const bool last = depth == integrator.bounces;
+    if (last && strategy == Strategy::light_only) break;
+    BrdfSample next = sample(vertex.brdf, wo, samples.pair(uint32_t(2 * depth + 2)));
+    if (!(next.pdf > 0)) break;
+    Vec3 d = vertex.frame * next.wi;
+    if (glm::dot(vertex.ng, d) <= 0) break;
+    throughput *= next.weight;
+    if (black(throughput)) break;
+    Hit hit;
+    bool leaves = last ? !integrator.intersector.occluded(vertex.position, d) : !integrator.intersector.nearest(vertex.position, d, hit);
+    if (leaves && strategy != Strategy::light_only) {
+      float weight = strategy == Strategy::combined ? mis_weight(next.pdf, environment_pdf(integrator.sampler, d)) : 1.0f;
+      sum += throughput * radiance(*integrator.environment, d) * weight;
+    }
+    if (leaves || last || !make_vertex(*integrator.scene, hit, d, vertex)) break;
+  }
+  return sum;
+}
+
+}  // namespace lambent::reference

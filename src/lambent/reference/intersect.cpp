@@ -1,0 +1,127 @@
+// Ray tracing by Embree 3: one scene, watertight ("robust") traversal, single rays.
+#include <lambent/core/parallel.h>
+#include <lambent/reference/intersect.h>
+
+#include <embree3/rtcore.h>
+
+#include <cstring>
+
+namespace lambent::reference {
+
+struct Intersector::Impl {
+  const Scene* scene = nullptr;
+  RTCDevice device = nullptr;
+  RTCScene bvh = nullptr;
+  ~Impl() {
+    if (bvh) rtcReleaseScene(bvh);
+    if (device) rtcReleaseDevice(device);
+  }
+};
+
+namespace {
+
+// 8 were enough for every direction steeper than 1e-5 to the plane; at flatter ones the rounding of the direction itself decides.
+constexpr float offset_ulps = 16;
+
+struct CameraContext {
+  RTCIntersectContext context;  // first, so that Embree's pointer to it is a pointer to this
+  const Scene* scene;
+};
+
+// Refuses backs of one-sided triangles. Embree's Ng is cross(v1 - v0, v2 - v0): it points to the front.
+void skip_backs(const RTCFilterFunctionNArguments* args) {
+  const Scene& scene = *reinterpret_cast<const CameraContext*>(args->context)->scene;
+  for (unsigned i = 0; i < args->N; ++i) {
+    if (args->valid[i] == 0) continue;
+    if (scene.triangles[RTCHitN_primID(args->hit, args->N, i)].two_sided) continue;
+    float facing = RTCRayN_dir_x(args->ray, args->N, i) * RTCHitN_Ng_x(args->hit, args->N, i) +
+                   RTCRayN_dir_y(args->ray, args->N, i) * RTCHitN_Ng_y(args->hit, args->N, i) +
+                   RTCRayN_dir_z(args->ray, args->N, i) * RTCHitN_Ng_z(args->hit, args->N, i);
+    if (facing >= 0) args->valid[i] = 0;
+  }
+}
+
+void set_ray(RTCRay& ray, Vec3 origin, Vec3 d) {
+  ray.org_x = origin.x, ray.org_y = origin.y, ray.org_z = origin.z, ray.tnear = 0;
+  ray.dir_x = d.x, ray.dir_y = d.y, ray.dir_z = d.z, ray.tfar = INFINITY;
+  ray.time = 0, ray.mask = ~0u, ray.id = 0, ray.flags = 0;
+}
+
+bool trace(RTCScene bvh, RTCIntersectContext& context, Vec3 origin, Vec3 d, Hit& hit) {
+  RTCRayHit r;
+  set_ray(r.ray, origin, d);
+  r.hit.geomID = RTC_INVALID_GEOMETRY_ID, r.hit.instID[0] = RTC_INVALID_GEOMETRY_ID;
+  rtcIntersect1(bvh, &context, &r);
+  if (r.hit.geomID == RTC_INVALID_GEOMETRY_ID) return false;
+  hit = {r.hit.primID, r.hit.u, r.hit.v};
+  return true;
+}
+
+}  // namespace
+
+Result<Intersector> Intersector::make(const Scene& scene) {
+  if (scene.triangles.empty()) return Error{scene.path, "no triangles to trace"};
+  auto impl = std::make_shared<Impl>();
+  impl->scene = &scene;
+  impl->device = rtcNewDevice(nullptr);
+  if (!impl->device) return Error{scene.path, "the ray tracer cannot start"};
+  impl->bvh = rtcNewScene(impl->device);
+  rtcSetSceneFlags(impl->bvh, RTCSceneFlags(RTC_SCENE_FLAG_ROBUST | RTC_SCENE_FLAG_CONTEXT_FILTER_FUNCTION));
+  RTCGeometry mesh = rtcNewGeometry(impl->device, RTC_GEOMETRY_TYPE_TRIANGLE);
+  // Embree's own buffers: it reads 16 bytes at the last vertex.
+  void* positions = rtcSetNewGeometryBuffer(mesh, RTC_BUFFER_TYPE_VERTEX, 0, RTC_FORMAT_FLOAT3, sizeof(Vec3), scene.positions.size());
+  auto* corners = static_cast<uint32_t*>(rtcSetNewGeometryBuffer(mesh, RTC_BUFFER_TYPE_INDEX, 0, RTC_FORMAT_UINT3,
+                                                                 3 * sizeof(uint32_t), scene.triangles.size()));
+  if (positions && corners) {
+    std::memcpy(positions, scene.positions.data(), scene.positions.size() * sizeof(Vec3));
+    for (const Triangle& t : scene.triangles) corners = std::copy(t.v, t.v + 3, corners);
+    rtcCommitGeometry(mesh);
+    rtcAttachGeometry(impl->bvh, mesh);
+    // Which of two triangles at the same distance is hit depends on the order in the tree.
+    run_serially([&] { rtcJoinCommitScene(impl->bvh); });
+  }
+  rtcReleaseGeometry(mesh);
+  if (rtcGetDeviceError(impl->device) != RTC_ERROR_NONE) return Error{scene.path, "not enough memory to trace the scene"};
+  Intersector intersector;
+  intersector.impl_ = std::move(impl);
+  return intersector;
+}
+
+bool Intersector::nearest(Vec3 origin, Vec3 d, Hit& hit) const {
+  RTCIntersectContext context;
+  rtcInitIntersectContext(&context);
+  return trace(impl_->bvh, context, origin, d, hit);
+}
+
+bool Intersector::nearest_visible(Vec3 origin, Vec3 d, Hit& hit) const {
+  CameraContext camera;
+  rtcInitIntersectContext(&camera.context);
+  camera.context.filter = skip_backs, camera.scene = impl_->scene;
+  return trace(impl_->bvh, camera.context, origin, d, hit);
+}
+
+bool Intersector::occluded(Vec3 origin, Vec3 d) const {
+  RTCIntersectContext context;
+  rtcInitIntersectContext(&context);
+  RTCRay ray;
+  set_ray(ray, origin, d);
+  rtcOccluded1(impl_->bvh, &context, &ray);
+  return ray.tfar < 0;
+}
+
+SurfacePoint surface_point(const Scene& scene, const Hit& hit) {
+  const Triangle& t = scene.triangles[hit.triangle];
+  Vec3 a = scene.positions[t.v[0]], b = scene.positions[t.v[1]], c = scene.positions[t.v[2]];
+  // Double precision: the only rounding left is the last one, to float.
+  glm::dvec3 ab = glm::dvec3(b) - glm::dvec3(a), ac = glm::dvec3(c) - glm::dvec3(a);
+  glm::dvec3 p = glm::dvec3(a) + double(hit.u) * ab + double(hit.v) * ac, n = glm::cross(ab, ac);
+  double length = glm::length(n);
+  Vec3 largest = glm::max(glm::max(glm::abs(a), glm::abs(b)), glm::abs(c));
+  SurfacePoint s;
+  s.position = Vec3(p);
+  s.ng = length > 0 ? Vec3(n / length) : Vec3(0, 0, 1);
+  s.offset = offset_ulps * 0x1p-24f * std::max({largest.x, largest.y, largest.z});
+  return s;
+}
+
+}  // namespace lambent::reference
