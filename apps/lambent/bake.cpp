@@ -1,0 +1,115 @@
+#include "commands.h"
+#include "options.h"
+
+#include <lambent/bake/bake.h>
+#include <lambent/baked/baked_file.h>
+
+#include <fmt/format.h>
+
+#include <chrono>
+
+namespace lambent::tool {
+namespace {
+
+struct BakeCommand {
+  SceneOptions scene;
+  BakeOptions bake;
+  std::string output, shadows = "on", precision = "half";
+};
+
+using Clock = std::chrono::steady_clock;
+double seconds_since(Clock::time_point start) { return std::chrono::duration<double>(Clock::now() - start).count(); }
+
+int run_bake(Context& context, BakeCommand o) {
+  o.bake.shadows = o.shadows == "on";
+  if (!o.bake.shadows) o.bake.bounces = 0;
+  o.bake.precision = o.precision == "half" ? Precision::half : Precision::single;
+  if (auto ok = check_output(o.output, {"glb"}); !ok) return fail(ok.error());
+
+  auto start = Clock::now();
+  auto scene = load_prepared_scene(o.scene);
+  if (!scene) return fail(scene.error());
+  const double load_seconds = seconds_since(start);
+
+  start = Clock::now();
+  auto tracer = Tracer::build(*scene);
+  if (!tracer) return fail(tracer.error());
+  const Receivers receivers = make_vertex_receivers(*scene);
+  const double build_seconds = seconds_since(start);
+
+  BakeReport report;
+  auto transfer = bake(*scene, *tracer, receivers, o.bake, &report, &context.progress);
+  if (!transfer) return fail(transfer.error());
+
+  nlohmann::json provenance{
+      {"generator", "lambent " LAMBENT_VERSION},
+      {"input", {{"name", scene->path.substr(scene->path.find_last_of('/') + 1)}, {"xxh3_128", scene->hash}}},
+      {"options",
+       {{"order", o.bake.order}, {"samples", o.bake.samples}, {"bounces", o.bake.bounces}, {"shadows", o.bake.shadows},
+        {"ground", o.scene.ground}, {"max_edge", o.scene.max_edge}, {"seed", o.bake.seed}, {"precision", o.precision}}},
+      {"report", {{"receivers", report.receivers}, {"buried", report.buried}}}};
+  if (report.error >= 0) provenance["report"]["error"] = report.error;
+
+  start = Clock::now();
+  if (auto ok = save_baked(o.output, *scene, receivers, *transfer, provenance.dump()); !ok) return fail(ok.error());
+  const double save_seconds = seconds_since(start);
+
+  const double bytes_each = double(report.bytes) / double(report.receivers);
+  if (context.json) {
+    nlohmann::json result{{"output", o.output},
+                          {"receivers", report.receivers},
+                          {"buried", report.buried},
+                          {"vertices", scene->positions.size()},
+                          {"triangles", scene->triangles.size()},
+                          {"rays", report.rays},
+                          {"channels", transfer->channels},
+                          {"seconds", {{"load", load_seconds}, {"build", build_seconds}, {"trace", report.trace_seconds},
+                                       {"bounce", report.bounce_seconds}, {"save", save_seconds}}},
+                          {"rays_per_second", report.trace_seconds > 0 ? double(report.rays) / report.trace_seconds : 0.0},
+                          {"bytes", report.bytes},
+                          {"bytes_per_receiver", bytes_each},
+                          {"operator_bytes", report.operator_bytes},
+                          {"operator_kept", report.operator_kept},
+                          {"working_memory", report.working_memory}};
+    result["error"] = report.error >= 0 ? nlohmann::json(report.error) : nlohmann::json();
+    print_json(result);
+    return success;
+  }
+  fmt::print("{}\n", o.output);
+  fmt::print("  receivers  {} ({} vertices, {} triangles{})\n", human_count(report.receivers), human_count(scene->positions.size()),
+             human_count(scene->triangles.size()), report.buried ? "; " + human_count(report.buried) + " buried, filled from neighbours" : "");
+  fmt::print("  rays       {} ({:.1f} million a second)\n", human_count(report.rays),
+             report.trace_seconds > 0 ? double(report.rays) / report.trace_seconds / 1e6 : 0.0);
+  fmt::print("  time       load {}, build {}, trace {}, bounce {}, save {}\n", human_seconds(load_seconds), human_seconds(build_seconds),
+             human_seconds(report.trace_seconds), human_seconds(report.bounce_seconds), human_seconds(save_seconds));
+  fmt::print("  size       {} a receiver, {} in all (order {}, {} channel{}, {})\n", human_bytes(bytes_each), human_bytes(double(report.bytes)),
+             transfer->order, transfer->channels, transfer->channels == 1 ? "" : "s", o.precision);
+  if (report.operator_kept < 1)
+    fmt::print("  memory     {:.0f}% of the gather operator fitted; the rest was traced again for each bounce\n", 100 * report.operator_kept);
+  if (report.error >= 0) fmt::print("  error      {:.2f}% RMS, estimated from half-sample gathers\n", 100 * report.error);
+  return success;
+}
+
+}  // namespace
+
+void add_bake(CLI::App& app, Run& run) {
+  auto o = std::make_shared<BakeCommand>();
+  CLI::App* c = app.add_subcommand("bake", "Bake a scene's diffuse light transport");
+  o->scene.add_to(*c);
+  c->add_option("-o,--output", o->output, "Baked file to write (.glb)")->required();
+  c->add_option("--order", o->bake.order, "Bands of the lighting's spherical harmonics")->check(CLI::Range(1, max_sh_order))->capture_default_str();
+  c->add_option("--samples", o->bake.samples, "Rays a receiver")->check(CLI::Range(1, 1 << 20))->capture_default_str();
+  auto* bounces = c->add_option("--bounces", o->bake.bounces, "Reflections between surfaces")->check(CLI::Range(0, 64))->capture_default_str();
+  c->add_option("--shadows", o->shadows, "off: open light everywhere, no shadows and no bounces")->check(CLI::IsMember({"on", "off"}))->capture_default_str();
+  c->add_option("--memory", o->bake.memory, "Working memory beyond scene and result; e.g. 500MB, 2GiB")
+      ->transform(CLI::AsSizeValue(false))->default_str("4GiB");
+  c->add_option("--seed", o->bake.seed, "Of the ray directions")->capture_default_str();
+  c->add_option("--precision", o->precision, "Of the stored transfer")->check(CLI::IsMember({"half", "single"}))->capture_default_str();
+  c->callback([o, bounces, &run] {
+    if (o->shadows == "off" && bounces->count() && o->bake.bounces > 0)
+      throw CLI::ValidationError("--shadows off has no bounces: leave --bounces out, or set it to 0");
+    run = [o](Context& context) { return run_bake(context, *o); };
+  });
+}
+
+}  // namespace lambent::tool

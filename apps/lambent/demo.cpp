@@ -1,0 +1,147 @@
+#include "commands.h"
+#include "options.h"
+
+#include <lambent/bake/bake.h>
+#include <lambent/baked/baked_file.h>
+#include <lambent/core/file.h>
+#include <lambent/image/compare.h>
+#include <lambent/light/project.h>
+#include <lambent/light/sky.h>
+#include <lambent/reference/path_tracer.h>
+#include <lambent/relight/relight.h>
+#include <lambent/render/render.h>
+#include <lambent/scene/procedural.h>
+
+#include <fmt/format.h>
+
+#include <chrono>
+#include <filesystem>
+
+namespace lambent::tool {
+namespace {
+
+using Clock = std::chrono::steady_clock;
+double seconds_since(Clock::time_point start) { return std::chrono::duration<double>(Clock::now() - start).count(); }
+
+struct DemoCommand {
+  std::string folder = "out";
+  int spp = 256, width = 480, height = 360;
+  float detail = 1, exposure = -0.5f;
+};
+
+struct Hour {
+  const char* name;
+  float elevation, azimuth;
+};
+constexpr Hour hours[] = {{"morning", 22, 160}, {"noon", 68, 75}, {"evening", 9, 35}};
+
+struct Row {
+  std::string name;
+  ImageDifference order6, sky;
+  double relight_ms, reference_seconds;
+};
+
+int run_demo(Context& context, const DemoCommand& o) {
+  std::error_code status;
+  std::filesystem::create_directories(o.folder, status);
+  if (!std::filesystem::is_directory(o.folder)) return fail({o.folder, "cannot be made: " + status.message()});
+  auto at = [&](const std::string& name) { return o.folder + "/" + name; };
+
+  const Scene scene = make_courtyard(o.detail);
+  auto tracer = Tracer::build(scene);
+  if (!tracer) return fail(tracer.error());
+  const Receivers receivers = make_vertex_receivers(scene);
+  const CornerReceivers corners = corner_receivers(scene, receivers.front, receivers.back);
+  const Camera camera = courtyard_camera();
+  BakeOptions options;
+  BakeReport report;
+  auto transfer = bake(scene, *tracer, receivers, options, &report, &context.progress);
+  if (!transfer) return fail(transfer.error());
+  const nlohmann::json provenance{{"generator", "lambent " LAMBENT_VERSION}, {"input", "courtyard (built in)"},
+                                  {"options", {{"order", options.order}, {"samples", options.samples}, {"bounces", options.bounces}}}};
+  if (auto ok = save_baked(at("courtyard.glb"), scene, receivers, *transfer, provenance.dump()); !ok) return fail(ok.error());
+
+  std::vector<Row> rows;
+  Relit relit;
+  for (const Hour& hour : hours) {
+    SkyOptions sky;
+    sky.elevation = hour.elevation, sky.azimuth = hour.azimuth;
+    auto env = make_sky(sky);
+    if (!env) return fail(env.error());
+    const std::vector<Vec3> light = project_environment(*env, options.order);
+    relight(*transfer, light, relit);  // the first call sizes the output
+    const auto start = Clock::now();
+    relight(*transfer, light, relit);
+    Row row{hour.name, {}, {}, 1e3 * seconds_since(start), 0};
+
+    const Environment smooth = reconstruct_environment(light);
+    const RenderOptions view{o.width, o.height, 64, nullptr, true};
+    auto picture = render(scene, *tracer, corners, relit, camera, view, &context.progress);
+    if (!picture) return fail(picture.error());
+    ReferenceOptions truth;
+    truth.width = o.width, truth.height = o.height, truth.spp = o.spp, truth.bounces = options.bounces, truth.background = false;
+    const auto traced = Clock::now();
+    auto same_light = path_trace(scene, smooth, camera, truth, &context.progress);
+    if (!same_light) return fail(same_light.error());
+    row.reference_seconds = seconds_since(traced);
+    auto full_light = path_trace(scene, *env, camera, truth, &context.progress);
+    if (!full_light) return fail(full_light.error());
+    auto d6 = compare_images(*picture, same_light->image, o.exposure), dsky = compare_images(*picture, full_light->image, o.exposure);
+    if (!d6) return fail(d6.error());
+    if (!dsky) return fail(dsky.error());
+    row.order6 = *d6, row.sky = *dsky;
+
+    // The pictures to look at have the sky behind them.
+    RenderOptions shown = view;
+    shown.background = &*env;
+    auto pretty = render(scene, *tracer, corners, relit, camera, shown, &context.progress);
+    if (!pretty) return fail(pretty.error());
+    const std::pair<std::string, Image> files[] = {
+        {"relit_" + row.name, std::move(*pretty)},
+        {"reference_" + row.name, same_light->image},
+        {"reference_sky_" + row.name, full_light->image},
+        {"error_" + row.name, difference_picture(*picture, same_light->image, o.exposure)}};
+    for (const auto& [name, image] : files) {
+      // Error maps are already pictures of displayed values.
+      if (auto ok = save_image(at(name + ".png"), image, name.starts_with("error") ? 0 : o.exposure); !ok) return fail(ok.error());
+      if (name.starts_with("relit"))
+        if (auto ok = save_image(at(name + ".exr"), image); !ok) return fail(ok.error());
+    }
+    rows.push_back(row);
+  }
+
+  nlohmann::json json{{"scene", {{"vertices", scene.positions.size()}, {"triangles", scene.triangles.size()}}},
+                      {"bake", {{"receivers", report.receivers}, {"rays", report.rays}, {"trace_seconds", report.trace_seconds},
+                                {"bounce_seconds", report.bounce_seconds}, {"bytes_per_receiver", double(report.bytes) / double(report.receivers)},
+                                {"error", report.error}}},
+                      {"rows", nlohmann::json::array()}};
+  std::string table = fmt::format(
+      "Courtyard: {} vertices, {} receivers, {} rays; traced in {}, {} bounces in {}; {:.0f} bytes a receiver; estimated error {:.2f}%\n\n"
+      "| sky | relight, ms | against the reference under the same order-{} light: PSNR, dB | FLIP | against the full sky: PSNR, dB | FLIP | reference, s |\n"
+      "|---|---|---|---|---|---|---|\n",
+      human_count(scene.positions.size()), human_count(report.receivers), human_count(report.rays), human_seconds(report.trace_seconds),
+      options.bounces, human_seconds(report.bounce_seconds), double(report.bytes) / double(report.receivers), 100 * report.error, options.order);
+  for (const Row& r : rows) {
+    table += fmt::format("| {} | {:.2f} | {:.1f} | {:.3f} | {:.1f} | {:.3f} | {:.1f} |\n", r.name, r.relight_ms, r.order6.psnr, r.order6.flip,
+                         r.sky.psnr, r.sky.flip, r.reference_seconds);
+    json["rows"].push_back({{"sky", r.name}, {"relight_ms", r.relight_ms}, {"psnr", r.order6.psnr}, {"flip", r.order6.flip},
+                            {"psnr_full_sky", r.sky.psnr}, {"flip_full_sky", r.sky.flip}, {"reference_seconds", r.reference_seconds}});
+  }
+  if (auto ok = write_file_atomically(at("summary.md"), table); !ok) return fail(ok.error());
+  if (context.json) print_json(json);
+  else fmt::print("{}\nPictures and table are in {}/\n", table, o.folder);
+  return success;
+}
+
+}  // namespace
+
+void add_demo(CLI::App& app, Run& run) {
+  auto o = std::make_shared<DemoCommand>();
+  CLI::App* c = app.add_subcommand("demo", "Bake the built-in courtyard, relight it under three skies, judge it by path tracing");
+  c->add_option("-o,--output", o->folder, "Folder to write to")->capture_default_str();
+  c->add_option("--spp", o->spp, "Paths a pixel of the reference")->check(CLI::Range(1, 1 << 16))->capture_default_str();
+  c->add_option("--detail", o->detail, "Tessellation of the scene; 1 is 50,000 vertices and more")->check(CLI::Range(0.05f, 8.0f))->capture_default_str();
+  c->callback([o, &run] { run = [o](Context& context) { return run_demo(context, *o); }; });
+}
+
+}  // namespace lambent::tool

@@ -1,0 +1,110 @@
+#include "commands.h"
+#include "options.h"
+
+#include <lambent/baked/baked_file.h>
+#include <lambent/core/file.h>
+#include <lambent/receivers/receivers.h>
+#include <lambent/scene/load.h>
+
+#include <fmt/format.h>
+
+#include <set>
+
+namespace lambent::tool {
+namespace {
+
+nlohmann::json vector_json(Vec3 v) { return {v.x, v.y, v.z}; }
+
+nlohmann::json describe_scene(const Scene& scene) {
+  const Bounds box = bounds(scene);
+  size_t two_sided = 0;
+  for (const Triangle& t : scene.triangles) two_sided += t.two_sided;
+  nlohmann::json materials = nlohmann::json::array();
+  for (const Material& m : scene.materials)
+    materials.push_back({{"name", m.name}, {"base_color", vector_json(m.base_color)}, {"textured", m.base_color_texture >= 0},
+                         {"double_sided", m.double_sided}});
+  return {{"vertices", scene.positions.size()}, {"triangles", scene.triangles.size()}, {"two_sided_triangles", two_sided},
+          {"parts", scene.parts.size()}, {"textures", scene.textures.size()}, {"materials", materials},
+          {"bounds", {{"min", vector_json(box.min)}, {"max", vector_json(box.max)}}}, {"receivers", make_vertex_receivers(scene).count()},
+          {"warnings", scene.warnings}};
+}
+
+void print_scene(const nlohmann::json& d) {
+  fmt::print("  {} vertices, {} triangles ({} two-sided) in {} parts; {} materials, {} textures\n", human_count(d["vertices"].get<size_t>()),
+             human_count(d["triangles"].get<size_t>()), human_count(d["two_sided_triangles"].get<size_t>()), d["parts"].get<size_t>(),
+             d["materials"].size(), d["textures"].get<size_t>());
+  const auto& a = d["bounds"]["min"];
+  const auto& b = d["bounds"]["max"];
+  fmt::print("  from ({:.4g}, {:.4g}, {:.4g}) to ({:.4g}, {:.4g}, {:.4g})\n", a[0].get<double>(), a[1].get<double>(), a[2].get<double>(),
+             b[0].get<double>(), b[1].get<double>(), b[2].get<double>());
+  fmt::print("  {} receivers at its vertices\n", human_count(d["receivers"].get<size_t>()));
+}
+
+int inspect_picture(Context& context, const std::string& path) {
+  auto image = load_image(path);
+  if (!image) return fail(image.error());
+  size_t negative = 0, broken = 0;
+  double peak = 0, sum = 0;
+  for (Vec3 p : image->rgb) {
+    if (!is_finite(p)) {
+      ++broken;
+      continue;
+    }
+    negative += p.x < 0 || p.y < 0 || p.z < 0;
+    peak = std::max(peak, double(luminance(p))), sum += luminance(p);
+  }
+  const double mean = sum / double(std::max<size_t>(1, image->rgb.size() - broken));
+  if (context.json)
+    print_json({{"file", path}, {"kind", "image"}, {"width", image->width}, {"height", image->height}, {"alpha", !image->alpha.empty()},
+                {"mean_luminance", mean}, {"peak_luminance", peak}, {"negative_pixels", negative}, {"non_finite_pixels", broken}});
+  else
+    fmt::print("{}\n  picture, {} x {}{}\n  luminance: mean {:.4g}, peak {:.4g}; {} pixels with a negative channel, {} not finite\n", path,
+               image->width, image->height, image->alpha.empty() ? "" : ", with alpha", mean, peak, negative, broken);
+  return success;
+}
+
+int run_inspect(Context& context, const std::string& path) {
+  const std::string extension = file_extension(path);
+  if (std::set<std::string>{"hdr", "exr", "png", "jpg", "jpeg"}.contains(extension)) return inspect_picture(context, path);
+  if ((extension == "glb" || extension == "gltf") && is_baked(path)) {
+    auto baked = load_baked(path);
+    if (!baked) return fail(baked.error());
+    const Transfer& t = baked->transfer;
+    nlohmann::json d{{"file", path}, {"kind", "baked"}, {"scene", describe_scene(baked->scene)},
+                     {"transfer", {{"order", t.order}, {"channels", t.channels}, {"receivers", t.receivers}, {"bytes", t.bytes()},
+                                   {"precision", t.precision == Precision::half ? "half" : "single"}}},
+                     {"provenance", nlohmann::json::parse(baked->provenance, nullptr, false)}};
+    if (context.json) {
+      print_json(d);
+    } else {
+      fmt::print("{}\n  baked: order {}, {} channel{}, {} receivers, {} ({})\n", path, t.order, t.channels, t.channels == 1 ? "" : "s",
+                 human_count(t.receivers), human_bytes(double(t.bytes())), t.precision == Precision::half ? "half" : "single");
+      print_scene(d["scene"]);
+      fmt::print("  provenance {}\n", d["provenance"].dump(-1, ' ', false, nlohmann::json::error_handler_t::replace));
+    }
+    return success;
+  }
+  auto scene = load_scene(path);
+  if (!scene) return fail(scene.error());
+  nlohmann::json d = describe_scene(*scene);
+  d["file"] = path, d["kind"] = "scene";
+  if (context.json) {
+    print_json(d);
+  } else {
+    warn(scene->warnings);
+    fmt::print("{}\n", path);
+    print_scene(d);
+  }
+  return success;
+}
+
+}  // namespace
+
+void add_inspect(CLI::App& app, Run& run) {
+  auto path = std::make_shared<std::string>();
+  CLI::App* c = app.add_subcommand("inspect", "Say what is in a scene, a baked file, an environment or a picture");
+  c->add_option("file", *path, "File")->required();
+  c->callback([path, &run] { run = [path](Context& context) { return run_inspect(context, *path); }; });
+}
+
+}  // namespace lambent::tool

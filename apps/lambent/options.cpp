@@ -1,0 +1,126 @@
+#include "options.h"
+
+#include <lambent/core/file.h>
+#include <lambent/scene/load.h>
+#include <lambent/scene/refine.h>
+
+#include <unistd.h>
+
+#include <charconv>
+#include <filesystem>
+
+namespace lambent::tool {
+
+const std::map<std::string, ShWindow> window_names{
+    {"none", ShWindow::none}, {"hann", ShWindow::hann}, {"lanczos", ShWindow::lanczos}, {"auto", ShWindow::automatic}};
+
+Result<std::vector<float>> parse_numbers(const std::string& text, size_t count, const std::string& what) {
+  std::vector<float> values;
+  const char* p = text.data();
+  const char* end = p + text.size();
+  while (true) {
+    float value = 0;
+    auto [next, status] = std::from_chars(p, end, value);
+    if (status != std::errc() || !std::isfinite(value)) break;
+    values.push_back(value), p = next;
+    if (p == end || *p != ',') break;
+    ++p;
+  }
+  if (p != end || values.size() != count)
+    return Error{what, "expects " + std::to_string(count) + " numbers separated by commas, not \"" + text + "\""};
+  return values;
+}
+
+void SceneOptions::add_to(CLI::App& command) {
+  command.add_option("scene", path, "Scene: .gltf, .glb, .obj or .ply")->required();
+  command.add_flag("--ground", ground, "Add a tessellated floor under the scene");
+  command.add_option("--max-edge", max_edge, "Split edges longer than this many scene units")->check(CLI::PositiveNumber);
+}
+
+Result<Scene> load_prepared_scene(const SceneOptions& options) {
+  auto scene = load_scene(options.path);
+  if (!scene) return scene;
+  if (options.ground) add_ground(*scene);
+  if (options.max_edge > 0)
+    if (auto ok = split_long_edges(*scene, options.max_edge); !ok) return ok.error();
+  warn(scene->warnings);
+  return scene;
+}
+
+void ViewOptions::add_to(CLI::App& command) {
+  command.add_option("--camera", camera, "EX,EY,EZ,TX,TY,TZ,FOV: eye, target, vertical degrees; or auto")->capture_default_str();
+  command.add_option("--size", size, "Picture size, WIDTHxHEIGHT pixels")->capture_default_str();
+  command.add_option("--exposure", exposure, "Stops that a PNG is brightened by")->check(CLI::Range(-100.0f, 100.0f))->capture_default_str();
+  command.add_option("--background", background, "What lies behind the scene: env, or none (transparent)")
+      ->check(CLI::IsMember({"env", "none"}))->capture_default_str();
+  command.add_option("-o,--output", output, "Picture to write: .png (8-bit sRGB) or .exr (linear)")->required();
+}
+
+namespace {
+
+// What there is to look at: everything but an added floor, unless there is nothing else.
+Bounds subject_bounds(const Scene& scene) {
+  Bounds box;
+  for (const Triangle& t : scene.triangles)
+    if (scene.parts[t.part].name != ground_name)
+      for (uint32_t v : t.v) box.extend(scene.positions[v]);
+  return box.empty() ? bounds(scene) : box;
+}
+
+}  // namespace
+
+Result<View> make_view(const ViewOptions& options, const Scene& scene) {
+  View view;
+  const size_t x = options.size.find('x');
+  auto number = [&](const std::string& digits, int& value) {
+    auto [end, status] = std::from_chars(digits.data(), digits.data() + digits.size(), value);
+    return status == std::errc() && end == digits.data() + digits.size() && value >= 1 && value <= 16384;
+  };
+  if (x == std::string::npos || !number(options.size.substr(0, x), view.width) || !number(options.size.substr(x + 1), view.height))
+    return Error{"--size", "expects WIDTHxHEIGHT, each from 1 to 16384, not \"" + options.size + "\""};
+  if (options.camera == "auto") {
+    view.camera = camera_around(subject_bounds(scene));
+    return view;
+  }
+  auto n = parse_numbers(options.camera, 7, "--camera");
+  if (!n) return n.error();
+  view.camera.eye = {(*n)[0], (*n)[1], (*n)[2]}, view.camera.target = {(*n)[3], (*n)[4], (*n)[5]}, view.camera.fov = (*n)[6];
+  if (!(view.camera.fov > 0 && view.camera.fov < 180)) return Error{"--camera", "field of view must lie between 0 and 180 degrees"};
+  if (view.camera.eye == view.camera.target) return Error{"--camera", "eye and target are the same point"};
+  return view;
+}
+
+void LightOptions::add_to(CLI::App& command) {
+  command.add_option("--env", env, "Environment: a .hdr or .exr file, uniform:R,G,B, or sky:elevation=35,azimuth=45,turbidity=3")->required();
+  command.add_option("--env-rotate", rotate, "YAW,PITCH,ROLL: turn the environment, degrees about +Y, +X, +Z");
+}
+
+Result<Environment> load_light(const LightOptions& options) {
+  auto env = load_environment(options.env);
+  if (env) warn(env->warnings);
+  return env;
+}
+
+Result<Mat3> light_rotation(const LightOptions& options) {
+  if (options.rotate.empty()) return Mat3(1.0f);
+  auto n = parse_numbers(options.rotate, 3, "--env-rotate");
+  if (!n) return n.error();
+  return rotation_from_yaw_pitch_roll({(*n)[0], (*n)[1], (*n)[2]});
+}
+
+Result<void> check_output(const std::string& path, std::initializer_list<const char*> extensions) {
+  const std::string extension = file_extension(path);
+  std::string known;
+  bool fits = false;
+  for (const char* e : extensions) fits |= extension == e, known += (known.empty() ? "." : ", .") + std::string(e);
+  if (!fits) return Error{path, "cannot be written: the name must end in " + known};
+  std::string folder = std::filesystem::path(path).parent_path().string();
+  if (folder.empty()) folder = ".";
+  std::error_code status;
+  if (!std::filesystem::is_directory(folder, status)) return Error{path, "cannot be written: no folder " + folder};
+  if (::access(folder.c_str(), W_OK) != 0) return Error{path, "cannot be written: folder " + folder + " is read-only"};
+  if (std::filesystem::is_directory(path, status)) return Error{path, "is a folder"};
+  return {};
+}
+
+}  // namespace lambent::tool

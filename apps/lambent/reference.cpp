@@ -1,0 +1,73 @@
+#include "commands.h"
+#include "options.h"
+
+#include <lambent/light/project.h>
+#include <lambent/reference/path_tracer.h>
+
+#include <fmt/format.h>
+
+#include <chrono>
+
+namespace lambent::tool {
+namespace {
+
+struct ReferenceCommand {
+  SceneOptions scene;
+  LightOptions light;
+  ViewOptions view;
+  ShWindow window = ShWindow::none;
+  int light_order = 0;
+  ReferenceOptions options;
+};
+
+int run_reference(Context& context, ReferenceCommand o) {
+  if (auto ok = check_output(o.view.output, {"png", "exr"}); !ok) return fail(ok.error());
+  auto rotation = light_rotation(o.light);
+  if (!rotation) return fail(rotation.error());
+  auto scene = load_prepared_scene(o.scene);
+  if (!scene) return fail(scene.error());
+  auto view = make_view(o.view, *scene);
+  if (!view) return fail(view.error());
+  auto env = load_light(o.light);
+  if (!env) return fail(env.error());
+  if (o.light_order) {
+    std::vector<Vec3> light = rotate_sh(make_sh_rotation(o.light_order, *rotation), project_environment(*env, o.light_order));
+    apply_sh_window(o.window, light);
+    *env = reconstruct_environment(light);
+  } else if (!o.light.rotate.empty()) {
+    *env = rotated(*env, *rotation);
+  }
+  o.options.width = view->width, o.options.height = view->height, o.options.background = o.view.background == "env";
+  const auto start = std::chrono::steady_clock::now();
+  auto result = path_trace(*scene, *env, view->camera, o.options, &context.progress);
+  if (!result) return fail(result.error());
+  const double seconds = std::chrono::duration<double>(std::chrono::steady_clock::now() - start).count();
+  if (auto ok = save_image(o.view.output, result->image, o.view.exposure); !ok) return fail(ok.error());
+
+  double variance = 0;
+  for (Vec3 v : result->variance) variance += (double(v.x) + v.y + v.z) / 3;
+  const double noise = std::sqrt(variance / double(result->variance.size()));
+  if (context.json) print_json({{"output", o.view.output}, {"seconds", seconds}, {"spp", o.options.spp}, {"noise_rms", noise}});
+  else fmt::print("{}\n  {} paths a pixel in {}, noise {:.2g} RMS\n", o.view.output, o.options.spp, human_seconds(seconds), noise);
+  return success;
+}
+
+}  // namespace
+
+void add_reference(CLI::App& app, Run& run) {
+  auto o = std::make_shared<ReferenceCommand>();
+  CLI::App* c = app.add_subcommand("reference", "Path-trace a scene: the truth to judge bakes by");
+  o->scene.add_to(*c);
+  o->light.add_to(*c);
+  o->view.add_to(*c);
+  c->add_option("--light-order", o->light_order, "Light by the environment's projection to this many bands, negative light included")
+      ->check(CLI::Range(1, max_sh_order));
+  c->add_option("--window", o->window, "With --light-order: as for render")
+      ->transform(CLI::CheckedTransformer(window_names).description("{none,hann,lanczos,auto}"));
+  c->add_option("--bounces", o->options.bounces, "Reflections between surfaces")->check(CLI::Range(0, 64))->capture_default_str();
+  c->add_option("--spp", o->options.spp, "Paths a pixel")->check(CLI::Range(1, 1 << 20))->capture_default_str();
+  c->add_option("--seed", o->options.seed, "Of the paths")->capture_default_str();
+  c->callback([o, &run] { run = [o](Context& context) { return run_reference(context, *o); }; });
+}
+
+}  // namespace lambent::tool

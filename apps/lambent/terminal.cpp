@@ -1,0 +1,104 @@
+#include "terminal.h"
+
+#include <lambent/core/file.h>
+
+#include <fmt/format.h>
+#include <unistd.h>
+
+#include <chrono>
+#include <csignal>
+#include <cstdio>
+#include <cstdlib>
+#include <memory>
+
+namespace lambent::tool {
+namespace {
+
+using Clock = std::chrono::steady_clock;
+
+bool colour_allowed() {
+  const char* no = std::getenv("NO_COLOR");
+  return ::isatty(2) && !(no && *no);
+}
+
+// One line that is drawn over itself, once a stage has run for a second.
+class ProgressLine {
+ public:
+  void operator()(const std::string& stage, double fraction) {
+    const auto now = Clock::now();
+    if (fraction == 0) started_ = now, drawn_ = {};
+    const double run = std::chrono::duration<double>(now - started_).count();
+    if (fraction >= 1) {
+      if (shown_) std::fprintf(stderr, "\r\033[K"), std::fflush(stderr);
+      shown_ = false;
+      return;
+    }
+    if (run < 1 || std::chrono::duration<double>(now - drawn_).count() < 0.1) return;
+    drawn_ = now, shown_ = true;
+    const std::string left = fraction > 0.01 ? human_seconds(run / fraction * (1 - fraction)) + " left" : "";
+    std::fprintf(stderr, "\r\033[K%s  %3d%%  %s", stage.c_str(), int(100 * fraction), left.c_str());
+    std::fflush(stderr);
+  }
+
+ private:
+  Clock::time_point started_, drawn_;
+  bool shown_ = false;
+};
+
+Progress* interrupted_progress = nullptr;
+std::sig_atomic_t interruptions = 0;
+
+extern "C" void on_interrupt(int) {
+  if (interrupted_progress) interrupted_progress->cancel();
+  if (++interruptions > 1) {  // asked twice: leave now, but leave nothing half-written
+    remove_unfinished_files();
+    ::_exit(failure);
+  }
+}
+
+}  // namespace
+
+Context::Context() : progress(::isatty(2) ? Progress::Report(ProgressLine()) : Progress::Report()) {
+  interrupted_progress = &progress;
+  struct sigaction action = {};
+  action.sa_handler = on_interrupt;
+  ::sigaction(SIGINT, &action, nullptr);
+  ::sigaction(SIGTERM, &action, nullptr);
+  ::signal(SIGPIPE, SIG_IGN);
+}
+
+int fail(const Error& error) {
+  fmt::print(stderr, "{} {}\n", colour_allowed() ? "\033[31mlambent:\033[0m" : "lambent:", error.text());
+  return error.where.starts_with("--") ? bad_usage : failure;
+}
+
+void warn(const std::string& message) {
+  fmt::print(stderr, "{} {}\n", colour_allowed() ? "\033[33mwarning:\033[0m" : "warning:", message);
+}
+void warn(const std::vector<std::string>& messages) {
+  for (const std::string& m : messages) warn(m);
+}
+
+void print_json(const nlohmann::json& value) { fmt::print("{}\n", value.dump(2, ' ', false, nlohmann::json::error_handler_t::replace)); }
+
+std::string human_bytes(double bytes) {
+  if (bytes < 1000) return fmt::format("{:.0f} bytes", bytes);
+  const char* units[] = {"kB", "MB", "GB", "TB"};
+  int unit = -1;
+  while (bytes >= 1000 && unit < 3) bytes /= 1000, ++unit;
+  return fmt::format("{:.3g} {}", bytes, units[unit]);
+}
+
+std::string human_seconds(double s) {
+  if (s < 10) return fmt::format("{:.2f} s", s);
+  if (s < 120) return fmt::format("{:.0f} s", s);
+  return fmt::format("{} min {} s", int(s) / 60, int(s) % 60);
+}
+
+std::string human_count(size_t count) {
+  std::string digits = std::to_string(count);
+  for (int i = int(digits.size()) - 3; i > 0; i -= 3) digits.insert(size_t(i), ",");
+  return digits;
+}
+
+}  // namespace lambent::tool

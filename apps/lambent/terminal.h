@@ -1,0 +1,34 @@
+#pragma once
+// What all commands share: results on stdout, progress and messages on stderr, Ctrl-C, exit codes.
+#include <lambent/core/progress.h>
+#include <lambent/core/result.h>
+
+#include <nlohmann/json.hpp>
+
+#include <string>
+#include <vector>
+
+namespace lambent::tool {
+
+inline constexpr int success = 0, failure = 1, bad_usage = 2;
+
+struct Context {
+  bool json = false;
+  int threads = 0;
+  Progress progress;
+  Context();  // progress goes to stderr if that is a terminal; Ctrl-C and SIGTERM cancel it
+};
+
+// "lambent: where: message" on stderr; returns `failure`, or `bad_usage` where the place is an option.
+int fail(const Error& error);
+void warn(const std::string& message);
+void warn(const std::vector<std::string>& messages);
+
+void print_json(const nlohmann::json& value);
+
+// "1.5 MB", "830 bytes"; "12.3 s", "2 min 5 s"; 1234567 -> "1,234,567".
+std::string human_bytes(double bytes);
+std::string human_seconds(double seconds);
+std::string human_count(size_t count);
+
+}  // namespace lambent::tool
