@@ -1,0 +1,37 @@
+#pragma once
+// Benchmarks print one JSON object a line: name, ours, limit (or peer), ratio, and what they ran on. Limits are measured in the
+// same run, on the same data. Nothing here is a test: machines are shared and noisy.
+#include <lambent/scene/scene.h>
+
+#include <nlohmann/json.hpp>
+
+#include <chrono>
+#include <optional>
+#include <string>
+
+namespace lambent::bench {
+
+// Prints {"name": ..., "ours": ..., "limit": ..., "ratio": ours / limit, "unit": ..., ...more}.
+void report(const std::string& name, double ours, double limit, const std::string& unit, const std::string& limit_is,
+            nlohmann::json more = nlohmann::json::object());
+
+// Least time of `runs` calls, seconds. The least is what the code can do when the machine lets it.
+template <class F>
+double least_seconds(int runs, F&& f) {
+  double least = 1e300;
+  for (int i = 0; i < runs; ++i) {
+    const auto start = std::chrono::steady_clock::now();
+    f();
+    least = std::min(least, std::chrono::duration<double>(std::chrono::steady_clock::now() - start).count());
+  }
+  return least;
+}
+
+// A shared mesh on a floor, if the data folder (LAMBENT_DATA, or ../shared/data beside the repository) is there.
+std::optional<Scene> data_scene(const std::string& name, bool ground);
+
+void bench_bake();
+void bench_relight();
+void bench_scaling();
+
+}  // namespace lambent::bench

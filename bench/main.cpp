@@ -1,0 +1,50 @@
+#include "bench.h"
+
+#include <lambent/core/parallel.h>
+#include <lambent/scene/load.h>
+#include <lambent/scene/refine.h>
+
+#include <fmt/format.h>
+
+#include <cstdlib>
+#include <cstring>
+#include <filesystem>
+
+namespace lambent::bench {
+
+void report(const std::string& name, double ours, double limit, const std::string& unit, const std::string& limit_is, nlohmann::json more) {
+  nlohmann::ordered_json line{{"name", name}, {"ours", ours}, {"limit", limit}, {"ratio", ours / limit}, {"unit", unit},
+                              {"limit_is", limit_is}, {"threads", thread_count()}};
+  for (auto& [key, value] : more.items()) line[key] = value;
+  fmt::print("{}\n", line.dump());
+  std::fflush(stdout);
+}
+
+std::optional<Scene> data_scene(const std::string& name, bool ground) {
+  const char* given = std::getenv("LAMBENT_DATA");
+  const std::filesystem::path repository = std::filesystem::path(__FILE__).parent_path().parent_path();
+  const std::filesystem::path folder = given ? std::filesystem::path(given) : repository.parent_path() / "shared" / "data";
+  auto scene = load_scene((folder / "meshes" / name).string());
+  if (!scene) {
+    fmt::print(stderr, "skipped: {}\n", scene.error().text());
+    return std::nullopt;
+  }
+  if (ground) add_ground(*scene);
+  return std::move(*scene);
+}
+
+}  // namespace lambent::bench
+
+int main(int argc, char** argv) {
+  using namespace lambent::bench;
+  const std::pair<const char*, void (*)()> all[] = {{"bake", bench_bake}, {"relight", bench_relight}, {"scaling", bench_scaling}};
+  bool known = argc == 1;
+  for (int i = 1; i < argc; ++i)
+    for (auto [name, run] : all) known |= !std::strcmp(argv[i], name);
+  if (!known) return fmt::print(stderr, "usage: lambent-bench [bake] [relight] [scaling]\n"), 2;
+  for (auto [name, run] : all) {
+    bool wanted = argc == 1;
+    for (int i = 1; i < argc; ++i) wanted |= !std::strcmp(argv[i], name);
+    if (wanted) run();
+  }
+}

@@ -1,0 +1,73 @@
+// Relighting against the memory it streams: the limit is a plain SIMD sum over the same bytes, same threads, same run.
+#include "bench.h"
+
+#include <lambent/core/half.h>
+#include <lambent/core/parallel.h>
+#include <lambent/core/random.h>
+#include <lambent/relight/relight.h>
+
+#include <atomic>
+#include <cstring>
+
+namespace lambent::bench {
+namespace {
+
+// Bytes a second of reading memory once, with as many running sums as hide the latency of adding.
+double read_bandwidth(std::span<const uint8_t> data) {
+  std::atomic<uint64_t> total{0};
+  const double seconds = least_seconds(7, [&] {
+    parallel_for(data.size() / 64, size_t{1} << 14, [&](size_t begin, size_t end) {
+      uint64_t sums[16] = {};
+      const uint8_t* p = data.data() + begin * 64;
+      for (size_t i = begin; i + 1 < end; i += 2, p += 128) {
+        uint64_t words[16];
+        std::memcpy(words, p, 128);
+        for (int k = 0; k < 16; ++k) sums[k] += words[k];
+      }
+      uint64_t sum = 0;
+      for (uint64_t s : sums) sum += s;
+      total += sum;
+    });
+  });
+  if (total == 42) std::fprintf(stderr, "an unlikely sum\n");  // the result is used
+  return double(data.size()) / seconds;
+}
+
+void relight_case(size_t receivers, int channels, Precision precision) {
+  const int order = 6;
+  WritableTransfer w = make_transfer(order, channels, receivers, precision);
+  parallel_for(w.transfer.bytes() / 4, 1 << 16, [&](size_t begin, size_t end) {
+    Random random(begin);
+    for (size_t i = begin; i < end; ++i) {
+      const float a = random.next(), b = random.next();
+      if (precision == Precision::half) {
+        const uint16_t h[2] = {float_to_half(a), float_to_half(b)};
+        std::memcpy(w.values + 4 * i, h, 4);
+      } else {
+        std::memcpy(w.values + 4 * i, &a, 4);
+      }
+    }
+  });
+  std::vector<Vec3> light(size_t(order * order), Vec3(0.3f, -0.2f, 0.1f));
+  Relit out;
+  relight(w.transfer, light, out);
+  const double bandwidth = read_bandwidth(w.transfer.data);
+  const double seconds = least_seconds(9, [&] { relight(w.transfer, light, out); });
+  const double bytes = double(w.transfer.bytes());
+  const std::string name = std::string("relight_") + (receivers >= 8'000'000 ? "8M" : "1M") + (precision == Precision::half ? "_half" : "_single") +
+                           (channels == 3 ? "_rgb_transfer" : "");
+  report(name, bytes / seconds / 1e9, bandwidth / 1e9, "GB/s", "reading the same memory",
+         {{"receivers", receivers}, {"coefficients", order * order}, {"channels", channels}, {"ms", 1e3 * seconds},
+          {"with_writes_GBs", (bytes + 12.0 * double(receivers)) / seconds / 1e9}, {"aim", precision == Precision::half ? ">= 0.85" : ">= 0.7"}});
+}
+
+}  // namespace
+
+void bench_relight() {
+  for (size_t receivers : {size_t{1'000'000}, size_t{8'000'000}})
+    for (Precision precision : {Precision::half, Precision::single})
+      for (int channels : {1, 3})
+        if (receivers < 8'000'000 || channels == 1 || precision == Precision::half) relight_case(receivers, channels, precision);
+}
+
+}  // namespace lambent::bench
