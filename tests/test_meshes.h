@@ -6,6 +6,9 @@
 #include <cstdlib>
 #include <filesystem>
 #include <map>
+#include <span>
+#include <string>
+#include <string_view>
 #include <tuple>
 
 namespace lambent::test {
@@ -19,7 +22,9 @@ inline std::string data_folder() {
   return std::filesystem::is_directory(folder, ignored) ? folder.string() : std::string();
 }
 
-inline std::span<const uint8_t> bytes_of(std::string_view text) { return {reinterpret_cast<const uint8_t*>(text.data()), text.size()}; }
+inline std::span<const uint8_t> bytes_of(std::string_view text) {
+  return {reinterpret_cast<const uint8_t*>(text.data()), text.size()};
+}
 
 // What is wrong with the scene's arrays and runs; empty if nothing is.
 inline std::string broken_invariant(const Scene& s) {

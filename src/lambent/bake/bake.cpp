@@ -127,7 +127,7 @@ struct Baker {
         // Which blocks are kept depends on the scheduling, the result does not: the others are traced again, alike.
         const size_t bytes = block.rows.bytes() + block.half_rows.bytes() + sizeof(GatherBlock);
         if (used.fetch_add(bytes) + bytes <= budget) {
-          kept[begin / gather_block] = {exact_copy(block.rows), exact_copy(block.half_rows)};
+          kept[begin / gather_block] = {trimmed(block.rows), trimmed(block.half_rows)};
           is_kept[begin / gather_block] = 1;
         } else {
           used.fetch_sub(bytes);
@@ -168,7 +168,7 @@ struct Baker {
         multiply_rows(block.rows, setup.channels, X.data(), width, setup.row_scale(size_t(options.samples)), next.data() + begin * width);
         for (size_t r = begin; r < end; ++r) add_T0(T0.data() + r * C, next.data() + r * width);
         if (last && has_halves()) {
-          AlignedVector<float> half(block.half_rows.ends.size() * width);
+          AlignedVector<float> half(block.half_rows.row_count * width);
           multiply_rows(block.half_rows, setup.channels, X.data(), width, setup.row_scale(setup.sets.half), half.data());
           for (size_t r = begin, i = 0; r < end; r += check_every, ++i) {
             add_T0(T0_half.data() + r / check_every * C, half.data() + i * width);
@@ -200,7 +200,7 @@ struct Baker {
     return std::move(out.transfer);
   }
 
-  static SparseRows exact_copy(const SparseRows& rows) { return rows; }  // a copied vector has no spare capacity
+  static SparseBlock trimmed(const SparseBlock& block) { return block; }  // a copied vector has no spare capacity
 
   void finish_report(const std::vector<uint8_t>& buried, const std::vector<ErrorSum>& errors, std::chrono::steady_clock::time_point start) {
     for (uint8_t b : buried) report.buried += b;

@@ -17,6 +17,42 @@ constexpr size_t burial_rays = 64;
 
 bool is_grey(Vec3 c) { return c.x == c.y && c.y == c.z; }
 
+// Entries of a block as its rays meet them, row after row.
+struct UnsortedEntries {
+  size_t row_count = 0;
+  std::vector<uint32_t> columns;
+  std::vector<uint8_t> rows;
+  std::vector<uint16_t> weights;
+};
+
+// Sorted by column, rows in order within each: a stable radix sort on 11 bits at a time.
+SparseBlock by_columns(const UnsortedEntries& in, int channels, size_t column_limit) {
+  const size_t n = in.columns.size();
+  std::vector<uint32_t> order(n), other(n);
+  for (size_t i = 0; i < n; ++i) order[i] = uint32_t(i);
+  for (int shift = 0; shift < 32 && column_limit >> shift; shift += 11) {
+    uint32_t start[2049] = {};
+    for (uint32_t c : in.columns) ++start[(c >> shift & 2047) + 1];
+    for (int k = 0; k < 2048; ++k) start[k + 1] += start[k];
+    for (uint32_t i : order) other[start[in.columns[i] >> shift & 2047]++] = i;
+    std::swap(order, other);
+  }
+  SparseBlock out;
+  out.row_count = in.row_count;
+  out.rows.resize(n), out.weights.resize(n * size_t(channels));
+  for (size_t i = 0; i < n; ++i) {
+    const size_t from = order[i];
+    if (out.columns.empty() || out.columns.back() != in.columns[from]) {
+      if (!out.columns.empty()) out.ends.push_back(uint32_t(i));
+      out.columns.push_back(in.columns[from]);
+    }
+    out.rows[i] = in.rows[from];
+    for (size_t c = 0; c < size_t(channels); ++c) out.weights[i * size_t(channels) + c] = in.weights[from * size_t(channels) + c];
+  }
+  if (!out.columns.empty()) out.ends.push_back(uint32_t(n));
+  return out;
+}
+
 // Sums weights by receiver. Open addressing; the entries come out in the order in which they were first met.
 class RowAccumulator {
  public:
@@ -38,12 +74,13 @@ class RowAccumulator {
     }
     slots_[i].weight += weight;
   }
-  void append_to(SparseRows& rows, int channels, float unit) const {
+  void append_to(UnsortedEntries& entries, int channels, float unit) const {
     for (uint32_t i : touched_) {
-      rows.columns.push_back(slots_[i].receiver);
-      for (int c = 0; c < channels; ++c) rows.weights.push_back(float_to_half(slots_[i].weight[c] * unit));
+      entries.columns.push_back(slots_[i].receiver);
+      entries.rows.push_back(uint8_t(entries.row_count));
+      for (int c = 0; c < channels; ++c) entries.weights.push_back(float_to_half(slots_[i].weight[c] * unit));
     }
-    rows.ends.push_back(uint32_t(rows.columns.size()));
+    ++entries.row_count;
   }
   void clear() {
     for (uint32_t i : touched_) slots_[i] = {none, Vec3(0)};
@@ -122,11 +159,13 @@ GatherSetup make_gather_setup(const Scene& scene, const Tracer& tracer, const Re
 }
 
 void trace_gather(const GatherSetup& setup, size_t first, size_t count, GatherBlock* block, const GatherSky* sky) {
+  LAMBENT_CHECK(count <= gather_block);
   const DirectionSets& sets = setup.sets;
   const size_t coefficients = setup.coefficients(), rays = size_t(sets.samples);
   Fan fan(sets);
   RowAccumulator row(rays);
   std::vector<Hit> hits(rays);
+  UnsortedEntries entries, half_entries;
   for (size_t i = 0; i < count; ++i) {
     const size_t r = first + i;
     const bool checked = r % check_every == 0;
@@ -135,7 +174,7 @@ void trace_gather(const GatherSetup& setup, size_t first, size_t count, GatherBl
     for (size_t j = 0; j < rays; ++j) {
       const Hit& h = hits[j];
       fan.visible[j] = h.triangle == none ? 1.0f : 0.0f;
-      if (block && checked && j == sets.half) row.append_to(block->half_rows, setup.channels, setup.weight_unit);
+      if (block && checked && j == sets.half) row.append_to(half_entries, setup.channels, setup.weight_unit);
       if (h.triangle == none) continue;
       const auto* corner = setup.corners.find(h.triangle, h.front);
       if (!corner) {
@@ -150,14 +189,18 @@ void trace_gather(const GatherSetup& setup, size_t first, size_t count, GatherBl
       row.add((*corner)[2], rho * h.v);
     }
     if (block) {
-      if (checked && sets.half >= rays) row.append_to(block->half_rows, setup.channels, setup.weight_unit);
-      row.append_to(block->rows, setup.channels, setup.weight_unit);
+      if (checked && sets.half >= rays) row.append_to(half_entries, setup.channels, setup.weight_unit);
+      row.append_to(entries, setup.channels, setup.weight_unit);
       row.clear();
     }
     if (sky) {
       fan.project(sky->rows + i * coefficients, checked_row(sky->half_rows, first, r, coefficients));
       sky->buried[i] = 2 * backs > rays;
     }
+  }
+  if (block) {
+    block->rows = by_columns(entries, setup.channels, setup.receivers.count());
+    block->half_rows = by_columns(half_entries, setup.channels, setup.receivers.count());
   }
 }
 
@@ -188,17 +231,12 @@ void trace_sky(const GatherSetup& setup, size_t first, size_t count, const Gathe
   }
 }
 
-void multiply_rows(const SparseRows& rows, int channels, const float* x, size_t width, float scale, float* y) {
-  AlignedVector<float> sum(width);
-  size_t begin = 0;
-  for (size_t i = 0; i < rows.ends.size(); ++i) {
-    const size_t end = rows.ends[i];
-    std::fill(sum.begin(), sum.end(), 0.0f);
-    gather_rows(rows.columns.data() + begin, rows.weights.data() + begin * size_t(channels), end - begin, channels, x, width, width,
-                sum.data());
-    for (size_t j = 0; j < width; ++j) y[i * width + j] = scale * sum[j];
-    begin = end;
-  }
+void multiply_rows(const SparseBlock& block, int channels, const float* x, size_t width, float scale, float* y) {
+  const size_t values = block.row_count * width;
+  std::fill(y, y + values, 0.0f);
+  multiply_entries({block.columns.data(), block.ends.data(), block.columns.size(), block.rows.data(), block.weights.data()}, channels, x,
+                   width, y);
+  for (size_t i = 0; i < values; ++i) y[i] *= scale;
 }
 
 std::vector<FillStep> make_fill_steps(const CornerReceivers& corners, const std::vector<uint8_t>& buried) {

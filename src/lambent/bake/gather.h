@@ -15,19 +15,21 @@ namespace lambent {
 // Receivers whose half-sample rows are kept too, to estimate the error: one in this many.
 inline constexpr size_t check_every = 16;
 // Receivers traced and multiplied as one piece of work.
-inline constexpr size_t gather_block = 128;
+inline constexpr size_t gather_block = 64;
 
-// Rows of a sparse matrix, one after another. Weights are halves, `channels` an entry.
-struct SparseRows {
-  std::vector<uint32_t> ends;  // of each row, in entries
-  std::vector<uint32_t> columns;
+// Rows of the sparse matrix B of neighbouring receivers, stored by columns (kernels.h): neighbours see the same surfaces, so a
+// column serves many of them. Weights are halves, `channels` an entry.
+struct SparseBlock {
+  size_t row_count = 0;
+  std::vector<uint32_t> columns, ends;
+  std::vector<uint8_t> rows;
   std::vector<uint16_t> weights;
-  size_t bytes() const { return (ends.size() + columns.size()) * 4 + weights.size() * 2; }
+  size_t bytes() const { return (columns.size() + ends.size()) * 4 + rows.size() + weights.size() * 2; }
 };
 
 struct GatherBlock {
-  SparseRows rows;       // of receivers [first, first + count)
-  SparseRows half_rows;  // the same by the first half of the rays alone, for receivers divisible by check_every
+  SparseBlock rows;       // of receivers [first, first + count), count at most gather_block
+  SparseBlock half_rows;  // the same by the first half of the rays alone, for receivers divisible by check_every
 };
 
 struct GatherSetup {
@@ -62,8 +64,8 @@ void trace_gather(const GatherSetup& setup, size_t first, size_t count, GatherBl
 // Traces occlusion only: the sky rows, without hit rows.
 void trace_sky(const GatherSetup& setup, size_t first, size_t count, const GatherSky& sky);
 
-// y[row] = scale * (row of B) x, for consecutive rows; x and y are [receiver][column x channel], `width` padded floats a row.
-void multiply_rows(const SparseRows& rows, int channels, const float* x, size_t width, float scale, float* y);
+// y[row] = scale * (row of B) x, for the block's rows; x and y are [receiver][column x channel], `width` padded floats a row.
+void multiply_rows(const SparseBlock& rows, int channels, const float* x, size_t width, float scale, float* y);
 
 // Values of buried receivers are taken from their neighbours along the mesh.
 struct FillStep {

@@ -7,6 +7,7 @@
 #undef HWY_TARGET_INCLUDE
 #define HWY_TARGET_INCLUDE "lambent/bake/kernels.cpp"
 #include <hwy/foreach_target.h>
+#include <hwy/cache_control.h>
 #include <hwy/highway.h>
 
 HWY_BEFORE_NAMESPACE();
@@ -59,74 +60,91 @@ void WeightedRows(const float* table, size_t rows, size_t stride, const float* w
   }
 }
 
-// Sums of `vectors` vectors stay in registers while the entries stream by.
+// Entries [begin, end) of one column, `vectors` vectors of it: the column's values stay in registers while rows of acc pass by.
 template <size_t vectors, int channels>
-void GatherVectors(const uint32_t* columns, const float* weights, size_t entries, const float* x, size_t stride, size_t offset,
-                   float* acc) {
+HWY_INLINE void AddColumn(const float* x, const uint8_t* rows, const float* weights, size_t begin, size_t end, size_t width, size_t offset,
+                          float* acc) {
   const F d;
-  const size_t lanes = hn::Lanes(d);
-  hn::Vec<F> sum[vectors];
-  for (size_t k = 0; k < vectors; ++k) sum[k] = hn::LoadU(d, acc + offset + k * lanes);
-  [[maybe_unused]] size_t phase[vectors];
-  for (size_t k = 0; k < vectors; ++k) phase[k] = (offset + k * lanes) % 3;
-  for (size_t e = 0; e < entries; ++e) {
-    const float* row = x + size_t(columns[e]) * stride + offset;
+  constexpr size_t lanes = hn::MaxLanes(F());
+  hn::Vec<F> value[vectors];
+  for (size_t k = 0; k < vectors; ++k) value[k] = hn::LoadU(d, x + offset + k * lanes);
+  // Lane i of vector k takes weight (offset + k lanes + i) % 3: three patterns in turn.
+  HWY_ALIGN int32_t pattern[3][lanes];
+  for (size_t p = 0; p < 3; ++p)
+    for (size_t i = 0; i < lanes; ++i) pattern[p][i] = int32_t((offset + p * lanes + i) % 3);
+#if HWY_TARGET != HWY_SCALAR
+  const auto i0 = hn::SetTableIndices(d, pattern[0]), i1 = hn::SetTableIndices(d, pattern[1]), i2 = hn::SetTableIndices(d, pattern[2]);
+#endif
+  for (size_t e = begin; e < end; ++e) {
+    float* row = acc + size_t(rows[e]) * width + offset;
     if constexpr (channels == 1) {
       const auto w = hn::Set(d, weights[e]);
-      for (size_t k = 0; k < vectors; ++k) sum[k] = hn::MulAdd(w, hn::LoadU(d, row + k * lanes), sum[k]);
+      for (size_t k = 0; k < vectors; ++k) hn::StoreU(hn::MulAdd(w, value[k], hn::LoadU(d, row + k * lanes)), d, row + k * lanes);
     } else {
-      // A run of the pattern r g b r g b ... long enough for any phase lies in `weights`: see GatherRows.
-      const float* pattern = weights + e * 20;
-      for (size_t k = 0; k < vectors; ++k) {
-        const auto w = hn::LoadU(d, pattern + phase[k]);
-        sum[k] = hn::MulAdd(w, hn::LoadU(d, row + k * lanes), sum[k]);
-      }
+#if HWY_TARGET != HWY_SCALAR
+      const auto rgb = hn::LoadDup128(d, weights + 4 * e);
+      const hn::Vec<F> w[3] = {hn::TableLookupLanes(rgb, i0), hn::TableLookupLanes(rgb, i1), hn::TableLookupLanes(rgb, i2)};
+#else
+      const hn::Vec<F> w[3] = {hn::Set(d, weights[4 * e + size_t(pattern[0][0])]), hn::Set(d, weights[4 * e + size_t(pattern[1][0])]),
+                               hn::Set(d, weights[4 * e + size_t(pattern[2][0])])};
+#endif
+      for (size_t k = 0; k < vectors; ++k)
+        hn::StoreU(hn::MulAdd(w[k % 3], value[k], hn::LoadU(d, row + k * lanes)), d, row + k * lanes);
     }
   }
-  for (size_t k = 0; k < vectors; ++k) hn::StoreU(sum[k], d, acc + offset + k * lanes);
 }
 
 template <int channels>
-void GatherAll(const uint32_t* columns, const float* weights, size_t entries, const float* x, size_t stride, size_t width,
-               float* acc) {
-  const F d;
-  const size_t lanes = hn::Lanes(d);
+HWY_INLINE void AddColumnAll(const float* x, const uint8_t* rows, const float* weights, size_t begin, size_t end, size_t width, float* acc) {
+  constexpr size_t lanes = hn::MaxLanes(F());
   size_t j = 0;
-  for (; j + 8 * lanes <= width; j += 8 * lanes) GatherVectors<8, channels>(columns, weights, entries, x, stride, j, acc);
+  for (; j + 8 * lanes <= width; j += 8 * lanes) AddColumn<8, channels>(x, rows, weights, begin, end, width, j, acc);
   switch ((width - j) / lanes) {
-    case 7: GatherVectors<7, channels>(columns, weights, entries, x, stride, j, acc); break;
-    case 6: GatherVectors<6, channels>(columns, weights, entries, x, stride, j, acc); break;
-    case 5: GatherVectors<5, channels>(columns, weights, entries, x, stride, j, acc); break;
-    case 4: GatherVectors<4, channels>(columns, weights, entries, x, stride, j, acc); break;
-    case 3: GatherVectors<3, channels>(columns, weights, entries, x, stride, j, acc); break;
-    case 2: GatherVectors<2, channels>(columns, weights, entries, x, stride, j, acc); break;
-    case 1: GatherVectors<1, channels>(columns, weights, entries, x, stride, j, acc); break;
+    case 7: AddColumn<7, channels>(x, rows, weights, begin, end, width, j, acc); break;
+    case 6: AddColumn<6, channels>(x, rows, weights, begin, end, width, j, acc); break;
+    case 5: AddColumn<5, channels>(x, rows, weights, begin, end, width, j, acc); break;
+    case 4: AddColumn<4, channels>(x, rows, weights, begin, end, width, j, acc); break;
+    case 3: AddColumn<3, channels>(x, rows, weights, begin, end, width, j, acc); break;
+    case 2: AddColumn<2, channels>(x, rows, weights, begin, end, width, j, acc); break;
+    case 1: AddColumn<1, channels>(x, rows, weights, begin, end, width, j, acc); break;
     default: break;
   }
 }
 
-void GatherRows(const uint32_t* columns, const uint16_t* weights, size_t entries, int channels, const float* x, size_t stride,
-                size_t width, float* acc) {
+void MultiplyEntries(const SparseEntries& s, int channels, const float* x, size_t width, float* acc) {
   const F d;
   const hn::Rebind<hwy::float16_t, F> dh;
-  constexpr size_t chunk = 64;
-  HWY_ALIGN float w[chunk * 20 + 16];
-  for (size_t begin = 0; begin < entries; begin += chunk) {
-    const size_t n = std::min(chunk, entries - begin);
-    const uint16_t* half = weights + begin * size_t(channels);
-    const size_t count = n * size_t(channels);
-    HWY_ALIGN float decoded[chunk * 3 + 4];
+  // Weights are decoded a window at a time, three of them spread to four for aligned broadcasts.
+  constexpr size_t window = 512;
+  HWY_ALIGN float decoded[window * 3 + 16];
+  HWY_ALIGN float spread[window * 4];
+  const size_t entries = s.column_count ? s.ends[s.column_count - 1] : 0;
+  size_t column = 0;
+  for (size_t first = 0; first < entries; first += window) {
+    const size_t n = std::min(window, entries - first), count = n * size_t(channels);
+    const uint16_t* half = s.weights + first * size_t(channels);
     size_t i = 0;
     for (; i + hn::Lanes(d) <= count; i += hn::Lanes(d))
       hn::StoreU(hn::PromoteTo(d, hn::LoadU(dh, reinterpret_cast<const hwy::float16_t*>(half + i))), d, decoded + i);
     for (; i < count; ++i) decoded[i] = half_to_float(half[i]);
-    if (channels == 1) {
-      GatherAll<1>(columns + begin, decoded, n, x, stride, width, acc);
-      continue;
+    if (channels == 3)
+      for (size_t e = 0; e < n; ++e) {
+        spread[4 * e] = decoded[3 * e], spread[4 * e + 1] = decoded[3 * e + 1], spread[4 * e + 2] = decoded[3 * e + 2];
+        spread[4 * e + 3] = 0;
+      }
+    for (size_t e = 0; e < n;) {
+      const size_t end = std::min(size_t(s.ends[column]) - first, n);
+      // The columns are known ahead: ask for a row of x well before its turn.
+      if (column + 4 < s.column_count) {
+        const float* ahead = x + size_t(s.columns[column + 4]) * width;
+        for (size_t j = 0; j < width; j += 16) hwy::Prefetch(ahead + j);
+      }
+      const float* row = x + size_t(s.columns[column]) * width;
+      if (channels == 1) AddColumnAll<1>(row, s.rows + first, decoded, e, end, width, acc);
+      else AddColumnAll<3>(row, s.rows + first, spread, e, end, width, acc);
+      e = end;
+      if (first + end == s.ends[column]) ++column;
     }
-    for (size_t e = 0; e < n; ++e)
-      for (size_t k = 0; k < 20; ++k) w[e * 20 + k] = decoded[e * 3 + k % 3];
-    GatherAll<3>(columns + begin, w, n, x, stride, width, acc);
   }
 }
 
@@ -139,7 +157,7 @@ namespace lambent {
 
 HWY_EXPORT(RotateDirections);
 HWY_EXPORT(WeightedRows);
-HWY_EXPORT(GatherRows);
+HWY_EXPORT(MultiplyEntries);
 
 void rotate_directions(const Mat3& R, const float* x, const float* y, const float* z, size_t count, float* ox, float* oy, float* oz) {
   LAMBENT_CHECK(count % lane_multiple == 0);
@@ -151,10 +169,9 @@ void weighted_rows(const float* table, size_t rows, size_t stride, const float* 
   HWY_DYNAMIC_DISPATCH(WeightedRows)(table, rows, stride, weights, count, out);
 }
 
-void gather_rows(const uint32_t* columns, const uint16_t* weights, size_t entries, int channels, const float* x, size_t stride,
-                 size_t width, float* acc) {
-  LAMBENT_CHECK(width % lane_multiple == 0 && width <= stride && (channels == 1 || channels == 3));
-  HWY_DYNAMIC_DISPATCH(GatherRows)(columns, weights, entries, channels, x, stride, width, acc);
+void multiply_entries(const SparseEntries& entries, int channels, const float* x, size_t width, float* acc) {
+  LAMBENT_CHECK(width % lane_multiple == 0 && (channels == 1 || channels == 3));
+  HWY_DYNAMIC_DISPATCH(MultiplyEntries)(entries, channels, x, width, acc);
 }
 
 }  // namespace lambent

@@ -17,9 +17,19 @@ void rotate_directions(const Mat3& R, const float* x, const float* y, const floa
 // out[i] = sum over j < count of table[i * stride + j] * weights[j], for i < rows; count and stride multiples of lane_multiple.
 void weighted_rows(const float* table, size_t rows, size_t stride, const float* weights, size_t count, float* out);
 
-// acc[j] += sum over entries e of w(e, j) * x[columns[e] * stride + j], j < width (a multiple of lane_multiple, at most stride).
-// Weights are halves: one an entry if channels is 1; else three, and lane j takes weight j % 3 (values lie [column][channel]).
-void gather_rows(const uint32_t* columns, const uint16_t* weights, size_t entries, int channels, const float* x, size_t stride,
-                 size_t width, float* acc);
+// A block of sparse-matrix rows by columns: each of the matrix's columns that the block touches, once, in order; its entries say
+// which of the block's rows takes it, with what weight.
+struct SparseEntries {
+  const uint32_t* columns;   // distinct, ascending
+  const uint32_t* ends;      // of each column's run of entries
+  size_t column_count;
+  const uint8_t* rows;       // within the block
+  const uint16_t* weights;   // halves: `channels` an entry
+};
+
+// acc[row * width + j] += w(e, j) * x[column * width + j] over all entries. width is a multiple of lane_multiple. With one
+// channel, w is the entry's weight; with three, lane j takes weight j % 3 (values lie [coefficient][channel]). Every row of x that
+// the block needs is read from memory once, and the rows of acc stay in cache.
+void multiply_entries(const SparseEntries& entries, int channels, const float* x, size_t width, float* acc);
 
 }  // namespace lambent

@@ -30,9 +30,10 @@ TEST(Brdf, WhiteLambertReflectsEverything) {
   constexpr float tolerance = 1e-4f;
   for (Vec3 wo : eyes) {
     Vec3 white = integrate_hemisphere(100, 200, [&](Vec3 wi) { return evaluate(Lambert{Vec3(1)}, wi, wo) * wi.z; });
-    Vec3 coloured = integrate_hemisphere(100, 200, [&](Vec3 wi) { return evaluate(Lambert{Vec3(0.8f, 0.5f, 0.1f)}, wi, wo) * wi.z; });
+    const Vec3 albedo(0.8f, 0.5f, 0.1f);
+    Vec3 coloured = integrate_hemisphere(100, 200, [&](Vec3 wi) { return evaluate(Lambert{albedo}, wi, wo) * wi.z; });
     EXPECT_LT(glm::length(white - Vec3(1)), tolerance);
-    EXPECT_LT(glm::length(coloured - Vec3(0.8f, 0.5f, 0.1f)), tolerance);
+    EXPECT_LT(glm::length(coloured - albedo), tolerance);
   }
 }
 
@@ -85,7 +86,8 @@ TEST(Brdf, SamplesFollowDensity) {
       }
       for (int i = 0; i < nz * fine; ++i)
         for (int j = 0; j < nphi * fine; ++j) {
-          float z = (float(i) + 0.5f) / (nz * fine), phi = ((float(j) + 0.5f) / (nphi * fine) - 0.5f) * 2 * pi, r = std::sqrt(1 - z * z);
+          float z = (float(i) + 0.5f) / (nz * fine), r = std::sqrt(1 - z * z);
+          float phi = ((float(j) + 0.5f) / (nphi * fine) - 0.5f) * 2 * pi;
           expected[size_t(i / fine * nphi + j / fine)] +=
               pdf(brdf, Vec3(r * std::cos(phi), r * std::sin(phi), z), wo) * 2 * pi / (nz * nphi * fine * fine) * draws;
         }

@@ -311,6 +311,13 @@ Image displayed(const Image& image, float exposure) {
   return out;
 }
 
+Image mean_of(Image a, const Image& b) {
+  LAMBENT_CHECK(a.width == b.width && a.height == b.height && a.alpha.size() == b.alpha.size());
+  for (size_t i = 0; i < a.rgb.size(); ++i) a.rgb[i] = 0.5f * (a.rgb[i] + b.rgb[i]);
+  for (size_t i = 0; i < a.alpha.size(); ++i) a.alpha[i] = 0.5f * (a.alpha[i] + b.alpha[i]);
+  return a;
+}
+
 Image beside(std::span<const Image> images) {
   int width = 0;
   bool any_alpha = false;

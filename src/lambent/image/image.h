@@ -62,6 +62,9 @@ float srgb_decode(float encoded);
 // Pixels as shown in front of black: sRGB-encoded rgb * 2^exposure, clamped to [0, 1]; without alpha.
 Image displayed(const Image& image, float exposure);
 
+// Pixel by pixel: two renderings with different seeds make one of twice the samples. Sizes must agree.
+Image mean_of(Image a, const Image& b);
+
 // Pictures of equal height side by side.
 Image beside(std::span<const Image> images);
 

@@ -1,6 +1,7 @@
 // Path tracing with next-event estimation: J. Kajiya, "The rendering equation", 1986; multiple importance sampling by the
 // power heuristic: E. Veach and L. Guibas, "Optimally combining sampling techniques", 1995. Padded Sobol' pairs in shuffled
-// order: B. Burley, "Practical hash-based Owen scrambling", 2020, section 5; the hash: N. Vegdahl, "Building a better LK hash", 2021.
+// order: B. Burley, "Practical hash-based Owen scrambling", 2020, section 5; the hash: N. Vegdahl, "Building a
+// better LK hash", 2021.
 #include <lambent/core/random.h>
 #include <lambent/core/sampling.h>
 #include <lambent/reference/integrator.h>
@@ -106,7 +107,8 @@ Vec3 exit_radiance_estimate(const Integrator& integrator, PathVertex vertex, con
     throughput *= next.weight;
     if (black(throughput)) break;
     Hit hit;
-    bool leaves = last ? !integrator.intersector.occluded(vertex.position, d) : !integrator.intersector.nearest(vertex.position, d, hit);
+    bool leaves = last ? !integrator.intersector.occluded(vertex.position, d)
+                       : !integrator.intersector.nearest(vertex.position, d, hit);
     if (leaves && strategy != Strategy::light_only) {
       float weight = strategy == Strategy::combined ? mis_weight(next.pdf, environment_pdf(integrator.sampler, d)) : 1.0f;
       sum += throughput * radiance(*integrator.environment, d) * weight;

@@ -39,7 +39,8 @@ struct Integrator {
   int bounces;
   Strategy strategy;
 };
-Result<Integrator> make_integrator(const Scene& scene, const Environment& env, int bounces, Strategy strategy = Strategy::combined);
+Result<Integrator> make_integrator(const Scene& scene, const Environment& env, int bounces,
+                                   Strategy strategy = Strategy::combined);
 
 // False where nothing reflects towards -d: the back of a one-sided triangle.
 bool make_vertex(const Scene& scene, const Hit& hit, Vec3 d, PathVertex& vertex);
@@ -51,6 +52,7 @@ PathVertex white_vertex(Vec3 origin, Vec3 n);
 Vec3 exit_radiance_estimate(const Integrator& integrator, PathVertex vertex, const PathSamples& samples);
 
 // The picture, as path_trace() returns it; `options` must be in range.
-Result<ReferenceImage> render(const Integrator& integrator, const Camera& camera, const ReferenceOptions& options, Progress* progress);
+Result<ReferenceImage> render(const Integrator& integrator, const Camera& camera, const ReferenceOptions& options,
+                              Progress* progress);
 
 }  // namespace lambent::reference

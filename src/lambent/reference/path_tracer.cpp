@@ -27,7 +27,8 @@ constexpr size_t tile = 8;  // pixels, square: neighbours in the picture are nei
 
 }  // namespace
 
-Result<ReferenceImage> render(const Integrator& integrator, const Camera& camera, const ReferenceOptions& options, Progress* progress) {
+Result<ReferenceImage> render(const Integrator& integrator, const Camera& camera, const ReferenceOptions& options,
+                              Progress* progress) {
   const size_t width = size_t(options.width), height = size_t(options.height);
   const CameraRays rays(camera, options.width, options.height);
   const uint64_t seed = hash64(options.seed);

@@ -94,7 +94,8 @@ TEST(PathTracer, NeverMeetsTheSurfaceItLeaves) {
       move(scene, R, centre);
       auto integrator = reference::make_integrator(scene, env, 0, Strategy::brdf_only);
       ASSERT_TRUE(integrator);
-      auto result = reference::render(*integrator, look(centre + R * (Vec3(2, 1.5f, 3) * size), centre), picture(32, 16, 0), nullptr);
+      Camera camera = look(centre + R * (Vec3(2, 1.5f, 3) * size), centre);
+      auto result = reference::render(*integrator, camera, picture(32, 16, 0), nullptr);
       ASSERT_TRUE(result);
       for (size_t i = 0; i < result->image.rgb.size(); ++i)
         ASSERT_NEAR(result->image.rgb[i].x, a * result->image.alpha[i], tolerance) << "size " << size << " shift " << shift;
@@ -314,7 +315,8 @@ TEST(PathTracer, ShadowsReachTheContact) {
 }
 
 TEST(PathTracer, ShadingNormalWeighsAndTrueGeometryDecides) {
-  // Normals tilted by delta from the plane's: of the hemisphere above the plane they see pi (1 + cos(delta)) / 2 under their cosine.
+  // Normals tilted by delta from the plane's: the integral of their cosine over the hemisphere above the plane is
+  // pi (1 + cos(delta)) / 2.
   constexpr float a = 0.6f, delta = pi / 3;
   Scene scene = make_quad({-1, 0, 1}, {2, 0, 0}, {0, 0, -2}, 1, 1, Vec3(a));
   for (Vec3& n : scene.normals) n = Vec3(std::sin(delta), std::cos(delta), 0);
@@ -349,7 +351,8 @@ TEST(PathTracer, ThreadCountDoesNotMatter) {
     auto result = path_trace(scene, skewed(), look({1, 2, 4}, Vec3(0)), picture(40, 8, 2));
     std::vector<Vec3> all = result ? result->image.rgb : std::vector<Vec3>{};
     if (result) all.insert(all.end(), result->variance.begin(), result->variance.end());
-    for (const ExitRadiance& r : exit_radiances(scene, skewed(), at, n, 2, 5000, 1)) all.push_back(r.mean), all.push_back(r.variance);
+    for (const ExitRadiance& r : exit_radiances(scene, skewed(), at, n, 2, 5000, 1))
+      all.insert(all.end(), {r.mean, r.variance});
     return all;
   };
   std::vector<Vec3> one = render(1), two = render(2);
@@ -367,7 +370,8 @@ void expect_same(const ReferenceImage& a, const ReferenceImage& b) {
       EXPECT_LE(std::abs(d), sigmas * std::sqrt(v) + 1e-6) << "pixel " << i;  // 1e-6: pixels without noise round differently
       difference[c] += d, variance[c] += v;
     }
-  for (int c = 0; c < 3; ++c) EXPECT_LE(std::abs(difference[c]), 4 * std::sqrt(variance[c]));  // three numbers: 4 sigmas are rare enough
+  // Three numbers: 4 sigmas are rare enough.
+  for (int c = 0; c < 3; ++c) EXPECT_LE(std::abs(difference[c]), 4 * std::sqrt(variance[c]));
 }
 
 TEST(PathTracer, LightAndBrdfSamplingAgree) {

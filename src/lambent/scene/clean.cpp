@@ -95,7 +95,9 @@ Vec3 unit_or(DVec3 sum, DVec3 fallback) {
 // of faces on one edge lie on a circle, so joining neighbours on that circle joins all pairs, however many faces there are.
 void join_over_edge(UnionFind& groups, std::span<const Edge> edges, const std::vector<uint32_t>& corner_ids, uint32_t low,
                     const std::vector<DVec3>& faces, double cos_crease) {
-  auto end_corner = [&](Edge e, bool at_low) { return (corner_ids[e.corner] == low) == at_low ? e.corner : next_corner(e.corner); };
+  auto end_corner = [&](Edge e, bool at_low) {
+    return (corner_ids[e.corner] == low) == at_low ? e.corner : next_corner(e.corner);
+  };
   auto try_join = [&](Edge a, Edge b) {
     if (glm::dot(faces[a.corner / 3], faces[b.corner / 3]) <= cos_crease) return;
     groups.join(end_corner(a, true), end_corner(b, true));

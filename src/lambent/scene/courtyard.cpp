@@ -143,8 +143,11 @@ void add_arcade(Builder& b) {
       });
     }
     add_surface(b, across, deep, false, [&](int k, int j) { return Point{at(outline(up + k), depth(j)), {0, 1, 0}}; });
-    if (centre > 1) add_surface(b, up, deep, false, [&](int k, int j) { return Point{at(outline(k), depth(j)), {1, 0, 0}}; });
-    if (centre < -1) add_surface(b, up, deep, false, [&](int k, int j) { return Point{at(outline(along - up + k), depth(j)), {-1, 0, 0}}; });
+    if (centre > 1) {
+      add_surface(b, up, deep, false, [&](int k, int j) { return Point{at(outline(k), depth(j)), {1, 0, 0}}; });
+    } else if (centre < -1) {
+      add_surface(b, up, deep, false, [&](int k, int j) { return Point{at(outline(along - up + k), depth(j)), {-1, 0, 0}}; });
+    }
   }
 }
 
@@ -172,7 +175,8 @@ void add_knot(Builder& b) {
   Mat3 stand(side, glm::cross(axis, side), axis);
   size_t first = b.positions.size();
   add_surface(b, around, along, true, [&](int i, int j) {
-    float t = 2 * pi * float(j) / float(along) + pi / 2, c2 = std::cos(2 * t), s2 = std::sin(2 * t), c3 = std::cos(3 * t), s3 = std::sin(3 * t);
+    float t = 2 * pi * float(j) / float(along) + pi / 2;
+    float c2 = std::cos(2 * t), s2 = std::sin(2 * t), c3 = std::cos(3 * t), s3 = std::sin(3 * t);
     float r = major + minor * c3;
     Vec3 out(c2 * c3, s2 * c3, s3);  // the torus's normal
     Vec3 tangent = glm::normalize(Vec3(-3 * minor * s3 * c2 - 2 * r * s2, -3 * minor * s3 * s2 + 2 * r * c2, 3 * minor * c3));
@@ -222,7 +226,8 @@ Scene make_courtyard(float detail) {
   add_block(b, {-half, base, -half}, {half, loggia, loggia_front}, {coarse, coarse, coarse, fine, coarse, fine});
   b.finish(scene, stone, "steps");
 
-  const Cells left_wall{coarse, medium, coarse, coarse, coarse, medium}, right_wall{medium, coarse, coarse, coarse, coarse, medium};
+  const Cells left_wall{coarse, medium, coarse, coarse, coarse, medium};
+  const Cells right_wall{medium, coarse, coarse, coarse, coarse, medium};
   add_block(b, {-outer, base, -outer}, {-half, arcade_top, roof_front}, left_wall);
   add_block(b, {-outer, base, roof_front}, {-half, left_height, half}, left_wall);
   b.finish(scene, terracotta, "left wall");
@@ -234,7 +239,8 @@ Scene make_courtyard(float detail) {
   add_block(b, {-outer - 0.05f, left_height, roof_front}, {-half + 0.05f, left_height + 0.07f, half + 0.05f}, medium);
   add_block(b, {half - 0.05f, right_height, roof_front}, {outer + 0.05f, right_height + 0.07f, half + 0.05f}, medium);
   b.finish(scene, plaster, "copings");
-  add_block(b, {-outer - 0.05f, arcade_top, -outer - 0.05f}, {outer + 0.05f, roof_top, roof_front}, {medium, medium, medium, 0.15f, coarse, fine});
+  add_block(b, {-outer - 0.05f, arcade_top, -outer - 0.05f}, {outer + 0.05f, roof_top, roof_front},
+            {medium, medium, medium, 0.15f, coarse, fine});
   b.finish(scene, plaster, "roof");
 
   add_arcade(b);
@@ -271,8 +277,8 @@ Scene make_courtyard(float detail) {
 
 Camera courtyard_camera() {
   Camera camera;
-  camera.eye = {0.95f, 1.95f, 7.6f}, camera.target = {-0.05f, 1.33f, -0.3f};
-  camera.fov = 36.0f;
+  camera.eye = {0.95f, 1.95f, 7.6f}, camera.target = {-0.05f, 1.42f, -0.3f};
+  camera.fov = 35.0f;
   return camera;
 }
 

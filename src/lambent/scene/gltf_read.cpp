@@ -308,7 +308,7 @@ GltfAccessor read_accessor(GltfCheck& check, const GltfDocument& document, size_
     int components;
   } shapes[] = {{"SCALAR", 1}, {"VEC2", 2}, {"VEC3", 3}, {"VEC4", 4}, {"MAT2", 4}, {"MAT3", 9}, {"MAT4", 16}};
   for (const auto& s : shapes) {
-    if (shape == s.name) a.components = s.components;
+    if (shape == s.name) a.shape = s.name, a.components = s.components;
   }
   a.is_matrix = shape.starts_with("MAT");
   if (check.ok() && a.components == 0) check.fail(where, "type " + in_quotes(shape) + " does not exist");

@@ -62,7 +62,8 @@ struct GltfAccessor {
   std::span<const uint8_t> data;  // from the first element on; empty when all elements are zero
   size_t count = 0, stride = 0, element_size = 0;
   GltfType type = GltfType::none;
-  int components = 0;  // 1 SCALAR, 2 to 4 VECn, 4, 9, 16 MATn
+  const char* shape = "";  // "SCALAR", "VEC2", ...
+  int components = 0;      // 1 SCALAR, 2 to 4 VECn, 4, 9, 16 MATn
   bool is_matrix = false, normalized = false;
   // Elements that differ: strictly increasing indices, and the values in their order.
   std::span<const uint8_t> sparse_indices, sparse_values;

@@ -105,7 +105,7 @@ size_t GlbWriter::add_indices(std::span<const uint32_t> indices) {
                             {"type", "SCALAR"}});
 }
 
-size_t GlbWriter::add_copy(const GltfAccessor& from, const Json& description, std::span<const uint32_t> source) {
+size_t GlbWriter::add_copy(const GltfAccessor& from, std::span<const uint32_t> source, bool with_bounds) {
   const size_t stride = round_up(from.element_size, 4);  // vertex attributes begin at multiples of four
   std::vector<uint8_t> bytes(source.size() * stride);
   for (size_t i = 0; i < source.size(); ++i) {
@@ -119,9 +119,9 @@ size_t GlbWriter::add_copy(const GltfAccessor& from, const Json& description, st
   Json accessor = {{"bufferView", view},
                    {"componentType", int(from.type)},
                    {"count", source.size()},
-                   {"type", description.at("type")}};
+                   {"type", from.shape}};
   if (from.normalized) accessor["normalized"] = true;
-  if (description.contains("min")) {
+  if (with_bounds) {
     add_bounds(accessor, source.size(), from.components,
                [&](size_t i, int c) { return from.component(from.element(source[i]), c); });
   }

@@ -23,8 +23,8 @@ class GlbWriter {
   // Accessors of fresh vertex data and indices.
   size_t add_vectors(std::span<const float> values, int components, bool with_bounds);
   size_t add_indices(std::span<const uint32_t> indices);
-  // Elements source[0], source[1], ... of an accessor, in its own type; `json` is its description in the document.
-  size_t add_copy(const GltfAccessor& from, const Json& json, std::span<const uint32_t> source);
+  // Elements source[0], source[1], ... of an accessor, in its own type.
+  size_t add_copy(const GltfAccessor& from, std::span<const uint32_t> source, bool with_bounds);
 
   size_t size() const { return size_; }  // of the binary chunk
   Result<void> write(const std::string& path) const;

@@ -161,7 +161,8 @@ Result<void> check_references(const ObjFile& obj) {
     for (size_t c = face.first; c < face.first + face.count; ++c) {
       Corner corner = obj.corners[c];
       auto wrong = [&](const char* what, uint32_t index, size_t count) {
-        return Error{fmt::format("{}:{}", obj.path, face.line), fmt::format("{} {} of {} does not exist", what, uint64_t(index) + 1, count)};
+        return Error{fmt::format("{}:{}", obj.path, face.line),
+                     fmt::format("{} {} of {} does not exist", what, uint64_t(index) + 1, count)};
       };
       if (corner.v >= obj.v.size()) return wrong("vertex", corner.v, obj.v.size());
       if (corner.vt != none && corner.vt >= obj.vt.size()) return wrong("texture coordinate", corner.vt, obj.vt.size());

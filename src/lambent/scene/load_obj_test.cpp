@@ -82,7 +82,8 @@ TEST(LoadObj, LineEndsCommentsAndContinuations) {
   Scene expected = must_load(plain);
   for (const char* text : {"v 0 0 0\r\nv 1 0 0\r\nv 0 1 0\r\nf 1 2 3\r\n", "v 0 0 0\rv 1 0 0\rv 0 1 0\rf 1 2 3",
                            "# x\n\n  v 0 0 0 # origin\n\tv 1\t0 0\nv 0 1 0\nf 1 2 3 # 4 5",
-                           "v 0 0 \\\n 0\nv 1 \\\r\n0 0\nv 0 1 0\nf 1 \\\n2 \\\n3", "v +0 0 0\nv 1e0 0 0\nv 0 1.0 0\ncurv2 1 x\nl 1 2\ns off\nf 1 2 3\n"}) {
+                           "v 0 0 \\\n 0\nv 1 \\\r\n0 0\nv 0 1 0\nf 1 \\\n2 \\\n3",
+                           "v +0 0 0\nv 1e0 0 0\nv 0 1.0 0\ncurv2 1 x\nl 1 2\ns off\nf 1 2 3\n"}) {
     Scene s = must_load(text);
     EXPECT_EQ(s.positions, expected.positions) << text;
     EXPECT_EQ(s.triangles.size(), 1u);
@@ -108,7 +109,8 @@ TEST(LoadObj, RefusesWithTheLine) {
   EXPECT_EQ(error_of(three + "f 1 2 4\n"), "t.obj:4: vertex 4 of 3 does not exist");
   EXPECT_EQ(error_of(three + "f 1/1 2/1 3/1\n"), "t.obj:4: texture coordinate 1 of 0 does not exist");
   EXPECT_EQ(error_of(three + "f 1//1 2//2 3//1\nvn 0 0 1\n"), "t.obj:4: normal 2 of 1 does not exist");
-  for (const char* face : {"f 1 2 0", "f 1 2 x", "f 1 2 3x", "f 1 2 99999999999999999999", "f 1 2 4294967295", "f 1 2 -9223372036854775808",
+  for (const char* face : {"f 1 2 0", "f 1 2 x", "f 1 2 3x", "f 1 2 99999999999999999999", "f 1 2 4294967295",
+                           "f 1 2 -9223372036854775808",
                            "f 1 2 3/1/1/1", "f 1 2 /3"})
     EXPECT_EQ(error_of(three + face), "t.obj:4: malformed or out-of-range face corner") << face;
   EXPECT_EQ(error_of("v 0 0\n"), "t.obj:1: a vertex needs three coordinates");
@@ -201,8 +203,10 @@ TEST(LoadObj, MaterialsAndTextures) {
   ASSERT_FALSE(malformed);
   EXPECT_NE(malformed.error().where.find("my lib.mtl:2"), std::string::npos);
   for (const char* name : {"../my lib.mtl", "/etc/passwd", "no.mtl"}) {
-    Scene plain = must_load("mtllib " + std::string(name) + "\nv 0 0 0\nv 1 0 0\nv 0 1 0\nusemtl red\nf 1 2 3\n", folder.path.string());
-    EXPECT_EQ(plain.warnings.size(), std::string_view(name).find(' ') == std::string_view::npos ? 1u : 2u);
+    std::string body = "\nv 0 0 0\nv 1 0 0\nv 0 1 0\nusemtl red\nf 1 2 3\n";
+    Scene plain = must_load("mtllib " + std::string(name) + body, folder.path.string());
+    bool one_name = std::string_view(name).find(' ') == std::string_view::npos;  // else each word is tried
+    EXPECT_EQ(plain.warnings.size(), one_name ? 1u : 2u);
   }
 }
 
@@ -268,7 +272,8 @@ TEST(LoadObj, ConcavePolygonsKeepTheirArea) {
       Scene s = must_load(tilted_face(p));
       double area = shoelace(p);
       EXPECT_NEAR(test::total_area(s), std::abs(area), rounding * std::abs(area)) << p.size();
-      for (const Triangle& t : s.triangles) EXPECT_GE(glm::dot(area_normal(s, t), Vec3(0.8f, 0, -0.6f)) * (area > 0 ? -1 : 1), -1e-5f);
+      Vec3 up = Vec3(-0.8f, 0, 0.6f) * (area > 0 ? 1.0f : -1.0f);
+      for (const Triangle& t : s.triangles) EXPECT_GE(glm::dot(area_normal(s, t), up), -1e-5f);
     }
   }
 }
@@ -295,7 +300,8 @@ TEST(Triangulator, EndsWithItsBudget) {
 }
 
 TEST(TakeNumber, ReadsWhatFilesHold) {
-  for (auto [text, expected] : {std::pair{"1.5", 1.5}, {"+2", 2.0}, {"-3e2", -300.0}, {".5", 0.5}, {"5.", 5.0}, {"1e-999", 0.0}, {"1e999", INFINITY}}) {
+  for (auto [text, expected] : {std::pair{"1.5", 1.5}, {"+2", 2.0}, {"-3e2", -300.0}, {".5", 0.5}, {"5.", 5.0}, {"1e-999", 0.0},
+                                {"1e999", INFINITY}}) {
     std::string_view rest = text;
     double value = -1;
     EXPECT_TRUE(take_number(rest, value)) << text;

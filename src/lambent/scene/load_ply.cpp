@@ -65,7 +65,9 @@ Result<Header> parse_header(std::string_view text, const std::string& path) {
       std::string_view name = take_word(rest), version = take_word(rest);
       if (name != "ascii" && name != "binary_little_endian" && name != "binary_big_endian") return wrong("unknown format");
       if (version != "1.0") return wrong("version is not 1.0");
-      header.format = name == "ascii" ? Format::ascii : name == "binary_little_endian" ? Format::little_endian : Format::big_endian;
+      header.format = name == "ascii"                  ? Format::ascii
+                      : name == "binary_little_endian" ? Format::little_endian
+                                                       : Format::big_endian;
       has_format = true;
     } else if (keyword == "element") {
       Element element;
@@ -212,7 +214,8 @@ class PlyBody {
   // Reads a list's count and checks it against the bytes that are left.
   bool read_count(const Property& list, uint64_t& count) {
     double value;
-    if (!reader_.read(list.count_type, value) || !(value >= 0 && value < double(none)) || value != std::floor(value)) return false;
+    if (!reader_.read(list.count_type, value)) return false;
+    if (!(value >= 0 && value < double(none)) || value != std::floor(value)) return false;
     count = uint64_t(value);
     return reader_.can_hold_list(count, list.type);
   }

@@ -104,7 +104,8 @@ TEST(LoadPly, LineEndsOfAllKinds) {
     for (char c : text) other += c == '\n' ? std::string(end) : std::string(1, c);
     EXPECT_EQ(must_load(other).positions, must_load(text).positions);
   }
-  std::string header = "ply\r\nformat binary_little_endian 1.0\r\nelement vertex 3\r\nproperty uchar x\r\nproperty char y\r\nproperty short z\r\n"
+  std::string header = "ply\r\nformat binary_little_endian 1.0\r\nelement vertex 3\r\n"
+                       "property uchar x\r\nproperty char y\r\nproperty short z\r\n"
                        "element face 1\r\nproperty list uint ushort vertex_index\r\nend_header\r\n";
   std::string body("\0\0\0\0\x0a\0\0\0\0\x0a\0\0\x03\0\0\0\0\0\x01\0\x02\0", 22);
   EXPECT_EQ(must_load(header + body).positions[1], Vec3(10, 0, 0));
@@ -122,7 +123,8 @@ TEST(LoadPly, RefusesWithTheReason) {
   EXPECT_EQ(error_of(triangle(three, "3 0 1 -1\n")), "t.ply:13: face 0 names vertex -1 of 3");
   EXPECT_EQ(error_of(triangle(three, "3 0 1 1.5\n")), "t.ply:13: face 0 names vertex 1.5 of 3");
   EXPECT_EQ(error_of(triangle(three, "3 0 1 nan\n")), "t.ply:13: face 0 names vertex nan of 3");
-  EXPECT_EQ(error_of(triangle("0 0 0\n1 nan 0\n0 1 0\n", "3 0 1 2\n")), "t.ply:11: coordinate of vertex 1 is not finite or beyond 1e9");
+  EXPECT_EQ(error_of(triangle("0 0 0\n1 nan 0\n0 1 0\n", "3 0 1 2\n")),
+            "t.ply:11: coordinate of vertex 1 is not finite or beyond 1e9");
   EXPECT_EQ(error_of(triangle("0 0 0\n1 q 0\n0 1 0\n", "3 0 1 2\n")),
             "t.ply:11: the file ends or holds something that is not a number in vertex 1");
   EXPECT_EQ(error_of(triangle(three, "0\n")), "t.ply: no triangles");
@@ -134,23 +136,29 @@ TEST(LoadPly, RefusesWithTheReason) {
   EXPECT_EQ(error_of("ply\nproperty float x\n"), "t.ply:2: property before the first element");
   EXPECT_EQ(error_of("ply\nelement vertex 3\nproperty half x\n"), "t.ply:3: unknown property type");
   EXPECT_EQ(error_of("ply\nelement vertex 3\nelement vertex 3\n"), "t.ply:3: element vertex comes twice");
-  EXPECT_EQ(error_of("ply\nelement face 3\nproperty list float int vertex_indices\n"), "t.ply:3: a list's count must be of a whole-number type");
+  EXPECT_EQ(error_of("ply\nelement face 3\nproperty list float int vertex_indices\n"),
+            "t.ply:3: a list's count must be of a whole-number type");
 }
 
 TEST(LoadPly, CountsThatLieAreFoundBeforeAnythingIsSetAside) {
   for (const char* format : {"ascii", "binary_little_endian"}) {
+    const std::string xyz = "property float x\nproperty float y\nproperty float z\nend_header\n0 0 0\n";
+    const std::string list = "property list uchar int vertex_indices\nend_header\n3 0 0 0\n";
     for (const char* count : {"1000000", "4294967295", "4294967296", "18446744073709551615"}) {
       std::string start = "ply\nformat " + std::string(format) + " 1.0\n";
-      EXPECT_EQ(error_of(start + "element vertex " + count + "\nproperty float x\nproperty float y\nproperty float z\nend_header\n0 0 0\n"),
+      EXPECT_EQ(error_of(start + "element vertex " + count + "\n" + xyz),
                 "t.ply:3: the file is too short for " + std::string(count) + " vertex elements");
-      EXPECT_NE(error_of(start + "element face " + count + "\nproperty list uchar int vertex_indices\nend_header\n3 0 0 0\n"), "loaded");
+      EXPECT_NE(error_of(start + "element face " + count + "\n" + list), "loaded");
       EXPECT_NE(error_of(start + "element nothing " + count + "\nend_header\n0 0 0\n"), "loaded");
     }
-    EXPECT_EQ(error_of("ply\nformat ascii 1.0\nelement vertex 99999999999999999999\n"), "t.ply:3: element count is not a whole number");
-    EXPECT_EQ(error_of("ply\nformat ascii 1.0\nelement vertex -1\n"), "t.ply:3: element count is not a whole number");
+  }
+  for (const char* count : {"99999999999999999999", "-1", "3x", ""}) {
+    EXPECT_EQ(error_of("ply\nformat ascii 1.0\nelement vertex " + std::string(count) + "\n"),
+              "t.ply:3: element count is not a whole number");
   }
   // A list of 2^32 - 1 corners in a few bytes.
-  std::string header = "ply\nformat binary_little_endian 1.0\nelement vertex 1\nproperty uchar x\nproperty uchar y\nproperty uchar z\n"
+  std::string header = "ply\nformat binary_little_endian 1.0\nelement vertex 1\n"
+                       "property uchar x\nproperty uchar y\nproperty uchar z\n"
                        "element face 1\nproperty list uint uchar vertex_indices\nend_header\n";
   EXPECT_EQ(error_of(header + std::string("\0\0\0\xff\xff\xff\xff\0\0\0", 10)), "t.ply: the file ends in face 0");
   EXPECT_EQ(error_of(header + std::string("\0\0\0\xfe\xff\xff\xff\0\0\0", 10)), "t.ply: the file ends in face 0");
@@ -158,9 +166,9 @@ TEST(LoadPly, CountsThatLieAreFoundBeforeAnythingIsSetAside) {
 
 TEST(LoadPly, NormalsColoursAndStrayVertices) {
   std::string text =
-      "ply\nformat ascii 1.0\nelement vertex 5\nproperty float x\nproperty float y\nproperty float z\nproperty float nx\nproperty float ny\n"
-      "property float nz\nproperty float red\nproperty float green\nproperty float blue\nelement face 2\n"
-      "property list uchar int vertex_index\nend_header\n"
+      "ply\nformat ascii 1.0\nelement vertex 5\nproperty float x\nproperty float y\nproperty float z\n"
+      "property float nx\nproperty float ny\nproperty float nz\nproperty float red\nproperty float green\nproperty float blue\n"
+      "element face 2\nproperty list uchar int vertex_index\nend_header\n"
       "9 9 9 0 0 1 0 0 0\n0 0 0 0 0 -2 0.25 0.5 7\n1 0 0 0 0 -1 0 0 0\n8 8 8 0 0 1 0 0 0\n0 1 0 0 0 -1 1 1 1\n3 1 2 4\n3 1 2 2\n";
   Scene s = must_load(text);
   ASSERT_EQ(s.positions.size(), 3u);

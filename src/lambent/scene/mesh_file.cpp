@@ -31,7 +31,8 @@ void drop_unused(Scene& scene) {
       if (place[v] != none) values[place[v]] = values[v];
     values.resize(used);
   };
-  compact(scene.positions), compact(scene.normals), compact(scene.texcoords[0]), compact(scene.texcoords[1]), compact(scene.colors);
+  compact(scene.positions), compact(scene.normals), compact(scene.colors);
+  for (auto& uv : scene.texcoords) compact(uv);
   for (Triangle& t : scene.triangles)
     for (uint32_t& v : t.v) v = place[v];
 }

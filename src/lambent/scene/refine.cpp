@@ -51,10 +51,11 @@ class EdgeSplitter {
  private:
   void split_part(uint32_t p) {
     Part& part = scene_.parts[p];
-    uint32_t old_first = part.first_vertex, first = uint32_t(out_.positions.size()), first_triangle = uint32_t(out_.triangles.size());
+    uint32_t old_first = part.first_vertex, first = uint32_t(out_.positions.size());
+    uint32_t first_triangle = uint32_t(out_.triangles.size());
     copy_run(part);
-    size_t marked = 0;
-    for (size_t t = part.first_triangle; t < size_t(part.first_triangle) + part.triangle_count; ++t) marked += std::popcount(marks_[t]);
+    size_t marked = 0, end = size_t(part.first_triangle) + part.triangle_count;
+    for (size_t t = part.first_triangle; t < end; ++t) marked += size_t(std::popcount(marks_[t]));
     IndexTable table(marked);
     edges_.clear();
     uint32_t first_middle = uint32_t(out_.positions.size());
@@ -64,7 +65,7 @@ class EdgeSplitter {
       if (m == edges_.size()) edges_.push_back(edge), add_middle(std::min(a, b), std::max(a, b));
       return first_middle + m;
     };
-    for (size_t t = part.first_triangle; t < size_t(part.first_triangle) + part.triangle_count; ++t) {
+    for (size_t t = part.first_triangle; t < end; ++t) {
       Triangle triangle = scene_.triangles[t];
       for (uint32_t& v : triangle.v) v = v - old_first + first;
       uint32_t m[3];
@@ -130,9 +131,9 @@ class EdgeSplitter {
 // edges covers more than an equilateral one.
 double fewest_triangles(const Scene& scene, const Triangle& t, double max_edge) {
   const std::vector<Vec3>& p = scene.positions;
-  double longest = std::sqrt(std::max({length2(p[t.v[0]], p[t.v[1]]), length2(p[t.v[1]], p[t.v[2]]), length2(p[t.v[2]], p[t.v[0]])}));
+  double longest2 = std::max({length2(p[t.v[0]], p[t.v[1]]), length2(p[t.v[1]], p[t.v[2]]), length2(p[t.v[2]], p[t.v[0]])});
   glm::dvec3 a = p[t.v[0]], area2 = glm::cross(glm::dvec3(p[t.v[1]]) - a, glm::dvec3(p[t.v[2]]) - a);
-  return std::max({1.0, longest / max_edge, glm::length(area2) / (std::sqrt(0.75) * max_edge * max_edge)});
+  return std::max({1.0, std::sqrt(longest2) / max_edge, glm::length(area2) / (std::sqrt(0.75) * max_edge * max_edge)});
 }
 
 }  // namespace
@@ -186,7 +187,8 @@ Result<void> split_long_edges(Scene& scene, float max_edge, size_t max_triangles
     }
   }
   auto too_many = [&](double count) {
-    return Error{scene.path, fmt::format("edges of at most {} need {:.3g} triangles or more, the limit is {}", max_edge, count, max_triangles)};
+    return Error{scene.path, fmt::format("edges of at most {} need {:.3g} triangles or more, the limit is {}", max_edge, count,
+                                         max_triangles)};
   };
   if (longest2 <= double(max_edge) * double(max_edge)) return {};
   if (fewest > double(max_triangles)) return too_many(fewest);

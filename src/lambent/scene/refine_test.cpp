@@ -12,8 +12,12 @@ constexpr double area_error = 1e-5;  // relative: rounding of middles in float
 
 double longest_edge(const Scene& s) {
   double longest = 0;
-  for (const Triangle& t : s.triangles)
-    for (int k = 0; k < 3; ++k) longest = std::max(longest, glm::length(glm::dvec3(s.positions[t.v[k]]) - glm::dvec3(s.positions[t.v[(k + 1) % 3]])));
+  for (const Triangle& t : s.triangles) {
+    for (int k = 0; k < 3; ++k) {
+      glm::dvec3 a = s.positions[t.v[k]], b = s.positions[t.v[(k + 1) % 3]];
+      longest = std::max(longest, glm::length(a - b));
+    }
+  }
   return longest;
 }
 
@@ -115,7 +119,8 @@ TEST(AddGround, LiesUnderTheSceneAndReachesFar) {
   for (size_t v = vertices; v < s.positions.size(); ++v) {
     EXPECT_EQ(s.positions[v].y, box.min.y);
     floor.extend(s.positions[v]);
-    if (v > vertices && s.positions[v].x > s.positions[v - 1].x) finest = std::min(finest, double(s.positions[v].x - s.positions[v - 1].x));
+    float step = s.positions[v].x - s.positions[v - 1].x;
+    if (v > vertices && step > 0) finest = std::min(finest, double(step));
   }
   for (int axis : {0, 2}) {
     EXPECT_NEAR(floor.min[axis], box.centre()[axis] - 3 * radius, rounding * radius);

@@ -106,11 +106,9 @@ class MaterialWriter {
   std::map<std::string, size_t> images_;
 };
 
-glm::dmat3 linear_part(const glm::dmat4& m) { return glm::dmat3(m); }
-
 // Takes a unit normal of the world back into the frame that `m` leads out of.
 Vec3 local_normal(const glm::dmat4& m, Vec3 world) {
-  glm::dvec3 n = glm::transpose(linear_part(m)) * glm::dvec3(world);
+  glm::dvec3 n = glm::transpose(glm::dmat3(m)) * glm::dvec3(world);
   double length = glm::length(n);
   return length > 0 && std::isfinite(length) ? Vec3(n / length) : world;
 }
@@ -157,8 +155,19 @@ void write_geometry(GlbWriter& out, const Scene& scene, const Part& part, const 
     if (says || before.contains("COLOR_0")) attributes["COLOR_0"] = out.add_vectors(floats(colors), 3, false);
   }
   primitive["attributes"] = std::move(attributes);
-  primitive["indices"] = add_triangles(out, scene, part, glm::determinant(linear_part(frame)) < 0);
+  primitive["indices"] = add_triangles(out, scene, part, glm::determinant(glm::dmat3(frame)) < 0);
   primitive.erase("mode");
+}
+
+// Adds a node to the default scene, or, where there are no scenes, to the nodes, all of which then are shown.
+size_t add_root(GlbWriter& out, Json node) {
+  size_t number = out.push("nodes", std::move(node));
+  if (!out.json.contains("scenes") || out.json["scenes"].empty()) return number;
+  size_t scene = out.json.contains("scene") ? out.json["scene"].get<size_t>() : 0;
+  Json& roots = out.json["scenes"][scene]["nodes"];
+  if (!roots.is_array()) roots = Json::array();
+  roots.push_back(number);
+  return number;
 }
 
 // The document part of the output: rewrites what changed in a copy of the document.
@@ -246,7 +255,7 @@ class DocumentWriter {
     });
     // Vertices that are not the document's have no joints or morph targets to move by: the whole node gets its rest pose.
     const glm::dmat4& world = pose_.world[node];
-    const double determinant = glm::determinant(linear_part(world));
+    const double determinant = glm::determinant(glm::dmat3(world));
     const bool singular = determinant == 0 || !std::isfinite(1 / determinant);
     const bool still = new_vertices && (skinned || morphs || singular);
     const bool apart = new_vertices && (skinned || singular);  // then it stands in the world, on a node of its own
@@ -295,11 +304,10 @@ class DocumentWriter {
     LAMBENT_CHECK(part.source.size() == part.vertex_count);
     GltfCheck check("");
     const Json before = primitive["attributes"];
-    auto accessor = [&](const Json& holder, const char* key) {
-      size_t index = holder[key].get<size_t>();
-      return std::pair(read_accessor(check, document_, index), &gltf_item(document_.json, "accessors", index));
+    auto accessor = [&](const Json& holder, const std::string& key) {
+      return read_accessor(check, document_, holder[key].get<size_t>());
     };
-    const size_t old_count = accessor(before, "POSITION").first.count;
+    const size_t old_count = accessor(before, "POSITION").count;
     for (uint32_t s : part.source) LAMBENT_CHECK(s < old_count);
     GltfPlacement placement;
     LAMBENT_CHECK(read_placement(check, document_, pose_, node, primitive, old_count, {}, placement));
@@ -307,20 +315,18 @@ class DocumentWriter {
     // Where the document has no normals, what it says about tangents is void too.
     auto is_void = [&](const std::string& name) { return !had_normals && (name == "NORMAL" || name == "TANGENT"); };
 
-    const GltfAccessor old_normals = had_normals ? accessor(before, "NORMAL").first : GltfAccessor{};
+    const GltfAccessor old_normals = had_normals ? accessor(before, "NORMAL") : GltfAccessor{};
     Json attributes = {{"NORMAL", copy_normals(part, placement, old_normals)}};
     for (auto item = before.begin(); item != before.end(); ++item) {
       if (item.key() == "NORMAL" || is_void(item.key())) continue;
-      auto [from, description] = accessor(before, item.key().c_str());
-      attributes[item.key()] = out_.add_copy(from, *description, part.source);
+      attributes[item.key()] = out_.add_copy(accessor(before, item.key()), part.source, item.key() == "POSITION");
     }
     if (primitive.contains("targets")) {
       for (Json& target : primitive["targets"]) {
         Json copies = Json::object();
         for (auto item = target.begin(); item != target.end(); ++item) {
           if (is_void(item.key())) continue;
-          auto [from, description] = accessor(target, item.key().c_str());
-          copies[item.key()] = out_.add_copy(from, *description, part.source);
+          copies[item.key()] = out_.add_copy(accessor(target, item.key()), part.source, item.key() == "POSITION");
         }
         target = std::move(copies);
       }
@@ -367,19 +373,6 @@ class DocumentWriter {
     }
   }
 
- public:
-  // Adds a node to the default scene, or, where there are no scenes, to the nodes, all of which then are shown.
-  static size_t add_root(GlbWriter& out, Json node) {
-    size_t number = out.push("nodes", std::move(node));
-    if (!out.json.contains("scenes") || out.json["scenes"].empty()) return number;
-    size_t scene = out.json.contains("scene") ? out.json["scene"].get<size_t>() : 0;
-    Json& roots = out.json["scenes"][scene]["nodes"];
-    if (!roots.is_array()) roots = Json::array();
-    roots.push_back(number);
-    return number;
-  }
-
- private:
   GlbWriter& out_;
   const Scene& scene_;
   const GltfDocument& document_;
@@ -430,7 +423,7 @@ Result<void> save_glb(const std::string& path, const Scene& scene, std::span<con
     Json mesh = {{"primitives", Json::array({std::move(primitive)})}}, node = Json::object();
     if (!part.name.empty()) mesh["name"] = part.name, node["name"] = part.name;
     node["mesh"] = out.push("meshes", std::move(mesh));
-    places.part_nodes[p] = int(DocumentWriter::add_root(out, std::move(node)));
+    places.part_nodes[p] = int(add_root(out, std::move(node)));
     places.part_primitives[p] = 0;
   }
 

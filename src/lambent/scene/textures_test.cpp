@@ -24,7 +24,8 @@ TEST(DecodeTexture, RefusesWhatIsNoImage) {
     EXPECT_EQ(texture.error().text(), "a.png: is neither PNG nor JPEG");
   }
   EXPECT_FALSE(decode_texture({0xff, 0xd8, 0xff, 0xe0}, "a"));
-  for (auto [width, height] : {std::pair{0u, 1u}, {1u, 0u}, {16385u, 1u}, {1u, 16385u}, {16384u, 16384u}, {100'000'000u, 100'000'000u}, {4u, 4u}})
+  for (auto [width, height] : {std::pair{0u, 1u}, {1u, 0u}, {16385u, 1u}, {1u, 16385u},
+                               {16384u, 16384u}, {100'000'000u, 100'000'000u}, {4u, 4u}})
     EXPECT_FALSE(decode_texture(png_header(width, height), "a")) << width << " " << height;
 }
 

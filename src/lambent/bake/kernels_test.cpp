@@ -1,0 +1,69 @@
+#include <lambent/bake/gather.h>
+#include <lambent/bake/kernels.h>
+#include <lambent/core/half.h>
+#include <lambent/core/random.h>
+
+#include <gtest/gtest.h>
+
+namespace lambent {
+namespace {
+
+TEST(Kernels, MultiplyEntriesIsTheSparseProduct) {
+  for (int channels : {1, 3})
+    for (size_t width : {size_t{16}, size_t{48}, size_t{112}, size_t{144}, size_t{432}}) {
+      Random random(width);
+      const size_t receivers = 300;
+      AlignedVector<float> x(receivers * width);
+      for (float& v : x) v = random.next() - 0.5f;
+      SparseBlock block;
+      block.row_count = 5;
+      std::vector<double> expected(5 * width, 0.0);
+      for (uint32_t column = 0; column < receivers; column += 1 + uint32_t(random.next() * 3)) {
+        for (int row = 0; row < 5; ++row) {
+          if (random.next() < 0.3f) continue;
+          block.rows.push_back(uint8_t(row));
+          float w[3];
+          for (int c = 0; c < channels; ++c) {
+            block.weights.push_back(float_to_half(random.next()));
+            w[c] = half_to_float(block.weights.back());
+          }
+          for (size_t j = 0; j < width; ++j) expected[size_t(row) * width + j] += double(w[channels == 1 ? 0 : j % 3]) * x[column * width + j];
+        }
+        if (block.rows.size() > (block.ends.empty() ? 0 : block.ends.back())) {
+          block.columns.push_back(column);
+          block.ends.push_back(uint32_t(block.rows.size()));
+        }
+      }
+      std::vector<float> y(5 * width);
+      multiply_rows(block, channels, x.data(), width, 0.25f, y.data());
+      for (size_t i = 0; i < y.size(); ++i) EXPECT_NEAR(y[i], 0.25 * expected[i], 1e-5) << "channels " << channels << " width " << width;
+    }
+}
+
+TEST(Kernels, WeightedRowsIsTheDenseProduct) {
+  Random random(3);
+  for (size_t rows : {size_t{1}, size_t{4}, size_t{9}, size_t{35}}) {
+    const size_t stride = 96, count = 64;
+    AlignedVector<float> table(rows * stride), weights(count);
+    for (float& v : table) v = random.next() - 0.5f;
+    for (float& v : weights) v = random.next();
+    std::vector<float> out(rows);
+    weighted_rows(table.data(), rows, stride, weights.data(), count, out.data());
+    for (size_t i = 0; i < rows; ++i) {
+      double sum = 0;
+      for (size_t j = 0; j < count; ++j) sum += double(table[i * stride + j]) * weights[j];
+      EXPECT_NEAR(out[i], sum, 1e-5);
+    }
+  }
+}
+
+TEST(Kernels, RotateDirectionsIsTheMatrix) {
+  const Mat3 R = rotation_from_yaw_pitch_roll({20, 30, 40});
+  float x[16], y[16], z[16], ox[16], oy[16], oz[16];
+  for (int i = 0; i < 16; ++i) x[i] = float(i), y[i] = 1 - float(i), z[i] = 0.5f * float(i);
+  rotate_directions(R, x, y, z, 16, ox, oy, oz);
+  for (int i = 0; i < 16; ++i) EXPECT_LT(glm::length(R * Vec3(x[i], y[i], z[i]) - Vec3(ox[i], oy[i], oz[i])), 1e-5f);
+}
+
+}  // namespace
+}  // namespace lambent

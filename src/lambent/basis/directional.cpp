@@ -1,0 +1,182 @@
+// Follows: general-prt (directional and custom bases). A lobe g(cos t) has Legendre moments I_l = integral over [-1, 1] of g P_l;
+// then (Funk-Hecke) the integral of y_lm against the lobe about a is 2 pi I_l y_lm(a), and that of two lobes at an angle c is
+// pi sum_l (2l+1) I_l I'_l P_l(cos c).
+#include <lambent/basis/directional.h>
+#include <lambent/basis/pseudo_inverse.h>
+#include <lambent/basis/quadrature.h>
+#include <lambent/core/check.h>
+
+namespace lambent {
+namespace {
+
+// Terms of the sum over l for two lobes: those of the broadest cosine lobe, s = 1, fall as l^-4 and leave 1e-9.
+constexpr int moments_kept = 640;
+
+// A float's rounding of a unit axis would show in sharp lobes.
+glm::dvec3 axis_of(const Lobe& lobe) { return glm::normalize(glm::dvec3(lobe.axis)); }
+
+// 1 / the root of the integral of the lobe's square.
+double lobe_scale(LobeKind kind, double s) {
+  const double two_pi = 2 * std::numbers::pi;
+  return kind == LobeKind::cosine_power ? std::sqrt((2 * s + 1) / two_pi) : std::sqrt(2 * s / (two_pi * -std::expm1(-4 * s)));
+}
+
+double lobe_value(LobeKind kind, double s, double cosine) {
+  return kind == LobeKind::cosine_power ? (cosine > 0 ? std::pow(cosine, s) : 0) : std::exp(s * (cosine - 1));
+}
+
+// I_l of the unscaled lobe, l < count.
+std::vector<double> moments(LobeKind kind, double s, int count) {
+  std::vector<double> I(size_t(count), 0.0);
+  if (kind == LobeKind::cosine_power) {
+    // The integral over [0, 1] of t^s P_l.
+    I[0] = 1 / (s + 1);
+    if (count > 1) I[1] = 1 / (s + 2);
+    for (int l = 2; l < count; ++l) I[size_t(l)] = I[size_t(l - 2)] * (s - l + 2) / (s + l + 1);
+    return I;
+  }
+  // 2 exp(-s) times the modified spherical Bessel functions i_l(s): downwards, from where they are negligible (Miller).
+  double above = 0, at = 1e-280;
+  for (int l = std::max(count, int(s)) + 40 + int(8 * std::sqrt(s)); l > 0; --l) {
+    const double below = above + (2 * l + 1) / s * at;
+    above = at, at = below;
+    if (l - 1 < count) I[size_t(l - 1)] = at;
+    if (at > 1e200) {
+      above *= 1e-200, at *= 1e-200;
+      for (int k = l - 1; k < count; ++k) I[size_t(k)] *= 1e-200;
+    }
+  }
+  const double scale = -std::expm1(-2 * s) / s / I[0];
+  for (double& x : I) x *= scale;
+  return I;
+}
+
+// The integral of the product of two unscaled lobes.
+double lobe_product(LobeKind kind, const Lobe& p, const Lobe& q, std::span<const double> Ip, std::span<const double> Iq) {
+  const glm::dvec3 a = axis_of(p), b = axis_of(q);
+  if (kind == LobeKind::von_mises_fisher) {
+    // exp((s a + s' b).d - s - s') is a lobe about the sum.
+    const double sum = double(p.sharpness) + q.sharpness, k = glm::length(double(p.sharpness) * a + double(q.sharpness) * b);
+    return k < 1e-6 ? 4 * std::numbers::pi * std::exp(-sum) : 2 * std::numbers::pi * std::exp(k - sum) * -std::expm1(-2 * k) / k;
+  }
+  const double x = std::clamp(glm::dot(a, b), -1.0, 1.0);
+  double p0 = 1, p1 = x, result = Ip[0] * Iq[0] + 3 * Ip[1] * Iq[1] * x;
+  for (int l = 2; l < moments_kept; ++l) {
+    const double next = ((2 * l - 1) * x * p1 - (l - 1) * p0) / l;
+    p0 = p1, p1 = next;
+    result += (2 * l + 1) * Ip[size_t(l)] * Iq[size_t(l)] * next;
+  }
+  return std::numbers::pi * result;
+}
+
+// Coefficients of the scaled lobe in spherical harmonics.
+void lobe_to_sh(LobeKind kind, const Lobe& lobe, int order, std::span<double> out) {
+  const std::vector<double> I = moments(kind, lobe.sharpness, order);
+  const double scale = 2 * std::numbers::pi * lobe_scale(kind, lobe.sharpness);
+  evaluate_sh(order, axis_of(lobe), out);
+  for (int i = 0; i < sh_count(order); ++i) out[size_t(i)] *= scale * I[size_t(sh_band(i))];
+}
+
+}  // namespace
+
+std::vector<Vec3> even_directions(int count) {
+  LAMBENT_CHECK(count >= 0);
+  std::vector<Vec3> directions;
+  const double golden_angle = std::numbers::pi * (3 - std::sqrt(5.0));
+  for (int i = 0; i < count; ++i) {
+    const double z = 1 - (2.0 * i + 1) / count, r = std::sqrt(1 - z * z), phi = golden_angle * i;
+    directions.emplace_back(r * std::cos(phi), r * std::sin(phi), z);
+  }
+  return directions;
+}
+
+DirectionalBasis make_directional_basis(int sh_order, LobeKind kind, std::vector<Lobe> lobes, double cutoff) {
+  LAMBENT_CHECK(sh_order >= 0 && sh_order <= max_sh_order && (sh_order > 0 || !lobes.empty()));
+  for (const Lobe& lobe : lobes) {
+    LAMBENT_CHECK(lobe.sharpness >= (kind == LobeKind::cosine_power ? 1.0f : 1e-3f) && lobe.sharpness <= 1e5f);
+    LAMBENT_CHECK(std::abs(glm::length(lobe.axis) - 1) < 1e-4f);
+  }
+  DirectionalBasis basis{sh_order, kind, std::move(lobes), {}, {}, 0, 1};
+  const size_t n = basis.count(), harmonics = size_t(sh_count(sh_order));
+  basis.gram.assign(n * n, 0.0);
+  auto set = [&](size_t i, size_t j, double value) { basis.gram[i * n + j] = basis.gram[j * n + i] = value; };
+  for (size_t i = 0; i < harmonics; ++i) set(i, i, 1);
+  std::vector<std::vector<double>> I;
+  if (kind == LobeKind::cosine_power)
+    for (const Lobe& lobe : basis.lobes) I.push_back(moments(kind, lobe.sharpness, moments_kept));
+  else I.resize(basis.lobes.size());
+  std::vector<double> projected(harmonics);
+  for (size_t p = 0; p < basis.lobes.size(); ++p) {
+    const Lobe& lobe = basis.lobes[p];
+    if (sh_order > 0) {
+      lobe_to_sh(kind, lobe, sh_order, projected);
+      for (size_t i = 0; i < harmonics; ++i) set(i, harmonics + p, projected[i]);
+    }
+    set(harmonics + p, harmonics + p, 1);
+    for (size_t q = 0; q < p; ++q) {
+      const double scale = lobe_scale(kind, lobe.sharpness) * lobe_scale(kind, basis.lobes[q].sharpness);
+      set(harmonics + p, harmonics + q, scale * lobe_product(kind, lobe, basis.lobes[q], I[p], I[q]));
+    }
+  }
+  PseudoInverse inverse = pseudo_inverse(basis.gram, int(n), cutoff);
+  basis.dual = std::move(inverse.values), basis.rank = inverse.rank, basis.condition = inverse.condition;
+  return basis;
+}
+
+void evaluate_directional(const DirectionalBasis& basis, glm::dvec3 d, std::span<double> out) {
+  LAMBENT_CHECK(out.size() >= basis.count());
+  size_t i = size_t(sh_count(basis.sh_order));
+  if (basis.sh_order > 0) evaluate_sh(basis.sh_order, d, out);
+  for (const Lobe& lobe : basis.lobes)
+    out[i++] = lobe_scale(basis.kind, lobe.sharpness) * lobe_value(basis.kind, lobe.sharpness, glm::dot(axis_of(lobe), d));
+}
+
+std::vector<double> apply_directional_dual(const DirectionalBasis& basis, std::span<const double> integrals) {
+  const size_t n = basis.count();
+  LAMBENT_CHECK(integrals.size() == n);
+  std::vector<double> result(n);
+  for (size_t i = 0; i < n; ++i)
+    for (size_t j = 0; j < n; ++j) result[i] += basis.dual[i * n + j] * integrals[j];
+  return result;
+}
+
+void evaluate_directional_dual(const DirectionalBasis& basis, glm::dvec3 d, std::span<double> out) {
+  std::vector<double> values(basis.count());
+  evaluate_directional(basis, d, values);
+  const std::vector<double> dual = apply_directional_dual(basis, values);
+  LAMBENT_CHECK(out.size() >= dual.size());
+  std::copy(dual.begin(), dual.end(), out.begin());
+}
+
+std::vector<double> project_directional(const DirectionalBasis& basis, const std::function<double(glm::dvec3)>& f, int exact_order) {
+  std::vector<double> integrals(basis.count()), values(basis.count());
+  for (const DirectionNode& node : direction_quadrature(std::max(basis.sh_order, exact_order))) {
+    evaluate_directional(basis, node.direction, values);
+    const double value = f(node.direction) * node.weight;
+    for (size_t i = 0; i < values.size(); ++i) integrals[i] += value * values[i];
+  }
+  return apply_directional_dual(basis, integrals);
+}
+
+double reconstruct_directional(const DirectionalBasis& basis, std::span<const double> coefficients, glm::dvec3 d) {
+  LAMBENT_CHECK(coefficients.size() == basis.count());
+  std::vector<double> values(basis.count());
+  evaluate_directional(basis, d, values);
+  double sum = 0;
+  for (size_t i = 0; i < values.size(); ++i) sum += coefficients[i] * values[i];
+  return sum;
+}
+
+std::vector<double> directional_to_sh(const DirectionalBasis& basis, std::span<const double> coefficients, int order) {
+  LAMBENT_CHECK(coefficients.size() == basis.count() && order >= 1 && order <= max_sh_order);
+  std::vector<double> result(size_t(sh_count(order))), projected(result.size());
+  const size_t harmonics = size_t(sh_count(basis.sh_order));
+  std::copy_n(coefficients.begin(), std::min(harmonics, result.size()), result.begin());
+  for (size_t p = 0; p < basis.lobes.size(); ++p) {
+    lobe_to_sh(basis.kind, basis.lobes[p], order, projected);
+    for (size_t i = 0; i < result.size(); ++i) result[i] += coefficients[harmonics + p] * projected[i];
+  }
+  return result;
+}
+
+}  // namespace lambent

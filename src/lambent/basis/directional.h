@@ -1,0 +1,50 @@
+#pragma once
+// Bases of lobes, functions of the angle to an axis, alone or together with spherical harmonics: "order n and K lamps". They are
+// not orthonormal, so a function f = sum_i c_i b_i has coefficients c_i = integral of f b~_i with the DUAL functions
+// b~_i = sum_j (G^-1)_ij b_j, G_ij = integral of b_i b_j. Source: general-prt (directional and custom light bases).
+#include <lambent/basis/sh.h>
+
+namespace lambent {
+
+enum class LobeKind {
+  cosine_power,      // max(0, cos t)^s, s >= 1: nothing beyond 90 degrees
+  von_mises_fisher,  // exp(s (cos t - 1)), s > 0: smooth everywhere
+};
+
+struct Lobe {
+  Vec3 axis;        // unit
+  float sharpness;  // s above
+};
+
+// `count` directions spread evenly over the sphere (a Fibonacci lattice), no two alike.
+std::vector<Vec3> even_directions(int count);
+
+// Order n of spherical harmonics (0 for none), then the lobes, each scaled so that the integral of its square is 1.
+struct DirectionalBasis {
+  int sh_order = 0;
+  LobeKind kind = LobeKind::von_mises_fisher;
+  std::vector<Lobe> lobes;
+  std::vector<double> gram, dual;  // G and its (pseudo-)inverse, count x count, row-major
+  int rank = 0;                    // count, unless the functions are dependent to within the cutoff
+  double condition = 1;            // greatest over least eigenvalue of G that is kept
+  size_t count() const { return size_t(sh_count(sh_order)) + lobes.size(); }
+};
+// Eigenvalues of G at or below `cutoff` times the greatest are left out, so that functions that are nearly dependent (two equal
+// lamps, a broad lamp that the harmonics can make) do not get huge coefficients of opposite sign.
+DirectionalBasis make_directional_basis(int sh_order, LobeKind kind, std::vector<Lobe> lobes, double cutoff = 1e-10);
+
+// The functions and their duals at the unit direction d; out has count() values.
+void evaluate_directional(const DirectionalBasis& basis, glm::dvec3 d, std::span<double> out);
+void evaluate_directional_dual(const DirectionalBasis& basis, glm::dvec3 d, std::span<double> out);
+
+// The least-squares coefficients of f, by quadrature of exact_order nodes in z and twice as many about it.
+std::vector<double> project_directional(const DirectionalBasis& basis, const std::function<double(glm::dvec3)>& f, int exact_order = 64);
+// The same from the integrals of f b_i.
+std::vector<double> apply_directional_dual(const DirectionalBasis& basis, std::span<const double> integrals);
+double reconstruct_directional(const DirectionalBasis& basis, std::span<const double> coefficients, glm::dvec3 d);
+
+// The part of the function that spherical harmonics of `order` can hold: order^2 coefficients, in closed form (Funk-Hecke).
+// With it lamps light what was baked for harmonics.
+std::vector<double> directional_to_sh(const DirectionalBasis& basis, std::span<const double> coefficients, int order);
+
+}  // namespace lambent

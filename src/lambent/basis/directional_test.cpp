@@ -1,0 +1,124 @@
+#include <lambent/basis/directional.h>
+#include <lambent/basis/quadrature.h>
+#include <lambent/core/random.h>
+
+#include <gtest/gtest.h>
+
+namespace lambent {
+namespace {
+
+// Double rounding, magnified by condition numbers of up to some thousand; smooth lobes.
+constexpr double smooth_tolerance = 1e-8;
+// Quadrature with 96 nodes across the edge of a cosine lobe at 90 degrees, where its s-th derivative jumps: s >= 2.
+constexpr double edge_tolerance = 2e-4;
+
+double tolerance(LobeKind kind) { return kind == LobeKind::cosine_power ? edge_tolerance : smooth_tolerance; }
+
+std::vector<Lobe> uneven_lobes(int count, float least, float most) {
+  std::vector<Lobe> lobes;
+  for (Vec3 axis : even_directions(count)) lobes.push_back({axis, least + (most - least) * float(lobes.size()) / float(count)});
+  return lobes;
+}
+
+std::vector<DirectionalBasis> bases() {
+  return {make_directional_basis(0, LobeKind::von_mises_fisher, uneven_lobes(20, 8, 12)),
+          make_directional_basis(0, LobeKind::cosine_power, uneven_lobes(20, 9, 12)),
+          make_directional_basis(4, LobeKind::von_mises_fisher, uneven_lobes(5, 20, 60)),
+          make_directional_basis(3, LobeKind::cosine_power, uneven_lobes(4, 16, 30)),
+          make_directional_basis(5, LobeKind::cosine_power, {})};
+}
+
+TEST(Directional, DirectionsAreSpreadEvenly) {
+  const auto directions = even_directions(200);
+  Vec3 mean(0.0f);
+  double nearest = 4, second[3] = {};
+  for (size_t i = 0; i < directions.size(); ++i) {
+    mean += directions[i] / 200.0f;
+    for (int c = 0; c < 3; ++c) second[c] += double(directions[i][c]) * directions[i][c] / 200;
+    for (size_t j = 0; j < i; ++j) nearest = std::min(nearest, double(glm::distance(directions[i], directions[j])));
+  }
+  EXPECT_LT(glm::length(mean), 0.01f);
+  for (double s : second) EXPECT_NEAR(s, 1.0 / 3, 0.005);
+  EXPECT_GT(nearest, 0.75 * std::sqrt(4 * std::numbers::pi / 200));  // against the side of a square of equal share
+}
+
+TEST(Directional, GramMatrixIsTheIntegralOfProducts) {
+  for (const DirectionalBasis& basis : bases()) {
+    const size_t n = basis.count();
+    std::vector<double> gram(n * n), values(n);
+    for (const DirectionNode& node : direction_quadrature(96)) {
+      evaluate_directional(basis, node.direction, values);
+      for (size_t i = 0; i < n; ++i)
+        for (size_t j = 0; j < n; ++j) gram[i * n + j] += node.weight * values[i] * values[j];
+    }
+    for (size_t i = 0; i < n * n; ++i) EXPECT_NEAR(gram[i], basis.gram[i], 1e-6) << i / n << " " << i % n;
+  }
+}
+
+TEST(Directional, BroadCosineLobesMatchTheirClosedForm) {
+  // Of two clamped cosines at an angle c: the integral is 2/3 (sin c + (pi - c) cos c); each has the square 2 pi / 3.
+  const double c = 0.9;
+  const auto basis = make_directional_basis(0, LobeKind::cosine_power, {{Vec3(0, 0, 1), 1}, {Vec3(float(std::sin(c)), 0, float(std::cos(c))), 1}});
+  EXPECT_NEAR(basis.gram[1], (std::sin(c) + (std::numbers::pi - c) * std::cos(c)) / std::numbers::pi, 1e-7);
+}
+
+TEST(Directional, DualsAreBiorthogonal) {
+  for (const DirectionalBasis& basis : bases()) {
+    const size_t n = basis.count();
+    EXPECT_EQ(basis.rank, int(n));
+    std::vector<double> products(n * n), values(n), duals(n);
+    for (const DirectionNode& node : direction_quadrature(96)) {
+      evaluate_directional(basis, node.direction, values);
+      evaluate_directional_dual(basis, node.direction, duals);
+      for (size_t i = 0; i < n; ++i)
+        for (size_t j = 0; j < n; ++j) products[i * n + j] += node.weight * duals[i] * values[j];
+    }
+    for (size_t i = 0; i < n; ++i)
+      for (size_t j = 0; j < n; ++j) EXPECT_NEAR(products[i * n + j], i == j ? 1 : 0, tolerance(basis.kind)) << i << " " << j;
+  }
+}
+
+TEST(Directional, ReproducesTheSpan) {
+  for (const DirectionalBasis& basis : bases()) {
+    Random random(3);
+    std::vector<double> c(basis.count());
+    for (double& x : c) x = 2 * random.next() - 1;
+    const auto again = project_directional(basis, [&](glm::dvec3 d) { return reconstruct_directional(basis, c, d); }, 96);
+    for (size_t i = 0; i < c.size(); ++i) EXPECT_NEAR(again[i], c[i], tolerance(basis.kind)) << i;
+  }
+}
+
+// Harmonics alone blur a lamp; with the lamp in the basis the sky stays as good and the lamp becomes exact.
+TEST(Directional, HarmonicsAndLampsHoldASkyWithALamp) {
+  const Vec3 lamp = glm::normalize(Vec3(0.3f, -0.5f, 0.8f));
+  const auto mixed = make_directional_basis(4, LobeKind::von_mises_fisher, {{lamp, 200}});
+  auto sky = [&](glm::dvec3 d) { return 1 + 0.5 * d.z - 0.3 * d.x * d.y + 30 * std::exp(200 * (glm::dot(glm::normalize(glm::dvec3(lamp)), d) - 1)); };
+  const auto c = project_directional(mixed, sky), harmonics = project_sh(4, sky);
+  double worst = 0, worst_harmonics = 0;
+  for (Vec3 v : even_directions(500)) {
+    const glm::dvec3 d = glm::normalize(glm::dvec3(v));
+    double y[16], sum = 0;
+    evaluate_sh(4, d, y);
+    for (size_t i = 0; i < 16; ++i) sum += harmonics[i] * y[i];
+    worst = std::max(worst, std::abs(reconstruct_directional(mixed, c, d) - sky(d)));
+    worst_harmonics = std::max(worst_harmonics, std::abs(sum - sky(d)));
+  }
+  EXPECT_LT(worst, 1e-5);
+  EXPECT_GT(worst_harmonics, 5);
+  // The harmonics' share of it all is what projecting to harmonics gives.
+  const auto share = directional_to_sh(mixed, c, 4);
+  for (size_t i = 0; i < 16; ++i) EXPECT_NEAR(share[i], harmonics[i], 1e-6) << i;
+}
+
+TEST(Directional, EqualLobesShareTheirCoefficient) {
+  const Lobe lobe{Vec3(0, 1, 0), 10};
+  const auto basis = make_directional_basis(0, LobeKind::von_mises_fisher, {lobe, lobe, {Vec3(1, 0, 0), 10}});
+  EXPECT_EQ(basis.rank, 2);
+  const auto c = project_directional(basis, [&](glm::dvec3 d) { return std::exp(10 * (d.y - 1)); });
+  EXPECT_NEAR(c[0], c[1], smooth_tolerance);
+  EXPECT_NEAR(c[2], 0, smooth_tolerance);
+  EXPECT_NEAR(reconstruct_directional(basis, c, glm::dvec3(0, 1, 0)), 1, 1e-6);
+}
+
+}  // namespace
+}  // namespace lambent
