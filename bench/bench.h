@@ -31,6 +31,7 @@ double least_seconds(int runs, F&& f) {
 std::optional<Scene> data_scene(const std::string& name, bool ground);
 
 void bench_bake();
+void bench_basis();
 void bench_relight();
 void bench_scaling();
 

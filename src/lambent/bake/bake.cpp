@@ -4,6 +4,7 @@
 #include <lambent/bake/gather.h>
 #include <lambent/bake/kernels.h>
 #include <lambent/core/parallel.h>
+#include <lambent/core/pool.h>
 
 #include <atomic>
 #include <chrono>
@@ -26,7 +27,7 @@ size_t solution_bytes(size_t receivers, size_t coefficients, int channels) {
 
 // Direction tables, corner maps and the scratch of every thread; an upper estimate.
 size_t table_bytes(size_t triangles, size_t coefficients, size_t samples) {
-  return 8 * pad_lanes(samples) * 4 * (coefficients + 3) + 24 * triangles + size_t(thread_count()) * samples * 200;
+  return 8 * pad_lanes(samples) * 4 * (coefficients + 3) + 32 * triangles + size_t(thread_count()) * samples * gather_block * 3 * 36;
 }
 
 // Luminance-free measure of how far `part` of the rays is from all of them.
@@ -48,6 +49,7 @@ struct Baker {
   const GatherSetup setup;
   Progress* progress;
   BakeReport& report;
+  Pool<GatherScratch, DeleteScratch> scratch{[this] { return make_gather_scratch(setup); }};
 
   size_t n() const { return receivers.count(); }
   size_t coefficients() const { return setup.coefficients(); }
@@ -78,7 +80,7 @@ struct Baker {
       parallel_for(n(), gather_block, [&](size_t begin, size_t end) {
         if (stage.cancelled()) return;
         std::vector<float> rows((end - begin) * coefficients()), half_rows(checked_count(end - begin) * coefficients());
-        trace_sky(setup, begin, end - begin, {rows.data(), half_rows.data(), buried.data() + begin});
+        trace_sky(setup, *scratch.borrow(), begin, end - begin, {rows.data(), half_rows.data(), buried.data() + begin});
         for (size_t r = begin; r < end; ++r) {
           const float* row = rows.data() + (r - begin) * coefficients();
           store_receiver(out, r, {row, coefficients()});
@@ -123,7 +125,7 @@ struct Baker {
         if (stage.cancelled()) return;
         GatherBlock block;
         const GatherSky sky = sky_of(begin);
-        trace_gather(setup, begin, end - begin, &block, &sky);
+        trace_gather(setup, *scratch.borrow(), begin, end - begin, &block, &sky);
         // Which blocks are kept depends on the scheduling, the result does not: the others are traced again, alike.
         const size_t bytes = block.rows.bytes() + block.half_rows.bytes() + sizeof(GatherBlock);
         if (used.fetch_add(bytes) + bytes <= budget) {
@@ -163,7 +165,7 @@ struct Baker {
         if (stage.cancelled()) return;
         const size_t b = begin / gather_block;
         GatherBlock again;
-        if (!is_kept[b]) trace_gather(setup, begin, end - begin, &again, nullptr);
+        if (!is_kept[b]) trace_gather(setup, *scratch.borrow(), begin, end - begin, &again, nullptr);
         const GatherBlock& block = is_kept[b] ? kept[b] : again;
         multiply_rows(block.rows, setup.channels, X.data(), width, setup.row_scale(size_t(options.samples)), next.data() + begin * width);
         for (size_t r = begin; r < end; ++r) add_T0(T0.data() + r * C, next.data() + r * width);

@@ -210,7 +210,7 @@ TEST(Bake, TheSameBytesWhateverTheThreadsAndTheMemory) {
   const size_t receivers = make_vertex_receivers(scene).count();
   // The solution vectors and tables fit, and hardly any of the operator.
   const size_t least = least_memory(receivers, true, {.order = 4, .samples = 64, .bounces = 2});
-  EXPECT_EQ(bytes_with(2, least + scene.triangles.size() * 24 + (size_t{1} << 20), &kept_little), expected);
+  EXPECT_EQ(bytes_with(2, least + scene.triangles.size() * 32 + (size_t{1} << 20), &kept_little), expected);
   EXPECT_LT(kept_little, 0.9);
 }
 

@@ -14,87 +14,64 @@ namespace {
 constexpr int set_count = 8;
 // Rays of the second look at dark receivers, when only occlusion was traced.
 constexpr size_t burial_rays = 64;
+// Hits are looked up in tables larger than the caches: so many rays ahead.
+constexpr size_t lookahead = 16;
 
 bool is_grey(Vec3 c) { return c.x == c.y && c.y == c.z; }
 
-// Entries of a block as its rays meet them, row after row.
-struct UnsortedEntries {
-  size_t row_count = 0;
-  std::vector<uint32_t> columns;
-  std::vector<uint8_t> rows;
-  std::vector<uint16_t> weights;
+// What one ray adds to the row of its receiver at one corner of the triangle that it met.
+struct Record {
+  uint32_t column;
+  Vec3 weight;
 };
 
-// Sorted by column, rows in order within each: a stable radix sort on 11 bits at a time.
-SparseBlock by_columns(const UnsortedEntries& in, int channels, size_t column_limit) {
-  const size_t n = in.columns.size();
-  std::vector<uint32_t> order(n), other(n);
-  for (size_t i = 0; i < n; ++i) order[i] = uint32_t(i);
-  for (int shift = 0; shift < 32 && column_limit >> shift; shift += 11) {
+// The records of a block as its rays meet them, row after row, and room to sort them in.
+struct Records {
+  std::vector<Record> list;
+  std::vector<uint32_t> row_ends;
+  std::vector<uint64_t> order, other;  // column, index
+  std::vector<uint8_t> row_of;
+  std::vector<float> weights;
+  void clear() { list.clear(), row_ends.clear(); }
+};
+
+// Merges records of the same column and row. A stable radix sort on 11 bits of the column at a time keeps rows in order within a
+// column, and with them the order of every sum.
+SparseBlock by_columns(Records& in, int channels, float unit, size_t column_limit) {
+  const size_t n = in.list.size();
+  in.order.resize(n), in.other.resize(n), in.row_of.resize(n), in.weights.clear();
+  for (size_t row = 0, i = 0; row < in.row_ends.size(); ++row)
+    for (; i < in.row_ends[row]; ++i) in.order[i] = uint64_t(in.list[i].column) << 32 | i, in.row_of[i] = uint8_t(row);
+  for (int shift = 32; shift < 64 && column_limit >> (shift - 32); shift += 11) {
     uint32_t start[2049] = {};
-    for (uint32_t c : in.columns) ++start[(c >> shift & 2047) + 1];
+    for (uint64_t o : in.order) ++start[(o >> shift & 2047) + 1];
     for (int k = 0; k < 2048; ++k) start[k + 1] += start[k];
-    for (uint32_t i : order) other[start[in.columns[i] >> shift & 2047]++] = i;
-    std::swap(order, other);
+    for (uint64_t o : in.order) in.other[start[o >> shift & 2047]++] = o;
+    std::swap(in.order, in.other);
   }
   SparseBlock out;
-  out.row_count = in.row_count;
-  out.rows.resize(n), out.weights.resize(n * size_t(channels));
-  for (size_t i = 0; i < n; ++i) {
-    const size_t from = order[i];
-    if (out.columns.empty() || out.columns.back() != in.columns[from]) {
-      if (!out.columns.empty()) out.ends.push_back(uint32_t(i));
-      out.columns.push_back(in.columns[from]);
+  out.row_count = in.row_ends.size();
+  out.rows.reserve(n);
+  uint32_t column = none;
+  for (size_t i = 0; i < n;) {
+    const uint32_t first = uint32_t(in.order[i]);
+    const uint8_t row = in.row_of[first];
+    const uint32_t here = uint32_t(in.order[i] >> 32);
+    Vec3 weight = in.list[first].weight;
+    for (++i; i < n && uint32_t(in.order[i] >> 32) == here && in.row_of[uint32_t(in.order[i])] == row; ++i)
+      weight += in.list[uint32_t(in.order[i])].weight;
+    if (here != column) {
+      if (column != none) out.ends.push_back(uint32_t(out.rows.size()));
+      out.columns.push_back(here), column = here;
     }
-    out.rows[i] = in.rows[from];
-    for (size_t c = 0; c < size_t(channels); ++c) out.weights[i * size_t(channels) + c] = in.weights[from * size_t(channels) + c];
+    out.rows.push_back(row);
+    for (int c = 0; c < channels; ++c) in.weights.push_back(weight[c] * unit);
   }
-  if (!out.columns.empty()) out.ends.push_back(uint32_t(n));
+  if (column != none) out.ends.push_back(uint32_t(out.rows.size()));
+  out.weights.resize(in.weights.size());
+  floats_to_halves(in.weights.data(), in.weights.size(), out.weights.data());
   return out;
 }
-
-// Sums weights by receiver. Open addressing; the entries come out in the order in which they were first met.
-class RowAccumulator {
- public:
-  explicit RowAccumulator(size_t rays) {
-    size_t capacity = 16;
-    while (capacity < 6 * rays) capacity *= 2;
-    slots_.assign(capacity, {none, Vec3(0)});
-    touched_.reserve(3 * rays);
-  }
-  void add(uint32_t receiver, Vec3 weight) {
-    size_t i = size_t(receiver * 0x9e3779b1u) & (slots_.size() - 1);
-    while (slots_[i].receiver != receiver) {
-      if (slots_[i].receiver == none) {
-        slots_[i].receiver = receiver;
-        touched_.push_back(uint32_t(i));
-        break;
-      }
-      i = (i + 1) & (slots_.size() - 1);
-    }
-    slots_[i].weight += weight;
-  }
-  void append_to(UnsortedEntries& entries, int channels, float unit) const {
-    for (uint32_t i : touched_) {
-      entries.columns.push_back(slots_[i].receiver);
-      entries.rows.push_back(uint8_t(entries.row_count));
-      for (int c = 0; c < channels; ++c) entries.weights.push_back(float_to_half(slots_[i].weight[c] * unit));
-    }
-    ++entries.row_count;
-  }
-  void clear() {
-    for (uint32_t i : touched_) slots_[i] = {none, Vec3(0)};
-    touched_.clear();
-  }
-
- private:
-  struct Slot {
-    uint32_t receiver;
-    Vec3 weight;
-  };
-  std::vector<Slot> slots_;
-  std::vector<uint32_t> touched_;
-};
 
 // One receiver's directions in world space, and the sky row of a visibility.
 struct Fan {
@@ -142,6 +119,15 @@ float* checked_row(float* rows, size_t first, size_t receiver, size_t coefficien
 
 }  // namespace
 
+struct GatherScratch {
+  Fan fan;
+  std::vector<Hit> hits;
+  Records records, half_records;
+  explicit GatherScratch(const DirectionSets& sets) : fan(sets), hits(size_t(sets.samples)) {}
+};
+void DeleteScratch::operator()(GatherScratch* scratch) const { delete scratch; }
+ScratchPointer make_gather_scratch(const GatherSetup& setup) { return ScratchPointer(new GatherScratch(setup.sets)); }
+
 GatherSetup make_gather_setup(const Scene& scene, const Tracer& tracer, const Receivers& receivers, int order, int samples, uint32_t seed) {
   GatherSetup setup{scene, tracer, receivers, corner_receivers(scene, receivers.front, receivers.back),
                     make_direction_sets(order, samples, set_count, seed), seed, 1, 1.0f, {}, {}};
@@ -158,40 +144,47 @@ GatherSetup make_gather_setup(const Scene& scene, const Tracer& tracer, const Re
   return setup;
 }
 
-void trace_gather(const GatherSetup& setup, size_t first, size_t count, GatherBlock* block, const GatherSky* sky) {
+void trace_gather(const GatherSetup& setup, GatherScratch& scratch, size_t first, size_t count, GatherBlock* block, const GatherSky* sky) {
   LAMBENT_CHECK(count <= gather_block);
   const DirectionSets& sets = setup.sets;
-  const size_t coefficients = setup.coefficients(), rays = size_t(sets.samples);
-  Fan fan(sets);
-  RowAccumulator row(rays);
-  std::vector<Hit> hits(rays);
-  UnsortedEntries entries, half_entries;
+  const size_t coefficients = setup.coefficients(), rays = size_t(sets.samples), half = std::min(sets.half, rays);
+  Fan& fan = scratch.fan;
+  const std::vector<Hit>& hits = scratch.hits;
+  Records& records = scratch.records;
+  Records& half_records = scratch.half_records;
+  records.clear(), half_records.clear();
   for (size_t i = 0; i < count; ++i) {
-    const size_t r = first + i;
-    const bool checked = r % check_every == 0;
-    setup.tracer.closest_fan(setup.receivers.origins[r], fan.aim(setup.receivers.normals[r], setup.seed, r), hits.data());
+    const size_t r = first + i, begin = records.list.size();
+    setup.tracer.closest_fan(setup.receivers.origins[r], fan.aim(setup.receivers.normals[r], setup.seed, r), scratch.hits.data());
+    records.list.resize(begin + 3 * rays);
+    Record* out = records.list.data() + begin;
+    Record* out_at_half = nullptr;
     size_t backs = 0;
     for (size_t j = 0; j < rays; ++j) {
+      if (j == half) out_at_half = out;
+      if (j + lookahead < rays) setup.corners.prefetch(hits[j + lookahead].triangle, hits[j + lookahead].front);
       const Hit& h = hits[j];
       fan.visible[j] = h.triangle == none ? 1.0f : 0.0f;
-      if (block && checked && j == sets.half) row.append_to(half_entries, setup.channels, setup.weight_unit);
       if (h.triangle == none) continue;
-      const auto* corner = setup.corners.find(h.triangle, h.front);
+      const Corners* corner = setup.corners.find(h.triangle, h.front);
       if (!corner) {
         ++backs;
         continue;
       }
-      if (!block) continue;
-      const Triangle& t = setup.scene.triangles[h.triangle];
-      const Vec3 rho = setup.part_varies[t.part] ? albedo(setup.scene, t, h.u, h.v) : setup.part_albedo[t.part];
-      row.add((*corner)[0], rho * (1 - h.u - h.v));
-      row.add((*corner)[1], rho * h.u);
-      row.add((*corner)[2], rho * h.v);
+      const Vec3 rho = setup.part_varies[corner->part] ? albedo(setup.scene, setup.scene.triangles[h.triangle], h.u, h.v)
+                                                       : setup.part_albedo[corner->part];
+      *out++ = {corner->receiver[0], rho * (1 - h.u - h.v)};
+      *out++ = {corner->receiver[1], rho * h.u};
+      *out++ = {corner->receiver[2], rho * h.v};
     }
-    if (block) {
-      if (checked && sets.half >= rays) row.append_to(half_entries, setup.channels, setup.weight_unit);
-      row.append_to(entries, setup.channels, setup.weight_unit);
-      row.clear();
+    if (!out_at_half) out_at_half = out;
+    const size_t length = size_t(out - (records.list.data() + begin)), half_length = size_t(out_at_half - (records.list.data() + begin));
+    records.list.resize(begin + length);
+    records.row_ends.push_back(uint32_t(records.list.size()));
+    if (block && r % check_every == 0) {
+      const auto from = records.list.begin() + ptrdiff_t(begin);
+      half_records.list.insert(half_records.list.end(), from, from + ptrdiff_t(half_length));
+      half_records.row_ends.push_back(uint32_t(half_records.list.size()));
     }
     if (sky) {
       fan.project(sky->rows + i * coefficients, checked_row(sky->half_rows, first, r, coefficients));
@@ -199,15 +192,15 @@ void trace_gather(const GatherSetup& setup, size_t first, size_t count, GatherBl
     }
   }
   if (block) {
-    block->rows = by_columns(entries, setup.channels, setup.receivers.count());
-    block->half_rows = by_columns(half_entries, setup.channels, setup.receivers.count());
+    block->rows = by_columns(records, setup.channels, setup.weight_unit, setup.receivers.count());
+    block->half_rows = by_columns(half_records, setup.channels, setup.weight_unit, setup.receivers.count());
   }
 }
 
-void trace_sky(const GatherSetup& setup, size_t first, size_t count, const GatherSky& sky) {
+void trace_sky(const GatherSetup& setup, GatherScratch& scratch, size_t first, size_t count, const GatherSky& sky) {
   const DirectionSets& sets = setup.sets;
   const size_t coefficients = setup.coefficients(), rays = size_t(sets.samples);
-  Fan fan(sets);
+  Fan& fan = scratch.fan;
   float fx[burial_rays], fy[burial_rays], fz[burial_rays];
   Hit hits[burial_rays];
   for (size_t i = 0; i < count; ++i) {
@@ -243,10 +236,11 @@ std::vector<FillStep> make_fill_steps(const CornerReceivers& corners, const std:
   std::vector<std::pair<uint32_t, uint32_t>> edges;  // (buried receiver, neighbour)
   for (const auto* side : {&corners.front, &corners.back})
     for (const auto& c : *side) {
-      if (c[0] == none) continue;
+      const auto& r = c.receiver;
+      if (r[0] == none) continue;
       for (int k = 0; k < 3; ++k)
         for (int j = 1; j < 3; ++j)
-          if (buried[c[k]] && c[k] != c[(k + j) % 3]) edges.push_back({c[k], c[(k + j) % 3]});
+          if (buried[r[k]] && r[k] != r[(k + j) % 3]) edges.push_back({r[k], r[(k + j) % 3]});
     }
   std::sort(edges.begin(), edges.end());
   edges.erase(std::unique(edges.begin(), edges.end()), edges.end());

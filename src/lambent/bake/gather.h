@@ -8,6 +8,7 @@
 #include <lambent/receivers/receivers.h>
 #include <lambent/trace/tracer.h>
 
+#include <memory>
 #include <vector>
 
 namespace lambent {
@@ -58,11 +59,19 @@ struct GatherSky {
   uint8_t* buried;   // 1: most rays met the back of a one-sided surface; the receiver lies inside something
 };
 
+// What one thread needs while it traces; made once and lent out (core/pool.h).
+struct GatherScratch;
+struct DeleteScratch {
+  void operator()(GatherScratch* scratch) const;
+};
+using ScratchPointer = std::unique_ptr<GatherScratch, DeleteScratch>;
+ScratchPointer make_gather_scratch(const GatherSetup& setup);
+
 // Traces closest hits. Either of `block` and `sky` may be null.
-void trace_gather(const GatherSetup& setup, size_t first, size_t count, GatherBlock* block, const GatherSky* sky);
+void trace_gather(const GatherSetup& setup, GatherScratch& scratch, size_t first, size_t count, GatherBlock* block, const GatherSky* sky);
 
 // Traces occlusion only: the sky rows, without hit rows.
-void trace_sky(const GatherSetup& setup, size_t first, size_t count, const GatherSky& sky);
+void trace_sky(const GatherSetup& setup, GatherScratch& scratch, size_t first, size_t count, const GatherSky& sky);
 
 // y[row] = scale * (row of B) x, for the block's rows; x and y are [receiver][column x channel], `width` padded floats a row.
 void multiply_rows(const SparseBlock& rows, int channels, const float* x, size_t width, float scale, float* y);

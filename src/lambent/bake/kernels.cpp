@@ -148,6 +148,15 @@ void MultiplyEntries(const SparseEntries& s, int channels, const float* x, size_
   }
 }
 
+void FloatsToHalves(const float* floats, size_t count, uint16_t* halves) {
+  const F d;
+  const hn::Rebind<hwy::float16_t, F> dh;
+  size_t i = 0;
+  for (; i + hn::Lanes(d) <= count; i += hn::Lanes(d))
+    hn::StoreU(hn::DemoteTo(dh, hn::LoadU(d, floats + i)), dh, reinterpret_cast<hwy::float16_t*>(halves + i));
+  for (; i < count; ++i) halves[i] = float_to_half(floats[i]);
+}
+
 }  // namespace HWY_NAMESPACE
 }  // namespace lambent
 HWY_AFTER_NAMESPACE();
@@ -158,6 +167,7 @@ namespace lambent {
 HWY_EXPORT(RotateDirections);
 HWY_EXPORT(WeightedRows);
 HWY_EXPORT(MultiplyEntries);
+HWY_EXPORT(FloatsToHalves);
 
 void rotate_directions(const Mat3& R, const float* x, const float* y, const float* z, size_t count, float* ox, float* oy, float* oz) {
   LAMBENT_CHECK(count % lane_multiple == 0);
@@ -167,6 +177,10 @@ void rotate_directions(const Mat3& R, const float* x, const float* y, const floa
 void weighted_rows(const float* table, size_t rows, size_t stride, const float* weights, size_t count, float* out) {
   LAMBENT_CHECK(count % lane_multiple == 0 && stride % lane_multiple == 0);
   HWY_DYNAMIC_DISPATCH(WeightedRows)(table, rows, stride, weights, count, out);
+}
+
+void floats_to_halves(const float* floats, size_t count, uint16_t* halves) {
+  HWY_DYNAMIC_DISPATCH(FloatsToHalves)(floats, count, halves);
 }
 
 void multiply_entries(const SparseEntries& entries, int channels, const float* x, size_t width, float* acc) {

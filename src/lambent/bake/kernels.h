@@ -17,6 +17,9 @@ void rotate_directions(const Mat3& R, const float* x, const float* y, const floa
 // out[i] = sum over j < count of table[i * stride + j] * weights[j], for i < rows; count and stride multiples of lane_multiple.
 void weighted_rows(const float* table, size_t rows, size_t stride, const float* weights, size_t count, float* out);
 
+// IEEE halves of floats, rounded to nearest even.
+void floats_to_halves(const float* floats, size_t count, uint16_t* halves);
+
 // A block of sparse-matrix rows by columns: each of the matrix's columns that the block touches, once, in order; its entries say
 // which of the block's rows takes it, with what weight.
 struct SparseEntries {

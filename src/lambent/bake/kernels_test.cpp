@@ -40,6 +40,15 @@ TEST(Kernels, MultiplyEntriesIsTheSparseProduct) {
     }
 }
 
+TEST(Kernels, FloatsToHalvesRoundsAsOneByOne) {
+  Random random(8);
+  std::vector<float> floats(1003);
+  for (float& f : floats) f = (random.next() - 0.5f) * std::exp(20 * random.next() - 12);
+  std::vector<uint16_t> halves(floats.size());
+  floats_to_halves(floats.data(), floats.size(), halves.data());
+  for (size_t i = 0; i < floats.size(); ++i) EXPECT_EQ(halves[i], float_to_half(floats[i])) << floats[i];
+}
+
 TEST(Kernels, WeightedRowsIsTheDenseProduct) {
   Random random(3);
   for (size_t rows : {size_t{1}, size_t{4}, size_t{9}, size_t{35}}) {

@@ -9,8 +9,9 @@
 namespace lambent {
 namespace {
 
-// Terms of the sum over l for two lobes: those of the broadest cosine lobe, s = 1, fall as l^-4 and leave 1e-9.
-constexpr int moments_kept = 640;
+// Terms of the sum over l for two cosine lobes. Those of the broadest, s = 1, fall as l^-4 and leave 1e-9; those of sharp ones fall
+// as exp(-l^2 / s).
+int moments_needed(float sharpest) { return 640 + int(6 * std::sqrt(sharpest)); }
 
 // A float's rounding of a unit axis would show in sharp lobes.
 glm::dvec3 axis_of(const Lobe& lobe) { return glm::normalize(glm::dvec3(lobe.axis)); }
@@ -61,10 +62,10 @@ double lobe_product(LobeKind kind, const Lobe& p, const Lobe& q, std::span<const
   }
   const double x = std::clamp(glm::dot(a, b), -1.0, 1.0);
   double p0 = 1, p1 = x, result = Ip[0] * Iq[0] + 3 * Ip[1] * Iq[1] * x;
-  for (int l = 2; l < moments_kept; ++l) {
-    const double next = ((2 * l - 1) * x * p1 - (l - 1) * p0) / l;
+  for (size_t l = 2; l < Ip.size(); ++l) {
+    const double k = double(l), next = ((2 * k - 1) * x * p1 - (k - 1) * p0) / k;
     p0 = p1, p1 = next;
-    result += (2 * l + 1) * Ip[size_t(l)] * Iq[size_t(l)] * next;
+    result += (2 * k + 1) * Ip[l] * Iq[l] * next;
   }
   return std::numbers::pi * result;
 }
@@ -92,7 +93,9 @@ std::vector<Vec3> even_directions(int count) {
 
 DirectionalBasis make_directional_basis(int sh_order, LobeKind kind, std::vector<Lobe> lobes, double cutoff) {
   LAMBENT_CHECK(sh_order >= 0 && sh_order <= max_sh_order && (sh_order > 0 || !lobes.empty()));
+  float sharpest = 0;
   for (const Lobe& lobe : lobes) {
+    sharpest = std::max(sharpest, lobe.sharpness);
     LAMBENT_CHECK(lobe.sharpness >= (kind == LobeKind::cosine_power ? 1.0f : 1e-3f) && lobe.sharpness <= 1e5f);
     LAMBENT_CHECK(std::abs(glm::length(lobe.axis) - 1) < 1e-4f);
   }
@@ -103,7 +106,7 @@ DirectionalBasis make_directional_basis(int sh_order, LobeKind kind, std::vector
   for (size_t i = 0; i < harmonics; ++i) set(i, i, 1);
   std::vector<std::vector<double>> I;
   if (kind == LobeKind::cosine_power)
-    for (const Lobe& lobe : basis.lobes) I.push_back(moments(kind, lobe.sharpness, moments_kept));
+    for (const Lobe& lobe : basis.lobes) I.push_back(moments(kind, lobe.sharpness, moments_needed(sharpest)));
   else I.resize(basis.lobes.size());
   std::vector<double> projected(harmonics);
   for (size_t p = 0; p < basis.lobes.size(); ++p) {

@@ -70,7 +70,8 @@ TriplingTensor make_tripling_tensor(int order_a, int order_b, int order_c) {
               if (ta[p].m + tb[q].m + tc[r].m != 0) continue;
               const double weight = (ta[p].weight * tb[q].weight * tc[r].weight).real();
               const Wigner3jFamily w = wigner_3j_family(lb, lc, tb[q].m, tc[r].m);
-              for (int la = w.first; la <= std::min(lb + lc, order_a - 1); ++la) sums[size_t(la)] += weight * w.values[size_t(la - w.first)];
+              for (int la = w.first; la <= std::min(lb + lc, order_a - 1); ++la)
+                sums[size_t(la)] += weight * w.values[size_t(la - w.first)];
             }
         for (int la = std::max(std::abs(ma), std::abs(lb - lc)); la <= std::min(lb + lc, order_a - 1); ++la) {
           if ((la + lb + lc) % 2) continue;
@@ -82,7 +83,10 @@ TriplingTensor make_tripling_tensor(int order_a, int order_b, int order_c) {
       }
     }
     std::sort(entries.begin(), entries.end(), [](const Entry& x, const Entry& y) { return x.i != y.i ? x.i < y.i : x.j < y.j; });
-    for (const Entry& e : entries) t.i.push_back(e.i), t.j.push_back(e.j), t.value.push_back(e.value), t.single.push_back(float(e.value));
+    for (const Entry& e : entries) {
+      t.i.push_back(e.i), t.j.push_back(e.j);
+      t.value.push_back(e.value), t.single.push_back(float(e.value));
+    }
     t.begin.push_back(uint32_t(t.value.size()));
   }
   return t;
@@ -92,7 +96,8 @@ double tripling_coefficient(int i, int j, int k) {
   LAMBENT_CHECK(i >= 0 && j >= 0 && k >= 0);
   const int la = sh_band(i), lb = sh_band(j), lc = sh_band(k);
   ComplexTerm ta[2], tb[2], tc[2];
-  const int na = complex_terms(i - sh_index(la, 0), ta), nb = complex_terms(j - sh_index(lb, 0), tb), nc = complex_terms(k - sh_index(lc, 0), tc);
+  const int na = complex_terms(i - sh_index(la, 0), ta), nb = complex_terms(j - sh_index(lb, 0), tb);
+  const int nc = complex_terms(k - sh_index(lc, 0), tc);
   double sum = 0;
   for (int p = 0; p < na; ++p)
     for (int q = 0; q < nb; ++q)
@@ -117,7 +122,8 @@ std::vector<double> sh_product_matrix(const TriplingTensor& t, std::span<const d
   return T;
 }
 
-std::vector<double> project_sh_pair(int order_in, int order_out, const std::function<double(glm::dvec3, glm::dvec3)>& T, int exact_order) {
+std::vector<double> project_sh_pair(int order_in, int order_out, const std::function<double(glm::dvec3, glm::dvec3)>& T,
+                                    int exact_order) {
   const size_t rows = size_t(sh_count(order_in)), columns = size_t(sh_count(order_out));
   const std::vector<DirectionNode> nodes = direction_quadrature(std::max({order_in, order_out, exact_order}));
   std::vector<double> in(nodes.size() * rows), inner(rows), y(columns), result(rows * columns);

@@ -1,6 +1,7 @@
-// multiply_sh: orders 2 and 3 in closed form, all others on a grid. A degree of a + b + c - 3 in z needs (a + b + c - 2) / 2 Gauss-Legendre nodes, the same
-// azimuthal frequency needs a + b + c - 2 equal steps (all orders). Steps come in fours, phi, -phi, pi - phi, pi + phi, which share
-// one set of sums over even and odd cosines and sines. SIMD lanes hold nodes of z on the way out and degrees on the way back.
+// multiply_sh: orders 2 and 3 in closed form, all others on a grid. A degree of a + b + c - 3 in z (all orders) needs
+// (a + b + c - 1) / 2 Gauss-Legendre nodes, rounded down; the same azimuthal frequency needs a + b + c - 2 equal steps. Steps come in
+// fours, phi, -phi, pi - phi, pi + phi, which share one set of sums over even and odd cosines and sines. SIMD lanes hold nodes of z
+// on the way out and degrees on the way back.
 #include <lambent/basis/quadrature.h>
 #include <lambent/basis/sh_product.h>
 #include <lambent/core/check.h>
@@ -171,8 +172,10 @@ ProductGrid make_product_grid(int a, int b, int c) {
     size_t row = 0;
     for (int m = 0; m < table; ++m)
       for (int l = m; l < table; ++l) g.legendre[row++ * g.nodes + i] = float(y[size_t(sh_index(l, m))]);
-    for (int m = 0; m < c; ++m)
-      for (int l = m; l < c; ++l) g.back[(size_t(m) * g.nodes + i) * g.degrees + size_t(l - m)] = float(weight * y[size_t(sh_index(l, m))]);
+    for (int m = 0; m < c; ++m) {
+      float* back = g.back.data() + (size_t(m) * g.nodes + i) * g.degrees;
+      for (int l = m; l < c; ++l) back[l - m] = float(weight * y[size_t(sh_index(l, m))]);
+    }
   }
   for (size_t j = 0; j < g.quarter; ++j)
     for (int m = 0; m < max_sh_order; ++m) {
@@ -204,7 +207,8 @@ constexpr float k0 = 0.28209479f, k1 = 0.48860251f, k2 = 1.09254843f, k20 = 0.63
 
 Quadratic quadratic(const float* f) {
   const float half = 0.5f * k2, axis = -0.5f * k20 * f[6];
-  return {k0 * f[0], k1 * Vec3(-f[3], -f[1], f[2]), axis + half * f[8], axis - half * f[8], k20 * f[6], half * f[4], -half * f[5], -half * f[7]};
+  return {k0 * f[0],  k1 * Vec3(-f[3], -f[1], f[2]), axis + half * f[8], axis - half * f[8], k20 * f[6], half * f[4],
+          -half * f[5], -half * f[7]};
 }
 
 // With <> the mean over the sphere, <di dj> = 1/3 delta and <di dj dk dl> = 1/15 (three pairs of deltas), the product's parts are
@@ -217,11 +221,13 @@ void multiply_quadratic(const float* f, const float* g, float* out) {
   };
   const float k = 4.0f / 7;
   const float qx = a.xx * b.xx, qy = a.yy * b.yy, qz = a.zz * b.zz, rx = a.yz * b.yz, ry = a.xz * b.xz, rz = a.xy * b.xy;
-  const Vec3 squares(a.vector.x * b.vector.x + k * (qx + ry + rz), a.vector.y * b.vector.y + k * (qy + rx + rz), a.vector.z * b.vector.z + k * (qz + rx + ry));
-  const float constant = a.constant * b.constant + (1.0f / 3) * glm::dot(a.vector, b.vector) + (2.0f / 15) * (qx + qy + qz + 2 * (rx + ry + rz));
+  const Vec3 squares = a.vector * b.vector + k * Vec3(qx + ry + rz, qy + rx + rz, qz + rx + ry);
+  const float contraction = qx + qy + qz + 2 * (rx + ry + rz);
+  const float constant = a.constant * b.constant + (1.0f / 3) * glm::dot(a.vector, b.vector) + (2.0f / 15) * contraction;
   const Vec3 vector = a.constant * b.vector + b.constant * a.vector + 0.4f * (times(a, b.vector) + times(b, a.vector));
   const float third = (1.0f / 3) * (squares.x + squares.y + squares.z);
-  const float xx = a.constant * b.xx + b.constant * a.xx + squares.x - third, yy = a.constant * b.yy + b.constant * a.yy + squares.y - third;
+  const float xx = a.constant * b.xx + b.constant * a.xx + squares.x - third;
+  const float yy = a.constant * b.yy + b.constant * a.yy + squares.y - third;
   const float zz = a.constant * b.zz + b.constant * a.zz + squares.z - third;
   // (Q Q')_xy = xx xy' + xy yy' + xz yz', and so on; halves of the symmetric parts.
   const float xy = a.constant * b.xy + b.constant * a.xy +

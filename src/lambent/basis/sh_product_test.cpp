@@ -3,6 +3,7 @@
 #include <lambent/core/random.h>
 
 #include <gtest/gtest.h>
+#include <hwy/targets.h>
 
 namespace lambent {
 namespace {
@@ -75,7 +76,8 @@ TEST(ShProduct, TensorIsRightAtOrderTwelve) {
     negative += int(t.i[e]) < sh_index(sh_band(t.i[e]), 0);
   }
   EXPECT_GT(negative, 50);
-  double squares = 0, exact = 0;  // nothing is left out: the sum of all C^2 is the integral of a product of three kernels
+  // Nothing is left out: the sum of all C^2 is the integral of a product of three kernels.
+  double squares = 0, exact = 0;
   for (double c : t.value) squares += c * c;
   // sum over i of y_i(d) y_i(e) = K(d.e), so the sum of C^2 is the double integral of K^3 = 8 pi^2 int K(z)^3 dz.
   for (auto [z, w] : gauss_legendre(24)) {
@@ -114,7 +116,8 @@ TEST(ShProduct, FastAgreesWithPlainForAllOrders) {
     multiply_sh(a, b, fast);
     multiply_sh_plain(make_tripling_tensor(na, nb, nc), da, db, plain);
     const double tolerance = float_rounding * length(a) * length(b);
-    for (size_t k = 0; k < fast.size(); ++k) ASSERT_NEAR(fast[k], plain[k], tolerance) << na << " " << nb << " " << nc << " coefficient " << k;
+    for (size_t k = 0; k < fast.size(); ++k)
+      ASSERT_NEAR(fast[k], plain[k], tolerance) << na << " " << nb << " " << nc << " coefficient " << k;
   };
   for (int na = 1; na <= 6; ++na)
     for (int nb = 1; nb <= 6; ++nb)
@@ -123,15 +126,20 @@ TEST(ShProduct, FastAgreesWithPlainForAllOrders) {
   check(6, 11, 6), check(2, 16, 9), check(12, 5, 16), check(8, 8, 15), check(16, 16, 16);
 }
 
-TEST(ShProduct, FastAgreesWithPlainInFloatAndWorksInPlace) {
-  for (int n : {2, 3, 6, 9}) {
-    auto a = random_coefficients<float>(n, 5);
-    const auto b = random_coefficients<float>(n, 6);
+TEST(ShProduct, FastWorksInPlaceOnEverySimdTarget) {
+  for (int n : {2, 3, 4, 5, 6, 7, 8, 11}) {
+    const auto a = random_coefficients<float>(n, 5), b = random_coefficients<float>(n, 6);
     const double tolerance = float_rounding * length(a) * length(b);
     std::vector<float> plain(a.size());
     multiply_sh_plain(make_tripling_tensor(n, n, n), a, b, plain);
-    multiply_sh(a, b, a);
-    for (size_t k = 0; k < plain.size(); ++k) EXPECT_NEAR(a[k], plain[k], tolerance) << n << " " << k;
+    for (int64_t target : hwy::SupportedAndGeneratedTargets()) {
+      hwy::SetSupportedTargetsForTest(target);
+      std::vector<float> product = a;
+      multiply_sh(product, b, product);
+      hwy::SetSupportedTargetsForTest(0);
+      for (size_t k = 0; k < plain.size(); ++k)
+        EXPECT_NEAR(product[k], plain[k], tolerance) << hwy::TargetName(target) << " " << n << " " << k;
+    }
   }
 }
 
@@ -219,7 +227,8 @@ TEST(ShProduct, DoubleProjectionFindsTheMatrixOfABandLimitedFunction) {
   const std::vector<double> again = project_sh_pair(in, out, T, 5);
   for (size_t i = 0; i < M.size(); ++i) EXPECT_NEAR(again[i], M[i], coefficient_tolerance) << i;
   // A function of the angle between the two directions is diagonal with one value a band (Funk-Hecke): 3/4 + z^2/4 here.
-  const std::vector<double> zonal = project_sh_pair(3, 3, [](glm::dvec3 a, glm::dvec3 b) { return 0.75 + 0.25 * glm::dot(a, b) * glm::dot(a, b); }, 5);
+  auto zonal_T = [](glm::dvec3 a, glm::dvec3 b) { return 0.75 + 0.25 * glm::dot(a, b) * glm::dot(a, b); };
+  const std::vector<double> zonal = project_sh_pair(3, 3, zonal_T, 5);
   const double band[3] = {10 * std::numbers::pi / 3, 0, 2 * std::numbers::pi / 15};
   for (int m = 0; m < 9; ++m)
     for (int n = 0; n < 9; ++n) EXPECT_NEAR(zonal[size_t(m * 9 + n)], m == n ? band[sh_band(m)] : 0, coefficient_tolerance) << m << " " << n;

@@ -38,6 +38,7 @@ using V4 = hn::Vec<F4>;
 struct Turn {
   V4 even_cos, even_sin, odd_cos, odd_sin;  // of m t, m = 0 2 4 6 and 1 3 5 7
 };
+template <bool up_to_3>  // m = 0 1 2 3 only: lanes 2 and 3 repeat 0 and 1
 HWY_INLINE Turn MakeTurn(float cosine, float sine) {
   const F4 d;
   auto times = [](V4& c, V4& s, V4 ac, V4 as, V4 bc, V4 bs) {
@@ -46,10 +47,11 @@ HWY_INLINE Turn MakeTurn(float cosine, float sine) {
   const V4 one = hn::Set(d, 1.0f), zero = hn::Zero(d), c1 = hn::Set(d, cosine), s1 = hn::Set(d, sine);
   V4 c2, s2, c4, s4, next_c, next_s;
   times(c2, s2, c1, s1, c1, s1);
+  const V4 low_c = hn::OddEven(c2, one), low_s = hn::OddEven(s2, zero);  // 0 2 0 2
+  times(next_c, next_s, low_c, low_s, c1, s1);                           // 1 3 1 3
+  if constexpr (up_to_3) return {low_c, low_s, next_c, next_s};
   times(c4, s4, c2, s2, c2, s2);
-  const V4 low_c = hn::OddEven(c2, one), low_s = hn::OddEven(s2, zero);                            // 0 2 0 2
   const V4 high_c = hn::ConcatUpperLower(d, c4, one), high_s = hn::ConcatUpperLower(d, s4, zero);  // 0 0 4 4
-  times(next_c, next_s, low_c, low_s, c1, s1);                                                     // 1 3 1 3
   Turn t;
   times(t.even_cos, t.even_sin, high_c, high_s, low_c, low_s);
   times(t.odd_cos, t.odd_sin, high_c, high_s, next_c, next_s);
@@ -81,11 +83,20 @@ HWY_INLINE void RotateBand(const Turn turns[3], const float* HWY_RESTRICT column
   const float* centre = in + l * (l + 1);
   // m = 0 .. 3, 4 .. 7, -7 .. -4, -3 .. 0, without reading beyond the band.
   V4 c_low, c_high, s_low, s_high;
-  if constexpr (l == 2) c_low = hn::ShiftRightLanes<1>(d, hn::LoadU(d, centre - 1)), s_high = hn::ShiftLeftLanes<1>(d, hn::LoadU(d, centre - 2));
-  else c_low = hn::LoadU(d, centre), s_high = hn::LoadU(d, centre - 3);
-  if constexpr (l < 4) c_high = s_low = hn::Zero(d);
-  else if constexpr (l == 7) c_high = hn::LoadU(d, centre + 4), s_low = hn::LoadU(d, centre - 7);
-  else c_high = hn::ShiftRightLanes<7 - l>(d, hn::LoadU(d, centre + l - 3)), s_low = hn::ShiftLeftLanes<7 - l>(d, hn::LoadU(d, centre - l));
+  if constexpr (l == 2) {
+    c_low = hn::ShiftRightLanes<1>(d, hn::LoadU(d, centre - 1));
+    s_high = hn::ShiftLeftLanes<1>(d, hn::LoadU(d, centre - 2));
+  } else {
+    c_low = hn::LoadU(d, centre), s_high = hn::LoadU(d, centre - 3);
+  }
+  if constexpr (l < 4) {
+    c_high = s_low = hn::Zero(d);
+  } else if constexpr (l == 7) {
+    c_high = hn::LoadU(d, centre + 4), s_low = hn::LoadU(d, centre - 7);
+  } else {
+    c_high = hn::ShiftRightLanes<7 - l>(d, hn::LoadU(d, centre + l - 3));
+    s_low = hn::ShiftLeftLanes<7 - l>(d, hn::LoadU(d, centre - l));
+  }
   V4 f[4] = {hn::ConcatEven(d, c_high, c_low), hn::ConcatOdd(d, c_high, c_low), hn::Reverse(d, hn::ConcatOdd(d, s_high, s_low)),
              hn::Reverse(d, hn::ConcatEven(d, s_high, s_low))};
   TurnAboutZ(turns[2], f);
@@ -105,10 +116,16 @@ HWY_INLINE void RotateBand(const Turn turns[3], const float* HWY_RESTRICT column
 
 // Bands 2 and up, order 3 .. simd_order.
 void RotateBands(int order, const EulerZyz& e, const float*, const float* columns, const float* in, float* out) {
-  const Turn turns[3] = {MakeTurn(e.cos_a, e.sin_a), MakeTurn(e.cos_b, e.sin_b), MakeTurn(e.cos_c, e.sin_c)};
+  if (order <= 4) {
+    const Turn turns[3] = {MakeTurn<true>(e.cos_a, e.sin_a), MakeTurn<true>(e.cos_b, e.sin_b), MakeTurn<true>(e.cos_c, e.sin_c)};
+    RotateBand<2>(turns, columns, in, out);
+    if (order > 3) RotateBand<3>(turns, columns, in, out);
+    return;
+  }
+  const Turn turns[3] = {MakeTurn<false>(e.cos_a, e.sin_a), MakeTurn<false>(e.cos_b, e.sin_b), MakeTurn<false>(e.cos_c, e.sin_c)};
   RotateBand<2>(turns, columns, in, out);
-  if (order > 3) RotateBand<3>(turns, columns, in, out);
-  if (order > 4) RotateBand<4>(turns, columns, in, out);
+  RotateBand<3>(turns, columns, in, out);
+  RotateBand<4>(turns, columns, in, out);
   if (order > 5) RotateBand<5>(turns, columns, in, out);
   if (order > 6) RotateBand<6>(turns, columns, in, out);
   if (order > 7) RotateBand<7>(turns, columns, in, out);

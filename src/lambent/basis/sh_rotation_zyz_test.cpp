@@ -3,6 +3,7 @@
 #include <lambent/core/random.h>
 
 #include <gtest/gtest.h>
+#include <hwy/targets.h>
 
 namespace lambent {
 namespace {
@@ -19,8 +20,12 @@ std::vector<float> random_coefficients(int order, uint64_t seed = 5) {
   return c;
 }
 
-glm::dmat3 about_z(double t) { return {glm::dvec3(std::cos(t), std::sin(t), 0), glm::dvec3(-std::sin(t), std::cos(t), 0), glm::dvec3(0, 0, 1)}; }
-glm::dmat3 about_y(double t) { return {glm::dvec3(std::cos(t), 0, -std::sin(t)), glm::dvec3(0, 1, 0), glm::dvec3(std::sin(t), 0, std::cos(t))}; }
+glm::dmat3 about_z(double t) {
+  return {glm::dvec3(std::cos(t), std::sin(t), 0), glm::dvec3(-std::sin(t), std::cos(t), 0), glm::dvec3(0, 0, 1)};
+}
+glm::dmat3 about_y(double t) {
+  return {glm::dvec3(std::cos(t), 0, -std::sin(t)), glm::dvec3(0, 1, 0), glm::dvec3(std::sin(t), 0, std::cos(t))};
+}
 
 // Skew ones, and those where Euler angles are awkward: the identity, half turns, b next to 0 and 180 degrees.
 std::vector<glm::dmat3> rotations() {
@@ -28,14 +33,18 @@ std::vector<glm::dmat3> rotations() {
                               about_y(std::numbers::pi / 2), about_z(-2.0) * about_y(-1.2) * about_z(0.3)};
   for (double b : {1e-3, 1e-5, 3e-8, 1e-20, std::numbers::pi - 1e-5}) all.push_back(about_z(0.8) * about_y(b) * about_z(-2.3));
   Random random(11);
-  for (int i = 0; i < 8; ++i) all.push_back(about_z(6.28 * random.next()) * about_y(3.14 * random.next()) * about_z(6.28 * random.next()));
+  for (int i = 0; i < 8; ++i) {
+    const double a = 6.28 * random.next(), b = 3.14 * random.next(), c = 6.28 * random.next();
+    all.push_back(about_z(a) * about_y(b) * about_z(c));
+  }
   return all;
 }
 
 TEST(ShRotationZyz, EulerAnglesGiveTheMatrixBack) {
   for (const glm::dmat3& R : rotations()) {
     const EulerZyz e = euler_zyz(Mat3(R));
-    const glm::dmat3 again = about_z(std::atan2(e.sin_a, e.cos_a)) * about_y(std::atan2(e.sin_b, e.cos_b)) * about_z(std::atan2(e.sin_c, e.cos_c));
+    const double a = std::atan2(e.sin_a, e.cos_a), b = std::atan2(e.sin_b, e.cos_b), c = std::atan2(e.sin_c, e.cos_c);
+    const glm::dmat3 again = about_z(a) * about_y(b) * about_z(c);
     EXPECT_NEAR(double(e.sin_c) * e.sin_c + double(e.cos_c) * e.cos_c, 1, float_rounding);
     EXPECT_GE(e.sin_b, 0);
     for (int i = 0; i < 3; ++i)
@@ -43,14 +52,20 @@ TEST(ShRotationZyz, EulerAnglesGiveTheMatrixBack) {
   }
 }
 
-TEST(ShRotationZyz, AgreesWithTheDenseRotationAtEveryOrder) {
+TEST(ShRotationZyz, AgreesWithTheDenseRotationAtEveryOrderAndSimdTarget) {
   for (int order = 1; order <= max_sh_order; ++order)
     for (const glm::dmat3& R : rotations()) {
       const std::vector<float> f = random_coefficients(order);
-      std::vector<float> dense(f.size()), fast = f;
+      std::vector<float> dense(f.size());
       rotate_sh(make_sh_rotation(order, Mat3(R)), f, dense);
-      rotate_sh_zyz(Mat3(R), fast, fast);  // in place
-      for (size_t i = 0; i < f.size(); ++i) ASSERT_NEAR(fast[i], dense[i], float_rounding) << "order " << order << " coefficient " << i;
+      for (int64_t target : hwy::SupportedAndGeneratedTargets()) {
+        hwy::SetSupportedTargetsForTest(target);
+        std::vector<float> fast = f;
+        rotate_sh_zyz(Mat3(R), fast, fast);  // in place
+        hwy::SetSupportedTargetsForTest(0);
+        for (size_t i = 0; i < f.size(); ++i)
+          ASSERT_NEAR(fast[i], dense[i], float_rounding) << hwy::TargetName(target) << " order " << order << " coefficient " << i;
+      }
     }
 }
 
@@ -99,7 +114,8 @@ bool operator<(Counted a, Counted b) { return a.value < b.value; }
 // Rotates f in double; angles go in directly. Returns the multiplications made.
 int count_rotation(int order, double a, double b, double c, std::vector<double>& f) {
   const glm::dmat3 R = about_z(a) * about_y(b) * about_z(c);
-  Counted rows[9], angles[6] = {Counted(std::cos(a)), Counted(std::sin(a)), Counted(std::cos(b)), Counted(std::sin(b)), Counted(std::cos(c)), Counted(std::sin(c))};
+  Counted rows[9], angles[6] = {Counted(std::cos(a)), Counted(std::sin(a)), Counted(std::cos(b)),
+                                Counted(std::sin(b)), Counted(std::cos(c)), Counted(std::sin(c))};
   for (int i = 0; i < 9; ++i) rows[i] = Counted(R[i % 3][i / 3]);
   std::vector<Counted> blocks, values, scratch(f.size());
   for (double x : zyz::quarter_turn_blocks()) blocks.emplace_back(x);

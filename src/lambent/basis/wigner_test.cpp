@@ -62,18 +62,18 @@ TEST(Wigner, ClosedFormsAtDegreeForty) {
         double expected = 0;
         if (s % 2 == 0) {
           const int g = s / 2;
-          expected = sign(g) * std::exp(0.5 * (log_factorial(s - 2 * a) + log_factorial(s - 2 * b) + log_factorial(s - 2 * c) - log_factorial(s + 1)) +
-                                        log_factorial(g) - log_factorial(g - a) - log_factorial(g - b) - log_factorial(g - c));
+          const double triangle =
+              log_factorial(s - 2 * a) + log_factorial(s - 2 * b) + log_factorial(s - 2 * c) - log_factorial(s + 1);
+          expected = sign(g) * std::exp(0.5 * triangle + log_factorial(g) - log_factorial(g - a) - log_factorial(g - b) - log_factorial(g - c));
         }
         EXPECT_NEAR(wigner_3j(a, b, c, 0, 0, 0), expected, recurrence_rounding) << a << " " << b << " " << c;
       }
   for (int m : {-40, -13, 0, 7, 40})
     for (int n : {-30, -2, 5, 30}) {
       const int a = 40, b = 30, c = a + b;
-      const double expected =
-          sign(a - b + m + n) * std::exp(0.5 * (log_factorial(2 * a) + log_factorial(2 * b) + log_factorial(c + m + n) + log_factorial(c - m - n) -
-                                                log_factorial(2 * c + 1) - log_factorial(a + m) - log_factorial(a - m) - log_factorial(b + n) -
-                                                log_factorial(b - n)));
+      const double above = log_factorial(2 * a) + log_factorial(2 * b) + log_factorial(c + m + n) + log_factorial(c - m - n);
+      const double below = log_factorial(2 * c + 1) + log_factorial(a + m) + log_factorial(a - m) + log_factorial(b + n) + log_factorial(b - n);
+      const double expected = sign(a - b + m + n) * std::exp(0.5 * (above - below));
       EXPECT_NEAR(wigner_3j(a, b, c, m, n, -m - n), expected, recurrence_rounding) << m << " " << n;
     }
 }

@@ -5,6 +5,7 @@
 #include <tbb/task_arena.h>
 
 #include <algorithm>
+#include <thread>
 
 namespace lambent {
 
@@ -18,18 +19,20 @@ void parallel_for(size_t count, size_t grain, const std::function<void(size_t, s
 void run_serially(const std::function<void()>& body) { tbb::task_arena(1).execute(body); }
 
 struct ThreadLimit::Impl {
-  tbb::global_control control;
+  tbb::global_control control;  // never copied: the copy's end would lift the limit
+  explicit Impl(size_t threads) : control(tbb::global_control::max_allowed_parallelism, threads) {}
+  Impl(const Impl&) = delete;
 };
 
 ThreadLimit::ThreadLimit(int threads) {
-  if (threads > 0)
-    impl_ = std::make_unique<Impl>(Impl{tbb::global_control(tbb::global_control::max_allowed_parallelism, size_t(threads))});
+  if (threads > 0) impl_ = std::make_unique<Impl>(size_t(threads));
 }
 ThreadLimit::~ThreadLimit() = default;
 
 int thread_count() {
+  // The control in force knows; an arena that was made before it still reports what it was made with.
   return int(std::min(tbb::global_control::active_value(tbb::global_control::max_allowed_parallelism),
-                      size_t(tbb::this_task_arena::max_concurrency())));
+                      size_t(std::thread::hardware_concurrency())));
 }
 
 }  // namespace lambent

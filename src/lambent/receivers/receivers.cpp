@@ -150,16 +150,14 @@ CornerReceivers corner_receivers(const Scene& scene, const std::vector<uint32_t>
   CornerReceivers corners;
   corners.front.resize(scene.triangles.size());
   if (!back.empty()) corners.back.resize(scene.triangles.size());
-  auto fill = [](const Triangle& t, const std::vector<uint32_t>& map, std::array<uint32_t, 3>& out) {
-    out = {map[t.v[0]], map[t.v[1]], map[t.v[2]]};
-    if (out[0] == none || out[1] == none || out[2] == none) out = {none, none, none};
+  auto fill = [](const Triangle& t, const std::vector<uint32_t>& map, Corners& out) {
+    out = {{map[t.v[0]], map[t.v[1]], map[t.v[2]]}, t.part};
+    if (out.receiver[0] == none || out.receiver[1] == none || out.receiver[2] == none) out.receiver = {none, none, none};
   };
   for (size_t i = 0; i < scene.triangles.size(); ++i) {
     const Triangle& t = scene.triangles[i];
     fill(t, front, corners.front[i]);
-    if (back.empty()) continue;
-    corners.back[i] = {none, none, none};
-    if (t.two_sided) fill(t, back, corners.back[i]);
+    if (!back.empty() && t.two_sided) fill(t, back, corners.back[i]);
   }
   return corners;
 }

@@ -23,14 +23,23 @@ struct Receivers {
 // Receivers lie along a space-filling curve, so that neighbours in memory are neighbours in space.
 Receivers make_vertex_receivers(const Scene& scene);
 
-// The receivers at the corners of every triangle, front sides then (if any side is two-sided) back sides.
+// The receivers at the corners of every triangle, and its part, together, since both are wanted at every hit.
+struct Corners {
+  std::array<uint32_t, 3> receiver{none, none, none};
+  uint32_t part = 0;
+};
 struct CornerReceivers {
-  std::vector<std::array<uint32_t, 3>> front, back;
+  std::vector<Corners> front, back;  // by triangle; `back` is empty where the whole scene is one-sided
   // Corners as seen from a side, or null where that side receives nothing.
-  const std::array<uint32_t, 3>* find(uint32_t triangle, bool front_side) const {
+  const Corners* find(uint32_t triangle, bool front_side) const {
     const auto& side = front_side ? front : back;
-    if (side.empty() || side[triangle][0] == none) return nullptr;
+    if (side.empty() || side[triangle].receiver[0] == none) return nullptr;
     return &side[triangle];
+  }
+  // Asks the caches for what find() will want.
+  void prefetch(uint32_t triangle, bool front_side) const {
+    const auto& side = front_side ? front : back;
+    if (triangle < side.size()) __builtin_prefetch(&side[triangle]);
   }
 };
 CornerReceivers corner_receivers(const Scene& scene, const std::vector<uint32_t>& front, const std::vector<uint32_t>& back);

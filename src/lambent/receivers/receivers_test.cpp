@@ -68,7 +68,7 @@ TEST(Receivers, HaveABackWhereTheSurfaceHas) {
     EXPECT_EQ(r.normals[r.back[v]].y, -1);
   }
   const CornerReceivers corners = corner_receivers(scene, r.front, r.back);
-  EXPECT_EQ((*corners.find(0, false))[0], r.back[scene.triangles[0].v[0]]);
+  EXPECT_EQ(corners.find(0, false)->receiver[0], r.back[scene.triangles[0].v[0]]);
 }
 
 }  // namespace

@@ -43,7 +43,8 @@ Result<Image> render(const Scene& scene, const Tracer& tracer, const CornerRecei
           ++covered;
           const auto* corner = corners.find(hit.triangle, hit.front);
           if (!corner) continue;
-          const Vec3 white = (1 - hit.u - hit.v) * relit.at((*corner)[0]) + hit.u * relit.at((*corner)[1]) + hit.v * relit.at((*corner)[2]);
+          const auto& r = corner->receiver;
+          const Vec3 white = (1 - hit.u - hit.v) * relit.at(r[0]) + hit.u * relit.at(r[1]) + hit.v * relit.at(r[2]);
           sum += options.albedo ? albedo(scene, scene.triangles[hit.triangle], hit.u, hit.v) * white : white;
         }
         image.at(x, y) = sum / float(options.samples);
