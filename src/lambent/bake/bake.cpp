@@ -26,8 +26,9 @@ size_t solution_bytes(size_t receivers, size_t coefficients, int channels) {
 }
 
 // Direction tables, corner maps and the scratch of every thread; an upper estimate.
-size_t table_bytes(size_t triangles, size_t coefficients, size_t samples) {
-  return 8 * pad_lanes(samples) * 4 * (coefficients + 3) + 32 * triangles + size_t(thread_count()) * samples * gather_block * 3 * 36;
+size_t table_bytes(size_t receivers, size_t triangles, size_t coefficients, size_t samples) {
+  const size_t entries = gather_block * std::min(3 * samples, receivers);
+  return 8 * pad_lanes(samples) * 4 * (coefficients + 3) + 32 * triangles + size_t(thread_count()) * (48 * receivers + 48 * entries + 100 * samples);
 }
 
 // Luminance-free measure of how far `part` of the rays is from all of them.
@@ -112,7 +113,7 @@ struct Baker {
     std::vector<uint8_t> buried(n());
     std::vector<GatherBlock> kept(blocks);
     std::vector<uint8_t> is_kept(blocks, 0);
-    const size_t fixed = solution_bytes(n(), C, setup.channels) + table_bytes(scene.triangles.size(), C, size_t(options.samples));
+    const size_t fixed = solution_bytes(n(), C, setup.channels) + table_bytes(n(), scene.triangles.size(), C, size_t(options.samples));
     const size_t budget = options.memory > fixed ? options.memory - fixed : 0;
     std::atomic<size_t> used{0};
 
@@ -129,7 +130,7 @@ struct Baker {
         // Which blocks are kept depends on the scheduling, the result does not: the others are traced again, alike.
         const size_t bytes = block.rows.bytes() + block.half_rows.bytes() + sizeof(GatherBlock);
         if (used.fetch_add(bytes) + bytes <= budget) {
-          kept[begin / gather_block] = {trimmed(block.rows), trimmed(block.half_rows)};
+          kept[begin / gather_block] = std::move(block);
           is_kept[begin / gather_block] = 1;
         } else {
           used.fetch_sub(bytes);
@@ -202,8 +203,6 @@ struct Baker {
     return std::move(out.transfer);
   }
 
-  static SparseBlock trimmed(const SparseBlock& block) { return block; }  // a copied vector has no spare capacity
-
   void finish_report(const std::vector<uint8_t>& buried, const std::vector<ErrorSum>& errors, std::chrono::steady_clock::time_point start) {
     for (uint8_t b : buried) report.buried += b;
     report.trace_seconds = seconds_since(start);
@@ -225,7 +224,7 @@ Result<void> check_options(const BakeOptions& o) {
 
 size_t least_memory(size_t receivers, bool coloured, const BakeOptions& options) {
   const size_t coefficients = size_t(sh_count(options.order));
-  const size_t tables = table_bytes(0, coefficients, size_t(options.samples));
+  const size_t tables = table_bytes(options.bounces > 0 ? receivers : 0, 0, coefficients, size_t(options.samples));
   if (!options.shadows) return 0;
   return tables + (options.bounces > 0 ? solution_bytes(receivers, coefficients, coloured ? 3 : 1) : 0);
 }

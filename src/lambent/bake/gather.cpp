@@ -5,7 +5,6 @@
 #include <lambent/core/half.h>
 
 #include <algorithm>
-#include <cstring>
 
 namespace lambent {
 namespace {
@@ -13,65 +12,80 @@ namespace {
 // A handful of sets keeps the tables in cache; the spin makes every receiver's directions its own.
 constexpr int set_count = 8;
 // Rays of the second look at dark receivers, when only occlusion was traced.
-constexpr size_t burial_rays = 64;
+constexpr size_t burial_rays = 64, burial_packet = 16;
 // Hits are looked up in tables larger than the caches: so many rays ahead.
 constexpr size_t lookahead = 16;
 
 bool is_grey(Vec3 c) { return c.x == c.y && c.y == c.z; }
 
-// What one ray adds to the row of its receiver at one corner of the triangle that it met.
-struct Record {
-  uint32_t column;
-  Vec3 weight;
-};
+// A block's entries as its rays meet them, merged by row and column. Tables as long as there are columns find an entry without
+// searching and need no clearing: what an earlier row or block left there is told by its number.
+class BlockBuilder {
+ public:
+  explicit BlockBuilder(size_t column_limit) : places_(column_limit) {}
 
-// The records of a block as its rays meet them, row after row, and room to sort them in.
-struct Records {
-  std::vector<Record> list;
-  std::vector<uint32_t> row_ends;
-  std::vector<uint64_t> order, other;  // column, index
-  std::vector<uint8_t> row_of;
-  std::vector<float> weights;
-  void clear() { list.clear(), row_ends.clear(); }
-};
-
-// Merges records of the same column and row. A stable radix sort on 11 bits of the column at a time keeps rows in order within a
-// column, and with them the order of every sum.
-SparseBlock by_columns(Records& in, int channels, float unit, size_t column_limit) {
-  const size_t n = in.list.size();
-  in.order.resize(n), in.other.resize(n), in.row_of.resize(n), in.weights.clear();
-  for (size_t row = 0, i = 0; row < in.row_ends.size(); ++row)
-    for (; i < in.row_ends[row]; ++i) in.order[i] = uint64_t(in.list[i].column) << 32 | i, in.row_of[i] = uint8_t(row);
-  for (int shift = 32; shift < 64 && column_limit >> (shift - 32); shift += 11) {
-    uint32_t start[2049] = {};
-    for (uint64_t o : in.order) ++start[(o >> shift & 2047) + 1];
-    for (int k = 0; k < 2048; ++k) start[k + 1] += start[k];
-    for (uint64_t o : in.order) in.other[start[o >> shift & 2047]++] = o;
-    std::swap(in.order, in.other);
+  void begin_block() {
+    ++block_;
+    entries_.clear(), row_ends_.clear(), columns_.clear(), counts_.clear();
   }
-  SparseBlock out;
-  out.row_count = in.row_ends.size();
-  out.rows.reserve(n);
-  uint32_t column = none;
-  for (size_t i = 0; i < n;) {
-    const uint32_t first = uint32_t(in.order[i]);
-    const uint8_t row = in.row_of[first];
-    const uint32_t here = uint32_t(in.order[i] >> 32);
-    Vec3 weight = in.list[first].weight;
-    for (++i; i < n && uint32_t(in.order[i] >> 32) == here && in.row_of[uint32_t(in.order[i])] == row; ++i)
-      weight += in.list[uint32_t(in.order[i])].weight;
-    if (here != column) {
-      if (column != none) out.ends.push_back(uint32_t(out.rows.size()));
-      out.columns.push_back(here), column = here;
+  void begin_row() { ++row_; }
+  void end_row() { row_ends_.push_back(uint32_t(entries_.size())); }
+
+  void add(uint32_t column, Vec3 weight) {
+    Place& place = places_[column];
+    if (place.row == row_) {
+      entries_[place.entry].weight += weight;
+      return;
     }
-    out.rows.push_back(row);
-    for (int c = 0; c < channels; ++c) in.weights.push_back(weight[c] * unit);
+    if (place.block != block_) {
+      place.block = block_, place.local = uint32_t(columns_.size());
+      columns_.push_back(column), counts_.push_back(0);
+    }
+    ++counts_[place.local];
+    place.row = row_, place.entry = uint32_t(entries_.size());
+    entries_.push_back({place.local, weight});
   }
-  if (column != none) out.ends.push_back(uint32_t(out.rows.size()));
-  out.weights.resize(in.weights.size());
-  floats_to_halves(in.weights.data(), in.weights.size(), out.weights.data());
-  return out;
-}
+
+  // Regroups the rows by columns: a counting sort, which keeps the rows of a column in order.
+  SparseBlock finish(int channels, float unit) {
+    SparseBlock out;
+    out.row_count = row_ends_.size();
+    out.columns = columns_;
+    out.ends.resize(columns_.size());
+    uint32_t start = 0;
+    for (size_t k = 0; k < columns_.size(); ++k) out.ends[k] = start, start += counts_[k];
+    out.rows.resize(entries_.size());
+    floats_.resize(entries_.size() * size_t(channels));
+    for (size_t row = 0, i = 0; row < row_ends_.size(); ++row)
+      for (; i < row_ends_[row]; ++i) {
+        const size_t at = out.ends[entries_[i].local]++;  // the end once all are placed
+        out.rows[at] = uint8_t(row);
+        const Vec3 weight = entries_[i].weight * unit;
+        if (channels == 1) floats_[at] = weight.x;
+        else floats_[3 * at] = weight.x, floats_[3 * at + 1] = weight.y, floats_[3 * at + 2] = weight.z;
+      }
+    out.weights.resize(floats_.size());
+    floats_to_halves(floats_.data(), floats_.size(), out.weights.data());
+    return out;
+  }
+
+ private:
+  struct Place {
+    uint64_t row = 0;                // the last that met this column, counted over all blocks
+    uint32_t block = 0, local = 0;   // and its number among that block's columns
+    uint32_t entry = 0;
+  };
+  struct Entry {
+    uint32_t local;
+    Vec3 weight;
+  };
+  uint64_t row_ = 0;
+  uint32_t block_ = 0;
+  std::vector<Place> places_;
+  std::vector<Entry> entries_;
+  std::vector<uint32_t> row_ends_, columns_, counts_;
+  std::vector<float> floats_;
+};
 
 // One receiver's directions in world space, and the sky row of a visibility.
 struct Fan {
@@ -111,6 +125,26 @@ struct Fan {
   }
 };
 
+// A second look at a receiver that sees little sky, when only occlusion was traced: do most rays meet backs of one-sided
+// surfaces? A first packet settles it for all but those near something of the kind.
+bool is_buried(const GatherSetup& setup, const Fan& fan, Vec3 origin, size_t rays) {
+  float x[burial_rays], y[burial_rays], z[burial_rays];
+  Hit hits[burial_rays];
+  const size_t n = std::min(burial_rays, rays);
+  size_t backs = 0;
+  for (size_t begin = 0; begin < n; begin += burial_packet) {
+    const size_t m = std::min(burial_packet, n - begin);
+    for (size_t k = 0; k < m; ++k) {  // every packet is spread over the whole fan
+      const size_t j = (begin + k) * 37 % n * rays / n;
+      x[k] = fan.x[j], y[k] = fan.y[j], z[k] = fan.z[j];
+    }
+    setup.tracer.closest_fan(origin, {x, y, z, m}, hits);
+    for (size_t k = 0; k < m; ++k) backs += hits[k].triangle != none && !setup.corners.find(hits[k].triangle, hits[k].front);
+    if (backs == 0) return false;
+  }
+  return 2 * backs > n;
+}
+
 // Index of a checked receiver among those of the block that begins at `first`.
 float* checked_row(float* rows, size_t first, size_t receiver, size_t coefficients) {
   if (!rows || receiver % check_every) return nullptr;
@@ -122,11 +156,11 @@ float* checked_row(float* rows, size_t first, size_t receiver, size_t coefficien
 struct GatherScratch {
   Fan fan;
   std::vector<Hit> hits;
-  Records records, half_records;
-  explicit GatherScratch(const DirectionSets& sets) : fan(sets), hits(size_t(sets.samples)) {}
+  BlockBuilder rows, half_rows;
+  GatherScratch(const DirectionSets& sets, size_t receivers) : fan(sets), hits(size_t(sets.samples)), rows(receivers), half_rows(receivers) {}
 };
 void DeleteScratch::operator()(GatherScratch* scratch) const { delete scratch; }
-ScratchPointer make_gather_scratch(const GatherSetup& setup) { return ScratchPointer(new GatherScratch(setup.sets)); }
+ScratchPointer make_gather_scratch(const GatherSetup& setup) { return ScratchPointer(new GatherScratch(setup.sets, setup.receivers.count())); }
 
 GatherSetup make_gather_setup(const Scene& scene, const Tracer& tracer, const Receivers& receivers, int order, int samples, uint32_t seed) {
   GatherSetup setup{scene, tracer, receivers, corner_receivers(scene, receivers.front, receivers.back),
@@ -150,18 +184,15 @@ void trace_gather(const GatherSetup& setup, GatherScratch& scratch, size_t first
   const size_t coefficients = setup.coefficients(), rays = size_t(sets.samples), half = std::min(sets.half, rays);
   Fan& fan = scratch.fan;
   const std::vector<Hit>& hits = scratch.hits;
-  Records& records = scratch.records;
-  Records& half_records = scratch.half_records;
-  records.clear(), half_records.clear();
+  scratch.rows.begin_block(), scratch.half_rows.begin_block();
   for (size_t i = 0; i < count; ++i) {
-    const size_t r = first + i, begin = records.list.size();
+    const size_t r = first + i;
+    const bool checked = block && r % check_every == 0;
     setup.tracer.closest_fan(setup.receivers.origins[r], fan.aim(setup.receivers.normals[r], setup.seed, r), scratch.hits.data());
-    records.list.resize(begin + 3 * rays);
-    Record* out = records.list.data() + begin;
-    Record* out_at_half = nullptr;
+    scratch.rows.begin_row();
+    if (checked) scratch.half_rows.begin_row();
     size_t backs = 0;
     for (size_t j = 0; j < rays; ++j) {
-      if (j == half) out_at_half = out;
       if (j + lookahead < rays) setup.corners.prefetch(hits[j + lookahead].triangle, hits[j + lookahead].front);
       const Hit& h = hits[j];
       fan.visible[j] = h.triangle == none ? 1.0f : 0.0f;
@@ -171,29 +202,24 @@ void trace_gather(const GatherSetup& setup, GatherScratch& scratch, size_t first
         ++backs;
         continue;
       }
+      if (!block) continue;
       const Vec3 rho = setup.part_varies[corner->part] ? albedo(setup.scene, setup.scene.triangles[h.triangle], h.u, h.v)
                                                        : setup.part_albedo[corner->part];
-      *out++ = {corner->receiver[0], rho * (1 - h.u - h.v)};
-      *out++ = {corner->receiver[1], rho * h.u};
-      *out++ = {corner->receiver[2], rho * h.v};
+      const float weight[3] = {1 - h.u - h.v, h.u, h.v};
+      for (int k = 0; k < 3; ++k) scratch.rows.add(corner->receiver[k], rho * weight[k]);
+      if (checked && j < half)
+        for (int k = 0; k < 3; ++k) scratch.half_rows.add(corner->receiver[k], rho * weight[k]);
     }
-    if (!out_at_half) out_at_half = out;
-    const size_t length = size_t(out - (records.list.data() + begin)), half_length = size_t(out_at_half - (records.list.data() + begin));
-    records.list.resize(begin + length);
-    records.row_ends.push_back(uint32_t(records.list.size()));
-    if (block && r % check_every == 0) {
-      const auto from = records.list.begin() + ptrdiff_t(begin);
-      half_records.list.insert(half_records.list.end(), from, from + ptrdiff_t(half_length));
-      half_records.row_ends.push_back(uint32_t(half_records.list.size()));
-    }
+    scratch.rows.end_row();
+    if (checked) scratch.half_rows.end_row();
     if (sky) {
       fan.project(sky->rows + i * coefficients, checked_row(sky->half_rows, first, r, coefficients));
       sky->buried[i] = 2 * backs > rays;
     }
   }
   if (block) {
-    block->rows = by_columns(records, setup.channels, setup.weight_unit, setup.receivers.count());
-    block->half_rows = by_columns(half_records, setup.channels, setup.weight_unit, setup.receivers.count());
+    block->rows = scratch.rows.finish(setup.channels, setup.weight_unit);
+    block->half_rows = scratch.half_rows.finish(setup.channels, setup.weight_unit);
   }
 }
 
@@ -201,8 +227,6 @@ void trace_sky(const GatherSetup& setup, GatherScratch& scratch, size_t first, s
   const DirectionSets& sets = setup.sets;
   const size_t coefficients = setup.coefficients(), rays = size_t(sets.samples);
   Fan& fan = scratch.fan;
-  float fx[burial_rays], fy[burial_rays], fz[burial_rays];
-  Hit hits[burial_rays];
   for (size_t i = 0; i < count; ++i) {
     const size_t r = first + i;
     const Vec3 origin = setup.receivers.origins[r];
@@ -210,17 +234,7 @@ void trace_sky(const GatherSetup& setup, GatherScratch& scratch, size_t first, s
     fan.project(sky.rows + i * coefficients, checked_row(sky.half_rows, first, r, coefficients));
     size_t seen = 0;
     for (size_t j = 0; j < rays; ++j) seen += fan.visible[j] > 0;
-    sky.buried[i] = 0;
-    if (2 * seen >= rays) continue;
-    const size_t n = std::min(burial_rays, rays);
-    for (size_t k = 0; k < n; ++k) {
-      const size_t j = k * rays / n;
-      fx[k] = fan.x[j], fy[k] = fan.y[j], fz[k] = fan.z[j];
-    }
-    setup.tracer.closest_fan(origin, {fx, fy, fz, n}, hits);
-    size_t backs = 0;
-    for (size_t k = 0; k < n; ++k) backs += hits[k].triangle != none && !setup.corners.find(hits[k].triangle, hits[k].front);
-    sky.buried[i] = 2 * backs > n;
+    sky.buried[i] = 4 * seen < rays && is_buried(setup, fan, origin, rays);
   }
 }
 

@@ -20,10 +20,10 @@ void weighted_rows(const float* table, size_t rows, size_t stride, const float* 
 // IEEE halves of floats, rounded to nearest even.
 void floats_to_halves(const float* floats, size_t count, uint16_t* halves);
 
-// A block of sparse-matrix rows by columns: each of the matrix's columns that the block touches, once, in order; its entries say
+// A block of sparse-matrix rows by columns: each of the matrix's columns that the block touches, once; its entries say
 // which of the block's rows takes it, with what weight.
 struct SparseEntries {
-  const uint32_t* columns;   // distinct, ascending
+  const uint32_t* columns;   // distinct
   const uint32_t* ends;      // of each column's run of entries
   size_t column_count;
   const uint8_t* rows;       // within the block
