@@ -110,7 +110,7 @@ int run_demo(Context& context, const DemoCommand& o) {
     row.order6 = *d6, row.sky = *dsky;
 
     // The pictures to look at have the sky behind them.
-    RenderOptions shown{2 * o.width, 2 * o.height, 16, &*env, true};
+    RenderOptions shown{o.width * 3 / 2, o.height * 3 / 2, 32, &*env, true};
     auto pretty = render(scene, *tracer, corners, relit, camera, shown, &context.progress);
     if (!pretty) return fail(pretty.error());
     relit_pictures.push_back(*pretty);
