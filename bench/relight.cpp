@@ -35,7 +35,7 @@ double read_bandwidth(std::span<const uint8_t> data) {
 
 void relight_case(size_t receivers, int channels, Precision precision) {
   const int order = 6;
-  WritableTransfer w = make_transfer(order, channels, receivers, precision);
+  WritableTransfer w = make_transfer({.order = order}, 1, channels, receivers, precision);
   parallel_for(w.transfer.bytes() / 4, 1 << 16, [&](size_t begin, size_t end) {
     Random random(begin);
     for (size_t i = begin; i < end; ++i) {

@@ -29,7 +29,7 @@ int main(int argc, char** argv) {
   // light
   auto environment = load_environment(argv[2]);
   if (!environment) return complain(environment.error());
-  std::vector<Vec3> light = project_environment(*environment, transfer->order);
+  std::vector<Vec3> light = project_environment(*environment, transfer->light.order);
 
   // outgoing = O(view) . T . light
   Relit relit;

@@ -16,7 +16,7 @@ extern "C" int LLVMFuzzerTestOneInput(const uint8_t* data, size_t size) {
   if (!file) return 0;
   auto baked = lambent::load_baked(*file, "fuzz.glb");
   if (!baked) return 0;
-  const std::vector<lambent::Vec3> light(baked->transfer.coefficients(), lambent::Vec3(0.5f));
+  const std::vector<lambent::Vec3> light(baked->transfer.columns(), lambent::Vec3(0.5f));
   lambent::Relit relit;
   lambent::relight(baked->transfer, light, relit);
   float sum = 0;

@@ -83,7 +83,7 @@ int run_bake(Context& context, BakeCommand o) {
   fmt::print("  time       load {}, build {}, trace {}, bounce {}, save {}\n", human_seconds(load_seconds), human_seconds(build_seconds),
              human_seconds(report.trace_seconds), human_seconds(report.bounce_seconds), human_seconds(save_seconds));
   fmt::print("  size       {} a receiver, {} in all (order {}, {} channel{}, {})\n", human_bytes(bytes_each), human_bytes(double(report.bytes)),
-             transfer->order, transfer->channels, transfer->channels == 1 ? "" : "s", o.precision);
+             transfer->light.order, transfer->channels, transfer->channels == 1 ? "" : "s", o.precision);
   if (report.operator_kept < 1)
     fmt::print("  memory     {:.0f}% of the gather operator fitted; the rest was traced again for each bounce\n", 100 * report.operator_kept);
   if (report.error >= 0) fmt::print("  error      {:.2f}% RMS, estimated from half-sample gathers\n", 100 * report.error);

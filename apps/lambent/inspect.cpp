@@ -71,13 +71,13 @@ int run_inspect(Context& context, const std::string& path) {
     if (!baked) return fail(baked.error());
     const Transfer& t = baked->transfer;
     nlohmann::json d{{"file", path}, {"kind", "baked"}, {"scene", describe_scene(baked->scene)},
-                     {"transfer", {{"order", t.order}, {"channels", t.channels}, {"receivers", t.receivers}, {"bytes", t.bytes()},
+                     {"transfer", {{"order", t.light.order}, {"channels", t.channels}, {"receivers", t.receivers}, {"bytes", t.bytes()},
                                    {"precision", t.precision == Precision::half ? "half" : "single"}}},
                      {"provenance", nlohmann::json::parse(baked->provenance, nullptr, false)}};
     if (context.json) {
       print_json(d);
     } else {
-      fmt::print("{}\n  baked: order {}, {} channel{}, {} receivers, {} ({})\n", path, t.order, t.channels, t.channels == 1 ? "" : "s",
+      fmt::print("{}\n  baked: order {}, {} channel{}, {} receivers, {} ({})\n", path, t.light.order, t.channels, t.channels == 1 ? "" : "s",
                  human_count(t.receivers), human_bytes(double(t.bytes())), t.precision == Precision::half ? "half" : "single");
       print_scene(d["scene"]);
       fmt::print("  provenance {}\n", d["provenance"].dump(-1, ' ', false, nlohmann::json::error_handler_t::replace));

@@ -34,10 +34,10 @@ int run_render(Context& context, const RenderCommand& o) {
   if (!env) return fail(env.error());
 
   // light: projected once, turned and windowed as coefficients.
-  const int order = o.light_order ? std::min(o.light_order, baked->transfer.order) : baked->transfer.order;
+  const int order = o.light_order ? std::min(o.light_order, baked->transfer.light.order) : baked->transfer.light.order;
   std::vector<Vec3> light = rotate_sh(make_sh_rotation(order, *rotation), project_environment(*env, order));
   const std::vector<float> window = apply_sh_window(o.window, light);
-  light.resize(baked->transfer.coefficients(), Vec3(0.0f));
+  light.resize(baked->transfer.columns(), Vec3(0.0f));
 
   // T . light
   Relit relit;

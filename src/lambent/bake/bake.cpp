@@ -57,7 +57,7 @@ struct Baker {
   bool has_halves() const { return setup.sets.half < size_t(setup.sets.samples); }
 
   Result<Transfer> unshadowed() {
-    WritableTransfer out = make_transfer(options.order, 1, n(), options.precision);
+    WritableTransfer out = make_transfer({.order = options.order}, 1, 1, n(), options.precision);
     parallel_for(n(), gather_block, [&](size_t begin, size_t end) {
       std::vector<float> row(coefficients());
       for (size_t r = begin; r < end; ++r) {
@@ -73,7 +73,7 @@ struct Baker {
 
   Result<Transfer> direct() {
     const auto start = std::chrono::steady_clock::now();
-    WritableTransfer out = make_transfer(options.order, 1, n(), options.precision);
+    WritableTransfer out = make_transfer({.order = options.order}, 1, 1, n(), options.precision);
     std::vector<uint8_t> buried(n());
     std::vector<ErrorSum> errors((n() + gather_block - 1) / gather_block);
     {
@@ -186,7 +186,7 @@ struct Baker {
       std::swap(X, next);
     }
 
-    WritableTransfer out = make_transfer(options.order, setup.channels, n(), options.precision);
+    WritableTransfer out = make_transfer({.order = options.order}, 1, setup.channels, n(), options.precision);
     parallel_for(n(), gather_block, [&](size_t begin, size_t end) {
       std::vector<float> row(C * channels);
       for (size_t r = begin; r < end; ++r) {

@@ -4,7 +4,9 @@
 #include <lambent/scene/gltf.h>
 #include <lambent/scene/load.h>
 
+#include <algorithm>
 #include <bit>
+#include <cmath>
 #include <cstring>
 #include <filesystem>
 #include <map>
@@ -28,6 +30,48 @@ Result<size_t> read_count(const json& object, const char* key, size_t limit, con
   if (!object.is_object() || it == object.end() || !it->is_number_unsigned() || it->get<uint64_t>() > limit)
     return Error{where, std::string("\"") + key + "\" is missing or out of range"};
   return it->get<size_t>();
+}
+
+const std::map<LobeKind, std::string> lobe_names{{LobeKind::cosine_power, "cosine_power"}, {LobeKind::von_mises_fisher, "von_mises_fisher"}};
+
+void write_light(json& object, const LightBasis& light) {
+  object["basis"] = "sh";
+  object["order"] = light.order;
+  if (!light.lobes.empty()) {
+    json lobes = json::array();
+    for (const Lobe& l : light.lobes) lobes.push_back({l.axis.x, l.axis.y, l.axis.z, l.sharpness});
+    object["lobeKind"] = lobe_names.at(light.lobe_kind);
+    object["lobes"] = std::move(lobes);
+  }
+  if (!light.groups.empty()) object["groups"] = light.groups;
+}
+
+Result<LightBasis> read_light(const json& object, const std::string& where) {
+  LightBasis light;
+  if (!object.contains("basis") || object["basis"] != "sh") return Error{where, "the light basis is not known to this program"};
+  auto order = read_count(object, "order", size_t(max_sh_order), where);
+  if (!order) return order.error();
+  light.order = int(*order);
+  if (const auto lobes = object.find("lobes"); lobes != object.end()) {
+    if (!lobes->is_array() || lobes->size() > max_columns) return Error{where, "\"lobes\" is not a list, or too long a one"};
+    for (const auto& [kind, name] : lobe_names)
+      if (object.contains("lobeKind") && object["lobeKind"] == name) light.lobe_kind = kind;
+    for (const json& l : *lobes) {
+      if (!l.is_array() || l.size() != 4 || !std::all_of(l.begin(), l.end(), [](const json& x) { return x.is_number(); }))
+        return Error{where, "a lobe is not four numbers"};
+      const Lobe lobe{{l[0].get<float>(), l[1].get<float>(), l[2].get<float>()}, l[3].get<float>()};
+      if (!(std::abs(glm::length(lobe.axis) - 1) < 1e-3f) || !(lobe.sharpness > 0) || !std::isfinite(lobe.sharpness))
+        return Error{where, "a lobe has no unit axis or no positive sharpness"};
+      light.lobes.push_back(lobe);
+    }
+  }
+  if (const auto groups = object.find("groups"); groups != object.end()) {
+    if (!groups->is_array() || groups->size() > max_columns || !std::all_of(groups->begin(), groups->end(), [](const json& x) { return x.is_string(); }))
+      return Error{where, "\"groups\" is not a list of names, or too long a one"};
+    light.groups = groups->get<std::vector<std::string>>();
+  }
+  if (light.count() < 1 || light.count() > max_columns) return Error{where, "the transfer has no columns, or too many"};
+  return light;
 }
 
 // The bytes of a buffer view of the (single) binary chunk.
@@ -77,12 +121,11 @@ Result<void> save_baked(const std::string& path, const Scene& scene, const Recei
     json extension;
     extension["version"] = baked_file_version;
     extension["transfer"] = {{"kind", "diffuse"},
-                             {"basis", "sh"},
-                             {"order", transfer.order},
                              {"channels", transfer.channels},
                              {"precision", transfer.precision == Precision::half ? "half" : "single"},
                              {"receivers", transfer.receivers},
                              {"bufferView", places.first_view}};
+    write_light(extension["transfer"], transfer.light);
     json parts = json::array();
     for (size_t i = 0; i < scene.parts.size(); ++i) {
       json part{{"node", places.part_nodes[i]}, {"primitive", places.part_primitives[i]}, {"front", places.first_view + 1 + int(i)}};
@@ -126,16 +169,16 @@ Result<Baked> load_baked(const MappedFile& file, const std::string& path) {
   if (t == extension.end() || !t->is_object()) return Error{where, "\"transfer\" is missing"};
   auto text = [&](const char* key) { return t->contains(key) && (*t)[key].is_string() ? (*t)[key].get<std::string>() : ""; };
   if (text("kind") != "diffuse") return Error{where, "transfer of kind \"" + text("kind") + "\" is not known to this program"};
-  if (text("basis") != "sh") return Error{where, "light basis \"" + text("basis") + "\" is not known to this program"};
   if (text("precision") != "half" && text("precision") != "single") return Error{where, "\"precision\" must be half or single"};
-  auto order = read_count(*t, "order", size_t(max_sh_order), where);
+  auto light = read_light(*t, where);
+  if (!light) return light.error();
   auto channels = read_count(*t, "channels", 3, where);
   auto receivers = read_count(*t, "receivers", 0xfffffffe, where);
   auto view = read_count(*t, "bufferView", 0x7fffffff, where);
-  for (const auto* count : {&order, &channels, &receivers, &view})
+  for (const auto* count : {&channels, &receivers, &view})
     if (!*count) return count->error();
-  if (*order < 1 || (*channels != 1 && *channels != 3)) return Error{where, "\"order\" or \"channels\" is out of range"};
-  baked.transfer.order = int(*order), baked.transfer.channels = int(*channels), baked.transfer.receivers = *receivers;
+  if (*channels != 1 && *channels != 3) return Error{where, "\"channels\" is out of range"};
+  baked.transfer.light = std::move(*light), baked.transfer.channels = int(*channels), baked.transfer.receivers = *receivers;
   baked.transfer.precision = text("precision") == "half" ? Precision::half : Precision::single;
   auto data = view_bytes(*chunks, *view, where);
   if (!data) return data.error();

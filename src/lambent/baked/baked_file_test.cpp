@@ -32,7 +32,7 @@ Small small_bake(int channels, Precision precision) {
   s.scene.materials.back().double_sided = true;
   for (Triangle& t : s.scene.triangles) t.two_sided = t.part == 1;
   s.receivers = make_vertex_receivers(s.scene);
-  s.transfer = make_transfer(3, channels, s.receivers.count(), precision);
+  s.transfer = make_transfer({.order = 3}, 1, channels, s.receivers.count(), precision);
   Random random(2);
   std::vector<float> row(size_t(9 * channels));
   for (size_t r = 0; r < s.receivers.count(); ++r) {
@@ -56,7 +56,7 @@ TEST(BakedFile, ComesBackAsItWas) {
       EXPECT_EQ(back->scene.triangles.size(), s.scene.triangles.size());
       EXPECT_EQ(back->front, s.receivers.front);
       EXPECT_EQ(back->back, s.receivers.back);
-      EXPECT_EQ(back->transfer.order, 3);
+      EXPECT_EQ(back->transfer.light.order, 3);
       EXPECT_EQ(back->transfer.channels, channels);
       EXPECT_EQ(back->transfer.precision, precision);
       EXPECT_TRUE(std::equal(back->transfer.data.begin(), back->transfer.data.end(), s.transfer.transfer.data.begin(), s.transfer.transfer.data.end()));

@@ -12,7 +12,7 @@ TEST(Relight, AgreesWithPlainDotProducts) {
     for (Precision precision : {Precision::half, Precision::single})
       for (int channels : {1, 3}) {
         const size_t receivers = 101, C = size_t(order * order);
-        const WritableTransfer w = make_transfer(order, channels, receivers, precision);
+        const WritableTransfer w = make_transfer({.order = order}, 1, channels, receivers, precision);
         Random random(uint64_t(order * 10 + channels));
         std::vector<float> row(C * size_t(channels));
         for (size_t r = 0; r < receivers; ++r) {
@@ -34,8 +34,38 @@ TEST(Relight, AgreesWithPlainDotProducts) {
       }
 }
 
+TEST(Relight, RowsAreDotProductsOfTheirOwn) {
+  const int rows = 5;
+  const size_t receivers = 37, C = 4 + 2 + 1;  // harmonics, lobes, a group
+  LightBasis light{.order = 2, .lobes = {{Vec3(0, 0, 1), 8}, {Vec3(1, 0, 0), 20}}, .groups = {"lamp"}};
+  ASSERT_EQ(light.count(), C);
+  for (int channels : {1, 3}) {
+    const WritableTransfer w = make_transfer(light, rows, channels, receivers, Precision::single);
+    Random random(uint64_t(90 + channels));
+    std::vector<float> values(w.transfer.receiver_values());
+    for (size_t r = 0; r < receivers; ++r) {
+      for (float& v : values) v = random.next() - 0.5f;
+      store_receiver(w, r, values);
+    }
+    std::vector<Vec3> coefficients(C);
+    for (Vec3& l : coefficients) l = {random.next(), -random.next(), random.next() - 0.5f};
+    Relit out;
+    relight(w.transfer, coefficients, out);
+    for (size_t r = 0; r < receivers; ++r) {
+      const std::vector<float> t = load_receiver(w.transfer, r);
+      for (int row = 0; row < rows; ++row)
+        for (int c = 0; c < 3; ++c) {
+          const float* values = t.data() + (size_t(row) * size_t(channels) + (channels == 3 ? size_t(c) : 0)) * C;
+          double sum = 0;
+          for (size_t k = 0; k < C; ++k) sum += double(values[k]) * coefficients[k][c];
+          EXPECT_NEAR(out.at(r, row)[c], sum, 1e-6 * double(C));  // float rounding over C terms below 1
+        }
+    }
+  }
+}
+
 TEST(Relight, IsTheSameOnOneThreadAndDoesNotMoveItsOutput) {
-  const WritableTransfer w = make_transfer(6, 1, 50000, Precision::single);
+  const WritableTransfer w = make_transfer({.order = 6}, 1, 1, 50000, Precision::single);
   Random random(4);
   std::vector<float> row(36);
   for (size_t r = 0; r < 50000; r += 7) {

@@ -6,9 +6,10 @@
 
 namespace lambent {
 
-WritableTransfer make_transfer(int order, int channels, size_t receivers, Precision precision) {
+WritableTransfer make_transfer(LightBasis light, int rows, int channels, size_t receivers, Precision precision) {
   WritableTransfer w;
-  w.transfer.order = order, w.transfer.channels = channels, w.transfer.receivers = receivers, w.transfer.precision = precision;
+  LAMBENT_CHECK(light.count() <= max_columns && rows >= 1 && (channels == 1 || channels == 3));
+  w.transfer.light = std::move(light), w.transfer.rows = rows, w.transfer.channels = channels, w.transfer.receivers = receivers, w.transfer.precision = precision;
   auto memory = std::make_shared<AlignedVector<uint8_t>>(w.transfer.bytes());
   w.values = memory->data();
   w.transfer.data = *memory;
@@ -18,7 +19,7 @@ WritableTransfer make_transfer(int order, int channels, size_t receivers, Precis
 
 void store_receiver(const WritableTransfer& w, size_t receiver, std::span<const float> values) {
   const Transfer& t = w.transfer;
-  LAMBENT_CHECK(receiver < t.receivers && values.size() == t.coefficients() * size_t(t.channels));
+  LAMBENT_CHECK(receiver < t.receivers && values.size() == t.receiver_values());
   size_t at = receiver / transfer_block * t.block_values() + receiver % transfer_block;
   for (float v : values) {
     if (t.precision == Precision::half) {
@@ -33,7 +34,7 @@ void store_receiver(const WritableTransfer& w, size_t receiver, std::span<const 
 
 std::vector<float> load_receiver(const Transfer& t, size_t receiver) {
   LAMBENT_CHECK(receiver < t.receivers);
-  std::vector<float> values(t.coefficients() * size_t(t.channels));
+  std::vector<float> values(t.receiver_values());
   size_t at = receiver / transfer_block * t.block_values() + receiver % transfer_block;
   for (float& v : values) {
     if (t.precision == Precision::half) {

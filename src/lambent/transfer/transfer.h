@@ -1,13 +1,15 @@
 #pragma once
-// WHAT is stored at each receiver, and the narrow waist between baking and relighting. So far one row a receiver: the diffuse
-// transfer vector. Cosine, visibility, bounces and 1/pi are in it, the receiver's own albedo is not:
-// exit radiance = albedo * dot(transfer, light).
+// WHAT is stored at each receiver, and the narrow waist between baking and relighting: a matrix T that takes light coefficients
+// to `rows` numbers a receiver, for each colour channel. Diffuse transfer is its one-row case: cosine, visibility, bounces and
+// 1/pi are in it, the receiver's own albedo is not, and exit radiance = albedo * (T light).
+#include <lambent/basis/directional.h>
 #include <lambent/core/aligned.h>
 #include <lambent/core/result.h>
 
 #include <cstdint>
 #include <memory>
 #include <span>
+#include <string>
 #include <vector>
 
 namespace lambent {
@@ -17,19 +19,34 @@ enum class Precision { half, single };
 // Receivers are stored in blocks of this many, so that one SIMD stream relights a block.
 inline constexpr size_t transfer_block = 16;
 
+// The COLUMNS of T: what light is a combination of. Harmonics come first, then lobes (lamps in the distance), then the scene's
+// own lamps by group.
+struct LightBasis {
+  int order = 0;  // bands of spherical harmonics (basis/sh.h): order^2 columns; 0: none
+  LobeKind lobe_kind = LobeKind::von_mises_fisher;
+  std::vector<Lobe> lobes;          // one column each, scaled to unit norm (basis/directional.h)
+  std::vector<std::string> groups;  // one column each
+  size_t count() const { return size_t(sh_count(order)) + lobes.size() + groups.size(); }
+};
+
+// Columns that relighting takes at most.
+inline constexpr size_t max_columns = 1024;
+
 struct Transfer {
-  int order = 0;         // of the light's spherical harmonics (basis/sh.h): order^2 columns
+  LightBasis light;
+  int rows = 1;
   int channels = 1;      // 1: the same transfer for R, G and B (no coloured bounce); 3: one for each
   size_t receivers = 0;
   Precision precision = Precision::half;
-  // Layout [block][channel][coefficient][receiver in block], little-endian; the last block is padded with zeros.
+  // Layout [block][row][channel][column][receiver in block], little-endian; the last block is padded with zeros.
   std::span<const uint8_t> data;
   std::shared_ptr<const void> storage;  // keeps `data` alive: memory of ours or a mapped file
 
-  size_t coefficients() const { return size_t(order) * size_t(order); }
+  size_t columns() const { return light.count(); }
   size_t blocks() const { return (receivers + transfer_block - 1) / transfer_block; }
   size_t value_bytes() const { return precision == Precision::half ? 2 : 4; }
-  size_t block_values() const { return size_t(channels) * coefficients() * transfer_block; }
+  size_t receiver_values() const { return size_t(rows) * size_t(channels) * columns(); }
+  size_t block_values() const { return receiver_values() * transfer_block; }
   size_t bytes() const { return blocks() * block_values() * value_bytes(); }
 };
 
@@ -38,12 +55,12 @@ struct WritableTransfer {
   Transfer transfer;
   uint8_t* values = nullptr;
 };
-WritableTransfer make_transfer(int order, int channels, size_t receivers, Precision precision);
+WritableTransfer make_transfer(LightBasis light, int rows, int channels, size_t receivers, Precision precision);
 
-// Writes one receiver's values, [channel][coefficient].
+// Writes one receiver's values, [row][channel][column].
 void store_receiver(const WritableTransfer& t, size_t receiver, std::span<const float> values);
 
-// One receiver's values, [channel][coefficient].
+// One receiver's values, [row][channel][column].
 std::vector<float> load_receiver(const Transfer& t, size_t receiver);
 
 }  // namespace lambent

@@ -35,7 +35,7 @@ TEST(Half, RoundsToNearestEvenAndComesBack) {
 TEST(Transfer, KeepsWhatIsStored) {
   for (Precision precision : {Precision::half, Precision::single})
     for (int channels : {1, 3}) {
-      const WritableTransfer w = make_transfer(3, channels, 37, precision);
+      const WritableTransfer w = make_transfer({.order = 3}, 1, channels, 37, precision);
       EXPECT_EQ(w.transfer.data.size(), 3u * 16 * size_t(channels) * 9 * (precision == Precision::half ? 2 : 4));
       Random random(3);
       std::vector<std::vector<float>> rows(37);
