@@ -125,9 +125,11 @@ struct Fan {
   }
 };
 
-// A second look at a receiver that sees little sky, when only occlusion was traced: do most rays meet backs of one-sided
-// surfaces? A first packet settles it for all but those near something of the kind.
-bool is_buried(const GatherSetup& setup, const Fan& fan, Vec3 origin, size_t rays) {
+}  // namespace
+
+// A first packet settles it for all but those near something of the kind.
+bool is_buried(const Tracer& tracer, const CornerReceivers& corners, Vec3 origin, const Directions& fan) {
+  const size_t rays = fan.count;
   float x[burial_rays], y[burial_rays], z[burial_rays];
   Hit hits[burial_rays];
   const size_t n = std::min(burial_rays, rays);
@@ -138,12 +140,14 @@ bool is_buried(const GatherSetup& setup, const Fan& fan, Vec3 origin, size_t ray
       const size_t j = (begin + k) * 37 % n * rays / n;
       x[k] = fan.x[j], y[k] = fan.y[j], z[k] = fan.z[j];
     }
-    setup.tracer.closest_fan(origin, {x, y, z, m}, hits);
-    for (size_t k = 0; k < m; ++k) backs += hits[k].triangle != none && !setup.corners.find(hits[k].triangle, hits[k].front);
+    tracer.closest_fan(origin, {x, y, z, m}, hits);
+    for (size_t k = 0; k < m; ++k) backs += hits[k].triangle != none && !corners.find(hits[k].triangle, hits[k].front);
     if (backs == 0) return false;
   }
   return 2 * backs > n;
 }
+
+namespace {
 
 // Index of a checked receiver among those of the block that begins at `first`.
 float* checked_row(float* rows, size_t first, size_t receiver, size_t coefficients) {
@@ -234,7 +238,7 @@ void trace_sky(const GatherSetup& setup, GatherScratch& scratch, size_t first, s
     fan.project(sky.rows + i * coefficients, checked_row(sky.half_rows, first, r, coefficients));
     size_t seen = 0;
     for (size_t j = 0; j < rays; ++j) seen += fan.visible[j] > 0;
-    sky.buried[i] = 4 * seen < rays && is_buried(setup, fan, origin, rays);
+    sky.buried[i] = 4 * seen < rays && is_buried(setup.tracer, setup.corners, origin, {fan.x.data(), fan.y.data(), fan.z.data(), rays});
   }
 }
 

@@ -73,6 +73,10 @@ void trace_gather(const GatherSetup& setup, GatherScratch& scratch, size_t first
 // Traces occlusion only: the sky rows, without hit rows.
 void trace_sky(const GatherSetup& setup, GatherScratch& scratch, size_t first, size_t count, const GatherSky& sky);
 
+// A second look at a receiver that sees little sky, when only occlusion was traced: do most of a sample of the fan's rays meet
+// backs of one-sided surfaces?
+bool is_buried(const Tracer& tracer, const CornerReceivers& corners, Vec3 origin, const Directions& fan);
+
 // y[row] = scale * (row of B) x, for the block's rows; x and y are [receiver][column x channel], `width` padded floats a row.
 void multiply_rows(const SparseBlock& rows, int channels, const float* x, size_t width, float scale, float* y);
 

@@ -52,6 +52,17 @@ Vec2 square_to_disk(Vec2 u) {
   return {r * std::cos(phi), r * std::sin(phi)};
 }
 
+Vec2 disk_to_square(Vec2 d) {
+  const float r = std::min(glm::length(d), 1.0f);
+  float phi = std::atan2(d.y, d.x), a, b;
+  if (phi < -pi / 4) phi += 2 * pi;
+  if (phi < pi / 4) a = r, b = phi * a / (pi / 4);
+  else if (phi < 3 * pi / 4) b = r, a = -(phi - pi / 2) * b / (pi / 4);
+  else if (phi < 5 * pi / 4) a = -r, b = (phi - pi) * a / (pi / 4);
+  else b = -r, a = -(phi - 3 * pi / 2) * b / (pi / 4);
+  return {std::clamp(0.5f * (a + 1), 0.0f, 1.0f), std::clamp(0.5f * (b + 1), 0.0f, 1.0f)};
+}
+
 Vec3 square_to_cosine_hemisphere(Vec2 u) {
   Vec2 d = square_to_disk(u);
   return {d.x, d.y, std::sqrt(std::max(0.0f, 1 - d.x * d.x - d.y * d.y))};

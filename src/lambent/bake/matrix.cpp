@@ -1,0 +1,478 @@
+// Follows: general-prt (transfer matrices, the recursion over bounces with glossy scattering, the last reflection),
+// triple-product-integrals (direct light as a triple product: with V known to order n + m - 1 the product of light and incident
+// basis, of orders n and m, against it is exact).
+#include <lambent/bake/gather.h>
+#include <lambent/bake/matrix.h>
+#include <lambent/bake/matrix_kernels.h>
+#include <lambent/basis/sh_product.h>
+#include <lambent/core/check.h>
+#include <lambent/core/half.h>
+#include <lambent/core/parallel.h>
+#include <lambent/core/pool.h>
+
+#include <atomic>
+#include <chrono>
+#include <map>
+
+namespace lambent {
+namespace {
+
+using Clock = std::chrono::steady_clock;
+double seconds_since(Clock::time_point start) { return std::chrono::duration<double>(Clock::now() - start).count(); }
+
+// A hit that scatters, as it is kept for the bounces.
+struct MatrixHit {
+  uint32_t corner;   // triangle, and in the lowest bit whether its front was met
+  uint32_t ray;
+  uint16_t u, v;     // of 65535
+  uint16_t rgb[3];   // halves: base colour there
+};
+
+struct MatrixHits {  // of a block of receivers
+  std::vector<MatrixHit> hits;
+  std::vector<uint32_t> ends;  // by receiver
+  size_t bytes() const { return hits.size() * sizeof(MatrixHit) + ends.size() * 4 + sizeof(MatrixHits); }
+};
+
+// Functions given by coefficients over rows j, turned by phi about z: rows (l, m) and (l, -m) mix. `rows` is [j][width].
+void turn_rows_about_z(float* rows, int order, size_t width, float phi) {
+  for (int m = 1; m < order; ++m) {
+    const float c = std::cos(float(m) * phi), s = std::sin(float(m) * phi);
+    for (int l = m; l < order; ++l) {
+      float* p = rows + size_t(sh_index(l, m)) * width;
+      float* q = rows + size_t(sh_index(l, -m)) * width;
+      for (size_t i = 0; i < width; ++i) {
+        const float a = p[i], b = q[i];
+        p[i] = a * c - b * s, q[i] = a * s + b * c;
+      }
+    }
+  }
+}
+
+// What a thread needs for one receiver at a time.
+struct MatrixScratch {
+  AlignedVector<float> x, y, z, visible;
+  std::vector<Hit> hits;
+  std::vector<float> V, column_row;
+  AlignedVector<float> sh_rows, v, zb;
+  std::vector<ViewWeights> weights;
+  std::vector<float> scalars;
+  DirectionChoice choice{};
+  float phi = 0;  // from the set's frame to the receiver's, about the normal
+};
+
+struct MatrixBaker {
+  const Scene& scene;
+  Receivers receivers;  // a copy: buried ones move
+  const ReceiverMaterials& materials;
+  const BakeOptions& options;
+  const MatrixOptions& matrix;
+  const GatherSetup setup;
+  Progress* progress;
+  BakeReport& report;
+
+  CosineBasis basis = make_cosine_basis(matrix.incident_order);
+  TriplingTensor tensor = make_tripling_tensor(options.order, matrix.incident_order, options.order + matrix.incident_order - 1);
+  ShZyzRotator rotator{options.order};
+  std::vector<FactoredResponse> scatter{};
+  std::vector<ViewMap> responses{};
+  std::vector<size_t> first_row{};  // of each receiver's scattered rows; one more at the end
+  Pool<MatrixScratch> scratch{[this] { return make_scratch(); }};
+
+  size_t n() const { return receivers.count(); }
+  size_t J() const { return size_t(basis.count()); }                // rows of X
+  size_t C() const { return size_t(sh_count(options.order)); }      // columns
+  size_t channels() const { return size_t(setup.channels); }
+  size_t width() const { return pad_lanes(C()); }                   // floats of a row of one channel
+  size_t V_count() const { return setup.coefficients(); }
+  size_t rays() const { return size_t(setup.sets.samples); }
+  bool has_halves() const { return setup.sets.half < rays(); }
+
+  std::unique_ptr<MatrixScratch> make_scratch() const {
+    auto s = std::make_unique<MatrixScratch>();
+    const size_t stride = setup.sets.stride, w = channels() * width();
+    s->x.resize(stride), s->y.resize(stride), s->z.resize(stride), s->visible.resize(stride), s->hits.resize(rays());
+    s->V.resize(V_count()), s->column_row.resize(C());
+    s->sh_rows.resize(J() * w), s->v.resize(hit_batch * w), s->zb.resize(hit_batch * J());
+    s->weights.resize(J()), s->scalars.resize(J() * 3);
+    return s;
+  }
+
+  Directions aim(MatrixScratch& s, size_t r) const {
+    const DirectionSets& sets = setup.sets;
+    s.choice = choose_directions(sets, receivers.normals[r], setup.seed, r);
+    const size_t base = size_t(s.choice.set) * sets.stride;
+    rotate_directions(s.choice.rotation, sets.x.data() + base, sets.y.data() + base, sets.z.data() + base, sets.stride, s.x.data(), s.y.data(), s.z.data());
+    const Vec3 x_axis = s.choice.rotation[0] * materials.frames[r];  // the set's x axis in the receiver's frame
+    s.phi = std::atan2(x_axis.y, x_axis.x);
+    return {s.x.data(), s.y.data(), s.z.data(), rays()};
+  }
+
+  // Rows over the harmonics of the set's frame -> rows over the incident basis of the receiver's frame, into out[j][width].
+  void to_incident(float* sh_rows, float phi, size_t w, float scale, float* out) const {
+    turn_rows_about_z(sh_rows, basis.order, w, phi);
+    for (size_t j = 0; j < J(); ++j) {
+      std::fill(out + j * w, out + (j + 1) * w, 0.0f);
+      for (size_t k = 0; k <= j; ++k) {
+        const float f = scale * float(basis.from_sh[j * J() + k]);
+        if (f == 0) continue;
+        for (size_t i = 0; i < w; ++i) out[j * w + i] += f * sh_rows[k * w + i];
+      }
+    }
+  }
+
+  // Direct light from the first `count` rays: X0_ji = mean of V y_i z_j = sum_k C_ijk V_k. out is [J][width].
+  void direct(MatrixScratch& s, size_t count, float* out) const {
+    const size_t w = width(), base = size_t(s.choice.set) * V_count() * setup.sets.stride;
+    weighted_rows(setup.sets.table.data() + base, V_count(), setup.sets.stride, s.visible.data(), count == rays() ? setup.sets.stride : count, s.V.data());
+    float* rows = s.sh_rows.data();
+    std::fill(rows, rows + J() * w, 0.0f);
+    for (size_t k = 0; k < V_count(); ++k) {
+      const float v = s.V[k];
+      for (uint32_t e = tensor.begin[k]; e < tensor.begin[k + 1]; ++e) rows[size_t(tensor.j[e]) * w + tensor.i[e]] += tensor.single[e] * v;
+    }
+    for (size_t j = 0; j < J(); ++j) rotator.rotate(s.choice.a, s.choice.b, s.choice.c, {rows + j * w, C()});
+    to_incident(rows, s.phi, w, 1.0f / float(count), out);
+  }
+
+  // Light that the hits of rays below `limit` scatter to receiver r, added to out[J][channel][width]; Y holds scattered rows.
+  void scattered(MatrixScratch& s, std::span<const MatrixHit> hits, size_t limit, const float* Y, float* out) const {
+    const size_t w = width(), wc = channels() * w;
+    float* rows = s.sh_rows.data();
+    std::fill(rows, rows + J() * wc, 0.0f);
+    const float* table = setup.sets.table.data() + size_t(s.choice.set) * V_count() * setup.sets.stride;
+    size_t in_batch = 0;
+    for (size_t i = 0; i < hits.size() && hits[i].ray < limit; ++i) {
+      const MatrixHit& h = hits[i];
+      float* v = s.v.data() + in_batch * wc;
+      std::fill(v, v + wc, 0.0f);
+      const Corners& corners = *setup.corners.find(h.corner >> 1, h.corner & 1);
+      const Vec3 back(-s.x[h.ray], -s.y[h.ray], -s.z[h.ray]);
+      const Vec3 colour(half_to_float(h.rgb[0]), half_to_float(h.rgb[1]), half_to_float(h.rgb[2]));
+      const float b1 = float(h.u) / 65535.0f, b2 = float(h.v) / 65535.0f, b[3] = {1 - b1 - b2, b1, b2};
+      for (int k = 0; k < 3; ++k) {
+        const uint32_t c = corners.receiver[k];
+        const FactoredResponse& f = scatter[materials.of_receiver[c]];
+        const ViewWeights* weights = f.g.values.data();
+        if (!f.constant) {
+          Vec3 wo = back * materials.frames[c];
+          if (wo.z < 0) wo = normalize_or(Vec3(wo.x, wo.y, 0), Vec3(0, 0, 1));
+          look_up(f.g, wo, s.weights);
+          weights = s.weights.data();
+        }
+        for (size_t r = 0; r < size_t(f.rows); ++r) {
+          const Vec3 weight = b[k] * (Vec3(weights[r]) + colour * weights[r].w);
+          for (size_t ch = 0; ch < channels(); ++ch) s.scalars[r * channels() + ch] = weight[int(ch)];
+        }
+        add_weighted_rows(Y + first_row[c] * wc, size_t(f.rows), channels(), w, s.scalars.data(), v);
+      }
+      for (size_t j = 0; j < J(); ++j) s.zb[in_batch * J() + j] = table[j * setup.sets.stride + h.ray];
+      if (++in_batch == hit_batch) add_outer_products(s.zb.data(), J(), s.v.data(), wc, rows), in_batch = 0;
+    }
+    if (in_batch) {
+      std::fill(s.zb.data() + in_batch * J(), s.zb.data() + hit_batch * J(), 0.0f);
+      add_outer_products(s.zb.data(), J(), s.v.data(), wc, rows);
+    }
+    AlignedVector<float> sum(J() * wc);
+    to_incident(rows, s.phi, wc, 1.0f / float(limit), sum.data());
+    for (size_t i = 0; i < sum.size(); ++i) out[i] += sum[i];
+  }
+
+  // Traces receiver r: its visible rays, and its scattering hits if wanted. True: it lies inside something.
+  bool trace(MatrixScratch& s, size_t r, MatrixHits* hits) const {
+    const Directions d = aim(s, r);
+    if (!hits) {
+      setup.tracer.visible_fan(receivers.origins[r], d, s.visible.data());
+      size_t seen = 0;
+      for (size_t j = 0; j < rays(); ++j) seen += s.visible[j] > 0;
+      return 4 * seen < rays() && is_buried(setup.tracer, setup.corners, receivers.origins[r], d);
+    }
+    setup.tracer.closest_fan(receivers.origins[r], d, s.hits.data());
+    size_t backs = 0;
+    for (size_t j = 0; j < rays(); ++j) {
+      const Hit& h = s.hits[j];
+      s.visible[j] = h.triangle == none ? 1.0f : 0.0f;
+      if (h.triangle == none) continue;
+      const Corners* corner = setup.corners.find(h.triangle, h.front);
+      if (!corner) {
+        ++backs;
+        continue;
+      }
+      const Vec3 colour = setup.part_varies[corner->part] ? albedo(scene, scene.triangles[h.triangle], h.u, h.v) : setup.part_albedo[corner->part];
+      hits->hits.push_back({h.triangle << 1 | uint32_t(h.front), uint32_t(j), uint16_t(h.u * 65535.0f + 0.5f), uint16_t(h.v * 65535.0f + 0.5f),
+                            {float_to_half(colour.x), float_to_half(colour.y), float_to_half(colour.z)}});
+    }
+    return 2 * backs > rays();
+  }
+
+  // out[row][channel][width] = H x, x[J][channel][width].
+  static void apply(std::span<const float> h, size_t rows, size_t J, size_t wc, const float* x, float* out) {
+    std::fill(out, out + rows * wc, 0.0f);
+    for (size_t r = 0; r < rows; ++r)
+      for (size_t j = 0; j < J; ++j) {
+        const float f = h[r * J + j];
+        if (f == 0) continue;
+        for (size_t i = 0; i < wc; ++i) out[r * wc + i] += f * x[j * wc + i];
+      }
+  }
+
+  void make_responses() {
+    ProgressStage stage(progress, "materials", materials.materials.size());
+    for (const LinearMaterial& m : materials.materials) {
+      responses.push_back(make_response(m, basis, matrix.grid, matrix.response_samples));
+      scatter.push_back(factor_response(responses.back(), matrix.scatter_rows, matrix.scatter_error));
+      stage.advance();
+    }
+    first_row.assign(1, 0);
+    for (size_t r = 0; r < n(); ++r) first_row.push_back(first_row.back() + size_t(scatter[materials.of_receiver[r]].rows));
+  }
+
+  // How X becomes the stored rows: for each material and channel a matrix, rows x J.
+  struct Last {
+    Outgoing outgoing;
+    int rows = 0, channels = 1;
+    std::vector<std::array<std::vector<float>, 3>> h;  // by material, by channel
+  };
+  Last make_last() const {
+    Last last;
+    Outgoing& o = last.outgoing;
+    o.kind = matrix.outgoing;
+    o.frames = materials.frames;
+    last.channels = setup.channels;
+    last.h.resize(materials.materials.size());
+    if (o.kind == OutgoingKind::map) {
+      o.order = matrix.incident_order, o.maps = responses, o.map_of = materials.of_receiver;
+      std::vector<float> identity(J() * J(), 0.0f);
+      for (size_t j = 0; j < J(); ++j) identity[j * J() + j] = 1;
+      for (auto& h : last.h) h = {identity, identity, identity};
+    } else if (o.kind == OutgoingKind::svd) {
+      o.order = matrix.incident_order, o.map_of = materials.of_receiver;
+      std::vector<FactoredResponse> factors;
+      size_t rows = 1;
+      for (const ViewMap& response : responses) factors.push_back(factor_response(response, matrix.svd_rows, 1e-4)), rows = std::max(rows, size_t(factors.back().rows));
+      for (size_t m = 0; m < factors.size(); ++m) {  // every receiver has as many rows; the rest are zero
+        FactoredResponse& f = factors[m];
+        ViewMap wide{f.g.grid, int(rows), std::vector<ViewWeights>(size_t(f.g.grid) * size_t(f.g.grid) * rows, ViewWeights(0.0f))};
+        for (size_t i = 0; i < size_t(f.g.grid) * size_t(f.g.grid); ++i)
+          std::copy_n(f.g.values.begin() + ptrdiff_t(i * size_t(f.rows)), f.rows, wide.values.begin() + ptrdiff_t(i * rows));
+        o.maps.push_back(std::move(wide));
+        f.h.resize(rows * J(), 0.0f);
+        last.h[m] = {f.h, f.h, f.h};
+      }
+    } else {
+      o.order = matrix.outgoing_order;
+      std::vector<std::array<std::vector<float>, 4>> parts;
+      bool coloured = false;
+      o.has_b = false;
+      for (const ViewMap& response : responses) {
+        parts.push_back(project_response(response, o.kind, o.order));
+        for (const ViewWeights& w : response.values) coloured |= w.x != w.y || w.y != w.z, o.has_b |= w.w != 0;
+      }
+      if (coloured) last.channels = 3;
+      for (size_t m = 0; m < parts.size(); ++m)
+        for (size_t c = 0; c < 3; ++c) {
+          last.h[m][c] = parts[m][c];
+          if (o.has_b) last.h[m][c].insert(last.h[m][c].end(), parts[m][3].begin(), parts[m][3].end());
+        }
+    }
+    last.rows = o.rows();
+    return last;
+  }
+
+  Result<MatrixBake> run() {
+    make_responses();
+    const size_t wc = channels() * width(), blocks = (n() + gather_block - 1) / gather_block;
+    const bool bounces = options.bounces > 0;
+    auto start = Clock::now();
+    AlignedVector<float> T0(n() * J() * width());
+    std::vector<float> T0_half((n() + check_every - 1) / check_every * J() * width());
+    std::vector<uint8_t> buried(n());
+    std::vector<MatrixHits> kept(blocks);
+    std::vector<uint8_t> is_kept(blocks, 0);
+    const size_t fixed = matrix_memory(n(), int(channels()), options, matrix);
+    const size_t budget = options.memory > fixed ? options.memory - fixed : 0;
+    std::atomic<size_t> used{0};
+
+    auto trace_receiver = [&](MatrixScratch& s, size_t r, MatrixHits* hits) {
+      buried[r] = trace(s, r, hits);
+      direct(s, rays(), T0.data() + r * J() * width());
+      if (r % check_every == 0) {
+        float* half = T0_half.data() + r / check_every * J() * width();
+        direct(s, std::min(setup.sets.half, rays()), half);
+      }
+      if (hits) hits->ends.push_back(uint32_t(hits->hits.size()));
+    };
+    // Which blocks are kept depends on the scheduling, the result does not: the others are traced again, alike.
+    auto keep = [&](size_t block, MatrixHits&& hits) {
+      const size_t bytes = hits.bytes();
+      if (used.fetch_add(bytes) + bytes <= budget) kept[block] = std::move(hits), is_kept[block] = 1;
+      else used.fetch_sub(bytes);
+    };
+    {
+      ProgressStage stage(progress, "tracing", n());
+      parallel_for(n(), gather_block, [&](size_t begin, size_t end) {
+        if (stage.cancelled()) return;
+        auto s = scratch.borrow();
+        MatrixHits hits;
+        for (size_t r = begin; r < end; ++r) trace_receiver(*s, r, bounces ? &hits : nullptr);
+        if (bounces) keep(begin / gather_block, std::move(hits));
+        stage.advance(end - begin);
+      });
+      if (stage.cancelled()) return Error{"", "cancelled"};
+    }
+    report.rays = n() * rays();
+    move_buried(buried, T0, trace_receiver, bounces, kept, is_kept, used);
+    report.operator_bytes = used;
+    report.operator_kept = bounces ? double(std::count(is_kept.begin(), is_kept.end(), uint8_t(1))) / double(blocks) : 1;
+    report.trace_seconds = seconds_since(start);
+    start = Clock::now();
+
+    const Last last = make_last();
+    WritableTransfer out = make_transfer({.order = options.order}, last.rows, last.channels, n(), options.precision);
+    auto expand = [&](const float* t, float* x) {  // T0 in every channel
+      for (size_t j = 0; j < J(); ++j)
+        for (size_t c = 0; c < channels(); ++c) std::copy_n(t + j * width(), width(), x + (j * channels() + c) * width());
+    };
+    auto store = [&](size_t r, const float* x) {
+      std::vector<float> values(size_t(last.rows) * size_t(last.channels) * C());
+      for (size_t row = 0; row < size_t(last.rows); ++row)
+        for (size_t c = 0; c < size_t(last.channels); ++c) {
+          const float* h = last.h[materials.of_receiver[r]][c].data() + row * J();
+          float* v = values.data() + (row * size_t(last.channels) + c) * C();
+          for (size_t j = 0; j < J(); ++j) {
+            const float* xj = x + (j * channels() + std::min(c, channels() - 1)) * width();
+            if (h[j] != 0)
+              for (size_t k = 0; k < C(); ++k) v[k] += h[j] * xj[k];
+          }
+        }
+      store_receiver(out, r, values);
+    };
+    auto scatter_rows = [&](size_t r, const float* x, float* Y) {
+      const FactoredResponse& f = scatter[materials.of_receiver[r]];
+      apply(f.h, size_t(f.rows), J(), wc, x, Y + first_row[r] * wc);
+    };
+
+    AlignedVector<float> Y, next;
+    if (bounces) Y.resize(first_row.back() * wc), next.resize(Y.size());
+    parallel_for(n(), gather_block, [&](size_t begin, size_t end) {
+      AlignedVector<float> x(J() * wc);
+      for (size_t r = begin; r < end; ++r) {
+        expand(T0.data() + r * J() * width(), x.data());
+        if (bounces) scatter_rows(r, x.data(), Y.data());
+        else store(r, x.data());
+      }
+    });
+    std::vector<double> differences(blocks, 0.0), totals(blocks, 0.0);
+    auto check = [&](size_t block, const float* half, const float* full, size_t count) {
+      for (size_t i = 0; i < count; ++i) differences[block] += double(half[i] - full[i]) * (half[i] - full[i]), totals[block] += double(full[i]) * full[i];
+    };
+    if (!bounces)
+      for (size_t r = 0; r < n(); r += check_every)
+        if (!buried[r]) check(r / gather_block, T0_half.data() + r / check_every * J() * width(), T0.data() + r * J() * width(), J() * width());
+
+    for (int bounce = 1; bounce <= options.bounces; ++bounce) {
+      const bool is_last = bounce == options.bounces;
+      ProgressStage stage(progress, "bounce " + std::to_string(bounce), n());
+      parallel_for(n(), gather_block, [&](size_t begin, size_t end) {
+        if (stage.cancelled()) return;
+        auto s = scratch.borrow();
+        const size_t b = begin / gather_block;
+        MatrixHits again;
+        if (!is_kept[b])
+          for (size_t r = begin; r < end; ++r) (void)trace(*s, r, &again), again.ends.push_back(uint32_t(again.hits.size()));
+        const MatrixHits& hits = is_kept[b] ? kept[b] : again;
+        AlignedVector<float> x(J() * wc);
+        for (size_t r = begin; r < end; ++r) {
+          (void)aim(*s, r);
+          const size_t first = r == begin ? 0 : hits.ends[r - begin - 1];
+          const std::span<const MatrixHit> mine(hits.hits.data() + first, hits.ends[r - begin] - first);
+          expand(T0.data() + r * J() * width(), x.data());
+          scattered(*s, mine, rays(), Y.data(), x.data());
+          if (!is_last) {
+            scatter_rows(r, x.data(), next.data());
+            continue;
+          }
+          store(r, x.data());
+          if (has_halves() && r % check_every == 0 && !buried[r]) {
+            AlignedVector<float> half(J() * wc);
+            expand(T0_half.data() + r / check_every * J() * width(), half.data());
+            scattered(*s, mine, setup.sets.half, Y.data(), half.data());
+            check(b, half.data(), x.data(), half.size());
+          }
+        }
+        stage.advance(end - begin);
+      });
+      if (stage.cancelled()) return Error{"", "cancelled"};
+      report.rays += size_t(double(n()) * (1 - report.operator_kept) + 0.5) * rays();
+      std::swap(Y, next);
+    }
+    report.bounce_seconds = seconds_since(start);
+    report.working_memory = fixed + used;
+    double difference = 0, total = 0;
+    for (size_t b = 0; b < blocks; ++b) difference += differences[b], total += totals[b];
+    report.error = has_halves() ? (total > 0 ? std::sqrt(difference / total) : 0) : -1;
+    report.receivers = n(), report.bytes = out.transfer.bytes();
+    for (uint8_t x : buried) report.buried += x;
+    return MatrixBake{std::move(out.transfer), last.outgoing};
+  }
+
+  // A buried receiver looks out from where its nearest clear neighbour along the mesh lies.
+  template <class TraceReceiver>
+  void move_buried(const std::vector<uint8_t>& was_buried, AlignedVector<float>&, TraceReceiver& trace_receiver, bool bounces, std::vector<MatrixHits>& kept,
+                   std::vector<uint8_t>& is_kept, std::atomic<size_t>& used) {
+    const std::vector<uint8_t> buried = was_buried;
+    const auto steps = make_fill_steps(setup.corners, buried);
+    if (steps.empty()) return;
+    for (const FillStep& step : steps) receivers.origins[step.receiver] = receivers.origins[step.sources[0]];
+    std::map<size_t, bool> touched;
+    for (const FillStep& step : steps) touched[step.receiver / gather_block] = true;
+    auto s = scratch.borrow();
+    for (const auto& [block, yes] : touched) {
+      const size_t begin = block * gather_block, end = std::min(n(), begin + gather_block);
+      MatrixHits hits;
+      for (size_t r = begin; r < end; ++r) trace_receiver(*s, r, bounces ? &hits : nullptr);
+      if (bounces && is_kept[block]) used += hits.bytes(), used -= kept[block].bytes(), kept[block] = std::move(hits);
+    }
+  }
+};
+
+Result<void> check_options(const BakeOptions& o, const MatrixOptions& m, const ReceiverMaterials& materials, size_t receivers) {
+  auto within = [](const char* name, int value, int least, int most) -> Result<void> {
+    if (value >= least && value <= most) return {};
+    return Error{name, "must lie between " + std::to_string(least) + " and " + std::to_string(most) + ", not " + std::to_string(value)};
+  };
+  for (auto& ok : {within("order", o.order, 1, max_sh_order), within("samples", o.samples, 1, 1 << 20), within("bounces", o.bounces, 0, 64),
+                   within("incident-order", m.incident_order, 1, max_incident_order), within("outgoing-order", m.outgoing_order, 1, max_incident_order),
+                   within("order and incident-order together", o.order + m.incident_order, 2, max_sh_order + 1),
+                   within("svd rows", m.svd_rows, 1, sh_count(m.incident_order)), within("grid", m.grid, 8, 256)})
+    if (!ok) return ok.error();
+  LAMBENT_CHECK(materials.of_receiver.size() == receivers && materials.frames.size() == receivers && !materials.materials.empty());
+  return {};
+}
+
+}  // namespace
+
+size_t matrix_memory(size_t receivers, int channels, const BakeOptions& o, const MatrixOptions& m) {
+  const size_t width = pad_lanes(size_t(sh_count(o.order))), J = size_t(sh_count(m.incident_order));
+  const size_t table = 8 * pad_lanes(size_t(o.samples)) * 4 * size_t(sh_count(o.order + m.incident_order - 1) + 3);
+  const size_t scattered = o.bounces > 0 ? 2 * size_t(m.scatter_rows) * size_t(channels) * width : 0;
+  return receivers * (4 * (J * width * (check_every + 1) / check_every + scattered) + 2 * sizeof(Vec3) + sizeof(Mat3)) + table;
+}
+
+Result<MatrixBake> bake_matrix(const Scene& scene, const Tracer& tracer, const Receivers& receivers, const ReceiverMaterials& materials,
+                               const BakeOptions& options, const MatrixOptions& matrix, BakeReport* report, Progress* progress) {
+  if (receivers.count() == 0) return Error{scene.path, "nothing to bake: no triangle has an area"};
+  if (auto ok = check_options(options, matrix, materials, receivers.count()); !ok) return ok.error();
+  BakeReport unwanted;
+  BakeReport& r = report ? *report : unwanted;
+  r = {};
+  GatherSetup setup = make_gather_setup(scene, tracer, receivers, options.order + matrix.incident_order - 1, options.samples, options.seed);
+  if (options.bounces == 0) setup.channels = 1;  // direct light meets no coloured surface on its way
+  const size_t needed = matrix_memory(receivers.count(), setup.channels, options, matrix);
+  if (needed > options.memory)
+    return Error{scene.path, "baking needs at least " + std::to_string(needed) + " bytes of working memory, and was allowed " + std::to_string(options.memory)};
+  MatrixBaker baker{scene, receivers, materials, options, matrix, std::move(setup), progress, r};
+  return baker.run();
+}
+
+}  // namespace lambent

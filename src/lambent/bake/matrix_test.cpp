@@ -1,0 +1,124 @@
+#include <lambent/bake/matrix.h>
+#include <lambent/core/parallel.h>
+#include <lambent/core/random.h>
+#include <lambent/core/sampling.h>
+#include <lambent/relight/relight.h>
+#include <lambent/scene/procedural.h>
+
+#include <gtest/gtest.h>
+
+namespace lambent {
+namespace {
+
+// A floor, a wall and a box, in two colours.
+Scene corner_scene() {
+  Scene scene;
+  const uint32_t red = add_material(scene, "red", Vec3(0.8f, 0.3f, 0.2f)), grey = add_material(scene, "grey", Vec3(0.6f));
+  add_quad(scene, red, "floor", Vec3(-2, 0, -2), Vec3(0, 0, 4), Vec3(4, 0, 0), 12, 12);
+  add_quad(scene, grey, "wall", Vec3(-2, 0, -2), Vec3(4, 0, 0), Vec3(0, 3, 0), 12, 12);
+  add_box(scene, grey, "box", Vec3(-0.5f, 0.01f, -0.5f), Vec3(0.5f, 1.0f, 0.5f), 4);
+  return scene;
+}
+
+ReceiverMaterials all_of(const LinearMaterial& material, const Receivers& receivers) {
+  ReceiverMaterials m;
+  m.materials = {material};
+  m.of_receiver.assign(receivers.count(), 0);
+  for (const Vec3& n : receivers.normals) m.frames.push_back(frame_about(n));
+  return m;
+}
+
+const LinearMaterial diffuse{Lambert{Vec3(0)}, Lambert{Vec3(1)}};
+
+std::vector<Vec3> uneven_light(int order, uint64_t seed) {
+  Random random(seed);
+  std::vector<Vec3> light(size_t(sh_count(order)));
+  for (size_t k = 0; k < light.size(); ++k) light[k] = (Vec3(random.next(), random.next(), random.next()) - 0.5f) / float(1 + sh_band(int(k)));
+  light[0] = Vec3(3, 2.5f, 2);
+  return light;
+}
+
+TEST(Matrix, WithLambertIsTheDiffuseBake) {
+  const Scene scene = corner_scene();
+  auto tracer = Tracer::build(scene);
+  ASSERT_TRUE(tracer);
+  const Receivers receivers = make_vertex_receivers(scene);
+  for (int bounces : {0, 2}) {
+    const BakeOptions options{.order = 4, .samples = 512, .bounces = bounces, .precision = Precision::single};
+    auto vector = bake(scene, *tracer, receivers, options);
+    ASSERT_TRUE(vector);
+    for (OutgoingKind kind : {OutgoingKind::map, OutgoingKind::svd}) {
+      MatrixOptions matrix{.incident_order = 3, .outgoing = kind, .svd_rows = 2, .grid = 8};
+      auto baked = bake_matrix(scene, *tracer, receivers, all_of(diffuse, receivers), options, matrix);
+      ASSERT_TRUE(baked) << baked.error().text();
+      ASSERT_EQ(baked->transfer.rows, kind == OutgoingKind::map ? 9 : 1);
+      // The same rays; the bounces' hits are rounded (u, v to 16 bits; weights of the diffuse operator to halves).
+      double worst = 0;
+      std::vector<ViewWeights> weights(size_t(baked->transfer.rows));
+      const std::vector<Vec3> light = uneven_light(4, 3);
+      Relit a, b;
+      relight(*vector, light, a);
+      relight(baked->transfer, light, b);
+      for (size_t r = 0; r < receivers.count(); ++r) {
+        evaluate_outgoing(baked->outgoing, r, normalize_or(receivers.normals[r] + Vec3(0.3f, 0.1f, -0.2f), Vec3(0, 1, 0)), weights);
+        const Vec3 radiance = reflect_rows(weights, Vec3(1), [&](size_t row) { return b.at(r, int(row)); });
+        worst = std::max(worst, double(glm::length(radiance - a.at(r))));
+      }
+      EXPECT_LT(worst, bounces ? 2e-3 : 2e-5) << outgoing_names[int(kind)] << " " << bounces;
+    }
+  }
+}
+
+TEST(Matrix, IsTheSameOnOneThreadAndInLittleMemory) {
+  const Scene scene = corner_scene();
+  auto tracer = Tracer::build(scene);
+  ASSERT_TRUE(tracer);
+  const Receivers receivers = make_vertex_receivers(scene);
+  BakeOptions options{.order = 3, .samples = 128, .bounces = 2};
+  const MatrixOptions matrix{.incident_order = 3, .outgoing = OutgoingKind::map, .grid = 8};
+  auto a = bake_matrix(scene, *tracer, receivers, all_of(diffuse, receivers), options, matrix);
+  options.memory = matrix_memory(receivers.count(), 3, options, matrix) + 1000;
+  ThreadLimit one(1);
+  BakeReport report;
+  auto b = bake_matrix(scene, *tracer, receivers, all_of(diffuse, receivers), options, matrix, &report);
+  ASSERT_TRUE(a && b);
+  EXPECT_LT(report.operator_kept, 0.5);
+  EXPECT_TRUE(std::equal(a->transfer.data.begin(), a->transfer.data.end(), b->transfer.data.begin(), b->transfer.data.end()));
+  options.memory = 1000;
+  auto none = bake_matrix(scene, *tracer, receivers, all_of(diffuse, receivers), options, matrix);
+  ASSERT_FALSE(none);
+  EXPECT_NE(none.error().message.find("bytes"), std::string::npos);
+}
+
+TEST(Matrix, RowsAreTheIntegralsTheyStandFor) {
+  // Rows of direct transfer on the floor beside the wall, against a plain sum over an independent set of directions.
+  const Scene scene = corner_scene();
+  auto tracer = Tracer::build(scene);
+  ASSERT_TRUE(tracer);
+  const Receivers receivers = make_vertex_receivers(scene);
+  const BakeOptions options{.order = 4, .samples = 4096, .bounces = 0, .precision = Precision::single};
+  const MatrixOptions matrix{.incident_order = 4, .outgoing = OutgoingKind::map, .grid = 8};
+  const ReceiverMaterials materials = all_of(diffuse, receivers);
+  auto baked = bake_matrix(scene, *tracer, receivers, materials, options, matrix);
+  ASSERT_TRUE(baked);
+  const CosineBasis basis = make_cosine_basis(4);
+  std::vector<float> z(16), y(16);
+  for (size_t r = 5; r < receivers.count(); r += 97) {
+    std::vector<double> sum(16 * 16, 0.0);
+    const int count = 1 << 15;
+    for (int s = 0; s < count; ++s) {
+      const Vec3 local = square_to_cosine_hemisphere(sobol_owen(uint32_t(s), 77)), world = materials.frames[r] * local;
+      if (tracer->closest(receivers.origins[r], world).triangle != none) continue;
+      evaluate_cosine_basis(basis, local, z);
+      evaluate_sh(4, world, y);
+      for (size_t j = 0; j < 16; ++j)
+        for (size_t i = 0; i < 16; ++i) sum[j * 16 + i] += double(z[j]) * y[i] / count;
+    }
+    const std::vector<float> t = load_receiver(baked->transfer, r);
+    // 4,096 scrambled Sobol' points against a discontinuous visibility: about 4096^-0.75 of functions up to 3.
+    for (size_t k = 0; k < 256; ++k) EXPECT_NEAR(t[k], sum[k], 0.02) << "receiver " << r << " row " << k / 16 << " column " << k % 16;
+  }
+}
+
+}  // namespace
+}  // namespace lambent

@@ -1,0 +1,106 @@
+#include <lambent/bake/response.h>
+#include <lambent/basis/hemispherical.h>
+#include <lambent/basis/svd.h>
+#include <lambent/core/check.h>
+#include <lambent/core/parallel.h>
+#include <lambent/core/sampling.h>
+
+#include <array>
+
+namespace lambent {
+
+ViewMap make_response(const LinearMaterial& material, const CosineBasis& basis, int grid, int samples) {
+  const size_t n = size_t(basis.count());
+  ViewMap map{grid, int(n), std::vector<ViewWeights>(size_t(grid) * size_t(grid) * n, ViewWeights(0.0f))};
+  const auto* black = std::get_if<Lambert>(&material.black);
+  const auto* white = std::get_if<Lambert>(&material.white);
+  if (black && white) {  // exact: z_0 = 1, and the others are orthogonal to it
+    for (size_t i = 0; i < map.values.size(); i += n) map.values[i] = ViewWeights(black->albedo, white->albedo.x - black->albedo.x);
+    return map;
+  }
+  parallel_for(size_t(grid), 1, [&](size_t begin, size_t end) {
+    std::vector<float> z(n);
+    std::vector<glm::dvec4> sum(n);
+    for (size_t y = begin; y < end; ++y)
+      for (int x = 0; x < grid; ++x) {
+        const Vec3 wo = view_map_direction(grid, x, int(y));
+        std::fill(sum.begin(), sum.end(), glm::dvec4(0.0));
+        for (int s = 0; s < samples; ++s) {
+          // The same points for every view, so that noise does not vary from node to node.
+          const BrdfSample drawn = sample(material.white, wo, sobol_owen(uint32_t(s), 0x0b5e));
+          if (!(drawn.pdf > 0)) continue;
+          const Vec3 a = evaluate(material.black, drawn.wi, wo) * (drawn.wi.z / drawn.pdf);
+          const float b = luminance(drawn.weight - a);
+          evaluate_cosine_basis(basis, drawn.wi, z);
+          for (size_t j = 0; j < n; ++j) sum[j] += glm::dvec4(a, b) * double(z[j]);
+        }
+        ViewWeights* out = map.values.data() + (y * size_t(grid) + size_t(x)) * n;
+        for (size_t j = 0; j < n; ++j) out[j] = ViewWeights(sum[j] / double(samples));
+      }
+  });
+  return map;
+}
+
+FactoredResponse factor_response(const ViewMap& response, int max_rows, double tolerance) {
+  const int nodes = response.grid * response.grid, n = response.rows;
+  // One row of the matrix for each node and component; the map has equal areas, so every node weighs the same.
+  std::vector<double> A(size_t(nodes) * 4 * size_t(n));
+  for (int i = 0; i < nodes; ++i)
+    for (int c = 0; c < 4; ++c)
+      for (int j = 0; j < n; ++j) A[(size_t(i) * 4 + size_t(c)) * size_t(n) + size_t(j)] = response.values[size_t(i * n + j)][c];
+  const Svd d = thin_svd(A, nodes * 4, n);
+  FactoredResponse f;
+  f.singular_values = d.s;
+  double total = 0;
+  for (double s : d.s) total += s * s;
+  double left = total;
+  while (f.rows < std::min(max_rows, d.k) && (f.rows == 0 || left > tolerance * tolerance * total)) left -= d.s[size_t(f.rows)] * d.s[size_t(f.rows)], ++f.rows;
+  f.error = total > 0 ? std::sqrt(std::max(left, 0.0) / total) : 0;
+  f.h.resize(size_t(f.rows) * size_t(n));
+  for (int r = 0; r < f.rows; ++r)
+    for (int j = 0; j < n; ++j) f.h[size_t(r * n + j)] = float(d.V[size_t(j * d.k + r)]);
+  f.g = {response.grid, f.rows, std::vector<ViewWeights>(size_t(nodes) * size_t(f.rows))};
+  for (int i = 0; i < nodes; ++i)
+    for (int r = 0; r < f.rows; ++r)
+      for (int c = 0; c < 4; ++c) f.g.values[size_t(i * f.rows + r)][c] = float(d.U[(size_t(i) * 4 + size_t(c)) * size_t(d.k) + size_t(r)] * d.s[size_t(r)]);
+  f.constant = f.rows == 1;
+  for (const ViewWeights& w : f.g.values) {
+    const ViewWeights apart = glm::abs(w - f.g.values[0]);
+    f.constant = f.constant && std::max({apart.x, apart.y, apart.z, apart.w}) < 1e-5f * glm::length(w);
+  }
+  return f;
+}
+
+std::array<std::vector<float>, 4> project_response(const ViewMap& response, OutgoingKind kind, int order) {
+  LAMBENT_CHECK(kind == OutgoingKind::sh || kind == OutgoingKind::hemisphere || kind == OutgoingKind::hsh);
+  const size_t rows = size_t(sh_count(order)), n = size_t(response.rows), nodes = size_t(response.grid);
+  // The map has equal areas: a node stands for 2 pi / (grid - 1)^2 of solid angle, half of it on an edge, a quarter in a corner.
+  std::vector<std::vector<double>> sums(4, std::vector<double>(rows * n, 0.0));
+  std::vector<float> y(rows);
+  for (size_t row = 0; row < nodes; ++row)
+    for (size_t column = 0; column < nodes; ++column) {
+      auto share = [&](size_t i) { return i == 0 || i == nodes - 1 ? 0.5 : 1.0; };
+      const double w = share(row) * share(column) * 2 * std::numbers::pi / double((nodes - 1) * (nodes - 1));
+      const Vec3 wo = view_map_direction(response.grid, int(column), int(row));
+      if (kind == OutgoingKind::hsh) evaluate_hsh(order, wo, y);
+      else evaluate_sh(order, wo, y);
+      const ViewWeights* O = response.values.data() + (row * nodes + column) * n;
+      for (size_t q = 0; q < rows; ++q)
+        for (size_t j = 0; j < n; ++j)
+          for (size_t c = 0; c < 4; ++c) sums[c][q * n + j] += w * y[q] * O[j][int(c)];
+    }
+  std::array<std::vector<float>, 4> out;
+  const HemisphereFit fit = kind == OutgoingKind::hemisphere ? make_hemisphere_fit(order, 1e-4) : HemisphereFit{};
+  for (size_t c = 0; c < 4; ++c) {
+    out[c].resize(rows * n);
+    for (size_t j = 0; j < n; ++j) {
+      std::vector<double> column(rows);
+      for (size_t q = 0; q < rows; ++q) column[q] = sums[c][q * n + j];
+      if (kind == OutgoingKind::hemisphere) column = fit_hemisphere(fit, column);
+      for (size_t q = 0; q < rows; ++q) out[c][q * n + j] = float(column[q]);
+    }
+  }
+  return out;
+}
+
+}  // namespace lambent

@@ -1,0 +1,36 @@
+#pragma once
+// How a material answers light, over the incident basis (basis/cosine_basis.h): the vectors O_j(wo) = integral of f(wi, wo) z_j(wi)
+// cos over the hemisphere, and what is made of them: few rows by singular values, rows of an outgoing basis.
+// Source: general-prt, "Final reflection"; separable BRDFs by SVD; local-deformable-prt eq. 14-15.
+#include <lambent/basis/cosine_basis.h>
+#include <lambent/brdf/brdf.h>
+#include <lambent/transfer/outgoing.h>
+
+namespace lambent {
+
+// A material as a function of its base colour, in which it is linear: `black` is its BRDF at base colour 0, `white` at 1.
+// A BRDF that has no base colour is black = white = itself.
+struct LinearMaterial {
+  Brdf black, white;
+};
+
+// O_j over a grid of views, rows = order^2. `samples` directions a view, drawn from the BRDF.
+ViewMap make_response(const LinearMaterial& material, const CosineBasis& basis, int grid, int samples);
+
+// O = sum_r g_r(wo) h_rj: the rows h and the weights g, by singular values over the views. At most max_rows, and as few as leave
+// a relative error (root of the sum of squares) of `tolerance`.
+struct FactoredResponse {
+  int rows = 0;
+  std::vector<float> h;      // rows x order^2
+  ViewMap g;                 // rows
+  bool constant = false;     // g is the same in every view (Lambert)
+  std::vector<double> singular_values;  // all of them
+  double error = 0;          // what is left out, relative
+};
+FactoredResponse factor_response(const ViewMap& response, int max_rows, double tolerance);
+
+// The matrix C of outgoing bases: coefficients over wo of each component (a.r, a.g, a.b, b) of O_j, order^2 x order_in^2 for each.
+// `kind` is sh, hemisphere or hsh.
+std::array<std::vector<float>, 4> project_response(const ViewMap& response, OutgoingKind kind, int order);
+
+}  // namespace lambent

@@ -1,0 +1,52 @@
+// Follows: general-prt, "Final reflection": view-dependent vectors O_j(wo) looked up in a map, or a basis of the outgoing radiance.
+#include <lambent/basis/hemispherical.h>
+#include <lambent/core/check.h>
+#include <lambent/core/sampling.h>
+#include <lambent/transfer/outgoing.h>
+
+namespace lambent {
+
+const char* const outgoing_names[5] = {"map", "svd", "sh", "hemisphere", "hsh"};
+
+Vec3 view_map_direction(int grid, int x, int y) {
+  const Vec2 disk = square_to_disk({float(x) / float(grid - 1), float(y) / float(grid - 1)});
+  constexpr float lowest = 2e-3f;  // the horizon itself reflects nothing that could be measured
+  const float z = std::max(1 - glm::dot(disk, disk), lowest), r = std::sqrt(1 - z * z);
+  const Vec2 flat = normalize_or(Vec3(disk, 0), Vec3(0));
+  return {flat * r, z};
+}
+
+void look_up(const ViewMap& map, Vec3 wo, std::span<ViewWeights> out) {
+  LAMBENT_CHECK(map.grid >= 2 && out.size() >= size_t(map.rows));
+  const float z = std::clamp(wo.z, 0.0f, 1.0f);
+  const Vec2 flat = normalize_or(Vec3(wo.x, wo.y, 0), Vec3(0));
+  const Vec2 square = disk_to_square(flat * std::sqrt(1 - z));
+  const float last = float(map.grid - 1), sx = square.x * last, sy = square.y * last;
+  const int x = std::min(int(sx), map.grid - 2), y = std::min(int(sy), map.grid - 2);
+  const float fx = sx - float(x), fy = sy - float(y);
+  const ViewWeights* p = map.values.data() + size_t(y * map.grid + x) * size_t(map.rows);
+  const ViewWeights* q = p + size_t(map.grid) * size_t(map.rows);
+  const float w00 = (1 - fx) * (1 - fy), w10 = fx * (1 - fy), w01 = (1 - fx) * fy, w11 = fx * fy;
+  for (int r = 0; r < map.rows; ++r) out[size_t(r)] = w00 * p[r] + w10 * p[map.rows + r] + w01 * q[r] + w11 * q[map.rows + r];
+}
+
+int Outgoing::rows() const {
+  if (kind == OutgoingKind::map || kind == OutgoingKind::svd) return maps.empty() ? 0 : maps[0].rows;
+  return sh_count(order) * (has_b ? 2 : 1);
+}
+
+void evaluate_outgoing(const Outgoing& o, size_t receiver, Vec3 view, std::span<ViewWeights> out) {
+  Vec3 wo = view * o.frames[receiver];
+  if (wo.z < 0) wo = normalize_or(Vec3(wo.x, wo.y, 0), Vec3(0, 0, 1));
+  if (o.kind == OutgoingKind::map || o.kind == OutgoingKind::svd) return look_up(o.maps[o.map_of[receiver]], wo, out);
+  float y[sh_count(max_sh_order)];
+  const size_t n = size_t(sh_count(o.order));
+  if (o.kind == OutgoingKind::hsh) evaluate_hsh(o.order, wo, {y, n});
+  else evaluate_sh(o.order, wo, {y, n});
+  for (size_t k = 0; k < n; ++k) {
+    out[k] = ViewWeights(y[k], y[k], y[k], 0);
+    if (o.has_b) out[n + k] = ViewWeights(0, 0, 0, y[k]);
+  }
+}
+
+}  // namespace lambent
