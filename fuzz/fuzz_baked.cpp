@@ -22,7 +22,13 @@ extern "C" int LLVMFuzzerTestOneInput(const uint8_t* data, size_t size) {
   float sum = 0;
   for (const auto* map : {&baked->front, &baked->back})
     for (uint32_t r : *map)
-      if (r != lambent::none) sum += relit.at(r).x;
+      if (r != lambent::none) {
+        sum += relit.at(r).x;
+        if (!baked->outgoing) continue;
+        std::vector<lambent::ViewWeights> weights(size_t(relit.rows));
+        lambent::evaluate_outgoing(*baked->outgoing, r, lambent::Vec3(0.6f, 0, 0.8f), weights);
+        sum += lambent::reflect_rows(weights, lambent::Vec3(1), [&](size_t row) { return relit.at(r, int(row)); }).x;
+      }
   volatile float used = sum;
   (void)used;
   return 0;

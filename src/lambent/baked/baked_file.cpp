@@ -1,6 +1,7 @@
 #include <lambent/baked/baked_file.h>
 #include <lambent/basis/sh.h>
 #include <lambent/core/check.h>
+#include <lambent/core/half.h>
 #include <lambent/scene/gltf.h>
 #include <lambent/scene/load.h>
 
@@ -94,6 +95,80 @@ Result<std::span<const uint8_t>> view_bytes(const GltfChunks& chunks, size_t ind
   return chunks.binary.subspan(offset, *length);
 }
 
+// The last reflection as bulk data: view maps as halves [map][y][x][row][a.r, a.g, a.b, b]; by receiver, the map and a frame's
+// tangent and normal.
+struct OutgoingBlobs {
+  std::vector<uint16_t> maps, map_of;
+  std::vector<Vec3> frames;
+};
+
+OutgoingBlobs outgoing_blobs(const Outgoing& o) {
+  OutgoingBlobs b;
+  for (const ViewMap& map : o.maps)
+    for (const ViewWeights& w : map.values)
+      for (int c = 0; c < 4; ++c) b.maps.push_back(float_to_half(w[c]));
+  b.map_of = o.map_of;
+  for (const Mat3& f : o.frames) b.frames.push_back(f[0]), b.frames.push_back(f[2]);
+  return b;
+}
+
+template <class T>
+Result<std::vector<T>> read_values(const GltfChunks& chunks, const json& object, const char* key, size_t count, const std::string& where) {
+  auto index = read_count(object, key, 0x7fffffff, where);
+  if (!index) return index.error();
+  auto bytes = view_bytes(chunks, *index, where);
+  if (!bytes) return bytes.error();
+  if (bytes->size() != count * sizeof(T))
+    return Error{where, std::string("\"") + key + "\" holds " + std::to_string(bytes->size()) + " bytes where " + std::to_string(count * sizeof(T)) + " belong"};
+  std::vector<T> values(count);
+  if (count) std::memcpy(values.data(), bytes->data(), bytes->size());
+  return values;
+}
+
+Result<Outgoing> read_outgoing(const GltfChunks& chunks, const json& object, const Transfer& transfer, const std::string& where) {
+  Outgoing o;
+  const auto kind = std::find_if(std::begin(outgoing_names), std::end(outgoing_names), [&](const char* name) { return object.contains("kind") && object["kind"] == name; });
+  if (kind == std::end(outgoing_names)) return Error{where, "the outgoing basis is not known to this program"};
+  o.kind = OutgoingKind(kind - std::begin(outgoing_names));
+  auto order = read_count(object, "order", size_t(max_sh_order), where);
+  if (!order) return order.error();
+  o.order = int(*order);
+  o.has_b = object.value("hasB", true);
+  if (o.order < 1) return Error{where, "the outgoing order is 0"};
+  const size_t receivers = transfer.receivers;
+  if (o.kind == OutgoingKind::map || o.kind == OutgoingKind::svd) {
+    auto grid = read_count(object, "grid", 256, where), maps = read_count(object, "mapCount", 65535, where);
+    for (const auto* count : {&grid, &maps})
+      if (!*count) return count->error();
+    if (*grid < 2 || *maps < 1) return Error{where, "view maps have no size"};
+    const size_t each = *grid * *grid * size_t(transfer.rows);
+    if (*maps > chunks.binary.size() / (8 * each)) return Error{where, "there is no room for so many view maps"};
+    auto halves = read_values<uint16_t>(chunks, object, "maps", *maps * each * 4, where);
+    if (!halves) return halves.error();
+    const uint16_t* p = halves->data();
+    for (size_t m = 0; m < *maps; ++m) {
+      ViewMap map{int(*grid), transfer.rows, std::vector<ViewWeights>(each)};
+      for (ViewWeights& w : map.values)
+        for (int c = 0; c < 4; ++c) w[c] = half_to_float(*p++);
+      o.maps.push_back(std::move(map));
+    }
+    auto map_of = read_values<uint16_t>(chunks, object, "mapOf", receivers, where);
+    if (!map_of) return map_of.error();
+    for (uint16_t m : *map_of)
+      if (m >= *maps) return Error{where, "view map " + std::to_string(m) + " does not exist"};
+    o.map_of = std::move(*map_of);
+  }
+  auto frames = read_values<Vec3>(chunks, object, "frames", 2 * receivers, where);
+  if (!frames) return frames.error();
+  for (size_t r = 0; r < receivers; ++r) {
+    const Vec3 t = (*frames)[2 * r], n = (*frames)[2 * r + 1];
+    if (!is_finite(t) || !is_finite(n) || glm::dot(t, t) > 2 || glm::dot(n, n) > 2) return Error{where, "a receiver's frame is broken"};
+    o.frames.push_back(Mat3(t, glm::cross(n, t), n));
+  }
+  if (o.rows() != transfer.rows) return Error{where, "\"rows\" does not fit the outgoing basis"};
+  return o;
+}
+
 Result<std::vector<uint32_t>> read_map(const GltfChunks& chunks, const json& part, const char* key, const Part& target,
                                        size_t receivers, const std::string& where) {
   auto index = read_count(part, key, 0x7fffffff, where);
@@ -111,21 +186,39 @@ Result<std::vector<uint32_t>> read_map(const GltfChunks& chunks, const json& par
 }  // namespace
 
 Result<void> save_baked(const std::string& path, const Scene& scene, const Receivers& receivers, const Transfer& transfer,
-                        const std::string& provenance) {
+                        const std::string& provenance, const Outgoing* outgoing) {
+  LAMBENT_CHECK(transfer.rows == (outgoing ? outgoing->rows() : 1));
+  const OutgoingBlobs last = outgoing ? outgoing_blobs(*outgoing) : OutgoingBlobs{};
   std::vector<GltfBlob> blobs{{transfer.data, 64}};
   for (const auto* map : {&receivers.front, &receivers.back})
     if (!map->empty())
       for (const Part& part : scene.parts)
         blobs.push_back({bytes_of(std::span<const uint32_t>(*map).subspan(part.first_vertex, part.vertex_count)), 4});
+  const size_t outgoing_view = blobs.size();
+  if (outgoing) {
+    blobs.push_back({bytes_of(std::span<const Vec3>(last.frames)), 4});
+    if (!last.maps.empty()) blobs.push_back({bytes_of(std::span<const uint16_t>(last.maps)), 4}), blobs.push_back({bytes_of(std::span<const uint16_t>(last.map_of)), 4});
+  }
   return save_glb(path, scene, blobs, [&](json& document, const GltfPlaces& places) {
     json extension;
     extension["version"] = baked_file_version;
-    extension["transfer"] = {{"kind", "diffuse"},
+    extension["transfer"] = {{"kind", outgoing ? "matrix" : "diffuse"},
                              {"channels", transfer.channels},
                              {"precision", transfer.precision == Precision::half ? "half" : "single"},
                              {"receivers", transfer.receivers},
                              {"bufferView", places.first_view}};
     write_light(extension["transfer"], transfer.light);
+    if (outgoing) {
+      extension["transfer"]["rows"] = transfer.rows;
+      const int first = places.first_view + int(outgoing_view);
+      json& o = extension["transfer"]["outgoing"];
+      o = {{"kind", outgoing_names[int(outgoing->kind)]}, {"order", outgoing->order}, {"frames", first}};
+      if (outgoing->maps.empty()) {
+        o["hasB"] = outgoing->has_b;
+      } else {
+        o["grid"] = outgoing->maps[0].grid, o["mapCount"] = outgoing->maps.size(), o["maps"] = first + 1, o["mapOf"] = first + 2;
+      }
+    }
     json parts = json::array();
     for (size_t i = 0; i < scene.parts.size(); ++i) {
       json part{{"node", places.part_nodes[i]}, {"primitive", places.part_primitives[i]}, {"front", places.first_view + 1 + int(i)}};
@@ -168,7 +261,8 @@ Result<Baked> load_baked(const MappedFile& file, const std::string& path) {
   const auto t = extension.find("transfer");
   if (t == extension.end() || !t->is_object()) return Error{where, "\"transfer\" is missing"};
   auto text = [&](const char* key) { return t->contains(key) && (*t)[key].is_string() ? (*t)[key].get<std::string>() : ""; };
-  if (text("kind") != "diffuse") return Error{where, "transfer of kind \"" + text("kind") + "\" is not known to this program"};
+  const bool is_matrix = text("kind") == "matrix";
+  if (!is_matrix && text("kind") != "diffuse") return Error{where, "transfer of kind \"" + text("kind") + "\" is not known to this program"};
   if (text("precision") != "half" && text("precision") != "single") return Error{where, "\"precision\" must be half or single"};
   auto light = read_light(*t, where);
   if (!light) return light.error();
@@ -180,6 +274,12 @@ Result<Baked> load_baked(const MappedFile& file, const std::string& path) {
   if (*channels != 1 && *channels != 3) return Error{where, "\"channels\" is out of range"};
   baked.transfer.light = std::move(*light), baked.transfer.channels = int(*channels), baked.transfer.receivers = *receivers;
   baked.transfer.precision = text("precision") == "half" ? Precision::half : Precision::single;
+  if (is_matrix) {
+    auto rows = read_count(*t, "rows", 2 * sh_count(max_sh_order), where);
+    if (!rows) return rows.error();
+    if (*rows < 1) return Error{where, "the transfer has no rows"};
+    baked.transfer.rows = int(*rows);
+  }
   auto data = view_bytes(*chunks, *view, where);
   if (!data) return data.error();
   if (data->size() != baked.transfer.bytes())
@@ -188,6 +288,12 @@ Result<Baked> load_baked(const MappedFile& file, const std::string& path) {
   if (reinterpret_cast<uintptr_t>(data->data()) % baked.transfer.value_bytes()) return Error{where, "the transfer is not aligned"};
   baked.transfer.data = *data;
   baked.transfer.storage = std::make_shared<MappedFile>(file);
+  if (is_matrix) {
+    if (!t->contains("outgoing") || !(*t)["outgoing"].is_object()) return Error{where, "\"outgoing\" is missing"};
+    auto outgoing = read_outgoing(*chunks, (*t)["outgoing"], baked.transfer, where + ": outgoing");
+    if (!outgoing) return outgoing.error();
+    baked.outgoing = std::move(*outgoing);
+  }
 
   const std::string folder = std::filesystem::path(path).parent_path().string();
   auto scene = load_gltf(file, path, folder.empty() ? "." : folder);

@@ -65,6 +65,52 @@ TEST(BakedFile, ComesBackAsItWas) {
     }
 }
 
+TEST(BakedFile, MatricesComeBackWithTheirLastReflection) {
+  Small s = small_bake(1, Precision::half);
+  const size_t n = s.receivers.count();
+  Random random(8);
+  for (OutgoingKind kind : {OutgoingKind::map, OutgoingKind::svd, OutgoingKind::sh, OutgoingKind::hsh}) {
+    Outgoing o;
+    o.kind = kind, o.order = 2, o.has_b = kind == OutgoingKind::sh;
+    const bool mapped = kind == OutgoingKind::map || kind == OutgoingKind::svd;
+    if (mapped)
+      for (int m = 0; m < 3; ++m) {
+        ViewMap map{5, 4, std::vector<ViewWeights>(100)};
+        for (ViewWeights& w : map.values) w = ViewWeights(random.next(), random.next(), random.next(), random.next());
+        o.maps.push_back(std::move(map));
+      }
+    for (size_t r = 0; r < n; ++r) {
+      if (mapped) o.map_of.push_back(uint16_t(r % 3));
+      o.frames.push_back(frame_about(normalize_or(Vec3(random.next(), random.next(), random.next() - 0.5f), Vec3(0, 0, 1))));
+    }
+    const WritableTransfer w = make_transfer({.order = 3}, o.rows(), 3, n, Precision::single);
+    std::vector<float> values(w.transfer.receiver_values());
+    for (size_t r = 0; r < n; ++r) {
+      for (float& v : values) v = random.next();
+      store_receiver(w, r, values);
+    }
+    const TemporaryFile file("matrix.glb"), cut("matrix_cut.glb");
+    ASSERT_TRUE(save_baked(file.path, s.scene, s.receivers, w.transfer, "{}", &o));
+    auto back = load_baked(file.path);
+    ASSERT_TRUE(back) << back.error().text();
+    ASSERT_TRUE(back->outgoing);
+    EXPECT_EQ(back->transfer.rows, o.rows());
+    EXPECT_TRUE(std::equal(back->transfer.data.begin(), back->transfer.data.end(), w.transfer.data.begin(), w.transfer.data.end()));
+    std::vector<ViewWeights> a(size_t(o.rows())), b(a.size());
+    for (size_t r = 0; r < n; ++r) {
+      const Vec3 view = normalize_or(o.frames[r] * Vec3(0.3f, -0.5f, 0.6f), Vec3(0));
+      evaluate_outgoing(o, r, view, a), evaluate_outgoing(*back->outgoing, r, view, b);
+      for (size_t k = 0; k < a.size(); ++k) EXPECT_LT(glm::length(a[k] - b[k]), mapped ? 2e-3f : 1e-5f);  // maps are halves
+    }
+    const std::vector<uint8_t> bytes = *read_file(file.path);
+    for (size_t length = 0; length < bytes.size(); length += 997) {
+      const std::span<const uint8_t> piece(bytes.data(), length);
+      ASSERT_TRUE(write_file_atomically(cut.path, {&piece, 1}));
+      EXPECT_FALSE(load_baked(cut.path)) << length;
+    }
+  }
+}
+
 TEST(BakedFile, IsTheSameBytesEveryTime) {
   const TemporaryFile a("a.glb"), b("b.glb");
   const Small s = small_bake(3, Precision::half);

@@ -27,6 +27,7 @@ Result<Image> render(const Scene& scene, const Tracer& tracer, const CornerRecei
   ProgressStage stage(progress, "rendering", size_t(options.height));
   parallel_for(size_t(options.height), 1, [&](size_t begin, size_t end) {
     if (stage.cancelled()) return;
+    std::vector<ViewWeights> weights(options.outgoing ? size_t(relit.rows) : 0);
     for (int y = int(begin); y < int(end); ++y)
       for (int x = 0; x < options.width; ++x) {
         Vec3 sum(0.0f);
@@ -44,8 +45,16 @@ Result<Image> render(const Scene& scene, const Tracer& tracer, const CornerRecei
           const auto* corner = corners.find(hit.triangle, hit.front);
           if (!corner) continue;
           const auto& r = corner->receiver;
-          const Vec3 white = (1 - hit.u - hit.v) * relit.at(r[0]) + hit.u * relit.at(r[1]) + hit.v * relit.at(r[2]);
-          sum += options.albedo ? albedo(scene, scene.triangles[hit.triangle], hit.u, hit.v) * white : white;
+          const float b[3] = {1 - hit.u - hit.v, hit.u, hit.v};
+          const Vec3 colour = options.albedo ? albedo(scene, scene.triangles[hit.triangle], hit.u, hit.v) : Vec3(1);
+          if (!options.outgoing) {
+            sum += colour * (b[0] * relit.at(r[0]) + b[1] * relit.at(r[1]) + b[2] * relit.at(r[2]));
+            continue;
+          }
+          for (int k = 0; k < 3; ++k) {
+            evaluate_outgoing(*options.outgoing, r[k], -direction, weights);
+            sum += b[k] * reflect_rows(weights, colour, [&](size_t row) { return relit.at(r[k], int(row)); });
+          }
         }
         image.at(x, y) = sum / float(options.samples);
         if (!options.background) image.alpha[size_t(y) * size_t(options.width) + size_t(x)] = float(covered) / float(options.samples);

@@ -7,6 +7,7 @@
 #include <lambent/receivers/receivers.h>
 #include <lambent/relight/relight.h>
 #include <lambent/trace/tracer.h>
+#include <lambent/transfer/outgoing.h>
 
 namespace lambent {
 
@@ -15,6 +16,7 @@ struct RenderOptions {
   int samples = 16;               // rays a pixel, [1, 4096], box filter
   const Environment* background = nullptr;  // null: black, and the image has alpha (coverage)
   bool albedo = true;             // false: as if everything were white
+  const Outgoing* outgoing = nullptr;  // the last reflection of transfer matrices; null: diffuse
 };
 
 // One-sided triangles are absent from behind, as in any glTF viewer. Errors: cancelled.
