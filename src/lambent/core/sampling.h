@@ -13,6 +13,8 @@ Vec2 sobol_owen(uint32_t index, uint32_t seed);
 
 // Unit disk, area-preserving with low distortion (Shirley and Chiu 1997).
 Vec2 square_to_disk(Vec2 u);
+// Its inverse: the point of [0, 1]^2, for a point of the unit disk.
+Vec2 disk_to_square(Vec2 d);
 
 // Hemisphere about +z with density cos(theta)/pi.
 Vec3 square_to_cosine_hemisphere(Vec2 u);
