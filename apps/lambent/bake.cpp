@@ -4,6 +4,8 @@
 #include <lambent/bake/bake.h>
 #include <lambent/bake/materials.h>
 #include <lambent/baked/baked_file.h>
+#include <lambent/light/project.h>
+#include <lambent/relight/fix_light.h>
 
 #include <fmt/format.h>
 
@@ -17,7 +19,7 @@ struct BakeCommand {
   BakeOptions bake;
   MatrixOptions matrix;
   BrdfOptions brdf;
-  std::string transfer = "diffuse", outgoing = "svd:6", output, shadows = "on", precision = "half";
+  std::string transfer = "diffuse", outgoing = "svd:6", fix_light, output, shadows = "on", precision = "half";
 };
 
 // KIND or KIND:N, where N is the number of rows (svd) or bands (sh, hemisphere, hsh).
@@ -75,6 +77,14 @@ int run_bake(Context& context, BakeCommand o) {
     if (!transfer) return fail(transfer.error());
   }
 
+  if (!o.fix_light.empty()) {
+    auto env = load_environment(o.fix_light);
+    if (!env) return fail(env.error());
+    warn(env->warnings);
+    *transfer = fix_light(*transfer, project_environment(*env, o.bake.order), env->name);
+    report.bytes = transfer->bytes();
+  }
+
   nlohmann::json provenance{
       {"generator", "lambent " LAMBENT_VERSION},
       {"input", {{"name", scene->path.substr(scene->path.find_last_of('/') + 1)}, {"xxh3_128", scene->hash}}},
@@ -84,6 +94,7 @@ int run_bake(Context& context, BakeCommand o) {
       {"report", {{"receivers", report.receivers}, {"buried", report.buried}}}};
   if (is_matrix)
     provenance["options"].update({{"brdf", o.brdf.brdf}, {"outgoing", o.outgoing}, {"incident_order", o.matrix.incident_order}});
+  if (!o.fix_light.empty()) provenance["options"]["fix_light"] = o.fix_light;
   if (report.error >= 0) provenance["report"]["error"] = report.error;
 
   start = Clock::now();
@@ -143,6 +154,7 @@ void add_bake(CLI::App& app, Run& run) {
                    ->capture_default_str();
   o->brdf.brdf = "materials";
   auto* brdf = o->brdf.add_to(*c);
+  c->add_option("--fix-light", o->fix_light, "Bake this environment in, so that only its brightness is left: a surface light field");
   c->add_option("--samples", o->bake.samples, "Rays a receiver")->check(CLI::Range(1, 1 << 20))->capture_default_str();
   auto* bounces = c->add_option("--bounces", o->bake.bounces, "Reflections between surfaces")->check(CLI::Range(0, 64))->capture_default_str();
   c->add_option("--shadows", o->shadows, "off: open light everywhere, no shadows and no bounces")->check(CLI::IsMember({"on", "off"}))->capture_default_str();

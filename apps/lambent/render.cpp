@@ -1,6 +1,7 @@
 #include "commands.h"
 #include "options.h"
 
+#include <lambent/bake/materials.h>
 #include <lambent/baked/baked_file.h>
 #include <lambent/light/project.h>
 #include <lambent/relight/relight.h>
@@ -17,10 +18,29 @@ struct RenderCommand {
   std::string baked;
   LightOptions light;
   ViewOptions view;
+  BrdfOptions brdf;
+  bool new_brdf = false;
   ShWindow window = ShWindow::none;
   int light_order = 0, samples = 16;
   bool no_albedo = false;
 };
+
+// Other materials for a bake that kept incident light: its last reflection is made anew.
+Result<void> change_materials(Baked& baked, const BrdfOptions& options, const std::string& path) {
+  if (!baked.outgoing || baked.outgoing->kind != OutgoingKind::map)
+    return Error{path, "--brdf needs a bake that kept incident light: lambent bake --transfer matrix --outgoing map"};
+  auto reflection = load_reflection(options);
+  if (!reflection) return reflection.error();
+  Receivers receivers;
+  receivers.origins.resize(baked.transfer.receivers), receivers.front = baked.front, receivers.back = baked.back;
+  for (const Mat3& frame : baked.outgoing->frames) receivers.normals.push_back(frame[2]);
+  const ReceiverMaterials materials = make_receiver_materials(baked.scene, receivers, *reflection);
+  const CosineBasis basis = make_cosine_basis(baked.outgoing->order);
+  baked.outgoing->maps.clear();
+  for (const LinearMaterial& m : materials.materials) baked.outgoing->maps.push_back(make_response(m, basis, MatrixOptions{}.grid, MatrixOptions{}.response_samples));
+  baked.outgoing->map_of = materials.of_receiver;
+  return {};
+}
 
 int run_render(Context& context, const RenderCommand& o) {
   if (auto ok = check_output(o.view.output, {"png", "exr"}); !ok) return fail(ok.error());
@@ -28,16 +48,26 @@ int run_render(Context& context, const RenderCommand& o) {
   if (!rotation) return fail(rotation.error());
   auto baked = load_baked(o.baked);
   if (!baked) return fail(baked.error());
+  if (o.new_brdf)
+    if (auto ok = change_materials(*baked, o.brdf, o.baked); !ok) return fail(ok.error());
   auto view = make_view(o.view, baked->scene);
   if (!view) return fail(view.error());
-  auto env = load_light(o.light);
+  const LightBasis& basis = baked->transfer.light;
+  if (o.light.env.empty() && basis.order > 0) return fail({"--env", "is needed: an environment to light the scene by"});
+  Result<Environment> env = Environment{};
+  if (!o.light.env.empty()) env = load_light(o.light);
   if (!env) return fail(env.error());
 
-  // light: projected once, turned and windowed as coefficients.
-  const int order = o.light_order ? std::min(o.light_order, baked->transfer.light.order) : baked->transfer.light.order;
-  std::vector<Vec3> light = rotate_sh(make_sh_rotation(order, *rotation), project_environment(*env, order));
-  const std::vector<float> window = apply_sh_window(o.window, light);
-  light.resize(baked->transfer.columns(), Vec3(0.0f));
+  // light: projected once, turned and windowed as coefficients. Light that was fixed in the bake is on.
+  const int order = o.light_order ? std::min(o.light_order, basis.order) : basis.order;
+  std::vector<Vec3> light;
+  std::vector<float> window;
+  if (order > 0) {
+    light = rotate_sh(make_sh_rotation(order, *rotation), project_environment(*env, order));
+    window = apply_sh_window(o.window, light);
+  }
+  light.resize(basis.count(), Vec3(0.0f));
+  std::fill_n(light.end() - ptrdiff_t(basis.groups.size()), basis.groups.size(), Vec3(1.0f));
 
   // T . light
   Relit relit;
@@ -51,7 +81,7 @@ int run_render(Context& context, const RenderCommand& o) {
   const CornerReceivers corners = corner_receivers(baked->scene, baked->front, baked->back);
   RenderOptions options{view->width, view->height, o.samples, nullptr, !o.no_albedo, baked->outgoing ? &*baked->outgoing : nullptr};
   Environment turned;
-  if (o.view.background == "env") {
+  if (o.view.background == "env" && !o.light.env.empty()) {
     turned = o.light.rotate.empty() ? std::move(*env) : rotated(*env, *rotation);
     options.background = &turned;
   }
@@ -73,14 +103,15 @@ void add_render(CLI::App& app, Run& run) {
   auto o = std::make_shared<RenderCommand>();
   CLI::App* c = app.add_subcommand("render", "Relight a baked scene and draw it");
   c->add_option("baked", o->baked, "Baked file, from `lambent bake`")->required();
-  o->light.add_to(*c);
+  o->light.add_to(*c, false);
   o->view.add_to(*c);
   c->add_option("--window", o->window, "Against ringing: none, hann, lanczos, or auto (as weak as keeps open surfaces from going dark)")
       ->transform(CLI::CheckedTransformer(window_names).description("{none,hann,lanczos,auto}"));
   c->add_option("--light-order", o->light_order, "Use only this many bands of the baked ones")->check(CLI::Range(1, max_sh_order));
   c->add_option("--spp", o->samples, "Rays a pixel")->check(CLI::Range(1, 4096))->capture_default_str();
   c->add_flag("--no-albedo", o->no_albedo, "Draw everything as if it were white");
-  c->callback([o, &run] { run = [o](Context& context) { return run_render(context, *o); }; });
+  auto* brdf = o->brdf.add_to(*c);
+  c->callback([o, brdf, &run] { o->new_brdf = brdf->count() > 0; run = [o](Context& context) { return run_render(context, *o); }; });
 }
 
 }  // namespace lambent::tool
