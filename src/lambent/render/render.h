@@ -7,6 +7,7 @@
 #include <lambent/receivers/receivers.h>
 #include <lambent/relight/relight.h>
 #include <lambent/trace/tracer.h>
+#include <lambent/transfer/directional.h>
 
 namespace lambent {
 
@@ -15,10 +16,12 @@ struct RenderOptions {
   int samples = 16;               // rays a pixel, [1, 4096], box filter
   const Environment* background = nullptr;  // null: black, and the image has alpha (coverage)
   bool albedo = true;             // false: as if everything were white
+  DirectionalKind directional = DirectionalKind::none;  // what relit's rows are; shaded with the interpolated normal
+  std::vector<Vec3> emission;     // radiance of each material's surfaces as lamps that are seen; empty: none are
 };
 
 // One-sided triangles are absent from behind, as in any glTF viewer. Errors: cancelled.
-Result<Image> render(const Scene& scene, const Tracer& tracer, const CornerReceivers& corners, const Relit& relit,
+Result<Image> render(const Scene& scene, const Tracer& tracer, const SpatialBasis& basis, const Relit& relit,
                      const Camera& camera, const RenderOptions& options, Progress* progress = nullptr);
 
 }  // namespace lambent
