@@ -1,3 +1,4 @@
+#include "bake_lightmap.h"
 #include "commands.h"
 #include "options.h"
 
@@ -14,13 +15,27 @@ namespace {
 struct BakeCommand {
   SceneOptions scene;
   BakeOptions bake;
-  std::string output, shadows = "on", precision = "half";
+  std::string output, shadows = "on", precision = "half", transfer = "diffuse", bounces = "3";
+  ReceiverFlags receivers;
+  LightmapFlags lightmap;
+  bool order_given = false;
 };
 
 using Clock = std::chrono::steady_clock;
 double seconds_since(Clock::time_point start) { return std::chrono::duration<double>(Clock::now() - start).count(); }
 
 int run_bake(Context& context, BakeCommand o) {
+  auto bounces = parse_bounces(o.bounces);
+  if (!bounces) return fail(bounces.error());
+  if (o.transfer == "lightmap") {
+    // Harmonics of a distant light join the lamps only where they are asked for: then it is a PRT lightmap.
+    return run_lightmap(context, {o.scene, o.receivers, o.lightmap,
+                                  {.order = o.order_given ? o.bake.order : 0, .samples = o.bake.samples, .bounces = bounces->count,
+                                   .converge = bounces->converge, .memory = o.bake.memory, .seed = o.bake.seed},
+                                  o.output, o.precision});
+  }
+  if (bounces->converge > 0) return fail({"--bounces", "converge:EPS is for --transfer lightmap"});
+  o.bake.bounces = bounces->count;
   o.bake.shadows = o.shadows == "on";
   if (!o.bake.shadows) o.bake.bounces = 0;
   o.bake.precision = o.precision == "half" ? Precision::half : Precision::single;
@@ -29,12 +44,14 @@ int run_bake(Context& context, BakeCommand o) {
   auto start = Clock::now();
   auto scene = load_prepared_scene(o.scene);
   if (!scene) return fail(scene.error());
+  auto placed = place_receivers(*scene, o.receivers, "vertices");
+  if (!placed) return fail(placed.error());
+  const Receivers& receivers = placed->receivers;
   const double load_seconds = seconds_since(start);
 
   start = Clock::now();
   auto tracer = Tracer::build(*scene);
   if (!tracer) return fail(tracer.error());
-  const Receivers receivers = make_vertex_receivers(*scene);
   const double build_seconds = seconds_since(start);
 
   BakeReport report;
@@ -97,16 +114,22 @@ void add_bake(CLI::App& app, Run& run) {
   CLI::App* c = app.add_subcommand("bake", "Bake a scene's diffuse light transport");
   o->scene.add_to(*c);
   c->add_option("-o,--output", o->output, "Baked file to write (.glb)")->required();
-  c->add_option("--order", o->bake.order, "Bands of the lighting's spherical harmonics")->check(CLI::Range(1, max_sh_order))->capture_default_str();
+  c->add_option("--transfer", o->transfer, "What is stored: diffuse, transfer of distant light; lightmap, the light of the scene's own lamps")
+      ->check(CLI::IsMember({"diffuse", "lightmap"}))->capture_default_str();
+  auto* order = c->add_option("--order", o->bake.order, "Bands of the lighting's spherical harmonics")->check(CLI::Range(1, max_sh_order))->capture_default_str();
   c->add_option("--samples", o->bake.samples, "Rays a receiver")->check(CLI::Range(1, 1 << 20))->capture_default_str();
-  auto* bounces = c->add_option("--bounces", o->bake.bounces, "Reflections between surfaces")->check(CLI::Range(0, 64))->capture_default_str();
+  auto* bounces = c->add_option("--bounces", o->bounces, "Reflections between surfaces, 0 to 64; lightmaps also converge:EPS, as many as leave that residual")
+                      ->capture_default_str();
   c->add_option("--shadows", o->shadows, "off: open light everywhere, no shadows and no bounces")->check(CLI::IsMember({"on", "off"}))->capture_default_str();
   c->add_option("--memory", o->bake.memory, "Working memory beyond scene and result; e.g. 500MB, 2GiB")
       ->transform(CLI::AsSizeValue(false))->default_str("4GiB");
   c->add_option("--seed", o->bake.seed, "Of the ray directions")->capture_default_str();
   c->add_option("--precision", o->precision, "Of the stored transfer")->check(CLI::IsMember({"half", "single"}))->capture_default_str();
-  c->callback([o, bounces, &run] {
-    if (o->shadows == "off" && bounces->count() && o->bake.bounces > 0)
+  o->receivers.add_to(*c);
+  o->lightmap.add_to(*c);
+  c->callback([o, bounces, order, &run] {
+    o->order_given = order->count() > 0;
+    if (o->shadows == "off" && bounces->count() && o->bounces != "0")
       throw CLI::ValidationError("--shadows off has no bounces: leave --bounces out, or set it to 0");
     run = [o](Context& context) { return run_bake(context, *o); };
   });
