@@ -55,6 +55,61 @@ expect 0 "open.glb" bake corner.obj --shadows off -o open.glb
 for thread_count in 1 2; do "$tool" bake corner.obj --max-edge 0.3 --samples 64 --threads $thread_count -o threads_$thread_count.glb >/dev/null 2>&1; done
 cmp -s threads_1.glb threads_2.glb && ok || bad "1 and 2 threads give different files"
 
+# Lightmaps: a box with a glowing ceiling, and a sky.
+cat >box.mtl <<'M'
+newmtl wall
+Kd 0.7 0.6 0.5
+newmtl lamp
+Kd 0.5 0.5 0.5
+Ke 4 3 2
+M
+cat >box.obj <<'O'
+mtllib box.mtl
+v 0 0 0
+v 2 0 0
+v 2 0 2
+v 0 0 2
+v 0 1 0
+v 2 1 0
+v 0.5 0.99 0.5
+v 1.5 0.99 0.5
+v 1.5 0.99 1.5
+v 0.5 0.99 1.5
+usemtl wall
+f 4 3 2 1
+f 1 2 6 5
+usemtl lamp
+f 7 8 9 10
+O
+view="--camera 3,0.8,4,1,0.4,0.7,40 --size 48x32 --background none"
+expect 0 'charts' bake box.obj --transfer lightmap --sky uniform:0.3,0.4,0.6 --light-groups --texels-per-unit 20 --samples 512 --bounces 2 -o map.glb
+for picture in map.lamp.exr map.sky.exr; do [ -s $picture ] && ok || bad "$picture is missing"; done
+expect 0 'relit' render map.glb $view --spp 256 -o map_lit.exr
+expect 0 'paths' reference box.obj --lamps --env uniform:0.3,0.4,0.6 --bounces 2 --spp 256 $view -o map_truth.exr
+expect 0 '"psnr"' compare map_lit.exr map_truth.exr --json
+psnr=$(sed -n 's/.*"psnr": \([0-9]*\).*/\1/p' stdout)
+[ "${psnr:-0}" -ge 35 ] && ok || bad "lightmapped and path-traced boxes differ: PSNR ${psnr:-none}"
+expect 0 'relit' render map.glb $view --lamp lamp=0.1,0.2,0 --lamp sky=0,0,1 -o dimmed.exr
+expect 2 'no group' render map.glb $view --lamp chandelier=1,1,1 -o x.png
+expect 0 'applications' bake box.obj --transfer lightmap --atlas 64x48 --samples 64 --bounces converge:1e-3 --solver southwell --direct separate --json -o map2.glb
+for picture in map2.direct.exr map2.indirect.exr; do [ -s $picture ] && ok || bad "$picture is missing"; done
+expect 0 'lamps' bake box.obj --transfer lightmap --receivers patches --samples 64 -o patches.glb
+expect 0 'relit' render patches.glb $view -o patches.exr
+expect 0 'lamps' bake box.obj --transfer lightmap --directional hl2 --atlas 64x64 --samples 64 -o hl2.glb
+expect 0 'relit' render hl2.glb $view -o hl2.exr
+expect 0 'receivers' bake box.obj --receivers texels --atlas 64x64 --order 3 --samples 64 -o prt.glb
+expect 0 'relit' render prt.glb --env sky:elevation=30 $view -o prt.exr
+for thread_count in 1 2; do "$tool" bake box.obj --transfer lightmap --atlas 64x64 --samples 64 --threads $thread_count -o map_$thread_count.glb >/dev/null 2>&1; done
+cmp -s map_1.glb map_2.glb && ok || bad "1 and 2 threads give different lightmaps"
+expect 1 'nothing gives light' bake corner.obj --transfer lightmap -o x.glb
+expect 2 'need at least' bake box.obj --transfer lightmap --atlas 4x4 -o x.glb
+expect 2 'limit' bake box.obj --transfer lightmap --texels-per-unit 1e9 -o x.glb
+expect 2 'receivers texels' bake box.obj --transfer lightmap --receivers vertices --atlas 64x64 -o x.glb
+expect 2 'bounces' bake box.obj --transfer lightmap --bounces converge:nan -o x.glb
+expect 2 'no material' bake box.obj --transfer lightmap --emit sofa=1,1,1 -o x.glb
+expect 2 'env' render prt.glb -o x.png
+expect 2 'lamps' reference box.obj -o x.png
+
 # Usage: exit 2.
 expect 2 'order' bake corner.obj --order 0 -o x.glb
 expect 2 'order' bake corner.obj --order 1000 -o x.glb

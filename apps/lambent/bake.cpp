@@ -1,3 +1,4 @@
+#include "bake_lightmap.h"
 #include "commands.h"
 #include "options.h"
 
@@ -19,7 +20,10 @@ struct BakeCommand {
   BakeOptions bake;
   MatrixOptions matrix;
   BrdfOptions brdf;
-  std::string transfer = "diffuse", outgoing = "svd:6", fix_light, output, shadows = "on", precision = "half";
+  std::string transfer = "diffuse", outgoing = "svd:6", fix_light, output, shadows = "on", precision = "half", bounces = "3";
+  ReceiverFlags receivers;
+  LightmapFlags lightmap;
+  bool order_given = false;
 };
 
 // KIND or KIND:N, where N is the number of rows (svd) or bands (sh, hemisphere, hsh).
@@ -43,6 +47,17 @@ using Clock = std::chrono::steady_clock;
 double seconds_since(Clock::time_point start) { return std::chrono::duration<double>(Clock::now() - start).count(); }
 
 int run_bake(Context& context, BakeCommand o) {
+  auto bounces = parse_bounces(o.bounces);
+  if (!bounces) return fail(bounces.error());
+  if (o.transfer == "lightmap") {
+    // Harmonics of a distant light join the lamps only where they are asked for: then it is a PRT lightmap.
+    return run_lightmap(context, {o.scene, o.receivers, o.lightmap,
+                                  {.order = o.order_given ? o.bake.order : 0, .samples = o.bake.samples, .bounces = bounces->count,
+                                   .converge = bounces->converge, .memory = o.bake.memory, .seed = o.bake.seed},
+                                  o.output, o.precision});
+  }
+  if (bounces->converge > 0) return fail({"--bounces", "converge:EPS is for --transfer lightmap"});
+  o.bake.bounces = bounces->count;
   o.bake.shadows = o.shadows == "on";
   if (!o.bake.shadows) o.bake.bounces = 0;
   o.bake.precision = o.precision == "half" ? Precision::half : Precision::single;
@@ -56,12 +71,15 @@ int run_bake(Context& context, BakeCommand o) {
   auto start = Clock::now();
   auto scene = load_prepared_scene(o.scene);
   if (!scene) return fail(scene.error());
+  auto placed = place_receivers(*scene, o.receivers, "vertices");
+  if (!placed) return fail(placed.error());
+  const Receivers& receivers = placed->receivers;
+  if (is_matrix && !std::holds_alternative<CornerReceivers>(receivers.basis)) return fail({"--receivers", "--transfer matrix is baked at vertices"});
   const double load_seconds = seconds_since(start);
 
   start = Clock::now();
   auto tracer = Tracer::build(*scene);
   if (!tracer) return fail(tracer.error());
-  const Receivers receivers = make_vertex_receivers(*scene);
   const double build_seconds = seconds_since(start);
 
   BakeReport report;
@@ -98,7 +116,7 @@ int run_bake(Context& context, BakeCommand o) {
   if (report.error >= 0) provenance["report"]["error"] = report.error;
 
   start = Clock::now();
-  if (auto ok = save_baked(o.output, *scene, receivers, *transfer, provenance.dump(), outgoing ? &*outgoing : nullptr); !ok) return fail(ok.error());
+  if (auto ok = save_baked(o.output, *scene, receivers, *transfer, provenance.dump(), {.outgoing = outgoing ? &*outgoing : nullptr}); !ok) return fail(ok.error());
   const double save_seconds = seconds_since(start);
 
   const double bytes_each = double(report.bytes) / double(report.receivers);
@@ -145,9 +163,10 @@ void add_bake(CLI::App& app, Run& run) {
   CLI::App* c = app.add_subcommand("bake", "Bake a scene's light transport");
   o->scene.add_to(*c);
   c->add_option("-o,--output", o->output, "Baked file to write (.glb)")->required();
-  c->add_option("--order", o->bake.order, "Bands of the lighting's spherical harmonics")->check(CLI::Range(1, max_sh_order))->capture_default_str();
-  c->add_option("--transfer", o->transfer, "diffuse: a vector a receiver; matrix: incident light in every direction, for glossy materials")
-      ->check(CLI::IsMember({"diffuse", "matrix"}))->capture_default_str();
+  c->add_option("--transfer", o->transfer, "What is stored: diffuse, a vector a receiver for distant light; matrix, incident light in every direction, "
+                                           "for glossy materials; lightmap, the light of the scene's own lamps")
+      ->check(CLI::IsMember({"diffuse", "matrix", "lightmap"}))->capture_default_str();
+  auto* order = c->add_option("--order", o->bake.order, "Bands of the lighting's spherical harmonics")->check(CLI::Range(1, max_sh_order))->capture_default_str();
   auto* incident = c->add_option("--incident-order", o->matrix.incident_order, "matrix: bands of incident light")
                        ->check(CLI::Range(1, max_incident_order))->capture_default_str();
   auto* last = c->add_option("--outgoing", o->outgoing, "matrix: rows for the last reflection: map, svd:ROWS, sh:BANDS, hemisphere:BANDS, hsh:BANDS")
@@ -156,14 +175,18 @@ void add_bake(CLI::App& app, Run& run) {
   auto* brdf = o->brdf.add_to(*c);
   c->add_option("--fix-light", o->fix_light, "Bake this environment in, so that only its brightness is left: a surface light field");
   c->add_option("--samples", o->bake.samples, "Rays a receiver")->check(CLI::Range(1, 1 << 20))->capture_default_str();
-  auto* bounces = c->add_option("--bounces", o->bake.bounces, "Reflections between surfaces")->check(CLI::Range(0, 64))->capture_default_str();
+  auto* bounces = c->add_option("--bounces", o->bounces, "Reflections between surfaces, 0 to 64; lightmaps also converge:EPS, as many as leave that residual")
+                      ->capture_default_str();
   c->add_option("--shadows", o->shadows, "off: open light everywhere, no shadows and no bounces")->check(CLI::IsMember({"on", "off"}))->capture_default_str();
   c->add_option("--memory", o->bake.memory, "Working memory beyond scene and result; e.g. 500MB, 2GiB")
       ->transform(CLI::AsSizeValue(false))->default_str("4GiB");
   c->add_option("--seed", o->bake.seed, "Of the ray directions")->capture_default_str();
   c->add_option("--precision", o->precision, "Of the stored transfer")->check(CLI::IsMember({"half", "single"}))->capture_default_str();
-  c->callback([o, bounces, incident, last, brdf, &run] {
-    if (o->shadows == "off" && bounces->count() && o->bake.bounces > 0)
+  o->receivers.add_to(*c);
+  o->lightmap.add_to(*c);
+  c->callback([o, bounces, order, incident, last, brdf, &run] {
+    o->order_given = order->count() > 0;
+    if (o->shadows == "off" && bounces->count() && o->bounces != "0")
       throw CLI::ValidationError("--shadows off has no bounces: leave --bounces out, or set it to 0");
     for (const CLI::Option* option : {incident, last, brdf})
       if (option->count() && o->transfer != "matrix") throw CLI::ValidationError(option->get_name() + " needs --transfer matrix");

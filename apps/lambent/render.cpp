@@ -9,7 +9,9 @@
 
 #include <fmt/format.h>
 
+#include <algorithm>
 #include <chrono>
+#include <optional>
 
 namespace lambent::tool {
 namespace {
@@ -23,6 +25,7 @@ struct RenderCommand {
   ShWindow window = ShWindow::none;
   int light_order = 0, samples = 16;
   bool no_albedo = false;
+  std::vector<std::string> lamps;  // NAME=R,G,B
 };
 
 // Other materials for a bake that kept incident light: its last reflection is made anew.
@@ -53,12 +56,15 @@ int run_render(Context& context, const RenderCommand& o) {
   auto view = make_view(o.view, baked->scene);
   if (!view) return fail(view.error());
   const LightBasis& basis = baked->transfer.light;
-  if (o.light.env.empty() && basis.order > 0) return fail({"--env", "is needed: an environment to light the scene by"});
-  Result<Environment> env = Environment{};
-  if (!o.light.env.empty()) env = load_light(o.light);
-  if (!env) return fail(env.error());
+  if (o.light.env.empty() && basis.order > 0) return fail({"--env", "is needed: the file is baked for distant light"});
+  std::optional<Environment> env;
+  if (!o.light.env.empty()) {
+    auto loaded = load_light(o.light);
+    if (!loaded) return fail(loaded.error());
+    env = std::move(*loaded);
+  }
 
-  // light: projected once, turned and windowed as coefficients. Light that was fixed in the bake is on.
+  // light: projected once, turned and windowed as coefficients; lobes dark, lamps as they were unless told otherwise.
   const int order = o.light_order ? std::min(o.light_order, basis.order) : basis.order;
   std::vector<Vec3> light;
   std::vector<float> window;
@@ -66,8 +72,17 @@ int run_render(Context& context, const RenderCommand& o) {
     light = rotate_sh(make_sh_rotation(order, *rotation), project_environment(*env, order));
     window = apply_sh_window(o.window, light);
   }
-  light.resize(basis.count(), Vec3(0.0f));
-  std::fill_n(light.end() - ptrdiff_t(basis.groups.size()), basis.groups.size(), Vec3(1.0f));
+  light.resize(basis.count() - basis.groups.size(), Vec3(0.0f));
+  std::vector<Vec3> lamps(basis.groups.size(), Vec3(1.0f));
+  for (const std::string& text : o.lamps) {
+    auto lamp = parse_named_color(text, "--lamp");
+    if (!lamp) return fail(lamp.error());
+    const auto group = std::find(basis.groups.begin(), basis.groups.end(), lamp->name);
+    if (group == basis.groups.end())
+      return fail({"--lamp", "the file has no group \"" + lamp->name + "\"; it has " + (basis.groups.empty() ? "none" : fmt::format("{}", fmt::join(basis.groups, ", ")))});
+    lamps[size_t(group - basis.groups.begin())] = lamp->color;
+  }
+  light.insert(light.end(), lamps.begin(), lamps.end());
 
   // T . light
   Relit relit;
@@ -78,14 +93,20 @@ int run_render(Context& context, const RenderCommand& o) {
   // O(view)
   auto tracer = Tracer::build(baked->scene);
   if (!tracer) return fail(tracer.error());
-  const CornerReceivers corners = corner_receivers(baked->scene, baked->front, baked->back);
-  RenderOptions options{view->width, view->height, o.samples, nullptr, !o.no_albedo, baked->outgoing ? &*baked->outgoing : nullptr};
+  RenderOptions options{view->width, view->height, o.samples, nullptr, !o.no_albedo, baked->outgoing ? &*baked->outgoing : nullptr, baked->directional};
+  if (!basis.groups.empty()) {
+    const bool one = basis.groups.size() == 1 && basis.groups[0] == std::string("all");
+    for (const Material& m : baked->scene.materials) {
+      const auto group = std::find(basis.groups.begin(), basis.groups.end(), m.name);
+      options.emission.push_back(m.emissive * (one ? lamps[0] : group == basis.groups.end() ? Vec3(0) : lamps[size_t(group - basis.groups.begin())]));
+    }
+  }
   Environment turned;
-  if (o.view.background == "env" && !o.light.env.empty()) {
+  if (o.view.background == "env" && env) {
     turned = o.light.rotate.empty() ? std::move(*env) : rotated(*env, *rotation);
     options.background = &turned;
   }
-  auto image = render(baked->scene, *tracer, corners, relit, view->camera, options, &context.progress);
+  auto image = render(baked->scene, *tracer, baked->basis, relit, view->camera, options, &context.progress);
   if (!image) return fail(image.error());
   if (auto ok = save_image(o.view.output, *image, o.view.exposure); !ok) return fail(ok.error());
 
@@ -109,6 +130,7 @@ void add_render(CLI::App& app, Run& run) {
       ->transform(CLI::CheckedTransformer(window_names).description("{none,hann,lanczos,auto}"));
   c->add_option("--light-order", o->light_order, "Use only this many bands of the baked ones")->check(CLI::Range(1, max_sh_order));
   c->add_option("--spp", o->samples, "Rays a pixel")->check(CLI::Range(1, 4096))->capture_default_str();
+  c->add_option("--lamp", o->lamps, "NAME=R,G,B: scale a group of lamps by this colour (files baked with --light-groups)");
   c->add_flag("--no-albedo", o->no_albedo, "Draw everything as if it were white");
   auto* brdf = o->brdf.add_to(*c);
   c->callback([o, brdf, &run] { o->new_brdf = brdf->count() > 0; run = [o](Context& context) { return run_render(context, *o); }; });

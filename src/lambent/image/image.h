@@ -51,6 +51,9 @@ Result<void> check_image_size(uint64_t width, uint64_t height, size_t bytes, con
 Result<Image> load_exr(std::span<const uint8_t> bytes, const std::string& path);
 Result<std::vector<uint8_t>> encode_exr(const Image& image, const std::string& path);
 
+// The bytes of a .png as save_image writes it; `path` names it in errors.
+Result<std::vector<uint8_t>> encode_png(const Image& image, float exposure, const std::string& path);
+
 // Matrix from linear RGB of other primaries and white (CIE x, y) to linear Rec. 709: through XYZ, with Bradford adaptation of
 // that white to D65. Errors: a y of 0, collinear primaries.
 Result<Mat3> rec709_from_primaries(Vec2 red, Vec2 green, Vec2 blue, Vec2 white);
