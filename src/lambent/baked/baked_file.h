@@ -4,6 +4,7 @@
 #include <lambent/core/file.h>
 #include <lambent/receivers/receivers.h>
 #include <lambent/scene/scene.h>
+#include <lambent/transfer/lattice.h>
 #include <lambent/transfer/outgoing.h>
 #include <lambent/transfer/transfer.h>
 
@@ -19,13 +20,14 @@ struct Baked {
   std::vector<uint32_t> front, back;  // receiver of each scene vertex, by side, as in Receivers
   Transfer transfer;                  // read in place: its data lies in the mapped file
   std::optional<Outgoing> outgoing;   // the last reflection of a transfer matrix; none: diffuse transfer
+  std::optional<LatticeTransfer> lattice;  // light in free space, for the same light; its data lies in the mapped file too
   std::string provenance;             // JSON text: inputs and their hashes, options, version, what the bake reported
 };
 
 // Errors: the disk's; more than 4 GiB, which a GLB cannot hold.
-// `outgoing` belongs to a transfer matrix; null for diffuse transfer.
+// `outgoing` belongs to a transfer matrix; null for diffuse transfer. `lattice`, if any, is for the same light as the transfer.
 Result<void> save_baked(const std::string& path, const Scene& scene, const Receivers& receivers, const Transfer& transfer,
-                        const std::string& provenance, const Outgoing* outgoing = nullptr);
+                        const std::string& provenance, const Outgoing* outgoing = nullptr, const LatticeTransfer* lattice = nullptr);
 
 // Errors: not a baked file, another version, anything that does not fit.
 Result<Baked> load_baked(const std::string& path);
