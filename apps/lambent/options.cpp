@@ -148,7 +148,7 @@ Result<Mat3> light_rotation(const LightOptions& options) {
 
 CLI::Option* BrdfOptions::add_to(CLI::App& command) {
   return command.add_option("--brdf", brdf, std::string("How surfaces reflect: diffuse (by base colour), materials (glTF's metallic-roughness), "
-                                                 "or one model for all: ") + brdf_syntax)->capture_default_str();
+                                                        "or one model for all: ") + brdf_syntax)->capture_default_str();
 }
 
 Result<Reflection> load_reflection(const BrdfOptions& options) {

@@ -170,8 +170,9 @@ struct GatherScratch {
 void DeleteScratch::operator()(GatherScratch* scratch) const { delete scratch; }
 ScratchPointer make_gather_scratch(const GatherSetup& setup) { return ScratchPointer(new GatherScratch(setup.sets, setup.receivers.count())); }
 
-GatherSetup make_gather_setup(const Scene& scene, const Tracer& tracer, const Receivers& receivers, int order, int samples, uint32_t seed) {
-  GatherSetup setup{scene, tracer, receivers, make_direction_sets(order, samples, set_count, seed), seed, 1, 1.0f, {}, {}};
+GatherSetup make_gather_setup(const Scene& scene, const Tracer& tracer, const Receivers& receivers, int order, int samples, uint32_t seed,
+                              DirectionWarp warp) {
+  GatherSetup setup{scene, tracer, receivers, make_direction_sets(order, samples, set_count, seed, warp), seed, 1, 1.0f, {}, {}};
   // Weights are sums over rays: halves hold 65504.
   setup.weight_unit = std::min(1.0f, 16384.0f / float(samples));
   bool coloured = false;

@@ -50,7 +50,8 @@ struct GatherSetup {
   float row_scale(size_t rays) const { return 1.0f / (weight_unit * float(rays)); }
 };
 
-GatherSetup make_gather_setup(const Scene& scene, const Tracer& tracer, const Receivers& receivers, int order, int samples, uint32_t seed);
+GatherSetup make_gather_setup(const Scene& scene, const Tracer& tracer, const Receivers& receivers, int order, int samples, uint32_t seed,
+                              DirectionWarp warp = square_to_cosine_hemisphere);
 
 // What tracing receivers [first, first + count) yields beside the hit rows. Spans are indexed from `first`.
 struct GatherSky {

@@ -172,6 +172,60 @@ Result<Outgoing> read_outgoing(const GltfChunks& chunks, const json& object, con
   return o;
 }
 
+// Precision, channels and the bulk data of a transfer whose light, rows and receivers are set.
+Result<void> read_transfer_data(const GltfChunks& chunks, const MappedFile& file, const json& object, Transfer& t, const std::string& where) {
+  const auto precision = object.find("precision");
+  const bool half = precision != object.end() && *precision == "half";
+  if (!half && (precision == object.end() || *precision != "single")) return Error{where, "\"precision\" must be half or single"};
+  auto channels = read_count(object, "channels", 3, where), view = read_count(object, "bufferView", 0x7fffffff, where);
+  for (const auto* count : {&channels, &view})
+    if (!*count) return count->error();
+  if (*channels != 1 && *channels != 3) return Error{where, "\"channels\" is out of range"};
+  t.channels = int(*channels), t.precision = half ? Precision::half : Precision::single;
+  auto data = view_bytes(chunks, *view, where);
+  if (!data) return data.error();
+  if (data->size() != t.bytes())
+    return Error{where, "the transfer holds " + std::to_string(data->size()) + " bytes where its header makes " + std::to_string(t.bytes())};
+  if (reinterpret_cast<uintptr_t>(data->data()) % t.value_bytes()) return Error{where, "the transfer is not aligned"};
+  t.data = *data;
+  t.storage = std::make_shared<MappedFile>(file);
+  return {};
+}
+
+Result<LatticeTransfer> read_lattice(const GltfChunks& chunks, const MappedFile& file, const json& object, const LightBasis& light, const std::string& where) {
+  if (!object.is_object()) return Error{where, "is not an object"};
+  LatticeTransfer l;
+  for (const char* key : {"min", "max"}) {
+    const auto corner = object.find(key);
+    if (corner == object.end() || !corner->is_array() || corner->size() != 3) return Error{where, std::string("\"") + key + "\" is not three numbers"};
+    for (size_t k = 0; k < 3; ++k) {
+      const json& x = (*corner)[k];
+      if (!x.is_number() || !(std::abs(x.get<double>()) <= 1e9)) return Error{where, std::string("\"") + key + "\" is not three numbers within 1e9"};
+      (key[1] == 'i' ? l.lattice.min : l.lattice.max)[int(k)] = x.get<float>();
+    }
+  }
+  for (int k = 0; k < 3; ++k)
+    if (l.lattice.min[k] > l.lattice.max[k]) return Error{where, "its box is empty"};
+  const auto points = object.find("points");
+  if (points == object.end() || !points->is_array() || points->size() != 3) return Error{where, "\"points\" is not three numbers"};
+  for (size_t k = 0; k < 3; ++k) {
+    const json& n = (*points)[k];
+    if (!n.is_number_unsigned() || n.get<uint64_t>() < 1 || n.get<uint64_t>() > uint64_t(max_lattice_points))
+      return Error{where, "an axis must have from 1 to " + std::to_string(max_lattice_points) + " points"};
+    (k == 0 ? l.lattice.nx : k == 1 ? l.lattice.ny : l.lattice.nz) = n.get<int>();
+  }
+  auto order = read_count(object, "order", size_t(max_sh_order), where);
+  if (!order) return order.error();
+  if (*order < 1) return Error{where, "its order is 0"};
+  l.order = int(*order);
+  l.transfer.light = light, l.transfer.rows = sh_count(l.order), l.transfer.receivers = l.lattice.count();
+  if (auto ok = read_transfer_data(chunks, file, object, l.transfer, where); !ok) return ok.error();
+  auto valid = read_values<uint8_t>(chunks, object, "valid", l.lattice.count(), where);
+  if (!valid) return valid.error();
+  l.valid = std::move(*valid);
+  return l;
+}
+
 Result<std::vector<uint32_t>> read_receivers(const GltfChunks& chunks, const json& object, const char* key, size_t count, size_t receivers,
                                              const std::string& where) {
   auto map = read_values<uint32_t>(chunks, object, key, count, where);
@@ -294,6 +348,8 @@ Result<void> save_baked(const std::string& path, const Scene& scene, const Recei
                         const std::string& provenance, const BakedExtras& extras) {
   const Outgoing* outgoing = extras.outgoing;
   const DirectionalKind directional = extras.directional;
+  const LatticeTransfer* lattice = extras.lattice;
+  LAMBENT_CHECK(!lattice || (lattice->transfer.columns() == transfer.columns() && lattice->valid.size() == lattice->lattice.count()));
   LAMBENT_CHECK(transfer.rows == (outgoing ? outgoing->rows() : directional_rows(directional)));
   const auto front = side_bytes(scene, receivers, false), back = side_bytes(scene, receivers, true);
   const auto* texels = std::get_if<TexelReceivers>(&receivers.basis);
@@ -308,6 +364,8 @@ Result<void> save_baked(const std::string& path, const Scene& scene, const Recei
     blobs.push_back({bytes_of(std::span<const Vec3>(last.frames)), 4});
     if (!last.maps.empty()) blobs.push_back({bytes_of(std::span<const uint16_t>(last.maps)), 4}), blobs.push_back({bytes_of(std::span<const uint16_t>(last.map_of)), 4});
   }
+  const size_t lattice_view = blobs.size();
+  if (lattice) blobs.push_back({lattice->transfer.data, 64}), blobs.push_back({lattice->valid, 4});
   LookWriter look_writer(scene, receivers, extras.look);
   look_writer.add_blobs(blobs);
   return save_glb(path, scene, blobs, [&](json& document, const GltfPlaces& places) {
@@ -330,6 +388,18 @@ Result<void> save_baked(const std::string& path, const Scene& scene, const Recei
       } else {
         o["grid"] = outgoing->maps[0].grid, o["mapCount"] = outgoing->maps.size(), o["maps"] = first + 1, o["mapOf"] = first + 2;
       }
+    }
+    if (lattice) {
+      const Lattice& l = lattice->lattice;
+      const int first = places.first_view + int(lattice_view);
+      extension["lattice"] = {{"min", {l.min.x, l.min.y, l.min.z}},
+                              {"max", {l.max.x, l.max.y, l.max.z}},
+                              {"points", {l.nx, l.ny, l.nz}},
+                              {"order", lattice->order},
+                              {"channels", lattice->transfer.channels},
+                              {"precision", lattice->transfer.precision == Precision::half ? "half" : "single"},
+                              {"bufferView", first},
+                              {"valid", first + 1}};
     }
     json parts = json::array();
     for (size_t i = 0; i < scene.parts.size(); ++i) {
@@ -382,17 +452,11 @@ Result<Baked> load_baked(const MappedFile& file, const std::string& path) {
   auto text = [&](const char* key) { return t->contains(key) && (*t)[key].is_string() ? (*t)[key].get<std::string>() : ""; };
   const bool is_matrix = text("kind") == "matrix";
   if (!is_matrix && text("kind") != "diffuse") return Error{where, "transfer of kind \"" + text("kind") + "\" is not known to this program"};
-  if (text("precision") != "half" && text("precision") != "single") return Error{where, "\"precision\" must be half or single"};
   auto light = read_light(*t, where);
   if (!light) return light.error();
-  auto channels = read_count(*t, "channels", 3, where);
   auto receivers = read_count(*t, "receivers", 0xfffffffe, where);
-  auto view = read_count(*t, "bufferView", 0x7fffffff, where);
-  for (const auto* count : {&channels, &receivers, &view})
-    if (!*count) return count->error();
-  if (*channels != 1 && *channels != 3) return Error{where, "\"channels\" is out of range"};
-  baked.transfer.light = std::move(*light), baked.transfer.channels = int(*channels), baked.transfer.receivers = *receivers;
-  baked.transfer.precision = text("precision") == "half" ? Precision::half : Precision::single;
+  if (!receivers) return receivers.error();
+  baked.transfer.light = std::move(*light), baked.transfer.receivers = *receivers;
   if (t->contains("directional")) {
     const auto kind = directional_kind(text("directional"));
     if (!kind) return Error{where, "directional light \"" + text("directional") + "\" is not known to this program"};
@@ -406,19 +470,17 @@ Result<Baked> load_baked(const MappedFile& file, const std::string& path) {
   } else {
     baked.transfer.rows = directional_rows(baked.directional);
   }
-  auto data = view_bytes(*chunks, *view, where);
-  if (!data) return data.error();
-  if (data->size() != baked.transfer.bytes())
-    return Error{where, "the transfer holds " + std::to_string(data->size()) + " bytes where its header makes " +
-                            std::to_string(baked.transfer.bytes())};
-  if (reinterpret_cast<uintptr_t>(data->data()) % baked.transfer.value_bytes()) return Error{where, "the transfer is not aligned"};
-  baked.transfer.data = *data;
-  baked.transfer.storage = std::make_shared<MappedFile>(file);
+  if (auto ok = read_transfer_data(*chunks, file, *t, baked.transfer, where); !ok) return ok.error();
   if (is_matrix) {
     if (!t->contains("outgoing") || !(*t)["outgoing"].is_object()) return Error{where, "\"outgoing\" is missing"};
     auto outgoing = read_outgoing(*chunks, (*t)["outgoing"], baked.transfer, where + ": outgoing");
     if (!outgoing) return outgoing.error();
     baked.outgoing = std::move(*outgoing);
+  }
+  if (const auto object = extension.find("lattice"); object != extension.end()) {
+    auto lattice = read_lattice(*chunks, file, *object, baked.transfer.light, where + ": lattice");
+    if (!lattice) return lattice.error();
+    baked.lattice = std::move(*lattice);
   }
 
   const std::string folder = std::filesystem::path(path).parent_path().string();

@@ -4,6 +4,7 @@
 #include <lambent/core/file.h>
 #include <lambent/receivers/receivers.h>
 #include <lambent/scene/scene.h>
+#include <lambent/transfer/lattice.h>
 #include <lambent/transfer/outgoing.h>
 #include <lambent/transfer/directional.h>
 #include <lambent/transfer/transfer.h>
@@ -22,6 +23,7 @@ struct Baked {
   Transfer transfer;                  // read in place: its data lies in the mapped file
   std::optional<Outgoing> outgoing;   // the last reflection of a transfer matrix
   DirectionalKind directional = DirectionalKind::none;  // what the rows of a directional lightmap are
+  std::optional<LatticeTransfer> lattice;  // light in free space, for the same light; its data lies in the mapped file too
   std::string provenance;             // JSON text: inputs and their hashes, options, version, what the bake reported
 };
 
@@ -37,6 +39,7 @@ struct BakedExtras {
   const Outgoing* outgoing = nullptr;                   // of a transfer matrix
   DirectionalKind directional = DirectionalKind::none;  // of a directional lightmap
   const ViewerLook* look = nullptr;
+  const LatticeTransfer* lattice = nullptr;             // light in free space, for the same light as the transfer
 };
 
 // With a look, primitives get materials for it, two-sided ones a second primitive for their backs; the scene's own materials stay

@@ -230,6 +230,70 @@ TEST(BakedFile, RefusesSurfacesThatLie) {
   }
 }
 
+LatticeTransfer small_lattice() {
+  LatticeTransfer l{{Vec3(-1, 0, -2), Vec3(1, 2.5f, 3), 3, 1, 2}, 2, {}, {1, 1, 0, 1, 1, 0}};
+  const WritableTransfer w = make_transfer({.order = 3}, 4, 3, 6, Precision::half);
+  Random random(12);
+  std::vector<float> values(w.transfer.receiver_values());
+  for (size_t p = 0; p < 6; ++p) {
+    for (float& v : values) v = random.next();
+    store_receiver(w, p, values);
+  }
+  l.transfer = w.transfer;
+  return l;
+}
+
+TEST(BakedFile, LightInFreeSpaceComesBack) {
+  const TemporaryFile file("lattice.glb"), lying("lattice_lie.glb"), cut("lattice_cut.glb");
+  const Small s = small_bake(1, Precision::single);
+  const LatticeTransfer l = small_lattice();
+  ASSERT_TRUE(save_baked(file.path, s.scene, s.receivers, s.transfer.transfer, "{}", {.lattice = &l}));
+  auto back = load_baked(file.path);
+  ASSERT_TRUE(back) << back.error().text();
+  ASSERT_TRUE(back->lattice);
+  EXPECT_EQ(back->lattice->lattice.min, l.lattice.min);
+  EXPECT_EQ(back->lattice->lattice.max, l.lattice.max);
+  EXPECT_EQ(back->lattice->lattice.count(), 6u);
+  EXPECT_EQ(back->lattice->lattice.nx, 3);
+  EXPECT_EQ(back->lattice->order, 2);
+  EXPECT_EQ(back->lattice->valid, l.valid);
+  EXPECT_EQ(back->lattice->transfer.channels, 3);
+  EXPECT_EQ(back->lattice->transfer.columns(), 9u);
+  EXPECT_TRUE(std::equal(back->lattice->transfer.data.begin(), back->lattice->transfer.data.end(), l.transfer.data.begin(), l.transfer.data.end()));
+  EXPECT_EQ(reinterpret_cast<uintptr_t>(back->lattice->transfer.data.data()) % 64, 0u);
+
+  const std::vector<uint8_t> bytes = *read_file(file.path);
+  const std::string text(bytes.begin(), bytes.end());
+  const size_t begin = text.find("\"lattice\":{"), end = text.find('}', begin);
+  ASSERT_NE(begin, std::string::npos);
+  const std::string object = text.substr(begin, end - begin);
+  const std::pair<std::string, std::string> lies[] = {{"\"points\":[3,1,2]", "\"points\":[3,2,2]"}, {"\"points\":[3,1,2]", "\"points\":[3,0,2]"},
+                                                      {"\"points\":[3,1,2]", "\"points\":[3,-1] "}, {"\"points\":[3,1,2]", "\"points\":[3,1  ]"},
+                                                      {"\"points\":[3,1,2]", "\"points\":[3,99] "}, {"\"order\":2", "\"order\":3"},
+                                                      {"\"order\":2", "\"order\":0"},               {"\"channels\":3", "\"channels\":1"},
+                                                      {"\"channels\":3", "\"channels\":2"},         {"\"precision\":\"half\"", "\"precision\":\"hal?\""},
+                                                      {"\"max\":[1.0,", "\"max\":[-9 ,"},           {"\"max\":[1.0,", "\"max\":[9e9,"},
+                                                      {"\"max\":[1.0,", "\"max\":[\"\" ,"},           {"\"min\"", "\"mid\""},
+                                                      {"\"valid\"", "\"vapid\""},                   {"\"bufferView\"", "\"bufferVeil\""}};
+  for (const auto& [from, to] : lies) {
+    const size_t at = object.find(from);
+    ASSERT_NE(at, std::string::npos) << from << " in " << object;
+    std::vector<uint8_t> changed = bytes;
+    std::copy(to.begin(), to.end(), changed.begin() + ptrdiff_t(begin + at));
+    const std::span<const uint8_t> piece(changed);
+    ASSERT_TRUE(write_file_atomically(lying.path, {&piece, 1}));
+    auto result = load_baked(lying.path);
+    ASSERT_FALSE(result) << to;
+    EXPECT_EQ(result.error().text().find('\n'), std::string::npos);
+    EXPECT_NE(result.error().text().find(lying.path), std::string::npos);
+  }
+  for (size_t length = 0; length < bytes.size(); length += 199) {
+    const std::span<const uint8_t> piece(bytes.data(), length);
+    ASSERT_TRUE(write_file_atomically(cut.path, {&piece, 1}));
+    EXPECT_FALSE(load_baked(cut.path)) << length;
+  }
+}
+
 TEST(BakedFile, IsTheSameBytesEveryTime) {
   const TemporaryFile a("a.glb"), b("b.glb");
   const Small s = small_bake(3, Precision::half);

@@ -24,7 +24,7 @@ TEST(PathTracerLamps, ClosedBoxOfUniformEmission) {
   add_box(scene, m, "box", Vec3(-1), Vec3(1, 0.5f, 2), 2, true);
   const Vec3 at(0.2f, -0.999f, 0.3f), up(0, 1, 0);
   for (int k : {0, 1, 4}) {
-    const auto r = exit_radiances(scene, black(), {&at, 1}, {&up, 1}, k, 16384, 5, true)[0];
+    const auto r = exit_radiances(scene, black(), {&at, 1}, {&up, 1}, k, 16384, 5, {}, true)[0];
     Vec3 expected(0), power(1);
     for (int j = 0; j <= k; ++j) expected += e * power, power *= rho;
     for (int c = 0; c < 3; ++c) EXPECT_NEAR(r.mean[c], expected[c], sigmas * std::sqrt(r.variance[c]) + 1e-5f) << k;
@@ -52,7 +52,7 @@ TEST(PathTracerLamps, EachWayToFindALampAgrees) {
   glm::dvec3 means[3], variances[3];
   const Strategy strategies[] = {Strategy::combined, Strategy::light_only, Strategy::brdf_only};
   for (int s = 0; s < 3; ++s) {
-    auto integrator = reference::make_integrator(scene, env, 2, strategies[s], true);
+    auto integrator = reference::make_integrator(scene, env, 2, strategies[s], {}, true);
     ASSERT_TRUE(integrator);
     glm::dvec3 sum(0), squares(0);
     const uint32_t paths = 1 << 16;
