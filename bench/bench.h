@@ -34,5 +34,6 @@ void bench_bake();
 void bench_basis();
 void bench_relight();
 void bench_scaling();
+void bench_zonal();
 
 }  // namespace lambent::bench
