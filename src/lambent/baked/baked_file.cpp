@@ -183,42 +183,22 @@ Result<std::vector<uint32_t>> read_map(const GltfChunks& chunks, const json& par
   return map;
 }
 
-}  // namespace
-
-Result<void> save_baked(const std::string& path, const Scene& scene, const Receivers& receivers, const Transfer& transfer,
-                        const std::string& provenance, const Outgoing* outgoing) {
-  LAMBENT_CHECK(transfer.rows == (outgoing ? outgoing->rows() : 1));
-  const OutgoingBlobs last = outgoing ? outgoing_blobs(*outgoing) : OutgoingBlobs{};
-  std::vector<GltfBlob> blobs{{transfer.data, 64}};
+// What all kinds share: bulk data first, then the maps of receivers, then `more`. `describe` makes the kind's header; it is given the
+// first of `more`'s views.
+Result<void> save(const std::string& path, const Scene& scene, const Receivers& receivers, std::span<const uint8_t> data,
+                  const std::vector<GltfBlob>& more, const std::string& provenance, const std::function<json(int first_more)>& describe) {
+  std::vector<GltfBlob> blobs{{data, 64}};
   for (const auto* map : {&receivers.front, &receivers.back})
     if (!map->empty())
       for (const Part& part : scene.parts)
         blobs.push_back({bytes_of(std::span<const uint32_t>(*map).subspan(part.first_vertex, part.vertex_count)), 4});
-  const size_t outgoing_view = blobs.size();
-  if (outgoing) {
-    blobs.push_back({bytes_of(std::span<const Vec3>(last.frames)), 4});
-    if (!last.maps.empty()) blobs.push_back({bytes_of(std::span<const uint16_t>(last.maps)), 4}), blobs.push_back({bytes_of(std::span<const uint16_t>(last.map_of)), 4});
-  }
+  const int more_view = int(blobs.size());
+  blobs.insert(blobs.end(), more.begin(), more.end());
   return save_glb(path, scene, blobs, [&](json& document, const GltfPlaces& places) {
     json extension;
     extension["version"] = baked_file_version;
-    extension["transfer"] = {{"kind", outgoing ? "matrix" : "diffuse"},
-                             {"channels", transfer.channels},
-                             {"precision", transfer.precision == Precision::half ? "half" : "single"},
-                             {"receivers", transfer.receivers},
-                             {"bufferView", places.first_view}};
-    write_light(extension["transfer"], transfer.light);
-    if (outgoing) {
-      extension["transfer"]["rows"] = transfer.rows;
-      const int first = places.first_view + int(outgoing_view);
-      json& o = extension["transfer"]["outgoing"];
-      o = {{"kind", outgoing_names[int(outgoing->kind)]}, {"order", outgoing->order}, {"frames", first}};
-      if (outgoing->maps.empty()) {
-        o["hasB"] = outgoing->has_b;
-      } else {
-        o["grid"] = outgoing->maps[0].grid, o["mapCount"] = outgoing->maps.size(), o["maps"] = first + 1, o["mapOf"] = first + 2;
-      }
-    }
+    extension["transfer"] = describe(places.first_view + more_view);
+    extension["transfer"]["bufferView"] = places.first_view;
     json parts = json::array();
     for (size_t i = 0; i < scene.parts.size(); ++i) {
       json part{{"node", places.part_nodes[i]}, {"primitive", places.part_primitives[i]}, {"front", places.first_view + 1 + int(i)}};
@@ -232,6 +212,48 @@ Result<void> save_baked(const std::string& path, const Scene& scene, const Recei
     json& used = document["extensionsUsed"];
     if (!used.is_array()) used = json::array();
     if (std::find(used.begin(), used.end(), extension_name) == used.end()) used.push_back(extension_name);
+  });
+}
+
+json header(const char* kind, int channels, Precision precision, size_t receivers) {
+  return {{"kind", kind}, {"channels", channels}, {"precision", precision == Precision::half ? "half" : "single"}, {"receivers", receivers}};
+}
+
+}  // namespace
+
+Result<void> save_baked(const std::string& path, const Scene& scene, const Receivers& receivers, const Transfer& transfer,
+                        const std::string& provenance, const Outgoing* outgoing) {
+  LAMBENT_CHECK(transfer.rows == (outgoing ? outgoing->rows() : 1));
+  const OutgoingBlobs last = outgoing ? outgoing_blobs(*outgoing) : OutgoingBlobs{};
+  std::vector<GltfBlob> more;
+  if (outgoing) {
+    more.push_back({bytes_of(std::span<const Vec3>(last.frames)), 4});
+    if (!last.maps.empty()) more.push_back({bytes_of(std::span<const uint16_t>(last.maps)), 4}), more.push_back({bytes_of(std::span<const uint16_t>(last.map_of)), 4});
+  }
+  return save(path, scene, receivers, transfer.data, more, provenance, [&](int first) {
+    json t = header(outgoing ? "matrix" : "diffuse", transfer.channels, transfer.precision, transfer.receivers);
+    write_light(t, transfer.light);
+    if (outgoing) {
+      t["rows"] = transfer.rows;
+      json& o = t["outgoing"];
+      o = {{"kind", outgoing_names[int(outgoing->kind)]}, {"order", outgoing->order}, {"frames", first}};
+      if (outgoing->maps.empty()) {
+        o["hasB"] = outgoing->has_b;
+      } else {
+        o["grid"] = outgoing->maps[0].grid, o["mapCount"] = outgoing->maps.size(), o["maps"] = first + 1, o["mapOf"] = first + 2;
+      }
+    }
+    return t;
+  });
+}
+
+Result<void> save_baked(const std::string& path, const Scene& scene, const Receivers& receivers, const ZonalTransfer& transfer,
+                        const std::string& provenance) {
+  return save(path, scene, receivers, transfer.data, {}, provenance, [&](int) {
+    json t = header("zonal", transfer.channels, transfer.precision, transfer.receivers);
+    write_light(t, {.order = transfer.order});
+    t["lobeCount"] = transfer.lobes;
+    return t;
   });
 }
 
@@ -261,8 +283,8 @@ Result<Baked> load_baked(const MappedFile& file, const std::string& path) {
   const auto t = extension.find("transfer");
   if (t == extension.end() || !t->is_object()) return Error{where, "\"transfer\" is missing"};
   auto text = [&](const char* key) { return t->contains(key) && (*t)[key].is_string() ? (*t)[key].get<std::string>() : ""; };
-  const bool is_matrix = text("kind") == "matrix";
-  if (!is_matrix && text("kind") != "diffuse") return Error{where, "transfer of kind \"" + text("kind") + "\" is not known to this program"};
+  const bool is_matrix = text("kind") == "matrix", is_zonal = text("kind") == "zonal";
+  if (!is_matrix && !is_zonal && text("kind") != "diffuse") return Error{where, "transfer of kind \"" + text("kind") + "\" is not known to this program"};
   if (text("precision") != "half" && text("precision") != "single") return Error{where, "\"precision\" must be half or single"};
   auto light = read_light(*t, where);
   if (!light) return light.error();
@@ -272,22 +294,37 @@ Result<Baked> load_baked(const MappedFile& file, const std::string& path) {
   for (const auto* count : {&channels, &receivers, &view})
     if (!*count) return count->error();
   if (*channels != 1 && *channels != 3) return Error{where, "\"channels\" is out of range"};
-  baked.transfer.light = std::move(*light), baked.transfer.channels = int(*channels), baked.transfer.receivers = *receivers;
-  baked.transfer.precision = text("precision") == "half" ? Precision::half : Precision::single;
-  if (is_matrix) {
-    auto rows = read_count(*t, "rows", 2 * sh_count(max_sh_order), where);
-    if (!rows) return rows.error();
-    if (*rows < 1) return Error{where, "the transfer has no rows"};
-    baked.transfer.rows = int(*rows);
-  }
+  const Precision precision = text("precision") == "half" ? Precision::half : Precision::single;
   auto data = view_bytes(*chunks, *view, where);
   if (!data) return data.error();
-  if (data->size() != baked.transfer.bytes())
-    return Error{where, "the transfer holds " + std::to_string(data->size()) + " bytes where its header makes " +
-                            std::to_string(baked.transfer.bytes())};
-  if (reinterpret_cast<uintptr_t>(data->data()) % baked.transfer.value_bytes()) return Error{where, "the transfer is not aligned"};
-  baked.transfer.data = *data;
-  baked.transfer.storage = std::make_shared<MappedFile>(file);
+  // The bulk data of either kind, in place.
+  auto attach = [&](auto& transfer) -> Result<void> {
+    transfer.channels = int(*channels), transfer.receivers = *receivers, transfer.precision = precision;
+    if (data->size() != transfer.bytes())
+      return Error{where, "the transfer holds " + std::to_string(data->size()) + " bytes where its header makes " + std::to_string(transfer.bytes())};
+    if (reinterpret_cast<uintptr_t>(data->data()) % transfer.value_bytes()) return Error{where, "the transfer is not aligned"};
+    transfer.data = *data;
+    transfer.storage = std::make_shared<MappedFile>(file);
+    return {};
+  };
+  if (is_zonal) {
+    auto lobes = read_count(*t, "lobeCount", size_t(max_stored_lobes), where);
+    if (!lobes) return lobes.error();
+    if (*lobes < 1) return Error{where, "there are no lobes"};
+    if (light->order < 1 || light->count() != size_t(sh_count(light->order))) return Error{where, "zonal transfer is of spherical harmonics alone"};
+    ZonalTransfer& zonal = baked.zonal.emplace();
+    zonal.order = light->order, zonal.lobes = int(*lobes);
+    if (auto ok = attach(zonal); !ok) return ok.error();
+  } else {
+    baked.transfer.light = std::move(*light);
+    if (is_matrix) {
+      auto rows = read_count(*t, "rows", 2 * sh_count(max_sh_order), where);
+      if (!rows) return rows.error();
+      if (*rows < 1) return Error{where, "the transfer has no rows"};
+      baked.transfer.rows = int(*rows);
+    }
+    if (auto ok = attach(baked.transfer); !ok) return ok.error();
+  }
   if (is_matrix) {
     if (!t->contains("outgoing") || !(*t)["outgoing"].is_object()) return Error{where, "\"outgoing\" is missing"};
     auto outgoing = read_outgoing(*chunks, (*t)["outgoing"], baked.transfer, where + ": outgoing");

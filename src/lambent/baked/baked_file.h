@@ -6,6 +6,7 @@
 #include <lambent/scene/scene.h>
 #include <lambent/transfer/outgoing.h>
 #include <lambent/transfer/transfer.h>
+#include <lambent/transfer/zonal_transfer.h>
 
 #include <optional>
 #include <string>
@@ -19,6 +20,7 @@ struct Baked {
   std::vector<uint32_t> front, back;  // receiver of each scene vertex, by side, as in Receivers
   Transfer transfer;                  // read in place: its data lies in the mapped file
   std::optional<Outgoing> outgoing;   // the last reflection of a transfer matrix; none: diffuse transfer
+  std::optional<ZonalTransfer> zonal;  // in place of `transfer`, which then has no receivers; read in place too
   std::string provenance;             // JSON text: inputs and their hashes, options, version, what the bake reported
 };
 
@@ -26,6 +28,8 @@ struct Baked {
 // `outgoing` belongs to a transfer matrix; null for diffuse transfer.
 Result<void> save_baked(const std::string& path, const Scene& scene, const Receivers& receivers, const Transfer& transfer,
                         const std::string& provenance, const Outgoing* outgoing = nullptr);
+Result<void> save_baked(const std::string& path, const Scene& scene, const Receivers& receivers, const ZonalTransfer& transfer,
+                        const std::string& provenance);
 
 // Errors: not a baked file, another version, anything that does not fit.
 Result<Baked> load_baked(const std::string& path);
