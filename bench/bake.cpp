@@ -5,6 +5,7 @@
 #include <lambent/bake/bake.h>
 #include <lambent/bake/gather.h>
 #include <lambent/bake/kernels.h>
+#include <lambent/bake/materials.h>
 #include <lambent/core/parallel.h>
 #include <lambent/scene/procedural.h>
 
@@ -126,9 +127,19 @@ void bake_scene(const std::string& name, const Scene& scene) {
     return least_seconds(runs, [&] { (void)bake(scene, *tracer, receivers, options, &report); });
   };
   BakeReport r0, r1, r3;
+  auto matrix_seconds = [&](int bounces) {
+    const BakeOptions options{.order = 5, .samples = samples, .bounces = bounces};
+    const ReceiverMaterials materials = make_receiver_materials(scene, receivers, {.everywhere = Ggx{.alpha = Vec2(0.16f)}});
+    return least_seconds(runs, [&] { (void)bake_matrix(scene, *tracer, receivers, materials, options, {.response_samples = 256}); });
+  };
+  const double m0 = matrix_seconds(0), m1 = matrix_seconds(1);
   const double b0 = bake_seconds(0, r0), b1 = bake_seconds(1, r1), b3 = bake_seconds(3, r3);
   report("bake_direct", rays / b0, rays / occluded, "Mrays/s", "best raw Embree occlusion, same rays",
          with({{"raw_stream", rays / stream}, {"raw_packets", rays / packet}, {"aim", ">= 0.8"}}));
+  report("bake_matrix_direct", rays / m0, rays / occluded, "Mrays/s", "best raw Embree occlusion, same rays",
+         with({{"order", 5}, {"incident_order", 5}, {"outgoing", "svd:6"}, {"aim", ">= 0.5"}}));
+  report("bake_matrix_1_bounce", rays / m1, rays / closest, "Mrays/s", "raw Embree closest hits, same rays",
+         with({{"order", 5}, {"incident_order", 5}, {"outgoing", "svd:6"}}));
   report("bake_1_bounce", b1, closest, "s", "raw Embree closest hits, same rays",
          with({{"raw_stream_s", closest_m}, {"raw_packets_s", closest_packet}, {"trace_s", r1.trace_seconds}, {"bounce_s", r1.bounce_seconds}, {"aim", "<= 1.35"}}));
   report("bake_3_bounces", b3, b1, "s", "the bake with 1 bounce",

@@ -6,8 +6,7 @@ cd "$1/src/lambent"
 declare -A allowed=(
   [core]="" [basis]="" [image]="" [brdf]="basis" [light]="basis image" [scene]="brdf light image" [receivers]="scene"
   [trace]="scene" [transfer]="basis" [baked]="transfer scene receivers basis" [bake]="trace receivers scene brdf light basis transfer"
-  [compress]="transfer basis brdf"
-  [relight]="transfer basis brdf light" [render]="relight transfer trace receivers scene light image" [reference]="scene brdf light image"
+  [compress]="transfer basis brdf" [relight]="transfer basis brdf light" [render]="relight transfer trace receivers scene light image" [reference]="scene brdf light image"
 )
 bad=0
 for folder in */; do

@@ -2,6 +2,7 @@
 #include "options.h"
 
 #include <lambent/bake/bake.h>
+#include <lambent/bake/materials.h>
 #include <lambent/baked/baked_file.h>
 
 #include <fmt/format.h>
@@ -14,8 +15,27 @@ namespace {
 struct BakeCommand {
   SceneOptions scene;
   BakeOptions bake;
-  std::string output, shadows = "on", precision = "half";
+  MatrixOptions matrix;
+  BrdfOptions brdf;
+  std::string transfer = "diffuse", outgoing = "svd:6", output, shadows = "on", precision = "half";
 };
+
+// KIND or KIND:N, where N is the number of rows (svd) or bands (sh, hemisphere, hsh).
+Result<void> parse_outgoing(const std::string& text, MatrixOptions& matrix) {
+  const size_t colon = text.find(':');
+  const std::string name = text.substr(0, colon);
+  const auto kind = std::find(std::begin(outgoing_names), std::end(outgoing_names), name);
+  if (kind == std::end(outgoing_names)) return Error{"--outgoing", "must be map, svd:ROWS, sh:BANDS, hemisphere:BANDS or hsh:BANDS, not \"" + text + "\""};
+  matrix.outgoing = OutgoingKind(kind - std::begin(outgoing_names));
+  if (colon == std::string::npos) return {};
+  if (matrix.outgoing == OutgoingKind::map) return Error{"--outgoing", "map takes no number: --incident-order says how many rows it has"};
+  auto number = parse_numbers(text.substr(colon + 1), 1, "--outgoing");
+  if (!number) return number.error();
+  const float n = (*number)[0];
+  if (n != std::floor(n) || n < 1 || n > 64) return Error{"--outgoing", "expects a whole number from 1 to 64 after the colon, not \"" + text + "\""};
+  (matrix.outgoing == OutgoingKind::svd ? matrix.svd_rows : matrix.outgoing_order) = int(n);
+  return {};
+}
 
 using Clock = std::chrono::steady_clock;
 double seconds_since(Clock::time_point start) { return std::chrono::duration<double>(Clock::now() - start).count(); }
@@ -24,7 +44,12 @@ int run_bake(Context& context, BakeCommand o) {
   o.bake.shadows = o.shadows == "on";
   if (!o.bake.shadows) o.bake.bounces = 0;
   o.bake.precision = o.precision == "half" ? Precision::half : Precision::single;
+  const bool is_matrix = o.transfer == "matrix";
   if (auto ok = check_output(o.output, {"glb"}); !ok) return fail(ok.error());
+  if (is_matrix)
+    if (auto ok = parse_outgoing(o.outgoing, o.matrix); !ok) return fail(ok.error());
+  auto reflection = load_reflection(o.brdf);
+  if (!reflection) return fail(reflection.error());
 
   auto start = Clock::now();
   auto scene = load_prepared_scene(o.scene);
@@ -38,20 +63,31 @@ int run_bake(Context& context, BakeCommand o) {
   const double build_seconds = seconds_since(start);
 
   BakeReport report;
-  auto transfer = bake(*scene, *tracer, receivers, o.bake, &report, &context.progress);
-  if (!transfer) return fail(transfer.error());
+  std::optional<Outgoing> outgoing;
+  Result<Transfer> transfer = Error{};
+  if (is_matrix) {
+    auto baked = bake_matrix(*scene, *tracer, receivers, make_receiver_materials(*scene, receivers, *reflection), o.bake, o.matrix, &report,
+                             &context.progress);
+    if (!baked) return fail(baked.error());
+    transfer = std::move(baked->transfer), outgoing = std::move(baked->outgoing);
+  } else {
+    transfer = bake(*scene, *tracer, receivers, o.bake, &report, &context.progress);
+    if (!transfer) return fail(transfer.error());
+  }
 
   nlohmann::json provenance{
       {"generator", "lambent " LAMBENT_VERSION},
       {"input", {{"name", scene->path.substr(scene->path.find_last_of('/') + 1)}, {"xxh3_128", scene->hash}}},
       {"options",
-       {{"order", o.bake.order}, {"samples", o.bake.samples}, {"bounces", o.bake.bounces}, {"shadows", o.bake.shadows},
+       {{"transfer", o.transfer}, {"order", o.bake.order}, {"samples", o.bake.samples}, {"bounces", o.bake.bounces}, {"shadows", o.bake.shadows},
         {"ground", o.scene.ground}, {"max_edge", o.scene.max_edge}, {"seed", o.bake.seed}, {"precision", o.precision}}},
       {"report", {{"receivers", report.receivers}, {"buried", report.buried}}}};
+  if (is_matrix)
+    provenance["options"].update({{"brdf", o.brdf.brdf}, {"outgoing", o.outgoing}, {"incident_order", o.matrix.incident_order}});
   if (report.error >= 0) provenance["report"]["error"] = report.error;
 
   start = Clock::now();
-  if (auto ok = save_baked(o.output, *scene, receivers, *transfer, provenance.dump()); !ok) return fail(ok.error());
+  if (auto ok = save_baked(o.output, *scene, receivers, *transfer, provenance.dump(), outgoing ? &*outgoing : nullptr); !ok) return fail(ok.error());
   const double save_seconds = seconds_since(start);
 
   const double bytes_each = double(report.bytes) / double(report.receivers);
@@ -63,6 +99,7 @@ int run_bake(Context& context, BakeCommand o) {
                           {"triangles", scene->triangles.size()},
                           {"rays", report.rays},
                           {"channels", transfer->channels},
+                          {"rows", transfer->rows},
                           {"seconds", {{"load", load_seconds}, {"build", build_seconds}, {"trace", report.trace_seconds},
                                        {"bounce", report.bounce_seconds}, {"save", save_seconds}}},
                           {"rays_per_second", report.trace_seconds > 0 ? double(report.rays) / report.trace_seconds : 0.0},
@@ -82,8 +119,8 @@ int run_bake(Context& context, BakeCommand o) {
              report.trace_seconds > 0 ? double(report.rays) / report.trace_seconds / 1e6 : 0.0);
   fmt::print("  time       load {}, build {}, trace {}, bounce {}, save {}\n", human_seconds(load_seconds), human_seconds(build_seconds),
              human_seconds(report.trace_seconds), human_seconds(report.bounce_seconds), human_seconds(save_seconds));
-  fmt::print("  size       {} a receiver, {} in all (order {}, {} channel{}, {})\n", human_bytes(bytes_each), human_bytes(double(report.bytes)),
-             transfer->light.order, transfer->channels, transfer->channels == 1 ? "" : "s", o.precision);
+  fmt::print("  size       {} a receiver, {} in all (order {}, {} row{}, {} channel{}, {})\n", human_bytes(bytes_each), human_bytes(double(report.bytes)),
+             transfer->light.order, transfer->rows, transfer->rows == 1 ? "" : "s", transfer->channels, transfer->channels == 1 ? "" : "s", o.precision);
   if (report.operator_kept < 1)
     fmt::print("  memory     {:.0f}% of the gather operator fitted; the rest was traced again for each bounce\n", 100 * report.operator_kept);
   if (report.error >= 0) fmt::print("  error      {:.2f}% RMS, estimated from half-sample gathers\n", 100 * report.error);
@@ -94,10 +131,18 @@ int run_bake(Context& context, BakeCommand o) {
 
 void add_bake(CLI::App& app, Run& run) {
   auto o = std::make_shared<BakeCommand>();
-  CLI::App* c = app.add_subcommand("bake", "Bake a scene's diffuse light transport");
+  CLI::App* c = app.add_subcommand("bake", "Bake a scene's light transport");
   o->scene.add_to(*c);
   c->add_option("-o,--output", o->output, "Baked file to write (.glb)")->required();
   c->add_option("--order", o->bake.order, "Bands of the lighting's spherical harmonics")->check(CLI::Range(1, max_sh_order))->capture_default_str();
+  c->add_option("--transfer", o->transfer, "diffuse: a vector a receiver; matrix: incident light in every direction, for glossy materials")
+      ->check(CLI::IsMember({"diffuse", "matrix"}))->capture_default_str();
+  auto* incident = c->add_option("--incident-order", o->matrix.incident_order, "matrix: bands of incident light")
+                       ->check(CLI::Range(1, max_incident_order))->capture_default_str();
+  auto* last = c->add_option("--outgoing", o->outgoing, "matrix: rows for the last reflection: map, svd:ROWS, sh:BANDS, hemisphere:BANDS, hsh:BANDS")
+                   ->capture_default_str();
+  o->brdf.brdf = "materials";
+  auto* brdf = o->brdf.add_to(*c);
   c->add_option("--samples", o->bake.samples, "Rays a receiver")->check(CLI::Range(1, 1 << 20))->capture_default_str();
   auto* bounces = c->add_option("--bounces", o->bake.bounces, "Reflections between surfaces")->check(CLI::Range(0, 64))->capture_default_str();
   c->add_option("--shadows", o->shadows, "off: open light everywhere, no shadows and no bounces")->check(CLI::IsMember({"on", "off"}))->capture_default_str();
@@ -105,9 +150,12 @@ void add_bake(CLI::App& app, Run& run) {
       ->transform(CLI::AsSizeValue(false))->default_str("4GiB");
   c->add_option("--seed", o->bake.seed, "Of the ray directions")->capture_default_str();
   c->add_option("--precision", o->precision, "Of the stored transfer")->check(CLI::IsMember({"half", "single"}))->capture_default_str();
-  c->callback([o, bounces, &run] {
+  c->callback([o, bounces, incident, last, brdf, &run] {
     if (o->shadows == "off" && bounces->count() && o->bake.bounces > 0)
       throw CLI::ValidationError("--shadows off has no bounces: leave --bounces out, or set it to 0");
+    for (const CLI::Option* option : {incident, last, brdf})
+      if (option->count() && o->transfer != "matrix") throw CLI::ValidationError(option->get_name() + " needs --transfer matrix");
+    if (o->transfer == "matrix" && o->shadows == "off") throw CLI::ValidationError("--transfer matrix is always baked with shadows");
     run = [o](Context& context) { return run_bake(context, *o); };
   });
 }

@@ -1,5 +1,6 @@
 #include "options.h"
 
+#include <lambent/brdf/parse_brdf.h>
 #include <lambent/core/file.h>
 #include <lambent/scene/load.h>
 #include <lambent/scene/refine.h>
@@ -106,6 +107,24 @@ Result<Mat3> light_rotation(const LightOptions& options) {
   auto n = parse_numbers(options.rotate, 3, "--env-rotate");
   if (!n) return n.error();
   return rotation_from_yaw_pitch_roll({(*n)[0], (*n)[1], (*n)[2]});
+}
+
+void BrdfOptions::add_to(CLI::App& command) {
+  command.add_option("--brdf", brdf, std::string("How surfaces reflect: diffuse (by base colour), materials (glTF's metallic-roughness), "
+                                                 "or one model for all: ") + brdf_syntax)->capture_default_str();
+}
+
+Result<Reflection> load_reflection(const BrdfOptions& options) {
+  Reflection reflection;
+  if (options.brdf == "diffuse") return reflection;
+  if (options.brdf == "materials") {
+    reflection.model = Reflection::Model::materials;
+    return reflection;
+  }
+  auto brdf = parse_brdf(options.brdf);
+  if (!brdf) return Error{"--brdf", brdf.error().text()};
+  reflection.everywhere = std::move(*brdf);
+  return reflection;
 }
 
 Result<void> check_output(const std::string& path, std::initializer_list<const char*> extensions) {

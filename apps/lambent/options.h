@@ -5,6 +5,7 @@
 #include <lambent/basis/sh.h>
 #include <lambent/core/camera.h>
 #include <lambent/light/environment.h>
+#include <lambent/scene/reflection.h>
 #include <lambent/scene/scene.h>
 
 #include <CLI/CLI.hpp>
@@ -40,6 +41,12 @@ struct LightOptions {
 };
 Result<Environment> load_light(const LightOptions& options);
 Result<Mat3> light_rotation(const LightOptions& options);
+
+struct BrdfOptions {
+  std::string brdf = "diffuse";
+  void add_to(CLI::App& command);
+};
+Result<Reflection> load_reflection(const BrdfOptions& options);
 
 extern const std::map<std::string, ShWindow> window_names;
 

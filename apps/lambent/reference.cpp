@@ -15,6 +15,7 @@ struct ReferenceCommand {
   SceneOptions scene;
   LightOptions light;
   ViewOptions view;
+  BrdfOptions brdf;
   ShWindow window = ShWindow::none;
   int light_order = 0;
   ReferenceOptions options;
@@ -24,6 +25,9 @@ int run_reference(Context& context, ReferenceCommand o) {
   if (auto ok = check_output(o.view.output, {"png", "exr"}); !ok) return fail(ok.error());
   auto rotation = light_rotation(o.light);
   if (!rotation) return fail(rotation.error());
+  auto reflection = load_reflection(o.brdf);
+  if (!reflection) return fail(reflection.error());
+  o.options.reflection = std::move(*reflection);
   auto scene = load_prepared_scene(o.scene);
   if (!scene) return fail(scene.error());
   auto view = make_view(o.view, *scene);
@@ -60,6 +64,7 @@ void add_reference(CLI::App& app, Run& run) {
   o->scene.add_to(*c);
   o->light.add_to(*c);
   o->view.add_to(*c);
+  o->brdf.add_to(*c);
   c->add_option("--light-order", o->light_order, "Light by the environment's projection to this many bands, negative light included")
       ->check(CLI::Range(1, max_sh_order));
   c->add_option("--window", o->window, "With --light-order: as for render")

@@ -49,7 +49,7 @@ int run_render(Context& context, const RenderCommand& o) {
   auto tracer = Tracer::build(baked->scene);
   if (!tracer) return fail(tracer.error());
   const CornerReceivers corners = corner_receivers(baked->scene, baked->front, baked->back);
-  RenderOptions options{view->width, view->height, o.samples, nullptr, !o.no_albedo};
+  RenderOptions options{view->width, view->height, o.samples, nullptr, !o.no_albedo, baked->outgoing ? &*baked->outgoing : nullptr};
   Environment turned;
   if (o.view.background == "env") {
     turned = o.light.rotate.empty() ? std::move(*env) : rotated(*env, *rotation);

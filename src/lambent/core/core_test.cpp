@@ -48,6 +48,21 @@ TEST(Sampling, WarpsHaveTheirMoments) {
   }
 }
 
+TEST(Sampling, DiskGoesBackToTheSquare) {
+  constexpr float rounding = 1e-6f;
+  for (uint32_t i = 0; i < 1000; ++i) {
+    const Vec2 u = sobol_owen(i, 4), back = disk_to_square(square_to_disk(u));
+    EXPECT_NEAR(back.x, u.x, rounding);
+    EXPECT_NEAR(back.y, u.y, rounding);
+  }
+  EXPECT_EQ(disk_to_square({0, 0}), Vec2(0.5f));
+  for (Vec2 corner : {Vec2(0, 0), Vec2(0, 1), Vec2(1, 0), Vec2(1, 1), Vec2(0.5f, 0), Vec2(1, 0.5f)}) {
+    const Vec2 back = disk_to_square(square_to_disk(corner));
+    EXPECT_NEAR(back.x, corner.x, rounding);
+    EXPECT_NEAR(back.y, corner.y, rounding);
+  }
+}
+
 TEST(Vec, YawTurnsXTowardsMinusZ) {
   // A right-handed turn about +Y takes +Z to +X and +X to -Z.
   const Mat3 yaw = rotation_from_yaw_pitch_roll({90, 0, 0});

@@ -13,7 +13,7 @@ Vec2 sobol_owen(uint32_t index, uint32_t seed);
 
 // Unit disk, area-preserving with low distortion (Shirley and Chiu 1997).
 Vec2 square_to_disk(Vec2 u);
-// Its inverse.
+// Its inverse: the point of [0, 1]^2, for a point of the unit disk.
 Vec2 disk_to_square(Vec2 d);
 
 // Hemisphere about +z with density cos(theta)/pi.

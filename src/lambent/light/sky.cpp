@@ -1,7 +1,6 @@
 // Preetham, Shirley and Smits 1999, "A practical analytic model for daylight": the sky's distribution (appendix A.2) in the form
 // of Perez et al. 1993, the sun's attenuation (appendix A.1) with Iqbal's absorption data. Relative air mass: Kasten 1966.
-// Colour matching functions: Wyman, Sloan and Shirley 2013, "Simple analytic approximations to the CIE XYZ color matching
-// functions".
+#include <lambent/core/color.h>
 #include <lambent/core/parallel.h>
 #include <lambent/core/sampling.h>
 #include <lambent/light/sky.h>
@@ -17,12 +16,6 @@ constexpr double sun_radius = 0.5 * 0.533 * pi_d / 180;  // angular, radians
 constexpr double unit = 10000;                           // cd/m^2
 
 double radians(double degrees) { return degrees * pi_d / 180; }
-
-// Linear Rec. 709 of XYZ; out-of-gamut channels are negative.
-glm::dvec3 rec709_from_xyz(glm::dvec3 c) {
-  return {3.2409699 * c.x - 1.5373832 * c.y - 0.4986108 * c.z, -0.9692436 * c.x + 1.8759675 * c.y + 0.0415551 * c.z,
-          0.0556301 * c.x - 0.2039770 * c.y + 1.0569715 * c.z};
-}
 
 // --- The sun
 
@@ -44,16 +37,6 @@ constexpr SpectrumRow spectrum[] = {
     {2110, 0.036, 0, 0},    {2073, 0.028, 0.016, 0}, {2024, 0.023, 0.024, 0}, {1987, 0.018, 0.0125, 0}, {1943, 0.014, 1.0, 0},
     {1907, 0.011, 0.87, 0}, {1863, 0.010, 0.061, 0}, {1826, 0.009, 0.001, 0}, {1788, 0.007, 1e-5, 3.0}, {1751, 0.004, 1e-5, 0.21},
     {1714, 0, 6e-4, 0}};
-
-glm::dvec3 matching_functions(double nm) {
-  auto lobe = [nm](double height, double centre, double below, double above) {
-    double t = (nm - centre) / (nm < centre ? below : above);
-    return height * std::exp(-0.5 * t * t);
-  };
-  return {lobe(1.056, 599.8, 37.9, 31.0) + lobe(0.362, 442.0, 16.0, 26.7) + lobe(-0.065, 501.1, 20.4, 26.2),
-          lobe(0.821, 568.8, 46.9, 40.5) + lobe(0.286, 530.9, 16.3, 31.1),
-          lobe(1.217, 437.0, 11.8, 36.0) + lobe(0.681, 459.0, 26.0, 13.8)};
-}
 
 // Transmittance of the atmosphere, appendix A.1, for relative air mass m.
 double transmittance(const SpectrumRow& row, double um, double m, double turbidity) {
@@ -154,7 +137,7 @@ Vec3 sun_irradiance(float elevation, float turbidity) {
   glm::dvec3 xyz(0);
   double nm = first_wavelength;
   for (const SpectrumRow& row : spectrum) {
-    xyz += matching_functions(nm) * (row.radiance * transmittance(row, nm / 1000, m, double(turbidity)));
+    xyz += cie_matching_functions(nm) * (row.radiance * transmittance(row, nm / 1000, m, double(turbidity)));
     nm += wavelength_step;
   }
   xyz *= wavelength_step * radiance_si * solid_angle * lumens_a_watt / unit;

@@ -11,11 +11,6 @@
 namespace lambent::reference {
 namespace {
 
-// The one place that says how a surface reflects.
-Brdf get_brdf(const Scene& scene, const Triangle& triangle, float u, float v) {
-  return Lambert{albedo(scene, triangle, u, v)};
-}
-
 // Power heuristic, exponent 2, from the ratio so that large densities do not overflow.
 float mis_weight(float pdf, float other) {
   float ratio = other / pdf;
@@ -54,14 +49,16 @@ Vec2 PathSamples::pair(uint32_t dimension) const {
   return sobol_owen(shuffled(index, uint32_t(seed)) & mask, uint32_t(seed >> 32));
 }
 
-Result<Integrator> make_integrator(const Scene& scene, const Environment& env, int bounces, Strategy strategy) {
+Result<Integrator> make_integrator(const Scene& scene, const Environment& env, int bounces, Strategy strategy,
+                                   const Reflection& reflection) {
   if (env.image.width < 1 || env.image.height < 1) return Error{env.name, "the environment is empty"};
   Result<Intersector> intersector = Intersector::make(scene);
   if (!intersector) return intersector.error();
-  return Integrator{&scene, &env, *intersector, make_environment_sampler(env), bounces, strategy};
+  return Integrator{&scene, &env, *intersector, make_environment_sampler(env), bounces, strategy, reflection};
 }
 
-bool make_vertex(const Scene& scene, const Hit& hit, Vec3 d, PathVertex& vertex) {
+bool make_vertex(const Integrator& integrator, const Hit& hit, Vec3 d, PathVertex& vertex) {
+  const Scene& scene = *integrator.scene;
   const Triangle& triangle = scene.triangles[hit.triangle];
   SurfacePoint s = surface_point(scene, hit);
   bool front = glm::dot(s.ng, d) < 0;
@@ -70,13 +67,13 @@ bool make_vertex(const Scene& scene, const Hit& hit, Vec3 d, PathVertex& vertex)
   vertex.position = s.position + vertex.ng * s.offset;
   Vec3 n = normalize_or(interpolate(scene.normals, triangle, hit.u, hit.v), vertex.ng);
   if (glm::dot(n, vertex.ng) < 0) n = -n;
-  vertex.frame = frame_about(n);
+  vertex.frame = shading_frame(scene, triangle, n);
   // Near silhouettes the shading normal can turn away from the eye while the surface does not: lift wo to its horizon, so
   // that such places are not black.
   vertex.wo = -d * vertex.frame;
   constexpr float lowest = 1e-4f;
   if (vertex.wo.z < lowest) vertex.wo = glm::normalize(Vec3(vertex.wo.x, vertex.wo.y, lowest));
-  vertex.brdf = get_brdf(scene, triangle, hit.u, hit.v);
+  vertex.brdf = surface_brdf(scene, integrator.reflection, triangle, hit.u, hit.v);
   return true;
 }
 
@@ -91,9 +88,9 @@ Vec3 exit_radiance_estimate(const Integrator& integrator, PathVertex vertex, con
       EnvironmentSample light = sample_environment(integrator.sampler, samples.pair(uint32_t(2 * depth + 1)));
       if (light.pdf > 0 && glm::dot(vertex.ng, light.direction) > 0) {
         Vec3 wi = light.direction * vertex.frame;
-        Vec3 f = evaluate(vertex.brdf, wi, wo);
+        const auto [f, density] = evaluate_with_pdf(vertex.brdf, wi, wo);
         if (!black(f) && !integrator.intersector.occluded(vertex.position, light.direction)) {
-          float weight = strategy == Strategy::combined ? mis_weight(light.pdf, pdf(vertex.brdf, wi, wo)) : 1.0f;
+          float weight = strategy == Strategy::combined ? mis_weight(light.pdf, density) : 1.0f;
           sum += throughput * f * light.radiance * (wi.z * weight / light.pdf);
         }
       }
@@ -113,7 +110,7 @@ Vec3 exit_radiance_estimate(const Integrator& integrator, PathVertex vertex, con
       float weight = strategy == Strategy::combined ? mis_weight(next.pdf, environment_pdf(integrator.sampler, d)) : 1.0f;
       sum += throughput * radiance(*integrator.environment, d) * weight;
     }
-    if (leaves || last || !make_vertex(*integrator.scene, hit, d, vertex)) break;
+    if (leaves || last || !make_vertex(integrator, hit, d, vertex)) break;
   }
   return sum;
 }

@@ -4,6 +4,7 @@
 #include <lambent/light/environment.h>
 #include <lambent/reference/intersect.h>
 #include <lambent/reference/path_tracer.h>
+#include <lambent/scene/reflection.h>
 #include <lambent/scene/scene.h>
 
 namespace lambent::reference {
@@ -38,12 +39,13 @@ struct Integrator {
   EnvironmentSampler sampler;
   int bounces;
   Strategy strategy;
+  Reflection reflection;
 };
 Result<Integrator> make_integrator(const Scene& scene, const Environment& env, int bounces,
-                                   Strategy strategy = Strategy::combined);
+                                   Strategy strategy = Strategy::combined, const Reflection& reflection = {});
 
 // False where nothing reflects towards -d: the back of a one-sided triangle.
-bool make_vertex(const Scene& scene, const Hit& hit, Vec3 d, PathVertex& vertex);
+bool make_vertex(const Integrator& integrator, const Hit& hit, Vec3 d, PathVertex& vertex);
 
 // A white Lambert receiver.
 PathVertex white_vertex(Vec3 origin, Vec3 n);

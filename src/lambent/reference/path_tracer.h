@@ -9,6 +9,7 @@
 #include <lambent/core/camera.h>
 #include <lambent/core/progress.h>
 #include <lambent/light/environment.h>
+#include <lambent/scene/reflection.h>
 #include <lambent/scene/scene.h>
 
 #include <span>
@@ -21,6 +22,7 @@ struct ReferenceOptions {
   int bounces = 3;                // reflections between surfaces after the first hit, [0, 64]; 0 is direct light only
   bool background = true;         // the environment behind the scene, interpolated; false: black, and the image has alpha
   uint32_t seed = 1;
+  Reflection reflection;  // of the surfaces
 };
 
 struct ReferenceImage {
@@ -44,10 +46,12 @@ Result<ReferenceImage> path_trace(const Scene& scene, const Environment& env, co
 Vec3 exit_radiance(const Scene& scene, const Environment& env, Vec3 origin, Vec3 n, int bounces, int paths, uint32_t seed);
 
 // The same at many points, and the variance of each mean (as ReferenceImage::variance). One preparation serves all points.
+// `reflection` is of the scene's surfaces, not of the receivers.
 struct ExitRadiance {
   Vec3 mean, variance;
 };
 std::vector<ExitRadiance> exit_radiances(const Scene& scene, const Environment& env, std::span<const Vec3> origins,
-                                         std::span<const Vec3> normals, int bounces, int paths, uint32_t seed);
+                                         std::span<const Vec3> normals, int bounces, int paths, uint32_t seed,
+                                         const Reflection& reflection = {});
 
 }  // namespace lambent

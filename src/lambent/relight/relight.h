@@ -3,7 +3,7 @@
 // bandwidth. O is left to whoever draws: the albedo for diffuse transfer, the last reflection towards the eye for other rows.
 #include <lambent/core/aligned.h>
 #include <lambent/core/vec.h>
-#include <lambent/transfer/transfer.h>
+#include <lambent/transfer/cpca_transfer.h>
 
 #include <span>
 
@@ -14,6 +14,7 @@ namespace lambent {
 struct Relit {
   int rows = 1;
   AlignedVector<float> values;
+  AlignedVector<float> scratch;  // of whatever computes them
   Vec3 at(size_t receiver, int row = 0) const {
     const float* v = values.data() + (receiver / transfer_block * size_t(rows) + size_t(row)) * (3 * transfer_block) + receiver % transfer_block;
     return {v[0], v[transfer_block], v[2 * transfer_block]};
@@ -23,5 +24,8 @@ struct Relit {
 // light: coefficients of radiance, at least as many as there are columns (harmonics of higher order are cut off). Sizes `out` on
 // first use and allocates nothing after that. All cores; the sum of each receiver has a fixed order.
 void relight(const Transfer& transfer, std::span<const Vec3> light, Relit& out);
+
+// The same from clusters: what relighting the whole transfer gives, but for the compression's error.
+void relight(const CpcaTransfer& transfer, std::span<const Vec3> light, Relit& out);
 
 }  // namespace lambent

@@ -21,7 +21,7 @@ const Json* read_extension(GltfCheck& check, const Json& parent, const char* nam
 
 // `key` names a texture reference, a textureInfo of the specification.
 void read_texture_reference(GltfCheck& check, const Json& parent, const char* key, size_t texture_count, const GltfWhere& where,
-                            GltfMaterial& out) {
+                            GltfTextureUse& out) {
   const Json* info = check.object(parent, key, where);
   if (!info) return;
   out.texture = check.index(*info, "index", texture_count, where);
@@ -35,8 +35,8 @@ void read_texture_reference(GltfCheck& check, const Json& parent, const char* ke
   check.numbers(*transform, "scale", scale, where);
   double angle = check.number(*transform, "rotation", 0, where), c = std::cos(angle), s = std::sin(angle);
   // Counter-clockwise as seen with v pointing down.
-  out.material.uv_transform = {float(c * scale[0]),  float(s * scale[1]), float(offset[0]),
-                               float(-s * scale[0]), float(c * scale[1]), float(offset[1])};
+  out.transform = {float(c * scale[0]),  float(s * scale[1]), float(offset[0]),
+                   float(-s * scale[0]), float(c * scale[1]), float(offset[1])};
 }
 
 Vec3 read_color(GltfCheck& check, const Json& parent, const char* key, const GltfWhere& where) {
@@ -60,12 +60,13 @@ GltfMaterial read_material(GltfCheck& check, const Json& json, size_t texture_co
     m.base_color = read_color(check, *gloss, "diffuseFactor", where);
     m.metallic = 0.0f;
     m.roughness = 1.0f - read_share(check, *gloss, "glossinessFactor", where);
-    read_texture_reference(check, *gloss, "diffuseTexture", texture_count, where, out);
+    read_texture_reference(check, *gloss, "diffuseTexture", texture_count, where, out.base_color);
   } else if (const Json* pbr = check.object(json, "pbrMetallicRoughness", where)) {
     m.base_color = read_color(check, *pbr, "baseColorFactor", where);
     m.metallic = read_share(check, *pbr, "metallicFactor", where);
     m.roughness = read_share(check, *pbr, "roughnessFactor", where);
-    read_texture_reference(check, *pbr, "baseColorTexture", texture_count, where, out);
+    read_texture_reference(check, *pbr, "baseColorTexture", texture_count, where, out.base_color);
+    read_texture_reference(check, *pbr, "metallicRoughnessTexture", texture_count, where, out.metallic_roughness);
   }
   double factor[3] = {0, 0, 0}, strength = 1;
   check.numbers(json, "emissiveFactor", factor, where);
@@ -97,30 +98,30 @@ std::span<const uint8_t> image_bytes(GltfCheck& check, const GltfDocument& docum
 // Decoded images: those of the same bytes and wrap modes are one texture.
 class TextureReader {
  public:
-  TextureReader(GltfCheck& check, GltfDocument& document, const std::vector<std::string>& image_problems, Scene& scene)
-      : check_(check), document_(document), problems_(image_problems), scene_(scene) {}
+  TextureReader(GltfDocument& document, const std::vector<std::string>& image_problems, Scene& scene)
+      : document_(document), problems_(image_problems), scene_(scene) {}
 
   // The number in scene.textures of a glTF texture, -1 on failure.
-  int read(size_t index) {
+  int read(GltfCheck& check, size_t index) {
     GltfWhere where{"texture", index};
     const Json& texture = gltf_item(document_.json, "textures", index);
     Wrap wrap_s = Wrap::repeat, wrap_t = Wrap::repeat;
-    if (auto sampler = check_.index(texture, "sampler", gltf_count(document_.json, "samplers"), where)) {
+    if (auto sampler = check.index(texture, "sampler", gltf_count(document_.json, "samplers"), where)) {
       const Json& json = gltf_item(document_.json, "samplers", *sampler);
-      wrap_s = read_wrap(check_, json, "wrapS", {"sampler", *sampler});
-      wrap_t = read_wrap(check_, json, "wrapT", {"sampler", *sampler});
+      wrap_s = read_wrap(check, json, "wrapS", {"sampler", *sampler});
+      wrap_t = read_wrap(check, json, "wrapT", {"sampler", *sampler});
     }
-    auto image = check_.index(texture, "source", gltf_count(document_.json, "images"), where);
-    if (check_.ok() && !image) check_.fail(where, "has no PNG or JPEG image");
-    if (!check_.ok()) return -1;
+    auto image = check.index(texture, "source", gltf_count(document_.json, "images"), where);
+    if (check.ok() && !image) check.fail(where, "has no PNG or JPEG image");
+    if (!check.ok()) return -1;
 
     GltfWhere image_where{"image", *image};
-    if (!problems_[*image].empty()) check_.fail(image_where, problems_[*image]);
-    std::span<const uint8_t> bytes = image_bytes(check_, document_, *image, image_where);
+    if (!problems_[*image].empty()) check.fail(image_where, problems_[*image]);
+    std::span<const uint8_t> bytes = image_bytes(check, document_, *image, image_where);
     const Json& json = gltf_item(document_.json, "images", *image);
-    std::string name = check_.text(json, "name", image_where), uri = check_.text(json, "uri", image_where);
+    std::string name = check.text(json, "name", image_where), uri = check.text(json, "uri", image_where);
     if (name.empty()) name = uri;
-    if (!check_.ok()) return -1;
+    if (!check.ok()) return -1;
 
     auto [place, is_new] = known_.try_emplace({bytes.data(), bytes.size(), wrap_s, wrap_t}, int(scene_.textures.size()));
     if (!is_new) return place->second;
@@ -129,12 +130,14 @@ class TextureReader {
     if (twin != decoded_.end()) {
       decoded = scene_.textures[size_t(twin->second)];
     } else if (auto result = decode_texture(bytes, "", decoded); !result) {
-      check_.fail(image_where, (name.empty() ? "" : in_quotes(name) + " ") + result.error().message);
+      known_.erase(place);
+      check.fail(image_where, (name.empty() ? "" : in_quotes(name) + " ") + result.error().message);
       return -1;
     }
     pixels_ += uint64_t(decoded.width) * uint64_t(decoded.height);
     if (pixels_ > max_pixels) {
-      check_.fail(image_where, "the scene's base colour images have more than " + std::to_string(max_pixels) + " pixels");
+      known_.erase(place);
+      check.fail(image_where, "the scene's material images have more than " + std::to_string(max_pixels) + " pixels");
       return -1;
     }
     decoded_.try_emplace({bytes.data(), bytes.size()}, place->second);
@@ -147,7 +150,6 @@ class TextureReader {
  private:
   static constexpr uint64_t max_pixels = uint64_t{1} << 30;
   using Bytes = std::pair<const uint8_t*, size_t>;
-  GltfCheck& check_;
   GltfDocument& document_;
   const std::vector<std::string>& problems_;
   Scene& scene_;
@@ -173,19 +175,34 @@ std::vector<GltfMaterial> read_materials(GltfCheck& check, const GltfDocument& d
 
 bool read_textures(GltfCheck& check, GltfDocument& document, const std::vector<GltfMaterial>& materials,
                    const std::vector<bool>& used, const std::vector<std::string>& image_problems, Scene& scene) {
-  TextureReader reader(check, document, image_problems, scene);
+  TextureReader reader(document, image_problems, scene);
   size_t translucent = 0, glowing = 0;
   for (size_t i = 0; i < materials.size(); ++i) {
     if (!used[i]) continue;
     translucent += !materials[i].opaque, glowing += materials[i].emissive_texture;
-    if (!materials[i].texture) continue;
-    if (materials[i].texcoord_set > 1) {
-      return check.fail({"material", i}, "its base colour reads TEXCOORD_" + std::to_string(materials[i].texcoord_set) +
-                                             "; only sets 0 and 1 are supported");
+    auto read = [&](GltfCheck& checked, const GltfTextureUse& use, const char* what) {
+      if (use.texcoord_set <= 1) return reader.read(checked, *use.texture);
+      checked.fail({"material", i}, std::string("its ") + what + " reads TEXCOORD_" + std::to_string(use.texcoord_set) +
+                                        "; only sets 0 and 1 are supported");
+      return -1;
+    };
+    Material& m = scene.materials[i];
+    if (const GltfTextureUse& use = materials[i].base_color; use.texture) {
+      m.base_color_texture = read(check, use, "base colour");
+      m.texcoord_set = int(use.texcoord_set), m.uv_transform = use.transform;
+      if (!check.ok()) return false;
     }
-    scene.materials[i].texcoord_set = int(materials[i].texcoord_set);
-    scene.materials[i].base_color_texture = reader.read(*materials[i].texture);
-    if (!check.ok()) return false;
+    if (const GltfTextureUse& use = materials[i].metallic_roughness; use.texture) {
+      // Few look at it: the scene is still good without.
+      GltfCheck trial = check;
+      const int texture = read(trial, use, "metallic-roughness");
+      if (trial.ok()) {
+        m.metallic_roughness_texture = texture;
+        m.metallic_roughness_set = int(use.texcoord_set), m.metallic_roughness_transform = use.transform;
+      } else {
+        scene.warnings.push_back("metallic-roughness texture not read: " + trial.error().message);
+      }
+    }
   }
   warn_count(scene, translucent, " material with alpha is treated as opaque", " materials with alpha are treated as opaque");
   warn_count(scene, glowing, " material has an emissive texture, which is not read",

@@ -334,6 +334,38 @@ TEST(LoadGltf, TextureTransform) {
   EXPECT_NEAR(m[3] * 0.3f + m[4] * 0.1f + m[5], -0.6f + 0.25f, rounding);
 }
 
+TEST(LoadGltf, MetallicRoughnessTextures) {
+  Builder b = textured(make_png(2, 2, 3, 8, four_colors));
+  primitive(b)["attributes"]["TEXCOORD_1"] = b.floats({0.3f, 0.1f, 0, 0, 0, 0}, "VEC2");
+  b.json["images"].push_back({{"bufferView", b.view(make_png(1, 1, 3, 8, {9, 51, 102}))}, {"mimeType", "image/png"}});
+  b.json["textures"].push_back({{"source", 1}});
+  Json& pbr = b.json["materials"][0]["pbrMetallicRoughness"];
+  pbr["metallicRoughnessTexture"] = {{"index", 1}, {"texCoord", 1}};
+  pbr["metallicRoughnessTexture"]["extensions"]["KHR_texture_transform"] = {{"offset", {0.5, 0.25}}};
+  pbr["roughnessFactor"] = 0.5;
+  Scene s = loaded(b);
+  ASSERT_EQ(s.textures.size(), 2u);
+  EXPECT_EQ(s.materials[0].base_color_texture, 0);
+  EXPECT_EQ(s.materials[0].metallic_roughness_texture, 1);
+  EXPECT_EQ(s.materials[0].metallic_roughness_set, 1);
+  EXPECT_EQ(s.materials[0].texcoord_set, 0);
+  EXPECT_EQ(s.materials[0].metallic_roughness_transform[2], 0.5f);
+  EXPECT_EQ(s.materials[0].uv_transform, Material{}.uv_transform);
+  const Vec2 m = metallic_roughness(s, s.triangles[0], 0.2f, 0.3f);
+  EXPECT_NEAR(m.x, 102.0f / 255, rounding);
+  EXPECT_NEAR(m.y, 0.5f * 51 / 255, rounding);
+
+  // One that cannot be read is a warning; a reference to nowhere is an error.
+  Builder broken = b;
+  broken.json["images"][1] = {{"bufferView", broken.view(bytes_of("no image"))}, {"mimeType", "image/png"}};
+  s = loaded(broken);
+  EXPECT_EQ(s.materials[0].metallic_roughness_texture, -1);
+  ASSERT_EQ(s.warnings.size(), 1u);
+  EXPECT_EQ(s.warnings[0], "metallic-roughness texture not read: is neither PNG nor JPEG");
+  broken.json["materials"][0]["pbrMetallicRoughness"]["metallicRoughnessTexture"]["index"] = 7;
+  EXPECT_FALSE(broken.load());
+}
+
 TEST(LoadGltf, TexturesAreDecodedOnce) {
   Builder b = textured(make_png(2, 2, 3, 8, four_colors));
   b.json["textures"] = {{{"source", 0}, {"sampler", 0}}, {{"source", 0}, {"sampler", 0}}, {{"source", 0}}};

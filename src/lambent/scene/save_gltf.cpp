@@ -41,7 +41,12 @@ class MaterialWriter {
     if (m.base_color_texture >= 0) {
       auto texture = add_texture(size_t(m.base_color_texture));
       if (!texture) return texture.error();
-      pbr["baseColorTexture"] = texture_reference(m, *texture);
+      pbr["baseColorTexture"] = texture_reference(*texture, m.texcoord_set, m.uv_transform);
+    }
+    if (m.metallic_roughness_texture >= 0) {
+      auto texture = add_texture(size_t(m.metallic_roughness_texture));
+      if (!texture) return texture.error();
+      pbr["metallicRoughnessTexture"] = texture_reference(*texture, m.metallic_roughness_set, m.metallic_roughness_transform);
     }
     Json json = {{"pbrMetallicRoughness", std::move(pbr)}, {"doubleSided", two_sided}};
     if (!m.name.empty()) json["name"] = m.name;
@@ -63,9 +68,8 @@ class MaterialWriter {
     json["emissiveFactor"] = json_of(emissive);
   }
 
-  Json texture_reference(const Material& m, size_t texture) {
-    Json info = {{"index", texture}, {"texCoord", m.texcoord_set}};
-    const std::array<float, 6>& t = m.uv_transform;
+  Json texture_reference(size_t texture, int texcoord_set, const std::array<float, 6>& t) {
+    Json info = {{"index", texture}, {"texCoord", texcoord_set}};
     if (t != Material{}.uv_transform) {
       // uv' = rotation(angle) diag(scale) uv + offset; there is no shear to express.
       double scale_u = std::hypot(t[0], t[3]), angle = std::atan2(-double(t[3]), t[0]);

@@ -38,14 +38,24 @@ void expect_same_material(const Material& a, const Material& b, const Scene& sa,
   EXPECT_EQ(a.metallic, b.metallic);
   EXPECT_EQ(a.roughness, b.roughness);
   EXPECT_EQ(a.emissive, b.emissive);
-  ASSERT_EQ(a.base_color_texture < 0, b.base_color_texture < 0);
-  if (a.base_color_texture < 0) return;
-  EXPECT_EQ(a.texcoord_set, b.texcoord_set);
-  for (size_t i = 0; i < 6; ++i) EXPECT_NEAR(a.uv_transform[i], b.uv_transform[i], normal_rounding);
-  const Texture &ta = sa.textures[size_t(a.base_color_texture)], &tb = sb.textures[size_t(b.base_color_texture)];
-  EXPECT_EQ(ta.rgb, tb.rgb);
-  EXPECT_EQ(ta.wrap_s, tb.wrap_s);
-  EXPECT_EQ(ta.wrap_t, tb.wrap_t);
+  auto expect_same_texture = [&](int ia, int ib, const std::array<float, 6>& transform_a, const std::array<float, 6>& transform_b) {
+    ASSERT_EQ(ia < 0, ib < 0);
+    if (ia < 0) return;
+    for (size_t i = 0; i < 6; ++i) EXPECT_NEAR(transform_a[i], transform_b[i], normal_rounding);
+    const Texture &ta = sa.textures[size_t(ia)], &tb = sb.textures[size_t(ib)];
+    EXPECT_EQ(ta.rgb, tb.rgb);
+    EXPECT_EQ(ta.wrap_s, tb.wrap_s);
+    EXPECT_EQ(ta.wrap_t, tb.wrap_t);
+  };
+  expect_same_texture(a.base_color_texture, b.base_color_texture, a.uv_transform, b.uv_transform);
+  expect_same_texture(a.metallic_roughness_texture, b.metallic_roughness_texture, a.metallic_roughness_transform,
+                      b.metallic_roughness_transform);
+  if (a.base_color_texture >= 0) {
+    EXPECT_EQ(a.texcoord_set, b.texcoord_set);
+  }
+  if (a.metallic_roughness_texture >= 0) {
+    EXPECT_EQ(a.metallic_roughness_set, b.metallic_roughness_set);
+  }
 }
 
 // Positions may differ by `tolerance` times the size of the scene.
@@ -105,6 +115,7 @@ Scene made_scene() {
     m.base_color_texture = i == 3 ? -1 : i, m.texcoord_set = i % 2;
     if (i == 1) m.uv_transform = {2 * std::cos(0.3f), 3 * std::sin(0.3f), 0.5f, -2 * std::sin(0.3f), 3 * std::cos(0.3f), -0.25f};
     if (i == 2) m.uv_transform = {1, 0, 0, 0, -1, 1};  // upside down
+    if (i >= 2) m.metallic_roughness_texture = 3 - i, m.metallic_roughness_set = 1, m.metallic_roughness_transform = {2, 0, 0.5f, 0, 1, 0};
     s.materials.push_back(m);
   }
   Random random(3);

@@ -14,6 +14,15 @@ const std::array<float, 256>& decode_table() {
   return table;
 }
 
+const std::array<float, 256>& linear_table() {
+  static const std::array<float, 256> table = [] {
+    std::array<float, 256> t{};
+    for (size_t i = 0; i < t.size(); ++i) t[i] = float(i) / 255.0f;
+    return t;
+  }();
+  return table;
+}
+
 // Brings a coordinate into one period, so that the texel index below cannot overflow.
 float wrap_coordinate(float u, Wrap wrap) {
   if (!std::isfinite(u)) return 0.0f;
@@ -42,6 +51,25 @@ Tap tap(float u, int size, Wrap wrap) {
   return {size_t(wrap_texel(i, size, wrap)), size_t(wrap_texel(i + 1, size, wrap)), x - whole};
 }
 
+Vec3 sample_bytes(const Texture& texture, Vec2 uv, const std::array<float, 256>& linear) {
+  if (texture.width <= 0 || texture.height <= 0 || texture.rgb.empty()) return Vec3(1.0f);
+  Tap s = tap(uv.x, texture.width, texture.wrap_s), t = tap(uv.y, texture.height, texture.wrap_t);
+  auto texel = [&](size_t x, size_t y) {
+    const uint8_t* p = texture.rgb.data() + (y * size_t(texture.width) + x) * 3;
+    return Vec3(linear[p[0]], linear[p[1]], linear[p[2]]);
+  };
+  Vec3 top = glm::mix(texel(s.first, t.first), texel(s.second, t.first), s.share);
+  Vec3 bottom = glm::mix(texel(s.first, t.second), texel(s.second, t.second), s.share);
+  return glm::mix(top, bottom, t.share);
+}
+
+// Where a texture is looked up: the interpolated coordinates of a set, transformed.
+Vec2 texture_place(const Scene& scene, const Triangle& triangle, float u, float v, int set, const std::array<float, 6>& m) {
+  const std::vector<Vec2>& texcoords = scene.texcoords[size_t(set)];
+  Vec2 uv = texcoords.empty() ? Vec2(0.0f) : interpolate(texcoords, triangle, u, v);
+  return {m[0] * uv.x + m[1] * uv.y + m[2], m[3] * uv.x + m[4] * uv.y + m[5]};
+}
+
 }  // namespace
 
 float srgb_to_linear(float e) { return e <= 0.04045f ? e / 12.92f : std::pow((e + 0.055f) / 1.055f, 2.4f); }
@@ -58,31 +86,31 @@ Bounds bounds(const Scene& scene) {
   return box;
 }
 
-Vec3 sample_texture(const Texture& texture, Vec2 uv) {
-  if (texture.width <= 0 || texture.height <= 0 || texture.rgb.empty()) return Vec3(1.0f);
-  const std::array<float, 256>& linear = decode_table();
-  Tap s = tap(uv.x, texture.width, texture.wrap_s), t = tap(uv.y, texture.height, texture.wrap_t);
-  auto texel = [&](size_t x, size_t y) {
-    const uint8_t* p = texture.rgb.data() + (y * size_t(texture.width) + x) * 3;
-    return Vec3(linear[p[0]], linear[p[1]], linear[p[2]]);
-  };
-  Vec3 top = glm::mix(texel(s.first, t.first), texel(s.second, t.first), s.share);
-  Vec3 bottom = glm::mix(texel(s.first, t.second), texel(s.second, t.second), s.share);
-  return glm::mix(top, bottom, t.share);
-}
+Vec3 sample_texture(const Texture& texture, Vec2 uv) { return sample_bytes(texture, uv, decode_table()); }
+
+Vec3 sample_linear_texture(const Texture& texture, Vec2 uv) { return sample_bytes(texture, uv, linear_table()); }
 
 Vec3 albedo(const Scene& scene, const Triangle& triangle, float u, float v) {
   const Material& material = scene.materials[scene.parts[triangle.part].material];
   Vec3 color = material.base_color;
   if (material.base_color_texture >= 0) {
-    const std::vector<Vec2>& texcoords = scene.texcoords[size_t(material.texcoord_set)];
-    Vec2 uv = texcoords.empty() ? Vec2(0.0f) : interpolate(texcoords, triangle, u, v);
-    const std::array<float, 6>& m = material.uv_transform;
     color *= sample_texture(scene.textures[size_t(material.base_color_texture)],
-                            {m[0] * uv.x + m[1] * uv.y + m[2], m[3] * uv.x + m[4] * uv.y + m[5]});
+                            texture_place(scene, triangle, u, v, material.texcoord_set, material.uv_transform));
   }
   if (!scene.colors.empty()) color *= interpolate(scene.colors, triangle, u, v);
   return glm::clamp(color, Vec3(0.0f), Vec3(1.0f));
+}
+
+Vec2 metallic_roughness(const Scene& scene, const Triangle& triangle, float u, float v) {
+  const Material& material = scene.materials[scene.parts[triangle.part].material];
+  Vec2 value(material.metallic, material.roughness);
+  if (material.metallic_roughness_texture >= 0) {
+    Vec3 texel = sample_linear_texture(
+        scene.textures[size_t(material.metallic_roughness_texture)],
+        texture_place(scene, triangle, u, v, material.metallic_roughness_set, material.metallic_roughness_transform));
+    value *= Vec2(texel.z, texel.y);
+  }
+  return glm::clamp(value, Vec2(0.0f), Vec2(1.0f));
 }
 
 }  // namespace lambent

@@ -15,17 +15,17 @@ inline constexpr uint32_t none = 0xffffffffu;
 
 enum class Wrap : uint8_t { repeat, clamp, mirror };
 
-// A colour texture: kept encoded (PNG or JPEG) to be written back as it came, and decoded to sRGB bytes for look-ups.
+// A texture: kept encoded (PNG or JPEG) to be written back as it came, and decoded to bytes for look-ups.
 struct Texture {
   std::string name;
   std::string mime_type;         // "image/png" or "image/jpeg"
   std::vector<uint8_t> encoded;  // may be empty for a scene whose document already holds the bytes
   int width = 0, height = 0;
-  std::vector<uint8_t> rgb;  // width * height * 3, first row is v = 0 (glTF: the image's top row), sRGB-encoded
+  std::vector<uint8_t> rgb;  // width * height * 3, first row is v = 0 (glTF: the image's top row); colours are sRGB-encoded
   Wrap wrap_s = Wrap::repeat, wrap_t = Wrap::repeat;
 };
 
-// glTF metallic-roughness. The diffuse pipeline reads base colour alone.
+// glTF metallic-roughness. The diffuse pipeline reads base colour alone; reflection.h says what else there is.
 struct Material {
   std::string name;
   Vec3 base_color{1.0f};        // linear, [0, 1]
@@ -33,7 +33,11 @@ struct Material {
   int texcoord_set = 0;         // 0 or 1
   // KHR_texture_transform of the base colour: uv' = (uv_matrix rows) * (u, v, 1).
   std::array<float, 6> uv_transform{1, 0, 0, 0, 1, 0};
-  float metallic = 1.0f, roughness = 1.0f;
+  float metallic = 1.0f, roughness = 1.0f;  // factors of the texture below, [0, 1]
+  // Roughness in its green, metallic in its blue channel, linear; with a texcoord set and transform of its own.
+  int metallic_roughness_texture = -1;
+  int metallic_roughness_set = 0;
+  std::array<float, 6> metallic_roughness_transform{1, 0, 0, 0, 1, 0};
   Vec3 emissive{0.0f};       // radiance, linear
   bool double_sided = true;  // false: seen from the front only; its back is black to light and absent to cameras
 };
@@ -95,8 +99,13 @@ T interpolate(const std::vector<T>& values, const Triangle& t, float u, float v)
 // Linear base colour (factor x texture x vertex colour) at a point of a triangle, clamped to [0, 1]; bilinear texture look-up.
 Vec3 albedo(const Scene& scene, const Triangle& triangle, float u, float v);
 
+// (metallic, roughness): factors times the texture, at a point of a triangle, each in [0, 1].
+Vec2 metallic_roughness(const Scene& scene, const Triangle& triangle, float u, float v);
+
 // Bilinear look-up at texture coordinates (u, v), decoded to linear.
 Vec3 sample_texture(const Texture& texture, Vec2 uv);
+// The same for a texture whose bytes are linear: byte / 255.
+Vec3 sample_linear_texture(const Texture& texture, Vec2 uv);
 
 float srgb_to_linear(float encoded);
 float linear_to_srgb(float linear);

@@ -120,5 +120,27 @@ TEST(Albedo, MultipliesFactorTextureAndVertexColour) {
   expect_color(albedo(s, s.triangles[0], 0.0f, 1.0f), {0, 1, 0});
 }
 
+TEST(MetallicRoughnessTexture, GreenIsRoughnessBlueIsMetallicLinear) {
+  Scene s = one_triangle();
+  s.materials[0].metallic = 0.5f, s.materials[0].roughness = 0.8f;
+  auto expect_pair = [&](float u, float v, float metallic, float roughness) {
+    const Vec2 m = metallic_roughness(s, s.triangles[0], u, v);
+    EXPECT_NEAR(m.x, metallic, rounding);
+    EXPECT_NEAR(m.y, roughness, rounding);
+  };
+  expect_pair(0.2f, 0.3f, 0.5f, 0.8f);
+  s.textures.push_back(checker());
+  s.textures[0].rgb = {7, 128, 51, 7, 255, 0, 7, 0, 255, 7, 0, 0};
+  s.materials[0].metallic_roughness_texture = 0, s.materials[0].metallic_roughness_set = 1;
+  s.texcoords[1] = {{0.25f, 0.25f}, {0.75f, 0.25f}, {0.25f, 0.75f}, {0, 0}};
+  expect_pair(0, 0, 0.5f * 51 / 255, 0.8f * 128 / 255);  // not decoded from sRGB
+  expect_pair(1, 0, 0, 0.8f);
+  expect_pair(0, 1, 0.5f, 0);
+  s.materials[0].metallic_roughness_transform = {0, 1, 0, 1, 0, 0};  // u and v change places
+  expect_pair(0, 1, 0, 0.8f);
+  s.materials[0].uv_transform = {0, 1, 0, 1, 0, 0};  // of the base colour: does not matter
+  expect_pair(0, 1, 0, 0.8f);
+}
+
 }  // namespace
 }  // namespace lambent

@@ -1,0 +1,12 @@
+#pragma once
+// Which material each receiver has, for baking transfer matrices.
+#include <lambent/bake/matrix.h>
+#include <lambent/scene/reflection.h>
+
+namespace lambent {
+
+// Roughness and metallic are taken at the receiver's vertex and rounded to steps of 1/32 and 1/8, so that textures make a palette of
+// materials and not one a receiver; base colour is not rounded, since responses are linear in it (transfer/outgoing.h).
+ReceiverMaterials make_receiver_materials(const Scene& scene, const Receivers& receivers, const Reflection& reflection);
+
+}  // namespace lambent

@@ -1,0 +1,27 @@
+#pragma once
+// The BRDF of a surface point, and the frame it is read in: one rule for everything that reflects.
+#include <lambent/brdf/brdf.h>
+#include <lambent/scene/scene.h>
+
+#include <optional>
+
+namespace lambent {
+
+// How a scene's surfaces reflect.
+struct Reflection {
+  enum class Model {
+    diffuse,    // Lambert of the base colour
+    materials,  // glTF's metallic-roughness: base colour, metallic and roughness of the material, with their textures
+  };
+  Model model = Model::diffuse;
+  std::optional<Brdf> everywhere;  // stands in for both, on every surface
+};
+
+Brdf surface_brdf(const Scene& scene, const Reflection& reflection, const Triangle& triangle, float u, float v);
+
+// Columns (t, b, n), right-handed and orthonormal, about the unit shading normal n; what wi and wo of a BRDF refer to. t is the
+// direction in which u of texture coordinate set 0 grows over the triangle, v held, made square to n. Where there are none, or they
+// do not vary, it is level: +Y x n, as on a turned vase; and +X made square to n where n is upright.
+Mat3 shading_frame(const Scene& scene, const Triangle& triangle, Vec3 n);
+
+}  // namespace lambent
