@@ -4,7 +4,9 @@
 
 #include <lambent/bake/bake.h>
 #include <lambent/compress/zonal_fit.h>
+#include <lambent/core/parallel.h>
 #include <lambent/core/random.h>
+#include <lambent/relight/zonal.h>
 
 #include <algorithm>
 
@@ -84,9 +86,86 @@ void mesh_case(const std::string& name) {
   }
 }
 
+// Lobes with unit axes and random coefficients, as shading does not care.
+WritableZonalTransfer random_lobes(size_t receivers, int lobes) {
+  const WritableZonalTransfer w = make_zonal_transfer(order, lobes, 1, receivers, Precision::half);
+  parallel_for(receivers, 1 << 12, [&](size_t begin, size_t end) {
+    std::vector<float> v(w.transfer.receiver_values());
+    for (size_t r = begin; r < end; ++r) {
+      Random random(3, r);
+      for (float& x : v) x = 2 * random.next() - 1;
+      store_receiver(w, r, v);
+    }
+  });
+  return w;
+}
+
+// All on one core, light and output RGB, transfer grey.
+void shading_case() {
+  ThreadLimit one(1);
+  constexpr size_t receivers = 200'000;
+  const WritableZonalTransfer w = random_lobes(receivers, 4);
+  const ZonalTransfer& z = w.transfer;
+  std::vector<Vec3> light;
+  Random random(5);
+  for (int k = 0; k < sh_count(order); ++k) light.push_back({random.next(), random.next() - 0.5f, random.next()});
+
+  ZonalLight table;
+  const double build = least_seconds(50, [&] { specialise_light(z, light, table); });
+  report("zonal_table", 1 / build, 20000, "a second", "the aim (the paper's graphics card: 1,430)", {{"texels", ZonalLight::width * ZonalLight::height}, {"aim", ">= 1"}});
+
+  std::vector<Mat3> rotations;
+  for (size_t r = 0; r < receivers; ++r) rotations.push_back(rotation_from_yaw_pitch_roll({float(r % 360), float(r % 90), float(r % 77)}));
+  const ReceiverFrames frames = make_receiver_frames(rotations);
+  Relit out;
+  const double specialised = least_seconds(9, [&] { relight_zonal(z, &frames, table, out); });
+  const double still = least_seconds(9, [&] { relight_zonal(z, nullptr, table, out); });
+  const double direct = least_seconds(9, [&] { relight_zonal(z, &frames, light, out); });
+
+  // Plain code, one receiver at a time: equation 13, and the dot product of 36 coefficients.
+  std::vector<std::vector<float>> rows;
+  for (size_t r = 0; r < 20'000; ++r) rows.push_back(load_receiver(z, r));
+  Vec3 sum(0.0f);
+  const double plain_direct = double(receivers) / double(rows.size()) * least_seconds(3, [&] {
+    float y[sh_count(order)];
+    for (size_t r = 0; r < rows.size(); ++r) {
+      const std::vector<float>& v = rows[r];
+      for (int i = 0; i < z.lobes; ++i) {
+        evaluate_sh(order, glm::normalize(rotations[r] * lobe_axis(z, v, i)), y);
+        const float* g = v.data() + z.exact_values() + size_t(i) * z.lobe_values() + 3;
+        for (int l = z.exact_bands(); l < order; ++l)
+          for (int k = l * l; k < (l + 1) * (l + 1); ++k) sum += (g[l - z.exact_bands()] * y[k]) * light[size_t(k)];
+      }
+    }
+  });
+  const Transfer harmonics = first_receivers(random_signals(1000), receivers);
+  const float* values = reinterpret_cast<const float*>(harmonics.data.data());
+  const double plain_dot = least_seconds(5, [&] {
+    for (size_t r = 0; r < receivers; ++r) {
+      Vec3 s(0.0f);
+      for (size_t k = 0; k < size_t(sh_count(order)); ++k) s += values[r * size_t(sh_count(order)) + k] * light[k];
+      out.values[r] = s.x + s.y + s.z;
+    }
+  });
+  const double streamed = least_seconds(9, [&] { relight(harmonics, light, out); });
+  if (sum.x == 42.125f) std::fprintf(stderr, "an unlikely sum\n");  // the result is used
+  auto each = [&](double seconds) { return 1e9 * seconds / double(receivers); };
+  const nlohmann::json about{{"receivers", receivers}, {"lobes", 4}, {"threads_used", 1}};
+  auto line = [&](const char* name, double ours, double limit, const char* is, const char* aim) {
+    nlohmann::json more = about;
+    more["aim"] = aim;
+    report(name, each(ours), each(limit), "ns a receiver", is, more);
+  };
+  line("zonal_shade_turned", specialised, plain_direct, "equation 13 in plain code", "<= 0.2");
+  line("zonal_shade_turned_vs_simd", specialised, direct, "equation 13, 16 receivers side by side", "<= 1");
+  line("zonal_shade_still", still, plain_dot, "the plain dot product of 36 coefficients", "<= 1");
+  line("zonal_shade_still_vs_simd", still, streamed, "relight(): the same, 16 receivers side by side, from memory", "-");
+}
+
 }  // namespace
 
 void bench_zonal() {
+  shading_case();
   random_case();
   for (const char* name : {"bunny.obj", "armadillo.obj", "scorpion.obj"}) mesh_case(name);
 }

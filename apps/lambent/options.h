@@ -37,14 +37,14 @@ Result<View> make_view(const ViewOptions& options, const Scene& scene);
 
 struct LightOptions {
   std::string env, rotate;
-  void add_to(CLI::App& command);
+  void add_to(CLI::App& command, bool required = true);
 };
 Result<Environment> load_light(const LightOptions& options);
 Result<Mat3> light_rotation(const LightOptions& options);
 
 struct BrdfOptions {
   std::string brdf = "diffuse";
-  void add_to(CLI::App& command);
+  CLI::Option* add_to(CLI::App& command);
 };
 Result<Reflection> load_reflection(const BrdfOptions& options);
 

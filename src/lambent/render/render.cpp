@@ -19,15 +19,15 @@ Hit first_visible(const Scene& scene, const Tracer& tracer, Vec3 eye, Vec3 direc
 
 }  // namespace
 
-Result<Image> render(const Scene& scene, const Tracer& tracer, const CornerReceivers& corners, const Relit& relit,
-                     const Camera& camera, const RenderOptions& options, Progress* progress) {
+Result<Image> render_surfaces(const Scene& scene, const Tracer& tracer, const Camera& camera, const RenderOptions& options,
+                              const std::function<SurfaceShade()>& make_shade, Progress* progress) {
   Image image(options.width, options.height);
   if (!options.background) image.alpha.assign(image.rgb.size(), 0.0f);
   const CameraRays rays(camera, options.width, options.height);
   ProgressStage stage(progress, "rendering", size_t(options.height));
   parallel_for(size_t(options.height), 1, [&](size_t begin, size_t end) {
     if (stage.cancelled()) return;
-    std::vector<ViewWeights> weights(options.outgoing ? size_t(relit.rows) : 0);
+    const SurfaceShade shade = make_shade();
     for (int y = int(begin); y < int(end); ++y)
       for (int x = 0; x < options.width; ++x) {
         Vec3 sum(0.0f);
@@ -42,19 +42,7 @@ Result<Image> render(const Scene& scene, const Tracer& tracer, const CornerRecei
             continue;
           }
           ++covered;
-          const auto* corner = corners.find(hit.triangle, hit.front);
-          if (!corner) continue;
-          const auto& r = corner->receiver;
-          const float b[3] = {1 - hit.u - hit.v, hit.u, hit.v};
-          const Vec3 colour = options.albedo ? albedo(scene, scene.triangles[hit.triangle], hit.u, hit.v) : Vec3(1);
-          if (!options.outgoing) {
-            sum += colour * (b[0] * relit.at(r[0]) + b[1] * relit.at(r[1]) + b[2] * relit.at(r[2]));
-            continue;
-          }
-          for (int k = 0; k < 3; ++k) {
-            evaluate_outgoing(*options.outgoing, r[k], -direction, weights);
-            sum += b[k] * reflect_rows(weights, colour, [&](size_t row) { return relit.at(r[k], int(row)); });
-          }
+          sum += shade(hit, direction);
         }
         image.at(x, y) = sum / float(options.samples);
         if (!options.background) image.alpha[size_t(y) * size_t(options.width) + size_t(x)] = float(covered) / float(options.samples);
@@ -63,6 +51,26 @@ Result<Image> render(const Scene& scene, const Tracer& tracer, const CornerRecei
   });
   if (stage.cancelled()) return Error{"", "cancelled"};
   return image;
+}
+
+Result<Image> render(const Scene& scene, const Tracer& tracer, const CornerReceivers& corners, const Relit& relit,
+                     const Camera& camera, const RenderOptions& options, Progress* progress) {
+  return render_surfaces(scene, tracer, camera, options, [&]() -> SurfaceShade {
+    return [&, weights = std::vector<ViewWeights>(options.outgoing ? size_t(relit.rows) : 0)](const Hit& hit, Vec3 direction) mutable {
+      const auto* corner = corners.find(hit.triangle, hit.front);
+      if (!corner) return Vec3(0.0f);
+      const auto& r = corner->receiver;
+      const float b[3] = {1 - hit.u - hit.v, hit.u, hit.v};
+      const Vec3 colour = options.albedo ? albedo(scene, scene.triangles[hit.triangle], hit.u, hit.v) : Vec3(1);
+      if (!options.outgoing) return colour * (b[0] * relit.at(r[0]) + b[1] * relit.at(r[1]) + b[2] * relit.at(r[2]));
+      Vec3 sum(0.0f);
+      for (int k = 0; k < 3; ++k) {
+        evaluate_outgoing(*options.outgoing, r[k], -direction, weights);
+        sum += b[k] * reflect_rows(weights, colour, [&](size_t row) { return relit.at(r[k], int(row)); });
+      }
+      return sum;
+    };
+  }, progress);
 }
 
 }  // namespace lambent
