@@ -93,6 +93,8 @@ expect 2 'camera' render corner.glb --env uniform:1 --camera 1,2,3 -o x.png
 expect 2 'size' render corner.glb --env uniform:1 --size 0x10 -o x.png
 expect 2 'rotate' render corner.glb --env uniform:1 --env-rotate nan,0,0 -o x.png
 expect 2 'window' render corner.glb --env uniform:1 --window square -o x.png
+expect 2 'no reflection model' reference corner.obj --env uniform:1 --brdf glass -o x.png
+expect 2 'roughness must lie' reference corner.obj --env uniform:1 --brdf ggx:roughness=7 -o x.png
 expect 2 '.' bake
 expect 2 '.' nonsense
 
@@ -121,8 +123,6 @@ expect 1 'no folder' bake corner.obj -o nowhere/x.glb
 expect 1 'must end in' bake corner.obj -o x.obj
 expect 1 'must end in' render corner.glb --env uniform:1 -o x.gif
 expect 1 'sizes|size' compare a.exr difference.png
-expect 1 'no reflection model' reference corner.obj --env uniform:1 --brdf glass -o x.png
-expect 1 'roughness must lie' reference corner.obj --env uniform:1 --brdf ggx:roughness=7 -o x.png
 expect 1 'nowhere.brdf.*no such file' reference corner.obj --env uniform:1 --brdf measured:nowhere.brdf -o x.png
 printf '6 440 480 520 560 600 640\n0.1 0 0.2 1 1 2 3 nan 5 6\n' >nan.brdf
 expect 1 'nan.brdf:2: a number is not finite' reference corner.obj --env uniform:1 --brdf measured:nan.brdf -o x.png

@@ -7,6 +7,8 @@
 #include <lambent/compress/parametric.h>
 #include <lambent/compress/zonal_fit.h>
 #include <lambent/image/image.h>
+#include <lambent/light/project.h>
+#include <lambent/relight/fix_light.h>
 
 #include <fmt/format.h>
 
@@ -21,7 +23,7 @@ struct BakeCommand {
   MatrixOptions matrix;
   BrdfOptions brdf;
   ZonalFitOptions zonal;
-  std::string transfer = "diffuse", membrane, outgoing = "svd:6", output, shadows = "on", precision = "half";
+  std::string transfer = "diffuse", membrane, outgoing = "svd:6", fix_light, output, shadows = "on", precision = "half";
 };
 
 // KIND or KIND:N, where N is the number of rows (svd) or bands (sh, hemisphere, hsh).
@@ -119,6 +121,14 @@ int run_bake(Context& context, BakeCommand o) {
     if (!transfer) return fail(transfer.error());
   }
 
+  if (!o.fix_light.empty()) {
+    auto env = load_environment(o.fix_light);
+    if (!env) return fail(env.error());
+    warn(env->warnings);
+    *transfer = fix_light(*transfer, project_environment(*env, o.bake.order), env->name);
+    report.bytes = transfer->bytes();
+  }
+
   nlohmann::json provenance{
       {"generator", "lambent " LAMBENT_VERSION},
       {"input", {{"name", scene->path.substr(scene->path.find_last_of('/') + 1)}, {"xxh3_128", scene->hash}}},
@@ -128,6 +138,7 @@ int run_bake(Context& context, BakeCommand o) {
       {"report", {{"receivers", report.receivers}, {"buried", report.buried}}}};
   if (is_matrix)
     provenance["options"].update({{"brdf", o.brdf.brdf}, {"outgoing", o.outgoing}, {"incident_order", o.matrix.incident_order}});
+  if (!o.fix_light.empty()) provenance["options"]["fix_light"] = o.fix_light;
   if (report.error >= 0) provenance["report"]["error"] = report.error;
 
   ZonalFitReport fit;
@@ -204,6 +215,7 @@ void add_bake(CLI::App& app, Run& run) {
   auto* membrane = c->add_option("--membrane", o->membrane, "No simulation: thin sheets that let this share of the light through, 0 to 1, or a picture of it");
   o->brdf.brdf = "materials";
   auto* brdf = o->brdf.add_to(*c);
+  auto* fixed = c->add_option("--fix-light", o->fix_light, "Bake this environment in, so that only its brightness is left: a surface light field");
   c->add_option("--samples", o->bake.samples, "Rays a receiver")->check(CLI::Range(1, 1 << 20))->capture_default_str();
   auto* bounces = c->add_option("--bounces", o->bake.bounces, "Reflections between surfaces")->check(CLI::Range(0, 64))->capture_default_str();
   c->add_option("--shadows", o->shadows, "off: open light everywhere, no shadows and no bounces")->check(CLI::IsMember({"on", "off"}))->capture_default_str();
@@ -211,10 +223,11 @@ void add_bake(CLI::App& app, Run& run) {
       ->transform(CLI::AsSizeValue(false))->default_str("4GiB");
   c->add_option("--seed", o->bake.seed, "Of the ray directions")->capture_default_str();
   c->add_option("--precision", o->precision, "Of the stored transfer")->check(CLI::IsMember({"half", "single"}))->capture_default_str();
-  c->callback([o, bounces, lobes, membrane, incident, last, brdf, &run] {
+  c->callback([o, bounces, lobes, membrane, fixed, incident, last, brdf, &run] {
     if (o->shadows == "off" && bounces->count() && o->bake.bounces > 0)
       throw CLI::ValidationError("--shadows off has no bounces: leave --bounces out, or set it to 0");
     if (membrane->count() && o->transfer != "diffuse") throw CLI::ValidationError("--membrane is a transfer of its own: leave --transfer out");
+    if (fixed->count() && (membrane->count() || o->transfer == "zonal")) throw CLI::ValidationError("--fix-light leaves nothing to turn: it is for diffuse and matrix transfer");
     if (lobes->count() && o->transfer != "zonal") throw CLI::ValidationError("--lobes needs --transfer zonal");
     for (const CLI::Option* option : {incident, last, brdf})
       if (option->count() && o->transfer != "matrix") throw CLI::ValidationError(option->get_name() + " needs --transfer matrix");

@@ -122,7 +122,7 @@ Result<Reflection> load_reflection(const BrdfOptions& options) {
     return reflection;
   }
   auto brdf = parse_brdf(options.brdf);
-  if (!brdf) return Error{"--brdf", brdf.error().text()};
+  if (!brdf) return options.brdf.starts_with("measured:") ? brdf.error() : Error{"--brdf", brdf.error().text()};
   reflection.everywhere = std::move(*brdf);
   return reflection;
 }

@@ -121,7 +121,7 @@ Result<std::vector<T>> read_values(const GltfChunks& chunks, const json& object,
   if (bytes->size() != count * sizeof(T))
     return Error{where, std::string("\"") + key + "\" holds " + std::to_string(bytes->size()) + " bytes where " + std::to_string(count * sizeof(T)) + " belong"};
   std::vector<T> values(count);
-  if (count) std::memcpy(values.data(), bytes->data(), bytes->size());
+  if (count) std::memcpy(static_cast<void*>(values.data()), bytes->data(), bytes->size());
   return values;
 }
 
