@@ -371,5 +371,27 @@ void relight_zonal(const ZonalTransfer& t, const ReceiverFrames* frames, const Z
   });
 }
 
+Vec3 shade_zonal(const ZonalTransfer& t, std::span<const float> values, const Mat3& R, std::span<const Vec3> light) {
+  LAMBENT_CHECK(values.size() == t.receiver_values() && light.size() >= size_t(sh_count(t.order)));
+  const size_t exact = size_t(t.exact_bands()), exact_count = exact * exact, bands = size_t(t.order) - exact;
+  Vec3 sum(0.0f);
+  for (int c = 0; c < 3; ++c) {
+    const float* f = values.data() + (t.channels == 3 ? size_t(c) * exact_count : 0);
+    sum[c] = f[0] * light[0][c];
+    if (exact == 2) sum[c] += glm::dot(R * Vec3(-f[3], -f[1], f[2]), Vec3(-light[3][c], -light[1][c], light[2][c]));
+  }
+  float y[sh_count(max_sh_order)];
+  for (int i = 0; i < t.lobes; ++i) {
+    evaluate_sh(t.order, normalize_or(R * lobe_axis(t, values, i), {0, 0, 1}), y);
+    const float* g = values.data() + t.exact_values() + size_t(i) * t.lobe_values() + 3;
+    for (size_t l = exact; l < size_t(t.order); ++l) {
+      Vec3 band(0.0f);
+      for (size_t k = l * l; k < (l + 1) * (l + 1); ++k) band += y[k] * light[k];
+      for (int c = 0; c < 3; ++c) sum[c] += g[(t.channels == 3 ? size_t(c) * bands : 0) + l - exact] * band[c];
+    }
+  }
+  return sum;
+}
+
 }  // namespace lambent
 #endif

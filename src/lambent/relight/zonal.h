@@ -19,6 +19,9 @@ ReceiverFrames make_receiver_frames(std::span<const Mat3> rotations);
 // call to call. Sizes `out` on first use and allocates nothing after that.
 void relight_zonal(const ZonalTransfer& transfer, const ReceiverFrames* frames, std::span<const Vec3> light, Relit& out);
 
+// The same for one receiver, given its values, turned by R: for light that varies from place to place, and for textures.
+Vec3 shade_zonal(const ZonalTransfer& transfer, std::span<const float> values, const Mat3& R, std::span<const Vec3> light);
+
 // One light for many receivers: a table of the light's bands by direction (eq. 24), [row][column][4 bands at a time][r, g, b, 0][4].
 // Rows go from pole to pole, both included; columns once around, the first repeated at the end.
 struct ZonalLight {
