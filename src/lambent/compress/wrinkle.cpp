@@ -133,8 +133,8 @@ Result<WrinkleTable> make_wrinkle_table(const WrinkleOptions& o) {
         if (psi < best * advantage) best = psi, row[x] = found, best_g = g;
       };
       if (!above[x].empty()) attempt(Axes(above[x]), 1);
-      if (x > 0) attempt(Axes(row[x - 1]), 0.9);  // what continues the depth is preferred
-      if (above[x].empty() && x == 0) {
+      else if (x > 0) attempt(Axes(row[x - 1]), 1);
+      else {
         // The linear lobe, and others symmetric about it in the cross-section and along the groove.
         const glm::dvec3 axis(linear_axis(t)), along(0, 1, 0), across = glm::normalize(glm::cross(along, axis));
         for (double angle = 0.2; angle < 1.5; angle += 0.1)

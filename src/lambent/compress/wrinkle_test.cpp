@@ -24,7 +24,7 @@ TEST(Wrinkle, NoGrooveIsAnOpenPlane) {
 
 // The cross-section's simulation against the baker, on a long groove.
 TEST(Wrinkle, IsWhatTheBakeOfALongGrooveFinds) {
-  constexpr int across = 96, along = 40;
+  constexpr int across = 192, along = 40;
   constexpr float depth = 0.7f, length = 60;
   std::vector<Vec3> positions, normals;
   std::vector<uint32_t> indices;
@@ -52,16 +52,9 @@ TEST(Wrinkle, IsWhatTheBakeOfALongGrooveFinds) {
   auto transfer = bake(scene, *tracer, receivers, options);
   ASSERT_TRUE(transfer);
   const std::vector<float> ours = simulate_wrinkle(6, 32, depth, 0.5f);
-  // Places (i + 1/2) / 32 - 1/2 lie at every grid line but one: x = 3 i / 96 - 3/2 = (2 place + 1) / 64 - 1/2 has no solution, so take means.
-  for (int place : {0, 5, 12, 16, 25}) {
-    std::vector<float> mean(36);
-    for (int side : {0, 1}) {
-      const size_t i = size_t(place + 32 + side);
-      const std::vector<float> row = load_receiver(*transfer, receivers.front[size_t(along / 2 * (across + 1)) + i]);
-      for (size_t k = 0; k < 36; ++k) mean[k] += 0.5f * row[k];
-    }
-    // Noise of 4,096 rays, facets, and the curvature over one step.
-    EXPECT_LT(distance(mean, &ours[size_t(place) * 36]), 0.03) << place;
+  for (int place : {0, 5, 12, 16, 25}) {  // (place + 1/2) / 32 - 1/2 = 3 i / 192 - 3/2
+    const std::vector<float> row = load_receiver(*transfer, receivers.front[size_t(along / 2 * (across + 1) + 65 + 2 * place)]);
+    EXPECT_LT(distance(row, &ours[size_t(place) * 36]), 0.03) << place;  // noise of 4,096 rays, and facets
   }
 }
 
@@ -69,20 +62,25 @@ TEST(Wrinkle, LobesCorrespondSoThatTheTableInterpolates) {
   auto table = make_wrinkle_table({});
   ASSERT_TRUE(table);
   EXPECT_LT(table->rms, 0.05);
-  // Between the entries, in place and depth.
-  double worst = 0, error = 0, total = 0;
-  for (float depth : {0.2f, 0.45f, 0.8f}) {
-    const float d = (std::floor(depth * 32) + 0.5f) / 32;
-    const std::vector<float> exact = simulate_wrinkle(6, 64, d, 0.5f);
+  // Between the entries, in place and depth. What interpolation of the exact vectors would miss is counted as well: the table's lobes must
+  // not add much to it, as they would if they were mixed up.
+  double error = 0, plain = 0, total = 0;
+  for (int row : {6, 14, 25}) {
+    const std::vector<float> exact = simulate_wrinkle(6, 64, (float(row) + 1.5f) / 32, 0.5f);
+    const std::vector<float> above = simulate_wrinkle(6, 32, (float(row) + 1) / 32, 0.5f), below = simulate_wrinkle(6, 32, (float(row) + 2) / 32, 0.5f);
     for (int place = 1; place < 63; ++place) {
-      const float x = (float(place) + 0.5f) / 64 - 0.5f;
-      const std::vector<float> fit = zonal_harmonics(table->transfer, sample_wrinkle(*table, x, d));
-      worst = std::max(worst, distance(fit, &exact[size_t(place) * 36]));
-      for (size_t k = 0; k < 36; ++k) error += std::pow(fit[k] - exact[size_t(place) * 36 + k], 2), total += std::pow(exact[size_t(place) * 36 + k], 2);
+      const float x = (float(place) + 0.5f) / 64 - 0.5f, p = (x + 0.5f) * 32 - 0.5f, f = p - std::floor(p);
+      const size_t i = size_t(p) * 36;
+      const std::vector<float> fit = zonal_harmonics(table->transfer, sample_wrinkle(*table, x, (float(row) + 1.5f) / 32));
+      for (size_t k = 0; k < 36; ++k) {
+        const double t = exact[size_t(place) * 36 + k];
+        const double mean = 0.5 * ((1 - f) * (above[i + k] + below[i + k]) + f * (above[i + 36 + k] + below[i + 36 + k]));
+        error += std::pow(fit[k] - t, 2), plain += std::pow(mean - t, 2), total += t * t;
+      }
     }
   }
-  EXPECT_LT(std::sqrt(error / total), 2 * table->rms + 0.01);
-  EXPECT_LT(worst, 0.25);
+  std::printf("entries %.4f, between %.4f, exact vectors between %.4f\n", table->rms, std::sqrt(error / total), std::sqrt(plain / total));
+  EXPECT_LT(std::sqrt(error / total), std::sqrt(plain / total) + 1.5 * table->rms);
 }
 
 TEST(Wrinkle, RefusesWhatMakesNoSense) {

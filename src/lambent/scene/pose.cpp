@@ -14,12 +14,12 @@ namespace {
 
 using Json = nlohmann::json;
 
-// The least rotation that takes unit a to unit b. Opposite ones: half a turn about some axis across.
+// The least rotation that takes unit a to unit b. Where they are (nearly) opposite, by way of a direction across.
 glm::dmat3 least_rotation(glm::dvec3 a, glm::dvec3 b) {
   const double c = glm::dot(a, b);
-  if (c < -1 + 1e-9) {
-    const glm::dvec3 across = glm::dvec3(frame_about(Vec3(a))[0]);
-    return 2.0 * glm::outerProduct(across, across) - glm::dmat3(1.0);
+  if (c < -1 + 1e-6) {
+    const glm::dvec3 across = glm::normalize(glm::cross(a, glm::dvec3(frame_about(Vec3(a))[1])));
+    return least_rotation(across, b) * least_rotation(a, across);
   }
   const glm::dvec3 v = glm::cross(a, b);
   const glm::dmat3 K(glm::dvec3(0, v.z, -v.y), glm::dvec3(-v.z, 0, v.x), glm::dvec3(v.y, -v.x, 0));
@@ -101,7 +101,7 @@ Result<std::vector<GltfAnimation>> animations_of(const Scene& scene) {
 }  // namespace
 
 Mat3 pose_rotation(const glm::dmat3& F, Vec3 rest_normal, Vec3 normal) {
-  const glm::dvec3 a(rest_normal), b(normal);
+  const glm::dvec3 a = glm::normalize(glm::dvec3(rest_normal)), b = glm::normalize(glm::dvec3(normal));
   const std::optional<glm::dmat3> R = orthogonal_part(F);
   return Mat3(R ? least_rotation(glm::normalize(*R * a), b) * *R : least_rotation(a, b));
 }
