@@ -35,5 +35,6 @@ void bench_basis();
 void bench_radiosity();
 void bench_relight();
 void bench_scaling();
+void bench_zonal();
 
 }  // namespace lambent::bench

@@ -110,6 +110,35 @@ expect 2 'no material' bake box.obj --transfer lightmap --emit sofa=1,1,1 -o x.g
 expect 2 'env' render prt.glb -o x.png
 expect 2 'lamps' reference box.obj -o x.png
 
+# Zonal lobes: closer with more of them, turning with what moves; a texture of them; a membrane.
+expect 0 '"rms"' compress corner.glb --zonal 4 -o lobes.glb --view-error error.png --size 40x40 --json
+expect 0 'zonal lobes' inspect lobes.glb
+expect 0 'relit' render lobes.glb --env uniform:1,0.5,0.25 --camera 3,2,4,1,0.5,1,40 --size 48x32 --spp 64 -o lobes.exr --background none
+expect 0 '"psnr"' compare lobes.exr a.exr --json
+psnr=$(sed -n 's/.*"psnr": \([0-9]*\).*/\1/p' stdout)
+[ "${psnr:-0}" -ge 40 ] && ok || bad "lobes and harmonics differ: PSNR ${psnr:-none}"
+expect 0 'relit' render lobes.glb --env sky:elevation=40 --deform twist:50,y --size 40x40 -o twisted.png
+expect 0 'cannot turn' render corner.glb --env sky:elevation=40 --deform bend:50,x,y --size 40x40 -o bent.png
+expect 0 'lobes' bake corner.obj --max-edge 0.5 --samples 64 --transfer zonal --lobes 2 -o direct.glb
+expect 0 'paths' reference corner.obj --env uniform:1 --deform twist:50 --size 16x16 --spp 1 -o twisted.exr
+expect 0 'membrane' bake corner.obj --membrane 0.4 -o membrane.glb
+expect 0 'RMS' patch sky.png --size 8 --samples 64 --lobes 3 -o relief.lpt
+expect 0 'texels' render corner.obj --transfer-texture relief.lpt --tile 2,2 --env sky:elevation=40 --size 24x24 -o relief.png
+expect 1 'no animation|not glTF' render corner.glb --env uniform:1 --animation walk -o x.png
+expect 1 'no animation|not glTF' reference corner.obj --env uniform:1 --animation 0 -o x.png
+expect 1 'diffuse transfer' compress lobes.glb --zonal 2 -o x.glb
+expect 1 'corner.obj' render corner.obj --transfer-texture corner.obj --env uniform:1 -o x.png
+head -c 200 relief.lpt >cut.lpt
+expect 1 'cut.lpt' render corner.obj --transfer-texture cut.lpt --env uniform:1 -o x.png
+expect 1 'alpha|coordinates|no such' bake corner.obj --membrane missing.png -o x.glb
+expect 2 'zonal|lobes' compress corner.glb --zonal 0 -o x.glb
+expect 2 'zonal|lobes' compress corner.glb --zonal 100 -o x.glb
+expect 2 'lobes' bake corner.obj --lobes 4 -o x.glb
+expect 2 'deform' render corner.glb --env uniform:1 --deform melt:3 -o x.png
+expect 2 'animation' render corner.glb --env uniform:1 --time 1 -o x.png
+expect 2 'frames' render corner.glb --env uniform:1 --animation 0 --frames 3:1 -o x.png
+expect 2 'membrane' bake corner.obj --membrane 1.5 -o x.glb
+expect 2 'tile' render corner.obj --transfer-texture relief.lpt --tile 1 --env uniform:1 -o x.png
 # Usage: exit 2.
 expect 2 'order' bake corner.obj --order 0 -o x.glb
 expect 2 'order' bake corner.obj --order 1000 -o x.glb

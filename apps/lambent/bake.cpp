@@ -5,6 +5,9 @@
 #include <lambent/bake/bake.h>
 #include <lambent/bake/materials.h>
 #include <lambent/baked/baked_file.h>
+#include <lambent/compress/parametric.h>
+#include <lambent/compress/zonal_fit.h>
+#include <lambent/image/image.h>
 #include <lambent/light/project.h>
 #include <lambent/relight/fix_light.h>
 
@@ -20,7 +23,8 @@ struct BakeCommand {
   BakeOptions bake;
   MatrixOptions matrix;
   BrdfOptions brdf;
-  std::string transfer = "diffuse", outgoing = "svd:6", fix_light, output, shadows = "on", precision = "half", bounces = "3";
+  ZonalFitOptions zonal;
+  std::string transfer = "diffuse", membrane, outgoing = "svd:6", fix_light, output, shadows = "on", precision = "half", bounces = "3";
   ReceiverFlags receivers;
   LightmapFlags lightmap;
   bool order_given = false;
@@ -43,6 +47,43 @@ Result<void> parse_outgoing(const std::string& text, MatrixOptions& matrix) {
   return {};
 }
 
+// What share of the light a sheet lets through at each receiver: one number, or a picture's luminance at its texture coordinates.
+Result<std::vector<float>> membrane_alphas(const std::string& text, const Scene& scene, const Receivers& receivers) {
+  if (auto number = parse_numbers(text, 1, "--membrane")) {
+    if (!((*number)[0] >= 0 && (*number)[0] <= 1)) return Error{"--membrane", "lets through a share from 0 to 1, not " + text};
+    return std::vector<float>(receivers.count(), (*number)[0]);
+  }
+  auto picture = load_image(text);
+  if (!picture) return picture.error();
+  if (scene.texcoords[0].empty()) return Error{scene.path, "has no texture coordinates to look the membrane's picture up by"};
+  std::vector<float> alphas(receivers.count());
+  for (const auto* map : {&receivers.front, &receivers.back})
+    for (size_t v = 0; v < map->size(); ++v) {
+      if ((*map)[v] == none) continue;
+      const Vec2 uv = scene.texcoords[0][v] - glm::floor(scene.texcoords[0][v]);
+      const int x = std::min(int(uv.x * float(picture->width)), picture->width - 1), y = std::min(int(uv.y * float(picture->height)), picture->height - 1);
+      const float alpha = luminance(picture->at(x, y));
+      alphas[(*map)[v]] = std::isfinite(alpha) ? std::clamp(alpha, 0.0f, 1.0f) : 0.0f;
+    }
+  return alphas;
+}
+
+int bake_membrane(Context& context, const BakeCommand& o) {
+  auto scene = load_prepared_scene(o.scene);
+  if (!scene) return fail(scene.error());
+  const Receivers receivers = make_vertex_receivers(*scene);
+  auto alphas = membrane_alphas(o.membrane, *scene, receivers);
+  if (!alphas) return fail(alphas.error());
+  const ZonalTransfer transfer = membrane_transfer(o.bake.order, receivers.normals, *alphas, o.bake.precision);
+  const nlohmann::json provenance{{"generator", "lambent " LAMBENT_VERSION},
+                                  {"input", {{"name", scene->path.substr(scene->path.find_last_of('/') + 1)}, {"xxh3_128", scene->hash}}},
+                                  {"options", {{"order", o.bake.order}, {"membrane", o.membrane}, {"precision", o.precision}}}};
+  if (auto ok = save_baked(o.output, *scene, receivers, transfer, provenance.dump()); !ok) return fail(ok.error());
+  if (context.json) print_json({{"output", o.output}, {"receivers", transfer.receivers}, {"bytes", transfer.bytes()}});
+  else fmt::print("{}\n  a membrane at {} receivers, one lobe each, {}\n", o.output, human_count(transfer.receivers), human_bytes(double(transfer.bytes())));
+  return success;
+}
+
 using Clock = std::chrono::steady_clock;
 double seconds_since(Clock::time_point start) { return std::chrono::duration<double>(Clock::now() - start).count(); }
 
@@ -61,8 +102,11 @@ int run_bake(Context& context, BakeCommand o) {
   o.bake.shadows = o.shadows == "on";
   if (!o.bake.shadows) o.bake.bounces = 0;
   o.bake.precision = o.precision == "half" ? Precision::half : Precision::single;
-  const bool is_matrix = o.transfer == "matrix";
+  const bool is_matrix = o.transfer == "matrix", is_zonal = o.transfer == "zonal";
+  o.zonal.precision = o.bake.precision;
+  if (is_zonal) o.bake.precision = Precision::single;  // it is rounded once, as lobes
   if (auto ok = check_output(o.output, {"glb"}); !ok) return fail(ok.error());
+  if (!o.membrane.empty()) return bake_membrane(context, o);
   if (is_matrix)
     if (auto ok = parse_outgoing(o.outgoing, o.matrix); !ok) return fail(ok.error());
   auto reflection = load_reflection(o.brdf);
@@ -74,7 +118,8 @@ int run_bake(Context& context, BakeCommand o) {
   auto placed = place_receivers(*scene, o.receivers, "vertices");
   if (!placed) return fail(placed.error());
   const Receivers& receivers = placed->receivers;
-  if (is_matrix && !std::holds_alternative<CornerReceivers>(receivers.basis)) return fail({"--receivers", "--transfer matrix is baked at vertices"});
+  if ((is_matrix || is_zonal) && !std::holds_alternative<CornerReceivers>(receivers.basis))
+    return fail({"--receivers", "--transfer " + o.transfer + " is baked at vertices"});
   const double load_seconds = seconds_since(start);
 
   start = Clock::now();
@@ -115,8 +160,21 @@ int run_bake(Context& context, BakeCommand o) {
   if (!o.fix_light.empty()) provenance["options"]["fix_light"] = o.fix_light;
   if (report.error >= 0) provenance["report"]["error"] = report.error;
 
+  ZonalFitReport fit;
+  std::optional<ZonalTransfer> zonal;
+  if (is_zonal) {
+    auto fitted = fit_zonal(*transfer, o.zonal, &fit, &context.progress);
+    if (!fitted) return fail(fitted.error());
+    zonal = std::move(*fitted);
+    report.bytes = zonal->bytes();
+    provenance["zonal"] = {{"lobes", o.zonal.lobes}, {"rms", fit.rms}};
+  }
+
   start = Clock::now();
-  if (auto ok = save_baked(o.output, *scene, receivers, *transfer, provenance.dump(), {.outgoing = outgoing ? &*outgoing : nullptr}); !ok) return fail(ok.error());
+  if (auto ok = zonal ? save_baked(o.output, *scene, receivers, *zonal, provenance.dump())
+                      : save_baked(o.output, *scene, receivers, *transfer, provenance.dump(), {.outgoing = outgoing ? &*outgoing : nullptr});
+      !ok)
+    return fail(ok.error());
   const double save_seconds = seconds_since(start);
 
   const double bytes_each = double(report.bytes) / double(report.receivers);
@@ -137,6 +195,7 @@ int run_bake(Context& context, BakeCommand o) {
                           {"operator_bytes", report.operator_bytes},
                           {"operator_kept", report.operator_kept},
                           {"working_memory", report.working_memory}};
+    if (zonal) result["zonal"] = {{"lobes", zonal->lobes}, {"rms", fit.rms}, {"seconds", fit.seconds}};
     result["error"] = report.error >= 0 ? nlohmann::json(report.error) : nlohmann::json();
     print_json(result);
     return success;
@@ -150,6 +209,7 @@ int run_bake(Context& context, BakeCommand o) {
              human_seconds(report.trace_seconds), human_seconds(report.bounce_seconds), human_seconds(save_seconds));
   fmt::print("  size       {} a receiver, {} in all (order {}, {} row{}, {} channel{}, {})\n", human_bytes(bytes_each), human_bytes(double(report.bytes)),
              transfer->light.order, transfer->rows, transfer->rows == 1 ? "" : "s", transfer->channels, transfer->channels == 1 ? "" : "s", o.precision);
+  if (zonal) fmt::print("  lobes      {}, fitted in {}, with an error of {:.2f}% RMS\n", zonal->lobes, human_seconds(fit.seconds), 100 * fit.rms);
   if (report.operator_kept < 1)
     fmt::print("  memory     {:.0f}% of the gather operator fitted; the rest was traced again for each bounce\n", 100 * report.operator_kept);
   if (report.error >= 0) fmt::print("  error      {:.2f}% RMS, estimated from half-sample gathers\n", 100 * report.error);
@@ -164,16 +224,18 @@ void add_bake(CLI::App& app, Run& run) {
   o->scene.add_to(*c);
   c->add_option("-o,--output", o->output, "Baked file to write (.glb)")->required();
   c->add_option("--transfer", o->transfer, "What is stored: diffuse, a vector a receiver for distant light; matrix, incident light in every direction, "
-                                           "for glossy materials; lightmap, the light of the scene's own lamps")
-      ->check(CLI::IsMember({"diffuse", "matrix", "lightmap"}))->capture_default_str();
+                                           "for glossy materials; zonal, lobes, for what moves; lightmap, the light of the scene's own lamps")
+      ->check(CLI::IsMember({"diffuse", "matrix", "zonal", "lightmap"}))->capture_default_str();
   auto* order = c->add_option("--order", o->bake.order, "Bands of the lighting's spherical harmonics")->check(CLI::Range(1, max_sh_order))->capture_default_str();
+  auto* lobes = c->add_option("--lobes", o->zonal.lobes, "zonal: lobes a receiver")->check(CLI::Range(1, max_stored_lobes))->capture_default_str();
   auto* incident = c->add_option("--incident-order", o->matrix.incident_order, "matrix: bands of incident light")
                        ->check(CLI::Range(1, max_incident_order))->capture_default_str();
   auto* last = c->add_option("--outgoing", o->outgoing, "matrix: rows for the last reflection: map, svd:ROWS, sh:BANDS, hemisphere:BANDS, hsh:BANDS")
                    ->capture_default_str();
+  auto* membrane = c->add_option("--membrane", o->membrane, "No simulation: thin sheets that let this share of the light through, 0 to 1, or a picture of it");
   o->brdf.brdf = "materials";
   auto* brdf = o->brdf.add_to(*c);
-  c->add_option("--fix-light", o->fix_light, "Bake this environment in, so that only its brightness is left: a surface light field");
+  auto* fixed = c->add_option("--fix-light", o->fix_light, "Bake this environment in, so that only its brightness is left: a surface light field");
   c->add_option("--samples", o->bake.samples, "Rays a receiver")->check(CLI::Range(1, 1 << 20))->capture_default_str();
   auto* bounces = c->add_option("--bounces", o->bounces, "Reflections between surfaces, 0 to 64; lightmaps also converge:EPS, as many as leave that residual")
                       ->capture_default_str();
@@ -184,10 +246,13 @@ void add_bake(CLI::App& app, Run& run) {
   c->add_option("--precision", o->precision, "Of the stored transfer")->check(CLI::IsMember({"half", "single"}))->capture_default_str();
   o->receivers.add_to(*c);
   o->lightmap.add_to(*c);
-  c->callback([o, bounces, order, incident, last, brdf, &run] {
+  c->callback([o, bounces, order, lobes, membrane, fixed, incident, last, brdf, &run] {
     o->order_given = order->count() > 0;
     if (o->shadows == "off" && bounces->count() && o->bounces != "0")
       throw CLI::ValidationError("--shadows off has no bounces: leave --bounces out, or set it to 0");
+    if (membrane->count() && o->transfer != "diffuse") throw CLI::ValidationError("--membrane is a transfer of its own: leave --transfer out");
+    if (fixed->count() && (membrane->count() || o->transfer == "zonal")) throw CLI::ValidationError("--fix-light leaves nothing to turn: it is for diffuse and matrix transfer");
+    if (lobes->count() && o->transfer != "zonal") throw CLI::ValidationError("--lobes needs --transfer zonal");
     for (const CLI::Option* option : {incident, last, brdf})
       if (option->count() && o->transfer != "matrix") throw CLI::ValidationError(option->get_name() + " needs --transfer matrix");
     if (o->transfer == "matrix" && o->shadows == "off") throw CLI::ValidationError("--transfer matrix is always baked with shadows");

@@ -63,6 +63,20 @@ int inspect_picture(Context& context, const std::string& path) {
   return success;
 }
 
+int inspect_zonal(Context& context, const std::string& path, const Baked& baked) {
+  const ZonalTransfer& t = *baked.zonal;
+  const nlohmann::json d{{"file", path}, {"kind", "baked"}, {"scene", describe_scene(baked.scene)},
+                         {"transfer", {{"kind", "zonal"}, {"order", t.order}, {"lobes", t.lobes}, {"channels", t.channels}, {"receivers", t.receivers},
+                                       {"bytes", t.bytes()}, {"precision", t.precision == Precision::half ? "half" : "single"}}},
+                         {"provenance", nlohmann::json::parse(baked.provenance, nullptr, false)}};
+  if (context.json) return print_json(d), success;
+  fmt::print("{}\n  baked: {} zonal lobes, order {}, {} channel{}, {} receivers, {} ({})\n", path, t.lobes, t.order, t.channels,
+             t.channels == 1 ? "" : "s", human_count(t.receivers), human_bytes(double(t.bytes())), t.precision == Precision::half ? "half" : "single");
+  print_scene(d["scene"]);
+  fmt::print("  provenance {}\n", d["provenance"].dump(-1, ' ', false, nlohmann::json::error_handler_t::replace));
+  return success;
+}
+
 int run_inspect(Context& context, const std::string& path) {
   const std::string extension = file_extension(path);
   if (std::set<std::string>{"hdr", "exr", "png", "jpg", "jpeg"}.contains(extension)) return inspect_picture(context, path);
@@ -70,6 +84,7 @@ int run_inspect(Context& context, const std::string& path) {
     auto baked = load_baked(path);
     if (!baked) return fail(baked.error());
     const Transfer& t = baked->transfer;
+    if (baked->zonal) return inspect_zonal(context, path, *baked);
     nlohmann::json d{{"file", path}, {"kind", "baked"}, {"scene", describe_scene(baked->scene)},
                      {"transfer", {{"kind", baked->outgoing ? "matrix" : "diffuse"}, {"order", t.light.order}, {"columns", t.columns()}, {"rows", t.rows}, {"channels", t.channels}, {"receivers", t.receivers}, {"bytes", t.bytes()},
                                    {"precision", t.precision == Precision::half ? "half" : "single"}}},

@@ -1,4 +1,5 @@
 #include "commands.h"
+#include "motion.h"
 #include "options.h"
 
 #include <lambent/light/project.h>
@@ -15,6 +16,7 @@ struct ReferenceCommand {
   SceneOptions scene;
   LightOptions light;
   ViewOptions view;
+  MotionOptions motion;
   BrdfOptions brdf;
   ShWindow window = ShWindow::none;
   int light_order = 0;
@@ -30,6 +32,9 @@ int run_reference(Context& context, ReferenceCommand o) {
   o.options.reflection = std::move(*reflection);
   auto scene = load_prepared_scene(o.scene);
   if (!scene) return fail(scene.error());
+  auto poses = make_poses(o.motion, *scene);
+  if (!poses) return fail(poses.error());
+  if (poses->front()) *scene = posed(*scene, *poses->front());
   auto view = make_view(o.view, *scene);
   if (!view) return fail(view.error());
   if (o.light.env.empty() && !o.options.lamps) return fail({"--env", "is needed, or --lamps"});
@@ -66,6 +71,7 @@ void add_reference(CLI::App& app, Run& run) {
   o->scene.add_to(*c);
   o->light.add_to(*c, false);
   o->view.add_to(*c);
+  o->motion.add_to(*c, false);
   o->brdf.add_to(*c);
   c->add_option("--light-order", o->light_order, "Light by the environment's projection to this many bands, negative light included")
       ->check(CLI::Range(1, max_sh_order));

@@ -1,11 +1,14 @@
 #include "commands.h"
+#include "motion.h"
 #include "options.h"
 
 #include <lambent/bake/materials.h>
 #include <lambent/baked/baked_file.h>
 #include <lambent/light/project.h>
-#include <lambent/relight/relight.h>
+#include <lambent/relight/zonal.h>
 #include <lambent/render/render.h>
+#include <lambent/render/transfer_texture.h>
+#include <lambent/scene/load.h>
 
 #include <fmt/format.h>
 
@@ -17,9 +20,10 @@ namespace lambent::tool {
 namespace {
 
 struct RenderCommand {
-  std::string baked;
+  std::string baked, texture, tile = "1,1";
   LightOptions light;
   ViewOptions view;
+  MotionOptions motion;
   BrdfOptions brdf;
   bool new_brdf = false;
   ShWindow window = ShWindow::none;
@@ -28,6 +32,48 @@ struct RenderCommand {
   std::vector<std::string> lamps;  // NAME=R,G,B
 };
 
+// Any mesh, animated or not, with a transfer texture on it.
+int run_textured(Context& context, const RenderCommand& o) {
+  if (auto ok = check_output(o.view.output, {"png", "exr"}); !ok) return fail(ok.error());
+  auto rotation = light_rotation(o.light);
+  if (!rotation) return fail(rotation.error());
+  if (o.light.env.empty()) return fail({"--env", "is needed: an environment to light the scene by"});
+  auto tile = parse_numbers(o.tile, 2, "--tile");
+  if (!tile) return fail(tile.error());
+  auto texture = load_zonal_texture(o.texture);
+  if (!texture) return fail(texture.error());
+  auto scene = load_scene(o.baked);
+  if (!scene) return fail(scene.error());
+  warn(scene->warnings);
+  if (scene->texcoords[0].empty()) warn(o.baked + ": has no texture coordinates, so that the transfer texture shows as one colour");
+  auto poses = make_poses(o.motion, *scene);
+  if (!poses) return fail(poses.error());
+  auto env = load_light(o.light);
+  if (!env) return fail(env.error());
+  const int order = o.light_order ? std::min(o.light_order, texture->transfer.order) : texture->transfer.order;
+  std::vector<Vec3> light = rotate_sh(make_sh_rotation(order, *rotation), project_environment(*env, order));
+  apply_sh_window(o.window, light);
+  light.resize(size_t(sh_count(texture->transfer.order)), Vec3(0.0f));
+  Environment turned;
+  if (o.view.background == "env") turned = o.light.rotate.empty() ? std::move(*env) : rotated(*env, *rotation);
+  std::vector<Image> images;
+  Result<View> view = Error{};
+  for (const std::optional<Pose>& pose : *poses) {
+    const Scene moved = pose ? posed(*scene, *pose) : *scene;
+    if (images.empty()) view = make_view(o.view, moved);
+    if (!view) return fail(view.error());
+    auto tracer = Tracer::build(moved);
+    if (!tracer) return fail(tracer.error());
+    RenderOptions options{view->width, view->height, o.samples, nullptr, !o.no_albedo};
+    if (o.view.background == "env") options.background = &turned;
+    auto image = render_transfer_texture(moved, *tracer, *texture, {(*tile)[0], (*tile)[1]}, light, view->camera, options, &context.progress);
+    if (!image) return fail(image.error());
+    images.push_back(std::move(*image));
+  }
+  if (auto ok = save_image(o.view.output, images.size() > 1 ? beside(images) : images.front(), o.view.exposure); !ok) return fail(ok.error());
+  if (context.json) print_json({{"output", o.view.output}, {"texels", texture->transfer.receivers}, {"frames", images.size()}});
+  else fmt::print("{}\n  {} x {} texels of {} lobes\n", o.view.output, texture->width, texture->height, texture->transfer.lobes);
+  return success;
 // Other materials for a bake that kept incident light: its last reflection is made anew.
 Result<void> change_materials(Baked& baked, const BrdfOptions& options, const std::string& path) {
   if (!baked.outgoing || baked.outgoing->kind != OutgoingKind::map)
@@ -46,6 +92,7 @@ Result<void> change_materials(Baked& baked, const BrdfOptions& options, const st
 }
 
 int run_render(Context& context, const RenderCommand& o) {
+  if (!o.texture.empty()) return run_textured(context, o);
   if (auto ok = check_output(o.view.output, {"png", "exr"}); !ok) return fail(ok.error());
   auto rotation = light_rotation(o.light);
   if (!rotation) return fail(rotation.error());
@@ -53,9 +100,14 @@ int run_render(Context& context, const RenderCommand& o) {
   if (!baked) return fail(baked.error());
   if (o.new_brdf)
     if (auto ok = change_materials(*baked, o.brdf, o.baked); !ok) return fail(ok.error());
-  auto view = make_view(o.view, baked->scene);
+  auto poses = make_poses(o.motion, baked->scene);
+  if (!poses) return fail(poses.error());
+  // What moves is seen by the camera that looks at its first pose.
+  const Scene first = poses->front() ? posed(baked->scene, *poses->front()) : Scene();
+  auto view = make_view(o.view, poses->front() ? first : baked->scene);
   if (!view) return fail(view.error());
-  const LightBasis& basis = baked->transfer.light;
+  const LightBasis basis = baked->zonal ? LightBasis{.order = baked->zonal->order} : baked->transfer.light;
+  const size_t receivers = baked->zonal ? baked->zonal->receivers : baked->transfer.receivers;
   if (o.light.env.empty() && basis.order > 0) return fail({"--env", "is needed: the file is baked for distant light"});
   std::optional<Environment> env;
   if (!o.light.env.empty()) {
@@ -83,16 +135,10 @@ int run_render(Context& context, const RenderCommand& o) {
     lamps[size_t(group - basis.groups.begin())] = lamp->color;
   }
   light.insert(light.end(), lamps.begin(), lamps.end());
+  ZonalLight table;
+  if (baked->zonal) specialise_light(*baked->zonal, light, table);
+  else if (o.motion.any()) warn(o.baked + ": its transfer cannot turn with the surface (`lambent compress --zonal` makes one that can); it is used as baked");
 
-  // T . light
-  Relit relit;
-  const auto start = std::chrono::steady_clock::now();
-  relight(baked->transfer, light, relit);
-  const double relight_seconds = std::chrono::duration<double>(std::chrono::steady_clock::now() - start).count();
-
-  // O(view)
-  auto tracer = Tracer::build(baked->scene);
-  if (!tracer) return fail(tracer.error());
   RenderOptions options{view->width, view->height, o.samples, nullptr, !o.no_albedo, baked->outgoing ? &*baked->outgoing : nullptr, baked->directional};
   if (!basis.groups.empty()) {
     const bool one = basis.groups.size() == 1 && basis.groups[0] == std::string("all");
@@ -106,15 +152,33 @@ int run_render(Context& context, const RenderCommand& o) {
     turned = o.light.rotate.empty() ? std::move(*env) : rotated(*env, *rotation);
     options.background = &turned;
   }
-  auto image = render(baked->scene, *tracer, baked->basis, relit, view->camera, options, &context.progress);
-  if (!image) return fail(image.error());
-  if (auto ok = save_image(o.view.output, *image, o.view.exposure); !ok) return fail(ok.error());
+  double relight_seconds = 1e9;
+  std::vector<Image> images;
+  for (const std::optional<Pose>& pose : *poses) {
+    // T . light
+    Relit relit;
+    const ReceiverFrames frames = baked->zonal && pose ? make_receiver_frames(receiver_rotations(*pose, baked->front, baked->back, receivers)) : ReceiverFrames();
+    const auto start = std::chrono::steady_clock::now();
+    if (baked->zonal) relight_zonal(*baked->zonal, pose ? &frames : nullptr, table, relit);
+    else relight(baked->transfer, light, relit);
+    relight_seconds = std::min(relight_seconds, std::chrono::duration<double>(std::chrono::steady_clock::now() - start).count());
+
+    // O(view)
+    const Scene moved = pose ? posed(baked->scene, *pose) : Scene();
+    const Scene& scene = pose ? moved : baked->scene;
+    auto tracer = Tracer::build(scene);
+    if (!tracer) return fail(tracer.error());
+    auto image = render(scene, *tracer, baked->basis, relit, view->camera, options, &context.progress);
+    if (!image) return fail(image.error());
+    images.push_back(std::move(*image));
+  }
+  if (auto ok = save_image(o.view.output, images.size() > 1 ? beside(images) : images.front(), o.view.exposure); !ok) return fail(ok.error());
 
   if (context.json)
-    print_json({{"output", o.view.output}, {"receivers", baked->transfer.receivers}, {"order", order}, {"window", window},
+    print_json({{"output", o.view.output}, {"receivers", receivers}, {"frames", images.size()}, {"order", order}, {"window", window},
                 {"relight_seconds", relight_seconds}});
   else
-    fmt::print("{}\n  relit {} receivers in {:.2f} ms\n", o.view.output, human_count(baked->transfer.receivers), 1e3 * relight_seconds);
+    fmt::print("{}\n  relit {} receivers in {:.2f} ms\n", o.view.output, human_count(receivers), 1e3 * relight_seconds);
   return success;
 }
 
@@ -123,9 +187,12 @@ int run_render(Context& context, const RenderCommand& o) {
 void add_render(CLI::App& app, Run& run) {
   auto o = std::make_shared<RenderCommand>();
   CLI::App* c = app.add_subcommand("render", "Relight a baked scene and draw it");
-  c->add_option("baked", o->baked, "Baked file, from `lambent bake`")->required();
+  c->add_option("baked", o->baked, "Baked file, from `lambent bake`; with --transfer-texture, any scene")->required();
   o->light.add_to(*c, false);
   o->view.add_to(*c);
+  o->motion.add_to(*c, true);
+  auto* texture = c->add_option("--transfer-texture", o->texture, "Shade the scene by this texture of zonal lobes, from `lambent patch`");
+  c->add_option("--tile", o->tile, "U,V: its repetitions over the unit of texture coordinates")->needs(texture)->capture_default_str();
   c->add_option("--window", o->window, "Against ringing: none, hann, lanczos, or auto (as weak as keeps open surfaces from going dark)")
       ->transform(CLI::CheckedTransformer(window_names).description("{none,hann,lanczos,auto}"));
   c->add_option("--light-order", o->light_order, "Use only this many bands of the baked ones")->check(CLI::Range(1, max_sh_order));

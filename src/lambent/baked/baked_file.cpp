@@ -11,6 +11,7 @@
 #include <cmath>
 #include <cstring>
 #include <filesystem>
+#include <functional>
 #include <map>
 
 namespace lambent {
@@ -173,7 +174,8 @@ Result<Outgoing> read_outgoing(const GltfChunks& chunks, const json& object, con
 }
 
 // Precision, channels and the bulk data of a transfer whose light, rows and receivers are set.
-Result<void> read_transfer_data(const GltfChunks& chunks, const MappedFile& file, const json& object, Transfer& t, const std::string& where) {
+template <class T>
+Result<void> read_transfer_data(const GltfChunks& chunks, const MappedFile& file, const json& object, T& t, const std::string& where) {
   const auto precision = object.find("precision");
   const bool half = precision != object.end() && *precision == "half";
   if (!half && (precision == object.end() || *precision != "single")) return Error{where, "\"precision\" must be half or single"};
@@ -342,65 +344,27 @@ struct SurfaceReader {
   }
 };
 
-}  // namespace
-
-Result<void> save_baked(const std::string& path, const Scene& scene, const Receivers& receivers, const Transfer& transfer,
-                        const std::string& provenance, const BakedExtras& extras) {
-  const Outgoing* outgoing = extras.outgoing;
-  const DirectionalKind directional = extras.directional;
-  const LatticeTransfer* lattice = extras.lattice;
-  LAMBENT_CHECK(!lattice || (lattice->transfer.columns() == transfer.columns() && lattice->valid.size() == lattice->lattice.count()));
-  LAMBENT_CHECK(transfer.rows == (outgoing ? outgoing->rows() : directional_rows(directional)));
+// What all kinds share: bulk data first, then the maps of receivers, then `more`. `describe` makes the kind's header, the extension's
+// "transfer", and what else the extension has; it is given the first of `more`'s views.
+Result<void> save(const std::string& path, const Scene& scene, const Receivers& receivers, std::span<const uint8_t> data,
+                  const std::vector<GltfBlob>& more, const ViewerLook* look, const std::string& provenance,
+                  const std::function<void(json& extension, int first_more)>& describe) {
   const auto front = side_bytes(scene, receivers, false), back = side_bytes(scene, receivers, true);
   const auto* texels = std::get_if<TexelReceivers>(&receivers.basis);
-  const OutgoingBlobs last = outgoing ? outgoing_blobs(*outgoing) : OutgoingBlobs{};
-  std::vector<GltfBlob> blobs{{transfer.data, 64}};
+  std::vector<GltfBlob> blobs{{data, 64}};
   for (const auto* side : {&front, &back})
     for (const auto& bytes : *side) blobs.push_back({bytes, 4});
   const size_t texels_blob = blobs.size();
   if (texels) blobs.push_back({bytes_of(std::span<const uint32_t>(texels->texels)), 4});
-  const size_t outgoing_view = blobs.size();
-  if (outgoing) {
-    blobs.push_back({bytes_of(std::span<const Vec3>(last.frames)), 4});
-    if (!last.maps.empty()) blobs.push_back({bytes_of(std::span<const uint16_t>(last.maps)), 4}), blobs.push_back({bytes_of(std::span<const uint16_t>(last.map_of)), 4});
-  }
-  const size_t lattice_view = blobs.size();
-  if (lattice) blobs.push_back({lattice->transfer.data, 64}), blobs.push_back({lattice->valid, 4});
-  LookWriter look_writer(scene, receivers, extras.look);
+  const int more_view = int(blobs.size());
+  blobs.insert(blobs.end(), more.begin(), more.end());
+  LookWriter look_writer(scene, receivers, look);
   look_writer.add_blobs(blobs);
   return save_glb(path, scene, blobs, [&](json& document, const GltfPlaces& places) {
     json extension;
     extension["version"] = baked_file_version;
-    extension["transfer"] = {{"kind", outgoing ? "matrix" : "diffuse"},
-                             {"channels", transfer.channels},
-                             {"precision", transfer.precision == Precision::half ? "half" : "single"},
-                             {"receivers", transfer.receivers},
-                             {"bufferView", places.first_view}};
-    if (directional != DirectionalKind::none) extension["transfer"]["directional"] = directional_name(directional);
-    write_light(extension["transfer"], transfer.light);
-    if (outgoing) {
-      extension["transfer"]["rows"] = transfer.rows;
-      const int first = places.first_view + int(outgoing_view);
-      json& o = extension["transfer"]["outgoing"];
-      o = {{"kind", outgoing_names[int(outgoing->kind)]}, {"order", outgoing->order}, {"frames", first}};
-      if (outgoing->maps.empty()) {
-        o["hasB"] = outgoing->has_b;
-      } else {
-        o["grid"] = outgoing->maps[0].grid, o["mapCount"] = outgoing->maps.size(), o["maps"] = first + 1, o["mapOf"] = first + 2;
-      }
-    }
-    if (lattice) {
-      const Lattice& l = lattice->lattice;
-      const int first = places.first_view + int(lattice_view);
-      extension["lattice"] = {{"min", {l.min.x, l.min.y, l.min.z}},
-                              {"max", {l.max.x, l.max.y, l.max.z}},
-                              {"points", {l.nx, l.ny, l.nz}},
-                              {"order", lattice->order},
-                              {"channels", lattice->transfer.channels},
-                              {"precision", lattice->transfer.precision == Precision::half ? "half" : "single"},
-                              {"bufferView", first},
-                              {"valid", first + 1}};
-    }
+    describe(extension, places.first_view + more_view);
+    extension["transfer"]["bufferView"] = places.first_view;
     json parts = json::array();
     for (size_t i = 0; i < scene.parts.size(); ++i) {
       json part{{"node", places.part_nodes[i]}, {"primitive", places.part_primitives[i]}, {"front", places.first_view + 1 + int(i)}};
@@ -421,6 +385,63 @@ Result<void> save_baked(const std::string& path, const Scene& scene, const Recei
     json& used = document["extensionsUsed"];
     if (!used.is_array()) used = json::array();
     if (std::find(used.begin(), used.end(), extension_name) == used.end()) used.push_back(extension_name);
+  });
+}
+
+json header(const char* kind, int channels, Precision precision, size_t receivers) {
+  return {{"kind", kind}, {"channels", channels}, {"precision", precision == Precision::half ? "half" : "single"}, {"receivers", receivers}};
+}
+
+}  // namespace
+
+Result<void> save_baked(const std::string& path, const Scene& scene, const Receivers& receivers, const Transfer& transfer,
+                        const std::string& provenance, const BakedExtras& extras) {
+  const Outgoing* outgoing = extras.outgoing;
+  const LatticeTransfer* lattice = extras.lattice;
+  LAMBENT_CHECK(!lattice || (lattice->transfer.columns() == transfer.columns() && lattice->valid.size() == lattice->lattice.count()));
+  LAMBENT_CHECK(transfer.rows == (outgoing ? outgoing->rows() : directional_rows(extras.directional)));
+  const OutgoingBlobs last = outgoing ? outgoing_blobs(*outgoing) : OutgoingBlobs{};
+  std::vector<GltfBlob> more;
+  if (outgoing) {
+    more.push_back({bytes_of(std::span<const Vec3>(last.frames)), 4});
+    if (!last.maps.empty()) more.push_back({bytes_of(std::span<const uint16_t>(last.maps)), 4}), more.push_back({bytes_of(std::span<const uint16_t>(last.map_of)), 4});
+  }
+  const int lattice_at = int(more.size());
+  if (lattice) more.push_back({lattice->transfer.data, 64}), more.push_back({lattice->valid, 4});
+  return save(path, scene, receivers, transfer.data, more, extras.look, provenance, [&](json& extension, int first) {
+    json& t = extension["transfer"] = header(outgoing ? "matrix" : "diffuse", transfer.channels, transfer.precision, transfer.receivers);
+    if (extras.directional != DirectionalKind::none) t["directional"] = directional_name(extras.directional);
+    write_light(t, transfer.light);
+    if (outgoing) {
+      t["rows"] = transfer.rows;
+      json& o = t["outgoing"];
+      o = {{"kind", outgoing_names[int(outgoing->kind)]}, {"order", outgoing->order}, {"frames", first}};
+      if (outgoing->maps.empty()) {
+        o["hasB"] = outgoing->has_b;
+      } else {
+        o["grid"] = outgoing->maps[0].grid, o["mapCount"] = outgoing->maps.size(), o["maps"] = first + 1, o["mapOf"] = first + 2;
+      }
+    }
+    if (lattice) {
+      const Lattice& l = lattice->lattice;
+      extension["lattice"] = {{"min", {l.min.x, l.min.y, l.min.z}},
+                              {"max", {l.max.x, l.max.y, l.max.z}},
+                              {"points", {l.nx, l.ny, l.nz}},
+                              {"order", lattice->order},
+                              {"channels", lattice->transfer.channels},
+                              {"precision", lattice->transfer.precision == Precision::half ? "half" : "single"},
+                              {"bufferView", first + lattice_at},
+                              {"valid", first + lattice_at + 1}};
+    }
+  });
+}
+
+Result<void> save_baked(const std::string& path, const Scene& scene, const Receivers& receivers, const ZonalTransfer& transfer,
+                        const std::string& provenance) {
+  return save(path, scene, receivers, transfer.data, {}, nullptr, provenance, [&](json& extension, int) {
+    json& t = extension["transfer"] = header("zonal", transfer.channels, transfer.precision, transfer.receivers);
+    write_light(t, {.order = transfer.order});
+    t["lobeCount"] = transfer.lobes;
   });
 }
 
@@ -450,27 +471,37 @@ Result<Baked> load_baked(const MappedFile& file, const std::string& path) {
   const auto t = extension.find("transfer");
   if (t == extension.end() || !t->is_object()) return Error{where, "\"transfer\" is missing"};
   auto text = [&](const char* key) { return t->contains(key) && (*t)[key].is_string() ? (*t)[key].get<std::string>() : ""; };
-  const bool is_matrix = text("kind") == "matrix";
-  if (!is_matrix && text("kind") != "diffuse") return Error{where, "transfer of kind \"" + text("kind") + "\" is not known to this program"};
+  const bool is_matrix = text("kind") == "matrix", is_zonal = text("kind") == "zonal";
+  if (!is_matrix && !is_zonal && text("kind") != "diffuse") return Error{where, "transfer of kind \"" + text("kind") + "\" is not known to this program"};
   auto light = read_light(*t, where);
   if (!light) return light.error();
   auto receivers = read_count(*t, "receivers", 0xfffffffe, where);
   if (!receivers) return receivers.error();
-  baked.transfer.light = std::move(*light), baked.transfer.receivers = *receivers;
   if (t->contains("directional")) {
     const auto kind = directional_kind(text("directional"));
     if (!kind) return Error{where, "directional light \"" + text("directional") + "\" is not known to this program"};
     baked.directional = *kind;
   }
-  if (is_matrix) {
-    auto rows = read_count(*t, "rows", 2 * sh_count(max_sh_order), where);
-    if (!rows) return rows.error();
-    if (*rows < 1) return Error{where, "the transfer has no rows"};
-    baked.transfer.rows = int(*rows);
+  if (is_zonal) {
+    auto lobes = read_count(*t, "lobeCount", size_t(max_stored_lobes), where);
+    if (!lobes) return lobes.error();
+    if (*lobes < 1) return Error{where, "there are no lobes"};
+    if (light->order < 1 || light->count() != size_t(sh_count(light->order))) return Error{where, "zonal transfer is of spherical harmonics alone"};
+    ZonalTransfer& zonal = baked.zonal.emplace();
+    zonal.order = light->order, zonal.lobes = int(*lobes), zonal.receivers = *receivers;
+    if (auto ok = read_transfer_data(*chunks, file, *t, zonal, where); !ok) return ok.error();
   } else {
-    baked.transfer.rows = directional_rows(baked.directional);
+    baked.transfer.light = std::move(*light), baked.transfer.receivers = *receivers;
+    if (is_matrix) {
+      auto rows = read_count(*t, "rows", 2 * sh_count(max_sh_order), where);
+      if (!rows) return rows.error();
+      if (*rows < 1) return Error{where, "the transfer has no rows"};
+      baked.transfer.rows = int(*rows);
+    } else {
+      baked.transfer.rows = directional_rows(baked.directional);
+    }
+    if (auto ok = read_transfer_data(*chunks, file, *t, baked.transfer, where); !ok) return ok.error();
   }
-  if (auto ok = read_transfer_data(*chunks, file, *t, baked.transfer, where); !ok) return ok.error();
   if (is_matrix) {
     if (!t->contains("outgoing") || !(*t)["outgoing"].is_object()) return Error{where, "\"outgoing\" is missing"};
     auto outgoing = read_outgoing(*chunks, (*t)["outgoing"], baked.transfer, where + ": outgoing");

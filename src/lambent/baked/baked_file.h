@@ -8,6 +8,7 @@
 #include <lambent/transfer/outgoing.h>
 #include <lambent/transfer/directional.h>
 #include <lambent/transfer/transfer.h>
+#include <lambent/transfer/zonal_transfer.h>
 
 #include <optional>
 #include <string>
@@ -24,6 +25,7 @@ struct Baked {
   std::optional<Outgoing> outgoing;   // the last reflection of a transfer matrix
   DirectionalKind directional = DirectionalKind::none;  // what the rows of a directional lightmap are
   std::optional<LatticeTransfer> lattice;  // light in free space, for the same light; its data lies in the mapped file too
+  std::optional<ZonalTransfer> zonal;  // in place of `transfer`, which then has no receivers; read in place too
   std::string provenance;             // JSON text: inputs and their hashes, options, version, what the bake reported
 };
 
@@ -46,6 +48,8 @@ struct BakedExtras {
 // in the file, and loading finds them again. Errors: the disk's; more than 4 GiB, which a GLB cannot hold.
 Result<void> save_baked(const std::string& path, const Scene& scene, const Receivers& receivers, const Transfer& transfer,
                         const std::string& provenance, const BakedExtras& extras = {});
+Result<void> save_baked(const std::string& path, const Scene& scene, const Receivers& receivers, const ZonalTransfer& transfer,
+                        const std::string& provenance);
 
 // Errors: not a baked file, another version, anything that does not fit.
 Result<Baked> load_baked(const std::string& path);

@@ -340,6 +340,40 @@ TEST(BakedFile, RefusesHeadersThatLie) {
   }
 }
 
+TEST(BakedFile, KeepsZonalTransferAndRefusesLiesAboutIt) {
+  const TemporaryFile file("zonal.glb"), lying("zonal_lie.glb");
+  const Small s = small_bake(3, Precision::half);
+  const WritableZonalTransfer w = make_zonal_transfer(6, 4, 3, s.receivers.count(), Precision::half);
+  Random random(3);
+  for (size_t r = 0; r < s.receivers.count(); ++r) {
+    std::vector<float> v(w.transfer.receiver_values());
+    for (float& x : v) x = random.next();
+    store_receiver(w, r, v);
+  }
+  ASSERT_TRUE(save_baked(file.path, s.scene, s.receivers, w.transfer, "{}"));
+  auto back = load_baked(file.path);
+  ASSERT_TRUE(back) << back.error().text();
+  ASSERT_TRUE(back->zonal);
+  EXPECT_EQ(back->transfer.receivers, 0u);
+  EXPECT_EQ(back->front, s.receivers.front);
+  EXPECT_EQ(back->zonal->order, 6);
+  EXPECT_EQ(back->zonal->lobes, 4);
+  EXPECT_EQ(back->zonal->channels, 3);
+  EXPECT_TRUE(std::equal(back->zonal->data.begin(), back->zonal->data.end(), w.transfer.data.begin(), w.transfer.data.end()));
+  EXPECT_EQ(reinterpret_cast<uintptr_t>(back->zonal->data.data()) % 64, 0u);
+  const std::pair<std::string, std::string> lies[] = {{"\"lobeCount\":4", "\"lobeCount\":5"}, {"\"lobeCount\":4", "\"lobeCount\":0"},
+                                                      {"\"lobeCount\":4", "\"lobeCount\":9"}, {"\"lobeCount\":4", "\"lobeCoun?\":4"},
+                                                      {"\"order\":6", "\"order\":0"}, {"\"kind\":\"zonal\"", "\"kind\":\"zona?\""}};
+  for (const auto& [from, to] : lies) {
+    const auto changed = edited(*read_file(file.path), from, to);
+    const std::span<const uint8_t> piece(changed);
+    ASSERT_TRUE(write_file_atomically(lying.path, {&piece, 1}));
+    auto result = load_baked(lying.path);
+    ASSERT_FALSE(result) << to;
+    EXPECT_EQ(result.error().text().find('\n'), std::string::npos);
+  }
+}
+
 TEST(BakedFile, RefusesOtherThings) {
   EXPECT_FALSE(load_baked("/nonexistent/x.glb"));
   EXPECT_FALSE(load_baked("/tmp"));

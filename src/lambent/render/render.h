@@ -10,6 +10,8 @@
 #include <lambent/transfer/outgoing.h>
 #include <lambent/transfer/directional.h>
 
+#include <functional>
+
 namespace lambent {
 
 struct RenderOptions {
@@ -25,5 +27,11 @@ struct RenderOptions {
 // One-sided triangles are absent from behind, as in any glTF viewer. Errors: cancelled.
 Result<Image> render(const Scene& scene, const Tracer& tracer, const SpatialBasis& basis, const Relit& relit,
                      const Camera& camera, const RenderOptions& options, Progress* progress = nullptr);
+
+// What render() is made of: primary rays, and `shade` for the radiance of what they meet, in the direction that they came along.
+// `make_shade` is called once for each row, on the thread that draws it.
+using SurfaceShade = std::function<Vec3(const Hit&, Vec3 direction)>;
+Result<Image> render_surfaces(const Scene& scene, const Tracer& tracer, const Camera& camera, const RenderOptions& options,
+                              const std::function<SurfaceShade()>& make_shade, Progress* progress = nullptr);
 
 }  // namespace lambent
