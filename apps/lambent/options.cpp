@@ -78,16 +78,21 @@ Result<View> make_view(const ViewOptions& options, const Scene& scene) {
   };
   if (x == std::string::npos || !number(options.size.substr(0, x), view.width) || !number(options.size.substr(x + 1), view.height))
     return Error{"--size", "expects WIDTHxHEIGHT, each from 1 to 16384, not \"" + options.size + "\""};
-  if (options.camera == "auto") {
-    view.camera = camera_around(subject_bounds(scene));
-    return view;
-  }
-  auto n = parse_numbers(options.camera, 7, "--camera");
-  if (!n) return n.error();
-  view.camera.eye = {(*n)[0], (*n)[1], (*n)[2]}, view.camera.target = {(*n)[3], (*n)[4], (*n)[5]}, view.camera.fov = (*n)[6];
-  if (!(view.camera.fov > 0 && view.camera.fov < 180)) return Error{"--camera", "field of view must lie between 0 and 180 degrees"};
-  if (view.camera.eye == view.camera.target) return Error{"--camera", "eye and target are the same point"};
+  auto camera = parse_camera(options.camera);
+  if (!camera) return camera.error();
+  view.camera = *camera ? **camera : camera_around(subject_bounds(scene));
   return view;
+}
+
+Result<std::optional<Camera>> parse_camera(const std::string& text) {
+  if (text == "auto") return std::optional<Camera>();
+  auto n = parse_numbers(text, 7, "--camera");
+  if (!n) return n.error();
+  Camera camera;
+  camera.eye = {(*n)[0], (*n)[1], (*n)[2]}, camera.target = {(*n)[3], (*n)[4], (*n)[5]}, camera.fov = (*n)[6];
+  if (!(camera.fov > 0 && camera.fov < 180)) return Error{"--camera", "field of view must lie between 0 and 180 degrees"};
+  if (camera.eye == camera.target) return Error{"--camera", "eye and target are the same point"};
+  return std::optional<Camera>(camera);
 }
 
 void LightOptions::add_to(CLI::App& command) {
