@@ -1,8 +1,10 @@
 // `lambent view`, headless Chromium and what the tests ask of them.
 import { spawn, type ChildProcess } from 'node:child_process';
-import { existsSync, writeFileSync } from 'node:fs';
+import { existsSync, readFileSync, writeFileSync } from 'node:fs';
 import { join } from 'node:path';
+import { fileURLToPath } from 'node:url';
 import { chromium, type Browser, type Page } from 'playwright-core';
+import { createServer, type ViteDevServer } from 'vite';
 import { lambentJson, random, toolPath } from '../test/tool.ts';
 
 export const browserPath = process.env['CHROMIUM'] ?? '/usr/bin/chromium';
@@ -45,6 +47,22 @@ export async function open(browser: Browser, address: string, fragment: string, 
   if (problem) throw new Error(`the page says: ${problem}`);
   await drawn(page);
   return page;
+}
+
+/** The scenes of fixture/scenes.ts, with files of `folder` under /files/, a tilde for each slash. */
+export async function openFixture(browser: Browser, folder: string): Promise<{ page: Page; server: ViteDevServer }> {
+  const web = fileURLToPath(new URL('..', import.meta.url));
+  const server = await createServer({
+    root: join(web, 'e2e/fixture'), configFile: false, logLevel: 'error', cacheDir: join(folder, 'cache'),
+    server: { host: '127.0.0.1', port: 0, fs: { allow: [web] } },
+  });
+  await server.listen();
+  const page = await browser.newPage();
+  page.on('pageerror', (error) => console.error('page:', error.message));
+  await page.route('**/files/*', (route) => route.fulfill({ body: readFileSync(join(folder, route.request().url().replace(/.*\/files\//, '').replaceAll('~', '/'))) }));
+  await page.goto(server.resolvedUrls!.local[0]!);
+  await page.waitForFunction(() => 'scenes' in window);
+  return { page, server };
 }
 
 /** Two frames later, what was asked for has been drawn. */
@@ -90,4 +108,21 @@ export function writeScene(folder: string): string {
   const path = join(folder, 'scene.obj');
   writeFileSync(path, [...lines, ...faces].join('\n') + '\n');
   return path;
+}
+
+/** A unit ball alone. */
+export function writeBall(path: string): void {
+  const rows = 40, turns = 80, lines: string[] = [];
+  for (let j = 0; j <= rows; ++j)
+    for (let i = 0; i < turns; ++i) {
+      const t = (Math.PI * j) / rows, p = (2 * Math.PI * i) / turns;
+      lines.push(`v ${Math.sin(t) * Math.cos(p)} ${Math.cos(t)} ${Math.sin(t) * Math.sin(p)}`);
+    }
+  const at = (i: number, j: number): number => j * turns + (i % turns) + 1;
+  for (let j = 0; j < rows; ++j)
+    for (let i = 0; i < turns; ++i) {
+      if (j < rows - 1) lines.push(`f ${at(i, j)} ${at(i + 1, j + 1)} ${at(i, j + 1)}`);
+      if (j > 0) lines.push(`f ${at(i, j)} ${at(i + 1, j)} ${at(i + 1, j + 1)}`);
+    }
+  writeFileSync(path, lines.join('\n') + '\n');
 }

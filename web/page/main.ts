@@ -72,6 +72,7 @@ class Page {
     await this.openBaked(manifest.name, await this.fetch(manifest.name, manifest.baked));
     if (manifest.compare) viewer.setModel('compare', await this.parse('the second file', await this.fetch('the second file', manifest.compare)));
     if (manifest.reference) viewer.setReference(mapTexture(readMap(await this.fetch('the reference', manifest.reference))));
+    get('loading').hidden = true;
     this.show();
   }
 
