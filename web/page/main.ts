@@ -3,7 +3,7 @@ import { Euler, MathUtils, Vector3 } from 'three';
 import { LambentError, shBand, shIndex, shWindows, type ShWindow } from '../src/index.js';
 import { fetchFile, loadManifest, makeEnvironment, mapTexture, plainSky, readBaked, readMap, type EnvironmentFile, type Manifest } from './loading.js';
 import { defaultState, formatState, parseState, type State, type View } from './state.js';
-import { Viewer } from './viewer.js';
+import { falseColorEnd, Viewer } from './viewer.js';
 
 const get = <T extends HTMLElement>(id: string): T => document.getElementById(id) as T;
 const input = (id: string): HTMLInputElement => get(id);
@@ -110,7 +110,7 @@ class Page {
     const l = shBand(state.coefficient), m = state.coefficient - shIndex(l, 0);
     get('coefficient-row').hidden = get('scale').hidden = !usesCoefficient;
     get('coefficient-name').textContent = `l ${l}, m ${m}`;
-    const end = 1 / (2 * 2 ** state.exposure);
+    const end = falseColorEnd / 2 ** state.exposure;
     get('scale-low').textContent = `−${end.toPrecision(2)}`, get('scale-high').textContent = `+${end.toPrecision(2)}`;
     const wipe = get('wipe');
     wipe.hidden = !state.against;

@@ -22,6 +22,8 @@ export interface ViewerCallbacks {
 }
 
 const groundName = 'ground'; // of the floor that `lambent bake --ground` adds
+/** Transfer at the ends of the false-colour scale, at exposure 0: those of open surfaces stay below 0.33. */
+export const falseColorEnd = 0.25;
 const pause = 250; // milliseconds without a frame
 
 export class Viewer {
@@ -163,7 +165,7 @@ export class Viewer {
     this.fitToCanvas();
     if (this.lightChanged) this.relight();
     renderer.toneMappingExposure = 2 ** this.exposure;
-    this.gain.value = 2 * 2 ** this.exposure;
+    this.gain.value = 2 ** this.exposure / falseColorEnd;
     sky.turnBack.value.setFromMatrix4(new Matrix4().makeRotationFromQuaternion(new Quaternion().copy(this.orbit.light).invert()));
     sky.unproject.value.copy(camera.matrixWorld).multiply(camera.projectionMatrixInverse);
     const ratio = renderer.getPixelRatio(), width = this.canvas.width / ratio, height = this.canvas.height / ratio;
