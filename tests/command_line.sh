@@ -139,6 +139,30 @@ expect 2 'animation' render corner.glb --env uniform:1 --time 1 -o x.png
 expect 2 'frames' render corner.glb --env uniform:1 --animation 0 --frames 3:1 -o x.png
 expect 2 'membrane' bake corner.obj --membrane 1.5 -o x.glb
 expect 2 'tile' render corner.obj --transfer-texture relief.lpt --tile 1 --env uniform:1 -o x.png
+# The web viewer, where it has been built: the folder is there whole or not at all, and nothing of others' is replaced.
+"$tool" export corner.glb --web site >/dev/null 2>stderr
+if grep -q 'scripts/web' stderr; then
+  echo "skipped: export and view, since the page is not built"
+  expect 1 'scripts/web' view corner.glb --no-browser
+  absent site
+else
+  expect 0 'files' export corner.glb --web site --env uniform:1,0.5,0.25 --env sky:elevation=20 --compare open.glb --reference a.exr
+  cmp -s corner.glb site/data/scene.glb && [ -s site/index.html ] && [ -s site/data/environment-1.exr ] && [ -s site/data/reference.exr ] && ok ||
+    bad "the exported folder is not whole"
+  expect 0 '"mean_luminance"' inspect site/data/environment-1.exr --json
+  mkdir mine && touch mine/work
+  expect 1 'mine.*left alone' export corner.glb --web mine
+  expect 1 'no folder' export corner.glb --web nowhere/site
+  expect 1 'corner.obj' export corner.obj --web site2
+  expect 1 'nowhere.hdr' export corner.glb --web site2 --env nowhere.hdr
+  expect 2 'camera' export corner.glb --web site2 --camera 1,2
+  expect 1 'corner.obj' view corner.obj --no-browser
+  expect 1 'nowhere.hdr' view corner.glb --env nowhere.hdr --no-browser
+  expect 2 'port' view corner.glb --port 70000 --no-browser
+  absent site2
+  [ -z "$(ls -d site?* 2>/dev/null)" ] && ok || bad "export left a temporary: $(ls -d site?*)"
+fi
+
 # Usage: exit 2.
 expect 2 'order' bake corner.obj --order 0 -o x.glb
 expect 2 'order' bake corner.obj --order 1000 -o x.glb

@@ -116,16 +116,21 @@ Result<View> make_view(const ViewOptions& options, const Scene& scene) {
   auto size = parse_size(options.size, "--size");
   if (!size) return size.error();
   view.width = (*size)[0], view.height = (*size)[1];
-  if (options.camera == "auto") {
-    view.camera = camera_around(subject_bounds(scene));
-    return view;
-  }
-  auto n = parse_numbers(options.camera, 7, "--camera");
-  if (!n) return n.error();
-  view.camera.eye = {(*n)[0], (*n)[1], (*n)[2]}, view.camera.target = {(*n)[3], (*n)[4], (*n)[5]}, view.camera.fov = (*n)[6];
-  if (!(view.camera.fov > 0 && view.camera.fov < 180)) return Error{"--camera", "field of view must lie between 0 and 180 degrees"};
-  if (view.camera.eye == view.camera.target) return Error{"--camera", "eye and target are the same point"};
+  auto camera = parse_camera(options.camera);
+  if (!camera) return camera.error();
+  view.camera = *camera ? **camera : camera_around(subject_bounds(scene));
   return view;
+}
+
+Result<std::optional<Camera>> parse_camera(const std::string& text) {
+  if (text == "auto") return std::optional<Camera>();
+  auto n = parse_numbers(text, 7, "--camera");
+  if (!n) return n.error();
+  Camera camera;
+  camera.eye = {(*n)[0], (*n)[1], (*n)[2]}, camera.target = {(*n)[3], (*n)[4], (*n)[5]}, camera.fov = (*n)[6];
+  if (!(camera.fov > 0 && camera.fov < 180)) return Error{"--camera", "field of view must lie between 0 and 180 degrees"};
+  if (camera.eye == camera.target) return Error{"--camera", "eye and target are the same point"};
+  return std::optional<Camera>(camera);
 }
 
 void LightOptions::add_to(CLI::App& command, bool required) {

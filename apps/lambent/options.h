@@ -10,6 +10,8 @@
 
 #include <CLI/CLI.hpp>
 
+#include <optional>
+
 namespace lambent::tool {
 
 // Strictly `count` finite numbers, separated by commas.
@@ -46,6 +48,8 @@ struct View {
   int width = 0, height = 0;
 };
 Result<View> make_view(const ViewOptions& options, const Scene& scene);
+// What --camera says: seven numbers, or nothing for "auto".
+Result<std::optional<Camera>> parse_camera(const std::string& text);
 
 struct LightOptions {
   std::string env, rotate;
