@@ -269,8 +269,16 @@ void trace_gather_on(const GatherSetup& setup, const Basis& basis, GatherScratch
   }
 }
 
-template <class Basis>
-void trace_sky_on(const GatherSetup& setup, const Basis& basis, GatherScratch& scratch, size_t first, size_t count, const GatherSky& sky) {
+}  // namespace
+
+// The kind of basis is asked for once a block, so that the loop over rays is compiled for each.
+void trace_gather(const GatherSetup& setup, GatherScratch& scratch, size_t first, size_t count, GatherBlock* block, const GatherSky* sky,
+                  const GatherDirect* direct) {
+  LAMBENT_CHECK(count <= gather_block);
+  std::visit([&](const auto& basis) { trace_gather_on(setup, basis, scratch, first, count, block, sky, direct); }, setup.receivers.basis);
+}
+
+void trace_sky(const GatherSetup& setup, GatherScratch& scratch, size_t first, size_t count, const GatherSky& sky) {
   const DirectionSets& sets = setup.sets;
   const size_t coefficients = setup.coefficients(), rays = size_t(sets.samples);
   Fan& fan = scratch.fan;
@@ -283,19 +291,6 @@ void trace_sky_on(const GatherSetup& setup, const Basis& basis, GatherScratch& s
     for (size_t j = 0; j < rays; ++j) seen += fan.visible[j] > 0;
     sky.buried[i] = 4 * seen < rays && is_buried(setup.tracer, setup.receivers.basis, origin, {fan.x.data(), fan.y.data(), fan.z.data(), rays});
   }
-}
-
-}  // namespace
-
-// The kind of basis is asked for once a block, so that the loop over rays is compiled for each.
-void trace_gather(const GatherSetup& setup, GatherScratch& scratch, size_t first, size_t count, GatherBlock* block, const GatherSky* sky,
-                  const GatherDirect* direct) {
-  LAMBENT_CHECK(count <= gather_block);
-  std::visit([&](const auto& basis) { trace_gather_on(setup, basis, scratch, first, count, block, sky, direct); }, setup.receivers.basis);
-}
-
-void trace_sky(const GatherSetup& setup, GatherScratch& scratch, size_t first, size_t count, const GatherSky& sky) {
-  std::visit([&](const auto& basis) { trace_sky_on(setup, basis, scratch, first, count, sky); }, setup.receivers.basis);
 }
 
 void multiply_rows(const SparseBlock& block, int channels, const float* x, size_t width, float scale, float* y) {
