@@ -1,6 +1,8 @@
 // The baked-file reader on hostile bytes: whatever it accepts must be safe to relight.
 #include <lambent/baked/baked_file.h>
 #include <lambent/relight/lattice.h>
+#include <lambent/relight/relight.h>
+#include <lambent/relight/zonal.h>
 
 #include <sys/mman.h>
 #include <unistd.h>
@@ -18,7 +20,14 @@ extern "C" int LLVMFuzzerTestOneInput(const uint8_t* data, size_t size) {
   if (!baked) return 0;
   const std::vector<lambent::Vec3> light(baked->transfer.columns(), lambent::Vec3(0.5f));
   lambent::Relit relit;
-  lambent::relight(baked->transfer, light, relit);
+  if (baked->zonal) {
+    const std::vector<lambent::Vec3> harmonics(size_t(lambent::sh_count(baked->zonal->order)), lambent::Vec3(0.5f));
+    lambent::ZonalLight table;
+    lambent::specialise_light(*baked->zonal, harmonics, table);
+    lambent::relight_zonal(*baked->zonal, nullptr, table, relit);
+  } else {
+    lambent::relight(baked->transfer, light, relit);
+  }
   float sum = 0;
   for (const auto* map : {&baked->front, &baked->back})
     for (uint32_t r : *map)

@@ -88,6 +88,114 @@ expect 2 'together' bake corner.obj --order 12 --lattice 2,2,2 --lattice-order 6
 for thread_count in 1 2; do "$tool" bake corner.obj --max-edge 0.3 --lattice 4,4,4 --samples 64 --threads $thread_count -o threads_$thread_count.glb >/dev/null 2>&1; done
 cmp -s threads_1.glb threads_2.glb && ok || bad "1 and 2 threads give different files"
 
+# Lightmaps: a box with a glowing ceiling, and a sky.
+cat >box.mtl <<'M'
+newmtl wall
+Kd 0.7 0.6 0.5
+newmtl lamp
+Kd 0.5 0.5 0.5
+Ke 4 3 2
+M
+cat >box.obj <<'O'
+mtllib box.mtl
+v 0 0 0
+v 2 0 0
+v 2 0 2
+v 0 0 2
+v 0 1 0
+v 2 1 0
+v 0.5 0.99 0.5
+v 1.5 0.99 0.5
+v 1.5 0.99 1.5
+v 0.5 0.99 1.5
+usemtl wall
+f 4 3 2 1
+f 1 2 6 5
+usemtl lamp
+f 7 8 9 10
+O
+view="--camera 3,0.8,4,1,0.4,0.7,40 --size 48x32 --background none"
+expect 0 'charts' bake box.obj --transfer lightmap --sky uniform:0.3,0.4,0.6 --light-groups --texels-per-unit 20 --samples 512 --bounces 2 -o map.glb
+for picture in map.lamp.exr map.sky.exr; do [ -s $picture ] && ok || bad "$picture is missing"; done
+expect 0 'relit' render map.glb $view --spp 256 -o map_lit.exr
+expect 0 'paths' reference box.obj --lamps --env uniform:0.3,0.4,0.6 --bounces 2 --spp 256 $view -o map_truth.exr
+expect 0 '"psnr"' compare map_lit.exr map_truth.exr --json
+psnr=$(sed -n 's/.*"psnr": \([0-9]*\).*/\1/p' stdout)
+[ "${psnr:-0}" -ge 35 ] && ok || bad "lightmapped and path-traced boxes differ: PSNR ${psnr:-none}"
+expect 0 'relit' render map.glb $view --lamp lamp=0.1,0.2,0 --lamp sky=0,0,1 -o dimmed.exr
+expect 2 'no group' render map.glb $view --lamp chandelier=1,1,1 -o x.png
+expect 0 'applications' bake box.obj --transfer lightmap --atlas 64x48 --samples 64 --bounces converge:1e-3 --solver southwell --direct separate --json -o map2.glb
+for picture in map2.direct.exr map2.indirect.exr; do [ -s $picture ] && ok || bad "$picture is missing"; done
+expect 0 'lamps' bake box.obj --transfer lightmap --receivers patches --samples 64 -o patches.glb
+expect 0 'relit' render patches.glb $view -o patches.exr
+expect 0 'lamps' bake box.obj --transfer lightmap --directional hl2 --atlas 64x64 --samples 64 -o hl2.glb
+expect 0 'relit' render hl2.glb $view -o hl2.exr
+expect 0 'receivers' bake box.obj --receivers texels --atlas 64x64 --order 3 --samples 64 -o prt.glb
+expect 0 'relit' render prt.glb --env sky:elevation=30 $view -o prt.exr
+for thread_count in 1 2; do "$tool" bake box.obj --transfer lightmap --atlas 64x64 --samples 64 --threads $thread_count -o map_$thread_count.glb >/dev/null 2>&1; done
+cmp -s map_1.glb map_2.glb && ok || bad "1 and 2 threads give different lightmaps"
+expect 1 'nothing gives light' bake corner.obj --transfer lightmap -o x.glb
+expect 2 'need at least' bake box.obj --transfer lightmap --atlas 4x4 -o x.glb
+expect 2 'limit' bake box.obj --transfer lightmap --texels-per-unit 1e9 -o x.glb
+expect 2 'receivers texels' bake box.obj --transfer lightmap --receivers vertices --atlas 64x64 -o x.glb
+expect 2 'bounces' bake box.obj --transfer lightmap --bounces converge:nan -o x.glb
+expect 2 'no material' bake box.obj --transfer lightmap --emit sofa=1,1,1 -o x.glb
+expect 2 'env' render prt.glb -o x.png
+expect 2 'lamps' reference box.obj -o x.png
+
+# Zonal lobes: closer with more of them, turning with what moves; a texture of them; a membrane.
+expect 0 '"rms"' compress corner.glb --zonal 4 -o lobes.glb --view-error error.png --size 40x40 --json
+expect 0 'zonal lobes' inspect lobes.glb
+expect 0 'relit' render lobes.glb --env uniform:1,0.5,0.25 --camera 3,2,4,1,0.5,1,40 --size 48x32 --spp 64 -o lobes.exr --background none
+expect 0 '"psnr"' compare lobes.exr a.exr --json
+psnr=$(sed -n 's/.*"psnr": \([0-9]*\).*/\1/p' stdout)
+[ "${psnr:-0}" -ge 40 ] && ok || bad "lobes and harmonics differ: PSNR ${psnr:-none}"
+expect 0 'relit' render lobes.glb --env sky:elevation=40 --deform twist:50,y --size 40x40 -o twisted.png
+expect 0 'cannot turn' render corner.glb --env sky:elevation=40 --deform bend:50,x,y --size 40x40 -o bent.png
+expect 0 'lobes' bake corner.obj --max-edge 0.5 --samples 64 --transfer zonal --lobes 2 -o direct.glb
+expect 0 'paths' reference corner.obj --env uniform:1 --deform twist:50 --size 16x16 --spp 1 -o twisted.exr
+expect 0 'membrane' bake corner.obj --membrane 0.4 -o membrane.glb
+expect 0 'RMS' patch sky.png --size 8 --samples 64 --lobes 3 -o relief.lpt
+expect 0 'texels' render corner.obj --transfer-texture relief.lpt --tile 2,2 --env sky:elevation=40 --size 24x24 -o relief.png
+expect 1 'no animation|not glTF' render corner.glb --env uniform:1 --animation walk -o x.png
+expect 1 'no animation|not glTF' reference corner.obj --env uniform:1 --animation 0 -o x.png
+expect 1 'diffuse transfer' compress lobes.glb --zonal 2 -o x.glb
+expect 1 'corner.obj' render corner.obj --transfer-texture corner.obj --env uniform:1 -o x.png
+head -c 200 relief.lpt >cut.lpt
+expect 1 'cut.lpt' render corner.obj --transfer-texture cut.lpt --env uniform:1 -o x.png
+expect 1 'alpha|coordinates|no such' bake corner.obj --membrane missing.png -o x.glb
+expect 2 'zonal|lobes' compress corner.glb --zonal 0 -o x.glb
+expect 2 'zonal|lobes' compress corner.glb --zonal 100 -o x.glb
+expect 2 'lobes' bake corner.obj --lobes 4 -o x.glb
+expect 2 'deform' render corner.glb --env uniform:1 --deform melt:3 -o x.png
+expect 2 'animation' render corner.glb --env uniform:1 --time 1 -o x.png
+expect 2 'frames' render corner.glb --env uniform:1 --animation 0 --frames 3:1 -o x.png
+expect 2 'membrane' bake corner.obj --membrane 1.5 -o x.glb
+expect 2 'tile' render corner.obj --transfer-texture relief.lpt --tile 1 --env uniform:1 -o x.png
+# The web viewer, where it has been built: the folder is there whole or not at all, and nothing of others' is replaced.
+"$tool" export corner.glb --web site >/dev/null 2>stderr
+if grep -q 'scripts/web' stderr; then
+  echo "skipped: export and view, since the page is not built"
+  expect 1 'scripts/web' view corner.glb --no-browser
+  absent site
+else
+  expect 0 'files' export corner.glb --web site --env uniform:1,0.5,0.25 --env sky:elevation=20 --compare open.glb --reference a.exr
+  cmp -s corner.glb site/data/scene.glb && [ -s site/index.html ] && [ -s site/data/environment-1.exr ] && [ -s site/data/reference.exr ] && ok ||
+    bad "the exported folder is not whole"
+  expect 0 '"mean_luminance"' inspect site/data/environment-1.exr --json
+  mkdir mine && touch mine/work
+  expect 1 'mine.*left alone' export corner.glb --web mine
+  expect 1 'no folder' export corner.glb --web nowhere/site
+  expect 1 'corner.obj' export corner.obj --web site2
+  expect 1 'nowhere.hdr' export corner.glb --web site2 --env nowhere.hdr
+  expect 2 'camera' export corner.glb --web site2 --camera 1,2
+  expect 1 'corner.obj' view corner.obj --no-browser
+  expect 1 'nowhere.hdr' view corner.glb --env nowhere.hdr --no-browser
+  expect 2 'port' view corner.glb --port 70000 --no-browser
+  absent site2
+  [ -z "$(ls -d site?* 2>/dev/null)" ] && ok || bad "export left a temporary: $(ls -d site?*)"
+fi
+
 # Usage: exit 2.
 expect 2 'order' bake corner.obj --order 0 -o x.glb
 expect 2 'order' bake corner.obj --order 1000 -o x.glb
@@ -97,6 +205,8 @@ expect 2 'camera' render corner.glb --env uniform:1 --camera 1,2,3 -o x.png
 expect 2 'size' render corner.glb --env uniform:1 --size 0x10 -o x.png
 expect 2 'rotate' render corner.glb --env uniform:1 --env-rotate nan,0,0 -o x.png
 expect 2 'window' render corner.glb --env uniform:1 --window square -o x.png
+expect 2 'no reflection model' reference corner.obj --env uniform:1 --brdf glass -o x.png
+expect 2 'roughness must lie' reference corner.obj --env uniform:1 --brdf ggx:roughness=7 -o x.png
 expect 2 '.' bake
 expect 2 '.' nonsense
 
@@ -125,8 +235,6 @@ expect 1 'no folder' bake corner.obj -o nowhere/x.glb
 expect 1 'must end in' bake corner.obj -o x.obj
 expect 1 'must end in' render corner.glb --env uniform:1 -o x.gif
 expect 1 'sizes|size' compare a.exr difference.png
-expect 1 'no reflection model' reference corner.obj --env uniform:1 --brdf glass -o x.png
-expect 1 'roughness must lie' reference corner.obj --env uniform:1 --brdf ggx:roughness=7 -o x.png
 expect 1 'nowhere.brdf.*no such file' reference corner.obj --env uniform:1 --brdf measured:nowhere.brdf -o x.png
 printf '6 440 480 520 560 600 640\n0.1 0 0.2 1 1 2 3 nan 5 6\n' >nan.brdf
 expect 1 'nan.brdf:2: a number is not finite' reference corner.obj --env uniform:1 --brdf measured:nan.brdf -o x.png

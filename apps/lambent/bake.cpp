@@ -1,3 +1,4 @@
+#include "bake_lightmap.h"
 #include "commands.h"
 #include "options.h"
 
@@ -5,6 +6,11 @@
 #include <lambent/bake/lattice.h>
 #include <lambent/bake/materials.h>
 #include <lambent/baked/baked_file.h>
+#include <lambent/compress/parametric.h>
+#include <lambent/compress/zonal_fit.h>
+#include <lambent/image/image.h>
+#include <lambent/light/project.h>
+#include <lambent/relight/fix_light.h>
 
 #include <fmt/format.h>
 
@@ -18,9 +24,13 @@ struct BakeCommand {
   BakeOptions bake;
   MatrixOptions matrix;
   BrdfOptions brdf;
+  ZonalFitOptions zonal;
   LatticeOptions lattice;
   std::string lattice_points, lattice_box;
-  std::string transfer = "diffuse", outgoing = "svd:6", simulate = "recursion", output, shadows = "on", precision = "half";
+  std::string transfer = "diffuse", membrane, outgoing = "svd:6", simulate = "recursion", fix_light, output, shadows = "on", precision = "half", bounces = "3";
+  ReceiverFlags receivers;
+  LightmapFlags lightmap;
+  bool order_given = false;
 };
 
 // KIND or KIND:N, where N is the number of rows (svd) or bands (sh, hemisphere, hsh).
@@ -57,16 +67,67 @@ Result<Lattice> parse_lattice(const BakeCommand& o, const Scene& scene) {
   return Lattice{box.min, box.max, int((*counts)[0]), int((*counts)[1]), int((*counts)[2])};
 }
 
+// What share of the light a sheet lets through at each receiver: one number, or a picture's luminance at its texture coordinates.
+Result<std::vector<float>> membrane_alphas(const std::string& text, const Scene& scene, const Receivers& receivers) {
+  if (auto number = parse_numbers(text, 1, "--membrane")) {
+    if (!((*number)[0] >= 0 && (*number)[0] <= 1)) return Error{"--membrane", "lets through a share from 0 to 1, not " + text};
+    return std::vector<float>(receivers.count(), (*number)[0]);
+  }
+  auto picture = load_image(text);
+  if (!picture) return picture.error();
+  if (scene.texcoords[0].empty()) return Error{scene.path, "has no texture coordinates to look the membrane's picture up by"};
+  std::vector<float> alphas(receivers.count());
+  for (const auto* map : {&receivers.front, &receivers.back})
+    for (size_t v = 0; v < map->size(); ++v) {
+      if ((*map)[v] == none) continue;
+      const Vec2 uv = scene.texcoords[0][v] - glm::floor(scene.texcoords[0][v]);
+      const int x = std::min(int(uv.x * float(picture->width)), picture->width - 1), y = std::min(int(uv.y * float(picture->height)), picture->height - 1);
+      const float alpha = luminance(picture->at(x, y));
+      alphas[(*map)[v]] = std::isfinite(alpha) ? std::clamp(alpha, 0.0f, 1.0f) : 0.0f;
+    }
+  return alphas;
+}
+
+int bake_membrane(Context& context, const BakeCommand& o) {
+  auto scene = load_prepared_scene(o.scene);
+  if (!scene) return fail(scene.error());
+  const Receivers receivers = make_vertex_receivers(*scene);
+  auto alphas = membrane_alphas(o.membrane, *scene, receivers);
+  if (!alphas) return fail(alphas.error());
+  const ZonalTransfer transfer = membrane_transfer(o.bake.order, receivers.normals, *alphas, o.bake.precision);
+  const nlohmann::json provenance{{"generator", "lambent " LAMBENT_VERSION},
+                                  {"input", {{"name", scene->path.substr(scene->path.find_last_of('/') + 1)}, {"xxh3_128", scene->hash}}},
+                                  {"options", {{"order", o.bake.order}, {"membrane", o.membrane}, {"precision", o.precision}}}};
+  if (auto ok = save_baked(o.output, *scene, receivers, transfer, provenance.dump()); !ok) return fail(ok.error());
+  if (context.json) print_json({{"output", o.output}, {"receivers", transfer.receivers}, {"bytes", transfer.bytes()}});
+  else fmt::print("{}\n  a membrane at {} receivers, one lobe each, {}\n", o.output, human_count(transfer.receivers), human_bytes(double(transfer.bytes())));
+  return success;
+}
+
 using Clock = std::chrono::steady_clock;
 double seconds_since(Clock::time_point start) { return std::chrono::duration<double>(Clock::now() - start).count(); }
 
 int run_bake(Context& context, BakeCommand o) {
+  auto bounces = parse_bounces(o.bounces);
+  if (!bounces) return fail(bounces.error());
+  if (o.transfer == "lightmap") {
+    // Harmonics of a distant light join the lamps only where they are asked for: then it is a PRT lightmap.
+    return run_lightmap(context, {o.scene, o.receivers, o.lightmap,
+                                  {.order = o.order_given ? o.bake.order : 0, .samples = o.bake.samples, .bounces = bounces->count,
+                                   .converge = bounces->converge, .memory = o.bake.memory, .seed = o.bake.seed},
+                                  o.output, o.precision});
+  }
+  if (bounces->converge > 0) return fail({"--bounces", "converge:EPS is for --transfer lightmap"});
+  o.bake.bounces = bounces->count;
   o.bake.shadows = o.shadows == "on";
   if (!o.bake.shadows) o.bake.bounces = 0;
   o.bake.precision = o.precision == "half" ? Precision::half : Precision::single;
-  const bool is_matrix = o.transfer == "matrix";
+  const bool is_matrix = o.transfer == "matrix", is_zonal = o.transfer == "zonal";
   o.matrix.simulate_paths = o.simulate == "paths";
+  o.zonal.precision = o.bake.precision;
+  if (is_zonal) o.bake.precision = Precision::single;  // it is rounded once, as lobes
   if (auto ok = check_output(o.output, {"glb"}); !ok) return fail(ok.error());
+  if (!o.membrane.empty()) return bake_membrane(context, o);
   if (is_matrix)
     if (auto ok = parse_outgoing(o.outgoing, o.matrix); !ok) return fail(ok.error());
   auto reflection = load_reflection(o.brdf);
@@ -75,6 +136,13 @@ int run_bake(Context& context, BakeCommand o) {
   auto start = Clock::now();
   auto scene = load_prepared_scene(o.scene);
   if (!scene) return fail(scene.error());
+  auto placed = place_receivers(*scene, o.receivers, "vertices");
+  if (!placed) return fail(placed.error());
+  const Receivers& receivers = placed->receivers;
+  const bool at_vertices = std::holds_alternative<CornerReceivers>(receivers.basis);
+  if (!o.lattice_points.empty() && !at_vertices) return fail({"--receivers", "--lattice needs a bake at vertices"});
+  if ((is_matrix || is_zonal) && !at_vertices)
+    return fail({"--receivers", "--transfer " + o.transfer + " is baked at vertices"});
   const double load_seconds = seconds_since(start);
 
   o.lattice.samples = o.bake.samples, o.lattice.memory = o.bake.memory, o.lattice.seed = o.bake.seed, o.lattice.precision = o.bake.precision;
@@ -89,7 +157,6 @@ int run_bake(Context& context, BakeCommand o) {
   start = Clock::now();
   auto tracer = Tracer::build(*scene);
   if (!tracer) return fail(tracer.error());
-  const Receivers receivers = make_vertex_receivers(*scene);
   const double build_seconds = seconds_since(start);
 
   BakeReport report;
@@ -113,6 +180,14 @@ int run_bake(Context& context, BakeCommand o) {
     free_space = std::move(*baked);
   }
 
+  if (!o.fix_light.empty()) {
+    auto env = load_environment(o.fix_light);
+    if (!env) return fail(env.error());
+    warn(env->warnings);
+    *transfer = fix_light(*transfer, project_environment(*env, o.bake.order), env->name);
+    report.bytes = transfer->bytes();
+  }
+
   nlohmann::json provenance{
       {"generator", "lambent " LAMBENT_VERSION},
       {"input", {{"name", scene->path.substr(scene->path.find_last_of('/') + 1)}, {"xxh3_128", scene->hash}}},
@@ -122,15 +197,27 @@ int run_bake(Context& context, BakeCommand o) {
       {"report", {{"receivers", report.receivers}, {"buried", report.buried}}}};
   if (is_matrix)
     provenance["options"].update({{"brdf", o.brdf.brdf}, {"outgoing", o.outgoing}, {"incident_order", o.matrix.incident_order}, {"simulate", o.simulate}});
+  if (!o.fix_light.empty()) provenance["options"]["fix_light"] = o.fix_light;
   if (free_space) {
     provenance["options"].update({{"lattice", o.lattice_points}, {"lattice_order", o.lattice.order}});
     provenance["report"]["lattice_invalid"] = lattice_report.invalid;
   }
   if (report.error >= 0) provenance["report"]["error"] = report.error;
 
+  ZonalFitReport fit;
+  std::optional<ZonalTransfer> zonal;
+  if (is_zonal) {
+    auto fitted = fit_zonal(*transfer, o.zonal, &fit, &context.progress);
+    if (!fitted) return fail(fitted.error());
+    zonal = std::move(*fitted);
+    report.bytes = zonal->bytes();
+    provenance["zonal"] = {{"lobes", o.zonal.lobes}, {"rms", fit.rms}};
+  }
+
   start = Clock::now();
-  if (auto ok = save_baked(o.output, *scene, receivers, *transfer, provenance.dump(), outgoing ? &*outgoing : nullptr,
-                           free_space ? &*free_space : nullptr);
+  if (auto ok = zonal ? save_baked(o.output, *scene, receivers, *zonal, provenance.dump())
+                      : save_baked(o.output, *scene, receivers, *transfer, provenance.dump(),
+                                   {.outgoing = outgoing ? &*outgoing : nullptr, .lattice = free_space ? &*free_space : nullptr});
       !ok)
     return fail(ok.error());
   const double save_seconds = seconds_since(start);
@@ -153,6 +240,7 @@ int run_bake(Context& context, BakeCommand o) {
                           {"operator_bytes", report.operator_bytes},
                           {"operator_kept", report.operator_kept},
                           {"working_memory", report.working_memory}};
+    if (zonal) result["zonal"] = {{"lobes", zonal->lobes}, {"rms", fit.rms}, {"seconds", fit.seconds}};
     result["error"] = report.error >= 0 ? nlohmann::json(report.error) : nlohmann::json();
     if (free_space)
       result["lattice"] = {{"points", lattice_report.points}, {"invalid", lattice_report.invalid}, {"rays", lattice_report.rays},
@@ -169,6 +257,7 @@ int run_bake(Context& context, BakeCommand o) {
              human_seconds(report.trace_seconds), human_seconds(report.bounce_seconds), human_seconds(save_seconds));
   fmt::print("  size       {} a receiver, {} in all (order {}, {} row{}, {} channel{}, {})\n", human_bytes(bytes_each), human_bytes(double(report.bytes)),
              transfer->light.order, transfer->rows, transfer->rows == 1 ? "" : "s", transfer->channels, transfer->channels == 1 ? "" : "s", o.precision);
+  if (zonal) fmt::print("  lobes      {}, fitted in {}, with an error of {:.2f}% RMS\n", zonal->lobes, human_seconds(fit.seconds), 100 * fit.rms);
   if (free_space)
     fmt::print("  lattice    {} points, order {}, {} in {}{}\n", human_count(lattice_report.points), o.lattice.order, human_bytes(double(lattice_report.bytes)),
                human_seconds(lattice_report.seconds),
@@ -186,31 +275,42 @@ void add_bake(CLI::App& app, Run& run) {
   CLI::App* c = app.add_subcommand("bake", "Bake a scene's light transport");
   o->scene.add_to(*c);
   c->add_option("-o,--output", o->output, "Baked file to write (.glb)")->required();
-  c->add_option("--order", o->bake.order, "Bands of the lighting's spherical harmonics")->check(CLI::Range(1, max_sh_order))->capture_default_str();
-  c->add_option("--transfer", o->transfer, "diffuse: a vector a receiver; matrix: incident light in every direction, for glossy materials")
-      ->check(CLI::IsMember({"diffuse", "matrix"}))->capture_default_str();
+  c->add_option("--transfer", o->transfer, "What is stored: diffuse, a vector a receiver for distant light; matrix, incident light in every direction, "
+                                           "for glossy materials; zonal, lobes, for what moves; lightmap, the light of the scene's own lamps")
+      ->check(CLI::IsMember({"diffuse", "matrix", "zonal", "lightmap"}))->capture_default_str();
+  auto* order = c->add_option("--order", o->bake.order, "Bands of the lighting's spherical harmonics")->check(CLI::Range(1, max_sh_order))->capture_default_str();
+  auto* lobes = c->add_option("--lobes", o->zonal.lobes, "zonal: lobes a receiver")->check(CLI::Range(1, max_stored_lobes))->capture_default_str();
   auto* incident = c->add_option("--incident-order", o->matrix.incident_order, "matrix: bands of incident light")
                        ->check(CLI::Range(1, max_incident_order))->capture_default_str();
   auto* last = c->add_option("--outgoing", o->outgoing, "matrix: rows for the last reflection: map, svd:ROWS, sh:BANDS, hemisphere:BANDS, hsh:BANDS")
                    ->capture_default_str();
+  auto* membrane = c->add_option("--membrane", o->membrane, "No simulation: thin sheets that let this share of the light through, 0 to 1, or a picture of it");
   auto* simulate = c->add_option("--simulate", o->simulate, "matrix: bounces by the recursion over receivers, or by paths (caustics, coarse meshes; noisier)")
                        ->check(CLI::IsMember({"recursion", "paths"}))->capture_default_str();
   o->brdf.brdf = "materials";
   auto* brdf = o->brdf.add_to(*c);
+  auto* fixed = c->add_option("--fix-light", o->fix_light, "Bake this environment in, so that only its brightness is left: a surface light field");
   c->add_option("--samples", o->bake.samples, "Rays a receiver")->check(CLI::Range(1, 1 << 20))->capture_default_str();
-  auto* bounces = c->add_option("--bounces", o->bake.bounces, "Reflections between surfaces")->check(CLI::Range(0, 64))->capture_default_str();
+  auto* bounces = c->add_option("--bounces", o->bounces, "Reflections between surfaces, 0 to 64; lightmaps also converge:EPS, as many as leave that residual")
+                      ->capture_default_str();
   c->add_option("--shadows", o->shadows, "off: open light everywhere, no shadows and no bounces")->check(CLI::IsMember({"on", "off"}))->capture_default_str();
   c->add_option("--memory", o->bake.memory, "Working memory beyond scene and result; e.g. 500MB, 2GiB")
       ->transform(CLI::AsSizeValue(false))->default_str("4GiB");
   c->add_option("--seed", o->bake.seed, "Of the ray directions")->capture_default_str();
   c->add_option("--precision", o->precision, "Of the stored transfer")->check(CLI::IsMember({"half", "single"}))->capture_default_str();
+  o->receivers.add_to(*c);
+  o->lightmap.add_to(*c);
   auto* points = c->add_option("--lattice", o->lattice_points, "NX,NY,NZ: also bake light in free space at so many points, for `render --insert`");
   auto* box = c->add_option("--lattice-box", o->lattice_box, "X0,Y0,Z0,X1,Y1,Z1: where, if not throughout the scene's box");
   auto* lattice_order = c->add_option("--lattice-order", o->lattice.order, "Bands of the light that arrives there")
                             ->check(CLI::Range(1, max_sh_order))->capture_default_str();
-  c->callback([o, bounces, incident, last, brdf, simulate, points, box, lattice_order, &run] {
-    if (o->shadows == "off" && bounces->count() && o->bake.bounces > 0)
+  c->callback([o, bounces, order, lobes, membrane, fixed, incident, last, brdf, simulate, points, box, lattice_order, &run] {
+    o->order_given = order->count() > 0;
+    if (o->shadows == "off" && bounces->count() && o->bounces != "0")
       throw CLI::ValidationError("--shadows off has no bounces: leave --bounces out, or set it to 0");
+    if (membrane->count() && o->transfer != "diffuse") throw CLI::ValidationError("--membrane is a transfer of its own: leave --transfer out");
+    if (fixed->count() && (membrane->count() || o->transfer == "zonal")) throw CLI::ValidationError("--fix-light leaves nothing to turn: it is for diffuse and matrix transfer");
+    if (lobes->count() && o->transfer != "zonal") throw CLI::ValidationError("--lobes needs --transfer zonal");
     for (const CLI::Option* option : {incident, last, brdf, simulate})
       if (option->count() && o->transfer != "matrix") throw CLI::ValidationError(option->get_name() + " needs --transfer matrix");
     if (o->transfer == "matrix" && o->shadows == "off") throw CLI::ValidationError("--transfer matrix is always baked with shadows");
@@ -219,6 +319,8 @@ void add_bake(CLI::App& app, Run& run) {
     if (points->count() && o->shadows == "off") throw CLI::ValidationError("--lattice is always baked with shadows");
     if (points->count() && o->bake.order + o->lattice.order > max_sh_order + 1)
       throw CLI::ValidationError("--order and --lattice-order may be " + std::to_string(max_sh_order + 1) + " together");
+    if (points->count() && (membrane->count() || fixed->count() || (o->transfer != "diffuse" && o->transfer != "matrix")))
+      throw CLI::ValidationError("--lattice goes with diffuse and matrix transfer, under any distant light");
     run = [o](Context& context) { return run_bake(context, *o); };
   });
 }

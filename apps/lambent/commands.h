@@ -13,8 +13,12 @@ void add_bake(CLI::App& app, Run& run);
 void add_render(CLI::App& app, Run& run);
 void add_reference(CLI::App& app, Run& run);
 void add_compare(CLI::App& app, Run& run);
+void add_compress(CLI::App& app, Run& run);
+void add_patch(CLI::App& app, Run& run);
 void add_inspect(CLI::App& app, Run& run);
 void add_env(CLI::App& app, Run& run);
 void add_demo(CLI::App& app, Run& run);
+void add_view(CLI::App& app, Run& run);
+void add_export(CLI::App& app, Run& run);
 
 }  // namespace lambent::tool

@@ -63,6 +63,20 @@ int inspect_picture(Context& context, const std::string& path) {
   return success;
 }
 
+int inspect_zonal(Context& context, const std::string& path, const Baked& baked) {
+  const ZonalTransfer& t = *baked.zonal;
+  const nlohmann::json d{{"file", path}, {"kind", "baked"}, {"scene", describe_scene(baked.scene)},
+                         {"transfer", {{"kind", "zonal"}, {"order", t.order}, {"lobes", t.lobes}, {"channels", t.channels}, {"receivers", t.receivers},
+                                       {"bytes", t.bytes()}, {"precision", t.precision == Precision::half ? "half" : "single"}}},
+                         {"provenance", nlohmann::json::parse(baked.provenance, nullptr, false)}};
+  if (context.json) return print_json(d), success;
+  fmt::print("{}\n  baked: {} zonal lobes, order {}, {} channel{}, {} receivers, {} ({})\n", path, t.lobes, t.order, t.channels,
+             t.channels == 1 ? "" : "s", human_count(t.receivers), human_bytes(double(t.bytes())), t.precision == Precision::half ? "half" : "single");
+  print_scene(d["scene"]);
+  fmt::print("  provenance {}\n", d["provenance"].dump(-1, ' ', false, nlohmann::json::error_handler_t::replace));
+  return success;
+}
+
 int run_inspect(Context& context, const std::string& path) {
   const std::string extension = file_extension(path);
   if (std::set<std::string>{"hdr", "exr", "png", "jpg", "jpeg"}.contains(extension)) return inspect_picture(context, path);
@@ -70,8 +84,9 @@ int run_inspect(Context& context, const std::string& path) {
     auto baked = load_baked(path);
     if (!baked) return fail(baked.error());
     const Transfer& t = baked->transfer;
+    if (baked->zonal) return inspect_zonal(context, path, *baked);
     nlohmann::json d{{"file", path}, {"kind", "baked"}, {"scene", describe_scene(baked->scene)},
-                     {"transfer", {{"order", t.light.order}, {"channels", t.channels}, {"receivers", t.receivers}, {"bytes", t.bytes()},
+                     {"transfer", {{"kind", baked->outgoing ? "matrix" : "diffuse"}, {"order", t.light.order}, {"columns", t.columns()}, {"rows", t.rows}, {"channels", t.channels}, {"receivers", t.receivers}, {"bytes", t.bytes()},
                                    {"precision", t.precision == Precision::half ? "half" : "single"}}},
                      {"provenance", nlohmann::json::parse(baked->provenance, nullptr, false)}};
     if (baked->lattice) {
@@ -82,7 +97,9 @@ int run_inspect(Context& context, const std::string& path) {
     if (context.json) {
       print_json(d);
     } else {
-      fmt::print("{}\n  baked: order {}, {} channel{}, {} receivers, {} ({})\n", path, t.light.order, t.channels, t.channels == 1 ? "" : "s",
+      fmt::print("{}\n  baked: {}, order {}, {} column{}, {} row{}, {} channel{}, {} receivers, {} ({})\n", path,
+                 baked->outgoing ? std::string("matrix, outgoing ") + outgoing_names[int(baked->outgoing->kind)] : "diffuse", t.light.order, t.columns(),
+                 t.columns() == 1 ? "" : "s", t.rows, t.rows == 1 ? "" : "s", t.channels, t.channels == 1 ? "" : "s",
                  human_count(t.receivers), human_bytes(double(t.bytes())), t.precision == Precision::half ? "half" : "single");
       if (baked->lattice)
         fmt::print("  light in free space at {} x {} x {} points, order {}, {}\n", baked->lattice->lattice.nx, baked->lattice->lattice.ny,

@@ -22,9 +22,13 @@ int main(int argc, char** argv) {
   tool::add_render(app, run);
   tool::add_reference(app, run);
   tool::add_compare(app, run);
+  tool::add_compress(app, run);
+  tool::add_patch(app, run);
   tool::add_inspect(app, run);
   tool::add_env(app, run);
   tool::add_demo(app, run);
+  tool::add_view(app, run);
+  tool::add_export(app, run);
 
   try {
     app.parse(argc, argv);

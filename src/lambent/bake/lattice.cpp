@@ -122,7 +122,7 @@ struct LatticeBaker {
         ++seen;
         continue;
       }
-      const Corners* corners = setup.corners.find(h.triangle, h.front);
+      const Corners* corners = std::get<CornerReceivers>(setup.receivers.basis).find(h.triangle, h.front);
       if (!corners) {  // black
         ++backs;
         continue;

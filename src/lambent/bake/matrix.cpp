@@ -15,6 +15,7 @@
 #include <atomic>
 #include <chrono>
 #include <map>
+#include <variant>
 
 namespace lambent {
 namespace {
@@ -81,6 +82,7 @@ struct MatrixBaker {
   std::vector<size_t> first_row{};  // of each receiver's scattered rows; one more at the end
   Pool<MatrixScratch> scratch{[this] { return make_scratch(); }};
 
+  const CornerReceivers& corners() const { return std::get<CornerReceivers>(receivers.basis); }
   size_t n() const { return receivers.count(); }
   size_t J() const { return size_t(basis.count()); }                // rows of X
   size_t C() const { return size_t(sh_count(options.order)); }      // columns
@@ -148,12 +150,12 @@ struct MatrixBaker {
       const MatrixHit& h = hits[i];
       float* v = s.v.data() + in_batch * wc;
       std::fill(v, v + wc, 0.0f);
-      const Corners& corners = *setup.corners.find(h.corner >> 1, h.corner & 1);
+      const Corners& at = *corners().find(h.corner >> 1, h.corner & 1);
       const Vec3 back(-s.x[h.ray], -s.y[h.ray], -s.z[h.ray]);
       const Vec3 colour(half_to_float(h.rgb[0]), half_to_float(h.rgb[1]), half_to_float(h.rgb[2]));
       const float b1 = float(h.u) / 65535.0f, b2 = float(h.v) / 65535.0f, b[3] = {1 - b1 - b2, b1, b2};
       for (int k = 0; k < 3; ++k) {
-        const uint32_t c = corners.receiver[k];
+        const uint32_t c = at.receiver[k];
         const FactoredResponse& f = scatter[materials.of_receiver[c]];
         const ViewWeights* weights = f.g.values.data();
         if (!f.constant) {
@@ -214,7 +216,7 @@ struct MatrixBaker {
       setup.tracer.visible_fan(receivers.origins[r], d, s.visible.data());
       size_t seen = 0;
       for (size_t j = 0; j < rays(); ++j) seen += s.visible[j] > 0;
-      return 4 * seen < rays() && is_buried(setup.tracer, setup.corners, receivers.origins[r], d);
+      return 4 * seen < rays() && is_buried(setup.tracer, receivers.basis, receivers.origins[r], d);
     }
     setup.tracer.closest_fan(receivers.origins[r], d, s.hits.data());
     size_t backs = 0;
@@ -222,7 +224,7 @@ struct MatrixBaker {
       const Hit& h = s.hits[j];
       s.visible[j] = h.triangle == none ? 1.0f : 0.0f;
       if (h.triangle == none) continue;
-      const Corners* corner = setup.corners.find(h.triangle, h.front);
+      const Corners* corner = corners().find(h.triangle, h.front);
       if (!corner) {
         ++backs;
         continue;
@@ -386,7 +388,7 @@ struct MatrixBaker {
       if (stage.cancelled()) return Error{"", "cancelled"};
     }
     auto s = scratch.borrow();
-    for (const FillStep& step : make_fill_steps(setup.corners, buried)) {
+    for (const FillStep& step : make_fill_steps(scene, receivers.basis, buried)) {
       receivers.origins[step.receiver] = receivers.origins[step.sources[0]];
       (void)receive(*s, step.receiver);
     }
@@ -512,7 +514,7 @@ struct MatrixBaker {
   void move_buried(const std::vector<uint8_t>& was_buried, AlignedVector<float>&, TraceReceiver& trace_receiver, bool bounces, std::vector<MatrixHits>& kept,
                    std::vector<uint8_t>& is_kept, std::atomic<size_t>& used) {
     const std::vector<uint8_t> buried = was_buried;
-    const auto steps = make_fill_steps(setup.corners, buried);
+    const auto steps = make_fill_steps(scene, receivers.basis, buried);
     if (steps.empty()) return;
     for (const FillStep& step : steps) receivers.origins[step.receiver] = receivers.origins[step.sources[0]];
     std::map<size_t, bool> touched;
@@ -553,6 +555,7 @@ size_t matrix_memory(size_t receivers, int channels, const BakeOptions& o, const
 Result<MatrixBake> bake_matrix(const Scene& scene, const Tracer& tracer, const Receivers& receivers, const ReceiverMaterials& materials,
                                const BakeOptions& options, const MatrixOptions& matrix, BakeReport* report, Progress* progress) {
   if (receivers.count() == 0) return Error{scene.path, "nothing to bake: no triangle has an area"};
+  if (!std::holds_alternative<CornerReceivers>(receivers.basis)) return Error{scene.path, "transfer matrices are baked at vertices"};
   if (auto ok = check_options(options, matrix, materials, receivers.count()); !ok) return ok.error();
   BakeReport unwanted;
   BakeReport& r = report ? *report : unwanted;

@@ -1,6 +1,6 @@
 // Follows: P.-P. Sloan, "Stupid spherical harmonics tricks" (2008); normalised Legendre recurrences as in any text on
 // geodesy, with sin^m(theta) cos/sin(m phi) taken from powers of (x + iy) so that no angle is computed.
-#include <lambent/basis/sh.h>
+#include <lambent/basis/sh_tables.h>
 #include <lambent/core/check.h>
 
 #include <array>
@@ -10,32 +10,25 @@ namespace {
 
 constexpr int n_max = max_sh_order;
 
-// q(l, m) = z a(l, m) q(l-1, m) + b(l, m) q(l-2, m), for the normalised Legendre function divided by sin^m.
-struct LegendreTables {
-  double diagonal[n_max];
-  double a[n_max][n_max], b[n_max][n_max];
-  LegendreTables() {
-    double q = std::sqrt(1 / (4 * std::numbers::pi));
-    for (int m = 0; m < n_max; ++m) {
-      diagonal[m] = q * (m > 0 ? std::numbers::sqrt2 : 1.0) * (m % 2 ? -1.0 : 1.0);  // sqrt 2 and Condon-Shortley sign
-      q *= std::sqrt((2.0 * m + 3) / (2.0 * m + 2));
-      for (int l = m + 1; l < n_max; ++l) {
-        double l2 = double(l) * l, m2 = double(m) * m, k = double(l - 1) * (l - 1);
-        a[l][m] = std::sqrt((4 * l2 - 1) / (l2 - m2));
-        b[l][m] = l > m + 1 ? -std::sqrt((2.0 * l + 1) * (k - m2) / ((2.0 * l - 3) * (l2 - m2))) : 0.0;
-      }
+ShTables make_tables() {
+  ShTables t{};
+  double q = std::sqrt(1 / (4 * std::numbers::pi));
+  for (int m = 0; m < n_max; ++m) {
+    t.diagonal[m] = q * (m > 0 ? std::numbers::sqrt2 : 1.0) * (m % 2 ? -1.0 : 1.0);  // sqrt 2 and Condon-Shortley sign
+    q *= std::sqrt((2.0 * m + 3) / (2.0 * m + 2));
+    for (int l = m + 1; l < n_max; ++l) {
+      double l2 = double(l) * l, m2 = double(m) * m, k = double(l - 1) * (l - 1);
+      t.a[l][m] = std::sqrt((4 * l2 - 1) / (l2 - m2));
+      t.b[l][m] = l > m + 1 ? -std::sqrt((2.0 * l + 1) * (k - m2) / ((2.0 * l - 3) * (l2 - m2))) : 0.0;
     }
   }
-};
-const LegendreTables& tables() {
-  static const LegendreTables t;
   return t;
 }
 
 template <class T>
 void evaluate(int order, T x, T y, T z, std::span<T> out) {
   LAMBENT_CHECK(order >= 1 && order <= n_max && out.size() >= size_t(sh_count(order)));
-  const LegendreTables& t = tables();
+  const ShTables& t = sh_tables();
   T c = 1, s = 0;  // real and imaginary part of (x + iy)^m
   for (int m = 0; m < order; ++m) {
     T q1 = T(t.diagonal[m]), q2 = 0;
@@ -53,6 +46,11 @@ void evaluate(int order, T x, T y, T z, std::span<T> out) {
 }
 
 }  // namespace
+
+const ShTables& sh_tables() {
+  static const ShTables t = make_tables();
+  return t;
+}
 
 void evaluate_sh(int order, Vec3 d, std::span<float> out) { evaluate<float>(order, d.x, d.y, d.z, out); }
 void evaluate_sh(int order, glm::dvec3 d, std::span<double> out) { evaluate<double>(order, d.x, d.y, d.z, out); }

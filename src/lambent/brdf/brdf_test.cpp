@@ -82,7 +82,7 @@ Integrals integrate(const Brdf& brdf, Vec3 wo) {
     }
   return sum;
 }
-constexpr double quadrature = 1e-3;  // what integrate() misses at most; halving its steps changes no result below by a third of it
+constexpr double quadrature = 1e-3;  // what integrate() may miss; means of draws, which know no grid, agree to it
 
 // --- What holds for all
 

@@ -26,8 +26,10 @@ struct Setting {
 class Settings {
  public:
   Settings(std::string_view model, std::string_view text) : model_(model) { read(text); }
+
   void color(std::string_view key, Vec3& value) {
-    if (Setting* s = take(key, 3, 1)) value = s->numbers.size() == 1 ? Vec3(s->numbers[0]) : Vec3(s->numbers[0], s->numbers[1], s->numbers[2]);
+    const Setting* s = take(key, 3, 1);
+    if (s) value = s->numbers.size() == 1 ? Vec3(s->numbers[0]) : Vec3(s->numbers[0], s->numbers[1], s->numbers[2]);
   }
   void number(std::string_view key, float& value, float highest = 1) {
     if (Setting* s = take(key, 1, highest)) value = s->numbers[0];
@@ -71,7 +73,7 @@ class Settings {
       float x = 0;
       auto [stop, status] = std::from_chars(item.data(), item.data() + item.size(), x);
       if (status != std::errc() || stop != item.data() + item.size() || !std::isfinite(x))
-        return fail(std::string(settings_.back().key) + " is not a number: " + quoted(item));
+        return fail(quoted(settings_.back().key) + " is not a number: " + quoted(item));
       settings_.back().numbers.push_back(x);
     }
   }

@@ -64,9 +64,9 @@ TEST(ParseBrdf, RefusesInOneLine) {
   EXPECT_EQ(error("lambert:colour=1"), "lambert: there is no \"colour\"; it takes albedo");
   EXPECT_EQ(error("ggx:roughness"), "ggx: \"roughness\" is not of the form key=value");
   EXPECT_EQ(error("ggx:roughness=0.3,roughness=0.4"), "ggx: \"roughness\" is given twice");
-  EXPECT_EQ(error("ggx:roughness="), "ggx: roughness is not a number: \"\"");
+  EXPECT_EQ(error("ggx:roughness="), "ggx: \"roughness\" is not a number: \"\"");
   EXPECT_EQ(error("ggx:roughness=0.3,"), "ggx: ends in a comma");
-  EXPECT_EQ(error("ggx:roughness=nan"), "ggx: roughness is not a number: \"nan\"");
+  EXPECT_EQ(error("ggx:roughness=nan"), "ggx: \"roughness\" is not a number: \"nan\"");
   EXPECT_EQ(error("ggx:roughness=2"), "ggx: roughness must lie in [0, 1]");
   EXPECT_EQ(error("ggx:roughness=-0.1"), "ggx: roughness must lie in [0, 1]");
   EXPECT_EQ(error("ggx:roughness=0.1,0.2,0.3"), "ggx: roughness takes one number or 2");
@@ -74,7 +74,7 @@ TEST(ParseBrdf, RefusesInOneLine) {
   EXPECT_EQ(error("lambert:albedo=1,2"), "lambert: albedo takes one number or 3");
   EXPECT_EQ(error("phong:exponent=1e6"), "phong: exponent must lie in [0, 100000]");
   EXPECT_EQ(error("phong:diffuse=0.5,specular=0.1,0.6,0.1"), "phong: diffuse and specular add up to more than 1");
-  for (const char* text : {"", ":", "=", "lambert:=", "lambert:,", "a\nb", "ggx:\n=1", "ggx:x=\n"}) {
+  for (const char* text : {"", ":", "=", "lambert:=", "lambert:,", "a\nb", "ggx:\n=1", "ggx:\n=a", "ggx:x=\n"}) {
     EXPECT_FALSE(error(text).empty()) << text;
     EXPECT_EQ(error(text).find('\n'), std::string::npos) << text;
   }

@@ -1,5 +1,6 @@
 #include <lambent/core/parallel.h>
 #include <lambent/core/random.h>
+#include <lambent/relight/fix_light.h>
 #include <lambent/relight/relight.h>
 
 #include <gtest/gtest.h>
@@ -62,6 +63,27 @@ TEST(Relight, RowsAreDotProductsOfTheirOwn) {
         }
     }
   }
+}
+
+TEST(FixLight, KeepsWhatRelightingGives) {
+  const WritableTransfer w = make_transfer({.order = 3}, 4, 3, 50, Precision::single);
+  Random random(31);
+  std::vector<float> values(w.transfer.receiver_values());
+  for (size_t r = 0; r < 50; ++r) {
+    for (float& v : values) v = random.next() - 0.5f;
+    store_receiver(w, r, values);
+  }
+  std::vector<Vec3> light(9);
+  for (Vec3& l : light) l = {random.next(), -random.next(), random.next()};
+  Relit a, b;
+  relight(w.transfer, light, a);
+  const Transfer fixed = fix_light(w.transfer, light, "light");
+  ASSERT_EQ(fixed.columns(), 1u);
+  EXPECT_EQ(fixed.light.groups[0], "light");
+  const Vec3 half_red(0.5f, 1, 1);  // what is left of the light is its brightness
+  relight(fixed, {&half_red, 1}, b);
+  for (size_t r = 0; r < 50; ++r)
+    for (int row = 0; row < 4; ++row) EXPECT_LT(glm::length(b.at(r, row) - half_red * a.at(r, row)), 1e-6f);
 }
 
 TEST(Relight, IsTheSameOnOneThreadAndDoesNotMoveItsOutput) {

@@ -1,7 +1,9 @@
+#include <lambent/core/check.h>
 #include <lambent/core/parallel.h>
 #include <lambent/core/random.h>
 #include <lambent/core/sampling.h>
 #include <lambent/render/render.h>
+#include <lambent/scene/lights.h>
 
 namespace lambent {
 namespace {
@@ -19,15 +21,15 @@ Hit first_visible(const Scene& scene, const Tracer& tracer, Vec3 eye, Vec3 direc
 
 }  // namespace
 
-Result<Image> render(const Scene& scene, const Tracer& tracer, const CornerReceivers& corners, const Relit& relit,
-                     const Camera& camera, const RenderOptions& options, Progress* progress) {
+Result<Image> render_surfaces(const Scene& scene, const Tracer& tracer, const Camera& camera, const RenderOptions& options,
+                              const std::function<SurfaceShade()>& make_shade, Progress* progress) {
   Image image(options.width, options.height);
   if (!options.background) image.alpha.assign(image.rgb.size(), 0.0f);
   const CameraRays rays(camera, options.width, options.height);
   ProgressStage stage(progress, "rendering", size_t(options.height));
   parallel_for(size_t(options.height), 1, [&](size_t begin, size_t end) {
     if (stage.cancelled()) return;
-    std::vector<ViewWeights> weights(options.outgoing ? size_t(relit.rows) : 0);
+    const SurfaceShade shade = make_shade();
     for (int y = int(begin); y < int(end); ++y)
       for (int x = 0; x < options.width; ++x) {
         Vec3 sum(0.0f);
@@ -42,19 +44,7 @@ Result<Image> render(const Scene& scene, const Tracer& tracer, const CornerRecei
             continue;
           }
           ++covered;
-          const auto* corner = corners.find(hit.triangle, hit.front);
-          if (!corner) continue;
-          const auto& r = corner->receiver;
-          const float b[3] = {1 - hit.u - hit.v, hit.u, hit.v};
-          const Vec3 colour = options.albedo ? albedo(scene, scene.triangles[hit.triangle], hit.u, hit.v) : Vec3(1);
-          if (!options.outgoing) {
-            sum += colour * (b[0] * relit.at(r[0]) + b[1] * relit.at(r[1]) + b[2] * relit.at(r[2]));
-            continue;
-          }
-          for (int k = 0; k < 3; ++k) {
-            evaluate_outgoing(*options.outgoing, r[k], -direction, weights);
-            sum += b[k] * reflect_rows(weights, colour, [&](size_t row) { return relit.at(r[k], int(row)); });
-          }
+          sum += shade(hit, direction);
         }
         image.at(x, y) = sum / float(options.samples);
         if (!options.background) image.alpha[size_t(y) * size_t(options.width) + size_t(x)] = float(covered) / float(options.samples);
@@ -63,6 +53,37 @@ Result<Image> render(const Scene& scene, const Tracer& tracer, const CornerRecei
   });
   if (stage.cancelled()) return Error{"", "cancelled"};
   return image;
+}
+
+Result<Image> render(const Scene& scene, const Tracer& tracer, const SpatialBasis& basis, const Relit& relit,
+                     const Camera& camera, const RenderOptions& options, Progress* progress) {
+  LAMBENT_CHECK(options.outgoing ? relit.rows == options.outgoing->rows() : relit.rows == directional_rows(options.directional));
+  return render_surfaces(scene, tracer, camera, options, [&]() -> SurfaceShade {
+    return [&, weights = std::vector<ViewWeights>(size_t(relit.rows))](const Hit& hit, Vec3 direction) mutable {
+      const Triangle& triangle = scene.triangles[hit.triangle];
+      Vec3 sum(0.0f);
+      if (!options.emission.empty() && emits(scene, triangle, hit.front)) sum += options.emission[scene.parts[triangle.part].material];
+      const Vec3 colour = options.albedo ? albedo(scene, triangle, hit.u, hit.v) : Vec3(1);
+      std::array<Vec3, 9> rows{};
+      std::visit([&](const auto& b) {
+        const auto* at = b.find(hit.triangle, hit.front);
+        if (!at) return;
+        b.spread(*at, hit.u, hit.v, [&](uint32_t receiver, float weight) {
+          if (options.outgoing) {  // each receiver reflects in its own frame
+            evaluate_outgoing(*options.outgoing, receiver, -direction, weights);
+            sum += weight * reflect_rows(weights, colour, [&](size_t row) { return relit.at(receiver, int(row)); });
+            return;
+          }
+          for (int row = 0; row < relit.rows; ++row) rows[size_t(row)] += weight * relit.at(receiver, row);
+        });
+      }, basis);
+      if (options.directional == DirectionalKind::none) return sum + colour * rows[0];
+      const Vec3 face = normalize_or(area_normal(scene, triangle), Vec3(0, 1, 0)) * (hit.front ? 1.0f : -1.0f);
+      Vec3 n = normalize_or(interpolate(scene.normals, triangle, hit.u, hit.v), face);
+      if (glm::dot(n, face) < 0) n = -n;
+      return sum + colour * evaluate_directional_light(options.directional, rows, receiver_frame(n), n);
+    };
+  }, progress);
 }
 
 }  // namespace lambent

@@ -1,6 +1,7 @@
 // glTF 2.0 specification (ISO/IEC 12113): the loader. Sections 3.7.2 (meshes, morph targets) and 3.7.3 (skins) in the rest pose.
 #include <lambent/scene/clean.h>
 #include <lambent/scene/gltf_container.h>
+#include <lambent/scene/gltf_geometry.h>
 #include <lambent/scene/gltf_materials.h>
 #include <lambent/scene/gltf_read.h>
 #include <lambent/scene/load.h>
@@ -138,11 +139,6 @@ bool read_images(GltfCheck& check, GltfDocument& document, UriReader& files, std
   return true;
 }
 
-struct MorphTarget {
-  double weight;
-  std::optional<GltfAccessor> positions, normals;
-};
-
 // Reads the primitives of all shown nodes into the scene.
 class PrimitiveReader {
  public:
@@ -178,13 +174,17 @@ class PrimitiveReader {
     GltfWhere where{"mesh", mesh, "primitive", number};
     const uint64_t mode = check_.integer(primitive, "mode", triangle_list, triangle_fan + 1, where);
     const Json* attributes = check_.object(primitive, "attributes", where);
+    // What a bake left for other viewers: primitives of backs, and materials in place of the scene's own.
+    const Json* extensions = check_.object(primitive, "extensions", where);
+    const Json* baked = extensions ? check_.object(*extensions, "LAMBENT_transfer", where) : nullptr;
     if (!check_.ok()) return false;
+    if (baked && check_.boolean(*baked, "viewerOnly", false, where)) return true;
     if (mode < triangle_list) return ++skipped_, true;
     if (!attributes) return check_.fail(where, "has no attributes");
     auto position_index = check_.index(*attributes, "POSITION", gltf_count(document_.json, "accessors"), where);
     if (!position_index) return check_.ok();  // to be ignored, says the specification
     GltfAccessor positions = read_accessor(check_, document_, *position_index);
-    if (!check_.ok() || !check_vector(positions, "POSITION", where)) return false;
+    if (!check_.ok() || !check_gltf_vector(check_, positions, "POSITION", where)) return false;
     std::optional<GltfAccessor> indices;
     if (auto index = check_.index(primitive, "indices", gltf_count(document_.json, "accessors"), where)) {
       indices = read_accessor(check_, document_, *index);
@@ -197,8 +197,8 @@ class PrimitiveReader {
     const size_t triangles = mode == triangle_list ? corners / 3 : corners < 3 ? 0 : corners - 2;
     if (triangles == 0) return true;
 
-    std::vector<MorphTarget> targets;
-    if (!read_targets(node, mesh, primitive, positions.count, where, targets)) return false;
+    std::vector<GltfMorph> targets;
+    if (!read_morphs(check_, document_, node, mesh, primitive, positions.count, where, targets)) return false;
     if (!check_size(positions, indices, triangles, targets.size(), where)) return false;
     // Every attribute must be readable, so that the writer can copy it.
     for (auto attribute = attributes->begin(); attribute != attributes->end(); ++attribute) {
@@ -215,22 +215,18 @@ class PrimitiveReader {
     part.node = int(node), part.primitive = int(number);
     part.first_vertex = uint32_t(scene_.positions.size()), part.vertex_count = uint32_t(positions.count);
     part.first_triangle = uint32_t(scene_.triangles.size());
-    auto material = check_.index(primitive, "material", gltf_count(document_.json, "materials"), where);
+    const bool has_own = baked && baked->contains("ownMaterial");
+    auto material = check_.index(has_own ? *baked : primitive, has_own ? "ownMaterial" : "material", gltf_count(document_.json, "materials"), where);
     if (!check_.ok()) return false;
     part.material = material ? uint32_t(*material) : default_material();
-    if (!read_geometry(*attributes, positions, targets, placement, where) || !read_colors(*attributes, positions.count, where)) {
+    if (!read_vertices(check_, document_, *attributes, positions, targets, placement, where, scene_.positions, scene_.normals) ||
+        !read_colors(*attributes, positions.count, where)) {
       return false;
     }
     if (!read_triangles(part, mode, indices, triangles, placement.mirrored, where)) return false;
     if (!attributes->contains("NORMAL")) bare_.push_back(scene_.parts.size());
     scene_.parts.push_back(std::move(part));
     return true;
-  }
-
-  // POSITION, NORMAL and their morph targets: three floats, or small integers by KHR_mesh_quantization.
-  bool check_vector(const GltfAccessor& a, const char* name, const GltfWhere& where) {
-    if (a.components == 3 && a.type != GltfType::u32) return true;
-    return check_.fail(where, std::string(name) + " is not three floats or small integers");
   }
 
   bool check_size(const GltfAccessor& positions, const std::optional<GltfAccessor>& indices, size_t triangles, size_t targets,
@@ -245,62 +241,6 @@ class PrimitiveReader {
                                     std::to_string(max_triangles) + " triangles");
     }
     return true;
-  }
-
-  // Targets of weights other than zero. The others are checked too, for the writer copies them.
-  bool read_targets(size_t node, size_t mesh, const Json& primitive, size_t count, const GltfWhere& where,
-                    std::vector<MorphTarget>& out) {
-    const Json* targets = check_.array(primitive, "targets", where);
-    if (!targets || targets->empty()) return check_.ok();
-    const Json& node_json = gltf_item(document_.json, "nodes", node);
-    bool own = node_json.contains("weights");
-    const Json& holder = own ? node_json : gltf_item(document_.json, "meshes", mesh);
-    std::vector<double> weights(targets->size(), 0.0);
-    check_.numbers(holder, "weights", weights, own ? GltfWhere{"node", node} : GltfWhere{"mesh", mesh});
-    for (size_t t = 0; t < targets->size() && check_.ok(); ++t) {
-      const Json& target = (*targets)[t];
-      if (!target.is_object()) return check_.fail(where, "a morph target is not an object");
-      MorphTarget morph{weights[t], read_attribute(check_, document_, target, "POSITION", count, where),
-                        read_attribute(check_, document_, target, "NORMAL", count, where)};
-      if (morph.positions && !check_vector(*morph.positions, "a morph target's POSITION", where)) return false;
-      if (morph.normals && !check_vector(*morph.normals, "a morph target's NORMAL", where)) return false;
-      for (auto attribute = target.begin(); attribute != target.end(); ++attribute) {
-        read_attribute(check_, document_, target, attribute.key().c_str(), count, where);
-      }
-      if (morph.weight != 0) out.push_back(std::move(morph));
-    }
-    return check_.ok();
-  }
-
-  bool read_geometry(const Json& attributes, const GltfAccessor& positions, const std::vector<MorphTarget>& targets,
-                     const GltfPlacement& placement, const GltfWhere& where) {
-    auto normals = read_attribute(check_, document_, attributes, "NORMAL", positions.count, where);
-    if (!check_.ok() || (normals && !check_vector(*normals, "NORMAL", where))) return false;
-    glm::dmat4 world = placement.world;
-    glm::dmat3 turn = normal_matrix(world);
-    for (size_t i = 0; i < positions.count; ++i) {
-      if (placement.joints) world = placement.at(i), turn = normal_matrix(world);
-      glm::dvec3 p = positions.read3(i), n = normals ? normals->read3(i) : glm::dvec3(0);
-      for (const MorphTarget& target : targets) {
-        if (target.positions) p += target.weight * target.positions->read3(i);
-        if (normals && target.normals) n += target.weight * target.normals->read3(i);
-      }
-      Vec3 position(glm::dvec3(world * glm::dvec4(p, 1)));
-      if (!is_finite(position)) return check_.fail(where, "vertex " + std::to_string(i) + " is not at a finite position");
-      n = turn * n;
-      scene_.positions.push_back(position);
-      scene_.normals.push_back(unit_normal(n));
-    }
-    return true;
-  }
-
-  // Zero stands for broken: repair_normals() finds it. What is unit but for rounding stays as it is, so that a saved normal
-  // comes back with the same bits.
-  static Vec3 unit_normal(glm::dvec3 n) {
-    constexpr double rounding = 1e-6;
-    double length = glm::length(n);
-    if (!(length > 0) || !std::isfinite(length)) return Vec3(0.0f);
-    return Vec3(std::abs(length - 1) < rounding ? n : n / length);
   }
 
   bool read_colors(const Json& attributes, size_t count, const GltfWhere& where) {
@@ -396,7 +336,7 @@ bool read_scene(GltfCheck& check, GltfDocument& document, std::span<const uint8_
   if (!check.ok() || !read_pose(check, document, pose)) return false;
   for (const GltfMaterial& m : materials) scene.materials.push_back(m.material);
   PrimitiveReader primitives(check, document, pose, scene);
-  if (!primitives.read_all()) return false;
+  if (!primitives.read_all() || !read_lights(check, document, pose, scene)) return false;
   if (scene.triangles.empty()) return check.fail({}, "no triangles");
   bool usable = false;
   for (size_t t = 0; t < scene.triangles.size() && !usable; ++t) {

@@ -1,8 +1,5 @@
 #include <lambent/core/check.h>
-#include <lambent/core/half.h>
-#include <lambent/transfer/transfer.h>
-
-#include <cstring>
+#include <lambent/transfer/blocks.h>
 
 namespace lambent {
 
@@ -18,34 +15,14 @@ WritableTransfer make_transfer(LightBasis light, int rows, int channels, size_t 
 }
 
 void store_receiver(const WritableTransfer& w, size_t receiver, std::span<const float> values) {
-  const Transfer& t = w.transfer;
-  LAMBENT_CHECK(receiver < t.receivers && values.size() == t.receiver_values());
-  size_t at = receiver / transfer_block * t.block_values() + receiver % transfer_block;
-  for (float v : values) {
-    if (t.precision == Precision::half) {
-      const uint16_t h = float_to_half(v);
-      std::memcpy(w.values + 2 * at, &h, 2);
-    } else {
-      std::memcpy(w.values + 4 * at, &v, 4);
-    }
-    at += transfer_block;
-  }
+  LAMBENT_CHECK(receiver < w.transfer.receivers && values.size() == w.transfer.receiver_values());
+  store_values(w.values, w.transfer.precision, receiver, values);
 }
 
 std::vector<float> load_receiver(const Transfer& t, size_t receiver) {
   LAMBENT_CHECK(receiver < t.receivers);
   std::vector<float> values(t.receiver_values());
-  size_t at = receiver / transfer_block * t.block_values() + receiver % transfer_block;
-  for (float& v : values) {
-    if (t.precision == Precision::half) {
-      uint16_t h;
-      std::memcpy(&h, t.data.data() + 2 * at, 2);
-      v = half_to_float(h);
-    } else {
-      std::memcpy(&v, t.data.data() + 4 * at, 4);
-    }
-    at += transfer_block;
-  }
+  load_values(t.data.data(), t.precision, receiver, values);
   return values;
 }
 

@@ -1,0 +1,105 @@
+#include "commands.h"
+#include "options.h"
+
+#include <lambent/baked/baked_file.h>
+#include <lambent/compress/zonal_fit.h>
+#include <lambent/render/render.h>
+
+#include <fmt/format.h>
+
+namespace lambent::tool {
+namespace {
+
+struct CompressCommand {
+  std::string baked, output, error_picture, precision = "half";
+  ZonalFitOptions zonal;
+  std::string camera = "auto", size = "512x512";
+  float white = 0.1f;
+};
+
+// The relative error of each receiver's fit as a false colour on the mesh; `white` is the brightest.
+Result<Image> paint_errors(const Baked& baked, const std::vector<float>& errors, const CompressCommand& o, Progress* progress) {
+  ViewOptions view_options;
+  view_options.camera = o.camera, view_options.size = o.size;
+  auto view = make_view(view_options, baked.scene);
+  if (!view) return view.error();
+  auto tracer = Tracer::build(baked.scene);
+  if (!tracer) return tracer.error();
+  Relit relit;
+  relit.values.resize((errors.size() + transfer_block - 1) / transfer_block * 3 * transfer_block);
+  for (size_t r = 0; r < errors.size(); ++r) {
+    const Vec3 colour = false_color(errors[r] / o.white);
+    for (size_t c = 0; c < 3; ++c) relit.values[(r / transfer_block * 3 + c) * transfer_block + r % transfer_block] = colour[int(c)];
+  }
+  RenderOptions options;
+  options.width = view->width, options.height = view->height, options.albedo = false;
+  auto image = render(baked.scene, *tracer, corner_receivers(baked.scene, baked.front, baked.back), relit, view->camera, options, progress);
+  if (!image) return image;
+  image->alpha.clear();
+  draw_text(*image, 6, 6, fmt::format("white: {:.3g}%", 100 * o.white), Vec3(1.0f));
+  return image;
+}
+
+int run_compress(Context& context, CompressCommand o) {
+  if (auto ok = check_output(o.output, {"glb"}); !ok) return fail(ok.error());
+  if (!o.error_picture.empty())
+    if (auto ok = check_output(o.error_picture, {"png", "exr"}); !ok) return fail(ok.error());
+  o.zonal.precision = o.precision == "half" ? Precision::half : Precision::single;
+  auto baked = load_baked(o.baked);
+  if (!baked) return fail(baked.error());
+  if (baked->zonal || baked->outgoing) return fail({o.baked, "holds no diffuse transfer of spherical harmonics, which is what lobes are fitted to"});
+  ZonalFitReport report;
+  auto fit = fit_zonal(baked->transfer, o.zonal, &report, &context.progress);
+  if (!fit) return fail({o.baked, fit.error().text()});
+
+  auto provenance = nlohmann::json::parse(baked->provenance, nullptr, false);
+  if (!provenance.is_object()) provenance = nlohmann::json::object();
+  provenance["zonal"] = {{"lobes", fit->lobes}, {"starts", o.zonal.starts}, {"retry", o.zonal.retry}, {"ridge", o.zonal.ridge},
+                         {"seed", o.zonal.seed}, {"rms", report.rms}};
+  Receivers receivers;
+  receivers.front = baked->front, receivers.back = baked->back;
+  if (auto ok = save_baked(o.output, baked->scene, receivers, *fit, provenance.dump()); !ok) return fail(ok.error());
+  if (!o.error_picture.empty()) {
+    auto image = paint_errors(*baked, report.errors, o, &context.progress);
+    if (!image) return fail(image.error());
+    if (auto ok = save_image(o.error_picture, *image); !ok) return fail(ok.error());
+  }
+
+  std::vector<float> sorted = report.errors;
+  std::sort(sorted.begin(), sorted.end());
+  const double median = sorted.empty() ? 0 : sorted[sorted.size() / 2], worst = sorted.empty() ? 0 : sorted.back();
+  const double bytes = double(fit->receiver_values() * fit->value_bytes());
+  const double before = double(baked->transfer.receiver_values() * baked->transfer.value_bytes());
+  if (context.json)
+    print_json({{"output", o.output}, {"receivers", fit->receivers}, {"lobes", fit->lobes}, {"channels", fit->channels}, {"rms", report.rms},
+                {"median", median}, {"worst", worst}, {"seconds", report.seconds}, {"retried", report.retried}, {"bytes", fit->bytes()},
+                {"bytes_per_receiver", bytes}, {"bytes_per_receiver_before", before}});
+  else
+    fmt::print("{}\n  error      {:.2f}% RMS of the transfer; receivers: median {:.2f}%, worst {:.1f}%\n  time       {} for {} receivers\n"
+               "  size       {} a receiver, {} before ({} lobes, order {}, {} channel{})\n",
+               o.output, 100 * report.rms, 100 * median, 100 * worst, human_seconds(report.seconds), human_count(fit->receivers), human_bytes(bytes),
+               human_bytes(before), fit->lobes, fit->order, fit->channels, fit->channels == 1 ? "" : "s");
+  return success;
+}
+
+}  // namespace
+
+void add_compress(CLI::App& app, Run& run) {
+  auto o = std::make_shared<CompressCommand>();
+  CLI::App* c = app.add_subcommand("compress", "Fit zonal lobes to baked transfer: it then turns with a surface that moves");
+  c->add_option("baked", o->baked, "Baked file, from `lambent bake`")->required();
+  c->add_option("--zonal", o->zonal.lobes, "Lobes a receiver")->required()->check(CLI::Range(1, max_stored_lobes));
+  c->add_option("-o,--output", o->output, "Baked file to write (.glb)")->required();
+  c->add_option("--starts", o->zonal.starts, "Searches from random axes where the error is high")->check(CLI::Range(0, 1000))->capture_default_str();
+  c->add_option("--retry", o->zonal.retry, "What error is high, relative")->check(CLI::Range(0.0f, 1.0f))->capture_default_str();
+  c->add_option("--ridge", o->zonal.ridge, "What squared coefficients count in the squared error")->check(CLI::Range(0.0f, 1.0f))->capture_default_str();
+  c->add_option("--seed", o->zonal.seed, "Of the random axes")->capture_default_str();
+  c->add_option("--precision", o->precision, "Of the stored lobes")->check(CLI::IsMember({"half", "single"}))->capture_default_str();
+  auto* picture = c->add_option("--view-error", o->error_picture, "Picture of the fit's error on the mesh (.png or .exr)");
+  c->add_option("--camera", o->camera, "For --view-error, as for render")->needs(picture)->capture_default_str();
+  c->add_option("--size", o->size, "For --view-error, as for render")->needs(picture)->capture_default_str();
+  c->add_option("--white", o->white, "For --view-error: the relative error drawn white")->needs(picture)->check(CLI::PositiveNumber)->capture_default_str();
+  c->callback([o, &run] { run = [o](Context& context) { return run_compress(context, *o); }; });
+}
+
+}  // namespace lambent::tool

@@ -1,0 +1,85 @@
+// Follows: local-deformable-prt, section 6 (local patches from height fields).
+#include <lambent/bake/patch.h>
+#include <lambent/core/check.h>
+
+namespace lambent {
+
+Result<HeightField> make_height_field(std::span<const float> values, int width, int height, int size, float depth) {
+  LAMBENT_CHECK(values.size() == size_t(width) * size_t(height));
+  if (width < 2 || height < 2) return Error{"", "a height map needs at least 2 x 2 pixels, and this has " + std::to_string(width) + " x " + std::to_string(height)};
+  if (size < 2 || size > 1024) return Error{"size", "must lie between 2 and 1024"};
+  if (!(std::abs(depth) <= 10)) return Error{"depth", "must lie between -10 and 10 sides of the patch"};
+  for (float v : values)
+    if (!std::isfinite(v)) return Error{"", "a height is not a finite number"};
+  HeightField field{size, std::vector<float>(size_t(size) * size_t(size))};
+  // Over a texel's extent, the mean of the picture, taken as piecewise constant where it is finer and linear where it is coarser.
+  const int fine = std::max(1, std::max(width, height) / size) * 2;
+  auto value = [&](double u, double v) {
+    const double x = u * width - 0.5, y = v * height - 0.5;
+    const int i = int(std::floor(x)), j = int(std::floor(y));
+    const double fx = x - i, fy = y - j;
+    auto at = [&](int a, int b) { return double(values[size_t((b + height) % height) * size_t(width) + size_t((a + width) % width)]); };
+    return (1 - fy) * ((1 - fx) * at(i, j) + fx * at(i + 1, j)) + fy * ((1 - fx) * at(i, j + 1) + fx * at(i + 1, j + 1));
+  };
+  for (int j = 0; j < size; ++j)
+    for (int i = 0; i < size; ++i) {
+      double sum = 0;
+      for (int b = 0; b < fine; ++b)
+        for (int a = 0; a < fine; ++a) sum += value((i + (a + 0.5) / fine) / size, (j + (b + 0.5) / fine) / size);
+      field.heights[size_t(j * size + i)] = float(sum / (fine * fine) * depth);
+    }
+  return field;
+}
+
+double seam_jump(const HeightField& f) {
+  const size_t n = size_t(f.size);
+  double seam = 0, inside = 0;
+  for (size_t j = 0; j < n; ++j)
+    for (size_t i = 0; i < n; ++i) {
+      const double across = f.heights[j * n + (i + 1) % n] - f.heights[j * n + i], down = f.heights[(j + 1) % n * n + i] - f.heights[j * n + i];
+      (i + 1 == n ? seam : inside) += across * across;
+      (j + 1 == n ? seam : inside) += down * down;
+    }
+  inside /= double(2 * n * (n - 1)), seam /= double(2 * n);
+  return inside > 0 ? std::sqrt(seam / inside) : seam > 0 ? INFINITY : 1.0;
+}
+
+PatchScene make_patch(const HeightField& field, Vec3 albedo) {
+  const int n = field.size, side = 3 * n;
+  PatchScene patch;
+  Scene& s = patch.scene;
+  auto h = [&](int i, int j) { return field.heights[size_t((j % n + n) % n * n + (i % n + n) % n)]; };
+  const float texel = 1.0f / float(n);
+  for (int j = 0; j <= side; ++j)
+    for (int i = 0; i <= side; ++i) {
+      s.positions.push_back({(float(i - n) + 0.5f) * texel, -(float(j - n) + 0.5f) * texel, h(i, j)});
+      // Central differences, y against v.
+      s.normals.push_back(glm::normalize(Vec3(h(i - 1, j) - h(i + 1, j), h(i, j + 1) - h(i, j - 1), 2 * texel)));
+    }
+  for (int j = 0; j < side; ++j)
+    for (int i = 0; i < side; ++i) {
+      const uint32_t a = uint32_t(j * (side + 1) + i), b = a + 1, c = a + uint32_t(side) + 1, d = c + 1;
+      s.triangles.push_back({{a, c, b}, 0, false}), s.triangles.push_back({{b, c, d}, 0, false});
+    }
+  Material material;
+  material.name = "relief", material.base_color = albedo, material.double_sided = false;
+  s.materials.push_back(material);
+  Part part;
+  part.name = "relief", part.vertex_count = uint32_t(s.positions.size()), part.triangle_count = uint32_t(s.triangles.size());
+  s.parts.push_back(part);
+
+  // Origins a hair off the surface, as for any vertices; then only the middle ones stay, and every vertex points at its like.
+  const Receivers all = make_vertex_receivers(s);
+  Receivers& r = patch.receivers;
+  for (int j = n; j < 2 * n; ++j)
+    for (int i = n; i < 2 * n; ++i) {
+      const uint32_t from = all.front[size_t(j * (side + 1) + i)];
+      r.origins.push_back(all.origins[from]), r.normals.push_back(all.normals[from]);
+    }
+  r.front.resize(s.positions.size());
+  for (int j = 0; j <= side; ++j)
+    for (int i = 0; i <= side; ++i) r.front[size_t(j * (side + 1) + i)] = uint32_t(j % n * n + i % n);
+  return patch;
+}
+
+}  // namespace lambent

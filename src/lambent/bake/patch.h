@@ -1,0 +1,29 @@
+#pragma once
+// Transfer of a small piece of relief that repeats, for use as a texture on other surfaces. Source: local-deformable-prt, section 6.
+#include <lambent/bake/bake.h>
+
+namespace lambent {
+
+// Heights at the texels of a square that repeats, row by row from the first (v = 0); 1 is one side of the square.
+struct HeightField {
+  int size = 0;  // texels a side, [2, 1024]
+  std::vector<float> heights;
+};
+
+// A picture's values, box-filtered or interpolated to size x size, times depth. Errors: fewer than 2 x 2 values; values that are not
+// finite; size or depth out of range.
+Result<HeightField> make_height_field(std::span<const float> values, int width, int height, int size, float depth);
+
+// How much a field jumps from its last row and column to its first, as a multiple of how much it changes from row to row
+// elsewhere: about 1 for a field that tiles.
+double seam_jump(const HeightField& field);
+
+// The relief in 3 x 3 repetitions, in the frame that its transfer is given in: x along +u, y along -v, z outward. Receivers are the
+// texels of the middle one, in their order; light that bounces off the outer ones comes from their likes in the middle.
+struct PatchScene {
+  Scene scene;
+  Receivers receivers;
+};
+PatchScene make_patch(const HeightField& field, Vec3 albedo);
+
+}  // namespace lambent

@@ -1,0 +1,80 @@
+// Textured patches against the displaced geometry itself.
+#include <lambent/bake/patch.h>
+#include <lambent/compress/zonal_fit.h>
+#include <lambent/render/transfer_texture.h>
+
+#include <gtest/gtest.h>
+
+namespace lambent {
+namespace {
+
+TEST(TransferTexture, FramesFollowTheTexture) {
+  Scene s;
+  s.positions = {{0, 0, 0}, {2, 0, 0}, {0, 0, -3}};  // +u along +x, -v along -z, seen from above
+  s.normals.assign(3, Vec3(0, 1, 0));
+  s.texcoords[0] = {{0, 1}, {1, 1}, {0, 0}};
+  s.triangles.push_back({{0, 1, 2}, 0, false});
+  const Mat3 f = texture_frame(s, s.triangles[0], Vec3(0, 1, 0));
+  EXPECT_LT(glm::length(f[0] - Vec3(1, 0, 0)) + glm::length(f[1] - Vec3(0, 0, -1)), 1e-6f);
+  for (Vec2& uv : s.texcoords[0]) uv.x = -uv.x;  // mirrored
+  const Mat3 m = texture_frame(s, s.triangles[0], Vec3(0, 1, 0));
+  EXPECT_LT(glm::length(m[0] - Vec3(-1, 0, 0)) + glm::length(m[1] - Vec3(0, 0, -1)), 1e-6f);
+  for (Vec2& uv : s.texcoords[0]) uv = Vec2(0.5f);
+  EXPECT_LT(glm::length(texture_frame(s, s.triangles[0], Vec3(0, 1, 0))[2] - Vec3(0, 1, 0)), 1e-6f);
+}
+
+// A wall in the xy plane that carries the texture, looked at from far in front, is shaded as the relief: the same receivers, relit.
+TEST(TransferTexture, ShadesAFlatWallAsTheReliefItself) {
+  const int n = 16;
+  HeightField field{n, {}};
+  for (int j = 0; j < n; ++j)
+    for (int i = 0; i < n; ++i) field.heights.push_back(0.1f * std::sin(2 * pi * float(i) / n + 0.5f * std::sin(2 * pi * float(j) / n)));
+  const PatchScene patch = make_patch(field, Vec3(0.6f));
+  auto tracer = Tracer::build(patch.scene);
+  BakeOptions bake_options;
+  bake_options.samples = 512, bake_options.bounces = 1, bake_options.precision = Precision::single;
+  auto transfer = bake(patch.scene, *tracer, patch.receivers, bake_options);
+  ASSERT_TRUE(transfer);
+  auto lobes = fit_zonal(*transfer, {.lobes = 6, .ridge = 1e-9f, .precision = Precision::single});
+  ASSERT_TRUE(lobes);
+  const ZonalTexture texture{n, n, *lobes};
+
+  std::vector<Vec3> light(36);
+  for (size_t k = 0; k < 36; ++k) light[k] = Vec3(std::sin(float(k) * 1.7f) / float(1 + k / 6), 0.1f * float(k % 5), std::cos(float(k)));
+  Relit relit;
+  relight(*transfer, light, relit);
+
+  // The wall, turned: R takes the patch's frame to it.
+  const Mat3 R = rotation_from_yaw_pitch_roll({25, -40, 70});
+  Scene wall;
+  for (Vec2 uv : {Vec2(0, 1), Vec2(1, 1), Vec2(1, 0), Vec2(0, 0)}) {
+    wall.positions.push_back(R * Vec3(uv.x, -uv.y, 0));
+    wall.normals.push_back(R * Vec3(0, 0, 1));
+    wall.texcoords[0].push_back(uv);
+  }
+  wall.triangles = {{{0, 1, 2}, 0, false}, {{0, 2, 3}, 0, false}};
+  wall.materials.resize(1);
+  Part part;
+  part.vertex_count = 4, part.triangle_count = 2;
+  wall.parts.push_back(part);
+  auto wall_tracer = Tracer::build(wall);
+  Camera camera;
+  camera.target = R * Vec3(0.5f, -0.5f, 0), camera.eye = R * Vec3(0.5f, -0.5f, 1000), camera.up = R * Vec3(0, 1, 0);
+  camera.fov = 2 * glm::degrees(std::atan(0.5f / 1000));  // the wall fills the picture, pixel by texel
+  RenderOptions options;
+  options.width = options.height = n, options.samples = 64;
+  const std::vector<Vec3> turned = rotate_sh(make_sh_rotation(6, R), light);
+  auto image = render_transfer_texture(wall, *wall_tracer, texture, Vec2(1), turned, camera, options);
+  ASSERT_TRUE(image);
+  double error = 0, total = 0;
+  for (int j = 0; j < n; ++j)
+    for (int i = 0; i < n; ++i) {
+      const Vec3 truth = relit.at(size_t(j * n + i)), seen = image->at(i, j);
+      error += glm::dot(seen - truth, seen - truth), total += glm::dot(truth, truth);
+    }
+  // Exact bands are blended over a pixel's area; the lobes are exact.
+  EXPECT_LT(std::sqrt(error / total), 0.08);
+}
+
+}  // namespace
+}  // namespace lambent

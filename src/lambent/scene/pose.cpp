@@ -1,0 +1,267 @@
+// Follows: local-deformable-prt, section 5; polar decomposition by Newton's iteration as in N. Higham, "Computing the polar
+// decomposition" (1986); bending and twisting as in A. Barr, "Global and local deformations of solid primitives" (1984).
+#include <lambent/scene/pose.h>
+
+#include <lambent/core/parallel.h>
+#include <lambent/scene/clean.h>
+#include <lambent/scene/gltf_animation.h>
+#include <lambent/scene/gltf_geometry.h>
+
+#include <charconv>
+
+namespace lambent {
+namespace {
+
+using Json = nlohmann::json;
+
+// The least rotation that takes unit a to unit b. Where they are (nearly) opposite, by way of a direction across.
+glm::dmat3 least_rotation(glm::dvec3 a, glm::dvec3 b) {
+  const double c = glm::dot(a, b);
+  if (c < -1 + 1e-6) {
+    const glm::dvec3 across = glm::normalize(glm::cross(a, glm::dvec3(frame_about(Vec3(a))[1])));
+    return least_rotation(across, b) * least_rotation(a, across);
+  }
+  const glm::dvec3 v = glm::cross(a, b);
+  const glm::dmat3 K(glm::dvec3(0, v.z, -v.y), glm::dvec3(-v.z, 0, v.x), glm::dvec3(v.y, -v.x, 0));
+  return glm::dmat3(1.0) + K + K * K / (1 + c);
+}
+
+double frobenius(const glm::dmat3& m) { return std::sqrt(glm::dot(m[0], m[0]) + glm::dot(m[1], m[1]) + glm::dot(m[2], m[2])); }
+
+// The nearest orthogonal matrix, or nothing where F is (nearly) singular.
+std::optional<glm::dmat3> orthogonal_part(glm::dmat3 F) {
+  const double size = frobenius(F);
+  if (!(size > 0) || !std::isfinite(size)) return std::nullopt;
+  F /= size;
+  if (std::abs(glm::determinant(F)) < 1e-9) return std::nullopt;
+  for (int i = 0; i < 30; ++i) {
+    const glm::dmat3 inverse = glm::transpose(glm::inverse(F));
+    const double scale = std::sqrt(frobenius(inverse) / frobenius(F));
+    const glm::dmat3 next = 0.5 * (scale * F + inverse / scale);
+    const double change = frobenius(next - F);
+    F = next;
+    if (change < 1e-13) break;
+  }
+  return F;
+}
+
+// Gradients of the map from rest to pose about each vertex: the mean over the faces around its position, by their rest areas. A face
+// says what becomes of its edges; its normal keeps its length.
+std::vector<glm::dmat3> gradients(const Scene& scene, const std::vector<Vec3>& positions, const std::vector<uint8_t>& mirrored) {
+  const PositionIds places = number_positions(scene.positions);
+  std::vector<glm::dmat3> sums(places.count, glm::dmat3(0.0));
+  for (const Triangle& t : scene.triangles) {
+    auto edges = [&](const std::vector<Vec3>& p, double flip, glm::dmat3& E) {
+      const glm::dvec3 a(p[t.v[0]]), e1 = glm::dvec3(p[t.v[1]]) - a, e2 = glm::dvec3(p[t.v[2]]) - a, n = glm::cross(e1, e2);
+      const double area = glm::length(n);
+      E = glm::dmat3(e1, e2, area > 0 ? flip * n / area : glm::dvec3(0.0));
+      return area;
+    };
+    glm::dmat3 rest, now;
+    const double area = edges(scene.positions, 1, rest);
+    edges(positions, mirrored[t.part] ? -1 : 1, now);
+    if (!(area > 0)) continue;
+    const glm::dmat3 F = now * glm::inverse(rest);
+    if (!std::isfinite(frobenius(F))) continue;
+    for (uint32_t v : t.v) sums[places.ids[v]] += area * F;
+  }
+  std::vector<glm::dmat3> result(scene.positions.size());
+  for (size_t v = 0; v < result.size(); ++v) result[v] = sums[places.ids[v]];
+  return result;
+}
+
+// Where a pose has no normal of its own, the rest normal is carried along.
+Vec3 carried_normal(const glm::dmat3& F, Vec3 normal) {
+  const glm::dmat3 cofactors(glm::cross(F[1], F[2]), glm::cross(F[2], F[0]), glm::cross(F[0], F[1]));
+  const glm::dvec3 n = (glm::determinant(F) < 0 ? -1.0 : 1.0) * (cofactors * glm::dvec3(normal));
+  const double length = glm::length(n);
+  return length > 0 && std::isfinite(length) ? Vec3(n / length) : normal;
+}
+
+void finish_pose(const Scene& scene, Pose& pose) {
+  const std::vector<glm::dmat3> F = gradients(scene, pose.positions, pose.mirrored);
+  pose.rotations.resize(scene.positions.size());
+  parallel_for(scene.positions.size(), 4096, [&](size_t begin, size_t end) {
+    for (size_t v = begin; v < end; ++v) {
+      const float length = glm::length(pose.normals[v]);
+      pose.normals[v] = length > 0.5f ? pose.normals[v] / length : carried_normal(F[v], scene.normals[v]);
+      pose.rotations[v] = pose_rotation(F[v], scene.normals[v], pose.normals[v]);
+    }
+  });
+}
+
+Result<std::vector<GltfAnimation>> animations_of(const Scene& scene) {
+  if (!scene.document) return Error{scene.path, "has no animations: it is not glTF"};
+  GltfCheck check(scene.path);
+  std::vector<GltfAnimation> animations;
+  if (!read_animations(check, *scene.document, animations)) return check.error();
+  return animations;
+}
+
+}  // namespace
+
+Mat3 pose_rotation(const glm::dmat3& F, Vec3 rest_normal, Vec3 normal) {
+  const glm::dvec3 a = glm::normalize(glm::dvec3(rest_normal)), b = glm::normalize(glm::dvec3(normal));
+  const std::optional<glm::dmat3> R = orthogonal_part(F);
+  return Mat3(R ? least_rotation(glm::normalize(*R * a), b) * *R : least_rotation(a, b));
+}
+
+Result<std::vector<AnimationInfo>> list_animations(const Scene& scene) {
+  auto animations = animations_of(scene);
+  if (!animations) return animations.error();
+  std::vector<AnimationInfo> list;
+  for (const GltfAnimation& a : *animations) list.push_back({a.name, a.from, a.to});
+  return list;
+}
+
+Result<size_t> find_animation(const Scene& scene, const std::string& text) {
+  auto animations = animations_of(scene);
+  if (!animations) return animations.error();
+  if (animations->empty()) return Error{scene.path, "has no animations"};
+  for (size_t i = 0; i < animations->size(); ++i)
+    if ((*animations)[i].name == text) return i;
+  size_t index = 0;
+  const auto [end, status] = std::from_chars(text.data(), text.data() + text.size(), index);
+  if (status == std::errc() && end == text.data() + text.size() && index < animations->size()) return index;
+  std::string names;
+  for (const GltfAnimation& a : *animations) names += (names.empty() ? "" : ", ") + (a.name.empty() ? std::to_string(names.size()) : "\"" + a.name.substr(0, 40) + "\"");
+  return Error{scene.path, "has no animation \"" + text + "\"; there are " + std::to_string(animations->size()) + ": " + names.substr(0, 300)};
+}
+
+Result<Pose> pose_scene(const Scene& scene, size_t animation, double time) {
+  if (!scene.document) return Error{scene.path, "has no animations: it is not glTF"};
+  if (!std::isfinite(time)) return Error{scene.path, "the time is not a finite number"};
+  GltfCheck check(scene.path);
+  const GltfDocument& rest = *scene.document;
+  if (animation >= gltf_count(rest.json, "animations")) return Error{scene.path, "has no animation " + std::to_string(animation)};
+  GltfDocument moved;  // the same bytes, other nodes
+  Json nodes;
+  if (!animate_nodes(check, rest, animation, time, nodes)) return check.error();
+  moved.json = rest.json, moved.buffers = rest.buffers;
+  moved.json["nodes"] = std::move(nodes);
+  GltfPose rest_pose, moved_pose;
+  if (!read_pose(check, rest, rest_pose) || !read_pose(check, moved, moved_pose)) return check.error();
+
+  Pose pose;
+  for (size_t p = 0; p < scene.parts.size(); ++p) {
+    const Part& part = scene.parts[p];
+    const std::string place = "part \"" + part.name.substr(0, 60) + "\"";
+    if (part.node < 0) {  // a floor that was added: it stands still
+      for (size_t v = part.first_vertex; v < part.first_vertex + part.vertex_count; ++v)
+        pose.positions.push_back(scene.positions[v]), pose.normals.push_back(scene.normals[v]);
+      pose.mirrored.push_back(0);
+      continue;
+    }
+    const size_t node = size_t(part.node);
+    const Json& json_node = gltf_item(moved.json, "nodes", node);
+    auto mesh = check.index(json_node, "mesh", gltf_count(moved.json, "meshes"), {"node", node});
+    if (!check.ok()) return check.error();
+    if (!mesh) return Error{scene.path, place + " has lost its mesh"};
+    const Json* primitives = check.array(gltf_item(moved.json, "meshes", *mesh), "primitives", {"mesh", *mesh});
+    if (!primitives || size_t(part.primitive) >= primitives->size()) return Error{scene.path, place + " has lost its primitive"};
+    const Json& primitive = (*primitives)[size_t(part.primitive)];
+    const GltfWhere where{"mesh", *mesh, "primitive", size_t(part.primitive)};
+    const Json* attributes = check.object(primitive, "attributes", where);
+    if (!attributes) return Error{scene.path, place + " has no attributes"};
+    auto index = check.index(*attributes, "POSITION", gltf_count(moved.json, "accessors"), where);
+    if (!index) return Error{scene.path, place + " has no positions"};
+    const GltfAccessor accessor = read_accessor(check, moved, *index);
+    std::vector<GltfMorph> morphs;
+    GltfPlacement at_rest, placement;
+    std::vector<Vec3> positions, normals;
+    if (!check.ok() || !check_gltf_vector(check, accessor, "POSITION", where) ||
+        !read_morphs(check, moved, node, *mesh, primitive, accessor.count, where, morphs) ||
+        !read_placement(check, rest, rest_pose, node, primitive, accessor.count, where, at_rest) ||
+        !read_placement(check, moved, moved_pose, node, primitive, accessor.count, where, placement) ||
+        !read_vertices(check, moved, *attributes, accessor, morphs, placement, where, positions, normals))
+      return check.error();
+    if (part.source.empty() && positions.size() != part.vertex_count)
+      return Error{scene.path, place + " was refined (--max-edge), so that its vertices no longer hang on anything that moves"};
+    for (size_t v = 0; v < part.vertex_count; ++v) {
+      const size_t from = part.source.empty() ? v : part.source[v];
+      if (from >= positions.size()) return Error{scene.path, place + " does not fit its mesh"};
+      pose.positions.push_back(positions[from]);
+      // A vertex that was split for its normals has none in the file: it carries its own along.
+      pose.normals.push_back(part.source.empty() ? normals[from] : Vec3(0.0f));
+    }
+    pose.mirrored.push_back(placement.mirrored != at_rest.mirrored);
+  }
+  finish_pose(scene, pose);
+  return pose;
+}
+
+Result<Deformation> parse_deformation(const std::string& text) {
+  const Error wrong{"--deform", "expects bend:ANGLE[,along[,towards]] or twist:ANGLE[,along], axes as x, y, z, not \"" + text.substr(0, 80) + "\""};
+  Deformation d;
+  size_t at = 0;
+  if (text.starts_with("bend:")) at = 5;
+  else if (text.starts_with("twist:")) at = 6, d.kind = DeformKind::twist;
+  else return wrong;
+  const auto [end, status] = std::from_chars(text.data() + at, text.data() + text.size(), d.degrees);
+  if (status != std::errc() || !std::isfinite(d.degrees)) return wrong;
+  at = size_t(end - text.data());
+  for (int* axis : {&d.along, &d.towards}) {
+    if (at == text.size()) break;
+    if (at + 2 > text.size() || text[at] != ',' || text[at + 1] < 'x' || text[at + 1] > 'z' || (axis == &d.towards && d.kind == DeformKind::twist)) return wrong;
+    *axis = text[at + 1] - 'x';
+    at += 2;
+  }
+  if (at != text.size() || (d.along >= 0 && d.along == d.towards)) return wrong;
+  if (d.kind == DeformKind::bend && !(std::abs(d.degrees) < 360)) return Error{"--deform", "bends by less than 360 degrees"};
+  if (!(std::abs(d.degrees) <= 36000)) return Error{"--deform", "twists by at most 36000 degrees"};
+  return d;
+}
+
+Pose deform_scene(const Scene& scene, const Deformation& deformation) {
+  const Bounds box = bounds(scene);
+  const glm::dvec3 centre(box.centre()), size(box.max - box.min);
+  int along = deformation.along;
+  if (along < 0) along = size.x >= size.y && size.x >= size.z ? 0 : size.y >= size.z ? 1 : 2;
+  if (along == deformation.towards) along = (along + 1) % 3;
+  const int towards = deformation.towards >= 0 ? deformation.towards : (along + 1) % 3, across = 3 - along - towards;
+  const double length = std::max(size[along], 1e-30), turn = glm::radians(double(deformation.degrees)) / length;  // radians a metre
+  auto map = [&](glm::dvec3 p) {
+    p -= centre;
+    const double h = p[along], angle = turn * h, c = std::cos(angle), s = std::sin(angle);
+    glm::dvec3 q = p;
+    if (deformation.kind == DeformKind::twist) {
+      // Right-handed about the axis.
+      const int u = (along + 1) % 3, v = (along + 2) % 3;
+      q[u] = c * p[u] - s * p[v], q[v] = s * p[u] + c * p[v];
+    } else {
+      // The middle line becomes an arc that keeps its length; sin(x)/x and (1 - cos x)/x are taken for x = angle.
+      const double sinc = std::abs(angle) > 1e-8 ? s / angle : 1, versine = std::abs(angle) > 1e-8 ? (1 - c) / angle : 0.5 * angle;
+      q[along] = h * sinc - p[towards] * s, q[towards] = h * versine + p[towards] * c, q[across] = p[across];
+    }
+    return q + centre;
+  };
+  Pose pose;
+  const size_t n = scene.positions.size();
+  pose.positions.resize(n), pose.normals.resize(n), pose.rotations.resize(n), pose.mirrored.assign(scene.parts.size(), 0);
+  const double step = 1e-6 * std::max({size.x, size.y, size.z, 1e-30});
+  parallel_for(n, 4096, [&](size_t begin, size_t end) {
+    for (size_t v = begin; v < end; ++v) {
+      const glm::dvec3 p(scene.positions[v]);
+      glm::dmat3 F;
+      for (int k = 0; k < 3; ++k) {
+        glm::dvec3 h(0.0);
+        h[k] = step;
+        F[k] = (map(p + h) - map(p - h)) / (2 * step);
+      }
+      pose.positions[v] = Vec3(map(p));
+      pose.normals[v] = carried_normal(F, scene.normals[v]);
+      pose.rotations[v] = pose_rotation(F, scene.normals[v], pose.normals[v]);
+    }
+  });
+  return pose;
+}
+
+Scene posed(const Scene& scene, const Pose& pose) {
+  Scene s = scene;
+  s.positions = pose.positions, s.normals = pose.normals;
+  for (Triangle& t : s.triangles)
+    if (pose.mirrored[t.part]) std::swap(t.v[1], t.v[2]);
+  return s;
+}
+
+}  // namespace lambent
