@@ -52,7 +52,40 @@ expect 0 'relit' render corner.glb --env sky:elevation=40,azimuth=20 --env-rotat
 expect 0 '0   0' env uniform:1 --order 3 -o env.png
 expect 0 '' env sky:turbidity=4 --convention three --order 3 --json
 expect 0 "open.glb" bake corner.obj --shadows off -o open.glb
-for thread_count in 1 2; do "$tool" bake corner.obj --max-edge 0.3 --samples 64 --threads $thread_count -o threads_$thread_count.glb >/dev/null 2>&1; done
+# A small object in the scene's light in free space.
+cat >pyramid.obj <<'O'
+v 0 0 0
+v 1 0 0
+v 0 0 1
+v 0.3 0.8 0.3
+f 1 2 3
+f 1 4 2
+f 2 4 3
+f 3 4 1
+O
+expect 0 'lattice' bake corner.obj --max-edge 0.4 --samples 128 --lattice 3,2,3 --lattice-order 3 --lattice-box 0.1,0.1,0.1,1.9,1.9,1.9 -o lattice.glb
+expect 0 'free space at 3 x 2 x 3' inspect lattice.glb
+expect 0 'relit' render lattice.glb --env sky:elevation=40 --insert pyramid.obj@1,0.1,1,0.5 --insert pyramid.obj@0.4,0.5,1.5,0.2 --size 40x40 -o inserted.png
+expect 0 'out of the lattice' render lattice.glb --env sky:elevation=40 --insert pyramid.obj@1,3,1 --size 20x20 -o inserted.png
+expect 0 'lattice' bake corner.obj --transfer matrix --brdf ggx:roughness=0.5 --outgoing svd:3 --order 3 --incident-order 3 --bounces 1 --samples 64 --lattice 2,2,2 -o glossy.glb
+expect 0 'relit' render glossy.glb --env sky:elevation=40 --insert pyramid.obj@1,0.1,1,0.5 --size 40x40 -o inserted.png
+expect 0 'simulate' bake --help
+expect 0 'receivers' bake corner.obj --transfer matrix --simulate paths --order 3 --incident-order 3 --samples 64 -o paths.glb
+expect 2 'needs --transfer matrix' bake corner.obj --simulate paths -o x.glb
+expect 0 'lattice' bake corner.obj --transfer matrix --outgoing sh:3 --order 3 --incident-order 3 --bounces 0 --samples 64 --lattice 1,1,1 -o rows.glb
+expect 1 'rows.glb.*kind sh' render rows.glb --env sky:elevation=40 --insert pyramid.obj@1,0.1,1 -o x.png
+expect 1 'corner.glb.*--lattice' render corner.glb --env sky:elevation=40 --insert pyramid.obj@1,0.1,1 -o x.png
+expect 1 'missing.obj' render lattice.glb --env sky:elevation=40 --insert missing.obj@1,0.1,1 -o x.png
+expect 1 'bytes' bake corner.obj --lattice 64,64,64 --memory 1MB -o x.glb
+expect 2 'insert' render lattice.glb --env sky:elevation=40 --insert pyramid.obj -o x.png
+expect 2 'insert' render lattice.glb --env sky:elevation=40 --insert pyramid.obj@1,2 -o x.png
+expect 2 'scale' render lattice.glb --env sky:elevation=40 --insert pyramid.obj@1,2,3,-1 -o x.png
+expect 2 'lattice' bake corner.obj --lattice 3,3 -o x.glb
+expect 2 'lattice' bake corner.obj --lattice 3,3,65 -o x.glb
+expect 2 'lattice-box' bake corner.obj --lattice 3,3,3 --lattice-box 0,0,0,1,-1,1 -o x.glb
+expect 2 'needs --lattice' bake corner.obj --lattice-order 3 -o x.glb
+expect 2 'together' bake corner.obj --order 12 --lattice 2,2,2 --lattice-order 6 -o x.glb
+for thread_count in 1 2; do "$tool" bake corner.obj --max-edge 0.3 --lattice 4,4,4 --samples 64 --threads $thread_count -o threads_$thread_count.glb >/dev/null 2>&1; done
 cmp -s threads_1.glb threads_2.glb && ok || bad "1 and 2 threads give different files"
 
 # Lightmaps: a box with a glowing ceiling, and a sky.
