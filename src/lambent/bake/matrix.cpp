@@ -10,6 +10,7 @@
 #include <lambent/core/half.h>
 #include <lambent/core/parallel.h>
 #include <lambent/core/pool.h>
+#include <lambent/core/sampling.h>
 #include <lambent/core/random.h>
 
 #include <atomic>
@@ -529,6 +530,19 @@ struct MatrixBaker {
   }
 };
 
+// Whether a BRDF of no base colour tints what it reflects: judged along mirrored and along unrelated directions.
+bool tints(const Brdf& brdf) {
+  for (uint32_t i = 0; i < 16; ++i) {
+    const Vec3 wo = square_to_cosine_hemisphere(sobol_owen(i, 1));
+    for (const Vec3 wi : {Vec3(-wo.x, -wo.y, wo.z), square_to_cosine_hemisphere(sobol_owen(i, 2))}) {
+      const Vec3 f = evaluate(brdf, wi, wo);
+      const float most = std::max({f.x, f.y, f.z}), least = std::min({f.x, f.y, f.z});
+      if (most - least > 1e-5f * most) return true;
+    }
+  }
+  return false;
+}
+
 Result<void> check_options(const BakeOptions& o, const MatrixOptions& m, const ReceiverMaterials& materials, size_t receivers) {
   auto within = [](const char* name, int value, int least, int most) -> Result<void> {
     if (value >= least && value <= most) return {};
@@ -561,6 +575,8 @@ Result<MatrixBake> bake_matrix(const Scene& scene, const Tracer& tracer, const R
   BakeReport& r = report ? *report : unwanted;
   r = {};
   GatherSetup setup = make_gather_setup(scene, tracer, receivers, options.order + matrix.incident_order - 1, options.samples, options.seed);
+  for (const LinearMaterial& m : materials.materials)
+    if (tints(m.black)) setup.channels = 3;
   if (options.bounces == 0) setup.channels = 1;  // direct light meets no coloured surface on its way
   const size_t needed = matrix_memory(receivers.count(), setup.channels, options, matrix);
   if (needed > options.memory)

@@ -90,6 +90,35 @@ TEST(Matrix, IsTheSameOnOneThreadAndInLittleMemory) {
   EXPECT_NE(none.error().message.find("bytes"), std::string::npos);
 }
 
+TEST(Matrix, ColouredReflectionTintsBouncesInGreyScenes) {
+  Scene scene;
+  const uint32_t grey = add_material(scene, "grey", Vec3(0.6f));
+  add_quad(scene, grey, "floor", Vec3(-1, 0, -1), Vec3(0, 0, 2), Vec3(2, 0, 0), 6, 6);
+  add_quad(scene, grey, "wall", Vec3(-1, 0, -1), Vec3(2, 0, 0), Vec3(0, 2, 0), 6, 6);
+  auto tracer = Tracer::build(scene);
+  ASSERT_TRUE(tracer);
+  const Receivers receivers = make_vertex_receivers(scene);
+  const Brdf gold = Ggx{Vec3(0.9f, 0.6f, 0.2f), Vec2(0.3f)};
+  // Scattered once, light is tinted once: channels of the bounce alone stand as f0 do, but for Schlick's whitening at grazing.
+  std::vector<Vec3> total;
+  for (int bounces : {0, 1}) {
+    auto baked = bake_matrix(scene, *tracer, receivers, all_of({gold, gold}, receivers), {.order = 2, .samples = 512, .bounces = bounces, .precision = Precision::single},
+                             {.incident_order = 3, .outgoing = OutgoingKind::map, .grid = 8, .response_samples = 256});
+    ASSERT_TRUE(baked);
+    EXPECT_EQ(baked->transfer.channels, bounces ? 3 : 1);
+    Relit relit;
+    const std::vector<Vec3> light(4, Vec3(1));
+    relight(baked->transfer, light, relit);
+    Vec3 sum(0.0f);
+    for (size_t r = 0; r < receivers.count(); ++r) sum += relit.at(r);
+    total.push_back(sum);
+  }
+  const Vec3 bounce = total[1] - total[0];
+  EXPECT_GT(bounce.x, 0);
+  EXPECT_LT(bounce.z / bounce.x, 0.6f);
+  EXPECT_GT(bounce.z / bounce.x, 0.2f / 0.9f);
+}
+
 TEST(Matrix, RowsAreTheIntegralsTheyStandFor) {
   // Rows of direct transfer on the floor beside the wall, against a plain sum over an independent set of directions.
   const Scene scene = corner_scene();
