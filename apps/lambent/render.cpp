@@ -71,6 +71,8 @@ int run_textured(Context& context, const RenderCommand& o) {
   if (context.json) print_json({{"output", o.view.output}, {"texels", texture->transfer.receivers}, {"frames", images.size()}});
   else fmt::print("{}\n  {} x {} texels of {} lobes\n", o.view.output, texture->width, texture->height, texture->transfer.lobes);
   return success;
+}
+
 // Other materials for a bake that kept incident light: its last reflection is made anew.
 Result<void> change_materials(Baked& baked, const BrdfOptions& options, const std::string& path) {
   if (!baked.outgoing || baked.outgoing->kind != OutgoingKind::map)
