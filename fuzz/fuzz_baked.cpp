@@ -1,5 +1,6 @@
 // The baked-file reader on hostile bytes: whatever it accepts must be safe to relight.
 #include <lambent/baked/baked_file.h>
+#include <lambent/relight/lattice.h>
 #include <lambent/relight/relight.h>
 #include <lambent/relight/zonal.h>
 
@@ -37,6 +38,15 @@ extern "C" int LLVMFuzzerTestOneInput(const uint8_t* data, size_t size) {
         lambent::evaluate_outgoing(*baked->outgoing, r, lambent::Vec3(0.6f, 0, 0.8f), weights);
         sum += lambent::reflect_rows(weights, lambent::Vec3(1), [&](size_t row) { return relit.at(r, int(row)); }).x;
       }
+  if (baked->lattice) {
+    const lambent::Lattice& l = baked->lattice->lattice;
+    lambent::relight(baked->lattice->transfer, light, relit);
+    std::vector<lambent::Vec3> incident(size_t(relit.rows));
+    for (float t : {-0.5f, 0.0f, 0.3f, 1.0f, 1.5f}) {
+      lambent::interpolate_lattice(l, relit, l.min + t * (l.max - l.min), incident);
+      sum += incident[0].x;
+    }
+  }
   volatile float used = sum;
   (void)used;
   return 0;

@@ -52,8 +52,96 @@ expect 0 'relit' render corner.glb --env sky:elevation=40,azimuth=20 --env-rotat
 expect 0 '0   0' env uniform:1 --order 3 -o env.png
 expect 0 '' env sky:turbidity=4 --convention three --order 3 --json
 expect 0 "open.glb" bake corner.obj --shadows off -o open.glb
-for thread_count in 1 2; do "$tool" bake corner.obj --max-edge 0.3 --samples 64 --threads $thread_count -o threads_$thread_count.glb >/dev/null 2>&1; done
+# A small object in the scene's light in free space.
+cat >pyramid.obj <<'O'
+v 0 0 0
+v 1 0 0
+v 0 0 1
+v 0.3 0.8 0.3
+f 1 2 3
+f 1 4 2
+f 2 4 3
+f 3 4 1
+O
+expect 0 'lattice' bake corner.obj --max-edge 0.4 --samples 128 --lattice 3,2,3 --lattice-order 3 --lattice-box 0.1,0.1,0.1,1.9,1.9,1.9 -o lattice.glb
+expect 0 'free space at 3 x 2 x 3' inspect lattice.glb
+expect 0 'relit' render lattice.glb --env sky:elevation=40 --insert pyramid.obj@1,0.1,1,0.5 --insert pyramid.obj@0.4,0.5,1.5,0.2 --size 40x40 -o inserted.png
+expect 0 'out of the lattice' render lattice.glb --env sky:elevation=40 --insert pyramid.obj@1,3,1 --size 20x20 -o inserted.png
+expect 0 'lattice' bake corner.obj --transfer matrix --brdf ggx:roughness=0.5 --outgoing svd:3 --order 3 --incident-order 3 --bounces 1 --samples 64 --lattice 2,2,2 -o glossy.glb
+expect 0 'relit' render glossy.glb --env sky:elevation=40 --insert pyramid.obj@1,0.1,1,0.5 --size 40x40 -o inserted.png
+expect 0 'simulate' bake --help
+expect 0 'receivers' bake corner.obj --transfer matrix --simulate paths --order 3 --incident-order 3 --samples 64 -o paths.glb
+expect 2 'needs --transfer matrix' bake corner.obj --simulate paths -o x.glb
+expect 0 'lattice' bake corner.obj --transfer matrix --outgoing sh:3 --order 3 --incident-order 3 --bounces 0 --samples 64 --lattice 1,1,1 -o rows.glb
+expect 1 'rows.glb.*kind sh' render rows.glb --env sky:elevation=40 --insert pyramid.obj@1,0.1,1 -o x.png
+expect 1 'corner.glb.*--lattice' render corner.glb --env sky:elevation=40 --insert pyramid.obj@1,0.1,1 -o x.png
+expect 1 'missing.obj' render lattice.glb --env sky:elevation=40 --insert missing.obj@1,0.1,1 -o x.png
+expect 1 'bytes' bake corner.obj --lattice 64,64,64 --memory 1MB -o x.glb
+expect 2 'insert' render lattice.glb --env sky:elevation=40 --insert pyramid.obj -o x.png
+expect 2 'insert' render lattice.glb --env sky:elevation=40 --insert pyramid.obj@1,2 -o x.png
+expect 2 'scale' render lattice.glb --env sky:elevation=40 --insert pyramid.obj@1,2,3,-1 -o x.png
+expect 2 'lattice' bake corner.obj --lattice 3,3 -o x.glb
+expect 2 'lattice' bake corner.obj --lattice 3,3,65 -o x.glb
+expect 2 'lattice-box' bake corner.obj --lattice 3,3,3 --lattice-box 0,0,0,1,-1,1 -o x.glb
+expect 2 'needs --lattice' bake corner.obj --lattice-order 3 -o x.glb
+expect 2 'together' bake corner.obj --order 12 --lattice 2,2,2 --lattice-order 6 -o x.glb
+for thread_count in 1 2; do "$tool" bake corner.obj --max-edge 0.3 --lattice 4,4,4 --samples 64 --threads $thread_count -o threads_$thread_count.glb >/dev/null 2>&1; done
 cmp -s threads_1.glb threads_2.glb && ok || bad "1 and 2 threads give different files"
+
+# Lightmaps: a box with a glowing ceiling, and a sky.
+cat >box.mtl <<'M'
+newmtl wall
+Kd 0.7 0.6 0.5
+newmtl lamp
+Kd 0.5 0.5 0.5
+Ke 4 3 2
+M
+cat >box.obj <<'O'
+mtllib box.mtl
+v 0 0 0
+v 2 0 0
+v 2 0 2
+v 0 0 2
+v 0 1 0
+v 2 1 0
+v 0.5 0.99 0.5
+v 1.5 0.99 0.5
+v 1.5 0.99 1.5
+v 0.5 0.99 1.5
+usemtl wall
+f 4 3 2 1
+f 1 2 6 5
+usemtl lamp
+f 7 8 9 10
+O
+view="--camera 3,0.8,4,1,0.4,0.7,40 --size 48x32 --background none"
+expect 0 'charts' bake box.obj --transfer lightmap --sky uniform:0.3,0.4,0.6 --light-groups --texels-per-unit 20 --samples 512 --bounces 2 -o map.glb
+for picture in map.lamp.exr map.sky.exr; do [ -s $picture ] && ok || bad "$picture is missing"; done
+expect 0 'relit' render map.glb $view --spp 256 -o map_lit.exr
+expect 0 'paths' reference box.obj --lamps --env uniform:0.3,0.4,0.6 --bounces 2 --spp 256 $view -o map_truth.exr
+expect 0 '"psnr"' compare map_lit.exr map_truth.exr --json
+psnr=$(sed -n 's/.*"psnr": \([0-9]*\).*/\1/p' stdout)
+[ "${psnr:-0}" -ge 35 ] && ok || bad "lightmapped and path-traced boxes differ: PSNR ${psnr:-none}"
+expect 0 'relit' render map.glb $view --lamp lamp=0.1,0.2,0 --lamp sky=0,0,1 -o dimmed.exr
+expect 2 'no group' render map.glb $view --lamp chandelier=1,1,1 -o x.png
+expect 0 'applications' bake box.obj --transfer lightmap --atlas 64x48 --samples 64 --bounces converge:1e-3 --solver southwell --direct separate --json -o map2.glb
+for picture in map2.direct.exr map2.indirect.exr; do [ -s $picture ] && ok || bad "$picture is missing"; done
+expect 0 'lamps' bake box.obj --transfer lightmap --receivers patches --samples 64 -o patches.glb
+expect 0 'relit' render patches.glb $view -o patches.exr
+expect 0 'lamps' bake box.obj --transfer lightmap --directional hl2 --atlas 64x64 --samples 64 -o hl2.glb
+expect 0 'relit' render hl2.glb $view -o hl2.exr
+expect 0 'receivers' bake box.obj --receivers texels --atlas 64x64 --order 3 --samples 64 -o prt.glb
+expect 0 'relit' render prt.glb --env sky:elevation=30 $view -o prt.exr
+for thread_count in 1 2; do "$tool" bake box.obj --transfer lightmap --atlas 64x64 --samples 64 --threads $thread_count -o map_$thread_count.glb >/dev/null 2>&1; done
+cmp -s map_1.glb map_2.glb && ok || bad "1 and 2 threads give different lightmaps"
+expect 1 'nothing gives light' bake corner.obj --transfer lightmap -o x.glb
+expect 2 'need at least' bake box.obj --transfer lightmap --atlas 4x4 -o x.glb
+expect 2 'limit' bake box.obj --transfer lightmap --texels-per-unit 1e9 -o x.glb
+expect 2 'receivers texels' bake box.obj --transfer lightmap --receivers vertices --atlas 64x64 -o x.glb
+expect 2 'bounces' bake box.obj --transfer lightmap --bounces converge:nan -o x.glb
+expect 2 'no material' bake box.obj --transfer lightmap --emit sofa=1,1,1 -o x.glb
+expect 2 'env' render prt.glb -o x.png
+expect 2 'lamps' reference box.obj -o x.png
 
 # Zonal lobes: closer with more of them, turning with what moves; a texture of them; a membrane.
 expect 0 '"rms"' compress corner.glb --zonal 4 -o lobes.glb --view-error error.png --size 40x40 --json
@@ -84,6 +172,30 @@ expect 2 'animation' render corner.glb --env uniform:1 --time 1 -o x.png
 expect 2 'frames' render corner.glb --env uniform:1 --animation 0 --frames 3:1 -o x.png
 expect 2 'membrane' bake corner.obj --membrane 1.5 -o x.glb
 expect 2 'tile' render corner.obj --transfer-texture relief.lpt --tile 1 --env uniform:1 -o x.png
+# The web viewer, where it has been built: the folder is there whole or not at all, and nothing of others' is replaced.
+"$tool" export corner.glb --web site >/dev/null 2>stderr
+if grep -q 'scripts/web' stderr; then
+  echo "skipped: export and view, since the page is not built"
+  expect 1 'scripts/web' view corner.glb --no-browser
+  absent site
+else
+  expect 0 'files' export corner.glb --web site --env uniform:1,0.5,0.25 --env sky:elevation=20 --compare open.glb --reference a.exr
+  cmp -s corner.glb site/data/scene.glb && [ -s site/index.html ] && [ -s site/data/environment-1.exr ] && [ -s site/data/reference.exr ] && ok ||
+    bad "the exported folder is not whole"
+  expect 0 '"mean_luminance"' inspect site/data/environment-1.exr --json
+  mkdir mine && touch mine/work
+  expect 1 'mine.*left alone' export corner.glb --web mine
+  expect 1 'no folder' export corner.glb --web nowhere/site
+  expect 1 'corner.obj' export corner.obj --web site2
+  expect 1 'nowhere.hdr' export corner.glb --web site2 --env nowhere.hdr
+  expect 2 'camera' export corner.glb --web site2 --camera 1,2
+  expect 1 'corner.obj' view corner.obj --no-browser
+  expect 1 'nowhere.hdr' view corner.glb --env nowhere.hdr --no-browser
+  expect 2 'port' view corner.glb --port 70000 --no-browser
+  absent site2
+  [ -z "$(ls -d site?* 2>/dev/null)" ] && ok || bad "export left a temporary: $(ls -d site?*)"
+fi
+
 # Usage: exit 2.
 expect 2 'order' bake corner.obj --order 0 -o x.glb
 expect 2 'order' bake corner.obj --order 1000 -o x.glb

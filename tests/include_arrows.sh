@@ -31,5 +31,5 @@ only tbb/ core
 only stb_image image scene
 only OpenEXR image
 only Imf image
-only Eigen basis brdf
+only Eigen basis
 exit $bad

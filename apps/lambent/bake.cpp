@@ -1,7 +1,9 @@
+#include "bake_lightmap.h"
 #include "commands.h"
 #include "options.h"
 
 #include <lambent/bake/bake.h>
+#include <lambent/bake/lattice.h>
 #include <lambent/bake/materials.h>
 #include <lambent/baked/baked_file.h>
 #include <lambent/compress/parametric.h>
@@ -23,7 +25,12 @@ struct BakeCommand {
   MatrixOptions matrix;
   BrdfOptions brdf;
   ZonalFitOptions zonal;
-  std::string transfer = "diffuse", membrane, outgoing = "svd:6", fix_light, output, shadows = "on", precision = "half";
+  LatticeOptions lattice;
+  std::string lattice_points, lattice_box;
+  std::string transfer = "diffuse", membrane, outgoing = "svd:6", simulate = "recursion", fix_light, output, shadows = "on", precision = "half", bounces = "3";
+  ReceiverFlags receivers;
+  LightmapFlags lightmap;
+  bool order_given = false;
 };
 
 // KIND or KIND:N, where N is the number of rows (svd) or bands (sh, hemisphere, hsh).
@@ -41,6 +48,23 @@ Result<void> parse_outgoing(const std::string& text, MatrixOptions& matrix) {
   if (n != std::floor(n) || n < 1 || n > 64) return Error{"--outgoing", "expects a whole number from 1 to 64 after the colon, not \"" + text + "\""};
   (matrix.outgoing == OutgoingKind::svd ? matrix.svd_rows : matrix.outgoing_order) = int(n);
   return {};
+}
+
+Result<Lattice> parse_lattice(const BakeCommand& o, const Scene& scene) {
+  auto counts = parse_numbers(o.lattice_points, 3, "--lattice");
+  if (!counts) return counts.error();
+  for (float n : *counts)
+    if (n != std::floor(n) || n < 1 || n > float(max_lattice_points))
+      return Error{"--lattice", "expects three whole numbers from 1 to " + std::to_string(max_lattice_points) + ", not \"" + o.lattice_points + "\""};
+  Bounds box = default_lattice_box(scene);
+  if (!o.lattice_box.empty()) {
+    auto b = parse_numbers(o.lattice_box, 6, "--lattice-box");
+    if (!b) return b.error();
+    box = {{(*b)[0], (*b)[1], (*b)[2]}, {(*b)[3], (*b)[4], (*b)[5]}};
+    if (glm::any(glm::greaterThan(box.min, box.max))) return Error{"--lattice-box", "expects the lower corner first, then the upper"};
+    if (glm::any(glm::greaterThan(glm::max(glm::abs(box.min), glm::abs(box.max)), Vec3(1e9f)))) return Error{"--lattice-box", "lies beyond 1e9"};
+  }
+  return Lattice{box.min, box.max, int((*counts)[0]), int((*counts)[1]), int((*counts)[2])};
 }
 
 // What share of the light a sheet lets through at each receiver: one number, or a picture's luminance at its texture coordinates.
@@ -84,10 +108,22 @@ using Clock = std::chrono::steady_clock;
 double seconds_since(Clock::time_point start) { return std::chrono::duration<double>(Clock::now() - start).count(); }
 
 int run_bake(Context& context, BakeCommand o) {
+  auto bounces = parse_bounces(o.bounces);
+  if (!bounces) return fail(bounces.error());
+  if (o.transfer == "lightmap") {
+    // Harmonics of a distant light join the lamps only where they are asked for: then it is a PRT lightmap.
+    return run_lightmap(context, {o.scene, o.receivers, o.lightmap,
+                                  {.order = o.order_given ? o.bake.order : 0, .samples = o.bake.samples, .bounces = bounces->count,
+                                   .converge = bounces->converge, .memory = o.bake.memory, .seed = o.bake.seed},
+                                  o.output, o.precision});
+  }
+  if (bounces->converge > 0) return fail({"--bounces", "converge:EPS is for --transfer lightmap"});
+  o.bake.bounces = bounces->count;
   o.bake.shadows = o.shadows == "on";
   if (!o.bake.shadows) o.bake.bounces = 0;
   o.bake.precision = o.precision == "half" ? Precision::half : Precision::single;
   const bool is_matrix = o.transfer == "matrix", is_zonal = o.transfer == "zonal";
+  o.matrix.simulate_paths = o.simulate == "paths";
   o.zonal.precision = o.bake.precision;
   if (is_zonal) o.bake.precision = Precision::single;  // it is rounded once, as lobes
   if (auto ok = check_output(o.output, {"glb"}); !ok) return fail(ok.error());
@@ -100,12 +136,27 @@ int run_bake(Context& context, BakeCommand o) {
   auto start = Clock::now();
   auto scene = load_prepared_scene(o.scene);
   if (!scene) return fail(scene.error());
+  auto placed = place_receivers(*scene, o.receivers, "vertices");
+  if (!placed) return fail(placed.error());
+  const Receivers& receivers = placed->receivers;
+  const bool at_vertices = std::holds_alternative<CornerReceivers>(receivers.basis);
+  if (!o.lattice_points.empty() && !at_vertices) return fail({"--receivers", "--lattice needs a bake at vertices"});
+  if ((is_matrix || is_zonal) && !at_vertices)
+    return fail({"--receivers", "--transfer " + o.transfer + " is baked at vertices"});
   const double load_seconds = seconds_since(start);
+
+  o.lattice.samples = o.bake.samples, o.lattice.memory = o.bake.memory, o.lattice.seed = o.bake.seed, o.lattice.precision = o.bake.precision;
+  std::optional<Lattice> lattice;
+  if (!o.lattice_points.empty()) {
+    auto parsed = parse_lattice(o, *scene);
+    if (!parsed) return fail(parsed.error());
+    if (auto ok = check_lattice(*parsed, o.bake.order, o.lattice); !ok) return fail(ok.error());
+    lattice = *parsed;
+  }
 
   start = Clock::now();
   auto tracer = Tracer::build(*scene);
   if (!tracer) return fail(tracer.error());
-  const Receivers receivers = make_vertex_receivers(*scene);
   const double build_seconds = seconds_since(start);
 
   BakeReport report;
@@ -119,6 +170,14 @@ int run_bake(Context& context, BakeCommand o) {
   } else {
     transfer = bake(*scene, *tracer, receivers, o.bake, &report, &context.progress);
     if (!transfer) return fail(transfer.error());
+  }
+
+  std::optional<LatticeTransfer> free_space;
+  LatticeReport lattice_report;
+  if (lattice) {
+    auto baked = bake_lattice(*scene, *tracer, receivers, *transfer, outgoing ? &*outgoing : nullptr, *lattice, o.lattice, &lattice_report, &context.progress);
+    if (!baked) return fail(baked.error());
+    free_space = std::move(*baked);
   }
 
   if (!o.fix_light.empty()) {
@@ -137,8 +196,12 @@ int run_bake(Context& context, BakeCommand o) {
         {"ground", o.scene.ground}, {"max_edge", o.scene.max_edge}, {"seed", o.bake.seed}, {"precision", o.precision}}},
       {"report", {{"receivers", report.receivers}, {"buried", report.buried}}}};
   if (is_matrix)
-    provenance["options"].update({{"brdf", o.brdf.brdf}, {"outgoing", o.outgoing}, {"incident_order", o.matrix.incident_order}});
+    provenance["options"].update({{"brdf", o.brdf.brdf}, {"outgoing", o.outgoing}, {"incident_order", o.matrix.incident_order}, {"simulate", o.simulate}});
   if (!o.fix_light.empty()) provenance["options"]["fix_light"] = o.fix_light;
+  if (free_space) {
+    provenance["options"].update({{"lattice", o.lattice_points}, {"lattice_order", o.lattice.order}});
+    provenance["report"]["lattice_invalid"] = lattice_report.invalid;
+  }
   if (report.error >= 0) provenance["report"]["error"] = report.error;
 
   ZonalFitReport fit;
@@ -153,7 +216,8 @@ int run_bake(Context& context, BakeCommand o) {
 
   start = Clock::now();
   if (auto ok = zonal ? save_baked(o.output, *scene, receivers, *zonal, provenance.dump())
-                      : save_baked(o.output, *scene, receivers, *transfer, provenance.dump(), outgoing ? &*outgoing : nullptr);
+                      : save_baked(o.output, *scene, receivers, *transfer, provenance.dump(),
+                                   {.outgoing = outgoing ? &*outgoing : nullptr, .lattice = free_space ? &*free_space : nullptr});
       !ok)
     return fail(ok.error());
   const double save_seconds = seconds_since(start);
@@ -178,6 +242,9 @@ int run_bake(Context& context, BakeCommand o) {
                           {"working_memory", report.working_memory}};
     if (zonal) result["zonal"] = {{"lobes", zonal->lobes}, {"rms", fit.rms}, {"seconds", fit.seconds}};
     result["error"] = report.error >= 0 ? nlohmann::json(report.error) : nlohmann::json();
+    if (free_space)
+      result["lattice"] = {{"points", lattice_report.points}, {"invalid", lattice_report.invalid}, {"rays", lattice_report.rays},
+                           {"seconds", lattice_report.seconds}, {"bytes", lattice_report.bytes}};
     print_json(result);
     return success;
   }
@@ -191,6 +258,10 @@ int run_bake(Context& context, BakeCommand o) {
   fmt::print("  size       {} a receiver, {} in all (order {}, {} row{}, {} channel{}, {})\n", human_bytes(bytes_each), human_bytes(double(report.bytes)),
              transfer->light.order, transfer->rows, transfer->rows == 1 ? "" : "s", transfer->channels, transfer->channels == 1 ? "" : "s", o.precision);
   if (zonal) fmt::print("  lobes      {}, fitted in {}, with an error of {:.2f}% RMS\n", zonal->lobes, human_seconds(fit.seconds), 100 * fit.rms);
+  if (free_space)
+    fmt::print("  lattice    {} points, order {}, {} in {}{}\n", human_count(lattice_report.points), o.lattice.order, human_bytes(double(lattice_report.bytes)),
+               human_seconds(lattice_report.seconds),
+               lattice_report.invalid ? "; " + human_count(lattice_report.invalid) + " inside something, filled from neighbours" : "");
   if (report.operator_kept < 1)
     fmt::print("  memory     {:.0f}% of the gather operator fitted; the rest was traced again for each bounce\n", 100 * report.operator_kept);
   if (report.error >= 0) fmt::print("  error      {:.2f}% RMS, estimated from half-sample gathers\n", 100 * report.error);
@@ -204,34 +275,52 @@ void add_bake(CLI::App& app, Run& run) {
   CLI::App* c = app.add_subcommand("bake", "Bake a scene's light transport");
   o->scene.add_to(*c);
   c->add_option("-o,--output", o->output, "Baked file to write (.glb)")->required();
-  c->add_option("--order", o->bake.order, "Bands of the lighting's spherical harmonics")->check(CLI::Range(1, max_sh_order))->capture_default_str();
-  c->add_option("--transfer", o->transfer, "diffuse: a vector a receiver; matrix: incident light in every direction, for glossy materials; zonal: lobes, for what moves")
-      ->check(CLI::IsMember({"diffuse", "matrix", "zonal"}))->capture_default_str();
+  c->add_option("--transfer", o->transfer, "What is stored: diffuse, a vector a receiver for distant light; matrix, incident light in every direction, "
+                                           "for glossy materials; zonal, lobes, for what moves; lightmap, the light of the scene's own lamps")
+      ->check(CLI::IsMember({"diffuse", "matrix", "zonal", "lightmap"}))->capture_default_str();
+  auto* order = c->add_option("--order", o->bake.order, "Bands of the lighting's spherical harmonics")->check(CLI::Range(1, max_sh_order))->capture_default_str();
   auto* lobes = c->add_option("--lobes", o->zonal.lobes, "zonal: lobes a receiver")->check(CLI::Range(1, max_stored_lobes))->capture_default_str();
   auto* incident = c->add_option("--incident-order", o->matrix.incident_order, "matrix: bands of incident light")
                        ->check(CLI::Range(1, max_incident_order))->capture_default_str();
   auto* last = c->add_option("--outgoing", o->outgoing, "matrix: rows for the last reflection: map, svd:ROWS, sh:BANDS, hemisphere:BANDS, hsh:BANDS")
                    ->capture_default_str();
   auto* membrane = c->add_option("--membrane", o->membrane, "No simulation: thin sheets that let this share of the light through, 0 to 1, or a picture of it");
+  auto* simulate = c->add_option("--simulate", o->simulate, "matrix: bounces by the recursion over receivers, or by paths (caustics, coarse meshes; noisier)")
+                       ->check(CLI::IsMember({"recursion", "paths"}))->capture_default_str();
   o->brdf.brdf = "materials";
   auto* brdf = o->brdf.add_to(*c);
   auto* fixed = c->add_option("--fix-light", o->fix_light, "Bake this environment in, so that only its brightness is left: a surface light field");
   c->add_option("--samples", o->bake.samples, "Rays a receiver")->check(CLI::Range(1, 1 << 20))->capture_default_str();
-  auto* bounces = c->add_option("--bounces", o->bake.bounces, "Reflections between surfaces")->check(CLI::Range(0, 64))->capture_default_str();
+  auto* bounces = c->add_option("--bounces", o->bounces, "Reflections between surfaces, 0 to 64; lightmaps also converge:EPS, as many as leave that residual")
+                      ->capture_default_str();
   c->add_option("--shadows", o->shadows, "off: open light everywhere, no shadows and no bounces")->check(CLI::IsMember({"on", "off"}))->capture_default_str();
   c->add_option("--memory", o->bake.memory, "Working memory beyond scene and result; e.g. 500MB, 2GiB")
       ->transform(CLI::AsSizeValue(false))->default_str("4GiB");
   c->add_option("--seed", o->bake.seed, "Of the ray directions")->capture_default_str();
   c->add_option("--precision", o->precision, "Of the stored transfer")->check(CLI::IsMember({"half", "single"}))->capture_default_str();
-  c->callback([o, bounces, lobes, membrane, fixed, incident, last, brdf, &run] {
-    if (o->shadows == "off" && bounces->count() && o->bake.bounces > 0)
+  o->receivers.add_to(*c);
+  o->lightmap.add_to(*c);
+  auto* points = c->add_option("--lattice", o->lattice_points, "NX,NY,NZ: also bake light in free space at so many points, for `render --insert`");
+  auto* box = c->add_option("--lattice-box", o->lattice_box, "X0,Y0,Z0,X1,Y1,Z1: where, if not throughout the scene's box");
+  auto* lattice_order = c->add_option("--lattice-order", o->lattice.order, "Bands of the light that arrives there")
+                            ->check(CLI::Range(1, max_sh_order))->capture_default_str();
+  c->callback([o, bounces, order, lobes, membrane, fixed, incident, last, brdf, simulate, points, box, lattice_order, &run] {
+    o->order_given = order->count() > 0;
+    if (o->shadows == "off" && bounces->count() && o->bounces != "0")
       throw CLI::ValidationError("--shadows off has no bounces: leave --bounces out, or set it to 0");
     if (membrane->count() && o->transfer != "diffuse") throw CLI::ValidationError("--membrane is a transfer of its own: leave --transfer out");
     if (fixed->count() && (membrane->count() || o->transfer == "zonal")) throw CLI::ValidationError("--fix-light leaves nothing to turn: it is for diffuse and matrix transfer");
     if (lobes->count() && o->transfer != "zonal") throw CLI::ValidationError("--lobes needs --transfer zonal");
-    for (const CLI::Option* option : {incident, last, brdf})
+    for (const CLI::Option* option : {incident, last, brdf, simulate})
       if (option->count() && o->transfer != "matrix") throw CLI::ValidationError(option->get_name() + " needs --transfer matrix");
     if (o->transfer == "matrix" && o->shadows == "off") throw CLI::ValidationError("--transfer matrix is always baked with shadows");
+    for (const CLI::Option* option : {box, lattice_order})
+      if (option->count() && !points->count()) throw CLI::ValidationError(option->get_name() + " needs --lattice");
+    if (points->count() && o->shadows == "off") throw CLI::ValidationError("--lattice is always baked with shadows");
+    if (points->count() && o->bake.order + o->lattice.order > max_sh_order + 1)
+      throw CLI::ValidationError("--order and --lattice-order may be " + std::to_string(max_sh_order + 1) + " together");
+    if (points->count() && (membrane->count() || fixed->count() || (o->transfer != "diffuse" && o->transfer != "matrix")))
+      throw CLI::ValidationError("--lattice goes with diffuse and matrix transfer, under any distant light");
     run = [o](Context& context) { return run_bake(context, *o); };
   });
 }

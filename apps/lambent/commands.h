@@ -18,5 +18,7 @@ void add_patch(CLI::App& app, Run& run);
 void add_inspect(CLI::App& app, Run& run);
 void add_env(CLI::App& app, Run& run);
 void add_demo(CLI::App& app, Run& run);
+void add_view(CLI::App& app, Run& run);
+void add_export(CLI::App& app, Run& run);
 
 }  // namespace lambent::tool

@@ -89,6 +89,11 @@ int run_inspect(Context& context, const std::string& path) {
                      {"transfer", {{"kind", baked->outgoing ? "matrix" : "diffuse"}, {"order", t.light.order}, {"columns", t.columns()}, {"rows", t.rows}, {"channels", t.channels}, {"receivers", t.receivers}, {"bytes", t.bytes()},
                                    {"precision", t.precision == Precision::half ? "half" : "single"}}},
                      {"provenance", nlohmann::json::parse(baked->provenance, nullptr, false)}};
+    if (baked->lattice) {
+      const LatticeTransfer& l = *baked->lattice;
+      d["lattice"] = {{"points", {l.lattice.nx, l.lattice.ny, l.lattice.nz}}, {"order", l.order}, {"min", vector_json(l.lattice.min)},
+                      {"max", vector_json(l.lattice.max)}, {"invalid", std::count(l.valid.begin(), l.valid.end(), uint8_t(0))}, {"bytes", l.transfer.bytes()}};
+    }
     if (context.json) {
       print_json(d);
     } else {
@@ -96,6 +101,9 @@ int run_inspect(Context& context, const std::string& path) {
                  baked->outgoing ? std::string("matrix, outgoing ") + outgoing_names[int(baked->outgoing->kind)] : "diffuse", t.light.order, t.columns(),
                  t.columns() == 1 ? "" : "s", t.rows, t.rows == 1 ? "" : "s", t.channels, t.channels == 1 ? "" : "s",
                  human_count(t.receivers), human_bytes(double(t.bytes())), t.precision == Precision::half ? "half" : "single");
+      if (baked->lattice)
+        fmt::print("  light in free space at {} x {} x {} points, order {}, {}\n", baked->lattice->lattice.nx, baked->lattice->lattice.ny,
+                   baked->lattice->lattice.nz, baked->lattice->order, human_bytes(double(baked->lattice->transfer.bytes())));
       print_scene(d["scene"]);
       fmt::print("  provenance {}\n", d["provenance"].dump(-1, ' ', false, nlohmann::json::error_handler_t::replace));
     }

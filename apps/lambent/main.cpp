@@ -27,6 +27,8 @@ int main(int argc, char** argv) {
   tool::add_inspect(app, run);
   tool::add_env(app, run);
   tool::add_demo(app, run);
+  tool::add_view(app, run);
+  tool::add_export(app, run);
 
   try {
     app.parse(argc, argv);

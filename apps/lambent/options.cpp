@@ -32,15 +32,56 @@ Result<std::vector<float>> parse_numbers(const std::string& text, size_t count, 
   return values;
 }
 
+Result<NamedColor> parse_named_color(const std::string& text, const std::string& option) {
+  const size_t at = text.rfind('=');
+  if (at == std::string::npos || at == 0) return Error{option, "expects NAME=R,G,B, not \"" + text + "\""};
+  auto n = parse_numbers(text.substr(at + 1), 3, option);
+  if (!n) return n.error();
+  if ((*n)[0] < 0 || (*n)[1] < 0 || (*n)[2] < 0) return Error{option, "a colour may not be negative"};
+  return NamedColor{text.substr(0, at), {(*n)[0], (*n)[1], (*n)[2]}};
+}
+
+Result<std::array<int, 2>> parse_size(const std::string& text, const std::string& option) {
+  std::array<int, 2> size{};
+  const size_t x = text.find('x');
+  auto number = [&](const std::string& digits, int& value) {
+    auto [end, status] = std::from_chars(digits.data(), digits.data() + digits.size(), value);
+    return status == std::errc() && end == digits.data() + digits.size() && value >= 1 && value <= 16384;
+  };
+  if (x == std::string::npos || !number(text.substr(0, x), size[0]) || !number(text.substr(x + 1), size[1]))
+    return Error{option, "expects WIDTHxHEIGHT, each from 1 to 16384, not \"" + text + "\""};
+  return size;
+}
+
+namespace {
+
+Result<void> change_materials(Scene& scene, const SceneOptions& options) {
+  for (const std::string& text : options.emit) {
+    auto lamp = parse_named_color(text, "--emit");
+    if (!lamp) return lamp.error();
+    bool found = false;
+    for (Material& m : scene.materials)
+      if (m.name == lamp->name) m.emissive = lamp->color, found = true;
+    if (!found) return Error{"--emit", "the scene has no material \"" + lamp->name + "\""};
+  }
+  for (Material& m : scene.materials) m.base_color = glm::min(m.base_color, Vec3(options.max_albedo));
+  return {};
+}
+
+}  // namespace
+
 void SceneOptions::add_to(CLI::App& command) {
   command.add_option("scene", path, "Scene: .gltf, .glb, .obj or .ply")->required();
   command.add_flag("--ground", ground, "Add a tessellated floor under the scene");
+  command.add_option("--emit", emit, "MATERIAL=R,G,B: make a material a lamp of this radiance");
+  command.add_option("--max-albedo", max_albedo, "Darken base colours to at most this, channel by channel")->check(CLI::Range(0.0f, 1.0f));
   command.add_option("--max-edge", max_edge, "Split edges longer than this many scene units")->check(CLI::PositiveNumber);
 }
 
 Result<Scene> load_prepared_scene(const SceneOptions& options) {
   auto scene = load_scene(options.path);
   if (!scene) return scene;
+  if (auto ok = change_materials(*scene, options); !ok) return ok.error();
   if (options.ground) add_ground(*scene);
   if (options.max_edge > 0)
     if (auto ok = split_long_edges(*scene, options.max_edge); !ok) return ok.error();
@@ -72,23 +113,24 @@ Bounds subject_bounds(const Scene& scene) {
 
 Result<View> make_view(const ViewOptions& options, const Scene& scene) {
   View view;
-  const size_t x = options.size.find('x');
-  auto number = [&](const std::string& digits, int& value) {
-    auto [end, status] = std::from_chars(digits.data(), digits.data() + digits.size(), value);
-    return status == std::errc() && end == digits.data() + digits.size() && value >= 1 && value <= 16384;
-  };
-  if (x == std::string::npos || !number(options.size.substr(0, x), view.width) || !number(options.size.substr(x + 1), view.height))
-    return Error{"--size", "expects WIDTHxHEIGHT, each from 1 to 16384, not \"" + options.size + "\""};
-  if (options.camera == "auto") {
-    view.camera = camera_around(subject_bounds(scene));
-    return view;
-  }
-  auto n = parse_numbers(options.camera, 7, "--camera");
-  if (!n) return n.error();
-  view.camera.eye = {(*n)[0], (*n)[1], (*n)[2]}, view.camera.target = {(*n)[3], (*n)[4], (*n)[5]}, view.camera.fov = (*n)[6];
-  if (!(view.camera.fov > 0 && view.camera.fov < 180)) return Error{"--camera", "field of view must lie between 0 and 180 degrees"};
-  if (view.camera.eye == view.camera.target) return Error{"--camera", "eye and target are the same point"};
+  auto size = parse_size(options.size, "--size");
+  if (!size) return size.error();
+  view.width = (*size)[0], view.height = (*size)[1];
+  auto camera = parse_camera(options.camera);
+  if (!camera) return camera.error();
+  view.camera = *camera ? **camera : camera_around(subject_bounds(scene));
   return view;
+}
+
+Result<std::optional<Camera>> parse_camera(const std::string& text) {
+  if (text == "auto") return std::optional<Camera>();
+  auto n = parse_numbers(text, 7, "--camera");
+  if (!n) return n.error();
+  Camera camera;
+  camera.eye = {(*n)[0], (*n)[1], (*n)[2]}, camera.target = {(*n)[3], (*n)[4], (*n)[5]}, camera.fov = (*n)[6];
+  if (!(camera.fov > 0 && camera.fov < 180)) return Error{"--camera", "field of view must lie between 0 and 180 degrees"};
+  if (camera.eye == camera.target) return Error{"--camera", "eye and target are the same point"};
+  return std::optional<Camera>(camera);
 }
 
 void LightOptions::add_to(CLI::App& command, bool required) {
@@ -111,7 +153,7 @@ Result<Mat3> light_rotation(const LightOptions& options) {
 
 CLI::Option* BrdfOptions::add_to(CLI::App& command) {
   return command.add_option("--brdf", brdf, std::string("How surfaces reflect: diffuse (by base colour), materials (glTF's metallic-roughness), "
-                                                 "or one model for all: ") + brdf_syntax)->capture_default_str();
+                                                        "or one model for all: ") + brdf_syntax)->capture_default_str();
 }
 
 Result<Reflection> load_reflection(const BrdfOptions& options) {

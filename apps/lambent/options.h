@@ -10,15 +10,29 @@
 
 #include <CLI/CLI.hpp>
 
+#include <optional>
+
 namespace lambent::tool {
 
 // Strictly `count` finite numbers, separated by commas.
 Result<std::vector<float>> parse_numbers(const std::string& text, size_t count, const std::string& what);
 
+// "NAME=R,G,B": a name (which may hold '=') and three numbers.
+struct NamedColor {
+  std::string name;
+  Vec3 color;
+};
+Result<NamedColor> parse_named_color(const std::string& text, const std::string& option);
+
+// WIDTHxHEIGHT, each from 1 to 16384.
+Result<std::array<int, 2>> parse_size(const std::string& text, const std::string& option);
+
 struct SceneOptions {
   std::string path;
   bool ground = false;
   float max_edge = 0;  // 0: leave edges alone
+  std::vector<std::string> emit;  // NAME=R,G,B
+  float max_albedo = 1;
   void add_to(CLI::App& command);
 };
 // Loads and prepares a scene; prints its warnings.
@@ -34,6 +48,8 @@ struct View {
   int width = 0, height = 0;
 };
 Result<View> make_view(const ViewOptions& options, const Scene& scene);
+// What --camera says: seven numbers, or nothing for "auto".
+Result<std::optional<Camera>> parse_camera(const std::string& text);
 
 struct LightOptions {
   std::string env, rotate;

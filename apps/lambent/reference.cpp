@@ -37,6 +37,8 @@ int run_reference(Context& context, ReferenceCommand o) {
   if (poses->front()) *scene = posed(*scene, *poses->front());
   auto view = make_view(o.view, *scene);
   if (!view) return fail(view.error());
+  if (o.light.env.empty() && !o.options.lamps) return fail({"--env", "is needed, or --lamps"});
+  if (o.light.env.empty()) o.light.env = "uniform:0";
   auto env = load_light(o.light);
   if (!env) return fail(env.error());
   if (o.light_order) {
@@ -67,7 +69,7 @@ void add_reference(CLI::App& app, Run& run) {
   auto o = std::make_shared<ReferenceCommand>();
   CLI::App* c = app.add_subcommand("reference", "Path-trace a scene: the truth to judge bakes by");
   o->scene.add_to(*c);
-  o->light.add_to(*c);
+  o->light.add_to(*c, false);
   o->view.add_to(*c);
   o->motion.add_to(*c, false);
   o->brdf.add_to(*c);
@@ -75,6 +77,7 @@ void add_reference(CLI::App& app, Run& run) {
       ->check(CLI::Range(1, max_sh_order));
   c->add_option("--window", o->window, "With --light-order: as for render")
       ->transform(CLI::CheckedTransformer(window_names).description("{none,hann,lanczos,auto}"));
+  c->add_flag("--lamps", o->options.lamps, "The scene's own lamps give light too: emissive materials and punctual lights");
   c->add_option("--bounces", o->options.bounces, "Reflections between surfaces")->check(CLI::Range(0, 64))->capture_default_str();
   c->add_option("--spp", o->options.spp, "Paths a pixel")->check(CLI::Range(1, 1 << 20))->capture_default_str();
   c->add_option("--seed", o->options.seed, "Of the paths")->capture_default_str();

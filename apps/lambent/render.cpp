@@ -2,17 +2,22 @@
 #include "motion.h"
 #include "options.h"
 
+#include <lambent/bake/bake.h>
 #include <lambent/bake/materials.h>
 #include <lambent/baked/baked_file.h>
 #include <lambent/light/project.h>
 #include <lambent/relight/zonal.h>
+#include <lambent/render/insert.h>
 #include <lambent/render/render.h>
 #include <lambent/render/transfer_texture.h>
+#include <lambent/scene/append.h>
 #include <lambent/scene/load.h>
 
 #include <fmt/format.h>
 
+#include <algorithm>
 #include <chrono>
+#include <optional>
 
 namespace lambent::tool {
 namespace {
@@ -27,6 +32,8 @@ struct RenderCommand {
   ShWindow window = ShWindow::none;
   int light_order = 0, samples = 16;
   bool no_albedo = false;
+  std::vector<std::string> lamps;  // NAME=R,G,B
+  std::vector<std::string> insert;
 };
 
 // Any mesh, animated or not, with a transfer texture on it.
@@ -90,6 +97,48 @@ Result<void> change_materials(Baked& baked, const BrdfOptions& options, const st
   return {};
 }
 
+struct Insertion {
+  std::string path;
+  Vec3 foot;
+  float scale = 1;
+};
+
+// FILE@X,Y,Z or FILE@X,Y,Z,SCALE.
+Result<Insertion> parse_insertion(const std::string& text) {
+  const size_t at = text.rfind('@');
+  if (at == std::string::npos || at == 0) return Error{"--insert", "expects FILE@X,Y,Z or FILE@X,Y,Z,SCALE, not \"" + text + "\""};
+  const std::string place = text.substr(at + 1);
+  const bool scaled = std::count(place.begin(), place.end(), ',') == 3;
+  auto n = parse_numbers(place, scaled ? 4 : 3, "--insert");
+  if (!n) return n.error();
+  Insertion out{text.substr(0, at), {(*n)[0], (*n)[1], (*n)[2]}, scaled ? (*n)[3] : 1};
+  if (!(out.scale > 0)) return Error{"--insert", "the scale must be above 0"};
+  if (glm::any(glm::greaterThan(glm::abs(out.foot), Vec3(1e9f)))) return Error{"--insert", "the place lies beyond 1e9"};
+  return out;
+}
+
+// Adds the object to what is drawn, lit by the lattice. It must be loaded and baked alone where it stands.
+Result<void> add_insertion(Context& context, const Insertion& insertion, const LatticeTransfer& lattice, const Relit& light, RelitScene& drawn) {
+  auto object = load_scene(insertion.path);
+  if (!object) return object.error();
+  warn(object->warnings);
+  place_scene(*object, insertion.foot, insertion.scale);
+  for (const Vec3& p : object->positions)
+    if (!is_finite(p)) return Error{insertion.path, "is too large to be scaled so"};
+  const Bounds box = bounds(*object);
+  const Vec3 slack(0.01f * glm::length(lattice.lattice.max - lattice.lattice.min));
+  if (glm::any(glm::lessThan(box.min, lattice.lattice.min - slack)) || glm::any(glm::greaterThan(box.max, lattice.lattice.max + slack)))
+    warn(insertion.path + ": reaches out of the lattice's box; light there is that of the box's border");
+  auto tracer = Tracer::build(*object);
+  if (!tracer) return tracer.error();
+  const Receivers receivers = make_vertex_receivers(*object);
+  // What the object does to light that comes to it: own shadows, and one bounce.
+  auto transfer = bake(*object, *tracer, receivers, {.order = lattice.order, .samples = 512, .bounces = 1, .precision = Precision::single}, nullptr,
+                       &context.progress);
+  if (!transfer) return transfer.error();
+  return insert_object(drawn, *object, receivers, *transfer, lattice.lattice, light);
+}
+
 int run_render(Context& context, const RenderCommand& o) {
   if (!o.texture.empty()) return run_textured(context, o);
   if (auto ok = check_output(o.view.output, {"png", "exr"}); !ok) return fail(ok.error());
@@ -105,14 +154,27 @@ int run_render(Context& context, const RenderCommand& o) {
   const Scene first = poses->front() ? posed(baked->scene, *poses->front()) : Scene();
   auto view = make_view(o.view, poses->front() ? first : baked->scene);
   if (!view) return fail(view.error());
+  std::vector<Insertion> insertions;
+  for (const std::string& text : o.insert) {
+    auto insertion = parse_insertion(text);
+    if (!insertion) return fail(insertion.error());
+    insertions.push_back(std::move(*insertion));
+  }
+  if (!insertions.empty() && !baked->lattice) return fail({o.baked, "has no light in free space for --insert: bake it with --lattice"});
+  if (!insertions.empty() && (!std::holds_alternative<CornerReceivers>(baked->basis) || baked->directional != DirectionalKind::none))
+    return fail({o.baked, "objects can only be inserted into bakes at vertices"});
+  if (!insertions.empty() && o.motion.any()) return fail({"--insert", "draws the scene at rest: leave the animation out"});
   const LightBasis basis = baked->zonal ? LightBasis{.order = baked->zonal->order} : baked->transfer.light;
   const size_t receivers = baked->zonal ? baked->zonal->receivers : baked->transfer.receivers;
-  if (o.light.env.empty() && basis.order > 0) return fail({"--env", "is needed: an environment to light the scene by"});
-  Result<Environment> env = Environment{};
-  if (!o.light.env.empty()) env = load_light(o.light);
-  if (!env) return fail(env.error());
+  if (o.light.env.empty() && basis.order > 0) return fail({"--env", "is needed: the file is baked for distant light"});
+  std::optional<Environment> env;
+  if (!o.light.env.empty()) {
+    auto loaded = load_light(o.light);
+    if (!loaded) return fail(loaded.error());
+    env = std::move(*loaded);
+  }
 
-  // light: projected once, turned and windowed as coefficients. Light that was fixed in the bake is on.
+  // light: projected once, turned and windowed as coefficients; lobes dark, lamps as they were unless told otherwise.
   const int order = o.light_order ? std::min(o.light_order, basis.order) : basis.order;
   std::vector<Vec3> light;
   std::vector<float> window;
@@ -120,16 +182,34 @@ int run_render(Context& context, const RenderCommand& o) {
     light = rotate_sh(make_sh_rotation(order, *rotation), project_environment(*env, order));
     window = apply_sh_window(o.window, light);
   }
-  light.resize(basis.count(), Vec3(0.0f));
-  std::fill_n(light.end() - ptrdiff_t(basis.groups.size()), basis.groups.size(), Vec3(1.0f));
+  light.resize(basis.count() - basis.groups.size(), Vec3(0.0f));
+  std::vector<Vec3> lamps(basis.groups.size(), Vec3(1.0f));
+  for (const std::string& text : o.lamps) {
+    auto lamp = parse_named_color(text, "--lamp");
+    if (!lamp) return fail(lamp.error());
+    const auto group = std::find(basis.groups.begin(), basis.groups.end(), lamp->name);
+    if (group == basis.groups.end())
+      return fail({"--lamp", "the file has no group \"" + lamp->name + "\"; it has " + (basis.groups.empty() ? "none" : fmt::format("{}", fmt::join(basis.groups, ", ")))});
+    lamps[size_t(group - basis.groups.begin())] = lamp->color;
+  }
+  light.insert(light.end(), lamps.begin(), lamps.end());
   ZonalLight table;
   if (baked->zonal) specialise_light(*baked->zonal, light, table);
   else if (o.motion.any()) warn(o.baked + ": its transfer cannot turn with the surface (`lambent compress --zonal` makes one that can); it is used as baked");
 
+  RenderOptions options{view->width, view->height, o.samples, nullptr, !o.no_albedo, baked->outgoing ? &*baked->outgoing : nullptr, baked->directional};
+  if (!basis.groups.empty()) {
+    const bool one = basis.groups.size() == 1 && basis.groups[0] == std::string("all");
+    for (const Material& m : baked->scene.materials) {
+      const auto group = std::find(basis.groups.begin(), basis.groups.end(), m.name);
+      options.emission.push_back(m.emissive * (one ? lamps[0] : group == basis.groups.end() ? Vec3(0) : lamps[size_t(group - basis.groups.begin())]));
+    }
+  }
   Environment turned;
-  const bool show_env = o.view.background == "env" && !o.light.env.empty();
-  if (show_env) turned = o.light.rotate.empty() ? std::move(*env) : rotated(*env, *rotation);
-  const CornerReceivers corners = corner_receivers(baked->scene, baked->front, baked->back);
+  if (o.view.background == "env" && env) {
+    turned = o.light.rotate.empty() ? std::move(*env) : rotated(*env, *rotation);
+    options.background = &turned;
+  }
   double relight_seconds = 1e9;
   std::vector<Image> images;
   for (const std::optional<Pose>& pose : *poses) {
@@ -144,11 +224,21 @@ int run_render(Context& context, const RenderCommand& o) {
     // O(view)
     const Scene moved = pose ? posed(baked->scene, *pose) : Scene();
     const Scene& scene = pose ? moved : baked->scene;
-    auto tracer = Tracer::build(scene);
+    RelitScene drawn;
+    if (!insertions.empty()) {
+      drawn = {baked->scene, baked->front, baked->back, receivers, std::move(relit), baked->outgoing};
+      Relit free_space;
+      relight(baked->lattice->transfer, light, free_space);
+      for (const Insertion& insertion : insertions)
+        if (auto ok = add_insertion(context, insertion, *baked->lattice, free_space, drawn); !ok) return fail(ok.error());
+      if (drawn.outgoing) options.outgoing = &*drawn.outgoing;
+      if (!options.emission.empty()) options.emission.resize(drawn.scene.materials.size(), Vec3(0.0f));
+    }
+    const Scene& shown = insertions.empty() ? scene : drawn.scene;
+    auto tracer = Tracer::build(shown);
     if (!tracer) return fail(tracer.error());
-    RenderOptions options{view->width, view->height, o.samples, nullptr, !o.no_albedo, baked->outgoing ? &*baked->outgoing : nullptr};
-    if (show_env) options.background = &turned;
-    auto image = render(scene, *tracer, corners, relit, view->camera, options, &context.progress);
+    const SpatialBasis spatial = insertions.empty() ? baked->basis : SpatialBasis(corner_receivers(shown, drawn.front, drawn.back));
+    auto image = render(shown, *tracer, spatial, insertions.empty() ? relit : drawn.relit, view->camera, options, &context.progress);
     if (!image) return fail(image.error());
     images.push_back(std::move(*image));
   }
@@ -177,6 +267,9 @@ void add_render(CLI::App& app, Run& run) {
       ->transform(CLI::CheckedTransformer(window_names).description("{none,hann,lanczos,auto}"));
   c->add_option("--light-order", o->light_order, "Use only this many bands of the baked ones")->check(CLI::Range(1, max_sh_order));
   c->add_option("--spp", o->samples, "Rays a pixel")->check(CLI::Range(1, 4096))->capture_default_str();
+  c->add_option("--lamp", o->lamps, "NAME=R,G,B: scale a group of lamps by this colour (files baked with --light-groups)");
+  c->add_option("--insert", o->insert, "FILE@X,Y,Z[,SCALE]: put a small diffuse object there, lit by the scene's lattice; may be given again")
+      ->allow_extra_args(false);
   c->add_flag("--no-albedo", o->no_albedo, "Draw everything as if it were white");
   auto* brdf = o->brdf.add_to(*c);
   c->callback([o, brdf, &run] { o->new_brdf = brdf->count() > 0; run = [o](Context& context) { return run_render(context, *o); }; });

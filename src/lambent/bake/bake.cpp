@@ -92,7 +92,7 @@ struct Baker {
       });
       if (stage.cancelled()) return Error{"", "cancelled"};
     }
-    for (const FillStep& step : make_fill_steps(setup.corners, buried)) {
+    for (const FillStep& step : make_fill_steps(scene, receivers.basis, buried)) {
       std::vector<float> mean(coefficients());
       for (uint32_t s : step.sources) {
         const std::vector<float> value = load_receiver(out.transfer, s);
@@ -143,7 +143,7 @@ struct Baker {
     report.operator_bytes = used;
     const size_t kept_count = size_t(std::count(is_kept.begin(), is_kept.end(), uint8_t(1)));
     report.operator_kept = double(kept_count) / double(blocks);
-    const auto fill = make_fill_steps(setup.corners, buried);
+    const auto fill = make_fill_steps(scene, receivers.basis, buried);
     fill_buried(fill, T0.data(), C, C);
     report.trace_seconds = seconds_since(start);
     start = std::chrono::steady_clock::now();

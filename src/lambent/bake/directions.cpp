@@ -1,7 +1,6 @@
 #include <lambent/bake/directions.h>
 #include <lambent/bake/kernels.h>
 #include <lambent/core/random.h>
-#include <lambent/core/sampling.h>
 
 #include <algorithm>
 
@@ -21,7 +20,7 @@ uint32_t morton2(Vec2 u) {
 
 }  // namespace
 
-DirectionSets make_direction_sets(int order, int samples, int sets, uint32_t seed) {
+DirectionSets make_direction_sets(int order, int samples, int sets, uint32_t seed, DirectionWarp warp) {
   DirectionSets s{order, samples, sets, pad_lanes(size_t(samples)), 0, {}, {}, {}};
   const size_t n = size_t(samples), coefficients = size_t(sh_count(order));
   s.half = n >= 2 * lane_multiple ? pad_lanes(n / 2) : n;
@@ -37,7 +36,7 @@ DirectionSets make_direction_sets(int order, int samples, int sets, uint32_t see
     std::sort(points.begin() + ptrdiff_t(s.half), points.end(), along_curve);
     const size_t base = size_t(set) * s.stride;
     for (size_t i = 0; i < n; ++i) {
-      const Vec3 d = square_to_cosine_hemisphere(points[i]);
+      const Vec3 d = warp(points[i]);
       s.x[base + i] = d.x, s.y[base + i] = d.y, s.z[base + i] = d.z;
       evaluate_sh(order, d, y);
       for (size_t k = 0; k < coefficients; ++k) s.table[(size_t(set) * coefficients + k) * s.stride + i] = y[k];

@@ -1,8 +1,9 @@
 #pragma once
-// Directions and their basis values, made once and shared by all receivers: a few cosine-distributed sets about +z. A receiver
-// takes one set, turned into its frame by a rotation of its own; sums over its visible directions are formed in the set's frame
+// Directions and their basis values, made once and shared by all receivers: a few sets, cosine-distributed about +z unless another
+// warp is given. A receiver takes one set, turned into its frame by a rotation of its own; sums over its visible directions are formed in the set's frame
 // and turned back as spherical harmonics.
 #include <lambent/basis/sh.h>
+#include <lambent/core/sampling.h>
 #include <lambent/trace/tracer.h>
 
 #include <vector>
@@ -17,8 +18,11 @@ struct DirectionSets {
   std::vector<float> table;    // [set][coefficient][stride]: harmonics at each direction, 0 in the padding
 };
 
+// From the unit square to directions (core/sampling.h).
+using DirectionWarp = Vec3 (*)(Vec2);
+
 // Sobol' points, Owen-scrambled anew for every set, sorted within each half along a space-filling curve.
-DirectionSets make_direction_sets(int order, int samples, int sets, uint32_t seed);
+DirectionSets make_direction_sets(int order, int samples, int sets, uint32_t seed, DirectionWarp warp = square_to_cosine_hemisphere);
 
 // A receiver's draw: which set, and the rotation Rz(a) Ry(b) Rz(c) that takes +z to its normal with a random spin c.
 struct DirectionChoice {

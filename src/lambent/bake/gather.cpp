@@ -3,6 +3,7 @@
 #include <lambent/bake/kernels.h>
 #include <lambent/core/check.h>
 #include <lambent/core/half.h>
+#include <lambent/core/random.h>
 
 #include <algorithm>
 
@@ -128,7 +129,7 @@ struct Fan {
 }  // namespace
 
 // A first packet settles it for all but those near something of the kind.
-bool is_buried(const Tracer& tracer, const CornerReceivers& corners, Vec3 origin, const Directions& fan) {
+bool is_buried(const Tracer& tracer, const SpatialBasis& basis, Vec3 origin, const Directions& fan) {
   const size_t rays = fan.count;
   float x[burial_rays], y[burial_rays], z[burial_rays];
   Hit hits[burial_rays];
@@ -141,7 +142,9 @@ bool is_buried(const Tracer& tracer, const CornerReceivers& corners, Vec3 origin
       x[k] = fan.x[j], y[k] = fan.y[j], z[k] = fan.z[j];
     }
     tracer.closest_fan(origin, {x, y, z, m}, hits);
-    for (size_t k = 0; k < m; ++k) backs += hits[k].triangle != none && !corners.find(hits[k].triangle, hits[k].front);
+    std::visit([&](const auto& b) {
+      for (size_t k = 0; k < m; ++k) backs += hits[k].triangle != none && !b.find(hits[k].triangle, hits[k].front);
+    }, basis);
     if (backs == 0) return false;
   }
   return 2 * backs > n;
@@ -161,14 +164,15 @@ struct GatherScratch {
   Fan fan;
   std::vector<Hit> hits;
   BlockBuilder rows, half_rows;
+  std::vector<LampLight> lights;
   GatherScratch(const DirectionSets& sets, size_t receivers) : fan(sets), hits(size_t(sets.samples)), rows(receivers), half_rows(receivers) {}
 };
 void DeleteScratch::operator()(GatherScratch* scratch) const { delete scratch; }
 ScratchPointer make_gather_scratch(const GatherSetup& setup) { return ScratchPointer(new GatherScratch(setup.sets, setup.receivers.count())); }
 
-GatherSetup make_gather_setup(const Scene& scene, const Tracer& tracer, const Receivers& receivers, int order, int samples, uint32_t seed) {
-  GatherSetup setup{scene, tracer, receivers, corner_receivers(scene, receivers.front, receivers.back),
-                    make_direction_sets(order, samples, set_count, seed), seed, 1, 1.0f, {}, {}};
+GatherSetup make_gather_setup(const Scene& scene, const Tracer& tracer, const Receivers& receivers, int order, int samples, uint32_t seed,
+                              DirectionWarp warp) {
+  GatherSetup setup{scene, tracer, receivers, make_direction_sets(order, samples, set_count, seed, warp), seed, 1, 1.0f, {}, {}};
   // Weights are sums over rays: halves hold 65504.
   setup.weight_unit = std::min(1.0f, 16384.0f / float(samples));
   bool coloured = false;
@@ -182,8 +186,27 @@ GatherSetup make_gather_setup(const Scene& scene, const Tracer& tracer, const Re
   return setup;
 }
 
-void trace_gather(const GatherSetup& setup, GatherScratch& scratch, size_t first, size_t count, GatherBlock* block, const GatherSky* sky) {
-  LAMBENT_CHECK(count <= gather_block);
+namespace {
+
+// All of a hit's receivers, or, of bilinear texels, one drawn by its weight.
+template <class Basis, class At, class Add>
+void scatter(const Basis& basis, const At& at, const Hit& h, uint64_t, Add add) {
+  basis.spread(at, h.u, h.v, add);
+}
+template <class Add>
+void scatter(const TexelReceivers& basis, const TexelTriangle& at, const Hit& h, uint64_t key, Add add) {
+  float left = to_unit_float(uint32_t(hash64(key)));
+  uint32_t chosen = none;
+  basis.spread(at, h.u, h.v, [&](uint32_t receiver, float weight) {
+    if (left >= 0) chosen = receiver;
+    left -= weight;
+  });
+  if (chosen != none) add(chosen, 1.0f);
+}
+
+template <class Basis>
+void trace_gather_on(const GatherSetup& setup, const Basis& basis, GatherScratch& scratch, size_t first, size_t count, GatherBlock* block,
+                     const GatherSky* sky, const GatherDirect* direct) {
   const DirectionSets& sets = setup.sets;
   const size_t coefficients = setup.coefficients(), rays = size_t(sets.samples), half = std::min(sets.half, rays);
   Fan& fan = scratch.fan;
@@ -196,23 +219,42 @@ void trace_gather(const GatherSetup& setup, GatherScratch& scratch, size_t first
     scratch.rows.begin_row();
     if (checked) scratch.half_rows.begin_row();
     size_t backs = 0;
+    const Vec3 normal = setup.receivers.normals[r];
+    auto direction = [&](size_t j) { return Vec3(fan.x[j], fan.y[j], fan.z[j]); };
+    auto add_light = [&](const LampLight& light) {
+      float* row = direct->rows + i * direct->width + size_t(light.group) * 3;
+      for (int c = 0; c < 3; ++c) row[c] += light.value[c];
+    };
+    if (direct) {
+      scratch.lights.clear();
+      sample_lamps(setup.scene, setup.tracer, direct->lamps, setup.receivers.origins[r], normal, direct->samples, rays, setup.seed, r, scratch.lights);
+      for (const LampLight& light : scratch.lights) add_light(light);
+    }
+    const bool sees_sky = direct && direct->lamps.sky, sees_lamps = direct && !direct->lamps.of_triangle.empty();
     for (size_t j = 0; j < rays; ++j) {
-      if (j + lookahead < rays) setup.corners.prefetch(hits[j + lookahead].triangle, hits[j + lookahead].front);
+      if (j + lookahead < rays) basis.prefetch(hits[j + lookahead].triangle, hits[j + lookahead].front);
       const Hit& h = hits[j];
       fan.visible[j] = h.triangle == none ? 1.0f : 0.0f;
-      if (h.triangle == none) continue;
-      const Corners* corner = setup.corners.find(h.triangle, h.front);
-      if (!corner) {
+      if (h.triangle == none) {
+        if (sees_sky) add_light(met_sky(direct->lamps, direction(j), glm::dot(normal, direction(j)), direct->samples, rays));
+        continue;
+      }
+      if (sees_lamps) {
+        const uint32_t lamp = direct->lamps.of_triangle[h.triangle];
+        if (lamp != none && emits(setup.scene, setup.scene.triangles[h.triangle], h.front))
+          add_light(met_lamp(setup.scene, direct->lamps, lamp, direction(j), glm::dot(normal, direction(j)), h.distance, direct->samples, rays));
+      }
+      const auto* at = basis.find(h.triangle, h.front);
+      if (!at) {
         ++backs;
         continue;
       }
       if (!block) continue;
-      const Vec3 rho = setup.part_varies[corner->part] ? albedo(setup.scene, setup.scene.triangles[h.triangle], h.u, h.v)
-                                                       : setup.part_albedo[corner->part];
-      const float weight[3] = {1 - h.u - h.v, h.u, h.v};
-      for (int k = 0; k < 3; ++k) scratch.rows.add(corner->receiver[k], rho * weight[k]);
+      const Vec3 rho = setup.part_varies[at->part] ? albedo(setup.scene, setup.scene.triangles[h.triangle], h.u, h.v)
+                                                   : setup.part_albedo[at->part];
+      scatter(basis, *at, h, r * rays + j, [&](uint32_t receiver, float weight) { scratch.rows.add(receiver, rho * weight); });
       if (checked && j < half)
-        for (int k = 0; k < 3; ++k) scratch.half_rows.add(corner->receiver[k], rho * weight[k]);
+        scatter(basis, *at, h, r * rays + j, [&](uint32_t receiver, float weight) { scratch.half_rows.add(receiver, rho * weight); });
     }
     scratch.rows.end_row();
     if (checked) scratch.half_rows.end_row();
@@ -227,6 +269,15 @@ void trace_gather(const GatherSetup& setup, GatherScratch& scratch, size_t first
   }
 }
 
+}  // namespace
+
+// The kind of basis is asked for once a block, so that the loop over rays is compiled for each.
+void trace_gather(const GatherSetup& setup, GatherScratch& scratch, size_t first, size_t count, GatherBlock* block, const GatherSky* sky,
+                  const GatherDirect* direct) {
+  LAMBENT_CHECK(count <= gather_block);
+  std::visit([&](const auto& basis) { trace_gather_on(setup, basis, scratch, first, count, block, sky, direct); }, setup.receivers.basis);
+}
+
 void trace_sky(const GatherSetup& setup, GatherScratch& scratch, size_t first, size_t count, const GatherSky& sky) {
   const DirectionSets& sets = setup.sets;
   const size_t coefficients = setup.coefficients(), rays = size_t(sets.samples);
@@ -238,7 +289,7 @@ void trace_sky(const GatherSetup& setup, GatherScratch& scratch, size_t first, s
     fan.project(sky.rows + i * coefficients, checked_row(sky.half_rows, first, r, coefficients));
     size_t seen = 0;
     for (size_t j = 0; j < rays; ++j) seen += fan.visible[j] > 0;
-    sky.buried[i] = 4 * seen < rays && is_buried(setup.tracer, setup.corners, origin, {fan.x.data(), fan.y.data(), fan.z.data(), rays});
+    sky.buried[i] = 4 * seen < rays && is_buried(setup.tracer, setup.receivers.basis, origin, {fan.x.data(), fan.y.data(), fan.z.data(), rays});
   }
 }
 
@@ -250,19 +301,8 @@ void multiply_rows(const SparseBlock& block, int channels, const float* x, size_
   for (size_t i = 0; i < values; ++i) y[i] *= scale;
 }
 
-std::vector<FillStep> make_fill_steps(const CornerReceivers& corners, const std::vector<uint8_t>& buried) {
-  std::vector<std::pair<uint32_t, uint32_t>> edges;  // (buried receiver, neighbour)
-  for (const auto* side : {&corners.front, &corners.back})
-    for (const auto& c : *side) {
-      const auto& r = c.receiver;
-      if (r[0] == none) continue;
-      for (int k = 0; k < 3; ++k)
-        for (int j = 1; j < 3; ++j)
-          if (buried[r[k]] && r[k] != r[(k + j) % 3]) edges.push_back({r[k], r[(k + j) % 3]});
-    }
-  std::sort(edges.begin(), edges.end());
-  edges.erase(std::unique(edges.begin(), edges.end()), edges.end());
-
+std::vector<FillStep> make_fill_steps(const Scene& scene, const SpatialBasis& basis, const std::vector<uint8_t>& buried) {
+  const auto edges = neighbours_of(scene, basis, buried);  // (buried receiver, neighbour)
   std::vector<FillStep> steps;
   std::vector<uint8_t> waiting = buried;
   for (bool grew = true; grew;) {  // layer by layer from the receivers that are clear

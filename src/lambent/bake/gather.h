@@ -4,6 +4,7 @@
 // The hit rows are a sparse matrix B, and a bounce is a product: T_{k+1} = B T_k (general-prt, "Transfer Matrix for Bounce
 // k+1", one-row case), with no further ray. Any number of columns: the same B carries radiosity (alpha = e + B alpha).
 #include <lambent/bake/directions.h>
+#include <lambent/bake/lamps.h>
 #include <lambent/core/aligned.h>
 #include <lambent/receivers/receivers.h>
 #include <lambent/trace/tracer.h>
@@ -37,7 +38,6 @@ struct GatherSetup {
   const Scene& scene;
   const Tracer& tracer;
   const Receivers& receivers;
-  CornerReceivers corners;
   DirectionSets sets;
   uint32_t seed;
   int channels;         // of weights: 1 if all albedo is grey, else 3
@@ -50,13 +50,22 @@ struct GatherSetup {
   float row_scale(size_t rays) const { return 1.0f / (weight_unit * float(rays)); }
 };
 
-GatherSetup make_gather_setup(const Scene& scene, const Tracer& tracer, const Receivers& receivers, int order, int samples, uint32_t seed);
+GatherSetup make_gather_setup(const Scene& scene, const Tracer& tracer, const Receivers& receivers, int order, int samples, uint32_t seed,
+                              DirectionWarp warp = square_to_cosine_hemisphere);
 
 // What tracing receivers [first, first + count) yields beside the hit rows. Spans are indexed from `first`.
 struct GatherSky {
   float* rows;       // [receiver][coefficient]: T0
   float* half_rows;  // [checked receiver][coefficient]: T0 by the first half of the rays
   uint8_t* buried;   // 1: most rays met the back of a one-sided surface; the receiver lies inside something
+};
+
+// Direct light of lamps, from the same rays and from samples towards the lamps (lamps.h).
+struct GatherDirect {
+  const Lamps& lamps;
+  int samples;   // a group, towards its lamps
+  float* rows;   // [receiver][group][r, g, b], zero on entry
+  size_t width;  // floats a row
 };
 
 // What one thread needs while it traces; made once and lent out (core/pool.h).
@@ -67,25 +76,27 @@ struct DeleteScratch {
 using ScratchPointer = std::unique_ptr<GatherScratch, DeleteScratch>;
 ScratchPointer make_gather_scratch(const GatherSetup& setup);
 
-// Traces closest hits. Either of `block` and `sky` may be null.
-void trace_gather(const GatherSetup& setup, GatherScratch& scratch, size_t first, size_t count, GatherBlock* block, const GatherSky* sky);
+// Traces closest hits. `block`, `sky` and `direct` may be null. A ray that meets bilinear texels counts for one of the four,
+// drawn with the probability of its weight: a quarter of the entries, with the same mean.
+void trace_gather(const GatherSetup& setup, GatherScratch& scratch, size_t first, size_t count, GatherBlock* block, const GatherSky* sky,
+                  const GatherDirect* direct = nullptr);
 
 // Traces occlusion only: the sky rows, without hit rows.
 void trace_sky(const GatherSetup& setup, GatherScratch& scratch, size_t first, size_t count, const GatherSky& sky);
 
 // A second look at a receiver that sees little sky, when only occlusion was traced: do most of a sample of the fan's rays meet
 // backs of one-sided surfaces?
-bool is_buried(const Tracer& tracer, const CornerReceivers& corners, Vec3 origin, const Directions& fan);
+bool is_buried(const Tracer& tracer, const SpatialBasis& basis, Vec3 origin, const Directions& fan);
 
 // y[row] = scale * (row of B) x, for the block's rows; x and y are [receiver][column x channel], `width` padded floats a row.
 void multiply_rows(const SparseBlock& rows, int channels, const float* x, size_t width, float scale, float* y);
 
-// Values of buried receivers are taken from their neighbours along the mesh.
+// Values of buried receivers are taken from their neighbours (neighbours_of).
 struct FillStep {
   uint32_t receiver;
   std::vector<uint32_t> sources;  // not buried, or filled by an earlier step
 };
-std::vector<FillStep> make_fill_steps(const CornerReceivers& corners, const std::vector<uint8_t>& buried);
+std::vector<FillStep> make_fill_steps(const Scene& scene, const SpatialBasis& basis, const std::vector<uint8_t>& buried);
 void fill_buried(const std::vector<FillStep>& steps, float* values, size_t stride, size_t width);
 
 }  // namespace lambent

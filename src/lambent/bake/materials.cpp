@@ -10,6 +10,7 @@ ReceiverMaterials make_receiver_materials(const Scene& scene, const Receivers& r
   ReceiverMaterials out;
   out.of_receiver.assign(receivers.count(), 0);
   out.frames.resize(receivers.count());
+  out.reflection = reflection;
   std::vector<uint8_t> done(receivers.count(), 0);
   std::map<std::pair<int, int>, uint16_t> palette;
   if (reflection.everywhere) out.materials.push_back({*reflection.everywhere, *reflection.everywhere});

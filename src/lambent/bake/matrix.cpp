@@ -1,18 +1,21 @@
 // Follows: general-prt (transfer matrices, the recursion over bounces with glossy scattering, the last reflection),
 // triple-product-integrals (direct light as a triple product: with V known to order n + m - 1 the product of light and incident
-// basis, of orders n and m, against it is exact).
+// basis, of orders n and m, against it is exact). Instead of the recursion, bounces by paths (general-prt, "direct simulation").
 #include <lambent/bake/gather.h>
 #include <lambent/bake/matrix.h>
 #include <lambent/bake/matrix_kernels.h>
+#include <lambent/bake/path.h>
 #include <lambent/basis/sh_product.h>
 #include <lambent/core/check.h>
 #include <lambent/core/half.h>
 #include <lambent/core/parallel.h>
 #include <lambent/core/pool.h>
+#include <lambent/core/random.h>
 
 #include <atomic>
 #include <chrono>
 #include <map>
+#include <variant>
 
 namespace lambent {
 namespace {
@@ -79,6 +82,7 @@ struct MatrixBaker {
   std::vector<size_t> first_row{};  // of each receiver's scattered rows; one more at the end
   Pool<MatrixScratch> scratch{[this] { return make_scratch(); }};
 
+  const CornerReceivers& corners() const { return std::get<CornerReceivers>(receivers.basis); }
   size_t n() const { return receivers.count(); }
   size_t J() const { return size_t(basis.count()); }                // rows of X
   size_t C() const { return size_t(sh_count(options.order)); }      // columns
@@ -146,12 +150,12 @@ struct MatrixBaker {
       const MatrixHit& h = hits[i];
       float* v = s.v.data() + in_batch * wc;
       std::fill(v, v + wc, 0.0f);
-      const Corners& corners = *setup.corners.find(h.corner >> 1, h.corner & 1);
+      const Corners& at = *corners().find(h.corner >> 1, h.corner & 1);
       const Vec3 back(-s.x[h.ray], -s.y[h.ray], -s.z[h.ray]);
       const Vec3 colour(half_to_float(h.rgb[0]), half_to_float(h.rgb[1]), half_to_float(h.rgb[2]));
       const float b1 = float(h.u) / 65535.0f, b2 = float(h.v) / 65535.0f, b[3] = {1 - b1 - b2, b1, b2};
       for (int k = 0; k < 3; ++k) {
-        const uint32_t c = corners.receiver[k];
+        const uint32_t c = at.receiver[k];
         const FactoredResponse& f = scatter[materials.of_receiver[c]];
         const ViewWeights* weights = f.g.values.data();
         if (!f.constant) {
@@ -169,12 +173,39 @@ struct MatrixBaker {
       for (size_t j = 0; j < J(); ++j) s.zb[in_batch * J() + j] = table[j * setup.sets.stride + h.ray];
       if (++in_batch == hit_batch) add_outer_products(s.zb.data(), J(), s.v.data(), wc, rows), in_batch = 0;
     }
+    add_rest(s, in_batch, limit, out);
+  }
+
+  // The same light by following the rays below `limit` on from their hits, each to its end.
+  void simulated(MatrixScratch& s, size_t r, std::span<const MatrixHit> hits, size_t limit, float* out) const {
+    const size_t w = width(), wc = channels() * w;
+    std::fill(s.sh_rows.begin(), s.sh_rows.end(), 0.0f);
+    const float* table = setup.sets.table.data() + size_t(s.choice.set) * V_count() * setup.sets.stride;
+    const uint64_t key = hash64(hash64(setup.seed, 0x9a7e5), r);
+    size_t in_batch = 0;
+    for (size_t i = 0; i < hits.size() && hits[i].ray < limit; ++i) {
+      const uint32_t ray = hits[i].ray;
+      const PathEnd end = follow_path(scene, setup.tracer, materials.reflection, {s.x[ray], s.y[ray], s.z[ray]}, s.hits[ray], options.bounces, key, ray);
+      if (!end.leaves) continue;
+      evaluate_sh(options.order, end.direction, s.column_row);
+      float* v = s.v.data() + in_batch * wc;
+      for (size_t c = 0; c < channels(); ++c)
+        for (size_t k = 0; k < C(); ++k) v[c * w + k] = end.throughput[int(c)] * s.column_row[k];
+      for (size_t j = 0; j < J(); ++j) s.zb[in_batch * J() + j] = table[j * setup.sets.stride + ray];
+      if (++in_batch == hit_batch) add_outer_products(s.zb.data(), J(), s.v.data(), wc, s.sh_rows.data()), in_batch = 0;
+    }
+    add_rest(s, in_batch, limit, out);
+  }
+
+  // Adds the last hits of a sum over rays, and the sum, as rows over the incident basis, to out.
+  void add_rest(MatrixScratch& s, size_t in_batch, size_t limit, float* out) const {
+    const size_t wc = channels() * width();
     if (in_batch) {
       std::fill(s.zb.data() + in_batch * J(), s.zb.data() + hit_batch * J(), 0.0f);
-      add_outer_products(s.zb.data(), J(), s.v.data(), wc, rows);
+      add_outer_products(s.zb.data(), J(), s.v.data(), wc, s.sh_rows.data());
     }
     AlignedVector<float> sum(J() * wc);
-    to_incident(rows, s.phi, wc, 1.0f / float(limit), sum.data());
+    to_incident(s.sh_rows.data(), s.phi, wc, 1.0f / float(limit), sum.data());
     for (size_t i = 0; i < sum.size(); ++i) out[i] += sum[i];
   }
 
@@ -185,7 +216,7 @@ struct MatrixBaker {
       setup.tracer.visible_fan(receivers.origins[r], d, s.visible.data());
       size_t seen = 0;
       for (size_t j = 0; j < rays(); ++j) seen += s.visible[j] > 0;
-      return 4 * seen < rays() && is_buried(setup.tracer, setup.corners, receivers.origins[r], d);
+      return 4 * seen < rays() && is_buried(setup.tracer, receivers.basis, receivers.origins[r], d);
     }
     setup.tracer.closest_fan(receivers.origins[r], d, s.hits.data());
     size_t backs = 0;
@@ -193,7 +224,7 @@ struct MatrixBaker {
       const Hit& h = s.hits[j];
       s.visible[j] = h.triangle == none ? 1.0f : 0.0f;
       if (h.triangle == none) continue;
-      const Corners* corner = setup.corners.find(h.triangle, h.front);
+      const Corners* corner = corners().find(h.triangle, h.front);
       if (!corner) {
         ++backs;
         continue;
@@ -279,6 +310,94 @@ struct MatrixBaker {
     return last;
   }
 
+  // T0 in every channel.
+  void expand(const float* t, float* x) const {
+    for (size_t j = 0; j < J(); ++j)
+      for (size_t c = 0; c < channels(); ++c) std::copy_n(t + j * width(), width(), x + (j * channels() + c) * width());
+  }
+
+  // X of receiver r as the rows that are kept.
+  void store(const Last& last, const WritableTransfer& out, size_t r, const float* x) const {
+    std::vector<float> values(size_t(last.rows) * size_t(last.channels) * C());
+    for (size_t row = 0; row < size_t(last.rows); ++row)
+      for (size_t c = 0; c < size_t(last.channels); ++c) {
+        const float* h = last.h[materials.of_receiver[r]][c].data() + row * J();
+        float* v = values.data() + (row * size_t(last.channels) + c) * C();
+        for (size_t j = 0; j < J(); ++j) {
+          const float* xj = x + (j * channels() + std::min(c, channels() - 1)) * width();
+          if (h[j] != 0)
+            for (size_t k = 0; k < C(); ++k) v[k] += h[j] * xj[k];
+        }
+      }
+    store_receiver(out, r, values);
+  }
+
+  // Sums of squares by block, added up in order.
+  struct ErrorSums {
+    std::vector<double> differences, totals;
+    explicit ErrorSums(size_t blocks) : differences(blocks, 0.0), totals(blocks, 0.0) {}
+    void add(size_t block, const float* half, const float* full, size_t count) {
+      for (size_t i = 0; i < count; ++i) differences[block] += double(half[i] - full[i]) * (half[i] - full[i]), totals[block] += double(full[i]) * full[i];
+    }
+    double relative() const {
+      double difference = 0, total = 0;
+      for (size_t b = 0; b < differences.size(); ++b) difference += differences[b], total += totals[b];
+      return total > 0 ? std::sqrt(difference / total) : 0;
+    }
+  };
+
+  MatrixBake finish(const std::vector<uint8_t>& buried, const ErrorSums& errors, WritableTransfer&& out, const Last& last) const {
+    report.error = has_halves() ? errors.relative() : -1;
+    report.receivers = n(), report.bytes = out.transfer.bytes();
+    for (uint8_t x : buried) report.buried += x;
+    return {std::move(out.transfer), last.outgoing};
+  }
+
+  // Every receiver by itself: nothing is kept from one to the next.
+  Result<MatrixBake> run_simulated() {
+    make_responses();
+    const auto start = Clock::now();
+    const Last last = make_last();
+    WritableTransfer out = make_transfer({.order = options.order}, last.rows, last.channels, n(), options.precision);
+    std::vector<uint8_t> buried(n());
+    ErrorSums errors((n() + gather_block - 1) / gather_block);
+    auto receive = [&](MatrixScratch& s, size_t r) {
+      MatrixHits hits;
+      const bool inside = trace(s, r, &hits);
+      AlignedVector<float> t0(J() * width()), x(J() * channels() * width());
+      auto gather = [&](size_t limit) {
+        direct(s, limit, t0.data());
+        expand(t0.data(), x.data());
+        simulated(s, r, hits.hits, limit, x.data());
+      };
+      AlignedVector<float> half;
+      const bool checked = has_halves() && r % check_every == 0 && !inside;
+      if (checked) gather(setup.sets.half), half = x;
+      gather(rays());
+      if (checked) errors.add(r / gather_block, half.data(), x.data(), x.size());
+      store(last, out, r, x.data());
+      return inside;
+    };
+    {
+      ProgressStage stage(progress, "paths", n());
+      parallel_for(n(), gather_block, [&](size_t begin, size_t end) {
+        auto s = scratch.borrow();
+        for (size_t r = begin; r < end && !stage.cancelled(); ++r) buried[r] = receive(*s, r);
+        stage.advance(end - begin);
+      });
+      if (stage.cancelled()) return Error{"", "cancelled"};
+    }
+    auto s = scratch.borrow();
+    for (const FillStep& step : make_fill_steps(scene, receivers.basis, buried)) {
+      receivers.origins[step.receiver] = receivers.origins[step.sources[0]];
+      (void)receive(*s, step.receiver);
+    }
+    report.rays = n() * rays();
+    report.trace_seconds = seconds_since(start);
+    report.working_memory = matrix_memory(n(), int(channels()), options, matrix);
+    return finish(buried, errors, std::move(out), last);
+  }
+
   Result<MatrixBake> run() {
     make_responses();
     const size_t wc = channels() * width(), blocks = (n() + gather_block - 1) / gather_block;
@@ -329,24 +448,6 @@ struct MatrixBaker {
 
     const Last last = make_last();
     WritableTransfer out = make_transfer({.order = options.order}, last.rows, last.channels, n(), options.precision);
-    auto expand = [&](const float* t, float* x) {  // T0 in every channel
-      for (size_t j = 0; j < J(); ++j)
-        for (size_t c = 0; c < channels(); ++c) std::copy_n(t + j * width(), width(), x + (j * channels() + c) * width());
-    };
-    auto store = [&](size_t r, const float* x) {
-      std::vector<float> values(size_t(last.rows) * size_t(last.channels) * C());
-      for (size_t row = 0; row < size_t(last.rows); ++row)
-        for (size_t c = 0; c < size_t(last.channels); ++c) {
-          const float* h = last.h[materials.of_receiver[r]][c].data() + row * J();
-          float* v = values.data() + (row * size_t(last.channels) + c) * C();
-          for (size_t j = 0; j < J(); ++j) {
-            const float* xj = x + (j * channels() + std::min(c, channels() - 1)) * width();
-            if (h[j] != 0)
-              for (size_t k = 0; k < C(); ++k) v[k] += h[j] * xj[k];
-          }
-        }
-      store_receiver(out, r, values);
-    };
     auto scatter_rows = [&](size_t r, const float* x, float* Y) {
       const FactoredResponse& f = scatter[materials.of_receiver[r]];
       apply(f.h, size_t(f.rows), J(), wc, x, Y + first_row[r] * wc);
@@ -359,16 +460,13 @@ struct MatrixBaker {
       for (size_t r = begin; r < end; ++r) {
         expand(T0.data() + r * J() * width(), x.data());
         if (bounces) scatter_rows(r, x.data(), Y.data());
-        else store(r, x.data());
+        else store(last, out, r, x.data());
       }
     });
-    std::vector<double> differences(blocks, 0.0), totals(blocks, 0.0);
-    auto check = [&](size_t block, const float* half, const float* full, size_t count) {
-      for (size_t i = 0; i < count; ++i) differences[block] += double(half[i] - full[i]) * (half[i] - full[i]), totals[block] += double(full[i]) * full[i];
-    };
+    ErrorSums errors(blocks);
     if (!bounces)
       for (size_t r = 0; r < n(); r += check_every)
-        if (!buried[r]) check(r / gather_block, T0_half.data() + r / check_every * J() * width(), T0.data() + r * J() * width(), J() * width());
+        if (!buried[r]) errors.add(r / gather_block, T0_half.data() + r / check_every * J() * width(), T0.data() + r * J() * width(), J() * width());
 
     for (int bounce = 1; bounce <= options.bounces; ++bounce) {
       const bool is_last = bounce == options.bounces;
@@ -392,12 +490,12 @@ struct MatrixBaker {
             scatter_rows(r, x.data(), next.data());
             continue;
           }
-          store(r, x.data());
+          store(last, out, r, x.data());
           if (has_halves() && r % check_every == 0 && !buried[r]) {
             AlignedVector<float> half(J() * wc);
             expand(T0_half.data() + r / check_every * J() * width(), half.data());
             scattered(*s, mine, setup.sets.half, Y.data(), half.data());
-            check(b, half.data(), x.data(), half.size());
+            errors.add(b, half.data(), x.data(), half.size());
           }
         }
         stage.advance(end - begin);
@@ -408,12 +506,7 @@ struct MatrixBaker {
     }
     report.bounce_seconds = seconds_since(start);
     report.working_memory = fixed + used;
-    double difference = 0, total = 0;
-    for (size_t b = 0; b < blocks; ++b) difference += differences[b], total += totals[b];
-    report.error = has_halves() ? (total > 0 ? std::sqrt(difference / total) : 0) : -1;
-    report.receivers = n(), report.bytes = out.transfer.bytes();
-    for (uint8_t x : buried) report.buried += x;
-    return MatrixBake{std::move(out.transfer), last.outgoing};
+    return finish(buried, errors, std::move(out), last);
   }
 
   // A buried receiver looks out from where its nearest clear neighbour along the mesh lies.
@@ -421,7 +514,7 @@ struct MatrixBaker {
   void move_buried(const std::vector<uint8_t>& was_buried, AlignedVector<float>&, TraceReceiver& trace_receiver, bool bounces, std::vector<MatrixHits>& kept,
                    std::vector<uint8_t>& is_kept, std::atomic<size_t>& used) {
     const std::vector<uint8_t> buried = was_buried;
-    const auto steps = make_fill_steps(setup.corners, buried);
+    const auto steps = make_fill_steps(scene, receivers.basis, buried);
     if (steps.empty()) return;
     for (const FillStep& step : steps) receivers.origins[step.receiver] = receivers.origins[step.sources[0]];
     std::map<size_t, bool> touched;
@@ -462,6 +555,7 @@ size_t matrix_memory(size_t receivers, int channels, const BakeOptions& o, const
 Result<MatrixBake> bake_matrix(const Scene& scene, const Tracer& tracer, const Receivers& receivers, const ReceiverMaterials& materials,
                                const BakeOptions& options, const MatrixOptions& matrix, BakeReport* report, Progress* progress) {
   if (receivers.count() == 0) return Error{scene.path, "nothing to bake: no triangle has an area"};
+  if (!std::holds_alternative<CornerReceivers>(receivers.basis)) return Error{scene.path, "transfer matrices are baked at vertices"};
   if (auto ok = check_options(options, matrix, materials, receivers.count()); !ok) return ok.error();
   BakeReport unwanted;
   BakeReport& r = report ? *report : unwanted;
@@ -472,7 +566,7 @@ Result<MatrixBake> bake_matrix(const Scene& scene, const Tracer& tracer, const R
   if (needed > options.memory)
     return Error{scene.path, "baking needs at least " + std::to_string(needed) + " bytes of working memory, and was allowed " + std::to_string(options.memory)};
   MatrixBaker baker{scene, receivers, materials, options, matrix, std::move(setup), progress, r};
-  return baker.run();
+  return matrix.simulate_paths && options.bounces > 0 ? baker.run_simulated() : baker.run();
 }
 
 }  // namespace lambent

@@ -7,6 +7,7 @@
 // Source: general-prt ("Transfer Matrix for Bounce k+1", "Final reflection"); triple-product-integrals.
 #include <lambent/bake/bake.h>
 #include <lambent/bake/response.h>
+#include <lambent/scene/reflection.h>
 
 namespace lambent {
 
@@ -19,6 +20,9 @@ struct MatrixOptions {
   int response_samples = 2048;  // directions a view when a BRDF is projected
   int scatter_rows = 8;         // rows at most with which surfaces scatter between bounces; as few as leave scatter_error
   double scatter_error = 0.01;
+  // Bounces by following every ray to its end instead of the recursion: each hit samples the BRDF there, not the rows of vertices
+  // around it, so it takes any path (caustics) and any tessellation, at the price of noise.
+  bool simulate_paths = false;
 };
 
 // The materials of a bake: which one each receiver has.
@@ -26,6 +30,7 @@ struct ReceiverMaterials {
   std::vector<LinearMaterial> materials;
   std::vector<uint16_t> of_receiver;
   std::vector<Mat3> frames;  // by receiver: tangent, bitangent, normal
+  Reflection reflection;     // the same surfaces between receivers, for simulated paths
 };
 
 struct MatrixBake {

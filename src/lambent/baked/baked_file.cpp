@@ -1,4 +1,5 @@
 #include <lambent/baked/baked_file.h>
+#include <lambent/baked/viewer_look.h>
 #include <lambent/basis/sh.h>
 #include <lambent/core/check.h>
 #include <lambent/core/half.h>
@@ -10,6 +11,7 @@
 #include <cmath>
 #include <cstring>
 #include <filesystem>
+#include <functional>
 #include <map>
 
 namespace lambent {
@@ -95,6 +97,21 @@ Result<std::span<const uint8_t>> view_bytes(const GltfChunks& chunks, size_t ind
   return chunks.binary.subspan(offset, *length);
 }
 
+// Values of type T, exactly `count`, that member `key` names.
+template <class T>
+Result<std::vector<T>> read_values(const GltfChunks& chunks, const json& object, const char* key, size_t count, const std::string& where) {
+  auto index = read_count(object, key, 0x7fffffff, where);
+  if (!index) return index.error();
+  auto bytes = view_bytes(chunks, *index, where);
+  if (!bytes) return bytes.error();
+  if (bytes->size() / sizeof(T) != count || bytes->size() % sizeof(T))
+    return Error{where, std::string("\"") + key + "\" holds " + std::to_string(bytes->size()) + " bytes where " + std::to_string(count * sizeof(T)) +
+                            " are due"};
+  std::vector<T> values(count);
+  if (count) std::memcpy(static_cast<void*>(values.data()), bytes->data(), bytes->size());
+  return values;
+}
+
 // The last reflection as bulk data: view maps as halves [map][y][x][row][a.r, a.g, a.b, b]; by receiver, the map and a frame's
 // tangent and normal.
 struct OutgoingBlobs {
@@ -110,19 +127,6 @@ OutgoingBlobs outgoing_blobs(const Outgoing& o) {
   b.map_of = o.map_of;
   for (const Mat3& f : o.frames) b.frames.push_back(f[0]), b.frames.push_back(f[2]);
   return b;
-}
-
-template <class T>
-Result<std::vector<T>> read_values(const GltfChunks& chunks, const json& object, const char* key, size_t count, const std::string& where) {
-  auto index = read_count(object, key, 0x7fffffff, where);
-  if (!index) return index.error();
-  auto bytes = view_bytes(chunks, *index, where);
-  if (!bytes) return bytes.error();
-  if (bytes->size() != count * sizeof(T))
-    return Error{where, std::string("\"") + key + "\" holds " + std::to_string(bytes->size()) + " bytes where " + std::to_string(count * sizeof(T)) + " belong"};
-  std::vector<T> values(count);
-  if (count) std::memcpy(static_cast<void*>(values.data()), bytes->data(), bytes->size());
-  return values;
 }
 
 Result<Outgoing> read_outgoing(const GltfChunks& chunks, const json& object, const Transfer& transfer, const std::string& where) {
@@ -169,43 +173,212 @@ Result<Outgoing> read_outgoing(const GltfChunks& chunks, const json& object, con
   return o;
 }
 
-Result<std::vector<uint32_t>> read_map(const GltfChunks& chunks, const json& part, const char* key, const Part& target,
-                                       size_t receivers, const std::string& where) {
-  auto index = read_count(part, key, 0x7fffffff, where);
-  if (!index) return index.error();
-  auto bytes = view_bytes(chunks, *index, where);
-  if (!bytes) return bytes.error();
-  std::vector<uint32_t> map(target.vertex_count);
-  if (bytes->size() != map.size() * 4) return Error{where, std::string("\"") + key + "\" does not have one entry a vertex"};
-  if (!map.empty()) std::memcpy(map.data(), bytes->data(), bytes->size());
-  for (uint32_t r : map)
+// Precision, channels and the bulk data of a transfer whose light, rows and receivers are set.
+template <class T>
+Result<void> read_transfer_data(const GltfChunks& chunks, const MappedFile& file, const json& object, T& t, const std::string& where) {
+  const auto precision = object.find("precision");
+  const bool half = precision != object.end() && *precision == "half";
+  if (!half && (precision == object.end() || *precision != "single")) return Error{where, "\"precision\" must be half or single"};
+  auto channels = read_count(object, "channels", 3, where), view = read_count(object, "bufferView", 0x7fffffff, where);
+  for (const auto* count : {&channels, &view})
+    if (!*count) return count->error();
+  if (*channels != 1 && *channels != 3) return Error{where, "\"channels\" is out of range"};
+  t.channels = int(*channels), t.precision = half ? Precision::half : Precision::single;
+  auto data = view_bytes(chunks, *view, where);
+  if (!data) return data.error();
+  if (data->size() != t.bytes())
+    return Error{where, "the transfer holds " + std::to_string(data->size()) + " bytes where its header makes " + std::to_string(t.bytes())};
+  if (reinterpret_cast<uintptr_t>(data->data()) % t.value_bytes()) return Error{where, "the transfer is not aligned"};
+  t.data = *data;
+  t.storage = std::make_shared<MappedFile>(file);
+  return {};
+}
+
+Result<LatticeTransfer> read_lattice(const GltfChunks& chunks, const MappedFile& file, const json& object, const LightBasis& light, const std::string& where) {
+  if (!object.is_object()) return Error{where, "is not an object"};
+  LatticeTransfer l;
+  for (const char* key : {"min", "max"}) {
+    const auto corner = object.find(key);
+    if (corner == object.end() || !corner->is_array() || corner->size() != 3) return Error{where, std::string("\"") + key + "\" is not three numbers"};
+    for (size_t k = 0; k < 3; ++k) {
+      const json& x = (*corner)[k];
+      if (!x.is_number() || !(std::abs(x.get<double>()) <= 1e9)) return Error{where, std::string("\"") + key + "\" is not three numbers within 1e9"};
+      (key[1] == 'i' ? l.lattice.min : l.lattice.max)[int(k)] = x.get<float>();
+    }
+  }
+  for (int k = 0; k < 3; ++k)
+    if (l.lattice.min[k] > l.lattice.max[k]) return Error{where, "its box is empty"};
+  const auto points = object.find("points");
+  if (points == object.end() || !points->is_array() || points->size() != 3) return Error{where, "\"points\" is not three numbers"};
+  for (size_t k = 0; k < 3; ++k) {
+    const json& n = (*points)[k];
+    if (!n.is_number_unsigned() || n.get<uint64_t>() < 1 || n.get<uint64_t>() > uint64_t(max_lattice_points))
+      return Error{where, "an axis must have from 1 to " + std::to_string(max_lattice_points) + " points"};
+    (k == 0 ? l.lattice.nx : k == 1 ? l.lattice.ny : l.lattice.nz) = n.get<int>();
+  }
+  auto order = read_count(object, "order", size_t(max_sh_order), where);
+  if (!order) return order.error();
+  if (*order < 1) return Error{where, "its order is 0"};
+  l.order = int(*order);
+  l.transfer.light = light, l.transfer.rows = sh_count(l.order), l.transfer.receivers = l.lattice.count();
+  if (auto ok = read_transfer_data(chunks, file, object, l.transfer, where); !ok) return ok.error();
+  auto valid = read_values<uint8_t>(chunks, object, "valid", l.lattice.count(), where);
+  if (!valid) return valid.error();
+  l.valid = std::move(*valid);
+  return l;
+}
+
+Result<std::vector<uint32_t>> read_receivers(const GltfChunks& chunks, const json& object, const char* key, size_t count, size_t receivers,
+                                             const std::string& where) {
+  auto map = read_values<uint32_t>(chunks, object, key, count, where);
+  if (!map) return map.error();
+  for (uint32_t r : *map)
     if (r != none && r >= receivers) return Error{where, "receiver " + std::to_string(r) + " is out of range"};
   return map;
 }
 
-// What all kinds share: bulk data first, then the maps of receivers, then `more`. `describe` makes the kind's header; it is given the
-// first of `more`'s views.
+// What parts hold, by the kind of receivers: vertices, a receiver a vertex; patches, a receiver a triangle; texels, a place in the
+// atlas a vertex, two floats.
+enum class Kind { vertices, texels, patches };
+const char* const kind_names[] = {"vertices", "texels", "patches"};
+
+// The bytes of one side of every part; none where the whole side has no receivers.
+std::vector<std::vector<uint8_t>> side_bytes(const Scene& scene, const Receivers& receivers, bool back) {
+  std::vector<std::vector<uint8_t>> out;
+  auto copy = [&](auto values) {
+    const auto bytes = bytes_of(values);
+    out.emplace_back(bytes.begin(), bytes.end());
+  };
+  if (const auto* texels = std::get_if<TexelReceivers>(&receivers.basis)) {
+    const auto& side = back ? texels->back : texels->front;
+    if (side.empty()) return out;
+    std::vector<Vec2> at(scene.positions.size(), Vec2(0));
+    for (size_t i = 0; i < side.size(); ++i)
+      if (side[i].part != none)
+        for (size_t k = 0; k < 3; ++k) at[scene.triangles[i].v[k]] = side[i].at[k];
+    for (const Part& part : scene.parts) copy(std::span<const Vec2>(at).subspan(part.first_vertex, part.vertex_count));
+  } else if (const auto* patches = std::get_if<PatchReceivers>(&receivers.basis)) {
+    const auto& side = back ? patches->back : patches->front;
+    if (side.empty()) return out;
+    std::vector<uint32_t> map(side.size());
+    for (size_t i = 0; i < side.size(); ++i) map[i] = side[i].receiver;
+    for (const Part& part : scene.parts) copy(std::span<const uint32_t>(map).subspan(part.first_triangle, part.triangle_count));
+  } else {
+    const auto& map = back ? receivers.back : receivers.front;
+    if (map.empty()) return out;
+    for (const Part& part : scene.parts) copy(std::span<const uint32_t>(map).subspan(part.first_vertex, part.vertex_count));
+  }
+  return out;
+}
+
+// Gathers the parts' sides into a spatial basis.
+struct SurfaceReader {
+  const GltfChunks& chunks;
+  Baked& baked;
+  size_t receivers;
+  Kind kind = Kind::vertices;
+  int width = 0, height = 0;
+  std::vector<uint32_t> texels, front, back;  // back: empty until a part has one
+  std::vector<Vec2> front_at, back_at;
+
+  Result<void> begin(const json& extension, const std::string& where) {
+    const auto surface = extension.find("surface");
+    if (surface != extension.end()) {
+      if (!surface->is_object() || !surface->contains("kind")) return Error{where, "\"surface\" has no kind"};
+      const auto name = std::find_if(std::begin(kind_names), std::end(kind_names), [&](const char* n) { return (*surface)["kind"] == n; });
+      if (name == std::end(kind_names)) return Error{where, "receivers of this kind are not known to this program"};
+      kind = Kind(name - std::begin(kind_names));
+    }
+    if (kind == Kind::texels) {
+      auto w = read_count(*surface, "width", 1 << 16, where), h = read_count(*surface, "height", 1 << 16, where);
+      if (!w) return w.error();
+      if (!h) return h.error();
+      if (*w < 1 || *h < 1) return Error{where, "the atlas is empty"};
+      auto map = read_receivers(chunks, *surface, "texels", *w * *h, receivers, where);
+      if (!map) return map.error();
+      width = int(*w), height = int(*h), texels = std::move(*map);
+    }
+    if (kind == Kind::texels) front_at.assign(elements(), Vec2(0));
+    else front.assign(elements(), none);
+    return {};
+  }
+  size_t elements() const { return kind == Kind::patches ? baked.scene.triangles.size() : baked.scene.positions.size(); }
+
+  Result<void> read_part(const json& entry, const Part& part, const std::string& where) {
+    const size_t first = kind == Kind::patches ? part.first_triangle : part.first_vertex;
+    const size_t count = kind == Kind::patches ? part.triangle_count : part.vertex_count;
+    for (const char* side : {"front", "back"}) {
+      const bool is_back = side[0] == 'b';
+      if (is_back && !entry.contains("back")) continue;
+      if (kind == Kind::texels) {
+        auto at = read_values<Vec2>(chunks, entry, side, count, where);
+        if (!at) return at.error();
+        for (Vec2 p : *at)
+          if (!(p.x >= 0 && p.x <= float(width) && p.y >= 0 && p.y <= float(height))) return Error{where, "a place lies outside the atlas"};
+        if (is_back && back_at.empty()) back_at.assign(elements(), Vec2(0));
+        std::copy(at->begin(), at->end(), (is_back ? back_at : front_at).begin() + ptrdiff_t(first));
+      } else {
+        auto map = read_receivers(chunks, entry, side, count, receivers, where);
+        if (!map) return map.error();
+        if (is_back && back.empty()) back.assign(elements(), none);
+        std::copy(map->begin(), map->end(), (is_back ? back : front).begin() + ptrdiff_t(first));
+      }
+    }
+    return {};
+  }
+
+  void finish() {
+    const Scene& scene = baked.scene;
+    if (kind == Kind::texels) {
+      baked.basis = texel_receivers(scene, width, height, front_at, back_at, std::move(texels));
+    } else if (kind == Kind::patches) {
+      PatchReceivers patches;
+      patches.front.resize(front.size()), patches.back.resize(back.size());
+      for (size_t i = 0; i < front.size(); ++i) patches.front[i] = {front[i], scene.triangles[i].part};
+      for (size_t i = 0; i < back.size(); ++i) patches.back[i] = {back[i], scene.triangles[i].part};
+      baked.basis = std::move(patches);
+    } else {
+      baked.basis = corner_receivers(scene, front, back);
+      baked.front = std::move(front), baked.back = std::move(back);
+    }
+  }
+};
+
+// What all kinds share: bulk data first, then the maps of receivers, then `more`. `describe` makes the kind's header, the extension's
+// "transfer", and what else the extension has; it is given the first of `more`'s views.
 Result<void> save(const std::string& path, const Scene& scene, const Receivers& receivers, std::span<const uint8_t> data,
-                  const std::vector<GltfBlob>& more, const std::string& provenance, const std::function<json(int first_more)>& describe) {
+                  const std::vector<GltfBlob>& more, const ViewerLook* look, const std::string& provenance,
+                  const std::function<void(json& extension, int first_more)>& describe) {
+  const auto front = side_bytes(scene, receivers, false), back = side_bytes(scene, receivers, true);
+  const auto* texels = std::get_if<TexelReceivers>(&receivers.basis);
   std::vector<GltfBlob> blobs{{data, 64}};
-  for (const auto* map : {&receivers.front, &receivers.back})
-    if (!map->empty())
-      for (const Part& part : scene.parts)
-        blobs.push_back({bytes_of(std::span<const uint32_t>(*map).subspan(part.first_vertex, part.vertex_count)), 4});
+  for (const auto* side : {&front, &back})
+    for (const auto& bytes : *side) blobs.push_back({bytes, 4});
+  const size_t texels_blob = blobs.size();
+  if (texels) blobs.push_back({bytes_of(std::span<const uint32_t>(texels->texels)), 4});
   const int more_view = int(blobs.size());
   blobs.insert(blobs.end(), more.begin(), more.end());
+  LookWriter look_writer(scene, receivers, look);
+  look_writer.add_blobs(blobs);
   return save_glb(path, scene, blobs, [&](json& document, const GltfPlaces& places) {
     json extension;
     extension["version"] = baked_file_version;
-    extension["transfer"] = describe(places.first_view + more_view);
+    describe(extension, places.first_view + more_view);
     extension["transfer"]["bufferView"] = places.first_view;
     json parts = json::array();
     for (size_t i = 0; i < scene.parts.size(); ++i) {
       json part{{"node", places.part_nodes[i]}, {"primitive", places.part_primitives[i]}, {"front", places.first_view + 1 + int(i)}};
-      if (!receivers.back.empty()) part["back"] = places.first_view + 1 + int(scene.parts.size() + i);
+      if (!back.empty()) part["back"] = places.first_view + 1 + int(scene.parts.size() + i);
       parts.push_back(std::move(part));
     }
     extension["parts"] = std::move(parts);
+    if (texels) {
+      extension["surface"] = {{"kind", "texels"}, {"width", texels->width}, {"height", texels->height},
+                              {"texels", places.first_view + int(texels_blob)}};
+    } else if (std::holds_alternative<PatchReceivers>(receivers.basis)) {
+      extension["surface"] = {{"kind", "patches"}};
+    }
+    look_writer.write(document, places);
     extension["provenance"] = json::parse(provenance, nullptr, false);
     LAMBENT_CHECK(!extension["provenance"].is_discarded());
     document["extensions"][extension_name] = std::move(extension);
@@ -222,16 +395,22 @@ json header(const char* kind, int channels, Precision precision, size_t receiver
 }  // namespace
 
 Result<void> save_baked(const std::string& path, const Scene& scene, const Receivers& receivers, const Transfer& transfer,
-                        const std::string& provenance, const Outgoing* outgoing) {
-  LAMBENT_CHECK(transfer.rows == (outgoing ? outgoing->rows() : 1));
+                        const std::string& provenance, const BakedExtras& extras) {
+  const Outgoing* outgoing = extras.outgoing;
+  const LatticeTransfer* lattice = extras.lattice;
+  LAMBENT_CHECK(!lattice || (lattice->transfer.columns() == transfer.columns() && lattice->valid.size() == lattice->lattice.count()));
+  LAMBENT_CHECK(transfer.rows == (outgoing ? outgoing->rows() : directional_rows(extras.directional)));
   const OutgoingBlobs last = outgoing ? outgoing_blobs(*outgoing) : OutgoingBlobs{};
   std::vector<GltfBlob> more;
   if (outgoing) {
     more.push_back({bytes_of(std::span<const Vec3>(last.frames)), 4});
     if (!last.maps.empty()) more.push_back({bytes_of(std::span<const uint16_t>(last.maps)), 4}), more.push_back({bytes_of(std::span<const uint16_t>(last.map_of)), 4});
   }
-  return save(path, scene, receivers, transfer.data, more, provenance, [&](int first) {
-    json t = header(outgoing ? "matrix" : "diffuse", transfer.channels, transfer.precision, transfer.receivers);
+  const int lattice_at = int(more.size());
+  if (lattice) more.push_back({lattice->transfer.data, 64}), more.push_back({lattice->valid, 4});
+  return save(path, scene, receivers, transfer.data, more, extras.look, provenance, [&](json& extension, int first) {
+    json& t = extension["transfer"] = header(outgoing ? "matrix" : "diffuse", transfer.channels, transfer.precision, transfer.receivers);
+    if (extras.directional != DirectionalKind::none) t["directional"] = directional_name(extras.directional);
     write_light(t, transfer.light);
     if (outgoing) {
       t["rows"] = transfer.rows;
@@ -243,17 +422,26 @@ Result<void> save_baked(const std::string& path, const Scene& scene, const Recei
         o["grid"] = outgoing->maps[0].grid, o["mapCount"] = outgoing->maps.size(), o["maps"] = first + 1, o["mapOf"] = first + 2;
       }
     }
-    return t;
+    if (lattice) {
+      const Lattice& l = lattice->lattice;
+      extension["lattice"] = {{"min", {l.min.x, l.min.y, l.min.z}},
+                              {"max", {l.max.x, l.max.y, l.max.z}},
+                              {"points", {l.nx, l.ny, l.nz}},
+                              {"order", lattice->order},
+                              {"channels", lattice->transfer.channels},
+                              {"precision", lattice->transfer.precision == Precision::half ? "half" : "single"},
+                              {"bufferView", first + lattice_at},
+                              {"valid", first + lattice_at + 1}};
+    }
   });
 }
 
 Result<void> save_baked(const std::string& path, const Scene& scene, const Receivers& receivers, const ZonalTransfer& transfer,
                         const std::string& provenance) {
-  return save(path, scene, receivers, transfer.data, {}, provenance, [&](int) {
-    json t = header("zonal", transfer.channels, transfer.precision, transfer.receivers);
+  return save(path, scene, receivers, transfer.data, {}, nullptr, provenance, [&](json& extension, int) {
+    json& t = extension["transfer"] = header("zonal", transfer.channels, transfer.precision, transfer.receivers);
     write_light(t, {.order = transfer.order});
     t["lobeCount"] = transfer.lobes;
-    return t;
   });
 }
 
@@ -285,45 +473,34 @@ Result<Baked> load_baked(const MappedFile& file, const std::string& path) {
   auto text = [&](const char* key) { return t->contains(key) && (*t)[key].is_string() ? (*t)[key].get<std::string>() : ""; };
   const bool is_matrix = text("kind") == "matrix", is_zonal = text("kind") == "zonal";
   if (!is_matrix && !is_zonal && text("kind") != "diffuse") return Error{where, "transfer of kind \"" + text("kind") + "\" is not known to this program"};
-  if (text("precision") != "half" && text("precision") != "single") return Error{where, "\"precision\" must be half or single"};
   auto light = read_light(*t, where);
   if (!light) return light.error();
-  auto channels = read_count(*t, "channels", 3, where);
   auto receivers = read_count(*t, "receivers", 0xfffffffe, where);
-  auto view = read_count(*t, "bufferView", 0x7fffffff, where);
-  for (const auto* count : {&channels, &receivers, &view})
-    if (!*count) return count->error();
-  if (*channels != 1 && *channels != 3) return Error{where, "\"channels\" is out of range"};
-  const Precision precision = text("precision") == "half" ? Precision::half : Precision::single;
-  auto data = view_bytes(*chunks, *view, where);
-  if (!data) return data.error();
-  // The bulk data of either kind, in place.
-  auto attach = [&](auto& transfer) -> Result<void> {
-    transfer.channels = int(*channels), transfer.receivers = *receivers, transfer.precision = precision;
-    if (data->size() != transfer.bytes())
-      return Error{where, "the transfer holds " + std::to_string(data->size()) + " bytes where its header makes " + std::to_string(transfer.bytes())};
-    if (reinterpret_cast<uintptr_t>(data->data()) % transfer.value_bytes()) return Error{where, "the transfer is not aligned"};
-    transfer.data = *data;
-    transfer.storage = std::make_shared<MappedFile>(file);
-    return {};
-  };
+  if (!receivers) return receivers.error();
+  if (t->contains("directional")) {
+    const auto kind = directional_kind(text("directional"));
+    if (!kind) return Error{where, "directional light \"" + text("directional") + "\" is not known to this program"};
+    baked.directional = *kind;
+  }
   if (is_zonal) {
     auto lobes = read_count(*t, "lobeCount", size_t(max_stored_lobes), where);
     if (!lobes) return lobes.error();
     if (*lobes < 1) return Error{where, "there are no lobes"};
     if (light->order < 1 || light->count() != size_t(sh_count(light->order))) return Error{where, "zonal transfer is of spherical harmonics alone"};
     ZonalTransfer& zonal = baked.zonal.emplace();
-    zonal.order = light->order, zonal.lobes = int(*lobes);
-    if (auto ok = attach(zonal); !ok) return ok.error();
+    zonal.order = light->order, zonal.lobes = int(*lobes), zonal.receivers = *receivers;
+    if (auto ok = read_transfer_data(*chunks, file, *t, zonal, where); !ok) return ok.error();
   } else {
-    baked.transfer.light = std::move(*light);
+    baked.transfer.light = std::move(*light), baked.transfer.receivers = *receivers;
     if (is_matrix) {
       auto rows = read_count(*t, "rows", 2 * sh_count(max_sh_order), where);
       if (!rows) return rows.error();
       if (*rows < 1) return Error{where, "the transfer has no rows"};
       baked.transfer.rows = int(*rows);
+    } else {
+      baked.transfer.rows = directional_rows(baked.directional);
     }
-    if (auto ok = attach(baked.transfer); !ok) return ok.error();
+    if (auto ok = read_transfer_data(*chunks, file, *t, baked.transfer, where); !ok) return ok.error();
   }
   if (is_matrix) {
     if (!t->contains("outgoing") || !(*t)["outgoing"].is_object()) return Error{where, "\"outgoing\" is missing"};
@@ -331,12 +508,18 @@ Result<Baked> load_baked(const MappedFile& file, const std::string& path) {
     if (!outgoing) return outgoing.error();
     baked.outgoing = std::move(*outgoing);
   }
+  if (const auto object = extension.find("lattice"); object != extension.end()) {
+    auto lattice = read_lattice(*chunks, file, *object, baked.transfer.light, where + ": lattice");
+    if (!lattice) return lattice.error();
+    baked.lattice = std::move(*lattice);
+  }
 
   const std::string folder = std::filesystem::path(path).parent_path().string();
   auto scene = load_gltf(file, path, folder.empty() ? "." : folder);
   if (!scene) return scene.error();
   baked.scene = std::move(*scene);
-  baked.front.assign(baked.scene.positions.size(), none);
+  SurfaceReader surface{*chunks, baked, *receivers, Kind::vertices, 0, 0, {}, {}, {}, {}, {}};
+  if (auto ok = surface.begin(extension, where); !ok) return ok.error();
   const auto parts = extension.find("parts");
   if (parts == extension.end() || !parts->is_array()) return Error{where, "\"parts\" is missing"};
   std::map<std::pair<size_t, size_t>, const json*> by_place;
@@ -350,15 +533,9 @@ Result<Baked> load_baked(const MappedFile& file, const std::string& path) {
     const auto entry = by_place.find({size_t(part.node), size_t(part.primitive)});
     const std::string place = where + ": node " + std::to_string(part.node) + ", primitive " + std::to_string(part.primitive);
     if (entry == by_place.end()) return Error{place, "has no receivers"};
-    for (const char* side : {"front", "back"}) {
-      const bool is_back = side[0] == 'b';
-      if (is_back && !entry->second->contains("back")) continue;
-      auto map = read_map(*chunks, *entry->second, side, part, *receivers, place);
-      if (!map) return map.error();
-      if (is_back && baked.back.empty()) baked.back.assign(baked.scene.positions.size(), none);
-      std::copy(map->begin(), map->end(), (is_back ? baked.back : baked.front).begin() + part.first_vertex);
-    }
+    if (auto ok = surface.read_part(*entry->second, part, place); !ok) return ok.error();
   }
+  surface.finish();
   const auto provenance = extension.find("provenance");
   baked.provenance = provenance == extension.end() ? "{}" : provenance->dump(-1, ' ', false, json::error_handler_t::replace);
   return baked;

@@ -4,7 +4,9 @@
 #include <lambent/core/file.h>
 #include <lambent/receivers/receivers.h>
 #include <lambent/scene/scene.h>
+#include <lambent/transfer/lattice.h>
 #include <lambent/transfer/outgoing.h>
+#include <lambent/transfer/directional.h>
 #include <lambent/transfer/transfer.h>
 #include <lambent/transfer/zonal_transfer.h>
 
@@ -17,17 +19,35 @@ inline constexpr int baked_file_version = 1;
 
 struct Baked {
   Scene scene;
-  std::vector<uint32_t> front, back;  // receiver of each scene vertex, by side, as in Receivers
+  std::vector<uint32_t> front, back;  // receiver of each scene vertex, by side, as in Receivers; of vertex receivers alone
+  SpatialBasis basis;                 // how values between receivers interpolate
   Transfer transfer;                  // read in place: its data lies in the mapped file
-  std::optional<Outgoing> outgoing;   // the last reflection of a transfer matrix; none: diffuse transfer
+  std::optional<Outgoing> outgoing;   // the last reflection of a transfer matrix
+  DirectionalKind directional = DirectionalKind::none;  // what the rows of a directional lightmap are
+  std::optional<LatticeTransfer> lattice;  // light in free space, for the same light; its data lies in the mapped file too
   std::optional<ZonalTransfer> zonal;  // in place of `transfer`, which then has no receivers; read in place too
   std::string provenance;             // JSON text: inputs and their hashes, options, version, what the bake reported
 };
 
-// Errors: the disk's; more than 4 GiB, which a GLB cannot hold.
-// `outgoing` belongs to a transfer matrix; null for diffuse transfer.
+// What viewers without our extension are to show of a bake over texels: every surface glows with one picture over the atlas, the
+// light that leaves it, as an emissive texture of a black material. Lamps keep their own emission.
+struct ViewerLook {
+  std::vector<uint8_t> png;  // sRGB, of radiance / strength
+  float strength = 1;
+};
+
+// What some bakes have beside transfer.
+struct BakedExtras {
+  const Outgoing* outgoing = nullptr;                   // of a transfer matrix
+  DirectionalKind directional = DirectionalKind::none;  // of a directional lightmap
+  const ViewerLook* look = nullptr;
+  const LatticeTransfer* lattice = nullptr;             // light in free space, for the same light as the transfer
+};
+
+// With a look, primitives get materials for it, two-sided ones a second primitive for their backs; the scene's own materials stay
+// in the file, and loading finds them again. Errors: the disk's; more than 4 GiB, which a GLB cannot hold.
 Result<void> save_baked(const std::string& path, const Scene& scene, const Receivers& receivers, const Transfer& transfer,
-                        const std::string& provenance, const Outgoing* outgoing = nullptr);
+                        const std::string& provenance, const BakedExtras& extras = {});
 Result<void> save_baked(const std::string& path, const Scene& scene, const Receivers& receivers, const ZonalTransfer& transfer,
                         const std::string& provenance);
 

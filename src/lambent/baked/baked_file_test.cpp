@@ -1,6 +1,9 @@
 #include <lambent/baked/baked_file.h>
 #include <lambent/core/file.h>
 #include <lambent/core/random.h>
+#include <lambent/image/image.h>
+#include <lambent/receivers/atlas.h>
+#include <lambent/scene/gltf.h>
 #include <lambent/scene/procedural.h>
 
 #include <gtest/gtest.h>
@@ -90,7 +93,7 @@ TEST(BakedFile, MatricesComeBackWithTheirLastReflection) {
       store_receiver(w, r, values);
     }
     const TemporaryFile file("matrix.glb"), cut("matrix_cut.glb");
-    ASSERT_TRUE(save_baked(file.path, s.scene, s.receivers, w.transfer, "{}", &o));
+    ASSERT_TRUE(save_baked(file.path, s.scene, s.receivers, w.transfer, "{}", {.outgoing = &o}));
     auto back = load_baked(file.path);
     ASSERT_TRUE(back) << back.error().text();
     ASSERT_TRUE(back->outgoing);
@@ -108,6 +111,186 @@ TEST(BakedFile, MatricesComeBackWithTheirLastReflection) {
       ASSERT_TRUE(write_file_atomically(cut.path, {&piece, 1}));
       EXPECT_FALSE(load_baked(cut.path)) << length;
     }
+  }
+}
+
+// Replaces text in the JSON chunk by text of the same length.
+std::vector<uint8_t> edited(std::vector<uint8_t> bytes, const std::string& from, const std::string& to) {
+  EXPECT_EQ(from.size(), to.size());
+  const auto at = std::search(bytes.begin(), bytes.end(), from.begin(), from.end());
+  EXPECT_NE(at, bytes.end()) << from;
+  if (at != bytes.end()) std::copy(to.begin(), to.end(), at);
+  return bytes;
+}
+
+// A lightmap of one group over texels or patches: values that tell every receiver apart.
+struct Mapped {
+  Scene scene;
+  Receivers receivers;
+  WritableTransfer transfer;
+};
+Mapped small_map(bool texels) {
+  Mapped m;
+  m.scene = small_bake(1, Precision::half).scene;
+  m.scene.materials[0].emissive = Vec3(0, 2, 1);
+  if (texels) {
+    auto atlas = make_atlas(m.scene, {.texels_per_unit = 6});
+    EXPECT_TRUE(atlas);
+    m.receivers = make_texel_receivers(m.scene, *atlas);
+  } else {
+    m.receivers = make_patch_receivers(m.scene);
+  }
+  m.transfer = make_transfer({.groups = {"lamp"}}, 1, 3, m.receivers.count(), Precision::single);
+  for (size_t r = 0; r < m.receivers.count(); ++r) store_receiver(m.transfer, r, std::vector<float>{float(r), 1, -float(r)});
+  return m;
+}
+
+// All look-ups at one point of every triangle's sides.
+std::vector<double> look_ups(const Scene& scene, const SpatialBasis& basis) {
+  std::vector<double> out;
+  std::visit([&](const auto& b) {
+    for (uint32_t i = 0; i < scene.triangles.size(); ++i)
+      for (bool front : {true, false})
+        if (const auto* at = b.find(i, front))
+          b.spread(*at, 0.21f, 0.47f, [&](uint32_t r, float w) { out.push_back(double(r) + double(w)); });
+  }, basis);
+  return out;
+}
+
+TEST(BakedFile, KeepsTexelsAndPatchesAndWhatViewersShow) {
+  for (bool texels : {true, false}) {
+    const TemporaryFile file("map.glb");
+    const Mapped m = small_map(texels);
+    const Image picture(4, 4);
+    const ViewerLook look{*encode_png(picture, 0, ""), 3.5f};
+    ASSERT_TRUE(save_baked(file.path, m.scene, m.receivers, m.transfer.transfer, "{}", {.look = &look}));
+    auto back = load_baked(file.path);
+    ASSERT_TRUE(back) << back.error().text();
+    EXPECT_EQ(back->transfer.light.groups, std::vector<std::string>{"lamp"});
+    ASSERT_EQ(back->scene.triangles.size(), m.scene.triangles.size());  // backs for viewers are left out
+    EXPECT_EQ(back->scene.positions, m.scene.positions);
+    EXPECT_EQ(look_ups(back->scene, back->basis), look_ups(m.scene, m.receivers.basis));
+    // The scene's own materials are back, not the glowing ones.
+    for (size_t p = 0; p < m.scene.parts.size(); ++p) {
+      const Material &was = m.scene.materials[m.scene.parts[p].material], &is = back->scene.materials[back->scene.parts[p].material];
+      EXPECT_EQ(is.base_color, was.base_color);
+      EXPECT_EQ(is.emissive, was.emissive);
+    }
+    // To a viewer: lamps glow as before, the rest by the picture; the sheet has a second primitive for its back.
+    auto bytes = MappedFile::open(file.path);
+    auto chunks = split_gltf(bytes->bytes(), file.path);
+    ASSERT_TRUE(chunks);
+    size_t primitives = 0, glowing = 0, lamps = 0;
+    for (const auto& mesh : chunks->json["meshes"])
+      for (const auto& primitive : mesh["primitives"]) {
+        ++primitives;
+        const auto& material = chunks->json["materials"][primitive["material"].get<size_t>()];
+        if (!texels) continue;
+        EXPECT_TRUE(primitive["attributes"].contains("TEXCOORD_0"));
+        EXPECT_TRUE(primitive["attributes"].contains("TEXCOORD_1"));
+        EXPECT_EQ(material["doubleSided"], false);
+        glowing += material.contains("emissiveTexture");
+        lamps += !material.contains("emissiveTexture") && material["emissiveFactor"] == nlohmann::json({0.0, 1.0, 0.5});
+      }
+    EXPECT_EQ(primitives, texels ? 3u : 2u);
+    if (texels) {
+      EXPECT_EQ(glowing, 2u);
+      EXPECT_EQ(lamps, 1u);
+    }
+    // Baked again from the baked file: still the scene's own materials.
+    const TemporaryFile again("again.glb");
+    Mapped second{std::move(back->scene), m.receivers, m.transfer};
+    ASSERT_TRUE(save_baked(again.path, second.scene, second.receivers, second.transfer.transfer, "{}", {.look = &look}));
+    auto twice = load_baked(again.path);
+    ASSERT_TRUE(twice) << twice.error().text();
+    EXPECT_EQ(twice->scene.materials[twice->scene.parts[1].material].base_color, Vec3(0.2f, 0.5f, 0.7f));
+    EXPECT_EQ(twice->scene.triangles.size(), m.scene.triangles.size());
+  }
+}
+
+TEST(BakedFile, RefusesSurfacesThatLie) {
+  const TemporaryFile whole("surface.glb"), lying("lying.glb");
+  const Mapped m = small_map(true);
+  ASSERT_TRUE(save_baked(whole.path, m.scene, m.receivers, m.transfer.transfer, "{}"));
+  const std::vector<uint8_t> bytes = *read_file(whole.path);
+  const auto& texels = std::get<TexelReceivers>(m.receivers.basis);
+  const std::string width = "\"width\":" + std::to_string(texels.width);
+  std::string wider = width;
+  wider.back() = wider.back() == '9' ? '8' : char(wider.back() + 1);
+  for (const auto& [from, to] : {std::pair<std::string, std::string>{"\"kind\":\"texels\"", "\"kind\":\"pixels\""}, {width, wider}}) {
+    const auto changed = edited(bytes, from, to);
+    const std::span<const uint8_t> piece(changed);
+    ASSERT_TRUE(write_file_atomically(lying.path, {&piece, 1}));
+    EXPECT_FALSE(load_baked(lying.path)) << to;
+  }
+  for (size_t length = 0; length < bytes.size(); length += length < 256 ? 1 : 997) {
+    const std::span<const uint8_t> piece(bytes.data(), length);
+    ASSERT_TRUE(write_file_atomically(lying.path, {&piece, 1}));
+    EXPECT_FALSE(load_baked(lying.path)) << length;
+  }
+}
+
+LatticeTransfer small_lattice() {
+  LatticeTransfer l{{Vec3(-1, 0, -2), Vec3(1, 2.5f, 3), 3, 1, 2}, 2, {}, {1, 1, 0, 1, 1, 0}};
+  const WritableTransfer w = make_transfer({.order = 3}, 4, 3, 6, Precision::half);
+  Random random(12);
+  std::vector<float> values(w.transfer.receiver_values());
+  for (size_t p = 0; p < 6; ++p) {
+    for (float& v : values) v = random.next();
+    store_receiver(w, p, values);
+  }
+  l.transfer = w.transfer;
+  return l;
+}
+
+TEST(BakedFile, LightInFreeSpaceComesBack) {
+  const TemporaryFile file("lattice.glb"), lying("lattice_lie.glb"), cut("lattice_cut.glb");
+  const Small s = small_bake(1, Precision::single);
+  const LatticeTransfer l = small_lattice();
+  ASSERT_TRUE(save_baked(file.path, s.scene, s.receivers, s.transfer.transfer, "{}", {.lattice = &l}));
+  auto back = load_baked(file.path);
+  ASSERT_TRUE(back) << back.error().text();
+  ASSERT_TRUE(back->lattice);
+  EXPECT_EQ(back->lattice->lattice.min, l.lattice.min);
+  EXPECT_EQ(back->lattice->lattice.max, l.lattice.max);
+  EXPECT_EQ(back->lattice->lattice.count(), 6u);
+  EXPECT_EQ(back->lattice->lattice.nx, 3);
+  EXPECT_EQ(back->lattice->order, 2);
+  EXPECT_EQ(back->lattice->valid, l.valid);
+  EXPECT_EQ(back->lattice->transfer.channels, 3);
+  EXPECT_EQ(back->lattice->transfer.columns(), 9u);
+  EXPECT_TRUE(std::equal(back->lattice->transfer.data.begin(), back->lattice->transfer.data.end(), l.transfer.data.begin(), l.transfer.data.end()));
+  EXPECT_EQ(reinterpret_cast<uintptr_t>(back->lattice->transfer.data.data()) % 64, 0u);
+
+  const std::vector<uint8_t> bytes = *read_file(file.path);
+  const std::string text(bytes.begin(), bytes.end());
+  const size_t begin = text.find("\"lattice\":{"), end = text.find('}', begin);
+  ASSERT_NE(begin, std::string::npos);
+  const std::string object = text.substr(begin, end - begin);
+  const std::pair<std::string, std::string> lies[] = {{"\"points\":[3,1,2]", "\"points\":[3,2,2]"}, {"\"points\":[3,1,2]", "\"points\":[3,0,2]"},
+                                                      {"\"points\":[3,1,2]", "\"points\":[3,-1] "}, {"\"points\":[3,1,2]", "\"points\":[3,1  ]"},
+                                                      {"\"points\":[3,1,2]", "\"points\":[3,99] "}, {"\"order\":2", "\"order\":3"},
+                                                      {"\"order\":2", "\"order\":0"},               {"\"channels\":3", "\"channels\":1"},
+                                                      {"\"channels\":3", "\"channels\":2"},         {"\"precision\":\"half\"", "\"precision\":\"hal?\""},
+                                                      {"\"max\":[1.0,", "\"max\":[-9 ,"},           {"\"max\":[1.0,", "\"max\":[9e9,"},
+                                                      {"\"max\":[1.0,", "\"max\":[\"\" ,"},           {"\"min\"", "\"mid\""},
+                                                      {"\"valid\"", "\"vapid\""},                   {"\"bufferView\"", "\"bufferVeil\""}};
+  for (const auto& [from, to] : lies) {
+    const size_t at = object.find(from);
+    ASSERT_NE(at, std::string::npos) << from << " in " << object;
+    std::vector<uint8_t> changed = bytes;
+    std::copy(to.begin(), to.end(), changed.begin() + ptrdiff_t(begin + at));
+    const std::span<const uint8_t> piece(changed);
+    ASSERT_TRUE(write_file_atomically(lying.path, {&piece, 1}));
+    auto result = load_baked(lying.path);
+    ASSERT_FALSE(result) << to;
+    EXPECT_EQ(result.error().text().find('\n'), std::string::npos);
+    EXPECT_NE(result.error().text().find(lying.path), std::string::npos);
+  }
+  for (size_t length = 0; length < bytes.size(); length += 199) {
+    const std::span<const uint8_t> piece(bytes.data(), length);
+    ASSERT_TRUE(write_file_atomically(cut.path, {&piece, 1}));
+    EXPECT_FALSE(load_baked(cut.path)) << length;
   }
 }
 
@@ -130,15 +313,6 @@ TEST(BakedFile, RefusesEveryTruncation) {
     ASSERT_TRUE(write_file_atomically(cut.path, {&piece, 1}));
     EXPECT_FALSE(load_baked(cut.path)) << length;
   }
-}
-
-// Replaces text in the JSON chunk by text of the same length.
-std::vector<uint8_t> edited(std::vector<uint8_t> bytes, const std::string& from, const std::string& to) {
-  EXPECT_EQ(from.size(), to.size());
-  const auto at = std::search(bytes.begin(), bytes.end(), from.begin(), from.end());
-  EXPECT_NE(at, bytes.end()) << from;
-  if (at != bytes.end()) std::copy(to.begin(), to.end(), at);
-  return bytes;
 }
 
 TEST(BakedFile, RefusesHeadersThatLie) {

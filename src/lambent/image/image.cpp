@@ -212,6 +212,8 @@ Result<Image> load_stb(std::span<const uint8_t> bytes, ImageFormat format, const
   return p ? Result<Image>(decode_channels(p.get(), width, height, channels)) : failure();
 }
 
+}  // namespace
+
 Result<std::vector<uint8_t>> encode_png(const Image& image, float exposure, const std::string& path) {
   size_t channels = image.alpha.empty() ? 3 : 4;
   // stb counts bytes in int, with a filter byte a row and room for incompressible data.
@@ -233,8 +235,6 @@ Result<std::vector<uint8_t>> encode_png(const Image& image, float exposure, cons
     return Error{path, "PNG could not be encoded"};
   return encoded;
 }
-
-}  // namespace
 
 Result<void> check_image_size(uint64_t width, uint64_t height, size_t bytes, const std::string& path) {
   constexpr uint64_t free_pixels = uint64_t{1} << 22, pixels_a_byte = 8192;

@@ -47,9 +47,13 @@ Result<void> save_image(const std::string& path, const Image& image, float expos
 // than 8192 a byte, which no honest compressor reaches. Asked before memory is taken.
 Result<void> check_image_size(uint64_t width, uint64_t height, size_t bytes, const std::string& path);
 
-// The OpenEXR half of the two above, on bytes.
+// The OpenEXR half of the two above, on bytes. Single floats are for light: the sun is brighter than half floats go.
+enum class ExrPrecision { half, single };
 Result<Image> load_exr(std::span<const uint8_t> bytes, const std::string& path);
-Result<std::vector<uint8_t>> encode_exr(const Image& image, const std::string& path);
+Result<std::vector<uint8_t>> encode_exr(const Image& image, const std::string& path, ExrPrecision precision = ExrPrecision::half);
+
+// The bytes of a .png as save_image writes it; `path` names it in errors.
+Result<std::vector<uint8_t>> encode_png(const Image& image, float exposure, const std::string& path);
 
 // Matrix from linear RGB of other primaries and white (CIE x, y) to linear Rec. 709: through XYZ, with Bradford adaptation of
 // that white to D65. Errors: a y of 0, collinear primaries.

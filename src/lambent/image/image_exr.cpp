@@ -307,32 +307,46 @@ Result<Image> load_exr(std::span<const uint8_t> bytes, const std::string& path) 
   }
 }
 
-Result<std::vector<uint8_t>> encode_exr(const Image& image, const std::string& path) {
+namespace {
+
+// Interleaved pixels of one channel type, `bytes` a value, as a ZIP-compressed file.
+std::vector<uint8_t> encode_pixels(const Image& image, const std::string& path, Imf::PixelType type, const void* pixels, size_t bytes) {
+  const size_t channels = image.alpha.empty() ? 3 : 4, step = bytes * channels;
+  Imf::Header header(image.width, image.height);
+  header.compression() = Imf::ZIP_COMPRESSION;
+  Imf::FrameBuffer slices;
+  const char* names[] = {"R", "G", "B", "A"};
+  for (size_t c = 0; c < channels; ++c) {
+    header.channels().insert(names[c], Imf::Channel(type));
+    char* first = const_cast<char*>(static_cast<const char*>(pixels)) + c * bytes;  // only read by an OutputFile
+    slices.insert(names[c], Imf::Slice(type, first, step, step * size_t(image.width)));
+  }
+  MemoryOutput stream(path);
+  {
+    Imf::OutputFile file(stream, header, 0);
+    file.setFrameBuffer(slices);
+    file.writePixels(image.height);
+  }
+  return std::move(stream.bytes);
+}
+
+}  // namespace
+
+Result<std::vector<uint8_t>> encode_exr(const Image& image, const std::string& path, ExrPrecision precision) {
   constexpr float half_max = 65504;
-  size_t channels = image.alpha.empty() ? 3 : 4, count = image.rgb.size();
   auto to_half = [](float v) { return half(std::isfinite(v) ? std::fmin(std::fmax(v, -half_max), half_max) : v); };
+  auto interleave = [&](auto convert) {
+    std::vector<decltype(convert(0.0f))> pixels;
+    pixels.reserve(image.rgb.size() * 4);
+    for (size_t i = 0; i < image.rgb.size(); ++i) {
+      for (int c = 0; c < 3; ++c) pixels.push_back(convert(image.rgb[i][c]));
+      if (!image.alpha.empty()) pixels.push_back(convert(image.alpha[i]));
+    }
+    return pixels;
+  };
   try {
-    std::vector<half> pixels(count * channels);
-    for (size_t i = 0; i < count; ++i) {
-      for (size_t c = 0; c < 3; ++c) pixels[i * channels + c] = to_half(image.rgb[i][int(c)]);
-      if (channels == 4) pixels[i * channels + 3] = to_half(image.alpha[i]);
-    }
-    Imf::Header header(image.width, image.height);
-    header.compression() = Imf::ZIP_COMPRESSION;
-    Imf::FrameBuffer slices;
-    const char* names[] = {"R", "G", "B", "A"};
-    for (size_t c = 0; c < channels; ++c) {
-      size_t step = sizeof(half) * channels;
-      header.channels().insert(names[c], Imf::Channel(Imf::HALF));
-      slices.insert(names[c], Imf::Slice(Imf::HALF, reinterpret_cast<char*>(&pixels[c]), step, step * size_t(image.width)));
-    }
-    MemoryOutput stream(path);
-    {
-      Imf::OutputFile file(stream, header, 0);
-      file.setFrameBuffer(slices);
-      file.writePixels(image.height);
-    }
-    return std::move(stream.bytes);
+    if (precision == ExrPrecision::half) return encode_pixels(image, path, Imf::HALF, interleave(to_half).data(), sizeof(half));
+    return encode_pixels(image, path, Imf::FLOAT, interleave([](float v) { return v; }).data(), sizeof(float));
   } catch (const std::exception& e) {
     return Error{path, "OpenEXR could not be encoded: " + one_line(e.what(), path)};
   }

@@ -99,6 +99,20 @@ Bytes encoded(const Image& image) {
   return *bytes;
 }
 
+TEST(Exr, SingleRoundTripIsExactBeyondHalf) {
+  Image image(7, 4);
+  Random random(11);
+  for (Vec3& c : image.rgb)
+    for (int k = 0; k < 3; ++k) c[k] = 1e6f * float(random.next()) - 1e5f;
+  image.rgb[2] = {1.6e5f, 1e-20f, 3e30f};
+  auto bytes = encode_exr(image, "a.exr", ExrPrecision::single);
+  ASSERT_TRUE(bytes);
+  auto back = load_image(*bytes, "a.exr");
+  ASSERT_TRUE(back) << back.error().text();
+  EXPECT_EQ(back->rgb, image.rgb);
+  EXPECT_TRUE(back->alpha.empty());
+}
+
 TEST(Exr, HalfRoundTripIsExact) {
   Image image(5, 3);
   Random random(7);

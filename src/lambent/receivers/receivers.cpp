@@ -1,4 +1,5 @@
 #include <lambent/receivers/receivers.h>
+#include <lambent/scene/clean.h>
 
 #include <algorithm>
 #include <numeric>
@@ -49,6 +50,21 @@ uint64_t morton(Vec3 p, const Bounds& box) {
 }
 
 }  // namespace
+
+std::vector<uint32_t> curve_order(const std::vector<Vec3>& points, const Bounds& box) {
+  std::vector<uint32_t> order(points.size());
+  std::iota(order.begin(), order.end(), 0u);
+  std::vector<uint64_t> codes(points.size());
+  for (size_t i = 0; i < points.size(); ++i) codes[i] = morton(points[i], box);
+  std::sort(order.begin(), order.end(), [&](uint32_t a, uint32_t b) { return codes[a] != codes[b] ? codes[a] < codes[b] : a < b; });
+  return order;
+}
+
+float receiver_lift(Vec3 p, float size, float diagonal) {
+  const Vec3 magnitude = glm::abs(p);
+  const float smallest = rounding * (std::max({magnitude.x, magnitude.y, magnitude.z}) + diagonal);
+  return std::max(std::min(lift * size, lift_limit * diagonal), smallest);
+}
 
 Receivers make_vertex_receivers(const Scene& scene) {
   const size_t vertices = scene.positions.size();
@@ -118,11 +134,9 @@ Receivers make_vertex_receivers(const Scene& scene) {
   }
 
   const Bounds box = bounds(scene);
-  std::vector<uint32_t> order(welded.size());
-  std::iota(order.begin(), order.end(), 0u);
-  std::vector<uint64_t> codes(welded.size());
-  for (size_t i = 0; i < welded.size(); ++i) codes[i] = morton(welded[i].position, box);
-  std::sort(order.begin(), order.end(), [&](uint32_t a, uint32_t b) { return codes[a] != codes[b] ? codes[a] < codes[b] : a < b; });
+  std::vector<Vec3> places(welded.size());
+  for (size_t i = 0; i < welded.size(); ++i) places[i] = welded[i].position;
+  const std::vector<uint32_t> order = curve_order(places, box);
 
   Receivers r;
   r.origins.resize(welded.size()), r.normals.resize(welded.size());
@@ -131,18 +145,17 @@ Receivers make_vertex_receivers(const Scene& scene) {
   for (size_t i = 0; i < order.size(); ++i) {
     const Welded& w = welded[order[i]];
     rank[order[i]] = uint32_t(i);
-    const Vec3 magnitude = glm::abs(w.position);
-    const float smallest = rounding * (std::max({magnitude.x, magnitude.y, magnitude.z}) + diagonal);
     const float edge = std::isfinite(w.edge) ? w.edge : 0.0f;
     const Vec3 inward = w.inward - w.normal * glm::dot(w.inward, w.normal);
     // A border's sum is at most 2 long (a half-plane); a full ring's is about 0, and the inset fades with it.
-    r.origins[i] = w.position + w.normal * std::max(std::min(lift * edge, lift_limit * diagonal), smallest) +
+    r.origins[i] = w.position + w.normal * receiver_lift(w.position, edge, diagonal) +
                    inward * (0.5f * std::min(inset * edge, inset_limit * diagonal));
     r.normals[i] = w.normal;
   }
   r.front.assign(vertices, none);
   if (any_back) r.back.assign(vertices, none);
   for (size_t i = 0; i < sides.size(); ++i) (sides[i].back ? r.back : r.front)[sides[i].vertex] = rank[receiver_of_side[i]];
+  r.basis = corner_receivers(scene, r.front, r.back);
   return r;
 }
 
@@ -160,6 +173,105 @@ CornerReceivers corner_receivers(const Scene& scene, const std::vector<uint32_t>
     if (!back.empty() && t.two_sided) fill(t, back, corners.back[i]);
   }
   return corners;
+}
+
+Receivers make_patch_receivers(const Scene& scene) {
+  struct Side {
+    uint32_t triangle;
+    bool back;
+  };
+  std::vector<Side> sides;
+  std::vector<Vec3> centres;
+  bool any_back = false;
+  for (uint32_t i = 0; i < scene.triangles.size(); ++i) {
+    const Triangle& t = scene.triangles[i];
+    const Vec3 n = area_normal(scene, t);
+    if (!(glm::dot(n, n) > 0)) continue;
+    const Vec3 centre = (scene.positions[t.v[0]] + scene.positions[t.v[1]] + scene.positions[t.v[2]]) / 3.0f;
+    for (int back = 0; back <= int(t.two_sided); ++back) sides.push_back({i, back == 1}), centres.push_back(centre);
+    any_back |= t.two_sided;
+  }
+  const Bounds box = bounds(scene);
+  const float diagonal = box.diagonal();
+  PatchReceivers patches;
+  patches.front.resize(scene.triangles.size());
+  if (any_back) patches.back.resize(scene.triangles.size());
+  Receivers r;
+  for (uint32_t i : curve_order(centres, box)) {
+    const Triangle& t = scene.triangles[sides[i].triangle];
+    const Vec3 n = glm::normalize(area_normal(scene, t)) * (sides[i].back ? -1.0f : 1.0f);
+    float edge = INFINITY;
+    for (int k = 0; k < 3; ++k) edge = std::min(edge, glm::length(scene.positions[t.v[k]] - scene.positions[t.v[(k + 1) % 3]]));
+    (sides[i].back ? patches.back : patches.front)[sides[i].triangle] = {uint32_t(r.count()), t.part};
+    r.origins.push_back(centres[i] + n * receiver_lift(centres[i], edge, diagonal));
+    r.normals.push_back(n);
+  }
+  r.basis = std::move(patches);
+  return r;
+}
+
+namespace {
+
+using Pairs = std::vector<std::pair<uint32_t, uint32_t>>;
+
+void add_neighbours(const Scene&, const CornerReceivers& corners, const std::vector<uint8_t>& marked, Pairs& pairs) {
+  for (const auto* side : {&corners.front, &corners.back})
+    for (const Corners& c : *side) {
+      if (c.receiver[0] == none) continue;
+      for (int k = 0; k < 3; ++k)
+        for (int j = 1; j < 3; ++j) {
+          const uint32_t r = c.receiver[size_t(k)], other = c.receiver[size_t(k + j) % 3];
+          if (marked[r] && r != other) pairs.push_back({r, other});
+        }
+    }
+}
+
+void add_neighbours(const Scene&, const TexelReceivers& t, const std::vector<uint8_t>& marked, Pairs& pairs) {
+  const int step[4][2] = {{1, 0}, {-1, 0}, {0, 1}, {0, -1}};
+  for (int y = 0; y < t.height; ++y)
+    for (int x = 0; x < t.width; ++x) {
+      const uint32_t r = t.texels[size_t(y) * size_t(t.width) + size_t(x)];
+      if (r == none || !marked[r]) continue;
+      for (auto [dx, dy] : step) {
+        if (x + dx < 0 || y + dy < 0 || x + dx >= t.width || y + dy >= t.height) continue;
+        const uint32_t other = t.texels[size_t(y + dy) * size_t(t.width) + size_t(x + dx)];
+        if (other != none) pairs.push_back({r, other});
+      }
+    }
+}
+
+// Patches along an edge are paired in a row, so that a thousand sheets on one edge do not make a million pairs.
+void add_neighbours(const Scene& scene, const PatchReceivers& patches, const std::vector<uint8_t>& marked, Pairs& pairs) {
+  const std::vector<uint32_t> ids = number_positions(scene.positions).ids;
+  for (const auto* side : {&patches.front, &patches.back}) {
+    std::vector<std::tuple<uint32_t, uint32_t, uint32_t>> edges;
+    for (size_t i = 0; i < side->size(); ++i) {
+      if ((*side)[i].receiver == none) continue;
+      for (int k = 0; k < 3; ++k) {
+        const uint32_t a = ids[scene.triangles[i].v[k]], b = ids[scene.triangles[i].v[(k + 1) % 3]];
+        edges.push_back({std::min(a, b), std::max(a, b), (*side)[i].receiver});
+      }
+    }
+    std::sort(edges.begin(), edges.end());
+    for (size_t i = 1; i < edges.size(); ++i) {
+      const auto [a, b, r] = edges[i - 1];
+      const auto [c, d, other] = edges[i];
+      if (a != c || b != d || r == other) continue;
+      if (marked[r]) pairs.push_back({r, other});
+      if (marked[other]) pairs.push_back({other, r});
+    }
+  }
+}
+
+}  // namespace
+
+std::vector<std::pair<uint32_t, uint32_t>> neighbours_of(const Scene& scene, const SpatialBasis& basis,
+                                                         const std::vector<uint8_t>& marked) {
+  Pairs pairs;
+  std::visit([&](const auto& b) { add_neighbours(scene, b, marked, pairs); }, basis);
+  std::sort(pairs.begin(), pairs.end());
+  pairs.erase(std::unique(pairs.begin(), pairs.end()), pairs.end());
+  return pairs;
 }
 
 }  // namespace lambent

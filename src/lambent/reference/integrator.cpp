@@ -5,6 +5,7 @@
 #include <lambent/core/random.h>
 #include <lambent/core/sampling.h>
 #include <lambent/reference/integrator.h>
+#include <lambent/scene/lights.h>
 
 #include <bit>
 
@@ -37,7 +38,38 @@ uint32_t shuffled(uint32_t x, uint32_t seed) {
   return reverse_bits(x);
 }
 
+// Pairs of random numbers for lamps lie beyond those of the paths.
+constexpr uint32_t lamp_pairs = 1000;
+
 bool black(Vec3 c) { return c.x == 0 && c.y == 0 && c.z == 0; }
+
+// Light that reaches the vertex straight from the scene's lamps and leaves towards wo.
+Vec3 light_from_lamps(const Integrator& integrator, const PathVertex& vertex, const PathSamples& samples, uint32_t depth) {
+  Vec3 sum(0);
+  // Shadow rays end at the lamp: a nearer hit hides it. Lamps are met from afar, so a relative margin will do.
+  constexpr float margin = 1e-4f;
+  auto reaches = [&](Vec3 d, float distance) {
+    Hit hit;
+    if (!integrator.intersector.nearest(vertex.position, d, hit)) return true;
+    return glm::length(surface_point(*integrator.scene, hit).position - vertex.position) >= distance * (1 - margin);
+  };
+  const EmitterSample e = sample_emitter(integrator.emitters, vertex.position, samples.pair(lamp_pairs + 2 * depth).x,
+                                         samples.pair(lamp_pairs + 2 * depth + 1));
+  if (e.pdf > 0 && glm::dot(vertex.ng, e.direction) > 0) {
+    const Vec3 wi = e.direction * vertex.frame, f = evaluate(vertex.brdf, wi, vertex.wo);
+    if (!black(f) && reaches(e.direction, e.distance)) {
+      const float weight = integrator.strategy == Strategy::combined ? mis_weight(e.pdf, pdf(vertex.brdf, wi, vertex.wo)) : 1.0f;
+      sum += f * e.radiance * (wi.z * weight / e.pdf);
+    }
+  }
+  for (const PunctualLight& light : integrator.scene->lights) {
+    const LampArrival a = arriving(light, vertex.position);
+    if (black(a.irradiance) || glm::dot(vertex.ng, a.direction) <= 0) continue;
+    const Vec3 wi = a.direction * vertex.frame, f = evaluate(vertex.brdf, wi, vertex.wo);
+    if (!black(f) && reaches(a.direction, a.distance)) sum += f * a.irradiance * wi.z;
+  }
+  return sum;
+}
 
 }  // namespace
 
@@ -49,12 +81,13 @@ Vec2 PathSamples::pair(uint32_t dimension) const {
   return sobol_owen(shuffled(index, uint32_t(seed)) & mask, uint32_t(seed >> 32));
 }
 
-Result<Integrator> make_integrator(const Scene& scene, const Environment& env, int bounces, Strategy strategy,
-                                   const Reflection& reflection) {
+Result<Integrator> make_integrator(const Scene& scene, const Environment& env, int bounces, Strategy strategy, const Reflection& reflection,
+                                   bool lamps) {
   if (env.image.width < 1 || env.image.height < 1) return Error{env.name, "the environment is empty"};
   Result<Intersector> intersector = Intersector::make(scene);
   if (!intersector) return intersector.error();
-  return Integrator{&scene, &env, *intersector, make_environment_sampler(env), bounces, strategy, reflection};
+  return Integrator{&scene, &env, *intersector, make_environment_sampler(env), bounces, strategy, reflection, lamps,
+                    lamps ? make_emitter_sampler(scene) : EmitterSampler{}};
 }
 
 bool make_vertex(const Integrator& integrator, const Hit& hit, Vec3 d, PathVertex& vertex) {
@@ -95,6 +128,8 @@ Vec3 exit_radiance_estimate(const Integrator& integrator, PathVertex vertex, con
         }
       }
     }
+    if (integrator.lamps && strategy != Strategy::brdf_only)
+      sum += throughput * light_from_lamps(integrator, vertex, samples, uint32_t(depth));
     const bool last = depth == integrator.bounces;
     if (last && strategy == Strategy::light_only) break;
     BrdfSample next = sample(vertex.brdf, wo, samples.pair(uint32_t(2 * depth + 2)));
@@ -104,11 +139,18 @@ Vec3 exit_radiance_estimate(const Integrator& integrator, PathVertex vertex, con
     throughput *= next.weight;
     if (black(throughput)) break;
     Hit hit;
-    bool leaves = last ? !integrator.intersector.occluded(vertex.position, d)
-                       : !integrator.intersector.nearest(vertex.position, d, hit);
+    bool leaves = last && !integrator.lamps ? !integrator.intersector.occluded(vertex.position, d)
+                                            : !integrator.intersector.nearest(vertex.position, d, hit);
     if (leaves && strategy != Strategy::light_only) {
       float weight = strategy == Strategy::combined ? mis_weight(next.pdf, environment_pdf(integrator.sampler, d)) : 1.0f;
       sum += throughput * radiance(*integrator.environment, d) * weight;
+    }
+    if (integrator.lamps && !leaves && strategy != Strategy::light_only) {
+      const Vec3 radiance = emitted(*integrator.scene, hit, d);
+      if (!black(radiance)) {
+        const float weight = strategy == Strategy::combined ? mis_weight(next.pdf, emitter_pdf(integrator.emitters, hit, vertex.position, d)) : 1.0f;
+        sum += throughput * radiance * weight;
+      }
     }
     if (leaves || last || !make_vertex(integrator, hit, d, vertex)) break;
   }

@@ -3,6 +3,7 @@
 #include <lambent/brdf/brdf.h>
 #include <lambent/light/environment.h>
 #include <lambent/reference/intersect.h>
+#include <lambent/reference/lamps.h>
 #include <lambent/reference/path_tracer.h>
 #include <lambent/scene/reflection.h>
 #include <lambent/scene/scene.h>
@@ -40,9 +41,11 @@ struct Integrator {
   int bounces;
   Strategy strategy;
   Reflection reflection;
+  bool lamps;  // the scene's own; light_only and combined alone know punctual ones
+  EmitterSampler emitters;
 };
-Result<Integrator> make_integrator(const Scene& scene, const Environment& env, int bounces,
-                                   Strategy strategy = Strategy::combined, const Reflection& reflection = {});
+Result<Integrator> make_integrator(const Scene& scene, const Environment& env, int bounces, Strategy strategy = Strategy::combined,
+                                   const Reflection& reflection = {}, bool lamps = false);
 
 // False where nothing reflects towards -d: the back of a one-sided triangle.
 bool make_vertex(const Integrator& integrator, const Hit& hit, Vec3 d, PathVertex& vertex);
@@ -50,7 +53,7 @@ bool make_vertex(const Integrator& integrator, const Hit& hit, Vec3 d, PathVerte
 // A white Lambert receiver.
 PathVertex white_vertex(Vec3 origin, Vec3 n);
 
-// An estimate of the radiance that leaves `vertex` towards wo. Uses pairs 1 and up.
+// An estimate of the radiance that leaves `vertex` towards wo, without what it emits itself. Uses pairs 1 and up.
 Vec3 exit_radiance_estimate(const Integrator& integrator, PathVertex vertex, const PathSamples& samples);
 
 // The picture, as path_trace() returns it; `options` must be in range.

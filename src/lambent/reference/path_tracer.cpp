@@ -48,7 +48,8 @@ Result<ReferenceImage> render(const Integrator& integrator, const Camera& camera
       PathVertex vertex;
       if (integrator.intersector.nearest_visible(rays.eye, d, hit)) {
         ++covered;
-        if (make_vertex(integrator, hit, d, vertex)) value = exit_radiance_estimate(integrator, vertex, samples);
+        if (integrator.lamps) value += emitted(*integrator.scene, hit, d);
+        if (make_vertex(integrator, hit, d, vertex)) value += exit_radiance_estimate(integrator, vertex, samples);
       } else if (options.background) {
         value = radiance_bilinear(*integrator.environment, d);
       }
@@ -81,16 +82,17 @@ Result<ReferenceImage> path_trace(const Scene& scene, const Environment& env, co
     return Error{"", "the picture's size must be between 1 and 2^28 pixels"};
   if (options.spp < 1 || options.spp > 1 << 20) return Error{"", "paths a pixel must be between 1 and 2^20"};
   if (options.bounces < 0 || options.bounces > 64) return Error{"", "bounces must be between 0 and 64"};
-  Result<reference::Integrator> integrator = reference::make_integrator(scene, env, options.bounces, reference::Strategy::combined, options.reflection);
+  Result<reference::Integrator> integrator =
+      reference::make_integrator(scene, env, options.bounces, reference::Strategy::combined, options.reflection, options.lamps);
   if (!integrator) return integrator.error();
   return reference::render(*integrator, camera, options, progress);
 }
 
 std::vector<ExitRadiance> exit_radiances(const Scene& scene, const Environment& env, std::span<const Vec3> origins,
                                          std::span<const Vec3> normals, int bounces, int paths, uint32_t seed,
-                                         const Reflection& reflection) {
+                                         const Reflection& reflection, bool lamps) {
   LAMBENT_CHECK(origins.size() == normals.size() && paths >= 1 && bounces >= 0);
-  Result<reference::Integrator> integrator = reference::make_integrator(scene, env, bounces, reference::Strategy::combined, reflection);
+  Result<reference::Integrator> integrator = reference::make_integrator(scene, env, bounces, reference::Strategy::combined, reflection, lamps);
   LAMBENT_CHECK(bool(integrator));
   // Blocks of paths, summed in order afterwards: one point keeps all cores busy, and the sum does not depend on them.
   constexpr size_t block = 1024;
@@ -115,8 +117,8 @@ std::vector<ExitRadiance> exit_radiances(const Scene& scene, const Environment& 
   return results;
 }
 
-Vec3 exit_radiance(const Scene& scene, const Environment& env, Vec3 origin, Vec3 n, int bounces, int paths, uint32_t seed) {
-  return exit_radiances(scene, env, {&origin, 1}, {&n, 1}, bounces, paths, seed)[0].mean;
+Vec3 exit_radiance(const Scene& scene, const Environment& env, Vec3 origin, Vec3 n, int bounces, int paths, uint32_t seed, bool lamps) {
+  return exit_radiances(scene, env, {&origin, 1}, {&n, 1}, bounces, paths, seed, {}, lamps)[0].mean;
 }
 
 }  // namespace lambent

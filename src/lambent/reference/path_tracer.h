@@ -2,7 +2,8 @@
 // Ground truth: an independent path tracer. It shares scenes, BRDFs and environments with the rest, and no transport code, no
 // basis and no ray tracing: an error there must not cancel against itself here.
 //
-// What it computes. Light is distant: the environment, constant over each texel. Emissive materials are ignored. At a hit point
+// What it computes. Light is distant: the environment, constant over each texel; and, where asked for, the scene's own lamps:
+// emissive materials (their factor, on the sides that are not black) and punctual lights. At a hit point
 // with interpolated normal n, turned to the side that is seen, exit radiance is the integral of f L max(0, n . wi) over the
 // directions wi above the true (geometric) surface; what lies along wi is decided by true geometry. With k bounces, light
 // reaches the first hit directly or after reflection at 1, 2, ... k other points. No path is cut short or dropped at random.
@@ -23,6 +24,7 @@ struct ReferenceOptions {
   bool background = true;         // the environment behind the scene, interpolated; false: black, and the image has alpha
   uint32_t seed = 1;
   Reflection reflection;  // of the surfaces
+  bool lamps = false;             // the scene's own give light too, and are seen
 };
 
 struct ReferenceImage {
@@ -43,7 +45,8 @@ Result<ReferenceImage> path_trace(const Scene& scene, const Environment& env, co
 // Exit radiance of a white (albedo 1) Lambert receiver at a point with unit normal n, lit by the scene and environment: what a
 // diffuse bake stores times the light. For tests. `origin` must be clear of the surface. `bounces` and `seed` as above; the
 // noise at different points is independent.
-Vec3 exit_radiance(const Scene& scene, const Environment& env, Vec3 origin, Vec3 n, int bounces, int paths, uint32_t seed);
+Vec3 exit_radiance(const Scene& scene, const Environment& env, Vec3 origin, Vec3 n, int bounces, int paths, uint32_t seed,
+                   bool lamps = false);
 
 // The same at many points, and the variance of each mean (as ReferenceImage::variance). One preparation serves all points.
 // `reflection` is of the scene's surfaces, not of the receivers.
@@ -52,6 +55,6 @@ struct ExitRadiance {
 };
 std::vector<ExitRadiance> exit_radiances(const Scene& scene, const Environment& env, std::span<const Vec3> origins,
                                          std::span<const Vec3> normals, int bounces, int paths, uint32_t seed,
-                                         const Reflection& reflection = {});
+                                         const Reflection& reflection = {}, bool lamps = false);
 
 }  // namespace lambent

@@ -19,6 +19,10 @@ struct Relit {
     const float* v = values.data() + (receiver / transfer_block * size_t(rows) + size_t(row)) * (3 * transfer_block) + receiver % transfer_block;
     return {v[0], v[transfer_block], v[2 * transfer_block]};
   }
+  void set(size_t receiver, int row, Vec3 value) {
+    float* v = values.data() + (receiver / transfer_block * size_t(rows) + size_t(row)) * (3 * transfer_block) + receiver % transfer_block;
+    v[0] = value.x, v[transfer_block] = value.y, v[2 * transfer_block] = value.z;
+  }
 };
 
 // light: coefficients of radiance, at least as many as there are columns (harmonics of higher order are cut off). Sizes `out` on

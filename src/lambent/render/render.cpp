@@ -1,7 +1,9 @@
+#include <lambent/core/check.h>
 #include <lambent/core/parallel.h>
 #include <lambent/core/random.h>
 #include <lambent/core/sampling.h>
 #include <lambent/render/render.h>
+#include <lambent/scene/lights.h>
 
 namespace lambent {
 namespace {
@@ -53,22 +55,33 @@ Result<Image> render_surfaces(const Scene& scene, const Tracer& tracer, const Ca
   return image;
 }
 
-Result<Image> render(const Scene& scene, const Tracer& tracer, const CornerReceivers& corners, const Relit& relit,
+Result<Image> render(const Scene& scene, const Tracer& tracer, const SpatialBasis& basis, const Relit& relit,
                      const Camera& camera, const RenderOptions& options, Progress* progress) {
+  LAMBENT_CHECK(options.outgoing ? relit.rows == options.outgoing->rows() : relit.rows == directional_rows(options.directional));
   return render_surfaces(scene, tracer, camera, options, [&]() -> SurfaceShade {
-    return [&, weights = std::vector<ViewWeights>(options.outgoing ? size_t(relit.rows) : 0)](const Hit& hit, Vec3 direction) mutable {
-      const auto* corner = corners.find(hit.triangle, hit.front);
-      if (!corner) return Vec3(0.0f);
-      const auto& r = corner->receiver;
-      const float b[3] = {1 - hit.u - hit.v, hit.u, hit.v};
-      const Vec3 colour = options.albedo ? albedo(scene, scene.triangles[hit.triangle], hit.u, hit.v) : Vec3(1);
-      if (!options.outgoing) return colour * (b[0] * relit.at(r[0]) + b[1] * relit.at(r[1]) + b[2] * relit.at(r[2]));
+    return [&, weights = std::vector<ViewWeights>(size_t(relit.rows))](const Hit& hit, Vec3 direction) mutable {
+      const Triangle& triangle = scene.triangles[hit.triangle];
       Vec3 sum(0.0f);
-      for (int k = 0; k < 3; ++k) {
-        evaluate_outgoing(*options.outgoing, r[k], -direction, weights);
-        sum += b[k] * reflect_rows(weights, colour, [&](size_t row) { return relit.at(r[k], int(row)); });
-      }
-      return sum;
+      if (!options.emission.empty() && emits(scene, triangle, hit.front)) sum += options.emission[scene.parts[triangle.part].material];
+      const Vec3 colour = options.albedo ? albedo(scene, triangle, hit.u, hit.v) : Vec3(1);
+      std::array<Vec3, 9> rows{};
+      std::visit([&](const auto& b) {
+        const auto* at = b.find(hit.triangle, hit.front);
+        if (!at) return;
+        b.spread(*at, hit.u, hit.v, [&](uint32_t receiver, float weight) {
+          if (options.outgoing) {  // each receiver reflects in its own frame
+            evaluate_outgoing(*options.outgoing, receiver, -direction, weights);
+            sum += weight * reflect_rows(weights, colour, [&](size_t row) { return relit.at(receiver, int(row)); });
+            return;
+          }
+          for (int row = 0; row < relit.rows; ++row) rows[size_t(row)] += weight * relit.at(receiver, row);
+        });
+      }, basis);
+      if (options.directional == DirectionalKind::none) return sum + colour * rows[0];
+      const Vec3 face = normalize_or(area_normal(scene, triangle), Vec3(0, 1, 0)) * (hit.front ? 1.0f : -1.0f);
+      Vec3 n = normalize_or(interpolate(scene.normals, triangle, hit.u, hit.v), face);
+      if (glm::dot(n, face) < 0) n = -n;
+      return sum + colour * evaluate_directional_light(options.directional, rows, receiver_frame(n), n);
     };
   }, progress);
 }

@@ -8,6 +8,7 @@
 #include <lambent/relight/relight.h>
 #include <lambent/trace/tracer.h>
 #include <lambent/transfer/outgoing.h>
+#include <lambent/transfer/directional.h>
 
 #include <functional>
 
@@ -19,10 +20,12 @@ struct RenderOptions {
   const Environment* background = nullptr;  // null: black, and the image has alpha (coverage)
   bool albedo = true;             // false: as if everything were white
   const Outgoing* outgoing = nullptr;  // the last reflection of transfer matrices; null: diffuse
+  DirectionalKind directional = DirectionalKind::none;  // what relit's rows are; shaded with the interpolated normal
+  std::vector<Vec3> emission;     // radiance of each material's surfaces as lamps that are seen; empty: none are
 };
 
 // One-sided triangles are absent from behind, as in any glTF viewer. Errors: cancelled.
-Result<Image> render(const Scene& scene, const Tracer& tracer, const CornerReceivers& corners, const Relit& relit,
+Result<Image> render(const Scene& scene, const Tracer& tracer, const SpatialBasis& basis, const Relit& relit,
                      const Camera& camera, const RenderOptions& options, Progress* progress = nullptr);
 
 // What render() is made of: primary rays, and `shade` for the radiance of what they meet, in the direction that they came along.

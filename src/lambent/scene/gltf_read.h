@@ -92,6 +92,9 @@ struct GltfPose {
 };
 bool read_pose(GltfCheck& check, const GltfDocument& document, GltfPose& pose);
 
+// Lamps of shown nodes, KHR_lights_punctual, into scene.lights.
+bool read_lights(GltfCheck& check, const GltfDocument& document, const GltfPose& pose, Scene& scene);
+
 // Takes vertices of one primitive of one node to the world: by the node's transform, or by the joints alone where it is skinned.
 struct GltfPlacement {
   glm::dmat4 world{1.0};

@@ -174,7 +174,11 @@ class PrimitiveReader {
     GltfWhere where{"mesh", mesh, "primitive", number};
     const uint64_t mode = check_.integer(primitive, "mode", triangle_list, triangle_fan + 1, where);
     const Json* attributes = check_.object(primitive, "attributes", where);
+    // What a bake left for other viewers: primitives of backs, and materials in place of the scene's own.
+    const Json* extensions = check_.object(primitive, "extensions", where);
+    const Json* baked = extensions ? check_.object(*extensions, "LAMBENT_transfer", where) : nullptr;
     if (!check_.ok()) return false;
+    if (baked && check_.boolean(*baked, "viewerOnly", false, where)) return true;
     if (mode < triangle_list) return ++skipped_, true;
     if (!attributes) return check_.fail(where, "has no attributes");
     auto position_index = check_.index(*attributes, "POSITION", gltf_count(document_.json, "accessors"), where);
@@ -211,7 +215,8 @@ class PrimitiveReader {
     part.node = int(node), part.primitive = int(number);
     part.first_vertex = uint32_t(scene_.positions.size()), part.vertex_count = uint32_t(positions.count);
     part.first_triangle = uint32_t(scene_.triangles.size());
-    auto material = check_.index(primitive, "material", gltf_count(document_.json, "materials"), where);
+    const bool has_own = baked && baked->contains("ownMaterial");
+    auto material = check_.index(has_own ? *baked : primitive, has_own ? "ownMaterial" : "material", gltf_count(document_.json, "materials"), where);
     if (!check_.ok()) return false;
     part.material = material ? uint32_t(*material) : default_material();
     if (!read_vertices(check_, document_, *attributes, positions, targets, placement, where, scene_.positions, scene_.normals) ||
@@ -331,7 +336,7 @@ bool read_scene(GltfCheck& check, GltfDocument& document, std::span<const uint8_
   if (!check.ok() || !read_pose(check, document, pose)) return false;
   for (const GltfMaterial& m : materials) scene.materials.push_back(m.material);
   PrimitiveReader primitives(check, document, pose, scene);
-  if (!primitives.read_all()) return false;
+  if (!primitives.read_all() || !read_lights(check, document, pose, scene)) return false;
   if (scene.triangles.empty()) return check.fail({}, "no triangles");
   bool usable = false;
   for (size_t t = 0; t < scene.triangles.size() && !usable; ++t) {

@@ -1,6 +1,7 @@
 // glTF 2.0 specification (ISO/IEC 12113): the writer. KHR_texture_transform, KHR_materials_emissive_strength.
 #include <lambent/core/check.h>
 #include <lambent/scene/gltf.h>
+#include <lambent/scene/gltf_materials.h>
 #include <lambent/scene/gltf_write.h>
 #include <lambent/scene/textures.h>
 
@@ -52,6 +53,29 @@ class MaterialWriter {
     if (!m.name.empty()) json["name"] = m.name;
     add_emission(json, m.emissive);
     return materials_[{index, two_sided}] = out_.push("materials", std::move(json));
+  }
+
+  // Base colour and emission of the document's materials as the scene has them now, where somebody changed them.
+  void update_document() {
+    GltfCheck check("");
+    const std::vector<GltfMaterial> before = read_materials(check, *scene_.document);
+    for (size_t i = 0; i < before.size(); ++i) {
+      const Material& m = scene_.materials[i];
+      Json& json = out_.list("materials")[i];
+      if (m.base_color != before[i].material.base_color) {
+        Json* extensions = json.contains("extensions") ? &json["extensions"] : nullptr;
+        const bool gloss = extensions && extensions->contains("KHR_materials_pbrSpecularGlossiness");
+        Json& holder = gloss ? (*extensions)["KHR_materials_pbrSpecularGlossiness"] : json["pbrMetallicRoughness"];
+        Json& factor = holder[gloss ? "diffuseFactor" : "baseColorFactor"];
+        const Json alpha = factor.is_array() && factor.size() == 4 ? factor[3] : Json(1.0f);
+        factor = Json::array({m.base_color.x, m.base_color.y, m.base_color.z, alpha});
+      }
+      if (m.emissive != before[i].material.emissive) {
+        json.erase("emissiveTexture"), json.erase("emissiveFactor");
+        if (json.contains("extensions")) json["extensions"].erase("KHR_materials_emissive_strength");
+        add_emission(json, m.emissive);
+      }
+    }
   }
 
  private:
@@ -410,6 +434,7 @@ Result<void> save_glb(const std::string& path, const Scene& scene, std::span<con
   }
 
   MaterialWriter materials(out, scene, path);
+  if (scene.document) materials.update_document();
   for (size_t p = 0; p < scene.parts.size(); ++p) {
     const Part& part = scene.parts[p];
     if (part.node >= 0 || part.vertex_count == 0) continue;

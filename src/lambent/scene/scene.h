@@ -42,6 +42,17 @@ struct Material {
   bool double_sided = true;  // false: seen from the front only; its back is black to light and absent to cameras
 };
 
+// A lamp without a surface (KHR_lights_punctual), in world space.
+struct PunctualLight {
+  enum class Kind : uint8_t { point, spot, directional };
+  std::string name;
+  Kind kind = Kind::point;
+  Vec3 position{0.0f};        // not of directional ones
+  Vec3 direction{0, 0, -1};   // unit, the way that spots and directional lights shine
+  Vec3 intensity{1.0f};       // linear; flux per steradian, or, of directional ones, irradiance of a surface that faces it
+  float inner_cone = 0, outer_cone = pi / 4;  // radians from the axis: full within the inner, nothing beyond the outer
+};
+
 struct Triangle {
   uint32_t v[3];  // vertex indices, counter-clockwise seen from the front
   uint32_t part;
@@ -78,6 +89,7 @@ struct Scene {
   std::vector<Part> parts;          // in order of their runs, covering all vertices and triangles
   std::vector<Material> materials;  // at least one
   std::vector<Texture> textures;
+  std::vector<PunctualLight> lights;
 
   std::shared_ptr<const GltfDocument> document;  // null unless the input was glTF
   std::vector<std::string> warnings;             // one line each, in the order found

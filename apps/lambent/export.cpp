@@ -1,0 +1,84 @@
+#include "commands.h"
+#include "web.h"
+
+#include <fmt/format.h>
+#include <unistd.h>
+
+#include <filesystem>
+
+namespace lambent::tool {
+namespace {
+
+namespace fs = std::filesystem;
+
+struct ExportCommand {
+  WebOptions web;
+  std::string folder;
+};
+
+// The folder of an earlier export, or nothing: all else is somebody's work.
+Result<void> check_target(const fs::path& target) {
+  std::error_code status;
+  if (!fs::exists(fs::symlink_status(target, status))) {
+    const fs::path parent = target.has_parent_path() ? target.parent_path() : fs::path(".");
+    if (!fs::is_directory(parent, status)) return Error{target.string(), "cannot be written: no folder " + parent.string()};
+    return {};
+  }
+  if (!fs::is_directory(target, status)) return Error{target.string(), "is there already and is not a folder"};
+  if (!fs::is_empty(target, status) && !fs::is_regular_file(target / "lambent.json", status))
+    return Error{target.string(), "is there already and is no earlier export: it is left alone"};
+  return {};
+}
+
+// All files into a new folder beside the target, which then takes its place.
+Result<void> write_folder(const fs::path& target, const WebFiles& files, const Progress& progress) {
+  const fs::path fresh = target.string() + ".part" + std::to_string(::getpid()), old = target.string() + ".old" + std::to_string(::getpid());
+  std::error_code status;
+  const auto give_up = [&](Error error) {
+    std::error_code ignored;
+    fs::remove_all(fresh, ignored);
+    return error;
+  };
+  for (const auto& [name, file] : files) {
+    if (progress.cancelled()) return give_up({"", "cancelled"});
+    fs::create_directories((fresh / name).parent_path(), status);
+    if (status) return give_up({target.string(), "cannot be written: " + status.message()});
+    if (auto ok = write_file_atomically((fresh / name).string(), file.bytes()); !ok) return give_up(ok.error());
+  }
+  const bool replaces = fs::exists(target, status);
+  if (replaces) fs::rename(target, old, status);
+  if (!status) fs::rename(fresh, target, status);
+  if (status) {
+    const std::string why = status.message();
+    if (replaces && !fs::exists(target, status)) fs::rename(old, target, status);
+    return give_up({target.string(), "cannot be written: " + why});
+  }
+  if (replaces) fs::remove_all(old, status);
+  return {};
+}
+
+int run_export(Context& context, const ExportCommand& o) {
+  fs::path target = fs::path(o.folder).lexically_normal();
+  if (!target.has_filename()) target = target.parent_path();  // "site/"
+  if (auto ok = check_target(target); !ok) return fail(ok.error());
+  auto files = web_files(o.web);
+  if (!files) return fail(files.error());
+  if (auto ok = write_folder(target, *files, context.progress); !ok) return fail(ok.error());
+  size_t bytes = 0;
+  for (const auto& [name, file] : *files) bytes += file.bytes().size();
+  if (context.json) print_json({{"output", target.string()}, {"files", files->size()}, {"bytes", bytes}});
+  else fmt::print("{}\n  {} files, {}: any web server can show it\n", target.string(), files->size(), human_bytes(double(bytes)));
+  return success;
+}
+
+}  // namespace
+
+void add_export(CLI::App& app, Run& run) {
+  auto o = std::make_shared<ExportCommand>();
+  CLI::App* c = app.add_subcommand("export", "Write a baked file in another form");
+  o->web.add_to(*c);
+  c->add_option("--web", o->folder, "Folder to write: the page that `view` serves, with its data, for any web server")->required();
+  c->callback([o, &run] { run = [o](Context& context) { return run_export(context, *o); }; });
+}
+
+}  // namespace lambent::tool

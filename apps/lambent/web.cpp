@@ -1,0 +1,125 @@
+#include "web.h"
+
+#include "options.h"
+
+#include <lambent/baked/baked_file.h>
+#include <lambent/image/image.h>
+
+#include <algorithm>
+#include <filesystem>
+
+namespace lambent::tool {
+namespace {
+
+namespace fs = std::filesystem;
+
+// Where scripts/web (or an install) leaves the page, seen from the program: share/lambent/web of its prefix, or build/web of the
+// source tree that it was built in.
+Result<fs::path> page_folder() {
+  std::error_code status;
+  const fs::path program = fs::read_symlink("/proc/self/exe", status).parent_path();
+  for (const char* place : {"../share/lambent/web", "../../web"}) {
+    const fs::path folder = (program / place).lexically_normal();
+    if (fs::is_regular_file(folder / "index.html", status)) return folder;
+  }
+  return Error{(program / "../../web").lexically_normal().string(), "the web page is not there: build it with scripts/web"};
+}
+
+const char* media_type(const std::string& extension) {
+  static const std::map<std::string, const char*> types{
+      {"html", "text/html; charset=utf-8"}, {"js", "text/javascript; charset=utf-8"}, {"css", "text/css; charset=utf-8"},
+      {"json", "application/json"},         {"svg", "image/svg+xml"},                 {"png", "image/png"},
+      {"glb", "model/gltf-binary"},         {"wasm", "application/wasm"},             {"exr", "image/x-exr"}};
+  const auto known = types.find(extension);
+  return known == types.end() ? "application/octet-stream" : known->second;
+}
+
+Result<void> add_page(WebFiles& files) {
+  auto folder = page_folder();
+  if (!folder) return folder.error();
+  std::error_code status;
+  for (const auto& entry : fs::recursive_directory_iterator(*folder, status)) {
+    if (!entry.is_regular_file(status)) continue;
+    const std::string path = entry.path().string();
+    auto file = MappedFile::open(path);
+    if (!file) return file.error();
+    files[entry.path().lexically_relative(*folder).generic_string()] = {media_type(file_extension(path)), std::move(*file)};
+  }
+  return {};
+}
+
+Result<void> add_baked(WebFiles& files, const std::string& path, const std::string& name) {
+  auto file = MappedFile::open(path);
+  if (!file) return file.error();
+  if (auto whole = load_baked(*file, path); !whole) return whole.error();
+  files[name] = {media_type("glb"), std::move(*file)};
+  return {};
+}
+
+Result<void> add_map(WebFiles& files, const Image& image, const std::string& path, const std::string& name) {
+  auto bytes = encode_exr(image, path, ExrPrecision::single);
+  if (!bytes) return bytes.error();
+  files[name] = {media_type("exr"), std::string(bytes->begin(), bytes->end())};
+  return {};
+}
+
+}  // namespace
+
+std::string_view WebFile::bytes() const {
+  if (const auto* text = std::get_if<std::string>(&content)) return *text;
+  const auto mapped = std::get<MappedFile>(content).bytes();
+  return {reinterpret_cast<const char*>(mapped.data()), mapped.size()};
+}
+
+void WebOptions::add_to(CLI::App& command) {
+  command.add_option("baked", baked, "Baked file, from `lambent bake`")->required();
+  command.add_option("--env", env, "Environments to choose from, each as for render; the option may be repeated")->allow_extra_args(false)->take_all();
+  command.add_option("--compare", compare, "A second baked file, to wipe against: with fewer bounces, say");
+  command.add_option("--reference", reference, "A picture of the same camera, to wipe against: .exr, or .png at exposure 0");
+  command.add_option("--camera", camera, "EX,EY,EZ,TX,TY,TZ,FOV to begin with; or auto")->capture_default_str();
+  command.add_option("--env-rotate", rotate, "YAW,PITCH,ROLL to begin with, degrees about +Y, +X, +Z");
+  command.add_option("--exposure", exposure, "Stops to begin with")->check(CLI::Range(-6.0f, 6.0f))->capture_default_str();
+}
+
+Result<WebFiles> web_files(const WebOptions& options) {
+  nlohmann::json manifest{{"name", fs::path(options.baked).filename().string()}, {"baked", "data/scene.glb"}, {"exposure", options.exposure}};
+  auto camera = parse_camera(options.camera);
+  if (!camera) return camera.error();
+  if (*camera) {
+    const Camera& c = **camera;
+    manifest["camera"] = {c.eye.x, c.eye.y, c.eye.z, c.target.x, c.target.y, c.target.z, c.fov};
+  }
+  if (!options.rotate.empty()) {
+    auto turn = parse_numbers(options.rotate, 3, "--env-rotate");
+    if (!turn) return turn.error();
+    manifest["rotate"] = *turn;
+  }
+  WebFiles files;
+  if (auto ok = add_page(files); !ok) return ok.error();
+  if (auto ok = add_baked(files, options.baked, "data/scene.glb"); !ok) return ok.error();
+  if (!options.compare.empty()) {
+    if (auto ok = add_baked(files, options.compare, "data/compare.glb"); !ok) return ok.error();
+    manifest["compare"] = "data/compare.glb";
+  }
+  if (!options.reference.empty()) {
+    auto image = load_image(options.reference);
+    if (!image) return image.error();
+    image->alpha.clear();
+    if (auto ok = add_map(files, *image, options.reference, "data/reference.exr"); !ok) return ok.error();
+    manifest["reference"] = "data/reference.exr";
+  }
+  manifest["environments"] = nlohmann::json::array();
+  const std::vector<std::string> specs = options.env.empty() ? std::vector<std::string>{"sky:elevation=35,azimuth=45"} : options.env;
+  for (size_t i = 0; i < specs.size(); ++i) {
+    auto env = load_light({specs[i], ""});
+    if (!env) return env.error();
+    const std::string name = "data/environment-" + std::to_string(i) + ".exr";
+    if (auto ok = add_map(files, env->image, specs[i], name); !ok) return ok.error();
+    const bool is_file = !specs[i].starts_with("sky:") && !specs[i].starts_with("uniform:");
+    manifest["environments"].push_back({{"name", is_file ? env->name : specs[i]}, {"file", name}});
+  }
+  files["lambent.json"] = {media_type("json"), manifest.dump(2, ' ', false, nlohmann::json::error_handler_t::replace) + "\n"};
+  return files;
+}
+
+}  // namespace lambent::tool

@@ -1,0 +1,36 @@
+#pragma once
+// The web viewer as files: the built page, and beside it what it is to show. `view` serves them, `export` writes them.
+#include <lambent/core/file.h>
+#include <lambent/core/result.h>
+
+#include <CLI/CLI.hpp>
+
+#include <map>
+#include <string>
+#include <variant>
+#include <vector>
+
+namespace lambent::tool {
+
+struct WebOptions {
+  std::string baked, compare, reference;
+  std::vector<std::string> env;
+  std::string camera = "auto", rotate;
+  float exposure = 0;
+  void add_to(CLI::App& command);
+};
+
+struct WebFile {
+  std::string type;  // media type
+  std::variant<MappedFile, std::string> content;
+  std::string_view bytes() const;
+};
+
+// By path relative to the page: index.html and what it needs; lambent.json, which says what to show; data/….
+using WebFiles = std::map<std::string, WebFile>;
+
+// Environments, files and skies alike, become .exr files of single floats, read as every other command reads them. The default is
+// a sky. Errors: the page is not built; anything wrong with a file or an option.
+Result<WebFiles> web_files(const WebOptions& options);
+
+}  // namespace lambent::tool

@@ -1,0 +1,96 @@
+// Follows: radiosity, "Discussion 3" ("Spherical Harmonics" and "vector irradiance" are keywords), "Radiosity Normal Mapping".
+#include <lambent/basis/sh.h>
+#include <lambent/bake/directional.h>
+#include <lambent/bake/kernels.h>
+#include <lambent/core/random.h>
+
+namespace lambent {
+namespace {
+
+// A cosine-distributed ray stands for light spread by 1 / cos; grazing ones would weigh without bound.
+constexpr float least_cosine = 0.02f;
+constexpr int most_rows = 9;
+
+// What one unit of E from direction d adds to each row: the row's kernel over that of E, cos / pi.
+void row_weights(DirectionalKind kind, Vec3 d, const Mat3& frame, float* out) {
+  const float scale = 1 / std::max(glm::dot(d, frame[2]), least_cosine);
+  switch (kind) {
+    case DirectionalKind::none:
+      out[0] = 1;
+      break;
+    case DirectionalKind::sh2:
+    case DirectionalKind::sh3: {
+      const int order = kind == DirectionalKind::sh2 ? 2 : 3;
+      evaluate_sh(order, d, {out, size_t(sh_count(order))});
+      for (int k = 0; k < sh_count(order); ++k) out[k] *= float(clamped_cosine(sh_band(k))) * scale;
+      break;
+    }
+    case DirectionalKind::hl2:
+      for (int k = 0; k < 3; ++k) out[k] = std::max(0.0f, glm::dot(d, frame * hl2_basis[k])) * scale;
+      break;
+    case DirectionalKind::vector:
+      for (int k = 0; k < 3; ++k) out[k] = d[k] * scale;
+      break;
+  }
+}
+
+template <class Basis>
+void gather_on(const GatherSetup& setup, const Basis& basis, const Lamps& lamps, int lamp_samples, DirectionalKind kind, const float* x,
+               size_t width, size_t first, size_t count, float* out) {
+  const DirectionSets& sets = setup.sets;
+  const size_t rays = size_t(sets.samples), rows = size_t(directional_rows(kind));
+  AlignedVector<float> dx(sets.stride), dy(sets.stride), dz(sets.stride);
+  std::vector<Hit> hits(rays);
+  std::vector<LampLight> lights;
+  std::vector<float> value(width);
+  float weights[most_rows];
+  for (size_t i = 0; i < count; ++i) {
+    const size_t r = first + i;
+    const Vec3 normal = setup.receivers.normals[r], origin = setup.receivers.origins[r];
+    const Mat3 frame = receiver_frame(normal);
+    float* own = out + i * rows * width;
+    const DirectionChoice choice = choose_directions(sets, normal, setup.seed, r);
+    const size_t base = size_t(choice.set) * sets.stride;
+    rotate_directions(choice.rotation, sets.x.data() + base, sets.y.data() + base, sets.z.data() + base, sets.stride, dx.data(), dy.data(), dz.data());
+    setup.tracer.closest_fan(origin, {dx.data(), dy.data(), dz.data(), rays}, hits.data());
+    lights.clear();
+    sample_lamps(setup.scene, setup.tracer, lamps, origin, normal, lamp_samples, rays, setup.seed, r, lights);
+    for (size_t j = 0; j < rays; ++j) {
+      const Hit& h = hits[j];
+      const Vec3 d(dx[j], dy[j], dz[j]);
+      const float cosine = glm::dot(normal, d);
+      if (h.triangle == none) {
+        if (lamps.sky) lights.push_back(met_sky(lamps, d, cosine, lamp_samples, rays));
+        continue;
+      }
+      const Triangle& triangle = setup.scene.triangles[h.triangle];
+      const uint32_t lamp = lamps.of_triangle.empty() ? none : lamps.of_triangle[h.triangle];
+      if (lamp != none && emits(setup.scene, triangle, h.front))
+        lights.push_back(met_lamp(setup.scene, lamps, lamp, d, cosine, h.distance, lamp_samples, rays));
+      const auto* at = basis.find(h.triangle, h.front);
+      if (!at || !x) continue;
+      std::fill(value.begin(), value.end(), 0.0f);
+      basis.spread(*at, h.u, h.v, [&](uint32_t receiver, float w) {
+        for (size_t k = 0; k < width; ++k) value[k] += w * x[size_t(receiver) * width + k];
+      });
+      const Vec3 rho = albedo(setup.scene, triangle, h.u, h.v) / float(rays);
+      row_weights(kind, d, frame, weights);
+      for (size_t row = 0; row < rows; ++row)
+        for (size_t k = 0; k < width; ++k) own[row * width + k] += weights[row] * rho[int(k % 3)] * value[k];
+    }
+    for (const LampLight& light : lights) {
+      row_weights(kind, light.direction, frame, weights);
+      for (size_t row = 0; row < rows; ++row)
+        for (int c = 0; c < 3; ++c) own[row * width + size_t(light.group) * 3 + size_t(c)] += weights[row] * light.value[c];
+    }
+  }
+}
+
+}  // namespace
+
+void gather_directional(const GatherSetup& setup, const Lamps& lamps, int lamp_samples, DirectionalKind kind, const float* x, size_t width,
+                        size_t first, size_t count, float* out) {
+  std::visit([&](const auto& basis) { gather_on(setup, basis, lamps, lamp_samples, kind, x, width, first, count, out); }, setup.receivers.basis);
+}
+
+}  // namespace lambent

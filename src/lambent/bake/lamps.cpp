@@ -1,0 +1,157 @@
+// Follows: radiosity, "Discussion 4" (direct light apart); E. Veach and L. Guibas, "Optimally combining sampling techniques for
+// Monte Carlo rendering", 1995.
+#include <lambent/bake/lamps.h>
+#include <lambent/core/random.h>
+#include <lambent/core/sampling.h>
+
+#include <algorithm>
+
+namespace lambent {
+namespace {
+
+float largest(Vec3 c) { return std::max({c.x, c.y, c.z}); }
+
+// Distances that agree to this fraction are the same surface.
+constexpr float same_distance = 1e-3f;
+
+// A fan of rays that end at given distances; says which arrive.
+struct ShadowRays {
+  std::vector<float> x, y, z;
+  std::vector<Hit> hits;
+  void clear() { x.clear(), y.clear(), z.clear(); }
+  size_t add(Vec3 d) {
+    x.push_back(d.x), y.push_back(d.y), z.push_back(d.z);
+    return x.size() - 1;
+  }
+  void trace(const Tracer& tracer, Vec3 origin) {
+    hits.resize(x.size());
+    tracer.closest_fan(origin, {x.data(), y.data(), z.data(), x.size()}, hits.data());
+  }
+};
+
+// L p_c / (N p_l + M p_c)
+Vec3 balanced(Vec3 radiance, float cosine, double lamp_density, int samples, size_t rays) {
+  const double p_c = double(std::max(cosine, 0.0f)) / std::numbers::pi;
+  const double sum = double(samples) * lamp_density + double(rays) * p_c;
+  return sum > 0 ? radiance * float(p_c / sum) : Vec3(0);
+}
+
+struct PendingSample {
+  LampLight light;
+  uint32_t triangle;  // that the ray must meet; none: it must travel `distance`
+  float distance;
+};
+
+}  // namespace
+
+Lamps make_lamps(const Scene& scene, const Environment* sky, bool separate) {
+  Lamps lamps;
+  auto group_of = [&](const std::string& name) {
+    const std::string key = separate ? name : all_lamps;
+    const auto known = std::find(lamps.names.begin(), lamps.names.end(), key);
+    if (known != lamps.names.end()) return uint32_t(known - lamps.names.begin());
+    lamps.names.push_back(key);
+    return uint32_t(lamps.names.size() - 1);
+  };
+  std::vector<uint32_t> material_group(scene.materials.size(), none);
+  for (uint32_t t = 0; t < scene.triangles.size(); ++t) {
+    const Triangle& triangle = scene.triangles[t];
+    const uint32_t m = scene.parts[triangle.part].material;
+    const Material& material = scene.materials[m];
+    const float area = 0.5f * glm::length(area_normal(scene, triangle));
+    if (!(largest(material.emissive) > 0) || !(area > 0)) continue;
+    if (material_group[m] == none) material_group[m] = group_of(material.name.empty() ? "material " + std::to_string(m) : material.name);
+    lamps.area.push_back({t, material_group[m], material.emissive, double(area)});  // its area, until all are known
+  }
+  for (const PunctualLight& light : scene.lights)
+    lamps.punctual_group.push_back(largest(light.intensity) > 0 ? group_of(light.name) : none);
+  if (sky) {
+    lamps.sky = sky, lamps.sky_sampler = make_environment_sampler(*sky);
+    if (lamps.sky_sampler.total > 0) lamps.sky_group = group_of(sky_name);
+    else lamps.sky = nullptr;
+  }
+  std::stable_sort(lamps.area.begin(), lamps.area.end(), [](const AreaLamp& a, const AreaLamp& b) { return a.group < b.group; });
+  lamps.first.assign(lamps.groups() + 1, 0);
+  for (const AreaLamp& lamp : lamps.area) ++lamps.first[lamp.group + 1];
+  for (size_t g = 0; g < lamps.groups(); ++g) lamps.first[g + 1] += lamps.first[g];
+  lamps.cumulative.resize(lamps.area.size());
+  if (!lamps.area.empty()) lamps.of_triangle.assign(scene.triangles.size(), none);
+  for (size_t g = 0; g < lamps.groups(); ++g) {
+    double sum = 0;
+    for (uint32_t i = lamps.first[g]; i < lamps.first[g + 1]; ++i) {
+      sum += lamps.area[i].density * double(largest(lamps.area[i].radiance));
+      lamps.cumulative[i] = sum, lamps.of_triangle[lamps.area[i].triangle] = i;
+    }
+    for (uint32_t i = lamps.first[g]; i < lamps.first[g + 1]; ++i) lamps.area[i].density = double(largest(lamps.area[i].radiance)) / sum;
+  }
+  return lamps;
+}
+
+void sample_lamps(const Scene& scene, const Tracer& tracer, const Lamps& lamps, Vec3 origin, Vec3 normal, int samples, size_t rays,
+                  uint32_t seed, size_t receiver, std::vector<LampLight>& out) {
+  thread_local ShadowRays shadow;
+  thread_local std::vector<PendingSample> pending;
+  shadow.clear(), pending.clear();
+  auto add = [&](uint32_t group, Vec3 d, Vec3 value, uint32_t triangle, float distance) {
+    if (!(largest(value) > 0)) return;
+    shadow.add(d);
+    pending.push_back({{group, d, value}, triangle, distance});
+  };
+  for (size_t g = 0; g < lamps.groups(); ++g) {
+    const uint32_t begin = lamps.first[g], end = lamps.first[g + 1];
+    if (begin == end) continue;
+    const double total = lamps.cumulative[end - 1];
+    const uint32_t key = uint32_t(hash64(hash64(seed, 0x1a3 + g), receiver)), pick_key = uint32_t(hash64(key));
+    for (int s = 0; s < samples; ++s) {
+      const Vec2 u = sobol_owen(uint32_t(s), key);
+      const double target = double(sobol_owen(uint32_t(s), pick_key).x) * total;
+      const size_t at = std::min<size_t>(size_t(std::upper_bound(lamps.cumulative.begin() + begin, lamps.cumulative.begin() + end, target) - lamps.cumulative.begin()), end - 1);
+      const AreaLamp& lamp = lamps.area[at];
+      const Triangle& t = scene.triangles[lamp.triangle];
+      // Uniform over the triangle.
+      const float root = std::sqrt(u.x), v = u.y * root;
+      const Vec3 to = interpolate(scene.positions, t, 1 - root, v) - origin;
+      const float distance2 = glm::dot(to, to);
+      if (!(distance2 > 0)) continue;
+      const float distance = std::sqrt(distance2);
+      const Vec3 d = to / distance;
+      const float cosine = glm::dot(normal, d), facing = -glm::dot(normalize_or(area_normal(scene, t), Vec3(0)), d);
+      if (!(cosine > 0) || !emits(scene, t, facing > 0) || facing == 0) continue;
+      const double density = lamp.density * double(distance2) / double(std::abs(facing));
+      add(lamp.group, d, balanced(lamp.radiance, cosine, density, samples, rays), lamp.triangle, distance);
+    }
+  }
+  for (size_t l = 0; l < lamps.punctual_group.size(); ++l) {
+    if (lamps.punctual_group[l] == none) continue;
+    const LampArrival a = arriving(scene.lights[l], origin);
+    add(lamps.punctual_group[l], a.direction, a.irradiance * (std::max(0.0f, glm::dot(normal, a.direction)) / pi), none, a.distance);
+  }
+  if (lamps.sky) {
+    const uint32_t key = uint32_t(hash64(hash64(seed, 0x5c1), receiver));
+    for (int s = 0; s < samples; ++s) {
+      const EnvironmentSample e = sample_environment(lamps.sky_sampler, sobol_owen(uint32_t(s), key));
+      add(lamps.sky_group, e.direction, balanced(e.radiance, glm::dot(normal, e.direction), double(e.pdf), samples, rays), none, INFINITY);
+    }
+  }
+  shadow.trace(tracer, origin);
+  for (size_t i = 0; i < pending.size(); ++i) {
+    const Hit& h = shadow.hits[i];
+    const bool arrives = h.triangle == none || h.triangle == pending[i].triangle || h.distance >= pending[i].distance * (1 - same_distance);
+    if (arrives) out.push_back(pending[i].light);
+  }
+}
+
+LampLight met_lamp(const Scene& scene, const Lamps& lamps, uint32_t index, Vec3 direction, float cosine, float distance, int samples,
+                   size_t rays) {
+  const AreaLamp& lamp = lamps.area[index];
+  const float facing = std::abs(glm::dot(normalize_or(area_normal(scene, scene.triangles[lamp.triangle]), Vec3(0)), direction));
+  const double density = lamp.density * double(distance) * double(distance) / double(std::max(facing, 1e-30f));
+  return {lamp.group, direction, balanced(lamp.radiance, cosine, density, samples, rays)};
+}
+
+LampLight met_sky(const Lamps& lamps, Vec3 direction, float cosine, int samples, size_t rays) {
+  return {lamps.sky_group, direction,
+          balanced(radiance(*lamps.sky, direction), cosine, double(environment_pdf(lamps.sky_sampler, direction)), samples, rays)};
+}
+
+}  // namespace lambent

@@ -1,0 +1,42 @@
+#pragma once
+// Scene and lamps -> Transfer: radiosity. The columns are groups of the scene's own lamps, and, where wanted, harmonics of a
+// distant light (a PRT lightmap); the operator and the rays are those of bake.h. Relit with coefficient 1 a group, it is exit
+// radiance of white receivers, irradiance / pi; other coefficients dim and tint the groups.
+#include <lambent/bake/directional.h>
+#include <lambent/bake/solve.h>
+#include <lambent/transfer/transfer.h>
+
+#include <optional>
+
+namespace lambent {
+
+struct LightmapOptions {
+  int order = 0;                    // bands of a distant light's harmonics, columns before the groups; 0: none, at most max_sh_order
+  int samples = 512;                // rays a receiver, [1, 2^20]
+  int lamp_samples = 32;            // towards each group's lamps, [1, 2^16]
+  int bounces = 3;                  // reflections between surfaces, [0, 64]; not read where `converge` is set
+  double converge = 0;              // above 0: as many bounces as leave this residual (SolveOptions::tolerance)
+  Solver solver = Solver::gmres;    // for `converge`
+  DirectionalKind directional = DirectionalKind::none;  // rows of the transfer; others than none take order 0
+  size_t memory = size_t{4} << 30;  // bytes for the hit rows; those beyond are traced again at each bounce
+  uint32_t seed = 1;
+  Precision precision = Precision::half;
+};
+
+struct Lightmap {
+  Transfer all;                    // direct and bounced
+  std::optional<Transfer> direct;  // alone, where asked for, in one row: all - direct is the indirect part
+};
+
+struct LightmapReport {
+  size_t receivers = 0, buried = 0, rays = 0, operator_bytes = 0;
+  double operator_kept = 1, trace_seconds = 0, bounce_seconds = 0;
+  SolveReport solve;  // empty where bounces are counted
+};
+
+// Errors: options out of range, nothing that gives light (no groups and order 0), too many columns; cancelled.
+Result<Lightmap> bake_lightmap(const Scene& scene, const Tracer& tracer, const Receivers& receivers, const Lamps& lamps,
+                               const LightmapOptions& options, bool direct_apart, LightmapReport* report = nullptr,
+                               Progress* progress = nullptr);
+
+}  // namespace lambent

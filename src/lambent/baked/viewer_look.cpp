@@ -1,0 +1,136 @@
+// glTF 2.0 specification (ISO/IEC 12113); KHR_materials_emissive_strength, KHR_materials_specular. A lightmap is shown as the
+// emission of a black material without reflections: emission is core glTF, its strength goes beyond 1, and no viewer multiplies
+// it by lights of its own. (KHR_materials_unlit would end at 1 and escape tone mapping.)
+#include <lambent/baked/viewer_look.h>
+
+#include <algorithm>
+#include <map>
+#include <optional>
+
+namespace lambent {
+namespace {
+
+using nlohmann::json;
+
+json& list(json& document, const char* key) {
+  if (!document[key].is_array()) document[key] = json::array();
+  return document[key];
+}
+size_t push(json& document, const char* key, json item) {
+  list(document, key).push_back(std::move(item));
+  return document[key].size() - 1;
+}
+void use_extension(json& document, const char* name) {
+  json& used = list(document, "extensionsUsed");
+  if (std::find(used.begin(), used.end(), name) == used.end()) used.push_back(name);
+}
+
+template <class T>
+std::span<const uint8_t> bytes_of(const std::vector<T>& v) { return {reinterpret_cast<const uint8_t*>(v.data()), v.size() * sizeof(T)}; }
+
+}  // namespace
+
+LookWriter::LookWriter(const Scene& scene, const Receivers& receivers, const ViewerLook* look) : scene_(scene), look_(look) {
+  const auto* texels = std::get_if<TexelReceivers>(&receivers.basis);
+  if (!texels) look_ = nullptr;
+  if (!look_) return;
+  const Vec2 size(float(texels->width), float(texels->height));
+  for (const Part& part : scene.parts) {
+    Side front, back;
+    front.at.assign(part.vertex_count, Vec2(0)), back.at = front.at;
+    for (uint32_t i = part.first_triangle; i < part.first_triangle + part.triangle_count; ++i) {
+      const uint32_t* v = scene.triangles[i].v;
+      for (size_t k = 0; k < 3; ++k) {
+        if (const auto* at = texels->find(i, true)) front.at[v[k] - part.first_vertex] = at->at[k] / size;
+        if (const auto* at = texels->find(i, false)) back.at[v[k] - part.first_vertex] = at->at[k] / size;
+      }
+      if (texels->find(i, false))
+        for (int k : {0, 2, 1}) back.indices.push_back(v[k] - part.first_vertex);
+    }
+    fronts_.push_back(std::move(front)), backs_.push_back(std::move(back));
+  }
+}
+
+void LookWriter::add_blobs(std::vector<GltfBlob>& blobs) {
+  first_blob_ = blobs.size();
+  if (!look_) return;
+  blobs.push_back({look_->png, 4});
+  for (const Side& side : fronts_) blobs.push_back({bytes_of(side.at), 4});
+  for (const Side& side : backs_)
+    if (!side.indices.empty()) blobs.push_back({bytes_of(side.at), 4}), blobs.push_back({bytes_of(side.indices), 4});
+}
+
+// A copy of the material that glows with the texture; lamps with their own emission.
+size_t LookWriter::lit_material(json& document, const json& original, size_t texture) const {
+  json lit = {{"pbrMetallicRoughness", {{"baseColorFactor", {0, 0, 0, 1}}, {"metallicFactor", 0}, {"roughnessFactor", 1}}},
+              {"doubleSided", false}};
+  json& extensions = lit["extensions"];
+  extensions["KHR_materials_specular"] = {{"specularFactor", 0}};
+  use_extension(document, "KHR_materials_specular"), use_extension(document, "KHR_materials_emissive_strength");
+  lit["name"] = original.value("name", std::string("surface")) + " with lightmap";
+  double own[3] = {0, 0, 0};
+  if (original.contains("emissiveFactor") && original["emissiveFactor"].is_array() && original["emissiveFactor"].size() == 3)
+    for (size_t c = 0; c < 3; ++c) own[c] = original["emissiveFactor"][c].is_number() ? original["emissiveFactor"][c].get<double>() : 0;
+  if (own[0] > 0 || own[1] > 0 || own[2] > 0) {
+    lit["emissiveFactor"] = original["emissiveFactor"];
+    const json none = json::object();
+    const json& given = original.contains("extensions") ? original["extensions"] : none;
+    if (given.is_object() && given.contains("KHR_materials_emissive_strength"))
+      extensions["KHR_materials_emissive_strength"] = given["KHR_materials_emissive_strength"];
+  } else {
+    lit["emissiveFactor"] = {1, 1, 1};
+    lit["emissiveTexture"] = {{"index", texture}, {"texCoord", 1}};
+    extensions["KHR_materials_emissive_strength"] = {{"emissiveStrength", look_->strength}};
+  }
+  return push(document, "materials", std::move(lit));
+}
+
+void LookWriter::write(json& document, const GltfPlaces& places) const {
+  if (!look_) return;
+  for (json& mesh : list(document, "meshes")) {  // what an earlier bake left
+    json kept = json::array();
+    for (json& primitive : mesh["primitives"])
+      if (!(primitive.contains("extensions") && primitive["extensions"].contains("LAMBENT_transfer") &&
+            primitive["extensions"]["LAMBENT_transfer"].contains("viewerOnly")))
+        kept.push_back(std::move(primitive));
+    mesh["primitives"] = std::move(kept);
+  }
+  const int first_view = places.first_view + int(first_blob_);
+  const size_t image = push(document, "images", {{"bufferView", first_view}, {"mimeType", "image/png"}, {"name", "lightmap"}});
+  const size_t sampler = push(document, "samplers", {{"magFilter", 9729}, {"minFilter", 9729}, {"wrapS", 33071}, {"wrapT", 33071}});
+  const size_t texture = push(document, "textures", {{"source", image}, {"sampler", sampler}});
+  std::optional<size_t> plain;  // what primitives without a material have, spelt out
+  std::map<size_t, size_t> lit;
+  int view = first_view + 1 + int(fronts_.size());  // of the backs
+  auto places_accessor = [&](int buffer_view, size_t count) {
+    return push(document, "accessors", {{"bufferView", buffer_view}, {"componentType", 5126}, {"count", count}, {"type", "VEC2"}});
+  };
+  for (size_t p = 0; p < scene_.parts.size(); ++p) {
+    const Part& part = scene_.parts[p];
+    if (part.vertex_count == 0) continue;
+    json& mesh = document["meshes"][document["nodes"][size_t(places.part_nodes[p])]["mesh"].get<size_t>()];
+    json& primitive = mesh["primitives"][size_t(places.part_primitives[p])];
+    // Baked before, or fresh; our loader takes this material, and leaves out the primitives of backs.
+    const json& holder = primitive.contains("extensions") && primitive["extensions"].contains("LAMBENT_transfer") ? primitive["extensions"]["LAMBENT_transfer"] : primitive;
+    const char* key = &holder == &primitive ? "material" : "ownMaterial";
+    if (!holder.contains(key) && !plain) plain = push(document, "materials", {{"name", "default"}});
+    const size_t original = holder.contains(key) ? holder[key].get<size_t>() : *plain;
+    auto [material, is_new] = lit.try_emplace(original, 0);
+    if (is_new) material->second = lit_material(document, json(document["materials"][original]), texture);
+    primitive["extensions"]["LAMBENT_transfer"] = {{"ownMaterial", original}};
+    primitive["material"] = material->second;
+    const size_t front = places_accessor(first_view + 1 + int(p), part.vertex_count);
+    primitive["attributes"]["TEXCOORD_1"] = front;
+    if (!primitive["attributes"].contains("TEXCOORD_0")) primitive["attributes"]["TEXCOORD_0"] = front;
+    if (backs_[p].indices.empty()) continue;
+    const size_t at = places_accessor(view, part.vertex_count);
+    const size_t indices = push(document, "accessors", {{"bufferView", view + 1}, {"componentType", 5125}, {"count", backs_[p].indices.size()}, {"type", "SCALAR"}});
+    view += 2;
+    json back = {{"attributes", {{"POSITION", primitive["attributes"]["POSITION"]}, {"TEXCOORD_0", at}, {"TEXCOORD_1", at}}},
+                 {"indices", indices}, {"material", material->second}};
+    back["extensions"]["LAMBENT_transfer"] = {{"viewerOnly", true}};
+    mesh["primitives"].push_back(std::move(back));
+  }
+}
+
+}  // namespace lambent

@@ -1,0 +1,81 @@
+#include <lambent/scene/gltf_test-inl.h>
+#include <lambent/scene/lights.h>
+
+#include <gtest/gtest.h>
+
+namespace lambent {
+namespace {
+
+using namespace test;
+
+Builder lit_triangle(const Json& light, const Json& node) {
+  Builder b = triangle();
+  b.json["extensions"]["KHR_lights_punctual"]["lights"] = Json::array({light});
+  Json holder = node;
+  holder["extensions"]["KHR_lights_punctual"]["light"] = 0;
+  b.json["nodes"].push_back(holder);
+  return b;
+}
+
+TEST(GltfLights, StandAndShineAsTheirNodesSay) {
+  // A quarter turn about +Y takes -Z to -X; the parent moves and scales, which does not change the lamp.
+  Builder b = lit_triangle({{"type", "spot"}, {"color", {1, 0.5, 0.25}}, {"intensity", 8}, {"name", "desk"}, {"spot", {{"innerConeAngle", 0.2}, {"outerConeAngle", 0.6}}}},
+                           {{"translation", {1, 2, 3}}, {"rotation", {0, std::sqrt(0.5), 0, std::sqrt(0.5)}}});
+  b.json["nodes"].push_back({{"children", {1}}, {"translation", {10, 0, 0}}, {"scale", {2, 2, 2}}});
+  auto scene = b.load();
+  ASSERT_TRUE(scene) << scene.error().text();
+  ASSERT_EQ(scene->lights.size(), 1u);
+  const PunctualLight& l = scene->lights[0];
+  EXPECT_EQ(l.name, "desk");
+  EXPECT_EQ(l.kind, PunctualLight::Kind::spot);
+  EXPECT_EQ(l.position, Vec3(12, 4, 6));
+  EXPECT_LT(glm::length(l.direction - Vec3(-1, 0, 0)), 1e-6f);
+  EXPECT_EQ(l.intensity, Vec3(8, 4, 2));
+  EXPECT_FLOAT_EQ(l.inner_cone, 0.2f);
+  EXPECT_FLOAT_EQ(l.outer_cone, 0.6f);
+  // On the axis the full intensity over the squared distance; beyond the outer cone nothing.
+  const LampArrival on = arriving(l, Vec3(10, 4, 6)), off = arriving(l, Vec3(11, 4, 7));
+  EXPECT_FLOAT_EQ(on.irradiance.x, 2);
+  EXPECT_FLOAT_EQ(on.distance, 2);
+  EXPECT_LT(glm::length(on.direction - Vec3(1, 0, 0)), 1e-6f);
+  EXPECT_EQ(off.irradiance, Vec3(0));
+}
+
+TEST(GltfLights, DefaultsAndNames) {
+  for (const char* type : {"point", "directional"}) {
+    auto scene = lit_triangle({{"type", type}}, {{"name", "lamp node"}}).load();
+    ASSERT_TRUE(scene) << scene.error().text();
+    EXPECT_EQ(scene->lights.at(0).name, "lamp node");
+    EXPECT_EQ(scene->lights[0].intensity, Vec3(1));
+    EXPECT_EQ(scene->lights[0].direction, Vec3(0, 0, -1));
+  }
+  const PunctualLight sun{.kind = PunctualLight::Kind::directional, .direction = Vec3(0, -1, 0), .intensity = Vec3(5)};
+  EXPECT_EQ(arriving(sun, Vec3(7)).irradiance, Vec3(5));
+  EXPECT_EQ(arriving(sun, Vec3(7)).direction, Vec3(0, 1, 0));
+}
+
+TEST(GltfLights, RefusesWhatIsNoLamp) {
+  const std::pair<Json, const char*> wrong[] = {
+      {{{"type", "tube"}}, "type"},
+      {{{"color", {1, 1, 1}}}, "type"},
+      {{{"type", "point"}, {"intensity", -1}}, "negative or too large"},
+      {{{"type", "point"}, {"intensity", 1e300}}, "negative or too large"},
+      {{{"type", "spot"}, {"spot", {{"innerConeAngle", 1}, {"outerConeAngle", 0.5}}}}, "cone"},
+      {{{"type", "spot"}, {"spot", {{"outerConeAngle", 3}}}}, "cone"},
+      {5, "object"}};
+  for (const auto& [light, message] : wrong) {
+    auto scene = lit_triangle(light, Json::object()).load();
+    ASSERT_FALSE(scene) << light.dump();
+    EXPECT_NE(scene.error().text().find(message), std::string::npos) << scene.error().text();
+  }
+  Builder b = lit_triangle({{"type", "point"}}, Json::object());
+  b.json["nodes"][1]["extensions"]["KHR_lights_punctual"]["light"] = 7;
+  EXPECT_FALSE(b.load());
+  b.json["nodes"][1]["extensions"]["KHR_lights_punctual"] = Json::object();
+  EXPECT_FALSE(b.load());
+  b.json["extensions"].erase("KHR_lights_punctual");
+  EXPECT_FALSE(b.load());
+}
+
+}  // namespace
+}  // namespace lambent

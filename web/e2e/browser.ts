@@ -1,0 +1,128 @@
+// `lambent view`, headless Chromium and what the tests ask of them.
+import { spawn, type ChildProcess } from 'node:child_process';
+import { existsSync, readFileSync, writeFileSync } from 'node:fs';
+import { join } from 'node:path';
+import { fileURLToPath } from 'node:url';
+import { chromium, type Browser, type Page } from 'playwright-core';
+import { createServer, type ViteDevServer } from 'vite';
+import { lambentJson, random, toolPath } from '../test/tool.ts';
+
+export const browserPath = process.env['CHROMIUM'] ?? '/usr/bin/chromium';
+export const haveBrowser = existsSync(browserPath);
+if (!haveBrowser) console.warn(`skipped: there is no ${browserPath}`);
+
+export const launch = (): Promise<Browser> => chromium.launch({
+  executablePath: browserPath,
+  args: ['--no-sandbox', '--use-angle=swiftshader', '--enable-unsafe-swiftshader', '--disable-background-networking', '--disable-component-update',
+    '--disable-sync', '--no-first-run'],
+});
+
+export interface Server {
+  address: string;
+  stop(): Promise<number | null>;
+}
+
+export function serve(...args: string[]): Promise<Server> {
+  const child: ChildProcess = spawn(toolPath, ['view', ...args, '--no-browser', '--json'], { stdio: ['ignore', 'pipe', 'pipe'] });
+  const ended = new Promise<number | null>((resolve) => child.once('exit', resolve));
+  return new Promise((resolve, reject) => {
+    let text = '', errors = '';
+    child.stderr!.on('data', (piece: Buffer) => (errors += piece.toString()));
+    child.stdout!.on('data', (piece: Buffer) => {
+      text += piece.toString();
+      const address = /"address": "([^"]*)"/.exec(text)?.[1];
+      if (address) resolve({ address, stop: () => (child.kill('SIGINT'), ended) });
+    });
+    void ended.then((code) => reject(new Error(`view ended with ${code}: ${errors}`)));
+  });
+}
+
+/** Opens the page at a state; resolves once all is loaded and drawn. */
+export async function open(browser: Browser, address: string, fragment: string, width: number, height: number): Promise<Page> {
+  const page = await browser.newPage({ viewport: { width, height }, deviceScaleFactor: 1 });
+  page.on('pageerror', (error) => console.error('page:', error.message));
+  await page.goto(`${address}#${fragment}`);
+  await page.waitForSelector('body[data-ready=yes], #problem:not([hidden])', { state: 'attached' });
+  const problem = await page.textContent('#problem-text');
+  if (problem) throw new Error(`the page says: ${problem}`);
+  await drawn(page);
+  return page;
+}
+
+/** The scenes of fixture/scenes.ts, with files of `folder` under /files/, a tilde for each slash. */
+export async function openFixture(browser: Browser, folder: string): Promise<{ page: Page; server: ViteDevServer }> {
+  const web = fileURLToPath(new URL('..', import.meta.url));
+  const server = await createServer({
+    root: join(web, 'e2e/fixture'), configFile: false, logLevel: 'error', cacheDir: join(folder, 'cache'),
+    server: { host: '127.0.0.1', port: 0, fs: { allow: [web] } },
+  });
+  await server.listen();
+  const page = await browser.newPage();
+  page.on('pageerror', (error) => console.error('page:', error.message));
+  await page.route('**/files/*', (route) => route.fulfill({ body: readFileSync(join(folder, route.request().url().replace(/.*\/files\//, '').replaceAll('~', '/'))) }));
+  await page.goto(server.resolvedUrls!.local[0]!);
+  await page.waitForFunction(() => 'scenes' in window);
+  return { page, server };
+}
+
+/** Two frames later, what was asked for has been drawn. */
+export const drawn = (page: Page): Promise<void> =>
+  page.evaluate(() => new Promise<void>((resolve) => requestAnimationFrame(() => requestAnimationFrame(() => requestAnimationFrame(() => resolve())))));
+
+export const psnr = (a: string, b: string): number => (lambentJson('compare', a, b) as { psnr: number }).psnr;
+
+/**
+ * A lopsided scene: a floor, a corner of two walls, a ball, and a sail with two sides, in colours that bleed. Fine enough that
+ * triangles are smaller than most pixels would need.
+ */
+export function writeScene(folder: string): string {
+  const lines: string[] = ['mtllib scene.mtl'], faces: string[] = [];
+  let vertices = 0;
+  const quad = (material: string, corner: number[], a: number[], b: number[], n: number): void => {
+    faces.push(`usemtl ${material}`);
+    for (let j = 0; j <= n; ++j)
+      for (let i = 0; i <= n; ++i) lines.push('v ' + [0, 1, 2].map((k) => corner[k]! + (a[k]! * i) / n + (b[k]! * j) / n).join(' '));
+    const at = (i: number, j: number): number => vertices + j * (n + 1) + i + 1;
+    for (let j = 0; j < n; ++j) for (let i = 0; i < n; ++i) faces.push(`f ${at(i, j)} ${at(i + 1, j)} ${at(i + 1, j + 1)} ${at(i, j + 1)}`);
+    vertices += (n + 1) ** 2;
+  };
+  quad('grey', [-2, 0, 2], [4, 0, 0], [0, 0, -4], 32);
+  quad('red', [-2, 0, 2], [0, 0, -4], [0, 2.4, 0], 24);
+  quad('green', [-2, 0, -2], [4, 0, 0], [0, 2.4, 0], 24);
+  quad('white', [0.9, 0.1, 0.2], [0.7, 0.3, -0.6], [-0.1, 1.6, 0.1], 14);
+  const rows = 24, turns = 48, centre = [-0.4, 0.75, 0.3], radius = 0.7, jitter = random(2);
+  faces.push('usemtl blue');
+  for (let j = 0; j <= rows; ++j)
+    for (let i = 0; i < turns; ++i) {
+      const t = (Math.PI * j) / rows, p = (2 * Math.PI * (i + 0.2 * jitter())) / turns;
+      lines.push(`v ${centre[0]! + radius * Math.sin(t) * Math.cos(p)} ${centre[1]! + radius * Math.cos(t)} ${centre[2]! + radius * Math.sin(t) * Math.sin(p)}`);
+    }
+  const ball = (i: number, j: number): number => vertices + j * turns + (i % turns) + 1;
+  for (let j = 0; j < rows; ++j)
+    for (let i = 0; i < turns; ++i) {
+      if (j < rows - 1) faces.push(`f ${ball(i, j)} ${ball(i + 1, j + 1)} ${ball(i, j + 1)}`);
+      if (j > 0) faces.push(`f ${ball(i, j)} ${ball(i + 1, j)} ${ball(i + 1, j + 1)}`);
+    }
+  const colours: Record<string, string> = { grey: '0.6 0.58 0.55', red: '0.7 0.2 0.12', green: '0.25 0.6 0.2', white: '0.85 0.85 0.8', blue: '0.3 0.4 0.75' };
+  writeFileSync(join(folder, 'scene.mtl'), Object.entries(colours).map(([name, kd]) => `newmtl ${name}\nKd ${kd}\n`).join(''));
+  const path = join(folder, 'scene.obj');
+  writeFileSync(path, [...lines, ...faces].join('\n') + '\n');
+  return path;
+}
+
+/** A unit ball alone. */
+export function writeBall(path: string): void {
+  const rows = 40, turns = 80, lines: string[] = [];
+  for (let j = 0; j <= rows; ++j)
+    for (let i = 0; i < turns; ++i) {
+      const t = (Math.PI * j) / rows, p = (2 * Math.PI * i) / turns;
+      lines.push(`v ${Math.sin(t) * Math.cos(p)} ${Math.cos(t)} ${Math.sin(t) * Math.sin(p)}`);
+    }
+  const at = (i: number, j: number): number => j * turns + (i % turns) + 1;
+  for (let j = 0; j < rows; ++j)
+    for (let i = 0; i < turns; ++i) {
+      if (j < rows - 1) lines.push(`f ${at(i, j)} ${at(i + 1, j + 1)} ${at(i, j + 1)}`);
+      if (j > 0) lines.push(`f ${at(i, j)} ${at(i + 1, j)} ${at(i + 1, j + 1)}`);
+    }
+  writeFileSync(path, lines.join('\n') + '\n');
+}

@@ -1,0 +1,122 @@
+// Everything that comes from files: the manifest beside the page, baked scenes, environments. Errors are sentences.
+import { DataTexture, DataUtils, FloatType, HalfFloatType, LinearFilter, RepeatWrapping, RGBAFormat, type Texture } from 'three';
+import { EXRLoader } from 'three/addons/loaders/EXRLoader.js';
+import { GLTFLoader, type GLTF } from 'three/addons/loaders/GLTFLoader.js';
+import { HDRLoader } from 'three/addons/loaders/HDRLoader.js';
+import { checkBakedFile, LambentError, LambentTransferPlugin, latLongMap, Lighting, projectLatLong, type LatLongMap } from '../src/index.js';
+
+/** lambent.json beside the page, as `lambent view` and `lambent export` write it; paths are relative to it. */
+export interface Manifest {
+  name: string;
+  baked: string;
+  compare?: string;
+  reference?: string;
+  environments: { name: string; file: string }[];
+  camera?: number[];
+  rotate?: number[];
+  exposure?: number;
+}
+
+export interface EnvironmentFile {
+  name: string;
+  lighting: Lighting;
+  background: DataTexture; // first row at the zenith
+}
+
+/** The manifest, or undefined where the page stands alone. */
+export async function loadManifest(): Promise<Manifest | undefined> {
+  const answer = await fetch('lambent.json', { cache: 'no-store' }).catch(() => undefined);
+  if (!answer?.ok) return undefined;
+  try {
+    return (await answer.json()) as Manifest;
+  } catch {
+    return undefined; // a host that answers everything with its own page
+  }
+}
+
+/** A whole file, telling the share that has come. */
+export async function fetchFile(path: string, onProgress: (share: number, bytes: number) => void): Promise<ArrayBuffer> {
+  const answer = await fetch(path).catch(() => {
+    throw new LambentError('cannot be reached: is "lambent view" still running?');
+  });
+  if (!answer.ok || !answer.body) throw new LambentError(`cannot be had: the server says ${answer.status}`);
+  const total = Number(answer.headers.get('content-length') ?? 0), reader = answer.body.getReader(), pieces: Uint8Array[] = [];
+  let done = 0;
+  for (;;) {
+    const piece = await reader.read().catch(() => {
+      throw new LambentError(`broke off after ${done.toLocaleString('en')} bytes`);
+    });
+    if (piece.done) break;
+    pieces.push(piece.value), done += piece.value.length;
+    onProgress(total > 0 ? done / total : 0, done);
+  }
+  if (total > 0 && done < total) throw new LambentError(`broke off after ${done.toLocaleString('en')} of ${total.toLocaleString('en')} bytes`);
+  const bytes = new Uint8Array(done);
+  let at = 0;
+  for (const piece of pieces) bytes.set(piece, at), at += piece.length;
+  return bytes.buffer;
+}
+
+/** A baked scene; its BakedScene is in gltf.userData.lambent. */
+export async function readBaked(bytes: ArrayBuffer): Promise<GLTF> {
+  checkBakedFile(bytes);
+  const loader = new GLTFLoader();
+  loader.register((parser) => new LambentTransferPlugin(parser));
+  try {
+    return await loader.parseAsync(bytes, '');
+  } catch (error) {
+    if (error instanceof LambentError) throw error;
+    throw new LambentError(`cannot be read: ${error instanceof Error ? error.message : String(error)}`);
+  }
+}
+
+/** Linear radiance of an .hdr or .exr, told apart by content. */
+export function readMap(bytes: ArrayBuffer): LatLongMap {
+  const head = new Uint8Array(bytes, 0, Math.min(4, bytes.byteLength));
+  const isExr = head.length === 4 && head[0] === 0x76 && head[1] === 0x2f && head[2] === 0x31 && head[3] === 0x01;
+  const isHdr = head.length >= 2 && head[0] === 0x23 && head[1] === 0x3f;
+  if (!isExr && !isHdr) throw new LambentError('is no environment: .hdr or .exr is wanted');
+  let read: object;
+  try {
+    read = isExr ? new EXRLoader().setDataType(FloatType).parse(bytes) : new HDRLoader().setDataType(FloatType).parse(bytes);
+  } catch (error) {
+    throw new LambentError(`cannot be read: ${error instanceof Error ? error.message : String(error)}`);
+  }
+  const { data, width, height } = read as { data: ArrayLike<number>; width: number; height: number };
+  // What their own load() makes of it: .hdr has its first row at the top, .exr at the bottom.
+  const map = latLongMap({ image: { data, width, height }, type: FloatType, flipY: isHdr } as unknown as Texture);
+  // A mantissa counts 256ths; three's loader takes it for 255ths.
+  return isHdr ? { ...map, data: Float32Array.from(map.data, (v) => (v * 255) / 256) } : map;
+}
+
+/** Half floats, clamped to what those hold; first row at the top. */
+export function mapTexture(map: LatLongMap): DataTexture {
+  const data = new Uint16Array(4 * map.width * map.height);
+  for (let i = 0; i < map.width * map.height; ++i)
+    for (let c = 0; c < 4; ++c) {
+      const value = c < map.channels ? map.data[i * map.channels + c]! : 1;
+      data[4 * i + c] = DataUtils.toHalfFloat(value > 0 ? Math.min(value, 65504) : 0);
+    }
+  const texture = new DataTexture(data, map.width, map.height, RGBAFormat, HalfFloatType);
+  texture.minFilter = texture.magFilter = LinearFilter, texture.wrapS = RepeatWrapping, texture.generateMipmaps = false;
+  texture.needsUpdate = true;
+  return texture;
+}
+
+export const makeEnvironment = (name: string, map: LatLongMap): EnvironmentFile =>
+  ({ name, lighting: new Lighting(projectLatLong(map, 16)), background: mapTexture(map) });
+
+/** Light for a page that was given none: a plain sky over darker ground, with a broad sun in the east. */
+export function plainSky(): LatLongMap {
+  const width = 256, height = 128, data = new Float32Array(3 * width * height), sun = [0.62, 0.55, 0.56];
+  for (let y = 0; y < height; ++y)
+    for (let x = 0; x < width; ++x) {
+      const phi = 2 * Math.PI * ((x + 0.5) / width - 0.5), theta = (Math.PI * (y + 0.5)) / height;
+      const d = [Math.sin(theta) * Math.cos(phi), Math.cos(theta), Math.sin(theta) * Math.sin(phi)];
+      const towards = d[0]! * sun[0]! + d[1]! * sun[1]! + d[2]! * sun[2]!, up = d[1]!;
+      const glow = 9 * Math.exp(40 * (towards - 1));
+      const sky = up > 0 ? [0.35 + 0.25 * (1 - up), 0.45 + 0.2 * (1 - up), 0.7] : [0.16, 0.14, 0.12];
+      for (let c = 0; c < 3; ++c) data[3 * (y * width + x) + c] = sky[c]! + (up > 0 ? glow * [1, 0.85, 0.6][c]! : 0);
+    }
+  return { data, width, height, channels: 3 };
+}

@@ -1,0 +1,302 @@
+// The page: controls, the wipe, files that are opened or dropped, and every message a user may see.
+import { Euler, MathUtils, Vector3 } from 'three';
+import { LambentError, shBand, shIndex, shWindows, type ShWindow } from '../src/index.js';
+import { fetchFile, loadManifest, makeEnvironment, mapTexture, plainSky, readBaked, readMap, type EnvironmentFile, type Manifest } from './loading.js';
+import { defaultState, formatState, parseState, type State, type View } from './state.js';
+import { falseColorEnd, Viewer } from './viewer.js';
+
+const get = <T extends HTMLElement>(id: string): T => document.getElementById(id) as T;
+const input = (id: string): HTMLInputElement => get(id);
+const select = (id: string): HTMLSelectElement => get(id);
+
+function showProblem(text: string): void {
+  document.body.classList.remove('bare');
+  get('loading').hidden = true;
+  get('problem-text').textContent = text;
+  get('problem').hidden = false;
+}
+const hideProblem = (): void => void (get('problem').hidden = true);
+const sentence = (name: string, error: unknown): string =>
+  error instanceof LambentError ? (name ? `${name} ${error.message}` : error.message) : `${name ? name + ': ' : ''}${error instanceof Error ? error.message : String(error)}`;
+
+function showLoading(what: string, share?: number): void {
+  get('loading-what').textContent = what;
+  const bar = get<HTMLProgressElement>('loading-share');
+  if (share === undefined || share === 0) bar.removeAttribute('value');
+  else bar.value = share;
+  get('loading').hidden = false;
+}
+
+const megabytes = (bytes: number): string => `${(bytes / 1e6).toPrecision(3)} MB`;
+const names: Record<View, string> = {
+  baked: 'Baked', compare: 'Second file', unshadowed: 'Unshadowed', coefficient: 'One coefficient', reference: 'Reference',
+};
+
+class Page {
+  private readonly state: State;
+  private readonly viewer: Viewer;
+  private readonly environments: { name: string; load: () => Promise<EnvironmentFile> }[] = [];
+  private frameTime = 0;
+  private savedSoon = 0;
+
+  constructor(private readonly manifest: Manifest | undefined) {
+    const base = defaultState();
+    if (manifest?.camera) base.camera = manifest.camera;
+    if (manifest?.rotate) base.rotate = manifest.rotate;
+    if (manifest?.exposure !== undefined) base.exposure = manifest.exposure;
+    this.state = parseState(location.hash, base);
+    this.viewer = new Viewer(get<HTMLCanvasElement>('picture'), {
+      onFrame: (ms) => this.onFrame(ms),
+      onChange: () => this.saveSoon(),
+      onUse: (what) => what === 'light' && get('hint').classList.add('gone'),
+      onProblem: showProblem,
+      onRecovered: hideProblem,
+    });
+    this.connect();
+  }
+
+  async start(): Promise<void> {
+    const { manifest, state, viewer } = this;
+    for (const { name, file } of manifest?.environments ?? [])
+      this.environments.push({ name, load: async () => makeEnvironment(name, readMap(await this.fetch(name, file))) });
+    if (this.environments.length === 0) this.environments.push({ name: 'plain sky', load: () => Promise.resolve(makeEnvironment('plain sky', plainSky())) });
+    this.listEnvironments();
+    this.setRotation(state.rotate);
+    await this.chooseEnvironment(Math.min(state.env, this.environments.length - 1));
+    if (!manifest) {
+      get('loading').hidden = true;
+      get('invitation').hidden = false;
+      this.show();
+      return;
+    }
+    await this.openBaked(manifest.name, await this.fetch(manifest.name, manifest.baked));
+    if (manifest.compare) viewer.setModel('compare', await this.parse('the second file', await this.fetch('the second file', manifest.compare)));
+    if (manifest.reference) viewer.setReference(mapTexture(readMap(await this.fetch('the reference', manifest.reference))));
+    get('loading').hidden = true;
+    this.show();
+  }
+
+  /** All of the state to controls and viewer. */
+  private show(): void {
+    const { state, viewer } = this;
+    const possible: View[] = ['baked', 'unshadowed', 'coefficient'];
+    if (this.manifest?.compare) possible.splice(1, 0, 'compare');
+    if (this.manifest?.reference) possible.push('reference');
+    if (!possible.includes(state.view)) state.view = 'baked';
+    if (state.against && !possible.includes(state.against)) delete state.against;
+    const option = (value: string, text: string): HTMLOptionElement => new Option(text, value);
+    select('view').replaceChildren(...possible.map((v) => option(v, names[v])));
+    select('against').replaceChildren(option('', 'nothing'), ...possible.map((v) => option(v, names[v].toLowerCase())));
+    select('window').replaceChildren(...shWindows.map((w) => option(w, w)));
+    select('view').value = state.view, select('against').value = state.against ?? '', select('window').value = state.window;
+    const all = viewer.bakedScene?.transfer.order ?? 1;
+    state.coefficient = Math.min(state.coefficient, all * all - 1);
+    input('order').max = String(all), input('order').value = String(state.order || all);
+    input('coefficient').max = String(all * all - 1), input('coefficient').value = String(state.coefficient);
+    input('exposure').value = String(state.exposure), input('background').checked = state.background;
+    get('play').hidden = !viewer.hasAnimation;
+    document.body.classList.toggle('bare', !state.ui);
+    this.apply();
+  }
+
+  private apply(): void {
+    const { state, viewer } = this;
+    viewer.view = state.view, viewer.against = state.against, viewer.wipe = state.wipe, viewer.exposure = state.exposure;
+    viewer.order = state.order, viewer.window = state.window, viewer.coefficient = state.coefficient, viewer.showBackground = state.background;
+    viewer.changeLight();
+    get('exposure-value').textContent = `${state.exposure > 0 ? '+' : ''}${state.exposure.toFixed(1)}`;
+    get('order-value').textContent = `${viewer.bands} of ${viewer.bakedScene?.transfer.order ?? 1}`;
+    const usesCoefficient = [state.view, state.against].includes('coefficient');
+    const l = shBand(state.coefficient), m = state.coefficient - shIndex(l, 0);
+    get('coefficient-row').hidden = get('scale').hidden = !usesCoefficient;
+    get('coefficient-name').textContent = `l ${l}, m ${m}`;
+    const end = falseColorEnd / 2 ** state.exposure;
+    get('scale-low').textContent = `−${end.toPrecision(2)}`, get('scale-high').textContent = `+${end.toPrecision(2)}`;
+    const wipe = get('wipe');
+    wipe.hidden = !state.against;
+    wipe.style.left = `${100 * state.wipe}%`;
+    wipe.setAttribute('aria-valuenow', String(Math.round(100 * state.wipe)));
+    get('left-name').textContent = names[state.view], get('right-name').textContent = state.against ? names[state.against] : '';
+    this.saveSoon();
+  }
+
+  private connect(): void {
+    const { state, viewer } = this;
+    const on = (id: string, event: string, change: () => void): void => get(id).addEventListener(event, () => (change(), this.apply()));
+    on('exposure', 'input', () => (state.exposure = Number(input('exposure').value)));
+    on('order', 'input', () => (state.order = input('order').value === input('order').max ? 0 : Number(input('order').value)));
+    on('window', 'change', () => (state.window = select('window').value as ShWindow));
+    on('view', 'change', () => (state.view = select('view').value as View));
+    on('against', 'change', () => {
+      if (select('against').value) state.against = select('against').value as View;
+      else delete state.against;
+    });
+    on('coefficient', 'input', () => (state.coefficient = MathUtils.clamp(Math.floor(Number(input('coefficient').value)) || 0, 0, Number(input('coefficient').max))));
+    on('background', 'change', () => (state.background = input('background').checked));
+    get('env').addEventListener('change', () => void this.attempt('', () => this.chooseEnvironment(select('env').selectedIndex)));
+    get('turn').addEventListener('click', () => {
+      viewer.orbit.lightFirst = !viewer.orbit.lightFirst;
+      get('turn').setAttribute('aria-pressed', String(viewer.orbit.lightFirst));
+      get('picture').classList.toggle('light-first', viewer.orbit.lightFirst);
+    });
+    get('play').addEventListener('click', () => {
+      const on = get('play').getAttribute('aria-pressed') !== 'true';
+      get('play').setAttribute('aria-pressed', String(on));
+      viewer.play(on);
+    });
+    get('reset-view').addEventListener('click', () => this.setCamera(this.manifest?.camera));
+    get('reset-light').addEventListener('click', () => this.setRotation(this.manifest?.rotate ?? [0, 0, 0]));
+    get('problem-close').addEventListener('click', hideProblem);
+    get('open').addEventListener('click', () => get('file').click());
+    get('file').addEventListener('change', () => {
+      const file = input('file').files?.[0];
+      if (file) this.openFile(file);
+      input('file').value = '';
+    });
+    for (const event of ['dragenter', 'dragover', 'dragleave', 'drop'])
+      addEventListener(event, (e) => (e.preventDefault(), document.body.classList.toggle('dropping', event.startsWith('drage') || event === 'dragover')));
+    addEventListener('drop', (e) => {
+      const file = e.dataTransfer?.files[0];
+      if (file) this.openFile(file);
+    });
+    this.connectWipe();
+    get('controls').addEventListener('submit', (e) => e.preventDefault());
+    addEventListener('hashchange', () => {
+      if (location.hash !== formatState(this.current())) location.reload();
+    });
+  }
+
+  private connectWipe(): void {
+    const wipe = get('wipe'), move = (share: number): void => ((this.state.wipe = MathUtils.clamp(share, 0, 1)), this.apply());
+    wipe.addEventListener('pointerdown', (e) => wipe.setPointerCapture(e.pointerId));
+    wipe.addEventListener('pointermove', (e) => wipe.hasPointerCapture(e.pointerId) && move(e.clientX / innerWidth));
+    wipe.addEventListener('keydown', (e) => {
+      const step = { ArrowLeft: -0.02, ArrowRight: 0.02, Home: -1, End: 1 }[e.key];
+      if (step !== undefined) move(this.state.wipe + step), e.preventDefault();
+    });
+  }
+
+  private openFile(file: File): void {
+    void this.attempt(file.name, async () => {
+      showLoading(`Reading ${file.name}`);
+      const bytes = await file.arrayBuffer();
+      if (file.name.toLowerCase().endsWith('.glb')) {
+        await this.openBaked(file.name, bytes);
+        this.show();
+      } else {
+        const environment = makeEnvironment(file.name, readMap(bytes));
+        this.environments.push({ name: file.name, load: () => Promise.resolve(makeEnvironment(file.name, readMap(bytes))) });
+        this.listEnvironments();
+        this.useEnvironment(this.environments.length - 1, environment);
+      }
+      get('loading').hidden = true;
+    });
+  }
+
+  private async openBaked(name: string, bytes: ArrayBuffer): Promise<void> {
+    const { viewer } = this, first = !viewer.bakedScene;
+    viewer.setModel('baked', await this.parse(name, bytes));
+    get('name').textContent = document.title = name;
+    get('hint').hidden = false, get('invitation').hidden = true;
+    this.setCamera(first ? this.state.camera : undefined);
+    get('loading').hidden = true;
+    const t = viewer.bakedScene!.transfer;
+    const rows: [string, string][] = [
+      ['Transfer', `${t.kind}, order ${t.order}, ${t.channels === 3 ? 'colour' : 'grey'}`],
+      ['Receivers', t.receivers.toLocaleString('en')],
+      ['Vertices', t.meshes.reduce((n, m) => n + m.geometry.getAttribute('position').count, 0).toLocaleString('en')],
+      ['In the file', megabytes(t.fileBytes)],
+      ['On the graphics card', megabytes(t.gpuBytes)],
+    ];
+    get('statistics').replaceChildren(...rows.flatMap(([term, text]) => {
+      const dt = document.createElement('dt'), dd = document.createElement('dd');
+      dt.textContent = term, dd.textContent = text;
+      return [dt, dd];
+    }));
+  }
+
+  private parse(name: string, bytes: ArrayBuffer): ReturnType<typeof readBaked> {
+    return readBaked(bytes).catch((error: unknown) => {
+      throw new LambentError(sentence(name, error));
+    });
+  }
+
+  private fetch(name: string, file: string): Promise<ArrayBuffer> {
+    showLoading(`Loading ${name}`);
+    return fetchFile(file, (share, bytes) => showLoading(`Loading ${name}: ${megabytes(bytes)}`, share)).catch((error: unknown) => {
+      throw new LambentError(sentence(name, error));
+    });
+  }
+
+  private listEnvironments(): void {
+    select('env').replaceChildren(...this.environments.map(({ name }, i) => new Option(name, String(i))));
+  }
+
+  private async chooseEnvironment(index: number): Promise<void> {
+    const environment = await this.environments[index]!.load().catch((error: unknown) => {
+      throw new LambentError(sentence(this.environments[index]!.name, error));
+    });
+    get('loading').hidden = true;
+    this.useEnvironment(index, environment);
+  }
+
+  private useEnvironment(index: number, environment: EnvironmentFile): void {
+    this.state.env = index;
+    select('env').selectedIndex = index;
+    this.viewer.setEnvironment(environment);
+    this.saveSoon();
+  }
+
+  private setCamera(camera: number[] | undefined): void {
+    if (!camera) return this.viewer.frameAll();
+    this.viewer.camera.fov = camera[6]!;
+    this.viewer.orbit.look(new Vector3().fromArray(camera), new Vector3().fromArray(camera, 3));
+  }
+
+  /** Yaw, pitch, roll in degrees, as --env-rotate. */
+  private setRotation(degrees: number[]): void {
+    const [yaw, pitch, roll] = degrees.map((d) => MathUtils.degToRad(d)) as [number, number, number];
+    this.viewer.orbit.light.setFromEuler(new Euler(pitch, yaw, roll, 'YXZ'));
+    this.viewer.changeLight();
+    this.saveSoon();
+  }
+
+  private current(): State {
+    const { camera, orbit } = this.viewer, turn = new Euler().setFromQuaternion(orbit.light, 'YXZ');
+    return {
+      ...this.state,
+      camera: [...camera.position.toArray(), ...orbit.target.toArray(), camera.fov],
+      rotate: [turn.y, turn.x, turn.z].map((a) => MathUtils.radToDeg(a)),
+    };
+  }
+
+  private saveSoon(): void {
+    clearTimeout(this.savedSoon);
+    this.savedSoon = window.setTimeout(() => {
+      if (this.viewer.bakedScene) history.replaceState(null, '', formatState(this.current()));
+    }, 300);
+  }
+
+  private onFrame(milliseconds: number): void {
+    this.frameTime = this.frameTime ? 0.9 * this.frameTime + 0.1 * milliseconds : milliseconds;
+    get('figures').textContent = `${this.frameTime.toFixed(this.frameTime < 10 ? 1 : 0)} ms a frame`;
+  }
+
+  private async attempt(name: string, work: () => Promise<void>): Promise<void> {
+    hideProblem();
+    try {
+      await work();
+    } catch (error) {
+      showProblem(sentence(name, error));
+    }
+  }
+}
+
+addEventListener('error', (e) => showProblem(e.message));
+addEventListener('unhandledrejection', (e) => showProblem(sentence('', e.reason)));
+try {
+  await new Page(await loadManifest()).start();
+  document.body.dataset['ready'] = 'yes';
+} catch (error) {
+  showProblem(sentence('', error));
+}

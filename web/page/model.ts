@@ -1,0 +1,57 @@
+// A loaded file and the materials its meshes wear in each view. Those beyond the baked ones are made when first wanted.
+import type { Material, Mesh, Object3D } from 'three';
+import type { GLTF } from 'three/addons/loaders/GLTFLoader.js';
+import { bakedScene, diffuseParameters, LambentError, UnshadowedMaterial, type BakedScene, type Lighting } from '../src/index.js';
+
+export type Look = 'baked' | 'unshadowed' | 'coefficient';
+
+export class Model {
+  readonly root: Object3D;
+  readonly baked: BakedScene;
+  private readonly own: Material[]; // by mesh, as all lists here
+  private unshadowed: UnshadowedMaterial[] | undefined;
+  private coefficient: { index: number; materials: Material[] } | undefined;
+
+  constructor(gltf: GLTF) {
+    const baked = bakedScene(gltf);
+    if (!baked) throw new LambentError('holds no transfer');
+    this.root = gltf.scene, this.baked = baked;
+    this.own = this.meshes.map((mesh) => mesh.material as Material);
+  }
+
+  get meshes(): Mesh[] {
+    return this.baked.transfer.meshes;
+  }
+
+  /** `gain` scales false colour; `index` says which coefficient. */
+  wear(look: Look, lighting: Lighting | undefined, index: number, gain: { value: number }): void {
+    let materials = this.own;
+    if (look === 'unshadowed') {
+      if (!this.unshadowed) {
+        const made = new Map<Material, UnshadowedMaterial>();
+        for (const m of this.own) if (!made.has(m)) made.set(m, new UnshadowedMaterial(this.baked.transfer.order, diffuseParameters(m)));
+        this.unshadowed = this.own.map((m) => made.get(m)!);
+        if (lighting) this.relight(lighting);
+      }
+      materials = this.unshadowed;
+    } else if (look === 'coefficient') {
+      if (this.coefficient?.index !== index) {
+        this.coefficient?.materials.forEach((m) => m.dispose());
+        this.coefficient = { index, materials: this.baked.transfer.coefficientMaterials(index, gain) };
+      }
+      materials = this.coefficient.materials;
+    }
+    this.meshes.forEach((mesh, i) => (mesh.material = materials[i]!));
+  }
+
+  relight(lighting: Lighting): void {
+    this.baked.relight(lighting);
+    for (const material of new Set(this.unshadowed ?? [])) material.relight(lighting);
+  }
+
+  dispose(): void {
+    this.unshadowed?.forEach((m) => m.dispose());
+    this.coefficient?.materials.forEach((m) => m.dispose());
+    this.baked.dispose();
+  }
+}

@@ -1,0 +1,73 @@
+// What is on show, as the address's fragment: a link or a reload gives the same picture.
+// Numbers are separated by commas; `camera` and `rotate` are spelt as --camera and --env-rotate of the command line.
+import { shWindows, type ShWindow } from '../src/index.js';
+
+export const views = ['baked', 'compare', 'unshadowed', 'coefficient', 'reference'] as const;
+export type View = (typeof views)[number];
+
+export interface State {
+  camera?: number[]; // eye, target, vertical field of view in degrees
+  rotate: number[]; // yaw, pitch, roll in degrees
+  env: number;
+  exposure: number; // stops
+  order: number; // bands; 0: all that are baked
+  window: ShWindow;
+  view: View;
+  against?: View; // right of the wipe
+  wipe: number; // share of the width left of the wipe
+  coefficient: number;
+  background: boolean;
+  ui: boolean;
+}
+
+export const defaultState = (): State => ({
+  rotate: [0, 0, 0], env: 0, exposure: 0, order: 0, window: 'none', view: 'baked', wipe: 0.5, coefficient: 3, background: true, ui: true,
+});
+
+const numbers = (text: string | null, count: number): number[] | undefined => {
+  const values = (text ?? '').split(',').map(Number);
+  return text !== null && text !== '' && values.length === count && values.every(Number.isFinite) ? values : undefined;
+};
+
+/** `fragment` over `base`; what cannot be read is left as it is. */
+export function parseState(fragment: string, base: State): State {
+  const from = new URLSearchParams(fragment.replace(/^#/, '')), state = { ...base };
+  const one = (key: string, low: number, high: number): number | undefined => {
+    const value = numbers(from.get(key), 1)?.[0];
+    return value === undefined ? undefined : Math.min(high, Math.max(low, value));
+  };
+  const camera = numbers(from.get('camera'), 7);
+  if (camera && camera[6]! > 0 && camera[6]! < 180 && [0, 1, 2].some((i) => camera[i] !== camera[i + 3])) state.camera = camera;
+  state.rotate = numbers(from.get('rotate'), 3) ?? state.rotate;
+  state.env = Math.floor(one('env', 0, 1e6) ?? state.env);
+  state.exposure = one('exposure', -20, 20) ?? state.exposure;
+  state.order = Math.floor(one('order', 0, 16) ?? state.order);
+  state.window = shWindows.find((w) => w === from.get('window')) ?? state.window;
+  state.view = views.find((v) => v === from.get('view')) ?? state.view;
+  const against = views.find((v) => v === from.get('against'));
+  if (against) state.against = against;
+  state.wipe = one('wipe', 0, 1) ?? state.wipe;
+  state.coefficient = Math.floor(one('coefficient', 0, 255) ?? state.coefficient);
+  if (from.has('background')) state.background = from.get('background') !== 'none';
+  if (from.has('ui')) state.ui = from.get('ui') !== 'off';
+  return state;
+}
+
+const short = (x: number): string => String(Number(x.toPrecision(6)));
+
+export function formatState(state: State): string {
+  const base = defaultState(), parts: string[] = [];
+  const put = (key: string, text: string): void => void parts.push(`${key}=${text}`);
+  if (state.camera) put('camera', state.camera.map(short).join(','));
+  if (state.rotate.some((r) => Math.abs(r) > 1e-4)) put('rotate', state.rotate.map(short).join(','));
+  if (state.env !== base.env) put('env', String(state.env));
+  if (state.exposure !== base.exposure) put('exposure', short(state.exposure));
+  if (state.order !== base.order) put('order', String(state.order));
+  if (state.window !== base.window) put('window', state.window);
+  if (state.view !== base.view) put('view', state.view);
+  if (state.against) put('against', state.against), put('wipe', short(state.wipe));
+  if (state.coefficient !== base.coefficient) put('coefficient', String(state.coefficient));
+  if (!state.background) put('background', 'none');
+  if (!state.ui) put('ui', 'off');
+  return '#' + parts.join('&');
+}

@@ -1,0 +1,4 @@
+/** What a user can be told about a file or a device: one sentence, fit for the page. */
+export class LambentError extends Error {
+  override name = 'LambentError';
+}

@@ -1,0 +1,16 @@
+import { diffuseKind } from './diffuse.js';
+import { registerTransferKind } from './kinds.js';
+
+registerTransferKind(diffuseKind);
+
+export { LambentError } from './errors.js';
+export { checkBakedFile, extensionName } from './glb.js';
+export { knownKinds, registerTransferKind, type BakedTransfer, type TransferKind, type TransferSource } from './kinds.js';
+export { latLongMap, Lighting } from './lighting.js';
+export { bakedScene, LambentTransferPlugin, type BakedScene } from './plugin.js';
+export { projectLatLong, texelSolidAngle, type LatLongMap } from './projection.js';
+export { diffuseParameters, PrtMaterial } from './prt_material.js';
+export { clampedCosine, evaluateSh, maxShOrder, shBand, shCount, shIndex } from './sh.js';
+export { makeShRotation, rotateSh, type ShRotation } from './sh_rotation.js';
+export { shWindow, shWindows, type ShWindow } from './sh_window.js';
+export { UnshadowedMaterial } from './unshadowed_material.js';

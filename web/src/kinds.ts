@@ -1,0 +1,44 @@
+// The kinds of transfer that a file may hold. A new one (matrix, zonal, lightmap) is one entry here and one module.
+import type { Material, Mesh } from 'three';
+import type { TransferExtension } from './glb.js';
+import type { Lighting } from './lighting.js';
+
+/** What a kind is given to read itself from. */
+export interface TransferSource {
+  extension: TransferExtension;
+  /** Bytes of a buffer view; rejects where there is none. */
+  bufferView(index: number): Promise<ArrayBuffer>;
+  /** The mesh that draws a part. Throws LambentError where the file has none. */
+  mesh(part: TransferExtension['parts'][number]): Mesh;
+}
+
+/** The transfer of one file, bound to its meshes. */
+export interface BakedTransfer {
+  readonly kind: string;
+  readonly order: number;
+  readonly channels: number;
+  readonly receivers: number;
+  /** In the file, and what the same takes on the graphics card, receiver indices included. */
+  readonly fileBytes: number;
+  readonly gpuBytes: number;
+  /** Meshes whose material is ours now. */
+  readonly meshes: Mesh[];
+  /** Shows the meshes under this light. Writes a few hundred bytes of uniforms and nothing else. */
+  relight(lighting: Lighting): void;
+  /**
+   * Materials that show one coefficient of transfer in false colour, one a mesh in the order of `meshes`; `gain` is a shared uniform.
+   * Made on demand; the caller disposes of them.
+   */
+  coefficientMaterials(index: number, gain: { value: number }): Material[];
+  dispose(): void;
+}
+
+export interface TransferKind {
+  name: string;
+  load(source: TransferSource): Promise<BakedTransfer>;
+}
+
+const kinds = new Map<string, TransferKind>();
+export const registerTransferKind = (kind: TransferKind): void => void kinds.set(kind.name, kind);
+export const transferKind = (name: string): TransferKind | undefined => kinds.get(name);
+export const knownKinds = (): string[] => [...kinds.keys()];

@@ -1,0 +1,72 @@
+// The GLTFLoader plugin: `new GLTFLoader().register((parser) => new LambentTransferPlugin(parser))`. A file with our extension
+// comes with `gltf.userData.lambent`, a BakedScene; files without it are left alone.
+import type { Mesh, Object3D } from 'three';
+import type { GLTF, GLTFLoaderPlugin, GLTFParser } from 'three/addons/loaders/GLTFLoader.js';
+import { LambentError } from './errors.js';
+import { extensionName, transferExtension, type TransferExtension } from './glb.js';
+import { transferKind, type BakedTransfer, type TransferSource } from './kinds.js';
+import type { Lighting } from './lighting.js';
+
+export interface BakedScene {
+  transfer: BakedTransfer;
+  /** What the bake was told and what it reported. */
+  provenance: unknown;
+  relight(lighting: Lighting): void;
+  dispose(): void;
+}
+
+/** The baked scene of a loaded file, or undefined. */
+export const bakedScene = (gltf: { userData: Record<string, unknown> }): BakedScene | undefined => gltf.userData['lambent'] as BakedScene | undefined;
+
+interface Association {
+  nodes?: number;
+  primitives?: number;
+}
+
+/** Meshes by node and primitive. */
+function findMeshes(gltf: GLTF, parser: GLTFParser): Map<string, Mesh> {
+  const meshes = new Map<string, Mesh>();
+  const of = (object: Object3D): Association | undefined => parser.associations.get(object);
+  for (const scene of gltf.scenes)
+    scene.traverse((object) => {
+      const primitive = of(object)?.primitives;
+      if (!(object as Mesh).isMesh || primitive === undefined) return;
+      let owner: Object3D | null = object;
+      while (owner && of(owner)?.nodes === undefined) owner = owner.parent;
+      if (owner) meshes.set(`${of(owner)!.nodes} ${primitive}`, object as Mesh);
+    });
+  return meshes;
+}
+
+export class LambentTransferPlugin implements GLTFLoaderPlugin {
+  readonly name = extensionName;
+
+  constructor(private readonly parser: GLTFParser) {}
+
+  async afterRoot(gltf: GLTF): Promise<void> {
+    const document = this.parser.json as { extensions?: Record<string, unknown>; bufferViews?: unknown[] };
+    if (document.extensions?.[extensionName] === undefined) return;
+    const extension = transferExtension(document);
+    const meshes = findMeshes(gltf, this.parser);
+    const source: TransferSource = {
+      extension,
+      bufferView: async (index) => {
+        if (index >= (document.bufferViews?.length ?? 0)) throw new LambentError(`buffer view ${index} does not exist`);
+        return (await this.parser.getDependency('bufferView', index)) as ArrayBuffer;
+      },
+      mesh: ({ node, primitive }: TransferExtension['parts'][number]) => {
+        const mesh = meshes.get(`${node} ${primitive}`);
+        if (!mesh) throw new LambentError(`node ${node}, primitive ${primitive} has transfer but no mesh`);
+        return mesh;
+      },
+    };
+    const transfer = await transferKind(extension.transfer.kind)!.load(source);
+    const baked: BakedScene = {
+      transfer,
+      provenance: extension.provenance,
+      relight: (lighting) => transfer.relight(lighting),
+      dispose: () => transfer.dispose(),
+    };
+    gltf.userData['lambent'] = baked;
+  }
+}

@@ -1,0 +1,67 @@
+// What baking is compared with: a diffuse surface under the same light, but with nothing in its way. Exit radiance of white is
+// sum_lm A_l / pi L_lm y_lm(n), by the Funk-Hecke theorem (docs/theory.md), summed at the vertex so that it is interpolated as baked
+// transfer is. A_l vanishes for odd l beyond 1; what is left is generated without loops.
+import { MeshBasicMaterial, type WebGLProgramParametersWithUniforms, type MeshBasicMaterialParameters } from 'three';
+import type { Lighting } from './lighting.js';
+import { replaceOnce, whiteLine } from './prt_material.js';
+import { clampedCosine, legendre, shBand, shCount, shIndex } from './sh.js';
+
+/** Indices of the harmonics that irradiance has. */
+export const irradianceIndices = (order: number): number[] =>
+  Array.from({ length: shCount(order) }, (_, i) => i).filter((i) => clampedCosine(shBand(i)) !== 0);
+
+/** GLSL that adds to `even` and `odd` the sums over harmonics of the normal `n`, by the recurrences of sh.ts. */
+export function glslIrradiance(order: number): string {
+  const number = (x: number): string => x.toExponential(9);
+  const place = new Map(irradianceIndices(order).map((index, at) => [index, at]));
+  const lines = ['float c = 1.0, s = 0.0, q0, q1, q2, t;'];
+  for (let m = 0; m < order; ++m) {
+    lines.push(`q1 = ${number(legendre.diagonal[m]!)}; q2 = 0.0;`);
+    for (let l = m; l < order; ++l) {
+      if (l > m) lines.push(`q0 = ${number(legendre.a(l, m))} * n.z * q1 + ${number(legendre.b(l, m))} * q2; q2 = q1; q1 = q0;`);
+      const sum = l % 2 ? 'odd' : 'even', cosine = place.get(shIndex(l, m)), sine = place.get(shIndex(l, -m));
+      if (cosine !== undefined) lines.push(`${sum} += q1 * c * irradianceLight[ ${cosine} ];`);
+      if (m > 0 && sine !== undefined) lines.push(`${sum} += q1 * s * irradianceLight[ ${sine} ];`);
+    }
+    lines.push('t = c * n.x - s * n.y; s = c * n.y + s * n.x; c = t;');
+  }
+  return lines.join('\n  ');
+}
+
+export class UnshadowedMaterial extends MeshBasicMaterial {
+  private readonly light: { value: Float32Array };
+
+  constructor(
+    readonly order: number,
+    parameters: MeshBasicMaterialParameters = {},
+  ) {
+    super(parameters);
+    this.light = { value: new Float32Array(3 * irradianceIndices(order).length) };
+  }
+
+  relight(lighting: Lighting): void {
+    const light = lighting.coefficients(this.order);
+    irradianceIndices(this.order).forEach((index, at) => {
+      for (let c = 0; c < 3; ++c) this.light.value[3 * at + c] = (light[3 * index + c]! * clampedCosine(shBand(index))) / Math.PI;
+    });
+  }
+
+  override onBeforeCompile(shader: WebGLProgramParametersWithUniforms): void {
+    shader.uniforms['irradianceLight'] = this.light;
+    const declarations = `uniform vec3 irradianceLight[ ${irradianceIndices(this.order).length} ];\nvarying vec3 vEven;\nvarying vec3 vOdd;\n`;
+    const body = `
+  vec3 n = normalize( ( vec4( transformedNormal, 0.0 ) * viewMatrix ).xyz );
+  vec3 even = vec3( 0.0 ), odd = vec3( 0.0 );
+  ${glslIrradiance(this.order)}
+  vEven = even; vOdd = odd;`;
+    const withNormals = replaceOnce(shader.vertexShader, '#if defined ( USE_ENVMAP ) || defined ( USE_SKINNING )', '#if 1');
+    shader.vertexShader = declarations + replaceOnce(withNormals, '#include <fog_vertex>', '#include <fog_vertex>' + body);
+    // On the back the normal is the other way, and odd harmonics change sign.
+    shader.fragmentShader = 'varying vec3 vEven;\nvarying vec3 vOdd;\n' + replaceOnce(shader.fragmentShader, whiteLine,
+      'reflectedLight.indirectDiffuse += max( gl_FrontFacing ? vEven + vOdd : vEven - vOdd, vec3( 0.0 ) );');
+  }
+
+  override customProgramCacheKey(): string {
+    return `lambent unshadowed ${this.order}`;
+  }
+}
