@@ -11,7 +11,7 @@ namespace {
 constexpr double pi_d = std::numbers::pi;
 constexpr int angles = 256;         // rays in the cross-section for bounces
 constexpr int profile = 512;        // pieces of the groove's outline
-constexpr double ridge = 1e-5;      // shallow grooves need one lobe: keeps the others from growing against each other
+constexpr double ridge = 1e-4;         // shallow grooves need one lobe: keeps the others from growing against each other, and entries alike
 
 double groove_height(double x, double depth) { return std::abs(x) < 0.5 ? -depth * std::cos(pi_d * x) * std::cos(pi_d * x) : 0; }
 

@@ -61,7 +61,7 @@ TEST(Wrinkle, IsWhatTheBakeOfALongGrooveFinds) {
 TEST(Wrinkle, LobesCorrespondSoThatTheTableInterpolates) {
   auto table = make_wrinkle_table({});
   ASSERT_TRUE(table);
-  EXPECT_LT(table->rms, 0.05);
+  EXPECT_LT(table->rms, 0.07);
   // Between the entries, in place and depth. What interpolation of the exact vectors would miss is counted as well: the table's lobes must
   // not add much to it, as they would if they were mixed up.
   double error = 0, plain = 0, total = 0;

@@ -6,10 +6,10 @@
 // by the addition theorem: only the target is ever evaluated, at the axes alone. What is left to minimise is a function of 2N angles,
 //   psi(s) = |t|^2 - sum_l b_l . g_l,
 // (variable projection) by Newton's method, damped, with its exact gradient and Hessian.
+#include <lambent/core/aligned.h>
+
 #include <cstddef>
 #include <vector>
-
-#include <lambent/core/aligned.h>
 
 namespace lambent {
 

@@ -50,6 +50,9 @@ std::optional<Channel> read_channel(GltfCheck& check, const GltfDocument& docume
   if (!check.ok()) return std::nullopt;
   if (c.input.components != 1 || c.input.type != GltfType::f32 || c.input.count == 0)
     return check.fail(where, "a sampler's times are not floats, or none"), std::nullopt;
+  // Accessors without bytes are all zeros, as many as they like to say.
+  if ((c.input.data.empty() || c.output.data.empty()) && std::max(c.input.count, c.output.count) > 4096)
+    return check.fail(where, "a sampler's accessor has no bytes"), std::nullopt;
   const size_t keys = c.input.count * (c.interpolation == Interpolation::cubic ? 3 : 1);
   const bool weights = c.path == "weights";
   c.width = weights ? c.output.count / keys : c.path == "rotation" ? 4 : 3;
