@@ -145,7 +145,8 @@ void bench_radiosity() {
   bench_operator("courtyard", make_courtyard());
   if (auto scene = data_scene("zdm2_level.glb", false)) bench_operator("zdm2_level.glb", std::move(*scene));
   bench_solvers();
-  bench_growth();
 }
+
+void bench_lightmaps() { bench_growth(); }
 
 }  // namespace lambent::bench

@@ -38,6 +38,14 @@ extern "C" int LLVMFuzzerTestOneInput(const uint8_t* data, size_t size) {
         lambent::evaluate_outgoing(*baked->outgoing, r, lambent::Vec3(0.6f, 0, 0.8f), weights);
         sum += lambent::reflect_rows(weights, lambent::Vec3(1), [&](size_t row) { return relit.at(r, int(row)); }).x;
       }
+  std::visit([&](const auto& basis) {
+    for (uint32_t t = 0; t < baked->scene.triangles.size(); ++t)
+      for (bool front : {true, false})
+        if (const auto* at = basis.find(t, front))
+          basis.spread(*at, 0.3f, 0.6f, [&](uint32_t receiver, float weight) {
+            for (int row = 0; row < relit.rows; ++row) sum += weight * relit.at(receiver, row).x;
+          });
+  }, baked->basis);
   if (baked->lattice) {
     const lambent::Lattice& l = baked->lattice->lattice;
     lambent::relight(baked->lattice->transfer, light, relit);

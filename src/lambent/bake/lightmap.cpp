@@ -44,10 +44,21 @@ double seconds_since(std::chrono::steady_clock::time_point start) {
 
 }  // namespace
 
+size_t least_lightmap_memory(size_t receivers, size_t groups, const LightmapOptions& o) {
+  const size_t harmonics = size_t(sh_count(o.order)), width = pad_lanes(3 * (harmonics + groups));
+  // e, x and the next x; GMRES keeps its Krylov vectors; directional rows.
+  const size_t vectors = o.converge > 0 && o.solver == Solver::gmres ? 13 : 3;
+  const size_t rows = o.directional == DirectionalKind::none ? 0 : size_t(directional_rows(o.directional));
+  return 4 * receivers * (width * (vectors + rows) + harmonics);
+}
+
 Result<Lightmap> bake_lightmap(const Scene& scene, const Tracer& tracer, const Receivers& receivers, const Lamps& lamps,
                                const LightmapOptions& o, bool direct_apart, LightmapReport* report, Progress* progress) {
   if (auto ok = check_options(scene, lamps, o); !ok) return ok.error();
   if (receivers.count() == 0) return Error{scene.path, "nothing to bake: no triangle has an area"};
+  const size_t least = least_lightmap_memory(receivers.count(), lamps.groups(), o);
+  if (o.memory < least)
+    return Error{scene.path, "baking needs at least " + std::to_string(least) + " bytes of working memory, and was allowed " + std::to_string(o.memory)};
   LightmapReport unwanted;
   LightmapReport& r = report ? *report : unwanted;
   r = {};
@@ -60,7 +71,7 @@ Result<Lightmap> bake_lightmap(const Scene& scene, const Tracer& tracer, const R
   std::vector<float> sky(harmonics ? n * harmonics : 0);
   const bool bounces = o.converge > 0 || o.bounces > 0;
   const GatherDirect direct{lamps, o.lamp_samples, e.data() + 3 * harmonics, width};
-  auto op = GatherOperator::trace(setup, lamps.groups() ? &direct : nullptr, harmonics ? sky.data() : nullptr, bounces, o.memory, progress);
+  auto op = GatherOperator::trace(setup, lamps.groups() ? &direct : nullptr, harmonics ? sky.data() : nullptr, bounces, o.memory - least, progress);
   if (!op) return op.error();
   parallel_for(harmonics ? n : 0, gather_block, [&](size_t begin, size_t end) {
     for (size_t i = begin; i < end; ++i)

@@ -18,7 +18,7 @@ struct LightmapOptions {
   double converge = 0;              // above 0: as many bounces as leave this residual (SolveOptions::tolerance)
   Solver solver = Solver::gmres;    // for `converge`
   DirectionalKind directional = DirectionalKind::none;  // rows of the transfer; others than none take order 0
-  size_t memory = size_t{4} << 30;  // bytes for the hit rows; those beyond are traced again at each bounce
+  size_t memory = size_t{4} << 30;  // bytes of working memory beyond scene and result; less means rays traced again
   uint32_t seed = 1;
   Precision precision = Precision::half;
 };
@@ -34,7 +34,11 @@ struct LightmapReport {
   SolveReport solve;  // empty where bounces are counted
 };
 
-// Errors: options out of range, nothing that gives light (no groups and order 0), too many columns; cancelled.
+// Least working memory with which such a bake can run: the solution vectors. What is more holds the operator.
+size_t least_lightmap_memory(size_t receivers, size_t groups, const LightmapOptions& options);
+
+// Errors: options out of range, nothing that gives light (no groups and order 0), too many columns; memory too small (says what is
+// needed); cancelled.
 Result<Lightmap> bake_lightmap(const Scene& scene, const Tracer& tracer, const Receivers& receivers, const Lamps& lamps,
                                const LightmapOptions& options, bool direct_apart, LightmapReport* report = nullptr,
                                Progress* progress = nullptr);

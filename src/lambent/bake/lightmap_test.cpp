@@ -288,8 +288,13 @@ TEST(Lightmap, TheSameBytesWhateverTheThreadsAndTheMemory) {
   const auto expected = bytes_with(1, size_t{4} << 30, &kept);
   EXPECT_EQ(kept, 1);
   EXPECT_EQ(bytes_with(2, size_t{4} << 30, &kept), expected);
-  EXPECT_EQ(bytes_with(2, 200000, &kept), expected);
+  Scene scene = corner(true);
+  const size_t least = least_lightmap_memory(place(scene, Where::texels, 10).count(), 3, {});
+  EXPECT_EQ(bytes_with(2, least + 200000, &kept), expected);
   EXPECT_LT(kept, 0.9);
+  auto tracer = Tracer::build(scene);
+  const Lamps lamps = make_lamps(scene, nullptr, false);
+  EXPECT_FALSE(bake_lightmap(scene, *tracer, make_vertex_receivers(scene), lamps, {.memory = 1000}, false));
 }
 
 TEST(Lightmap, RefusesWhatCannotBeBaked) {

@@ -39,6 +39,12 @@ bool any_two_sided(const Scene& scene) {
   return std::any_of(scene.triangles.begin(), scene.triangles.end(), [](const Triangle& t) { return t.two_sided; });
 }
 
+Result<void> check_texels(int64_t width, int64_t height, const AtlasOptions& o) {
+  if (width * height <= max_atlas_texels) return {};
+  return Error{o.texels_per_unit > 0 ? "--texels-per-unit" : "--atlas",
+               "makes an atlas of " + size_text(width, height) + ", more than " + std::to_string(max_atlas_texels) + " texels"};
+}
+
 // Uses the scene's own coordinates, or says in `remark` why not. Backs, where there are any, get the same layout below.
 Result<bool> reuse_texcoords(const Scene& scene, const AtlasOptions& o, Atlas& atlas) {
   const std::vector<Vec2>& uv = scene.texcoords[1];
@@ -69,6 +75,7 @@ Result<bool> reuse_texcoords(const Scene& scene, const AtlasOptions& o, Atlas& a
     atlas.width = o.width, atlas.height = o.height / layers;
     if (atlas.height < 1) return refuse("the atlas has no room for both sides");
   }
+  if (auto ok = check_texels(atlas.width, int64_t(atlas.height) * layers, o); !ok) return ok.error();
   atlas.texels_per_unit = float(std::sqrt(covered * atlas.width * atlas.height / surface));
   std::vector<Vec2> at(uv.size());
   for (size_t v = 0; v < uv.size(); ++v) at[v] = uv[v] * Vec2(float(atlas.width), float(atlas.height));
@@ -287,6 +294,7 @@ Result<void> check_options(const Scene& scene, const AtlasOptions& o) {
   return {};
 }
 
+
 }  // namespace
 
 Result<Atlas> make_atlas(Scene& scene, const AtlasOptions& o) {
@@ -310,6 +318,7 @@ Result<Atlas> make_atlas(Scene& scene, const AtlasOptions& o) {
     auto fitted = o.texels_per_unit > 0 ? fit_density(layout, o) : fit_size(layout, o);
     if (!fitted) return fitted.error();
     fit = std::move(*fitted);
+    if (auto ok = check_texels(fit.width, o.height ? o.height : fit.packing.height, o); !ok) return ok.error();
     if (round == most_layers || part_overlaps(layout, fit.density, layers) == 0) break;
   }
   atlas.charts = layout.charts.count, atlas.texels_per_unit = float(fit.density);

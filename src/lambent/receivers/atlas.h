@@ -6,6 +6,7 @@
 namespace lambent {
 
 inline constexpr int max_atlas_side = 16384;
+inline constexpr int64_t max_atlas_texels = int64_t{1} << 26;
 
 struct AtlasOptions {
   float texels_per_unit = 0;  // texels along one scene unit; 0: as many as `width` x `height` can hold
