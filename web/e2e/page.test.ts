@@ -1,6 +1,7 @@
 // The page under the hand, and what it says when something is wrong.
-import { copyFileSync, readFileSync, writeFileSync } from 'node:fs';
-import { request } from 'node:http';
+import { copyFileSync, existsSync, readFileSync, rmSync, writeFileSync } from 'node:fs';
+import { createServer, request } from 'node:http';
+import type { AddressInfo } from 'node:net';
 import { join } from 'node:path';
 import type { Browser, Page } from 'playwright-core';
 import { afterAll, beforeAll, describe, expect, it } from 'vitest';
@@ -212,6 +213,48 @@ describe.skipIf(!haveTool || !haveBrowser)('the page', () => {
       expect(box.y + box.height).toBeLessThanOrEqual(640);
     }
     expect(await page.evaluate(() => document.documentElement.scrollWidth)).toBeLessThanOrEqual(360);
+    await page.close();
+  });
+});
+
+describe.skipIf(!haveTool || !haveBrowser)('an exported folder', () => {
+  const folder = makeFolder(), types: Record<string, string> = { html: 'text/html', js: 'text/javascript', css: 'text/css' };
+  // Any server of files; the page lies in a folder of it.
+  const host = createServer((request, response) => {
+    const path = join(folder, new URL(request.url ?? '/', 'http://host').pathname.replace(/\/$/, '/index.html'));
+    if (!existsSync(path)) return void response.writeHead(404).end();
+    response.writeHead(200, { 'content-type': types[path.replace(/.*\./, '')] ?? 'application/octet-stream' }).end(readFileSync(path));
+  });
+  let browser: Browser, address = '';
+
+  beforeAll(async () => {
+    writeBall(join(folder, 'ball.obj'));
+    lambent('bake', join(folder, 'ball.obj'), '--samples', '64', '-o', join(folder, 'ball.glb'));
+    lambent('export', join(folder, 'ball.glb'), '--env', 'sky:elevation=20,azimuth=70', '--web', join(folder, 'site'));
+    await new Promise<void>((resolve) => host.listen(0, '127.0.0.1', resolve));
+    address = `http://127.0.0.1:${(host.address() as AddressInfo).port}/site/`;
+    browser = await launch();
+  });
+  afterAll(async () => {
+    await browser?.close();
+    host.close();
+  });
+
+  it('shows its scene from any server', async () => {
+    const page = await open(browser, address, '', 400, 400);
+    expect(await page.textContent('#name')).toBe('ball.glb');
+    expect(await page.textContent('#env')).toBe('sky:elevation=20,azimuth=70');
+    await page.close();
+  });
+
+  it('asks for a file where it has none, and takes it', async () => {
+    rmSync(join(folder, 'site/lambent.json'));
+    const page = await open(browser, address, '', 400, 400);
+    expect(await page.isVisible('#invitation')).toBe(true);
+    await page.setInputFiles('#file', join(folder, 'ball.glb'));
+    await page.waitForFunction(() => document.title === 'ball.glb');
+    expect(await page.isVisible('#invitation')).toBe(false);
+    expect(await page.isVisible('#problem')).toBe(false);
     await page.close();
   });
 });
