@@ -27,7 +27,7 @@ struct BakeCommand {
   ZonalFitOptions zonal;
   LatticeOptions lattice;
   std::string lattice_points, lattice_box;
-  std::string transfer = "diffuse", membrane, outgoing = "svd:6", simulate = "recursion", fix_light, output, shadows = "on", precision = "half", bounces = "3";
+  std::string transfer = "diffuse", membrane, outgoing = "map", simulate = "recursion", fix_light, output, shadows = "on", precision = "half", bounces = "3";
   ReceiverFlags receivers;
   LightmapFlags lightmap;
   bool order_given = false;

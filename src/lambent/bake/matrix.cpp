@@ -534,7 +534,7 @@ struct MatrixBaker {
 bool tints(const Brdf& brdf) {
   for (uint32_t i = 0; i < 16; ++i) {
     const Vec3 wo = square_to_cosine_hemisphere(sobol_owen(i, 1));
-    for (const Vec3 wi : {Vec3(-wo.x, -wo.y, wo.z), square_to_cosine_hemisphere(sobol_owen(i, 2))}) {
+    for (const Vec3& wi : {Vec3(-wo.x, -wo.y, wo.z), square_to_cosine_hemisphere(sobol_owen(i, 2))}) {
       const Vec3 f = evaluate(brdf, wi, wo);
       const float most = std::max({f.x, f.y, f.z}), least = std::min({f.x, f.y, f.z});
       if (most - least > 1e-5f * most) return true;
