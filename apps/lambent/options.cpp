@@ -109,8 +109,8 @@ Result<Mat3> light_rotation(const LightOptions& options) {
   return rotation_from_yaw_pitch_roll({(*n)[0], (*n)[1], (*n)[2]});
 }
 
-void BrdfOptions::add_to(CLI::App& command) {
-  command.add_option("--brdf", brdf, std::string("How surfaces reflect: diffuse (by base colour), materials (glTF's metallic-roughness), "
+CLI::Option* BrdfOptions::add_to(CLI::App& command) {
+  return command.add_option("--brdf", brdf, std::string("How surfaces reflect: diffuse (by base colour), materials (glTF's metallic-roughness), "
                                                  "or one model for all: ") + brdf_syntax)->capture_default_str();
 }
 

@@ -44,7 +44,7 @@ Result<Mat3> light_rotation(const LightOptions& options);
 
 struct BrdfOptions {
   std::string brdf = "diffuse";
-  void add_to(CLI::App& command);
+  CLI::Option* add_to(CLI::App& command);
 };
 Result<Reflection> load_reflection(const BrdfOptions& options);
 
