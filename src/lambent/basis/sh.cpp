@@ -34,7 +34,7 @@ const LegendreTables& tables() {
 
 template <class T>
 void evaluate(int order, T x, T y, T z, std::span<T> out) {
-  LAMBENT_CHECK(order >= 1 && order <= n_max && out.size() >= size_t(sh_count(order)));
+  LAMBENT_CHECK(order >= 0 && order <= n_max && out.size() >= size_t(sh_count(order)));
   const LegendreTables& t = tables();
   T c = 1, s = 0;  // real and imaginary part of (x + iy)^m
   for (int m = 0; m < order; ++m) {
