@@ -70,15 +70,20 @@ int run_inspect(Context& context, const std::string& path) {
     auto baked = load_baked(path);
     if (!baked) return fail(baked.error());
     const Transfer& t = baked->transfer;
+    nlohmann::json lobes = nlohmann::json::array();
+    for (const Lobe& l : t.light.lobes) lobes.push_back({{"axis", vector_json(l.axis)}, {"sharpness", l.sharpness}});
     nlohmann::json d{{"file", path}, {"kind", "baked"}, {"scene", describe_scene(baked->scene)},
-                     {"transfer", {{"order", t.light.order}, {"channels", t.channels}, {"receivers", t.receivers}, {"bytes", t.bytes()},
+                     {"transfer", {{"order", t.light.order}, {"lobes", lobes}, {"groups", t.light.groups}, {"columns", t.columns()}, {"channels", t.channels}, {"receivers", t.receivers}, {"bytes", t.bytes()},
                                    {"precision", t.precision == Precision::half ? "half" : "single"}}},
                      {"provenance", nlohmann::json::parse(baked->provenance, nullptr, false)}};
     if (context.json) {
       print_json(d);
     } else {
-      fmt::print("{}\n  baked: order {}, {} channel{}, {} receivers, {} ({})\n", path, t.light.order, t.channels, t.channels == 1 ? "" : "s",
+      fmt::print("{}\n  baked: {}, {} channel{}, {} receivers, {} ({})\n", path, describe_light(t.light), t.channels, t.channels == 1 ? "" : "s",
                  human_count(t.receivers), human_bytes(double(t.bytes())), t.precision == Precision::half ? "half" : "single");
+      for (const Lobe& l : t.light.lobes)
+        fmt::print("  lobe about ({:.4f}, {:.4f}, {:.4f}), sharpness {:.4g}: {:.2g} degrees across\n", l.axis.x, l.axis.y, l.axis.z, l.sharpness,
+                   std::min(180.0, double(glm::degrees(2 / std::sqrt(l.sharpness)))));
       print_scene(d["scene"]);
       fmt::print("  provenance {}\n", d["provenance"].dump(-1, ' ', false, nlohmann::json::error_handler_t::replace));
     }

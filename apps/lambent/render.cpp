@@ -2,7 +2,7 @@
 #include "options.h"
 
 #include <lambent/baked/baked_file.h>
-#include <lambent/light/project.h>
+#include <lambent/relight/light.h>
 #include <lambent/relight/relight.h>
 #include <lambent/render/render.h>
 
@@ -33,16 +33,13 @@ int run_render(Context& context, const RenderCommand& o) {
   auto env = load_light(o.light);
   if (!env) return fail(env.error());
 
-  // light: projected once, turned and windowed as coefficients.
-  const int order = o.light_order ? std::min(o.light_order, baked->transfer.light.order) : baked->transfer.light.order;
-  std::vector<Vec3> light = rotate_sh(make_sh_rotation(order, *rotation), project_environment(*env, order));
-  const std::vector<float> window = apply_sh_window(o.window, light);
-  light.resize(baked->transfer.columns(), Vec3(0.0f));
+  // light
+  const LightProjection projection = project_light(*env, baked->transfer.light, *rotation, o.light_order, o.window);
 
   // T . light
   Relit relit;
   const auto start = std::chrono::steady_clock::now();
-  relight(baked->transfer, light, relit);
+  relight(baked->transfer, projection.light, relit);
   const double relight_seconds = std::chrono::duration<double>(std::chrono::steady_clock::now() - start).count();
 
   // O(view)
@@ -60,8 +57,8 @@ int run_render(Context& context, const RenderCommand& o) {
   if (auto ok = save_image(o.view.output, *image, o.view.exposure); !ok) return fail(ok.error());
 
   if (context.json)
-    print_json({{"output", o.view.output}, {"receivers", baked->transfer.receivers}, {"order", order}, {"window", window},
-                {"relight_seconds", relight_seconds}});
+    print_json({{"output", o.view.output}, {"receivers", baked->transfer.receivers}, {"order", projection.window.size()},
+                {"lobes", projection.basis.lobes.size()}, {"window", projection.window}, {"relight_seconds", relight_seconds}});
   else
     fmt::print("{}\n  relit {} receivers in {:.2f} ms\n", o.view.output, human_count(baked->transfer.receivers), 1e3 * relight_seconds);
   return success;
@@ -75,9 +72,9 @@ void add_render(CLI::App& app, Run& run) {
   c->add_option("baked", o->baked, "Baked file, from `lambent bake`")->required();
   o->light.add_to(*c);
   o->view.add_to(*c);
-  c->add_option("--window", o->window, "Against ringing: none, hann, lanczos, or auto (as weak as keeps open surfaces from going dark)")
+  c->add_option("--window", o->window, "Against ringing of the harmonics: none, hann, lanczos, or auto (as weak as keeps open surfaces from going dark)")
       ->transform(CLI::CheckedTransformer(window_names).description("{none,hann,lanczos,auto}"));
-  c->add_option("--light-order", o->light_order, "Use only this many bands of the baked ones")->check(CLI::Range(1, max_sh_order));
+  c->add_option("--light-order", o->light_order, "Use only this many bands of the baked ones; lobes are kept")->check(CLI::Range(1, max_sh_order));
   c->add_option("--spp", o->samples, "Rays a pixel")->check(CLI::Range(1, 4096))->capture_default_str();
   c->add_flag("--no-albedo", o->no_albedo, "Draw everything as if it were white");
   c->callback([o, &run] { run = [o](Context& context) { return run_render(context, *o); }; });
