@@ -50,18 +50,22 @@ std::vector<Lobe> find_lamps(const Environment& env, int count) {
     if (taken[peak]) continue;
     const double edge = std::max(edge_of_peak * brightness(peak), least_over_mean * mean);
     region.assign(1, peak), taken[peak] = 1;
-    double strength = 0;
-    glm::dvec3 moment(0);
-    for (size_t k = 0; k < region.size(); ++k) {
-      const int x = int(region[k] % size_t(w)), y = int(region[k] / size_t(w));
-      strength += brightness(region[k]) * texel_solid_angle(y, w, h);
-      moment += brightness(region[k]) * texel_moment(x, y, w, h);
+    auto grow = [&](size_t texel, double least) {
+      const int x = int(texel % size_t(w)), y = int(texel / size_t(w));
       for (int dy = -1; dy <= 1; ++dy)
         for (int dx = -1; dx <= 1; ++dx) {
           if (y + dy < 0 || y + dy >= h) continue;
           const size_t beside = size_t(y + dy) * size_t(w) + size_t((x + dx + w) % w);
-          if (!taken[beside] && brightness(beside) >= edge) region.push_back(beside), taken[beside] = 1;
+          if (!taken[beside] && brightness(beside) >= least) region.push_back(beside), taken[beside] = 1;
         }
+    };
+    for (size_t k = 0; k < region.size(); ++k) grow(region[k], edge);
+    for (size_t k = 0, inside = region.size(); k < inside; ++k) grow(region[k], 0);  // the rim
+    double strength = 0;
+    glm::dvec3 moment(0);
+    for (size_t texel : region) {
+      strength += brightness(texel) * texel_solid_angle(int(texel / size_t(w)), w, h);
+      moment += brightness(texel) * texel_moment(int(texel % size_t(w)), int(texel / size_t(w)), w, h);
     }
     const double length = glm::length(moment), sharpness = sharpness_of(length / strength);
     if (sharpness >= least_sharpness) lamps.push_back({strength, {Vec3(moment / length), float(sharpness)}});

@@ -1,6 +1,7 @@
 #include <lambent/core/random.h>
 #include <lambent/light/lamps.h>
 #include <lambent/light/project.h>
+#include <lambent/light/sky.h>
 
 #include <gtest/gtest.h>
 
@@ -58,14 +59,28 @@ TEST(EnvironmentLamps, HaveTheSharpnessOfALobe) {
     const Vec3 axis = glm::normalize(Vec3(0.4f, 0.3f, -0.7f));
     const auto basis = make_directional_basis(0, LobeKind::von_mises_fisher, {{axis, s}});
     const std::vector<Vec3> one{Vec3(1)};
-    const auto lamps = find_lamps(reconstruct_environment(basis, one), 3);
+    const auto lamps = find_lamps(reconstruct_environment(basis, one, 4096), 3);
     ASSERT_GE(lamps.size(), 1u);
     EXPECT_LT(glm::distance(lamps[0].axis, axis), 0.05f / std::sqrt(s));
-    // Cut where it has fallen to c = 1/5 a sharp lobe's mean of 1 - cos is (1 - c + c ln c) / (1 - c) / s; not so sharp ones are
-    // cut earlier, at four times the mean.
-    const float expected = s * 0.8f / (0.8f + 0.2f * std::log(0.2f));
-    EXPECT_NEAR(lamps[0].sharpness / expected, 1, s < 50 ? 0.3f : 0.02f) << s;
+    // Cut where it has fallen to c a sharp lobe's mean of 1 - cos is (1 - c + c ln c) / (1 - c) / s. That is a texel beyond where it
+    // has fallen to 1/5; not so sharp ones are cut earlier, at four times the mean.
+    const float radius = std::sqrt(2 * std::log(5.0f) / s) + 2 * pi / 4096, c = std::exp(-0.5f * s * radius * radius);
+    const float expected = s * (1 - c) / (1 - c + c * std::log(c));
+    EXPECT_NEAR(lamps[0].sharpness / expected, 1, s < 50 ? 0.3f : 0.03f) << s;
   }
+}
+
+TEST(EnvironmentLamps, TheSunIsOneWhereverItStands) {
+  // Its disc covers a few texels, some of them in part.
+  for (float azimuth : {30.0f, 30.1f, 30.2f, 77.3f})
+    for (int width : {512, 1024, 2048}) {
+      auto sky = make_sky({.elevation = 40, .azimuth = azimuth, .width = width});
+      ASSERT_TRUE(sky);
+      const auto lamps = find_lamps(*sky, 5);
+      ASSERT_EQ(lamps.size(), 1u) << azimuth << " " << width;
+      const float e = glm::radians(40.0f), a = glm::radians(azimuth);
+      EXPECT_LT(glm::distance(lamps[0].axis, Vec3(std::cos(e) * std::cos(a), std::sin(e), std::cos(e) * std::sin(a))), 0.5f * 2 * pi / float(width));
+    }
 }
 
 TEST(EnvironmentLamps, AreNotTwiceTheSame) {
