@@ -1,7 +1,6 @@
 // The command-line tool, where it is built (LAMBENT_TOOL, or build/release/bin/lambent): the other half of every truth test.
 import { execFileSync } from 'node:child_process';
-import { existsSync, mkdtempSync, writeFileSync } from 'node:fs';
-import { tmpdir } from 'node:os';
+import { existsSync, mkdirSync, mkdtempSync, writeFileSync } from 'node:fs';
 import { join } from 'node:path';
 import { fileURLToPath } from 'node:url';
 
@@ -9,7 +8,12 @@ export const toolPath = process.env['LAMBENT_TOOL'] ?? fileURLToPath(new URL('..
 export const haveTool = existsSync(toolPath);
 if (!haveTool) console.warn(`skipped what compares with the tool: ${toolPath} is not built`);
 
-export const makeFolder = (): string => mkdtempSync(join(tmpdir(), 'lambent-web-'));
+/** A new folder under build/web-tests, which scripts/web empties before and leaves after: a failed test's pictures can be looked at. */
+export function makeFolder(): string {
+  const all = fileURLToPath(new URL('../../build/web-tests/', import.meta.url));
+  mkdirSync(all, { recursive: true });
+  return mkdtempSync(join(all, 'test-'));
+}
 
 export function lambent(...args: string[]): string {
   return execFileSync(toolPath, args, { encoding: 'utf8', stdio: ['ignore', 'pipe', 'pipe'], maxBuffer: 1 << 28 });
