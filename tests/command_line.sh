@@ -88,6 +88,28 @@ expect 2 'together' bake corner.obj --order 12 --lattice 2,2,2 --lattice-order 6
 for thread_count in 1 2; do "$tool" bake corner.obj --max-edge 0.3 --lattice 4,4,4 --samples 64 --threads $thread_count -o threads_$thread_count.glb >/dev/null 2>&1; done
 cmp -s threads_1.glb threads_2.glb && ok || bad "1 and 2 threads give different files"
 
+# Light of harmonics and lamps, and of lobes alone: the bake agrees with the reference under the same projection of the light.
+sun=sky:elevation=55,azimuth=120,width=256
+shot="--camera 3,2,4,1,0.5,1,40 --size 48x32 --background none"
+for light in "sh:5+lamps:2@$sun" directional:16; do
+  expect 0 'lobe' bake corner.obj --max-edge 0.1 --samples 1024 --light "$light" -o lamps.glb
+  expect 0 'sharpness' inspect lamps.glb
+  # shellcheck disable=SC2086
+  expect 0 'relit' render lamps.glb --env $sun --env-rotate 20,0,0 $shot --spp 256 -o lamps_lit.exr
+  # shellcheck disable=SC2086
+  expect 0 'paths' reference corner.obj --max-edge 0.1 --env $sun --env-rotate 20,0,0 --light-basis lamps.glb $shot --spp 256 -o lamps_truth.exr
+  expect 0 '"psnr"' compare lamps_lit.exr lamps_truth.exr --exposure -3 --json
+  psnr=$(sed -n 's/.*"psnr": \([0-9]*\).*/\1/p' stdout)
+  [ "${psnr:-0}" -ge 40 ] && ok || bad "baked and path-traced corners under $light differ: PSNR ${psnr:-none}"
+done
+expect 2 'env: is needed' render lamps.glb -o x.png
+expect 0 'lamps that stand out, not 64' bake corner.obj --samples 64 --bounces 0 --light sh:5+lamps:64@$sun -o lamps.glb
+expect 0 'order 3,' bake corner.obj --samples 64 --light sh:3+lamps:4@uniform:1 -o lamps.glb
+expect 0 'lamp group' bake corner.obj --samples 64 --light sh:3+lamps:1@$sun --fix-light $sun -o fixed.glb
+expect 0 'relit' render fixed.glb --size 24x24 -o fixed.png
+for thread_count in 1 2; do "$tool" bake corner.obj --max-edge 0.3 --samples 64 --light sh:4+lamps:3@$sun --threads $thread_count -o threads_$thread_count.glb >/dev/null 2>&1; done
+cmp -s threads_1.glb threads_2.glb && ok || bad "1 and 2 threads give different files"
+
 # Lightmaps: a box with a glowing ceiling, and a sky.
 cat >box.mtl <<'M'
 newmtl wall
@@ -207,6 +229,16 @@ expect 2 'rotate' render corner.glb --env uniform:1 --env-rotate nan,0,0 -o x.pn
 expect 2 'window' render corner.glb --env uniform:1 --window square -o x.png
 expect 2 'no reflection model' reference corner.obj --env uniform:1 --brdf glass -o x.png
 expect 2 'roughness must lie' reference corner.obj --env uniform:1 --brdf ggx:roughness=7 -o x.png
+for light in sh: sh:0 sh:17 sh:x sh:3x harmonics:3 directional: directional:3 directional:257 directional:-1 sh:3+ sh:3+lamps sh:3+lamps: sh:3+lamps:4 \
+  sh:3+lamps:4@ sh:3+lamps:0@uniform:1 sh:3+lamps:-2@uniform:1 sh:3+lamps:65@uniform:1 sh:3+lamps:x@uniform:1 sh:3+lamps:99999999999@uniform:1; do
+  expect 2 '^lambent: --light: ' bake corner.obj --light "$light" -o x.glb
+done
+expect 2 'give one' bake corner.obj --order 3 --light sh:3 -o x.glb
+expect 2 'light' bake corner.obj --transfer matrix --light directional:9 -o x.glb
+expect 2 'free space' bake corner.obj --light directional:9 --lattice 2,2,2 -o x.glb
+expect 2 'together' bake corner.obj --light sh:12 --lattice 2,2,2 --lattice-order 6 -o x.glb
+expect 2 'simulate paths' bake corner.obj --transfer matrix --simulate paths --light sh:3+lamps:1@$sun -o x.glb
+expect 2 'by --order' bake corner.obj --transfer zonal --light directional:9 -o x.glb
 expect 2 '.' bake
 expect 2 '.' nonsense
 
@@ -229,6 +261,11 @@ expect 1 'escape.gltf' bake escape.gltf -o x.glb
 expect 1 'nowhere.hdr' render corner.glb --env nowhere.hdr -o x.png
 : >empty.hdr
 expect 1 'empty.hdr' render corner.glb --env empty.hdr -o x.png
+expect 1 'nowhere.hdr' bake corner.obj --light sh:3+lamps:4@nowhere.hdr -o x.glb
+expect 1 'empty.hdr' bake corner.obj --light sh:3+lamps:4@empty.hdr -o x.glb
+expect 1 'elevation' bake corner.obj --light sh:3+lamps:4@sky:elevation=900 -o x.glb
+expect 1 'corner.obj' reference corner.obj --env uniform:1 --light-basis corner.obj -o x.png
+expect 1 'cut.glb' reference corner.obj --env uniform:1 --light-basis cut.glb -o x.png
 expect 1 'sky' render corner.glb --env sky:elevation=900 -o x.png
 expect 1 'memory' bake corner.obj --max-edge 0.1 --memory 1000 -o x.glb
 expect 1 'no folder' bake corner.obj -o nowhere/x.glb

@@ -9,11 +9,13 @@
 #include <lambent/compress/parametric.h>
 #include <lambent/compress/zonal_fit.h>
 #include <lambent/image/image.h>
-#include <lambent/light/project.h>
+#include <lambent/light/lamps.h>
 #include <lambent/relight/fix_light.h>
+#include <lambent/relight/light.h>
 
 #include <fmt/format.h>
 
+#include <charconv>
 #include <chrono>
 
 namespace lambent::tool {
@@ -27,7 +29,7 @@ struct BakeCommand {
   ZonalFitOptions zonal;
   LatticeOptions lattice;
   std::string lattice_points, lattice_box;
-  std::string transfer = "diffuse", membrane, outgoing = "map", simulate = "recursion", fix_light, output, shadows = "on", precision = "half", bounces = "3";
+  std::string light, transfer = "diffuse", membrane, outgoing = "map", simulate = "recursion", fix_light, output, shadows = "on", precision = "half", bounces = "3";
   ReceiverFlags receivers;
   LightmapFlags lightmap;
   bool order_given = false;
@@ -104,6 +106,47 @@ int bake_membrane(Context& context, const BakeCommand& o) {
   return success;
 }
 
+constexpr int max_lamps = 64, max_directional = 256;
+constexpr const char* light_syntax = "sh:BANDS, sh:BANDS+lamps:COUNT@ENV, or directional:COUNT";
+
+Result<int> parse_whole(const std::string& text, int least, int most, const std::string& what) {
+  int value = 0;
+  const auto [end, status] = std::from_chars(text.data(), text.data() + text.size(), value);
+  if (status != std::errc() || end != text.data() + text.size() || value < least || value > most)
+    return Error{"--light", what + " must be a whole number from " + std::to_string(least) + " to " + std::to_string(most) + ", not \"" + text + "\""};
+  return value;
+}
+
+// Sets the columns of light that `text` asks for; loads the environment it names, if any.
+Result<void> parse_light(const std::string& text, BakeOptions& bake) {
+  if (text.starts_with("directional:")) {
+    auto count = parse_whole(text.substr(12), 4, max_directional, "the count after directional:");
+    if (!count) return count.error();
+    bake.order = 0, bake.lobes = even_lobes(*count);
+    return {};
+  }
+  if (!text.starts_with("sh:")) return Error{"--light", "must be " + std::string(light_syntax) + ", not \"" + text + "\""};
+  const size_t plus = text.find('+');
+  auto order = parse_whole(text.substr(3, plus == std::string::npos ? plus : plus - 3), 1, max_sh_order, "the bands after sh:");
+  if (!order) return order.error();
+  bake.order = *order;
+  if (plus == std::string::npos) return {};
+  const std::string lamps = text.substr(plus + 1);
+  const size_t at = lamps.find('@');
+  if (!lamps.starts_with("lamps:") || at == std::string::npos || at + 1 == lamps.size())
+    return Error{"--light", "expects lamps:COUNT@ENV after the plus sign, not \"" + lamps + "\""};
+  auto count = parse_whole(lamps.substr(6, at - 6), 1, max_lamps, "the count after lamps:");
+  if (!count) return count.error();
+  const std::string name = lamps.substr(at + 1);
+  auto env = load_environment(name);
+  if (!env) return env.error();
+  warn(env->warnings);
+  bake.lobes = find_lamps(*env, *count);
+  const size_t found = bake.lobes.size();
+  if (found < size_t(*count)) warn(name + ": has " + std::to_string(found) + (found == 1 ? " lamp" : " lamps") + " that stand out, not " + std::to_string(*count));
+  return {};
+}
+
 using Clock = std::chrono::steady_clock;
 double seconds_since(Clock::time_point start) { return std::chrono::duration<double>(Clock::now() - start).count(); }
 
@@ -132,6 +175,14 @@ int run_bake(Context& context, BakeCommand o) {
     if (auto ok = parse_outgoing(o.outgoing, o.matrix); !ok) return fail(ok.error());
   auto reflection = load_reflection(o.brdf);
   if (!reflection) return fail(reflection.error());
+  if (o.light.empty()) o.light = "sh:" + std::to_string(o.bake.order);
+  if (auto ok = parse_light(o.light, o.bake); !ok) return fail(ok.error());
+  if (is_matrix && o.bake.order == 0) return fail({"--light", "directional light cannot be baked with --transfer matrix"});
+  if (!o.bake.lobes.empty() && !o.lattice_points.empty()) return fail({"--light", "lobes do not light free space: leave --lattice out"});
+  if (!o.bake.lobes.empty() && o.matrix.simulate_paths && o.bake.bounces > 0)
+    return fail({"--light", "lobes do not bounce along --simulate paths: leave it out, or bake with --bounces 0"});
+  if (!o.lattice_points.empty() && o.bake.order + o.lattice.order > max_sh_order + 1)
+    return fail({"--lattice-order", "and the bands of the light may be " + std::to_string(max_sh_order + 1) + " together"});
 
   auto start = Clock::now();
   auto scene = load_prepared_scene(o.scene);
@@ -184,15 +235,18 @@ int run_bake(Context& context, BakeCommand o) {
     auto env = load_environment(o.fix_light);
     if (!env) return fail(env.error());
     warn(env->warnings);
-    *transfer = fix_light(*transfer, project_environment(*env, o.bake.order), env->name);
+    *transfer = fix_light(*transfer, project_light(*env, transfer->light).light, env->name);
     report.bytes = transfer->bytes();
   }
 
+  // Of an environment's path the name alone.
+  const size_t at = o.light.find('@');
+  const std::string light_name = at == std::string::npos ? o.light : o.light.substr(0, at + 1) + o.light.substr(o.light.find_last_of("/@") + 1);
   nlohmann::json provenance{
       {"generator", "lambent " LAMBENT_VERSION},
       {"input", {{"name", scene->path.substr(scene->path.find_last_of('/') + 1)}, {"xxh3_128", scene->hash}}},
       {"options",
-       {{"transfer", o.transfer}, {"order", o.bake.order}, {"samples", o.bake.samples}, {"bounces", o.bake.bounces}, {"shadows", o.bake.shadows},
+       {{"transfer", o.transfer}, {"light", light_name}, {"order", o.bake.order}, {"samples", o.bake.samples}, {"bounces", o.bake.bounces}, {"shadows", o.bake.shadows},
         {"ground", o.scene.ground}, {"max_edge", o.scene.max_edge}, {"seed", o.bake.seed}, {"precision", o.precision}}},
       {"report", {{"receivers", report.receivers}, {"buried", report.buried}}}};
   if (is_matrix)
@@ -215,8 +269,9 @@ int run_bake(Context& context, BakeCommand o) {
   }
 
   start = Clock::now();
-  if (auto ok = zonal ? save_baked(o.output, *scene, receivers, *zonal, provenance.dump())
-                      : save_baked(o.output, *scene, receivers, *transfer, provenance.dump(),
+  const std::string origin = provenance.dump(-1, ' ', false, nlohmann::json::error_handler_t::replace);
+  if (auto ok = zonal ? save_baked(o.output, *scene, receivers, *zonal, origin)
+                      : save_baked(o.output, *scene, receivers, *transfer, origin,
                                    {.outgoing = outgoing ? &*outgoing : nullptr, .lattice = free_space ? &*free_space : nullptr});
       !ok)
     return fail(ok.error());
@@ -230,6 +285,8 @@ int run_bake(Context& context, BakeCommand o) {
                           {"vertices", scene->positions.size()},
                           {"triangles", scene->triangles.size()},
                           {"rays", report.rays},
+                          {"order", transfer->light.order},
+                          {"lobes", transfer->light.lobes.size()},
                           {"channels", transfer->channels},
                           {"rows", transfer->rows},
                           {"seconds", {{"load", load_seconds}, {"build", build_seconds}, {"trace", report.trace_seconds},
@@ -255,8 +312,8 @@ int run_bake(Context& context, BakeCommand o) {
              report.trace_seconds > 0 ? double(report.rays) / report.trace_seconds / 1e6 : 0.0);
   fmt::print("  time       load {}, build {}, trace {}, bounce {}, save {}\n", human_seconds(load_seconds), human_seconds(build_seconds),
              human_seconds(report.trace_seconds), human_seconds(report.bounce_seconds), human_seconds(save_seconds));
-  fmt::print("  size       {} a receiver, {} in all (order {}, {} row{}, {} channel{}, {})\n", human_bytes(bytes_each), human_bytes(double(report.bytes)),
-             transfer->light.order, transfer->rows, transfer->rows == 1 ? "" : "s", transfer->channels, transfer->channels == 1 ? "" : "s", o.precision);
+  fmt::print("  size       {} a receiver, {} in all ({}, {} row{}, {} channel{}, {})\n", human_bytes(bytes_each), human_bytes(double(report.bytes)),
+             describe_light(transfer->light), transfer->rows, transfer->rows == 1 ? "" : "s", transfer->channels, transfer->channels == 1 ? "" : "s", o.precision);
   if (zonal) fmt::print("  lobes      {}, fitted in {}, with an error of {:.2f}% RMS\n", zonal->lobes, human_seconds(fit.seconds), 100 * fit.rms);
   if (free_space)
     fmt::print("  lattice    {} points, order {}, {} in {}{}\n", human_count(lattice_report.points), o.lattice.order, human_bytes(double(lattice_report.bytes)),
@@ -279,6 +336,7 @@ void add_bake(CLI::App& app, Run& run) {
                                            "for glossy materials; zonal, lobes, for what moves; lightmap, the light of the scene's own lamps")
       ->check(CLI::IsMember({"diffuse", "matrix", "zonal", "lightmap"}))->capture_default_str();
   auto* order = c->add_option("--order", o->bake.order, "Bands of the lighting's spherical harmonics")->check(CLI::Range(1, max_sh_order))->capture_default_str();
+  auto* light = c->add_option("--light", o->light, std::string("What light is made of, in place of --order: ") + light_syntax);
   auto* lobes = c->add_option("--lobes", o->zonal.lobes, "zonal: lobes a receiver")->check(CLI::Range(1, max_stored_lobes))->capture_default_str();
   auto* incident = c->add_option("--incident-order", o->matrix.incident_order, "matrix: bands of incident light")
                        ->check(CLI::Range(1, max_incident_order))->capture_default_str();
@@ -304,8 +362,11 @@ void add_bake(CLI::App& app, Run& run) {
   auto* box = c->add_option("--lattice-box", o->lattice_box, "X0,Y0,Z0,X1,Y1,Z1: where, if not throughout the scene's box");
   auto* lattice_order = c->add_option("--lattice-order", o->lattice.order, "Bands of the light that arrives there")
                             ->check(CLI::Range(1, max_sh_order))->capture_default_str();
-  c->callback([o, bounces, order, lobes, membrane, fixed, incident, last, brdf, simulate, points, box, lattice_order, &run] {
+  c->callback([o, bounces, order, light, lobes, membrane, fixed, incident, last, brdf, simulate, points, box, lattice_order, &run] {
     o->order_given = order->count() > 0;
+    if (order->count() && light->count()) throw CLI::ValidationError("--order and --light both say how many bands there are: give one");
+    if (light->count() && (membrane->count() || (o->transfer != "diffuse" && o->transfer != "matrix")))
+      throw CLI::ValidationError("--light is for diffuse and matrix transfer; others take harmonics alone, by --order");
     if (o->shadows == "off" && bounces->count() && o->bounces != "0")
       throw CLI::ValidationError("--shadows off has no bounces: leave --bounces out, or set it to 0");
     if (membrane->count() && o->transfer != "diffuse") throw CLI::ValidationError("--membrane is a transfer of its own: leave --transfer out");
@@ -317,8 +378,6 @@ void add_bake(CLI::App& app, Run& run) {
     for (const CLI::Option* option : {box, lattice_order})
       if (option->count() && !points->count()) throw CLI::ValidationError(option->get_name() + " needs --lattice");
     if (points->count() && o->shadows == "off") throw CLI::ValidationError("--lattice is always baked with shadows");
-    if (points->count() && o->bake.order + o->lattice.order > max_sh_order + 1)
-      throw CLI::ValidationError("--order and --lattice-order may be " + std::to_string(max_sh_order + 1) + " together");
     if (points->count() && (membrane->count() || fixed->count() || (o->transfer != "diffuse" && o->transfer != "matrix")))
       throw CLI::ValidationError("--lattice goes with diffuse and matrix transfer, under any distant light");
     run = [o](Context& context) { return run_bake(context, *o); };

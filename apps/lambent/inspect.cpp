@@ -85,8 +85,11 @@ int run_inspect(Context& context, const std::string& path) {
     if (!baked) return fail(baked.error());
     const Transfer& t = baked->transfer;
     if (baked->zonal) return inspect_zonal(context, path, *baked);
+    nlohmann::json lobes = nlohmann::json::array();
+    for (const Lobe& l : t.light.lobes) lobes.push_back({{"axis", vector_json(l.axis)}, {"sharpness", l.sharpness}});
     nlohmann::json d{{"file", path}, {"kind", "baked"}, {"scene", describe_scene(baked->scene)},
-                     {"transfer", {{"kind", baked->outgoing ? "matrix" : "diffuse"}, {"order", t.light.order}, {"columns", t.columns()}, {"rows", t.rows}, {"channels", t.channels}, {"receivers", t.receivers}, {"bytes", t.bytes()},
+                     {"transfer", {{"kind", baked->outgoing ? "matrix" : "diffuse"}, {"order", t.light.order}, {"lobes", lobes}, {"groups", t.light.groups},
+                                   {"columns", t.columns()}, {"rows", t.rows}, {"channels", t.channels}, {"receivers", t.receivers}, {"bytes", t.bytes()},
                                    {"precision", t.precision == Precision::half ? "half" : "single"}}},
                      {"provenance", nlohmann::json::parse(baked->provenance, nullptr, false)}};
     if (baked->lattice) {
@@ -97,10 +100,13 @@ int run_inspect(Context& context, const std::string& path) {
     if (context.json) {
       print_json(d);
     } else {
-      fmt::print("{}\n  baked: {}, order {}, {} column{}, {} row{}, {} channel{}, {} receivers, {} ({})\n", path,
-                 baked->outgoing ? std::string("matrix, outgoing ") + outgoing_names[int(baked->outgoing->kind)] : "diffuse", t.light.order, t.columns(),
-                 t.columns() == 1 ? "" : "s", t.rows, t.rows == 1 ? "" : "s", t.channels, t.channels == 1 ? "" : "s",
+      fmt::print("{}\n  baked: {}, {}, {} column{}, {} row{}, {} channel{}, {} receivers, {} ({})\n", path,
+                 baked->outgoing ? std::string("matrix, outgoing ") + outgoing_names[int(baked->outgoing->kind)] : "diffuse", describe_light(t.light),
+                 t.columns(), t.columns() == 1 ? "" : "s", t.rows, t.rows == 1 ? "" : "s", t.channels, t.channels == 1 ? "" : "s",
                  human_count(t.receivers), human_bytes(double(t.bytes())), t.precision == Precision::half ? "half" : "single");
+      for (const Lobe& l : t.light.lobes)
+        fmt::print("  lobe about ({:.4f}, {:.4f}, {:.4f}), sharpness {:.4g}: {:.2g} degrees across\n", l.axis.x, l.axis.y, l.axis.z, l.sharpness,
+                   std::min(180.0, double(glm::degrees(2 / std::sqrt(l.sharpness)))));
       if (baked->lattice)
         fmt::print("  light in free space at {} x {} x {} points, order {}, {}\n", baked->lattice->lattice.nx, baked->lattice->lattice.ny,
                    baked->lattice->lattice.nz, baked->lattice->order, human_bytes(double(baked->lattice->transfer.bytes())));

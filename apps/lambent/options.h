@@ -7,6 +7,7 @@
 #include <lambent/light/environment.h>
 #include <lambent/scene/reflection.h>
 #include <lambent/scene/scene.h>
+#include <lambent/transfer/transfer.h>
 
 #include <CLI/CLI.hpp>
 
@@ -65,6 +66,9 @@ struct BrdfOptions {
 Result<Reflection> load_reflection(const BrdfOptions& options);
 
 extern const std::map<std::string, ShWindow> window_names;
+
+// "order 6", "order 5 and 8 lobes", "36 lobes".
+std::string describe_light(const LightBasis& light);
 
 // Before long work: the folder of `path` exists and can be written, and the extension is one of those given.
 Result<void> check_output(const std::string& path, std::initializer_list<const char*> extensions);

@@ -2,8 +2,10 @@
 #include "motion.h"
 #include "options.h"
 
+#include <lambent/baked/baked_file.h>
 #include <lambent/light/project.h>
 #include <lambent/reference/path_tracer.h>
+#include <lambent/relight/light.h>
 
 #include <fmt/format.h>
 
@@ -20,6 +22,7 @@ struct ReferenceCommand {
   BrdfOptions brdf;
   ShWindow window = ShWindow::none;
   int light_order = 0;
+  std::string light_basis;
   ReferenceOptions options;
 };
 
@@ -30,6 +33,12 @@ int run_reference(Context& context, ReferenceCommand o) {
   auto reflection = load_reflection(o.brdf);
   if (!reflection) return fail(reflection.error());
   o.options.reflection = std::move(*reflection);
+  LightBasis basis{.order = o.light_order};
+  if (!o.light_basis.empty()) {
+    auto baked = load_baked(o.light_basis);
+    if (!baked) return fail(baked.error());
+    basis = baked->zonal ? LightBasis{.order = baked->zonal->order} : baked->transfer.light;
+  }
   auto scene = load_prepared_scene(o.scene);
   if (!scene) return fail(scene.error());
   auto poses = make_poses(o.motion, *scene);
@@ -41,10 +50,9 @@ int run_reference(Context& context, ReferenceCommand o) {
   if (o.light.env.empty()) o.light.env = "uniform:0";
   auto env = load_light(o.light);
   if (!env) return fail(env.error());
-  if (o.light_order) {
-    std::vector<Vec3> light = rotate_sh(make_sh_rotation(o.light_order, *rotation), project_environment(*env, o.light_order));
-    apply_sh_window(o.window, light);
-    *env = reconstruct_environment(light);
+  if (basis.count() > 0) {
+    const LightProjection projection = project_light(*env, basis, *rotation, o.light_order, o.window);
+    *env = reconstruct_environment(projection.basis, projection.light);
   } else if (!o.light.rotate.empty()) {
     *env = rotated(*env, *rotation);
   }
@@ -75,7 +83,8 @@ void add_reference(CLI::App& app, Run& run) {
   o->brdf.add_to(*c);
   c->add_option("--light-order", o->light_order, "Light by the environment's projection to this many bands, negative light included")
       ->check(CLI::Range(1, max_sh_order));
-  c->add_option("--window", o->window, "With --light-order: as for render")
+  c->add_option("--light-basis", o->light_basis, "Light by the environment's projection onto what this baked file has columns for");
+  c->add_option("--window", o->window, "With --light-order or --light-basis: as for render")
       ->transform(CLI::CheckedTransformer(window_names).description("{none,hann,lanczos,auto}"));
   c->add_flag("--lamps", o->options.lamps, "The scene's own lamps give light too: emissive materials and punctual lights");
   c->add_option("--bounces", o->options.bounces, "Reflections between surfaces")->check(CLI::Range(0, 64))->capture_default_str();

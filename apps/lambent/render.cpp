@@ -6,6 +6,8 @@
 #include <lambent/bake/materials.h>
 #include <lambent/baked/baked_file.h>
 #include <lambent/light/project.h>
+#include <lambent/relight/light.h>
+#include <lambent/relight/relight.h>
 #include <lambent/relight/zonal.h>
 #include <lambent/render/insert.h>
 #include <lambent/render/render.h>
@@ -166,7 +168,7 @@ int run_render(Context& context, const RenderCommand& o) {
   if (!insertions.empty() && o.motion.any()) return fail({"--insert", "draws the scene at rest: leave the animation out"});
   const LightBasis basis = baked->zonal ? LightBasis{.order = baked->zonal->order} : baked->transfer.light;
   const size_t receivers = baked->zonal ? baked->zonal->receivers : baked->transfer.receivers;
-  if (o.light.env.empty() && basis.order > 0) return fail({"--env", "is needed: the file is baked for distant light"});
+  if (o.light.env.empty() && (basis.order > 0 || !basis.lobes.empty())) return fail({"--env", "is needed: the file is baked for distant light"});
   std::optional<Environment> env;
   if (!o.light.env.empty()) {
     auto loaded = load_light(o.light);
@@ -174,15 +176,11 @@ int run_render(Context& context, const RenderCommand& o) {
     env = std::move(*loaded);
   }
 
-  // light: projected once, turned and windowed as coefficients; lobes dark, lamps as they were unless told otherwise.
-  const int order = o.light_order ? std::min(o.light_order, basis.order) : basis.order;
-  std::vector<Vec3> light;
-  std::vector<float> window;
-  if (order > 0) {
-    light = rotate_sh(make_sh_rotation(order, *rotation), project_environment(*env, order));
-    window = apply_sh_window(o.window, light);
-  }
-  light.resize(basis.count() - basis.groups.size(), Vec3(0.0f));
+  // light: of the environment, and of the scene's own lamps what they are unless told otherwise.
+  LightProjection projection;
+  if (env) projection = project_light(*env, basis, *rotation, o.light_order, o.window);
+  else projection.light.assign(basis.count(), Vec3(0.0f));
+  std::vector<Vec3>& light = projection.light;
   std::vector<Vec3> lamps(basis.groups.size(), Vec3(1.0f));
   for (const std::string& text : o.lamps) {
     auto lamp = parse_named_color(text, "--lamp");
@@ -192,7 +190,7 @@ int run_render(Context& context, const RenderCommand& o) {
       return fail({"--lamp", "the file has no group \"" + lamp->name + "\"; it has " + (basis.groups.empty() ? "none" : fmt::format("{}", fmt::join(basis.groups, ", ")))});
     lamps[size_t(group - basis.groups.begin())] = lamp->color;
   }
-  light.insert(light.end(), lamps.begin(), lamps.end());
+  std::copy(lamps.begin(), lamps.end(), light.end() - ptrdiff_t(lamps.size()));
   ZonalLight table;
   if (baked->zonal) specialise_light(*baked->zonal, light, table);
   else if (o.motion.any()) warn(o.baked + ": its transfer cannot turn with the surface (`lambent compress --zonal` makes one that can); it is used as baked");
@@ -245,8 +243,8 @@ int run_render(Context& context, const RenderCommand& o) {
   if (auto ok = save_image(o.view.output, images.size() > 1 ? beside(images) : images.front(), o.view.exposure); !ok) return fail(ok.error());
 
   if (context.json)
-    print_json({{"output", o.view.output}, {"receivers", receivers}, {"frames", images.size()}, {"order", order}, {"window", window},
-                {"relight_seconds", relight_seconds}});
+    print_json({{"output", o.view.output}, {"receivers", receivers}, {"frames", images.size()}, {"order", projection.window.size()},
+                {"lobes", basis.lobes.size()}, {"window", projection.window}, {"relight_seconds", relight_seconds}});
   else
     fmt::print("{}\n  relit {} receivers in {:.2f} ms\n", o.view.output, human_count(receivers), 1e3 * relight_seconds);
   return success;
@@ -263,9 +261,9 @@ void add_render(CLI::App& app, Run& run) {
   o->motion.add_to(*c, true);
   auto* texture = c->add_option("--transfer-texture", o->texture, "Shade the scene by this texture of zonal lobes, from `lambent patch`");
   c->add_option("--tile", o->tile, "U,V: its repetitions over the unit of texture coordinates")->needs(texture)->capture_default_str();
-  c->add_option("--window", o->window, "Against ringing: none, hann, lanczos, or auto (as weak as keeps open surfaces from going dark)")
+  c->add_option("--window", o->window, "Against ringing of the harmonics: none, hann, lanczos, or auto (as weak as keeps open surfaces from going dark)")
       ->transform(CLI::CheckedTransformer(window_names).description("{none,hann,lanczos,auto}"));
-  c->add_option("--light-order", o->light_order, "Use only this many bands of the baked ones")->check(CLI::Range(1, max_sh_order));
+  c->add_option("--light-order", o->light_order, "Use only this many bands of the baked ones; lobes are kept")->check(CLI::Range(1, max_sh_order));
   c->add_option("--spp", o->samples, "Rays a pixel")->check(CLI::Range(1, 4096))->capture_default_str();
   c->add_option("--lamp", o->lamps, "NAME=R,G,B: scale a group of lamps by this colour (files baked with --light-groups)");
   c->add_option("--insert", o->insert, "FILE@X,Y,Z[,SCALE]: put a small diffuse object there, lit by the scene's lattice; may be given again")

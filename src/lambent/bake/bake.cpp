@@ -3,6 +3,7 @@
 #include <lambent/bake/bake.h>
 #include <lambent/bake/gather.h>
 #include <lambent/bake/kernels.h>
+#include <lambent/bake/lobes.h>
 #include <lambent/core/parallel.h>
 #include <lambent/core/pool.h>
 
@@ -50,20 +51,41 @@ struct Baker {
   const GatherSetup setup;
   Progress* progress;
   BakeReport& report;
+  const LobeSets lobes = make_lobe_sets(options.lobe_kind, options.lobes, options.samples, options.seed);
+  Pool<LobeRays> lobe_rays{[this] { return std::make_unique<LobeRays>(make_lobe_rays(lobes)); }};
   Pool<GatherScratch, DeleteScratch> scratch{[this] { return make_gather_scratch(setup); }};
 
   size_t n() const { return receivers.count(); }
-  size_t coefficients() const { return setup.coefficients(); }
+  size_t harmonics() const { return setup.coefficients(); }
+  size_t coefficients() const { return harmonics() + lobes.count(); }
+  size_t rays_each() const { return size_t(options.samples) + size_t(lobes.rays) * lobes.sharp.size(); }
   bool has_halves() const { return setup.sets.half < size_t(setup.sets.samples); }
 
+  // The columns of the sharp lobes, beside those that the fan has filled.
+  void trace_sharp_lobes(size_t first, size_t count, const GatherSky& sky) {
+    if (lobes.sharp.empty()) return;
+    auto rays = lobe_rays.borrow();
+    for (size_t r = first; r < first + count; ++r) {
+      float* half = checked_row(sky, first, r);
+      trace_lobes(lobes, setup.tracer, receivers.origins[r], receivers.normals[r], r, *rays, sky.rows + (r - first) * sky.stride + harmonics(),
+                  half ? half + harmonics() : nullptr);
+    }
+  }
+
   Result<Transfer> unshadowed() {
-    WritableTransfer out = make_transfer({.order = options.order}, 1, 1, n(), options.precision);
+    WritableTransfer out = make_transfer(options.light(), 1, 1, n(), options.precision);
+    std::vector<std::vector<double>> irradiance;
+    for (const Lobe& lobe : options.lobes) irradiance.push_back(lobe_irradiance(options.lobe_kind, lobe.sharpness));
     parallel_for(n(), gather_block, [&](size_t begin, size_t end) {
       std::vector<float> row(coefficients());
       for (size_t r = begin; r < end; ++r) {
         // An open plane: the clamped cosine, convolved (pi, 2 pi/3, pi/4, ...), over pi.
         evaluate_sh(options.order, receivers.normals[r], row);
-        for (size_t k = 0; k < row.size(); ++k) row[k] *= float(clamped_cosine(sh_band(int(k))) / std::numbers::pi);
+        for (size_t k = 0; k < harmonics(); ++k) row[k] *= float(clamped_cosine(sh_band(int(k))) / std::numbers::pi);
+        for (size_t k = 0; k < irradiance.size(); ++k) {
+          const glm::dvec3 axis = glm::normalize(glm::dvec3(options.lobes[k].axis));
+          row[harmonics() + k] = float(evaluate_legendre(irradiance[k], glm::dot(axis, glm::dvec3(receivers.normals[r]))) / std::numbers::pi);
+        }
         store_receiver(out, r, row);
       }
     });
@@ -73,7 +95,7 @@ struct Baker {
 
   Result<Transfer> direct() {
     const auto start = std::chrono::steady_clock::now();
-    WritableTransfer out = make_transfer({.order = options.order}, 1, 1, n(), options.precision);
+    WritableTransfer out = make_transfer(options.light(), 1, 1, n(), options.precision);
     std::vector<uint8_t> buried(n());
     std::vector<ErrorSum> errors((n() + gather_block - 1) / gather_block);
     {
@@ -81,7 +103,9 @@ struct Baker {
       parallel_for(n(), gather_block, [&](size_t begin, size_t end) {
         if (stage.cancelled()) return;
         std::vector<float> rows((end - begin) * coefficients()), half_rows(checked_count(end - begin) * coefficients());
-        trace_sky(setup, *scratch.borrow(), begin, end - begin, {rows.data(), half_rows.data(), buried.data() + begin});
+        const GatherSky sky{rows.data(), half_rows.data(), coefficients(), &lobes, buried.data() + begin};
+        trace_sky(setup, *scratch.borrow(), begin, end - begin, sky);
+        trace_sharp_lobes(begin, end - begin, sky);
         for (size_t r = begin; r < end; ++r) {
           const float* row = rows.data() + (r - begin) * coefficients();
           store_receiver(out, r, {row, coefficients()});
@@ -101,7 +125,7 @@ struct Baker {
       store_receiver(out, step.receiver, mean);
     }
     finish_report(buried, errors, start);
-    report.rays = n() * size_t(options.samples);
+    report.rays = n() * rays_each();
     return std::move(out.transfer);
   }
 
@@ -113,12 +137,13 @@ struct Baker {
     std::vector<uint8_t> buried(n());
     std::vector<GatherBlock> kept(blocks);
     std::vector<uint8_t> is_kept(blocks, 0);
-    const size_t fixed = solution_bytes(n(), C, setup.channels) + table_bytes(n(), scene.triangles.size(), C, size_t(options.samples));
+    const size_t fixed = solution_bytes(n(), C, setup.channels) + table_bytes(n(), scene.triangles.size(), C, size_t(options.samples)) +
+                         lobe_set_bytes(options.samples, lobes.count());
     const size_t budget = options.memory > fixed ? options.memory - fixed : 0;
     std::atomic<size_t> used{0};
 
     auto sky_of = [&](size_t begin) {
-      return GatherSky{T0.data() + begin * C, T0_half.data() + begin / check_every * C, buried.data() + begin};
+      return GatherSky{T0.data() + begin * C, T0_half.data() + begin / check_every * C, C, &lobes, buried.data() + begin};
     };
     {
       ProgressStage stage(progress, "tracing", n());
@@ -127,6 +152,7 @@ struct Baker {
         GatherBlock block;
         const GatherSky sky = sky_of(begin);
         trace_gather(setup, *scratch.borrow(), begin, end - begin, &block, &sky);
+        trace_sharp_lobes(begin, end - begin, sky);
         // Which blocks are kept depends on the scheduling, the result does not: the others are traced again, alike.
         const size_t bytes = block.rows.bytes() + block.half_rows.bytes() + sizeof(GatherBlock);
         if (used.fetch_add(bytes) + bytes <= budget) {
@@ -139,7 +165,7 @@ struct Baker {
       });
       if (stage.cancelled()) return Error{"", "cancelled"};
     }
-    report.rays = n() * size_t(options.samples);
+    report.rays = n() * rays_each();
     report.operator_bytes = used;
     const size_t kept_count = size_t(std::count(is_kept.begin(), is_kept.end(), uint8_t(1)));
     report.operator_kept = double(kept_count) / double(blocks);
@@ -186,7 +212,7 @@ struct Baker {
       std::swap(X, next);
     }
 
-    WritableTransfer out = make_transfer({.order = options.order}, 1, setup.channels, n(), options.precision);
+    WritableTransfer out = make_transfer(options.light(), 1, setup.channels, n(), options.precision);
     parallel_for(n(), gather_block, [&](size_t begin, size_t end) {
       std::vector<float> row(C * channels);
       for (size_t r = begin; r < end; ++r) {
@@ -213,8 +239,7 @@ struct Baker {
 };
 
 Result<void> check_options(const BakeOptions& o) {
-  if (o.order < 1 || o.order > max_sh_order)
-    return Error{"order", "must lie between 1 and " + std::to_string(max_sh_order) + ", not " + std::to_string(o.order)};
+  if (auto ok = check_light_basis(o, o.lobes.empty() ? 1 : 0); !ok) return ok;
   if (o.samples < 1 || o.samples > 1 << 20) return Error{"samples", "must lie between 1 and 1048576, not " + std::to_string(o.samples)};
   if (o.bounces < 0 || o.bounces > 64) return Error{"bounces", "must lie between 0 and 64, not " + std::to_string(o.bounces)};
   return {};
@@ -222,9 +247,19 @@ Result<void> check_options(const BakeOptions& o) {
 
 }  // namespace
 
+Result<void> check_light_basis(const BakeOptions& o, int least_order) {
+  if (o.order < least_order || o.order > max_sh_order)
+    return Error{"order", "must lie between " + std::to_string(least_order) + " and " + std::to_string(max_sh_order) + ", not " + std::to_string(o.order)};
+  if (o.light().count() > max_columns) return Error{"lobes", "at most " + std::to_string(max_columns) + " columns of light are possible"};
+  for (const Lobe& lobe : o.lobes)
+    if (!is_lobe(o.lobe_kind, lobe)) return Error{"lobes", "a lobe has no unit axis, or a sharpness out of range"};
+  return {};
+}
+
 size_t least_memory(size_t receivers, bool coloured, const BakeOptions& options) {
-  const size_t coefficients = size_t(sh_count(options.order));
-  const size_t tables = table_bytes(options.bounces > 0 ? receivers : 0, 0, coefficients, size_t(options.samples));
+  const size_t coefficients = options.light().count();
+  const size_t tables = table_bytes(options.bounces > 0 ? receivers : 0, 0, coefficients, size_t(options.samples)) +
+                        lobe_set_bytes(options.samples, options.lobes.size());
   if (!options.shadows) return 0;
   return tables + (options.bounces > 0 ? solution_bytes(receivers, coefficients, coloured ? 3 : 1) : 0);
 }

@@ -11,14 +11,22 @@
 namespace lambent {
 
 struct BakeOptions {
-  int order = 6;                               // SH bands of the light, [1, 16]: order^2 coefficients
-  int samples = 1024;                          // rays a receiver, [1, 2^20]; error falls a little faster than 1/sqrt
+  int order = 6;                               // SH bands of the light, [1, 16]: order^2 coefficients; 0 with lobes alone
+  LobeKind lobe_kind = LobeKind::von_mises_fisher;
+  std::vector<Lobe> lobes;                     // more columns, one each: lamps beside the harmonics, or a basis of their own
+  int samples = 1024;                          // rays a receiver, [1, 2^20]; error falls a little faster than 1/sqrt.
+                                               // Sharp lobes share as many again, at least 64 each
   int bounces = 3;                             // reflections between surfaces, [0, 64]
   bool shadows = true;                         // false: light everywhere as if nothing stood in its way, and no bounces
   size_t memory = size_t{4} << 30;             // bytes of working memory beyond scene and result; less means rays traced again
   uint32_t seed = 1;                           // of the ray directions
   Precision precision = Precision::half;       // of the stored transfer
+
+  LightBasis light() const { return {order, lobe_kind, lobes, {}}; }
 };
+
+// What is wrong with the light basis of these options.
+Result<void> check_light_basis(const BakeOptions& options, int least_order);
 
 struct BakeReport {
   size_t receivers = 0, buried = 0;  // buried: inside something, filled from their neighbours

@@ -20,20 +20,24 @@ uint32_t morton2(Vec2 u) {
 
 }  // namespace
 
+std::vector<Vec2> sorted_points(size_t count, size_t half, uint32_t key) {
+  std::vector<Vec2> points(count);
+  for (size_t i = 0; i < count; ++i) points[i] = sobol_owen(uint32_t(i), key);
+  auto along_curve = [](Vec2 a, Vec2 b) { return morton2(a) < morton2(b); };
+  std::sort(points.begin(), points.begin() + ptrdiff_t(half), along_curve);
+  std::sort(points.begin() + ptrdiff_t(half), points.end(), along_curve);
+  return points;
+}
+
 DirectionSets make_direction_sets(int order, int samples, int sets, uint32_t seed, DirectionWarp warp) {
   DirectionSets s{order, samples, sets, pad_lanes(size_t(samples)), 0, {}, {}, {}};
   const size_t n = size_t(samples), coefficients = size_t(sh_count(order));
   s.half = n >= 2 * lane_multiple ? pad_lanes(n / 2) : n;
   s.x.assign(s.stride * size_t(sets), 0), s.y = s.x, s.z.assign(s.stride * size_t(sets), 1);
   s.table.assign(s.stride * size_t(sets) * coefficients, 0);
-  std::vector<Vec2> points(n);
   float y[sh_count(max_sh_order)];
   for (int set = 0; set < sets; ++set) {
-    const uint32_t key = uint32_t(hash64(seed, uint64_t(set)));
-    for (size_t i = 0; i < n; ++i) points[i] = sobol_owen(uint32_t(i), key);
-    auto along_curve = [](Vec2 a, Vec2 b) { return morton2(a) < morton2(b); };
-    std::sort(points.begin(), points.begin() + ptrdiff_t(s.half), along_curve);
-    std::sort(points.begin() + ptrdiff_t(s.half), points.end(), along_curve);
+    const std::vector<Vec2> points = sorted_points(n, s.half, uint32_t(hash64(seed, uint64_t(set))));
     const size_t base = size_t(set) * s.stride;
     for (size_t i = 0; i < n; ++i) {
       const Vec3 d = warp(points[i]);

@@ -21,6 +21,9 @@ struct DirectionSets {
 // From the unit square to directions (core/sampling.h).
 using DirectionWarp = Vec3 (*)(Vec2);
 
+// The first `count` Sobol' points under one Owen scrambling; [0, half) and [half, count) each sorted along a space-filling curve.
+std::vector<Vec2> sorted_points(size_t count, size_t half, uint32_t key);
+
 // Sobol' points, Owen-scrambled anew for every set, sorted within each half along a space-filling curve.
 DirectionSets make_direction_sets(int order, int samples, int sets, uint32_t seed, DirectionWarp warp = square_to_cosine_hemisphere);
 

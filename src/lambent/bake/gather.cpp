@@ -92,13 +92,13 @@ class BlockBuilder {
 struct Fan {
   const DirectionSets& sets;
   ShZyzRotator rotator;
-  AlignedVector<float> x, y, z, visible;
+  AlignedVector<float> x, y, z, visible, lobe;
   std::vector<float> half, rest;
   DirectionChoice choice{};
 
   explicit Fan(const DirectionSets& s)
-      : sets(s), rotator(s.order), x(s.stride), y(s.stride), z(s.stride), visible(s.stride), half(size_t(sh_count(s.order))),
-        rest(half.size()) {}
+      : sets(s), rotator(s.order), x(s.stride), y(s.stride), z(s.stride), visible(s.stride), lobe(s.stride),
+        half(size_t(sh_count(s.order))), rest(half.size()) {}
 
   Directions aim(Vec3 normal, uint32_t seed, size_t receiver) {
     choice = choose_directions(sets, normal, seed, receiver);
@@ -123,6 +123,26 @@ struct Fan {
     const float rays = float(std::min(sets.half, size_t(sets.samples)));
     for (size_t k = 0; k < coefficients; ++k) half_row[k] = half[k] / rays;
     rotator.rotate(choice.a, choice.b, choice.c, {half_row, coefficients});
+  }
+
+  // The same for the broad lobes: the mean of V b.
+  void project_lobes(const LobeSets& lobes, float* row, float* half_row) {
+    const size_t samples = size_t(sets.samples), half_rays = std::min(sets.half, samples);
+    for (uint32_t k : lobes.broad) {
+      evaluate_on_fan(lobes, k, x.data(), y.data(), z.data(), sets.stride, lobe.data());
+      float first = 0, second = 0;
+      weighted_rows(lobe.data(), 1, sets.stride, visible.data(), sets.half < samples ? sets.half : sets.stride, &first);
+      if (sets.half < samples) weighted_rows(lobe.data() + sets.half, 1, sets.stride, visible.data() + sets.half, sets.stride - sets.half, &second);
+      row[k] = (first + second) / float(samples);
+      if (half_row) half_row[k] = first / float(half_rays);
+    }
+  }
+
+  void project(const GatherSky& sky, size_t first, size_t receiver) {
+    float* row = sky.rows + (receiver - first) * sky.stride;
+    float* half_row = checked_row(sky, first, receiver);
+    project(row, half_row);
+    if (sky.lobes) project_lobes(*sky.lobes, row + half.size(), half_row ? half_row + half.size() : nullptr);
   }
 };
 
@@ -150,15 +170,10 @@ bool is_buried(const Tracer& tracer, const SpatialBasis& basis, Vec3 origin, con
   return 2 * backs > n;
 }
 
-namespace {
-
-// Index of a checked receiver among those of the block that begins at `first`.
-float* checked_row(float* rows, size_t first, size_t receiver, size_t coefficients) {
-  if (!rows || receiver % check_every) return nullptr;
-  return rows + (receiver / check_every - (first + check_every - 1) / check_every) * coefficients;
+float* checked_row(const GatherSky& sky, size_t first, size_t receiver) {
+  if (!sky.half_rows || receiver % check_every) return nullptr;
+  return sky.half_rows + (receiver / check_every - (first + check_every - 1) / check_every) * sky.stride;
 }
-
-}  // namespace
 
 struct GatherScratch {
   Fan fan;
@@ -208,7 +223,7 @@ template <class Basis>
 void trace_gather_on(const GatherSetup& setup, const Basis& basis, GatherScratch& scratch, size_t first, size_t count, GatherBlock* block,
                      const GatherSky* sky, const GatherDirect* direct) {
   const DirectionSets& sets = setup.sets;
-  const size_t coefficients = setup.coefficients(), rays = size_t(sets.samples), half = std::min(sets.half, rays);
+  const size_t rays = size_t(sets.samples), half = std::min(sets.half, rays);
   Fan& fan = scratch.fan;
   const std::vector<Hit>& hits = scratch.hits;
   scratch.rows.begin_block(), scratch.half_rows.begin_block();
@@ -259,7 +274,7 @@ void trace_gather_on(const GatherSetup& setup, const Basis& basis, GatherScratch
     scratch.rows.end_row();
     if (checked) scratch.half_rows.end_row();
     if (sky) {
-      fan.project(sky->rows + i * coefficients, checked_row(sky->half_rows, first, r, coefficients));
+      fan.project(*sky, first, r);
       sky->buried[i] = 2 * backs > rays;
     }
   }
@@ -280,13 +295,13 @@ void trace_gather(const GatherSetup& setup, GatherScratch& scratch, size_t first
 
 void trace_sky(const GatherSetup& setup, GatherScratch& scratch, size_t first, size_t count, const GatherSky& sky) {
   const DirectionSets& sets = setup.sets;
-  const size_t coefficients = setup.coefficients(), rays = size_t(sets.samples);
+  const size_t rays = size_t(sets.samples);
   Fan& fan = scratch.fan;
   for (size_t i = 0; i < count; ++i) {
     const size_t r = first + i;
     const Vec3 origin = setup.receivers.origins[r];
     setup.tracer.visible_fan(origin, fan.aim(setup.receivers.normals[r], setup.seed, r), fan.visible.data());
-    fan.project(sky.rows + i * coefficients, checked_row(sky.half_rows, first, r, coefficients));
+    fan.project(sky, first, r);
     size_t seen = 0;
     for (size_t j = 0; j < rays; ++j) seen += fan.visible[j] > 0;
     sky.buried[i] = 4 * seen < rays && is_buried(setup.tracer, setup.receivers.basis, origin, {fan.x.data(), fan.y.data(), fan.z.data(), rays});

@@ -5,6 +5,7 @@
 // k+1", one-row case), with no further ray. Any number of columns: the same B carries radiosity (alpha = e + B alpha).
 #include <lambent/bake/directions.h>
 #include <lambent/bake/lamps.h>
+#include <lambent/bake/lobes.h>
 #include <lambent/core/aligned.h>
 #include <lambent/receivers/receivers.h>
 #include <lambent/trace/tracer.h>
@@ -55,10 +56,14 @@ GatherSetup make_gather_setup(const Scene& scene, const Tracer& tracer, const Re
 
 // What tracing receivers [first, first + count) yields beside the hit rows. Spans are indexed from `first`.
 struct GatherSky {
-  float* rows;       // [receiver][coefficient]: T0
-  float* half_rows;  // [checked receiver][coefficient]: T0 by the first half of the rays
+  float* rows;       // [receiver][stride], of which the coefficients come first: T0; then the lobes, if any
+  float* half_rows;  // [checked receiver][stride]: T0 by the first half of the rays
+  size_t stride;     // floats from one receiver to the next, no fewer than coefficients and lobes
+  const LobeSets* lobes;  // broad ones are summed, sharp ones left alone; may be null
   uint8_t* buried;   // 1: most rays met the back of a one-sided surface; the receiver lies inside something
 };
+// The row of half_rows for a receiver of the block that begins at `first`; null where it is not checked.
+float* checked_row(const GatherSky& sky, size_t first, size_t receiver);
 
 // Direct light of lamps, from the same rays and from samples towards the lamps (lamps.h).
 struct GatherDirect {

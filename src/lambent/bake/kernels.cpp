@@ -8,6 +8,7 @@
 #define HWY_TARGET_INCLUDE "lambent/bake/kernels.cpp"
 #include <hwy/foreach_target.h>
 #include <hwy/cache_control.h>
+#include <hwy/contrib/math/math-inl.h>
 #include <hwy/highway.h>
 
 HWY_BEFORE_NAMESPACE();
@@ -157,6 +158,23 @@ void FloatsToHalves(const float* floats, size_t count, uint16_t* halves) {
   for (; i < count; ++i) halves[i] = float_to_half(floats[i]);
 }
 
+void LobeValues(bool cosine_power, const float* axis, float sharpness, float scale, const float* x, const float* y, const float* z, size_t count,
+                float* out) {
+  const F d;
+  const auto ax = hn::Set(d, axis[0]), ay = hn::Set(d, axis[1]), az = hn::Set(d, axis[2]), s = hn::Set(d, sharpness), peak = hn::Set(d, scale);
+  for (size_t i = 0; i < count; i += hn::Lanes(d)) {
+    const auto c = hn::MulAdd(ax, hn::LoadU(d, x + i), hn::MulAdd(ay, hn::LoadU(d, y + i), hn::Mul(az, hn::LoadU(d, z + i))));
+    // The logarithm needs a positive number, and anything to the power of 1 or more that small is as good as 0.
+    const auto exponent = cosine_power ? hn::Mul(s, hn::Log(d, hn::Max(c, hn::Set(d, 1e-30f)))) : hn::Mul(s, hn::Sub(c, hn::Set(d, 1.0f)));
+    hn::StoreU(hn::Mul(peak, hn::Exp(d, exponent)), d, out + i);
+  }
+}
+
+void MultiplyValues(const float* a, const float* b, size_t count, float* out) {
+  const F d;
+  for (size_t i = 0; i < count; i += hn::Lanes(d)) hn::StoreU(hn::Mul(hn::LoadU(d, a + i), hn::LoadU(d, b + i)), d, out + i);
+}
+
 }  // namespace HWY_NAMESPACE
 }  // namespace lambent
 HWY_AFTER_NAMESPACE();
@@ -168,6 +186,8 @@ HWY_EXPORT(RotateDirections);
 HWY_EXPORT(WeightedRows);
 HWY_EXPORT(MultiplyEntries);
 HWY_EXPORT(FloatsToHalves);
+HWY_EXPORT(LobeValues);
+HWY_EXPORT(MultiplyValues);
 
 void rotate_directions(const Mat3& R, const float* x, const float* y, const float* z, size_t count, float* ox, float* oy, float* oz) {
   LAMBENT_CHECK(count % lane_multiple == 0);
@@ -177,6 +197,16 @@ void rotate_directions(const Mat3& R, const float* x, const float* y, const floa
 void weighted_rows(const float* table, size_t rows, size_t stride, const float* weights, size_t count, float* out) {
   LAMBENT_CHECK(count % lane_multiple == 0 && stride % lane_multiple == 0);
   HWY_DYNAMIC_DISPATCH(WeightedRows)(table, rows, stride, weights, count, out);
+}
+
+void lobe_values(bool cosine_power, Vec3 axis, float sharpness, float scale, const float* x, const float* y, const float* z, size_t count, float* out) {
+  LAMBENT_CHECK(count % lane_multiple == 0);
+  HWY_DYNAMIC_DISPATCH(LobeValues)(cosine_power, &axis[0], sharpness, scale, x, y, z, count, out);
+}
+
+void multiply_values(const float* a, const float* b, size_t count, float* out) {
+  LAMBENT_CHECK(count % lane_multiple == 0);
+  HWY_DYNAMIC_DISPATCH(MultiplyValues)(a, b, count, out);
 }
 
 void floats_to_halves(const float* floats, size_t count, uint16_t* halves) {

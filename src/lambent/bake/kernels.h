@@ -17,6 +17,13 @@ void rotate_directions(const Mat3& R, const float* x, const float* y, const floa
 // out[i] = sum over j < count of table[i * stride + j] * weights[j], for i < rows; count and stride multiples of lane_multiple.
 void weighted_rows(const float* table, size_t rows, size_t stride, const float* weights, size_t count, float* out);
 
+// out[i] = scale * exp(sharpness * (axis . (x, y, z)[i] - 1)) or, with cosine_power, scale * max(0, axis . (x, y, z)[i])^sharpness;
+// count a multiple of lane_multiple.
+void lobe_values(bool cosine_power, Vec3 axis, float sharpness, float scale, const float* x, const float* y, const float* z, size_t count, float* out);
+
+// out[i] = a[i] * b[i]; count a multiple of lane_multiple.
+void multiply_values(const float* a, const float* b, size_t count, float* out);
+
 // IEEE halves of floats, rounded to nearest even.
 void floats_to_halves(const float* floats, size_t count, uint16_t* halves);
 

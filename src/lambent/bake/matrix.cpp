@@ -2,7 +2,9 @@
 // triple-product-integrals (direct light as a triple product: with V known to order n + m - 1 the product of light and incident
 // basis, of orders n and m, against it is exact). Instead of the recursion, bounces by paths (general-prt, "direct simulation").
 #include <lambent/bake/gather.h>
+#include <lambent/bake/lobes.h>
 #include <lambent/bake/matrix.h>
+#include <lambent/bake/kernels.h>
 #include <lambent/bake/matrix_kernels.h>
 #include <lambent/bake/path.h>
 #include <lambent/basis/sh_product.h>
@@ -55,12 +57,14 @@ void turn_rows_about_z(float* rows, int order, size_t width, float phi) {
 
 // What a thread needs for one receiver at a time.
 struct MatrixScratch {
-  AlignedVector<float> x, y, z, visible;
+  AlignedVector<float> x, y, z, visible, lobe;
   std::vector<Hit> hits;
   std::vector<float> V, column_row;
   AlignedVector<float> sh_rows, v, zb;
   std::vector<ViewWeights> weights;
-  std::vector<float> scalars;
+  std::vector<float> scalars, z_values;
+  std::vector<double> lobe_sums;
+  LobeRays lobe_rays;
   DirectionChoice choice{};
   float phi = 0;  // from the set's frame to the receiver's, about the normal
 };
@@ -75,6 +79,7 @@ struct MatrixBaker {
   Progress* progress;
   BakeReport& report;
 
+  const LobeSets lobes = make_lobe_sets(options.lobe_kind, options.lobes, options.samples, options.seed);
   CosineBasis basis = make_cosine_basis(matrix.incident_order);
   TriplingTensor tensor = make_tripling_tensor(options.order, matrix.incident_order, options.order + matrix.incident_order - 1);
   ShZyzRotator rotator{options.order};
@@ -86,7 +91,8 @@ struct MatrixBaker {
   const CornerReceivers& corners() const { return std::get<CornerReceivers>(receivers.basis); }
   size_t n() const { return receivers.count(); }
   size_t J() const { return size_t(basis.count()); }                // rows of X
-  size_t C() const { return size_t(sh_count(options.order)); }      // columns
+  size_t harmonics() const { return size_t(sh_count(options.order)); }
+  size_t C() const { return harmonics() + lobes.count(); }          // columns
   size_t channels() const { return size_t(setup.channels); }
   size_t width() const { return pad_lanes(C()); }                   // floats of a row of one channel
   size_t V_count() const { return setup.coefficients(); }
@@ -96,10 +102,11 @@ struct MatrixBaker {
   std::unique_ptr<MatrixScratch> make_scratch() const {
     auto s = std::make_unique<MatrixScratch>();
     const size_t stride = setup.sets.stride, w = channels() * width();
-    s->x.resize(stride), s->y.resize(stride), s->z.resize(stride), s->visible.resize(stride), s->hits.resize(rays());
+    s->x.resize(stride), s->y.resize(stride), s->z.resize(stride), s->visible.resize(stride), s->lobe.resize(stride), s->hits.resize(rays());
     s->V.resize(V_count()), s->column_row.resize(C());
     s->sh_rows.resize(J() * w), s->v.resize(hit_batch * w), s->zb.resize(hit_batch * J());
     s->weights.resize(J()), s->scalars.resize(J() * 3);
+    s->z_values.resize(J()), s->lobe_sums.resize(2 * J()), s->lobe_rays = make_lobe_rays(lobes);
     return s;
   }
 
@@ -136,8 +143,36 @@ struct MatrixBaker {
       const float v = s.V[k];
       for (uint32_t e = tensor.begin[k]; e < tensor.begin[k + 1]; ++e) rows[size_t(tensor.j[e]) * w + tensor.i[e]] += tensor.single[e] * v;
     }
-    for (size_t j = 0; j < J(); ++j) rotator.rotate(s.choice.a, s.choice.b, s.choice.c, {rows + j * w, C()});
+    for (size_t j = 0; j < J(); ++j) rotator.rotate(s.choice.a, s.choice.b, s.choice.c, {rows + j * w, harmonics()});
+    // Broad lobes: V b takes the place of V, and the harmonics below J that of the triple product.
+    for (uint32_t k : lobes.broad) {
+      evaluate_on_fan(lobes, k, s.x.data(), s.y.data(), s.z.data(), setup.sets.stride, s.lobe.data());
+      multiply_values(s.lobe.data(), s.visible.data(), setup.sets.stride, s.lobe.data());
+      weighted_rows(setup.sets.table.data() + base, J(), setup.sets.stride, s.lobe.data(), count == rays() ? setup.sets.stride : count, s.V.data());
+      for (size_t j = 0; j < J(); ++j) rows[j * w + harmonics() + k] = s.V[j];
+    }
     to_incident(rows, s.phi, w, 1.0f / float(count), out);
+  }
+
+  // Direct light of the sharp lobes, by rays of their own: X0_jk = 1/pi integral of V b_k z_j cos, into out and, if given, half_out.
+  void direct_sharp_lobes(MatrixScratch& s, size_t r, float* out, float* half_out) const {
+    for (size_t lobe = 0; lobe < lobes.sharp.size(); ++lobe) {
+      const size_t k = lobes.sharp[lobe];
+      trace_lobe(lobes, setup.tracer, receivers.origins[r], receivers.normals[r], r, lobe, s.lobe_rays);
+      std::fill(s.lobe_sums.begin(), s.lobe_sums.end(), 0.0);
+      for (size_t i = 0; i < s.lobe_rays.count; ++i) {
+        const float weight = s.lobe_rays.visible[i] * s.lobe_rays.cosine[i];
+        if (weight == 0) continue;
+        evaluate_cosine_basis(basis, Vec3(s.lobe_rays.x[i], s.lobe_rays.y[i], s.lobe_rays.z[i]) * materials.frames[r], s.z_values);
+        double* sums = s.lobe_sums.data() + (i < s.lobe_rays.half ? 0 : J());
+        for (size_t j = 0; j < J(); ++j) sums[j] += double(weight) * s.z_values[j];
+      }
+      const double scale = double(lobes.integrals[k]) / std::numbers::pi;
+      for (size_t j = 0; j < J(); ++j) {
+        out[j * width() + harmonics() + k] = float(scale * (s.lobe_sums[j] + s.lobe_sums[J() + j]) / lobes.rays);
+        if (half_out) half_out[j * width() + harmonics() + k] = float(scale * s.lobe_sums[j] / double(lobes.half));
+      }
+    }
   }
 
   // Light that the hits of rays below `limit` scatter to receiver r, added to out[J][channel][width]; Y holds scattered rows.
@@ -359,7 +394,7 @@ struct MatrixBaker {
     make_responses();
     const auto start = Clock::now();
     const Last last = make_last();
-    WritableTransfer out = make_transfer({.order = options.order}, last.rows, last.channels, n(), options.precision);
+    WritableTransfer out = make_transfer(options.light(), last.rows, last.channels, n(), options.precision);
     std::vector<uint8_t> buried(n());
     ErrorSums errors((n() + gather_block - 1) / gather_block);
     auto receive = [&](MatrixScratch& s, size_t r) {
@@ -416,10 +451,9 @@ struct MatrixBaker {
     auto trace_receiver = [&](MatrixScratch& s, size_t r, MatrixHits* hits) {
       buried[r] = trace(s, r, hits);
       direct(s, rays(), T0.data() + r * J() * width());
-      if (r % check_every == 0) {
-        float* half = T0_half.data() + r / check_every * J() * width();
-        direct(s, std::min(setup.sets.half, rays()), half);
-      }
+      float* half = r % check_every == 0 ? T0_half.data() + r / check_every * J() * width() : nullptr;
+      if (half) direct(s, std::min(setup.sets.half, rays()), half);
+      direct_sharp_lobes(s, r, T0.data() + r * J() * width(), half);
       if (hits) hits->ends.push_back(uint32_t(hits->hits.size()));
     };
     // Which blocks are kept depends on the scheduling, the result does not: the others are traced again, alike.
@@ -440,7 +474,7 @@ struct MatrixBaker {
       });
       if (stage.cancelled()) return Error{"", "cancelled"};
     }
-    report.rays = n() * rays();
+    report.rays = n() * (rays() + size_t(lobes.rays) * lobes.sharp.size());
     move_buried(buried, T0, trace_receiver, bounces, kept, is_kept, used);
     report.operator_bytes = used;
     report.operator_kept = bounces ? double(std::count(is_kept.begin(), is_kept.end(), uint8_t(1))) / double(blocks) : 1;
@@ -448,7 +482,7 @@ struct MatrixBaker {
     start = Clock::now();
 
     const Last last = make_last();
-    WritableTransfer out = make_transfer({.order = options.order}, last.rows, last.channels, n(), options.precision);
+    WritableTransfer out = make_transfer(options.light(), last.rows, last.channels, n(), options.precision);
     auto scatter_rows = [&](size_t r, const float* x, float* Y) {
       const FactoredResponse& f = scatter[materials.of_receiver[r]];
       apply(f.h, size_t(f.rows), J(), wc, x, Y + first_row[r] * wc);
@@ -548,11 +582,13 @@ Result<void> check_options(const BakeOptions& o, const MatrixOptions& m, const R
     if (value >= least && value <= most) return {};
     return Error{name, "must lie between " + std::to_string(least) + " and " + std::to_string(most) + ", not " + std::to_string(value)};
   };
-  for (auto& ok : {within("order", o.order, 1, max_sh_order), within("samples", o.samples, 1, 1 << 20), within("bounces", o.bounces, 0, 64),
+  for (auto& ok : {check_light_basis(o, 1), within("samples", o.samples, 1, 1 << 20), within("bounces", o.bounces, 0, 64),
                    within("incident-order", m.incident_order, 1, max_incident_order), within("outgoing-order", m.outgoing_order, 1, max_incident_order),
                    within("order and incident-order together", o.order + m.incident_order, 2, max_sh_order + 1),
                    within("svd rows", m.svd_rows, 1, sh_count(m.incident_order)), within("grid", m.grid, 8, 256)})
     if (!ok) return ok.error();
+  // A path seldom meets a lamp by chance.
+  if (m.simulate_paths && o.bounces > 0 && !o.lobes.empty()) return Error{"lobes", "bounces by simulated paths are of harmonics alone"};
   LAMBENT_CHECK(materials.of_receiver.size() == receivers && materials.frames.size() == receivers && !materials.materials.empty());
   return {};
 }
@@ -560,10 +596,11 @@ Result<void> check_options(const BakeOptions& o, const MatrixOptions& m, const R
 }  // namespace
 
 size_t matrix_memory(size_t receivers, int channels, const BakeOptions& o, const MatrixOptions& m) {
-  const size_t width = pad_lanes(size_t(sh_count(o.order))), J = size_t(sh_count(m.incident_order));
+  const size_t width = pad_lanes(o.light().count()), J = size_t(sh_count(m.incident_order));
   const size_t table = 8 * pad_lanes(size_t(o.samples)) * 4 * size_t(sh_count(o.order + m.incident_order - 1) + 3);
   const size_t scattered = o.bounces > 0 ? 2 * size_t(m.scatter_rows) * size_t(channels) * width : 0;
-  return receivers * (4 * (J * width * (check_every + 1) / check_every + scattered) + 2 * sizeof(Vec3) + sizeof(Mat3)) + table;
+  return receivers * (4 * (J * width * (check_every + 1) / check_every + scattered) + 2 * sizeof(Vec3) + sizeof(Mat3)) + table +
+         lobe_set_bytes(o.samples, o.lobes.size());
 }
 
 Result<MatrixBake> bake_matrix(const Scene& scene, const Tracer& tracer, const Receivers& receivers, const ReceiverMaterials& materials,

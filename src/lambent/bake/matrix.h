@@ -22,6 +22,7 @@ struct MatrixOptions {
   double scatter_error = 0.01;
   // Bounces by following every ray to its end instead of the recursion: each hit samples the BRDF there, not the rows of vertices
   // around it, so it takes any path (caustics) and any tessellation, at the price of noise.
+  // With bounces, light must be harmonics alone.
   bool simulate_paths = false;
 };
 

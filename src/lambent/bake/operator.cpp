@@ -23,7 +23,8 @@ Result<GatherOperator> GatherOperator::trace(const GatherSetup& setup, const Gat
     if (stage.cancelled()) return;
     GatherBlock block;
     std::vector<float> unwanted(sky_rows ? 0 : (end - begin) * setup.coefficients());
-    const GatherSky sky{sky_rows ? sky_rows + begin * setup.coefficients() : unwanted.data(), nullptr, op.buried_.data() + begin};
+    const GatherSky sky{sky_rows ? sky_rows + begin * setup.coefficients() : unwanted.data(), nullptr, setup.coefficients(), nullptr,
+                        op.buried_.data() + begin};
     auto scratch = op.scratch_->borrow();
     if (direct) {
       const GatherDirect here{direct->lamps, direct->samples, direct->rows + begin * direct->width, direct->width};

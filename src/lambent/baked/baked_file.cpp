@@ -57,14 +57,14 @@ Result<LightBasis> read_light(const json& object, const std::string& where) {
   light.order = int(*order);
   if (const auto lobes = object.find("lobes"); lobes != object.end()) {
     if (!lobes->is_array() || lobes->size() > max_columns) return Error{where, "\"lobes\" is not a list, or too long a one"};
-    for (const auto& [kind, name] : lobe_names)
-      if (object.contains("lobeKind") && object["lobeKind"] == name) light.lobe_kind = kind;
+    const auto kind = std::find_if(lobe_names.begin(), lobe_names.end(), [&](const auto& k) { return object.contains("lobeKind") && object["lobeKind"] == k.second; });
+    if (kind == lobe_names.end()) return Error{where, "the kind of lobes is not known to this program"};
+    light.lobe_kind = kind->first;
     for (const json& l : *lobes) {
       if (!l.is_array() || l.size() != 4 || !std::all_of(l.begin(), l.end(), [](const json& x) { return x.is_number(); }))
         return Error{where, "a lobe is not four numbers"};
       const Lobe lobe{{l[0].get<float>(), l[1].get<float>(), l[2].get<float>()}, l[3].get<float>()};
-      if (!(std::abs(glm::length(lobe.axis) - 1) < 1e-3f) || !(lobe.sharpness > 0) || !std::isfinite(lobe.sharpness))
-        return Error{where, "a lobe has no unit axis or no positive sharpness"};
+      if (!is_lobe(light.lobe_kind, lobe)) return Error{where, "a lobe has no unit axis, or a sharpness out of range"};
       light.lobes.push_back(lobe);
     }
   }

@@ -374,6 +374,39 @@ TEST(BakedFile, KeepsZonalTransferAndRefusesLiesAboutIt) {
   }
 }
 
+TEST(BakedFile, LobesComeBackAndTheirHeadersMayNotLie) {
+  Small s = small_bake(1, Precision::half);
+  const LightBasis light{2, LobeKind::cosine_power, {{Vec3(0, 1, 0), 50}, {glm::normalize(Vec3(0.3f, -0.5f, 0.8f)), 77777.5f}}, {"desk", "roof"}};
+  const WritableTransfer w = make_transfer(light, 1, 1, s.receivers.count(), Precision::half);
+  const TemporaryFile file("lobes.glb"), lying("lobes_lying.glb");
+  ASSERT_TRUE(save_baked(file.path, s.scene, s.receivers, w.transfer, "{}"));
+  auto back = load_baked(file.path);
+  ASSERT_TRUE(back) << back.error().text();
+  const LightBasis& got = back->transfer.light;
+  EXPECT_EQ(got.order, 2);
+  EXPECT_EQ(got.lobe_kind, LobeKind::cosine_power);
+  EXPECT_EQ(got.groups, light.groups);
+  ASSERT_EQ(got.lobes.size(), 2u);
+  for (size_t k = 0; k < 2; ++k) {
+    EXPECT_EQ(got.lobes[k].axis, light.lobes[k].axis);
+    EXPECT_EQ(got.lobes[k].sharpness, light.lobes[k].sharpness);
+  }
+  const std::vector<uint8_t> bytes = *read_file(file.path);
+  const std::pair<std::string, std::string> lies[] = {{"cosine_power", "cosine_tower"},           {"lobeKind", "lobeKine"},
+                                                      {"[0.0,1.0,0.0,50.0]", "[0.0,1.0,0.0,-5.0]"}, {"[0.0,1.0,0.0,50.0]", "[0.0,1.0,0.0,5e99]"},
+                                                      {"[0.0,1.0,0.0,50.0]", "[0.0,2.0,0.0,50.0]"}, {"[0.0,1.0,0.0,50.0]", "[0.0,1.0,0.0,0.50]"},
+                                                      {"[0.0,1.0,0.0,50.0]", "[0.0,1.0,0.0,null]"}, {"[0.0,1.0,0.0,50.0]", "[0.0,1.0,0.000050]"},
+                                                      {"[0.0,1.0,0.0,50.0],", "                   "}, {"\"desk\",", "       "}};
+  for (const auto& [from, to] : lies) {
+    const auto changed = edited(bytes, from, to);
+    const std::span<const uint8_t> piece(changed);
+    ASSERT_TRUE(write_file_atomically(lying.path, {&piece, 1}));
+    auto result = load_baked(lying.path);
+    ASSERT_FALSE(result) << to;
+    EXPECT_NE(result.error().text().find(lying.path), std::string::npos);
+  }
+}
+
 TEST(BakedFile, RefusesOtherThings) {
   EXPECT_FALSE(load_baked("/nonexistent/x.glb"));
   EXPECT_FALSE(load_baked("/tmp"));

@@ -7,6 +7,20 @@
 #include <lambent/core/check.h>
 
 namespace lambent {
+
+bool is_lobe(LobeKind kind, const Lobe& lobe) {
+  return std::abs(glm::length(lobe.axis) - 1) < 1e-4f && lobe.sharpness >= min_sharpness(kind) && lobe.sharpness <= max_sharpness;
+}
+
+double lobe_value(LobeKind kind, double s, double cosine) {
+  return kind == LobeKind::cosine_power ? (cosine > 0 ? std::pow(cosine, s) : 0) : std::exp(s * (cosine - 1));
+}
+
+double lobe_scale(LobeKind kind, double s) {
+  const double two_pi = 2 * std::numbers::pi;
+  return kind == LobeKind::cosine_power ? std::sqrt((2 * s + 1) / two_pi) : std::sqrt(2 * s / (two_pi * -std::expm1(-4 * s)));
+}
+
 namespace {
 
 // Terms of the sum over l for two cosine lobes. Those of the broadest, s = 1, fall as l^-4 and leave 1e-9; those of sharp ones fall
@@ -15,16 +29,6 @@ int moments_needed(float sharpest) { return 640 + int(6 * std::sqrt(sharpest)); 
 
 // A float's rounding of a unit axis would show in sharp lobes.
 glm::dvec3 axis_of(const Lobe& lobe) { return glm::normalize(glm::dvec3(lobe.axis)); }
-
-// 1 / the root of the integral of the lobe's square.
-double lobe_scale(LobeKind kind, double s) {
-  const double two_pi = 2 * std::numbers::pi;
-  return kind == LobeKind::cosine_power ? std::sqrt((2 * s + 1) / two_pi) : std::sqrt(2 * s / (two_pi * -std::expm1(-4 * s)));
-}
-
-double lobe_value(LobeKind kind, double s, double cosine) {
-  return kind == LobeKind::cosine_power ? (cosine > 0 ? std::pow(cosine, s) : 0) : std::exp(s * (cosine - 1));
-}
 
 // I_l of the unscaled lobe, l < count.
 std::vector<double> moments(LobeKind kind, double s, int count) {
@@ -80,6 +84,46 @@ void lobe_to_sh(LobeKind kind, const Lobe& lobe, int order, std::span<double> ou
 
 }  // namespace
 
+double lobe_integral(LobeKind kind, double s) {
+  const double unscaled = kind == LobeKind::cosine_power ? 1 / (s + 1) : -std::expm1(-2 * s) / s;
+  return 2 * std::numbers::pi * lobe_scale(kind, s) * unscaled;
+}
+
+double lobe_overlap(LobeKind kind, const Lobe& a, const Lobe& b) {
+  std::vector<double> I, J;
+  if (kind == LobeKind::cosine_power) {
+    const int count = moments_needed(std::max(a.sharpness, b.sharpness));
+    I = moments(kind, a.sharpness, count), J = moments(kind, b.sharpness, count);
+  }
+  return lobe_scale(kind, a.sharpness) * lobe_scale(kind, b.sharpness) * lobe_product(kind, a, b, I, J);
+}
+
+Vec3 sample_lobe(LobeKind kind, float sharpness, Vec2 u) {
+  // By inversion; v = 1 - cos t keeps its digits in sharp lobes.
+  const double s = sharpness, x = 1 - double(u.x);
+  const double v = kind == LobeKind::cosine_power ? -std::expm1(std::log(x) / (s + 1)) : -std::log(x + (1 - x) * std::exp(-2 * s)) / s;
+  const double r = std::sqrt(std::max(0.0, v * (2 - v))), phi = 2 * std::numbers::pi * double(u.y);
+  return Vec3(r * std::cos(phi), r * std::sin(phi), 1 - v);
+}
+
+std::vector<double> lobe_irradiance(LobeKind kind, double s) {
+  const int count = moments_needed(float(s));
+  std::vector<double> series = moments(kind, s, count);
+  const std::vector<double> cosine = moments(LobeKind::cosine_power, 1, count);
+  for (size_t l = 0; l < series.size(); ++l) series[l] *= std::numbers::pi * lobe_scale(kind, s) * double(2 * l + 1) * cosine[l];
+  return series;
+}
+
+double evaluate_legendre(std::span<const double> c, double x) {
+  double p0 = 1, p1 = x, sum = 0;
+  for (size_t l = 0; l < c.size(); ++l) {
+    sum += c[l] * p0;
+    const double k = double(l + 1), next = ((2 * k + 1) * x * p1 - k * p0) / (k + 1);
+    p0 = p1, p1 = next;
+  }
+  return sum;
+}
+
 std::vector<Vec3> even_directions(int count) {
   LAMBENT_CHECK(count >= 0);
   std::vector<Vec3> directions;
@@ -91,13 +135,18 @@ std::vector<Vec3> even_directions(int count) {
   return directions;
 }
 
+std::vector<Lobe> even_lobes(int count) {
+  std::vector<Lobe> lobes;
+  for (Vec3 axis : even_directions(count)) lobes.push_back({axis, 0.15f * float(count)});
+  return lobes;
+}
+
 DirectionalBasis make_directional_basis(int sh_order, LobeKind kind, std::vector<Lobe> lobes, double cutoff) {
   LAMBENT_CHECK(sh_order >= 0 && sh_order <= max_sh_order && (sh_order > 0 || !lobes.empty()));
   float sharpest = 0;
   for (const Lobe& lobe : lobes) {
     sharpest = std::max(sharpest, lobe.sharpness);
-    LAMBENT_CHECK(lobe.sharpness >= (kind == LobeKind::cosine_power ? 1.0f : 1e-3f) && lobe.sharpness <= 1e5f);
-    LAMBENT_CHECK(std::abs(glm::length(lobe.axis) - 1) < 1e-4f);
+    LAMBENT_CHECK(is_lobe(kind, lobe));
   }
   DirectionalBasis basis{sh_order, kind, std::move(lobes), {}, {}, 0, 1};
   const size_t n = basis.count(), harmonics = size_t(sh_count(sh_order));

@@ -16,8 +16,31 @@ struct Lobe {
   float sharpness;  // s above
 };
 
+// Sharpness that the functions below take; the sharpest lobe is 0.2 degrees across, less than the sun.
+inline constexpr float max_sharpness = 1e5f;
+constexpr float min_sharpness(LobeKind kind) { return kind == LobeKind::cosine_power ? 1.0f : 1e-3f; }
+// Is the axis of unit length, and the sharpness within these limits? False for numbers that are not finite.
+bool is_lobe(LobeKind kind, const Lobe& lobe);
+
+// A lobe's value at an angle of this cosine to its axis, at most 1; the factor that makes the integral of its square 1. Of lobes
+// so scaled: the integral over the sphere, and that of the product of two (1 for equal ones).
+double lobe_value(LobeKind kind, double sharpness, double cosine);
+double lobe_scale(LobeKind kind, double sharpness);
+double lobe_integral(LobeKind kind, double sharpness);
+double lobe_overlap(LobeKind kind, const Lobe& a, const Lobe& b);
+
+// A direction about the axis +z with density lobe / integral, from u in [0, 1)^2.
+Vec3 sample_lobe(LobeKind kind, float sharpness, Vec2 u);
+
+// Irradiance from a scaled lobe, the integral of it times max(0, n . d), as Legendre coefficients of the function of n . axis.
+std::vector<double> lobe_irradiance(LobeKind kind, double sharpness);
+double evaluate_legendre(std::span<const double> coefficients, double x);
+
 // `count` directions spread evenly over the sphere (a Fibonacci lattice), no two alike.
 std::vector<Vec3> even_directions(int count);
+// von Mises-Fisher lobes about them. Broader ones hold smooth functions better, but their duals grow; these have fallen to a third
+// at a neighbour's axis, and the dual functions are up to 5 times as large as they are (in norm).
+std::vector<Lobe> even_lobes(int count);
 
 // Order n of spherical harmonics (0 for none), then the lobes, each scaled so that the integral of its square is 1.
 struct DirectionalBasis {

@@ -27,7 +27,7 @@ ShTables make_tables() {
 
 template <class T>
 void evaluate(int order, T x, T y, T z, std::span<T> out) {
-  LAMBENT_CHECK(order >= 1 && order <= n_max && out.size() >= size_t(sh_count(order)));
+  LAMBENT_CHECK(order >= 0 && order <= n_max && out.size() >= size_t(sh_count(order)));
   const ShTables& t = sh_tables();
   T c = 1, s = 0;  // real and imaginary part of (x + iy)^m
   for (int m = 0; m < order; ++m) {

@@ -21,7 +21,7 @@ constexpr int sh_band(int index) {
   return l;
 }
 
-// Values of the first order^2 harmonics at the unit direction d, into out[0 .. order^2).
+// Values of the first order^2 harmonics at the unit direction d, into out[0 .. order^2); of none for order 0.
 void evaluate_sh(int order, Vec3 d, std::span<float> out);
 void evaluate_sh(int order, glm::dvec3 d, std::span<double> out);
 

@@ -47,7 +47,7 @@ double element(int l, int m, int n, const Block& first, const Block& below) {
 }  // namespace
 
 ShRotation make_sh_rotation(int order, const Mat3& R) {
-  LAMBENT_CHECK(order >= 1 && order <= max_sh_order);
+  LAMBENT_CHECK(order >= 0 && order <= max_sh_order);
   ShRotation rotation{order, {}};
   Block first(1), band(0);
   const int axis[3] = {1, 2, 0};  // m = -1, 0, 1 are y, z, x

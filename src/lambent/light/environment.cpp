@@ -111,6 +111,12 @@ double texel_solid_angle(int y, int width, int height) {
   return 2 * pi_d / width * 2 * std::sin(pi_d * (y + 0.5) / height) * std::sin(0.5 * pi_d / height);
 }
 
+glm::dvec3 texel_moment(int x, int y, int width, int height) {
+  const glm::dvec2 moments = row_moments(y, height);
+  const double phi = 2 * pi_d * ((x + 0.5) / width - 0.5), column = 2 * std::sin(pi_d / width);
+  return {moments.x * column * std::cos(phi), 2 * pi_d / width * moments.y, moments.x * column * std::sin(phi)};
+}
+
 Vec3 radiance(const Environment& env, Vec3 d) {
   Vec2 uv = latlong_uv(d);
   return env.image.at(cell(uv.x, env.image.width), cell(uv.y, env.image.height));

@@ -1,0 +1,226 @@
+#include <lambent/bake/lobes.h>
+#include <lambent/bake/matrix.h>
+#include <lambent/basis/quadrature.h>
+#include <lambent/core/parallel.h>
+#include <lambent/light/lamps.h>
+#include <lambent/light/project.h>
+#include <lambent/light/sky.h>
+#include <lambent/reference/path_tracer.h>
+#include <lambent/relight/light.h>
+#include <lambent/relight/relight.h>
+#include <lambent/scene/procedural.h>
+
+#include <gtest/gtest.h>
+
+namespace lambent {
+namespace {
+
+struct Baking {
+  Scene scene;
+  Receivers receivers;
+  Transfer transfer;
+};
+
+Baking bake_scene(Scene scene, const BakeOptions& options) {
+  auto tracer = Tracer::build(scene);
+  EXPECT_TRUE(tracer);
+  Baking b{std::move(scene), {}, {}};
+  b.receivers = make_vertex_receivers(b.scene);
+  auto transfer = bake(b.scene, *tracer, b.receivers, options);
+  EXPECT_TRUE(transfer) << (transfer ? "" : transfer.error().text());
+  if (transfer) b.transfer = *transfer;
+  return b;
+}
+
+const std::vector<Lobe> skew_lobes{{glm::normalize(Vec3(0.3f, 0.8f, -0.5f)), 5000},
+                                   {glm::normalize(Vec3(0.2f, 0.3f, 0.7f)), 3},     // reaches well below the plane
+                                   {glm::normalize(Vec3(-0.9f, 0.2f, 0.1f)), 40},
+                                   {Vec3(0, -1, 0), 100000}};
+
+TEST(BakeLobes, OpenPlaneIsTheIntegral) {
+  const Vec3 a(0.1f, 0.2f, 1), b(1, -0.2f, 0), n = glm::normalize(glm::cross(a, b));
+  const Mat3 frame = frame_about(n);
+  for (LobeKind kind : {LobeKind::von_mises_fisher, LobeKind::cosine_power})
+    for (bool shadows : {true, false}) {
+      // Without shadows a closed form; with them the two sharp lobes have 2,048 stratified rays each, and the broad ones what of the
+      // fan's 4,096 meets them: few of the grazing one, which sets the absolute tolerance.
+      const double relative = shadows ? 2e-3 : 1e-4, absolute = shadows ? 5e-4 : 1e-5;
+      const Baking baked = bake_scene(make_quad(Vec3(0), a, b, 2, 2, Vec3(0.8f)), {.order = 2, .lobe_kind = kind, .lobes = skew_lobes, .samples = 4096,
+                                                                               .bounces = 0, .shadows = shadows, .precision = Precision::single});
+      ASSERT_EQ(baked.transfer.columns(), 8u);
+      for (size_t k = 0; k < skew_lobes.size(); ++k) {
+        const double s = skew_lobes[k].sharpness, scale = lobe_scale(kind, s);
+        double expected = 0;
+        if (s > 1000) {
+          expected = std::max(0.0f, glm::dot(skew_lobes[k].axis, n)) * lobe_integral(kind, s) / std::numbers::pi;
+        } else {
+          for (const DirectionNode& node : direction_quadrature(160, 0, 1)) {
+            const double cosine = glm::dot(glm::normalize(glm::dvec3(skew_lobes[k].axis)), glm::dmat3(frame) * node.direction);
+            expected += node.weight * node.direction.z * scale * lobe_value(kind, s, cosine) / std::numbers::pi;
+          }
+        }
+        for (size_t r = 0; r < baked.receivers.count(); ++r)
+          EXPECT_NEAR(load_receiver(baked.transfer, r)[4 + k], expected, std::max(absolute, relative * expected)) << int(kind) << shadows << " lobe " << k;
+      }
+    }
+}
+
+TEST(BakeLobes, BoundsItsRays) {
+  EXPECT_TRUE(is_sharp({Vec3(0, 1, 0), 100}, 1024));
+  EXPECT_FALSE(is_sharp({Vec3(0, 1, 0), 50}, 1024));
+  EXPECT_EQ(rays_per_lobe(1024, 1), 1024);
+  EXPECT_EQ(rays_per_lobe(1024, 8), 128);
+  EXPECT_EQ(rays_per_lobe(16, 8), 64);
+  EXPECT_EQ(rays_per_lobe(1024, 0), 0);
+}
+
+// A floor under a black awning: a lamp at 45 degrees shines under it from one side.
+TEST(BakeLobes, ASharpLampCastsASharpShadow) {
+  Scene scene;
+  add_quad(scene, add_material(scene, "grey", Vec3(0.5f)), "floor", Vec3(-2, 0, -2), Vec3(0, 0, 4), Vec3(4, 0, 0), 40, 40);
+  add_quad(scene, add_material(scene, "black", Vec3(0)), "awning", Vec3(-1, 1, -20), Vec3(2, 0, 0), Vec3(0, 0, 40), 1, 1);
+  for (Triangle& t : scene.triangles) t.two_sided = true;
+  const Lobe lamp{glm::normalize(Vec3(1, 1, 0)), 1e5f};
+  const Baking b = bake_scene(std::move(scene), {.order = 2, .lobes = {lamp}, .samples = 64, .bounces = 1, .precision = Precision::single});
+  const float lit = float(lobe_integral(LobeKind::von_mises_fisher, lamp.sharpness)) * lamp.axis.y / pi;
+  int in_light = 0, in_shadow = 0;
+  for (size_t v = 0; v < 41 * 41; ++v) {
+    const float x = b.scene.positions[v].x;  // the awning's shadow lies on [-2, 0]
+    const float value = load_receiver(b.transfer, b.receivers.front[v])[4];
+    if (x > 0.05f) {
+      EXPECT_NEAR(value / lit, 1, 0.01f) << x;
+      ++in_light;
+    } else if (x < -0.05f && x > -1.95f) {
+      EXPECT_EQ(value, 0) << x;
+      ++in_shadow;
+    }
+  }
+  EXPECT_GT(in_light, 700);
+  EXPECT_GT(in_shadow, 700);
+}
+
+Scene court() {
+  Scene scene;
+  const uint32_t red = add_material(scene, "red", Vec3(0.8f, 0.2f, 0.1f)), grey = add_material(scene, "grey", Vec3(0.6f));
+  add_quad(scene, grey, "floor", Vec3(-1, 0, -1), Vec3(0, 0, 2), Vec3(2, 0, 0), 24, 24);
+  add_quad(scene, red, "wall", Vec3(-1, 0, -1), Vec3(2, 0, 0), Vec3(0, 1.5f, 0), 24, 18);
+  add_sphere(scene, grey, "ball", Vec3(0.3f, 0.5f, -0.2f), 0.35f, 3);
+  return scene;
+}
+
+TEST(BakeLobes, AgreesWithThePathTracerUnderSunAndSky) {
+  auto sky = make_sky({.elevation = 50, .azimuth = 70, .width = 512});
+  ASSERT_TRUE(sky);
+  const Mat3 R = rotation_from_yaw_pitch_roll({15, 10, -5});
+  for (bool directional : {false, true}) {
+    const std::vector<Lobe> lobes = directional ? even_lobes(24) : find_lamps(*sky, 2);
+    ASSERT_GE(lobes.size(), 1u);
+    const Baking b = bake_scene(court(), {.order = directional ? 0 : 5, .lobes = lobes, .samples = 2048, .bounces = 2});
+    const LightProjection projection = project_light(*sky, b.transfer.light, directional ? R : Mat3(1.0f));
+    ASSERT_EQ(projection.light.size(), b.transfer.columns());
+    Relit lit;
+    relight(b.transfer, projection.light, lit);
+    const Environment env = reconstruct_environment(projection.basis, projection.light, directional ? 0 : 2048);
+    std::vector<Vec3> origins, normals;
+    std::vector<size_t> chosen;
+    for (size_t k = 0; k < 16; ++k) {
+      chosen.push_back(k * b.receivers.count() / 16 + 7);
+      origins.push_back(b.receivers.origins[chosen.back()]), normals.push_back(b.receivers.normals[chosen.back()]);
+    }
+    const auto truth = exit_radiances(b.scene, env, origins, normals, 2, 8192, 3);
+    // Rays, paths, half floats, and bounces between vertices: 2 % of the brightest, which the sun makes 3.
+    float brightest = 0;
+    for (const auto& t : truth) brightest = std::max(brightest, t.mean.y);
+    EXPECT_GT(brightest, 1.0f);
+    for (size_t k = 0; k < 16; ++k)
+      for (int c = 0; c < 3; ++c) EXPECT_NEAR(lit.at(chosen[k])[c], truth[k].mean[c], 0.02f * brightest) << directional << " receiver " << k << " channel " << c;
+  }
+}
+
+TEST(BakeLobes, TheSameBytesWhateverTheThreadsAndTheMemory) {
+  const Scene scene = court();
+  auto bytes_with = [&](int threads, int bounces, size_t memory) {
+    ThreadLimit limit(threads);
+    const Baking b = bake_scene(scene, {.order = 3, .lobes = skew_lobes, .samples = 64, .bounces = bounces, .memory = memory});
+    return std::vector<uint8_t>(b.transfer.data.begin(), b.transfer.data.end());
+  };
+  const BakeOptions options{.order = 3, .lobes = skew_lobes, .samples = 64, .bounces = 2};
+  const size_t least = least_memory(make_vertex_receivers(scene).count(), true, options);
+  for (int bounces : {0, 2}) {
+    const auto expected = bytes_with(1, bounces, size_t{4} << 30);
+    EXPECT_EQ(bytes_with(2, bounces, size_t{4} << 30), expected);
+    EXPECT_EQ(bytes_with(2, bounces, least + (size_t{1} << 18)), expected);
+  }
+}
+
+TEST(BakeLobes, RefusesLobesThatAreNone) {
+  const Scene scene = make_quad(Vec3(0), Vec3(1, 0, 0), Vec3(0, 1, 0), 1, 1, Vec3(0.5f));
+  auto tracer = Tracer::build(scene);
+  ASSERT_TRUE(tracer);
+  const Receivers receivers = make_vertex_receivers(scene);
+  for (Lobe bad : {Lobe{Vec3(0), 5}, {Vec3(0, 2, 0), 5}, {Vec3(0, 1, 0), 0}, {Vec3(0, 1, 0), -1}, {Vec3(0, 1, 0), 1e9f}, {Vec3(0, NAN, 0), 5}, {Vec3(0, 1, 0), NAN}})
+    EXPECT_FALSE(bake(scene, *tracer, receivers, {.lobes = {bad}}));
+  EXPECT_FALSE(bake(scene, *tracer, receivers, {.order = 1, .lobes = std::vector<Lobe>(1024, {Vec3(0, 1, 0), 5})}));
+  EXPECT_TRUE(bake(scene, *tracer, receivers, {.order = 0, .lobes = {{Vec3(0, 1, 0), 5}}, .samples = 1}));
+}
+
+TEST(BakeLobes, MatrixRowsAreTheIntegralsTheyStandFor) {
+  const Vec3 a(0.1f, 0.2f, 1), b(1, -0.2f, 0);
+  const Scene scene = make_quad(Vec3(0), a, b, 1, 1, Vec3(0.8f));
+  auto tracer = Tracer::build(scene);
+  ASSERT_TRUE(tracer);
+  const Receivers receivers = make_vertex_receivers(scene);
+  ReceiverMaterials materials{{LinearMaterial{Lambert{Vec3(0)}, Lambert{Vec3(1)}}}, {}, {}};
+  materials.of_receiver.assign(receivers.count(), 0);
+  for (const Vec3& n : receivers.normals) materials.frames.push_back(frame_about(n));
+  const Lobe beam{glm::normalize(Vec3(0.5f, 0.9f, -0.3f)), 1e5f}, broad{glm::normalize(Vec3(-0.7f, 0.4f, 0.2f)), 6};
+  auto baked = bake_matrix(scene, *tracer, receivers, materials, {.order = 2, .lobes = {beam, broad}, .samples = 4096, .bounces = 0, .precision = Precision::single},
+                           {.incident_order = 4, .outgoing = OutgoingKind::map, .grid = 8});
+  ASSERT_TRUE(baked) << baked.error().text();
+  const CosineBasis basis = make_cosine_basis(4);
+  std::vector<float> z(16);
+  for (size_t r = 0; r < receivers.count(); ++r) {
+    const auto values = load_receiver(baked->transfer, r);  // [row][column]
+    evaluate_cosine_basis(basis, beam.axis * materials.frames[r], z);
+    const float strength = float(lobe_integral(LobeKind::von_mises_fisher, beam.sharpness)) * glm::dot(beam.axis, receivers.normals[r]) / pi;
+    for (size_t j = 0; j < 16; ++j) EXPECT_NEAR(values[j * 6 + 4] / strength, z[j], 2e-3f) << j;  // the beam's width
+    std::vector<double> expected(16);
+    const Vec3 axis = broad.axis * materials.frames[r];
+    for (const DirectionNode& node : direction_quadrature(64, 0, 1)) {
+      evaluate_cosine_basis(basis, Vec3(node.direction), z);
+      const double value = lobe_scale(LobeKind::von_mises_fisher, 6) * lobe_value(LobeKind::von_mises_fisher, 6, glm::dot(glm::dvec3(axis), node.direction));
+      for (size_t j = 0; j < 16; ++j) expected[j] += node.weight * value * node.direction.z * z[j] / std::numbers::pi;
+    }
+    for (size_t j = 0; j < 16; ++j) EXPECT_NEAR(values[j * 6 + 5], expected[j], 3e-3) << j;  // 4,096 stratified rays, rows of norm 1
+  }
+}
+
+TEST(BakeLobes, MatrixWithLambertIsTheDiffuseBake) {
+  const Scene scene = court();
+  auto tracer = Tracer::build(scene);
+  ASSERT_TRUE(tracer);
+  const Receivers receivers = make_vertex_receivers(scene);
+  ReceiverMaterials materials{{LinearMaterial{Lambert{Vec3(0)}, Lambert{Vec3(1)}}}, {}, {}};
+  materials.of_receiver.assign(receivers.count(), 0);
+  for (const Vec3& n : receivers.normals) materials.frames.push_back(frame_about(n));
+  for (int bounces : {0, 2}) {
+    const BakeOptions options{.order = 3, .lobes = skew_lobes, .samples = 128, .bounces = bounces, .precision = Precision::single};
+    auto vector = bake(scene, *tracer, receivers, options);
+    auto matrix = bake_matrix(scene, *tracer, receivers, materials, options, {.incident_order = 3, .outgoing = OutgoingKind::svd, .svd_rows = 2, .grid = 8});
+    ASSERT_TRUE(vector);
+    ASSERT_TRUE(matrix) << matrix.error().text();
+    std::vector<Vec3> light(vector->columns(), Vec3(0.5f, 1, 0.2f));
+    Relit a, b;
+    relight(*vector, light, a), relight(matrix->transfer, light, b);
+    std::vector<ViewWeights> weights(size_t(matrix->transfer.rows));
+    // As for harmonics: the same rays, hits rounded.
+    for (size_t r = 0; r < receivers.count(); ++r) {
+      evaluate_outgoing(matrix->outgoing, r, receivers.normals[r], weights);
+      const Vec3 radiance = reflect_rows(weights, Vec3(1), [&](size_t row) { return b.at(r, int(row)); });
+      EXPECT_LT(glm::length(radiance - a.at(r)), bounces ? 2e-3f : 2e-5f) << r;
+    }
+  }
+}
+
+}  // namespace
+}  // namespace lambent
