@@ -36,6 +36,7 @@ void bench_lightmaps();
 void bench_radiosity();
 void bench_relight();
 void bench_scaling();
+void bench_solvers();
 void bench_zonal();
 
 }  // namespace lambent::bench

@@ -145,6 +145,16 @@ expect 0 '"psnr"' compare map_lit.exr map_truth.exr --json
 psnr=$(sed -n 's/.*"psnr": \([0-9]*\).*/\1/p' stdout)
 [ "${psnr:-0}" -ge 35 ] && ok || bad "lightmapped and path-traced boxes differ: PSNR ${psnr:-none}"
 expect 0 'relit' render map.glb $view --lamp lamp=0.1,0.2,0 --lamp sky=0,0,1 -o dimmed.exr
+for part in radiosity albedo product; do expect 0 'relit' render map.glb $view --show $part -o map_$part.png; done
+cmp -s map_radiosity.png map_product.png && bad "radiosity and product are the same picture" || ok
+expect 2 'product' render map.glb $view --show colour -o x.png
+expect 0 'hemicube\|lamps' bake box.obj --transfer lightmap --gather hemicube --atlas 64x64 --samples 300 -o cube.glb
+expect 0 'texels' export map.glb --three map_three
+expect 0 'texels' export map.glb --godot map_godot
+expect 0 'lamps' bake box.obj --transfer lightmap --directional sh:2 --atlas 64x64 --samples 64 -o sh2.glb
+expect 0 'sh2_godot.3.exr' export sh2.glb --godot sh2_godot
+expect 0 'sh2_three.3.exr' export sh2.glb --three sh2_three
+for picture in map_three.exr map_godot.exr sh2_godot.0.exr sh2_three.0.exr; do [ -s $picture ] && ok || bad "$picture is missing"; done
 expect 2 'no group' render map.glb $view --lamp chandelier=1,1,1 -o x.png
 expect 0 'applications' bake box.obj --transfer lightmap --atlas 64x48 --samples 64 --bounces converge:1e-3 --solver southwell --direct separate --json -o map2.glb
 for picture in map2.direct.exr map2.indirect.exr; do [ -s $picture ] && ok || bad "$picture is missing"; done
@@ -152,7 +162,9 @@ expect 0 'lamps' bake box.obj --transfer lightmap --receivers patches --samples 
 expect 0 'relit' render patches.glb $view -o patches.exr
 expect 0 'lamps' bake box.obj --transfer lightmap --directional hl2 --atlas 64x64 --samples 64 -o hl2.glb
 expect 0 'relit' render hl2.glb $view -o hl2.exr
+expect 1 'sh:2 or sh:3' export hl2.glb --godot x
 expect 0 'receivers' bake box.obj --receivers texels --atlas 64x64 --order 3 --samples 64 -o prt.glb
+expect 1 'no lamps' export prt.glb --three x
 expect 0 'relit' render prt.glb --env sky:elevation=30 $view -o prt.exr
 for thread_count in 1 2; do "$tool" bake box.obj --transfer lightmap --atlas 64x64 --samples 64 --threads $thread_count -o map_$thread_count.glb >/dev/null 2>&1; done
 cmp -s map_1.glb map_2.glb && ok || bad "1 and 2 threads give different lightmaps"

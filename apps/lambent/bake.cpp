@@ -5,6 +5,7 @@
 #include <lambent/bake/bake.h>
 #include <lambent/bake/lattice.h>
 #include <lambent/bake/materials.h>
+#include <lambent/bake/unbury.h>
 #include <lambent/baked/baked_file.h>
 #include <lambent/compress/parametric.h>
 #include <lambent/compress/zonal_fit.h>
@@ -189,7 +190,7 @@ int run_bake(Context& context, BakeCommand o) {
   if (!scene) return fail(scene.error());
   auto placed = place_receivers(*scene, o.receivers, "vertices");
   if (!placed) return fail(placed.error());
-  const Receivers& receivers = placed->receivers;
+  Receivers& receivers = placed->receivers;
   const bool at_vertices = std::holds_alternative<CornerReceivers>(receivers.basis);
   if (!o.lattice_points.empty() && !at_vertices) return fail({"--receivers", "--lattice needs a bake at vertices"});
   if ((is_matrix || is_zonal) && !at_vertices)
@@ -209,6 +210,7 @@ int run_bake(Context& context, BakeCommand o) {
   auto tracer = Tracer::build(*scene);
   if (!tracer) return fail(tracer.error());
   const double build_seconds = seconds_since(start);
+  if (placed->atlas) move_buried_texels(*scene, *tracer, *placed->atlas, receivers);
 
   BakeReport report;
   std::optional<Outgoing> outgoing;

@@ -32,7 +32,7 @@ Result<Image> paint_errors(const Baked& baked, const std::vector<float>& errors,
     for (size_t c = 0; c < 3; ++c) relit.values[(r / transfer_block * 3 + c) * transfer_block + r % transfer_block] = colour[int(c)];
   }
   RenderOptions options;
-  options.width = view->width, options.height = view->height, options.albedo = false;
+  options.width = view->width, options.height = view->height, options.show = RenderOptions::Show::radiosity;
   auto image = render(baked.scene, *tracer, corner_receivers(baked.scene, baked.front, baked.back), relit, view->camera, options, progress);
   if (!image) return image;
   image->alpha.clear();

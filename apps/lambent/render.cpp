@@ -24,6 +24,9 @@
 namespace lambent::tool {
 namespace {
 
+const std::map<std::string, RenderOptions::Show> show_names{
+    {"product", RenderOptions::Show::product}, {"radiosity", RenderOptions::Show::radiosity}, {"albedo", RenderOptions::Show::albedo}};
+
 struct RenderCommand {
   std::string baked, texture, tile = "1,1";
   LightOptions light;
@@ -33,7 +36,7 @@ struct RenderCommand {
   bool new_brdf = false;
   ShWindow window = ShWindow::none;
   int light_order = 0, samples = 16;
-  bool no_albedo = false;
+  RenderOptions::Show show = RenderOptions::Show::product;
   std::vector<std::string> lamps;  // NAME=R,G,B
   std::vector<std::string> insert;
 };
@@ -70,7 +73,7 @@ int run_textured(Context& context, const RenderCommand& o) {
     if (!view) return fail(view.error());
     auto tracer = Tracer::build(moved);
     if (!tracer) return fail(tracer.error());
-    RenderOptions options{view->width, view->height, o.samples, nullptr, !o.no_albedo};
+    RenderOptions options{view->width, view->height, o.samples, nullptr, o.show};
     if (o.view.background == "env") options.background = &turned;
     auto image = render_transfer_texture(moved, *tracer, *texture, {(*tile)[0], (*tile)[1]}, light, view->camera, options, &context.progress);
     if (!image) return fail(image.error());
@@ -195,7 +198,7 @@ int run_render(Context& context, const RenderCommand& o) {
   if (baked->zonal) specialise_light(*baked->zonal, light, table);
   else if (o.motion.any()) warn(o.baked + ": its transfer cannot turn with the surface (`lambent compress --zonal` makes one that can); it is used as baked");
 
-  RenderOptions options{view->width, view->height, o.samples, nullptr, !o.no_albedo, baked->outgoing ? &*baked->outgoing : nullptr, baked->directional};
+  RenderOptions options{view->width, view->height, o.samples, nullptr, o.show, baked->outgoing ? &*baked->outgoing : nullptr, baked->directional};
   if (!basis.groups.empty()) {
     const bool one = basis.groups.size() == 1 && basis.groups[0] == std::string("all");
     for (const Material& m : baked->scene.materials) {
@@ -268,7 +271,8 @@ void add_render(CLI::App& app, Run& run) {
   c->add_option("--lamp", o->lamps, "NAME=R,G,B: scale a group of lamps by this colour (files baked with --light-groups)");
   c->add_option("--insert", o->insert, "FILE@X,Y,Z[,SCALE]: put a small diffuse object there, lit by the scene's lattice; may be given again")
       ->allow_extra_args(false);
-  c->add_flag("--no-albedo", o->no_albedo, "Draw everything as if it were white");
+  c->add_option("--show", o->show, "product of light and colour; radiosity: the light alone, as if everything were white; albedo: the colour alone")
+      ->transform(CLI::CheckedTransformer(show_names).description("{product,radiosity,albedo}"));
   auto* brdf = o->brdf.add_to(*c);
   c->callback([o, brdf, &run] { o->new_brdf = brdf->count() > 0; run = [o](Context& context) { return run_render(context, *o); }; });
 }

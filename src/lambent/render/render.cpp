@@ -4,6 +4,7 @@
 #include <lambent/core/sampling.h>
 #include <lambent/render/render.h>
 #include <lambent/scene/lights.h>
+#include <lambent/scene/reflection.h>
 
 namespace lambent {
 namespace {
@@ -61,9 +62,11 @@ Result<Image> render(const Scene& scene, const Tracer& tracer, const SpatialBasi
   return render_surfaces(scene, tracer, camera, options, [&]() -> SurfaceShade {
     return [&, weights = std::vector<ViewWeights>(size_t(relit.rows))](const Hit& hit, Vec3 direction) mutable {
       const Triangle& triangle = scene.triangles[hit.triangle];
+      if (options.show == RenderOptions::Show::albedo) return albedo(scene, triangle, hit.u, hit.v);
       Vec3 sum(0.0f);
-      if (!options.emission.empty() && emits(scene, triangle, hit.front)) sum += options.emission[scene.parts[triangle.part].material];
-      const Vec3 colour = options.albedo ? albedo(scene, triangle, hit.u, hit.v) : Vec3(1);
+      if (!options.emission.empty() && emits(scene, triangle, hit.front))
+        sum += options.emission[scene.parts[triangle.part].material] * emission_texel(scene, triangle, hit.u, hit.v);
+      const Vec3 colour = options.show == RenderOptions::Show::product ? albedo(scene, triangle, hit.u, hit.v) : Vec3(1);
       std::array<Vec3, 9> rows{};
       std::visit([&](const auto& b) {
         const auto* at = b.find(hit.triangle, hit.front);
@@ -78,10 +81,12 @@ Result<Image> render(const Scene& scene, const Tracer& tracer, const SpatialBasi
         });
       }, basis);
       if (options.directional == DirectionalKind::none) return sum + colour * rows[0];
-      const Vec3 face = normalize_or(area_normal(scene, triangle), Vec3(0, 1, 0)) * (hit.front ? 1.0f : -1.0f);
+      const float side = hit.front ? 1.0f : -1.0f;
+      const Vec3 face = normalize_or(area_normal(scene, triangle), Vec3(0, 1, 0));
       Vec3 n = normalize_or(interpolate(scene.normals, triangle, hit.u, hit.v), face);
       if (glm::dot(n, face) < 0) n = -n;
-      return sum + colour * evaluate_directional_light(options.directional, rows, receiver_frame(n), n);
+      const Vec3 bent = mapped_normal(scene, triangle, hit.u, hit.v, n);
+      return sum + colour * evaluate_directional_light(options.directional, rows, receiver_frame(side * n), side * bent);
     };
   }, progress);
 }
