@@ -10,7 +10,8 @@ namespace lambent {
 namespace {
 
 constexpr size_t rays = 64;
-// Distances from the centre, in texels, at which points are tried, in `turns` directions; then the gap to the last one is halved.
+// Half sides of squares about the centre, in texels, on which points are tried, in `turns` directions; then the gap to the last one is
+// halved. Points beyond the surface's border stand for the nearest on it, as texel centres do.
 constexpr float radii[] = {0.3f, 0.6f, 0.99f};
 constexpr int turns = 8, halvings = 3;
 
@@ -79,21 +80,25 @@ size_t move_buried_texels(const Scene& scene, const Tracer& tracer, const Atlas&
       const TexelPlace place = receivers.places[r];
       // Puts the receiver there; false where there is no surface, or only more of the inside.
       auto stands_clear = [&](Vec2 at) {
+        ClosestPoint nearest{0, 0, INFINITY};
+        Side on{};
         for (const Side& side : texel.sides) {
           const TexelTriangle& own = *map.find(side.triangle, !side.back);
           const ClosestPoint c = closest_point({own.at[0], own.at[1], own.at[2]}, at);
-          if (c.distance > 0) continue;
-          place_texel(scene, receivers, r, {side.triangle, c.u, c.v}, side.back, texel_size, diagonal);
-          return !lies_inside(tracer, receivers, r);
+          const Vec2 away = glm::abs((1 - c.u - c.v) * own.at[0] + c.u * own.at[1] + c.v * own.at[2] - texel.centre);
+          if (std::max(away.x, away.y) < 1 && c.distance < nearest.distance) nearest = c, on = side;
         }
-        return false;
+        if (!(nearest.distance < INFINITY)) return false;
+        place_texel(scene, receivers, r, {on.triangle, nearest.u, nearest.v}, on.back, texel_size, diagonal);
+        return !lies_inside(tracer, receivers, r);
       };
       auto search = [&] {
         float last = 0;
         for (float radius : radii) {
           for (int turn = 0; turn < turns; ++turn) {
             const float angle = 2 * pi * float(turn) / turns;
-            const Vec2 way(std::cos(angle), std::sin(angle));
+            Vec2 way(std::cos(angle), std::sin(angle));
+            way /= std::max(std::abs(way.x), std::abs(way.y));
             if (!stands_clear(texel.centre + radius * way)) continue;
             float in = last, out = radius;
             for (int k = 0; k < halvings; ++k) {
