@@ -1,5 +1,6 @@
 // The baked-file reader on hostile bytes: whatever it accepts must be safe to project light onto and to relight.
 #include <lambent/baked/baked_file.h>
+#include <lambent/relight/factors.h>
 #include <lambent/relight/lattice.h>
 #include <lambent/relight/light.h>
 #include <lambent/relight/relight.h>
@@ -31,6 +32,8 @@ extern "C" int LLVMFuzzerTestOneInput(const uint8_t* data, size_t size) {
     lambent::ZonalLight table;
     lambent::specialise_light(*baked->zonal, harmonics, table);
     lambent::relight_zonal(*baked->zonal, nullptr, table, relit);
+  } else if (baked->factors) {
+    lambent::relight_factors(baked->transfer, *baked->outgoing, light, relit);
   } else if (baked->cpca) {
     lambent::relight(*baked->cpca, light, relit);
   } else {

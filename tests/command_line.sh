@@ -105,6 +105,21 @@ done
 expect 2 'env: is needed' render lamps.glb -o x.png
 expect 0 'lamps? that stands? out, not 64' bake corner.obj --samples 64 --bounces 0 --light sh:5+lamps:64@$sun -o lamps.glb
 expect 0 'order 3,' bake corner.obj --samples 64 --light sh:3+lamps:4@uniform:1 -o lamps.glb
+# Factors: the pictures of a matrix bake of direct light, in fewer bytes; the material is still free. Phong's lobe by convolution.
+"$tool" bake corner.obj --max-edge 0.5 --samples 64 --transfer matrix --brdf ggx:roughness=0.5 --order 3 --incident-order 3 --bounces 0 -o whole.glb >/dev/null 2>&1
+expect 0 'receivers' bake corner.obj --max-edge 0.5 --samples 64 --transfer matrix --brdf phong:exponent=9 --order 3 --incident-order 3 --factors -o factors.glb
+expect 0 'factors, order 3' inspect factors.glb
+for f in whole factors; do expect 0 'relit' render $f.glb --env sky:elevation=30 --brdf ggx:roughness=0.5 --size 24x18 --background none -o $f.exr; done
+expect 0 'PSNR +([5-9][0-9]|inf)' compare factors.exr whole.exr
+[ "$(stat -c %s factors.glb)" -lt "$(stat -c %s whole.glb)" ] && ok || bad "factors take more bytes than the matrix"
+expect 0 'rows' bake corner.obj --samples 64 --transfer matrix --brdf phong:exponent=5 --outgoing phong --order 3 --incident-order 3 -o phong.glb
+expect 0 'outgoing phong' inspect phong.glb
+expect 0 'relit' render phong.glb --env sky:elevation=30 --size 16x16 -o phong.png
+expect 1 'phong' bake corner.obj --samples 64 --transfer matrix --brdf ggx:roughness=0.5 --outgoing phong --order 3 -o x.glb
+expect 1 'plain transfer' compress factors.glb --cpca 4,3 -o x.glb
+expect 2 'direct light' bake corner.obj --transfer matrix --factors --bounces 2 -o x.glb
+expect 2 'factors' bake corner.obj --factors -o x.glb
+expect 2 'factors' bake corner.obj --transfer matrix --factors --order 12 --incident-order 6 -o x.glb
 # A fixed view is image relighting: the picture that the whole bake makes of that view.
 expect 0 'pixel' bake corner.obj --max-edge 0.5 --samples 64 --order 4 --fix-view 3,2,4,1,0.5,0,40 --size 24x18 --spp 4 -o view.glb
 expect 0 'fixed view of 24 x 18' inspect view.glb

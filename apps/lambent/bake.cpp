@@ -34,6 +34,7 @@ struct BakeCommand {
   std::string lattice_points, lattice_box;
   std::string light, transfer = "diffuse", membrane, outgoing = "map", simulate = "recursion", fix_light, fix_view,
               size = "512x512", compress, output, shadows = "on", precision = "half", bounces = "3";
+  bool factors = false;
   int view_samples = 16;  // rays a pixel of a fixed view
   ReceiverFlags receivers;
   LightmapFlags lightmap;
@@ -45,10 +46,10 @@ Result<void> parse_outgoing(const std::string& text, MatrixOptions& matrix) {
   const size_t colon = text.find(':');
   const std::string name = text.substr(0, colon);
   const auto kind = std::find(std::begin(outgoing_names), std::end(outgoing_names), name);
-  if (kind == std::end(outgoing_names)) return Error{"--outgoing", "must be map, svd:ROWS, sh:BANDS, hemisphere:BANDS or hsh:BANDS, not \"" + text + "\""};
+  if (kind == std::end(outgoing_names)) return Error{"--outgoing", "must be map, phong, svd:ROWS, sh:BANDS, hemisphere:BANDS or hsh:BANDS, not \"" + text + "\""};
   matrix.outgoing = OutgoingKind(kind - std::begin(outgoing_names));
   if (colon == std::string::npos) return {};
-  if (matrix.outgoing == OutgoingKind::map) return Error{"--outgoing", "map takes no number: --incident-order says how many rows it has"};
+  if (matrix.outgoing == OutgoingKind::map || matrix.outgoing == OutgoingKind::phong) return Error{"--outgoing", name + " takes no number: --incident-order says how many rows it has"};
   auto number = parse_numbers(text.substr(colon + 1), 1, "--outgoing");
   if (!number) return number.error();
   const float n = (*number)[0];
@@ -182,6 +183,11 @@ int run_bake(Context& context, BakeCommand o) {
   if (!reflection) return fail(reflection.error());
   if (o.light.empty()) o.light = "sh:" + std::to_string(o.bake.order);
   if (auto ok = parse_light(o.light, o.bake); !ok) return fail(ok.error());
+  if (o.factors) {
+    if (!o.bake.lobes.empty()) return fail({"--light", "--factors multiplies harmonics: leave lobes out"});
+    if (o.bake.order + o.matrix.incident_order - 1 > max_sh_order)
+      return fail({"--factors", "needs the bands of the light and of incident light, less one, and " + std::to_string(max_sh_order) + " is all there are"});
+  }
   if (is_matrix && o.bake.order == 0) return fail({"--light", "directional light cannot be baked with --transfer matrix"});
   if (!o.bake.lobes.empty() && !o.lattice_points.empty()) return fail({"--light", "lobes do not light free space: leave --lattice out"});
   if (!o.bake.lobes.empty() && o.matrix.simulate_paths && o.bake.bounces > 0)
@@ -231,7 +237,14 @@ int run_bake(Context& context, BakeCommand o) {
   BakeReport report;
   std::optional<Outgoing> outgoing;
   Result<Transfer> transfer = Error{};
-  if (is_matrix) {
+  if (o.factors) {
+    // Visibility times cosine is diffuse transfer of direct light, of as many bands as make the product with light exact.
+    BakeOptions visibility = o.bake;
+    visibility.order = o.bake.order + o.matrix.incident_order - 1, visibility.bounces = 0;
+    transfer = bake(*scene, *tracer, receivers, visibility, &report, &context.progress);
+    if (!transfer) return fail(transfer.error());
+    outgoing = make_map_outgoing(make_receiver_materials(*scene, receivers, *reflection), o.matrix.incident_order, o.matrix);
+  } else if (is_matrix) {
     auto baked = bake_matrix(*scene, *tracer, receivers, make_receiver_materials(*scene, receivers, *reflection), o.bake, o.matrix, &report,
                              &context.progress);
     if (!baked) return fail(baked.error());
@@ -278,7 +291,7 @@ int run_bake(Context& context, BakeCommand o) {
         {"ground", o.scene.ground}, {"max_edge", o.scene.max_edge}, {"seed", o.bake.seed}, {"precision", o.precision}}},
       {"report", {{"receivers", report.receivers}, {"buried", report.buried}}}};
   if (is_matrix)
-    provenance["options"].update({{"brdf", o.brdf.brdf}, {"outgoing", o.outgoing}, {"incident_order", o.matrix.incident_order}, {"simulate", o.simulate}});
+    provenance["options"].update({{"brdf", o.brdf.brdf}, {"outgoing", o.outgoing}, {"incident_order", o.matrix.incident_order}, {"simulate", o.simulate}, {"factors", o.factors}});
   if (!o.fix_light.empty()) provenance["options"]["fix_light"] = o.fix_light;
   if (view) provenance["options"].update({{"fix_view", o.fix_view}, {"size", o.size}});
   if (free_space) {
@@ -311,7 +324,8 @@ int run_bake(Context& context, BakeCommand o) {
 
   start = Clock::now();
   const std::string origin = provenance.dump(-1, ' ', false, nlohmann::json::error_handler_t::replace);
-  const BakedExtras extras{.outgoing = outgoing ? &*outgoing : nullptr, .lattice = free_space ? &*free_space : nullptr, .view = view ? &*view : nullptr};
+  const BakedExtras extras{.outgoing = outgoing ? &*outgoing : nullptr, .lattice = free_space ? &*free_space : nullptr,
+                           .factors = o.factors, .view = view ? &*view : nullptr};
   const Receivers of_surfaces = view ? Receivers{} : receivers;
   if (auto ok = zonal      ? save_baked(o.output, *scene, receivers, *zonal, origin)
                 : clusters ? save_baked(o.output, *scene, receivers, *clusters, origin, extras)
@@ -388,11 +402,12 @@ void add_bake(CLI::App& app, Run& run) {
   auto* lobes = c->add_option("--lobes", o->zonal.lobes, "zonal: lobes a receiver")->check(CLI::Range(1, max_stored_lobes))->capture_default_str();
   auto* incident = c->add_option("--incident-order", o->matrix.incident_order, "matrix: bands of incident light")
                        ->check(CLI::Range(1, max_incident_order))->capture_default_str();
-  auto* last = c->add_option("--outgoing", o->outgoing, "matrix: rows for the last reflection: map, svd:ROWS, sh:BANDS, hemisphere:BANDS, hsh:BANDS")
+  auto* last = c->add_option("--outgoing", o->outgoing, "matrix: rows for the last reflection: map, phong, svd:ROWS, sh:BANDS, hemisphere:BANDS, hsh:BANDS")
                    ->capture_default_str();
   auto* membrane = c->add_option("--membrane", o->membrane, "No simulation: thin sheets that let this share of the light through, 0 to 1, or a picture of it");
   auto* simulate = c->add_option("--simulate", o->simulate, "matrix: bounces by the recursion over receivers, or by paths (caustics, coarse meshes; noisier)")
                        ->check(CLI::IsMember({"recursion", "paths"}))->capture_default_str();
+  auto* factors = c->add_flag("--factors", o->factors, "matrix: keep visibility, light and BRDF as factors; direct light alone, a tenth of the size");
   o->brdf.brdf = "materials";
   auto* brdf = o->brdf.add_to(*c);
   auto* fixed = c->add_option("--fix-light", o->fix_light, "Bake this environment in, so that only its brightness is left: a surface light field");
@@ -414,7 +429,7 @@ void add_bake(CLI::App& app, Run& run) {
   auto* box = c->add_option("--lattice-box", o->lattice_box, "X0,Y0,Z0,X1,Y1,Z1: where, if not throughout the scene's box");
   auto* lattice_order = c->add_option("--lattice-order", o->lattice.order, "Bands of the light that arrives there")
                             ->check(CLI::Range(1, max_sh_order))->capture_default_str();
-  c->callback([o, bounces, order, light, lobes, membrane, fixed, view, compress, incident, last, brdf, simulate, points, box, lattice_order, &run] {
+  c->callback([o, bounces, order, light, lobes, membrane, fixed, view, compress, factors, incident, last, brdf, simulate, points, box, lattice_order, &run] {
     o->order_given = order->count() > 0;
     if (order->count() && light->count()) throw CLI::ValidationError("--order and --light both say how many bands there are: give one");
     if (light->count() && (membrane->count() || (o->transfer != "diffuse" && o->transfer != "matrix")))
@@ -429,7 +444,14 @@ void add_bake(CLI::App& app, Run& run) {
     if (view->count() && compress->count()) throw CLI::ValidationError("--compress makes clusters of receivers on surfaces, and --fix-view has pixels: give one");
     if (view->count() && points->count()) throw CLI::ValidationError("--fix-view leaves no room for what --lattice would light: give one");
     if (lobes->count() && o->transfer != "zonal") throw CLI::ValidationError("--lobes needs --transfer zonal");
-    for (const CLI::Option* option : {incident, last, brdf, simulate})
+    if (factors->count()) {
+      if (bounces->count() && o->bounces != "0") throw CLI::ValidationError("--factors is direct light: leave --bounces out, or set it to 0");
+      if (o->outgoing != "map") throw CLI::ValidationError("--factors keeps incident light: leave --outgoing out, or set it to map");
+      for (const CLI::Option* option : {fixed, view, compress, points, simulate})
+        if (option->count()) throw CLI::ValidationError("--factors does not go with " + option->get_name());
+      o->bounces = "0";
+    }
+    for (const CLI::Option* option : {factors, incident, last, brdf, simulate})
       if (option->count() && o->transfer != "matrix") throw CLI::ValidationError(option->get_name() + " needs --transfer matrix");
     if (o->transfer == "matrix" && o->shadows == "off") throw CLI::ValidationError("--transfer matrix is always baked with shadows");
     for (const CLI::Option* option : {box, lattice_order})

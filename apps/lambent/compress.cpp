@@ -46,7 +46,7 @@ Result<Image> paint_errors(const Baked& baked, const std::vector<float>& errors,
 int compress_to_clusters(Context& context, const CompressCommand& o, const Baked& baked) {
   CpcaOptions options;
   if (auto ok = parse_cpca("cpca:" + o.cpca, options); !ok) return fail({"--cpca", ok.error().message});
-  if (baked.zonal || baked.cpca || baked.view) return fail({o.baked, "holds no plain transfer at receivers on surfaces, which is what clusters are made of"});
+  if (baked.zonal || baked.cpca || baked.view || baked.factors) return fail({o.baked, "holds no plain transfer at receivers on surfaces, which is what clusters are made of"});
   double error = 0;
   const auto start = std::chrono::steady_clock::now();
   auto clusters = compress_cpca(baked.transfer, options, &error, &context.progress);

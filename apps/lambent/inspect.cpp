@@ -85,12 +85,13 @@ int run_inspect(Context& context, const std::string& path) {
     if (!baked) return fail(baked.error());
     if (baked->zonal) return inspect_zonal(context, path, *baked);
     Transfer t = baked->transfer;
+    t.light = light_of(*baked);
     if (baked->cpca) t.light = baked->cpca->light, t.rows = baked->cpca->rows, t.channels = baked->cpca->channels, t.receivers = baked->cpca->receivers;
-    const size_t bytes = baked->cpca ? baked->cpca->bytes() : t.bytes();
+    const size_t bytes = baked->cpca ? baked->cpca->bytes() : baked->transfer.bytes();
     nlohmann::json lobes = nlohmann::json::array();
     for (const Lobe& l : t.light.lobes) lobes.push_back({{"axis", vector_json(l.axis)}, {"sharpness", l.sharpness}});
     nlohmann::json d{{"file", path}, {"kind", "baked"}, {"scene", describe_scene(baked->scene)},
-                     {"transfer", {{"kind", baked->outgoing ? "matrix" : "diffuse"}, {"order", t.light.order}, {"lobes", lobes}, {"groups", t.light.groups},
+                     {"transfer", {{"kind", baked->factors ? "factors" : baked->outgoing ? "matrix" : "diffuse"}, {"order", t.light.order}, {"lobes", lobes}, {"groups", t.light.groups},
                                    {"columns", t.columns()}, {"rows", t.rows}, {"channels", t.channels}, {"receivers", t.receivers}, {"bytes", bytes},
                                    {"precision", t.precision == Precision::half ? "half" : "single"}}},
                      {"provenance", nlohmann::json::parse(baked->provenance, nullptr, false)}};
@@ -108,7 +109,7 @@ int run_inspect(Context& context, const std::string& path) {
       print_json(d);
     } else {
       fmt::print("{}\n  baked: {}, {}, {} column{}, {} row{}, {} channel{}, {} receivers, {} ({})\n", path,
-                 baked->outgoing ? std::string("matrix, outgoing ") + outgoing_names[int(baked->outgoing->kind)] : "diffuse", describe_light(t.light),
+                 baked->factors ? "factors" : baked->outgoing ? std::string("matrix, outgoing ") + outgoing_names[int(baked->outgoing->kind)] : "diffuse", describe_light(t.light),
                  t.columns(), t.columns() == 1 ? "" : "s", t.rows, t.rows == 1 ? "" : "s", t.channels, t.channels == 1 ? "" : "s",
                  human_count(t.receivers), human_bytes(double(bytes)), t.precision == Precision::half ? "half" : "single");
       if (baked->cpca) fmt::print("  in {} clusters of rank {}\n", baked->cpca->clusters, baked->cpca->rank);

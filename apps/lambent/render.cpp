@@ -6,6 +6,7 @@
 #include <lambent/bake/materials.h>
 #include <lambent/baked/baked_file.h>
 #include <lambent/light/project.h>
+#include <lambent/relight/factors.h>
 #include <lambent/relight/light.h>
 #include <lambent/relight/relight.h>
 #include <lambent/relight/zonal.h>
@@ -94,11 +95,9 @@ Result<void> change_materials(Baked& baked, const BrdfOptions& options, const st
   Receivers receivers;
   receivers.origins.resize(receivers_of(baked)), receivers.front = baked.front, receivers.back = baked.back;
   for (const Mat3& frame : baked.outgoing->frames) receivers.normals.push_back(frame[2]);
-  const ReceiverMaterials materials = make_receiver_materials(baked.scene, receivers, *reflection);
-  const CosineBasis basis = make_cosine_basis(baked.outgoing->order);
-  baked.outgoing->maps.clear();
-  for (const LinearMaterial& m : materials.materials) baked.outgoing->maps.push_back(make_response(m, basis, MatrixOptions{}.grid, MatrixOptions{}.response_samples));
-  baked.outgoing->map_of = materials.of_receiver;
+  Outgoing changed = make_map_outgoing(make_receiver_materials(baked.scene, receivers, *reflection), baked.outgoing->order);
+  changed.frames = std::move(baked.outgoing->frames);
+  baked.outgoing = std::move(changed);
   return {};
 }
 
@@ -225,6 +224,7 @@ int run_render(Context& context, const RenderCommand& o) {
     const auto start = std::chrono::steady_clock::now();
     if (baked->zonal) relight_zonal(*baked->zonal, pose ? &frames : nullptr, table, relit);
     else if (baked->cpca) relight(*baked->cpca, light, relit);
+    else if (baked->factors) relight_factors(baked->transfer, *baked->outgoing, light, relit);
     else relight(baked->transfer, light, relit);
     relight_seconds = std::min(relight_seconds, std::chrono::duration<double>(std::chrono::steady_clock::now() - start).count());
 

@@ -41,4 +41,12 @@ ReceiverMaterials make_receiver_materials(const Scene& scene, const Receivers& r
   return out;
 }
 
+Outgoing make_map_outgoing(const ReceiverMaterials& materials, int incident_order, const MatrixOptions& options) {
+  Outgoing o;
+  o.kind = OutgoingKind::map, o.order = incident_order, o.map_of = materials.of_receiver, o.frames = materials.frames;
+  const CosineBasis basis = make_cosine_basis(incident_order);
+  for (const LinearMaterial& m : materials.materials) o.maps.push_back(make_response(m, basis, options.grid, options.response_samples));
+  return o;
+}
+
 }  // namespace lambent

@@ -1,5 +1,6 @@
 #include <lambent/baked/baked_file.h>
 #include <lambent/baked/viewer_look.h>
+#include <lambent/basis/cosine_basis.h>
 #include <lambent/basis/sh.h>
 #include <lambent/core/check.h>
 #include <lambent/core/half.h>
@@ -462,14 +463,14 @@ class ExtrasWriter {
     view_at_ = int(blobs.size());
     if (extras.view) blobs.push_back({bytes_of(std::span<const float>(extras.view->coverage)), 4});
   }
-  const char* kind() const { return extras_.outgoing ? "matrix" : "diffuse"; }
+  const char* kind() const { return extras_.factors ? "factors" : extras_.outgoing ? "matrix" : "diffuse"; }
 
   // `first`: the buffer view of the first of `blobs`.
   void write(json& extension, int rows, int first) const {
     json& t = extension["transfer"];
     if (extras_.directional != DirectionalKind::none) t["directional"] = directional_name(extras_.directional);
     if (const Outgoing* outgoing = extras_.outgoing) {
-      t["rows"] = rows;
+      if (!extras_.factors) t["rows"] = rows;
       json& o = t["outgoing"];
       o = {{"kind", outgoing_names[int(outgoing->kind)]}, {"order", outgoing->order}, {"frames", first}};
       if (outgoing->maps.empty()) {
@@ -507,7 +508,8 @@ class ExtrasWriter {
 void check_extras(const BakedExtras& extras, const LightBasis& light, int rows) {
   const LatticeTransfer* lattice = extras.lattice;
   LAMBENT_CHECK(!lattice || (lattice->transfer.columns() == light.count() && lattice->valid.size() == lattice->lattice.count()));
-  LAMBENT_CHECK(rows == (extras.outgoing ? extras.outgoing->rows() : directional_rows(extras.directional)));
+  LAMBENT_CHECK(!extras.factors || (rows == 1 && extras.outgoing && extras.outgoing->kind == OutgoingKind::map && light.order >= extras.outgoing->order));
+  LAMBENT_CHECK(rows == (extras.outgoing && !extras.factors ? extras.outgoing->rows() : directional_rows(extras.directional)));
 }
 
 }  // namespace
@@ -577,7 +579,8 @@ Result<Baked> load_baked(const MappedFile& file, const std::string& path) {
   const auto t = extension.find("transfer");
   if (t == extension.end() || !t->is_object()) return Error{where, "\"transfer\" is missing"};
   auto text = [&](const char* key) { return t->contains(key) && (*t)[key].is_string() ? (*t)[key].get<std::string>() : ""; };
-  const bool is_matrix = text("kind") == "matrix", is_zonal = text("kind") == "zonal";
+  baked.factors = text("kind") == "factors";
+  const bool is_matrix = text("kind") == "matrix" || baked.factors, is_zonal = text("kind") == "zonal";
   if (!is_matrix && !is_zonal && text("kind") != "diffuse") return Error{where, "transfer of kind \"" + text("kind") + "\" is not known to this program"};
   auto light = read_light(*t, where);
   if (!light) return light.error();
@@ -598,7 +601,9 @@ Result<Baked> load_baked(const MappedFile& file, const std::string& path) {
     if (auto ok = read_transfer_data(*chunks, file, *t, zonal, where); !ok) return ok.error();
   } else {
     int rows = directional_rows(baked.directional);
-    if (is_matrix) {
+    if (baked.factors && (rows != 1 || t->contains("cpca") || light->count() != size_t(sh_count(light->order))))
+      return Error{where, "visibility as a factor is of harmonics alone, with one row"};
+    if (is_matrix && !baked.factors) {
       auto count = read_count(*t, "rows", 2 * sh_count(max_sh_order), where);
       if (!count) return count.error();
       if (*count < 1) return Error{where, "the transfer has no rows"};
@@ -614,8 +619,15 @@ Result<Baked> load_baked(const MappedFile& file, const std::string& path) {
     }
     if (is_matrix) {
       if (!t->contains("outgoing") || !(*t)["outgoing"].is_object()) return Error{where, "\"outgoing\" is missing"};
+      if (baked.factors) {
+        auto order = read_count((*t)["outgoing"], "order", size_t(max_incident_order), where + ": outgoing");
+        if (!order) return order.error();
+        rows = sh_count(int(*order));
+      }
       auto outgoing = read_outgoing(*chunks, (*t)["outgoing"], rows, *receivers, where + ": outgoing");
       if (!outgoing) return outgoing.error();
+      if (baked.factors && (outgoing->kind != OutgoingKind::map || baked.transfer.light.order < outgoing->order || baked.transfer.channels != 1))
+        return Error{where, "visibility as a factor has too few bands, or a last reflection of another kind, or more than one channel"};
       baked.outgoing = std::move(*outgoing);
     }
   }
@@ -661,6 +673,7 @@ Result<Baked> load_baked(const MappedFile& file, const std::string& path) {
 
 LightBasis light_of(const Baked& baked) {
   if (baked.zonal) return {.order = baked.zonal->order};
+  if (baked.factors) return {.order = baked.transfer.light.order - baked.outgoing->order + 1};
   return baked.cpca ? baked.cpca->light : baked.transfer.light;
 }
 

@@ -36,6 +36,7 @@ struct Baked {
   std::optional<LatticeTransfer> lattice;  // light in free space, for the same light; its data lies in the mapped file too
   std::optional<ZonalTransfer> zonal;  // in place of `transfer`, which then has no receivers; read in place too
   std::optional<CpcaTransfer> cpca;    // likewise in place of `transfer`
+  bool factors = false;               // `transfer` is visibility times cosine, from which relight_factors() makes the rows of `outgoing`
   std::optional<FixedView> view;      // then receivers are pixels, and no surface has any
   std::string provenance;             // JSON text: inputs and their hashes, options, version, what the bake reported
 };
@@ -53,10 +54,11 @@ struct BakedExtras {
   DirectionalKind directional = DirectionalKind::none;  // of a directional lightmap
   const ViewerLook* look = nullptr;
   const LatticeTransfer* lattice = nullptr;             // light in free space, for the same light as the transfer
+  bool factors = false;                                 // `transfer` is visibility times cosine, of one row and channel; needs `outgoing`, a map
   const FixedView* view = nullptr;                      // the receivers are its pixels
 };
 
-// What all kinds have.
+// What all kinds have. The light is what relighting takes.
 LightBasis light_of(const Baked& baked);
 size_t receivers_of(const Baked& baked);
 
