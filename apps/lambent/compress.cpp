@@ -47,7 +47,7 @@ int run_compress(Context& context, CompressCommand o) {
   o.zonal.precision = o.precision == "half" ? Precision::half : Precision::single;
   auto baked = load_baked(o.baked);
   if (!baked) return fail(baked.error());
-  if (baked->zonal || baked->outgoing) return fail({o.baked, "holds no diffuse transfer of spherical harmonics, which is what lobes are fitted to"});
+  if (baked->zonal || baked->outgoing || baked->visibility) return fail({o.baked, "holds no diffuse transfer of spherical harmonics, which is what lobes are fitted to"});
   ZonalFitReport report;
   auto fit = fit_zonal(baked->transfer, o.zonal, &report, &context.progress);
   if (!fit) return fail({o.baked, fit.error().text()});

@@ -1,3 +1,4 @@
+#include "blocks.h"
 #include "commands.h"
 #include "motion.h"
 #include "options.h"
@@ -30,7 +31,8 @@ struct RenderCommand {
   ViewOptions view;
   MotionOptions motion;
   BrdfOptions brdf;
-  bool new_brdf = false;
+  bool new_brdf = false, product_options = false;
+  ProductFlags products;
   ShWindow window = ShWindow::none;
   int light_order = 0, samples = 16;
   bool no_albedo = false;
@@ -148,6 +150,11 @@ int run_render(Context& context, const RenderCommand& o) {
   if (!rotation) return fail(rotation.error());
   auto baked = load_baked(o.baked);
   if (!baked) return fail(baked.error());
+  if (baked->visibility) {
+    if (o.motion.any() || !o.insert.empty() || !o.lamps.empty()) return fail({o.baked, "is of visibility in blocks: nothing in it moves, and it has no lamps of its own"});
+    return run_product_render(context, *baked, o.products, o.light, o.view, o.brdf, o.samples);
+  }
+  if (o.product_options) return fail({o.baked, "--method and its options need a bake of visibility: lambent bake --transfer blocks"});
   if (o.new_brdf)
     if (auto ok = change_materials(*baked, o.brdf, o.baked); !ok) return fail(ok.error());
   auto poses = make_poses(o.motion, baked->scene);
@@ -270,7 +277,14 @@ void add_render(CLI::App& app, Run& run) {
       ->allow_extra_args(false);
   c->add_flag("--no-albedo", o->no_albedo, "Draw everything as if it were white");
   auto* brdf = o->brdf.add_to(*c);
-  c->callback([o, brdf, &run] { o->new_brdf = brdf->count() > 0; run = [o](Context& context) { return run_render(context, *o); }; });
+  std::vector<CLI::Option*> products = o->products.add_to(*c);
+  products.push_back(c->add_option("--indirect", o->products.indirect, "Files of visibility in blocks: sh adds light that has bounced, by a diffuse bake in harmonics")
+                         ->check(CLI::IsMember({"none", "sh"}))->capture_default_str());
+  c->callback([o, brdf, products, &run] {
+    o->new_brdf = brdf->count() > 0;
+    for (const CLI::Option* option : products) o->product_options |= option->count() > 0;
+    run = [o](Context& context) { return run_render(context, *o); };
+  });
 }
 
 }  // namespace lambent::tool

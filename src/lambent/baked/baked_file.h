@@ -8,6 +8,7 @@
 #include <lambent/transfer/outgoing.h>
 #include <lambent/transfer/directional.h>
 #include <lambent/transfer/transfer.h>
+#include <lambent/transfer/visibility.h>
 #include <lambent/transfer/zonal_transfer.h>
 
 #include <optional>
@@ -26,6 +27,7 @@ struct Baked {
   DirectionalKind directional = DirectionalKind::none;  // what the rows of a directional lightmap are
   std::optional<LatticeTransfer> lattice;  // light in free space, for the same light; its data lies in the mapped file too
   std::optional<ZonalTransfer> zonal;  // in place of `transfer`, which then has no receivers; read in place too
+  std::optional<Visibility> visibility;  // in place of `transfer` as well: all-frequency light; its records are read in place
   std::string provenance;             // JSON text: inputs and their hashes, options, version, what the bake reported
 };
 
@@ -49,6 +51,8 @@ struct BakedExtras {
 Result<void> save_baked(const std::string& path, const Scene& scene, const Receivers& receivers, const Transfer& transfer,
                         const std::string& provenance, const BakedExtras& extras = {});
 Result<void> save_baked(const std::string& path, const Scene& scene, const Receivers& receivers, const ZonalTransfer& transfer,
+                        const std::string& provenance);
+Result<void> save_baked(const std::string& path, const Scene& scene, const Receivers& receivers, const Visibility& visibility,
                         const std::string& provenance);
 
 // Errors: not a baked file, another version, anything that does not fit.

@@ -431,6 +431,15 @@ ProductMaterial make_product_material(const Brdf& brdf, const Cube& cube, const 
   return m;
 }
 
+Vec3 diffuse_albedo(const Brdf& brdf) {
+  if (const auto* b = std::get_if<Lambert>(&brdf)) return b->albedo;
+  if (const auto* b = std::get_if<Phong>(&brdf)) return b->diffuse;
+  if (const auto* b = std::get_if<Ward>(&brdf)) return b->diffuse;
+  if (const auto* b = std::get_if<CookTorrance>(&brdf)) return b->diffuse;
+  if (const auto* b = std::get_if<MetallicRoughness>(&brdf)) return b->base_color * (1 - b->metallic);
+  return Vec3(0);
+}
+
 void Breakdown::add(const Breakdown& b) {
   blocked += b.blocked, light_brdf += b.light_brdf, light_visibility += b.light_visibility, triple += b.triple;
   for (size_t k = 0; k < 4; ++k) samples[k] += b.samples[k];

