@@ -15,7 +15,7 @@ namespace {
 Scene ball_on_floor(int cells, int levels) {
   Scene scene;
   const uint32_t m = add_material(scene, "grey", Vec3(0.6f, 0.5f, 0.4f));
-  add_quad(scene, m, "floor", Vec3(-2, 0, 2), Vec3(4, 0, 0), Vec3(0, 0, -4), cells, cells);
+  add_quad(scene, m, "floor", Vec3(-1.2f, 0, 1.2f), Vec3(2.4f, 0, 0), Vec3(0, 0, -2.4f), cells, cells);
   add_sphere(scene, m, "ball", Vec3(0, 0.7f, 0), 0.5f, levels);
   return scene;
 }
@@ -67,13 +67,13 @@ double psnr_of(const Image& a, const Image& b) {
 }
 
 TEST(ProductPictures, SharpShadowsAreThoseOfThePathTracer) {
-  const Scene scene = ball_on_floor(160, 5);
+  const Scene scene = ball_on_floor(60, 3);
   const Environment env = sun_and_sky();
   for (const Brdf& brdf : {Brdf(Lambert{Vec3(0.6f, 0.5f, 0.4f)}), Brdf(Phong{Vec3(0.4f), Vec3(0.3f), 30})}) {
     Reflection reflection;
     reflection.everywhere = brdf;
-    const Pictures p = draw(scene, env, reflection, {.size = 128, .bits = 6}, 128);
-    const auto truth = path_trace(scene, env, camera_at_the_side(), {.width = 128, .height = 128, .spp = 256, .bounces = 0, .background = false, .reflection = reflection});
+    const Pictures p = draw(scene, env, reflection, {.size = 64, .bits = 6}, 64);
+    const auto truth = path_trace(scene, env, camera_at_the_side(), {.width = 64, .height = 64, .spp = 128, .bounces = 0, .background = false, .reflection = reflection});
     ASSERT_TRUE(truth);
     std::printf("blocks against standard %.1f dB, standard against path tracer %.1f dB\n", psnr_of(p.blocks, p.standard), psnr_of(p.standard, truth->image));
     EXPECT_GT(psnr_of(p.blocks, p.standard), 50);
