@@ -4,6 +4,7 @@
 #include <lambent/relight/light.h>
 #include <lambent/relight/relight.h>
 #include <lambent/relight/zonal.h>
+#include <lambent/render/render.h>
 
 #include <sys/mman.h>
 #include <unistd.h>
@@ -25,10 +26,10 @@ extern "C" int LLVMFuzzerTestOneInput(const uint8_t* data, size_t size) {
     for (size_t r = 0; r < std::min<size_t>(v.receivers, 64); ++r) lambent::decode_visibility(v, r, levels);
     return 0;
   }
-  std::vector<lambent::Vec3> light(baked->transfer.columns(), lambent::Vec3(0.5f));
+  std::vector<lambent::Vec3> light(lambent::light_of(*baked).count(), lambent::Vec3(0.5f));
   if (light.size() <= 24) {  // the dual functions of many take long
     const auto env = lambent::make_environment("fuzz", 64, 32, [](lambent::Vec3 d) { return lambent::Vec3(1, 1 + d.x, 1 + d.y); });
-    light = lambent::project_light(env, baked->transfer.light).light;
+    light = lambent::project_light(env, lambent::light_of(*baked)).light;
   }
   lambent::Relit relit;
   if (baked->zonal) {
@@ -36,10 +37,13 @@ extern "C" int LLVMFuzzerTestOneInput(const uint8_t* data, size_t size) {
     lambent::ZonalLight table;
     lambent::specialise_light(*baked->zonal, harmonics, table);
     lambent::relight_zonal(*baked->zonal, nullptr, table, relit);
+  } else if (baked->cpca) {
+    lambent::relight(*baked->cpca, light, relit);
   } else {
     lambent::relight(baked->transfer, light, relit);
   }
   float sum = 0;
+  if (const auto& v = baked->view) sum += lambent::pixels_image(relit, v->coverage, v->camera, v->width, v->height, nullptr).rgb[0].x;
   for (const auto* map : {&baked->front, &baked->back})
     for (uint32_t r : *map)
       if (r != lambent::none) {

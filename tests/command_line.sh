@@ -103,8 +103,34 @@ for light in "sh:5+lamps:2@$sun" directional:16; do
   [ "${psnr:-0}" -ge 40 ] && ok || bad "baked and path-traced corners under $light differ: PSNR ${psnr:-none}"
 done
 expect 2 'env: is needed' render lamps.glb -o x.png
-expect 0 'lamps that stand out, not 64' bake corner.obj --samples 64 --bounces 0 --light sh:5+lamps:64@$sun -o lamps.glb
+expect 0 'lamps? that stands? out, not 64' bake corner.obj --samples 64 --bounces 0 --light sh:5+lamps:64@$sun -o lamps.glb
 expect 0 'order 3,' bake corner.obj --samples 64 --light sh:3+lamps:4@uniform:1 -o lamps.glb
+# A fixed view is image relighting: the picture that the whole bake makes of that view.
+expect 0 'pixel' bake corner.obj --max-edge 0.5 --samples 64 --order 4 --fix-view 3,2,4,1,0.5,0,40 --size 24x18 --spp 4 -o view.glb
+expect 0 'fixed view of 24 x 18' inspect view.glb
+"$tool" bake corner.obj --max-edge 0.5 --samples 64 --order 4 -o whole.glb >/dev/null 2>&1
+expect 0 'relit 432' render view.glb --env sky:elevation=30 --env-rotate 20,30,40 --background none -o view.exr
+expect 0 'relit' render whole.glb --env sky:elevation=30 --env-rotate 20,30,40 --background none --camera 3,2,4,1,0.5,0,40 --size 24x18 --spp 4 -o whole.exr
+expect 0 'PSNR +(6[0-9]|[7-9][0-9]|inf)' compare view.exr whole.exr
+expect 1 'view is fixed' render view.glb --env sky:elevation=30 --camera auto -o x.png
+expect 0 'rows?' bake corner.obj --transfer matrix --brdf ggx:roughness=0.5 --order 3 --incident-order 3 --samples 64 --bounces 0 --fix-view auto --size 8x8 -o view.glb
+expect 0 'relit 64' render view.glb --env uniform:1,1,1 -o glossy_view.png
+expect 2 'fix-view' bake corner.obj --fix-view 1,2 -o x.glb
+expect 2 'fix-view' bake corner.obj --fix-view auto --compress cpca:2,2 -o x.glb
+expect 2 'needs|requires' bake corner.obj --size 8x8 -o x.glb
+# Clusters, from the bake or from its file.
+expect 0 'clusters +4 of rank 3' bake corner.obj --max-edge 0.3 --samples 64 --compress cpca:4,3 -o clusters.glb
+expect 0 'in 4 clusters of rank 3' inspect clusters.glb
+"$tool" bake corner.obj --max-edge 0.3 --samples 64 -o whole.glb >/dev/null 2>&1
+expect 0 'clusters of rank' compress whole.glb --cpca 4,3 -o clusters2.glb
+for f in clusters clusters2 whole; do expect 0 'relit' render $f.glb --env sky:elevation=30 --size 24x18 --background none -o $f.exr; done
+expect 0 'PSNR +([3-9][0-9])' compare clusters.exr whole.exr
+expect 0 'PSNR +(inf|[6-9][0-9])' compare clusters.exr clusters2.exr
+expect 1 'plain transfer' compress clusters.glb --cpca 4,3 -o x.glb
+expect 1 'clusters.glb' compress clusters.glb --zonal 2 -o x.glb
+expect 2 'cpca' bake corner.obj --compress cpca:0,3 -o x.glb
+expect 2 'cpca' bake corner.obj --compress zip -o x.glb
+expect 2 'cpca' compress whole.glb -o x.glb
 expect 0 'lamp group' bake corner.obj --samples 64 --light sh:3+lamps:1@$sun --fix-light $sun -o fixed.glb
 expect 0 'relit' render fixed.glb --size 24x24 -o fixed.png
 for thread_count in 1 2; do "$tool" bake corner.obj --max-edge 0.3 --samples 64 --light sh:4+lamps:3@$sun --threads $thread_count -o threads_$thread_count.glb >/dev/null 2>&1; done

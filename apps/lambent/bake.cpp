@@ -7,12 +7,14 @@
 #include <lambent/bake/lattice.h>
 #include <lambent/bake/materials.h>
 #include <lambent/baked/baked_file.h>
+#include <lambent/compress/cpca.h>
 #include <lambent/compress/parametric.h>
 #include <lambent/compress/zonal_fit.h>
 #include <lambent/image/image.h>
 #include <lambent/light/lamps.h>
 #include <lambent/relight/fix_light.h>
 #include <lambent/relight/light.h>
+#include <lambent/render/render.h>
 
 #include <fmt/format.h>
 
@@ -30,7 +32,9 @@ struct BakeCommand {
   ZonalFitOptions zonal;
   LatticeOptions lattice;
   std::string lattice_points, lattice_box;
-  std::string light, transfer = "diffuse", membrane, outgoing = "map", simulate = "recursion", fix_light, output, shadows = "on", precision = "half", bounces = "3";
+  std::string light, transfer = "diffuse", membrane, outgoing = "map", simulate = "recursion", fix_light, fix_view,
+              size = "512x512", compress, output, shadows = "on", precision = "half", bounces = "3";
+  int view_samples = 16;  // rays a pixel of a fixed view
   ReceiverFlags receivers;
   LightmapFlags lightmap;
   BlocksFlags blocks;
@@ -145,7 +149,7 @@ Result<void> parse_light(const std::string& text, BakeOptions& bake) {
   warn(env->warnings);
   bake.lobes = find_lamps(*env, *count);
   const size_t found = bake.lobes.size();
-  if (found < size_t(*count)) warn(name + ": has " + std::to_string(found) + (found == 1 ? " lamp" : " lamps") + " that stand out, not " + std::to_string(*count));
+  if (found < size_t(*count)) warn(name + ": has " + std::to_string(found) + (found == 1 ? " lamp that stands" : " lamps that stand") + " out, not " + std::to_string(*count));
   return {};
 }
 
@@ -187,9 +191,21 @@ int run_bake(Context& context, BakeCommand o) {
   if (!o.lattice_points.empty() && o.bake.order + o.lattice.order > max_sh_order + 1)
     return fail({"--lattice-order", "and the bands of the light may be " + std::to_string(max_sh_order + 1) + " together"});
 
+  CpcaOptions cpca_options;
+  if (!o.compress.empty())
+    if (auto ok = parse_cpca(o.compress, cpca_options); !ok) return fail(ok.error());
+
   auto start = Clock::now();
   auto scene = load_prepared_scene(o.scene);
   if (!scene) return fail(scene.error());
+  std::optional<View> fixed;
+  if (!o.fix_view.empty()) {
+    ViewOptions asked;
+    asked.camera = o.fix_view, asked.size = o.size;
+    auto made = make_view(asked, *scene);
+    if (!made) return fail(Error{made.error().where == "--camera" ? "--fix-view" : made.error().where, made.error().message});
+    fixed = *made;
+  }
   auto placed = place_receivers(*scene, o.receivers, "vertices");
   if (!placed) return fail(placed.error());
   const Receivers& receivers = placed->receivers;
@@ -234,6 +250,16 @@ int run_bake(Context& context, BakeCommand o) {
     free_space = std::move(*baked);
   }
 
+  std::optional<FixedView> view;
+  if (fixed) {
+    RenderOptions options;
+    options.width = fixed->width, options.height = fixed->height, options.samples = o.view_samples, options.outgoing = outgoing ? &*outgoing : nullptr;
+    auto pixels = fix_view(*scene, *tracer, receivers.basis, *transfer, fixed->camera, options, &context.progress);
+    if (!pixels) return fail(pixels.error());
+    *transfer = std::move(pixels->transfer), outgoing.reset();
+    view = FixedView{fixed->camera, fixed->width, fixed->height, std::move(pixels->coverage)};
+    report.bytes = transfer->bytes();
+  }
   if (!o.fix_light.empty()) {
     auto env = load_environment(o.fix_light);
     if (!env) return fail(env.error());
@@ -255,6 +281,7 @@ int run_bake(Context& context, BakeCommand o) {
   if (is_matrix)
     provenance["options"].update({{"brdf", o.brdf.brdf}, {"outgoing", o.outgoing}, {"incident_order", o.matrix.incident_order}, {"simulate", o.simulate}});
   if (!o.fix_light.empty()) provenance["options"]["fix_light"] = o.fix_light;
+  if (view) provenance["options"].update({{"fix_view", o.fix_view}, {"size", o.size}});
   if (free_space) {
     provenance["options"].update({{"lattice", o.lattice_points}, {"lattice_order", o.lattice.order}});
     provenance["report"]["lattice_invalid"] = lattice_report.invalid;
@@ -271,16 +298,30 @@ int run_bake(Context& context, BakeCommand o) {
     provenance["zonal"] = {{"lobes", o.zonal.lobes}, {"rms", fit.rms}};
   }
 
+  std::optional<CpcaTransfer> clusters;
+  double cpca_error = 0, cpca_seconds = 0;
+  if (!o.compress.empty()) {
+    start = Clock::now();
+    auto made = compress_cpca(*transfer, cpca_options, &cpca_error, &context.progress);
+    if (!made) return fail(made.error());
+    clusters = std::move(*made), cpca_seconds = seconds_since(start);
+    report.bytes = clusters->bytes();
+    provenance["options"]["compress"] = o.compress;
+    provenance["report"]["cpca_error"] = cpca_error;
+  }
+
   start = Clock::now();
   const std::string origin = provenance.dump(-1, ' ', false, nlohmann::json::error_handler_t::replace);
-  if (auto ok = zonal ? save_baked(o.output, *scene, receivers, *zonal, origin)
-                      : save_baked(o.output, *scene, receivers, *transfer, origin,
-                                   {.outgoing = outgoing ? &*outgoing : nullptr, .lattice = free_space ? &*free_space : nullptr});
+  const BakedExtras extras{.outgoing = outgoing ? &*outgoing : nullptr, .lattice = free_space ? &*free_space : nullptr, .view = view ? &*view : nullptr};
+  const Receivers of_surfaces = view ? Receivers{} : receivers;
+  if (auto ok = zonal      ? save_baked(o.output, *scene, receivers, *zonal, origin)
+                : clusters ? save_baked(o.output, *scene, receivers, *clusters, origin, extras)
+                           : save_baked(o.output, *scene, of_surfaces, *transfer, origin, extras);
       !ok)
     return fail(ok.error());
   const double save_seconds = seconds_since(start);
 
-  const double bytes_each = double(report.bytes) / double(report.receivers);
+  const double bytes_each = double(report.bytes) / double(view ? transfer->receivers : report.receivers);
   if (context.json) {
     nlohmann::json result{{"output", o.output},
                           {"receivers", report.receivers},
@@ -301,6 +342,8 @@ int run_bake(Context& context, BakeCommand o) {
                           {"operator_kept", report.operator_kept},
                           {"working_memory", report.working_memory}};
     if (zonal) result["zonal"] = {{"lobes", zonal->lobes}, {"rms", fit.rms}, {"seconds", fit.seconds}};
+    if (clusters) result["cpca"] = {{"clusters", clusters->clusters}, {"rank", clusters->rank}, {"error", cpca_error}, {"seconds", cpca_seconds}};
+    if (view) result["pixels"] = transfer->receivers;
     result["error"] = report.error >= 0 ? nlohmann::json(report.error) : nlohmann::json();
     if (free_space)
       result["lattice"] = {{"points", lattice_report.points}, {"invalid", lattice_report.invalid}, {"rays", lattice_report.rays},
@@ -315,9 +358,12 @@ int run_bake(Context& context, BakeCommand o) {
              report.trace_seconds > 0 ? double(report.rays) / report.trace_seconds / 1e6 : 0.0);
   fmt::print("  time       load {}, build {}, trace {}, bounce {}, save {}\n", human_seconds(load_seconds), human_seconds(build_seconds),
              human_seconds(report.trace_seconds), human_seconds(report.bounce_seconds), human_seconds(save_seconds));
-  fmt::print("  size       {} a receiver, {} in all ({}, {} row{}, {} channel{}, {})\n", human_bytes(bytes_each), human_bytes(double(report.bytes)),
+  fmt::print("  size       {} a {}, {} in all ({}, {} row{}, {} channel{}, {})\n", human_bytes(bytes_each), view ? "pixel" : "receiver", human_bytes(double(report.bytes)),
              describe_light(transfer->light), transfer->rows, transfer->rows == 1 ? "" : "s", transfer->channels, transfer->channels == 1 ? "" : "s", o.precision);
   if (zonal) fmt::print("  lobes      {}, fitted in {}, with an error of {:.2f}% RMS\n", zonal->lobes, human_seconds(fit.seconds), 100 * fit.rms);
+  if (clusters)
+    fmt::print("  clusters   {} of rank {}, found in {}, with an error of {:.2f}% RMS\n", clusters->clusters, clusters->rank, human_seconds(cpca_seconds),
+               100 * cpca_error);
   if (free_space)
     fmt::print("  lattice    {} points, order {}, {} in {}{}\n", human_count(lattice_report.points), o.lattice.order, human_bytes(double(lattice_report.bytes)),
                human_seconds(lattice_report.seconds),
@@ -352,6 +398,10 @@ void add_bake(CLI::App& app, Run& run) {
   o->brdf.brdf = "materials";
   auto* brdf = o->brdf.add_to(*c);
   auto* fixed = c->add_option("--fix-light", o->fix_light, "Bake this environment in, so that only its brightness is left: a surface light field");
+  auto* view = c->add_option("--fix-view", o->fix_view, "EYE,TARGET,FOV or auto: bake this camera in, one row a pixel: image relighting");
+  c->add_option("--size", o->size, "--fix-view: WIDTHxHEIGHT in pixels")->needs(view)->capture_default_str();
+  c->add_option("--spp", o->view_samples, "--fix-view: rays a pixel")->needs(view)->check(CLI::Range(1, 4096))->capture_default_str();
+  auto* compress = c->add_option("--compress", o->compress, "cpca:CLUSTERS,RANK: store clusters, and a few weights a receiver");
   c->add_option("--samples", o->bake.samples, "Rays a receiver")->check(CLI::Range(1, 1 << 20))->capture_default_str();
   auto* bounces = c->add_option("--bounces", o->bounces, "Reflections between surfaces, 0 to 64; lightmaps also converge:EPS, as many as leave that residual")
                       ->capture_default_str();
@@ -367,7 +417,7 @@ void add_bake(CLI::App& app, Run& run) {
   auto* box = c->add_option("--lattice-box", o->lattice_box, "X0,Y0,Z0,X1,Y1,Z1: where, if not throughout the scene's box");
   auto* lattice_order = c->add_option("--lattice-order", o->lattice.order, "Bands of the light that arrives there")
                             ->check(CLI::Range(1, max_sh_order))->capture_default_str();
-  c->callback([o, bounces, order, light, lobes, membrane, fixed, incident, last, brdf, simulate, points, box, lattice_order, blocks, &run] {
+  c->callback([o, bounces, order, light, lobes, membrane, fixed, view, compress, incident, last, brdf, simulate, points, box, lattice_order, blocks, &run] {
     o->order_given = order->count() > 0;
     if (order->count() && light->count()) throw CLI::ValidationError("--order and --light both say how many bands there are: give one");
     if (light->count() && (membrane->count() || (o->transfer != "diffuse" && o->transfer != "matrix")))
@@ -376,12 +426,17 @@ void add_bake(CLI::App& app, Run& run) {
       throw CLI::ValidationError("--shadows off has no bounces: leave --bounces out, or set it to 0");
     if (membrane->count() && o->transfer != "diffuse") throw CLI::ValidationError("--membrane is a transfer of its own: leave --transfer out");
     if (fixed->count() && (membrane->count() || o->transfer == "zonal")) throw CLI::ValidationError("--fix-light leaves nothing to turn: it is for diffuse and matrix transfer");
+    for (const CLI::Option* option : {view, compress})
+      if (option->count() && (membrane->count() || (o->transfer != "diffuse" && o->transfer != "matrix")))
+        throw CLI::ValidationError(option->get_name() + " is for diffuse and matrix transfer");
+    if (view->count() && compress->count()) throw CLI::ValidationError("--compress makes clusters of receivers on surfaces, and --fix-view has pixels: give one");
+    if (view->count() && points->count()) throw CLI::ValidationError("--fix-view leaves no room for what --lattice would light: give one");
     if (lobes->count() && o->transfer != "zonal") throw CLI::ValidationError("--lobes needs --transfer zonal");
     for (const CLI::Option* option : {incident, last, brdf, simulate})
       if (option->count() && o->transfer != "matrix") throw CLI::ValidationError(option->get_name() + " needs --transfer matrix");
     for (const CLI::Option* option : blocks)
       if (option->count() && o->transfer != "blocks") throw CLI::ValidationError(option->get_name() + " needs --transfer blocks");
-    for (const CLI::Option* option : {order, light, membrane, fixed, points, bounces})
+    for (const CLI::Option* option : {order, light, membrane, fixed, view, compress, points, bounces})
       if (option->count() && o->transfer == "blocks") throw CLI::ValidationError(option->get_name() + " is not for --transfer blocks: it stores what is seen, and no light");
     if (o->transfer == "blocks" && (o->shadows == "off" || (!o->receivers.kind.empty() && o->receivers.kind != "vertices")))
       throw CLI::ValidationError("--transfer blocks is baked at vertices, with shadows");

@@ -2,16 +2,19 @@
 #include "options.h"
 
 #include <lambent/baked/baked_file.h>
+#include <lambent/compress/cpca.h>
 #include <lambent/compress/zonal_fit.h>
 #include <lambent/render/render.h>
 
 #include <fmt/format.h>
 
+#include <chrono>
+
 namespace lambent::tool {
 namespace {
 
 struct CompressCommand {
-  std::string baked, output, error_picture, precision = "half";
+  std::string baked, output, cpca, error_picture, precision = "half";
   ZonalFitOptions zonal;
   std::string camera = "auto", size = "512x512";
   float white = 0.1f;
@@ -40,6 +43,34 @@ Result<Image> paint_errors(const Baked& baked, const std::vector<float>& errors,
   return image;
 }
 
+int compress_to_clusters(Context& context, const CompressCommand& o, const Baked& baked) {
+  CpcaOptions options;
+  if (auto ok = parse_cpca("cpca:" + o.cpca, options); !ok) return fail({"--cpca", ok.error().message});
+  if (baked.zonal || baked.cpca || baked.view) return fail({o.baked, "holds no plain transfer at receivers on surfaces, which is what clusters are made of"});
+  double error = 0;
+  const auto start = std::chrono::steady_clock::now();
+  auto clusters = compress_cpca(baked.transfer, options, &error, &context.progress);
+  if (!clusters) return fail({o.baked, clusters.error().text()});
+  const double seconds = std::chrono::duration<double>(std::chrono::steady_clock::now() - start).count();
+  auto provenance = nlohmann::json::parse(baked.provenance, nullptr, false);
+  if (!provenance.is_object()) provenance = nlohmann::json::object();
+  provenance["cpca"] = {{"clusters", clusters->clusters}, {"rank", clusters->rank}, {"error", error}};
+  Receivers receivers;
+  receivers.front = baked.front, receivers.back = baked.back, receivers.basis = baked.basis;
+  const BakedExtras extras{.outgoing = baked.outgoing ? &*baked.outgoing : nullptr, .directional = baked.directional,
+                           .lattice = baked.lattice ? &*baked.lattice : nullptr};
+  if (auto ok = save_baked(o.output, baked.scene, receivers, *clusters, provenance.dump(), extras); !ok) return fail(ok.error());
+  const double n = double(clusters->receivers), bytes = double(clusters->bytes()), before = double(baked.transfer.bytes());
+  if (context.json)
+    print_json({{"output", o.output}, {"receivers", clusters->receivers}, {"clusters", clusters->clusters}, {"rank", clusters->rank}, {"error", error},
+                {"seconds", seconds}, {"bytes", bytes}, {"bytes_per_receiver", bytes / n}, {"bytes_per_receiver_before", before / n}});
+  else
+    fmt::print("{}\n  error      {:.2f}% RMS of the transfer\n  time       {} for {} receivers\n  size       {} a receiver, {} before ({} clusters of rank {})\n",
+               o.output, 100 * error, human_seconds(seconds), human_count(clusters->receivers), human_bytes(bytes / n), human_bytes(before / n),
+               clusters->clusters, clusters->rank);
+  return success;
+}
+
 int run_compress(Context& context, CompressCommand o) {
   if (auto ok = check_output(o.output, {"glb"}); !ok) return fail(ok.error());
   if (!o.error_picture.empty())
@@ -47,7 +78,9 @@ int run_compress(Context& context, CompressCommand o) {
   o.zonal.precision = o.precision == "half" ? Precision::half : Precision::single;
   auto baked = load_baked(o.baked);
   if (!baked) return fail(baked.error());
-  if (baked->zonal || baked->outgoing || baked->visibility) return fail({o.baked, "holds no diffuse transfer of spherical harmonics, which is what lobes are fitted to"});
+  if (baked->visibility) return fail({o.baked, "holds no transfer to compress, but visibility in blocks"});
+  if (!o.cpca.empty()) return compress_to_clusters(context, o, *baked);
+  if (baked->zonal || baked->outgoing || baked->cpca || baked->view) return fail({o.baked, "holds no diffuse transfer of spherical harmonics, which is what lobes are fitted to"});
   ZonalFitReport report;
   auto fit = fit_zonal(baked->transfer, o.zonal, &report, &context.progress);
   if (!fit) return fail({o.baked, fit.error().text()});
@@ -86,9 +119,10 @@ int run_compress(Context& context, CompressCommand o) {
 
 void add_compress(CLI::App& app, Run& run) {
   auto o = std::make_shared<CompressCommand>();
-  CLI::App* c = app.add_subcommand("compress", "Fit zonal lobes to baked transfer: it then turns with a surface that moves");
+  CLI::App* c = app.add_subcommand("compress", "Store baked transfer in less: zonal lobes, which turn with a surface that moves, or clusters");
   c->add_option("baked", o->baked, "Baked file, from `lambent bake`")->required();
-  c->add_option("--zonal", o->zonal.lobes, "Lobes a receiver")->required()->check(CLI::Range(1, max_stored_lobes));
+  auto* cpca = c->add_option("--cpca", o->cpca, "CLUSTERS,RANK: clusters of receivers with like transfer, each a mean and so many components");
+  auto* zonal = c->add_option("--zonal", o->zonal.lobes, "Lobes a receiver")->check(CLI::Range(1, max_stored_lobes));
   c->add_option("-o,--output", o->output, "Baked file to write (.glb)")->required();
   c->add_option("--starts", o->zonal.starts, "Searches from random axes where the error is high")->check(CLI::Range(0, 1000))->capture_default_str();
   c->add_option("--retry", o->zonal.retry, "What error is high, relative")->check(CLI::Range(0.0f, 1.0f))->capture_default_str();
@@ -99,7 +133,11 @@ void add_compress(CLI::App& app, Run& run) {
   c->add_option("--camera", o->camera, "For --view-error, as for render")->needs(picture)->capture_default_str();
   c->add_option("--size", o->size, "For --view-error, as for render")->needs(picture)->capture_default_str();
   c->add_option("--white", o->white, "For --view-error: the relative error drawn white")->needs(picture)->check(CLI::PositiveNumber)->capture_default_str();
-  c->callback([o, &run] { run = [o](Context& context) { return run_compress(context, *o); }; });
+  cpca->excludes(zonal)->excludes(picture);
+  c->callback([o, cpca, zonal, &run] {
+    if (!cpca->count() && !zonal->count()) throw CLI::ValidationError("give --zonal LOBES or --cpca CLUSTERS,RANK");
+    run = [o](Context& context) { return run_compress(context, *o); };
+  });
 }
 
 }  // namespace lambent::tool

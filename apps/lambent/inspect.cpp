@@ -98,16 +98,23 @@ int run_inspect(Context& context, const std::string& path) {
   if ((extension == "glb" || extension == "gltf") && is_baked(path)) {
     auto baked = load_baked(path);
     if (!baked) return fail(baked.error());
-    const Transfer& t = baked->transfer;
     if (baked->visibility) return inspect_visibility(context, path, *baked);
     if (baked->zonal) return inspect_zonal(context, path, *baked);
+    Transfer t = baked->transfer;
+    if (baked->cpca) t.light = baked->cpca->light, t.rows = baked->cpca->rows, t.channels = baked->cpca->channels, t.receivers = baked->cpca->receivers;
+    const size_t bytes = baked->cpca ? baked->cpca->bytes() : t.bytes();
     nlohmann::json lobes = nlohmann::json::array();
     for (const Lobe& l : t.light.lobes) lobes.push_back({{"axis", vector_json(l.axis)}, {"sharpness", l.sharpness}});
     nlohmann::json d{{"file", path}, {"kind", "baked"}, {"scene", describe_scene(baked->scene)},
                      {"transfer", {{"kind", baked->outgoing ? "matrix" : "diffuse"}, {"order", t.light.order}, {"lobes", lobes}, {"groups", t.light.groups},
-                                   {"columns", t.columns()}, {"rows", t.rows}, {"channels", t.channels}, {"receivers", t.receivers}, {"bytes", t.bytes()},
+                                   {"columns", t.columns()}, {"rows", t.rows}, {"channels", t.channels}, {"receivers", t.receivers}, {"bytes", bytes},
                                    {"precision", t.precision == Precision::half ? "half" : "single"}}},
                      {"provenance", nlohmann::json::parse(baked->provenance, nullptr, false)}};
+    if (baked->cpca) d["transfer"]["cpca"] = {{"clusters", baked->cpca->clusters}, {"rank", baked->cpca->rank}};
+    if (baked->view) {
+      const FixedView& v = *baked->view;
+      d["view"] = {{"width", v.width}, {"height", v.height}, {"eye", vector_json(v.camera.eye)}, {"target", vector_json(v.camera.target)}, {"fov", v.camera.fov}};
+    }
     if (baked->lattice) {
       const LatticeTransfer& l = *baked->lattice;
       d["lattice"] = {{"points", {l.lattice.nx, l.lattice.ny, l.lattice.nz}}, {"order", l.order}, {"min", vector_json(l.lattice.min)},
@@ -119,7 +126,9 @@ int run_inspect(Context& context, const std::string& path) {
       fmt::print("{}\n  baked: {}, {}, {} column{}, {} row{}, {} channel{}, {} receivers, {} ({})\n", path,
                  baked->outgoing ? std::string("matrix, outgoing ") + outgoing_names[int(baked->outgoing->kind)] : "diffuse", describe_light(t.light),
                  t.columns(), t.columns() == 1 ? "" : "s", t.rows, t.rows == 1 ? "" : "s", t.channels, t.channels == 1 ? "" : "s",
-                 human_count(t.receivers), human_bytes(double(t.bytes())), t.precision == Precision::half ? "half" : "single");
+                 human_count(t.receivers), human_bytes(double(bytes)), t.precision == Precision::half ? "half" : "single");
+      if (baked->cpca) fmt::print("  in {} clusters of rank {}\n", baked->cpca->clusters, baked->cpca->rank);
+      if (baked->view) fmt::print("  a fixed view of {} x {} pixels\n", baked->view->width, baked->view->height);
       for (const Lobe& l : t.light.lobes)
         fmt::print("  lobe about ({:.4f}, {:.4f}, {:.4f}), sharpness {:.4g}: {:.2g} degrees across\n", l.axis.x, l.axis.y, l.axis.z, l.sharpness,
                    std::min(180.0, double(glm::degrees(2 / std::sqrt(l.sharpness)))));

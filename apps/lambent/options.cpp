@@ -5,6 +5,7 @@
 #include <lambent/scene/load.h>
 #include <lambent/scene/refine.h>
 
+#include <fmt/format.h>
 #include <unistd.h>
 
 #include <charconv>
@@ -131,6 +132,19 @@ Result<std::optional<Camera>> parse_camera(const std::string& text) {
   if (!(camera.fov > 0 && camera.fov < 180)) return Error{"--camera", "field of view must lie between 0 and 180 degrees"};
   if (camera.eye == camera.target) return Error{"--camera", "eye and target are the same point"};
   return std::optional<Camera>(camera);
+}
+
+Result<void> parse_cpca(const std::string& text, CpcaOptions& options) {
+  const std::string where = "--compress";
+  if (!text.starts_with("cpca:")) return Error{where, "must be cpca:CLUSTERS,RANK, not \"" + text + "\""};
+  auto n = parse_numbers(text.substr(5), 2, where);
+  if (!n) return n.error();
+  const float most[] = {float(max_cpca_clusters), float(max_cpca_rank)};
+  for (size_t k = 0; k < 2; ++k)
+    if ((*n)[k] != std::floor((*n)[k]) || (*n)[k] < float(1 - k) || (*n)[k] > most[k])
+      return Error{where, fmt::format("expects from 1 to {} clusters of rank 0 to {}, not \"{}\"", max_cpca_clusters, max_cpca_rank, text)};
+  options.clusters = int((*n)[0]), options.rank = int((*n)[1]);
+  return {};
 }
 
 void LightOptions::add_to(CLI::App& command, bool required) {

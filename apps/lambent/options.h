@@ -3,6 +3,7 @@
 #include "terminal.h"
 
 #include <lambent/basis/sh.h>
+#include <lambent/compress/cpca.h>
 #include <lambent/core/camera.h>
 #include <lambent/light/environment.h>
 #include <lambent/scene/reflection.h>
@@ -64,6 +65,9 @@ struct BrdfOptions {
   CLI::Option* add_to(CLI::App& command);
 };
 Result<Reflection> load_reflection(const BrdfOptions& options);
+
+// cpca:CLUSTERS,RANK.
+Result<void> parse_cpca(const std::string& text, CpcaOptions& options);
 
 extern const std::map<std::string, ShWindow> window_names;
 

@@ -31,7 +31,7 @@ struct RenderCommand {
   ViewOptions view;
   MotionOptions motion;
   BrdfOptions brdf;
-  bool new_brdf = false, product_options = false;
+  bool new_brdf = false, view_given = false, product_options = false;
   ProductFlags products;
   ShWindow window = ShWindow::none;
   int light_order = 0, samples = 16;
@@ -91,7 +91,7 @@ Result<void> change_materials(Baked& baked, const BrdfOptions& options, const st
   auto reflection = load_reflection(options);
   if (!reflection) return reflection.error();
   Receivers receivers;
-  receivers.origins.resize(baked.transfer.receivers), receivers.front = baked.front, receivers.back = baked.back;
+  receivers.origins.resize(receivers_of(baked)), receivers.front = baked.front, receivers.back = baked.back;
   for (const Mat3& frame : baked.outgoing->frames) receivers.normals.push_back(frame[2]);
   const ReceiverMaterials materials = make_receiver_materials(baked.scene, receivers, *reflection);
   const CosineBasis basis = make_cosine_basis(baked.outgoing->order);
@@ -163,6 +163,11 @@ int run_render(Context& context, const RenderCommand& o) {
   const Scene first = poses->front() ? posed(baked->scene, *poses->front()) : Scene();
   auto view = make_view(o.view, poses->front() ? first : baked->scene);
   if (!view) return fail(view.error());
+  if (baked->view) {
+    if (o.view_given) return fail({o.baked, "its view is fixed: leave --camera, --size and --spp out"});
+    if (o.motion.any()) return fail({o.baked, "its view is fixed, and nothing in it can move"});
+    *view = {baked->view->camera, baked->view->width, baked->view->height};
+  }
   std::vector<Insertion> insertions;
   for (const std::string& text : o.insert) {
     auto insertion = parse_insertion(text);
@@ -173,8 +178,8 @@ int run_render(Context& context, const RenderCommand& o) {
   if (!insertions.empty() && (!std::holds_alternative<CornerReceivers>(baked->basis) || baked->directional != DirectionalKind::none))
     return fail({o.baked, "objects can only be inserted into bakes at vertices"});
   if (!insertions.empty() && o.motion.any()) return fail({"--insert", "draws the scene at rest: leave the animation out"});
-  const LightBasis basis = baked->zonal ? LightBasis{.order = baked->zonal->order} : baked->transfer.light;
-  const size_t receivers = baked->zonal ? baked->zonal->receivers : baked->transfer.receivers;
+  const LightBasis basis = light_of(*baked);
+  const size_t receivers = receivers_of(*baked);
   if (o.light.env.empty() && (basis.order > 0 || !basis.lobes.empty())) return fail({"--env", "is needed: the file is baked for distant light"});
   std::optional<Environment> env;
   if (!o.light.env.empty()) {
@@ -223,8 +228,14 @@ int run_render(Context& context, const RenderCommand& o) {
     const ReceiverFrames frames = baked->zonal && pose ? make_receiver_frames(receiver_rotations(*pose, baked->front, baked->back, receivers)) : ReceiverFrames();
     const auto start = std::chrono::steady_clock::now();
     if (baked->zonal) relight_zonal(*baked->zonal, pose ? &frames : nullptr, table, relit);
+    else if (baked->cpca) relight(*baked->cpca, light, relit);
     else relight(baked->transfer, light, relit);
     relight_seconds = std::min(relight_seconds, std::chrono::duration<double>(std::chrono::steady_clock::now() - start).count());
+
+    if (baked->view) {  // O(view) is in T
+      images.push_back(pixels_image(relit, baked->view->coverage, view->camera, view->width, view->height, options.background));
+      continue;
+    }
 
     // O(view)
     const Scene moved = pose ? posed(baked->scene, *pose) : Scene();
@@ -271,7 +282,7 @@ void add_render(CLI::App& app, Run& run) {
   c->add_option("--window", o->window, "Against ringing of the harmonics: none, hann, lanczos, or auto (as weak as keeps open surfaces from going dark)")
       ->transform(CLI::CheckedTransformer(window_names).description("{none,hann,lanczos,auto}"));
   c->add_option("--light-order", o->light_order, "Use only this many bands of the baked ones; lobes are kept")->check(CLI::Range(1, max_sh_order));
-  c->add_option("--spp", o->samples, "Rays a pixel")->check(CLI::Range(1, 4096))->capture_default_str();
+  auto* spp = c->add_option("--spp", o->samples, "Rays a pixel")->check(CLI::Range(1, 4096))->capture_default_str();
   c->add_option("--lamp", o->lamps, "NAME=R,G,B: scale a group of lamps by this colour (files baked with --light-groups)");
   c->add_option("--insert", o->insert, "FILE@X,Y,Z[,SCALE]: put a small diffuse object there, lit by the scene's lattice; may be given again")
       ->allow_extra_args(false);
@@ -280,9 +291,10 @@ void add_render(CLI::App& app, Run& run) {
   std::vector<CLI::Option*> products = o->products.add_to(*c);
   products.push_back(c->add_option("--indirect", o->products.indirect, "Files of visibility in blocks: sh adds light that has bounced, by a diffuse bake in harmonics")
                          ->check(CLI::IsMember({"none", "sh"}))->capture_default_str());
-  c->callback([o, brdf, products, &run] {
+  c->callback([o, c, brdf, spp, products, &run] {
     o->new_brdf = brdf->count() > 0;
     for (const CLI::Option* option : products) o->product_options |= option->count() > 0;
+    o->view_given = c->count("--camera") > 0 || c->count("--size") > 0 || spp->count() > 0;
     run = [o](Context& context) { return run_render(context, *o); };
   });
 }

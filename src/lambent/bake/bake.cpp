@@ -2,12 +2,11 @@
 // the transfer of up to k bounces. It is also the radiosity equation's Jacobi step.
 #include <lambent/bake/bake.h>
 #include <lambent/bake/gather.h>
-#include <lambent/bake/kernels.h>
+#include <lambent/bake/kept_rows.h>
 #include <lambent/bake/lobes.h>
 #include <lambent/core/parallel.h>
 #include <lambent/core/pool.h>
 
-#include <atomic>
 #include <chrono>
 
 namespace lambent {
@@ -54,6 +53,7 @@ struct Baker {
   const LobeSets lobes = make_lobe_sets(options.lobe_kind, options.lobes, options.samples, options.seed);
   Pool<LobeRays> lobe_rays{[this] { return std::make_unique<LobeRays>(make_lobe_rays(lobes)); }};
   Pool<GatherScratch, DeleteScratch> scratch{[this] { return make_gather_scratch(setup); }};
+  Pool<GatherBlock> gathered{[] { return std::make_unique<GatherBlock>(); }};
 
   size_t n() const { return receivers.count(); }
   size_t harmonics() const { return setup.coefficients(); }
@@ -135,12 +135,10 @@ struct Baker {
     const size_t blocks = (n() + gather_block - 1) / gather_block;
     std::vector<float> T0(n() * C), T0_half(checked_count(n()) * C);
     std::vector<uint8_t> buried(n());
-    std::vector<GatherBlock> kept(blocks);
-    std::vector<uint8_t> is_kept(blocks, 0);
     const size_t fixed = solution_bytes(n(), C, setup.channels) + table_bytes(n(), scene.triangles.size(), C, size_t(options.samples)) +
                          lobe_set_bytes(options.samples, lobes.count());
     const size_t budget = options.memory > fixed ? options.memory - fixed : 0;
-    std::atomic<size_t> used{0};
+    KeptRows kept(blocks, budget, most_bytes(size_t(options.samples), n(), setup.channels));
 
     auto sky_of = [&](size_t begin) {
       return GatherSky{T0.data() + begin * C, T0_half.data() + begin / check_every * C, C, &lobes, buried.data() + begin};
@@ -149,26 +147,17 @@ struct Baker {
       ProgressStage stage(progress, "tracing", n());
       parallel_for(n(), gather_block, [&](size_t begin, size_t end) {
         if (stage.cancelled()) return;
-        GatherBlock block;
+        auto block = gathered.borrow();
         const GatherSky sky = sky_of(begin);
-        trace_gather(setup, *scratch.borrow(), begin, end - begin, &block, &sky);
+        trace_gather(setup, *scratch.borrow(), begin, end - begin, block.get(), &sky);
         trace_sharp_lobes(begin, end - begin, sky);
-        // Which blocks are kept depends on the scheduling, the result does not: the others are traced again, alike.
-        const size_t bytes = block.rows.bytes() + block.half_rows.bytes() + sizeof(GatherBlock);
-        if (used.fetch_add(bytes) + bytes <= budget) {
-          kept[begin / gather_block] = std::move(block);
-          is_kept[begin / gather_block] = 1;
-        } else {
-          used.fetch_sub(bytes);
-        }
+        kept.keep(begin / gather_block, *block);
         stage.advance(end - begin);
       });
       if (stage.cancelled()) return Error{"", "cancelled"};
     }
     report.rays = n() * rays_each();
-    report.operator_bytes = used;
-    const size_t kept_count = size_t(std::count(is_kept.begin(), is_kept.end(), uint8_t(1)));
-    report.operator_kept = double(kept_count) / double(blocks);
+    report.operator_bytes = kept.bytes(), report.operator_kept = kept.fraction();
     const auto fill = make_fill_steps(scene, receivers.basis, buried);
     fill_buried(fill, T0.data(), C, C);
     report.trace_seconds = seconds_since(start);
@@ -191,9 +180,10 @@ struct Baker {
       parallel_for(n(), gather_block, [&](size_t begin, size_t end) {
         if (stage.cancelled()) return;
         const size_t b = begin / gather_block;
-        GatherBlock again;
-        if (!is_kept[b]) trace_gather(setup, *scratch.borrow(), begin, end - begin, &again, nullptr);
-        const GatherBlock& block = is_kept[b] ? kept[b] : again;
+        const KeptRows::Block* found = kept.find(b);
+        auto again = gathered.borrow();
+        if (!found) trace_gather(setup, *scratch.borrow(), begin, end - begin, again.get(), nullptr);
+        const KeptRows::Block block = found ? *found : KeptRows::Block{again->rows.view(), again->half_rows.view()};
         multiply_rows(block.rows, setup.channels, X.data(), width, setup.row_scale(size_t(options.samples)), next.data() + begin * width);
         for (size_t r = begin; r < end; ++r) add_T0(T0.data() + r * C, next.data() + r * width);
         if (last && has_halves()) {
@@ -222,7 +212,7 @@ struct Baker {
       }
     });
     report.bounce_seconds = seconds_since(start);
-    report.working_memory = fixed + used;
+    report.working_memory = fixed + kept.bytes();
     const double trace_seconds = report.trace_seconds;
     finish_report(buried, errors, start);
     report.trace_seconds = trace_seconds;

@@ -4,6 +4,7 @@
 // The hit rows are a sparse matrix B, and a bounce is a product: T_{k+1} = B T_k (general-prt, "Transfer Matrix for Bounce
 // k+1", one-row case), with no further ray. Any number of columns: the same B carries radiosity (alpha = e + B alpha).
 #include <lambent/bake/directions.h>
+#include <lambent/bake/kernels.h>
 #include <lambent/bake/lamps.h>
 #include <lambent/bake/lobes.h>
 #include <lambent/core/aligned.h>
@@ -22,14 +23,19 @@ inline constexpr size_t gather_block = 64;
 
 // Rows of the sparse matrix B of neighbouring receivers, stored by columns (kernels.h): neighbours see the same surfaces, so a
 // column serves many of them. Weights are halves, `channels` an entry.
+struct SparseRows {
+  size_t row_count = 0;
+  SparseEntries entries{};
+};
 struct SparseBlock {
   size_t row_count = 0;
   std::vector<uint32_t> columns, ends;
   std::vector<uint8_t> rows;
   std::vector<uint16_t> weights;
-  size_t bytes() const { return (columns.size() + ends.size()) * 4 + rows.size() + weights.size() * 2; }
+  SparseRows view() const { return {row_count, {columns.data(), ends.data(), columns.size(), rows.data(), weights.data()}}; }
 };
 
+// Made anew by each tracing, in the memory of the last.
 struct GatherBlock {
   SparseBlock rows;       // of receivers [first, first + count), count at most gather_block
   SparseBlock half_rows;  // the same by the first half of the rays alone, for receivers divisible by check_every
@@ -94,7 +100,7 @@ void trace_sky(const GatherSetup& setup, GatherScratch& scratch, size_t first, s
 bool is_buried(const Tracer& tracer, const SpatialBasis& basis, Vec3 origin, const Directions& fan);
 
 // y[row] = scale * (row of B) x, for the block's rows; x and y are [receiver][column x channel], `width` padded floats a row.
-void multiply_rows(const SparseBlock& rows, int channels, const float* x, size_t width, float scale, float* y);
+void multiply_rows(const SparseRows& rows, int channels, const float* x, size_t width, float scale, float* y);
 
 // Values of buried receivers are taken from their neighbours (neighbours_of).
 struct FillStep {

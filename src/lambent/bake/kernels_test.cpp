@@ -35,7 +35,7 @@ TEST(Kernels, MultiplyEntriesIsTheSparseProduct) {
         }
       }
       std::vector<float> y(5 * width);
-      multiply_rows(block, channels, x.data(), width, 0.25f, y.data());
+      multiply_rows(block.view(), channels, x.data(), width, 0.25f, y.data());
       for (size_t i = 0; i < y.size(); ++i) EXPECT_NEAR(y[i], 0.25 * expected[i], 1e-5) << "channels " << channels << " width " << width;
     }
 }

@@ -4,7 +4,6 @@
 #include <lambent/core/half.h>
 #include <lambent/core/parallel.h>
 
-#include <atomic>
 #include <chrono>
 
 namespace lambent {
@@ -15,51 +14,52 @@ Result<GatherOperator> GatherOperator::trace(const GatherSetup& setup, const Gat
   GatherOperator op;
   op.setup_ = &setup;
   const size_t n = setup.receivers.count();
-  op.kept_.resize(op.blocks()), op.is_kept_.assign(op.blocks(), 0), op.buried_.assign(n, 0);
+  op.buried_.assign(n, 0);
+  op.kept_ = std::make_shared<KeptRows>(op.blocks(), hits ? memory : 0, most_bytes(size_t(setup.sets.samples), n, setup.channels));
+  op.gathered_ = std::make_shared<Pool<GatherBlock>>([] { return std::make_unique<GatherBlock>(); });
   op.scratch_ = std::make_shared<Pool<GatherScratch, DeleteScratch>>([&setup] { return make_gather_scratch(setup); });
-  std::atomic<size_t> used{0};
   ProgressStage stage(progress, "tracing", n);
   parallel_for(n, gather_block, [&](size_t begin, size_t end) {
     if (stage.cancelled()) return;
-    GatherBlock block;
+    auto block = op.gathered_->borrow();
     std::vector<float> unwanted(sky_rows ? 0 : (end - begin) * setup.coefficients());
     const GatherSky sky{sky_rows ? sky_rows + begin * setup.coefficients() : unwanted.data(), nullptr, setup.coefficients(), nullptr,
                         op.buried_.data() + begin};
     auto scratch = op.scratch_->borrow();
     if (direct) {
       const GatherDirect here{direct->lamps, direct->samples, direct->rows + begin * direct->width, direct->width};
-      trace_gather(setup, *scratch, begin, end - begin, hits ? &block : nullptr, &sky, &here);
+      trace_gather(setup, *scratch, begin, end - begin, hits ? block.get() : nullptr, &sky, &here);
     } else {
-      trace_gather(setup, *scratch, begin, end - begin, hits ? &block : nullptr, &sky);
+      trace_gather(setup, *scratch, begin, end - begin, hits ? block.get() : nullptr, &sky);
     }
     stage.advance(end - begin);
     if (!hits) return;
-    // Which blocks are kept depends on the scheduling, the result does not: the others are traced again, alike.
-    block.half_rows = {};
-    const size_t bytes = block.rows.bytes() + sizeof(GatherBlock);
-    if (used.fetch_add(bytes) + bytes <= memory) {
-      op.kept_[begin / gather_block] = std::move(block);
-      op.is_kept_[begin / gather_block] = 1;
-    } else {
-      used.fetch_sub(bytes);
-    }
+    block->half_rows = {};
+    op.kept_->keep(begin / gather_block, *block);
   });
   if (stage.cancelled()) return Error{"", "cancelled"};
   op.fill_ = make_fill_steps(setup.scene, setup.receivers.basis, op.buried_);
   if (direct) fill_buried(op.fill_, direct->rows, direct->width, 3 * direct->lamps.groups());
   if (sky_rows) fill_buried(op.fill_, sky_rows, setup.coefficients(), setup.coefficients());
   for (uint8_t b : op.buried_) op.report_.buried += b;
-  op.report_.rays = n * size_t(setup.sets.samples), op.report_.bytes = used;
-  op.report_.kept = double(std::count(op.is_kept_.begin(), op.is_kept_.end(), uint8_t(1))) / double(std::max<size_t>(op.blocks(), 1));
+  op.report_.rays = n * size_t(setup.sets.samples), op.report_.bytes = op.kept_->bytes();
+  op.report_.kept = op.kept_->fraction();
   op.report_.seconds = std::chrono::duration<double>(std::chrono::steady_clock::now() - start).count();
   return op;
 }
 
+void GatherOperator::with_rows(size_t b, auto f) const {
+  if (const KeptRows::Block* kept = kept_->find(b)) return f(kept->rows);
+  const size_t begin = b * gather_block;
+  auto again = gathered_->borrow();
+  trace_gather(*setup_, *scratch_->borrow(), begin, std::min(gather_block, rows() - begin), again.get(), nullptr);
+  f(again->rows.view());
+}
+
 void GatherOperator::apply_block(size_t b, const float* x, size_t width, float* y) const {
-  const size_t begin = b * gather_block, count = std::min(gather_block, rows() - begin);
-  GatherBlock again;
-  if (!is_kept_[b]) trace_gather(*setup_, *scratch_->borrow(), begin, count, &again, nullptr);
-  multiply_rows(is_kept_[b] ? kept_[b].rows : again.rows, setup_->channels, x, width, setup_->row_scale(size_t(setup_->sets.samples)), y);
+  with_rows(b, [&](const SparseRows& rows) {
+    multiply_rows(rows, setup_->channels, x, width, setup_->row_scale(size_t(setup_->sets.samples)), y);
+  });
 }
 
 void GatherOperator::apply(const float* x, size_t width, float* y) const {
@@ -76,15 +76,15 @@ GatherOperator::Push GatherOperator::transposed() const {
   push.first.assign(rows() + 1, 0);
   const size_t channels = size_t(push.channels);
   auto each_entry = [&](auto f) {
-    for (size_t b = 0; b < blocks(); ++b) {
-      const size_t first = b * gather_block, count = std::min(gather_block, rows() - first);
-      GatherBlock again;
-      if (!is_kept_[b]) trace_gather(*setup_, *scratch_->borrow(), first, count, &again, nullptr);
-      const SparseBlock& s = is_kept_[b] ? kept_[b].rows : again.rows;
-      for (size_t k = 0, e = 0; k < s.columns.size(); ++k)
-        for (; e < s.ends[k]; ++e)
-          if (!buried_[first + s.rows[e]]) f(s.columns[k], uint32_t(first + s.rows[e]), s.weights.data() + e * channels);
-    }
+    for (size_t b = 0; b < blocks(); ++b)
+      with_rows(b, [&](const SparseRows& rows) {
+        const SparseEntries& s = rows.entries;
+        for (size_t k = 0, e = 0; k < s.column_count; ++k)
+          for (; e < s.ends[k]; ++e) {
+            const size_t row = b * gather_block + s.rows[e];
+            if (!buried_[row]) f(s.columns[k], uint32_t(row), s.weights + e * channels);
+          }
+      });
   };
   each_entry([&](uint32_t column, uint32_t, const uint16_t*) { ++push.first[column + 1]; });
   for (const FillStep& step : fill_)

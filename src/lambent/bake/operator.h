@@ -2,7 +2,7 @@
 // The gather operator as a whole: traced once, kept as far as a budget goes, and applied to any number of columns.
 //   y = F B x,   F: values of buried receivers are those of their neighbours.
 // Columns are light groups times channels, or coefficients times channels; a row of x holds them all, `width` padded floats.
-#include <lambent/bake/gather.h>
+#include <lambent/bake/kept_rows.h>
 #include <lambent/core/pool.h>
 #include <lambent/core/progress.h>
 
@@ -47,9 +47,13 @@ class GatherOperator {
 
  private:
   const GatherSetup* setup_ = nullptr;
-  std::vector<GatherBlock> kept_;
-  std::vector<uint8_t> is_kept_, buried_;
+  // Calls f with the rows of a block, kept or traced again.
+  void with_rows(size_t block, auto f) const;
+
+  std::vector<uint8_t> buried_;
   std::vector<FillStep> fill_;
+  std::shared_ptr<KeptRows> kept_;
+  std::shared_ptr<Pool<GatherBlock>> gathered_;
   std::shared_ptr<Pool<GatherScratch, DeleteScratch>> scratch_;
   mutable Report report_;
 };

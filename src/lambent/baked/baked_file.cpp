@@ -129,7 +129,7 @@ OutgoingBlobs outgoing_blobs(const Outgoing& o) {
   return b;
 }
 
-Result<Outgoing> read_outgoing(const GltfChunks& chunks, const json& object, const Transfer& transfer, const std::string& where) {
+Result<Outgoing> read_outgoing(const GltfChunks& chunks, const json& object, int rows, size_t receivers, const std::string& where) {
   Outgoing o;
   const auto kind = std::find_if(std::begin(outgoing_names), std::end(outgoing_names), [&](const char* name) { return object.contains("kind") && object["kind"] == name; });
   if (kind == std::end(outgoing_names)) return Error{where, "the outgoing basis is not known to this program"};
@@ -139,19 +139,18 @@ Result<Outgoing> read_outgoing(const GltfChunks& chunks, const json& object, con
   o.order = int(*order);
   o.has_b = object.value("hasB", true);
   if (o.order < 1) return Error{where, "the outgoing order is 0"};
-  const size_t receivers = transfer.receivers;
   if (o.kind == OutgoingKind::map || o.kind == OutgoingKind::svd) {
     auto grid = read_count(object, "grid", 256, where), maps = read_count(object, "mapCount", 65535, where);
     for (const auto* count : {&grid, &maps})
       if (!*count) return count->error();
     if (*grid < 2 || *maps < 1) return Error{where, "view maps have no size"};
-    const size_t each = *grid * *grid * size_t(transfer.rows);
+    const size_t each = *grid * *grid * size_t(rows);
     if (*maps > chunks.binary.size() / (8 * each)) return Error{where, "there is no room for so many view maps"};
     auto halves = read_values<uint16_t>(chunks, object, "maps", *maps * each * 4, where);
     if (!halves) return halves.error();
     const uint16_t* p = halves->data();
     for (size_t m = 0; m < *maps; ++m) {
-      ViewMap map{int(*grid), transfer.rows, std::vector<ViewWeights>(each)};
+      ViewMap map{int(*grid), rows, std::vector<ViewWeights>(each)};
       for (ViewWeights& w : map.values)
         for (int c = 0; c < 4; ++c) w[c] = half_to_float(*p++);
       o.maps.push_back(std::move(map));
@@ -169,7 +168,7 @@ Result<Outgoing> read_outgoing(const GltfChunks& chunks, const json& object, con
     if (!is_finite(t) || !is_finite(n) || glm::dot(t, t) > 2 || glm::dot(n, n) > 2) return Error{where, "a receiver's frame is broken"};
     o.frames.push_back(Mat3(t, glm::cross(n, t), n));
   }
-  if (o.rows() != transfer.rows) return Error{where, "\"rows\" does not fit the outgoing basis"};
+  if (o.rows() != rows) return Error{where, "\"rows\" does not fit the outgoing basis"};
   return o;
 }
 
@@ -192,6 +191,63 @@ Result<void> read_transfer_data(const GltfChunks& chunks, const MappedFile& file
   t.data = *data;
   t.storage = std::make_shared<MappedFile>(file);
   return {};
+}
+
+// Light, rows and receivers are set.
+Result<void> read_cpca(const GltfChunks& chunks, const json& transfer, CpcaTransfer& c, const std::string& where) {
+  const json& object = transfer["cpca"];
+  auto clusters = read_count(object, "clusters", size_t(max_cpca_clusters), where), rank = read_count(object, "rank", size_t(max_cpca_rank), where);
+  auto channels = read_count(transfer, "channels", 3, where);
+  for (const auto* count : {&clusters, &rank, &channels})
+    if (!*count) return count->error();
+  if (*clusters < 1) return Error{where, "there are no clusters"};
+  if (*channels != 1 && *channels != 3) return Error{where, "\"channels\" is out of range"};
+  c.clusters = int(*clusters), c.rank = int(*rank), c.channels = int(*channels);
+  if (c.receivers > chunks.binary.size() / 2) return Error{where, "there is no room for so many receivers"};
+  auto vectors = read_values<float>(chunks, transfer, "bufferView", *clusters * (1 + *rank) * c.receiver_values(), where);
+  if (!vectors) return vectors.error();
+  for (float v : *vectors)
+    if (!std::isfinite(v)) return Error{where, "a cluster's vector is not finite"};
+  auto cluster_of = read_values<uint16_t>(chunks, object, "clusterOf", c.receivers, where);
+  if (!cluster_of) return cluster_of.error();
+  for (uint16_t k : *cluster_of)
+    if (k >= *clusters) return Error{where, "cluster " + std::to_string(k) + " does not exist"};
+  auto weights = read_values<uint16_t>(chunks, object, "weights", c.receivers * *rank, where);
+  if (!weights) return weights.error();
+  c.vectors = std::move(*vectors), c.cluster_of = std::move(*cluster_of), c.weights = std::move(*weights);
+  return {};
+}
+
+// So many finite numbers within 1e9.
+Result<std::vector<float>> read_numbers(const json& object, const char* key, size_t count, const std::string& where) {
+  const auto list = object.find(key);
+  const auto fits = [](const json& x) { return x.is_number() && std::abs(x.get<double>()) <= 1e9; };
+  if (list == object.end() || !list->is_array() || list->size() != count || !std::all_of(list->begin(), list->end(), fits))
+    return Error{where, "\"" + std::string(key) + "\" is not a list of " + std::to_string(count) + " numbers within 1e9"};
+  return list->get<std::vector<float>>();
+}
+
+Result<FixedView> read_view(const GltfChunks& chunks, const json& object, size_t receivers, const std::string& where) {
+  if (!object.is_object()) return Error{where, "is not an object"};
+  FixedView view;
+  auto width = read_count(object, "width", 1 << 16, where), height = read_count(object, "height", 1 << 16, where);
+  for (const auto* count : {&width, &height})
+    if (!*count) return count->error();
+  if (*width < 1 || *height < 1 || *width * *height != receivers) return Error{where, "has not as many pixels as there are receivers"};
+  view.width = int(*width), view.height = int(*height);
+  auto eye = read_numbers(object, "eye", 3, where), target = read_numbers(object, "target", 3, where);
+  for (const auto* list : {&eye, &target})
+    if (!*list) return list->error();
+  const auto fov = object.find("fov");
+  if (fov == object.end() || !fov->is_number() || !(fov->get<double>() > 0 && fov->get<double>() < 180)) return Error{where, "\"fov\" is out of range"};
+  view.camera.eye = {(*eye)[0], (*eye)[1], (*eye)[2]}, view.camera.target = {(*target)[0], (*target)[1], (*target)[2]};
+  view.camera.fov = fov->get<float>();
+  auto coverage = read_values<float>(chunks, object, "coverage", receivers, where);
+  if (!coverage) return coverage.error();
+  for (float c : *coverage)
+    if (!(c >= 0 && c <= 1)) return Error{where, "a pixel's coverage is out of range"};
+  view.coverage = std::move(*coverage);
+  return view;
 }
 
 Result<Visibility> read_visibility(const GltfChunks& chunks, const MappedFile& file, const json& object, const std::string& where) {
@@ -224,15 +280,10 @@ Result<Visibility> read_visibility(const GltfChunks& chunks, const MappedFile& f
 Result<LatticeTransfer> read_lattice(const GltfChunks& chunks, const MappedFile& file, const json& object, const LightBasis& light, const std::string& where) {
   if (!object.is_object()) return Error{where, "is not an object"};
   LatticeTransfer l;
-  for (const char* key : {"min", "max"}) {
-    const auto corner = object.find(key);
-    if (corner == object.end() || !corner->is_array() || corner->size() != 3) return Error{where, std::string("\"") + key + "\" is not three numbers"};
-    for (size_t k = 0; k < 3; ++k) {
-      const json& x = (*corner)[k];
-      if (!x.is_number() || !(std::abs(x.get<double>()) <= 1e9)) return Error{where, std::string("\"") + key + "\" is not three numbers within 1e9"};
-      (key[1] == 'i' ? l.lattice.min : l.lattice.max)[int(k)] = x.get<float>();
-    }
-  }
+  auto min = read_numbers(object, "min", 3, where), max = read_numbers(object, "max", 3, where);
+  for (const auto* list : {&min, &max})
+    if (!*list) return list->error();
+  l.lattice.min = {(*min)[0], (*min)[1], (*min)[2]}, l.lattice.max = {(*max)[0], (*max)[1], (*max)[2]};
   for (int k = 0; k < 3; ++k)
     if (l.lattice.min[k] > l.lattice.max[k]) return Error{where, "its box is empty"};
   const auto points = object.find("points");
@@ -393,9 +444,9 @@ Result<void> save(const std::string& path, const Scene& scene, const Receivers& 
     describe(extension, places.first_view + more_view);
     extension["transfer"]["bufferView"] = places.first_view;
     json parts = json::array();
-    for (size_t i = 0; i < scene.parts.size(); ++i) {
+    for (size_t i = 0; i < front.size(); ++i) {
       json part{{"node", places.part_nodes[i]}, {"primitive", places.part_primitives[i]}, {"front", places.first_view + 1 + int(i)}};
-      if (!back.empty()) part["back"] = places.first_view + 1 + int(scene.parts.size() + i);
+      if (!back.empty()) part["back"] = places.first_view + 1 + int(front.size() + i);
       parts.push_back(std::move(part));
     }
     extension["parts"] = std::move(parts);
@@ -421,26 +472,31 @@ json header(const char* kind, int channels, Precision precision, size_t receiver
 
 }  // namespace
 
-Result<void> save_baked(const std::string& path, const Scene& scene, const Receivers& receivers, const Transfer& transfer,
-                        const std::string& provenance, const BakedExtras& extras) {
-  const Outgoing* outgoing = extras.outgoing;
-  const LatticeTransfer* lattice = extras.lattice;
-  LAMBENT_CHECK(!lattice || (lattice->transfer.columns() == transfer.columns() && lattice->valid.size() == lattice->lattice.count()));
-  LAMBENT_CHECK(transfer.rows == (outgoing ? outgoing->rows() : directional_rows(extras.directional)));
-  const OutgoingBlobs last = outgoing ? outgoing_blobs(*outgoing) : OutgoingBlobs{};
-  std::vector<GltfBlob> more;
-  if (outgoing) {
-    more.push_back({bytes_of(std::span<const Vec3>(last.frames)), 4});
-    if (!last.maps.empty()) more.push_back({bytes_of(std::span<const uint16_t>(last.maps)), 4}), more.push_back({bytes_of(std::span<const uint16_t>(last.map_of)), 4});
+namespace {
+
+// What the extras hold, as bulk data, and where it is told of in the extension.
+class ExtrasWriter {
+ public:
+  explicit ExtrasWriter(const BakedExtras& extras) : extras_(extras) {
+    if (const Outgoing* o = extras.outgoing) {
+      last_ = outgoing_blobs(*o);
+      blobs.push_back({bytes_of(std::span<const Vec3>(last_.frames)), 4});
+      if (!last_.maps.empty())
+        blobs.push_back({bytes_of(std::span<const uint16_t>(last_.maps)), 4}), blobs.push_back({bytes_of(std::span<const uint16_t>(last_.map_of)), 4});
+    }
+    lattice_at_ = int(blobs.size());
+    if (extras.lattice) blobs.push_back({extras.lattice->transfer.data, 64}), blobs.push_back({extras.lattice->valid, 4});
+    view_at_ = int(blobs.size());
+    if (extras.view) blobs.push_back({bytes_of(std::span<const float>(extras.view->coverage)), 4});
   }
-  const int lattice_at = int(more.size());
-  if (lattice) more.push_back({lattice->transfer.data, 64}), more.push_back({lattice->valid, 4});
-  return save(path, scene, receivers, transfer.data, more, extras.look, provenance, [&](json& extension, int first) {
-    json& t = extension["transfer"] = header(outgoing ? "matrix" : "diffuse", transfer.channels, transfer.precision, transfer.receivers);
-    if (extras.directional != DirectionalKind::none) t["directional"] = directional_name(extras.directional);
-    write_light(t, transfer.light);
-    if (outgoing) {
-      t["rows"] = transfer.rows;
+  const char* kind() const { return extras_.outgoing ? "matrix" : "diffuse"; }
+
+  // `first`: the buffer view of the first of `blobs`.
+  void write(json& extension, int rows, int first) const {
+    json& t = extension["transfer"];
+    if (extras_.directional != DirectionalKind::none) t["directional"] = directional_name(extras_.directional);
+    if (const Outgoing* outgoing = extras_.outgoing) {
+      t["rows"] = rows;
       json& o = t["outgoing"];
       o = {{"kind", outgoing_names[int(outgoing->kind)]}, {"order", outgoing->order}, {"frames", first}};
       if (outgoing->maps.empty()) {
@@ -449,7 +505,7 @@ Result<void> save_baked(const std::string& path, const Scene& scene, const Recei
         o["grid"] = outgoing->maps[0].grid, o["mapCount"] = outgoing->maps.size(), o["maps"] = first + 1, o["mapOf"] = first + 2;
       }
     }
-    if (lattice) {
+    if (const LatticeTransfer* lattice = extras_.lattice) {
       const Lattice& l = lattice->lattice;
       extension["lattice"] = {{"min", {l.min.x, l.min.y, l.min.z}},
                               {"max", {l.max.x, l.max.y, l.max.z}},
@@ -457,9 +513,59 @@ Result<void> save_baked(const std::string& path, const Scene& scene, const Recei
                               {"order", lattice->order},
                               {"channels", lattice->transfer.channels},
                               {"precision", lattice->transfer.precision == Precision::half ? "half" : "single"},
-                              {"bufferView", first + lattice_at},
-                              {"valid", first + lattice_at + 1}};
+                              {"bufferView", first + lattice_at_},
+                              {"valid", first + lattice_at_ + 1}};
     }
+    if (const FixedView* v = extras_.view) {
+      const Vec3 e = v->camera.eye, at = v->camera.target;
+      extension["view"] = {{"width", v->width}, {"height", v->height}, {"eye", {e.x, e.y, e.z}}, {"target", {at.x, at.y, at.z}},
+                           {"fov", v->camera.fov}, {"coverage", first + view_at_}};
+    }
+  }
+
+  std::vector<GltfBlob> blobs;
+
+ private:
+  const BakedExtras& extras_;
+  OutgoingBlobs last_;
+  int lattice_at_ = 0, view_at_ = 0;
+};
+
+void check_extras(const BakedExtras& extras, const LightBasis& light, int rows) {
+  const LatticeTransfer* lattice = extras.lattice;
+  LAMBENT_CHECK(!lattice || (lattice->transfer.columns() == light.count() && lattice->valid.size() == lattice->lattice.count()));
+  LAMBENT_CHECK(rows == (extras.outgoing ? extras.outgoing->rows() : directional_rows(extras.directional)));
+}
+
+}  // namespace
+
+Result<void> save_baked(const std::string& path, const Scene& scene, const Receivers& receivers, const Transfer& transfer,
+                        const std::string& provenance, const BakedExtras& extras) {
+  check_extras(extras, transfer.light, transfer.rows);
+  LAMBENT_CHECK(!extras.view || (extras.view->coverage.size() == transfer.receivers && !extras.outgoing));
+  const ExtrasWriter more(extras);
+  return save(path, scene, receivers, transfer.data, more.blobs, extras.look, provenance, [&](json& extension, int first) {
+    extension["transfer"] = header(more.kind(), transfer.channels, transfer.precision, transfer.receivers);
+    write_light(extension["transfer"], transfer.light);
+    more.write(extension, transfer.rows, first);
+  });
+}
+
+Result<void> save_baked(const std::string& path, const Scene& scene, const Receivers& receivers, const CpcaTransfer& transfer,
+                        const std::string& provenance, const BakedExtras& extras) {
+  check_extras(extras, transfer.light, transfer.rows);
+  LAMBENT_CHECK(!extras.view);
+  const ExtrasWriter more(extras);
+  std::vector<GltfBlob> blobs = more.blobs;
+  blobs.push_back({bytes_of(std::span<const uint16_t>(transfer.cluster_of)), 4});
+  blobs.push_back({bytes_of(std::span<const uint16_t>(transfer.weights)), 4});
+  const int at = int(more.blobs.size());
+  return save(path, scene, receivers, bytes_of(std::span<const float>(transfer.vectors)), blobs, extras.look, provenance, [&](json& extension, int first) {
+    json& t = extension["transfer"] = header(more.kind(), transfer.channels, Precision::half, transfer.receivers);
+    write_light(t, transfer.light);
+    more.write(extension, transfer.rows, first);
+    t["cpca"] = {{"clusters", transfer.clusters}, {"rank", transfer.rank},
+                 {"clusterOf", first + at}, {"weights", first + at + 1}};
   });
 }
 
@@ -533,25 +639,30 @@ Result<Baked> load_baked(const MappedFile& file, const std::string& path) {
     zonal.order = light->order, zonal.lobes = int(*lobes), zonal.receivers = *receivers;
     if (auto ok = read_transfer_data(*chunks, file, *t, zonal, where); !ok) return ok.error();
   } else {
-    baked.transfer.light = std::move(*light), baked.transfer.receivers = *receivers;
+    int rows = directional_rows(baked.directional);
     if (is_matrix) {
-      auto rows = read_count(*t, "rows", 2 * sh_count(max_sh_order), where);
-      if (!rows) return rows.error();
-      if (*rows < 1) return Error{where, "the transfer has no rows"};
-      baked.transfer.rows = int(*rows);
-    } else {
-      baked.transfer.rows = directional_rows(baked.directional);
+      auto count = read_count(*t, "rows", 2 * sh_count(max_sh_order), where);
+      if (!count) return count.error();
+      if (*count < 1) return Error{where, "the transfer has no rows"};
+      rows = int(*count);
     }
-    if (auto ok = read_transfer_data(*chunks, file, *t, baked.transfer, where); !ok) return ok.error();
-  }
-  if (is_matrix) {
-    if (!t->contains("outgoing") || !(*t)["outgoing"].is_object()) return Error{where, "\"outgoing\" is missing"};
-    auto outgoing = read_outgoing(*chunks, (*t)["outgoing"], baked.transfer, where + ": outgoing");
-    if (!outgoing) return outgoing.error();
-    baked.outgoing = std::move(*outgoing);
+    if (t->contains("cpca")) {
+      CpcaTransfer& cpca = baked.cpca.emplace();
+      cpca.light = std::move(*light), cpca.receivers = *receivers, cpca.rows = rows;
+      if (auto ok = read_cpca(*chunks, *t, cpca, where + ": cpca"); !ok) return ok.error();
+    } else {
+      baked.transfer.light = std::move(*light), baked.transfer.receivers = *receivers, baked.transfer.rows = rows;
+      if (auto ok = read_transfer_data(*chunks, file, *t, baked.transfer, where); !ok) return ok.error();
+    }
+    if (is_matrix) {
+      if (!t->contains("outgoing") || !(*t)["outgoing"].is_object()) return Error{where, "\"outgoing\" is missing"};
+      auto outgoing = read_outgoing(*chunks, (*t)["outgoing"], rows, *receivers, where + ": outgoing");
+      if (!outgoing) return outgoing.error();
+      baked.outgoing = std::move(*outgoing);
+    }
   }
   if (const auto object = extension.find("lattice"); object != extension.end() && !is_blocks) {
-    auto lattice = read_lattice(*chunks, file, *object, baked.transfer.light, where + ": lattice");
+    auto lattice = read_lattice(*chunks, file, *object, light_of(baked), where + ": lattice");
     if (!lattice) return lattice.error();
     baked.lattice = std::move(*lattice);
   }
@@ -560,6 +671,15 @@ Result<Baked> load_baked(const MappedFile& file, const std::string& path) {
   auto scene = load_gltf(file, path, folder.empty() ? "." : folder);
   if (!scene) return scene.error();
   baked.scene = std::move(*scene);
+  const auto provenance = extension.find("provenance");
+  baked.provenance = provenance == extension.end() ? "{}" : provenance->dump(-1, ' ', false, json::error_handler_t::replace);
+  if (const auto object = extension.find("view"); object != extension.end()) {
+    if (is_zonal || is_matrix || is_blocks || baked.directional != DirectionalKind::none) return Error{where, "a fixed view has one row a pixel"};
+    auto view = read_view(*chunks, *object, *receivers, where + ": view");
+    if (!view) return view.error();
+    baked.view = std::move(*view);
+    return baked;
+  }
   SurfaceReader surface{*chunks, baked, *receivers, Kind::vertices, 0, 0, {}, {}, {}, {}, {}};
   if (auto ok = surface.begin(extension, where); !ok) return ok.error();
   const auto parts = extension.find("parts");
@@ -578,9 +698,16 @@ Result<Baked> load_baked(const MappedFile& file, const std::string& path) {
     if (auto ok = surface.read_part(*entry->second, part, place); !ok) return ok.error();
   }
   surface.finish();
-  const auto provenance = extension.find("provenance");
-  baked.provenance = provenance == extension.end() ? "{}" : provenance->dump(-1, ' ', false, json::error_handler_t::replace);
   return baked;
+}
+
+LightBasis light_of(const Baked& baked) {
+  if (baked.zonal) return {.order = baked.zonal->order};
+  return baked.cpca ? baked.cpca->light : baked.transfer.light;
+}
+
+size_t receivers_of(const Baked& baked) {
+  return baked.zonal ? baked.zonal->receivers : baked.cpca ? baked.cpca->receivers : baked.transfer.receivers;
 }
 
 bool is_baked(const std::string& path) {

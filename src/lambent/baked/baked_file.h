@@ -1,9 +1,11 @@
 #pragma once
 // The baked file: a glTF 2.0 binary that any viewer opens, the input's scene kept, with the transfer in the extension
 // LAMBENT_transfer (docs/file-format.md; schema in docs/schema/).
+#include <lambent/core/camera.h>
 #include <lambent/core/file.h>
 #include <lambent/receivers/receivers.h>
 #include <lambent/scene/scene.h>
+#include <lambent/transfer/cpca_transfer.h>
 #include <lambent/transfer/lattice.h>
 #include <lambent/transfer/outgoing.h>
 #include <lambent/transfer/directional.h>
@@ -18,6 +20,13 @@ namespace lambent {
 
 inline constexpr int baked_file_version = 1;
 
+// A bake whose view is fixed: its receivers are the pixels of a picture, row by row from the top (relight/fix_view.h).
+struct FixedView {
+  Camera camera;  // `up` is the default
+  int width = 0, height = 0;
+  std::vector<float> coverage;  // [0, 1] a pixel: how much of it the scene covers
+};
+
 struct Baked {
   Scene scene;
   std::vector<uint32_t> front, back;  // receiver of each scene vertex, by side, as in Receivers; of vertex receivers alone
@@ -28,6 +37,8 @@ struct Baked {
   std::optional<LatticeTransfer> lattice;  // light in free space, for the same light; its data lies in the mapped file too
   std::optional<ZonalTransfer> zonal;  // in place of `transfer`, which then has no receivers; read in place too
   std::optional<Visibility> visibility;  // in place of `transfer` as well: all-frequency light; its records are read in place
+  std::optional<CpcaTransfer> cpca;    // likewise in place of `transfer`
+  std::optional<FixedView> view;      // then receivers are pixels, and no surface has any
   std::string provenance;             // JSON text: inputs and their hashes, options, version, what the bake reported
 };
 
@@ -44,7 +55,12 @@ struct BakedExtras {
   DirectionalKind directional = DirectionalKind::none;  // of a directional lightmap
   const ViewerLook* look = nullptr;
   const LatticeTransfer* lattice = nullptr;             // light in free space, for the same light as the transfer
+  const FixedView* view = nullptr;                      // the receivers are its pixels
 };
+
+// What all kinds have.
+LightBasis light_of(const Baked& baked);
+size_t receivers_of(const Baked& baked);
 
 // With a look, primitives get materials for it, two-sided ones a second primitive for their backs; the scene's own materials stay
 // in the file, and loading finds them again. Errors: the disk's; more than 4 GiB, which a GLB cannot hold.
@@ -54,6 +70,9 @@ Result<void> save_baked(const std::string& path, const Scene& scene, const Recei
                         const std::string& provenance);
 Result<void> save_baked(const std::string& path, const Scene& scene, const Receivers& receivers, const Visibility& visibility,
                         const std::string& provenance);
+// In place of the transfer that it was made of.
+Result<void> save_baked(const std::string& path, const Scene& scene, const Receivers& receivers, const CpcaTransfer& transfer,
+                        const std::string& provenance, const BakedExtras& extras = {});
 
 // Errors: not a baked file, another version, anything that does not fit.
 Result<Baked> load_baked(const std::string& path);

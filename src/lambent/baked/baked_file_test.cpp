@@ -1,5 +1,6 @@
 #include <lambent/baked/baked_file.h>
 #include <lambent/core/file.h>
+#include <lambent/core/half.h>
 #include <lambent/core/random.h>
 #include <lambent/image/image.h>
 #include <lambent/receivers/atlas.h>
@@ -230,6 +231,28 @@ TEST(BakedFile, RefusesSurfacesThatLie) {
   }
 }
 
+// Each of `lies`, (from, to) of equal length, told once in place of the first `from` after `after`: refused in one line that names the file.
+void expect_refused(const std::string& path, const std::string& after, std::initializer_list<std::pair<std::string, std::string>> lies) {
+  const TemporaryFile lying("lie.glb");
+  const std::vector<uint8_t> bytes = *read_file(path);
+  const std::string text(bytes.begin(), bytes.end());
+  const size_t begin = text.find(after);
+  ASSERT_NE(begin, std::string::npos) << after;
+  for (const auto& [from, to] : lies) {
+    ASSERT_EQ(from.size(), to.size()) << from;
+    const size_t at = text.find(from, begin);
+    ASSERT_NE(at, std::string::npos) << from;
+    std::vector<uint8_t> changed = bytes;
+    std::copy(to.begin(), to.end(), changed.begin() + ptrdiff_t(at));
+    const std::span<const uint8_t> piece(changed);
+    ASSERT_TRUE(write_file_atomically(lying.path, {&piece, 1}));
+    auto result = load_baked(lying.path);
+    ASSERT_FALSE(result) << to;
+    EXPECT_EQ(result.error().text().find('\n'), std::string::npos);
+    EXPECT_NE(result.error().text().find(lying.path), std::string::npos);
+  }
+}
+
 LatticeTransfer small_lattice() {
   LatticeTransfer l{{Vec3(-1, 0, -2), Vec3(1, 2.5f, 3), 3, 1, 2}, 2, {}, {1, 1, 0, 1, 1, 0}};
   const WritableTransfer w = make_transfer({.order = 3}, 4, 3, 6, Precision::half);
@@ -244,7 +267,7 @@ LatticeTransfer small_lattice() {
 }
 
 TEST(BakedFile, LightInFreeSpaceComesBack) {
-  const TemporaryFile file("lattice.glb"), lying("lattice_lie.glb"), cut("lattice_cut.glb");
+  const TemporaryFile file("lattice.glb"), cut("lattice_cut.glb");
   const Small s = small_bake(1, Precision::single);
   const LatticeTransfer l = small_lattice();
   ASSERT_TRUE(save_baked(file.path, s.scene, s.receivers, s.transfer.transfer, "{}", {.lattice = &l}));
@@ -262,36 +285,75 @@ TEST(BakedFile, LightInFreeSpaceComesBack) {
   EXPECT_TRUE(std::equal(back->lattice->transfer.data.begin(), back->lattice->transfer.data.end(), l.transfer.data.begin(), l.transfer.data.end()));
   EXPECT_EQ(reinterpret_cast<uintptr_t>(back->lattice->transfer.data.data()) % 64, 0u);
 
-  const std::vector<uint8_t> bytes = *read_file(file.path);
-  const std::string text(bytes.begin(), bytes.end());
-  const size_t begin = text.find("\"lattice\":{"), end = text.find('}', begin);
-  ASSERT_NE(begin, std::string::npos);
-  const std::string object = text.substr(begin, end - begin);
-  const std::pair<std::string, std::string> lies[] = {{"\"points\":[3,1,2]", "\"points\":[3,2,2]"}, {"\"points\":[3,1,2]", "\"points\":[3,0,2]"},
+  expect_refused(file.path, "\"lattice\":{", {{"\"points\":[3,1,2]", "\"points\":[3,2,2]"}, {"\"points\":[3,1,2]", "\"points\":[3,0,2]"},
                                                       {"\"points\":[3,1,2]", "\"points\":[3,-1] "}, {"\"points\":[3,1,2]", "\"points\":[3,1  ]"},
                                                       {"\"points\":[3,1,2]", "\"points\":[3,99] "}, {"\"order\":2", "\"order\":3"},
                                                       {"\"order\":2", "\"order\":0"},               {"\"channels\":3", "\"channels\":1"},
                                                       {"\"channels\":3", "\"channels\":2"},         {"\"precision\":\"half\"", "\"precision\":\"hal?\""},
                                                       {"\"max\":[1.0,", "\"max\":[-9 ,"},           {"\"max\":[1.0,", "\"max\":[9e9,"},
                                                       {"\"max\":[1.0,", "\"max\":[\"\" ,"},           {"\"min\"", "\"mid\""},
-                                                      {"\"valid\"", "\"vapid\""},                   {"\"bufferView\"", "\"bufferVeil\""}};
-  for (const auto& [from, to] : lies) {
-    const size_t at = object.find(from);
-    ASSERT_NE(at, std::string::npos) << from << " in " << object;
-    std::vector<uint8_t> changed = bytes;
-    std::copy(to.begin(), to.end(), changed.begin() + ptrdiff_t(begin + at));
-    const std::span<const uint8_t> piece(changed);
-    ASSERT_TRUE(write_file_atomically(lying.path, {&piece, 1}));
-    auto result = load_baked(lying.path);
-    ASSERT_FALSE(result) << to;
-    EXPECT_EQ(result.error().text().find('\n'), std::string::npos);
-    EXPECT_NE(result.error().text().find(lying.path), std::string::npos);
-  }
+                                                      {"\"valid\"", "\"vapid\""},                   {"\"bufferView\"", "\"bufferVeil\""}});
+  const std::vector<uint8_t> bytes = *read_file(file.path);
   for (size_t length = 0; length < bytes.size(); length += 199) {
     const std::span<const uint8_t> piece(bytes.data(), length);
     ASSERT_TRUE(write_file_atomically(cut.path, {&piece, 1}));
     EXPECT_FALSE(load_baked(cut.path)) << length;
   }
+}
+
+TEST(BakedFile, ClustersComeBack) {
+  const TemporaryFile file("clusters.glb");
+  const Small s = small_bake(3, Precision::half);
+  const size_t n = s.receivers.count();
+  CpcaTransfer c;
+  c.light = {.order = 3}, c.channels = 3, c.receivers = n, c.clusters = 4, c.rank = 2;
+  Random random(21);
+  for (size_t i = 0; i < 4 * 3 * c.receiver_values(); ++i) c.vectors.push_back(random.next());
+  for (size_t r = 0; r < n; ++r) c.cluster_of.push_back(uint16_t(random.next() * 4)), c.weights.push_back(float_to_half(random.next())), c.weights.push_back(0);
+  ASSERT_TRUE(save_baked(file.path, s.scene, s.receivers, c, "{}"));
+  auto back = load_baked(file.path);
+  ASSERT_TRUE(back) << back.error().text();
+  ASSERT_TRUE(back->cpca);
+  EXPECT_EQ(back->transfer.receivers, 0u);
+  EXPECT_EQ(receivers_of(*back), n);
+  EXPECT_EQ(light_of(*back).order, 3);
+  EXPECT_EQ(back->front, s.receivers.front);
+  EXPECT_EQ(back->cpca->clusters, 4);
+  EXPECT_EQ(back->cpca->rank, 2);
+  EXPECT_EQ(back->cpca->vectors, c.vectors);
+  EXPECT_EQ(back->cpca->cluster_of, c.cluster_of);
+  EXPECT_EQ(back->cpca->weights, c.weights);
+  expect_refused(file.path, "\"cpca\":{", {{"\"clusters\":4", "\"clusters\":3"}, {"\"clusters\":4", "\"clusters\":0"}, {"\"rank\":2", "\"rank\":1"},
+                                           {"\"rank\":2", "\"rank\":9"}, {"\"clusterOf\"", "\"clusterof\""}, {"\"weights\"", "\"weighty\""}});
+  c.cluster_of[1] = 4;
+  ASSERT_TRUE(save_baked(file.path, s.scene, s.receivers, c, "{}"));
+  EXPECT_FALSE(load_baked(file.path));
+  c.cluster_of[1] = 3, c.vectors[5] = NAN;
+  ASSERT_TRUE(save_baked(file.path, s.scene, s.receivers, c, "{}"));
+  EXPECT_FALSE(load_baked(file.path));
+}
+
+TEST(BakedFile, FixedViewsComeBack) {
+  const TemporaryFile file("view.glb");
+  const Small s = small_bake(1, Precision::half);
+  const WritableTransfer w = make_transfer({.order = 2}, 1, 3, 6, Precision::half);
+  FixedView view{Camera{Vec3(1, 2, 3), Vec3(0, 0.5f, 0), Vec3(0, 1, 0), 33}, 3, 2, {0, 0.25f, 1, 1, 0.5f, 0}};
+  ASSERT_TRUE(save_baked(file.path, s.scene, {}, w.transfer, "{}", {.view = &view}));
+  auto back = load_baked(file.path);
+  ASSERT_TRUE(back) << back.error().text();
+  ASSERT_TRUE(back->view);
+  EXPECT_EQ(back->view->width, 3);
+  EXPECT_EQ(back->view->height, 2);
+  EXPECT_EQ(back->view->camera.eye, view.camera.eye);
+  EXPECT_EQ(back->view->camera.target, view.camera.target);
+  EXPECT_EQ(back->view->camera.fov, 33);
+  EXPECT_EQ(back->view->coverage, view.coverage);
+  EXPECT_EQ(back->scene.triangles.size(), s.scene.triangles.size());
+  expect_refused(file.path, "\"view\":{", {{"\"width\":3", "\"width\":2"}, {"\"height\":2", "\"height\":0"}, {"\"fov\":33", "\"fov\":-3"}, {"\"eye\":[", "\"eya\":["},
+                                           {"\"target\":[0.0", "\"target\":[9e9"}, {"\"coverage\"", "\"coverall\""}});
+  view.coverage[2] = 1.5f;
+  ASSERT_TRUE(save_baked(file.path, s.scene, {}, w.transfer, "{}", {.view = &view}));
+  EXPECT_FALSE(load_baked(file.path));
 }
 
 TEST(BakedFile, IsTheSameBytesEveryTime) {

@@ -19,39 +19,73 @@ Hit first_visible(const Scene& scene, const Tracer& tracer, Vec3 eye, Vec3 direc
   return {};
 }
 
+struct PixelRay {
+  Hit hit;  // no triangle where it meets nothing
+  Vec3 direction;
+};
+// Calls a visitor with every pixel, row by row from the top, and its rays. `make_visit` is called once for each row of the picture, on the
+// thread that draws it.
+using VisitPixel = std::function<void(size_t pixel, std::span<const PixelRay> rays)>;
+Result<void> trace_pixels(const Scene& scene, const Tracer& tracer, const Camera& camera, const RenderOptions& options,
+                          const std::function<VisitPixel()>& make_visit, Progress* progress) {
+  const CameraRays camera_rays(camera, options.width, options.height);
+  ProgressStage stage(progress, "rendering", size_t(options.height));
+  parallel_for(size_t(options.height), 1, [&](size_t begin, size_t end) {
+    if (stage.cancelled()) return;
+    const VisitPixel visit = make_visit();
+    std::vector<PixelRay> rays(size_t(options.samples));
+    for (int y = int(begin); y < int(end); ++y)
+      for (int x = 0; x < options.width; ++x) {
+        const uint32_t key = uint32_t(hash64(uint64_t(y) << 32 | uint64_t(x), 0xf11));
+        for (int s = 0; s < options.samples; ++s) {
+          const Vec2 jitter = sobol_owen(uint32_t(s), key);
+          const Vec3 direction = camera_rays.direction(float(x) + jitter.x, float(y) + jitter.y);
+          rays[size_t(s)] = {first_visible(scene, tracer, camera_rays.eye, direction), direction};
+        }
+        visit(size_t(y) * size_t(options.width) + size_t(x), rays);
+      }
+    stage.advance(end - begin);
+  });
+  if (stage.cancelled()) return Error{"", "cancelled"};
+  return {};
+}
+
+// O(view) at a hit, as what it is, a row of numbers: radiance is the sum over all add(receiver, row, weight) of weight times that row of
+// T . light. `weights` is scratch, a value a row.
+template <class Add>
+void reflect_at(const Scene& scene, const SpatialBasis& basis, const RenderOptions& options, const Hit& hit, Vec3 direction,
+                std::span<ViewWeights> weights, Add add) {
+  const Vec3 colour = options.albedo ? albedo(scene, scene.triangles[hit.triangle], hit.u, hit.v) : Vec3(1);
+  std::visit([&](const auto& b) {
+    const auto* at = b.find(hit.triangle, hit.front);
+    if (!at) return;
+    b.spread(*at, hit.u, hit.v, [&](uint32_t receiver, float weight) {
+      if (!options.outgoing) return add(receiver, 0, weight * colour);
+      evaluate_outgoing(*options.outgoing, receiver, -direction, weights);  // each receiver reflects in its own frame
+      for (size_t row = 0; row < weights.size(); ++row) add(receiver, int(row), weight * (Vec3(weights[row]) + colour * weights[row].w));
+    });
+  }, basis);
+}
+
 }  // namespace
 
 Result<Image> render_surfaces(const Scene& scene, const Tracer& tracer, const Camera& camera, const RenderOptions& options,
                               const std::function<SurfaceShade()>& make_shade, Progress* progress) {
   Image image(options.width, options.height);
   if (!options.background) image.alpha.assign(image.rgb.size(), 0.0f);
-  const CameraRays rays(camera, options.width, options.height);
-  ProgressStage stage(progress, "rendering", size_t(options.height));
-  parallel_for(size_t(options.height), 1, [&](size_t begin, size_t end) {
-    if (stage.cancelled()) return;
-    const SurfaceShade shade = make_shade();
-    for (int y = int(begin); y < int(end); ++y)
-      for (int x = 0; x < options.width; ++x) {
-        Vec3 sum(0.0f);
-        int covered = 0;
-        const uint32_t key = uint32_t(hash64(uint64_t(y) << 32 | uint64_t(x), 0xf11));
-        for (int s = 0; s < options.samples; ++s) {
-          const Vec2 jitter = sobol_owen(uint32_t(s), key);
-          const Vec3 direction = rays.direction(float(x) + jitter.x, float(y) + jitter.y);
-          const Hit hit = first_visible(scene, tracer, rays.eye, direction);
-          if (hit.triangle == none) {
-            if (options.background) sum += radiance_bilinear(*options.background, direction);
-            continue;
-          }
-          ++covered;
-          sum += shade(hit, direction);
-        }
-        image.at(x, y) = sum / float(options.samples);
-        if (!options.background) image.alpha[size_t(y) * size_t(options.width) + size_t(x)] = float(covered) / float(options.samples);
+  auto traced = trace_pixels(scene, tracer, camera, options, [&]() -> VisitPixel {
+    return [&, shade = make_shade()](size_t pixel, std::span<const PixelRay> rays) {
+      Vec3 sum(0.0f);
+      size_t covered = 0;
+      for (const PixelRay& ray : rays) {
+        if (ray.hit.triangle != none) sum += shade(ray.hit, ray.direction), ++covered;
+        else if (options.background) sum += radiance_bilinear(*options.background, ray.direction);
       }
-    stage.advance(end - begin);
-  });
-  if (stage.cancelled()) return Error{"", "cancelled"};
+      image.rgb[pixel] = sum / float(rays.size());
+      if (!options.background) image.alpha[pixel] = float(covered) / float(rays.size());
+    };
+  }, progress);
+  if (!traced) return traced.error();
   return image;
 }
 
@@ -63,27 +97,79 @@ Result<Image> render(const Scene& scene, const Tracer& tracer, const SpatialBasi
       const Triangle& triangle = scene.triangles[hit.triangle];
       Vec3 sum(0.0f);
       if (!options.emission.empty() && emits(scene, triangle, hit.front)) sum += options.emission[scene.parts[triangle.part].material];
+      if (options.directional == DirectionalKind::none) {
+        reflect_at(scene, basis, options, hit, direction, weights, [&](uint32_t receiver, int row, Vec3 weight) { sum += weight * relit.at(receiver, row); });
+        return sum;
+      }
       const Vec3 colour = options.albedo ? albedo(scene, triangle, hit.u, hit.v) : Vec3(1);
       std::array<Vec3, 9> rows{};
       std::visit([&](const auto& b) {
         const auto* at = b.find(hit.triangle, hit.front);
         if (!at) return;
         b.spread(*at, hit.u, hit.v, [&](uint32_t receiver, float weight) {
-          if (options.outgoing) {  // each receiver reflects in its own frame
-            evaluate_outgoing(*options.outgoing, receiver, -direction, weights);
-            sum += weight * reflect_rows(weights, colour, [&](size_t row) { return relit.at(receiver, int(row)); });
-            return;
-          }
           for (int row = 0; row < relit.rows; ++row) rows[size_t(row)] += weight * relit.at(receiver, row);
         });
       }, basis);
-      if (options.directional == DirectionalKind::none) return sum + colour * rows[0];
       const Vec3 face = normalize_or(area_normal(scene, triangle), Vec3(0, 1, 0)) * (hit.front ? 1.0f : -1.0f);
       Vec3 n = normalize_or(interpolate(scene.normals, triangle, hit.u, hit.v), face);
       if (glm::dot(n, face) < 0) n = -n;
       return sum + colour * evaluate_directional_light(options.directional, rows, receiver_frame(n), n);
     };
   }, progress);
+}
+
+Result<FixedViewTransfer> fix_view(const Scene& scene, const Tracer& tracer, const SpatialBasis& basis, const Transfer& transfer, const Camera& camera,
+                                   const RenderOptions& options, Progress* progress) {
+  LAMBENT_CHECK(transfer.rows == (options.outgoing ? options.outgoing->rows() : 1));
+  const size_t pixels = size_t(options.width) * size_t(options.height), C = transfer.columns(), channels = size_t(transfer.channels);
+  FixedViewTransfer out;
+  out.coverage.assign(pixels, 0.0f);
+  const WritableTransfer fixed = make_transfer(transfer.light, 1, 3, pixels, transfer.precision);
+  auto traced = trace_pixels(scene, tracer, camera, options, [&]() -> VisitPixel {
+    // What a pixel's rays ask of the receivers, row by row, is gathered first: many meet the same ones.
+    using Asked = std::pair<uint32_t, std::vector<Vec3>>;
+    return [&, asked = std::vector<Asked>(), weights = std::vector<ViewWeights>(size_t(transfer.rows)), row = std::vector<float>(3 * C)](
+               size_t pixel, std::span<const PixelRay> rays) mutable {
+      asked.clear();
+      size_t covered = 0;
+      for (const PixelRay& ray : rays) {
+        if (ray.hit.triangle == none) continue;
+        ++covered;
+        reflect_at(scene, basis, options, ray.hit, ray.direction, weights, [&](uint32_t receiver, int r, Vec3 weight) {
+          auto place = std::find_if(asked.begin(), asked.end(), [&](const Asked& a) { return a.first == receiver; });
+          if (place == asked.end()) place = asked.insert(asked.end(), {receiver, std::vector<Vec3>(size_t(transfer.rows), Vec3(0.0f))});
+          place->second[size_t(r)] += weight / float(rays.size());
+        });
+      }
+      std::fill(row.begin(), row.end(), 0.0f);
+      for (const auto& [receiver, of_rows] : asked) {
+        const std::vector<float> values = load_receiver(transfer, receiver);  // [row][channel][column]
+        for (size_t r = 0; r < of_rows.size(); ++r)
+          for (size_t c = 0; c < 3; ++c) {
+            const float* v = values.data() + (r * channels + std::min(c, channels - 1)) * C;
+            for (size_t k = 0; k < C; ++k) row[c * C + k] += of_rows[r][int(c)] * v[k];
+          }
+      }
+      store_receiver(fixed, pixel, row);
+      out.coverage[pixel] = float(covered) / float(rays.size());
+    };
+  }, progress);
+  if (!traced) return traced.error();
+  out.transfer = fixed.transfer;
+  return out;
+}
+
+Image pixels_image(const Relit& relit, const std::vector<float>& coverage, const Camera& camera, int width, int height, const Environment* background) {
+  Image image(width, height);
+  const CameraRays rays(camera, width, height);
+  for (size_t i = 0; i < image.rgb.size(); ++i) {
+    image.rgb[i] = relit.at(i);
+    if (!background || coverage[i] >= 1) continue;
+    const Vec3 direction = rays.direction(float(i % size_t(width)) + 0.5f, float(i / size_t(width)) + 0.5f);
+    image.rgb[i] += (1 - coverage[i]) * radiance_bilinear(*background, direction);
+  }
+  if (!background) image.alpha = coverage;
+  return image;
 }
 
 }  // namespace lambent

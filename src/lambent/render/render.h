@@ -28,6 +28,19 @@ struct RenderOptions {
 Result<Image> render(const Scene& scene, const Tracer& tracer, const SpatialBasis& basis, const Relit& relit,
                      const Camera& camera, const RenderOptions& options, Progress* progress = nullptr);
 
+// O(view) . T with the view fixed: a transfer whose receivers are the pixels of a picture, row by row from the top, with one row and
+// three channels, so that relighting is T . light and the picture is there. Directional lightmaps and lamps that are seen are left out. coverage: of
+// each pixel, [0, 1]. Source: general-prt, "Special cases" (fixed view: image relighting). Errors: cancelled.
+struct FixedViewTransfer {
+  Transfer transfer;
+  std::vector<float> coverage;
+};
+Result<FixedViewTransfer> fix_view(const Scene& scene, const Tracer& tracer, const SpatialBasis& basis, const Transfer& transfer, const Camera& camera,
+                                   const RenderOptions& options, Progress* progress = nullptr);
+
+// The picture of such a transfer, relit.
+Image pixels_image(const Relit& relit, const std::vector<float>& coverage, const Camera& camera, int width, int height, const Environment* background);
+
 // What render() is made of: primary rays, and `shade` for the radiance of what they meet, in the direction that they came along.
 // `make_shade` is called once for each row, on the thread that draws it.
 using SurfaceShade = std::function<Vec3(const Hit&, Vec3 direction)>;

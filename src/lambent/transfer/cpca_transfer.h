@@ -4,6 +4,8 @@
 
 namespace lambent {
 
+inline constexpr int max_cpca_clusters = 65535, max_cpca_rank = 64;
+
 struct CpcaTransfer {
   LightBasis light;
   int rows = 1, channels = 1;
