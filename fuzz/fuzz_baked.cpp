@@ -21,6 +21,12 @@ extern "C" int LLVMFuzzerTestOneInput(const uint8_t* data, size_t size) {
   if (!file) return 0;
   auto baked = lambent::load_baked(*file, "fuzz.glb");
   if (!baked) return 0;
+  if (baked->visibility) {
+    const lambent::Visibility& v = *baked->visibility;
+    std::vector<uint8_t> levels(lambent::cube_texels(v.size));
+    for (size_t r = 0; r < std::min<size_t>(v.receivers, 64); ++r) lambent::decode_visibility(v, r, levels);
+    return 0;
+  }
   std::vector<lambent::Vec3> light(lambent::light_of(*baked).count(), lambent::Vec3(0.5f));
   if (light.size() <= 24) {  // the dual functions of many take long
     const auto env = lambent::make_environment("fuzz", 64, 32, [](lambent::Vec3 d) { return lambent::Vec3(1, 1 + d.x, 1 + d.y); });

@@ -330,6 +330,24 @@ printf '6 440 480 520 560 600 640\n0.1 0 0.2 1 1 2 3 nan 5 6\n' >nan.brdf
 expect 1 'nan.brdf:2: a number is not finite' reference corner.obj --env uniform:1 --brdf measured:nan.brdf -o x.png
 head -c 1000 /dev/zero >cut.binary
 expect 1 'cut.binary' reference corner.obj --env uniform:1 --brdf measured:cut.binary -o x.png
+# All-frequency light: visibility in blocks, three roads to one picture.
+expect 0 'mixed' bake corner.obj --max-edge 0.1 --transfer blocks --cube 32 -o blocks.glb
+expect 0 '"cube": 32' inspect blocks.glb --json
+view=(--env sky:elevation=50,azimuth=20,sun=on --camera 3,2,4,1,0.5,1,40 --size 48x32 --background none --brdf phong:exponent=20,diffuse=0.3,specular=0.4)
+for method in blocks standard haar:1; do expect 0 'shaded' render blocks.glb "${view[@]}" --method $method -o ${method/:/_}.exr; done
+for method in blocks haar_1; do
+  expect 0 '"psnr"' compare $method.exr standard.exr --json
+  psnr=$(sed -n 's/.*"psnr": \([0-9]*\).*/\1/p' stdout)
+  [ "${psnr:-1000}" -ge 50 ] && ok || bad "$method and the standard basis differ: PSNR $psnr"
+done
+expect 0 'shaded' render blocks.glb "${view[@]}" --indirect sh -o indirect.png
+expect 0 'frames_per_second' relight blocks.glb --env sky:elevation=50 --turntable --spin-light --frames 3 --json
+expect 1 'lambent bake --transfer blocks' relight corner.glb --env uniform:1
+expect 1 'lambent bake --transfer blocks' render corner.glb --env uniform:1 --method haar -o x.png
+expect 2 '\-\-method' render blocks.glb --env uniform:1 --method wavelets -o x.png
+expect 2 '\-\-visibility' bake corner.obj --transfer blocks --visibility bits:9 -o x.glb
+expect 2 '\-\-cube needs' bake corner.obj --cube 64 -o x.glb
+expect 1 'more than --memory' bake corner.obj --max-edge 0.02 --transfer blocks --memory 1KB -o x.glb
 absent x.glb
 absent x.png
 

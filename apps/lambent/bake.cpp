@@ -1,4 +1,5 @@
 #include "bake_lightmap.h"
+#include "blocks.h"
 #include "commands.h"
 #include "options.h"
 
@@ -38,6 +39,7 @@ struct BakeCommand {
   int view_samples = 16;  // rays a pixel of a fixed view
   ReceiverFlags receivers;
   LightmapFlags lightmap;
+  BlocksFlags blocks;
   bool order_given = false;
 };
 
@@ -157,6 +159,7 @@ using Clock = std::chrono::steady_clock;
 double seconds_since(Clock::time_point start) { return std::chrono::duration<double>(Clock::now() - start).count(); }
 
 int run_bake(Context& context, BakeCommand o) {
+  if (o.transfer == "blocks") return run_blocks_bake(context, o.scene, o.blocks, o.bake.memory, o.output);
   auto bounces = parse_bounces(o.bounces);
   if (!bounces) return fail(bounces.error());
   if (o.transfer == "lightmap") {
@@ -395,8 +398,9 @@ void add_bake(CLI::App& app, Run& run) {
   o->scene.add_to(*c);
   c->add_option("-o,--output", o->output, "Baked file to write (.glb)")->required();
   c->add_option("--transfer", o->transfer, "What is stored: diffuse, a vector a receiver for distant light; matrix, incident light in every direction, "
-                                           "for glossy materials; zonal, lobes, for what moves; lightmap, the light of the scene's own lamps")
-      ->check(CLI::IsMember({"diffuse", "matrix", "zonal", "lightmap"}))->capture_default_str();
+                                           "for glossy materials; zonal, lobes, for what moves; lightmap, the light of the scene's own lamps; "
+                                           "blocks, visibility for sharp shadows and highlights, with materials chosen when it is drawn")
+      ->check(CLI::IsMember({"diffuse", "matrix", "zonal", "lightmap", "blocks"}))->capture_default_str();
   auto* order = c->add_option("--order", o->bake.order, "Bands of the lighting's spherical harmonics")->check(CLI::Range(1, max_sh_order))->capture_default_str();
   auto* light = c->add_option("--light", o->light, std::string("What light is made of, in place of --order: ") + light_syntax);
   auto* lobes = c->add_option("--lobes", o->zonal.lobes, "zonal: lobes a receiver")->check(CLI::Range(1, max_stored_lobes))->capture_default_str();
@@ -425,11 +429,12 @@ void add_bake(CLI::App& app, Run& run) {
   c->add_option("--precision", o->precision, "Of the stored transfer")->check(CLI::IsMember({"half", "single"}))->capture_default_str();
   o->receivers.add_to(*c);
   o->lightmap.add_to(*c);
+  const std::vector<CLI::Option*> blocks = o->blocks.add_to(*c);
   auto* points = c->add_option("--lattice", o->lattice_points, "NX,NY,NZ: also bake light in free space at so many points, for `render --insert`");
   auto* box = c->add_option("--lattice-box", o->lattice_box, "X0,Y0,Z0,X1,Y1,Z1: where, if not throughout the scene's box");
   auto* lattice_order = c->add_option("--lattice-order", o->lattice.order, "Bands of the light that arrives there")
                             ->check(CLI::Range(1, max_sh_order))->capture_default_str();
-  c->callback([o, bounces, order, light, lobes, membrane, fixed, view, compress, factors, incident, last, brdf, simulate, points, box, lattice_order, &run] {
+  c->callback([o, bounces, order, light, lobes, membrane, fixed, view, compress, factors, incident, last, brdf, simulate, points, box, lattice_order, blocks, &run] {
     o->order_given = order->count() > 0;
     if (order->count() && light->count()) throw CLI::ValidationError("--order and --light both say how many bands there are: give one");
     if (light->count() && (membrane->count() || (o->transfer != "diffuse" && o->transfer != "matrix")))
@@ -453,6 +458,12 @@ void add_bake(CLI::App& app, Run& run) {
     }
     for (const CLI::Option* option : {factors, incident, last, brdf, simulate})
       if (option->count() && o->transfer != "matrix") throw CLI::ValidationError(option->get_name() + " needs --transfer matrix");
+    for (const CLI::Option* option : blocks)
+      if (option->count() && o->transfer != "blocks") throw CLI::ValidationError(option->get_name() + " needs --transfer blocks");
+    for (const CLI::Option* option : {order, light, membrane, fixed, view, compress, points, bounces})
+      if (option->count() && o->transfer == "blocks") throw CLI::ValidationError(option->get_name() + " is not for --transfer blocks: it stores what is seen, and no light");
+    if (o->transfer == "blocks" && (o->shadows == "off" || (!o->receivers.kind.empty() && o->receivers.kind != "vertices")))
+      throw CLI::ValidationError("--transfer blocks is baked at vertices, with shadows");
     if (o->transfer == "matrix" && o->shadows == "off") throw CLI::ValidationError("--transfer matrix is always baked with shadows");
     for (const CLI::Option* option : {box, lattice_order})
       if (option->count() && !points->count()) throw CLI::ValidationError(option->get_name() + " needs --lattice");

@@ -78,6 +78,7 @@ int run_compress(Context& context, CompressCommand o) {
   o.zonal.precision = o.precision == "half" ? Precision::half : Precision::single;
   auto baked = load_baked(o.baked);
   if (!baked) return fail(baked.error());
+  if (baked->visibility) return fail({o.baked, "holds no transfer to compress, but visibility in blocks"});
   if (!o.cpca.empty()) return compress_to_clusters(context, o, *baked);
   if (baked->zonal || baked->outgoing || baked->cpca || baked->view) return fail({o.baked, "holds no diffuse transfer of spherical harmonics, which is what lobes are fitted to"});
   ZonalFitReport report;

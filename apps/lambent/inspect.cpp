@@ -77,12 +77,28 @@ int inspect_zonal(Context& context, const std::string& path, const Baked& baked)
   return success;
 }
 
+int inspect_visibility(Context& context, const std::string& path, const Baked& baked) {
+  const Visibility& v = *baked.visibility;
+  const VisibilityStatistics s = visibility_statistics(v);
+  const nlohmann::json d{{"file", path}, {"kind", "baked"}, {"scene", describe_scene(baked.scene)},
+                         {"transfer", {{"kind", "blocks"}, {"cube", v.size}, {"bits", v.bits}, {"receivers", v.receivers}, {"bytes", v.data.size()},
+                                       {"blocked", s.blocked}, {"clear", s.clear}, {"mixed", s.mixed}, {"changes_per_mixed_block", s.changes}}},
+                         {"provenance", nlohmann::json::parse(baked.provenance, nullptr, false)}};
+  if (context.json) return print_json(d), success;
+  fmt::print("{}\n  baked: visibility in blocks, cube {}, {} bit{}, {} receivers, {}; {:.1f} % of blocks mixed, with {:.1f} changes each\n", path, v.size, v.bits,
+             v.bits == 1 ? "" : "s", human_count(v.receivers), human_bytes(double(v.data.size())), 100 * s.mixed, s.changes);
+  print_scene(d["scene"]);
+  fmt::print("  provenance {}\n", d["provenance"].dump(-1, ' ', false, nlohmann::json::error_handler_t::replace));
+  return success;
+}
+
 int run_inspect(Context& context, const std::string& path) {
   const std::string extension = file_extension(path);
   if (std::set<std::string>{"hdr", "exr", "png", "jpg", "jpeg"}.contains(extension)) return inspect_picture(context, path);
   if ((extension == "glb" || extension == "gltf") && is_baked(path)) {
     auto baked = load_baked(path);
     if (!baked) return fail(baked.error());
+    if (baked->visibility) return inspect_visibility(context, path, *baked);
     if (baked->zonal) return inspect_zonal(context, path, *baked);
     Transfer t = baked->transfer;
     t.light = light_of(*baked);

@@ -38,6 +38,7 @@ int run_reference(Context& context, ReferenceCommand o) {
   if (!o.light_basis.empty()) {
     auto baked = load_baked(o.light_basis);
     if (!baked) return fail(baked.error());
+    if (baked->visibility) return fail({o.light_basis, "holds no light basis: it takes all of any environment"});
     basis = baked->zonal ? LightBasis{.order = baked->zonal->order} : baked->transfer.light;
   }
   auto scene = load_prepared_scene(o.scene);

@@ -1,3 +1,4 @@
+#include "blocks.h"
 #include "commands.h"
 #include "motion.h"
 #include "options.h"
@@ -34,7 +35,8 @@ struct RenderCommand {
   ViewOptions view;
   MotionOptions motion;
   BrdfOptions brdf;
-  bool new_brdf = false, view_given = false;
+  bool new_brdf = false, view_given = false, product_options = false;
+  ProductFlags products;
   ShWindow window = ShWindow::none;
   int light_order = 0, samples = 16;
   RenderOptions::Show show = RenderOptions::Show::product;
@@ -150,6 +152,11 @@ int run_render(Context& context, const RenderCommand& o) {
   if (!rotation) return fail(rotation.error());
   auto baked = load_baked(o.baked);
   if (!baked) return fail(baked.error());
+  if (baked->visibility) {
+    if (o.motion.any() || !o.insert.empty() || !o.lamps.empty()) return fail({o.baked, "is of visibility in blocks: nothing in it moves, and it has no lamps of its own"});
+    return run_product_render(context, *baked, o.products, o.light, o.view, o.brdf, o.samples);
+  }
+  if (o.product_options) return fail({o.baked, "--method and its options need a bake of visibility: lambent bake --transfer blocks"});
   if (o.new_brdf)
     if (auto ok = change_materials(*baked, o.brdf, o.baked); !ok) return fail(ok.error());
   auto poses = make_poses(o.motion, baked->scene);
@@ -285,8 +292,12 @@ void add_render(CLI::App& app, Run& run) {
   c->add_option("--show", o->show, "product of light and colour; radiosity: the light alone, as if everything were white; albedo: the colour alone")
       ->transform(CLI::CheckedTransformer(show_names).description("{product,radiosity,albedo}"));
   auto* brdf = o->brdf.add_to(*c);
-  c->callback([o, c, brdf, spp, &run] {
+  std::vector<CLI::Option*> products = o->products.add_to(*c);
+  products.push_back(c->add_option("--indirect", o->products.indirect, "Files of visibility in blocks: sh adds light that has bounced, by a diffuse bake in harmonics")
+                         ->check(CLI::IsMember({"none", "sh"}))->capture_default_str());
+  c->callback([o, c, brdf, spp, products, &run] {
     o->new_brdf = brdf->count() > 0;
+    for (const CLI::Option* option : products) o->product_options |= option->count() > 0;
     o->view_given = c->count("--camera") > 0 || c->count("--size") > 0 || spp->count() > 0;
     run = [o](Context& context) { return run_render(context, *o); };
   });

@@ -251,6 +251,33 @@ Result<FixedView> read_view(const GltfChunks& chunks, const json& object, size_t
   return view;
 }
 
+Result<Visibility> read_visibility(const GltfChunks& chunks, const MappedFile& file, const json& object, const std::string& where) {
+  Visibility v;
+  auto size = read_count(object, "cube", size_t(max_cube_size), where), bits = read_count(object, "bits", size_t(max_visibility_bits), where),
+       receivers = read_count(object, "receivers", 0xfffffffe, where), data = read_count(object, "bufferView", 0x7fffffff, where),
+       lengths = read_count(object, "lengths", 0x7fffffff, where);
+  for (const auto* count : {&size, &bits, &receivers, &data, &lengths})
+    if (!*count) return count->error();
+  if (!is_cube_size(int(*size))) return Error{where, "\"cube\" must be a multiple of 16 up to " + std::to_string(max_cube_size)};
+  if (*bits < 1) return Error{where, "\"bits\" is 0"};
+  auto records = view_bytes(chunks, *data, where), numbers = view_bytes(chunks, *lengths, where);
+  if (!records) return records.error();
+  if (!numbers) return numbers.error();
+  if (*receivers > numbers->size()) return Error{where, "there are fewer lengths than receivers"};
+  v.size = int(*size), v.bits = int(*bits), v.receivers = *receivers, v.data = *records;
+  v.begin.reserve(*receivers + 1), v.begin.push_back(0);
+  size_t at = 0;
+  for (size_t r = 0; r < *receivers; ++r) {
+    uint64_t length = 0;
+    if (!read_varint(*numbers, at, length) || length > records->size() - v.begin.back()) return Error{where, "the length of receiver " + std::to_string(r) + " is broken"};
+    v.begin.push_back(v.begin.back() + length);
+  }
+  if (at != numbers->size()) return Error{where, "there are more lengths than receivers"};
+  if (auto ok = check_visibility(v, where); !ok) return ok.error();
+  v.storage = std::make_shared<MappedFile>(file);
+  return v;
+}
+
 Result<LatticeTransfer> read_lattice(const GltfChunks& chunks, const MappedFile& file, const json& object, const LightBasis& light, const std::string& where) {
   if (!object.is_object()) return Error{where, "is not an object"};
   LatticeTransfer l;
@@ -553,6 +580,16 @@ Result<void> save_baked(const std::string& path, const Scene& scene, const Recei
   });
 }
 
+Result<void> save_baked(const std::string& path, const Scene& scene, const Receivers& receivers, const Visibility& visibility,
+                        const std::string& provenance) {
+  LAMBENT_CHECK(visibility.receivers == receivers.count());
+  std::vector<uint8_t> lengths;
+  for (size_t r = 0; r < visibility.receivers; ++r) append_varint(lengths, visibility.begin[r + 1] - visibility.begin[r]);
+  return save(path, scene, receivers, visibility.data, {{lengths, 4}}, nullptr, provenance, [&](json& extension, int first) {
+    extension["transfer"] = {{"kind", "blocks"}, {"cube", visibility.size}, {"bits", visibility.bits}, {"receivers", visibility.receivers}, {"lengths", first}};
+  });
+}
+
 Result<Baked> load_baked(const std::string& path) {
   auto file = MappedFile::open(path);
   if (!file) return file.error();
@@ -580,9 +617,9 @@ Result<Baked> load_baked(const MappedFile& file, const std::string& path) {
   if (t == extension.end() || !t->is_object()) return Error{where, "\"transfer\" is missing"};
   auto text = [&](const char* key) { return t->contains(key) && (*t)[key].is_string() ? (*t)[key].get<std::string>() : ""; };
   baked.factors = text("kind") == "factors";
-  const bool is_matrix = text("kind") == "matrix" || baked.factors, is_zonal = text("kind") == "zonal";
-  if (!is_matrix && !is_zonal && text("kind") != "diffuse") return Error{where, "transfer of kind \"" + text("kind") + "\" is not known to this program"};
-  auto light = read_light(*t, where);
+  const bool is_matrix = text("kind") == "matrix" || baked.factors, is_zonal = text("kind") == "zonal", is_blocks = text("kind") == "blocks";
+  if (!is_matrix && !is_zonal && !is_blocks && text("kind") != "diffuse") return Error{where, "transfer of kind \"" + text("kind") + "\" is not known to this program"};
+  auto light = is_blocks ? Result<LightBasis>(LightBasis{}) : read_light(*t, where);
   if (!light) return light.error();
   auto receivers = read_count(*t, "receivers", 0xfffffffe, where);
   if (!receivers) return receivers.error();
@@ -591,7 +628,12 @@ Result<Baked> load_baked(const MappedFile& file, const std::string& path) {
     if (!kind) return Error{where, "directional light \"" + text("directional") + "\" is not known to this program"};
     baked.directional = *kind;
   }
-  if (is_zonal) {
+  if (is_blocks) {
+    if (extension.contains("surface")) return Error{where, "visibility in blocks is baked at vertices"};
+    auto visibility = read_visibility(*chunks, file, *t, where);
+    if (!visibility) return visibility.error();
+    baked.visibility = std::move(*visibility);
+  } else if (is_zonal) {
     auto lobes = read_count(*t, "lobeCount", size_t(max_stored_lobes), where);
     if (!lobes) return lobes.error();
     if (*lobes < 1) return Error{where, "there are no lobes"};
@@ -631,7 +673,7 @@ Result<Baked> load_baked(const MappedFile& file, const std::string& path) {
       baked.outgoing = std::move(*outgoing);
     }
   }
-  if (const auto object = extension.find("lattice"); object != extension.end()) {
+  if (const auto object = extension.find("lattice"); object != extension.end() && !is_blocks) {
     auto lattice = read_lattice(*chunks, file, *object, light_of(baked), where + ": lattice");
     if (!lattice) return lattice.error();
     baked.lattice = std::move(*lattice);
@@ -644,7 +686,7 @@ Result<Baked> load_baked(const MappedFile& file, const std::string& path) {
   const auto provenance = extension.find("provenance");
   baked.provenance = provenance == extension.end() ? "{}" : provenance->dump(-1, ' ', false, json::error_handler_t::replace);
   if (const auto object = extension.find("view"); object != extension.end()) {
-    if (is_zonal || is_matrix || baked.directional != DirectionalKind::none) return Error{where, "a fixed view has one row a pixel"};
+    if (is_zonal || is_matrix || is_blocks || baked.directional != DirectionalKind::none) return Error{where, "a fixed view has one row a pixel"};
     auto view = read_view(*chunks, *object, *receivers, where + ": view");
     if (!view) return view.error();
     baked.view = std::move(*view);
