@@ -242,7 +242,7 @@ int run_product_render(Context& context, const Baked& baked, const ProductFlags&
   if (!tracer) return fail(tracer.error());
   if (flags.indirect == "sh")
     if (auto ok = add_indirect(context, baked, *tracer, *env, *rotation, p); !ok) return fail(ok.error());
-  RenderOptions options{.width = view->width, .height = view->height, .samples = samples, .albedo = false};
+  RenderOptions options{.width = view->width, .height = view->height, .samples = samples, .show = RenderOptions::Show::radiosity};
   Environment turned;
   if (view_options.background == "env") {
     turned = light_options.rotate.empty() ? std::move(*env) : rotated(*env, *rotation);

@@ -50,7 +50,7 @@ Pictures draw(const Scene& scene, const Environment& env, const Reflection& refl
   const std::vector<uint32_t> seen = seen_receivers(scene, receivers.front, receivers.back, receivers.count(), camera, size, size);
   Pictures out;
   out.seen = seen.size(), out.receivers = receivers.count();
-  const RenderOptions options{.width = size, .height = size, .samples = 16, .albedo = false};
+  const RenderOptions options{.width = size, .height = size, .samples = 16, .show = RenderOptions::Show::radiosity};
   Relit relit;
   shade_receivers(Product::blocks, light, nullptr, visibility, products, seen, camera.eye, relit, &out.breakdown);
   out.blocks = *render(scene, *tracer, receivers.basis, relit, camera, options);
