@@ -1,5 +1,6 @@
 #include <lambent/bake/materials.h>
 #include <lambent/core/check.h>
+#include <lambent/core/parallel.h>
 
 #include <map>
 
@@ -45,7 +46,10 @@ Outgoing make_map_outgoing(const ReceiverMaterials& materials, int incident_orde
   Outgoing o;
   o.kind = OutgoingKind::map, o.order = incident_order, o.map_of = materials.of_receiver, o.frames = materials.frames;
   const CosineBasis basis = make_cosine_basis(incident_order);
-  for (const LinearMaterial& m : materials.materials) o.maps.push_back(make_response(m, basis, options.grid, options.response_samples));
+  o.maps.resize(materials.materials.size());
+  parallel_for(o.maps.size(), 1, [&](size_t begin, size_t end) {
+    for (size_t m = begin; m < end; ++m) o.maps[m] = make_response(materials.materials[m], basis, options.grid, options.response_samples);
+  });
   return o;
 }
 

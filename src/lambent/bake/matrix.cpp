@@ -285,11 +285,14 @@ struct MatrixBaker {
 
   void make_responses() {
     ProgressStage stage(progress, "materials", materials.materials.size());
-    for (const LinearMaterial& m : materials.materials) {
-      responses.push_back(make_response(m, basis, matrix.grid, matrix.response_samples));
-      scatter.push_back(factor_response(responses.back(), matrix.scatter_rows, matrix.scatter_error));
-      stage.advance();
-    }
+    responses.resize(materials.materials.size()), scatter.resize(responses.size());
+    parallel_for(responses.size(), 1, [&](size_t begin, size_t end) {
+      for (size_t m = begin; m < end; ++m) {
+        responses[m] = make_response(materials.materials[m], basis, matrix.grid, matrix.response_samples);
+        scatter[m] = factor_response(responses[m], matrix.scatter_rows, matrix.scatter_error);
+        stage.advance();
+      }
+    });
     first_row.assign(1, 0);
     for (size_t r = 0; r < n(); ++r) first_row.push_back(first_row.back() + size_t(scatter[materials.of_receiver[r]].rows));
   }
