@@ -33,9 +33,11 @@ std::optional<Scene> data_scene(const std::string& name, bool ground);
 void bench_bake();
 void bench_basis();
 void bench_lightmaps();
+void bench_products();
 void bench_radiosity();
 void bench_relight();
 void bench_scaling();
+void bench_solvers();
 void bench_zonal();
 
 }  // namespace lambent::bench

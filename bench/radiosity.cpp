@@ -81,7 +81,7 @@ void bench_operator(const std::string& name, Scene scene) {
 }
 
 // A closed room of albedo 0.8 with a small lamp: error against work, for all solvers.
-void bench_solvers() {
+void bench_convergence() {
   Scene scene;
   const uint32_t wall = add_material(scene, "wall", Vec3(0.8f)), lamp = add_material(scene, "lamp", Vec3(0.8f));
   scene.materials[lamp].emissive = Vec3(10);
@@ -144,9 +144,10 @@ void bench_growth() {
 void bench_radiosity() {
   bench_operator("courtyard", make_courtyard());
   if (auto scene = data_scene("zdm2_level.glb", false)) bench_operator("zdm2_level.glb", std::move(*scene));
-  bench_solvers();
 }
 
 void bench_lightmaps() { bench_growth(); }
+
+void bench_solvers() { bench_convergence(); }
 
 }  // namespace lambent::bench

@@ -1,5 +1,6 @@
 // The baked-file reader on hostile bytes: whatever it accepts must be safe to project light onto and to relight.
 #include <lambent/baked/baked_file.h>
+#include <lambent/relight/factors.h>
 #include <lambent/relight/lattice.h>
 #include <lambent/relight/light.h>
 #include <lambent/relight/relight.h>
@@ -20,6 +21,12 @@ extern "C" int LLVMFuzzerTestOneInput(const uint8_t* data, size_t size) {
   if (!file) return 0;
   auto baked = lambent::load_baked(*file, "fuzz.glb");
   if (!baked) return 0;
+  if (baked->visibility) {
+    const lambent::Visibility& v = *baked->visibility;
+    std::vector<uint8_t> levels(lambent::cube_texels(v.size));
+    for (size_t r = 0; r < std::min<size_t>(v.receivers, 64); ++r) lambent::decode_visibility(v, r, levels);
+    return 0;
+  }
   std::vector<lambent::Vec3> light(lambent::light_of(*baked).count(), lambent::Vec3(0.5f));
   if (light.size() <= 24) {  // the dual functions of many take long
     const auto env = lambent::make_environment("fuzz", 64, 32, [](lambent::Vec3 d) { return lambent::Vec3(1, 1 + d.x, 1 + d.y); });
@@ -31,6 +38,8 @@ extern "C" int LLVMFuzzerTestOneInput(const uint8_t* data, size_t size) {
     lambent::ZonalLight table;
     lambent::specialise_light(*baked->zonal, harmonics, table);
     lambent::relight_zonal(*baked->zonal, nullptr, table, relit);
+  } else if (baked->factors) {
+    lambent::relight_factors(baked->transfer, *baked->outgoing, light, relit);
   } else if (baked->cpca) {
     lambent::relight(*baked->cpca, light, relit);
   } else {

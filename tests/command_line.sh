@@ -105,6 +105,21 @@ done
 expect 2 'env: is needed' render lamps.glb -o x.png
 expect 0 'lamps? that stands? out, not 64' bake corner.obj --samples 64 --bounces 0 --light sh:5+lamps:64@$sun -o lamps.glb
 expect 0 'order 3,' bake corner.obj --samples 64 --light sh:3+lamps:4@uniform:1 -o lamps.glb
+# Factors: the pictures of a matrix bake of direct light, in fewer bytes; the material is still free. Phong's lobe by convolution.
+"$tool" bake corner.obj --max-edge 0.5 --samples 64 --transfer matrix --brdf ggx:roughness=0.5 --order 3 --incident-order 3 --bounces 0 -o whole.glb >/dev/null 2>&1
+expect 0 'receivers' bake corner.obj --max-edge 0.5 --samples 64 --transfer matrix --brdf phong:exponent=9 --order 3 --incident-order 3 --factors -o factors.glb
+expect 0 'factors, order 3' inspect factors.glb
+for f in whole factors; do expect 0 'relit' render $f.glb --env sky:elevation=30 --brdf ggx:roughness=0.5 --size 24x18 --background none -o $f.exr; done
+expect 0 'PSNR +([5-9][0-9]|inf)' compare factors.exr whole.exr
+[ "$(stat -c %s factors.glb)" -lt "$(stat -c %s whole.glb)" ] && ok || bad "factors take more bytes than the matrix"
+expect 0 'rows' bake corner.obj --samples 64 --transfer matrix --brdf phong:exponent=5 --outgoing phong --order 3 --incident-order 3 -o phong.glb
+expect 0 'outgoing phong' inspect phong.glb
+expect 0 'relit' render phong.glb --env sky:elevation=30 --size 16x16 -o phong.png
+expect 1 'phong' bake corner.obj --samples 64 --transfer matrix --brdf ggx:roughness=0.5 --outgoing phong --order 3 -o x.glb
+expect 1 'plain transfer' compress factors.glb --cpca 4,3 -o x.glb
+expect 2 'direct light' bake corner.obj --transfer matrix --factors --bounces 2 -o x.glb
+expect 2 'factors' bake corner.obj --factors -o x.glb
+expect 2 'factors' bake corner.obj --transfer matrix --factors --order 12 --incident-order 6 -o x.glb
 # A fixed view is image relighting: the picture that the whole bake makes of that view.
 expect 0 'pixel' bake corner.obj --max-edge 0.5 --samples 64 --order 4 --fix-view 3,2,4,1,0.5,0,40 --size 24x18 --spp 4 -o view.glb
 expect 0 'fixed view of 24 x 18' inspect view.glb
@@ -171,6 +186,16 @@ expect 0 '"psnr"' compare map_lit.exr map_truth.exr --json
 psnr=$(sed -n 's/.*"psnr": \([0-9]*\).*/\1/p' stdout)
 [ "${psnr:-0}" -ge 35 ] && ok || bad "lightmapped and path-traced boxes differ: PSNR ${psnr:-none}"
 expect 0 'relit' render map.glb $view --lamp lamp=0.1,0.2,0 --lamp sky=0,0,1 -o dimmed.exr
+for part in radiosity albedo product; do expect 0 'relit' render map.glb $view --show $part -o map_$part.png; done
+cmp -s map_radiosity.png map_product.png && bad "radiosity and product are the same picture" || ok
+expect 2 'product' render map.glb $view --show colour -o x.png
+expect 0 'lamps' bake box.obj --transfer lightmap --gather hemicube --atlas 64x64 --samples 300 -o cube.glb
+expect 0 'texels' export map.glb --three map_three
+expect 0 'texels' export map.glb --godot map_godot
+expect 0 'lamps' bake box.obj --transfer lightmap --directional sh:2 --atlas 64x64 --samples 64 -o sh2.glb
+expect 0 'sh2_godot.3.exr' export sh2.glb --godot sh2_godot
+expect 0 'sh2_three.3.exr' export sh2.glb --three sh2_three
+for picture in map_three.exr map_godot.exr sh2_godot.0.exr sh2_three.0.exr; do [ -s $picture ] && ok || bad "$picture is missing"; done
 expect 2 'no group' render map.glb $view --lamp chandelier=1,1,1 -o x.png
 expect 0 'applications' bake box.obj --transfer lightmap --atlas 64x48 --samples 64 --bounces converge:1e-3 --solver southwell --direct separate --json -o map2.glb
 for picture in map2.direct.exr map2.indirect.exr; do [ -s $picture ] && ok || bad "$picture is missing"; done
@@ -178,7 +203,9 @@ expect 0 'lamps' bake box.obj --transfer lightmap --receivers patches --samples 
 expect 0 'relit' render patches.glb $view -o patches.exr
 expect 0 'lamps' bake box.obj --transfer lightmap --directional hl2 --atlas 64x64 --samples 64 -o hl2.glb
 expect 0 'relit' render hl2.glb $view -o hl2.exr
+expect 1 'sh:2 or sh:3' export hl2.glb --godot x
 expect 0 'receivers' bake box.obj --receivers texels --atlas 64x64 --order 3 --samples 64 -o prt.glb
+expect 1 'no lamps' export prt.glb --three x
 expect 0 'relit' render prt.glb --env sky:elevation=30 $view -o prt.exr
 for thread_count in 1 2; do "$tool" bake box.obj --transfer lightmap --atlas 64x64 --samples 64 --threads $thread_count -o map_$thread_count.glb >/dev/null 2>&1; done
 cmp -s map_1.glb map_2.glb && ok || bad "1 and 2 threads give different lightmaps"
@@ -303,6 +330,24 @@ printf '6 440 480 520 560 600 640\n0.1 0 0.2 1 1 2 3 nan 5 6\n' >nan.brdf
 expect 1 'nan.brdf:2: a number is not finite' reference corner.obj --env uniform:1 --brdf measured:nan.brdf -o x.png
 head -c 1000 /dev/zero >cut.binary
 expect 1 'cut.binary' reference corner.obj --env uniform:1 --brdf measured:cut.binary -o x.png
+# All-frequency light: visibility in blocks, three roads to one picture.
+expect 0 'mixed' bake corner.obj --max-edge 0.1 --transfer blocks --cube 32 -o blocks.glb
+expect 0 '"cube": 32' inspect blocks.glb --json
+view=(--env sky:elevation=50,azimuth=20,sun=on --camera 3,2,4,1,0.5,1,40 --size 48x32 --background none --brdf phong:exponent=20,diffuse=0.3,specular=0.4)
+for method in blocks standard haar:1; do expect 0 'shaded' render blocks.glb "${view[@]}" --method $method -o ${method/:/_}.exr; done
+for method in blocks haar_1; do
+  expect 0 '"psnr"' compare $method.exr standard.exr --json
+  psnr=$(sed -n 's/.*"psnr": \([0-9]*\).*/\1/p' stdout)
+  [ "${psnr:-1000}" -ge 50 ] && ok || bad "$method and the standard basis differ: PSNR $psnr"
+done
+expect 0 'shaded' render blocks.glb "${view[@]}" --indirect sh -o indirect.png
+expect 0 'frames_per_second' relight blocks.glb --env sky:elevation=50 --turntable --spin-light --frames 3 --json
+expect 1 'lambent bake --transfer blocks' relight corner.glb --env uniform:1
+expect 1 'lambent bake --transfer blocks' render corner.glb --env uniform:1 --method haar -o x.png
+expect 2 '\-\-method' render blocks.glb --env uniform:1 --method wavelets -o x.png
+expect 2 '\-\-visibility' bake corner.obj --transfer blocks --visibility bits:9 -o x.glb
+expect 2 '\-\-cube needs' bake corner.obj --cube 64 -o x.glb
+expect 1 'more than --memory' bake corner.obj --max-edge 0.02 --transfer blocks --memory 1KB -o x.glb
 absent x.glb
 absent x.png
 

@@ -1,10 +1,12 @@
 #include "bake_lightmap.h"
+#include "blocks.h"
 #include "commands.h"
 #include "options.h"
 
 #include <lambent/bake/bake.h>
 #include <lambent/bake/lattice.h>
 #include <lambent/bake/materials.h>
+#include <lambent/bake/unbury.h>
 #include <lambent/baked/baked_file.h>
 #include <lambent/compress/cpca.h>
 #include <lambent/compress/parametric.h>
@@ -33,9 +35,11 @@ struct BakeCommand {
   std::string lattice_points, lattice_box;
   std::string light, transfer = "diffuse", membrane, outgoing = "map", simulate = "recursion", fix_light, fix_view,
               size = "512x512", compress, output, shadows = "on", precision = "half", bounces = "3";
+  bool factors = false;
   int view_samples = 16;  // rays a pixel of a fixed view
   ReceiverFlags receivers;
   LightmapFlags lightmap;
+  BlocksFlags blocks;
   bool order_given = false;
 };
 
@@ -44,10 +48,10 @@ Result<void> parse_outgoing(const std::string& text, MatrixOptions& matrix) {
   const size_t colon = text.find(':');
   const std::string name = text.substr(0, colon);
   const auto kind = std::find(std::begin(outgoing_names), std::end(outgoing_names), name);
-  if (kind == std::end(outgoing_names)) return Error{"--outgoing", "must be map, svd:ROWS, sh:BANDS, hemisphere:BANDS or hsh:BANDS, not \"" + text + "\""};
+  if (kind == std::end(outgoing_names)) return Error{"--outgoing", "must be map, phong, svd:ROWS, sh:BANDS, hemisphere:BANDS or hsh:BANDS, not \"" + text + "\""};
   matrix.outgoing = OutgoingKind(kind - std::begin(outgoing_names));
   if (colon == std::string::npos) return {};
-  if (matrix.outgoing == OutgoingKind::map) return Error{"--outgoing", "map takes no number: --incident-order says how many rows it has"};
+  if (matrix.outgoing == OutgoingKind::map || matrix.outgoing == OutgoingKind::phong) return Error{"--outgoing", name + " takes no number: --incident-order says how many rows it has"};
   auto number = parse_numbers(text.substr(colon + 1), 1, "--outgoing");
   if (!number) return number.error();
   const float n = (*number)[0];
@@ -155,6 +159,7 @@ using Clock = std::chrono::steady_clock;
 double seconds_since(Clock::time_point start) { return std::chrono::duration<double>(Clock::now() - start).count(); }
 
 int run_bake(Context& context, BakeCommand o) {
+  if (o.transfer == "blocks") return run_blocks_bake(context, o.scene, o.blocks, o.bake.memory, o.output);
   auto bounces = parse_bounces(o.bounces);
   if (!bounces) return fail(bounces.error());
   if (o.transfer == "lightmap") {
@@ -181,6 +186,11 @@ int run_bake(Context& context, BakeCommand o) {
   if (!reflection) return fail(reflection.error());
   if (o.light.empty()) o.light = "sh:" + std::to_string(o.bake.order);
   if (auto ok = parse_light(o.light, o.bake); !ok) return fail(ok.error());
+  if (o.factors) {
+    if (!o.bake.lobes.empty()) return fail({"--light", "--factors multiplies harmonics: leave lobes out"});
+    if (o.bake.order + o.matrix.incident_order - 1 > max_sh_order)
+      return fail({"--factors", "needs the bands of the light and of incident light, less one, and " + std::to_string(max_sh_order) + " is all there are"});
+  }
   if (is_matrix && o.bake.order == 0) return fail({"--light", "directional light cannot be baked with --transfer matrix"});
   if (!o.bake.lobes.empty() && !o.lattice_points.empty()) return fail({"--light", "lobes do not light free space: leave --lattice out"});
   if (!o.bake.lobes.empty() && o.matrix.simulate_paths && o.bake.bounces > 0)
@@ -205,7 +215,7 @@ int run_bake(Context& context, BakeCommand o) {
   }
   auto placed = place_receivers(*scene, o.receivers, "vertices");
   if (!placed) return fail(placed.error());
-  const Receivers& receivers = placed->receivers;
+  Receivers& receivers = placed->receivers;
   const bool at_vertices = std::holds_alternative<CornerReceivers>(receivers.basis);
   if (!o.lattice_points.empty() && !at_vertices) return fail({"--receivers", "--lattice needs a bake at vertices"});
   if ((is_matrix || is_zonal) && !at_vertices)
@@ -225,11 +235,19 @@ int run_bake(Context& context, BakeCommand o) {
   auto tracer = Tracer::build(*scene);
   if (!tracer) return fail(tracer.error());
   const double build_seconds = seconds_since(start);
+  if (placed->atlas) move_buried_texels(*scene, *tracer, *placed->atlas, receivers);
 
   BakeReport report;
   std::optional<Outgoing> outgoing;
   Result<Transfer> transfer = Error{};
-  if (is_matrix) {
+  if (o.factors) {
+    // Visibility times cosine is diffuse transfer of direct light, of as many bands as make the product with light exact.
+    BakeOptions visibility = o.bake;
+    visibility.order = o.bake.order + o.matrix.incident_order - 1, visibility.bounces = 0;
+    transfer = bake(*scene, *tracer, receivers, visibility, &report, &context.progress);
+    if (!transfer) return fail(transfer.error());
+    outgoing = make_map_outgoing(make_receiver_materials(*scene, receivers, *reflection), o.matrix.incident_order, o.matrix);
+  } else if (is_matrix) {
     auto baked = bake_matrix(*scene, *tracer, receivers, make_receiver_materials(*scene, receivers, *reflection), o.bake, o.matrix, &report,
                              &context.progress);
     if (!baked) return fail(baked.error());
@@ -276,7 +294,7 @@ int run_bake(Context& context, BakeCommand o) {
         {"ground", o.scene.ground}, {"max_edge", o.scene.max_edge}, {"seed", o.bake.seed}, {"precision", o.precision}}},
       {"report", {{"receivers", report.receivers}, {"buried", report.buried}}}};
   if (is_matrix)
-    provenance["options"].update({{"brdf", o.brdf.brdf}, {"outgoing", o.outgoing}, {"incident_order", o.matrix.incident_order}, {"simulate", o.simulate}});
+    provenance["options"].update({{"brdf", o.brdf.brdf}, {"outgoing", o.outgoing}, {"incident_order", o.matrix.incident_order}, {"simulate", o.simulate}, {"factors", o.factors}});
   if (!o.fix_light.empty()) provenance["options"]["fix_light"] = o.fix_light;
   if (view) provenance["options"].update({{"fix_view", o.fix_view}, {"size", o.size}});
   if (free_space) {
@@ -309,7 +327,8 @@ int run_bake(Context& context, BakeCommand o) {
 
   start = Clock::now();
   const std::string origin = provenance.dump(-1, ' ', false, nlohmann::json::error_handler_t::replace);
-  const BakedExtras extras{.outgoing = outgoing ? &*outgoing : nullptr, .lattice = free_space ? &*free_space : nullptr, .view = view ? &*view : nullptr};
+  const BakedExtras extras{.outgoing = outgoing ? &*outgoing : nullptr, .lattice = free_space ? &*free_space : nullptr,
+                           .factors = o.factors, .view = view ? &*view : nullptr};
   const Receivers of_surfaces = view ? Receivers{} : receivers;
   if (auto ok = zonal      ? save_baked(o.output, *scene, receivers, *zonal, origin)
                 : clusters ? save_baked(o.output, *scene, receivers, *clusters, origin, extras)
@@ -379,18 +398,20 @@ void add_bake(CLI::App& app, Run& run) {
   o->scene.add_to(*c);
   c->add_option("-o,--output", o->output, "Baked file to write (.glb)")->required();
   c->add_option("--transfer", o->transfer, "What is stored: diffuse, a vector a receiver for distant light; matrix, incident light in every direction, "
-                                           "for glossy materials; zonal, lobes, for what moves; lightmap, the light of the scene's own lamps")
-      ->check(CLI::IsMember({"diffuse", "matrix", "zonal", "lightmap"}))->capture_default_str();
+                                           "for glossy materials; zonal, lobes, for what moves; lightmap, the light of the scene's own lamps; "
+                                           "blocks, visibility for sharp shadows and highlights, with materials chosen when it is drawn")
+      ->check(CLI::IsMember({"diffuse", "matrix", "zonal", "lightmap", "blocks"}))->capture_default_str();
   auto* order = c->add_option("--order", o->bake.order, "Bands of the lighting's spherical harmonics")->check(CLI::Range(1, max_sh_order))->capture_default_str();
   auto* light = c->add_option("--light", o->light, std::string("What light is made of, in place of --order: ") + light_syntax);
   auto* lobes = c->add_option("--lobes", o->zonal.lobes, "zonal: lobes a receiver")->check(CLI::Range(1, max_stored_lobes))->capture_default_str();
   auto* incident = c->add_option("--incident-order", o->matrix.incident_order, "matrix: bands of incident light")
                        ->check(CLI::Range(1, max_incident_order))->capture_default_str();
-  auto* last = c->add_option("--outgoing", o->outgoing, "matrix: rows for the last reflection: map, svd:ROWS, sh:BANDS, hemisphere:BANDS, hsh:BANDS")
+  auto* last = c->add_option("--outgoing", o->outgoing, "matrix: rows for the last reflection: map, phong, svd:ROWS, sh:BANDS, hemisphere:BANDS, hsh:BANDS")
                    ->capture_default_str();
   auto* membrane = c->add_option("--membrane", o->membrane, "No simulation: thin sheets that let this share of the light through, 0 to 1, or a picture of it");
   auto* simulate = c->add_option("--simulate", o->simulate, "matrix: bounces by the recursion over receivers, or by paths (caustics, coarse meshes; noisier)")
                        ->check(CLI::IsMember({"recursion", "paths"}))->capture_default_str();
+  auto* factors = c->add_flag("--factors", o->factors, "matrix: keep visibility, light and BRDF as factors; direct light alone, a tenth of the size");
   o->brdf.brdf = "materials";
   auto* brdf = o->brdf.add_to(*c);
   auto* fixed = c->add_option("--fix-light", o->fix_light, "Bake this environment in, so that only its brightness is left: a surface light field");
@@ -408,11 +429,12 @@ void add_bake(CLI::App& app, Run& run) {
   c->add_option("--precision", o->precision, "Of the stored transfer")->check(CLI::IsMember({"half", "single"}))->capture_default_str();
   o->receivers.add_to(*c);
   o->lightmap.add_to(*c);
+  const std::vector<CLI::Option*> blocks = o->blocks.add_to(*c);
   auto* points = c->add_option("--lattice", o->lattice_points, "NX,NY,NZ: also bake light in free space at so many points, for `render --insert`");
   auto* box = c->add_option("--lattice-box", o->lattice_box, "X0,Y0,Z0,X1,Y1,Z1: where, if not throughout the scene's box");
   auto* lattice_order = c->add_option("--lattice-order", o->lattice.order, "Bands of the light that arrives there")
                             ->check(CLI::Range(1, max_sh_order))->capture_default_str();
-  c->callback([o, bounces, order, light, lobes, membrane, fixed, view, compress, incident, last, brdf, simulate, points, box, lattice_order, &run] {
+  c->callback([o, bounces, order, light, lobes, membrane, fixed, view, compress, factors, incident, last, brdf, simulate, points, box, lattice_order, blocks, &run] {
     o->order_given = order->count() > 0;
     if (order->count() && light->count()) throw CLI::ValidationError("--order and --light both say how many bands there are: give one");
     if (light->count() && (membrane->count() || (o->transfer != "diffuse" && o->transfer != "matrix")))
@@ -427,8 +449,21 @@ void add_bake(CLI::App& app, Run& run) {
     if (view->count() && compress->count()) throw CLI::ValidationError("--compress makes clusters of receivers on surfaces, and --fix-view has pixels: give one");
     if (view->count() && points->count()) throw CLI::ValidationError("--fix-view leaves no room for what --lattice would light: give one");
     if (lobes->count() && o->transfer != "zonal") throw CLI::ValidationError("--lobes needs --transfer zonal");
-    for (const CLI::Option* option : {incident, last, brdf, simulate})
+    if (factors->count()) {
+      if (bounces->count() && o->bounces != "0") throw CLI::ValidationError("--factors is direct light: leave --bounces out, or set it to 0");
+      if (o->outgoing != "map") throw CLI::ValidationError("--factors keeps incident light: leave --outgoing out, or set it to map");
+      for (const CLI::Option* option : {fixed, view, compress, points, simulate})
+        if (option->count()) throw CLI::ValidationError("--factors does not go with " + option->get_name());
+      o->bounces = "0";
+    }
+    for (const CLI::Option* option : {factors, incident, last, brdf, simulate})
       if (option->count() && o->transfer != "matrix") throw CLI::ValidationError(option->get_name() + " needs --transfer matrix");
+    for (const CLI::Option* option : blocks)
+      if (option->count() && o->transfer != "blocks") throw CLI::ValidationError(option->get_name() + " needs --transfer blocks");
+    for (const CLI::Option* option : {order, light, membrane, fixed, view, compress, points, bounces})
+      if (option->count() && o->transfer == "blocks") throw CLI::ValidationError(option->get_name() + " is not for --transfer blocks: it stores what is seen, and no light");
+    if (o->transfer == "blocks" && (o->shadows == "off" || (!o->receivers.kind.empty() && o->receivers.kind != "vertices")))
+      throw CLI::ValidationError("--transfer blocks is baked at vertices, with shadows");
     if (o->transfer == "matrix" && o->shadows == "off") throw CLI::ValidationError("--transfer matrix is always baked with shadows");
     for (const CLI::Option* option : {box, lattice_order})
       if (option->count() && !points->count()) throw CLI::ValidationError(option->get_name() + " needs --lattice");

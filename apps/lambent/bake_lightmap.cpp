@@ -1,5 +1,6 @@
 #include "bake_lightmap.h"
 
+#include <lambent/bake/unbury.h>
 #include <lambent/baked/baked_file.h>
 #include <lambent/render/lightmap_picture.h>
 
@@ -36,12 +37,13 @@ std::vector<Vec3> only_group(const LightBasis& light, size_t group) {
 // What leaves every texel, fit for eight bits: values beyond the brightest thousandth are clamped to it.
 Result<ViewerLook> make_look(const Scene& scene, const Receivers& receivers, DirectionalKind kind, const Relit& relit, const std::string& path) {
   std::vector<Vec3> radiance = texel_albedo(scene, receivers);
+  const std::vector<Vec3> glow = texel_emission(scene, receivers);
   std::vector<float> brightness(radiance.size());
   for (size_t r = 0; r < radiance.size(); ++r) {
     std::array<Vec3, 9> rows{};
     for (int row = 0; row < relit.rows; ++row) rows[size_t(row)] = relit.at(r, row);
     const Vec3 n = receivers.normals[r], white = evaluate_directional_light(kind, rows, receiver_frame(n), n);
-    radiance[r] = glm::max(radiance[r] * white, Vec3(0));
+    radiance[r] = glm::max(radiance[r] * white, Vec3(0)) + glow[r];
     brightness[r] = std::max({radiance[r].x, radiance[r].y, radiance[r].z});
   }
   ViewerLook look;
@@ -99,6 +101,8 @@ void LightmapFlags::add_to(CLI::App& command) {
       ->check(CLI::IsMember({"none", "sh:2", "sh:3", "hl2", "vector"}))->capture_default_str();
   command.add_option("--solver", solver, "Lightmaps, with --bounces converge:EPS: jacobi, gauss-seidel, southwell or gmres")
       ->check(CLI::IsMember(solver_names))->capture_default_str();
+  command.add_option("--gather", gather, "Lightmaps: bounces by cosine-distributed rays, or through a hemicube's pixels, 3 n^2 as near to --samples as can be")
+      ->check(CLI::IsMember({"rays", "hemicube"}))->capture_default_str();
   command.add_option("--sky", sky, "Lightmaps: an environment (as --env of render) as one more lamp, named sky");
   command.add_flag("--light-groups", groups, "Lightmaps: a column for each material that glows, each lamp by name, and the sky");
   command.add_option("--lamp-samples", lamp_samples, "Lightmaps: samples a receiver towards each group's lamps")->check(CLI::Range(1, 1 << 16))->capture_default_str();
@@ -135,17 +139,19 @@ int run_lightmap(Context& context, LightmapBake o) {
   const Lamps lamps = make_lamps(*scene, sky ? &*sky : nullptr, o.flags.groups);
   auto placed = place_receivers(*scene, o.receivers, "texels");
   if (!placed) return fail(placed.error());
-  const Receivers& receivers = placed->receivers;
+  Receivers& receivers = placed->receivers;
   const double load_seconds = seconds_since(start);
   start = Clock::now();
   auto tracer = Tracer::build(*scene);
   if (!tracer) return fail(tracer.error());
   const double build_seconds = seconds_since(start);
+  const size_t moved = placed->atlas ? move_buried_texels(*scene, *tracer, *placed->atlas, receivers) : 0;
 
   if (o.flags.directional != "none" && o.flags.direct == "separate")
     return fail({"--direct", "separate goes with --directional none"});
   o.options.solver = solver_names.at(o.flags.solver), o.options.lamp_samples = o.flags.lamp_samples;
   o.options.directional = *directional_kind(o.flags.directional);
+  o.options.gather = o.flags.gather == "hemicube" ? GatherKind::hemicube : GatherKind::rays;
   o.options.precision = o.precision == "half" ? Precision::half : Precision::single;
   LightmapReport report;
   // Splitting changed vertex numbers, not triangles: the lamps still fit.
@@ -186,14 +192,14 @@ int run_lightmap(Context& context, LightmapBake o) {
       {"generator", "lambent " LAMBENT_VERSION},
       {"input", {{"name", scene->path.substr(scene->path.find_last_of('/') + 1)}, {"xxh3_128", scene->hash}}},
       {"options", {{"transfer", "lightmap"}, {"order", o.options.order}, {"samples", o.options.samples}, {"lamp_samples", o.options.lamp_samples},
-                   {"bounces", o.options.bounces}, {"converge", o.options.converge}, {"directional", o.flags.directional}, {"sky", o.flags.sky}, {"emit", o.scene.emit},
+                   {"bounces", o.options.bounces}, {"converge", o.options.converge}, {"directional", o.flags.directional}, {"gather", o.flags.gather}, {"sky", o.flags.sky}, {"emit", o.scene.emit},
                    {"max_albedo", o.scene.max_albedo}, {"ground", o.scene.ground}, {"max_edge", o.scene.max_edge}, {"seed", o.options.seed}}},
-      {"report", {{"receivers", report.receivers}, {"buried", report.buried}}}};
+      {"report", {{"receivers", report.receivers}, {"moved", moved}, {"buried", report.buried}}}};
   if (auto ok = save_baked(o.output, *scene, receivers, map->all, provenance.dump(), {.directional = o.options.directional, .look = look ? &*look : nullptr}); !ok) return fail(ok.error());
   const double save_seconds = seconds_since(start);
 
   if (context.json) {
-    nlohmann::json result{{"output", o.output}, {"pictures", pictures}, {"receivers", report.receivers}, {"buried", report.buried},
+    nlohmann::json result{{"output", o.output}, {"pictures", pictures}, {"receivers", report.receivers}, {"moved", moved}, {"buried", report.buried},
                           {"groups", light.groups}, {"rays", report.rays},
                           {"seconds", {{"load", load_seconds}, {"build", build_seconds}, {"trace", report.trace_seconds},
                                        {"bounce", report.bounce_seconds}, {"save", save_seconds}}},
@@ -210,7 +216,7 @@ int run_lightmap(Context& context, LightmapBake o) {
   if (placed->atlas)
     fmt::print("  atlas      {}x{}, {} charts, {:.3g} texels a unit\n", placed->atlas->width, placed->atlas->height, human_count(placed->atlas->charts),
                placed->atlas->texels_per_unit);
-  fmt::print("  receivers  {}{}\n", human_count(report.receivers), report.buried ? "; " + human_count(report.buried) + " buried, filled from neighbours" : "");
+  fmt::print("  receivers  {}{}{}\n", human_count(report.receivers), moved ? "; " + human_count(moved) + " moved out of geometry" : "", report.buried ? "; " + human_count(report.buried) + " buried, filled from neighbours" : "");
   fmt::print("  lamps      {}\n", light.groups.empty() ? "none; harmonics of order " + std::to_string(light.order) : fmt::format("{}", fmt::join(light.groups, ", ")));
   fmt::print("  rays       {} ({:.1f} million a second)\n", human_count(report.rays), double(report.rays) / std::max(report.trace_seconds, 1e-9) / 1e6);
   fmt::print("  time       load {}, build {}, trace {}, bounce {}, save {}\n", human_seconds(load_seconds), human_seconds(build_seconds),

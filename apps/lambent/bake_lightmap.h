@@ -22,7 +22,7 @@ struct PlacedReceivers {
 Result<PlacedReceivers> place_receivers(Scene& scene, const ReceiverFlags& flags, const std::string& default_kind);
 
 struct LightmapFlags {
-  std::string direct = "included", solver = "gmres", sky, directional = "none";
+  std::string direct = "included", solver = "gmres", sky, directional = "none", gather = "rays";
   bool groups = false;
   int lamp_samples = 32;
   void add_to(CLI::App& command);

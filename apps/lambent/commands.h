@@ -11,6 +11,7 @@ namespace lambent::tool {
 using Run = std::function<int(Context&)>;
 void add_bake(CLI::App& app, Run& run);
 void add_render(CLI::App& app, Run& run);
+void add_relight(CLI::App& app, Run& run);
 void add_reference(CLI::App& app, Run& run);
 void add_compare(CLI::App& app, Run& run);
 void add_compress(CLI::App& app, Run& run);

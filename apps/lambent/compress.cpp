@@ -35,7 +35,7 @@ Result<Image> paint_errors(const Baked& baked, const std::vector<float>& errors,
     for (size_t c = 0; c < 3; ++c) relit.values[(r / transfer_block * 3 + c) * transfer_block + r % transfer_block] = colour[int(c)];
   }
   RenderOptions options;
-  options.width = view->width, options.height = view->height, options.albedo = false;
+  options.width = view->width, options.height = view->height, options.show = RenderOptions::Show::radiosity;
   auto image = render(baked.scene, *tracer, corner_receivers(baked.scene, baked.front, baked.back), relit, view->camera, options, progress);
   if (!image) return image;
   image->alpha.clear();
@@ -46,7 +46,7 @@ Result<Image> paint_errors(const Baked& baked, const std::vector<float>& errors,
 int compress_to_clusters(Context& context, const CompressCommand& o, const Baked& baked) {
   CpcaOptions options;
   if (auto ok = parse_cpca("cpca:" + o.cpca, options); !ok) return fail({"--cpca", ok.error().message});
-  if (baked.zonal || baked.cpca || baked.view) return fail({o.baked, "holds no plain transfer at receivers on surfaces, which is what clusters are made of"});
+  if (baked.zonal || baked.cpca || baked.view || baked.factors) return fail({o.baked, "holds no plain transfer at receivers on surfaces, which is what clusters are made of"});
   double error = 0;
   const auto start = std::chrono::steady_clock::now();
   auto clusters = compress_cpca(baked.transfer, options, &error, &context.progress);
@@ -78,6 +78,7 @@ int run_compress(Context& context, CompressCommand o) {
   o.zonal.precision = o.precision == "half" ? Precision::half : Precision::single;
   auto baked = load_baked(o.baked);
   if (!baked) return fail(baked.error());
+  if (baked->visibility) return fail({o.baked, "holds no transfer to compress, but visibility in blocks"});
   if (!o.cpca.empty()) return compress_to_clusters(context, o, *baked);
   if (baked->zonal || baked->outgoing || baked->cpca || baked->view) return fail({o.baked, "holds no diffuse transfer of spherical harmonics, which is what lobes are fitted to"});
   ZonalFitReport report;

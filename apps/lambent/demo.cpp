@@ -93,7 +93,7 @@ int run_demo(Context& context, const DemoCommand& o) {
     Row row{hour.name, {}, {}, 0, 1e3 * seconds_since(start), 0};
 
     const Environment smooth = reconstruct_environment(light);
-    const RenderOptions view{o.width, o.height, 64, nullptr, true};
+    const RenderOptions view{o.width, o.height, 64};
     auto picture = render(scene, *tracer, corners, relit, camera, view, &context.progress);
     if (!picture) return fail(picture.error());
     ReferenceOptions truth;
@@ -110,7 +110,7 @@ int run_demo(Context& context, const DemoCommand& o) {
     row.order6 = *d6, row.sky = *dsky;
 
     // The pictures to look at have the sky behind them.
-    RenderOptions shown{o.width * 3 / 2, o.height * 3 / 2, 32, &*env, true};
+    RenderOptions shown{o.width * 3 / 2, o.height * 3 / 2, 32, &*env};
     auto pretty = render(scene, *tracer, corners, relit, camera, shown, &context.progress);
     if (!pretty) return fail(pretty.error());
     relit_pictures.push_back(*pretty);

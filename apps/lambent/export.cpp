@@ -1,4 +1,5 @@
 #include "commands.h"
+#include "export_lightmap.h"
 #include "web.h"
 
 #include <fmt/format.h>
@@ -13,7 +14,7 @@ namespace fs = std::filesystem;
 
 struct ExportCommand {
   WebOptions web;
-  std::string folder;
+  std::string folder, three, godot;
 };
 
 // The folder of an earlier export, or nothing: all else is somebody's work.
@@ -58,6 +59,8 @@ Result<void> write_folder(const fs::path& target, const WebFiles& files, const P
 }
 
 int run_export(Context& context, const ExportCommand& o) {
+  if (!o.three.empty()) return export_lightmap(context, o.web.baked, LightmapTarget::three, o.three);
+  if (!o.godot.empty()) return export_lightmap(context, o.web.baked, LightmapTarget::godot, o.godot);
   fs::path target = fs::path(o.folder).lexically_normal();
   if (!target.has_filename()) target = target.parent_path();  // "site/"
   if (auto ok = check_target(target); !ok) return fail(ok.error());
@@ -77,7 +80,11 @@ void add_export(CLI::App& app, Run& run) {
   auto o = std::make_shared<ExportCommand>();
   CLI::App* c = app.add_subcommand("export", "Write a baked file in another form");
   o->web.add_to(*c);
-  c->add_option("--web", o->folder, "Folder to write: the page that `view` serves, with its data, for any web server")->required();
+  CLI::Option_group* target = c->add_option_group("Target");
+  target->add_option("--web", o->folder, "Folder to write: the page that `view` serves, with its data, for any web server");
+  target->add_option("--three", o->three, "PREFIX of pictures for three.js: a lightmap's irradiance, or LightProbe coefficients a texel");
+  target->add_option("--godot", o->godot, "PREFIX of pictures for Godot: the layers of a directional lightmap, from sh:2 or sh:3");
+  target->require_option(1);
   c->callback([o, &run] { run = [o](Context& context) { return run_export(context, *o); }; });
 }
 

@@ -77,20 +77,37 @@ int inspect_zonal(Context& context, const std::string& path, const Baked& baked)
   return success;
 }
 
+int inspect_visibility(Context& context, const std::string& path, const Baked& baked) {
+  const Visibility& v = *baked.visibility;
+  const VisibilityStatistics s = visibility_statistics(v);
+  const nlohmann::json d{{"file", path}, {"kind", "baked"}, {"scene", describe_scene(baked.scene)},
+                         {"transfer", {{"kind", "blocks"}, {"cube", v.size}, {"bits", v.bits}, {"receivers", v.receivers}, {"bytes", v.data.size()},
+                                       {"blocked", s.blocked}, {"clear", s.clear}, {"mixed", s.mixed}, {"changes_per_mixed_block", s.changes}}},
+                         {"provenance", nlohmann::json::parse(baked.provenance, nullptr, false)}};
+  if (context.json) return print_json(d), success;
+  fmt::print("{}\n  baked: visibility in blocks, cube {}, {} bit{}, {} receivers, {}; {:.1f} % of blocks mixed, with {:.1f} changes each\n", path, v.size, v.bits,
+             v.bits == 1 ? "" : "s", human_count(v.receivers), human_bytes(double(v.data.size())), 100 * s.mixed, s.changes);
+  print_scene(d["scene"]);
+  fmt::print("  provenance {}\n", d["provenance"].dump(-1, ' ', false, nlohmann::json::error_handler_t::replace));
+  return success;
+}
+
 int run_inspect(Context& context, const std::string& path) {
   const std::string extension = file_extension(path);
   if (std::set<std::string>{"hdr", "exr", "png", "jpg", "jpeg"}.contains(extension)) return inspect_picture(context, path);
   if ((extension == "glb" || extension == "gltf") && is_baked(path)) {
     auto baked = load_baked(path);
     if (!baked) return fail(baked.error());
+    if (baked->visibility) return inspect_visibility(context, path, *baked);
     if (baked->zonal) return inspect_zonal(context, path, *baked);
     Transfer t = baked->transfer;
+    t.light = light_of(*baked);
     if (baked->cpca) t.light = baked->cpca->light, t.rows = baked->cpca->rows, t.channels = baked->cpca->channels, t.receivers = baked->cpca->receivers;
-    const size_t bytes = baked->cpca ? baked->cpca->bytes() : t.bytes();
+    const size_t bytes = baked->cpca ? baked->cpca->bytes() : baked->transfer.bytes();
     nlohmann::json lobes = nlohmann::json::array();
     for (const Lobe& l : t.light.lobes) lobes.push_back({{"axis", vector_json(l.axis)}, {"sharpness", l.sharpness}});
     nlohmann::json d{{"file", path}, {"kind", "baked"}, {"scene", describe_scene(baked->scene)},
-                     {"transfer", {{"kind", baked->outgoing ? "matrix" : "diffuse"}, {"order", t.light.order}, {"lobes", lobes}, {"groups", t.light.groups},
+                     {"transfer", {{"kind", baked->factors ? "factors" : baked->outgoing ? "matrix" : "diffuse"}, {"order", t.light.order}, {"lobes", lobes}, {"groups", t.light.groups},
                                    {"columns", t.columns()}, {"rows", t.rows}, {"channels", t.channels}, {"receivers", t.receivers}, {"bytes", bytes},
                                    {"precision", t.precision == Precision::half ? "half" : "single"}}},
                      {"provenance", nlohmann::json::parse(baked->provenance, nullptr, false)}};
@@ -108,7 +125,7 @@ int run_inspect(Context& context, const std::string& path) {
       print_json(d);
     } else {
       fmt::print("{}\n  baked: {}, {}, {} column{}, {} row{}, {} channel{}, {} receivers, {} ({})\n", path,
-                 baked->outgoing ? std::string("matrix, outgoing ") + outgoing_names[int(baked->outgoing->kind)] : "diffuse", describe_light(t.light),
+                 baked->factors ? "factors" : baked->outgoing ? std::string("matrix, outgoing ") + outgoing_names[int(baked->outgoing->kind)] : "diffuse", describe_light(t.light),
                  t.columns(), t.columns() == 1 ? "" : "s", t.rows, t.rows == 1 ? "" : "s", t.channels, t.channels == 1 ? "" : "s",
                  human_count(t.receivers), human_bytes(double(bytes)), t.precision == Precision::half ? "half" : "single");
       if (baked->cpca) fmt::print("  in {} clusters of rank {}\n", baked->cpca->clusters, baked->cpca->rank);

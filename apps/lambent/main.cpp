@@ -20,6 +20,7 @@ int main(int argc, char** argv) {
   tool::Run run;
   tool::add_bake(app, run);
   tool::add_render(app, run);
+  tool::add_relight(app, run);
   tool::add_reference(app, run);
   tool::add_compare(app, run);
   tool::add_compress(app, run);

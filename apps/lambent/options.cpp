@@ -62,7 +62,7 @@ Result<void> change_materials(Scene& scene, const SceneOptions& options) {
     if (!lamp) return lamp.error();
     bool found = false;
     for (Material& m : scene.materials)
-      if (m.name == lamp->name) m.emissive = lamp->color, found = true;
+      if (m.name == lamp->name) m.emissive = lamp->color, m.emissive_texture = -1, found = true;
     if (!found) return Error{"--emit", "the scene has no material \"" + lamp->name + "\""};
   }
   for (Material& m : scene.materials) m.base_color = glm::min(m.base_color, Vec3(options.max_albedo));

@@ -23,6 +23,7 @@ struct ReferenceCommand {
   ShWindow window = ShWindow::none;
   int light_order = 0;
   std::string light_basis;
+  bool normal_maps = true;
   ReferenceOptions options;
 };
 
@@ -32,11 +33,12 @@ int run_reference(Context& context, ReferenceCommand o) {
   if (!rotation) return fail(rotation.error());
   auto reflection = load_reflection(o.brdf);
   if (!reflection) return fail(reflection.error());
-  o.options.reflection = std::move(*reflection);
+  o.options.reflection = std::move(*reflection), o.options.reflection.normal_maps = o.normal_maps;
   LightBasis basis{.order = o.light_order};
   if (!o.light_basis.empty()) {
     auto baked = load_baked(o.light_basis);
     if (!baked) return fail(baked.error());
+    if (baked->visibility) return fail({o.light_basis, "holds no light basis: it takes all of any environment"});
     basis = baked->zonal ? LightBasis{.order = baked->zonal->order} : baked->transfer.light;
   }
   auto scene = load_prepared_scene(o.scene);
@@ -87,6 +89,7 @@ void add_reference(CLI::App& app, Run& run) {
   c->add_option("--window", o->window, "With --light-order or --light-basis: as for render")
       ->transform(CLI::CheckedTransformer(window_names).description("{none,hann,lanczos,auto}"));
   c->add_flag("--lamps", o->options.lamps, "The scene's own lamps give light too: emissive materials and punctual lights");
+  c->add_flag("!--no-normal-maps", o->normal_maps, "Leave materials' normal textures out");
   c->add_option("--bounces", o->options.bounces, "Reflections between surfaces")->check(CLI::Range(0, 64))->capture_default_str();
   c->add_option("--spp", o->options.spp, "Paths a pixel")->check(CLI::Range(1, 1 << 20))->capture_default_str();
   c->add_option("--seed", o->options.seed, "Of the paths")->capture_default_str();

@@ -1,3 +1,4 @@
+#include "blocks.h"
 #include "commands.h"
 #include "motion.h"
 #include "options.h"
@@ -6,6 +7,7 @@
 #include <lambent/bake/materials.h>
 #include <lambent/baked/baked_file.h>
 #include <lambent/light/project.h>
+#include <lambent/relight/factors.h>
 #include <lambent/relight/light.h>
 #include <lambent/relight/relight.h>
 #include <lambent/relight/zonal.h>
@@ -24,16 +26,20 @@
 namespace lambent::tool {
 namespace {
 
+const std::map<std::string, RenderOptions::Show> show_names{
+    {"product", RenderOptions::Show::product}, {"radiosity", RenderOptions::Show::radiosity}, {"albedo", RenderOptions::Show::albedo}};
+
 struct RenderCommand {
   std::string baked, texture, tile = "1,1";
   LightOptions light;
   ViewOptions view;
   MotionOptions motion;
   BrdfOptions brdf;
-  bool new_brdf = false, view_given = false;
+  bool new_brdf = false, view_given = false, product_options = false;
+  ProductFlags products;
   ShWindow window = ShWindow::none;
   int light_order = 0, samples = 16;
-  bool no_albedo = false;
+  RenderOptions::Show show = RenderOptions::Show::product;
   std::vector<std::string> lamps;  // NAME=R,G,B
   std::vector<std::string> insert;
 };
@@ -70,7 +76,7 @@ int run_textured(Context& context, const RenderCommand& o) {
     if (!view) return fail(view.error());
     auto tracer = Tracer::build(moved);
     if (!tracer) return fail(tracer.error());
-    RenderOptions options{view->width, view->height, o.samples, nullptr, !o.no_albedo};
+    RenderOptions options{view->width, view->height, o.samples, nullptr, o.show};
     if (o.view.background == "env") options.background = &turned;
     auto image = render_transfer_texture(moved, *tracer, *texture, {(*tile)[0], (*tile)[1]}, light, view->camera, options, &context.progress);
     if (!image) return fail(image.error());
@@ -91,11 +97,9 @@ Result<void> change_materials(Baked& baked, const BrdfOptions& options, const st
   Receivers receivers;
   receivers.origins.resize(receivers_of(baked)), receivers.front = baked.front, receivers.back = baked.back;
   for (const Mat3& frame : baked.outgoing->frames) receivers.normals.push_back(frame[2]);
-  const ReceiverMaterials materials = make_receiver_materials(baked.scene, receivers, *reflection);
-  const CosineBasis basis = make_cosine_basis(baked.outgoing->order);
-  baked.outgoing->maps.clear();
-  for (const LinearMaterial& m : materials.materials) baked.outgoing->maps.push_back(make_response(m, basis, MatrixOptions{}.grid, MatrixOptions{}.response_samples));
-  baked.outgoing->map_of = materials.of_receiver;
+  Outgoing changed = make_map_outgoing(make_receiver_materials(baked.scene, receivers, *reflection), baked.outgoing->order);
+  changed.frames = std::move(baked.outgoing->frames);
+  baked.outgoing = std::move(changed);
   return {};
 }
 
@@ -148,6 +152,11 @@ int run_render(Context& context, const RenderCommand& o) {
   if (!rotation) return fail(rotation.error());
   auto baked = load_baked(o.baked);
   if (!baked) return fail(baked.error());
+  if (baked->visibility) {
+    if (o.motion.any() || !o.insert.empty() || !o.lamps.empty()) return fail({o.baked, "is of visibility in blocks: nothing in it moves, and it has no lamps of its own"});
+    return run_product_render(context, *baked, o.products, o.light, o.view, o.brdf, o.samples);
+  }
+  if (o.product_options) return fail({o.baked, "--method and its options need a bake of visibility: lambent bake --transfer blocks"});
   if (o.new_brdf)
     if (auto ok = change_materials(*baked, o.brdf, o.baked); !ok) return fail(ok.error());
   auto poses = make_poses(o.motion, baked->scene);
@@ -200,7 +209,7 @@ int run_render(Context& context, const RenderCommand& o) {
   if (baked->zonal) specialise_light(*baked->zonal, light, table);
   else if (o.motion.any()) warn(o.baked + ": its transfer cannot turn with the surface (`lambent compress --zonal` makes one that can); it is used as baked");
 
-  RenderOptions options{view->width, view->height, o.samples, nullptr, !o.no_albedo, baked->outgoing ? &*baked->outgoing : nullptr, baked->directional};
+  RenderOptions options{view->width, view->height, o.samples, nullptr, o.show, baked->outgoing ? &*baked->outgoing : nullptr, baked->directional};
   if (!basis.groups.empty()) {
     const bool one = basis.groups.size() == 1 && basis.groups[0] == std::string("all");
     for (const Material& m : baked->scene.materials) {
@@ -222,6 +231,7 @@ int run_render(Context& context, const RenderCommand& o) {
     const auto start = std::chrono::steady_clock::now();
     if (baked->zonal) relight_zonal(*baked->zonal, pose ? &frames : nullptr, table, relit);
     else if (baked->cpca) relight(*baked->cpca, light, relit);
+    else if (baked->factors) relight_factors(baked->transfer, *baked->outgoing, light, relit);
     else relight(baked->transfer, light, relit);
     relight_seconds = std::min(relight_seconds, std::chrono::duration<double>(std::chrono::steady_clock::now() - start).count());
 
@@ -279,10 +289,15 @@ void add_render(CLI::App& app, Run& run) {
   c->add_option("--lamp", o->lamps, "NAME=R,G,B: scale a group of lamps by this colour (files baked with --light-groups)");
   c->add_option("--insert", o->insert, "FILE@X,Y,Z[,SCALE]: put a small diffuse object there, lit by the scene's lattice; may be given again")
       ->allow_extra_args(false);
-  c->add_flag("--no-albedo", o->no_albedo, "Draw everything as if it were white");
+  c->add_option("--show", o->show, "product of light and colour; radiosity: the light alone, as if everything were white; albedo: the colour alone")
+      ->transform(CLI::CheckedTransformer(show_names).description("{product,radiosity,albedo}"));
   auto* brdf = o->brdf.add_to(*c);
-  c->callback([o, c, brdf, spp, &run] {
+  std::vector<CLI::Option*> products = o->products.add_to(*c);
+  products.push_back(c->add_option("--indirect", o->products.indirect, "Files of visibility in blocks: sh adds light that has bounced, by a diffuse bake in harmonics")
+                         ->check(CLI::IsMember({"none", "sh"}))->capture_default_str());
+  c->callback([o, c, brdf, spp, products, &run] {
     o->new_brdf = brdf->count() > 0;
+    for (const CLI::Option* option : products) o->product_options |= option->count() > 0;
     o->view_given = c->count("--camera") > 0 || c->count("--size") > 0 || spp->count() > 0;
     run = [o](Context& context) { return run_render(context, *o); };
   });

@@ -51,7 +51,9 @@ Result<void> add_page(WebFiles& files) {
 Result<void> add_baked(WebFiles& files, const std::string& path, const std::string& name) {
   auto file = MappedFile::open(path);
   if (!file) return file.error();
-  if (auto whole = load_baked(*file, path); !whole) return whole.error();
+  auto whole = load_baked(*file, path);
+  if (!whole) return whole.error();
+  if (whole->visibility) return Error{path, "is of visibility in blocks, which the web viewer cannot draw: see `lambent render` and `lambent relight`"};
   files[name] = {media_type("glb"), std::move(*file)};
   return {};
 }

@@ -58,22 +58,26 @@ void gather_on(const GatherSetup& setup, const Basis& basis, const Lamps& lamps,
     for (size_t j = 0; j < rays; ++j) {
       const Hit& h = hits[j];
       const Vec3 d(dx[j], dy[j], dz[j]);
-      const float cosine = glm::dot(normal, d);
+      const float cosine = glm::dot(normal, d), share = sets.weights.empty() ? 1.0f : sets.weights[j];
+      auto add_light = [&](LampLight light) {
+        light.value *= share;
+        lights.push_back(light);
+      };
       if (h.triangle == none) {
-        if (lamps.sky) lights.push_back(met_sky(lamps, d, cosine, lamp_samples, rays));
+        if (lamps.sky) add_light(met_sky(lamps, d, cosine, lamp_samples, rays));
         continue;
       }
       const Triangle& triangle = setup.scene.triangles[h.triangle];
       const uint32_t lamp = lamps.of_triangle.empty() ? none : lamps.of_triangle[h.triangle];
       if (lamp != none && emits(setup.scene, triangle, h.front))
-        lights.push_back(met_lamp(setup.scene, lamps, lamp, d, cosine, h.distance, lamp_samples, rays));
+        add_light(met_lamp(setup.scene, lamps, lamp, h, d, cosine, lamp_samples, rays));
       const auto* at = basis.find(h.triangle, h.front);
       if (!at || !x) continue;
       std::fill(value.begin(), value.end(), 0.0f);
       basis.spread(*at, h.u, h.v, [&](uint32_t receiver, float w) {
         for (size_t k = 0; k < width; ++k) value[k] += w * x[size_t(receiver) * width + k];
       });
-      const Vec3 rho = albedo(setup.scene, triangle, h.u, h.v) / float(rays);
+      const Vec3 rho = albedo(setup.scene, triangle, h.u, h.v) * (share / float(rays));
       row_weights(kind, d, frame, weights);
       for (size_t row = 0; row < rows; ++row)
         for (size_t k = 0; k < width; ++k) own[row * width + k] += weights[row] * rho[int(k % 3)] * value[k];

@@ -30,7 +30,7 @@ std::vector<Vec2> sorted_points(size_t count, size_t half, uint32_t key) {
 }
 
 DirectionSets make_direction_sets(int order, int samples, int sets, uint32_t seed, DirectionWarp warp) {
-  DirectionSets s{order, samples, sets, pad_lanes(size_t(samples)), 0, {}, {}, {}};
+  DirectionSets s{order, samples, sets, pad_lanes(size_t(samples)), 0, {}, {}, {}, {}, {}};
   const size_t n = size_t(samples), coefficients = size_t(sh_count(order));
   s.half = n >= 2 * lane_multiple ? pad_lanes(n / 2) : n;
   s.x.assign(s.stride * size_t(sets), 0), s.y = s.x, s.z.assign(s.stride * size_t(sets), 1);
@@ -45,6 +45,51 @@ DirectionSets make_direction_sets(int order, int samples, int sets, uint32_t see
       evaluate_sh(order, d, y);
       for (size_t k = 0; k < coefficients; ++k) s.table[(size_t(set) * coefficients + k) * s.stride + i] = y[k];
     }
+  }
+  return s;
+}
+
+DirectionSets make_hemicube_set(int order, int samples) {
+  const int n = 2 * std::max(1, int(std::lround(std::sqrt(double(samples) / 3) / 2)));
+  struct Pixel {
+    Vec3 direction;
+    double form_factor;
+  };
+  std::vector<Pixel> pixels;
+  // Integrals of cos / pi per solid angle over [0, a] x [0, b] of the top face, z = 1, and of a side, x = 1, from its foot up.
+  auto top = [](double a, double b) {
+    const double p = std::sqrt(1 + a * a), q = std::sqrt(1 + b * b);
+    return (a / p * std::atan(b / p) + b / q * std::atan(a / q)) / (2 * std::numbers::pi);
+  };
+  auto side = [](double y, double z) {
+    const double q = std::sqrt(1 + z * z);
+    return (std::atan(y) - std::atan(y / q) / q) / (2 * std::numbers::pi);
+  };
+  auto over_pixel = [](auto f, double a0, double a1, double b0, double b1) { return f(a1, b1) - f(a0, b1) - f(a1, b0) + f(a0, b0); };
+  auto edge = [&](int i) { return 2.0 * i / n - 1; };
+  for (int j = 0; j < n; ++j)
+    for (int i = 0; i < n; ++i) {
+      const double x0 = edge(i), x1 = edge(i + 1), y0 = edge(j), y1 = edge(j + 1);
+      pixels.push_back({glm::normalize(Vec3(float(x0 + x1) / 2, float(y0 + y1) / 2, 1)), over_pixel(top, x0, x1, y0, y1)});
+    }
+  for (int face = 0; face < 4; ++face)
+    for (int j = n / 2; j < n; ++j)
+      for (int i = 0; i < n; ++i) {
+        const double y0 = edge(i), y1 = edge(i + 1), z0 = edge(j), z1 = edge(j + 1);
+        const Vec3 d = glm::normalize(Vec3(1, float(y0 + y1) / 2, float(z0 + z1) / 2));
+        const Vec3 turned[4] = {d, {-d.y, d.x, d.z}, {-d.x, -d.y, d.z}, {d.y, -d.x, d.z}};
+        pixels.push_back({turned[face], over_pixel(side, y0, y1, z0, z1)});
+      }
+  const size_t count = pixels.size(), coefficients = size_t(sh_count(order));
+  DirectionSets s{.order = order, .samples = int(count), .sets = 1, .stride = pad_lanes(count), .half = count};
+  s.x.assign(s.stride, 0), s.y = s.x, s.z.assign(s.stride, 1), s.table.assign(s.stride * coefficients, 0);
+  float y[sh_count(max_sh_order)];
+  for (size_t i = 0; i < count; ++i) {
+    const Vec3 d = pixels[i].direction;
+    s.x[i] = d.x, s.y[i] = d.y, s.z[i] = d.z;
+    s.weights.push_back(float(pixels[i].form_factor * double(count)));
+    evaluate_sh(order, d, y);
+    for (size_t k = 0; k < coefficients; ++k) s.table[k * s.stride + i] = y[k];
   }
   return s;
 }

@@ -246,29 +246,30 @@ void trace_gather_on(const GatherSetup& setup, const Basis& basis, GatherScratch
     size_t backs = 0;
     const Vec3 normal = setup.receivers.normals[r];
     auto direction = [&](size_t j) { return Vec3(fan.x[j], fan.y[j], fan.z[j]); };
-    auto add_light = [&](const LampLight& light) {
+    auto add_light = [&](const LampLight& light, float share) {
       float* row = direct->rows + i * direct->width + size_t(light.group) * 3;
-      for (int c = 0; c < 3; ++c) row[c] += light.value[c];
+      for (int c = 0; c < 3; ++c) row[c] += share * light.value[c];
     };
     if (direct) {
       scratch.lights.clear();
       sample_lamps(setup.scene, setup.tracer, direct->lamps, setup.receivers.origins[r], normal, direct->samples, rays, setup.seed, r, scratch.lights);
-      for (const LampLight& light : scratch.lights) add_light(light);
+      for (const LampLight& light : scratch.lights) add_light(light, 1);
     }
     const bool sees_sky = direct && direct->lamps.sky, sees_lamps = direct && !direct->lamps.of_triangle.empty();
     for (size_t j = 0; j < rays; ++j) {
       if (j + lookahead < rays) basis.prefetch(hits[j + lookahead].triangle, hits[j + lookahead].front);
       if (block && j + lookahead / 2 < rays) prefetch_places(basis, hits[j + lookahead / 2], scratch.rows);
       const Hit& h = hits[j];
-      fan.visible[j] = h.triangle == none ? 1.0f : 0.0f;
+      const float share = sets.weights.empty() ? 1.0f : sets.weights[j];
+      fan.visible[j] = h.triangle == none ? share : 0.0f;
       if (h.triangle == none) {
-        if (sees_sky) add_light(met_sky(direct->lamps, direction(j), glm::dot(normal, direction(j)), direct->samples, rays));
+        if (sees_sky) add_light(met_sky(direct->lamps, direction(j), glm::dot(normal, direction(j)), direct->samples, rays), share);
         continue;
       }
       if (sees_lamps) {
         const uint32_t lamp = direct->lamps.of_triangle[h.triangle];
         if (lamp != none && emits(setup.scene, setup.scene.triangles[h.triangle], h.front))
-          add_light(met_lamp(setup.scene, direct->lamps, lamp, direction(j), glm::dot(normal, direction(j)), h.distance, direct->samples, rays));
+          add_light(met_lamp(setup.scene, direct->lamps, lamp, h, direction(j), glm::dot(normal, direction(j)), direct->samples, rays), share);
       }
       const auto* at = basis.find(h.triangle, h.front);
       if (!at) {
@@ -278,9 +279,9 @@ void trace_gather_on(const GatherSetup& setup, const Basis& basis, GatherScratch
       if (!block) continue;
       const Vec3 rho = setup.part_varies[at->part] ? albedo(setup.scene, setup.scene.triangles[h.triangle], h.u, h.v)
                                                    : setup.part_albedo[at->part];
-      scatter(basis, *at, h, r * rays + j, [&](uint32_t receiver, float weight) { scratch.rows.add(receiver, rho * weight); });
+      scatter(basis, *at, h, r * rays + j, [&](uint32_t receiver, float weight) { scratch.rows.add(receiver, rho * (weight * share)); });
       if (checked && j < half)
-        scatter(basis, *at, h, r * rays + j, [&](uint32_t receiver, float weight) { scratch.half_rows.add(receiver, rho * weight); });
+        scatter(basis, *at, h, r * rays + j, [&](uint32_t receiver, float weight) { scratch.half_rows.add(receiver, rho * (weight * share)); });
     }
     scratch.rows.end_row();
     if (checked) scratch.half_rows.end_row();

@@ -36,6 +36,22 @@ Vec3 balanced(Vec3 radiance, float cosine, double lamp_density, int samples, siz
   return sum > 0 ? radiance * float(p_c / sum) : Vec3(0);
 }
 
+// Of the emission over a triangle, as far as a few hundred points tell. Never so small that a bright spot between them would be
+// drawn too seldom.
+Vec3 mean_emission(const Scene& scene, const Triangle& t) {
+  const Material& m = scene.materials[scene.parts[t.part].material];
+  if (m.emissive_texture < 0) return m.emissive;
+  constexpr int points = 256;
+  constexpr float least_share = 0.02f;
+  Vec3 sum(0);
+  for (int i = 0; i < points; ++i) {
+    const Vec2 u = sobol_owen(uint32_t(i), 0);
+    const float root = std::sqrt(u.x);
+    sum += emission_texel(scene, t, 1 - root, u.y * root);
+  }
+  return m.emissive * glm::max(sum / float(points), Vec3(least_share));
+}
+
 struct PendingSample {
   LampLight light;
   uint32_t triangle;  // that the ray must meet; none: it must travel `distance`
@@ -61,7 +77,7 @@ Lamps make_lamps(const Scene& scene, const Environment* sky, bool separate) {
     const float area = 0.5f * glm::length(area_normal(scene, triangle));
     if (!(largest(material.emissive) > 0) || !(area > 0)) continue;
     if (material_group[m] == none) material_group[m] = group_of(material.name.empty() ? "material " + std::to_string(m) : material.name);
-    lamps.area.push_back({t, material_group[m], material.emissive, double(area)});  // its area, until all are known
+    lamps.area.push_back({t, material_group[m], mean_emission(scene, triangle), double(area)});  // its area, until all are known
   }
   for (const PunctualLight& light : scene.lights)
     lamps.punctual_group.push_back(largest(light.intensity) > 0 ? group_of(light.name) : none);
@@ -101,13 +117,17 @@ void sample_lamps(const Scene& scene, const Tracer& tracer, const Lamps& lamps, 
     const uint32_t begin = lamps.first[g], end = lamps.first[g + 1];
     if (begin == end) continue;
     const double total = lamps.cumulative[end - 1];
-    const uint32_t key = uint32_t(hash64(hash64(seed, 0x1a3 + g), receiver)), pick_key = uint32_t(hash64(key));
+    const uint32_t key = uint32_t(hash64(hash64(seed, 0x1a3 + g), receiver));
     for (int s = 0; s < samples; ++s) {
-      const Vec2 u = sobol_owen(uint32_t(s), key);
-      const double target = double(sobol_owen(uint32_t(s), pick_key).x) * total;
+      // One number picks the triangle and, by where within its share it fell, the place in it: the points stay spread over both. (A
+      // second sequence of the same dimension would follow the first, digit by digit, however it is scrambled.)
+      Vec2 u = sobol_owen(uint32_t(s), key);
+      const double target = double(u.x) * total;
       const size_t at = std::min<size_t>(size_t(std::upper_bound(lamps.cumulative.begin() + begin, lamps.cumulative.begin() + end, target) - lamps.cumulative.begin()), end - 1);
       const AreaLamp& lamp = lamps.area[at];
       const Triangle& t = scene.triangles[lamp.triangle];
+      const double low = at == begin ? 0.0 : lamps.cumulative[at - 1];
+      u.x = std::min(float((target - low) / (lamps.cumulative[at] - low)), 1.0f);
       // Uniform over the triangle.
       const float root = std::sqrt(u.x), v = u.y * root;
       const Vec3 to = interpolate(scene.positions, t, 1 - root, v) - origin;
@@ -118,7 +138,7 @@ void sample_lamps(const Scene& scene, const Tracer& tracer, const Lamps& lamps, 
       const float cosine = glm::dot(normal, d), facing = -glm::dot(normalize_or(area_normal(scene, t), Vec3(0)), d);
       if (!(cosine > 0) || !emits(scene, t, facing > 0) || facing == 0) continue;
       const double density = lamp.density * double(distance2) / double(std::abs(facing));
-      add(lamp.group, d, balanced(lamp.radiance, cosine, density, samples, rays), lamp.triangle, distance);
+      add(lamp.group, d, balanced(emission(scene, t, 1 - root, v), cosine, density, samples, rays), lamp.triangle, distance);
     }
   }
   for (size_t l = 0; l < lamps.punctual_group.size(); ++l) {
@@ -141,12 +161,13 @@ void sample_lamps(const Scene& scene, const Tracer& tracer, const Lamps& lamps, 
   }
 }
 
-LampLight met_lamp(const Scene& scene, const Lamps& lamps, uint32_t index, Vec3 direction, float cosine, float distance, int samples,
+LampLight met_lamp(const Scene& scene, const Lamps& lamps, uint32_t index, const Hit& hit, Vec3 direction, float cosine, int samples,
                    size_t rays) {
   const AreaLamp& lamp = lamps.area[index];
-  const float facing = std::abs(glm::dot(normalize_or(area_normal(scene, scene.triangles[lamp.triangle]), Vec3(0)), direction));
-  const double density = lamp.density * double(distance) * double(distance) / double(std::max(facing, 1e-30f));
-  return {lamp.group, direction, balanced(lamp.radiance, cosine, density, samples, rays)};
+  const Triangle& t = scene.triangles[lamp.triangle];
+  const float facing = std::abs(glm::dot(normalize_or(area_normal(scene, t), Vec3(0)), direction));
+  const double density = lamp.density * double(hit.distance) * double(hit.distance) / double(std::max(facing, 1e-30f));
+  return {lamp.group, direction, balanced(emission(scene, t, hit.u, hit.v), cosine, density, samples, rays)};
 }
 
 LampLight met_sky(const Lamps& lamps, Vec3 direction, float cosine, int samples, size_t rays) {

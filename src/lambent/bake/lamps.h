@@ -15,7 +15,7 @@ namespace lambent {
 
 struct AreaLamp {
   uint32_t triangle, group;
-  Vec3 radiance;
+  Vec3 radiance;   // the mean over it, or a little more: what the density follows
   double density;  // of the group's samples, per area
 };
 
@@ -55,7 +55,7 @@ void sample_lamps(const Scene& scene, const Tracer& tracer, const Lamps& lamps, 
                   uint32_t seed, size_t receiver, std::vector<LampLight>& out);
 
 // What a ray of the fan brings that met an area lamp, or left the scene.
-LampLight met_lamp(const Scene& scene, const Lamps& lamps, uint32_t lamp, Vec3 direction, float cosine, float distance, int samples, size_t rays);
+LampLight met_lamp(const Scene& scene, const Lamps& lamps, uint32_t lamp, const Hit& hit, Vec3 direction, float cosine, int samples, size_t rays);
 LampLight met_sky(const Lamps& lamps, Vec3 direction, float cosine, int samples, size_t rays);
 
 }  // namespace lambent

@@ -63,7 +63,10 @@ Result<Lightmap> bake_lightmap(const Scene& scene, const Tracer& tracer, const R
   LightmapReport& r = report ? *report : unwanted;
   r = {};
   const size_t n = receivers.count(), harmonics = size_t(sh_count(o.order)), width = pad_lanes(3 * (harmonics + lamps.groups()));
-  const GatherSetup setup = make_gather_setup(scene, tracer, receivers, std::max(o.order, 1), o.samples, o.seed);
+  const int order = std::max(o.order, 1);
+  DirectionSets cube = o.gather == GatherKind::hemicube ? make_hemicube_set(order, o.samples) : DirectionSets{};
+  GatherSetup setup = make_gather_setup(scene, tracer, receivers, order, cube.samples ? cube.samples : o.samples, o.seed);
+  if (cube.samples) setup.sets = std::move(cube);
   const LightBasis light{.order = o.order, .groups = lamps.names};
 
   // e: [harmonics | groups][channel]

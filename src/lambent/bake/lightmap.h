@@ -10,6 +10,9 @@
 
 namespace lambent {
 
+// How hit rows are gathered: by cosine-distributed rays, or through the pixels of a hemicube.
+enum class GatherKind { rays, hemicube };
+
 struct LightmapOptions {
   int order = 0;                    // bands of a distant light's harmonics, columns before the groups; 0: none, at most max_sh_order
   int samples = 512;                // rays a receiver, [1, 2^20]
@@ -19,6 +22,7 @@ struct LightmapOptions {
   Solver solver = Solver::gmres;    // for `converge`
   DirectionalKind directional = DirectionalKind::none;  // rows of the transfer; others than none take order 0
   size_t memory = size_t{4} << 30;  // bytes of working memory beyond scene and result; less means rays traced again
+  GatherKind gather = GatherKind::rays;  // hemicube: `samples` is rounded to 3 n^2
   uint32_t seed = 1;
   Precision precision = Precision::half;
 };

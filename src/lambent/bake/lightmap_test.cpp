@@ -1,4 +1,5 @@
 #include <lambent/bake/bake.h>
+#include <lambent/bake/kernels.h>
 #include <lambent/bake/lightmap.h>
 #include <lambent/core/parallel.h>
 #include <lambent/core/random.h>
@@ -89,6 +90,68 @@ TEST(Lightmap, FormFactorsOfSquares) {
     const Baking b = bake_lamps(scene, Where::patches, {.samples = 1024, .lamp_samples = 64, .bounces = 0});
     const Vec3 mean = mean_over(b, b.lit({Vec3(1)}), 0);
     for (int c = 0; c < 3; ++c) EXPECT_NEAR(mean[c] / L[c], facing ? parallel : 0.20004, facing ? collocation * parallel : 0.02 * 0.2) << facing;
+  }
+}
+
+TEST(Hemicube, FormFactorsOfSquares) {
+  // Pixels: their delta form factors sum to 1, and are cos / pi times the solid angle where pixels are small.
+  for (int samples : {12, 1000, 12288}) {
+    const DirectionSets cube = make_hemicube_set(3, samples);
+    double sum = 0, lit = 0;
+    for (size_t i = 0; i < cube.weights.size(); ++i) sum += double(cube.weights[i]) / cube.samples, lit += double(cube.weights[i]) / cube.samples * double(cube.z[i]);
+    EXPECT_NEAR(sum, 1, 1e-6);
+    EXPECT_NEAR(lit, 2.0 / 3, 2.0 / samples);  // the integral of cos^2 / pi
+  }
+  // Rows of the operator: one square's patches glow, the other gathers. Both kinds of rows give the form factors by formula
+  // (Lightmap.FormFactorsOfSquares); 3,072 pixels alias by under a percent.
+  for (bool facing : {true, false}) {
+    Scene scene;
+    const uint32_t white = add_material(scene, "white", Vec3(1));
+    add_quad(scene, white, "receiver", Vec3(0), Vec3(0, 0, 1), Vec3(1, 0, 0), 8, 8);
+    if (facing) add_quad(scene, white, "lamp", Vec3(0, 1, 0), Vec3(1, 0, 0), Vec3(0, 0, 1), 2, 2);
+    else add_quad(scene, white, "lamp", Vec3(0), Vec3(1, 0, 0), Vec3(0, 1, 0), 2, 2);
+    const Receivers receivers = make_patch_receivers(scene);
+    const auto& patches = std::get<PatchReceivers>(receivers.basis);
+    auto tracer = Tracer::build(scene);
+    for (bool hemicube : {false, true}) {
+      GatherSetup setup = make_gather_setup(scene, *tracer, receivers, 1, 3072, 1);
+      if (hemicube) setup.sets = make_hemicube_set(1, 3072);
+      auto op = GatherOperator::trace(setup, nullptr, nullptr, true, size_t{1} << 30);
+      ASSERT_TRUE(op);
+      const size_t width = pad_lanes(1);
+      AlignedVector<float> x(receivers.count() * width, 0.0f), y(x.size());
+      const Part &from = scene.parts[1], &to = scene.parts[0];
+      for (uint32_t t = from.first_triangle; t < from.first_triangle + from.triangle_count; ++t) x[patches.front[t].receiver * width] = 1;
+      op->apply(x.data(), width, y.data());
+      double mean = 0;
+      for (uint32_t t = to.first_triangle; t < to.first_triangle + to.triangle_count; ++t)
+        mean += double(y[patches.front[t].receiver * width]) / to.triangle_count;
+      const double formula = facing ? 0.19982 : 0.20004;
+      EXPECT_NEAR(mean, formula, (facing ? 0.01 : 0.025) * formula) << facing << hemicube;
+    }
+  }
+}
+
+TEST(Hemicube, ClosedBoxAndDirectionalRows) {
+  // The same closed forms as by rays: radiosity e / (1 - rho); and E along the receiver's own normal is E by the vector.
+  const Vec3 e(1, 2, 0.5f), rho(0.8f, 0.5f, 0.3f);
+  Scene scene;
+  add_box(scene, add_lamp(scene, "wall", rho, e), "box", Vec3(-1), Vec3(1, 0.5f, 2), 3, true);
+  for (DirectionalKind kind : {DirectionalKind::none, DirectionalKind::vector}) {
+    const Receivers receivers = make_vertex_receivers(scene);
+    auto tracer = Tracer::build(scene);
+    auto map = bake_lightmap(scene, *tracer, receivers, make_lamps(scene, nullptr, false),
+                             {.samples = 768, .lamp_samples = 16, .converge = 1e-4, .directional = kind, .gather = GatherKind::hemicube, .precision = Precision::single}, false);
+    ASSERT_TRUE(map);
+    Relit lit;
+    relight(map->all, std::vector<Vec3>{Vec3(1)}, lit);
+    Vec3 mean(0);
+    for (size_t r = 0; r < receivers.count(); ++r) {
+      std::array<Vec3, 3> rows{};
+      for (int row = 0; row < lit.rows; ++row) rows[size_t(row)] = lit.at(r, row);
+      mean += evaluate_directional_light(kind, rows, receiver_frame(receivers.normals[r]), receivers.normals[r]) / float(receivers.count());
+    }
+    for (int c = 0; c < 3; ++c) EXPECT_NEAR(mean[c], e[c] / (1 - rho[c]), 0.02f * e[c] / (1 - rho[c])) << int(kind);
   }
 }
 
@@ -320,6 +383,45 @@ TEST(Lightmap, RefusesWhatCannotBeBaked) {
   Progress cancelled;
   cancelled.cancel();
   EXPECT_FALSE(bake_lightmap(lit, *lit_tracer, lit_receivers, lamps, {.samples = 16}, false, nullptr, &cancelled));
+}
+
+TEST(Lightmap, AnEmissiveTextureIsItsPatternOfLamps) {
+  // A lamp of 2 x 1 whose texture is white on its first half, as against a lamp of that half alone; lamp samples, rays or both find
+  // it, and so does the path tracer.
+  constexpr int size = 64;
+  Texture halves;
+  halves.width = size, halves.height = 1, halves.wrap_s = halves.wrap_t = Wrap::clamp;
+  for (int i = 0; i < 3 * size; ++i) halves.rgb.push_back(i < 3 * size / 2 ? 255 : 0);
+  auto scene_with = [&](bool textured) {
+    Scene scene;
+    const uint32_t grey = add_material(scene, "grey", Vec3(0.5f)), lamp = add_lamp(scene, "lamp", Vec3(0), Vec3(4, 3, 2));
+    add_quad(scene, grey, "floor", Vec3(-1, 0, -1), Vec3(0, 0, 2), Vec3(2, 0, 0), 4, 4);
+    add_quad(scene, lamp, "lamp", Vec3(-1, 0.7f, -0.5f), Vec3(textured ? 2 : 1, 0, 0), Vec3(0, 0, 1), 1, 1);
+    if (!textured) return scene;
+    scene.textures.push_back(halves), scene.materials[lamp].emissive_texture = 0;
+    for (Vec3 p : scene.positions) scene.texcoords[0].push_back({(p.x + 1) / 2, 0});
+    return scene;
+  };
+  const Environment black = make_environment("black", 4, 2, [](Vec3) { return Vec3(0); });
+  for (auto [samples, lamp_samples] : {std::pair(4096, 1), std::pair(1, 4096), std::pair(1024, 256)}) {
+    const LightmapOptions options{.samples = samples, .lamp_samples = lamp_samples, .bounces = 0};
+    const Baking with = bake_lamps(scene_with(true), Where::patches, options), without = bake_lamps(scene_with(false), Where::patches, options);
+    const Relit a = with.lit({Vec3(1)}), b = without.lit({Vec3(1)});
+    // What the texture's slope between its halves and noise leave.
+    for (size_t r = 0; r < with.receivers.count(); ++r) {
+      if (with.receivers.origins[r].y > 0.5f) continue;
+      const auto other = std::min_element(without.receivers.origins.begin(), without.receivers.origins.end(), [&](Vec3 p, Vec3 q) {
+        return glm::length(p - with.receivers.origins[r]) < glm::length(q - with.receivers.origins[r]); });
+      const Vec3 truth = b.at(size_t(other - without.receivers.origins.begin()));
+      for (int c = 0; c < 3; ++c) EXPECT_NEAR(a.at(r)[c], truth[c], 0.02f) << samples << " " << lamp_samples << " at " << r;
+    }
+    if (samples != 1024) continue;
+    for (size_t r = 0; r < with.receivers.count(); r += 7) {
+      if (with.receivers.origins[r].y > 0.5f) continue;
+      const Vec3 truth = exit_radiance(with.scene, black, with.receivers.origins[r], with.receivers.normals[r], 0, 4096, 1, true);
+      for (int c = 0; c < 3; ++c) EXPECT_NEAR(a.at(r)[c], truth[c], 0.02f) << r;
+    }
+  }
 }
 
 }  // namespace

@@ -1,5 +1,6 @@
 #include <lambent/bake/materials.h>
 #include <lambent/core/check.h>
+#include <lambent/core/parallel.h>
 
 #include <map>
 
@@ -39,6 +40,17 @@ ReceiverMaterials make_receiver_materials(const Scene& scene, const Receivers& r
     if (!done[r]) out.frames[r] = frame_about(receivers.normals[r]);
   if (out.materials.empty()) out.materials.push_back({Lambert{Vec3(0)}, Lambert{Vec3(1)}});
   return out;
+}
+
+Outgoing make_map_outgoing(const ReceiverMaterials& materials, int incident_order, const MatrixOptions& options) {
+  Outgoing o;
+  o.kind = OutgoingKind::map, o.order = incident_order, o.map_of = materials.of_receiver, o.frames = materials.frames;
+  const CosineBasis basis = make_cosine_basis(incident_order);
+  o.maps.resize(materials.materials.size());
+  parallel_for(o.maps.size(), 1, [&](size_t begin, size_t end) {
+    for (size_t m = begin; m < end; ++m) o.maps[m] = make_response(materials.materials[m], basis, options.grid, options.response_samples);
+  });
+  return o;
 }
 
 }  // namespace lambent

@@ -9,4 +9,7 @@ namespace lambent {
 // materials and not one a receiver; base colour is not rounded, since responses are linear in it (transfer/outgoing.h).
 ReceiverMaterials make_receiver_materials(const Scene& scene, const Receivers& receivers, const Reflection& reflection);
 
+// The last reflection of incident light as it is, of kind map.
+Outgoing make_map_outgoing(const ReceiverMaterials& materials, int incident_order, const MatrixOptions& options = {});
+
 }  // namespace lambent

@@ -285,11 +285,14 @@ struct MatrixBaker {
 
   void make_responses() {
     ProgressStage stage(progress, "materials", materials.materials.size());
-    for (const LinearMaterial& m : materials.materials) {
-      responses.push_back(make_response(m, basis, matrix.grid, matrix.response_samples));
-      scatter.push_back(factor_response(responses.back(), matrix.scatter_rows, matrix.scatter_error));
-      stage.advance();
-    }
+    responses.resize(materials.materials.size()), scatter.resize(responses.size());
+    parallel_for(responses.size(), 1, [&](size_t begin, size_t end) {
+      for (size_t m = begin; m < end; ++m) {
+        responses[m] = make_response(materials.materials[m], basis, matrix.grid, matrix.response_samples);
+        scatter[m] = factor_response(responses[m], matrix.scatter_rows, matrix.scatter_error);
+        stage.advance();
+      }
+    });
     first_row.assign(1, 0);
     for (size_t r = 0; r < n(); ++r) first_row.push_back(first_row.back() + size_t(scatter[materials.of_receiver[r]].rows));
   }
@@ -326,6 +329,15 @@ struct MatrixBaker {
         f.h.resize(rows * J(), 0.0f);
         last.h[m] = {f.h, f.h, f.h};
       }
+    } else if (o.kind == OutgoingKind::phong) {
+      o.order = matrix.incident_order, o.has_b = false;
+      for (size_t m = 0; m < materials.materials.size(); ++m)
+        for (size_t c = 0; c < 3; ++c) {
+          last.h[m][c] = convolve_phong(materials.materials[m], basis, int(c));
+          const auto b = last.h[m][c].end() - ptrdiff_t(J());
+          o.has_b |= std::any_of(b, last.h[m][c].end(), [](float x) { return x != 0; });
+          if (last.h[m][c] != last.h[m][0]) last.channels = 3;
+        }
     } else {
       o.order = matrix.outgoing_order;
       std::vector<std::array<std::vector<float>, 4>> parts;
@@ -589,6 +601,9 @@ Result<void> check_options(const BakeOptions& o, const MatrixOptions& m, const R
     if (!ok) return ok.error();
   // A path seldom meets a lamp by chance.
   if (m.simulate_paths && o.bounces > 0 && !o.lobes.empty()) return Error{"lobes", "bounces by simulated paths are of harmonics alone"};
+  if (m.outgoing == OutgoingKind::phong)
+    for (const LinearMaterial& material : materials.materials)
+      if (convolve_phong(material, make_cosine_basis(1), 0).empty()) return Error{"outgoing", "phong convolves Phong's lobe and takes no other material"};
   LAMBENT_CHECK(materials.of_receiver.size() == receivers && materials.frames.size() == receivers && !materials.materials.empty());
   return {};
 }

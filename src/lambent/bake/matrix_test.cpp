@@ -1,11 +1,16 @@
+#include <lambent/bake/materials.h>
 #include <lambent/bake/matrix.h>
+#include <lambent/bake/response.h>
 #include <lambent/core/parallel.h>
 #include <lambent/core/random.h>
 #include <lambent/core/sampling.h>
+#include <lambent/relight/factors.h>
 #include <lambent/relight/relight.h>
 #include <lambent/scene/procedural.h>
 
 #include <gtest/gtest.h>
+
+#include <cmath>
 
 namespace lambent {
 namespace {
@@ -36,6 +41,121 @@ std::vector<Vec3> uneven_light(int order, uint64_t seed) {
   for (size_t k = 0; k < light.size(); ++k) light[k] = (Vec3(random.next(), random.next(), random.next()) - 0.5f) / float(1 + sh_band(int(k)));
   light[0] = Vec3(3, 2.5f, 2);
   return light;
+}
+
+// The eigenvalues of convolution, by the midpoint rule.
+TEST(Matrix, PhongConvolutionHasTheEigenvaluesOfItsLobe) {
+  for (float n : {1.0f, 2.0f, 3.5f, 20.0f, 200.0f}) {
+    const std::vector<double> bands = phong_convolution(n, 9);
+    for (int l = 0; l < 9; ++l) {
+      double sum = 0;
+      const int steps = 200000;
+      for (int i = 0; i < steps; ++i) {
+        const double t = (i + 0.5) / steps;
+        sum += (n + 2.0) * std::pow(t, double(n)) * std::legendre(unsigned(l), t) / steps;
+      }
+      EXPECT_NEAR(bands[size_t(l)], sum, 1e-6) << "n " << n << " band " << l;
+    }
+  }
+}
+
+// An open plane under uneven light, seen from several sides. By definition the rows give the lobe's integral of L cos cut off at the incident
+// order; the true integral is neared as the order grows.
+TEST(Matrix, PhongByConvolutionIsTheLobesIntegralOfBandLimitedLight) {
+  const Scene scene = make_quad(Vec3(-1, 0, -1), Vec3(0, 0, 2), Vec3(2, 0, 0), 1, 1, Vec3(0.5f));
+  auto tracer = Tracer::build(scene);
+  const Receivers receivers = make_vertex_receivers(scene);
+  const Phong phong{Vec3(0.3f, 0.2f, 0.1f), Vec3(0.2f, 0.4f, 0.6f), 6};
+  const std::vector<Vec3> light = uneven_light(3, 17);
+  auto radiance_of = [&](Vec3 d) {
+    std::vector<float> y(9);
+    evaluate_sh(3, d, y);
+    Vec3 sum(0.0f);
+    for (size_t k = 0; k < 9; ++k) sum += y[k] * light[k];
+    return sum;
+  };
+  // Even directions of the sphere.
+  const int count = 40000;
+  auto direction = [&](int i) {
+    const float z = 1 - 2 * (float(i) + 0.5f) / float(count), phi = 2.39996323f * float(i), r = std::sqrt(1 - z * z);
+    return Vec3(r * std::cos(phi), z, r * std::sin(phi));
+  };
+  const float each = 4 * pi / float(count);
+  double last_error = 1e9;
+  for (int m : {3, 5, 8}) {
+    auto baked = bake_matrix(scene, *tracer, receivers, all_of({phong, phong}, receivers), {.order = 3, .samples = 16384, .bounces = 0, .precision = Precision::single},
+                             {.incident_order = m, .outgoing = OutgoingKind::phong, .grid = 8, .response_samples = 16});
+    ASSERT_TRUE(baked) << baked.error().text();
+    ASSERT_EQ(baked->transfer.rows, m * m + 1);
+    Relit relit;
+    relight(baked->transfer, light, relit);
+    std::vector<Vec3> band_limited(size_t(m * m), Vec3(0.0f));
+    std::vector<float> y(band_limited.size());
+    Vec3 irradiance(0.0f);
+    for (int i = 0; i < count; ++i) {
+      const Vec3 d = direction(i);
+      if (d.y <= 0) continue;
+      irradiance += each * d.y * radiance_of(d);
+      evaluate_sh(m, d, y);
+      for (size_t k = 0; k < y.size(); ++k) band_limited[k] += each * y[k] * d.y * radiance_of(d);
+    }
+    double error = 0;
+    for (const Vec3& view : {glm::normalize(Vec3(0.1f, 1, 0.2f)), glm::normalize(Vec3(-0.8f, 0.7f, 0.1f)), glm::normalize(Vec3(0.3f, 0.4f, -0.9f))}) {
+      const Vec3 mirrored(-view.x, view.y, -view.z);
+      Vec3 expected = phong.diffuse * irradiance / pi, truth = expected;
+      for (int i = 0; i < count; ++i) {
+        const Vec3 d = direction(i);
+        const float lobe = each * (phong.exponent + 2) / (2 * pi) * std::pow(std::max(0.0f, glm::dot(d, mirrored)), phong.exponent);
+        if (lobe == 0) continue;
+        evaluate_sh(m, d, y);
+        Vec3 g(0.0f);
+        for (size_t k = 0; k < y.size(); ++k) g += y[k] * band_limited[k];
+        expected += phong.specular * lobe * g;
+        if (d.y > 0) truth += phong.specular * lobe * d.y * radiance_of(d);
+      }
+      std::vector<ViewWeights> weights(size_t(relit.rows));
+      evaluate_outgoing(baked->outgoing, 0, view, weights);
+      const Vec3 got = reflect_rows(weights, Vec3(1), [&](size_t row) { return relit.at(0, int(row)); });
+      for (int c = 0; c < 3; ++c) {
+        EXPECT_NEAR(got[c], expected[c], 0.01f * std::abs(expected[c]) + 0.002f) << "m " << m;
+        error += std::abs(got[c] - truth[c]) / std::abs(truth[c]) / 9;
+      }
+    }
+    EXPECT_LT(error, last_error + 0.002);
+    last_error = error;
+  }
+  EXPECT_LT(last_error, 0.02);
+  EXPECT_FALSE(bake_matrix(scene, *tracer, receivers, all_of({Ggx{}, Ggx{}}, receivers), {.order = 3, .samples = 16, .bounces = 0},
+                           {.outgoing = OutgoingKind::phong}));
+}
+
+// Light times kept visibility, or the same product baked into matrices: the same numbers.
+TEST(Matrix, VisibilityAsAFactorGivesTheRowsOfADirectMatrix) {
+  const Scene scene = corner_scene();
+  auto tracer = Tracer::build(scene);
+  const Receivers receivers = make_vertex_receivers(scene);
+  const ReceiverMaterials materials = all_of({Ggx{.alpha = Vec2(0.3f)}, Ggx{.alpha = Vec2(0.3f)}}, receivers);
+  const int n = 4, m = 3;
+  const MatrixOptions options{.incident_order = m, .outgoing = OutgoingKind::map, .grid = 8, .response_samples = 64};
+  auto matrix = bake_matrix(scene, *tracer, receivers, materials, {.order = n, .samples = 256, .bounces = 0, .precision = Precision::single}, options);
+  auto visibility = bake(scene, *tracer, receivers, {.order = n + m - 1, .samples = 256, .bounces = 0, .precision = Precision::single});
+  ASSERT_TRUE(matrix && visibility);
+  const Outgoing outgoing = make_map_outgoing(materials, m, options);
+  const std::vector<Vec3> light = uneven_light(n, 5);
+  Relit a, b;
+  relight(matrix->transfer, light, a);
+  relight_factors(*visibility, outgoing, light, b);
+  ASSERT_EQ(a.rows, b.rows);
+  double difference = 0, total = 0;
+  for (size_t r = 0; r < receivers.count(); ++r)
+    for (int j = 0; j < m * m; ++j)
+      for (int c = 0; c < 3; ++c) difference += std::pow(a.at(r, j)[c] - b.at(r, j)[c], 2), total += std::pow(a.at(r, j)[c], 2);
+  EXPECT_GT(total, 100);
+  EXPECT_LT(std::sqrt(difference / total), 1e-4);
+  std::vector<ViewWeights> wa(size_t(a.rows)), wb(wa.size());
+  evaluate_outgoing(matrix->outgoing, 7, glm::normalize(receivers.normals[7] + Vec3(0.2f, 0.1f, 0.3f)), wa);
+  evaluate_outgoing(outgoing, 7, glm::normalize(receivers.normals[7] + Vec3(0.2f, 0.1f, 0.3f)), wb);
+  for (size_t j = 0; j < wa.size(); ++j) EXPECT_EQ(wa[j], wb[j]);
 }
 
 TEST(Matrix, WithLambertIsTheDiffuseBake) {

@@ -41,6 +41,31 @@ ViewMap make_response(const LinearMaterial& material, const CosineBasis& basis, 
   return map;
 }
 
+std::vector<double> phong_convolution(float exponent, int order) {
+  const double n = exponent;
+  std::vector<double> bands{(n + 2) / (n + 1), 1.0};
+  for (int l = 2; l < order; ++l) bands.push_back(bands[size_t(l - 2)] * (n - l + 2) / (n + l + 1));
+  bands.resize(size_t(order));
+  return bands;
+}
+
+std::vector<float> convolve_phong(const LinearMaterial& material, const CosineBasis& basis, int channel) {
+  const Phong* phong = std::get_if<Phong>(&material.black);
+  const Lambert *black = std::get_if<Lambert>(&material.black), *white = std::get_if<Lambert>(&material.white);
+  if (!phong && !(black && white)) return {};
+  const size_t J = size_t(basis.count());
+  std::vector<float> rows((J + 2) * J, 0.0f);
+  rows[J * J] = phong ? phong->diffuse[channel] : black->albedo[channel];  // z_0 = 1: X_0 is irradiance over pi
+  rows[(J + 1) * J] = phong ? 0 : white->albedo[channel] - black->albedo[channel];
+  if (!phong) return rows;
+  // y_k = sum_j S_kj z_j on the hemisphere, so that sum_j S_kj X_j is 1/pi * integral of L V cos y_k.
+  const std::vector<double> bands = phong_convolution(phong->exponent, basis.order);
+  for (size_t k = 0; k < J; ++k)
+    for (size_t j = 0; j <= k; ++j)
+      rows[k * J + j] = float(std::numbers::pi * bands[size_t(sh_band(int(k)))] * phong->specular[channel] * basis.to_sh[k * J + j]);
+  return rows;
+}
+
 FactoredResponse factor_response(const ViewMap& response, int max_rows, double tolerance) {
   const int nodes = response.grid * response.grid, n = response.rows;
   // One row of the matrix for each node and component; the map has equal areas, so every node weighs the same.

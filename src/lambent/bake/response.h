@@ -29,6 +29,13 @@ struct FactoredResponse {
 };
 FactoredResponse factor_response(const ViewMap& response, int max_rows, double tolerance);
 
+// Phong's lobe by convolution (general-prt, "Phong-like BRDFs"): light times visibility and cosine, cut off at the incident order,
+// is convolved with the lobe about the mirrored view. Rows over the incident basis, of one channel: order^2 for harmonics of the mirrored view, a
+// diffuse row, and one for diffuse reflection of the base colour. Empty for what is not Phong or Lambert.
+std::vector<float> convolve_phong(const LinearMaterial& material, const CosineBasis& basis, int channel);
+// The eigenvalues of convolution with Phong's lobe (n + 2) / (2 pi) cos^n over the half sphere, by band: (n + 2) * integral of t^n P_l over [0, 1].
+std::vector<double> phong_convolution(float exponent, int order);
+
 // The matrix C of outgoing bases: coefficients over wo of each component (a.r, a.g, a.b, b) of O_j, order^2 x order_in^2 for each.
 // `kind` is sh, hemisphere or hsh.
 std::array<std::vector<float>, 4> project_response(const ViewMap& response, OutgoingKind kind, int order);

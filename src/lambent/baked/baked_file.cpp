@@ -1,5 +1,6 @@
 #include <lambent/baked/baked_file.h>
 #include <lambent/baked/viewer_look.h>
+#include <lambent/basis/cosine_basis.h>
 #include <lambent/basis/sh.h>
 #include <lambent/core/check.h>
 #include <lambent/core/half.h>
@@ -250,6 +251,33 @@ Result<FixedView> read_view(const GltfChunks& chunks, const json& object, size_t
   return view;
 }
 
+Result<Visibility> read_visibility(const GltfChunks& chunks, const MappedFile& file, const json& object, const std::string& where) {
+  Visibility v;
+  auto size = read_count(object, "cube", size_t(max_cube_size), where), bits = read_count(object, "bits", size_t(max_visibility_bits), where),
+       receivers = read_count(object, "receivers", 0xfffffffe, where), data = read_count(object, "bufferView", 0x7fffffff, where),
+       lengths = read_count(object, "lengths", 0x7fffffff, where);
+  for (const auto* count : {&size, &bits, &receivers, &data, &lengths})
+    if (!*count) return count->error();
+  if (!is_cube_size(int(*size))) return Error{where, "\"cube\" must be a multiple of 16 up to " + std::to_string(max_cube_size)};
+  if (*bits < 1) return Error{where, "\"bits\" is 0"};
+  auto records = view_bytes(chunks, *data, where), numbers = view_bytes(chunks, *lengths, where);
+  if (!records) return records.error();
+  if (!numbers) return numbers.error();
+  if (*receivers > numbers->size()) return Error{where, "there are fewer lengths than receivers"};
+  v.size = int(*size), v.bits = int(*bits), v.receivers = *receivers, v.data = *records;
+  v.begin.reserve(*receivers + 1), v.begin.push_back(0);
+  size_t at = 0;
+  for (size_t r = 0; r < *receivers; ++r) {
+    uint64_t length = 0;
+    if (!read_varint(*numbers, at, length) || length > records->size() - v.begin.back()) return Error{where, "the length of receiver " + std::to_string(r) + " is broken"};
+    v.begin.push_back(v.begin.back() + length);
+  }
+  if (at != numbers->size()) return Error{where, "there are more lengths than receivers"};
+  if (auto ok = check_visibility(v, where); !ok) return ok.error();
+  v.storage = std::make_shared<MappedFile>(file);
+  return v;
+}
+
 Result<LatticeTransfer> read_lattice(const GltfChunks& chunks, const MappedFile& file, const json& object, const LightBasis& light, const std::string& where) {
   if (!object.is_object()) return Error{where, "is not an object"};
   LatticeTransfer l;
@@ -462,14 +490,14 @@ class ExtrasWriter {
     view_at_ = int(blobs.size());
     if (extras.view) blobs.push_back({bytes_of(std::span<const float>(extras.view->coverage)), 4});
   }
-  const char* kind() const { return extras_.outgoing ? "matrix" : "diffuse"; }
+  const char* kind() const { return extras_.factors ? "factors" : extras_.outgoing ? "matrix" : "diffuse"; }
 
   // `first`: the buffer view of the first of `blobs`.
   void write(json& extension, int rows, int first) const {
     json& t = extension["transfer"];
     if (extras_.directional != DirectionalKind::none) t["directional"] = directional_name(extras_.directional);
     if (const Outgoing* outgoing = extras_.outgoing) {
-      t["rows"] = rows;
+      if (!extras_.factors) t["rows"] = rows;
       json& o = t["outgoing"];
       o = {{"kind", outgoing_names[int(outgoing->kind)]}, {"order", outgoing->order}, {"frames", first}};
       if (outgoing->maps.empty()) {
@@ -507,7 +535,8 @@ class ExtrasWriter {
 void check_extras(const BakedExtras& extras, const LightBasis& light, int rows) {
   const LatticeTransfer* lattice = extras.lattice;
   LAMBENT_CHECK(!lattice || (lattice->transfer.columns() == light.count() && lattice->valid.size() == lattice->lattice.count()));
-  LAMBENT_CHECK(rows == (extras.outgoing ? extras.outgoing->rows() : directional_rows(extras.directional)));
+  LAMBENT_CHECK(!extras.factors || (rows == 1 && extras.outgoing && extras.outgoing->kind == OutgoingKind::map && light.order >= extras.outgoing->order));
+  LAMBENT_CHECK(rows == (extras.outgoing && !extras.factors ? extras.outgoing->rows() : directional_rows(extras.directional)));
 }
 
 }  // namespace
@@ -551,6 +580,16 @@ Result<void> save_baked(const std::string& path, const Scene& scene, const Recei
   });
 }
 
+Result<void> save_baked(const std::string& path, const Scene& scene, const Receivers& receivers, const Visibility& visibility,
+                        const std::string& provenance) {
+  LAMBENT_CHECK(visibility.receivers == receivers.count());
+  std::vector<uint8_t> lengths;
+  for (size_t r = 0; r < visibility.receivers; ++r) append_varint(lengths, visibility.begin[r + 1] - visibility.begin[r]);
+  return save(path, scene, receivers, visibility.data, {{lengths, 4}}, nullptr, provenance, [&](json& extension, int first) {
+    extension["transfer"] = {{"kind", "blocks"}, {"cube", visibility.size}, {"bits", visibility.bits}, {"receivers", visibility.receivers}, {"lengths", first}};
+  });
+}
+
 Result<Baked> load_baked(const std::string& path) {
   auto file = MappedFile::open(path);
   if (!file) return file.error();
@@ -577,9 +616,10 @@ Result<Baked> load_baked(const MappedFile& file, const std::string& path) {
   const auto t = extension.find("transfer");
   if (t == extension.end() || !t->is_object()) return Error{where, "\"transfer\" is missing"};
   auto text = [&](const char* key) { return t->contains(key) && (*t)[key].is_string() ? (*t)[key].get<std::string>() : ""; };
-  const bool is_matrix = text("kind") == "matrix", is_zonal = text("kind") == "zonal";
-  if (!is_matrix && !is_zonal && text("kind") != "diffuse") return Error{where, "transfer of kind \"" + text("kind") + "\" is not known to this program"};
-  auto light = read_light(*t, where);
+  baked.factors = text("kind") == "factors";
+  const bool is_matrix = text("kind") == "matrix" || baked.factors, is_zonal = text("kind") == "zonal", is_blocks = text("kind") == "blocks";
+  if (!is_matrix && !is_zonal && !is_blocks && text("kind") != "diffuse") return Error{where, "transfer of kind \"" + text("kind") + "\" is not known to this program"};
+  auto light = is_blocks ? Result<LightBasis>(LightBasis{}) : read_light(*t, where);
   if (!light) return light.error();
   auto receivers = read_count(*t, "receivers", 0xfffffffe, where);
   if (!receivers) return receivers.error();
@@ -588,7 +628,12 @@ Result<Baked> load_baked(const MappedFile& file, const std::string& path) {
     if (!kind) return Error{where, "directional light \"" + text("directional") + "\" is not known to this program"};
     baked.directional = *kind;
   }
-  if (is_zonal) {
+  if (is_blocks) {
+    if (extension.contains("surface")) return Error{where, "visibility in blocks is baked at vertices"};
+    auto visibility = read_visibility(*chunks, file, *t, where);
+    if (!visibility) return visibility.error();
+    baked.visibility = std::move(*visibility);
+  } else if (is_zonal) {
     auto lobes = read_count(*t, "lobeCount", size_t(max_stored_lobes), where);
     if (!lobes) return lobes.error();
     if (*lobes < 1) return Error{where, "there are no lobes"};
@@ -598,7 +643,9 @@ Result<Baked> load_baked(const MappedFile& file, const std::string& path) {
     if (auto ok = read_transfer_data(*chunks, file, *t, zonal, where); !ok) return ok.error();
   } else {
     int rows = directional_rows(baked.directional);
-    if (is_matrix) {
+    if (baked.factors && (rows != 1 || t->contains("cpca") || light->count() != size_t(sh_count(light->order))))
+      return Error{where, "visibility as a factor is of harmonics alone, with one row"};
+    if (is_matrix && !baked.factors) {
       auto count = read_count(*t, "rows", 2 * sh_count(max_sh_order), where);
       if (!count) return count.error();
       if (*count < 1) return Error{where, "the transfer has no rows"};
@@ -614,12 +661,19 @@ Result<Baked> load_baked(const MappedFile& file, const std::string& path) {
     }
     if (is_matrix) {
       if (!t->contains("outgoing") || !(*t)["outgoing"].is_object()) return Error{where, "\"outgoing\" is missing"};
+      if (baked.factors) {
+        auto order = read_count((*t)["outgoing"], "order", size_t(max_incident_order), where + ": outgoing");
+        if (!order) return order.error();
+        rows = sh_count(int(*order));
+      }
       auto outgoing = read_outgoing(*chunks, (*t)["outgoing"], rows, *receivers, where + ": outgoing");
       if (!outgoing) return outgoing.error();
+      if (baked.factors && (outgoing->kind != OutgoingKind::map || baked.transfer.light.order < outgoing->order || baked.transfer.channels != 1))
+        return Error{where, "visibility as a factor has too few bands, or a last reflection of another kind, or more than one channel"};
       baked.outgoing = std::move(*outgoing);
     }
   }
-  if (const auto object = extension.find("lattice"); object != extension.end()) {
+  if (const auto object = extension.find("lattice"); object != extension.end() && !is_blocks) {
     auto lattice = read_lattice(*chunks, file, *object, light_of(baked), where + ": lattice");
     if (!lattice) return lattice.error();
     baked.lattice = std::move(*lattice);
@@ -632,7 +686,7 @@ Result<Baked> load_baked(const MappedFile& file, const std::string& path) {
   const auto provenance = extension.find("provenance");
   baked.provenance = provenance == extension.end() ? "{}" : provenance->dump(-1, ' ', false, json::error_handler_t::replace);
   if (const auto object = extension.find("view"); object != extension.end()) {
-    if (is_zonal || is_matrix || baked.directional != DirectionalKind::none) return Error{where, "a fixed view has one row a pixel"};
+    if (is_zonal || is_matrix || is_blocks || baked.directional != DirectionalKind::none) return Error{where, "a fixed view has one row a pixel"};
     auto view = read_view(*chunks, *object, *receivers, where + ": view");
     if (!view) return view.error();
     baked.view = std::move(*view);
@@ -661,6 +715,7 @@ Result<Baked> load_baked(const MappedFile& file, const std::string& path) {
 
 LightBasis light_of(const Baked& baked) {
   if (baked.zonal) return {.order = baked.zonal->order};
+  if (baked.factors) return {.order = baked.transfer.light.order - baked.outgoing->order + 1};
   return baked.cpca ? baked.cpca->light : baked.transfer.light;
 }
 

@@ -10,6 +10,7 @@
 #include <lambent/transfer/outgoing.h>
 #include <lambent/transfer/directional.h>
 #include <lambent/transfer/transfer.h>
+#include <lambent/transfer/visibility.h>
 #include <lambent/transfer/zonal_transfer.h>
 
 #include <optional>
@@ -35,7 +36,9 @@ struct Baked {
   DirectionalKind directional = DirectionalKind::none;  // what the rows of a directional lightmap are
   std::optional<LatticeTransfer> lattice;  // light in free space, for the same light; its data lies in the mapped file too
   std::optional<ZonalTransfer> zonal;  // in place of `transfer`, which then has no receivers; read in place too
+  std::optional<Visibility> visibility;  // in place of `transfer` as well: all-frequency light; its records are read in place
   std::optional<CpcaTransfer> cpca;    // likewise in place of `transfer`
+  bool factors = false;               // `transfer` is visibility times cosine, from which relight_factors() makes the rows of `outgoing`
   std::optional<FixedView> view;      // then receivers are pixels, and no surface has any
   std::string provenance;             // JSON text: inputs and their hashes, options, version, what the bake reported
 };
@@ -53,10 +56,11 @@ struct BakedExtras {
   DirectionalKind directional = DirectionalKind::none;  // of a directional lightmap
   const ViewerLook* look = nullptr;
   const LatticeTransfer* lattice = nullptr;             // light in free space, for the same light as the transfer
+  bool factors = false;                                 // `transfer` is visibility times cosine, of one row and channel; needs `outgoing`, a map
   const FixedView* view = nullptr;                      // the receivers are its pixels
 };
 
-// What all kinds have.
+// What all kinds have. The light is what relighting takes.
 LightBasis light_of(const Baked& baked);
 size_t receivers_of(const Baked& baked);
 
@@ -65,6 +69,8 @@ size_t receivers_of(const Baked& baked);
 Result<void> save_baked(const std::string& path, const Scene& scene, const Receivers& receivers, const Transfer& transfer,
                         const std::string& provenance, const BakedExtras& extras = {});
 Result<void> save_baked(const std::string& path, const Scene& scene, const Receivers& receivers, const ZonalTransfer& transfer,
+                        const std::string& provenance);
+Result<void> save_baked(const std::string& path, const Scene& scene, const Receivers& receivers, const Visibility& visibility,
                         const std::string& provenance);
 // In place of the transfer that it was made of.
 Result<void> save_baked(const std::string& path, const Scene& scene, const Receivers& receivers, const CpcaTransfer& transfer,

@@ -475,5 +475,82 @@ TEST(BakedFile, RefusesOtherThings) {
   EXPECT_FALSE(is_baked("/nonexistent/x.glb"));
 }
 
+// A small scene with visibility in blocks: a box over a sheet, levels by a formula.
+Visibility small_visibility(size_t receivers, int bits) {
+  std::vector<std::vector<uint8_t>> pieces(1);
+  std::vector<uint32_t> lengths;
+  std::vector<uint8_t> levels(cube_texels(16));
+  Random random(4);
+  for (size_t r = 0; r < receivers; ++r) {
+    for (size_t t = 0; t < levels.size(); ++t) levels[t] = t < 512 ? uint8_t(0) : random.next() < 0.1f ? uint8_t(random.next() * float(1 << bits)) : levels[t - 1];
+    const size_t before = pieces[0].size();
+    encode_visibility(16, bits, levels, pieces[0]);
+    lengths.push_back(uint32_t(pieces[0].size() - before));
+  }
+  return make_visibility(16, bits, std::move(pieces), lengths);
+}
+
+TEST(BakedFile, VisibilityComesBackAsItWas) {
+  for (int bits : {1, 6}) {
+    const TemporaryFile file("blocks.glb");
+    const Small s = small_bake(1, Precision::half);
+    const Visibility v = small_visibility(s.receivers.count(), bits);
+    ASSERT_TRUE(save_baked(file.path, s.scene, s.receivers, v, "{}"));
+    auto back = load_baked(file.path);
+    ASSERT_TRUE(back) << back.error().text();
+    ASSERT_TRUE(back->visibility);
+    EXPECT_EQ(back->visibility->size, 16);
+    EXPECT_EQ(back->visibility->bits, bits);
+    EXPECT_EQ(back->visibility->begin, v.begin);
+    EXPECT_TRUE(std::equal(v.data.begin(), v.data.end(), back->visibility->data.begin(), back->visibility->data.end()));
+    EXPECT_EQ(back->front, s.receivers.front);
+    EXPECT_EQ(back->back, s.receivers.back);
+    EXPECT_EQ(back->transfer.receivers, 0u);
+  }
+}
+
+// Every other cube, more bits, any cut and any changed byte: refused in one line, or read without harm.
+TEST(BakedFile, BrokenVisibilityIsRefusedOrHarmless) {
+  const TemporaryFile file("blocks_broken.glb");
+  const Small s = small_bake(1, Precision::half);
+  ASSERT_TRUE(save_baked(file.path, s.scene, s.receivers, small_visibility(s.receivers.count(), 6), "{}"));
+  const std::vector<uint8_t> whole = *read_file(file.path);
+  const std::string text(whole.begin(), whole.end());
+  auto refuses = [&](const std::string& from, const std::string& to, const char* why) {
+    ASSERT_EQ(from.size(), to.size());
+    std::string changed = text;
+    const size_t at = changed.find(from);
+    ASSERT_NE(at, std::string::npos) << from;
+    changed.replace(at, from.size(), to);
+    ASSERT_TRUE(write_file_atomically(file.path, changed));
+    auto baked = load_baked(file.path);
+    ASSERT_FALSE(baked) << to;
+    EXPECT_NE(baked.error().text().find(why), std::string::npos) << baked.error().text();
+    EXPECT_EQ(baked.error().text().find('\n'), std::string::npos);
+  };
+  refuses("\"cube\":16", "\"cube\":32", "is broken");
+  refuses("\"cube\":16", "\"cube\":17", "multiple of 16");
+  refuses("\"bits\":6", "\"bits\":0", "bits");
+  refuses("\"bits\":6", "\"bits\":1", "is broken");
+  refuses("\"bits\":6", "\"bits\":9", "bits");
+  Random random(8);
+  size_t refused = 0;
+  for (int i = 0; i < 3000; ++i) {
+    std::string changed = text;
+    if (i % 8 == 0) changed.resize(size_t(random.next() * float(text.size())));
+    else changed[size_t(random.next() * float(text.size()))] = char(random.next64());
+    ASSERT_TRUE(write_file_atomically(file.path, changed));
+    auto baked = load_baked(file.path);
+    if (!baked) {
+      ++refused;
+      continue;
+    }
+    if (!baked->visibility) continue;
+    std::vector<uint8_t> levels(cube_texels(baked->visibility->size));
+    for (size_t r = 0; r < baked->visibility->receivers; ++r) decode_visibility(*baked->visibility, r, levels);
+  }
+  EXPECT_GT(refused, 500u);
+}
+
 }  // namespace
 }  // namespace lambent

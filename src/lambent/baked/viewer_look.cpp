@@ -60,7 +60,7 @@ void LookWriter::add_blobs(std::vector<GltfBlob>& blobs) {
     if (!side.indices.empty()) blobs.push_back({bytes_of(side.at), 4}), blobs.push_back({bytes_of(side.indices), 4});
 }
 
-// A copy of the material that glows with the texture; lamps with their own emission.
+// A copy of the material that glows with the texture; lamps with their own emission, which, of those with a texture, is in ours.
 size_t LookWriter::lit_material(json& document, const json& original, size_t texture) const {
   json lit = {{"pbrMetallicRoughness", {{"baseColorFactor", {0, 0, 0, 1}}, {"metallicFactor", 0}, {"roughnessFactor", 1}}},
               {"doubleSided", false}};
@@ -71,7 +71,7 @@ size_t LookWriter::lit_material(json& document, const json& original, size_t tex
   double own[3] = {0, 0, 0};
   if (original.contains("emissiveFactor") && original["emissiveFactor"].is_array() && original["emissiveFactor"].size() == 3)
     for (size_t c = 0; c < 3; ++c) own[c] = original["emissiveFactor"][c].is_number() ? original["emissiveFactor"][c].get<double>() : 0;
-  if (own[0] > 0 || own[1] > 0 || own[2] > 0) {
+  if ((own[0] > 0 || own[1] > 0 || own[2] > 0) && !original.contains("emissiveTexture")) {
     lit["emissiveFactor"] = original["emissiveFactor"];
     const json none = json::object();
     const json& given = original.contains("extensions") ? original["extensions"] : none;

@@ -244,10 +244,12 @@ void split_vertices(Scene& scene, const Charts& charts, const std::vector<std::a
   struct {
     std::vector<Vec3> positions, normals, colors;
     std::vector<Vec2> texcoords;
+    std::vector<Vec4> tangents;
     std::vector<Triangle> triangles;
-  } old{std::move(scene.positions), std::move(scene.normals), std::move(scene.colors), std::move(scene.texcoords[0]), scene.triangles};
+  } old{std::move(scene.positions), std::move(scene.normals), std::move(scene.colors), std::move(scene.texcoords[0]),
+        std::move(scene.tangents), scene.triangles};
   scene.positions.clear(), scene.normals.clear(), scene.colors.clear();
-  scene.texcoords[0].clear(), scene.texcoords[1].clear();
+  scene.texcoords[0].clear(), scene.texcoords[1].clear(), scene.tangents.clear();
   const bool backs = any_two_sided(scene);
   struct Key {
     uint32_t vertex, chart;
@@ -267,6 +269,7 @@ void split_vertices(Scene& scene, const Charts& charts, const std::vector<std::a
       scene.positions.push_back(old.positions[key.vertex]), scene.normals.push_back(old.normals[key.vertex]);
       if (!old.texcoords.empty()) scene.texcoords[0].push_back(old.texcoords[key.vertex]);
       if (!old.colors.empty()) scene.colors.push_back(old.colors[key.vertex]);
+      if (!old.tangents.empty()) scene.tangents.push_back(old.tangents[key.vertex]);
     }
     atlas.front.resize(scene.positions.size(), Vec2(0));
     if (backs) atlas.back.resize(scene.positions.size(), Vec2(0));
@@ -307,7 +310,8 @@ Result<Atlas> make_atlas(Scene& scene, const AtlasOptions& o) {
   }
   for (const Part& part : scene.parts) {
     const Material& m = scene.materials[part.material];
-    if (m.base_color_texture >= 0 && m.texcoord_set == 1)
+    if ((m.base_color_texture >= 0 && m.texcoord_set == 1) || (m.normal_texture >= 0 && m.normal_set == 1) ||
+        (m.emissive_texture >= 0 && m.emissive_set == 1))
       return Error{scene.path, "material \"" + m.name + "\" reads TEXCOORD_1, which the lightmap would replace"};
   }
   Layout layout;

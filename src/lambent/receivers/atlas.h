@@ -26,12 +26,15 @@ struct Atlas {
 // Reuses TEXCOORD_1 if every triangle with an area has its own place there within [0, 1]^2; else cuts the surface into charts
 // (charts.h), packs them, splits vertices where charts part and writes TEXCOORD_1: front / (width, height). Backs of two-sided
 // triangles get places of their own. Splitting changes the scene's vertices. Errors: options out of range; an atlas too small
-// or too large (says the size needed); a material whose base colour reads TEXCOORD_1, which then cannot be replaced.
+// or too large (says the size needed); a material whose base colour, normals or emission read TEXCOORD_1, which then cannot be replaced.
 Result<Atlas> make_atlas(Scene& scene, const AtlasOptions& options);
 
 // A receiver for every texel whose tent reaches the surface: at its centre, or, for texels partly covered, at the surface's
 // point closest to it, moved a hair inwards.
 Receivers make_texel_receivers(const Scene& scene, const Atlas& atlas);
+
+// Moves receiver `r` to a point of a triangle's side. `texel`: the length of one in the scene; `diagonal`: of the scene's bounds.
+void place_texel(const Scene& scene, Receivers& receivers, size_t r, const TexelPlace& place, bool back, float texel, float diagonal);
 
 // Heights-first shelves: rectangles of the given sizes, none wider than `width`, placed without overlap; their corners, and the
 // height needed. Time n log n.

@@ -27,6 +27,19 @@ TexelReceivers texel_receivers(const Scene& scene, int width, int height, const 
   return map;
 }
 
+void place_texel(const Scene& scene, Receivers& receivers, size_t r, const TexelPlace& at, bool back, float texel, float diagonal) {
+  const Triangle& t = scene.triangles[at.triangle];
+  const Vec3 face = normalize_or(area_normal(scene, t), Vec3(0, 1, 0)) * (back ? -1.0f : 1.0f);
+  Vec3 n = normalize_or(interpolate(scene.normals, t, at.u, at.v), face);
+  if (glm::dot(n, face) < 0) n = -n;
+  Vec3 p = interpolate(scene.positions, t, at.u, at.v);
+  const Vec3 inward = (scene.positions[t.v[0]] + scene.positions[t.v[1]] + scene.positions[t.v[2]]) / 3.0f - p;
+  if (std::min({at.u, at.v, 1 - at.u - at.v}) < border_inset)
+    p += inward * std::min(0.5f, border_inset * texel / std::max(glm::length(inward), 1e-30f));
+  receivers.origins[r] = p + face * receiver_lift(p, texel, diagonal);
+  receivers.normals[r] = n, receivers.places[r] = at;
+}
+
 Receivers make_texel_receivers(const Scene& scene, const Atlas& atlas) {
   const size_t texels = size_t(atlas.width) * size_t(atlas.height);
   TexelReceivers map = texel_receivers(scene, atlas.width, atlas.height, atlas.front, atlas.back, std::vector<uint32_t>(texels, none));
@@ -60,20 +73,12 @@ Receivers make_texel_receivers(const Scene& scene, const Atlas& atlas) {
   const Bounds box = bounds(scene);
   const float diagonal = box.diagonal(), texel_size = 1 / std::max(atlas.texels_per_unit, 1e-30f);
   Receivers r;
+  r.origins.resize(used.size()), r.normals.resize(used.size()), r.places.resize(used.size());
+  uint32_t next = 0;
   for (uint32_t i : curve_order(places, box)) {
     const Nearest& at = nearest[used[i]];
-    const Triangle& t = scene.triangles[at.triangle];
-    map.texels[used[i]] = uint32_t(r.count());
-    const float side = at.back ? -1.0f : 1.0f;
-    const Vec3 face = normalize_or(area_normal(scene, t), Vec3(0, 1, 0)) * side;
-    Vec3 n = normalize_or(interpolate(scene.normals, t, at.u, at.v), face);
-    if (glm::dot(n, face) < 0) n = -n;
-    Vec3 p = places[i];
-    const Vec3 inward = (scene.positions[t.v[0]] + scene.positions[t.v[1]] + scene.positions[t.v[2]]) / 3.0f - p;
-    if (std::min({at.u, at.v, 1 - at.u - at.v}) < border_inset)
-      p += inward * std::min(0.5f, border_inset * texel_size / std::max(glm::length(inward), 1e-30f));
-    r.origins.push_back(p + face * receiver_lift(p, texel_size, diagonal));
-    r.normals.push_back(n), r.places.push_back({at.triangle, at.u, at.v});
+    map.texels[used[i]] = next;
+    place_texel(scene, r, next++, {at.triangle, at.u, at.v}, at.back, texel_size, diagonal);
   }
   r.basis = std::move(map);
   return r;

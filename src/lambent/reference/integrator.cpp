@@ -98,8 +98,10 @@ bool make_vertex(const Integrator& integrator, const Hit& hit, Vec3 d, PathVerte
   if (!front && !triangle.two_sided) return false;
   vertex.ng = front ? s.ng : -s.ng;
   vertex.position = s.position + vertex.ng * s.offset;
-  Vec3 n = normalize_or(interpolate(scene.normals, triangle, hit.u, hit.v), vertex.ng);
-  if (glm::dot(n, vertex.ng) < 0) n = -n;
+  Vec3 n = normalize_or(interpolate(scene.normals, triangle, hit.u, hit.v), s.ng);
+  if (glm::dot(n, s.ng) < 0) n = -n;
+  if (integrator.reflection.normal_maps) n = mapped_normal(scene, triangle, hit.u, hit.v, n);
+  if (!front) n = -n;
   vertex.frame = shading_frame(scene, triangle, n);
   // Near silhouettes the shading normal can turn away from the eye while the surface does not: lift wo to its horizon, so
   // that such places are not black.

@@ -6,6 +6,7 @@
 namespace lambent::reference {
 namespace {
 
+// Without its texture: what densities follow.
 Vec3 material_emission(const Scene& scene, const Triangle& t) { return scene.materials[scene.parts[t.part].material].emissive; }
 
 double weight(Vec3 radiance) { return double(std::max({radiance.x, radiance.y, radiance.z})); }
@@ -50,7 +51,7 @@ EmitterSample sample_emitter(const EmitterSampler& s, Vec3 point, float pick, Ve
 Vec3 emitted(const Scene& scene, const Hit& hit, Vec3 d) {
   const Triangle& t = scene.triangles[hit.triangle];
   const bool front = glm::dot(area_normal(scene, t), d) < 0;
-  return front || t.two_sided ? material_emission(scene, t) : Vec3(0);
+  return front || t.two_sided ? emission(scene, t, hit.u, hit.v) : Vec3(0);
 }
 
 float emitter_pdf(const EmitterSampler& s, const Hit& hit, Vec3 point, Vec3 d) {

@@ -3,8 +3,8 @@
 // basis and no ray tracing: an error there must not cancel against itself here.
 //
 // What it computes. Light is distant: the environment, constant over each texel; and, where asked for, the scene's own lamps:
-// emissive materials (their factor, on the sides that are not black) and punctual lights. At a hit point
-// with interpolated normal n, turned to the side that is seen, exit radiance is the integral of f L max(0, n . wi) over the
+// emissive materials (factor times texture, on the sides that are not black) and punctual lights. At a hit point
+// with interpolated normal n, bent by the normal texture and turned to the side that is seen, exit radiance is the integral of f L max(0, n . wi) over the
 // directions wi above the true (geometric) surface; what lies along wi is decided by true geometry. With k bounces, light
 // reaches the first hit directly or after reflection at 1, 2, ... k other points. No path is cut short or dropped at random.
 #include <lambent/core/camera.h>

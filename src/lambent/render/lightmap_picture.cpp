@@ -41,15 +41,30 @@ Image lightmap_picture(const TexelReceivers& texels, const Relit& relit, int dil
   return lightmap_picture(texels, values, dilate);
 }
 
-std::vector<Vec3> texel_albedo(const Scene& scene, const Receivers& receivers) {
+namespace {
+
+template <class Value>
+std::vector<Vec3> at_places(const Scene& scene, const Receivers& receivers, Value value) {
   std::vector<Vec3> out(receivers.places.size());
   parallel_for(out.size(), 4096, [&](size_t begin, size_t end) {
     for (size_t r = begin; r < end; ++r) {
       const TexelPlace& p = receivers.places[r];
-      out[r] = albedo(scene, scene.triangles[p.triangle], p.u, p.v);
+      out[r] = value(scene.triangles[p.triangle], p.u, p.v);
     }
   });
   return out;
+}
+
+}  // namespace
+
+std::vector<Vec3> texel_albedo(const Scene& scene, const Receivers& receivers) {
+  return at_places(scene, receivers, [&](const Triangle& t, float u, float v) { return albedo(scene, t, u, v); });
+}
+
+std::vector<Vec3> texel_emission(const Scene& scene, const Receivers& receivers) {
+  return at_places(scene, receivers, [&](const Triangle& t, float u, float v) {
+    return scene.materials[scene.parts[t.part].material].emissive_texture < 0 ? Vec3(0) : emission(scene, t, u, v);
+  });
 }
 
 }  // namespace lambent

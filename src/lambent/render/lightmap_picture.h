@@ -13,7 +13,8 @@ Image lightmap_picture(const TexelReceivers& texels, const Relit& relit, int dil
 // The same of any values, one a receiver.
 Image lightmap_picture(const TexelReceivers& texels, const std::vector<Vec3>& values, int dilate = 4);
 
-// Albedo where each texel receives.
+// Albedo where each texel receives; and what textures of emission send out there, 0 where a lamp has none.
 std::vector<Vec3> texel_albedo(const Scene& scene, const Receivers& receivers);
+std::vector<Vec3> texel_emission(const Scene& scene, const Receivers& receivers);
 
 }  // namespace lambent

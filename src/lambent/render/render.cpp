@@ -4,6 +4,7 @@
 #include <lambent/core/sampling.h>
 #include <lambent/render/render.h>
 #include <lambent/scene/lights.h>
+#include <lambent/scene/reflection.h>
 
 namespace lambent {
 namespace {
@@ -50,12 +51,17 @@ Result<void> trace_pixels(const Scene& scene, const Tracer& tracer, const Camera
   return {};
 }
 
+// What the light at a hit is multiplied by.
+Vec3 shown_colour(const Scene& scene, const RenderOptions& options, const Hit& hit) {
+  return options.show == RenderOptions::Show::product ? albedo(scene, scene.triangles[hit.triangle], hit.u, hit.v) : Vec3(1);
+}
+
 // O(view) at a hit, as what it is, a row of numbers: radiance is the sum over all add(receiver, row, weight) of weight times that row of
 // T . light. `weights` is scratch, a value a row.
 template <class Add>
 void reflect_at(const Scene& scene, const SpatialBasis& basis, const RenderOptions& options, const Hit& hit, Vec3 direction,
                 std::span<ViewWeights> weights, Add add) {
-  const Vec3 colour = options.albedo ? albedo(scene, scene.triangles[hit.triangle], hit.u, hit.v) : Vec3(1);
+  const Vec3 colour = shown_colour(scene, options, hit);
   std::visit([&](const auto& b) {
     const auto* at = b.find(hit.triangle, hit.front);
     if (!at) return;
@@ -95,13 +101,15 @@ Result<Image> render(const Scene& scene, const Tracer& tracer, const SpatialBasi
   return render_surfaces(scene, tracer, camera, options, [&]() -> SurfaceShade {
     return [&, weights = std::vector<ViewWeights>(size_t(relit.rows))](const Hit& hit, Vec3 direction) mutable {
       const Triangle& triangle = scene.triangles[hit.triangle];
+      if (options.show == RenderOptions::Show::albedo) return albedo(scene, triangle, hit.u, hit.v);
       Vec3 sum(0.0f);
-      if (!options.emission.empty() && emits(scene, triangle, hit.front)) sum += options.emission[scene.parts[triangle.part].material];
+      if (!options.emission.empty() && emits(scene, triangle, hit.front))
+        sum += options.emission[scene.parts[triangle.part].material] * emission_texel(scene, triangle, hit.u, hit.v);
       if (options.directional == DirectionalKind::none) {
         reflect_at(scene, basis, options, hit, direction, weights, [&](uint32_t receiver, int row, Vec3 weight) { sum += weight * relit.at(receiver, row); });
         return sum;
       }
-      const Vec3 colour = options.albedo ? albedo(scene, triangle, hit.u, hit.v) : Vec3(1);
+      const Vec3 colour = shown_colour(scene, options, hit);
       std::array<Vec3, 9> rows{};
       std::visit([&](const auto& b) {
         const auto* at = b.find(hit.triangle, hit.front);
@@ -110,10 +118,12 @@ Result<Image> render(const Scene& scene, const Tracer& tracer, const SpatialBasi
           for (int row = 0; row < relit.rows; ++row) rows[size_t(row)] += weight * relit.at(receiver, row);
         });
       }, basis);
-      const Vec3 face = normalize_or(area_normal(scene, triangle), Vec3(0, 1, 0)) * (hit.front ? 1.0f : -1.0f);
+      const float side = hit.front ? 1.0f : -1.0f;
+      const Vec3 face = normalize_or(area_normal(scene, triangle), Vec3(0, 1, 0));
       Vec3 n = normalize_or(interpolate(scene.normals, triangle, hit.u, hit.v), face);
       if (glm::dot(n, face) < 0) n = -n;
-      return sum + colour * evaluate_directional_light(options.directional, rows, receiver_frame(n), n);
+      const Vec3 bent = mapped_normal(scene, triangle, hit.u, hit.v, n);
+      return sum + colour * evaluate_directional_light(options.directional, rows, receiver_frame(side * n), side * bent);
     };
   }, progress);
 }

@@ -18,10 +18,11 @@ struct RenderOptions {
   int width = 512, height = 512;  // pixels
   int samples = 16;               // rays a pixel, [1, 4096], box filter
   const Environment* background = nullptr;  // null: black, and the image has alpha (coverage)
-  bool albedo = true;             // false: as if everything were white
+  // The light that surfaces receive, as if they were white (radiosity); their colour; or the product of both.
+  enum class Show { product, radiosity, albedo } show = Show::product;
   const Outgoing* outgoing = nullptr;  // the last reflection of transfer matrices; null: diffuse
-  DirectionalKind directional = DirectionalKind::none;  // what relit's rows are; shaded with the interpolated normal
-  std::vector<Vec3> emission;     // radiance of each material's surfaces as lamps that are seen; empty: none are
+  DirectionalKind directional = DirectionalKind::none;  // what relit's rows are; shaded with the normal that the normal texture gives
+  std::vector<Vec3> emission;     // radiance of each material's surfaces as lamps that are seen, times emissive textures; empty: none are
 };
 
 // One-sided triangles are absent from behind, as in any glTF viewer. Errors: cancelled.

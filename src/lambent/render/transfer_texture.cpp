@@ -31,7 +31,9 @@ Result<Image> render_transfer_texture(const Scene& scene, const Tracer& tracer, 
       const Vec2 uv = scene.texcoords[0].empty() ? Vec2(0.0f) : interpolate(scene.texcoords[0], t, hit.u, hit.v);
       sample_zonal_texture(texture, uv * tile, values);
       const Vec3 white = shade_zonal(texture.transfer, values, texture_frame(scene, t, normal), light);
-      return options.albedo ? albedo(scene, t, hit.u, hit.v) * white : white;
+      if (options.show == RenderOptions::Show::radiosity) return white;
+      const Vec3 colour = albedo(scene, t, hit.u, hit.v);
+      return options.show == RenderOptions::Show::albedo ? colour : colour * white;
     };
   }, progress);
 }

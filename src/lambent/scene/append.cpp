@@ -25,7 +25,7 @@ void place_scene(Scene& scene, Vec3 foot, float scale) {
 void append_scene(Scene& a, const Scene& b) {
   const size_t vertices = a.positions.size(), added = b.positions.size();
   LAMBENT_CHECK(vertices + added < none && a.triangles.size() + b.triangles.size() < none);
-  append_attribute(a.colors, vertices, b.colors, added, Vec3(1));
+  append_attribute(a.colors, vertices, b.colors, added, Vec3(1)), append_attribute(a.tangents, vertices, b.tangents, added, Vec4(0));
   for (size_t set = 0; set < a.texcoords.size(); ++set) append_attribute(a.texcoords[set], vertices, b.texcoords[set], added, Vec2(0));
   a.positions.insert(a.positions.end(), b.positions.begin(), b.positions.end());
   a.normals.insert(a.normals.end(), b.normals.begin(), b.normals.end());
@@ -42,7 +42,7 @@ void append_scene(Scene& a, const Scene& b) {
     a.parts.push_back(std::move(part));
   }
   for (Material material : b.materials) {
-    for (int* texture : {&material.base_color_texture, &material.metallic_roughness_texture})
+    for (int* texture : {&material.base_color_texture, &material.metallic_roughness_texture, &material.normal_texture, &material.emissive_texture})
       if (*texture >= 0) *texture += int(a.textures.size());
     a.materials.push_back(std::move(material));
   }

@@ -15,7 +15,9 @@ TEST(AppendScene, KeepsBothAsTheyWere) {
   a.textures.push_back(texture);
   texture.rgb = {10, 200, 30};
   b.textures.push_back(texture);
-  b.materials[0].base_color_texture = b.materials[0].metallic_roughness_texture = 0;
+  b.materials[0].base_color_texture = b.materials[0].metallic_roughness_texture = b.materials[0].emissive_texture = 0;
+  b.materials[0].emissive = Vec3(2);
+  b.tangents.assign(b.positions.size(), Vec4(1, 0, 0, -1));
   b.colors.assign(b.positions.size(), Vec3(0.5f));
   b.texcoords[1].assign(b.positions.size(), Vec2(0.25f, 0.75f));
   Scene both = a;
@@ -28,6 +30,8 @@ TEST(AppendScene, KeepsBothAsTheyWere) {
     const Triangle& before = from.triangles[first ? t : t - a.triangles.size()];
     EXPECT_EQ(albedo(both, both.triangles[t], 0.2f, 0.3f), albedo(from, before, 0.2f, 0.3f));
     EXPECT_EQ(metallic_roughness(both, both.triangles[t], 0.2f, 0.3f), metallic_roughness(from, before, 0.2f, 0.3f));
+    EXPECT_EQ(emission(both, both.triangles[t], 0.2f, 0.3f), emission(from, before, 0.2f, 0.3f));
+    EXPECT_EQ(both.tangents[both.triangles[t].v[0]], first ? Vec4(0) : Vec4(1, 0, 0, -1));
     for (int k = 0; k < 3; ++k) {
       EXPECT_EQ(both.positions[both.triangles[t].v[k]], from.positions[before.v[k]]);
       EXPECT_EQ(both.normals[both.triangles[t].v[k]], from.normals[before.v[k]]);

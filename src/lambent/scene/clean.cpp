@@ -240,7 +240,7 @@ void make_normals(Scene& scene, std::span<const size_t> parts, bool flat) {
       }
       values = std::move(moved);
     };
-    insert_copies(scene.positions), insert_copies(scene.normals), insert_copies(scene.colors);
+    insert_copies(scene.positions), insert_copies(scene.normals), insert_copies(scene.colors), insert_copies(scene.tangents);
     insert_copies(scene.texcoords[0]), insert_copies(scene.texcoords[1]);
   }
   uint32_t shift = 0;

@@ -73,11 +73,13 @@ GltfMaterial read_material(GltfCheck& check, const Json& json, size_t texture_co
   if (const Json* extension = read_extension(check, json, "KHR_materials_emissive_strength", where)) {
     strength = check.number(*extension, "emissiveStrength", 1, where);
   }
-  out.emissive_texture = check.object(json, "emissiveTexture", where) != nullptr;
   constexpr double brightest = 1e30;  // keeps the float finite
-  for (int c = 0; c < 3; ++c) {
-    m.emissive[c] = out.emissive_texture ? 0.0f : float(std::clamp(factor[c] * strength, 0.0, brightest));
-  }
+  for (int c = 0; c < 3; ++c) m.emissive[c] = float(std::clamp(factor[c] * strength, 0.0, brightest));
+  read_texture_reference(check, json, "emissiveTexture", texture_count, where, out.emissive);
+  read_texture_reference(check, json, "normalTexture", texture_count, where, out.normal);
+  constexpr double steepest = 1e6;
+  if (const Json* info = check.object(json, "normalTexture", where))
+    m.normal_scale = float(std::clamp(check.number(*info, "scale", 1, where), -steepest, steepest));
   return out;
 }
 
@@ -176,10 +178,10 @@ std::vector<GltfMaterial> read_materials(GltfCheck& check, const GltfDocument& d
 bool read_textures(GltfCheck& check, GltfDocument& document, const std::vector<GltfMaterial>& materials,
                    const std::vector<bool>& used, const std::vector<std::string>& image_problems, Scene& scene) {
   TextureReader reader(document, image_problems, scene);
-  size_t translucent = 0, glowing = 0;
+  size_t translucent = 0;
   for (size_t i = 0; i < materials.size(); ++i) {
     if (!used[i]) continue;
-    translucent += !materials[i].opaque, glowing += materials[i].emissive_texture;
+    translucent += !materials[i].opaque;
     auto read = [&](GltfCheck& checked, const GltfTextureUse& use, const char* what) {
       if (use.texcoord_set <= 1) return reader.read(checked, *use.texture);
       checked.fail({"material", i}, std::string("its ") + what + " reads TEXCOORD_" + std::to_string(use.texcoord_set) +
@@ -192,21 +194,23 @@ bool read_textures(GltfCheck& check, GltfDocument& document, const std::vector<G
       m.texcoord_set = int(use.texcoord_set), m.uv_transform = use.transform;
       if (!check.ok()) return false;
     }
-    if (const GltfTextureUse& use = materials[i].metallic_roughness; use.texture) {
-      // Few look at it: the scene is still good without.
+    // The scene is still good without these.
+    auto read_extra = [&](const GltfTextureUse& use, const char* what, int& texture, int& set, std::array<float, 6>& transform) {
+      if (!use.texture) return true;
       GltfCheck trial = check;
-      const int texture = read(trial, use, "metallic-roughness");
-      if (trial.ok()) {
-        m.metallic_roughness_texture = texture;
-        m.metallic_roughness_set = int(use.texcoord_set), m.metallic_roughness_transform = use.transform;
-      } else {
-        scene.warnings.push_back("metallic-roughness texture not read: " + trial.error().message);
-      }
-    }
+      const int read_texture = read(trial, use, what);
+      if (trial.ok()) texture = read_texture, set = int(use.texcoord_set), transform = use.transform;
+      else scene.warnings.push_back(std::string(what) + " texture not read: " + trial.error().message);
+      return trial.ok();
+    };
+    const GltfMaterial& from = materials[i];
+    read_extra(from.metallic_roughness, "metallic-roughness", m.metallic_roughness_texture, m.metallic_roughness_set, m.metallic_roughness_transform);
+    read_extra(from.normal, "normal", m.normal_texture, m.normal_set, m.normal_transform);
+    // A lamp of unknown pattern gives no light.
+    const bool black = m.emissive == Vec3(0);
+    if (!black && !read_extra(from.emissive, "emissive", m.emissive_texture, m.emissive_set, m.emissive_transform)) m.emissive = Vec3(0);
   }
   warn_count(scene, translucent, " material with alpha is treated as opaque", " materials with alpha are treated as opaque");
-  warn_count(scene, glowing, " material has an emissive texture, which is not read",
-             " materials have emissive textures, which are not read");
   return true;
 }
 

@@ -13,15 +13,14 @@ struct GltfTextureUse {
 
 struct GltfMaterial {
   Material material;  // its textures not set yet
-  GltfTextureUse base_color, metallic_roughness;
-  bool opaque = true, emissive_texture = false;
+  GltfTextureUse base_color, metallic_roughness, normal, emissive;
+  bool opaque = true;
 };
 
 // All of the document's materials, in its order.
 std::vector<GltfMaterial> read_materials(GltfCheck& check, const GltfDocument& document);
 
-// Decodes the base colour and metallic-roughness images of the materials that `used` marks into scene.textures, each once, and sets the textures
-// of scene.materials, whose first ones are the document's. `image_problems` says for each image why its file could not be read
+// Decodes the images of the materials that `used` marks into scene.textures, each once, and sets the textures of scene.materials, whose first ones are the document's. `image_problems` says for each image why its file could not be read
 // (empty: it could).
 bool read_textures(GltfCheck& check, GltfDocument& document, const std::vector<GltfMaterial>& materials,
                    const std::vector<bool>& used, const std::vector<std::string>& image_problems, Scene& scene);

@@ -89,7 +89,7 @@ size_t GlbWriter::add_vectors(std::span<const float> values, int components, boo
   Json accessor = {{"bufferView", view},
                    {"componentType", int(GltfType::f32)},
                    {"count", count},
-                   {"type", components == 2 ? "VEC2" : "VEC3"}};
+                   {"type", "VEC" + std::to_string(components)}};
   if (with_bounds) {
     add_bounds(accessor, count, components, [&](size_t i, int c) { return double(values[i * size_t(components) + size_t(c)]); });
   }

@@ -220,7 +220,7 @@ class PrimitiveReader {
     if (!check_.ok()) return false;
     part.material = material ? uint32_t(*material) : default_material();
     if (!read_vertices(check_, document_, *attributes, positions, targets, placement, where, scene_.positions, scene_.normals) ||
-        !read_colors(*attributes, positions.count, where)) {
+        !read_colors(*attributes, positions.count, where) || !read_tangents(*attributes, positions.count, placement, where)) {
       return false;
     }
     if (!read_triangles(part, mode, indices, triangles, placement.mirrored, where)) return false;
@@ -275,6 +275,25 @@ class PrimitiveReader {
     for (size_t i = 0; a && i < count; ++i) {
       Vec3 color(a->read3(i));
       if (is_finite(color)) scene_.colors[first + i] = glm::max(color, Vec3(0.0f));
+    }
+    return true;
+  }
+
+  bool read_tangents(const Json& attributes, size_t count, const GltfPlacement& placement, const GltfWhere& where) {
+    auto a = read_attribute(check_, document_, attributes, "TANGENT", count, where);
+    if (!check_.ok()) return false;
+    if (a && (a->components != 4 || a->is_matrix || a->type == GltfType::u32)) return check_.fail(where, "TANGENT is not four floats or small integers");
+    if (!attributes.contains("NORMAL")) a.reset();  // void without
+    if (!a && scene_.tangents.empty()) return true;
+    const size_t first = scene_.positions.size() - count;
+    scene_.tangents.resize(first + count, Vec4(0.0f));
+    for (size_t i = 0; a && i < count; ++i) {
+      double t[4] = {};
+      a->read(i, t);
+      const glm::dmat3 world(placement.joints ? placement.at(i) : placement.world);
+      const Vec3 along = normalize_or(Vec3(world * glm::dvec3(t[0], t[1], t[2])), Vec3(0.0f));
+      if (along == Vec3(0) || !(std::abs(t[3]) > 0)) continue;
+      scene_.tangents[first + i] = Vec4(along, (t[3] > 0) == (glm::determinant(world) > 0) ? 1.0f : -1.0f);
     }
     return true;
   }

@@ -1,5 +1,6 @@
 #include <lambent/scene/gltf_test-inl.h>
 
+#include <lambent/scene/reflection.h>
 #include <gtest/gtest.h>
 
 namespace lambent {
@@ -364,6 +365,52 @@ TEST(LoadGltf, MetallicRoughnessTextures) {
   EXPECT_EQ(s.warnings[0], "metallic-roughness texture not read: is neither PNG nor JPEG");
   broken.json["materials"][0]["pbrMetallicRoughness"]["metallicRoughnessTexture"]["index"] = 7;
   EXPECT_FALSE(broken.load());
+}
+
+TEST(LoadGltf, NormalTexturesAndTangents) {
+  // A texel (51, 204, 230) = (-0.6, 0.6, 0.804), seen under a node that turns or mirrors: the normal turns and mirrors with it.
+  const Vec3 local = glm::normalize(Vec3(2 * 51 / 255.0f - 1, 2 * 204 / 255.0f - 1, 2 * 230 / 255.0f - 1));
+  for (bool tangents : {false, true})
+    for (bool mirrored : {false, true}) {
+      Builder b = textured(make_png(1, 1, 3, 8, {51, 204, 230}));
+      b.json["materials"][0] = {{"normalTexture", {{"index", 0}, {"scale", 1}}}};
+      Json& attributes = primitive(b)["attributes"];
+      attributes["TEXCOORD_0"] = b.floats({0, 1, 1, 1, 0, 0}, "VEC2");  // upright: u along x, v against y
+      if (tangents) attributes["TANGENT"] = b.floats({1, 0, 0, 1, 1, 0, 0, 1, 1, 0, 0, 1}, "VEC4");
+      // Ry(90 degrees), after x changes its sign: x -> -z or z, z -> x.
+      const float q = std::sqrt(0.5f);
+      b.json["nodes"][0]["rotation"] = {0, q, 0, q};
+      if (mirrored) b.json["nodes"][0]["scale"] = {-1, 1, 1};
+      const Scene s = loaded(b);
+      ASSERT_EQ(s.materials[0].normal_texture, 0);
+      EXPECT_EQ(s.tangents.empty(), !tangents);
+      const Vec3 expected(local.z, local.y, mirrored ? local.x : -local.x);
+      EXPECT_LT(glm::length(mapped_normal(s, s.triangles[0], 0.2f, 0.3f, s.normals[0]) - expected), 10 * rounding) << tangents << mirrored;
+    }
+  Builder broken = textured(make_png(1, 1, 3, 8, {128, 128, 255}));
+  primitive(broken)["attributes"]["TANGENT"] = broken.floats({1, 0, 0, 1, 0, 0, 1, 0, 0}, "VEC3");
+  EXPECT_FALSE(broken.load());
+}
+
+TEST(LoadGltf, EmissiveTextures) {
+  Builder b = textured(make_png(1, 1, 3, 8, {255, 188, 0}));
+  b.json["materials"][0] = {{"emissiveTexture", {{"index", 0}, {"texCoord", 1}}}, {"emissiveFactor", {1, 0.5, 1}},
+                            {"extensions", {{"KHR_materials_emissive_strength", {{"emissiveStrength", 8}}}}}};
+  Scene s = loaded(b);
+  EXPECT_EQ(s.materials[0].emissive, Vec3(8, 4, 8));
+  EXPECT_EQ(s.materials[0].emissive_set, 1);
+  const Vec3 e = emission(s, s.triangles[0], 0.2f, 0.3f);
+  EXPECT_NEAR(e.x, 8, rounding);
+  EXPECT_NEAR(e.y, 4 * 0.5029f, 1e-3f);  // sRGB 188 is half of white
+  EXPECT_EQ(e.z, 0);
+  // Without its picture it is dark, and a warning says so; a black one asks for none.
+  b.json["images"][0] = {{"bufferView", b.view(bytes_of("no image"))}, {"mimeType", "image/png"}};
+  s = loaded(b);
+  EXPECT_EQ(s.materials[0].emissive, Vec3(0));
+  ASSERT_EQ(s.warnings.size(), 1u);
+  EXPECT_EQ(s.warnings[0], "emissive texture not read: is neither PNG nor JPEG");
+  b.json["materials"][0]["emissiveFactor"] = {0, 0, 0};
+  EXPECT_TRUE(loaded(b).warnings.empty());
 }
 
 TEST(LoadGltf, TexturesAreDecodedOnce) {

@@ -259,6 +259,7 @@ Pose deform_scene(const Scene& scene, const Deformation& deformation) {
 Scene posed(const Scene& scene, const Pose& pose) {
   Scene s = scene;
   s.positions = pose.positions, s.normals = pose.normals;
+  s.tangents.clear();  // they were the rest pose's: texture coordinates tell them anew
   for (Triangle& t : s.triangles)
     if (pose.mirrored[t.part]) std::swap(t.v[1], t.v[2]);
   return s;

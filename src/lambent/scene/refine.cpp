@@ -44,6 +44,7 @@ class EdgeSplitter {
     for (size_t p = 0; p < scene_.parts.size(); ++p) split_part(uint32_t(p));
     scene_.positions = std::move(out_.positions), scene_.normals = std::move(out_.normals);
     scene_.texcoords = std::move(out_.texcoords), scene_.colors = std::move(out_.colors);
+    scene_.tangents = std::move(out_.tangents);
     scene_.triangles = std::move(out_.triangles);
     out_ = Scene();
   }
@@ -83,6 +84,7 @@ class EdgeSplitter {
       to.insert(to.end(), from.begin() + part.first_vertex, from.begin() + part.first_vertex + part.vertex_count);
     };
     copy(scene_.positions, out_.positions), copy(scene_.normals, out_.normals), copy(scene_.colors, out_.colors);
+    copy(scene_.tangents, out_.tangents);
     for (size_t set = 0; set < 2; ++set) copy(scene_.texcoords[set], out_.texcoords[set]);
   }
 
@@ -91,6 +93,10 @@ class EdgeSplitter {
       if (!values.empty()) values.push_back(0.5f * values[a] + 0.5f * values[b]);
     };
     halve(out_.positions), halve(out_.colors), halve(out_.texcoords[0]), halve(out_.texcoords[1]);
+    if (!out_.tangents.empty()) {
+      const Vec4 t = out_.tangents[a], other = out_.tangents[b];
+      out_.tangents.push_back(Vec4(normalize_or(Vec3(t) + Vec3(other), Vec3(t)), t.w));
+    }
     if (out_.normals.empty()) return;
     Vec3 normal = out_.normals[a];
     out_.normals.push_back(normalize_or(normal + out_.normals[b], normal));

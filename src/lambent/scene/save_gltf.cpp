@@ -51,7 +51,18 @@ class MaterialWriter {
     }
     Json json = {{"pbrMetallicRoughness", std::move(pbr)}, {"doubleSided", two_sided}};
     if (!m.name.empty()) json["name"] = m.name;
+    if (m.normal_texture >= 0) {
+      auto texture = add_texture(size_t(m.normal_texture));
+      if (!texture) return texture.error();
+      json["normalTexture"] = texture_reference(*texture, m.normal_set, m.normal_transform);
+      if (m.normal_scale != 1) json["normalTexture"]["scale"] = finite_or(m.normal_scale, 1);
+    }
     add_emission(json, m.emissive);
+    if (m.emissive_texture >= 0) {
+      auto texture = add_texture(size_t(m.emissive_texture));
+      if (!texture) return texture.error();
+      json["emissiveTexture"] = texture_reference(*texture, m.emissive_set, m.emissive_transform);
+    }
     return materials_[{index, two_sided}] = out_.push("materials", std::move(json));
   }
 
@@ -70,8 +81,11 @@ class MaterialWriter {
         const Json alpha = factor.is_array() && factor.size() == 4 ? factor[3] : Json(1.0f);
         factor = Json::array({m.base_color.x, m.base_color.y, m.base_color.z, alpha});
       }
-      if (m.emissive != before[i].material.emissive) {
-        json.erase("emissiveTexture"), json.erase("emissiveFactor");
+      const bool textured = before[i].emissive.texture.has_value(), lost = textured && m.emissive_texture < 0;
+      const bool unread = lost && m.emissive == Vec3(0);  // the loader could not, or it is black anyhow
+      if ((m.emissive != before[i].material.emissive || lost) && !unread) {
+        if (lost) json.erase("emissiveTexture");
+        json.erase("emissiveFactor");
         if (json.contains("extensions")) json["extensions"].erase("KHR_materials_emissive_strength");
         add_emission(json, m.emissive);
       }
@@ -142,6 +156,7 @@ Vec3 local_normal(const glm::dmat4& m, Vec3 world) {
 }
 
 std::span<const float> floats(const std::vector<Vec3>& v) { return {v.empty() ? nullptr : &v[0].x, v.size() * 3}; }
+std::span<const float> floats(const std::vector<Vec4>& v) { return {v.empty() ? nullptr : &v[0].x, v.size() * 4}; }
 std::span<const float> floats(const std::vector<Vec2>& v) { return {v.empty() ? nullptr : &v[0].x, v.size() * 2}; }
 
 size_t add_triangles(GlbWriter& out, const Scene& scene, const Part& part, bool mirrored) {
@@ -182,8 +197,20 @@ void write_geometry(GlbWriter& out, const Scene& scene, const Part& part, const 
     bool says = std::any_of(colors.begin(), colors.end(), [](Vec3 c) { return c != Vec3(1.0f); });
     if (says || before.contains("COLOR_0")) attributes["COLOR_0"] = out.add_vectors(floats(colors), 3, false);
   }
+  const bool mirrored = glm::determinant(glm::dmat3(frame)) < 0;
+  if (!scene.tangents.empty()) {
+    std::vector<Vec4> tangents(scene.tangents.begin() + first, scene.tangents.begin() + first + count);
+    for (Vec4& t : tangents) {
+      const glm::dvec3 local = glm::dmat3(inverse) * glm::dvec3(t);
+      const double length = glm::length(local);
+      t = Vec4(length > 0 && std::isfinite(length) ? Vec3(local / length) : Vec3(0), mirrored ? -t.w : t.w);
+    }
+    // A tangent that is missing may not be written: then viewers make all of them.
+    bool says = std::all_of(tangents.begin(), tangents.end(), [](Vec4 t) { return Vec3(t) != Vec3(0) && t.w != 0; });
+    if (says) attributes["TANGENT"] = out.add_vectors(floats(tangents), 4, false);
+  }
   primitive["attributes"] = std::move(attributes);
-  primitive["indices"] = add_triangles(out, scene, part, glm::determinant(glm::dmat3(frame)) < 0);
+  primitive["indices"] = add_triangles(out, scene, part, mirrored);
   primitive.erase("mode");
 }
 

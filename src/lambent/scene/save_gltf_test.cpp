@@ -50,6 +50,11 @@ void expect_same_material(const Material& a, const Material& b, const Scene& sa,
   expect_same_texture(a.base_color_texture, b.base_color_texture, a.uv_transform, b.uv_transform);
   expect_same_texture(a.metallic_roughness_texture, b.metallic_roughness_texture, a.metallic_roughness_transform,
                       b.metallic_roughness_transform);
+  expect_same_texture(a.normal_texture, b.normal_texture, a.normal_transform, b.normal_transform);
+  expect_same_texture(a.emissive_texture, b.emissive_texture, a.emissive_transform, b.emissive_transform);
+  EXPECT_EQ(a.normal_set, b.normal_set);
+  EXPECT_EQ(a.normal_scale, b.normal_scale);
+  EXPECT_EQ(a.emissive_set, b.emissive_set);
   if (a.base_color_texture >= 0) {
     EXPECT_EQ(a.texcoord_set, b.texcoord_set);
   }
@@ -73,6 +78,7 @@ void expect_same(const Scene& a, const Scene& b, float tolerance = 0) {
       Vec2 uv_b = b.texcoords[set].empty() ? Vec2(0) : b.texcoords[set][i];
       slid = std::max(slid, glm::length(uv_a - uv_b));
     }
+    if (!a.tangents.empty() && !b.tangents.empty()) turned = std::max(turned, glm::length(a.tangents[i] - b.tangents[i]));
     Vec3 color_a = a.colors.empty() ? Vec3(1) : a.colors[i], color_b = b.colors.empty() ? Vec3(1) : b.colors[i];
     faded = std::max(faded, glm::length(color_a - color_b));
   }
@@ -116,6 +122,8 @@ Scene made_scene() {
     if (i == 1) m.uv_transform = {2 * std::cos(0.3f), 3 * std::sin(0.3f), 0.5f, -2 * std::sin(0.3f), 3 * std::cos(0.3f), -0.25f};
     if (i == 2) m.uv_transform = {1, 0, 0, 0, -1, 1};  // upside down
     if (i >= 2) m.metallic_roughness_texture = 3 - i, m.metallic_roughness_set = 1, m.metallic_roughness_transform = {2, 0, 0.5f, 0, 1, 0};
+    if (i == 1) m.normal_texture = 2, m.normal_set = 1, m.normal_transform = {1, 0, 0.25f, 0, 2, 0}, m.normal_scale = -1.5f;
+    if (i == 3) m.emissive_texture = 1, m.emissive_set = 1, m.emissive_transform = {3, 0, 0, 0, 1, 0.5f};
     s.materials.push_back(m);
   }
   Random random(3);
@@ -129,6 +137,7 @@ Scene made_scene() {
       s.normals.push_back(glm::normalize(Vec3(random.next() - 0.5f, random.next() - 0.5f, random.next() + 0.1f)));
       s.texcoords[0].push_back(p == 0 ? Vec2(0.0f) : random.next2());
       s.texcoords[1].push_back(random.next2());
+      s.tangents.push_back(Vec4(frame_about(s.normals.back())[0], p % 2 ? 1 : -1));
       s.colors.push_back(p < 2 ? Vec3(1.0f) : Vec3(random.next(), random.next(), random.next()));
     }
     uint32_t v = part.first_vertex;

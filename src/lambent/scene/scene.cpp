@@ -63,13 +63,6 @@ Vec3 sample_bytes(const Texture& texture, Vec2 uv, const std::array<float, 256>&
   return glm::mix(top, bottom, t.share);
 }
 
-// Where a texture is looked up: the interpolated coordinates of a set, transformed.
-Vec2 texture_place(const Scene& scene, const Triangle& triangle, float u, float v, int set, const std::array<float, 6>& m) {
-  const std::vector<Vec2>& texcoords = scene.texcoords[size_t(set)];
-  Vec2 uv = texcoords.empty() ? Vec2(0.0f) : interpolate(texcoords, triangle, u, v);
-  return {m[0] * uv.x + m[1] * uv.y + m[2], m[3] * uv.x + m[4] * uv.y + m[5]};
-}
-
 }  // namespace
 
 float srgb_to_linear(float e) { return e <= 0.04045f ? e / 12.92f : std::pow((e + 0.055f) / 1.055f, 2.4f); }
@@ -86,6 +79,12 @@ Bounds bounds(const Scene& scene) {
   return box;
 }
 
+Vec2 texture_place(const Scene& scene, const Triangle& triangle, float u, float v, int set, const std::array<float, 6>& m) {
+  const std::vector<Vec2>& texcoords = scene.texcoords[size_t(set)];
+  Vec2 uv = texcoords.empty() ? Vec2(0.0f) : interpolate(texcoords, triangle, u, v);
+  return {m[0] * uv.x + m[1] * uv.y + m[2], m[3] * uv.x + m[4] * uv.y + m[5]};
+}
+
 Vec3 sample_texture(const Texture& texture, Vec2 uv) { return sample_bytes(texture, uv, decode_table()); }
 
 Vec3 sample_linear_texture(const Texture& texture, Vec2 uv) { return sample_bytes(texture, uv, linear_table()); }
@@ -99,6 +98,16 @@ Vec3 albedo(const Scene& scene, const Triangle& triangle, float u, float v) {
   }
   if (!scene.colors.empty()) color *= interpolate(scene.colors, triangle, u, v);
   return glm::clamp(color, Vec3(0.0f), Vec3(1.0f));
+}
+
+Vec3 emission_texel(const Scene& scene, const Triangle& triangle, float u, float v) {
+  const Material& m = scene.materials[scene.parts[triangle.part].material];
+  if (m.emissive_texture < 0) return Vec3(1.0f);
+  return sample_texture(scene.textures[size_t(m.emissive_texture)], texture_place(scene, triangle, u, v, m.emissive_set, m.emissive_transform));
+}
+
+Vec3 emission(const Scene& scene, const Triangle& triangle, float u, float v) {
+  return scene.materials[scene.parts[triangle.part].material].emissive * emission_texel(scene, triangle, u, v);
 }
 
 Vec2 metallic_roughness(const Scene& scene, const Triangle& triangle, float u, float v) {

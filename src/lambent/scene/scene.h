@@ -25,7 +25,7 @@ struct Texture {
   Wrap wrap_s = Wrap::repeat, wrap_t = Wrap::repeat;
 };
 
-// glTF metallic-roughness. The diffuse pipeline reads base colour alone; reflection.h says what else there is.
+// glTF metallic-roughness. The diffuse pipeline reads base colour and emission; reflection.h says what else there is.
 struct Material {
   std::string name;
   Vec3 base_color{1.0f};        // linear, [0, 1]
@@ -38,7 +38,15 @@ struct Material {
   int metallic_roughness_texture = -1;
   int metallic_roughness_set = 0;
   std::array<float, 6> metallic_roughness_transform{1, 0, 0, 0, 1, 0};
-  Vec3 emissive{0.0f};       // radiance, linear
+  // Normals about the surface's own (mapped_normal): a byte b stands for 2 b / 255 - 1, x and y times the scale.
+  int normal_texture = -1;
+  int normal_set = 0;
+  std::array<float, 6> normal_transform{1, 0, 0, 0, 1, 0};
+  float normal_scale = 1.0f;
+  Vec3 emissive{0.0f};        // radiance, linear; times the texture
+  int emissive_texture = -1;
+  int emissive_set = 0;
+  std::array<float, 6> emissive_transform{1, 0, 0, 0, 1, 0};
   bool double_sided = true;  // false: seen from the front only; its back is black to light and absent to cameras
 };
 
@@ -84,6 +92,8 @@ struct Scene {
   std::vector<Vec3> normals;                // unit, as many as positions
   std::array<std::vector<Vec2>, 2> texcoords;  // each empty, or as many as positions
   std::vector<Vec3> colors;                 // linear vertex colours: empty, or as many as positions
+  // Along +u of the normal texture; w: the sign of the bitangent cross(n, t) w. Empty, or as many as positions; zero: not given.
+  std::vector<Vec4> tangents;
 
   std::vector<Triangle> triangles;
   std::vector<Part> parts;          // in order of their runs, covering all vertices and triangles
@@ -113,6 +123,13 @@ Vec3 albedo(const Scene& scene, const Triangle& triangle, float u, float v);
 
 // (metallic, roughness): factors times the texture, at a point of a triangle, each in [0, 1].
 Vec2 metallic_roughness(const Scene& scene, const Triangle& triangle, float u, float v);
+
+// Radiance that a point of a triangle sends out of its own: factor times texture. The second: the texture alone, 1 without.
+Vec3 emission(const Scene& scene, const Triangle& triangle, float u, float v);
+Vec3 emission_texel(const Scene& scene, const Triangle& triangle, float u, float v);
+
+// Where a texture is looked up: the interpolated coordinates of a set, transformed.
+Vec2 texture_place(const Scene& scene, const Triangle& triangle, float u, float v, int set, const std::array<float, 6>& transform);
 
 // Bilinear look-up at texture coordinates (u, v), decoded to linear.
 Vec3 sample_texture(const Texture& texture, Vec2 uv);

@@ -6,7 +6,7 @@
 
 namespace lambent {
 
-const char* const outgoing_names[5] = {"map", "svd", "sh", "hemisphere", "hsh"};
+const char* const outgoing_names[6] = {"map", "svd", "sh", "hemisphere", "hsh", "phong"};
 
 Vec3 view_map_direction(int grid, int x, int y) {
   const Vec2 disk = square_to_disk({float(x) / float(grid - 1), float(y) / float(grid - 1)});
@@ -32,6 +32,7 @@ void look_up(const ViewMap& map, Vec3 wo, std::span<ViewWeights> out) {
 
 int Outgoing::rows() const {
   if (kind == OutgoingKind::map || kind == OutgoingKind::svd) return maps.empty() ? 0 : maps[0].rows;
+  if (kind == OutgoingKind::phong) return sh_count(order) + 1 + has_b;
   return sh_count(order) * (has_b ? 2 : 1);
 }
 
@@ -41,6 +42,13 @@ void evaluate_outgoing(const Outgoing& o, size_t receiver, Vec3 view, std::span<
   if (o.kind == OutgoingKind::map || o.kind == OutgoingKind::svd) return look_up(o.maps[o.map_of[receiver]], wo, out);
   float y[sh_count(max_sh_order)];
   const size_t n = size_t(sh_count(o.order));
+  if (o.kind == OutgoingKind::phong) {
+    evaluate_sh(o.order, Vec3(-wo.x, -wo.y, wo.z), {y, n});
+    for (size_t k = 0; k < n; ++k) out[k] = ViewWeights(y[k], y[k], y[k], 0);
+    out[n] = ViewWeights(1, 1, 1, 0);
+    if (o.has_b) out[n + 1] = ViewWeights(0, 0, 0, 1);
+    return;
+  }
   if (o.kind == OutgoingKind::hsh) evaluate_hsh(o.order, wo, {y, n});
   else evaluate_sh(o.order, wo, {y, n});
   for (size_t k = 0; k < n; ++k) {

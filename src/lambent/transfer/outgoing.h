@@ -19,8 +19,9 @@ enum class OutgoingKind {
   sh,          // rows: outgoing radiance in spherical harmonics, zero below the horizon
   hemisphere,  // the same, fitted by least squares on the hemisphere alone
   hsh,         // rows: outgoing radiance in hemispherical harmonics
+  phong,       // rows: light convolved with Phong's lobe, in harmonics of the mirrored view; then diffuse radiance
 };
-extern const char* const outgoing_names[5];  // by kind
+extern const char* const outgoing_names[6];  // by kind
 
 // a and b as (a.r, a.g, a.b, b).
 using ViewWeights = glm::vec4;
@@ -38,8 +39,9 @@ void look_up(const ViewMap& map, Vec3 wo, std::span<ViewWeights> out);
 
 struct Outgoing {
   OutgoingKind kind = OutgoingKind::map;
-  int order = 0;              // of the rows' basis (map: incident; sh, hemisphere, hsh: outgoing)
-  bool has_b = true;          // sh, hemisphere, hsh: order^2 rows of a, then order^2 of b; without b, those of a alone
+  int order = 0;              // of the rows' basis (map, phong: incident; sh, hemisphere, hsh: outgoing)
+  // sh, hemisphere, hsh: order^2 rows of a, then order^2 of b; without b, those of a alone. phong: order^2 rows of a, a diffuse one of a, and one of b.
+  bool has_b = true;
   std::vector<ViewMap> maps;  // map, svd: one a material
   std::vector<uint16_t> map_of;  // map, svd: by receiver
   std::vector<Mat3> frames;      // by receiver: tangent, bitangent, normal

@@ -1,0 +1,240 @@
+// Normal textures on directional lightmaps: against the bumps' own formula, and against the path tracer.
+#include <lambent/bake/lightmap.h>
+#include <lambent/receivers/atlas.h>
+#include <lambent/reference/path_tracer.h>
+#include <lambent/relight/relight.h>
+#include <lambent/render/render.h>
+#include <lambent/scene/procedural.h>
+#include <lambent/scene/reflection.h>
+
+#include <gtest/gtest.h>
+
+namespace lambent {
+namespace {
+
+// A tilted quad of 2 x 1.5 with bumps h = height sin(2 pi k s) sin(2 pi k t) on it, s along a, t along b, both from 0 to 1.
+struct Bumps {
+  Vec3 origin{0.3f, -0.2f, 0.1f}, a, b;
+  float height = 0.1f, k = 2;
+  Bumps() {
+    const Mat3 turn = rotation_from_yaw_pitch_roll({30, 20, -15});
+    a = turn * Vec3(2, 0, 0), b = turn * Vec3(0, 1.5f, 0);
+  }
+  Vec3 n() const { return glm::normalize(glm::cross(a, b)); }
+  // In the frame (a, b, n) / lengths: (-dh/ds / |a|, -dh/dt / |b|, 1).
+  Vec3 local(float s, float t) const {
+    const float w = 2 * pi * k;
+    return glm::normalize(Vec3(-height * w * std::cos(w * s) * std::sin(w * t) / glm::length(a), -height * w * std::sin(w * s) * std::cos(w * t) / glm::length(b), 1));
+  }
+  Vec3 normal(float s, float t) const {
+    const Vec3 l = local(s, t);
+    return l.x * glm::normalize(a) + l.y * glm::normalize(b) + l.z * n();
+  }
+  // Places (s, t) of a point of the plane.
+  Vec2 place(Vec3 p) const { return {glm::dot(p - origin, a) / glm::dot(a, a), glm::dot(p - origin, b) / glm::dot(b, b)}; }
+};
+
+// The quad, its normal texture and coordinates: the picture upright, or mirrored in u; with or without tangents.
+Scene bumpy(const Bumps& bumps, bool mirrored = false, bool tangents = false) {
+  Scene scene = make_quad(bumps.origin, bumps.a, bumps.b, 3, 3, Vec3(0.5f));
+  constexpr int size = 128;
+  Texture texture;
+  texture.width = texture.height = size;
+  for (int j = 0; j < size; ++j)
+    for (int i = 0; i < size; ++i) {
+      const float u = (float(i) + 0.5f) / size, v = (float(j) + 0.5f) / size;
+      Vec3 n = bumps.local(mirrored ? 1 - u : u, 1 - v);
+      if (mirrored) n.x = -n.x;  // its x is along +u, which runs against a
+      for (int c = 0; c < 3; ++c) texture.rgb.push_back(uint8_t(std::lround((n[c] + 1) / 2 * 255)));
+    }
+  scene.textures.push_back(texture);
+  scene.materials[0].normal_texture = 0;
+  for (Vec3 p : scene.positions) {
+    const Vec2 at = bumps.place(p);
+    scene.texcoords[0].push_back({mirrored ? 1 - at.x : at.x, 1 - at.y});
+    if (tangents) scene.tangents.push_back(Vec4(glm::normalize(mirrored ? -bumps.a : bumps.a), mirrored ? -1 : 1));
+  }
+  return scene;
+}
+
+Camera facing(const Bumps& bumps) {
+  const Vec3 middle = bumps.origin + 0.5f * (bumps.a + bumps.b);
+  return {middle + 3.5f * bumps.n() + 0.4f * bumps.a, middle, bumps.b, 35};
+}
+
+Image draw(Scene scene, const Environment* sky, DirectionalKind kind, int samples = 16) {
+  auto atlas = make_atlas(scene, {.texels_per_unit = 12});
+  EXPECT_TRUE(atlas);
+  const Receivers receivers = make_texel_receivers(scene, *atlas);
+  auto tracer = Tracer::build(scene);
+  auto map = bake_lightmap(scene, *tracer, receivers, make_lamps(scene, sky, false),
+                           {.samples = 2048, .lamp_samples = 256, .bounces = 0, .directional = kind, .precision = Precision::single}, false);
+  EXPECT_TRUE(map) << (map ? "" : map.error().text());
+  Relit relit;
+  relight(map->all, std::vector<Vec3>(map->all.columns(), Vec3(1)), relit);
+  auto image = render(scene, *tracer, receivers.basis, relit, facing(Bumps()), {.width = 96, .height = 72, .samples = samples, .directional = kind});
+  EXPECT_TRUE(image);
+  return *image;
+}
+
+// RMS difference over the covered pixels, relative to the second picture's mean.
+double difference(const Image& x, const Image& y) {
+  double square = 0, mean = 0;
+  size_t count = 0;
+  for (size_t i = 0; i < x.rgb.size(); ++i) {
+    if (y.alpha[i] < 1) continue;
+    square += double(glm::dot(x.rgb[i] - y.rgb[i], x.rgb[i] - y.rgb[i])) / 3, mean += double(y.rgb[i].x + y.rgb[i].y + y.rgb[i].z) / 3;
+    ++count;
+  }
+  EXPECT_GT(count, x.rgb.size() / 4);
+  return std::sqrt(square / double(count)) / (mean / double(count));
+}
+
+// Of the covered pixels' luminance: 1 for pictures that differ by gain and offset alone.
+double correlation(const Image& x, const Image& y) {
+  double n = 0, sx = 0, sy = 0, xx = 0, yy = 0, xy = 0;
+  for (size_t i = 0; i < x.rgb.size(); ++i) {
+    if (y.alpha[i] < 1) continue;
+    const double a = double(luminance(x.rgb[i])), b = double(luminance(y.rgb[i]));
+    n += 1, sx += a, sy += b, xx += a * a, yy += b * b, xy += a * b;
+  }
+  return (xy - sx * sy / n) / std::sqrt((xx - sx * sx / n) * (yy - sy * sy / n));
+}
+
+TEST(NormalMap, NormalsAreThoseOfTheBumps) {
+  const Bumps bumps;
+  constexpr float eight_bits = 0.012f;  // half a step in each of three channels, and between texels
+  for (bool mirrored : {false, true})
+    for (bool tangents : {false, true}) {
+      const Scene scene = bumpy(bumps, mirrored, tangents);
+      float worst = 0;
+      for (const Triangle& t : scene.triangles)
+        for (Vec2 uv : {Vec2(0.2f, 0.3f), Vec2(0.6f, 0.1f), Vec2(0.05f, 0.8f)}) {
+          const Vec2 at = bumps.place(interpolate(scene.positions, t, uv.x, uv.y));
+          worst = std::max(worst, glm::length(mapped_normal(scene, t, uv.x, uv.y, bumps.n()) - bumps.normal(at.x, at.y)));
+        }
+      EXPECT_LT(worst, eight_bits) << mirrored << tangents;
+    }
+  // The scale: half of the slope, as a fraction of x and y before they are made unit again.
+  Scene scene = bumpy(bumps);
+  scene.materials[0].normal_scale = 0.5f;
+  const Triangle& t = scene.triangles[4];
+  const Vec2 at = bumps.place(interpolate(scene.positions, t, 0.2f, 0.3f));
+  const Vec3 l = bumps.local(at.x, at.y) * Vec3(0.5f, 0.5f, 1), world = glm::normalize(l.x * glm::normalize(bumps.a) + l.y * glm::normalize(bumps.b) + l.z * bumps.n());
+  EXPECT_LT(glm::length(mapped_normal(scene, t, 0.2f, 0.3f, bumps.n()) - world), eight_bits);
+  // No texture, no coordinates, coordinates that do not vary: the surface's own.
+  for (Vec2& uv : scene.texcoords[0]) uv = Vec2(0.5f);
+  EXPECT_EQ(mapped_normal(scene, t, 0.2f, 0.3f, bumps.n()), bumps.n());
+  scene.texcoords[0].clear();
+  EXPECT_EQ(mapped_normal(scene, t, 0.2f, 0.3f, bumps.n()), bumps.n());
+}
+
+TEST(NormalMap, ALampOnBumpsIsItsFormula) {
+  const Bumps bumps;
+  Scene scene = bumpy(bumps);
+  const Vec3 I(3, 2, 1), to_sun = glm::normalize(bumps.n() + 0.5f * glm::normalize(bumps.a) - 0.3f * glm::normalize(bumps.b));
+  scene.lights.push_back({.name = "sun", .kind = PunctualLight::Kind::directional, .direction = -to_sun, .intensity = I});
+  Image formula(96, 72), flat(96, 72);
+  formula.alpha.assign(formula.rgb.size(), 0), flat.alpha = formula.alpha;
+  const CameraRays rays(facing(bumps), 96, 72);
+  for (int y = 0; y < 72; ++y)
+    for (int x = 0; x < 96; ++x) {
+      constexpr int grid = 4;
+      int covered = 0;
+      for (int k = 0; k < grid * grid; ++k) {
+        const Vec3 d = rays.direction(float(x) + (float(k % grid) + 0.5f) / grid, float(y) + (float(k / grid) + 0.5f) / grid);
+        const Vec3 p = rays.eye + d * (glm::dot(bumps.origin - rays.eye, bumps.n()) / glm::dot(d, bumps.n()));
+        const Vec2 at = bumps.place(p);
+        if (at.x < 0 || at.x > 1 || at.y < 0 || at.y > 1) continue;
+        ++covered;
+        formula.at(x, y) += 0.5f * I * std::max(0.0f, glm::dot(bumps.normal(at.x, at.y), to_sun)) / pi / float(grid * grid);
+        flat.at(x, y) += 0.5f * I * glm::dot(bumps.n(), to_sun) / pi / float(grid * grid);
+      }
+      formula.alpha[size_t(y) * 96 + size_t(x)] = flat.alpha[size_t(y) * 96 + size_t(x)] = float(covered) / (grid * grid);
+    }
+  EXPECT_GT(difference(flat, formula), 0.2);  // the bumps show
+  for (bool mirrored : {false, true}) {
+    Scene drawn = bumpy(bumps, mirrored);
+    drawn.lights = scene.lights;
+    EXPECT_LT(difference(draw(drawn, nullptr, DirectionalKind::vector), formula), 0.012) << mirrored;
+    auto traced = path_trace(drawn, make_environment("black", 4, 2, [](Vec3) { return Vec3(0); }), facing(bumps),
+                             {.width = 96, .height = 72, .spp = 16, .bounces = 0, .background = false, .lamps = true});
+    ASSERT_TRUE(traced);
+    EXPECT_LT(difference(traced->image, formula), 0.012) << mirrored;
+  }
+  // The other ways store one lamp as well as they can (see DirectionalLightmap); what the flat normal misses is more.
+  EXPECT_LT(difference(draw(scene, nullptr, DirectionalKind::sh3), formula), 0.1);
+}
+
+TEST(NormalMap, UnderASkyAsThePathTracerHasIt) {
+  const Bumps bumps;
+  Scene scene = bumpy(bumps);
+  scene.materials[0].base_color = Vec3(0.8f, 0.5f, 0.3f);
+  const Vec3 bright = glm::normalize(bumps.n() + 0.7f * glm::normalize(bumps.a));
+  const Environment sky = make_environment("lobe", 64, 32, [&](Vec3 d) { return Vec3(0.2f, 0.3f, 0.5f) + std::exp(8 * (glm::dot(d, bright) - 1)) * Vec3(4, 3, 2); });
+  auto traced = path_trace(scene, sky, facing(bumps), {.width = 96, .height = 72, .spp = 256, .bounces = 0, .background = false});
+  ASSERT_TRUE(traced);
+  ReferenceOptions smooth{.width = 96, .height = 72, .spp = 256, .bounces = 0, .background = false};
+  smooth.reflection.normal_maps = false;
+  auto flat = path_trace(scene, sky, facing(bumps), smooth);
+  ASSERT_TRUE(flat);
+  const double bump = difference(flat->image, traced->image);
+  EXPECT_GT(bump, 0.12);
+  EXPECT_LT(difference(draw(scene, &sky, DirectionalKind::sh3), traced->image), 0.15 * bump);
+  // The cheaper ones err in brightness (DirectionalLightmap says by how much) more than in the relief.
+  EXPECT_LT(correlation(flat->image, traced->image), 0.5);
+  for (DirectionalKind kind : {DirectionalKind::sh2, DirectionalKind::hl2, DirectionalKind::vector})
+    EXPECT_GT(correlation(draw(scene, &sky, kind), traced->image), 0.9) << int(kind);
+}
+
+TEST(NormalMap, BacksHaveTheNegatedNormal) {
+  // A sun behind a two-sided quad: the path tracer and the lightmap agree about what is seen from there.
+  const Bumps bumps;
+  Scene scene = bumpy(bumps);
+  for (Triangle& t : scene.triangles) t.two_sided = true;
+  const Vec3 to_sun = glm::normalize(-bumps.n() + 0.5f * glm::normalize(bumps.a));
+  scene.lights.push_back({.name = "sun", .kind = PunctualLight::Kind::directional, .direction = -to_sun, .intensity = Vec3(2)});
+  Camera camera = facing(bumps);
+  camera.eye = 2.0f * camera.target - camera.eye;
+  auto traced = path_trace(scene, make_environment("black", 4, 2, [](Vec3) { return Vec3(0); }), camera,
+                           {.width = 96, .height = 72, .spp = 64, .bounces = 0, .background = false, .lamps = true});
+  ASSERT_TRUE(traced);
+  const Receivers receivers = make_vertex_receivers(scene);
+  auto tracer = Tracer::build(scene);
+  auto map = bake_lightmap(scene, *tracer, receivers, make_lamps(scene, nullptr, false),
+                           {.samples = 64, .bounces = 0, .directional = DirectionalKind::vector, .precision = Precision::single}, false);
+  ASSERT_TRUE(map);
+  Relit relit;
+  relight(map->all, std::vector<Vec3>{Vec3(1)}, relit);
+  auto image = render(scene, *tracer, receivers.basis, relit, camera, {.width = 96, .height = 72, .samples = 64, .directional = DirectionalKind::vector});
+  ASSERT_TRUE(image);
+  EXPECT_LT(difference(*image, traced->image), 0.01);
+}
+
+TEST(Show, RadiosityTimesAlbedoIsTheProduct) {
+  Scene scene = make_quad(Vec3(0), Vec3(0, 0, 1), Vec3(1, 0, 0), 2, 2, Vec3(0.8f, 0.4f, 0.2f));
+  const Receivers receivers = make_vertex_receivers(scene);
+  auto tracer = Tracer::build(scene);
+  Relit relit;
+  relit.rows = 1;
+  relit.values.assign((receivers.count() + transfer_block - 1) / transfer_block * 3 * transfer_block, 0.0f);
+  for (size_t r = 0; r < receivers.count(); ++r) relit.set(r, 0, float(r + 1) * Vec3(0.25f, 0.5f, 0.75f));
+  auto shown = [&](RenderOptions::Show show) {
+    auto image = render(scene, *tracer, receivers.basis, relit, camera_around(bounds(scene)), {.width = 24, .height = 24, .samples = 1, .show = show});
+    EXPECT_TRUE(image);
+    return *image;
+  };
+  const Image product = shown(RenderOptions::Show::product), light = shown(RenderOptions::Show::radiosity), colour = shown(RenderOptions::Show::albedo);
+  double sum = 0;
+  for (size_t i = 0; i < product.rgb.size(); ++i) {
+    for (int c = 0; c < 3; ++c) EXPECT_FLOAT_EQ(product.rgb[i][c], light.rgb[i][c] * colour.rgb[i][c]);
+    if (colour.alpha[i] > 0) {
+      EXPECT_EQ(colour.rgb[i], Vec3(0.8f, 0.4f, 0.2f));
+    }
+    sum += double(product.rgb[i].x);
+  }
+  EXPECT_GT(sum, 0);
+}
+
+}  // namespace
+}  // namespace lambent
