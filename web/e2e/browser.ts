@@ -126,3 +126,54 @@ export function writeBall(path: string): void {
     }
   writeFileSync(path, lines.join('\n') + '\n');
 }
+
+/**
+ * A skinned glTF: a sheet with ridges, 2 long and 1 wide, whose far half a bone turns over a second by 80 degrees about a skew axis
+ * (animation "bend"). `blend`: over how much of its length the skin goes from one bone to the other. Normals are those of the ridges.
+ */
+export function writeSkin(path: string, blend: number): void {
+  const columns = 96, rows = 40, positions: number[] = [], normals: number[] = [], joints: number[] = [], weights: number[] = [], indices: number[] = [];
+  for (let j = 0; j <= rows; ++j)
+    for (let i = 0; i <= columns; ++i) {
+      const x = (2 * i) / columns - 1, z = j / rows - 0.5, kx = 17, kz = 9, a = 0.07;
+      positions.push(x, a * Math.sin(kx * x) * Math.cos(kz * z + 0.7), z);
+      const n = [-a * kx * Math.cos(kx * x) * Math.cos(kz * z + 0.7), 1, a * kz * Math.sin(kx * x) * Math.sin(kz * z + 0.7)], size = Math.hypot(...n);
+      normals.push(...n.map((v) => v / size));
+      const t = Math.min(1, Math.max(0, x / blend + 0.5)), w = t * t * (3 - 2 * t);
+      joints.push(0, 1, 0, 0), weights.push(1 - w, w, 0, 0);
+    }
+  const at = (i: number, j: number): number => j * (columns + 1) + i;
+  for (let j = 0; j < rows; ++j) for (let i = 0; i < columns; ++i) indices.push(at(i, j), at(i, j + 1), at(i + 1, j), at(i + 1, j), at(i, j + 1), at(i + 1, j + 1));
+  const axis = [0.36, 0.48, 0.8], half = (40 * Math.PI) / 180, turn = [...axis.map((v) => v * Math.sin(half)), Math.cos(half)];
+  const identity = [1, 0, 0, 0, 0, 1, 0, 0, 0, 0, 1, 0, 0, 0, 0, 1];
+  const pieces: Buffer[] = [], bufferViews: object[] = [], accessors: object[] = [];
+  let length = 0;
+  const add = (values: Float32Array | Uint32Array | Uint8Array, type: string, size: number, more: object = {}): number => {
+    const bytes = Buffer.from(values.buffer, values.byteOffset, values.byteLength);
+    bufferViews.push({ buffer: 0, byteOffset: length, byteLength: bytes.length });
+    pieces.push(bytes), length += bytes.length;
+    const componentType = values instanceof Float32Array ? 5126 : values instanceof Uint32Array ? 5125 : 5121;
+    return accessors.push({ bufferView: bufferViews.length - 1, componentType, count: values.length / size, type, ...more }) - 1;
+  };
+  const count = positions.length / 3, of = (c: number): number[] => Array.from({ length: count }, (_, k) => positions[3 * k + c]!);
+  const bounds = { min: [0, 1, 2].map((c) => Math.fround(Math.min(...of(c)))), max: [0, 1, 2].map((c) => Math.fround(Math.max(...of(c)))) };
+  const attributes = {
+    POSITION: add(new Float32Array(positions), 'VEC3', 3, bounds), NORMAL: add(new Float32Array(normals), 'VEC3', 3),
+    JOINTS_0: add(new Uint8Array(joints), 'VEC4', 4), WEIGHTS_0: add(new Float32Array(weights), 'VEC4', 4),
+  };
+  const index = add(new Uint32Array(indices), 'SCALAR', 1), inverse = add(new Float32Array([...identity, ...identity]), 'MAT4', 16);
+  const times = add(new Float32Array([0, 1]), 'SCALAR', 1, { min: [0], max: [1] }), turns = add(new Float32Array([0, 0, 0, 1, ...turn]), 'VEC4', 4);
+  const json = JSON.stringify({
+    asset: { version: '2.0' }, scene: 0, scenes: [{ nodes: [0, 1] }],
+    nodes: [{ name: 'sheet', mesh: 0, skin: 0 }, { name: 'root', children: [2] }, { name: 'tip' }],
+    meshes: [{ primitives: [{ attributes, indices: index, material: 0 }] }],
+    materials: [{ pbrMetallicRoughness: { baseColorFactor: [0.7, 0.6, 0.45, 1], metallicFactor: 0 }, doubleSided: true }],
+    skins: [{ joints: [1, 2], inverseBindMatrices: inverse }],
+    animations: [{ name: 'bend', samplers: [{ input: times, output: turns }], channels: [{ sampler: 0, target: { node: 2, path: 'rotation' } }] }],
+    buffers: [{ byteLength: length }], bufferViews, accessors,
+  });
+  const text = Buffer.from(json.padEnd(Math.ceil(json.length / 4) * 4)), head = Buffer.alloc(20), bin = Buffer.alloc(8);
+  [0x46546c67, 2, 28 + text.length + length, text.length, 0x4e4f534a].forEach((v, k) => head.writeUInt32LE(v, 4 * k));
+  bin.writeUInt32LE(length, 0), bin.writeUInt32LE(0x004e4942, 4);
+  writeFileSync(path, Buffer.concat([head, text, bin, ...pieces]));
+}

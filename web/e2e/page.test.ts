@@ -6,7 +6,7 @@ import { join } from 'node:path';
 import type { Browser, Page } from 'playwright-core';
 import { afterAll, beforeAll, describe, expect, it } from 'vitest';
 import { haveTool, lambent, makeFolder, writeHdr } from '../test/tool.ts';
-import { drawn, haveBrowser, launch, open, serve, writeBall, writeScene, type Server } from './browser.ts';
+import { drawn, haveBrowser, launch, open, serve, writeBall, writeScene, writeSkin, type Server } from './browser.ts';
 
 describe.skipIf(!haveTool || !haveBrowser)('the page', () => {
   const folder = makeFolder(), at = (name: string): string => join(folder, name);
@@ -17,6 +17,7 @@ describe.skipIf(!haveTool || !haveBrowser)('the page', () => {
     // One lamp towards (0, 0.2, 1), where the camera is: three quarters of the way to the right is +Z.
     writeHdr(at('lamp.hdr'), 64, 32, (x, y) => (Math.hypot(x - 47.5, y - 14) < 3 ? [250, 240, 220, 133] : [20, 22, 30, 124]));
     lambent('bake', at('ball.obj'), '--samples', '256', '-o', at('ball.glb'));
+    lambent('compress', at('ball.glb'), '--zonal', '2', '-o', at('lobes.glb'));
     browser = await launch();
     server = await serve(at('ball.glb'), '--env', at('lamp.hdr'));
   });
@@ -94,8 +95,8 @@ describe.skipIf(!haveTool || !haveBrowser)('the page', () => {
     await page.close();
   });
 
-  it('uploads nothing but uniforms when the light turns', async () => {
-    const page = await browser.newPage({ viewport: { width: 400, height: 400 } });
+  it.each(['ball.glb', 'lobes.glb'])('uploads nothing but uniforms when the light turns: %s', async (name) => {
+    const other = await serve(at(name), '--env', at('lamp.hdr')), page = await browser.newPage({ viewport: { width: 400, height: 400 } });
     await page.addInitScript(() => {
       const counts = { uploads: 0, uniformBytes: 0 }, gl = WebGL2RenderingContext.prototype as unknown as Record<string, (...a: unknown[]) => unknown>;
       (window as unknown as { counts: typeof counts }).counts = counts;
@@ -110,7 +111,7 @@ describe.skipIf(!haveTool || !haveBrowser)('the page', () => {
         };
       }
     });
-    await page.goto(`${server.address}#ui=off&camera=0,0.8,5,0,0,0,35`);
+    await page.goto(`${other.address}#ui=off&camera=0,0.8,5,0,0,0,35`);
     await page.waitForSelector('body[data-ready=yes]', { state: 'attached' });
     await drawn(page);
     const counts = (): Promise<{ uploads: number; uniformBytes: number }> => page.evaluate(() => ({ ...(window as unknown as { counts: { uploads: number; uniformBytes: number } }).counts }));
@@ -122,10 +123,84 @@ describe.skipIf(!haveTool || !haveBrowser)('the page', () => {
     expect(after.uploads - before.uploads).toBe(0);
     // Ten light changes, each drawn once: 432 bytes of light and the matrices of two draws.
     const each = (after.uniformBytes - before.uniformBytes) / 10;
-    console.log(`turning the light: 0 uploads, ${each.toFixed(0)} bytes of uniforms a frame`);
+    console.log(`turning the light of ${name}: 0 uploads, ${each.toFixed(0)} bytes of uniforms a frame`);
     expect(each).toBeGreaterThan(432);
     expect(each).toBeLessThan(2000);
     await page.close();
+    await other.stop();
+  });
+
+  it('wipes with the hand and with the keys', async () => {
+    const page = await open(browser, server.address, 'camera=0,0.8,5,0,0,0,35&against=coefficient&wipe=0.5', 400, 400);
+    const share = (): Promise<number> => page.evaluate(() => Number(document.getElementById('wipe')!.getAttribute('aria-valuenow')));
+    const middle = (): Promise<Buffer> => page.screenshot({ clip: { x: 150, y: 195, width: 20, height: 40 } }); // left of the line at first, below its labels
+    const before = await middle(), box = (await page.locator('#wipe').boundingBox())!;
+    expect(await share()).toBe(50);
+    await page.mouse.move(box.x + box.width / 2, 200); // clear of the controls
+    await page.mouse.down();
+    await page.mouse.move(100, 200, { steps: 5 });
+    await page.mouse.up();
+    await drawn(page);
+    expect(Math.abs((await share()) - 25)).toBeLessThan(3);
+    expect((await middle()).equals(before)).toBe(false); // the other view lies there now
+    await page.focus('#wipe');
+    await page.keyboard.press('End');
+    await drawn(page);
+    expect(await share()).toBe(100);
+    expect((await middle()).equals(before)).toBe(true);
+    await page.close();
+  });
+
+  it('follows fingers: one looks, or turns the light; two zoom', async () => {
+    const context = await browser.newContext({ viewport: { width: 400, height: 400 }, hasTouch: true }), page = await context.newPage();
+    await page.goto(`${server.address}#ui=off&background=none&exposure=-2&camera=0,0.8,5,0,0,0,35`);
+    await page.waitForSelector('body[data-ready=yes]', { state: 'attached' });
+    const session = await context.newCDPSession(page);
+    const touch = async (type: 'touchStart' | 'touchMove' | 'touchEnd', ...points: [number, number][]): Promise<void> =>
+      void (await session.send('Input.dispatchTouchEvent', { type, touchPoints: points.map(([x, y], id) => ({ x, y, id })) }));
+    const swipe = async (): Promise<void> => {
+      await touch('touchStart', [200, 200]);
+      for (let i = 1; i <= 5; ++i) await touch('touchMove', [200 + 12 * i, 200]);
+      await touch('touchEnd');
+    };
+    const state = async (key: string): Promise<number[]> => (await page.waitForTimeout(500), (new URLSearchParams(new URL(page.url()).hash.slice(1)).get(key) ?? '0,0,0').split(',').map(Number));
+    await swipe();
+    const looked = await state('camera');
+    expect(looked[0]!).toBeLessThan(-0.3); // the scene goes with the finger, so the eye goes the other way
+    expect(await state('rotate')).toEqual([0, 0, 0]);
+    await page.evaluate(() => document.getElementById('turn')!.click());
+    await swipe();
+    expect(Math.hypot(...(await state('rotate')))).toBeGreaterThan(5);
+    expect(await state('camera')).toEqual(looked);
+    await touch('touchStart', [150, 200], [250, 200]);
+    for (let i = 1; i <= 5; ++i) await touch('touchMove', [150 - 10 * i, 200], [250 + 10 * i, 200]);
+    await touch('touchEnd');
+    const near = await state('camera'), distance = (c: number[]): number => Math.hypot(c[0]! - c[3]!, c[1]! - c[4]!, c[2]! - c[5]!);
+    expect(distance(near) / distance(looked)).toBeGreaterThan(0.4);
+    expect(distance(near) / distance(looked)).toBeLessThan(0.6); // fingers twice as far apart
+    await context.close();
+  });
+
+  it('plays an animation and stands still where it was stopped', async () => {
+    writeSkin(at('skin.glb'), 0.3);
+    lambent('bake', at('skin.glb'), '--samples', '64', '--bounces', '0', '-o', at('skinned.glb'));
+    const other = await serve(at('skinned.glb'), '--env', at('lamp.hdr'));
+    const page = await open(browser, other.address, '', 400, 400), middle = (): Promise<Buffer> => page.screenshot({ clip: { x: 100, y: 110, width: 200, height: 150 } });
+    const rest = await middle();
+    await page.click('#play');
+    await page.waitForTimeout(400);
+    expect((await middle()).equals(rest)).toBe(false);
+    await page.click('#play');
+    await drawn(page);
+    const stopped = await middle();
+    await page.waitForFunction(() => /time=/.test(location.hash));
+    expect((await middle()).equals(stopped)).toBe(true);
+    await page.reload();
+    await page.waitForSelector('body[data-ready=yes]', { state: 'attached' });
+    await drawn(page);
+    expect((await middle()).equals(rest)).toBe(false); // the address keeps the time
+    await page.close();
+    await other.stop();
   });
 
   it('opens an environment from a file', async () => {

@@ -89,7 +89,7 @@ class Page {
     select('against').replaceChildren(option('', 'nothing'), ...possible.map((v) => option(v, names[v].toLowerCase())));
     select('window').replaceChildren(...shWindows.map((w) => option(w, w)));
     select('view').value = state.view, select('against').value = state.against ?? '', select('window').value = state.window;
-    const all = viewer.bakedScene?.transfer.order ?? 1;
+    const all = Math.max(1, viewer.bakedScene?.transfer.order ?? 1); // none where there are lamps alone
     state.coefficient = Math.min(state.coefficient, all * all - 1);
     input('order').max = String(all), input('order').value = String(state.order || all);
     input('coefficient').max = String(all * all - 1), input('coefficient').value = String(state.coefficient);
@@ -143,6 +143,9 @@ class Page {
       const on = get('play').getAttribute('aria-pressed') !== 'true';
       get('play').setAttribute('aria-pressed', String(on));
       viewer.play(on);
+      if (on) delete state.time;
+      else if (viewer.animationTime !== undefined) state.time = viewer.animationTime;
+      this.saveSoon();
     });
     get('reset-view').addEventListener('click', () => this.setCamera(this.manifest?.camera));
     get('reset-light').addEventListener('click', () => this.setRotation(this.manifest?.rotate ?? [0, 0, 0]));
@@ -199,6 +202,7 @@ class Page {
     get('name').textContent = document.title = name;
     get('hint').hidden = false, get('invitation').hidden = true;
     this.setCamera(first ? this.state.camera : undefined);
+    if (first && this.state.time !== undefined) viewer.pose(this.state.time);
     get('loading').hidden = true;
     const t = viewer.bakedScene!.transfer;
     const rows: [string, string][] = [
@@ -207,7 +211,11 @@ class Page {
       ['Vertices', t.meshes.reduce((n, m) => n + m.geometry.getAttribute('position').count, 0).toLocaleString('en')],
       ['In the file', megabytes(t.fileBytes)],
       ['On the graphics card', megabytes(t.gpuBytes)],
+      ...(t.lamps?.size ? [['Lamps', [...t.lamps.keys()].join(', ')] as [string, string]] : []),
+      ['A receiver', `${Math.round(t.fileBytes / t.receivers)} bytes`],
     ];
+    const zonal = (viewer.bakedScene!.provenance as { zonal?: { lobes?: unknown; rms?: unknown } } | undefined)?.zonal;
+    if (typeof zonal?.lobes === 'number' && typeof zonal.rms === 'number') rows.push(['Lobes', `${zonal.lobes} a receiver`], ['Fit error', `${(100 * zonal.rms).toPrecision(3)} % RMS`]);
     get('statistics').replaceChildren(...rows.flatMap(([term, text]) => {
       const dt = document.createElement('dt'), dd = document.createElement('dd');
       dt.textContent = term, dd.textContent = text;

@@ -29,7 +29,7 @@ export class Model {
     if (look === 'unshadowed') {
       if (!this.unshadowed) {
         const made = new Map<Material, UnshadowedMaterial>();
-        for (const m of this.own) if (!made.has(m)) made.set(m, new UnshadowedMaterial(this.baked.transfer.order, diffuseParameters(m)));
+        for (const m of this.own) if (!made.has(m)) made.set(m, new UnshadowedMaterial(Math.max(1, this.baked.transfer.order), diffuseParameters(m)));
         this.unshadowed = this.own.map((m) => made.get(m)!);
         if (lighting) this.relight(lighting);
       }

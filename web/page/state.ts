@@ -16,6 +16,7 @@ export interface State {
   against?: View; // right of the wipe
   wipe: number; // share of the width left of the wipe
   coefficient: number;
+  time?: number; // seconds into the animation, standing still
   background: boolean;
   ui: boolean;
 }
@@ -48,6 +49,8 @@ export function parseState(fragment: string, base: State): State {
   if (against) state.against = against;
   state.wipe = one('wipe', 0, 1) ?? state.wipe;
   state.coefficient = Math.floor(one('coefficient', 0, 255) ?? state.coefficient);
+  const time = one('time', 0, 1e6);
+  if (time !== undefined) state.time = time;
   if (from.has('background')) state.background = from.get('background') !== 'none';
   if (from.has('ui')) state.ui = from.get('ui') !== 'off';
   return state;
@@ -67,6 +70,7 @@ export function formatState(state: State): string {
   if (state.view !== base.view) put('view', state.view);
   if (state.against) put('against', state.against), put('wipe', short(state.wipe));
   if (state.coefficient !== base.coefficient) put('coefficient', String(state.coefficient));
+  if (state.time !== undefined) put('time', short(state.time));
   if (!state.background) put('background', 'none');
   if (!state.ui) put('ui', 'off');
   return '#' + parts.join('&');

@@ -68,7 +68,7 @@ export class Viewer {
     this.renderer.toneMapping = LinearToneMapping; // exposure, then the sRGB curve: as `lambent render` writes a PNG
     this.renderer.setClearColor(0x000000, 1);
     canvas.addEventListener('webglcontextlost', () => callbacks.onProblem('The graphics card was taken away from this page. The picture returns with it.'));
-    canvas.addEventListener('webglcontextrestored', () => (callbacks.onRecovered(), this.invalidate()));
+    canvas.addEventListener('webglcontextrestored', () => (callbacks.onRecovered(), this.changeLight())); // what was drawn into textures is gone
     this.orbit = new Orbit(this.camera, canvas, {
       onChange: () => (this.changeLight(), callbacks.onChange()),
       onUse: (what) => callbacks.onUse(what),
@@ -100,7 +100,7 @@ export class Viewer {
     return this.animation !== undefined;
   }
   get bands(): number {
-    const all = this.baked?.baked.transfer.order ?? 1;
+    const all = Math.max(1, this.baked?.baked.transfer.order ?? 1);
     return this.order > 0 ? Math.min(this.order, all) : all;
   }
 
@@ -142,6 +142,18 @@ export class Viewer {
     action.paused = !on;
     if (on) action.play();
     this.invalidate();
+  }
+
+  /** Stands still at so many seconds into the animation. */
+  pose(time: number): void {
+    if (!this.animation) return;
+    this.animation.action.play();
+    this.animation.mixer.setTime(time);
+    this.animation.action.paused = true;
+    this.invalidate();
+  }
+  get animationTime(): number | undefined {
+    return this.animation?.action.isScheduled() ? this.animation.action.time : undefined;
   }
 
   invalidate(): void {

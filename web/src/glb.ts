@@ -9,6 +9,8 @@ export const extensionName = 'LAMBENT_transfer';
 export interface TransferExtension {
   version: number;
   transfer: { kind: string; [key: string]: unknown };
+  /** Where receivers lie; absent: at vertices. */
+  surface?: { kind: unknown; [key: string]: unknown };
   parts: { node: number; primitive: number; front?: number; back?: number; [key: string]: unknown }[];
   provenance?: unknown;
 }
@@ -29,6 +31,7 @@ export function transferExtension(document: unknown): TransferExtension {
     throw new LambentError(`holds transfer of kind "${transfer['kind']}", which this version does not know (it knows ${knownKinds().join(', ')})`);
   if (!Array.isArray(parts) || !parts.every((p) => isObject(p) && isIndex(p['node']) && isIndex(p['primitive'])))
     throw new LambentError('holds no list of "parts"');
+  if (extension['surface'] !== undefined && !isObject(extension['surface'])) throw new LambentError('holds a "surface" that is none');
   return extension as unknown as TransferExtension;
 }
 

@@ -1,7 +1,9 @@
 import { diffuseKind } from './diffuse.js';
 import { registerTransferKind } from './kinds.js';
+import { zonalKind } from './zonal.js';
 
 registerTransferKind(diffuseKind);
+registerTransferKind(zonalKind);
 
 export { LambentError } from './errors.js';
 export { checkBakedFile, extensionName } from './glb.js';

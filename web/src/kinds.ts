@@ -1,5 +1,5 @@
-// The kinds of transfer that a file may hold. A new one (matrix, zonal, lightmap) is one entry here and one module.
-import type { Material, Mesh } from 'three';
+// The kinds of transfer that a file may hold. A new one (matrix) is one entry here and one module.
+import type { Color, Material, Mesh } from 'three';
 import type { TransferExtension } from './glb.js';
 import type { Lighting } from './lighting.js';
 
@@ -10,6 +10,8 @@ export interface TransferSource {
   bufferView(index: number): Promise<ArrayBuffer>;
   /** The mesh that draws a part. Throws LambentError where the file has none. */
   mesh(part: TransferExtension['parts'][number]): Mesh;
+  /** The scene's own material of a part whose mesh wears one for other viewers; its mesh's material where it does not. */
+  ownMaterial(part: TransferExtension['parts'][number]): Promise<Material>;
 }
 
 /** The transfer of one file, bound to its meshes. */
@@ -25,6 +27,8 @@ export interface BakedTransfer {
   readonly meshes: Mesh[];
   /** Shows the meshes under this light. Writes a few hundred bytes of uniforms and nothing else. */
   relight(lighting: Lighting): void;
+  /** The scene's own lamps, where the file has them: a colour that scales each, by name. Counts at the next relight(). */
+  readonly lamps?: Map<string, Color>;
   /**
    * Materials that show one coefficient of transfer in false colour, one a mesh in the order of `meshes`; `gain` is a shared uniform.
    * Made on demand; the caller disposes of them.

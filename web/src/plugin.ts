@@ -1,9 +1,9 @@
 // The GLTFLoader plugin: `new GLTFLoader().register((parser) => new LambentTransferPlugin(parser))`. A file with our extension
 // comes with `gltf.userData.lambent`, a BakedScene; files without it are left alone.
-import type { Mesh, Object3D } from 'three';
+import type { Material, Mesh, Object3D } from 'three';
 import type { GLTF, GLTFLoaderPlugin, GLTFParser } from 'three/addons/loaders/GLTFLoader.js';
 import { LambentError } from './errors.js';
-import { extensionName, transferExtension, type TransferExtension } from './glb.js';
+import { extensionName, isIndex, transferExtension, type TransferExtension } from './glb.js';
 import { transferKind, type BakedTransfer, type TransferSource } from './kinds.js';
 import type { Lighting } from './lighting.js';
 
@@ -38,13 +38,28 @@ function findMeshes(gltf: GLTF, parser: GLTFParser): Map<string, Mesh> {
   return meshes;
 }
 
+interface Document {
+  extensions?: Record<string, unknown>;
+  bufferViews?: unknown[];
+  materials?: unknown[];
+  nodes?: { mesh?: number }[];
+  meshes?: { primitives?: { extensions?: Record<string, unknown> }[] }[];
+}
+
+/** Our extension of a primitive, by "node primitive"; empty where it has none. */
+function primitiveOf(document: Document, key: string): Record<string, unknown> {
+  const [node, primitive] = key.split(' ').map(Number) as [number, number];
+  const extension = document.meshes?.[document.nodes?.[node]?.mesh ?? -1]?.primitives?.[primitive]?.extensions?.[extensionName];
+  return typeof extension === 'object' && extension !== null ? (extension as Record<string, unknown>) : {};
+}
+
 export class LambentTransferPlugin implements GLTFLoaderPlugin {
   readonly name = extensionName;
 
   constructor(private readonly parser: GLTFParser) {}
 
   async afterRoot(gltf: GLTF): Promise<void> {
-    const document = this.parser.json as { extensions?: Record<string, unknown>; bufferViews?: unknown[] };
+    const document = this.parser.json as Document;
     if (document.extensions?.[extensionName] === undefined) return;
     const extension = transferExtension(document);
     const meshes = findMeshes(gltf, this.parser);
@@ -59,7 +74,15 @@ export class LambentTransferPlugin implements GLTFLoaderPlugin {
         if (!mesh) throw new LambentError(`node ${node}, primitive ${primitive} has transfer but no mesh`);
         return mesh;
       },
+      ownMaterial: async (part) => {
+        const own = primitiveOf(document, `${part.node} ${part.primitive}`)['ownMaterial'];
+        if (own === undefined) return source.mesh(part).material as Material;
+        if (!isIndex(own, (document.materials?.length ?? 0) - 1)) throw new LambentError('a primitive\'s "ownMaterial" does not exist');
+        return (await this.parser.getDependency('material', own)) as Material;
+      },
     };
+    // What other viewers are shown of backs is drawn by the parts themselves.
+    for (const [key, mesh] of meshes) if (primitiveOf(document, key)['viewerOnly'] === true) mesh.visible = false;
     const transfer = await transferKind(extension.transfer.kind)!.load(source);
     const baked: BakedScene = {
       transfer,

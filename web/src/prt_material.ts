@@ -1,7 +1,10 @@
 // A MeshBasicMaterial whose "white" is the exit radiance of the vertex's receiver, transfer . light, so that colour, texture, vertex
 // colours, fog, clipping, skinning and tone mapping are three's own.
-import { MeshBasicMaterial, type Material, type WebGLProgramParametersWithUniforms, type DataArrayTexture, type MeshBasicMaterialParameters } from 'three';
-import type { DiffuseLayout } from './diffuse_texture.js';
+import {
+  MeshBasicMaterial, type DataArrayTexture, type DataTexture, type Material, type Matrix3, type MeshBasicMaterialParameters,
+  type WebGLProgramParametersWithUniforms,
+} from 'three';
+import type { BlockLayout } from './block_texture.js';
 
 /** Replaces one piece of a shader of three's; fails loudly where another version of three has no such piece. */
 export function replaceOnce(shader: string, piece: string, by: string): string {
@@ -24,15 +27,29 @@ export function diffuseParameters(source: Material): MeshBasicMaterialParameters
 
 /** Uniforms that all materials of one file share. */
 export interface PrtUniforms {
-  /** diffuse_texture.ts */
+  /** block_texture.ts */
   prtTransfer: { value: DataArrayTexture };
-  /** 3 quads vec4: coefficients of red, then green, then blue, padded with zeros. */
+  /** 3 ceil(order^2 / 4) vec4: coefficients of red, then green, then blue, padded with zeros. */
   prtLight: { value: Float32Array };
 }
 
+/** What a kind of transfer adds to the vertex shader. */
+export interface PrtShader {
+  /** Of programs: the same for the same GLSL. */
+  key: string;
+  /** Defines vec3 prtRadiance( uint receiver ), from prtValues( receiver, k ), prtLight and prtFrame. */
+  radiance: string;
+  /** Whether prtFrame is asked for. */
+  turns: boolean;
+}
+
 export interface PrtOptions {
-  layout: DiffuseLayout;
+  order: number;
+  layout: BlockLayout;
   channels: 1 | 3;
+  shader: PrtShader;
+  /** The pose that was baked, where the kind turns: bone matrices, four texels a bone as in three's own bone texture, or the inverse of the mesh's. */
+  rest?: { bones: DataTexture } | { inverse: Matrix3 };
   /** Vertices have receivers on their back as well. */
   twoSided: boolean;
   /** Instead of light: transfer . light, signed, in false colour; +-1 / gain are the ends of the scale. */
@@ -47,28 +64,51 @@ varying vec3 vPrtFront;
   varying vec3 vPrtBack;
 #endif
 uniform highp sampler2DArray prtTransfer;
-uniform vec4 prtLight[ 3 * PRT_QUADS ];
+uniform vec4 prtLight[ 3 * PRT_LIGHT_QUADS ];
 
-vec3 prtRadiance( const in uint receiver ) {
-  if ( receiver == 0xffffffffu ) return vec3( 0.0 );
+// Values 4k .. 4k + 3 of a receiver.
+vec4 prtValues( const in uint receiver, const in int k ) {
   int r = int( receiver );
   ivec3 at = ivec3( ( r & ( PRT_COLUMNS - 1 ) ) * PRT_TEXELS, ( r / PRT_COLUMNS ) & ( PRT_ROWS - 1 ), r / ( PRT_COLUMNS * PRT_ROWS ) );
-  vec3 sum = vec3( 0.0 );
-  for ( int k = 0; k < PRT_QUADS; ++ k ) {
-    vec4 red = texelFetch( prtTransfer, at + ivec3( k, 0, 0 ), 0 );
-    #if PRT_CHANNELS == 3
-      vec4 green = texelFetch( prtTransfer, at + ivec3( PRT_QUADS + k, 0, 0 ), 0 );
-      vec4 blue = texelFetch( prtTransfer, at + ivec3( 2 * PRT_QUADS + k, 0, 0 ), 0 );
-    #else
-      vec4 green = red, blue = red;
-    #endif
-    sum += vec3( dot( red, prtLight[ k ] ), dot( green, prtLight[ PRT_QUADS + k ] ), dot( blue, prtLight[ 2 * PRT_QUADS + k ] ) );
-  }
-  return sum;
+  return texelFetch( prtTransfer, at + ivec3( k, 0, 0 ), 0 );
 }
+
+#ifdef PRT_TURNS
+  // How the surface stands now against the pose that was baked: a rotation of the world.
+  mat3 prtFrame = mat3( 1.0 );
+  #ifdef USE_SKINNING
+    uniform highp sampler2D prtRestBones;
+    mat3 prtRestBone( const in float i ) {
+      int size = textureSize( prtRestBones, 0 ).x, j = int( i ) * 4, x = j % size, y = j / size;
+      return mat3( texelFetch( prtRestBones, ivec2( x, y ), 0 ).xyz, texelFetch( prtRestBones, ivec2( x + 1, y ), 0 ).xyz,
+                   texelFetch( prtRestBones, ivec2( x + 2, y ), 0 ).xyz );
+    }
+  #else
+    uniform mat3 prtRestInverse;
+  #endif
+  // The orthogonal part of a gradient: Higham's iteration, whose error squares at each step. Flat gradients keep the axes.
+  mat3 prtOrthogonal( const in mat3 gradient ) {
+    mat3 q = gradient;
+    for ( int i = 0; i < 6; ++ i ) {
+      if ( abs( determinant( q ) ) < 1e-6 ) return mat3( 1.0 );
+      q = 0.5 * ( q + transpose( inverse( q ) ) );
+    }
+    return q;
+  }
+#endif
 `;
 
 const vertexBody = /* glsl */ `
+  #ifdef PRT_TURNS
+    #ifdef USE_SKINNING
+      mat3 prtNow = skinWeight.x * mat3( boneMatX ) + skinWeight.y * mat3( boneMatY ) + skinWeight.z * mat3( boneMatZ ) + skinWeight.w * mat3( boneMatW );
+      mat3 prtThen = skinWeight.x * prtRestBone( skinIndex.x ) + skinWeight.y * prtRestBone( skinIndex.y )
+                   + skinWeight.z * prtRestBone( skinIndex.z ) + skinWeight.w * prtRestBone( skinIndex.w );
+      prtFrame = prtOrthogonal( prtNow * inverse( prtThen ) );
+    #else
+      prtFrame = prtOrthogonal( mat3( modelMatrix ) * prtRestInverse );
+    #endif
+  #endif
   vPrtFront = prtRadiance( lambentReceiver );
   #ifdef PRT_TWO_SIDED
     vPrtBack = prtRadiance( lambentReceiverBack );
@@ -76,11 +116,7 @@ const vertexBody = /* glsl */ `
 `;
 
 // The scale runs from dark to bright, so that it is read without colour vision: navy -1, grey 0, pale yellow +1.
-const fragmentDeclarations = /* glsl */ `
-varying vec3 vPrtFront;
-#ifdef PRT_TWO_SIDED
-  varying vec3 vPrtBack;
-#endif
+export const falseColorScale = /* glsl */ `
 #ifdef PRT_FALSE_COLOR
   uniform float prtGain;
   vec3 prtScale( const in float value ) {
@@ -88,6 +124,13 @@ varying vec3 vPrtFront;
     vec3 positive = mix( vec3( 0.212, 0.212, 0.212 ), vec3( 1.0, 0.871, 0.352 ), clamp( value, 0.0, 1.0 ) );
     return value < 0.0 ? negative : positive;
   }
+#endif
+`;
+
+const fragmentDeclarations = /* glsl */ `
+varying vec3 vPrtFront;
+#ifdef PRT_TWO_SIDED
+  varying vec3 vPrtBack;
 #endif
 vec3 prtExitRadiance() {
   #ifdef PRT_TWO_SIDED
@@ -98,6 +141,13 @@ vec3 prtExitRadiance() {
 }
 `;
 
+/** three's own fragment shader with prtExitRadiance() for white. */
+export function useExitRadiance(fragmentShader: string, declarations: string, falseColor: boolean): string {
+  const lit = falseColorScale + declarations + replaceOnce(fragmentShader, whiteLine, 'reflectedLight.indirectDiffuse += max( prtExitRadiance(), vec3( 0.0 ) );');
+  return !falseColor ? lit : replaceOnce(lit, '#include <opaque_fragment>',
+    'outgoingLight = prtScale( prtGain * luminance( prtExitRadiance() ) );\n#include <opaque_fragment>');
+}
+
 export class PrtMaterial extends MeshBasicMaterial {
   constructor(
     readonly prtUniforms: PrtUniforms,
@@ -105,26 +155,22 @@ export class PrtMaterial extends MeshBasicMaterial {
     parameters: MeshBasicMaterialParameters = {},
   ) {
     super(parameters);
-    const { layout, channels, twoSided, falseColor } = options;
+    const { order, layout, channels, twoSided, falseColor, shader } = options;
     this.defines = {
-      PRT_QUADS: layout.quads, PRT_TEXELS: layout.texels, PRT_COLUMNS: layout.columns, PRT_ROWS: layout.rows, PRT_CHANNELS: channels,
-      ...(twoSided && { PRT_TWO_SIDED: '' }), ...(falseColor && { PRT_FALSE_COLOR: '' }),
+      PRT_LIGHT_QUADS: Math.ceil((order * order) / 4), PRT_QUADS: layout.quads, PRT_TEXELS: layout.texels, PRT_COLUMNS: layout.columns, PRT_ROWS: layout.rows, PRT_CHANNELS: channels,
+      ...(twoSided && { PRT_TWO_SIDED: '' }), ...(falseColor && { PRT_FALSE_COLOR: '' }), ...(shader.turns && { PRT_TURNS: '' }),
     };
     if (falseColor) this.toneMapped = false;
   }
 
   override onBeforeCompile(shader: WebGLProgramParametersWithUniforms): void {
-    const { falseColor } = this.options;
-    Object.assign(shader.uniforms, this.prtUniforms, falseColor && { prtGain: falseColor.gain });
-    shader.vertexShader = vertexDeclarations + replaceOnce(shader.vertexShader, '#include <fog_vertex>', '#include <fog_vertex>' + vertexBody);
-    shader.fragmentShader = fragmentDeclarations + replaceOnce(
-      shader.fragmentShader, whiteLine, 'reflectedLight.indirectDiffuse += max( prtExitRadiance(), vec3( 0.0 ) );');
-    if (falseColor)
-      shader.fragmentShader = replaceOnce(shader.fragmentShader, '#include <opaque_fragment>',
-        'outgoingLight = prtScale( prtGain * luminance( prtExitRadiance() ) );\n#include <opaque_fragment>');
+    const { falseColor, rest, shader: kind } = this.options;
+    Object.assign(shader.uniforms, this.prtUniforms, falseColor && { prtGain: falseColor.gain }, rest && ('bones' in rest ? { prtRestBones: { value: rest.bones } } : { prtRestInverse: { value: rest.inverse } }));
+    shader.vertexShader = vertexDeclarations + kind.radiance + replaceOnce(shader.vertexShader, '#include <fog_vertex>', '#include <fog_vertex>' + vertexBody);
+    shader.fragmentShader = useExitRadiance(shader.fragmentShader, fragmentDeclarations, falseColor !== undefined);
   }
 
   override customProgramCacheKey(): string {
-    return 'lambent diffuse'; // the rest is in the defines
+    return `lambent ${this.options.shader.key}`; // the rest is in the defines
   }
 }

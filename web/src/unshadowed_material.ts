@@ -2,9 +2,10 @@
 // sum_lm A_l / pi L_lm y_lm(n), by the Funk-Hecke theorem (docs/theory.md), summed at the vertex so that it is interpolated as baked
 // transfer is. A_l vanishes for odd l beyond 1; what is left is generated without loops.
 import { MeshBasicMaterial, type WebGLProgramParametersWithUniforms, type MeshBasicMaterialParameters } from 'three';
+import { glslHarmonics } from './glsl_harmonics.js';
 import type { Lighting } from './lighting.js';
 import { replaceOnce, whiteLine } from './prt_material.js';
-import { clampedCosine, legendre, shBand, shCount, shIndex } from './sh.js';
+import { clampedCosine, shBand, shCount } from './sh.js';
 
 /** Indices of the harmonics that irradiance has. */
 export const irradianceIndices = (order: number): number[] =>
@@ -12,20 +13,11 @@ export const irradianceIndices = (order: number): number[] =>
 
 /** GLSL that adds to `even` and `odd` the sums over harmonics of the normal `n`, by the recurrences of sh.ts. */
 export function glslIrradiance(order: number): string {
-  const number = (x: number): string => x.toExponential(9);
   const place = new Map(irradianceIndices(order).map((index, at) => [index, at]));
-  const lines = ['float c = 1.0, s = 0.0, q0, q1, q2, t;'];
-  for (let m = 0; m < order; ++m) {
-    lines.push(`q1 = ${number(legendre.diagonal[m]!)}; q2 = 0.0;`);
-    for (let l = m; l < order; ++l) {
-      if (l > m) lines.push(`q0 = ${number(legendre.a(l, m))} * n.z * q1 + ${number(legendre.b(l, m))} * q2; q2 = q1; q1 = q0;`);
-      const sum = l % 2 ? 'odd' : 'even', cosine = place.get(shIndex(l, m)), sine = place.get(shIndex(l, -m));
-      if (cosine !== undefined) lines.push(`${sum} += q1 * c * irradianceLight[ ${cosine} ];`);
-      if (m > 0 && sine !== undefined) lines.push(`${sum} += q1 * s * irradianceLight[ ${sine} ];`);
-    }
-    lines.push('t = c * n.x - s * n.y; s = c * n.y + s * n.x; c = t;');
-  }
-  return lines.join('\n  ');
+  return glslHarmonics(order, (index, value) => {
+    const at = place.get(index);
+    return at === undefined ? '' : `${shBand(index) % 2 ? 'odd' : 'even'} += ${value} * irradianceLight[ ${at} ];`;
+  });
 }
 
 export class UnshadowedMaterial extends MeshBasicMaterial {

@@ -1,0 +1,58 @@
+// What every kind reads alike: the header, receivers, and geometries that carry them (docs/file-format.md).
+import { BufferGeometry } from 'three';
+import { LambentError } from './errors.js';
+import { isIndex, type TransferExtension } from './glb.js';
+import type { TransferSource } from './kinds.js';
+import { maxShOrder } from './sh.js';
+
+export const noReceiver = 0xffffffff;
+
+export interface TransferHeader {
+  order: number;
+  channels: 1 | 3;
+  precision: 'half' | 'single';
+  receivers: number;
+  bufferView: number;
+}
+
+/** What every kind has in its header; refuses by name what this version does not draw. */
+export function readHeader({ transfer, surface }: TransferExtension, surfaceKind: 'vertices' | 'texels' = 'vertices'): TransferHeader {
+  const { basis, order, channels, precision, receivers, bufferView, lobes, groups, directional } = transfer;
+  const text = (value: unknown): string => (typeof value === 'string' ? value : 'something else'), where = text(surface?.kind ?? 'vertices');
+  const isMore = (list: unknown): boolean => list !== undefined && !(Array.isArray(list) && list.length === 0);
+  if (basis !== 'sh') throw new LambentError(`holds light in the basis "${String(basis)}", which this version does not know`);
+  if (isMore(lobes)) throw new LambentError('holds lobes of light (lamps, or --light directional), which this version does not draw; "lambent render" does');
+  if (isMore(groups) && surfaceKind === 'vertices')
+    throw new LambentError("holds the light of the scene's own lamps at vertices, where this version draws it over an atlas; \"lambent render\" draws it");
+  if (directional !== undefined)
+    throw new LambentError(`holds a directional lightmap ("${text(directional)}"), which this version does not draw; "lambent render" does`);
+  if (where !== surfaceKind)
+    throw new LambentError(`holds transfer over ${where}, where this version draws vertices and, for diffuse transfer, texels; "lambent render" draws it`);
+  if (precision !== 'half' && precision !== 'single') throw new LambentError('"precision" must be half or single');
+  if (!isIndex(order, maxShOrder) || (order < 1 && !isMore(groups))) throw new LambentError('"order" is out of range');
+  if (channels !== 1 && channels !== 3) throw new LambentError('"channels" is out of range');
+  if (!isIndex(receivers, noReceiver - 1) || receivers < 1) throw new LambentError('"receivers" is out of range');
+  if (!isIndex(bufferView)) throw new LambentError('"bufferView" is missing');
+  return { order, channels, precision, receivers, bufferView };
+}
+
+/** `count` of u32, all of them receivers or none; `message` where there are not so many. */
+export async function readReceivers(source: TransferSource, view: unknown, count: number, receivers: number, message: string): Promise<Uint32Array> {
+  if (!isIndex(view)) throw new LambentError('a part has no buffer view of receivers');
+  const bytes = await source.bufferView(view);
+  if (bytes.byteLength !== 4 * count) throw new LambentError(message);
+  const map = new Uint32Array(bytes);
+  for (const r of map) if (r !== noReceiver && r >= receivers) throw new LambentError(`receiver ${r} is out of range`);
+  return map;
+}
+
+/** A geometry of its own, which shares all attributes, since nodes that share a mesh have receivers of their own. */
+export function shareGeometry(shared: BufferGeometry): BufferGeometry {
+  const geometry = new BufferGeometry();
+  geometry.name = shared.name, geometry.index = shared.index, geometry.userData = shared.userData;
+  geometry.groups = shared.groups, geometry.drawRange = shared.drawRange;
+  geometry.morphAttributes = shared.morphAttributes, geometry.morphTargetsRelative = shared.morphTargetsRelative;
+  geometry.boundingBox = shared.boundingBox, geometry.boundingSphere = shared.boundingSphere;
+  for (const [name, attribute] of Object.entries(shared.attributes)) geometry.setAttribute(name, attribute);
+  return geometry;
+}

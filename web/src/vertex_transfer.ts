@@ -1,0 +1,124 @@
+// Transfer at vertices, whatever its kind: a texture of every receiver's values, receivers as attributes, and light as uniforms.
+import {
+  DataTexture, FloatType, Matrix3, RGBAFormat, Uint32BufferAttribute, type DataArrayTexture, type Material, type Mesh, type Object3D,
+  type SkinnedMesh,
+} from 'three';
+import { blockTexture, packBlocks } from './block_texture.js';
+import type { TransferExtension } from './glb.js';
+import { readReceivers, shareGeometry, type TransferHeader } from './header.js';
+import type { BakedTransfer, TransferSource } from './kinds.js';
+import type { Lighting } from './lighting.js';
+import { diffuseParameters, PrtMaterial, type PrtOptions, type PrtShader, type PrtUniforms } from './prt_material.js';
+import { shCount } from './sh.js';
+
+/** The part's mesh, its vertices with their receivers. */
+async function bindPart(source: TransferSource, part: TransferExtension['parts'][number], receivers: number): Promise<Mesh> {
+  const mesh = source.mesh(part), geometry = shareGeometry(mesh.geometry), vertices = geometry.getAttribute('position').count;
+  const add = async (name: string, view: unknown): Promise<void> => {
+    const map = await readReceivers(source, view, vertices, receivers, 'a part does not have one receiver a vertex');
+    geometry.setAttribute(name, new Uint32BufferAttribute(map, 1));
+  };
+  await add('lambentReceiver', part.front);
+  if (part.back !== undefined) await add('lambentReceiverBack', part.back);
+  mesh.geometry = geometry;
+  return mesh;
+}
+
+/** Bone matrices as they stand on loading (world matrices are up to date), which is the pose that was baked; laid out as three's bone texture. */
+function restBones(mesh: SkinnedMesh): DataTexture {
+  mesh.skeleton.update();
+  const matrices = mesh.skeleton.boneMatrices!, bones = mesh.skeleton.bones.length;
+  const size = Math.max(4, Math.ceil(Math.sqrt(4 * bones) / 4) * 4), data = new Float32Array(4 * size * size);
+  data.set(matrices.subarray(0, 16 * bones));
+  const texture = new DataTexture(data, size, size, RGBAFormat, FloatType);
+  texture.needsUpdate = true;
+  return texture;
+}
+
+/** How a kind lays out and reads the values of a receiver. */
+export interface VertexKind {
+  kind: string;
+  /** Values in the file a receiver: [channel][count]. */
+  count: number;
+  valueChannels: 1 | 3;
+  shader: PrtShader;
+}
+
+export class VertexTransfer implements BakedTransfer {
+  readonly kind: string;
+  readonly order: number;
+  readonly channels: number;
+  readonly receivers: number;
+  readonly fileBytes: number;
+  readonly gpuBytes: number;
+  private readonly texture: DataArrayTexture;
+  private readonly bones = new Map<string, DataTexture>(); // by skeleton
+  private readonly uniforms: PrtUniforms;
+  private readonly optionsOf: PrtOptions[] = [];
+  private readonly materials = new Map<string, PrtMaterial>();
+  private readonly quads: number; // of the light, a channel
+
+  private constructor(header: TransferHeader, { kind, count, valueChannels, shader }: VertexKind, values: ArrayBuffer, readonly meshes: Mesh[]) {
+    this.kind = kind, this.order = header.order, this.channels = header.channels, this.receivers = header.receivers, this.fileBytes = values.byteLength;
+    const { layout, data } = packBlocks({ count, channels: valueChannels, precision: header.precision, receivers: header.receivers }, values);
+    this.quads = Math.ceil(shCount(header.order) / 4);
+    this.texture = blockTexture(layout, data);
+    this.uniforms = { prtTransfer: { value: this.texture }, prtLight: { value: new Float32Array(12 * this.quads) } };
+    let gpuBytes = data.byteLength;
+    for (const mesh of meshes) {
+      const twoSided = mesh.geometry.hasAttribute('lambentReceiverBack');
+      const rest = shader.turns ? this.restOf(mesh) : undefined;
+      const vertices = mesh.geometry.getAttribute('position').count;
+      const options: PrtOptions = { order: header.order, layout, channels: header.channels, shader, twoSided, ...(rest && { rest }) };
+      gpuBytes += vertices * (twoSided ? 8 : 4);
+      this.optionsOf.push(options);
+      // Meshes of one material share its edition, unless each turns by itself.
+      const source = mesh.material as Material, key = `${source.uuid} ${twoSided} ${rest ? mesh.uuid : ''}`;
+      const material = this.materials.get(key) ?? new PrtMaterial(this.uniforms, options, diffuseParameters(source));
+      this.materials.set(key, material);
+      mesh.material = material;
+    }
+    this.gpuBytes = gpuBytes;
+  }
+
+  private restOf(mesh: Mesh): NonNullable<PrtOptions['rest']> {
+    let root: Object3D = mesh;
+    while (root.parent) root = root.parent;
+    root.updateMatrixWorld(true);
+    const skinned = mesh as SkinnedMesh;
+    if (!skinned.isSkinnedMesh) return { inverse: new Matrix3().setFromMatrix4(mesh.matrixWorld).invert() };
+    const bones = this.bones.get(skinned.skeleton.uuid) ?? restBones(skinned);
+    this.bones.set(skinned.skeleton.uuid, bones);
+    return { bones };
+  }
+
+  /** Reads values and receivers, and dresses the meshes. */
+  static async load(source: TransferSource, header: TransferHeader, kind: VertexKind): Promise<VertexTransfer> {
+    const values = await source.bufferView(header.bufferView);
+    const meshes = await Promise.all(source.extension.parts.map((part) => bindPart(source, part, header.receivers)));
+    return new VertexTransfer(header, kind, values, meshes);
+  }
+
+  relight(lighting: Lighting): void {
+    this.fill(this.uniforms.prtLight.value, lighting.coefficients(this.order));
+  }
+
+  coefficientMaterials(index: number, gain: { value: number }): Material[] {
+    const light = new Float64Array(3 * shCount(this.order)).fill(1, 3 * index, 3 * index + 3);
+    const uniforms = { prtTransfer: this.uniforms.prtTransfer, prtLight: { value: new Float32Array(12 * this.quads) } };
+    this.fill(uniforms.prtLight.value, light);
+    return this.meshes.map((mesh, i) => new PrtMaterial(uniforms, { ...this.optionsOf[i]!, falseColor: { gain } }, { side: (mesh.material as Material).side }));
+  }
+
+  dispose(): void {
+    this.texture.dispose();
+    for (const texture of this.bones.values()) texture.dispose();
+    for (const material of this.materials.values()) material.dispose();
+    for (const mesh of this.meshes) mesh.geometry.dispose();
+  }
+
+  /** [coefficient][3] to red, green and blue in whole texels. */
+  private fill(out: Float32Array, light: ArrayLike<number>): void {
+    for (let k = 0; k < shCount(this.order); ++k) for (let c = 0; c < 3; ++c) out[4 * this.quads * c + k] = light[3 * k + c]!;
+  }
+}

@@ -1,0 +1,78 @@
+// Zonal lobes (docs/zonal.md, docs/file-format.md, kind "zonal"): t_lm = sum_i y_lm(axis_i) g_il, so that exit radiance is
+// sum_i sum_l g_il sum_m L_lm y_lm(axis_i). Follows: Sloan, Luna and Snyder, "Local, Deformable Precomputed Radiance Transfer" (2005),
+// eq. 13. Its eq. 25 looks the inner sums up in a table made anew for each light; here they are summed at the axis, without loops, so
+// that turning the light uploads no table and there is none of its error.
+import { LambentError } from './errors.js';
+import { isIndex } from './glb.js';
+import { glslHarmonics } from './glsl_harmonics.js';
+import { readHeader } from './header.js';
+import type { TransferKind } from './kinds.js';
+import type { PrtShader } from './prt_material.js';
+import { shBand, shCount } from './sh.js';
+import { VertexTransfer } from './vertex_transfer.js';
+
+const maxLobes = 8;
+
+/** Bands that are stored as they are: `exact_zonal_bands` of the C++ library. */
+export const exactZonalBands = (order: number, lobes: number): number => Math.min(order, lobes >= 3 ? 2 : 1);
+
+/** Values a receiver: [channel][exact coefficient], then for each lobe its axis and [channel][band that is not exact]. */
+export function zonalValues(order: number, lobes: number, channels: number): number {
+  const exact = exactZonalBands(order, lobes);
+  return channels * shCount(exact) + lobes * (3 + channels * (order - exact));
+}
+
+export function zonalShader(order: number, lobes: number, channels: 1 | 3): PrtShader {
+  const exact = exactZonalBands(order, lobes), upper = order - exact, lightQuads = Math.ceil(shCount(order) / 4);
+  const swizzle = (k: number): string => 'xyzw'[k & 3]!;
+  const value = (k: number): string => `v[ ${k >> 2} ].${swizzle(k)}`;
+  /** Coefficient k of the light, three channels. */
+  const light = (k: number): string => `vec3( ${[0, 1, 2].map((c) => `prtLight[ ${lightQuads * c + (k >> 2)} ].${swizzle(k)}`).join(', ')} )`;
+  /** Value k, or those of three channels that lie `stride` apart. */
+  const color = (k: number, stride: number): string =>
+    `vec3( ${[0, 1, 2].map((c) => value(k + (channels === 3 ? c * stride : 0))).join(', ')} )`;
+  const lines: string[] = [`sum += ${color(0, shCount(exact))} * ${light(0)};`];
+  if (exact > 1) {
+    // The linear band is a vector in x, y, z for each channel: (-t_11, -t_1-1, t_10).
+    for (let c = 0; c < 3; ++c) {
+      const at = channels === 3 ? 4 * c : 0, of = (k: number): string => `prtLight[ ${lightQuads * c + (k >> 2)} ].${swizzle(k)}`;
+      lines.push(`sum[ ${c} ] += dot( prtFrame * vec3( - ${value(at + 3)}, - ${value(at + 1)}, ${value(at + 2)} ), vec3( - ${of(3)}, - ${of(1)}, ${of(2)} ) );`);
+    }
+  }
+  const first = channels * shCount(exact), stride = 3 + channels * upper;
+  for (let i = 0; i < lobes && upper > 0; ++i) {
+    const at = first + i * stride;
+    const coefficients = Array.from({ length: upper }, (_, l) => `g[ ${l} ] = ${color(at + 3 + l, upper)};`).join(' ');
+    lines.push(`axis = vec3( ${value(at)}, ${value(at + 1)}, ${value(at + 2)} ); ${coefficients}`, 'sum += prtLobe( axis, g );');
+  }
+  const lobe = upper === 0 ? '' : `
+vec3 prtLobe( const in vec3 axis, const in vec3 g[ ${upper} ] ) {
+  float size = length( axis );
+  vec3 n = prtFrame * ( size > 0.0 ? axis / size : vec3( 0.0, 0.0, 1.0 ) ), sum = vec3( 0.0 );
+  ${glslHarmonics(order, (index, y) => (shBand(index) < exact ? '' : `sum += g[ ${shBand(index) - exact} ] * ( ${y} * ${light(index)} );`))}
+  return sum;
+}`;
+  return {
+    key: `zonal ${order} ${lobes} ${channels}`, turns: true,
+    radiance: `${lobe}
+vec3 prtRadiance( const in uint receiver ) {
+  if ( receiver == 0xffffffffu ) return vec3( 0.0 );
+  vec4 v[ PRT_QUADS ];
+  for ( int k = 0; k < PRT_QUADS; ++ k ) v[ k ] = prtValues( receiver, k );
+  vec3 sum = vec3( 0.0 )${upper > 0 ? `, axis, g[ ${upper} ]` : ''};
+  ${lines.join('\n  ')}
+  return sum;
+}
+`,
+  };
+}
+
+export const zonalKind: TransferKind = {
+  name: 'zonal',
+  load: async (source) => {
+    const header = readHeader(source.extension), lobes = source.extension.transfer['lobeCount'];
+    if (!isIndex(lobes, maxLobes) || lobes < 1) throw new LambentError('"lobeCount" is out of range');
+    const { order, channels } = header;
+    return VertexTransfer.load(source, header, { kind: 'zonal', count: zonalValues(order, lobes, channels), valueChannels: 1, shader: zonalShader(order, lobes, channels) });
+  },
+};
