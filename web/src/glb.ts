@@ -11,6 +11,8 @@ export interface TransferExtension {
   transfer: { kind: string; [key: string]: unknown };
   /** Where receivers lie; absent: at vertices. */
   surface?: { kind: unknown; [key: string]: unknown };
+  /** A fixed view: receivers are the pixels of a picture. */
+  view?: unknown;
   parts: { node: number; primitive: number; front?: number; back?: number; [key: string]: unknown }[];
   provenance?: unknown;
 }
