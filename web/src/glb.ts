@@ -11,7 +11,7 @@ export interface TransferExtension {
   transfer: { kind: string; [key: string]: unknown };
   /** Where receivers lie; absent: at vertices. */
   surface?: { kind: unknown; [key: string]: unknown };
-  /** Of a bake of one picture's pixels. */
+  /** A fixed view: receivers are the pixels of a picture. */
   view?: unknown;
   parts: { node: number; primitive: number; front?: number; back?: number; [key: string]: unknown }[];
   provenance?: unknown;

@@ -17,15 +17,15 @@ export interface TransferHeader {
 
 /** What every kind has in its header; refuses by name what this version does not draw. */
 export function readHeader({ transfer, surface, view }: TransferExtension, surfaceKind: 'vertices' | 'texels' = 'vertices'): TransferHeader {
-  const { basis, order, channels, precision, receivers, bufferView, lobes, groups, directional } = transfer;
+  const { basis, order, channels, precision, receivers, bufferView, lobes, groups, directional, cpca } = transfer;
   const text = (value: unknown): string => (typeof value === 'string' ? value : 'something else'), where = text(surface?.kind ?? 'vertices');
   const isMore = (list: unknown): boolean => list !== undefined && !(Array.isArray(list) && list.length === 0);
   if (basis !== 'sh') throw new LambentError(`holds light in the basis "${String(basis)}", which this version does not know`);
-  if (view !== undefined) throw new LambentError('holds one fixed view (bake --fix-view), which this version does not draw; "lambent render" does');
-  if (transfer['cpca'] !== undefined) throw new LambentError('holds transfer in clusters (cpca), which this version does not draw; "lambent render" does');
   if (isMore(lobes)) throw new LambentError('holds lobes of light (lamps, or --light directional), which this version does not draw; "lambent render" does');
   if (isMore(groups) && surfaceKind === 'vertices')
     throw new LambentError("holds the light of the scene's own lamps at vertices, where this version draws it over an atlas; \"lambent render\" draws it");
+  if (view !== undefined) throw new LambentError('holds a fixed view (--fix-view), a picture and no surfaces; "lambent render" draws it');
+  if (cpca !== undefined) throw new LambentError('holds clusters (--compress cpca), which this version does not draw; "lambent render" does');
   if (directional !== undefined)
     throw new LambentError(`holds a directional lightmap ("${text(directional)}"), which this version does not draw; "lambent render" does`);
   if (where !== surfaceKind)
