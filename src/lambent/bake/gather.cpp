@@ -112,6 +112,7 @@ struct Fan {
   // T0: the mean of V y over cosine-distributed directions, which is the integral of V y cos / pi.
   void project(float* row, float* half_row) {
     const size_t coefficients = half.size();
+    if (coefficients == 0) return;  // light of lobes alone
     const float* table = sets.table.data() + size_t(choice.set) * coefficients * sets.stride;
     weighted_rows(table, coefficients, sets.stride, visible.data(), sets.half >= size_t(sets.samples) ? sets.stride : sets.half,
                   half.data());
