@@ -22,11 +22,12 @@ inline constexpr size_t check_every = 16;
 inline constexpr size_t gather_block = 64;
 
 // Rows of the sparse matrix B of neighbouring receivers, stored by columns (kernels.h): neighbours see the same surfaces, so a
-// column serves many of them. Weights are halves, `channels` an entry.
+// column serves many of them. Weights are halves, `channels` an entry. Memory is someone else's: a SparseBlock's, or KeptRows'.
 struct SparseRows {
   size_t row_count = 0;
   SparseEntries entries{};
 };
+// The same with memory of its own.
 struct SparseBlock {
   size_t row_count = 0;
   std::vector<uint32_t> columns, ends;

@@ -1,5 +1,5 @@
 #include <lambent/baked/baked_file.h>
-#include <lambent/baked/viewer_look.h>
+#include <lambent/baked/extension.h>
 #include <lambent/basis/cosine_basis.h>
 #include <lambent/basis/sh.h>
 #include <lambent/core/check.h>
@@ -8,25 +8,15 @@
 #include <lambent/scene/load.h>
 
 #include <algorithm>
-#include <bit>
 #include <cmath>
 #include <cstring>
 #include <filesystem>
-#include <functional>
 #include <map>
 
 namespace lambent {
 namespace {
 
-static_assert(std::endian::native == std::endian::little, "the file and its in-place reader are little-endian");
-
 using nlohmann::json;
-const char* const extension_name = "LAMBENT_transfer";
-
-template <class T>
-std::span<const uint8_t> bytes_of(std::span<const T> values) {
-  return {reinterpret_cast<const uint8_t*>(values.data()), values.size_bytes()};
-}
 
 // A non-negative integer member, at most `limit`.
 Result<size_t> read_count(const json& object, const char* key, size_t limit, const std::string& where) {
@@ -34,20 +24,6 @@ Result<size_t> read_count(const json& object, const char* key, size_t limit, con
   if (!object.is_object() || it == object.end() || !it->is_number_unsigned() || it->get<uint64_t>() > limit)
     return Error{where, std::string("\"") + key + "\" is missing or out of range"};
   return it->get<size_t>();
-}
-
-const std::map<LobeKind, std::string> lobe_names{{LobeKind::cosine_power, "cosine_power"}, {LobeKind::von_mises_fisher, "von_mises_fisher"}};
-
-void write_light(json& object, const LightBasis& light) {
-  object["basis"] = "sh";
-  object["order"] = light.order;
-  if (!light.lobes.empty()) {
-    json lobes = json::array();
-    for (const Lobe& l : light.lobes) lobes.push_back({l.axis.x, l.axis.y, l.axis.z, l.sharpness});
-    object["lobeKind"] = lobe_names.at(light.lobe_kind);
-    object["lobes"] = std::move(lobes);
-  }
-  if (!light.groups.empty()) object["groups"] = light.groups;
 }
 
 Result<LightBasis> read_light(const json& object, const std::string& where) {
@@ -111,23 +87,6 @@ Result<std::vector<T>> read_values(const GltfChunks& chunks, const json& object,
   std::vector<T> values(count);
   if (count) std::memcpy(static_cast<void*>(values.data()), bytes->data(), bytes->size());
   return values;
-}
-
-// The last reflection as bulk data: view maps as halves [map][y][x][row][a.r, a.g, a.b, b]; by receiver, the map and a frame's
-// tangent and normal.
-struct OutgoingBlobs {
-  std::vector<uint16_t> maps, map_of;
-  std::vector<Vec3> frames;
-};
-
-OutgoingBlobs outgoing_blobs(const Outgoing& o) {
-  OutgoingBlobs b;
-  for (const ViewMap& map : o.maps)
-    for (const ViewWeights& w : map.values)
-      for (int c = 0; c < 4; ++c) b.maps.push_back(float_to_half(w[c]));
-  b.map_of = o.map_of;
-  for (const Mat3& f : o.frames) b.frames.push_back(f[0]), b.frames.push_back(f[2]);
-  return b;
 }
 
 Result<Outgoing> read_outgoing(const GltfChunks& chunks, const json& object, int rows, size_t receivers, const std::string& where) {
@@ -316,46 +275,12 @@ Result<std::vector<uint32_t>> read_receivers(const GltfChunks& chunks, const jso
   return map;
 }
 
-// What parts hold, by the kind of receivers: vertices, a receiver a vertex; patches, a receiver a triangle; texels, a place in the
-// atlas a vertex, two floats.
-enum class Kind { vertices, texels, patches };
-const char* const kind_names[] = {"vertices", "texels", "patches"};
-
-// The bytes of one side of every part; none where the whole side has no receivers.
-std::vector<std::vector<uint8_t>> side_bytes(const Scene& scene, const Receivers& receivers, bool back) {
-  std::vector<std::vector<uint8_t>> out;
-  auto copy = [&](auto values) {
-    const auto bytes = bytes_of(values);
-    out.emplace_back(bytes.begin(), bytes.end());
-  };
-  if (const auto* texels = std::get_if<TexelReceivers>(&receivers.basis)) {
-    const auto& side = back ? texels->back : texels->front;
-    if (side.empty()) return out;
-    std::vector<Vec2> at(scene.positions.size(), Vec2(0));
-    for (size_t i = 0; i < side.size(); ++i)
-      if (side[i].part != none)
-        for (size_t k = 0; k < 3; ++k) at[scene.triangles[i].v[k]] = side[i].at[k];
-    for (const Part& part : scene.parts) copy(std::span<const Vec2>(at).subspan(part.first_vertex, part.vertex_count));
-  } else if (const auto* patches = std::get_if<PatchReceivers>(&receivers.basis)) {
-    const auto& side = back ? patches->back : patches->front;
-    if (side.empty()) return out;
-    std::vector<uint32_t> map(side.size());
-    for (size_t i = 0; i < side.size(); ++i) map[i] = side[i].receiver;
-    for (const Part& part : scene.parts) copy(std::span<const uint32_t>(map).subspan(part.first_triangle, part.triangle_count));
-  } else {
-    const auto& map = back ? receivers.back : receivers.front;
-    if (map.empty()) return out;
-    for (const Part& part : scene.parts) copy(std::span<const uint32_t>(map).subspan(part.first_vertex, part.vertex_count));
-  }
-  return out;
-}
-
 // Gathers the parts' sides into a spatial basis.
 struct SurfaceReader {
   const GltfChunks& chunks;
   Baked& baked;
   size_t receivers;
-  Kind kind = Kind::vertices;
+  SurfaceKind kind = SurfaceKind::vertices;
   int width = 0, height = 0;
   std::vector<uint32_t> texels, front, back;  // back: empty until a part has one
   std::vector<Vec2> front_at, back_at;
@@ -364,11 +289,11 @@ struct SurfaceReader {
     const auto surface = extension.find("surface");
     if (surface != extension.end()) {
       if (!surface->is_object() || !surface->contains("kind")) return Error{where, "\"surface\" has no kind"};
-      const auto name = std::find_if(std::begin(kind_names), std::end(kind_names), [&](const char* n) { return (*surface)["kind"] == n; });
-      if (name == std::end(kind_names)) return Error{where, "receivers of this kind are not known to this program"};
-      kind = Kind(name - std::begin(kind_names));
+      const auto name = std::find_if(std::begin(surface_kind_names), std::end(surface_kind_names), [&](const char* n) { return (*surface)["kind"] == n; });
+      if (name == std::end(surface_kind_names)) return Error{where, "receivers of this kind are not known to this program"};
+      kind = SurfaceKind(name - std::begin(surface_kind_names));
     }
-    if (kind == Kind::texels) {
+    if (kind == SurfaceKind::texels) {
       auto w = read_count(*surface, "width", 1 << 16, where), h = read_count(*surface, "height", 1 << 16, where);
       if (!w) return w.error();
       if (!h) return h.error();
@@ -377,19 +302,19 @@ struct SurfaceReader {
       if (!map) return map.error();
       width = int(*w), height = int(*h), texels = std::move(*map);
     }
-    if (kind == Kind::texels) front_at.assign(elements(), Vec2(0));
+    if (kind == SurfaceKind::texels) front_at.assign(elements(), Vec2(0));
     else front.assign(elements(), none);
     return {};
   }
-  size_t elements() const { return kind == Kind::patches ? baked.scene.triangles.size() : baked.scene.positions.size(); }
+  size_t elements() const { return kind == SurfaceKind::patches ? baked.scene.triangles.size() : baked.scene.positions.size(); }
 
   Result<void> read_part(const json& entry, const Part& part, const std::string& where) {
-    const size_t first = kind == Kind::patches ? part.first_triangle : part.first_vertex;
-    const size_t count = kind == Kind::patches ? part.triangle_count : part.vertex_count;
+    const size_t first = kind == SurfaceKind::patches ? part.first_triangle : part.first_vertex;
+    const size_t count = kind == SurfaceKind::patches ? part.triangle_count : part.vertex_count;
     for (const char* side : {"front", "back"}) {
       const bool is_back = side[0] == 'b';
       if (is_back && !entry.contains("back")) continue;
-      if (kind == Kind::texels) {
+      if (kind == SurfaceKind::texels) {
         auto at = read_values<Vec2>(chunks, entry, side, count, where);
         if (!at) return at.error();
         for (Vec2 p : *at)
@@ -408,9 +333,9 @@ struct SurfaceReader {
 
   void finish() {
     const Scene& scene = baked.scene;
-    if (kind == Kind::texels) {
+    if (kind == SurfaceKind::texels) {
       baked.basis = texel_receivers(scene, width, height, front_at, back_at, std::move(texels));
-    } else if (kind == Kind::patches) {
+    } else if (kind == SurfaceKind::patches) {
       PatchReceivers patches;
       patches.front.resize(front.size()), patches.back.resize(back.size());
       for (size_t i = 0; i < front.size(); ++i) patches.front[i] = {front[i], scene.triangles[i].part};
@@ -423,172 +348,7 @@ struct SurfaceReader {
   }
 };
 
-// What all kinds share: bulk data first, then the maps of receivers, then `more`. `describe` makes the kind's header, the extension's
-// "transfer", and what else the extension has; it is given the first of `more`'s views.
-Result<void> save(const std::string& path, const Scene& scene, const Receivers& receivers, std::span<const uint8_t> data,
-                  const std::vector<GltfBlob>& more, const ViewerLook* look, const std::string& provenance,
-                  const std::function<void(json& extension, int first_more)>& describe) {
-  const auto front = side_bytes(scene, receivers, false), back = side_bytes(scene, receivers, true);
-  const auto* texels = std::get_if<TexelReceivers>(&receivers.basis);
-  std::vector<GltfBlob> blobs{{data, 64}};
-  for (const auto* side : {&front, &back})
-    for (const auto& bytes : *side) blobs.push_back({bytes, 4});
-  const size_t texels_blob = blobs.size();
-  if (texels) blobs.push_back({bytes_of(std::span<const uint32_t>(texels->texels)), 4});
-  const int more_view = int(blobs.size());
-  blobs.insert(blobs.end(), more.begin(), more.end());
-  LookWriter look_writer(scene, receivers, look);
-  look_writer.add_blobs(blobs);
-  return save_glb(path, scene, blobs, [&](json& document, const GltfPlaces& places) {
-    json extension;
-    extension["version"] = baked_file_version;
-    describe(extension, places.first_view + more_view);
-    extension["transfer"]["bufferView"] = places.first_view;
-    json parts = json::array();
-    for (size_t i = 0; i < front.size(); ++i) {
-      json part{{"node", places.part_nodes[i]}, {"primitive", places.part_primitives[i]}, {"front", places.first_view + 1 + int(i)}};
-      if (!back.empty()) part["back"] = places.first_view + 1 + int(front.size() + i);
-      parts.push_back(std::move(part));
-    }
-    extension["parts"] = std::move(parts);
-    if (texels) {
-      extension["surface"] = {{"kind", "texels"}, {"width", texels->width}, {"height", texels->height},
-                              {"texels", places.first_view + int(texels_blob)}};
-    } else if (std::holds_alternative<PatchReceivers>(receivers.basis)) {
-      extension["surface"] = {{"kind", "patches"}};
-    }
-    look_writer.write(document, places);
-    extension["provenance"] = json::parse(provenance, nullptr, false);
-    LAMBENT_CHECK(!extension["provenance"].is_discarded());
-    document["extensions"][extension_name] = std::move(extension);
-    json& used = document["extensionsUsed"];
-    if (!used.is_array()) used = json::array();
-    if (std::find(used.begin(), used.end(), extension_name) == used.end()) used.push_back(extension_name);
-  });
-}
-
-json header(const char* kind, int channels, Precision precision, size_t receivers) {
-  return {{"kind", kind}, {"channels", channels}, {"precision", precision == Precision::half ? "half" : "single"}, {"receivers", receivers}};
-}
-
 }  // namespace
-
-namespace {
-
-// What the extras hold, as bulk data, and where it is told of in the extension.
-class ExtrasWriter {
- public:
-  explicit ExtrasWriter(const BakedExtras& extras) : extras_(extras) {
-    if (const Outgoing* o = extras.outgoing) {
-      last_ = outgoing_blobs(*o);
-      blobs.push_back({bytes_of(std::span<const Vec3>(last_.frames)), 4});
-      if (!last_.maps.empty())
-        blobs.push_back({bytes_of(std::span<const uint16_t>(last_.maps)), 4}), blobs.push_back({bytes_of(std::span<const uint16_t>(last_.map_of)), 4});
-    }
-    lattice_at_ = int(blobs.size());
-    if (extras.lattice) blobs.push_back({extras.lattice->transfer.data, 64}), blobs.push_back({extras.lattice->valid, 4});
-    view_at_ = int(blobs.size());
-    if (extras.view) blobs.push_back({bytes_of(std::span<const float>(extras.view->coverage)), 4});
-  }
-  const char* kind() const { return extras_.factors ? "factors" : extras_.outgoing ? "matrix" : "diffuse"; }
-
-  // `first`: the buffer view of the first of `blobs`.
-  void write(json& extension, int rows, int first) const {
-    json& t = extension["transfer"];
-    if (extras_.directional != DirectionalKind::none) t["directional"] = directional_name(extras_.directional);
-    if (const Outgoing* outgoing = extras_.outgoing) {
-      if (!extras_.factors) t["rows"] = rows;
-      json& o = t["outgoing"];
-      o = {{"kind", outgoing_names[int(outgoing->kind)]}, {"order", outgoing->order}, {"frames", first}};
-      if (outgoing->maps.empty()) {
-        o["hasB"] = outgoing->has_b;
-      } else {
-        o["grid"] = outgoing->maps[0].grid, o["mapCount"] = outgoing->maps.size(), o["maps"] = first + 1, o["mapOf"] = first + 2;
-      }
-    }
-    if (const LatticeTransfer* lattice = extras_.lattice) {
-      const Lattice& l = lattice->lattice;
-      extension["lattice"] = {{"min", {l.min.x, l.min.y, l.min.z}},
-                              {"max", {l.max.x, l.max.y, l.max.z}},
-                              {"points", {l.nx, l.ny, l.nz}},
-                              {"order", lattice->order},
-                              {"channels", lattice->transfer.channels},
-                              {"precision", lattice->transfer.precision == Precision::half ? "half" : "single"},
-                              {"bufferView", first + lattice_at_},
-                              {"valid", first + lattice_at_ + 1}};
-    }
-    if (const FixedView* v = extras_.view) {
-      const Vec3 e = v->camera.eye, at = v->camera.target;
-      extension["view"] = {{"width", v->width}, {"height", v->height}, {"eye", {e.x, e.y, e.z}}, {"target", {at.x, at.y, at.z}},
-                           {"fov", v->camera.fov}, {"coverage", first + view_at_}};
-    }
-  }
-
-  std::vector<GltfBlob> blobs;
-
- private:
-  const BakedExtras& extras_;
-  OutgoingBlobs last_;
-  int lattice_at_ = 0, view_at_ = 0;
-};
-
-void check_extras(const BakedExtras& extras, const LightBasis& light, int rows) {
-  const LatticeTransfer* lattice = extras.lattice;
-  LAMBENT_CHECK(!lattice || (lattice->transfer.columns() == light.count() && lattice->valid.size() == lattice->lattice.count()));
-  LAMBENT_CHECK(!extras.factors || (rows == 1 && extras.outgoing && extras.outgoing->kind == OutgoingKind::map && light.order >= extras.outgoing->order));
-  LAMBENT_CHECK(rows == (extras.outgoing && !extras.factors ? extras.outgoing->rows() : directional_rows(extras.directional)));
-}
-
-}  // namespace
-
-Result<void> save_baked(const std::string& path, const Scene& scene, const Receivers& receivers, const Transfer& transfer,
-                        const std::string& provenance, const BakedExtras& extras) {
-  check_extras(extras, transfer.light, transfer.rows);
-  LAMBENT_CHECK(!extras.view || (extras.view->coverage.size() == transfer.receivers && !extras.outgoing));
-  const ExtrasWriter more(extras);
-  return save(path, scene, receivers, transfer.data, more.blobs, extras.look, provenance, [&](json& extension, int first) {
-    extension["transfer"] = header(more.kind(), transfer.channels, transfer.precision, transfer.receivers);
-    write_light(extension["transfer"], transfer.light);
-    more.write(extension, transfer.rows, first);
-  });
-}
-
-Result<void> save_baked(const std::string& path, const Scene& scene, const Receivers& receivers, const CpcaTransfer& transfer,
-                        const std::string& provenance, const BakedExtras& extras) {
-  check_extras(extras, transfer.light, transfer.rows);
-  LAMBENT_CHECK(!extras.view);
-  const ExtrasWriter more(extras);
-  std::vector<GltfBlob> blobs = more.blobs;
-  blobs.push_back({bytes_of(std::span<const uint16_t>(transfer.cluster_of)), 4});
-  blobs.push_back({bytes_of(std::span<const uint16_t>(transfer.weights)), 4});
-  const int at = int(more.blobs.size());
-  return save(path, scene, receivers, bytes_of(std::span<const float>(transfer.vectors)), blobs, extras.look, provenance, [&](json& extension, int first) {
-    json& t = extension["transfer"] = header(more.kind(), transfer.channels, Precision::half, transfer.receivers);
-    write_light(t, transfer.light);
-    more.write(extension, transfer.rows, first);
-    t["cpca"] = {{"clusters", transfer.clusters}, {"rank", transfer.rank},
-                 {"clusterOf", first + at}, {"weights", first + at + 1}};
-  });
-}
-
-Result<void> save_baked(const std::string& path, const Scene& scene, const Receivers& receivers, const ZonalTransfer& transfer,
-                        const std::string& provenance) {
-  return save(path, scene, receivers, transfer.data, {}, nullptr, provenance, [&](json& extension, int) {
-    json& t = extension["transfer"] = header("zonal", transfer.channels, transfer.precision, transfer.receivers);
-    write_light(t, {.order = transfer.order});
-    t["lobeCount"] = transfer.lobes;
-  });
-}
-
-Result<void> save_baked(const std::string& path, const Scene& scene, const Receivers& receivers, const Visibility& visibility,
-                        const std::string& provenance) {
-  LAMBENT_CHECK(visibility.receivers == receivers.count());
-  std::vector<uint8_t> lengths;
-  for (size_t r = 0; r < visibility.receivers; ++r) append_varint(lengths, visibility.begin[r + 1] - visibility.begin[r]);
-  return save(path, scene, receivers, visibility.data, {{lengths, 4}}, nullptr, provenance, [&](json& extension, int first) {
-    extension["transfer"] = {{"kind", "blocks"}, {"cube", visibility.size}, {"bits", visibility.bits}, {"receivers", visibility.receivers}, {"lengths", first}};
-  });
-}
 
 Result<Baked> load_baked(const std::string& path) {
   auto file = MappedFile::open(path);
@@ -692,7 +452,7 @@ Result<Baked> load_baked(const MappedFile& file, const std::string& path) {
     baked.view = std::move(*view);
     return baked;
   }
-  SurfaceReader surface{*chunks, baked, *receivers, Kind::vertices, 0, 0, {}, {}, {}, {}, {}};
+  SurfaceReader surface{*chunks, baked, *receivers, SurfaceKind::vertices, 0, 0, {}, {}, {}, {}, {}};
   if (auto ok = surface.begin(extension, where); !ok) return ok.error();
   const auto parts = extension.find("parts");
   if (parts == extension.end() || !parts->is_array()) return Error{where, "\"parts\" is missing"};

@@ -378,28 +378,18 @@ TEST(BakedFile, RefusesEveryTruncation) {
 }
 
 TEST(BakedFile, RefusesHeadersThatLie) {
-  const TemporaryFile whole("lie.glb"), lying("lying.glb");
+  const TemporaryFile whole("whole.glb");
   const Small s = small_bake(1, Precision::half);
   ASSERT_TRUE(save_baked(whole.path, s.scene, s.receivers, s.transfer.transfer, "{}"));
-  const std::vector<uint8_t> bytes = *read_file(whole.path);
   const std::string receivers = "\"receivers\":" + std::to_string(s.receivers.count());
-  const std::pair<std::string, std::string> lies[] = {{"\"version\":1}", "\"version\":2}"},
-                                                      {"\"order\":3", "\"order\":4"},
-                                                      {"\"order\":3", "\"order\":0"},
-                                                      {"\"channels\":1", "\"channels\":2"},
-                                                      {"\"channels\":1", "\"channels\":3"},
-                                                      {receivers, receivers.substr(0, receivers.size() - 1) + (receivers.back() == '0' ? "1" : "0")},
-                                                      {"\"kind\":\"diffuse\"", "\"kind\":\"unknown\""},
-                                                      {"\"precision\":\"half\"", "\"precision\":\"hal?\""}};
-  for (const auto& [from, to] : lies) {
-    const auto changed = edited(bytes, from, to);
-    const std::span<const uint8_t> piece(changed);
-    ASSERT_TRUE(write_file_atomically(lying.path, {&piece, 1}));
-    auto result = load_baked(lying.path);
-    ASSERT_FALSE(result) << to;
-    EXPECT_EQ(result.error().text().find('\n'), std::string::npos);
-    EXPECT_NE(result.error().text().find(lying.path), std::string::npos);
-  }
+  expect_refused(whole.path, "", {{"\"version\":1}", "\"version\":2}"},
+                                  {"\"order\":3", "\"order\":4"},
+                                  {"\"order\":3", "\"order\":0"},
+                                  {"\"channels\":1", "\"channels\":2"},
+                                  {"\"channels\":1", "\"channels\":3"},
+                                  {receivers, receivers.substr(0, receivers.size() - 1) + (receivers.back() == '0' ? "1" : "0")},
+                                  {"\"kind\":\"diffuse\"", "\"kind\":\"unknown\""},
+                                  {"\"precision\":\"half\"", "\"precision\":\"hal?\""}});
 }
 
 TEST(BakedFile, KeepsZonalTransferAndRefusesLiesAboutIt) {
