@@ -131,6 +131,7 @@ expect 1 'view is fixed' render view.glb --env sky:elevation=30 --camera auto -o
 expect 0 'rows?' bake corner.obj --transfer matrix --brdf ggx:roughness=0.5 --order 3 --incident-order 3 --samples 64 --bounces 0 --fix-view auto --size 8x8 -o view.glb
 expect 0 'relit 64' render view.glb --env uniform:1,1,1 -o glossy_view.png
 expect 2 'fix-view' bake corner.obj --fix-view 1,2 -o x.glb
+expect 2 '4 GiB' bake corner.obj --fix-view auto --size 9000x9000 -o x.glb
 expect 2 'fix-view' bake corner.obj --fix-view auto --compress cpca:2,2 -o x.glb
 expect 2 'needs|requires' bake corner.obj --size 8x8 -o x.glb
 # Clusters, from the bake or from its file.

@@ -212,6 +212,9 @@ int run_bake(Context& context, BakeCommand o) {
     auto made = make_view(asked, *scene);
     if (!made) return fail(Error{made.error().where == "--camera" ? "--fix-view" : made.error().where, made.error().message});
     fixed = *made;
+    const size_t bytes = 3 * size_t(fixed->width) * size_t(fixed->height) * o.bake.light().count() * (o.bake.precision == Precision::half ? 2 : 4);
+    if (bytes >= size_t{1} << 32)
+      return fail({"--size", fmt::format("{} pixels of {} columns take {} bytes, and a baked file holds 4 GiB", o.size, o.bake.light().count(), bytes)});
   }
   auto placed = place_receivers(*scene, o.receivers, "vertices");
   if (!placed) return fail(placed.error());
