@@ -60,7 +60,7 @@ struct MatrixScratch {
   AlignedVector<float> x, y, z, visible, lobe;
   std::vector<Hit> hits;
   std::vector<float> V, column_row;
-  AlignedVector<float> sh_rows, v, zb;
+  AlignedVector<float> sh_rows, v, zb, full, half;
   std::vector<ViewWeights> weights;
   std::vector<float> scalars, z_values;
   std::vector<double> lobe_sums;
@@ -105,6 +105,7 @@ struct MatrixBaker {
     s->x.resize(stride), s->y.resize(stride), s->z.resize(stride), s->visible.resize(stride), s->lobe.resize(stride), s->hits.resize(rays());
     s->V.resize(V_count()), s->column_row.resize(C());
     s->sh_rows.resize(J() * w), s->v.resize(hit_batch * w), s->zb.resize(hit_batch * J());
+    s->full.resize(J() * width()), s->half.resize(J() * width());
     s->weights.resize(J()), s->scalars.resize(J() * 3);
     s->z_values.resize(J()), s->lobe_sums.resize(2 * J()), s->lobe_rays = make_lobe_rays(lobes);
     return s;
@@ -451,8 +452,13 @@ struct MatrixBaker {
     const size_t wc = channels() * width(), blocks = (n() + gather_block - 1) / gather_block;
     const bool bounces = options.bounces > 0;
     auto start = Clock::now();
-    AlignedVector<float> T0(n() * J() * width());
-    std::vector<float> T0_half((n() + check_every - 1) / check_every * J() * width());
+    // Bounces need the direct rows of all receivers at once; without them each is stored as it comes.
+    const size_t held = bounces ? n() : 0;
+    AlignedVector<float> T0(held * J() * width());
+    std::vector<float> T0_half((held + check_every - 1) / check_every * J() * width());
+    const Last last = make_last();
+    WritableTransfer out = make_transfer(options.light(), last.rows, last.channels, n(), options.precision);
+    ErrorSums errors(blocks);
     std::vector<uint8_t> buried(n());
     std::vector<MatrixHits> kept(blocks);
     std::vector<uint8_t> is_kept(blocks, 0);
@@ -461,12 +467,18 @@ struct MatrixBaker {
     std::atomic<size_t> used{0};
 
     auto trace_receiver = [&](MatrixScratch& s, size_t r, MatrixHits* hits) {
+      const bool moved = buried[r];
       buried[r] = trace(s, r, hits);
-      direct(s, rays(), T0.data() + r * J() * width());
-      float* half = r % check_every == 0 ? T0_half.data() + r / check_every * J() * width() : nullptr;
+      const bool checked = r % check_every == 0;
+      float* full = bounces ? T0.data() + r * J() * width() : s.full.data();
+      float* half = !checked ? nullptr : bounces ? T0_half.data() + r / check_every * J() * width() : s.half.data();
+      direct(s, rays(), full);
       if (half) direct(s, std::min(setup.sets.half, rays()), half);
-      direct_sharp_lobes(s, r, T0.data() + r * J() * width(), half);
+      direct_sharp_lobes(s, r, full, half);
       if (hits) hits->ends.push_back(uint32_t(hits->hits.size()));
+      if (bounces) return;
+      store(last, out, r, full);
+      if (checked && !buried[r] && !moved) errors.add(r / gather_block, half, full, J() * width());
     };
     // Which blocks are kept depends on the scheduling, the result does not: the others are traced again, alike.
     auto keep = [&](size_t block, MatrixHits&& hits) {
@@ -487,14 +499,12 @@ struct MatrixBaker {
       if (stage.cancelled()) return Error{"", "cancelled"};
     }
     report.rays = n() * (rays() + size_t(lobes.rays) * lobes.sharp.size());
-    move_buried(buried, T0, trace_receiver, bounces, kept, is_kept, used);
+    move_buried(buried, trace_receiver, bounces, kept, is_kept, used);
     report.operator_bytes = used;
     report.operator_kept = bounces ? double(std::count(is_kept.begin(), is_kept.end(), uint8_t(1))) / double(blocks) : 1;
     report.trace_seconds = seconds_since(start);
     start = Clock::now();
 
-    const Last last = make_last();
-    WritableTransfer out = make_transfer(options.light(), last.rows, last.channels, n(), options.precision);
     auto scatter_rows = [&](size_t r, const float* x, float* Y) {
       const FactoredResponse& f = scatter[materials.of_receiver[r]];
       apply(f.h, size_t(f.rows), J(), wc, x, Y + first_row[r] * wc);
@@ -502,18 +512,13 @@ struct MatrixBaker {
 
     AlignedVector<float> Y, next;
     if (bounces) Y.resize(first_row.back() * wc), next.resize(Y.size());
-    parallel_for(n(), gather_block, [&](size_t begin, size_t end) {
+    parallel_for(held, gather_block, [&](size_t begin, size_t end) {
       AlignedVector<float> x(J() * wc);
       for (size_t r = begin; r < end; ++r) {
         expand(T0.data() + r * J() * width(), x.data());
-        if (bounces) scatter_rows(r, x.data(), Y.data());
-        else store(last, out, r, x.data());
+        scatter_rows(r, x.data(), Y.data());
       }
     });
-    ErrorSums errors(blocks);
-    if (!bounces)
-      for (size_t r = 0; r < n(); r += check_every)
-        if (!buried[r]) errors.add(r / gather_block, T0_half.data() + r / check_every * J() * width(), T0.data() + r * J() * width(), J() * width());
 
     for (int bounce = 1; bounce <= options.bounces; ++bounce) {
       const bool is_last = bounce == options.bounces;
@@ -558,20 +563,24 @@ struct MatrixBaker {
 
   // A buried receiver looks out from where its nearest clear neighbour along the mesh lies.
   template <class TraceReceiver>
-  void move_buried(const std::vector<uint8_t>& was_buried, AlignedVector<float>&, TraceReceiver& trace_receiver, bool bounces, std::vector<MatrixHits>& kept,
+  void move_buried(const std::vector<uint8_t>& was_buried, TraceReceiver& trace_receiver, bool bounces, std::vector<MatrixHits>& kept,
                    std::vector<uint8_t>& is_kept, std::atomic<size_t>& used) {
     const std::vector<uint8_t> buried = was_buried;
     const auto steps = make_fill_steps(scene, receivers.basis, buried);
     if (steps.empty()) return;
     for (const FillStep& step : steps) receivers.origins[step.receiver] = receivers.origins[step.sources[0]];
+    auto s = scratch.borrow();
+    if (!bounces) {
+      for (const FillStep& step : steps) trace_receiver(*s, step.receiver, nullptr);
+      return;
+    }
     std::map<size_t, bool> touched;
     for (const FillStep& step : steps) touched[step.receiver / gather_block] = true;
-    auto s = scratch.borrow();
     for (const auto& [block, yes] : touched) {
       const size_t begin = block * gather_block, end = std::min(n(), begin + gather_block);
       MatrixHits hits;
-      for (size_t r = begin; r < end; ++r) trace_receiver(*s, r, bounces ? &hits : nullptr);
-      if (bounces && is_kept[block]) used += hits.bytes(), used -= kept[block].bytes(), kept[block] = std::move(hits);
+      for (size_t r = begin; r < end; ++r) trace_receiver(*s, r, &hits);
+      if (is_kept[block]) used += hits.bytes(), used -= kept[block].bytes(), kept[block] = std::move(hits);
     }
   }
 };
@@ -613,8 +622,9 @@ Result<void> check_options(const BakeOptions& o, const MatrixOptions& m, const R
 size_t matrix_memory(size_t receivers, int channels, const BakeOptions& o, const MatrixOptions& m) {
   const size_t width = pad_lanes(o.light().count()), J = size_t(sh_count(m.incident_order));
   const size_t table = 8 * pad_lanes(size_t(o.samples)) * 4 * size_t(sh_count(o.order + m.incident_order - 1) + 3);
-  const size_t scattered = o.bounces > 0 ? 2 * size_t(m.scatter_rows) * size_t(channels) * width : 0;
-  return receivers * (4 * (J * width * (check_every + 1) / check_every + scattered) + 2 * sizeof(Vec3) + sizeof(Mat3)) + table +
+  // Bounces hold direct rows and scattered ones; direct light alone is stored as it comes.
+  const size_t held = o.bounces > 0 ? J * width * (check_every + 1) / check_every + 2 * size_t(m.scatter_rows) * size_t(channels) * width : 0;
+  return receivers * (4 * held + 2 * sizeof(Vec3) + sizeof(Mat3)) + table +
          lobe_set_bytes(o.samples, o.lobes.size());
 }
 

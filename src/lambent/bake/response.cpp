@@ -68,11 +68,14 @@ std::vector<float> convolve_phong(const LinearMaterial& material, const CosineBa
 
 FactoredResponse factor_response(const ViewMap& response, int max_rows, double tolerance) {
   const int nodes = response.grid * response.grid, n = response.rows;
-  // One row of the matrix for each node and component; the map has equal areas, so every node weighs the same.
-  std::vector<double> A(size_t(nodes) * 4 * size_t(n));
-  for (int i = 0; i < nodes; ++i)
+  // One row of the matrix for each node and component, weighed by how much of a picture, or of the rays that meet a surface, sees it so: the cosine of its
+  // view (the map has equal areas; a grazing view keeps a little).
+  std::vector<double> A(size_t(nodes) * 4 * size_t(n)), seen;
+  for (int i = 0; i < nodes; ++i) {
+    seen.push_back(std::sqrt(std::max(0.02, double(view_map_direction(response.grid, i % response.grid, i / response.grid).z))));
     for (int c = 0; c < 4; ++c)
-      for (int j = 0; j < n; ++j) A[(size_t(i) * 4 + size_t(c)) * size_t(n) + size_t(j)] = response.values[size_t(i * n + j)][c];
+      for (int j = 0; j < n; ++j) A[(size_t(i) * 4 + size_t(c)) * size_t(n) + size_t(j)] = seen.back() * response.values[size_t(i * n + j)][c];
+  }
   const Svd d = thin_svd(A, nodes * 4, n);
   FactoredResponse f;
   f.singular_values = d.s;
@@ -87,7 +90,7 @@ FactoredResponse factor_response(const ViewMap& response, int max_rows, double t
   f.g = {response.grid, f.rows, std::vector<ViewWeights>(size_t(nodes) * size_t(f.rows))};
   for (int i = 0; i < nodes; ++i)
     for (int r = 0; r < f.rows; ++r)
-      for (int c = 0; c < 4; ++c) f.g.values[size_t(i * f.rows + r)][c] = float(d.U[(size_t(i) * 4 + size_t(c)) * size_t(d.k) + size_t(r)] * d.s[size_t(r)]);
+      for (int c = 0; c < 4; ++c) f.g.values[size_t(i * f.rows + r)][c] = float(d.U[(size_t(i) * 4 + size_t(c)) * size_t(d.k) + size_t(r)] * d.s[size_t(r)] / seen[size_t(i)]);
   f.constant = f.rows == 1;
   for (const ViewWeights& w : f.g.values) {
     const ViewWeights apart = glm::abs(w - f.g.values[0]);

@@ -17,8 +17,8 @@ struct LinearMaterial {
 // O_j over a grid of views, rows = order^2. `samples` directions a view, drawn from the BRDF.
 ViewMap make_response(const LinearMaterial& material, const CosineBasis& basis, int grid, int samples);
 
-// O = sum_r g_r(wo) h_rj: the rows h and the weights g, by singular values over the views. At most max_rows, and as few as leave
-// a relative error (root of the sum of squares) of `tolerance`.
+// O = sum_r g_r(wo) h_rj: the rows h and the weights g, by singular values of O weighed by the cosine of the view. At most max_rows, and as
+// few as leave a relative error (root of the weighed sum of squares) of `tolerance`.
 struct FactoredResponse {
   int rows = 0;
   std::vector<float> h;      // rows x order^2
