@@ -42,11 +42,16 @@ export async function open(browser: Browser, address: string, fragment: string, 
   const page = await browser.newPage({ viewport: { width, height }, deviceScaleFactor: 1 });
   page.on('pageerror', (error) => console.error('page:', error.message));
   await page.goto(`${address}#${fragment}`);
+  await ready(page);
+  return page;
+}
+
+/** All is loaded and drawn; throws what the page complains of. */
+export async function ready(page: Page): Promise<void> {
   await page.waitForSelector('body[data-ready=yes], #problem:not([hidden])', { state: 'attached' });
   const problem = await page.textContent('#problem-text');
   if (problem) throw new Error(`the page says: ${problem}`);
   await drawn(page);
-  return page;
 }
 
 /** The scenes of fixture/scenes.ts, with files of `folder` under /files/, a tilde for each slash. */

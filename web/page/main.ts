@@ -104,7 +104,7 @@ class Page {
     viewer.view = state.view, viewer.against = state.against, viewer.wipe = state.wipe, viewer.exposure = state.exposure;
     viewer.order = state.order, viewer.window = state.window, viewer.coefficient = state.coefficient, viewer.showBackground = state.background;
     viewer.changeLight();
-    get('exposure-value').textContent = `${state.exposure > 0 ? '+' : ''}${state.exposure.toFixed(1)}`;
+    get('exposure-value').textContent = `${state.exposure > 0 ? '+' : ''}${state.exposure.toFixed(1)}`.replace('-', '−');
     get('order-value').textContent = `${viewer.bands} of ${viewer.bakedScene?.transfer.order ?? 1}`;
     const usesCoefficient = [state.view, state.against].includes('coefficient');
     const l = shBand(state.coefficient), m = state.coefficient - shIndex(l, 0);

@@ -116,7 +116,7 @@ export class Viewer {
     this.invalidate();
   }
 
-  /** From the front right and a little above, all of it in view: the camera of `lambent render --camera auto`. */
+  /** From the front right and a little above, all of it in view: the camera of `lambent render --camera auto`, from farther off where the page is narrow. */
   frameAll(): void {
     const root = this.baked?.root;
     if (!root) return;
@@ -126,7 +126,8 @@ export class Viewer {
     if (box.isEmpty()) box.setFromObject(root, true);
     this.camera.fov = 35;
     const centre = box.getCenter(new Vector3()), radius = Math.max(box.getSize(new Vector3()).length() / 2, 1e-6);
-    const distance = (radius / Math.sin((35 * Math.PI) / 360)) * 0.95;
+    const narrow = Math.max(1, this.canvas.clientHeight / Math.max(1, this.canvas.clientWidth));
+    const distance = (radius / Math.sin((35 * Math.PI) / 360)) * 0.95 * narrow;
     this.orbit.look(new Vector3(0.55, 0.4, 1).normalize().multiplyScalar(distance).add(centre), centre);
   }
 
