@@ -55,6 +55,8 @@ describe.skipIf(!haveTool || !haveBrowser || !haveData)('screenshots', () => {
     await shoot('web_lobes.jpg', [at('man.glb'), '--env', environment('chinese_garden')], 'time=0.6&exposure=-1&window=auto', desk, async (page) => {
       await page.focus('#picture');
       for (let i = 0; i < 2; ++i) await page.keyboard.press('-'); // clear of the hint and the controls
+      await drawn(page);
+      await page.mouse.dblclick(440, 250);
     });
   });
 }, 240_000);

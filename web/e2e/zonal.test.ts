@@ -3,7 +3,7 @@ import { join } from 'node:path';
 import type { Browser } from 'playwright-core';
 import { afterAll, beforeAll, describe, expect, it } from 'vitest';
 import { haveTool, lambent, makeFolder, writeLopsidedHdr } from '../test/tool.ts';
-import { haveBrowser, launch, open, psnr, serve, writeScene, writeSkin } from './browser.ts';
+import { drawn, haveBrowser, launch, open, psnr, serve, writeBall, writeScene, writeSkin } from './browser.ts';
 
 const rotate = '40,-25,70';
 
@@ -57,5 +57,38 @@ describe.skipIf(!haveTool || !haveBrowser)('zonal lobes', () => {
     expect(turned).toBeGreaterThan(rest - 1);
     expect(turned).toBeGreaterThan(38);
     expect(stiff).toBeLessThan(turned - 8); // the comparison can fail
+  });
+
+  it('shows the lobes of the receiver under the pointer, in the picture and in words', async () => {
+    writeBall(at('ball.obj'));
+    lambent('bake', at('ball.obj'), '--samples', '256', '-o', at('ball.glb'));
+    lambent('compress', at('ball.glb'), '--zonal', '1', '-o', at('one.glb'));
+    const server = await serve(at('one.glb'), '--env', at('light.hdr')), page = await open(browser, server.address, 'camera=0,0,5,0,0,0,35', 400, 400);
+    const middle = (): Promise<Buffer> => page.screenshot({ clip: { x: 60, y: 110, width: 280, height: 180 } }); // clear of the words and the controls
+    const axis = async (): Promise<number[]> => {
+      const text = (await page.textContent('#lobes'))!;
+      expect(text).toMatch(/^1 lobe of energy 0\.\d+: 100 % about /);
+      return /\((.*)\)/.exec(text)![1]!.split(', ').map((v) => Number(v.replace('−', '-')));
+    };
+    const before = await middle();
+    // Open sky about a ball: a lobe along the normal.
+    await page.mouse.dblclick(200, 200);
+    await drawn(page);
+    expect((await axis())[2]).toBeGreaterThan(0.98);
+    expect((await middle()).equals(before)).toBe(false);
+    await page.mouse.move(290, 200);
+    await page.keyboard.press('l');
+    await drawn(page);
+    const ray = Math.atan((90 / 200) * Math.tan((35 / 360) * Math.PI)), normal = Math.asin(5 * Math.sin(ray)) - ray; // from 5 away, angles with +Z
+    expect(Math.abs((await axis())[0]! - Math.sin(normal))).toBeLessThan(0.05);
+    await page.keyboard.press('Escape');
+    await drawn(page);
+    expect(await page.textContent('#lobes')).toBe('');
+    expect((await middle()).equals(before)).toBe(true);
+    await page.mouse.dblclick(20, 200); // beside the ball
+    await drawn(page);
+    expect((await middle()).equals(before)).toBe(true);
+    await page.close();
+    await server.stop();
   });
 });

@@ -145,6 +145,7 @@ class Page {
       viewer.play(on);
       if (on) delete state.time;
       else if (viewer.animationTime !== undefined) state.time = viewer.animationTime;
+      if (!on) get('lobes').textContent = viewer.lobes ?? ''; // not while it plays: a status that changes each frame is noise
       this.saveSoon();
     });
     get('reset-view').addEventListener('click', () => this.setCamera(this.manifest?.camera));
@@ -163,6 +164,7 @@ class Page {
       if (file) this.openFile(file);
     });
     this.connectWipe();
+    this.connectLobes();
     get('controls').addEventListener('submit', (e) => e.preventDefault());
     addEventListener('hashchange', () => {
       if (location.hash !== formatState(this.current())) location.reload();
@@ -176,6 +178,24 @@ class Page {
     wipe.addEventListener('keydown', (e) => {
       const step = { ArrowLeft: -0.02, ArrowRight: 0.02, Home: -1, End: 1 }[e.key];
       if (step !== undefined) move(this.state.wipe + step), e.preventDefault();
+    });
+  }
+
+  /** A double click, or the key L under the pointer, in the picture's middle where there is none. */
+  private connectLobes(): void {
+    const { viewer } = this, picture = get('picture');
+    let at: { x: number; y: number } | undefined;
+    const pick = (x: number, y: number): void => {
+      if (!viewer.hasLobes) return;
+      get('lobes').textContent = viewer.pickLobes(x, y) ?? '';
+      get('hint').hidden = true; // the words stand in its place
+    };
+    picture.addEventListener('pointermove', (e) => (at = { x: e.offsetX, y: e.offsetY }));
+    picture.addEventListener('pointerleave', () => (at = undefined));
+    picture.addEventListener('dblclick', (e) => pick(e.offsetX, e.offsetY));
+    picture.addEventListener('keydown', (e) => {
+      if (e.key.toLowerCase() === 'l' && !e.ctrlKey && !e.metaKey && !e.altKey) pick(at?.x ?? picture.clientWidth / 2, at?.y ?? picture.clientHeight / 2);
+      else if (e.key === 'Escape') viewer.clearLobes(), (get('lobes').textContent = '');
     });
   }
 
@@ -201,6 +221,7 @@ class Page {
     viewer.setModel('baked', await this.parse(name, bytes));
     get('name').textContent = document.title = name;
     get('hint').hidden = false, get('invitation').hidden = true;
+    get('lobes').textContent = '', get('lobes-how').hidden = !viewer.hasLobes;
     this.setCamera(first ? this.state.camera : undefined);
     if (first && this.state.time !== undefined) viewer.pose(this.state.time);
     get('loading').hidden = true;

@@ -1,12 +1,13 @@
 // The picture: a baked scene, its light and what it is compared with. Draws when something has changed, and only then.
 import {
-  AnimationMixer, Box3, LinearToneMapping, Matrix4, PerspectiveCamera, Quaternion, Scene, Sphere, Vector3, WebGLRenderer,
+  AnimationMixer, Box3, LinearToneMapping, Matrix4, PerspectiveCamera, Quaternion, Raycaster, Scene, Sphere, Vector2, Vector3, WebGLRenderer,
   type AnimationAction, type DataTexture, type Mesh, type Object3D,
 } from 'three';
 import type { GLTF } from 'three/addons/loaders/GLTFLoader.js';
 import { FullScreenQuad } from 'three/addons/postprocessing/Pass.js';
 import { LambentError, type BakedScene, type ShWindow } from '../src/index.js';
 import type { EnvironmentFile } from './loading.js';
+import { LobeGlyphs, pickVertex } from './lobes.js';
 import { Model } from './model.js';
 import { Orbit } from './orbit.js';
 import { PictureMaterial, SkyMaterial } from './screen.js';
@@ -44,6 +45,7 @@ export class Viewer {
   private readonly picture = new PictureMaterial();
   private readonly screen = new FullScreenQuad(this.sky);
   private readonly gain = { value: 1 }; // of false colour
+  private readonly glyphs = new LobeGlyphs();
   private readonly bounds = new Sphere(new Vector3(), 1);
   private baked: Model | undefined;
   private compare: Model | undefined;
@@ -84,6 +86,7 @@ export class Viewer {
     this.scene.add(model.root);
     if (role === 'baked') {
       this.animation = undefined;
+      this.glyphs.clear();
       if (gltf.animations[0]) {
         const mixer = new AnimationMixer(gltf.scene);
         this.animation = { mixer, action: mixer.clipAction(gltf.animations[0]) };
@@ -155,6 +158,26 @@ export class Viewer {
   }
   get animationTime(): number | undefined {
     return this.animation?.action.isScheduled() ? this.animation.action.time : undefined;
+  }
+
+  get hasLobes(): boolean {
+    return this.baked?.baked.transfer.lobesAt !== undefined;
+  }
+  /** Shows the lobes under a point of the canvas, in pixels, and says what they are; takes them away where there are none. */
+  pickLobes(x: number, y: number): string | undefined {
+    const { canvas, baked } = this, ray = new Raycaster();
+    if (!baked) return undefined;
+    ray.setFromCamera(new Vector2((2 * x) / canvas.clientWidth - 1, 1 - (2 * y) / canvas.clientHeight), this.camera);
+    this.invalidate();
+    return this.glyphs.pick(baked.baked.transfer, pickVertex(baked.meshes, ray));
+  }
+  clearLobes(): void {
+    this.glyphs.clear();
+    this.invalidate();
+  }
+  /** The lobes that are shown, in words. */
+  get lobes(): string | undefined {
+    return this.glyphs.describe();
   }
 
   invalidate(): void {
@@ -234,6 +257,10 @@ export class Viewer {
     for (const model of [this.baked, this.compare]) if (model) model.root.visible = model === shown;
     shown.wear(view === 'compare' ? 'baked' : view, this.environment?.lighting, this.coefficient, this.gain);
     renderer.render(this.scene, this.camera);
+    const glyphs = shown === this.baked ? this.glyphs.place(this.camera) : undefined;
+    if (!glyphs) return;
+    renderer.clearDepth(); // lobes may point into the surface
+    renderer.render(glyphs, this.camera);
   }
 }
 

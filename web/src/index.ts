@@ -9,6 +9,7 @@ export { LambentError } from './errors.js';
 export { checkBakedFile, extensionName } from './glb.js';
 export { knownKinds, registerTransferKind, type BakedTransfer, type TransferKind, type TransferSource } from './kinds.js';
 export { latLongMap, Lighting } from './lighting.js';
+export { lobeValue, type Lobe } from './lobes.js';
 export { bakedScene, LambentTransferPlugin, type BakedScene } from './plugin.js';
 export { projectLatLong, texelSolidAngle, type LatLongMap } from './projection.js';
 export { diffuseParameters, PrtMaterial } from './prt_material.js';

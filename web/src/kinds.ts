@@ -2,6 +2,7 @@
 import type { Color, Material, Mesh } from 'three';
 import type { TransferExtension } from './glb.js';
 import type { Lighting } from './lighting.js';
+import type { Lobe } from './lobes.js';
 
 /** What a kind is given to read itself from. */
 export interface TransferSource {
@@ -34,6 +35,8 @@ export interface BakedTransfer {
    * Made on demand; the caller disposes of them.
    */
   coefficientMaterials(index: number, gain: { value: number }): Material[];
+  /** Zonal transfer: the lobes of a vertex as the surface stands now, or of its back; undefined where it has no receiver. */
+  readonly lobesAt?: (mesh: Mesh, vertex: number, back: boolean) => Lobe[] | undefined;
   dispose(): void;
 }
 

@@ -1,13 +1,14 @@
 // Transfer at vertices, whatever its kind: a texture of every receiver's values, receivers as attributes, and light as uniforms.
 import {
-  DataTexture, FloatType, Matrix3, RGBAFormat, Uint32BufferAttribute, type DataArrayTexture, type Material, type Mesh, type Object3D,
+  DataTexture, DataUtils, FloatType, Matrix3, RGBAFormat, Uint32BufferAttribute, type DataArrayTexture, type Material, type Mesh, type Object3D,
   type SkinnedMesh,
 } from 'three';
 import { blockTexture, packBlocks } from './block_texture.js';
 import type { TransferExtension } from './glb.js';
-import { readReceivers, shareGeometry, type TransferHeader } from './header.js';
+import { noReceiver, readReceivers, shareGeometry, type TransferHeader } from './header.js';
 import type { BakedTransfer, TransferSource } from './kinds.js';
 import type { Lighting } from './lighting.js';
+import { surfaceFrame, type Lobe } from './lobes.js';
 import { diffuseParameters, PrtMaterial, type PrtOptions, type PrtShader, type PrtUniforms } from './prt_material.js';
 import { shCount } from './sh.js';
 
@@ -42,6 +43,8 @@ export interface VertexKind {
   count: number;
   valueChannels: 1 | 3;
   shader: PrtShader;
+  /** Where the values of a receiver are lobes. */
+  readLobes?: (values: ArrayLike<number>) => Lobe[];
 }
 
 export class VertexTransfer implements BakedTransfer {
@@ -51,6 +54,7 @@ export class VertexTransfer implements BakedTransfer {
   readonly receivers: number;
   readonly fileBytes: number;
   readonly gpuBytes: number;
+  readonly lobesAt?: NonNullable<BakedTransfer['lobesAt']>;
   private readonly texture: DataArrayTexture;
   private readonly bones = new Map<string, DataTexture>(); // by skeleton
   private readonly uniforms: PrtUniforms;
@@ -58,7 +62,7 @@ export class VertexTransfer implements BakedTransfer {
   private readonly materials = new Map<string, PrtMaterial>();
   private readonly quads: number; // of the light, a channel
 
-  private constructor(header: TransferHeader, { kind, count, valueChannels, shader }: VertexKind, values: ArrayBuffer, readonly meshes: Mesh[]) {
+  private constructor(header: TransferHeader, { kind, count, valueChannels, shader, readLobes }: VertexKind, values: ArrayBuffer, readonly meshes: Mesh[]) {
     this.kind = kind, this.order = header.order, this.channels = header.channels, this.receivers = header.receivers, this.fileBytes = values.byteLength;
     const { layout, data } = packBlocks({ count, channels: valueChannels, precision: header.precision, receivers: header.receivers }, values);
     this.quads = Math.ceil(shCount(header.order) / 4);
@@ -79,6 +83,16 @@ export class VertexTransfer implements BakedTransfer {
       mesh.material = material;
     }
     this.gpuBytes = gpuBytes;
+    if (readLobes)
+      this.lobesAt = (mesh, vertex, back) => {
+        const receiver = mesh.geometry.getAttribute(back ? 'lambentReceiverBack' : 'lambentReceiver').getX(vertex);
+        if (receiver === noReceiver) return undefined;
+        const stride = 4 * layout.texels, values = Array.from(data.subarray(stride * receiver, stride * receiver + count)); // block_texture.ts
+        const lobes = readLobes(data instanceof Uint16Array ? values.map((bits) => DataUtils.fromHalfFloat(bits)) : values);
+        const frame = surfaceFrame(mesh, vertex, this.optionsOf[meshes.indexOf(mesh)]!.rest!);
+        for (const lobe of lobes) lobe.axis.applyMatrix3(frame);
+        return lobes;
+      };
   }
 
   private restOf(mesh: Mesh): NonNullable<PrtOptions['rest']> {

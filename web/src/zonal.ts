@@ -7,6 +7,7 @@ import { isIndex } from './glb.js';
 import { glslHarmonics } from './glsl_harmonics.js';
 import { readHeader } from './header.js';
 import type { TransferKind } from './kinds.js';
+import { readLobes } from './lobes.js';
 import type { PrtShader } from './prt_material.js';
 import { shBand, shCount } from './sh.js';
 import { VertexTransfer } from './vertex_transfer.js';
@@ -73,6 +74,7 @@ export const zonalKind: TransferKind = {
     const header = readHeader(source.extension), lobes = source.extension.transfer['lobeCount'];
     if (!isIndex(lobes, maxLobes) || lobes < 1) throw new LambentError('"lobeCount" is out of range');
     const { order, channels } = header;
-    return VertexTransfer.load(source, header, { kind: 'zonal', count: zonalValues(order, lobes, channels), valueChannels: 1, shader: zonalShader(order, lobes, channels) });
+    return VertexTransfer.load(source, header, { kind: 'zonal', count: zonalValues(order, lobes, channels), valueChannels: 1, shader: zonalShader(order, lobes, channels),
+      readLobes: (values) => readLobes(values, order, exactZonalBands(order, lobes), lobes, channels) });
   },
 };
