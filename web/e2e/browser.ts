@@ -70,6 +70,24 @@ export async function openFixture(browser: Browser, folder: string): Promise<{ p
   return { page, server };
 }
 
+/** What the page complains of, on a graphics card that has none of `extensions` and answers `parameters`, by name, with these numbers. */
+export async function complaint(browser: Browser, address: string, extensions: string[], parameters: Record<string, number>): Promise<string> {
+  const page = await browser.newPage();
+  await page.addInitScript(([extensions, parameters]) => {
+    interface Context { getExtension(name: string): unknown; getParameter(name: number): unknown }
+    const gl = WebGL2RenderingContext.prototype as unknown as Context & Record<string, number>;
+    const real = { extension: Reflect.get(gl, 'getExtension'), parameter: Reflect.get(gl, 'getParameter') };
+    const numbers = new Map(Object.entries(parameters).map(([name, value]) => [(WebGL2RenderingContext as unknown as Record<string, number>)[name], value]));
+    gl.getExtension = function (name) { return extensions.includes(name) ? null : real.extension.call(this, name); };
+    gl.getParameter = function (name) { return numbers.get(name) ?? real.parameter.call(this, name); };
+  }, [extensions, parameters] as const);
+  await page.goto(address);
+  await page.waitForSelector('body[data-ready=yes], #problem:not([hidden])', { state: 'attached' });
+  const text = (await page.isVisible('#problem')) ? (await page.textContent('#problem-text'))! : '';
+  await page.close();
+  return text;
+}
+
 /** Two frames later, what was asked for has been drawn. */
 export const drawn = (page: Page): Promise<void> =>
   page.evaluate(() => new Promise<void>((resolve) => requestAnimationFrame(() => requestAnimationFrame(() => requestAnimationFrame(() => resolve())))));

@@ -182,18 +182,4 @@ describe.skipIf(!haveTool || !haveBrowser)('under the hand', () => {
     expect((await page.screenshot({ clip })).equals(held)).toBe(false);
     await page.close();
   });
-
-  it('says so where vertex shaders cannot read textures', async () => {
-    const page = await browser.newPage();
-    await page.addInitScript(() => {
-      const real = Reflect.get(WebGL2RenderingContext.prototype, 'getParameter') as (this: WebGL2RenderingContext, name: number) => unknown;
-      WebGL2RenderingContext.prototype.getParameter = function (this: WebGL2RenderingContext, name: number) {
-        return name === this.MAX_VERTEX_TEXTURE_IMAGE_UNITS ? 0 : real.call(this, name);
-      };
-    });
-    await page.goto(ball.address);
-    await page.waitForSelector('#problem:not([hidden])');
-    expect(await page.textContent('#problem-text')).toMatch(/cannot read textures in vertex shaders/);
-    await page.close();
-  });
 });

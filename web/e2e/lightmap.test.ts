@@ -3,7 +3,7 @@ import { join } from 'node:path';
 import type { Browser } from 'playwright-core';
 import { afterAll, beforeAll, describe, expect, it } from 'vitest';
 import { haveTool, lambent, makeFolder, writeLopsidedHdr } from '../test/tool.ts';
-import { haveBrowser, launch, open, psnr, serve, writeScene } from './browser.ts';
+import { complaint, haveBrowser, launch, open, psnr, serve, writeScene } from './browser.ts';
 
 const rotate = '40,-25,70', camera = '3.1,2.6,4.3,-0.3,0.8,0,38';
 
@@ -32,5 +32,13 @@ describe.skipIf(!haveTool || !haveBrowser)('a lightmap', () => {
     console.log(`lightmap: ${db.toFixed(1)} dB; light not turned ${other.toFixed(1)} dB (${folder})`);
     expect(db).toBeGreaterThan(40);
     expect(other).toBeLessThan(db - 8); // the comparison can fail
+  });
+
+  it('is refused in words where the graphics card cannot draw into half floats, or takes no atlas so large', async () => {
+    const server = await serve(at('lit.glb'), '--env', at('light.hdr'));
+    expect(await complaint(browser, server.address, ['EXT_color_buffer_float', 'EXT_color_buffer_half_float'], {})).toMatch(/^lit\.glb is a lightmap, which needs .*half-float/);
+    expect(await complaint(browser, server.address, ['EXT_color_buffer_float'], {})).toBe(''); // the lesser extension will do
+    expect(await complaint(browser, server.address, [], { MAX_TEXTURE_SIZE: 32 })).toMatch(/^lit\.glb has an atlas of .* takes 32$/);
+    expect(await server.stop()).toBe(0);
   });
 });

@@ -6,7 +6,7 @@ import { join } from 'node:path';
 import type { Browser, Page } from 'playwright-core';
 import { afterAll, beforeAll, describe, expect, it } from 'vitest';
 import { haveTool, lambent, makeFolder, writeHdr } from '../test/tool.ts';
-import { drawn, haveBrowser, launch, open, serve, writeBall, writeScene, writeSkin, type Server } from './browser.ts';
+import { complaint, drawn, haveBrowser, launch, open, serve, writeBall, writeScene, writeSkin, type Server } from './browser.ts';
 
 describe.skipIf(!haveTool || !haveBrowser)('the page', () => {
   const folder = makeFolder(), at = (name: string): string => join(folder, name);
@@ -238,6 +238,11 @@ describe.skipIf(!haveTool || !haveBrowser)('the page', () => {
     await page.waitForSelector('#problem:not([hidden])');
     expect(await page.textContent('#problem-text')).toMatch(/no WebGL 2/);
     await page.close();
+  });
+
+  it('says so where vertex shaders read no textures, and needs no drawing into floats', async () => {
+    expect(await complaint(browser, server.address, [], { MAX_VERTEX_TEXTURE_IMAGE_UNITS: 0 })).toMatch(/^ball\.glb is relit in vertex shaders, .* reads 0 there$/);
+    expect(await complaint(browser, server.address, ['EXT_color_buffer_float', 'EXT_color_buffer_half_float', 'OES_texture_float_linear'], {})).toBe('');
   });
 
   it('asks no other host for anything', async () => {

@@ -70,7 +70,7 @@ class Page {
       return;
     }
     await this.openBaked(manifest.name, await this.fetch(manifest.name, manifest.baked));
-    if (manifest.compare) viewer.setModel('compare', await this.parse('the second file', await this.fetch('the second file', manifest.compare)));
+    if (manifest.compare) await this.useModel('compare', 'the second file', await this.fetch('the second file', manifest.compare));
     if (manifest.reference) viewer.setReference(mapTexture(readMap(await this.fetch('the reference', manifest.reference))));
     get('loading').hidden = true;
     this.show();
@@ -218,7 +218,7 @@ class Page {
 
   private async openBaked(name: string, bytes: ArrayBuffer): Promise<void> {
     const { viewer } = this, first = !viewer.bakedScene;
-    viewer.setModel('baked', await this.parse(name, bytes));
+    await this.useModel('baked', name, bytes);
     get('name').textContent = document.title = name;
     get('hint').hidden = false, get('invitation').hidden = true;
     get('lobes').textContent = '', get('lobes-how').hidden = !viewer.hasLobes;
@@ -244,10 +244,12 @@ class Page {
     }));
   }
 
-  private parse(name: string, bytes: ArrayBuffer): ReturnType<typeof readBaked> {
-    return readBaked(bytes).catch((error: unknown) => {
+  private async useModel(role: 'baked' | 'compare', name: string, bytes: ArrayBuffer): Promise<void> {
+    try {
+      this.viewer.setModel(role, await readBaked(bytes));
+    } catch (error) {
       throw new LambentError(sentence(name, error));
-    });
+    }
   }
 
   private fetch(name: string, file: string): Promise<ArrayBuffer> {

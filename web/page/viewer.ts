@@ -61,9 +61,6 @@ export class Viewer {
     } catch {
       throw new LambentError('This browser gives the page no WebGL 2, which it draws with.');
     }
-    const gl = this.renderer.getContext();
-    if (gl.getParameter(gl.MAX_VERTEX_TEXTURE_IMAGE_UNITS) < 1)
-      throw new LambentError('This graphics card cannot read textures in vertex shaders, where relighting is done.');
     this.renderer.debug.onShaderError = (context, program) =>
       callbacks.onProblem(`The graphics driver refuses a shader: ${context.getProgramInfoLog(program) ?? 'no reason given'}`);
     this.renderer.autoClear = false;
@@ -78,9 +75,10 @@ export class Viewer {
     new ResizeObserver(() => this.invalidate()).observe(canvas);
   }
 
-  /** Takes a loaded file in, in place of the one that was there. */
+  /** Takes a loaded file in, in place of the one that was there; throws LambentError where the graphics card cannot draw it. */
   setModel(role: 'baked' | 'compare', gltf: GLTF): void {
     const model = new Model(gltf), old = this[role];
+    model.baked.transfer.check(this.renderer);
     if (old) this.scene.remove(old.root), old.dispose();
     this[role] = model;
     this.scene.add(model.root);

@@ -1,5 +1,5 @@
 // The kinds of transfer that a file may hold. A new one (matrix) is one entry here and one module.
-import type { Color, Material, Mesh } from 'three';
+import type { Color, Material, Mesh, WebGLRenderer } from 'three';
 import type { TransferExtension } from './glb.js';
 import type { Lighting } from './lighting.js';
 import type { Lobe } from './lobes.js';
@@ -26,6 +26,8 @@ export interface BakedTransfer {
   readonly gpuBytes: number;
   /** Meshes whose material is ours now. */
   readonly meshes: Mesh[];
+  /** Throws LambentError where the graphics card lacks what this is drawn with. */
+  check(renderer: WebGLRenderer): void;
   /** Shows the meshes under this light. Writes a few hundred bytes of uniforms and nothing else. */
   relight(lighting: Lighting): void;
   /** The scene's own lamps, where the file has them: a colour that scales each, by name. Counts at the next relight(). */

@@ -77,14 +77,18 @@ class Atlas {
     this.changed = true;
   }
 
-  /** Before what shows it is drawn; the renderer is left as it was. */
-  update(renderer: WebGLRenderer): void {
-    if (!this.changed) return;
+  check(renderer: WebGLRenderer): void {
     const { width, height } = this.target;
     if (Math.max(width, height) > renderer.capabilities.maxTextureSize)
       throw new LambentError(`has an atlas of ${width} x ${height} texels, where this graphics card takes ${renderer.capabilities.maxTextureSize}`);
     if (!renderer.extensions.has('EXT_color_buffer_float') && !renderer.extensions.has('EXT_color_buffer_half_float'))
-      throw new LambentError('is a lightmap, which needs a graphics card that draws into half-float textures');
+      throw new LambentError('is a lightmap, which needs a graphics card that draws into half-float textures (EXT_color_buffer_float)');
+  }
+
+  /** Before what shows it is drawn; the renderer is left as it was. */
+  update(renderer: WebGLRenderer): void {
+    if (!this.changed) return;
+    this.check(renderer);
     this.changed = false;
     const before = renderer.getRenderTarget(), face = renderer.getActiveCubeFace(), level = renderer.getActiveMipmapLevel();
     renderer.setRenderTarget(this.target);
@@ -185,6 +189,10 @@ class LightmapTransfer implements BakedTransfer {
       gpuBytes += mesh.geometry.getAttribute('position').count * (twoSided ? 16 : 8);
     });
     this.gpuBytes = gpuBytes;
+  }
+
+  check(renderer: WebGLRenderer): void {
+    this.atlas.check(renderer);
   }
 
   relight(lighting: Lighting): void {

@@ -1,9 +1,10 @@
 // Transfer at vertices, whatever its kind: a texture of every receiver's values, receivers as attributes, and light as uniforms.
 import {
   DataTexture, DataUtils, FloatType, Matrix3, RGBAFormat, Uint32BufferAttribute, type DataArrayTexture, type Material, type Mesh, type Object3D,
-  type SkinnedMesh,
+  type SkinnedMesh, type WebGLRenderer,
 } from 'three';
 import { blockTexture, packBlocks } from './block_texture.js';
+import { LambentError } from './errors.js';
 import type { TransferExtension } from './glb.js';
 import { noReceiver, readReceivers, shareGeometry, type TransferHeader } from './header.js';
 import type { BakedTransfer, TransferSource } from './kinds.js';
@@ -111,6 +112,14 @@ export class VertexTransfer implements BakedTransfer {
     const values = await source.bufferView(header.bufferView);
     const meshes = await Promise.all(source.extension.parts.map((part) => bindPart(source, part, header.receivers)));
     return new VertexTransfer(header, kind, values, meshes);
+  }
+
+  check(renderer: WebGLRenderer): void {
+    // Transfer, bones as they are and as they were, and three's own of morph targets. All else is within what WebGL 2 promises.
+    const wanted = Math.max(...this.meshes.map((mesh) =>
+      1 + ('isSkinnedMesh' in mesh ? 1 + Number(this.bones.size > 0) : 0) + Number(Object.keys(mesh.geometry.morphAttributes).length > 0)));
+    if (renderer.capabilities.maxVertexTextures < wanted)
+      throw new LambentError(`is relit in vertex shaders, which must read textures, ${wanted} at once; this graphics card reads ${renderer.capabilities.maxVertexTextures} there`);
   }
 
   relight(lighting: Lighting): void {
