@@ -9,7 +9,6 @@
 namespace lambent {
 namespace {
 
-float largest(Vec3 c) { return std::max({c.x, c.y, c.z}); }
 
 // Distances that agree to this fraction are the same surface.
 constexpr float same_distance = 1e-3f;

@@ -4,10 +4,19 @@
 #include <lambent/core/parallel.h>
 #include <lambent/receivers/seams.h>
 
+#include <fmt/format.h>
+
 #include <chrono>
+#include <numeric>
 
 namespace lambent {
 namespace {
+
+// Beyond any lamp in any unit (the sun is 1.6e9 cd/m2), and far from where products of a few such numbers overflow.
+constexpr float brightest_lamp = 1e15f;
+std::string too_bright(const char* what, const std::string& name, float value) {
+  return fmt::format("{} \"{}\" shines with {:.3g}; the most that is taken is {:g}", what, name, value, brightest_lamp);
+}
 
 Result<void> check_options(const Scene& scene, const Lamps& lamps, const LightmapOptions& o) {
   if (o.order < 0 || o.order > max_sh_order) return Error{"order", "must lie between 0 and " + std::to_string(max_sh_order)};
@@ -16,6 +25,10 @@ Result<void> check_options(const Scene& scene, const Lamps& lamps, const Lightma
   if (o.bounces < 0 || o.bounces > 64) return Error{"bounces", "must lie between 0 and 64, not " + std::to_string(o.bounces)};
   if (!(o.converge >= 0 && o.converge < 1)) return Error{"converge", "must lie between 0 and 1"};
   if (o.directional != DirectionalKind::none && o.order > 0) return Error{"directional", "lightmaps hold lamps alone: leave the order out"};
+  for (const AreaLamp& lamp : lamps.area)
+    if (!(largest(lamp.radiance) <= brightest_lamp)) return Error{scene.path, too_bright("a lamp of the group", lamps.names[lamp.group], largest(lamp.radiance))};
+  for (const PunctualLight& light : scene.lights)
+    if (!(largest(light.intensity) <= brightest_lamp)) return Error{scene.path, too_bright("the light", light.name, largest(light.intensity))};
   const size_t columns = size_t(sh_count(o.order)) + lamps.groups();
   if (columns == 0) return Error{scene.path, "nothing gives light: no emissive material, no lamp, no sky, no harmonics"};
   if (columns > max_columns) return Error{scene.path, std::to_string(columns) + " columns are more than " + std::to_string(max_columns)};
@@ -23,8 +36,11 @@ Result<void> check_options(const Scene& scene, const Lamps& lamps, const Lightma
 }
 
 // x, [receiver][row][column][channel], as a Transfer.
-Transfer to_transfer(const LightBasis& light, const AlignedVector<float>& x, size_t rows, size_t receivers, size_t width, Precision precision) {
+Result<Transfer> to_transfer(const LightBasis& light, const AlignedVector<float>& x, size_t rows, size_t receivers, size_t width, Precision precision) {
   const size_t columns = light.count();
+  const float brightest = std::transform_reduce(x.begin(), x.end(), 0.0f, [](float a, float b) { return std::max(a, b); }, [](float v) { return std::abs(v); });
+  if (precision == Precision::half && !(brightest <= 65504.0f))
+    return Error{"lightmap", fmt::format("its values go up to {:.3g}, and half floats to 65504: dim the lamps, or keep it in single precision", brightest)};
   WritableTransfer out = make_transfer(light, int(rows), 3, receivers, precision);
   parallel_for(receivers, transfer_block, [&](size_t begin, size_t end) {
     std::vector<float> values(rows * 3 * columns);
@@ -111,8 +127,14 @@ Result<Lightmap> bake_lightmap(const Scene& scene, const Tracer& tracer, const R
   r.receivers = n, r.buried = op->report().buried, r.rays = op->report().rays;
   r.operator_bytes = op->report().bytes, r.operator_kept = bounces ? op->report().kept : 1;
 
-  Lightmap map{to_transfer(light, *x, rows, n, width, o.precision), std::nullopt};
-  if (direct_apart) map.direct = to_transfer(light, e, 1, n, width, o.precision);
+  auto all = to_transfer(light, *x, rows, n, width, o.precision);
+  if (!all) return all.error();
+  Lightmap map{std::move(*all), std::nullopt};
+  if (direct_apart) {
+    auto direct = to_transfer(light, e, 1, n, width, o.precision);
+    if (!direct) return direct.error();
+    map.direct = std::move(*direct);
+  }
   return map;
 }
 

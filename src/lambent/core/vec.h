@@ -22,6 +22,7 @@ inline constexpr float pi = std::numbers::pi_v<float>;
 // Rec. 709 luminance of a linear colour.
 inline float luminance(Vec3 c) { return 0.2126f * c.x + 0.7152f * c.y + 0.0722f * c.z; }
 
+inline float largest(Vec3 v) { return std::max({v.x, v.y, v.z}); }
 inline bool is_finite(Vec3 v) { return std::isfinite(v.x) && std::isfinite(v.y) && std::isfinite(v.z); }
 
 // Unit vector along v, or `fallback` where v is too short to have a direction.

@@ -98,8 +98,8 @@ class MaterialWriter {
     if (!is_finite(emissive) || !(brightest > 0)) return;
     emissive = glm::max(emissive, Vec3(0.0f));
     if (brightest > 1) {
-      float strength = std::exp2(std::ceil(std::log2(brightest)));  // a power of two divides without rounding
-      emissive /= strength;
+      float strength = std::min(0x1p127f, std::exp2(std::ceil(std::log2(brightest))));  // a power of two divides without rounding
+      emissive = glm::min(Vec3(1), emissive / strength);
       json["extensions"]["KHR_materials_emissive_strength"]["emissiveStrength"] = strength;
       out_.use_extension("KHR_materials_emissive_strength");
     }
