@@ -9,7 +9,6 @@
 namespace lambent {
 namespace {
 
-
 // Distances that agree to this fraction are the same surface.
 constexpr float same_distance = 1e-3f;
 

@@ -185,7 +185,6 @@ void evaluate_terms(const Terms& t, const float* x, const float* y, const float*
 
 Vec3 contract(const float* m, Vec3 n) { return n.x * Vec3(m[0], m[1], m[2]) + n.y * Vec3(m[4], m[5], m[6]) + n.z * Vec3(m[8], m[9], m[10]); }
 
-
 // Exponent of a Phong lobe as wide as the model's: half-vector slopes of width alpha turn the mirror image by twice the angle.
 float equivalent_exponent(const Brdf& brdf) {
   auto of_alpha = [](float alpha) { return 1 / (2 * alpha * alpha); };
