@@ -37,7 +37,6 @@ void bench_products();
 void bench_radiosity();
 void bench_relight();
 void bench_scaling();
-void bench_solvers();
 void bench_zonal();
 
 }  // namespace lambent::bench

@@ -1,4 +1,4 @@
-// Lightmaps: the gather operator over texels against raw Embree, a further bounce, solvers, many light groups, and growth.
+// Lightmaps: the gather operator over texels against raw Embree, a further bounce, many light groups, and growth.
 #include "bench.h"
 
 #include <lambent/bake/kernels.h>
@@ -80,38 +80,6 @@ void bench_operator(const std::string& name, Scene scene) {
   report("radiosity_64_groups", many, one, "s", "one group's bounce", with({{"aim", "<= 2"}}));
 }
 
-// A closed room of albedo 0.8 with a small lamp: error against work, for all solvers.
-void bench_convergence() {
-  Scene scene;
-  const uint32_t wall = add_material(scene, "wall", Vec3(0.8f)), lamp = add_material(scene, "lamp", Vec3(0.8f));
-  scene.materials[lamp].emissive = Vec3(10);
-  add_box(scene, wall, "room", Vec3(-2, -1, -3), Vec3(2, 1, 3), 24, true);
-  add_box(scene, wall, "block", Vec3(-1, -1, -1), Vec3(0.2f, 0.3f, 0.5f), 12);
-  add_quad(scene, lamp, "lamp", Vec3(-0.5f, 0.999f, -0.5f), Vec3(1, 0, 0), Vec3(0, 0, 1), 4, 4);
-  auto tracer = Tracer::build(scene);
-  const Receivers receivers = make_vertex_receivers(scene);
-  const GatherSetup setup = make_gather_setup(scene, *tracer, receivers, 1, 1024, 1);
-  const Lamps lamps = make_lamps(scene, nullptr, false);
-  const size_t width = pad_lanes(3);
-  AlignedVector<float> e(receivers.count() * width, 0.0f);
-  const GatherDirect direct{lamps, 64, e.data(), width};
-  auto op = GatherOperator::trace(setup, &direct, nullptr, true, size_t{8} << 30);
-  double jacobi = 0;
-  const std::pair<const char*, Solver> solvers[] = {
-      {"jacobi", Solver::jacobi}, {"gauss-seidel", Solver::gauss_seidel}, {"southwell", Solver::southwell}, {"gmres", Solver::gmres}};
-  for (const auto& [name, solver] : solvers) {
-    SolveReport r, fine;
-    const double seconds = least_seconds(runs, [&] { (void)solve(*op, e.data(), width, {solver, 1e-3, 200}, &r); });
-    (void)solve(*op, e.data(), width, {solver, 1e-6, 200}, &fine);
-    nlohmann::json steps = nlohmann::json::array();
-    for (const SolveStep& s : fine.steps) steps.push_back({s.applications, s.residual});
-    const double applications = r.steps.back().applications;
-    if (solver == Solver::jacobi) jacobi = applications;
-    report(std::string("radiosity_solver_") + name, applications, jacobi, "applications", "Jacobi, to a residual of 1e-3",
-           {{"receivers", receivers.count()}, {"albedo", 0.8}, {"seconds", seconds}, {"steps", steps}, {"aim", solver == Solver::gmres ? "< 1" : ""}});
-  }
-}
-
 // A whole bake of a building, at two sizes: the cost of a texel should not grow.
 void bench_growth() {
   double first = 0;
@@ -147,7 +115,5 @@ void bench_radiosity() {
 }
 
 void bench_lightmaps() { bench_growth(); }
-
-void bench_solvers() { bench_convergence(); }
 
 }  // namespace lambent::bench

@@ -21,5 +21,6 @@ void add_env(CLI::App& app, Run& run);
 void add_demo(CLI::App& app, Run& run);
 void add_view(CLI::App& app, Run& run);
 void add_export(CLI::App& app, Run& run);
+void add_bench(CLI::App& app, Run& run);
 
 }  // namespace lambent::tool

@@ -30,6 +30,7 @@ int main(int argc, char** argv) {
   tool::add_demo(app, run);
   tool::add_view(app, run);
   tool::add_export(app, run);
+  tool::add_bench(app, run);
 
   try {
     app.parse(argc, argv);
