@@ -4,6 +4,7 @@
 
 #include <algorithm>
 #include <array>
+#include <cmath>
 
 namespace lambent {
 namespace {
@@ -130,6 +131,16 @@ void keep_largest(std::span<HaarTree> trees, double fraction) {
       if (std::abs(c) <= least) c = 0;
     mark_occupied(t);
   }
+}
+
+void quantise_haar(HaarTree& tree, int bits) {
+  LAMBENT_CHECK(bits >= 2 && bits <= 16);
+  float most = 0;
+  for (float c : tree.coefficients) most = std::max(most, std::abs(c));
+  if (most == 0) return;
+  const float steps = float((1 << (bits - 1)) - 1), step = most / steps;
+  for (float& c : tree.coefficients) c = std::round(c / step) * step;
+  mark_occupied(tree);
 }
 
 double haar_triple_product(const HaarTree& a, const HaarTree& b, const HaarTree& c, size_t* visited) {

@@ -27,6 +27,9 @@ std::vector<float> haar_pixels(const HaarTree& tree);
 // Non-linear approximation: of the coefficients of all trees together, only this share, the largest, stays.
 void keep_largest(std::span<HaarTree> trees, double fraction);
 
+// As kept in so many bits a coefficient, 2 to 16: rounded to steps of the largest over 2^(bits - 1) - 1 (Ng et al.: visibility in 8).
+void quantise_haar(HaarTree& tree, int bits);
+
 // The integral over the square of the product of three functions, in time linear in their coefficients: sums over the squares where at
 // least two have any, with the values of the coarser squares' wavelets passed down. `visited` counts squares where it is given.
 double haar_triple_product(const HaarTree& a, const HaarTree& b, const HaarTree& c, size_t* visited = nullptr);

@@ -79,5 +79,27 @@ TEST(Haar, TripleProductOfWhatIsLeft) {
   EXPECT_LT(visited, haar_squares(levels));
 }
 
+TEST(Haar, QuantisedCoefficientsAreStepsApart) {
+  Random random(8);
+  std::vector<float> pixels(256);
+  for (float& p : pixels) p = random.next() - 0.4f;
+  HaarTree tree, rounded;
+  haar_transform(4, pixels, tree);
+  rounded = tree;
+  quantise_haar(rounded, 8);
+  float most = 0;
+  for (float c : tree.coefficients) most = std::max(most, std::abs(c));
+  for (size_t i = 0; i < tree.coefficients.size(); ++i) {
+    const float steps = rounded.coefficients[i] / most * 127;
+    EXPECT_NEAR(steps, std::round(steps), 1e-3);
+    EXPECT_NEAR(rounded.coefficients[i], tree.coefficients[i], 0.501f * most / 127);
+  }
+  EXPECT_NE(rounded.coefficients, tree.coefficients);
+  HaarTree zero;
+  haar_transform(4, std::vector<float>(256, 0.0f), zero);
+  quantise_haar(zero, 8);
+  EXPECT_EQ(zero.coefficients, std::vector<float>(256, 0.0f));
+}
+
 }  // namespace
 }  // namespace lambent

@@ -3,107 +3,147 @@
 #include <lambent/core/parallel.h>
 #include <lambent/light/cube_light.h>
 
-#include <array>
+#include <algorithm>
+#include <numbers>
 
 namespace lambent {
 namespace {
 
-// A convex polygon of few corners.
-template <class V>
+// A convex polygon: a quad, cut by at most two lines a side and once more by each of two.
 struct Polygon {
-  std::array<V, 12> at;
+  float at[2][12];  // by axis
   int count = 0;
-  void add(V v) { at[size_t(count++)] = v; }
+
+  Polygon() {}  // corners are set as they come
+  void add(int axis, float along, float across) { at[axis][count] = along, at[1 - axis][count++] = across; }
 };
 
-// What of the polygon lies where side(v) >= 0; side is linear.
-template <class V, class Side>
-Polygon<V> clip(const Polygon<V>& p, Side side) {
-  Polygon<V> out;
+// What of the polygon lies below and above `place` on an axis.
+void cut(const Polygon& p, int axis, float place, Polygon& low, Polygon& high) {
+  low.count = high.count = 0;
+  const float *along = p.at[axis], *across = p.at[1 - axis];
   for (int i = 0; i < p.count; ++i) {
-    const V a = p.at[size_t(i)], b = p.at[size_t((i + 1) % p.count)];
-    const float s = side(a), t = side(b);
-    if (s >= 0) out.add(a);
-    if ((s < 0) != (t < 0)) out.add(a + (b - a) * (s / (s - t)));
+    const int j = i + 1 == p.count ? 0 : i + 1;
+    const bool below = along[i] <= place;
+    (below ? low : high).add(axis, along[i], across[i]);
+    if (below != (along[j] <= place)) {
+      const float y = across[i] + (across[j] - across[i]) * ((place - along[i]) / (along[j] - along[i]));
+      low.add(axis, place, y), high.add(axis, place, y);
+    }
   }
-  return out;
 }
 
-// Parts of one texel of the map: where they lie in the cube, their solid angles, and directions.
+// Parts of one texel of the map: where they lie in the cube, their solid angles, and the directions of their middles.
+struct Part {
+  size_t texel;
+  float solid_angle;
+  Vec3 direction;
+};
 struct Parts {
-  struct Part {
-    size_t texel;
-    float solid_angle;
-    Vec3 direction;
-  };
-  std::vector<Part> parts;
+  Part at[64];
+  int count = 0;
   float total = 0;
+
+  Parts() {}
 };
 
-void add_part(int size, int face, int column, int row, const Polygon<Vec2>& p, Parts& out) {
-  float area = 0;
-  Vec2 centre(0);
+void add_part(int size, int face, int column, int row, const Polygon& p, Parts& out) {
+  if (p.count < 3 || out.count == std::ssize(out.at)) return;
+  const float x0 = p.at[0][0], y0 = p.at[1][0];
+  float twice = 0, cx = 0, cy = 0;
   for (int i = 1; i + 1 < p.count; ++i) {
-    const Vec2 a = p.at[size_t(i)] - p.at[0], b = p.at[size_t(i + 1)] - p.at[0];
-    const float twice = std::abs(a.x * b.y - a.y * b.x);
-    area += 0.5f * twice, centre += 0.5f * twice * (p.at[0] + (a + b) / 3.0f);
+    const float ax = p.at[0][i] - x0, ay = p.at[1][i] - y0, bx = p.at[0][i + 1] - x0, by = p.at[1][i + 1] - y0, area = std::abs(ax * by - ay * bx);
+    twice += area, cx += area * (ax + bx), cy += area * (ay + by);
   }
-  if (!(area > 0)) return;
-  centre = centre / area * (2 / float(size)) - 1.0f;
-  const Vec3 point = cube_point(face, centre.x, centre.y);
-  const float length2 = glm::dot(point, point), solid_angle = area / (length2 * std::sqrt(length2));
-  out.parts.push_back({cube_texel(size, face, column, row), solid_angle, point / std::sqrt(length2)});
+  if (!(twice > 0)) return;
+  const float third = 1 / (3 * twice), scale = 2 / float(size);
+  const Vec3 point = cube_point(face, (x0 + cx * third) * scale - 1, (y0 + cy * third) * scale - 1);
+  const float inverse = 1 / std::sqrt(glm::dot(point, point)), solid_angle = 0.5f * twice * inverse * inverse * inverse;
+  out.at[out.count++] = {cube_texel(size, face, column, row), solid_angle, point * inverse};
   out.total += solid_angle;
 }
 
-// The polygon on a face, in texels.
-void add_parts(int size, int face, const Polygon<Vec2>& p, Parts& out) {
-  Vec2 least(p.at[0]), most(p.at[0]);
-  for (int i = 1; i < p.count; ++i) least = glm::min(least, p.at[size_t(i)]), most = glm::max(most, p.at[size_t(i)]);
-  auto cell = [&](float x) { return std::clamp(int(x), 0, size - 1); };
-  const int x0 = cell(least.x), x1 = cell(most.x), y0 = cell(least.y), y1 = cell(most.y);
-  for (int y = y0; y <= y1; ++y) {
-    Polygon<Vec2> strip = p;
-    if (y > y0) strip = clip(strip, [&](Vec2 v) { return v.y - float(y); });
-    if (y < y1) strip = clip(strip, [&](Vec2 v) { return float(y + 1) - v.y; });
-    for (int x = x0; x <= x1; ++x) {
-      Polygon<Vec2> part = strip;
-      if (x > x0) part = clip(part, [&](Vec2 v) { return v.x - float(x); });
-      if (x < x1) part = clip(part, [&](Vec2 v) { return float(x + 1) - v.x; });
-      add_part(size, face, x, y, part, out);
+// The polygon on a face, in texels, along their grid, which it meets in these columns and rows.
+void add_parts(int size, int face, const Polygon& p, int first_column, int last_column, int first_row, int last_row, Parts& out) {
+  Polygon right = p, column, lower, cell;
+  for (int x = first_column; x <= last_column; ++x) {
+    if (x < last_column) {
+      const Polygon whole = right;
+      cut(whole, 0, float(x + 1), column, right);
     }
+    const Polygon& strip = x < last_column ? column : right;
+    if (first_row == last_row) {
+      add_part(size, face, x, first_row, strip, out);
+      continue;
+    }
+    lower = strip;
+    for (int y = first_row; y < last_row; ++y) {
+      const Polygon whole = lower;
+      cut(whole, 1, float(y + 1), cell, lower);
+      add_part(size, face, x, y, cell, out);
+    }
+    add_part(size, face, x, last_row, lower, out);
   }
 }
 
-Vec2 to_texels(const CubePlace& p, int size) { return (Vec2(p.u, p.v) + 1.0f) * (0.5f * float(size)); }
+// A corner of a texel of the map.
+struct Corner {
+  Vec3 d;
+  int face;
+  Vec2 at;  // on it, in texels
+  int column, row;
+};
+Corner make_corner(int size, Vec3 d) {
+  const CubePlace place = cube_place(d);
+  const Vec2 at = (Vec2(place.u, place.v) + 1.0f) * (0.5f * float(size));
+  return {d, place.face, at, std::min(int(at.x), size - 1), std::min(int(at.y), size - 1)};
+}
 
-void add_texel(int size, const std::array<Vec3, 4>& corners, Parts& out) {
-  out.parts.clear(), out.total = 0;
-  Polygon<Vec2> flat;
-  int face = -1;
-  bool one = true;
-  for (const Vec3& c : corners) {
-    const CubePlace place = cube_place(c);
-    one &= face < 0 || place.face == face;
-    face = place.face;
-    flat.add(to_texels(place, size));
-  }
-  if (one) return add_parts(size, face, flat, out);
+// A texel whose corners lie on several faces: on each that it may touch, what lies within the face.
+void add_over_edges(int size, const Corner* const (&corners)[4], Parts& out) {
+  const float end = float(size);
   for (int f = 0; f < 6; ++f) {
-    // The face's cone: |u|, |v| <= w along its axis.
     const Vec3 axis = cube_point(f, 0, 0), u = cube_point(f, 1, 0) - axis, v = cube_point(f, 0, 1) - axis;
-    Polygon<Vec3> p;
-    for (const Vec3& c : corners) p.add(c);
-    for (const Vec3& edge : {axis - u, axis + u, axis - v, axis + v})
-      if (p.count > 0) p = clip(p, [&](Vec3 d) { return glm::dot(edge, d); });
-    if (p.count < 3) continue;
-    Polygon<Vec2> on_face;
-    for (int i = 0; i < p.count; ++i) {
-      const Vec3 d = p.at[size_t(i)] / glm::dot(axis, p.at[size_t(i)]);
-      on_face.add(glm::clamp(to_texels({f, glm::dot(u, d), glm::dot(v, d)}, size), 0.0f, float(size)));
+    Polygon p, inside, outside;
+    bool near = true;
+    for (const Corner* c : corners) {
+      const float along = glm::dot(axis, c->d);
+      near &= along > 0.4f;  // on the face it would be 0.577 at least
+      p.add(0, (glm::dot(u, c->d) / along + 1) * 0.5f * end, (glm::dot(v, c->d) / along + 1) * 0.5f * end);
     }
-    add_parts(size, f, on_face, out);
+    if (!near) continue;
+    for (int axis_of_face = 0; axis_of_face < 2; ++axis_of_face) {
+      cut(p, axis_of_face, end, inside, outside);
+      cut(inside, axis_of_face, 0, outside, p);
+    }
+    if (p.count < 3) continue;
+    int first[2], last[2];
+    for (int a = 0; a < 2; ++a) {
+      const auto [least, most] = std::minmax_element(p.at[a], p.at[a] + p.count);
+      first[a] = std::clamp(int(*least), 0, size - 1), last[a] = std::clamp(int(*most), 0, size - 1);
+    }
+    add_parts(size, f, p, first[0], last[0], first[1], last[1], out);
   }
+}
+
+void add_texel(int size, const Corner* const (&corners)[4], Parts& out) {
+  const Corner &a = *corners[0], &b = *corners[1], &c = *corners[2], &d = *corners[3];
+  out.count = 0, out.total = 0;
+  if (a.face != b.face || a.face != c.face || a.face != d.face) {
+    add_over_edges(size, corners, out);
+  } else {
+    const auto [first_column, last_column] = std::minmax({a.column, b.column, c.column, d.column});
+    const auto [first_row, last_row] = std::minmax({a.row, b.row, c.row, d.row});
+    if (first_column != last_column || first_row != last_row) {
+      Polygon p;
+      for (const Corner* corner : corners) p.add(0, corner->at.x, corner->at.y);
+      add_parts(size, a.face, p, first_column, last_column, first_row, last_row, out);
+    }
+  }
+  if (out.count > 0) return;
+  // Within one texel of the cube, or too thin for floats to have an area.
+  out.at[out.count++] = {cube_texel(size, a.face, a.column, a.row), 1, 0.25f * (a.d + b.d + c.d + d.d)};
+  out.total = 1;
 }
 
 }  // namespace
@@ -113,48 +153,61 @@ CubeLight cube_light(const Environment& env, int size, const Mat3& rotation) {
   // Texels of the map are cut so small that the arcs of their parallels are straight.
   const int w = env.image.width, h = env.image.height, split = std::max(1, (4 * size + w - 1) / w);
   const int fine_w = w * split, fine_h = h * split;
-  constexpr size_t pieces = 8;  // whose sums are added in order, so that the result does not depend on threads
+  constexpr size_t pieces = 4;  // whose sums are added in order, so that the result does not depend on threads
   struct Sum {
-    std::vector<Vec3> energy;
-    std::vector<Vec3> moment;  // sum of channels of energy, times direction
+    Vec3 energy;
+    Vec3 moment;  // sum of channels of energy, times direction
   };
-  std::vector<Sum> sums(pieces);
+  std::vector<std::vector<Sum>> sums(pieces);
+  std::vector<Vec3> meridians;  // on the equator, turned
+  for (int x = 0; x <= fine_w; ++x) meridians.push_back(rotation * latlong_direction(Vec2(float(x) / float(fine_w), 0.5f)));
   parallel_for(pieces, 1, [&](size_t begin, size_t end) {
     for (size_t piece = begin; piece < end; ++piece) {
-      Sum& sum = sums[piece];
-      sum.energy.assign(cube_texels(size), Vec3(0)), sum.moment.assign(cube_texels(size), Vec3(0));
+      std::vector<Sum>& sum = sums[piece];
+      sum.assign(cube_texels(size), {Vec3(0), Vec3(0)});
       Parts parts;
-      std::vector<Vec3> above, below;
-      auto corners = [&](int row) {
-        std::vector<Vec3> out;
-        for (int x = 0; x <= fine_w; ++x) out.push_back(rotation * latlong_direction(Vec2(float(x) / float(fine_w), float(row) / float(fine_h))));
-        return out;
+      std::vector<Corner> above(size_t(fine_w) + 1), below(size_t(fine_w) + 1);
+      auto set_corners = [&](int row, std::vector<Corner>& corners) {
+        const double theta = std::numbers::pi * row / fine_h;
+        const float sine = float(std::sin(theta));
+        const Vec3 up = float(std::cos(theta)) * rotation[1];
+        for (size_t x = 0; x < corners.size(); ++x) corners[x] = make_corner(size, sine * meridians[x] + up);
       };
       const int first = int(size_t(fine_h) * piece / pieces), last = int(size_t(fine_h) * (piece + 1) / pieces);
-      if (first < last) below = corners(first);
+      if (first < last) set_corners(first, below);
       for (int y = first; y < last; ++y) {
-        above = std::move(below), below = corners(y + 1);
+        std::swap(above, below);
+        set_corners(y + 1, below);
         const float solid_angle = float(texel_solid_angle(y, fine_w, fine_h));
+        const Vec3* row = &env.image.at(0, y / split);
         for (int x = 0; x < fine_w; ++x) {
-          const Vec3 radiance = env.image.at(x / split, y / split);
+          const Vec3 radiance = row[x / split];
           if (radiance == Vec3(0)) continue;
           const size_t i = size_t(x);
-          add_texel(size, {above[i], above[i + 1], below[i + 1], below[i]}, parts);
-          for (const Parts::Part& part : parts.parts) {
-            const Vec3 energy = radiance * (solid_angle * part.solid_angle / parts.total);
-            sum.energy[part.texel] += energy;
-            sum.moment[part.texel] += (energy.x + energy.y + energy.z) * part.direction;
+          add_texel(size, {&above[i], &above[i + 1], &below[i + 1], &below[i]}, parts);
+          const float scale = solid_angle / parts.total, channels = radiance.x + radiance.y + radiance.z;
+          for (int k = 0; k < parts.count; ++k) {
+            const Part& part = parts.at[k];
+            const float share = part.solid_angle * scale;
+            sum[part.texel].energy += share * radiance;
+            sum[part.texel].moment += share * channels * part.direction;
           }
         }
       }
     }
   });
-  CubeLight light{size, std::move(sums[0].energy), std::move(sums[0].moment)};
-  const Cube cube = make_cube(size);
-  parallel_for(cube_texels(size), 4096, [&](size_t begin, size_t end) {
-    for (size_t piece = 1; piece < pieces; ++piece)
-      for (size_t t = begin; t < end; ++t) light.energy[t] += sums[piece].energy[t], light.direction[t] += sums[piece].moment[t];
-    for (size_t t = begin; t < end; ++t) light.direction[t] = normalize_or(light.direction[t], cube.texels.at(t));
+  CubeLight light{size, std::vector<Vec3>(cube_texels(size)), std::vector<Vec3>(cube_texels(size))};
+  parallel_for(size_t(6 * size), 16, [&](size_t begin, size_t end) {
+    for (size_t line = begin; line < end; ++line)
+      for (int column = 0; column < size; ++column) {
+        const int face = int(line) / size, row = int(line) % size;
+        const size_t t = cube_texel(size, face, column, row);
+        Sum total = sums[0][t];
+        for (size_t piece = 1; piece < pieces; ++piece) total.energy += sums[piece][t].energy, total.moment += sums[piece][t].moment;
+        const auto place = [&](int k) { return (2 * float(k) + 1) / float(size) - 1; };
+        light.energy[t] = total.energy;
+        light.direction[t] = normalize_or(total.moment, glm::normalize(cube_point(face, place(column), place(row))));
+      }
   });
   return light;
 }

@@ -472,8 +472,8 @@ Vec3 shade_standard_scalar(const BlockLight& light, const Visibility& visibility
   return Vec3(sum);
 }
 
-HaarLight make_haar_light(const CubeLight& light, double fraction) {
-  HaarLight out{std::make_shared<const Cube>(make_cube(light.size)), fraction, {}, light.direction};
+HaarLight make_haar_light(const CubeLight& light, double fraction, int visibility_bits) {
+  HaarLight out{std::make_shared<const Cube>(make_cube(light.size)), fraction, visibility_bits, {}, light.direction};
   const int size = light.size, levels = std::countr_zero(unsigned(size));
   LAMBENT_CHECK(std::has_single_bit(unsigned(size)));
   std::vector<float> face(size_t(size) * size_t(size));
@@ -510,6 +510,8 @@ void project_haar(const HaarLight& light, const Visibility& visibility, size_t r
     trees.resize(6);
     for (size_t f = 0; f < 6; ++f) haar_transform(levels, std::span<const float>(s.faces).subspan(c * count + f * area, area), trees[f]);
     if (c < 3) keep_largest(trees, light.fraction);
+    else if (light.visibility_bits > 0)
+      for (HaarTree& tree : trees) quantise_haar(tree, light.visibility_bits);
   }
 }
 

@@ -66,14 +66,16 @@ Vec3 shade_blocks(const BlockLight& light, const Visibility& visibility, size_t 
 Vec3 shade_standard(const BlockLight& light, const Visibility& visibility, size_t receiver, const ProductMaterial& material, const Mat3& frame, Vec3 wo);
 Vec3 shade_standard_scalar(const BlockLight& light, const Visibility& visibility, size_t receiver, const ProductMaterial& material, const Mat3& frame, Vec3 wo);
 
-// Light and BRDFs in Haar wavelets on whole faces, of which `fraction` is kept; visibility in all of its own. Cubes of 2^k texels a side.
+// Light and BRDFs in Haar wavelets on whole faces, of which `fraction` is kept; visibility in all of its own, of so many bits each (0: floats).
+// Cubes of 2^k texels a side.
 struct HaarLight {
   std::shared_ptr<const Cube> cube;
   double fraction = 1;
+  int visibility_bits = 8;
   std::array<std::vector<HaarTree>, 3> trees;  // by channel, six faces
   std::vector<Vec3> direction;                 // by texel
 };
-HaarLight make_haar_light(const CubeLight& light, double fraction);
+HaarLight make_haar_light(const CubeLight& light, double fraction, int visibility_bits = 8);
 struct HaarScratch {
   std::array<std::vector<HaarTree>, 3> brdf;
   std::vector<HaarTree> visibility;
