@@ -8,10 +8,10 @@
 namespace lambent {
 namespace {
 
-// A sky with no symmetry, and a sun high up that is 20,000 times as bright.
-CubeLight sunny_light(int size) {
+// A sky with no symmetry, and a sun high up that is 20,000 times as bright, or `sun` times.
+CubeLight sunny_light(int size, float sun) {
   Environment env = make_environment("sunny", 256, 128, [](Vec3 d) { return Vec3(0.5f + 0.3f * d.y, 0.6f + 0.2f * d.x, 0.7f - 0.1f * d.z); });
-  env.image.at(70, 25) = Vec3(20000, 17000, 12000);
+  env.image.at(70, 25) = sun * Vec3(1, 0.85f, 0.6f);
   return cube_light(env, size);
 }
 
@@ -60,10 +60,10 @@ struct Setting {
   std::vector<Point> points;
   Visibility visibility;
 };
-Setting make_setting(int size, int bits, size_t count, uint64_t seed) {
+Setting make_setting(int size, int bits, size_t count, uint64_t seed, float sun = 20000) {
   Setting s;
   Random random(seed);
-  s.cube_light = sunny_light(size);
+  s.cube_light = sunny_light(size, sun);
   set_light(s.light, s.cube_light);
   for (size_t i = 0; i < count; ++i) s.points.push_back(random_point(random));
   s.visibility = random_visibility(*s.light.cube, bits, s.points, random);
@@ -150,6 +150,23 @@ TEST(Products, FewSamplesAreNearTheStandardBasis) {
                 psnr(theirs, truth), 100 * double(paper_tally.samples[3]) / all);
     EXPECT_GT(psnr(ours, truth), 50) << "model " << brdf.index();
     EXPECT_LT(double(tally.samples[3]), 0.6 * all) << "model " << brdf.index();
+  }
+}
+
+// Appendix A under a sky without a sun: about the 45.67 dB that the paper prints. With a sun, which finds each error of a narrow lobe between
+// 16 samples out, it has 15 dB less.
+TEST(Products, AppendixAIsAsGoodAsItsPaperSaysWhereTheSkyIsEven) {
+  for (float sun : {0.5f, 20000.0f}) {
+    const Setting s = make_setting(64, 1, 150, 14, sun);
+    const ProductMaterial m = make_product_material(Phong{Vec3(0.3f, 0.2f, 0.1f), Vec3(0.6f), 200}, *s.light.cube, {SamplingRule::appendix_a});
+    std::vector<Vec3> theirs, truth;
+    for (size_t r = 0; r < s.points.size(); ++r) {
+      theirs.push_back(shade_blocks(s.light, s.visibility, r, m, s.points[r].frame, s.points[r].wo));
+      truth.push_back(shade_standard(s.light, s.visibility, r, m, s.points[r].frame, s.points[r].wo));
+    }
+    RecordProperty(sun < 1 ? "even_dB" : "sunny_dB", std::to_string(psnr(theirs, truth)));
+    if (sun < 1) EXPECT_GT(psnr(theirs, truth), 45);
+    else EXPECT_LT(psnr(theirs, truth), 35);
   }
 }
 
