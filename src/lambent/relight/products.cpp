@@ -408,7 +408,7 @@ ProductMaterial make_product_material(const Brdf& brdf, const Cube& cube, const 
     if (exponent < 30) m.cosines = {-2, exponent > 0 ? wide : 2, 2, 2};
     else m.cosines = {-2, wide, narrow, exponent > 250 ? narrow : 2};
   } else if (phong) {
-    // From the far side on, the first angle at which the error is too large.
+    // From the far side on, the first angle at which the error is too large; twice the tolerance, since this is the worst of the block.
     constexpr int steps = 90;
     m.cosines = {2, 2, 2, 2};
     const float half_width = cube.widest / std::sqrt(2.0f), weight = pi * largest(phong->specular);
@@ -416,7 +416,7 @@ ProductMaterial make_product_material(const Brdf& brdf, const Cube& cube, const 
       const float angle = float(i) * pi / steps;
       const std::array<float, 4> errors = phong_errors(phong->exponent, angle, half_width, cube);
       for (size_t k = 0; k < 4; ++k)
-        if (m.cosines[k] > 1 && weight * errors[k] > sampling.tolerance) m.cosines[k] = std::cos(std::min(pi, angle + pi / steps)) - 1e-6f;
+        if (m.cosines[k] > 1 && weight * errors[k] > 2 * sampling.tolerance) m.cosines[k] = std::cos(std::min(pi, angle + pi / steps)) - 1e-6f;
     }
     // More samples are never wrong: the classes are nested.
     for (size_t k = 3; k > 0; --k) m.cosines[k - 1] = std::min(m.cosines[k - 1], m.cosines[k]);
