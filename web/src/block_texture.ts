@@ -16,7 +16,7 @@ const maxSize = 2048, maxLayers = 256, leastRows = 256;
 
 export interface BlockHeader {
   count: number; // values a channel
-  channels: 1 | 3;
+  channels: number; // of matrices: rows * channels
   precision: 'half' | 'single';
   receivers: number;
 }

@@ -1,9 +1,11 @@
 import { diffuseKind } from './diffuse.js';
 import { registerTransferKind } from './kinds.js';
+import { matrixKind } from './matrix.js';
 import { zonalKind } from './zonal.js';
 
 registerTransferKind(diffuseKind);
 registerTransferKind(zonalKind);
+registerTransferKind(matrixKind);
 
 export { LambentError } from './errors.js';
 export { checkBakedFile, extensionName } from './glb.js';

@@ -1,4 +1,4 @@
-// The kinds of transfer that a file may hold. A new one (matrix) is one entry here and one module.
+// The kinds of transfer that a file may hold. A new one is one entry here and one module.
 import type { Color, Material, Mesh, WebGLRenderer } from 'three';
 import type { TransferExtension } from './glb.js';
 import type { Lighting } from './lighting.js';

@@ -1,9 +1,8 @@
 // Diffuse transfer over the texels of an atlas (docs/lightmaps.md): columns of harmonics, then of the scene's own lamps. Light is summed
 // once into a half-float picture of the atlas, on the graphics card, when it changes; pixels look that up bilinearly.
 import {
-  Camera, Color, DataTexture, Float32BufferAttribute, GLSL3, HalfFloatType, LinearFilter, Mesh, MeshBasicMaterial, NearestFilter, PlaneGeometry, RawShaderMaterial,
-  RedIntegerFormat, RGBAFormat, Scene, UnsignedIntType, WebGLRenderTarget, type DataArrayTexture, type Material, type MeshStandardMaterial,
-  type WebGLProgramParametersWithUniforms, type WebGLRenderer,
+  Color, DataTexture, Float32BufferAttribute, LinearFilter, MeshBasicMaterial, NearestFilter, RedIntegerFormat, UnsignedIntType, type DataArrayTexture, type Material,
+  type Mesh, type MeshStandardMaterial, type WebGLProgramParametersWithUniforms, type WebGLRenderer,
 } from 'three';
 import { blockTexture, packBlocks, type BlockLayout } from './block_texture.js';
 import { LambentError } from './errors.js';
@@ -11,95 +10,11 @@ import { isIndex } from './glb.js';
 import { readHeader, readReceivers, shareGeometry, type TransferHeader } from './header.js';
 import type { BakedTransfer, TransferSource } from './kinds.js';
 import type { Lighting } from './lighting.js';
+import { LightSum, maxColumns } from './light_sum.js';
 import { diffuseParameters, replaceOnce, useExitRadiance } from './prt_material.js';
 import { shCount } from './sh.js';
 
-const maxColumns = 256; // uniforms: 192 vec4 of the 224 that WebGL 2 promises
 const maxSide = 16384; // of an atlas; what a graphics card takes is less, mostly, and asked of it
-
-const atlasVertex = 'in vec3 position;\nvoid main() { gl_Position = vec4( position, 1.0 ); }';
-const atlasFragment = /* glsl */ `
-precision highp float;
-precision highp int;
-uniform highp sampler2DArray prtTransfer;
-uniform highp usampler2D prtReceivers;
-uniform vec4 prtLight[ 3 * PRT_QUADS ];
-out vec4 radiance;
-void main() {
-  uint receiver = texelFetch( prtReceivers, ivec2( gl_FragCoord.xy ), 0 ).r;
-  radiance = vec4( 0.0, 0.0, 0.0, 1.0 );
-  if ( receiver == 0xffffffffu ) return;
-  int r = int( receiver );
-  ivec3 at = ivec3( ( r & ( PRT_COLUMNS - 1 ) ) * PRT_TEXELS, ( r / PRT_COLUMNS ) & ( PRT_ROWS - 1 ), r / ( PRT_COLUMNS * PRT_ROWS ) );
-  for ( int k = 0; k < PRT_QUADS; ++ k ) {
-    vec4 red = texelFetch( prtTransfer, at + ivec3( k, 0, 0 ), 0 ), green = red, blue = red;
-    #if PRT_CHANNELS == 3
-      green = texelFetch( prtTransfer, at + ivec3( PRT_QUADS + k, 0, 0 ), 0 );
-      blue = texelFetch( prtTransfer, at + ivec3( 2 * PRT_QUADS + k, 0, 0 ), 0 );
-    #endif
-    radiance.rgb += vec3( dot( red, prtLight[ k ] ), dot( green, prtLight[ PRT_QUADS + k ] ), dot( blue, prtLight[ 2 * PRT_QUADS + k ] ) );
-  }
-}`;
-
-/** Exit radiance of white at every texel, under one light. */
-class Atlas {
-  readonly light: Float32Array;
-  readonly target: WebGLRenderTarget;
-  private readonly quad: Mesh<PlaneGeometry, RawShaderMaterial>;
-  private readonly scene = new Scene();
-  private readonly camera = new Camera();
-  private changed = true;
-
-  constructor(layout: BlockLayout, channels: number, transfer: DataArrayTexture, receivers: DataTexture) {
-    this.light = new Float32Array(12 * layout.quads);
-    const { width, height } = receivers.image;
-    this.target = new WebGLRenderTarget(width, height, {
-      type: HalfFloatType, format: RGBAFormat, minFilter: LinearFilter, magFilter: LinearFilter, depthBuffer: false, generateMipmaps: false,
-    });
-    const material = new RawShaderMaterial({
-      glslVersion: GLSL3, vertexShader: atlasVertex, fragmentShader: atlasFragment, depthTest: false, depthWrite: false,
-      defines: { PRT_QUADS: layout.quads, PRT_TEXELS: layout.texels, PRT_COLUMNS: layout.columns, PRT_ROWS: layout.rows, PRT_CHANNELS: channels },
-      uniforms: { prtTransfer: { value: transfer }, prtReceivers: { value: receivers }, prtLight: { value: this.light } },
-    });
-    this.quad = new Mesh(new PlaneGeometry(2, 2), material);
-    this.quad.frustumCulled = false;
-    this.scene.add(this.quad);
-  }
-
-  /** `light` is [column][3]. */
-  set(light: ArrayLike<number>): void {
-    const quads = this.light.length / 12;
-    for (let k = 0; k < light.length / 3; ++k) for (let c = 0; c < 3; ++c) this.light[4 * quads * c + k] = light[3 * k + c]!;
-    this.changed = true;
-  }
-
-  refresh(): void {
-    this.changed = true;
-  }
-
-  check(renderer: WebGLRenderer): void {
-    const { width, height } = this.target;
-    if (Math.max(width, height) > renderer.capabilities.maxTextureSize)
-      throw new LambentError(`has an atlas of ${width} x ${height} texels, where this graphics card takes ${renderer.capabilities.maxTextureSize}`);
-    if (!renderer.extensions.has('EXT_color_buffer_float') && !renderer.extensions.has('EXT_color_buffer_half_float'))
-      throw new LambentError('is a lightmap, which needs a graphics card that draws into half-float textures (EXT_color_buffer_float)');
-  }
-
-  /** Before what shows it is drawn; the renderer is left as it was. */
-  update(renderer: WebGLRenderer): void {
-    if (!this.changed) return;
-    this.check(renderer);
-    this.changed = false;
-    const before = renderer.getRenderTarget(), face = renderer.getActiveCubeFace(), level = renderer.getActiveMipmapLevel();
-    renderer.setRenderTarget(this.target);
-    renderer.render(this.scene, this.camera);
-    renderer.setRenderTarget(before, face, level);
-  }
-
-  dispose(): void {
-    this.target.dispose(), this.quad.geometry.dispose(), this.quad.material.dispose();
-  }
-}
 
 const vertexDeclarations = /* glsl */ `
 attribute vec2 lambentPlace;
@@ -132,7 +47,7 @@ vec3 prtExitRadiance() {
 `;
 
 class LightmapMaterial extends MeshBasicMaterial {
-  constructor(readonly atlas: Atlas, twoSided: boolean, readonly emission: { value: Color }, source: Material, readonly gain?: { value: number }) {
+  constructor(readonly atlas: LightSum, twoSided: boolean, readonly emission: { value: Color }, source: Material, readonly gain?: { value: number }) {
     super(gain ? { side: source.side } : diffuseParameters(source));
     this.defines = { ...(twoSided && { PRT_TWO_SIDED: '' }), ...(gain && { PRT_FALSE_COLOR: '' }) };
     if (gain) this.toneMapped = false;
@@ -165,9 +80,9 @@ class LightmapTransfer implements BakedTransfer {
   readonly lamps = new Map<string, Color>();
   private readonly layout: BlockLayout;
   private readonly transfer: DataArrayTexture;
-  private readonly atlas: Atlas;
+  private readonly atlas: LightSum;
   private readonly materials: LightmapMaterial[] = [];
-  private readonly ofCoefficients = new Set<Atlas>();
+  private readonly ofCoefficients = new Set<LightSum>();
   private readonly glow: { emission: { value: Color }; own: Color; lamp: string }[] = [];
 
   constructor(header: TransferHeader, groups: string[], values: ArrayBuffer, private readonly receiversOf: DataTexture, readonly meshes: Mesh[], owns: Material[]) {
@@ -175,7 +90,7 @@ class LightmapTransfer implements BakedTransfer {
     for (const name of groups) this.lamps.set(name, new Color(1, 1, 1));
     const { layout, data } = packBlocks({ ...header, count: shCount(header.order) + groups.length }, values);
     this.layout = layout, this.transfer = blockTexture(layout, data);
-    this.atlas = new Atlas(layout, this.channels, this.transfer, receiversOf);
+    this.atlas = this.makeAtlas();
     const { width, height } = receiversOf.image;
     let gpuBytes = data.byteLength + 12 * width * height;
     meshes.forEach((mesh, i) => {
@@ -189,6 +104,21 @@ class LightmapTransfer implements BakedTransfer {
       gpuBytes += mesh.geometry.getAttribute('position').count * (twoSided ? 16 : 8);
     });
     this.gpuBytes = gpuBytes;
+  }
+
+  /** Exit radiance of white at every texel, under one light. */
+  private makeAtlas(): LightSum {
+    const { width, height } = this.receiversOf.image;
+    return new LightSum({
+      layout: this.layout, channels: this.channels, transfer: this.transfer, width, height, filter: LinearFilter, uniforms: { prtReceivers: { value: this.receiversOf } },
+      what: { size: 'has an atlas', use: 'is a lightmap' },
+      pick: `
+uniform highp usampler2D prtReceivers;
+uint prtPick( const in ivec2 texel, out int row ) {
+  row = 0;
+  return texelFetch( prtReceivers, texel, 0 ).r;
+}`,
+    });
   }
 
   check(renderer: WebGLRenderer): void {
@@ -208,7 +138,7 @@ class LightmapTransfer implements BakedTransfer {
   }
 
   coefficientMaterials(index: number, gain: { value: number }): Material[] {
-    const atlas = new Atlas(this.layout, this.channels, this.transfer, this.receiversOf);
+    const atlas = this.makeAtlas();
     atlas.set(new Float64Array(3 * (shCount(this.order) + this.lamps.size)).fill(1, 3 * index, 3 * index + 3));
     this.ofCoefficients.add(atlas);
     const made = this.meshes.map((mesh, i) =>

@@ -141,11 +141,16 @@ vec3 prtExitRadiance() {
 }
 `;
 
-/** three's own fragment shader with prtExitRadiance() for white. */
-export function useExitRadiance(fragmentShader: string, declarations: string, falseColor: boolean): string {
-  const lit = falseColorScale + declarations + replaceOnce(fragmentShader, whiteLine, 'reflectedLight.indirectDiffuse += max( prtExitRadiance(), vec3( 0.0 ) );');
-  return !falseColor ? lit : replaceOnce(lit, '#include <opaque_fragment>',
-    'outgoingLight = prtScale( prtGain * luminance( prtExitRadiance() ) );\n#include <opaque_fragment>');
+/**
+ * three's own fragment shader with prtExitRadiance() for white. `addsGloss`: and with prtGloss(), which base colour does not tint; then both may
+ * be negative, and only their sum is clamped.
+ */
+export function useExitRadiance(fragmentShader: string, declarations: string, falseColor: boolean, addsGloss = false): string {
+  const radiance = addsGloss ? 'prtExitRadiance()' : 'max( prtExitRadiance(), vec3( 0.0 ) )';
+  const lit = falseColorScale + declarations + replaceOnce(fragmentShader, whiteLine, `reflectedLight.indirectDiffuse += ${radiance};`);
+  const last = falseColor ? `outgoingLight = prtScale( prtGain * luminance( prtExitRadiance()${addsGloss ? ' + prtGloss()' : ''} ) );`
+    : addsGloss ? 'outgoingLight = max( outgoingLight + prtGloss(), vec3( 0.0 ) );' : '';
+  return last ? replaceOnce(lit, '#include <opaque_fragment>', `${last}\n#include <opaque_fragment>`) : lit;
 }
 
 export class PrtMaterial extends MeshBasicMaterial {

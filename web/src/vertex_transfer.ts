@@ -14,7 +14,7 @@ import { diffuseParameters, PrtMaterial, type PrtOptions, type PrtShader, type P
 import { shCount } from './sh.js';
 
 /** The part's mesh, its vertices with their receivers. */
-async function bindPart(source: TransferSource, part: TransferExtension['parts'][number], receivers: number): Promise<Mesh> {
+export async function bindPart(source: TransferSource, part: TransferExtension['parts'][number], receivers: number): Promise<Mesh> {
   const mesh = source.mesh(part), geometry = shareGeometry(mesh.geometry), vertices = geometry.getAttribute('position').count;
   const add = async (name: string, view: unknown): Promise<void> => {
     const map = await readReceivers(source, view, vertices, receivers, 'a part does not have one receiver a vertex');

@@ -3,6 +3,7 @@ import { DataUtils } from 'three';
 import { blockLayout, packBlocks, type BlockHeader } from '../src/block_texture.ts';
 import { readHeader } from '../src/header.ts';
 import { checkBakedFile } from '../src/index.ts';
+import { mapLayout, packMaps, readOutgoing } from '../src/matrix.ts';
 import { zonalValues } from '../src/zonal.ts';
 import { random } from './tool.ts';
 
@@ -55,6 +56,36 @@ describe('the transfer texture', () => {
 describe('zonal values', () => {
   // docs/zonal.md: bytes a vertex in half floats, grey, order 6.
   it('take the bytes of the docs', () => expect([1, 2, 3, 4, 5, 6].map((lobes) => 2 * zonalValues(6, lobes, 1))).toEqual([18, 34, 50, 64, 78, 92]));
+});
+
+describe('view maps', () => {
+  it('lie as tiles where the shader looks', () => {
+    const grid = 64, maps = 5, rows = 25, next = random(3), values = Uint16Array.from({ length: 4 * maps * grid * grid * rows }, () => Math.floor(65535 * next()));
+    const { across, width, height } = mapLayout(grid, maps, rows), out = packMaps(grid, maps, rows, values);
+    expect(out.length).toBe(4 * width * height);
+    expect(width).toBeLessThanOrEqual(4096);
+    for (let i = 0; i < 2000; ++i) {
+      const [m, y, x, r, c] = [maps, grid, grid, rows, 4].map((n) => Math.floor(next() * n)) as [number, number, number, number, number], tile = m * rows + r;
+      const px = (tile % across) * grid + x, py = Math.floor(tile / across) * grid + y;
+      expect(out[4 * (py * width + px) + c]).toBe(values[4 * (((m * grid + y) * grid + x) * rows + r) + c]);
+    }
+  });
+
+  it('are refused where they do not fit', () => {
+    const map = { kind: 'map', order: 5, grid: 64, mapCount: 3, maps: 1, mapOf: 2, frames: 3 };
+    const read = (outgoing: unknown, rows: unknown = 25) => () => readOutgoing({ kind: 'matrix', rows, outgoing });
+    expect(read(map)()).toMatchObject({ rows: 25, outgoing: { kind: 'map', grid: 64, maps: 3 } });
+    expect(read({ kind: 'sh', order: 4 }, 32)()).toMatchObject({ rows: 32, outgoing: { hasB: true } });
+    expect(read(undefined)).toThrow(/no "outgoing"/);
+    expect(read({ ...map, kind: 'wavelets' })).toThrow(/"wavelets"/);
+    expect(read({ ...map, grid: 1 })).toThrow(/no size/);
+    expect(read({ ...map, grid: 1e9 })).toThrow(/no size/);
+    expect(read({ ...map, mapCount: 0 })).toThrow(/no size/);
+    expect(read(map, 0)).toThrow(/"rows"/);
+    expect(read(map, 1e6)).toThrow(/"rows"/);
+    expect(read({ kind: 'sh', order: 4 }, 31)).toThrow(/does not fit/);
+    expect(read({ kind: 'phong', order: 17 }, 31)).toThrow(/order/);
+  });
 });
 
 /** A GLB with this JSON and no binary chunk. */

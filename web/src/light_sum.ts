@@ -1,0 +1,118 @@
+// T . light on the graphics card: a half-float picture with a texel for each row of each receiver, drawn when the light changes and only
+// looked up until then. Who makes one says which texel is whose.
+import {
+  Camera, GLSL3, HalfFloatType, Mesh, PlaneGeometry, RawShaderMaterial, RGBAFormat, Scene, WebGLRenderTarget, type DataArrayTexture,
+  type IUniform, type LinearFilter, type NearestFilter, type WebGLRenderer,
+} from 'three';
+import type { BlockLayout } from './block_texture.js';
+import { LambentError } from './errors.js';
+
+/** Columns of light at most: uniforms of 192 vec4 of the 224 that WebGL 2 promises. */
+export const maxColumns = 256;
+
+const vertexShader = 'in vec3 position;\nvoid main() { gl_Position = vec4( position, 1.0 ); }';
+const fragmentShader = (pick: string): string => /* glsl */ `
+precision highp float;
+precision highp int;
+uniform highp sampler2DArray prtTransfer;
+uniform vec4 prtLight[ 3 * PRT_QUADS ];
+out vec4 radiance;
+${pick}
+void main() {
+  int row = 0;
+  uint receiver = prtPick( ivec2( gl_FragCoord.xy ), row );
+  radiance = vec4( 0.0, 0.0, 0.0, 1.0 );
+  if ( receiver == 0xffffffffu ) return;
+  int r = int( receiver );
+  ivec3 at = ivec3( ( r & ( PRT_COLUMNS - 1 ) ) * PRT_TEXELS, ( r / PRT_COLUMNS ) & ( PRT_ROWS - 1 ), r / ( PRT_COLUMNS * PRT_ROWS ) );
+  at.x += row * PRT_CHANNELS * PRT_QUADS;
+  for ( int k = 0; k < PRT_QUADS; ++ k ) {
+    vec4 red = texelFetch( prtTransfer, at + ivec3( k, 0, 0 ), 0 ), green = red, blue = red;
+    #if PRT_CHANNELS == 3
+      green = texelFetch( prtTransfer, at + ivec3( PRT_QUADS + k, 0, 0 ), 0 );
+      blue = texelFetch( prtTransfer, at + ivec3( 2 * PRT_QUADS + k, 0, 0 ), 0 );
+    #endif
+    radiance.rgb += vec3( dot( red, prtLight[ k ] ), dot( green, prtLight[ PRT_QUADS + k ] ), dot( blue, prtLight[ 2 * PRT_QUADS + k ] ) );
+  }
+}`;
+
+export interface SumOptions {
+  layout: BlockLayout;
+  /** Of a row. */
+  channels: number;
+  transfer: DataArrayTexture;
+  width: number;
+  height: number;
+  filter: typeof NearestFilter | typeof LinearFilter;
+  /** GLSL: uint prtPick( ivec2 texel, out int row ), the receiver or 0xffffffffu, and what it reads. */
+  pick: string;
+  uniforms?: Record<string, IUniform>;
+  /** Beginnings of sentences about what it is: "has an atlas" [of W x H texels], "is a lightmap" [, which needs]. */
+  what: { size: string; use: string };
+}
+
+export class LightSum {
+  readonly light: Float32Array;
+  readonly target: WebGLRenderTarget;
+  private readonly quad: Mesh<PlaneGeometry, RawShaderMaterial>;
+  private readonly scene = new Scene();
+  private readonly camera = new Camera();
+  private changed = true;
+  private readonly what: SumOptions['what'];
+
+  constructor({ layout, channels, transfer, width, height, filter, pick, uniforms, what }: SumOptions) {
+    this.what = what;
+    this.light = new Float32Array(12 * layout.quads);
+    this.target = new WebGLRenderTarget(width, height, {
+      type: HalfFloatType, format: RGBAFormat, minFilter: filter, magFilter: filter, depthBuffer: false, generateMipmaps: false,
+    });
+    const material = new RawShaderMaterial({
+      glslVersion: GLSL3, vertexShader, fragmentShader: fragmentShader(pick), depthTest: false, depthWrite: false,
+      defines: { PRT_QUADS: layout.quads, PRT_TEXELS: layout.texels, PRT_COLUMNS: layout.columns, PRT_ROWS: layout.rows, PRT_CHANNELS: channels },
+      uniforms: { prtTransfer: { value: transfer }, prtLight: { value: this.light }, ...uniforms },
+    });
+    this.quad = new Mesh(new PlaneGeometry(2, 2), material);
+    this.quad.frustumCulled = false;
+    this.scene.add(this.quad);
+  }
+
+  get bytes(): number {
+    return 8 * this.target.width * this.target.height;
+  }
+
+  /** `light` is [column][3]. */
+  set(light: ArrayLike<number>): void {
+    const quads = this.light.length / 12;
+    for (let k = 0; k < light.length / 3; ++k) for (let c = 0; c < 3; ++c) this.light[4 * quads * c + k] = light[3 * k + c]!;
+    this.changed = true;
+  }
+
+  /** Draws again: a lost context has taken what was drawn. */
+  refresh(): void {
+    this.changed = true;
+  }
+
+  /** Throws LambentError where the graphics card cannot draw this. */
+  check(renderer: WebGLRenderer): void {
+    const { width, height } = this.target;
+    if (Math.max(width, height) > renderer.capabilities.maxTextureSize)
+      throw new LambentError(`${this.what.size} of ${width} x ${height} texels, where this graphics card takes ${renderer.capabilities.maxTextureSize}`);
+    if (!renderer.extensions.has('EXT_color_buffer_float') && !renderer.extensions.has('EXT_color_buffer_half_float'))
+      throw new LambentError(`${this.what.use}, which needs a graphics card that draws into half-float textures (EXT_color_buffer_float)`);
+  }
+
+  /** Before what shows it is drawn; the renderer is left as it was. */
+  update(renderer: WebGLRenderer): void {
+    if (!this.changed) return;
+    this.check(renderer);
+    this.changed = false;
+    const before = renderer.getRenderTarget(), face = renderer.getActiveCubeFace(), level = renderer.getActiveMipmapLevel();
+    renderer.setRenderTarget(this.target);
+    renderer.render(this.scene, this.camera);
+    renderer.setRenderTarget(before, face, level);
+  }
+
+  dispose(): void {
+    this.target.dispose(), this.quad.geometry.dispose(), this.quad.material.dispose();
+  }
+}
