@@ -3,6 +3,7 @@ import { spawn, type ChildProcess } from 'node:child_process';
 import { existsSync, readFileSync, writeFileSync } from 'node:fs';
 import { join } from 'node:path';
 import { fileURLToPath } from 'node:url';
+import { crc32, deflateSync } from 'node:zlib';
 import { chromium, type Browser, type Page } from 'playwright-core';
 import { createServer, type ViteDevServer } from 'vite';
 import { lambentJson, random, toolPath } from '../test/tool.ts';
@@ -199,4 +200,69 @@ export function writeSkin(path: string, blend: number): void {
   [0x46546c67, 2, 28 + text.length + length, text.length, 0x4e4f534a].forEach((v, k) => head.writeUInt32LE(v, 4 * k));
   bin.writeUInt32LE(length, 0), bin.writeUInt32LE(0x004e4942, 4);
   writeFileSync(path, Buffer.concat([head, text, bin, ...pieces]));
+}
+
+/** A PNG of 8-bit RGB. */
+function png(width: number, height: number, texel: (x: number, y: number) => number[]): Buffer {
+  const rows = Buffer.alloc(height * (1 + 3 * width));
+  for (let y = 0; y < height; ++y) for (let x = 0; x < width; ++x) rows.set(texel(x, y).map((v) => Math.round(255 * v)), y * (1 + 3 * width) + 1 + 3 * x);
+  const chunk = (type: string, data: Buffer): Buffer => {
+    const body = Buffer.concat([Buffer.from(type), data]), out = Buffer.alloc(8 + body.length);
+    out.writeUInt32BE(data.length, 0), body.copy(out, 4), out.writeUInt32BE(crc32(body), 4 + body.length);
+    return out;
+  };
+  const header = Buffer.alloc(13);
+  header.writeUInt32BE(width, 0), header.writeUInt32BE(height, 4), header.set([8, 2, 0, 0, 0], 8);
+  return Buffer.concat([Buffer.from([137, 80, 78, 71, 13, 10, 26, 10]), chunk('IHDR', header), chunk('IDAT', deflateSync(rows)), chunk('IEND', Buffer.alloc(0))]);
+}
+
+/** A floor and two walls with bumps in their normal texture, one of the walls mirrored, and a sign between them that glows by a texture. */
+export function writeBumpy(path: string): void {
+  const positions: number[] = [], normals: number[] = [], places: number[] = [], walls: number[] = [], sign: number[] = [];
+  const quad = (indices: number[], corner: number[], a: number[], b: number[], mirrored: boolean): void => {
+    const n = 12, first = positions.length / 3, cross = [0, 1, 2].map((k) => a[(k + 1) % 3]! * b[(k + 2) % 3]! - a[(k + 2) % 3]! * b[(k + 1) % 3]!), size = Math.hypot(...cross);
+    for (let j = 0; j <= n; ++j)
+      for (let i = 0; i <= n; ++i) {
+        positions.push(...[0, 1, 2].map((k) => corner[k]! + (a[k]! * i) / n + (b[k]! * j) / n)), normals.push(...cross.map((v) => v / size));
+        places.push(mirrored ? 1 - i / n : i / n, 1 - j / n);
+      }
+    for (let j = 0; j < n; ++j)
+      for (let i = 0; i < n; ++i) {
+        const at = first + j * (n + 1) + i;
+        indices.push(at, at + 1, at + n + 2, at, at + n + 2, at + n + 1);
+      }
+  };
+  quad(walls, [-1, 0, 1], [2, 0, 0], [0, 0, -2], false);
+  quad(walls, [-1, 0, -1], [2, 0, 0], [0, 1.5, 0], true);
+  quad(walls, [-1, 0, 1], [0, 0, -2], [0, 1.5, 0], false);
+  quad(sign, [0.1, 0.1, -0.3], [0.7, 0, 0.2], [0, 0.6, 0], false);
+  const bump = (x: number, y: number): number[] => {
+    const w = 2 * Math.PI * 3, u = (x + 0.5) / 128, v = (y + 0.5) / 128, n = [-0.5 * Math.cos(w * u) * Math.sin(w * v), 0.5 * Math.sin(w * u) * Math.cos(w * v), 1], size = Math.hypot(...n);
+    return n.map((k) => (k / size + 1) / 2);
+  };
+  const glow = (x: number, y: number): number[] => ((x >> 4) + (y >> 4)) % 2 ? [0.9, 0.7, 0.2] : [0.1, 0.2, 0.6];
+  const pieces: Buffer[] = [], bufferViews: object[] = [], accessors: object[] = [];
+  let length = 0;
+  const add = (values: Float32Array | Uint32Array, type: string, size: number, more: object = {}): number => {
+    const bytes = Buffer.from(values.buffer, values.byteOffset, values.byteLength);
+    bufferViews.push({ buffer: 0, byteOffset: length, byteLength: bytes.length });
+    pieces.push(bytes), length += bytes.length;
+    return accessors.push({ bufferView: bufferViews.length - 1, componentType: values instanceof Float32Array ? 5126 : 5125, count: values.length / size, type, ...more }) - 1;
+  };
+  const attributes = {
+    POSITION: add(new Float32Array(positions), 'VEC3', 3, { min: [-1, 0, -1], max: [1, 1.5, 1] }), NORMAL: add(new Float32Array(normals), 'VEC3', 3),
+    TEXCOORD_0: add(new Float32Array(places), 'VEC2', 2),
+  };
+  const uri = (type: string, bytes: Buffer): string => `data:${type};base64,${bytes.toString('base64')}`;
+  const primitives = [walls, sign].map((indices, material) => ({ attributes, indices: add(new Uint32Array(indices), 'SCALAR', 1), material }));
+  writeFileSync(path, JSON.stringify({
+    asset: { version: '2.0' }, scene: 0, scenes: [{ nodes: [0] }], nodes: [{ mesh: 0 }], meshes: [{ primitives }],
+    materials: [
+      { name: 'bumps', pbrMetallicRoughness: { baseColorFactor: [0.7, 0.65, 0.6, 1], metallicFactor: 0 }, normalTexture: { index: 0, scale: 0.8 } },
+      { name: 'sign', doubleSided: true, pbrMetallicRoughness: { baseColorFactor: [0.3, 0.3, 0.3, 1], metallicFactor: 0 }, emissiveFactor: [1, 1, 1], emissiveTexture: { index: 1 } },
+    ],
+    textures: [{ source: 0, sampler: 0 }, { source: 1, sampler: 0 }], samplers: [{ magFilter: 9729, minFilter: 9729 }],
+    images: [{ uri: uri('image/png', png(128, 128, bump)) }, { uri: uri('image/png', png(64, 64, glow)) }],
+    buffers: [{ byteLength: length, uri: uri('application/octet-stream', Buffer.concat(pieces)) }], bufferViews, accessors,
+  }));
 }

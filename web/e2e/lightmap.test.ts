@@ -3,7 +3,7 @@ import { join } from 'node:path';
 import type { Browser } from 'playwright-core';
 import { afterAll, beforeAll, describe, expect, it } from 'vitest';
 import { haveTool, lambent, makeFolder, writeLopsidedHdr } from '../test/tool.ts';
-import { complaint, haveBrowser, launch, open, psnr, serve, writeScene } from './browser.ts';
+import { complaint, haveBrowser, launch, open, psnr, serve, writeBumpy, writeScene } from './browser.ts';
 
 const rotate = '40,-25,70', camera = '3.1,2.6,4.3,-0.3,0.8,0,38';
 
@@ -33,6 +33,24 @@ describe.skipIf(!haveTool || !haveBrowser)('a lightmap', () => {
     expect(db).toBeGreaterThan(40);
     expect(other).toBeLessThan(db - 8); // the comparison can fail
   });
+
+  for (const kind of ['sh:2', 'sh:3', 'hl2', 'vector'])
+    it(`is lit as render lights it where a normal texture bends its normals, and glows by a texture: ${kind}`, async () => {
+      const view = '1.6,1.5,2.2,-0.1,0.4,-0.2,40', name = kind.replace(':', '');
+      writeBumpy(at('bumpy.gltf'));
+      lambent('bake', at('bumpy.gltf'), '--transfer', 'lightmap', '--texels-per-unit', '16', '--samples', '128', '--bounces', '2', '--directional', kind,
+        '--sky', 'sky:elevation=30,azimuth=60', '-o', at(`${name}.glb`));
+      const server = await serve(at(`${name}.glb`), '--env', at('light.hdr'));
+      const page = await open(browser, server.address, `ui=off&background=none&camera=${view}&exposure=-2`, 640, 480);
+      await page.screenshot({ path: at(`page_${name}.png`) });
+      await page.close();
+      expect(await server.stop()).toBe(0);
+      const shot = ['--camera', view, '--size', '640x480', '--spp', '16', '--background', 'none', '--exposure', '-2'];
+      lambent('render', at(`${name}.glb`), ...shot, '-o', at(`${name}.png`));
+      const db = psnr(at(`page_${name}.png`), at(`${name}.png`));
+      console.log(`${kind}: ${db.toFixed(1)} dB (${folder})`);
+      expect(db).toBeGreaterThan(40);
+    });
 
   it('is refused in words where the graphics card cannot draw into half floats, or takes no atlas so large', async () => {
     const server = await serve(at('lit.glb'), '--env', at('light.hdr'));

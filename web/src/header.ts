@@ -13,7 +13,13 @@ export interface TransferHeader {
   precision: 'half' | 'single';
   receivers: number;
   bufferView: number;
+  directional: Directional;
 }
+
+/** Rows of a lightmap for the normals of a normal map (docs/lightmaps.md). */
+export const directionalRows = { none: 1, 'sh:2': 4, 'sh:3': 9, hl2: 3, vector: 3 } as const;
+export type Directional = keyof typeof directionalRows;
+const isDirectional = (value: unknown): value is Directional => typeof value === 'string' && Object.hasOwn(directionalRows, value);
 
 /** What every kind has in its header; refuses by name what this version does not draw. */
 export function readHeader({ transfer, surface, view }: TransferExtension, surfaceKind: 'vertices' | 'texels' = 'vertices'): TransferHeader {
@@ -26,8 +32,8 @@ export function readHeader({ transfer, surface, view }: TransferExtension, surfa
     throw new LambentError("holds the light of the scene's own lamps at vertices, where this version draws it over an atlas; \"lambent render\" draws it");
   if (view !== undefined) throw new LambentError('holds a fixed view (--fix-view), a picture and no surfaces; "lambent render" draws it');
   if (cpca !== undefined) throw new LambentError('holds clusters (--compress cpca), which this version does not draw; "lambent render" does');
-  if (directional !== undefined)
-    throw new LambentError(`holds a directional lightmap ("${text(directional)}"), which this version does not draw; "lambent render" does`);
+  if (directional !== undefined && (surfaceKind === 'vertices' || !isDirectional(directional)))
+    throw new LambentError(`holds directional light ("${text(directional)}"), which this version does not draw ${isDirectional(directional) ? 'but over an atlas' : 'at all'}; "lambent render" does`);
   if (where !== surfaceKind)
     throw new LambentError(`holds transfer over ${where}, where this version draws vertices and, for diffuse transfer, texels; "lambent render" draws it`);
   if (precision !== 'half' && precision !== 'single') throw new LambentError('"precision" must be half or single');
@@ -35,7 +41,7 @@ export function readHeader({ transfer, surface, view }: TransferExtension, surfa
   if (channels !== 1 && channels !== 3) throw new LambentError('"channels" is out of range');
   if (!isIndex(receivers, noReceiver - 1) || receivers < 1) throw new LambentError('"receivers" is out of range');
   if (!isIndex(bufferView)) throw new LambentError('"bufferView" is missing');
-  return { order, channels, precision, receivers, bufferView };
+  return { order, channels, precision, receivers, bufferView, directional: isDirectional(directional) ? directional : 'none' };
 }
 
 /** `count` of u32, all of them receivers or none; `message` where there are not so many. */

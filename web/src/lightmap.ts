@@ -1,13 +1,16 @@
 // Diffuse transfer over the texels of an atlas (docs/lightmaps.md): columns of harmonics, then of the scene's own lamps. Light is summed
-// once into a half-float picture of the atlas, on the graphics card, when it changes; pixels look that up bilinearly.
+// once into a half-float picture of the atlas, on the graphics card, when it changes; pixels look that up bilinearly. Directional lightmaps have
+// several rows, one below the other, which pixels evaluate for the normal of the scene's normal map.
 import {
-  Color, DataTexture, Float32BufferAttribute, LinearFilter, MeshBasicMaterial, NearestFilter, RedIntegerFormat, UnsignedIntType, type DataArrayTexture, type Material,
-  type Mesh, type MeshStandardMaterial, type WebGLProgramParametersWithUniforms, type WebGLRenderer,
+  Color, DataTexture, Float32BufferAttribute, LinearFilter, MeshBasicMaterial, NearestFilter, RedIntegerFormat, UnsignedIntType, type BufferAttribute, type BufferGeometry,
+  type DataArrayTexture, type InterleavedBufferAttribute, type Material, type Mesh, type MeshStandardMaterial, type Texture, type WebGLProgramParametersWithUniforms,
+  type WebGLRenderer,
 } from 'three';
 import { blockTexture, packBlocks, type BlockLayout } from './block_texture.js';
 import { LambentError } from './errors.js';
 import { isIndex } from './glb.js';
-import { readHeader, readReceivers, shareGeometry, type TransferHeader } from './header.js';
+import { glslHarmonics } from './glsl_harmonics.js';
+import { directionalRows, readHeader, readReceivers, shareGeometry, type Directional, type TransferHeader } from './header.js';
 import type { BakedTransfer, TransferSource } from './kinds.js';
 import type { Lighting } from './lighting.js';
 import { LightSum, maxColumns } from './light_sum.js';
@@ -23,33 +26,184 @@ varying vec2 vPrtFront;
   attribute vec2 lambentPlaceBack;
   varying vec2 vPrtBack;
 #endif
+#ifdef PRT_DIRECTIONAL
+  varying vec3 vPrtNormal, vPrtPosition;
+#endif
+#ifdef PRT_NORMAL_MAP
+  attribute vec2 lambentNormalPlace;
+  varying vec2 vPrtNormalPlace;
+  uniform mat3 prtNormalTransform;
+  #ifdef PRT_TANGENTS
+    attribute vec4 lambentTangent;
+    varying vec4 vPrtTangent;
+  #endif
+#endif
+#ifdef PRT_EMISSIVE_MAP
+  attribute vec2 lambentEmissivePlace;
+  varying vec2 vPrtEmissivePlace;
+  uniform mat3 prtEmissiveTransform;
+#endif
 `;
 const vertexBody = /* glsl */ `
   vPrtFront = lambentPlace;
   #ifdef PRT_TWO_SIDED
     vPrtBack = lambentPlaceBack;
   #endif
+  #ifdef PRT_DIRECTIONAL
+    vPrtNormal = transpose( inverse( mat3( modelMatrix ) ) ) * normal;
+    vPrtPosition = ( modelMatrix * vec4( position, 1.0 ) ).xyz;
+  #endif
+  #ifdef PRT_NORMAL_MAP
+    vPrtNormalPlace = ( prtNormalTransform * vec3( lambentNormalPlace, 1.0 ) ).xy;
+    #ifdef PRT_TANGENTS
+      vPrtTangent = vec4( mat3( modelMatrix ) * lambentTangent.xyz, lambentTangent.w );
+    #endif
+  #endif
+  #ifdef PRT_EMISSIVE_MAP
+    vPrtEmissivePlace = ( prtEmissiveTransform * vec3( lambentEmissivePlace, 1.0 ) ).xy;
+  #endif
 `;
-const fragmentDeclarations = /* glsl */ `
+/** E(n) / pi of the rows at a pixel, n the bent normal and N the surface's own, on the side that is seen (transfer/directional.cpp). */
+const evaluations: Record<Directional, string> = {
+  none: 'return prtRowAt( place, 0 );',
+  'sh:2': '', 'sh:3': '', // below
+  vector: 'return max( n.x * prtRowAt( place, 0 ) + n.y * prtRowAt( place, 1 ) + n.z * prtRowAt( place, 2 ), vec3( 0.0 ) );',
+  hl2: `
+  // Half-Life 2's directions in the frame about the surface's normal (frame_about of core/vec.h).
+  float side = N.z < 0.0 ? - 1.0 : 1.0, a = - 1.0 / ( side + N.z ), b = N.x * N.y * a;
+  mat3 frame = mat3( vec3( 1.0 + side * N.x * N.x * a, side * b, - side * N.x ), vec3( b, side + N.y * N.y * a, - N.y ), N );
+  vec3 cosines = max( n * ( frame * mat3( - 0.40824829, - 0.70710678, 0.57735027, - 0.40824829, 0.70710678, 0.57735027, 0.81649658, 0.0, 0.57735027 ) ), vec3( 0.0 ) );
+  vec3 w = cosines * cosines;
+  float total = w.x + w.y + w.z;
+  return total > 0.0 ? ( w.x * prtRowAt( place, 0 ) + w.y * prtRowAt( place, 1 ) + w.z * prtRowAt( place, 2 ) ) / total : vec3( 0.0 );`,
+};
+const evaluation = (kind: Directional): string =>
+  kind !== 'sh:2' && kind !== 'sh:3' ? evaluations[kind]
+    : `vec3 sum = vec3( 0.0 );\n  ${glslHarmonics(Number(kind[3]), (i, y) => `sum += ( ${y} ) * prtRowAt( place, ${i} );`)}\n  return max( sum, vec3( 0.0 ) );`;
+
+const fragmentDeclarations = (kind: Directional): string => /* glsl */ `
 uniform highp sampler2D prtAtlas;
 uniform vec3 prtEmission;
 varying vec2 vPrtFront;
 #ifdef PRT_TWO_SIDED
   varying vec2 vPrtBack;
 #endif
+#ifdef PRT_DIRECTIONAL
+  varying vec3 vPrtNormal, vPrtPosition;
+#endif
+#ifdef PRT_NORMAL_MAP
+  uniform sampler2D prtNormalMap;
+  uniform float prtNormalScale;
+  varying vec2 vPrtNormalPlace;
+  #ifdef PRT_TANGENTS
+    varying vec4 vPrtTangent;
+  #endif
+#endif
+#ifdef PRT_EMISSIVE_MAP
+  uniform sampler2D prtEmissiveMap;
+  varying vec2 vPrtEmissivePlace;
+#endif
+// Rows lie below each other.
+vec3 prtRowAt( const in vec2 place, const in int row ) {
+  vec2 size = vec2( textureSize( prtAtlas, 0 ) );
+  return texture( prtAtlas, ( place + vec2( 0.0, size.y / float( PRT_ATLAS_ROWS ) * float( row ) ) ) / size ).rgb;
+}
+#ifdef PRT_DIRECTIONAL
+  vec3 prtEvaluate( const in vec2 place, const in vec3 N, const in vec3 n ) {
+    ${evaluation(kind)}
+  }
+  // The part of v that is square to n, as a unit vector; zero where v is nearly along n.
+  vec3 prtSquareTo( const in vec3 v, const in vec3 n ) {
+    float size = length( v );
+    if ( ! ( size > 0.0 ) ) return vec3( 0.0 );
+    vec3 t = v / size - n * dot( v / size, n );
+    return length( t ) > 0.01 ? normalize( t ) : vec3( 0.0 );
+  }
+#endif
 vec3 prtExitRadiance() {
   vec2 place = vPrtFront;
   #ifdef PRT_TWO_SIDED
     if ( ! gl_FrontFacing ) place = vPrtBack;
   #endif
-  return texture( prtAtlas, place / vec2( textureSize( prtAtlas, 0 ) ) ).rgb;
+  #ifndef PRT_DIRECTIONAL
+    return prtRowAt( place, 0 );
+  #else
+    // Of the front: the normal, turned to its face's side, and what the normal map makes of it (scene/reflection.cpp).
+    vec3 px = dFdx( vPrtPosition ), py = dFdy( vPrtPosition ), n = normalize( vPrtNormal );
+    float side = gl_FrontFacing ? 1.0 : - 1.0;
+    if ( side * dot( n, cross( px, py ) ) < 0.0 ) n = - n;
+    vec3 bent = n;
+    #ifdef PRT_NORMAL_MAP
+      vec4 along = vec4( 0.0 );
+      #ifdef PRT_TANGENTS
+        along = vPrtTangent;
+      #endif
+      vec3 t = prtSquareTo( along.xyz, n );
+      if ( t == vec3( 0.0 ) || along.w == 0.0 ) {
+        vec2 ux = dFdx( vPrtNormalPlace ), uy = dFdy( vPrtNormalPlace );
+        float area = ux.x * uy.y - ux.y * uy.x;
+        along = vec4( ( px * uy.y - py * ux.y ) * sign( area ), side * area < 0.0 ? 1.0 : - 1.0 );
+        t = prtSquareTo( along.xyz, n );
+      }
+      if ( t != vec3( 0.0 ) ) {
+        vec3 texel = ( 2.0 * texture( prtNormalMap, vPrtNormalPlace ).xyz - 1.0 ) * vec3( prtNormalScale, prtNormalScale, 1.0 );
+        bent = normalize( t * texel.x + cross( n, t ) * ( along.w > 0.0 ? texel.y : - texel.y ) + n * texel.z );
+      }
+    #endif
+    return prtEvaluate( place, side * n, side * bent );
+  #endif
+}
+vec3 prtEmitted() {
+  #ifdef PRT_EMISSIVE_MAP
+    return prtEmission * texture( prtEmissiveMap, vPrtEmissivePlace ).rgb;
+  #else
+    return prtEmission;
+  #endif
 }
 `;
 
+/** A texture of the scene's own material, with the coordinates that it reads. */
+interface Placed {
+  texture: Texture;
+  place: BufferAttribute | InterleavedBufferAttribute;
+}
+function placed(texture: Texture | null | undefined, geometry: BufferGeometry): Placed | undefined {
+  const place = texture && geometry.getAttribute(texture.channel > 0 ? `uv${texture.channel}` : 'uv');
+  if (!place) return undefined;
+  texture.updateMatrix();
+  return { texture, place };
+}
+
+/** What a part's surface adds to its lightmap. */
+interface Surface {
+  twoSided: boolean;
+  emission: { value: Color };
+  normals?: Placed & { scale: number; tangents: boolean };
+  emissive?: Placed;
+}
+/** Names the attributes that the shader reads, whichever set they are. */
+function readSurface(geometry: BufferGeometry, own: Material & Partial<MeshStandardMaterial>, directional: Directional): Surface {
+  const surface: Surface = { twoSided: geometry.hasAttribute('lambentPlaceBack'), emission: { value: new Color(0, 0, 0) } };
+  const normals = directional === 'none' ? undefined : placed(own.normalMap, geometry), emissive = placed(own.emissiveMap, geometry);
+  if (normals) {
+    geometry.setAttribute('lambentNormalPlace', normals.place);
+    const tangents = geometry.hasAttribute('tangent');
+    if (tangents) geometry.setAttribute('lambentTangent', geometry.getAttribute('tangent'));
+    surface.normals = { ...normals, scale: own.normalScale?.x ?? 1, tangents };
+  }
+  if (emissive) geometry.setAttribute('lambentEmissivePlace', emissive.place), (surface.emissive = emissive);
+  return surface;
+}
+
 class LightmapMaterial extends MeshBasicMaterial {
-  constructor(readonly atlas: LightSum, twoSided: boolean, readonly emission: { value: Color }, source: Material, readonly gain?: { value: number }) {
+  constructor(readonly atlas: LightSum, readonly directional: Directional, readonly surface: Surface, source: Material, readonly gain?: { value: number }) {
     super(gain ? { side: source.side } : diffuseParameters(source));
-    this.defines = { ...(twoSided && { PRT_TWO_SIDED: '' }), ...(gain && { PRT_FALSE_COLOR: '' }) };
+    const { twoSided, normals, emissive } = surface;
+    this.defines = {
+      PRT_ATLAS_ROWS: directionalRows[directional], ...(twoSided && { PRT_TWO_SIDED: '' }), ...(gain && { PRT_FALSE_COLOR: '' }),
+      ...(directional !== 'none' && { PRT_DIRECTIONAL: '' }), ...(normals && { PRT_NORMAL_MAP: '' }), ...(normals?.tangents && { PRT_TANGENTS: '' }),
+      ...(emissive && { PRT_EMISSIVE_MAP: '' }),
+    };
     if (gain) this.toneMapped = false;
   }
 
@@ -58,15 +212,18 @@ class LightmapMaterial extends MeshBasicMaterial {
   }
 
   override onBeforeCompile(shader: WebGLProgramParametersWithUniforms): void {
-    Object.assign(shader.uniforms, { prtAtlas: { value: this.atlas.target.texture }, prtEmission: this.emission }, this.gain && { prtGain: this.gain });
+    const { emission, normals, emissive } = this.surface;
+    Object.assign(shader.uniforms, { prtAtlas: { value: this.atlas.target.texture }, prtEmission: emission }, this.gain && { prtGain: this.gain },
+      normals && { prtNormalMap: { value: normals.texture }, prtNormalScale: { value: normals.scale }, prtNormalTransform: { value: normals.texture.matrix } },
+      emissive && { prtEmissiveMap: { value: emissive.texture }, prtEmissiveTransform: { value: emissive.texture.matrix } });
     shader.vertexShader = vertexDeclarations + replaceOnce(shader.vertexShader, '#include <fog_vertex>', '#include <fog_vertex>' + vertexBody);
-    shader.fragmentShader = useExitRadiance(shader.fragmentShader, fragmentDeclarations, this.gain !== undefined);
+    shader.fragmentShader = useExitRadiance(shader.fragmentShader, fragmentDeclarations(this.directional), this.gain !== undefined);
     if (!this.gain)
-      shader.fragmentShader = replaceOnce(shader.fragmentShader, '#include <opaque_fragment>', 'outgoingLight += prtEmission;\n#include <opaque_fragment>');
+      shader.fragmentShader = replaceOnce(shader.fragmentShader, '#include <opaque_fragment>', 'outgoingLight += prtEmitted();\n#include <opaque_fragment>');
   }
 
   override customProgramCacheKey(): string {
-    return 'lambent lightmap'; // the rest is in the defines
+    return `lambent lightmap ${this.directional}`; // the rest is in the defines
   }
 }
 
@@ -78,6 +235,7 @@ class LightmapTransfer implements BakedTransfer {
   readonly fileBytes: number;
   readonly gpuBytes: number;
   readonly lamps = new Map<string, Color>();
+  private readonly directional: Directional;
   private readonly layout: BlockLayout;
   private readonly transfer: DataArrayTexture;
   private readonly atlas: LightSum;
@@ -88,35 +246,36 @@ class LightmapTransfer implements BakedTransfer {
   constructor(header: TransferHeader, groups: string[], values: ArrayBuffer, private readonly receiversOf: DataTexture, readonly meshes: Mesh[], owns: Material[]) {
     this.order = header.order, this.channels = header.channels, this.receivers = header.receivers, this.fileBytes = values.byteLength;
     for (const name of groups) this.lamps.set(name, new Color(1, 1, 1));
-    const { layout, data } = packBlocks({ ...header, count: shCount(header.order) + groups.length }, values);
+    this.directional = header.directional;
+    const count = shCount(header.order) + groups.length, rows = directionalRows[header.directional];
+    const { layout, data } = packBlocks({ ...header, count, channels: rows * header.channels }, values);
     this.layout = layout, this.transfer = blockTexture(layout, data);
     this.atlas = this.makeAtlas();
     const { width, height } = receiversOf.image;
-    let gpuBytes = data.byteLength + 12 * width * height;
+    let gpuBytes = data.byteLength + this.atlas.bytes + 4 * width * height;
     meshes.forEach((mesh, i) => {
-      const own = owns[i]! as Material & Partial<MeshStandardMaterial>, twoSided = mesh.geometry.hasAttribute('lambentPlaceBack');
-      const emission = { value: new Color(0, 0, 0) };
-      if (own.emissive) this.glow.push({ emission, own: own.emissive.clone().multiplyScalar(own.emissiveIntensity ?? 1), lamp: own.name });
-      const material = new LightmapMaterial(this.atlas, twoSided, emission, own);
+      const own = owns[i]! as Material & Partial<MeshStandardMaterial>, surface = readSurface(mesh.geometry, own, header.directional);
+      if (own.emissive) this.glow.push({ emission: surface.emission, own: own.emissive.clone().multiplyScalar(own.emissiveIntensity ?? 1), lamp: own.name });
+      const material = new LightmapMaterial(this.atlas, header.directional, surface, own);
       material.vertexColors = mesh.geometry.hasAttribute('color');
       this.materials.push(material);
       mesh.material = material;
-      gpuBytes += mesh.geometry.getAttribute('position').count * (twoSided ? 16 : 8);
+      gpuBytes += mesh.geometry.getAttribute('position').count * (surface.twoSided ? 16 : 8);
     });
     this.gpuBytes = gpuBytes;
   }
 
   /** Exit radiance of white at every texel, under one light. */
   private makeAtlas(): LightSum {
-    const { width, height } = this.receiversOf.image;
+    const { width, height } = this.receiversOf.image, rows = directionalRows[this.directional];
     return new LightSum({
-      layout: this.layout, channels: this.channels, transfer: this.transfer, width, height, filter: LinearFilter, uniforms: { prtReceivers: { value: this.receiversOf } },
+      layout: this.layout, channels: this.channels, transfer: this.transfer, width, height: rows * height, filter: LinearFilter, uniforms: { prtReceivers: { value: this.receiversOf } },
       what: { size: 'has an atlas', use: 'is a lightmap' },
       pick: `
 uniform highp usampler2D prtReceivers;
 uint prtPick( const in ivec2 texel, out int row ) {
-  row = 0;
-  return texelFetch( prtReceivers, texel, 0 ).r;
+  row = texel.y / ${height};
+  return texelFetch( prtReceivers, ivec2( texel.x, texel.y % ${height} ), 0 ).r;
 }`,
     });
   }
@@ -141,8 +300,8 @@ uint prtPick( const in ivec2 texel, out int row ) {
     const atlas = this.makeAtlas();
     atlas.set(new Float64Array(3 * (shCount(this.order) + this.lamps.size)).fill(1, 3 * index, 3 * index + 3));
     this.ofCoefficients.add(atlas);
-    const made = this.meshes.map((mesh, i) =>
-      new LightmapMaterial(atlas, mesh.geometry.hasAttribute('lambentPlaceBack'), { value: new Color(0, 0, 0) }, this.materials[i]!, gain));
+    const made = this.meshes.map((_, i) =>
+      new LightmapMaterial(atlas, this.directional, { ...this.materials[i]!.surface, emission: { value: new Color(0, 0, 0) } }, this.materials[i]!, gain));
     let left = made.length;
     for (const material of made)
       material.addEventListener('dispose', () => {
