@@ -200,9 +200,9 @@ for picture in map_three.exr map_godot.exr sh2_godot.0.exr sh2_three.0.exr; do [
 expect 2 'no group' render map.glb $view --lamp chandelier=1,1,1 -o x.png
 expect 0 'applications' bake box.obj --transfer lightmap --atlas 64x48 --samples 64 --bounces converge:1e-3 --solver southwell --direct separate --json -o map2.glb
 for picture in map2.direct.exr map2.indirect.exr; do [ -s $picture ] && ok || bad "$picture is missing"; done
-expect 0 'gmres' bench solvers --samples 64
-expect 0 '"residual"' bench solvers box.obj --receivers texels --atlas 64x64 --samples 64 --json
-expect 0 'not reached' bench solvers --samples 16 --most 1
+expect 0 'gmres' bench solvers --samples 8 --residual 0.3 --plot-residual 0.2
+expect 0 '"residual"' bench solvers box.obj --receivers texels --atlas 48x48 --samples 16 --residual 0.1 --plot-residual 0.01 --json
+expect 0 'not reached' bench solvers box.obj --samples 16 --most 1
 expect 1 'nothing gives light' bench solvers corner.obj
 expect 2 'subcommand' bench
 expect 2 'residual' bench solvers --residual 0
