@@ -394,9 +394,11 @@ Vec3 shade_blocks_with(Scratch& s, const BlockLight& light, const Visibility& vi
       }
       evaluate_terms(t, x, y, z, 16, s.nodes, 16);
       if (clear) {
-        for (size_t i = 0; i < each; ++i) {
-          const Vec3 at_node = contract(cardinal + i * sum_width, n);
-          for (int k = 0; k < t.count; ++k) sums[k + 1] += s.nodes[16 * k + int(i)] * at_node;
+        for (int k = 0; k < t.count; ++k) {
+          float m[sum_width] = {};
+          for (size_t i = 0; i < each; ++i)
+            for (size_t l = 0; l < sum_width; ++l) m[l] += s.nodes[16 * size_t(k) + i] * cardinal[i * sum_width + l];
+          sums[k + 1] += contract(m, n);
         }
       } else {
         const uint32_t rows = rows_seen(changes);
