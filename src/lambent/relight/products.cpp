@@ -91,25 +91,68 @@ void EvaluateTerms(const Terms& b, const float* x, const float* y, const float* 
   }
 }
 
-// For one block, [direction x, y, z, energy r, g, b][256]: adds the irradiance weighted by `weight` (null: 1) to sums[0], and that times s_k to
-// sums[1 + k]. terms is [k][256].
-void IntegrateTexels(const float* light, const float* weight, Vec3 n, const float* terms, int count, Vec3* sums) {
+// For one block, [direction x, y, z, energy r, g, b][256]: adds the irradiance weighted by `weight` to sums[0] if `plain`, and that
+// times s_k to sums[1 + k]. terms is [k][256]. Only texels of `rows` are looked at.
+template <int count, bool plain, bool weighted>
+void IntegrateRows(const float* light, const float* weight, Vec3 n, const float* terms, uint32_t rows, Vec3* sums) {
   const F d;
-  decltype(hn::Zero(d)) acc[4][3];
-  for (auto& row : acc)
-    for (auto& a : row) a = hn::Zero(d);
-  for (size_t i = 0; i < block_texels; i += hn::Lanes(d)) {
-    auto cosine = hn::MulAdd(hn::Set(d, n.x), hn::Load(d, light + i), hn::MulAdd(hn::Set(d, n.y), hn::Load(d, light + 256 + i), hn::Mul(hn::Set(d, n.z), hn::Load(d, light + 512 + i))));
-    if (weight) cosine = hn::Mul(cosine, hn::Load(d, weight + i));
-    const auto r = hn::Load(d, light + 768 + i), g = hn::Load(d, light + 1024 + i), b = hn::Load(d, light + 1280 + i);
-    acc[0][0] = hn::MulAdd(cosine, r, acc[0][0]), acc[0][1] = hn::MulAdd(cosine, g, acc[0][1]), acc[0][2] = hn::MulAdd(cosine, b, acc[0][2]);
+  // The plain sum comes last, so that no accumulator is unused without it.
+  constexpr int kinds = count + plain;
+  if constexpr (kinds > 0) {
+    decltype(hn::Zero(d)) acc[kinds][3];
+    for (auto& row : acc)
+      for (auto& a : row) a = hn::Zero(d);
+    const auto nx = hn::Set(d, n.x), ny = hn::Set(d, n.y), nz = hn::Set(d, n.z);
+    for (; rows; rows &= rows - 1) {
+      const size_t begin = size_t(std::countr_zero(rows)) * block_side;
+      for (size_t i = begin; i < begin + block_side; i += hn::Lanes(d)) {
+        const float* l = light + i;
+        auto cosine = hn::MulAdd(nx, hn::Load(d, l), hn::MulAdd(ny, hn::Load(d, l + 256), hn::Mul(nz, hn::Load(d, l + 512))));
+        if constexpr (weighted) cosine = hn::Mul(cosine, hn::Load(d, weight + i));
+        const auto r = hn::Load(d, l + 768), g = hn::Load(d, l + 1024), b = hn::Load(d, l + 1280);
+        for (int k = 0; k < kinds; ++k) {
+          const auto f = k < count ? hn::Mul(cosine, hn::Load(d, terms + 256 * k + i)) : cosine;
+          acc[k][0] = hn::MulAdd(f, r, acc[k][0]), acc[k][1] = hn::MulAdd(f, g, acc[k][1]), acc[k][2] = hn::MulAdd(f, b, acc[k][2]);
+        }
+      }
+    }
+    for (int k = 0; k < kinds; ++k)
+      for (int c = 0; c < 3; ++c) sums[k < count ? k + 1 : 0][c] += hn::GetLane(hn::SumOfLanes(d, acc[k][c]));
+  }
+}
+
+template <int count>
+void IntegrateCount(const float* light, const float* weight, Vec3 n, const float* terms, bool plain, uint32_t rows, Vec3* sums) {
+  if (plain && weight) IntegrateRows<count, true, true>(light, weight, n, terms, rows, sums);
+  else if (plain) IntegrateRows<count, true, false>(light, weight, n, terms, rows, sums);
+  else if (weight) IntegrateRows<count, false, true>(light, weight, n, terms, rows, sums);
+  else IntegrateRows<count, false, false>(light, weight, n, terms, rows, sums);
+}
+
+// `weight` null: 1.
+void IntegrateTexels(const float* light, const float* weight, Vec3 n, const float* terms, int count, bool plain, uint32_t rows, Vec3* sums) {
+  if (count == 0) IntegrateCount<0>(light, weight, n, terms, plain, rows, sums);
+  else if (count == 1) IntegrateCount<1>(light, weight, n, terms, plain, rows, sums);
+  else if (count == 2) IntegrateCount<2>(light, weight, n, terms, plain, rows, sums);
+  else IntegrateCount<3>(light, weight, n, terms, plain, rows, sums);
+}
+
+// s_k at the texels of `rows` from its values at side x side nodes, [k][16]; out is [k][256].
+void InterpolateTerms(const float* nodes, const float* cardinal, int side, int count, uint32_t rows, float* out) {
+  const F d;
+  for (; rows; rows &= rows - 1) {
+    const int row = std::countr_zero(rows);
     for (int k = 0; k < count; ++k) {
-      const auto f = hn::Mul(cosine, hn::Load(d, terms + 256 * k + i));
-      acc[k + 1][0] = hn::MulAdd(f, r, acc[k + 1][0]), acc[k + 1][1] = hn::MulAdd(f, g, acc[k + 1][1]), acc[k + 1][2] = hn::MulAdd(f, b, acc[k + 1][2]);
+      float along[4] = {};
+      for (int j = 0; j < side; ++j)
+        for (int i = 0; i < side; ++i) along[i] += nodes[16 * k + j * side + i] * cardinal[j * block_side + row];
+      for (int x = 0; x < block_side; x += int(hn::Lanes(d))) {
+        auto value = hn::Mul(hn::Set(d, along[0]), hn::LoadU(d, cardinal + x));
+        for (int i = 1; i < side; ++i) value = hn::MulAdd(hn::Set(d, along[i]), hn::LoadU(d, cardinal + i * block_side + x), value);
+        hn::Store(value, d, out + 256 * k + block_side * row + x);
+      }
     }
   }
-  for (int k = 0; k <= count; ++k)
-    for (int c = 0; c < 3; ++c) sums[k][c] += hn::GetLane(hn::SumOfLanes(d, acc[k][c]));
 }
 
 // eq. 6 and line 9: light summed over what is seen of a block, 12 numbers.
@@ -138,6 +181,7 @@ namespace lambent {
 
 HWY_EXPORT(EvaluateTerms);
 HWY_EXPORT(IntegrateTexels);
+HWY_EXPORT(InterpolateTerms);
 HWY_EXPORT(SumSeen);
 
 namespace {
@@ -231,8 +275,28 @@ struct Scratch {
   AlignedVector<float> middles;
 };
 
-// s_k at a block's own directions of light.
-void evaluate_block(const Terms& t, const float* light, float* out) { evaluate_terms(t, light, light + 256, light + 512, block_texels, out, block_texels); }
+constexpr uint32_t all_rows = (1u << block_side) - 1;
+
+// Rows of a block, a bit each, of which anything is seen.
+uint32_t rows_seen(const BlockChanges& c) {
+  uint32_t rows = 0;
+  for (int i = 0; i < c.count; ++i) {
+    if (c.level_after(i) == 0) continue;
+    const int first = c.where[i] / block_side, last = ((i + 1 < c.count ? c.where[i + 1] : block_texels) - 1) / block_side;
+    rows |= (2u << last) - (1u << first);
+  }
+  return rows;
+}
+
+// s_k at a block's own directions of light, in `rows`.
+void evaluate_block(const Terms& t, const float* light, uint32_t rows, float* out) {
+  while (rows) {
+    const int first = std::countr_zero(rows), count = std::countr_one(rows >> first);
+    const float* l = light + first * block_side;
+    evaluate_terms(t, l, l + 256, l + 512, size_t(count) * block_side, out + first * block_side, block_texels);
+    rows &= ~(((1u << count) - 1) << first);
+  }
+}
 
 void expand(const BlockChanges& c, float scale, float* weights) {
   int t = 0;
@@ -300,6 +364,11 @@ Vec3 shade_blocks_with(Scratch& s, const BlockLight& light, const Visibility& vi
     if (!clear) HWY_DYNAMIC_DISPATCH(SumSeen)(light.sums.data() + b * block_texels * sum_width, changes, scale, s.sum);
     const Vec3 seen = contract(clear ? coarse : s.sum, n);
     sums[0] += seen;
+    const float* texels = light.texels.data() + b * 6 * block_texels;
+    auto integrate = [&](uint32_t rows) {
+      if (!clear) expand(changes, scale, s.weights);
+      HWY_DYNAMIC_DISPATCH(IntegrateTexels)(texels, clear ? nullptr : s.weights, n, s.terms, t.count, false, rows, sums);
+    };
     int samples = 0;
     if (t.count > 0) {
       samples = sample_class(material, glm::dot(t.mirror, cube.nodes[0].at(b)));
@@ -309,7 +378,8 @@ Vec3 shade_blocks_with(Scratch& s, const BlockLight& light, const Visibility& vi
       }
       // Samples below the horizon say nothing about the block's part above it.
       if (!clear && t.kind != Terms::Kind::phong && samples == 1 && glm::dot(n, cube.nodes[0].at(b)) <= 0) samples = 4;
-      if (!clear && samples > 1) samples = 4;
+      // Nor do nodes below it, where the model's values break off.
+      if (!clear && t.kind != Terms::Kind::phong && samples > 1 && glm::dot(n, cube.nodes[0].at(b)) < std::sin(cube.reach[b])) samples = 4;
     }
     if (samples == 1) {
       for (int k = 0; k < t.count; ++k) sums[k + 1] += s.middles[size_t(k) * stride + b] * seen;
@@ -323,17 +393,23 @@ Vec3 shade_blocks_with(Scratch& s, const BlockLight& light, const Visibility& vi
         x[i] = nodes.x[j], y[i] = nodes.y[j], z[i] = nodes.z[j];
       }
       evaluate_terms(t, x, y, z, 16, s.nodes, 16);
-      for (size_t i = 0; i < each; ++i) {
-        const Vec3 at_node = contract(cardinal + i * sum_width, n);
-        for (int k = 0; k < t.count; ++k) sums[k + 1] += s.nodes[16 * k + int(i)] * at_node;
+      if (clear) {
+        for (int k = 0; k < t.count; ++k) {
+          float m[sum_width] = {};
+          for (size_t i = 0; i < each; ++i)
+            for (size_t l = 0; l < sum_width; ++l) m[l] += s.nodes[16 * size_t(k) + i] * cardinal[i * sum_width + l];
+          sums[k + 1] += contract(m, n);
+        }
+      } else {
+        const uint32_t rows = rows_seen(changes);
+        const size_t grid = size_t(samples - 1);
+        HWY_DYNAMIC_DISPATCH(InterpolateTerms)(s.nodes, cube.cardinal[grid].data(), node_sides[grid], t.count, rows, s.terms);
+        integrate(rows);
       }
     } else if (samples == 4) {
-      const float* texels = light.texels.data() + b * 6 * block_texels;
-      evaluate_block(t, texels, s.terms);
-      if (!clear) expand(changes, scale, s.weights);
-      Vec3 here[4] = {};
-      HWY_DYNAMIC_DISPATCH(IntegrateTexels)(texels, clear ? nullptr : s.weights, n, s.terms, t.count, here);
-      for (int k = 1; k <= t.count; ++k) sums[k] += here[k];
+      const uint32_t rows = clear ? all_rows : rows_seen(changes);
+      evaluate_block(t, texels, rows, s.terms);
+      integrate(rows);
     }
     ++tally.samples[size_t(std::max(samples, 1) - 1)];
     ++(clear ? tally.light_brdf : samples <= 1 ? tally.light_visibility : tally.triple);
@@ -353,8 +429,9 @@ Vec3 shade_standard_with(Scratch& s, const BlockLight& light, const Visibility& 
     if (sight == BlockSight::blocked) continue;
     if (sight == BlockSight::mixed) expand(reader.next(), scale, s.weights);
     const float* texels = light.texels.data() + size_t(b) * 6 * block_texels;
-    evaluate_block(t, texels, s.terms);
-    HWY_DYNAMIC_DISPATCH(IntegrateTexels)(texels, sight == BlockSight::clear ? nullptr : s.weights, frame[2], s.terms, t.count, sums);
+    evaluate_block(t, texels, all_rows, s.terms);
+    const float* weights = sight == BlockSight::clear ? nullptr : s.weights;
+    HWY_DYNAMIC_DISPATCH(IntegrateTexels)(texels, weights, frame[2], s.terms, t.count, true, all_rows, sums);
   }
   return total(t, sums);
 }
