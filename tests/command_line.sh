@@ -239,6 +239,24 @@ expect 0 'paths' reference corner.obj --env uniform:1 --deform twist:50 --size 1
 expect 0 'membrane' bake corner.obj --membrane 0.4 -o membrane.glb
 expect 0 'RMS' patch sky.png --size 8 --samples 64 --lobes 3 -o relief.lpt
 expect 0 'texels' render corner.obj --transfer-texture relief.lpt --tile 2,2 --env sky:elevation=40 --size 24x24 -o relief.png
+expect 0 'events' bake corner.obj --subsurface marble:2 --samples 16 -o through.glb
+expect 0 'lost' bake corner.obj --subsurface sigma_s=0,sigma_a=0 --samples 16 -o through.glb
+expect 0 'lobes' bake corner.obj --subsurface sigma_s=3,2,1,sigma_a=0.1,g=0.5,eta=1.3 --transfer zonal --lobes 3 --samples 16 -o through.glb
+expect 0 'RMS' patch sky.png --size 8 --samples 64 --lobes 3 --subsurface skin:5 -o skin.lpt
+expect 0 'texels' render corner.obj --transfer-texture skin.lpt --env sky:elevation=40 --size 24x24 -o skin.png
+printf 'v 0 0 0\nv 1 0 0\nv 1 1 0\nv 0 1 0\nv 0.5 0.5 0.3\nf 1 2 5\nf 2 3 5\nf 3 4 5\nf 4 1 5\n' >pyramid.obj
+expect 0 'RMS' patch pyramid.obj --size 8 --samples 64 --lobes 3 -o pyramid.lpt
+expect 0 'RMS' patch pyramid.obj --size 8 --samples 16 --subsurface sigma_s=9,8,7,sigma_a=1 -o wax.lpt
+printf 'v 0 0 0\nv 1 0 0\nv 0 2 0\nf 1 2 3\n' >oblong.obj
+expect 1 'as wide as' patch oblong.obj -o x.lpt
+expect 2 'depth' patch pyramid.obj --depth 0.2 -o x.lpt
+expect 2 'subsurface' bake corner.obj --subsurface jelly -o x.glb
+expect 2 'sigma_a' bake corner.obj --subsurface sigma_s=1 -o x.glb
+expect 2 'subsurface' bake corner.obj --subsurface marble --transfer matrix -o x.glb
+expect 2 'subsurface' bake corner.obj --subsurface marble --shadows off -o x.glb
+expect 2 'subsurface' patch sky.png --subsurface marble --albedo 0.2 -o x.lpt
+expect 2 'subsurface' patch sky.png --subsurface sigma_s=nan,sigma_a=1 -o x.lpt
+absent x.lpt
 expect 1 'no animation|not glTF' render corner.glb --env uniform:1 --animation walk -o x.png
 expect 1 'no animation|not glTF' reference corner.obj --env uniform:1 --animation 0 -o x.png
 expect 1 'diffuse transfer' compress lobes.glb --zonal 2 -o x.glb

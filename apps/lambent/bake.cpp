@@ -6,6 +6,7 @@
 #include <lambent/bake/bake.h>
 #include <lambent/bake/lattice.h>
 #include <lambent/bake/materials.h>
+#include <lambent/bake/subsurface.h>
 #include <lambent/bake/unbury.h>
 #include <lambent/baked/baked_file.h>
 #include <lambent/compress/cpca.h>
@@ -33,7 +34,7 @@ struct BakeCommand {
   ZonalFitOptions zonal;
   LatticeOptions lattice;
   std::string lattice_points, lattice_box;
-  std::string light, transfer = "diffuse", membrane, outgoing = "map", simulate = "recursion", fix_light, fix_view,
+  std::string light, transfer = "diffuse", membrane, subsurface, outgoing = "map", simulate = "recursion", fix_light, fix_view,
               size = "512x512", compress, output, shadows = "on", precision = "half", bounces = "3";
   bool factors = false;
   int view_samples = 16;  // rays a pixel of a fixed view
@@ -180,6 +181,13 @@ int run_bake(Context& context, BakeCommand o) {
   if (is_zonal) o.bake.precision = Precision::single;  // it is rounded once, as lobes
   if (auto ok = check_output(o.output, {"glb"}); !ok) return fail(ok.error());
   if (!o.membrane.empty()) return bake_membrane(context, o);
+  SubsurfaceOptions subsurface;
+  SubsurfaceReport walks;
+  if (!o.subsurface.empty()) {
+    auto medium = parse_medium(o.subsurface);
+    if (!medium) return fail({"--subsurface", medium.error().text()});
+    subsurface.medium = *medium;
+  }
   if (is_matrix)
     if (auto ok = parse_outgoing(o.outgoing, o.matrix); !ok) return fail(ok.error());
   auto reflection = load_reflection(o.brdf);
@@ -256,8 +264,10 @@ int run_bake(Context& context, BakeCommand o) {
     if (!baked) return fail(baked.error());
     transfer = std::move(baked->transfer), outgoing = std::move(baked->outgoing);
   } else {
-    transfer = bake(*scene, *tracer, receivers, o.bake, &report, &context.progress);
+    transfer = o.subsurface.empty() ? bake(*scene, *tracer, receivers, o.bake, &report, &context.progress)
+                                    : bake_subsurface(*scene, *tracer, receivers, o.bake, subsurface, &report, &walks, &context.progress);
     if (!transfer) return fail(transfer.error());
+    warn_of_lost_walks(walks);
   }
 
   std::optional<LatticeTransfer> free_space;
@@ -299,6 +309,7 @@ int run_bake(Context& context, BakeCommand o) {
   if (is_matrix)
     provenance["options"].update({{"brdf", o.brdf.brdf}, {"outgoing", o.outgoing}, {"incident_order", o.matrix.incident_order}, {"simulate", o.simulate}, {"factors", o.factors}});
   if (!o.fix_light.empty()) provenance["options"]["fix_light"] = o.fix_light;
+  if (!o.subsurface.empty()) provenance["options"]["subsurface"] = o.subsurface;
   if (view) provenance["options"].update({{"fix_view", o.fix_view}, {"size", o.size}});
   if (free_space) {
     provenance["options"].update({{"lattice", o.lattice_points}, {"lattice_order", o.lattice.order}});
@@ -362,6 +373,7 @@ int run_bake(Context& context, BakeCommand o) {
                           {"working_memory", report.working_memory}};
     if (zonal) result["zonal"] = {{"lobes", zonal->lobes}, {"rms", fit.rms}, {"seconds", fit.seconds}};
     if (clusters) result["cpca"] = {{"clusters", clusters->clusters}, {"rank", clusters->rank}, {"error", cpca_error}, {"seconds", cpca_seconds}};
+    if (!o.subsurface.empty()) result["subsurface"] = {{"events", walks.events}, {"lost", walks.lost}};
     if (view) result["pixels"] = transfer->receivers;
     result["error"] = report.error >= 0 ? nlohmann::json(report.error) : nlohmann::json();
     if (free_space)
@@ -383,6 +395,7 @@ int run_bake(Context& context, BakeCommand o) {
   if (clusters)
     fmt::print("  clusters   {} of rank {}, found in {}, with an error of {:.2f}% RMS\n", clusters->clusters, clusters->rank, human_seconds(cpca_seconds),
                100 * cpca_error);
+  if (!o.subsurface.empty()) fmt::print("  medium     {:.1f} events a walk\n", walks.events);
   if (free_space)
     fmt::print("  lattice    {} points, order {}, {} in {}{}\n", human_count(lattice_report.points), o.lattice.order, human_bytes(double(lattice_report.bytes)),
                human_seconds(lattice_report.seconds),
@@ -412,6 +425,7 @@ void add_bake(CLI::App& app, Run& run) {
   auto* last = c->add_option("--outgoing", o->outgoing, "matrix: rows for the last reflection: map, phong, svd:ROWS, sh:BANDS, hemisphere:BANDS, hsh:BANDS")
                    ->capture_default_str();
   auto* membrane = c->add_option("--membrane", o->membrane, "No simulation: thin sheets that let this share of the light through, 0 to 1, or a picture of it");
+  auto* subsurface = c->add_option("--subsurface", o->subsurface, subsurface_help);
   auto* simulate = c->add_option("--simulate", o->simulate, "matrix: bounces by the recursion over receivers, or by paths (caustics, coarse meshes; noisier)")
                        ->check(CLI::IsMember({"recursion", "paths"}))->capture_default_str();
   auto* factors = c->add_flag("--factors", o->factors, "matrix: keep visibility, light and BRDF as factors; direct light alone, a tenth of the size");
@@ -437,7 +451,7 @@ void add_bake(CLI::App& app, Run& run) {
   auto* box = c->add_option("--lattice-box", o->lattice_box, "X0,Y0,Z0,X1,Y1,Z1: where, if not throughout the scene's box");
   auto* lattice_order = c->add_option("--lattice-order", o->lattice.order, "Bands of the light that arrives there")
                             ->check(CLI::Range(1, max_sh_order))->capture_default_str();
-  c->callback([o, bounces, order, light, lobes, membrane, fixed, view, compress, factors, incident, last, brdf, simulate, points, box, lattice_order, blocks, &run] {
+  c->callback([o, bounces, order, light, lobes, membrane, subsurface, fixed, view, compress, factors, incident, last, brdf, simulate, points, box, lattice_order, blocks, &run] {
     o->order_given = order->count() > 0;
     if (order->count() && light->count()) throw CLI::ValidationError("--order and --light both say how many bands there are: give one");
     if (light->count() && (membrane->count() || (o->transfer != "diffuse" && o->transfer != "matrix")))
@@ -445,6 +459,9 @@ void add_bake(CLI::App& app, Run& run) {
     if (o->shadows == "off" && bounces->count() && o->bounces != "0")
       throw CLI::ValidationError("--shadows off has no bounces: leave --bounces out, or set it to 0");
     if (membrane->count() && o->transfer != "diffuse") throw CLI::ValidationError("--membrane is a transfer of its own: leave --transfer out");
+    if (subsurface->count() && (membrane->count() || points->count() || (o->transfer != "diffuse" && o->transfer != "zonal")))
+      throw CLI::ValidationError("--subsurface is for diffuse and zonal transfer on surfaces");
+    if (subsurface->count() && o->shadows == "off") throw CLI::ValidationError("--subsurface is always baked with shadows");
     if (fixed->count() && (membrane->count() || o->transfer == "zonal")) throw CLI::ValidationError("--fix-light leaves nothing to turn: it is for diffuse and matrix transfer");
     for (const CLI::Option* option : {view, compress})
       if (option->count() && (membrane->count() || (o->transfer != "diffuse" && o->transfer != "matrix")))

@@ -207,4 +207,9 @@ Result<void> check_output(const std::string& path, std::initializer_list<const c
   return {};
 }
 
+void warn_of_lost_walks(const SubsurfaceReport& walks) {
+  if (walks.lost > 0.005)
+    warn(fmt::format("{:.1f}% of the walks through the medium were lost, and their light with them: surfaces are not closed, or the medium is too dense", 100 * walks.lost));
+}
+
 }  // namespace lambent::tool

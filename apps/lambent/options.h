@@ -2,6 +2,7 @@
 // Options that several commands take, in one spelling.
 #include "terminal.h"
 
+#include <lambent/bake/subsurface.h>
 #include <lambent/basis/sh.h>
 #include <lambent/compress/cpca.h>
 #include <lambent/core/camera.h>
@@ -76,5 +77,10 @@ std::string describe_light(const LightBasis& light);
 
 // Before long work: the folder of `path` exists and can be written, and the extension is one of those given.
 Result<void> check_output(const std::string& path, std::initializer_list<const char*> extensions);
+
+// Of --subsurface: what it takes, and a warning where walks came to nothing.
+inline constexpr const char* subsurface_help = "Light through a medium: sigma_s=S,sigma_a=A[,g=G][,eta=E] per unit, S and A one number or R,G,B; or NAME[:MM], a "
+                                               "measured one (marble, skin, wholemilk, ...) where a unit is MM millimetres (1000)";
+void warn_of_lost_walks(const SubsurfaceReport& walks);
 
 }  // namespace lambent::tool

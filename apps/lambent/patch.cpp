@@ -2,9 +2,11 @@
 #include "options.h"
 
 #include <lambent/bake/patch.h>
+#include <lambent/bake/subsurface.h>
 #include <lambent/compress/zonal_fit.h>
 #include <lambent/core/file.h>
 #include <lambent/image/image.h>
+#include <lambent/scene/load.h>
 #include <lambent/transfer/zonal_texture.h>
 
 #include <fmt/format.h>
@@ -13,42 +15,76 @@ namespace lambent::tool {
 namespace {
 
 struct PatchCommand {
-  std::string heights, output, precision = "half";
+  std::string heights, output, precision = "half", subsurface;
   float depth = 0.1f, albedo = 0.5f;
   int size = 128;
   BakeOptions bake;
   ZonalFitOptions zonal;
+
+  bool is_mesh() const {
+    const std::string extension = file_extension(heights);
+    return extension == "glb" || extension == "gltf" || extension == "obj" || extension == "ply";
+  }
 };
 
-int run_patch(Context& context, PatchCommand o) {
-  if (auto ok = check_output(o.output, {"lpt"}); !ok) return fail(ok.error());
+Result<PatchScene> load_height_patch(const PatchCommand& o, double& jump) {
   auto picture = load_image(o.heights);
-  if (!picture) return fail(picture.error());
+  if (!picture) return picture.error();
   // A height is what the file holds: the curve that loading undoes in PNG and JPEG is put back.
   const std::string extension = file_extension(o.heights);
   const bool encoded = extension == "png" || extension == "jpg" || extension == "jpeg";
   std::vector<float> values;
   for (Vec3 p : picture->rgb) values.push_back(encoded ? srgb_encode(luminance(p)) : luminance(p));
   auto field = make_height_field(values, picture->width, picture->height, o.size, o.depth);
-  if (!field) return fail({o.heights, field.error().text()});
-  const double jump = seam_jump(*field);
-  if (jump > 3) warn(fmt::format("{}: does not tile: it jumps {:.1f} times as far from one repetition to the next as inside", o.heights, jump));
+  if (!field) return Error{o.heights, field.error().text()};
+  jump = seam_jump(*field);
+  return make_patch(*field, o.subsurface.empty() ? Vec3(o.albedo) : Vec3(1));
+}
 
-  const PatchScene patch = make_patch(*field, Vec3(o.albedo));
+Result<PatchScene> load_mesh_patch(const PatchCommand& o, double& jump) {
+  auto tile = load_scene(o.heights);
+  if (!tile) return tile.error();
+  warn(tile->warnings);
+  HeightField heights;
+  auto patch = make_mesh_patch(*tile, o.size, &heights);
+  if (patch) jump = seam_jump(heights);
+  return patch;
+}
+
+int run_patch(Context& context, PatchCommand o) {
+  if (auto ok = check_output(o.output, {"lpt"}); !ok) return fail(ok.error());
+  SubsurfaceOptions subsurface{.period = 1};
+  SubsurfaceReport walks;
+  if (!o.subsurface.empty()) {
+    auto medium = parse_medium(o.subsurface);
+    if (!medium) return fail({"--subsurface", medium.error().text()});
+    subsurface.medium = *medium;
+  }
+  double jump = 1;
+  auto made = o.is_mesh() ? load_mesh_patch(o, jump) : load_height_patch(o, jump);
+  if (!made) return fail(made.error());
+  const PatchScene& patch = *made;
+  if (jump > 3) warn(fmt::format("{}: does not tile: it jumps {:.1f} times as far from one repetition to the next as inside", o.heights, jump));
   auto tracer = Tracer::build(patch.scene);
   if (!tracer) return fail(tracer.error());
   o.bake.precision = Precision::single;
   o.zonal.precision = o.precision == "half" ? Precision::half : Precision::single;
   BakeReport report;
-  auto transfer = bake(patch.scene, *tracer, patch.receivers, o.bake, &report, &context.progress);
+  auto transfer = o.subsurface.empty()
+                      ? bake(patch.scene, *tracer, patch.receivers, o.bake, &report, &context.progress)
+                      : bake_subsurface(patch.scene, *tracer, patch.receivers, o.bake, subsurface, &report, &walks, &context.progress);
   if (!transfer) return fail(transfer.error());
+  warn_of_lost_walks(walks);
   ZonalFitReport fit;
   auto lobes = fit_zonal(*transfer, o.zonal, &fit, &context.progress);
   if (!lobes) return fail(lobes.error());
   if (auto ok = save_zonal_texture(o.output, {o.size, o.size, *lobes}); !ok) return fail(ok.error());
+  nlohmann::json through;
+  if (!o.subsurface.empty()) through = {{"events", walks.events}, {"lost", walks.lost}};
   if (context.json)
     print_json({{"output", o.output}, {"size", o.size}, {"lobes", o.zonal.lobes}, {"order", o.bake.order}, {"rays", report.rays}, {"trace_seconds", report.trace_seconds},
-                {"bounce_seconds", report.bounce_seconds}, {"fit_seconds", fit.seconds}, {"rms", fit.rms}, {"bytes", lobes->bytes()}, {"seam_jump", jump}});
+                {"bounce_seconds", report.bounce_seconds}, {"fit_seconds", fit.seconds}, {"rms", fit.rms}, {"bytes", lobes->bytes()}, {"seam_jump", jump},
+                {"subsurface", through}});
   else
     fmt::print("{}\n  {} x {} texels, {} lobes, order {}, {}\n  simulated in {} ({} rays), fitted in {} with an error of {:.2f}% RMS\n", o.output, o.size, o.size,
                o.zonal.lobes, o.bake.order, human_bytes(double(lobes->bytes())), human_seconds(report.trace_seconds + report.bounce_seconds), human_count(report.rays),
@@ -61,18 +97,23 @@ int run_patch(Context& context, PatchCommand o) {
 void add_patch(CLI::App& app, Run& run) {
   auto o = std::make_shared<PatchCommand>();
   CLI::App* c = app.add_subcommand("patch", "Simulate a repeating relief and make a transfer texture of it, for render --transfer-texture");
-  c->add_option("heights", o->heights, "Height map: a picture that tiles")->required();
+  c->add_option("heights", o->heights, "What repeats: a height map, or a mesh (.glb, .gltf, .obj, .ply) that is as wide along x as along y and faces +z")->required();
   c->add_option("-o,--output", o->output, "Transfer texture to write (.lpt)")->required();
-  c->add_option("--depth", o->depth, "Height of white over black, in sides of the patch")->capture_default_str();
+  auto* depth = c->add_option("--depth", o->depth, "Height of white over black, in sides of the patch")->capture_default_str();
   c->add_option("--size", o->size, "Texels a side")->check(CLI::Range(2, 1024))->capture_default_str();
-  c->add_option("--albedo", o->albedo, "What the relief reflects of the light that bounces")->check(CLI::Range(0.0f, 1.0f))->capture_default_str();
+  auto* albedo = c->add_option("--albedo", o->albedo, "What the relief reflects of the light that bounces")->check(CLI::Range(0.0f, 1.0f))->capture_default_str();
+  auto* subsurface = c->add_option("--subsurface", o->subsurface, std::string(subsurface_help) + "; a unit is one side of the patch");
   c->add_option("--lobes", o->zonal.lobes, "Zonal lobes a texel")->check(CLI::Range(1, max_stored_lobes))->capture_default_str();
   c->add_option("--order", o->bake.order, "Bands of the lighting's spherical harmonics")->check(CLI::Range(1, max_sh_order))->capture_default_str();
   c->add_option("--samples", o->bake.samples, "Rays a texel")->check(CLI::Range(1, 1 << 20))->capture_default_str();
   c->add_option("--bounces", o->bake.bounces, "Reflections between surfaces")->check(CLI::Range(0, 64))->capture_default_str();
   c->add_option("--seed", o->bake.seed, "Of the ray directions")->capture_default_str();
   c->add_option("--precision", o->precision, "Of the stored lobes")->check(CLI::IsMember({"half", "single"}))->capture_default_str();
-  c->callback([o, &run] { run = [o](Context& context) { return run_patch(context, *o); }; });
+  c->callback([o, albedo, depth, subsurface, &run] {
+    if (albedo->count() && subsurface->count()) throw CLI::ValidationError("--albedo is of reflection, and --subsurface has none: give one");
+    if (o->is_mesh() && (albedo->count() || depth->count())) throw CLI::ValidationError("--albedo and --depth are of height maps: a mesh has its own");
+    run = [o](Context& context) { return run_patch(context, *o); };
+  });
 }
 
 }  // namespace lambent::tool

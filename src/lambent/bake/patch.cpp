@@ -1,6 +1,7 @@
-// Follows: local-deformable-prt, section 6 (local patches from height fields).
+// Follows: local-deformable-prt, section 6 (local patches from height fields and meshes).
 #include <lambent/bake/patch.h>
 #include <lambent/core/check.h>
+#include <lambent/receivers/atlas.h>
 
 namespace lambent {
 
@@ -79,6 +80,75 @@ PatchScene make_patch(const HeightField& field, Vec3 albedo) {
   r.front.resize(s.positions.size());
   for (int j = 0; j <= side; ++j)
     for (int i = 0; i <= side; ++i) r.front[size_t(j * (side + 1) + i)] = uint32_t(j % n * n + i % n);
+  r.basis = corner_receivers(s, r.front, {});
+  return patch;
+}
+
+Result<PatchScene> make_mesh_patch(const Scene& tile, int size, HeightField* heights) {
+  constexpr size_t most_triangles = 4'000'000;
+  if (size < 2 || size > 1024) return Error{"size", "must lie between 2 and 1024"};
+  if (tile.triangles.size() > most_triangles) return Error{tile.path, "has more than 4,000,000 triangles to repeat"};
+  const Bounds box = bounds(tile);
+  const Vec3 extent = box.max - box.min;
+  const float side = extent.x;
+  if (!(side > 0 && std::isfinite(1 / side) && std::abs(extent.y - side) <= 0.01f * side))
+    return Error{tile.path, "a patch is as wide as it is high, and this extends by " + std::to_string(extent.x) + " along x and " + std::to_string(extent.y) + " along y"};
+  if (!(extent.z <= 10 * side)) return Error{tile.path, "is more than ten times as deep as it is wide"};
+
+  PatchScene patch;
+  Scene& s = patch.scene;
+  s.path = tile.path, s.materials = tile.materials, s.textures = tile.textures;
+  const uint32_t vertices = uint32_t(tile.positions.size()), triangles = uint32_t(tile.triangles.size()), parts = uint32_t(tile.parts.size());
+  std::vector<Vec2> places;  // in texels, alike in all repetitions
+  uint32_t copy = 0;
+  for (int j = -1; j <= 1; ++j)
+    for (int i = -1; i <= 1; ++i, ++copy) {
+      for (Vec3 p : tile.positions) {
+        const Vec3 unit((p.x - box.min.x) / side, (p.y - box.max.y) / extent.y, (p.z - box.min.z) / side);
+        s.positions.push_back(unit + Vec3(float(i), float(j), 0)), places.push_back(Vec2(unit.x, -unit.y) * float(size));
+      }
+      s.normals.insert(s.normals.end(), tile.normals.begin(), tile.normals.end());
+      s.colors.insert(s.colors.end(), tile.colors.begin(), tile.colors.end());
+      for (size_t set = 0; set < tile.texcoords.size(); ++set)
+        s.texcoords[set].insert(s.texcoords[set].end(), tile.texcoords[set].begin(), tile.texcoords[set].end());
+      for (Triangle t : tile.triangles) {
+        for (uint32_t& v : t.v) v += copy * vertices;
+        t.part += copy * parts;
+        s.triangles.push_back(t);
+      }
+      for (const Part& from : tile.parts) {
+        Part part;
+        part.name = from.name, part.material = from.material;
+        part.first_vertex = from.first_vertex + copy * vertices, part.vertex_count = from.vertex_count;
+        part.first_triangle = from.first_triangle + copy * triangles, part.triangle_count = from.triangle_count;
+        s.parts.push_back(part);
+      }
+    }
+
+  auto tracer = Tracer::build(s);
+  if (!tracer) return tracer.error();
+  Receivers& r = patch.receivers;
+  const size_t count = size_t(size) * size_t(size);
+  r.origins.resize(count), r.normals.resize(count), r.places.resize(count);
+  std::vector<uint32_t> texels(count);
+  if (heights) *heights = {size, std::vector<float>(count)};
+  const float above = extent.z / side + 1, texel = 1 / float(size), diagonal = bounds(s).diagonal();
+  for (size_t k = 0; k < count; ++k) {
+    const size_t i = k % size_t(size), j = k / size_t(size);
+    texels[k] = uint32_t(k);
+    Hit hit;
+    // Beside an edge where a ray slips between triangles there are triangles.
+    for (int attempt = 0; attempt < 3 && hit.triangle == none; ++attempt) {
+      const float off = 0.5f + 0.01f * float(attempt);
+      hit = tracer->closest({(float(i) + off) * texel, -(float(j) + off) * texel, above}, {0, 0, -1});
+    }
+    auto where = [&] { return "texel " + std::to_string(i) + ", " + std::to_string(j) + " "; };
+    if (hit.triangle == none) return Error{tile.path, where() + "meets no geometry from above: a patch may have no holes"};
+    if (!hit.front && !s.triangles[hit.triangle].two_sided) return Error{tile.path, where() + "meets the back of a one-sided surface: a patch faces +z"};
+    place_texel(s, r, k, {hit.triangle, hit.u, hit.v}, !hit.front, texel, diagonal);
+    if (heights) heights->heights[k] = above - hit.distance;
+  }
+  r.basis = texel_receivers(s, size, size, places, places, std::move(texels));
   return patch;
 }
 

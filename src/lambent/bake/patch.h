@@ -26,4 +26,10 @@ struct PatchScene {
 };
 PatchScene make_patch(const HeightField& field, Vec3 albedo);
 
+// The same of a mesh that repeats along x and y with the extents of its box, which have to be alike to 1%, seen as a picture from +z: u along
+// +x, v along -y. It is scaled to a side of 1. Receivers lie where rays from above through the middles of size x size texels meet it;
+// what lies below something else has no receiver of its own, and gives back what the texel above it does. `heights`, if asked for, are those
+// of the receivers. Errors: no such extents; a texel that meets nothing or the back of a one-sided surface; too many triangles.
+Result<PatchScene> make_mesh_patch(const Scene& tile, int size, HeightField* heights = nullptr);
+
 }  // namespace lambent

@@ -1,7 +1,10 @@
 #include <lambent/bake/patch.h>
 #include <lambent/basis/sh.h>
+#include <lambent/scene/procedural.h>
 
 #include <gtest/gtest.h>
+
+#include <array>
 
 namespace lambent {
 namespace {
@@ -55,6 +58,79 @@ TEST(Patch, RepeatsAndDoesNotFeelItsSeams) {
       for (size_t k = 0; k < 36; ++k) error += std::pow(u[k] - v[k], 2), total += u[k] * u[k];
     }
   EXPECT_LT(std::sqrt(error / total), 0.01);  // noise of 4,096 rays, twice
+}
+
+// A deep groove that reflects everything, evenly lit, gives back what it hides as bounces go on.
+TEST(Patch, BouncesBetweenItsWalls) {
+  const int n = 16;
+  HeightField field{n, {}};
+  for (int k = 0; k < n * n; ++k) field.heights.push_back(0.3f * std::cos(2 * pi * float(k % n) / n));
+  auto mean = [&](int bounces) {
+    const Transfer t = baked(make_patch(field, Vec3(1)), 1024, bounces);
+    double sum = 0;
+    for (size_t r = 0; r < t.receivers; ++r) sum += load_receiver(t, r)[0] * std::sqrt(4 * std::numbers::pi) / double(t.receivers);
+    return sum;
+  };
+  EXPECT_LT(mean(0), 0.75);
+  EXPECT_NEAR(mean(40), 1, 0.01);  // rays that meet the relief's outermost rows from behind are few
+}
+
+// The middle repetition of a relief, cut out as a mesh.
+Scene as_mesh(const PatchScene& patch, int n) {
+  Scene tile;
+  add_material(tile, "relief", Vec3(0.7f));
+  std::vector<Vec3> positions, normals;
+  std::vector<uint32_t> indices;
+  const int side = 3 * n, row = side + 1;
+  for (int j = n; j <= 2 * n; ++j)
+    for (int i = n; i <= 2 * n; ++i)
+      positions.push_back(patch.scene.positions[size_t(j * row + i)] * 5.0f + Vec3(1, 2, 3)), normals.push_back(patch.scene.normals[size_t(j * row + i)]);
+  for (uint32_t j = 0; j < uint32_t(n); ++j)
+    for (uint32_t i = 0; i < uint32_t(n); ++i) {
+      const uint32_t a = j * uint32_t(n + 1) + i, b = a + 1, c = a + uint32_t(n) + 1, d = c + 1;
+      indices.insert(indices.end(), {a, c, b, b, c, d});
+    }
+  add_mesh(tile, 0, "relief", positions, normals, indices);
+  return tile;
+}
+
+TEST(Patch, OfAMeshIsThatOfItsHeights) {
+  // The mesh begins at the middle of the first texel, and its own texels lie between those of the field, at twice as many.
+  const int n = 16;
+  HeightField field{n, {}};
+  for (int k = 0; k < n * n; ++k) field.heights.push_back(0.1f * std::sin(2 * pi * float(k % n) / n) * std::cos(2 * pi * float(k / n) / n + 1));
+  const PatchScene relief = make_patch(field, Vec3(0.7f));
+  HeightField heights;
+  auto mesh = make_mesh_patch(as_mesh(relief, n), 2 * n, &heights);
+  ASSERT_TRUE(mesh) << mesh.error().text();
+  const float least = *std::min_element(field.heights.begin(), field.heights.end());
+  EXPECT_LT(seam_jump(heights), 2);
+  const Transfer a = baked(relief, 4096, 3), b = baked(*mesh, 4096, 3), direct = baked(*mesh, 1024, 0);
+  double error = 0, unbounced = 0, total = 0;
+  for (int j = 0; j < n - 1; ++j)
+    for (int i = 0; i < n - 1; ++i) {
+      // Four of the field's texels about the centre of a cell; texels of the mesh about the same.
+      std::array<float, 36> u{}, v{}, w{};
+      for (int k = 0; k < 4; ++k) {
+        const std::vector<float> x = load_receiver(a, size_t((j + k / 2) * n + i + k % 2)), y = load_receiver(b, size_t((2 * j + k / 2) * 2 * n + 2 * i + k % 2)),
+                                 z = load_receiver(direct, size_t((2 * j + k / 2) * 2 * n + 2 * i + k % 2));
+        for (size_t c = 0; c < 36; ++c) u[c] += x[c] / 4, v[c] += y[c] / 4, w[c] += z[c] / 4;
+      }
+      for (size_t c = 0; c < 36; ++c) error += std::pow(u[c] - v[c], 2), unbounced += std::pow(u[c] - w[c], 2), total += u[c] * u[c];
+      EXPECT_NEAR(heights.heights[size_t(2 * j * 2 * n + 2 * i)], field.heights[size_t(j * n + i)] - least, 0.03);
+    }
+  EXPECT_LT(std::sqrt(error / total), 0.015);      // curvature within a cell, noise
+  EXPECT_GT(std::sqrt(unbounced / total), 0.025);  // so that bounces are held
+}
+
+TEST(Patch, RefusesMeshesThatDoNotRepeat) {
+  auto refused = [](const Scene& tile, int size = 4) { return !make_mesh_patch(tile, size); };
+  EXPECT_FALSE(refused(make_quad(Vec3(0), Vec3(2, 0, 0), Vec3(0, 2, 0), 1, 1, Vec3(1))));
+  EXPECT_TRUE(refused(make_quad(Vec3(0), Vec3(2, 0, 0), Vec3(0, 2, 0), 1, 1, Vec3(1)), 1));
+  EXPECT_TRUE(refused(make_quad(Vec3(0), Vec3(2, 0, 0), Vec3(0, 1, 0), 1, 1, Vec3(1))));  // not square
+  EXPECT_TRUE(refused(make_quad(Vec3(0), Vec3(2, 0, 0), Vec3(0, 0, 2), 1, 1, Vec3(1))));  // no extent along y
+  EXPECT_TRUE(refused(make_quad(Vec3(0), Vec3(0, 2, 0), Vec3(2, 0, 0), 1, 1, Vec3(1))));  // faces away
+  EXPECT_TRUE(refused(make_sphere(1, 2, Vec3(1)), 32));                                   // holes at its corners
 }
 
 TEST(Patch, MakesHeightFieldsOfPictures) {

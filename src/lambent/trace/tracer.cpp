@@ -109,13 +109,13 @@ void Tracer::closest_fan(Vec3 origin, const Directions& d, Hit* hits) const {
   }
 }
 
-Hit Tracer::closest(Vec3 origin, Vec3 direction, float from) const {
+Hit Tracer::closest(Vec3 origin, Vec3 direction, float from, float to) const {
   RTCRayHit r;
   RTCIntersectContext context;
   rtcInitIntersectContext(&context);
   r.ray.org_x = origin.x, r.ray.org_y = origin.y, r.ray.org_z = origin.z, r.ray.tnear = from;
   r.ray.dir_x = direction.x, r.ray.dir_y = direction.y, r.ray.dir_z = direction.z, r.ray.time = 0;
-  r.ray.tfar = INFINITY, r.ray.mask = ~0u, r.ray.id = 0, r.ray.flags = 0;
+  r.ray.tfar = to, r.ray.mask = ~0u, r.ray.id = 0, r.ray.flags = 0;
   r.hit.geomID = RTC_INVALID_GEOMETRY_ID, r.hit.instID[0] = RTC_INVALID_GEOMETRY_ID;
   rtcIntersect1(impl_->scene, &context, &r);
   if (r.hit.geomID == RTC_INVALID_GEOMETRY_ID) return {};

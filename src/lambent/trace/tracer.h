@@ -32,8 +32,8 @@ class Tracer {
   void visible_fan(Vec3 origin, const Directions& directions, float* visible) const;
   // hits[i] = the closest hit from `origin` along direction i.
   void closest_fan(Vec3 origin, const Directions& directions, Hit* hits) const;
-  // One ray, starting `from` units along it.
-  Hit closest(Vec3 origin, Vec3 direction, float from = 0) const;
+  // One ray, from `from` units along it to `to`.
+  Hit closest(Vec3 origin, Vec3 direction, float from = 0, float to = INFINITY) const;
 
   size_t bytes() const;  // of the acceleration structure
 
