@@ -203,7 +203,7 @@ export function writeSkin(path: string, blend: number): void {
 }
 
 /** A PNG of 8-bit RGB. */
-function png(width: number, height: number, texel: (x: number, y: number) => number[]): Buffer {
+export function png(width: number, height: number, texel: (x: number, y: number) => number[]): Buffer {
   const rows = Buffer.alloc(height * (1 + 3 * width));
   for (let y = 0; y < height; ++y) for (let x = 0; x < width; ++x) rows.set(texel(x, y).map((v) => Math.round(255 * v)), y * (1 + 3 * width) + 1 + 3 * x);
   const chunk = (type: string, data: Buffer): Buffer => {

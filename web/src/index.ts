@@ -18,4 +18,5 @@ export { diffuseParameters, PrtMaterial } from './prt_material.js';
 export { clampedCosine, evaluateSh, maxShOrder, shBand, shCount, shIndex } from './sh.js';
 export { makeShRotation, rotateSh, type ShRotation } from './sh_rotation.js';
 export { shWindow, shWindows, type ShWindow } from './sh_window.js';
+export { readTransferTexture, TransferTextureMaterial, type TransferTexture } from './transfer_texture.js';
 export { UnshadowedMaterial } from './unshadowed_material.js';

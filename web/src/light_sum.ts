@@ -51,27 +51,22 @@ export interface SumOptions {
   what: { size: string; use: string };
 }
 
-export class LightSum {
-  readonly light: Float32Array;
+/** A half-float picture that is drawn anew when what it shows has changed. */
+export class DrawnPicture {
   readonly target: WebGLRenderTarget;
   private readonly quad: Mesh<PlaneGeometry, RawShaderMaterial>;
   private readonly scene = new Scene();
   private readonly camera = new Camera();
   private changed = true;
-  private readonly what: SumOptions['what'];
 
-  constructor({ layout, channels, transfer, width, height, filter, pick, uniforms, what }: SumOptions) {
-    this.what = what;
-    this.light = new Float32Array(12 * layout.quads);
+  constructor(
+    width: number, height: number, filter: SumOptions['filter'], private readonly what: SumOptions['what'],
+    drawing: { fragmentShader: string; defines: Record<string, number>; uniforms: Record<string, IUniform> },
+  ) {
     this.target = new WebGLRenderTarget(width, height, {
       type: HalfFloatType, format: RGBAFormat, minFilter: filter, magFilter: filter, depthBuffer: false, generateMipmaps: false,
     });
-    const material = new RawShaderMaterial({
-      glslVersion: GLSL3, vertexShader, fragmentShader: fragmentShader(pick), depthTest: false, depthWrite: false,
-      defines: { PRT_QUADS: layout.quads, PRT_TEXELS: layout.texels, PRT_COLUMNS: layout.columns, PRT_ROWS: layout.rows, PRT_CHANNELS: channels },
-      uniforms: { prtTransfer: { value: transfer }, prtLight: { value: this.light }, ...uniforms },
-    });
-    this.quad = new Mesh(new PlaneGeometry(2, 2), material);
+    this.quad = new Mesh(new PlaneGeometry(2, 2), new RawShaderMaterial({ glslVersion: GLSL3, vertexShader, depthTest: false, depthWrite: false, ...drawing }));
     this.quad.frustumCulled = false;
     this.scene.add(this.quad);
   }
@@ -80,14 +75,7 @@ export class LightSum {
     return 8 * this.target.width * this.target.height;
   }
 
-  /** `light` is [column][3]. */
-  set(light: ArrayLike<number>): void {
-    const quads = this.light.length / 12;
-    for (let k = 0; k < light.length / 3; ++k) for (let c = 0; c < 3; ++c) this.light[4 * quads * c + k] = light[3 * k + c]!;
-    this.changed = true;
-  }
-
-  /** Draws again: a lost context has taken what was drawn. */
+  /** Draws again: the light has changed, or a lost context has taken what was drawn. */
   refresh(): void {
     this.changed = true;
   }
@@ -114,5 +102,31 @@ export class LightSum {
 
   dispose(): void {
     this.target.dispose(), this.quad.geometry.dispose(), this.quad.material.dispose();
+  }
+}
+
+/** [coefficient][3] to red, green and blue in whole texels, as the uniform prtLight has them. */
+export function packLight(out: Float32Array, light: ArrayLike<number>): void {
+  const quads = out.length / 12;
+  for (let k = 0; k < light.length / 3; ++k) for (let c = 0; c < 3; ++c) out[4 * quads * c + k] = light[3 * k + c]!;
+}
+
+export class LightSum extends DrawnPicture {
+  readonly light: Float32Array;
+
+  constructor({ layout, channels, transfer, width, height, filter, pick, uniforms, what }: SumOptions) {
+    const light = new Float32Array(12 * layout.quads);
+    super(width, height, filter, what, {
+      fragmentShader: fragmentShader(pick),
+      defines: { PRT_QUADS: layout.quads, PRT_TEXELS: layout.texels, PRT_COLUMNS: layout.columns, PRT_ROWS: layout.rows, PRT_CHANNELS: channels },
+      uniforms: { prtTransfer: { value: transfer }, prtLight: { value: light }, ...uniforms },
+    });
+    this.light = light;
+  }
+
+  /** `light` is [column][3]. */
+  set(light: ArrayLike<number>): void {
+    packLight(this.light, light);
+    this.refresh();
   }
 }

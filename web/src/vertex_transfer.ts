@@ -9,6 +9,7 @@ import type { TransferExtension } from './glb.js';
 import { noReceiver, readReceivers, shareGeometry, type TransferHeader } from './header.js';
 import type { BakedTransfer, TransferSource } from './kinds.js';
 import type { Lighting } from './lighting.js';
+import { packLight } from './light_sum.js';
 import { surfaceFrame, type Lobe } from './lobes.js';
 import { diffuseParameters, PrtMaterial, type PrtOptions, type PrtShader, type PrtUniforms } from './prt_material.js';
 import { shCount } from './sh.js';
@@ -123,13 +124,13 @@ export class VertexTransfer implements BakedTransfer {
   }
 
   relight(lighting: Lighting): void {
-    this.fill(this.uniforms.prtLight.value, lighting.coefficients(this.order));
+    packLight(this.uniforms.prtLight.value, lighting.coefficients(this.order));
   }
 
   coefficientMaterials(index: number, gain: { value: number }): Material[] {
     const light = new Float64Array(3 * shCount(this.order)).fill(1, 3 * index, 3 * index + 3);
     const uniforms = { prtTransfer: this.uniforms.prtTransfer, prtLight: { value: new Float32Array(12 * this.quads) } };
-    this.fill(uniforms.prtLight.value, light);
+    packLight(uniforms.prtLight.value, light);
     return this.meshes.map((mesh, i) => new PrtMaterial(uniforms, { ...this.optionsOf[i]!, falseColor: { gain } }, { side: (mesh.material as Material).side }));
   }
 
@@ -138,10 +139,5 @@ export class VertexTransfer implements BakedTransfer {
     for (const texture of this.bones.values()) texture.dispose();
     for (const material of this.materials.values()) material.dispose();
     for (const mesh of this.meshes) mesh.geometry.dispose();
-  }
-
-  /** [coefficient][3] to red, green and blue in whole texels. */
-  private fill(out: Float32Array, light: ArrayLike<number>): void {
-    for (let k = 0; k < shCount(this.order); ++k) for (let c = 0; c < 3; ++c) out[4 * this.quads * c + k] = light[3 * k + c]!;
   }
 }

@@ -1,7 +1,7 @@
 // Zonal lobes (docs/zonal.md, docs/file-format.md, kind "zonal"): t_lm = sum_i y_lm(axis_i) g_il, so that exit radiance is
 // sum_i sum_l g_il sum_m L_lm y_lm(axis_i). Follows: Sloan, Luna and Snyder, "Local, Deformable Precomputed Radiance Transfer" (2005),
-// eq. 13. Its eq. 25 looks the inner sums up in a table made anew for each light; here they are summed at the axis, without loops, so
-// that turning the light uploads no table and there is none of its error.
+// eq. 13. At vertices the inner sums are made at the axis, without loops; pixels of a transfer texture look them up in a table of the light, eq. 25
+// (transfer_texture.ts).
 import { LambentError } from './errors.js';
 import { isIndex } from './glb.js';
 import { glslHarmonics } from './glsl_harmonics.js';
@@ -12,7 +12,7 @@ import type { PrtShader } from './prt_material.js';
 import { shBand, shCount } from './sh.js';
 import { VertexTransfer } from './vertex_transfer.js';
 
-const maxLobes = 8;
+export const maxLobes = 8;
 
 /** Bands that are stored as they are: `exact_zonal_bands` of the C++ library. */
 export const exactZonalBands = (order: number, lobes: number): number => Math.min(order, lobes >= 3 ? 2 : 1);
@@ -23,7 +23,11 @@ export function zonalValues(order: number, lobes: number, channels: number): num
   return channels * shCount(exact) + lobes * (3 + channels * (order - exact));
 }
 
-export function zonalShader(order: number, lobes: number, channels: 1 | 3): PrtShader {
+/**
+ * GLSL: vec3 prtSum( vec4 v[ PRT_QUADS ] ), exit radiance of the values of one receiver under prtLight, turned by prtFrame. `table`: lobes by the
+ * look-up vec3 prtBand( vec3 direction, int band ), counted from the first that is not exact, in place of harmonics at their axes.
+ */
+export function zonalSum(order: number, lobes: number, channels: 1 | 3, table = false): string {
   const exact = exactZonalBands(order, lobes), upper = order - exact, lightQuads = Math.ceil(shCount(order) / 4);
   const swizzle = (k: number): string => 'xyzw'[k & 3]!;
   const value = (k: number): string => `v[ ${k >> 2} ].${swizzle(k)}`;
@@ -50,23 +54,30 @@ export function zonalShader(order: number, lobes: number, channels: 1 | 3): PrtS
 vec3 prtLobe( const in vec3 axis, const in vec3 g[ ${upper} ] ) {
   float size = length( axis );
   vec3 n = prtFrame * ( size > 0.0 ? axis / size : vec3( 0.0, 0.0, 1.0 ) ), sum = vec3( 0.0 );
-  ${glslHarmonics(order, (index, y) => (shBand(index) < exact ? '' : `sum += g[ ${shBand(index) - exact} ] * ( ${y} * ${light(index)} );`))}
+  ${table ? Array.from({ length: upper }, (_, l) => `sum += g[ ${l} ] * prtBand( n, ${l} );`).join('\n  ')
+    : glslHarmonics(order, (index, y) => (shBand(index) < exact ? '' : `sum += g[ ${shBand(index) - exact} ] * ( ${y} * ${light(index)} );`))}
   return sum;
 }`;
-  return {
-    key: `zonal ${order} ${lobes} ${channels}`, turns: true,
-    radiance: `${lobe}
-vec3 prtRadiance( const in uint receiver ) {
-  if ( receiver == 0xffffffffu ) return vec3( 0.0 );
-  vec4 v[ PRT_QUADS ];
-  for ( int k = 0; k < PRT_QUADS; ++ k ) v[ k ] = prtValues( receiver, k );
+  return `${lobe}
+vec3 prtSum( const in vec4 v[ PRT_QUADS ] ) {
   vec3 sum = vec3( 0.0 )${upper > 0 ? `, axis, g[ ${upper} ]` : ''};
   ${lines.join('\n  ')}
   return sum;
 }
-`,
-  };
+`;
 }
+
+export const zonalShader = (order: number, lobes: number, channels: 1 | 3): PrtShader => ({
+  key: `zonal ${order} ${lobes} ${channels}`, turns: true,
+  radiance: `${zonalSum(order, lobes, channels)}
+vec3 prtRadiance( const in uint receiver ) {
+  if ( receiver == 0xffffffffu ) return vec3( 0.0 );
+  vec4 v[ PRT_QUADS ];
+  for ( int k = 0; k < PRT_QUADS; ++ k ) v[ k ] = prtValues( receiver, k );
+  return prtSum( v );
+}
+`,
+});
 
 export const zonalKind: TransferKind = {
   name: 'zonal',
