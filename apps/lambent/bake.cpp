@@ -344,7 +344,7 @@ int run_bake(Context& context, BakeCommand o) {
   const BakedExtras extras{.outgoing = outgoing ? &*outgoing : nullptr, .lattice = free_space ? &*free_space : nullptr,
                            .factors = o.factors, .view = view ? &*view : nullptr};
   const Receivers of_surfaces = view ? Receivers{} : receivers;
-  if (auto ok = zonal      ? save_baked(o.output, *scene, receivers, *zonal, origin)
+  if (auto ok = zonal      ? save_baked(o.output, *scene, receivers, *zonal, origin, fit.errors)
                 : clusters ? save_baked(o.output, *scene, receivers, *clusters, origin, extras)
                            : save_baked(o.output, *scene, of_surfaces, *transfer, origin, extras);
       !ok)

@@ -91,7 +91,7 @@ int run_compress(Context& context, CompressCommand o) {
                          {"seed", o.zonal.seed}, {"rms", report.rms}};
   Receivers receivers;
   receivers.front = baked->front, receivers.back = baked->back;
-  if (auto ok = save_baked(o.output, baked->scene, receivers, *fit, provenance.dump()); !ok) return fail(ok.error());
+  if (auto ok = save_baked(o.output, baked->scene, receivers, *fit, provenance.dump(), report.errors); !ok) return fail(ok.error());
   if (!o.error_picture.empty()) {
     auto image = paint_errors(*baked, report.errors, o, &context.progress);
     if (!image) return fail(image.error());

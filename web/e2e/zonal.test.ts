@@ -1,9 +1,10 @@
 // Zonal lobes in the browser against `lambent render` of the same file, camera, light and exposure; at rest, and where the surface moves.
+import { readFileSync } from 'node:fs';
 import { join } from 'node:path';
 import type { Browser } from 'playwright-core';
 import { afterAll, beforeAll, describe, expect, it } from 'vitest';
 import { haveTool, lambent, makeFolder, writeLopsidedHdr } from '../test/tool.ts';
-import { drawn, haveBrowser, launch, open, psnr, serve, writeBall, writeScene, writeSkin } from './browser.ts';
+import { drawn, haveBrowser, launch, open, openFixture, psnr, serve, writeBall, writeScene, writeSkin } from './browser.ts';
 
 const rotate = '40,-25,70';
 
@@ -42,6 +43,27 @@ describe.skipIf(!haveTool || !haveBrowser)('zonal lobes', () => {
       console.log(`${lobes} lobes: ${db.toFixed(1)} dB (${folder})`);
       expect(db).toBeGreaterThan(40);
     });
+
+  it('show the error of their fit, as the file has it', async () => {
+    const file = readFileSync(at('scene_2.glb')), jsonLength = file.readUInt32LE(12), json = JSON.parse(file.subarray(20, 20 + jsonLength).toString()) as {
+      bufferViews: { byteOffset?: number; byteLength: number }[]; extensions: { LAMBENT_transfer: { transfer: { fitErrors: number } } } };
+    const view = json.bufferViews[json.extensions.LAMBENT_transfer.transfer.fitErrors]!, start = 28 + jsonLength + (view.byteOffset ?? 0);
+    const errors = new Float32Array(new Uint8Array(file.subarray(start, start + view.byteLength)).buffer), gain = 0.5 / errors.reduce((a, b) => Math.max(a, b));
+    const { page, server } = await openFixture(browser, folder);
+    const shown = await page.evaluate((gain) => window.scenes.fitErrors('/files/scene_2.glb', gain), gain);
+    await page.close(), await server.close();
+    const off = shown.map(([receiver, value]) => Math.abs(value / gain - errors[receiver]!)).sort((a, b) => a - b), mean = errors.reduce((a, b) => a + b) / errors.length;
+    console.log(`errors of a fit: mean ${(100 * mean).toFixed(2)} %, shown within ${((100 * off[off.length >> 1]!) / mean).toFixed(1)} % of that at half of ${off.length} vertices`);
+    expect(off.length).toBeGreaterThan(1000);
+    expect(mean).toBeGreaterThan(0.01);
+    expect(off[off.length >> 1]! / mean).toBeLessThan(0.1);
+    // The page offers it, with a scale.
+    const viewer = await serve(at('scene_2.glb'), '--env', at('light.hdr')), tab = await open(browser, viewer.address, 'view=error', 640, 480);
+    expect(await tab.inputValue('#view')).toBe('error');
+    expect(await tab.textContent('#scale-high')).toBe('10 %');
+    await tab.close();
+    expect(await viewer.stop()).toBe(0);
+  });
 
   // A thin sheet on black is nearly all outline, which the browser smooths after tone mapping: at rest, with nothing turned, the same picture
   // has 38.8 dB. So what turning costs is held against that.

@@ -3,7 +3,7 @@ import { Euler, MathUtils, Vector3 } from 'three';
 import { LambentError, shBand, shIndex, shWindows, type ShWindow } from '../src/index.js';
 import { fetchFile, loadManifest, makeEnvironment, mapTexture, plainSky, readBaked, readMap, type EnvironmentFile, type Manifest } from './loading.js';
 import { defaultState, formatState, parseState, type State, type View } from './state.js';
-import { falseColorEnd, Viewer } from './viewer.js';
+import { falseColorEnd, fitErrorEnd, Viewer } from './viewer.js';
 
 const get = <T extends HTMLElement>(id: string): T => document.getElementById(id) as T;
 const input = (id: string): HTMLInputElement => get(id);
@@ -29,7 +29,7 @@ function showLoading(what: string, share?: number): void {
 
 const megabytes = (bytes: number): string => `${(bytes / 1e6).toPrecision(3)} MB`;
 const names: Record<View, string> = {
-  baked: 'Baked', compare: 'Second file', unshadowed: 'Unshadowed', coefficient: 'One coefficient', reference: 'Reference',
+  baked: 'Baked', compare: 'Second file', unshadowed: 'Unshadowed', coefficient: 'One coefficient', error: 'Error of the fit', reference: 'Reference',
 };
 
 class Page {
@@ -80,6 +80,7 @@ class Page {
   private show(): void {
     const { state, viewer } = this;
     const possible: View[] = ['baked', 'unshadowed', 'coefficient'];
+    if (viewer.bakedScene?.transfer.fitErrorMaterials) possible.push('error');
     if (this.manifest?.compare) possible.splice(1, 0, 'compare');
     if (this.manifest?.reference) possible.push('reference');
     if (!possible.includes(state.view)) state.view = 'baked';
@@ -108,10 +109,13 @@ class Page {
     get('order-value').textContent = `${viewer.bands} of ${viewer.bakedScene?.transfer.order ?? 1}`;
     const usesCoefficient = [state.view, state.against].includes('coefficient');
     const l = shBand(state.coefficient), m = state.coefficient - shIndex(l, 0);
-    get('coefficient-row').hidden = get('scale').hidden = !usesCoefficient;
+    const usesError = [state.view, state.against].includes('error');
+    get('coefficient-row').hidden = !usesCoefficient, get('scale').hidden = !usesCoefficient && !usesError;
     get('coefficient-name').textContent = `l ${l}, m ${m}`;
     const end = falseColorEnd / 2 ** state.exposure;
     get('scale-low').textContent = `−${end.toPrecision(2)}`, get('scale-high').textContent = `+${end.toPrecision(2)}`;
+    if (usesError && !usesCoefficient) // the scale's dark half is not used
+      get('scale-low').textContent = 'grey: 0 %', get('scale-high').textContent = `${(100 * fitErrorEnd / 2 ** state.exposure).toPrecision(2)} %`;
     const wipe = get('wipe');
     wipe.hidden = !state.against;
     wipe.style.left = `${100 * state.wipe}%`;

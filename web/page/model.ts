@@ -3,13 +3,14 @@ import type { Material, Mesh, Object3D } from 'three';
 import type { GLTF } from 'three/addons/loaders/GLTFLoader.js';
 import { bakedScene, diffuseParameters, LambentError, UnshadowedMaterial, type BakedScene, type Lighting } from '../src/index.js';
 
-export type Look = 'baked' | 'unshadowed' | 'coefficient';
+export type Look = 'baked' | 'unshadowed' | 'coefficient' | 'error';
 
 export class Model {
   readonly root: Object3D;
   readonly baked: BakedScene;
   private readonly own: Material[]; // by mesh, as all lists here
   private unshadowed: UnshadowedMaterial[] | undefined;
+  private errors: Material[] | undefined;
   private coefficient: { index: number; materials: Material[] } | undefined;
 
   constructor(gltf: GLTF) {
@@ -23,8 +24,8 @@ export class Model {
     return this.baked.transfer.meshes;
   }
 
-  /** `gain` scales false colour; `index` says which coefficient. */
-  wear(look: Look, lighting: Lighting | undefined, index: number, gain: { value: number }): void {
+  /** Gains scale false colour; `index` says which coefficient. */
+  wear(look: Look, lighting: Lighting | undefined, index: number, gain: { value: number }, errorGain: { value: number }): void {
     let materials = this.own;
     if (look === 'unshadowed') {
       if (!this.unshadowed) {
@@ -40,6 +41,8 @@ export class Model {
         this.coefficient = { index, materials: this.baked.transfer.coefficientMaterials(index, gain) };
       }
       materials = this.coefficient.materials;
+    } else if (look === 'error') {
+      materials = this.errors ??= this.baked.transfer.fitErrorMaterials?.(errorGain) ?? this.own;
     }
     this.meshes.forEach((mesh, i) => (mesh.material = materials[i]!));
   }
@@ -52,6 +55,7 @@ export class Model {
   dispose(): void {
     this.unshadowed?.forEach((m) => m.dispose());
     this.coefficient?.materials.forEach((m) => m.dispose());
+    if (this.errors !== this.own) this.errors?.forEach((m) => m.dispose());
     this.baked.dispose();
   }
 }

@@ -2,7 +2,7 @@
 // Numbers are separated by commas; `camera` and `rotate` are spelt as --camera and --env-rotate of the command line.
 import { shWindows, type ShWindow } from '../src/index.js';
 
-export const views = ['baked', 'compare', 'unshadowed', 'coefficient', 'reference'] as const;
+export const views = ['baked', 'compare', 'unshadowed', 'coefficient', 'error', 'reference'] as const;
 export type View = (typeof views)[number];
 
 export interface State {

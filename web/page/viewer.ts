@@ -25,6 +25,8 @@ export interface ViewerCallbacks {
 const groundName = 'ground'; // of the floor that `lambent bake --ground` adds
 /** Transfer at the ends of the false-colour scale, at exposure 0: those of open surfaces stay below 0.33. */
 export const falseColorEnd = 0.25;
+/** Of errors of a fit, relative. */
+export const fitErrorEnd = 0.1;
 const pause = 250; // milliseconds without a frame
 
 export class Viewer {
@@ -45,6 +47,7 @@ export class Viewer {
   private readonly picture = new PictureMaterial();
   private readonly screen = new FullScreenQuad(this.sky);
   private readonly gain = { value: 1 }; // of false colour
+  private readonly errorGain = { value: 1 };
   private readonly glyphs = new LobeGlyphs();
   private readonly bounds = new Sphere(new Vector3(), 1);
   private baked: Model | undefined;
@@ -199,7 +202,7 @@ export class Viewer {
     this.fitToCanvas();
     if (this.lightChanged) this.relight();
     renderer.toneMappingExposure = 2 ** this.exposure;
-    this.gain.value = 2 ** this.exposure / falseColorEnd;
+    this.gain.value = 2 ** this.exposure / falseColorEnd, this.errorGain.value = 2 ** this.exposure / fitErrorEnd;
     sky.turnBack.value.setFromMatrix4(new Matrix4().makeRotationFromQuaternion(new Quaternion().copy(this.orbit.light).invert()));
     sky.unproject.value.copy(camera.matrixWorld).multiply(camera.projectionMatrixInverse);
     const ratio = renderer.getPixelRatio(), width = this.canvas.width / ratio, height = this.canvas.height / ratio;
@@ -246,14 +249,14 @@ export class Viewer {
       if (image) screen.render(renderer);
       return;
     }
-    if (this.showBackground && this.environment && view !== 'coefficient') {
+    if (this.showBackground && this.environment && view !== 'coefficient' && view !== 'error') {
       screen.material = this.sky;
       screen.render(renderer);
     }
     const shown = view === 'compare' ? this.compare : this.baked;
     if (!shown) return;
     for (const model of [this.baked, this.compare]) if (model) model.root.visible = model === shown;
-    shown.wear(view === 'compare' ? 'baked' : view, this.environment?.lighting, this.coefficient, this.gain);
+    shown.wear(view === 'compare' ? 'baked' : view, this.environment?.lighting, this.coefficient, this.gain, this.errorGain);
     renderer.render(this.scene, this.camera);
     const glyphs = shown === this.baked ? this.glyphs.place(this.camera) : undefined;
     if (!glyphs) return;

@@ -37,6 +37,8 @@ export interface BakedTransfer {
    * Made on demand; the caller disposes of them.
    */
   coefficientMaterials(index: number, gain: { value: number }): Material[];
+  /** Where the file has the errors of a fit: materials that show them in false colour, as coefficientMaterials() does. */
+  readonly fitErrorMaterials?: (gain: { value: number }) => Material[];
   /** Zonal transfer: the lobes of a vertex as the surface stands now, or of its back; undefined where it has no receiver. */
   readonly lobesAt?: (mesh: Mesh, vertex: number, back: boolean) => Lobe[] | undefined;
   dispose(): void;

@@ -31,6 +31,7 @@ export interface PrtUniforms {
   prtTransfer: { value: DataArrayTexture };
   /** 3 ceil(order^2 / 4) vec4: coefficients of red, then green, then blue, padded with zeros. */
   prtLight: { value: Float32Array };
+  [name: string]: { value: unknown };
 }
 
 /** What a kind of transfer adds to the vertex shader. */

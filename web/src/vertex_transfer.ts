@@ -1,6 +1,6 @@
 // Transfer at vertices, whatever its kind: a texture of every receiver's values, receivers as attributes, and light as uniforms.
 import {
-  DataTexture, DataUtils, FloatType, Matrix3, RGBAFormat, Uint32BufferAttribute, type DataArrayTexture, type Material, type Mesh, type Object3D,
+  DataTexture, DataUtils, FloatType, Matrix3, RedFormat, RGBAFormat, Uint32BufferAttribute, type DataArrayTexture, type Material, type Mesh, type Object3D,
   type SkinnedMesh, type WebGLRenderer,
 } from 'three';
 import { blockTexture, packBlocks } from './block_texture.js';
@@ -38,6 +38,27 @@ function restBones(mesh: SkinnedMesh): DataTexture {
   return texture;
 }
 
+const errorWidth = 2048;
+function errorTexture(errors: Float32Array): DataTexture {
+  const height = Math.ceil(errors.length / errorWidth), data = new Float32Array(errorWidth * height);
+  data.set(errors);
+  const texture = new DataTexture(data, errorWidth, height, RedFormat, FloatType);
+  texture.needsUpdate = true;
+  return texture;
+}
+/** In place of a kind's own: the error of the receiver's fit. */
+const errorShader = ({ turns }: PrtShader): PrtShader => ({
+  key: 'fit error', turns,
+  radiance: `
+uniform highp sampler2D prtErrors;
+vec3 prtRadiance( const in uint receiver ) {
+  if ( receiver == 0xffffffffu ) return vec3( 0.0 );
+  int r = int( receiver );
+  return vec3( texelFetch( prtErrors, ivec2( r % ${errorWidth}, r / ${errorWidth} ), 0 ).r );
+}
+`,
+});
+
 /** How a kind lays out and reads the values of a receiver. */
 export interface VertexKind {
   kind: string;
@@ -45,6 +66,8 @@ export interface VertexKind {
   count: number;
   valueChannels: 1 | 3;
   shader: PrtShader;
+  /** One number a receiver, where there are any: how far its values are from what they were fitted to. */
+  fitErrors?: Float32Array;
   /** Where the values of a receiver are lobes. */
   readLobes?: (values: ArrayLike<number>) => Lobe[];
 }
@@ -57,6 +80,8 @@ export class VertexTransfer implements BakedTransfer {
   readonly fileBytes: number;
   readonly gpuBytes: number;
   readonly lobesAt?: NonNullable<BakedTransfer['lobesAt']>;
+  readonly fitErrorMaterials?: NonNullable<BakedTransfer['fitErrorMaterials']>;
+  private errors: DataTexture | undefined;
   private readonly texture: DataArrayTexture;
   private readonly bones = new Map<string, DataTexture>(); // by skeleton
   private readonly uniforms: PrtUniforms;
@@ -64,7 +89,7 @@ export class VertexTransfer implements BakedTransfer {
   private readonly materials = new Map<string, PrtMaterial>();
   private readonly quads: number; // of the light, a channel
 
-  private constructor(header: TransferHeader, { kind, count, valueChannels, shader, readLobes }: VertexKind, values: ArrayBuffer, readonly meshes: Mesh[]) {
+  private constructor(header: TransferHeader, { kind, count, valueChannels, shader, readLobes, fitErrors }: VertexKind, values: ArrayBuffer, readonly meshes: Mesh[]) {
     this.kind = kind, this.order = header.order, this.channels = header.channels, this.receivers = header.receivers, this.fileBytes = values.byteLength;
     const { layout, data } = packBlocks({ count, channels: valueChannels, precision: header.precision, receivers: header.receivers }, values);
     this.quads = Math.ceil(shCount(header.order) / 4);
@@ -85,6 +110,11 @@ export class VertexTransfer implements BakedTransfer {
       mesh.material = material;
     }
     this.gpuBytes = gpuBytes;
+    if (fitErrors)
+      this.fitErrorMaterials = (gain) => {
+        const uniforms = { ...this.uniforms, prtErrors: { value: (this.errors ??= errorTexture(fitErrors)) } };
+        return meshes.map((mesh, i) => new PrtMaterial(uniforms, { ...this.optionsOf[i]!, shader: errorShader(shader), falseColor: { gain } }, { side: (mesh.material as Material).side }));
+      };
     if (readLobes)
       this.lobesAt = (mesh, vertex, back) => {
         const receiver = mesh.geometry.getAttribute(back ? 'lambentReceiverBack' : 'lambentReceiver').getX(vertex);
@@ -135,7 +165,7 @@ export class VertexTransfer implements BakedTransfer {
   }
 
   dispose(): void {
-    this.texture.dispose();
+    this.texture.dispose(), this.errors?.dispose();
     for (const texture of this.bones.values()) texture.dispose();
     for (const material of this.materials.values()) material.dispose();
     for (const mesh of this.meshes) mesh.geometry.dispose();

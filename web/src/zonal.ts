@@ -84,8 +84,16 @@ export const zonalKind: TransferKind = {
   load: async (source) => {
     const header = readHeader(source.extension), lobes = source.extension.transfer['lobeCount'];
     if (!isIndex(lobes, maxLobes) || lobes < 1) throw new LambentError('"lobeCount" is out of range');
-    const { order, channels } = header;
-    return VertexTransfer.load(source, header, { kind: 'zonal', count: zonalValues(order, lobes, channels), valueChannels: 1, shader: zonalShader(order, lobes, channels),
+    const { order, channels } = header, errors = source.extension.transfer['fitErrors'];
+    let fitErrors: Float32Array | undefined;
+    if (errors !== undefined) {
+      if (!isIndex(errors)) throw new LambentError('"fitErrors" is no buffer view');
+      const bytes = await source.bufferView(errors);
+      if (bytes.byteLength !== 4 * header.receivers) throw new LambentError('there is not one error of a fit for each receiver');
+      fitErrors = new Float32Array(bytes);
+      if (!fitErrors.every(Number.isFinite)) throw new LambentError('the error of a fit is not finite');
+    }
+    return VertexTransfer.load(source, header, { kind: 'zonal', count: zonalValues(order, lobes, channels), valueChannels: 1, shader: zonalShader(order, lobes, channels), ...(fitErrors && { fitErrors }),
       readLobes: (values) => readLobes(values, order, exactZonalBands(order, lobes), lobes, channels) });
   },
 };

@@ -401,6 +401,13 @@ Result<Baked> load_baked(const MappedFile& file, const std::string& path) {
     ZonalTransfer& zonal = baked.zonal.emplace();
     zonal.order = light->order, zonal.lobes = int(*lobes), zonal.receivers = *receivers;
     if (auto ok = read_transfer_data(*chunks, file, *t, zonal, where); !ok) return ok.error();
+    if (t->contains("fitErrors")) {
+      auto errors = read_values<float>(*chunks, *t, "fitErrors", *receivers, where);
+      if (!errors) return errors.error();
+      for (float e : *errors)
+        if (!std::isfinite(e)) return Error{where, "the error of a fit is not finite"};
+      baked.fit_errors = std::move(*errors);
+    }
   } else {
     int rows = directional_rows(baked.directional);
     if (baked.factors && (rows != 1 || t->contains("cpca") || light->count() != size_t(sh_count(light->order))))

@@ -36,6 +36,7 @@ struct Baked {
   DirectionalKind directional = DirectionalKind::none;  // what the rows of a directional lightmap are
   std::optional<LatticeTransfer> lattice;  // light in free space, for the same light; its data lies in the mapped file too
   std::optional<ZonalTransfer> zonal;  // in place of `transfer`, which then has no receivers; read in place too
+  std::vector<float> fit_errors;       // of zonal transfer, where they were kept: relative RMS of each receiver's fit
   std::optional<Visibility> visibility;  // in place of `transfer` as well: all-frequency light; its records are read in place
   std::optional<CpcaTransfer> cpca;    // likewise in place of `transfer`
   bool factors = false;               // `transfer` is visibility times cosine, from which relight_factors() makes the rows of `outgoing`
@@ -69,7 +70,7 @@ size_t receivers_of(const Baked& baked);
 Result<void> save_baked(const std::string& path, const Scene& scene, const Receivers& receivers, const Transfer& transfer,
                         const std::string& provenance, const BakedExtras& extras = {});
 Result<void> save_baked(const std::string& path, const Scene& scene, const Receivers& receivers, const ZonalTransfer& transfer,
-                        const std::string& provenance);
+                        const std::string& provenance, std::span<const float> fit_errors = {});
 Result<void> save_baked(const std::string& path, const Scene& scene, const Receivers& receivers, const Visibility& visibility,
                         const std::string& provenance);
 // In place of the transfer that it was made of.

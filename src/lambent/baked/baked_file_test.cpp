@@ -402,10 +402,13 @@ TEST(BakedFile, KeepsZonalTransferAndRefusesLiesAboutIt) {
     for (float& x : v) x = random.next();
     store_receiver(w, r, v);
   }
-  ASSERT_TRUE(save_baked(file.path, s.scene, s.receivers, w.transfer, "{}"));
+  std::vector<float> errors(s.receivers.count());
+  for (float& e : errors) e = random.next();
+  ASSERT_TRUE(save_baked(file.path, s.scene, s.receivers, w.transfer, "{}", errors));
   auto back = load_baked(file.path);
   ASSERT_TRUE(back) << back.error().text();
   ASSERT_TRUE(back->zonal);
+  EXPECT_EQ(back->fit_errors, errors);
   EXPECT_EQ(back->transfer.receivers, 0u);
   EXPECT_EQ(back->front, s.receivers.front);
   EXPECT_EQ(back->zonal->order, 6);
@@ -424,6 +427,16 @@ TEST(BakedFile, KeepsZonalTransferAndRefusesLiesAboutIt) {
     ASSERT_FALSE(result) << to;
     EXPECT_EQ(result.error().text().find('\n'), std::string::npos);
   }
+}
+
+TEST(BakedFile, ErrorsOfFitsAreFinite) {
+  const TemporaryFile file("zonal_nan.glb");
+  const Small s = small_bake(3, Precision::half);
+  const WritableZonalTransfer w = make_zonal_transfer(3, 1, 1, s.receivers.count(), Precision::half);
+  ASSERT_TRUE(save_baked(file.path, s.scene, s.receivers, w.transfer, "{}", std::vector<float>(s.receivers.count(), NAN)));
+  auto result = load_baked(file.path);
+  ASSERT_FALSE(result);
+  EXPECT_NE(result.error().text().find("not finite"), std::string::npos);
 }
 
 TEST(BakedFile, LobesComeBackAndTheirHeadersMayNotLie) {

@@ -221,11 +221,15 @@ Result<void> save_baked(const std::string& path, const Scene& scene, const Recei
 }
 
 Result<void> save_baked(const std::string& path, const Scene& scene, const Receivers& receivers, const ZonalTransfer& transfer,
-                        const std::string& provenance) {
-  return save(path, scene, receivers, transfer.data, {}, nullptr, provenance, [&](json& extension, int) {
+                        const std::string& provenance, std::span<const float> fit_errors) {
+  LAMBENT_CHECK(fit_errors.empty() || fit_errors.size() == transfer.receivers);
+  std::vector<GltfBlob> blobs;
+  if (!fit_errors.empty()) blobs.push_back({bytes_of(fit_errors), 4});
+  return save(path, scene, receivers, transfer.data, blobs, nullptr, provenance, [&](json& extension, int first) {
     json& t = extension["transfer"] = header("zonal", transfer.channels, transfer.precision, transfer.receivers);
     write_light(t, {.order = transfer.order});
     t["lobeCount"] = transfer.lobes;
+    if (!fit_errors.empty()) t["fitErrors"] = first;
   });
 }
 
