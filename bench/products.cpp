@@ -286,7 +286,7 @@ void product_scene(const std::string& name, const Scene& scene) {
                         {"phong_10", Phong{Vec3(0.3f), Vec3(0.4f), 10}, 50},
                         {"phong_200", Phong{Vec3(0.3f), Vec3(0.4f), 200}, 40},
                         {"ward", Ward{Vec3(0.3f), Vec3(0.4f), Vec2(0.1f, 0.2f)}, 40}};
-  const std::vector<Camera> cameras = flyby(scene, 6);
+  const std::vector<Camera> cameras = flyby(scene, 3);
   for (const Case& c : cases) {
     Reflection reflection;
     reflection.everywhere = c.brdf;
@@ -314,10 +314,10 @@ void product_scene(const std::string& name, const Scene& scene) {
       Camera near = camera;
       near.fov /= 3;
       const std::vector<uint32_t> few = visible(near);
-      frame_seconds += least_seconds(3, [&] { shade(ours, seen, camera, relit, nullptr); });
+      frame_seconds += least_seconds(2, [&] { shade(ours, seen, camera, relit, nullptr); });
       ThreadLimit one(1);
-      near_seconds += least_seconds(2, [&] { shade(ours, few, camera, relit, nullptr); });
-      paper_seconds += least_seconds(2, [&] { shade(paper, seen, camera, by_paper, nullptr); });
+      near_seconds += least_seconds(1, [&] { shade(ours, few, camera, relit, nullptr); });
+      paper_seconds += least_seconds(1, [&] { shade(paper, seen, camera, by_paper, nullptr); });
       seconds += least_seconds(2, [&] { shade(ours, seen, camera, relit, nullptr); });
       shade(ours, seen, camera, relit, &tally);
       shade(paper, seen, camera, by_paper, &paper_tally);
