@@ -1,6 +1,7 @@
 // All-frequency products (locally-adaptive-products): its Tables 1 to 3 and the comparison of its Fig. 5 on our scenes, and what a new
 // environment takes. The paper's figures stand beside ours as "limit" where it
 // prints them; baselines are run on the same vertices.
+// LAMBENT_PRODUCTS_SCENES names those that are wanted, with commas ("hall,bunny.obj"); all if it is not set.
 // LAMBENT_PRODUCTS_DETAIL below 1 takes so much of the vertices of the made scenes and leaves out the shared ones: to try it, not to time it.
 #include "bench.h"
 #include "embree.h"
@@ -386,14 +387,18 @@ void bench_products() {
   const float detail = given ? std::clamp(std::strtof(given, nullptr), 0.001f, 1.0f) : 1.0f;
   light_case(64, 5);
   light_case(128, 20);
-  product_scene("round table", make_table(detail));
-  product_scene("relief", make_relief(detail));
-  product_scene("wheels", make_wheels(detail));
-  product_scene("hall", make_hall(detail));
+  const char* named = std::getenv("LAMBENT_PRODUCTS_SCENES");
+  auto wanted = [&](const std::string& name) { return !named || ("," + std::string(named) + ",").find("," + name + ",") != std::string::npos; };
+  if (wanted("round table")) product_scene("round table", make_table(detail));
+  if (wanted("relief")) product_scene("relief", make_relief(detail));
+  if (wanted("wheels")) product_scene("wheels", make_wheels(detail));
+  if (wanted("hall")) product_scene("hall", make_hall(detail));
   if (detail < 1) return;
-  product_scene("courtyard", make_courtyard(1.5f));
-  for (const char* name : {"bunny.obj", "armadillo.obj", "scorpion_loop1_200k.ply"})
+  if (wanted("courtyard")) product_scene("courtyard", make_courtyard(1.5f));
+  for (const char* name : {"bunny.obj", "armadillo.obj", "scorpion_loop1_200k.ply"}) {
+    if (!wanted(name)) continue;
     if (auto scene = refined(data_scene(name, true), 120'000)) product_scene(name, *scene);
+  }
 }
 
 }  // namespace lambent::bench
