@@ -12,9 +12,6 @@
 namespace lambent::tool {
 namespace {
 
-const std::map<std::string, Solver> solver_names{
-    {"jacobi", Solver::jacobi}, {"gauss-seidel", Solver::gauss_seidel}, {"southwell", Solver::southwell}, {"gmres", Solver::gmres}};
-
 using Clock = std::chrono::steady_clock;
 double seconds_since(Clock::time_point start) { return std::chrono::duration<double>(Clock::now() - start).count(); }
 
@@ -57,13 +54,16 @@ Result<ViewerLook> make_look(const Scene& scene, const Receivers& receivers, Dir
   return look;
 }
 
+}  // namespace
+
+const std::map<std::string, Solver> solver_names{
+    {"jacobi", Solver::jacobi}, {"gauss-seidel", Solver::gauss_seidel}, {"southwell", Solver::southwell}, {"gmres", Solver::gmres}};
+
 nlohmann::json convergence(const SolveReport& report) {
   nlohmann::json steps = nlohmann::json::array();
   for (const SolveStep& s : report.steps) steps.push_back({{"applications", s.applications}, {"residual", s.residual}});
   return {{"converged", report.converged}, {"steps", steps}};
 }
-
-}  // namespace
 
 void ReceiverFlags::add_to(CLI::App& command) {
   command.add_option("--receivers", kind, "Where light is received: vertices, texels of an atlas, or patches (triangles); texels for lightmaps, else vertices")

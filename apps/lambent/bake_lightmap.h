@@ -28,6 +28,10 @@ struct LightmapFlags {
   void add_to(CLI::App& command);
 };
 
+extern const std::map<std::string, Solver> solver_names;
+// {converged, steps: [{applications, residual}]}
+nlohmann::json convergence(const SolveReport& report);
+
 // "k" or "converge:EPS".
 struct Bounces {
   int count = 0;

@@ -66,20 +66,17 @@ int run_solvers(Context& context, const SolversCommand& o) {
   auto op = GatherOperator::trace(setup, &direct, nullptr, true, o.memory, &context.progress);
   if (!op) return fail(op.error());
 
-  const std::pair<const char*, Solver> solvers[] = {
-      {"jacobi", Solver::jacobi}, {"gauss-seidel", Solver::gauss_seidel}, {"southwell", Solver::southwell}, {"gmres", Solver::gmres}};
   nlohmann::json all = nlohmann::json::array();
   std::string table = fmt::format("{:14}{:>16}{:>10}{:>16}\n", "solver", fmt::format("to {:g}", o.tolerance), "seconds", fmt::format("to {:g}", o.fine));
-  for (const auto& [name, solver] : solvers) {
+  for (const auto& [name, solver] : solver_names) {
     SolveReport report, fine;
     const auto start = std::chrono::steady_clock::now();
     if (auto x = solve(*op, e.data(), width, {solver, o.tolerance, o.most}, &report, &context.progress); !x) return fail(x.error());
     const double seconds = std::chrono::duration<double>(std::chrono::steady_clock::now() - start).count();
     if (auto x = solve(*op, e.data(), width, {solver, o.fine, o.most}, &fine, &context.progress); !x) return fail(x.error());
-    nlohmann::json steps = nlohmann::json::array();
-    for (const SolveStep& s : fine.steps) steps.push_back({{"applications", s.applications}, {"residual", s.residual}});
     const auto coarse_count = applications_to(report, o.tolerance), fine_count = applications_to(fine, o.fine);
-    nlohmann::json one{{"solver", name}, {"converged", report.converged}, {"seconds", seconds}, {"steps", steps}};
+    nlohmann::json one = convergence(fine);
+    one["solver"] = name, one["converged"] = report.converged, one["seconds"] = seconds;
     one["applications"] = coarse_count ? nlohmann::json(*coarse_count) : nlohmann::json();
     all.push_back(one);
     auto shown = [](const std::optional<double>& n) { return n ? fmt::format("{:.1f}", *n) : std::string("not reached"); };

@@ -2,7 +2,7 @@
 // looked up until then. Who makes one says which texel is whose.
 import {
   Camera, GLSL3, HalfFloatType, Mesh, PlaneGeometry, RawShaderMaterial, RGBAFormat, Scene, WebGLRenderTarget, type DataArrayTexture,
-  type IUniform, type LinearFilter, type NearestFilter, type WebGLRenderer,
+  type IUniform, type LinearFilter, type Material, type NearestFilter, type WebGLRenderer,
 } from 'three';
 import type { BlockLayout } from './block_texture.js';
 import { LambentError } from './errors.js';
@@ -103,6 +103,15 @@ export class DrawnPicture {
   dispose(): void {
     this.target.dispose(), this.quad.geometry.dispose(), this.quad.material.dispose();
   }
+}
+
+/** Calls `done` when the last of the materials has been disposed of. */
+export function afterAll(materials: Material[], done: () => void): void {
+  let left = materials.length;
+  for (const material of materials)
+    material.addEventListener('dispose', () => {
+      if (--left === 0) done();
+    });
 }
 
 /** [coefficient][3] to red, green and blue in whole texels, as the uniform prtLight has them. */

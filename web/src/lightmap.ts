@@ -13,7 +13,7 @@ import { glslHarmonics } from './glsl_harmonics.js';
 import { directionalRows, readHeader, readReceivers, shareGeometry, type Directional, type TransferHeader } from './header.js';
 import type { BakedTransfer, TransferSource } from './kinds.js';
 import type { Lighting } from './lighting.js';
-import { LightSum, maxColumns } from './light_sum.js';
+import { afterAll, LightSum, maxColumns } from './light_sum.js';
 import { diffuseParameters, replaceOnce, useExitRadiance } from './prt_material.js';
 import { shCount } from './sh.js';
 
@@ -302,11 +302,7 @@ uint prtPick( const in ivec2 texel, out int row ) {
     this.ofCoefficients.add(atlas);
     const made = this.meshes.map((_, i) =>
       new LightmapMaterial(atlas, this.directional, { ...this.materials[i]!.surface, emission: { value: new Color(0, 0, 0) } }, this.materials[i]!, gain));
-    let left = made.length;
-    for (const material of made)
-      material.addEventListener('dispose', () => {
-        if (--left === 0) this.ofCoefficients.delete(atlas), atlas.dispose();
-      });
+    afterAll(made, () => (this.ofCoefficients.delete(atlas), atlas.dispose()));
     return made;
   }
 

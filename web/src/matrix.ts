@@ -15,7 +15,7 @@ import { glslHarmonics } from './glsl_harmonics.js';
 import { readHeader, type TransferHeader } from './header.js';
 import type { BakedTransfer, TransferKind, TransferSource } from './kinds.js';
 import type { Lighting } from './lighting.js';
-import { LightSum } from './light_sum.js';
+import { afterAll, LightSum } from './light_sum.js';
 import { diffuseParameters, replaceOnce, useExitRadiance } from './prt_material.js';
 import { maxShOrder, shCount } from './sh.js';
 import { bindPart } from './vertex_transfer.js';
@@ -241,11 +241,7 @@ uint prtPick( const in ivec2 texel, out int row ) {
     sum.set(new Float64Array(3 * shCount(this.order)).fill(1, 3 * index, 3 * index + 3));
     this.ofCoefficients.add(sum);
     const made = this.meshes.map((mesh) => new MatrixMaterial(sum, this.shared, mesh.geometry.hasAttribute('lambentReceiverBack'), mesh.material as Material, gain));
-    let left = made.length;
-    for (const material of made)
-      material.addEventListener('dispose', () => {
-        if (--left === 0) this.ofCoefficients.delete(sum), sum.dispose();
-      });
+    afterAll(made, () => (this.ofCoefficients.delete(sum), sum.dispose()));
     return made;
   }
 
