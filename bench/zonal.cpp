@@ -1,8 +1,10 @@
 // Zonal lobes (local-deformable-prt): how close they come, how long the fit takes, and how fast they shade. Figures of the paper and
 // of an earlier prototype stand beside ours as "limit". Not measured here: baking, posing.
-#include "bench.h"
+#include "embree.h"
 
 #include <lambent/bake/bake.h>
+#include <lambent/bake/matrix.h>
+#include <lambent/bake/patch.h>
 #include <lambent/compress/zonal_fit.h>
 #include <lambent/core/parallel.h>
 #include <lambent/core/random.h>
@@ -162,11 +164,100 @@ void shading_case() {
   line("zonal_shade_still_vs_simd", still, streamed, "relight(): the same, 16 receivers side by side, from memory", "-");
 }
 
+// The paper's Fig. 4: Cook and Torrance's BRDF of roughness 0.3 under light of order 4. Errors are of radiance in eight directions about each
+// receiver's normal, under a light whose bands fall off, relative to what all rows give.
+void glossy_case(const std::string& name) {
+  auto scene = data_scene(name, false);
+  if (!scene) return;
+  auto tracer = Tracer::build(*scene);
+  if (!tracer) return;
+  const Receivers receivers = make_vertex_receivers(*scene);
+  const CookTorrance metal{.diffuse = Vec3(0.2f), .specular = Vec3(0.8f), .f0 = Vec3(0.5f), .m = 0.3f};
+  ReceiverMaterials materials;
+  materials.materials = {{metal, metal}}, materials.of_receiver.assign(receivers.count(), 0);
+  for (const Vec3& n : receivers.normals) materials.frames.push_back(frame_about(n));
+  auto bake_rows = [&](OutgoingKind kind, int rows) {
+    return bake_matrix(*scene, *tracer, receivers, materials, {.order = 4, .samples = 256, .bounces = 0, .precision = Precision::single},
+                       {.outgoing = kind, .svd_rows = rows, .grid = 32});
+  };
+  std::vector<Vec3> light;
+  Random random(9);
+  for (int k = 0; k < sh_count(4); ++k) light.push_back((Vec3(random.next(), random.next(), random.next()) - 0.5f) / float(1 + sh_band(k)));
+  light[0] = Vec3(2.0f);
+  using Radiance = std::vector<Vec3>;
+  auto radiance = [&](const Outgoing& o, const Relit& relit) {
+    Radiance out;
+    std::vector<ViewWeights> w(size_t(relit.rows));
+    for (size_t r = 0; r < receivers.count(); ++r)
+      for (int i = 0; i < 8; ++i) {
+        const float z = (float(i) + 0.5f) / 8, phi = 2.4f * float(i), rho = std::sqrt(1 - z * z);
+        evaluate_outgoing(o, r, o.frames[r] * Vec3(rho * std::cos(phi), rho * std::sin(phi), z), w);
+        out.push_back(reflect_rows(w, Vec3(1), [&](size_t row) { return relit.at(r, int(row)); }));
+      }
+    return out;
+  };
+  auto error = [](const Radiance& a, const Radiance& b, const Radiance& whole) {
+    double sum = 0, total = 0;
+    for (size_t i = 0; i < a.size(); ++i) sum += glm::dot(a[i] - b[i], a[i] - b[i]), total += glm::dot(whole[i], whole[i]);
+    return std::sqrt(sum / total);
+  };
+  auto map = bake_rows(OutgoingKind::map, 1);
+  if (!map) return;
+  Relit relit;
+  relight(map->transfer, light, relit);
+  const Radiance truth = radiance(map->outgoing, relit);
+  for (int rows : {3, 6, 10}) {
+    auto svd = bake_rows(OutgoingKind::svd, rows);
+    if (!svd) return;
+    relight(svd->transfer, light, relit);
+    const Radiance of_rows = radiance(svd->outgoing, relit);
+    const double of_svd = error(of_rows, truth, truth);
+    for (int lobes = 1; lobes <= 4; ++lobes) {
+      ZonalFitReport fit;
+      auto z = fit_zonal(svd->transfer, {.lobes = lobes, .row_weights = row_weights(svd->outgoing)}, &fit);
+      if (!z) return;
+      relight_zonal(*z, nullptr, light, relit);
+      report("zonal_glossy", error(radiance(svd->outgoing, relit), of_rows, truth), of_svd, "relative RMS, of the lobes", "relative RMS, of the rows",
+             {{"scene", name}, {"rows", rows}, {"lobes", lobes}, {"receivers", receivers.count()}, {"fit", fit.rms}, {"seconds", fit.seconds},
+              {"bytes_per_receiver", double(z->bytes()) / double(receivers.count())}, {"aim", "<= 1"}});
+    }
+  }
+}
+
+// A patch of 128 x 128 texels and some 5,000 rays each, rounded hills, with the default bounces; against closest hits on the same rays.
+void patch_case() {
+  constexpr int size = 128, samples = 5120, runs = 3;
+  HeightField field{size, {}};
+  for (int j = 0; j < size; ++j)
+    for (int i = 0; i < size; ++i) {
+      const float u = 2 * pi * float(i) / size, v = 2 * pi * float(j) / size;
+      field.heights.push_back(0.04f * (std::sin(3 * u + std::sin(2 * v)) + std::sin(4 * v - std::cos(u)) + 0.4f * std::sin(9 * u + 7 * v)));
+    }
+  const PatchScene patch = make_patch(field, Vec3(0.5f));
+  auto tracer = Tracer::build(patch.scene);
+  if (!tracer) return;
+  const RawScene raw(patch.scene);
+  const DirectionSets sets = make_direction_sets(order, samples, 8, 1);
+  auto time = [&](auto f) {
+    return raw_seconds(runs, patch.receivers, sets, [&](Vec3 o, const float* x, const float* y, const float* z, size_t n) { return f(raw.scene, o, x, y, z, n); });
+  };
+  const double stream = time(closest_stream), packet = time(packets<true>), limit = std::min(stream, packet);
+  const double rays = double(patch.receivers.count()) * samples / 1e6;
+  for (int bounces : {0, 3}) {
+    BakeReport r;
+    const double seconds = least_seconds(runs, [&] { (void)bake(patch.scene, *tracer, patch.receivers, {.order = order, .samples = samples, .bounces = bounces, .precision = Precision::single}, &r); });
+    report("zonal_patch_simulation", rays / seconds, rays / limit, "Mrays/s", "best raw Embree closest hits, same rays",
+           {{"texels", size * size}, {"samples", samples}, {"bounces", bounces}, {"seconds", seconds}, {"raw_stream", rays / stream}, {"raw_packets", rays / packet}, {"aim", ">= 0.6"}});
+  }
+}
+
 }  // namespace
 
 void bench_zonal() {
+  patch_case();
   shading_case();
   random_case();
+  glossy_case("bunny.obj");
   for (const char* name : {"bunny.obj", "armadillo.obj", "scorpion.obj"}) mesh_case(name);
 }
 

@@ -36,7 +36,7 @@ struct BakeCommand {
   std::string lattice_points, lattice_box;
   std::string light, transfer = "diffuse", membrane, subsurface, outgoing = "map", simulate = "recursion", fix_light, fix_view,
               size = "512x512", compress, output, shadows = "on", precision = "half", bounces = "3";
-  bool factors = false;
+  bool factors = false, glossy = false;  // glossy: lobes of the rows of a matrix
   int view_samples = 16;  // rays a pixel of a fixed view
   ReceiverFlags receivers;
   LightmapFlags lightmap;
@@ -175,7 +175,7 @@ int run_bake(Context& context, BakeCommand o) {
   o.bake.shadows = o.shadows == "on";
   if (!o.bake.shadows) o.bake.bounces = 0;
   o.bake.precision = o.precision == "half" ? Precision::half : Precision::single;
-  const bool is_matrix = o.transfer == "matrix", is_zonal = o.transfer == "zonal";
+  const bool is_zonal = o.transfer == "zonal", is_matrix = o.transfer == "matrix" || (is_zonal && o.glossy);
   o.matrix.simulate_paths = o.simulate == "paths";
   o.zonal.precision = o.bake.precision;
   if (is_zonal) o.bake.precision = Precision::single;  // it is rounded once, as lobes
@@ -320,6 +320,7 @@ int run_bake(Context& context, BakeCommand o) {
   ZonalFitReport fit;
   std::optional<ZonalTransfer> zonal;
   if (is_zonal) {
+    if (outgoing) o.zonal.row_weights = row_weights(*outgoing);
     auto fitted = fit_zonal(*transfer, o.zonal, &fit, &context.progress);
     if (!fitted) return fail(fitted.error());
     zonal = std::move(*fitted);
@@ -342,9 +343,9 @@ int run_bake(Context& context, BakeCommand o) {
   start = Clock::now();
   const std::string origin = provenance.dump(-1, ' ', false, nlohmann::json::error_handler_t::replace);
   const BakedExtras extras{.outgoing = outgoing ? &*outgoing : nullptr, .lattice = free_space ? &*free_space : nullptr,
-                           .factors = o.factors, .view = view ? &*view : nullptr};
+                           .factors = o.factors, .view = view ? &*view : nullptr, .fit_errors = fit.errors};
   const Receivers of_surfaces = view ? Receivers{} : receivers;
-  if (auto ok = zonal      ? save_baked(o.output, *scene, receivers, *zonal, origin, fit.errors)
+  if (auto ok = zonal      ? save_baked(o.output, *scene, receivers, *zonal, origin, extras)
                 : clusters ? save_baked(o.output, *scene, receivers, *clusters, origin, extras)
                            : save_baked(o.output, *scene, of_surfaces, *transfer, origin, extras);
       !ok)
@@ -414,7 +415,7 @@ void add_bake(CLI::App& app, Run& run) {
   o->scene.add_to(*c);
   c->add_option("-o,--output", o->output, "Baked file to write (.glb)")->required();
   c->add_option("--transfer", o->transfer, "What is stored: diffuse, a vector a receiver for distant light; matrix, incident light in every direction, "
-                                           "for glossy materials; zonal, lobes, for what moves; lightmap, the light of the scene's own lamps; "
+                                           "for glossy materials; zonal, lobes, for what moves, glossy too with --brdf or --outgoing; lightmap, the light of the scene's own lamps; "
                                            "blocks, visibility for sharp shadows and highlights, with materials chosen when it is drawn")
       ->check(CLI::IsMember({"diffuse", "matrix", "zonal", "lightmap", "blocks"}))->capture_default_str();
   auto* order = c->add_option("--order", o->bake.order, "Bands of the lighting's spherical harmonics")->check(CLI::Range(1, max_sh_order))->capture_default_str();
@@ -424,6 +425,8 @@ void add_bake(CLI::App& app, Run& run) {
                        ->check(CLI::Range(1, max_incident_order))->capture_default_str();
   auto* last = c->add_option("--outgoing", o->outgoing, "matrix: rows for the last reflection: map, phong, svd:ROWS, sh:BANDS, hemisphere:BANDS, hsh:BANDS")
                    ->capture_default_str();
+  auto* grid = c->add_option("--view-map", o->matrix.grid, "matrix: nodes a side of the maps that the last reflection is looked up in by view, map and svd")
+                   ->check(CLI::Range(8, 256))->capture_default_str();
   auto* membrane = c->add_option("--membrane", o->membrane, "No simulation: thin sheets that let this share of the light through, 0 to 1, or a picture of it");
   auto* subsurface = c->add_option("--subsurface", o->subsurface, subsurface_help);
   auto* simulate = c->add_option("--simulate", o->simulate, "matrix: bounces by the recursion over receivers, or by paths (caustics, coarse meshes; noisier)")
@@ -451,7 +454,7 @@ void add_bake(CLI::App& app, Run& run) {
   auto* box = c->add_option("--lattice-box", o->lattice_box, "X0,Y0,Z0,X1,Y1,Z1: where, if not throughout the scene's box");
   auto* lattice_order = c->add_option("--lattice-order", o->lattice.order, "Bands of the light that arrives there")
                             ->check(CLI::Range(1, max_sh_order))->capture_default_str();
-  c->callback([o, bounces, order, light, lobes, membrane, subsurface, fixed, view, compress, factors, incident, last, brdf, simulate, points, box, lattice_order, blocks, &run] {
+  c->callback([o, grid, bounces, order, light, lobes, membrane, subsurface, fixed, view, compress, factors, incident, last, brdf, simulate, points, box, lattice_order, blocks, &run] {
     o->order_given = order->count() > 0;
     if (order->count() && light->count()) throw CLI::ValidationError("--order and --light both say how many bands there are: give one");
     if (light->count() && (membrane->count() || (o->transfer != "diffuse" && o->transfer != "matrix")))
@@ -476,8 +479,12 @@ void add_bake(CLI::App& app, Run& run) {
         if (option->count()) throw CLI::ValidationError("--factors does not go with " + option->get_name());
       o->bounces = "0";
     }
-    for (const CLI::Option* option : {factors, incident, last, brdf, simulate})
-      if (option->count() && o->transfer != "matrix") throw CLI::ValidationError(option->get_name() + " needs --transfer matrix");
+    // Lobes of a matrix's rows, where a last reflection is asked for.
+    o->glossy = o->transfer == "zonal" && (last->count() || brdf->count());
+    for (const CLI::Option* option : {factors, incident, last, brdf, simulate, grid})
+      if (option->count() && o->transfer != "matrix" && !(o->glossy && option != factors))
+        throw CLI::ValidationError(option->get_name() + (o->transfer == "zonal" && option != factors ? " needs --transfer matrix, or --outgoing or --brdf" : " needs --transfer matrix"));
+    if (subsurface->count() && o->glossy) throw CLI::ValidationError("--subsurface is for diffuse and zonal transfer on surfaces");
     for (const CLI::Option* option : blocks)
       if (option->count() && o->transfer != "blocks") throw CLI::ValidationError(option->get_name() + " needs --transfer blocks");
     for (const CLI::Option* option : {order, light, membrane, fixed, view, compress, points, bounces})

@@ -80,8 +80,11 @@ int run_compress(Context& context, CompressCommand o) {
   if (!baked) return fail(baked.error());
   if (baked->visibility) return fail({o.baked, "holds no transfer to compress, but visibility in blocks"});
   if (!o.cpca.empty()) return compress_to_clusters(context, o, *baked);
-  if (baked->zonal || baked->outgoing || baked->cpca || baked->view) return fail({o.baked, "holds no diffuse transfer of spherical harmonics, which is what lobes are fitted to"});
+  if (baked->zonal || baked->cpca || baked->view || baked->factors || baked->directional != DirectionalKind::none || baked->front.empty())
+    return fail({o.baked, "holds no transfer of spherical harmonics at vertices, which is what lobes are fitted to"});
+  if (baked->lattice) warn(o.baked + ": light in free space is left out: lobes have none");
   ZonalFitReport report;
+  if (baked->outgoing) o.zonal.row_weights = row_weights(*baked->outgoing);
   auto fit = fit_zonal(baked->transfer, o.zonal, &report, &context.progress);
   if (!fit) return fail({o.baked, fit.error().text()});
 
@@ -91,7 +94,8 @@ int run_compress(Context& context, CompressCommand o) {
                          {"seed", o.zonal.seed}, {"rms", report.rms}};
   Receivers receivers;
   receivers.front = baked->front, receivers.back = baked->back;
-  if (auto ok = save_baked(o.output, baked->scene, receivers, *fit, provenance.dump(), report.errors); !ok) return fail(ok.error());
+  const BakedExtras extras{.outgoing = baked->outgoing ? &*baked->outgoing : nullptr, .fit_errors = report.errors};
+  if (auto ok = save_baked(o.output, baked->scene, receivers, *fit, provenance.dump(), extras); !ok) return fail(ok.error());
   if (!o.error_picture.empty()) {
     auto image = paint_errors(*baked, report.errors, o, &context.progress);
     if (!image) return fail(image.error());
@@ -104,14 +108,14 @@ int run_compress(Context& context, CompressCommand o) {
   const double bytes = double(fit->receiver_values() * fit->value_bytes());
   const double before = double(baked->transfer.receiver_values() * baked->transfer.value_bytes());
   if (context.json)
-    print_json({{"output", o.output}, {"receivers", fit->receivers}, {"lobes", fit->lobes}, {"channels", fit->channels}, {"rms", report.rms},
+    print_json({{"output", o.output}, {"receivers", fit->receivers}, {"lobes", fit->lobes}, {"rows", fit->rows}, {"channels", fit->channels}, {"rms", report.rms},
                 {"median", median}, {"worst", worst}, {"seconds", report.seconds}, {"retried", report.retried}, {"bytes", fit->bytes()},
                 {"bytes_per_receiver", bytes}, {"bytes_per_receiver_before", before}});
   else
     fmt::print("{}\n  error      {:.2f}% RMS of the transfer; receivers: median {:.2f}%, worst {:.1f}%\n  time       {} for {} receivers\n"
-               "  size       {} a receiver, {} before ({} lobes, order {}, {} channel{})\n",
+               "  size       {} a receiver, {} before ({} lobes{}, order {}, {} channel{})\n",
                o.output, 100 * report.rms, 100 * median, 100 * worst, human_seconds(report.seconds), human_count(fit->receivers), human_bytes(bytes),
-               human_bytes(before), fit->lobes, fit->order, fit->channels, fit->channels == 1 ? "" : "s");
+               human_bytes(before), fit->lobes, fit->rows > 1 ? fmt::format(" in each of {} rows", fit->rows) : "", fit->order, fit->channels, fit->channels == 1 ? "" : "s");
   return success;
 }
 
@@ -122,7 +126,7 @@ void add_compress(CLI::App& app, Run& run) {
   CLI::App* c = app.add_subcommand("compress", "Store baked transfer in less: zonal lobes, which turn with a surface that moves, or clusters");
   c->add_option("baked", o->baked, "Baked file, from `lambent bake`")->required();
   auto* cpca = c->add_option("--cpca", o->cpca, "CLUSTERS,RANK: clusters of receivers with like transfer, each a mean and so many components");
-  auto* zonal = c->add_option("--zonal", o->zonal.lobes, "Lobes a receiver")->check(CLI::Range(1, max_stored_lobes));
+  auto* zonal = c->add_option("--zonal", o->zonal.lobes, "Lobes a receiver; of a matrix, a row")->check(CLI::Range(1, max_stored_lobes));
   c->add_option("-o,--output", o->output, "Baked file to write (.glb)")->required();
   c->add_option("--starts", o->zonal.starts, "Searches from random axes where the error is high")->check(CLI::Range(0, 1000))->capture_default_str();
   c->add_option("--retry", o->zonal.retry, "What error is high, relative")->check(CLI::Range(0.0f, 1.0f))->capture_default_str();

@@ -65,12 +65,14 @@ int inspect_picture(Context& context, const std::string& path) {
 
 int inspect_zonal(Context& context, const std::string& path, const Baked& baked) {
   const ZonalTransfer& t = *baked.zonal;
+  const nlohmann::json outgoing = baked.outgoing ? nlohmann::json(outgoing_names[int(baked.outgoing->kind)]) : nlohmann::json();
   const nlohmann::json d{{"file", path}, {"kind", "baked"}, {"scene", describe_scene(baked.scene)},
-                         {"transfer", {{"kind", "zonal"}, {"order", t.order}, {"lobes", t.lobes}, {"channels", t.channels}, {"receivers", t.receivers},
+                         {"transfer", {{"kind", "zonal"}, {"order", t.order}, {"lobes", t.lobes}, {"rows", t.rows}, {"outgoing", outgoing}, {"channels", t.channels}, {"receivers", t.receivers},
                                        {"bytes", t.bytes()}, {"precision", t.precision == Precision::half ? "half" : "single"}}},
                          {"provenance", nlohmann::json::parse(baked.provenance, nullptr, false)}};
   if (context.json) return print_json(d), success;
-  fmt::print("{}\n  baked: {} zonal lobes, order {}, {} channel{}, {} receivers, {} ({})\n", path, t.lobes, t.order, t.channels,
+  fmt::print("{}\n  baked: {} zonal lobes{}, order {}, {} channel{}, {} receivers, {} ({})\n", path, t.lobes,
+             baked.outgoing ? fmt::format(" in each of {} rows ({})", t.rows, outgoing_names[int(baked.outgoing->kind)]) : "", t.order, t.channels,
              t.channels == 1 ? "" : "s", human_count(t.receivers), human_bytes(double(t.bytes())), t.precision == Precision::half ? "half" : "single");
   print_scene(d["scene"]);
   fmt::print("  provenance {}\n", d["provenance"].dump(-1, ' ', false, nlohmann::json::error_handler_t::replace));

@@ -1,11 +1,10 @@
 #include "commands.h"
 #include "options.h"
+#include "relief.h"
 
-#include <lambent/bake/patch.h>
 #include <lambent/bake/subsurface.h>
 #include <lambent/compress/zonal_fit.h>
 #include <lambent/core/file.h>
-#include <lambent/image/image.h>
 #include <lambent/scene/load.h>
 #include <lambent/transfer/zonal_texture.h>
 
@@ -28,15 +27,8 @@ struct PatchCommand {
 };
 
 Result<PatchScene> load_height_patch(const PatchCommand& o, double& jump) {
-  auto picture = load_image(o.heights);
-  if (!picture) return picture.error();
-  // A height is what the file holds: the curve that loading undoes in PNG and JPEG is put back.
-  const std::string extension = file_extension(o.heights);
-  const bool encoded = extension == "png" || extension == "jpg" || extension == "jpeg";
-  std::vector<float> values;
-  for (Vec3 p : picture->rgb) values.push_back(encoded ? srgb_encode(luminance(p)) : luminance(p));
-  auto field = make_height_field(values, picture->width, picture->height, o.size, o.depth);
-  if (!field) return Error{o.heights, field.error().text()};
+  auto field = load_heights(o.heights, o.size, o.depth);
+  if (!field) return field.error();
   jump = seam_jump(*field);
   return make_patch(*field, o.subsurface.empty() ? Vec3(o.albedo) : Vec3(1));
 }
@@ -82,7 +74,7 @@ int run_patch(Context& context, PatchCommand o) {
   nlohmann::json through;
   if (!o.subsurface.empty()) through = {{"events", walks.events}, {"lost", walks.lost}};
   if (context.json)
-    print_json({{"output", o.output}, {"size", o.size}, {"lobes", o.zonal.lobes}, {"order", o.bake.order}, {"rays", report.rays}, {"trace_seconds", report.trace_seconds},
+    print_json({{"output", o.output}, {"size", o.size}, {"lobes", o.zonal.lobes}, {"order", o.bake.order}, {"rays", report.rays}, {"buried", report.buried}, {"trace_seconds", report.trace_seconds},
                 {"bounce_seconds", report.bounce_seconds}, {"fit_seconds", fit.seconds}, {"rms", fit.rms}, {"bytes", lobes->bytes()}, {"seam_jump", jump},
                 {"subsurface", through}});
   else

@@ -1,6 +1,7 @@
 #include "commands.h"
 #include "motion.h"
 #include "options.h"
+#include "relief.h"
 
 #include <lambent/baked/baked_file.h>
 #include <lambent/light/project.h>
@@ -19,6 +20,7 @@ struct ReferenceCommand {
   LightOptions light;
   ViewOptions view;
   MotionOptions motion;
+  DisplaceOptions displace;
   BrdfOptions brdf;
   ShWindow window = ShWindow::none;
   int light_order = 0;
@@ -46,10 +48,12 @@ int run_reference(Context& context, ReferenceCommand o) {
   auto poses = make_poses(o.motion, *scene);
   if (!poses) return fail(poses.error());
   if (poses->front()) *scene = posed(*scene, *poses->front());
-  auto view = make_view(o.view, *scene);
+  auto view = make_view(o.view, *scene);  // of the scene before it is displaced, as render looks at it
   if (!view) return fail(view.error());
   if (o.light.env.empty() && !o.options.lamps) return fail({"--env", "is needed, or --lamps"});
   if (o.light.env.empty()) o.light.env = "uniform:0";
+  if (!o.displace.heights.empty())
+    if (auto ok = displace_scene(*scene, o.displace); !ok) return fail(ok.error());
   auto env = load_light(o.light);
   if (!env) return fail(env.error());
   if (basis.count() > 0) {
@@ -82,6 +86,7 @@ void add_reference(CLI::App& app, Run& run) {
   o->light.add_to(*c, false);
   o->view.add_to(*c);
   o->motion.add_to(*c, false);
+  o->displace.add_to(*c);
   o->brdf.add_to(*c);
   c->add_option("--light-order", o->light_order, "Light by the environment's projection to this many bands, negative light included")
       ->check(CLI::Range(1, max_sh_order));

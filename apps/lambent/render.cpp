@@ -227,7 +227,13 @@ int run_render(Context& context, const RenderCommand& o) {
   for (const std::optional<Pose>& pose : *poses) {
     // T . light
     Relit relit;
-    const ReceiverFrames frames = baked->zonal && pose ? make_receiver_frames(receiver_rotations(*pose, baked->front, baked->back, receivers)) : ReceiverFrames();
+    ReceiverFrames frames;
+    Outgoing outgoing;
+    if (baked->zonal && pose) {
+      const std::vector<Mat3> rotations = receiver_rotations(*pose, baked->front, baked->back, receivers);
+      frames = make_receiver_frames(rotations);
+      if (baked->outgoing) outgoing = turn_outgoing(*baked->outgoing, rotations), options.outgoing = &outgoing;
+    }
     const auto start = std::chrono::steady_clock::now();
     if (baked->zonal) relight_zonal(*baked->zonal, pose ? &frames : nullptr, table, relit);
     else if (baked->cpca) relight(*baked->cpca, light, relit);

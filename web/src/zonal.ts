@@ -82,6 +82,7 @@ vec3 prtRadiance( const in uint receiver ) {
 export const zonalKind: TransferKind = {
   name: 'zonal',
   load: async (source) => {
+    if (source.extension.transfer['outgoing'] !== undefined) throw new LambentError('holds lobes of a transfer matrix, which this viewer does not draw yet: bake it with --transfer matrix');
     const header = readHeader(source.extension), lobes = source.extension.transfer['lobeCount'];
     if (!isIndex(lobes, maxLobes) || lobes < 1) throw new LambentError('"lobeCount" is out of range');
     const { order, channels } = header, errors = source.extension.transfer['fitErrors'];

@@ -32,6 +32,15 @@ Result<HeightField> make_height_field(std::span<const float> values, int width, 
   return field;
 }
 
+float sample_height(const HeightField& field, Vec2 uv) {
+  const int n = field.size;
+  uv = (uv - glm::floor(uv)) * float(n) - 0.5f;
+  const int i = int(std::floor(uv.x)), j = int(std::floor(uv.y));
+  const float fx = uv.x - float(i), fy = uv.y - float(j);
+  auto at = [&](int a, int b) { return field.heights[size_t((b + n) % n * n + (a + n) % n)]; };
+  return (1 - fy) * ((1 - fx) * at(i, j) + fx * at(i + 1, j)) + fy * ((1 - fx) * at(i, j + 1) + fx * at(i + 1, j + 1));
+}
+
 double seam_jump(const HeightField& f) {
   const size_t n = size_t(f.size);
   double seam = 0, inside = 0;
@@ -69,13 +78,14 @@ PatchScene make_patch(const HeightField& field, Vec3 albedo) {
   part.name = "relief", part.vertex_count = uint32_t(s.positions.size()), part.triangle_count = uint32_t(s.triangles.size());
   s.parts.push_back(part);
 
-  // Origins a hair off the surface, as for any vertices; then only the middle ones stay, and every vertex points at its like.
-  const Receivers all = make_vertex_receivers(s);
+  // The middle ones receive, and every vertex points at its like. Origins are a hair off the surface, upward: at the bottom of a steep valley the
+  // normal may point into its other side.
   Receivers& r = patch.receivers;
+  const float diagonal = bounds(s).diagonal();
   for (int j = n; j < 2 * n; ++j)
     for (int i = n; i < 2 * n; ++i) {
-      const uint32_t from = all.front[size_t(j * (side + 1) + i)];
-      r.origins.push_back(all.origins[from]), r.normals.push_back(all.normals[from]);
+      const size_t v = size_t(j * (side + 1) + i);
+      r.origins.push_back(s.positions[v] + Vec3(0, 0, 2 * receiver_lift(s.positions[v], texel, diagonal))), r.normals.push_back(s.normals[v]);
     }
   r.front.resize(s.positions.size());
   for (int j = 0; j <= side; ++j)

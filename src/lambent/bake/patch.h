@@ -14,6 +14,9 @@ struct HeightField {
 // finite; size or depth out of range.
 Result<HeightField> make_height_field(std::span<const float> values, int width, int height, int size, float depth);
 
+// Bilinear at uv, repeated.
+float sample_height(const HeightField& field, Vec2 uv);
+
 // How much a field jumps from its last row and column to its first, as a multiple of how much it changes from row to row
 // elsewhere: about 1 for a field that tiles.
 double seam_jump(const HeightField& field);

@@ -1,5 +1,7 @@
 #include <lambent/bake/patch.h>
 #include <lambent/basis/sh.h>
+#include <lambent/core/random.h>
+#include <lambent/reference/path_tracer.h>
 #include <lambent/scene/procedural.h>
 
 #include <gtest/gtest.h>
@@ -146,6 +148,27 @@ TEST(Patch, MakesHeightFieldsOfPictures) {
   HeightField ramp{16, {}};
   for (int k = 0; k < 256; ++k) ramp.heights.push_back(float(k % 16));
   EXPECT_GT(seam_jump(ramp), 5);
+}
+
+// At the bottom of a steep valley the normal may point into its other side; what is received there is still what arrives there.
+TEST(Patch, SteepValleysAreNotTakenForBuried) {
+  const int n = 16;
+  HeightField field{n, {}};
+  for (int k = 0; k < n * n; ++k) {
+    Random random(4, uint64_t(k));
+    field.heights.push_back(0.3f * random.next());
+  }
+  const PatchScene patch = make_patch(field, Vec3(0.5f));
+  auto tracer = Tracer::build(patch.scene);
+  BakeReport report;
+  auto transfer = bake(patch.scene, *tracer, patch.receivers, {.order = 1, .samples = 1024, .bounces = 0, .precision = Precision::single}, &report);
+  ASSERT_TRUE(transfer);
+  EXPECT_EQ(report.buried, 0u);
+  const Environment env = *load_environment("uniform:1");
+  const std::vector<ExitRadiance> truth = exit_radiances(patch.scene, env, patch.receivers.origins, patch.receivers.normals, 0, 1024, 1);
+  double error = 0;
+  for (size_t r = 0; r < truth.size(); ++r) error += std::pow(load_receiver(*transfer, r)[0] * std::sqrt(4 * std::numbers::pi) - truth[r].mean.x, 2);
+  EXPECT_LT(std::sqrt(error / double(truth.size())), 0.01);
 }
 
 }  // namespace

@@ -26,6 +26,14 @@ Result<size_t> read_count(const json& object, const char* key, size_t limit, con
   return it->get<size_t>();
 }
 
+// Rows of a transfer matrix.
+Result<int> read_rows(const json& transfer, const std::string& where) {
+  auto count = read_count(transfer, "rows", 2 * sh_count(max_sh_order), where);
+  if (!count) return count.error();
+  if (*count < 1) return Error{where, "the transfer has no rows"};
+  return int(*count);
+}
+
 Result<LightBasis> read_light(const json& object, const std::string& where) {
   LightBasis light;
   if (!object.contains("basis") || object["basis"] != "sh") return Error{where, "the light basis is not known to this program"};
@@ -90,6 +98,7 @@ Result<std::vector<T>> read_values(const GltfChunks& chunks, const json& object,
 }
 
 Result<Outgoing> read_outgoing(const GltfChunks& chunks, const json& object, int rows, size_t receivers, const std::string& where) {
+  if (!object.is_object()) return Error{where, "is not an object"};
   Outgoing o;
   const auto kind = std::find_if(std::begin(outgoing_names), std::end(outgoing_names), [&](const char* name) { return object.contains("kind") && object["kind"] == name; });
   if (kind == std::end(outgoing_names)) return Error{where, "the outgoing basis is not known to this program"};
@@ -400,6 +409,14 @@ Result<Baked> load_baked(const MappedFile& file, const std::string& path) {
     if (light->order < 1 || light->count() != size_t(sh_count(light->order))) return Error{where, "zonal transfer is of spherical harmonics alone"};
     ZonalTransfer& zonal = baked.zonal.emplace();
     zonal.order = light->order, zonal.lobes = int(*lobes), zonal.receivers = *receivers;
+    if (t->contains("outgoing")) {
+      auto rows = read_rows(*t, where);
+      if (!rows) return rows.error();
+      zonal.rows = *rows;
+      auto outgoing = read_outgoing(*chunks, (*t)["outgoing"], *rows, *receivers, where + ": outgoing");
+      if (!outgoing) return outgoing.error();
+      baked.outgoing = std::move(*outgoing);
+    }
     if (auto ok = read_transfer_data(*chunks, file, *t, zonal, where); !ok) return ok.error();
     if (t->contains("fitErrors")) {
       auto errors = read_values<float>(*chunks, *t, "fitErrors", *receivers, where);
@@ -413,10 +430,9 @@ Result<Baked> load_baked(const MappedFile& file, const std::string& path) {
     if (baked.factors && (rows != 1 || t->contains("cpca") || light->count() != size_t(sh_count(light->order))))
       return Error{where, "visibility as a factor is of harmonics alone, with one row"};
     if (is_matrix && !baked.factors) {
-      auto count = read_count(*t, "rows", 2 * sh_count(max_sh_order), where);
+      auto count = read_rows(*t, where);
       if (!count) return count.error();
-      if (*count < 1) return Error{where, "the transfer has no rows"};
-      rows = int(*count);
+      rows = *count;
     }
     if (t->contains("cpca")) {
       CpcaTransfer& cpca = baked.cpca.emplace();

@@ -32,7 +32,7 @@ struct Baked {
   std::vector<uint32_t> front, back;  // receiver of each scene vertex, by side, as in Receivers; of vertex receivers alone
   SpatialBasis basis;                 // how values between receivers interpolate
   Transfer transfer;                  // read in place: its data lies in the mapped file
-  std::optional<Outgoing> outgoing;   // the last reflection of a transfer matrix
+  std::optional<Outgoing> outgoing;   // the last reflection of a transfer matrix, or of its rows as lobes
   DirectionalKind directional = DirectionalKind::none;  // what the rows of a directional lightmap are
   std::optional<LatticeTransfer> lattice;  // light in free space, for the same light; its data lies in the mapped file too
   std::optional<ZonalTransfer> zonal;  // in place of `transfer`, which then has no receivers; read in place too
@@ -53,12 +53,13 @@ struct ViewerLook {
 
 // What some bakes have beside transfer.
 struct BakedExtras {
-  const Outgoing* outgoing = nullptr;                   // of a transfer matrix
+  const Outgoing* outgoing = nullptr;                   // of a transfer matrix, or of its rows as lobes
   DirectionalKind directional = DirectionalKind::none;  // of a directional lightmap
   const ViewerLook* look = nullptr;
   const LatticeTransfer* lattice = nullptr;             // light in free space, for the same light as the transfer
   bool factors = false;                                 // `transfer` is visibility times cosine, of one row and channel; needs `outgoing`, a map
   const FixedView* view = nullptr;                      // the receivers are its pixels
+  std::span<const float> fit_errors;                    // of zonal transfer: relative RMS of each receiver's fit
 };
 
 // What all kinds have. The light is what relighting takes.
@@ -69,8 +70,9 @@ size_t receivers_of(const Baked& baked);
 // in the file, and loading finds them again. Errors: the disk's; more than 4 GiB, which a GLB cannot hold.
 Result<void> save_baked(const std::string& path, const Scene& scene, const Receivers& receivers, const Transfer& transfer,
                         const std::string& provenance, const BakedExtras& extras = {});
+// Of the extras, the last reflection and the errors of the fit.
 Result<void> save_baked(const std::string& path, const Scene& scene, const Receivers& receivers, const ZonalTransfer& transfer,
-                        const std::string& provenance, std::span<const float> fit_errors = {});
+                        const std::string& provenance, const BakedExtras& extras = {});
 Result<void> save_baked(const std::string& path, const Scene& scene, const Receivers& receivers, const Visibility& visibility,
                         const std::string& provenance);
 // In place of the transfer that it was made of.

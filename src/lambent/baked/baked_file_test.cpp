@@ -404,7 +404,7 @@ TEST(BakedFile, KeepsZonalTransferAndRefusesLiesAboutIt) {
   }
   std::vector<float> errors(s.receivers.count());
   for (float& e : errors) e = random.next();
-  ASSERT_TRUE(save_baked(file.path, s.scene, s.receivers, w.transfer, "{}", errors));
+  ASSERT_TRUE(save_baked(file.path, s.scene, s.receivers, w.transfer, "{}", {.fit_errors = errors}));
   auto back = load_baked(file.path);
   ASSERT_TRUE(back) << back.error().text();
   ASSERT_TRUE(back->zonal);
@@ -429,11 +429,41 @@ TEST(BakedFile, KeepsZonalTransferAndRefusesLiesAboutIt) {
   }
 }
 
+TEST(BakedFile, LobesOfAMatrixComeBackWithTheirLastReflection) {
+  const TemporaryFile file("glossy.glb");
+  const Small s = small_bake(1, Precision::half);
+  const size_t n = s.receivers.count();
+  Outgoing o;
+  o.kind = OutgoingKind::svd, o.order = 3, o.has_b = false;
+  o.maps = {{8, 2, std::vector<ViewWeights>(8 * 8 * 2, ViewWeights(0.5f, 0.25f, 1, 0.125f))}};
+  o.map_of.assign(n, 0);
+  for (const Vec3& normal : s.receivers.normals) o.frames.push_back(frame_about(normal));
+  const WritableZonalTransfer w = make_zonal_transfer(4, 3, 1, n, Precision::half, 2);
+  Random random(3);
+  for (size_t r = 0; r < n; ++r) {
+    std::vector<float> v(w.transfer.receiver_values());
+    for (float& x : v) x = random.next();
+    store_receiver(w, r, v);
+  }
+  const std::vector<float> errors(n, 0.5f);
+  ASSERT_TRUE(save_baked(file.path, s.scene, s.receivers, w.transfer, "{}", {.outgoing = &o, .fit_errors = errors}));
+  auto back = load_baked(file.path);
+  ASSERT_TRUE(back) << back.error().text();
+  ASSERT_TRUE(back->zonal && back->outgoing);
+  EXPECT_EQ(back->zonal->rows, 2);
+  EXPECT_EQ(back->outgoing->maps[0].values, o.maps[0].values);
+  EXPECT_EQ(back->fit_errors, errors);
+  EXPECT_TRUE(std::equal(back->zonal->data.begin(), back->zonal->data.end(), w.transfer.data.begin(), w.transfer.data.end()));
+  expect_refused(file.path, "\"transfer\":{", {{"\"rows\":2", "\"rows\":3"}, {"\"rows\":2", "\"rows\":0"}, {"\"rows\"", "\"rose\""}, {"\"grid\":8", "\"grid\":9"},
+                                            {"\"lobeCount\":3", "\"lobeCount\":4"}, {"\"kind\":\"svd\"", "\"kind\":\"sv?\""}});
+}
+
 TEST(BakedFile, ErrorsOfFitsAreFinite) {
   const TemporaryFile file("zonal_nan.glb");
   const Small s = small_bake(3, Precision::half);
   const WritableZonalTransfer w = make_zonal_transfer(3, 1, 1, s.receivers.count(), Precision::half);
-  ASSERT_TRUE(save_baked(file.path, s.scene, s.receivers, w.transfer, "{}", std::vector<float>(s.receivers.count(), NAN)));
+  const std::vector<float> errors(s.receivers.count(), NAN);
+  ASSERT_TRUE(save_baked(file.path, s.scene, s.receivers, w.transfer, "{}", {.fit_errors = errors}));
   auto result = load_baked(file.path);
   ASSERT_FALSE(result);
   EXPECT_NE(result.error().text().find("not finite"), std::string::npos);

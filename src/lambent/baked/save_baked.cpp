@@ -221,15 +221,20 @@ Result<void> save_baked(const std::string& path, const Scene& scene, const Recei
 }
 
 Result<void> save_baked(const std::string& path, const Scene& scene, const Receivers& receivers, const ZonalTransfer& transfer,
-                        const std::string& provenance, std::span<const float> fit_errors) {
-  LAMBENT_CHECK(fit_errors.empty() || fit_errors.size() == transfer.receivers);
-  std::vector<GltfBlob> blobs;
-  if (!fit_errors.empty()) blobs.push_back({bytes_of(fit_errors), 4});
+                        const std::string& provenance, const BakedExtras& extras) {
+  check_extras(extras, {.order = transfer.order}, transfer.rows);
+  LAMBENT_CHECK(!extras.view && !extras.lattice && !extras.factors && extras.directional == DirectionalKind::none);
+  LAMBENT_CHECK(extras.fit_errors.empty() || extras.fit_errors.size() == transfer.receivers);
+  const ExtrasWriter more(extras);
+  std::vector<GltfBlob> blobs = more.blobs;
+  if (!extras.fit_errors.empty()) blobs.push_back({bytes_of(extras.fit_errors), 4});
+  const int errors_at = int(more.blobs.size());
   return save(path, scene, receivers, transfer.data, blobs, nullptr, provenance, [&](json& extension, int first) {
     json& t = extension["transfer"] = header("zonal", transfer.channels, transfer.precision, transfer.receivers);
     write_light(t, {.order = transfer.order});
+    more.write(extension, transfer.rows, first);
     t["lobeCount"] = transfer.lobes;
-    if (!fit_errors.empty()) t["fitErrors"] = first;
+    if (!extras.fit_errors.empty()) t["fitErrors"] = first + errors_at;
   });
 }
 

@@ -12,6 +12,7 @@
 #include <array>
 #include <atomic>
 #include <chrono>
+#include <cstring>
 
 namespace lambent {
 namespace {
@@ -31,6 +32,7 @@ struct Scratch {
 
 class BlockFit {
  public:
+  // Of transfer and result with one row.
   BlockFit(const Transfer& t, const WritableZonalTransfer& out, const ZonalFitOptions& options, const ZonalStarts& starts, Scratch& s,
            size_t begin, size_t end)
       : t_(t), out_(out), options_(options), starts_(starts), s_(s), begin_(begin), count_(end - begin), N_(size_t(options.lobes)),
@@ -221,9 +223,24 @@ Result<void> check(const Transfer& t, const ZonalFitOptions& o) {
   if (o.starts < 0 || o.starts > 1000) return Error{"starts", "must lie between 0 and 1000, not " + std::to_string(o.starts)};
   if (!(o.retry >= 0 && o.retry <= 1)) return Error{"retry", "must lie between 0 and 1"};
   if (!(o.ridge >= 0 && o.ridge <= 1)) return Error{"ridge", "must lie between 0 and 1"};
-  if (t.rows != 1 || t.columns() != size_t(sh_count(t.light.order)) || t.light.order < 1)
-    return Error{"", "zonal lobes are fitted to diffuse transfer of spherical harmonics alone"};
+  if (t.columns() != size_t(sh_count(t.light.order)) || t.light.order < 1) return Error{"", "zonal lobes are fitted to transfer of spherical harmonics alone"};
+  LAMBENT_CHECK(o.row_weights.empty() || o.row_weights.size() == size_t(t.rows));
   return {};
+}
+
+// Row `row` of a transfer, as one of its own. Rows of a block lie side by side, so that this is a copy of pieces; likewise below.
+Transfer transfer_row(const Transfer& t, int row) {
+  if (t.rows == 1) return t;
+  const WritableTransfer w = make_transfer(t.light, 1, t.channels, t.receivers, t.precision);
+  const size_t piece = w.transfer.block_values() * t.value_bytes();
+  for (size_t b = 0; b < t.blocks(); ++b) std::memcpy(w.values + b * piece, t.data.data() + (b * size_t(t.rows) + size_t(row)) * piece, piece);
+  return w.transfer;
+}
+
+void put_row(const WritableZonalTransfer& out, int row, const ZonalTransfer& from) {
+  const size_t piece = from.row_values() * transfer_block * from.value_bytes();
+  for (size_t b = 0; b < from.blocks(); ++b)
+    std::memcpy(out.values + (b * size_t(out.transfer.rows) + size_t(row)) * piece, from.data.data() + b * piece, piece);
 }
 
 }  // namespace
@@ -232,35 +249,42 @@ Result<ZonalTransfer> fit_zonal(const Transfer& t, const ZonalFitOptions& option
   const auto start = std::chrono::steady_clock::now();
   if (auto ok = check(t, options); !ok) return ok.error();
   const int order = t.light.order, exact = exact_zonal_bands(order, options.lobes);
-  WritableZonalTransfer out = make_zonal_transfer(order, options.lobes, t.channels, t.receivers, options.precision);
+  WritableZonalTransfer out = make_zonal_transfer(order, options.lobes, t.channels, t.receivers, options.precision, t.rows);
   const ZonalStarts starts = make_zonal_starts(order, hemicube_cells);
   const int first_band = std::min(exact, order - 1);  // where all is exact, the last band is fitted for nothing
   Pool<Scratch> pool([&] {
     return std::make_unique<Scratch>(Scratch{make_zonal_batch(order, first_band, t.channels, options.lobes),
                                              make_zonal_batch(order, first_band, t.channels, 1), {}, {}, {}});
   });
-  std::vector<double> errors(t.receivers), energies(t.receivers);
+  std::vector<double> errors(t.receivers), energies(t.receivers), error(t.receivers), energy(t.receivers);
   std::atomic<size_t> retried{0};
   {
-    ProgressStage stage(progress, "fitting lobes", t.receivers);
-    parallel_for(t.receivers, fit_block, [&](size_t begin, size_t end) {
-      if (stage.cancelled()) return;
-      auto scratch = pool.borrow();
-      BlockFit fit(t, out, options, starts, *scratch, begin, end);
-      if (order > exact) retried += fit.search();
-      fit.store(errors, energies);
-      stage.advance(end - begin);
-    });
-    if (stage.cancelled()) return Error{"", "cancelled"};
+    ProgressStage stage(progress, "fitting lobes", t.receivers * size_t(t.rows));
+    for (int row = 0; row < t.rows; ++row) {
+      const Transfer target = transfer_row(t, row);
+      const WritableZonalTransfer fitted = t.rows == 1 ? out : make_zonal_transfer(order, options.lobes, t.channels, t.receivers, options.precision);
+      parallel_for(t.receivers, fit_block, [&](size_t begin, size_t end) {
+        if (stage.cancelled()) return;
+        auto scratch = pool.borrow();
+        BlockFit fit(target, fitted, options, starts, *scratch, begin, end);
+        if (order > exact) retried += fit.search();
+        fit.store(error, energy);
+        stage.advance(end - begin);
+      });
+      if (stage.cancelled()) return Error{"", "cancelled"};
+      if (t.rows > 1) put_row(out, row, fitted.transfer);
+      const double weight = options.row_weights.empty() ? 1 : double(options.row_weights[size_t(row)]);
+      for (size_t r = 0; r < t.receivers; ++r) errors[r] += weight * error[r], energies[r] += weight * energy[r];
+    }
   }
   if (report) {
-    double error = 0, total = 0;
+    double sum = 0, total = 0;
     report->errors.resize(t.receivers);
     for (size_t r = 0; r < t.receivers; ++r) {
-      error += errors[r], total += energies[r];
+      sum += errors[r], total += energies[r];
       report->errors[r] = energies[r] > 0 ? float(std::sqrt(errors[r] / energies[r])) : 0.0f;
     }
-    report->rms = total > 0 ? std::sqrt(error / total) : 0;
+    report->rms = total > 0 ? std::sqrt(sum / total) : 0;
     report->retried = retried;
     report->seconds = std::chrono::duration<double>(std::chrono::steady_clock::now() - start).count();
   }

@@ -156,11 +156,42 @@ TEST(ZonalFit, RefusesWhatItCannotDo) {
   EXPECT_FALSE(fit_zonal(t, {.starts = -1}));
   EXPECT_FALSE(fit_zonal(t, {.retry = NAN}));
   EXPECT_FALSE(fit_zonal(t, {.ridge = -1}));
-  EXPECT_FALSE(fit_zonal(make_transfer({.order = 3}, 2, 1, 2, Precision::half).transfer, {}));
   EXPECT_FALSE(fit_zonal(make_transfer({.order = 3, .groups = {"lamp"}}, 1, 1, 2, Precision::half).transfer, {}));
   Progress stopped;
   stopped.cancel();
   EXPECT_FALSE(fit_zonal(t, {}, nullptr, &stopped));
+}
+
+// Each row is fitted as if it were alone, and counts in the report what its weight says.
+TEST(ZonalFit, RowsAreFittedEachForItself) {
+  const size_t n = 150;
+  const Transfer a = random_signals(4, 1, n, 5), b = smooth_signals(1, n);
+  const WritableTransfer b4 = make_transfer({.order = 4}, 1, 1, n, Precision::single), both = make_transfer({.order = 4}, 2, 1, n, Precision::single);
+  for (size_t r = 0; r < n; ++r) {
+    std::vector<float> of_a = load_receiver(a, r), of_b = load_receiver(b, r);
+    of_b.resize(16);
+    store_receiver(b4, r, of_b);
+    of_a.insert(of_a.end(), of_b.begin(), of_b.end());
+    store_receiver(both, r, of_a);
+  }
+  ZonalFitOptions options{.lobes = 2};
+  ZonalFitReport ra, rb, rows;
+  const ZonalTransfer fa = *fit_zonal(a, options, &ra), fb = *fit_zonal(b4.transfer, options, &rb);
+  options.row_weights = {0.25f, 3};
+  const ZonalTransfer fit = *fit_zonal(both.transfer, options, &rows);
+  ASSERT_EQ(fit.rows, 2);
+  double error = 0, total = 0;
+  for (size_t r = 0; r < n; ++r) {
+    std::vector<float> expected = load_receiver(fa, r), second = load_receiver(fb, r);
+    expected.insert(expected.end(), second.begin(), second.end());
+    ASSERT_EQ(load_receiver(fit, r), expected) << r;
+    const double ea = 0.25 * squared(load_receiver(a, r)), eb = 3 * squared(load_receiver(b4.transfer, r));
+    const double of_both = ra.errors[r] * ra.errors[r] * ea + rb.errors[r] * rb.errors[r] * eb;
+    EXPECT_NEAR(rows.errors[r], std::sqrt(of_both / (ea + eb)), 1e-5);
+    error += of_both, total += ea + eb;
+  }
+  EXPECT_NEAR(rows.rms, std::sqrt(error / total), 1e-6);
+  EXPECT_EQ(rows.retried, ra.retried + rb.retried);
 }
 
 }  // namespace

@@ -88,10 +88,11 @@ template <class Value>
 void Direct(const ZonalTransfer& t, const uint8_t* bytes, const float* frames, size_t blocks, const DirectLight& light, float* out) {
   const F d;
   const size_t exact = size_t(t.exact_bands()), bands = size_t(t.order) - exact, channels = size_t(t.channels);
-  for (size_t b = 0; b < blocks; ++b)
+  const size_t rows = size_t(t.rows);
+  for (size_t b = 0; b < blocks * rows; ++b)
     for (size_t part = 0; part < block; part += hn::Lanes(d)) {
-      const Receivers<Value> r{reinterpret_cast<const Value*>(bytes) + b * t.receiver_values() * block + part,
-                               frames ? frames + b * 9 * block + part : nullptr};
+      const Receivers<Value> r{reinterpret_cast<const Value*>(bytes) + b * t.row_values() * block + part,
+                               frames ? frames + b / rows * 9 * block + part : nullptr};
       V sum[3];
       for (size_t c = 0; c < 3; ++c) sum[c] = ExactBands(r, channels == 3 ? c : 0, exact, light.light, c);
       for (size_t i = 0; i < size_t(t.lobes); ++i) {
@@ -159,9 +160,10 @@ void Specialised(const ZonalTransfer& t, const uint8_t* bytes, const float* fram
   HWY_ALIGN float across[block], down[block];
   HWY_ALIGN float g[max_quads][3][block][4];  // [quad][channel][receiver][band]
   HWY_ALIGN float acc[block][16];
-  for (size_t b = 0; b < blocks; ++b) {
-    const Value* values = reinterpret_cast<const Value*>(bytes) + b * t.receiver_values() * block;
-    const float* frame = frames ? frames + b * 9 * block : nullptr;
+  const size_t rows = size_t(t.rows);
+  for (size_t b = 0; b < blocks * rows; ++b) {
+    const Value* values = reinterpret_cast<const Value*>(bytes) + b * t.row_values() * block;
+    const float* frame = frames ? frames + b / rows * 9 * block : nullptr;
     for (size_t i = 0; i < lobes; ++i) {
       const size_t at = t.exact_values() + i * t.lobe_values();
       for (size_t part = 0; part < block; part += hn::Lanes(d)) {
@@ -300,12 +302,13 @@ const Grid& grid(int order) {
 template <class Shade>
 void for_blocks(const ZonalTransfer& t, const ReceiverFrames* frames, Relit& out, const Shade& shade) {
   LAMBENT_CHECK(t.data.size() == t.bytes() && (!frames || frames->receivers == t.receivers));
-  out.rows = 1;
-  out.values.resize(t.blocks() * 3 * block);
+  const size_t rows = size_t(t.rows);
+  out.rows = t.rows;
+  out.values.resize(t.blocks() * rows * 3 * block);
   const size_t block_bytes = t.receiver_values() * block * t.value_bytes();
   parallel_for(t.blocks(), std::max<size_t>(1, (size_t{1} << 18) / block_bytes), [&](size_t begin, size_t end) {
     shade(t.data.data() + begin * block_bytes, frames ? frames->values.data() + begin * 9 * block : nullptr, end - begin,
-          out.values.data() + begin * 3 * block);
+          out.values.data() + begin * rows * 3 * block);
   });
 }
 
@@ -372,7 +375,7 @@ void relight_zonal(const ZonalTransfer& t, const ReceiverFrames* frames, const Z
 }
 
 Vec3 shade_zonal(const ZonalTransfer& t, std::span<const float> values, const Mat3& R, std::span<const Vec3> light) {
-  LAMBENT_CHECK(values.size() == t.receiver_values() && light.size() >= size_t(sh_count(t.order)));
+  LAMBENT_CHECK(values.size() == t.row_values() && light.size() >= size_t(sh_count(t.order)));
   const size_t exact = size_t(t.exact_bands()), exact_count = exact * exact, bands = size_t(t.order) - exact;
   Vec3 sum(0.0f);
   for (int c = 0; c < 3; ++c) {

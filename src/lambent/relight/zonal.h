@@ -14,12 +14,12 @@ struct ReceiverFrames {
 };
 ReceiverFrames make_receiver_frames(std::span<const Mat3> rotations);
 
-// Exit radiance of white receivers under distant light, which is what relight() gives for plain transfer. `light`: order^2
+// T . light for every row: for diffuse transfer exit radiance of white receivers, as relight() gives it for plain transfer. `light`: order^2
 // coefficients of radiance at least. `frames` may be null: as baked. Directly, by equation 13: also for light that differs from
 // call to call. Sizes `out` on first use and allocates nothing after that.
 void relight_zonal(const ZonalTransfer& transfer, const ReceiverFrames* frames, std::span<const Vec3> light, Relit& out);
 
-// The same for one receiver, given its values, turned by R: for light that varies from place to place, and for textures.
+// The same for one row of a receiver, given its values, turned by R: for light that varies from place to place, and for textures.
 Vec3 shade_zonal(const ZonalTransfer& transfer, std::span<const float> values, const Mat3& R, std::span<const Vec3> light);
 
 // One light for many receivers: a table of the light's bands by direction (eq. 24), [row][column][4 bands at a time][r, g, b, 0][4].

@@ -126,6 +126,39 @@ TEST(RelightZonal, IsTheSameOnOneThreadAndDoesNotMoveItsOutput) {
   EXPECT_EQ(a.values, b.values);
 }
 
+// Rows of one receiver are turned alike, and each is what it is alone.
+TEST(RelightZonal, RowsAreReceiversThatTurnTogether) {
+  const int rows = 3;
+  const Case alone = make_case(5, 3, 3, 40 * rows, Precision::half);
+  const WritableZonalTransfer w = make_zonal_transfer(5, 3, 3, 40, Precision::half, rows);
+  const size_t each = w.transfer.row_values();
+  ASSERT_EQ(w.transfer.receiver_values(), 3 * each);
+  std::vector<Mat3> rotations;
+  for (size_t r = 0; r < 40; ++r) {
+    std::vector<float> all;
+    for (size_t row = 0; row < 3; ++row) {
+      const std::vector<float> v = load_receiver(alone.w.transfer, r * 3 + row);
+      all.insert(all.end(), v.begin(), v.end());
+    }
+    store_receiver(w, r, all);
+    rotations.push_back(alone.rotations[r]);
+  }
+  const ReceiverFrames frames = make_receiver_frames(rotations);
+  ZonalLight light;
+  specialise_light(w.transfer, alone.light, light);
+  Relit direct, table;
+  relight_zonal(w.transfer, &frames, alone.light, direct);
+  relight_zonal(w.transfer, &frames, light, table);
+  ASSERT_EQ(direct.rows, rows);
+  ASSERT_EQ(table.rows, rows);
+  for (size_t r = 0; r < 40; ++r)
+    for (int row = 0; row < rows; ++row) {
+      const Vec3 truth = shade_zonal(alone.w.transfer, load_receiver(alone.w.transfer, r * 3 + size_t(row)), rotations[r], alone.light);
+      EXPECT_LT(glm::length(direct.at(r, row) - truth), 1e-4f * (1 + glm::length(truth)));
+      EXPECT_LT(glm::length(table.at(r, row) - truth), 0.05f * (1 + glm::length(truth)));
+    }
+}
+
 TEST(RelightZonal, BrokenNumbersDoNotLeadAstray) {
   // What a hostile file may hold: axes of zero, infinite and not numbers.
   const WritableZonalTransfer w = make_zonal_transfer(6, 3, 1, 16, Precision::half);

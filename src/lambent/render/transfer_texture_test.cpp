@@ -1,7 +1,13 @@
 // Textured patches against the displaced geometry itself.
 #include <lambent/bake/patch.h>
 #include <lambent/compress/zonal_fit.h>
+#include <lambent/light/project.h>
+#include <lambent/light/sky.h>
+#include <lambent/reference/path_tracer.h>
 #include <lambent/render/transfer_texture.h>
+#include <lambent/scene/displace.h>
+#include <lambent/scene/pose.h>
+#include <lambent/scene/procedural.h>
 
 #include <gtest/gtest.h>
 
@@ -74,6 +80,57 @@ TEST(TransferTexture, ShadesAFlatWallAsTheReliefItself) {
     }
   // Exact bands are blended over a pixel's area; the lobes are exact.
   EXPECT_LT(std::sqrt(error / total), 0.08);
+}
+
+// Sheets of relief for real, flat and bent, path-traced: other geometry, other rays, other reconstruction of the same light. A texture has no
+// parallax, so each is looked at along its normals.
+TEST(TransferTexture, ShadesSheetsAsTheirDisplacedGeometry) {
+  const int n = 24, tiles = 5;
+  HeightField field{n, {}};
+  for (int j = 0; j < n; ++j)
+    for (int i = 0; i < n; ++i) field.heights.push_back(0.08f * std::sin(2 * pi * float(i) / n + std::sin(2 * pi * float(j) / n)));
+  const PatchScene patch = make_patch(field, Vec3(0.5f));
+  auto patch_tracer = Tracer::build(patch.scene);
+  auto transfer = bake(patch.scene, *patch_tracer, patch.receivers, {.samples = 1024, .bounces = 2, .precision = Precision::single});
+  ASSERT_TRUE(transfer);
+  auto lobes = fit_zonal(*transfer, {.lobes = 4});
+  ASSERT_TRUE(lobes);
+  const ZonalTexture texture{n, n, *lobes};
+
+  Scene sheet = make_quad(Vec3(-2.5f, 0, 2.5f), Vec3(5, 0, 0), Vec3(0, 0, -5), n * tiles, n * tiles, Vec3(0.5f));
+  for (Vec3 p : sheet.positions) sheet.texcoords[0].push_back({(p.x + 2.5f) / 5, (p.z + 2.5f) / 5});
+  const std::vector<Vec3> light = project_environment(*make_sky(*parse_sky("elevation=35,azimuth=60,turbidity=3")), 6);
+  const Environment env = reconstruct_environment(light, 256);
+  Camera camera;
+  camera.up = Vec3(0, 0, -1), camera.target = Vec3(0), camera.eye = Vec3(0, 300, 0);
+  camera.fov = 2 * glm::degrees(std::atan(0.5f / 300));  // one tile
+  for (const char* text : {"bend:0.01,x,y", "bend:-100,x,y", "twist:60,x"}) {
+    const Scene bent = posed(sheet, deform_scene(sheet, *parse_deformation(text)));
+    auto tracer = Tracer::build(bent);
+    // The middle of the sheet has moved up by bending.
+    const Hit middle = tracer->closest({0.01f, 100, 0.02f}, {0, -1, 0});
+    ASSERT_NE(middle.triangle, none);
+    camera.target.y = 100 - middle.distance, camera.eye.y = camera.target.y + 300;
+    RenderOptions options;
+    options.width = options.height = 48, options.samples = 64;
+    auto ours = render_transfer_texture(bent, *tracer, texture, Vec2(float(tiles)), light, camera, options);
+    ASSERT_TRUE(ours);
+    Scene relief = bent;
+    ASSERT_TRUE(displace(relief, [&](Vec2 uv) { return sample_height(field, uv); }, Vec2(float(tiles))));
+    ReferenceOptions traced;
+    traced.width = traced.height = 48, traced.spp = 256, traced.bounces = 3;
+    auto truth = path_trace(relief, env, camera, traced);
+    ASSERT_TRUE(truth);
+    double error = 0, smooth = 0, total = 0, mean = 0;
+    for (Vec3 p : truth->image.rgb) mean += luminance(p) / double(truth->image.rgb.size());
+    for (size_t i = 0; i < ours->rgb.size(); ++i) {
+      const Vec3 d = ours->rgb[i] - truth->image.rgb[i];
+      error += glm::dot(d, d), total += glm::dot(truth->image.rgb[i], truth->image.rgb[i]);
+      smooth += std::pow(luminance(truth->image.rgb[i]) - mean, 2);
+    }
+    std::printf("%s: %.4f of what is there, %.4f of how it varies\n", text, std::sqrt(error / total), std::sqrt(error / 3 / smooth));
+    EXPECT_LT(std::sqrt(error / total), 0.06) << text;
+  }
 }
 
 }  // namespace

@@ -57,4 +57,29 @@ void evaluate_outgoing(const Outgoing& o, size_t receiver, Vec3 view, std::span<
   }
 }
 
+std::vector<float> row_weights(const Outgoing& o) {
+  std::vector<float> weights(size_t(o.rows()), 1.0f);
+  if (o.maps.empty()) return weights;
+  std::vector<double> sum(weights.size());
+  double total = 0;
+  for (const ViewMap& map : o.maps) {
+    const ViewWeights* w = map.values.data();
+    for (int y = 0; y < map.grid; ++y)
+      for (int x = 0; x < map.grid; ++x) {
+        const double seen = view_map_direction(map.grid, x, y).z;  // the map has equal areas
+        total += seen;
+        for (double& s : sum) s += seen * glm::dot(*w, *w), ++w;
+      }
+  }
+  for (size_t r = 0; r < sum.size(); ++r) weights[r] = float(sum[r] / total);
+  return weights;
+}
+
+Outgoing turn_outgoing(const Outgoing& o, std::span<const Mat3> rotations) {
+  LAMBENT_CHECK(rotations.size() == o.frames.size());
+  Outgoing out = o;
+  for (size_t r = 0; r < rotations.size(); ++r) out.frames[r] = rotations[r] * o.frames[r];
+  return out;
+}
+
 }  // namespace lambent

@@ -52,6 +52,13 @@ struct Outgoing {
 // is lifted to it.
 void evaluate_outgoing(const Outgoing& o, size_t receiver, Vec3 view, std::span<ViewWeights> out);
 
+// What the square of an error in each row makes of the square of an error in the picture, on average over views and materials, seen as
+// cosine-distributed: of harmonic rows, 1.
+std::vector<float> row_weights(const Outgoing& o);
+
+// The same surfaces turned, each by a rotation of its own, which may mirror.
+Outgoing turn_outgoing(const Outgoing& o, std::span<const Mat3> rotations);
+
 // Sum of weights and rows: (a + colour b) . X.
 inline Vec3 reflect_rows(std::span<const ViewWeights> weights, Vec3 colour, auto&& row) {
   Vec3 a(0.0f), b(0.0f);

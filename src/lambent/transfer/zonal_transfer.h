@@ -1,6 +1,6 @@
 #pragma once
-// Transfer as zonal lobes: it turns with the surface by turning a few axes. Diffuse, one row a receiver, with the meaning of
-// transfer.h. Source: local-deformable-prt, eq. 11 and section 3.3.
+// Transfer as zonal lobes: it turns with the surface by turning a few axes. Rows have the meaning of transfer.h: one for diffuse
+// surfaces, several where a last reflection (outgoing.h) makes radiance of them. Source: local-deformable-prt, eq. 11, 16 and section 3.3.
 //
 // t_lm = sum_i y_lm(s_i) g_il for the bands from exact_bands() on; the bands below are stored as they are: DC alone for one or two
 // lobes, DC and linear for three or more, which could reproduce them anyhow. Channels share the axes: what blocks the light is the
@@ -16,11 +16,12 @@ constexpr int exact_zonal_bands(int order, int lobes) { return std::min(order, l
 
 struct ZonalTransfer {
   int order = 0;  // bands of the light's harmonics, [1, 16]
-  int lobes = 0;  // a receiver, [1, 8]
+  int lobes = 0;  // a row, [1, 8]
+  int rows = 1;
   int channels = 1;
   size_t receivers = 0;
   Precision precision = Precision::half;
-  // Layout [block][value][receiver in block], little-endian, last block padded with zeros. The values of a receiver:
+  // Layout [block][row][value][receiver in block], little-endian, last block padded with zeros. The values of a row:
   // [channel][exact coefficient], then for each lobe its axis x, y, z and [channel][band - exact_bands()].
   std::span<const uint8_t> data;
   std::shared_ptr<const void> storage;
@@ -28,7 +29,8 @@ struct ZonalTransfer {
   int exact_bands() const { return exact_zonal_bands(order, lobes); }
   size_t exact_values() const { return size_t(channels) * size_t(sh_count(exact_bands())); }
   size_t lobe_values() const { return 3 + size_t(channels) * size_t(order - exact_bands()); }
-  size_t receiver_values() const { return exact_values() + size_t(lobes) * lobe_values(); }
+  size_t row_values() const { return exact_values() + size_t(lobes) * lobe_values(); }
+  size_t receiver_values() const { return size_t(rows) * row_values(); }
   size_t value_bytes() const { return precision == Precision::half ? 2 : 4; }
   size_t blocks() const { return (receivers + transfer_block - 1) / transfer_block; }
   size_t bytes() const { return blocks() * receiver_values() * transfer_block * value_bytes(); }
@@ -38,16 +40,16 @@ struct WritableZonalTransfer {
   ZonalTransfer transfer;
   uint8_t* values = nullptr;
 };
-WritableZonalTransfer make_zonal_transfer(int order, int lobes, int channels, size_t receivers, Precision precision);
+WritableZonalTransfer make_zonal_transfer(int order, int lobes, int channels, size_t receivers, Precision precision, int rows = 1);
 
-// One receiver's values in the order above.
+// One receiver's values, row by row.
 void store_receiver(const WritableZonalTransfer& t, size_t receiver, std::span<const float> values);
 std::vector<float> load_receiver(const ZonalTransfer& t, size_t receiver);
 
-// Axis i of the values of one receiver: of unit length, which rounding to half may have spoilt; +z where it is zero.
+// Axis i of the values of one row: of unit length, which rounding to half may have spoilt; +z where it is zero.
 Vec3 lobe_axis(const ZonalTransfer& t, std::span<const float> values, int lobe);
 
-// The harmonics that the values of one receiver stand for, turned by R: [channel][order^2]. (Rf)(s) = f(R^-1 s).
+// The harmonics that the values of one row stand for, turned by R: [channel][order^2]. (Rf)(s) = f(R^-1 s).
 std::vector<float> zonal_harmonics(const ZonalTransfer& t, std::span<const float> values, const Mat3& R = Mat3(1.0f));
 
 }  // namespace lambent

@@ -1,0 +1,52 @@
+#include "relief.h"
+
+#include <lambent/core/file.h>
+#include <lambent/image/image.h>
+#include <lambent/scene/displace.h>
+#include <lambent/scene/refine.h>
+
+#include <numeric>
+
+namespace lambent::tool {
+
+Result<HeightField> load_heights(const std::string& path, int size, float depth) {
+  auto picture = load_image(path);
+  if (!picture) return picture.error();
+  // A height is what the file holds: the curve that loading undoes in PNG and JPEG is put back.
+  const std::string extension = file_extension(path);
+  const bool encoded = extension == "png" || extension == "jpg" || extension == "jpeg";
+  std::vector<float> values;
+  for (Vec3 p : picture->rgb) values.push_back(encoded ? srgb_encode(luminance(p)) : luminance(p));
+  auto field = make_height_field(values, picture->width, picture->height, size, depth);
+  if (!field) return Error{path, field.error().text()};
+  return field;
+}
+
+void DisplaceOptions::add_to(CLI::App& c) {
+  auto* given = c.add_option("--displace", heights, "Move the surface by this height map, as geometry: what `render --transfer-texture` stands for");
+  c.add_option("--depth", depth, "--displace: height of white over black, in sides of one repetition")->needs(given)->capture_default_str();
+  c.add_option("--tile", tile, "--displace: U,V, its repetitions over the unit of texture coordinates")->needs(given)->capture_default_str();
+  c.add_option("--heights", size, "--displace: texels a side that the map is taken at")->needs(given)->check(CLI::Range(2, 1024))->capture_default_str();
+}
+
+Result<void> displace_scene(Scene& scene, const DisplaceOptions& o) {
+  constexpr size_t most_triangles = size_t{1} << 25;
+  auto tile = parse_numbers(o.tile, 2, "--tile");
+  if (!tile) return tile.error();
+  auto field = load_heights(o.heights, o.size, o.depth);
+  if (!field) return field.error();
+  const std::vector<Vec2>& uv = scene.texcoords[0];
+  if (uv.empty()) return Error{scene.path, "has no texture coordinates to displace it by"};
+  const Vec2 repeat((*tile)[0], (*tile)[1]);
+  double area = 0, covered = 0;
+  for (const Triangle& t : scene.triangles) {
+    const Vec2 a = (uv[t.v[1]] - uv[t.v[0]]) * repeat, b = (uv[t.v[2]] - uv[t.v[0]]) * repeat;
+    area += glm::length(area_normal(scene, t)), covered += std::abs(double(a.x) * b.y - double(a.y) * b.x);
+  }
+  if (!(covered > 0 && area > 0)) return Error{scene.path, "has texture coordinates that cover nothing"};
+  if (auto ok = split_long_edges(scene, float(0.8 * std::sqrt(area / covered) / o.size), most_triangles); !ok) return ok.error();
+  const double mean = std::accumulate(field->heights.begin(), field->heights.end(), 0.0) / double(field->heights.size());
+  return displace(scene, [&](Vec2 at) { return sample_height(*field, at) - float(mean); }, repeat);
+}
+
+}  // namespace lambent::tool

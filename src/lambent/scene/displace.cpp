@@ -1,0 +1,69 @@
+#include <lambent/scene/displace.h>
+
+#include <cstring>
+#include <unordered_map>
+
+namespace lambent {
+namespace {
+
+// Vertices that share a place, and with `normals` a normal, get one number.
+std::vector<uint32_t> weld(const Scene& scene, bool normals) {
+  struct Hash {
+    size_t operator()(const std::array<float, 6>& k) const {
+      uint64_t h = 0x9e3779b97f4a7c15;
+      for (float f : k) {
+        uint32_t bits;
+        std::memcpy(&bits, &f, 4);
+        h = (h ^ bits) * 0xff51afd7ed558ccd, h ^= h >> 32;
+      }
+      return size_t(h);
+    }
+  };
+  std::unordered_map<std::array<float, 6>, uint32_t, Hash> numbers;
+  std::vector<uint32_t> out;
+  for (size_t v = 0; v < scene.positions.size(); ++v) {
+    std::array<float, 6> key{};
+    for (int k = 0; k < 3; ++k) {
+      key[size_t(k)] = scene.positions[v][k] + 0.0f;  // -0 is 0
+      if (normals) key[size_t(k) + 3] = std::round(scene.normals[v][k] * 4096) + 0.0f;
+    }
+    out.push_back(numbers.try_emplace(key, uint32_t(numbers.size())).first->second);
+  }
+  return out;
+}
+
+}  // namespace
+
+Result<void> displace(Scene& scene, const std::function<float(Vec2)>& height, Vec2 tile) {
+  const std::vector<Vec2>& uv = scene.texcoords[0];
+  if (uv.empty()) return Error{scene.path, "has no texture coordinates to displace it by"};
+  const size_t n = scene.positions.size();
+  const std::vector<uint32_t> place = weld(scene, false), smooth = weld(scene, true);
+  std::vector<double> area(n), covered(n);
+  std::vector<Vec3> normals(n, Vec3(0.0f));  // by place
+  for (const Triangle& t : scene.triangles) {
+    const Vec2 d1 = (uv[t.v[1]] - uv[t.v[0]]) * tile, d2 = (uv[t.v[2]] - uv[t.v[0]]) * tile;
+    const double a = glm::length(area_normal(scene, t)), c = std::abs(double(d1.x) * d2.y - double(d1.y) * d2.x);
+    for (uint32_t v : t.v) area[place[v]] += a, covered[place[v]] += c;
+  }
+  std::vector<float> moves(n);
+  std::vector<uint32_t> count(n);
+  for (size_t v = 0; v < n; ++v) {
+    const size_t p = place[v];
+    const double side = covered[p] > 0 ? std::sqrt(area[p] / covered[p]) : 0;
+    moves[p] += float(side) * height(uv[v] * tile), ++count[p], normals[p] += scene.normals[v];
+  }
+  for (size_t v = 0; v < n; ++v) {
+    const size_t p = place[v];
+    scene.positions[v] += normalize_or(normals[p], scene.normals[v]) * (moves[p] / float(count[p]));
+  }
+  std::fill(normals.begin(), normals.end(), Vec3(0.0f));  // by smooth number from here
+  for (const Triangle& t : scene.triangles) {
+    const Vec3 a = area_normal(scene, t);
+    for (uint32_t v : t.v) normals[smooth[v]] += a;
+  }
+  for (size_t v = 0; v < n; ++v) scene.normals[v] = normalize_or(normals[smooth[v]], scene.normals[v]);
+  return {};
+}
+
+}  // namespace lambent
