@@ -16,6 +16,7 @@ extern "C" int LLVMFuzzerTestOneInput(const uint8_t* data, size_t size) {
   for (lambent::Vec2 uv : {lambent::Vec2(0), lambent::Vec2(0.99f), lambent::Vec2(-3.2f, 1e30f)}) {
     lambent::sample_zonal_texture(*texture, uv, values);
     (void)lambent::zonal_harmonics(texture->transfer, values);
+    if (texture->groove_depth > 0) lambent::sample_groove(*texture, uv.x, uv.y, values);
   }
   return 0;
 }

@@ -283,6 +283,23 @@ expect 2 'animation' render corner.glb --env uniform:1 --time 1 -o x.png
 expect 2 'frames' render corner.glb --env uniform:1 --animation 0 --frames 3:1 -o x.png
 expect 2 'membrane' bake corner.obj --membrane 1.5 -o x.glb
 expect 2 'tile' render corner.obj --transfer-texture relief.lpt --tile 1 --env uniform:1 -o x.png
+# Grooves as a table, near lamps, relief as geometry.
+expect 0 'grooves' patch --groove 1 --size 6 -o groove.lpt
+printf 'v 0 0 0\nv 1 0 0\nv 1 0 -1\nv 0 0 -1\nvt 0 0\nvt 1 0\nvt 1 1\nvt 0 1\nf 1/1 2/2 3/3\nf 1/1 3/3 4/4\n' >card.obj
+expect 0 'grooves' render card.obj --transfer-texture groove.lpt --tile 5,0 --groove-depth 0.5 --groove-width 0.6 --groove-map sky.png --env sky:elevation=40 --size 24x24 -o grooves.png
+expect 0 'texels' render card.obj --transfer-texture relief.lpt --sphere-lamp 0.5,1,-0.5,0.2,5,4,3 --size 24x24 -o near.png
+expect 0 'relit' render lobes.glb --sphere-lamp 3,3,3,0.5,9,9,9 --env uniform:0.1 --size 24x24 -o near.png
+expect 0 'paths' reference card.obj --displace sky.png --depth 0.2 --tile 2,2 --heights 16 --env uniform:1 --size 16x16 --spp 1 -o displaced.exr
+expect 1 'no texture coordinates' reference corner.obj --displace sky.png --env uniform:1 --size 16x16 -o x.exr
+expect 1 'no grooves' render card.obj --transfer-texture relief.lpt --groove-depth 0.5 --env uniform:1 -o x.png
+expect 1 'sphere-lamp' render corner.glb --sphere-lamp 3,3,3,0.5,9,9,9 --env uniform:1 -o x.png
+expect 2 'radius' render lobes.glb --sphere-lamp 3,3,3,0,9,9,9 -o x.png
+expect 2 'sphere-lamp' render lobes.glb --sphere-lamp 3,3,3,nan,9,9,9 -o x.png
+expect 2 'not both' patch sky.png --groove 1 -o x.lpt
+expect 2 'not both' patch -o x.lpt
+expect 2 'grooves' patch --groove 1 --depth 0.1 -o x.lpt
+expect 2 'lobes' patch --groove 1 --lobes 2 -o x.lpt
+absent x.lpt
 # The web viewer, where it has been built: the folder is there whole or not at all, and nothing of others' is replaced.
 "$tool" export corner.glb --web site >/dev/null 2>stderr
 if grep -q 'scripts/web' stderr; then

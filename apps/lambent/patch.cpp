@@ -3,6 +3,7 @@
 #include "relief.h"
 
 #include <lambent/bake/subsurface.h>
+#include <lambent/compress/wrinkle.h>
 #include <lambent/compress/zonal_fit.h>
 #include <lambent/core/file.h>
 #include <lambent/scene/load.h>
@@ -15,7 +16,7 @@ namespace {
 
 struct PatchCommand {
   std::string heights, output, precision = "half", subsurface;
-  float depth = 0.1f, albedo = 0.5f;
+  float depth = 0.1f, albedo = 0.5f, groove = 0;
   int size = 128;
   BakeOptions bake;
   ZonalFitOptions zonal;
@@ -43,8 +44,21 @@ Result<PatchScene> load_mesh_patch(const PatchCommand& o, double& jump) {
   return patch;
 }
 
+int run_grooves(Context& context, const PatchCommand& o) {
+  auto table = make_wrinkle_table({o.bake.order, o.zonal.lobes, o.size, o.groove, o.albedo});
+  if (!table) return fail({"--groove", table.error().text()});
+  if (auto ok = save_zonal_texture(o.output, table->texture); !ok) return fail(ok.error());
+  const ZonalTransfer& t = table->texture.transfer;
+  if (context.json) print_json({{"output", o.output}, {"size", o.size}, {"lobes", t.lobes}, {"order", t.order}, {"groove_depth", o.groove}, {"rms", table->rms}, {"bytes", t.bytes()}});
+  else
+    fmt::print("{}\n  grooves of {} depths up to {:.3g} widths at {} places across, {} lobes, order {}, {}\n  fitted with an error of {:.2f}% RMS\n", o.output, o.size, o.groove, o.size,
+               t.lobes, t.order, human_bytes(double(t.bytes())), 100 * table->rms);
+  return success;
+}
+
 int run_patch(Context& context, PatchCommand o) {
   if (auto ok = check_output(o.output, {"lpt"}); !ok) return fail(ok.error());
+  if (o.groove > 0) return run_grooves(context, o);
   SubsurfaceOptions subsurface{.period = 1};
   SubsurfaceReport walks;
   if (!o.subsurface.empty()) {
@@ -89,19 +103,27 @@ int run_patch(Context& context, PatchCommand o) {
 void add_patch(CLI::App& app, Run& run) {
   auto o = std::make_shared<PatchCommand>();
   CLI::App* c = app.add_subcommand("patch", "Simulate a repeating relief and make a transfer texture of it, for render --transfer-texture");
-  c->add_option("heights", o->heights, "What repeats: a height map, or a mesh (.glb, .gltf, .obj, .ply) that is as wide along x as along y and faces +z")->required();
+  auto* heights = c->add_option("heights", o->heights, "What repeats: a height map, or a mesh (.glb, .gltf, .obj, .ply) that is as wide along x as along y and faces +z");
+  auto* groove = c->add_option("--groove", o->groove, "In place of these, a table of grooves of cosine shape up to this depth, in their widths, for wrinkles")->check(CLI::Range(1e-3f, 10.0f));
   c->add_option("-o,--output", o->output, "Transfer texture to write (.lpt)")->required();
   auto* depth = c->add_option("--depth", o->depth, "Height of white over black, in sides of the patch")->capture_default_str();
-  c->add_option("--size", o->size, "Texels a side")->check(CLI::Range(2, 1024))->capture_default_str();
+  auto* size = c->add_option("--size", o->size, "Texels a side; places and depths of grooves, 32 of them")->check(CLI::Range(2, 1024))->capture_default_str();
   auto* albedo = c->add_option("--albedo", o->albedo, "What the relief reflects of the light that bounces")->check(CLI::Range(0.0f, 1.0f))->capture_default_str();
   auto* subsurface = c->add_option("--subsurface", o->subsurface, std::string(subsurface_help) + "; a unit is one side of the patch");
-  c->add_option("--lobes", o->zonal.lobes, "Zonal lobes a texel")->check(CLI::Range(1, max_stored_lobes))->capture_default_str();
+  auto* lobes = c->add_option("--lobes", o->zonal.lobes, "Zonal lobes a texel; of grooves 3")->check(CLI::Range(1, max_stored_lobes))->capture_default_str();
   c->add_option("--order", o->bake.order, "Bands of the lighting's spherical harmonics")->check(CLI::Range(1, max_sh_order))->capture_default_str();
-  c->add_option("--samples", o->bake.samples, "Rays a texel")->check(CLI::Range(1, 1 << 20))->capture_default_str();
-  c->add_option("--bounces", o->bake.bounces, "Reflections between surfaces")->check(CLI::Range(0, 64))->capture_default_str();
+  auto* samples = c->add_option("--samples", o->bake.samples, "Rays a texel")->check(CLI::Range(1, 1 << 20))->capture_default_str();
+  auto* bounces = c->add_option("--bounces", o->bake.bounces, "Reflections between surfaces")->check(CLI::Range(0, 64))->capture_default_str();
   c->add_option("--seed", o->bake.seed, "Of the ray directions")->capture_default_str();
   c->add_option("--precision", o->precision, "Of the stored lobes")->check(CLI::IsMember({"half", "single"}))->capture_default_str();
-  c->callback([o, albedo, depth, subsurface, &run] {
+  c->callback([o, heights, groove, size, lobes, samples, bounces, albedo, depth, subsurface, &run] {
+    if (!heights->count() == !groove->count()) throw CLI::ValidationError("give a height map or a mesh, or --groove DEPTH, and not both");
+    if (groove->count()) {
+      for (const CLI::Option* option : {samples, bounces, depth, subsurface})
+        if (option->count()) throw CLI::ValidationError(option->get_name() + " is not of grooves, which are computed in their cross-section with all bounces");
+      if (!size->count()) o->size = 32;
+      if (!lobes->count()) o->zonal.lobes = 3;
+    }
     if (albedo->count() && subsurface->count()) throw CLI::ValidationError("--albedo is of reflection, and --subsurface has none: give one");
     if (o->is_mesh() && (albedo->count() || depth->count())) throw CLI::ValidationError("--albedo and --depth are of height maps: a mesh has its own");
     run = [o](Context& context) { return run_patch(context, *o); };

@@ -9,15 +9,28 @@
 
 namespace lambent::tool {
 
-Result<HeightField> load_heights(const std::string& path, int size, float depth) {
+Result<HeightMap> load_height_map(const std::string& path) {
   auto picture = load_image(path);
   if (!picture) return picture.error();
-  // A height is what the file holds: the curve that loading undoes in PNG and JPEG is put back.
   const std::string extension = file_extension(path);
   const bool encoded = extension == "png" || extension == "jpg" || extension == "jpeg";
-  std::vector<float> values;
-  for (Vec3 p : picture->rgb) values.push_back(encoded ? srgb_encode(luminance(p)) : luminance(p));
-  auto field = make_height_field(values, picture->width, picture->height, size, depth);
+  HeightMap map{picture->width, picture->height, {}};
+  for (Vec3 p : picture->rgb) map.values.push_back(encoded ? srgb_encode(luminance(p)) : luminance(p));
+  return map;
+}
+
+float sample_height_map(const HeightMap& map, Vec2 uv) {
+  uv = (uv - glm::floor(uv)) * Vec2(float(map.width), float(map.height)) - 0.5f;
+  const int i = int(std::floor(uv.x)), j = int(std::floor(uv.y));
+  const float fx = uv.x - float(i), fy = uv.y - float(j);
+  auto at = [&](int a, int b) { return map.values[size_t((b + map.height) % map.height) * size_t(map.width) + size_t((a + map.width) % map.width)]; };
+  return (1 - fy) * ((1 - fx) * at(i, j) + fx * at(i + 1, j)) + fy * ((1 - fx) * at(i, j + 1) + fx * at(i + 1, j + 1));
+}
+
+Result<HeightField> load_heights(const std::string& path, int size, float depth) {
+  auto map = load_height_map(path);
+  if (!map) return map.error();
+  auto field = make_height_field(map->values, map->width, map->height, size, depth);
   if (!field) return Error{path, field.error().text()};
   return field;
 }

@@ -2,6 +2,7 @@
 #include "commands.h"
 #include "motion.h"
 #include "options.h"
+#include "textured.h"
 
 #include <lambent/bake/bake.h>
 #include <lambent/bake/materials.h>
@@ -13,7 +14,6 @@
 #include <lambent/relight/zonal.h>
 #include <lambent/render/insert.h>
 #include <lambent/render/render.h>
-#include <lambent/render/transfer_texture.h>
 #include <lambent/scene/append.h>
 #include <lambent/scene/load.h>
 
@@ -30,7 +30,9 @@ const std::map<std::string, RenderOptions::Show> show_names{
     {"product", RenderOptions::Show::product}, {"radiosity", RenderOptions::Show::radiosity}, {"albedo", RenderOptions::Show::albedo}};
 
 struct RenderCommand {
-  std::string baked, texture, tile = "1,1";
+  std::string baked;
+  TexturedFlags textured;
+  std::vector<std::string> sphere_lamps;  // X,Y,Z,RADIUS,R,G,B
   LightOptions light;
   ViewOptions view;
   MotionOptions motion;
@@ -43,50 +45,6 @@ struct RenderCommand {
   std::vector<std::string> lamps;  // NAME=R,G,B
   std::vector<std::string> insert;
 };
-
-// Any mesh, animated or not, with a transfer texture on it.
-int run_textured(Context& context, const RenderCommand& o) {
-  if (auto ok = check_output(o.view.output, {"png", "exr"}); !ok) return fail(ok.error());
-  auto rotation = light_rotation(o.light);
-  if (!rotation) return fail(rotation.error());
-  if (o.light.env.empty()) return fail({"--env", "is needed: an environment to light the scene by"});
-  auto tile = parse_numbers(o.tile, 2, "--tile");
-  if (!tile) return fail(tile.error());
-  auto texture = load_zonal_texture(o.texture);
-  if (!texture) return fail(texture.error());
-  auto scene = load_scene(o.baked);
-  if (!scene) return fail(scene.error());
-  warn(scene->warnings);
-  if (scene->texcoords[0].empty()) warn(o.baked + ": has no texture coordinates, so that the transfer texture shows as one colour");
-  auto poses = make_poses(o.motion, *scene);
-  if (!poses) return fail(poses.error());
-  auto env = load_light(o.light);
-  if (!env) return fail(env.error());
-  const int order = o.light_order ? std::min(o.light_order, texture->transfer.order) : texture->transfer.order;
-  std::vector<Vec3> light = rotate_sh(make_sh_rotation(order, *rotation), project_environment(*env, order));
-  apply_sh_window(o.window, light);
-  light.resize(size_t(sh_count(texture->transfer.order)), Vec3(0.0f));
-  Environment turned;
-  if (o.view.background == "env") turned = o.light.rotate.empty() ? std::move(*env) : rotated(*env, *rotation);
-  std::vector<Image> images;
-  Result<View> view = Error{};
-  for (const std::optional<Pose>& pose : *poses) {
-    const Scene moved = pose ? posed(*scene, *pose) : *scene;
-    if (images.empty()) view = make_view(o.view, moved);
-    if (!view) return fail(view.error());
-    auto tracer = Tracer::build(moved);
-    if (!tracer) return fail(tracer.error());
-    RenderOptions options{view->width, view->height, o.samples, nullptr, o.show};
-    if (o.view.background == "env") options.background = &turned;
-    auto image = render_transfer_texture(moved, *tracer, *texture, {(*tile)[0], (*tile)[1]}, light, view->camera, options, &context.progress);
-    if (!image) return fail(image.error());
-    images.push_back(std::move(*image));
-  }
-  if (auto ok = save_image(o.view.output, images.size() > 1 ? beside(images) : images.front(), o.view.exposure); !ok) return fail(ok.error());
-  if (context.json) print_json({{"output", o.view.output}, {"texels", texture->transfer.receivers}, {"frames", images.size()}});
-  else fmt::print("{}\n  {} x {} texels of {} lobes\n", o.view.output, texture->width, texture->height, texture->transfer.lobes);
-  return success;
-}
 
 // Other materials for a bake that kept incident light: its last reflection is made anew.
 Result<void> change_materials(Baked& baked, const BrdfOptions& options, const std::string& path) {
@@ -101,6 +59,15 @@ Result<void> change_materials(Baked& baked, const BrdfOptions& options, const st
   changed.frames = std::move(baked.outgoing->frames);
   baked.outgoing = std::move(changed);
   return {};
+}
+
+// Where each receiver is: at (the first of) its vertices.
+std::vector<Vec3> receiver_places(const std::vector<Vec3>& positions, const Baked& baked, size_t receivers) {
+  std::vector<Vec3> places(receivers, Vec3(0.0f));
+  for (const auto* map : {&baked.back, &baked.front})
+    for (size_t v = map->size(); v-- > 0;)
+      if ((*map)[v] != none) places[(*map)[v]] = positions[v];
+  return places;
 }
 
 struct Insertion {
@@ -146,16 +113,20 @@ Result<void> add_insertion(Context& context, const Insertion& insertion, const L
 }
 
 int run_render(Context& context, const RenderCommand& o) {
-  if (!o.texture.empty()) return run_textured(context, o);
+  auto near = parse_sphere_lamps(o.sphere_lamps);
+  if (!near) return fail(near.error());
+  if (!o.textured.texture.empty())
+    return run_textured(context, {o.baked, o.textured, o.light, *near, o.view, o.motion, o.window, o.light_order, o.samples, o.show});
   if (auto ok = check_output(o.view.output, {"png", "exr"}); !ok) return fail(ok.error());
   auto rotation = light_rotation(o.light);
   if (!rotation) return fail(rotation.error());
   auto baked = load_baked(o.baked);
   if (!baked) return fail(baked.error());
   if (baked->visibility) {
-    if (o.motion.any() || !o.insert.empty() || !o.lamps.empty()) return fail({o.baked, "is of visibility in blocks: nothing in it moves, and it has no lamps of its own"});
+    if (o.motion.any() || !o.insert.empty() || !o.lamps.empty() || !near->empty()) return fail({o.baked, "is of visibility in blocks: nothing in it moves, and no lamps but the environment light it"});
     return run_product_render(context, *baked, o.products, o.light, o.view, o.brdf, o.samples);
   }
+  if (!near->empty() && !baked->zonal) return fail({o.baked, "--sphere-lamp lights lobes and transfer textures: `lambent compress --zonal` makes lobes"});
   if (o.product_options) return fail({o.baked, "--method and its options need a bake of visibility: lambent bake --transfer blocks"});
   if (o.new_brdf)
     if (auto ok = change_materials(*baked, o.brdf, o.baked); !ok) return fail(ok.error());
@@ -182,7 +153,7 @@ int run_render(Context& context, const RenderCommand& o) {
   if (!insertions.empty() && o.motion.any()) return fail({"--insert", "draws the scene at rest: leave the animation out"});
   const LightBasis basis = light_of(*baked);
   const size_t receivers = receivers_of(*baked);
-  if (o.light.env.empty() && (basis.order > 0 || !basis.lobes.empty())) return fail({"--env", "is needed: the file is baked for distant light"});
+  if (o.light.env.empty() && near->empty() && (basis.order > 0 || !basis.lobes.empty())) return fail({"--env", "is needed: the file is baked for distant light"});
   std::optional<Environment> env;
   if (!o.light.env.empty()) {
     auto loaded = load_light(o.light);
@@ -222,6 +193,8 @@ int run_render(Context& context, const RenderCommand& o) {
     turned = o.light.rotate.empty() ? std::move(*env) : rotated(*env, *rotation);
     options.background = &turned;
   }
+  LocalLight local{light, *near};
+  if (baked->zonal) local.distant.resize(size_t(sh_count(baked->zonal->order)), Vec3(0.0f));
   double relight_seconds = 1e9;
   std::vector<Image> images;
   for (const std::optional<Pose>& pose : *poses) {
@@ -235,7 +208,9 @@ int run_render(Context& context, const RenderCommand& o) {
       if (baked->outgoing) outgoing = turn_outgoing(*baked->outgoing, rotations), options.outgoing = &outgoing;
     }
     const auto start = std::chrono::steady_clock::now();
-    if (baked->zonal) relight_zonal(*baked->zonal, pose ? &frames : nullptr, table, relit);
+    if (baked->zonal && !near->empty())
+      relight_zonal(*baked->zonal, pose ? &frames : nullptr, make_light_field(local, receiver_places(pose ? pose->positions : baked->scene.positions, *baked, receivers)), relit);
+    else if (baked->zonal) relight_zonal(*baked->zonal, pose ? &frames : nullptr, table, relit);
     else if (baked->cpca) relight(*baked->cpca, light, relit);
     else if (baked->factors) relight_factors(baked->transfer, *baked->outgoing, light, relit);
     else relight(baked->transfer, light, relit);
@@ -286,8 +261,9 @@ void add_render(CLI::App& app, Run& run) {
   o->light.add_to(*c, false);
   o->view.add_to(*c);
   o->motion.add_to(*c, true);
-  auto* texture = c->add_option("--transfer-texture", o->texture, "Shade the scene by this texture of zonal lobes, from `lambent patch`");
-  c->add_option("--tile", o->tile, "U,V: its repetitions over the unit of texture coordinates")->needs(texture)->capture_default_str();
+  o->textured.add_to(*c);
+  c->add_option("--sphere-lamp", o->sphere_lamps, "X,Y,Z,RADIUS,R,G,B: a near lamp, a sphere of that radiance, for lobes and transfer textures; may be given again")
+      ->allow_extra_args(false);
   c->add_option("--window", o->window, "Against ringing of the harmonics: none, hann, lanczos, or auto (as weak as keeps open surfaces from going dark)")
       ->transform(CLI::CheckedTransformer(window_names).description("{none,hann,lanczos,auto}"));
   c->add_option("--light-order", o->light_order, "Use only this many bands of the baked ones; lobes are kept")->check(CLI::Range(1, max_sh_order));

@@ -35,6 +35,7 @@ export function readTransferTexture(bytes: ArrayBuffer): TransferTexture {
   if (!magic.startsWith('LMBTLPT')) throw new LambentError('is not a texture of zonal lobes (make one with "lambent patch")');
   if (magic !== 'LMBTLPT1') throw new LambentError('is a texture of zonal lobes of another version');
   const [width, height, order, lobes, channels, valueBytes] = [0, 1, 2, 3, 4, 5].map((k) => view.getUint32(8 + 4 * k, true)) as [number, number, number, number, number, number];
+  if (view.getUint32(32, true) !== 0) throw new LambentError('is a table of grooves, which this viewer does not draw');
   const within = (x: number, most: number): boolean => x >= 1 && x <= most;
   if (!within(width, maxSide) || !within(height, maxSide)) throw new LambentError('its width or height is out of range');
   if (!within(order, maxShOrder) || !within(lobes, maxLobes) || (channels !== 1 && channels !== 3)) throw new LambentError('its order, lobes or channels are out of range');

@@ -46,6 +46,147 @@ double meet(double x, double depth, double psi) {
   return NAN;
 }
 
+// All entries of the table at once, so that what lies between them is right too (section 4.2): the squared error at places and depths twice as
+// fine, of lobes interpolated bilinearly, as a function of all axes and coefficients of the table, [entry][lobe][3 + bands].
+class TableFit {
+ public:
+  // targets: [depth][place][order^2] on the finer grid.
+  TableFit(int order, int first_band, size_t lobes, size_t n, std::vector<float> targets)
+      : order_(order), first_(first_band), bands_(order - first_band), lobes_(lobes), n_(n), fine_(2 * n - 1), targets_(std::move(targets)) {}
+  size_t lobe_values() const { return size_t(3 + bands_); }
+  size_t entry_values() const { return lobes_ * lobe_values(); }
+  size_t count() const { return n_ * n_ * entry_values(); }
+
+  // psi, and its gradient by eq. 19-21.
+  double operator()(const std::vector<double>& p, std::vector<double>& gradient) const {
+    gradient.assign(count(), 0.0);
+    std::vector<double> errors(fine_), own(fine_ * fine_ * entry_values());
+    parallel_for(fine_, 1, [&](size_t begin, size_t end) {
+      for (size_t d = begin; d < end; ++d)
+        for (size_t x = 0; x < fine_; ++x) errors[d] += sample(p, d, x, &own[(d * fine_ + x) * entry_values()]);
+    });
+    double psi = 0;
+    for (double e : errors) psi += e;
+    for (size_t d = 0; d < fine_; ++d)
+      for (size_t x = 0; x < fine_; ++x)
+        corners(d, x, [&](size_t entry, double weight) {
+          for (size_t k = 0; k < entry_values(); ++k) gradient[entry * entry_values() + k] += weight * own[(d * fine_ + x) * entry_values() + k];
+        });
+    for (size_t i = 0; i < count(); ++i)
+      if (i % lobe_values() >= 3) psi += ridge_between * p[i] * p[i], gradient[i] += 2 * ridge_between * p[i];
+    return psi;
+  }
+
+ private:
+  static constexpr double ridge_between = 1e-5;
+
+  template <class F>
+  void corners(size_t d, size_t x, F add) const {
+    for (size_t b = d / 2; b <= (d + 1) / 2; ++b)
+      for (size_t a = x / 2; a <= (x + 1) / 2; ++a) add(b * n_ + a, (d % 2 ? 0.5 : 1.0) * (x % 2 ? 0.5 : 1.0));
+  }
+
+  // The squared error at one place of the finer grid, and its derivatives by the numbers there.
+  double sample(const std::vector<double>& p, size_t d, size_t x, double* out) const {
+    const size_t C = size_t(sh_count(order_)), from = size_t(sh_count(first_));
+    std::vector<double> at(entry_values()), residual(C), y(lobes_ * C), step(C);
+    corners(d, x, [&](size_t entry, double weight) {
+      for (size_t k = 0; k < at.size(); ++k) at[k] += weight * p[entry * entry_values() + k];
+    });
+    const float* t = &targets_[(d * fine_ + x) * C];
+    for (size_t k = from; k < C; ++k) residual[k] = -double(t[k]);
+    std::vector<glm::dvec3> axes(lobes_);
+    for (size_t i = 0; i < lobes_; ++i) {
+      const double* v = &at[i * lobe_values()];
+      axes[i] = glm::normalize(glm::dvec3(v[0], v[1], v[2]));
+      evaluate_sh(order_, axes[i], {&y[i * C], C});
+      for (int l = first_; l < order_; ++l)
+        for (size_t k = size_t(l * l); k < size_t((l + 1) * (l + 1)); ++k) residual[k] += v[3 + l - first_] * y[i * C + k];
+    }
+    double psi = 0;
+    for (size_t k = from; k < C; ++k) psi += residual[k] * residual[k];
+    for (size_t i = 0; i < lobes_; ++i) {
+      const double* v = &at[i * lobe_values()];
+      double* g = out + i * lobe_values();
+      const double length = glm::length(glm::dvec3(v[0], v[1], v[2]));
+      // Along two tangents, by differences; the normalisation leaves nothing along the axis itself (eq. 21).
+      const glm::dvec3 u = glm::normalize(std::abs(axes[i].x) < 0.7 ? glm::cross(axes[i], {1, 0, 0}) : glm::cross(axes[i], {0, 1, 0}));
+      glm::dvec3 slope(0.0);
+      for (const glm::dvec3& tangent : {u, glm::cross(axes[i], u)}) {
+        constexpr double h = 1e-5;
+        double change = 0;
+        for (double side : {h, -h}) {
+          evaluate_sh(order_, glm::normalize(axes[i] + side * tangent), step);
+          for (int l = first_; l < order_; ++l)
+            for (size_t k = size_t(l * l); k < size_t((l + 1) * (l + 1)); ++k) change += residual[k] * v[3 + l - first_] * step[k] / (2 * side);
+        }
+        slope += tangent * change;
+      }
+      for (int k = 0; k < 3; ++k) g[k] = 2 * slope[k] / length;
+      for (int l = first_; l < order_; ++l) {
+        double sum = 0;
+        for (size_t k = size_t(l * l); k < size_t((l + 1) * (l + 1)); ++k) sum += residual[k] * y[i * C + k];
+        g[3 + l - first_] = 2 * sum;
+      }
+    }
+    return psi;
+  }
+
+  int order_, first_, bands_;
+  size_t lobes_, n_, fine_;
+  std::vector<float> targets_;
+};
+
+double dot(const std::vector<double>& a, const std::vector<double>& b) {
+  double sum = 0;
+  for (size_t i = 0; i < a.size(); ++i) sum += a[i] * b[i];
+  return sum;
+}
+
+// Quasi-Newton steps with a short memory (L-BFGS; Nocedal and Wright, "Numerical Optimization", algorithm 7.4): it scales axes against coefficients, for
+// which conjugate gradients, the paper's choice, would need many more.
+void minimise(const TableFit& f, std::vector<double>& p, int iterations) {
+  constexpr size_t memory = 12;
+  struct Step {
+    std::vector<double> s, y;
+    double rho;
+  };
+  std::vector<Step> steps;
+  std::vector<double> g, next_g, next(p.size());
+  double psi = f(p, g);
+  for (int i = 0; i < iterations; ++i) {
+    std::vector<double> q = g, alpha(steps.size());
+    for (size_t k = steps.size(); k-- > 0;) {
+      alpha[k] = steps[k].rho * dot(steps[k].s, q);
+      for (size_t j = 0; j < q.size(); ++j) q[j] -= alpha[k] * steps[k].y[j];
+    }
+    const double scale = steps.empty() ? 0.1 / std::sqrt(dot(g, g) + 1e-30) : 1 / (steps.back().rho * dot(steps.back().y, steps.back().y));
+    for (double& v : q) v *= scale;
+    for (size_t k = 0; k < steps.size(); ++k) {
+      const double beta = steps[k].rho * dot(steps[k].y, q);
+      for (size_t j = 0; j < q.size(); ++j) q[j] += (alpha[k] - beta) * steps[k].s[j];
+    }
+    const double slope = dot(g, q);
+    double length = 1, next_psi = psi;
+    for (int halving = 0; halving < 30; ++halving, length *= 0.5) {
+      for (size_t j = 0; j < p.size(); ++j) next[j] = p[j] - length * q[j];
+      next_psi = f(next, next_g);
+      if (next_psi <= psi - 1e-4 * length * slope) break;
+    }
+    if (!(next_psi < psi)) break;
+    Step step{std::vector<double>(p.size()), std::vector<double>(p.size()), 0};
+    for (size_t j = 0; j < p.size(); ++j) step.s[j] = next[j] - p[j], step.y[j] = next_g[j] - g[j];
+    const double curvature = dot(step.s, step.y);
+    const bool settled = psi - next_psi < 1e-5 * psi;
+    p.swap(next), g.swap(next_g), psi = next_psi;
+    if (settled) break;
+    if (curvature <= 0) continue;
+    step.rho = 1 / curvature;
+    steps.push_back(std::move(step));
+    if (steps.size() > memory) steps.erase(steps.begin());
+  }
+}
+
 }  // namespace
 
 std::vector<float> simulate_wrinkle(int order, int count, float depth, float albedo) {
@@ -55,7 +196,7 @@ std::vector<float> simulate_wrinkle(int order, int count, float depth, float alb
   parallel_for(n, 1, [&](size_t begin, size_t end) {
     std::vector<double> y(C);
     for (size_t r = begin; r < end; ++r) {
-      const double x = (double(r) + 0.5) / count - 0.5, slope = depth * pi_d * std::sin(2 * pi_d * x);
+      const double x = double(r) / (count - 1) - 0.5, slope = depth * pi_d * std::sin(2 * pi_d * x);
       const double normal = std::atan2(1.0, -slope);  // its angle in the cross-section
       // Visible and before the surface: an interval of angles about the groove's axis.
       const double from = std::max(horizon(x, depth, 1), normal - pi_d / 2), to = std::min(pi_d - horizon(x, depth, -1), normal + pi_d / 2);
@@ -74,7 +215,7 @@ std::vector<float> simulate_wrinkle(int order, int count, float depth, float alb
         const double hit = meet(x, depth, psi);
         if (std::isnan(hit)) continue;
         // Between the two nearest places.
-        const double place = std::clamp((hit + 0.5) * count - 0.5, 0.0, count - 1.0);
+        const double place = std::clamp((hit + 0.5) * (count - 1), 0.0, count - 1.0);
         const size_t i = std::min(size_t(place), n - 1), j = std::min(i + 1, n - 1);
         const double share = albedo / angles, f = place - double(i);
         B[r * n + i] += share * (1 - f), B[r * n + j] += share * f;
@@ -99,7 +240,7 @@ std::vector<float> simulate_wrinkle(int order, int count, float depth, float alb
 Result<WrinkleTable> make_wrinkle_table(const WrinkleOptions& o) {
   if (o.order < 3 || o.order > max_sh_order) return Error{"order", "must lie between 3 and " + std::to_string(max_sh_order)};
   if (o.lobes < 3 || o.lobes > max_zonal_lobes) return Error{"lobes", "must lie between 3 and " + std::to_string(max_zonal_lobes)};
-  if (o.size < 2 || o.size > 256) return Error{"size", "must lie between 2 and 256"};
+  if (o.size < 3 || o.size > 256) return Error{"size", "must lie between 3 and 256"};
   if (!(o.max_depth > 0 && o.max_depth <= 10)) return Error{"depth", "must be above 0 and at most 10"};
   if (!(o.albedo >= 0 && o.albedo < 1)) return Error{"albedo", "must lie between 0 and 1"};
   const size_t n = size_t(o.size), C = size_t(sh_count(o.order)), N = size_t(o.lobes);
@@ -108,11 +249,11 @@ Result<WrinkleTable> make_wrinkle_table(const WrinkleOptions& o) {
   ZonalBatch batch = make_zonal_batch(o.order, exact, 1, o.lobes);  // all lanes alike
   using Axes = std::vector<glm::dvec3>;
   std::vector<Axes> above(n), row(n);
-  auto refine = [&](const std::vector<float>& t, const Axes& from, Axes& to, std::vector<float>& g) {
+  auto refine = [&](const std::vector<float>& t, const Axes& from, int iterations, Axes& to, std::vector<float>& g) {
     for (size_t k = 0; k < C; ++k) std::fill_n(batch.target(0, int(k)), zonal_lanes, double(t[k]));
     for (size_t i = 0; i < N; ++i)
       for (int k = 0; k < 3; ++k) std::fill_n(batch.axis(int(i), k), zonal_lanes, from[i][k]);
-    refine_zonal(batch, {60, 1e-8, ridge});
+    refine_zonal(batch, {iterations, 1e-8, ridge});
     to.resize(N), g.clear();
     for (size_t i = 0; i < N; ++i) {
       for (int k = 0; k < 3; ++k) to[i][k] = batch.axis(int(i), k)[0];
@@ -120,20 +261,31 @@ Result<WrinkleTable> make_wrinkle_table(const WrinkleOptions& o) {
     }
     return batch.psi[0];
   };
-  double error = 0, total = 0;
+  // Fits of their own first, each going on from its neighbours', from the deepest groove up.
+  const size_t fine = 2 * n - 1;
+  std::vector<float> simulated;  // [depth][place][order^2], twice as fine
+  for (size_t d = 0; d < fine; ++d) {
+    const std::vector<float> row_of = simulate_wrinkle(o.order, int(fine), o.max_depth * float(d) / float(fine - 1), o.albedo);
+    simulated.insert(simulated.end(), row_of.begin(), row_of.end());
+  }
+  auto target = [&](size_t d, size_t x) {  // of an entry
+    const auto at = simulated.begin() + ptrdiff_t((2 * d * fine + 2 * x) * C);
+    return std::vector<float>(at, at + ptrdiff_t(C));
+  };
+  const size_t lobe = 3 + size_t(o.order - exact);
+  std::vector<double> p(n * n * N * lobe);
   for (size_t d = n; d-- > 0;) {
-    const std::vector<float> simulated = simulate_wrinkle(o.order, o.size, o.max_depth * float(d + 1) / float(n), o.albedo);
     for (size_t x = 0; x < n; ++x) {
-      const std::vector<float> t(simulated.begin() + ptrdiff_t(x * C), simulated.begin() + ptrdiff_t((x + 1) * C));
+      const std::vector<float> t = target(d, x);
       double best = INFINITY;
       std::vector<float> g, best_g;
       Axes found;
-      auto attempt = [&](const Axes& from, double advantage) {
-        const double psi = refine(t, from, found, g);
-        if (psi < best * advantage) best = psi, row[x] = found, best_g = g;
+      auto attempt = [&](const Axes& from) {
+        const double psi = refine(t, from, d == 0 ? 0 : 60, found, g);
+        if (psi < best) best = psi, row[x] = found, best_g = g;
       };
-      if (!above[x].empty()) attempt(Axes(above[x]), 1);
-      else if (x > 0) attempt(Axes(row[x - 1]), 1);
+      if (!above[x].empty()) attempt(Axes(above[x]));
+      else if (x > 0) attempt(Axes(row[x - 1]));
       else {
         // The linear lobe, and others symmetric about it in the cross-section and along the groove.
         const glm::dvec3 axis(linear_axis(t)), along(0, 1, 0), across = glm::normalize(glm::cross(along, axis));
@@ -144,40 +296,30 @@ Result<WrinkleTable> make_wrinkle_table(const WrinkleOptions& o) {
               const double a = angle * double((i + 1) / 2) * (i % 2 ? 1 : -1);
               from.push_back(glm::normalize(axis * std::cos(a) + side * std::sin(a)));
             }
-            attempt(from, 1);
+            attempt(from);
           }
       }
-      std::vector<float> values(t.begin(), t.begin() + sh_count(exact));
       for (size_t i = 0; i < N; ++i) {
-        for (int k = 0; k < 3; ++k) values.push_back(float(row[x][i][k]));
-        values.insert(values.end(), best_g.begin() + ptrdiff_t(i * size_t(o.order - exact)), best_g.begin() + ptrdiff_t((i + 1) * size_t(o.order - exact)));
+        double* v = &p[((d * n + x) * N + i) * lobe];
+        for (int k = 0; k < 3; ++k) v[k] = row[x][i][k];
+        for (size_t k = 3; k < lobe; ++k) v[k] = best_g[i * (lobe - 3) + k - 3];
       }
+    }
+    above = row;
+  }
+  if (exact < o.order) minimise(TableFit(o.order, exact, N, n, simulated), p, o.iterations);
+
+  double error = 0, total = 0;
+  for (size_t d = 0; d < n; ++d)
+    for (size_t x = 0; x < n; ++x) {
+      const std::vector<float> t = target(d, x);
+      std::vector<float> values(t.begin(), t.begin() + sh_count(exact));
+      values.insert(values.end(), p.begin() + ptrdiff_t((d * n + x) * N * lobe), p.begin() + ptrdiff_t((d * n + x + 1) * N * lobe));
       store_receiver(out, d * n + x, values);
       const std::vector<float> fit = zonal_harmonics(out.transfer, values);
       for (size_t k = 0; k < C; ++k) error += std::pow(double(fit[k]) - t[k], 2), total += double(t[k]) * t[k];
     }
-    above = row;
-  }
-  return WrinkleTable{o.size, o.max_depth, std::move(out.transfer), std::sqrt(error / total)};
-}
-
-std::vector<float> sample_wrinkle(const WrinkleTable& table, float x, float depth) {
-  const ZonalTransfer& t = table.transfer;
-  auto place = [&](float u) { return std::clamp(u, 0.0f, float(table.size - 1)); };
-  const float px = place((x + 0.5f) * float(table.size) - 0.5f), pd = place(depth / table.max_depth * float(table.size) - 1);
-  const int i = std::min(int(px), table.size - 2), j = std::min(int(pd), table.size - 2);
-  std::vector<float> sum(t.receiver_values());
-  for (int b = 0; b < 2; ++b)
-    for (int a = 0; a < 2; ++a) {
-      const float weight = (a ? px - float(i) : 1 - px + float(i)) * (b ? pd - float(j) : 1 - pd + float(j));
-      const std::vector<float> v = load_receiver(t, size_t((j + b) * table.size + i + a));
-      for (size_t k = 0; k < sum.size(); ++k) sum[k] += weight * v[k];
-    }
-  for (int l = 0; l < t.lobes; ++l) {
-    const Vec3 axis = lobe_axis(t, sum, l);
-    for (size_t k = 0; k < 3; ++k) sum[t.exact_values() + size_t(l) * t.lobe_values() + k] = axis[int(k)];
-  }
-  return sum;
+  return WrinkleTable{{o.size, o.size, std::move(out.transfer), o.max_depth}, std::sqrt(error / total)};
 }
 
 }  // namespace lambent

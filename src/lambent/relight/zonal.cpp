@@ -16,11 +16,13 @@
 #define LAMBENT_ZONAL_ONCE
 namespace lambent {
 namespace {
-// The tables of sh_tables.h, and a light, as floats.
+// The tables of sh_tables.h, and a light, as floats: one light for all, or one for each receiver of a block.
 struct DirectLight {
   int order;
   float diagonal[max_sh_order], a[max_sh_order][max_sh_order], b[max_sh_order][max_sh_order];
   float light[sh_count(max_sh_order)][3];
+  const float* field = nullptr;  // [block][coefficient][3][16]
+  size_t field_coefficients = 0;
 };
 constexpr size_t block = transfer_block;
 constexpr int row_length = ZonalLight::width + 1;
@@ -69,32 +71,45 @@ struct Receivers {
   }
 };
 
+// One light's coefficients, or those of a group of lanes.
+struct SharedLight {
+  const float (*light)[3];
+  V operator()(size_t k, size_t c) const { return hn::Set(F(), light[k][c]); }
+};
+struct OwnLight {
+  const float* light;
+  V operator()(size_t k, size_t c) const { return hn::LoadU(F(), light + (3 * k + c) * block); }
+};
+
 // The bands that are stored as they are, of channel c.
-template <class Value>
-V ExactBands(const Receivers<Value>& r, size_t channel, size_t exact_bands, const float (*light)[3], size_t colour) {
-  const F d;
+template <class Value, class Light>
+V ExactBands(const Receivers<Value>& r, size_t channel, size_t exact_bands, const Light& light, size_t colour) {
   const size_t at = channel * exact_bands * exact_bands;
-  V sum = hn::Mul(r.load(at), hn::Set(d, light[0][colour]));
+  V sum = hn::Mul(r.load(at), light(0, colour));
   if (exact_bands == 2) {
     // The linear band is the vector (-f_11, -f_1-1, f_10).
     const Vec v = r.turn({r.load(at + 3), r.load(at + 1), hn::Neg(r.load(at + 2))});
-    sum = hn::MulAdd(v.x, hn::Set(d, light[3][colour]), hn::MulAdd(v.y, hn::Set(d, light[1][colour]), sum));
-    sum = hn::NegMulAdd(v.z, hn::Set(d, light[2][colour]), sum);
+    sum = hn::MulAdd(v.x, light(3, colour), hn::MulAdd(v.y, light(1, colour), sum));
+    sum = hn::NegMulAdd(v.z, light(2, colour), sum);
   }
   return sum;
 }
 
-template <class Value>
+template <class Value, class Light>
 void Direct(const ZonalTransfer& t, const uint8_t* bytes, const float* frames, size_t blocks, const DirectLight& light, float* out) {
   const F d;
+  constexpr bool own = std::is_same_v<Light, OwnLight>;
   const size_t exact = size_t(t.exact_bands()), bands = size_t(t.order) - exact, channels = size_t(t.channels);
   const size_t rows = size_t(t.rows);
   for (size_t b = 0; b < blocks * rows; ++b)
     for (size_t part = 0; part < block; part += hn::Lanes(d)) {
       const Receivers<Value> r{reinterpret_cast<const Value*>(bytes) + b * t.row_values() * block + part,
                                frames ? frames + b / rows * 9 * block + part : nullptr};
+      Light e;
+      if constexpr (own) e.light = light.field + b / rows * light.field_coefficients * 3 * block + part;
+      else e.light = light.light;
       V sum[3];
-      for (size_t c = 0; c < 3; ++c) sum[c] = ExactBands(r, channels == 3 ? c : 0, exact, light.light, c);
+      for (size_t c = 0; c < 3; ++c) sum[c] = ExactBands(r, channels == 3 ? c : 0, exact, e, c);
       for (size_t i = 0; i < size_t(t.lobes); ++i) {
         const size_t at = t.exact_values() + i * t.lobe_values();
         const Vec s = r.axis(at);
@@ -111,8 +126,7 @@ void Direct(const ZonalTransfer& t, const uint8_t* bytes, const float* frames, s
             V weight = hn::Mul(q1, r.load(at + 3 + size_t(l) - exact));
             for (size_t c = 0; c < 3; ++c) {
               if (channels == 3 && c > 0) weight = hn::Mul(q1, r.load(at + 3 + c * bands + size_t(l) - exact));
-              const V around = hn::MulAdd(re, hn::Set(d, light.light[sh_index(l, m)][c]),
-                                          m ? hn::Mul(im, hn::Set(d, light.light[sh_index(l, -m)][c])) : hn::Zero(d));
+              const V around = hn::MulAdd(re, e(size_t(sh_index(l, m)), c), m ? hn::Mul(im, e(size_t(sh_index(l, -m)), c)) : hn::Zero(d));
               sum[c] = hn::MulAdd(weight, around, sum[c]);
             }
           }
@@ -208,7 +222,7 @@ void Specialised(const ZonalTransfer& t, const uint8_t* bytes, const float* fram
     for (size_t part = 0; part < block; part += hn::Lanes(d)) {
       const Receivers<Value> r{values + part, frame ? frame + part : nullptr};
       for (size_t c = 0; c < 3; ++c) {
-        V sum = ExactBands(r, channels == 3 ? c : 0, exact, exact_light, c);
+        V sum = ExactBands(r, channels == 3 ? c : 0, exact, SharedLight{exact_light}, c);
         if (quads) {
           HWY_ALIGN float lobe_sum[16];
           for (size_t j = 0; j < hn::Lanes(d); ++j) {
@@ -224,10 +238,12 @@ void Specialised(const ZonalTransfer& t, const uint8_t* bytes, const float* fram
 }
 
 void DirectHalf(const ZonalTransfer& t, const uint8_t* bytes, const float* frames, size_t blocks, const DirectLight& light, float* out) {
-  Direct<hwy::float16_t>(t, bytes, frames, blocks, light, out);
+  if (light.field) Direct<hwy::float16_t, OwnLight>(t, bytes, frames, blocks, light, out);
+  else Direct<hwy::float16_t, SharedLight>(t, bytes, frames, blocks, light, out);
 }
 void DirectSingle(const ZonalTransfer& t, const uint8_t* bytes, const float* frames, size_t blocks, const DirectLight& light, float* out) {
-  Direct<float>(t, bytes, frames, blocks, light, out);
+  if (light.field) Direct<float, OwnLight>(t, bytes, frames, blocks, light, out);
+  else Direct<float, SharedLight>(t, bytes, frames, blocks, light, out);
 }
 void SpecialisedHalf(const ZonalTransfer& t, const uint8_t* bytes, const float* frames, size_t blocks, const float* texels,
                      const float (*exact)[3], float* out) {
@@ -299,6 +315,17 @@ const Grid& grid(int order) {
   return grids[size_t(order)];
 }
 
+DirectLight direct_light(const ZonalTransfer& t) {
+  const ShTables& tables = sh_tables();
+  DirectLight direct;
+  direct.order = t.order;
+  for (int l = 0; l < t.order; ++l) {
+    direct.diagonal[l] = float(tables.diagonal[l]);
+    for (int m = 0; m < t.order; ++m) direct.a[l][m] = float(tables.a[l][m]), direct.b[l][m] = float(tables.b[l][m]);
+  }
+  return direct;
+}
+
 template <class Shade>
 void for_blocks(const ZonalTransfer& t, const ReceiverFrames* frames, Relit& out, const Shade& shade) {
   LAMBENT_CHECK(t.data.size() == t.bytes() && (!frames || frames->receivers == t.receivers));
@@ -307,8 +334,17 @@ void for_blocks(const ZonalTransfer& t, const ReceiverFrames* frames, Relit& out
   out.values.resize(t.blocks() * rows * 3 * block);
   const size_t block_bytes = t.receiver_values() * block * t.value_bytes();
   parallel_for(t.blocks(), std::max<size_t>(1, (size_t{1} << 18) / block_bytes), [&](size_t begin, size_t end) {
-    shade(t.data.data() + begin * block_bytes, frames ? frames->values.data() + begin * 9 * block : nullptr, end - begin,
+    shade(begin, t.data.data() + begin * block_bytes, frames ? frames->values.data() + begin * 9 * block : nullptr, end - begin,
           out.values.data() + begin * rows * 3 * block);
+  });
+}
+
+void shade_directly(const ZonalTransfer& t, const ReceiverFrames* frames, const DirectLight& light, Relit& out) {
+  for_blocks(t, frames, out, [&](size_t first, const uint8_t* data, const float* turned, size_t blocks, float* values) {
+    DirectLight here = light;
+    if (here.field) here.field += first * here.field_coefficients * 3 * block;
+    if (t.precision == Precision::half) HWY_DYNAMIC_DISPATCH(DirectHalf)(t, data, turned, blocks, here, values);
+    else HWY_DYNAMIC_DISPATCH(DirectSingle)(t, data, turned, blocks, here, values);
   });
 }
 
@@ -325,19 +361,17 @@ ReceiverFrames make_receiver_frames(std::span<const Mat3> rotations) {
 
 void relight_zonal(const ZonalTransfer& t, const ReceiverFrames* frames, std::span<const Vec3> light, Relit& out) {
   LAMBENT_CHECK(light.size() >= size_t(sh_count(t.order)));
-  const ShTables& tables = sh_tables();
-  DirectLight direct;
-  direct.order = t.order;
-  for (int l = 0; l < t.order; ++l) {
-    direct.diagonal[l] = float(tables.diagonal[l]);
-    for (int m = 0; m < t.order; ++m) direct.a[l][m] = float(tables.a[l][m]), direct.b[l][m] = float(tables.b[l][m]);
-  }
+  DirectLight direct = direct_light(t);
   for (int k = 0; k < sh_count(t.order); ++k)
     for (int c = 0; c < 3; ++c) direct.light[k][c] = light[size_t(k)][c];
-  for_blocks(t, frames, out, [&](const uint8_t* data, const float* turned, size_t blocks, float* values) {
-    if (t.precision == Precision::half) HWY_DYNAMIC_DISPATCH(DirectHalf)(t, data, turned, blocks, direct, values);
-    else HWY_DYNAMIC_DISPATCH(DirectSingle)(t, data, turned, blocks, direct, values);
-  });
+  shade_directly(t, frames, direct, out);
+}
+
+void relight_zonal(const ZonalTransfer& t, const ReceiverFrames* frames, const LightField& light, Relit& out) {
+  LAMBENT_CHECK(light.order >= t.order && light.receivers == t.receivers);
+  DirectLight direct = direct_light(t);
+  direct.field = light.values.data(), direct.field_coefficients = size_t(sh_count(light.order));
+  shade_directly(t, frames, direct, out);
 }
 
 void specialise_light(const ZonalTransfer& t, std::span<const Vec3> light, ZonalLight& out) {
@@ -368,7 +402,7 @@ void relight_zonal(const ZonalTransfer& t, const ReceiverFrames* frames, const Z
   float exact[4][3];
   for (int k = 0; k < 4; ++k)
     for (int c = 0; c < 3; ++c) exact[k][c] = light.exact[size_t(k)][c];
-  for_blocks(t, frames, out, [&](const uint8_t* data, const float* turned, size_t blocks, float* values) {
+  for_blocks(t, frames, out, [&](size_t, const uint8_t* data, const float* turned, size_t blocks, float* values) {
     if (t.precision == Precision::half) HWY_DYNAMIC_DISPATCH(SpecialisedHalf)(t, data, turned, blocks, light.texels.data(), exact, values);
     else HWY_DYNAMIC_DISPATCH(SpecialisedSingle)(t, data, turned, blocks, light.texels.data(), exact, values);
   });

@@ -1,5 +1,6 @@
 #pragma once
 // Shading by zonal lobes, each receiver turned by a rotation of its own. Source: local-deformable-prt, section 5.
+#include <lambent/relight/local_light.h>
 #include <lambent/relight/relight.h>
 #include <lambent/transfer/zonal_transfer.h>
 
@@ -18,6 +19,9 @@ ReceiverFrames make_receiver_frames(std::span<const Mat3> rotations);
 // coefficients of radiance at least. `frames` may be null: as baked. Directly, by equation 13: also for light that differs from
 // call to call. Sizes `out` on first use and allocates nothing after that.
 void relight_zonal(const ZonalTransfer& transfer, const ReceiverFrames* frames, std::span<const Vec3> light, Relit& out);
+
+// Every receiver under a light of its own, of at least as many bands.
+void relight_zonal(const ZonalTransfer& transfer, const ReceiverFrames* frames, const LightField& light, Relit& out);
 
 // The same for one row of a receiver, given its values, turned by R: for light that varies from place to place, and for textures.
 Vec3 shade_zonal(const ZonalTransfer& transfer, std::span<const float> values, const Mat3& R, std::span<const Vec3> light);

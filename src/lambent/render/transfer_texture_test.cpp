@@ -1,5 +1,6 @@
 // Textured patches against the displaced geometry itself.
 #include <lambent/bake/patch.h>
+#include <lambent/compress/wrinkle.h>
 #include <lambent/compress/zonal_fit.h>
 #include <lambent/light/project.h>
 #include <lambent/light/sky.h>
@@ -70,7 +71,7 @@ TEST(TransferTexture, ShadesAFlatWallAsTheReliefItself) {
   RenderOptions options;
   options.width = options.height = n, options.samples = 64;
   const std::vector<Vec3> turned = rotate_sh(make_sh_rotation(6, R), light);
-  auto image = render_transfer_texture(wall, *wall_tracer, texture, Vec2(1), turned, camera, options);
+  auto image = render_transfer_texture(wall, *wall_tracer, texture, {}, {turned, {}}, camera, options);
   ASSERT_TRUE(image);
   double error = 0, total = 0;
   for (int j = 0; j < n; ++j)
@@ -113,7 +114,7 @@ TEST(TransferTexture, ShadesSheetsAsTheirDisplacedGeometry) {
     camera.target.y = 100 - middle.distance, camera.eye.y = camera.target.y + 300;
     RenderOptions options;
     options.width = options.height = 48, options.samples = 64;
-    auto ours = render_transfer_texture(bent, *tracer, texture, Vec2(float(tiles)), light, camera, options);
+    auto ours = render_transfer_texture(bent, *tracer, texture, {.tile = Vec2(float(tiles))}, {light, {}}, camera, options);
     ASSERT_TRUE(ours);
     Scene relief = bent;
     ASSERT_TRUE(displace(relief, [&](Vec2 uv) { return sample_height(field, uv); }, Vec2(float(tiles))));
@@ -131,6 +132,101 @@ TEST(TransferTexture, ShadesSheetsAsTheirDisplacedGeometry) {
     std::printf("%s: %.4f of what is there, %.4f of how it varies\n", text, std::sqrt(error / total), std::sqrt(error / 3 / smooth));
     EXPECT_LT(std::sqrt(error / total), 0.06) << text;
   }
+}
+
+// How far two pictures are apart, relative to the second.
+double relative_rms(const Image& ours, const Image& truth) {
+  double error = 0, total = 0;
+  for (size_t i = 0; i < ours.rgb.size(); ++i) {
+    const Vec3 d = ours.rgb[i] - truth.rgb[i];
+    error += glm::dot(d, d), total += glm::dot(truth.rgb[i], truth.rgb[i]);
+  }
+  return std::sqrt(error / total);
+}
+
+// A sheet of 5 x 5 repetitions about the origin, facing +y, with u along x and v against z.
+Scene tiled_sheet(int cells) {
+  Scene sheet = make_quad(Vec3(-2.5f, 0, 2.5f), Vec3(5, 0, 0), Vec3(0, 0, -5), cells, cells, Vec3(0.5f));
+  for (Vec3 p : sheet.positions) sheet.texcoords[0].push_back({(p.x + 2.5f) / 5, (p.z + 2.5f) / 5});
+  return sheet;
+}
+
+Camera from_above(float y) {
+  Camera camera;
+  camera.up = Vec3(0, 0, -1), camera.target = Vec3(0, y, 0), camera.eye = Vec3(0, y + 300, 0);
+  camera.fov = 2 * glm::degrees(std::atan(0.5f / 300));
+  return camera;
+}
+
+// Grooves from the table against grooves of triangles, path-traced: across u and across v, of two depths, wide and narrow, flat and bent.
+TEST(TransferTexture, GroovesAreThoseOfDisplacedGeometry) {
+  auto table = make_wrinkle_table({});
+  ASSERT_TRUE(table);
+  const std::vector<Vec3> light = project_environment(*make_sky(*parse_sky("elevation=35,azimuth=60,turbidity=3")), 6);
+  const Environment env = reconstruct_environment(light, 256);
+  struct Case {
+    Vec2 tile;
+    float width, depth;
+    const char* deform;
+  };
+  for (const Case& c : {Case{{5, 0}, 1, 0.5f, "bend:0.01,x,y"}, {{5, 0}, 1, 0.9f, "bend:0.01,x,y"}, {{0, 5}, 0.6f, 0.5f, "bend:0.01,x,y"}, {{5, 0}, 1, 0.5f, "bend:-100,x,y"}}) {
+    const Scene sheet = tiled_sheet(240);
+    const Scene bent = posed(sheet, deform_scene(sheet, *parse_deformation(c.deform)));
+    auto tracer = Tracer::build(bent);
+    const Hit middle = tracer->closest({0.01f, 100, 0.02f}, {0, -1, 0});
+    const Camera camera = from_above(100 - middle.distance);
+    RenderOptions options;
+    options.width = options.height = 48, options.samples = 64;
+    auto ours = render_transfer_texture(bent, *tracer, table->texture, {c.tile, c.width, c.depth, {}}, {light, {}}, camera, options);
+    ASSERT_TRUE(ours);
+    Scene relief = bent;
+    ASSERT_TRUE(displace(relief, [&](Vec2 uv) {
+      const float phase = c.tile.x > 0 ? uv.x : uv.y, x = (phase - std::floor(phase) - 0.5f) / c.width;
+      return std::abs(x) < 0.5f ? -c.depth * c.width * std::pow(std::cos(pi * x), 2.0f) : 0.0f;
+    }, Vec2(5)));
+    ReferenceOptions traced;
+    traced.width = traced.height = 48, traced.spp = 256, traced.bounces = 6;
+    auto truth = path_trace(relief, env, camera, traced);
+    ASSERT_TRUE(truth);
+    std::printf("tile %g,%g width %g depth %g %s: %.4f\n", c.tile.x, c.tile.y, c.width, c.depth, c.deform, relative_rms(*ours, truth->image));
+    EXPECT_LT(relative_rms(*ours, truth->image), 0.1);
+  }
+}
+
+// A glowing ball near the relief, against the path tracer's: a mesh of triangles that it samples.
+TEST(TransferTexture, NearLampsLightItAsTheyDoTheDisplacedGeometry) {
+  const int n = 24;
+  HeightField field{n, {}};
+  for (int j = 0; j < n; ++j)
+    for (int i = 0; i < n; ++i) field.heights.push_back(0.08f * std::sin(2 * pi * float(i) / n + std::sin(2 * pi * float(j) / n)));
+  const PatchScene patch = make_patch(field, Vec3(0.5f));
+  auto patch_tracer = Tracer::build(patch.scene);
+  auto transfer = bake(patch.scene, *patch_tracer, patch.receivers, {.samples = 1024, .bounces = 2, .precision = Precision::single});
+  ASSERT_TRUE(transfer);
+  auto lobes = fit_zonal(*transfer, {.lobes = 4});
+  ASSERT_TRUE(lobes);
+  const Scene sheet = tiled_sheet(n * 5);
+  auto tracer = Tracer::build(sheet);
+  // From below the lamp, which would stand before the sheet.
+  Camera camera = from_above(0);
+  camera.eye.y = 0.8f, camera.fov = 2 * glm::degrees(std::atan(0.5f / 0.8f));
+  RenderOptions options;
+  options.width = options.height = 48, options.samples = 64;
+  const SphereLamp lamp{{0.8f, 1.6f, 0.3f}, 0.7f, {5, 4, 3}};
+  Scene relief = sheet;
+  ASSERT_TRUE(displace(relief, [&](Vec2 uv) { return sample_height(field, uv); }, Vec2(5)));
+  const uint32_t glow = add_material(relief, "lamp", Vec3(0.0f));
+  add_sphere(relief, glow, "lamp", lamp.centre, lamp.radius, 4);
+  relief.materials[glow].emissive = lamp.radiance;
+  relief.texcoords[0].resize(relief.positions.size());
+  ReferenceOptions traced;
+  traced.width = traced.height = 48, traced.spp = 256, traced.bounces = 3, traced.lamps = true;
+  auto ours = render_transfer_texture(sheet, *tracer, {n, n, *lobes}, {.tile = Vec2(5)}, {std::vector<Vec3>(36, Vec3(0.0f)), {lamp}}, camera, options);
+  ASSERT_TRUE(ours);
+  auto truth = path_trace(relief, *load_environment("uniform:0"), camera, traced);
+  ASSERT_TRUE(truth);
+  std::printf("near lamp: %.4f\n", relative_rms(*ours, truth->image));
+  EXPECT_LT(relative_rms(*ours, truth->image), 0.12);
 }
 
 }  // namespace

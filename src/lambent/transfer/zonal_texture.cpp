@@ -3,6 +3,7 @@
 #include <lambent/transfer/zonal_texture.h>
 
 #include <array>
+#include <bit>
 
 namespace lambent {
 namespace {
@@ -29,7 +30,9 @@ Result<void> save_zonal_texture(const std::string& path, const ZonalTexture& tex
   const ZonalTransfer& t = texture.transfer;
   LAMBENT_CHECK(t.receivers == size_t(texture.width) * size_t(texture.height) && t.data.size() == t.bytes());
   std::array<uint8_t, header_size> header{};
-  const uint32_t fields[6] = {uint32_t(texture.width), uint32_t(texture.height), uint32_t(t.order), uint32_t(t.lobes), uint32_t(t.channels), uint32_t(t.value_bytes())};
+  LAMBENT_CHECK(t.rows == 1);
+  const uint32_t fields[8] = {uint32_t(texture.width), uint32_t(texture.height), uint32_t(t.order), uint32_t(t.lobes), uint32_t(t.channels), uint32_t(t.value_bytes()),
+                              uint32_t(texture.groove_depth > 0), std::bit_cast<uint32_t>(texture.groove_depth)};
   std::memcpy(header.data(), magic, 8);
   std::memcpy(header.data() + 8, fields, sizeof fields);
   const std::span<const uint8_t> pieces[2] = {header, t.data};
@@ -46,14 +49,18 @@ Result<ZonalTexture> load_zonal_texture(const MappedFile& file, const std::strin
   const std::span<const uint8_t> bytes = file.bytes();
   if (bytes.size() < header_size || std::memcmp(bytes.data(), magic, 7) != 0) return Error{path, "is not a texture of zonal lobes (make one with `lambent patch`)"};
   if (bytes[7] != uint8_t(magic[7])) return Error{path, "is a texture of zonal lobes of another version"};
-  uint32_t fields[6];
+  uint32_t fields[8];
   std::memcpy(fields, bytes.data() + 8, sizeof fields);
-  const auto [width, height, order, lobes, channels, value_bytes] = std::to_array(fields);
+  const auto [width, height, order, lobes, channels, value_bytes, kind, depth_bits] = std::to_array(fields);
+  const float depth = std::bit_cast<float>(depth_bits);
   auto within = [](uint32_t x, uint32_t most) { return x >= 1 && x <= most; };
   if (!within(width, max_zonal_texture_size) || !within(height, max_zonal_texture_size)) return Error{path, "its width or height is out of range"};
   if (!within(order, max_sh_order) || !within(lobes, max_stored_lobes) || (channels != 1 && channels != 3)) return Error{path, "its order, lobes or channels are out of range"};
   if (value_bytes != 2 && value_bytes != 4) return Error{path, "its precision is not known to this program"};
+  if (kind > 1) return Error{path, "is of a kind that is not known to this program"};
+  if (kind == 1 && !(depth > 0 && depth <= 10 && width >= 2 && height >= 2)) return Error{path, "its grooves have no depth, or too few places"};
   ZonalTexture texture;
+  if (kind == 1) texture.groove_depth = depth;
   texture.width = int(width), texture.height = int(height);
   ZonalTransfer& t = texture.transfer;
   t.order = int(order), t.lobes = int(lobes), t.channels = int(channels), t.receivers = size_t(width) * height;
@@ -80,6 +87,23 @@ void sample_zonal_texture(const ZonalTexture& texture, Vec2 uv, std::span<float>
                 fy * ((1 - fx) * load_value(t, texel(i, j + 1), k) + fx * load_value(t, texel(i + 1, j + 1), k));
   const size_t nearest = texel(std::min(int(x), texture.width - 1), std::min(int(y), texture.height - 1));
   for (size_t k = t.exact_values(); k < values.size(); ++k) values[k] = load_value(t, nearest, k);
+}
+
+void sample_groove(const ZonalTexture& table, float x, float depth, std::span<float> values) {
+  const ZonalTransfer& t = table.transfer;
+  LAMBENT_CHECK(values.size() == t.receiver_values() && table.groove_depth > 0);
+  if (!(std::abs(x) < 0.5f)) x = 0.5f, depth = 0;
+  auto place = [](float u, int n) { return std::isfinite(u) ? std::clamp(u, 0.0f, 1.0f) * float(n - 1) : 0.0f; };
+  const float px = place(x + 0.5f, table.width), pd = place(depth / table.groove_depth, table.height);
+  const int i = std::min(int(px), table.width - 2), j = std::min(int(pd), table.height - 2);
+  const float fx = px - float(i), fd = pd - float(j);
+  const size_t a = size_t(j * table.width + i), b = a + size_t(table.width);
+  for (size_t k = 0; k < values.size(); ++k)
+    values[k] = (1 - fd) * ((1 - fx) * load_value(t, a, k) + fx * load_value(t, a + 1, k)) + fd * ((1 - fx) * load_value(t, b, k) + fx * load_value(t, b + 1, k));
+  for (int l = 0; l < t.lobes; ++l) {
+    const Vec3 axis = lobe_axis(t, values, l);
+    for (size_t k = 0; k < 3; ++k) values[t.exact_values() + size_t(l) * t.lobe_values() + k] = axis[int(k)];
+  }
 }
 
 }  // namespace lambent
