@@ -283,6 +283,22 @@ expect 2 'animation' render corner.glb --env uniform:1 --time 1 -o x.png
 expect 2 'frames' render corner.glb --env uniform:1 --animation 0 --frames 3:1 -o x.png
 expect 2 'membrane' bake corner.obj --membrane 1.5 -o x.glb
 expect 2 'tile' render corner.obj --transfer-texture relief.lpt --tile 1 --env uniform:1 -o x.png
+# Heights of 16 bits, all within four steps of 8 bits, and the same as floats; then with one that is not a number.
+echo iVBORw0KGgoAAAANSUhEUgAAAAQAAAAEEAAAAADcCh3hAAAALUlEQVR42mMoUy7vK48t3cpQtqriZvmsclGG8g3lTaXF5XMYSm0rLlV0lgsAABW2D0qypiRMAAAAAElFTkSuQmCC | base64 -d >heights.png
+echo H4sIAAAAAAACA4VNMU4DMRBcX1JQotQU1DRAhESqRYAEJVKEFNFhzo5iZOzT2QqBii/wB15AyQ/4CMVdctblBTgXSzlI4ZVWO7M7Mzs9PCYJAKQTqhSXxgMpjIVTv7uA1WVVJPT11ma4tYFUP2U5N0Zo9Qc3R0YtHQnF9DM86FlfwC5sqhOaCZNJ+hLVSaH4Tc543kLNl0zMuDw3GU/tkFqhYSw1tdBt3G9nJs05V+v4S66st037Y9hpvWhLRoLZyb8IuCNr4XuY32GSZBNy5Ht+NUe359B9VVg+lhjjJPgWtwtcftboThxWBxXGeBJ87t5ndR2WPwW6gccR3gm+4rXA5UeNda/Gar/CGP8FtnHOPTkCAAA= | base64 -d | gzip -d >heights.exr
+echo H4sIAAAAAAACA4VNMU4DMRBcX1JQImoKahogDVSLAAlKpAgposO5cxQjY5/OVgg08AX+wAsoqWj5CMVdYuvyApyLpRyk8EqrndmdmZ0cHJEEANIxlZIJ7YHg2sCx353D8rIsEvpqY9Pf2ECqHvKCac2V/IObY0YNHXCZqUcYqmmPwzasqxM64zoX9CmqE1yy6yJjRQs1X3I+ZeJM5yw1fWq4gpFQ1EC3cb+e6rRgTK7iL5g03jbpjWCr9aItGfDMjP9FwC1ZCd/C/A6TJOuQQ9+zyxm6XYfu02J1X2GMk+Cb38xx8VEjwNeL3bcY40nwuTuf1XVY/ZToTjyO8E7wlc8lLt5rrHdqtHsWY/wXCih0PjkCAAA= | base64 -d | gzip -d >nan.exr
+for heights in png exr; do
+  expect 0 'RMS' patch heights.$heights --depth 5 --size 8 --samples 256 --lobes 3 -o heights_$heights.lpt
+  expect 0 'texels' render corner.obj --transfer-texture heights_$heights.lpt --env sky:elevation=40 --size 24x24 -o heights_$heights.exr
+done
+expect 0 '"psnr"' compare heights_png.exr heights_exr.exr --json
+psnr=$(sed -n 's/.*"psnr": \([0-9]*\).*/\1/p' stdout)
+grep -q '"psnr": null' stdout || [ "${psnr:-0}" -ge 50 ] && ok || bad "heights of 16 bits and floats differ: PSNR ${psnr:-none}"
+expect 1 'not a finite number' patch nan.exr -o x.lpt
+head -c 60 heights.png >cut.png
+expect 1 'cut.png' patch cut.png -o x.lpt
+printf 'P6\n1 1\n255\nabc' >one.ppm
+expect 1 'one.ppm' patch one.ppm -o x.lpt
 # Grooves as a table, near lamps, relief as geometry.
 expect 0 'grooves' patch --groove 1 --size 6 -o groove.lpt
 printf 'v 0 0 0\nv 1 0 0\nv 1 0 -1\nv 0 0 -1\nvt 0 0\nvt 1 0\nvt 1 1\nvt 0 1\nf 1/1 2/2 3/3\nf 1/1 3/3 4/4\n' >card.obj
