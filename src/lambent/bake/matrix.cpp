@@ -1,19 +1,10 @@
-// Follows: general-prt (transfer matrices, the recursion over bounces with glossy scattering, the last reflection),
-// triple-product-integrals (direct light as a triple product: with V known to order n + m - 1 the product of light and incident
-// basis, of orders n and m, against it is exact). Instead of the recursion, bounces by paths (general-prt, "direct simulation").
-#include <lambent/bake/gather.h>
-#include <lambent/bake/lobes.h>
-#include <lambent/bake/matrix.h>
+// Follows: general-prt (transfer matrices, the recursion over bounces, the last reflection).
 #include <lambent/bake/kernels.h>
-#include <lambent/bake/matrix_kernels.h>
-#include <lambent/bake/path.h>
-#include <lambent/basis/sh_product.h>
+#include <lambent/bake/last_reflection.h>
+#include <lambent/bake/matrix_gather.h>
 #include <lambent/core/check.h>
-#include <lambent/core/half.h>
 #include <lambent/core/parallel.h>
-#include <lambent/core/pool.h>
 #include <lambent/core/sampling.h>
-#include <lambent/core/random.h>
 
 #include <atomic>
 #include <chrono>
@@ -26,252 +17,10 @@ namespace {
 using Clock = std::chrono::steady_clock;
 double seconds_since(Clock::time_point start) { return std::chrono::duration<double>(Clock::now() - start).count(); }
 
-// A hit that scatters, as it is kept for the bounces.
-struct MatrixHit {
-  uint32_t corner;   // triangle, and in the lowest bit whether its front was met
-  uint32_t ray;
-  uint16_t u, v;     // of 65535
-  uint16_t rgb[3];   // halves: base colour there
-};
-
-struct MatrixHits {  // of a block of receivers
-  std::vector<MatrixHit> hits;
-  std::vector<uint32_t> ends;  // by receiver
-  size_t bytes() const { return hits.size() * sizeof(MatrixHit) + ends.size() * 4 + sizeof(MatrixHits); }
-};
-
-// Functions given by coefficients over rows j, turned by phi about z: rows (l, m) and (l, -m) mix. `rows` is [j][width].
-void turn_rows_about_z(float* rows, int order, size_t width, float phi) {
-  for (int m = 1; m < order; ++m) {
-    const float c = std::cos(float(m) * phi), s = std::sin(float(m) * phi);
-    for (int l = m; l < order; ++l) {
-      float* p = rows + size_t(sh_index(l, m)) * width;
-      float* q = rows + size_t(sh_index(l, -m)) * width;
-      for (size_t i = 0; i < width; ++i) {
-        const float a = p[i], b = q[i];
-        p[i] = a * c - b * s, q[i] = a * s + b * c;
-      }
-    }
-  }
-}
-
-// What a thread needs for one receiver at a time.
-struct MatrixScratch {
-  AlignedVector<float> x, y, z, visible, lobe;
-  std::vector<Hit> hits;
-  std::vector<float> V, column_row;
-  AlignedVector<float> sh_rows, v, zb, full, half;
-  std::vector<ViewWeights> weights;
-  std::vector<float> scalars, z_values;
-  std::vector<double> lobe_sums;
-  LobeRays lobe_rays;
-  DirectionChoice choice{};
-  float phi = 0;  // from the set's frame to the receiver's, about the normal
-};
-
-struct MatrixBaker {
-  const Scene& scene;
-  Receivers receivers;  // a copy: buried ones move
-  const ReceiverMaterials& materials;
-  const BakeOptions& options;
-  const MatrixOptions& matrix;
-  const GatherSetup setup;
+struct MatrixBaker : MatrixGather {
   Progress* progress;
   BakeReport& report;
-
-  const LobeSets lobes = make_lobe_sets(options.lobe_kind, options.lobes, options.samples, options.seed);
-  CosineBasis basis = make_cosine_basis(matrix.incident_order);
-  TriplingTensor tensor = make_tripling_tensor(options.order, matrix.incident_order, options.order + matrix.incident_order - 1);
-  ShZyzRotator rotator{options.order};
-  std::vector<FactoredResponse> scatter{};
   std::vector<ViewMap> responses{};
-  std::vector<size_t> first_row{};  // of each receiver's scattered rows; one more at the end
-  Pool<MatrixScratch> scratch{[this] { return make_scratch(); }};
-
-  const CornerReceivers& corners() const { return std::get<CornerReceivers>(receivers.basis); }
-  size_t n() const { return receivers.count(); }
-  size_t J() const { return size_t(basis.count()); }                // rows of X
-  size_t harmonics() const { return size_t(sh_count(options.order)); }
-  size_t C() const { return harmonics() + lobes.count(); }          // columns
-  size_t channels() const { return size_t(setup.channels); }
-  size_t width() const { return pad_lanes(C()); }                   // floats of a row of one channel
-  size_t V_count() const { return setup.coefficients(); }
-  size_t rays() const { return size_t(setup.sets.samples); }
-  bool has_halves() const { return setup.sets.half < rays(); }
-
-  std::unique_ptr<MatrixScratch> make_scratch() const {
-    auto s = std::make_unique<MatrixScratch>();
-    const size_t stride = setup.sets.stride, w = channels() * width();
-    s->x.resize(stride), s->y.resize(stride), s->z.resize(stride), s->visible.resize(stride), s->lobe.resize(stride), s->hits.resize(rays());
-    s->V.resize(V_count()), s->column_row.resize(C());
-    s->sh_rows.resize(J() * w), s->v.resize(hit_batch * w), s->zb.resize(hit_batch * J());
-    s->full.resize(J() * width()), s->half.resize(J() * width());
-    s->weights.resize(J()), s->scalars.resize(J() * 3);
-    s->z_values.resize(J()), s->lobe_sums.resize(2 * J()), s->lobe_rays = make_lobe_rays(lobes);
-    return s;
-  }
-
-  Directions aim(MatrixScratch& s, size_t r) const {
-    const DirectionSets& sets = setup.sets;
-    s.choice = choose_directions(sets, receivers.normals[r], setup.seed, r);
-    const size_t base = size_t(s.choice.set) * sets.stride;
-    rotate_directions(s.choice.rotation, sets.x.data() + base, sets.y.data() + base, sets.z.data() + base, sets.stride, s.x.data(), s.y.data(), s.z.data());
-    const Vec3 x_axis = s.choice.rotation[0] * materials.frames[r];  // the set's x axis in the receiver's frame
-    s.phi = std::atan2(x_axis.y, x_axis.x);
-    return {s.x.data(), s.y.data(), s.z.data(), rays()};
-  }
-
-  // Rows over the harmonics of the set's frame -> rows over the incident basis of the receiver's frame, into out[j][width].
-  void to_incident(float* sh_rows, float phi, size_t w, float scale, float* out) const {
-    turn_rows_about_z(sh_rows, basis.order, w, phi);
-    for (size_t j = 0; j < J(); ++j) {
-      std::fill(out + j * w, out + (j + 1) * w, 0.0f);
-      for (size_t k = 0; k <= j; ++k) {
-        const float f = scale * float(basis.from_sh[j * J() + k]);
-        if (f == 0) continue;
-        for (size_t i = 0; i < w; ++i) out[j * w + i] += f * sh_rows[k * w + i];
-      }
-    }
-  }
-
-  // Direct light from the first `count` rays: X0_ji = mean of V y_i z_j = sum_k C_ijk V_k. out is [J][width].
-  void direct(MatrixScratch& s, size_t count, float* out) const {
-    const size_t w = width(), base = size_t(s.choice.set) * V_count() * setup.sets.stride;
-    weighted_rows(setup.sets.table.data() + base, V_count(), setup.sets.stride, s.visible.data(), count == rays() ? setup.sets.stride : count, s.V.data());
-    float* rows = s.sh_rows.data();
-    std::fill(rows, rows + J() * w, 0.0f);
-    for (size_t k = 0; k < V_count(); ++k) {
-      const float v = s.V[k];
-      for (uint32_t e = tensor.begin[k]; e < tensor.begin[k + 1]; ++e) rows[size_t(tensor.j[e]) * w + tensor.i[e]] += tensor.single[e] * v;
-    }
-    for (size_t j = 0; j < J(); ++j) rotator.rotate(s.choice.a, s.choice.b, s.choice.c, {rows + j * w, harmonics()});
-    // Broad lobes: V b takes the place of V, and the harmonics below J that of the triple product.
-    for (uint32_t k : lobes.broad) {
-      evaluate_on_fan(lobes, k, s.x.data(), s.y.data(), s.z.data(), setup.sets.stride, s.lobe.data());
-      multiply_values(s.lobe.data(), s.visible.data(), setup.sets.stride, s.lobe.data());
-      weighted_rows(setup.sets.table.data() + base, J(), setup.sets.stride, s.lobe.data(), count == rays() ? setup.sets.stride : count, s.V.data());
-      for (size_t j = 0; j < J(); ++j) rows[j * w + harmonics() + k] = s.V[j];
-    }
-    to_incident(rows, s.phi, w, 1.0f / float(count), out);
-  }
-
-  // Direct light of the sharp lobes, by rays of their own: X0_jk = 1/pi integral of V b_k z_j cos, into out and, if given, half_out.
-  void direct_sharp_lobes(MatrixScratch& s, size_t r, float* out, float* half_out) const {
-    for (size_t lobe = 0; lobe < lobes.sharp.size(); ++lobe) {
-      const size_t k = lobes.sharp[lobe];
-      trace_lobe(lobes, setup.tracer, receivers.origins[r], receivers.normals[r], r, lobe, s.lobe_rays);
-      std::fill(s.lobe_sums.begin(), s.lobe_sums.end(), 0.0);
-      for (size_t i = 0; i < s.lobe_rays.count; ++i) {
-        const float weight = s.lobe_rays.visible[i] * s.lobe_rays.cosine[i];
-        if (weight == 0) continue;
-        evaluate_cosine_basis(basis, Vec3(s.lobe_rays.x[i], s.lobe_rays.y[i], s.lobe_rays.z[i]) * materials.frames[r], s.z_values);
-        double* sums = s.lobe_sums.data() + (i < s.lobe_rays.half ? 0 : J());
-        for (size_t j = 0; j < J(); ++j) sums[j] += double(weight) * s.z_values[j];
-      }
-      const double scale = double(lobes.integrals[k]) / std::numbers::pi;
-      for (size_t j = 0; j < J(); ++j) {
-        out[j * width() + harmonics() + k] = float(scale * (s.lobe_sums[j] + s.lobe_sums[J() + j]) / lobes.rays);
-        if (half_out) half_out[j * width() + harmonics() + k] = float(scale * s.lobe_sums[j] / double(lobes.half));
-      }
-    }
-  }
-
-  // Light that the hits of rays below `limit` scatter to receiver r, added to out[J][channel][width]; Y holds scattered rows.
-  void scattered(MatrixScratch& s, std::span<const MatrixHit> hits, size_t limit, const float* Y, float* out) const {
-    const size_t w = width(), wc = channels() * w;
-    float* rows = s.sh_rows.data();
-    std::fill(rows, rows + J() * wc, 0.0f);
-    const float* table = setup.sets.table.data() + size_t(s.choice.set) * V_count() * setup.sets.stride;
-    size_t in_batch = 0;
-    for (size_t i = 0; i < hits.size() && hits[i].ray < limit; ++i) {
-      const MatrixHit& h = hits[i];
-      float* v = s.v.data() + in_batch * wc;
-      std::fill(v, v + wc, 0.0f);
-      const Corners& at = *corners().find(h.corner >> 1, h.corner & 1);
-      const Vec3 back(-s.x[h.ray], -s.y[h.ray], -s.z[h.ray]);
-      const Vec3 colour(half_to_float(h.rgb[0]), half_to_float(h.rgb[1]), half_to_float(h.rgb[2]));
-      const float b1 = float(h.u) / 65535.0f, b2 = float(h.v) / 65535.0f, b[3] = {1 - b1 - b2, b1, b2};
-      for (int k = 0; k < 3; ++k) {
-        const uint32_t c = at.receiver[k];
-        const FactoredResponse& f = scatter[materials.of_receiver[c]];
-        const ViewWeights* weights = f.g.values.data();
-        if (!f.constant) {
-          Vec3 wo = back * materials.frames[c];
-          if (wo.z < 0) wo = normalize_or(Vec3(wo.x, wo.y, 0), Vec3(0, 0, 1));
-          look_up(f.g, wo, s.weights);
-          weights = s.weights.data();
-        }
-        for (size_t r = 0; r < size_t(f.rows); ++r) {
-          const Vec3 weight = b[k] * (Vec3(weights[r]) + colour * weights[r].w);
-          for (size_t ch = 0; ch < channels(); ++ch) s.scalars[r * channels() + ch] = weight[int(ch)];
-        }
-        add_weighted_rows(Y + first_row[c] * wc, size_t(f.rows), channels(), w, s.scalars.data(), v);
-      }
-      for (size_t j = 0; j < J(); ++j) s.zb[in_batch * J() + j] = table[j * setup.sets.stride + h.ray];
-      if (++in_batch == hit_batch) add_outer_products(s.zb.data(), J(), s.v.data(), wc, rows), in_batch = 0;
-    }
-    add_rest(s, in_batch, limit, out);
-  }
-
-  // The same light by following the rays below `limit` on from their hits, each to its end.
-  void simulated(MatrixScratch& s, size_t r, std::span<const MatrixHit> hits, size_t limit, float* out) const {
-    const size_t w = width(), wc = channels() * w;
-    std::fill(s.sh_rows.begin(), s.sh_rows.end(), 0.0f);
-    const float* table = setup.sets.table.data() + size_t(s.choice.set) * V_count() * setup.sets.stride;
-    const uint64_t key = hash64(hash64(setup.seed, 0x9a7e5), r);
-    size_t in_batch = 0;
-    for (size_t i = 0; i < hits.size() && hits[i].ray < limit; ++i) {
-      const uint32_t ray = hits[i].ray;
-      const PathEnd end = follow_path(scene, setup.tracer, materials.reflection, {s.x[ray], s.y[ray], s.z[ray]}, s.hits[ray], options.bounces, key, ray);
-      if (!end.leaves) continue;
-      evaluate_sh(options.order, end.direction, s.column_row);
-      float* v = s.v.data() + in_batch * wc;
-      for (size_t c = 0; c < channels(); ++c)
-        for (size_t k = 0; k < C(); ++k) v[c * w + k] = end.throughput[int(c)] * s.column_row[k];
-      for (size_t j = 0; j < J(); ++j) s.zb[in_batch * J() + j] = table[j * setup.sets.stride + ray];
-      if (++in_batch == hit_batch) add_outer_products(s.zb.data(), J(), s.v.data(), wc, s.sh_rows.data()), in_batch = 0;
-    }
-    add_rest(s, in_batch, limit, out);
-  }
-
-  // Adds the last hits of a sum over rays, and the sum, as rows over the incident basis, to out.
-  void add_rest(MatrixScratch& s, size_t in_batch, size_t limit, float* out) const {
-    const size_t wc = channels() * width();
-    if (in_batch) {
-      std::fill(s.zb.data() + in_batch * J(), s.zb.data() + hit_batch * J(), 0.0f);
-      add_outer_products(s.zb.data(), J(), s.v.data(), wc, s.sh_rows.data());
-    }
-    AlignedVector<float> sum(J() * wc);
-    to_incident(s.sh_rows.data(), s.phi, wc, 1.0f / float(limit), sum.data());
-    for (size_t i = 0; i < sum.size(); ++i) out[i] += sum[i];
-  }
-
-  // Traces receiver r: its visible rays, and its scattering hits if wanted. True: it lies inside something.
-  bool trace(MatrixScratch& s, size_t r, MatrixHits* hits) const {
-    const Directions d = aim(s, r);
-    if (!hits) {
-      setup.tracer.visible_fan(receivers.origins[r], d, s.visible.data());
-      size_t seen = 0;
-      for (size_t j = 0; j < rays(); ++j) seen += s.visible[j] > 0;
-      return 4 * seen < rays() && is_buried(setup.tracer, receivers.basis, receivers.origins[r], d);
-    }
-    setup.tracer.closest_fan(receivers.origins[r], d, s.hits.data());
-    size_t backs = 0;
-    for (size_t j = 0; j < rays(); ++j) {
-      const Hit& h = s.hits[j];
-      s.visible[j] = h.triangle == none ? 1.0f : 0.0f;
-      if (h.triangle == none) continue;
-      const Corners* corner = corners().find(h.triangle, h.front);
-      if (!corner) {
-        ++backs;
-        continue;
-      }
-      const Vec3 colour = setup.part_varies[corner->part] ? albedo(scene, scene.triangles[h.triangle], h.u, h.v) : setup.part_albedo[corner->part];
-      hits->hits.push_back({h.triangle << 1 | uint32_t(h.front), uint32_t(j), uint16_t(h.u * 65535.0f + 0.5f), uint16_t(h.v * 65535.0f + 0.5f),
-                            {float_to_half(colour.x), float_to_half(colour.y), float_to_half(colour.z)}});
-    }
-    return 2 * backs > rays();
-  }
 
   // out[row][channel][width] = H x, x[J][channel][width].
   static void apply(std::span<const float> h, size_t rows, size_t J, size_t wc, const float* x, float* out) {
@@ -298,87 +47,10 @@ struct MatrixBaker {
     for (size_t r = 0; r < n(); ++r) first_row.push_back(first_row.back() + size_t(scatter[materials.of_receiver[r]].rows));
   }
 
-  // How X becomes the stored rows: for each material and channel a matrix, rows x J.
-  struct Last {
-    Outgoing outgoing;
-    int rows = 0, channels = 1;
-    std::vector<std::array<std::vector<float>, 3>> h;  // by material, by channel
-  };
-  Last make_last() const {
-    Last last;
-    Outgoing& o = last.outgoing;
-    o.kind = matrix.outgoing;
-    o.frames = materials.frames;
-    last.channels = setup.channels;
-    last.h.resize(materials.materials.size());
-    if (o.kind == OutgoingKind::map) {
-      o.order = matrix.incident_order, o.maps = responses, o.map_of = materials.of_receiver;
-      std::vector<float> identity(J() * J(), 0.0f);
-      for (size_t j = 0; j < J(); ++j) identity[j * J() + j] = 1;
-      for (auto& h : last.h) h = {identity, identity, identity};
-    } else if (o.kind == OutgoingKind::svd) {
-      o.order = matrix.incident_order, o.map_of = materials.of_receiver;
-      std::vector<FactoredResponse> factors;
-      size_t rows = 1;
-      for (const ViewMap& response : responses) factors.push_back(factor_response(response, matrix.svd_rows, 1e-4)), rows = std::max(rows, size_t(factors.back().rows));
-      for (size_t m = 0; m < factors.size(); ++m) {  // every receiver has as many rows; the rest are zero
-        FactoredResponse& f = factors[m];
-        ViewMap wide{f.g.grid, int(rows), std::vector<ViewWeights>(size_t(f.g.grid) * size_t(f.g.grid) * rows, ViewWeights(0.0f))};
-        for (size_t i = 0; i < size_t(f.g.grid) * size_t(f.g.grid); ++i)
-          std::copy_n(f.g.values.begin() + ptrdiff_t(i * size_t(f.rows)), f.rows, wide.values.begin() + ptrdiff_t(i * rows));
-        o.maps.push_back(std::move(wide));
-        f.h.resize(rows * J(), 0.0f);
-        last.h[m] = {f.h, f.h, f.h};
-      }
-    } else if (o.kind == OutgoingKind::phong) {
-      o.order = matrix.incident_order, o.has_b = false;
-      for (size_t m = 0; m < materials.materials.size(); ++m)
-        for (size_t c = 0; c < 3; ++c) {
-          last.h[m][c] = convolve_phong(materials.materials[m], basis, int(c));
-          const auto b = last.h[m][c].end() - ptrdiff_t(J());
-          o.has_b |= std::any_of(b, last.h[m][c].end(), [](float x) { return x != 0; });
-          if (last.h[m][c] != last.h[m][0]) last.channels = 3;
-        }
-    } else {
-      o.order = matrix.outgoing_order;
-      std::vector<std::array<std::vector<float>, 4>> parts;
-      bool coloured = false;
-      o.has_b = false;
-      for (const ViewMap& response : responses) {
-        parts.push_back(project_response(response, o.kind, o.order));
-        for (const ViewWeights& w : response.values) coloured |= w.x != w.y || w.y != w.z, o.has_b |= w.w != 0;
-      }
-      if (coloured) last.channels = 3;
-      for (size_t m = 0; m < parts.size(); ++m)
-        for (size_t c = 0; c < 3; ++c) {
-          last.h[m][c] = parts[m][c];
-          if (o.has_b) last.h[m][c].insert(last.h[m][c].end(), parts[m][3].begin(), parts[m][3].end());
-        }
-    }
-    last.rows = o.rows();
-    return last;
-  }
-
   // T0 in every channel.
   void expand(const float* t, float* x) const {
     for (size_t j = 0; j < J(); ++j)
       for (size_t c = 0; c < channels(); ++c) std::copy_n(t + j * width(), width(), x + (j * channels() + c) * width());
-  }
-
-  // X of receiver r as the rows that are kept.
-  void store(const Last& last, const WritableTransfer& out, size_t r, const float* x) const {
-    std::vector<float> values(size_t(last.rows) * size_t(last.channels) * C());
-    for (size_t row = 0; row < size_t(last.rows); ++row)
-      for (size_t c = 0; c < size_t(last.channels); ++c) {
-        const float* h = last.h[materials.of_receiver[r]][c].data() + row * J();
-        float* v = values.data() + (row * size_t(last.channels) + c) * C();
-        for (size_t j = 0; j < J(); ++j) {
-          const float* xj = x + (j * channels() + std::min(c, channels() - 1)) * width();
-          if (h[j] != 0)
-            for (size_t k = 0; k < C(); ++k) v[k] += h[j] * xj[k];
-        }
-      }
-    store_receiver(out, r, values);
   }
 
   // Sums of squares by block, added up in order.
@@ -395,7 +67,7 @@ struct MatrixBaker {
     }
   };
 
-  MatrixBake finish(const std::vector<uint8_t>& buried, const ErrorSums& errors, WritableTransfer&& out, const Last& last) const {
+  MatrixBake finish(const std::vector<uint8_t>& buried, const ErrorSums& errors, WritableTransfer&& out, const LastReflection& last) const {
     report.error = has_halves() ? errors.relative() : -1;
     report.receivers = n(), report.bytes = out.transfer.bytes();
     for (uint8_t x : buried) report.buried += x;
@@ -406,7 +78,7 @@ struct MatrixBaker {
   Result<MatrixBake> run_simulated() {
     make_responses();
     const auto start = Clock::now();
-    const Last last = make_last();
+    const LastReflection last = make_last_reflection(responses, materials, matrix, basis, setup.channels);
     WritableTransfer out = make_transfer(options.light(), last.rows, last.channels, n(), options.precision);
     std::vector<uint8_t> buried(n());
     ErrorSums errors((n() + gather_block - 1) / gather_block);
@@ -424,7 +96,7 @@ struct MatrixBaker {
       if (checked) gather(setup.sets.half), half = x;
       gather(rays());
       if (checked) errors.add(r / gather_block, half.data(), x.data(), x.size());
-      store(last, out, r, x.data());
+      store_rows(last, materials, out, r, x.data(), channels(), width());
       return inside;
     };
     {
@@ -456,7 +128,7 @@ struct MatrixBaker {
     const size_t held = bounces ? n() : 0;
     AlignedVector<float> T0(held * J() * width());
     std::vector<float> T0_half((held + check_every - 1) / check_every * J() * width());
-    const Last last = make_last();
+    const LastReflection last = make_last_reflection(responses, materials, matrix, basis, setup.channels);
     WritableTransfer out = make_transfer(options.light(), last.rows, last.channels, n(), options.precision);
     ErrorSums errors(blocks);
     std::vector<uint8_t> buried(n());
@@ -477,7 +149,7 @@ struct MatrixBaker {
       direct_sharp_lobes(s, r, full, half);
       if (hits) hits->ends.push_back(uint32_t(hits->hits.size()));
       if (bounces) return;
-      store(last, out, r, full);
+      store_rows(last, materials, out, r, full, channels(), width());
       if (checked && !buried[r] && !moved) errors.add(r / gather_block, half, full, J() * width());
     };
     // Which blocks are kept depends on the scheduling, the result does not: the others are traced again, alike.
@@ -542,7 +214,7 @@ struct MatrixBaker {
             scatter_rows(r, x.data(), next.data());
             continue;
           }
-          store(last, out, r, x.data());
+          store_rows(last, materials, out, r, x.data(), channels(), width());
           if (has_halves() && r % check_every == 0 && !buried[r]) {
             AlignedVector<float> half(J() * wc);
             expand(T0_half.data() + r / check_every * J() * width(), half.data());
@@ -643,7 +315,7 @@ Result<MatrixBake> bake_matrix(const Scene& scene, const Tracer& tracer, const R
   const size_t needed = matrix_memory(receivers.count(), setup.channels, options, matrix);
   if (needed > options.memory)
     return Error{scene.path, "baking needs at least " + std::to_string(needed) + " bytes of working memory, and was allowed " + std::to_string(options.memory)};
-  MatrixBaker baker{scene, receivers, materials, options, matrix, std::move(setup), progress, r};
+  MatrixBaker baker{{scene, receivers, materials, options, matrix, std::move(setup)}, progress, r};
   return matrix.simulate_paths && options.bounces > 0 ? baker.run_simulated() : baker.run();
 }
 
