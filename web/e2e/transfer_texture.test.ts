@@ -51,6 +51,7 @@ describe.skipIf(!haveTool || !haveBrowser)('a transfer texture', () => {
     expect(read(() => new Uint8Array(0))).toThrow(/is not a texture/);
     expect(read((b) => b.subarray(0, 100))).toThrow(/36 bytes/);
     expect(read((b) => b.set([50], 7))).toThrow(/another version/);
+    expect(read((b) => b.set([1], 32))).toThrow(/grooves/);
     expect(read((b) => b.set([0, 0, 0, 0], 8))).toThrow(/width or height/);
     expect(read((b) => b.set([99], 16))).toThrow(/order, lobes/);
     expect(read((b) => b.set([3], 28))).toThrow(/precision/);

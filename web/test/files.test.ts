@@ -4,7 +4,7 @@ import { blockLayout, packBlocks, type BlockHeader } from '../src/block_texture.
 import { readHeader } from '../src/header.ts';
 import { checkBakedFile } from '../src/index.ts';
 import { mapLayout, packMaps, readOutgoing } from '../src/matrix.ts';
-import { zonalValues } from '../src/zonal.ts';
+import { zonalKind, zonalValues } from '../src/zonal.ts';
 import { random } from './tool.ts';
 
 describe('the transfer texture', () => {
@@ -54,6 +54,8 @@ describe('the transfer texture', () => {
 });
 
 describe('zonal values', () => {
+  it('of a matrix are refused by name', async () =>
+    expect(zonalKind.load({ extension: { transfer: { outgoing: {} } } } as never)).rejects.toThrow(/lobes of a transfer matrix/));
   // docs/zonal.md: bytes a vertex in half floats, grey, order 6.
   it('take the bytes of the docs', () => expect([1, 2, 3, 4, 5, 6].map((lobes) => 2 * zonalValues(6, lobes, 1))).toEqual([18, 34, 50, 64, 78, 92]));
 });

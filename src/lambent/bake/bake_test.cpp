@@ -7,6 +7,8 @@
 #include <lambent/relight/relight.h>
 #include <lambent/scene/procedural.h>
 
+#include "sanitizers.h"
+
 #include <gtest/gtest.h>
 
 #include <cstring>
@@ -120,6 +122,7 @@ Scene ball_with_port(float rho, float cosine, float& fraction) {
 }
 
 TEST(Bake, IntegratingSphereWithAPort) {
+  SKIP_UNDER_SANITIZERS();
   // The ball has 5,120 flat faces: its chords fall short of the sphere's by about 0.3%, and every bounce repeats that.
   constexpr float faceted = 0.01f;
   for (float rho : {0.3f, 0.8f}) {
@@ -215,6 +218,7 @@ TEST(Bake, TheSameBytesWhateverTheThreadsAndTheMemory) {
 }
 
 TEST(Bake, EstimatesItsErrorNotFarFromTheTruth) {
+  SKIP_UNDER_SANITIZERS();
   const Scene scene = make_courtyard(0.15f);
   const BakeOptions coarse{.order = 6, .samples = 64, .bounces = 2};
   BakeOptions fine = coarse;

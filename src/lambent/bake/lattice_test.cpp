@@ -6,6 +6,8 @@
 #include <lambent/relight/lattice.h>
 #include <lambent/scene/procedural.h>
 
+#include "sanitizers.h"
+
 #include <gtest/gtest.h>
 
 namespace lambent {
@@ -119,6 +121,7 @@ TEST(Lattice, HoldsTheIntegralsItStandsFor) {
 }
 
 TEST(Lattice, SeesGlossySurfacesFromWhereItIs) {
+  SKIP_UNDER_SANITIZERS();
   const Surfaces s = bake_surfaces(coloured_corner(), {.order = 3, .samples = 16, .bounces = 0});
   ReceiverMaterials materials;
   materials.materials = {{MetallicRoughness{Vec3(0), 0.5f, 0.3f}, MetallicRoughness{Vec3(1), 0.5f, 0.3f}}};

@@ -8,6 +8,8 @@
 #include <lambent/relight/relight.h>
 #include <lambent/scene/procedural.h>
 
+#include "sanitizers.h"
+
 #include <gtest/gtest.h>
 
 #include <cmath>
@@ -62,6 +64,7 @@ TEST(Matrix, PhongConvolutionHasTheEigenvaluesOfItsLobe) {
 // An open plane under uneven light, seen from several sides. By definition the rows give the lobe's integral of L cos cut off at the incident
 // order; the true integral is neared as the order grows.
 TEST(Matrix, PhongByConvolutionIsTheLobesIntegralOfBandLimitedLight) {
+  SKIP_UNDER_SANITIZERS();
   const Scene scene = make_quad(Vec3(-1, 0, -1), Vec3(0, 0, 2), Vec3(2, 0, 0), 1, 1, Vec3(0.5f));
   auto tracer = Tracer::build(scene);
   const Receivers receivers = make_vertex_receivers(scene);

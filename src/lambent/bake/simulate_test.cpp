@@ -7,6 +7,8 @@
 #include <lambent/relight/relight.h>
 #include <lambent/scene/procedural.h>
 
+#include "sanitizers.h"
+
 #include <gtest/gtest.h>
 
 namespace lambent {
@@ -80,6 +82,7 @@ Reflection by_materials() {
 }
 
 TEST(SimulatedPaths, AreTheRecursionWhereThatIsRight) {
+  SKIP_UNDER_SANITIZERS();
   // Fine cells, smooth materials and no contact, beside which hats are wrong.
   for (const bool glossy : {false, true}) {
     const Scene scene = bare_corner(20, 20, 0.4f, glossy ? 0.7f : 1.0f, glossy ? 1.0f : 0.0f);
@@ -96,6 +99,7 @@ TEST(SimulatedPaths, AreTheRecursionWhereThatIsRight) {
 }
 
 TEST(SimulatedPaths, CarryCausticsOffCoarseMetal) {
+  SKIP_UNDER_SANITIZERS();
   const Scene scene = metal_corner(1, 0.25f, 1);
   const std::vector<Vec3> light = uneven_light(light_order);
   const Environment env = reconstruct_environment(light, 256);

@@ -3,6 +3,8 @@
 #include <lambent/core/sampling.h>
 
 #include <chi_square.h>
+#include "sanitizers.h"
+
 #include <gtest/gtest.h>
 
 #include <functional>
@@ -165,6 +167,7 @@ TEST(Brdf, MeanWeightIsAlbedo) {
 }
 
 TEST(Brdf, SamplesFollowDensity) {
+  SKIP_UNDER_SANITIZERS();
   // Cells in even steps of sqrt(1 - z), of equal solid angle times their distance from the pole, so that lobes about the normal span
   // several; and one cell for draws that came to nothing.
   constexpr int ns = 16, nphi = 24, draws = 60000, fine = 40;

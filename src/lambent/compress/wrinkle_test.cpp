@@ -3,6 +3,8 @@
 #include <lambent/compress/wrinkle.h>
 #include <lambent/scene/procedural.h>
 
+#include "sanitizers.h"
+
 #include <gtest/gtest.h>
 
 namespace lambent {
@@ -60,6 +62,7 @@ TEST(Wrinkle, IsWhatTheBakeOfALongGrooveFinds) {
 
 // Between the entries, in place and depth, the table is nearly as good as on them, and fitting all entries together is what makes it so.
 TEST(Wrinkle, LobesCorrespondSoThatTheTableInterpolates) {
+  SKIP_UNDER_SANITIZERS();
   double between[2];
   for (int together : {0, 1}) {
     auto table = make_wrinkle_table({.iterations = together ? 200 : 0});
