@@ -5,6 +5,7 @@ import {
   type WebGLProgramParametersWithUniforms,
 } from 'three';
 import type { BlockLayout } from './block_texture.js';
+import { glossFragmentDeclarations, glossVaryings, glossVertexBody } from './outgoing.js';
 
 /** Replaces one piece of a shader of three's; fails loudly where another version of three has no such piece. */
 export function replaceOnce(shader: string, piece: string, by: string): string {
@@ -38,10 +39,12 @@ export interface PrtUniforms {
 export interface PrtShader {
   /** Of programs: the same for the same GLSL. */
   key: string;
-  /** Defines vec3 prtRadiance( uint receiver ), from prtValues( receiver, k ), prtLight and prtFrame. */
+  /** Defines vec3 prtRadiance( uint receiver ), from prtValues( receiver, k ), prtLight and prtFrame; with `gloss`, prtReflect in its place (outgoing.ts). */
   radiance: string;
+  gloss?: boolean;
   /** Whether prtFrame is asked for. */
   turns: boolean;
+  defines?: Record<string, number>;
 }
 
 export interface PrtOptions {
@@ -99,7 +102,7 @@ vec4 prtValues( const in uint receiver, const in int k ) {
 #endif
 `;
 
-const vertexBody = /* glsl */ `
+const turnBody = /* glsl */ `
   #ifdef PRT_TURNS
     #ifdef USE_SKINNING
       mat3 prtNow = skinWeight.x * mat3( boneMatX ) + skinWeight.y * mat3( boneMatY ) + skinWeight.z * mat3( boneMatZ ) + skinWeight.w * mat3( boneMatW );
@@ -110,6 +113,9 @@ const vertexBody = /* glsl */ `
       prtFrame = prtOrthogonal( mat3( modelMatrix ) * prtRestInverse );
     #endif
   #endif
+`;
+
+const radianceBody = /* glsl */ `
   vPrtFront = prtRadiance( lambentReceiver );
   #ifdef PRT_TWO_SIDED
     vPrtBack = prtRadiance( lambentReceiverBack );
@@ -164,7 +170,7 @@ export class PrtMaterial extends MeshBasicMaterial {
     const { order, layout, channels, twoSided, falseColor, shader } = options;
     this.defines = {
       PRT_LIGHT_QUADS: Math.ceil((order * order) / 4), PRT_QUADS: layout.quads, PRT_TEXELS: layout.texels, PRT_COLUMNS: layout.columns, PRT_ROWS: layout.rows, PRT_CHANNELS: channels,
-      ...(twoSided && { PRT_TWO_SIDED: '' }), ...(falseColor && { PRT_FALSE_COLOR: '' }), ...(shader.turns && { PRT_TURNS: '' }),
+      ...(twoSided && { PRT_TWO_SIDED: '' }), ...(falseColor && { PRT_FALSE_COLOR: '' }), ...(shader.turns && { PRT_TURNS: '' }), ...shader.defines,
     };
     if (falseColor) this.toneMapped = false;
   }
@@ -172,8 +178,9 @@ export class PrtMaterial extends MeshBasicMaterial {
   override onBeforeCompile(shader: WebGLProgramParametersWithUniforms): void {
     const { falseColor, rest, shader: kind } = this.options;
     Object.assign(shader.uniforms, this.prtUniforms, falseColor && { prtGain: falseColor.gain }, rest && ('bones' in rest ? { prtRestBones: { value: rest.bones } } : { prtRestInverse: { value: rest.inverse } }));
-    shader.vertexShader = vertexDeclarations + kind.radiance + replaceOnce(shader.vertexShader, '#include <fog_vertex>', '#include <fog_vertex>' + vertexBody);
-    shader.fragmentShader = useExitRadiance(shader.fragmentShader, fragmentDeclarations, falseColor !== undefined);
+    const declarations = vertexDeclarations + (kind.gloss ? glossVaryings : '') + kind.radiance, body = turnBody + (kind.gloss ? glossVertexBody : radianceBody);
+    shader.vertexShader = declarations + replaceOnce(shader.vertexShader, '#include <fog_vertex>', '#include <fog_vertex>' + body);
+    shader.fragmentShader = useExitRadiance(shader.fragmentShader, kind.gloss ? glossFragmentDeclarations : fragmentDeclarations, falseColor !== undefined, kind.gloss);
   }
 
   override customProgramCacheKey(): string {

@@ -11,6 +11,7 @@ import type { BakedTransfer, TransferSource } from './kinds.js';
 import type { Lighting } from './lighting.js';
 import { packLight } from './light_sum.js';
 import { surfaceFrame, type Lobe } from './lobes.js';
+import { checkReflection, reflectionBytes, reflectionUniforms, type LastReflection } from './outgoing.js';
 import { diffuseParameters, PrtMaterial, type PrtOptions, type PrtShader, type PrtUniforms } from './prt_material.js';
 import { shCount } from './sh.js';
 
@@ -62,12 +63,14 @@ vec3 prtRadiance( const in uint receiver ) {
 /** How a kind lays out and reads the values of a receiver. */
 export interface VertexKind {
   kind: string;
-  /** Values in the file a receiver: [channel][count]. */
+  /** Values in the file a receiver: [channel][count]; rows of a last reflection count as channels. */
   count: number;
-  valueChannels: 1 | 3;
+  valueChannels: number;
   shader: PrtShader;
   /** One number a receiver, where there are any: how far its values are from what they were fitted to. */
   fitErrors?: Float32Array;
+  /** With a shader that is glossy. */
+  last?: LastReflection;
   /** Where the values of a receiver are lobes. */
   readLobes?: (values: ArrayLike<number>) => Lobe[];
 }
@@ -81,6 +84,7 @@ export class VertexTransfer implements BakedTransfer {
   readonly gpuBytes: number;
   readonly lobesAt?: NonNullable<BakedTransfer['lobesAt']>;
   readonly fitErrorMaterials?: NonNullable<BakedTransfer['fitErrorMaterials']>;
+  private readonly last: LastReflection | undefined;
   private errors: DataTexture | undefined;
   private readonly texture: DataArrayTexture;
   private readonly bones = new Map<string, DataTexture>(); // by skeleton
@@ -89,13 +93,14 @@ export class VertexTransfer implements BakedTransfer {
   private readonly materials = new Map<string, PrtMaterial>();
   private readonly quads: number; // of the light, a channel
 
-  private constructor(header: TransferHeader, { kind, count, valueChannels, shader, readLobes, fitErrors }: VertexKind, values: ArrayBuffer, readonly meshes: Mesh[]) {
+  private constructor(header: TransferHeader, { kind, count, valueChannels, shader, readLobes, fitErrors, last }: VertexKind, values: ArrayBuffer, readonly meshes: Mesh[]) {
     this.kind = kind, this.order = header.order, this.channels = header.channels, this.receivers = header.receivers, this.fileBytes = values.byteLength;
     const { layout, data } = packBlocks({ count, channels: valueChannels, precision: header.precision, receivers: header.receivers }, values);
+    this.last = last;
     this.quads = Math.ceil(shCount(header.order) / 4);
     this.texture = blockTexture(layout, data);
-    this.uniforms = { prtTransfer: { value: this.texture }, prtLight: { value: new Float32Array(12 * this.quads) } };
-    let gpuBytes = data.byteLength;
+    this.uniforms = { prtTransfer: { value: this.texture }, prtLight: { value: new Float32Array(12 * this.quads) }, ...(last && reflectionUniforms(last)) };
+    let gpuBytes = data.byteLength + (last ? reflectionBytes(last) : 0);
     for (const mesh of meshes) {
       const twoSided = mesh.geometry.hasAttribute('lambentReceiverBack');
       const rest = shader.turns ? this.restOf(mesh) : undefined;
@@ -146,9 +151,10 @@ export class VertexTransfer implements BakedTransfer {
   }
 
   check(renderer: WebGLRenderer): void {
-    // Transfer, bones as they are and as they were, and three's own of morph targets. All else is within what WebGL 2 promises.
+    if (this.last) checkReflection(this.last, renderer);
+    // Transfer, frames and view maps, bones as they are and as they were, and three's own of morph targets. All else is within what WebGL 2 promises.
     const wanted = Math.max(...this.meshes.map((mesh) =>
-      1 + ('isSkinnedMesh' in mesh ? 1 + Number(this.bones.size > 0) : 0) + Number(Object.keys(mesh.geometry.morphAttributes).length > 0)));
+      1 + (this.last ? 2 : 0) + ('isSkinnedMesh' in mesh ? 1 + Number(this.bones.size > 0) : 0) + Number(Object.keys(mesh.geometry.morphAttributes).length > 0)));
     if (renderer.capabilities.maxVertexTextures < wanted)
       throw new LambentError(`is relit in vertex shaders, which must read textures, ${wanted} at once; this graphics card reads ${renderer.capabilities.maxVertexTextures} there`);
   }
@@ -159,13 +165,13 @@ export class VertexTransfer implements BakedTransfer {
 
   coefficientMaterials(index: number, gain: { value: number }): Material[] {
     const light = new Float64Array(3 * shCount(this.order)).fill(1, 3 * index, 3 * index + 3);
-    const uniforms = { prtTransfer: this.uniforms.prtTransfer, prtLight: { value: new Float32Array(12 * this.quads) } };
+    const uniforms = { ...this.uniforms, prtLight: { value: new Float32Array(12 * this.quads) } };
     packLight(uniforms.prtLight.value, light);
     return this.meshes.map((mesh, i) => new PrtMaterial(uniforms, { ...this.optionsOf[i]!, falseColor: { gain } }, { side: (mesh.material as Material).side }));
   }
 
   dispose(): void {
-    this.texture.dispose(), this.errors?.dispose();
+    this.texture.dispose(), this.errors?.dispose(), this.last?.frames.dispose(), this.last?.maps.dispose();
     for (const texture of this.bones.values()) texture.dispose();
     for (const material of this.materials.values()) material.dispose();
     for (const mesh of this.meshes) mesh.geometry.dispose();

@@ -8,6 +8,7 @@ import { glslHarmonics } from './glsl_harmonics.js';
 import { readHeader } from './header.js';
 import type { TransferKind } from './kinds.js';
 import { readLobes } from './lobes.js';
+import { glslReflect, loadLastReflection, reflectionDefines, reflectionKey, type LastReflection } from './outgoing.js';
 import type { PrtShader } from './prt_material.js';
 import { shBand, shCount } from './sh.js';
 import { VertexTransfer } from './vertex_transfer.js';
@@ -79,10 +80,23 @@ vec3 prtRadiance( const in uint receiver ) {
 `,
 });
 
+/** Lobes for every row of a last reflection (eq. 16). */
+const glossyShader = (order: number, lobes: number, channels: 1 | 3, last: LastReflection): PrtShader => ({
+  key: `zonal ${order} ${lobes} ${channels} ${reflectionKey(last)}`, turns: true, gloss: true, defines: reflectionDefines(last),
+  radiance: `${zonalSum(order, lobes, channels)}
+vec3 prtRow( const in int r, const in int row ) {
+  vec4 v[ PRT_QUADS ];
+  for ( int k = 0; k < PRT_QUADS; ++ k ) v[ k ] = prtValues( uint( r ), row * PRT_QUADS + k );
+  return prtSum( v );
+}
+${glslReflect(last.outgoing, true)}`,
+});
+
+const maxGlossyLobes = 64; // of all rows
+
 export const zonalKind: TransferKind = {
   name: 'zonal',
   load: async (source) => {
-    if (source.extension.transfer['outgoing'] !== undefined) throw new LambentError('holds lobes of a transfer matrix, which this viewer does not draw yet: bake it with --transfer matrix');
     const header = readHeader(source.extension), lobes = source.extension.transfer['lobeCount'];
     if (!isIndex(lobes, maxLobes) || lobes < 1) throw new LambentError('"lobeCount" is out of range');
     const { order, channels } = header, errors = source.extension.transfer['fitErrors'];
@@ -93,6 +107,12 @@ export const zonalKind: TransferKind = {
       if (bytes.byteLength !== 4 * header.receivers) throw new LambentError('there is not one error of a fit for each receiver');
       fitErrors = new Float32Array(bytes);
       if (!fitErrors.every(Number.isFinite)) throw new LambentError('the error of a fit is not finite');
+    }
+    if (source.extension.transfer['outgoing'] !== undefined) {
+      const last = await loadLastReflection(source, header.receivers);
+      if (last.rows * lobes > maxGlossyLobes) throw new LambentError(`has ${last.rows} rows of ${lobes} lobes, where this version draws ${maxGlossyLobes} lobes in all; "lambent render" draws it`);
+      return VertexTransfer.load(source, header, { kind: 'zonal', count: zonalValues(order, lobes, channels), valueChannels: last.rows, last,
+        shader: glossyShader(order, lobes, channels, last), ...(fitErrors && { fitErrors }) });
     }
     return VertexTransfer.load(source, header, { kind: 'zonal', count: zonalValues(order, lobes, channels), valueChannels: 1, shader: zonalShader(order, lobes, channels), ...(fitErrors && { fitErrors }),
       readLobes: (values) => readLobes(values, order, exactZonalBands(order, lobes), lobes, channels) });

@@ -3,8 +3,8 @@ import { DataUtils } from 'three';
 import { blockLayout, packBlocks, type BlockHeader } from '../src/block_texture.ts';
 import { readHeader } from '../src/header.ts';
 import { checkBakedFile } from '../src/index.ts';
-import { mapLayout, packMaps, readOutgoing } from '../src/matrix.ts';
-import { zonalKind, zonalValues } from '../src/zonal.ts';
+import { mapLayout, packMaps, readOutgoing } from '../src/outgoing.ts';
+import { zonalValues } from '../src/zonal.ts';
 import { random } from './tool.ts';
 
 describe('the transfer texture', () => {
@@ -54,8 +54,6 @@ describe('the transfer texture', () => {
 });
 
 describe('zonal values', () => {
-  it('of a matrix are refused by name', async () =>
-    expect(zonalKind.load({ extension: { transfer: { outgoing: {} } } } as never)).rejects.toThrow(/lobes of a transfer matrix/));
   // docs/zonal.md: bytes a vertex in half floats, grey, order 6.
   it('take the bytes of the docs', () => expect([1, 2, 3, 4, 5, 6].map((lobes) => 2 * zonalValues(6, lobes, 1))).toEqual([18, 34, 50, 64, 78, 92]));
 });
