@@ -16,3 +16,4 @@ gtest_discover_tests(lambent-tests DISCOVERY_TIMEOUT 60)
 
 add_test(NAME include_arrows COMMAND ${CMAKE_CURRENT_SOURCE_DIR}/tests/include_arrows.sh ${CMAKE_CURRENT_SOURCE_DIR})
 add_test(NAME command_line COMMAND ${CMAKE_CURRENT_SOURCE_DIR}/tests/command_line.sh $<TARGET_FILE:lambent-tool>)
+set_tests_properties(command_line PROPERTIES COST 1000)  # the longest: first, beside the others
