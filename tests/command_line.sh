@@ -316,6 +316,12 @@ expect 2 'not both' patch -o x.lpt
 expect 2 'grooves' patch --groove 1 --depth 0.1 -o x.lpt
 expect 2 'lobes' patch --groove 1 --lobes 2 -o x.lpt
 absent x.lpt
+expect 2 'precision' patch --groove 1 --precision half -o x.lpt
+expect 2 'below 1' patch --groove 1 --albedo 1 -o x.lpt
+expect 2 'shadows' bake corner.obj --transfer zonal --outgoing svd:2 --shadows off -o x.glb
+expect 2 'goes with none' render card.obj --transfer-texture relief.lpt --env uniform:1 --lamp x=1,1,1 -o x.png
+expect 0 'paths' reference card.obj --ground --displace sky.png --heights 8 --env uniform:1 --size 8x8 --spp 1 -o displaced.exr
+expect 0 'paths' reference corner.obj --light-basis clusters.glb --env uniform:1 --size 8x8 --spp 1 -o basis.exr
 # The web viewer, where it has been built: the folder is there whole or not at all, and nothing of others' is replaced.
 "$tool" export corner.glb --web site >/dev/null 2>stderr
 if grep -q 'scripts/web' stderr; then

@@ -491,7 +491,7 @@ void add_bake(CLI::App& app, Run& run) {
       if (option->count() && o->transfer == "blocks") throw CLI::ValidationError(option->get_name() + " is not for --transfer blocks: it stores what is seen, and no light");
     if (o->transfer == "blocks" && (o->shadows == "off" || (!o->receivers.kind.empty() && o->receivers.kind != "vertices")))
       throw CLI::ValidationError("--transfer blocks is baked at vertices, with shadows");
-    if (o->transfer == "matrix" && o->shadows == "off") throw CLI::ValidationError("--transfer matrix is always baked with shadows");
+    if ((o->transfer == "matrix" || o->glossy) && o->shadows == "off") throw CLI::ValidationError("glossy transfer is always baked with shadows");
     for (const CLI::Option* option : {box, lattice_order})
       if (option->count() && !points->count()) throw CLI::ValidationError(option->get_name() + " needs --lattice");
     if (points->count() && o->shadows == "off") throw CLI::ValidationError("--lattice is always baked with shadows");

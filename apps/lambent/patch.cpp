@@ -114,13 +114,13 @@ void add_patch(CLI::App& app, Run& run) {
   c->add_option("--order", o->bake.order, "Bands of the lighting's spherical harmonics")->check(CLI::Range(1, max_sh_order))->capture_default_str();
   auto* samples = c->add_option("--samples", o->bake.samples, "Rays a texel")->check(CLI::Range(1, 1 << 20))->capture_default_str();
   auto* bounces = c->add_option("--bounces", o->bake.bounces, "Reflections between surfaces")->check(CLI::Range(0, 64))->capture_default_str();
-  c->add_option("--seed", o->bake.seed, "Of the ray directions")->capture_default_str();
-  c->add_option("--precision", o->precision, "Of the stored lobes")->check(CLI::IsMember({"half", "single"}))->capture_default_str();
-  c->callback([o, heights, groove, size, lobes, samples, bounces, albedo, depth, subsurface, &run] {
+  auto* seed = c->add_option("--seed", o->bake.seed, "Of the ray directions")->capture_default_str();
+  auto* precision = c->add_option("--precision", o->precision, "Of the stored lobes")->check(CLI::IsMember({"half", "single"}))->capture_default_str();
+  c->callback([o, seed, precision, heights, groove, size, lobes, samples, bounces, albedo, depth, subsurface, &run] {
     if (!heights->count() == !groove->count()) throw CLI::ValidationError("give a height map or a mesh, or --groove DEPTH, and not both");
     if (groove->count()) {
-      for (const CLI::Option* option : {samples, bounces, depth, subsurface})
-        if (option->count()) throw CLI::ValidationError(option->get_name() + " is not of grooves, which are computed in their cross-section with all bounces");
+      for (const CLI::Option* option : {samples, bounces, depth, subsurface, seed, precision})
+        if (option->count()) throw CLI::ValidationError(option->get_name() + " is not of grooves, which are computed in their cross-section with all bounces, and kept in single precision");
       if (!size->count()) o->size = 32;
       if (!lobes->count()) o->zonal.lobes = 3;
     }

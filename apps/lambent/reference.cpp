@@ -7,6 +7,7 @@
 #include <lambent/light/project.h>
 #include <lambent/reference/path_tracer.h>
 #include <lambent/relight/light.h>
+#include <lambent/scene/refine.h>
 
 #include <fmt/format.h>
 
@@ -41,9 +42,12 @@ int run_reference(Context& context, ReferenceCommand o) {
     auto baked = load_baked(o.light_basis);
     if (!baked) return fail(baked.error());
     if (baked->visibility) return fail({o.light_basis, "holds no light basis: it takes all of any environment"});
-    basis = baked->zonal ? LightBasis{.order = baked->zonal->order} : baked->transfer.light;
+    basis = light_of(*baked);
   }
-  auto scene = load_prepared_scene(o.scene);
+  const bool displaced = !o.displace.heights.empty();
+  SceneOptions prepared = o.scene;
+  if (displaced) prepared.ground = false;  // it stays flat
+  auto scene = load_prepared_scene(prepared);
   if (!scene) return fail(scene.error());
   auto poses = make_poses(o.motion, *scene);
   if (!poses) return fail(poses.error());
@@ -52,8 +56,9 @@ int run_reference(Context& context, ReferenceCommand o) {
   if (!view) return fail(view.error());
   if (o.light.env.empty() && !o.options.lamps) return fail({"--env", "is needed, or --lamps"});
   if (o.light.env.empty()) o.light.env = "uniform:0";
-  if (!o.displace.heights.empty())
+  if (displaced)
     if (auto ok = displace_scene(*scene, o.displace); !ok) return fail(ok.error());
+  if (displaced && o.scene.ground) add_ground(*scene);
   auto env = load_light(o.light);
   if (!env) return fail(env.error());
   if (basis.count() > 0) {

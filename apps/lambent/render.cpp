@@ -115,6 +115,8 @@ Result<void> add_insertion(Context& context, const Insertion& insertion, const L
 int run_render(Context& context, const RenderCommand& o) {
   auto near = parse_sphere_lamps(o.sphere_lamps);
   if (!near) return fail(near.error());
+  if (!o.textured.texture.empty() && (o.new_brdf || !o.lamps.empty() || !o.insert.empty() || o.product_options))
+    return fail({"--transfer-texture", "goes with none of --brdf, --lamp, --insert and --method"});
   if (!o.textured.texture.empty())
     return run_textured(context, {o.baked, o.textured, o.light, *near, o.view, o.motion, o.window, o.light_order, o.samples, o.show});
   if (auto ok = check_output(o.view.output, {"png", "exr"}); !ok) return fail(ok.error());
@@ -193,8 +195,11 @@ int run_render(Context& context, const RenderCommand& o) {
     turned = o.light.rotate.empty() ? std::move(*env) : rotated(*env, *rotation);
     options.background = &turned;
   }
-  LocalLight local{light, *near};
-  if (baked->zonal) local.distant.resize(size_t(sh_count(baked->zonal->order)), Vec3(0.0f));
+  LocalLight local{light, *near, projection.window};
+  if (baked->zonal) {
+    local.distant.resize(size_t(sh_count(baked->zonal->order)), Vec3(0.0f));
+    if (!env) local.window = sh_window(o.window, o.light_order ? std::min(o.light_order, baked->zonal->order) : baked->zonal->order);
+  }
   double relight_seconds = 1e9;
   std::vector<Image> images;
   for (const std::optional<Pose>& pose : *poses) {

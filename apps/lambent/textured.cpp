@@ -68,9 +68,9 @@ int run_textured(Context& context, const TexturedRender& o) {
   if (!env) return fail(env.error());
   const int order = o.light_order ? std::min(o.light_order, texture->transfer.order) : texture->transfer.order;
   std::vector<Vec3> light = rotate_sh(make_sh_rotation(order, *rotation), project_environment(*env, order));
-  apply_sh_window(o.window, light);
+  const std::vector<float> window = apply_sh_window(o.window, light);
   light.resize(size_t(sh_count(texture->transfer.order)), Vec3(0.0f));
-  const LocalLight local{std::move(light), o.lamps};
+  const LocalLight local{std::move(light), o.lamps, window};
   Environment turned;
   if (o.view.background == "env") turned = o.light.rotate.empty() ? std::move(*env) : rotated(*env, *rotation);
   std::vector<Image> images;

@@ -159,6 +159,7 @@ export function readOutgoing(transfer: TransferSource['extension']['transfer']):
   if (!isKind(kind)) throw new LambentError(`holds the outgoing basis "${String(kind)}", which this version does not know`);
   if (!isIndex(order, maxShOrder) || order < 1) throw new LambentError('the outgoing "order" is out of range');
   if (!isIndex(rows, 2 * maxShOrder * maxShOrder) || rows < 1) throw new LambentError('"rows" is out of range');
+  if (hasB !== undefined && typeof hasB !== 'boolean') throw new LambentError('"hasB" is neither true nor false');
   const isMapped = kind === 'map' || kind === 'svd';
   if (isMapped && (!isIndex(grid, 256) || grid < 2 || !isIndex(mapCount, 65535) || mapCount < 1)) throw new LambentError('view maps have no size');
   const outgoing: Outgoing = { kind, order, hasB: hasB !== false, grid: isMapped ? (grid as number) : 2, maps: isMapped ? (mapCount as number) : 0 };

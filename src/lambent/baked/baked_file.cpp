@@ -106,7 +106,10 @@ Result<Outgoing> read_outgoing(const GltfChunks& chunks, const json& object, int
   auto order = read_count(object, "order", size_t(max_sh_order), where);
   if (!order) return order.error();
   o.order = int(*order);
-  o.has_b = object.value("hasB", true);
+  if (const auto b = object.find("hasB"); b != object.end()) {
+    if (!b->is_boolean()) return Error{where, "\"hasB\" is neither true nor false"};
+    o.has_b = b->get<bool>();
+  }
   if (o.order < 1) return Error{where, "the outgoing order is 0"};
   if (o.kind == OutgoingKind::map || o.kind == OutgoingKind::svd) {
     auto grid = read_count(object, "grid", 256, where), maps = read_count(object, "mapCount", 65535, where);
@@ -396,6 +399,7 @@ Result<Baked> load_baked(const MappedFile& file, const std::string& path) {
     const auto kind = directional_kind(text("directional"));
     if (!kind) return Error{where, "directional light \"" + text("directional") + "\" is not known to this program"};
     baked.directional = *kind;
+    if (text("kind") != "diffuse" && *kind != DirectionalKind::none) return Error{where, "directional light is of diffuse transfer alone"};
   }
   if (is_blocks) {
     if (extension.contains("surface")) return Error{where, "visibility in blocks is baked at vertices"};
@@ -403,6 +407,7 @@ Result<Baked> load_baked(const MappedFile& file, const std::string& path) {
     if (!visibility) return visibility.error();
     baked.visibility = std::move(*visibility);
   } else if (is_zonal) {
+    if (extension.contains("surface")) return Error{where, "zonal transfer is baked at vertices"};
     auto lobes = read_count(*t, "lobeCount", size_t(max_stored_lobes), where);
     if (!lobes) return lobes.error();
     if (*lobes < 1) return Error{where, "there are no lobes"};

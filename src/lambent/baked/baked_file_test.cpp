@@ -454,6 +454,13 @@ TEST(BakedFile, LobesOfAMatrixComeBackWithTheirLastReflection) {
   EXPECT_EQ(back->outgoing->maps[0].values, o.maps[0].values);
   EXPECT_EQ(back->fit_errors, errors);
   EXPECT_TRUE(std::equal(back->zonal->data.begin(), back->zonal->data.end(), w.transfer.data.begin(), w.transfer.data.end()));
+  // What a matrix of another kind may have, told of the right type and of none.
+  Outgoing harmonics;
+  harmonics.kind = OutgoingKind::sh, harmonics.order = 1, harmonics.frames = o.frames;
+  const TemporaryFile other("glossy_sh.glb");
+  ASSERT_TRUE(save_baked(other.path, s.scene, s.receivers, w.transfer, "{}", {.outgoing = &harmonics}));
+  ASSERT_TRUE(load_baked(other.path));
+  expect_refused(other.path, "\"transfer\":{", {{"\"hasB\":true", "\"hasB\":7   "}});
   expect_refused(file.path, "\"transfer\":{", {{"\"rows\":2", "\"rows\":3"}, {"\"rows\":2", "\"rows\":0"}, {"\"rows\"", "\"rose\""}, {"\"grid\":8", "\"grid\":9"},
                                             {"\"lobeCount\":3", "\"lobeCount\":4"}, {"\"kind\":\"svd\"", "\"kind\":\"sv?\""}});
 }

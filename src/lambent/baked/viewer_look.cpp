@@ -67,7 +67,8 @@ size_t LookWriter::lit_material(json& document, const json& original, size_t tex
   json& extensions = lit["extensions"];
   extensions["KHR_materials_specular"] = {{"specularFactor", 0}};
   use_extension(document, "KHR_materials_specular"), use_extension(document, "KHR_materials_emissive_strength");
-  lit["name"] = original.value("name", std::string("surface")) + " with lightmap";
+  const auto name = original.find("name");
+  lit["name"] = (name != original.end() && name->is_string() ? name->get<std::string>() : "surface") + " with lightmap";
   double own[3] = {0, 0, 0};
   if (original.contains("emissiveFactor") && original["emissiveFactor"].is_array() && original["emissiveFactor"].size() == 3)
     for (size_t c = 0; c < 3; ++c) own[c] = original["emissiveFactor"][c].is_number() ? original["emissiveFactor"][c].get<double>() : 0;

@@ -242,7 +242,7 @@ Result<WrinkleTable> make_wrinkle_table(const WrinkleOptions& o) {
   if (o.lobes < 3 || o.lobes > max_zonal_lobes) return Error{"lobes", "must lie between 3 and " + std::to_string(max_zonal_lobes)};
   if (o.size < 3 || o.size > 256) return Error{"size", "must lie between 3 and 256"};
   if (!(o.max_depth > 0 && o.max_depth <= 10)) return Error{"depth", "must be above 0 and at most 10"};
-  if (!(o.albedo >= 0 && o.albedo < 1)) return Error{"albedo", "must lie between 0 and 1"};
+  if (!(o.albedo >= 0 && o.albedo < 1)) return Error{"albedo", "must lie from 0 to below 1"};
   const size_t n = size_t(o.size), C = size_t(sh_count(o.order)), N = size_t(o.lobes);
   WritableZonalTransfer out = make_zonal_transfer(o.order, o.lobes, 1, n * n, Precision::single);
   const int exact = out.transfer.exact_bands();

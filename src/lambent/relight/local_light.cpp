@@ -24,7 +24,8 @@ void light_at(const LocalLight& light, Vec3 place, std::span<Vec3> out) {
     for (int l = 0; l < order; ++l) {
       // 2 pi times the integral of P_l from the cap's edge to 1; 1 - cos a without cancelling.
       const double band = l == 0 ? 2 * std::numbers::pi * (cosine < 0 ? 2 : sine2 / (1 + cosine)) : 2 * std::numbers::pi * (P[l - 1] - P[l + 1]) / (2 * l + 1);
-      for (size_t k = size_t(l * l); k < size_t((l + 1) * (l + 1)); ++k) out[k] += lamp.radiance * float(band * y[k]);
+      const double factor = light.window.empty() ? 1 : size_t(l) < light.window.size() ? light.window[size_t(l)] : 0;
+      for (size_t k = size_t(l * l); k < size_t((l + 1) * (l + 1)); ++k) out[k] += lamp.radiance * float(factor * band * y[k]);
     }
   }
 }

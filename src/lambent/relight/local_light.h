@@ -21,6 +21,7 @@ struct SphereLamp {
 struct LocalLight {
   std::vector<Vec3> distant;  // coefficients of radiance, order^2 of them
   std::vector<SphereLamp> lamps;
+  std::vector<float> window;  // factors a band of the lamps' light, which `distant` has already; beyond them 0; empty: 1 for all
 };
 
 // The coefficients at a place, as many as `distant` has: a lamp is a cap of directions there, with zonal coefficients in closed form; within it, all

@@ -14,7 +14,7 @@ namespace {
 TEST(LocalLight, ALampIsACapOfDirections) {
   const Vec3 place(0.3f, -1, 0.5f);
   for (const SphereLamp& lamp : {SphereLamp{{2, 3, -1}, 0.4f, {1, 2, 3}}, SphereLamp{{0.5f, -0.2f, 0.4f}, 0.8f, {1, 0, 5}}, SphereLamp{{900, 3, -1}, 0.5f, {1, 2, 3}}}) {
-    const LocalLight light{std::vector<Vec3>(49, Vec3(0.25f)), {lamp}};
+    const LocalLight light{std::vector<Vec3>(49, Vec3(0.25f)), {lamp}, {}};
     std::vector<Vec3> out(49);
     light_at(light, place, out);
     const double d = glm::length(glm::dvec3(lamp.centre - place)), edge = std::sqrt(1 - std::pow(lamp.radius / d, 2));
@@ -27,9 +27,15 @@ TEST(LocalLight, ALampIsACapOfDirections) {
       for (int c = 0; c < 3; ++c)
         EXPECT_NEAR((out[size_t(k)][c] - 0.25f) / size, lamp.radiance[c] * cap[size_t(sh_band(k))] * y[k] / size, d > 100 ? 0.06 : 1e-5) << k;
   }
+  // A window weighs its bands, and leaves out those beyond.
+  const SphereLamp lamp{{2, 3, -1}, 0.4f, {1, 2, 3}};
+  std::vector<Vec3> whole(16), windowed(16);
+  light_at({std::vector<Vec3>(16, Vec3(0.0f)), {lamp}, {}}, place, whole);
+  light_at({std::vector<Vec3>(16, Vec3(0.0f)), {lamp}, {1, 0.5f}}, place, windowed);
+  for (int k = 0; k < 16; ++k) EXPECT_EQ(windowed[size_t(k)], whole[size_t(k)] * (k == 0 ? 1.0f : k < 4 ? 0.5f : 0.0f)) << k;
   // Within the lamp light comes from everywhere.
   std::vector<Vec3> out(9);
-  light_at({std::vector<Vec3>(9, Vec3(0.0f)), {{{0, 0, 0}, 2, Vec3(1)}}}, Vec3(0.5f), out);
+  light_at({std::vector<Vec3>(9, Vec3(0.0f)), {{{0, 0, 0}, 2, Vec3(1)}}, {}}, Vec3(0.5f), out);
   EXPECT_NEAR(out[0].x, std::sqrt(4 * std::numbers::pi), 1e-5);
   for (size_t k = 1; k < 9; ++k) EXPECT_NEAR(out[k].x, 0, 1e-6);
 }
@@ -46,7 +52,7 @@ TEST(LocalLight, LightsAPlaneByTheInverseSquare) {
   }
   const SphereLamp lamp{{0.2f, 0.5f, 1.5f}, 1.0f, {3, 2, 1}};
   Relit relit;
-  relight_zonal(plane.transfer, nullptr, make_light_field({std::vector<Vec3>(36, Vec3(0)), {lamp}}, places), relit);
+  relight_zonal(plane.transfer, nullptr, make_light_field({std::vector<Vec3>(36, Vec3(0)), {lamp}, {}}, places), relit);
   for (size_t r = 0; r < 40; ++r) {
     const Vec3 to = lamp.centre - places[r];
     const float d = glm::length(to), cosine = to.z / d, truth = 3 * lamp.radius * lamp.radius / (d * d) * cosine;
@@ -72,7 +78,7 @@ TEST(LocalLight, EveryReceiverHasItsOwn) {
         rotations.push_back(rotation_from_yaw_pitch_roll({360 * random.next(), 90 * random.next(), 0}));
         places.push_back({random.next(), random.next(), random.next()});
       }
-      LocalLight light{std::vector<Vec3>(25), {{{2, 1, 0}, 0.5f, {4, 5, 6}}, {{0.5f, 0.5f, 0.5f}, 0.2f, {1, 0, 2}}}};
+      LocalLight light{std::vector<Vec3>(25), {{{2, 1, 0}, 0.5f, {4, 5, 6}}, {{0.5f, 0.5f, 0.5f}, 0.2f, {1, 0, 2}}}, {}};
       for (Vec3& e : light.distant) e = {random.next(), random.next(), random.next() - 0.5f};
       const ReceiverFrames frames = make_receiver_frames(rotations);
       Relit out;

@@ -24,13 +24,16 @@ Mat3 texture_frame(const Scene& scene, const Triangle& t, Vec3 normal) {
 Mat3 groove_frame(const Scene& scene, const Triangle& t, Vec2 tile, Vec3 normal) {
   const std::vector<Vec2>& uv = scene.texcoords[0];
   if (uv.empty()) return frame_about(normal);
-  const Vec3 e1 = scene.positions[t.v[1]] - scene.positions[t.v[0]], e2 = scene.positions[t.v[2]] - scene.positions[t.v[0]], a = glm::cross(e1, e2);
+  using glm::dvec2, glm::dvec3;  // edges and coordinates of any size, to the fourth power
+  const dvec3 p(scene.positions[t.v[0]]), e1 = dvec3(scene.positions[t.v[1]]) - p, e2 = dvec3(scene.positions[t.v[2]]) - p, a = glm::cross(e1, e2);
+  const dvec2 d1(uv[t.v[1]] - uv[t.v[0]]), d2(uv[t.v[2]] - uv[t.v[0]]);
   // The gradient of tile . uv over the triangle, in the plane of the normal.
-  Vec3 across = glm::dot(tile, uv[t.v[1]] - uv[t.v[0]]) * glm::cross(e2, a) - glm::dot(tile, uv[t.v[2]] - uv[t.v[0]]) * glm::cross(e1, a);
-  across -= normal * glm::dot(normal, across);
-  if (!(glm::dot(across, across) > 0)) return frame_about(normal);
-  across = normalize_or(across, frame_about(normal)[0]);
-  return {across, glm::cross(normal, across), normal};
+  dvec3 across = glm::dot(dvec2(tile), d1) * glm::cross(e2, a) - glm::dot(dvec2(tile), d2) * glm::cross(e1, a);
+  across -= dvec3(normal) * glm::dot(dvec3(normal), across);
+  const double length = glm::length(across);
+  if (!(length > 0 && std::isfinite(length))) return frame_about(normal);
+  const Vec3 x(across / length);
+  return {x, glm::cross(normal, x), normal};
 }
 
 Result<Image> render_transfer_texture(const Scene& scene, const Tracer& tracer, const ZonalTexture& texture, const TextureUse& use, const LocalLight& light,

@@ -30,6 +30,19 @@ TEST(TransferTexture, FramesFollowTheTexture) {
   EXPECT_LT(glm::length(texture_frame(s, s.triangles[0], Vec3(0, 1, 0))[2] - Vec3(0, 1, 0)), 1e-6f);
 }
 
+TEST(TransferTexture, GroovesLieAlikeAtAnyScale) {
+  for (float scale : {1e-8f, 1e-3f, 1.0f, 1e6f, 1e9f}) {
+    Scene s;
+    for (Vec3 p : {Vec3(0, 0, 0), Vec3(2, 0, 0), Vec3(0, 0, -3)}) s.positions.push_back(p * scale);
+    s.normals.assign(3, Vec3(0, 1, 0));
+    s.texcoords[0] = {{0, 1}, {1e-3f, 1}, {0, 1 - 1e-3f}};
+    s.triangles.push_back({{0, 1, 2}, 0, false});
+    // v falls along -z.
+    EXPECT_LT(glm::length(groove_frame(s, s.triangles[0], Vec2(0, 12), Vec3(0, 1, 0))[0] - Vec3(0, 0, 1)), 1e-4f) << scale;
+    EXPECT_LT(glm::length(groove_frame(s, s.triangles[0], Vec2(-5, 0), Vec3(0, 1, 0))[0] - Vec3(-1, 0, 0)), 1e-4f) << scale;
+  }
+}
+
 // A wall in the xy plane that carries the texture, looked at from far in front, is shaded as the relief: the same receivers, relit.
 TEST(TransferTexture, ShadesAFlatWallAsTheReliefItself) {
   const int n = 16;
@@ -71,7 +84,7 @@ TEST(TransferTexture, ShadesAFlatWallAsTheReliefItself) {
   RenderOptions options;
   options.width = options.height = n, options.samples = 64;
   const std::vector<Vec3> turned = rotate_sh(make_sh_rotation(6, R), light);
-  auto image = render_transfer_texture(wall, *wall_tracer, texture, {}, {turned, {}}, camera, options);
+  auto image = render_transfer_texture(wall, *wall_tracer, texture, {}, {turned, {}, {}}, camera, options);
   ASSERT_TRUE(image);
   double error = 0, total = 0;
   for (int j = 0; j < n; ++j)
@@ -114,7 +127,7 @@ TEST(TransferTexture, ShadesSheetsAsTheirDisplacedGeometry) {
     camera.target.y = 100 - middle.distance, camera.eye.y = camera.target.y + 300;
     RenderOptions options;
     options.width = options.height = 48, options.samples = 64;
-    auto ours = render_transfer_texture(bent, *tracer, texture, {.tile = Vec2(float(tiles))}, {light, {}}, camera, options);
+    auto ours = render_transfer_texture(bent, *tracer, texture, {.tile = Vec2(float(tiles))}, {light, {}, {}}, camera, options);
     ASSERT_TRUE(ours);
     Scene relief = bent;
     ASSERT_TRUE(displace(relief, [&](Vec2 uv) { return sample_height(field, uv); }, Vec2(float(tiles))));
@@ -177,7 +190,7 @@ TEST(TransferTexture, GroovesAreThoseOfDisplacedGeometry) {
     const Camera camera = from_above(100 - middle.distance);
     RenderOptions options;
     options.width = options.height = 48, options.samples = 64;
-    auto ours = render_transfer_texture(bent, *tracer, table->texture, {c.tile, c.width, c.depth, {}}, {light, {}}, camera, options);
+    auto ours = render_transfer_texture(bent, *tracer, table->texture, {c.tile, c.width, c.depth, {}}, {light, {}, {}}, camera, options);
     ASSERT_TRUE(ours);
     Scene relief = bent;
     ASSERT_TRUE(displace(relief, [&](Vec2 uv) {
@@ -221,7 +234,7 @@ TEST(TransferTexture, NearLampsLightItAsTheyDoTheDisplacedGeometry) {
   relief.texcoords[0].resize(relief.positions.size());
   ReferenceOptions traced;
   traced.width = traced.height = 48, traced.spp = 256, traced.bounces = 3, traced.lamps = true;
-  auto ours = render_transfer_texture(sheet, *tracer, {n, n, *lobes}, {.tile = Vec2(5)}, {std::vector<Vec3>(36, Vec3(0.0f)), {lamp}}, camera, options);
+  auto ours = render_transfer_texture(sheet, *tracer, {n, n, *lobes}, {.tile = Vec2(5)}, {std::vector<Vec3>(36, Vec3(0.0f)), {lamp}, {}}, camera, options);
   ASSERT_TRUE(ours);
   auto truth = path_trace(relief, *load_environment("uniform:0"), camera, traced);
   ASSERT_TRUE(truth);

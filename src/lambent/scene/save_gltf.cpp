@@ -259,7 +259,7 @@ class DocumentWriter {
       std::string type = image_mime_type(bytes);
       auto told = image.find("mimeType");
       if (type.empty() && told != image.end() && told->is_string()) type = told->get<std::string>();
-      if (type.empty()) type = "image/" + file_extension(image.value("uri", std::string()));
+      if (type.empty()) type = "image/" + file_extension(image.contains("uri") && image["uri"].is_string() ? image["uri"].get<std::string>() : "");
       auto [view, is_new] = views.try_emplace({bytes.data(), bytes.size()}, 0);
       if (is_new) view->second = out_.add_view(bytes, 4);
       image.erase("uri");
