@@ -302,6 +302,9 @@ expect 1 'one.ppm' patch one.ppm -o x.lpt
 # Grooves as a table, near lamps, relief as geometry.
 expect 0 'grooves' patch --groove 1 --size 6 -o groove.lpt
 printf 'v 0 0 0\nv 1 0 0\nv 1 0 -1\nv 0 0 -1\nvt 0 0\nvt 1 0\nvt 1 1\nvt 0 1\nf 1/1 2/2 3/3\nf 1/1 3/3 4/4\n' >card.obj
+expect 0 'grooves up to' inspect groove.lpt
+expect 0 'transfer texture' inspect relief.lpt --json
+expect 1 'cut.lpt' inspect cut.lpt
 expect 0 'grooves' render card.obj --transfer-texture groove.lpt --tile 5,0 --groove-depth 0.5 --groove-width 0.6 --groove-map sky.png --env sky:elevation=40 --size 24x24 -o grooves.png
 expect 0 'texels' render card.obj --transfer-texture relief.lpt --sphere-lamp 0.5,1,-0.5,0.2,5,4,3 --size 24x24 -o near.png
 expect 0 'relit' render lobes.glb --sphere-lamp 3,3,3,0.5,9,9,9 --env uniform:0.1 --size 24x24 -o near.png

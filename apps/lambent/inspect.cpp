@@ -5,6 +5,7 @@
 #include <lambent/core/file.h>
 #include <lambent/receivers/receivers.h>
 #include <lambent/scene/load.h>
+#include <lambent/transfer/zonal_texture.h>
 
 #include <fmt/format.h>
 
@@ -63,6 +64,22 @@ int inspect_picture(Context& context, const std::string& path) {
   return success;
 }
 
+int inspect_texture(Context& context, const std::string& path) {
+  auto texture = load_zonal_texture(path);
+  if (!texture) return fail(texture.error());
+  const ZonalTransfer& t = texture->transfer;
+  const bool grooves = texture->groove_depth > 0;
+  const char* precision = t.precision == Precision::half ? "half" : "single";
+  if (context.json)
+    print_json({{"file", path}, {"kind", grooves ? "grooves" : "transfer texture"}, {"width", texture->width}, {"height", texture->height}, {"order", t.order}, {"lobes", t.lobes},
+                {"channels", t.channels}, {"bytes", t.bytes()}, {"precision", precision}, {"groove_depth", grooves ? nlohmann::json(texture->groove_depth) : nlohmann::json()}});
+  else
+    fmt::print("{}\n  {}: {} x {}, {} zonal lobes, order {}, {} channel{}, {} ({})\n", path,
+               grooves ? fmt::format("grooves up to {:.3g} widths deep, places by depths", texture->groove_depth) : "transfer texture", texture->width, texture->height, t.lobes, t.order,
+               t.channels, t.channels == 1 ? "" : "s", human_bytes(double(t.bytes())), precision);
+  return success;
+}
+
 int inspect_zonal(Context& context, const std::string& path, const Baked& baked) {
   const ZonalTransfer& t = *baked.zonal;
   const nlohmann::json outgoing = baked.outgoing ? nlohmann::json(outgoing_names[int(baked.outgoing->kind)]) : nlohmann::json();
@@ -96,6 +113,7 @@ int inspect_visibility(Context& context, const std::string& path, const Baked& b
 
 int run_inspect(Context& context, const std::string& path) {
   const std::string extension = file_extension(path);
+  if (extension == "lpt") return inspect_texture(context, path);
   if (std::set<std::string>{"hdr", "exr", "png", "jpg", "jpeg"}.contains(extension)) return inspect_picture(context, path);
   if ((extension == "glb" || extension == "gltf") && is_baked(path)) {
     auto baked = load_baked(path);
@@ -161,7 +179,7 @@ int run_inspect(Context& context, const std::string& path) {
 
 void add_inspect(CLI::App& app, Run& run) {
   auto path = std::make_shared<std::string>();
-  CLI::App* c = app.add_subcommand("inspect", "Say what is in a scene, a baked file, an environment or a picture");
+  CLI::App* c = app.add_subcommand("inspect", "Say what is in a scene, a baked file, a transfer texture, an environment or a picture");
   c->add_option("file", *path, "File")->required();
   c->callback([path, &run] { run = [path](Context& context) { return run_inspect(context, *path); }; });
 }

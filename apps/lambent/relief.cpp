@@ -19,14 +19,6 @@ Result<HeightMap> load_height_map(const std::string& path) {
   return map;
 }
 
-float sample_height_map(const HeightMap& map, Vec2 uv) {
-  uv = (uv - glm::floor(uv)) * Vec2(float(map.width), float(map.height)) - 0.5f;
-  const int i = int(std::floor(uv.x)), j = int(std::floor(uv.y));
-  const float fx = uv.x - float(i), fy = uv.y - float(j);
-  auto at = [&](int a, int b) { return map.values[size_t((b + map.height) % map.height) * size_t(map.width) + size_t((a + map.width) % map.width)]; };
-  return (1 - fy) * ((1 - fx) * at(i, j) + fx * at(i + 1, j)) + fy * ((1 - fx) * at(i, j + 1) + fx * at(i + 1, j + 1));
-}
-
 Result<HeightField> load_heights(const std::string& path, int size, float depth) {
   auto map = load_height_map(path);
   if (!map) return map.error();
@@ -60,7 +52,7 @@ Result<void> displace_scene(Scene& scene, const DisplaceOptions& o) {
   if (!(covered > 0 && area > 0)) return Error{scene.path, "has texture coordinates that cover nothing"};
   if (auto ok = split_long_edges(scene, float(0.8 * std::sqrt(area / covered) / o.size), most_triangles); !ok) return ok.error();
   const double mean = std::accumulate(field->heights.begin(), field->heights.end(), 0.0) / double(field->heights.size());
-  return displace(scene, [&](Vec2 at) { return sample_height(*field, at) - float(mean); }, repeat);
+  return displace(scene, [&](Vec2 at) { return float(sample_heights(field->heights, field->size, field->size, at) - mean); }, repeat);
 }
 
 }  // namespace lambent::tool

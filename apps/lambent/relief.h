@@ -12,8 +12,6 @@ struct HeightMap {
   std::vector<float> values;
 };
 Result<HeightMap> load_height_map(const std::string& path);
-// Bilinear, repeated.
-float sample_height_map(const HeightMap& map, Vec2 uv);
 
 // A picture as heights, white `depth` sides of the patch above black. Errors name the file.
 Result<HeightField> load_heights(const std::string& path, int size, float depth);

@@ -54,7 +54,7 @@ int run_textured(Context& context, const TexturedRender& o) {
   if (!o.flags.groove_map.empty()) {
     auto loaded = load_height_map(o.flags.groove_map);
     if (!loaded) return fail(loaded.error());
-    map = std::move(*loaded), use.groove_map = [&map](Vec2 uv) { return sample_height_map(map, uv); };
+    map = std::move(*loaded), use.groove_map = [&map](Vec2 uv) { return float(sample_heights(map.values, map.width, map.height, uv)); };
   }
   auto scene = load_scene(o.scene);
   if (!scene) return fail(scene.error());

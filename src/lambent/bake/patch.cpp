@@ -5,6 +5,15 @@
 
 namespace lambent {
 
+double sample_heights(std::span<const float> values, int width, int height, glm::dvec2 uv) {
+  if (!std::isfinite(uv.x) || !std::isfinite(uv.y)) return 0;
+  uv = (uv - glm::floor(uv)) * glm::dvec2(width, height) - 0.5;
+  const int i = int(std::floor(uv.x)), j = int(std::floor(uv.y));
+  const double fx = uv.x - i, fy = uv.y - j;
+  auto at = [&](int a, int b) { return double(values[size_t((b + height) % height) * size_t(width) + size_t((a + width) % width)]); };
+  return (1 - fy) * ((1 - fx) * at(i, j) + fx * at(i + 1, j)) + fy * ((1 - fx) * at(i, j + 1) + fx * at(i + 1, j + 1));
+}
+
 Result<HeightField> make_height_field(std::span<const float> values, int width, int height, int size, float depth) {
   LAMBENT_CHECK(values.size() == size_t(width) * size_t(height));
   if (width < 2 || height < 2) return Error{"", "a height map needs at least 2 x 2 pixels, and this has " + std::to_string(width) + " x " + std::to_string(height)};
@@ -15,30 +24,14 @@ Result<HeightField> make_height_field(std::span<const float> values, int width, 
   HeightField field{size, std::vector<float>(size_t(size) * size_t(size))};
   // Over a texel's extent, the mean of the picture, taken as piecewise constant where it is finer and linear where it is coarser.
   const int fine = std::max(1, std::max(width, height) / size) * 2;
-  auto value = [&](double u, double v) {
-    const double x = u * width - 0.5, y = v * height - 0.5;
-    const int i = int(std::floor(x)), j = int(std::floor(y));
-    const double fx = x - i, fy = y - j;
-    auto at = [&](int a, int b) { return double(values[size_t((b + height) % height) * size_t(width) + size_t((a + width) % width)]); };
-    return (1 - fy) * ((1 - fx) * at(i, j) + fx * at(i + 1, j)) + fy * ((1 - fx) * at(i, j + 1) + fx * at(i + 1, j + 1));
-  };
   for (int j = 0; j < size; ++j)
     for (int i = 0; i < size; ++i) {
       double sum = 0;
       for (int b = 0; b < fine; ++b)
-        for (int a = 0; a < fine; ++a) sum += value((i + (a + 0.5) / fine) / size, (j + (b + 0.5) / fine) / size);
+        for (int a = 0; a < fine; ++a) sum += sample_heights(values, width, height, {(i + (a + 0.5) / fine) / size, (j + (b + 0.5) / fine) / size});
       field.heights[size_t(j * size + i)] = float(sum / (fine * fine) * depth);
     }
   return field;
-}
-
-float sample_height(const HeightField& field, Vec2 uv) {
-  const int n = field.size;
-  uv = (uv - glm::floor(uv)) * float(n) - 0.5f;
-  const int i = int(std::floor(uv.x)), j = int(std::floor(uv.y));
-  const float fx = uv.x - float(i), fy = uv.y - float(j);
-  auto at = [&](int a, int b) { return field.heights[size_t((b + n) % n * n + (a + n) % n)]; };
-  return (1 - fy) * ((1 - fx) * at(i, j) + fx * at(i + 1, j)) + fy * ((1 - fx) * at(i, j + 1) + fx * at(i + 1, j + 1));
 }
 
 double seam_jump(const HeightField& f) {

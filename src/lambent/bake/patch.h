@@ -10,12 +10,12 @@ struct HeightField {
   std::vector<float> heights;
 };
 
+// Bilinear at uv in a picture that repeats; 0 where uv is not finite.
+double sample_heights(std::span<const float> values, int width, int height, glm::dvec2 uv);
+
 // A picture's values, box-filtered or interpolated to size x size, times depth. Errors: fewer than 2 x 2 values; values that are not
 // finite; size or depth out of range.
 Result<HeightField> make_height_field(std::span<const float> values, int width, int height, int size, float depth);
-
-// Bilinear at uv, repeated.
-float sample_height(const HeightField& field, Vec2 uv);
 
 // How much a field jumps from its last row and column to its first, as a multiple of how much it changes from row to row
 // elsewhere: about 1 for a field that tiles.

@@ -143,8 +143,8 @@ double dot(const std::vector<double>& a, const std::vector<double>& b) {
   return sum;
 }
 
-// Quasi-Newton steps with a short memory (L-BFGS; Nocedal and Wright, "Numerical Optimization", algorithm 7.4): it scales axes against coefficients, for
-// which conjugate gradients, the paper's choice, would need many more.
+// Quasi-Newton steps with a short memory (L-BFGS; Nocedal and Wright, "Numerical Optimization", algorithm 7.4), which scale axes against
+// coefficients by themselves; the paper took conjugate gradients.
 void minimise(const TableFit& f, std::vector<double>& p, int iterations) {
   constexpr size_t memory = 12;
   struct Step {

@@ -11,8 +11,7 @@ namespace lambent {
 void light_at(const LocalLight& light, Vec3 place, std::span<Vec3> out) {
   LAMBENT_CHECK(out.size() == light.distant.size());
   std::copy(light.distant.begin(), light.distant.end(), out.begin());
-  int order = 0;
-  while (size_t(sh_count(order + 1)) <= out.size()) ++order;
+  const int order = sh_order(out.size());
   float y[sh_count(max_sh_order)];
   double P[max_sh_order + 1];
   for (const SphereLamp& lamp : light.lamps) {
@@ -33,8 +32,7 @@ void light_at(const LocalLight& light, Vec3 place, std::span<Vec3> out) {
 LightField make_light_field(const LocalLight& light, std::span<const Vec3> places) {
   constexpr size_t block = transfer_block;
   const size_t C = light.distant.size();
-  LightField f{places.size(), 0, AlignedVector<float>((places.size() + block - 1) / block * C * 3 * block)};
-  while (size_t(sh_count(f.order + 1)) <= C) ++f.order;
+  LightField f{places.size(), sh_order(C), AlignedVector<float>((places.size() + block - 1) / block * C * 3 * block)};
   parallel_for(places.size(), 1024, [&](size_t begin, size_t end) {
     std::vector<Vec3> at(C);
     for (size_t r = begin; r < end; ++r) {

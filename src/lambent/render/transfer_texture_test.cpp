@@ -96,57 +96,6 @@ TEST(TransferTexture, ShadesAFlatWallAsTheReliefItself) {
   EXPECT_LT(std::sqrt(error / total), 0.08);
 }
 
-// Sheets of relief for real, flat and bent, path-traced: other geometry, other rays, other reconstruction of the same light. A texture has no
-// parallax, so each is looked at along its normals.
-TEST(TransferTexture, ShadesSheetsAsTheirDisplacedGeometry) {
-  const int n = 24, tiles = 5;
-  HeightField field{n, {}};
-  for (int j = 0; j < n; ++j)
-    for (int i = 0; i < n; ++i) field.heights.push_back(0.08f * std::sin(2 * pi * float(i) / n + std::sin(2 * pi * float(j) / n)));
-  const PatchScene patch = make_patch(field, Vec3(0.5f));
-  auto patch_tracer = Tracer::build(patch.scene);
-  auto transfer = bake(patch.scene, *patch_tracer, patch.receivers, {.samples = 1024, .bounces = 2, .precision = Precision::single});
-  ASSERT_TRUE(transfer);
-  auto lobes = fit_zonal(*transfer, {.lobes = 4});
-  ASSERT_TRUE(lobes);
-  const ZonalTexture texture{n, n, *lobes};
-
-  Scene sheet = make_quad(Vec3(-2.5f, 0, 2.5f), Vec3(5, 0, 0), Vec3(0, 0, -5), n * tiles, n * tiles, Vec3(0.5f));
-  for (Vec3 p : sheet.positions) sheet.texcoords[0].push_back({(p.x + 2.5f) / 5, (p.z + 2.5f) / 5});
-  const std::vector<Vec3> light = project_environment(*make_sky(*parse_sky("elevation=35,azimuth=60,turbidity=3")), 6);
-  const Environment env = reconstruct_environment(light, 256);
-  Camera camera;
-  camera.up = Vec3(0, 0, -1), camera.target = Vec3(0), camera.eye = Vec3(0, 300, 0);
-  camera.fov = 2 * glm::degrees(std::atan(0.5f / 300));  // one tile
-  for (const char* text : {"bend:0.01,x,y", "bend:-100,x,y", "twist:60,x"}) {
-    const Scene bent = posed(sheet, deform_scene(sheet, *parse_deformation(text)));
-    auto tracer = Tracer::build(bent);
-    // The middle of the sheet has moved up by bending.
-    const Hit middle = tracer->closest({0.01f, 100, 0.02f}, {0, -1, 0});
-    ASSERT_NE(middle.triangle, none);
-    camera.target.y = 100 - middle.distance, camera.eye.y = camera.target.y + 300;
-    RenderOptions options;
-    options.width = options.height = 48, options.samples = 64;
-    auto ours = render_transfer_texture(bent, *tracer, texture, {.tile = Vec2(float(tiles))}, {light, {}, {}}, camera, options);
-    ASSERT_TRUE(ours);
-    Scene relief = bent;
-    ASSERT_TRUE(displace(relief, [&](Vec2 uv) { return sample_height(field, uv); }, Vec2(float(tiles))));
-    ReferenceOptions traced;
-    traced.width = traced.height = 48, traced.spp = 256, traced.bounces = 3;
-    auto truth = path_trace(relief, env, camera, traced);
-    ASSERT_TRUE(truth);
-    double error = 0, smooth = 0, total = 0, mean = 0;
-    for (Vec3 p : truth->image.rgb) mean += luminance(p) / double(truth->image.rgb.size());
-    for (size_t i = 0; i < ours->rgb.size(); ++i) {
-      const Vec3 d = ours->rgb[i] - truth->image.rgb[i];
-      error += glm::dot(d, d), total += glm::dot(truth->image.rgb[i], truth->image.rgb[i]);
-      smooth += std::pow(luminance(truth->image.rgb[i]) - mean, 2);
-    }
-    std::printf("%s: %.4f of what is there, %.4f of how it varies\n", text, std::sqrt(error / total), std::sqrt(error / 3 / smooth));
-    EXPECT_LT(std::sqrt(error / total), 0.06) << text;
-  }
-}
-
 // How far two pictures are apart, relative to the second.
 double relative_rms(const Image& ours, const Image& truth) {
   double error = 0, total = 0;
@@ -169,6 +118,52 @@ Camera from_above(float y) {
   camera.up = Vec3(0, 0, -1), camera.target = Vec3(0, y, 0), camera.eye = Vec3(0, y + 300, 0);
   camera.fov = 2 * glm::degrees(std::atan(0.5f / 300));
   return camera;
+}
+
+// A wavy relief of n x n texels as a texture of lobes, and its heights.
+struct WavyRelief {
+  HeightField field;
+  ZonalTexture texture;
+  float at(Vec2 uv) const { return float(sample_heights(field.heights, field.size, field.size, uv)); }
+};
+WavyRelief wavy_relief(int n) {
+  HeightField field{n, {}};
+  for (int j = 0; j < n; ++j)
+    for (int i = 0; i < n; ++i) field.heights.push_back(0.08f * std::sin(2 * pi * float(i) / n + std::sin(2 * pi * float(j) / n)));
+  const PatchScene patch = make_patch(field, Vec3(0.5f));
+  auto tracer = Tracer::build(patch.scene);
+  auto transfer = bake(patch.scene, *tracer, patch.receivers, {.samples = 1024, .bounces = 2, .precision = Precision::single});
+  return {field, {n, n, *fit_zonal(*transfer, {.lobes = 4})}};
+}
+
+// Sheets of relief for real, flat and bent, path-traced: other geometry, other rays, other reconstruction of the same light. A texture has no
+// parallax, so each is looked at along its normals.
+TEST(TransferTexture, ShadesSheetsAsTheirDisplacedGeometry) {
+  const WavyRelief wavy = wavy_relief(24);
+  const Scene sheet = tiled_sheet(24 * 5);
+  const std::vector<Vec3> light = project_environment(*make_sky(*parse_sky("elevation=35,azimuth=60,turbidity=3")), 6);
+  const Environment env = reconstruct_environment(light, 256);
+  for (const char* text : {"bend:0.01,x,y", "bend:-100,x,y", "twist:60,x"}) {
+    const Scene bent = posed(sheet, deform_scene(sheet, *parse_deformation(text)));
+    auto tracer = Tracer::build(bent);
+    // The middle of the sheet has moved up by bending.
+    const Hit middle = tracer->closest({0.01f, 100, 0.02f}, {0, -1, 0});
+    ASSERT_NE(middle.triangle, none);
+    const Camera camera = from_above(100 - middle.distance);
+    RenderOptions options;
+    options.width = options.height = 48, options.samples = 64;
+    auto ours = render_transfer_texture(bent, *tracer, wavy.texture, {.tile = Vec2(5)}, {light, {}, {}}, camera, options);
+    ASSERT_TRUE(ours);
+    Scene relief = bent;
+    ASSERT_TRUE(displace(relief, [&](Vec2 uv) { return wavy.at(uv); }, Vec2(5)));
+    ReferenceOptions traced;
+    traced.width = traced.height = 48, traced.spp = 256, traced.bounces = 3;
+    auto truth = path_trace(relief, env, camera, traced);
+    ASSERT_TRUE(truth);
+    std::printf("%s: %.4f\n", text, relative_rms(*ours, truth->image));
+    // 2.4 to 2.7% here: the reference's noise, and lobes of the nearest texel.
+    EXPECT_LT(relative_rms(*ours, truth->image), 0.04) << text;
+  }
 }
 
 // Grooves from the table against grooves of triangles, path-traced: across u and across v, of two depths, wide and narrow, flat and bent.
@@ -202,23 +197,14 @@ TEST(TransferTexture, GroovesAreThoseOfDisplacedGeometry) {
     auto truth = path_trace(relief, env, camera, traced);
     ASSERT_TRUE(truth);
     std::printf("tile %g,%g width %g depth %g %s: %.4f\n", c.tile.x, c.tile.y, c.width, c.depth, c.deform, relative_rms(*ours, truth->image));
-    EXPECT_LT(relative_rms(*ours, truth->image), 0.1);
+    EXPECT_LT(relative_rms(*ours, truth->image), 0.08);  // the table itself is off by 5.6%
   }
 }
 
 // A glowing ball near the relief, against the path tracer's: a mesh of triangles that it samples.
 TEST(TransferTexture, NearLampsLightItAsTheyDoTheDisplacedGeometry) {
-  const int n = 24;
-  HeightField field{n, {}};
-  for (int j = 0; j < n; ++j)
-    for (int i = 0; i < n; ++i) field.heights.push_back(0.08f * std::sin(2 * pi * float(i) / n + std::sin(2 * pi * float(j) / n)));
-  const PatchScene patch = make_patch(field, Vec3(0.5f));
-  auto patch_tracer = Tracer::build(patch.scene);
-  auto transfer = bake(patch.scene, *patch_tracer, patch.receivers, {.samples = 1024, .bounces = 2, .precision = Precision::single});
-  ASSERT_TRUE(transfer);
-  auto lobes = fit_zonal(*transfer, {.lobes = 4});
-  ASSERT_TRUE(lobes);
-  const Scene sheet = tiled_sheet(n * 5);
+  const WavyRelief wavy = wavy_relief(24);
+  const Scene sheet = tiled_sheet(24 * 5);
   auto tracer = Tracer::build(sheet);
   // From below the lamp, which would stand before the sheet.
   Camera camera = from_above(0);
@@ -227,19 +213,19 @@ TEST(TransferTexture, NearLampsLightItAsTheyDoTheDisplacedGeometry) {
   options.width = options.height = 48, options.samples = 64;
   const SphereLamp lamp{{0.8f, 1.6f, 0.3f}, 0.7f, {5, 4, 3}};
   Scene relief = sheet;
-  ASSERT_TRUE(displace(relief, [&](Vec2 uv) { return sample_height(field, uv); }, Vec2(5)));
+  ASSERT_TRUE(displace(relief, [&](Vec2 uv) { return wavy.at(uv); }, Vec2(5)));
   const uint32_t glow = add_material(relief, "lamp", Vec3(0.0f));
   add_sphere(relief, glow, "lamp", lamp.centre, lamp.radius, 4);
   relief.materials[glow].emissive = lamp.radiance;
   relief.texcoords[0].resize(relief.positions.size());
   ReferenceOptions traced;
   traced.width = traced.height = 48, traced.spp = 256, traced.bounces = 3, traced.lamps = true;
-  auto ours = render_transfer_texture(sheet, *tracer, {n, n, *lobes}, {.tile = Vec2(5)}, {std::vector<Vec3>(36, Vec3(0.0f)), {lamp}, {}}, camera, options);
+  auto ours = render_transfer_texture(sheet, *tracer, wavy.texture, {.tile = Vec2(5)}, {std::vector<Vec3>(36, Vec3(0.0f)), {lamp}, {}}, camera, options);
   ASSERT_TRUE(ours);
   auto truth = path_trace(relief, *load_environment("uniform:0"), camera, traced);
   ASSERT_TRUE(truth);
   std::printf("near lamp: %.4f\n", relative_rms(*ours, truth->image));
-  EXPECT_LT(relative_rms(*ours, truth->image), 0.12);
+  EXPECT_LT(relative_rms(*ours, truth->image), 0.1);  // six bands of a lamp 0.9 away blur its shadows
 }
 
 }  // namespace

@@ -1,34 +1,19 @@
+#include <lambent/scene/clean.h>
 #include <lambent/scene/displace.h>
 
-#include <cstring>
 #include <unordered_map>
 
 namespace lambent {
 namespace {
 
-// Vertices that share a place, and with `normals` a normal, get one number.
-std::vector<uint32_t> weld(const Scene& scene, bool normals) {
-  struct Hash {
-    size_t operator()(const std::array<float, 6>& k) const {
-      uint64_t h = 0x9e3779b97f4a7c15;
-      for (float f : k) {
-        uint32_t bits;
-        std::memcpy(&bits, &f, 4);
-        h = (h ^ bits) * 0xff51afd7ed558ccd, h ^= h >> 32;
-      }
-      return size_t(h);
-    }
-  };
-  std::unordered_map<std::array<float, 6>, uint32_t, Hash> numbers;
+// Vertices that share a place and nearly a normal get one number; those shade smoothly into each other.
+std::vector<uint32_t> number_smooth(const std::vector<uint32_t>& place, const std::vector<Vec3>& normals) {
+  std::vector<Vec3> rounded;
+  for (Vec3 n : normals) rounded.push_back(glm::round(n * 4096.0f));
+  const std::vector<uint32_t> direction = number_positions(rounded).ids;
+  std::unordered_map<uint64_t, uint32_t> numbers;
   std::vector<uint32_t> out;
-  for (size_t v = 0; v < scene.positions.size(); ++v) {
-    std::array<float, 6> key{};
-    for (int k = 0; k < 3; ++k) {
-      key[size_t(k)] = scene.positions[v][k] + 0.0f;  // -0 is 0
-      if (normals) key[size_t(k) + 3] = std::round(scene.normals[v][k] * 4096) + 0.0f;
-    }
-    out.push_back(numbers.try_emplace(key, uint32_t(numbers.size())).first->second);
-  }
+  for (size_t v = 0; v < place.size(); ++v) out.push_back(numbers.try_emplace(uint64_t(place[v]) << 32 | direction[v], uint32_t(numbers.size())).first->second);
   return out;
 }
 
@@ -38,7 +23,7 @@ Result<void> displace(Scene& scene, const std::function<float(Vec2)>& height, Ve
   const std::vector<Vec2>& uv = scene.texcoords[0];
   if (uv.empty()) return Error{scene.path, "has no texture coordinates to displace it by"};
   const size_t n = scene.positions.size();
-  const std::vector<uint32_t> place = weld(scene, false), smooth = weld(scene, true);
+  const std::vector<uint32_t> place = number_positions(scene.positions).ids, smooth = number_smooth(place, scene.normals);
   std::vector<double> area(n), covered(n);
   std::vector<Vec3> normals(n, Vec3(0.0f));  // by place
   for (const Triangle& t : scene.triangles) {
