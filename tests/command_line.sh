@@ -319,6 +319,7 @@ expect 2 'not both' patch -o x.lpt
 expect 2 'grooves' patch --groove 1 --depth 0.1 -o x.lpt
 expect 2 'lobes' patch --groove 1 --lobes 2 -o x.lpt
 absent x.lpt
+expect 2 'depth' patch --groove nan -o x.lpt
 expect 2 'precision' patch --groove 1 --precision half -o x.lpt
 expect 2 'below 1' patch --groove 1 --albedo 1 -o x.lpt
 expect 2 'shadows' bake corner.obj --transfer zonal --outgoing svd:2 --shadows off -o x.glb

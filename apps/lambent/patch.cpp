@@ -58,7 +58,7 @@ int run_grooves(Context& context, const PatchCommand& o) {
 
 int run_patch(Context& context, PatchCommand o) {
   if (auto ok = check_output(o.output, {"lpt"}); !ok) return fail(ok.error());
-  if (o.groove > 0) return run_grooves(context, o);
+  if (o.groove != 0) return run_grooves(context, o);
   SubsurfaceOptions subsurface{.period = 1};
   SubsurfaceReport walks;
   if (!o.subsurface.empty()) {
