@@ -1,6 +1,7 @@
-// Spherical harmonics one function at a time, on one thread: evaluating, rotating and multiplying, orders 2 to 12. Inputs change from
-// call to call and stay in the first-level cache. Limits are the plain code for the same thing in the same run; "public" is what
-// the best published code is known to need on one thread of a like machine, in ns. Not measured here: building the tables.
+// Spherical harmonics one function at a time, on one thread: evaluating, rotating and multiplying, orders 2 to 12.
+// Inputs change from call to call and stay in the first-level cache. Limits are the plain code for the same thing in
+// the same run; "public" is what the best published code is known to need on one thread of a like machine, in ns. Not
+// measured here: building the tables.
 #include "bench.h"
 
 #include <lambent/basis/sh_product.h>
@@ -25,7 +26,8 @@ double nanoseconds(int calls, F&& f) {
   return 1e9 * seconds / calls;
 }
 
-nlohmann::json about(int order, const std::map<int, double>& published, double ours, nlohmann::json more = nlohmann::json::object()) {
+nlohmann::json about(int order, const std::map<int, double>& published, double ours,
+                     nlohmann::json more = nlohmann::json::object()) {
   more["order"] = order, more["threads_used"] = 1;
   if (auto found = published.find(order); found != published.end()) {
     more["public_ns"] = found->second;
@@ -44,15 +46,16 @@ void basis_case(int order) {
   std::vector<Mat3> rotations;
   for (int i = 0; i < inputs; ++i) {
     directions.push_back(glm::normalize(Vec3(random.next() - 0.5f, random.next() - 0.5f, random.next() - 0.5f)));
-    rotations.push_back(rotation_from_yaw_pitch_roll({360 * random.next(), 180 * random.next() - 90, 360 * random.next()}));
+    rotations.push_back(
+        rotation_from_yaw_pitch_roll({360 * random.next(), 180 * random.next() - 90, 360 * random.next()}));
   }
   std::vector<float> out(count);
   std::vector<double> exact(count);
 
-  const double evaluate = nanoseconds(2000, [&](size_t i) { return evaluate_sh(order, directions[i], out), out.back(); });
-  const double evaluate_double = nanoseconds(2000, [&](size_t i) {
-    return evaluate_sh(order, glm::dvec3(directions[i]), exact), float(exact.back());
-  });
+  const double evaluate =
+      nanoseconds(2000, [&](size_t i) { return evaluate_sh(order, directions[i], out), out.back(); });
+  const double evaluate_double = nanoseconds(
+      2000, [&](size_t i) { return evaluate_sh(order, glm::dvec3(directions[i]), exact), float(exact.back()); });
   report("sh_evaluate", evaluate, evaluate_double, "ns", "the same in double", about(order, {}, evaluate));
 
   const double rotate = nanoseconds(1000, [&](size_t i) { return rotate_sh_zyz(rotations[i], f[i], out), out.back(); });
@@ -62,19 +65,20 @@ void basis_case(int order) {
   const ShRotation built = make_sh_rotation(order, rotations[0]);
   const double applied = nanoseconds(1000, [&](size_t i) { return rotate_sh(built, f[i], out), out.back(); });
   report("sh_rotate", rotate, dense, "ns", "building the dense blocks and applying them",
-         about(order, {{3, 16.7}, {4, 25.9}, {5, 41.7}, {6, 64}}, rotate, {{"dense_blocks_given_ns", applied}, {"aim", "<= the public figure"}}));
+         about(order, {{3, 16.7}, {4, 25.9}, {5, 41.7}, {6, 64}}, rotate,
+               {{"dense_blocks_given_ns", applied}, {"aim", "<= the public figure"}}));
 
   const TriplingTensor tensor = make_tripling_tensor(order, order, order);
   const int calls = std::max(10, 400000 / int(tensor.value.size()));
-  const double product = nanoseconds(1000, [&](size_t i) {
-    return multiply_sh(f[i], f[(i + 1) % inputs], out), out.back();
-  });
+  const double product =
+      nanoseconds(1000, [&](size_t i) { return multiply_sh(f[i], f[(i + 1) % inputs], out), out.back(); });
   const double plain = nanoseconds(std::min(calls, 1000), [&](size_t i) {
     return multiply_sh_plain(tensor, f[i], f[(i + 1) % inputs], out), out.back();
   });
-  report("sh_product", product, plain, "ns", "the plain loop over the sparse tensor",
-         about(order, {{3, 20.5}, {4, 67}, {5, 197}, {6, 690}, {8, 4240}, {10, 11700}}, product,
-               {{"coefficients", tensor.value.size()}, {"speedup", plain / product}, {"aim", "speedup >= 3 at order 6"}}));
+  report(
+      "sh_product", product, plain, "ns", "the plain loop over the sparse tensor",
+      about(order, {{3, 20.5}, {4, 67}, {5, 197}, {6, 690}, {8, 4240}, {10, 11700}}, product,
+            {{"coefficients", tensor.value.size()}, {"speedup", plain / product}, {"aim", "speedup >= 3 at order 6"}}));
 }
 
 }  // namespace

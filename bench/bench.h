@@ -1,6 +1,6 @@
 #pragma once
-// Benchmarks print one JSON object a line: name, ours, limit (or peer), ratio, and what they ran on. Limits are measured in the
-// same run, on the same data. Nothing here is a test: machines are shared and noisy.
+// Benchmarks print one JSON object a line: name, ours, limit (or peer), ratio, and what they ran on. Limits are
+// measured in the same run, on the same data. Nothing here is a test: machines are shared and noisy.
 #include <lambent/scene/scene.h>
 
 #include <nlohmann/json.hpp>

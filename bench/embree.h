@@ -1,6 +1,6 @@
 #pragma once
-// Embree itself on a bake's rays: same origins, same sorted and spun directions, nothing done with the answer. The limit that
-// bakes are held to.
+// Embree itself on a bake's rays: same origins, same sorted and spun directions, nothing done with the answer. The
+// limit that bakes are held to.
 #include "bench.h"
 
 #include <lambent/bake/gather.h>
@@ -20,16 +20,19 @@ struct RawScene {
   explicit RawScene(const Scene& s) {
     rtcSetSceneBuildQuality(scene, RTC_BUILD_QUALITY_HIGH);
     RTCGeometry g = rtcNewGeometry(device, RTC_GEOMETRY_TYPE_TRIANGLE);
-    void* p = rtcSetNewGeometryBuffer(g, RTC_BUFFER_TYPE_VERTEX, 0, RTC_FORMAT_FLOAT3, sizeof(Vec3), s.positions.size());
+    void* p =
+        rtcSetNewGeometryBuffer(g, RTC_BUFFER_TYPE_VERTEX, 0, RTC_FORMAT_FLOAT3, sizeof(Vec3), s.positions.size());
     std::memcpy(p, s.positions.data(), s.positions.size() * sizeof(Vec3));
-    auto* i = static_cast<uint32_t*>(rtcSetNewGeometryBuffer(g, RTC_BUFFER_TYPE_INDEX, 0, RTC_FORMAT_UINT3, 12, s.triangles.size()));
+    auto* i = static_cast<uint32_t*>(
+        rtcSetNewGeometryBuffer(g, RTC_BUFFER_TYPE_INDEX, 0, RTC_FORMAT_UINT3, 12, s.triangles.size()));
     for (const Triangle& t : s.triangles) std::memcpy(i, t.v, 12), i += 3;
     rtcCommitGeometry(g), rtcAttachGeometry(scene, g), rtcReleaseGeometry(g), rtcCommitScene(scene);
   }
   ~RawScene() { rtcReleaseScene(scene), rtcReleaseDevice(device); }
 };
 
-// Least seconds of `runs` calls of trace(origin, x, y, z, count) for every receiver's directions, in parallel; samples % 256 == 0.
+// Least seconds of `runs` calls of trace(origin, x, y, z, count) for every receiver's directions, in parallel; samples
+// % 256 == 0.
 template <class Trace>
 double raw_seconds(int runs, const Receivers& receivers, const DirectionSets& sets, Trace trace) {
   std::atomic<size_t> hits{0};
@@ -41,8 +44,10 @@ double raw_seconds(int runs, const Receivers& receivers, const DirectionSets& se
       for (size_t r = begin; r < end; ++r) {
         const DirectionChoice c = choose_directions(sets, receivers.normals[r], 1, r);
         const size_t base = size_t(c.set) * sets.stride;
-        rotate_directions(c.rotation, sets.x.data() + base, sets.y.data() + base, sets.z.data() + base, sets.stride, x.data(), y.data(), z.data());
-        for (size_t i = 0; i < samples; i += 256) found += trace(receivers.origins[r], x.data() + i, y.data() + i, z.data() + i, 256);
+        rotate_directions(c.rotation, sets.x.data() + base, sets.y.data() + base, sets.z.data() + base, sets.stride,
+                          x.data(), y.data(), z.data());
+        for (size_t i = 0; i < samples; i += 256)
+          found += trace(receivers.origins[r], x.data() + i, y.data() + i, z.data() + i, 256);
       }
       hits += found;
     });
@@ -73,8 +78,10 @@ size_t packets(RTCScene scene, Vec3 o, const float* x, const float* y, const flo
     RTCRayHit16 p;
     for (int i = 0; i < 16; ++i) {
       p.ray.org_x[i] = o.x, p.ray.org_y[i] = o.y, p.ray.org_z[i] = o.z;
-      p.ray.dir_x[i] = x[begin + size_t(i)], p.ray.dir_y[i] = y[begin + size_t(i)], p.ray.dir_z[i] = z[begin + size_t(i)];
-      p.ray.tnear[i] = 0, p.ray.tfar[i] = INFINITY, p.ray.time[i] = 0, p.ray.mask[i] = ~0u, p.ray.id[i] = 0, p.ray.flags[i] = 0;
+      p.ray.dir_x[i] = x[begin + size_t(i)], p.ray.dir_y[i] = y[begin + size_t(i)],
+      p.ray.dir_z[i] = z[begin + size_t(i)];
+      p.ray.tnear[i] = 0, p.ray.tfar[i] = INFINITY, p.ray.time[i] = 0, p.ray.mask[i] = ~0u, p.ray.id[i] = 0,
+      p.ray.flags[i] = 0;
       p.hit.geomID[i] = RTC_INVALID_GEOMETRY_ID, p.hit.instID[0][i] = RTC_INVALID_GEOMETRY_ID;
     }
     if (closest) rtcIntersect16(valid, scene, &context, &p);

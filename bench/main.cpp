@@ -12,9 +12,11 @@
 
 namespace lambent::bench {
 
-void report(const std::string& name, double ours, double limit, const std::string& unit, const std::string& limit_is, nlohmann::json more) {
-  nlohmann::ordered_json line{{"name", name}, {"ours", ours}, {"limit", limit}, {"ratio", ours / limit}, {"unit", unit},
-                              {"limit_is", limit_is}, {"threads", thread_count()}};
+void report(const std::string& name, double ours, double limit, const std::string& unit, const std::string& limit_is,
+            nlohmann::json more) {
+  nlohmann::ordered_json line{
+      {"name", name}, {"ours", ours},         {"limit", limit},           {"ratio", ours / limit},
+      {"unit", unit}, {"limit_is", limit_is}, {"threads", thread_count()}};
   for (auto& [key, value] : more.items()) line[key] = value;
   fmt::print("{}\n", line.dump());
   std::fflush(stdout);
@@ -23,7 +25,8 @@ void report(const std::string& name, double ours, double limit, const std::strin
 std::optional<Scene> data_scene(const std::string& name, bool ground) {
   const char* given = std::getenv("LAMBENT_DATA");
   const std::filesystem::path repository = std::filesystem::path(__FILE__).parent_path().parent_path();
-  const std::filesystem::path folder = given ? std::filesystem::path(given) : repository.parent_path() / "shared" / "data";
+  const std::filesystem::path folder = given ? std::filesystem::path(given)
+                                             : repository.parent_path() / "shared" / "data";
   auto scene = load_scene((folder / "meshes" / name).string());
   if (!scene) {
     fmt::print(stderr, "skipped: {}\n", scene.error().text());
@@ -37,12 +40,18 @@ std::optional<Scene> data_scene(const std::string& name, bool ground) {
 
 int main(int argc, char** argv) {
   using namespace lambent::bench;
-  const std::pair<const char*, void (*)()> all[] = {{"bake", bench_bake},       {"basis", bench_basis},     {"products", bench_products}, {"radiosity", bench_radiosity}, {"lightmaps", bench_lightmaps},
-                                                    {"relight", bench_relight}, {"scaling", bench_scaling}, {"zonal", bench_zonal}};
+  const std::pair<const char*, void (*)()> all[] = {{"bake", bench_bake},           {"basis", bench_basis},
+                                                    {"products", bench_products},   {"radiosity", bench_radiosity},
+                                                    {"lightmaps", bench_lightmaps}, {"relight", bench_relight},
+                                                    {"scaling", bench_scaling},     {"zonal", bench_zonal}};
   bool known = argc == 1;
   for (int i = 1; i < argc; ++i)
     for (auto [name, run] : all) known |= !std::strcmp(argv[i], name);
-  if (!known) return fmt::print(stderr, "usage: lambent-bench [bake] [basis] [products] [radiosity] [lightmaps] [relight] [scaling] [zonal]\n"), 2;
+  if (!known)
+    return fmt::print(
+               stderr,
+               "usage: lambent-bench [bake] [basis] [products] [radiosity] [lightmaps] [relight] [scaling] [zonal]\n"),
+           2;
   for (auto [name, run] : all) {
     bool wanted = argc == 1;
     for (int i = 1; i < argc; ++i) wanted |= !std::strcmp(argv[i], name);

@@ -1,8 +1,8 @@
-// All-frequency products (locally-adaptive-products): its Tables 1 to 3 and the comparison of its Fig. 5 on our scenes, and what a new
-// environment takes. The paper's figures stand beside ours as "limit" where it
-// prints them; baselines are run on the same vertices.
-// LAMBENT_PRODUCTS_SCENES names those that are wanted, with commas ("hall,bunny.obj"); all if it is not set.
-// LAMBENT_PRODUCTS_DETAIL below 1 takes so much of the vertices of the made scenes and leaves out the shared ones: to try it, not to time it.
+// All-frequency products (locally-adaptive-products): its Tables 1 to 3 and the comparison of its Fig. 5 on our scenes,
+// and what a new environment takes. The paper's figures stand beside ours as "limit" where it prints them; baselines
+// are run on the same vertices. LAMBENT_PRODUCTS_SCENES names those that are wanted, with commas ("hall,bunny.obj");
+// all if it is not set. LAMBENT_PRODUCTS_DETAIL below 1 takes so much of the vertices of the made scenes and leaves out
+// the shared ones: to try it, not to time it.
 #include "bench.h"
 #include "embree.h"
 
@@ -26,7 +26,8 @@ struct Place {
 };
 
 // f over [0, 1] x [0, 1] in na x nb cells, turned to the side of its normals; `around` joins b = 1 to b = 0.
-void add_grid(Scene& scene, uint32_t material, const char* name, int na, int nb, bool around, const std::function<Place(float, float)>& f) {
+void add_grid(Scene& scene, uint32_t material, const char* name, int na, int nb, bool around,
+              const std::function<Place(float, float)>& f) {
   const int columns = around ? nb : nb + 1;
   std::vector<Vec3> positions, normals;
   for (int i = 0; i <= na; ++i)
@@ -49,7 +50,8 @@ void add_grid(Scene& scene, uint32_t material, const char* name, int na, int nb,
 }
 
 // A round bar from p to q, its radius going from r to s.
-void add_bar(Scene& scene, uint32_t material, const char* name, Vec3 p, Vec3 q, float r, float s, int along, int around) {
+void add_bar(Scene& scene, uint32_t material, const char* name, Vec3 p, Vec3 q, float r, float s, int along,
+             int around) {
   const Vec3 axis = q - p;
   const Mat3 frame = frame_about(glm::normalize(axis));
   add_grid(scene, material, name, along, around, true, [&](float a, float b) {
@@ -61,13 +63,17 @@ void add_bar(Scene& scene, uint32_t material, const char* name, Vec3 p, Vec3 q, 
 // A disc of radius r, facing n.
 void add_disc(Scene& scene, uint32_t material, const char* name, Vec3 centre, Vec3 n, float r, int along, int around) {
   const Mat3 frame = frame_about(n);
-  add_grid(scene, material, name, along, around, true,
-           [&](float a, float b) { return Place{centre + std::max(a, 1e-3f) * r * (std::cos(2 * pi * b) * frame[0] + std::sin(2 * pi * b) * frame[1]), n}; });
+  add_grid(scene, material, name, along, around, true, [&](float a, float b) {
+    return Place{centre + std::max(a, 1e-3f) * r * (std::cos(2 * pi * b) * frame[0] + std::sin(2 * pi * b) * frame[1]),
+                 n};
+  });
 }
 
-void add_ring(Scene& scene, uint32_t material, const char* name, Vec3 centre, float radius, float thick, int around, int across) {
+void add_ring(Scene& scene, uint32_t material, const char* name, Vec3 centre, float radius, float thick, int around,
+              int across) {
   add_grid(scene, material, name, around, across, true, [&](float a, float b) {
-    const Vec3 out(std::cos(2 * pi * a), std::sin(2 * pi * a), 0), n = std::cos(2 * pi * b) * out + std::sin(2 * pi * b) * Vec3(0, 0, 1);
+    const Vec3 out(std::cos(2 * pi * a), std::sin(2 * pi * a), 0),
+        n = std::cos(2 * pi * b) * out + std::sin(2 * pi * b) * Vec3(0, 0, 1);
     return Place{centre + radius * out + thick * n, n};
   });
 }
@@ -116,13 +122,15 @@ Scene make_relief(float detail) {
   auto height = [](float x, float z) {
     const float r = std::sqrt(x * x + z * z) + 1e-6f, turn = std::atan2(z, x);
     const float rosette = 0.09f * std::exp(-2.5f * r * r) * (1 + std::cos(9 * turn + 6 * r)) * std::min(1.0f, 4 * r);
-    const float u = x * 5 - std::round(x * 5), v = z * 5 - std::round(z * 5), dome = std::sqrt(std::max(0.0f, 0.12f - u * u - v * v));
+    const float u = x * 5 - std::round(x * 5), v = z * 5 - std::round(z * 5),
+                dome = std::sqrt(std::max(0.0f, 0.12f - u * u - v * v));
     return rosette + 0.25f * dome + 0.006f * std::sin(60 * r) + 0.05f * std::cos(3 * x) * std::cos(2 * z);
   };
   const int n = cells(706, detail);
   add_grid(scene, m, "relief", n, n, false, [&](float a, float b) {
     const float x = 2 * a - 1, z = 2 * b - 1, d = 1e-3f;
-    return Place{Vec3(x, height(x, z), z), Vec3(height(x - d, z) - height(x + d, z), 2 * d, height(x, z - d) - height(x, z + d))};
+    return Place{Vec3(x, height(x, z), z),
+                 Vec3(height(x - d, z) - height(x + d, z), 2 * d, height(x, z - d) - height(x, z + d))};
   });
   return scene;
 }
@@ -143,8 +151,14 @@ Scene make_wheels(float detail) {
       add_bar(scene, m, "spoke", hub + 0.02f * out + lean, hub + 0.315f * out, 0.0015f, 0.0015f, n(120), n(8));
     }
   }
-  const Vec3 pedals(-0.08f, 0.3f, 0), saddle(-0.2f, 0.85f, 0), head(0.35f, 0.85f, 0), back(-0.5f, 0.35f, 0), front(0.5f, 0.35f, 0);
-  for (const auto& [p, q] : {std::pair{pedals, saddle}, {pedals, head}, {saddle - Vec3(0, 0.1f, 0), head}, {pedals, back}, {saddle, back}, {head, front}})
+  const Vec3 pedals(-0.08f, 0.3f, 0), saddle(-0.2f, 0.85f, 0), head(0.35f, 0.85f, 0), back(-0.5f, 0.35f, 0),
+      front(0.5f, 0.35f, 0);
+  for (const auto& [p, q] : {std::pair{pedals, saddle},
+                             {pedals, head},
+                             {saddle - Vec3(0, 0.1f, 0), head},
+                             {pedals, back},
+                             {saddle, back},
+                             {head, front}})
     add_bar(scene, m, "tube", p, q, 0.016f, 0.016f, n(140), n(30));
   return scene;
 }
@@ -181,17 +195,20 @@ std::optional<Scene> refined(std::optional<Scene> scene, size_t vertices) {
 Environment harsh_light(std::string& name) {
   const char* given = std::getenv("LAMBENT_DATA");
   const std::filesystem::path folder =
-      given ? std::filesystem::path(given) : std::filesystem::path(__FILE__).parent_path().parent_path().parent_path() / "shared" / "data";
+      given ? std::filesystem::path(given)
+            : std::filesystem::path(__FILE__).parent_path().parent_path().parent_path() / "shared" / "data";
   auto env = load_environment((folder / "environments" / "chinese_garden_1k.hdr").string());
   name = "chinese_garden_1k.hdr";
   if (env) return std::move(*env);
   name = "made";
-  Environment made = make_environment("made", 1024, 512, [](Vec3 d) { return Vec3(0.3f + 0.2f * d.y, 0.4f + 0.2f * d.y, 0.6f + 0.2f * d.y); });
+  Environment made = make_environment(
+      "made", 1024, 512, [](Vec3 d) { return Vec3(0.3f + 0.2f * d.y, 0.4f + 0.2f * d.y, 0.6f + 0.2f * d.y); });
   made.image.at(600, 170) = Vec3(70000, 60000, 50000);
   return made;
 }
 
-// Embree on the bake's own rays, origins and directions, 256 at a time, nothing done with the answer; of some 20,000 receivers.
+// Embree on the bake's own rays, origins and directions, 256 at a time, nothing done with the answer; of some 20,000
+// receivers.
 double raw_rays_a_second(const Scene& scene, const Receivers& receivers, const Cube& cube) {
   const RawScene raw(scene);
   std::atomic<size_t> rays{0}, hits{0};
@@ -204,9 +221,11 @@ double raw_rays_a_second(const Scene& scene, const Receivers& receivers, const C
         const size_t r = i * step;
         x.clear(), y.clear(), z.clear();
         for (size_t t = 0; t < cube.count(); ++t)
-          if (const Vec3 d = cube.texels.at(t); glm::dot(receivers.normals[r], d) > 0) x.push_back(d.x), y.push_back(d.y), z.push_back(d.z);
+          if (const Vec3 d = cube.texels.at(t); glm::dot(receivers.normals[r], d) > 0)
+            x.push_back(d.x), y.push_back(d.y), z.push_back(d.z);
         for (size_t k = 0; k < x.size(); k += 256)
-          found += occluded_stream(raw.scene, receivers.origins[r], &x[k], &y[k], &z[k], std::min<size_t>(256, x.size() - k));
+          found += occluded_stream(raw.scene, receivers.origins[r], &x[k], &y[k], &z[k],
+                                   std::min<size_t>(256, x.size() - k));
         count += x.size();
       }
       rays += count, hits += found;
@@ -243,7 +262,9 @@ nlohmann::json shares(const Breakdown& b) {
   const double all = double(b.light_brdf + b.light_visibility + b.triple);
   nlohmann::json samples = nlohmann::json::array();
   for (size_t n : b.samples) samples.push_back(100 * double(n) / all);
-  return {{"line_6", 100 * double(b.light_brdf) / all}, {"line_9", 100 * double(b.light_visibility) / all}, {"line_11", 100 * double(b.triple) / all},
+  return {{"line_6", 100 * double(b.light_brdf) / all},
+          {"line_9", 100 * double(b.light_visibility) / all},
+          {"line_11", 100 * double(b.triple) / all},
           {"samples_1_4_16_256", samples}};
 }
 
@@ -276,12 +297,16 @@ void product_scene(const std::string& name, const Scene& scene) {
     more.update(about), more["aim"] = aim;
     report(what, ours, limit, unit, is, more);
   };
-  line("products_bake", double(baked.rays) / baked.seconds / 1e6, raw_rays_a_second(scene, receivers, *light.cube) / 1e6,
-       "million rays/s", "Embree on the same rays",
-       ">= 0.8", {{"seconds", baked.seconds}, {"rays", baked.rays}});
-  line("products_database", double(visibility.bytes()) / count, 290e6 / 280e3, "bytes a vertex", "the paper, Table 3, round table", "<= 1",
+  line("products_bake", double(baked.rays) / baked.seconds / 1e6,
+       raw_rays_a_second(scene, receivers, *light.cube) / 1e6, "million rays/s", "Embree on the same rays", ">= 0.8",
+       {{"seconds", baked.seconds}, {"rays", baked.rays}});
+  line("products_database", double(visibility.bytes()) / count, 290e6 / 280e3, "bytes a vertex",
+       "the paper, Table 3, round table", "<= 1",
        {{"MB", double(visibility.bytes()) / 1e6},
-        {"blocked", s.blocked}, {"clear", s.clear}, {"mixed", s.mixed}, {"changes_per_mixed_block", s.changes}});
+        {"blocked", s.blocked},
+        {"clear", s.clear},
+        {"mixed", s.mixed},
+        {"changes_per_mixed_block", s.changes}});
 
   const Case cases[] = {{"diffuse", Lambert{Vec3(0.5f)}, 120},
                         {"phong_10", Phong{Vec3(0.3f), Vec3(0.4f), 10}, 50},
@@ -292,12 +317,14 @@ void product_scene(const std::string& name, const Scene& scene) {
     Reflection reflection;
     reflection.everywhere = c.brdf;
     auto shading = [&](SamplingRule rule) {
-      return make_product_receivers(scene, receivers.front, receivers.back, receivers.count(), reflection, *light.cube, {.rule = rule});
+      return make_product_receivers(scene, receivers.front, receivers.back, receivers.count(), reflection, *light.cube,
+                                    {.rule = rule});
     };
     auto visible = [&](const Camera& camera) {
       return seen_receivers(scene, receivers.front, receivers.back, receivers.count(), camera, 800, 600);
     };
-    auto shade = [&](const ProductReceivers& by, const std::vector<uint32_t>& list, const Camera& camera, Relit& out, Breakdown* tally) {
+    auto shade = [&](const ProductReceivers& by, const std::vector<uint32_t>& list, const Camera& camera, Relit& out,
+                     Breakdown* tally) {
       shade_receivers(Product::blocks, light, nullptr, visibility, by, list, camera.eye, out, tally);
     };
     const ProductReceivers ours = shading(SamplingRule::bounded), paper = shading(SamplingRule::appendix_a);
@@ -334,7 +361,8 @@ void product_scene(const std::string& name, const Scene& scene) {
         ++simd_count;
         blocks.push_back(relit.at(r)), appendix.push_back(by_paper.at(r)), standard.push_back(value);
         if (i / step % 10) continue;
-        scalar_seconds += least_seconds(1, [&] { value = shade_standard_scalar(light, visibility, r, m, ours.frames[r], wo); });
+        scalar_seconds +=
+            least_seconds(1, [&] { value = shade_standard_scalar(light, visibility, r, m, ours.frames[r], wo); });
         ++scalar_count;
         truth_of_wavelets.push_back(value);
         project_haar(haar, visibility, r, m, ours.frames[r], wo, scratch);
@@ -343,27 +371,36 @@ void product_scene(const std::string& name, const Scene& scene) {
       }
     }
     if (seen_all == 0) return;
-    const double each = 1e9 * seconds / double(seen_all), simd = 1e9 * simd_seconds / double(simd_count), scalar = 1e9 * scalar_seconds / double(scalar_count);
+    const double each = 1e9 * seconds / double(seen_all), simd = 1e9 * simd_seconds / double(simd_count),
+                 scalar = 1e9 * scalar_seconds / double(scalar_count);
     const nlohmann::json material{{"material", c.name}};
     auto with = [&](nlohmann::json more) { return more.update(material), more; };
     line("products_blocks_vs_simd", each, simd, "ns a vertex and core", "our best standard basis",
-         c.paper_over_standard == 120 ? "<= 1/120" : c.paper_over_standard == 50 ? "<= 1/50" : "<= 1/40",
+         c.paper_over_standard == 120  ? "<= 1/120"
+         : c.paper_over_standard == 50 ? "<= 1/50"
+                                       : "<= 1/40",
          with({{"times_faster", simd / each},
-               {"appendix_a_ns", 1e9 * paper_seconds / double(seen_all)}, {"seen", double(seen_all) / double(cameras.size())}}));
+               {"appendix_a_ns", 1e9 * paper_seconds / double(seen_all)},
+               {"seen", double(seen_all) / double(cameras.size())}}));
     line("products_blocks_vs_scalar", each, scalar, "ns a vertex and core", "a plain loop over all texels",
-         c.paper_over_standard == 120 ? "<= 1/300" : c.paper_over_standard == 50 ? "<= 1/120" : "<= 1/100",
+         c.paper_over_standard == 120  ? "<= 1/300"
+         : c.paper_over_standard == 50 ? "<= 1/120"
+                                       : "<= 1/100",
          with({{"times_faster", scalar / each}}));
-    line("products_haar_vs_scalar", 1e9 * haar_seconds / double(scalar_count), scalar, "ns a vertex and core", "a plain loop over all texels",
-         "<= 1/10 (Ng et al.)",
-         with({{"fraction", 0.01}}));
-    line("products_frame", 1e3 * frame_seconds / double(cameras.size()), 1e3 / 14, "ms", "the paper's round table, on four cores of 2011", "-",
-         with({{"ns_a_vertex_near", seen_near ? 1e9 * near_seconds / double(seen_near) : 0.0}, {"ns_a_vertex_all", each},
+    line("products_haar_vs_scalar", 1e9 * haar_seconds / double(scalar_count), scalar, "ns a vertex and core",
+         "a plain loop over all texels", "<= 1/10 (Ng et al.)", with({{"fraction", 0.01}}));
+    line("products_frame", 1e3 * frame_seconds / double(cameras.size()), 1e3 / 14, "ms",
+         "the paper's round table, on four cores of 2011", "-",
+         with({{"ns_a_vertex_near", seen_near ? 1e9 * near_seconds / double(seen_near) : 0.0},
+               {"ns_a_vertex_all", each},
                {"seen_near", double(seen_near) / double(cameras.size())}}));
     const nlohmann::json own = shares(tally), theirs = shares(paper_tally);
     line("products_table_1_2", own["line_11"], 2.5, "% of blocks in line 11", "the most of the paper's Table 1", "<= 1",
          with({{"bounded", own}, {"appendix_a", theirs}}));
     line("products_accuracy", clipped_psnr(blocks, standard), 45.67, "dB", "the paper, its Fig. 5", ">= 50 dB",
-         with({{"appendix_a", clipped_psnr(appendix, standard)}, {"haar_1_percent", clipped_psnr(wavelets, truth_of_wavelets)}, {"haar_of_the_paper", 33.54}}));
+         with({{"appendix_a", clipped_psnr(appendix, standard)},
+               {"haar_1_percent", clipped_psnr(wavelets, truth_of_wavelets)},
+               {"haar_of_the_paper", 33.54}}));
   }
 }
 
@@ -388,7 +425,9 @@ void bench_products() {
   light_case(64, 5);
   light_case(128, 20);
   const char* named = std::getenv("LAMBENT_PRODUCTS_SCENES");
-  auto wanted = [&](const std::string& name) { return !named || ("," + std::string(named) + ",").find("," + name + ",") != std::string::npos; };
+  auto wanted = [&](const std::string& name) {
+    return !named || ("," + std::string(named) + ",").find("," + name + ",") != std::string::npos;
+  };
   if (wanted("round table")) product_scene("round table", make_table(detail));
   if (wanted("relief")) product_scene("relief", make_relief(detail));
   if (wanted("wheels")) product_scene("wheels", make_wheels(detail));

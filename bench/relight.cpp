@@ -37,7 +37,8 @@ double read_bandwidth(std::span<const uint8_t> data) {
   return double(data.size()) / seconds;
 }
 
-void relight_case(const std::string& name, int order, int rows, size_t receivers, int channels, Precision precision, const char* aim) {
+void relight_case(const std::string& name, int order, int rows, size_t receivers, int channels, Precision precision,
+                  const char* aim) {
   WritableTransfer w = make_transfer({.order = order}, rows, channels, receivers, precision);
   parallel_for(w.transfer.bytes() / 4, 1 << 16, [&](size_t begin, size_t end) {
     Random random(begin);
@@ -58,20 +59,28 @@ void relight_case(const std::string& name, int order, int rows, size_t receivers
   const double seconds = least_seconds(9, [&] { relight(w.transfer, light, out); });
   const double bytes = double(w.transfer.bytes());
   report(name, bytes / seconds / 1e9, bandwidth / 1e9, "GB/s", "reading the same memory",
-         {{"receivers", receivers}, {"columns", order * order}, {"rows", rows}, {"channels", channels}, {"ms", 1e3 * seconds},
-          {"with_writes_GBs", (bytes + 12.0 * double(rows) * double(receivers)) / seconds / 1e9}, {"aim", aim}});
+         {{"receivers", receivers},
+          {"columns", order * order},
+          {"rows", rows},
+          {"channels", channels},
+          {"ms", 1e3 * seconds},
+          {"with_writes_GBs", (bytes + 12.0 * double(rows) * double(receivers)) / seconds / 1e9},
+          {"aim", aim}});
 }
 
-// A glossy bake in clusters, of the least rank whose error is at most the bake's own (the estimate from half its samples), against the same bake whole. Both
-// scenes are more than a cache holds: 360 MB of one channel, 290 MB of three.
+// A glossy bake in clusters, of the least rank whose error is at most the bake's own (the estimate from half its
+// samples), against the same bake whole. Both scenes are more than a cache holds: 360 MB of one channel, 290 MB of
+// three.
 void cpca_case(int bounces) {
   const Scene scene = make_courtyard(bounces == 0 ? 2 : 1);
   auto tracer = Tracer::build(scene);
   if (!tracer) return;
   const Receivers receivers = make_vertex_receivers(scene);
-  const ReceiverMaterials materials = make_receiver_materials(scene, receivers, {.everywhere = Ggx{.alpha = Vec2(0.16f)}});
+  const ReceiverMaterials materials =
+      make_receiver_materials(scene, receivers, {.everywhere = Ggx{.alpha = Vec2(0.16f)}});
   BakeReport about;
-  auto baked = bake_matrix(scene, *tracer, receivers, materials, {.order = 5, .samples = 512, .bounces = bounces}, {.outgoing = OutgoingKind::map, .response_samples = 64}, &about);
+  auto baked = bake_matrix(scene, *tracer, receivers, materials, {.order = 5, .samples = 512, .bounces = bounces},
+                           {.outgoing = OutgoingKind::map, .response_samples = 64}, &about);
   if (!baked) return;
   const Transfer& t = baked->transfer;
   const std::vector<Vec3> light(25, Vec3(0.3f, -0.2f, 0.1f));
@@ -85,9 +94,17 @@ void cpca_case(int bounces) {
     if (error > about.error) continue;
     const double clustered = least_seconds(9, [&] { relight(*packed, light, out); });
     report("relight_cpca", clustered, whole, "s", "the same transfer whole",
-           {{"receivers", t.receivers}, {"rows", t.rows}, {"columns", 25}, {"channels", t.channels}, {"clusters", clusters}, {"rank", rank}, {"error", error},
-            {"bake_error", about.error}, {"bytes_ratio", double(t.bytes()) / double(packed->bytes())},
-            {"bytes_per_receiver", double(packed->bytes()) / double(t.receivers)}, {"aim", "<= 0.5, and bytes_ratio >= 4, where error <= bake_error"}});
+           {{"receivers", t.receivers},
+            {"rows", t.rows},
+            {"columns", 25},
+            {"channels", t.channels},
+            {"clusters", clusters},
+            {"rank", rank},
+            {"error", error},
+            {"bake_error", about.error},
+            {"bytes_ratio", double(t.bytes()) / double(packed->bytes())},
+            {"bytes_per_receiver", double(packed->bytes()) / double(t.receivers)},
+            {"aim", "<= 0.5, and bytes_ratio >= 4, where error <= bake_error"}});
     return;
   }
 }
@@ -99,7 +116,8 @@ void bench_relight() {
     for (Precision precision : {Precision::half, Precision::single})
       for (int channels : {1, 3})
         if (receivers < 8'000'000 || channels == 1 || precision == Precision::half)
-          relight_case(std::string("relight_") + (receivers >= 8'000'000 ? "8M" : "1M") + (precision == Precision::half ? "_half" : "_single") +
+          relight_case(std::string("relight_") + (receivers >= 8'000'000 ? "8M" : "1M") +
+                           (precision == Precision::half ? "_half" : "_single") +
                            (channels == 3 ? "_rgb_transfer" : ""),
                        6, 1, receivers, channels, precision, precision == Precision::half ? ">= 0.85" : ">= 0.7");
   relight_case("relight_glossy_svd6", 5, 6, 100'000, 3, Precision::half, ">= 0.7");

@@ -21,15 +21,24 @@ void bench_scaling() {
     const double each = 1e6 * seconds / double(receivers.count());
     const RawScene raw(scene);
     const DirectionSets sets = make_direction_sets(options.order, options.samples, 8, 1);
-    const double raw_each = 1e6 / double(receivers.count()) * raw_seconds(2, receivers, sets, [&](Vec3 o, const float* x, const float* y, const float* z, size_t n) {
-      return packets<true>(raw.scene, o, x, y, z, n);
-    });
+    const double raw_each =
+        1e6 / double(receivers.count()) *
+        raw_seconds(2, receivers, sets, [&](Vec3 o, const float* x, const float* y, const float* z, size_t n) {
+          return packets<true>(raw.scene, o, x, y, z, n);
+        });
     if (first == 0) first = each, first_raw = raw_each;
     report("bake_scaling", each, first, "us a receiver", "the smallest of these scenes",
-           {{"receivers", receivers.count()}, {"triangles", scene.triangles.size()}, {"samples", options.samples}, {"bounces", options.bounces},
-            {"operator_kept", r.operator_kept}, {"raw_us", raw_each}, {"raw_growth", raw_each / first_raw},
-            {"trace_us", 1e6 * r.trace_seconds / double(receivers.count())}, {"bounce_us", 1e6 * r.bounce_seconds / double(receivers.count())},
-            {"operator_bytes_per_receiver", double(r.operator_bytes) / double(receivers.count())}, {"aim", "<= 1.3"}});
+           {{"receivers", receivers.count()},
+            {"triangles", scene.triangles.size()},
+            {"samples", options.samples},
+            {"bounces", options.bounces},
+            {"operator_kept", r.operator_kept},
+            {"raw_us", raw_each},
+            {"raw_growth", raw_each / first_raw},
+            {"trace_us", 1e6 * r.trace_seconds / double(receivers.count())},
+            {"bounce_us", 1e6 * r.bounce_seconds / double(receivers.count())},
+            {"operator_bytes_per_receiver", double(r.operator_bytes) / double(receivers.count())},
+            {"aim", "<= 1.3"}});
   }
 }
 

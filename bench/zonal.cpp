@@ -1,5 +1,5 @@
-// Zonal lobes (local-deformable-prt): how close they come, how long the fit takes, and how fast they shade. Figures of the paper and
-// of an earlier prototype stand beside ours as "limit". Not measured here: baking, posing.
+// Zonal lobes (local-deformable-prt): how close they come, how long the fit takes, and how fast they shade. Figures of
+// the paper and of an earlier prototype stand beside ours as "limit". Not measured here: baking, posing.
 #include "embree.h"
 
 #include <lambent/bake/bake.h>
@@ -49,9 +49,14 @@ void random_case() {
     auto fit = fit_zonal(signals, {.lobes = lobes, .retry = 0, .ridge = 1e-11f, .precision = Precision::single}, &r);
     if (!fit) return;
     std::sort(r.errors.begin(), r.errors.end());
-    nlohmann::json more{{"lobes", lobes}, {"signals", 1000}, {"p90", r.errors[900]}, {"worst", r.errors.back()}, {"seconds", r.seconds}};
+    nlohmann::json more{{"lobes", lobes},
+                        {"signals", 1000},
+                        {"p90", r.errors[900]},
+                        {"worst", r.errors.back()},
+                        {"seconds", r.seconds}};
     if (lobes == 6) more["paper"] = 0.00908;
-    report("zonal_random", r.errors[500], prototype[lobes - 1], "relative RMS, median", "a prototype's median (six starts)", more);
+    report("zonal_random", r.errors[500], prototype[lobes - 1], "relative RMS, median",
+           "a prototype's median (six starts)", more);
   }
 }
 
@@ -70,9 +75,17 @@ void mesh_case(const std::string& name) {
     auto fit = fit_zonal(*t, {.lobes = lobes}, &r);
     if (!fit) return;
     std::sort(r.errors.begin(), r.errors.end());
-    report("zonal_mesh", r.rms, lobes == 3 ? 0.045 : r.rms, "relative RMS", lobes == 3 ? "the paper, its Fig. 3" : "itself (the paper prints no number)",
-           {{"scene", name}, {"lobes", lobes}, {"receivers", t->receivers}, {"channels", t->channels}, {"median", r.errors[r.errors.size() / 2]},
-            {"worst", r.errors.back()}, {"seconds", r.seconds}, {"retried", r.retried}, {"bytes_per_receiver", double(fit->bytes()) / double(t->receivers)}});
+    report("zonal_mesh", r.rms, lobes == 3 ? 0.045 : r.rms, "relative RMS",
+           lobes == 3 ? "the paper, its Fig. 3" : "itself (the paper prints no number)",
+           {{"scene", name},
+            {"lobes", lobes},
+            {"receivers", t->receivers},
+            {"channels", t->channels},
+            {"median", r.errors[r.errors.size() / 2]},
+            {"worst", r.errors.back()},
+            {"seconds", r.seconds},
+            {"retried", r.retried},
+            {"bytes_per_receiver", double(fit->bytes()) / double(t->receivers)}});
   }
   double each = 0;
   for (size_t count : {size_t{17575}, 2 * size_t{17575}, 4 * size_t{17575}}) {
@@ -81,9 +94,11 @@ void mesh_case(const std::string& name) {
     (void)fit_zonal(part, {}, &r);
     if (each == 0) {
       each = r.seconds / double(count);
-      report("zonal_fit_17575", r.seconds, 10, "s", "the aim, for 4 lobes (the paper: up to 30 minutes)", {{"scene", name}, {"rms", r.rms}, {"aim", "<= 1"}});
+      report("zonal_fit_17575", r.seconds, 10, "s", "the aim, for 4 lobes (the paper: up to 30 minutes)",
+             {{"scene", name}, {"rms", r.rms}, {"aim", "<= 1"}});
     } else {
-      report("zonal_fit_growth", r.seconds / double(count), each, "s a receiver", "17,575 receivers", {{"scene", name}, {"receivers", count}, {"aim", "<= 1.1"}});
+      report("zonal_fit_growth", r.seconds / double(count), each, "s a receiver", "17,575 receivers",
+             {{"scene", name}, {"receivers", count}, {"aim", "<= 1.1"}});
     }
   }
 }
@@ -114,10 +129,12 @@ void shading_case() {
 
   ZonalLight table;
   const double build = least_seconds(50, [&] { specialise_light(z, light, table); });
-  report("zonal_table", 1 / build, 20000, "a second", "the aim (the paper's graphics card: 1,430)", {{"texels", ZonalLight::width * ZonalLight::height}, {"aim", ">= 1"}});
+  report("zonal_table", 1 / build, 20000, "a second", "the aim (the paper's graphics card: 1,430)",
+         {{"texels", ZonalLight::width * ZonalLight::height}, {"aim", ">= 1"}});
 
   std::vector<Mat3> rotations;
-  for (size_t r = 0; r < receivers; ++r) rotations.push_back(rotation_from_yaw_pitch_roll({float(r % 360), float(r % 90), float(r % 77)}));
+  for (size_t r = 0; r < receivers; ++r)
+    rotations.push_back(rotation_from_yaw_pitch_roll({float(r % 360), float(r % 90), float(r % 77)}));
   const ReceiverFrames frames = make_receiver_frames(rotations);
   Relit out;
   const double specialised = least_seconds(9, [&] { relight_zonal(z, &frames, table, out); });
@@ -129,17 +146,18 @@ void shading_case() {
   for (size_t r = 0; r < 20'000; ++r) rows.push_back(load_receiver(z, r));
   Vec3 sum(0.0f);
   const double plain_direct = double(receivers) / double(rows.size()) * least_seconds(3, [&] {
-    float y[sh_count(order)];
-    for (size_t r = 0; r < rows.size(); ++r) {
-      const std::vector<float>& v = rows[r];
-      for (int i = 0; i < z.lobes; ++i) {
-        evaluate_sh(order, glm::normalize(rotations[r] * lobe_axis(z, v, i)), y);
-        const float* g = v.data() + z.exact_values() + size_t(i) * z.lobe_values() + 3;
-        for (int l = z.exact_bands(); l < order; ++l)
-          for (int k = l * l; k < (l + 1) * (l + 1); ++k) sum += (g[l - z.exact_bands()] * y[k]) * light[size_t(k)];
-      }
-    }
-  });
+                                float y[sh_count(order)];
+                                for (size_t r = 0; r < rows.size(); ++r) {
+                                  const std::vector<float>& v = rows[r];
+                                  for (int i = 0; i < z.lobes; ++i) {
+                                    evaluate_sh(order, glm::normalize(rotations[r] * lobe_axis(z, v, i)), y);
+                                    const float* g = v.data() + z.exact_values() + size_t(i) * z.lobe_values() + 3;
+                                    for (int l = z.exact_bands(); l < order; ++l)
+                                      for (int k = l * l; k < (l + 1) * (l + 1); ++k)
+                                        sum += (g[l - z.exact_bands()] * y[k]) * light[size_t(k)];
+                                  }
+                                }
+                              });
   const Transfer harmonics = first_receivers(random_signals(1000), receivers);
   const float* values = reinterpret_cast<const float*>(harmonics.data.data());
   const double plain_dot = least_seconds(5, [&] {
@@ -161,11 +179,12 @@ void shading_case() {
   line("zonal_shade_turned", specialised, plain_direct, "equation 13 in plain code", "<= 0.2");
   line("zonal_shade_turned_vs_simd", specialised, direct, "equation 13, 16 receivers side by side", "<= 1");
   line("zonal_shade_still", still, plain_dot, "the plain dot product of 36 coefficients", "<= 1");
-  line("zonal_shade_still_vs_simd", still, streamed, "relight(): the same, 16 receivers side by side, from memory", "-");
+  line("zonal_shade_still_vs_simd", still, streamed, "relight(): the same, 16 receivers side by side, from memory",
+       "-");
 }
 
-// The paper's Fig. 4: Cook and Torrance's BRDF of roughness 0.3 under light of order 4. Errors are of radiance in eight directions about each
-// receiver's normal, under a light whose bands fall off, relative to what all rows give.
+// The paper's Fig. 4: Cook and Torrance's BRDF of roughness 0.3 under light of order 4. Errors are of radiance in eight
+// directions about each receiver's normal, under a light whose bands fall off, relative to what all rows give.
 void glossy_case(const std::string& name) {
   auto scene = data_scene(name, false);
   if (!scene) return;
@@ -177,12 +196,14 @@ void glossy_case(const std::string& name) {
   materials.materials = {{metal, metal}}, materials.of_receiver.assign(receivers.count(), 0);
   for (const Vec3& n : receivers.normals) materials.frames.push_back(frame_about(n));
   auto bake_rows = [&](OutgoingKind kind, int rows) {
-    return bake_matrix(*scene, *tracer, receivers, materials, {.order = 4, .samples = 256, .bounces = 0, .precision = Precision::single},
+    return bake_matrix(*scene, *tracer, receivers, materials,
+                       {.order = 4, .samples = 256, .bounces = 0, .precision = Precision::single},
                        {.outgoing = kind, .svd_rows = rows, .grid = 32});
   };
   std::vector<Vec3> light;
   Random random(9);
-  for (int k = 0; k < sh_count(4); ++k) light.push_back((Vec3(random.next(), random.next(), random.next()) - 0.5f) / float(1 + sh_band(k)));
+  for (int k = 0; k < sh_count(4); ++k)
+    light.push_back((Vec3(random.next(), random.next(), random.next()) - 0.5f) / float(1 + sh_band(k)));
   light[0] = Vec3(2.0f);
   using Radiance = std::vector<Vec3>;
   auto radiance = [&](const Outgoing& o, const Relit& relit) {
@@ -198,7 +219,8 @@ void glossy_case(const std::string& name) {
   };
   auto error = [](const Radiance& a, const Radiance& b, const Radiance& whole) {
     double sum = 0, total = 0;
-    for (size_t i = 0; i < a.size(); ++i) sum += glm::dot(a[i] - b[i], a[i] - b[i]), total += glm::dot(whole[i], whole[i]);
+    for (size_t i = 0; i < a.size(); ++i)
+      sum += glm::dot(a[i] - b[i], a[i] - b[i]), total += glm::dot(whole[i], whole[i]);
     return std::sqrt(sum / total);
   };
   auto map = bake_rows(OutgoingKind::map, 1);
@@ -217,21 +239,30 @@ void glossy_case(const std::string& name) {
       auto z = fit_zonal(svd->transfer, {.lobes = lobes, .row_weights = row_weights(svd->outgoing)}, &fit);
       if (!z) return;
       relight_zonal(*z, nullptr, light, relit);
-      report("zonal_glossy", error(radiance(svd->outgoing, relit), of_rows, truth), of_svd, "relative RMS, of the lobes", "relative RMS, of the rows",
-             {{"scene", name}, {"rows", rows}, {"lobes", lobes}, {"receivers", receivers.count()}, {"fit", fit.rms}, {"seconds", fit.seconds},
-              {"bytes_per_receiver", double(z->bytes()) / double(receivers.count())}, {"aim", "<= 1"}});
+      report("zonal_glossy", error(radiance(svd->outgoing, relit), of_rows, truth), of_svd,
+             "relative RMS, of the lobes", "relative RMS, of the rows",
+             {{"scene", name},
+              {"rows", rows},
+              {"lobes", lobes},
+              {"receivers", receivers.count()},
+              {"fit", fit.rms},
+              {"seconds", fit.seconds},
+              {"bytes_per_receiver", double(z->bytes()) / double(receivers.count())},
+              {"aim", "<= 1"}});
     }
   }
 }
 
-// A patch of 128 x 128 texels and some 5,000 rays each, rounded hills, with the default bounces; against closest hits on the same rays.
+// A patch of 128 x 128 texels and some 5,000 rays each, rounded hills, with the default bounces; against closest hits
+// on the same rays.
 void patch_case() {
   constexpr int size = 128, samples = 5120, runs = 3;
   HeightField field{size, {}};
   for (int j = 0; j < size; ++j)
     for (int i = 0; i < size; ++i) {
       const float u = 2 * pi * float(i) / size, v = 2 * pi * float(j) / size;
-      field.heights.push_back(0.04f * (std::sin(3 * u + std::sin(2 * v)) + std::sin(4 * v - std::cos(u)) + 0.4f * std::sin(9 * u + 7 * v)));
+      field.heights.push_back(
+          0.04f * (std::sin(3 * u + std::sin(2 * v)) + std::sin(4 * v - std::cos(u)) + 0.4f * std::sin(9 * u + 7 * v)));
     }
   const PatchScene patch = make_patch(field, Vec3(0.5f));
   auto tracer = Tracer::build(patch.scene);
@@ -239,15 +270,26 @@ void patch_case() {
   const RawScene raw(patch.scene);
   const DirectionSets sets = make_direction_sets(order, samples, 8, 1);
   auto time = [&](auto f) {
-    return raw_seconds(runs, patch.receivers, sets, [&](Vec3 o, const float* x, const float* y, const float* z, size_t n) { return f(raw.scene, o, x, y, z, n); });
+    return raw_seconds(
+        runs, patch.receivers, sets,
+        [&](Vec3 o, const float* x, const float* y, const float* z, size_t n) { return f(raw.scene, o, x, y, z, n); });
   };
   const double stream = time(closest_stream), packet = time(packets<true>), limit = std::min(stream, packet);
   const double rays = double(patch.receivers.count()) * samples / 1e6;
   for (int bounces : {0, 3}) {
     BakeReport r;
-    const double seconds = least_seconds(runs, [&] { (void)bake(patch.scene, *tracer, patch.receivers, {.order = order, .samples = samples, .bounces = bounces, .precision = Precision::single}, &r); });
+    const double seconds = least_seconds(runs, [&] {
+      (void)bake(patch.scene, *tracer, patch.receivers,
+                 {.order = order, .samples = samples, .bounces = bounces, .precision = Precision::single}, &r);
+    });
     report("zonal_patch_simulation", rays / seconds, rays / limit, "Mrays/s", "best raw Embree closest hits, same rays",
-           {{"texels", size * size}, {"samples", samples}, {"bounces", bounces}, {"seconds", seconds}, {"raw_stream", rays / stream}, {"raw_packets", rays / packet}, {"aim", ">= 0.6"}});
+           {{"texels", size * size},
+            {"samples", samples},
+            {"bounces", bounces},
+            {"seconds", seconds},
+            {"raw_stream", rays / stream},
+            {"raw_packets", rays / packet},
+            {"aim", ">= 0.6"}});
   }
 }
 

@@ -29,7 +29,8 @@ extern "C" int LLVMFuzzerTestOneInput(const uint8_t* data, size_t size) {
   }
   std::vector<lambent::Vec3> light(lambent::light_of(*baked).count(), lambent::Vec3(0.5f));
   if (light.size() <= 24) {  // the dual functions of many take long
-    const auto env = lambent::make_environment("fuzz", 64, 32, [](lambent::Vec3 d) { return lambent::Vec3(1, 1 + d.x, 1 + d.y); });
+    const auto env =
+        lambent::make_environment("fuzz", 64, 32, [](lambent::Vec3 d) { return lambent::Vec3(1, 1 + d.x, 1 + d.y); });
     light = lambent::project_light(env, lambent::light_of(*baked)).light;
   }
   lambent::Relit relit;
@@ -46,7 +47,8 @@ extern "C" int LLVMFuzzerTestOneInput(const uint8_t* data, size_t size) {
     lambent::relight(baked->transfer, light, relit);
   }
   float sum = 0;
-  if (const auto& v = baked->view) sum += lambent::pixels_image(relit, v->coverage, v->camera, v->width, v->height, nullptr).rgb[0].x;
+  if (const auto& v = baked->view)
+    sum += lambent::pixels_image(relit, v->coverage, v->camera, v->width, v->height, nullptr).rgb[0].x;
   for (const auto* map : {&baked->front, &baked->back})
     for (uint32_t r : *map)
       if (r != lambent::none) {
@@ -56,14 +58,16 @@ extern "C" int LLVMFuzzerTestOneInput(const uint8_t* data, size_t size) {
         lambent::evaluate_outgoing(*baked->outgoing, r, lambent::Vec3(0.6f, 0, 0.8f), weights);
         sum += lambent::reflect_rows(weights, lambent::Vec3(1), [&](size_t row) { return relit.at(r, int(row)); }).x;
       }
-  std::visit([&](const auto& basis) {
-    for (uint32_t t = 0; t < baked->scene.triangles.size(); ++t)
-      for (bool front : {true, false})
-        if (const auto* at = basis.find(t, front))
-          basis.spread(*at, 0.3f, 0.6f, [&](uint32_t receiver, float weight) {
-            for (int row = 0; row < relit.rows; ++row) sum += weight * relit.at(receiver, row).x;
-          });
-  }, baked->basis);
+  std::visit(
+      [&](const auto& basis) {
+        for (uint32_t t = 0; t < baked->scene.triangles.size(); ++t)
+          for (bool front : {true, false})
+            if (const auto* at = basis.find(t, front))
+              basis.spread(*at, 0.3f, 0.6f, [&](uint32_t receiver, float weight) {
+                for (int row = 0; row < relit.rows; ++row) sum += weight * relit.at(receiver, row).x;
+              });
+      },
+      baked->basis);
   if (baked->lattice) {
     const lambent::Lattice& l = baked->lattice->lattice;
     lambent::relight(baked->lattice->transfer, light, relit);

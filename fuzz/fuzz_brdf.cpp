@@ -1,5 +1,5 @@
-// Any bytes given as measured reflection, and as the text of a model, end in an error of one line or in values that are finite, not
-// negative and reciprocal.
+// Any bytes given as measured reflection, and as the text of a model, end in an error of one line or in values that are
+// finite, not negative and reciprocal.
 #include <lambent/brdf/load_measured.h>
 #include <lambent/brdf/parse_brdf.h>
 #include <lambent/core/check.h>
@@ -27,7 +27,8 @@ void check_error(const Error& error) {
 }  // namespace
 
 extern "C" int LLVMFuzzerTestOneInput(const uint8_t* data, size_t size) {
-  if (auto table = load_measured({data, size}, "fuzz.brdf")) check_brdf(Measured{std::make_shared<const MeasuredTable>(std::move(*table))});
+  if (auto table = load_measured({data, size}, "fuzz.brdf"))
+    check_brdf(Measured{std::make_shared<const MeasuredTable>(std::move(*table))});
   else check_error(table.error());
   const std::string_view text(reinterpret_cast<const char*>(data), size);
   if (text.starts_with("measured")) return 0;  // names files

@@ -15,7 +15,8 @@ extern "C" int LLVMFuzzerTestOneInput(const uint8_t* data, size_t size) {
   Environment env = environment_from_image("fuzz", std::move(*image));
   EnvironmentSampler sampler = make_environment_sampler(env);
   EnvironmentSample sample = sample_environment(sampler, {0.3f, 0.7f});
-  if (!is_finite(sample.direction) || !is_finite(sample.radiance) || !is_finite(radiance_bilinear(env, sample.direction)))
+  if (!is_finite(sample.direction) || !is_finite(sample.radiance) ||
+      !is_finite(radiance_bilinear(env, sample.direction)))
     std::abort();
   return 0;
 }

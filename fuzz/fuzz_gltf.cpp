@@ -25,7 +25,8 @@ extern "C" int LLVMFuzzerTestOneInput(const uint8_t* data, size_t size) {
       LAMBENT_CHECK(!pose.error().message.empty());
       continue;
     }
-    LAMBENT_CHECK(pose->positions.size() == scene->positions.size() && pose->rotations.size() == scene->positions.size());
+    LAMBENT_CHECK(pose->positions.size() == scene->positions.size() &&
+                  pose->rotations.size() == scene->positions.size());
     for (Vec3 n : pose->normals) LAMBENT_CHECK(glm::dot(n, n) > 0.99f && glm::dot(n, n) < 1.01f);
   }
   return 0;

@@ -7,9 +7,10 @@
 
 namespace lambent::test {
 
-// Fails where the counts of independent draws are unlikely under the expectations. Cells of which fewer than 5 are expected are taken
-// together, for the statistic is chi-square only where counts are nearly normal. For k degrees of freedom it has mean k and variance
-// 2 k; six standard deviations are passed by chance less than once in a million runs, and draws are keyed anyway.
+// Fails where the counts of independent draws are unlikely under the expectations. Cells of which fewer than 5 are
+// expected are taken together, for the statistic is chi-square only where counts are nearly normal. For k degrees of
+// freedom it has mean k and variance 2 k; six standard deviations are passed by chance less than once in a million
+// runs, and draws are keyed anyway.
 inline void expect_chi_square(std::span<const double> counts, std::span<const double> expected) {
   constexpr double least = 5, sigmas = 6;
   ASSERT_EQ(counts.size(), expected.size());

@@ -6,8 +6,8 @@
 
 namespace lambent::test {
 
-// An estimate may lie this many of its own standard deviations from the truth: by chance once in 5e8 for one number, so about
-// once in 1e5 for a whole small picture; and the seeds are fixed.
+// An estimate may lie this many of its own standard deviations from the truth: by chance once in 5e8 for one number, so
+// about once in 1e5 for a whole small picture; and the seeds are fixed.
 inline constexpr float sigmas = 6.0f;
 
 inline Environment uniform_environment(float L) {
@@ -17,7 +17,8 @@ inline Environment uniform_environment(float L) {
 // Bright on one side, no symmetry, never zero.
 inline Environment skewed_environment() {
   return make_environment("skewed", 32, 16, [](Vec3 d) {
-    return Vec3(0.3f) + 3.0f * std::exp(4 * (glm::dot(d, glm::normalize(Vec3(1, 2, -0.5f))) - 1)) * Vec3(1, 0.8f, 0.5f) +
+    return Vec3(0.3f) +
+           3.0f * std::exp(4 * (glm::dot(d, glm::normalize(Vec3(1, 2, -0.5f))) - 1)) * Vec3(1, 0.8f, 0.5f) +
            0.2f * std::max(0.0f, d.z) * Vec3(0.2f, 0.4f, 1);
   });
 }
@@ -39,8 +40,10 @@ inline void expect_same(const ReferenceImage& a, const ReferenceImage& b) {
   glm::dvec3 difference(0), variance(0);
   for (size_t i = 0; i < a.image.rgb.size(); ++i)
     for (int c = 0; c < 3; ++c) {
-      double d = double(a.image.rgb[i][c]) - double(b.image.rgb[i][c]), v = double(a.variance[i][c]) + double(b.variance[i][c]);
-      EXPECT_LE(std::abs(d), sigmas * std::sqrt(v) + 1e-6) << "pixel " << i;  // 1e-6: pixels without noise round differently
+      double d = double(a.image.rgb[i][c]) - double(b.image.rgb[i][c]),
+             v = double(a.variance[i][c]) + double(b.variance[i][c]);
+      EXPECT_LE(std::abs(d), sigmas * std::sqrt(v) + 1e-6)
+          << "pixel " << i;  // 1e-6: pixels without noise round differently
       difference[c] += d, variance[c] += v;
     }
   // Three numbers: 4 sigmas are rare enough.

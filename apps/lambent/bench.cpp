@@ -67,25 +67,35 @@ int run_solvers(Context& context, const SolversCommand& o) {
   if (!op) return fail(op.error());
 
   nlohmann::json all = nlohmann::json::array();
-  std::string table = fmt::format("{:14}{:>16}{:>10}{:>16}\n", "solver", fmt::format("to {:g}", o.tolerance), "seconds", fmt::format("to {:g}", o.fine));
+  std::string table = fmt::format("{:14}{:>16}{:>10}{:>16}\n", "solver", fmt::format("to {:g}", o.tolerance), "seconds",
+                                  fmt::format("to {:g}", o.fine));
   for (const auto& [name, solver] : solver_names) {
     SolveReport report, fine;
     const auto start = std::chrono::steady_clock::now();
-    if (auto x = solve(*op, e.data(), width, {solver, o.tolerance, o.most}, &report, &context.progress); !x) return fail(x.error());
+    if (auto x = solve(*op, e.data(), width, {solver, o.tolerance, o.most}, &report, &context.progress); !x)
+      return fail(x.error());
     const double seconds = std::chrono::duration<double>(std::chrono::steady_clock::now() - start).count();
-    if (auto x = solve(*op, e.data(), width, {solver, o.fine, o.most}, &fine, &context.progress); !x) return fail(x.error());
+    if (auto x = solve(*op, e.data(), width, {solver, o.fine, o.most}, &fine, &context.progress); !x)
+      return fail(x.error());
     const auto coarse_count = applications_to(report, o.tolerance), fine_count = applications_to(fine, o.fine);
     nlohmann::json one = convergence(fine);
     one["solver"] = name, one["converged"] = report.converged, one["seconds"] = seconds;
     one["applications"] = coarse_count ? nlohmann::json(*coarse_count) : nlohmann::json();
     all.push_back(one);
-    auto shown = [](const std::optional<double>& n) { return n ? fmt::format("{:.1f}", *n) : std::string("not reached"); };
+    auto shown = [](const std::optional<double>& n) {
+      return n ? fmt::format("{:.1f}", *n) : std::string("not reached");
+    };
     table += fmt::format("{:14}{:>16}{:>10.3f}{:>16}\n", name, shown(coarse_count), seconds, shown(fine_count));
   }
   if (context.json)
-    print_json({{"scene", o.scene.path.empty() ? "closed room" : o.scene.path}, {"receivers", receivers.count()}, {"samples", o.samples}, {"tolerance", o.tolerance}, {"solvers", all}});
+    print_json({{"scene", o.scene.path.empty() ? "closed room" : o.scene.path},
+                {"receivers", receivers.count()},
+                {"samples", o.samples},
+                {"tolerance", o.tolerance},
+                {"solvers", all}});
   else
-    fmt::print("{} receivers, {} rays each; applications of the operator until the residual is reached\n{}", receivers.count(), o.samples, table);
+    fmt::print("{} receivers, {} rays each; applications of the operator until the residual is reached\n{}",
+               receivers.count(), o.samples, table);
   return success;
 }
 
@@ -97,15 +107,26 @@ void add_bench(CLI::App& app, Run& run) {
   bench->require_subcommand(1);
   CLI::App* c = bench->add_subcommand("solvers", "The scene's radiosity by every solver: residual against work");
   o->scene.add_to(*c);
-  c->get_option("scene")->required(false)->description("Scene: .gltf, .glb, .obj or .ply; a closed room of albedo 0.8 if there is none");
+  c->get_option("scene")->required(false)->description(
+      "Scene: .gltf, .glb, .obj or .ply; a closed room of albedo 0.8 if there is none");
   o->receivers.add_to(*c);
   c->add_option("--sky", o->sky, "An environment (as --env of render) as one more lamp");
   c->add_option("--samples", o->samples, "Rays a receiver")->check(CLI::Range(1, 1 << 20))->capture_default_str();
-  c->add_option("--lamp-samples", o->lamp_samples, "Samples a receiver towards the lamps")->check(CLI::Range(1, 1 << 16))->capture_default_str();
-  c->add_option("--residual", o->tolerance, "Of the solution that is timed")->check(CLI::Range(1e-7, 0.5))->capture_default_str();
-  c->add_option("--plot-residual", o->fine, "How far the steps go")->check(CLI::Range(1e-7, 0.5))->capture_default_str();
-  c->add_option("--most", o->most, "Applications of the operator at most")->check(CLI::Range(1, 10000))->capture_default_str();
-  c->add_option("--memory", o->memory, "Working memory for the operator; e.g. 500MB, 2GiB")->transform(CLI::AsSizeValue(false))->default_str("4GiB");
+  c->add_option("--lamp-samples", o->lamp_samples, "Samples a receiver towards the lamps")
+      ->check(CLI::Range(1, 1 << 16))
+      ->capture_default_str();
+  c->add_option("--residual", o->tolerance, "Of the solution that is timed")
+      ->check(CLI::Range(1e-7, 0.5))
+      ->capture_default_str();
+  c->add_option("--plot-residual", o->fine, "How far the steps go")
+      ->check(CLI::Range(1e-7, 0.5))
+      ->capture_default_str();
+  c->add_option("--most", o->most, "Applications of the operator at most")
+      ->check(CLI::Range(1, 10000))
+      ->capture_default_str();
+  c->add_option("--memory", o->memory, "Working memory for the operator; e.g. 500MB, 2GiB")
+      ->transform(CLI::AsSizeValue(false))
+      ->default_str("4GiB");
   c->add_option("--seed", o->seed, "Of the ray directions")->capture_default_str();
   c->callback([o, &run] { run = [o](Context& context) { return run_solvers(context, *o); }; });
 }

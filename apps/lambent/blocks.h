@@ -13,7 +13,8 @@ struct BlocksFlags {
   std::string visibility = "binary";  // or bits:N
   std::vector<CLI::Option*> add_to(CLI::App& command);
 };
-int run_blocks_bake(Context& context, const SceneOptions& scene, const BlocksFlags& flags, size_t memory, const std::string& output);
+int run_blocks_bake(Context& context, const SceneOptions& scene, const BlocksFlags& flags, size_t memory,
+                    const std::string& output);
 
 // How visibility in blocks is shaded.
 struct ProductFlags {
@@ -23,7 +24,7 @@ struct ProductFlags {
   std::string indirect = "none";
   std::vector<CLI::Option*> add_to(CLI::App& command);
 };
-int run_product_render(Context& context, const Baked& baked, const ProductFlags& flags, const LightOptions& light, const ViewOptions& view,
-                       const BrdfOptions& brdf, int samples);
+int run_product_render(Context& context, const Baked& baked, const ProductFlags& flags, const LightOptions& light,
+                       const ViewOptions& view, const BrdfOptions& brdf, int samples);
 
 }  // namespace lambent::tool

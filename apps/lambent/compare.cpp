@@ -23,17 +23,28 @@ int run_compare(Context& context, const CompareCommand& o) {
   if (!b) return fail(b.error());
   auto d = compare_images(*a, *b, o.exposure);
   if (!d) return fail(d.error());
-  if (o.mean && a->alpha.size() != b->alpha.size()) return fail({o.b, "--mean needs both pictures with alpha, or both without"});
+  if (o.mean && a->alpha.size() != b->alpha.size())
+    return fail({o.b, "--mean needs both pictures with alpha, or both without"});
   if (!o.output.empty())
-    if (auto ok = save_image(o.output, o.mean ? mean_of(*a, *b) : difference_picture(*a, *b, o.exposure), o.mean ? o.exposure : 0); !ok) return fail(ok.error());
+    if (auto ok = save_image(o.output, o.mean ? mean_of(*a, *b) : difference_picture(*a, *b, o.exposure),
+                             o.mean ? o.exposure : 0);
+        !ok)
+      return fail(ok.error());
   if (context.json) {
-    print_json({{"a", o.a}, {"b", o.b}, {"pixels", d->pixels}, {"rmse", d->rmse}, {"relative_mse", d->relative_mse},
-                {"psnr", std::isfinite(d->psnr) ? nlohmann::json(d->psnr) : nlohmann::json()}, {"flip", d->flip},
-                {"mean_a", d->mean_a}, {"mean_b", d->mean_b}});
+    print_json({{"a", o.a},
+                {"b", o.b},
+                {"pixels", d->pixels},
+                {"rmse", d->rmse},
+                {"relative_mse", d->relative_mse},
+                {"psnr", std::isfinite(d->psnr) ? nlohmann::json(d->psnr) : nlohmann::json()},
+                {"flip", d->flip},
+                {"mean_a", d->mean_a},
+                {"mean_b", d->mean_b}});
   } else {
-    fmt::print("{} pixels\n  RMSE          {:.5f}\n  relative MSE  {:.3g}\n  PSNR          {:.2f} dB\n  FLIP          {:.4f}\n"
-               "  mean          {:.5f} against {:.5f}\n",
-               human_count(d->pixels), d->rmse, d->relative_mse, d->psnr, d->flip, d->mean_a, d->mean_b);
+    fmt::print(
+        "{} pixels\n  RMSE          {:.5f}\n  relative MSE  {:.3g}\n  PSNR          {:.2f} dB\n  FLIP          {:.4f}\n"
+        "  mean          {:.5f} against {:.5f}\n",
+        human_count(d->pixels), d->rmse, d->relative_mse, d->psnr, d->flip, d->mean_a, d->mean_b);
     if (!o.output.empty()) fmt::print("{}\n", o.output);
   }
   return success;
@@ -47,8 +58,10 @@ void add_compare(CLI::App& app, Run& run) {
   c->add_option("a", o->a, "Picture")->required();
   c->add_option("b", o->b, "Reference picture")->required();
   c->add_option("-o,--output", o->output, "Picture to write: A, B and the false-colour difference");
-  c->add_flag("--mean", o->mean, "Write the mean of A and B instead: two references with different seeds make one of twice the paths");
-  c->add_option("--exposure", o->exposure, "Stops of exposure for PSNR, FLIP and the picture")->check(CLI::Range(-100.0f, 100.0f));
+  c->add_flag("--mean", o->mean,
+              "Write the mean of A and B instead: two references with different seeds make one of twice the paths");
+  c->add_option("--exposure", o->exposure, "Stops of exposure for PSNR, FLIP and the picture")
+      ->check(CLI::Range(-100.0f, 100.0f));
   c->callback([o, &run] { run = [o](Context& context) { return run_compare(context, *o); }; });
 }
 

@@ -21,7 +21,8 @@ struct CompressCommand {
 };
 
 // The relative error of each receiver's fit as a false colour on the mesh; `white` is the brightest.
-Result<Image> paint_errors(const Baked& baked, const std::vector<float>& errors, const CompressCommand& o, Progress* progress) {
+Result<Image> paint_errors(const Baked& baked, const std::vector<float>& errors, const CompressCommand& o,
+                           Progress* progress) {
   ViewOptions view_options;
   view_options.camera = o.camera, view_options.size = o.size;
   auto view = make_view(view_options, baked.scene);
@@ -32,11 +33,13 @@ Result<Image> paint_errors(const Baked& baked, const std::vector<float>& errors,
   relit.values.resize((errors.size() + transfer_block - 1) / transfer_block * 3 * transfer_block);
   for (size_t r = 0; r < errors.size(); ++r) {
     const Vec3 colour = false_color(errors[r] / o.white);
-    for (size_t c = 0; c < 3; ++c) relit.values[(r / transfer_block * 3 + c) * transfer_block + r % transfer_block] = colour[int(c)];
+    for (size_t c = 0; c < 3; ++c)
+      relit.values[(r / transfer_block * 3 + c) * transfer_block + r % transfer_block] = colour[int(c)];
   }
   RenderOptions options;
   options.width = view->width, options.height = view->height, options.show = RenderOptions::Show::radiosity;
-  auto image = render(baked.scene, *tracer, corner_receivers(baked.scene, baked.front, baked.back), relit, view->camera, options, progress);
+  auto image = render(baked.scene, *tracer, corner_receivers(baked.scene, baked.front, baked.back), relit, view->camera,
+                      options, progress);
   if (!image) return image;
   image->alpha.clear();
   draw_text(*image, 6, 6, fmt::format("white: {:.3g}%", 100 * o.white), Vec3(1.0f));
@@ -46,7 +49,8 @@ Result<Image> paint_errors(const Baked& baked, const std::vector<float>& errors,
 int compress_to_clusters(Context& context, const CompressCommand& o, const Baked& baked) {
   CpcaOptions options;
   if (auto ok = parse_cpca("cpca:" + o.cpca, options); !ok) return fail({"--cpca", ok.error().message});
-  if (baked.zonal || baked.cpca || baked.view || baked.factors) return fail({o.baked, "holds no plain transfer at receivers on surfaces, which is what clusters are made of"});
+  if (baked.zonal || baked.cpca || baked.view || baked.factors)
+    return fail({o.baked, "holds no plain transfer at receivers on surfaces, which is what clusters are made of"});
   double error = 0;
   const auto start = std::chrono::steady_clock::now();
   auto clusters = compress_cpca(baked.transfer, options, &error, &context.progress);
@@ -57,17 +61,29 @@ int compress_to_clusters(Context& context, const CompressCommand& o, const Baked
   provenance["cpca"] = {{"clusters", clusters->clusters}, {"rank", clusters->rank}, {"error", error}};
   Receivers receivers;
   receivers.front = baked.front, receivers.back = baked.back, receivers.basis = baked.basis;
-  const BakedExtras extras{.outgoing = baked.outgoing ? &*baked.outgoing : nullptr, .directional = baked.directional,
+  const BakedExtras extras{.outgoing = baked.outgoing ? &*baked.outgoing : nullptr,
+                           .directional = baked.directional,
                            .lattice = baked.lattice ? &*baked.lattice : nullptr};
-  if (auto ok = save_baked(o.output, baked.scene, receivers, *clusters, provenance.dump(), extras); !ok) return fail(ok.error());
-  const double n = double(clusters->receivers), bytes = double(clusters->bytes()), before = double(baked.transfer.bytes());
+  if (auto ok = save_baked(o.output, baked.scene, receivers, *clusters, provenance.dump(), extras); !ok)
+    return fail(ok.error());
+  const double n = double(clusters->receivers), bytes = double(clusters->bytes()),
+               before = double(baked.transfer.bytes());
   if (context.json)
-    print_json({{"output", o.output}, {"receivers", clusters->receivers}, {"clusters", clusters->clusters}, {"rank", clusters->rank}, {"error", error},
-                {"seconds", seconds}, {"bytes", bytes}, {"bytes_per_receiver", bytes / n}, {"bytes_per_receiver_before", before / n}});
+    print_json({{"output", o.output},
+                {"receivers", clusters->receivers},
+                {"clusters", clusters->clusters},
+                {"rank", clusters->rank},
+                {"error", error},
+                {"seconds", seconds},
+                {"bytes", bytes},
+                {"bytes_per_receiver", bytes / n},
+                {"bytes_per_receiver_before", before / n}});
   else
-    fmt::print("{}\n  error      {:.2f}% RMS of the transfer\n  time       {} for {} receivers\n  size       {} a receiver, {} before ({} clusters of rank {})\n",
-               o.output, 100 * error, human_seconds(seconds), human_count(clusters->receivers), human_bytes(bytes / n), human_bytes(before / n),
-               clusters->clusters, clusters->rank);
+    fmt::print(
+        "{}\n  error      {:.2f}% RMS of the transfer\n  time       {} for {} receivers\n  size       {} a receiver, "
+        "{} before ({} clusters of rank {})\n",
+        o.output, 100 * error, human_seconds(seconds), human_count(clusters->receivers), human_bytes(bytes / n),
+        human_bytes(before / n), clusters->clusters, clusters->rank);
   return success;
 }
 
@@ -80,7 +96,8 @@ int run_compress(Context& context, CompressCommand o) {
   if (!baked) return fail(baked.error());
   if (baked->visibility) return fail({o.baked, "holds no transfer to compress, but visibility in blocks"});
   if (!o.cpca.empty()) return compress_to_clusters(context, o, *baked);
-  if (baked->zonal || baked->cpca || baked->view || baked->factors || baked->directional != DirectionalKind::none || baked->front.empty())
+  if (baked->zonal || baked->cpca || baked->view || baked->factors || baked->directional != DirectionalKind::none ||
+      baked->front.empty())
     return fail({o.baked, "holds no transfer of spherical harmonics at vertices, which is what lobes are fitted to"});
   if (baked->lattice) warn(o.baked + ": light in free space is left out: lobes have none");
   ZonalFitReport report;
@@ -90,12 +107,13 @@ int run_compress(Context& context, CompressCommand o) {
 
   auto provenance = nlohmann::json::parse(baked->provenance, nullptr, false);
   if (!provenance.is_object()) provenance = nlohmann::json::object();
-  provenance["zonal"] = {{"lobes", fit->lobes}, {"starts", o.zonal.starts}, {"retry", o.zonal.retry}, {"ridge", o.zonal.ridge},
-                         {"seed", o.zonal.seed}, {"rms", report.rms}};
+  provenance["zonal"] = {{"lobes", fit->lobes},    {"starts", o.zonal.starts}, {"retry", o.zonal.retry},
+                         {"ridge", o.zonal.ridge}, {"seed", o.zonal.seed},     {"rms", report.rms}};
   Receivers receivers;
   receivers.front = baked->front, receivers.back = baked->back;
   const BakedExtras extras{.outgoing = baked->outgoing ? &*baked->outgoing : nullptr, .fit_errors = report.errors};
-  if (auto ok = save_baked(o.output, baked->scene, receivers, *fit, provenance.dump(), extras); !ok) return fail(ok.error());
+  if (auto ok = save_baked(o.output, baked->scene, receivers, *fit, provenance.dump(), extras); !ok)
+    return fail(ok.error());
   if (!o.error_picture.empty()) {
     auto image = paint_errors(*baked, report.errors, o, &context.progress);
     if (!image) return fail(image.error());
@@ -108,14 +126,28 @@ int run_compress(Context& context, CompressCommand o) {
   const double bytes = double(fit->receiver_values() * fit->value_bytes());
   const double before = double(baked->transfer.receiver_values() * baked->transfer.value_bytes());
   if (context.json)
-    print_json({{"output", o.output}, {"receivers", fit->receivers}, {"lobes", fit->lobes}, {"rows", fit->rows}, {"channels", fit->channels}, {"rms", report.rms},
-                {"median", median}, {"worst", worst}, {"seconds", report.seconds}, {"retried", report.retried}, {"bytes", fit->bytes()},
-                {"bytes_per_receiver", bytes}, {"bytes_per_receiver_before", before}});
+    print_json({{"output", o.output},
+                {"receivers", fit->receivers},
+                {"lobes", fit->lobes},
+                {"rows", fit->rows},
+                {"channels", fit->channels},
+                {"rms", report.rms},
+                {"median", median},
+                {"worst", worst},
+                {"seconds", report.seconds},
+                {"retried", report.retried},
+                {"bytes", fit->bytes()},
+                {"bytes_per_receiver", bytes},
+                {"bytes_per_receiver_before", before}});
   else
-    fmt::print("{}\n  error      {:.2f}% RMS of the transfer; receivers: median {:.2f}%, worst {:.1f}%\n  time       {} for {} receivers\n"
-               "  size       {} a receiver, {} before ({} lobes{}, order {}, {} channel{})\n",
-               o.output, 100 * report.rms, 100 * median, 100 * worst, human_seconds(report.seconds), human_count(fit->receivers), human_bytes(bytes),
-               human_bytes(before), fit->lobes, fit->rows > 1 ? fmt::format(" in each of {} rows", fit->rows) : "", fit->order, fit->channels, fit->channels == 1 ? "" : "s");
+    fmt::print(
+        "{}\n  error      {:.2f}% RMS of the transfer; receivers: median {:.2f}%, worst {:.1f}%\n  time       {} for "
+        "{} receivers\n"
+        "  size       {} a receiver, {} before ({} lobes{}, order {}, {} channel{})\n",
+        o.output, 100 * report.rms, 100 * median, 100 * worst, human_seconds(report.seconds),
+        human_count(fit->receivers), human_bytes(bytes), human_bytes(before), fit->lobes,
+        fit->rows > 1 ? fmt::format(" in each of {} rows", fit->rows) : "", fit->order, fit->channels,
+        fit->channels == 1 ? "" : "s");
   return success;
 }
 
@@ -123,20 +155,35 @@ int run_compress(Context& context, CompressCommand o) {
 
 void add_compress(CLI::App& app, Run& run) {
   auto o = std::make_shared<CompressCommand>();
-  CLI::App* c = app.add_subcommand("compress", "Store baked transfer in less: zonal lobes, which turn with a surface that moves, or clusters");
+  CLI::App* c = app.add_subcommand(
+      "compress", "Store baked transfer in less: zonal lobes, which turn with a surface that moves, or clusters");
   c->add_option("baked", o->baked, "Baked file, from `lambent bake`")->required();
-  auto* cpca = c->add_option("--cpca", o->cpca, "CLUSTERS,RANK: clusters of receivers with like transfer, each a mean and so many components");
-  auto* zonal = c->add_option("--zonal", o->zonal.lobes, "Lobes a receiver; of a matrix, a row")->check(CLI::Range(1, max_stored_lobes));
+  auto* cpca = c->add_option(
+      "--cpca", o->cpca, "CLUSTERS,RANK: clusters of receivers with like transfer, each a mean and so many components");
+  auto* zonal = c->add_option("--zonal", o->zonal.lobes, "Lobes a receiver; of a matrix, a row")
+                    ->check(CLI::Range(1, max_stored_lobes));
   c->add_option("-o,--output", o->output, "Baked file to write (.glb)")->required();
-  c->add_option("--starts", o->zonal.starts, "Searches from random axes where the error is high")->check(CLI::Range(0, 1000))->capture_default_str();
-  c->add_option("--retry", o->zonal.retry, "What error is high, relative")->check(CLI::Range(0.0f, 1.0f))->capture_default_str();
-  c->add_option("--ridge", o->zonal.ridge, "What squared coefficients count in the squared error")->check(CLI::Range(0.0f, 1.0f))->capture_default_str();
+  c->add_option("--starts", o->zonal.starts, "Searches from random axes where the error is high")
+      ->check(CLI::Range(0, 1000))
+      ->capture_default_str();
+  c->add_option("--retry", o->zonal.retry, "What error is high, relative")
+      ->check(CLI::Range(0.0f, 1.0f))
+      ->capture_default_str();
+  c->add_option("--ridge", o->zonal.ridge, "What squared coefficients count in the squared error")
+      ->check(CLI::Range(0.0f, 1.0f))
+      ->capture_default_str();
   c->add_option("--seed", o->zonal.seed, "Of the random axes")->capture_default_str();
-  c->add_option("--precision", o->precision, "Of the stored lobes")->check(CLI::IsMember({"half", "single"}))->capture_default_str();
-  auto* picture = c->add_option("--view-error", o->error_picture, "Picture of the fit's error on the mesh (.png or .exr)");
+  c->add_option("--precision", o->precision, "Of the stored lobes")
+      ->check(CLI::IsMember({"half", "single"}))
+      ->capture_default_str();
+  auto* picture =
+      c->add_option("--view-error", o->error_picture, "Picture of the fit's error on the mesh (.png or .exr)");
   c->add_option("--camera", o->camera, "For --view-error, as for render")->needs(picture)->capture_default_str();
   c->add_option("--size", o->size, "For --view-error, as for render")->needs(picture)->capture_default_str();
-  c->add_option("--white", o->white, "For --view-error: the relative error drawn white")->needs(picture)->check(CLI::PositiveNumber)->capture_default_str();
+  c->add_option("--white", o->white, "For --view-error: the relative error drawn white")
+      ->needs(picture)
+      ->check(CLI::PositiveNumber)
+      ->capture_default_str();
   cpca->excludes(zonal)->excludes(picture);
   c->callback([o, cpca, zonal, &run] {
     if (!cpca->count() && !zonal->count()) throw CLI::ValidationError("give --zonal LOBES or --cpca CLUSTERS,RANK");

@@ -42,10 +42,10 @@ struct Row {
   double relight_ms, reference_seconds;
 };
 
-// The mean of two independent pictures of half the paths each. Their distance from each other is twice the mean's distance from
-// the truth, 6 dB, so it tells the noise.
-Result<Image> trace_twice(const Scene& scene, const Environment& env, const Camera& camera, ReferenceOptions options, Progress& progress,
-                          float exposure, double* noise_psnr) {
+// The mean of two independent pictures of half the paths each. Their distance from each other is twice the mean's
+// distance from the truth, 6 dB, so it tells the noise.
+Result<Image> trace_twice(const Scene& scene, const Environment& env, const Camera& camera, ReferenceOptions options,
+                          Progress& progress, float exposure, double* noise_psnr) {
   options.spp = std::max(1, options.spp / 2);
   auto a = path_trace(scene, env, camera, options, &progress);
   if (!a) return a.error();
@@ -74,9 +74,12 @@ int run_demo(Context& context, const DemoCommand& o) {
   BakeReport report;
   auto transfer = bake(scene, *tracer, receivers, options, &report, &context.progress);
   if (!transfer) return fail(transfer.error());
-  const nlohmann::json provenance{{"generator", "lambent " LAMBENT_VERSION}, {"input", "courtyard (built in)"},
-                                  {"options", {{"order", options.order}, {"samples", options.samples}, {"bounces", options.bounces}}}};
-  if (auto ok = save_baked(at("courtyard.glb"), scene, receivers, *transfer, provenance.dump()); !ok) return fail(ok.error());
+  const nlohmann::json provenance{
+      {"generator", "lambent " LAMBENT_VERSION},
+      {"input", "courtyard (built in)"},
+      {"options", {{"order", options.order}, {"samples", options.samples}, {"bounces", options.bounces}}}};
+  if (auto ok = save_baked(at("courtyard.glb"), scene, receivers, *transfer, provenance.dump()); !ok)
+    return fail(ok.error());
 
   std::vector<Row> rows;
   std::vector<Image> relit_pictures;
@@ -97,14 +100,16 @@ int run_demo(Context& context, const DemoCommand& o) {
     auto picture = render(scene, *tracer, corners, relit, camera, view, &context.progress);
     if (!picture) return fail(picture.error());
     ReferenceOptions truth;
-    truth.width = o.width, truth.height = o.height, truth.spp = o.spp, truth.bounces = options.bounces, truth.background = false;
+    truth.width = o.width, truth.height = o.height, truth.spp = o.spp, truth.bounces = options.bounces,
+    truth.background = false;
     const auto traced = Clock::now();
     auto same_light = trace_twice(scene, smooth, camera, truth, context.progress, o.exposure, &row.noise_psnr);
     if (!same_light) return fail(same_light.error());
     row.reference_seconds = seconds_since(traced);
     auto full_light = trace_twice(scene, *env, camera, truth, context.progress, o.exposure, nullptr);
     if (!full_light) return fail(full_light.error());
-    auto d6 = compare_images(*picture, *same_light, o.exposure), dsky = compare_images(*picture, *full_light, o.exposure);
+    auto d6 = compare_images(*picture, *same_light, o.exposure),
+         dsky = compare_images(*picture, *full_light, o.exposure);
     if (!d6) return fail(d6.error());
     if (!dsky) return fail(dsky.error());
     row.order6 = *d6, row.sky = *dsky;
@@ -121,7 +126,8 @@ int run_demo(Context& context, const DemoCommand& o) {
         {"error_" + row.name, difference_picture(*picture, *same_light, o.exposure)}};
     for (const auto& [name, image] : files) {
       // Error maps are already pictures of displayed values.
-      if (auto ok = save_image(at(name + ".png"), image, name.starts_with("error") ? 0 : o.exposure); !ok) return fail(ok.error());
+      if (auto ok = save_image(at(name + ".png"), image, name.starts_with("error") ? 0 : o.exposure); !ok)
+        return fail(ok.error());
       if (name.starts_with("relit"))
         if (auto ok = save_image(at(name + ".exr"), image); !ok) return fail(ok.error());
     }
@@ -131,22 +137,35 @@ int run_demo(Context& context, const DemoCommand& o) {
   if (auto ok = save_image(at("courtyard.png"), beside(relit_pictures), o.exposure); !ok) return fail(ok.error());
 
   nlohmann::json json{{"scene", {{"vertices", scene.positions.size()}, {"triangles", scene.triangles.size()}}},
-                      {"bake", {{"receivers", report.receivers}, {"rays", report.rays}, {"trace_seconds", report.trace_seconds},
-                                {"bounce_seconds", report.bounce_seconds}, {"bytes_per_receiver", double(report.bytes) / double(report.receivers)},
-                                {"error", report.error}}},
+                      {"bake",
+                       {{"receivers", report.receivers},
+                        {"rays", report.rays},
+                        {"trace_seconds", report.trace_seconds},
+                        {"bounce_seconds", report.bounce_seconds},
+                        {"bytes_per_receiver", double(report.bytes) / double(report.receivers)},
+                        {"error", report.error}}},
                       {"rows", nlohmann::json::array()}};
   std::string table = fmt::format(
-      "Courtyard: {} vertices, {} receivers, {} rays; traced in {}, {} bounces in {}; {:.0f} bytes a receiver; estimated error {:.2f}%\n\n"
-      "| sky | relight, ms | against the reference under the same order-{} light: PSNR, dB | FLIP | noise of that reference alone, dB | against the full sky: PSNR, dB | FLIP | reference, s |\n"
+      "Courtyard: {} vertices, {} receivers, {} rays; traced in {}, {} bounces in {}; {:.0f} bytes a receiver; "
+      "estimated error {:.2f}%\n\n"
+      "| sky | relight, ms | against the reference under the same order-{} light: PSNR, dB | FLIP | noise of that "
+      "reference alone, dB | against the full sky: PSNR, dB | FLIP | reference, s |\n"
       "|---|---|---|---|---|---|---|---|\n",
-      human_count(scene.positions.size()), human_count(report.receivers), human_count(report.rays), human_seconds(report.trace_seconds),
-      options.bounces, human_seconds(report.bounce_seconds), double(report.bytes) / double(report.receivers), 100 * report.error, options.order);
+      human_count(scene.positions.size()), human_count(report.receivers), human_count(report.rays),
+      human_seconds(report.trace_seconds), options.bounces, human_seconds(report.bounce_seconds),
+      double(report.bytes) / double(report.receivers), 100 * report.error, options.order);
   for (const Row& r : rows) {
-    table += fmt::format("| {} | {:.2f} | {:.1f} | {:.3f} | {:.1f} | {:.1f} | {:.3f} | {:.1f} |\n", r.name, r.relight_ms, r.order6.psnr, r.order6.flip,
-                         r.noise_psnr,
-                         r.sky.psnr, r.sky.flip, r.reference_seconds);
-    json["rows"].push_back({{"sky", r.name}, {"relight_ms", r.relight_ms}, {"psnr", r.order6.psnr}, {"flip", r.order6.flip}, {"reference_noise_psnr", r.noise_psnr},
-                            {"psnr_full_sky", r.sky.psnr}, {"flip_full_sky", r.sky.flip}, {"reference_seconds", r.reference_seconds}});
+    table += fmt::format("| {} | {:.2f} | {:.1f} | {:.3f} | {:.1f} | {:.1f} | {:.3f} | {:.1f} |\n", r.name,
+                         r.relight_ms, r.order6.psnr, r.order6.flip, r.noise_psnr, r.sky.psnr, r.sky.flip,
+                         r.reference_seconds);
+    json["rows"].push_back({{"sky", r.name},
+                            {"relight_ms", r.relight_ms},
+                            {"psnr", r.order6.psnr},
+                            {"flip", r.order6.flip},
+                            {"reference_noise_psnr", r.noise_psnr},
+                            {"psnr_full_sky", r.sky.psnr},
+                            {"flip_full_sky", r.sky.flip},
+                            {"reference_seconds", r.reference_seconds}});
   }
   if (auto ok = write_file_atomically(at("summary.md"), table); !ok) return fail(ok.error());
   if (context.json) print_json(json);
@@ -158,10 +177,15 @@ int run_demo(Context& context, const DemoCommand& o) {
 
 void add_demo(CLI::App& app, Run& run) {
   auto o = std::make_shared<DemoCommand>();
-  CLI::App* c = app.add_subcommand("demo", "Bake the built-in courtyard, relight it under three skies, judge it by path tracing");
+  CLI::App* c =
+      app.add_subcommand("demo", "Bake the built-in courtyard, relight it under three skies, judge it by path tracing");
   c->add_option("-o,--output", o->folder, "Folder to write to")->capture_default_str();
-  c->add_option("--spp", o->spp, "Paths a pixel of the reference")->check(CLI::Range(1, 1 << 16))->capture_default_str();
-  c->add_option("--detail", o->detail, "Tessellation of the scene; 1 is 50,000 vertices and more")->check(CLI::Range(0.05f, 8.0f))->capture_default_str();
+  c->add_option("--spp", o->spp, "Paths a pixel of the reference")
+      ->check(CLI::Range(1, 1 << 16))
+      ->capture_default_str();
+  c->add_option("--detail", o->detail, "Tessellation of the scene; 1 is 50,000 vertices and more")
+      ->check(CLI::Range(0.05f, 8.0f))
+      ->capture_default_str();
   c->callback([o, &run] { run = [o](Context& context) { return run_demo(context, *o); }; });
 }
 

@@ -50,14 +50,23 @@ int run_env(Context& context, const EnvCommand& o) {
   if (context.json) {
     nlohmann::json coefficients = nlohmann::json::array();
     for (Vec3 c : converted) coefficients.push_back({c.x, c.y, c.z});
-    print_json({{"environment", env->name}, {"width", env->image.width}, {"height", env->image.height}, {"order", o.order},
-                {"convention", o.convention}, {"window", window}, {"energy_kept", all > 0 ? kept / all : 1.0}, {"coefficients", coefficients}});
+    print_json({{"environment", env->name},
+                {"width", env->image.width},
+                {"height", env->image.height},
+                {"order", o.order},
+                {"convention", o.convention},
+                {"window", window},
+                {"energy_kept", all > 0 ? kept / all : 1.0},
+                {"coefficients", coefficients}});
   } else {
-    fmt::print("# {}: {} x {}, order {}, {:.1f}% of the squared radiance within it\n#  l   m           red         green          blue\n", env->name,
-               env->image.width, env->image.height, o.order, all > 0 ? 100 * kept / all : 100.0);
+    fmt::print(
+        "# {}: {} x {}, order {}, {:.1f}% of the squared radiance within it\n#  l   m           red         green      "
+        "    blue\n",
+        env->name, env->image.width, env->image.height, o.order, all > 0 ? 100 * kept / all : 100.0);
     for (size_t i = 0; i < converted.size(); ++i) {
       const int l = sh_band(int(i));
-      fmt::print("{:4d} {:3d} {:13.6g} {:13.6g} {:13.6g}\n", l, int(i) - l * (l + 1), converted[i].x, converted[i].y, converted[i].z);
+      fmt::print("{:4d} {:3d} {:13.6g} {:13.6g} {:13.6g}\n", l, int(i) - l * (l + 1), converted[i].x, converted[i].y,
+                 converted[i].z);
     }
   }
   if (!o.output.empty()) {
@@ -76,9 +85,11 @@ void add_env(CLI::App& app, Run& run) {
   c->add_option("env", o->light.env, "Environment: a .hdr or .exr file, uniform:R,G,B, or sky:…")->required();
   c->add_option("--env-rotate", o->light.rotate, "YAW,PITCH,ROLL: turn the environment, degrees about +Y, +X, +Z");
   c->add_option("--order", o->order, "Bands")->check(CLI::Range(1, max_sh_order))->capture_default_str();
-  c->add_option("--window", o->window, "Against ringing")->transform(CLI::CheckedTransformer(window_names).description("{none,hann,lanczos,auto}"));
+  c->add_option("--window", o->window, "Against ringing")
+      ->transform(CLI::CheckedTransformer(window_names).description("{none,hann,lanczos,auto}"));
   c->add_option("--convention", o->convention, "Whose coefficients to print")
-      ->check(CLI::IsMember({"lambent", "three", "unity", "godot", "gltf-ibl"}))->capture_default_str();
+      ->check(CLI::IsMember({"lambent", "three", "unity", "godot", "gltf-ibl"}))
+      ->capture_default_str();
   c->add_option("-o,--output", o->output, "Picture to write: the environment beside its reconstruction");
   c->add_option("--exposure", o->exposure, "Stops that a PNG is brightened by")->check(CLI::Range(-100.0f, 100.0f));
   c->callback([o, &run] { run = [o](Context& context) { return run_env(context, *o); }; });

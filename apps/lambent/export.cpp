@@ -22,7 +22,8 @@ Result<void> check_target(const fs::path& target) {
   std::error_code status;
   if (!fs::exists(fs::symlink_status(target, status))) {
     const fs::path parent = target.has_parent_path() ? target.parent_path() : fs::path(".");
-    if (!fs::is_directory(parent, status)) return Error{target.string(), "cannot be written: no folder " + parent.string()};
+    if (!fs::is_directory(parent, status))
+      return Error{target.string(), "cannot be written: no folder " + parent.string()};
     return {};
   }
   if (!fs::is_directory(target, status)) return Error{target.string(), "is there already and is not a folder"};
@@ -33,7 +34,8 @@ Result<void> check_target(const fs::path& target) {
 
 // All files into a new folder beside the target, which then takes its place.
 Result<void> write_folder(const fs::path& target, const WebFiles& files, const Progress& progress) {
-  const fs::path fresh = target.string() + ".part" + std::to_string(::getpid()), old = target.string() + ".old" + std::to_string(::getpid());
+  const fs::path fresh = target.string() + ".part" + std::to_string(::getpid()),
+                 old = target.string() + ".old" + std::to_string(::getpid());
   std::error_code status;
   const auto give_up = [&](Error error) {
     std::error_code ignored;
@@ -70,7 +72,9 @@ int run_export(Context& context, const ExportCommand& o) {
   size_t bytes = 0;
   for (const auto& [name, file] : *files) bytes += file.bytes().size();
   if (context.json) print_json({{"output", target.string()}, {"files", files->size()}, {"bytes", bytes}});
-  else fmt::print("{}\n  {} files, {}: any web server can show it\n", target.string(), files->size(), human_bytes(double(bytes)));
+  else
+    fmt::print("{}\n  {} files, {}: any web server can show it\n", target.string(), files->size(),
+               human_bytes(double(bytes)));
   return success;
 }
 
@@ -81,9 +85,12 @@ void add_export(CLI::App& app, Run& run) {
   CLI::App* c = app.add_subcommand("export", "Write a baked file in another form");
   o->web.add_to(*c);
   CLI::Option_group* target = c->add_option_group("Target");
-  target->add_option("--web", o->folder, "Folder to write: the page that `view` serves, with its data, for any web server");
-  target->add_option("--three", o->three, "PREFIX of pictures for three.js: a lightmap's irradiance, or LightProbe coefficients a texel");
-  target->add_option("--godot", o->godot, "PREFIX of pictures for Godot: the layers of a directional lightmap, from sh:2 or sh:3");
+  target->add_option("--web", o->folder,
+                     "Folder to write: the page that `view` serves, with its data, for any web server");
+  target->add_option("--three", o->three,
+                     "PREFIX of pictures for three.js: a lightmap's irradiance, or LightProbe coefficients a texel");
+  target->add_option("--godot", o->godot,
+                     "PREFIX of pictures for Godot: the layers of a directional lightmap, from sh:2 or sh:3");
   target->require_option(1);
   c->callback([o, &run] { run = [o](Context& context) { return run_export(context, *o); }; });
 }

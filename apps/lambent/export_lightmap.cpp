@@ -14,12 +14,14 @@ int export_lightmap(Context& context, const std::string& path, LightmapTarget ta
   if (!baked) return fail(baked.error());
   const auto* texels = std::get_if<TexelReceivers>(&baked->basis);
   const LightBasis& light = baked->transfer.light;
-  if (!texels || baked->zonal || baked->outgoing) return fail({path, "is no lightmap over texels: bake it with --transfer lightmap"});
+  if (!texels || baked->zonal || baked->outgoing)
+    return fail({path, "is no lightmap over texels: bake it with --transfer lightmap"});
   if (light.groups.empty()) return fail({path, "holds no lamps, only distant light"});
   const DirectionalKind kind = baked->directional;
   const bool harmonics = kind == DirectionalKind::sh2 || kind == DirectionalKind::sh3;
   if (!harmonics && kind != DirectionalKind::none)
-    return fail({path, "is a directional lightmap of kind " + directional_name(kind) + ", which the other system cannot hold: bake it with sh:2 or sh:3"});
+    return fail({path, "is a directional lightmap of kind " + directional_name(kind) +
+                           ", which the other system cannot hold: bake it with sh:2 or sh:3"});
   std::vector<Vec3> lit(light.count(), Vec3(0));
   std::fill(lit.end() - ptrdiff_t(light.groups.size()), lit.end(), Vec3(1));
   Relit relit;

@@ -9,7 +9,8 @@ constexpr size_t max_frames = 64;
 
 // A:B[:STEP], in seconds.
 Result<std::vector<double>> parse_frames(const std::string& text) {
-  const Error wrong{"--frames", "expects FROM:TO[:STEP] in seconds, at most " + std::to_string(max_frames) + " of them, not \"" + text + "\""};
+  const Error wrong{"--frames", "expects FROM:TO[:STEP] in seconds, at most " + std::to_string(max_frames) +
+                                    " of them, not \"" + text + "\""};
   double n[3] = {0, 0, 0};
   size_t count = 0;
   const char* p = text.data();
@@ -34,8 +35,13 @@ Result<std::vector<double>> parse_frames(const std::string& text) {
 void MotionOptions::add_to(CLI::App& c, bool with_frames) {
   auto* named = c.add_option("--animation", animation, "Pose the scene by this glTF animation, by name or number");
   auto* at = c.add_option("--time", time, "At this time, seconds")->needs(named);
-  if (with_frames) c.add_option("--frames", frames, "FROM:TO[:STEP]: at these times, seconds, as a strip of pictures")->needs(named)->excludes(at);
-  c.add_option("--deform", deform, "bend:ANGLE[,along[,towards]] or twist:ANGLE[,along]: degrees from end to end, axes x, y or z")->excludes(named);
+  if (with_frames)
+    c.add_option("--frames", frames, "FROM:TO[:STEP]: at these times, seconds, as a strip of pictures")
+        ->needs(named)
+        ->excludes(at);
+  c.add_option("--deform", deform,
+               "bend:ANGLE[,along[,towards]] or twist:ANGLE[,along]: degrees from end to end, axes x, y or z")
+      ->excludes(named);
 }
 
 Result<std::vector<std::optional<Pose>>> make_poses(const MotionOptions& o, const Scene& scene) {
@@ -64,7 +70,8 @@ Result<std::vector<std::optional<Pose>>> make_poses(const MotionOptions& o, cons
   return poses;
 }
 
-std::vector<Mat3> receiver_rotations(const Pose& pose, const std::vector<uint32_t>& front, const std::vector<uint32_t>& back, size_t receivers) {
+std::vector<Mat3> receiver_rotations(const Pose& pose, const std::vector<uint32_t>& front,
+                                     const std::vector<uint32_t>& back, size_t receivers) {
   std::vector<Mat3> rotations(receivers, Mat3(1.0f));
   std::vector<bool> known(receivers);
   for (const auto* map : {&front, &back})

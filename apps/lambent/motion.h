@@ -17,6 +17,7 @@ struct MotionOptions {
 Result<std::vector<std::optional<Pose>>> make_poses(const MotionOptions& options, const Scene& scene);
 
 // Of each receiver, the rotation of (the first of) its vertices.
-std::vector<Mat3> receiver_rotations(const Pose& pose, const std::vector<uint32_t>& front, const std::vector<uint32_t>& back, size_t receivers);
+std::vector<Mat3> receiver_rotations(const Pose& pose, const std::vector<uint32_t>& front,
+                                     const std::vector<uint32_t>& back, size_t receivers);
 
 }  // namespace lambent::tool

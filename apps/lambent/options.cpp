@@ -75,8 +75,10 @@ void SceneOptions::add_to(CLI::App& command) {
   command.add_option("scene", path, "Scene: .gltf, .glb, .obj or .ply")->required();
   command.add_flag("--ground", ground, "Add a tessellated floor under the scene");
   command.add_option("--emit", emit, "MATERIAL=R,G,B: make a material a lamp of this radiance");
-  command.add_option("--max-albedo", max_albedo, "Darken base colours to at most this, channel by channel")->check(CLI::Range(0.0f, 1.0f));
-  command.add_option("--max-edge", max_edge, "Split edges longer than this many scene units")->check(CLI::PositiveNumber);
+  command.add_option("--max-albedo", max_albedo, "Darken base colours to at most this, channel by channel")
+      ->check(CLI::Range(0.0f, 1.0f));
+  command.add_option("--max-edge", max_edge, "Split edges longer than this many scene units")
+      ->check(CLI::PositiveNumber);
 }
 
 Result<Scene> load_prepared_scene(const SceneOptions& options) {
@@ -91,11 +93,15 @@ Result<Scene> load_prepared_scene(const SceneOptions& options) {
 }
 
 void ViewOptions::add_to(CLI::App& command) {
-  command.add_option("--camera", camera, "EX,EY,EZ,TX,TY,TZ,FOV: eye, target, vertical degrees; or auto")->capture_default_str();
+  command.add_option("--camera", camera, "EX,EY,EZ,TX,TY,TZ,FOV: eye, target, vertical degrees; or auto")
+      ->capture_default_str();
   command.add_option("--size", size, "Picture size, WIDTHxHEIGHT pixels")->capture_default_str();
-  command.add_option("--exposure", exposure, "Stops that a PNG is brightened by")->check(CLI::Range(-100.0f, 100.0f))->capture_default_str();
+  command.add_option("--exposure", exposure, "Stops that a PNG is brightened by")
+      ->check(CLI::Range(-100.0f, 100.0f))
+      ->capture_default_str();
   command.add_option("--background", background, "What lies behind the scene: env, or none (transparent)")
-      ->check(CLI::IsMember({"env", "none"}))->capture_default_str();
+      ->check(CLI::IsMember({"env", "none"}))
+      ->capture_default_str();
   command.add_option("-o,--output", output, "Picture to write: .png (8-bit sRGB) or .exr (linear)")->required();
 }
 
@@ -129,7 +135,8 @@ Result<std::optional<Camera>> parse_camera(const std::string& text) {
   if (!n) return n.error();
   Camera camera;
   camera.eye = {(*n)[0], (*n)[1], (*n)[2]}, camera.target = {(*n)[3], (*n)[4], (*n)[5]}, camera.fov = (*n)[6];
-  if (!(camera.fov > 0 && camera.fov < 180)) return Error{"--camera", "field of view must lie between 0 and 180 degrees"};
+  if (!(camera.fov > 0 && camera.fov < 180))
+    return Error{"--camera", "field of view must lie between 0 and 180 degrees"};
   if (camera.eye == camera.target) return Error{"--camera", "eye and target are the same point"};
   return std::optional<Camera>(camera);
 }
@@ -142,13 +149,17 @@ Result<void> parse_cpca(const std::string& text, CpcaOptions& options) {
   const float most[] = {float(max_cpca_clusters), float(max_cpca_rank)};
   for (size_t k = 0; k < 2; ++k)
     if ((*n)[k] != std::floor((*n)[k]) || (*n)[k] < float(1 - k) || (*n)[k] > most[k])
-      return Error{where, fmt::format("expects from 1 to {} clusters of rank 0 to {}, not \"{}\"", max_cpca_clusters, max_cpca_rank, text)};
+      return Error{where, fmt::format("expects from 1 to {} clusters of rank 0 to {}, not \"{}\"", max_cpca_clusters,
+                                      max_cpca_rank, text)};
   options.clusters = int((*n)[0]), options.rank = int((*n)[1]);
   return {};
 }
 
 void LightOptions::add_to(CLI::App& command, bool required) {
-  command.add_option("--env", env, "Environment: a .hdr or .exr file, uniform:R,G,B, or sky:elevation=35,azimuth=45,turbidity=3")->required(required);
+  command
+      .add_option("--env", env,
+                  "Environment: a .hdr or .exr file, uniform:R,G,B, or sky:elevation=35,azimuth=45,turbidity=3")
+      ->required(required);
   command.add_option("--env-rotate", rotate, "YAW,PITCH,ROLL: turn the environment, degrees about +Y, +X, +Z");
 }
 
@@ -166,8 +177,12 @@ Result<Mat3> light_rotation(const LightOptions& options) {
 }
 
 CLI::Option* BrdfOptions::add_to(CLI::App& command) {
-  return command.add_option("--brdf", brdf, std::string("How surfaces reflect: diffuse (by base colour), materials (glTF's metallic-roughness), "
-                                                        "or one model for all: ") + brdf_syntax)->capture_default_str();
+  return command
+      .add_option("--brdf", brdf,
+                  std::string("How surfaces reflect: diffuse (by base colour), materials (glTF's metallic-roughness), "
+                              "or one model for all: ") +
+                      brdf_syntax)
+      ->capture_default_str();
 }
 
 Result<Reflection> load_reflection(const BrdfOptions& options) {
@@ -209,7 +224,10 @@ Result<void> check_output(const std::string& path, std::initializer_list<const c
 
 void warn_of_lost_walks(const SubsurfaceReport& walks) {
   if (walks.lost > 0.005)
-    warn(fmt::format("{:.1f}% of the walks through the medium were lost, and their light with them: surfaces are not closed, or the medium is too dense", 100 * walks.lost));
+    warn(
+        fmt::format("{:.1f}% of the walks through the medium were lost, and their light with them: surfaces are not "
+                    "closed, or the medium is too dense",
+                    100 * walks.lost));
 }
 
 }  // namespace lambent::tool

@@ -33,7 +33,7 @@ Result<std::array<int, 2>> parse_size(const std::string& text, const std::string
 struct SceneOptions {
   std::string path;
   bool ground = false;
-  float max_edge = 0;  // 0: leave edges alone
+  float max_edge = 0;             // 0: leave edges alone
   std::vector<std::string> emit;  // NAME=R,G,B
   float max_albedo = 1;
   void add_to(CLI::App& command);
@@ -79,8 +79,9 @@ std::string describe_light(const LightBasis& light);
 Result<void> check_output(const std::string& path, std::initializer_list<const char*> extensions);
 
 // Of --subsurface: what it takes, and a warning where walks came to nothing.
-inline constexpr const char* subsurface_help = "Light through a medium: sigma_s=S,sigma_a=A[,g=G][,eta=E] per unit, S and A one number or R,G,B; or NAME[:MM], a "
-                                               "measured one (marble, skin, wholemilk, ...) where a unit is MM millimetres (1000)";
+inline constexpr const char* subsurface_help =
+    "Light through a medium: sigma_s=S,sigma_a=A[,g=G][,eta=E] per unit, S and A one number or R,G,B; or NAME[:MM], a "
+    "measured one (marble, skin, wholemilk, ...) where a unit is MM millimetres (1000)";
 void warn_of_lost_walks(const SubsurfaceReport& walks);
 
 }  // namespace lambent::tool

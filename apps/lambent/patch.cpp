@@ -49,10 +49,19 @@ int run_grooves(Context& context, const PatchCommand& o) {
   if (!table) return fail({"--groove", table.error().text()});
   if (auto ok = save_zonal_texture(o.output, table->texture); !ok) return fail(ok.error());
   const ZonalTransfer& t = table->texture.transfer;
-  if (context.json) print_json({{"output", o.output}, {"size", o.size}, {"lobes", t.lobes}, {"order", t.order}, {"groove_depth", o.groove}, {"rms", table->rms}, {"bytes", t.bytes()}});
+  if (context.json)
+    print_json({{"output", o.output},
+                {"size", o.size},
+                {"lobes", t.lobes},
+                {"order", t.order},
+                {"groove_depth", o.groove},
+                {"rms", table->rms},
+                {"bytes", t.bytes()}});
   else
-    fmt::print("{}\n  grooves of {} depths up to {:.3g} widths at {} places across, {} lobes, order {}, {}\n  fitted with an error of {:.2f}% RMS\n", o.output, o.size, o.groove, o.size,
-               t.lobes, t.order, human_bytes(double(t.bytes())), 100 * table->rms);
+    fmt::print(
+        "{}\n  grooves of {} depths up to {:.3g} widths at {} places across, {} lobes, order {}, {}\n  fitted with an "
+        "error of {:.2f}% RMS\n",
+        o.output, o.size, o.groove, o.size, t.lobes, t.order, human_bytes(double(t.bytes())), 100 * table->rms);
   return success;
 }
 
@@ -70,15 +79,17 @@ int run_patch(Context& context, PatchCommand o) {
   auto made = o.is_mesh() ? load_mesh_patch(o, jump) : load_height_patch(o, jump);
   if (!made) return fail(made.error());
   const PatchScene& patch = *made;
-  if (jump > 3) warn(fmt::format("{}: does not tile: it jumps {:.1f} times as far from one repetition to the next as inside", o.heights, jump));
+  if (jump > 3)
+    warn(fmt::format("{}: does not tile: it jumps {:.1f} times as far from one repetition to the next as inside",
+                     o.heights, jump));
   auto tracer = Tracer::build(patch.scene);
   if (!tracer) return fail(tracer.error());
   o.bake.precision = Precision::single;
   o.zonal.precision = o.precision == "half" ? Precision::half : Precision::single;
   BakeReport report;
-  auto transfer = o.subsurface.empty()
-                      ? bake(patch.scene, *tracer, patch.receivers, o.bake, &report, &context.progress)
-                      : bake_subsurface(patch.scene, *tracer, patch.receivers, o.bake, subsurface, &report, &walks, &context.progress);
+  auto transfer = o.subsurface.empty() ? bake(patch.scene, *tracer, patch.receivers, o.bake, &report, &context.progress)
+                                       : bake_subsurface(patch.scene, *tracer, patch.receivers, o.bake, subsurface,
+                                                         &report, &walks, &context.progress);
   if (!transfer) return fail(transfer.error());
   warn_of_lost_walks(walks);
   ZonalFitReport fit;
@@ -88,13 +99,26 @@ int run_patch(Context& context, PatchCommand o) {
   nlohmann::json through;
   if (!o.subsurface.empty()) through = {{"events", walks.events}, {"lost", walks.lost}};
   if (context.json)
-    print_json({{"output", o.output}, {"size", o.size}, {"lobes", o.zonal.lobes}, {"order", o.bake.order}, {"rays", report.rays}, {"buried", report.buried}, {"trace_seconds", report.trace_seconds},
-                {"bounce_seconds", report.bounce_seconds}, {"fit_seconds", fit.seconds}, {"rms", fit.rms}, {"bytes", lobes->bytes()}, {"seam_jump", jump},
+    print_json({{"output", o.output},
+                {"size", o.size},
+                {"lobes", o.zonal.lobes},
+                {"order", o.bake.order},
+                {"rays", report.rays},
+                {"buried", report.buried},
+                {"trace_seconds", report.trace_seconds},
+                {"bounce_seconds", report.bounce_seconds},
+                {"fit_seconds", fit.seconds},
+                {"rms", fit.rms},
+                {"bytes", lobes->bytes()},
+                {"seam_jump", jump},
                 {"subsurface", through}});
   else
-    fmt::print("{}\n  {} x {} texels, {} lobes, order {}, {}\n  simulated in {} ({} rays), fitted in {} with an error of {:.2f}% RMS\n", o.output, o.size, o.size,
-               o.zonal.lobes, o.bake.order, human_bytes(double(lobes->bytes())), human_seconds(report.trace_seconds + report.bounce_seconds), human_count(report.rays),
-               human_seconds(fit.seconds), 100 * fit.rms);
+    fmt::print(
+        "{}\n  {} x {} texels, {} lobes, order {}, {}\n  simulated in {} ({} rays), fitted in {} with an error of "
+        "{:.2f}% RMS\n",
+        o.output, o.size, o.size, o.zonal.lobes, o.bake.order, human_bytes(double(lobes->bytes())),
+        human_seconds(report.trace_seconds + report.bounce_seconds), human_count(report.rays),
+        human_seconds(fit.seconds), 100 * fit.rms);
   return success;
 }
 
@@ -102,30 +126,58 @@ int run_patch(Context& context, PatchCommand o) {
 
 void add_patch(CLI::App& app, Run& run) {
   auto o = std::make_shared<PatchCommand>();
-  CLI::App* c = app.add_subcommand("patch", "Simulate a repeating relief and make a transfer texture of it, for render --transfer-texture");
-  auto* heights = c->add_option("heights", o->heights, "What repeats: a height map, or a mesh (.glb, .gltf, .obj, .ply) that is as wide along x as along y and faces +z");
-  auto* groove = c->add_option("--groove", o->groove, "In place of these, a table of grooves of cosine shape up to this depth, in their widths, for wrinkles")->check(CLI::Range(1e-3f, 10.0f));
+  CLI::App* c = app.add_subcommand(
+      "patch", "Simulate a repeating relief and make a transfer texture of it, for render --transfer-texture");
+  auto* heights = c->add_option("heights", o->heights,
+                                "What repeats: a height map, or a mesh (.glb, .gltf, .obj, .ply) that is as wide along "
+                                "x as along y and faces +z");
+  auto* groove =
+      c->add_option(
+           "--groove", o->groove,
+           "In place of these, a table of grooves of cosine shape up to this depth, in their widths, for wrinkles")
+          ->check(CLI::Range(1e-3f, 10.0f));
   c->add_option("-o,--output", o->output, "Transfer texture to write (.lpt)")->required();
-  auto* depth = c->add_option("--depth", o->depth, "Height of white over black, in sides of the patch")->capture_default_str();
-  auto* size = c->add_option("--size", o->size, "Texels a side; places and depths of grooves, 32 of them")->check(CLI::Range(2, 1024))->capture_default_str();
-  auto* albedo = c->add_option("--albedo", o->albedo, "What the relief reflects of the light that bounces")->check(CLI::Range(0.0f, 1.0f))->capture_default_str();
-  auto* subsurface = c->add_option("--subsurface", o->subsurface, std::string(subsurface_help) + "; a unit is one side of the patch");
-  auto* lobes = c->add_option("--lobes", o->zonal.lobes, "Zonal lobes a texel; of grooves 3")->check(CLI::Range(1, max_stored_lobes))->capture_default_str();
-  c->add_option("--order", o->bake.order, "Bands of the lighting's spherical harmonics")->check(CLI::Range(1, max_sh_order))->capture_default_str();
-  auto* samples = c->add_option("--samples", o->bake.samples, "Rays a texel")->check(CLI::Range(1, 1 << 20))->capture_default_str();
-  auto* bounces = c->add_option("--bounces", o->bake.bounces, "Reflections between surfaces")->check(CLI::Range(0, 64))->capture_default_str();
+  auto* depth =
+      c->add_option("--depth", o->depth, "Height of white over black, in sides of the patch")->capture_default_str();
+  auto* size = c->add_option("--size", o->size, "Texels a side; places and depths of grooves, 32 of them")
+                   ->check(CLI::Range(2, 1024))
+                   ->capture_default_str();
+  auto* albedo = c->add_option("--albedo", o->albedo, "What the relief reflects of the light that bounces")
+                     ->check(CLI::Range(0.0f, 1.0f))
+                     ->capture_default_str();
+  auto* subsurface =
+      c->add_option("--subsurface", o->subsurface, std::string(subsurface_help) + "; a unit is one side of the patch");
+  auto* lobes = c->add_option("--lobes", o->zonal.lobes, "Zonal lobes a texel; of grooves 3")
+                    ->check(CLI::Range(1, max_stored_lobes))
+                    ->capture_default_str();
+  c->add_option("--order", o->bake.order, "Bands of the lighting's spherical harmonics")
+      ->check(CLI::Range(1, max_sh_order))
+      ->capture_default_str();
+  auto* samples =
+      c->add_option("--samples", o->bake.samples, "Rays a texel")->check(CLI::Range(1, 1 << 20))->capture_default_str();
+  auto* bounces = c->add_option("--bounces", o->bake.bounces, "Reflections between surfaces")
+                      ->check(CLI::Range(0, 64))
+                      ->capture_default_str();
   auto* seed = c->add_option("--seed", o->bake.seed, "Of the ray directions")->capture_default_str();
-  auto* precision = c->add_option("--precision", o->precision, "Of the stored lobes")->check(CLI::IsMember({"half", "single"}))->capture_default_str();
+  auto* precision = c->add_option("--precision", o->precision, "Of the stored lobes")
+                        ->check(CLI::IsMember({"half", "single"}))
+                        ->capture_default_str();
   c->callback([o, seed, precision, heights, groove, size, lobes, samples, bounces, albedo, depth, subsurface, &run] {
-    if (!heights->count() == !groove->count()) throw CLI::ValidationError("give a height map or a mesh, or --groove DEPTH, and not both");
+    if (!heights->count() == !groove->count())
+      throw CLI::ValidationError("give a height map or a mesh, or --groove DEPTH, and not both");
     if (groove->count()) {
       for (const CLI::Option* option : {samples, bounces, depth, subsurface, seed, precision})
-        if (option->count()) throw CLI::ValidationError(option->get_name() + " is not of grooves, which are computed in their cross-section with all bounces, and kept in single precision");
+        if (option->count())
+          throw CLI::ValidationError(option->get_name() +
+                                     " is not of grooves, which are computed in their cross-section with all bounces, "
+                                     "and kept in single precision");
       if (!size->count()) o->size = 32;
       if (!lobes->count()) o->zonal.lobes = 3;
     }
-    if (albedo->count() && subsurface->count()) throw CLI::ValidationError("--albedo is of reflection, and --subsurface has none: give one");
-    if (o->is_mesh() && (albedo->count() || depth->count())) throw CLI::ValidationError("--albedo and --depth are of height maps: a mesh has its own");
+    if (albedo->count() && subsurface->count())
+      throw CLI::ValidationError("--albedo is of reflection, and --subsurface has none: give one");
+    if (o->is_mesh() && (albedo->count() || depth->count()))
+      throw CLI::ValidationError("--albedo and --depth are of height maps: a mesh has its own");
     run = [o](Context& context) { return run_patch(context, *o); };
   });
 }

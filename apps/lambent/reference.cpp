@@ -77,8 +77,11 @@ int run_reference(Context& context, ReferenceCommand o) {
   double variance = 0;
   for (Vec3 v : result->variance) variance += (double(v.x) + v.y + v.z) / 3;
   const double noise = std::sqrt(variance / double(result->variance.size()));
-  if (context.json) print_json({{"output", o.view.output}, {"seconds", seconds}, {"spp", o.options.spp}, {"noise_rms", noise}});
-  else fmt::print("{}\n  {} paths a pixel in {}, noise {:.2g} RMS\n", o.view.output, o.options.spp, human_seconds(seconds), noise);
+  if (context.json)
+    print_json({{"output", o.view.output}, {"seconds", seconds}, {"spp", o.options.spp}, {"noise_rms", noise}});
+  else
+    fmt::print("{}\n  {} paths a pixel in {}, noise {:.2g} RMS\n", o.view.output, o.options.spp, human_seconds(seconds),
+               noise);
   return success;
 }
 
@@ -93,14 +96,19 @@ void add_reference(CLI::App& app, Run& run) {
   o->motion.add_to(*c, false);
   o->displace.add_to(*c);
   o->brdf.add_to(*c);
-  c->add_option("--light-order", o->light_order, "Light by the environment's projection to this many bands, negative light included")
+  c->add_option("--light-order", o->light_order,
+                "Light by the environment's projection to this many bands, negative light included")
       ->check(CLI::Range(1, max_sh_order));
-  c->add_option("--light-basis", o->light_basis, "Light by the environment's projection onto what this baked file has columns for");
+  c->add_option("--light-basis", o->light_basis,
+                "Light by the environment's projection onto what this baked file has columns for");
   c->add_option("--window", o->window, "With --light-order or --light-basis: as for render")
       ->transform(CLI::CheckedTransformer(window_names).description("{none,hann,lanczos,auto}"));
-  c->add_flag("--lamps", o->options.lamps, "The scene's own lamps give light too: emissive materials and punctual lights");
+  c->add_flag("--lamps", o->options.lamps,
+              "The scene's own lamps give light too: emissive materials and punctual lights");
   c->add_flag("!--no-normal-maps", o->normal_maps, "Leave materials' normal textures out");
-  c->add_option("--bounces", o->options.bounces, "Reflections between surfaces")->check(CLI::Range(0, 64))->capture_default_str();
+  c->add_option("--bounces", o->options.bounces, "Reflections between surfaces")
+      ->check(CLI::Range(0, 64))
+      ->capture_default_str();
   c->add_option("--spp", o->options.spp, "Paths a pixel")->check(CLI::Range(1, 1 << 20))->capture_default_str();
   c->add_option("--seed", o->options.seed, "Of the paths")->capture_default_str();
   c->callback([o, &run] { run = [o](Context& context) { return run_reference(context, *o); }; });

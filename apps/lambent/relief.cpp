@@ -28,10 +28,19 @@ Result<HeightField> load_heights(const std::string& path, int size, float depth)
 }
 
 void DisplaceOptions::add_to(CLI::App& c) {
-  auto* given = c.add_option("--displace", heights, "Move the surface by this height map, as geometry: what `render --transfer-texture` stands for");
-  c.add_option("--depth", depth, "--displace: height of white over black, in sides of one repetition")->needs(given)->capture_default_str();
-  c.add_option("--tile", tile, "--displace: U,V, its repetitions over the unit of texture coordinates")->needs(given)->capture_default_str();
-  c.add_option("--heights", size, "--displace: texels a side that the map is taken at")->needs(given)->check(CLI::Range(2, 1024))->capture_default_str();
+  auto* given =
+      c.add_option("--displace", heights,
+                   "Move the surface by this height map, as geometry: what `render --transfer-texture` stands for");
+  c.add_option("--depth", depth, "--displace: height of white over black, in sides of one repetition")
+      ->needs(given)
+      ->capture_default_str();
+  c.add_option("--tile", tile, "--displace: U,V, its repetitions over the unit of texture coordinates")
+      ->needs(given)
+      ->capture_default_str();
+  c.add_option("--heights", size, "--displace: texels a side that the map is taken at")
+      ->needs(given)
+      ->check(CLI::Range(2, 1024))
+      ->capture_default_str();
 }
 
 Result<void> displace_scene(Scene& scene, const DisplaceOptions& o) {
@@ -50,9 +59,13 @@ Result<void> displace_scene(Scene& scene, const DisplaceOptions& o) {
     if (c > 0) covered += c, area += glm::length(area_normal(scene, t));
   }
   if (!(covered > 0 && area > 0)) return Error{scene.path, "has texture coordinates that cover nothing"};
-  if (auto ok = split_long_edges(scene, float(0.8 * std::sqrt(area / covered) / o.size), most_triangles); !ok) return ok.error();
-  const double mean = std::accumulate(field->heights.begin(), field->heights.end(), 0.0) / double(field->heights.size());
-  return displace(scene, [&](Vec2 at) { return float(sample_heights(field->heights, field->size, field->size, at) - mean); }, repeat);
+  if (auto ok = split_long_edges(scene, float(0.8 * std::sqrt(area / covered) / o.size), most_triangles); !ok)
+    return ok.error();
+  const double mean = std::accumulate(field->heights.begin(), field->heights.end(), 0.0) /
+                      double(field->heights.size());
+  return displace(
+      scene, [&](Vec2 at) { return float(sample_heights(field->heights, field->size, field->size, at) - mean); },
+      repeat);
 }
 
 }  // namespace lambent::tool

@@ -79,7 +79,9 @@ void warn(const std::vector<std::string>& messages) {
   for (const std::string& m : messages) warn(m);
 }
 
-void print_json(const nlohmann::json& value) { fmt::print("{}\n", value.dump(2, ' ', false, nlohmann::json::error_handler_t::replace)); }
+void print_json(const nlohmann::json& value) {
+  fmt::print("{}\n", value.dump(2, ' ', false, nlohmann::json::error_handler_t::replace));
+}
 
 std::string human_bytes(double bytes) {
   if (bytes < 1000) return fmt::format("{:.0f} bytes", bytes);

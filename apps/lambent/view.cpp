@@ -17,8 +17,8 @@ struct ViewCommand {
   bool no_browser = false;
 };
 
-// One table of files and nothing else: a path is looked up, never opened. Answers only requests that name this machine, so that a
-// foreign page cannot have its own name point here and read them.
+// One table of files and nothing else: a path is looked up, never opened. Answers only requests that name this machine,
+// so that a foreign page cannot have its own name point here and read them.
 void answer_from(httplib::Server& server, const WebFiles& files, const int& port) {
   server.set_pre_routing_handler([&port](const httplib::Request& request, httplib::Response& response) {
     const std::string host = request.get_header_value("Host"), tail = ":" + std::to_string(port);
@@ -35,11 +35,14 @@ void answer_from(httplib::Server& server, const WebFiles& files, const int& port
       return;
     }
     const std::string_view bytes = file->second.bytes();
-    response.set_content_provider(bytes.size(), file->second.type, [bytes](size_t offset, size_t length, httplib::DataSink& sink) {
-      return sink.write(bytes.data() + offset, std::min<size_t>(length, 1 << 16));
-    });
+    response.set_content_provider(bytes.size(), file->second.type,
+                                  [bytes](size_t offset, size_t length, httplib::DataSink& sink) {
+                                    return sink.write(bytes.data() + offset, std::min<size_t>(length, 1 << 16));
+                                  });
   });
-  server.set_default_headers({{"X-Content-Type-Options", "nosniff"}, {"Cache-Control", "no-store"}, {"Cross-Origin-Resource-Policy", "same-origin"}});
+  server.set_default_headers({{"X-Content-Type-Options", "nosniff"},
+                              {"Cache-Control", "no-store"},
+                              {"Cross-Origin-Resource-Policy", "same-origin"}});
   server.set_payload_max_length(0);
   // The library's default lets two programs share a port, and each would get half of the other's requests.
   server.set_socket_options([](socket_t socket) {
@@ -49,13 +52,17 @@ void answer_from(httplib::Server& server, const WebFiles& files, const int& port
 }
 
 void open_browser(const std::string& address) {
-  const auto is_set = [](const char* name) { const char* value = std::getenv(name); return value && *value; };
+  const auto is_set = [](const char* name) {
+    const char* value = std::getenv(name);
+    return value && *value;
+  };
   if (!is_set("DISPLAY") && !is_set("WAYLAND_DISPLAY")) return;
   char program[] = "xdg-open";
   std::string argument = address;
   char* const arguments[] = {program, argument.data(), nullptr};
   pid_t child;
-  if (::posix_spawnp(&child, program, nullptr, nullptr, arguments, environ) != 0) warn("no browser could be started: open the address by hand");
+  if (::posix_spawnp(&child, program, nullptr, nullptr, arguments, environ) != 0)
+    warn("no browser could be started: open the address by hand");
 }
 
 int run_view(Context& context, const ViewCommand& o) {
@@ -66,7 +73,8 @@ int run_view(Context& context, const ViewCommand& o) {
   answer_from(server, *files, port);
   if (port == 0) port = server.bind_to_any_port("127.0.0.1");
   else if (!server.bind_to_port("127.0.0.1", port)) port = -1;
-  if (port < 0) return fail({"--port", o.port ? "port " + std::to_string(o.port) + " is taken or not allowed" : "no port is free"});
+  if (port < 0)
+    return fail({"--port", o.port ? "port " + std::to_string(o.port) + " is taken or not allowed" : "no port is free"});
   std::thread serving([&server] { server.listen_after_bind(); });
   const std::string address = fmt::format("http://127.0.0.1:{}/", port);
   if (context.json) print_json({{"address", address}});
@@ -85,7 +93,9 @@ void add_view(CLI::App& app, Run& run) {
   auto o = std::make_shared<ViewCommand>();
   CLI::App* c = app.add_subcommand("view", "Show a baked file in the browser; the light turns under the hand");
   o->web.add_to(*c);
-  c->add_option("--port", o->port, "Port on 127.0.0.1; 0: any that is free")->check(CLI::Range(0, 65535))->capture_default_str();
+  c->add_option("--port", o->port, "Port on 127.0.0.1; 0: any that is free")
+      ->check(CLI::Range(0, 65535))
+      ->capture_default_str();
   c->add_flag("--no-browser", o->no_browser, "Only print the address");
   c->callback([o, &run] { run = [o](Context& context) { return run_view(context, *o); }; });
 }

@@ -13,8 +13,8 @@ namespace {
 
 namespace fs = std::filesystem;
 
-// Where scripts/web (or an install) leaves the page, seen from the program: share/lambent/web of its prefix, or build/web of the
-// source tree that it was built in.
+// Where scripts/web (or an install) leaves the page, seen from the program: share/lambent/web of its prefix, or
+// build/web of the source tree that it was built in.
 Result<fs::path> page_folder() {
   std::error_code status;
   const fs::path program = fs::read_symlink("/proc/self/exe", status).parent_path();
@@ -22,14 +22,20 @@ Result<fs::path> page_folder() {
     const fs::path folder = (program / place).lexically_normal();
     if (fs::is_regular_file(folder / "index.html", status)) return folder;
   }
-  return Error{(program / "../../web").lexically_normal().string(), "the web page is not there: build it with scripts/web"};
+  return Error{(program / "../../web").lexically_normal().string(),
+               "the web page is not there: build it with scripts/web"};
 }
 
 const char* media_type(const std::string& extension) {
-  static const std::map<std::string, const char*> types{
-      {"html", "text/html; charset=utf-8"}, {"js", "text/javascript; charset=utf-8"}, {"css", "text/css; charset=utf-8"},
-      {"json", "application/json"},         {"svg", "image/svg+xml"},                 {"png", "image/png"},
-      {"glb", "model/gltf-binary"},         {"wasm", "application/wasm"},             {"exr", "image/x-exr"}};
+  static const std::map<std::string, const char*> types{{"html", "text/html; charset=utf-8"},
+                                                        {"js", "text/javascript; charset=utf-8"},
+                                                        {"css", "text/css; charset=utf-8"},
+                                                        {"json", "application/json"},
+                                                        {"svg", "image/svg+xml"},
+                                                        {"png", "image/png"},
+                                                        {"glb", "model/gltf-binary"},
+                                                        {"wasm", "application/wasm"},
+                                                        {"exr", "image/x-exr"}};
   const auto known = types.find(extension);
   return known == types.end() ? "application/octet-stream" : known->second;
 }
@@ -43,7 +49,8 @@ Result<void> add_page(WebFiles& files) {
     const std::string path = entry.path().string();
     auto file = MappedFile::open(path);
     if (!file) return file.error();
-    files[entry.path().lexically_relative(*folder).generic_string()] = {media_type(file_extension(path)), std::move(*file)};
+    files[entry.path().lexically_relative(*folder).generic_string()] = {media_type(file_extension(path)),
+                                                                        std::move(*file)};
   }
   return {};
 }
@@ -53,7 +60,10 @@ Result<void> add_baked(WebFiles& files, const std::string& path, const std::stri
   if (!file) return file.error();
   auto whole = load_baked(*file, path);
   if (!whole) return whole.error();
-  if (whole->visibility) return Error{path, "is of visibility in blocks, which the web viewer cannot draw: see `lambent render` and `lambent relight`"};
+  if (whole->visibility)
+    return Error{
+        path,
+        "is of visibility in blocks, which the web viewer cannot draw: see `lambent render` and `lambent relight`"};
   files[name] = {media_type("glb"), std::move(*file)};
   return {};
 }
@@ -75,16 +85,23 @@ std::string_view WebFile::bytes() const {
 
 void WebOptions::add_to(CLI::App& command) {
   command.add_option("baked", baked, "Baked file, from `lambent bake`")->required();
-  command.add_option("--env", env, "Environments to choose from, each as for render; the option may be repeated")->allow_extra_args(false)->take_all();
+  command.add_option("--env", env, "Environments to choose from, each as for render; the option may be repeated")
+      ->allow_extra_args(false)
+      ->take_all();
   command.add_option("--compare", compare, "A second baked file, to wipe against: with fewer bounces, say");
-  command.add_option("--reference", reference, "A picture of the same camera, to wipe against: .exr, or .png at exposure 0");
+  command.add_option("--reference", reference,
+                     "A picture of the same camera, to wipe against: .exr, or .png at exposure 0");
   command.add_option("--camera", camera, "EX,EY,EZ,TX,TY,TZ,FOV to begin with; or auto")->capture_default_str();
   command.add_option("--env-rotate", rotate, "YAW,PITCH,ROLL to begin with, degrees about +Y, +X, +Z");
-  command.add_option("--exposure", exposure, "Stops to begin with")->check(CLI::Range(-6.0f, 6.0f))->capture_default_str();
+  command.add_option("--exposure", exposure, "Stops to begin with")
+      ->check(CLI::Range(-6.0f, 6.0f))
+      ->capture_default_str();
 }
 
 Result<WebFiles> web_files(const WebOptions& options) {
-  nlohmann::json manifest{{"name", fs::path(options.baked).filename().string()}, {"baked", "data/scene.glb"}, {"exposure", options.exposure}};
+  nlohmann::json manifest{{"name", fs::path(options.baked).filename().string()},
+                          {"baked", "data/scene.glb"},
+                          {"exposure", options.exposure}};
   auto camera = parse_camera(options.camera);
   if (!camera) return camera.error();
   if (*camera) {
@@ -111,7 +128,8 @@ Result<WebFiles> web_files(const WebOptions& options) {
     manifest["reference"] = "data/reference.exr";
   }
   manifest["environments"] = nlohmann::json::array();
-  const std::vector<std::string> specs = options.env.empty() ? std::vector<std::string>{"sky:elevation=35,azimuth=45"} : options.env;
+  const std::vector<std::string> specs = options.env.empty() ? std::vector<std::string>{"sky:elevation=35,azimuth=45"}
+                                                             : options.env;
   for (size_t i = 0; i < specs.size(); ++i) {
     auto env = load_light({specs[i], ""});
     if (!env) return env.error();
@@ -120,7 +138,8 @@ Result<WebFiles> web_files(const WebOptions& options) {
     const bool is_file = !specs[i].starts_with("sky:") && !specs[i].starts_with("uniform:");
     manifest["environments"].push_back({{"name", is_file ? env->name : specs[i]}, {"file", name}});
   }
-  files["lambent.json"] = {media_type("json"), manifest.dump(2, ' ', false, nlohmann::json::error_handler_t::replace) + "\n"};
+  files["lambent.json"] = {media_type("json"),
+                           manifest.dump(2, ' ', false, nlohmann::json::error_handler_t::replace) + "\n"};
   return files;
 }
 

@@ -29,8 +29,8 @@ struct WebFile {
 // By path relative to the page: index.html and what it needs; lambent.json, which says what to show; data/….
 using WebFiles = std::map<std::string, WebFile>;
 
-// Environments, files and skies alike, become .exr files of single floats, read as every other command reads them. The default is
-// a sky. Errors: the page is not built; anything wrong with a file or an option.
+// Environments, files and skies alike, become .exr files of single floats, read as every other command reads them. The
+// default is a sky. Errors: the page is not built; anything wrong with a file or an option.
 Result<WebFiles> web_files(const WebOptions& options);
 
 }  // namespace lambent::tool

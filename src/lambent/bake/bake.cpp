@@ -1,5 +1,5 @@
-// Follows: general-prt. T0 holds direct light with shadows; X_{k+1} = T0 + B X_k sums the Neumann series term by term, so X_k is
-// the transfer of up to k bounces. It is also the radiosity equation's Jacobi step.
+// Follows: general-prt. T0 holds direct light with shadows; X_{k+1} = T0 + B X_k sums the Neumann series term by term,
+// so X_k is the transfer of up to k bounces. It is also the radiosity equation's Jacobi step.
 #include <lambent/bake/bake.h>
 #include <lambent/bake/gather.h>
 #include <lambent/bake/kept_rows.h>
@@ -22,13 +22,15 @@ size_t checked_count(size_t receivers) { return (receivers + check_every - 1) / 
 
 // Solution vectors: T0, X and the next X; T0 of half the rays at the checked receivers.
 size_t solution_bytes(size_t receivers, size_t coefficients, int channels) {
-  return 4 * (receivers * (coefficients + 2 * row_width(coefficients, channels)) + checked_count(receivers) * coefficients);
+  return 4 *
+         (receivers * (coefficients + 2 * row_width(coefficients, channels)) + checked_count(receivers) * coefficients);
 }
 
 // Direction tables, corner maps and the scratch of every thread; an upper estimate.
 size_t table_bytes(size_t receivers, size_t triangles, size_t coefficients, size_t samples) {
   const size_t entries = gather_block * std::min(3 * samples, receivers);
-  return 8 * pad_lanes(samples) * 4 * (coefficients + 3) + 32 * triangles + size_t(thread_count()) * (48 * receivers + 48 * entries + 100 * samples);
+  return 8 * pad_lanes(samples) * 4 * (coefficients + 3) + 32 * triangles +
+         size_t(thread_count()) * (48 * receivers + 48 * entries + 100 * samples);
 }
 
 // Luminance-free measure of how far `part` of the rays is from all of them.
@@ -67,8 +69,8 @@ struct Baker {
     auto rays = lobe_rays.borrow();
     for (size_t r = first; r < first + count; ++r) {
       float* half = checked_row(sky, first, r);
-      trace_lobes(lobes, setup.tracer, receivers.origins[r], receivers.normals[r], r, *rays, sky.rows + (r - first) * sky.stride + harmonics(),
-                  half ? half + harmonics() : nullptr);
+      trace_lobes(lobes, setup.tracer, receivers.origins[r], receivers.normals[r], r, *rays,
+                  sky.rows + (r - first) * sky.stride + harmonics(), half ? half + harmonics() : nullptr);
     }
   }
 
@@ -84,7 +86,8 @@ struct Baker {
         for (size_t k = 0; k < harmonics(); ++k) row[k] *= float(clamped_cosine(sh_band(int(k))) / std::numbers::pi);
         for (size_t k = 0; k < irradiance.size(); ++k) {
           const glm::dvec3 axis = glm::normalize(glm::dvec3(options.lobes[k].axis));
-          row[harmonics() + k] = float(evaluate_legendre(irradiance[k], glm::dot(axis, glm::dvec3(receivers.normals[r]))) / std::numbers::pi);
+          row[harmonics() + k] = float(
+              evaluate_legendre(irradiance[k], glm::dot(axis, glm::dvec3(receivers.normals[r]))) / std::numbers::pi);
         }
         store_receiver(out, r, row);
       }
@@ -110,7 +113,8 @@ struct Baker {
           const float* row = rows.data() + (r - begin) * coefficients();
           store_receiver(out, r, {row, coefficients()});
           if (r % check_every == 0 && !buried[r])
-            errors[begin / gather_block].add(half_rows.data() + (r - begin) / check_every * coefficients(), row, coefficients());
+            errors[begin / gather_block].add(half_rows.data() + (r - begin) / check_every * coefficients(), row,
+                                             coefficients());
         }
         stage.advance(end - begin);
       });
@@ -135,13 +139,15 @@ struct Baker {
     const size_t blocks = (n() + gather_block - 1) / gather_block;
     std::vector<float> T0(n() * C), T0_half(checked_count(n()) * C);
     std::vector<uint8_t> buried(n());
-    const size_t fixed = solution_bytes(n(), C, setup.channels) + table_bytes(n(), scene.triangles.size(), C, size_t(options.samples)) +
+    const size_t fixed = solution_bytes(n(), C, setup.channels) +
+                         table_bytes(n(), scene.triangles.size(), C, size_t(options.samples)) +
                          lobe_set_bytes(options.samples, lobes.count());
     const size_t budget = options.memory > fixed ? options.memory - fixed : 0;
     KeptRows kept(blocks, budget, most_bytes(size_t(options.samples), n(), setup.channels));
 
     auto sky_of = [&](size_t begin) {
-      return GatherSky{T0.data() + begin * C, T0_half.data() + begin / check_every * C, C, &lobes, buried.data() + begin};
+      return GatherSky{T0.data() + begin * C, T0_half.data() + begin / check_every * C, C, &lobes,
+                       buried.data() + begin};
     };
     {
       ProgressStage stage(progress, "tracing", n());
@@ -184,11 +190,13 @@ struct Baker {
         auto again = gathered.borrow();
         if (!found) trace_gather(setup, *scratch.borrow(), begin, end - begin, again.get(), nullptr);
         const KeptRows::Block block = found ? *found : KeptRows::Block{again->rows.view(), again->half_rows.view()};
-        multiply_rows(block.rows, setup.channels, X.data(), width, setup.row_scale(size_t(options.samples)), next.data() + begin * width);
+        multiply_rows(block.rows, setup.channels, X.data(), width, setup.row_scale(size_t(options.samples)),
+                      next.data() + begin * width);
         for (size_t r = begin; r < end; ++r) add_T0(T0.data() + r * C, next.data() + r * width);
         if (last && has_halves()) {
           AlignedVector<float> half(block.half_rows.row_count * width);
-          multiply_rows(block.half_rows, setup.channels, X.data(), width, setup.row_scale(setup.sets.half), half.data());
+          multiply_rows(block.half_rows, setup.channels, X.data(), width, setup.row_scale(setup.sets.half),
+                        half.data());
           for (size_t r = begin, i = 0; r < end; r += check_every, ++i) {
             add_T0(T0_half.data() + r / check_every * C, half.data() + i * width);
             if (!buried[r]) errors[b].add(half.data() + i * width, next.data() + r * width, width);
@@ -219,7 +227,8 @@ struct Baker {
     return std::move(out.transfer);
   }
 
-  void finish_report(const std::vector<uint8_t>& buried, const std::vector<ErrorSum>& errors, std::chrono::steady_clock::time_point start) {
+  void finish_report(const std::vector<uint8_t>& buried, const std::vector<ErrorSum>& errors,
+                     std::chrono::steady_clock::time_point start) {
     for (uint8_t b : buried) report.buried += b;
     report.trace_seconds = seconds_since(start);
     ErrorSum all;
@@ -230,8 +239,10 @@ struct Baker {
 
 Result<void> check_options(const BakeOptions& o) {
   if (auto ok = check_light_basis(o, o.lobes.empty() ? 1 : 0); !ok) return ok;
-  if (o.samples < 1 || o.samples > 1 << 20) return Error{"samples", "must lie between 1 and 1048576, not " + std::to_string(o.samples)};
-  if (o.bounces < 0 || o.bounces > 64) return Error{"bounces", "must lie between 0 and 64, not " + std::to_string(o.bounces)};
+  if (o.samples < 1 || o.samples > 1 << 20)
+    return Error{"samples", "must lie between 1 and 1048576, not " + std::to_string(o.samples)};
+  if (o.bounces < 0 || o.bounces > 64)
+    return Error{"bounces", "must lie between 0 and 64, not " + std::to_string(o.bounces)};
   return {};
 }
 
@@ -239,8 +250,10 @@ Result<void> check_options(const BakeOptions& o) {
 
 Result<void> check_light_basis(const BakeOptions& o, int least_order) {
   if (o.order < least_order || o.order > max_sh_order)
-    return Error{"order", "must lie between " + std::to_string(least_order) + " and " + std::to_string(max_sh_order) + ", not " + std::to_string(o.order)};
-  if (o.light().count() > max_columns) return Error{"lobes", "at most " + std::to_string(max_columns) + " columns of light are possible"};
+    return Error{"order", "must lie between " + std::to_string(least_order) + " and " + std::to_string(max_sh_order) +
+                              ", not " + std::to_string(o.order)};
+  if (o.light().count() > max_columns)
+    return Error{"lobes", "at most " + std::to_string(max_columns) + " columns of light are possible"};
   for (const Lobe& lobe : o.lobes)
     if (!is_lobe(o.lobe_kind, lobe)) return Error{"lobes", "a lobe has no unit axis, or a sharpness out of range"};
   return {};
@@ -261,12 +274,17 @@ Result<Transfer> bake(const Scene& scene, const Tracer& tracer, const Receivers&
   BakeReport unwanted;
   BakeReport& r = report ? *report : unwanted;
   r = {};
-  Baker baker{scene, receivers, options,
-              make_gather_setup(scene, tracer, receivers, options.order, options.shadows ? options.samples : 1, options.seed), progress, r};
+  Baker baker{
+      scene,
+      receivers,
+      options,
+      make_gather_setup(scene, tracer, receivers, options.order, options.shadows ? options.samples : 1, options.seed),
+      progress,
+      r};
   const size_t least = least_memory(receivers.count(), baker.setup.channels == 3, options);
   if (options.memory < least)
-    return Error{scene.path, "baking needs at least " + std::to_string(least) + " bytes of working memory, and was allowed " +
-                                 std::to_string(options.memory)};
+    return Error{scene.path, "baking needs at least " + std::to_string(least) +
+                                 " bytes of working memory, and was allowed " + std::to_string(options.memory)};
   auto result = !options.shadows ? baker.unshadowed() : options.bounces > 0 ? baker.bounced() : baker.direct();
   if (!result) return result;
   r.receivers = receivers.count(), r.bytes = result->bytes();

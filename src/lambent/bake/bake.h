@@ -11,16 +11,16 @@
 namespace lambent {
 
 struct BakeOptions {
-  int order = 6;                               // SH bands of the light, [1, 16]: order^2 coefficients; 0 with lobes alone
+  int order = 6;  // SH bands of the light, [1, 16]: order^2 coefficients; 0 with lobes alone
   LobeKind lobe_kind = LobeKind::von_mises_fisher;
-  std::vector<Lobe> lobes;                     // more columns, one each: lamps beside the harmonics, or a basis of their own
-  int samples = 1024;                          // rays a receiver, [1, 2^20]; error falls a little faster than 1/sqrt.
-                                               // Sharp lobes share as many again, at least 64 each
-  int bounces = 3;                             // reflections between surfaces, [0, 64]
-  bool shadows = true;                         // false: light everywhere as if nothing stood in its way, and no bounces
-  size_t memory = size_t{4} << 30;             // bytes of working memory beyond scene and result; less means rays traced again
-  uint32_t seed = 1;                           // of the ray directions
-  Precision precision = Precision::half;       // of the stored transfer
+  std::vector<Lobe> lobes;          // more columns, one each: lamps beside the harmonics, or a basis of their own
+  int samples = 1024;               // rays a receiver, [1, 2^20]; error falls a little faster than 1/sqrt.
+                                    // Sharp lobes share as many again, at least 64 each
+  int bounces = 3;                  // reflections between surfaces, [0, 64]
+  bool shadows = true;              // false: light everywhere as if nothing stood in its way, and no bounces
+  size_t memory = size_t{4} << 30;  // bytes of working memory beyond scene and result; less means rays traced again
+  uint32_t seed = 1;                // of the ray directions
+  Precision precision = Precision::half;  // of the stored transfer
 
   LightBasis light() const { return {order, lobe_kind, lobes, {}}; }
 };
@@ -33,8 +33,8 @@ struct BakeReport {
   size_t rays = 0;                   // traced in all
   size_t bytes = 0;                  // of the transfer
   size_t operator_bytes = 0;         // of the hit rows kept
-  double operator_kept = 1;          // fraction of the hit rows kept in memory; the rest was traced again for each bounce
-  size_t working_memory = 0;         // bytes, what the stages below allocated at their peak
+  double operator_kept = 1;   // fraction of the hit rows kept in memory; the rest was traced again for each bounce
+  size_t working_memory = 0;  // bytes, what the stages below allocated at their peak
   double trace_seconds = 0, bounce_seconds = 0;
   // Estimated relative RMS error of the transfer vectors, from half-sample gathers at one receiver in 16:
   // sqrt(sum |half - full|^2 / sum |full|^2). Halves of one low-discrepancy set lean to either side of it, so this

@@ -75,7 +75,8 @@ TEST(Bake, OpenPlaneIsTheClampedCosine) {
   const Scene plane = make_quad(Vec3(0), a, c, 2, 2, Vec3(0.8f));
   const Vec3 n = glm::normalize(glm::cross(a, c));
   for (bool shadows : {true, false}) {
-    const Baking b = bake_scene(plane, {.order = 6, .samples = 4096, .bounces = 0, .shadows = shadows, .precision = Precision::single});
+    const Baking b = bake_scene(
+        plane, {.order = 6, .samples = 4096, .bounces = 0, .shadows = shadows, .precision = Precision::single});
     float y[36];
     evaluate_sh(6, n, y);
     for (size_t r = 0; r < b.receivers.count(); ++r) {
@@ -144,10 +145,12 @@ TEST(Bake, IntegratingSphereWithAPort) {
 }
 
 TEST(Bake, AgreesWithThePathTracerUnderSkewLight) {
-  // 16 receivers, 16,384 paths each: noise of the paths is about 0.5%, of the bake's 4,096 rays and half floats about the same.
+  // 16 receivers, 16,384 paths each: noise of the paths is about 0.5%, of the bake's 4,096 rays and half floats about
+  // the same.
   constexpr float noise = 0.03f;
   Scene scene;
-  const uint32_t red = add_material(scene, "red", Vec3(0.8f, 0.2f, 0.1f)), grey = add_material(scene, "grey", Vec3(0.6f));
+  const uint32_t red = add_material(scene, "red", Vec3(0.8f, 0.2f, 0.1f)),
+                 grey = add_material(scene, "grey", Vec3(0.6f));
   add_quad(scene, grey, "floor", Vec3(-1, 0, -1), Vec3(0, 0, 2), Vec3(2, 0, 0), 24, 24);
   add_quad(scene, red, "wall", Vec3(-1, 0, -1), Vec3(2, 0, 0), Vec3(0, 1.5f, 0), 24, 18);
   add_sphere(scene, grey, "ball", Vec3(0.3f, 0.5f, -0.2f), 0.35f, 3);
@@ -157,7 +160,8 @@ TEST(Bake, AgreesWithThePathTracerUnderSkewLight) {
   const Environment env = reconstruct_environment(light);
   for (size_t k = 0; k < 16; ++k) {
     const size_t r = k * b.receivers.count() / 16 + 7;
-    const Vec3 truth = exit_radiance(b.scene, env, b.receivers.origins[r], b.receivers.normals[r], 2, 16384, uint32_t(k));
+    const Vec3 truth =
+        exit_radiance(b.scene, env, b.receivers.origins[r], b.receivers.normals[r], 2, 16384, uint32_t(k));
     for (int c = 0; c < 3; ++c) EXPECT_NEAR(lit.at(r)[c], truth[c], noise) << "receiver " << r << " channel " << c;
   }
 }
@@ -227,7 +231,8 @@ TEST(Bake, EstimatesItsErrorNotFarFromTheTruth) {
   double difference = 0, total = 0;
   for (size_t r = 0; r < a.receivers.count(); ++r) {
     const auto x = load_receiver(a.transfer, r), y = load_receiver(b.transfer, r);
-    for (size_t k = 0; k < x.size(); ++k) difference += double(x[k] - y[k]) * (x[k] - y[k]), total += double(y[k]) * y[k];
+    for (size_t k = 0; k < x.size(); ++k)
+      difference += double(x[k] - y[k]) * (x[k] - y[k]), total += double(y[k]) * y[k];
   }
   const double actual = std::sqrt(difference / total);
   // Halves of a low-discrepancy set lean to opposite sides, so the estimate errs upwards, by up to about two.
@@ -239,7 +244,13 @@ TEST(Bake, RefusesAbsurdOptions) {
   const Scene scene = make_quad(Vec3(0), Vec3(1, 0, 0), Vec3(0, 1, 0), 1, 1, Vec3(0.5f));
   auto tracer = Tracer::build(scene);
   const Receivers receivers = make_vertex_receivers(scene);
-  for (BakeOptions o : {BakeOptions{.order = 0}, {.order = 1000}, {.samples = 0}, {.samples = -5}, {.bounces = -1}, {.bounces = 1000}, {.memory = 10}})
+  for (BakeOptions o : {BakeOptions{.order = 0},
+                        {.order = 1000},
+                        {.samples = 0},
+                        {.samples = -5},
+                        {.bounces = -1},
+                        {.bounces = 1000},
+                        {.memory = 10}})
     EXPECT_FALSE(bake(scene, *tracer, receivers, o));
   Progress cancelled;
   cancelled.cancel();

@@ -1,4 +1,5 @@
-// Follows: radiosity, "Discussion 3" ("Spherical Harmonics" and "vector irradiance" are keywords), "Radiosity Normal Mapping".
+// Follows: radiosity, "Discussion 3" ("Spherical Harmonics" and "vector irradiance" are keywords), "Radiosity Normal
+// Mapping".
 #include <lambent/basis/sh.h>
 #include <lambent/bake/directional.h>
 #include <lambent/bake/kernels.h>
@@ -15,9 +16,7 @@ constexpr int most_rows = 9;
 void row_weights(DirectionalKind kind, Vec3 d, const Mat3& frame, float* out) {
   const float scale = 1 / std::max(glm::dot(d, frame[2]), least_cosine);
   switch (kind) {
-    case DirectionalKind::none:
-      out[0] = 1;
-      break;
+    case DirectionalKind::none: out[0] = 1; break;
     case DirectionalKind::sh2:
     case DirectionalKind::sh3: {
       const int order = kind == DirectionalKind::sh2 ? 2 : 3;
@@ -35,8 +34,8 @@ void row_weights(DirectionalKind kind, Vec3 d, const Mat3& frame, float* out) {
 }
 
 template <class Basis>
-void gather_on(const GatherSetup& setup, const Basis& basis, const Lamps& lamps, int lamp_samples, DirectionalKind kind, const float* x,
-               size_t width, size_t first, size_t count, float* out) {
+void gather_on(const GatherSetup& setup, const Basis& basis, const Lamps& lamps, int lamp_samples, DirectionalKind kind,
+               const float* x, size_t width, size_t first, size_t count, float* out) {
   const DirectionSets& sets = setup.sets;
   const size_t rays = size_t(sets.samples), rows = size_t(directional_rows(kind));
   AlignedVector<float> dx(sets.stride), dy(sets.stride), dz(sets.stride);
@@ -51,7 +50,8 @@ void gather_on(const GatherSetup& setup, const Basis& basis, const Lamps& lamps,
     float* own = out + i * rows * width;
     const DirectionChoice choice = choose_directions(sets, normal, setup.seed, r);
     const size_t base = size_t(choice.set) * sets.stride;
-    rotate_directions(choice.rotation, sets.x.data() + base, sets.y.data() + base, sets.z.data() + base, sets.stride, dx.data(), dy.data(), dz.data());
+    rotate_directions(choice.rotation, sets.x.data() + base, sets.y.data() + base, sets.z.data() + base, sets.stride,
+                      dx.data(), dy.data(), dz.data());
     setup.tracer.closest_fan(origin, {dx.data(), dy.data(), dz.data(), rays}, hits.data());
     lights.clear();
     sample_lamps(setup.scene, setup.tracer, lamps, origin, normal, lamp_samples, rays, setup.seed, r, lights);
@@ -85,16 +85,19 @@ void gather_on(const GatherSetup& setup, const Basis& basis, const Lamps& lamps,
     for (const LampLight& light : lights) {
       row_weights(kind, light.direction, frame, weights);
       for (size_t row = 0; row < rows; ++row)
-        for (int c = 0; c < 3; ++c) own[row * width + size_t(light.group) * 3 + size_t(c)] += weights[row] * light.value[c];
+        for (int c = 0; c < 3; ++c)
+          own[row * width + size_t(light.group) * 3 + size_t(c)] += weights[row] * light.value[c];
     }
   }
 }
 
 }  // namespace
 
-void gather_directional(const GatherSetup& setup, const Lamps& lamps, int lamp_samples, DirectionalKind kind, const float* x, size_t width,
-                        size_t first, size_t count, float* out) {
-  std::visit([&](const auto& basis) { gather_on(setup, basis, lamps, lamp_samples, kind, x, width, first, count, out); }, setup.receivers.basis);
+void gather_directional(const GatherSetup& setup, const Lamps& lamps, int lamp_samples, DirectionalKind kind,
+                        const float* x, size_t width, size_t first, size_t count, float* out) {
+  std::visit(
+      [&](const auto& basis) { gather_on(setup, basis, lamps, lamp_samples, kind, x, width, first, count, out); },
+      setup.receivers.basis);
 }
 
 }  // namespace lambent

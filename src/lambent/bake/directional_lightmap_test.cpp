@@ -8,7 +8,8 @@
 namespace lambent {
 namespace {
 
-constexpr DirectionalKind kinds[] = {DirectionalKind::sh2, DirectionalKind::sh3, DirectionalKind::hl2, DirectionalKind::vector};
+constexpr DirectionalKind kinds[] = {DirectionalKind::sh2, DirectionalKind::sh3, DirectionalKind::hl2,
+                                     DirectionalKind::vector};
 
 // A tilted plane: no axis is the world's.
 Scene plane() { return make_quad(Vec3(0), Vec3(1, 0.3f, 0), Vec3(0.2f, -0.4f, 1), 2, 2, Vec3(0.5f)); }
@@ -25,7 +26,8 @@ struct Baked {
   }
 };
 
-Baked bake_rows(const Scene& scene, const Environment* sky, DirectionalKind kind, LightmapOptions options = {.samples = 4096, .bounces = 0}) {
+Baked bake_rows(const Scene& scene, const Environment* sky, DirectionalKind kind,
+                LightmapOptions options = {.samples = 4096, .bounces = 0}) {
   Baked b{make_vertex_receivers(scene), {}};
   options.directional = kind, options.precision = Precision::single;
   auto tracer = Tracer::build(scene);
@@ -39,7 +41,8 @@ TEST(DirectionalLightmap, OfASunAreTheClosedForms) {
   Scene scene = plane();
   const Vec3 s = glm::normalize(Vec3(0.3f, -0.8f, 0.4f)) * -1.0f, I(3, 2, 1);  // to the sun: above the plane's front?
   const Vec3 normal = scene.normals[0], to_sun = glm::dot(s, normal) > 0 ? s : -s;
-  scene.lights.push_back({.name = "sun", .kind = PunctualLight::Kind::directional, .direction = -to_sun, .intensity = I});
+  scene.lights.push_back(
+      {.name = "sun", .kind = PunctualLight::Kind::directional, .direction = -to_sun, .intensity = I});
   const Vec3 n = glm::normalize(normal + 0.5f * receiver_frame(normal)[0] - 0.2f * receiver_frame(normal)[1]);
   for (DirectionalKind kind : kinds) {
     const Baked b = bake_rows(scene, nullptr, kind);
@@ -57,13 +60,15 @@ TEST(DirectionalLightmap, OfASunAreTheClosedForms) {
     }
     // One lamp is what the vector stands for: exact for any normal.
     if (kind == DirectionalKind::vector) {
-      EXPECT_NEAR(evaluate_directional_light(kind, rows, frame, n).x, I.x * std::max(0.0f, glm::dot(n, to_sun)) / pi, 1e-4f);
+      EXPECT_NEAR(evaluate_directional_light(kind, rows, frame, n).x, I.x * std::max(0.0f, glm::dot(n, to_sun)) / pi,
+                  1e-4f);
     }
   }
 }
 
 TEST(DirectionalLightmap, OfAUniformSkyAboveAPlane) {
-  // Light from the half-space above the plane alone: a normal at the angle t receives (1 + cos t) / 2 of it. The plane is black.
+  // Light from the half-space above the plane alone: a normal at the angle t receives (1 + cos t) / 2 of it. The plane
+  // is black.
   Scene scene = plane();
   scene.materials[0].base_color = Vec3(0);
   const Environment sky = make_environment("uniform", 8, 4, [](Vec3) { return Vec3(1, 2, 4); });
@@ -74,7 +79,9 @@ TEST(DirectionalLightmap, OfAUniformSkyAboveAPlane) {
     // A receiver in the middle of the plane.
     size_t r = 0;
     for (size_t i = 0; i < b.receivers.count(); ++i)
-      if (glm::length(b.receivers.origins[i] - Vec3(0.6f, -0.05f, 0.5f)) < glm::length(b.receivers.origins[r] - Vec3(0.6f, -0.05f, 0.5f))) r = i;
+      if (glm::length(b.receivers.origins[i] - Vec3(0.6f, -0.05f, 0.5f)) <
+          glm::length(b.receivers.origins[r] - Vec3(0.6f, -0.05f, 0.5f)))
+        r = i;
     const std::vector<Vec3> rows = b.rows(r);
     if (kind == DirectionalKind::hl2) {
       // Exact for its own directions, whose cosine to the normal is 1 / sqrt(3): within the clamp at grazing angles.
@@ -83,10 +90,14 @@ TEST(DirectionalLightmap, OfAUniformSkyAboveAPlane) {
     for (float t : {0.0f, 0.3f, 0.6f}) {
       const Vec3 n = std::cos(t) * normal + std::sin(t) * glm::normalize(frame[0] + 0.7f * frame[1]);
       const float expected = (1 + std::cos(t)) / 2;
-      // Order 3 holds the half-space's irradiance to 1%, order 2 and the vector to 6%, Half-Life 2's blend of three values of
-      // (1 + cos 55) / 2 is all alike: 0.79.
-      const float tolerance = kind == DirectionalKind::sh3 ? 0.02f : kind == DirectionalKind::hl2 ? 0.23f : kind == DirectionalKind::vector ? 0.16f : 0.08f;
-      EXPECT_NEAR(evaluate_directional_light(kind, rows, frame, n).y / 2, expected, tolerance) << int(kind) << " at " << t;
+      // Order 3 holds the half-space's irradiance to 1%, order 2 and the vector to 6%, Half-Life 2's blend of three
+      // values of (1 + cos 55) / 2 is all alike: 0.79.
+      const float tolerance = kind == DirectionalKind::sh3    ? 0.02f
+                            : kind == DirectionalKind::hl2    ? 0.23f
+                            : kind == DirectionalKind::vector ? 0.16f
+                                                              : 0.08f;
+      EXPECT_NEAR(evaluate_directional_light(kind, rows, frame, n).y / 2, expected, tolerance)
+          << int(kind) << " at " << t;
     }
   }
 }
@@ -94,16 +105,19 @@ TEST(DirectionalLightmap, OfAUniformSkyAboveAPlane) {
 TEST(DirectionalLightmap, ItsOwnNormalGivesTheLightmap) {
   // With bounces and lamps of all kinds, E(receiver's normal) by the vector is E itself, ray by ray.
   Scene scene;
-  const uint32_t red = add_material(scene, "red", Vec3(0.8f, 0.2f, 0.1f)), lamp = add_material(scene, "lamp", Vec3(0.3f));
+  const uint32_t red = add_material(scene, "red", Vec3(0.8f, 0.2f, 0.1f)),
+                 lamp = add_material(scene, "lamp", Vec3(0.3f));
   scene.materials[lamp].emissive = Vec3(6, 5, 3);
   add_quad(scene, red, "floor", Vec3(-1, 0, -1), Vec3(0, 0, 2), Vec3(2, 0, 0), 6, 6);
   add_quad(scene, red, "wall", Vec3(-1, 0, -1), Vec3(2, 0, 0), Vec3(0, 1.5f, 0), 6, 6);
   add_quad(scene, lamp, "lamp", Vec3(-0.6f, 1.4f, 0.1f), Vec3(0.4f, 0.1f, 0), Vec3(0, 0.05f, 0.3f), 1, 1);
-  const Environment sky = make_environment("skew", 16, 8, [](Vec3 d) { return Vec3(0.2f) + std::max(0.0f, d.x) * Vec3(1, 0.5f, 2); });
+  const Environment sky =
+      make_environment("skew", 16, 8, [](Vec3 d) { return Vec3(0.2f) + std::max(0.0f, d.x) * Vec3(1, 0.5f, 2); });
   const Baked plain = bake_rows(scene, &sky, DirectionalKind::none, {.samples = 1024, .bounces = 2});
   const Baked vector = bake_rows(scene, &sky, DirectionalKind::vector, {.samples = 1024, .bounces = 2});
   for (size_t r = 0; r < plain.receivers.count(); r += 5) {
-    const Vec3 n = plain.receivers.normals[r], e = plain.rows(r)[0], v = evaluate_directional_light(DirectionalKind::vector, vector.rows(r), receiver_frame(n), n);
+    const Vec3 n = plain.receivers.normals[r], e = plain.rows(r)[0],
+               v = evaluate_directional_light(DirectionalKind::vector, vector.rows(r), receiver_frame(n), n);
     // Rays below cosine 0.02, 0.04% of all, count for less; halves in the operator round.
     for (int c = 0; c < 3; ++c) EXPECT_NEAR(v[c], e[c], 2e-3f * (1 + e[c])) << r;
   }

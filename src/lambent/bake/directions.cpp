@@ -56,7 +56,8 @@ DirectionSets make_hemicube_set(int order, int samples) {
     double form_factor;
   };
   std::vector<Pixel> pixels;
-  // Integrals of cos / pi per solid angle over [0, a] x [0, b] of the top face, z = 1, and of a side, x = 1, from its foot up.
+  // Integrals of cos / pi per solid angle over [0, a] x [0, b] of the top face, z = 1, and of a side, x = 1, from its
+  // foot up.
   auto top = [](double a, double b) {
     const double p = std::sqrt(1 + a * a), q = std::sqrt(1 + b * b);
     return (a / p * std::atan(b / p) + b / q * std::atan(a / q)) / (2 * std::numbers::pi);
@@ -65,12 +66,15 @@ DirectionSets make_hemicube_set(int order, int samples) {
     const double q = std::sqrt(1 + z * z);
     return (std::atan(y) - std::atan(y / q) / q) / (2 * std::numbers::pi);
   };
-  auto over_pixel = [](auto f, double a0, double a1, double b0, double b1) { return f(a1, b1) - f(a0, b1) - f(a1, b0) + f(a0, b0); };
+  auto over_pixel = [](auto f, double a0, double a1, double b0, double b1) {
+    return f(a1, b1) - f(a0, b1) - f(a1, b0) + f(a0, b0);
+  };
   auto edge = [&](int i) { return 2.0 * i / n - 1; };
   for (int j = 0; j < n; ++j)
     for (int i = 0; i < n; ++i) {
       const double x0 = edge(i), x1 = edge(i + 1), y0 = edge(j), y1 = edge(j + 1);
-      pixels.push_back({glm::normalize(Vec3(float(x0 + x1) / 2, float(y0 + y1) / 2, 1)), over_pixel(top, x0, x1, y0, y1)});
+      pixels.push_back(
+          {glm::normalize(Vec3(float(x0 + x1) / 2, float(y0 + y1) / 2, 1)), over_pixel(top, x0, x1, y0, y1)});
     }
   for (int face = 0; face < 4; ++face)
     for (int j = n / 2; j < n; ++j)
@@ -103,8 +107,11 @@ DirectionChoice choose_directions(const DirectionSets& sets, Vec3 n, uint32_t se
   choice.a = sin_b > 0 ? std::atan2(n.y, n.x) : 0.0f;
   choice.b = std::atan2(sin_b, n.z);
   choice.c = 2 * pi * to_unit_float(uint32_t(bits >> 32));
-  auto turn_z = [](float t) { return Mat3(Vec3(std::cos(t), std::sin(t), 0), Vec3(-std::sin(t), std::cos(t), 0), Vec3(0, 0, 1)); };
-  const Mat3 turn_y(Vec3(std::cos(choice.b), 0, -std::sin(choice.b)), Vec3(0, 1, 0), Vec3(std::sin(choice.b), 0, std::cos(choice.b)));
+  auto turn_z = [](float t) {
+    return Mat3(Vec3(std::cos(t), std::sin(t), 0), Vec3(-std::sin(t), std::cos(t), 0), Vec3(0, 0, 1));
+  };
+  const Mat3 turn_y(Vec3(std::cos(choice.b), 0, -std::sin(choice.b)), Vec3(0, 1, 0),
+                    Vec3(std::sin(choice.b), 0, std::cos(choice.b)));
   choice.rotation = turn_z(choice.a) * turn_y * turn_z(choice.c);
   return choice;
 }

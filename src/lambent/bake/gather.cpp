@@ -1,4 +1,5 @@
-// Follows: general-prt (transfer by the Neumann recursion, interpolated between receivers), radiosity (the same operator).
+// Follows: general-prt (transfer by the Neumann recursion, interpolated between receivers), radiosity (the same
+// operator).
 #include <lambent/bake/gather.h>
 #include <lambent/bake/kernels.h>
 #include <lambent/core/check.h>
@@ -19,8 +20,8 @@ constexpr size_t lookahead = 16;
 
 bool is_grey(Vec3 c) { return c.x == c.y && c.y == c.z; }
 
-// A block's entries as its rays meet them, merged by row and column. Tables as long as there are columns find an entry without
-// searching and need no clearing: what an earlier row or block left there is told by its number.
+// A block's entries as its rays meet them, merged by row and column. Tables as long as there are columns find an entry
+// without searching and need no clearing: what an earlier row or block left there is told by its number.
 class BlockBuilder {
  public:
   explicit BlockBuilder(size_t column_limit) : places_(column_limit) {}
@@ -30,7 +31,9 @@ class BlockBuilder {
     entries_.clear(), row_ends_.clear(), columns_.clear(), counts_.clear();
   }
   void begin_row() {
-    if (++row_ == 0) std::fill(places_.begin(), places_.end(), Place{}), ++row_;  // numbers begin anew after four thousand million rows
+    if (++row_ == 0)
+      std::fill(places_.begin(), places_.end(), Place{}),
+          ++row_;  // numbers begin anew after four thousand million rows
   }
   void prefetch(uint32_t column) const { __builtin_prefetch(&places_[column]); }
   void end_row() { row_ends_.push_back(uint32_t(entries_.size())); }
@@ -74,8 +77,8 @@ class BlockBuilder {
  private:
   // Sixteen bytes, so that looking one up touches one cache line.
   struct alignas(16) Place {
-    uint32_t row = 0;                // the last that met this column, counted over all blocks
-    uint32_t block = 0, local = 0;   // and its number among that block's columns
+    uint32_t row = 0;               // the last that met this column, counted over all blocks
+    uint32_t block = 0, local = 0;  // and its number among that block's columns
     uint32_t entry = 0;
   };
   struct Entry {
@@ -98,14 +101,21 @@ struct Fan {
   DirectionChoice choice{};
 
   explicit Fan(const DirectionSets& s)
-      : sets(s), rotator(s.order), x(s.stride), y(s.stride), z(s.stride), visible(s.stride), lobe(s.stride),
-        half(size_t(sh_count(s.order))), rest(half.size()) {}
+      : sets(s),
+        rotator(s.order),
+        x(s.stride),
+        y(s.stride),
+        z(s.stride),
+        visible(s.stride),
+        lobe(s.stride),
+        half(size_t(sh_count(s.order))),
+        rest(half.size()) {}
 
   Directions aim(Vec3 normal, uint32_t seed, size_t receiver) {
     choice = choose_directions(sets, normal, seed, receiver);
     const size_t base = size_t(choice.set) * sets.stride;
-    rotate_directions(choice.rotation, sets.x.data() + base, sets.y.data() + base, sets.z.data() + base, sets.stride, x.data(),
-                      y.data(), z.data());
+    rotate_directions(choice.rotation, sets.x.data() + base, sets.y.data() + base, sets.z.data() + base, sets.stride,
+                      x.data(), y.data(), z.data());
     return {x.data(), y.data(), z.data(), size_t(sets.samples)};
   }
 
@@ -114,11 +124,12 @@ struct Fan {
     const size_t coefficients = half.size();
     if (coefficients == 0) return;  // light of lobes alone
     const float* table = sets.table.data() + size_t(choice.set) * coefficients * sets.stride;
-    weighted_rows(table, coefficients, sets.stride, visible.data(), sets.half >= size_t(sets.samples) ? sets.stride : sets.half,
-                  half.data());
+    weighted_rows(table, coefficients, sets.stride, visible.data(),
+                  sets.half >= size_t(sets.samples) ? sets.stride : sets.half, half.data());
     std::fill(rest.begin(), rest.end(), 0.0f);
     if (sets.half < size_t(sets.samples))
-      weighted_rows(table + sets.half, coefficients, sets.stride, visible.data() + sets.half, sets.stride - sets.half, rest.data());
+      weighted_rows(table + sets.half, coefficients, sets.stride, visible.data() + sets.half, sets.stride - sets.half,
+                    rest.data());
     for (size_t k = 0; k < coefficients; ++k) row[k] = (half[k] + rest[k]) / float(sets.samples);
     rotator.rotate(choice.a, choice.b, choice.c, {row, coefficients});
     if (!half_row) return;
@@ -134,7 +145,9 @@ struct Fan {
       evaluate_on_fan(lobes, k, x.data(), y.data(), z.data(), sets.stride, lobe.data());
       float first = 0, second = 0;
       weighted_rows(lobe.data(), 1, sets.stride, visible.data(), sets.half < samples ? sets.half : sets.stride, &first);
-      if (sets.half < samples) weighted_rows(lobe.data() + sets.half, 1, sets.stride, visible.data() + sets.half, sets.stride - sets.half, &second);
+      if (sets.half < samples)
+        weighted_rows(lobe.data() + sets.half, 1, sets.stride, visible.data() + sets.half, sets.stride - sets.half,
+                      &second);
       row[k] = (first + second) / float(samples);
       if (half_row) half_row[k] = first / float(half_rays);
     }
@@ -164,9 +177,11 @@ bool is_buried(const Tracer& tracer, const SpatialBasis& basis, Vec3 origin, con
       x[k] = fan.x[j], y[k] = fan.y[j], z[k] = fan.z[j];
     }
     tracer.closest_fan(origin, {x, y, z, m}, hits);
-    std::visit([&](const auto& b) {
-      for (size_t k = 0; k < m; ++k) backs += hits[k].triangle != none && !b.find(hits[k].triangle, hits[k].front);
-    }, basis);
+    std::visit(
+        [&](const auto& b) {
+          for (size_t k = 0; k < m; ++k) backs += hits[k].triangle != none && !b.find(hits[k].triangle, hits[k].front);
+        },
+        basis);
     if (backs == 0) return false;
   }
   return 2 * backs > n;
@@ -182,14 +197,18 @@ struct GatherScratch {
   std::vector<Hit> hits;
   BlockBuilder rows, half_rows;
   std::vector<LampLight> lights;
-  GatherScratch(const DirectionSets& sets, size_t receivers) : fan(sets), hits(size_t(sets.samples)), rows(receivers), half_rows(receivers) {}
+  GatherScratch(const DirectionSets& sets, size_t receivers)
+      : fan(sets), hits(size_t(sets.samples)), rows(receivers), half_rows(receivers) {}
 };
 void DeleteScratch::operator()(GatherScratch* scratch) const { delete scratch; }
-ScratchPointer make_gather_scratch(const GatherSetup& setup) { return ScratchPointer(new GatherScratch(setup.sets, setup.receivers.count())); }
+ScratchPointer make_gather_scratch(const GatherSetup& setup) {
+  return ScratchPointer(new GatherScratch(setup.sets, setup.receivers.count()));
+}
 
-GatherSetup make_gather_setup(const Scene& scene, const Tracer& tracer, const Receivers& receivers, int order, int samples, uint32_t seed,
-                              DirectionWarp warp) {
-  GatherSetup setup{scene, tracer, receivers, make_direction_sets(order, samples, set_count, seed, warp), seed, 1, 1.0f, {}, {}};
+GatherSetup make_gather_setup(const Scene& scene, const Tracer& tracer, const Receivers& receivers, int order,
+                              int samples, uint32_t seed, DirectionWarp warp) {
+  GatherSetup setup{scene, tracer, receivers, make_direction_sets(order, samples, set_count, seed, warp), seed, 1,
+                    1.0f,  {},     {}};
   // Weights are sums over rays: halves hold 65504.
   setup.weight_unit = std::min(1.0f, 16384.0f / float(samples));
   bool coloured = false;
@@ -231,8 +250,8 @@ void prefetch_places(const CornerReceivers& basis, const Hit& h, const BlockBuil
 }
 
 template <class Basis>
-void trace_gather_on(const GatherSetup& setup, const Basis& basis, GatherScratch& scratch, size_t first, size_t count, GatherBlock* block,
-                     const GatherSky* sky, const GatherDirect* direct) {
+void trace_gather_on(const GatherSetup& setup, const Basis& basis, GatherScratch& scratch, size_t first, size_t count,
+                     GatherBlock* block, const GatherSky* sky, const GatherDirect* direct) {
   const DirectionSets& sets = setup.sets;
   const size_t rays = size_t(sets.samples), half = std::min(sets.half, rays);
   Fan& fan = scratch.fan;
@@ -241,7 +260,8 @@ void trace_gather_on(const GatherSetup& setup, const Basis& basis, GatherScratch
   for (size_t i = 0; i < count; ++i) {
     const size_t r = first + i;
     const bool checked = block && r % check_every == 0;
-    setup.tracer.closest_fan(setup.receivers.origins[r], fan.aim(setup.receivers.normals[r], setup.seed, r), scratch.hits.data());
+    setup.tracer.closest_fan(setup.receivers.origins[r], fan.aim(setup.receivers.normals[r], setup.seed, r),
+                             scratch.hits.data());
     scratch.rows.begin_row();
     if (checked) scratch.half_rows.begin_row();
     size_t backs = 0;
@@ -253,7 +273,8 @@ void trace_gather_on(const GatherSetup& setup, const Basis& basis, GatherScratch
     };
     if (direct) {
       scratch.lights.clear();
-      sample_lamps(setup.scene, setup.tracer, direct->lamps, setup.receivers.origins[r], normal, direct->samples, rays, setup.seed, r, scratch.lights);
+      sample_lamps(setup.scene, setup.tracer, direct->lamps, setup.receivers.origins[r], normal, direct->samples, rays,
+                   setup.seed, r, scratch.lights);
       for (const LampLight& light : scratch.lights) add_light(light, 1);
     }
     const bool sees_sky = direct && direct->lamps.sky, sees_lamps = direct && !direct->lamps.of_triangle.empty();
@@ -264,13 +285,16 @@ void trace_gather_on(const GatherSetup& setup, const Basis& basis, GatherScratch
       const float share = sets.weights.empty() ? 1.0f : sets.weights[j];
       fan.visible[j] = h.triangle == none ? share : 0.0f;
       if (h.triangle == none) {
-        if (sees_sky) add_light(met_sky(direct->lamps, direction(j), glm::dot(normal, direction(j)), direct->samples, rays), share);
+        if (sees_sky)
+          add_light(met_sky(direct->lamps, direction(j), glm::dot(normal, direction(j)), direct->samples, rays), share);
         continue;
       }
       if (sees_lamps) {
         const uint32_t lamp = direct->lamps.of_triangle[h.triangle];
         if (lamp != none && emits(setup.scene, setup.scene.triangles[h.triangle], h.front))
-          add_light(met_lamp(setup.scene, direct->lamps, lamp, h, direction(j), glm::dot(normal, direction(j)), direct->samples, rays), share);
+          add_light(met_lamp(setup.scene, direct->lamps, lamp, h, direction(j), glm::dot(normal, direction(j)),
+                             direct->samples, rays),
+                    share);
       }
       const auto* at = basis.find(h.triangle, h.front);
       if (!at) {
@@ -280,9 +304,11 @@ void trace_gather_on(const GatherSetup& setup, const Basis& basis, GatherScratch
       if (!block) continue;
       const Vec3 rho = setup.part_varies[at->part] ? albedo(setup.scene, setup.scene.triangles[h.triangle], h.u, h.v)
                                                    : setup.part_albedo[at->part];
-      scatter(basis, *at, h, r * rays + j, [&](uint32_t receiver, float weight) { scratch.rows.add(receiver, rho * (weight * share)); });
+      scatter(basis, *at, h, r * rays + j,
+              [&](uint32_t receiver, float weight) { scratch.rows.add(receiver, rho * (weight * share)); });
       if (checked && j < half)
-        scatter(basis, *at, h, r * rays + j, [&](uint32_t receiver, float weight) { scratch.half_rows.add(receiver, rho * (weight * share)); });
+        scatter(basis, *at, h, r * rays + j,
+                [&](uint32_t receiver, float weight) { scratch.half_rows.add(receiver, rho * (weight * share)); });
     }
     scratch.rows.end_row();
     if (checked) scratch.half_rows.end_row();
@@ -300,10 +326,11 @@ void trace_gather_on(const GatherSetup& setup, const Basis& basis, GatherScratch
 }  // namespace
 
 // The kind of basis is asked for once a block, so that the loop over rays is compiled for each.
-void trace_gather(const GatherSetup& setup, GatherScratch& scratch, size_t first, size_t count, GatherBlock* block, const GatherSky* sky,
-                  const GatherDirect* direct) {
+void trace_gather(const GatherSetup& setup, GatherScratch& scratch, size_t first, size_t count, GatherBlock* block,
+                  const GatherSky* sky, const GatherDirect* direct) {
   LAMBENT_CHECK(count <= gather_block);
-  std::visit([&](const auto& basis) { trace_gather_on(setup, basis, scratch, first, count, block, sky, direct); }, setup.receivers.basis);
+  std::visit([&](const auto& basis) { trace_gather_on(setup, basis, scratch, first, count, block, sky, direct); },
+             setup.receivers.basis);
 }
 
 void trace_sky(const GatherSetup& setup, GatherScratch& scratch, size_t first, size_t count, const GatherSky& sky) {
@@ -317,7 +344,8 @@ void trace_sky(const GatherSetup& setup, GatherScratch& scratch, size_t first, s
     fan.project(sky, first, r);
     size_t seen = 0;
     for (size_t j = 0; j < rays; ++j) seen += fan.visible[j] > 0;
-    sky.buried[i] = 4 * seen < rays && is_buried(setup.tracer, setup.receivers.basis, origin, {fan.x.data(), fan.y.data(), fan.z.data(), rays});
+    sky.buried[i] = 4 * seen < rays && is_buried(setup.tracer, setup.receivers.basis, origin,
+                                                 {fan.x.data(), fan.y.data(), fan.z.data(), rays});
   }
 }
 
@@ -328,7 +356,8 @@ void multiply_rows(const SparseRows& block, int channels, const float* x, size_t
   for (size_t i = 0; i < values; ++i) y[i] *= scale;
 }
 
-std::vector<FillStep> make_fill_steps(const Scene& scene, const SpatialBasis& basis, const std::vector<uint8_t>& buried) {
+std::vector<FillStep> make_fill_steps(const Scene& scene, const SpatialBasis& basis,
+                                      const std::vector<uint8_t>& buried) {
   const auto edges = neighbours_of(scene, basis, buried);  // (buried receiver, neighbour)
   std::vector<FillStep> steps;
   std::vector<uint8_t> waiting = buried;

@@ -1,8 +1,9 @@
 #pragma once
-// The gather operator. Every receiver sends its rays once; a ray that leaves the scene adds to the receiver's SKY ROW (its
-// direct transfer T0), one that meets a surface adds to its HIT ROW: receivers there, times interpolation weight, times albedo.
-// The hit rows are a sparse matrix B, and a bounce is a product: T_{k+1} = B T_k (general-prt, "Transfer Matrix for Bounce
-// k+1", one-row case), with no further ray. Any number of columns: the same B carries radiosity (alpha = e + B alpha).
+// The gather operator. Every receiver sends its rays once; a ray that leaves the scene adds to the receiver's SKY ROW
+// (its direct transfer T0), one that meets a surface adds to its HIT ROW: receivers there, times interpolation weight,
+// times albedo. The hit rows are a sparse matrix B, and a bounce is a product: T_{k+1} = B T_k (general-prt, "Transfer
+// Matrix for Bounce k+1", one-row case), with no further ray. Any number of columns: the same B carries radiosity
+// (alpha = e + B alpha).
 #include <lambent/bake/directions.h>
 #include <lambent/bake/kernels.h>
 #include <lambent/bake/lamps.h>
@@ -21,8 +22,9 @@ inline constexpr size_t check_every = 16;
 // Receivers traced and multiplied as one piece of work.
 inline constexpr size_t gather_block = 64;
 
-// Rows of the sparse matrix B of neighbouring receivers, stored by columns (kernels.h): neighbours see the same surfaces, so a
-// column serves many of them. Weights are halves, `channels` an entry. Memory is someone else's: a SparseBlock's, or KeptRows'.
+// Rows of the sparse matrix B of neighbouring receivers, stored by columns (kernels.h): neighbours see the same
+// surfaces, so a column serves many of them. Weights are halves, `channels` an entry. Memory is someone else's: a
+// SparseBlock's, or KeptRows'.
 struct SparseRows {
   size_t row_count = 0;
   SparseEntries entries{};
@@ -33,7 +35,9 @@ struct SparseBlock {
   std::vector<uint32_t> columns, ends;
   std::vector<uint8_t> rows;
   std::vector<uint16_t> weights;
-  SparseRows view() const { return {row_count, {columns.data(), ends.data(), columns.size(), rows.data(), weights.data()}}; }
+  SparseRows view() const {
+    return {row_count, {columns.data(), ends.data(), columns.size(), rows.data(), weights.data()}};
+  }
 };
 
 // Made anew by each tracing, in the memory of the last.
@@ -48,8 +52,8 @@ struct GatherSetup {
   const Receivers& receivers;
   DirectionSets sets;
   uint32_t seed;
-  int channels;         // of weights: 1 if all albedo is grey, else 3
-  float weight_unit;    // stored weight = sum of albedo x interpolation weight over rays, x weight_unit
+  int channels;                   // of weights: 1 if all albedo is grey, else 3
+  float weight_unit;              // stored weight = sum of albedo x interpolation weight over rays, x weight_unit
   std::vector<Vec3> part_albedo;  // of parts with one albedo all over
   std::vector<uint8_t> part_varies;
 
@@ -58,18 +62,18 @@ struct GatherSetup {
   float row_scale(size_t rays) const { return 1.0f / (weight_unit * float(rays)); }
 };
 
-// `sets` of the setup may be replaced by make_hemicube_set(): its rows then are those of a hemicube ray cast at its pixels' centres,
-// which stand for the integral over the cosine that random rays estimate.
-GatherSetup make_gather_setup(const Scene& scene, const Tracer& tracer, const Receivers& receivers, int order, int samples, uint32_t seed,
-                              DirectionWarp warp = square_to_cosine_hemisphere);
+// `sets` of the setup may be replaced by make_hemicube_set(): its rows then are those of a hemicube ray cast at its
+// pixels' centres, which stand for the integral over the cosine that random rays estimate.
+GatherSetup make_gather_setup(const Scene& scene, const Tracer& tracer, const Receivers& receivers, int order,
+                              int samples, uint32_t seed, DirectionWarp warp = square_to_cosine_hemisphere);
 
 // What tracing receivers [first, first + count) yields beside the hit rows. Spans are indexed from `first`.
 struct GatherSky {
-  float* rows;       // [receiver][stride], of which the coefficients come first: T0; then the lobes, if any
-  float* half_rows;  // [checked receiver][stride]: T0 by the first half of the rays
-  size_t stride;     // floats from one receiver to the next, no fewer than coefficients and lobes
+  float* rows;            // [receiver][stride], of which the coefficients come first: T0; then the lobes, if any
+  float* half_rows;       // [checked receiver][stride]: T0 by the first half of the rays
+  size_t stride;          // floats from one receiver to the next, no fewer than coefficients and lobes
   const LobeSets* lobes;  // broad ones are summed, sharp ones left alone; may be null
-  uint8_t* buried;   // 1: most rays met the back of a one-sided surface; the receiver lies inside something
+  uint8_t* buried;        // 1: most rays met the back of a one-sided surface; the receiver lies inside something
 };
 // The row of half_rows for a receiver of the block that begins at `first`; null where it is not checked.
 float* checked_row(const GatherSky& sky, size_t first, size_t receiver);
@@ -90,19 +94,20 @@ struct DeleteScratch {
 using ScratchPointer = std::unique_ptr<GatherScratch, DeleteScratch>;
 ScratchPointer make_gather_scratch(const GatherSetup& setup);
 
-// Traces closest hits. `block`, `sky` and `direct` may be null. A ray that meets bilinear texels counts for one of the four,
-// drawn with the probability of its weight: a quarter of the entries, with the same mean.
-void trace_gather(const GatherSetup& setup, GatherScratch& scratch, size_t first, size_t count, GatherBlock* block, const GatherSky* sky,
-                  const GatherDirect* direct = nullptr);
+// Traces closest hits. `block`, `sky` and `direct` may be null. A ray that meets bilinear texels counts for one of the
+// four, drawn with the probability of its weight: a quarter of the entries, with the same mean.
+void trace_gather(const GatherSetup& setup, GatherScratch& scratch, size_t first, size_t count, GatherBlock* block,
+                  const GatherSky* sky, const GatherDirect* direct = nullptr);
 
 // Traces occlusion only: the sky rows, without hit rows.
 void trace_sky(const GatherSetup& setup, GatherScratch& scratch, size_t first, size_t count, const GatherSky& sky);
 
-// A second look at a receiver that sees little sky, when only occlusion was traced: do most of a sample of the fan's rays meet
-// backs of one-sided surfaces?
+// A second look at a receiver that sees little sky, when only occlusion was traced: do most of a sample of the fan's
+// rays meet backs of one-sided surfaces?
 bool is_buried(const Tracer& tracer, const SpatialBasis& basis, Vec3 origin, const Directions& fan);
 
-// y[row] = scale * (row of B) x, for the block's rows; x and y are [receiver][column x channel], `width` padded floats a row.
+// y[row] = scale * (row of B) x, for the block's rows; x and y are [receiver][column x channel], `width` padded floats
+// a row.
 void multiply_rows(const SparseRows& rows, int channels, const float* x, size_t width, float scale, float* y);
 
 // Values of buried receivers are taken from their neighbours (neighbours_of).
@@ -110,7 +115,8 @@ struct FillStep {
   uint32_t receiver;
   std::vector<uint32_t> sources;  // not buried, or filled by an earlier step
 };
-std::vector<FillStep> make_fill_steps(const Scene& scene, const SpatialBasis& basis, const std::vector<uint8_t>& buried);
+std::vector<FillStep> make_fill_steps(const Scene& scene, const SpatialBasis& basis,
+                                      const std::vector<uint8_t>& buried);
 void fill_buried(const std::vector<FillStep>& steps, float* values, size_t stride, size_t width);
 
 }  // namespace lambent

@@ -13,7 +13,8 @@ constexpr size_t large_page = size_t{1} << 21;
 size_t padded(size_t bytes) { return (bytes + 7) / 8 * 8; }
 
 size_t padded_bytes(const SparseBlock& s) {
-  return padded(s.columns.size() * 4) + padded(s.ends.size() * 4) + padded(s.rows.size()) + padded(s.weights.size() * 2);
+  return padded(s.columns.size() * 4) + padded(s.ends.size() * 4) + padded(s.rows.size()) +
+         padded(s.weights.size() * 2);
 }
 
 template <class T>
@@ -39,7 +40,8 @@ size_t most_bytes(size_t rays, size_t receivers, int channels) {
 }
 
 KeptRows::KeptRows(size_t blocks, size_t budget, size_t most_bytes_a_block) : blocks_(blocks), is_kept_(blocks, 0) {
-  const size_t most = blocks > 0 && most_bytes_a_block > SIZE_MAX / 2 / blocks ? SIZE_MAX / 2 : blocks * most_bytes_a_block;
+  const size_t most = blocks > 0 && most_bytes_a_block > SIZE_MAX / 2 / blocks ? SIZE_MAX / 2
+                                                                               : blocks * most_bytes_a_block;
   reserved_ = std::min({budget, most, size_t{1} << 46}) / large_page * large_page;
   if (reserved_ == 0) reserved_ = std::min(budget, most) / 4096 * 4096;
   if (reserved_ == 0) return;
@@ -69,7 +71,8 @@ bool KeptRows::keep(size_t block, const GatherBlock& rows) {
 }
 
 double KeptRows::fraction() const {
-  return blocks_.empty() ? 1.0 : double(std::count(is_kept_.begin(), is_kept_.end(), uint8_t(1))) / double(blocks_.size());
+  return blocks_.empty() ? 1.0
+                         : double(std::count(is_kept_.begin(), is_kept_.end(), uint8_t(1))) / double(blocks_.size());
 }
 
 }  // namespace lambent

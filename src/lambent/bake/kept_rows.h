@@ -1,6 +1,6 @@
 #pragma once
-// Hit rows kept for the bounces, as far as a budget goes. Which blocks are kept depends on the scheduling, the result does not: the
-// others are traced again, alike.
+// Hit rows kept for the bounces, as far as a budget goes. Which blocks are kept depends on the scheduling, the result
+// does not: the others are traced again, alike.
 #include <lambent/bake/gather.h>
 
 #include <atomic>
@@ -16,8 +16,9 @@ class KeptRows {
     SparseRows rows, half_rows;
   };
 
-  // At most `budget` bytes of rows, of so many blocks. Address space is reserved at once and memory taken as rows come, in large
-  // pages where the system has them: with pages of 4 KiB a tenth of a bake's time goes into the first touch of each.
+  // At most `budget` bytes of rows, of so many blocks. Address space is reserved at once and memory taken as rows come,
+  // in large pages where the system has them: with pages of 4 KiB a tenth of a bake's time goes into the first touch of
+  // each.
   KeptRows(size_t blocks, size_t budget, size_t most_bytes_a_block);
   ~KeptRows();
   KeptRows(const KeptRows&) = delete;

@@ -19,8 +19,8 @@ namespace hn = hwy::HWY_NAMESPACE;
 // At most 16 lanes, so that padded arrays hold whole vectors.
 using F = hn::CappedTag<float, 16>;
 
-void RotateDirections(const float* R, const float* x, const float* y, const float* z, size_t count, float* ox, float* oy,
-                      float* oz) {
+void RotateDirections(const float* R, const float* x, const float* y, const float* z, size_t count, float* ox,
+                      float* oy, float* oz) {
   const F d;
   auto row = [&](int r, auto vx, auto vy, auto vz) {
     auto s = hn::Mul(hn::Set(d, R[r]), vx);
@@ -61,10 +61,11 @@ void WeightedRows(const float* table, size_t rows, size_t stride, const float* w
   }
 }
 
-// Entries [begin, end) of one column, `vectors` vectors of it: the column's values stay in registers while rows of acc pass by.
+// Entries [begin, end) of one column, `vectors` vectors of it: the column's values stay in registers while rows of acc
+// pass by.
 template <size_t vectors, int channels>
-HWY_INLINE void AddColumn(const float* x, const uint8_t* rows, const float* weights, size_t begin, size_t end, size_t width, size_t offset,
-                          float* acc) {
+HWY_INLINE void AddColumn(const float* x, const uint8_t* rows, const float* weights, size_t begin, size_t end,
+                          size_t width, size_t offset, float* acc) {
   const F d;
   constexpr size_t lanes = hn::MaxLanes(F());
   hn::Vec<F> value[vectors];
@@ -74,19 +75,23 @@ HWY_INLINE void AddColumn(const float* x, const uint8_t* rows, const float* weig
   for (size_t p = 0; p < 3; ++p)
     for (size_t i = 0; i < lanes; ++i) pattern[p][i] = int32_t((offset + p * lanes + i) % 3);
 #if HWY_TARGET != HWY_SCALAR
-  const auto i0 = hn::SetTableIndices(d, pattern[0]), i1 = hn::SetTableIndices(d, pattern[1]), i2 = hn::SetTableIndices(d, pattern[2]);
+  const auto i0 = hn::SetTableIndices(d, pattern[0]), i1 = hn::SetTableIndices(d, pattern[1]),
+             i2 = hn::SetTableIndices(d, pattern[2]);
 #endif
   for (size_t e = begin; e < end; ++e) {
     float* row = acc + size_t(rows[e]) * width + offset;
     if constexpr (channels == 1) {
       const auto w = hn::Set(d, weights[e]);
-      for (size_t k = 0; k < vectors; ++k) hn::StoreU(hn::MulAdd(w, value[k], hn::LoadU(d, row + k * lanes)), d, row + k * lanes);
+      for (size_t k = 0; k < vectors; ++k)
+        hn::StoreU(hn::MulAdd(w, value[k], hn::LoadU(d, row + k * lanes)), d, row + k * lanes);
     } else {
 #if HWY_TARGET != HWY_SCALAR
       const auto rgb = hn::LoadDup128(d, weights + 4 * e);
-      const hn::Vec<F> w[3] = {hn::TableLookupLanes(rgb, i0), hn::TableLookupLanes(rgb, i1), hn::TableLookupLanes(rgb, i2)};
+      const hn::Vec<F> w[3] = {hn::TableLookupLanes(rgb, i0), hn::TableLookupLanes(rgb, i1),
+                               hn::TableLookupLanes(rgb, i2)};
 #else
-      const hn::Vec<F> w[3] = {hn::Set(d, weights[4 * e + size_t(pattern[0][0])]), hn::Set(d, weights[4 * e + size_t(pattern[1][0])]),
+      const hn::Vec<F> w[3] = {hn::Set(d, weights[4 * e + size_t(pattern[0][0])]),
+                               hn::Set(d, weights[4 * e + size_t(pattern[1][0])]),
                                hn::Set(d, weights[4 * e + size_t(pattern[2][0])])};
 #endif
       for (size_t k = 0; k < vectors; ++k)
@@ -96,7 +101,8 @@ HWY_INLINE void AddColumn(const float* x, const uint8_t* rows, const float* weig
 }
 
 template <int channels>
-HWY_INLINE void AddColumnAll(const float* x, const uint8_t* rows, const float* weights, size_t begin, size_t end, size_t width, float* acc) {
+HWY_INLINE void AddColumnAll(const float* x, const uint8_t* rows, const float* weights, size_t begin, size_t end,
+                             size_t width, float* acc) {
   constexpr size_t lanes = hn::MaxLanes(F());
   size_t j = 0;
   for (; j + 8 * lanes <= width; j += 8 * lanes) AddColumn<8, channels>(x, rows, weights, begin, end, width, j, acc);
@@ -158,21 +164,25 @@ void FloatsToHalves(const float* floats, size_t count, uint16_t* halves) {
   for (; i < count; ++i) halves[i] = float_to_half(floats[i]);
 }
 
-void LobeValues(bool cosine_power, const float* axis, float sharpness, float scale, const float* x, const float* y, const float* z, size_t count,
-                float* out) {
+void LobeValues(bool cosine_power, const float* axis, float sharpness, float scale, const float* x, const float* y,
+                const float* z, size_t count, float* out) {
   const F d;
-  const auto ax = hn::Set(d, axis[0]), ay = hn::Set(d, axis[1]), az = hn::Set(d, axis[2]), s = hn::Set(d, sharpness), peak = hn::Set(d, scale);
+  const auto ax = hn::Set(d, axis[0]), ay = hn::Set(d, axis[1]), az = hn::Set(d, axis[2]), s = hn::Set(d, sharpness),
+             peak = hn::Set(d, scale);
   for (size_t i = 0; i < count; i += hn::Lanes(d)) {
-    const auto c = hn::MulAdd(ax, hn::LoadU(d, x + i), hn::MulAdd(ay, hn::LoadU(d, y + i), hn::Mul(az, hn::LoadU(d, z + i))));
+    const auto c =
+        hn::MulAdd(ax, hn::LoadU(d, x + i), hn::MulAdd(ay, hn::LoadU(d, y + i), hn::Mul(az, hn::LoadU(d, z + i))));
     // The logarithm needs a positive number, and anything to the power of 1 or more that small is as good as 0.
-    const auto exponent = cosine_power ? hn::Mul(s, hn::Log(d, hn::Max(c, hn::Set(d, 1e-30f)))) : hn::Mul(s, hn::Sub(c, hn::Set(d, 1.0f)));
+    const auto exponent = cosine_power ? hn::Mul(s, hn::Log(d, hn::Max(c, hn::Set(d, 1e-30f))))
+                                       : hn::Mul(s, hn::Sub(c, hn::Set(d, 1.0f)));
     hn::StoreU(hn::Mul(peak, hn::Exp(d, exponent)), d, out + i);
   }
 }
 
 void MultiplyValues(const float* a, const float* b, size_t count, float* out) {
   const F d;
-  for (size_t i = 0; i < count; i += hn::Lanes(d)) hn::StoreU(hn::Mul(hn::LoadU(d, a + i), hn::LoadU(d, b + i)), d, out + i);
+  for (size_t i = 0; i < count; i += hn::Lanes(d))
+    hn::StoreU(hn::Mul(hn::LoadU(d, a + i), hn::LoadU(d, b + i)), d, out + i);
 }
 
 }  // namespace HWY_NAMESPACE
@@ -189,7 +199,8 @@ HWY_EXPORT(FloatsToHalves);
 HWY_EXPORT(LobeValues);
 HWY_EXPORT(MultiplyValues);
 
-void rotate_directions(const Mat3& R, const float* x, const float* y, const float* z, size_t count, float* ox, float* oy, float* oz) {
+void rotate_directions(const Mat3& R, const float* x, const float* y, const float* z, size_t count, float* ox,
+                       float* oy, float* oz) {
   LAMBENT_CHECK(count % lane_multiple == 0);
   HWY_DYNAMIC_DISPATCH(RotateDirections)(&R[0][0], x, y, z, count, ox, oy, oz);
 }
@@ -199,7 +210,8 @@ void weighted_rows(const float* table, size_t rows, size_t stride, const float* 
   HWY_DYNAMIC_DISPATCH(WeightedRows)(table, rows, stride, weights, count, out);
 }
 
-void lobe_values(bool cosine_power, Vec3 axis, float sharpness, float scale, const float* x, const float* y, const float* z, size_t count, float* out) {
+void lobe_values(bool cosine_power, Vec3 axis, float sharpness, float scale, const float* x, const float* y,
+                 const float* z, size_t count, float* out) {
   LAMBENT_CHECK(count % lane_multiple == 0);
   HWY_DYNAMIC_DISPATCH(LobeValues)(cosine_power, &axis[0], sharpness, scale, x, y, z, count, out);
 }

@@ -27,7 +27,8 @@ TEST(Kernels, MultiplyEntriesIsTheSparseProduct) {
             block.weights.push_back(float_to_half(random.next()));
             w[c] = half_to_float(block.weights.back());
           }
-          for (size_t j = 0; j < width; ++j) expected[size_t(row) * width + j] += double(w[channels == 1 ? 0 : j % 3]) * x[column * width + j];
+          for (size_t j = 0; j < width; ++j)
+            expected[size_t(row) * width + j] += double(w[channels == 1 ? 0 : j % 3]) * x[column * width + j];
         }
         if (block.rows.size() > (block.ends.empty() ? 0 : block.ends.back())) {
           block.columns.push_back(column);
@@ -36,7 +37,8 @@ TEST(Kernels, MultiplyEntriesIsTheSparseProduct) {
       }
       std::vector<float> y(5 * width);
       multiply_rows(block.view(), channels, x.data(), width, 0.25f, y.data());
-      for (size_t i = 0; i < y.size(); ++i) EXPECT_NEAR(y[i], 0.25 * expected[i], 1e-5) << "channels " << channels << " width " << width;
+      for (size_t i = 0; i < y.size(); ++i)
+        EXPECT_NEAR(y[i], 0.25 * expected[i], 1e-5) << "channels " << channels << " width " << width;
     }
 }
 
@@ -88,7 +90,10 @@ TEST(Kernels, LobeValuesAreTheLobe) {
     for (float s : {1.0f, 7.0f, 300.0f, 40000.0f}) {
       lobe_values(kind == LobeKind::cosine_power, axis, s, 2.5f, x.data(), y.data(), z.data(), n, out.data());
       // A cosine's rounding, times the sharpness.
-      for (size_t i = 0; i < n; ++i) EXPECT_NEAR(out[i], 2.5 * lobe_value(kind, s, glm::dot(glm::dvec3(axis), glm::dvec3(x[i], y[i], z[i]))), 1e-6 + 5e-7 * s) << i << " " << s;
+      for (size_t i = 0; i < n; ++i)
+        EXPECT_NEAR(out[i], 2.5 * lobe_value(kind, s, glm::dot(glm::dvec3(axis), glm::dvec3(x[i], y[i], z[i]))),
+                    1e-6 + 5e-7 * s)
+            << i << " " << s;
     }
   AlignedVector<float> product(n);
   multiply_values(x.data(), y.data(), n, product.data());

@@ -1,5 +1,5 @@
-// Follows: radiosity, "Discussion 4" (direct light apart); E. Veach and L. Guibas, "Optimally combining sampling techniques for
-// Monte Carlo rendering", 1995.
+// Follows: radiosity, "Discussion 4" (direct light apart); E. Veach and L. Guibas, "Optimally combining sampling
+// techniques for Monte Carlo rendering", 1995.
 #include <lambent/bake/lamps.h>
 #include <lambent/core/random.h>
 #include <lambent/core/sampling.h>
@@ -34,8 +34,8 @@ Vec3 balanced(Vec3 radiance, float cosine, double lamp_density, int samples, siz
   return sum > 0 ? radiance * float(p_c / sum) : Vec3(0);
 }
 
-// Of the emission over a triangle, as far as a few hundred points tell. Never so small that a bright spot between them would be
-// drawn too seldom.
+// Of the emission over a triangle, as far as a few hundred points tell. Never so small that a bright spot between them
+// would be drawn too seldom.
 Vec3 mean_emission(const Scene& scene, const Triangle& t) {
   const Material& m = scene.materials[scene.parts[t.part].material];
   if (m.emissive_texture < 0) return m.emissive;
@@ -74,8 +74,10 @@ Lamps make_lamps(const Scene& scene, const Environment* sky, bool separate) {
     const Material& material = scene.materials[m];
     const float area = 0.5f * glm::length(area_normal(scene, triangle));
     if (!(largest(material.emissive) > 0) || !(area > 0)) continue;
-    if (material_group[m] == none) material_group[m] = group_of(material.name.empty() ? "material " + std::to_string(m) : material.name);
-    lamps.area.push_back({t, material_group[m], mean_emission(scene, triangle), double(area)});  // its area, until all are known
+    if (material_group[m] == none)
+      material_group[m] = group_of(material.name.empty() ? "material " + std::to_string(m) : material.name);
+    lamps.area.push_back(
+        {t, material_group[m], mean_emission(scene, triangle), double(area)});  // its area, until all are known
   }
   for (const PunctualLight& light : scene.lights)
     lamps.punctual_group.push_back(largest(light.intensity) > 0 ? group_of(light.name) : none);
@@ -84,7 +86,8 @@ Lamps make_lamps(const Scene& scene, const Environment* sky, bool separate) {
     if (lamps.sky_sampler.total > 0) lamps.sky_group = group_of(sky_name);
     else lamps.sky = nullptr;
   }
-  std::stable_sort(lamps.area.begin(), lamps.area.end(), [](const AreaLamp& a, const AreaLamp& b) { return a.group < b.group; });
+  std::stable_sort(lamps.area.begin(), lamps.area.end(),
+                   [](const AreaLamp& a, const AreaLamp& b) { return a.group < b.group; });
   lamps.first.assign(lamps.groups() + 1, 0);
   for (const AreaLamp& lamp : lamps.area) ++lamps.first[lamp.group + 1];
   for (size_t g = 0; g < lamps.groups(); ++g) lamps.first[g + 1] += lamps.first[g];
@@ -96,13 +99,14 @@ Lamps make_lamps(const Scene& scene, const Environment* sky, bool separate) {
       sum += lamps.area[i].density * double(largest(lamps.area[i].radiance));
       lamps.cumulative[i] = sum, lamps.of_triangle[lamps.area[i].triangle] = i;
     }
-    for (uint32_t i = lamps.first[g]; i < lamps.first[g + 1]; ++i) lamps.area[i].density = double(largest(lamps.area[i].radiance)) / sum;
+    for (uint32_t i = lamps.first[g]; i < lamps.first[g + 1]; ++i)
+      lamps.area[i].density = double(largest(lamps.area[i].radiance)) / sum;
   }
   return lamps;
 }
 
-void sample_lamps(const Scene& scene, const Tracer& tracer, const Lamps& lamps, Vec3 origin, Vec3 normal, int samples, size_t rays,
-                  uint32_t seed, size_t receiver, std::vector<LampLight>& out) {
+void sample_lamps(const Scene& scene, const Tracer& tracer, const Lamps& lamps, Vec3 origin, Vec3 normal, int samples,
+                  size_t rays, uint32_t seed, size_t receiver, std::vector<LampLight>& out) {
   thread_local ShadowRays shadow;
   thread_local std::vector<PendingSample> pending;
   shadow.clear(), pending.clear();
@@ -117,11 +121,15 @@ void sample_lamps(const Scene& scene, const Tracer& tracer, const Lamps& lamps, 
     const double total = lamps.cumulative[end - 1];
     const uint32_t key = uint32_t(hash64(hash64(seed, 0x1a3 + g), receiver));
     for (int s = 0; s < samples; ++s) {
-      // One number picks the triangle and, by where within its share it fell, the place in it: the points stay spread over both. (A
-      // second sequence of the same dimension would follow the first, digit by digit, however it is scrambled.)
+      // One number picks the triangle and, by where within its share it fell, the place in it: the points stay spread
+      // over both. (A second sequence of the same dimension would follow the first, digit by digit, however it is
+      // scrambled.)
       Vec2 u = sobol_owen(uint32_t(s), key);
       const double target = double(u.x) * total;
-      const size_t at = std::min<size_t>(size_t(std::upper_bound(lamps.cumulative.begin() + begin, lamps.cumulative.begin() + end, target) - lamps.cumulative.begin()), end - 1);
+      const size_t at = std::min<size_t>(
+          size_t(std::upper_bound(lamps.cumulative.begin() + begin, lamps.cumulative.begin() + end, target) -
+                 lamps.cumulative.begin()),
+          end - 1);
       const AreaLamp& lamp = lamps.area[at];
       const Triangle& t = scene.triangles[lamp.triangle];
       const double low = at == begin ? 0.0 : lamps.cumulative[at - 1];
@@ -136,31 +144,35 @@ void sample_lamps(const Scene& scene, const Tracer& tracer, const Lamps& lamps, 
       const float cosine = glm::dot(normal, d), facing = -glm::dot(normalize_or(area_normal(scene, t), Vec3(0)), d);
       if (!(cosine > 0) || !emits(scene, t, facing > 0) || facing == 0) continue;
       const double density = lamp.density * double(distance2) / double(std::abs(facing));
-      add(lamp.group, d, balanced(emission(scene, t, 1 - root, v), cosine, density, samples, rays), lamp.triangle, distance);
+      add(lamp.group, d, balanced(emission(scene, t, 1 - root, v), cosine, density, samples, rays), lamp.triangle,
+          distance);
     }
   }
   for (size_t l = 0; l < lamps.punctual_group.size(); ++l) {
     if (lamps.punctual_group[l] == none) continue;
     const LampArrival a = arriving(scene.lights[l], origin);
-    add(lamps.punctual_group[l], a.direction, a.irradiance * (std::max(0.0f, glm::dot(normal, a.direction)) / pi), none, a.distance);
+    add(lamps.punctual_group[l], a.direction, a.irradiance * (std::max(0.0f, glm::dot(normal, a.direction)) / pi), none,
+        a.distance);
   }
   if (lamps.sky) {
     const uint32_t key = uint32_t(hash64(hash64(seed, 0x5c1), receiver));
     for (int s = 0; s < samples; ++s) {
       const EnvironmentSample e = sample_environment(lamps.sky_sampler, sobol_owen(uint32_t(s), key));
-      add(lamps.sky_group, e.direction, balanced(e.radiance, glm::dot(normal, e.direction), double(e.pdf), samples, rays), none, INFINITY);
+      add(lamps.sky_group, e.direction,
+          balanced(e.radiance, glm::dot(normal, e.direction), double(e.pdf), samples, rays), none, INFINITY);
     }
   }
   shadow.trace(tracer, origin);
   for (size_t i = 0; i < pending.size(); ++i) {
     const Hit& h = shadow.hits[i];
-    const bool arrives = h.triangle == none || h.triangle == pending[i].triangle || h.distance >= pending[i].distance * (1 - same_distance);
+    const bool arrives = h.triangle == none || h.triangle == pending[i].triangle ||
+                         h.distance >= pending[i].distance * (1 - same_distance);
     if (arrives) out.push_back(pending[i].light);
   }
 }
 
-LampLight met_lamp(const Scene& scene, const Lamps& lamps, uint32_t index, const Hit& hit, Vec3 direction, float cosine, int samples,
-                   size_t rays) {
+LampLight met_lamp(const Scene& scene, const Lamps& lamps, uint32_t index, const Hit& hit, Vec3 direction, float cosine,
+                   int samples, size_t rays) {
   const AreaLamp& lamp = lamps.area[index];
   const Triangle& t = scene.triangles[lamp.triangle];
   const float facing = std::abs(glm::dot(normalize_or(area_normal(scene, t), Vec3(0)), direction));
@@ -170,7 +182,8 @@ LampLight met_lamp(const Scene& scene, const Lamps& lamps, uint32_t index, const
 
 LampLight met_sky(const Lamps& lamps, Vec3 direction, float cosine, int samples, size_t rays) {
   return {lamps.sky_group, direction,
-          balanced(radiance(*lamps.sky, direction), cosine, double(environment_pdf(lamps.sky_sampler, direction)), samples, rays)};
+          balanced(radiance(*lamps.sky, direction), cosine, double(environment_pdf(lamps.sky_sampler, direction)),
+                   samples, rays)};
 }
 
 }  // namespace lambent

@@ -5,8 +5,8 @@
 
 namespace lambent {
 
-LastReflection make_last_reflection(const std::vector<ViewMap>& responses, const ReceiverMaterials& materials, const MatrixOptions& matrix, const CosineBasis& basis,
-                                    int channels) {
+LastReflection make_last_reflection(const std::vector<ViewMap>& responses, const ReceiverMaterials& materials,
+                                    const MatrixOptions& matrix, const CosineBasis& basis, int channels) {
   const size_t J = size_t(basis.count());
   LastReflection last;
   Outgoing& o = last.outgoing;
@@ -23,12 +23,16 @@ LastReflection make_last_reflection(const std::vector<ViewMap>& responses, const
     o.order = matrix.incident_order, o.map_of = materials.of_receiver;
     std::vector<FactoredResponse> factors;
     size_t rows = 1;
-    for (const ViewMap& response : responses) factors.push_back(factor_response(response, matrix.svd_rows, 1e-4)), rows = std::max(rows, size_t(factors.back().rows));
+    for (const ViewMap& response : responses)
+      factors.push_back(factor_response(response, matrix.svd_rows, 1e-4)),
+          rows = std::max(rows, size_t(factors.back().rows));
     for (size_t m = 0; m < factors.size(); ++m) {  // every receiver has as many rows; the rest are zero
       FactoredResponse& f = factors[m];
-      ViewMap wide{f.g.grid, int(rows), std::vector<ViewWeights>(size_t(f.g.grid) * size_t(f.g.grid) * rows, ViewWeights(0.0f))};
+      ViewMap wide{f.g.grid, int(rows),
+                   std::vector<ViewWeights>(size_t(f.g.grid) * size_t(f.g.grid) * rows, ViewWeights(0.0f))};
       for (size_t i = 0; i < size_t(f.g.grid) * size_t(f.g.grid); ++i)
-        std::copy_n(f.g.values.begin() + ptrdiff_t(i * size_t(f.rows)), f.rows, wide.values.begin() + ptrdiff_t(i * rows));
+        std::copy_n(f.g.values.begin() + ptrdiff_t(i * size_t(f.rows)), f.rows,
+                    wide.values.begin() + ptrdiff_t(i * rows));
       o.maps.push_back(std::move(wide));
       f.h.resize(rows * J, 0.0f);
       last.h[m] = {f.h, f.h, f.h};
@@ -62,7 +66,8 @@ LastReflection make_last_reflection(const std::vector<ViewMap>& responses, const
   return last;
 }
 
-void store_rows(const LastReflection& last, const ReceiverMaterials& materials, const WritableTransfer& out, size_t r, const float* x, size_t channels, size_t width) {
+void store_rows(const LastReflection& last, const ReceiverMaterials& materials, const WritableTransfer& out, size_t r,
+                const float* x, size_t channels, size_t width) {
   const size_t C = out.transfer.columns(), J = last.h[materials.of_receiver[r]][0].size() / size_t(last.rows);
   std::vector<float> values(size_t(last.rows) * size_t(last.channels) * C);
   for (size_t row = 0; row < size_t(last.rows); ++row)

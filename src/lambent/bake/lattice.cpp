@@ -1,5 +1,5 @@
-// Follows: general-prt (transferred incident radiance at points in free space), triple-product-integrals (light from the sky as a
-// triple product: with visibility known to order n + m - 1 it is exact, as in matrix.cpp).
+// Follows: general-prt (transferred incident radiance at points in free space), triple-product-integrals (light from
+// the sky as a triple product: with visibility known to order n + m - 1 it is exact, as in matrix.cpp).
 #include <lambent/bake/gather.h>
 #include <lambent/bake/lattice.h>
 #include <lambent/bake/matrix_kernels.h>
@@ -34,8 +34,8 @@ struct LatticeBaker {
 
   TriplingTensor tensor = make_tripling_tensor(surface.light.order, options.order, setup.sets.order);
   ShZyzRotator rotator{setup.sets.order};
-  AlignedVector<float> Y = unpack_surface();            // [receiver][row][channel][width]
-  std::vector<float> shortfall = make_shortfall();      // [set][k]
+  AlignedVector<float> Y = unpack_surface();        // [receiver][row][channel][width]
+  std::vector<float> shortfall = make_shortfall();  // [set][k]
   Pool<LatticeScratch> scratch{[this] { return make_scratch(); }};
 
   size_t C() const { return surface.columns(); }
@@ -55,15 +55,16 @@ struct LatticeBaker {
         const std::vector<float> t = load_receiver(surface, r);
         for (size_t row = 0; row < rows(); ++row)
           for (size_t c = 0; c < channels(); ++c)
-            std::copy_n(t.data() + (row * size_t(surface.channels) + std::min(c, size_t(surface.channels) - 1)) * C(), C(),
-                        out.data() + (r * rows() + row) * wc() + c * width());
+            std::copy_n(t.data() + (row * size_t(surface.channels) + std::min(c, size_t(surface.channels) - 1)) * C(),
+                        C(), out.data() + (r * rows() + row) * wc() + c * width());
       }
     });
     return out;
   }
 
-  // What a set of directions lacks of the sphere, the exact integrals of y_k less its sums. Added in the measure in which a point sees the
-  // sky it takes the sampling noise of an open sky away altogether, and most of it where the sky is nearly open.
+  // What a set of directions lacks of the sphere, the exact integrals of y_k less its sums. Added in the measure in
+  // which a point sees the sky it takes the sampling noise of an open sky away altogether, and most of it where the sky
+  // is nearly open.
   std::vector<float> make_shortfall() const {
     const DirectionSets& sets = setup.sets;
     std::vector<float> out(size_t(sets.sets) * V_count());
@@ -71,7 +72,8 @@ struct LatticeBaker {
     std::fill_n(ones.begin(), rays(), 1.0f);
     for (size_t set = 0; set < size_t(sets.sets); ++set) {
       float* row = out.data() + set * V_count();
-      weighted_rows(sets.table.data() + set * V_count() * sets.stride, V_count(), sets.stride, ones.data(), sets.stride, row);
+      weighted_rows(sets.table.data() + set * V_count() * sets.stride, V_count(), sets.stride, ones.data(), sets.stride,
+                    row);
       for (size_t k = 0; k < V_count(); ++k) row[k] = (k == 0 ? std::sqrt(4 * pi) : 0.0f) - row[k] * ray_angle();
     }
     return out;
@@ -82,13 +84,15 @@ struct LatticeBaker {
     const size_t stride = setup.sets.stride;
     s->x.resize(stride), s->y.resize(stride), s->z.resize(stride), s->visible.resize(stride), s->hits.resize(rays());
     s->sum.resize(J() * wc()), s->v.resize(hit_batch * wc()), s->yb.resize(hit_batch * J());
-    s->V.resize(V_count()), s->scalars.resize(rows() * channels()), s->out.resize(J() * channels() * C()), s->weights.resize(rows());
+    s->V.resize(V_count()), s->scalars.resize(rows() * channels()), s->out.resize(J() * channels() * C()),
+        s->weights.resize(rows());
     return s;
   }
 
   // Transfer of what leaves a hit towards -w, added to v[channel][width].
   void add_exit_radiance(LatticeScratch& s, const Corners& corners, const Hit& h, Vec3 w, float* v) const {
-    const Vec3 colour = setup.part_varies[corners.part] ? albedo(scene, scene.triangles[h.triangle], h.u, h.v) : setup.part_albedo[corners.part];
+    const Vec3 colour = setup.part_varies[corners.part] ? albedo(scene, scene.triangles[h.triangle], h.u, h.v)
+                                                        : setup.part_albedo[corners.part];
     const float b[3] = {1 - h.u - h.v, h.u, h.v};
     for (int k = 0; k < 3; ++k) {
       const uint32_t r = corners.receiver[size_t(k)];
@@ -110,7 +114,8 @@ struct LatticeBaker {
     const Vec3 pole = square_to_sphere({to_unit_float(uint32_t(bits >> 32)), to_unit_float(uint32_t(bits))});
     const DirectionChoice choice = choose_directions(sets, pole, setup.seed, point);
     const size_t base = size_t(choice.set) * sets.stride;
-    rotate_directions(choice.rotation, sets.x.data() + base, sets.y.data() + base, sets.z.data() + base, sets.stride, s.x.data(), s.y.data(), s.z.data());
+    rotate_directions(choice.rotation, sets.x.data() + base, sets.y.data() + base, sets.z.data() + base, sets.stride,
+                      s.x.data(), s.y.data(), s.z.data());
     setup.tracer.closest_fan(lattice.position(point), {s.x.data(), s.y.data(), s.z.data(), rays()}, s.hits.data());
 
     std::fill(s.sum.begin(), s.sum.end(), 0.0f), std::fill(s.v.begin(), s.v.end(), 0.0f);
@@ -138,16 +143,20 @@ struct LatticeBaker {
     if (in_batch) add_outer_products(s.yb.data(), J(), s.v.data(), wc(), s.sum.data());  // the rest of v is zero
 
     // V_k in the set's frame, turned into the world; then T_ji = sum_k C_ijk V_k.
-    weighted_rows(sets.table.data() + size_t(choice.set) * V_count() * sets.stride, V_count(), sets.stride, s.visible.data(), sets.stride, s.V.data());
+    weighted_rows(sets.table.data() + size_t(choice.set) * V_count() * sets.stride, V_count(), sets.stride,
+                  s.visible.data(), sets.stride, s.V.data());
     const float open = float(seen) / float(rays());
-    for (size_t k = 0; k < V_count(); ++k) s.V[k] = s.V[k] * ray_angle() + open * shortfall[size_t(choice.set) * V_count() + k];
+    for (size_t k = 0; k < V_count(); ++k)
+      s.V[k] = s.V[k] * ray_angle() + open * shortfall[size_t(choice.set) * V_count() + k];
     rotator.rotate(choice.a, choice.b, choice.c, s.V);
     for (size_t j = 0; j < J(); ++j)
       for (size_t c = 0; c < channels(); ++c)
-        for (size_t i = 0; i < C(); ++i) s.out[(j * channels() + c) * C() + i] = s.sum[j * wc() + c * width() + i] * ray_angle();
+        for (size_t i = 0; i < C(); ++i)
+          s.out[(j * channels() + c) * C() + i] = s.sum[j * wc() + c * width() + i] * ray_angle();
     for (size_t k = 0; k < V_count(); ++k)
       for (uint32_t e = tensor.begin[k]; e < tensor.begin[k + 1]; ++e)
-        for (size_t c = 0; c < channels(); ++c) s.out[(tensor.j[e] * channels() + c) * C() + tensor.i[e]] += tensor.single[e] * s.V[k];
+        for (size_t c = 0; c < channels(); ++c)
+          s.out[(tensor.j[e] * channels() + c) * C() + tensor.i[e]] += tensor.single[e] * s.V[k];
     store_receiver(out, point, s.out);
     return 2 * backs <= rays();
   }
@@ -167,7 +176,9 @@ void fill_invalid(const Lattice& lattice, const std::vector<uint8_t>& valid, con
       const int steps[6][3] = {{-1, 0, 0}, {1, 0, 0}, {0, -1, 0}, {0, 1, 0}, {0, 0, -1}, {0, 0, 1}};
       for (const auto& step : steps) {
         const int a = x + step[0], b = y + step[1], c = z + step[2];
-        if (a < 0 || b < 0 || c < 0 || a >= lattice.nx || b >= lattice.ny || c >= lattice.nz || !before[lattice.index(a, b, c)]) continue;
+        if (a < 0 || b < 0 || c < 0 || a >= lattice.nx || b >= lattice.ny || c >= lattice.nz ||
+            !before[lattice.index(a, b, c)])
+          continue;
         const std::vector<float> value = load_receiver(out.transfer, lattice.index(a, b, c));
         for (size_t k = 0; k < mean.size(); ++k) mean[k] += value[k];
         ++sources;
@@ -193,7 +204,8 @@ size_t table_bytes(int light_order, const LatticeOptions& o) {
 }
 
 Error too_little_memory(size_t needed, size_t allowed) {
-  return {"lattice", "needs at least " + std::to_string(needed) + " bytes of memory, and was allowed " + std::to_string(allowed)};
+  return {"lattice",
+          "needs at least " + std::to_string(needed) + " bytes of memory, and was allowed " + std::to_string(allowed)};
 }
 
 }  // namespace
@@ -206,18 +218,22 @@ Bounds default_lattice_box(const Scene& scene) {
 
 size_t lattice_bytes(const Lattice& lattice, int light_order, int order, int channels, Precision precision) {
   Transfer t;
-  t.light.order = light_order, t.rows = sh_count(order), t.channels = channels, t.receivers = lattice.count(), t.precision = precision;
+  t.light.order = light_order, t.rows = sh_count(order), t.channels = channels, t.receivers = lattice.count(),
+  t.precision = precision;
   return t.bytes();
 }
 
 Result<void> check_lattice(const Lattice& lattice, int light_order, const LatticeOptions& o) {
   auto within = [](const char* name, int value, int least, int most) -> Result<void> {
     if (value >= least && value <= most) return {};
-    return Error{name, "must lie between " + std::to_string(least) + " and " + std::to_string(most) + ", not " + std::to_string(value)};
+    return Error{name, "must lie between " + std::to_string(least) + " and " + std::to_string(most) + ", not " +
+                           std::to_string(value)};
   };
-  for (auto& ok : {within("lattice points along x", lattice.nx, 1, max_lattice_points), within("lattice points along y", lattice.ny, 1, max_lattice_points),
-                   within("lattice points along z", lattice.nz, 1, max_lattice_points), within("order", light_order, 1, max_sh_order),
-                   within("lattice order", o.order, 1, max_sh_order), within("order and lattice order together", light_order + o.order, 2, max_sh_order + 1),
+  for (auto& ok : {within("lattice points along x", lattice.nx, 1, max_lattice_points),
+                   within("lattice points along y", lattice.ny, 1, max_lattice_points),
+                   within("lattice points along z", lattice.nz, 1, max_lattice_points),
+                   within("order", light_order, 1, max_sh_order), within("lattice order", o.order, 1, max_sh_order),
+                   within("order and lattice order together", light_order + o.order, 2, max_sh_order + 1),
                    within("lattice samples", o.samples, 1, 1 << 20)})
     if (!ok) return ok.error();
   for (int k = 0; k < 3; ++k)
@@ -228,25 +244,29 @@ Result<void> check_lattice(const Lattice& lattice, int light_order, const Lattic
   return {};
 }
 
-Result<LatticeTransfer> bake_lattice(const Scene& scene, const Tracer& tracer, const Receivers& receivers, const Transfer& surface, const Outgoing* outgoing,
-                                     const Lattice& lattice, const LatticeOptions& options, LatticeReport* report, Progress* progress) {
+Result<LatticeTransfer> bake_lattice(const Scene& scene, const Tracer& tracer, const Receivers& receivers,
+                                     const Transfer& surface, const Outgoing* outgoing, const Lattice& lattice,
+                                     const LatticeOptions& options, LatticeReport* report, Progress* progress) {
   LAMBENT_CHECK(surface.receivers == receivers.count() && surface.columns() == size_t(sh_count(surface.light.order)));
   LAMBENT_CHECK(surface.rows == (outgoing ? outgoing->rows() : 1));
   if (auto ok = check_lattice(lattice, surface.light.order, options); !ok) return ok.error();
   const auto start = std::chrono::steady_clock::now();
-  const GatherSetup setup =
-      make_gather_setup(scene, tracer, receivers, surface.light.order + options.order - 1, options.samples, options.seed, square_to_sphere);
+  const GatherSetup setup = make_gather_setup(scene, tracer, receivers, surface.light.order + options.order - 1,
+                                              options.samples, options.seed, square_to_sphere);
   const int channels = setup.channels == 3 || surface.channels == 3 || (outgoing && is_coloured(*outgoing)) ? 3 : 1;
 
-  const size_t wc = size_t(channels) * pad_lanes(surface.columns()), J = size_t(sh_count(options.order)), stride = setup.sets.stride;
+  const size_t wc = size_t(channels) * pad_lanes(surface.columns()), J = size_t(sh_count(options.order)),
+               stride = setup.sets.stride;
   const size_t unpacked = 4 * surface.receivers * size_t(surface.rows) * wc;
   const size_t each_thread = stride * (16 + sizeof(Hit)) + 8 * (J + hit_batch) * wc;
   const size_t bytes = lattice_bytes(lattice, surface.light.order, options.order, channels, options.precision);
-  const size_t needed = bytes + table_bytes(surface.light.order, options) + unpacked + size_t(thread_count()) * each_thread;
+  const size_t needed = bytes + table_bytes(surface.light.order, options) + unpacked +
+                        size_t(thread_count()) * each_thread;
   if (needed > options.memory) return too_little_memory(needed, options.memory);
 
   LatticeBaker baker{scene, surface, outgoing, lattice, options, setup, channels};
-  WritableTransfer out = make_transfer({.order = surface.light.order}, int(J), channels, lattice.count(), options.precision);
+  WritableTransfer out =
+      make_transfer({.order = surface.light.order}, int(J), channels, lattice.count(), options.precision);
   LatticeTransfer result{lattice, options.order, {}, std::vector<uint8_t>(lattice.count())};
   {
     ProgressStage stage(progress, "lattice", lattice.count());

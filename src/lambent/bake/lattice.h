@@ -1,9 +1,11 @@
 #pragma once
-// Transfer in free space: after the surface solution one more gather, at every point of a lattice, over the whole sphere,
+// Transfer in free space: after the surface solution one more gather, at every point of a lattice, over the whole
+// sphere,
 //   T_ji(p) = integral over all w of L^i(p <- w) y_j(w),
-// with L^i the light that arrives when the environment is y_i: y_i itself where the sky is seen, and elsewhere what the surface
-// transfer says that leaves the hit towards p. It lights objects that the bake did not know. They must be small: they cast no shadow
-// and no light on the scene. Source: general-prt ("Transferred incident radiance", neighbourhood transfer); triple-product-integrals.
+// with L^i the light that arrives when the environment is y_i: y_i itself where the sky is seen, and elsewhere what the
+// surface transfer says that leaves the hit towards p. It lights objects that the bake did not know. They must be
+// small: they cast no shadow and no light on the scene. Source: general-prt ("Transferred incident radiance",
+// neighbourhood transfer); triple-product-integrals.
 #include <lambent/bake/bake.h>
 #include <lambent/transfer/lattice.h>
 #include <lambent/transfer/outgoing.h>
@@ -11,7 +13,8 @@
 namespace lambent {
 
 struct LatticeOptions {
-  int order = 4;       // m, bands of incident light; light's order + m <= max_sh_order + 1. A diffuse object needs 3, self-shadows more
+  int order = 4;       // m, bands of incident light; light's order + m <= max_sh_order + 1. A diffuse object needs 3,
+                       // self-shadows more
   int samples = 1024;  // rays a point, [1, 2^20]
   size_t memory = size_t{4} << 30;  // bytes for the result and the work
   uint32_t seed = 1;
@@ -25,7 +28,8 @@ struct LatticeReport {
   double seconds = 0;
 };
 
-// The scene's bounds less a thousandth of their diagonal on each side, so that outer points do not lie in a room's walls and floor.
+// The scene's bounds less a thousandth of their diagonal on each side, so that outer points do not lie in a room's
+// walls and floor.
 Bounds default_lattice_box(const Scene& scene);
 
 // Bytes that the lattice itself takes.
@@ -34,10 +38,12 @@ size_t lattice_bytes(const Lattice& lattice, int light_order, int order, int cha
 // What can be told before the surfaces are baked. Errors: options out of range; a box that is none; memory too small.
 Result<void> check_lattice(const Lattice& lattice, int light_order, const LatticeOptions& options);
 
-// `surface` is the scene's bake, of harmonics alone, and `outgoing` its last reflection, null for a diffuse one. The lattice's light
-// has been reflected once more than the surfaces'. Points most of whose rays meet backs of one-sided surfaces are invalid.
-// Errors: as above; every point invalid; cancelled.
-Result<LatticeTransfer> bake_lattice(const Scene& scene, const Tracer& tracer, const Receivers& receivers, const Transfer& surface, const Outgoing* outgoing,
-                                     const Lattice& lattice, const LatticeOptions& options, LatticeReport* report = nullptr, Progress* progress = nullptr);
+// `surface` is the scene's bake, of harmonics alone, and `outgoing` its last reflection, null for a diffuse one. The
+// lattice's light has been reflected once more than the surfaces'. Points most of whose rays meet backs of one-sided
+// surfaces are invalid. Errors: as above; every point invalid; cancelled.
+Result<LatticeTransfer> bake_lattice(const Scene& scene, const Tracer& tracer, const Receivers& receivers,
+                                     const Transfer& surface, const Outgoing* outgoing, const Lattice& lattice,
+                                     const LatticeOptions& options, LatticeReport* report = nullptr,
+                                     Progress* progress = nullptr);
 
 }  // namespace lambent

@@ -41,7 +41,8 @@ Surfaces bake_surfaces(Scene scene, const BakeOptions& options) {
   return s;
 }
 
-LatticeTransfer must_bake(const Surfaces& s, const Lattice& lattice, const LatticeOptions& options, LatticeReport* report = nullptr) {
+LatticeTransfer must_bake(const Surfaces& s, const Lattice& lattice, const LatticeOptions& options,
+                          LatticeReport* report = nullptr) {
   auto baked = bake_lattice(s.scene, s.tracer, s.receivers, s.transfer, nullptr, lattice, options, report);
   EXPECT_TRUE(baked) << (baked ? "" : baked.error().text());
   return baked ? *baked : LatticeTransfer{};
@@ -49,21 +50,25 @@ LatticeTransfer must_bake(const Surfaces& s, const Lattice& lattice, const Latti
 
 TEST(Lattice, OfEmptySpaceIsTheIdentity) {
   // A speck far below, which no ray finds.
-  Surfaces s = bake_surfaces(make_quad(Vec3(0, -1e4f, 0), Vec3(0, 0, 1e-3f), Vec3(1e-3f, 0, 0), 1, 1, Vec3(0.5f)), {.order = 4, .samples = 16, .bounces = 0});
+  Surfaces s = bake_surfaces(make_quad(Vec3(0, -1e4f, 0), Vec3(0, 0, 1e-3f), Vec3(1e-3f, 0, 0), 1, 1, Vec3(0.5f)),
+                             {.order = 4, .samples = 16, .bounces = 0});
   for (int order : {2, 4, 6}) {
-    const LatticeTransfer l = must_bake(s, {Vec3(-1), Vec3(1, 2, 3), 2, 3, 2}, {.order = order, .samples = 64, .precision = Precision::single});
+    const LatticeTransfer l = must_bake(s, {Vec3(-1), Vec3(1, 2, 3), 2, 3, 2},
+                                        {.order = order, .samples = 64, .precision = Precision::single});
     ASSERT_EQ(l.transfer.channels, 1);
     for (size_t p = 0; p < l.lattice.count(); ++p) {
       EXPECT_TRUE(l.valid[p]);
       const std::vector<float> T = load_receiver(l.transfer, p);
       for (size_t j = 0; j < size_t(sh_count(order)); ++j)
-        for (size_t i = 0; i < 16; ++i) EXPECT_NEAR(T[j * 16 + i], i == j ? 1 : 0, 2e-5) << j << " " << i;  // float sums of 64 rays, no noise
+        for (size_t i = 0; i < 16; ++i)
+          EXPECT_NEAR(T[j * 16 + i], i == j ? 1 : 0, 2e-5) << j << " " << i;  // float sums of 64 rays, no noise
     }
   }
 }
 
 // The definition, as it stands, over directions of its own.
-std::vector<double> plain_sum(const Surfaces& s, const Transfer& transfer, const Outgoing* outgoing, Vec3 p, int order, int rays) {
+std::vector<double> plain_sum(const Surfaces& s, const Transfer& transfer, const Outgoing* outgoing, Vec3 p, int order,
+                              int rays) {
   const CornerReceivers corners = corner_receivers(s.scene, s.receivers.front, s.receivers.back);
   const size_t C = transfer.columns(), J = size_t(sh_count(order));
   std::vector<std::vector<float>> T;
@@ -84,14 +89,17 @@ std::vector<double> plain_sum(const Surfaces& s, const Transfer& transfer, const
           const uint32_t r = corner->receiver[size_t(k)];
           if (outgoing) evaluate_outgoing(*outgoing, r, -w, weights);
           const float b = k == 0 ? 1 - h.u - h.v : k == 1 ? h.u : h.v;
-          radiance += b * reflect_rows(weights, albedo(s.scene, s.scene.triangles[h.triangle], h.u, h.v), [&](size_t row) {
-            Vec3 x;
-            for (int c = 0; c < 3; ++c) x[c] = T[r][(row * size_t(transfer.channels) + size_t(std::min(c, transfer.channels - 1))) * C + i];
-            return x;
-          });
+          radiance +=
+              b * reflect_rows(weights, albedo(s.scene, s.scene.triangles[h.triangle], h.u, h.v), [&](size_t row) {
+                Vec3 x;
+                for (int c = 0; c < 3; ++c)
+                  x[c] = T[r][(row * size_t(transfer.channels) + size_t(std::min(c, transfer.channels - 1))) * C + i];
+                return x;
+              });
         }
       for (size_t j = 0; j < J; ++j)
-        for (size_t c = 0; c < 3; ++c) sum[(j * 3 + c) * C + i] += 4 * std::numbers::pi * double(radiance[int(c)]) * y[j] / rays;
+        for (size_t c = 0; c < 3; ++c)
+          sum[(j * 3 + c) * C + i] += 4 * std::numbers::pi * double(radiance[int(c)]) * y[j] / rays;
     }
   }
   return sum;
@@ -99,20 +107,23 @@ std::vector<double> plain_sum(const Surfaces& s, const Transfer& transfer, const
 
 void expect_integrals(const Surfaces& s, const Transfer& transfer, const Outgoing* outgoing) {
   const Lattice lattice{Vec3(-1.2f, 0.2f, -1.4f), Vec3(1.1f, 1.6f, 1), 2, 2, 2};
-  auto l = bake_lattice(s.scene, s.tracer, s.receivers, transfer, outgoing, lattice, {.order = 4, .samples = 8192, .precision = Precision::single});
+  auto l = bake_lattice(s.scene, s.tracer, s.receivers, transfer, outgoing, lattice,
+                        {.order = 4, .samples = 8192, .precision = Precision::single});
   ASSERT_TRUE(l) << l.error().text();
   ASSERT_EQ(l->transfer.channels, 3);
   for (size_t p = 0; p < lattice.count(); ++p) {
     const std::vector<double> truth = plain_sum(s, transfer, outgoing, lattice.position(p), 4, 1 << 15);
     const std::vector<float> T = load_receiver(l->transfer, p);
     ASSERT_EQ(T.size(), truth.size());
-    // Entries are 4 pi times means of products that reach 2: the noise of 8,192 low-discrepancy rays, M^-0.75, against discontinuities.
+    // Entries are 4 pi times means of products that reach 2: the noise of 8,192 low-discrepancy rays, M^-0.75, against
+    // discontinuities.
     for (size_t k = 0; k < T.size(); ++k) EXPECT_NEAR(T[k], truth[k], 0.03) << "point " << p << " entry " << k;
   }
 }
 
 TEST(Lattice, HoldsTheIntegralsItStandsFor) {
-  // Light of direct transfer has no channels, that which its coloured surfaces send has; bounced transfer has them already.
+  // Light of direct transfer has no channels, that which its coloured surfaces send has; bounced transfer has them
+  // already.
   for (int bounces : {0, 2}) {
     const Surfaces s = bake_surfaces(coloured_corner(), {.order = 3, .samples = 256, .bounces = bounces});
     ASSERT_EQ(s.transfer.channels, bounces ? 3 : 1);
@@ -129,7 +140,8 @@ TEST(Lattice, SeesGlossySurfacesFromWhereItIs) {
   for (const Vec3& n : s.receivers.normals) materials.frames.push_back(frame_about(n));
   for (OutgoingKind kind : {OutgoingKind::map, OutgoingKind::svd, OutgoingKind::hemisphere}) {
     const MatrixOptions matrix{.incident_order = 3, .outgoing = kind, .outgoing_order = 3, .svd_rows = 3, .grid = 16};
-    auto baked = bake_matrix(s.scene, s.tracer, s.receivers, materials, {.order = 3, .samples = 256, .bounces = 1}, matrix);
+    auto baked =
+        bake_matrix(s.scene, s.tracer, s.receivers, materials, {.order = 3, .samples = 256, .bounces = 1}, matrix);
     ASSERT_TRUE(baked);
     expect_integrals(s, baked->transfer, &baked->outgoing);
   }
@@ -137,8 +149,10 @@ TEST(Lattice, SeesGlossySurfacesFromWhereItIs) {
 
 TEST(Lattice, SeesAUniformWorldAmongWhiteSurfaces) {
   // A furnace: where nothing absorbs, uniform light is uniform everywhere that no black back is seen from.
-  const Surfaces s = bake_surfaces(corner_scene(Vec3(1), Vec3(1), Vec3(1), 0.6f), {.order = 2, .samples = 256, .bounces = 40, .precision = Precision::single});
-  const LatticeTransfer l = must_bake(s, {Vec3(-1.5f, 0.1f, -1.5f), Vec3(1.6f, 1.4f, 1.6f), 4, 3, 4}, {.order = 3, .samples = 1024, .precision = Precision::single});
+  const Surfaces s = bake_surfaces(corner_scene(Vec3(1), Vec3(1), Vec3(1), 0.6f),
+                                   {.order = 2, .samples = 256, .bounces = 40, .precision = Precision::single});
+  const LatticeTransfer l = must_bake(s, {Vec3(-1.5f, 0.1f, -1.5f), Vec3(1.6f, 1.4f, 1.6f), 4, 3, 4},
+                                      {.order = 3, .samples = 1024, .precision = Precision::single});
   std::vector<Vec3> light(4, Vec3(0));
   light[0] = Vec3(3, 2, 1) * std::sqrt(4 * pi);
   Relit relit;
@@ -158,15 +172,18 @@ TEST(Lattice, FillsPointsInsideSolids) {
   EXPECT_EQ(l.valid, (std::vector<uint8_t>{1, 0, 1}));
   EXPECT_EQ(report.points, 3u);
   EXPECT_EQ(report.invalid, 1u);
-  const std::vector<float> a = load_receiver(l.transfer, 0), b = load_receiver(l.transfer, 1), c = load_receiver(l.transfer, 2);
+  const std::vector<float> a = load_receiver(l.transfer, 0), b = load_receiver(l.transfer, 1),
+                           c = load_receiver(l.transfer, 2);
   for (size_t k = 0; k < b.size(); ++k) EXPECT_NEAR(b[k], 0.5f * (a[k] + c[k]), 1e-6f);
   // Seven points inside, in a row from one that is clear, take its values one after another.
-  const LatticeTransfer row = must_bake(s, {Vec3(-1.5f, 0.5f, 0), Vec3(0.45f, 0.5f, 0), 14, 1, 1}, {.order = 2, .samples = 64, .precision = Precision::single});
+  const LatticeTransfer row = must_bake(s, {Vec3(-1.5f, 0.5f, 0), Vec3(0.45f, 0.5f, 0), 14, 1, 1},
+                                        {.order = 2, .samples = 64, .precision = Precision::single});
   const std::vector<float> last_valid = load_receiver(row.transfer, 6), end = load_receiver(row.transfer, 13);
   EXPECT_EQ(row.valid, (std::vector<uint8_t>{1, 1, 1, 1, 1, 1, 1, 0, 0, 0, 0, 0, 0, 0}));
   EXPECT_EQ(last_valid, end);
   // Nothing but the inside.
-  auto none_left = bake_lattice(s.scene, s.tracer, s.receivers, s.transfer, nullptr, {Vec3(-0.2f, 0.3f, -0.2f), Vec3(0.2f, 0.6f, 0.2f), 2, 2, 2}, {.samples = 64});
+  auto none_left = bake_lattice(s.scene, s.tracer, s.receivers, s.transfer, nullptr,
+                                {Vec3(-0.2f, 0.3f, -0.2f), Vec3(0.2f, 0.6f, 0.2f), 2, 2, 2}, {.samples = 64});
   ASSERT_FALSE(none_left);
   EXPECT_NE(none_left.error().message.find("inside something"), std::string::npos);
 }
@@ -178,7 +195,8 @@ TEST(Lattice, IsTheSameOnOneThreadAndSaysWhatMemoryItNeeds) {
   const LatticeTransfer a = must_bake(s, lattice, options);
   ThreadLimit one(1);
   const LatticeTransfer b = must_bake(s, lattice, options);
-  EXPECT_TRUE(std::equal(a.transfer.data.begin(), a.transfer.data.end(), b.transfer.data.begin(), b.transfer.data.end()));
+  EXPECT_TRUE(
+      std::equal(a.transfer.data.begin(), a.transfer.data.end(), b.transfer.data.begin(), b.transfer.data.end()));
   EXPECT_EQ(a.valid, b.valid);
   LatticeOptions poor = options;
   for (size_t memory : {size_t(1000), lattice_bytes(lattice, 3, 3, 3, Precision::half) + 40000}) {
@@ -196,8 +214,11 @@ TEST(Lattice, IsTheSameOnOneThreadAndSaysWhatMemoryItNeeds) {
 
 TEST(Lattice, InterpolatesLinearlyAndHoldsTheBorder) {
   // Trilinear interpolation reproduces what is linear in each coordinate: a + b x + c y z.
-  for (const Lattice& lattice : {Lattice{Vec3(-1, 0, 2), Vec3(1, 3, 5), 4, 3, 2}, Lattice{Vec3(-1, 1, 2), Vec3(1, 1, 5), 5, 1, 3}}) {
-    auto f = [](Vec3 p, int row) { return Vec3(1, 2, 3) + float(row + 1) * p.x * Vec3(0.5f, -1, 2) + p.y * p.z * Vec3(1, 0.2f, -0.3f); };
+  for (const Lattice& lattice :
+       {Lattice{Vec3(-1, 0, 2), Vec3(1, 3, 5), 4, 3, 2}, Lattice{Vec3(-1, 1, 2), Vec3(1, 1, 5), 5, 1, 3}}) {
+    auto f = [](Vec3 p, int row) {
+      return Vec3(1, 2, 3) + float(row + 1) * p.x * Vec3(0.5f, -1, 2) + p.y * p.z * Vec3(1, 0.2f, -0.3f);
+    };
     Relit relit;
     relit.rows = 4;
     relit.values.resize((lattice.count() + transfer_block - 1) / transfer_block * 4 * 3 * transfer_block);
@@ -206,10 +227,12 @@ TEST(Lattice, InterpolatesLinearlyAndHoldsTheBorder) {
     Random random(4);
     std::vector<Vec3> out(4);
     for (int i = 0; i < 200; ++i) {
-      const Vec3 p = lattice.min - 1.0f + Vec3(random.next(), random.next(), random.next()) * (lattice.max - lattice.min + 2.0f);
+      const Vec3 p = lattice.min - 1.0f +
+                     Vec3(random.next(), random.next(), random.next()) * (lattice.max - lattice.min + 2.0f);
       interpolate_lattice(lattice, relit, p, out);
       const Vec3 held = glm::clamp(p, lattice.min, lattice.max);
-      for (int row = 0; row < 4; ++row) EXPECT_LT(glm::length(out[size_t(row)] - f(held, row)), 1e-4f);  // float roundings of values up to 30
+      for (int row = 0; row < 4; ++row)
+        EXPECT_LT(glm::length(out[size_t(row)] - f(held, row)), 1e-4f);  // float roundings of values up to 30
     }
   }
 }

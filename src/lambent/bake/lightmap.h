@@ -1,7 +1,7 @@
 #pragma once
-// Scene and lamps -> Transfer: radiosity. The columns are groups of the scene's own lamps, and, where wanted, harmonics of a
-// distant light (a PRT lightmap); the operator and the rays are those of bake.h. Relit with coefficient 1 a group, it is exit
-// radiance of white receivers, irradiance / pi; other coefficients dim and tint the groups.
+// Scene and lamps -> Transfer: radiosity. The columns are groups of the scene's own lamps, and, where wanted, harmonics
+// of a distant light (a PRT lightmap); the operator and the rays are those of bake.h. Relit with coefficient 1 a group,
+// it is exit radiance of white receivers, irradiance / pi; other coefficients dim and tint the groups.
 #include <lambent/bake/directional.h>
 #include <lambent/bake/solve.h>
 #include <lambent/transfer/transfer.h>
@@ -14,12 +14,12 @@ namespace lambent {
 enum class GatherKind { rays, hemicube };
 
 struct LightmapOptions {
-  int order = 0;                    // bands of a distant light's harmonics, columns before the groups; 0: none, at most max_sh_order
-  int samples = 512;                // rays a receiver, [1, 2^20]
-  int lamp_samples = 32;            // towards each group's lamps, [1, 2^16]
-  int bounces = 3;                  // reflections between surfaces, [0, 64]; not read where `converge` is set
-  double converge = 0;              // above 0: as many bounces as leave this residual (SolveOptions::tolerance)
-  Solver solver = Solver::gmres;    // for `converge`
+  int order = 0;      // bands of a distant light's harmonics, columns before the groups; 0: none, at most max_sh_order
+  int samples = 512;  // rays a receiver, [1, 2^20]
+  int lamp_samples = 32;          // towards each group's lamps, [1, 2^16]
+  int bounces = 3;                // reflections between surfaces, [0, 64]; not read where `converge` is set
+  double converge = 0;            // above 0: as many bounces as leave this residual (SolveOptions::tolerance)
+  Solver solver = Solver::gmres;  // for `converge`
   DirectionalKind directional = DirectionalKind::none;  // rows of the transfer; others than none take order 0
   size_t memory = size_t{4} << 30;  // bytes of working memory beyond scene and result; less means rays traced again
   GatherKind gather = GatherKind::rays;  // hemicube: `samples` is rounded to 3 n^2
@@ -41,8 +41,8 @@ struct LightmapReport {
 // Least working memory with which such a bake can run: the solution vectors. What is more holds the operator.
 size_t least_lightmap_memory(size_t receivers, size_t groups, const LightmapOptions& options);
 
-// Errors: options out of range, nothing that gives light (no groups and order 0), too many columns; memory too small (says what is
-// needed); cancelled.
+// Errors: options out of range, nothing that gives light (no groups and order 0), too many columns; memory too small
+// (says what is needed); cancelled.
 Result<Lightmap> bake_lightmap(const Scene& scene, const Tracer& tracer, const Receivers& receivers, const Lamps& lamps,
                                const LightmapOptions& options, bool direct_apart, LightmapReport* report = nullptr,
                                Progress* progress = nullptr);

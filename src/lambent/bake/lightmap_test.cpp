@@ -35,7 +35,8 @@ Receivers place(Scene& scene, Where where, float density) {
   return make_texel_receivers(scene, *atlas);
 }
 
-Baking bake_lamps(Scene scene, Where where, LightmapOptions options, bool groups = false, const Environment* sky = nullptr, float density = 8) {
+Baking bake_lamps(Scene scene, Where where, LightmapOptions options, bool groups = false,
+                  const Environment* sky = nullptr, float density = 8) {
   Baking b{std::move(scene), {}, {}, {}};
   b.receivers = place(b.scene, where, density);
   options.precision = Precision::single;
@@ -58,14 +59,16 @@ Vec3 mean_over(const Baking& b, const Relit& lit, size_t part) {
   glm::dvec3 sum(0);
   size_t count = 0;
   const auto& patches = std::get<PatchReceivers>(b.receivers.basis);
-  for (uint32_t i = b.scene.parts[part].first_triangle; i < b.scene.parts[part].first_triangle + b.scene.parts[part].triangle_count; ++i)
+  for (uint32_t i = b.scene.parts[part].first_triangle;
+       i < b.scene.parts[part].first_triangle + b.scene.parts[part].triangle_count; ++i)
     sum += glm::dvec3(lit.at(patches.front[i].receiver)), ++count;
   return Vec3(sum / double(count));
 }
 
 TEST(Lightmap, FormFactorsOfSquares) {
-  // Patches of equal area: their mean is L times the form factor, by the formulas for unit squares one apart, and for two that
-  // share an edge. 128 patches are gathered at their centroids: what that misses of the area mean is below half a percent.
+  // Patches of equal area: their mean is L times the form factor, by the formulas for unit squares one apart, and for
+  // two that share an edge. 128 patches are gathered at their centroids: what that misses of the area mean is below
+  // half a percent.
   constexpr float collocation = 0.005f;
   const double s = std::sqrt(2.0), a = std::numbers::pi;
   const double parallel = 2 / a * (std::log(std::sqrt(4.0 / 3)) + 2 * s * std::atan(1 / s) - 2 * std::atan(1.0));
@@ -75,11 +78,13 @@ TEST(Lightmap, FormFactorsOfSquares) {
   const int n = 40;
   for (int i = 0; i < n * n; ++i)
     for (int j = 0; j < n * n; ++j) {
-      const glm::dvec3 p((i % n + 0.5) / n, 0, (i / n + 0.5) / n), q((j % n + 0.5) / n, (j / n + 0.5) / n, 0), d = q - p;
+      const glm::dvec3 p((i % n + 0.5) / n, 0, (i / n + 0.5) / n), q((j % n + 0.5) / n, (j / n + 0.5) / n, 0),
+          d = q - p;
       const double r2 = glm::dot(d, d);
       quadrature += d.y * -d.z / (a * r2 * r2) / (double(n) * n * n * n);
     }
-  EXPECT_NEAR(quadrature, 0.20004, 4e-3);  // the known value; the cells at the edge, where the integrand is singular, weigh 1/40 of it
+  EXPECT_NEAR(quadrature, 0.20004,
+              4e-3);  // the known value; the cells at the edge, where the integrand is singular, weigh 1/40 of it
   for (bool facing : {true, false}) {
     Scene scene;
     const Vec3 L(3, 2, 1);
@@ -89,7 +94,8 @@ TEST(Lightmap, FormFactorsOfSquares) {
     else add_quad(scene, lamp, "lamp", Vec3(0), Vec3(1, 0, 0), Vec3(0, 1, 0), 1, 1);
     const Baking b = bake_lamps(scene, Where::patches, {.samples = 1024, .lamp_samples = 64, .bounces = 0});
     const Vec3 mean = mean_over(b, b.lit({Vec3(1)}), 0);
-    for (int c = 0; c < 3; ++c) EXPECT_NEAR(mean[c] / L[c], facing ? parallel : 0.20004, facing ? collocation * parallel : 0.02 * 0.2) << facing;
+    for (int c = 0; c < 3; ++c)
+      EXPECT_NEAR(mean[c] / L[c], facing ? parallel : 0.20004, facing ? collocation * parallel : 0.02 * 0.2) << facing;
   }
 }
 
@@ -98,12 +104,13 @@ TEST(Hemicube, FormFactorsOfSquares) {
   for (int samples : {12, 1000, 12288}) {
     const DirectionSets cube = make_hemicube_set(3, samples);
     double sum = 0, lit = 0;
-    for (size_t i = 0; i < cube.weights.size(); ++i) sum += double(cube.weights[i]) / cube.samples, lit += double(cube.weights[i]) / cube.samples * double(cube.z[i]);
+    for (size_t i = 0; i < cube.weights.size(); ++i)
+      sum += double(cube.weights[i]) / cube.samples, lit += double(cube.weights[i]) / cube.samples * double(cube.z[i]);
     EXPECT_NEAR(sum, 1, 1e-6);
     EXPECT_NEAR(lit, 2.0 / 3, 2.0 / samples);  // the integral of cos^2 / pi
   }
-  // Rows of the operator: one square's patches glow, the other gathers. Both kinds of rows give the form factors by formula
-  // (Lightmap.FormFactorsOfSquares); 3,072 pixels alias by under a percent.
+  // Rows of the operator: one square's patches glow, the other gathers. Both kinds of rows give the form factors by
+  // formula (Lightmap.FormFactorsOfSquares); 3,072 pixels alias by under a percent.
   for (bool facing : {true, false}) {
     Scene scene;
     const uint32_t white = add_material(scene, "white", Vec3(1));
@@ -121,7 +128,8 @@ TEST(Hemicube, FormFactorsOfSquares) {
       const size_t width = pad_lanes(1);
       AlignedVector<float> x(receivers.count() * width, 0.0f), y(x.size());
       const Part &from = scene.parts[1], &to = scene.parts[0];
-      for (uint32_t t = from.first_triangle; t < from.first_triangle + from.triangle_count; ++t) x[patches.front[t].receiver * width] = 1;
+      for (uint32_t t = from.first_triangle; t < from.first_triangle + from.triangle_count; ++t)
+        x[patches.front[t].receiver * width] = 1;
       op->apply(x.data(), width, y.data());
       double mean = 0;
       for (uint32_t t = to.first_triangle; t < to.first_triangle + to.triangle_count; ++t)
@@ -133,7 +141,8 @@ TEST(Hemicube, FormFactorsOfSquares) {
 }
 
 TEST(Hemicube, ClosedBoxAndDirectionalRows) {
-  // The same closed forms as by rays: radiosity e / (1 - rho); and E along the receiver's own normal is E by the vector.
+  // The same closed forms as by rays: radiosity e / (1 - rho); and E along the receiver's own normal is E by the
+  // vector.
   const Vec3 e(1, 2, 0.5f), rho(0.8f, 0.5f, 0.3f);
   Scene scene;
   add_box(scene, add_lamp(scene, "wall", rho, e), "box", Vec3(-1), Vec3(1, 0.5f, 2), 3, true);
@@ -141,7 +150,13 @@ TEST(Hemicube, ClosedBoxAndDirectionalRows) {
     const Receivers receivers = make_vertex_receivers(scene);
     auto tracer = Tracer::build(scene);
     auto map = bake_lightmap(scene, *tracer, receivers, make_lamps(scene, nullptr, false),
-                             {.samples = 768, .lamp_samples = 16, .converge = 1e-4, .directional = kind, .gather = GatherKind::hemicube, .precision = Precision::single}, false);
+                             {.samples = 768,
+                              .lamp_samples = 16,
+                              .converge = 1e-4,
+                              .directional = kind,
+                              .gather = GatherKind::hemicube,
+                              .precision = Precision::single},
+                             false);
     ASSERT_TRUE(map);
     Relit lit;
     relight(map->all, std::vector<Vec3>{Vec3(1)}, lit);
@@ -149,24 +164,28 @@ TEST(Hemicube, ClosedBoxAndDirectionalRows) {
     for (size_t r = 0; r < receivers.count(); ++r) {
       std::array<Vec3, 3> rows{};
       for (int row = 0; row < lit.rows; ++row) rows[size_t(row)] = lit.at(r, row);
-      mean += evaluate_directional_light(kind, rows, receiver_frame(receivers.normals[r]), receivers.normals[r]) / float(receivers.count());
+      mean += evaluate_directional_light(kind, rows, receiver_frame(receivers.normals[r]), receivers.normals[r]) /
+              float(receivers.count());
     }
     for (int c = 0; c < 3; ++c) EXPECT_NEAR(mean[c], e[c] / (1 - rho[c]), 0.02f * e[c] / (1 - rho[c])) << int(kind);
   }
 }
 
 TEST(Lightmap, ClosedBoxOfUniformEmission) {
-  // Radiosity e / (1 - rho) everywhere, so that a white surface sends out as much; with k bounces e (1 - rho^{k+1}) / (1 - rho).
+  // Radiosity e / (1 - rho) everywhere, so that a white surface sends out as much; with k bounces e (1 - rho^{k+1}) /
+  // (1 - rho).
   const Vec3 e(1, 2, 0.5f), rho(0.8f, 0.5f, 0.3f);
   Scene scene;
   add_box(scene, add_lamp(scene, "wall", rho, e), "box", Vec3(-1), Vec3(1, 0.5f, 2), 3, true);
   for (Where where : {Where::vertices, Where::texels, Where::patches})
     for (int bounces : {0, 2, -1}) {
-      LightmapOptions options{.samples = 256, .lamp_samples = 16, .bounces = std::max(bounces, 0), .converge = bounces < 0 ? 1e-4 : 0.0};
+      LightmapOptions options{
+          .samples = 256, .lamp_samples = 16, .bounces = std::max(bounces, 0), .converge = bounces < 0 ? 1e-4 : 0.0};
       const Baking b = bake_lamps(scene, where, options, false, nullptr, 3);
       const Relit lit = b.lit({Vec3(1)});
       for (int c = 0; c < 3; ++c) {
-        const double expected = double(e[c]) * (bounces < 0 ? 1 : 1 - std::pow(double(rho[c]), bounces + 1)) / (1 - double(rho[c]));
+        const double expected = double(e[c]) * (bounces < 0 ? 1 : 1 - std::pow(double(rho[c]), bounces + 1)) /
+                                (1 - double(rho[c]));
         double mean = 0, square = 0;
         for (size_t r = 0; r < b.receivers.count(); ++r) {
           const double x = double(lit.at(r)[c]) / expected;
@@ -180,8 +199,8 @@ TEST(Lightmap, ClosedBoxOfUniformEmission) {
 }
 
 TEST(Lightmap, IntegratingSphereWithAnEmissivePatch) {
-  // Every point of a sphere sees every other with the same form factor: a patch that is the fraction f of it adds L f to all,
-  // and each bounce multiplies by rho. The ball's 5,120 faces fall 0.3% short of it, bounce by bounce.
+  // Every point of a sphere sees every other with the same form factor: a patch that is the fraction f of it adds L f
+  // to all, and each bounce multiplies by rho. The ball's 5,120 faces fall 0.3% short of it, bounce by bounce.
   constexpr float rho = 0.7f, L = 4, faceted = 0.01f;
   Scene scene = make_sphere(1, 4, Vec3(rho), true);
   add_lamp(scene, "lamp", Vec3(rho), Vec3(L));
@@ -196,9 +215,11 @@ TEST(Lightmap, IntegratingSphereWithAnEmissivePatch) {
   }
   // Two parts over the same vertices: the second with copies of them.
   const size_t vertices = scene.positions.size();
-  for (size_t v = 0; v < vertices; ++v) scene.positions.push_back(scene.positions[v]), scene.normals.push_back(scene.normals[v]);
+  for (size_t v = 0; v < vertices; ++v)
+    scene.positions.push_back(scene.positions[v]), scene.normals.push_back(scene.normals[v]);
   scene.parts[0].triangle_count = uint32_t(wall.size());
-  scene.parts.push_back({"patch", 1, uint32_t(vertices), uint32_t(vertices), uint32_t(wall.size()), uint32_t(patch.size())});
+  scene.parts.push_back(
+      {"patch", 1, uint32_t(vertices), uint32_t(vertices), uint32_t(wall.size()), uint32_t(patch.size())});
   scene.triangles = wall;
   for (Triangle t : patch) {
     for (uint32_t& v : t.v) v += uint32_t(vertices);
@@ -207,7 +228,8 @@ TEST(Lightmap, IntegratingSphereWithAnEmissivePatch) {
   }
   const double f = lamp / all;
   for (int bounces : {0, 1, -1}) {
-    LightmapOptions options{.samples = 512, .lamp_samples = 32, .bounces = std::max(bounces, 0), .converge = bounces < 0 ? 1e-4 : 0.0};
+    LightmapOptions options{
+        .samples = 512, .lamp_samples = 32, .bounces = std::max(bounces, 0), .converge = bounces < 0 ? 1e-4 : 0.0};
     const Baking b = bake_lamps(scene, Where::vertices, options);
     const Relit lit = b.lit({Vec3(1)});
     double mean = 0;
@@ -218,16 +240,25 @@ TEST(Lightmap, IntegratingSphereWithAnEmissivePatch) {
 }
 
 TEST(Lightmap, PunctualLightsOverAPlane) {
-  // Closed forms: E = I cos / d^2, with a spot's falloff; a directional light's E cos. Exact but for the receiver's hair's breadth.
+  // Closed forms: E = I cos / d^2, with a spot's falloff; a directional light's E cos. Exact but for the receiver's
+  // hair's breadth.
   Scene scene = make_quad(Vec3(-1, 0, -1), Vec3(0, 0, 2), Vec3(2, 0, 0), 6, 6, Vec3(0.5f));
   const Vec3 at(0.3f, 0.8f, -0.2f), axis = glm::normalize(Vec3(-0.4f, -1, 0.3f));
-  scene.lights.push_back({.name = "bulb", .kind = PunctualLight::Kind::point, .position = at, .intensity = Vec3(3, 2, 1)});
-  scene.lights.push_back({.name = "spot", .kind = PunctualLight::Kind::spot, .position = at, .direction = axis, .intensity = Vec3(5, 6, 7),
-                          .inner_cone = 0.3f, .outer_cone = 0.7f});
-  scene.lights.push_back({.name = "sun", .kind = PunctualLight::Kind::directional, .direction = axis, .intensity = Vec3(1, 2, 3)});
+  scene.lights.push_back(
+      {.name = "bulb", .kind = PunctualLight::Kind::point, .position = at, .intensity = Vec3(3, 2, 1)});
+  scene.lights.push_back({.name = "spot",
+                          .kind = PunctualLight::Kind::spot,
+                          .position = at,
+                          .direction = axis,
+                          .intensity = Vec3(5, 6, 7),
+                          .inner_cone = 0.3f,
+                          .outer_cone = 0.7f});
+  scene.lights.push_back(
+      {.name = "sun", .kind = PunctualLight::Kind::directional, .direction = axis, .intensity = Vec3(1, 2, 3)});
   const Baking b = bake_lamps(scene, Where::vertices, {.samples = 32, .bounces = 1}, true);
   ASSERT_EQ(b.map.all.light.groups, (std::vector<std::string>{"bulb", "spot", "sun"}));
-  const Relit bulb = b.lit({Vec3(1), Vec3(0), Vec3(0)}), spot = b.lit({Vec3(0), Vec3(1), Vec3(0)}), sun = b.lit({Vec3(0), Vec3(0), Vec3(1)});
+  const Relit bulb = b.lit({Vec3(1), Vec3(0), Vec3(0)}), spot = b.lit({Vec3(0), Vec3(1), Vec3(0)}),
+              sun = b.lit({Vec3(0), Vec3(0), Vec3(1)});
   int lit_by_spot = 0;
   for (size_t r = 0; r < b.receivers.count(); ++r) {
     const Vec3 d = at - b.receivers.origins[r];
@@ -247,12 +278,18 @@ TEST(Lightmap, PunctualLightsOverAPlane) {
 // A coloured corner with a lamp above, a bulb, and a sky: no symmetry.
 Scene corner(bool bulb) {
   Scene scene;
-  const uint32_t red = add_material(scene, "red", Vec3(0.8f, 0.2f, 0.1f)), grey = add_material(scene, "grey", Vec3(0.6f));
+  const uint32_t red = add_material(scene, "red", Vec3(0.8f, 0.2f, 0.1f)),
+                 grey = add_material(scene, "grey", Vec3(0.6f));
   add_quad(scene, grey, "floor", Vec3(-1, 0, -1), Vec3(0, 0, 2), Vec3(2, 0, 0), 24, 24);
   add_quad(scene, red, "wall", Vec3(-1, 0, -1), Vec3(2, 0, 0), Vec3(0, 1.5f, 0), 24, 18);
   add_sphere(scene, grey, "ball", Vec3(0.3f, 0.5f, -0.2f), 0.35f, 3);
-  add_quad(scene, add_lamp(scene, "lamp", Vec3(0.3f), Vec3(6, 5, 3)), "lamp", Vec3(-0.6f, 1.4f, 0.1f), Vec3(0.4f, 0.1f, 0), Vec3(0, 0.05f, 0.3f), 1, 1);
-  if (bulb) scene.lights.push_back({.name = "bulb", .kind = PunctualLight::Kind::point, .position = Vec3(0.8f, 0.6f, 0.7f), .intensity = Vec3(0.5f, 0.6f, 0.9f)});
+  add_quad(scene, add_lamp(scene, "lamp", Vec3(0.3f), Vec3(6, 5, 3)), "lamp", Vec3(-0.6f, 1.4f, 0.1f),
+           Vec3(0.4f, 0.1f, 0), Vec3(0, 0.05f, 0.3f), 1, 1);
+  if (bulb)
+    scene.lights.push_back({.name = "bulb",
+                            .kind = PunctualLight::Kind::point,
+                            .position = Vec3(0.8f, 0.6f, 0.7f),
+                            .intensity = Vec3(0.5f, 0.6f, 0.9f)});
   return scene;
 }
 
@@ -263,27 +300,32 @@ Environment skew_sky() {
 }
 
 TEST(Lightmap, AgreesWithThePathTracer) {
-  // 12 receivers of each kind; paths and rays leave noise below 1%, interpolation between receivers a little more. Seams of the
-  // ball's charts move single texels by a few percent, since it is look-ups that they make agree.
+  // 12 receivers of each kind; paths and rays leave noise below 1%, interpolation between receivers a little more.
+  // Seams of the ball's charts move single texels by a few percent, since it is look-ups that they make agree.
   constexpr float noise = 0.02f, seams = 0.03f;
   const Environment sky = skew_sky();
   for (Where where : {Where::vertices, Where::texels, Where::patches}) {
-    const Baking b = bake_lamps(corner(true), where, {.samples = 1024, .lamp_samples = 64, .bounces = 2}, true, &sky, 24);
+    const Baking b =
+        bake_lamps(corner(true), where, {.samples = 1024, .lamp_samples = 64, .bounces = 2}, true, &sky, 24);
     ASSERT_EQ(b.map.all.light.groups, (std::vector<std::string>{"lamp", "bulb", "sky"}));
     const Relit lit = b.lit({Vec3(1), Vec3(1), Vec3(1)});
     for (size_t k = 0; k < 12; ++k) {
       const size_t r = k * b.receivers.count() / 12 + 5;
-      const Vec3 truth = exit_radiance(b.scene, sky, b.receivers.origins[r], b.receivers.normals[r], 2, 8192, uint32_t(k), true);
+      const Vec3 truth =
+          exit_radiance(b.scene, sky, b.receivers.origins[r], b.receivers.normals[r], 2, 8192, uint32_t(k), true);
       for (int c = 0; c < 3; ++c)
-        EXPECT_NEAR(lit.at(r)[c], truth[c], (where == Where::texels ? noise + seams : noise) * std::max(truth[c], 0.5f)) << "kind " << int(where) << " receiver " << r << " channel " << c;
+        EXPECT_NEAR(lit.at(r)[c], truth[c], (where == Where::texels ? noise + seams : noise) * std::max(truth[c], 0.5f))
+            << "kind " << int(where) << " receiver " << r << " channel " << c;
     }
   }
 }
 
 TEST(Lightmap, GroupsAddUpToAll) {
   const Environment sky = skew_sky();
-  const Baking apart = bake_lamps(corner(true), Where::vertices, {.samples = 1024, .lamp_samples = 64, .bounces = 2}, true, &sky);
-  const Baking together = bake_lamps(corner(true), Where::vertices, {.samples = 1024, .lamp_samples = 64, .bounces = 2}, false, &sky);
+  const Baking apart =
+      bake_lamps(corner(true), Where::vertices, {.samples = 1024, .lamp_samples = 64, .bounces = 2}, true, &sky);
+  const Baking together =
+      bake_lamps(corner(true), Where::vertices, {.samples = 1024, .lamp_samples = 64, .bounces = 2}, false, &sky);
   ASSERT_EQ(together.map.all.light.groups, std::vector<std::string>{all_lamps});
   const Relit sum = apart.lit({Vec3(1), Vec3(1), Vec3(1)}), all = together.lit({Vec3(1)});
   // The same rays and the same samples, group by group: only the order of additions differs.
@@ -300,8 +342,8 @@ TEST(Lightmap, DirectApartIsTheBakeWithoutBounces) {
 }
 
 TEST(Lightmap, HarmonicsOverTexelsAreTheVertexBakeBetweenVertices) {
-  // A PRT lightmap against the vertex bake, both relit by one skew light, at random points of the floor away from its shadows'
-  // sharpest parts: interpolation over cells of 1/12, and rays of their own, leave 2% of the brightest.
+  // A PRT lightmap against the vertex bake, both relit by one skew light, at random points of the floor away from its
+  // shadows' sharpest parts: interpolation over cells of 1/12, and rays of their own, leave 2% of the brightest.
   Scene scene = corner(false);
   const Environment sky = skew_sky();
   std::vector<Vec3> light(16);
@@ -310,16 +352,19 @@ TEST(Lightmap, HarmonicsOverTexelsAreTheVertexBakeBetweenVertices) {
   light[0] += Vec3(4);
   auto tracer = Tracer::build(scene);
   const Receivers vertices = make_vertex_receivers(scene);
-  auto by_vertices = bake(scene, *tracer, vertices, {.order = 4, .samples = 2048, .bounces = 2, .precision = Precision::single});
+  auto by_vertices =
+      bake(scene, *tracer, vertices, {.order = 4, .samples = 2048, .bounces = 2, .precision = Precision::single});
   ASSERT_TRUE(by_vertices);
   Relit a, b;
   relight(*by_vertices, light, a);
   Scene split = scene;
   const Receivers texels = place(split, Where::texels, 16);
   auto tracer_again = Tracer::build(split);
-  auto map = bake_lightmap(split, *tracer_again, texels, Lamps{}, {.order = 4, .samples = 2048, .bounces = 2, .precision = Precision::single}, false);
+  auto map = bake_lightmap(split, *tracer_again, texels, Lamps{},
+                           {.order = 4, .samples = 2048, .bounces = 2, .precision = Precision::single}, false);
   ASSERT_TRUE(map) << map.error().text();
-  auto by_texels = bake(split, *tracer_again, texels, {.order = 4, .samples = 2048, .bounces = 2, .precision = Precision::single});
+  auto by_texels =
+      bake(split, *tracer_again, texels, {.order = 4, .samples = 2048, .bounces = 2, .precision = Precision::single});
   ASSERT_TRUE(by_texels);
   relight(map->all, light, b);
   Relit c;
@@ -327,14 +372,18 @@ TEST(Lightmap, HarmonicsOverTexelsAreTheVertexBakeBetweenVertices) {
   double squares = 0, total = 0;
   auto look_up = [](const SpatialBasis& basis, const Relit& lit, uint32_t t, float u, float v) {
     Vec3 sum(0);
-    std::visit([&](const auto& s) { s.spread(*s.find(t, true), u, v, [&](uint32_t r, float w) { sum += w * lit.at(r); }); }, basis);
+    std::visit(
+        [&](const auto& s) { s.spread(*s.find(t, true), u, v, [&](uint32_t r, float w) { sum += w * lit.at(r); }); },
+        basis);
     return sum;
   };
   for (uint32_t t = 0; t < split.triangles.size(); ++t) {
     const float u = 0.7f * random.next(), v = (1 - u) * random.next();
-    const Vec3 x = look_up(vertices.basis, a, t, u, v), y = look_up(texels.basis, b, t, u, v), z = look_up(texels.basis, c, t, u, v);
+    const Vec3 x = look_up(vertices.basis, a, t, u, v), y = look_up(texels.basis, b, t, u, v),
+               z = look_up(texels.basis, c, t, u, v);
     squares += double(glm::dot(x - y, x - y)), total += double(glm::dot(x, x));
-    EXPECT_LT(glm::length(y - z), 0.04f * (1 + glm::length(y)));  // the two paths through the code differ by seam smoothing
+    EXPECT_LT(glm::length(y - z),
+              0.04f * (1 + glm::length(y)));  // the two paths through the code differ by seam smoothing
   }
   EXPECT_LT(std::sqrt(squares / total), 0.03);
 }
@@ -343,7 +392,8 @@ TEST(Lightmap, TheSameBytesWhateverTheThreadsAndTheMemory) {
   const Environment sky = skew_sky();
   auto bytes_with = [&](int threads, size_t memory, double* kept) {
     ThreadLimit limit(threads);
-    const Baking b = bake_lamps(corner(true), Where::texels, {.samples = 64, .bounces = 2, .memory = memory}, true, &sky, 10);
+    const Baking b =
+        bake_lamps(corner(true), Where::texels, {.samples = 64, .bounces = 2, .memory = memory}, true, &sky, 10);
     *kept = b.report.operator_kept;
     return std::vector<uint8_t>(b.map.all.data.begin(), b.map.all.data.end());
   };
@@ -373,12 +423,14 @@ TEST(Lightmap, RefusesWhatCannotBeBaked) {
   add_quad(flat, m, "flat", Vec3(0), Vec3(1, 0, 0), Vec3(2, 0, 0), 1, 1);
   EXPECT_EQ(make_lamps(flat, nullptr, true).groups(), 0u);
   // One of no finite brightness is named, and so is light that halves cannot hold.
-  for (auto [radiance, words] : {std::pair{3e38f, "\"sun\" shines with"}, {INFINITY, "\"sun\" shines with"}, {1e9f, "half floats"}}) {
+  for (auto [radiance, words] :
+       {std::pair{3e38f, "\"sun\" shines with"}, {INFINITY, "\"sun\" shines with"}, {1e9f, "half floats"}}) {
     Scene glaring = dark;
     const uint32_t sun = add_lamp(glaring, "sun", Vec3(0.5f), Vec3(radiance));
     add_quad(glaring, sun, "sun", Vec3(0, 1, 0), Vec3(1, 0, 0), Vec3(0, 0, 1), 1, 1);
     auto glaring_tracer = Tracer::build(glaring);
-    auto refused = bake_lightmap(glaring, *glaring_tracer, make_vertex_receivers(glaring), make_lamps(glaring, nullptr, true), {.samples = 16}, false);
+    auto refused = bake_lightmap(glaring, *glaring_tracer, make_vertex_receivers(glaring),
+                                 make_lamps(glaring, nullptr, true), {.samples = 16}, false);
     ASSERT_FALSE(refused) << radiance;
     EXPECT_NE(refused.error().text().find(words), std::string::npos) << refused.error().text();
   }
@@ -388,7 +440,13 @@ TEST(Lightmap, RefusesWhatCannotBeBaked) {
   auto lit_tracer = Tracer::build(lit);
   const Receivers lit_receivers = make_vertex_receivers(lit);
   const Lamps lamps = make_lamps(lit, nullptr, false);
-  for (LightmapOptions o : {LightmapOptions{.order = 17}, {.order = -1}, {.samples = 0}, {.lamp_samples = 0}, {.bounces = 65}, {.converge = 2}, {.converge = NAN}})
+  for (LightmapOptions o : {LightmapOptions{.order = 17},
+                            {.order = -1},
+                            {.samples = 0},
+                            {.lamp_samples = 0},
+                            {.bounces = 65},
+                            {.converge = 2},
+                            {.converge = NAN}})
     EXPECT_FALSE(bake_lightmap(lit, *lit_tracer, lit_receivers, lamps, o, false));
   Progress cancelled;
   cancelled.cancel();
@@ -396,15 +454,16 @@ TEST(Lightmap, RefusesWhatCannotBeBaked) {
 }
 
 TEST(Lightmap, AnEmissiveTextureIsItsPatternOfLamps) {
-  // A lamp of 2 x 1 whose texture is white on its first half, as against a lamp of that half alone; lamp samples, rays or both find
-  // it, and so does the path tracer.
+  // A lamp of 2 x 1 whose texture is white on its first half, as against a lamp of that half alone; lamp samples, rays
+  // or both find it, and so does the path tracer.
   constexpr int size = 64;
   Texture halves;
   halves.width = size, halves.height = 1, halves.wrap_s = halves.wrap_t = Wrap::clamp;
   for (int i = 0; i < 3 * size; ++i) halves.rgb.push_back(i < 3 * size / 2 ? 255 : 0);
   auto scene_with = [&](bool textured) {
     Scene scene;
-    const uint32_t grey = add_material(scene, "grey", Vec3(0.5f)), lamp = add_lamp(scene, "lamp", Vec3(0), Vec3(4, 3, 2));
+    const uint32_t grey = add_material(scene, "grey", Vec3(0.5f)),
+                   lamp = add_lamp(scene, "lamp", Vec3(0), Vec3(4, 3, 2));
     add_quad(scene, grey, "floor", Vec3(-1, 0, -1), Vec3(0, 0, 2), Vec3(2, 0, 0), 4, 4);
     add_quad(scene, lamp, "lamp", Vec3(-1, 0.7f, -0.5f), Vec3(textured ? 2 : 1, 0, 0), Vec3(0, 0, 1), 1, 1);
     if (!textured) return scene;
@@ -415,20 +474,25 @@ TEST(Lightmap, AnEmissiveTextureIsItsPatternOfLamps) {
   const Environment black = make_environment("black", 4, 2, [](Vec3) { return Vec3(0); });
   for (auto [samples, lamp_samples] : {std::pair(4096, 1), std::pair(1, 4096), std::pair(1024, 256)}) {
     const LightmapOptions options{.samples = samples, .lamp_samples = lamp_samples, .bounces = 0};
-    const Baking with = bake_lamps(scene_with(true), Where::patches, options), without = bake_lamps(scene_with(false), Where::patches, options);
+    const Baking with = bake_lamps(scene_with(true), Where::patches, options),
+                 without = bake_lamps(scene_with(false), Where::patches, options);
     const Relit a = with.lit({Vec3(1)}), b = without.lit({Vec3(1)});
     // What the texture's slope between its halves and noise leave.
     for (size_t r = 0; r < with.receivers.count(); ++r) {
       if (with.receivers.origins[r].y > 0.5f) continue;
-      const auto other = std::min_element(without.receivers.origins.begin(), without.receivers.origins.end(), [&](Vec3 p, Vec3 q) {
-        return glm::length(p - with.receivers.origins[r]) < glm::length(q - with.receivers.origins[r]); });
+      const auto other =
+          std::min_element(without.receivers.origins.begin(), without.receivers.origins.end(), [&](Vec3 p, Vec3 q) {
+            return glm::length(p - with.receivers.origins[r]) < glm::length(q - with.receivers.origins[r]);
+          });
       const Vec3 truth = b.at(size_t(other - without.receivers.origins.begin()));
-      for (int c = 0; c < 3; ++c) EXPECT_NEAR(a.at(r)[c], truth[c], 0.02f) << samples << " " << lamp_samples << " at " << r;
+      for (int c = 0; c < 3; ++c)
+        EXPECT_NEAR(a.at(r)[c], truth[c], 0.02f) << samples << " " << lamp_samples << " at " << r;
     }
     if (samples != 1024) continue;
     for (size_t r = 0; r < with.receivers.count(); r += 7) {
       if (with.receivers.origins[r].y > 0.5f) continue;
-      const Vec3 truth = exit_radiance(with.scene, black, with.receivers.origins[r], with.receivers.normals[r], 0, 4096, 1, true);
+      const Vec3 truth =
+          exit_radiance(with.scene, black, with.receivers.origins[r], with.receivers.normals[r], 0, 4096, 1, true);
       for (int c = 0; c < 3; ++c) EXPECT_NEAR(a.at(r)[c], truth[c], 0.02f) << r;
     }
   }

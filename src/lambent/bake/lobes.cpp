@@ -17,13 +17,16 @@ bool is_sharp(const Lobe& lobe, int samples) { return lobe.sharpness > float(sam
 
 int rays_per_lobe(int samples, size_t lobes) { return lobes == 0 ? 0 : std::max(least_rays, samples / int(lobes)); }
 
-size_t lobe_set_bytes(int samples, size_t lobes) { return lobes * set_count * 12 * pad_lanes(size_t(rays_per_lobe(samples, lobes))); }
+size_t lobe_set_bytes(int samples, size_t lobes) {
+  return lobes * set_count * 12 * pad_lanes(size_t(rays_per_lobe(samples, lobes)));
+}
 
 LobeSets make_lobe_sets(LobeKind kind, const std::vector<Lobe>& lobes, int samples, uint32_t seed) {
   LobeSets s;
   s.kind = kind, s.lobes = lobes, s.seed = uint32_t(hash64(seed, 0x10be));
   for (size_t k = 0; k < lobes.size(); ++k) {
-    s.scales.push_back(float(lobe_scale(kind, lobes[k].sharpness))), s.integrals.push_back(float(lobe_integral(kind, lobes[k].sharpness)));
+    s.scales.push_back(float(lobe_scale(kind, lobes[k].sharpness))),
+        s.integrals.push_back(float(lobe_integral(kind, lobes[k].sharpness)));
     s.frames.push_back(frame_about(normalize_or(lobes[k].axis, Vec3(0, 0, 1))));
     (is_sharp(lobes[k], samples) ? s.sharp : s.broad).push_back(uint32_t(k));
   }
@@ -33,7 +36,8 @@ LobeSets make_lobe_sets(LobeKind kind, const std::vector<Lobe>& lobes, int sampl
   for (size_t i = 0; i < s.sharp.size(); ++i)
     for (size_t set = 0; set < set_count; ++set) {
       const size_t base = (i * set_count + set) * s.stride;
-      const std::vector<Vec2> points = sorted_points(size_t(s.rays), s.half, uint32_t(hash64(s.seed, s.sharp[i] * set_count + set)));
+      const std::vector<Vec2> points =
+          sorted_points(size_t(s.rays), s.half, uint32_t(hash64(s.seed, s.sharp[i] * set_count + set)));
       for (size_t j = 0; j < points.size(); ++j) {
         const Vec3 d = sample_lobe(kind, lobes[s.sharp[i]].sharpness, points[j]);
         s.x[base + j] = d.x, s.y[base + j] = d.y, s.z[base + j] = d.z;
@@ -48,17 +52,21 @@ LobeRays make_lobe_rays(const LobeSets& sets) {
   return rays;
 }
 
-void evaluate_on_fan(const LobeSets& sets, size_t k, const float* x, const float* y, const float* z, size_t count, float* out) {
-  lobe_values(sets.kind == LobeKind::cosine_power, sets.frames[k][2], sets.lobes[k].sharpness, sets.scales[k], x, y, z, count, out);
+void evaluate_on_fan(const LobeSets& sets, size_t k, const float* x, const float* y, const float* z, size_t count,
+                     float* out) {
+  lobe_values(sets.kind == LobeKind::cosine_power, sets.frames[k][2], sets.lobes[k].sharpness, sets.scales[k], x, y, z,
+              count, out);
 }
 
-void trace_lobe(const LobeSets& sets, const Tracer& tracer, Vec3 origin, Vec3 normal, size_t receiver, size_t lobe, LobeRays& rays) {
+void trace_lobe(const LobeSets& sets, const Tracer& tracer, Vec3 origin, Vec3 normal, size_t receiver, size_t lobe,
+                LobeRays& rays) {
   const uint32_t k = sets.sharp[lobe];
   const uint64_t bits = hash64(hash64(sets.seed, k), receiver);
   const size_t base = (lobe * set_count + size_t(bits % set_count)) * sets.stride;
   const float spin = 2 * pi * to_unit_float(uint32_t(bits >> 32)), c = std::cos(spin), s = std::sin(spin);
   const Mat3 turn = sets.frames[k] * Mat3(Vec3(c, s, 0), Vec3(-s, c, 0), Vec3(0, 0, 1));
-  rotate_directions(turn, sets.x.data() + base, sets.y.data() + base, sets.z.data() + base, sets.stride, rays.x.data(), rays.y.data(), rays.z.data());
+  rotate_directions(turn, sets.x.data() + base, sets.y.data() + base, sets.z.data() + base, sets.stride, rays.x.data(),
+                    rays.y.data(), rays.z.data());
   rays.count = rays.half = 0;
   for (size_t i = 0; i < size_t(sets.rays); ++i) {
     const Vec3 d(rays.x[i], rays.y[i], rays.z[i]);
@@ -71,7 +79,8 @@ void trace_lobe(const LobeSets& sets, const Tracer& tracer, Vec3 origin, Vec3 no
   tracer.visible_fan(origin, {rays.x.data(), rays.y.data(), rays.z.data(), rays.count}, rays.visible.data());
 }
 
-void trace_lobes(const LobeSets& sets, const Tracer& tracer, Vec3 origin, Vec3 normal, size_t receiver, LobeRays& rays, float* out, float* half_out) {
+void trace_lobes(const LobeSets& sets, const Tracer& tracer, Vec3 origin, Vec3 normal, size_t receiver, LobeRays& rays,
+                 float* out, float* half_out) {
   for (size_t lobe = 0; lobe < sets.sharp.size(); ++lobe) {
     const uint32_t k = sets.sharp[lobe];
     trace_lobe(sets, tracer, origin, normal, receiver, lobe, rays);

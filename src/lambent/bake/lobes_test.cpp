@@ -33,7 +33,7 @@ Baking bake_scene(Scene scene, const BakeOptions& options) {
 }
 
 const std::vector<Lobe> skew_lobes{{glm::normalize(Vec3(0.3f, 0.8f, -0.5f)), 5000},
-                                   {glm::normalize(Vec3(0.2f, 0.3f, 0.7f)), 3},     // reaches well below the plane
+                                   {glm::normalize(Vec3(0.2f, 0.3f, 0.7f)), 3},  // reaches well below the plane
                                    {glm::normalize(Vec3(-0.9f, 0.2f, 0.1f)), 40},
                                    {Vec3(0, -1, 0), 100000}};
 
@@ -42,11 +42,16 @@ TEST(BakeLobes, OpenPlaneIsTheIntegral) {
   const Mat3 frame = frame_about(n);
   for (LobeKind kind : {LobeKind::von_mises_fisher, LobeKind::cosine_power})
     for (bool shadows : {true, false}) {
-      // Without shadows a closed form; with them the two sharp lobes have 2,048 stratified rays each, and the broad ones what of the
-      // fan's 4,096 meets them: few of the grazing one, which sets the absolute tolerance.
+      // Without shadows a closed form; with them the two sharp lobes have 2,048 stratified rays each, and the broad
+      // ones what of the fan's 4,096 meets them: few of the grazing one, which sets the absolute tolerance.
       const double relative = shadows ? 2e-3 : 1e-4, absolute = shadows ? 5e-4 : 1e-5;
-      const Baking baked = bake_scene(make_quad(Vec3(0), a, b, 2, 2, Vec3(0.8f)), {.order = 2, .lobe_kind = kind, .lobes = skew_lobes, .samples = 4096,
-                                                                               .bounces = 0, .shadows = shadows, .precision = Precision::single});
+      const Baking baked = bake_scene(make_quad(Vec3(0), a, b, 2, 2, Vec3(0.8f)), {.order = 2,
+                                                                                   .lobe_kind = kind,
+                                                                                   .lobes = skew_lobes,
+                                                                                   .samples = 4096,
+                                                                                   .bounces = 0,
+                                                                                   .shadows = shadows,
+                                                                                   .precision = Precision::single});
       ASSERT_EQ(baked.transfer.columns(), 8u);
       for (size_t k = 0; k < skew_lobes.size(); ++k) {
         const double s = skew_lobes[k].sharpness, scale = lobe_scale(kind, s);
@@ -55,12 +60,14 @@ TEST(BakeLobes, OpenPlaneIsTheIntegral) {
           expected = std::max(0.0f, glm::dot(skew_lobes[k].axis, n)) * lobe_integral(kind, s) / std::numbers::pi;
         } else {
           for (const DirectionNode& node : direction_quadrature(160, 0, 1)) {
-            const double cosine = glm::dot(glm::normalize(glm::dvec3(skew_lobes[k].axis)), glm::dmat3(frame) * node.direction);
+            const double cosine =
+                glm::dot(glm::normalize(glm::dvec3(skew_lobes[k].axis)), glm::dmat3(frame) * node.direction);
             expected += node.weight * node.direction.z * scale * lobe_value(kind, s, cosine) / std::numbers::pi;
           }
         }
         for (size_t r = 0; r < baked.receivers.count(); ++r)
-          EXPECT_NEAR(load_receiver(baked.transfer, r)[4 + k], expected, std::max(absolute, relative * expected)) << int(kind) << shadows << " lobe " << k;
+          EXPECT_NEAR(load_receiver(baked.transfer, r)[4 + k], expected, std::max(absolute, relative * expected))
+              << int(kind) << shadows << " lobe " << k;
       }
     }
 }
@@ -77,11 +84,14 @@ TEST(BakeLobes, BoundsItsRays) {
 // A floor under a black awning: a lamp at 45 degrees shines under it from one side.
 TEST(BakeLobes, ASharpLampCastsASharpShadow) {
   Scene scene;
-  add_quad(scene, add_material(scene, "grey", Vec3(0.5f)), "floor", Vec3(-2, 0, -2), Vec3(0, 0, 4), Vec3(4, 0, 0), 40, 40);
-  add_quad(scene, add_material(scene, "black", Vec3(0)), "awning", Vec3(-1, 1, -20), Vec3(2, 0, 0), Vec3(0, 0, 40), 1, 1);
+  add_quad(scene, add_material(scene, "grey", Vec3(0.5f)), "floor", Vec3(-2, 0, -2), Vec3(0, 0, 4), Vec3(4, 0, 0), 40,
+           40);
+  add_quad(scene, add_material(scene, "black", Vec3(0)), "awning", Vec3(-1, 1, -20), Vec3(2, 0, 0), Vec3(0, 0, 40), 1,
+           1);
   for (Triangle& t : scene.triangles) t.two_sided = true;
   const Lobe lamp{glm::normalize(Vec3(1, 1, 0)), 1e5f};
-  const Baking b = bake_scene(std::move(scene), {.order = 2, .lobes = {lamp}, .samples = 64, .bounces = 1, .precision = Precision::single});
+  const Baking b = bake_scene(
+      std::move(scene), {.order = 2, .lobes = {lamp}, .samples = 64, .bounces = 1, .precision = Precision::single});
   const float lit = float(lobe_integral(LobeKind::von_mises_fisher, lamp.sharpness)) * lamp.axis.y / pi;
   int in_light = 0, in_shadow = 0;
   for (size_t v = 0; v < 41 * 41; ++v) {
@@ -101,7 +111,8 @@ TEST(BakeLobes, ASharpLampCastsASharpShadow) {
 
 Scene court() {
   Scene scene;
-  const uint32_t red = add_material(scene, "red", Vec3(0.8f, 0.2f, 0.1f)), grey = add_material(scene, "grey", Vec3(0.6f));
+  const uint32_t red = add_material(scene, "red", Vec3(0.8f, 0.2f, 0.1f)),
+                 grey = add_material(scene, "grey", Vec3(0.6f));
   add_quad(scene, grey, "floor", Vec3(-1, 0, -1), Vec3(0, 0, 2), Vec3(2, 0, 0), 24, 24);
   add_quad(scene, red, "wall", Vec3(-1, 0, -1), Vec3(2, 0, 0), Vec3(0, 1.5f, 0), 24, 18);
   add_sphere(scene, grey, "ball", Vec3(0.3f, 0.5f, -0.2f), 0.35f, 3);
@@ -133,7 +144,9 @@ TEST(BakeLobes, AgreesWithThePathTracerUnderSunAndSky) {
     for (const auto& t : truth) brightest = std::max(brightest, t.mean.y);
     EXPECT_GT(brightest, 1.0f);
     for (size_t k = 0; k < 16; ++k)
-      for (int c = 0; c < 3; ++c) EXPECT_NEAR(lit.at(chosen[k])[c], truth[k].mean[c], 0.02f * brightest) << directional << " receiver " << k << " channel " << c;
+      for (int c = 0; c < 3; ++c)
+        EXPECT_NEAR(lit.at(chosen[k])[c], truth[k].mean[c], 0.02f * brightest)
+            << directional << " receiver " << k << " channel " << c;
   }
 }
 
@@ -141,7 +154,8 @@ TEST(BakeLobes, TheSameBytesWhateverTheThreadsAndTheMemory) {
   const Scene scene = court();
   auto bytes_with = [&](int threads, int bounces, size_t memory) {
     ThreadLimit limit(threads);
-    const Baking b = bake_scene(scene, {.order = 3, .lobes = skew_lobes, .samples = 64, .bounces = bounces, .memory = memory});
+    const Baking b =
+        bake_scene(scene, {.order = 3, .lobes = skew_lobes, .samples = 64, .bounces = bounces, .memory = memory});
     return std::vector<uint8_t>(b.transfer.data.begin(), b.transfer.data.end());
   };
   const BakeOptions options{.order = 3, .lobes = skew_lobes, .samples = 64, .bounces = 2};
@@ -158,7 +172,13 @@ TEST(BakeLobes, RefusesLobesThatAreNone) {
   auto tracer = Tracer::build(scene);
   ASSERT_TRUE(tracer);
   const Receivers receivers = make_vertex_receivers(scene);
-  for (Lobe bad : {Lobe{Vec3(0), 5}, {Vec3(0, 2, 0), 5}, {Vec3(0, 1, 0), 0}, {Vec3(0, 1, 0), -1}, {Vec3(0, 1, 0), 1e9f}, {Vec3(0, NAN, 0), 5}, {Vec3(0, 1, 0), NAN}})
+  for (Lobe bad : {Lobe{Vec3(0), 5},
+                   {Vec3(0, 2, 0), 5},
+                   {Vec3(0, 1, 0), 0},
+                   {Vec3(0, 1, 0), -1},
+                   {Vec3(0, 1, 0), 1e9f},
+                   {Vec3(0, NAN, 0), 5},
+                   {Vec3(0, 1, 0), NAN}})
     EXPECT_FALSE(bake(scene, *tracer, receivers, {.lobes = {bad}}));
   EXPECT_FALSE(bake(scene, *tracer, receivers, {.order = 1, .lobes = std::vector<Lobe>(1024, {Vec3(0, 1, 0), 5})}));
   EXPECT_TRUE(bake(scene, *tracer, receivers, {.order = 0, .lobes = {{Vec3(0, 1, 0), 5}}, .samples = 1}));
@@ -174,24 +194,29 @@ TEST(BakeLobes, MatrixRowsAreTheIntegralsTheyStandFor) {
   materials.of_receiver.assign(receivers.count(), 0);
   for (const Vec3& n : receivers.normals) materials.frames.push_back(frame_about(n));
   const Lobe beam{glm::normalize(Vec3(0.5f, 0.9f, -0.3f)), 1e5f}, broad{glm::normalize(Vec3(-0.7f, 0.4f, 0.2f)), 6};
-  auto baked = bake_matrix(scene, *tracer, receivers, materials, {.order = 2, .lobes = {beam, broad}, .samples = 4096, .bounces = 0, .precision = Precision::single},
-                           {.incident_order = 4, .outgoing = OutgoingKind::map, .grid = 8});
+  auto baked =
+      bake_matrix(scene, *tracer, receivers, materials,
+                  {.order = 2, .lobes = {beam, broad}, .samples = 4096, .bounces = 0, .precision = Precision::single},
+                  {.incident_order = 4, .outgoing = OutgoingKind::map, .grid = 8});
   ASSERT_TRUE(baked) << baked.error().text();
   const CosineBasis basis = make_cosine_basis(4);
   std::vector<float> z(16);
   for (size_t r = 0; r < receivers.count(); ++r) {
     const auto values = load_receiver(baked->transfer, r);  // [row][column]
     evaluate_cosine_basis(basis, beam.axis * materials.frames[r], z);
-    const float strength = float(lobe_integral(LobeKind::von_mises_fisher, beam.sharpness)) * glm::dot(beam.axis, receivers.normals[r]) / pi;
+    const float strength = float(lobe_integral(LobeKind::von_mises_fisher, beam.sharpness)) *
+                           glm::dot(beam.axis, receivers.normals[r]) / pi;
     for (size_t j = 0; j < 16; ++j) EXPECT_NEAR(values[j * 6 + 4] / strength, z[j], 2e-3f) << j;  // the beam's width
     std::vector<double> expected(16);
     const Vec3 axis = broad.axis * materials.frames[r];
     for (const DirectionNode& node : direction_quadrature(64, 0, 1)) {
       evaluate_cosine_basis(basis, Vec3(node.direction), z);
-      const double value = lobe_scale(LobeKind::von_mises_fisher, 6) * lobe_value(LobeKind::von_mises_fisher, 6, glm::dot(glm::dvec3(axis), node.direction));
+      const double value = lobe_scale(LobeKind::von_mises_fisher, 6) *
+                           lobe_value(LobeKind::von_mises_fisher, 6, glm::dot(glm::dvec3(axis), node.direction));
       for (size_t j = 0; j < 16; ++j) expected[j] += node.weight * value * node.direction.z * z[j] / std::numbers::pi;
     }
-    for (size_t j = 0; j < 16; ++j) EXPECT_NEAR(values[j * 6 + 5], expected[j], 3e-3) << j;  // 4,096 stratified rays, rows of norm 1
+    for (size_t j = 0; j < 16; ++j)
+      EXPECT_NEAR(values[j * 6 + 5], expected[j], 3e-3) << j;  // 4,096 stratified rays, rows of norm 1
   }
 }
 
@@ -204,9 +229,11 @@ TEST(BakeLobes, MatrixWithLambertIsTheDiffuseBake) {
   materials.of_receiver.assign(receivers.count(), 0);
   for (const Vec3& n : receivers.normals) materials.frames.push_back(frame_about(n));
   for (int bounces : {0, 2}) {
-    const BakeOptions options{.order = 3, .lobes = skew_lobes, .samples = 128, .bounces = bounces, .precision = Precision::single};
+    const BakeOptions options{
+        .order = 3, .lobes = skew_lobes, .samples = 128, .bounces = bounces, .precision = Precision::single};
     auto vector = bake(scene, *tracer, receivers, options);
-    auto matrix = bake_matrix(scene, *tracer, receivers, materials, options, {.incident_order = 3, .outgoing = OutgoingKind::svd, .svd_rows = 2, .grid = 8});
+    auto matrix = bake_matrix(scene, *tracer, receivers, materials, options,
+                              {.incident_order = 3, .outgoing = OutgoingKind::svd, .svd_rows = 2, .grid = 8});
     ASSERT_TRUE(vector);
     ASSERT_TRUE(matrix) << matrix.error().text();
     std::vector<Vec3> light(vector->columns(), Vec3(0.5f, 1, 0.2f));

@@ -6,7 +6,8 @@
 
 namespace lambent {
 
-ReceiverMaterials make_receiver_materials(const Scene& scene, const Receivers& receivers, const Reflection& reflection) {
+ReceiverMaterials make_receiver_materials(const Scene& scene, const Receivers& receivers,
+                                          const Reflection& reflection) {
   constexpr float roughness_steps = 32, metallic_steps = 8;
   ReceiverMaterials out;
   out.of_receiver.assign(receivers.count(), 0);
@@ -15,7 +16,8 @@ ReceiverMaterials make_receiver_materials(const Scene& scene, const Receivers& r
   std::vector<uint8_t> done(receivers.count(), 0);
   std::map<std::pair<int, int>, uint16_t> palette;
   if (reflection.everywhere) out.materials.push_back({*reflection.everywhere, *reflection.everywhere});
-  else if (reflection.model == Reflection::Model::diffuse) out.materials.push_back({Lambert{Vec3(0)}, Lambert{Vec3(1)}});
+  else if (reflection.model == Reflection::Model::diffuse)
+    out.materials.push_back({Lambert{Vec3(0)}, Lambert{Vec3(1)}});
   const bool one = !out.materials.empty();
   for (const Triangle& t : scene.triangles)
     for (int k = 0; k < 3; ++k)
@@ -30,7 +32,8 @@ ReceiverMaterials make_receiver_materials(const Scene& scene, const Receivers& r
         const std::pair key(int(m.x * metallic_steps + 0.5f), int(m.y * roughness_steps + 0.5f));
         const auto [place, added] = palette.try_emplace(key, uint16_t(out.materials.size()));
         if (added) {
-          MetallicRoughness black{Vec3(0), float(key.first) / metallic_steps, float(key.second) / roughness_steps}, white = black;
+          MetallicRoughness black{Vec3(0), float(key.first) / metallic_steps, float(key.second) / roughness_steps},
+              white = black;
           white.base_color = Vec3(1);
           out.materials.push_back({black, white});
         }
@@ -48,7 +51,8 @@ Outgoing make_map_outgoing(const ReceiverMaterials& materials, int incident_orde
   const CosineBasis basis = make_cosine_basis(incident_order);
   o.maps.resize(materials.materials.size());
   parallel_for(o.maps.size(), 1, [&](size_t begin, size_t end) {
-    for (size_t m = begin; m < end; ++m) o.maps[m] = make_response(materials.materials[m], basis, options.grid, options.response_samples);
+    for (size_t m = begin; m < end; ++m)
+      o.maps[m] = make_response(materials.materials[m], basis, options.grid, options.response_samples);
   });
   return o;
 }

@@ -5,8 +5,9 @@
 
 namespace lambent {
 
-// Roughness and metallic are taken at the receiver's vertex and rounded to steps of 1/32 and 1/8, so that textures make a palette of
-// materials and not one a receiver; base colour is not rounded, since responses are linear in it (transfer/outgoing.h).
+// Roughness and metallic are taken at the receiver's vertex and rounded to steps of 1/32 and 1/8, so that textures make
+// a palette of materials and not one a receiver; base colour is not rounded, since responses are linear in it
+// (transfer/outgoing.h).
 ReceiverMaterials make_receiver_materials(const Scene& scene, const Receivers& receivers, const Reflection& reflection);
 
 // The last reflection of incident light as it is, of kind map.

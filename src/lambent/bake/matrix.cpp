@@ -44,7 +44,8 @@ struct MatrixBaker : MatrixGather {
       }
     });
     first_row.assign(1, 0);
-    for (size_t r = 0; r < n(); ++r) first_row.push_back(first_row.back() + size_t(scatter[materials.of_receiver[r]].rows));
+    for (size_t r = 0; r < n(); ++r)
+      first_row.push_back(first_row.back() + size_t(scatter[materials.of_receiver[r]].rows));
   }
 
   // T0 in every channel.
@@ -58,7 +59,9 @@ struct MatrixBaker : MatrixGather {
     std::vector<double> differences, totals;
     explicit ErrorSums(size_t blocks) : differences(blocks, 0.0), totals(blocks, 0.0) {}
     void add(size_t block, const float* half, const float* full, size_t count) {
-      for (size_t i = 0; i < count; ++i) differences[block] += double(half[i] - full[i]) * (half[i] - full[i]), totals[block] += double(full[i]) * full[i];
+      for (size_t i = 0; i < count; ++i)
+        differences[block] += double(half[i] - full[i]) * (half[i] - full[i]),
+            totals[block] += double(full[i]) * full[i];
     }
     double relative() const {
       double difference = 0, total = 0;
@@ -67,7 +70,8 @@ struct MatrixBaker : MatrixGather {
     }
   };
 
-  MatrixBake finish(const std::vector<uint8_t>& buried, const ErrorSums& errors, WritableTransfer&& out, const LastReflection& last) const {
+  MatrixBake finish(const std::vector<uint8_t>& buried, const ErrorSums& errors, WritableTransfer&& out,
+                    const LastReflection& last) const {
     report.error = has_halves() ? errors.relative() : -1;
     report.receivers = n(), report.bytes = out.transfer.bytes();
     for (uint8_t x : buried) report.buried += x;
@@ -173,7 +177,8 @@ struct MatrixBaker : MatrixGather {
     report.rays = n() * (rays() + size_t(lobes.rays) * lobes.sharp.size());
     move_buried(buried, trace_receiver, bounces, kept, is_kept, used);
     report.operator_bytes = used;
-    report.operator_kept = bounces ? double(std::count(is_kept.begin(), is_kept.end(), uint8_t(1))) / double(blocks) : 1;
+    report.operator_kept = bounces ? double(std::count(is_kept.begin(), is_kept.end(), uint8_t(1))) / double(blocks)
+                                   : 1;
     report.trace_seconds = seconds_since(start);
     start = Clock::now();
 
@@ -201,7 +206,8 @@ struct MatrixBaker : MatrixGather {
         const size_t b = begin / gather_block;
         MatrixHits again;
         if (!is_kept[b])
-          for (size_t r = begin; r < end; ++r) (void)trace(*s, r, &again), again.ends.push_back(uint32_t(again.hits.size()));
+          for (size_t r = begin; r < end; ++r)
+            (void)trace(*s, r, &again), again.ends.push_back(uint32_t(again.hits.size()));
         const MatrixHits& hits = is_kept[b] ? kept[b] : again;
         AlignedVector<float> x(J() * wc);
         for (size_t r = begin; r < end; ++r) {
@@ -235,8 +241,8 @@ struct MatrixBaker : MatrixGather {
 
   // A buried receiver looks out from where its nearest clear neighbour along the mesh lies.
   template <class TraceReceiver>
-  void move_buried(const std::vector<uint8_t>& was_buried, TraceReceiver& trace_receiver, bool bounces, std::vector<MatrixHits>& kept,
-                   std::vector<uint8_t>& is_kept, std::atomic<size_t>& used) {
+  void move_buried(const std::vector<uint8_t>& was_buried, TraceReceiver& trace_receiver, bool bounces,
+                   std::vector<MatrixHits>& kept, std::vector<uint8_t>& is_kept, std::atomic<size_t>& used) {
     const std::vector<uint8_t> buried = was_buried;
     const auto steps = make_fill_steps(scene, receivers.basis, buried);
     if (steps.empty()) return;
@@ -270,22 +276,29 @@ bool tints(const Brdf& brdf) {
   return false;
 }
 
-Result<void> check_options(const BakeOptions& o, const MatrixOptions& m, const ReceiverMaterials& materials, size_t receivers) {
+Result<void> check_options(const BakeOptions& o, const MatrixOptions& m, const ReceiverMaterials& materials,
+                           size_t receivers) {
   auto within = [](const char* name, int value, int least, int most) -> Result<void> {
     if (value >= least && value <= most) return {};
-    return Error{name, "must lie between " + std::to_string(least) + " and " + std::to_string(most) + ", not " + std::to_string(value)};
+    return Error{name, "must lie between " + std::to_string(least) + " and " + std::to_string(most) + ", not " +
+                           std::to_string(value)};
   };
-  for (auto& ok : {check_light_basis(o, 1), within("samples", o.samples, 1, 1 << 20), within("bounces", o.bounces, 0, 64),
-                   within("incident-order", m.incident_order, 1, max_incident_order), within("outgoing-order", m.outgoing_order, 1, max_incident_order),
-                   within("order and incident-order together", o.order + m.incident_order, 2, max_sh_order + 1),
-                   within("svd rows", m.svd_rows, 1, sh_count(m.incident_order)), within("grid", m.grid, 8, 256)})
+  for (auto& ok :
+       {check_light_basis(o, 1), within("samples", o.samples, 1, 1 << 20), within("bounces", o.bounces, 0, 64),
+        within("incident-order", m.incident_order, 1, max_incident_order),
+        within("outgoing-order", m.outgoing_order, 1, max_incident_order),
+        within("order and incident-order together", o.order + m.incident_order, 2, max_sh_order + 1),
+        within("svd rows", m.svd_rows, 1, sh_count(m.incident_order)), within("grid", m.grid, 8, 256)})
     if (!ok) return ok.error();
   // A path seldom meets a lamp by chance.
-  if (m.simulate_paths && o.bounces > 0 && !o.lobes.empty()) return Error{"lobes", "bounces by simulated paths are of harmonics alone"};
+  if (m.simulate_paths && o.bounces > 0 && !o.lobes.empty())
+    return Error{"lobes", "bounces by simulated paths are of harmonics alone"};
   if (m.outgoing == OutgoingKind::phong)
     for (const LinearMaterial& material : materials.materials)
-      if (convolve_phong(material, make_cosine_basis(1), 0).empty()) return Error{"outgoing", "phong convolves Phong's lobe and takes no other material"};
-  LAMBENT_CHECK(materials.of_receiver.size() == receivers && materials.frames.size() == receivers && !materials.materials.empty());
+      if (convolve_phong(material, make_cosine_basis(1), 0).empty())
+        return Error{"outgoing", "phong convolves Phong's lobe and takes no other material"};
+  LAMBENT_CHECK(materials.of_receiver.size() == receivers && materials.frames.size() == receivers &&
+                !materials.materials.empty());
   return {};
 }
 
@@ -295,26 +308,31 @@ size_t matrix_memory(size_t receivers, int channels, const BakeOptions& o, const
   const size_t width = pad_lanes(o.light().count()), J = size_t(sh_count(m.incident_order));
   const size_t table = 8 * pad_lanes(size_t(o.samples)) * 4 * size_t(sh_count(o.order + m.incident_order - 1) + 3);
   // Bounces hold direct rows and scattered ones; direct light alone is stored as it comes.
-  const size_t held = o.bounces > 0 ? J * width * (check_every + 1) / check_every + 2 * size_t(m.scatter_rows) * size_t(channels) * width : 0;
-  return receivers * (4 * held + 2 * sizeof(Vec3) + sizeof(Mat3)) + table +
-         lobe_set_bytes(o.samples, o.lobes.size());
+  const size_t held = o.bounces > 0 ? J * width * (check_every + 1) / check_every +
+                                          2 * size_t(m.scatter_rows) * size_t(channels) * width
+                                    : 0;
+  return receivers * (4 * held + 2 * sizeof(Vec3) + sizeof(Mat3)) + table + lobe_set_bytes(o.samples, o.lobes.size());
 }
 
-Result<MatrixBake> bake_matrix(const Scene& scene, const Tracer& tracer, const Receivers& receivers, const ReceiverMaterials& materials,
-                               const BakeOptions& options, const MatrixOptions& matrix, BakeReport* report, Progress* progress) {
+Result<MatrixBake> bake_matrix(const Scene& scene, const Tracer& tracer, const Receivers& receivers,
+                               const ReceiverMaterials& materials, const BakeOptions& options,
+                               const MatrixOptions& matrix, BakeReport* report, Progress* progress) {
   if (receivers.count() == 0) return Error{scene.path, "nothing to bake: no triangle has an area"};
-  if (!std::holds_alternative<CornerReceivers>(receivers.basis)) return Error{scene.path, "transfer matrices are baked at vertices"};
+  if (!std::holds_alternative<CornerReceivers>(receivers.basis))
+    return Error{scene.path, "transfer matrices are baked at vertices"};
   if (auto ok = check_options(options, matrix, materials, receivers.count()); !ok) return ok.error();
   BakeReport unwanted;
   BakeReport& r = report ? *report : unwanted;
   r = {};
-  GatherSetup setup = make_gather_setup(scene, tracer, receivers, options.order + matrix.incident_order - 1, options.samples, options.seed);
+  GatherSetup setup = make_gather_setup(scene, tracer, receivers, options.order + matrix.incident_order - 1,
+                                        options.samples, options.seed);
   for (const LinearMaterial& m : materials.materials)
     if (tints(m.black)) setup.channels = 3;
   if (options.bounces == 0) setup.channels = 1;  // direct light meets no coloured surface on its way
   const size_t needed = matrix_memory(receivers.count(), setup.channels, options, matrix);
   if (needed > options.memory)
-    return Error{scene.path, "baking needs at least " + std::to_string(needed) + " bytes of working memory, and was allowed " + std::to_string(options.memory)};
+    return Error{scene.path, "baking needs at least " + std::to_string(needed) +
+                                 " bytes of working memory, and was allowed " + std::to_string(options.memory)};
   MatrixBaker baker{{scene, receivers, materials, options, matrix, std::move(setup)}, progress, r};
   return matrix.simulate_paths && options.bounces > 0 ? baker.run_simulated() : baker.run();
 }

@@ -1,5 +1,6 @@
-// Follows: general-prt (transfer matrices, glossy scattering at the hits); triple-product-integrals (with V known to order n + m - 1 the product of light
-// and incident basis, of orders n and m, against it is exact). Instead of scattering, paths (general-prt, "direct simulation").
+// Follows: general-prt (transfer matrices, glossy scattering at the hits); triple-product-integrals (with V known to
+// order n + m - 1 the product of light and incident basis, of orders n and m, against it is exact). Instead of
+// scattering, paths (general-prt, "direct simulation").
 #include <lambent/bake/kernels.h>
 #include <lambent/bake/matrix_gather.h>
 #include <lambent/bake/matrix_kernels.h>
@@ -10,7 +11,8 @@
 namespace lambent {
 namespace {
 
-// Functions given by coefficients over rows j, turned by phi about z: rows (l, m) and (l, -m) mix. `rows` is [j][width].
+// Functions given by coefficients over rows j, turned by phi about z: rows (l, m) and (l, -m) mix. `rows` is
+// [j][width].
 void turn_rows_about_z(float* rows, int order, size_t width, float phi) {
   for (int m = 1; m < order; ++m) {
     const float c = std::cos(float(m) * phi), s = std::sin(float(m) * phi);
@@ -30,7 +32,8 @@ void turn_rows_about_z(float* rows, int order, size_t width, float phi) {
 std::unique_ptr<MatrixScratch> MatrixGather::make_scratch() const {
   auto s = std::make_unique<MatrixScratch>();
   const size_t stride = setup.sets.stride, w = channels() * width();
-  s->x.resize(stride), s->y.resize(stride), s->z.resize(stride), s->visible.resize(stride), s->lobe.resize(stride), s->hits.resize(rays());
+  s->x.resize(stride), s->y.resize(stride), s->z.resize(stride), s->visible.resize(stride), s->lobe.resize(stride),
+      s->hits.resize(rays());
   s->V.resize(V_count()), s->column_row.resize(C());
   s->sh_rows.resize(J() * w), s->v.resize(hit_batch * w), s->zb.resize(hit_batch * J());
   s->full.resize(J() * width()), s->half.resize(J() * width());
@@ -43,7 +46,8 @@ Directions MatrixGather::aim(MatrixScratch& s, size_t r) const {
   const DirectionSets& sets = setup.sets;
   s.choice = choose_directions(sets, receivers.normals[r], setup.seed, r);
   const size_t base = size_t(s.choice.set) * sets.stride;
-  rotate_directions(s.choice.rotation, sets.x.data() + base, sets.y.data() + base, sets.z.data() + base, sets.stride, s.x.data(), s.y.data(), s.z.data());
+  rotate_directions(s.choice.rotation, sets.x.data() + base, sets.y.data() + base, sets.z.data() + base, sets.stride,
+                    s.x.data(), s.y.data(), s.z.data());
   const Vec3 x_axis = s.choice.rotation[0] * materials.frames[r];  // the set's x axis in the receiver's frame
   s.phi = std::atan2(x_axis.y, x_axis.x);
   return {s.x.data(), s.y.data(), s.z.data(), rays()};
@@ -63,19 +67,22 @@ void MatrixGather::to_incident(float* sh_rows, float phi, size_t w, float scale,
 
 void MatrixGather::direct(MatrixScratch& s, size_t count, float* out) const {
   const size_t w = width(), base = size_t(s.choice.set) * V_count() * setup.sets.stride;
-  weighted_rows(setup.sets.table.data() + base, V_count(), setup.sets.stride, s.visible.data(), count == rays() ? setup.sets.stride : count, s.V.data());
+  weighted_rows(setup.sets.table.data() + base, V_count(), setup.sets.stride, s.visible.data(),
+                count == rays() ? setup.sets.stride : count, s.V.data());
   float* rows = s.sh_rows.data();
   std::fill(rows, rows + J() * w, 0.0f);
   for (size_t k = 0; k < V_count(); ++k) {
     const float v = s.V[k];
-    for (uint32_t e = tensor.begin[k]; e < tensor.begin[k + 1]; ++e) rows[size_t(tensor.j[e]) * w + tensor.i[e]] += tensor.single[e] * v;
+    for (uint32_t e = tensor.begin[k]; e < tensor.begin[k + 1]; ++e)
+      rows[size_t(tensor.j[e]) * w + tensor.i[e]] += tensor.single[e] * v;
   }
   for (size_t j = 0; j < J(); ++j) rotator.rotate(s.choice.a, s.choice.b, s.choice.c, {rows + j * w, harmonics()});
   // Broad lobes: V b takes the place of V, and the harmonics below J that of the triple product.
   for (uint32_t k : lobes.broad) {
     evaluate_on_fan(lobes, k, s.x.data(), s.y.data(), s.z.data(), setup.sets.stride, s.lobe.data());
     multiply_values(s.lobe.data(), s.visible.data(), setup.sets.stride, s.lobe.data());
-    weighted_rows(setup.sets.table.data() + base, J(), setup.sets.stride, s.lobe.data(), count == rays() ? setup.sets.stride : count, s.V.data());
+    weighted_rows(setup.sets.table.data() + base, J(), setup.sets.stride, s.lobe.data(),
+                  count == rays() ? setup.sets.stride : count, s.V.data());
     for (size_t j = 0; j < J(); ++j) rows[j * w + harmonics() + k] = s.V[j];
   }
   to_incident(rows, s.phi, w, 1.0f / float(count), out);
@@ -89,7 +96,8 @@ void MatrixGather::direct_sharp_lobes(MatrixScratch& s, size_t r, float* out, fl
     for (size_t i = 0; i < s.lobe_rays.count; ++i) {
       const float weight = s.lobe_rays.visible[i] * s.lobe_rays.cosine[i];
       if (weight == 0) continue;
-      evaluate_cosine_basis(basis, Vec3(s.lobe_rays.x[i], s.lobe_rays.y[i], s.lobe_rays.z[i]) * materials.frames[r], s.z_values);
+      evaluate_cosine_basis(basis, Vec3(s.lobe_rays.x[i], s.lobe_rays.y[i], s.lobe_rays.z[i]) * materials.frames[r],
+                            s.z_values);
       double* sums = s.lobe_sums.data() + (i < s.lobe_rays.half ? 0 : J());
       for (size_t j = 0; j < J(); ++j) sums[j] += double(weight) * s.z_values[j];
     }
@@ -101,7 +109,8 @@ void MatrixGather::direct_sharp_lobes(MatrixScratch& s, size_t r, float* out, fl
   }
 }
 
-void MatrixGather::scattered(MatrixScratch& s, std::span<const MatrixHit> hits, size_t limit, const float* Y, float* out) const {
+void MatrixGather::scattered(MatrixScratch& s, std::span<const MatrixHit> hits, size_t limit, const float* Y,
+                             float* out) const {
   const size_t w = width(), wc = channels() * w;
   float* rows = s.sh_rows.data();
   std::fill(rows, rows + J() * wc, 0.0f);
@@ -137,7 +146,8 @@ void MatrixGather::scattered(MatrixScratch& s, std::span<const MatrixHit> hits, 
   add_rest(s, in_batch, limit, out);
 }
 
-void MatrixGather::simulated(MatrixScratch& s, size_t r, std::span<const MatrixHit> hits, size_t limit, float* out) const {
+void MatrixGather::simulated(MatrixScratch& s, size_t r, std::span<const MatrixHit> hits, size_t limit,
+                             float* out) const {
   const size_t w = width(), wc = channels() * w;
   std::fill(s.sh_rows.begin(), s.sh_rows.end(), 0.0f);
   const float* table = setup.sets.table.data() + size_t(s.choice.set) * V_count() * setup.sets.stride;
@@ -145,7 +155,8 @@ void MatrixGather::simulated(MatrixScratch& s, size_t r, std::span<const MatrixH
   size_t in_batch = 0;
   for (size_t i = 0; i < hits.size() && hits[i].ray < limit; ++i) {
     const uint32_t ray = hits[i].ray;
-    const PathEnd end = follow_path(scene, setup.tracer, materials.reflection, {s.x[ray], s.y[ray], s.z[ray]}, s.hits[ray], options.bounces, key, ray);
+    const PathEnd end = follow_path(scene, setup.tracer, materials.reflection, {s.x[ray], s.y[ray], s.z[ray]},
+                                    s.hits[ray], options.bounces, key, ray);
     if (!end.leaves) continue;
     evaluate_sh(options.order, end.direction, s.column_row);
     float* v = s.v.data() + in_batch * wc;
@@ -187,8 +198,12 @@ bool MatrixGather::trace(MatrixScratch& s, size_t r, MatrixHits* hits) const {
       ++backs;
       continue;
     }
-    const Vec3 colour = setup.part_varies[corner->part] ? albedo(scene, scene.triangles[h.triangle], h.u, h.v) : setup.part_albedo[corner->part];
-    hits->hits.push_back({h.triangle << 1 | uint32_t(h.front), uint32_t(j), uint16_t(h.u * 65535.0f + 0.5f), uint16_t(h.v * 65535.0f + 0.5f),
+    const Vec3 colour = setup.part_varies[corner->part] ? albedo(scene, scene.triangles[h.triangle], h.u, h.v)
+                                                        : setup.part_albedo[corner->part];
+    hits->hits.push_back({h.triangle << 1 | uint32_t(h.front),
+                          uint32_t(j),
+                          uint16_t(h.u * 65535.0f + 0.5f),
+                          uint16_t(h.v * 65535.0f + 0.5f),
                           {float_to_half(colour.x), float_to_half(colour.y), float_to_half(colour.z)}});
   }
   return 2 * backs > rays();

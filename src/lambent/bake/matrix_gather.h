@@ -1,5 +1,6 @@
 #pragma once
-// What one receiver of a transfer matrix gathers: direct light as a triple product, and what hits scatter to it (matrix.h). Directions as in gather.h.
+// What one receiver of a transfer matrix gathers: direct light as a triple product, and what hits scatter to it
+// (matrix.h). Directions as in gather.h.
 #include <lambent/bake/gather.h>
 #include <lambent/bake/lobes.h>
 #include <lambent/bake/matrix.h>
@@ -10,10 +11,10 @@ namespace lambent {
 
 // A hit that scatters, as it is kept for the bounces.
 struct MatrixHit {
-  uint32_t corner;   // triangle, and in the lowest bit whether its front was met
+  uint32_t corner;  // triangle, and in the lowest bit whether its front was met
   uint32_t ray;
-  uint16_t u, v;     // of 65535
-  uint16_t rgb[3];   // halves: base colour there
+  uint16_t u, v;    // of 65535
+  uint16_t rgb[3];  // halves: base colour there
 };
 
 struct MatrixHits {  // of a block of receivers
@@ -46,7 +47,8 @@ struct MatrixGather {
 
   const LobeSets lobes = make_lobe_sets(options.lobe_kind, options.lobes, options.samples, options.seed);
   CosineBasis basis = make_cosine_basis(matrix.incident_order);
-  TriplingTensor tensor = make_tripling_tensor(options.order, matrix.incident_order, options.order + matrix.incident_order - 1);
+  TriplingTensor tensor =
+      make_tripling_tensor(options.order, matrix.incident_order, options.order + matrix.incident_order - 1);
   ShZyzRotator rotator{options.order};
   std::vector<FactoredResponse> scatter{};
   std::vector<size_t> first_row{};  // of each receiver's scattered rows; one more at the end
@@ -54,24 +56,27 @@ struct MatrixGather {
 
   const CornerReceivers& corners() const { return std::get<CornerReceivers>(receivers.basis); }
   size_t n() const { return receivers.count(); }
-  size_t J() const { return size_t(basis.count()); }                // rows of X
+  size_t J() const { return size_t(basis.count()); }  // rows of X
   size_t harmonics() const { return size_t(sh_count(options.order)); }
-  size_t C() const { return harmonics() + lobes.count(); }          // columns
+  size_t C() const { return harmonics() + lobes.count(); }  // columns
   size_t channels() const { return size_t(setup.channels); }
-  size_t width() const { return pad_lanes(C()); }                   // floats of a row of one channel
+  size_t width() const { return pad_lanes(C()); }  // floats of a row of one channel
   size_t V_count() const { return setup.coefficients(); }
   size_t rays() const { return size_t(setup.sets.samples); }
   bool has_halves() const { return setup.sets.half < rays(); }
 
   std::unique_ptr<MatrixScratch> make_scratch() const;
   Directions aim(MatrixScratch& s, size_t r) const;
-  // Rows over the harmonics of the set's frame -> rows over the incident basis of the receiver's frame, into out[j][width].
+  // Rows over the harmonics of the set's frame -> rows over the incident basis of the receiver's frame, into
+  // out[j][width].
   void to_incident(float* sh_rows, float phi, size_t w, float scale, float* out) const;
   // Direct light from the first `count` rays: X0_ji = mean of V y_i z_j = sum_k C_ijk V_k. out is [J][width].
   void direct(MatrixScratch& s, size_t count, float* out) const;
-  // Direct light of the sharp lobes, by rays of their own: X0_jk = 1/pi integral of V b_k z_j cos, into out and, if given, half_out.
+  // Direct light of the sharp lobes, by rays of their own: X0_jk = 1/pi integral of V b_k z_j cos, into out and, if
+  // given, half_out.
   void direct_sharp_lobes(MatrixScratch& s, size_t r, float* out, float* half_out) const;
-  // Light that the hits of rays below `limit` scatter to receiver r, added to out[J][channel][width]; Y holds scattered rows.
+  // Light that the hits of rays below `limit` scatter to receiver r, added to out[J][channel][width]; Y holds scattered
+  // rows.
   void scattered(MatrixScratch& s, std::span<const MatrixHit> hits, size_t limit, const float* Y, float* out) const;
   // The same light by following the rays below `limit` on from their hits, each to its end.
   void simulated(MatrixScratch& s, size_t r, std::span<const MatrixHit> hits, size_t limit, float* out) const;

@@ -1,6 +1,6 @@
 #pragma once
-// The inner loops of matrix baking, compiled for several instruction sets and chosen at run time. `width` is a multiple of
-// lane_multiple (kernels.h).
+// The inner loops of matrix baking, compiled for several instruction sets and chosen at run time. `width` is a multiple
+// of lane_multiple (kernels.h).
 #include <lambent/bake/kernels.h>
 
 namespace lambent {

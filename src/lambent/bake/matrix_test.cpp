@@ -20,7 +20,8 @@ namespace {
 // A floor, a wall and a box, in two colours.
 Scene corner_scene() {
   Scene scene;
-  const uint32_t red = add_material(scene, "red", Vec3(0.8f, 0.3f, 0.2f)), grey = add_material(scene, "grey", Vec3(0.6f));
+  const uint32_t red = add_material(scene, "red", Vec3(0.8f, 0.3f, 0.2f)),
+                 grey = add_material(scene, "grey", Vec3(0.6f));
   add_quad(scene, red, "floor", Vec3(-2, 0, -2), Vec3(0, 0, 4), Vec3(4, 0, 0), 12, 12);
   add_quad(scene, grey, "wall", Vec3(-2, 0, -2), Vec3(4, 0, 0), Vec3(0, 3, 0), 12, 12);
   add_box(scene, grey, "box", Vec3(-0.5f, 0.01f, -0.5f), Vec3(0.5f, 1.0f, 0.5f), 4);
@@ -40,7 +41,8 @@ const LinearMaterial diffuse{Lambert{Vec3(0)}, Lambert{Vec3(1)}};
 std::vector<Vec3> uneven_light(int order, uint64_t seed) {
   Random random(seed);
   std::vector<Vec3> light(size_t(sh_count(order)));
-  for (size_t k = 0; k < light.size(); ++k) light[k] = (Vec3(random.next(), random.next(), random.next()) - 0.5f) / float(1 + sh_band(int(k)));
+  for (size_t k = 0; k < light.size(); ++k)
+    light[k] = (Vec3(random.next(), random.next(), random.next()) - 0.5f) / float(1 + sh_band(int(k)));
   light[0] = Vec3(3, 2.5f, 2);
   return light;
 }
@@ -61,8 +63,8 @@ TEST(Matrix, PhongConvolutionHasTheEigenvaluesOfItsLobe) {
   }
 }
 
-// An open plane under uneven light, seen from several sides. By definition the rows give the lobe's integral of L cos cut off at the incident
-// order; the true integral is neared as the order grows.
+// An open plane under uneven light, seen from several sides. By definition the rows give the lobe's integral of L cos
+// cut off at the incident order; the true integral is neared as the order grows.
 TEST(Matrix, PhongByConvolutionIsTheLobesIntegralOfBandLimitedLight) {
   SKIP_UNDER_SANITIZERS();
   const Scene scene = make_quad(Vec3(-1, 0, -1), Vec3(0, 0, 2), Vec3(2, 0, 0), 1, 1, Vec3(0.5f));
@@ -86,7 +88,8 @@ TEST(Matrix, PhongByConvolutionIsTheLobesIntegralOfBandLimitedLight) {
   const float each = 4 * pi / float(count);
   double last_error = 1e9;
   for (int m : {3, 5, 8}) {
-    auto baked = bake_matrix(scene, *tracer, receivers, all_of({phong, phong}, receivers), {.order = 3, .samples = 16384, .bounces = 0, .precision = Precision::single},
+    auto baked = bake_matrix(scene, *tracer, receivers, all_of({phong, phong}, receivers),
+                             {.order = 3, .samples = 16384, .bounces = 0, .precision = Precision::single},
                              {.incident_order = m, .outgoing = OutgoingKind::phong, .grid = 8, .response_samples = 16});
     ASSERT_TRUE(baked) << baked.error().text();
     ASSERT_EQ(baked->transfer.rows, m * m + 1);
@@ -103,12 +106,14 @@ TEST(Matrix, PhongByConvolutionIsTheLobesIntegralOfBandLimitedLight) {
       for (size_t k = 0; k < y.size(); ++k) band_limited[k] += each * y[k] * d.y * radiance_of(d);
     }
     double error = 0;
-    for (const Vec3& view : {glm::normalize(Vec3(0.1f, 1, 0.2f)), glm::normalize(Vec3(-0.8f, 0.7f, 0.1f)), glm::normalize(Vec3(0.3f, 0.4f, -0.9f))}) {
+    for (const Vec3& view : {glm::normalize(Vec3(0.1f, 1, 0.2f)), glm::normalize(Vec3(-0.8f, 0.7f, 0.1f)),
+                             glm::normalize(Vec3(0.3f, 0.4f, -0.9f))}) {
       const Vec3 mirrored(-view.x, view.y, -view.z);
       Vec3 expected = phong.diffuse * irradiance / pi, truth = expected;
       for (int i = 0; i < count; ++i) {
         const Vec3 d = direction(i);
-        const float lobe = each * (phong.exponent + 2) / (2 * pi) * std::pow(std::max(0.0f, glm::dot(d, mirrored)), phong.exponent);
+        const float lobe = each * (phong.exponent + 2) / (2 * pi) *
+                           std::pow(std::max(0.0f, glm::dot(d, mirrored)), phong.exponent);
         if (lobe == 0) continue;
         evaluate_sh(m, d, y);
         Vec3 g(0.0f);
@@ -128,8 +133,8 @@ TEST(Matrix, PhongByConvolutionIsTheLobesIntegralOfBandLimitedLight) {
     last_error = error;
   }
   EXPECT_LT(last_error, 0.02);
-  EXPECT_FALSE(bake_matrix(scene, *tracer, receivers, all_of({Ggx{}, Ggx{}}, receivers), {.order = 3, .samples = 16, .bounces = 0},
-                           {.outgoing = OutgoingKind::phong}));
+  EXPECT_FALSE(bake_matrix(scene, *tracer, receivers, all_of({Ggx{}, Ggx{}}, receivers),
+                           {.order = 3, .samples = 16, .bounces = 0}, {.outgoing = OutgoingKind::phong}));
 }
 
 // Light times kept visibility, or the same product baked into matrices: the same numbers.
@@ -140,8 +145,10 @@ TEST(Matrix, VisibilityAsAFactorGivesTheRowsOfADirectMatrix) {
   const ReceiverMaterials materials = all_of({Ggx{.alpha = Vec2(0.3f)}, Ggx{.alpha = Vec2(0.3f)}}, receivers);
   const int n = 4, m = 3;
   const MatrixOptions options{.incident_order = m, .outgoing = OutgoingKind::map, .grid = 8, .response_samples = 64};
-  auto matrix = bake_matrix(scene, *tracer, receivers, materials, {.order = n, .samples = 256, .bounces = 0, .precision = Precision::single}, options);
-  auto visibility = bake(scene, *tracer, receivers, {.order = n + m - 1, .samples = 256, .bounces = 0, .precision = Precision::single});
+  auto matrix = bake_matrix(scene, *tracer, receivers, materials,
+                            {.order = n, .samples = 256, .bounces = 0, .precision = Precision::single}, options);
+  auto visibility = bake(scene, *tracer, receivers,
+                         {.order = n + m - 1, .samples = 256, .bounces = 0, .precision = Precision::single});
   ASSERT_TRUE(matrix && visibility);
   const Outgoing outgoing = make_map_outgoing(materials, m, options);
   const std::vector<Vec3> light = uneven_light(n, 5);
@@ -152,7 +159,8 @@ TEST(Matrix, VisibilityAsAFactorGivesTheRowsOfADirectMatrix) {
   double difference = 0, total = 0;
   for (size_t r = 0; r < receivers.count(); ++r)
     for (int j = 0; j < m * m; ++j)
-      for (int c = 0; c < 3; ++c) difference += std::pow(a.at(r, j)[c] - b.at(r, j)[c], 2), total += std::pow(a.at(r, j)[c], 2);
+      for (int c = 0; c < 3; ++c)
+        difference += std::pow(a.at(r, j)[c] - b.at(r, j)[c], 2), total += std::pow(a.at(r, j)[c], 2);
   EXPECT_GT(total, 100);
   EXPECT_LT(std::sqrt(difference / total), 1e-4);
   std::vector<ViewWeights> wa(size_t(a.rows)), wb(wa.size());
@@ -183,7 +191,8 @@ TEST(Matrix, WithLambertIsTheDiffuseBake) {
       relight(*vector, light, a);
       relight(baked->transfer, light, b);
       for (size_t r = 0; r < receivers.count(); ++r) {
-        evaluate_outgoing(baked->outgoing, r, normalize_or(receivers.normals[r] + Vec3(0.3f, 0.1f, -0.2f), Vec3(0, 1, 0)), weights);
+        evaluate_outgoing(baked->outgoing, r,
+                          normalize_or(receivers.normals[r] + Vec3(0.3f, 0.1f, -0.2f), Vec3(0, 1, 0)), weights);
         const Vec3 radiance = reflect_rows(weights, Vec3(1), [&](size_t row) { return b.at(r, int(row)); });
         worst = std::max(worst, double(glm::length(radiance - a.at(r))));
       }
@@ -206,7 +215,8 @@ TEST(Matrix, IsTheSameOnOneThreadAndInLittleMemory) {
   auto b = bake_matrix(scene, *tracer, receivers, all_of(diffuse, receivers), options, matrix, &report);
   ASSERT_TRUE(a && b);
   EXPECT_LT(report.operator_kept, 0.5);
-  EXPECT_TRUE(std::equal(a->transfer.data.begin(), a->transfer.data.end(), b->transfer.data.begin(), b->transfer.data.end()));
+  EXPECT_TRUE(
+      std::equal(a->transfer.data.begin(), a->transfer.data.end(), b->transfer.data.begin(), b->transfer.data.end()));
   options.memory = 1000;
   auto none = bake_matrix(scene, *tracer, receivers, all_of(diffuse, receivers), options, matrix);
   ASSERT_FALSE(none);
@@ -222,10 +232,12 @@ TEST(Matrix, ColouredReflectionTintsBouncesInGreyScenes) {
   ASSERT_TRUE(tracer);
   const Receivers receivers = make_vertex_receivers(scene);
   const Brdf gold = Ggx{Vec3(0.9f, 0.6f, 0.2f), Vec2(0.3f)};
-  // Scattered once, light is tinted once: channels of the bounce alone stand as f0 do, but for Schlick's whitening at grazing.
+  // Scattered once, light is tinted once: channels of the bounce alone stand as f0 do, but for Schlick's whitening at
+  // grazing.
   std::vector<Vec3> total;
   for (int bounces : {0, 1}) {
-    auto baked = bake_matrix(scene, *tracer, receivers, all_of({gold, gold}, receivers), {.order = 2, .samples = 512, .bounces = bounces, .precision = Precision::single},
+    auto baked = bake_matrix(scene, *tracer, receivers, all_of({gold, gold}, receivers),
+                             {.order = 2, .samples = 512, .bounces = bounces, .precision = Precision::single},
                              {.incident_order = 3, .outgoing = OutgoingKind::map, .grid = 8, .response_samples = 256});
     ASSERT_TRUE(baked);
     EXPECT_EQ(baked->transfer.channels, bounces ? 3 : 1);
@@ -268,7 +280,8 @@ TEST(Matrix, RowsAreTheIntegralsTheyStandFor) {
     }
     const std::vector<float> t = load_receiver(baked->transfer, r);
     // 4,096 scrambled Sobol' points against a discontinuous visibility: about 4096^-0.75 of functions up to 3.
-    for (size_t k = 0; k < 256; ++k) EXPECT_NEAR(t[k], sum[k], 0.02) << "receiver " << r << " row " << k / 16 << " column " << k % 16;
+    for (size_t k = 0; k < 256; ++k)
+      EXPECT_NEAR(t[k], sum[k], 0.02) << "receiver " << r << " row " << k / 16 << " column " << k % 16;
   }
 }
 

@@ -1,5 +1,5 @@
-// Sources: Fresnel's equations; for measured media H. W. Jensen et al. 2001, "A practical model for subsurface light transport",
-// figure 5.
+// Sources: Fresnel's equations; for measured media H. W. Jensen et al. 2001, "A practical model for subsurface light
+// transport", figure 5.
 #include <lambent/bake/medium.h>
 
 #include <charconv>
@@ -82,7 +82,8 @@ Result<Medium> parse_medium(const std::string& text) {
     const std::string key = text.substr(begin, equals - begin);
     const std::vector<float> v = numbers(text.substr(equals + 1, end - equals - 1));
     const bool colour = key == "sigma_s" || key == "sigma_a";
-    if (!colour && key != "g" && key != "eta") return Error{text, "knows sigma_s, sigma_a, g and eta, not \"" + key + "\""};
+    if (!colour && key != "g" && key != "eta")
+      return Error{text, "knows sigma_s, sigma_a, g and eta, not \"" + key + "\""};
     if (v.size() != 1 && !(colour && v.size() == 3))
       return Error{text, key + " expects " + (colour ? "one number or R,G,B" : "one number")};
     if (key == "g") medium.g = v[0];

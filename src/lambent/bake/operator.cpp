@@ -8,14 +8,15 @@
 
 namespace lambent {
 
-Result<GatherOperator> GatherOperator::trace(const GatherSetup& setup, const GatherDirect* direct, float* sky_rows, bool hits, size_t memory,
-                                             Progress* progress) {
+Result<GatherOperator> GatherOperator::trace(const GatherSetup& setup, const GatherDirect* direct, float* sky_rows,
+                                             bool hits, size_t memory, Progress* progress) {
   const auto start = std::chrono::steady_clock::now();
   GatherOperator op;
   op.setup_ = &setup;
   const size_t n = setup.receivers.count();
   op.buried_.assign(n, 0);
-  op.kept_ = std::make_shared<KeptRows>(op.blocks(), hits ? memory : 0, most_bytes(size_t(setup.sets.samples), n, setup.channels));
+  op.kept_ = std::make_shared<KeptRows>(op.blocks(), hits ? memory : 0,
+                                        most_bytes(size_t(setup.sets.samples), n, setup.channels));
   op.gathered_ = std::make_shared<Pool<GatherBlock>>([] { return std::make_unique<GatherBlock>(); });
   op.scratch_ = std::make_shared<Pool<GatherScratch, DeleteScratch>>([&setup] { return make_gather_scratch(setup); });
   ProgressStage stage(progress, "tracing", n);
@@ -23,8 +24,8 @@ Result<GatherOperator> GatherOperator::trace(const GatherSetup& setup, const Gat
     if (stage.cancelled()) return;
     auto block = op.gathered_->borrow();
     std::vector<float> unwanted(sky_rows ? 0 : (end - begin) * setup.coefficients());
-    const GatherSky sky{sky_rows ? sky_rows + begin * setup.coefficients() : unwanted.data(), nullptr, setup.coefficients(), nullptr,
-                        op.buried_.data() + begin};
+    const GatherSky sky{sky_rows ? sky_rows + begin * setup.coefficients() : unwanted.data(), nullptr,
+                        setup.coefficients(), nullptr, op.buried_.data() + begin};
     auto scratch = op.scratch_->borrow();
     if (direct) {
       const GatherDirect here{direct->lamps, direct->samples, direct->rows + begin * direct->width, direct->width};

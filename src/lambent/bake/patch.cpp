@@ -10,25 +10,31 @@ double sample_heights(std::span<const float> values, int width, int height, glm:
   uv = (uv - glm::floor(uv)) * glm::dvec2(width, height) - 0.5;
   const int i = int(std::floor(uv.x)), j = int(std::floor(uv.y));
   const double fx = uv.x - i, fy = uv.y - j;
-  auto at = [&](int a, int b) { return double(values[size_t((b + height) % height) * size_t(width) + size_t((a + width) % width)]); };
+  auto at = [&](int a, int b) {
+    return double(values[size_t((b + height) % height) * size_t(width) + size_t((a + width) % width)]);
+  };
   return (1 - fy) * ((1 - fx) * at(i, j) + fx * at(i + 1, j)) + fy * ((1 - fx) * at(i, j + 1) + fx * at(i + 1, j + 1));
 }
 
 Result<HeightField> make_height_field(std::span<const float> values, int width, int height, int size, float depth) {
   LAMBENT_CHECK(values.size() == size_t(width) * size_t(height));
-  if (width < 2 || height < 2) return Error{"", "a height map needs at least 2 x 2 pixels, and this has " + std::to_string(width) + " x " + std::to_string(height)};
+  if (width < 2 || height < 2)
+    return Error{"", "a height map needs at least 2 x 2 pixels, and this has " + std::to_string(width) + " x " +
+                         std::to_string(height)};
   if (size < 2 || size > 1024) return Error{"size", "must lie between 2 and 1024"};
   if (!(std::abs(depth) <= 10)) return Error{"depth", "must lie between -10 and 10 sides of the patch"};
   for (float v : values)
     if (!std::isfinite(v)) return Error{"", "a height is not a finite number"};
   HeightField field{size, std::vector<float>(size_t(size) * size_t(size))};
-  // Over a texel's extent, the mean of the picture, taken as piecewise constant where it is finer and linear where it is coarser.
+  // Over a texel's extent, the mean of the picture, taken as piecewise constant where it is finer and linear where it
+  // is coarser.
   const int fine = std::max(1, std::max(width, height) / size) * 2;
   for (int j = 0; j < size; ++j)
     for (int i = 0; i < size; ++i) {
       double sum = 0;
       for (int b = 0; b < fine; ++b)
-        for (int a = 0; a < fine; ++a) sum += sample_heights(values, width, height, {(i + (a + 0.5) / fine) / size, (j + (b + 0.5) / fine) / size});
+        for (int a = 0; a < fine; ++a)
+          sum += sample_heights(values, width, height, {(i + (a + 0.5) / fine) / size, (j + (b + 0.5) / fine) / size});
       field.heights[size_t(j * size + i)] = float(sum / (fine * fine) * depth);
     }
   return field;
@@ -39,7 +45,8 @@ double seam_jump(const HeightField& f) {
   double seam = 0, inside = 0;
   for (size_t j = 0; j < n; ++j)
     for (size_t i = 0; i < n; ++i) {
-      const double across = f.heights[j * n + (i + 1) % n] - f.heights[j * n + i], down = f.heights[(j + 1) % n * n + i] - f.heights[j * n + i];
+      const double across = f.heights[j * n + (i + 1) % n] - f.heights[j * n + i],
+                   down = f.heights[(j + 1) % n * n + i] - f.heights[j * n + i];
       (i + 1 == n ? seam : inside) += across * across;
       (j + 1 == n ? seam : inside) += down * down;
     }
@@ -68,17 +75,19 @@ PatchScene make_patch(const HeightField& field, Vec3 albedo) {
   material.name = "relief", material.base_color = albedo, material.double_sided = false;
   s.materials.push_back(material);
   Part part;
-  part.name = "relief", part.vertex_count = uint32_t(s.positions.size()), part.triangle_count = uint32_t(s.triangles.size());
+  part.name = "relief", part.vertex_count = uint32_t(s.positions.size()),
+  part.triangle_count = uint32_t(s.triangles.size());
   s.parts.push_back(part);
 
-  // The middle ones receive, and every vertex points at its like. Origins are a hair off the surface, upward: at the bottom of a steep valley the
-  // normal may point into its other side.
+  // The middle ones receive, and every vertex points at its like. Origins are a hair off the surface, upward: at the
+  // bottom of a steep valley the normal may point into its other side.
   Receivers& r = patch.receivers;
   const float diagonal = bounds(s).diagonal();
   for (int j = n; j < 2 * n; ++j)
     for (int i = n; i < 2 * n; ++i) {
       const size_t v = size_t(j * (side + 1) + i);
-      r.origins.push_back(s.positions[v] + Vec3(0, 0, 2 * receiver_lift(s.positions[v], texel, diagonal))), r.normals.push_back(s.normals[v]);
+      r.origins.push_back(s.positions[v] + Vec3(0, 0, 2 * receiver_lift(s.positions[v], texel, diagonal))),
+          r.normals.push_back(s.normals[v]);
     }
   r.front.resize(s.positions.size());
   for (int j = 0; j <= side; ++j)
@@ -95,20 +104,23 @@ Result<PatchScene> make_mesh_patch(const Scene& tile, int size, HeightField* hei
   const Vec3 extent = box.max - box.min;
   const float side = extent.x;
   if (!(side > 0 && std::isfinite(1 / side) && std::abs(extent.y - side) <= 0.01f * side))
-    return Error{tile.path, "a patch is as wide as it is high, and this extends by " + std::to_string(extent.x) + " along x and " + std::to_string(extent.y) + " along y"};
+    return Error{tile.path, "a patch is as wide as it is high, and this extends by " + std::to_string(extent.x) +
+                                " along x and " + std::to_string(extent.y) + " along y"};
   if (!(extent.z <= 10 * side)) return Error{tile.path, "is more than ten times as deep as it is wide"};
 
   PatchScene patch;
   Scene& s = patch.scene;
   s.path = tile.path, s.materials = tile.materials, s.textures = tile.textures;
-  const uint32_t vertices = uint32_t(tile.positions.size()), triangles = uint32_t(tile.triangles.size()), parts = uint32_t(tile.parts.size());
+  const uint32_t vertices = uint32_t(tile.positions.size()), triangles = uint32_t(tile.triangles.size()),
+                 parts = uint32_t(tile.parts.size());
   std::vector<Vec2> places;  // in texels, alike in all repetitions
   uint32_t copy = 0;
   for (int j = -1; j <= 1; ++j)
     for (int i = -1; i <= 1; ++i, ++copy) {
       for (Vec3 p : tile.positions) {
         const Vec3 unit((p.x - box.min.x) / side, (p.y - box.max.y) / extent.y, (p.z - box.min.z) / side);
-        s.positions.push_back(unit + Vec3(float(i), float(j), 0)), places.push_back(Vec2(unit.x, -unit.y) * float(size));
+        s.positions.push_back(unit + Vec3(float(i), float(j), 0)),
+            places.push_back(Vec2(unit.x, -unit.y) * float(size));
       }
       s.normals.insert(s.normals.end(), tile.normals.begin(), tile.normals.end());
       s.colors.insert(s.colors.end(), tile.colors.begin(), tile.colors.end());
@@ -146,8 +158,10 @@ Result<PatchScene> make_mesh_patch(const Scene& tile, int size, HeightField* hei
       hit = tracer->closest({(float(i) + off) * texel, -(float(j) + off) * texel, above}, {0, 0, -1});
     }
     auto where = [&] { return "texel " + std::to_string(i) + ", " + std::to_string(j) + " "; };
-    if (hit.triangle == none) return Error{tile.path, where() + "meets no geometry from above: a patch may have no holes"};
-    if (!hit.front && !s.triangles[hit.triangle].two_sided) return Error{tile.path, where() + "meets the back of a one-sided surface: a patch faces +z"};
+    if (hit.triangle == none)
+      return Error{tile.path, where() + "meets no geometry from above: a patch may have no holes"};
+    if (!hit.front && !s.triangles[hit.triangle].two_sided)
+      return Error{tile.path, where() + "meets the back of a one-sided surface: a patch faces +z"};
     place_texel(s, r, k, {hit.triangle, hit.u, hit.v}, !hit.front, texel, diagonal);
     if (heights) heights->heights[k] = above - hit.distance;
   }

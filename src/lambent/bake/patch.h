@@ -1,5 +1,6 @@
 #pragma once
-// Transfer of a small piece of relief that repeats, for use as a texture on other surfaces. Source: local-deformable-prt, section 6.
+// Transfer of a small piece of relief that repeats, for use as a texture on other surfaces. Source:
+// local-deformable-prt, section 6.
 #include <lambent/bake/bake.h>
 
 namespace lambent {
@@ -13,26 +14,28 @@ struct HeightField {
 // Bilinear at uv in a picture that repeats; 0 where uv is not finite.
 double sample_heights(std::span<const float> values, int width, int height, glm::dvec2 uv);
 
-// A picture's values, box-filtered or interpolated to size x size, times depth. Errors: fewer than 2 x 2 values; values that are not
-// finite; size or depth out of range.
+// A picture's values, box-filtered or interpolated to size x size, times depth. Errors: fewer than 2 x 2 values; values
+// that are not finite; size or depth out of range.
 Result<HeightField> make_height_field(std::span<const float> values, int width, int height, int size, float depth);
 
-// How much a field jumps from its last row and column to its first, as a multiple of how much it changes from row to row
-// elsewhere: about 1 for a field that tiles.
+// How much a field jumps from its last row and column to its first, as a multiple of how much it changes from row to
+// row elsewhere: about 1 for a field that tiles.
 double seam_jump(const HeightField& field);
 
-// The relief in 3 x 3 repetitions, in the frame that its transfer is given in: x along +u, y along -v, z outward. Receivers are the
-// texels of the middle one, in their order; light that bounces off the outer ones comes from their likes in the middle.
+// The relief in 3 x 3 repetitions, in the frame that its transfer is given in: x along +u, y along -v, z outward.
+// Receivers are the texels of the middle one, in their order; light that bounces off the outer ones comes from their
+// likes in the middle.
 struct PatchScene {
   Scene scene;
   Receivers receivers;
 };
 PatchScene make_patch(const HeightField& field, Vec3 albedo);
 
-// The same of a mesh that repeats along x and y with the extents of its box, which have to be alike to 1%, seen as a picture from +z: u along
-// +x, v along -y. It is scaled to a side of 1. Receivers lie where rays from above through the middles of size x size texels meet it;
-// what lies below something else has no receiver of its own, and gives back what the texel above it does. `heights`, if asked for, are those
-// of the receivers. Errors: no such extents; a texel that meets nothing or the back of a one-sided surface; too many triangles.
+// The same of a mesh that repeats along x and y with the extents of its box, which have to be alike to 1%, seen as a
+// picture from +z: u along +x, v along -y. It is scaled to a side of 1. Receivers lie where rays from above through the
+// middles of size x size texels meet it; what lies below something else has no receiver of its own, and gives back what
+// the texel above it does. `heights`, if asked for, are those of the receivers. Errors: no such extents; a texel that
+// meets nothing or the back of a one-sided surface; too many triangles.
 Result<PatchScene> make_mesh_patch(const Scene& tile, int size, HeightField* heights = nullptr);
 
 }  // namespace lambent

@@ -25,7 +25,9 @@ TEST(Patch, FlatReliefIsAnOpenPlane) {
   evaluate_sh(6, Vec3(0, 0, 1), y);
   for (size_t r : {size_t{0}, size_t{27}, size_t{63}}) {
     const std::vector<float> row = load_receiver(t, r);
-    for (int k = 0; k < 36; ++k) EXPECT_NEAR(row[size_t(k)], y[k] * float(clamped_cosine(sh_band(k)) / std::numbers::pi), 2e-3) << k;  // noise of 4096 rays
+    for (int k = 0; k < 36; ++k)
+      EXPECT_NEAR(row[size_t(k)], y[k] * float(clamped_cosine(sh_band(k)) / std::numbers::pi), 2e-3)
+          << k;  // noise of 4096 rays
   }
 }
 
@@ -37,18 +39,22 @@ TEST(Patch, KnowsItsAxes) {
     for (int i = 0; i < n; ++i) field.heights.push_back(0.3f * float(n - i) / n);
   const PatchScene patch = make_patch(field, Vec3(0.5f));
   EXPECT_GT(area_normal(patch.scene, patch.scene.triangles[0]).z, 0);
-  for (int i = 3; i < n - 3; ++i) EXPECT_GT(patch.receivers.normals[size_t(5 * n + i)].x, 0.2f);  // slopes down to +u, so faces it
+  for (int i = 3; i < n - 3; ++i)
+    EXPECT_GT(patch.receivers.normals[size_t(5 * n + i)].x, 0.2f);  // slopes down to +u, so faces it
   HeightField down{n, {}};
   for (int j = 0; j < n; ++j)
     for (int i = 0; i < n; ++i) down.heights.push_back(0.3f * float(n - j) / n);
-  EXPECT_LT(make_patch(down, Vec3(0.5f)).receivers.normals[size_t(5 * n + 5)].y, -0.2f);  // down towards larger v, which is -y
+  EXPECT_LT(make_patch(down, Vec3(0.5f)).receivers.normals[size_t(5 * n + 5)].y,
+            -0.2f);  // down towards larger v, which is -y
 }
 
 TEST(Patch, RepeatsAndDoesNotFeelItsSeams) {
   // The same relief shifted by half a period has the same transfer, shifted.
   const int n = 16;
   HeightField field{n, {}}, shifted{n, {}};
-  auto height = [&](int i, int j) { return 0.08f * std::sin(2 * pi * float(i) / n) * std::cos(4 * pi * float(j) / n + 1); };
+  auto height = [&](int i, int j) {
+    return 0.08f * std::sin(2 * pi * float(i) / n) * std::cos(4 * pi * float(j) / n + 1);
+  };
   for (int j = 0; j < n; ++j)
     for (int i = 0; i < n; ++i) field.heights.push_back(height(i, j)), shifted.heights.push_back(height(i + 8, j + 8));
   EXPECT_LT(seam_jump(field), 2);
@@ -56,7 +62,8 @@ TEST(Patch, RepeatsAndDoesNotFeelItsSeams) {
   double error = 0, total = 0;
   for (int j = 0; j < n; ++j)
     for (int i = 0; i < n; ++i) {
-      const std::vector<float> u = load_receiver(a, size_t((j + 8) % n * n + (i + 8) % n)), v = load_receiver(b, size_t(j * n + i));
+      const std::vector<float> u = load_receiver(a, size_t((j + 8) % n * n + (i + 8) % n)),
+                               v = load_receiver(b, size_t(j * n + i));
       for (size_t k = 0; k < 36; ++k) error += std::pow(u[k] - v[k], 2), total += u[k] * u[k];
     }
   EXPECT_LT(std::sqrt(error / total), 0.01);  // noise of 4,096 rays, twice
@@ -70,7 +77,8 @@ TEST(Patch, BouncesBetweenItsWalls) {
   auto mean = [&](int bounces) {
     const Transfer t = baked(make_patch(field, Vec3(1)), 1024, bounces);
     double sum = 0;
-    for (size_t r = 0; r < t.receivers; ++r) sum += load_receiver(t, r)[0] * std::sqrt(4 * std::numbers::pi) / double(t.receivers);
+    for (size_t r = 0; r < t.receivers; ++r)
+      sum += load_receiver(t, r)[0] * std::sqrt(4 * std::numbers::pi) / double(t.receivers);
     return sum;
   };
   EXPECT_LT(mean(0), 0.75);
@@ -86,7 +94,8 @@ Scene as_mesh(const PatchScene& patch, int n) {
   const int side = 3 * n, row = side + 1;
   for (int j = n; j <= 2 * n; ++j)
     for (int i = n; i <= 2 * n; ++i)
-      positions.push_back(patch.scene.positions[size_t(j * row + i)] * 5.0f + Vec3(1, 2, 3)), normals.push_back(patch.scene.normals[size_t(j * row + i)]);
+      positions.push_back(patch.scene.positions[size_t(j * row + i)] * 5.0f + Vec3(1, 2, 3)),
+          normals.push_back(patch.scene.normals[size_t(j * row + i)]);
   for (uint32_t j = 0; j < uint32_t(n); ++j)
     for (uint32_t i = 0; i < uint32_t(n); ++i) {
       const uint32_t a = j * uint32_t(n + 1) + i, b = a + 1, c = a + uint32_t(n) + 1, d = c + 1;
@@ -97,10 +106,12 @@ Scene as_mesh(const PatchScene& patch, int n) {
 }
 
 TEST(Patch, OfAMeshIsThatOfItsHeights) {
-  // The mesh begins at the middle of the first texel, and its own texels lie between those of the field, at twice as many.
+  // The mesh begins at the middle of the first texel, and its own texels lie between those of the field, at twice as
+  // many.
   const int n = 16;
   HeightField field{n, {}};
-  for (int k = 0; k < n * n; ++k) field.heights.push_back(0.1f * std::sin(2 * pi * float(k % n) / n) * std::cos(2 * pi * float(k / n) / n + 1));
+  for (int k = 0; k < n * n; ++k)
+    field.heights.push_back(0.1f * std::sin(2 * pi * float(k % n) / n) * std::cos(2 * pi * float(k / n) / n + 1));
   const PatchScene relief = make_patch(field, Vec3(0.7f));
   HeightField heights;
   auto mesh = make_mesh_patch(as_mesh(relief, n), 2 * n, &heights);
@@ -114,11 +125,13 @@ TEST(Patch, OfAMeshIsThatOfItsHeights) {
       // Four of the field's texels about the centre of a cell; texels of the mesh about the same.
       std::array<float, 36> u{}, v{}, w{};
       for (int k = 0; k < 4; ++k) {
-        const std::vector<float> x = load_receiver(a, size_t((j + k / 2) * n + i + k % 2)), y = load_receiver(b, size_t((2 * j + k / 2) * 2 * n + 2 * i + k % 2)),
+        const std::vector<float> x = load_receiver(a, size_t((j + k / 2) * n + i + k % 2)),
+                                 y = load_receiver(b, size_t((2 * j + k / 2) * 2 * n + 2 * i + k % 2)),
                                  z = load_receiver(direct, size_t((2 * j + k / 2) * 2 * n + 2 * i + k % 2));
         for (size_t c = 0; c < 36; ++c) u[c] += x[c] / 4, v[c] += y[c] / 4, w[c] += z[c] / 4;
       }
-      for (size_t c = 0; c < 36; ++c) error += std::pow(u[c] - v[c], 2), unbounced += std::pow(u[c] - w[c], 2), total += u[c] * u[c];
+      for (size_t c = 0; c < 36; ++c)
+        error += std::pow(u[c] - v[c], 2), unbounced += std::pow(u[c] - w[c], 2), total += u[c] * u[c];
       EXPECT_NEAR(heights.heights[size_t(2 * j * 2 * n + 2 * i)], field.heights[size_t(j * n + i)] - least, 0.03);
     }
   EXPECT_LT(std::sqrt(error / total), 0.015);      // curvature within a cell, noise
@@ -150,7 +163,8 @@ TEST(Patch, MakesHeightFieldsOfPictures) {
   EXPECT_GT(seam_jump(ramp), 5);
 }
 
-// At the bottom of a steep valley the normal may point into its other side; what is received there is still what arrives there.
+// At the bottom of a steep valley the normal may point into its other side; what is received there is still what
+// arrives there.
 TEST(Patch, SteepValleysAreNotTakenForBuried) {
   const int n = 16;
   HeightField field{n, {}};
@@ -161,13 +175,16 @@ TEST(Patch, SteepValleysAreNotTakenForBuried) {
   const PatchScene patch = make_patch(field, Vec3(0.5f));
   auto tracer = Tracer::build(patch.scene);
   BakeReport report;
-  auto transfer = bake(patch.scene, *tracer, patch.receivers, {.order = 1, .samples = 1024, .bounces = 0, .precision = Precision::single}, &report);
+  auto transfer = bake(patch.scene, *tracer, patch.receivers,
+                       {.order = 1, .samples = 1024, .bounces = 0, .precision = Precision::single}, &report);
   ASSERT_TRUE(transfer);
   EXPECT_EQ(report.buried, 0u);
   const Environment env = *load_environment("uniform:1");
-  const std::vector<ExitRadiance> truth = exit_radiances(patch.scene, env, patch.receivers.origins, patch.receivers.normals, 0, 1024, 1);
+  const std::vector<ExitRadiance> truth =
+      exit_radiances(patch.scene, env, patch.receivers.origins, patch.receivers.normals, 0, 1024, 1);
   double error = 0;
-  for (size_t r = 0; r < truth.size(); ++r) error += std::pow(load_receiver(*transfer, r)[0] * std::sqrt(4 * std::numbers::pi) - truth[r].mean.x, 2);
+  for (size_t r = 0; r < truth.size(); ++r)
+    error += std::pow(load_receiver(*transfer, r)[0] * std::sqrt(4 * std::numbers::pi) - truth[r].mean.x, 2);
   EXPECT_LT(std::sqrt(error / double(truth.size())), 0.01);
 }
 

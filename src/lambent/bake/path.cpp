@@ -4,8 +4,8 @@
 
 namespace lambent {
 
-PathEnd follow_path(const Scene& scene, const Tracer& tracer, const Reflection& reflection, Vec3 direction, const Hit& first, int reflections, uint64_t key,
-                    uint32_t index) {
+PathEnd follow_path(const Scene& scene, const Tracer& tracer, const Reflection& reflection, Vec3 direction,
+                    const Hit& first, int reflections, uint64_t key, uint32_t index) {
   PathEnd end{false, Vec3(1), direction};
   Hit hit = first;
   for (int bounce = 0; bounce < reflections; ++bounce) {
@@ -20,13 +20,15 @@ PathEnd follow_path(const Scene& scene, const Tracer& tracer, const Reflection& 
     Vec3 wo = -end.direction * frame;
     if (wo.z < lowest) wo = glm::normalize(Vec3(wo.x, wo.y, lowest));
 
-    const BrdfSample next = sample(surface_brdf(scene, reflection, triangle, hit.u, hit.v), wo, sobol_owen(index, uint32_t(hash64(key, uint64_t(bounce)))));
+    const BrdfSample next = sample(surface_brdf(scene, reflection, triangle, hit.u, hit.v), wo,
+                                   sobol_owen(index, uint32_t(hash64(key, uint64_t(bounce)))));
     if (!(next.pdf > 0)) break;
     end.direction = frame * next.wi, end.throughput *= next.weight;
     if (glm::dot(ng, end.direction) <= 0 || end.throughput == Vec3(0)) break;
     const Vec3 p = interpolate(scene.positions, triangle, hit.u, hit.v);
     // Clear of the surface by more than the rounding of p, which grows with coordinates and edges.
-    const Vec3 size = glm::abs(p) + glm::abs(scene.positions[triangle.v[1]] - p) + glm::abs(scene.positions[triangle.v[2]] - p);
+    const Vec3 size = glm::abs(p) + glm::abs(scene.positions[triangle.v[1]] - p) +
+                      glm::abs(scene.positions[triangle.v[2]] - p);
     hit = tracer.closest(p + ng * (1e-5f * std::max({size.x, size.y, size.z})), end.direction);
     if (hit.triangle == none) {
       end.leaves = true;

@@ -15,7 +15,8 @@ ViewMap make_response(const LinearMaterial& material, const CosineBasis& basis, 
   const auto* black = std::get_if<Lambert>(&material.black);
   const auto* white = std::get_if<Lambert>(&material.white);
   if (black && white) {  // exact: z_0 = 1, and the others are orthogonal to it
-    for (size_t i = 0; i < map.values.size(); i += n) map.values[i] = ViewWeights(black->albedo, white->albedo.x - black->albedo.x);
+    for (size_t i = 0; i < map.values.size(); i += n)
+      map.values[i] = ViewWeights(black->albedo, white->albedo.x - black->albedo.x);
     return map;
   }
   parallel_for(size_t(grid), 1, [&](size_t begin, size_t end) {
@@ -62,19 +63,22 @@ std::vector<float> convolve_phong(const LinearMaterial& material, const CosineBa
   const std::vector<double> bands = phong_convolution(phong->exponent, basis.order);
   for (size_t k = 0; k < J; ++k)
     for (size_t j = 0; j <= k; ++j)
-      rows[k * J + j] = float(std::numbers::pi * bands[size_t(sh_band(int(k)))] * phong->specular[channel] * basis.to_sh[k * J + j]);
+      rows[k * J + j] =
+          float(std::numbers::pi * bands[size_t(sh_band(int(k)))] * phong->specular[channel] * basis.to_sh[k * J + j]);
   return rows;
 }
 
 FactoredResponse factor_response(const ViewMap& response, int max_rows, double tolerance) {
   const int nodes = response.grid * response.grid, n = response.rows;
-  // One row of the matrix for each node and component, weighed by how much of a picture, or of the rays that meet a surface, sees it so: the cosine of its
-  // view (the map has equal areas; a grazing view keeps a little).
+  // One row of the matrix for each node and component, weighed by how much of a picture, or of the rays that meet a
+  // surface, sees it so: the cosine of its view (the map has equal areas; a grazing view keeps a little).
   std::vector<double> A(size_t(nodes) * 4 * size_t(n)), seen;
   for (int i = 0; i < nodes; ++i) {
-    seen.push_back(std::sqrt(std::max(0.02, double(view_map_direction(response.grid, i % response.grid, i / response.grid).z))));
+    seen.push_back(
+        std::sqrt(std::max(0.02, double(view_map_direction(response.grid, i % response.grid, i / response.grid).z))));
     for (int c = 0; c < 4; ++c)
-      for (int j = 0; j < n; ++j) A[(size_t(i) * 4 + size_t(c)) * size_t(n) + size_t(j)] = seen.back() * response.values[size_t(i * n + j)][c];
+      for (int j = 0; j < n; ++j)
+        A[(size_t(i) * 4 + size_t(c)) * size_t(n) + size_t(j)] = seen.back() * response.values[size_t(i * n + j)][c];
   }
   const Svd d = thin_svd(A, nodes * 4, n);
   FactoredResponse f;
@@ -82,7 +86,8 @@ FactoredResponse factor_response(const ViewMap& response, int max_rows, double t
   double total = 0;
   for (double s : d.s) total += s * s;
   double left = total;
-  while (f.rows < std::min(max_rows, d.k) && (f.rows == 0 || left > tolerance * tolerance * total)) left -= d.s[size_t(f.rows)] * d.s[size_t(f.rows)], ++f.rows;
+  while (f.rows < std::min(max_rows, d.k) && (f.rows == 0 || left > tolerance * tolerance * total))
+    left -= d.s[size_t(f.rows)] * d.s[size_t(f.rows)], ++f.rows;
   f.error = total > 0 ? std::sqrt(std::max(left, 0.0) / total) : 0;
   f.h.resize(size_t(f.rows) * size_t(n));
   for (int r = 0; r < f.rows; ++r)
@@ -90,7 +95,9 @@ FactoredResponse factor_response(const ViewMap& response, int max_rows, double t
   f.g = {response.grid, f.rows, std::vector<ViewWeights>(size_t(nodes) * size_t(f.rows))};
   for (int i = 0; i < nodes; ++i)
     for (int r = 0; r < f.rows; ++r)
-      for (int c = 0; c < 4; ++c) f.g.values[size_t(i * f.rows + r)][c] = float(d.U[(size_t(i) * 4 + size_t(c)) * size_t(d.k) + size_t(r)] * d.s[size_t(r)] / seen[size_t(i)]);
+      for (int c = 0; c < 4; ++c)
+        f.g.values[size_t(i * f.rows + r)][c] =
+            float(d.U[(size_t(i) * 4 + size_t(c)) * size_t(d.k) + size_t(r)] * d.s[size_t(r)] / seen[size_t(i)]);
   f.constant = f.rows == 1;
   for (const ViewWeights& w : f.g.values) {
     const ViewWeights apart = glm::abs(w - f.g.values[0]);
@@ -102,7 +109,8 @@ FactoredResponse factor_response(const ViewMap& response, int max_rows, double t
 std::array<std::vector<float>, 4> project_response(const ViewMap& response, OutgoingKind kind, int order) {
   LAMBENT_CHECK(kind == OutgoingKind::sh || kind == OutgoingKind::hemisphere || kind == OutgoingKind::hsh);
   const size_t rows = size_t(sh_count(order)), n = size_t(response.rows), nodes = size_t(response.grid);
-  // The map has equal areas: a node stands for 2 pi / (grid - 1)^2 of solid angle, half of it on an edge, a quarter in a corner.
+  // The map has equal areas: a node stands for 2 pi / (grid - 1)^2 of solid angle, half of it on an edge, a quarter in
+  // a corner.
   std::vector<std::vector<double>> sums(4, std::vector<double>(rows * n, 0.0));
   std::vector<float> y(rows);
   for (size_t row = 0; row < nodes; ++row)

@@ -1,5 +1,5 @@
-// Follows: radiosity ("Jacobi, Gauss-Seidel, Southwell", "Krylov subspace methods"); Saad and Schultz, "GMRES", 1986; Cohen,
-// Chen, Wallace and Greenberg, "A progressive refinement approach", 1988 (Southwell's relaxation as shooting).
+// Follows: radiosity ("Jacobi, Gauss-Seidel, Southwell", "Krylov subspace methods"); Saad and Schultz, "GMRES", 1986;
+// Cohen, Chen, Wallace and Greenberg, "A progressive refinement approach", 1988 (Southwell's relaxation as shooting).
 #include <lambent/bake/solve.h>
 #include <lambent/core/check.h>
 #include <lambent/core/parallel.h>
@@ -97,7 +97,8 @@ struct Problem {
         // All blocks of a phase read x before any of them writes it.
         AlignedVector<float> fresh(count * gather_block * width);
         parallel_for(count, 1, [&](size_t begin, size_t end) {
-          for (size_t i = begin; i < end; ++i) op.apply_block(phase + i * phases, x.data(), width, fresh.data() + i * gather_block * width);
+          for (size_t i = begin; i < end; ++i)
+            op.apply_block(phase + i * phases, x.data(), width, fresh.data() + i * gather_block * width);
         });
         parallel_for(count, 1, [&](size_t begin, size_t end) {
           for (size_t i = begin; i < end; ++i) {
@@ -130,8 +131,8 @@ struct Problem {
   AlignedVector<float> gmres();
 };
 
-// Buckets of receivers by the binary exponent of their residual, so that one of the greatest is found at once; entries whose
-// residual has changed since are told by their bucket.
+// Buckets of receivers by the binary exponent of their residual, so that one of the greatest is found at once; entries
+// whose residual has changed since are told by their bucket.
 class ResidualQueue {
  public:
   explicit ResidualQueue(size_t n) : bucket_(n, 0) {}
@@ -191,10 +192,13 @@ AlignedVector<float> Problem::southwell() {
     touched += push.first[j + 1] - push.first[j] + 1;
     if (touched >= next_look) {  // a quarter of an application between looks
       next_look = touched + entries / 4;
-      if (stage.cancelled() || done(double(touched) / double(entries), greatest_ratio(dots(r.data(), r.data(), n(), width), norms))) break;
+      if (stage.cancelled() ||
+          done(double(touched) / double(entries), greatest_ratio(dots(r.data(), r.data(), n(), width), norms)))
+        break;
     }
   }
-  if (!report.converged) done(double(touched) / double(entries), greatest_ratio(dots(r.data(), r.data(), n(), width), norms));
+  if (!report.converged)
+    done(double(touched) / double(entries), greatest_ratio(dots(r.data(), r.data(), n(), width), norms));
   op.fill(x.data(), width);
   return x;
 }
@@ -284,8 +288,8 @@ AlignedVector<float> Problem::gmres() {
 
 }  // namespace
 
-Result<AlignedVector<float>> solve(const GatherOperator& op, const float* e, size_t width, const SolveOptions& options, SolveReport* report,
-                                   Progress* progress) {
+Result<AlignedVector<float>> solve(const GatherOperator& op, const float* e, size_t width, const SolveOptions& options,
+                                   SolveReport* report, Progress* progress) {
   LAMBENT_CHECK(width % lane_multiple == 0 && options.most >= 1);
   if (!(options.tolerance > 0)) return Error{"tolerance", "must be positive"};
   SolveReport unwanted;
@@ -293,15 +297,16 @@ Result<AlignedVector<float>> solve(const GatherOperator& op, const float* e, siz
   r = {};
   ProgressStage stage(progress, "solving", size_t(options.most));
   Problem problem{op, e, width, options, r, stage};
-  AlignedVector<float> x = options.solver == Solver::jacobi         ? problem.jacobi()
-                           : options.solver == Solver::gauss_seidel ? problem.gauss_seidel()
-                           : options.solver == Solver::southwell    ? problem.southwell()
-                                                                    : problem.gmres();
+  AlignedVector<float> x = options.solver == Solver::jacobi       ? problem.jacobi()
+                         : options.solver == Solver::gauss_seidel ? problem.gauss_seidel()
+                         : options.solver == Solver::southwell    ? problem.southwell()
+                                                                  : problem.gmres();
   if (stage.cancelled()) return Error{"", "cancelled"};
   return x;
 }
 
-Result<AlignedVector<float>> bounce(const GatherOperator& op, const float* e, size_t width, int bounces, Progress* progress) {
+Result<AlignedVector<float>> bounce(const GatherOperator& op, const float* e, size_t width, int bounces,
+                                    Progress* progress) {
   AlignedVector<float> x(e, e + op.rows() * width), next(x.size());
   ProgressStage stage(progress, "bounces", size_t(bounces));
   for (int k = 0; k < bounces; ++k) {

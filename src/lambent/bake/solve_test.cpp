@@ -43,7 +43,8 @@ struct System {
   }
 };
 
-// Gaussian elimination with pivots, in double: the system itself, formed densely from the operator's images of unit vectors.
+// Gaussian elimination with pivots, in double: the system itself, formed densely from the operator's images of unit
+// vectors.
 std::vector<double> dense_solution(const System& s, size_t column) {
   const size_t n = s.receivers.count();
   std::vector<double> A(n * (n + 1), 0.0);
@@ -93,7 +94,8 @@ TEST(Solve, AllSolversFindTheSolutionOfTheDenseSystem) {
       ASSERT_TRUE(x);
       EXPECT_TRUE(report.converged) << int(solver);
       // The residual 1e-6 is magnified by at most 1 / (1 - 0.8); floats add their own 1e-6.
-      for (size_t r = 0; r < s.receivers.count(); ++r) EXPECT_NEAR((*x)[r * s.width + column], truth[r], 3e-5 * norm) << int(solver) << " " << r;
+      for (size_t r = 0; r < s.receivers.count(); ++r)
+        EXPECT_NEAR((*x)[r * s.width + column], truth[r], 3e-5 * norm) << int(solver) << " " << r;
     }
   }
 }
@@ -117,8 +119,10 @@ TEST(Solve, ColouredColumnsAgreeAndTheResidualIsWhatTheySay) {
       EXPECT_LT(std::sqrt(residual / norm), 2e-5) << int(solver) << " column " << c;
     }
     if (first.empty()) first = *x;
-    for (size_t i = 0; i < x->size(); ++i) EXPECT_NEAR((*x)[i], first[i], 1e-4f * (1 + std::abs(first[i]))) << int(solver);
-    for (size_t k = 1; k < report.steps.size(); ++k) EXPECT_GT(report.steps[k].applications, report.steps[k - 1].applications);
+    for (size_t i = 0; i < x->size(); ++i)
+      EXPECT_NEAR((*x)[i], first[i], 1e-4f * (1 + std::abs(first[i]))) << int(solver);
+    for (size_t k = 1; k < report.steps.size(); ++k)
+      EXPECT_GT(report.steps[k].applications, report.steps[k - 1].applications);
   }
 }
 

@@ -1,6 +1,6 @@
-// Follows: local-deformable-prt, section 6, by analogue random walks run backwards: from the receiver into the medium and out to
-// the light. Radiance over the square of the index is what keeps along a path through boundaries, so that no other factor stands
-// at them than what is let through, and a walk that is chosen by it carries weight 1.
+// Follows: local-deformable-prt, section 6, by analogue random walks run backwards: from the receiver into the medium
+// and out to the light. Radiance over the square of the index is what keeps along a path through boundaries, so that no
+// other factor stands at them than what is let through, and a walk that is chosen by it carries weight 1.
 #include <lambent/bake/gather.h>
 #include <lambent/bake/subsurface.h>
 #include <lambent/core/parallel.h>
@@ -21,7 +21,8 @@ double seconds_since(Clock::time_point start) { return std::chrono::duration<dou
 
 bool is_grey(Vec3 c) { return c.x == c.y && c.y == c.z; }
 
-// The direction of light that goes on through a boundary of normal n, which d points along, into a relative index of 1 / ratio.
+// The direction of light that goes on through a boundary of normal n, which d points along, into a relative index of 1
+// / ratio.
 Vec3 refract(Vec3 d, Vec3 n, float ratio) {
   const float cosine = glm::dot(d, n);
   const Vec3 along = ratio * (d - cosine * n);
@@ -128,9 +129,9 @@ void merge(std::vector<HitEntry>& entries, size_t from) {
 
 }  // namespace
 
-Result<Transfer> bake_subsurface(const Scene& scene, const Tracer& tracer, const Receivers& receivers, const BakeOptions& options,
-                                 const SubsurfaceOptions& subsurface, BakeReport* report_out, SubsurfaceReport* walks_out,
-                                 Progress* progress) {
+Result<Transfer> bake_subsurface(const Scene& scene, const Tracer& tracer, const Receivers& receivers,
+                                 const BakeOptions& options, const SubsurfaceOptions& subsurface,
+                                 BakeReport* report_out, SubsurfaceReport* walks_out, Progress* progress) {
   const Medium& medium = subsurface.medium;
   if (auto ok = check_light_basis(options, 1); !ok) return ok.error();
   if (!options.lobes.empty()) return Error{"light", "lobes do not go with a medium: its light is of harmonics alone"};
@@ -141,9 +142,11 @@ Result<Transfer> bake_subsurface(const Scene& scene, const Tracer& tracer, const
     return Error{"bounces", "must lie between 0 and 64, not " + std::to_string(options.bounces)};
 
   auto start = Clock::now();
-  const GatherSetup setup = make_gather_setup(scene, tracer, receivers, 1, 16, options.seed);  // for what it knows of albedos
+  const GatherSetup setup =
+      make_gather_setup(scene, tracer, receivers, 1, 16, options.seed);  // for what it knows of albedos
   const bool one_medium = is_grey(medium.sigma_s) && is_grey(medium.sigma_a);
-  const size_t channels = !one_medium || (options.bounces > 0 && setup.channels == 3) ? 3 : 1, media = one_medium ? 1 : 3;
+  const size_t channels = !one_medium || (options.bounces > 0 && setup.channels == 3) ? 3 : 1,
+               media = one_medium ? 1 : 3;
   const size_t n = receivers.count(), C = size_t(sh_count(options.order)), width = C * channels;
   const size_t samples = size_t(options.samples), half = samples / 2;
   const size_t fixed = 3 * n * width * sizeof(float);
@@ -185,7 +188,8 @@ Result<Transfer> bake_subsurface(const Scene& scene, const Tracer& tracer, const
         // A ray straight down a vertex may slip between its triangles, hence others beside it.
         Hit below = tracer.closest(origin, -up);
         for (int side = 0; side < 8 && (below.triangle == none || !below.front); ++side)
-          below = tracer.closest(origin, glm::normalize(frame * Vec3(0.05f * std::cos(float(side)), 0.05f * std::sin(float(side)), -1)));
+          below = tracer.closest(
+              origin, glm::normalize(frame * Vec3(0.05f * std::cos(float(side)), 0.05f * std::sin(float(side)), -1)));
         const size_t first_entry = sum.entries.size();
         if (!buried[r] && below.triangle != none && below.front) {
           const Vec3 start_at = walkers[0].beside(below, walkers[0].normal(below), -1);
@@ -210,10 +214,14 @@ Result<Transfer> bake_subsurface(const Scene& scene, const Tracer& tracer, const
                 Vec3 weight(0);
                 for (size_t c = from; c < to; ++c) weight[int(c)] = through / float(samples);
                 weight *= albedo(scene, scene.triangles[hit.triangle], hit.u, hit.v);
-                std::visit([&](const auto& basis) {
-                  if (const auto* at = basis.find(hit.triangle, hit.front))
-                    basis.spread(*at, hit.u, hit.v, [&](uint32_t q, float share) { sum.entries.push_back({q, share * weight}); });
-                }, receivers.basis);
+                std::visit(
+                    [&](const auto& basis) {
+                      if (const auto* at = basis.find(hit.triangle, hit.front))
+                        basis.spread(*at, hit.u, hit.v, [&](uint32_t q, float share) {
+                          sum.entries.push_back({q, share * weight});
+                        });
+                    },
+                    receivers.basis);
               }
             }
           }
@@ -231,13 +239,15 @@ Result<Transfer> bake_subsurface(const Scene& scene, const Tracer& tracer, const
       stage.advance(end - begin);
     });
     if (stage.cancelled()) return Error{"", "cancelled"};
-    if (fixed + entry_count * sizeof(HitEntry) > options.memory) return too_small(fixed + entry_count * sizeof(HitEntry));
+    if (fixed + entry_count * sizeof(HitEntry) > options.memory)
+      return too_small(fixed + entry_count * sizeof(HitEntry));
   }
   BakeReport report;
   SubsurfaceReport walks;
   double difference = 0, total = 0, lost = 0, events = 0, walk_count = 0;
   for (const WalkSums& s : sums)
-    difference += s.difference, total += s.total, lost += double(s.lost), events += double(s.events), walk_count += double(s.walks);
+    difference += s.difference, total += s.total, lost += double(s.lost), events += double(s.events),
+        walk_count += double(s.walks);
   walks.lost = walk_count > 0 ? lost / walk_count : 0, walks.events = walk_count > 0 ? events / walk_count : 0;
   for (uint8_t b : buried) report.buried += b;
   report.receivers = n, report.rays = size_t(events);

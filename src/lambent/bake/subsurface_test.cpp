@@ -14,8 +14,8 @@
 namespace lambent {
 namespace {
 
-Transfer baked(const Scene& scene, const Receivers& receivers, const Medium& medium, int samples, int bounces = 0, float period = 0,
-               SubsurfaceReport* walks = nullptr) {
+Transfer baked(const Scene& scene, const Receivers& receivers, const Medium& medium, int samples, int bounces = 0,
+               float period = 0, SubsurfaceReport* walks = nullptr) {
   auto tracer = Tracer::build(scene);
   EXPECT_TRUE(tracer);
   const BakeOptions options{.samples = samples, .bounces = bounces, .precision = Precision::single};
@@ -46,8 +46,8 @@ std::array<double, 6> zonal_at(double cosine) {
   return {y[0], y[2], y[6], y[12], y[20], y[30]};
 }
 
-// S. Chandrasekhar, Radiative Transfer, 1950: a half-space that scatters evenly reflects 1 - H(mu) sqrt(1 - albedo) of the light
-// that comes at cosine mu, where 1 / H(mu) = sqrt(1 - albedo) + albedo/2 int_0^1 nu H(nu) / (mu + nu) dnu.
+// S. Chandrasekhar, Radiative Transfer, 1950: a half-space that scatters evenly reflects 1 - H(mu) sqrt(1 - albedo) of
+// the light that comes at cosine mu, where 1 / H(mu) = sqrt(1 - albedo) + albedo/2 int_0^1 nu H(nu) / (mu + nu) dnu.
 std::vector<double> half_space_reflectance(double albedo, const std::vector<QuadratureNode>& nodes) {
   std::vector<double> H(nodes.size(), 1.0);
   for (int iteration = 0; iteration < 2000; ++iteration)
@@ -65,7 +65,8 @@ TEST(Subsurface, HalfSpaceReflectsWhatChandrasekharFound) {
   const PatchScene patch = make_patch({8, std::vector<float>(64, 0.3f)}, Vec3(1));
   const Vec3 albedo(0.5f, 0.9f, 0.99f);
   SubsurfaceReport walks;
-  const Transfer t = baked(patch.scene, patch.receivers, {40.0f * albedo, 40.0f * (1.0f - albedo), 0, 1}, 4096, 0, 1, &walks);
+  const Transfer t =
+      baked(patch.scene, patch.receivers, {40.0f * albedo, 40.0f * (1.0f - albedo), 0, 1}, 4096, 0, 1, &walks);
   ASSERT_EQ(t.channels, 3);
   EXPECT_EQ(walks.lost, 0);
   for (int c = 0; c < 3; ++c) {
@@ -83,7 +84,8 @@ TEST(Subsurface, HalfSpaceReflectsWhatChandrasekharFound) {
     EXPECT_NEAR(mean, 2 * (1 - std::sqrt(1 - double(albedo[c]))) / double(albedo[c]), 1e-5);
     RecordProperty("diffuse" + std::to_string(c), std::to_string(diffuse));
     const auto of_channel = mean_zonal(t, patch.receivers, c);
-    for (size_t l = 0; l < 6; ++l) EXPECT_NEAR(of_channel[l], exact[l], 0.002) << c << " " << l;  // 262,144 walks: 0.001 RMS or less
+    for (size_t l = 0; l < 6; ++l)
+      EXPECT_NEAR(of_channel[l], exact[l], 0.002) << c << " " << l;  // 262,144 walks: 0.001 RMS or less
   }
 }
 
@@ -98,7 +100,8 @@ TEST(Subsurface, ClosedBodiesWithoutAbsorptionGiveBackEvenLight) {
     size_t apart = 0;
     for (size_t r = 0; r < receivers.count(); ++r) apart += std::abs(load_receiver(t, r)[0] * even - 1) > 1e-5;
     EXPECT_LE(apart, size_t(walks.lost * 32 * double(receivers.count()) + 0.5));
-    // The mean chord of a convex body is 4 V / S, whatever scatters in it; a walk has an event for each free path, and its last.
+    // The mean chord of a convex body is 4 V / S, whatever scatters in it; a walk has an event for each free path, and
+    // its last.
     EXPECT_NEAR(walks.events, 5 * 4.0 / 3 + 1, 0.15);
   }
   // A boundary mirrors some of it on the outside: the mean of Fresnel's reflectance over the cosine, 9.18% for 1.5.
@@ -113,7 +116,8 @@ TEST(Subsurface, ClosedBodiesWithoutAbsorptionGiveBackEvenLight) {
 }
 
 // Photons from one direction into a sphere of the unit radius by its equation, counted where they leave.
-std::array<double, 6> forward_sphere(double sigma_s, double sigma_a, double g, double eta, int photons, double* inward) {
+std::array<double, 6> forward_sphere(double sigma_s, double sigma_a, double g, double eta, int photons,
+                                     double* inward) {
   std::array<double, 6> sum{};
   Random random(77);
   auto uniform = [&] { return double(random.next64() >> 11) * 0x1p-53; };
@@ -122,27 +126,33 @@ std::array<double, 6> forward_sphere(double sigma_s, double sigma_a, double g, d
     const double radius = std::sqrt(uniform()), turn = 2 * std::numbers::pi * uniform();
     glm::dvec3 p(radius * std::cos(turn), radius * std::sin(turn), std::sqrt(1 - radius * radius)), d(0, 0, -1);
     const double cosine = p.z, inside = std::sqrt(1 - (1 - cosine * cosine) / (eta * eta));
-    const double rs = (cosine - eta * inside) / (cosine + eta * inside), rp = (eta * cosine - inside) / (eta * cosine + inside);
+    const double rs = (cosine - eta * inside) / (cosine + eta * inside),
+                 rp = (eta * cosine - inside) / (eta * cosine + inside);
     if (uniform() < (rs * rs + rp * rp) / 2) continue;
     ++taken;
     d = glm::normalize(d / eta + (cosine / eta - inside) * p);
     while (true) {
-      const double along = glm::dot(p, d), to_wall = -along + std::sqrt(std::max(0.0, along * along + 1 - glm::dot(p, p)));
+      const double along = glm::dot(p, d),
+                   to_wall = -along + std::sqrt(std::max(0.0, along * along + 1 - glm::dot(p, p)));
       const double flight = -std::log(1 - uniform()) / (sigma_s + sigma_a);
       if (flight < to_wall) {
         p += flight * d;
         if (uniform() * (sigma_s + sigma_a) > sigma_s) break;
         // Henyey and Greenstein's cosine by its inverse, and a spin about d.
-        const double q = (1 - g * g) / (1 - g + 2 * g * uniform()), c = (1 + g * g - q * q) / (2 * g), a = 2 * std::numbers::pi * uniform();
-        const glm::dvec3 u = glm::normalize(glm::cross(d, std::abs(d.x) > 0.5 ? glm::dvec3(0, 1, 0) : glm::dvec3(1, 0, 0)));
-        d = glm::normalize(c * d + std::sqrt(std::max(0.0, 1 - c * c)) * (std::cos(a) * u + std::sin(a) * glm::cross(d, u)));
+        const double q = (1 - g * g) / (1 - g + 2 * g * uniform()), c = (1 + g * g - q * q) / (2 * g),
+                     a = 2 * std::numbers::pi * uniform();
+        const glm::dvec3 u =
+            glm::normalize(glm::cross(d, std::abs(d.x) > 0.5 ? glm::dvec3(0, 1, 0) : glm::dvec3(1, 0, 0)));
+        d = glm::normalize(c * d +
+                           std::sqrt(std::max(0.0, 1 - c * c)) * (std::cos(a) * u + std::sin(a) * glm::cross(d, u)));
         continue;
       }
       p = glm::normalize(p + to_wall * d);
       const double ci = glm::dot(d, p), s2 = (1 - ci * ci) * eta * eta;
       double reflects = 1;
       if (s2 < 1) {
-        const double ct = std::sqrt(1 - s2), a = (eta * ci - ct) / (eta * ci + ct), b = (ci - eta * ct) / (ci + eta * ct);
+        const double ct = std::sqrt(1 - s2), a = (eta * ci - ct) / (eta * ci + ct),
+                     b = (ci - eta * ct) / (ci + eta * ct);
         reflects = (a * a + b * b) / 2;
       }
       if (uniform() < reflects) {
@@ -159,15 +169,16 @@ std::array<double, 6> forward_sphere(double sigma_s, double sigma_a, double g, d
 }
 
 TEST(Subsurface, WalksBackwardsAgreeWithWalksForwards) {
-  // By symmetry transfer is zonal about the normal, and its value for light at an angle from it is how much leaves at that angle
-  // from the light.
+  // By symmetry transfer is zonal about the normal, and its value for light at an angle from it is how much leaves at
+  // that angle from the light.
   const Scene sphere = make_sphere(1, 4, Vec3(1));
   const Receivers receivers = make_vertex_receivers(sphere);
   double inward = 0;
   const auto forward = forward_sphere(4, 0.3, 0.6, 1.4, 400000, &inward);
   const Transfer t = baked(sphere, receivers, {Vec3(4), Vec3(0.3f), 0.6f, 1.4f}, 128);
   const auto backward = mean_zonal(t, receivers);
-  for (size_t l = 0; l < 6; ++l) EXPECT_NEAR(backward[l], forward[l], 0.004) << l;  // noise of either 0.001; facets 1/500
+  for (size_t l = 0; l < 6; ++l)
+    EXPECT_NEAR(backward[l], forward[l], 0.004) << l;  // noise of either 0.001; facets 1/500
   EXPECT_GT(inward, 0.85);
   EXPECT_LT(forward[1], 0.9 * forward[0]);  // light comes out behind as well
   // The other way of scattering is another result, so that g's sign is held.
@@ -182,7 +193,8 @@ TEST(Subsurface, WhatComesOutMayEnterAgain) {
   const Receivers receivers = make_vertex_receivers(scene);
   double last = 0;
   for (int bounces : {0, 1, 8}) {
-    const double mean = mean_zonal(baked(scene, receivers, {Vec3(5), Vec3(0), 0, 1}, 64, bounces), receivers)[0] * std::sqrt(4 * std::numbers::pi);
+    const double mean = mean_zonal(baked(scene, receivers, {Vec3(5), Vec3(0), 0, 1}, 64, bounces), receivers)[0] *
+                        std::sqrt(4 * std::numbers::pi);
     EXPECT_GT(mean, last + 1e-3);
     last = mean;
   }
@@ -212,7 +224,9 @@ TEST(Subsurface, EndsWhateverItIsGiven) {
   baked(patch.scene, patch.receivers, {Vec3(0), Vec3(0), 0, 1}, 2, 0, 1, &walks);  // straight down for ever
   EXPECT_EQ(walks.lost, 1);
   auto tracer = Tracer::build(quad);
-  auto fails = [&](BakeOptions options, const SubsurfaceOptions& medium) { return !bake_subsurface(quad, *tracer, receivers, options, medium); };
+  auto fails = [&](BakeOptions options, const SubsurfaceOptions& medium) {
+    return !bake_subsurface(quad, *tracer, receivers, options, medium);
+  };
   EXPECT_TRUE(fails({.order = 0}, {}));
   EXPECT_TRUE(fails({.lobes = {{}}}, {}));
   EXPECT_TRUE(fails({.samples = 0}, {}));
@@ -236,9 +250,29 @@ TEST(Subsurface, ReadsMedia) {
   EXPECT_NEAR(m->sigma_s.x, 21.9f, 1e-5f);
   EXPECT_EQ(m->eta, 1.5f);
   EXPECT_NEAR(parse_medium("ketchup")->sigma_a.z, 1450, 1e-2);
-  for (const char* bad : {"", "jelly", "marble:", "marble:0", "marble:-1", "marble:nan", "marble:1,2", "marble:1e9", "sigma_s=1", "sigma_a=1", "sigma_s=,sigma_a=1",
-                          "sigma_s=1,2,sigma_a=1", "sigma_s=1sigma_a=1", "sigma_s=1,sigma_a=1,", "sigma_s=1,sigma_a=-1", "sigma_s=1,sigma_a=inf",
-                          "sigma_s=1,sigma_a=1,g=1", "sigma_s=1,sigma_a=1,eta=0", "sigma_s=1,sigma_a=1,mu=3", "=1", "=", "sigma_s=1,=,=", "sigma_s==1"})
+  for (const char* bad : {"",
+                          "jelly",
+                          "marble:",
+                          "marble:0",
+                          "marble:-1",
+                          "marble:nan",
+                          "marble:1,2",
+                          "marble:1e9",
+                          "sigma_s=1",
+                          "sigma_a=1",
+                          "sigma_s=,sigma_a=1",
+                          "sigma_s=1,2,sigma_a=1",
+                          "sigma_s=1sigma_a=1",
+                          "sigma_s=1,sigma_a=1,",
+                          "sigma_s=1,sigma_a=-1",
+                          "sigma_s=1,sigma_a=inf",
+                          "sigma_s=1,sigma_a=1,g=1",
+                          "sigma_s=1,sigma_a=1,eta=0",
+                          "sigma_s=1,sigma_a=1,mu=3",
+                          "=1",
+                          "=",
+                          "sigma_s=1,=,=",
+                          "sigma_s==1"})
     EXPECT_FALSE(parse_medium(bad)) << bad;
 }
 

@@ -1,4 +1,5 @@
-// Follows: radiosity, "Bilinear Basis Function" (every tent that reaches the surface takes part), so a texel may stand for any point of its tent.
+// Follows: radiosity, "Bilinear Basis Function" (every tent that reaches the surface takes part), so a texel may stand
+// for any point of its tent.
 #include <lambent/bake/gather.h>
 #include <lambent/bake/unbury.h>
 #include <lambent/core/parallel.h>
@@ -10,8 +11,8 @@ namespace lambent {
 namespace {
 
 constexpr size_t rays = 64;
-// Half sides of squares about the centre, in texels, on which points are tried, in `turns` directions; then the gap to the last one is
-// halved. Points beyond the surface's border stand for the nearest on it, as texel centres do.
+// Half sides of squares about the centre, in texels, on which points are tried, in `turns` directions; then the gap to
+// the last one is halved. Points beyond the surface's border stand for the nearest on it, as texel centres do.
 constexpr float radii[] = {0.3f, 0.6f, 0.99f};
 constexpr int turns = 8, halvings = 3;
 

@@ -19,9 +19,11 @@ struct Lit {
     const auto& basis = std::get<TexelReceivers>(receivers.basis);
     for (uint32_t i = 0; i < scene.parts[0].triangle_count; ++i) {
       const Triangle& t = scene.triangles[i];
-      const Vec3 a = scene.positions[t.v[0]], ab = scene.positions[t.v[1]] - a, ac = scene.positions[t.v[2]] - a, ap = Vec3(x, 0, z) - a;
+      const Vec3 a = scene.positions[t.v[0]], ab = scene.positions[t.v[1]] - a, ac = scene.positions[t.v[2]] - a,
+                 ap = Vec3(x, 0, z) - a;
       if (std::max({std::abs(a.y), std::abs(ab.y), std::abs(ac.y)}) > 1e-6f) continue;
-      const float area = ab.x * ac.z - ab.z * ac.x, u = (ap.x * ac.z - ap.z * ac.x) / area, v = (ab.x * ap.z - ab.z * ap.x) / area;
+      const float area = ab.x * ac.z - ab.z * ac.x, u = (ap.x * ac.z - ap.z * ac.x) / area,
+                  v = (ab.x * ap.z - ab.z * ap.x) / area;
       if (u < -1e-5f || v < -1e-5f || u + v > 1 + 1e-5f) continue;
       Vec3 sum(0);
       basis.spread(*basis.find(i, true), u, v, [&](uint32_t r, float w) { sum += w * relit.at(r); });
@@ -41,7 +43,8 @@ Lit bake_texels(Scene scene, const Environment* sky, float density, bool move, i
   if (move) l.moved = move_buried_texels(l.scene, *tracer, *atlas, l.receivers);
   LightmapReport report;
   auto map = bake_lightmap(l.scene, *tracer, l.receivers, make_lamps(l.scene, sky, false),
-                           {.samples = 1024, .lamp_samples = 128, .bounces = bounces, .precision = Precision::single}, false, &report);
+                           {.samples = 1024, .lamp_samples = 128, .bounces = bounces, .precision = Precision::single},
+                           false, &report);
   EXPECT_TRUE(map) << (map ? "" : map.error().text());
   relight(map->all, std::vector<Vec3>{Vec3(1)}, l.relit);
   l.buried = report.buried;
@@ -49,7 +52,8 @@ Lit bake_texels(Scene scene, const Environment* sky, float density, bool move, i
 }
 
 TEST(MoveBuriedTexels, NoRimWhereABoxStands) {
-  // A box on a floor under a sky, its walls anywhere between texel centres. Along its foot the floor is as the path tracer has it.
+  // A box on a floor under a sky, its walls anywhere between texel centres. Along its foot the floor is as the path
+  // tracer has it.
   Scene scene;
   const uint32_t grey = add_material(scene, "grey", Vec3(0.5f)), dark = add_material(scene, "dark", Vec3(0));
   add_quad(scene, grey, "floor", Vec3(-2, 0, -2), Vec3(0, 0, 4), Vec3(4, 0, 0), 1, 1);
@@ -78,7 +82,8 @@ TEST(MoveBuriedTexels, NoRimWhereABoxStands) {
     rms[move] = std::sqrt(rms[move]);
     RecordProperty(move ? "moved" : "filled", std::to_string(rms[move]) + ", worst " + std::to_string(worst[move]));
   }
-  // Half of the sky is seen from there: 0.5. Texels a quarter wide bridge what changes within a few hundredths of a unit.
+  // Half of the sky is seen from there: 0.5. Texels a quarter wide bridge what changes within a few hundredths of a
+  // unit.
   EXPECT_LT(rms[1], 0.035) << "filled: " << rms[0];
   EXPECT_LT(worst[1], 0.12) << "filled: " << worst[0];
   EXPECT_LT(rms[1], 0.4 * rms[0]);
@@ -99,8 +104,8 @@ TEST(MoveBuriedTexels, NothingLeaksAcrossAWall) {
     for (float x : {-0.22f, -0.3f, -0.5f, -1.0f}) brightest = std::max(brightest, lit.at(x, z).x);
     darkest = std::min(darkest, lit.at(0.32f, z).x);
   }
-  // In the wall's far corners most rays meet fronts, of the room's own faces there: such texels do not pass for buried, and gather what
-  // their neighbours were filled with.
+  // In the wall's far corners most rays meet fronts, of the room's own faces there: such texels do not pass for buried,
+  // and gather what their neighbours were filled with.
   EXPECT_LT(brightest, 0.03f * darkest);
   EXPECT_GT(darkest, 0.1f);  // and no dark rim on the other
 }

@@ -29,7 +29,8 @@ struct VisibilityTracer {
     s.levels.assign(cube.count(), 0), s.texels.clear(), s.x.clear(), s.y.clear(), s.z.clear();
     const DirectionArray& d = cube.texels;
     for (size_t t = 0; t < cube.count(); ++t)
-      if (n.x * d.x[t] + n.y * d.y[t] + n.z * d.z[t] > 0) s.texels.push_back(t), s.x.push_back(d.x[t]), s.y.push_back(d.y[t]), s.z.push_back(d.z[t]);
+      if (n.x * d.x[t] + n.y * d.y[t] + n.z * d.z[t] > 0)
+        s.texels.push_back(t), s.x.push_back(d.x[t]), s.y.push_back(d.y[t]), s.z.push_back(d.z[t]);
     s.seen.resize(s.texels.size());
     tracer.visible_fan(origin, {s.x.data(), s.y.data(), s.z.data(), s.texels.size()}, s.seen.data());
     for (size_t i = 0; i < s.texels.size(); ++i) s.levels[s.texels[i]] = s.seen[i] > 0;
@@ -50,11 +51,13 @@ struct VisibilityTracer {
           if (!(glm::dot(n, cube.texels.at(texel)) > 0)) continue;
           bool edge = false;
           for (int j = std::max(row - 1, 0); j <= std::min(row + 1, size - 1); ++j)
-            for (int i = std::max(column - 1, 0); i <= std::min(column + 1, size - 1); ++i) edge |= centres[cube_texel(size, face, i, j)] != centres[texel];
+            for (int i = std::max(column - 1, 0); i <= std::min(column + 1, size - 1); ++i)
+              edge |= centres[cube_texel(size, face, i, j)] != centres[texel];
           if (!edge) continue;
           s.x.clear(), s.y.clear(), s.z.clear();
           for (int k = 0; k < fine * fine; ++k) {
-            const float u = float(column) + (float(k % fine) + 0.5f) / fine, v = float(row) + (float(k / fine) + 0.5f) / fine;
+            const float u = float(column) + (float(k % fine) + 0.5f) / fine,
+                        v = float(row) + (float(k / fine) + 0.5f) / fine;
             const Vec3 d = glm::normalize(cube_point(face, 2 * u / float(size) - 1, 2 * v / float(size) - 1));
             if (glm::dot(n, d) > 0) s.x.push_back(d.x), s.y.push_back(d.y), s.z.push_back(d.z);
           }
@@ -72,17 +75,19 @@ struct VisibilityTracer {
 }  // namespace
 
 size_t expected_visibility_bytes(size_t receivers, const VisibilityOptions& options) {
-  // The paper's scenes come to 500 to 1,400 bytes a vertex on a cube of 64; runs grow with its side, flags with its area.
+  // The paper's scenes come to 500 to 1,400 bytes a vertex on a cube of 64; runs grow with its side, flags with its
+  // area.
   const size_t scale = size_t(options.size) * size_t(options.size) / 4096 + 1;
   return receivers * (700 * scale * (options.bits > 1 ? 2 : 1) + sizeof(uint64_t));
 }
 
-Result<Visibility> bake_visibility(const Tracer& tracer, const Receivers& receivers, const VisibilityOptions& options, VisibilityReport* report,
-                                   Progress* progress) {
+Result<Visibility> bake_visibility(const Tracer& tracer, const Receivers& receivers, const VisibilityOptions& options,
+                                   VisibilityReport* report, Progress* progress) {
   LAMBENT_CHECK(is_cube_size(options.size) && options.bits >= 1 && options.bits <= max_visibility_bits);
   const size_t expected = expected_visibility_bytes(receivers.count(), options);
   if (expected > options.memory)
-    return Error{"", "the visibility of " + std::to_string(receivers.count()) + " receivers may take " + std::to_string(expected >> 20) +
+    return Error{"", "the visibility of " + std::to_string(receivers.count()) + " receivers may take " +
+                         std::to_string(expected >> 20) +
                          " MiB, more than --memory allows; take a smaller --cube or fewer vertices"};
   const auto start = std::chrono::steady_clock::now();
   const VisibilityTracer work{tracer, options};
@@ -111,7 +116,8 @@ Result<Visibility> bake_visibility(const Tracer& tracer, const Receivers& receiv
     if (stage.cancelled()) return Error{"", "cancelled"};
   }
   Visibility v = make_visibility(options.size, options.bits, std::move(pieces), lengths);
-  if (report) *report = {rays, v.bytes(), std::chrono::duration<double>(std::chrono::steady_clock::now() - start).count()};
+  if (report)
+    *report = {rays, v.bytes(), std::chrono::duration<double>(std::chrono::steady_clock::now() - start).count()};
   return v;
 }
 

@@ -1,5 +1,6 @@
 #pragma once
-// Scene -> Visibility: what each receiver sees, by one ray a texel of its hemisphere. Source: locally-adaptive-products, section 4.2.
+// Scene -> Visibility: what each receiver sees, by one ray a texel of its hemisphere. Source:
+// locally-adaptive-products, section 4.2.
 #include <lambent/core/progress.h>
 #include <lambent/receivers/receivers.h>
 #include <lambent/trace/tracer.h>
@@ -9,8 +10,8 @@ namespace lambent {
 
 struct VisibilityOptions {
   int size = 64;  // of the cube
-  // 1: binary. More: the share of a texel that is seen, in 2^bits levels, from one ray at the centre and, where a texel's neighbours
-  // disagree with it, 8 x 8 in place of that one.
+  // 1: binary. More: the share of a texel that is seen, in 2^bits levels, from one ray at the centre and, where a
+  // texel's neighbours disagree with it, 8 x 8 in place of that one.
   int bits = 1;
   size_t memory = size_t{4} << 30;  // bytes that the result may take, by an estimate made before it starts
 };
@@ -23,8 +24,9 @@ struct VisibilityReport {
 // Bytes that so many receivers are expected to take, from what scenes full of small shadows do.
 size_t expected_visibility_bytes(size_t receivers, const VisibilityOptions& options);
 
-// Errors: too large for memory, said before the first ray; cancelled. The uncompressed visibility of one receiver a thread is in memory.
-Result<Visibility> bake_visibility(const Tracer& tracer, const Receivers& receivers, const VisibilityOptions& options, VisibilityReport* report = nullptr,
-                                   Progress* progress = nullptr);
+// Errors: too large for memory, said before the first ray; cancelled. The uncompressed visibility of one receiver a
+// thread is in memory.
+Result<Visibility> bake_visibility(const Tracer& tracer, const Receivers& receivers, const VisibilityOptions& options,
+                                   VisibilityReport* report = nullptr, Progress* progress = nullptr);
 
 }  // namespace lambent

@@ -65,7 +65,8 @@ TEST(BakeVisibility, SharesAreMeansOfAFinerMap) {
       for (int row = 0; row < 16; ++row)
         for (int column = 0; column < 16; ++column) {
           const float u = 2 * (float(column) + 0.5f) / 16 - 1, v = 2 * (float(row) + 0.5f) / 16 - 1;
-          if (glm::dot(n, glm::normalize(cube_point(face, u, v))) < 0.15f) continue;  // across the horizon they differ by definition
+          if (glm::dot(n, glm::normalize(cube_point(face, u, v))) < 0.15f)
+            continue;  // across the horizon they differ by definition
           int sum = 0;
           for (int k = 0; k < 64; ++k) sum += levels[cube_texel(128, face, column * 8 + k % 8, row * 8 + k / 8)];
           const double share = shares[cube_texel(16, face, column, row)] / 63.0;

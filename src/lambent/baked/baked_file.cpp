@@ -36,17 +36,22 @@ Result<int> read_rows(const json& transfer, const std::string& where) {
 
 Result<LightBasis> read_light(const json& object, const std::string& where) {
   LightBasis light;
-  if (!object.contains("basis") || object["basis"] != "sh") return Error{where, "the light basis is not known to this program"};
+  if (!object.contains("basis") || object["basis"] != "sh")
+    return Error{where, "the light basis is not known to this program"};
   auto order = read_count(object, "order", size_t(max_sh_order), where);
   if (!order) return order.error();
   light.order = int(*order);
   if (const auto lobes = object.find("lobes"); lobes != object.end()) {
-    if (!lobes->is_array() || lobes->size() > max_columns) return Error{where, "\"lobes\" is not a list, or too long a one"};
-    const auto kind = std::find_if(lobe_names.begin(), lobe_names.end(), [&](const auto& k) { return object.contains("lobeKind") && object["lobeKind"] == k.second; });
+    if (!lobes->is_array() || lobes->size() > max_columns)
+      return Error{where, "\"lobes\" is not a list, or too long a one"};
+    const auto kind = std::find_if(lobe_names.begin(), lobe_names.end(), [&](const auto& k) {
+      return object.contains("lobeKind") && object["lobeKind"] == k.second;
+    });
     if (kind == lobe_names.end()) return Error{where, "the kind of lobes is not known to this program"};
     light.lobe_kind = kind->first;
     for (const json& l : *lobes) {
-      if (!l.is_array() || l.size() != 4 || !std::all_of(l.begin(), l.end(), [](const json& x) { return x.is_number(); }))
+      if (!l.is_array() || l.size() != 4 ||
+          !std::all_of(l.begin(), l.end(), [](const json& x) { return x.is_number(); }))
         return Error{where, "a lobe is not four numbers"};
       const Lobe lobe{{l[0].get<float>(), l[1].get<float>(), l[2].get<float>()}, l[3].get<float>()};
       if (!is_lobe(light.lobe_kind, lobe)) return Error{where, "a lobe has no unit axis, or a sharpness out of range"};
@@ -54,7 +59,8 @@ Result<LightBasis> read_light(const json& object, const std::string& where) {
     }
   }
   if (const auto groups = object.find("groups"); groups != object.end()) {
-    if (!groups->is_array() || groups->size() > max_columns || !std::all_of(groups->begin(), groups->end(), [](const json& x) { return x.is_string(); }))
+    if (!groups->is_array() || groups->size() > max_columns ||
+        !std::all_of(groups->begin(), groups->end(), [](const json& x) { return x.is_string(); }))
       return Error{where, "\"groups\" is not a list of names, or too long a one"};
     light.groups = groups->get<std::vector<std::string>>();
   }
@@ -66,7 +72,8 @@ Result<LightBasis> read_light(const json& object, const std::string& where) {
 Result<std::span<const uint8_t>> view_bytes(const GltfChunks& chunks, size_t index, const std::string& where) {
   const json& document = chunks.json;
   const std::string place = where + ": buffer view " + std::to_string(index);
-  if (!document.contains("bufferViews") || !document["bufferViews"].is_array() || index >= document["bufferViews"].size())
+  if (!document.contains("bufferViews") || !document["bufferViews"].is_array() ||
+      index >= document["bufferViews"].size())
     return Error{place, "does not exist"};
   const json& view = document["bufferViews"][index];
   auto buffer = read_count(view, "buffer", 0, place);
@@ -84,23 +91,26 @@ Result<std::span<const uint8_t>> view_bytes(const GltfChunks& chunks, size_t ind
 
 // Values of type T, exactly `count`, that member `key` names.
 template <class T>
-Result<std::vector<T>> read_values(const GltfChunks& chunks, const json& object, const char* key, size_t count, const std::string& where) {
+Result<std::vector<T>> read_values(const GltfChunks& chunks, const json& object, const char* key, size_t count,
+                                   const std::string& where) {
   auto index = read_count(object, key, 0x7fffffff, where);
   if (!index) return index.error();
   auto bytes = view_bytes(chunks, *index, where);
   if (!bytes) return bytes.error();
   if (bytes->size() / sizeof(T) != count || bytes->size() % sizeof(T))
-    return Error{where, std::string("\"") + key + "\" holds " + std::to_string(bytes->size()) + " bytes where " + std::to_string(count * sizeof(T)) +
-                            " are due"};
+    return Error{where, std::string("\"") + key + "\" holds " + std::to_string(bytes->size()) + " bytes where " +
+                            std::to_string(count * sizeof(T)) + " are due"};
   std::vector<T> values(count);
   if (count) std::memcpy(static_cast<void*>(values.data()), bytes->data(), bytes->size());
   return values;
 }
 
-Result<Outgoing> read_outgoing(const GltfChunks& chunks, const json& object, int rows, size_t receivers, const std::string& where) {
+Result<Outgoing> read_outgoing(const GltfChunks& chunks, const json& object, int rows, size_t receivers,
+                               const std::string& where) {
   if (!object.is_object()) return Error{where, "is not an object"};
   Outgoing o;
-  const auto kind = std::find_if(std::begin(outgoing_names), std::end(outgoing_names), [&](const char* name) { return object.contains("kind") && object["kind"] == name; });
+  const auto kind = std::find_if(std::begin(outgoing_names), std::end(outgoing_names),
+                                 [&](const char* name) { return object.contains("kind") && object["kind"] == name; });
   if (kind == std::end(outgoing_names)) return Error{where, "the outgoing basis is not known to this program"};
   o.kind = OutgoingKind(kind - std::begin(outgoing_names));
   auto order = read_count(object, "order", size_t(max_sh_order), where);
@@ -137,7 +147,8 @@ Result<Outgoing> read_outgoing(const GltfChunks& chunks, const json& object, int
   if (!frames) return frames.error();
   for (size_t r = 0; r < receivers; ++r) {
     const Vec3 t = (*frames)[2 * r], n = (*frames)[2 * r + 1];
-    if (!is_finite(t) || !is_finite(n) || glm::dot(t, t) > 2 || glm::dot(n, n) > 2) return Error{where, "a receiver's frame is broken"};
+    if (!is_finite(t) || !is_finite(n) || glm::dot(t, t) > 2 || glm::dot(n, n) > 2)
+      return Error{where, "a receiver's frame is broken"};
     o.frames.push_back(Mat3(t, glm::cross(n, t), n));
   }
   if (o.rows() != rows) return Error{where, "\"rows\" does not fit the outgoing basis"};
@@ -146,10 +157,12 @@ Result<Outgoing> read_outgoing(const GltfChunks& chunks, const json& object, int
 
 // Precision, channels and the bulk data of a transfer whose light, rows and receivers are set.
 template <class T>
-Result<void> read_transfer_data(const GltfChunks& chunks, const MappedFile& file, const json& object, T& t, const std::string& where) {
+Result<void> read_transfer_data(const GltfChunks& chunks, const MappedFile& file, const json& object, T& t,
+                                const std::string& where) {
   const auto precision = object.find("precision");
   const bool half = precision != object.end() && *precision == "half";
-  if (!half && (precision == object.end() || *precision != "single")) return Error{where, "\"precision\" must be half or single"};
+  if (!half && (precision == object.end() || *precision != "single"))
+    return Error{where, "\"precision\" must be half or single"};
   auto channels = read_count(object, "channels", 3, where), view = read_count(object, "bufferView", 0x7fffffff, where);
   for (const auto* count : {&channels, &view})
     if (!*count) return count->error();
@@ -158,7 +171,8 @@ Result<void> read_transfer_data(const GltfChunks& chunks, const MappedFile& file
   auto data = view_bytes(chunks, *view, where);
   if (!data) return data.error();
   if (data->size() != t.bytes())
-    return Error{where, "the transfer holds " + std::to_string(data->size()) + " bytes where its header makes " + std::to_string(t.bytes())};
+    return Error{where, "the transfer holds " + std::to_string(data->size()) + " bytes where its header makes " +
+                            std::to_string(t.bytes())};
   if (reinterpret_cast<uintptr_t>(data->data()) % t.value_bytes()) return Error{where, "the transfer is not aligned"};
   t.data = *data;
   t.storage = std::make_shared<MappedFile>(file);
@@ -168,7 +182,8 @@ Result<void> read_transfer_data(const GltfChunks& chunks, const MappedFile& file
 // Light, rows and receivers are set.
 Result<void> read_cpca(const GltfChunks& chunks, const json& transfer, CpcaTransfer& c, const std::string& where) {
   const json& object = transfer["cpca"];
-  auto clusters = read_count(object, "clusters", size_t(max_cpca_clusters), where), rank = read_count(object, "rank", size_t(max_cpca_rank), where);
+  auto clusters = read_count(object, "clusters", size_t(max_cpca_clusters), where),
+       rank = read_count(object, "rank", size_t(max_cpca_rank), where);
   auto channels = read_count(transfer, "channels", 3, where);
   for (const auto* count : {&clusters, &rank, &channels})
     if (!*count) return count->error();
@@ -176,7 +191,8 @@ Result<void> read_cpca(const GltfChunks& chunks, const json& transfer, CpcaTrans
   if (*channels != 1 && *channels != 3) return Error{where, "\"channels\" is out of range"};
   c.clusters = int(*clusters), c.rank = int(*rank), c.channels = int(*channels);
   if (c.receivers > chunks.binary.size() / 2) return Error{where, "there is no room for so many receivers"};
-  auto vectors = read_values<float>(chunks, transfer, "bufferView", *clusters * (1 + *rank) * c.receiver_values(), where);
+  auto vectors =
+      read_values<float>(chunks, transfer, "bufferView", *clusters * (1 + *rank) * c.receiver_values(), where);
   if (!vectors) return vectors.error();
   for (float v : *vectors)
     if (!std::isfinite(v)) return Error{where, "a cluster's vector is not finite"};
@@ -194,8 +210,10 @@ Result<void> read_cpca(const GltfChunks& chunks, const json& transfer, CpcaTrans
 Result<std::vector<float>> read_numbers(const json& object, const char* key, size_t count, const std::string& where) {
   const auto list = object.find(key);
   const auto fits = [](const json& x) { return x.is_number() && std::abs(x.get<double>()) <= 1e9; };
-  if (list == object.end() || !list->is_array() || list->size() != count || !std::all_of(list->begin(), list->end(), fits))
-    return Error{where, "\"" + std::string(key) + "\" is not a list of " + std::to_string(count) + " numbers within 1e9"};
+  if (list == object.end() || !list->is_array() || list->size() != count ||
+      !std::all_of(list->begin(), list->end(), fits))
+    return Error{where,
+                 "\"" + std::string(key) + "\" is not a list of " + std::to_string(count) + " numbers within 1e9"};
   return list->get<std::vector<float>>();
 }
 
@@ -205,13 +223,15 @@ Result<FixedView> read_view(const GltfChunks& chunks, const json& object, size_t
   auto width = read_count(object, "width", 1 << 16, where), height = read_count(object, "height", 1 << 16, where);
   for (const auto* count : {&width, &height})
     if (!*count) return count->error();
-  if (*width < 1 || *height < 1 || *width * *height != receivers) return Error{where, "has not as many pixels as there are receivers"};
+  if (*width < 1 || *height < 1 || *width * *height != receivers)
+    return Error{where, "has not as many pixels as there are receivers"};
   view.width = int(*width), view.height = int(*height);
   auto eye = read_numbers(object, "eye", 3, where), target = read_numbers(object, "target", 3, where);
   for (const auto* list : {&eye, &target})
     if (!*list) return list->error();
   const auto fov = object.find("fov");
-  if (fov == object.end() || !fov->is_number() || !(fov->get<double>() > 0 && fov->get<double>() < 180)) return Error{where, "\"fov\" is out of range"};
+  if (fov == object.end() || !fov->is_number() || !(fov->get<double>() > 0 && fov->get<double>() < 180))
+    return Error{where, "\"fov\" is out of range"};
   view.camera.eye = {(*eye)[0], (*eye)[1], (*eye)[2]}, view.camera.target = {(*target)[0], (*target)[1], (*target)[2]};
   view.camera.fov = fov->get<float>();
   auto coverage = read_values<float>(chunks, object, "coverage", receivers, where);
@@ -222,14 +242,18 @@ Result<FixedView> read_view(const GltfChunks& chunks, const json& object, size_t
   return view;
 }
 
-Result<Visibility> read_visibility(const GltfChunks& chunks, const MappedFile& file, const json& object, const std::string& where) {
+Result<Visibility> read_visibility(const GltfChunks& chunks, const MappedFile& file, const json& object,
+                                   const std::string& where) {
   Visibility v;
-  auto size = read_count(object, "cube", size_t(max_cube_size), where), bits = read_count(object, "bits", size_t(max_visibility_bits), where),
-       receivers = read_count(object, "receivers", 0xfffffffe, where), data = read_count(object, "bufferView", 0x7fffffff, where),
+  auto size = read_count(object, "cube", size_t(max_cube_size), where),
+       bits = read_count(object, "bits", size_t(max_visibility_bits), where),
+       receivers = read_count(object, "receivers", 0xfffffffe, where),
+       data = read_count(object, "bufferView", 0x7fffffff, where),
        lengths = read_count(object, "lengths", 0x7fffffff, where);
   for (const auto* count : {&size, &bits, &receivers, &data, &lengths})
     if (!*count) return count->error();
-  if (!is_cube_size(int(*size))) return Error{where, "\"cube\" must be a multiple of 16 up to " + std::to_string(max_cube_size)};
+  if (!is_cube_size(int(*size)))
+    return Error{where, "\"cube\" must be a multiple of 16 up to " + std::to_string(max_cube_size)};
   if (*bits < 1) return Error{where, "\"bits\" is 0"};
   auto records = view_bytes(chunks, *data, where), numbers = view_bytes(chunks, *lengths, where);
   if (!records) return records.error();
@@ -240,7 +264,8 @@ Result<Visibility> read_visibility(const GltfChunks& chunks, const MappedFile& f
   size_t at = 0;
   for (size_t r = 0; r < *receivers; ++r) {
     uint64_t length = 0;
-    if (!read_varint(*numbers, at, length) || length > records->size() - v.begin.back()) return Error{where, "the length of receiver " + std::to_string(r) + " is broken"};
+    if (!read_varint(*numbers, at, length) || length > records->size() - v.begin.back())
+      return Error{where, "the length of receiver " + std::to_string(r) + " is broken"};
     v.begin.push_back(v.begin.back() + length);
   }
   if (at != numbers->size()) return Error{where, "there are more lengths than receivers"};
@@ -249,7 +274,8 @@ Result<Visibility> read_visibility(const GltfChunks& chunks, const MappedFile& f
   return v;
 }
 
-Result<LatticeTransfer> read_lattice(const GltfChunks& chunks, const MappedFile& file, const json& object, const LightBasis& light, const std::string& where) {
+Result<LatticeTransfer> read_lattice(const GltfChunks& chunks, const MappedFile& file, const json& object,
+                                     const LightBasis& light, const std::string& where) {
   if (!object.is_object()) return Error{where, "is not an object"};
   LatticeTransfer l;
   auto min = read_numbers(object, "min", 3, where), max = read_numbers(object, "max", 3, where);
@@ -259,7 +285,8 @@ Result<LatticeTransfer> read_lattice(const GltfChunks& chunks, const MappedFile&
   for (int k = 0; k < 3; ++k)
     if (l.lattice.min[k] > l.lattice.max[k]) return Error{where, "its box is empty"};
   const auto points = object.find("points");
-  if (points == object.end() || !points->is_array() || points->size() != 3) return Error{where, "\"points\" is not three numbers"};
+  if (points == object.end() || !points->is_array() || points->size() != 3)
+    return Error{where, "\"points\" is not three numbers"};
   for (size_t k = 0; k < 3; ++k) {
     const json& n = (*points)[k];
     if (!n.is_number_unsigned() || n.get<uint64_t>() < 1 || n.get<uint64_t>() > uint64_t(max_lattice_points))
@@ -278,8 +305,8 @@ Result<LatticeTransfer> read_lattice(const GltfChunks& chunks, const MappedFile&
   return l;
 }
 
-Result<std::vector<uint32_t>> read_receivers(const GltfChunks& chunks, const json& object, const char* key, size_t count, size_t receivers,
-                                             const std::string& where) {
+Result<std::vector<uint32_t>> read_receivers(const GltfChunks& chunks, const json& object, const char* key,
+                                             size_t count, size_t receivers, const std::string& where) {
   auto map = read_values<uint32_t>(chunks, object, key, count, where);
   if (!map) return map.error();
   for (uint32_t r : *map)
@@ -301,8 +328,10 @@ struct SurfaceReader {
     const auto surface = extension.find("surface");
     if (surface != extension.end()) {
       if (!surface->is_object() || !surface->contains("kind")) return Error{where, "\"surface\" has no kind"};
-      const auto name = std::find_if(std::begin(surface_kind_names), std::end(surface_kind_names), [&](const char* n) { return (*surface)["kind"] == n; });
-      if (name == std::end(surface_kind_names)) return Error{where, "receivers of this kind are not known to this program"};
+      const auto name = std::find_if(std::begin(surface_kind_names), std::end(surface_kind_names),
+                                     [&](const char* n) { return (*surface)["kind"] == n; });
+      if (name == std::end(surface_kind_names))
+        return Error{where, "receivers of this kind are not known to this program"};
       kind = SurfaceKind(name - std::begin(surface_kind_names));
     }
     if (kind == SurfaceKind::texels) {
@@ -318,7 +347,9 @@ struct SurfaceReader {
     else front.assign(elements(), none);
     return {};
   }
-  size_t elements() const { return kind == SurfaceKind::patches ? baked.scene.triangles.size() : baked.scene.positions.size(); }
+  size_t elements() const {
+    return kind == SurfaceKind::patches ? baked.scene.triangles.size() : baked.scene.positions.size();
+  }
 
   Result<void> read_part(const json& entry, const Part& part, const std::string& where) {
     const size_t first = kind == SurfaceKind::patches ? part.first_triangle : part.first_vertex;
@@ -330,7 +361,8 @@ struct SurfaceReader {
         auto at = read_values<Vec2>(chunks, entry, side, count, where);
         if (!at) return at.error();
         for (Vec2 p : *at)
-          if (!(p.x >= 0 && p.x <= float(width) && p.y >= 0 && p.y <= float(height))) return Error{where, "a place lies outside the atlas"};
+          if (!(p.x >= 0 && p.x <= float(width) && p.y >= 0 && p.y <= float(height)))
+            return Error{where, "a place lies outside the atlas"};
         if (is_back && back_at.empty()) back_at.assign(elements(), Vec2(0));
         std::copy(at->begin(), at->end(), (is_back ? back_at : front_at).begin() + ptrdiff_t(first));
       } else {
@@ -387,10 +419,14 @@ Result<Baked> load_baked(const MappedFile& file, const std::string& path) {
   Baked baked;
   const auto t = extension.find("transfer");
   if (t == extension.end() || !t->is_object()) return Error{where, "\"transfer\" is missing"};
-  auto text = [&](const char* key) { return t->contains(key) && (*t)[key].is_string() ? (*t)[key].get<std::string>() : ""; };
+  auto text = [&](const char* key) {
+    return t->contains(key) && (*t)[key].is_string() ? (*t)[key].get<std::string>() : "";
+  };
   baked.factors = text("kind") == "factors";
-  const bool is_matrix = text("kind") == "matrix" || baked.factors, is_zonal = text("kind") == "zonal", is_blocks = text("kind") == "blocks";
-  if (!is_matrix && !is_zonal && !is_blocks && text("kind") != "diffuse") return Error{where, "transfer of kind \"" + text("kind") + "\" is not known to this program"};
+  const bool is_matrix = text("kind") == "matrix" || baked.factors, is_zonal = text("kind") == "zonal",
+             is_blocks = text("kind") == "blocks";
+  if (!is_matrix && !is_zonal && !is_blocks && text("kind") != "diffuse")
+    return Error{where, "transfer of kind \"" + text("kind") + "\" is not known to this program"};
   auto light = is_blocks ? Result<LightBasis>(LightBasis{}) : read_light(*t, where);
   if (!light) return light.error();
   auto receivers = read_count(*t, "receivers", 0xfffffffe, where);
@@ -399,7 +435,8 @@ Result<Baked> load_baked(const MappedFile& file, const std::string& path) {
     const auto kind = directional_kind(text("directional"));
     if (!kind) return Error{where, "directional light \"" + text("directional") + "\" is not known to this program"};
     baked.directional = *kind;
-    if (text("kind") != "diffuse" && *kind != DirectionalKind::none) return Error{where, "directional light is of diffuse transfer alone"};
+    if (text("kind") != "diffuse" && *kind != DirectionalKind::none)
+      return Error{where, "directional light is of diffuse transfer alone"};
   }
   if (is_blocks) {
     if (extension.contains("surface")) return Error{where, "visibility in blocks is baked at vertices"};
@@ -411,7 +448,8 @@ Result<Baked> load_baked(const MappedFile& file, const std::string& path) {
     auto lobes = read_count(*t, "lobeCount", size_t(max_stored_lobes), where);
     if (!lobes) return lobes.error();
     if (*lobes < 1) return Error{where, "there are no lobes"};
-    if (light->order < 1 || light->count() != size_t(sh_count(light->order))) return Error{where, "zonal transfer is of spherical harmonics alone"};
+    if (light->order < 1 || light->count() != size_t(sh_count(light->order)))
+      return Error{where, "zonal transfer is of spherical harmonics alone"};
     ZonalTransfer& zonal = baked.zonal.emplace();
     zonal.order = light->order, zonal.lobes = int(*lobes), zonal.receivers = *receivers;
     if (t->contains("outgoing")) {
@@ -456,8 +494,11 @@ Result<Baked> load_baked(const MappedFile& file, const std::string& path) {
       }
       auto outgoing = read_outgoing(*chunks, (*t)["outgoing"], rows, *receivers, where + ": outgoing");
       if (!outgoing) return outgoing.error();
-      if (baked.factors && (outgoing->kind != OutgoingKind::map || baked.transfer.light.order < outgoing->order || baked.transfer.channels != 1))
-        return Error{where, "visibility as a factor has too few bands, or a last reflection of another kind, or more than one channel"};
+      if (baked.factors && (outgoing->kind != OutgoingKind::map || baked.transfer.light.order < outgoing->order ||
+                            baked.transfer.channels != 1))
+        return Error{
+            where,
+            "visibility as a factor has too few bands, or a last reflection of another kind, or more than one channel"};
       baked.outgoing = std::move(*outgoing);
     }
   }
@@ -472,9 +513,11 @@ Result<Baked> load_baked(const MappedFile& file, const std::string& path) {
   if (!scene) return scene.error();
   baked.scene = std::move(*scene);
   const auto provenance = extension.find("provenance");
-  baked.provenance = provenance == extension.end() ? "{}" : provenance->dump(-1, ' ', false, json::error_handler_t::replace);
+  baked.provenance = provenance == extension.end() ? "{}"
+                                                   : provenance->dump(-1, ' ', false, json::error_handler_t::replace);
   if (const auto object = extension.find("view"); object != extension.end()) {
-    if (is_zonal || is_matrix || is_blocks || baked.directional != DirectionalKind::none) return Error{where, "a fixed view has one row a pixel"};
+    if (is_zonal || is_matrix || is_blocks || baked.directional != DirectionalKind::none)
+      return Error{where, "a fixed view has one row a pixel"};
     auto view = read_view(*chunks, *object, *receivers, where + ": view");
     if (!view) return view.error();
     baked.view = std::move(*view);
@@ -486,14 +529,16 @@ Result<Baked> load_baked(const MappedFile& file, const std::string& path) {
   if (parts == extension.end() || !parts->is_array()) return Error{where, "\"parts\" is missing"};
   std::map<std::pair<size_t, size_t>, const json*> by_place;
   for (const json& part : *parts) {
-    auto node = read_count(part, "node", 0x7fffffff, where), primitive = read_count(part, "primitive", 0x7fffffff, where);
+    auto node = read_count(part, "node", 0x7fffffff, where),
+         primitive = read_count(part, "primitive", 0x7fffffff, where);
     if (!node) return node.error();
     if (!primitive) return primitive.error();
     by_place[{*node, *primitive}] = &part;
   }
   for (const Part& part : baked.scene.parts) {
     const auto entry = by_place.find({size_t(part.node), size_t(part.primitive)});
-    const std::string place = where + ": node " + std::to_string(part.node) + ", primitive " + std::to_string(part.primitive);
+    const std::string place = where + ": node " + std::to_string(part.node) + ", primitive " +
+                              std::to_string(part.primitive);
     if (entry == by_place.end()) return Error{place, "has no receivers"};
     if (auto ok = surface.read_part(*entry->second, part, place); !ok) return ok.error();
   }

@@ -24,14 +24,16 @@ void write_light(json& object, const LightBasis& light) {
   if (!light.lobes.empty()) {
     json lobes = json::array();
     for (const Lobe& l : light.lobes) lobes.push_back({l.axis.x, l.axis.y, l.axis.z, l.sharpness});
-    object["lobeKind"] = std::find_if(lobe_names.begin(), lobe_names.end(), [&](const auto& k) { return k.first == light.lobe_kind; })->second;
+    object["lobeKind"] = std::find_if(lobe_names.begin(), lobe_names.end(), [&](const auto& k) {
+                           return k.first == light.lobe_kind;
+                         })->second;
     object["lobes"] = std::move(lobes);
   }
   if (!light.groups.empty()) object["groups"] = light.groups;
 }
 
-// The last reflection as bulk data: view maps as halves [map][y][x][row][a.r, a.g, a.b, b]; by receiver, the map and a frame's
-// tangent and normal.
+// The last reflection as bulk data: view maps as halves [map][y][x][row][a.r, a.g, a.b, b]; by receiver, the map and a
+// frame's tangent and normal.
 struct OutgoingBlobs {
   std::vector<uint16_t> maps, map_of;
   std::vector<Vec3> frames;
@@ -67,20 +69,22 @@ std::vector<std::vector<uint8_t>> side_bytes(const Scene& scene, const Receivers
     if (side.empty()) return out;
     std::vector<uint32_t> map(side.size());
     for (size_t i = 0; i < side.size(); ++i) map[i] = side[i].receiver;
-    for (const Part& part : scene.parts) copy(std::span<const uint32_t>(map).subspan(part.first_triangle, part.triangle_count));
+    for (const Part& part : scene.parts)
+      copy(std::span<const uint32_t>(map).subspan(part.first_triangle, part.triangle_count));
   } else {
     const auto& map = back ? receivers.back : receivers.front;
     if (map.empty()) return out;
-    for (const Part& part : scene.parts) copy(std::span<const uint32_t>(map).subspan(part.first_vertex, part.vertex_count));
+    for (const Part& part : scene.parts)
+      copy(std::span<const uint32_t>(map).subspan(part.first_vertex, part.vertex_count));
   }
   return out;
 }
 
-// What all kinds share: bulk data first, then the maps of receivers, then `more`. `describe` makes the kind's header, the extension's
-// "transfer", and what else the extension has; it is given the first of `more`'s views.
-Result<void> save(const std::string& path, const Scene& scene, const Receivers& receivers, std::span<const uint8_t> data,
-                  const std::vector<GltfBlob>& more, const ViewerLook* look, const std::string& provenance,
-                  const std::function<void(json& extension, int first_more)>& describe) {
+// What all kinds share: bulk data first, then the maps of receivers, then `more`. `describe` makes the kind's header,
+// the extension's "transfer", and what else the extension has; it is given the first of `more`'s views.
+Result<void> save(const std::string& path, const Scene& scene, const Receivers& receivers,
+                  std::span<const uint8_t> data, const std::vector<GltfBlob>& more, const ViewerLook* look,
+                  const std::string& provenance, const std::function<void(json& extension, int first_more)>& describe) {
   const auto front = side_bytes(scene, receivers, false), back = side_bytes(scene, receivers, true);
   const auto* texels = std::get_if<TexelReceivers>(&receivers.basis);
   std::vector<GltfBlob> blobs{{data, 64}};
@@ -99,13 +103,17 @@ Result<void> save(const std::string& path, const Scene& scene, const Receivers& 
     extension["transfer"]["bufferView"] = places.first_view;
     json parts = json::array();
     for (size_t i = 0; i < front.size(); ++i) {
-      json part{{"node", places.part_nodes[i]}, {"primitive", places.part_primitives[i]}, {"front", places.first_view + 1 + int(i)}};
+      json part{{"node", places.part_nodes[i]},
+                {"primitive", places.part_primitives[i]},
+                {"front", places.first_view + 1 + int(i)}};
       if (!back.empty()) part["back"] = places.first_view + 1 + int(front.size() + i);
       parts.push_back(std::move(part));
     }
     extension["parts"] = std::move(parts);
     if (texels) {
-      extension["surface"] = {{"kind", "texels"}, {"width", texels->width}, {"height", texels->height},
+      extension["surface"] = {{"kind", "texels"},
+                              {"width", texels->width},
+                              {"height", texels->height},
                               {"texels", places.first_view + int(texels_blob)}};
     } else if (std::holds_alternative<PatchReceivers>(receivers.basis)) {
       extension["surface"] = {{"kind", "patches"}};
@@ -121,7 +129,10 @@ Result<void> save(const std::string& path, const Scene& scene, const Receivers& 
 }
 
 json header(const char* kind, int channels, Precision precision, size_t receivers) {
-  return {{"kind", kind}, {"channels", channels}, {"precision", precision == Precision::half ? "half" : "single"}, {"receivers", receivers}};
+  return {{"kind", kind},
+          {"channels", channels},
+          {"precision", precision == Precision::half ? "half" : "single"},
+          {"receivers", receivers}};
 }
 
 // What the extras hold, as bulk data, and where it is told of in the extension.
@@ -132,10 +143,12 @@ class ExtrasWriter {
       last_ = outgoing_blobs(*o);
       blobs.push_back({bytes_of(std::span<const Vec3>(last_.frames)), 4});
       if (!last_.maps.empty())
-        blobs.push_back({bytes_of(std::span<const uint16_t>(last_.maps)), 4}), blobs.push_back({bytes_of(std::span<const uint16_t>(last_.map_of)), 4});
+        blobs.push_back({bytes_of(std::span<const uint16_t>(last_.maps)), 4}),
+            blobs.push_back({bytes_of(std::span<const uint16_t>(last_.map_of)), 4});
     }
     lattice_at_ = int(blobs.size());
-    if (extras.lattice) blobs.push_back({extras.lattice->transfer.data, 64}), blobs.push_back({extras.lattice->valid, 4});
+    if (extras.lattice)
+      blobs.push_back({extras.lattice->transfer.data, 64}), blobs.push_back({extras.lattice->valid, 4});
     view_at_ = int(blobs.size());
     if (extras.view) blobs.push_back({bytes_of(std::span<const float>(extras.view->coverage)), 4});
   }
@@ -152,7 +165,8 @@ class ExtrasWriter {
       if (outgoing->maps.empty()) {
         o["hasB"] = outgoing->has_b;
       } else {
-        o["grid"] = outgoing->maps[0].grid, o["mapCount"] = outgoing->maps.size(), o["maps"] = first + 1, o["mapOf"] = first + 2;
+        o["grid"] = outgoing->maps[0].grid, o["mapCount"] = outgoing->maps.size(), o["maps"] = first + 1,
+        o["mapOf"] = first + 2;
       }
     }
     if (const LatticeTransfer* lattice = extras_.lattice) {
@@ -168,8 +182,9 @@ class ExtrasWriter {
     }
     if (const FixedView* v = extras_.view) {
       const Vec3 e = v->camera.eye, at = v->camera.target;
-      extension["view"] = {{"width", v->width}, {"height", v->height}, {"eye", {e.x, e.y, e.z}}, {"target", {at.x, at.y, at.z}},
-                           {"fov", v->camera.fov}, {"coverage", first + view_at_}};
+      extension["view"] = {{"width", v->width},      {"height", v->height},
+                           {"eye", {e.x, e.y, e.z}}, {"target", {at.x, at.y, at.z}},
+                           {"fov", v->camera.fov},   {"coverage", first + view_at_}};
     }
   }
 
@@ -183,27 +198,31 @@ class ExtrasWriter {
 
 void check_extras(const BakedExtras& extras, const LightBasis& light, int rows) {
   const LatticeTransfer* lattice = extras.lattice;
-  LAMBENT_CHECK(!lattice || (lattice->transfer.columns() == light.count() && lattice->valid.size() == lattice->lattice.count()));
-  LAMBENT_CHECK(!extras.factors || (rows == 1 && extras.outgoing && extras.outgoing->kind == OutgoingKind::map && light.order >= extras.outgoing->order));
-  LAMBENT_CHECK(rows == (extras.outgoing && !extras.factors ? extras.outgoing->rows() : directional_rows(extras.directional)));
+  LAMBENT_CHECK(!lattice ||
+                (lattice->transfer.columns() == light.count() && lattice->valid.size() == lattice->lattice.count()));
+  LAMBENT_CHECK(!extras.factors || (rows == 1 && extras.outgoing && extras.outgoing->kind == OutgoingKind::map &&
+                                    light.order >= extras.outgoing->order));
+  LAMBENT_CHECK(rows ==
+                (extras.outgoing && !extras.factors ? extras.outgoing->rows() : directional_rows(extras.directional)));
 }
 
 }  // namespace
 
-Result<void> save_baked(const std::string& path, const Scene& scene, const Receivers& receivers, const Transfer& transfer,
-                        const std::string& provenance, const BakedExtras& extras) {
+Result<void> save_baked(const std::string& path, const Scene& scene, const Receivers& receivers,
+                        const Transfer& transfer, const std::string& provenance, const BakedExtras& extras) {
   check_extras(extras, transfer.light, transfer.rows);
   LAMBENT_CHECK(!extras.view || (extras.view->coverage.size() == transfer.receivers && !extras.outgoing));
   const ExtrasWriter more(extras);
-  return save(path, scene, receivers, transfer.data, more.blobs, extras.look, provenance, [&](json& extension, int first) {
-    extension["transfer"] = header(more.kind(), transfer.channels, transfer.precision, transfer.receivers);
-    write_light(extension["transfer"], transfer.light);
-    more.write(extension, transfer.rows, first);
-  });
+  return save(path, scene, receivers, transfer.data, more.blobs, extras.look, provenance,
+              [&](json& extension, int first) {
+                extension["transfer"] = header(more.kind(), transfer.channels, transfer.precision, transfer.receivers);
+                write_light(extension["transfer"], transfer.light);
+                more.write(extension, transfer.rows, first);
+              });
 }
 
-Result<void> save_baked(const std::string& path, const Scene& scene, const Receivers& receivers, const CpcaTransfer& transfer,
-                        const std::string& provenance, const BakedExtras& extras) {
+Result<void> save_baked(const std::string& path, const Scene& scene, const Receivers& receivers,
+                        const CpcaTransfer& transfer, const std::string& provenance, const BakedExtras& extras) {
   check_extras(extras, transfer.light, transfer.rows);
   LAMBENT_CHECK(!extras.view);
   const ExtrasWriter more(extras);
@@ -211,17 +230,21 @@ Result<void> save_baked(const std::string& path, const Scene& scene, const Recei
   blobs.push_back({bytes_of(std::span<const uint16_t>(transfer.cluster_of)), 4});
   blobs.push_back({bytes_of(std::span<const uint16_t>(transfer.weights)), 4});
   const int at = int(more.blobs.size());
-  return save(path, scene, receivers, bytes_of(std::span<const float>(transfer.vectors)), blobs, extras.look, provenance, [&](json& extension, int first) {
-    json& t = extension["transfer"] = header(more.kind(), transfer.channels, Precision::half, transfer.receivers);
-    write_light(t, transfer.light);
-    more.write(extension, transfer.rows, first);
-    t["cpca"] = {{"clusters", transfer.clusters}, {"rank", transfer.rank},
-                 {"clusterOf", first + at}, {"weights", first + at + 1}};
-  });
+  return save(path, scene, receivers, bytes_of(std::span<const float>(transfer.vectors)), blobs, extras.look,
+              provenance, [&](json& extension, int first) {
+                json& t = extension["transfer"] =
+                    header(more.kind(), transfer.channels, Precision::half, transfer.receivers);
+                write_light(t, transfer.light);
+                more.write(extension, transfer.rows, first);
+                t["cpca"] = {{"clusters", transfer.clusters},
+                             {"rank", transfer.rank},
+                             {"clusterOf", first + at},
+                             {"weights", first + at + 1}};
+              });
 }
 
-Result<void> save_baked(const std::string& path, const Scene& scene, const Receivers& receivers, const ZonalTransfer& transfer,
-                        const std::string& provenance, const BakedExtras& extras) {
+Result<void> save_baked(const std::string& path, const Scene& scene, const Receivers& receivers,
+                        const ZonalTransfer& transfer, const std::string& provenance, const BakedExtras& extras) {
   check_extras(extras, {.order = transfer.order}, transfer.rows);
   LAMBENT_CHECK(!extras.view && !extras.lattice && !extras.factors && extras.directional == DirectionalKind::none);
   LAMBENT_CHECK(extras.fit_errors.empty() || extras.fit_errors.size() == transfer.receivers);
@@ -238,14 +261,20 @@ Result<void> save_baked(const std::string& path, const Scene& scene, const Recei
   });
 }
 
-Result<void> save_baked(const std::string& path, const Scene& scene, const Receivers& receivers, const Visibility& visibility,
-                        const std::string& provenance) {
+Result<void> save_baked(const std::string& path, const Scene& scene, const Receivers& receivers,
+                        const Visibility& visibility, const std::string& provenance) {
   LAMBENT_CHECK(visibility.receivers == receivers.count());
   std::vector<uint8_t> lengths;
-  for (size_t r = 0; r < visibility.receivers; ++r) append_varint(lengths, visibility.begin[r + 1] - visibility.begin[r]);
-  return save(path, scene, receivers, visibility.data, {{lengths, 4}}, nullptr, provenance, [&](json& extension, int first) {
-    extension["transfer"] = {{"kind", "blocks"}, {"cube", visibility.size}, {"bits", visibility.bits}, {"receivers", visibility.receivers}, {"lengths", first}};
-  });
+  for (size_t r = 0; r < visibility.receivers; ++r)
+    append_varint(lengths, visibility.begin[r + 1] - visibility.begin[r]);
+  return save(path, scene, receivers, visibility.data, {{lengths, 4}}, nullptr, provenance,
+              [&](json& extension, int first) {
+                extension["transfer"] = {{"kind", "blocks"},
+                                         {"cube", visibility.size},
+                                         {"bits", visibility.bits},
+                                         {"receivers", visibility.receivers},
+                                         {"lengths", first}};
+              });
 }
 
 }  // namespace lambent

@@ -1,6 +1,6 @@
-// glTF 2.0 specification (ISO/IEC 12113); KHR_materials_emissive_strength, KHR_materials_specular. A lightmap is shown as the
-// emission of a black material without reflections: emission is core glTF, its strength goes beyond 1, and no viewer multiplies
-// it by lights of its own. (KHR_materials_unlit would end at 1 and escape tone mapping.)
+// glTF 2.0 specification (ISO/IEC 12113); KHR_materials_emissive_strength, KHR_materials_specular. A lightmap is shown
+// as the emission of a black material without reflections: emission is core glTF, its strength goes beyond 1, and no
+// viewer multiplies it by lights of its own. (KHR_materials_unlit would end at 1 and escape tone mapping.)
 #include <lambent/baked/viewer_look.h>
 
 #include <algorithm>
@@ -26,11 +26,14 @@ void use_extension(json& document, const char* name) {
 }
 
 template <class T>
-std::span<const uint8_t> bytes_of(const std::vector<T>& v) { return {reinterpret_cast<const uint8_t*>(v.data()), v.size() * sizeof(T)}; }
+std::span<const uint8_t> bytes_of(const std::vector<T>& v) {
+  return {reinterpret_cast<const uint8_t*>(v.data()), v.size() * sizeof(T)};
+}
 
 }  // namespace
 
-LookWriter::LookWriter(const Scene& scene, const Receivers& receivers, const ViewerLook* look) : scene_(scene), look_(look) {
+LookWriter::LookWriter(const Scene& scene, const Receivers& receivers, const ViewerLook* look)
+    : scene_(scene), look_(look) {
   const auto* texels = std::get_if<TexelReceivers>(&receivers.basis);
   if (!texels) look_ = nullptr;
   if (!look_) return;
@@ -60,18 +63,22 @@ void LookWriter::add_blobs(std::vector<GltfBlob>& blobs) {
     if (!side.indices.empty()) blobs.push_back({bytes_of(side.at), 4}), blobs.push_back({bytes_of(side.indices), 4});
 }
 
-// A copy of the material that glows with the texture; lamps with their own emission, which, of those with a texture, is in ours.
+// A copy of the material that glows with the texture; lamps with their own emission, which, of those with a texture, is
+// in ours.
 size_t LookWriter::lit_material(json& document, const json& original, size_t texture) const {
-  json lit = {{"pbrMetallicRoughness", {{"baseColorFactor", {0, 0, 0, 1}}, {"metallicFactor", 0}, {"roughnessFactor", 1}}},
-              {"doubleSided", false}};
+  json lit = {
+      {"pbrMetallicRoughness", {{"baseColorFactor", {0, 0, 0, 1}}, {"metallicFactor", 0}, {"roughnessFactor", 1}}},
+      {"doubleSided", false}};
   json& extensions = lit["extensions"];
   extensions["KHR_materials_specular"] = {{"specularFactor", 0}};
   use_extension(document, "KHR_materials_specular"), use_extension(document, "KHR_materials_emissive_strength");
   const auto name = original.find("name");
   lit["name"] = (name != original.end() && name->is_string() ? name->get<std::string>() : "surface") + " with lightmap";
   double own[3] = {0, 0, 0};
-  if (original.contains("emissiveFactor") && original["emissiveFactor"].is_array() && original["emissiveFactor"].size() == 3)
-    for (size_t c = 0; c < 3; ++c) own[c] = original["emissiveFactor"][c].is_number() ? original["emissiveFactor"][c].get<double>() : 0;
+  if (original.contains("emissiveFactor") && original["emissiveFactor"].is_array() &&
+      original["emissiveFactor"].size() == 3)
+    for (size_t c = 0; c < 3; ++c)
+      own[c] = original["emissiveFactor"][c].is_number() ? original["emissiveFactor"][c].get<double>() : 0;
   if ((own[0] > 0 || own[1] > 0 || own[2] > 0) && !original.contains("emissiveTexture")) {
     lit["emissiveFactor"] = original["emissiveFactor"];
     const json none = json::object();
@@ -97,14 +104,17 @@ void LookWriter::write(json& document, const GltfPlaces& places) const {
     mesh["primitives"] = std::move(kept);
   }
   const int first_view = places.first_view + int(first_blob_);
-  const size_t image = push(document, "images", {{"bufferView", first_view}, {"mimeType", "image/png"}, {"name", "lightmap"}});
-  const size_t sampler = push(document, "samplers", {{"magFilter", 9729}, {"minFilter", 9729}, {"wrapS", 33071}, {"wrapT", 33071}});
+  const size_t image =
+      push(document, "images", {{"bufferView", first_view}, {"mimeType", "image/png"}, {"name", "lightmap"}});
+  const size_t sampler =
+      push(document, "samplers", {{"magFilter", 9729}, {"minFilter", 9729}, {"wrapS", 33071}, {"wrapT", 33071}});
   const size_t texture = push(document, "textures", {{"source", image}, {"sampler", sampler}});
   std::optional<size_t> plain;  // what primitives without a material have, spelt out
   std::map<size_t, size_t> lit;
   int view = first_view + 1 + int(fronts_.size());  // of the backs
   auto places_accessor = [&](int buffer_view, size_t count) {
-    return push(document, "accessors", {{"bufferView", buffer_view}, {"componentType", 5126}, {"count", count}, {"type", "VEC2"}});
+    return push(document, "accessors",
+                {{"bufferView", buffer_view}, {"componentType", 5126}, {"count", count}, {"type", "VEC2"}});
   };
   for (size_t p = 0; p < scene_.parts.size(); ++p) {
     const Part& part = scene_.parts[p];
@@ -112,7 +122,9 @@ void LookWriter::write(json& document, const GltfPlaces& places) const {
     json& mesh = document["meshes"][document["nodes"][size_t(places.part_nodes[p])]["mesh"].get<size_t>()];
     json& primitive = mesh["primitives"][size_t(places.part_primitives[p])];
     // Baked before, or fresh; our loader takes this material, and leaves out the primitives of backs.
-    const json& holder = primitive.contains("extensions") && primitive["extensions"].contains("LAMBENT_transfer") ? primitive["extensions"]["LAMBENT_transfer"] : primitive;
+    const json& holder = primitive.contains("extensions") && primitive["extensions"].contains("LAMBENT_transfer")
+                           ? primitive["extensions"]["LAMBENT_transfer"]
+                           : primitive;
     const char* key = &holder == &primitive ? "material" : "ownMaterial";
     if (!holder.contains(key) && !plain) plain = push(document, "materials", {{"name", "default"}});
     const size_t original = holder.contains(key) ? holder[key].get<size_t>() : *plain;
@@ -125,10 +137,14 @@ void LookWriter::write(json& document, const GltfPlaces& places) const {
     if (!primitive["attributes"].contains("TEXCOORD_0")) primitive["attributes"]["TEXCOORD_0"] = front;
     if (backs_[p].indices.empty()) continue;
     const size_t at = places_accessor(view, part.vertex_count);
-    const size_t indices = push(document, "accessors", {{"bufferView", view + 1}, {"componentType", 5125}, {"count", backs_[p].indices.size()}, {"type", "SCALAR"}});
+    const size_t indices = push(
+        document, "accessors",
+        {{"bufferView", view + 1}, {"componentType", 5125}, {"count", backs_[p].indices.size()}, {"type", "SCALAR"}});
     view += 2;
-    json back = {{"attributes", {{"POSITION", primitive["attributes"]["POSITION"]}, {"TEXCOORD_0", at}, {"TEXCOORD_1", at}}},
-                 {"indices", indices}, {"material", material->second}};
+    json back = {
+        {"attributes", {{"POSITION", primitive["attributes"]["POSITION"]}, {"TEXCOORD_0", at}, {"TEXCOORD_1", at}}},
+        {"indices", indices},
+        {"material", material->second}};
     back["extensions"]["LAMBENT_transfer"] = {{"viewerOnly", true}};
     mesh["primitives"].push_back(std::move(back));
   }

@@ -5,7 +5,8 @@
 
 namespace lambent {
 
-// For save_glb: appends its blobs after the caller's, then edits the document. Does nothing without a look or without texels.
+// For save_glb: appends its blobs after the caller's, then edits the document. Does nothing without a look or without
+// texels.
 class LookWriter {
  public:
   LookWriter(const Scene& scene, const Receivers& receivers, const ViewerLook* look);

@@ -9,8 +9,8 @@ CosineBasis make_cosine_basis(int order) {
   CosineBasis basis;
   basis.order = order;
   const size_t n = size_t(sh_count(order));
-  // The Gram matrix of the harmonics under cos / pi; y_i y_j z has at most 2 order - 1 bands, and on the hemisphere parts of odd
-  // azimuthal frequency vanish.
+  // The Gram matrix of the harmonics under cos / pi; y_i y_j z has at most 2 order - 1 bands, and on the hemisphere
+  // parts of odd azimuthal frequency vanish.
   std::vector<double> gram(n * n, 0.0), y(n);
   for (const DirectionNode& node : direction_quadrature(2 * order + 2, 0, 1)) {
     evaluate_sh(order, node.direction, y);

@@ -1,10 +1,10 @@
 #pragma once
-// The incident basis {z_j} of transfer matrices (general-prt, "Basic idea"): functions on the hemisphere z >= 0 that span the
-// spherical harmonics of some order there and are orthonormal under the cosine measure of reflection,
+// The incident basis {z_j} of transfer matrices (general-prt, "Basic idea"): functions on the hemisphere z >= 0 that
+// span the spherical harmonics of some order there and are orthonormal under the cosine measure of reflection,
 //   1/pi * integral over z >= 0 of z_i z_j cos = delta_ij,
-// made by Gram and Schmidt in the harmonics' order, so z_0 = 1. A reflectance f(wi, wo) enters radiance as the integral of
-// f L cos; with X_j = 1/pi * integral of z_j L cos and O_j = integral of f z_j cos it is sum_j O_j X_j, exactly so wherever f or L
-// lies in the span. For Lambert's law O = (albedo, 0, 0, ...): diffuse transfer is the one-row case.
+// made by Gram and Schmidt in the harmonics' order, so z_0 = 1. A reflectance f(wi, wo) enters radiance as the integral
+// of f L cos; with X_j = 1/pi * integral of z_j L cos and O_j = integral of f z_j cos it is sum_j O_j X_j, exactly so
+// wherever f or L lies in the span. For Lambert's law O = (albedo, 0, 0, ...): diffuse transfer is the one-row case.
 #include <lambent/basis/sh.h>
 
 namespace lambent {

@@ -22,7 +22,8 @@ TEST(CosineBasis, IsOrthonormalUnderTheCosine) {
       for (size_t a = 0; a < n; ++a)
         for (size_t b = 0; b < n; ++b) gram[a * n + b] += double(z[a]) * z[b] * 2 * h / (rings * spokes);
     }
-  // The midpoint rule's error: the second derivative, some thousands for polynomials of degree 8 up to 10 at the horizon, over 24 rings^2.
+  // The midpoint rule's error: the second derivative, some thousands for polynomials of degree 8 up to 10 at the
+  // horizon, over 24 rings^2.
   for (size_t a = 0; a < n; ++a)
     for (size_t b = 0; b < n; ++b) EXPECT_NEAR(gram[a * n + b], a == b ? 1.0 : 0.0, 2e-4) << a << " " << b;
 }
@@ -40,7 +41,8 @@ TEST(CosineBasis, BeginsWithOneAndGoesBackToHarmonics) {
       EXPECT_NEAR(z[0], 1, 1e-6);
       for (size_t k = 0; k < n; ++k) {
         double sum = 0, size = 0;
-        for (size_t j = 0; j <= k; ++j) sum += basis.to_sh[k * n + j] * z[j], size += std::abs(basis.to_sh[k * n + j] * z[j]);
+        for (size_t j = 0; j <= k; ++j)
+          sum += basis.to_sh[k * n + j] * z[j], size += std::abs(basis.to_sh[k * n + j] * z[j]);
         EXPECT_NEAR(sum, y[k], 1e-5 * (1 + size));  // float rounding of the values summed
       }
     }

@@ -19,7 +19,8 @@ Vec3 cube_point(int face, float u, float v) {
 
 CubePlace cube_place(Vec3 d) {
   const Vec3 a = glm::abs(d);
-  if (a.x >= a.y && a.x >= a.z) return d.x > 0 ? CubePlace{0, -d.z / a.x, -d.y / a.x} : CubePlace{1, d.z / a.x, -d.y / a.x};
+  if (a.x >= a.y && a.x >= a.z)
+    return d.x > 0 ? CubePlace{0, -d.z / a.x, -d.y / a.x} : CubePlace{1, d.z / a.x, -d.y / a.x};
   if (a.y >= a.z) return d.y > 0 ? CubePlace{2, d.x / a.y, d.z / a.y} : CubePlace{3, d.x / a.y, -d.z / a.y};
   return d.z > 0 ? CubePlace{4, d.x / a.z, -d.y / a.z} : CubePlace{5, -d.x / a.z, -d.y / a.z};
 }
@@ -27,7 +28,8 @@ CubePlace cube_place(Vec3 d) {
 double cube_solid_angle(int size, int column, int row) {
   // Of the rectangle from the face's middle to (u, v).
   auto corner = [](double u, double v) { return std::atan2(u * v, std::sqrt(u * u + v * v + 1)); };
-  const double u0 = 2.0 * column / size - 1, u1 = 2.0 * (column + 1) / size - 1, v0 = 2.0 * row / size - 1, v1 = 2.0 * (row + 1) / size - 1;
+  const double u0 = 2.0 * column / size - 1, u1 = 2.0 * (column + 1) / size - 1, v0 = 2.0 * row / size - 1,
+               v1 = 2.0 * (row + 1) / size - 1;
   return corner(u1, v1) - corner(u0, v1) - corner(u1, v0) + corner(u0, v0);
 }
 
@@ -40,12 +42,16 @@ Cube make_cube(int size) {
   for (int face = 0; face < 6; ++face)
     for (int block = 0; block < side * side; ++block) {
       const float column = float(block % side * block_side), row = float(block / side * block_side);
-      auto direction = [&](float x, float y) { return glm::normalize(cube_point(face, coordinate(column + x), coordinate(row + y))); };
-      for (int t = 0; t < block_texels; ++t) cube.texels.push(direction(float(t % block_side) + 0.5f, float(t / block_side) + 0.5f));
+      auto direction = [&](float x, float y) {
+        return glm::normalize(cube_point(face, coordinate(column + x), coordinate(row + y)));
+      };
+      for (int t = 0; t < block_texels; ++t)
+        cube.texels.push(direction(float(t % block_side) + 0.5f, float(t / block_side) + 0.5f));
       for (int k = 0; k < 3; ++k) {
         const int n = node_sides[k];
         const float step = float(block_side) / float(n);
-        for (int i = 0; i < n * n; ++i) cube.nodes[size_t(k)].push(direction((float(i % n) + 0.5f) * step, (float(i / n) + 0.5f) * step));
+        for (int i = 0; i < n * n; ++i)
+          cube.nodes[size_t(k)].push(direction((float(i % n) + 0.5f) * step, (float(i / n) + 0.5f) * step));
       }
       const Vec3 middle = cube.nodes[0].at(cube.reach.size());
       float least = 1;

@@ -1,8 +1,9 @@
 #pragma once
-// The sphere of directions as the six faces of a cube, each cut in blocks of 16 x 16 texels. Source: locally-adaptive-products, section 4.
+// The sphere of directions as the six faces of a cube, each cut in blocks of 16 x 16 texels. Source:
+// locally-adaptive-products, section 4.
 //
-// Faces are +X -X +Y -Y +Z -Z; on each, u grows along its columns and v along its rows, both over [-1, 1]. Texels are stored
-// [block][row][column], blocks [face][block row][block column], so that a block is a run of 256.
+// Faces are +X -X +Y -Y +Z -Z; on each, u grows along its columns and v along its rows, both over [-1, 1]. Texels are
+// stored [block][row][column], blocks [face][block row][block column], so that a block is a run of 256.
 #include <lambent/core/aligned.h>
 #include <lambent/core/vec.h>
 
@@ -24,7 +25,8 @@ constexpr size_t cube_texel(int size, int face, int column, int row) {
   return size_t(block) * block_texels + size_t(row % block_side * block_side + column % block_side);
 }
 
-// The point of the cube's surface at (u, v) of a face, not of unit length; and the face and (u, v) that a direction meets.
+// The point of the cube's surface at (u, v) of a face, not of unit length; and the face and (u, v) that a direction
+// meets.
 Vec3 cube_point(int face, float u, float v);
 struct CubePlace {
   int face;
@@ -51,8 +53,8 @@ struct Cube {
   std::array<DirectionArray, 3> nodes;  // [block][row][column] for 1, 2 and 4 a side
   std::vector<float> reach;             // by block: angle from its middle to its farthest corner, radians
   float widest = 0;                     // of these
-  // Cardinal functions of the nodes along one side, [node][texel]: 1 at their own node, 0 at others, sums of as many cosines
-  // cos(pi k (x + 1/2) / 16) (the DCT's) as there are nodes. eq. 4, solved once.
+  // Cardinal functions of the nodes along one side, [node][texel]: 1 at their own node, 0 at others, sums of as many
+  // cosines cos(pi k (x + 1/2) / 16) (the DCT's) as there are nodes. eq. 4, solved once.
   std::array<std::vector<float>, 3> cardinal;
 
   int blocks() const { return cube_blocks(size); }

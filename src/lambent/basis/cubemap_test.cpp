@@ -56,7 +56,8 @@ TEST(Cubemap, BlocksHoldTheirTexels) {
           EXPECT_EQ(p.face, face);
           EXPECT_NEAR((p.u + 1) / 2 * float(size), float(column) + 0.5f, 1e-3f);
           EXPECT_NEAR((p.v + 1) / 2 * float(size), float(row) + 0.5f, 1e-3f);
-          EXPECT_LE(std::acos(glm::dot(cube.texels.at(t), cube.nodes[0].at(t / block_texels))), cube.reach[t / block_texels]);
+          EXPECT_LE(std::acos(glm::dot(cube.texels.at(t), cube.nodes[0].at(t / block_texels))),
+                    cube.reach[t / block_texels]);
         }
     for (int n : seen) EXPECT_EQ(n, 1);
   }
@@ -70,7 +71,9 @@ TEST(Cubemap, CardinalFunctionsInterpolateCosines) {
     for (int u = 0; u < n; ++u)
       for (int x = 0; x < block_side; ++x) {
         double sum = 0;
-        for (int i = 0; i < n; ++i) sum += std::cos(std::numbers::pi * u * (i + 0.5) / n) * double(cube.cardinal[size_t(k)][size_t(i * block_side + x)]);
+        for (int i = 0; i < n; ++i)
+          sum += std::cos(std::numbers::pi * u * (i + 0.5) / n) *
+                 double(cube.cardinal[size_t(k)][size_t(i * block_side + x)]);
         EXPECT_NEAR(sum, std::cos(std::numbers::pi * u * (x + 0.5) / block_side), 1e-6);
       }
   }

@@ -1,6 +1,6 @@
-// Follows: general-prt (directional and custom bases). A lobe g(cos t) has Legendre moments I_l = integral over [-1, 1] of g P_l;
-// then (Funk-Hecke) the integral of y_lm against the lobe about a is 2 pi I_l y_lm(a), and that of two lobes at an angle c is
-// pi sum_l (2l+1) I_l I'_l P_l(cos c).
+// Follows: general-prt (directional and custom bases). A lobe g(cos t) has Legendre moments I_l = integral over [-1, 1]
+// of g P_l; then (Funk-Hecke) the integral of y_lm against the lobe about a is 2 pi I_l y_lm(a), and that of two lobes
+// at an angle c is pi sum_l (2l+1) I_l I'_l P_l(cos c).
 #include <lambent/basis/directional.h>
 #include <lambent/basis/pseudo_inverse.h>
 #include <lambent/basis/quadrature.h>
@@ -9,7 +9,8 @@
 namespace lambent {
 
 bool is_lobe(LobeKind kind, const Lobe& lobe) {
-  return std::abs(glm::length(lobe.axis) - 1) < 1e-4f && lobe.sharpness >= min_sharpness(kind) && lobe.sharpness <= max_sharpness;
+  return std::abs(glm::length(lobe.axis) - 1) < 1e-4f && lobe.sharpness >= min_sharpness(kind) &&
+         lobe.sharpness <= max_sharpness;
 }
 
 double lobe_value(LobeKind kind, double s, double cosine) {
@@ -18,13 +19,14 @@ double lobe_value(LobeKind kind, double s, double cosine) {
 
 double lobe_scale(LobeKind kind, double s) {
   const double two_pi = 2 * std::numbers::pi;
-  return kind == LobeKind::cosine_power ? std::sqrt((2 * s + 1) / two_pi) : std::sqrt(2 * s / (two_pi * -std::expm1(-4 * s)));
+  return kind == LobeKind::cosine_power ? std::sqrt((2 * s + 1) / two_pi)
+                                        : std::sqrt(2 * s / (two_pi * -std::expm1(-4 * s)));
 }
 
 namespace {
 
-// Terms of the sum over l for two cosine lobes. Those of the broadest, s = 1, fall as l^-4 and leave 1e-9; those of sharp ones fall
-// as exp(-l^2 / s).
+// Terms of the sum over l for two cosine lobes. Those of the broadest, s = 1, fall as l^-4 and leave 1e-9; those of
+// sharp ones fall as exp(-l^2 / s).
 int moments_needed(float sharpest) { return 640 + int(6 * std::sqrt(sharpest)); }
 
 // A float's rounding of a unit axis would show in sharp lobes.
@@ -57,12 +59,15 @@ std::vector<double> moments(LobeKind kind, double s, int count) {
 }
 
 // The integral of the product of two unscaled lobes.
-double lobe_product(LobeKind kind, const Lobe& p, const Lobe& q, std::span<const double> Ip, std::span<const double> Iq) {
+double lobe_product(LobeKind kind, const Lobe& p, const Lobe& q, std::span<const double> Ip,
+                    std::span<const double> Iq) {
   const glm::dvec3 a = axis_of(p), b = axis_of(q);
   if (kind == LobeKind::von_mises_fisher) {
     // exp((s a + s' b).d - s - s') is a lobe about the sum.
-    const double sum = double(p.sharpness) + q.sharpness, k = glm::length(double(p.sharpness) * a + double(q.sharpness) * b);
-    return k < 1e-6 ? 4 * std::numbers::pi * std::exp(-sum) : 2 * std::numbers::pi * std::exp(k - sum) * -std::expm1(-2 * k) / k;
+    const double sum = double(p.sharpness) + q.sharpness,
+                 k = glm::length(double(p.sharpness) * a + double(q.sharpness) * b);
+    return k < 1e-6 ? 4 * std::numbers::pi * std::exp(-sum)
+                    : 2 * std::numbers::pi * std::exp(k - sum) * -std::expm1(-2 * k) / k;
   }
   const double x = std::clamp(glm::dot(a, b), -1.0, 1.0);
   double p0 = 1, p1 = x, result = Ip[0] * Iq[0] + 3 * Ip[1] * Iq[1] * x;
@@ -101,7 +106,8 @@ double lobe_overlap(LobeKind kind, const Lobe& a, const Lobe& b) {
 Vec3 sample_lobe(LobeKind kind, float sharpness, Vec2 u) {
   // By inversion; v = 1 - cos t keeps its digits in sharp lobes.
   const double s = sharpness, x = 1 - double(u.x);
-  const double v = kind == LobeKind::cosine_power ? -std::expm1(std::log(x) / (s + 1)) : -std::log(x + (1 - x) * std::exp(-2 * s)) / s;
+  const double v = kind == LobeKind::cosine_power ? -std::expm1(std::log(x) / (s + 1))
+                                                  : -std::log(x + (1 - x) * std::exp(-2 * s)) / s;
   const double r = std::sqrt(std::max(0.0, v * (2 - v))), phi = 2 * std::numbers::pi * double(u.y);
   return Vec3(r * std::cos(phi), r * std::sin(phi), 1 - v);
 }
@@ -110,7 +116,8 @@ std::vector<double> lobe_irradiance(LobeKind kind, double s) {
   const int count = moments_needed(float(s));
   std::vector<double> series = moments(kind, s, count);
   const std::vector<double> cosine = moments(LobeKind::cosine_power, 1, count);
-  for (size_t l = 0; l < series.size(); ++l) series[l] *= std::numbers::pi * lobe_scale(kind, s) * double(2 * l + 1) * cosine[l];
+  for (size_t l = 0; l < series.size(); ++l)
+    series[l] *= std::numbers::pi * lobe_scale(kind, s) * double(2 * l + 1) * cosine[l];
   return series;
 }
 
@@ -180,7 +187,8 @@ void evaluate_directional(const DirectionalBasis& basis, glm::dvec3 d, std::span
   size_t i = size_t(sh_count(basis.sh_order));
   if (basis.sh_order > 0) evaluate_sh(basis.sh_order, d, out);
   for (const Lobe& lobe : basis.lobes)
-    out[i++] = lobe_scale(basis.kind, lobe.sharpness) * lobe_value(basis.kind, lobe.sharpness, glm::dot(axis_of(lobe), d));
+    out[i++] = lobe_scale(basis.kind, lobe.sharpness) *
+               lobe_value(basis.kind, lobe.sharpness, glm::dot(axis_of(lobe), d));
 }
 
 std::vector<double> apply_directional_dual(const DirectionalBasis& basis, std::span<const double> integrals) {
@@ -200,7 +208,8 @@ void evaluate_directional_dual(const DirectionalBasis& basis, glm::dvec3 d, std:
   std::copy(dual.begin(), dual.end(), out.begin());
 }
 
-std::vector<double> project_directional(const DirectionalBasis& basis, const std::function<double(glm::dvec3)>& f, int exact_order) {
+std::vector<double> project_directional(const DirectionalBasis& basis, const std::function<double(glm::dvec3)>& f,
+                                        int exact_order) {
   std::vector<double> integrals(basis.count()), values(basis.count());
   for (const DirectionNode& node : direction_quadrature(std::max(basis.sh_order, exact_order))) {
     evaluate_directional(basis, node.direction, values);

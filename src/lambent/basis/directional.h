@@ -1,7 +1,8 @@
 #pragma once
-// Bases of lobes, functions of the angle to an axis, alone or together with spherical harmonics: "order n and K lamps". They are
-// not orthonormal, so a function f = sum_i c_i b_i has coefficients c_i = integral of f b~_i with the DUAL functions
-// b~_i = sum_j (G^-1)_ij b_j, G_ij = integral of b_i b_j. Source: general-prt (directional and custom light bases).
+// Bases of lobes, functions of the angle to an axis, alone or together with spherical harmonics: "order n and K lamps".
+// They are not orthonormal, so a function f = sum_i c_i b_i has coefficients c_i = integral of f b~_i with the DUAL
+// functions b~_i = sum_j (G^-1)_ij b_j, G_ij = integral of b_i b_j. Source: general-prt (directional and custom light
+// bases).
 #include <lambent/basis/sh.h>
 
 namespace lambent {
@@ -22,8 +23,8 @@ constexpr float min_sharpness(LobeKind kind) { return kind == LobeKind::cosine_p
 // Is the axis of unit length, and the sharpness within these limits? False for numbers that are not finite.
 bool is_lobe(LobeKind kind, const Lobe& lobe);
 
-// A lobe's value at an angle of this cosine to its axis, at most 1; the factor that makes the integral of its square 1. Of lobes
-// so scaled: the integral over the sphere, and that of the product of two (1 for equal ones).
+// A lobe's value at an angle of this cosine to its axis, at most 1; the factor that makes the integral of its square 1.
+// Of lobes so scaled: the integral over the sphere, and that of the product of two (1 for equal ones).
 double lobe_value(LobeKind kind, double sharpness, double cosine);
 double lobe_scale(LobeKind kind, double sharpness);
 double lobe_integral(LobeKind kind, double sharpness);
@@ -32,14 +33,15 @@ double lobe_overlap(LobeKind kind, const Lobe& a, const Lobe& b);
 // A direction about the axis +z with density lobe / integral, from u in [0, 1)^2.
 Vec3 sample_lobe(LobeKind kind, float sharpness, Vec2 u);
 
-// Irradiance from a scaled lobe, the integral of it times max(0, n . d), as Legendre coefficients of the function of n . axis.
+// Irradiance from a scaled lobe, the integral of it times max(0, n . d), as Legendre coefficients of the function of n
+// . axis.
 std::vector<double> lobe_irradiance(LobeKind kind, double sharpness);
 double evaluate_legendre(std::span<const double> coefficients, double x);
 
 // `count` directions spread evenly over the sphere (a Fibonacci lattice), no two alike.
 std::vector<Vec3> even_directions(int count);
-// von Mises-Fisher lobes about them. Broader ones hold smooth functions better, but their duals grow; these have fallen to a third
-// at a neighbour's axis, and the dual functions are up to 5 times as large as they are (in norm).
+// von Mises-Fisher lobes about them. Broader ones hold smooth functions better, but their duals grow; these have fallen
+// to a third at a neighbour's axis, and the dual functions are up to 5 times as large as they are (in norm).
 std::vector<Lobe> even_lobes(int count);
 
 // Order n of spherical harmonics (0 for none), then the lobes, each scaled so that the integral of its square is 1.
@@ -52,8 +54,8 @@ struct DirectionalBasis {
   double condition = 1;            // greatest over least eigenvalue of G that is kept
   size_t count() const { return size_t(sh_count(sh_order)) + lobes.size(); }
 };
-// Eigenvalues of G at or below `cutoff` times the greatest are left out, so that functions that are nearly dependent (two equal
-// lamps, a broad lamp that the harmonics can make) do not get huge coefficients of opposite sign.
+// Eigenvalues of G at or below `cutoff` times the greatest are left out, so that functions that are nearly dependent
+// (two equal lamps, a broad lamp that the harmonics can make) do not get huge coefficients of opposite sign.
 DirectionalBasis make_directional_basis(int sh_order, LobeKind kind, std::vector<Lobe> lobes, double cutoff = 1e-10);
 
 // The functions and their duals at the unit direction d; out has count() values.
@@ -61,13 +63,14 @@ void evaluate_directional(const DirectionalBasis& basis, glm::dvec3 d, std::span
 void evaluate_directional_dual(const DirectionalBasis& basis, glm::dvec3 d, std::span<double> out);
 
 // The least-squares coefficients of f, by quadrature of exact_order nodes in z and twice as many about it.
-std::vector<double> project_directional(const DirectionalBasis& basis, const std::function<double(glm::dvec3)>& f, int exact_order = 64);
+std::vector<double> project_directional(const DirectionalBasis& basis, const std::function<double(glm::dvec3)>& f,
+                                        int exact_order = 64);
 // The same from the integrals of f b_i.
 std::vector<double> apply_directional_dual(const DirectionalBasis& basis, std::span<const double> integrals);
 double reconstruct_directional(const DirectionalBasis& basis, std::span<const double> coefficients, glm::dvec3 d);
 
-// The part of the function that spherical harmonics of `order` can hold: order^2 coefficients, in closed form (Funk-Hecke).
-// With it lamps light what was baked for harmonics.
+// The part of the function that spherical harmonics of `order` can hold: order^2 coefficients, in closed form
+// (Funk-Hecke). With it lamps light what was baked for harmonics.
 std::vector<double> directional_to_sh(const DirectionalBasis& basis, std::span<const double> coefficients, int order);
 
 }  // namespace lambent

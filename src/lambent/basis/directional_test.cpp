@@ -8,13 +8,14 @@
 namespace lambent {
 namespace {
 
-// Double rounding, magnified by condition numbers of up to some thousand, and quadrature with 96 nodes across the edge of a cosine
-// lobe at 90 degrees, where its s-th derivative jumps: s >= 9 here.
+// Double rounding, magnified by condition numbers of up to some thousand, and quadrature with 96 nodes across the edge
+// of a cosine lobe at 90 degrees, where its s-th derivative jumps: s >= 9 here.
 constexpr double tolerance = 1e-8;
 
 std::vector<Lobe> uneven_lobes(int count, float least, float most) {
   std::vector<Lobe> lobes;
-  for (Vec3 axis : even_directions(count)) lobes.push_back({axis, least + (most - least) * float(lobes.size()) / float(count)});
+  for (Vec3 axis : even_directions(count))
+    lobes.push_back({axis, least + (most - least) * float(lobes.size()) / float(count)});
   return lobes;
 }
 
@@ -62,7 +63,8 @@ TEST(Directional, BroadCosineLobesMatchTheirClosedForm) {
 }
 
 TEST(Directional, SharpLobesMatchTheirLimit) {
-  // Near its axis cos^s t is exp(-s t^2 / 2); two such at a small angle c overlap by exp(-s c^2 / 4), to a few parts in s.
+  // Near its axis cos^s t is exp(-s t^2 / 2); two such at a small angle c overlap by exp(-s c^2 / 4), to a few parts in
+  // s.
   const double s = 2e4, c = 0.01;
   const Vec3 tilted(float(std::sin(c)), 0, float(std::cos(c)));
   for (LobeKind kind : {LobeKind::cosine_power, LobeKind::von_mises_fisher}) {
@@ -92,7 +94,8 @@ TEST(Directional, ReproducesTheSpan) {
     Random random(3);
     std::vector<double> c(basis.count());
     for (double& x : c) x = 2 * random.next() - 1;
-    const auto again = project_directional(basis, [&](glm::dvec3 d) { return reconstruct_directional(basis, c, d); }, 96);
+    const auto again = project_directional(
+        basis, [&](glm::dvec3 d) { return reconstruct_directional(basis, c, d); }, 96);
     for (size_t i = 0; i < c.size(); ++i) EXPECT_NEAR(again[i], c[i], tolerance) << i;
   }
 }
@@ -101,7 +104,9 @@ TEST(Directional, ReproducesTheSpan) {
 TEST(Directional, HarmonicsAndLampsHoldASkyWithALamp) {
   const Vec3 lamp = glm::normalize(Vec3(0.3f, -0.5f, 0.8f));
   const auto mixed = make_directional_basis(4, LobeKind::von_mises_fisher, {{lamp, 200}});
-  auto sky = [&](glm::dvec3 d) { return 1 + 0.5 * d.z - 0.3 * d.x * d.y + 30 * std::exp(200 * (glm::dot(glm::normalize(glm::dvec3(lamp)), d) - 1)); };
+  auto sky = [&](glm::dvec3 d) {
+    return 1 + 0.5 * d.z - 0.3 * d.x * d.y + 30 * std::exp(200 * (glm::dot(glm::normalize(glm::dvec3(lamp)), d) - 1));
+  };
   const auto c = project_directional(mixed, sky), harmonics = project_sh(4, sky);
   double worst = 0, worst_harmonics = 0;
   for (Vec3 v : even_directions(500)) {
@@ -130,8 +135,8 @@ TEST(Directional, EqualLobesShareTheirCoefficient) {
 }
 
 TEST(Directional, SamplesHaveTheDensityOfTheLobe) {
-  // The mean of y_lm over the samples is its coefficient of the lobe over the lobe's integral. 4,096 stratified points: errors are
-  // some 1e-3, and less for sharp lobes.
+  // The mean of y_lm over the samples is its coefficient of the lobe over the lobe's integral. 4,096 stratified points:
+  // errors are some 1e-3, and less for sharp lobes.
   constexpr double stratified = 3e-3;
   for (LobeKind kind : {LobeKind::cosine_power, LobeKind::von_mises_fisher})
     for (float s : {1.0f, 5.0f, 80.0f, 3000.0f, 1e5f}) {
@@ -144,7 +149,8 @@ TEST(Directional, SamplesHaveTheDensityOfTheLobe) {
         evaluate_sh(6, glm::normalize(glm::dvec3(d)), y);
         for (size_t k = 0; k < 36; ++k) mean[k] += y[k] / 4096;
       }
-      for (size_t k = 0; k < 36; ++k) EXPECT_NEAR(mean[k], expected[k] / lobe_integral(kind, s), stratified) << int(kind) << " " << s << " " << k;
+      for (size_t k = 0; k < 36; ++k)
+        EXPECT_NEAR(mean[k], expected[k] / lobe_integral(kind, s), stratified) << int(kind) << " " << s << " " << k;
     }
   // Sharp lobes spread as their limit, a normal distribution of variance 1/s in each direction across.
   double spread = 0;
@@ -161,7 +167,8 @@ TEST(Directional, LobesMatchQuadrature) {
     for (float s : {2.0f, 17.0f, 60.0f}) {
       double integral = 0, square = 0;
       for (const DirectionNode& node : direction_quadrature(128)) {
-        const double value = lobe_scale(kind, s) * lobe_value(kind, s, glm::dot(glm::normalize(glm::dvec3(a)), node.direction));
+        const double value = lobe_scale(kind, s) *
+                             lobe_value(kind, s, glm::dot(glm::normalize(glm::dvec3(a)), node.direction));
         integral += node.weight * value, square += node.weight * value * value;
       }
       constexpr double edge = 1e-5;  // of a squared cosine at 90 degrees, where its second derivative jumps
@@ -173,14 +180,16 @@ TEST(Directional, LobesMatchQuadrature) {
         const glm::dvec3 axis(std::sqrt(1 - x * x) * 0.6, std::sqrt(1 - x * x) * 0.8, x);
         double irradiance = 0;
         for (const DirectionNode& node : direction_quadrature(128, 0, 1))
-          irradiance += node.weight * node.direction.z * lobe_scale(kind, s) * lobe_value(kind, s, glm::dot(axis, node.direction));
+          irradiance += node.weight * node.direction.z * lobe_scale(kind, s) *
+                        lobe_value(kind, s, glm::dot(axis, node.direction));
         EXPECT_NEAR(evaluate_legendre(series, x), irradiance, edge) << int(kind) << " " << s << " " << x;
       }
     }
   // The sharpest is as good as a beam.
   const auto beam = lobe_irradiance(LobeKind::von_mises_fisher, max_sharpness);
   const double strength = lobe_integral(LobeKind::von_mises_fisher, max_sharpness);
-  for (double x : {-0.5, -0.05, 0.05, 0.3, 0.9}) EXPECT_NEAR(evaluate_legendre(beam, x) / strength, std::max(0.0, x), 1e-4) << x;
+  for (double x : {-0.5, -0.05, 0.05, 0.3, 0.9})
+    EXPECT_NEAR(evaluate_legendre(beam, x) / strength, std::max(0.0, x), 1e-4) << x;
 }
 
 TEST(Directional, OverlapIsTheGramMatrix) {
@@ -191,8 +200,9 @@ TEST(Directional, OverlapIsTheGramMatrix) {
   }
 }
 
-// Root of the mean squared error with which random functions of `order` bands are projected onto COUNT lobes, as a share of their
-// norm: 1 - tr(G^-1 Q) / order^2, where Q sums the products of the lobes' coefficients. `dual` gets the greatest norm of a dual.
+// Root of the mean squared error with which random functions of `order` bands are projected onto COUNT lobes, as a
+// share of their norm: 1 - tr(G^-1 Q) / order^2, where Q sums the products of the lobes' coefficients. `dual` gets the
+// greatest norm of a dual.
 double misfit(int count, float factor, int order, double& dual) {
   std::vector<Lobe> lobes = even_lobes(count);
   for (Lobe& lobe : lobes) lobe.sharpness *= factor;
@@ -214,8 +224,8 @@ double misfit(int count, float factor, int order, double& dual) {
 }
 
 TEST(Directional, EvenLobesSuitSmoothFunctions) {
-  // Half the bands that as many harmonics would hold are held to a few percent; twice as sharp leaves gaps, and half as sharp
-  // makes the duals several times larger.
+  // Half the bands that as many harmonics would hold are held to a few percent; twice as sharp leaves gaps, and half as
+  // sharp makes the duals several times larger.
   for (int count : {16, 36, 64, 144}) {
     const int order = int(std::sqrt(count)) / 2;
     double dual = 0, dual_sharp = 0, dual_broad = 0;

@@ -1,4 +1,5 @@
-// Follows: triple-product-integrals; Ng, Ramamoorthi and Hanrahan 2004, the Haar tripling coefficient theorem and its evaluation in linear time.
+// Follows: triple-product-integrals; Ng, Ramamoorthi and Hanrahan 2004, the Haar tripling coefficient theorem and its
+// evaluation in linear time.
 #include <lambent/basis/haar.h>
 #include <lambent/core/check.h>
 
@@ -19,7 +20,11 @@ size_t morton_index(size_t x, size_t y) {
 }
 
 // Signs of wavelet `type` over the quarters.
-constexpr int sign_of(int type, int quarter) { return type == 0 ? (quarter & 1 ? -1 : 1) : type == 1 ? (quarter & 2 ? -1 : 1) : (quarter == 1 || quarter == 2 ? -1 : 1); }
+constexpr int sign_of(int type, int quarter) {
+  return type == 0 ? (quarter & 1 ? -1 : 1)
+       : type == 1 ? (quarter & 2 ? -1 : 1)
+                   : (quarter == 1 || quarter == 2 ? -1 : 1);
+}
 
 struct Square {
   int level;
@@ -47,10 +52,12 @@ struct TripleProduct {
     const float *x = &a.coefficients[1 + 3 * s], *y = &b.coefficients[1 + 3 * s], *z = &c.coefficients[1 + 3 * s];
     const double height = double(size_t(1) << level);
     // Two alike under a coarser third, and three that differ.
-    double sum = pa * (double(y[0]) * z[0] + double(y[1]) * z[1] + double(y[2]) * z[2]) + pb * (double(x[0]) * z[0] + double(x[1]) * z[1] + double(x[2]) * z[2]) +
+    double sum = pa * (double(y[0]) * z[0] + double(y[1]) * z[1] + double(y[2]) * z[2]) +
+                 pb * (double(x[0]) * z[0] + double(x[1]) * z[1] + double(x[2]) * z[2]) +
                  pc * (double(x[0]) * y[0] + double(x[1]) * y[1] + double(x[2]) * y[2]);
-    sum += height * (x[0] * (double(y[1]) * z[2] + double(y[2]) * z[1]) + x[1] * (double(y[0]) * z[2] + double(y[2]) * z[0]) +
-                     x[2] * (double(y[0]) * z[1] + double(y[1]) * z[0]));
+    sum += height *
+           (x[0] * (double(y[1]) * z[2] + double(y[2]) * z[1]) + x[1] * (double(y[0]) * z[2] + double(y[2]) * z[0]) +
+            x[2] * (double(y[0]) * z[1] + double(y[1]) * z[0]));
     if (level + 1 == a.levels) return sum;
     for (int q = 0; q < 4; ++q) {
       double value[3] = {pa, pb, pc};
@@ -71,7 +78,8 @@ void mark_occupied(HaarTree& t) {
       const float* c = &t.coefficients[1 + 3 * s];
       bool any = c[0] != 0 || c[1] != 0 || c[2] != 0;
       if (level + 1 < t.levels)
-        for (size_t q = 0; q < 4; ++q) any |= t.occupied[level_begin(level + 1) + 4 * (s - level_begin(level)) + q] != 0;
+        for (size_t q = 0; q < 4; ++q)
+          any |= t.occupied[level_begin(level + 1) + 4 * (s - level_begin(level)) + q] != 0;
       t.occupied[s] = any;
     }
 }
@@ -91,7 +99,8 @@ void haar_transform(int levels, std::span<const float> pixels, HaarTree& out) {
     for (size_t i = 0; i < size_t(1) << 2 * level; ++i) {
       const double *m = &means[4 * i], mean = 0.25 * (m[0] + m[1] + m[2] + m[3]);
       float* c = &out.coefficients[1 + 3 * (level_begin(level) + i)];
-      c[0] = float(scale * (m[0] - m[1] + m[2] - m[3])), c[1] = float(scale * (m[0] + m[1] - m[2] - m[3])), c[2] = float(scale * (m[0] - m[1] - m[2] + m[3]));
+      c[0] = float(scale * (m[0] - m[1] + m[2] - m[3])), c[1] = float(scale * (m[0] + m[1] - m[2] - m[3])),
+      c[2] = float(scale * (m[0] - m[1] - m[2] + m[3]));
       means[i] = mean;
     }
   }
@@ -106,7 +115,9 @@ std::vector<float> haar_pixels(const HaarTree& t) {
     for (size_t i = 0; i < values.size(); ++i)
       for (int q = 0; q < 4; ++q) {
         double v = values[i];
-        for (int type = 0; type < 3; ++type) v += double(size_t(1) << level) * sign_of(type, q) * double(t.coefficients[1 + 3 * (level_begin(level) + i) + size_t(type)]);
+        for (int type = 0; type < 3; ++type)
+          v += double(size_t(1) << level) * sign_of(type, q) *
+               double(t.coefficients[1 + 3 * (level_begin(level) + i) + size_t(type)]);
         finer[4 * i + size_t(q)] = v;
       }
     values = std::move(finer);
@@ -160,7 +171,9 @@ double haar_tripling_coefficient(int levels, size_t i, size_t j, size_t k) {
   if (order[0] == 0) return order[1] == order[2] ? 1 : 0;
   const Square a = square_of(order[0]), b = square_of(order[1]), c = square_of(order[2]);
   if (b.level != c.level || b.index != c.index) return 0;
-  if (a.level == b.level) return a.index == b.index && a.type != b.type && b.type != c.type && a.type != c.type ? double(size_t(1) << a.level) : 0;
+  if (a.level == b.level)
+    return a.index == b.index && a.type != b.type && b.type != c.type && a.type != c.type ? double(size_t(1) << a.level)
+                                                                                          : 0;
   if (b.type != c.type || b.index >> 2 * (b.level - a.level) != a.index) return 0;
   const int quarter = int(b.index >> 2 * (b.level - a.level - 1) & 3);
   return sign_of(a.type, quarter) * double(size_t(1) << a.level);

@@ -67,9 +67,11 @@ TEST(Haar, TripleProductIsTheSumOverPixels) {
 // The same from what non-linear approximation leaves, and fewer squares are looked at.
 TEST(Haar, TripleProductOfWhatIsLeft) {
   const int levels = 5;
-  HaarTree a = tree_of(levels, noise(levels, 5)), b = tree_of(levels, noise(levels, 6)), c = tree_of(levels, noise(levels, 7));
+  HaarTree a = tree_of(levels, noise(levels, 5)), b = tree_of(levels, noise(levels, 6)),
+           c = tree_of(levels, noise(levels, 7));
   keep_largest({&a, 1}, 0.03), keep_largest({&b, 1}, 0.05);
-  const size_t left = size_t(std::count_if(a.coefficients.begin(), a.coefficients.end(), [](float x) { return x != 0; }));
+  const size_t left =
+      size_t(std::count_if(a.coefficients.begin(), a.coefficients.end(), [](float x) { return x != 0; }));
   EXPECT_EQ(left, size_t(std::ceil(0.03 * 1024)));
   const std::vector<float> pa = haar_pixels(a), pb = haar_pixels(b), pc = haar_pixels(c);
   double sum = 0;

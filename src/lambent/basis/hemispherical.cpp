@@ -1,5 +1,5 @@
-// Follows: P. Gautron, J. Krivanek, S. Pattanaik, K. Bouatouch, "A novel hemispherical basis for accurate and efficient rendering"
-// (2004); general-prt (least-squares optimal hemispherical SH).
+// Follows: P. Gautron, J. Krivanek, S. Pattanaik, K. Bouatouch, "A novel hemispherical basis for accurate and efficient
+// rendering" (2004); general-prt (least-squares optimal hemispherical SH).
 #include <lambent/basis/hemispherical.h>
 #include <lambent/basis/pseudo_inverse.h>
 #include <lambent/basis/quadrature.h>
@@ -10,7 +10,8 @@
 namespace lambent {
 namespace {
 
-// The direction at 2z - 1: its radius sqrt(1 - (2z-1)^2) over sqrt(1 - z^2) is 2 sqrt(z / (1 + z)), which the pole does not disturb.
+// The direction at 2z - 1: its radius sqrt(1 - (2z-1)^2) over sqrt(1 - z^2) is 2 sqrt(z / (1 + z)), which the pole does
+// not disturb.
 template <class T>
 void evaluate(int order, glm::vec<3, T> d, std::span<T> out) {
   LAMBENT_CHECK(order >= 1 && out.size() >= size_t(sh_count(order)));
@@ -79,7 +80,8 @@ std::vector<double> fit_hemisphere(const HemisphereFit& fit, std::span<const dou
   return result;
 }
 
-std::vector<double> project_hemisphere(const HemisphereFit& fit, const std::function<double(glm::dvec3)>& f, int exact_order) {
+std::vector<double> project_hemisphere(const HemisphereFit& fit, const std::function<double(glm::dvec3)>& f,
+                                       int exact_order) {
   return fit_hemisphere(fit, project_sh_hemisphere(fit.order, f, exact_order));
 }
 

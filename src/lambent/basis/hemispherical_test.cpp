@@ -13,7 +13,9 @@ constexpr double double_rounding = 1e-11;
 constexpr double float_rounding = 2e-5;
 
 // Smooth, without symmetry, and far from zero at the horizon.
-double asymmetric(glm::dvec3 d) { return 1.2 + std::exp(2 * glm::dot(d, glm::normalize(glm::dvec3(0.8, -0.3, 0.4)))) - 0.5 * d.y; }
+double asymmetric(glm::dvec3 d) {
+  return 1.2 + std::exp(2 * glm::dot(d, glm::normalize(glm::dvec3(0.8, -0.3, 0.4)))) - 0.5 * d.y;
+}
 
 double value(std::span<const double> c, glm::dvec3 d, bool hemispherical) {
   std::vector<double> y(c.size());
@@ -65,7 +67,8 @@ TEST(Hemispherical, HarmonicsReproduceTheirSpan) {
   Random random(4);
   std::vector<double> c(36);
   for (double& x : c) x = 2 * random.next() - 1;
-  const auto again = project_hsh(order, [&](glm::dvec3 d) { return value(c, d, true); }, 2 * order);
+  const auto again = project_hsh(
+      order, [&](glm::dvec3 d) { return value(c, d, true); }, 2 * order);
   std::vector<float> single(again.begin(), again.end());
   for (size_t i = 0; i < c.size(); ++i) EXPECT_NEAR(again[i], c[i], double_rounding) << i;
   const Vec3 d = glm::normalize(Vec3(-0.2f, 0.5f, 0.9f));

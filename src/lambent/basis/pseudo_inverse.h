@@ -5,8 +5,8 @@
 
 namespace lambent {
 
-// Pseudo-inverse of a symmetric positive semi-definite matrix, n x n: eigenvalues at or below `cutoff` times the greatest count
-// as zero. The result is symmetric too.
+// Pseudo-inverse of a symmetric positive semi-definite matrix, n x n: eigenvalues at or below `cutoff` times the
+// greatest count as zero. The result is symmetric too.
 struct PseudoInverse {
   std::vector<double> values;
   int rank = 0;

@@ -1,4 +1,5 @@
-// Follows: W. Press et al., "Numerical recipes", on Gauss-Legendre nodes by Newton's method from Tricomi's starting point.
+// Follows: W. Press et al., "Numerical recipes", on Gauss-Legendre nodes by Newton's method from Tricomi's starting
+// point.
 #include <lambent/basis/quadrature.h>
 #include <lambent/core/check.h>
 

@@ -16,9 +16,9 @@ struct DirectionNode {
   glm::dvec3 direction;
   double weight;  // solid angle, sr
 };
-// A product rule on the zone z_from <= z <= z_to (Gauss in z, even spacing about it), exact there for products of two functions
-// of `exact_order` bands whose part of each azimuthal frequency is a polynomial in z; on the whole sphere these are all products
-// of spherical harmonics.
+// A product rule on the zone z_from <= z <= z_to (Gauss in z, even spacing about it), exact there for products of two
+// functions of `exact_order` bands whose part of each azimuthal frequency is a polynomial in z; on the whole sphere
+// these are all products of spherical harmonics.
 std::vector<DirectionNode> direction_quadrature(int exact_order, double z_from = -1, double z_to = 1);
 
 }  // namespace lambent

@@ -1,7 +1,7 @@
 #pragma once
-// Real spherical harmonics: orthonormal, with the Condon-Shortley sign, coefficient index l(l+1)+m, evaluated at raw (x, y, z)
-// with +z as the pole. ORDER n means n bands, l = 0 .. n-1, and n^2 coefficients. Other systems' conventions: sh_convert.h.
-// Source: P.-P. Sloan, "Stupid spherical harmonics tricks" (2008); general-prt.
+// Real spherical harmonics: orthonormal, with the Condon-Shortley sign, coefficient index l(l+1)+m, evaluated at raw
+// (x, y, z) with +z as the pole. ORDER n means n bands, l = 0 .. n-1, and n^2 coefficients. Other systems' conventions:
+// sh_convert.h. Source: P.-P. Sloan, "Stupid spherical harmonics tricks" (2008); general-prt.
 #include <lambent/core/vec.h>
 
 #include <functional>
@@ -36,7 +36,8 @@ Vec3 reconstruct_sh(std::span<const Vec3> coefficients, Vec3 d);
 // Order of a coefficient vector: the square root of its length, which must be a square.
 int sh_order(size_t coefficient_count);
 
-// Convolution with the clamped cosine max(0, cos t) multiplies band l by this: pi, 2 pi/3, pi/4, 0, -pi/24, 0, pi/64, ...
+// Convolution with the clamped cosine max(0, cos t) multiplies band l by this: pi, 2 pi/3, pi/4, 0, -pi/24, 0, pi/64,
+// ...
 double clamped_cosine(int l);
 
 // A rotation of functions, (Rf)(s) = f(R^-1 s), as one dense block a band, row-major, bands one after another.

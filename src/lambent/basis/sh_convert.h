@@ -1,6 +1,7 @@
 #pragma once
-// Named converters from our spherical harmonics (sh.h: radiance, Condon-Shortley sign) to what other systems store. All keep
-// the index l(l+1)+m and raw z as the pole, so they only scale and flip coefficients; docs/conventions.md has the table.
+// Named converters from our spherical harmonics (sh.h: radiance, Condon-Shortley sign) to what other systems store. All
+// keep the index l(l+1)+m and raw z as the pole, so they only scale and flip coefficients; docs/conventions.md has the
+// table.
 #include <lambent/core/vec.h>
 
 #include <optional>
@@ -11,11 +12,11 @@
 namespace lambent {
 
 enum class ShConvention {
-  lambent,    // also Sloan, DirectXMath, Filament radiance, pbrt, Unreal, Babylon: radiance, Condon-Shortley
-  three,      // three.js LightProbe: radiance, no Condon-Shortley
-  unity,      // Unity SphericalHarmonicsL2, Filament --sh-shader: irradiance x basis constant / pi, no signs; order 3
-  godot,      // Godot probes: L / pi, no Condon-Shortley
-  gltf_ibl,   // EXT_lights_image_based: irradiance A.L, Condon-Shortley; order 3
+  lambent,   // also Sloan, DirectXMath, Filament radiance, pbrt, Unreal, Babylon: radiance, Condon-Shortley
+  three,     // three.js LightProbe: radiance, no Condon-Shortley
+  unity,     // Unity SphericalHarmonicsL2, Filament --sh-shader: irradiance x basis constant / pi, no signs; order 3
+  godot,     // Godot probes: L / pi, no Condon-Shortley
+  gltf_ibl,  // EXT_lights_image_based: irradiance A.L, Condon-Shortley; order 3
 };
 
 std::optional<ShConvention> parse_sh_convention(const std::string& name);

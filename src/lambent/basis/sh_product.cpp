@@ -1,7 +1,9 @@
-// Follows: triple-product-integrals (tripling coefficients from Wigner 3j symbols, transfer matrices by double projection);
-// general-prt (triple products). With Y the complex harmonics with Condon-Shortley sign and Gaunt's integral
+// Follows: triple-product-integrals (tripling coefficients from Wigner 3j symbols, transfer matrices by double
+// projection); general-prt (triple products). With Y the complex harmonics with Condon-Shortley sign and Gaunt's
+// integral
 //   int Y_1 Y_2 Y_3 = sqrt((2 l1+1)(2 l2+1)(2 l3+1) / 4 pi) (l1 l2 l3; 0 0 0) (l1 l2 l3; m1 m2 m3),
-// the real ones of sh.h are, for m > 0, y_lm = (Y_lm + (-1)^m Y_l-m) / sqrt 2 and y_l-m = (Y_lm - (-1)^m Y_l-m) / (i sqrt 2).
+// the real ones of sh.h are, for m > 0, y_lm = (Y_lm + (-1)^m Y_l-m) / sqrt 2 and y_l-m = (Y_lm - (-1)^m Y_l-m) / (i
+// sqrt 2).
 #include <lambent/basis/quadrature.h>
 #include <lambent/basis/sh_product.h>
 #include <lambent/basis/wigner.h>
@@ -32,9 +34,11 @@ bool frequencies_cancel(int ma, int mb, int mc) {
 }
 
 template <class T>
-void multiply_plain(const TriplingTensor& t, const std::vector<T>& values, std::span<const T> a, std::span<const T> b, std::span<T> out) {
+void multiply_plain(const TriplingTensor& t, const std::vector<T>& values, std::span<const T> a, std::span<const T> b,
+                    std::span<T> out) {
   const size_t count = size_t(sh_count(t.order_c));
-  LAMBENT_CHECK(a.size() == size_t(sh_count(t.order_a)) && b.size() == size_t(sh_count(t.order_b)) && out.size() == count);
+  LAMBENT_CHECK(a.size() == size_t(sh_count(t.order_a)) && b.size() == size_t(sh_count(t.order_b)) &&
+                out.size() == count);
   for (size_t k = 0; k < count; ++k) {
     T sum = 0;
     for (uint32_t e = t.begin[k]; e < t.begin[k + 1]; ++e) sum += values[e] * a[t.i[e]] * b[t.j[e]];
@@ -82,7 +86,8 @@ TriplingTensor make_tripling_tensor(int order_a, int order_b, int order_c) {
         }
       }
     }
-    std::sort(entries.begin(), entries.end(), [](const Entry& x, const Entry& y) { return x.i != y.i ? x.i < y.i : x.j < y.j; });
+    std::sort(entries.begin(), entries.end(),
+              [](const Entry& x, const Entry& y) { return x.i != y.i ? x.i < y.i : x.j < y.j; });
     for (const Entry& e : entries) {
       t.i.push_back(e.i), t.j.push_back(e.j);
       t.value.push_back(e.value), t.single.push_back(float(e.value));
@@ -103,13 +108,16 @@ double tripling_coefficient(int i, int j, int k) {
     for (int q = 0; q < nb; ++q)
       for (int r = 0; r < nc; ++r)
         sum += (ta[p].weight * tb[q].weight * tc[r].weight).real() * wigner_3j(la, lb, lc, ta[p].m, tb[q].m, tc[r].m);
-  return std::sqrt((2.0 * la + 1) * (2.0 * lb + 1) * (2.0 * lc + 1) / (4 * std::numbers::pi)) * wigner_3j(la, lb, lc, 0, 0, 0) * sum;
+  return std::sqrt((2.0 * la + 1) * (2.0 * lb + 1) * (2.0 * lc + 1) / (4 * std::numbers::pi)) *
+         wigner_3j(la, lb, lc, 0, 0, 0) * sum;
 }
 
-void multiply_sh_plain(const TriplingTensor& t, std::span<const double> a, std::span<const double> b, std::span<double> out) {
+void multiply_sh_plain(const TriplingTensor& t, std::span<const double> a, std::span<const double> b,
+                       std::span<double> out) {
   multiply_plain(t, t.value, a, b, out);
 }
-void multiply_sh_plain(const TriplingTensor& t, std::span<const float> a, std::span<const float> b, std::span<float> out) {
+void multiply_sh_plain(const TriplingTensor& t, std::span<const float> a, std::span<const float> b,
+                       std::span<float> out) {
   multiply_plain(t, t.single, a, b, out);
 }
 

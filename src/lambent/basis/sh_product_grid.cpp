@@ -1,7 +1,7 @@
 // multiply_sh: orders 2 and 3 in closed form, all others on a grid. A degree of a + b + c - 3 in z (all orders) needs
-// (a + b + c - 1) / 2 Gauss-Legendre nodes, rounded down; the same azimuthal frequency needs a + b + c - 2 equal steps. Steps come in
-// fours, phi, -phi, pi - phi, pi + phi, which share one set of sums over even and odd cosines and sines. SIMD lanes hold nodes of z
-// on the way out and degrees on the way back.
+// (a + b + c - 1) / 2 Gauss-Legendre nodes, rounded down; the same azimuthal frequency needs a + b + c - 2 equal steps.
+// Steps come in fours, phi, -phi, pi - phi, pi + phi, which share one set of sums over even and odd cosines and sines.
+// SIMD lanes hold nodes of z on the way out and degrees on the way back.
 #include <lambent/basis/quadrature.h>
 #include <lambent/basis/sh_product.h>
 #include <lambent/core/check.h>
@@ -23,10 +23,10 @@ namespace {
 constexpr size_t grid_lanes = 8;
 
 struct ProductGrid {
-  int a, b, c;              // orders
-  size_t nodes;             // in z, a multiple of grid_lanes; the weights of those beyond what is needed are zero
-  size_t quarter;           // steps of phi over four
-  size_t degrees;           // c rounded up to a multiple of grid_lanes
+  int a, b, c;                    // orders
+  size_t nodes;                   // in z, a multiple of grid_lanes; the weights of those beyond what is needed are zero
+  size_t quarter;                 // steps of phi over four
+  size_t degrees;                 // c rounded up to a multiple of grid_lanes
   AlignedVector<float> legendre;  // [m, l >= m][node], up to the greater of a and b
   AlignedVector<float> turns;     // [step][m] pairs cos(m phi), sin(m phi), max_sh_order pairs a step
   AlignedVector<float> back;      // [m][node][l - m], weights included
@@ -47,7 +47,8 @@ using V = hn::Vec<F>;
 
 // Sums over l at Lanes nodes of z: even and odd m, cosines at 2m, sines at 2m + 1.
 template <int fixed>
-HWY_INLINE void Spread(int order, const float* c, const float* HWY_RESTRICT legendre, size_t stride, int skip, V* HWY_RESTRICT f) {
+HWY_INLINE void Spread(int order, const float* c, const float* HWY_RESTRICT legendre, size_t stride, int skip,
+                       V* HWY_RESTRICT f) {
   const F d;
   if (fixed) order = fixed;
   for (int m = 0; m < order; ++m) {
@@ -84,7 +85,8 @@ template <int fixed>
 void MultiplyOnGrid(const ProductGrid& g, const float* a, const float* b, float* out) {
   const F d;
   const size_t lanes = hn::Lanes(d);
-  const int na = fixed ? fixed : g.a, nb = fixed ? fixed : g.b, nc = fixed ? fixed : g.c, table = fixed ? fixed : std::max(na, nb);
+  const int na = fixed ? fixed : g.a, nb = fixed ? fixed : g.b, nc = fixed ? fixed : g.c,
+            table = fixed ? fixed : std::max(na, nb);
   const size_t degrees = fixed ? (fixed + grid_lanes - 1) / grid_lanes * grid_lanes : g.degrees;
   constexpr int most = fixed ? fixed : max_sh_order;
   constexpr size_t most_degrees = (most + grid_lanes - 1) / grid_lanes * grid_lanes;
@@ -207,23 +209,29 @@ constexpr float k0 = 0.28209479f, k1 = 0.48860251f, k2 = 1.09254843f, k20 = 0.63
 
 Quadratic quadratic(const float* f) {
   const float half = 0.5f * k2, axis = -0.5f * k20 * f[6];
-  return {k0 * f[0],  k1 * Vec3(-f[3], -f[1], f[2]), axis + half * f[8], axis - half * f[8], k20 * f[6], half * f[4],
-          -half * f[5], -half * f[7]};
+  return {k0 * f[0],          k1 * Vec3(-f[3], -f[1], f[2]),
+          axis + half * f[8], axis - half * f[8],
+          k20 * f[6],         half * f[4],
+          -half * f[5],       -half * f[7]};
 }
 
-// With <> the mean over the sphere, <di dj> = 1/3 delta and <di dj dk dl> = 1/15 (three pairs of deltas), the product's parts are
+// With <> the mean over the sphere, <di dj> = 1/3 delta and <di dj dk dl> = 1/15 (three pairs of deltas), the product's
+// parts are
 //   constant  c c' + v.v'/3 + 2/15 Q:Q'       vector  c v' + c' v + 2/5 (Q v' + Q' v)
 //   tensor    c Q' + c' Q + traceless symmetric part of (v v' + 4/7 Q Q').
 void multiply_quadratic(const float* f, const float* g, float* out) {
   const Quadratic a = quadratic(f), b = quadratic(g);
   auto times = [](const Quadratic& q, Vec3 v) {
-    return Vec3(q.xx * v.x + q.xy * v.y + q.xz * v.z, q.xy * v.x + q.yy * v.y + q.yz * v.z, q.xz * v.x + q.yz * v.y + q.zz * v.z);
+    return Vec3(q.xx * v.x + q.xy * v.y + q.xz * v.z, q.xy * v.x + q.yy * v.y + q.yz * v.z,
+                q.xz * v.x + q.yz * v.y + q.zz * v.z);
   };
   const float k = 4.0f / 7;
-  const float qx = a.xx * b.xx, qy = a.yy * b.yy, qz = a.zz * b.zz, rx = a.yz * b.yz, ry = a.xz * b.xz, rz = a.xy * b.xy;
+  const float qx = a.xx * b.xx, qy = a.yy * b.yy, qz = a.zz * b.zz, rx = a.yz * b.yz, ry = a.xz * b.xz,
+              rz = a.xy * b.xy;
   const Vec3 squares = a.vector * b.vector + k * Vec3(qx + ry + rz, qy + rx + rz, qz + rx + ry);
   const float contraction = qx + qy + qz + 2 * (rx + ry + rz);
-  const float constant = a.constant * b.constant + (1.0f / 3) * glm::dot(a.vector, b.vector) + (2.0f / 15) * contraction;
+  const float constant = a.constant * b.constant + (1.0f / 3) * glm::dot(a.vector, b.vector) +
+                         (2.0f / 15) * contraction;
   const Vec3 vector = a.constant * b.vector + b.constant * a.vector + 0.4f * (times(a, b.vector) + times(b, a.vector));
   const float third = (1.0f / 3) * (squares.x + squares.y + squares.z);
   const float xx = a.constant * b.xx + b.constant * a.xx + squares.x - third;
@@ -241,7 +249,8 @@ void multiply_quadratic(const float* f, const float* g, float* out) {
                            k * ((a.xx + a.zz) * b.xz + a.xz * (b.xx + b.zz) + a.xy * b.yz + a.yz * b.xy));
   out[0] = constant * (1 / k0);
   out[1] = vector.y * (-1 / k1), out[2] = vector.z * (1 / k1), out[3] = vector.x * (-1 / k1);
-  out[4] = xy * (2 / k2), out[5] = yz * (-2 / k2), out[6] = zz * (1 / k20), out[7] = xz * (-2 / k2), out[8] = (xx - yy) * (1 / k2);
+  out[4] = xy * (2 / k2), out[5] = yz * (-2 / k2), out[6] = zz * (1 / k20), out[7] = xz * (-2 / k2),
+  out[8] = (xx - yy) * (1 / k2);
 }
 
 // The same without quadratic parts.

@@ -35,18 +35,21 @@ double length(std::span<const float> c) {
   return std::sqrt(sum);
 }
 
-// Weight-free values of the harmonics at nodes where products of three functions of these orders are integrated exactly.
+// Weight-free values of the harmonics at nodes where products of three functions of these orders are integrated
+// exactly.
 struct Sampled {
   std::vector<DirectionNode> nodes;
   std::vector<double> y;
   size_t count;
   Sampled(int order, int exact_order) : nodes(direction_quadrature(exact_order)), count(size_t(sh_count(order))) {
     y.resize(nodes.size() * count);
-    for (size_t s = 0; s < nodes.size(); ++s) evaluate_sh(order, nodes[s].direction, std::span(y).subspan(s * count, count));
+    for (size_t s = 0; s < nodes.size(); ++s)
+      evaluate_sh(order, nodes[s].direction, std::span(y).subspan(s * count, count));
   }
   double triple(size_t i, size_t j, size_t k) const {
     double sum = 0;
-    for (size_t s = 0; s < nodes.size(); ++s) sum += nodes[s].weight * y[s * count + i] * y[s * count + j] * y[s * count + k];
+    for (size_t s = 0; s < nodes.size(); ++s)
+      sum += nodes[s].weight * y[s * count + i] * y[s * count + j] * y[s * count + k];
     return sum;
   }
 };
@@ -60,7 +63,8 @@ TEST(ShProduct, TensorIsTheIntegralOfThreeHarmonics) {
     for (size_t i = 0; i < 9; ++i)
       for (size_t j = 0; j < 16; ++j) {
         EXPECT_NEAR(dense[i * 16 + j], sampled.triple(i, j, k), coefficient_tolerance) << i << " " << j << " " << k;
-        EXPECT_NEAR(tripling_coefficient(int(i), int(j), int(k)), dense[i * 16 + j], coefficient_tolerance) << i << " " << j << " " << k;
+        EXPECT_NEAR(tripling_coefficient(int(i), int(j), int(k)), dense[i * 16 + j], coefficient_tolerance)
+            << i << " " << j << " " << k;
       }
   }
 }
@@ -72,7 +76,8 @@ TEST(ShProduct, TensorIsRightAtOrderTwelve) {
   int negative = 0;
   for (size_t e = 0; e < t.value.size(); e += 1 + size_t(500 * random.next())) {
     const size_t k = size_t(std::upper_bound(t.begin.begin(), t.begin.end(), uint32_t(e)) - t.begin.begin()) - 1;
-    EXPECT_NEAR(t.value[e], sampled.triple(t.i[e], t.j[e], k), coefficient_tolerance) << t.i[e] << " " << t.j[e] << " " << k;
+    EXPECT_NEAR(t.value[e], sampled.triple(t.i[e], t.j[e], k), coefficient_tolerance)
+        << t.i[e] << " " << t.j[e] << " " << k;
     negative += int(t.i[e]) < sh_index(sh_band(t.i[e]), 0);
   }
   EXPECT_GT(negative, 50);
@@ -143,8 +148,8 @@ TEST(ShProduct, FastWorksInPlaceOnEverySimdTarget) {
   }
 }
 
-// A visibility with sharp edges and no symmetry. Sums over the nodes stand for integrals throughout, so that what follows holds
-// to rounding: y_i y_j is a sum of the first 2n - 1 bands at each node.
+// A visibility with sharp edges and no symmetry. Sums over the nodes stand for integrals throughout, so that what
+// follows holds to rounding: y_i y_j is a sum of the first 2n - 1 bands at each node.
 double visibility(glm::dvec3 d) { return d.z > 0.2 * d.x && (d.y < 0.4 || d.x > 0.3) ? 1 : 0; }
 
 TEST(ShProduct, MatrixIsExactWithTwiceTheBands) {
@@ -226,12 +231,14 @@ TEST(ShProduct, DoubleProjectionFindsTheMatrixOfABandLimitedFunction) {
   };
   const std::vector<double> again = project_sh_pair(in, out, T, 5);
   for (size_t i = 0; i < M.size(); ++i) EXPECT_NEAR(again[i], M[i], coefficient_tolerance) << i;
-  // A function of the angle between the two directions is diagonal with one value a band (Funk-Hecke): 3/4 + z^2/4 here.
+  // A function of the angle between the two directions is diagonal with one value a band (Funk-Hecke): 3/4 + z^2/4
+  // here.
   auto zonal_T = [](glm::dvec3 a, glm::dvec3 b) { return 0.75 + 0.25 * glm::dot(a, b) * glm::dot(a, b); };
   const std::vector<double> zonal = project_sh_pair(3, 3, zonal_T, 5);
   const double band[3] = {10 * std::numbers::pi / 3, 0, 2 * std::numbers::pi / 15};
   for (int m = 0; m < 9; ++m)
-    for (int n = 0; n < 9; ++n) EXPECT_NEAR(zonal[size_t(m * 9 + n)], m == n ? band[sh_band(m)] : 0, coefficient_tolerance) << m << " " << n;
+    for (int n = 0; n < 9; ++n)
+      EXPECT_NEAR(zonal[size_t(m * 9 + n)], m == n ? band[sh_band(m)] : 0, coefficient_tolerance) << m << " " << n;
 }
 
 }  // namespace

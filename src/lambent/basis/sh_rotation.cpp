@@ -1,6 +1,6 @@
-// Follows: J. Ivanic and K. Ruedenberg, "Rotation matrices for real spherical harmonics. Direct determination by recursion",
-// J. Phys. Chem. 100 (1996) with the corrections of 102 (1998). Their harmonics lack the Condon-Shortley sign: element (m, n)
-// takes (-1)^(m+n) at the end.
+// Follows: J. Ivanic and K. Ruedenberg, "Rotation matrices for real spherical harmonics. Direct determination by
+// recursion", J. Phys. Chem. 100 (1996) with the corrections of 102 (1998). Their harmonics lack the Condon-Shortley
+// sign: element (m, n) takes (-1)^(m+n) at the end.
 #include <lambent/basis/sh.h>
 #include <lambent/core/check.h>
 

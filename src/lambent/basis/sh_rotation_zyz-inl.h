@@ -2,9 +2,10 @@
 // The rotation Rz(a) Rx(-90) Rz(b) Rx(90) Rz(c) over any number type T with + - * <, so that its work can be counted.
 // Source: local-deformable-prt, which gives the multiplications for n = 3 .. 9 as 53, 121, 217, 345, 509, 713, 961.
 //
-// A quarter turn about x swaps the parities in y and z and keeps that in x. A band's harmonics fall into four classes by parity,
-// cosines and sines of even and odd m, and each class maps to one class only: of the (2l+1)^2 entries l^2 + l + 1 are not zero,
-// in four dense blocks. The turn back is the transpose. Blocks of one entry are +-1 and cost nothing.
+// A quarter turn about x swaps the parities in y and z and keeps that in x. A band's harmonics fall into four classes
+// by parity, cosines and sines of even and odd m, and each class maps to one class only: of the (2l+1)^2 entries l^2 +
+// l + 1 are not zero, in four dense blocks. The turn back is the transpose. Blocks of one entry are +-1 and cost
+// nothing.
 #include <lambent/basis/sh.h>
 
 namespace lambent::zyz {
@@ -42,14 +43,15 @@ void quarter_turn(int first, int order, const T* blocks, bool back, const T* in,
           continue;
         }
         result = block[back ? r : r * n] * leading;
-        for (int k = 1; k < n; ++k) result = result + block[back ? k * n + r : r * n + k] * in[centre + class_m(from, k)];
+        for (int k = 1; k < n; ++k)
+          result = result + block[back ? k * n + r : r * n + k] * in[centre + class_m(from, k)];
       }
       block += n * n;
     }
 }
 
-// Two multiplications a multiple: cos(m+1)t + cos(m-1)t = 2 cos t cos mt, or cos(m+1)t - cos(m-1)t = -2 sin t sin mt, whichever
-// has the greater factor: each loses digits where its factor is small.
+// Two multiplications a multiple: cos(m+1)t + cos(m-1)t = 2 cos t cos mt, or cos(m+1)t - cos(m-1)t = -2 sin t sin mt,
+// whichever has the greater factor: each loses digits where its factor is small.
 template <class T>
 void turn_about_z(int first, int order, T cosine, T sine, T* f) {
   auto size = [](T x) { return x < T(0) ? -x : x; };

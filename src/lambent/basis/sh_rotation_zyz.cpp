@@ -1,6 +1,6 @@
-// Follows: local-deformable-prt (rotation by z-x-z-x-z). In SIMD lanes each class of a band (sh_rotation_zyz-inl.h), at most four
-// harmonics up to order 8, is one vector of four lanes, padded with zeros in the blocks: a turn about z has no shuffles, and a
-// quarter turn about x broadcasts lane after lane.
+// Follows: local-deformable-prt (rotation by z-x-z-x-z). In SIMD lanes each class of a band (sh_rotation_zyz-inl.h), at
+// most four harmonics up to order 8, is one vector of four lanes, padded with zeros in the blocks: a turn about z has
+// no shuffles, and a quarter turn about x broadcasts lane after lane.
 #include <lambent/basis/quadrature.h>
 #include <lambent/basis/sh_rotation_zyz-inl.h>
 #include <lambent/basis/sh_rotation_zyz.h>
@@ -60,8 +60,10 @@ HWY_INLINE Turn MakeTurn(float cosine, float sine) {
 
 HWY_INLINE void TurnAboutZ(const Turn& t, V4 f[4]) {
   const V4 c0 = f[0], c1 = f[1];
-  f[0] = hn::NegMulAdd(f[2], t.even_sin, hn::Mul(c0, t.even_cos)), f[2] = hn::MulAdd(c0, t.even_sin, hn::Mul(f[2], t.even_cos));
-  f[1] = hn::NegMulAdd(f[3], t.odd_sin, hn::Mul(c1, t.odd_cos)), f[3] = hn::MulAdd(c1, t.odd_sin, hn::Mul(f[3], t.odd_cos));
+  f[0] = hn::NegMulAdd(f[2], t.even_sin, hn::Mul(c0, t.even_cos)),
+  f[2] = hn::MulAdd(c0, t.even_sin, hn::Mul(f[2], t.even_cos));
+  f[1] = hn::NegMulAdd(f[3], t.odd_sin, hn::Mul(c1, t.odd_cos)),
+  f[3] = hn::MulAdd(c1, t.odd_sin, hn::Mul(f[3], t.odd_cos));
 }
 
 // Columns of one padded block; lanes of sines of even m begin at m = 0.
@@ -97,8 +99,8 @@ HWY_INLINE void RotateBand(const Turn turns[3], const float* HWY_RESTRICT column
     c_high = hn::ShiftRightLanes<7 - l>(d, hn::LoadU(d, centre + l - 3));
     s_low = hn::ShiftLeftLanes<7 - l>(d, hn::LoadU(d, centre - l));
   }
-  V4 f[4] = {hn::ConcatEven(d, c_high, c_low), hn::ConcatOdd(d, c_high, c_low), hn::Reverse(d, hn::ConcatOdd(d, s_high, s_low)),
-             hn::Reverse(d, hn::ConcatEven(d, s_high, s_low))};
+  V4 f[4] = {hn::ConcatEven(d, c_high, c_low), hn::ConcatOdd(d, c_high, c_low),
+             hn::Reverse(d, hn::ConcatOdd(d, s_high, s_low)), hn::Reverse(d, hn::ConcatEven(d, s_high, s_low))};
   TurnAboutZ(turns[2], f);
   const float* table = columns + size_t(l - 2) * 8 * 16;
   V4 g[4];
@@ -107,7 +109,8 @@ HWY_INLINE void RotateBand(const Turn turns[3], const float* HWY_RESTRICT column
   for (int c = 0; c < 4; ++c) f[zyz::class_source(l, c)] = Columns<width>(table + (4 + c) * 16, g[c]);
   TurnAboutZ(turns[0], f);
   HWY_ALIGN float cosines[8], sines[8];
-  hn::Store(hn::InterleaveLower(d, f[0], f[1]), d, cosines), hn::Store(hn::InterleaveUpper(d, f[0], f[1]), d, cosines + 4);
+  hn::Store(hn::InterleaveLower(d, f[0], f[1]), d, cosines),
+      hn::Store(hn::InterleaveUpper(d, f[0], f[1]), d, cosines + 4);
   hn::Store(hn::Reverse(d, hn::InterleaveLower(d, f[2], f[3])), d, sines + 4);
   hn::Store(hn::Reverse(d, hn::InterleaveUpper(d, f[2], f[3])), d, sines);
   std::memcpy(out + l * (l + 1), cosines, (l + 1) * sizeof(float));
@@ -117,12 +120,14 @@ HWY_INLINE void RotateBand(const Turn turns[3], const float* HWY_RESTRICT column
 // Bands 2 and up, order 3 .. simd_order.
 void RotateBands(int order, const EulerZyz& e, const float*, const float* columns, const float* in, float* out) {
   if (order <= 4) {
-    const Turn turns[3] = {MakeTurn<true>(e.cos_a, e.sin_a), MakeTurn<true>(e.cos_b, e.sin_b), MakeTurn<true>(e.cos_c, e.sin_c)};
+    const Turn turns[3] = {MakeTurn<true>(e.cos_a, e.sin_a), MakeTurn<true>(e.cos_b, e.sin_b),
+                           MakeTurn<true>(e.cos_c, e.sin_c)};
     RotateBand<2>(turns, columns, in, out);
     if (order > 3) RotateBand<3>(turns, columns, in, out);
     return;
   }
-  const Turn turns[3] = {MakeTurn<false>(e.cos_a, e.sin_a), MakeTurn<false>(e.cos_b, e.sin_b), MakeTurn<false>(e.cos_c, e.sin_c)};
+  const Turn turns[3] = {MakeTurn<false>(e.cos_a, e.sin_a), MakeTurn<false>(e.cos_b, e.sin_b),
+                         MakeTurn<false>(e.cos_c, e.sin_c)};
   RotateBand<2>(turns, columns, in, out);
   RotateBand<3>(turns, columns, in, out);
   RotateBand<4>(turns, columns, in, out);
@@ -157,7 +162,8 @@ const std::vector<double>& quarter_turn_blocks() {
       for (int c = 0; c < 4; ++c)
         for (int r = 0; r < class_size(l, c); ++r)
           for (int k = 0; k < class_size(l, c); ++k) {
-            const size_t i = size_t(sh_index(l, class_m(c, r))), j = size_t(sh_index(l, class_m(class_source(l, c), k)));
+            const size_t i = size_t(sh_index(l, class_m(c, r))),
+                         j = size_t(sh_index(l, class_m(class_source(l, c), k)));
             double sum = 0;
             for (size_t s = 0; s < nodes.size(); ++s) sum += y[s * count + i] * turned[s * count + j];
             result.push_back(sum);
@@ -230,7 +236,8 @@ void rotate_sh_zyz(const Mat3& R, std::span<const float> in, std::span<float> ou
   if (order < 3) return;
   const EulerZyz e = euler_zyz(R);
   const Tables& t = tables();
-  HWY_DYNAMIC_DISPATCH(RotateBands)(std::min(order, simd_order), e, t.blocks.data(), t.columns.data(), in.data(), out.data());
+  HWY_DYNAMIC_DISPATCH(RotateBands)
+  (std::min(order, simd_order), e, t.blocks.data(), t.columns.data(), in.data(), out.data());
   if (order <= simd_order) return;
   float f[sh_count(max_sh_order)], scratch[sh_count(max_sh_order)];
   const float angles[6] = {e.cos_a, e.sin_a, e.cos_b, e.sin_b, e.cos_c, e.sin_c};

@@ -29,9 +29,14 @@ glm::dmat3 about_y(double t) {
 
 // Skew ones, and those where Euler angles are awkward: the identity, half turns, b next to 0 and 180 degrees.
 std::vector<glm::dmat3> rotations() {
-  std::vector<glm::dmat3> all{glm::dmat3(1.0), about_z(1.1), about_y(std::numbers::pi), about_y(std::numbers::pi) * about_z(0.7),
-                              about_y(std::numbers::pi / 2), about_z(-2.0) * about_y(-1.2) * about_z(0.3)};
-  for (double b : {1e-3, 1e-5, 3e-8, 1e-20, std::numbers::pi - 1e-5}) all.push_back(about_z(0.8) * about_y(b) * about_z(-2.3));
+  std::vector<glm::dmat3> all{glm::dmat3(1.0),
+                              about_z(1.1),
+                              about_y(std::numbers::pi),
+                              about_y(std::numbers::pi) * about_z(0.7),
+                              about_y(std::numbers::pi / 2),
+                              about_z(-2.0) * about_y(-1.2) * about_z(0.3)};
+  for (double b : {1e-3, 1e-5, 3e-8, 1e-20, std::numbers::pi - 1e-5})
+    all.push_back(about_z(0.8) * about_y(b) * about_z(-2.3));
   Random random(11);
   for (int i = 0; i < 8; ++i) {
     const double a = 6.28 * random.next(), b = 3.14 * random.next(), c = 6.28 * random.next();
@@ -64,7 +69,8 @@ TEST(ShRotationZyz, AgreesWithTheDenseRotationAtEveryOrderAndSimdTarget) {
         rotate_sh_zyz(Mat3(R), fast, fast);  // in place
         hwy::SetSupportedTargetsForTest(0);
         for (size_t i = 0; i < f.size(); ++i)
-          ASSERT_NEAR(fast[i], dense[i], float_rounding) << hwy::TargetName(target) << " order " << order << " coefficient " << i;
+          ASSERT_NEAR(fast[i], dense[i], float_rounding)
+              << hwy::TargetName(target) << " order " << order << " coefficient " << i;
       }
     }
 }
@@ -133,7 +139,8 @@ TEST(ShRotationZyz, NeedsNoMoreMultiplicationsThanPublished) {
       std::vector<double> f(size_t(sh_count(order)), 1.0);
       const int count = count_rotation(order, a, b, c, f);
       EXPECT_LE(count, published[order - 3]) << order;
-      EXPECT_EQ(count, published[order - 3] - (order == 3 ? 6 : 8)) << "the blocks that are +-1: three in band 2, one in band 3, twice";
+      EXPECT_EQ(count, published[order - 3] - (order == 3 ? 6 : 8))
+          << "the blocks that are +-1: three in band 2, one in band 3, twice";
     }
 }
 

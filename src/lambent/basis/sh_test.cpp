@@ -29,8 +29,15 @@ TEST(Sh, LowBandsAreTheKnownPolynomials) {
   evaluate_sh(3, d, y);
   const double k0 = 0.28209479177387814, k1 = 0.48860251190291992, k2 = 1.0925484305920792, k20 = 0.31539156525252005,
                k22 = 0.54627421529603959;
-  const double expected[9] = {k0, -k1 * d.y, k1 * d.z, -k1 * d.x, k2 * d.x * d.y, -k2 * d.y * d.z,
-                              k20 * (3 * d.z * d.z - 1), -k2 * d.x * d.z, k22 * (d.x * d.x - d.y * d.y)};
+  const double expected[9] = {k0,
+                              -k1 * d.y,
+                              k1 * d.z,
+                              -k1 * d.x,
+                              k2 * d.x * d.y,
+                              -k2 * d.y * d.z,
+                              k20 * (3 * d.z * d.z - 1),
+                              -k2 * d.x * d.z,
+                              k22 * (d.x * d.x - d.y * d.y)};
   for (int i = 0; i < 9; ++i) EXPECT_NEAR(y[i], expected[i], 1e-14) << i;
 }
 
@@ -39,7 +46,8 @@ TEST(Sh, IsOrthonormalAtEveryOrder) {
   // Project every harmonic in one pass: the result must be the identity.
   for (int i : {0, 1, 3, 6, 35, 36, 77, 143, 144, 200, n - 1}) {
     std::vector<double> y(static_cast<size_t>(n));
-    auto c = project_sh(order, [&](glm::dvec3 d) { return evaluate_sh(order, d, y), y[size_t(i)]; }, 2 * order);
+    auto c = project_sh(
+        order, [&](glm::dvec3 d) { return evaluate_sh(order, d, y), y[size_t(i)]; }, 2 * order);
     for (int j = 0; j < n; ++j) EXPECT_NEAR(c[size_t(j)], i == j ? 1 : 0, 1e-12) << i << " " << j;
   }
 }
@@ -58,7 +66,8 @@ TEST(Sh, SatisfiesTheAdditionTheorem) {
 TEST(Sh, ProjectsAndReconstructsABandLimitedFunction) {
   for (int order = 1; order <= max_sh_order; ++order) {
     auto c = asymmetric_coefficients(order);
-    auto back = project_sh(order, [&](glm::dvec3 d) { return reconstruct_sh(c, Vec3(d)); }, 2 * order);
+    auto back = project_sh(
+        order, [&](glm::dvec3 d) { return reconstruct_sh(c, Vec3(d)); }, 2 * order);
     for (size_t i = 0; i < c.size(); ++i) EXPECT_NEAR(back[i], c[i], 10 * float_rounding);
   }
 }
@@ -72,7 +81,8 @@ TEST(Sh, RotationAgreesWithResampling) {
       rotate_sh(make_sh_rotation(order, R), c, turned);
       for (int k = 0; k < 20; ++k) {
         Vec3 s = square_to_sphere(sobol_owen(uint32_t(k), 3));
-        EXPECT_NEAR(reconstruct_sh(turned, s), reconstruct_sh(c, glm::transpose(R) * s), order * order * float_rounding);
+        EXPECT_NEAR(reconstruct_sh(turned, s), reconstruct_sh(c, glm::transpose(R) * s),
+                    order * order * float_rounding);
       }
     }
 }
@@ -80,8 +90,12 @@ TEST(Sh, RotationAgreesWithResampling) {
 TEST(Sh, ZyzRotatorAgreesWithDenseBlocks) {
   for (int order : {1, 4, 6, 12, 16}) {
     float a = 0.7f, b = 1.9f, g = -2.3f;
-    auto Rz = [](float t) { return Mat3(Vec3(std::cos(t), std::sin(t), 0), Vec3(-std::sin(t), std::cos(t), 0), Vec3(0, 0, 1)); };
-    auto Ry = [](float t) { return Mat3(Vec3(std::cos(t), 0, -std::sin(t)), Vec3(0, 1, 0), Vec3(std::sin(t), 0, std::cos(t))); };
+    auto Rz = [](float t) {
+      return Mat3(Vec3(std::cos(t), std::sin(t), 0), Vec3(-std::sin(t), std::cos(t), 0), Vec3(0, 0, 1));
+    };
+    auto Ry = [](float t) {
+      return Mat3(Vec3(std::cos(t), 0, -std::sin(t)), Vec3(0, 1, 0), Vec3(std::sin(t), 0, std::cos(t)));
+    };
     auto c = asymmetric_coefficients(order);
     std::vector<float> expected(c.size());
     rotate_sh(make_sh_rotation(order, Rz(a) * Ry(b) * Rz(g)), c, expected);
@@ -102,13 +116,16 @@ TEST(Sh, RotatesLinearBandAsAVector) {
 }
 
 TEST(Sh, ClampedCosineMatchesQuadrature) {
-  const double known[] = {std::numbers::pi, 2 * std::numbers::pi / 3, std::numbers::pi / 4, 0, -std::numbers::pi / 24, 0,
-                          std::numbers::pi / 64};
+  const double known[] = {
+      std::numbers::pi,     2 * std::numbers::pi / 3, std::numbers::pi / 4, 0, -std::numbers::pi / 24, 0,
+      std::numbers::pi / 64};
   for (int l = 0; l < 7; ++l) EXPECT_NEAR(clamped_cosine(l), known[l], 1e-14);
   // The kink at the horizon limits the quadrature: 400 nodes leave about 1e-4.
-  auto c = project_sh(12, [](glm::dvec3 d) { return std::max(0.0, d.z); }, 400);
+  auto c = project_sh(
+      12, [](glm::dvec3 d) { return std::max(0.0, d.z); }, 400);
   for (int l = 0; l < 12; ++l)
-    EXPECT_NEAR(c[size_t(sh_index(l, 0))], clamped_cosine(l) * std::sqrt((2 * l + 1) / (4 * std::numbers::pi)), 1e-4) << l;
+    EXPECT_NEAR(c[size_t(sh_index(l, 0))], clamped_cosine(l) * std::sqrt((2 * l + 1) / (4 * std::numbers::pi)), 1e-4)
+        << l;
 }
 
 TEST(ShWindow, FixedWindowsFallFromOne) {
@@ -135,7 +152,8 @@ TEST(ShWindow, AutomaticLiftsNegativeIrradianceAndLeavesSmoothLightAlone) {
     float lowest = INFINITY;
     std::vector<Vec3> e(c.begin(), c.end());
     for (size_t i = 0; i < e.size(); ++i) e[i] *= float(clamped_cosine(sh_band(int(i))));
-    for (uint32_t k = 0; k < 4000; ++k) lowest = std::min(lowest, luminance(reconstruct_sh(e, square_to_sphere(sobol_owen(k, 1)))));
+    for (uint32_t k = 0; k < 4000; ++k)
+      lowest = std::min(lowest, luminance(reconstruct_sh(e, square_to_sphere(sobol_owen(k, 1)))));
     return lowest;
   };
   ASSERT_LT(irradiance_min(light), -0.01f);
@@ -154,7 +172,8 @@ TEST(ShConvert, ScalesAsTheTablesSay) {
   const float sign[9] = {1, -1, 1, -1, 1, -1, 1, -1, 1};
   for (size_t i = 0; i < 9; ++i) EXPECT_EQ(three[i].x, sign[i]) << i;
   auto unity = convert_sh(light, ShConvention::unity);
-  const float unity_scale[9] = {0.282095f, 0.325735f, 0.325735f, 0.325735f, 0.273137f, 0.273137f, 0.078848f, 0.273137f, 0.136569f};
+  const float unity_scale[9] = {0.282095f, 0.325735f, 0.325735f, 0.325735f, 0.273137f,
+                                0.273137f, 0.078848f, 0.273137f, 0.136569f};
   for (size_t i = 0; i < 9; ++i) EXPECT_NEAR(unity[i].x, sign[i] * unity_scale[i], 2e-6) << i;
   // Constant white radiance 1 has the single coefficient sqrt(4 pi); Unity's first coefficient is then 1.
   EXPECT_NEAR(convert_sh(std::vector<Vec3>{Vec3(std::sqrt(4 * pi))}, ShConvention::unity)[0].x, 1.0f, 1e-6);

@@ -1,5 +1,6 @@
-// Follows: K. Schulten and R. Gordon, "Exact recursive evaluation of 3j- and 6j-coefficients for quantum-mechanical coupling of
-// angular momenta", J. Math. Phys. 16 (1975): their three-term recurrence in one degree, sum rule and sign convention.
+// Follows: K. Schulten and R. Gordon, "Exact recursive evaluation of 3j- and 6j-coefficients for quantum-mechanical
+// coupling of angular momenta", J. Math. Phys. 16 (1975): their three-term recurrence in one degree, sum rule and sign
+// convention.
 #include <lambent/basis/wigner.h>
 #include <lambent/core/check.h>
 
@@ -12,8 +13,8 @@ namespace lambent {
 Wigner3jFamily wigner_3j_family(int j2, int j3, int m2, int m3) {
   LAMBENT_CHECK(std::abs(m2) <= j2 && std::abs(m3) <= j3);
   const int m1 = -m2 - m3, first = std::max(std::abs(j2 - j3), std::abs(m1)), last = j2 + j3, count = last - first + 1;
-  // up(j) f(j+1) + at(j) f(j) + down(j) f(j-1) = 0. For j2 = j3 and m1 = 0 everything has the factor j (j + 1), which is divided
-  // out so that j = 0 is no exception.
+  // up(j) f(j+1) + at(j) f(j) + down(j) f(j-1) = 0. For j2 = j3 and m1 = 0 everything has the factor j (j + 1), which
+  // is divided out so that j = 0 is no exception.
   const bool reduced = first == 0 && j2 == j3 && m1 == 0;
   auto A = [&](double j) {
     const double a = j * j - double(j2 - j3) * (j2 - j3), b = double(j2 + j3 + 1) * (j2 + j3 + 1) - j * j;
@@ -28,12 +29,13 @@ Wigner3jFamily wigner_3j_family(int j2, int j3, int m2, int m3) {
   Wigner3jFamily family{first, std::vector<double>(size_t(count), 1.0)};
   std::vector<double>& f = family.values;
   if (count > 1) {
-    // Where the middle term is least beside the others the solutions oscillate most, far from where either end's decays: the two
-    // runs meet there.
+    // Where the middle term is least beside the others the solutions oscillate most, far from where either end's
+    // decays: the two runs meet there.
     int meet = first;
     double least = INFINITY;
     for (int j = first; j < last; ++j) {
-      const double outer = std::sqrt(up(j) * std::max(down(j), 1e-300)) + std::sqrt(std::max(up(j + 1), 1e-300) * down(j + 1));
+      const double outer = std::sqrt(up(j) * std::max(down(j), 1e-300)) +
+                           std::sqrt(std::max(up(j + 1), 1e-300) * down(j + 1));
       const double ratio = (std::abs(at(j)) + std::abs(at(j + 1))) / outer + 1e-9 * std::abs(2 * j - first - last + 1);
       if (ratio < least) least = ratio, meet = j;
     }

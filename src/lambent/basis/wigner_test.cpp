@@ -48,7 +48,8 @@ TEST(Wigner, AgreesWithRacahsSumAtSmallDegrees) {
         for (int m1 = -j1; m1 <= j1; ++m1)
           for (int m2 = -j2; m2 <= j2; ++m2)
             if (std::abs(m1 + m2) <= j3) {
-              EXPECT_NEAR(wigner_3j(j1, j2, j3, m1, m2, -m1 - m2), racah(j1, j2, j3, m1, m2, -m1 - m2), recurrence_rounding)
+              EXPECT_NEAR(wigner_3j(j1, j2, j3, m1, m2, -m1 - m2), racah(j1, j2, j3, m1, m2, -m1 - m2),
+                          recurrence_rounding)
                   << j1 << j2 << j3 << " " << m1 << " " << m2;
             }
 }
@@ -62,17 +63,20 @@ TEST(Wigner, ClosedFormsAtDegreeForty) {
         double expected = 0;
         if (s % 2 == 0) {
           const int g = s / 2;
-          const double triangle =
-              log_factorial(s - 2 * a) + log_factorial(s - 2 * b) + log_factorial(s - 2 * c) - log_factorial(s + 1);
-          expected = sign(g) * std::exp(0.5 * triangle + log_factorial(g) - log_factorial(g - a) - log_factorial(g - b) - log_factorial(g - c));
+          const double triangle = log_factorial(s - 2 * a) + log_factorial(s - 2 * b) + log_factorial(s - 2 * c) -
+                                  log_factorial(s + 1);
+          expected = sign(g) * std::exp(0.5 * triangle + log_factorial(g) - log_factorial(g - a) -
+                                        log_factorial(g - b) - log_factorial(g - c));
         }
         EXPECT_NEAR(wigner_3j(a, b, c, 0, 0, 0), expected, recurrence_rounding) << a << " " << b << " " << c;
       }
   for (int m : {-40, -13, 0, 7, 40})
     for (int n : {-30, -2, 5, 30}) {
       const int a = 40, b = 30, c = a + b;
-      const double above = log_factorial(2 * a) + log_factorial(2 * b) + log_factorial(c + m + n) + log_factorial(c - m - n);
-      const double below = log_factorial(2 * c + 1) + log_factorial(a + m) + log_factorial(a - m) + log_factorial(b + n) + log_factorial(b - n);
+      const double above = log_factorial(2 * a) + log_factorial(2 * b) + log_factorial(c + m + n) +
+                           log_factorial(c - m - n);
+      const double below = log_factorial(2 * c + 1) + log_factorial(a + m) + log_factorial(a - m) +
+                           log_factorial(b + n) + log_factorial(b - n);
       const double expected = sign(a - b + m + n) * std::exp(0.5 * (above - below));
       EXPECT_NEAR(wigner_3j(a, b, c, m, n, -m - n), expected, recurrence_rounding) << m << " " << n;
     }
@@ -85,7 +89,8 @@ TEST(Wigner, IsOrthogonal) {
     for (int other : {11, 41, 77}) {
       double sum = 0;
       for (int m1 = -j1; m1 <= j1; ++m1)
-        if (std::abs(m1 + m3) <= j2) sum += wigner_3j(j1, j2, j3, m1, -m1 - m3, m3) * wigner_3j(j1, j2, other, m1, -m1 - m3, m3);
+        if (std::abs(m1 + m3) <= j2)
+          sum += wigner_3j(j1, j2, j3, m1, -m1 - m3, m3) * wigner_3j(j1, j2, other, m1, -m1 - m3, m3);
       EXPECT_NEAR(sum, j3 == other ? 1.0 / (2 * j3 + 1) : 0, recurrence_rounding) << j3 << " " << other;
     }
 }

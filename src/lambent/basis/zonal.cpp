@@ -14,7 +14,9 @@ void lobe_to_zonal(std::span<double> c) {
 
 void evaluate_legendre(double x, std::span<double> out) {
   for (size_t l = 0; l < out.size(); ++l)
-    out[l] = l == 0 ? 1 : l == 1 ? x : ((2 * double(l) - 1) * x * out[l - 1] - (double(l) - 1) * out[l - 2]) / double(l);
+    out[l] = l == 0 ? 1
+           : l == 1 ? x
+                    : ((2 * double(l) - 1) * x * out[l - 1] - (double(l) - 1) * out[l - 2]) / double(l);
 }
 
 std::vector<double> project_zonal(int order, const std::function<double(double)>& f, std::span<const double> kinks) {

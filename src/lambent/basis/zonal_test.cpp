@@ -47,9 +47,11 @@ TEST(Zonal, ScalesThereAndBack) {
 
 TEST(Zonal, HasTheHarmonicsOfItsValues) {
   const ZonalSum sum = random_sum(6, 3, 1);
-  const std::vector<double> projected = project_sh(6, [&](glm::dvec3 d) { return evaluate_zonal(sum, d); }, 8);
+  const std::vector<double> projected = project_sh(
+      6, [&](glm::dvec3 d) { return evaluate_zonal(sum, d); }, 8);
   const std::vector<float> sh = zonal_to_sh(sum);
-  for (size_t k = 0; k < sh.size(); ++k) EXPECT_NEAR(sh[k], projected[k], 2e-6) << k;  // float rounding of values up to 3
+  for (size_t k = 0; k < sh.size(); ++k)
+    EXPECT_NEAR(sh[k], projected[k], 2e-6) << k;  // float rounding of values up to 3
 }
 
 TEST(Zonal, RotatesAsTheHarmonicsItStandsFor) {
@@ -84,7 +86,8 @@ TEST(Zonal, ConvolvesAsTheIntegralDoes) {
     const Vec3 s = random_axis(random);
     double integral = 0;
     for (const DirectionNode& node : direction_quadrature(order))
-      integral += node.weight * reconstruct_sh(f, Vec3(node.direction)) * evaluate_lobe(lobe, glm::dot(glm::dvec3(s), node.direction));
+      integral += node.weight * reconstruct_sh(f, Vec3(node.direction)) *
+                  evaluate_lobe(lobe, glm::dot(glm::dvec3(s), node.direction));
     EXPECT_NEAR(reconstruct_sh(out, s), integral, 2e-5);
   }
 }
@@ -147,8 +150,8 @@ TEST(Zonal, MembraneIsWhatEquation22Projects) {
       for (size_t k = 1; k <= l / 2; ++k) half *= double(k);
       const double L = double(l), sign = (l / 2) % 2 ? 1 : -1;  // (-1)^(l/2 - 1)
       const double printed = l == 1 ? 2.0 / 3 * (1 - alpha)
-                             : l % 2 ? 0.0
-                                     : 2 * (1 + alpha) * sign / ((L + 2) * (L - 1)) * factorial / (power * half * half);
+                           : l % 2  ? 0.0
+                                    : 2 * (1 + alpha) * sign / ((L + 2) * (L - 1)) * factorial / (power * half * half);
       EXPECT_NEAR(printed, numeric[l], 1e-12) << l;
     }
   }

@@ -1,4 +1,5 @@
-// The horizon is judged here, once for all alternatives. Lambert's law: f = albedo / pi, sampled with density cos(theta) / pi.
+// The horizon is judged here, once for all alternatives. Lambert's law: f = albedo / pi, sampled with density
+// cos(theta) / pi.
 #include <lambent/brdf/lobes.h>
 #include <lambent/core/sampling.h>
 

@@ -15,7 +15,8 @@ namespace {
 
 constexpr double pi_d = std::numbers::pi;
 
-// A measured table that no symmetry but reciprocity governs: a lobe of Gaussian slopes whose height varies with theta_d and phi_d.
+// A measured table that no symmetry but reciprocity governs: a lobe of Gaussian slopes whose height varies with theta_d
+// and phi_d.
 Measured skew_measured() {
   auto t = std::make_shared<MeasuredTable>();
   t->theta_h = 40, t->theta_d = 12, t->phi_d = 16;
@@ -24,7 +25,8 @@ Measured skew_measured() {
       for (int p = 0; p < t->phi_d; ++p) {
         const HalfDifference a = cell_angles(*t, h, d, p);
         const float slope = std::tan(std::min(a.theta_h, 1.5f)) / 0.25f;
-        const float lobe = std::exp(-slope * slope) * (0.5f + 0.5f * std::sin(a.theta_d)) * (1 + 0.5f * std::sin(2 * a.phi_d + 0.3f));
+        const float lobe = std::exp(-slope * slope) * (0.5f + 0.5f * std::sin(a.theta_d)) *
+                           (1 + 0.5f * std::sin(2 * a.phi_d + 0.3f));
         t->f.push_back(Vec3(0.15f, 0.1f, 0.05f) + Vec3(0.5f, 0.4f, 0.6f) * lobe);
       }
   prepare_sampling(*t);
@@ -58,15 +60,15 @@ const std::vector<Named>& brdfs() {
 }
 
 // Overhead, aslant at odd azimuths, and near the horizon.
-const std::vector<Vec3> eyes{Vec3(0, 0, 1), glm::normalize(Vec3(0.5f, 0.3f, 0.8f)), glm::normalize(Vec3(-0.4f, 0.9f, 0.5f)),
-                             glm::normalize(Vec3(-3, 2, 0.2f))};
+const std::vector<Vec3> eyes{Vec3(0, 0, 1), glm::normalize(Vec3(0.5f, 0.3f, 0.8f)),
+                             glm::normalize(Vec3(-0.4f, 0.9f, 0.5f)), glm::normalize(Vec3(-3, 2, 0.2f))};
 
 Vec3 direction(double theta, double phi) {
   return Vec3(glm::dvec3(std::sin(theta) * std::cos(phi), std::sin(theta) * std::sin(phi), std::cos(theta)));
 }
 
-// Midpoint rule over the hemisphere. Steps of azimuth grow as the square of the distance from the mirror's, since narrow lobes are
-// narrowest there when the eye is low: a degree or less, at 0.055 above the horizon.
+// Midpoint rule over the hemisphere. Steps of azimuth grow as the square of the distance from the mirror's, since
+// narrow lobes are narrowest there when the eye is low: a degree or less, at 0.055 above the horizon.
 struct Integrals {
   glm::dvec3 albedo{0.0};
   double pdf = 0;
@@ -77,7 +79,8 @@ Integrals integrate(const Brdf& brdf, Vec3 wo) {
   Integrals sum;
   for (int i = 0; i < rows; ++i)
     for (int j = 0; j < columns; ++j) {
-      const double theta = (i + 0.5) * pi_d / 2 / rows, t = 2 * (j + 0.5) / columns - 1, phi = mirror + pi_d * t * t * t;
+      const double theta = (i + 0.5) * pi_d / 2 / rows, t = 2 * (j + 0.5) / columns - 1,
+                   phi = mirror + pi_d * t * t * t;
       const double solid_angle = std::sin(theta) * (pi_d / 2 / rows) * (3 * pi_d * t * t * 2 / columns);
       const BrdfValue value = evaluate_with_pdf(brdf, direction(theta, phi), wo);
       sum.albedo += glm::dvec3(value.f) * (std::cos(theta) * solid_angle), sum.pdf += double(value.pdf) * solid_angle;
@@ -94,12 +97,14 @@ TEST(Brdf, Reciprocal) {
     for (int i = 0; i < 2000; ++i) {
       Vec3 a = square_to_cosine_hemisphere(random.next2()), b = square_to_cosine_hemisphere(random.next2());
       Vec3 ab = evaluate(brdf, a, b), ba = evaluate(brdf, b, a);
-      EXPECT_LE(glm::length(ab - ba), 1e-5f * glm::length(ab)) << name;  // a few roundings, of angles in measured tables
+      EXPECT_LE(glm::length(ab - ba), 1e-5f * glm::length(ab))
+          << name;  // a few roundings, of angles in measured tables
       EXPECT_GE(std::min({ab.x, ab.y, ab.z}), 0) << name;
     }
 }
 
-// No more leaves than arrives. glTF's own mix breaks this at grazing angles for smooth dielectrics: see GainsLittleAsGltf.
+// No more leaves than arrives. glTF's own mix breaks this at grazing angles for smooth dielectrics: see
+// GainsLittleAsGltf.
 TEST(Brdf, ReflectsNoMoreThanArrives) {
   for (const auto& [name, brdf] : brdfs())
     for (Vec3 wo : eyes) {
@@ -168,8 +173,8 @@ TEST(Brdf, MeanWeightIsAlbedo) {
 
 TEST(Brdf, SamplesFollowDensity) {
   SKIP_UNDER_SANITIZERS();
-  // Cells in even steps of sqrt(1 - z), of equal solid angle times their distance from the pole, so that lobes about the normal span
-  // several; and one cell for draws that came to nothing.
+  // Cells in even steps of sqrt(1 - z), of equal solid angle times their distance from the pole, so that lobes about
+  // the normal span several; and one cell for draws that came to nothing.
   constexpr int ns = 16, nphi = 24, draws = 60000, fine = 40;
   Random random(3);
   for (const auto& [name, brdf] : brdfs())
@@ -209,10 +214,17 @@ TEST(Brdf, NothingBelowTheHorizon) {
 }
 
 TEST(Brdf, FiniteAtTheEndsOfEveryRange) {
-  const std::vector<Brdf> extremes{
-      Phong{Vec3(0), Vec3(0), 0}, Phong{Vec3(0), Vec3(1), 1e5f}, Ggx{Vec3(0), Vec2(0)}, Ggx{Vec3(1), Vec2(1)},
-      CookTorrance{Vec3(0), Vec3(1), Vec3(0), 0}, CookTorrance{Vec3(0), Vec3(1), Vec3(1), 1}, Ward{Vec3(0), Vec3(1), Vec2(0)},
-      Ward{Vec3(0), Vec3(0), Vec2(1)}, MetallicRoughness{Vec3(0), 1, 0}, MetallicRoughness{Vec3(1), 0, 0}, skew_measured()};
+  const std::vector<Brdf> extremes{Phong{Vec3(0), Vec3(0), 0},
+                                   Phong{Vec3(0), Vec3(1), 1e5f},
+                                   Ggx{Vec3(0), Vec2(0)},
+                                   Ggx{Vec3(1), Vec2(1)},
+                                   CookTorrance{Vec3(0), Vec3(1), Vec3(0), 0},
+                                   CookTorrance{Vec3(0), Vec3(1), Vec3(1), 1},
+                                   Ward{Vec3(0), Vec3(1), Vec2(0)},
+                                   Ward{Vec3(0), Vec3(0), Vec2(1)},
+                                   MetallicRoughness{Vec3(0), 1, 0},
+                                   MetallicRoughness{Vec3(1), 0, 0},
+                                   skew_measured()};
   std::vector<Vec3> directions{Vec3(0, 0, 1)};
   for (float z : {2e-6f, 1e-4f, 0.5f})
     for (float phi : {0.0f, 1.0f, pi}) directions.push_back(glm::normalize(Vec3(std::cos(phi), std::sin(phi), z)));
@@ -225,7 +237,8 @@ TEST(Brdf, FiniteAtTheEndsOfEveryRange) {
       }
       for (Vec2 u : {Vec2(0), Vec2(last), Vec2(0, last), Vec2(last, 0), Vec2(0.5f)}) {
         const BrdfSample s = sample(brdf, wo, u);
-        EXPECT_TRUE(is_finite(s.wi) && is_finite(s.weight) && std::isfinite(s.pdf)) << brdf.index() << " " << u.x << " " << u.y;
+        EXPECT_TRUE(is_finite(s.wi) && is_finite(s.weight) && std::isfinite(s.pdf))
+            << brdf.index() << " " << u.x << " " << u.y;
       }
     }
 }
@@ -275,7 +288,8 @@ TEST(Ggx, OfWidthOneIsLommelSeeliger) {
   expect_formula(brdf, [](Vec3 wi, Vec3 wo) { return 1 / (2 * pi_d * (double(wi.z) + double(wo.z))); });
   for (Vec3 wo : eyes) {
     const double z = wo.z;
-    EXPECT_NEAR(integrate(brdf, wo).albedo.x, 1 - z * std::log((1 + z) / z), 1e-5);  // smooth: the quadrature is far better
+    EXPECT_NEAR(integrate(brdf, wo).albedo.x, 1 - z * std::log((1 + z) / z),
+                1e-5);  // smooth: the quadrature is far better
   }
 }
 
@@ -289,7 +303,8 @@ TEST(Ggx, QuarterTurnSwapsWidths) {
     EXPECT_NEAR(evaluate(b, turned(wi), turned(wo)).x, f, 1e-5f * f);
   }
   // The lobe is long along x: it is there that light off the mirror direction still arrives.
-  EXPECT_GT(evaluate(a, direction(0.6, 0), Vec3(0, 0, 1)).x, 3 * evaluate(a, direction(0.6, pi_d / 2), Vec3(0, 0, 1)).x);
+  EXPECT_GT(evaluate(a, direction(0.6, 0), Vec3(0, 0, 1)).x,
+            3 * evaluate(a, direction(0.6, pi_d / 2), Vec3(0, 0, 1)).x);
 }
 
 TEST(Phong, IsItsFormulaAndHasItsAlbedo) {
@@ -306,10 +321,12 @@ TEST(CookTorrance, IsItsFormula) {
   constexpr float f0 = 0.09f, m = 0.25f;
   expect_formula(CookTorrance{Vec3(0.2f), Vec3(0.5f), Vec3(f0), m}, [](Vec3 wi, Vec3 wo) {
     const glm::dvec3 h = half_vector(wi, wo);
-    const double c = glm::dot(glm::dvec3(wi), h), d = std::exp(-slope_exponent(h, m, m)) / (pi_d * m * m * std::pow(h.z, 4));
+    const double c = glm::dot(glm::dvec3(wi), h),
+                 d = std::exp(-slope_exponent(h, m, m)) / (pi_d * m * m * std::pow(h.z, 4));
     const double g = std::min({1.0, 2 * h.z * double(wo.z) / c, 2 * h.z * double(wi.z) / c});
     // Fresnel by Snell's law and the two polarisations.
-    const double n = (1 + std::sqrt(double(f0))) / (1 - std::sqrt(double(f0))), t = std::sqrt(1 - (1 - c * c) / (n * n));
+    const double n = (1 + std::sqrt(double(f0))) / (1 - std::sqrt(double(f0))),
+                 t = std::sqrt(1 - (1 - c * c) / (n * n));
     const double rs = (c - n * t) / (c + n * t), rp = (t - n * c) / (t + n * c);
     return double(0.2f) / pi_d + 0.5 * d * g * (rs * rs + rp * rp) / 2 / (4 * double(wi.z) * double(wo.z));
   });
@@ -327,7 +344,8 @@ TEST(Ward, IsItsFormulaAndKeepsItsEnergy) {
   EXPECT_NEAR(integrate(Ward{Vec3(0), Vec3(1), Vec2(0.1f)}, eyes[1]).albedo.x, 1, 0.03);
   Random random(8);
   for (Vec3 wo : eyes)
-    for (int i = 0; i < 2000; ++i) EXPECT_LE(sample(Ward{Vec3(0), Vec3(1), Vec2(0.3f)}, wo, random.next2()).weight.x, 2.0001f);
+    for (int i = 0; i < 2000; ++i)
+      EXPECT_LE(sample(Ward{Vec3(0), Vec3(1), Vec2(0.3f)}, wo, random.next2()).weight.x, 2.0001f);
 }
 
 TEST(MetallicRoughness, IsGgxOnABase) {
@@ -335,7 +353,8 @@ TEST(MetallicRoughness, IsGgxOnABase) {
   Random random(9);
   for (int i = 0; i < 500; ++i) {
     Vec3 wi = square_to_cosine_hemisphere(random.next2()), wo = square_to_cosine_hemisphere(random.next2());
-    const Vec3 metal = evaluate(MetallicRoughness{color, 1, 0.5f}, wi, wo), ggx = evaluate(Ggx{color, Vec2(0.25f)}, wi, wo);
+    const Vec3 metal = evaluate(MetallicRoughness{color, 1, 0.5f}, wi, wo),
+               ggx = evaluate(Ggx{color, Vec2(0.25f)}, wi, wo);
     EXPECT_LE(glm::length(metal - ggx), 1e-6f * glm::length(ggx));
     // Dielectric: 4 % at normal incidence, the rest goes to the base.
     const double c = glm::dot(glm::dvec3(wi), half_vector(wi, wo)), f = 0.04 + 0.96 * std::pow(1 - c, 5);
@@ -348,8 +367,8 @@ TEST(MetallicRoughness, IsGgxOnABase) {
 }
 
 TEST(MetallicRoughness, GainsLittleAsGltf) {
-  // The mix takes the Fresnel of h, so at grazing angles the base still gets most light while the coat reflects as well. docs/brdf.md
-  // gives these figures. What bounces on is the mean over all directions weighted by the cosine.
+  // The mix takes the Fresnel of h, so at grazing angles the base still gets most light while the coat reflects as
+  // well. docs/brdf.md gives these figures. What bounces on is the mean over all directions weighted by the cosine.
   for (float roughness : {0.1f, 0.3f, 0.6f}) {
     double white = 0, pale = 0, largest = 0;
     constexpr int steps = 20;
@@ -363,7 +382,8 @@ TEST(MetallicRoughness, GainsLittleAsGltf) {
     EXPECT_LE(white, 1.045) << roughness;
     EXPECT_LE(pale, 1.0) << roughness;
     EXPECT_LE(largest, 1.55) << roughness;
-    std::printf("white dielectric of roughness %.1f: albedo %.3f on the mean, %.3f at most\n", double(roughness), white, largest);
+    std::printf("white dielectric of roughness %.1f: albedo %.3f on the mean, %.3f at most\n", double(roughness), white,
+                largest);
   }
 }
 
@@ -373,7 +393,8 @@ TEST(Brdf, DiffusePartIsLambert) {
   for (int i = 0; i < 100; ++i) {
     Vec3 wi = square_to_cosine_hemisphere(random.next2()), wo = square_to_cosine_hemisphere(random.next2());
     const BrdfValue lambert = evaluate_with_pdf(Lambert{color}, wi, wo);
-    for (const Brdf& b : {Brdf(Phong{color, Vec3(0)}), Brdf(CookTorrance{color, Vec3(0)}), Brdf(Ward{color, Vec3(0)})}) {
+    for (const Brdf& b :
+         {Brdf(Phong{color, Vec3(0)}), Brdf(CookTorrance{color, Vec3(0)}), Brdf(Ward{color, Vec3(0)})}) {
       EXPECT_EQ(evaluate(b, wi, wo), lambert.f);
       EXPECT_FLOAT_EQ(pdf(b, wi, wo), lambert.pdf);
     }

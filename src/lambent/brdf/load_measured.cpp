@@ -1,5 +1,5 @@
-// W. Matusik et al., "A data-driven reflectance model", 2003 (MERL's file); Cornell Program of Computer Graphics, "Reflectance data"
-// (text); R. Franke and G. Nielson, "Smooth interpolation of large sets of scattered data", 1980.
+// W. Matusik et al., "A data-driven reflectance model", 2003 (MERL's file); Cornell Program of Computer Graphics,
+// "Reflectance data" (text); R. Franke and G. Nielson, "Smooth interpolation of large sets of scattered data", 1980.
 #include <lambent/brdf/load_measured.h>
 #include <lambent/core/check.h>
 #include <lambent/core/color.h>
@@ -21,12 +21,13 @@ constexpr double largest = 1e9;  // per steradian: a mirror measured to a hundre
 constexpr size_t header_bytes = 12;
 constexpr uint32_t most_cells = 360;  // along each angle
 
-// Cells that were not measured take the value of the nearest measured one at a smaller theta_d, else at a larger one; rows of which
-// nothing was measured that of the row before, or of the first measured row after.
+// Cells that were not measured take the value of the nearest measured one at a smaller theta_d, else at a larger one;
+// rows of which nothing was measured that of the row before, or of the first measured row after.
 void fill_unmeasured(MeasuredTable& t, const std::vector<bool>& measured) {
   const size_t d_stride = size_t(t.phi_d), row = d_stride * size_t(t.theta_d);
   const size_t none = size_t(t.theta_h) * d_stride;
-  size_t last_full = none, waiting = 0;  // columns (theta_h, phi_d) seen so far without any value wait for the first that has one
+  size_t last_full = none,
+         waiting = 0;  // columns (theta_h, phi_d) seen so far without any value wait for the first that has one
   auto column = [&](size_t c) { return c / d_stride * row + c % d_stride; };
   auto copy_column = [&](size_t to, size_t from) {
     for (size_t d = 0; d < size_t(t.theta_d); ++d) t.f[column(to) + d * d_stride] = t.f[column(from) + d * d_stride];
@@ -55,10 +56,12 @@ Result<MeasuredTable> load_merl(std::span<const uint8_t> bytes, const std::strin
   std::array<uint32_t, 3> counts;
   std::memcpy(counts.data(), bytes.data(), header_bytes);
   for (uint32_t n : counts)
-    if (n < 1 || n > most_cells) return Error{where, "is not a MERL table: its counts of cells are not between 1 and 360"};
+    if (n < 1 || n > most_cells)
+      return Error{where, "is not a MERL table: its counts of cells are not between 1 and 360"};
   const size_t cells = size_t(counts[0]) * counts[1] * counts[2], expected = header_bytes + cells * 3 * sizeof(double);
   if (bytes.size() != expected)
-    return Error{where, "is " + std::to_string(bytes.size()) + " bytes long; a table of its counts of cells has " + std::to_string(expected)};
+    return Error{where, "is " + std::to_string(bytes.size()) + " bytes long; a table of its counts of cells has " +
+                            std::to_string(expected)};
   MeasuredTable t;
   t.theta_h = int(counts[0]), t.theta_d = int(counts[1]), t.phi_d = int(counts[2]), t.f.resize(cells);
   std::vector<bool> measured(cells, true);
@@ -67,12 +70,15 @@ Result<MeasuredTable> load_merl(std::span<const uint8_t> bytes, const std::strin
     for (size_t i = 0; i < cells; ++i) {
       double x;
       std::memcpy(&x, bytes.data() + header_bytes + (c * cells + i) * sizeof x, sizeof x);
-      if (!std::isfinite(x)) return Error{where, "number " + std::to_string(c * cells + i) + " of the table is not finite"};
-      if (x * scale[c] > largest) return Error{where, "number " + std::to_string(c * cells + i) + " of the table is too large"};
+      if (!std::isfinite(x))
+        return Error{where, "number " + std::to_string(c * cells + i) + " of the table is not finite"};
+      if (x * scale[c] > largest)
+        return Error{where, "number " + std::to_string(c * cells + i) + " of the table is too large"};
       if (x < 0) measured[i] = false;
       t.f[i][int(c)] = float(std::max(x, 0.0) * scale[c]);
     }
-  if (std::find(measured.begin(), measured.end(), true) == measured.end()) return Error{where, "has no number that was measured"};
+  if (std::find(measured.begin(), measured.end(), true) == measured.end())
+    return Error{where, "has no number that was measured"};
   fill_unmeasured(t, measured);
   return t;
 }
@@ -82,7 +88,8 @@ Result<MeasuredTable> load_merl(std::span<const uint8_t> bytes, const std::strin
 // Numbers between blanks and comments, with the line that each is on.
 class NumberReader {
  public:
-  explicit NumberReader(std::span<const uint8_t> bytes) : p_(reinterpret_cast<const char*>(bytes.data())), end_(p_ + bytes.size()) {}
+  explicit NumberReader(std::span<const uint8_t> bytes)
+      : p_(reinterpret_cast<const char*>(bytes.data())), end_(p_ + bytes.size()) {}
 
   enum class Read { number, end, wrong };
   Read next(double& x) {
@@ -94,7 +101,8 @@ class NumberReader {
     }
     if (p_ == end_) return Read::end;
     auto [stop, status] = std::from_chars(p_, end_, x);
-    if (status == std::errc::result_out_of_range) x = 0, status = std::errc();  // underflow, or found out of range below
+    if (status == std::errc::result_out_of_range)
+      x = 0, status = std::errc();  // underflow, or found out of range below
     const bool ends = stop == end_ || *stop == ' ' || *stop == '\t' || *stop == '\r' || *stop == '\n' || *stop == '#';
     if (status != std::errc() || !ends) return Read::wrong;
     p_ = stop;
@@ -183,8 +191,8 @@ Result<MeasuredTable> load_cornell(std::span<const uint8_t> bytes, const std::st
 
 // --- Resampling
 
-// Where a sample lies for the purpose of distances: lobes change fast with theta_h and slowly with theta_d; phi_d matters in so far as
-// both others open, and its mirror image is the same.
+// Where a sample lies for the purpose of distances: lobes change fast with theta_h and slowly with theta_d; phi_d
+// matters in so far as both others open, and its mirror image is the same.
 Vec3 place(const HalfDifference& a) {
   constexpr float along_lobe = 4;
   return {along_lobe * std::sqrt(a.theta_h * (2 / pi)), a.theta_d * (2 / pi),
@@ -245,7 +253,8 @@ MeasuredTable resample_measured(std::span<const MeasuredSample> samples, int the
 Result<MeasuredTable> load_measured(std::span<const uint8_t> bytes, const std::string& where) {
   if (bytes.empty()) return Error{where, "is empty"};
   const auto head = bytes.first(std::min(bytes.size(), header_bytes));
-  const bool binary = std::find(head.begin(), head.end(), uint8_t{0}) != head.end();  // counts below 2^24 have a zero byte
+  const bool binary = std::find(head.begin(), head.end(), uint8_t{0}) !=
+                      head.end();  // counts below 2^24 have a zero byte
   auto table = binary ? load_merl(bytes, where) : load_cornell(bytes, where);
   if (!table) return table;
   table->name = std::filesystem::path(where).stem().string();

@@ -1,6 +1,6 @@
 #pragma once
-// Inside brdf/: what each alternative of Brdf provides. wi and wo lie above the horizon. `draw` gives a direction of density `pdf`,
-// or one below the horizon where nothing is drawn.
+// Inside brdf/: what each alternative of Brdf provides. wi and wo lie above the horizon. `draw` gives a direction of
+// density `pdf`, or one below the horizon where nothing is drawn.
 #include <lambent/brdf/brdf.h>
 
 namespace lambent {
@@ -37,8 +37,8 @@ inline bool take_first(float share, Vec2& u) {
 
 inline Vec3 reflect_about(Vec3 h, Vec3 w) { return 2 * glm::dot(w, h) * h - w; }
 
-// Half vectors whose slopes h_x/h_z and h_y/h_z are Gaussian of variances alpha^2 / 2: Beckmann's normals weighted by their cosine.
-// Density per steradian of h: exp(-(h_x^2/a_x^2 + h_y^2/a_y^2) / h_z^2) / (pi a_x a_y h_z^3).
+// Half vectors whose slopes h_x/h_z and h_y/h_z are Gaussian of variances alpha^2 / 2: Beckmann's normals weighted by
+// their cosine. Density per steradian of h: exp(-(h_x^2/a_x^2 + h_y^2/a_y^2) / h_z^2) / (pi a_x a_y h_z^3).
 float gaussian_slope_density(Vec2 alpha, Vec3 h);
 Vec3 draw_gaussian_slopes(Vec2 alpha, Vec2 u);
 

@@ -1,6 +1,6 @@
-// Look-up is trilinear between cell centres and periodic in phi_d, so it is reciprocal as the parametrisation is. Half the draws
-// follow the cosine and half a lobe of half vectors: for microfacets f = D F G / (4 cos cos), so the mean of 4 f cos cos over the
-// difference angles, times the cosine of h, is in proportion to the density of their normals.
+// Look-up is trilinear between cell centres and periodic in phi_d, so it is reciprocal as the parametrisation is. Half
+// the draws follow the cosine and half a lobe of half vectors: for microfacets f = D F G / (4 cos cos), so the mean of
+// 4 f cos cos over the difference angles, times the cosine of h, is in proportion to the density of their normals.
 #include <lambent/brdf/lobes.h>
 #include <lambent/brdf/measured.h>
 #include <lambent/core/check.h>
@@ -28,14 +28,18 @@ Tap tap(float fraction, int cells, bool periodic) {
 }
 
 Vec3 look_up(const MeasuredTable& t, const HalfDifference& a) {
-  const Tap h = tap(half_fraction(a.theta_h), t.theta_h, false), d = tap(std::min(a.theta_d * (2 / pi), 1.0f), t.theta_d, false);
+  const Tap h = tap(half_fraction(a.theta_h), t.theta_h, false),
+            d = tap(std::min(a.theta_d * (2 / pi), 1.0f), t.theta_d, false);
   const Tap p = tap(std::min(a.phi_d / pi, 1.0f), t.phi_d, true);
-  auto along_phi = [&](int hi, int di) { return glm::mix(t.f[t.index(hi, di, p.first)], t.f[t.index(hi, di, p.second)], p.share); };
+  auto along_phi = [&](int hi, int di) {
+    return glm::mix(t.f[t.index(hi, di, p.first)], t.f[t.index(hi, di, p.second)], p.share);
+  };
   auto along_d = [&](int hi) { return glm::mix(along_phi(hi, d.first), along_phi(hi, d.second), d.share); };
   return glm::mix(along_d(h.first), along_d(h.second), h.share);
 }
 
-// 1 - cos(theta_h) at the edge between cells i - 1 and i of n. It keeps its digits near 0, where the cosine would lose them.
+// 1 - cos(theta_h) at the edge between cells i - 1 and i of n. It keeps its digits near 0, where the cosine would lose
+// them.
 double edge_drop(int i, int n) {
   const double fraction = double(i) / n, s = std::sin(std::numbers::pi / 4 * fraction * fraction);
   return 2 * s * s;
@@ -60,14 +64,16 @@ HalfDifference half_difference(Vec3 wi, Vec3 wo) {
 }
 
 DirectionPair directions(const HalfDifference& a) {
-  const Vec3 along(std::cos(a.theta_h), 0, -std::sin(a.theta_h)), across(0, 1, 0), h(std::sin(a.theta_h), 0, std::cos(a.theta_h));
+  const Vec3 along(std::cos(a.theta_h), 0, -std::sin(a.theta_h)), across(0, 1, 0),
+      h(std::sin(a.theta_h), 0, std::cos(a.theta_h));
   const Vec3 aside = std::sin(a.theta_d) * (std::cos(a.phi_d) * along + std::sin(a.phi_d) * across);
   return {std::cos(a.theta_d) * h + aside, std::cos(a.theta_d) * h - aside};
 }
 
 HalfDifference cell_angles(const MeasuredTable& t, int h, int d, int p) {
   const float fraction = (float(h) + 0.5f) / float(t.theta_h);
-  return {pi / 2 * fraction * fraction, pi / 2 * (float(d) + 0.5f) / float(t.theta_d), pi * (float(p) + 0.5f) / float(t.phi_d)};
+  return {pi / 2 * fraction * fraction, pi / 2 * (float(d) + 0.5f) / float(t.theta_d),
+          pi * (float(p) + 0.5f) / float(t.phi_d)};
 }
 
 void prepare_sampling(MeasuredTable& t) {
@@ -103,7 +109,8 @@ void prepare_sampling(MeasuredTable& t) {
 BrdfValue value_above(const Measured& b, Vec3 wi, Vec3 wo) {
   const MeasuredTable& t = *b.table;
   const HalfDifference a = half_difference(wi, wo);
-  const float lobe = t.lobe[size_t(half_cell(t, a.theta_h))] / (2 * glm::length(wi + wo));  // |wi + wo| = 2 cos(theta_d)
+  const float lobe = t.lobe[size_t(half_cell(t, a.theta_h))] /
+                     (2 * glm::length(wi + wo));  // |wi + wo| = 2 cos(theta_d)
   return {look_up(t, a), cosine_share * wi.z / pi + (1 - cosine_share) * lobe};
 }
 

@@ -109,8 +109,8 @@ Brdf measured_of(const std::string& file) {
 }
 
 TEST(LoadMerl, ReadsBackAKnownBrdf) {
-  // Full size. Trilinear between cells of 1 degree and 0.02 degrees or more of theta_h: below 1 % away from grazing, where D, F and G
-  // of this width are smooth.
+  // Full size. Trilinear between cells of 1 degree and 0.02 degrees or more of theta_h: below 1 % away from grazing,
+  // where D, F and G of this width are smooth.
   const Brdf known = Ggx{Vec3(0.9f, 0.5f, 0.2f), Vec2(0.3f)};
   const std::string file = merl_file(known, 90, 90, 180);
   EXPECT_EQ(file.size(), 34992012u);  // what files of the data base have
@@ -181,7 +181,8 @@ TEST(LoadMerl, RefusesWhatIsBroken) {
 
 // --- Cornell
 
-// The directions that the Cornell files have: theta_i 10 to 80 degrees, theta_o ten steps to 79 degrees, azimuths about every 10.
+// The directions that the Cornell files have: theta_i 10 to 80 degrees, theta_o ten steps to 79 degrees, azimuths about
+// every 10.
 std::string cornell_file(const Brdf& brdf, const std::function<double(double)>& spectrum) {
   std::string text = "# made by a test\n\n31 # wavelengths\n";
   for (int nm = 400; nm <= 700; nm += 10) text += fmt::format("{} ", nm);
@@ -189,7 +190,8 @@ std::string cornell_file(const Brdf& brdf, const std::function<double(double)>& 
   for (int i = 1; i <= 8; ++i)
     for (int j = 0; j < 10; ++j)
       for (int k = 0; k <= 18; ++k) {
-        const double ti = glm::radians(10.0 * i), to = glm::radians(std::min(8.2 * j + 0.06 * j * j, 79.0)), po = glm::radians(-10.0 * k);
+        const double ti = glm::radians(10.0 * i), to = glm::radians(std::min(8.2 * j + 0.06 * j * j, 79.0)),
+                     po = glm::radians(-10.0 * k);
         if (j == 0 && k > 0) continue;
         const float f = evaluate(brdf, direction(ti, 0), direction(to, po)).x;
         text += fmt::format("{:.6f} {:.6f} {:.6f} {:.6f}", ti, 0.0, to, po);
@@ -200,8 +202,8 @@ std::string cornell_file(const Brdf& brdf, const std::function<double(double)>& 
 }
 
 TEST(LoadCornell, ReadsBackAKnownBrdf) {
-  // 1,400 samples, ten degrees apart, say of a lobe of this width what a mean of neighbours can: half of the hemisphere's pairs are
-  // within 1 % (outside the lobe), nine tenths within 8 %.
+  // 1,400 samples, ten degrees apart, say of a lobe of this width what a mean of neighbours can: half of the
+  // hemisphere's pairs are within 1 % (outside the lobe), nine tenths within 8 %.
   const Brdf known = Phong{Vec3(0.3f), Vec3(0.6f), 12};
   const Brdf read = measured_of(cornell_file(known, [](double) { return 1.0; }));
   Random random(3);
@@ -215,8 +217,8 @@ TEST(LoadCornell, ReadsBackAKnownBrdf) {
     EXPECT_NEAR(b.z, b.x, 1e-4f * b.x);
   }
   std::sort(errors.begin(), errors.end());
-  std::printf("relative error: median %.4f, 90 %% below %.4f, largest %.4f\n", errors[errors.size() / 2], errors[errors.size() * 9 / 10],
-              errors.back());
+  std::printf("relative error: median %.4f, 90 %% below %.4f, largest %.4f\n", errors[errors.size() / 2],
+              errors[errors.size() * 9 / 10], errors.back());
   EXPECT_LT(errors[errors.size() / 2], 0.01);
   EXPECT_LT(errors[errors.size() * 9 / 10], 0.08);
 }
@@ -235,7 +237,8 @@ TEST(LoadCornell, ColoursOfSpectra) {
   EXPECT_GT(blue.z, 0.4f);
   EXPECT_LT(std::max(blue.x, blue.y), 0.1f);
   // Two halves of the spectrum add up to the whole.
-  const Vec3 low = color([](double nm) { return nm < 545 ? 0.9 : 0.3; }), high = color([](double nm) { return nm < 545 ? 0.1 : 0.7; });
+  const Vec3 low = color([](double nm) { return nm < 545 ? 0.9 : 0.3; }),
+             high = color([](double nm) { return nm < 545 ? 0.1 : 0.7; });
   for (int c = 0; c < 3; ++c) EXPECT_NEAR(low[c] + high[c], 0.5f, 1e-3f);
 }
 
@@ -274,7 +277,8 @@ TEST(LoadCornell, RefusesWhatIsBroken) {
   EXPECT_EQ(error(good + "0.1 0 0.2 1 1 2 3 4 5 6 # end"), "");
   EXPECT_EQ(error(""), "x.brdf: is empty");
   EXPECT_EQ(error("hello"), "x.brdf: is neither a MERL table nor text that begins with the number of wavelengths");
-  EXPECT_EQ(error("# nothing\n"), "x.brdf: is neither a MERL table nor text that begins with the number of wavelengths");
+  EXPECT_EQ(error("# nothing\n"),
+            "x.brdf: is neither a MERL table nor text that begins with the number of wavelengths");
   EXPECT_EQ(error("1e9\n"), "x.brdf:1: the number of wavelengths is not between 3 and 1000");
   EXPECT_EQ(error("3.5\n"), "x.brdf:1: the number of wavelengths is not between 3 and 1000");
   EXPECT_EQ(error("3\n440 430 640\n"), "x.brdf:2: the wavelengths do not rise");
@@ -313,8 +317,8 @@ TEST(LoadCornell, MeasuredPaints) {
       }
       const glm::dvec3 albedo = sum / double(draws);
       const double mean = double(luminance(Vec3(albedo))), deviation = std::sqrt(squares / draws - mean * mean);
-      std::printf("%s, eye at %.0f degrees: albedo %.3f %.3f %.3f, deviation of a draw %.2f of the mean\n", name, degrees, albedo.x, albedo.y,
-                  albedo.z, deviation / mean);
+      std::printf("%s, eye at %.0f degrees: albedo %.3f %.3f %.3f, deviation of a draw %.2f of the mean\n", name,
+                  degrees, albedo.x, albedo.y, albedo.z, deviation / mean);
       EXPECT_LT(std::max({albedo.x, albedo.y, albedo.z}), 1.0);
       EXPECT_GT(mean, 0.01);
       EXPECT_LT(deviation / mean, 4);

@@ -1,7 +1,8 @@
-// R. Cook and K. Torrance, "A reflectance model for computer graphics", 1982; B. Walter et al., "Microfacet models for refraction
-// through rough surfaces", 2007 (GGX); E. Heitz, "Understanding the masking-shadowing function in microfacet-based BRDFs", 2014
-// (anisotropic Smith, eq. 72 and 86; height correlation, eq. 99); C. Schlick, "An inexpensive BRDF model for physically-based
-// rendering", 1994; J. Dupuy and A. Benyoub, "Sampling visible GGX normals with spherical caps", 2023; glTF 2.0, appendix B.
+// R. Cook and K. Torrance, "A reflectance model for computer graphics", 1982; B. Walter et al., "Microfacet models for
+// refraction through rough surfaces", 2007 (GGX); E. Heitz, "Understanding the masking-shadowing function in
+// microfacet-based BRDFs", 2014 (anisotropic Smith, eq. 72 and 86; height correlation, eq. 99); C. Schlick, "An
+// inexpensive BRDF model for physically-based rendering", 1994; J. Dupuy and A. Benyoub, "Sampling visible GGX normals
+// with spherical caps", 2023; glTF 2.0, appendix B.
 #include <lambent/brdf/lobes.h>
 #include <lambent/core/sampling.h>
 
@@ -16,7 +17,8 @@ float fifth_power(float x) {
 }
 Vec3 schlick(Vec3 f0, float cosine) { return f0 + (Vec3(1) - f0) * fifth_power(std::max(0.0f, 1 - cosine)); }
 
-// Fresnel's equations for unpolarised light and an index n that reflects f0 at normal incidence (Cook and Torrance, section 3.2).
+// Fresnel's equations for unpolarised light and an index n that reflects f0 at normal incidence (Cook and Torrance,
+// section 3.2).
 float fresnel(float f0, float cosine) {
   const float root = std::sqrt(f0);
   if (root > 0.9999f) return 1;
@@ -36,7 +38,8 @@ struct GgxLobe {
   float cosine;  // wi . h
 };
 
-// With Lambda = (2 root / z - 1) / 2, G2 / (z_i z_o) = 1 / (z_o root_i + z_i root_o), and G1(wo) / z_o = 1 / (z_o / 2 + root_o).
+// With Lambda = (2 root / z - 1) / 2, G2 / (z_i z_o) = 1 / (z_o root_i + z_i root_o), and G1(wo) / z_o = 1 / (z_o / 2 +
+// root_o).
 GgxLobe ggx_lobe(Vec2 alpha, Vec3 wi, Vec3 wo) {
   const Vec3 sum = wi + wo;
   const float length = glm::length(sum);
@@ -46,8 +49,8 @@ GgxLobe ggx_lobe(Vec2 alpha, Vec3 wi, Vec3 wo) {
   return {d / (4 * (wo.z * root_i + wi.z * root_o)), d / (4 * (0.5f * wo.z + root_o)), length / 2};
 }
 
-// Normals visible from wo: the surface is stretched so that it is a hemisphere, on which they are the bisectors of wo with a
-// direction uniform over a spherical cap.
+// Normals visible from wo: the surface is stretched so that it is a hemisphere, on which they are the bisectors of wo
+// with a direction uniform over a spherical cap.
 Vec3 draw_visible_normal(Vec2 alpha, Vec3 wo, Vec2 u) {
   const Vec3 w = glm::normalize(Vec3(alpha.x * wo.x, alpha.y * wo.y, wo.z));
   const float phi = 2 * pi * u.x, z = (1 - u.y) * (1 + w.z) - w.z, r = std::sqrt(std::clamp(1 - z * z, 0.0f, 1.0f));
@@ -62,7 +65,8 @@ struct Layers {
 };
 Layers layers(const MetallicRoughness& b) {
   constexpr float dielectric = 0.04f;
-  return {widths(Vec2(b.roughness * b.roughness)), b.base_color * (1 - b.metallic), glm::mix(Vec3(dielectric), b.base_color, b.metallic)};
+  return {widths(Vec2(b.roughness * b.roughness)), b.base_color * (1 - b.metallic),
+          glm::mix(Vec3(dielectric), b.base_color, b.metallic)};
 }
 float diffuse_share(const Layers& l, Vec3 wo) {
   const Vec3 f = schlick(l.f0, wo.z);

@@ -141,7 +141,8 @@ Result<Brdf> parse_brdf(std::string_view text) {
   }
   if (name == "ward") {
     Ward b;
-    s.number("ax", b.alpha.x), s.number("ay", b.alpha.y), s.color("diffuse", b.diffuse), s.color("specular", b.specular);
+    s.number("ax", b.alpha.x), s.number("ay", b.alpha.y), s.color("diffuse", b.diffuse),
+        s.color("specular", b.specular);
     s.check_sum(b.diffuse, b.specular);
     return s.finish(b);
   }
@@ -150,7 +151,8 @@ Result<Brdf> parse_brdf(std::string_view text) {
     s.color("color", b.base_color), s.number("metallic", b.metallic), s.number("roughness", b.roughness);
     return s.finish(b);
   }
-  return Error{"", "no reflection model " + quoted(name) + ": lambert, phong, ggx, cook-torrance, ward, metallic-roughness or measured"};
+  return Error{"", "no reflection model " + quoted(name) +
+                       ": lambert, phong, ggx, cook-torrance, ward, metallic-roughness or measured"};
 }
 
 }  // namespace lambent

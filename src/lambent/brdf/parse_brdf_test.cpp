@@ -60,7 +60,8 @@ TEST(ParseBrdf, Measured) {
 }
 
 TEST(ParseBrdf, RefusesInOneLine) {
-  EXPECT_EQ(error("glass"), "no reflection model \"glass\": lambert, phong, ggx, cook-torrance, ward, metallic-roughness or measured");
+  EXPECT_EQ(error("glass"),
+            "no reflection model \"glass\": lambert, phong, ggx, cook-torrance, ward, metallic-roughness or measured");
   EXPECT_EQ(error("lambert:colour=1"), "lambert: there is no \"colour\"; it takes albedo");
   EXPECT_EQ(error("ggx:roughness"), "ggx: \"roughness\" is not of the form key=value");
   EXPECT_EQ(error("ggx:roughness=0.3,roughness=0.4"), "ggx: \"roughness\" is given twice");

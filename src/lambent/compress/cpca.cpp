@@ -1,6 +1,6 @@
-// Follows: general-prt, "Clustered PCA". Clusters begin as runs of receivers along their space-filling curve, so as neighbours on
-// the surface; then each receiver goes to whichever of the nearest clusters represents it best, and each cluster's components are
-// found anew by subspace iteration.
+// Follows: general-prt, "Clustered PCA". Clusters begin as runs of receivers along their space-filling curve, so as
+// neighbours on the surface; then each receiver goes to whichever of the nearest clusters represents it best, and each
+// cluster's components are found anew by subspace iteration.
 #include <lambent/compress/cpca.h>
 #include <lambent/core/half.h>
 #include <lambent/core/parallel.h>
@@ -35,7 +35,8 @@ float Dot(const float* a, const float* b, size_t n) {
 
 void AddScaled(float f, const float* a, size_t n, float* out) {
   const F d;
-  for (size_t i = 0; i < n; i += hn::Lanes(d)) hn::StoreU(hn::MulAdd(hn::Set(d, f), hn::LoadU(d, a + i), hn::LoadU(d, out + i)), d, out + i);
+  for (size_t i = 0; i < n; i += hn::Lanes(d))
+    hn::StoreU(hn::MulAdd(hn::Set(d, f), hn::LoadU(d, a + i), hn::LoadU(d, out + i)), d, out + i);
 }
 
 }  // namespace HWY_NAMESPACE
@@ -98,13 +99,15 @@ struct Compressor {
       std::vector<std::vector<float>> Y(Q.size(), std::vector<float>(stride, 0.0f));
       for (uint32_t r : members) {
         for (size_t k = 0; k < stride; ++k) centred[k] = value(r)[k] - cluster.mean[k];
-        for (size_t i = 0; i < Q.size(); ++i) add_scaled(dot(Q[i].data(), centred.data(), stride), centred.data(), stride, Y[i].data());
+        for (size_t i = 0; i < Q.size(); ++i)
+          add_scaled(dot(Q[i].data(), centred.data(), stride), centred.data(), stride, Y[i].data());
       }
       Q = std::move(Y);
       for (size_t i = 0; i < Q.size(); ++i) {
         const float before = std::sqrt(dot(Q[i].data(), Q[i].data(), stride));
         for (int again = 0; again < 2; ++again)
-          for (size_t j = 0; j < i; ++j) add_scaled(-dot(Q[i].data(), Q[j].data(), stride), Q[j].data(), stride, Q[i].data());
+          for (size_t j = 0; j < i; ++j)
+            add_scaled(-dot(Q[i].data(), Q[j].data(), stride), Q[j].data(), stride, Q[i].data());
         const float after = std::sqrt(dot(Q[i].data(), Q[i].data(), stride));
         // Fewer members than components, or all alike: what is left is rounding.
         const float scale = after > 1e-5f * before && after > 0 ? 1 / after : 0.0f;
@@ -141,13 +144,16 @@ struct Compressor {
       for (size_t r = begin; r < end; ++r) {
         near.clear();
         for (size_t c = 0; c < clusters.size(); ++c)  // |v - m|^2 less |v|^2
-          near.push_back({dot(clusters[c].mean.data(), clusters[c].mean.data(), stride) - 2 * dot(value(r), clusters[c].mean.data(), stride), uint16_t(c)});
+          near.push_back({dot(clusters[c].mean.data(), clusters[c].mean.data(), stride) -
+                              2 * dot(value(r), clusters[c].mean.data(), stride),
+                          uint16_t(c)});
         const size_t tried = std::min(near_clusters, near.size());
         std::partial_sort(near.begin(), near.begin() + ptrdiff_t(tried), near.end());
         uint16_t best = cluster_of[r];
         double least = error(clusters[best], r, centred, nullptr);
         for (size_t i = 0; i < tried; ++i)
-          if (const double e = error(clusters[near[i].second], r, centred, nullptr); e < least) least = e, best = near[i].second;
+          if (const double e = error(clusters[near[i].second], r, centred, nullptr); e < least)
+            least = e, best = near[i].second;
         cluster_of[r] = best;
       }
     });
@@ -156,11 +162,15 @@ struct Compressor {
 
 }  // namespace
 
-Result<CpcaTransfer> compress_cpca(const Transfer& transfer, const CpcaOptions& options, double* error, Progress* progress) {
+Result<CpcaTransfer> compress_cpca(const Transfer& transfer, const CpcaOptions& options, double* error,
+                                   Progress* progress) {
   if (options.clusters < 1 || size_t(options.clusters) > std::min<size_t>(transfer.receivers, 65535))
-    return Error{"clusters", "must lie between 1 and the number of receivers (at most 65535), not " + std::to_string(options.clusters)};
-  if (options.rank < 0 || options.rank > 64) return Error{"rank", "must lie between 0 and 64, not " + std::to_string(options.rank)};
-  if (options.iterations < 1 || options.iterations > 64) return Error{"iterations", "must lie between 1 and 64, not " + std::to_string(options.iterations)};
+    return Error{"clusters", "must lie between 1 and the number of receivers (at most 65535), not " +
+                                 std::to_string(options.clusters)};
+  if (options.rank < 0 || options.rank > 64)
+    return Error{"rank", "must lie between 0 and 64, not " + std::to_string(options.rank)};
+  if (options.iterations < 1 || options.iterations > 64)
+    return Error{"iterations", "must lie between 1 and 64, not " + std::to_string(options.iterations)};
   Compressor c{transfer, options};
   c.unpack();
   c.fit_all();
@@ -172,14 +182,16 @@ Result<CpcaTransfer> compress_cpca(const Transfer& transfer, const CpcaOptions& 
   }
 
   CpcaTransfer out;
-  out.light = transfer.light, out.rows = transfer.rows, out.channels = transfer.channels, out.receivers = transfer.receivers;
+  out.light = transfer.light, out.rows = transfer.rows, out.channels = transfer.channels,
+  out.receivers = transfer.receivers;
   out.clusters = options.clusters, out.rank = options.rank, out.cluster_of = c.cluster_of;
   const size_t rank = size_t(options.rank);
   for (Cluster& cluster : c.clusters) {
     if (cluster.mean.empty()) cluster.mean.assign(c.stride, 0.0f);
     cluster.components.resize(rank, std::vector<float>(c.stride, 0.0f));
     out.vectors.insert(out.vectors.end(), cluster.mean.begin(), cluster.mean.begin() + ptrdiff_t(c.D));
-    for (const auto& q : cluster.components) out.vectors.insert(out.vectors.end(), q.begin(), q.begin() + ptrdiff_t(c.D));
+    for (const auto& q : cluster.components)
+      out.vectors.insert(out.vectors.end(), q.begin(), q.begin() + ptrdiff_t(c.D));
   }
   out.weights.resize(c.n * rank);
   std::vector<double> errors(c.n), sizes(c.n);
@@ -195,7 +207,8 @@ Result<CpcaTransfer> compress_cpca(const Transfer& transfer, const CpcaOptions& 
       }
     }
   });
-  const double difference = std::accumulate(errors.begin(), errors.end(), 0.0), total = std::accumulate(sizes.begin(), sizes.end(), 0.0);
+  const double difference = std::accumulate(errors.begin(), errors.end(), 0.0),
+               total = std::accumulate(sizes.begin(), sizes.end(), 0.0);
   if (error) *error = total > 0 ? std::sqrt(difference / total) : 0;
   return out;
 }

@@ -85,7 +85,9 @@ TEST(Cpca, RelightsWhatItHolds) {
       for (int row = 0; row < 3; ++row)
         for (int ch = 0; ch < 3; ++ch) {
           double sum = 0;
-          for (size_t k = 0; k < 16; ++k) sum += double(t[(size_t(row) * size_t(channels) + (channels == 3 ? size_t(ch) : 0)) * 16 + k]) * light[k][ch];
+          for (size_t k = 0; k < 16; ++k)
+            sum += double(t[(size_t(row) * size_t(channels) + (channels == 3 ? size_t(ch) : 0)) * 16 + k]) *
+                   light[k][ch];
           EXPECT_NEAR(out.at(r, row)[ch], sum, 2e-5);  // float rounding of 16 terms of some units
         }
     }

@@ -5,7 +5,8 @@
 
 namespace lambent {
 
-ZonalTransfer membrane_transfer(int order, std::span<const Vec3> normals, std::span<const float> alphas, Precision precision) {
+ZonalTransfer membrane_transfer(int order, std::span<const Vec3> normals, std::span<const float> alphas,
+                                Precision precision) {
   LAMBENT_CHECK(normals.size() == alphas.size());
   WritableZonalTransfer out = make_zonal_transfer(order, 1, 1, normals.size(), precision);
   std::vector<float> values(out.transfer.receiver_values());

@@ -9,13 +9,17 @@ namespace lambent {
 namespace {
 
 constexpr double pi_d = std::numbers::pi;
-constexpr int angles = 256;         // rays in the cross-section for bounces
-constexpr int profile = 512;        // pieces of the groove's outline
-constexpr double ridge = 1e-4;         // shallow grooves need one lobe: keeps the others from growing against each other, and entries alike
+constexpr int angles = 256;   // rays in the cross-section for bounces
+constexpr int profile = 512;  // pieces of the groove's outline
+constexpr double ridge =
+    1e-4;  // shallow grooves need one lobe: keeps the others from growing against each other, and entries alike
 
-double groove_height(double x, double depth) { return std::abs(x) < 0.5 ? -depth * std::cos(pi_d * x) * std::cos(pi_d * x) : 0; }
+double groove_height(double x, double depth) {
+  return std::abs(x) < 0.5 ? -depth * std::cos(pi_d * x) * std::cos(pi_d * x) : 0;
+}
 
-// Angle of the direction (cos, sin) to the right of which, or left, the groove hides the sky, from (x, h(x)): in (-pi/2, pi/2).
+// Angle of the direction (cos, sin) to the right of which, or left, the groove hides the sky, from (x, h(x)): in
+// (-pi/2, pi/2).
 double horizon(double x, double depth, double side) {
   double best = 0;  // the plane beyond
   const double h = groove_height(x, depth), reach = 0.5 - side * x;
@@ -28,7 +32,8 @@ double horizon(double x, double depth, double side) {
 
 // Where a ray at angle psi from (x, h(x)) meets the groove, by marching and bisection; NaN: nowhere.
 double meet(double x, double depth, double psi) {
-  const double h = groove_height(x, depth), side = std::cos(psi) < 0 ? -1 : 1, slope = std::tan(psi), reach = 0.5 - side * x;
+  const double h = groove_height(x, depth), side = std::cos(psi) < 0 ? -1 : 1, slope = std::tan(psi),
+               reach = 0.5 - side * x;
   auto above = [&](double step) { return h + side * slope * step - groove_height(x + side * step, depth); };
   double last = 1e-6 * reach;
   for (int i = 1; i <= profile; ++i) {
@@ -46,13 +51,20 @@ double meet(double x, double depth, double psi) {
   return NAN;
 }
 
-// All entries of the table at once, so that what lies between them is right too (section 4.2): the squared error at places and depths twice as
-// fine, of lobes interpolated bilinearly, as a function of all axes and coefficients of the table, [entry][lobe][3 + bands].
+// All entries of the table at once, so that what lies between them is right too (section 4.2): the squared error at
+// places and depths twice as fine, of lobes interpolated bilinearly, as a function of all axes and coefficients of the
+// table, [entry][lobe][3 + bands].
 class TableFit {
  public:
   // targets: [depth][place][order^2] on the finer grid.
   TableFit(int order, int first_band, size_t lobes, size_t n, std::vector<float> targets)
-      : order_(order), first_(first_band), bands_(order - first_band), lobes_(lobes), n_(n), fine_(2 * n - 1), targets_(std::move(targets)) {}
+      : order_(order),
+        first_(first_band),
+        bands_(order - first_band),
+        lobes_(lobes),
+        n_(n),
+        fine_(2 * n - 1),
+        targets_(std::move(targets)) {}
   size_t lobe_values() const { return size_t(3 + bands_); }
   size_t entry_values() const { return lobes_ * lobe_values(); }
   size_t count() const { return n_ * n_ * entry_values(); }
@@ -70,7 +82,8 @@ class TableFit {
     for (size_t d = 0; d < fine_; ++d)
       for (size_t x = 0; x < fine_; ++x)
         corners(d, x, [&](size_t entry, double weight) {
-          for (size_t k = 0; k < entry_values(); ++k) gradient[entry * entry_values() + k] += weight * own[(d * fine_ + x) * entry_values() + k];
+          for (size_t k = 0; k < entry_values(); ++k)
+            gradient[entry * entry_values() + k] += weight * own[(d * fine_ + x) * entry_values() + k];
         });
     for (size_t i = 0; i < count(); ++i)
       if (i % lobe_values() >= 3) psi += ridge_between * p[i] * p[i], gradient[i] += 2 * ridge_between * p[i];
@@ -101,7 +114,8 @@ class TableFit {
       axes[i] = glm::normalize(glm::dvec3(v[0], v[1], v[2]));
       evaluate_sh(order_, axes[i], {&y[i * C], C});
       for (int l = first_; l < order_; ++l)
-        for (size_t k = size_t(l * l); k < size_t((l + 1) * (l + 1)); ++k) residual[k] += v[3 + l - first_] * y[i * C + k];
+        for (size_t k = size_t(l * l); k < size_t((l + 1) * (l + 1)); ++k)
+          residual[k] += v[3 + l - first_] * y[i * C + k];
     }
     double psi = 0;
     for (size_t k = from; k < C; ++k) psi += residual[k] * residual[k];
@@ -110,7 +124,8 @@ class TableFit {
       double* g = out + i * lobe_values();
       const double length = glm::length(glm::dvec3(v[0], v[1], v[2]));
       // Along two tangents, by differences; the normalisation leaves nothing along the axis itself (eq. 21).
-      const glm::dvec3 u = glm::normalize(std::abs(axes[i].x) < 0.7 ? glm::cross(axes[i], {1, 0, 0}) : glm::cross(axes[i], {0, 1, 0}));
+      const glm::dvec3 u =
+          glm::normalize(std::abs(axes[i].x) < 0.7 ? glm::cross(axes[i], {1, 0, 0}) : glm::cross(axes[i], {0, 1, 0}));
       glm::dvec3 slope(0.0);
       for (const glm::dvec3& tangent : {u, glm::cross(axes[i], u)}) {
         constexpr double h = 1e-5;
@@ -118,7 +133,8 @@ class TableFit {
         for (double side : {h, -h}) {
           evaluate_sh(order_, glm::normalize(axes[i] + side * tangent), step);
           for (int l = first_; l < order_; ++l)
-            for (size_t k = size_t(l * l); k < size_t((l + 1) * (l + 1)); ++k) change += residual[k] * v[3 + l - first_] * step[k] / (2 * side);
+            for (size_t k = size_t(l * l); k < size_t((l + 1) * (l + 1)); ++k)
+              change += residual[k] * v[3 + l - first_] * step[k] / (2 * side);
         }
         slope += tangent * change;
       }
@@ -143,8 +159,8 @@ double dot(const std::vector<double>& a, const std::vector<double>& b) {
   return sum;
 }
 
-// Quasi-Newton steps with a short memory (L-BFGS; Nocedal and Wright, "Numerical Optimization", algorithm 7.4), which scale axes against
-// coefficients by themselves; the paper took conjugate gradients.
+// Quasi-Newton steps with a short memory (L-BFGS; Nocedal and Wright, "Numerical Optimization", algorithm 7.4), which
+// scale axes against coefficients by themselves; the paper took conjugate gradients.
 void minimise(const TableFit& f, std::vector<double>& p, int iterations) {
   constexpr size_t memory = 12;
   struct Step {
@@ -160,7 +176,8 @@ void minimise(const TableFit& f, std::vector<double>& p, int iterations) {
       alpha[k] = steps[k].rho * dot(steps[k].s, q);
       for (size_t j = 0; j < q.size(); ++j) q[j] -= alpha[k] * steps[k].y[j];
     }
-    const double scale = steps.empty() ? 0.1 / std::sqrt(dot(g, g) + 1e-30) : 1 / (steps.back().rho * dot(steps.back().y, steps.back().y));
+    const double scale = steps.empty() ? 0.1 / std::sqrt(dot(g, g) + 1e-30)
+                                       : 1 / (steps.back().rho * dot(steps.back().y, steps.back().y));
     for (double& v : q) v *= scale;
     for (size_t k = 0; k < steps.size(); ++k) {
       const double beta = steps[k].rho * dot(steps[k].y, q);
@@ -199,12 +216,14 @@ std::vector<float> simulate_wrinkle(int order, int count, float depth, float alb
       const double x = double(r) / (count - 1) - 0.5, slope = depth * pi_d * std::sin(2 * pi_d * x);
       const double normal = std::atan2(1.0, -slope);  // its angle in the cross-section
       // Visible and before the surface: an interval of angles about the groove's axis.
-      const double from = std::max(horizon(x, depth, 1), normal - pi_d / 2), to = std::min(pi_d - horizon(x, depth, -1), normal + pi_d / 2);
+      const double from = std::max(horizon(x, depth, 1), normal - pi_d / 2),
+                   to = std::min(pi_d - horizon(x, depth, -1), normal + pi_d / 2);
       if (to > from)
         for (const QuadratureNode& psi : gauss_legendre(order + 8, from, to))
           for (const QuadratureNode& theta : around) {
             // theta from the groove's axis y.
-            const double s = std::sin(theta.x), weight = psi.weight * theta.weight * s * s * std::cos(psi.x - normal) / pi_d;
+            const double s = std::sin(theta.x),
+                         weight = psi.weight * theta.weight * s * s * std::cos(psi.x - normal) / pi_d;
             evaluate_sh(order, glm::dvec3(s * std::cos(psi.x), std::cos(theta.x), s * std::sin(psi.x)), y);
             for (size_t k = 0; k < C; ++k) direct[r * C + k] += weight * y[k];
           }
@@ -238,8 +257,10 @@ std::vector<float> simulate_wrinkle(int order, int count, float depth, float alb
 }
 
 Result<WrinkleTable> make_wrinkle_table(const WrinkleOptions& o) {
-  if (o.order < 3 || o.order > max_sh_order) return Error{"order", "must lie between 3 and " + std::to_string(max_sh_order)};
-  if (o.lobes < 3 || o.lobes > max_zonal_lobes) return Error{"lobes", "must lie between 3 and " + std::to_string(max_zonal_lobes)};
+  if (o.order < 3 || o.order > max_sh_order)
+    return Error{"order", "must lie between 3 and " + std::to_string(max_sh_order)};
+  if (o.lobes < 3 || o.lobes > max_zonal_lobes)
+    return Error{"lobes", "must lie between 3 and " + std::to_string(max_zonal_lobes)};
   if (o.size < 3 || o.size > 256) return Error{"size", "must lie between 3 and 256"};
   if (!(o.max_depth > 0 && o.max_depth <= 10)) return Error{"depth", "must be above 0 and at most 10"};
   if (!(o.albedo >= 0 && o.albedo < 1)) return Error{"albedo", "must lie from 0 to below 1"};
@@ -265,7 +286,8 @@ Result<WrinkleTable> make_wrinkle_table(const WrinkleOptions& o) {
   const size_t fine = 2 * n - 1;
   std::vector<float> simulated;  // [depth][place][order^2], twice as fine
   for (size_t d = 0; d < fine; ++d) {
-    const std::vector<float> row_of = simulate_wrinkle(o.order, int(fine), o.max_depth * float(d) / float(fine - 1), o.albedo);
+    const std::vector<float> row_of =
+        simulate_wrinkle(o.order, int(fine), o.max_depth * float(d) / float(fine - 1), o.albedo);
     simulated.insert(simulated.end(), row_of.begin(), row_of.end());
   }
   auto target = [&](size_t d, size_t x) {  // of an entry
@@ -314,7 +336,8 @@ Result<WrinkleTable> make_wrinkle_table(const WrinkleOptions& o) {
     for (size_t x = 0; x < n; ++x) {
       const std::vector<float> t = target(d, x);
       std::vector<float> values(t.begin(), t.begin() + sh_count(exact));
-      values.insert(values.end(), p.begin() + ptrdiff_t((d * n + x) * N * lobe), p.begin() + ptrdiff_t((d * n + x + 1) * N * lobe));
+      values.insert(values.end(), p.begin() + ptrdiff_t((d * n + x) * N * lobe),
+                    p.begin() + ptrdiff_t((d * n + x + 1) * N * lobe));
       store_receiver(out, d * n + x, values);
       const std::vector<float> fit = zonal_harmonics(out.transfer, values);
       for (size_t k = 0; k < C; ++k) error += std::pow(double(fit[k]) - t[k], 2), total += double(t[k]) * t[k];

@@ -21,7 +21,8 @@ TEST(Wrinkle, NoGrooveIsAnOpenPlane) {
   float y[36];
   evaluate_sh(6, Vec3(0, 0, 1), y);
   for (int x = 0; x < 4; ++x)
-    for (int k = 0; k < 36; ++k) EXPECT_NEAR(t[size_t(x * 36 + k)], y[k] * float(clamped_cosine(sh_band(k)) / std::numbers::pi), 1e-5) << k;
+    for (int k = 0; k < 36; ++k)
+      EXPECT_NEAR(t[size_t(x * 36 + k)], y[k] * float(clamped_cosine(sh_band(k)) / std::numbers::pi), 1e-5) << k;
 }
 
 // The cross-section's simulation against the baker, on a long groove.
@@ -55,12 +56,14 @@ TEST(Wrinkle, IsWhatTheBakeOfALongGrooveFinds) {
   ASSERT_TRUE(transfer);
   const std::vector<float> ours = simulate_wrinkle(6, 33, depth, 0.5f);
   for (int place : {0, 1, 5, 12, 16, 25, 32}) {  // place / 32 - 1/2 = 3 i / 192 - 3/2
-    const std::vector<float> row = load_receiver(*transfer, receivers.front[size_t(along / 2 * (across + 1) + 64 + 2 * place)]);
+    const std::vector<float> row =
+        load_receiver(*transfer, receivers.front[size_t(along / 2 * (across + 1) + 64 + 2 * place)]);
     EXPECT_LT(distance(row, &ours[size_t(place) * 36]), 0.03) << place;  // noise of 4,096 rays, and facets
   }
 }
 
-// Between the entries, in place and depth, the table is nearly as good as on them, and fitting all entries together is what makes it so.
+// Between the entries, in place and depth, the table is nearly as good as on them, and fitting all entries together is
+// what makes it so.
 TEST(Wrinkle, LobesCorrespondSoThatTheTableInterpolates) {
   SKIP_UNDER_SANITIZERS();
   double between[2];
@@ -70,7 +73,8 @@ TEST(Wrinkle, LobesCorrespondSoThatTheTableInterpolates) {
     double error = 0, plain = 0, total = 0;
     for (int row : {6, 14, 25}) {
       const std::vector<float> exact = simulate_wrinkle(6, 63, (float(row) + 0.5f) / 31, 0.5f);
-      const std::vector<float> above = simulate_wrinkle(6, 32, float(row) / 31, 0.5f), below = simulate_wrinkle(6, 32, float(row + 1) / 31, 0.5f);
+      const std::vector<float> above = simulate_wrinkle(6, 32, float(row) / 31, 0.5f),
+                               below = simulate_wrinkle(6, 32, float(row + 1) / 31, 0.5f);
       for (int place = 1; place < 62; ++place) {  // the odd ones lie between entries, the even ones on them
         const float x = float(place) / 62 - 0.5f, p = float(place) / 2, f = p - std::floor(p);
         const size_t i = std::min(size_t(p), size_t{30}) * 36;
@@ -79,13 +83,15 @@ TEST(Wrinkle, LobesCorrespondSoThatTheTableInterpolates) {
         const std::vector<float> fit = zonal_harmonics(table->texture.transfer, values);
         for (size_t k = 0; k < 36; ++k) {
           const double t = exact[size_t(place) * 36 + k];
-          const double mean = 0.5 * ((1 - f) * (above[i + k] + below[i + k]) + f * (above[i + 36 + k] + below[i + 36 + k]));
+          const double mean = 0.5 *
+                              ((1 - f) * (above[i + k] + below[i + k]) + f * (above[i + 36 + k] + below[i + 36 + k]));
           error += std::pow(fit[k] - t, 2), plain += std::pow(mean - t, 2), total += t * t;
         }
       }
     }
     between[together] = std::sqrt(error / total);
-    std::printf("%s: entries %.4f, between %.4f, exact vectors between %.4f\n", together ? "together" : "apart", table->rms, between[together], std::sqrt(plain / total));
+    std::printf("%s: entries %.4f, between %.4f, exact vectors between %.4f\n", together ? "together" : "apart",
+                table->rms, between[together], std::sqrt(plain / total));
     EXPECT_LT(table->rms, 0.07);
     if (together) {
       EXPECT_LT(between[1], table->rms + std::sqrt(plain / total));
@@ -101,7 +107,8 @@ TEST(Wrinkle, EndsInThePlane) {
   float y[36];
   evaluate_sh(6, Vec3(0, 0, 1), y);
   std::vector<float> values(table->texture.transfer.receiver_values());
-  for (auto [x, depth] : {std::pair(-0.5f, 0.9f), {0.5f, 0.3f}, {0.1f, 0.0f}, {-0.3f, 0.0f}, {0.7f, 1.0f}, {NAN, NAN}}) {
+  for (auto [x, depth] :
+       {std::pair(-0.5f, 0.9f), {0.5f, 0.3f}, {0.1f, 0.0f}, {-0.3f, 0.0f}, {0.7f, 1.0f}, {NAN, NAN}}) {
     sample_groove(table->texture, x, depth, values);
     const std::vector<float> sh = zonal_harmonics(table->texture.transfer, values);
     std::vector<float> plane(36);

@@ -1,5 +1,5 @@
-// Follows: local-deformable-prt, section 4.1: lobe by lobe on the residual, then all together, then from random axes where the error
-// is high; besides, from the neighbours' lobes.
+// Follows: local-deformable-prt, section 4.1: lobe by lobe on the residual, then all together, then from random axes
+// where the error is high; besides, from the neighbours' lobes.
 #include <lambent/basis/zonal.h>
 #include <lambent/compress/zonal_fit.h>
 #include <lambent/compress/zonal_kernel.h>
@@ -19,23 +19,31 @@ namespace {
 
 static_assert(max_stored_lobes == max_zonal_lobes);
 
-constexpr int hemicube_cells = 6;       // 108 directions, some 14 degrees apart
-constexpr size_t chain = 64;            // receivers that one lane fits one after another
+constexpr int hemicube_cells = 6;  // 108 directions, some 14 degrees apart
+constexpr size_t chain = 64;       // receivers that one lane fits one after another
 constexpr size_t fit_block = chain * zonal_lanes;
 constexpr double single_tolerance = 1e-3, joint_tolerance = 1e-5;
 
 // What a thread works with.
 struct Scratch {
   ZonalBatch batch, single;
-  std::vector<double> targets, axes, psi;  // of a block's receivers: [receiver][channel][order^2], [receiver][lobe][3], [receiver]
+  std::vector<double> targets, axes,
+      psi;  // of a block's receivers: [receiver][channel][order^2], [receiver][lobe][3], [receiver]
 };
 
 class BlockFit {
  public:
   // Of transfer and result with one row.
-  BlockFit(const Transfer& t, const WritableZonalTransfer& out, const ZonalFitOptions& options, const ZonalStarts& starts, Scratch& s,
-           size_t begin, size_t end)
-      : t_(t), out_(out), options_(options), starts_(starts), s_(s), begin_(begin), count_(end - begin), N_(size_t(options.lobes)),
+  BlockFit(const Transfer& t, const WritableZonalTransfer& out, const ZonalFitOptions& options,
+           const ZonalStarts& starts, Scratch& s, size_t begin, size_t end)
+      : t_(t),
+        out_(out),
+        options_(options),
+        starts_(starts),
+        s_(s),
+        begin_(begin),
+        count_(end - begin),
+        N_(size_t(options.lobes)),
         values_(t.receiver_values()) {
     s.targets.resize(count_ * values_), s.axes.assign(count_ * 3 * N_, 0.0), s.psi.assign(count_, INFINITY);
     for (size_t r = 0; r < count_; ++r) {
@@ -198,7 +206,8 @@ class BlockFit {
       for (size_t i = 0; i < N_; ++i)
         for (size_t j = 0; j < N_; ++j) {
           if (placed[i] || used[j]) continue;
-          const double cosine = model[3 * i] * axes[3 * j] + model[3 * i + 1] * axes[3 * j + 1] + model[3 * i + 2] * axes[3 * j + 2];
+          const double cosine = model[3 * i] * axes[3 * j] + model[3 * i + 1] * axes[3 * j + 1] +
+                                model[3 * i + 2] * axes[3 * j + 2];
           if (std::abs(cosine) > best) best = std::abs(cosine), to = i, from = j, sign = cosine < 0 ? -1 : 1;
         }
       placed[to] = used[from] = true;
@@ -219,42 +228,53 @@ class BlockFit {
 
 Result<void> check(const Transfer& t, const ZonalFitOptions& o) {
   if (o.lobes < 1 || o.lobes > max_zonal_lobes)
-    return Error{"lobes", "must lie between 1 and " + std::to_string(max_zonal_lobes) + ", not " + std::to_string(o.lobes)};
-  if (o.starts < 0 || o.starts > 1000) return Error{"starts", "must lie between 0 and 1000, not " + std::to_string(o.starts)};
+    return Error{"lobes",
+                 "must lie between 1 and " + std::to_string(max_zonal_lobes) + ", not " + std::to_string(o.lobes)};
+  if (o.starts < 0 || o.starts > 1000)
+    return Error{"starts", "must lie between 0 and 1000, not " + std::to_string(o.starts)};
   if (!(o.retry >= 0 && o.retry <= 1)) return Error{"retry", "must lie between 0 and 1"};
   if (!(o.ridge >= 0 && o.ridge <= 1)) return Error{"ridge", "must lie between 0 and 1"};
-  if (t.columns() != size_t(sh_count(t.light.order)) || t.light.order < 1) return Error{"", "zonal lobes are fitted to transfer of spherical harmonics alone"};
+  if (t.columns() != size_t(sh_count(t.light.order)) || t.light.order < 1)
+    return Error{"", "zonal lobes are fitted to transfer of spherical harmonics alone"};
   LAMBENT_CHECK(o.row_weights.empty() || o.row_weights.size() == size_t(t.rows));
   return {};
 }
 
-// Row `row` of a transfer, as one of its own. Rows of a block lie side by side, so that this is a copy of pieces; likewise below.
+// Row `row` of a transfer, as one of its own. Rows of a block lie side by side, so that this is a copy of pieces;
+// likewise below.
 Transfer transfer_row(const Transfer& t, int row) {
   if (t.rows == 1) return t;
   const WritableTransfer w = make_transfer(t.light, 1, t.channels, t.receivers, t.precision);
   const size_t piece = w.transfer.block_values() * t.value_bytes();
-  for (size_t b = 0; b < t.blocks(); ++b) std::memcpy(w.values + b * piece, t.data.data() + (b * size_t(t.rows) + size_t(row)) * piece, piece);
+  for (size_t b = 0; b < t.blocks(); ++b)
+    std::memcpy(w.values + b * piece, t.data.data() + (b * size_t(t.rows) + size_t(row)) * piece, piece);
   return w.transfer;
 }
 
 void put_row(const WritableZonalTransfer& out, int row, const ZonalTransfer& from) {
   const size_t piece = from.row_values() * transfer_block * from.value_bytes();
   for (size_t b = 0; b < from.blocks(); ++b)
-    std::memcpy(out.values + (b * size_t(out.transfer.rows) + size_t(row)) * piece, from.data.data() + b * piece, piece);
+    std::memcpy(out.values + (b * size_t(out.transfer.rows) + size_t(row)) * piece, from.data.data() + b * piece,
+                piece);
 }
 
 }  // namespace
 
-Result<ZonalTransfer> fit_zonal(const Transfer& t, const ZonalFitOptions& options, ZonalFitReport* report, Progress* progress) {
+Result<ZonalTransfer> fit_zonal(const Transfer& t, const ZonalFitOptions& options, ZonalFitReport* report,
+                                Progress* progress) {
   const auto start = std::chrono::steady_clock::now();
   if (auto ok = check(t, options); !ok) return ok.error();
   const int order = t.light.order, exact = exact_zonal_bands(order, options.lobes);
-  WritableZonalTransfer out = make_zonal_transfer(order, options.lobes, t.channels, t.receivers, options.precision, t.rows);
+  WritableZonalTransfer out =
+      make_zonal_transfer(order, options.lobes, t.channels, t.receivers, options.precision, t.rows);
   const ZonalStarts starts = make_zonal_starts(order, hemicube_cells);
   const int first_band = std::min(exact, order - 1);  // where all is exact, the last band is fitted for nothing
   Pool<Scratch> pool([&] {
     return std::make_unique<Scratch>(Scratch{make_zonal_batch(order, first_band, t.channels, options.lobes),
-                                             make_zonal_batch(order, first_band, t.channels, 1), {}, {}, {}});
+                                             make_zonal_batch(order, first_band, t.channels, 1),
+                                             {},
+                                             {},
+                                             {}});
   });
   std::vector<double> errors(t.receivers), energies(t.receivers), error(t.receivers), energy(t.receivers);
   std::atomic<size_t> retried{0};
@@ -262,7 +282,8 @@ Result<ZonalTransfer> fit_zonal(const Transfer& t, const ZonalFitOptions& option
     ProgressStage stage(progress, "fitting lobes", t.receivers * size_t(t.rows));
     for (int row = 0; row < t.rows; ++row) {
       const Transfer target = transfer_row(t, row);
-      const WritableZonalTransfer fitted = t.rows == 1 ? out : make_zonal_transfer(order, options.lobes, t.channels, t.receivers, options.precision);
+      const WritableZonalTransfer fitted =
+          t.rows == 1 ? out : make_zonal_transfer(order, options.lobes, t.channels, t.receivers, options.precision);
       parallel_for(t.receivers, fit_block, [&](size_t begin, size_t end) {
         if (stage.cancelled()) return;
         auto scratch = pool.borrow();

@@ -25,7 +25,8 @@ Transfer random_signals(int order, int channels, size_t count, uint64_t key) {
   return w.transfer;
 }
 
-// A smooth field of transfer-like vectors along a curve: clamped cosines about turning normals, of colours that vary, less a lobe.
+// A smooth field of transfer-like vectors along a curve: clamped cosines about turning normals, of colours that vary,
+// less a lobe.
 Transfer smooth_signals(int channels, size_t count) {
   const WritableTransfer w = make_transfer({.order = 6}, 1, channels, count, Precision::single);
   std::vector<float> cosine(6), y(36);
@@ -34,7 +35,10 @@ Transfer smooth_signals(int channels, size_t count) {
     const float u = float(r) * 0.01f;
     std::vector<float> v;
     for (int c = 0; c < channels; ++c) {
-      ZonalSum sum{6, {glm::normalize(Vec3(std::cos(u), std::sin(0.7f * u), 0.3f)), glm::normalize(Vec3(0.2f, std::cos(1.3f * u), std::sin(u)))}, {}};
+      ZonalSum sum{6,
+                   {glm::normalize(Vec3(std::cos(u), std::sin(0.7f * u), 0.3f)),
+                    glm::normalize(Vec3(0.2f, std::cos(1.3f * u), std::sin(u)))},
+                   {}};
       for (int l = 0; l < 6; ++l) sum.coefficients.push_back(cosine[size_t(l)] * (1 + 0.2f * float(c)));
       for (int l = 0; l < 6; ++l) sum.coefficients.push_back(-0.3f / float(l + 1 + c));
       const std::vector<float> sh = zonal_to_sh(sum);
@@ -78,7 +82,8 @@ TEST(ZonalFit, MoreLobesAreCloserAndTheReportTellsHowClose) {
 // Six lobes have 36 numbers for the 32 of bands 2 to 5.
 TEST(ZonalFit, SixLobesAreExactAtOrderSix) {
   ZonalFitReport report;
-  ASSERT_TRUE(fit_zonal(random_signals(6, 1, 300, 2), {.lobes = 6, .retry = 1e-5f, .ridge = 1e-11f, .precision = Precision::single}, &report));
+  ASSERT_TRUE(fit_zonal(random_signals(6, 1, 300, 2),
+                        {.lobes = 6, .retry = 1e-5f, .ridge = 1e-11f, .precision = Precision::single}, &report));
   for (float e : report.errors) EXPECT_LT(e, 2e-5f);  // float axes and coefficients
 }
 
@@ -106,7 +111,8 @@ TEST(ZonalFit, FindsTheBestSingleLobe) {
 TEST(ZonalFit, FindsWhatIsMadeOfLobes) {
   for (int channels : {1, 3}) {
     ZonalFitReport report;
-    ASSERT_TRUE(fit_zonal(smooth_signals(channels, 700), {.lobes = 3, .retry = 1e-3f, .ridge = 1e-9f, .precision = Precision::single}, &report));
+    ASSERT_TRUE(fit_zonal(smooth_signals(channels, 700),
+                          {.lobes = 3, .retry = 1e-3f, .ridge = 1e-9f, .precision = Precision::single}, &report));
     EXPECT_LT(report.rms, 1e-4);
     auto half = fit_zonal(smooth_signals(channels, 700), {.lobes = 3}, &report);
     ASSERT_TRUE(half);
@@ -120,7 +126,8 @@ TEST(ZonalFit, LobesKeepTheirNumbersAlongTheCurve) {
   size_t kept = 0;
   for (size_t r = 1; r < 500; ++r)
     for (int i = 0; i < 3; ++i)
-      kept += glm::dot(lobe_axis(*fit, load_receiver(*fit, r - 1), i), lobe_axis(*fit, load_receiver(*fit, r), i)) > 0.9f;
+      kept += glm::dot(lobe_axis(*fit, load_receiver(*fit, r - 1), i), lobe_axis(*fit, load_receiver(*fit, r), i)) >
+              0.9f;
   EXPECT_GT(kept, 1440u);  // of 1497
 }
 
@@ -166,7 +173,8 @@ TEST(ZonalFit, RefusesWhatItCannotDo) {
 TEST(ZonalFit, RowsAreFittedEachForItself) {
   const size_t n = 150;
   const Transfer a = random_signals(4, 1, n, 5), b = smooth_signals(1, n);
-  const WritableTransfer b4 = make_transfer({.order = 4}, 1, 1, n, Precision::single), both = make_transfer({.order = 4}, 2, 1, n, Precision::single);
+  const WritableTransfer b4 = make_transfer({.order = 4}, 1, 1, n, Precision::single),
+                         both = make_transfer({.order = 4}, 2, 1, n, Precision::single);
   for (size_t r = 0; r < n; ++r) {
     std::vector<float> of_a = load_receiver(a, r), of_b = load_receiver(b, r);
     of_b.resize(16);

@@ -1,6 +1,6 @@
-// Follows: local-deformable-prt, sections 3.1 and 4.1; variable projection as in G. Golub and V. Pereyra, "The differentiation of
-// pseudo-inverses and nonlinear least squares problems whose variables separate" (1973), here with second derivatives, which the
-// addition theorem makes cheap.
+// Follows: local-deformable-prt, sections 3.1 and 4.1; variable projection as in G. Golub and V. Pereyra, "The
+// differentiation of pseudo-inverses and nonlinear least squares problems whose variables separate" (1973), here with
+// second derivatives, which the addition theorem makes cheap.
 #include <lambent/basis/sh_tables.h>
 #include <lambent/basis/zonal.h>
 #include <lambent/compress/zonal_kernel.h>
@@ -38,15 +38,23 @@ struct Fit {
   V norm;  // |t|^2 of the bands that are fitted
 
   Fit(ZonalBatch& b, size_t lane_, double ridge_, double*& memory)
-      : batch(b), lane(lane_), ridge(ridge_), N(size_t(b.lobes)), B(size_t(b.bands())), C(size_t(b.channels)), norm(hn::Zero(F())) {
+      : batch(b),
+        lane(lane_),
+        ridge(ridge_),
+        N(size_t(b.lobes)),
+        B(size_t(b.bands())),
+        C(size_t(b.channels)),
+        norm(hn::Zero(F())) {
     auto take = [&](size_t n) {
       Slots s{memory};
       memory += n * hn::Lanes(F());
       return s;
     };
     const size_t order = size_t(b.order);
-    powers = take(2 * (order + 1)), legendre_m = take(3 * order * order), local = take(N * B * C * 6), frame = take(N * 9);
-    pairs = take(N * N * B * 3), angles = take(N * N * 6), factor = take(N * N), g = take(C * B * N), gradient = take(2 * N);
+    powers = take(2 * (order + 1)), legendre_m = take(3 * order * order), local = take(N * B * C * 6),
+    frame = take(N * 9);
+    pairs = take(N * N * B * 3), angles = take(N * N * 6), factor = take(N * N), g = take(C * B * N),
+    gradient = take(2 * N);
     hessian = take(4 * N * N), elimination = take(2 * N * N);
     for (int c = 0; c < b.channels; ++c)
       for (int k = sh_count(b.first_band); k < sh_count(b.order); ++k) {
@@ -89,10 +97,11 @@ struct Fit {
     const V vx = frame[9 * i + 3], vy = frame[9 * i + 4], vz = frame[9 * i + 5];
     for (int c = 0; c < batch.channels; ++c)
       for (int l = batch.first_band; l < order; ++l) {
-        // Of the polynomial in (x, y, z): value, gradient, and second derivatives; yy = -xx but for nothing, since (x + iy)^m is
-        // harmonic in the plane.
+        // Of the polynomial in (x, y, z): value, gradient, and second derivatives; yy = -xx but for nothing, since (x +
+        // iy)^m is harmonic in the plane.
         const V t0 = target(c, sh_index(l, 0));
-        V value = hn::Mul(legendre_m[at(l, 0)], t0), gz = hn::Mul(legendre_m[at(l, 0) + 1], t0), zz = hn::Mul(legendre_m[at(l, 0) + 2], t0);
+        V value = hn::Mul(legendre_m[at(l, 0)], t0), gz = hn::Mul(legendre_m[at(l, 0) + 1], t0),
+          zz = hn::Mul(legendre_m[at(l, 0) + 2], t0);
         V gx = hn::Zero(d), gy = gx, xx = gx, xy = gx, xz = gx, yz = gx;
         for (int m = 1; m <= l; ++m) {
           const size_t M = size_t(m);
@@ -103,7 +112,8 @@ struct Fit {
           const V fx = hn::Mul(mm, hn::MulAdd(plus, re[M - 1], hn::Mul(minus, im[M - 1])));
           const V fy = hn::Mul(mm, hn::Sub(hn::Mul(minus, re[M - 1]), hn::Mul(plus, im[M - 1])));
           value = hn::MulAdd(q, f, value), gz = hn::MulAdd(q1, f, gz), zz = hn::MulAdd(q2, f, zz);
-          gx = hn::MulAdd(q, fx, gx), gy = hn::MulAdd(q, fy, gy), xz = hn::MulAdd(q1, fx, xz), yz = hn::MulAdd(q1, fy, yz);
+          gx = hn::MulAdd(q, fx, gx), gy = hn::MulAdd(q, fy, gy), xz = hn::MulAdd(q1, fx, xz),
+          yz = hn::MulAdd(q1, fy, yz);
           if (m > 1) {
             const V m2 = hn::Mul(q, hn::Set(d, double(m) * (m - 1)));
             xx = hn::MulAdd(m2, hn::MulAdd(plus, re[M - 2], hn::Mul(minus, im[M - 2])), xx);
@@ -133,12 +143,20 @@ struct Fit {
     for (size_t i = 0; i < N; ++i) {
       const V x = axes[3 * i], y = axes[3 * i + 1], z = axes[3 * i + 2];
       const V sign = hn::CopySign(one, z), a = hn::Neg(hn::Div(one, hn::Add(sign, z))), b = hn::Mul(hn::Mul(x, y), a);
-      const V f[9] = {hn::MulAdd(hn::Mul(sign, a), hn::Mul(x, x), one), hn::Mul(sign, b), hn::Neg(hn::Mul(sign, x)), b,
-                      hn::MulAdd(hn::Mul(y, y), a, sign), hn::Neg(y), x, y, z};  // frame_about
+      const V f[9] = {hn::MulAdd(hn::Mul(sign, a), hn::Mul(x, x), one),
+                      hn::Mul(sign, b),
+                      hn::Neg(hn::Mul(sign, x)),
+                      b,
+                      hn::MulAdd(hn::Mul(y, y), a, sign),
+                      hn::Neg(y),
+                      x,
+                      y,
+                      z};  // frame_about
       for (size_t k = 0; k < 9; ++k) frame.set(9 * i + k, f[k]);
     }
     auto dot = [&](size_t a, size_t b) {
-      return hn::MulAdd(frame[a], frame[b], hn::MulAdd(frame[a + 1], frame[b + 1], hn::Mul(frame[a + 2], frame[b + 2])));
+      return hn::MulAdd(frame[a], frame[b],
+                        hn::MulAdd(frame[a + 1], frame[b + 1], hn::Mul(frame[a + 2], frame[b + 2])));
     };
     for (size_t i = 0; i < N; ++i)
       for (size_t j = 0; j < N; ++j) {
@@ -156,13 +174,15 @@ struct Fit {
         for (int l = 0; l < batch.order; ++l) {
           if (l > 0) {
             const double L = l;
-            const V p = hn::Sub(hn::Mul(hn::Set(d, (2 * L - 1) / L), hn::Mul(x, p0)), hn::Mul(hn::Set(d, (L - 1) / L), p1));
+            const V p =
+                hn::Sub(hn::Mul(hn::Set(d, (2 * L - 1) / L), hn::Mul(x, p0)), hn::Mul(hn::Set(d, (L - 1) / L), p1));
             const V s = hn::MulAdd(hn::Set(d, 2 * L - 1), p0, d1), c = hn::MulAdd(hn::Set(d, 2 * L - 1), d0, h1);
             p1 = p0, d1 = d0, h1 = h0, p0 = p, d0 = s, h0 = c;
           }
           if (l < batch.first_band) continue;
           const V k = hn::Set(d, band_energy(l));
-          for (size_t at : {((i * N + j) * B + size_t(l - batch.first_band)) * 3, ((j * N + i) * B + size_t(l - batch.first_band)) * 3})
+          for (size_t at : {((i * N + j) * B + size_t(l - batch.first_band)) * 3,
+                            ((j * N + i) * B + size_t(l - batch.first_band)) * 3})
             pairs.set(at, hn::Mul(k, p0)), pairs.set(at + 1, hn::Mul(k, d0)), pairs.set(at + 2, hn::Mul(k, h0));
         }
       }
@@ -200,7 +220,8 @@ struct Fit {
         const V first = hn::Mul(G[j], pairs[pair(k, j, b) + 1]), second = hn::Mul(G[j], pairs[pair(k, j, b) + 2]);
         const V cosine = j == k ? hn::Set(d, 1.0)
                                 : hn::MulAdd(frame[9 * k + 6], frame[9 * j + 6],
-                                             hn::MulAdd(frame[9 * k + 7], frame[9 * j + 7], hn::Mul(frame[9 * k + 8], frame[9 * j + 8])));
+                                             hn::MulAdd(frame[9 * k + 7], frame[9 * j + 7],
+                                                        hn::Mul(frame[9 * k + 8], frame[9 * j + 8])));
         if (j != k) {
           ru = hn::NegMulAdd(first, su, ru), rv = hn::NegMulAdd(first, sv, rv);
           uu = hn::NegMulAdd(second, hn::Mul(su, su), uu), uv = hn::NegMulAdd(second, hn::Mul(su, sv), uv);
@@ -214,7 +235,8 @@ struct Fit {
       hessian.add(h(2 * k + 1, 2 * k), hn::Neg(hn::Mul(G[k], uv)));
       hessian.add(h(2 * k + 1, 2 * k + 1), hn::Mul(G[k], hn::Sub(own, vv)));
       for (size_t j = 0; j < k; ++j) {
-        const V gg = hn::Mul(G[k], G[j]), first = hn::Mul(gg, pairs[pair(k, j, b) + 1]), second = hn::Mul(gg, pairs[pair(k, j, b) + 2]);
+        const V gg = hn::Mul(G[k], G[j]), first = hn::Mul(gg, pairs[pair(k, j, b) + 1]),
+                second = hn::Mul(gg, pairs[pair(k, j, b) + 2]);
         for (size_t a = 0; a < 2; ++a)
           for (size_t e = 0; e < 2; ++e)
             hessian.add(h(2 * k + a, 2 * j + e),
@@ -286,7 +308,8 @@ void Refine(ZonalBatch& batch, const ZonalRefineOptions& options) {
       memory += n * lanes;
       return s;
     };
-    const Slots trial = take(3 * N), best = take(3 * N), slope = take(angles), curve = take(angles * angles), M = take(angles * angles);
+    const Slots trial = take(3 * N), best = take(3 * N), slope = take(angles), curve = take(angles * angles),
+                M = take(angles * angles);
     const Slots pivot = take(angles), step = take(angles);
     for (size_t i = 0; i < 3 * N; ++i) trial.set(i, hn::Load(d, batch.axes.data() + i * zonal_lanes + lane));
     auto keep = [&](auto mask, V psi, V& best_psi) {
@@ -303,11 +326,14 @@ void Refine(ZonalBatch& batch, const ZonalRefineOptions& options) {
     for (int iteration = 0; iteration < options.iterations; ++iteration) {
       for (size_t a = 0; a < angles; ++a) {
         slope.set(a, hn::IfThenElse(moved, fit.gradient[a], slope[a]));
-        for (size_t e = 0; e <= a; ++e) curve.set(fit.h(a, e), hn::IfThenElse(moved, fit.hessian[fit.h(a, e)], curve[fit.h(a, e)]));
+        for (size_t e = 0; e <= a; ++e)
+          curve.set(fit.h(a, e), hn::IfThenElse(moved, fit.hessian[fit.h(a, e)], curve[fit.h(a, e)]));
       }
-      // (curve + damping) step = -slope by a factorisation L D L' whose D is made positive, so that the step always descends.
+      // (curve + damping) step = -slope by a factorisation L D L' whose D is made positive, so that the step always
+      // descends.
       V scale = hn::Set(d, 1e-30);
-      for (size_t a = 0; a < angles; ++a) scale = hn::MulAdd(hn::Abs(curve[fit.h(a, a)]), hn::Set(d, 1.0 / double(angles)), scale);
+      for (size_t a = 0; a < angles; ++a)
+        scale = hn::MulAdd(hn::Abs(curve[fit.h(a, a)]), hn::Set(d, 1.0 / double(angles)), scale);
       const V shift = hn::Mul(damping, scale), least = hn::Mul(scale, hn::Set(d, 1e-6));
       for (size_t a = 0; a < angles; ++a) {
         for (size_t e = 0; e <= a; ++e) {
@@ -328,13 +354,15 @@ void Refine(ZonalBatch& batch, const ZonalRefineOptions& options) {
         step.set(a, sum);
         gain = hn::NegMulAdd(sum, slope[a], gain);
       }
-      for (size_t i = 0; i < N; ++i) longest = hn::Max(longest, hn::MulAdd(step[2 * i], step[2 * i], hn::Mul(step[2 * i + 1], step[2 * i + 1])));
+      for (size_t i = 0; i < N; ++i)
+        longest = hn::Max(longest, hn::MulAdd(step[2 * i], step[2 * i], hn::Mul(step[2 * i + 1], step[2 * i + 1])));
       const V enough = hn::MulAdd(psi, hn::Set(d, options.tolerance), hn::Mul(fit.norm, hn::Set(d, 1e-16)));
       done = hn::Or(done, hn::Or(hn::Le(gain, enough), hn::Gt(damping, hn::Set(d, 1e8))));
       if (hn::AllTrue(d, done)) break;
 
       constexpr double reach = 0.5;  // radians, of the axis that turns most
-      const V share = hn::Min(hn::Set(d, 1.0), hn::Div(hn::Set(d, reach), hn::Sqrt(hn::Add(longest, hn::Set(d, 1e-30)))));
+      const V share =
+          hn::Min(hn::Set(d, 1.0), hn::Div(hn::Set(d, reach), hn::Sqrt(hn::Add(longest, hn::Set(d, 1e-30)))));
       fit.EvaluatePairs(best);  // the frames that the step refers to
       for (size_t i = 0; i < N; ++i) {
         const V a = hn::Mul(share, step[2 * i]), b = hn::Mul(share, step[2 * i + 1]);
@@ -349,7 +377,8 @@ void Refine(ZonalBatch& batch, const ZonalRefineOptions& options) {
       const V trial_psi = fit.Evaluate(trial, true);
       moved = hn::AndNot(done, hn::Lt(trial_psi, psi));
       keep(moved, trial_psi, psi);
-      damping = hn::IfThenElse(moved, hn::Mul(damping, hn::Set(d, 0.15)), hn::Mul(hn::Max(damping, hn::Set(d, 1e-3)), hn::Set(d, 6.0)));
+      damping = hn::IfThenElse(moved, hn::Mul(damping, hn::Set(d, 0.15)),
+                               hn::Mul(hn::Max(damping, hn::Set(d, 1e-3)), hn::Set(d, 6.0)));
     }
     hn::Store(psi, d, batch.psi.data() + lane);
     for (size_t i = 0; i < 3 * N; ++i) hn::Store(best[i], d, batch.axes.data() + i * zonal_lanes + lane);
@@ -368,7 +397,8 @@ void Derivatives(ZonalBatch& batch, double ridge, double* psi, double* gradient,
     for (size_t a = 0; a < 2 * N; ++a) {
       hn::StoreU(hn::Mul(hn::Set(d, 2.0), fit.gradient[a]), d, gradient + a * zonal_lanes + lane);
       for (size_t e = 0; e < 2 * N; ++e)
-        hn::StoreU(hn::Mul(hn::Set(d, 2.0), fit.hessian[fit.h(std::max(a, e), std::min(a, e))]), d, hessian + (a * 2 * N + e) * zonal_lanes + lane);
+        hn::StoreU(hn::Mul(hn::Set(d, 2.0), fit.hessian[fit.h(std::max(a, e), std::min(a, e))]), d,
+                   hessian + (a * 2 * N + e) * zonal_lanes + lane);
     }
   }
 }
@@ -392,11 +422,13 @@ void ChooseDirection(ZonalBatch& batch, const double* directions, const double* 
       }
       const auto better = hn::Gt(sum, best);
       best = hn::IfThenElse(better, sum, best);
-      x = hn::IfThenElse(better, hn::Set(d, directions[3 * i]), x), ay = hn::IfThenElse(better, hn::Set(d, directions[3 * i + 1]), ay);
+      x = hn::IfThenElse(better, hn::Set(d, directions[3 * i]), x),
+      ay = hn::IfThenElse(better, hn::Set(d, directions[3 * i + 1]), ay);
       z = hn::IfThenElse(better, hn::Set(d, directions[3 * i + 2]), z);
     }
     hn::StoreU(best, d, gain + lane);
-    hn::Store(x, d, batch.axis(0, 0) + lane), hn::Store(ay, d, batch.axis(0, 1) + lane), hn::Store(z, d, batch.axis(0, 2) + lane);
+    hn::Store(x, d, batch.axis(0, 0) + lane), hn::Store(ay, d, batch.axis(0, 1) + lane),
+        hn::Store(z, d, batch.axis(0, 2) + lane);
   }
 }
 
@@ -415,21 +447,26 @@ HWY_EXPORT(ChooseDirection);
 }  // namespace
 
 ZonalBatch make_zonal_batch(int order, int first_band, int channels, int lobes) {
-  LAMBENT_CHECK(order >= 1 && order <= max_sh_order && first_band >= 0 && first_band < order && channels >= 1 && channels <= 3);
+  LAMBENT_CHECK(order >= 1 && order <= max_sh_order && first_band >= 0 && first_band < order && channels >= 1 &&
+                channels <= 3);
   LAMBENT_CHECK(lobes >= 1 && lobes <= max_zonal_lobes);
   ZonalBatch b;
   b.order = order, b.first_band = first_band, b.channels = channels, b.lobes = lobes;
   const size_t N = size_t(lobes), B = size_t(b.bands()), C = size_t(channels), n = size_t(order);
   b.t.assign(C * n * n * zonal_lanes, 0.0);
   b.axes.assign(3 * N * zonal_lanes, 0.0), b.g.assign(C * B * N * zonal_lanes, 0.0), b.psi.assign(zonal_lanes, 0.0);
-  for (size_t i = 0; i < N * zonal_lanes; ++i) b.axes[i / zonal_lanes * 3 * zonal_lanes + 2 * zonal_lanes + i % zonal_lanes] = 1;
-  const size_t fit = 2 * (n + 1) + 3 * n * n + N * B * C * 6 + N * 9 + N * N * B * 3 + N * N * 6 + N * N + C * B * N + 2 * N + 6 * N * N;
+  for (size_t i = 0; i < N * zonal_lanes; ++i)
+    b.axes[i / zonal_lanes * 3 * zonal_lanes + 2 * zonal_lanes + i % zonal_lanes] = 1;
+  const size_t fit = 2 * (n + 1) + 3 * n * n + N * B * C * 6 + N * 9 + N * N * B * 3 + N * N * 6 + N * N + C * B * N +
+                     2 * N + 6 * N * N;
   const size_t search = 6 * N + 3 * 2 * N + 8 * N * N;
   b.scratch.assign((fit + search) * zonal_lanes, 0.0);
   return b;
 }
 
-void refine_zonal(ZonalBatch& batch, const ZonalRefineOptions& options) { HWY_DYNAMIC_DISPATCH(Refine)(batch, options); }
+void refine_zonal(ZonalBatch& batch, const ZonalRefineOptions& options) {
+  HWY_DYNAMIC_DISPATCH(Refine)(batch, options);
+}
 
 ZonalDerivatives differentiate_zonal(ZonalBatch& batch, double ridge) {
   const size_t n = 2 * size_t(batch.lobes);
@@ -463,7 +500,8 @@ ZonalStarts make_zonal_starts(int order, int n) {
 void choose_start(ZonalBatch& batch, const ZonalStarts& starts) {
   LAMBENT_CHECK(starts.order == batch.order);
   double gain[zonal_lanes];
-  HWY_DYNAMIC_DISPATCH(ChooseDirection)(batch, starts.directions.data(), starts.y.data(), starts.directions.size() / 3, gain);
+  HWY_DYNAMIC_DISPATCH(ChooseDirection)
+  (batch, starts.directions.data(), starts.y.data(), starts.directions.size() / 3, gain);
   if (batch.order < 2) return;
   double y[sh_count(max_sh_order)];
   for (size_t lane = 0; lane < zonal_lanes; ++lane) {
@@ -498,7 +536,8 @@ void zonal_residual(const ZonalBatch& batch, double* out) {
         for (int l = batch.first_band; l < batch.order; ++l) {
           const size_t band = c * size_t(batch.bands()) + size_t(l - batch.first_band);
           const double g = batch.g[(band * size_t(batch.lobes) + i) * zonal_lanes + lane];
-          for (size_t k = size_t(sh_count(l)); k < size_t(sh_count(l + 1)); ++k) out[(c * C + k) * zonal_lanes + lane] -= g * y[k];
+          for (size_t k = size_t(sh_count(l)); k < size_t(sh_count(l + 1)); ++k)
+            out[(c * C + k) * zonal_lanes + lane] -= g * y[k];
         }
     }
 }

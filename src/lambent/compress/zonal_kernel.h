@@ -1,9 +1,12 @@
 #pragma once
 // Fits of zonal lobes, eight side by side in SIMD lanes, in double. Source: local-deformable-prt, section 4.1.
 //
-// With the axes s_i given, the bands are independent and linear: band l of the target, t_l, is fitted by sum_i g_il y_l(s_i) with
-//   G_l g_l = b_l,   (G_l)_ij = y_l(s_i) . y_l(s_j) = k_l P_l(s_i . s_j),   (b_l)_i = y_l(s_i) . t_l = t_l(s_i),   k_l = (2l+1)/4pi,
-// by the addition theorem: only the target is ever evaluated, at the axes alone. What is left to minimise is a function of 2N angles,
+// With the axes s_i given, the bands are independent and linear: band l of the target, t_l, is fitted by sum_i g_il
+// y_l(s_i) with
+//   G_l g_l = b_l,   (G_l)_ij = y_l(s_i) . y_l(s_j) = k_l P_l(s_i . s_j),   (b_l)_i = y_l(s_i) . t_l = t_l(s_i),   k_l
+//   = (2l+1)/4pi,
+// by the addition theorem: only the target is ever evaluated, at the axes alone. What is left to minimise is a function
+// of 2N angles,
 //   psi(s) = |t|^2 - sum_l b_l . g_l,
 // (variable projection) by Newton's method, damped, with its exact gradient and Hessian.
 #include <lambent/core/aligned.h>
@@ -25,7 +28,9 @@ struct ZonalBatch {
   AlignedVector<double> psi;   // [lane]: squared error, plus ridge |g|^2
   AlignedVector<double> scratch;
   int bands() const { return order - first_band; }
-  double* target(int channel, int coefficient) { return t.data() + size_t(channel * order * order + coefficient) * zonal_lanes; }
+  double* target(int channel, int coefficient) {
+    return t.data() + size_t(channel * order * order + coefficient) * zonal_lanes;
+  }
   double* axis(int lobe, int component) { return axes.data() + size_t(lobe * 3 + component) * zonal_lanes; }
   double* coefficient(int channel, int band, int lobe) {
     return g.data() + size_t((channel * bands() + band - first_band) * lobes + lobe) * zonal_lanes;
@@ -34,14 +39,15 @@ struct ZonalBatch {
 ZonalBatch make_zonal_batch(int order, int first_band, int channels, int lobes);
 
 struct ZonalRefineOptions {
-  int iterations = 30;       // steps of Newton's method at most; 0 solves for the coefficients alone
-  double tolerance = 1e-6;   // stops where a step would gain less than this share of psi
-  double ridge = 1e-9;       // squared coefficients count this much, in psi: keeps nearly equal axes from huge ones
+  int iterations = 30;      // steps of Newton's method at most; 0 solves for the coefficients alone
+  double tolerance = 1e-6;  // stops where a step would gain less than this share of psi
+  double ridge = 1e-9;      // squared coefficients count this much, in psi: keeps nearly equal axes from huge ones
 };
 // From the axes in the batch to the nearest minimum: axes, g and psi. Target bands of zero are fitted by zeros.
 void refine_zonal(ZonalBatch& batch, const ZonalRefineOptions& options);
 
-// psi and its derivatives at the batch's axes, for tests. Angles are along frame_about(axis)'s first two columns, two a lobe.
+// psi and its derivatives at the batch's axes, for tests. Angles are along frame_about(axis)'s first two columns, two a
+// lobe.
 struct ZonalDerivatives {
   std::vector<double> psi, gradient, hessian;  // [lane], [2 lobes][lane], [2 lobes][2 lobes][lane]
 };
@@ -54,8 +60,8 @@ struct ZonalStarts {
   std::vector<double> y;           // [direction][order^2]
 };
 ZonalStarts make_zonal_starts(int order, int n);
-// Sets the axis of lobe 0 to the best of the starts for a single lobe (eq. 18), or to the target's linear axis (sum of channels)
-// where that is better.
+// Sets the axis of lobe 0 to the best of the starts for a single lobe (eq. 18), or to the target's linear axis (sum of
+// channels) where that is better.
 void choose_start(ZonalBatch& batch, const ZonalStarts& starts);
 
 // out = target - sum of the batch's lobes, [channel][order^2][lane]; bands below first_band are copied.

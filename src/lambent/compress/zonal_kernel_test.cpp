@@ -38,7 +38,8 @@ void turn_axis(ZonalBatch& b, size_t lane, int angle, double by) {
   glm::dvec3 s(b.axis(angle / 2, 0)[lane], b.axis(angle / 2, 1)[lane], b.axis(angle / 2, 2)[lane]);
   // frame_about in double.
   const double sign = std::copysign(1.0, s.z), a = -1 / (sign + s.z), c = s.x * s.y * a;
-  const glm::dvec3 tangent = angle % 2 ? glm::dvec3(c, sign + s.y * s.y * a, -s.y) : glm::dvec3(1 + sign * s.x * s.x * a, sign * c, -sign * s.x);
+  const glm::dvec3 tangent = angle % 2 ? glm::dvec3(c, sign + s.y * s.y * a, -s.y)
+                                       : glm::dvec3(1 + sign * s.x * s.x * a, sign * c, -sign * s.x);
   s = glm::normalize(s * std::cos(by) + tangent * std::sin(by));
   for (int k = 0; k < 3; ++k) b.axis(angle / 2, k)[lane] = s[k];
 }
@@ -46,7 +47,8 @@ void turn_axis(ZonalBatch& b, size_t lane, int angle, double by) {
 struct Shape {
   int order, first_band, channels, lobes;
 };
-const Shape shapes[] = {{2, 1, 1, 1}, {3, 1, 1, 2}, {6, 1, 1, 1}, {6, 2, 1, 4}, {6, 2, 3, 3}, {6, 0, 1, 2}, {9, 2, 2, 5}, {16, 2, 1, 8}};
+const Shape shapes[] = {{2, 1, 1, 1}, {3, 1, 1, 2}, {6, 1, 1, 1}, {6, 2, 1, 4},
+                        {6, 2, 3, 3}, {6, 0, 1, 2}, {9, 2, 2, 5}, {16, 2, 1, 8}};
 
 TEST(ZonalKernel, SolvesForTheBestCoefficients) {
   for (const Shape& s : shapes) {
@@ -89,7 +91,8 @@ TEST(ZonalKernel, OneLobeIsTheClosedForm) {
 TEST(ZonalKernel, DerivativesAreThoseOfDifferences) {
   for (const Shape& s : shapes)
     for (double ridge : {0.0, 0.03}) {
-      if (ridge == 0 && s.lobes > 2 * s.first_band + 1) continue;  // more lobes than the first band has dimensions: singular
+      if (ridge == 0 && s.lobes > 2 * s.first_band + 1)
+        continue;  // more lobes than the first band has dimensions: singular
       ZonalBatch b = random_batch(s.order, s.first_band, s.channels, s.lobes, 2);
       const ZonalDerivatives exact = differentiate_zonal(b, ridge);
       const size_t n = 2 * size_t(s.lobes);
@@ -104,11 +107,13 @@ TEST(ZonalKernel, DerivativesAreThoseOfDifferences) {
           moved = b;
           turn_axis(moved, lane, int(a), -step);
           const double down = differentiate_zonal(moved, ridge).psi[lane];
-          // The difference's own error: rounding of psi over the step, and the third derivative, of the size of order x Hessian.
+          // The difference's own error: rounding of psi over the step, and the third derivative, of the size of order x
+          // Hessian.
           EXPECT_NEAR(exact.gradient[a * zonal_lanes + lane], (up - down) / (2 * step), 1e-8 * size * s.order * s.order)
               << s.order << ' ' << s.lobes << ' ' << a;
           // Diagonal of the Hessian.
-          EXPECT_NEAR(exact.hessian[(a * n + a) * zonal_lanes + lane], (up + down - 2 * exact.psi[lane]) / (step * step), 2e-4 * size)
+          EXPECT_NEAR(exact.hessian[(a * n + a) * zonal_lanes + lane],
+                      (up + down - 2 * exact.psi[lane]) / (step * step), 2e-4 * size)
               << s.order << ' ' << s.lobes << ' ' << a;
         }
         // Mixed second derivatives of different lobes, and of one.
@@ -121,7 +126,8 @@ TEST(ZonalKernel, DerivativesAreThoseOfDifferences) {
               if (a == 1) {  // two angles of one axis: the frame turns with the first, so go along their diagonal
                 const glm::dvec3 axis(b.axis(0, 0)[lane], b.axis(0, 1)[lane], b.axis(0, 2)[lane]);
                 const double sign = std::copysign(1.0, axis.z), q = -1 / (sign + axis.z), c = axis.x * axis.y * q;
-                const glm::dvec3 u(1 + sign * axis.x * axis.x * q, sign * c, -sign * axis.x), v(c, sign + axis.y * axis.y * q, -axis.y);
+                const glm::dvec3 u(1 + sign * axis.x * axis.x * q, sign * c, -sign * axis.x),
+                    v(c, sign + axis.y * axis.y * q, -axis.y);
                 const glm::dvec3 along = (u * double(sa) + v * double(sb)) * (far);
                 const double length = glm::length(along);
                 const glm::dvec3 to = axis * std::cos(length) + along / length * std::sin(length);
@@ -131,7 +137,8 @@ TEST(ZonalKernel, DerivativesAreThoseOfDifferences) {
               }
               sum += sa * sb * differentiate_zonal(moved, ridge).psi[lane] / (4 * far * far);
             }
-          EXPECT_NEAR(exact.hessian[(0 * n + a) * zonal_lanes + lane], sum, 3e-4 * size * s.order * s.order) << s.order << ' ' << s.lobes << ' ' << a;
+          EXPECT_NEAR(exact.hessian[(0 * n + a) * zonal_lanes + lane], sum, 3e-4 * size * s.order * s.order)
+              << s.order << ' ' << s.lobes << ' ' << a;
         }
       }
     }

@@ -9,7 +9,8 @@ struct Camera {
   float fov = 40.0f;
 };
 
-// Maps image positions to directions. (x, y) in pixels from the top left corner, fractional; the result is a unit vector.
+// Maps image positions to directions. (x, y) in pixels from the top left corner, fractional; the result is a unit
+// vector.
 struct CameraRays {
   Vec3 eye, corner, dx, dy;
   CameraRays(const Camera& camera, int width, int height) : eye(camera.eye) {
@@ -30,7 +31,8 @@ inline Camera camera_around(const Bounds& box, float fov = 35.0f) {
   Camera camera;
   camera.fov = fov, camera.target = box.centre();
   float radius = std::max(0.5f * box.diagonal(), 1e-6f);
-  camera.eye = camera.target + glm::normalize(Vec3(0.55f, 0.4f, 1.0f)) * (radius / std::sin(glm::radians(fov) / 2) * 0.95f);
+  camera.eye = camera.target +
+               glm::normalize(Vec3(0.55f, 0.4f, 1.0f)) * (radius / std::sin(glm::radians(fov) / 2) * 0.95f);
   return camera;
 }
 

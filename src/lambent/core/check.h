@@ -3,10 +3,10 @@
 #include <cstdio>
 #include <cstdlib>
 
-#define LAMBENT_CHECK(condition)                                                              \
-  do {                                                                                        \
-    if (!(condition)) {                                                                       \
-      std::fprintf(stderr, "%s:%d: broken contract: %s\n", __FILE__, __LINE__, #condition);   \
-      std::abort();                                                                           \
-    }                                                                                         \
+#define LAMBENT_CHECK(condition)                                                            \
+  do {                                                                                      \
+    if (!(condition)) {                                                                     \
+      std::fprintf(stderr, "%s:%d: broken contract: %s\n", __FILE__, __LINE__, #condition); \
+      std::abort();                                                                         \
+    }                                                                                       \
   } while (0)

@@ -95,7 +95,8 @@ TEST(Parallel, PiecesCoverTheRangeOnceAndBeginAtMultiples) {
 }
 
 TEST(File, IsWrittenWholeOrNotAtAll) {
-  const std::string folder = (std::filesystem::temp_directory_path() / ("lambent_core_" + std::to_string(::getpid()))).string();
+  const std::string folder =
+      (std::filesystem::temp_directory_path() / ("lambent_core_" + std::to_string(::getpid()))).string();
   std::filesystem::create_directory(folder);
   ASSERT_TRUE(write_file_atomically(folder + "/a", "hello"));
   EXPECT_EQ(*read_file(folder + "/a"), std::vector<uint8_t>({'h', 'e', 'l', 'l', 'o'}));

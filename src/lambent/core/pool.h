@@ -6,8 +6,8 @@
 
 namespace lambent {
 
-// Scratch objects that pieces of parallel work borrow and give back, so that there are as many as threads at work and each is
-// allocated once.
+// Scratch objects that pieces of parallel work borrow and give back, so that there are as many as threads at work and
+// each is allocated once.
 template <class T, class Delete = std::default_delete<T>>
 class Pool {
  public:

@@ -10,7 +10,8 @@ namespace lambent {
 
 class Progress {
  public:
-  // report(stage, fraction in [0,1]) is called from any thread, one call at a time, at least once when a stage begins and ends.
+  // report(stage, fraction in [0,1]) is called from any thread, one call at a time, at least once when a stage begins
+  // and ends.
   using Report = std::function<void(const std::string& stage, double fraction)>;
   explicit Progress(Report report = {}) : report_(std::move(report)) {}
 

@@ -12,7 +12,9 @@ inline uint64_t hash64(uint64_t x) {
   x ^= x >> 27, x *= 0x94d049bb133111ebull;
   return x ^ (x >> 31);
 }
-inline uint64_t hash64(uint64_t a, uint64_t b) { return hash64(hash64(a + 0x9e3779b97f4a7c15ull) ^ (b + 0xd1b54a32d192ed03ull)); }
+inline uint64_t hash64(uint64_t a, uint64_t b) {
+  return hash64(hash64(a + 0x9e3779b97f4a7c15ull) ^ (b + 0xd1b54a32d192ed03ull));
+}
 
 // Uniform in [0, 1), from the upper 24 bits.
 inline float to_unit_float(uint32_t bits) { return float(bits >> 8) * 0x1p-24f; }

@@ -16,8 +16,8 @@ uint32_t reverse_bits(uint32_t x) {
   return ((x & 0x55555555u) << 1) | ((x & 0xaaaaaaaau) >> 1);
 }
 
-// Owen scramble of a bit-reversed number: every bit is flipped by a hash of the bits below it (Laine and Karras 2011, in
-// the form that Burley gives).
+// Owen scramble of a bit-reversed number: every bit is flipped by a hash of the bits below it (Laine and Karras 2011,
+// in the form that Burley gives).
 uint32_t laine_karras(uint32_t x, uint32_t seed) {
   x += seed;
   x ^= x * 0x6c50b47cu;
@@ -55,7 +55,8 @@ Vec2 square_to_disk(Vec2 u) {
 Vec2 disk_to_square(Vec2 d) {
   const float r = glm::length(d);
   if (r == 0) return Vec2(0.5f);
-  // Within the quarter of the disk about an axis, the coordinate along it is +-r and the other that times 4 phi / pi, phi from the axis.
+  // Within the quarter of the disk about an axis, the coordinate along it is +-r and the other that times 4 phi / pi,
+  // phi from the axis.
   float a, b;
   if (std::abs(d.x) > std::abs(d.y)) a = std::copysign(r, d.x), b = a * (4 / pi) * std::atan(d.y / d.x);
   else b = std::copysign(r, d.y), a = b * (4 / pi) * std::atan(d.x / d.y);

@@ -43,7 +43,8 @@ inline Mat3 frame_about(Vec3 n) {
 // R = Ry(yaw) Rx(pitch) Rz(roll). It acts on functions as (Rf)(s) = f(R^-1 s).
 inline Mat3 rotation_from_yaw_pitch_roll(Vec3 degrees) {
   Vec3 r = glm::radians(degrees);
-  float cy = std::cos(r.x), sy = std::sin(r.x), cp = std::cos(r.y), sp = std::sin(r.y), cr = std::cos(r.z), sr = std::sin(r.z);
+  float cy = std::cos(r.x), sy = std::sin(r.x), cp = std::cos(r.y), sp = std::sin(r.y), cr = std::cos(r.z),
+        sr = std::sin(r.z);
   Mat3 yaw(Vec3(cy, 0, -sy), Vec3(0, 1, 0), Vec3(sy, 0, cy));
   Mat3 pitch(Vec3(1, 0, 0), Vec3(0, cp, sp), Vec3(0, -sp, cp));
   Mat3 roll(Vec3(cr, sr, 0), Vec3(-sr, cr, 0), Vec3(0, 0, 1));

@@ -48,7 +48,8 @@ Result<ImageDifference> compare_images(const Image& a, const Image& b, float exp
   double squares = 0, relative = 0, shown_squares = 0;
   for (size_t i : compared) {
     for (int c = 0; c < 3; ++c) {
-      double va = a.rgb[i][c], vb = b.rgb[i][c], d = va - vb, shown = double(shown_a.rgb[i][c]) - double(shown_b.rgb[i][c]);
+      double va = a.rgb[i][c], vb = b.rgb[i][c], d = va - vb,
+             shown = double(shown_a.rgb[i][c]) - double(shown_b.rgb[i][c]);
       squares += d * d, relative += d * d / (vb * vb + 0.01), shown_squares += shown * shown;
     }
     out.flip += double(flip[i]);

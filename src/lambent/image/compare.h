@@ -5,11 +5,12 @@
 namespace lambent {
 
 struct ImageDifference {
-  size_t pixels = 0;          // compared: covered (alpha > 0) in either picture; all where neither has alpha
-  double rmse = 0;            // root mean square error of linear RGB
-  double relative_mse = 0;    // mean of (a - b)^2 / (b^2 + 0.01), linear RGB: b is the reference
-  double psnr = 0;  // decibels, of the displayed pictures (sRGB-encoded after exposure, clamped), peak 1; infinite if equal
-  double flip = 0;            // mean LDR-FLIP of the displayed pictures, 67 pixels a degree
+  size_t pixels = 0;        // compared: covered (alpha > 0) in either picture; all where neither has alpha
+  double rmse = 0;          // root mean square error of linear RGB
+  double relative_mse = 0;  // mean of (a - b)^2 / (b^2 + 0.01), linear RGB: b is the reference
+  double psnr =
+      0;  // decibels, of the displayed pictures (sRGB-encoded after exposure, clamped), peak 1; infinite if equal
+  double flip = 0;                // mean LDR-FLIP of the displayed pictures, 67 pixels a degree
   double mean_a = 0, mean_b = 0;  // mean luminance, linear: a ratio away from 1 is a factor, not noise
 };
 
@@ -17,8 +18,9 @@ struct ImageDifference {
 // Errors: sizes differ, or no pixel is covered, or a covered pixel is not finite.
 Result<ImageDifference> compare_images(const Image& a, const Image& b, float exposure = 0.0f);
 
-// FLIP error of every pixel, [0, 1], of two displayed pictures of one size (sRGB-encoded values in [0, 1]) at the viewing
-// resolution `pixels_per_degree`. Source: Andersson et al. 2020, "FLIP: a difference evaluator for alternating images".
+// FLIP error of every pixel, [0, 1], of two displayed pictures of one size (sRGB-encoded values in [0, 1]) at the
+// viewing resolution `pixels_per_degree`. Source: Andersson et al. 2020, "FLIP: a difference evaluator for alternating
+// images".
 std::vector<float> flip_map(const Image& reference, const Image& test, float pixels_per_degree = 67.0f);
 
 // CIELAB of linear Rec. 709 RGB, against D65.
@@ -27,8 +29,9 @@ Vec3 cielab(Vec3 linear);
 // The HyAB distance of two colours in CIELAB: |dL| + sqrt(da^2 + db^2).
 float hyab(Vec3 lab_a, Vec3 lab_b);
 
-// A, B and the false-coloured absolute difference of the displayed pictures (largest channel; white = `white` or more), with
-// labels above and a scale below. The exposure is applied: save or show the result with exposure 0. The sizes must be equal.
+// A, B and the false-coloured absolute difference of the displayed pictures (largest channel; white = `white` or more),
+// with labels above and a scale below. The exposure is applied: save or show the result with exposure 0. The sizes must
+// be equal.
 Image difference_picture(const Image& a, const Image& b, float exposure = 0.0f, float white = 0.1f);
 
 }  // namespace lambent

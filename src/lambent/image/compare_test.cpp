@@ -34,8 +34,9 @@ struct SlowFlip {
 
   static constexpr double m[3][3] = {
       {0.41239080, 0.35758434, 0.18048079}, {0.21263901, 0.71516868, 0.07219232}, {0.01933082, 0.11919478, 0.95053215}};
-  static constexpr double inv[3][3] = {
-      {3.24096994, -1.53738318, -0.49861076}, {-0.96924364, 1.87596750, 0.04155506}, {0.05563008, -0.20397696, 1.05697151}};
+  static constexpr double inv[3][3] = {{3.24096994, -1.53738318, -0.49861076},
+                                       {-0.96924364, 1.87596750, 0.04155506},
+                                       {0.05563008, -0.20397696, 1.05697151}};
   static glm::dvec3 apply(const double (&a)[3][3], glm::dvec3 v) {
     return {a[0][0] * v.x + a[0][1] * v.y + a[0][2] * v.z, a[1][0] * v.x + a[1][1] * v.y + a[1][2] * v.z,
             a[2][0] * v.x + a[2][1] * v.y + a[2][2] * v.z};
@@ -71,7 +72,8 @@ struct SlowFlip {
     Field out;
     for (Vec3 c : image.rgb) {
       glm::dvec3 linear;
-      for (int k = 0; k < 3; ++k) linear[k] = c[k] <= 0.04045 ? c[k] / 12.92 : std::pow((double(c[k]) + 0.055) / 1.055, 2.4);
+      for (int k = 0; k < 3; ++k)
+        linear[k] = c[k] <= 0.04045 ? c[k] / 12.92 : std::pow((double(c[k]) + 0.055) / 1.055, 2.4);
       glm::dvec3 t = apply(m, linear) / white();
       out.push_back({116 * t.y - 16, 500 * (t.x - t.y), 200 * (t.y - t.z)});
     }
@@ -85,11 +87,14 @@ struct SlowFlip {
     glm::dvec3 c;
     for (int k = 0; k < 3; ++k) {
       auto [a1, b1, a2, b2] = parameters[k];
-      c[k] = filter(f, k, px, py, radius, [&, a1 = a1, b1 = b1, a2 = a2, b2 = b2](double x, double y) {
-        double d2 = (x * x + y * y) / (ppd * ppd);
-        return a1 * std::sqrt(std::acos(-1.0) / b1) * std::exp(-pi2 * d2 / b1) +
-               a2 * std::sqrt(std::acos(-1.0) / b2) * std::exp(-pi2 * d2 / b2);
-      }, false);
+      c[k] = filter(
+          f, k, px, py, radius,
+          [&, a1 = a1, b1 = b1, a2 = a2, b2 = b2](double x, double y) {
+            double d2 = (x * x + y * y) / (ppd * ppd);
+            return a1 * std::sqrt(std::acos(-1.0) / b1) * std::exp(-pi2 * d2 / b1) +
+                   a2 * std::sqrt(std::acos(-1.0) / b2) * std::exp(-pi2 * d2 / b2);
+          },
+          false);
     }
     double y = (c.x + 16) / 116;
     glm::dvec3 linear = apply(inv, glm::dvec3(y + c.y / 500, y, y - c.z / 200) * white());
@@ -103,7 +108,8 @@ struct SlowFlip {
     auto g = [s](double x, double y) { return std::exp(-(x * x + y * y) / (2 * s * s)); };
     auto strength = [&](auto weight) {
       double x = filter(f, 0, px, py, radius, weight, true);
-      double y = filter(f, 0, px, py, radius, [&](double u, double v) { return weight(v, u); }, true);
+      double y = filter(
+          f, 0, px, py, radius, [&](double u, double v) { return weight(v, u); }, true);
       return std::hypot(x, y) / 116;  // both detectors are blind to the constant 16
     };
     return {strength([&](double x, double y) { return -x * g(x, y); }),
@@ -154,7 +160,8 @@ TEST(Flip, HyabOfKnownColours) {
 
 TEST(Flip, ConstantPictures) {
   // Filters of sum 1 leave them alone and the detectors see nothing, so the error is the redistributed HyAB distance:
-  // black and white: 100^0.7 = 25.1189, cmax = 203.305^0.7 = 41.2766, 0.95 + 0.05 (25.1189 - 16.5106) / (41.2766 - 16.5106)
+  // black and white: 100^0.7 = 25.1189, cmax = 203.305^0.7 = 41.2766, 0.95 + 0.05 (25.1189 - 16.5106) / (41.2766
+  // - 16.5106)
   constexpr float rounding = 2e-4f;  // rounding of the constant's sums leaves a feature of 1e-7, whose root counts
   auto error = [](Vec3 a, Vec3 b) {
     auto map = flip_map(constant(9, 6, a), constant(9, 6, b));
@@ -181,7 +188,8 @@ TEST(Flip, IdenticalIsZeroAndOrderDoesNotMatter) {
 TEST(Flip, GrowsWithNoiseAndBlur) {
   Image scene(64, 48);
   for (int y = 0; y < 48; ++y)
-    for (int x = 0; x < 64; ++x) scene.at(x, y) = x / 8 % 2 == y / 8 % 2 ? Vec3(0.8f, 0.7f, 0.3f) : Vec3(0.1f, 0.3f, 0.4f);
+    for (int x = 0; x < 64; ++x)
+      scene.at(x, y) = x / 8 % 2 == y / 8 % 2 ? Vec3(0.8f, 0.7f, 0.3f) : Vec3(0.1f, 0.3f, 0.4f);
   Image grain = noise(64, 48, 9);
   double last = 0;
   for (float amplitude : {0.05f, 0.1f, 0.2f, 0.4f}) {

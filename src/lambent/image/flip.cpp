@@ -1,6 +1,6 @@
-// Andersson, Nilsson, Akenine-Moeller, Oskarsson, Astrom, Fairchild 2020: "FLIP: a difference evaluator for alternating images".
-// Contrast sensitivity: Johnson and Fairchild 2003. HyAB: Abasi et al. 2020. All its two-dimensional filters are products, or
-// sums of two products, of one-dimensional ones, which is how they are applied here.
+// Andersson, Nilsson, Akenine-Moeller, Oskarsson, Astrom, Fairchild 2020: "FLIP: a difference evaluator for alternating
+// images". Contrast sensitivity: Johnson and Fairchild 2003. HyAB: Abasi et al. 2020. All its two-dimensional filters
+// are products, or sums of two products, of one-dimensional ones, which is how they are applied here.
 #include <lambent/core/check.h>
 #include <lambent/core/parallel.h>
 #include <lambent/image/compare.h>
@@ -77,8 +77,8 @@ Kernel make_kernel(int radius, F f) {
 using Matrix = glm::dmat3;
 
 // Rec. 709 to XYZ, rows X, Y, Z.
-const Matrix xyz_from_rgb = glm::transpose(Matrix(0.41239080, 0.35758434, 0.18048079, 0.21263901, 0.71516868, 0.07219232,
-                                                  0.01933082, 0.11919478, 0.95053215));
+const Matrix xyz_from_rgb = glm::transpose(
+    Matrix(0.41239080, 0.35758434, 0.18048079, 0.21263901, 0.71516868, 0.07219232, 0.01933082, 0.11919478, 0.95053215));
 const Mat3 relative_xyz_from_rgb = [] {  // white is (1, 1, 1)
   glm::dvec3 white = xyz_from_rgb * glm::dvec3(1);
   return Mat3(Matrix(1 / white.x, 0, 0, 0, 1 / white.y, 0, 0, 0, 1 / white.z) * xyz_from_rgb);
@@ -175,7 +175,8 @@ Prepared prepare(const Image& displayed, float pixels_per_degree) {
   Kernel smooth = normalized(make_kernel(radius, gauss));
   out.edge = feature(luminance, normalized(make_kernel(radius, [&](double x) { return -x * gauss(x); })), smooth);
   out.point = feature(
-      luminance, normalized(make_kernel(radius, [&](double x) { return (x * x / (sigma * sigma) - 1) * gauss(x); })), smooth);
+      luminance, normalized(make_kernel(radius, [&](double x) { return (x * x / (sigma * sigma) - 1) * gauss(x); })),
+      smooth);
 
   for (size_t k = 0; k < 3; ++k) channels[k] = contrast_filtered(channels[k], sensitivities[k], pixels_per_degree);
   out.lab.resize(displayed.rgb.size());
@@ -199,7 +200,8 @@ float hyab(Vec3 lab_a, Vec3 lab_b) {
 }
 
 std::vector<float> flip_map(const Image& reference, const Image& test, float pixels_per_degree) {
-  LAMBENT_CHECK(reference.width == test.width && reference.height == test.height && reference.width > 0 && reference.height > 0);
+  LAMBENT_CHECK(reference.width == test.width && reference.height == test.height && reference.width > 0 &&
+                reference.height > 0);
   LAMBENT_CHECK(reference.rgb.size() == test.rgb.size() && pixels_per_degree > 0);
   constexpr float qc = 0.7f, pc = 0.4f, pt = 0.95f, qf = 0.5f;
   Prepared a = prepare(reference, pixels_per_degree), b = prepare(test, pixels_per_degree);

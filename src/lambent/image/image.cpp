@@ -68,8 +68,8 @@ Result<void> parse_resolution(std::string_view text, uint64_t& width, uint64_t& 
   auto is_axis = [](std::string_view word) {
     return word.size() == 2 && (word[0] == '+' || word[0] == '-') && (word[1] == 'X' || word[1] == 'Y');
   };
-  if (count != 4 || !is_axis(words[0]) || !is_axis(words[2]) || words[0][1] == words[2][1] || !number(words[1], height) ||
-      !number(words[3], width))
+  if (count != 4 || !is_axis(words[0]) || !is_axis(words[2]) || words[0][1] == words[2][1] ||
+      !number(words[1], height) || !number(words[3], width))
     return Error{path, "bad resolution line"};
   if (words[0] != "-Y" || words[2] != "+X")
     return Error{path, "rows run " + std::string(words[0]) + " " + std::string(words[2]) + ": only -Y +X is read"};
@@ -93,7 +93,8 @@ bool read_planes(HdrReader& in, size_t width, std::vector<uint8_t>& row) {
   return true;
 }
 
-// One row flat or of the older code, where (1, 1, 1, n) repeats the pixel before it and successive ones shift n by 8 bits.
+// One row flat or of the older code, where (1, 1, 1, n) repeats the pixel before it and successive ones shift n by 8
+// bits.
 bool read_pixels(HdrReader& in, size_t width, std::vector<Vec3>& pixels) {
   int shift = 0;
   for (size_t x = 0; x < width;) {
@@ -122,7 +123,8 @@ Result<Image> load_hdr(std::span<const uint8_t> bytes, const std::string& path) 
     if (!in.line(text)) return Error{path, "truncated header"};
     if (text.empty()) break;
     if (text.starts_with("FORMAT=") && text != "FORMAT=32-bit_rle_rgbe")
-      return Error{path, text == "FORMAT=32-bit_rle_xyze" ? "XYZE pixels are not read, only RGBE" : "unknown pixel format"};
+      return Error{path,
+                   text == "FORMAT=32-bit_rle_xyze" ? "XYZE pixels are not read, only RGBE" : "unknown pixel format"};
   }
   if (!in.line(text)) return Error{path, "truncated header"};
   uint64_t width = 0, height = 0;
@@ -172,7 +174,8 @@ bool jpeg_is_whole(std::span<const uint8_t> bytes) {
     }
     i += 2;
     if (marker == 0xd9) return true;
-    if (marker == 0 || marker == 1 || (marker >= 0xd0 && marker <= 0xd8)) continue;  // stuffing, or markers without a length
+    if (marker == 0 || marker == 1 || (marker >= 0xd0 && marker <= 0xd8))
+      continue;  // stuffing, or markers without a length
     if (i + 2 > bytes.size()) return false;
     i += size_t(bytes[i]) << 8 | bytes[i + 1];
   }
@@ -199,7 +202,8 @@ Result<Image> load_stb(std::span<const uint8_t> bytes, ImageFormat format, const
   int size = int(bytes.size()), width = 0, height = 0, channels = 0;
   auto failure = [&] {
     const char* why = stbi_failure_reason();
-    return Error{path, std::string(format == ImageFormat::png ? "bad PNG: " : "bad JPEG: ") + (why ? why : "unreadable")};
+    return Error{path,
+                 std::string(format == ImageFormat::png ? "bad PNG: " : "bad JPEG: ") + (why ? why : "unreadable")};
   };
   if (!stbi_info_from_memory(bytes.data(), size, &width, &height, &channels)) return failure();
   if (auto ok = check_image_size(uint64_t(width), uint64_t(height), bytes.size(), path); !ok) return ok.error();
@@ -240,10 +244,12 @@ Result<void> check_image_size(uint64_t width, uint64_t height, size_t bytes, con
   constexpr uint64_t free_pixels = uint64_t{1} << 22, pixels_a_byte = 8192;
   if (width == 0 || height == 0) return Error{path, "image has no pixels"};
   if (width > max_image_pixels || height > max_image_pixels / width)
-    return Error{path, "image of " + std::to_string(width) + " x " + std::to_string(height) + " is larger than 2^28 pixels"};
+    return Error{path,
+                 "image of " + std::to_string(width) + " x " + std::to_string(height) + " is larger than 2^28 pixels"};
   uint64_t beyond = width * height > free_pixels ? width * height - free_pixels : 0;
   if (beyond / pixels_a_byte > bytes)
-    return Error{path, "image of " + std::to_string(width) + " x " + std::to_string(height) + " does not fit its few bytes"};
+    return Error{path,
+                 "image of " + std::to_string(width) + " x " + std::to_string(height) + " does not fit its few bytes"};
   return {};
 }
 
@@ -342,8 +348,8 @@ Image beside(std::span<const Image> images) {
 
 Vec3 false_color(float x) {
   x = std::fmin(std::fmax(x, 0.0f), 1.0f);
-  // A path through CIELAB, L* = 100 x. a* and b* were fitted to purple, rose, orange and yellow at lightness 18, 36, 54, 70 and
-  // 86; the path stays inside the Rec. 709 gamut.
+  // A path through CIELAB, L* = 100 x. a* and b* were fitted to purple, rose, orange and yellow at lightness 18, 36,
+  // 54, 70 and 86; the path stays inside the Rec. 709 gamut.
   float ends = x * (1 - x);
   float L = 100 * x;
   float a = ends * (6 + x * (1176 + x * (-2564 + x * (2547 - x * 1375))));

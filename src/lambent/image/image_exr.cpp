@@ -1,5 +1,5 @@
-// OpenEXR, through its C++ library. Header layout: "OpenEXR File Layout" of the project's documentation. Bradford adaptation:
-// Lam 1985; matrices from primaries: SMPTE RP 177.
+// OpenEXR, through its C++ library. Header layout: "OpenEXR File Layout" of the project's documentation. Bradford
+// adaptation: Lam 1985; matrices from primaries: SMPTE RP 177.
 #include <lambent/image/image.h>
 
 #include <ImfArray.h>
@@ -20,7 +20,8 @@
 namespace lambent {
 namespace {
 
-// --- A first look at the header, in which every size is checked, so that the library never allocates for one that lies.
+// --- A first look at the header, in which every size is checked, so that the library never allocates for one that
+// lies.
 
 struct ExrHeader {
   int64_t x0 = 0, y0 = 0, width = 0, height = 0;  // data window
@@ -55,7 +56,8 @@ struct ByteReader {
   bool text(std::string& value) {  // null-terminated, at most 255 characters
     const void* end = left() ? std::memchr(bytes.data() + at, 0, std::min<size_t>(left(), 256)) : nullptr;
     if (!end) return false;
-    value.assign(reinterpret_cast<const char*>(bytes.data()) + at, size_t(static_cast<const uint8_t*>(end) - bytes.data()) - at);
+    value.assign(reinterpret_cast<const char*>(bytes.data()) + at,
+                 size_t(static_cast<const uint8_t*>(end) - bytes.data()) - at);
     at += value.size() + 1;
     return true;
   }
@@ -144,7 +146,8 @@ Result<ExrHeader> read_header(std::span<const uint8_t> bytes, const std::string&
   if (header.channels.empty()) return Error{path, "header has no channels"};
   if (header.tiled != has_tiles) return Error{path, "header does not say clearly whether the image is tiled"};
 
-  if (auto ok = check_image_size(uint64_t(header.width), uint64_t(header.height), bytes.size(), path); !ok) return ok.error();
+  if (auto ok = check_image_size(uint64_t(header.width), uint64_t(header.height), bytes.size(), path); !ok)
+    return ok.error();
   // The library holds whole blocks of rows of all channels, or tiles, in memory.
   constexpr uint64_t free_bytes = uint64_t{1} << 26, bytes_a_byte = 65536;
   uint64_t pixels = uint64_t(header.width) * uint64_t(header.height);
@@ -154,8 +157,8 @@ Result<ExrHeader> read_header(std::span<const uint8_t> bytes, const std::string&
     constexpr uint64_t free_tile = uint64_t{1} << 20;
     if (header.tile_width > std::max(free_tile, pixels) / header.tile_height)
       return Error{path, "tiles are larger than the image"};
-    uint64_t tiles =
-        ((uint64_t(header.width) - 1) / header.tile_width + 1) * ((uint64_t(header.height) - 1) / header.tile_height + 1);
+    uint64_t tiles = ((uint64_t(header.width) - 1) / header.tile_width + 1) *
+                     ((uint64_t(header.height) - 1) / header.tile_height + 1);
     if (tiles > in.left() / 8) return Error{path, "truncated: fewer bytes than the table of tiles needs"};
   } else if (uint64_t(header.height) / 256 > in.left() / 8) {  // no compression packs more than 256 rows
     return Error{path, "truncated: fewer bytes than the table of rows needs"};
@@ -169,7 +172,8 @@ class MemoryInput : public Imf::IStream {
  public:
   MemoryInput(std::span<const uint8_t> bytes, const std::string& name) : IStream(name.c_str()), bytes_(bytes) {}
   bool read(char out[], int count) override {
-    if (count < 0 || at_ > bytes_.size() || uint64_t(count) > bytes_.size() - at_) throw std::runtime_error("truncated");
+    if (count < 0 || at_ > bytes_.size() || uint64_t(count) > bytes_.size() - at_)
+      throw std::runtime_error("truncated");
     std::memcpy(out, bytes_.data() + at_, size_t(count));
     at_ += uint64_t(count);
     return at_ < bytes_.size();
@@ -224,8 +228,8 @@ Result<Matrix> xyz_from_rgb(Vec2 red, Vec2 green, Vec2 blue, Vec2 white) {
 
 constexpr Vec2 rec709_red{0.64f, 0.33f}, rec709_green{0.30f, 0.60f}, rec709_blue{0.15f, 0.06f}, d65{0.3127f, 0.3290f};
 
-// Files print chromaticities with few digits, or print Rec. 709 as adapted to another white: a matrix this close to the identity
-// is meant to be it.
+// Files print chromaticities with few digits, or print Rec. 709 as adapted to another white: a matrix this close to the
+// identity is meant to be it.
 bool is_identity(const Mat3& m) {
   constexpr float rounding = 5e-4f;
   for (int column = 0; column < 3; ++column)
@@ -274,7 +278,8 @@ Result<Image> read_pixels(std::span<const uint8_t> bytes, const ExrHeader& heade
 }  // namespace
 
 Result<Mat3> rec709_from_primaries(Vec2 red, Vec2 green, Vec2 blue, Vec2 white) {
-  auto source = xyz_from_rgb(red, green, blue, white), target = xyz_from_rgb(rec709_red, rec709_green, rec709_blue, d65);
+  auto source = xyz_from_rgb(red, green, blue, white),
+       target = xyz_from_rgb(rec709_red, rec709_green, rec709_blue, d65);
   if (!source) return source.error();
   const Matrix cone = glm::transpose(Matrix(0.8951, 0.2664, -0.1614, -0.7502, 1.7135, 0.0367, 0.0389, -0.0685, 1.0296));
   const glm::dvec3 ones(1);
@@ -310,7 +315,8 @@ Result<Image> load_exr(std::span<const uint8_t> bytes, const std::string& path) 
 namespace {
 
 // Interleaved pixels of one channel type, `bytes` a value, as a ZIP-compressed file.
-std::vector<uint8_t> encode_pixels(const Image& image, const std::string& path, Imf::PixelType type, const void* pixels, size_t bytes) {
+std::vector<uint8_t> encode_pixels(const Image& image, const std::string& path, Imf::PixelType type, const void* pixels,
+                                   size_t bytes) {
   const size_t channels = image.alpha.empty() ? 3 : 4, step = bytes * channels;
   Imf::Header header(image.width, image.height);
   header.compression() = Imf::ZIP_COMPRESSION;
@@ -345,7 +351,8 @@ Result<std::vector<uint8_t>> encode_exr(const Image& image, const std::string& p
     return pixels;
   };
   try {
-    if (precision == ExrPrecision::half) return encode_pixels(image, path, Imf::HALF, interleave(to_half).data(), sizeof(half));
+    if (precision == ExrPrecision::half)
+      return encode_pixels(image, path, Imf::HALF, interleave(to_half).data(), sizeof(half));
     return encode_pixels(image, path, Imf::FLOAT, interleave([](float v) { return v; }).data(), sizeof(float));
   } catch (const std::exception& e) {
     return Error{path, "OpenEXR could not be encoded: " + one_line(e.what(), path)};

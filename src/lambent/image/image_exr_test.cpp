@@ -185,8 +185,8 @@ TEST(Exr, EveryLosslessCompressionFloatHalfAndWhole) {
 }
 
 TEST(Exr, LossyCompressionsRead) {
-  for (auto compression :
-       {Imf::PXR24_COMPRESSION, Imf::B44_COMPRESSION, Imf::B44A_COMPRESSION, Imf::DWAA_COMPRESSION, Imf::DWAB_COMPRESSION}) {
+  for (auto compression : {Imf::PXR24_COMPRESSION, Imf::B44_COMPRESSION, Imf::B44A_COMPRESSION, Imf::DWAA_COMPRESSION,
+                           Imf::DWAB_COMPRESSION}) {
     Maker maker(32, 20, {"R", "G", "B"}, Imf::HALF);
     maker.header.compression() = compression;
     maker.value = [](size_t, int, int) { return 0.5f; };
@@ -215,7 +215,8 @@ TEST(Exr, SubsetsOfChannels) {
   ASSERT_TRUE(green);
   EXPECT_EQ(green->at(2, 1), Vec3(0, 18, 0));
   Maker depth(3, 2, {"R", "Z"});
-  depth.channels[1].second.xSampling = 3, depth.channels[1].second.ySampling = 2;  // not asked for, so it may be anything
+  depth.channels[1].second.xSampling = 3,
+  depth.channels[1].second.ySampling = 2;  // not asked for, so it may be anything
   auto red = load_image(depth.bytes(), "a.exr");
   ASSERT_TRUE(red) << red.error().text();
   EXPECT_EQ(red->at(2, 1), Vec3(18, 0, 0));
@@ -322,7 +323,8 @@ TEST(Primaries, PublishedMatrices) {
   // ACEScg, whose white is not D65, by the Academy's Bradford-adapted matrix.
   auto acescg = rec709_from_primaries({0.713f, 0.293f}, {0.165f, 0.830f}, {0.128f, 0.044f}, {0.32168f, 0.33767f});
   ASSERT_TRUE(acescg);
-  expect_matrix(*acescg, {{1.70505f, -0.62179f, -0.08326f}, {-0.13026f, 1.14080f, -0.01055f}, {-0.02400f, -0.12897f, 1.15297f}},
+  expect_matrix(*acescg,
+                {{1.70505f, -0.62179f, -0.08326f}, {-0.13026f, 1.14080f, -0.01055f}, {-0.02400f, -0.12897f, 1.15297f}},
                 five_digits);
   auto same = rec709_from_primaries({0.64f, 0.33f}, {0.30f, 0.60f}, {0.15f, 0.06f}, {0.3127f, 0.3290f});
   ASSERT_TRUE(same);

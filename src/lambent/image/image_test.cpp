@@ -124,7 +124,7 @@ TEST(Hdr, RunsThatLeaveTheRowAreErrors) {
   };
   EXPECT_EQ(bad_row({2, 2, 0, 8, 128 + 9, 5}), "a.hdr: bad run in row 0");
   EXPECT_EQ(bad_row({2, 2, 0, 8, 0, 5}), "a.hdr: bad run in row 0");
-  EXPECT_EQ(bad_row({1, 1, 1, 3}), "a.hdr: bad run in row 0");               // nothing to repeat yet
+  EXPECT_EQ(bad_row({1, 1, 1, 3}), "a.hdr: bad run in row 0");              // nothing to repeat yet
   EXPECT_EQ(bad_row({9, 9, 9, 9, 1, 1, 1, 8}), "a.hdr: bad run in row 0");  // one too many
 }
 
@@ -299,7 +299,8 @@ TEST(FalseColor, LightnessIsEven) {
   constexpr float gamut_rounding = 1e-3f;
   for (int c = 0; c < 3; ++c) EXPECT_NEAR(false_color(1)[c], 1, gamut_rounding);
   float last = -1;
-  constexpr float tolerance = 0.1f;  // of 100: the matrices have seven digits, and colours near the gamut's edge are clamped
+  constexpr float tolerance =
+      0.1f;  // of 100: the matrices have seven digits, and colours near the gamut's edge are clamped
   for (int i = 0; i <= 500; ++i) {
     float x = float(i) / 500, L = cielab(false_color(x)).x;
     EXPECT_NEAR(L, 100 * x, tolerance);

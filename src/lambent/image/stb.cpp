@@ -1,4 +1,5 @@
-// The one place where the stb single-header libraries are compiled. PNG and JPEG only: .hdr and .exr have readers of their own.
+// The one place where the stb single-header libraries are compiled. PNG and JPEG only: .hdr and .exr have readers of
+// their own.
 #if defined(__GNUC__)
 #pragma GCC diagnostic ignored "-Wunused-function"
 #pragma GCC diagnostic ignored "-Wunused-but-set-variable"

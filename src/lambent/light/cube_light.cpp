@@ -52,7 +52,8 @@ void add_part(int size, int face, int column, int row, const Polygon& p, Parts& 
   const float x0 = p.at[0][0], y0 = p.at[1][0];
   float twice = 0, cx = 0, cy = 0;
   for (int i = 1; i + 1 < p.count; ++i) {
-    const float ax = p.at[0][i] - x0, ay = p.at[1][i] - y0, bx = p.at[0][i + 1] - x0, by = p.at[1][i + 1] - y0, area = std::abs(ax * by - ay * bx);
+    const float ax = p.at[0][i] - x0, ay = p.at[1][i] - y0, bx = p.at[0][i + 1] - x0, by = p.at[1][i + 1] - y0,
+                area = std::abs(ax * by - ay * bx);
     twice += area, cx += area * (ax + bx), cy += area * (ay + by);
   }
   if (!(twice > 0)) return;
@@ -64,7 +65,8 @@ void add_part(int size, int face, int column, int row, const Polygon& p, Parts& 
 }
 
 // The polygon on a face, in texels, along their grid, which it meets in these columns and rows.
-void add_parts(int size, int face, const Polygon& p, int first_column, int last_column, int first_row, int last_row, Parts& out) {
+void add_parts(int size, int face, const Polygon& p, int first_column, int last_column, int first_row, int last_row,
+               Parts& out) {
   Polygon right = p, column, lower, cell;
   for (int x = first_column; x <= last_column; ++x) {
     if (x < last_column) {
@@ -160,7 +162,8 @@ CubeLight cube_light(const Environment& env, int size, const Mat3& rotation) {
   };
   std::vector<std::vector<Sum>> sums(pieces);
   std::vector<Vec3> meridians;  // on the equator, turned
-  for (int x = 0; x <= fine_w; ++x) meridians.push_back(rotation * latlong_direction(Vec2(float(x) / float(fine_w), 0.5f)));
+  for (int x = 0; x <= fine_w; ++x)
+    meridians.push_back(rotation * latlong_direction(Vec2(float(x) / float(fine_w), 0.5f)));
   parallel_for(pieces, 1, [&](size_t begin, size_t end) {
     for (size_t piece = begin; piece < end; ++piece) {
       std::vector<Sum>& sum = sums[piece];
@@ -203,7 +206,8 @@ CubeLight cube_light(const Environment& env, int size, const Mat3& rotation) {
         const int face = int(line) / size, row = int(line) % size;
         const size_t t = cube_texel(size, face, column, row);
         Sum total = sums[0][t];
-        for (size_t piece = 1; piece < pieces; ++piece) total.energy += sums[piece][t].energy, total.moment += sums[piece][t].moment;
+        for (size_t piece = 1; piece < pieces; ++piece)
+          total.energy += sums[piece][t].energy, total.moment += sums[piece][t].moment;
         const auto place = [&](int k) { return (2 * float(k) + 1) / float(size) - 1; };
         light.energy[t] = total.energy;
         light.direction[t] = normalize_or(total.moment, glm::normalize(cube_point(face, place(column), place(row))));
@@ -223,7 +227,8 @@ Environment reduced(const Environment& env, int width) {
     for (int x = 0; x < w / factor; ++x) {
       glm::dvec3 sum(0);
       for (int j = 0; j < factor; ++j)
-        for (int i = 0; i < factor; ++i) sum += glm::dvec3(env.image.at(x * factor + i, y * factor + j)) * texel_solid_angle(y * factor + j, w, h);
+        for (int i = 0; i < factor; ++i)
+          sum += glm::dvec3(env.image.at(x * factor + i, y * factor + j)) * texel_solid_angle(y * factor + j, w, h);
       out.image.at(x, y) = Vec3(sum / texel_solid_angle(y, w / factor, h / factor));
     }
   return out;

@@ -9,7 +9,8 @@ namespace {
 
 // A sky with no symmetry and a sun of one texel, 50,000 times as bright.
 Environment sunny(int width) {
-  Environment env = make_environment("sunny", width, width / 2, [](Vec3 d) { return Vec3(0.5f + 0.3f * d.y, 0.6f + 0.2f * d.x, 0.7f - 0.1f * d.z); });
+  Environment env = make_environment(
+      "sunny", width, width / 2, [](Vec3 d) { return Vec3(0.5f + 0.3f * d.y, 0.6f + 0.2f * d.x, 0.7f - 0.1f * d.z); });
   env.image.at(width / 3, width / 9) = Vec3(30000, 25000, 20000);
   return env;
 }
@@ -17,7 +18,8 @@ Environment sunny(int width) {
 glm::dvec3 energy(const Environment& env) {
   glm::dvec3 sum(0);
   for (int y = 0; y < env.image.height; ++y)
-    for (int x = 0; x < env.image.width; ++x) sum += glm::dvec3(env.image.at(x, y)) * texel_solid_angle(y, env.image.width, env.image.height);
+    for (int x = 0; x < env.image.width; ++x)
+      sum += glm::dvec3(env.image.at(x, y)) * texel_solid_angle(y, env.image.width, env.image.height);
   return sum;
 }
 
@@ -41,13 +43,15 @@ TEST(CubeLight, AnEvenSkyStaysEven) {
     for (int face = 0; face < 6; ++face)
       for (int row = 0; row < 64; ++row)
         for (int column = 0; column < 64; ++column)
-          EXPECT_NEAR(light.energy[cube_texel(64, face, column, row)].x / float(cube_solid_angle(64, column, row)), 1, 1e-3);
+          EXPECT_NEAR(light.energy[cube_texel(64, face, column, row)].x / float(cube_solid_angle(64, column, row)), 1,
+                      1e-3);
   }
 }
 
 // Against points drawn over the texels of the map, in each texel of a coarse cube.
 TEST(CubeLight, EachTexelHasItsShare) {
-  const Environment env = make_environment("steep", 64, 32, [](Vec3 d) { return Vec3(std::exp(3 * d.x), 1 + d.y, d.z * d.z); });
+  const Environment env =
+      make_environment("steep", 64, 32, [](Vec3 d) { return Vec3(std::exp(3 * d.x), 1 + d.y, d.z * d.z); });
   const Mat3 R = rotation_from_yaw_pitch_roll({50, -30, 15});
   const CubeLight light = cube_light(env, 16, R);
   std::vector<glm::dvec3> drawn(cube_texels(16), glm::dvec3(0));
@@ -56,7 +60,8 @@ TEST(CubeLight, EachTexelHasItsShare) {
     const Vec3 d = square_to_sphere(sobol_owen(uint32_t(i), 5));
     const CubePlace p = cube_place(R * d);
     auto cell = [](float u) { return std::min(int((u + 1) * 8), 15); };
-    drawn[cube_texel(16, p.face, cell(p.u), cell(p.v))] += glm::dvec3(radiance(env, d)) * (4 * std::numbers::pi / draws);
+    drawn[cube_texel(16, p.face, cell(p.u), cell(p.v))] += glm::dvec3(radiance(env, d)) *
+                                                           (4 * std::numbers::pi / draws);
   }
   double difference = 0, total = 0;
   for (size_t t = 0; t < drawn.size(); ++t)
@@ -64,16 +69,19 @@ TEST(CubeLight, EachTexelHasItsShare) {
   EXPECT_LT(difference / total, 0.01);  // 2,700 points a texel
 }
 
-// The aim of the issue is 0.1 %. The directions know where in its texel the sun is; only texels across the plane's horizon err.
+// The aim of the issue is 0.1 %. The directions know where in its texel the sun is; only texels across the plane's
+// horizon err.
 TEST(CubeLight, GivesThePlanesIrradiance) {
   const Environment env = sunny(512);
   const CubeLight light = cube_light(env, 64);
   Random random(9);
   for (int i = 0; i < 200; ++i) {
     const Vec3 n = square_to_sphere(random.next2());
-    if (std::abs(glm::dot(n, texel_direction(512 / 3, 512 / 9, 512, 256))) < 0.03f) continue;  // the sun stands on the horizon
+    if (std::abs(glm::dot(n, texel_direction(512 / 3, 512 / 9, 512, 256))) < 0.03f)
+      continue;  // the sun stands on the horizon
     glm::dvec3 sum(0);
-    for (size_t t = 0; t < light.energy.size(); ++t) sum += glm::dvec3(light.energy[t] * std::max(0.0f, glm::dot(light.direction[t], n)));
+    for (size_t t = 0; t < light.energy.size(); ++t)
+      sum += glm::dvec3(light.energy[t] * std::max(0.0f, glm::dot(light.direction[t], n)));
     const Vec3 truth = irradiance(env, n);
     for (int c = 0; c < 3; ++c) EXPECT_NEAR(sum[c] / double(truth[c]), 1, 1e-3);
   }

@@ -22,7 +22,8 @@ int cell(float x, int count) {
 glm::dvec2 row_moments(int y, int height) {
   double top = pi_d * y / height, bottom = pi_d * (y + 1) / height;
   auto equatorial = [](double t) { return 0.5 * (t - std::sin(t) * std::cos(t)); };  // of sin^2
-  return {equatorial(bottom) - equatorial(top), 0.5 * (std::cos(top) * std::cos(top) - std::cos(bottom) * std::cos(bottom))};
+  return {equatorial(bottom) - equatorial(top),
+          0.5 * (std::cos(top) * std::cos(top) - std::cos(bottom) * std::cos(bottom))};
 }
 
 Result<Environment> parse_uniform(const std::string& spec, const std::string& values) {
@@ -130,7 +131,8 @@ Vec3 radiance_bilinear(const Environment& env, Vec3 d) {
   float wx = x - fx, wy = y - fy;
   int x0 = int(fx) < 0 ? image.width - 1 : std::min(int(fx), image.width - 1), x1 = (x0 + 1) % image.width;
   int y0 = std::clamp(int(fy), 0, image.height - 1), y1 = std::clamp(int(fy) + 1, 0, image.height - 1);
-  Vec3 top = image.at(x0, y0) * (1 - wx) + image.at(x1, y0) * wx, bottom = image.at(x0, y1) * (1 - wx) + image.at(x1, y1) * wx;
+  Vec3 top = image.at(x0, y0) * (1 - wx) + image.at(x1, y0) * wx,
+       bottom = image.at(x0, y1) * (1 - wx) + image.at(x1, y1) * wx;
   return top * (1 - wy) + bottom * wy;
 }
 

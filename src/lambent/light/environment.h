@@ -1,6 +1,7 @@
 #pragma once
-// Distant light: a lat-long map of radiance. +Y up, first row at the zenith; the image centre shows +X and three quarters of
-// the way to the right shows +Z: u = 1/2 + atan2(z, x) / 2 pi, v = acos(y) / pi. A texel's radiance is constant over it.
+// Distant light: a lat-long map of radiance. +Y up, first row at the zenith; the image centre shows +X and three
+// quarters of the way to the right shows +Z: u = 1/2 + atan2(z, x) / 2 pi, v = acos(y) / pi. A texel's radiance is
+// constant over it.
 #include <lambent/core/result.h>
 #include <lambent/core/vec.h>
 #include <lambent/image/image.h>
@@ -20,8 +21,9 @@ struct Environment {
 // `spec` is a .hdr or .exr file, or
 //   uniform:R,G,B                                          the same radiance everywhere (one number: grey)
 //   sky:elevation=E,azimuth=A,turbidity=T,ground=G,sun=on  an analytic sky (sky.h), any subset of the keys
-// Negative and non-finite values are clamped to 0 with one warning that counts the pixels they are in. A map that is not twice
-// as wide as high is used, with a warning. Errors: bad spec or file, zero size, a picture format without high dynamic range.
+// Negative and non-finite values are clamped to 0 with one warning that counts the pixels they are in. A map that is
+// not twice as wide as high is used, with a warning. Errors: bad spec or file, zero size, a picture format without high
+// dynamic range.
 Result<Environment> load_environment(const std::string& spec);
 
 // What load_environment does with a loaded file's picture.
@@ -38,21 +40,21 @@ double texel_solid_angle(int y, int width, int height);
 // Integral of the unit direction over a texel, exact: its solid angle times the mean direction.
 glm::dvec3 texel_moment(int x, int y, int width, int height);
 
-// Radiance from direction d (unit): the texel it falls in, or interpolated bilinearly between texel centres (around the seam;
-// above the first and below the last row's centres that row alone).
+// Radiance from direction d (unit): the texel it falls in, or interpolated bilinearly between texel centres (around the
+// seam; above the first and below the last row's centres that row alone).
 Vec3 radiance(const Environment& env, Vec3 d);
 Vec3 radiance_bilinear(const Environment& env, Vec3 d);
 
-// The environment turned by R: radiance of the result at d is that of env at R^-1 d, resampled with `supersample`^2 points a
-// texel, spread evenly over its solid angle.
+// The environment turned by R: radiance of the result at d is that of env at R^-1 d, resampled with `supersample`^2
+// points a texel, spread evenly over its solid angle.
 Environment rotated(const Environment& env, const Mat3& R, int supersample = 4);
 
 // A map of any function of direction, sampled at texel centres.
 Environment make_environment(std::string name, int width, int height, const std::function<Vec3(Vec3)>& f);
 
-// Draws directions with density proportional to the texels' largest |channel|, so that nothing that gives light is missed, not
-// even radiance whose luminance cancels. pdf is per solid angle, exact for the piecewise constant map. The environment must
-// outlive the sampler.
+// Draws directions with density proportional to the texels' largest |channel|, so that nothing that gives light is
+// missed, not even radiance whose luminance cancels. pdf is per solid angle, exact for the piecewise constant map. The
+// environment must outlive the sampler.
 struct EnvironmentSampler {
   const Environment* environment = nullptr;
   std::vector<double> row_cdf;    // height + 1
@@ -68,8 +70,8 @@ EnvironmentSampler make_environment_sampler(const Environment& env);
 EnvironmentSample sample_environment(const EnvironmentSampler& sampler, Vec2 u);
 float environment_pdf(const EnvironmentSampler& sampler, Vec3 direction);
 
-// Irradiance on a plane of unit normal n, by summing all texels: pi for radiance 1. A slow closed sum, for tests and reports:
-// exact but for texels that straddle the plane's horizon.
+// Irradiance on a plane of unit normal n, by summing all texels: pi for radiance 1. A slow closed sum, for tests and
+// reports: exact but for texels that straddle the plane's horizon.
 Vec3 irradiance(const Environment& env, Vec3 n);
 
 }  // namespace lambent

@@ -1,5 +1,5 @@
-// Sampling of a piecewise constant map by inverting its marginal (rows) and conditional (texels of a row) distributions, as in
-// Pharr, Jakob and Humphreys, "Physically Based Rendering".
+// Sampling of a piecewise constant map by inverting its marginal (rows) and conditional (texels of a row)
+// distributions, as in Pharr, Jakob and Humphreys, "Physically Based Rendering".
 #include <lambent/light/environment.h>
 
 namespace lambent {
@@ -9,8 +9,8 @@ constexpr double pi_d = std::numbers::pi;
 
 double weight(Vec3 c) { return double(std::max({std::abs(c.x), std::abs(c.y), std::abs(c.z)})); }
 
-// Finds the piece of a cumulative sum that u in [0, 1) of its total falls in, never an empty one, and turns u into the place
-// within the piece.
+// Finds the piece of a cumulative sum that u in [0, 1) of its total falls in, never an empty one, and turns u into the
+// place within the piece.
 size_t invert(const double* cdf, size_t pieces, double& u) {
   double target = u * cdf[pieces];
   size_t i = size_t(std::upper_bound(cdf, cdf + pieces + 1, target) - cdf);
@@ -31,7 +31,8 @@ EnvironmentSampler make_environment_sampler(const Environment& env) {
   for (size_t y = 0; y < height; ++y) {
     double* row = &sampler.texel_cdf[y * (width + 1)];
     for (size_t x = 0; x < width; ++x) row[x + 1] = row[x] + weight(env.image.rgb[y * width + x]);
-    sampler.row_cdf[y + 1] = sampler.row_cdf[y] + row[width] * texel_solid_angle(int(y), env.image.width, env.image.height);
+    sampler.row_cdf[y + 1] = sampler.row_cdf[y] +
+                             row[width] * texel_solid_angle(int(y), env.image.width, env.image.height);
   }
   sampler.total = sampler.row_cdf[height];
   return sampler;

@@ -27,11 +27,11 @@ void expect_near(Vec3 a, Vec3 b, float tolerance) {
 
 TEST(LatLong, KnownDirections) {
   constexpr float rounding = 1e-6f;
-  expect_near(latlong_direction({0.5f, 0.5f}), {1, 0, 0}, rounding);    // image centre
-  expect_near(latlong_direction({0.75f, 0.5f}), {0, 0, 1}, rounding);   // three quarters of the way right
+  expect_near(latlong_direction({0.5f, 0.5f}), {1, 0, 0}, rounding);   // image centre
+  expect_near(latlong_direction({0.75f, 0.5f}), {0, 0, 1}, rounding);  // three quarters of the way right
   expect_near(latlong_direction({0.25f, 0.5f}), {0, 0, -1}, rounding);
   expect_near(latlong_direction({0, 0.5f}), {-1, 0, 0}, rounding);
-  expect_near(latlong_direction({0.3f, 0}), {0, 1, 0}, rounding);       // first row
+  expect_near(latlong_direction({0.3f, 0}), {0, 1, 0}, rounding);  // first row
   expect_near(latlong_direction({0.3f, 1}), {0, -1, 0}, rounding);
   // Corner texels of a 4 x 2 map: theta = 45 degrees, phi = -135, 135 degrees.
   const float h = 0.5f, s = std::sqrt(0.5f);
@@ -58,8 +58,8 @@ TEST(LatLong, BilinearBetweenTexelsAndAcrossTheSeam) {
   constexpr float rounding = 1e-5f;
   auto at = [&](float x, float y) { return radiance_bilinear(env, latlong_direction({x / 8, y / 4})); };
   expect_near(at(3.0f, 1.5f), (env.image.at(2, 1) + env.image.at(3, 1)) * 0.5f, rounding);
-  Vec3 expected =
-      0.75f * 0.5f * (env.image.at(2, 1) + env.image.at(2, 2)) + 0.25f * 0.5f * (env.image.at(3, 1) + env.image.at(3, 2));
+  Vec3 expected = 0.75f * 0.5f * (env.image.at(2, 1) + env.image.at(2, 2)) +
+                  0.25f * 0.5f * (env.image.at(3, 1) + env.image.at(3, 2));
   expect_near(at(2.75f, 2.0f), expected, rounding);
   expect_near(at(0.25f, 2.5f), 0.75f * env.image.at(0, 2) + 0.25f * env.image.at(7, 2), rounding);
   expect_near(at(7.75f, 2.5f), 0.75f * env.image.at(7, 2) + 0.25f * env.image.at(0, 2), rounding);
@@ -69,8 +69,8 @@ TEST(LatLong, BilinearBetweenTexelsAndAcrossTheSeam) {
 
 TEST(LatLong, StrangeDirectionsStayInside) {
   Environment env = skewed(6, 3);
-  for (Vec3 d : {Vec3(0), Vec3(NAN), Vec3(INFINITY, 0, 1), Vec3(0, 1.0001f, 0), Vec3(0, -1.0001f, 0), Vec3(-1, 0, -0.0f),
-                 Vec3(-1, 0, 0), Vec3(1e-30f), Vec3(-1, 0, 1e-20f), Vec3(1e30f, -1e30f, 1)}) {
+  for (Vec3 d : {Vec3(0), Vec3(NAN), Vec3(INFINITY, 0, 1), Vec3(0, 1.0001f, 0), Vec3(0, -1.0001f, 0),
+                 Vec3(-1, 0, -0.0f), Vec3(-1, 0, 0), Vec3(1e-30f), Vec3(-1, 0, 1e-20f), Vec3(1e30f, -1e30f, 1)}) {
     Vec2 uv = latlong_uv(d);
     EXPECT_TRUE(uv.x >= 0 && uv.x <= 1 && uv.y >= 0 && uv.y <= 1) << d.x << " " << d.y << " " << d.z;
     EXPECT_TRUE(is_finite(radiance(env, d)));
@@ -118,7 +118,8 @@ TEST(Rotated, WholeTurnsMoveTexelsExactly) {
 }
 
 TEST(Rotated, IrradianceTurnsAlong) {
-  Environment env = make_environment("smooth", 64, 32, [](Vec3 d) { return Vec3(1 + 0.8f * d.x, 1 + d.y * d.z, 2 + d.z); });
+  Environment env =
+      make_environment("smooth", 64, 32, [](Vec3 d) { return Vec3(1 + 0.8f * d.x, 1 + d.y * d.z, 2 + d.z); });
   Mat3 R = rotation_from_yaw_pitch_roll({35, -50, 110});
   Environment turned = rotated(env, R);
   constexpr float resampling = 0.01f;
@@ -175,8 +176,8 @@ TEST(LoadEnvironment, FilesAndErrors) {
 
 TEST(LoadEnvironment, RealFiles) {
   const char* named = std::getenv("LAMBENT_DATA");
-  std::filesystem::path data =
-      named ? std::filesystem::path(named) : std::filesystem::path(__FILE__).parent_path() / "../../../../shared/data";
+  std::filesystem::path data = named ? std::filesystem::path(named)
+                                     : std::filesystem::path(__FILE__).parent_path() / "../../../../shared/data";
   std::filesystem::path folder = data / "environments";
   if (!std::filesystem::is_directory(folder)) GTEST_SKIP() << "no test data: set LAMBENT_DATA";
   size_t count = 0;
@@ -187,7 +188,8 @@ TEST(LoadEnvironment, RealFiles) {
     EXPECT_EQ(env->image.width, 2 * env->image.height);
     EXPECT_TRUE(env->image.width == 1024 || env->image.width == 512);
     EXPECT_EQ(env->name, entry.path().stem());
-    // Pixels with a negative channel as stored. The chromaticities of city.exr are Rec. 709 adapted to D50, so nothing is added.
+    // Pixels with a negative channel as stored. The chromaticities of city.exr are Rec. 709 adapted to D50, so nothing
+    // is added.
     if (env->name == "city" || env->name == "courtyard_dwab") {
       ASSERT_EQ(env->warnings.size(), 1u) << env->name;
       std::string expected = env->name == "city" ? "299" : "1188";
@@ -248,7 +250,8 @@ TEST(EnvironmentSampler, ChiSquareOverTexels) {
 TEST(EnvironmentSampler, UniformWithinATexel) {
   // One big texel: moments of direction over it against their integrals.
   Environment env = make_environment("one", 4, 2, [](Vec3) { return Vec3(0); });
-  env.image.at(2, 0) = Vec3(1);  // phi in [0, 90], theta in [0, 90] degrees: an octant, whose mean direction is (1, 1, 1) / 2
+  env.image.at(2, 0) =
+      Vec3(1);  // phi in [0, 90], theta in [0, 90] degrees: an octant, whose mean direction is (1, 1, 1) / 2
   EnvironmentSampler sampler = make_environment_sampler(env);
   glm::dvec3 sum(0);
   constexpr int side = 200;

@@ -1,8 +1,7 @@
-// Follows: general-prt (custom light bases). The sharpness that gives a lobe the mean cosine R solves coth s - 1/s = R (the maximum
-// likelihood estimate of a von Mises-Fisher distribution).
+// Follows: general-prt (custom light bases). The sharpness that gives a lobe the mean cosine R solves coth s - 1/s = R
+// (the maximum likelihood estimate of a von Mises-Fisher distribution).
 #include <lambent/core/check.h>
 #include <lambent/light/lamps.h>
-
 
 namespace lambent {
 namespace {
@@ -14,7 +13,8 @@ constexpr double least_sharpness = 2;
 double sharpness_of(double mean_cosine) {
   const double R = std::min(mean_cosine, 1.0);
   if (R > 1 - 1.0 / double(max_sharpness)) return double(max_sharpness);
-  // From a known approximation (Banerjee et al. 2005) by Newton's method; coth s is 1 in double precision beyond s = 20.
+  // From a known approximation (Banerjee et al. 2005) by Newton's method; coth s is 1 in double precision beyond s
+  // = 20.
   double s = R * (3 - R * R) / (1 - R * R);
   if (s > 20) s = 1 / (1 - R);
   for (int step = 0; step < 50 && s > 0 && s < 40; ++step) {
@@ -35,9 +35,12 @@ struct Lamp {
 std::vector<Lobe> find_lamps(const Environment& env, int count) {
   LAMBENT_CHECK(count >= 0);
   const int w = env.image.width, h = env.image.height;
-  auto brightness = [&](size_t texel) { return double(env.image.rgb[texel].x + env.image.rgb[texel].y + env.image.rgb[texel].z) / 3; };
+  auto brightness = [&](size_t texel) {
+    return double(env.image.rgb[texel].x + env.image.rgb[texel].y + env.image.rgb[texel].z) / 3;
+  };
   double mean = 0;
-  for (size_t i = 0; i < env.image.rgb.size(); ++i) mean += brightness(i) * texel_solid_angle(int(i / size_t(w)), w, h) / (4 * std::numbers::pi);
+  for (size_t i = 0; i < env.image.rgb.size(); ++i)
+    mean += brightness(i) * texel_solid_angle(int(i / size_t(w)), w, h) / (4 * std::numbers::pi);
   std::vector<size_t> bright;
   for (size_t i = 0; i < env.image.rgb.size(); ++i)
     if (mean > 0 && brightness(i) >= least_over_mean * mean) bright.push_back(i);

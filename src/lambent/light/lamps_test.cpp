@@ -47,7 +47,8 @@ TEST(EnvironmentLamps, AreFoundWhereTheyStand) {
 }
 
 TEST(EnvironmentLamps, AreNoneWhereNothingStandsOut) {
-  for (float value : {0.0f, 1.0f}) EXPECT_TRUE(find_lamps(make_environment("flat", 64, 32, [&](Vec3) { return Vec3(value); }), 8).empty());
+  for (float value : {0.0f, 1.0f})
+    EXPECT_TRUE(find_lamps(make_environment("flat", 64, 32, [&](Vec3) { return Vec3(value); }), 8).empty());
   EXPECT_TRUE(find_lamps(discs({}), 8).empty());
   EXPECT_TRUE(find_lamps(discs({{Vec3(0, 1, 0), 0.1f, Vec3(50)}}), 0).empty());
   EXPECT_TRUE(find_lamps(make_environment("texel", 1, 1, [](Vec3) { return Vec3(1); }), 3).empty());
@@ -62,8 +63,8 @@ TEST(EnvironmentLamps, HaveTheSharpnessOfALobe) {
     const auto lamps = find_lamps(reconstruct_environment(basis, one, 4096), 3);
     ASSERT_GE(lamps.size(), 1u);
     EXPECT_LT(glm::distance(lamps[0].axis, axis), 0.05f / std::sqrt(s));
-    // Cut where it has fallen to c a sharp lobe's mean of 1 - cos is (1 - c + c ln c) / (1 - c) / s. That is a texel beyond where it
-    // has fallen to 1/5; not so sharp ones are cut earlier, at four times the mean.
+    // Cut where it has fallen to c a sharp lobe's mean of 1 - cos is (1 - c + c ln c) / (1 - c) / s. That is a texel
+    // beyond where it has fallen to 1/5; not so sharp ones are cut earlier, at four times the mean.
     const float radius = std::sqrt(2 * std::log(5.0f) / s) + 2 * pi / 4096, c = std::exp(-0.5f * s * radius * radius);
     const float expected = s * (1 - c) / (1 - c + c * std::log(c));
     EXPECT_NEAR(lamps[0].sharpness / expected, 1, s < 50 ? 0.3f : 0.03f) << s;
@@ -79,7 +80,8 @@ TEST(EnvironmentLamps, TheSunIsOneWhereverItStands) {
       const auto lamps = find_lamps(*sky, 5);
       ASSERT_EQ(lamps.size(), 1u) << azimuth << " " << width;
       const float e = glm::radians(40.0f), a = glm::radians(azimuth);
-      EXPECT_LT(glm::distance(lamps[0].axis, Vec3(std::cos(e) * std::cos(a), std::sin(e), std::cos(e) * std::sin(a))), 0.5f * 2 * pi / float(width));
+      EXPECT_LT(glm::distance(lamps[0].axis, Vec3(std::cos(e) * std::cos(a), std::sin(e), std::cos(e) * std::sin(a))),
+                0.5f * 2 * pi / float(width));
     }
 }
 
@@ -87,10 +89,13 @@ TEST(EnvironmentLamps, AreNotTwiceTheSame) {
   // A sun in a glow that is cut off at its edge: a disc and a ring with the same axis.
   const Vec3 axis = glm::normalize(Vec3(0.2f, 0.5f, 0.6f));
   for (float glow : {0.066f, 0.2f}) {
-    const auto lamps = find_lamps(make_environment("glow", 1024, 512, [&](Vec3 d) {
-      const float angle = std::acos(std::min(1.0f, glm::dot(d, axis)));
-      return Vec3(angle < 0.06f ? 1000.0f : angle < glow ? 100.0f : 0.1f);
-    }), 4);
+    const auto lamps =
+        find_lamps(make_environment("glow", 1024, 512,
+                                    [&](Vec3 d) {
+                                      const float angle = std::acos(std::min(1.0f, glm::dot(d, axis)));
+                                      return Vec3(angle < 0.06f ? 1000.0f : angle < glow ? 100.0f : 0.1f);
+                                    }),
+                   4);
     EXPECT_EQ(lamps.size(), glow < 0.1f ? 1u : 2u);
     for (size_t i = 0; i < lamps.size(); ++i)
       for (size_t j = 0; j < i; ++j) EXPECT_LE(lobe_overlap(LobeKind::von_mises_fisher, lamps[i], lamps[j]), 0.8);
@@ -99,7 +104,9 @@ TEST(EnvironmentLamps, AreNotTwiceTheSame) {
 
 DirectionalBasis mixed_basis(float sharpest) {
   return make_directional_basis(4, LobeKind::von_mises_fisher,
-                                {{glm::normalize(Vec3(0.3f, 0.8f, -0.5f)), sharpest}, {glm::normalize(Vec3(-0.7f, -0.1f, 0.4f)), 30}, {Vec3(0, 1, 0), 60}});
+                                {{glm::normalize(Vec3(0.3f, 0.8f, -0.5f)), sharpest},
+                                 {glm::normalize(Vec3(-0.7f, -0.1f, 0.4f)), 30},
+                                 {Vec3(0, 1, 0), 60}});
 }
 
 std::vector<Vec3> uneven(size_t count) {
@@ -125,7 +132,8 @@ TEST(ProjectLobes, IntegratesLobesOfAnySharpnessOverTexels) {
   for (LobeKind kind : {LobeKind::cosine_power, LobeKind::von_mises_fisher})
     for (float s : {2.0f, 40.0f, 1500.0f, 1e5f}) {
       // Within half a standard deviation of the texel's corner or edge if sharp.
-      const Vec3 axis = glm::normalize(latlong_direction(Vec2((float(x) + 0.02f / std::sqrt(s)) / w, (float(y) + 0.3f) / h)));
+      const Vec3 axis =
+          glm::normalize(latlong_direction(Vec2((float(x) + 0.02f / std::sqrt(s)) / w, (float(y) + 0.3f) / h)));
       Environment env = make_environment("texel", w, h, [](Vec3) { return Vec3(0); });
       env.image.at(x, y) = Vec3(2, 1, 0.5f);
       const auto basis = make_directional_basis(0, kind, {{axis, s}});
@@ -140,7 +148,8 @@ TEST(ProjectLobes, IntegratesLobesOfAnySharpnessOverTexels) {
           sum += sine * lobe_value(kind, s, a.y * std::cos(theta) + sine * (a.x * std::cos(phi) + a.z * std::sin(phi)));
         }
       }
-      const double expected = 2 * sum * lobe_scale(kind, s) * std::numbers::pi / h / fine * 2 * std::numbers::pi / w / fine;
+      const double expected = 2 * sum * lobe_scale(kind, s) * std::numbers::pi / h / fine * 2 * std::numbers::pi / w /
+                              fine;
       EXPECT_NEAR(light.x / expected, 1, 2e-5) << int(kind) << " " << s;
       EXPECT_FLOAT_EQ(light.y, light.x / 2);
     }
@@ -149,7 +158,8 @@ TEST(ProjectLobes, IntegratesLobesOfAnySharpnessOverTexels) {
 TEST(ProjectLobes, AreTurnedWithTheEnvironment) {
   const Mat3 R = rotation_from_yaw_pitch_roll({40, 25, -70});
   const auto basis = mixed_basis(400);
-  const Environment env = discs({{glm::normalize(Vec3(0.3f, 0.5f, -0.5f)), 0.2f, Vec3(9, 8, 7)}, {Vec3(0, 0, 1), 0.3f, Vec3(1, 5, 3)}});
+  const Environment env =
+      discs({{glm::normalize(Vec3(0.3f, 0.5f, -0.5f)), 0.2f, Vec3(9, 8, 7)}, {Vec3(0, 0, 1), 0.3f, Vec3(1, 5, 3)}});
   const auto turned = project_environment(env, basis, R), resampled = project_environment(rotated(env, R, 6), basis);
   // Resampling blurs the discs' rims by a texel.
   for (size_t i = 0; i < turned.size(); ++i)
@@ -169,7 +179,8 @@ TEST(ProjectLobes, ReconstructsEnergyAtAnyWidth) {
       const Environment env = reconstruct_environment(basis, one, width);
       double sum = 0;
       for (int y = 0; y < env.image.height; ++y)
-        for (int x = 0; x < env.image.width; ++x) sum += env.image.at(x, y).x * texel_solid_angle(y, env.image.width, env.image.height);
+        for (int x = 0; x < env.image.width; ++x)
+          sum += env.image.at(x, y).x * texel_solid_angle(y, env.image.width, env.image.height);
       EXPECT_NEAR(sum / lobe_integral(LobeKind::von_mises_fisher, max_sharpness), 1, 1e-5) << width;
       EXPECT_EQ(env.image.width, width ? width : 4096);
     }

@@ -18,19 +18,23 @@ struct PlacedLobe {
 };
 
 PlacedLobe place(LobeKind kind, const Lobe& lobe, const Mat3& rotation) {
-  const double s = lobe.sharpness, cosine = kind == LobeKind::cosine_power ? std::exp(-30 / s) : std::max(-1.0, 1 - 30 / s);
+  const double s = lobe.sharpness,
+               cosine = kind == LobeKind::cosine_power ? std::exp(-30 / s) : std::max(-1.0, 1 - 30 / s);
   // The environment turned by R meets the lobe about a as the environment itself meets the lobe about R^-1 a.
   return {glm::normalize(glm::transpose(glm::dmat3(rotation)) * glm::dvec3(lobe.axis)), s, std::acos(cosine)};
 }
 
-// Gauss nodes across `width` radians about 0, so many that a lobe of this sharpness is integrated to one part in 10^5 or better:
-// pieces no wider than its standard deviation, 4 nodes each, or fewer nodes where the whole width is little of that.
+// Gauss nodes across `width` radians about 0, so many that a lobe of this sharpness is integrated to one part in 10^5
+// or better: pieces no wider than its standard deviation, 4 nodes each, or fewer nodes where the whole width is little
+// of that.
 std::vector<QuadratureNode> nodes_across(double width, double sharpness) {
   const double ratio = width * std::sqrt(sharpness);
   const int pieces = std::max(1, int(std::ceil(ratio))), count = ratio < 1.0 / 64 ? 1 : ratio < 0.25 ? 2 : 4;
   std::vector<QuadratureNode> nodes;
   for (int i = 0; i < pieces; ++i)
-    for (const QuadratureNode& n : gauss_legendre(count, width * (double(i) / pieces - 0.5), width * (double(i + 1) / pieces - 0.5))) nodes.push_back(n);
+    for (const QuadratureNode& n :
+         gauss_legendre(count, width * (double(i) / pieces - 0.5), width * (double(i + 1) / pieces - 0.5)))
+      nodes.push_back(n);
   return nodes;
 }
 
@@ -39,7 +43,8 @@ template <class Take>
 void integrate_lobe_over_row(LobeKind kind, const PlacedLobe& lobe, int y, int width, int height, Take&& take) {
   const double row = pi_d / height, theta = row * (y + 0.5), column = 2 * pi_d / width;
   if (std::abs(std::acos(std::clamp(lobe.axis.y, -1.0, 1.0)) - theta) > lobe.reach + 0.5 * row) return;
-  const double widest = std::sin(std::clamp(pi_d / 2, theta - 0.5 * row, theta + 0.5 * row)), texel = 0.5 * std::hypot(row, column * widest);
+  const double widest = std::sin(std::clamp(pi_d / 2, theta - 0.5 * row, theta + 0.5 * row)),
+               texel = 0.5 * std::hypot(row, column * widest);
   const double least_cosine = lobe.reach + texel < pi_d ? std::cos(lobe.reach + texel) : -1.0;
   struct Latitude {
     double cos, sin, weight;
@@ -55,7 +60,8 @@ void integrate_lobe_over_row(LobeKind kind, const PlacedLobe& lobe, int y, int w
     double sum = 0;
     for (const QuadratureNode& n : across) {
       const double c = equatorial * std::cos(phi + n.x / widest);
-      for (const Latitude& t : latitudes) sum += n.weight / widest * t.weight * lobe_value(kind, lobe.sharpness, lobe.axis.y * t.cos + c * t.sin);
+      for (const Latitude& t : latitudes)
+        sum += n.weight / widest * t.weight * lobe_value(kind, lobe.sharpness, lobe.axis.y * t.cos + c * t.sin);
     }
     take(x, sum);
   }
@@ -98,7 +104,8 @@ std::vector<Vec3> project_environment(const Environment& env, const DirectionalB
   const int w = env.image.width, h = env.image.height;
   const size_t lobes = basis.lobes.size(), harmonics = size_t(sh_count(basis.sh_order));
   std::vector<Vec3> sh;
-  if (basis.sh_order > 0) sh = rotate_sh(make_sh_rotation(basis.sh_order, rotation), project_environment(env, basis.sh_order));
+  if (basis.sh_order > 0)
+    sh = rotate_sh(make_sh_rotation(basis.sh_order, rotation), project_environment(env, basis.sh_order));
   if (lobes == 0) return sh;
   std::vector<PlacedLobe> placed;
   for (const Lobe& lobe : basis.lobes) placed.push_back(place(basis.kind, lobe, rotation));
@@ -107,8 +114,9 @@ std::vector<Vec3> project_environment(const Environment& env, const DirectionalB
   parallel_for(size_t(h), 4, [&](size_t begin, size_t end) {
     for (size_t y = begin; y < end; ++y)
       for (size_t k = 0; k < lobes; ++k)
-        integrate_lobe_over_row(basis.kind, placed[k], int(y), w, h,
-                                [&](int x, double integral) { rows[y * lobes + k] += glm::dvec3(env.image.at(x, int(y))) * integral; });
+        integrate_lobe_over_row(basis.kind, placed[k], int(y), w, h, [&](int x, double integral) {
+          rows[y * lobes + k] += glm::dvec3(env.image.at(x, int(y))) * integral;
+        });
   });
   std::vector<Vec3> light(basis.count());
   for (int c = 0; c < 3; ++c) {
@@ -139,18 +147,22 @@ Environment reconstruct_environment(const DirectionalBasis& basis, std::span<con
   const int height = width / 2;
   const size_t harmonics = size_t(sh_count(basis.sh_order));
   Environment env;
-  env.name = "harmonics of order " + std::to_string(basis.sh_order) + " and " + std::to_string(basis.lobes.size()) + " lobes";
+  env.name = "harmonics of order " + std::to_string(basis.sh_order) + " and " + std::to_string(basis.lobes.size()) +
+             " lobes";
   env.image = Image(width, height);
   std::vector<PlacedLobe> placed;
   for (const Lobe& lobe : basis.lobes) placed.push_back(place(basis.kind, lobe, Mat3(1.0f)));
   parallel_for(size_t(height), 4, [&](size_t begin, size_t end) {
     for (int y = int(begin); y < int(end); ++y) {
       if (harmonics > 0)
-        for (int x = 0; x < width; ++x) env.image.at(x, y) = reconstruct_sh(light.first(harmonics), texel_direction(x, y, width, height));
+        for (int x = 0; x < width; ++x)
+          env.image.at(x, y) = reconstruct_sh(light.first(harmonics), texel_direction(x, y, width, height));
       for (size_t k = 0; k < placed.size(); ++k) {
-        const float scale = float(lobe_scale(basis.kind, basis.lobes[k].sharpness) / texel_solid_angle(y, width, height));
-        integrate_lobe_over_row(basis.kind, placed[k], y, width, height,
-                                [&](int x, double integral) { env.image.at(x, y) += light[harmonics + k] * (scale * float(integral)); });
+        const float scale =
+            float(lobe_scale(basis.kind, basis.lobes[k].sharpness) / texel_solid_angle(y, width, height));
+        integrate_lobe_over_row(basis.kind, placed[k], y, width, height, [&](int x, double integral) {
+          env.image.at(x, y) += light[harmonics + k] * (scale * float(integral));
+        });
       }
     }
   });

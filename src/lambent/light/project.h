@@ -7,20 +7,22 @@
 
 namespace lambent {
 
-// Spherical-harmonic coefficients (basis/sh.h) of the environment's radiance, order^2 of them: a sum over texels with exact
-// solid angles; texels wider than a third of a degree are sampled at several points.
+// Spherical-harmonic coefficients (basis/sh.h) of the environment's radiance, order^2 of them: a sum over texels with
+// exact solid angles; texels wider than a third of a degree are sampled at several points.
 std::vector<Vec3> project_environment(const Environment& env, int order);
 
-// The least-squares coefficients in a basis with lobes (basis/directional.h), of the environment turned by `rotation`: the dual
-// functions applied to integrals against harmonics, as above and turned as coefficients, and against lobes, which take the
-// place of the sun on the environment before it is turned and are integrated over every texel however much sharper they are.
-std::vector<Vec3> project_environment(const Environment& env, const DirectionalBasis& basis, const Mat3& rotation = Mat3(1.0f));
+// The least-squares coefficients in a basis with lobes (basis/directional.h), of the environment turned by `rotation`:
+// the dual functions applied to integrals against harmonics, as above and turned as coefficients, and against lobes,
+// which take the place of the sun on the environment before it is turned and are integrated over every texel however
+// much sharper they are.
+std::vector<Vec3> project_environment(const Environment& env, const DirectionalBasis& basis,
+                                      const Mat3& rotation = Mat3(1.0f));
 
 // The band-limited environment with these coefficients as a map; it may be negative in places.
 Environment reconstruct_environment(std::span<const Vec3> light, int width = 1024);
 
-// The same of a basis with lobes. Lobes are averaged over texels, so energy is right at any width; width 0 chooses one whose
-// texels are no wider than half the standard deviation of the sharpest lobe, from 1024 to 4096.
+// The same of a basis with lobes. Lobes are averaged over texels, so energy is right at any width; width 0 chooses one
+// whose texels are no wider than half the standard deviation of the sharpest lobe, from 1024 to 4096.
 Environment reconstruct_environment(const DirectionalBasis& basis, std::span<const Vec3> light, int width = 0);
 
 }  // namespace lambent

@@ -1,5 +1,6 @@
-// Preetham, Shirley and Smits 1999, "A practical analytic model for daylight": the sky's distribution (appendix A.2) in the form
-// of Perez et al. 1993, the sun's attenuation (appendix A.1) with Iqbal's absorption data. Relative air mass: Kasten 1966.
+// Preetham, Shirley and Smits 1999, "A practical analytic model for daylight": the sky's distribution (appendix A.2) in
+// the form of Perez et al. 1993, the sun's attenuation (appendix A.1) with Iqbal's absorption data. Relative air mass:
+// Kasten 1966.
 #include <lambent/core/color.h>
 #include <lambent/core/parallel.h>
 #include <lambent/core/sampling.h>
@@ -28,14 +29,16 @@ struct SpectrumRow {
 constexpr double first_wavelength = 380, wavelength_step = 10;  // nm
 // The last three radiances continue the table as a black body of 5778 K.
 constexpr SpectrumRow spectrum[] = {
-    {1655, 0, 0, 0},        {1623, 0, 0, 0},         {2112, 0, 0, 0},         {2588, 0, 0, 0},          {2582, 0, 0, 0},
-    {2423, 0, 0, 0},        {2676, 0, 0, 0},         {2966, 0.003, 0, 0},     {3054, 0.006, 0, 0},      {3006, 0.009, 0, 0},
-    {3066, 0.014, 0, 0},    {2883, 0.021, 0, 0},     {2871, 0.030, 0, 0},     {2782, 0.040, 0, 0},      {2710, 0.048, 0, 0},
-    {2723, 0.063, 0, 0},    {2636, 0.075, 0, 0},     {2550, 0.085, 0, 0},     {2506, 0.103, 0, 0},      {2531, 0.120, 0, 0},
-    {2535, 0.120, 0, 0},    {2513, 0.115, 0, 0},     {2463, 0.125, 0, 0},     {2417, 0.120, 0, 0},      {2368, 0.105, 0, 0},
-    {2321, 0.090, 0, 0},    {2282, 0.079, 0, 0},     {2234, 0.067, 0, 0},     {2197, 0.057, 0, 0},      {2153, 0.048, 0, 0},
-    {2110, 0.036, 0, 0},    {2073, 0.028, 0.016, 0}, {2024, 0.023, 0.024, 0}, {1987, 0.018, 0.0125, 0}, {1943, 0.014, 1.0, 0},
-    {1907, 0.011, 0.87, 0}, {1863, 0.010, 0.061, 0}, {1826, 0.009, 0.001, 0}, {1788, 0.007, 1e-5, 3.0}, {1751, 0.004, 1e-5, 0.21},
+    {1655, 0, 0, 0},         {1623, 0, 0, 0},          {2112, 0, 0, 0},          {2588, 0, 0, 0},
+    {2582, 0, 0, 0},         {2423, 0, 0, 0},          {2676, 0, 0, 0},          {2966, 0.003, 0, 0},
+    {3054, 0.006, 0, 0},     {3006, 0.009, 0, 0},      {3066, 0.014, 0, 0},      {2883, 0.021, 0, 0},
+    {2871, 0.030, 0, 0},     {2782, 0.040, 0, 0},      {2710, 0.048, 0, 0},      {2723, 0.063, 0, 0},
+    {2636, 0.075, 0, 0},     {2550, 0.085, 0, 0},      {2506, 0.103, 0, 0},      {2531, 0.120, 0, 0},
+    {2535, 0.120, 0, 0},     {2513, 0.115, 0, 0},      {2463, 0.125, 0, 0},      {2417, 0.120, 0, 0},
+    {2368, 0.105, 0, 0},     {2321, 0.090, 0, 0},      {2282, 0.079, 0, 0},      {2234, 0.067, 0, 0},
+    {2197, 0.057, 0, 0},     {2153, 0.048, 0, 0},      {2110, 0.036, 0, 0},      {2073, 0.028, 0.016, 0},
+    {2024, 0.023, 0.024, 0}, {1987, 0.018, 0.0125, 0}, {1943, 0.014, 1.0, 0},    {1907, 0.011, 0.87, 0},
+    {1863, 0.010, 0.061, 0}, {1826, 0.009, 0.001, 0},  {1788, 0.007, 1e-5, 3.0}, {1751, 0.004, 1e-5, 0.21},
     {1714, 0, 6e-4, 0}};
 
 // Transmittance of the atmosphere, appendix A.1, for relative air mass m.
@@ -72,21 +75,24 @@ SkyModel make_model(double elevation, double turbidity) {
   double T = std::max(turbidity, 2.0);
   SkyModel m;
   const double theta_s = radians(90 - std::max(elevation, 0.0));
-  m.perez_Y = {0.1787 * T - 1.4630, -0.3554 * T + 0.4275, -0.0227 * T + 5.3251, 0.1206 * T - 2.5771, -0.0670 * T + 0.3703};
-  m.perez_x = {-0.0193 * T - 0.2592, -0.0665 * T + 0.0008, -0.0004 * T + 0.2125, -0.0641 * T - 0.8989, -0.0033 * T + 0.0452};
-  m.perez_y = {-0.0167 * T - 0.2608, -0.0950 * T + 0.0092, -0.0079 * T + 0.2102, -0.0441 * T - 1.6537, -0.0109 * T + 0.0529};
+  m.perez_Y = {0.1787 * T - 1.4630, -0.3554 * T + 0.4275, -0.0227 * T + 5.3251, 0.1206 * T - 2.5771,
+               -0.0670 * T + 0.3703};
+  m.perez_x = {-0.0193 * T - 0.2592, -0.0665 * T + 0.0008, -0.0004 * T + 0.2125, -0.0641 * T - 0.8989,
+               -0.0033 * T + 0.0452};
+  m.perez_y = {-0.0167 * T - 0.2608, -0.0950 * T + 0.0092, -0.0079 * T + 0.2102, -0.0441 * T - 1.6537,
+               -0.0109 * T + 0.0529};
   double chi = (4.0 / 9 - T / 120) * (pi_d - 2 * theta_s);
   double zenith_Y = std::max(0.0, 1000 * ((4.0453 * T - 4.9710) * std::tan(chi) - 0.2155 * T + 2.4192));
   zenith_Y *= std::exp(std::min(elevation, 0.0) / 1.5);
-  auto zenith = [&](const double (&rows)[3][4]) {
+  auto zenith = [&](const double(&rows)[3][4]) {
     double t = theta_s, sum = 0, power = T * T;
     for (const auto& r : rows) sum += power * (((r[0] * t + r[1]) * t + r[2]) * t + r[3]), power /= T;
     return sum;
   };
-  double zenith_x =
-      zenith({{0.00166, -0.00375, 0.00209, 0}, {-0.02903, 0.06377, -0.03202, 0.00394}, {0.11693, -0.21196, 0.06052, 0.25886}});
-  double zenith_y =
-      zenith({{0.00275, -0.00610, 0.00317, 0}, {-0.04214, 0.08970, -0.04153, 0.00516}, {0.15346, -0.26756, 0.06670, 0.26688}});
+  double zenith_x = zenith(
+      {{0.00166, -0.00375, 0.00209, 0}, {-0.02903, 0.06377, -0.03202, 0.00394}, {0.11693, -0.21196, 0.06052, 0.25886}});
+  double zenith_y = zenith(
+      {{0.00275, -0.00610, 0.00317, 0}, {-0.04214, 0.08970, -0.04153, 0.00516}, {0.15346, -0.26756, 0.06670, 0.26688}});
   m.scale_Y = zenith_Y / perez(m.perez_Y, 0, theta_s);
   m.scale_x = zenith_x / perez(m.perez_x, 0, theta_s);
   m.scale_y = zenith_y / perez(m.perez_y, 0, theta_s);
@@ -104,16 +110,18 @@ Vec3 sky_radiance(const SkyModel& m, Vec3 d, glm::dvec3 sun) {
 
 // Deposits the disc: points of equal solid angle each give their share of the irradiance to the texel they fall in.
 void add_sun(Image& image, glm::dvec3 sun, Vec3 irradiance) {
-  const int side = std::clamp(image.width / 4, 64, 1024);  // several points in each texel, also in the thin ones at the zenith
-  glm::dvec3 aside =
-      glm::normalize(std::abs(sun.y) < 0.9 ? glm::cross(sun, glm::dvec3(0, 1, 0)) : glm::cross(sun, glm::dvec3(1, 0, 0)));
+  const int side =
+      std::clamp(image.width / 4, 64, 1024);  // several points in each texel, also in the thin ones at the zenith
+  glm::dvec3 aside = glm::normalize(std::abs(sun.y) < 0.9 ? glm::cross(sun, glm::dvec3(0, 1, 0))
+                                                          : glm::cross(sun, glm::dvec3(1, 0, 0)));
   glm::dvec3 up = glm::cross(aside, sun);
   std::vector<int> points(image.rgb.size());
   for (int j = 0; j < side; ++j)
     for (int i = 0; i < side; ++i) {
       glm::dvec2 p(square_to_disk({(float(i) + 0.5f) / float(side), (float(j) + 0.5f) / float(side)}));
-      double r = glm::length(p), angle = 2 * std::asin(r * std::sin(sun_radius / 2));  // equal areas of the disc and the cap
-      glm::dvec2 around = p / r;  // never 0: points lie off the centre
+      double r = glm::length(p),
+             angle = 2 * std::asin(r * std::sin(sun_radius / 2));  // equal areas of the disc and the cap
+      glm::dvec2 around = p / r;                                   // never 0: points lie off the centre
       glm::dvec3 d = std::cos(angle) * sun + std::sin(angle) * (around.x * aside + around.y * up);
       if (d.y <= 0) continue;
       Vec2 uv = latlong_uv(Vec3(d));

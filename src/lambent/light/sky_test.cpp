@@ -76,8 +76,10 @@ TEST(Sky, DiscStandsWhereAskedAndItsEnergyIsExactAtAnySize) {
       Environment a = sky(with), b = sky(without);
       glm::dvec3 disc = power(a, width / 4) - power(b, width / 4);
       Vec3 expected = sun_irradiance(elevation, 3);
-      constexpr double float_texels = 1e-5;  // relative: the texels hold floats, and the disc is a difference of sums of them
-      for (int k = 0; k < 3; ++k) EXPECT_NEAR(disc[k] / double(expected[k]), 1, float_texels) << width << " " << elevation;
+      constexpr double float_texels =
+          1e-5;  // relative: the texels hold floats, and the disc is a difference of sums of them
+      for (int k = 0; k < 3; ++k)
+        EXPECT_NEAR(disc[k] / double(expected[k]), 1, float_texels) << width << " " << elevation;
       float e = glm::radians(elevation), phi = glm::radians(200.0f);
       Vec3 toward(std::cos(e) * std::cos(phi), std::sin(e), std::cos(e) * std::sin(phi));
       EXPECT_GT(luminance(radiance(a, toward)), luminance(radiance(b, toward)) * 1.5f) << width << " " << elevation;
@@ -135,7 +137,8 @@ TEST(Sky, ContinuousAcrossTheHorizonAndNeverNegative) {
         ASSERT_GE(std::min({c.x, c.y, c.z}), 0);
       }
       float now = luminance(irradiance(env, {0, 1, 0}));
-      constexpr float jump = 0.1f;  // relative, for a step of 0.05 degrees: the fade makes 0.033; haze 10 rises from near 0
+      constexpr float jump =
+          0.1f;  // relative, for a step of 0.05 degrees: the fade makes 0.033; haze 10 rises from near 0
       if (last >= 0) {
         EXPECT_NEAR(now / last, 1, jump) << options.elevation << " " << turbidity;
       }
@@ -167,13 +170,13 @@ TEST(Sky, Parsing) {
   EXPECT_EQ(options->width, 64);
   ASSERT_TRUE(parse_sky(""));
   EXPECT_EQ(parse_sky("sun=on")->elevation, SkyOptions().elevation);
-  for (const char* bad : {"elevation", "elevation=", "elevation=x", "elevation=1x", "elevation=nan", "height=3", "sun=1", "sun",
-                          "width=1e9", "width=9.5", "=", ",,"})
+  for (const char* bad : {"elevation", "elevation=", "elevation=x", "elevation=1x", "elevation=nan", "height=3",
+                          "sun=1", "sun", "width=1e9", "width=9.5", "=", ",,"})
     EXPECT_FALSE(parse_sky(bad)) << bad;
   EXPECT_EQ(parse_sky("height=3").error().text(),
             "sky: unknown key \"height\": elevation, azimuth, turbidity, ground, sun or width");
-  for (const char* bad : {"sky:elevation=-3", "sky:elevation=91", "sky:turbidity=1", "sky:turbidity=11", "sky:ground=1.5",
-                          "sky:ground=-1", "sky:width=0", "sky:width=9"})
+  for (const char* bad : {"sky:elevation=-3", "sky:elevation=91", "sky:turbidity=1", "sky:turbidity=11",
+                          "sky:ground=1.5", "sky:ground=-1", "sky:width=0", "sky:width=9"})
     EXPECT_FALSE(load_environment(bad)) << bad;
   auto env = load_environment("sky:elevation=60,width=32");
   ASSERT_TRUE(env);

@@ -8,14 +8,17 @@
 namespace lambent {
 namespace {
 
-// A texel is covered twice only where its centre lies this far inside two triangles, in weights: seams of one chart do not count.
+// A texel is covered twice only where its centre lies this far inside two triangles, in weights: seams of one chart do
+// not count.
 constexpr float well_inside = 1e-3f;
 // Triangles of one texel are neighbours if they lie within so many texels' widths in space.
 constexpr float neighbours_within = 4;
 // Rounds of cutting charts that overlap themselves.
 constexpr int most_layers = 8;
 
-std::array<Vec2, 3> at_corners(const std::vector<Vec2>& at, const Triangle& t) { return {at[t.v[0]], at[t.v[1]], at[t.v[2]]}; }
+std::array<Vec2, 3> at_corners(const std::vector<Vec2>& at, const Triangle& t) {
+  return {at[t.v[0]], at[t.v[1]], at[t.v[2]]};
+}
 
 double area2(const std::array<Vec2, 3>& t) {
   const glm::dvec2 a = glm::dvec2(t[1]) - glm::dvec2(t[0]), b = glm::dvec2(t[2]) - glm::dvec2(t[0]);
@@ -41,8 +44,9 @@ bool any_two_sided(const Scene& scene) {
 
 Result<void> check_texels(int64_t width, int64_t height, const AtlasOptions& o) {
   if (width * height <= max_atlas_texels) return {};
-  return Error{o.texels_per_unit > 0 ? "--texels-per-unit" : "--atlas",
-               "makes an atlas of " + size_text(width, height) + ", more than " + std::to_string(max_atlas_texels) + " texels"};
+  return Error{
+      o.texels_per_unit > 0 ? "--texels-per-unit" : "--atlas",
+      "makes an atlas of " + size_text(width, height) + ", more than " + std::to_string(max_atlas_texels) + " texels"};
 }
 
 // Uses the scene's own coordinates, or says in `remark` why not. Backs, where there are any, get the same layout below.
@@ -68,8 +72,10 @@ Result<bool> reuse_texcoords(const Scene& scene, const AtlasOptions& o, Atlas& a
   if (o.texels_per_unit > 0) {
     const double side = std::ceil(std::sqrt(surface / covered) * double(o.texels_per_unit));
     if (!(side * layers <= max_atlas_side))
-      return Error{"--texels-per-unit", "the scene's TEXCOORD_1 would need an atlas of " + size_text(int64_t(std::min(side, 1e15)), int64_t(std::min(side * layers, 1e15))) +
-                                            " texels; the limit is " + std::to_string(max_atlas_side) + " a side"};
+      return Error{"--texels-per-unit",
+                   "the scene's TEXCOORD_1 would need an atlas of " +
+                       size_text(int64_t(std::min(side, 1e15)), int64_t(std::min(side * layers, 1e15))) +
+                       " texels; the limit is " + std::to_string(max_atlas_side) + " a side"};
     atlas.width = std::max(1, int(side)), atlas.height = atlas.width;
   } else {
     atlas.width = o.width, atlas.height = o.height / layers;
@@ -83,7 +89,8 @@ Result<bool> reuse_texcoords(const Scene& scene, const AtlasOptions& o, Atlas& a
   double touched = 0;
   for (const Triangle& t : scene.triangles) {
     const auto corners = at_corners(at, t);
-    touched += area2(corners) + 2 * double(glm::length(corners[1] - corners[0]) + glm::length(corners[2] - corners[1])) + 9;
+    touched += area2(corners) +
+               2 * double(glm::length(corners[1] - corners[0]) + glm::length(corners[2] - corners[1])) + 9;
   }
   if (touched > 64.0 * atlas.width * atlas.height + 64.0 * double(scene.triangles.size()))
     return refuse("its triangles are too thin for the atlas's texels");
@@ -105,7 +112,8 @@ Result<bool> reuse_texcoords(const Scene& scene, const AtlasOptions& o, Atlas& a
   for (const Triangle& t : scene.triangles) {
     const Vec2 p = (at[t.v[0]] + at[t.v[1]] + at[t.v[2]]) / 3.0f;
     const Vec3 here = (scene.positions[t.v[0]] + scene.positions[t.v[1]] + scene.positions[t.v[2]]) / 3.0f;
-    Vec3& first = place[size_t(std::clamp(int(p.y), 0, atlas.height - 1)) * size_t(atlas.width) + size_t(std::clamp(int(p.x), 0, atlas.width - 1))];
+    Vec3& first = place[size_t(std::clamp(int(p.y), 0, atlas.height - 1)) * size_t(atlas.width) +
+                        size_t(std::clamp(int(p.x), 0, atlas.width - 1))];
     if (!std::isfinite(first.x)) first = here;
     else apart += glm::length(here - first) * atlas.texels_per_unit > neighbours_within;
   }
@@ -132,14 +140,16 @@ struct Layout {
     for (size_t i = 0; i < scene.triangles.size(); ++i)
       if (charts.of_triangle[i] != none) two_sided[charts.of_triangle[i]] = scene.triangles[i].two_sided;
     area = 0;
-    for (uint32_t c = 0; c < charts.count; ++c) area += double(flat.size[c].x) * double(flat.size[c].y) * (1 + two_sided[c]);
+    for (uint32_t c = 0; c < charts.count; ++c)
+      area += double(flat.size[c].x) * double(flat.size[c].y) * (1 + two_sided[c]);
   }
 
   // Tents reach one texel beyond the chart, on all sides. False if one rectangle alone is wider than `most`.
   bool rectangles(double density, int padding, int most, std::vector<std::array<int, 2>>& out) const {
     out.clear();
     for (uint32_t c = 0; c < charts.count; ++c) {
-      const double w = std::ceil(double(flat.size[c].x) * density) + 2 + padding, h = std::ceil(double(flat.size[c].y) * density) + 2 + padding;
+      const double w = std::ceil(double(flat.size[c].x) * density) + 2 + padding,
+                   h = std::ceil(double(flat.size[c].y) * density) + 2 + padding;
       if (!(w <= most && h <= max_atlas_side)) return false;
       for (int side = 0; side <= two_sided[c]; ++side) out.push_back({int(w), int(h)});
     }
@@ -161,7 +171,8 @@ Result<Fit> fit_density(const Layout& layout, const AtlasOptions& o) {
   std::vector<std::array<int, 2>> rectangles;
   const double guess = std::sqrt(std::max(layout.area, 0.0)) * fit.density;
   auto too_large = [&] {
-    return Error{"--texels-per-unit", "would need an atlas of about " + size_text(int64_t(std::min(guess, 1e15)), int64_t(std::min(guess, 1e15))) +
+    return Error{"--texels-per-unit", "would need an atlas of about " +
+                                          size_text(int64_t(std::min(guess, 1e15)), int64_t(std::min(guess, 1e15))) +
                                           " texels; the limit is " + std::to_string(max_atlas_side) + " a side"};
   };
   if (!layout.rectangles(fit.density, o.padding, max_atlas_side, rectangles)) return too_large();
@@ -192,7 +203,8 @@ Result<Fit> fit_size(const Layout& layout, const AtlasOptions& o) {
     AtlasOptions any = o;
     any.texels_per_unit = 1e-30f;
     auto needed = fit_density(layout, any);
-    const std::string size = needed ? size_text(needed->width, needed->packing.height) : "one beyond " + size_text(max_atlas_side, max_atlas_side);
+    const std::string size = needed ? size_text(needed->width, needed->packing.height)
+                                    : "one beyond " + size_text(max_atlas_side, max_atlas_side);
     return Error{"--atlas", size_text(o.width, o.height) + " is too small for " + std::to_string(layout.charts.count) +
                                 " charts: they need at least " + size + ", better several times that"};
   }
@@ -219,13 +231,15 @@ size_t part_overlaps(const Layout& layout, double density, std::vector<uint8_t>&
   std::vector<uint8_t> taken;
   for (uint32_t c = 0; c < layout.charts.count; ++c) {
     if (first[c + 1] - first[c] < 2) continue;
-    const int w = int(std::ceil(double(layout.flat.size[c].x) * density)) + 1, h = int(std::ceil(double(layout.flat.size[c].y) * density)) + 1;
+    const int w = int(std::ceil(double(layout.flat.size[c].x) * density)) + 1,
+              h = int(std::ceil(double(layout.flat.size[c].y) * density)) + 1;
     taken.assign(size_t(w) * size_t(h), 0);
     for (uint32_t k = first[c]; k < first[c + 1]; ++k) {
       std::array<Vec2, 3> at = layout.flat.corners[members[k]];
       for (Vec2& p : at) p *= float(density);
       bool clash = false;
-      each_texel(at, 0, w, h, [&](int i, int j) { clash |= taken[size_t(j) * size_t(w) + size_t(i)] && is_well_inside(at, i, j); });
+      each_texel(at, 0, w, h,
+                 [&](int i, int j) { clash |= taken[size_t(j) * size_t(w) + size_t(i)] && is_well_inside(at, i, j); });
       if (clash) {
         ++layers[members[k]], ++moved;
         continue;
@@ -239,15 +253,15 @@ size_t part_overlaps(const Layout& layout, double density, std::vector<uint8_t>&
 }
 
 // Gives every (vertex, chart) a vertex of its own, and its place.
-void split_vertices(Scene& scene, const Charts& charts, const std::vector<std::array<Vec2, 3>>& corners, const std::vector<Vec2>& front_shift,
-                    const std::vector<Vec2>& back_shift, Atlas& atlas) {
+void split_vertices(Scene& scene, const Charts& charts, const std::vector<std::array<Vec2, 3>>& corners,
+                    const std::vector<Vec2>& front_shift, const std::vector<Vec2>& back_shift, Atlas& atlas) {
   struct {
     std::vector<Vec3> positions, normals, colors;
     std::vector<Vec2> texcoords;
     std::vector<Vec4> tangents;
     std::vector<Triangle> triangles;
-  } old{std::move(scene.positions), std::move(scene.normals), std::move(scene.colors), std::move(scene.texcoords[0]),
-        std::move(scene.tangents), scene.triangles};
+  } old{std::move(scene.positions),    std::move(scene.normals),  std::move(scene.colors),
+        std::move(scene.texcoords[0]), std::move(scene.tangents), scene.triangles};
   scene.positions.clear(), scene.normals.clear(), scene.colors.clear();
   scene.texcoords[0].clear(), scene.texcoords[1].clear(), scene.tangents.clear();
   const bool backs = any_two_sided(scene);
@@ -287,7 +301,8 @@ void split_vertices(Scene& scene, const Charts& charts, const std::vector<std::a
 
 Result<void> check_options(const Scene& scene, const AtlasOptions& o) {
   const bool by_size = o.width != 0 || o.height != 0;
-  if (by_size == (o.texels_per_unit != 0)) return Error{"atlas", "needs either a density in texels or a size, and not both"};
+  if (by_size == (o.texels_per_unit != 0))
+    return Error{"atlas", "needs either a density in texels or a size, and not both"};
   if (!by_size && !(o.texels_per_unit > 0 && std::isfinite(o.texels_per_unit)))
     return Error{"--texels-per-unit", "must be positive"};
   if (by_size && (o.width < 1 || o.height < 1 || o.width > max_atlas_side || o.height > max_atlas_side))
@@ -296,7 +311,6 @@ Result<void> check_options(const Scene& scene, const AtlasOptions& o) {
   if (!(surface_area(scene) > 0)) return Error{scene.path, "nothing to bake: no triangle has an area"};
   return {};
 }
-
 
 }  // namespace
 
@@ -342,7 +356,8 @@ Result<Atlas> make_atlas(Scene& scene, const AtlasOptions& o) {
     for (Vec2& p : corners) p *= atlas.texels_per_unit;
   split_vertices(scene, layout.charts, layout.flat.corners, front_shift, back_shift, atlas);
   scene.texcoords[1].resize(scene.positions.size());
-  for (size_t v = 0; v < scene.positions.size(); ++v) scene.texcoords[1][v] = atlas.front[v] / Vec2(float(atlas.width), float(atlas.height));
+  for (size_t v = 0; v < scene.positions.size(); ++v)
+    scene.texcoords[1][v] = atlas.front[v] / Vec2(float(atlas.width), float(atlas.height));
   return atlas;
 }
 

@@ -19,25 +19,28 @@ struct Atlas {
   int width = 0, height = 0;
   std::vector<Vec2> front, back;  // place of each scene vertex, by side, in texels; `back` empty where all is one-sided
   float texels_per_unit = 0;
-  uint32_t charts = 0;            // 0: the scene's own coordinates are used
-  std::string remark;             // why the scene's own coordinates were not used, or ""
+  uint32_t charts = 0;  // 0: the scene's own coordinates are used
+  std::string remark;   // why the scene's own coordinates were not used, or ""
 };
 
-// Reuses TEXCOORD_1 if every triangle with an area has its own place there within [0, 1]^2; else cuts the surface into charts
-// (charts.h), packs them, splits vertices where charts part and writes TEXCOORD_1: front / (width, height). Backs of two-sided
-// triangles get places of their own. Splitting changes the scene's vertices. Errors: options out of range; an atlas too small
-// or too large (says the size needed); a material whose base colour, normals or emission read TEXCOORD_1, which then cannot be replaced.
+// Reuses TEXCOORD_1 if every triangle with an area has its own place there within [0, 1]^2; else cuts the surface into
+// charts (charts.h), packs them, splits vertices where charts part and writes TEXCOORD_1: front / (width, height).
+// Backs of two-sided triangles get places of their own. Splitting changes the scene's vertices. Errors: options out of
+// range; an atlas too small or too large (says the size needed); a material whose base colour, normals or emission read
+// TEXCOORD_1, which then cannot be replaced.
 Result<Atlas> make_atlas(Scene& scene, const AtlasOptions& options);
 
-// A receiver for every texel whose tent reaches the surface: at its centre, or, for texels partly covered, at the surface's
-// point closest to it, moved a hair inwards.
+// A receiver for every texel whose tent reaches the surface: at its centre, or, for texels partly covered, at the
+// surface's point closest to it, moved a hair inwards.
 Receivers make_texel_receivers(const Scene& scene, const Atlas& atlas);
 
-// Moves receiver `r` to a point of a triangle's side. `texel`: the length of one in the scene; `diagonal`: of the scene's bounds.
-void place_texel(const Scene& scene, Receivers& receivers, size_t r, const TexelPlace& place, bool back, float texel, float diagonal);
+// Moves receiver `r` to a point of a triangle's side. `texel`: the length of one in the scene; `diagonal`: of the
+// scene's bounds.
+void place_texel(const Scene& scene, Receivers& receivers, size_t r, const TexelPlace& place, bool back, float texel,
+                 float diagonal);
 
-// Heights-first shelves: rectangles of the given sizes, none wider than `width`, placed without overlap; their corners, and the
-// height needed. Time n log n.
+// Heights-first shelves: rectangles of the given sizes, none wider than `width`, placed without overlap; their corners,
+// and the height needed. Time n log n.
 struct Packing {
   std::vector<std::array<int, 2>> places;
   int64_t height = 0;

@@ -38,7 +38,8 @@ TEST(Charts, AreConnectedFlatEnoughAndKeepLengths) {
   for (size_t i = 0; i < scene.triangles.size(); ++i) {
     const uint32_t c = charts.of_triangle[i];
     ASSERT_NE(c, none);
-    const double area = 0.5 * double(glm::length(area_normal(scene, scene.triangles[i]))), projected = flat_area(flat.corners[i]);
+    const double area = 0.5 * double(glm::length(area_normal(scene, scene.triangles[i]))),
+                 projected = flat_area(flat.corners[i]);
     // An orthogonal projection shrinks areas by the cosine, and keeps the orientation.
     EXPECT_LE(projected, area * (1 + 1e-4));
     EXPECT_GE(projected, area * (double(chart_cosine) - 1e-4));
@@ -91,7 +92,8 @@ TEST(Raster, MeetsExactlyTheTexelsWhoseSquareMeetsTheTriangle) {
           for (int a = 0; a <= 60; ++a)
             for (int b = 0; a + b <= 60; ++b) {
               const Vec2 p = t[0] + (t[1] - t[0]) * (float(a) / 60) + (t[2] - t[0]) * (float(b) / 60);
-              inside |= std::abs(p.x - float(i) - 0.5f) < reach - 1e-4f && std::abs(p.y - float(j) - 0.5f) < reach - 1e-4f;
+              inside |= std::abs(p.x - float(i) - 0.5f) < reach - 1e-4f &&
+                        std::abs(p.y - float(j) - 0.5f) < reach - 1e-4f;
             }
           EXPECT_TRUE(!inside || met.count({i, j})) << round;
           // The row's span of the band is a bound in x alone: the box of a slanted edge's band may pass the square by.
@@ -115,7 +117,8 @@ TEST(Raster, ClosestPointIsTheClosest) {
     float brute = INFINITY;
     for (int a = 0; a <= 100; ++a)
       for (int b = 0; a + b <= 100; ++b)
-        brute = std::min(brute, glm::length(t[0] + (t[1] - t[0]) * (float(a) / 100) + (t[2] - t[0]) * (float(b) / 100) - p));
+        brute = std::min(brute,
+                         glm::length(t[0] + (t[1] - t[0]) * (float(a) / 100) + (t[2] - t[0]) * (float(b) / 100) - p));
     EXPECT_LE(c.distance, brute + 1e-5f);
     EXPECT_GE(c.distance, brute - 0.02f);  // the grid is 1/100 of edges up to sqrt(2) long
   }
@@ -153,7 +156,8 @@ TEST(Atlas, GivesEverySideItsOwnTexels) {
   for (uint32_t i = 0; i < scene.triangles.size(); ++i) {
     const TexelTriangle* t = texels.find(i, true);
     for (int k = 0; k < 3; ++k) {
-      const float space = glm::length(scene.positions[scene.triangles[i].v[k]] - scene.positions[scene.triangles[i].v[(k + 1) % 3]]);
+      const float space =
+          glm::length(scene.positions[scene.triangles[i].v[k]] - scene.positions[scene.triangles[i].v[(k + 1) % 3]]);
       const float place = glm::length(t->at[k] - t->at[(k + 1) % 3]);
       EXPECT_LE(place, 20 * space * 1.001f + 1e-3f);
       EXPECT_GE(place, 20 * space * (chart_cosine - 0.001f) - 1e-3f);
@@ -178,8 +182,13 @@ TEST(Atlas, FillsAGivenSizeOrSaysWhatItNeeds) {
   const size_t at = text.find("at least ") + 9;
   const int w = std::stoi(text.substr(at)), h = std::stoi(text.substr(text.find('x', at) + 1));
   EXPECT_TRUE(make_atlas(small, {.width = w, .height = h}));
-  for (AtlasOptions bad : {AtlasOptions{}, {.texels_per_unit = -1}, {.texels_per_unit = NAN}, {.texels_per_unit = 1e9f}, {.width = 10},
-                           {.texels_per_unit = 1, .width = 10, .height = 10}, {.width = 100000, .height = 10}}) {
+  for (AtlasOptions bad : {AtlasOptions{},
+                           {.texels_per_unit = -1},
+                           {.texels_per_unit = NAN},
+                           {.texels_per_unit = 1e9f},
+                           {.width = 10},
+                           {.texels_per_unit = 1, .width = 10, .height = 10},
+                           {.width = 100000, .height = 10}}) {
     Scene again = knotty_scene();
     EXPECT_FALSE(make_atlas(again, bad));
   }
@@ -188,7 +197,8 @@ TEST(Atlas, FillsAGivenSizeOrSaysWhatItNeeds) {
 TEST(Atlas, ReusesTheSecondCoordinatesUnlessTheyOverlap) {
   Scene quad = make_quad(Vec3(0), Vec3(0, 0, 2), Vec3(3, 0, 0), 4, 4, Vec3(0.5f));
   quad.texcoords[1].resize(quad.positions.size());
-  for (size_t v = 0; v < quad.positions.size(); ++v) quad.texcoords[1][v] = Vec2(quad.positions[v].x / 3, quad.positions[v].z / 2) * 0.8f + 0.1f;
+  for (size_t v = 0; v < quad.positions.size(); ++v)
+    quad.texcoords[1][v] = Vec2(quad.positions[v].x / 3, quad.positions[v].z / 2) * 0.8f + 0.1f;
   Scene own = quad;
   auto atlas = make_atlas(own, {.texels_per_unit = 10});
   ASSERT_TRUE(atlas);
@@ -213,7 +223,8 @@ TEST(Atlas, ASpiralDoesNotCoverItselfTwice) {
   std::vector<uint32_t> indices;
   for (int i = 0; i <= 96; ++i) {
     const float a = 4 * pi * float(i) / 96;
-    for (float radius : {1.0f, 2.0f}) positions.push_back({radius * std::cos(a), 0.1f * a, -radius * std::sin(a)}), normals.push_back({0, 1, 0});
+    for (float radius : {1.0f, 2.0f})
+      positions.push_back({radius * std::cos(a), 0.1f * a, -radius * std::sin(a)}), normals.push_back({0, 1, 0});
     if (i == 96) break;
     const uint32_t v = uint32_t(2 * i);
     indices.insert(indices.end(), {v, v + 1, v + 3, v, v + 3, v + 2});
@@ -228,7 +239,8 @@ TEST(Atlas, ASpiralDoesNotCoverItselfTwice) {
     const std::array<Vec2, 3> at{atlas->front[t.v[0]], atlas->front[t.v[1]], atlas->front[t.v[2]]};
     each_texel(at, 0, atlas->width, atlas->height, [&](int i, int j) {
       const ClosestPoint c = closest_point(at, Vec2(float(i) + 0.5f, float(j) + 0.5f));
-      if (c.distance == 0 && std::min({c.u, c.v, 1 - c.u - c.v}) > 1e-3f) ++covered[size_t(j) * size_t(atlas->width) + size_t(i)];
+      if (c.distance == 0 && std::min({c.u, c.v, 1 - c.u - c.v}) > 1e-3f)
+        ++covered[size_t(j) * size_t(atlas->width) + size_t(i)];
     });
   }
   EXPECT_EQ(*std::max_element(covered.begin(), covered.end()), 1);
@@ -274,21 +286,25 @@ TEST(Projection, HatsReproduceLinearFunctions) {
   }
   // Collocation reproduces it but for the hair that receivers are moved by: 1e-2 of an edge.
   const auto there = project_on_surface(scene, r, Projection::collocation, linear, 0.1f);
-  for (size_t v = 0; v < scene.positions.size(); ++v) EXPECT_NEAR(there[r.front[v]], linear(scene.positions[v], Vec3(0)), 0.01);
+  for (size_t v = 0; v < scene.positions.size(); ++v)
+    EXPECT_NEAR(there[r.front[v]], linear(scene.positions[v], Vec3(0)), 0.01);
 }
 
 TEST(Projection, BoxesTakeAreaMeans) {
   Scene scene = make_quad(Vec3(0), Vec3(2, 0, 0), Vec3(0, 0, 1), 2, 3, Vec3(0.5f));
   const Receivers r = make_patch_receivers(scene);
   ASSERT_EQ(r.count(), scene.triangles.size());
-  // The mean of a linear function over a triangle is its value at the centroid; of x^2, the mean over its edge midpoints.
+  // The mean of a linear function over a triangle is its value at the centroid; of x^2, the mean over its edge
+  // midpoints.
   auto f = [](Vec3 p, Vec3 n) { return linear(p, n) + 2 * double(p.x) * double(p.x); };
   const auto alpha = project_on_surface(scene, r, Projection::least_squares, f, 0.01f);
   for (uint32_t i = 0; i < scene.triangles.size(); ++i) {
     const Triangle& t = scene.triangles[i];
     double mean = 0;
-    for (int k = 0; k < 3; ++k) mean += f(0.5f * (scene.positions[t.v[k]] + scene.positions[t.v[(k + 1) % 3]]), Vec3(0)) / 3;
-    EXPECT_NEAR(reconstruct_on_surface(r.basis, alpha, i, 0.2f, 0.3f, true), mean, 1e-4);  // midpoint rule, cells of 1/100
+    for (int k = 0; k < 3; ++k)
+      mean += f(0.5f * (scene.positions[t.v[k]] + scene.positions[t.v[(k + 1) % 3]]), Vec3(0)) / 3;
+    EXPECT_NEAR(reconstruct_on_surface(r.basis, alpha, i, 0.2f, 0.3f, true), mean,
+                1e-4);  // midpoint rule, cells of 1/100
   }
 }
 
@@ -304,9 +320,11 @@ TEST(Projection, BilinearTexelsReproduceWhatIsLinearInTheAtlas) {
     for (int k = 0; k < 10; ++k) {
       const float u = random.next() * 0.5f, v = random.next() * 0.5f;
       const Vec3 p = interpolate(scene.positions, scene.triangles[t], u, v);
-      EXPECT_NEAR(reconstruct_on_surface(r.basis, alpha, t, u, v, true), linear(p, Vec3(0)), 2e-4);  // floats of atlas places
+      EXPECT_NEAR(reconstruct_on_surface(r.basis, alpha, t, u, v, true), linear(p, Vec3(0)),
+                  2e-4);  // floats of atlas places
     }
-  // Collocation: exact inside; texels on the border hold the border's value, so it errs within a texel of it by half a texel.
+  // Collocation: exact inside; texels on the border hold the border's value, so it errs within a texel of it by half a
+  // texel.
   const auto there = project_on_surface(scene, r, Projection::collocation, linear, 1.0f);
   for (uint32_t t = 0; t < scene.triangles.size(); ++t) {
     const Vec3 p = interpolate(scene.positions, scene.triangles[t], 0.3f, 0.3f);
@@ -323,7 +341,8 @@ TEST(Seams, AgreeAfterSmoothingAndNoticeNothingElse) {
   const auto& texels = std::get<TexelReceivers>(r.basis);
   Random random(6);
   std::vector<float> values(r.count() * 2);
-  for (size_t i = 0; i < r.count(); ++i) values[2 * i] = 1 + 0.2f * (random.next() - 0.5f), values[2 * i + 1] = r.normals[i].y;
+  for (size_t i = 0; i < r.count(); ++i)
+    values[2 * i] = 1 + 0.2f * (random.next() - 0.5f), values[2 * i + 1] = r.normals[i].y;
   auto jump = [&](size_t column) {
     // Root mean square difference of look-ups at the middles of edges that two charts share.
     std::map<std::pair<std::array<float, 3>, std::array<float, 3>>, std::vector<Vec2>> middles;
@@ -340,7 +359,9 @@ TEST(Seams, AgreeAfterSmoothingAndNoticeNothingElse) {
     for (const auto& [edge, at] : middles) {
       if (at.size() != 2 || glm::length(at[0] - at[1]) < 1e-3f) continue;
       double value[2] = {0, 0};
-      for (int s = 0; s < 2; ++s) texels.spread_at(at[size_t(s)], [&](uint32_t q, float w) { value[s] += double(w) * double(values[2 * q + column]); });
+      for (int s = 0; s < 2; ++s)
+        texels.spread_at(at[size_t(s)],
+                         [&](uint32_t q, float w) { value[s] += double(w) * double(values[2 * q + column]); });
       sum += (value[0] - value[1]) * (value[0] - value[1]), ++count;
     }
     EXPECT_GT(count, 50);

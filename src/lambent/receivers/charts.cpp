@@ -59,7 +59,8 @@ std::vector<Vec3> face_normals(const Scene& scene, std::vector<float>* areas) {
 std::vector<uint32_t> by_area(const std::vector<float>& areas) {
   std::vector<uint32_t> order(areas.size());
   std::iota(order.begin(), order.end(), 0u);
-  std::sort(order.begin(), order.end(), [&](uint32_t a, uint32_t b) { return areas[a] != areas[b] ? areas[a] > areas[b] : a < b; });
+  std::sort(order.begin(), order.end(),
+            [&](uint32_t a, uint32_t b) { return areas[a] != areas[b] ? areas[a] > areas[b] : a < b; });
   return order;
 }
 
@@ -77,7 +78,9 @@ Charts make_charts(const Scene& scene, const std::vector<uint8_t>& layers) {
     const uint32_t chart = charts.count++;
     // Nearest normals first, so that what is flat stays together; ties by number.
     using Candidate = std::pair<float, uint32_t>;
-    auto later = [](const Candidate& x, const Candidate& y) { return x.first != y.first ? x.first < y.first : x.second > y.second; };
+    auto later = [](const Candidate& x, const Candidate& y) {
+      return x.first != y.first ? x.first < y.first : x.second > y.second;
+    };
     std::priority_queue<Candidate, std::vector<Candidate>, decltype(later)> queue(later);
     queue.push({1.0f, seed});
     while (!queue.empty()) {
@@ -103,7 +106,8 @@ FlatCharts flatten(const Scene& scene, const Charts& charts) {
   flat.size.assign(charts.count, Vec2(0));
   // Triangles grouped by chart, the seed first.
   std::vector<uint32_t> order = by_area(areas);
-  std::stable_sort(order.begin(), order.end(), [&](uint32_t a, uint32_t b) { return charts.of_triangle[a] < charts.of_triangle[b]; });
+  std::stable_sort(order.begin(), order.end(),
+                   [&](uint32_t a, uint32_t b) { return charts.of_triangle[a] < charts.of_triangle[b]; });
   for (size_t begin = 0, end; begin < order.size() && charts.of_triangle[order[begin]] != none; begin = end) {
     const uint32_t chart = charts.of_triangle[order[begin]], seed = order[begin];
     for (end = begin; end < order.size() && charts.of_triangle[order[end]] == chart;) ++end;

@@ -1,4 +1,5 @@
-// First-fit decreasing-height shelves (Coffman, Garey, Johnson and Tarjan 1980), the first shelf with room found in a tree.
+// First-fit decreasing-height shelves (Coffman, Garey, Johnson and Tarjan 1980), the first shelf with room found in a
+// tree.
 #include <lambent/core/check.h>
 #include <lambent/receivers/atlas.h>
 

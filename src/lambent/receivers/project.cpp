@@ -1,4 +1,5 @@
-// Follows: radiosity, "Turns Out To Be Simple", "Easy Special Case: Box Functions" (there M is the areas, and alpha area means).
+// Follows: radiosity, "Turns Out To Be Simple", "Easy Special Case: Box Functions" (there M is the areas, and alpha
+// area means).
 #include <lambent/receivers/project.h>
 
 #include <cmath>
@@ -20,13 +21,16 @@ struct Point {
 
 float longest_edge(const Scene& s, const Triangle& t) {
   float longest = 0;
-  for (int k = 0; k < 3; ++k) longest = std::max(longest, glm::length(s.positions[t.v[k]] - s.positions[t.v[(k + 1) % 3]]));
+  for (int k = 0; k < 3; ++k)
+    longest = std::max(longest, glm::length(s.positions[t.v[k]] - s.positions[t.v[(k + 1) % 3]]));
   return longest;
 }
 
 // Into how many parts each edge of a triangle is cut.
 template <class At>
-int cuts_of(const At&, float longest, float cell) { return std::clamp(int(std::ceil(longest / cell)), 1, most_cuts); }
+int cuts_of(const At&, float longest, float cell) {
+  return std::clamp(int(std::ceil(longest / cell)), 1, most_cuts);
+}
 int cuts_of(const TexelTriangle& at, float longest, float cell) {
   float texels = 0;
   for (int k = 0; k < 3; ++k) texels = std::max(texels, glm::length(at.at[k] - at.at[(k + 1) % 3]));
@@ -34,7 +38,8 @@ int cuts_of(const TexelTriangle& at, float longest, float cell) {
 }
 
 template <class Basis>
-std::vector<Point> quadrature(const Scene& scene, const Basis& basis, const std::function<double(Vec3, Vec3)>& f, float cell) {
+std::vector<Point> quadrature(const Scene& scene, const Basis& basis, const std::function<double(Vec3, Vec3)>& f,
+                              float cell) {
   std::vector<Point> points;
   for (uint32_t i = 0; i < scene.triangles.size(); ++i)
     for (const bool front : {true, false}) {
@@ -49,7 +54,9 @@ std::vector<Point> quadrature(const Scene& scene, const Basis& basis, const std:
       auto add = [&](float u, float v) {
         Point p;
         p.area = area / (double(cuts) * cuts);
-        basis.spread(*at, u, v, [&](uint32_t r, float w) { p.receiver[size_t(p.count)] = r, p.weight[size_t(p.count)] = w, ++p.count; });
+        basis.spread(*at, u, v, [&](uint32_t r, float w) {
+          p.receiver[size_t(p.count)] = r, p.weight[size_t(p.count)] = w, ++p.count;
+        });
         p.f = f(interpolate(scene.positions, t, u, v), side);
         points.push_back(p);
       };
@@ -73,7 +80,8 @@ std::vector<double> project_on_surface(const Scene& scene, const Receivers& rece
     for (size_t i = 0; i < n; ++i) alpha[i] = f(receivers.origins[i], receivers.normals[i]);
     return alpha;
   }
-  const std::vector<Point> points = std::visit([&](const auto& basis) { return quadrature(scene, basis, f, cell); }, receivers.basis);
+  const std::vector<Point> points =
+      std::visit([&](const auto& basis) { return quadrature(scene, basis, f, cell); }, receivers.basis);
   std::vector<double> diagonal(n, 0.0), r(n, 0.0), p(n, 0.0), z(n, 0.0), Mp(n, 0.0);
   for (const Point& q : points)
     for (int k = 0; k < q.count; ++k) {
@@ -110,11 +118,15 @@ std::vector<double> project_on_surface(const Scene& scene, const Receivers& rece
   return alpha;
 }
 
-double reconstruct_on_surface(const SpatialBasis& basis, const std::vector<double>& alpha, uint32_t triangle, float u, float v, bool front) {
+double reconstruct_on_surface(const SpatialBasis& basis, const std::vector<double>& alpha, uint32_t triangle, float u,
+                              float v, bool front) {
   double sum = 0;
-  std::visit([&](const auto& b) {
-    if (const auto* at = b.find(triangle, front)) b.spread(*at, u, v, [&](uint32_t r, float w) { sum += double(w) * alpha[r]; });
-  }, basis);
+  std::visit(
+      [&](const auto& b) {
+        if (const auto* at = b.find(triangle, front))
+          b.spread(*at, u, v, [&](uint32_t r, float w) { sum += double(w) * alpha[r]; });
+      },
+      basis);
   return sum;
 }
 

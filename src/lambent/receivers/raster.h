@@ -1,20 +1,21 @@
 #pragma once
-// Triangles of an atlas against its texels, row by row, so that slivers cost what they cover. Texel (i, j) is centred at
-// (i + 1/2, j + 1/2).
+// Triangles of an atlas against its texels, row by row, so that slivers cost what they cover. Texel (i, j) is centred
+// at (i + 1/2, j + 1/2).
 #include <lambent/core/vec.h>
 
 #include <array>
 
 namespace lambent {
 
-// Calls f(i, j) for every texel of a width x height grid whose square of half side `reach` about the centre meets the triangle
-// (for 0: whose centre lies in the span of the triangle's row, which is inside or on its border).
+// Calls f(i, j) for every texel of a width x height grid whose square of half side `reach` about the centre meets the
+// triangle (for 0: whose centre lies in the span of the triangle's row, which is inside or on its border).
 template <class F>
 void each_texel(const std::array<Vec2, 3>& t, float reach, int width, int height, F f) {
   float low = INFINITY, high = -INFINITY;
   for (Vec2 p : t) low = std::min(low, p.y), high = std::max(high, p.y);
   // A centre at exactly `reach` from the triangle does not meet the open square.
-  const int first = std::max(0, int(std::floor(low - reach - 0.5f))), last = std::min(height - 1, int(std::ceil(high + reach - 0.5f)));
+  const int first = std::max(0, int(std::floor(low - reach - 0.5f))),
+            last = std::min(height - 1, int(std::ceil(high + reach - 0.5f)));
   for (int j = first; j <= last; ++j) {
     // Extent in x of the triangle within the row's band.
     const float y0 = float(j) + 0.5f - reach, y1 = float(j) + 0.5f + reach;
@@ -27,7 +28,8 @@ void each_texel(const std::array<Vec2, 3>& t, float reach, int width, int height
         if ((a.y < y) != (b.y < y)) include(a.x + (b.x - a.x) * ((y - a.y) / (b.y - a.y)));
     }
     if (!(left <= right)) continue;
-    const int begin = std::max(0, int(std::ceil(left - reach - 0.5f))), end = std::min(width - 1, int(std::floor(right + reach - 0.5f)));
+    const int begin = std::max(0, int(std::ceil(left - reach - 0.5f))),
+              end = std::min(width - 1, int(std::floor(right + reach - 0.5f)));
     for (int i = begin; i <= end; ++i) f(i, j);
   }
 }

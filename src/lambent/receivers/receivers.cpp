@@ -11,8 +11,8 @@ namespace {
 // Vertices at one place whose normals agree to this cosine (0.8 degrees) are one receiver.
 constexpr float same_normal = 0.9999f;
 
-// A receiver starts this far above its surface, and this far inside its faces' border, as fractions of its shortest edge;
-// neither exceeds a fraction of the scene.
+// A receiver starts this far above its surface, and this far inside its faces' border, as fractions of its shortest
+// edge; neither exceeds a fraction of the scene.
 constexpr float lift = 1e-3f, lift_limit = 1e-4f;
 constexpr float inset = 1e-2f, inset_limit = 1e-3f;
 // What rounding of coordinates needs, as a fraction of their magnitude.
@@ -20,8 +20,8 @@ constexpr float rounding = 4e-7f;
 
 struct VertexGeometry {
   Vec3 face_normal{0};  // sum of area normals
-  // Sum over faces of the integral of unit directions over the corner's wedge, 2 sin(angle/2) times its bisector. It vanishes
-  // in the tangent plane where the faces surround the vertex, and points into them where they do not.
+  // Sum over faces of the integral of unit directions over the corner's wedge, 2 sin(angle/2) times its bisector. It
+  // vanishes in the tangent plane where the faces surround the vertex, and points into them where they do not.
   Vec3 inward{0};
   float edge = INFINITY;  // shortest
   bool used = false, two_sided = false;
@@ -56,7 +56,8 @@ std::vector<uint32_t> curve_order(const std::vector<Vec3>& points, const Bounds&
   std::iota(order.begin(), order.end(), 0u);
   std::vector<uint64_t> codes(points.size());
   for (size_t i = 0; i < points.size(); ++i) codes[i] = morton(points[i], box);
-  std::sort(order.begin(), order.end(), [&](uint32_t a, uint32_t b) { return codes[a] != codes[b] ? codes[a] < codes[b] : a < b; });
+  std::sort(order.begin(), order.end(),
+            [&](uint32_t a, uint32_t b) { return codes[a] != codes[b] ? codes[a] < codes[b] : a < b; });
   return order;
 }
 
@@ -154,18 +155,21 @@ Receivers make_vertex_receivers(const Scene& scene) {
   }
   r.front.assign(vertices, none);
   if (any_back) r.back.assign(vertices, none);
-  for (size_t i = 0; i < sides.size(); ++i) (sides[i].back ? r.back : r.front)[sides[i].vertex] = rank[receiver_of_side[i]];
+  for (size_t i = 0; i < sides.size(); ++i)
+    (sides[i].back ? r.back : r.front)[sides[i].vertex] = rank[receiver_of_side[i]];
   r.basis = corner_receivers(scene, r.front, r.back);
   return r;
 }
 
-CornerReceivers corner_receivers(const Scene& scene, const std::vector<uint32_t>& front, const std::vector<uint32_t>& back) {
+CornerReceivers corner_receivers(const Scene& scene, const std::vector<uint32_t>& front,
+                                 const std::vector<uint32_t>& back) {
   CornerReceivers corners;
   corners.front.resize(scene.triangles.size());
   if (!back.empty()) corners.back.resize(scene.triangles.size());
   auto fill = [](const Triangle& t, const std::vector<uint32_t>& map, Corners& out) {
     out = {{map[t.v[0]], map[t.v[1]], map[t.v[2]]}, t.part};
-    if (out.receiver[0] == none || out.receiver[1] == none || out.receiver[2] == none) out.receiver = {none, none, none};
+    if (out.receiver[0] == none || out.receiver[1] == none || out.receiver[2] == none)
+      out.receiver = {none, none, none};
   };
   for (size_t i = 0; i < scene.triangles.size(); ++i) {
     const Triangle& t = scene.triangles[i];
@@ -201,7 +205,8 @@ Receivers make_patch_receivers(const Scene& scene) {
     const Triangle& t = scene.triangles[sides[i].triangle];
     const Vec3 n = glm::normalize(area_normal(scene, t)) * (sides[i].back ? -1.0f : 1.0f);
     float edge = INFINITY;
-    for (int k = 0; k < 3; ++k) edge = std::min(edge, glm::length(scene.positions[t.v[k]] - scene.positions[t.v[(k + 1) % 3]]));
+    for (int k = 0; k < 3; ++k)
+      edge = std::min(edge, glm::length(scene.positions[t.v[k]] - scene.positions[t.v[(k + 1) % 3]]));
     (sides[i].back ? patches.back : patches.front)[sides[i].triangle] = {uint32_t(r.count()), t.part};
     r.origins.push_back(centres[i] + n * receiver_lift(centres[i], edge, diagonal));
     r.normals.push_back(n);
@@ -241,7 +246,8 @@ void add_neighbours(const Scene&, const TexelReceivers& t, const std::vector<uin
 }
 
 // Patches along an edge are paired in a row, so that a thousand sheets on one edge do not make a million pairs.
-void add_neighbours(const Scene& scene, const PatchReceivers& patches, const std::vector<uint8_t>& marked, Pairs& pairs) {
+void add_neighbours(const Scene& scene, const PatchReceivers& patches, const std::vector<uint8_t>& marked,
+                    Pairs& pairs) {
   const std::vector<uint32_t> ids = number_positions(scene.positions).ids;
   for (const auto* side : {&patches.front, &patches.back}) {
     std::vector<std::tuple<uint32_t, uint32_t, uint32_t>> edges;

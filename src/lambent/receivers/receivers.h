@@ -1,6 +1,7 @@
 #pragma once
 // WHERE light is received, and how values between receivers interpolate: the spatial basis.
-//   vertices   hats: piecewise linear. A receiver is one side of one welded vertex: vertices that share position and normal
+//   vertices   hats: piecewise linear. A receiver is one side of one welded vertex: vertices that share position and
+//   normal
 //              share it, so that UV seams and part borders cost nothing.
 //   texels     of a lightmap over an atlas (atlas.h): bilinear.
 //   patches    boxes: one side of one triangle, constant over it.
@@ -32,8 +33,8 @@ struct CornerReceivers {
     const auto& side = front_side ? front : back;
     if (triangle < side.size()) __builtin_prefetch(&side[triangle]);
   }
-  // Calls add(receiver, weight) for all receivers whose basis functions do not vanish at weights (1-u-v, u, v) of the corners;
-  // their weights there sum to 1.
+  // Calls add(receiver, weight) for all receivers whose basis functions do not vanish at weights (1-u-v, u, v) of the
+  // corners; their weights there sum to 1.
   template <class Add>
   void spread(const Corners& at, float u, float v, Add add) const {
     add(at.receiver[0], 1 - u - v), add(at.receiver[1], u), add(at.receiver[2], v);
@@ -46,9 +47,9 @@ struct TexelTriangle {
   uint32_t part = none;  // none: that side has no place in the atlas
 };
 struct TexelReceivers {
-  int width = 0, height = 0;                // of the atlas
-  std::vector<uint32_t> texels;             // receiver of each texel, row by row; none where no triangle comes near
-  std::vector<TexelTriangle> front, back;   // by triangle, as in CornerReceivers
+  int width = 0, height = 0;               // of the atlas
+  std::vector<uint32_t> texels;            // receiver of each texel, row by row; none where no triangle comes near
+  std::vector<TexelTriangle> front, back;  // by triangle, as in CornerReceivers
   const TexelTriangle* find(uint32_t triangle, bool front_side) const {
     const auto& side = front_side ? front : back;
     if (side.empty() || side[triangle].part == none) return nullptr;
@@ -65,7 +66,8 @@ struct TexelReceivers {
   // The same for a place in the atlas; texel (i, j) is centred at (i + 1/2, j + 1/2).
   template <class Add>
   void spread_at(Vec2 place, Add add) const {
-    const float x = std::clamp(place.x - 0.5f, 0.0f, float(width - 1)), y = std::clamp(place.y - 0.5f, 0.0f, float(height - 1));
+    const float x = std::clamp(place.x - 0.5f, 0.0f, float(width - 1)),
+                y = std::clamp(place.y - 0.5f, 0.0f, float(height - 1));
     const int i = std::min(int(x), std::max(width - 2, 0)), j = std::min(int(y), std::max(height - 2, 0));
     const float s = x - float(i), t = y - float(j);
     const int right = width > 1, down = height > 1;
@@ -111,12 +113,12 @@ struct TexelPlace {
 };
 
 struct Receivers {
-  // Where rays start: the place moved off its surface by a hair, and, where its faces do not surround it (borders, creases),
-  // a hair towards them, so that a wall's foot does not lie in the wall.
+  // Where rays start: the place moved off its surface by a hair, and, where its faces do not surround it (borders,
+  // creases), a hair towards them, so that a wall's foot does not lie in the wall.
   std::vector<Vec3> origins;
   std::vector<Vec3> normals;  // unit, towards the side that the receiver is on
-  // Of vertices alone: receiver of each scene vertex, by side; `none` for vertices that no proper triangle uses, and on the back
-  // of one-sided surfaces. `back` is empty where the whole scene is one-sided.
+  // Of vertices alone: receiver of each scene vertex, by side; `none` for vertices that no proper triangle uses, and on
+  // the back of one-sided surfaces. `back` is empty where the whole scene is one-sided.
   std::vector<uint32_t> front, back;
   std::vector<TexelPlace> places;  // of texels alone, one a receiver
   SpatialBasis basis;
@@ -129,21 +131,23 @@ Receivers make_vertex_receivers(const Scene& scene);
 // Gathered at the middle of each triangle.
 Receivers make_patch_receivers(const Scene& scene);
 
-CornerReceivers corner_receivers(const Scene& scene, const std::vector<uint32_t>& front, const std::vector<uint32_t>& back);
+CornerReceivers corner_receivers(const Scene& scene, const std::vector<uint32_t>& front,
+                                 const std::vector<uint32_t>& back);
 
 // From the places of vertices in an atlas, by side (`back` may be empty), and the receiver of each of its texels.
-TexelReceivers texel_receivers(const Scene& scene, int width, int height, const std::vector<Vec2>& front, const std::vector<Vec2>& back,
-                               std::vector<uint32_t> texels);
+TexelReceivers texel_receivers(const Scene& scene, int width, int height, const std::vector<Vec2>& front,
+                               const std::vector<Vec2>& back, std::vector<uint32_t> texels);
 
-// Pairs (r, neighbour) for every marked receiver r, sorted, without repetition: receivers that share a triangle (hats), touch
-// in the atlas (texels) or share an edge (boxes).
+// Pairs (r, neighbour) for every marked receiver r, sorted, without repetition: receivers that share a triangle (hats),
+// touch in the atlas (texels) or share an edge (boxes).
 std::vector<std::pair<uint32_t, uint32_t>> neighbours_of(const Scene& scene, const SpatialBasis& basis,
                                                          const std::vector<uint8_t>& marked);
 
 // The order of points along a Morton curve through `box`: indices, ties by index.
 std::vector<uint32_t> curve_order(const std::vector<Vec3>& points, const Bounds& box);
 
-// How far a receiver at p starts above its surface, given the size of what it stands for (an edge, a texel) and of the scene.
+// How far a receiver at p starts above its surface, given the size of what it stands for (an edge, a texel) and of the
+// scene.
 float receiver_lift(Vec3 p, float size, float diagonal);
 
 }  // namespace lambent

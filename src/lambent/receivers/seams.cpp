@@ -1,5 +1,5 @@
-// Least-squares seams as in M. Iwanicki, "Lighting technology of The Last of Us", 2013; conjugate gradients: M. Hestenes and
-// E. Stiefel, 1952.
+// Least-squares seams as in M. Iwanicki, "Lighting technology of The Last of Us", 2013; conjugate gradients: M.
+// Hestenes and E. Stiefel, 1952.
 #include <lambent/receivers/seams.h>
 #include <lambent/scene/clean.h>
 
@@ -31,7 +31,8 @@ struct EdgeSide {
 
 }  // namespace
 
-size_t smooth_seams(const Scene& scene, const TexelReceivers& texels, float* values, size_t stride, size_t width, float cosine, float keep) {
+size_t smooth_seams(const Scene& scene, const TexelReceivers& texels, float* values, size_t stride, size_t width,
+                    float cosine, float keep) {
   const std::vector<uint32_t> ids = number_positions(scene.positions).ids;
   std::vector<EdgeSide> edges;
   for (uint32_t i = 0; i < scene.triangles.size(); ++i)
@@ -61,7 +62,9 @@ size_t smooth_seams(const Scene& scene, const TexelReceivers& texels, float* val
       row.texel[size_t(row.count)] = index[r], row.weight[size_t(row.count)] = sign * w, ++row.count;
     });
   };
-  auto normal = [&](const EdgeSide& e) { return normalize_or(area_normal(scene, scene.triangles[e.triangle]), Vec3(0)); };
+  auto normal = [&](const EdgeSide& e) {
+    return normalize_or(area_normal(scene, scene.triangles[e.triangle]), Vec3(0));
+  };
   for (size_t begin = 0, end; begin < edges.size(); begin = end) {
     for (end = begin; end < edges.size() && std::tie(edges[end].a, edges[end].b, edges[end].front) ==
                                                 std::tie(edges[begin].a, edges[begin].b, edges[begin].front);)
@@ -88,9 +91,11 @@ size_t smooth_seams(const Scene& scene, const TexelReceivers& texels, float* val
     for (const Row& row : rows) {
       std::fill(sum.begin(), sum.end(), 0.0);
       for (int k = 0; k < row.count; ++k)
-        for (size_t c = 0; c < width; ++c) sum[c] += double(row.weight[size_t(k)]) * v[row.texel[size_t(k)] * width + c];
+        for (size_t c = 0; c < width; ++c)
+          sum[c] += double(row.weight[size_t(k)]) * v[row.texel[size_t(k)] * width + c];
       for (int k = 0; k < row.count; ++k)
-        for (size_t c = 0; c < width; ++c) out[row.texel[size_t(k)] * width + c] += double(row.weight[size_t(k)]) * sum[c];
+        for (size_t c = 0; c < width; ++c)
+          out[row.texel[size_t(k)] * width + c] += double(row.weight[size_t(k)]) * sum[c];
     }
   };
   std::vector<double> x0(n * width), d(n * width, 0.0), r(n * width), p, Ap(n * width);
@@ -115,13 +120,15 @@ size_t smooth_seams(const Scene& scene, const TexelReceivers& texels, float* val
     for (size_t i = 0; i < n * width; ++i) d[i] += alpha[i % width] * p[i], r[i] -= alpha[i % width] * Ap[i];
     const std::vector<double> next = squares(r, r);
     bool done = true;
-    for (size_t c = 0; c < width; ++c) beta[c] = rr[c] > 0 ? next[c] / rr[c] : 0.0, done &= next[c] <= enough * enough * first[c];
+    for (size_t c = 0; c < width; ++c)
+      beta[c] = rr[c] > 0 ? next[c] / rr[c] : 0.0, done &= next[c] <= enough * enough * first[c];
     if (done) break;
     for (size_t i = 0; i < n * width; ++i) p[i] = r[i] + beta[i % width] * p[i];
     rr = next;
   }
   for (size_t i = 0; i < n; ++i)
-    for (size_t c = 0; c < width; ++c) values[size_t(number[i]) * stride + c] = float(x0[i * width + c] + d[i * width + c]);
+    for (size_t c = 0; c < width; ++c)
+      values[size_t(number[i]) * stride + c] = float(x0[i * width + c] + d[i * width + c]);
   return n;
 }
 

@@ -1,5 +1,5 @@
-// Follows: radiosity, "Bilinear Basis Function": a texel's function is a tent over four texels, and every tent that reaches the
-// surface takes part.
+// Follows: radiosity, "Bilinear Basis Function": a texel's function is a tent over four texels, and every tent that
+// reaches the surface takes part.
 #include <lambent/receivers/atlas.h>
 #include <lambent/receivers/raster.h>
 
@@ -11,8 +11,8 @@ constexpr float border_inset = 0.05f;
 
 }  // namespace
 
-TexelReceivers texel_receivers(const Scene& scene, int width, int height, const std::vector<Vec2>& front, const std::vector<Vec2>& back,
-                               std::vector<uint32_t> texels) {
+TexelReceivers texel_receivers(const Scene& scene, int width, int height, const std::vector<Vec2>& front,
+                               const std::vector<Vec2>& back, std::vector<uint32_t> texels) {
   TexelReceivers map;
   map.width = width, map.height = height, map.texels = std::move(texels);
   map.front.resize(scene.triangles.size());
@@ -27,7 +27,8 @@ TexelReceivers texel_receivers(const Scene& scene, int width, int height, const 
   return map;
 }
 
-void place_texel(const Scene& scene, Receivers& receivers, size_t r, const TexelPlace& at, bool back, float texel, float diagonal) {
+void place_texel(const Scene& scene, Receivers& receivers, size_t r, const TexelPlace& at, bool back, float texel,
+                 float diagonal) {
   const Triangle& t = scene.triangles[at.triangle];
   const Vec3 face = normalize_or(area_normal(scene, t), Vec3(0, 1, 0)) * (back ? -1.0f : 1.0f);
   Vec3 n = normalize_or(interpolate(scene.normals, t, at.u, at.v), face);
@@ -42,7 +43,8 @@ void place_texel(const Scene& scene, Receivers& receivers, size_t r, const Texel
 
 Receivers make_texel_receivers(const Scene& scene, const Atlas& atlas) {
   const size_t texels = size_t(atlas.width) * size_t(atlas.height);
-  TexelReceivers map = texel_receivers(scene, atlas.width, atlas.height, atlas.front, atlas.back, std::vector<uint32_t>(texels, none));
+  TexelReceivers map =
+      texel_receivers(scene, atlas.width, atlas.height, atlas.front, atlas.back, std::vector<uint32_t>(texels, none));
   struct Nearest {
     float distance = INFINITY;
     uint32_t triangle = none;

@@ -1,6 +1,6 @@
-// Path tracing with next-event estimation: J. Kajiya, "The rendering equation", 1986; multiple importance sampling by the
-// power heuristic: E. Veach and L. Guibas, "Optimally combining sampling techniques", 1995. Padded Sobol' pairs in shuffled
-// order: B. Burley, "Practical hash-based Owen scrambling", 2020, section 5; the hash: N. Vegdahl, "Building a
+// Path tracing with next-event estimation: J. Kajiya, "The rendering equation", 1986; multiple importance sampling by
+// the power heuristic: E. Veach and L. Guibas, "Optimally combining sampling techniques", 1995. Padded Sobol' pairs in
+// shuffled order: B. Burley, "Practical hash-based Owen scrambling", 2020, section 5; the hash: N. Vegdahl, "Building a
 // better LK hash", 2021.
 #include <lambent/core/random.h>
 #include <lambent/core/sampling.h>
@@ -26,8 +26,8 @@ uint32_t reverse_bits(uint32_t x) {
   return ((x & 0x55555555u) << 1) | ((x & 0xaaaaaaaau) >> 1);
 }
 
-// Flips every bit by a hash of the bits above it: the lowest k bits of the result permute those of x within each aligned run of
-// 2^k numbers, so runs of a power of two stay together.
+// Flips every bit by a hash of the bits above it: the lowest k bits of the result permute those of x within each
+// aligned run of 2^k numbers, so runs of a power of two stay together.
 uint32_t shuffled(uint32_t x, uint32_t seed) {
   x = reverse_bits(x);
   x ^= x * 0x3d20adeau;
@@ -44,7 +44,8 @@ constexpr uint32_t lamp_pairs = 1000;
 bool black(Vec3 c) { return c.x == 0 && c.y == 0 && c.z == 0; }
 
 // Light that reaches the vertex straight from the scene's lamps and leaves towards wo.
-Vec3 light_from_lamps(const Integrator& integrator, const PathVertex& vertex, const PathSamples& samples, uint32_t depth) {
+Vec3 light_from_lamps(const Integrator& integrator, const PathVertex& vertex, const PathSamples& samples,
+                      uint32_t depth) {
   Vec3 sum(0);
   // Shadow rays end at the lamp: a nearer hit hides it. Lamps are met from afar, so a relative margin will do.
   constexpr float margin = 1e-4f;
@@ -58,7 +59,8 @@ Vec3 light_from_lamps(const Integrator& integrator, const PathVertex& vertex, co
   if (e.pdf > 0 && glm::dot(vertex.ng, e.direction) > 0) {
     const Vec3 wi = e.direction * vertex.frame, f = evaluate(vertex.brdf, wi, vertex.wo);
     if (!black(f) && reaches(e.direction, e.distance)) {
-      const float weight = integrator.strategy == Strategy::combined ? mis_weight(e.pdf, pdf(vertex.brdf, wi, vertex.wo)) : 1.0f;
+      const float weight =
+          integrator.strategy == Strategy::combined ? mis_weight(e.pdf, pdf(vertex.brdf, wi, vertex.wo)) : 1.0f;
       sum += f * e.radiance * (wi.z * weight / e.pdf);
     }
   }
@@ -81,12 +83,19 @@ Vec2 PathSamples::pair(uint32_t dimension) const {
   return sobol_owen(shuffled(index, uint32_t(seed)) & mask, uint32_t(seed >> 32));
 }
 
-Result<Integrator> make_integrator(const Scene& scene, const Environment& env, int bounces, Strategy strategy, const Reflection& reflection,
-                                   bool lamps) {
+Result<Integrator> make_integrator(const Scene& scene, const Environment& env, int bounces, Strategy strategy,
+                                   const Reflection& reflection, bool lamps) {
   if (env.image.width < 1 || env.image.height < 1) return Error{env.name, "the environment is empty"};
   Result<Intersector> intersector = Intersector::make(scene);
   if (!intersector) return intersector.error();
-  return Integrator{&scene, &env, *intersector, make_environment_sampler(env), bounces, strategy, reflection, lamps,
+  return Integrator{&scene,
+                    &env,
+                    *intersector,
+                    make_environment_sampler(env),
+                    bounces,
+                    strategy,
+                    reflection,
+                    lamps,
                     lamps ? make_emitter_sampler(scene) : EmitterSampler{}};
 }
 
@@ -103,8 +112,8 @@ bool make_vertex(const Integrator& integrator, const Hit& hit, Vec3 d, PathVerte
   if (integrator.reflection.normal_maps) n = mapped_normal(scene, triangle, hit.u, hit.v, n);
   if (!front) n = -n;
   vertex.frame = shading_frame(scene, triangle, n);
-  // Near silhouettes the shading normal can turn away from the eye while the surface does not: lift wo to its horizon, so
-  // that such places are not black.
+  // Near silhouettes the shading normal can turn away from the eye while the surface does not: lift wo to its horizon,
+  // so that such places are not black.
   vertex.wo = -d * vertex.frame;
   constexpr float lowest = 1e-4f;
   if (vertex.wo.z < lowest) vertex.wo = glm::normalize(Vec3(vertex.wo.x, vertex.wo.y, lowest));
@@ -144,13 +153,16 @@ Vec3 exit_radiance_estimate(const Integrator& integrator, PathVertex vertex, con
     bool leaves = last && !integrator.lamps ? !integrator.intersector.occluded(vertex.position, d)
                                             : !integrator.intersector.nearest(vertex.position, d, hit);
     if (leaves && strategy != Strategy::light_only) {
-      float weight = strategy == Strategy::combined ? mis_weight(next.pdf, environment_pdf(integrator.sampler, d)) : 1.0f;
+      float weight = strategy == Strategy::combined ? mis_weight(next.pdf, environment_pdf(integrator.sampler, d))
+                                                    : 1.0f;
       sum += throughput * radiance(*integrator.environment, d) * weight;
     }
     if (integrator.lamps && !leaves && strategy != Strategy::light_only) {
       const Vec3 radiance = emitted(*integrator.scene, hit, d);
       if (!black(radiance)) {
-        const float weight = strategy == Strategy::combined ? mis_weight(next.pdf, emitter_pdf(integrator.emitters, hit, vertex.position, d)) : 1.0f;
+        const float weight = strategy == Strategy::combined
+                               ? mis_weight(next.pdf, emitter_pdf(integrator.emitters, hit, vertex.position, d))
+                               : 1.0f;
         sum += throughput * radiance * weight;
       }
     }

@@ -10,12 +10,12 @@
 
 namespace lambent::reference {
 
-// Which of the two ways to find the light is used. `combined` is the one for pictures; the other two exist so that tests can
-// hold one against the other. `light_only` misses texels whose luminance is zero.
+// Which of the two ways to find the light is used. `combined` is the one for pictures; the other two exist so that
+// tests can hold one against the other. `light_only` misses texels whose luminance is zero.
 enum class Strategy { combined, light_only, brdf_only };
 
-// Points for path number `index` of a run of `count`, in pairs of dimensions that are each a scrambled Sobol' sequence in an
-// order of its own. `key` names the run (a pixel).
+// Points for path number `index` of a run of `count`, in pairs of dimensions that are each a scrambled Sobol' sequence
+// in an order of its own. `key` names the run (a pixel).
 struct PathSamples {
   uint64_t key;
   uint32_t index, mask;  // mask: the power of two at or above `count`, less 1
@@ -44,8 +44,9 @@ struct Integrator {
   bool lamps;  // the scene's own; light_only and combined alone know punctual ones
   EmitterSampler emitters;
 };
-Result<Integrator> make_integrator(const Scene& scene, const Environment& env, int bounces, Strategy strategy = Strategy::combined,
-                                   const Reflection& reflection = {}, bool lamps = false);
+Result<Integrator> make_integrator(const Scene& scene, const Environment& env, int bounces,
+                                   Strategy strategy = Strategy::combined, const Reflection& reflection = {},
+                                   bool lamps = false);
 
 // False where nothing reflects towards -d: the back of a one-sided triangle.
 bool make_vertex(const Integrator& integrator, const Hit& hit, Vec3 d, PathVertex& vertex);

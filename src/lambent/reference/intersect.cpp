@@ -20,8 +20,8 @@ struct Intersector::Impl {
 
 namespace {
 
-// Of 4 million rays off flat meshes of all sizes none steeper than 1e-5 to the plane met the mesh again with half of this. At
-// flatter ones the rounding of the direction itself decides.
+// Of 4 million rays off flat meshes of all sizes none steeper than 1e-5 to the plane met the mesh again with half of
+// this. At flatter ones the rounding of the direction itself decides.
 constexpr float offset_ulps = 16;
 
 struct CameraContext {
@@ -70,8 +70,8 @@ Result<Intersector> Intersector::make(const Scene& scene) {
   rtcSetSceneFlags(impl->bvh, RTCSceneFlags(RTC_SCENE_FLAG_ROBUST | RTC_SCENE_FLAG_CONTEXT_FILTER_FUNCTION));
   RTCGeometry mesh = rtcNewGeometry(impl->device, RTC_GEOMETRY_TYPE_TRIANGLE);
   // Embree's own buffers: it reads 16 bytes at the last vertex.
-  void* positions = rtcSetNewGeometryBuffer(mesh, RTC_BUFFER_TYPE_VERTEX, 0, RTC_FORMAT_FLOAT3, sizeof(Vec3),
-                                            scene.positions.size());
+  void* positions =
+      rtcSetNewGeometryBuffer(mesh, RTC_BUFFER_TYPE_VERTEX, 0, RTC_FORMAT_FLOAT3, sizeof(Vec3), scene.positions.size());
   auto* corners = static_cast<uint32_t*>(rtcSetNewGeometryBuffer(mesh, RTC_BUFFER_TYPE_INDEX, 0, RTC_FORMAT_UINT3,
                                                                  3 * sizeof(uint32_t), scene.triangles.size()));
   if (positions && corners) {
@@ -83,7 +83,8 @@ Result<Intersector> Intersector::make(const Scene& scene) {
     run_serially([&] { rtcJoinCommitScene(impl->bvh); });
   }
   rtcReleaseGeometry(mesh);
-  if (rtcGetDeviceError(impl->device) != RTC_ERROR_NONE) return Error{scene.path, "not enough memory to trace the scene"};
+  if (rtcGetDeviceError(impl->device) != RTC_ERROR_NONE)
+    return Error{scene.path, "not enough memory to trace the scene"};
   Intersector intersector;
   intersector.impl_ = std::move(impl);
   return intersector;

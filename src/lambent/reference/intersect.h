@@ -37,10 +37,11 @@ struct SurfacePoint {
   float offset;  // how far along +-ng a ray must start so as not to meet the triangle it leaves
 };
 
-// The offset exceeds what rounding can do. The position is interpolated exactly and rounded once to float: half an ulp of its
-// largest coordinate. Then the tracer computes the ray's distance to the plane of this triangle, or of a coplanar neighbour, from
-// corners relative to the ray's origin: a few ulps of their distance from it. Neither exceeds a few ulps of the triangle's largest
-// corner coordinate, wherever the scene lies and whatever its unit; the offset is 16 of them, 1e-6 of that coordinate.
+// The offset exceeds what rounding can do. The position is interpolated exactly and rounded once to float: half an ulp
+// of its largest coordinate. Then the tracer computes the ray's distance to the plane of this triangle, or of a
+// coplanar neighbour, from corners relative to the ray's origin: a few ulps of their distance from it. Neither exceeds
+// a few ulps of the triangle's largest corner coordinate, wherever the scene lies and whatever its unit; the offset is
+// 16 of them, 1e-6 of that coordinate.
 SurfacePoint surface_point(const Scene& scene, const Hit& hit);
 
 }  // namespace lambent::reference

@@ -1,4 +1,5 @@
-// Light sampling over areas: P. Shirley, C. Wang and K. Zimmerman, "Monte Carlo techniques for direct lighting calculations", 1996.
+// Light sampling over areas: P. Shirley, C. Wang and K. Zimmerman, "Monte Carlo techniques for direct lighting
+// calculations", 1996.
 #include <lambent/reference/lamps.h>
 
 #include <algorithm>
@@ -7,7 +8,9 @@ namespace lambent::reference {
 namespace {
 
 // Without its texture: what densities follow.
-Vec3 material_emission(const Scene& scene, const Triangle& t) { return scene.materials[scene.parts[t.part].material].emissive; }
+Vec3 material_emission(const Scene& scene, const Triangle& t) {
+  return scene.materials[scene.parts[t.part].material].emissive;
+}
 
 double weight(Vec3 radiance) { return double(std::max({radiance.x, radiance.y, radiance.z})); }
 
@@ -21,7 +24,8 @@ EmitterSampler make_emitter_sampler(const Scene& scene) {
   s.scene = &scene;
   s.cdf.push_back(0);
   for (uint32_t i = 0; i < scene.triangles.size(); ++i) {
-    const double area = 0.5 * double(glm::length(area_normal(scene, scene.triangles[i]))), w = weight(material_emission(scene, scene.triangles[i]));
+    const double area = 0.5 * double(glm::length(area_normal(scene, scene.triangles[i]))),
+                 w = weight(material_emission(scene, scene.triangles[i]));
     if (!(area * w > 0)) continue;
     s.triangles.push_back(i), s.cdf.push_back(s.cdf.back() + area * w);
   }
@@ -31,7 +35,8 @@ EmitterSampler make_emitter_sampler(const Scene& scene) {
 EmitterSample sample_emitter(const EmitterSampler& s, Vec3 point, float pick, Vec2 u) {
   if (s.triangles.empty()) return {};
   const double target = double(pick) * s.cdf.back();
-  const size_t i = std::min(size_t(std::upper_bound(s.cdf.begin() + 1, s.cdf.end(), target) - s.cdf.begin()) - 1, s.triangles.size() - 1);
+  const size_t i = std::min(size_t(std::upper_bound(s.cdf.begin() + 1, s.cdf.end(), target) - s.cdf.begin()) - 1,
+                            s.triangles.size() - 1);
   const Triangle& t = s.scene->triangles[s.triangles[i]];
   const float root = std::sqrt(1 - u.x);
   const Hit hit{s.triangles[i], 1 - root, u.y * root};
@@ -44,7 +49,8 @@ EmitterSample sample_emitter(const EmitterSampler& s, Vec3 point, float pick, Ve
   sample.radiance = emitted(*s.scene, hit, sample.direction);
   const float facing = std::abs(glm::dot(at.ng, sample.direction));
   if (sample.radiance == Vec3(0) || !(facing > 0)) return {};
-  sample.pdf = float(area_density(s, material_emission(*s.scene, t)) * double(sample.distance) * double(sample.distance) / double(facing));
+  sample.pdf = float(area_density(s, material_emission(*s.scene, t)) * double(sample.distance) *
+                     double(sample.distance) / double(facing));
   return sample;
 }
 

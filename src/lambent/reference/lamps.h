@@ -6,18 +6,18 @@
 
 namespace lambent::reference {
 
-// Emissive triangles, drawn with density proportional to area times the largest channel of their radiance, uniformly over each.
-// The scene must outlive it.
+// Emissive triangles, drawn with density proportional to area times the largest channel of their radiance, uniformly
+// over each. The scene must outlive it.
 struct EmitterSampler {
   const Scene* scene = nullptr;
   std::vector<uint32_t> triangles;
   std::vector<double> cdf;  // one more than triangles
 };
 struct EmitterSample {
-  Vec3 direction;      // unit, from the point
+  Vec3 direction;  // unit, from the point
   float distance = 0;
   Vec3 radiance{0};
-  float pdf = 0;       // per solid angle at the point; 0 where nothing can come from there
+  float pdf = 0;  // per solid angle at the point; 0 where nothing can come from there
 };
 EmitterSampler make_emitter_sampler(const Scene& scene);
 EmitterSample sample_emitter(const EmitterSampler& sampler, Vec3 point, float pick, Vec2 u);

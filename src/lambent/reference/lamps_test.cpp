@@ -35,14 +35,17 @@ TEST(PathTracerLamps, ClosedBoxOfUniformEmission) {
     ASSERT_TRUE(picture);
     for (size_t i = 0; i < picture->image.rgb.size(); ++i)
       for (int c = 0; c < 3; ++c)
-        EXPECT_NEAR(picture->image.rgb[i][c], e[c] + rho[c] * expected[c], sigmas * std::sqrt(picture->variance[i][c]) + 1e-4f) << k;
+        EXPECT_NEAR(picture->image.rgb[i][c], e[c] + rho[c] * expected[c],
+                    sigmas * std::sqrt(picture->variance[i][c]) + 1e-4f)
+            << k;
   }
 }
 
 TEST(PathTracerLamps, EachWayToFindALampAgrees) {
   // A skew lamp of two triangles, half behind a block: sampling the lamp, sampling the cosine, and both.
   Scene scene;
-  const uint32_t grey = add_material(scene, "grey", Vec3(0.6f, 0.5f, 0.4f)), lamp = add_material(scene, "lamp", Vec3(0.2f));
+  const uint32_t grey = add_material(scene, "grey", Vec3(0.6f, 0.5f, 0.4f)),
+                 lamp = add_material(scene, "lamp", Vec3(0.2f));
   scene.materials[lamp].emissive = Vec3(4, 3, 2);
   add_quad(scene, grey, "floor", Vec3(-2, 0, -2), Vec3(0, 0, 4), Vec3(4, 0, 0), 2, 2);
   add_quad(scene, lamp, "lamp", Vec3(-0.5f, 1, -0.4f), Vec3(0.9f, 0.2f, 0.1f), Vec3(0, 0.1f, 0.8f), 1, 1);
@@ -57,14 +60,16 @@ TEST(PathTracerLamps, EachWayToFindALampAgrees) {
     glm::dvec3 sum(0), squares(0);
     const uint32_t paths = 1 << 16;
     for (uint32_t i = 0; i < paths; ++i) {
-      const glm::dvec3 x(reference::exit_radiance_estimate(*integrator, reference::white_vertex(at, n), reference::PathSamples(9, i, paths)));
+      const glm::dvec3 x(reference::exit_radiance_estimate(*integrator, reference::white_vertex(at, n),
+                                                           reference::PathSamples(9, i, paths)));
       sum += x, squares += x * x;
     }
     means[s] = sum / double(paths), variances[s] = (squares / double(paths) - means[s] * means[s]) / double(paths);
     EXPECT_GT(means[s].x, 0.03);
   }
   for (int s = 1; s < 3; ++s)
-    for (int c = 0; c < 3; ++c) EXPECT_NEAR(means[s][c], means[0][c], double(sigmas) * std::sqrt(variances[s][c] + variances[0][c])) << s;
+    for (int c = 0; c < 3; ++c)
+      EXPECT_NEAR(means[s][c], means[0][c], double(sigmas) * std::sqrt(variances[s][c] + variances[0][c])) << s;
   EXPECT_LT(variances[0].x, variances[2].x);
 }
 
@@ -84,7 +89,8 @@ TEST(PathTracerLamps, DensitiesOfDrawnPointsAreWhatTheHitsSay) {
     if (!(s.pdf > 0)) continue;
     reference::Hit hit;
     ASSERT_TRUE(intersector->nearest(p, s.direction, hit));
-    if (std::abs(glm::length(reference::surface_point(scene, hit).position - p) - s.distance) > 1e-4f) continue;  // hidden
+    if (std::abs(glm::length(reference::surface_point(scene, hit).position - p) - s.distance) > 1e-4f)
+      continue;  // hidden
     EXPECT_EQ(reference::emitted(scene, hit, s.direction), s.radiance);
     EXPECT_NEAR(reference::emitter_pdf(sampler, hit, p, s.direction) / s.pdf, 1, 1e-3f);
     ++compared;

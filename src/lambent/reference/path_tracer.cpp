@@ -82,8 +82,8 @@ Result<ReferenceImage> path_trace(const Scene& scene, const Environment& env, co
     return Error{"", "the picture's size must be between 1 and 2^28 pixels"};
   if (options.spp < 1 || options.spp > 1 << 20) return Error{"", "paths a pixel must be between 1 and 2^20"};
   if (options.bounces < 0 || options.bounces > 64) return Error{"", "bounces must be between 0 and 64"};
-  Result<reference::Integrator> integrator =
-      reference::make_integrator(scene, env, options.bounces, reference::Strategy::combined, options.reflection, options.lamps);
+  Result<reference::Integrator> integrator = reference::make_integrator(
+      scene, env, options.bounces, reference::Strategy::combined, options.reflection, options.lamps);
   if (!integrator) return integrator.error();
   return reference::render(*integrator, camera, options, progress);
 }
@@ -92,7 +92,8 @@ std::vector<ExitRadiance> exit_radiances(const Scene& scene, const Environment& 
                                          std::span<const Vec3> normals, int bounces, int paths, uint32_t seed,
                                          const Reflection& reflection, bool lamps) {
   LAMBENT_CHECK(origins.size() == normals.size() && paths >= 1 && bounces >= 0);
-  Result<reference::Integrator> integrator = reference::make_integrator(scene, env, bounces, reference::Strategy::combined, reflection, lamps);
+  Result<reference::Integrator> integrator =
+      reference::make_integrator(scene, env, bounces, reference::Strategy::combined, reflection, lamps);
   LAMBENT_CHECK(bool(integrator));
   // Blocks of paths, summed in order afterwards: one point keeps all cores busy, and the sum does not depend on them.
   constexpr size_t block = 1024;
@@ -104,8 +105,8 @@ std::vector<ExitRadiance> exit_radiances(const Scene& scene, const Environment& 
       const reference::PathVertex receiver = reference::white_vertex(origins[point], normals[point]);
       const uint64_t key = hash64(hash64(seed), point);
       for (size_t i = first; i < std::min(first + block, total); ++i)
-        moments[m].add(glm::dvec3(
-            reference::exit_radiance_estimate(*integrator, receiver, reference::PathSamples(key, uint32_t(i), uint32_t(paths)))));
+        moments[m].add(glm::dvec3(reference::exit_radiance_estimate(
+            *integrator, receiver, reference::PathSamples(key, uint32_t(i), uint32_t(paths)))));
     }
   });
   std::vector<ExitRadiance> results;
@@ -117,7 +118,8 @@ std::vector<ExitRadiance> exit_radiances(const Scene& scene, const Environment& 
   return results;
 }
 
-Vec3 exit_radiance(const Scene& scene, const Environment& env, Vec3 origin, Vec3 n, int bounces, int paths, uint32_t seed, bool lamps) {
+Vec3 exit_radiance(const Scene& scene, const Environment& env, Vec3 origin, Vec3 n, int bounces, int paths,
+                   uint32_t seed, bool lamps) {
   return exit_radiances(scene, env, {&origin, 1}, {&n, 1}, bounces, paths, seed, {}, lamps)[0].mean;
 }
 

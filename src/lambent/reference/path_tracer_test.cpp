@@ -40,8 +40,8 @@ Scene small_room() {
 }
 
 TEST(PathTracer, ConvexBodyUnderUniformLight) {
-  // Exit radiance a L everywhere. Facets of a level-5 icosphere turn up to 0.02 rad from their normals and so lose up to
-  // 0.02^2 / 4 = 1e-4 of the light below their planes.
+  // Exit radiance a L everywhere. Facets of a level-5 icosphere turn up to 0.02 rad from their normals and so lose up
+  // to 0.02^2 / 4 = 1e-4 of the light below their planes.
   constexpr float L = 2, terminator = 1e-4f;
   const Vec3 albedo(0.8f, 0.5f, 0.2f);
   Scene scene = make_sphere(1, 5, albedo);
@@ -53,23 +53,26 @@ TEST(PathTracer, ConvexBodyUnderUniformLight) {
     if (result->image.alpha[i] < 1) continue;
     ++covered, sum += glm::dvec3(result->image.rgb[i]), variance += glm::dvec3(result->variance[i]);
     for (int c = 0; c < 3; ++c)
-      EXPECT_NEAR(result->image.rgb[i][c], albedo[c] * L, sigmas * std::sqrt(result->variance[i][c]) + terminator * albedo[c] * L);
+      EXPECT_NEAR(result->image.rgb[i][c], albedo[c] * L,
+                  sigmas * std::sqrt(result->variance[i][c]) + terminator * albedo[c] * L);
   }
   EXPECT_GT(covered, 100);
   for (int c = 0; c < 3; ++c)
-    EXPECT_NEAR(sum[c] / covered, albedo[c] * L, sigmas * std::sqrt(variance[c]) / covered + terminator * albedo[c] * L);
+    EXPECT_NEAR(sum[c] / covered, albedo[c] * L,
+                sigmas * std::sqrt(variance[c]) / covered + terminator * albedo[c] * L);
 }
 
 TEST(PathTracer, NeverMeetsTheSurfaceItLeaves) {
-  // By BRDF sampling alone every path from a flat-faced convex body under uniform light is worth exactly a L, unless it meets
-  // the body again. Only roundings of a mean of equal floats remain.
+  // By BRDF sampling alone every path from a flat-faced convex body under uniform light is worth exactly a L, unless it
+  // meets the body again. Only roundings of a mean of equal floats remain.
   constexpr float a = 0.5f, tolerance = 1e-6f;
   const Environment env = uniform(1);
   Random random(5);
   for (float size : {1e-4f, 0.01f, 1.0f, 550.0f, 1e5f})
     for (float shift : {0.0f, 1.0f, 30.0f}) {
       Scene scene;
-      add_box(scene, add_material(scene, "grey", Vec3(a)), "box", Vec3(-1, -0.05f, -0.7f) * size, Vec3(1, 0.05f, 0.7f) * size, 3);
+      add_box(scene, add_material(scene, "grey", Vec3(a)), "box", Vec3(-1, -0.05f, -0.7f) * size,
+              Vec3(1, 0.05f, 0.7f) * size, 3);
       Mat3 R = rotation_from_yaw_pitch_roll(360.0f * Vec3(random.next(), random.next(), random.next()));
       Vec3 centre = shift * size * square_to_sphere(random.next2());
       move(scene, R, centre);
@@ -79,7 +82,8 @@ TEST(PathTracer, NeverMeetsTheSurfaceItLeaves) {
       auto result = reference::render(*integrator, camera, picture(32, 16, 0), nullptr);
       ASSERT_TRUE(result);
       for (size_t i = 0; i < result->image.rgb.size(); ++i)
-        ASSERT_NEAR(result->image.rgb[i].x, a * result->image.alpha[i], tolerance) << "size " << size << " shift " << shift;
+        ASSERT_NEAR(result->image.rgb[i].x, a * result->image.alpha[i], tolerance)
+            << "size " << size << " shift " << shift;
     }
 }
 
@@ -117,16 +121,17 @@ TEST(PathTracer, FloorAtTheFootOfAWallSeesHalfTheSky) {
 }
 
 TEST(PathTracer, SphereWithAPort) {
-  // Inside a sphere every point sees every patch under the same form factor, patch area / sphere area. With a port of fraction f
-  // and walls of albedo rho, k bounces give irradiance pi L f sum_{j <= k} (rho (1 - f))^j; exit radiance is that over pi.
-  // A level-4 icosphere is 0.05 % smaller than the sphere, mostly alike everywhere: within 0.1 %.
+  // Inside a sphere every point sees every patch under the same form factor, patch area / sphere area. With a port of
+  // fraction f and walls of albedo rho, k bounces give irradiance pi L f sum_{j <= k} (rho (1 - f))^j; exit radiance is
+  // that over pi. A level-4 icosphere is 0.05 % smaller than the sphere, mostly alike everywhere: within 0.1 %.
   constexpr float rho = 0.7f, L = 1, tessellation = 1e-3f;
   Scene scene = make_sphere(1, 4, Vec3(rho), true);
   double open = 0;  // solid angle of the port from the centre (Van Oosterom and Strackee 1983)
   std::erase_if(scene.triangles, [&](const Triangle& t) {
     Vec3 a = scene.positions[t.v[0]], b = scene.positions[t.v[1]], c = scene.positions[t.v[2]];
     if (glm::normalize(a + b + c).y < 0.8f) return false;
-    open += 2 * std::atan2(std::abs(glm::dot(a, glm::cross(b, c))), 1 + glm::dot(a, b) + glm::dot(b, c) + glm::dot(c, a));
+    open += 2 *
+            std::atan2(std::abs(glm::dot(a, glm::cross(b, c))), 1 + glm::dot(a, b) + glm::dot(b, c) + glm::dot(c, a));
     return true;
   });
   const double f = open / (4 * pi), kept = rho * (1 - f);
@@ -149,8 +154,9 @@ TEST(PathTracer, SphereWithAPort) {
 }
 
 TEST(PathTracer, LightComesFromWhereTheMapSaysOntoFacesThatFaceIt) {
-  // A black body would hide a flip: each of the six faces of a cube, seen head-on, under a light about one axis. The lit face
-  // must have irradiance(env, n) a / pi, a closed sum over texels; the other faces of that axis exactly nothing.
+  // A black body would hide a flip: each of the six faces of a cube, seen head-on, under a light about one axis. The
+  // lit face must have irradiance(env, n) a / pi, a closed sum over texels; the other faces of that axis exactly
+  // nothing.
   constexpr float a = 0.6f;
   Scene scene;
   add_box(scene, add_material(scene, "grey", Vec3(a)), "cube", Vec3(-1), Vec3(1), 1);
@@ -178,11 +184,13 @@ TEST(PathTracer, LightComesFromWhereTheMapSaysOntoFacesThatFaceIt) {
 }
 
 TEST(PathTracer, PictureIsUprightAndNotMirrored) {
-  // Looking down -Z: +X is right, +Y is up. A small sphere at the upper right, above a map with a bright spot at the lower left.
+  // Looking down -Z: +X is right, +Y is up. A small sphere at the upper right, above a map with a bright spot at the
+  // lower left.
   Scene scene;
   add_sphere(scene, add_material(scene, "white", Vec3(1)), "ball", {1, 1, -5}, 0.3f, 2);
   const Vec3 spot = glm::normalize(Vec3(-1, -1, -5));
-  Environment env = make_environment("spot", 256, 128, [&](Vec3 d) { return Vec3(glm::dot(d, spot) > 0.995f ? 1.0f : 0.0f); });
+  Environment env =
+      make_environment("spot", 256, 128, [&](Vec3 d) { return Vec3(glm::dot(d, spot) > 0.995f ? 1.0f : 0.0f); });
   ReferenceOptions options = picture(40, 4, 0);
   auto covered = path_trace(scene, env, look(Vec3(0), {0, 0, -1}, 60), options);
   options.background = true;
@@ -205,7 +213,8 @@ TEST(PathTracer, PictureIsUprightAndNotMirrored) {
 }
 
 TEST(PathTracer, BackgroundIsInterpolated) {
-  // A linear ramp over the map stays linear between texel centres: exactly bilinear, far from what texels alone would show.
+  // A linear ramp over the map stays linear between texel centres: exactly bilinear, far from what texels alone would
+  // show.
   Environment env;
   env.image = Image(16, 8);
   for (int y = 0; y < 8; ++y)
@@ -244,8 +253,7 @@ TEST(PathTracer, OneSidedTriangleFromBehind) {
   // To the camera it is absent, and so is a whole stack of them; what lies behind is seen.
   Scene stack;
   uint32_t white = add_material(stack, "white", Vec3(1));
-  for (int i = 0; i < 100; ++i)
-    add_quad(stack, white, "sheet", {-1, 0.01f * float(i), 1}, {2, 0, 0}, {0, 0, -2}, 1, 1);
+  for (int i = 0; i < 100; ++i) add_quad(stack, white, "sheet", {-1, 0.01f * float(i), 1}, {2, 0, 0}, {0, 0, -2}, 1, 1);
   Camera below = look({0, -5, 0.1f}, Vec3(0), 5), above = look({0, 5, 0.1f}, Vec3(0), 5);
   auto through = path_trace(stack, uniform(1), below, picture(4, 4, 1));
   ASSERT_TRUE(through);
@@ -263,8 +271,8 @@ TEST(PathTracer, OneSidedTriangleFromBehind) {
   for (float alpha : seen->image.alpha) EXPECT_EQ(alpha, 1);
   EXPECT_EQ(path_trace(stack, uniform(1), above, picture(1, 4, 0))->image.alpha[0], 1);
 
-  // To light it is black and casts shadows: a receiver under the back of a wide white sheet gets only what comes past its rim,
-  // with any number of bounces. The rim's elevation is 0.01: sin^2 of it, 1e-4, of the light.
+  // To light it is black and casts shadows: a receiver under the back of a wide white sheet gets only what comes past
+  // its rim, with any number of bounces. The rim's elevation is 0.01: sin^2 of it, 1e-4, of the light.
   Scene roof = make_quad({-100, 1, 100}, {200, 0, 0}, {0, 0, -200}, 1, 1, Vec3(1));
   add_quad(roof, 0, "floor", {-100, 0, 100}, {200, 0, 0}, {0, 0, -200}, 1, 1);
   Vec3 direct = exit_radiance(roof, uniform(1), {0, 0.01f, 0}, {0, 1, 0}, 0, 4096, 1);
@@ -277,8 +285,8 @@ TEST(PathTracer, OneSidedTriangleFromBehind) {
 }
 
 TEST(PathTracer, ShadowsReachTheContact) {
-  // A floor under the back of a lid: the camera sees through the lid, the light does not. The gap is 1e-4 of the floor and
-  // the lid reaches 10 further than the floor, so what creeps in is 1e-10 of the light: none in any run.
+  // A floor under the back of a lid: the camera sees through the lid, the light does not. The gap is 1e-4 of the floor
+  // and the lid reaches 10 further than the floor, so what creeps in is 1e-10 of the light: none in any run.
   Scene scene = make_quad({-1, 0, 1}, {2, 0, 0}, {0, 0, -2}, 2, 2, Vec3(1));
   add_quad(scene, add_material(scene, "black", Vec3(0)), "lid", {-11, 1e-4f, 11}, {0, 0, -22}, {22, 0, 0}, 1, 1);
   Mat3 R = rotation_from_yaw_pitch_roll({20, 30, 40});

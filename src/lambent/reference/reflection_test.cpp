@@ -23,7 +23,8 @@ std::vector<Named> models() {
     for (int d = 0; d < 4; ++d)
       for (int p = 0; p < 6; ++p) {
         const HalfDifference a = cell_angles(*table, h, d, p);
-        table->f.push_back(Vec3(0.1f, 0.05f, 0.02f) + (0.5f + 0.1f * std::sin(2 * a.phi_d)) * std::exp(-12 * a.theta_h * a.theta_h));
+        table->f.push_back(Vec3(0.1f, 0.05f, 0.02f) +
+                           (0.5f + 0.1f * std::sin(2 * a.phi_d)) * std::exp(-12 * a.theta_h * a.theta_h));
       }
   prepare_sampling(*table);
   return {{"Lambert", Lambert{Vec3(0.8f, 0.5f, 0.1f)}},
@@ -39,7 +40,8 @@ std::vector<Named> models() {
 // A sheet in the plane y = 0 whose texture coordinate u grows along `tangent`.
 Scene sheet(Vec3 tangent) {
   Scene s = make_quad({-1, 0, 1}, {2, 0, 0}, {0, 0, -2}, 1, 1, Vec3(0.5f));
-  for (Vec3 p : s.positions) s.texcoords[0].push_back({glm::dot(p, tangent), glm::dot(p, glm::cross(Vec3(0, 1, 0), tangent))});
+  for (Vec3 p : s.positions)
+    s.texcoords[0].push_back({glm::dot(p, tangent), glm::dot(p, glm::cross(Vec3(0, 1, 0), tangent))});
   return s;
 }
 
@@ -59,7 +61,8 @@ glm::dvec3 radiance_by_quadrature(const Brdf& brdf, const Mat3& frame, const Env
 }
 
 TEST(ReferenceReflection, SheetAgreesWithQuadrature) {
-  // An asymmetric light, a skew tangent, an eye aslant: wrong frames, signs or weights all show. Quadrature: 2e-3 for these lobes.
+  // An asymmetric light, a skew tangent, an eye aslant: wrong frames, signs or weights all show. Quadrature: 2e-3 for
+  // these lobes.
   constexpr double quadrature = 2e-3;
   const Environment env = test::skewed_environment();
   const Vec3 tangent = glm::normalize(Vec3(2, 0, -1));
@@ -73,22 +76,27 @@ TEST(ReferenceReflection, SheetAgreesWithQuadrature) {
     ASSERT_TRUE(result);
     const glm::dvec3 expected = radiance_by_quadrature(brdf, frame, env, glm::normalize(eye));
     for (int c = 0; c < 3; ++c)
-      EXPECT_NEAR(result->image.rgb[0][c], expected[c], sigmas * std::sqrt(result->variance[0][c]) + quadrature * expected[c]) << name;
+      EXPECT_NEAR(result->image.rgb[0][c], expected[c],
+                  sigmas * std::sqrt(result->variance[0][c]) + quadrature * expected[c])
+          << name;
   }
 }
 
 TEST(ReferenceReflection, TangentMatters) {
-  // Light from where h would be tilted by 20 degrees, square to the plane of the eye and the normal. With the tangent turned by a right
-  // angle the lobe lies across or along that tilt: anisotropic models look very different, others the same but for noise (below 1 %).
+  // Light from where h would be tilted by 20 degrees, square to the plane of the eye and the normal. With the tangent
+  // turned by a right angle the lobe lies across or along that tilt: anisotropic models look very different, others the
+  // same but for noise (below 1 %).
   const Vec3 spot = glm::reflect(glm::normalize(Vec3(3, -3, 0)), Vec3(0, std::cos(0.35f), std::sin(0.35f)));
-  const Environment env = make_environment("spot", 64, 32, [&](Vec3 d) { return Vec3(std::exp(40 * (glm::dot(d, spot) - 1))); });
+  const Environment env =
+      make_environment("spot", 64, 32, [&](Vec3 d) { return Vec3(std::exp(40 * (glm::dot(d, spot) - 1))); });
   for (const auto& [name, brdf] : models()) {
     const bool anisotropic = std::string(name) == "GGX" || std::string(name) == "Ward";
     Vec3 seen[2];
     for (int i = 0; i < 2; ++i) {
       ReferenceOptions options = test::small_picture(1, 8192, 0);
       options.reflection.everywhere = brdf;
-      auto result = path_trace(sheet(i ? Vec3(0, 0, -1) : Vec3(1, 0, 0)), env, test::look({-3, 3, 0}, Vec3(0), 0.05f), options);
+      auto result =
+          path_trace(sheet(i ? Vec3(0, 0, -1) : Vec3(1, 0, 0)), env, test::look({-3, 3, 0}, Vec3(0), 0.05f), options);
       ASSERT_TRUE(result);
       seen[i] = result->image.rgb[0];
     }
@@ -133,7 +141,8 @@ TEST(ReferenceReflection, MaterialsOfTheScene) {
   // A sheet looks as if its material were the model everywhere; and diffuse, of its base colour, is the default.
   const Environment env = test::skewed_environment();
   Scene scene = sheet({1, 0, 0});
-  scene.materials[0].metallic = 1, scene.materials[0].roughness = 0.4f, scene.materials[0].base_color = {0.9f, 0.6f, 0.3f};
+  scene.materials[0].metallic = 1, scene.materials[0].roughness = 0.4f,
+  scene.materials[0].base_color = {0.9f, 0.6f, 0.3f};
   const Camera camera = test::look({-3, 3, 1}, Vec3(0), 0.05f);
   ReferenceOptions options = test::small_picture(1, 256, 1);
   auto diffuse = path_trace(scene, env, camera, options);
@@ -152,8 +161,9 @@ TEST(ReferenceReflection, MaterialsOfTheScene) {
 }
 
 TEST(ReferenceReflection, BallInUniformLight) {
-  // It shows the albedo towards the eye of what it is made of: what light-only sampling, which never draws from the BRDF, says of each
-  // pixel, BRDF-only sampling must say too; and nothing shines brighter than the light, but for glTF's grazing gain of 2 %.
+  // It shows the albedo towards the eye of what it is made of: what light-only sampling, which never draws from the
+  // BRDF, says of each pixel, BRDF-only sampling must say too; and nothing shines brighter than the light, but for
+  // glTF's grazing gain of 2 %.
   const Scene scene = make_sphere(1, 5, Vec3(0.5f));
   const Environment env = test::uniform_environment(1);
   for (const auto& [name, brdf] : models()) {

@@ -11,7 +11,8 @@ namespace lambent {
 void relight_factors(const Transfer& visibility, const Outgoing& outgoing, std::span<const Vec3> light, Relit& out) {
   const int m = outgoing.order, n = visibility.light.order - m + 1;
   LAMBENT_CHECK(outgoing.kind == OutgoingKind::map && visibility.channels == 1 && visibility.rows == 1 && n >= 1);
-  LAMBENT_CHECK(visibility.columns() == size_t(sh_count(n + m - 1)) && light.size() >= size_t(sh_count(n)) && outgoing.frames.size() == visibility.receivers);
+  LAMBENT_CHECK(visibility.columns() == size_t(sh_count(n + m - 1)) && light.size() >= size_t(sh_count(n)) &&
+                outgoing.frames.size() == visibility.receivers);
   const size_t J = size_t(sh_count(m)), K = visibility.columns();
   const CosineBasis basis = make_cosine_basis(m);
   // product[c][j][k] = sum_i C_ijk L_i
@@ -19,7 +20,8 @@ void relight_factors(const Transfer& visibility, const Outgoing& outgoing, std::
   std::vector<float> product(3 * J * K, 0.0f);
   for (size_t k = 0; k < K; ++k)
     for (uint32_t e = tensor.begin[k]; e < tensor.begin[k + 1]; ++e)
-      for (size_t c = 0; c < 3; ++c) product[(c * J + tensor.j[e]) * K + k] += tensor.single[e] * light[tensor.i[e]][int(c)];
+      for (size_t c = 0; c < 3; ++c)
+        product[(c * J + tensor.j[e]) * K + k] += tensor.single[e] * light[tensor.i[e]][int(c)];
 
   out.rows = int(J);
   out.values.assign((visibility.receivers + transfer_block - 1) / transfer_block * J * 3 * transfer_block, 0.0f);

@@ -1,6 +1,6 @@
 #pragma once
-// T with its light fixed: one column, "the light is on". Of a transfer matrix this is a surface light field, radiance over place and
-// view. Source: general-prt, "Special cases".
+// T with its light fixed: one column, "the light is on". Of a transfer matrix this is a surface light field, radiance
+// over place and view. Source: general-prt, "Special cases".
 #include <lambent/relight/relight.h>
 
 namespace lambent {

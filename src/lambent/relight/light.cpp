@@ -3,7 +3,8 @@
 
 namespace lambent {
 
-LightProjection project_light(const Environment& env, const LightBasis& columns, const Mat3& rotation, int order, ShWindow window) {
+LightProjection project_light(const Environment& env, const LightBasis& columns, const Mat3& rotation, int order,
+                              ShWindow window) {
   LightProjection result;
   result.light.assign(columns.count(), Vec3(0.0f));
   if (order == 0 || order > columns.order) order = columns.order;

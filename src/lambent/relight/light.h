@@ -11,10 +11,10 @@ struct LightProjection {
   DirectionalBasis basis;     // the harmonics and lobes that these are coefficients of; empty without either
 };
 
-// The least-squares coefficients of the environment turned by `rotation`. Harmonics turn with it; lobes stand still in a bake, so
-// they are projected onto anew. `window` is applied to the harmonics alone. With `order` > 0 bands from it on are left out of the
-// basis: their coefficients are 0 and the others those that fit best without them.
-LightProjection project_light(const Environment& env, const LightBasis& basis, const Mat3& rotation = Mat3(1.0f), int order = 0,
-                              ShWindow window = ShWindow::none);
+// The least-squares coefficients of the environment turned by `rotation`. Harmonics turn with it; lobes stand still in
+// a bake, so they are projected onto anew. `window` is applied to the harmonics alone. With `order` > 0 bands from it
+// on are left out of the basis: their coefficients are 0 and the others those that fit best without them.
+LightProjection project_light(const Environment& env, const LightBasis& basis, const Mat3& rotation = Mat3(1.0f),
+                              int order = 0, ShWindow window = ShWindow::none);
 
 }  // namespace lambent

@@ -14,11 +14,13 @@ Environment lit() {
   });
 }
 
-const LightBasis columns{4, LobeKind::von_mises_fisher, {{glm::normalize(Vec3(0.4f, 0.8f, -0.3f)), 60}, {Vec3(-1, 0, 0), 20}}, {"desk"}};
+const LightBasis columns{
+    4, LobeKind::von_mises_fisher, {{glm::normalize(Vec3(0.4f, 0.8f, -0.3f)), 60}, {Vec3(-1, 0, 0), 20}}, {"desk"}};
 
 TEST(ProjectLight, HarmonicsAloneAreWhatTheyAlwaysWere) {
   const Mat3 R = rotation_from_yaw_pitch_roll({30, -20, 10});
-  EXPECT_EQ(project_light(lit(), {.order = 5}, R).light, rotate_sh(make_sh_rotation(5, R), project_environment(lit(), 5)));
+  EXPECT_EQ(project_light(lit(), {.order = 5}, R).light,
+            rotate_sh(make_sh_rotation(5, R), project_environment(lit(), 5)));
   EXPECT_EQ(project_light(lit(), {.order = 5}, Mat3(1.0f), 9).light.size(), 25u);  // no more bands than there are
 }
 
@@ -46,9 +48,11 @@ TEST(ProjectLight, WithFewerBandsFitsBestWithoutTheOthers) {
 }
 
 TEST(ProjectLight, WindowsTheHarmonicsAlone) {
-  const LightProjection plain = project_light(lit(), columns), windowed = project_light(lit(), columns, Mat3(1.0f), 0, ShWindow::hann);
+  const LightProjection plain = project_light(lit(), columns),
+                        windowed = project_light(lit(), columns, Mat3(1.0f), 0, ShWindow::hann);
   const auto factors = sh_window(ShWindow::hann, 4);
-  for (size_t i = 0; i < 16; ++i) EXPECT_LT(glm::distance(windowed.light[i], plain.light[i] * factors[size_t(sh_band(int(i)))]), 1e-6f);
+  for (size_t i = 0; i < 16; ++i)
+    EXPECT_LT(glm::distance(windowed.light[i], plain.light[i] * factors[size_t(sh_band(int(i)))]), 1e-6f);
   for (size_t i = 16; i < 19; ++i) EXPECT_EQ(windowed.light[i], plain.light[i]);
 }
 

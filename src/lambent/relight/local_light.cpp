@@ -16,15 +16,18 @@ void light_at(const LocalLight& light, Vec3 place, std::span<Vec3> out) {
   double P[max_sh_order + 1];
   for (const SphereLamp& lamp : light.lamps) {
     const Vec3 to = lamp.centre - place;
-    const double d2 = std::max(double(glm::dot(to, to)), 1e-30), sine2 = std::min(1.0, double(lamp.radius) * lamp.radius / d2);
+    const double d2 = std::max(double(glm::dot(to, to)), 1e-30),
+                 sine2 = std::min(1.0, double(lamp.radius) * lamp.radius / d2);
     const double cosine = sine2 < 1 ? std::sqrt(1 - sine2) : -1;
     evaluate_legendre(cosine, {P, size_t(order) + 1});
     evaluate_sh(order, normalize_or(to, {0, 0, 1}), y);
     for (int l = 0; l < order; ++l) {
       // 2 pi times the integral of P_l from the cap's edge to 1; 1 - cos a without cancelling.
-      const double band = l == 0 ? 2 * std::numbers::pi * (cosine < 0 ? 2 : sine2 / (1 + cosine)) : 2 * std::numbers::pi * (P[l - 1] - P[l + 1]) / (2 * l + 1);
+      const double band = l == 0 ? 2 * std::numbers::pi * (cosine < 0 ? 2 : sine2 / (1 + cosine))
+                                 : 2 * std::numbers::pi * (P[l - 1] - P[l + 1]) / (2 * l + 1);
       const double factor = light.window.empty() ? 1 : size_t(l) < light.window.size() ? light.window[size_t(l)] : 0;
-      for (size_t k = size_t(l * l); k < size_t((l + 1) * (l + 1)); ++k) out[k] += lamp.radiance * float(factor * band * y[k]);
+      for (size_t k = size_t(l * l); k < size_t((l + 1) * (l + 1)); ++k)
+        out[k] += lamp.radiance * float(factor * band * y[k]);
     }
   }
 }

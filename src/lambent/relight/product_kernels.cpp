@@ -21,14 +21,18 @@ using F4 = hn::CappedTag<float, 4>;
 template <class V>
 V Power(V x, float n) {
   const F d;
-  return hn::IfThenZeroElse(hn::Le(x, hn::Set(d, 1e-30f)), hn::Exp(d, hn::Mul(hn::Set(d, n), hn::Log(d, hn::Max(x, hn::Set(d, 1e-30f))))));
+  return hn::IfThenZeroElse(hn::Le(x, hn::Set(d, 1e-30f)),
+                            hn::Exp(d, hn::Mul(hn::Set(d, n), hn::Log(d, hn::Max(x, hn::Set(d, 1e-30f))))));
 }
 
 // s_k for `count` directions, padded to a multiple of 16 in all arrays; out[k] has `stride` floats.
-void EvaluateTerms(const Terms& b, const float* x, const float* y, const float* z, size_t count, float* out, size_t stride) {
+void EvaluateTerms(const Terms& b, const float* x, const float* y, const float* z, size_t count, float* out,
+                   size_t stride) {
   const F d;
   const auto zero = hn::Zero(d), one = hn::Set(d, 1.0f);
-  auto along = [&](Vec3 a, auto vx, auto vy, auto vz) HWY_ATTR { return hn::MulAdd(hn::Set(d, a.x), vx, hn::MulAdd(hn::Set(d, a.y), vy, hn::Mul(hn::Set(d, a.z), vz))); };
+  auto along = [&](Vec3 a, auto vx, auto vy, auto vz) HWY_ATTR {
+    return hn::MulAdd(hn::Set(d, a.x), vx, hn::MulAdd(hn::Set(d, a.y), vy, hn::Mul(hn::Set(d, a.z), vz)));
+  };
   for (size_t i = 0; i < count; i += hn::Lanes(d)) {
     const auto vx = hn::LoadU(d, x + i), vy = hn::LoadU(d, y + i), vz = hn::LoadU(d, z + i);
     if (b.kind == Terms::Kind::phong) {
@@ -36,9 +40,11 @@ void EvaluateTerms(const Terms& b, const float* x, const float* y, const float* 
       hn::StoreU(hn::Mul(hn::Set(d, (b.exponent + 2) / (2 * pi)), Power(c, b.exponent)), d, out + i);
       continue;
     }
-    const auto wx = along(b.frame[0], vx, vy, vz), wy = along(b.frame[1], vx, vy, vz), wz = along(b.frame[2], vx, vy, vz);
+    const auto wx = along(b.frame[0], vx, vy, vz), wy = along(b.frame[1], vx, vy, vz),
+               wz = along(b.frame[2], vx, vy, vz);
     const auto above = hn::Gt(wz, hn::Set(d, least_cosine));
-    auto hx = hn::Add(wx, hn::Set(d, b.wo.x)), hy = hn::Add(wy, hn::Set(d, b.wo.y)), hz = hn::Add(wz, hn::Set(d, b.wo.z));
+    auto hx = hn::Add(wx, hn::Set(d, b.wo.x)), hy = hn::Add(wy, hn::Set(d, b.wo.y)),
+         hz = hn::Add(wz, hn::Set(d, b.wo.z));
     const auto length = hn::Sqrt(hn::Max(hn::MulAdd(hx, hx, hn::MulAdd(hy, hy, hn::Mul(hz, hz))), hn::Set(d, 1e-12f)));
     const auto inverse = hn::Div(one, length), cosine = hn::Mul(hn::Set(d, 0.5f), length);
     hx = hn::Mul(hx, inverse), hy = hn::Mul(hy, inverse), hz = hn::Max(hn::Mul(hz, inverse), hn::Set(d, 1e-6f));
@@ -46,7 +52,8 @@ void EvaluateTerms(const Terms& b, const float* x, const float* y, const float* 
     if (b.kind == Terms::Kind::ward) {
       const auto hz2 = hn::Mul(hz, hz), slopes = hn::Div(hn::MulAdd(ax, ax, hn::Mul(ay, ay)), hz2);
       const auto bell = hn::Exp(d, hn::Max(hn::Neg(slopes), hn::Set(d, -80.0f)));
-      const auto below = hn::Mul(hn::Mul(hn::Set(d, 4 * pi * b.alpha.x * b.alpha.y), hn::Mul(cosine, cosine)), hn::Mul(hz2, hz2));
+      const auto below =
+          hn::Mul(hn::Mul(hn::Set(d, 4 * pi * b.alpha.x * b.alpha.y), hn::Mul(cosine, cosine)), hn::Mul(hz2, hz2));
       hn::StoreU(hn::IfThenElseZero(above, hn::Div(bell, below)), d, out + i);
       continue;
     }
@@ -56,9 +63,11 @@ void EvaluateTerms(const Terms& b, const float* x, const float* y, const float* 
       return hn::Mul(hn::Set(d, 0.5f), hn::Sqrt(hn::MulAdd(sx, sx, hn::MulAdd(sy, sy, hn::Mul(pz, pz)))));
     };
     const auto s = hn::MulAdd(ax, ax, hn::MulAdd(ay, ay, hn::Mul(hz, hz)));
-    const auto root_i = half_root(wx, wy, wz), root_o = half_root(hn::Set(d, b.wo.x), hn::Set(d, b.wo.y), hn::Set(d, b.wo.z));
+    const auto root_i = half_root(wx, wy, wz),
+               root_o = half_root(hn::Set(d, b.wo.x), hn::Set(d, b.wo.y), hn::Set(d, b.wo.z));
     const auto masking = hn::MulAdd(hn::Set(d, b.wo.z), root_i, hn::Mul(wz, root_o));
-    const auto lobe = hn::IfThenElseZero(above, hn::Div(hn::Set(d, 1 / (4 * pi * b.alpha.x * b.alpha.y)), hn::Mul(hn::Mul(s, s), masking)));
+    const auto lobe = hn::IfThenElseZero(
+        above, hn::Div(hn::Set(d, 1 / (4 * pi * b.alpha.x * b.alpha.y)), hn::Mul(hn::Mul(s, s), masking)));
     const auto q = hn::Max(hn::Sub(one, cosine), zero), q2 = hn::Mul(q, q), schlick = hn::Mul(hn::Mul(q2, q2), q);
     hn::StoreU(hn::Mul(lobe, hn::Sub(one, schlick)), d, out + i);
     hn::StoreU(hn::Mul(lobe, schlick), d, out + stride + i);
@@ -66,8 +75,8 @@ void EvaluateTerms(const Terms& b, const float* x, const float* y, const float* 
   }
 }
 
-// For one block, [direction x, y, z, energy r, g, b][256]: adds the irradiance weighted by `weight` to sums[0] if `plain`, and that
-// times s_k to sums[1 + k]. terms is [k][256]. Only texels of `rows` are looked at.
+// For one block, [direction x, y, z, energy r, g, b][256]: adds the irradiance weighted by `weight` to sums[0] if
+// `plain`, and that times s_k to sums[1 + k]. terms is [k][256]. Only texels of `rows` are looked at.
 template <int count, bool plain, bool weighted>
 void IntegrateRows(const float* light, const float* weight, Vec3 n, const float* terms, uint32_t rows, Vec3* sums) {
   const F d;
@@ -82,12 +91,14 @@ void IntegrateRows(const float* light, const float* weight, Vec3 n, const float*
       const size_t begin = size_t(std::countr_zero(rows)) * block_side;
       for (size_t i = begin; i < begin + block_side; i += hn::Lanes(d)) {
         const float* l = light + i;
-        auto cosine = hn::MulAdd(nx, hn::Load(d, l), hn::MulAdd(ny, hn::Load(d, l + 256), hn::Mul(nz, hn::Load(d, l + 512))));
+        auto cosine =
+            hn::MulAdd(nx, hn::Load(d, l), hn::MulAdd(ny, hn::Load(d, l + 256), hn::Mul(nz, hn::Load(d, l + 512))));
         if constexpr (weighted) cosine = hn::Mul(cosine, hn::Load(d, weight + i));
         const auto r = hn::Load(d, l + 768), g = hn::Load(d, l + 1024), b = hn::Load(d, l + 1280);
         for (int k = 0; k < kinds; ++k) {
           const auto f = k < count ? hn::Mul(cosine, hn::Load(d, terms + 256 * k + i)) : cosine;
-          acc[k][0] = hn::MulAdd(f, r, acc[k][0]), acc[k][1] = hn::MulAdd(f, g, acc[k][1]), acc[k][2] = hn::MulAdd(f, b, acc[k][2]);
+          acc[k][0] = hn::MulAdd(f, r, acc[k][0]), acc[k][1] = hn::MulAdd(f, g, acc[k][1]),
+          acc[k][2] = hn::MulAdd(f, b, acc[k][2]);
         }
       }
     }
@@ -97,7 +108,8 @@ void IntegrateRows(const float* light, const float* weight, Vec3 n, const float*
 }
 
 template <int count>
-void IntegrateCount(const float* light, const float* weight, Vec3 n, const float* terms, bool plain, uint32_t rows, Vec3* sums) {
+void IntegrateCount(const float* light, const float* weight, Vec3 n, const float* terms, bool plain, uint32_t rows,
+                    Vec3* sums) {
   if (plain && weight) IntegrateRows<count, true, true>(light, weight, n, terms, rows, sums);
   else if (plain) IntegrateRows<count, true, false>(light, weight, n, terms, rows, sums);
   else if (weight) IntegrateRows<count, false, true>(light, weight, n, terms, rows, sums);
@@ -105,7 +117,8 @@ void IntegrateCount(const float* light, const float* weight, Vec3 n, const float
 }
 
 // `weight` null: 1.
-void IntegrateTexels(const float* light, const float* weight, Vec3 n, const float* terms, int count, bool plain, uint32_t rows, Vec3* sums) {
+void IntegrateTexels(const float* light, const float* weight, Vec3 n, const float* terms, int count, bool plain,
+                     uint32_t rows, Vec3* sums) {
   if (count == 0) IntegrateCount<0>(light, weight, n, terms, plain, rows, sums);
   else if (count == 1) IntegrateCount<1>(light, weight, n, terms, plain, rows, sums);
   else if (count == 2) IntegrateCount<2>(light, weight, n, terms, plain, rows, sums);
@@ -123,7 +136,8 @@ void InterpolateTerms(const float* nodes, const float* cardinal, int side, int c
         for (int i = 0; i < side; ++i) along[i] += nodes[16 * k + j * side + i] * cardinal[j * block_side + row];
       for (int x = 0; x < block_side; x += int(hn::Lanes(d))) {
         auto value = hn::Mul(hn::Set(d, along[0]), hn::LoadU(d, cardinal + x));
-        for (int i = 1; i < side; ++i) value = hn::MulAdd(hn::Set(d, along[i]), hn::LoadU(d, cardinal + i * block_side + x), value);
+        for (int i = 1; i < side; ++i)
+          value = hn::MulAdd(hn::Set(d, along[i]), hn::LoadU(d, cardinal + i * block_side + x), value);
         hn::Store(value, d, out + 256 * k + block_side * row + x);
       }
     }
@@ -192,16 +206,19 @@ Terms make_terms(const Brdf& brdf, const Mat3& frame, Vec3 wo_world) {
   return t;
 }
 
-void evaluate_terms(const Terms& t, const float* x, const float* y, const float* z, size_t count, float* out, size_t stride) {
+void evaluate_terms(const Terms& t, const float* x, const float* y, const float* z, size_t count, float* out,
+                    size_t stride) {
   if (t.kind == Terms::Kind::none) return;
   if (t.kind != Terms::Kind::other) return HWY_DYNAMIC_DISPATCH(EvaluateTerms)(t, x, y, z, count, out, stride);
   for (size_t i = 0; i < count; ++i) {
-    const Vec3 w(x[i], y[i], z[i]), f = evaluate(*t.brdf, Vec3(glm::dot(t.frame[0], w), glm::dot(t.frame[1], w), glm::dot(t.frame[2], w)), t.wo);
+    const Vec3 w(x[i], y[i], z[i]),
+        f = evaluate(*t.brdf, Vec3(glm::dot(t.frame[0], w), glm::dot(t.frame[1], w), glm::dot(t.frame[2], w)), t.wo);
     for (size_t k = 0; k < 3; ++k) out[k * stride + i] = f[int(k)];
   }
 }
 
-void integrate_texels(const float* light, const float* weight, Vec3 n, const float* terms, int count, bool plain, uint32_t rows, Vec3* sums) {
+void integrate_texels(const float* light, const float* weight, Vec3 n, const float* terms, int count, bool plain,
+                      uint32_t rows, Vec3* sums) {
   HWY_DYNAMIC_DISPATCH(IntegrateTexels)(light, weight, n, terms, count, plain, rows, sums);
 }
 
@@ -209,7 +226,9 @@ void interpolate_terms(const float* nodes, const float* cardinal, int side, int 
   HWY_DYNAMIC_DISPATCH(InterpolateTerms)(nodes, cardinal, side, count, rows, out);
 }
 
-void sum_seen(const float* sums, const BlockChanges& changes, float scale, float* out) { HWY_DYNAMIC_DISPATCH(SumSeen)(sums, changes, scale, out); }
+void sum_seen(const float* sums, const BlockChanges& changes, float scale, float* out) {
+  HWY_DYNAMIC_DISPATCH(SumSeen)(sums, changes, scale, out);
+}
 
 }  // namespace lambent
 #endif

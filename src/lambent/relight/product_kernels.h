@@ -1,5 +1,6 @@
 #pragma once
-// What products do to a block of texels, in SIMD lanes chosen at run time. Source: locally-adaptive-products, section 4.
+// What products do to a block of texels, in SIMD lanes chosen at run time. Source: locally-adaptive-products,
+// section 4.
 #include <lambent/relight/products.h>
 
 namespace lambent {
@@ -25,10 +26,13 @@ inline Vec2 widths(Vec2 alpha) { return glm::max(alpha, Vec2(min_alpha)); }
 Terms make_terms(const Brdf& brdf, const Mat3& frame, Vec3 wo_world);
 
 // s_k for `count` directions, padded to a multiple of 16 in all arrays; out[k] has `stride` floats.
-void evaluate_terms(const Terms& t, const float* x, const float* y, const float* z, size_t count, float* out, size_t stride);
+void evaluate_terms(const Terms& t, const float* x, const float* y, const float* z, size_t count, float* out,
+                    size_t stride);
 
-// Sums over the texels of `rows` of light times `weight` (null: 1) times each of `count` terms, and times the cosine with n; or, `plain`, as they are.
-void integrate_texels(const float* light, const float* weight, Vec3 n, const float* terms, int count, bool plain, uint32_t rows, Vec3* sums);
+// Sums over the texels of `rows` of light times `weight` (null: 1) times each of `count` terms, and times the cosine
+// with n; or, `plain`, as they are.
+void integrate_texels(const float* light, const float* weight, Vec3 n, const float* terms, int count, bool plain,
+                      uint32_t rows, Vec3* sums);
 
 // s_k at the texels of `rows` from its values at side x side nodes, [k][16]; out is [k][256].
 void interpolate_terms(const float* nodes, const float* cardinal, int side, int count, uint32_t rows, float* out);

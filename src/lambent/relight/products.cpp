@@ -10,25 +10,31 @@
 namespace lambent {
 namespace {
 
-Vec3 contract(const float* m, Vec3 n) { return n.x * Vec3(m[0], m[1], m[2]) + n.y * Vec3(m[4], m[5], m[6]) + n.z * Vec3(m[8], m[9], m[10]); }
+Vec3 contract(const float* m, Vec3 n) {
+  return n.x * Vec3(m[0], m[1], m[2]) + n.y * Vec3(m[4], m[5], m[6]) + n.z * Vec3(m[8], m[9], m[10]);
+}
 
-// Exponent of a Phong lobe as wide as the model's: half-vector slopes of width alpha turn the mirror image by twice the angle.
+// Exponent of a Phong lobe as wide as the model's: half-vector slopes of width alpha turn the mirror image by twice the
+// angle.
 float equivalent_exponent(const Brdf& brdf) {
   auto of_alpha = [](float alpha) { return 1 / (2 * alpha * alpha); };
   if (const auto* b = std::get_if<Phong>(&brdf)) return b->exponent;
   if (const auto* b = std::get_if<Ward>(&brdf)) return of_alpha(std::min(widths(b->alpha).x, widths(b->alpha).y));
   if (const auto* b = std::get_if<Ggx>(&brdf)) return of_alpha(std::min(widths(b->alpha).x, widths(b->alpha).y));
   if (const auto* b = std::get_if<CookTorrance>(&brdf)) return of_alpha(widths(Vec2(b->m)).x);
-  if (const auto* b = std::get_if<MetallicRoughness>(&brdf)) return of_alpha(widths(Vec2(b->roughness * b->roughness)).x);
+  if (const auto* b = std::get_if<MetallicRoughness>(&brdf))
+    return of_alpha(widths(Vec2(b->roughness * b->roughness)).x);
   return 0;
 }
 
-// Largest error over a block, whose middle is `angle` from a Phong lobe's axis, of no sample, 1, 4 and 16: numerically, on a flat block.
+// Largest error over a block, whose middle is `angle` from a Phong lobe's axis, of no sample, 1, 4 and 16: numerically,
+// on a flat block.
 std::array<float, 4> phong_errors(float exponent, float angle, float half_width, const Cube& cube) {
   std::array<float, 4> errors{};
   for (float turn : {0.0f, pi / 4}) {
     auto lobe = [&](float x, float y) {
-      const float u = x * std::cos(turn) - y * std::sin(turn) + angle, v = x * std::sin(turn) + y * std::cos(turn), theta = std::sqrt(u * u + v * v);
+      const float u = x * std::cos(turn) - y * std::sin(turn) + angle, v = x * std::sin(turn) + y * std::cos(turn),
+                  theta = std::sqrt(u * u + v * v);
       return theta < pi / 2 ? std::pow(std::cos(theta), exponent) * (exponent + 2) / (2 * pi) : 0.0f;
     };
     auto place = [&](float texel) { return (texel / 8 - 1) * half_width; };
@@ -36,7 +42,8 @@ std::array<float, 4> phong_errors(float exponent, float angle, float half_width,
     for (int k = 0; k < 3; ++k)
       for (int i = 0; i < node_sides[k] * node_sides[k]; ++i) {
         const float step = 16.0f / float(node_sides[k]);
-        nodes[k][i] = lobe(place((float(i % node_sides[k]) + 0.5f) * step), place((float(i / node_sides[k]) + 0.5f) * step));
+        nodes[k][i] =
+            lobe(place((float(i % node_sides[k]) + 0.5f) * step), place((float(i / node_sides[k]) + 0.5f) * step));
       }
     for (int y = 0; y < 16; ++y)
       for (int x = 0; x < 16; ++x) {
@@ -45,7 +52,9 @@ std::array<float, 4> phong_errors(float exponent, float angle, float half_width,
         for (int k = 0; k < 3; ++k) {
           float sum = 0;
           const int n = node_sides[k];
-          for (int i = 0; i < n * n; ++i) sum += nodes[k][i] * cube.cardinal[size_t(k)][size_t(i % n * 16 + x)] * cube.cardinal[size_t(k)][size_t(i / n * 16 + y)];
+          for (int i = 0; i < n * n; ++i)
+            sum += nodes[k][i] * cube.cardinal[size_t(k)][size_t(i % n * 16 + x)] *
+                   cube.cardinal[size_t(k)][size_t(i / n * 16 + y)];
           errors[size_t(k + 1)] = std::max(errors[size_t(k + 1)], std::abs(sum - truth));
         }
       }
@@ -65,7 +74,8 @@ uint32_t rows_seen(const BlockChanges& c) {
   uint32_t rows = 0;
   for (int i = 0; i < c.count; ++i) {
     if (c.level_after(i) == 0) continue;
-    const int first = c.where[i] / block_side, last = ((i + 1 < c.count ? c.where[i + 1] : block_texels) - 1) / block_side;
+    const int first = c.where[i] / block_side,
+              last = ((i + 1 < c.count ? c.where[i + 1] : block_texels) - 1) / block_side;
     rows |= (2u << last) - (1u << first);
   }
   return rows;
@@ -97,15 +107,18 @@ Vec3 total(const Terms& t, const Vec3* sums) {
   return out;
 }
 
-// 0 for none, 1 to 4 for 1, 4, 16, 256 samples, for a block whose middle is at this cosine from the mirror image of the view.
+// 0 for none, 1 to 4 for 1, 4, 16, 256 samples, for a block whose middle is at this cosine from the mirror image of the
+// view.
 int sample_class(const ProductMaterial& m, float cosine) {
   int k = 0;
   while (k < 4 && cosine > m.cosines[size_t(k)]) ++k;
   return k;
 }
 
-// The same from values at 16 nodes and the middle: 1 sample where they are alike, 16 where those give the middle's value back, else 256.
-int class_by_values(const Terms& t, const ProductMaterial& m, const Cube& cube, const float* nodes, const float* middle, size_t stride) {
+// The same from values at 16 nodes and the middle: 1 sample where they are alike, 16 where those give the middle's
+// value back, else 256.
+int class_by_values(const Terms& t, const ProductMaterial& m, const Cube& cube, const float* nodes, const float* middle,
+                    size_t stride) {
   float least = INFINITY, most = 0, centre = 0, back = 0;
   const std::vector<float>& c = cube.cardinal[2];
   for (int i = 0; i < 16; ++i) {
@@ -113,7 +126,8 @@ int class_by_values(const Terms& t, const ProductMaterial& m, const Cube& cube, 
     for (int k = 0; k < t.count; ++k) value += largest(t.colour[k]) * nodes[16 * k + i];
     least = std::min(least, value), most = std::max(most, value);
     // Halfway between texels 7 and 8, along both sides.
-    back += value * 0.5f * (c[size_t(i % 4 * 16 + 7)] + c[size_t(i % 4 * 16 + 8)]) * 0.5f * (c[size_t(i / 4 * 16 + 7)] + c[size_t(i / 4 * 16 + 8)]);
+    back += value * 0.5f * (c[size_t(i % 4 * 16 + 7)] + c[size_t(i % 4 * 16 + 8)]) * 0.5f *
+            (c[size_t(i / 4 * 16 + 7)] + c[size_t(i / 4 * 16 + 8)]);
   }
   for (int k = 0; k < t.count; ++k) centre += largest(t.colour[k]) * middle[size_t(k) * stride];
   least = std::min(least, centre), most = std::max(most, centre);
@@ -121,8 +135,8 @@ int class_by_values(const Terms& t, const ProductMaterial& m, const Cube& cube, 
   return pi * std::abs(back - centre) < 0.25f * m.tolerance && most < 2 * least ? 3 : 4;
 }
 
-Vec3 shade_blocks_with(Scratch& s, const BlockLight& light, const Visibility& visibility, size_t receiver, const ProductMaterial& material, const Mat3& frame,
-                       Vec3 wo, Breakdown& tally) {
+Vec3 shade_blocks_with(Scratch& s, const BlockLight& light, const Visibility& visibility, size_t receiver,
+                       const ProductMaterial& material, const Mat3& frame, Vec3 wo, Breakdown& tally) {
   const Terms t = make_terms(material.brdf, frame, wo);
   if (!(t.wo.z > least_cosine)) return Vec3(0);
   const Cube& cube = *light.cube;
@@ -131,7 +145,8 @@ Vec3 shade_blocks_with(Scratch& s, const BlockLight& light, const Visibility& vi
   const float scale = 1 / float(visibility.top());
   if (t.count > 0) {
     s.middles.resize(3 * stride);
-    evaluate_terms(t, cube.nodes[0].x.data(), cube.nodes[0].y.data(), cube.nodes[0].z.data(), stride, s.middles.data(), stride);
+    evaluate_terms(t, cube.nodes[0].x.data(), cube.nodes[0].y.data(), cube.nodes[0].z.data(), stride, s.middles.data(),
+                   stride);
   }
   Vec3 sums[4] = {};
   VisibilityReader reader(visibility, receiver);
@@ -156,13 +171,16 @@ Vec3 shade_blocks_with(Scratch& s, const BlockLight& light, const Visibility& vi
     if (t.count > 0) {
       samples = sample_class(material, glm::dot(t.mirror, cube.nodes[0].at(b)));
       if (material.by_values && samples < 4) {
-        evaluate_terms(t, &cube.nodes[2].x[16 * b], &cube.nodes[2].y[16 * b], &cube.nodes[2].z[16 * b], 16, s.nodes, 16);
+        evaluate_terms(t, &cube.nodes[2].x[16 * b], &cube.nodes[2].y[16 * b], &cube.nodes[2].z[16 * b], 16, s.nodes,
+                       16);
         samples = class_by_values(t, material, cube, s.nodes, &s.middles[b], stride);
       }
       // Samples below the horizon say nothing about the block's part above it.
       if (!clear && t.kind != Terms::Kind::phong && samples == 1 && glm::dot(n, cube.nodes[0].at(b)) <= 0) samples = 4;
       // Nor do nodes below it, where the model's values break off.
-      if (!clear && t.kind != Terms::Kind::phong && samples > 1 && glm::dot(n, cube.nodes[0].at(b)) < std::sin(cube.reach[b])) samples = 4;
+      if (!clear && t.kind != Terms::Kind::phong && samples > 1 &&
+          glm::dot(n, cube.nodes[0].at(b)) < std::sin(cube.reach[b]))
+        samples = 4;
     }
     if (samples == 1) {
       for (int k = 0; k < t.count; ++k) sums[k + 1] += s.middles[size_t(k) * stride + b] * seen;
@@ -200,8 +218,8 @@ Vec3 shade_blocks_with(Scratch& s, const BlockLight& light, const Visibility& vi
   return total(t, sums);
 }
 
-Vec3 shade_standard_with(Scratch& s, const BlockLight& light, const Visibility& visibility, size_t receiver, const ProductMaterial& material, const Mat3& frame,
-                         Vec3 wo) {
+Vec3 shade_standard_with(Scratch& s, const BlockLight& light, const Visibility& visibility, size_t receiver,
+                         const ProductMaterial& material, const Mat3& frame, Vec3 wo) {
   const Terms t = make_terms(material.brdf, frame, wo);
   if (!(t.wo.z > least_cosine)) return Vec3(0);
   const float scale = 1 / float(visibility.top());
@@ -225,7 +243,8 @@ void set_light(BlockLight& out, const CubeLight& light) {
   if (!out.cube || out.cube->size != light.size) out.cube = std::make_shared<const Cube>(make_cube(light.size));
   const Cube& cube = *out.cube;
   const size_t blocks = size_t(cube.blocks());
-  out.texels.resize(blocks * 6 * block_texels), out.sums.resize(blocks * block_texels * sum_width), out.coarse.resize(blocks * coarse_each * sum_width);
+  out.texels.resize(blocks * 6 * block_texels), out.sums.resize(blocks * block_texels * sum_width),
+      out.coarse.resize(blocks * coarse_each * sum_width);
   parallel_for(blocks, 8, [&](size_t begin, size_t end) {
     for (size_t b = begin; b < end; ++b) {
       float* texels = out.texels.data() + b * 6 * block_texels;
@@ -268,7 +287,8 @@ ProductMaterial make_product_material(const Brdf& brdf, const Cube& cube, const 
     if (exponent < 30) m.cosines = {-2, exponent > 0 ? wide : 2, 2, 2};
     else m.cosines = {-2, wide, narrow, exponent > 250 ? narrow : 2};
   } else if (phong) {
-    // From the far side on, the first angle at which the error is too large; twice the tolerance, since this is the worst of the block.
+    // From the far side on, the first angle at which the error is too large; twice the tolerance, since this is the
+    // worst of the block.
     constexpr int steps = 90;
     m.cosines = {2, 2, 2, 2};
     const float half_width = cube.widest / std::sqrt(2.0f), weight = pi * largest(phong->specular);
@@ -276,7 +296,8 @@ ProductMaterial make_product_material(const Brdf& brdf, const Cube& cube, const 
       const float angle = float(i) * pi / steps;
       const std::array<float, 4> errors = phong_errors(phong->exponent, angle, half_width, cube);
       for (size_t k = 0; k < 4; ++k)
-        if (m.cosines[k] > 1 && weight * errors[k] > 2 * sampling.tolerance) m.cosines[k] = std::cos(std::min(pi, angle + pi / steps)) - 1e-6f;
+        if (m.cosines[k] > 1 && weight * errors[k] > 2 * sampling.tolerance)
+          m.cosines[k] = std::cos(std::min(pi, angle + pi / steps)) - 1e-6f;
     }
     // More samples are never wrong: the classes are nested.
     for (size_t k = 3; k > 0; --k) m.cosines[k - 1] = std::min(m.cosines[k - 1], m.cosines[k]);
@@ -303,8 +324,8 @@ void Breakdown::add(const Breakdown& b) {
   for (size_t k = 0; k < 4; ++k) samples[k] += b.samples[k];
 }
 
-Vec3 shade_blocks(const BlockLight& light, const Visibility& visibility, size_t receiver, const ProductMaterial& material, const Mat3& frame, Vec3 wo,
-                  Breakdown* breakdown) {
+Vec3 shade_blocks(const BlockLight& light, const Visibility& visibility, size_t receiver,
+                  const ProductMaterial& material, const Mat3& frame, Vec3 wo, Breakdown* breakdown) {
   Scratch s;
   Breakdown tally;
   const Vec3 out = shade_blocks_with(s, light, visibility, receiver, material, frame, wo, tally);
@@ -312,12 +333,14 @@ Vec3 shade_blocks(const BlockLight& light, const Visibility& visibility, size_t 
   return out;
 }
 
-Vec3 shade_standard(const BlockLight& light, const Visibility& visibility, size_t receiver, const ProductMaterial& material, const Mat3& frame, Vec3 wo) {
+Vec3 shade_standard(const BlockLight& light, const Visibility& visibility, size_t receiver,
+                    const ProductMaterial& material, const Mat3& frame, Vec3 wo) {
   Scratch s;
   return shade_standard_with(s, light, visibility, receiver, material, frame, wo);
 }
 
-Vec3 shade_standard_scalar(const BlockLight& light, const Visibility& visibility, size_t receiver, const ProductMaterial& material, const Mat3& frame, Vec3 wo) {
+Vec3 shade_standard_scalar(const BlockLight& light, const Visibility& visibility, size_t receiver,
+                           const ProductMaterial& material, const Mat3& frame, Vec3 wo) {
   const size_t count = light.cube->count();
   std::vector<uint8_t> levels(count);
   decode_visibility(visibility, receiver, levels);
@@ -327,7 +350,8 @@ Vec3 shade_standard_scalar(const BlockLight& light, const Visibility& visibility
   for (size_t t = 0; t < count; ++t) {
     const float* p = light.texels.data() + t / block_texels * 6 * block_texels + t % block_texels;
     const Vec3 wi = local(Vec3(p[0], p[256], p[512]));
-    sum += glm::dvec3(evaluate(material.brdf, wi, view) * Vec3(p[768], p[1024], p[1280]) * (wi.z * float(levels[t]) / float(visibility.top())));
+    sum += glm::dvec3(evaluate(material.brdf, wi, view) * Vec3(p[768], p[1024], p[1280]) *
+                      (wi.z * float(levels[t]) / float(visibility.top())));
   }
   return Vec3(sum);
 }
@@ -342,7 +366,8 @@ HaarLight make_haar_light(const CubeLight& light, double fraction, int visibilit
     for (int f = 0; f < 6; ++f) {
       // Of area 1: the integral is the sum of energies.
       for (int y = 0; y < size; ++y)
-        for (int x = 0; x < size; ++x) face[size_t(y * size + x)] = light.energy[cube_texel(size, f, x, y)][c] * float(size) * float(size);
+        for (int x = 0; x < size; ++x)
+          face[size_t(y * size + x)] = light.energy[cube_texel(size, f, x, y)][c] * float(size) * float(size);
       haar_transform(levels, face, out.trees[size_t(c)][size_t(f)]);
     }
     keep_largest(out.trees[size_t(c)], fraction);
@@ -350,7 +375,8 @@ HaarLight make_haar_light(const CubeLight& light, double fraction, int visibilit
   return out;
 }
 
-void project_haar(const HaarLight& light, const Visibility& visibility, size_t receiver, const ProductMaterial& material, const Mat3& frame, Vec3 wo, HaarScratch& s) {
+void project_haar(const HaarLight& light, const Visibility& visibility, size_t receiver,
+                  const ProductMaterial& material, const Mat3& frame, Vec3 wo, HaarScratch& s) {
   const int size = light.cube->size, levels = std::countr_zero(unsigned(size));
   const size_t count = light.cube->count(), area = size_t(size) * size_t(size);
   s.levels.resize(count), s.faces.resize(4 * count);
@@ -368,7 +394,8 @@ void project_haar(const HaarLight& light, const Visibility& visibility, size_t r
   for (size_t c = 0; c < 4; ++c) {
     std::vector<HaarTree>& trees = c < 3 ? s.brdf[c] : s.visibility;
     trees.resize(6);
-    for (size_t f = 0; f < 6; ++f) haar_transform(levels, std::span<const float>(s.faces).subspan(c * count + f * area, area), trees[f]);
+    for (size_t f = 0; f < 6; ++f)
+      haar_transform(levels, std::span<const float>(s.faces).subspan(c * count + f * area, area), trees[f]);
     if (c < 3) keep_largest(trees, light.fraction);
     else if (light.visibility_bits > 0)
       for (HaarTree& tree : trees) quantise_haar(tree, light.visibility_bits);
@@ -378,13 +405,16 @@ void project_haar(const HaarLight& light, const Visibility& visibility, size_t r
 Vec3 multiply_haar(const HaarLight& light, const HaarScratch& s, size_t* visited) {
   glm::dvec3 sum(0);
   for (size_t c = 0; c < 3; ++c)
-    for (size_t f = 0; f < 6; ++f) sum[int(c)] += haar_triple_product(light.trees[c][f], s.brdf[c][f], s.visibility[f], visited);
+    for (size_t f = 0; f < 6; ++f)
+      sum[int(c)] += haar_triple_product(light.trees[c][f], s.brdf[c][f], s.visibility[f], visited);
   return Vec3(sum);
 }
 
-void shade_receivers(Product product, const BlockLight& light, const HaarLight* haar, const Visibility& visibility, const ProductReceivers& receivers,
-                     std::span<const uint32_t> seen, Vec3 eye, Relit& out, Breakdown* breakdown) {
-  LAMBENT_CHECK(light.cube && light.cube->size == visibility.size && (product != Product::haar || haar) && receivers.positions.size() == visibility.receivers);
+void shade_receivers(Product product, const BlockLight& light, const HaarLight* haar, const Visibility& visibility,
+                     const ProductReceivers& receivers, std::span<const uint32_t> seen, Vec3 eye, Relit& out,
+                     Breakdown* breakdown) {
+  LAMBENT_CHECK(light.cube && light.cube->size == visibility.size && (product != Product::haar || haar) &&
+                receivers.positions.size() == visibility.receivers);
   out.rows = 1;
   out.values.assign((visibility.receivers + transfer_block - 1) / transfer_block * 3 * transfer_block, 0.0f);
   std::mutex mutex;

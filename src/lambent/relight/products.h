@@ -1,10 +1,11 @@
 #pragma once
-// Direct light at a vertex as the integral over all directions of light x visibility x BRDF x cosine, light, view and material all free:
-// in blocks (locally-adaptive-products, Algorithm 1), in the standard basis (every texel), and in Haar wavelets (Ng et al. 2004).
+// Direct light at a vertex as the integral over all directions of light x visibility x BRDF x cosine, light, view and
+// material all free: in blocks (locally-adaptive-products, Algorithm 1), in the standard basis (every texel), and in
+// Haar wavelets (Ng et al. 2004).
 //
-// What differs from the paper: the cosine is not folded into the BRDF. It is linear in the direction, so light is kept times each
-// coordinate of the direction, and Lambert's law costs one sample a block and has no error. The small inverses of eq. 4 are folded
-// into the light: it is kept as integrals against the cardinal functions of the samples.
+// What differs from the paper: the cosine is not folded into the BRDF. It is linear in the direction, so light is kept
+// times each coordinate of the direction, and Lambert's law costs one sample a block and has no error. The small
+// inverses of eq. 4 are folded into the light: it is kept as integrals against the cardinal functions of the samples.
 #include <lambent/basis/haar.h>
 #include <lambent/brdf/brdf.h>
 #include <lambent/light/cube_light.h>
@@ -17,7 +18,8 @@
 
 namespace lambent {
 
-// Light in its three forms for each block. M is energy x direction of a texel: x, y, z, each (r, g, b, 0), so that n . M is irradiance.
+// Light in its three forms for each block. M is energy x direction of a texel: x, y, z, each (r, g, b, 0), so that n .
+// M is irradiance.
 struct BlockLight {
   std::shared_ptr<const Cube> cube;
   AlignedVector<float> texels;  // standard: [block][direction x, y, z, energy r, g, b][256]
@@ -38,8 +40,8 @@ struct Sampling {
   float tolerance = 0.2f;
 };
 
-// A BRDF, and how near to the mirror image of the view a block has to be to get more samples: cosines of the angle between that and
-// the block's middle, for 1 sample (below it the lobe is left out), 4, 16 and 256.
+// A BRDF, and how near to the mirror image of the view a block has to be to get more samples: cosines of the angle
+// between that and the block's middle, for 1 sample (below it the lobe is left out), 4, 16 and 256.
 struct ProductMaterial {
   Brdf brdf;
   std::array<float, 4> cosines{-2, 2, 2, 2};
@@ -58,16 +60,19 @@ struct Breakdown {
   void add(const Breakdown& b);
 };
 
-// Exit radiance towards the unit direction wo, world space; `frame` has columns tangent, bitangent, normal; the normal must be the one that the
-// visibility was baked for. Nothing is seen from below the surface.
-Vec3 shade_blocks(const BlockLight& light, const Visibility& visibility, size_t receiver, const ProductMaterial& material, const Mat3& frame, Vec3 wo,
-                  Breakdown* breakdown = nullptr);
-// The same sum over every texel that is not in a blocked block, in SIMD; and over every texel, plainly, one after another.
-Vec3 shade_standard(const BlockLight& light, const Visibility& visibility, size_t receiver, const ProductMaterial& material, const Mat3& frame, Vec3 wo);
-Vec3 shade_standard_scalar(const BlockLight& light, const Visibility& visibility, size_t receiver, const ProductMaterial& material, const Mat3& frame, Vec3 wo);
+// Exit radiance towards the unit direction wo, world space; `frame` has columns tangent, bitangent, normal; the normal
+// must be the one that the visibility was baked for. Nothing is seen from below the surface.
+Vec3 shade_blocks(const BlockLight& light, const Visibility& visibility, size_t receiver,
+                  const ProductMaterial& material, const Mat3& frame, Vec3 wo, Breakdown* breakdown = nullptr);
+// The same sum over every texel that is not in a blocked block, in SIMD; and over every texel, plainly, one after
+// another.
+Vec3 shade_standard(const BlockLight& light, const Visibility& visibility, size_t receiver,
+                    const ProductMaterial& material, const Mat3& frame, Vec3 wo);
+Vec3 shade_standard_scalar(const BlockLight& light, const Visibility& visibility, size_t receiver,
+                           const ProductMaterial& material, const Mat3& frame, Vec3 wo);
 
-// Light and BRDFs in Haar wavelets on whole faces, of which `fraction` is kept; visibility in all of its own, of so many bits each (0: floats).
-// Cubes of 2^k texels a side.
+// Light and BRDFs in Haar wavelets on whole faces, of which `fraction` is kept; visibility in all of its own, of so
+// many bits each (0: floats). Cubes of 2^k texels a side.
 struct HaarLight {
   std::shared_ptr<const Cube> cube;
   double fraction = 1;
@@ -82,8 +87,10 @@ struct HaarScratch {
   std::vector<uint8_t> levels;
   std::vector<float> faces;
 };
-// The first half makes the coefficients of one vertex, which Ng et al. keep ready; the second is the triple product that they time.
-void project_haar(const HaarLight& light, const Visibility& visibility, size_t receiver, const ProductMaterial& material, const Mat3& frame, Vec3 wo, HaarScratch& scratch);
+// The first half makes the coefficients of one vertex, which Ng et al. keep ready; the second is the triple product
+// that they time.
+void project_haar(const HaarLight& light, const Visibility& visibility, size_t receiver,
+                  const ProductMaterial& material, const Mat3& frame, Vec3 wo, HaarScratch& scratch);
 Vec3 multiply_haar(const HaarLight& light, const HaarScratch& scratch, size_t* visited = nullptr);
 
 // What shading a list of receivers takes.
@@ -96,7 +103,8 @@ struct ProductReceivers {
 enum class Product { blocks, standard, haar };
 
 // Exit radiance of the receivers in `seen` towards the eye, row 0 of `out`; others are left 0. All cores.
-void shade_receivers(Product product, const BlockLight& light, const HaarLight* haar, const Visibility& visibility, const ProductReceivers& receivers,
-                     std::span<const uint32_t> seen, Vec3 eye, Relit& out, Breakdown* breakdown = nullptr);
+void shade_receivers(Product product, const BlockLight& light, const HaarLight* haar, const Visibility& visibility,
+                     const ProductReceivers& receivers, std::span<const uint32_t> seen, Vec3 eye, Relit& out,
+                     Breakdown* breakdown = nullptr);
 
 }  // namespace lambent

@@ -10,7 +10,8 @@ namespace {
 
 // A sky with no symmetry, and a sun high up that is 20,000 times as bright, or `sun` times.
 CubeLight sunny_light(int size, float sun) {
-  Environment env = make_environment("sunny", 256, 128, [](Vec3 d) { return Vec3(0.5f + 0.3f * d.y, 0.6f + 0.2f * d.x, 0.7f - 0.1f * d.z); });
+  Environment env = make_environment(
+      "sunny", 256, 128, [](Vec3 d) { return Vec3(0.5f + 0.3f * d.y, 0.6f + 0.2f * d.x, 0.7f - 0.1f * d.z); });
   env.image.at(70, 25) = sun * Vec3(1, 0.85f, 0.6f);
   return cube_light(env, size);
 }
@@ -79,7 +80,9 @@ const Brdf models[] = {Lambert{Vec3(0.8f, 0.5f, 0.2f)},
                        CookTorrance{Vec3(0.2f), Vec3(0.7f), Vec3(0.3f, 0.5f, 0.7f), 0.25f},
                        MetallicRoughness{Vec3(0.7f, 0.5f, 0.2f), 0.3f, 0.4f}};
 
-double largest_error(Vec3 value, Vec3 truth) { return glm::length(glm::dvec3(value) - glm::dvec3(truth)) / (1e-3 + glm::length(glm::dvec3(truth))); }
+double largest_error(Vec3 value, Vec3 truth) {
+  return glm::length(glm::dvec3(value) - glm::dvec3(truth)) / (1e-3 + glm::length(glm::dvec3(truth)));
+}
 
 // The SIMD forms of all models against evaluate() of brdf.h, texel by texel.
 TEST(Products, StandardInSimdIsThePlainSum) {
@@ -89,7 +92,8 @@ TEST(Products, StandardInSimdIsThePlainSum) {
       const ProductMaterial m = make_product_material(brdf, *s.light.cube, {});
       for (size_t r = 0; r < s.points.size(); ++r)
         EXPECT_LT(largest_error(shade_standard(s.light, s.visibility, r, m, s.points[r].frame, s.points[r].wo),
-                                shade_standard_scalar(s.light, s.visibility, r, m, s.points[r].frame, s.points[r].wo)), 2e-4)
+                                shade_standard_scalar(s.light, s.visibility, r, m, s.points[r].frame, s.points[r].wo)),
+                  2e-4)
             << "model " << brdf.index() << ", point " << r;
     }
   }
@@ -105,9 +109,11 @@ TEST(Products, BlocksSampledFullyAreTheStandardBasis) {
         Breakdown tally;
         for (size_t r = 0; r < s.points.size(); ++r)
           EXPECT_LT(largest_error(shade_blocks(s.light, s.visibility, r, m, s.points[r].frame, s.points[r].wo, &tally),
-                                  shade_standard(s.light, s.visibility, r, m, s.points[r].frame, s.points[r].wo)), 2e-5)
+                                  shade_standard(s.light, s.visibility, r, m, s.points[r].frame, s.points[r].wo)),
+                    2e-5)
               << "model " << brdf.index();
-        EXPECT_EQ(tally.blocked + tally.light_brdf + tally.light_visibility + tally.triple, s.points.size() * size_t(s.light.cube->blocks()));
+        EXPECT_EQ(tally.blocked + tally.light_brdf + tally.light_visibility + tally.triple,
+                  s.points.size() * size_t(s.light.cube->blocks()));
         if (brdf.index() > 0) {
           EXPECT_EQ(tally.samples[0] + tally.samples[1] + tally.samples[2], 0u);
         }
@@ -122,21 +128,25 @@ TEST(Products, DiffuseLightIsExact) {
   Breakdown tally;
   for (size_t r = 0; r < s.points.size(); ++r)
     EXPECT_LT(largest_error(shade_blocks(s.light, s.visibility, r, m, s.points[r].frame, s.points[r].wo, &tally),
-                            shade_standard_scalar(s.light, s.visibility, r, m, s.points[r].frame, s.points[r].wo)), 1e-4);
+                            shade_standard_scalar(s.light, s.visibility, r, m, s.points[r].frame, s.points[r].wo)),
+              1e-4);
   EXPECT_EQ(tally.samples[1] + tally.samples[2] + tally.samples[3], 0u);
 }
 
 double psnr(std::span<const Vec3> values, std::span<const Vec3> truth) {
   double peak = 0, sum = 0;
   for (size_t i = 0; i < truth.size(); ++i)
-    for (int c = 0; c < 3; ++c) peak = std::max(peak, double(truth[i][c])), sum += (double(values[i][c]) - double(truth[i][c])) * (double(values[i][c]) - double(truth[i][c]));
+    for (int c = 0; c < 3; ++c)
+      peak = std::max(peak, double(truth[i][c])),
+      sum += (double(values[i][c]) - double(truth[i][c])) * (double(values[i][c]) - double(truth[i][c]));
   return 10 * std::log10(peak * peak * 3 * double(truth.size()) / std::max(sum, 1e-30));
 }
 
 TEST(Products, FewSamplesAreNearTheStandardBasis) {
   const Setting s = make_setting(64, 1, 150, 14);
   for (const Brdf& brdf : models) {
-    const ProductMaterial m = make_product_material(brdf, *s.light.cube, {}), paper = make_product_material(brdf, *s.light.cube, {SamplingRule::appendix_a});
+    const ProductMaterial m = make_product_material(brdf, *s.light.cube, {}),
+                          paper = make_product_material(brdf, *s.light.cube, {SamplingRule::appendix_a});
     std::vector<Vec3> ours, theirs, truth;
     Breakdown tally, paper_tally;
     for (size_t r = 0; r < s.points.size(); ++r) {
@@ -145,20 +155,23 @@ TEST(Products, FewSamplesAreNearTheStandardBasis) {
       truth.push_back(shade_standard(s.light, s.visibility, r, m, s.points[r].frame, s.points[r].wo));
     }
     const double all = double(tally.samples[0] + tally.samples[1] + tally.samples[2] + tally.samples[3]);
-    std::printf("model %zu: %.1f dB (samples 1, 4, 16, 256: %.1f %.1f %.1f %.1f %%), appendix A %.1f dB (256: %.1f %%)\n", brdf.index(), psnr(ours, truth),
-                100 * double(tally.samples[0]) / all, 100 * double(tally.samples[1]) / all, 100 * double(tally.samples[2]) / all, 100 * double(tally.samples[3]) / all,
-                psnr(theirs, truth), 100 * double(paper_tally.samples[3]) / all);
+    std::printf(
+        "model %zu: %.1f dB (samples 1, 4, 16, 256: %.1f %.1f %.1f %.1f %%), appendix A %.1f dB (256: %.1f %%)\n",
+        brdf.index(), psnr(ours, truth), 100 * double(tally.samples[0]) / all, 100 * double(tally.samples[1]) / all,
+        100 * double(tally.samples[2]) / all, 100 * double(tally.samples[3]) / all, psnr(theirs, truth),
+        100 * double(paper_tally.samples[3]) / all);
     EXPECT_GT(psnr(ours, truth), 50) << "model " << brdf.index();
     EXPECT_LT(double(tally.samples[3]), 0.6 * all) << "model " << brdf.index();
   }
 }
 
-// Appendix A under a sky without a sun: about the 45.67 dB that the paper prints. With a sun, which finds each error of a narrow lobe between
-// 16 samples out, it has 15 dB less.
+// Appendix A under a sky without a sun: about the 45.67 dB that the paper prints. With a sun, which finds each error of
+// a narrow lobe between 16 samples out, it has 15 dB less.
 TEST(Products, AppendixAIsAsGoodAsItsPaperSaysWhereTheSkyIsEven) {
   for (float sun : {0.5f, 20000.0f}) {
     const Setting s = make_setting(64, 1, 150, 14, sun);
-    const ProductMaterial m = make_product_material(Phong{Vec3(0.3f, 0.2f, 0.1f), Vec3(0.6f), 200}, *s.light.cube, {SamplingRule::appendix_a});
+    const ProductMaterial m = make_product_material(Phong{Vec3(0.3f, 0.2f, 0.1f), Vec3(0.6f), 200}, *s.light.cube,
+                                                    {SamplingRule::appendix_a});
     std::vector<Vec3> theirs, truth;
     for (size_t r = 0; r < s.points.size(); ++r) {
       theirs.push_back(shade_blocks(s.light, s.visibility, r, m, s.points[r].frame, s.points[r].wo));
@@ -178,16 +191,20 @@ TEST(Products, MeasuredTablesAreShadedAsTheyAre) {
     for (int d = 0; d < table.theta_d; ++d)
       for (int p = 0; p < table.phi_d; ++p) {
         const HalfDifference a = cell_angles(table, h, d, p);
-        table.f.push_back(Vec3(0.2f, 0.15f, 0.1f) + std::exp(-30 * a.theta_h * a.theta_h) * Vec3(1, 1.5f, 2) * (1 + std::pow(a.theta_d, 4.0f)));
+        table.f.push_back(Vec3(0.2f, 0.15f, 0.1f) +
+                          std::exp(-30 * a.theta_h * a.theta_h) * Vec3(1, 1.5f, 2) * (1 + std::pow(a.theta_d, 4.0f)));
       }
   prepare_sampling(table);
   const Setting s = make_setting(64, 1, 40, 18);
-  const ProductMaterial m = make_product_material(Measured{std::make_shared<const MeasuredTable>(std::move(table))}, *s.light.cube, {});
+  const ProductMaterial m =
+      make_product_material(Measured{std::make_shared<const MeasuredTable>(std::move(table))}, *s.light.cube, {});
   std::vector<Vec3> ours, truth;
   for (size_t r = 0; r < s.points.size(); ++r) {
     ours.push_back(shade_blocks(s.light, s.visibility, r, m, s.points[r].frame, s.points[r].wo));
     truth.push_back(shade_standard(s.light, s.visibility, r, m, s.points[r].frame, s.points[r].wo));
-    EXPECT_LT(largest_error(truth.back(), shade_standard_scalar(s.light, s.visibility, r, m, s.points[r].frame, s.points[r].wo)), 1e-4);
+    EXPECT_LT(largest_error(truth.back(),
+                            shade_standard_scalar(s.light, s.visibility, r, m, s.points[r].frame, s.points[r].wo)),
+              1e-4);
   }
   EXPECT_GT(psnr(ours, truth), 50);
   RecordProperty("dB", std::to_string(psnr(ours, truth)));
@@ -214,13 +231,14 @@ TEST(Products, HaarWithAllCoefficientsIsTheStandardBasis) {
 // What 8 bits take from visibility is little beside what a hundredth of light and BRDF does.
 TEST(Products, HaarVisibilityOfEightBitsIsNear) {
   const Setting s = make_setting(64, 1, 60, 17);
-  const HaarLight floats = make_haar_light(s.cube_light, 1, 0), bytes = make_haar_light(s.cube_light, 1), crumbs = make_haar_light(s.cube_light, 1, 2),
-                  some = make_haar_light(s.cube_light, 0.01, 0);
+  const HaarLight floats = make_haar_light(s.cube_light, 1, 0), bytes = make_haar_light(s.cube_light, 1),
+                  crumbs = make_haar_light(s.cube_light, 1, 2), some = make_haar_light(s.cube_light, 0.01, 0);
   const ProductMaterial m = make_product_material(Phong{Vec3(0.3f), Vec3(0.4f), 20}, *s.light.cube, {});
   HaarScratch scratch;
   std::vector<Vec3> of_floats, of_bytes, of_crumbs, of_some;
   for (size_t r = 0; r < s.points.size(); ++r)
-    for (const auto& [light, out] : {std::pair{&floats, &of_floats}, {&bytes, &of_bytes}, {&crumbs, &of_crumbs}, {&some, &of_some}}) {
+    for (const auto& [light, out] :
+         {std::pair{&floats, &of_floats}, {&bytes, &of_bytes}, {&crumbs, &of_crumbs}, {&some, &of_some}}) {
       project_haar(*light, s.visibility, r, m, s.points[r].frame, s.points[r].wo, scratch);
       out->push_back(multiply_haar(*light, scratch));
     }
@@ -233,7 +251,8 @@ TEST(Products, HaarVisibilityOfEightBitsIsNear) {
 
 // Within 0.1 %, whatever the environment.
 TEST(Products, AWhitePlaneShowsItsIrradiance) {
-  Environment env = make_environment("sunny", 512, 256, [](Vec3 d) { return Vec3(1 + d.y, 1 + 0.5f * d.x, 1 - 0.3f * d.z); });
+  Environment env =
+      make_environment("sunny", 512, 256, [](Vec3 d) { return Vec3(1 + d.y, 1 + 0.5f * d.x, 1 - 0.3f * d.z); });
   env.image.at(100, 60) = Vec3(90000, 80000, 70000);
   BlockLight light;
   set_light(light, cube_light(env, 64));

@@ -20,8 +20,9 @@ inline auto LoadValues(const F d, const hwy::float16_t* p) {
   return hn::PromoteTo(d, hn::LoadU(hn::Rebind<hwy::float16_t, F>(), p));
 }
 
-// light is [channel][column]. A sum is kept in registers while its columns stream by, in memory order: reading several channels
-// at once would confuse the hardware's prefetching. Even and odd columns are summed apart, to hide the latency of adding.
+// light is [channel][column]. A sum is kept in registers while its columns stream by, in memory order: reading several
+// channels at once would confuse the hardware's prefetching. Even and odd columns are summed apart, to hide the latency
+// of adding.
 template <class Value>
 void RelightGrey(const Value* t, size_t pieces, size_t columns, const float* light, float* out) {
   const F d;

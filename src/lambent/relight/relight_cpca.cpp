@@ -1,4 +1,5 @@
-// Follows: general-prt, "Clustered PCA": light times the clusters' vectors once a frame, then `rank` products a row and receiver.
+// Follows: general-prt, "Clustered PCA": light times the clusters' vectors once a frame, then `rank` products a row and
+// receiver.
 #include <lambent/core/check.h>
 #include <lambent/core/half.h>
 #include <lambent/core/parallel.h>
@@ -15,9 +16,10 @@ namespace lambent {
 namespace HWY_NAMESPACE {
 namespace hn = hwy::HWY_NAMESPACE;
 
-// lit is [cluster][1 + rank][padded]; receivers [first, first + count) of one block of the output, which is [value][transfer_block].
-// `own` holds transfer_block x padded floats.
-void RelightBlock(const CpcaTransfer& t, const float* lit, size_t padded, size_t first, size_t count, float* own, float* out) {
+// lit is [cluster][1 + rank][padded]; receivers [first, first + count) of one block of the output, which is
+// [value][transfer_block]. `own` holds transfer_block x padded floats.
+void RelightBlock(const CpcaTransfer& t, const float* lit, size_t padded, size_t first, size_t count, float* own,
+                  float* out) {
   const hn::CappedTag<float, 16> d;
   const size_t rank = size_t(t.rank), each = 3 * size_t(t.rows), N = hn::Lanes(d);
   std::fill(own + count * padded, own + transfer_block * padded, 0.0f);
@@ -54,8 +56,10 @@ void RelightBlock(const CpcaTransfer& t, const float* lit, size_t padded, size_t
   for (size_t e = 0; e < each; e += 4)
     for (size_t i = 0; i < transfer_block; i += 4) {
       const float* p = own + i * padded + e;
-      const auto a = hn::Load(d4, p), b = hn::Load(d4, p + padded), c = hn::Load(d4, p + 2 * padded), f = hn::Load(d4, p + 3 * padded);
-      const auto ac0 = hn::InterleaveLower(d4, a, c), bf0 = hn::InterleaveLower(d4, b, f), ac1 = hn::InterleaveUpper(d4, a, c), bf1 = hn::InterleaveUpper(d4, b, f);
+      const auto a = hn::Load(d4, p), b = hn::Load(d4, p + padded), c = hn::Load(d4, p + 2 * padded),
+                 f = hn::Load(d4, p + 3 * padded);
+      const auto ac0 = hn::InterleaveLower(d4, a, c), bf0 = hn::InterleaveLower(d4, b, f),
+                 ac1 = hn::InterleaveUpper(d4, a, c), bf1 = hn::InterleaveUpper(d4, b, f);
       float* q = out + e * transfer_block + i;
       hn::Stream(hn::InterleaveLower(d4, ac0, bf0), d4, q);
       if (e + 1 < each) hn::Stream(hn::InterleaveUpper(d4, ac0, bf0), d4, q + transfer_block);
@@ -85,7 +89,8 @@ void LightVector(const float* v, size_t rows, size_t channels, size_t C, const f
       g = hn::MulAdd(hn::MaskedLoad(rest, d, vg + k), hn::MaskedLoad(rest, d, light + C + k), g);
       b = hn::MulAdd(hn::MaskedLoad(rest, d, vb + k), hn::MaskedLoad(rest, d, light + 2 * C + k), b);
     }
-    out[3 * row] = hn::GetLane(hn::SumOfLanes(d, r)), out[3 * row + 1] = hn::GetLane(hn::SumOfLanes(d, g)), out[3 * row + 2] = hn::GetLane(hn::SumOfLanes(d, b));
+    out[3 * row] = hn::GetLane(hn::SumOfLanes(d, r)), out[3 * row + 1] = hn::GetLane(hn::SumOfLanes(d, g)),
+            out[3 * row + 2] = hn::GetLane(hn::SumOfLanes(d, b));
   }
 }
 
@@ -113,13 +118,16 @@ void relight(const CpcaTransfer& t, std::span<const Vec3> light, Relit& out) {
     for (size_t k = 0; k < C; ++k) by_channel[c * C + k] = light[k][int(c)];
   parallel_for(size_t(t.clusters) * (1 + rank), 64, [&](size_t begin, size_t end) {
     for (size_t v = begin; v < end; ++v)
-      HWY_DYNAMIC_DISPATCH(LightVector)(t.vectors.data() + v * rows * channels * C, rows, channels, C, by_channel.data(), out.scratch.data() + v * padded);
+      HWY_DYNAMIC_DISPATCH(LightVector)
+      (t.vectors.data() + v * rows * channels * C, rows, channels, C, by_channel.data(),
+       out.scratch.data() + v * padded);
   });
   parallel_for(blocks, 64, [&](size_t begin, size_t end) {
     AlignedVector<float> own(transfer_block * padded);
     for (size_t b = begin; b < end; ++b)
-      HWY_DYNAMIC_DISPATCH(RelightBlock)(t, out.scratch.data(), padded, b * transfer_block, std::min(transfer_block, t.receivers - b * transfer_block), own.data(),
-                                         out.values.data() + b * rows * 3 * transfer_block);
+      HWY_DYNAMIC_DISPATCH(RelightBlock)
+      (t, out.scratch.data(), padded, b * transfer_block, std::min(transfer_block, t.receivers - b * transfer_block),
+       own.data(), out.values.data() + b * rows * 3 * transfer_block);
   });
 }
 

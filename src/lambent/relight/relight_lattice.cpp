@@ -10,7 +10,8 @@ void interpolate_lattice(const Lattice& lattice, const Relit& relit, Vec3 positi
   float share[3];
   for (int k = 0; k < 3; ++k) {
     const float extent = lattice.max[k] - lattice.min[k];
-    const float t = extent > 0 ? std::clamp((position[k] - lattice.min[k]) / extent, 0.0f, 1.0f) * float(n[k] - 1) : 0.0f;
+    const float t = extent > 0 ? std::clamp((position[k] - lattice.min[k]) / extent, 0.0f, 1.0f) * float(n[k] - 1)
+                               : 0.0f;
     cell[k] = std::clamp(int(t), 0, std::max(0, n[k] - 2));
     share[k] = t - float(cell[k]);
   }

@@ -1,5 +1,6 @@
-// Follows: local-deformable-prt, sections 3.2 and 5. A block's 16 receivers go side by side where their axes are concerned. Table look-ups
-// go one receiver at a time, but a texel's 16 numbers (four bands of three colours) are one or a few vectors.
+// Follows: local-deformable-prt, sections 3.2 and 5. A block's 16 receivers go side by side where their axes are
+// concerned. Table look-ups go one receiver at a time, but a texel's 16 numbers (four bands of three colours) are one
+// or a few vectors.
 #include <lambent/basis/sh_tables.h>
 #include <lambent/core/check.h>
 #include <lambent/core/parallel.h>
@@ -46,8 +47,8 @@ struct Vec {
 // What one group of lanes of a block needs.
 template <class Value>
 struct Receivers {
-  const Value* values;   // [value][16], from this group on
-  const float* frame;    // [9][16], or null
+  const Value* values;  // [value][16], from this group on
+  const float* frame;   // [9][16], or null
   V load(size_t i) const {
     if constexpr (sizeof(Value) == 4) return hn::LoadU(F(), values + i * block);
     else return hn::PromoteTo(F(), hn::LoadU(hn::Rebind<hwy::float16_t, F>(), values + i * block));
@@ -56,8 +57,9 @@ struct Receivers {
     if (!frame) return v;
     auto row = [&](size_t r) {
       const F d;
-      return hn::MulAdd(hn::LoadU(d, frame + r * block), v.x,
-                        hn::MulAdd(hn::LoadU(d, frame + (3 + r) * block), v.y, hn::Mul(hn::LoadU(d, frame + (6 + r) * block), v.z)));
+      return hn::MulAdd(
+          hn::LoadU(d, frame + r * block), v.x,
+          hn::MulAdd(hn::LoadU(d, frame + (3 + r) * block), v.y, hn::Mul(hn::LoadU(d, frame + (6 + r) * block), v.z)));
     };
     return {row(0), row(1), row(2)};
   }
@@ -96,7 +98,8 @@ V ExactBands(const Receivers<Value>& r, size_t channel, size_t exact_bands, cons
 }
 
 template <class Value, class Light>
-void Direct(const ZonalTransfer& t, const uint8_t* bytes, const float* frames, size_t blocks, const DirectLight& light, float* out) {
+void Direct(const ZonalTransfer& t, const uint8_t* bytes, const float* frames, size_t blocks, const DirectLight& light,
+            float* out) {
   const F d;
   constexpr bool own = std::is_same_v<Light, OwnLight>;
   const size_t exact = size_t(t.exact_bands()), bands = size_t(t.order) - exact, channels = size_t(t.channels);
@@ -119,14 +122,16 @@ void Direct(const ZonalTransfer& t, const uint8_t* bytes, const float* frames, s
           V q1 = hn::Set(d, light.diagonal[m]), q2 = hn::Zero(d);
           for (int l = m; l < t.order; ++l) {
             if (l > m) {
-              const V q = hn::MulAdd(hn::Mul(hn::Set(d, light.a[l][m]), s.z), q1, hn::Mul(hn::Set(d, light.b[l][m]), q2));
+              const V q =
+                  hn::MulAdd(hn::Mul(hn::Set(d, light.a[l][m]), s.z), q1, hn::Mul(hn::Set(d, light.b[l][m]), q2));
               q2 = q1, q1 = q;
             }
             if (l < int(exact)) continue;
             V weight = hn::Mul(q1, r.load(at + 3 + size_t(l) - exact));
             for (size_t c = 0; c < 3; ++c) {
               if (channels == 3 && c > 0) weight = hn::Mul(q1, r.load(at + 3 + c * bands + size_t(l) - exact));
-              const V around = hn::MulAdd(re, e(size_t(sh_index(l, m)), c), m ? hn::Mul(im, e(size_t(sh_index(l, -m)), c)) : hn::Zero(d));
+              const V around = hn::MulAdd(re, e(size_t(sh_index(l, m)), c),
+                                          m ? hn::Mul(im, e(size_t(sh_index(l, -m)), c)) : hn::Zero(d));
               sum[c] = hn::MulAdd(weight, around, sum[c]);
             }
           }
@@ -138,8 +143,8 @@ void Direct(const ZonalTransfer& t, const uint8_t* bytes, const float* frames, s
     }
 }
 
-// Polar angle by Abramowitz and Stegun 4.4.45 and azimuth by a minimax polynomial of the arc tangent on [0, 1]: errors under 1e-4, a
-// thousandth of a texel.
+// Polar angle by Abramowitz and Stegun 4.4.45 and azimuth by a minimax polynomial of the arc tangent on [0, 1]: errors
+// under 1e-4, a thousandth of a texel.
 V PolarAngle(V z) {
   const F d;
   const V x = hn::Min(hn::Abs(z), hn::Set(d, 1.0f));
@@ -188,10 +193,13 @@ void Specialised(const ZonalTransfer& t, const uint8_t* bytes, const float* fram
         const V iu = hn::Max(hn::Min(hn::Floor(u), hn::Set(d, float(ZonalLight::width - 1))), hn::Zero(d));
         const V iv = hn::Max(hn::Min(hn::Floor(v), hn::Set(d, float(ZonalLight::height - 2))), hn::Zero(d));
         hn::Store(hn::Sub(u, iu), d, across + part), hn::Store(hn::Sub(v, iv), d, down + part);
-        hn::Store(hn::ConvertTo(hn::RebindToSigned<F>(), hn::MulAdd(iv, hn::Set(d, float(row_length)), iu)), hn::RebindToSigned<F>(), place + part);
+        hn::Store(hn::ConvertTo(hn::RebindToSigned<F>(), hn::MulAdd(iv, hn::Set(d, float(row_length)), iu)),
+                  hn::RebindToSigned<F>(), place + part);
         for (size_t q = 0; q < quads; ++q)
           for (size_t c = 0; c < channels; ++c) {
-            auto band = [&](size_t k) { return 4 * q + k < bands ? r.load(at + 3 + c * bands + 4 * q + k) : hn::Zero(d); };
+            auto band = [&](size_t k) {
+              return 4 * q + k < bands ? r.load(at + 3 + c * bands + 4 * q + k) : hn::Zero(d);
+            };
             hn::StoreInterleaved4(band(0), band(1), band(2), band(3), d, &g[q][c][part][0]);
           }
       }
@@ -237,20 +245,22 @@ void Specialised(const ZonalTransfer& t, const uint8_t* bytes, const float* fram
   }
 }
 
-void DirectHalf(const ZonalTransfer& t, const uint8_t* bytes, const float* frames, size_t blocks, const DirectLight& light, float* out) {
+void DirectHalf(const ZonalTransfer& t, const uint8_t* bytes, const float* frames, size_t blocks,
+                const DirectLight& light, float* out) {
   if (light.field) Direct<hwy::float16_t, OwnLight>(t, bytes, frames, blocks, light, out);
   else Direct<hwy::float16_t, SharedLight>(t, bytes, frames, blocks, light, out);
 }
-void DirectSingle(const ZonalTransfer& t, const uint8_t* bytes, const float* frames, size_t blocks, const DirectLight& light, float* out) {
+void DirectSingle(const ZonalTransfer& t, const uint8_t* bytes, const float* frames, size_t blocks,
+                  const DirectLight& light, float* out) {
   if (light.field) Direct<float, OwnLight>(t, bytes, frames, blocks, light, out);
   else Direct<float, SharedLight>(t, bytes, frames, blocks, light, out);
 }
-void SpecialisedHalf(const ZonalTransfer& t, const uint8_t* bytes, const float* frames, size_t blocks, const float* texels,
-                     const float (*exact)[3], float* out) {
+void SpecialisedHalf(const ZonalTransfer& t, const uint8_t* bytes, const float* frames, size_t blocks,
+                     const float* texels, const float (*exact)[3], float* out) {
   Specialised<hwy::float16_t>(t, bytes, frames, blocks, texels, exact, out);
 }
-void SpecialisedSingle(const ZonalTransfer& t, const uint8_t* bytes, const float* frames, size_t blocks, const float* texels,
-                       const float (*exact)[3], float* out) {
+void SpecialisedSingle(const ZonalTransfer& t, const uint8_t* bytes, const float* frames, size_t blocks,
+                       const float* texels, const float (*exact)[3], float* out) {
   Specialised<float>(t, bytes, frames, blocks, texels, exact, out);
 }
 
@@ -295,7 +305,8 @@ Grid make_grid(int order) {
   for (int j = 0; j < ZonalLight::width; ++j)
     for (int m = 0; m < order; ++m) {
       const double phi = 2 * std::numbers::pi * j * m / ZonalLight::width;
-      g.turns[size_t((j * order + m) * 2)] = float(std::cos(phi)), g.turns[size_t((j * order + m) * 2 + 1)] = float(std::sin(phi));
+      g.turns[size_t((j * order + m) * 2)] = float(std::cos(phi)),
+                                       g.turns[size_t((j * order + m) * 2 + 1)] = float(std::sin(phi));
     }
   double y[sh_count(max_sh_order)];
   for (int i = 0; i < ZonalLight::height; ++i) {
@@ -334,8 +345,8 @@ void for_blocks(const ZonalTransfer& t, const ReceiverFrames* frames, Relit& out
   out.values.resize(t.blocks() * rows * 3 * block);
   const size_t block_bytes = t.receiver_values() * block * t.value_bytes();
   parallel_for(t.blocks(), std::max<size_t>(1, (size_t{1} << 18) / block_bytes), [&](size_t begin, size_t end) {
-    shade(begin, t.data.data() + begin * block_bytes, frames ? frames->values.data() + begin * 9 * block : nullptr, end - begin,
-          out.values.data() + begin * rows * 3 * block);
+    shade(begin, t.data.data() + begin * block_bytes, frames ? frames->values.data() + begin * 9 * block : nullptr,
+          end - begin, out.values.data() + begin * rows * 3 * block);
   });
 }
 
@@ -355,7 +366,8 @@ ReceiverFrames make_receiver_frames(std::span<const Mat3> rotations) {
   f.receivers = rotations.size();
   f.values.assign((rotations.size() + block - 1) / block * 9 * block, 0.0f);
   for (size_t r = 0; r < rotations.size(); ++r)
-    for (size_t k = 0; k < 9; ++k) f.values[(r / block * 9 + k) * block + r % block] = rotations[r][int(k / 3)][int(k % 3)];
+    for (size_t k = 0; k < 9; ++k)
+      f.values[(r / block * 9 + k) * block + r % block] = rotations[r][int(k / 3)][int(k % 3)];
   return f;
 }
 
@@ -393,7 +405,8 @@ void specialise_light(const ZonalTransfer& t, std::span<const Vec3> light, Zonal
           if (m) out.rows[(2 * m + 1) * texel + slot + 4 * size_t(c)] = q * light[l * l + l - m][c];
         }
       }
-    HWY_DYNAMIC_DISPATCH(TableRow)(out.rows.data(), g.turns.data(), order, texel, out.texels.data() + i * row_length * texel);
+    HWY_DYNAMIC_DISPATCH(TableRow)
+    (out.rows.data(), g.turns.data(), order, texel, out.texels.data() + i * row_length * texel);
   }
 }
 
@@ -403,7 +416,8 @@ void relight_zonal(const ZonalTransfer& t, const ReceiverFrames* frames, const Z
   for (int k = 0; k < 4; ++k)
     for (int c = 0; c < 3; ++c) exact[k][c] = light.exact[size_t(k)][c];
   for_blocks(t, frames, out, [&](size_t, const uint8_t* data, const float* turned, size_t blocks, float* values) {
-    if (t.precision == Precision::half) HWY_DYNAMIC_DISPATCH(SpecialisedHalf)(t, data, turned, blocks, light.texels.data(), exact, values);
+    if (t.precision == Precision::half)
+      HWY_DYNAMIC_DISPATCH(SpecialisedHalf)(t, data, turned, blocks, light.texels.data(), exact, values);
     else HWY_DYNAMIC_DISPATCH(SpecialisedSingle)(t, data, turned, blocks, light.texels.data(), exact, values);
   });
 }

@@ -21,7 +21,8 @@ Scene bumpy_sheet() {
     for (int j = 0; j <= n; ++j) {
       const float x = 2 * float(i) / n - 1, z = 2 * float(j) / n - 1, e = 1e-3f;
       positions.push_back({x, height(x, z), z});
-      normals.push_back(glm::normalize(Vec3(height(x - e, z) - height(x + e, z), 2 * e, height(x, z - e) - height(x, z + e))));
+      normals.push_back(
+          glm::normalize(Vec3(height(x - e, z) - height(x + e, z), 2 * e, height(x, z - e) - height(x, z + e))));
     }
   for (uint32_t i = 0; i < n; ++i)
     for (uint32_t j = 0; j < n; ++j) {
@@ -48,7 +49,8 @@ TEST(ZonalDeform, LobesFollowTheSheetThatHarmonicsDoNot) {
   auto lobes = fit_zonal(still, {});
   ASSERT_TRUE(lobes);
   std::vector<Vec3> light(36);
-  for (size_t k = 0; k < 36; ++k) light[k] = Vec3(std::sin(float(k) * 1.7f) / float(1 + k / 6));  // from nowhere in particular
+  for (size_t k = 0; k < 36; ++k)
+    light[k] = Vec3(std::sin(float(k) * 1.7f) / float(1 + k / 6));  // from nowhere in particular
   light[0] = Vec3(2.0f);
 
   for (const char* text : {"bend:-120,x,y", "twist:100,x"}) {
@@ -64,20 +66,25 @@ TEST(ZonalDeform, LobesFollowTheSheetThatHarmonicsDoNot) {
     relight_zonal(*lobes, &frames, light, turned);
     double with = 0, without = 0, total = 0;
     for (size_t v = 0; v < flat.positions.size(); ++v) {
-      if (std::max(std::abs(flat.positions[v].x), std::abs(flat.positions[v].z)) > 0.95f) continue;  // a border sees past the sheet's end
+      if (std::max(std::abs(flat.positions[v].x), std::abs(flat.positions[v].z)) > 0.95f)
+        continue;  // a border sees past the sheet's end
       const float t = truth.at(bent_receivers.front[v]).x;
-      with += std::pow(turned.at(receivers.front[v]).x - t, 2), without += std::pow(unturned.at(receivers.front[v]).x - t, 2), total += t * t;
+      with += std::pow(turned.at(receivers.front[v]).x - t, 2),
+          without += std::pow(unturned.at(receivers.front[v]).x - t, 2), total += t * t;
     }
-    // What is left is that bumps open where the sheet is convex, that twisting shears them, and what the sheet hides from itself.
+    // What is left is that bumps open where the sheet is convex, that twisting shears them, and what the sheet hides
+    // from itself.
     EXPECT_LT(std::sqrt(with / total), 0.16) << text;
     EXPECT_LT(std::sqrt(with), 0.35 * std::sqrt(without)) << text;
-    RecordProperty("turned", std::to_string(std::sqrt(with / total))), RecordProperty("unturned", std::to_string(std::sqrt(without / total)));
+    RecordProperty("turned", std::to_string(std::sqrt(with / total))),
+        RecordProperty("unturned", std::to_string(std::sqrt(without / total)));
     std::printf("%s: %.4f turned, %.4f as baked\n", text, std::sqrt(with / total), std::sqrt(without / total));
   }
 }
 
-// The same of a glossy sheet, by eq. 16: three rows of the BRDF's singular values, three lobes each, fourth-order light, as in the paper's
-// Fig. 4; radiance towards a fixed eye. The truth is the matrix of the bent sheet itself with all its rows.
+// The same of a glossy sheet, by eq. 16: three rows of the BRDF's singular values, three lobes each, fourth-order
+// light, as in the paper's Fig. 4; radiance towards a fixed eye. The truth is the matrix of the bent sheet itself with
+// all its rows.
 TEST(ZonalDeform, LobesOfAMatrixFollowTheGlossySheet) {
   const Scene flat = bumpy_sheet();
   const CookTorrance metal{.diffuse = Vec3(0.2f), .specular = Vec3(0.8f), .f0 = Vec3(0.5f), .m = 0.3f};
@@ -129,12 +136,14 @@ TEST(ZonalDeform, LobesOfAMatrixFollowTheGlossySheet) {
         return reflect_rows(w, Vec3(1), [&](size_t row) { return rows.at(r, int(row)); }).x;
       };
       const float t = radiance(of_bent.outgoing, there, all, truth);
-      const float ours = radiance(outgoing, here, three, turned_rows), rows = radiance(rows_of_bent.outgoing, there, three, truth_rows);
+      const float ours = radiance(outgoing, here, three, turned_rows),
+                  rows = radiance(rows_of_bent.outgoing, there, three, truth_rows);
       with += std::pow(ours - t, 2), rows_alone += std::pow(rows - t, 2), moved += std::pow(ours - rows, 2);
       without += std::pow(radiance(still.outgoing, here, three, unturned_rows) - t, 2), total += t * t;
     }
-    std::printf("%s: %.4f turned, %.4f as baked; of it three rows alone %.4f, turning alone %.4f, lobes alone %.4f\n", text, std::sqrt(with / total),
-                std::sqrt(without / total), std::sqrt(rows_alone / total), std::sqrt(moved / total), report.rms);
+    std::printf("%s: %.4f turned, %.4f as baked; of it three rows alone %.4f, turning alone %.4f, lobes alone %.4f\n",
+                text, std::sqrt(with / total), std::sqrt(without / total), std::sqrt(rows_alone / total),
+                std::sqrt(moved / total), report.rms);
     EXPECT_LT(std::sqrt(moved / total), 0.16) << text;
     EXPECT_LT(std::sqrt(with), 0.4 * std::sqrt(without)) << text;
   }

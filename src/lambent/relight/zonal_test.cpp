@@ -26,9 +26,11 @@ Case make_case(int order, int lobes, int channels, size_t receivers, Precision p
       for (int k = 0; k < 3; ++k) a[k] = axis[k];
     }
     store_receiver(c.w, r, v);
-    c.rotations.push_back(rotation_from_yaw_pitch_roll({360 * random.next(), 180 * random.next() - 90, 360 * random.next()}));
+    c.rotations.push_back(
+        rotation_from_yaw_pitch_roll({360 * random.next(), 180 * random.next() - 90, 360 * random.next()}));
   }
-  for (int k = 0; k < sh_count(order) + 2; ++k) c.light.push_back({random.next(), random.next() - 0.5f, -random.next()});
+  for (int k = 0; k < sh_count(order) + 2; ++k)
+    c.light.push_back({random.next(), random.next() - 0.5f, -random.next()});
   return c;
 }
 
@@ -54,7 +56,8 @@ TEST(RelightZonal, DirectIsTheDotProductOfTheTurnedHarmonics) {
             relight_zonal(c.w.transfer, turned ? &frames : nullptr, c.light, out);
             for (size_t r = 0; r < 37; ++r) {
               const Vec3 expected = plain(c, r, turned);
-              const Vec3 alone = shade_zonal(c.w.transfer, load_receiver(c.w.transfer, r), turned ? c.rotations[r] : Mat3(1.0f), c.light);
+              const Vec3 alone = shade_zonal(c.w.transfer, load_receiver(c.w.transfer, r),
+                                             turned ? c.rotations[r] : Mat3(1.0f), c.light);
               for (int k = 0; k < 3; ++k) {
                 EXPECT_NEAR(out.at(r)[k], expected[k], 2e-6 * order * order * lobes) << order << ' ' << lobes;
                 EXPECT_NEAR(alone[k], expected[k], 2e-6 * order * order * lobes) << order << ' ' << lobes;
@@ -101,9 +104,10 @@ TEST(RelightZonal, TheTableIsNearlyAsGoodAsTheDirectSum) {
               const glm::dvec3 a = direct.at(r), b = table.at(r);
               error += glm::dot(a - b, a - b), total += glm::dot(a, a);
             }
-            // Linear interpolation over h = pi / 31 misses up to h^2 / 8 times the second derivative, n^2 at most, and on the mean
-            // over a cell half of that.
-            EXPECT_LT(std::sqrt(error / total), 0.0013 / 2 * order * order + 1e-4) << order << ' ' << lobes << ' ' << channels;
+            // Linear interpolation over h = pi / 31 misses up to h^2 / 8 times the second derivative, n^2 at most, and
+            // on the mean over a cell half of that.
+            EXPECT_LT(std::sqrt(error / total), 0.0013 / 2 * order * order + 1e-4)
+                << order << ' ' << lobes << ' ' << channels;
           }
         }
 }
@@ -153,7 +157,8 @@ TEST(RelightZonal, RowsAreReceiversThatTurnTogether) {
   ASSERT_EQ(table.rows, rows);
   for (size_t r = 0; r < 40; ++r)
     for (int row = 0; row < rows; ++row) {
-      const Vec3 truth = shade_zonal(alone.w.transfer, load_receiver(alone.w.transfer, r * 3 + size_t(row)), rotations[r], alone.light);
+      const Vec3 truth = shade_zonal(alone.w.transfer, load_receiver(alone.w.transfer, r * 3 + size_t(row)),
+                                     rotations[r], alone.light);
       EXPECT_LT(glm::length(direct.at(r, row) - truth), 1e-4f * (1 + glm::length(truth)));
       EXPECT_LT(glm::length(table.at(r, row) - truth), 0.05f * (1 + glm::length(truth)));
     }
@@ -163,7 +168,11 @@ TEST(RelightZonal, BrokenNumbersDoNotLeadAstray) {
   // What a hostile file may hold: axes of zero, infinite and not numbers.
   const WritableZonalTransfer w = make_zonal_transfer(6, 3, 1, 16, Precision::half);
   for (size_t r = 0; r < 16; ++r)
-    store_receiver(w, r, std::vector<float>(w.transfer.receiver_values(), r % 4 == 0 ? 0.0f : r % 4 == 1 ? INFINITY : r % 4 == 2 ? NAN : -6e4f));
+    store_receiver(w, r,
+                   std::vector<float>(w.transfer.receiver_values(), r % 4 == 0   ? 0.0f
+                                                                    : r % 4 == 1 ? INFINITY
+                                                                    : r % 4 == 2 ? NAN
+                                                                                 : -6e4f));
   const std::vector<Vec3> e(36, Vec3(1.0f));
   ZonalLight light;
   specialise_light(w.transfer, e, light);

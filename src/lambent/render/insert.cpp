@@ -7,7 +7,8 @@ namespace lambent {
 namespace {
 
 // Appends b to a, which has one entry for each of `count` vertices or none at all; b counts from `first_receiver`.
-void append_side(std::vector<uint32_t>& a, size_t count, const std::vector<uint32_t>& b, size_t added, uint32_t first_receiver) {
+void append_side(std::vector<uint32_t>& a, size_t count, const std::vector<uint32_t>& b, size_t added,
+                 uint32_t first_receiver) {
   if (a.empty() && b.empty()) return;
   a.resize(count, none);
   for (uint32_t r : b) a.push_back(r == none ? none : r + first_receiver);
@@ -16,16 +17,18 @@ void append_side(std::vector<uint32_t>& a, size_t count, const std::vector<uint3
 
 }  // namespace
 
-Result<void> insert_object(RelitScene& into, const Scene& object, const Receivers& receivers, const Transfer& transfer, const Lattice& lattice,
-                           const Relit& light) {
-  LAMBENT_CHECK(transfer.rows == 1 && transfer.receivers == receivers.count() && transfer.columns() == size_t(light.rows));
+Result<void> insert_object(RelitScene& into, const Scene& object, const Receivers& receivers, const Transfer& transfer,
+                           const Lattice& lattice, const Relit& light) {
+  LAMBENT_CHECK(transfer.rows == 1 && transfer.receivers == receivers.count() &&
+                transfer.columns() == size_t(light.rows));
   const size_t first = into.receivers, added = receivers.count(), vertices = into.scene.positions.size();
   LAMBENT_CHECK(first + added < none);
   if (into.outgoing) {
     Outgoing& o = *into.outgoing;
     if (o.kind != OutgoingKind::map && o.kind != OutgoingKind::svd)
-      return Error{into.scene.path, std::string("objects cannot be inserted into a scene baked with outgoing rows of kind ") + outgoing_names[int(o.kind)] +
-                           ", only with map or svd"};
+      return Error{into.scene.path,
+                   std::string("objects cannot be inserted into a scene baked with outgoing rows of kind ") +
+                       outgoing_names[int(o.kind)] + ", only with map or svd"};
     if (o.maps.size() > 65535) return Error{into.scene.path, "has too many view maps to insert an object"};
     // Lambert's law: the first row, times the colour, in every view.
     ViewMap lambert{2, into.relit.rows, std::vector<ViewWeights>(4 * size_t(into.relit.rows), ViewWeights(0.0f))};
@@ -40,7 +43,8 @@ Result<void> insert_object(RelitScene& into, const Scene& object, const Receiver
 
   Relit& relit = into.relit;
   into.receivers = first + added;
-  relit.values.resize((into.receivers + transfer_block - 1) / transfer_block * size_t(relit.rows) * 3 * transfer_block, 0.0f);
+  relit.values.resize((into.receivers + transfer_block - 1) / transfer_block * size_t(relit.rows) * 3 * transfer_block,
+                      0.0f);
   parallel_for(added, transfer_block, [&](size_t begin, size_t end) {
     std::vector<Vec3> incident(size_t(light.rows));
     for (size_t r = begin; r < end; ++r) {

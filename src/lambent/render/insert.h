@@ -1,6 +1,6 @@
 #pragma once
-// A small object put into a relit scene: lit, shadowed and colour-bled by the scene through its lattice of light in free space. The
-// object casts neither shadow nor light on the scene, since the scene's transfer does not know it.
+// A small object put into a relit scene: lit, shadowed and colour-bled by the scene through its lattice of light in
+// free space. The object casts neither shadow nor light on the scene, since the scene's transfer does not know it.
 #include <lambent/receivers/receivers.h>
 #include <lambent/relight/lattice.h>
 #include <lambent/transfer/outgoing.h>
@@ -18,10 +18,11 @@ struct RelitScene {
   std::optional<Outgoing> outgoing;  // none: diffuse
 };
 
-// Appends a diffuse object. `transfer` is its own diffuse transfer, baked alone where it stands, of harmonics up to the lattice's order:
-// each of its receivers is lit by lattice light at its place, as if it were the same all over the object.
-// Errors: the last reflection is of a kind with no rows to spare for a diffuse surface (neither map nor svd), or has too many maps.
-Result<void> insert_object(RelitScene& into, const Scene& object, const Receivers& receivers, const Transfer& transfer, const Lattice& lattice,
-                           const Relit& light);
+// Appends a diffuse object. `transfer` is its own diffuse transfer, baked alone where it stands, of harmonics up to the
+// lattice's order: each of its receivers is lit by lattice light at its place, as if it were the same all over the
+// object. Errors: the last reflection is of a kind with no rows to spare for a diffuse surface (neither map nor svd),
+// or has too many maps.
+Result<void> insert_object(RelitScene& into, const Scene& object, const Receivers& receivers, const Transfer& transfer,
+                           const Lattice& lattice, const Relit& light);
 
 }  // namespace lambent

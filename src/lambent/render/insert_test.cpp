@@ -16,17 +16,22 @@ namespace {
 Scene coloured_room() {
   Scene scene;
   const int n = 24;
-  add_quad(scene, add_material(scene, "floor", Vec3(0.8f, 0.7f, 0.3f)), "floor", Vec3(-2, 0, -2), Vec3(0, 0, 4), Vec3(4, 0, 0), n, n);
-  add_quad(scene, add_material(scene, "back", Vec3(0.3f, 0.8f, 0.4f)), "back", Vec3(-2, 0, -2), Vec3(4, 0, 0), Vec3(0, 3, 0), n, n);
-  add_quad(scene, add_material(scene, "left", Vec3(0.9f, 0.2f, 0.1f)), "left", Vec3(-2, 0, -2), Vec3(0, 3, 0), Vec3(0, 0, 4), n, n);
-  add_box(scene, add_material(scene, "block", Vec3(0.2f, 0.3f, 0.9f)), "block", Vec3(0.2f, 0.01f, -1.0f), Vec3(1.2f, 1.4f, 0), 8);
+  add_quad(scene, add_material(scene, "floor", Vec3(0.8f, 0.7f, 0.3f)), "floor", Vec3(-2, 0, -2), Vec3(0, 0, 4),
+           Vec3(4, 0, 0), n, n);
+  add_quad(scene, add_material(scene, "back", Vec3(0.3f, 0.8f, 0.4f)), "back", Vec3(-2, 0, -2), Vec3(4, 0, 0),
+           Vec3(0, 3, 0), n, n);
+  add_quad(scene, add_material(scene, "left", Vec3(0.9f, 0.2f, 0.1f)), "left", Vec3(-2, 0, -2), Vec3(0, 3, 0),
+           Vec3(0, 0, 4), n, n);
+  add_box(scene, add_material(scene, "block", Vec3(0.2f, 0.3f, 0.9f)), "block", Vec3(0.2f, 0.01f, -1.0f),
+          Vec3(1.2f, 1.4f, 0), 8);
   return scene;
 }
 
 std::vector<Vec3> uneven_light(int order) {
   Random random(11);
   std::vector<Vec3> light(size_t(sh_count(order)));
-  for (size_t k = 0; k < light.size(); ++k) light[k] = (Vec3(random.next(), random.next(), random.next()) - 0.5f) * 2.0f / float(1 + sh_band(int(k)));
+  for (size_t k = 0; k < light.size(); ++k)
+    light[k] = (Vec3(random.next(), random.next(), random.next()) - 0.5f) * 2.0f / float(1 + sh_band(int(k)));
   light[0] = Vec3(3, 2.5f, 2);
   return light;
 }
@@ -41,7 +46,8 @@ struct Room {
 };
 
 RelitScene relit_scene(const Room& room, const Transfer& transfer, std::optional<Outgoing> outgoing = {}) {
-  RelitScene drawn{room.scene, room.receivers.front, room.receivers.back, room.receivers.count(), {}, std::move(outgoing)};
+  RelitScene drawn{room.scene, room.receivers.front, room.receivers.back, room.receivers.count(),
+                   {},         std::move(outgoing)};
   relight(transfer, room.light, drawn.relit);
   return drawn;
 }
@@ -54,13 +60,14 @@ struct Ball {
     place_scene(scene, foot, 1);
     auto tracer = Tracer::build(scene);
     receivers = make_vertex_receivers(scene);
-    transfer = *bake(scene, *tracer, receivers, {.order = lattice_order, .samples = 2048, .bounces = 1, .precision = Precision::single});
+    transfer = *bake(scene, *tracer, receivers,
+                     {.order = lattice_order, .samples = 2048, .bounces = 1, .precision = Precision::single});
   }
 };
 
 // Relative RMS difference of the balls' exit radiance from the path tracer's, whose rays know nothing of them.
-double error_of_balls(const Room& room, const Transfer& transfer, const Lattice& lattice, const LatticeTransfer& free_space, std::span<const Vec3> feet,
-                      int surface_bounces) {
+double error_of_balls(const Room& room, const Transfer& transfer, const Lattice& lattice,
+                      const LatticeTransfer& free_space, std::span<const Vec3> feet, int surface_bounces) {
   Relit light;
   relight(free_space.transfer, room.light, light);
   const Environment env = reconstruct_environment(room.light, 256);
@@ -70,7 +77,8 @@ double error_of_balls(const Room& room, const Transfer& transfer, const Lattice&
     RelitScene drawn = relit_scene(room, transfer);
     const size_t first = drawn.receivers;
     EXPECT_TRUE(insert_object(drawn, ball.scene, ball.receivers, ball.transfer, lattice, light));
-    const auto truth = exit_radiances(room.scene, env, ball.receivers.origins, ball.receivers.normals, surface_bounces + 1, 2048, 7);
+    const auto truth =
+        exit_radiances(room.scene, env, ball.receivers.origins, ball.receivers.normals, surface_bounces + 1, 2048, 7);
     for (size_t r = 0; r < truth.size(); ++r) {
       const glm::dvec3 d = glm::dvec3(drawn.relit.at(first + r)) - glm::dvec3(truth[r].mean), t(truth[r].mean);
       difference += glm::dot(d, d), total += glm::dot(t, t);
@@ -84,11 +92,13 @@ TEST(Insert, LightsATinyBallAsThePathTracerDoes) {
   auto transfer = bake(room.scene, room.tracer, room.receivers, {.order = light_order, .samples = 1024, .bounces = 2});
   ASSERT_TRUE(transfer);
   auto at_points = [&](const Lattice& lattice, std::span<const Vec3> feet) {
-    auto free_space = bake_lattice(room.scene, room.tracer, room.receivers, *transfer, nullptr, lattice, {.order = lattice_order, .samples = 4096});
+    auto free_space = bake_lattice(room.scene, room.tracer, room.receivers, *transfer, nullptr, lattice,
+                                   {.order = lattice_order, .samples = 4096});
     EXPECT_TRUE(free_space);
     return error_of_balls(room, *transfer, lattice, *free_space, feet, 2);
   };
-  // At the lattice's points, in four corners of the room: what six bands leave out (a cosine's seventh is 1/64), the noise of both.
+  // At the lattice's points, in four corners of the room: what six bands leave out (a cosine's seventh is 1/64), the
+  // noise of both.
   const Lattice corners{Vec3(-1.9f, 0.12f, -1.88f), Vec3(1.5f, 0.12f, -1.2f), 2, 1, 2};
   std::vector<Vec3> feet;
   for (size_t p = 0; p < corners.count(); ++p) feet.push_back(corners.position(p) - Vec3(0, 0.02f, 0));
@@ -97,7 +107,8 @@ TEST(Insert, LightsATinyBallAsThePathTracerDoes) {
   EXPECT_LT(error, 0.015);
   // Between points a quarter of a metre apart light is nearly linear, as near to walls as half of that.
   const Lattice room_lattice{Vec3(-1.95f, 0.05f, -1.95f), Vec3(1.95f, 2.8f, 1.95f), 16, 12, 16};
-  const double between = at_points(room_lattice, std::vector<Vec3>{Vec3(-1.81f, 0.15f, -1.77f), Vec3(-0.33f, 0.4f, -0.6f), Vec3(0.9f, 1.9f, -0.4f)});
+  const double between = at_points(
+      room_lattice, std::vector<Vec3>{Vec3(-1.81f, 0.15f, -1.77f), Vec3(-0.33f, 0.4f, -0.6f), Vec3(0.9f, 1.9f, -0.4f)});
   RecordProperty("error_between_points", std::to_string(between));
   EXPECT_LT(between, 0.02);
 }
@@ -113,7 +124,8 @@ TEST(Insert, DrawsADiffuseObjectAmongGlossyRows) {
   auto diffuse = bake(room.scene, room.tracer, room.receivers, options);
   ASSERT_TRUE(diffuse);
   const Lattice lattice{Vec3(-1.5f, 0.2f, -1.5f), Vec3(1.5f, 2, 1.5f), 3, 2, 3};
-  auto free_space = bake_lattice(room.scene, room.tracer, room.receivers, *diffuse, nullptr, lattice, {.order = lattice_order, .samples = 64});
+  auto free_space = bake_lattice(room.scene, room.tracer, room.receivers, *diffuse, nullptr, lattice,
+                                 {.order = lattice_order, .samples = 64});
   ASSERT_TRUE(free_space);
   Relit light;
   relight(free_space->transfer, room.light, light);
@@ -125,8 +137,10 @@ TEST(Insert, DrawsADiffuseObjectAmongGlossyRows) {
   const Relit before = relit_scene(room, *diffuse).relit;
   for (size_t r = 0; r < first; ++r) EXPECT_EQ(plain.relit.at(r), before.at(r));
 
-  for (OutgoingKind kind : {OutgoingKind::map, OutgoingKind::svd, OutgoingKind::sh, OutgoingKind::hemisphere, OutgoingKind::hsh}) {
-    auto glossy = bake_matrix(room.scene, room.tracer, room.receivers, materials, options, {.incident_order = 3, .outgoing = kind, .outgoing_order = 3, .grid = 8});
+  for (OutgoingKind kind :
+       {OutgoingKind::map, OutgoingKind::svd, OutgoingKind::sh, OutgoingKind::hemisphere, OutgoingKind::hsh}) {
+    auto glossy = bake_matrix(room.scene, room.tracer, room.receivers, materials, options,
+                              {.incident_order = 3, .outgoing = kind, .outgoing_order = 3, .grid = 8});
     ASSERT_TRUE(glossy);
     RelitScene drawn = relit_scene(room, glossy->transfer, glossy->outgoing);
     const RelitScene alone = drawn;

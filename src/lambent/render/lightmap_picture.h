@@ -6,8 +6,8 @@
 
 namespace lambent {
 
-// Row `row` of every texel's value. Texels that no surface reaches take the mean of their filled neighbours, ring by ring, so many
-// times over, for look-ups that stray (mip-maps); beyond that they are black.
+// Row `row` of every texel's value. Texels that no surface reaches take the mean of their filled neighbours, ring by
+// ring, so many times over, for look-ups that stray (mip-maps); beyond that they are black.
 Image lightmap_picture(const TexelReceivers& texels, const Relit& relit, int dilate = 4, int row = 0);
 
 // The same of any values, one a receiver.

@@ -12,7 +12,8 @@
 namespace lambent {
 namespace {
 
-// A tilted quad of 2 x 1.5 with bumps h = height sin(2 pi k s) sin(2 pi k t) on it, s along a, t along b, both from 0 to 1.
+// A tilted quad of 2 x 1.5 with bumps h = height sin(2 pi k s) sin(2 pi k t) on it, s along a, t along b, both from 0
+// to 1.
 struct Bumps {
   Vec3 origin{0.3f, -0.2f, 0.1f}, a, b;
   float height = 0.1f, k = 2;
@@ -24,14 +25,17 @@ struct Bumps {
   // In the frame (a, b, n) / lengths: (-dh/ds / |a|, -dh/dt / |b|, 1).
   Vec3 local(float s, float t) const {
     const float w = 2 * pi * k;
-    return glm::normalize(Vec3(-height * w * std::cos(w * s) * std::sin(w * t) / glm::length(a), -height * w * std::sin(w * s) * std::cos(w * t) / glm::length(b), 1));
+    return glm::normalize(Vec3(-height * w * std::cos(w * s) * std::sin(w * t) / glm::length(a),
+                               -height * w * std::sin(w * s) * std::cos(w * t) / glm::length(b), 1));
   }
   Vec3 normal(float s, float t) const {
     const Vec3 l = local(s, t);
     return l.x * glm::normalize(a) + l.y * glm::normalize(b) + l.z * n();
   }
   // Places (s, t) of a point of the plane.
-  Vec2 place(Vec3 p) const { return {glm::dot(p - origin, a) / glm::dot(a, a), glm::dot(p - origin, b) / glm::dot(b, b)}; }
+  Vec2 place(Vec3 p) const {
+    return {glm::dot(p - origin, a) / glm::dot(a, a), glm::dot(p - origin, b) / glm::dot(b, b)};
+  }
 };
 
 // The quad, its normal texture and coordinates: the picture upright, or mirrored in u; with or without tangents.
@@ -67,12 +71,14 @@ Image draw(Scene scene, const Environment* sky, DirectionalKind kind, int sample
   EXPECT_TRUE(atlas);
   const Receivers receivers = make_texel_receivers(scene, *atlas);
   auto tracer = Tracer::build(scene);
-  auto map = bake_lightmap(scene, *tracer, receivers, make_lamps(scene, sky, false),
-                           {.samples = 2048, .lamp_samples = 256, .bounces = 0, .directional = kind, .precision = Precision::single}, false);
+  auto map = bake_lightmap(
+      scene, *tracer, receivers, make_lamps(scene, sky, false),
+      {.samples = 2048, .lamp_samples = 256, .bounces = 0, .directional = kind, .precision = Precision::single}, false);
   EXPECT_TRUE(map) << (map ? "" : map.error().text());
   Relit relit;
   relight(map->all, std::vector<Vec3>(map->all.columns(), Vec3(1)), relit);
-  auto image = render(scene, *tracer, receivers.basis, relit, facing(Bumps()), {.width = 96, .height = 72, .samples = samples, .directional = kind});
+  auto image = render(scene, *tracer, receivers.basis, relit, facing(Bumps()),
+                      {.width = 96, .height = 72, .samples = samples, .directional = kind});
   EXPECT_TRUE(image);
   return *image;
 }
@@ -83,7 +89,8 @@ double difference(const Image& x, const Image& y) {
   size_t count = 0;
   for (size_t i = 0; i < x.rgb.size(); ++i) {
     if (y.alpha[i] < 1) continue;
-    square += double(glm::dot(x.rgb[i] - y.rgb[i], x.rgb[i] - y.rgb[i])) / 3, mean += double(y.rgb[i].x + y.rgb[i].y + y.rgb[i].z) / 3;
+    square += double(glm::dot(x.rgb[i] - y.rgb[i], x.rgb[i] - y.rgb[i])) / 3,
+        mean += double(y.rgb[i].x + y.rgb[i].y + y.rgb[i].z) / 3;
     ++count;
   }
   EXPECT_GT(count, x.rgb.size() / 4);
@@ -101,7 +108,8 @@ Image picture(const Bumps& bumps, F leaving) {
     for (int x = 0; x < 96; ++x) {
       int covered = 0;
       for (int k = 0; k < grid * grid; ++k) {
-        const Vec3 d = rays.direction(float(x) + (float(k % grid) + 0.5f) / grid, float(y) + (float(k / grid) + 0.5f) / grid);
+        const Vec3 d =
+            rays.direction(float(x) + (float(k % grid) + 0.5f) / grid, float(y) + (float(k / grid) + 0.5f) / grid);
         const Vec3 p = rays.eye + d * (glm::dot(bumps.origin - rays.eye, bumps.n()) / glm::dot(d, bumps.n()));
         const Vec2 at = bumps.place(p);
         if (at.x < 0 || at.x > 1 || at.y < 0 || at.y > 1) continue;
@@ -123,7 +131,8 @@ TEST(NormalMap, NormalsAreThoseOfTheBumps) {
       for (const Triangle& t : scene.triangles)
         for (Vec2 uv : {Vec2(0.2f, 0.3f), Vec2(0.6f, 0.1f), Vec2(0.05f, 0.8f)}) {
           const Vec2 at = bumps.place(interpolate(scene.positions, t, uv.x, uv.y));
-          worst = std::max(worst, glm::length(mapped_normal(scene, t, uv.x, uv.y, bumps.n()) - bumps.normal(at.x, at.y)));
+          worst =
+              std::max(worst, glm::length(mapped_normal(scene, t, uv.x, uv.y, bumps.n()) - bumps.normal(at.x, at.y)));
         }
       EXPECT_LT(worst, eight_bits) << mirrored << tangents;
     }
@@ -132,7 +141,8 @@ TEST(NormalMap, NormalsAreThoseOfTheBumps) {
   scene.materials[0].normal_scale = 0.5f;
   const Triangle& t = scene.triangles[4];
   const Vec2 at = bumps.place(interpolate(scene.positions, t, 0.2f, 0.3f));
-  const Vec3 l = bumps.local(at.x, at.y) * Vec3(0.5f, 0.5f, 1), world = glm::normalize(l.x * glm::normalize(bumps.a) + l.y * glm::normalize(bumps.b) + l.z * bumps.n());
+  const Vec3 l = bumps.local(at.x, at.y) * Vec3(0.5f, 0.5f, 1),
+             world = glm::normalize(l.x * glm::normalize(bumps.a) + l.y * glm::normalize(bumps.b) + l.z * bumps.n());
   EXPECT_LT(glm::length(mapped_normal(scene, t, 0.2f, 0.3f, bumps.n()) - world), eight_bits);
   // No texture, no coordinates, coordinates that do not vary: the surface's own.
   for (Vec2& uv : scene.texcoords[0]) uv = Vec2(0.5f);
@@ -144,8 +154,10 @@ TEST(NormalMap, NormalsAreThoseOfTheBumps) {
 TEST(NormalMap, ALampOnBumpsIsItsFormula) {
   const Bumps bumps;
   Scene scene = bumpy(bumps);
-  const Vec3 I(3, 2, 1), to_sun = glm::normalize(bumps.n() + 0.5f * glm::normalize(bumps.a) - 0.3f * glm::normalize(bumps.b));
-  scene.lights.push_back({.name = "sun", .kind = PunctualLight::Kind::directional, .direction = -to_sun, .intensity = I});
+  const Vec3 I(3, 2, 1),
+      to_sun = glm::normalize(bumps.n() + 0.5f * glm::normalize(bumps.a) - 0.3f * glm::normalize(bumps.b));
+  scene.lights.push_back(
+      {.name = "sun", .kind = PunctualLight::Kind::directional, .direction = -to_sun, .intensity = I});
   const Vec3 lit = 0.5f * I / pi;
   const Image formula = picture(bumps, [&](Vec3 n) { return lit * std::max(0.0f, glm::dot(n, to_sun)); });
   const Image flat = picture(bumps, [&](Vec3) { return lit * glm::dot(bumps.n(), to_sun); });
@@ -168,8 +180,11 @@ TEST(NormalMap, UnderASkyAsThePathTracerHasIt) {
   Scene scene = bumpy(bumps);
   scene.materials[0].base_color = Vec3(0.8f, 0.5f, 0.3f);
   const Vec3 bright = glm::normalize(bumps.n() + 0.7f * glm::normalize(bumps.a));
-  const Environment sky = make_environment("lobe", 64, 32, [&](Vec3 d) { return Vec3(0.2f, 0.3f, 0.5f) + std::exp(8 * (glm::dot(d, bright) - 1)) * Vec3(4, 3, 2); });
-  auto traced = path_trace(scene, sky, facing(bumps), {.width = 96, .height = 72, .spp = 256, .bounces = 0, .background = false});
+  const Environment sky = make_environment("lobe", 64, 32, [&](Vec3 d) {
+    return Vec3(0.2f, 0.3f, 0.5f) + std::exp(8 * (glm::dot(d, bright) - 1)) * Vec3(4, 3, 2);
+  });
+  auto traced =
+      path_trace(scene, sky, facing(bumps), {.width = 96, .height = 72, .spp = 256, .bounces = 0, .background = false});
   ASSERT_TRUE(traced);
   ReferenceOptions smooth{.width = 96, .height = 72, .spp = 256, .bounces = 0, .background = false};
   smooth.reflection.normal_maps = false;
@@ -181,8 +196,8 @@ TEST(NormalMap, UnderASkyAsThePathTracerHasIt) {
   EXPECT_LT(left, 0.15 * bump);
   RecordProperty("sh:3", std::to_string(left)), RecordProperty("none", std::to_string(bump));
 
-  // What the cheaper ones make of this sky, by sums over its directions: mean + n . first moment / 2 pi for two bands of irradiance / pi,
-  // the blend of three irradiances, and n . V.
+  // What the cheaper ones make of this sky, by sums over its directions: mean + n . first moment / 2 pi for two bands
+  // of irradiance / pi, the blend of three irradiances, and n . V.
   constexpr int many = 20000;
   double mean[3] = {}, moment[3][3] = {}, three[3][3] = {};
   const Mat3 frame = frame_about(bumps.n());
@@ -229,7 +244,8 @@ TEST(NormalMap, BacksHaveTheNegatedNormal) {
   Scene scene = bumpy(bumps);
   for (Triangle& t : scene.triangles) t.two_sided = true;
   const Vec3 to_sun = glm::normalize(-bumps.n() + 0.5f * glm::normalize(bumps.a));
-  scene.lights.push_back({.name = "sun", .kind = PunctualLight::Kind::directional, .direction = -to_sun, .intensity = Vec3(2)});
+  scene.lights.push_back(
+      {.name = "sun", .kind = PunctualLight::Kind::directional, .direction = -to_sun, .intensity = Vec3(2)});
   Camera camera = facing(bumps);
   camera.eye = 2.0f * camera.target - camera.eye;
   auto traced = path_trace(scene, make_environment("black", 4, 2, [](Vec3) { return Vec3(0); }), camera,
@@ -237,12 +253,14 @@ TEST(NormalMap, BacksHaveTheNegatedNormal) {
   ASSERT_TRUE(traced);
   const Receivers receivers = make_vertex_receivers(scene);
   auto tracer = Tracer::build(scene);
-  auto map = bake_lightmap(scene, *tracer, receivers, make_lamps(scene, nullptr, false),
-                           {.samples = 64, .bounces = 0, .directional = DirectionalKind::vector, .precision = Precision::single}, false);
+  auto map = bake_lightmap(
+      scene, *tracer, receivers, make_lamps(scene, nullptr, false),
+      {.samples = 64, .bounces = 0, .directional = DirectionalKind::vector, .precision = Precision::single}, false);
   ASSERT_TRUE(map);
   Relit relit;
   relight(map->all, std::vector<Vec3>{Vec3(1)}, relit);
-  auto image = render(scene, *tracer, receivers.basis, relit, camera, {.width = 96, .height = 72, .samples = 64, .directional = DirectionalKind::vector});
+  auto image = render(scene, *tracer, receivers.basis, relit, camera,
+                      {.width = 96, .height = 72, .samples = 64, .directional = DirectionalKind::vector});
   ASSERT_TRUE(image);
   EXPECT_LT(difference(*image, traced->image), 0.01);
 }
@@ -256,11 +274,13 @@ TEST(Show, RadiosityTimesAlbedoIsTheProduct) {
   relit.values.assign((receivers.count() + transfer_block - 1) / transfer_block * 3 * transfer_block, 0.0f);
   for (size_t r = 0; r < receivers.count(); ++r) relit.set(r, 0, float(r + 1) * Vec3(0.25f, 0.5f, 0.75f));
   auto shown = [&](RenderOptions::Show show) {
-    auto image = render(scene, *tracer, receivers.basis, relit, camera_around(bounds(scene)), {.width = 24, .height = 24, .samples = 1, .show = show});
+    auto image = render(scene, *tracer, receivers.basis, relit, camera_around(bounds(scene)),
+                        {.width = 24, .height = 24, .samples = 1, .show = show});
     EXPECT_TRUE(image);
     return *image;
   };
-  const Image product = shown(RenderOptions::Show::product), light = shown(RenderOptions::Show::radiosity), colour = shown(RenderOptions::Show::albedo);
+  const Image product = shown(RenderOptions::Show::product), light = shown(RenderOptions::Show::radiosity),
+              colour = shown(RenderOptions::Show::albedo);
   double sum = 0;
   for (size_t i = 0; i < product.rgb.size(); ++i) {
     for (int c = 0; c < 3; ++c) EXPECT_FLOAT_EQ(product.rgb[i][c], light.rgb[i][c] * colour.rgb[i][c]);

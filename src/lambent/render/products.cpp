@@ -3,8 +3,9 @@
 
 namespace lambent {
 
-ProductReceivers make_product_receivers(const Scene& scene, const std::vector<uint32_t>& front, const std::vector<uint32_t>& back, size_t count,
-                                        const Reflection& reflection, const Cube& cube, const Sampling& sampling) {
+ProductReceivers make_product_receivers(const Scene& scene, const std::vector<uint32_t>& front,
+                                        const std::vector<uint32_t>& back, size_t count, const Reflection& reflection,
+                                        const Cube& cube, const Sampling& sampling) {
   ProductReceivers out;
   out.positions.assign(count, Vec3(0)), out.frames.assign(count, Mat3(1.0f)), out.material_of.assign(count, 0);
   std::vector<Vec3> face_normal(scene.positions.size(), Vec3(0));
@@ -31,18 +32,21 @@ ProductReceivers make_product_receivers(const Scene& scene, const std::vector<ui
   return out;
 }
 
-std::vector<uint32_t> seen_receivers(const Scene& scene, const std::vector<uint32_t>& front, const std::vector<uint32_t>& back, size_t count, const Camera& camera,
-                                     int width, int height) {
+std::vector<uint32_t> seen_receivers(const Scene& scene, const std::vector<uint32_t>& front,
+                                     const std::vector<uint32_t>& back, size_t count, const Camera& camera, int width,
+                                     int height) {
   const CameraRays rays(camera, width, height);
   // Planes through the eye and the picture's sides, inward.
   const Vec3 right = rays.dx * float(width), down = rays.dy * float(height), corner = rays.corner;
   const Vec3 forward = corner + 0.5f * (right + down);
-  Vec3 planes[4] = {glm::cross(corner, down), glm::cross(corner + right, down), glm::cross(corner, right), glm::cross(corner + down, right)};
+  Vec3 planes[4] = {glm::cross(corner, down), glm::cross(corner + right, down), glm::cross(corner, right),
+                    glm::cross(corner + down, right)};
   for (Vec3& p : planes)
     if (glm::dot(p, forward) < 0) p = -p;
   std::vector<uint8_t> wanted(count, 0);
   for (const Triangle& t : scene.triangles) {
-    const Vec3 a = scene.positions[t.v[0]] - rays.eye, b = scene.positions[t.v[1]] - rays.eye, c = scene.positions[t.v[2]] - rays.eye;
+    const Vec3 a = scene.positions[t.v[0]] - rays.eye, b = scene.positions[t.v[1]] - rays.eye,
+               c = scene.positions[t.v[2]] - rays.eye;
     const bool is_front = glm::dot(area_normal(scene, t), a) < 0;
     const auto& side = is_front ? front : back;
     if (side.empty()) continue;

@@ -22,7 +22,8 @@ Scene ball_on_floor(int cells, int levels) {
 
 // A sky and a sun of half a degree, off every axis.
 Environment sun_and_sky() {
-  Environment env = make_environment("sun", 720, 360, [](Vec3 d) { return Vec3(0.25f + 0.15f * d.y, 0.3f + 0.15f * d.y, 0.4f + 0.1f * d.y); });
+  Environment env = make_environment(
+      "sun", 720, 360, [](Vec3 d) { return Vec3(0.25f + 0.15f * d.y, 0.3f + 0.15f * d.y, 0.4f + 0.1f * d.y); });
   env.image.at(430, 95) = Vec3(30000, 27000, 22000);  // irradiance of about 2
   return env;
 }
@@ -39,15 +40,18 @@ struct Pictures {
   size_t seen = 0, receivers = 0;
 };
 
-Pictures draw(const Scene& scene, const Environment& env, const Reflection& reflection, VisibilityOptions bake, int size) {
+Pictures draw(const Scene& scene, const Environment& env, const Reflection& reflection, VisibilityOptions bake,
+              int size) {
   const auto tracer = Tracer::build(scene);
   const Receivers receivers = make_vertex_receivers(scene);
   const Visibility visibility = *bake_visibility(*tracer, receivers, bake);
   BlockLight light;
   set_light(light, cube_light(env, bake.size));
-  const ProductReceivers products = make_product_receivers(scene, receivers.front, receivers.back, receivers.count(), reflection, *light.cube, {});
+  const ProductReceivers products =
+      make_product_receivers(scene, receivers.front, receivers.back, receivers.count(), reflection, *light.cube, {});
   const Camera camera = camera_at_the_side();
-  const std::vector<uint32_t> seen = seen_receivers(scene, receivers.front, receivers.back, receivers.count(), camera, size, size);
+  const std::vector<uint32_t> seen =
+      seen_receivers(scene, receivers.front, receivers.back, receivers.count(), camera, size, size);
   Pictures out;
   out.seen = seen.size(), out.receivers = receivers.count();
   const RenderOptions options{.width = size, .height = size, .samples = 16, .show = RenderOptions::Show::radiosity};
@@ -62,7 +66,8 @@ Pictures draw(const Scene& scene, const Environment& env, const Reflection& refl
 double psnr_of(const Image& a, const Image& b) {
   double peak = 0, sum = 0;
   for (size_t i = 0; i < a.rgb.size(); ++i)
-    for (int c = 0; c < 3; ++c) peak = std::max(peak, double(b.rgb[i][c])), sum += std::pow(double(a.rgb[i][c]) - double(b.rgb[i][c]), 2);
+    for (int c = 0; c < 3; ++c)
+      peak = std::max(peak, double(b.rgb[i][c])), sum += std::pow(double(a.rgb[i][c]) - double(b.rgb[i][c]), 2);
   return 10 * std::log10(peak * peak * 3 * double(a.rgb.size()) / std::max(sum, 1e-30));
 }
 
@@ -73,9 +78,12 @@ TEST(ProductPictures, SharpShadowsAreThoseOfThePathTracer) {
     Reflection reflection;
     reflection.everywhere = brdf;
     const Pictures p = draw(scene, env, reflection, {.size = 64, .bits = 6}, 64);
-    const auto truth = path_trace(scene, env, camera_at_the_side(), {.width = 64, .height = 64, .spp = 128, .bounces = 0, .background = false, .reflection = reflection});
+    const auto truth = path_trace(
+        scene, env, camera_at_the_side(),
+        {.width = 64, .height = 64, .spp = 128, .bounces = 0, .background = false, .reflection = reflection});
     ASSERT_TRUE(truth);
-    std::printf("blocks against standard %.1f dB, standard against path tracer %.1f dB\n", psnr_of(p.blocks, p.standard), psnr_of(p.standard, truth->image));
+    std::printf("blocks against standard %.1f dB, standard against path tracer %.1f dB\n",
+                psnr_of(p.blocks, p.standard), psnr_of(p.standard, truth->image));
     EXPECT_GT(psnr_of(p.blocks, p.standard), 50);
     EXPECT_GT(psnr_of(p.standard, truth->image), 35);
     EXPECT_LT(p.seen, p.receivers);
@@ -90,7 +98,8 @@ TEST(ProductPictures, WhatIsSeenIsShaded) {
   Camera camera = camera_at_the_side();
   for (float fov : {5.0f, 38.0f, 120.0f}) {
     camera.fov = fov;
-    const std::vector<uint32_t> seen = seen_receivers(scene, receivers.front, receivers.back, receivers.count(), camera, 90, 60);
+    const std::vector<uint32_t> seen =
+        seen_receivers(scene, receivers.front, receivers.back, receivers.count(), camera, 90, 60);
     const auto& corners = std::get<CornerReceivers>(receivers.basis);
     const CameraRays rays(camera, 90, 60);
     size_t hits = 0;

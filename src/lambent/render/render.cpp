@@ -24,8 +24,8 @@ struct PixelRay {
   Hit hit;  // no triangle where it meets nothing
   Vec3 direction;
 };
-// Calls a visitor with every pixel, row by row from the top, and its rays. `make_visit` is called once for each row of the picture, on the
-// thread that draws it.
+// Calls a visitor with every pixel, row by row from the top, and its rays. `make_visit` is called once for each row of
+// the picture, on the thread that draws it.
 using VisitPixel = std::function<void(size_t pixel, std::span<const PixelRay> rays)>;
 Result<void> trace_pixels(const Scene& scene, const Tracer& tracer, const Camera& camera, const RenderOptions& options,
                           const std::function<VisitPixel()>& make_visit, Progress* progress) {
@@ -53,123 +53,150 @@ Result<void> trace_pixels(const Scene& scene, const Tracer& tracer, const Camera
 
 // What the light at a hit is multiplied by.
 Vec3 shown_colour(const Scene& scene, const RenderOptions& options, const Hit& hit) {
-  return options.show == RenderOptions::Show::product ? albedo(scene, scene.triangles[hit.triangle], hit.u, hit.v) : Vec3(1);
+  return options.show == RenderOptions::Show::product ? albedo(scene, scene.triangles[hit.triangle], hit.u, hit.v)
+                                                      : Vec3(1);
 }
 
-// O(view) at a hit, as what it is, a row of numbers: radiance is the sum over all add(receiver, row, weight) of weight times that row of
-// T . light. `weights` is scratch, a value a row.
+// O(view) at a hit, as what it is, a row of numbers: radiance is the sum over all add(receiver, row, weight) of weight
+// times that row of T . light. `weights` is scratch, a value a row.
 template <class Add>
-void reflect_at(const Scene& scene, const SpatialBasis& basis, const RenderOptions& options, const Hit& hit, Vec3 direction,
-                std::span<ViewWeights> weights, Add add) {
+void reflect_at(const Scene& scene, const SpatialBasis& basis, const RenderOptions& options, const Hit& hit,
+                Vec3 direction, std::span<ViewWeights> weights, Add add) {
   const Vec3 colour = shown_colour(scene, options, hit);
-  std::visit([&](const auto& b) {
-    const auto* at = b.find(hit.triangle, hit.front);
-    if (!at) return;
-    b.spread(*at, hit.u, hit.v, [&](uint32_t receiver, float weight) {
-      if (!options.outgoing) return add(receiver, 0, weight * colour);
-      evaluate_outgoing(*options.outgoing, receiver, -direction, weights);  // each receiver reflects in its own frame
-      for (size_t row = 0; row < weights.size(); ++row) add(receiver, int(row), weight * (Vec3(weights[row]) + colour * weights[row].w));
-    });
-  }, basis);
+  std::visit(
+      [&](const auto& b) {
+        const auto* at = b.find(hit.triangle, hit.front);
+        if (!at) return;
+        b.spread(*at, hit.u, hit.v, [&](uint32_t receiver, float weight) {
+          if (!options.outgoing) return add(receiver, 0, weight * colour);
+          evaluate_outgoing(*options.outgoing, receiver, -direction,
+                            weights);  // each receiver reflects in its own frame
+          for (size_t row = 0; row < weights.size(); ++row)
+            add(receiver, int(row), weight * (Vec3(weights[row]) + colour * weights[row].w));
+        });
+      },
+      basis);
 }
 
 }  // namespace
 
-Result<Image> render_surfaces(const Scene& scene, const Tracer& tracer, const Camera& camera, const RenderOptions& options,
-                              const std::function<SurfaceShade()>& make_shade, Progress* progress) {
+Result<Image> render_surfaces(const Scene& scene, const Tracer& tracer, const Camera& camera,
+                              const RenderOptions& options, const std::function<SurfaceShade()>& make_shade,
+                              Progress* progress) {
   Image image(options.width, options.height);
   if (!options.background) image.alpha.assign(image.rgb.size(), 0.0f);
-  auto traced = trace_pixels(scene, tracer, camera, options, [&]() -> VisitPixel {
-    return [&, shade = make_shade()](size_t pixel, std::span<const PixelRay> rays) {
-      Vec3 sum(0.0f);
-      size_t covered = 0;
-      for (const PixelRay& ray : rays) {
-        if (ray.hit.triangle != none) sum += shade(ray.hit, ray.direction), ++covered;
-        else if (options.background) sum += radiance_bilinear(*options.background, ray.direction);
-      }
-      image.rgb[pixel] = sum / float(rays.size());
-      if (!options.background) image.alpha[pixel] = float(covered) / float(rays.size());
-    };
-  }, progress);
+  auto traced = trace_pixels(
+      scene, tracer, camera, options,
+      [&]() -> VisitPixel {
+        return [&, shade = make_shade()](size_t pixel, std::span<const PixelRay> rays) {
+          Vec3 sum(0.0f);
+          size_t covered = 0;
+          for (const PixelRay& ray : rays) {
+            if (ray.hit.triangle != none) sum += shade(ray.hit, ray.direction), ++covered;
+            else if (options.background) sum += radiance_bilinear(*options.background, ray.direction);
+          }
+          image.rgb[pixel] = sum / float(rays.size());
+          if (!options.background) image.alpha[pixel] = float(covered) / float(rays.size());
+        };
+      },
+      progress);
   if (!traced) return traced.error();
   return image;
 }
 
 Result<Image> render(const Scene& scene, const Tracer& tracer, const SpatialBasis& basis, const Relit& relit,
                      const Camera& camera, const RenderOptions& options, Progress* progress) {
-  LAMBENT_CHECK(options.outgoing ? relit.rows == options.outgoing->rows() : relit.rows == directional_rows(options.directional));
-  return render_surfaces(scene, tracer, camera, options, [&]() -> SurfaceShade {
-    return [&, weights = std::vector<ViewWeights>(size_t(relit.rows))](const Hit& hit, Vec3 direction) mutable {
-      const Triangle& triangle = scene.triangles[hit.triangle];
-      if (options.show == RenderOptions::Show::albedo) return albedo(scene, triangle, hit.u, hit.v);
-      Vec3 sum(0.0f);
-      if (!options.emission.empty() && emits(scene, triangle, hit.front))
-        sum += options.emission[scene.parts[triangle.part].material] * emission_texel(scene, triangle, hit.u, hit.v);
-      if (options.directional == DirectionalKind::none) {
-        reflect_at(scene, basis, options, hit, direction, weights, [&](uint32_t receiver, int row, Vec3 weight) { sum += weight * relit.at(receiver, row); });
-        return sum;
-      }
-      const Vec3 colour = shown_colour(scene, options, hit);
-      std::array<Vec3, 9> rows{};
-      std::visit([&](const auto& b) {
-        const auto* at = b.find(hit.triangle, hit.front);
-        if (!at) return;
-        b.spread(*at, hit.u, hit.v, [&](uint32_t receiver, float weight) {
-          for (int row = 0; row < relit.rows; ++row) rows[size_t(row)] += weight * relit.at(receiver, row);
-        });
-      }, basis);
-      const float side = hit.front ? 1.0f : -1.0f;
-      const Vec3 face = normalize_or(area_normal(scene, triangle), Vec3(0, 1, 0));
-      Vec3 n = normalize_or(interpolate(scene.normals, triangle, hit.u, hit.v), face);
-      if (glm::dot(n, face) < 0) n = -n;
-      const Vec3 bent = mapped_normal(scene, triangle, hit.u, hit.v, n);
-      return sum + colour * evaluate_directional_light(options.directional, rows, receiver_frame(side * n), side * bent);
-    };
-  }, progress);
+  LAMBENT_CHECK(options.outgoing ? relit.rows == options.outgoing->rows()
+                                 : relit.rows == directional_rows(options.directional));
+  return render_surfaces(
+      scene, tracer, camera, options,
+      [&]() -> SurfaceShade {
+        return [&, weights = std::vector<ViewWeights>(size_t(relit.rows))](const Hit& hit, Vec3 direction) mutable {
+          const Triangle& triangle = scene.triangles[hit.triangle];
+          if (options.show == RenderOptions::Show::albedo) return albedo(scene, triangle, hit.u, hit.v);
+          Vec3 sum(0.0f);
+          if (!options.emission.empty() && emits(scene, triangle, hit.front))
+            sum += options.emission[scene.parts[triangle.part].material] *
+                   emission_texel(scene, triangle, hit.u, hit.v);
+          if (options.directional == DirectionalKind::none) {
+            reflect_at(scene, basis, options, hit, direction, weights,
+                       [&](uint32_t receiver, int row, Vec3 weight) { sum += weight * relit.at(receiver, row); });
+            return sum;
+          }
+          const Vec3 colour = shown_colour(scene, options, hit);
+          std::array<Vec3, 9> rows{};
+          std::visit(
+              [&](const auto& b) {
+                const auto* at = b.find(hit.triangle, hit.front);
+                if (!at) return;
+                b.spread(*at, hit.u, hit.v, [&](uint32_t receiver, float weight) {
+                  for (int row = 0; row < relit.rows; ++row) rows[size_t(row)] += weight * relit.at(receiver, row);
+                });
+              },
+              basis);
+          const float side = hit.front ? 1.0f : -1.0f;
+          const Vec3 face = normalize_or(area_normal(scene, triangle), Vec3(0, 1, 0));
+          Vec3 n = normalize_or(interpolate(scene.normals, triangle, hit.u, hit.v), face);
+          if (glm::dot(n, face) < 0) n = -n;
+          const Vec3 bent = mapped_normal(scene, triangle, hit.u, hit.v, n);
+          return sum +
+                 colour * evaluate_directional_light(options.directional, rows, receiver_frame(side * n), side * bent);
+        };
+      },
+      progress);
 }
 
-Result<FixedViewTransfer> fix_view(const Scene& scene, const Tracer& tracer, const SpatialBasis& basis, const Transfer& transfer, const Camera& camera,
-                                   const RenderOptions& options, Progress* progress) {
+Result<FixedViewTransfer> fix_view(const Scene& scene, const Tracer& tracer, const SpatialBasis& basis,
+                                   const Transfer& transfer, const Camera& camera, const RenderOptions& options,
+                                   Progress* progress) {
   LAMBENT_CHECK(transfer.rows == (options.outgoing ? options.outgoing->rows() : 1));
-  const size_t pixels = size_t(options.width) * size_t(options.height), C = transfer.columns(), channels = size_t(transfer.channels);
+  const size_t pixels = size_t(options.width) * size_t(options.height), C = transfer.columns(),
+               channels = size_t(transfer.channels);
   FixedViewTransfer out;
   out.coverage.assign(pixels, 0.0f);
   const WritableTransfer fixed = make_transfer(transfer.light, 1, 3, pixels, transfer.precision);
-  auto traced = trace_pixels(scene, tracer, camera, options, [&]() -> VisitPixel {
-    // What a pixel's rays ask of the receivers, row by row, is gathered first: many meet the same ones.
-    using Asked = std::pair<uint32_t, std::vector<Vec3>>;
-    return [&, asked = std::vector<Asked>(), weights = std::vector<ViewWeights>(size_t(transfer.rows)), row = std::vector<float>(3 * C)](
-               size_t pixel, std::span<const PixelRay> rays) mutable {
-      asked.clear();
-      size_t covered = 0;
-      for (const PixelRay& ray : rays) {
-        if (ray.hit.triangle == none) continue;
-        ++covered;
-        reflect_at(scene, basis, options, ray.hit, ray.direction, weights, [&](uint32_t receiver, int r, Vec3 weight) {
-          auto place = std::find_if(asked.begin(), asked.end(), [&](const Asked& a) { return a.first == receiver; });
-          if (place == asked.end()) place = asked.insert(asked.end(), {receiver, std::vector<Vec3>(size_t(transfer.rows), Vec3(0.0f))});
-          place->second[size_t(r)] += weight / float(rays.size());
-        });
-      }
-      std::fill(row.begin(), row.end(), 0.0f);
-      for (const auto& [receiver, of_rows] : asked) {
-        const std::vector<float> values = load_receiver(transfer, receiver);  // [row][channel][column]
-        for (size_t r = 0; r < of_rows.size(); ++r)
-          for (size_t c = 0; c < 3; ++c) {
-            const float* v = values.data() + (r * channels + std::min(c, channels - 1)) * C;
-            for (size_t k = 0; k < C; ++k) row[c * C + k] += of_rows[r][int(c)] * v[k];
+  auto traced = trace_pixels(
+      scene, tracer, camera, options,
+      [&]() -> VisitPixel {
+        // What a pixel's rays ask of the receivers, row by row, is gathered first: many meet the same ones.
+        using Asked = std::pair<uint32_t, std::vector<Vec3>>;
+        return [&, asked = std::vector<Asked>(), weights = std::vector<ViewWeights>(size_t(transfer.rows)),
+                row = std::vector<float>(3 * C)](size_t pixel, std::span<const PixelRay> rays) mutable {
+          asked.clear();
+          size_t covered = 0;
+          for (const PixelRay& ray : rays) {
+            if (ray.hit.triangle == none) continue;
+            ++covered;
+            reflect_at(
+                scene, basis, options, ray.hit, ray.direction, weights, [&](uint32_t receiver, int r, Vec3 weight) {
+                  auto place =
+                      std::find_if(asked.begin(), asked.end(), [&](const Asked& a) { return a.first == receiver; });
+                  if (place == asked.end())
+                    place = asked.insert(asked.end(), {receiver, std::vector<Vec3>(size_t(transfer.rows), Vec3(0.0f))});
+                  place->second[size_t(r)] += weight / float(rays.size());
+                });
           }
-      }
-      store_receiver(fixed, pixel, row);
-      out.coverage[pixel] = float(covered) / float(rays.size());
-    };
-  }, progress);
+          std::fill(row.begin(), row.end(), 0.0f);
+          for (const auto& [receiver, of_rows] : asked) {
+            const std::vector<float> values = load_receiver(transfer, receiver);  // [row][channel][column]
+            for (size_t r = 0; r < of_rows.size(); ++r)
+              for (size_t c = 0; c < 3; ++c) {
+                const float* v = values.data() + (r * channels + std::min(c, channels - 1)) * C;
+                for (size_t k = 0; k < C; ++k) row[c * C + k] += of_rows[r][int(c)] * v[k];
+              }
+          }
+          store_receiver(fixed, pixel, row);
+          out.coverage[pixel] = float(covered) / float(rays.size());
+        };
+      },
+      progress);
   if (!traced) return traced.error();
   out.transfer = fixed.transfer;
   return out;
 }
 
-Image pixels_image(const Relit& relit, const std::vector<float>& coverage, const Camera& camera, int width, int height, const Environment* background) {
+Image pixels_image(const Relit& relit, const std::vector<float>& coverage, const Camera& camera, int width, int height,
+                   const Environment* background) {
   Image image(width, height);
   const CameraRays rays(camera, width, height);
   for (size_t i = 0; i < image.rgb.size(); ++i) {

@@ -15,37 +15,43 @@
 namespace lambent {
 
 struct RenderOptions {
-  int width = 512, height = 512;  // pixels
-  int samples = 16;               // rays a pixel, [1, 4096], box filter
+  int width = 512, height = 512;            // pixels
+  int samples = 16;                         // rays a pixel, [1, 4096], box filter
   const Environment* background = nullptr;  // null: black, and the image has alpha (coverage)
   // The light that surfaces receive, as if they were white (radiosity); their colour; or the product of both.
   enum class Show { product, radiosity, albedo } show = Show::product;
   const Outgoing* outgoing = nullptr;  // the last reflection of transfer matrices; null: diffuse
-  DirectionalKind directional = DirectionalKind::none;  // what relit's rows are; shaded with the normal that the normal texture gives
-  std::vector<Vec3> emission;     // radiance of each material's surfaces as lamps that are seen, times emissive textures; empty: none are
+  DirectionalKind directional =
+      DirectionalKind::none;   // what relit's rows are; shaded with the normal that the normal texture gives
+  std::vector<Vec3> emission;  // radiance of each material's surfaces as lamps that are seen, times emissive textures;
+                               // empty: none are
 };
 
 // One-sided triangles are absent from behind, as in any glTF viewer. Errors: cancelled.
 Result<Image> render(const Scene& scene, const Tracer& tracer, const SpatialBasis& basis, const Relit& relit,
                      const Camera& camera, const RenderOptions& options, Progress* progress = nullptr);
 
-// O(view) . T with the view fixed: a transfer whose receivers are the pixels of a picture, row by row from the top, with one row and
-// three channels, so that relighting is T . light and the picture is there. Directional lightmaps and lamps that are seen are left out. coverage: of
-// each pixel, [0, 1]. Source: general-prt, "Special cases" (fixed view: image relighting). Errors: cancelled.
+// O(view) . T with the view fixed: a transfer whose receivers are the pixels of a picture, row by row from the top,
+// with one row and three channels, so that relighting is T . light and the picture is there. Directional lightmaps and
+// lamps that are seen are left out. coverage: of each pixel, [0, 1]. Source: general-prt, "Special cases" (fixed view:
+// image relighting). Errors: cancelled.
 struct FixedViewTransfer {
   Transfer transfer;
   std::vector<float> coverage;
 };
-Result<FixedViewTransfer> fix_view(const Scene& scene, const Tracer& tracer, const SpatialBasis& basis, const Transfer& transfer, const Camera& camera,
-                                   const RenderOptions& options, Progress* progress = nullptr);
+Result<FixedViewTransfer> fix_view(const Scene& scene, const Tracer& tracer, const SpatialBasis& basis,
+                                   const Transfer& transfer, const Camera& camera, const RenderOptions& options,
+                                   Progress* progress = nullptr);
 
 // The picture of such a transfer, relit.
-Image pixels_image(const Relit& relit, const std::vector<float>& coverage, const Camera& camera, int width, int height, const Environment* background);
+Image pixels_image(const Relit& relit, const std::vector<float>& coverage, const Camera& camera, int width, int height,
+                   const Environment* background);
 
-// What render() is made of: primary rays, and `shade` for the radiance of what they meet, in the direction that they came along.
-// `make_shade` is called once for each row, on the thread that draws it.
+// What render() is made of: primary rays, and `shade` for the radiance of what they meet, in the direction that they
+// came along. `make_shade` is called once for each row, on the thread that draws it.
 using SurfaceShade = std::function<Vec3(const Hit&, Vec3 direction)>;
-Result<Image> render_surfaces(const Scene& scene, const Tracer& tracer, const Camera& camera, const RenderOptions& options,
-                              const std::function<SurfaceShade()>& make_shade, Progress* progress = nullptr);
+Result<Image> render_surfaces(const Scene& scene, const Tracer& tracer, const Camera& camera,
+                              const RenderOptions& options, const std::function<SurfaceShade()>& make_shade,
+                              Progress* progress = nullptr);
 
 }  // namespace lambent

@@ -11,8 +11,10 @@ namespace {
 
 Scene red_and_green() {
   Scene scene;
-  add_quad(scene, add_material(scene, "floor", Vec3(0.8f, 0.2f, 0.1f)), "floor", Vec3(-1, 0, -1), Vec3(0, 0, 2), Vec3(2, 0, 0), 6, 6);
-  add_box(scene, add_material(scene, "block", Vec3(0.2f, 0.7f, 0.3f)), "block", Vec3(-0.4f, 0.01f, -0.4f), Vec3(0.2f, 0.8f, 0.2f), 3);
+  add_quad(scene, add_material(scene, "floor", Vec3(0.8f, 0.2f, 0.1f)), "floor", Vec3(-1, 0, -1), Vec3(0, 0, 2),
+           Vec3(2, 0, 0), 6, 6);
+  add_box(scene, add_material(scene, "block", Vec3(0.2f, 0.7f, 0.3f)), "block", Vec3(-0.4f, 0.01f, -0.4f),
+          Vec3(0.2f, 0.8f, 0.2f), 3);
   return scene;
 }
 
@@ -21,7 +23,8 @@ struct View {
   RenderOptions options{24, 18, 9};
 };
 
-void expect_same_pictures(const Scene& scene, const Tracer& tracer, const Receivers& receivers, const Transfer& transfer, const Outgoing* outgoing) {
+void expect_same_pictures(const Scene& scene, const Tracer& tracer, const Receivers& receivers,
+                          const Transfer& transfer, const Outgoing* outgoing) {
   View v;
   v.options.outgoing = outgoing;
   auto fixed = fix_view(scene, tracer, receivers.basis, transfer, v.camera, v.options);
@@ -41,7 +44,8 @@ void expect_same_pictures(const Scene& scene, const Tracer& tracer, const Receiv
     const Image image = pixels_image(pixels, fixed->coverage, v.camera, 24, 18, nullptr);
     size_t covered = 0;
     for (size_t i = 0; i < image.rgb.size(); ++i) {
-      for (int c = 0; c < 3; ++c) EXPECT_NEAR(image.rgb[i][c], drawn->rgb[i][c], 2e-5f * (1 + std::abs(drawn->rgb[i][c]))) << i;
+      for (int c = 0; c < 3; ++c)
+        EXPECT_NEAR(image.rgb[i][c], drawn->rgb[i][c], 2e-5f * (1 + std::abs(drawn->rgb[i][c]))) << i;
       EXPECT_EQ(image.alpha[i], drawn->alpha[i]);
       covered += image.alpha[i] > 0;
     }
@@ -65,8 +69,9 @@ TEST(Render, FixedViewIsThePictureForAnyLight) {
   ASSERT_EQ(grey->channels, 1);
   expect_same_pictures(scene, *tracer, receivers, *grey, nullptr);
   for (OutgoingKind kind : {OutgoingKind::map, OutgoingKind::sh}) {
-    auto glossy = bake_matrix(scene, *tracer, receivers, make_receiver_materials(scene, receivers, {.everywhere = Ggx{.alpha = Vec2(0.2f)}}), options,
-                              {.incident_order = 3, .outgoing = kind, .outgoing_order = 3, .grid = 8, .response_samples = 64});
+    auto glossy = bake_matrix(
+        scene, *tracer, receivers, make_receiver_materials(scene, receivers, {.everywhere = Ggx{.alpha = Vec2(0.2f)}}),
+        options, {.incident_order = 3, .outgoing = kind, .outgoing_order = 3, .grid = 8, .response_samples = 64});
     ASSERT_TRUE(glossy);
     expect_same_pictures(scene, *tracer, receivers, glossy->transfer, &glossy->outgoing);
   }
@@ -78,7 +83,8 @@ TEST(Render, FixedViewOfAnOpenPlaneIsTheLightItself) {
   auto tracer = Tracer::build(scene);
   const Receivers receivers = make_vertex_receivers(scene);
   auto transfer = bake(scene, *tracer, receivers, {.order = 2, .shadows = false, .precision = Precision::single});
-  auto fixed = fix_view(scene, *tracer, receivers.basis, *transfer, Camera{Vec3(0, 1, 0.01f), Vec3(0), Vec3(0, 1, 0), 20}, {4, 4, 4});
+  auto fixed = fix_view(scene, *tracer, receivers.basis, *transfer,
+                        Camera{Vec3(0, 1, 0.01f), Vec3(0), Vec3(0, 1, 0), 20}, {4, 4, 4});
   ASSERT_TRUE(fixed);
   std::vector<Vec3> light(4, Vec3(0.0f));
   light[0] = Vec3(0.5f, 1, 2) * std::sqrt(4 * pi);

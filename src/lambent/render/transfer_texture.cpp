@@ -6,7 +6,8 @@ namespace lambent {
 Mat3 texture_frame(const Scene& scene, const Triangle& t, Vec3 normal) {
   const std::vector<Vec2>& uv = scene.texcoords[0];
   if (uv.empty()) return frame_about(normal);
-  const Vec3 e1 = scene.positions[t.v[1]] - scene.positions[t.v[0]], e2 = scene.positions[t.v[2]] - scene.positions[t.v[0]];
+  const Vec3 e1 = scene.positions[t.v[1]] - scene.positions[t.v[0]],
+             e2 = scene.positions[t.v[2]] - scene.positions[t.v[0]];
   const Vec2 d1 = uv[t.v[1]] - uv[t.v[0]], d2 = uv[t.v[2]] - uv[t.v[0]];
   const float area = d1.x * d2.y - d2.x * d1.y;
   if (!(std::abs(area) > 0) || !std::isfinite(area)) return frame_about(normal);
@@ -25,7 +26,8 @@ Mat3 groove_frame(const Scene& scene, const Triangle& t, Vec2 tile, Vec3 normal)
   const std::vector<Vec2>& uv = scene.texcoords[0];
   if (uv.empty()) return frame_about(normal);
   using glm::dvec2, glm::dvec3;  // edges and coordinates of any size, to the fourth power
-  const dvec3 p(scene.positions[t.v[0]]), e1 = dvec3(scene.positions[t.v[1]]) - p, e2 = dvec3(scene.positions[t.v[2]]) - p, a = glm::cross(e1, e2);
+  const dvec3 p(scene.positions[t.v[0]]), e1 = dvec3(scene.positions[t.v[1]]) - p,
+                                          e2 = dvec3(scene.positions[t.v[2]]) - p, a = glm::cross(e1, e2);
   const dvec2 d1(uv[t.v[1]] - uv[t.v[0]]), d2(uv[t.v[2]] - uv[t.v[0]]);
   // The gradient of tile . uv over the triangle, in the plane of the normal.
   dvec3 across = glm::dot(dvec2(tile), d1) * glm::cross(e2, a) - glm::dot(dvec2(tile), d2) * glm::cross(e1, a);
@@ -36,31 +38,37 @@ Mat3 groove_frame(const Scene& scene, const Triangle& t, Vec2 tile, Vec3 normal)
   return {x, glm::cross(normal, x), normal};
 }
 
-Result<Image> render_transfer_texture(const Scene& scene, const Tracer& tracer, const ZonalTexture& texture, const TextureUse& use, const LocalLight& light,
-                                      const Camera& camera, const RenderOptions& options, Progress* progress) {
-  return render_surfaces(scene, tracer, camera, options, [&]() -> SurfaceShade {
-    return [&, values = std::vector<float>(texture.transfer.receiver_values()), here = light.distant](const Hit& hit, Vec3) mutable {
-      const Triangle& t = scene.triangles[hit.triangle];
-      Vec3 normal = normalize_or(interpolate(scene.normals, t, hit.u, hit.v), {0, 0, 1});
-      if (!hit.front) normal = -normal;
-      const bool placed = !scene.texcoords[0].empty();
-      const Vec2 uv = placed ? interpolate(scene.texcoords[0], t, hit.u, hit.v) : Vec2(0.0f);
-      Mat3 frame;
-      if (texture.groove_depth > 0) {
-        const float phase = glm::dot(uv, use.tile), x = (phase - std::floor(phase) - 0.5f) / use.groove_width;
-        sample_groove(texture, placed ? x : 1, use.groove_depth * (use.groove_map ? use.groove_map(uv) : 1), values);
-        frame = groove_frame(scene, t, use.tile, normal);
-      } else {
-        sample_zonal_texture(texture, uv * use.tile, values);
-        frame = texture_frame(scene, t, normal);
-      }
-      if (!light.lamps.empty()) light_at(light, interpolate(scene.positions, t, hit.u, hit.v), here);
-      const Vec3 white = shade_zonal(texture.transfer, values, frame, here);
-      if (options.show == RenderOptions::Show::radiosity) return white;
-      const Vec3 colour = albedo(scene, t, hit.u, hit.v);
-      return options.show == RenderOptions::Show::albedo ? colour : colour * white;
-    };
-  }, progress);
+Result<Image> render_transfer_texture(const Scene& scene, const Tracer& tracer, const ZonalTexture& texture,
+                                      const TextureUse& use, const LocalLight& light, const Camera& camera,
+                                      const RenderOptions& options, Progress* progress) {
+  return render_surfaces(
+      scene, tracer, camera, options,
+      [&]() -> SurfaceShade {
+        return [&, values = std::vector<float>(texture.transfer.receiver_values()), here = light.distant](
+                   const Hit& hit, Vec3) mutable {
+          const Triangle& t = scene.triangles[hit.triangle];
+          Vec3 normal = normalize_or(interpolate(scene.normals, t, hit.u, hit.v), {0, 0, 1});
+          if (!hit.front) normal = -normal;
+          const bool placed = !scene.texcoords[0].empty();
+          const Vec2 uv = placed ? interpolate(scene.texcoords[0], t, hit.u, hit.v) : Vec2(0.0f);
+          Mat3 frame;
+          if (texture.groove_depth > 0) {
+            const float phase = glm::dot(uv, use.tile), x = (phase - std::floor(phase) - 0.5f) / use.groove_width;
+            sample_groove(texture, placed ? x : 1, use.groove_depth * (use.groove_map ? use.groove_map(uv) : 1),
+                          values);
+            frame = groove_frame(scene, t, use.tile, normal);
+          } else {
+            sample_zonal_texture(texture, uv * use.tile, values);
+            frame = texture_frame(scene, t, normal);
+          }
+          if (!light.lamps.empty()) light_at(light, interpolate(scene.positions, t, hit.u, hit.v), here);
+          const Vec3 white = shade_zonal(texture.transfer, values, frame, here);
+          if (options.show == RenderOptions::Show::radiosity) return white;
+          const Vec3 colour = albedo(scene, t, hit.u, hit.v);
+          return options.show == RenderOptions::Show::albedo ? colour : colour * white;
+        };
+      },
+      progress);
 }
 
 }  // namespace lambent

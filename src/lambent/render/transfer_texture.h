@@ -1,32 +1,34 @@
 #pragma once
-// Pictures of surfaces that carry a transfer texture: relief that shades itself, on any mesh, deforming or not. The mesh itself casts no
-// shadow. Source: local-deformable-prt, section 5.
+// Pictures of surfaces that carry a transfer texture: relief that shades itself, on any mesh, deforming or not. The
+// mesh itself casts no shadow. Source: local-deformable-prt, section 5.
 #include <lambent/relight/local_light.h>
 #include <lambent/render/render.h>
 #include <lambent/transfer/zonal_texture.h>
 
 namespace lambent {
 
-// The frame (T, B, N) of texture directions at a point of a triangle: along +u, along -v, and the normal; orthogonal, not always
-// right-handed. Triangles without texture coordinates of their own get frame_about(normal).
+// The frame (T, B, N) of texture directions at a point of a triangle: along +u, along -v, and the normal; orthogonal,
+// not always right-handed. Triangles without texture coordinates of their own get frame_about(normal).
 Mat3 texture_frame(const Scene& scene, const Triangle& triangle, Vec3 normal);
 
-// The frame of a groove at a point of a triangle, right-handed: across it, along which `tile` . (texture coordinates) rises, along it, and the normal.
+// The frame of a groove at a point of a triangle, right-handed: across it, along which `tile` . (texture coordinates)
+// rises, along it, and the normal.
 Mat3 groove_frame(const Scene& scene, const Triangle& triangle, Vec2 tile, Vec3 normal);
 
 // How a texture lies on a surface, over texture coordinates uv of set 0.
 struct TextureUse {
-  // Repetitions over the unit of uv. Of grooves: they lie side by side across the direction of `tile`, a repetition each: (12, 0) makes 12 over the
-  // unit of u, which run along v.
+  // Repetitions over the unit of uv. Of grooves: they lie side by side across the direction of `tile`, a repetition
+  // each: (12, 0) makes 12 over the unit of u, which run along v.
   Vec2 tile{1.0f};
-  float groove_width = 1;  // of a repetition, (0, 1]
-  float groove_depth = 1;  // in widths
+  float groove_width = 1;                 // of a repetition, (0, 1]
+  float groove_depth = 1;                 // in widths
   std::function<float(Vec2)> groove_map;  // optional: what the depth is multiplied by, at uv
 };
 
-// `light` has as many coefficients as the texture's order asks for. As render() otherwise; parts of the scene without texture coordinates show the
-// texture's first texel, or its plane.
-Result<Image> render_transfer_texture(const Scene& scene, const Tracer& tracer, const ZonalTexture& texture, const TextureUse& use, const LocalLight& light,
-                                      const Camera& camera, const RenderOptions& options, Progress* progress = nullptr);
+// `light` has as many coefficients as the texture's order asks for. As render() otherwise; parts of the scene without
+// texture coordinates show the texture's first texel, or its plane.
+Result<Image> render_transfer_texture(const Scene& scene, const Tracer& tracer, const ZonalTexture& texture,
+                                      const TextureUse& use, const LocalLight& light, const Camera& camera,
+                                      const RenderOptions& options, Progress* progress = nullptr);
 
 }  // namespace lambent

@@ -38,17 +38,21 @@ TEST(TransferTexture, GroovesLieAlikeAtAnyScale) {
     s.texcoords[0] = {{0, 1}, {1e-3f, 1}, {0, 1 - 1e-3f}};
     s.triangles.push_back({{0, 1, 2}, 0, false});
     // v falls along -z.
-    EXPECT_LT(glm::length(groove_frame(s, s.triangles[0], Vec2(0, 12), Vec3(0, 1, 0))[0] - Vec3(0, 0, 1)), 1e-4f) << scale;
-    EXPECT_LT(glm::length(groove_frame(s, s.triangles[0], Vec2(-5, 0), Vec3(0, 1, 0))[0] - Vec3(-1, 0, 0)), 1e-4f) << scale;
+    EXPECT_LT(glm::length(groove_frame(s, s.triangles[0], Vec2(0, 12), Vec3(0, 1, 0))[0] - Vec3(0, 0, 1)), 1e-4f)
+        << scale;
+    EXPECT_LT(glm::length(groove_frame(s, s.triangles[0], Vec2(-5, 0), Vec3(0, 1, 0))[0] - Vec3(-1, 0, 0)), 1e-4f)
+        << scale;
   }
 }
 
-// A wall in the xy plane that carries the texture, looked at from far in front, is shaded as the relief: the same receivers, relit.
+// A wall in the xy plane that carries the texture, looked at from far in front, is shaded as the relief: the same
+// receivers, relit.
 TEST(TransferTexture, ShadesAFlatWallAsTheReliefItself) {
   const int n = 16;
   HeightField field{n, {}};
   for (int j = 0; j < n; ++j)
-    for (int i = 0; i < n; ++i) field.heights.push_back(0.1f * std::sin(2 * pi * float(i) / n + 0.5f * std::sin(2 * pi * float(j) / n)));
+    for (int i = 0; i < n; ++i)
+      field.heights.push_back(0.1f * std::sin(2 * pi * float(i) / n + 0.5f * std::sin(2 * pi * float(j) / n)));
   const PatchScene patch = make_patch(field, Vec3(0.6f));
   auto tracer = Tracer::build(patch.scene);
   BakeOptions bake_options;
@@ -60,7 +64,8 @@ TEST(TransferTexture, ShadesAFlatWallAsTheReliefItself) {
   const ZonalTexture texture{n, n, *lobes};
 
   std::vector<Vec3> light(36);
-  for (size_t k = 0; k < 36; ++k) light[k] = Vec3(std::sin(float(k) * 1.7f) / float(1 + k / 6), 0.1f * float(k % 5), std::cos(float(k)));
+  for (size_t k = 0; k < 36; ++k)
+    light[k] = Vec3(std::sin(float(k) * 1.7f) / float(1 + k / 6), 0.1f * float(k % 5), std::cos(float(k)));
   Relit relit;
   relight(*transfer, light, relit);
 
@@ -129,15 +134,17 @@ struct WavyRelief {
 WavyRelief wavy_relief(int n) {
   HeightField field{n, {}};
   for (int j = 0; j < n; ++j)
-    for (int i = 0; i < n; ++i) field.heights.push_back(0.08f * std::sin(2 * pi * float(i) / n + std::sin(2 * pi * float(j) / n)));
+    for (int i = 0; i < n; ++i)
+      field.heights.push_back(0.08f * std::sin(2 * pi * float(i) / n + std::sin(2 * pi * float(j) / n)));
   const PatchScene patch = make_patch(field, Vec3(0.5f));
   auto tracer = Tracer::build(patch.scene);
-  auto transfer = bake(patch.scene, *tracer, patch.receivers, {.samples = 1024, .bounces = 2, .precision = Precision::single});
+  auto transfer =
+      bake(patch.scene, *tracer, patch.receivers, {.samples = 1024, .bounces = 2, .precision = Precision::single});
   return {field, {n, n, *fit_zonal(*transfer, {.lobes = 4})}};
 }
 
-// Sheets of relief for real, flat and bent, path-traced: other geometry, other rays, other reconstruction of the same light. A texture has no
-// parallax, so each is looked at along its normals.
+// Sheets of relief for real, flat and bent, path-traced: other geometry, other rays, other reconstruction of the same
+// light. A texture has no parallax, so each is looked at along its normals.
 TEST(TransferTexture, ShadesSheetsAsTheirDisplacedGeometry) {
   const WavyRelief wavy = wavy_relief(24);
   const Scene sheet = tiled_sheet(24 * 5);
@@ -152,10 +159,12 @@ TEST(TransferTexture, ShadesSheetsAsTheirDisplacedGeometry) {
     const Camera camera = from_above(100 - middle.distance);
     RenderOptions options;
     options.width = options.height = 48, options.samples = 64;
-    auto ours = render_transfer_texture(bent, *tracer, wavy.texture, {.tile = Vec2(5)}, {light, {}, {}}, camera, options);
+    auto ours =
+        render_transfer_texture(bent, *tracer, wavy.texture, {.tile = Vec2(5)}, {light, {}, {}}, camera, options);
     ASSERT_TRUE(ours);
     Scene relief = bent;
-    ASSERT_TRUE(displace(relief, [&](Vec2 uv) { return wavy.at(uv); }, Vec2(5)));
+    ASSERT_TRUE(displace(
+        relief, [&](Vec2 uv) { return wavy.at(uv); }, Vec2(5)));
     ReferenceOptions traced;
     traced.width = traced.height = 48, traced.spp = 256, traced.bounces = 3;
     auto truth = path_trace(relief, env, camera, traced);
@@ -166,7 +175,8 @@ TEST(TransferTexture, ShadesSheetsAsTheirDisplacedGeometry) {
   }
 }
 
-// Grooves from the table against grooves of triangles, path-traced: across u and across v, of two depths, wide and narrow, flat and bent.
+// Grooves from the table against grooves of triangles, path-traced: across u and across v, of two depths, wide and
+// narrow, flat and bent.
 TEST(TransferTexture, GroovesAreThoseOfDisplacedGeometry) {
   auto table = make_wrinkle_table({});
   ASSERT_TRUE(table);
@@ -177,7 +187,10 @@ TEST(TransferTexture, GroovesAreThoseOfDisplacedGeometry) {
     float width, depth;
     const char* deform;
   };
-  for (const Case& c : {Case{{5, 0}, 1, 0.5f, "bend:0.01,x,y"}, {{5, 0}, 1, 0.9f, "bend:0.01,x,y"}, {{0, 5}, 0.6f, 0.5f, "bend:0.01,x,y"}, {{5, 0}, 1, 0.5f, "bend:-100,x,y"}}) {
+  for (const Case& c : {Case{{5, 0}, 1, 0.5f, "bend:0.01,x,y"},
+                        {{5, 0}, 1, 0.9f, "bend:0.01,x,y"},
+                        {{0, 5}, 0.6f, 0.5f, "bend:0.01,x,y"},
+                        {{5, 0}, 1, 0.5f, "bend:-100,x,y"}}) {
     const Scene sheet = tiled_sheet(240);
     const Scene bent = posed(sheet, deform_scene(sheet, *parse_deformation(c.deform)));
     auto tracer = Tracer::build(bent);
@@ -185,18 +198,23 @@ TEST(TransferTexture, GroovesAreThoseOfDisplacedGeometry) {
     const Camera camera = from_above(100 - middle.distance);
     RenderOptions options;
     options.width = options.height = 48, options.samples = 64;
-    auto ours = render_transfer_texture(bent, *tracer, table->texture, {c.tile, c.width, c.depth, {}}, {light, {}, {}}, camera, options);
+    auto ours = render_transfer_texture(bent, *tracer, table->texture, {c.tile, c.width, c.depth, {}}, {light, {}, {}},
+                                        camera, options);
     ASSERT_TRUE(ours);
     Scene relief = bent;
-    ASSERT_TRUE(displace(relief, [&](Vec2 uv) {
-      const float phase = c.tile.x > 0 ? uv.x : uv.y, x = (phase - std::floor(phase) - 0.5f) / c.width;
-      return std::abs(x) < 0.5f ? -c.depth * c.width * std::pow(std::cos(pi * x), 2.0f) : 0.0f;
-    }, Vec2(5)));
+    ASSERT_TRUE(displace(
+        relief,
+        [&](Vec2 uv) {
+          const float phase = c.tile.x > 0 ? uv.x : uv.y, x = (phase - std::floor(phase) - 0.5f) / c.width;
+          return std::abs(x) < 0.5f ? -c.depth * c.width * std::pow(std::cos(pi * x), 2.0f) : 0.0f;
+        },
+        Vec2(5)));
     ReferenceOptions traced;
     traced.width = traced.height = 48, traced.spp = 256, traced.bounces = 6;
     auto truth = path_trace(relief, env, camera, traced);
     ASSERT_TRUE(truth);
-    std::printf("tile %g,%g width %g depth %g %s: %.4f\n", c.tile.x, c.tile.y, c.width, c.depth, c.deform, relative_rms(*ours, truth->image));
+    std::printf("tile %g,%g width %g depth %g %s: %.4f\n", c.tile.x, c.tile.y, c.width, c.depth, c.deform,
+                relative_rms(*ours, truth->image));
     EXPECT_LT(relative_rms(*ours, truth->image), 0.08);  // the table itself is off by 5.6%
   }
 }
@@ -213,14 +231,16 @@ TEST(TransferTexture, NearLampsLightItAsTheyDoTheDisplacedGeometry) {
   options.width = options.height = 48, options.samples = 64;
   const SphereLamp lamp{{0.8f, 1.6f, 0.3f}, 0.7f, {5, 4, 3}};
   Scene relief = sheet;
-  ASSERT_TRUE(displace(relief, [&](Vec2 uv) { return wavy.at(uv); }, Vec2(5)));
+  ASSERT_TRUE(displace(
+      relief, [&](Vec2 uv) { return wavy.at(uv); }, Vec2(5)));
   const uint32_t glow = add_material(relief, "lamp", Vec3(0.0f));
   add_sphere(relief, glow, "lamp", lamp.centre, lamp.radius, 4);
   relief.materials[glow].emissive = lamp.radiance;
   relief.texcoords[0].resize(relief.positions.size());
   ReferenceOptions traced;
   traced.width = traced.height = 48, traced.spp = 256, traced.bounces = 3, traced.lamps = true;
-  auto ours = render_transfer_texture(sheet, *tracer, wavy.texture, {.tile = Vec2(5)}, {std::vector<Vec3>(36, Vec3(0.0f)), {lamp}, {}}, camera, options);
+  auto ours = render_transfer_texture(sheet, *tracer, wavy.texture, {.tile = Vec2(5)},
+                                      {std::vector<Vec3>(36, Vec3(0.0f)), {lamp}, {}}, camera, options);
   ASSERT_TRUE(ours);
   auto truth = path_trace(relief, *load_environment("uniform:0"), camera, traced);
   ASSERT_TRUE(truth);

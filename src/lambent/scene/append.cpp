@@ -25,12 +25,15 @@ void place_scene(Scene& scene, Vec3 foot, float scale) {
 void append_scene(Scene& a, const Scene& b) {
   const size_t vertices = a.positions.size(), added = b.positions.size();
   LAMBENT_CHECK(vertices + added < none && a.triangles.size() + b.triangles.size() < none);
-  append_attribute(a.colors, vertices, b.colors, added, Vec3(1)), append_attribute(a.tangents, vertices, b.tangents, added, Vec4(0));
-  for (size_t set = 0; set < a.texcoords.size(); ++set) append_attribute(a.texcoords[set], vertices, b.texcoords[set], added, Vec2(0));
+  append_attribute(a.colors, vertices, b.colors, added, Vec3(1)),
+      append_attribute(a.tangents, vertices, b.tangents, added, Vec4(0));
+  for (size_t set = 0; set < a.texcoords.size(); ++set)
+    append_attribute(a.texcoords[set], vertices, b.texcoords[set], added, Vec2(0));
   a.positions.insert(a.positions.end(), b.positions.begin(), b.positions.end());
   a.normals.insert(a.normals.end(), b.normals.begin(), b.normals.end());
 
-  const uint32_t first_part = uint32_t(a.parts.size()), first_material = uint32_t(a.materials.size()), first_triangle = uint32_t(a.triangles.size());
+  const uint32_t first_part = uint32_t(a.parts.size()), first_material = uint32_t(a.materials.size()),
+                 first_triangle = uint32_t(a.triangles.size());
   for (Triangle t : b.triangles) {
     for (uint32_t& v : t.v) v += uint32_t(vertices);
     t.part += first_part;
@@ -42,7 +45,8 @@ void append_scene(Scene& a, const Scene& b) {
     a.parts.push_back(std::move(part));
   }
   for (Material material : b.materials) {
-    for (int* texture : {&material.base_color_texture, &material.metallic_roughness_texture, &material.normal_texture, &material.emissive_texture})
+    for (int* texture : {&material.base_color_texture, &material.metallic_roughness_texture, &material.normal_texture,
+                         &material.emissive_texture})
       if (*texture >= 0) *texture += int(a.textures.size());
     a.materials.push_back(std::move(material));
   }

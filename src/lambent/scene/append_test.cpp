@@ -9,7 +9,8 @@ namespace lambent {
 namespace {
 
 TEST(AppendScene, KeepsBothAsTheyWere) {
-  Scene a = make_quad(Vec3(0), Vec3(0, 0, 1), Vec3(1, 0, 0), 2, 2, Vec3(0.2f, 0.4f, 0.6f)), b = make_sphere(0.5f, 1, Vec3(0.9f, 0.1f, 0.3f));
+  Scene a = make_quad(Vec3(0), Vec3(0, 0, 1), Vec3(1, 0, 0), 2, 2, Vec3(0.2f, 0.4f, 0.6f)),
+        b = make_sphere(0.5f, 1, Vec3(0.9f, 0.1f, 0.3f));
   Texture texture;
   texture.width = texture.height = 1, texture.rgb = {255, 0, 128};
   a.textures.push_back(texture);

@@ -23,7 +23,8 @@ struct Edge {
 };
 
 // Calls visit(edges, low id) once for each undirected edge with all edges between its two positions, in order of ids.
-// `corner_ids` gives the position id of each corner; edges of triangles for which skip(triangle) holds do not take part.
+// `corner_ids` gives the position id of each corner; edges of triangles for which skip(triangle) holds do not take
+// part.
 template <class Skip, class Visit>
 void visit_edges(const std::vector<uint32_t>& corner_ids, uint32_t id_count, Skip skip, Visit visit) {
   std::vector<uint32_t> first(size_t(id_count) + 1, 0);
@@ -91,10 +92,11 @@ Vec3 unit_or(DVec3 sum, DVec3 fallback) {
   return n == DVec3(0) ? Vec3(0, 1, 0) : Vec3(n);
 }
 
-// Joins the corners at both ends of an edge for all pairs of its faces that meet at less than the crease angle. The normals
-// of faces on one edge lie on a circle, so joining neighbours on that circle joins all pairs, however many faces there are.
-void join_over_edge(UnionFind& groups, std::span<const Edge> edges, const std::vector<uint32_t>& corner_ids, uint32_t low,
-                    const std::vector<DVec3>& faces, double cos_crease) {
+// Joins the corners at both ends of an edge for all pairs of its faces that meet at less than the crease angle. The
+// normals of faces on one edge lie on a circle, so joining neighbours on that circle joins all pairs, however many
+// faces there are.
+void join_over_edge(UnionFind& groups, std::span<const Edge> edges, const std::vector<uint32_t>& corner_ids,
+                    uint32_t low, const std::vector<DVec3>& faces, double cos_crease) {
   auto end_corner = [&](Edge e, bool at_low) {
     return (corner_ids[e.corner] == low) == at_low ? e.corner : next_corner(e.corner);
   };
@@ -210,7 +212,9 @@ PositionIds number_positions(std::span<const Vec3> positions) {
   return out;
 }
 
-void make_normals(Scene& scene, size_t part, bool flat) { make_normals(scene, std::span<const size_t>(&part, 1), flat); }
+void make_normals(Scene& scene, size_t part, bool flat) {
+  make_normals(scene, std::span<const size_t>(&part, 1), flat);
+}
 
 void make_normals(Scene& scene, std::span<const size_t> parts, bool flat) {
   // Faces of one plane differ in direction by rounding alone.
@@ -240,7 +244,8 @@ void make_normals(Scene& scene, std::span<const size_t> parts, bool flat) {
       }
       values = std::move(moved);
     };
-    insert_copies(scene.positions), insert_copies(scene.normals), insert_copies(scene.colors), insert_copies(scene.tangents);
+    insert_copies(scene.positions), insert_copies(scene.normals), insert_copies(scene.colors),
+        insert_copies(scene.tangents);
     insert_copies(scene.texcoords[0]), insert_copies(scene.texcoords[1]);
   }
   uint32_t shift = 0;
@@ -262,7 +267,7 @@ void make_normals(Scene& scene, std::span<const size_t> parts, bool flat) {
 }
 
 void repair_normals(Scene& scene) {
-  constexpr double shortest = 1e-30;  // shorter ones hold too few digits to be a direction
+  constexpr double shortest = 1e-30;   // shorter ones hold too few digits to be a direction
   constexpr double unit_error = 1e-6;  // of the squared length: rounding of a unit vector, left as it is
   scene.normals.resize(scene.positions.size(), Vec3(0));
   std::vector<uint8_t> broken(scene.normals.size(), 0);

@@ -9,27 +9,27 @@ namespace lambent {
 // Faces that meet at a sharper angle than this get separate normals (and vertices) where a file brings none.
 inline constexpr float crease_angle_degrees = 70.0f;
 
-// Computes normals of a part that has none (`flat`: one a face, shared by coplanar neighbours, as glTF asks; else smooth over
-// vertices that share a position, weighted by corner angle, split at creases). Vertices that need several normals are
-// duplicated: vertices of later parts move up, and Part::source records the copies. Triangles without an area count for
-// nothing; vertices that no other triangle uses get +Y.
+// Computes normals of a part that has none (`flat`: one a face, shared by coplanar neighbours, as glTF asks; else
+// smooth over vertices that share a position, weighted by corner angle, split at creases). Vertices that need several
+// normals are duplicated: vertices of later parts move up, and Part::source records the copies. Triangles without an
+// area count for nothing; vertices that no other triangle uses get +Y.
 void make_normals(Scene& scene, size_t part, bool flat);
 
-// As above for several parts at once (ascending, none twice); the arrays are rebuilt only once, which matters for files of
-// many parts.
+// As above for several parts at once (ascending, none twice); the arrays are rebuilt only once, which matters for files
+// of many parts.
 void make_normals(Scene& scene, std::span<const size_t> parts, bool flat);
 
-// Replaces zero, NaN or denormal normals by the angle-weighted normal of the vertex's faces (or +Y), which marks the part
-// changed; normalises the rest.
+// Replaces zero, NaN or denormal normals by the angle-weighted normal of the vertex's faces (or +Y), which marks the
+// part changed; normalises the rest.
 void repair_normals(Scene& scene);
 
-// Drops triangles with the same corner positions and winding as an earlier one, and marks their parts changed; marks both of
-// an opposite pair two-sided. Triangles with a repeated corner position are left alone. Vertices stay, used or not, and so do
-// parts that are left without triangles.
+// Drops triangles with the same corner positions and winding as an earlier one, and marks their parts changed; marks
+// both of an opposite pair two-sided. Triangles with a repeated corner position are left alone. Vertices stay, used or
+// not, and so do parts that are left without triangles.
 void merge_duplicate_triangles(Scene& scene);
 
-// Sets Triangle::two_sided for a scene whose file carries no sidedness: components (connected over shared positions) that are
-// closed and of positive volume are one-sided, all others two-sided.
+// Sets Triangle::two_sided for a scene whose file carries no sidedness: components (connected over shared positions)
+// that are closed and of positive volume are one-sided, all others two-sided.
 void infer_sidedness(Scene& scene);
 
 // Numbers of exactly equal positions (-0 equals 0), counted from 0 in order of first appearance.

@@ -58,7 +58,8 @@ TEST(MakeNormals, JoinsSeamsAndIsTheSameWithoutIndices) {
   ASSERT_EQ(loose.positions.size(), 3 * loose.triangles.size());
   for (size_t t = 0; t < shared.triangles.size(); ++t) {
     for (int k = 0; k < 3; ++k) {
-      EXPECT_LT(glm::distance(shared.normals[shared.triangles[t].v[k]], loose.normals[loose.triangles[t].v[k]]), rounding);
+      EXPECT_LT(glm::distance(shared.normals[shared.triangles[t].v[k]], loose.normals[loose.triangles[t].v[k]]),
+                rounding);
     }
   }
 }
@@ -69,7 +70,8 @@ TEST(MakeNormals, WeightsByCornerAngle) {
   Scene s = bare_cube();
   s.normals.assign(8, Vec3(0));
   repair_normals(s);
-  for (int v = 0; v < 8; ++v) EXPECT_LT(glm::distance(s.normals[size_t(v)], glm::normalize(s.positions[size_t(v)])), rounding);
+  for (int v = 0; v < 8; ++v)
+    EXPECT_LT(glm::distance(s.normals[size_t(v)], glm::normalize(s.positions[size_t(v)])), rounding);
 }
 
 TEST(MakeNormals, ManyFacesOnOneEdge) {
@@ -99,7 +101,8 @@ TEST(MakeNormals, MovesLaterParts) {
   test::append(s, bare_cube());
   s.colors.resize(s.positions.size());
   s.texcoords[1].resize(s.positions.size());
-  for (size_t v = 0; v < s.positions.size(); ++v) s.colors[v] = s.positions[v], s.texcoords[1][v] = Vec2(s.positions[v]);
+  for (size_t v = 0; v < s.positions.size(); ++v)
+    s.colors[v] = s.positions[v], s.texcoords[1][v] = Vec2(s.positions[v]);
   const size_t bare[] = {0, 2};
   make_normals(s, bare, false);
   EXPECT_EQ(broken_invariant(s), "");
@@ -130,7 +133,8 @@ TEST(MakeNormals, TrianglesWithoutAreaCountForNothing) {
 TEST(RepairNormals, ReplacesTheBrokenAndScalesTheRest) {
   Scene s = make_quad({0, 0, 0}, {1, 0, 0}, {0, 1, 0}, 2, 2, Vec3(0.5f));
   const Vec3 tilted = glm::normalize(Vec3(0.1f, 0.2f, 1));
-  s.normals[0] = Vec3(0), s.normals[1] = Vec3(NAN, 0, 1), s.normals[2] = Vec3(1e-40f, 0, 0), s.normals[3] = Vec3(INFINITY, 0, 0);
+  s.normals[0] = Vec3(0), s.normals[1] = Vec3(NAN, 0, 1), s.normals[2] = Vec3(1e-40f, 0, 0),
+  s.normals[3] = Vec3(INFINITY, 0, 0);
   s.normals[4] = 3.0f * tilted, s.normals[5] = tilted;
   repair_normals(s);
   for (size_t v : {0, 1, 2, 3}) EXPECT_EQ(s.normals[v], Vec3(0, 0, 1));

@@ -7,7 +7,8 @@
 namespace lambent {
 namespace {
 
-// One part under construction, and the planes at which grids are divided so that pieces meet at vertices, not inside cells.
+// One part under construction, and the planes at which grids are divided so that pieces meet at vertices, not inside
+// cells.
 struct Builder {
   float detail;
   std::array<std::vector<float>, 3> planes;
@@ -26,7 +27,8 @@ struct Point {
   Vec3 position, normal;
 };
 
-// Grid of point(i, j), 0 <= i <= ni, 0 <= j <= nj; its front is along d/di x d/dj. `closed` joins the last row to the first.
+// Grid of point(i, j), 0 <= i <= ni, 0 <= j <= nj; its front is along d/di x d/dj. `closed` joins the last row to the
+// first.
 template <class F>
 void add_surface(Builder& b, int ni, int nj, bool closed, F point) {
   uint32_t first = uint32_t(b.positions.size()), row = uint32_t(ni) + 1, rows = uint32_t(closed ? nj : nj + 1);
@@ -86,7 +88,9 @@ void add_block(Builder& b, Vec3 min, Vec3 max, Cells cells) {
   }
 }
 
-void add_block(Builder& b, Vec3 min, Vec3 max, float cell) { add_block(b, min, max, {cell, cell, cell, cell, cell, cell}); }
+void add_block(Builder& b, Vec3 min, Vec3 max, float cell) {
+  add_block(b, min, max, {cell, cell, cell, cell, cell, cell});
+}
 
 // A cubic Bezier arc of a turned profile, (radius, height), upwards on the outside.
 using Arc = std::array<Vec2, 4>;
@@ -108,8 +112,8 @@ void add_turned(Builder& b, Vec3 foot, std::span<const Arc> profile, int around,
 
 // Heights and depths, metres. The yard is 6 x 6 between the walls; its front is at +z.
 constexpr float half = 3.0f, outer = 3.3f, base = -0.2f;
-constexpr float step_height = 0.15f, loggia = 2 * step_height;      // floor levels
-constexpr float step_front = -0.40f, loggia_front = -0.75f;         // edges
+constexpr float step_height = 0.15f, loggia = 2 * step_height;  // floor levels
+constexpr float step_front = -0.40f, loggia_front = -0.75f;     // edges
 constexpr float arcade_front = -1.05f, arcade_back = -1.35f;
 constexpr float spring = 1.95f, arch_radius = 0.78f, arcade_top = 3.0f;
 constexpr float roof_front = -0.88f, roof_top = 3.16f;
@@ -146,7 +150,9 @@ void add_arcade(Builder& b) {
     if (centre > 1) {
       add_surface(b, up, deep, false, [&](int k, int j) { return Point{at(outline(k), depth(j)), {1, 0, 0}}; });
     } else if (centre < -1) {
-      add_surface(b, up, deep, false, [&](int k, int j) { return Point{at(outline(along - up + k), depth(j)), {-1, 0, 0}}; });
+      add_surface(b, up, deep, false, [&](int k, int j) {
+        return Point{at(outline(along - up + k), depth(j)), {-1, 0, 0}};
+      });
     }
   }
 }
@@ -179,7 +185,8 @@ void add_knot(Builder& b) {
     float c2 = std::cos(2 * t), s2 = std::sin(2 * t), c3 = std::cos(3 * t), s3 = std::sin(3 * t);
     float r = major + minor * c3;
     Vec3 out(c2 * c3, s2 * c3, s3);  // the torus's normal
-    Vec3 tangent = glm::normalize(Vec3(-3 * minor * s3 * c2 - 2 * r * s2, -3 * minor * s3 * s2 + 2 * r * c2, 3 * minor * c3));
+    Vec3 tangent =
+        glm::normalize(Vec3(-3 * minor * s3 * c2 - 2 * r * s2, -3 * minor * s3 * s2 + 2 * r * c2, 3 * minor * c3));
     Vec3 across = glm::cross(tangent, out);
     float turn = 2 * pi * float(i) / float(around);
     Vec3 n = std::cos(turn) * out + std::sin(turn) * across;
@@ -217,12 +224,14 @@ Scene make_courtyard(float detail) {
   b.detail = detail;
   b.planes[0] = {-half, -2.90f, -2.45f, plinth.x - 0.45f, plinth.x + 0.45f, half};
   b.planes[1] = {0, step_height, loggia, right_height, left_height};
-  b.planes[2] = {-half, arcade_back, arcade_front, roof_front, loggia_front, step_front, plinth.z - 0.45f, plinth.z + 0.45f};
+  b.planes[2] = {-half,        arcade_back, arcade_front,     roof_front,
+                 loggia_front, step_front,  plinth.z - 0.45f, plinth.z + 0.45f};
   constexpr float fine = 0.05f, medium = 0.075f, coarse = 0.3f;
 
   add_block(b, {-half, base, step_front}, {half, 0, half}, {coarse, coarse, coarse, fine, coarse, medium});
   b.finish(scene, stone, "floor");
-  add_block(b, {-half, base, loggia_front}, {half, step_height, step_front}, {coarse, coarse, coarse, fine, coarse, fine});
+  add_block(b, {-half, base, loggia_front}, {half, step_height, step_front},
+            {coarse, coarse, coarse, fine, coarse, fine});
   add_block(b, {-half, base, -half}, {half, loggia, loggia_front}, {coarse, coarse, coarse, fine, coarse, fine});
   b.finish(scene, stone, "steps");
 
@@ -247,7 +256,8 @@ Scene make_courtyard(float detail) {
   for (float sign : {-1.0f, 1.0f}) {  // half-piers at the walls, with imposts
     auto pier = [&](float inner, float low, float high, float margin) {
       float x0 = sign * half, x1 = sign * inner;
-      add_block(b, {std::min(x0, x1), low, arcade_back - margin}, {std::max(x0, x1), high, arcade_front + margin}, fine);
+      add_block(b, {std::min(x0, x1), low, arcade_back - margin}, {std::max(x0, x1), high, arcade_front + margin},
+                fine);
     };
     pier(half - 0.22f, loggia, spring - 0.1f, 0.0f);
     pier(half - 0.26f, spring - 0.1f, spring, 0.04f);

@@ -13,7 +13,8 @@ std::vector<uint32_t> number_smooth(const std::vector<uint32_t>& place, const st
   const std::vector<uint32_t> direction = number_positions(rounded).ids;
   std::unordered_map<uint64_t, uint32_t> numbers;
   std::vector<uint32_t> out;
-  for (size_t v = 0; v < place.size(); ++v) out.push_back(numbers.try_emplace(uint64_t(place[v]) << 32 | direction[v], uint32_t(numbers.size())).first->second);
+  for (size_t v = 0; v < place.size(); ++v)
+    out.push_back(numbers.try_emplace(uint64_t(place[v]) << 32 | direction[v], uint32_t(numbers.size())).first->second);
   return out;
 }
 
@@ -23,7 +24,8 @@ Result<void> displace(Scene& scene, const std::function<float(Vec2)>& height, Ve
   const std::vector<Vec2>& uv = scene.texcoords[0];
   if (uv.empty()) return Error{scene.path, "has no texture coordinates to displace it by"};
   const size_t n = scene.positions.size();
-  const std::vector<uint32_t> place = number_positions(scene.positions).ids, smooth = number_smooth(place, scene.normals);
+  const std::vector<uint32_t> place = number_positions(scene.positions).ids,
+                              smooth = number_smooth(place, scene.normals);
   std::vector<double> area(n), covered(n);
   std::vector<Vec3> normals(n, Vec3(0.0f));  // by place
   for (const Triangle& t : scene.triangles) {

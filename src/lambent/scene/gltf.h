@@ -23,8 +23,8 @@ struct GltfDocument {
   MappedFile mapping;                             // storage behind the rest
 };
 
-// Splits GLB (or plain .gltf) bytes into JSON and the binary chunk. Errors: not glTF, version not 2, truncated, lengths that
-// do not fit, JSON that does not parse or nests deeper than 64.
+// Splits GLB (or plain .gltf) bytes into JSON and the binary chunk. Errors: not glTF, version not 2, truncated, lengths
+// that do not fit, JSON that does not parse or nests deeper than 64.
 struct GltfChunks {
   nlohmann::json json;
   std::span<const uint8_t> binary;
@@ -41,12 +41,13 @@ struct GltfBlob {
 };
 
 // Writes the scene as one self-contained GLB. With a document: the document as it came, its buffers and external images
-// embedded, changed parts rewritten (a mesh that several nodes share is copied for the changed node), new parts added as
-// nodes; without: nodes, meshes, materials and textures made from the scene. Changed parts that copy document vertices
-// (Part::source) keep all their attributes; others lose skin and morph targets and stand in their rest pose.
-// On return of the JSON to `extend` (which may be empty), part_nodes[i] and part_primitives[i] say where part i now stands;
-// `extend` may edit the JSON (add an extension) and names appended blobs by buffer-view index: blob i becomes buffer view
-// first_view + i. The same input gives the same bytes. Errors: more than 4 GiB, a texture without its encoded bytes, the disk's.
+// embedded, changed parts rewritten (a mesh that several nodes share is copied for the changed node), new parts added
+// as nodes; without: nodes, meshes, materials and textures made from the scene. Changed parts that copy document
+// vertices (Part::source) keep all their attributes; others lose skin and morph targets and stand in their rest pose.
+// On return of the JSON to `extend` (which may be empty), part_nodes[i] and part_primitives[i] say where part i now
+// stands; `extend` may edit the JSON (add an extension) and names appended blobs by buffer-view index: blob i becomes
+// buffer view first_view + i. The same input gives the same bytes. Errors: more than 4 GiB, a texture without its
+// encoded bytes, the disk's.
 struct GltfPlaces {
   std::vector<int> part_nodes, part_primitives;
   int first_view = 0;

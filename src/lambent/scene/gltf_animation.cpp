@@ -18,8 +18,8 @@ struct Channel {
 };
 
 // nullopt: broken (the check has failed) or to be ignored (it has not).
-std::optional<Channel> read_channel(GltfCheck& check, const GltfDocument& document, const Json& animation, const Json& channel,
-                                    const GltfWhere& where) {
+std::optional<Channel> read_channel(GltfCheck& check, const GltfDocument& document, const Json& animation,
+                                    const Json& channel, const GltfWhere& where) {
   if (!channel.is_object()) return check.fail(where, "a channel is not an object"), std::nullopt;
   const Json* samplers = check.array(animation, "samplers", where);
   const Json* target = check.object(channel, "target", where);
@@ -41,7 +41,8 @@ std::optional<Channel> read_channel(GltfCheck& check, const GltfDocument& docume
   const std::string how = check.text(sampler, "interpolation", where);
   if (how == "STEP") c.interpolation = Interpolation::step;
   else if (how == "CUBICSPLINE") c.interpolation = Interpolation::cubic;
-  else if (!how.empty() && how != "LINEAR") return check.fail(where, "a sampler's interpolation is not known"), std::nullopt;
+  else if (!how.empty() && how != "LINEAR")
+    return check.fail(where, "a sampler's interpolation is not known"), std::nullopt;
   auto input = check.index(sampler, "input", gltf_count(document.json, "accessors"), where);
   auto output = check.index(sampler, "output", gltf_count(document.json, "accessors"), where);
   if (!check.ok()) return std::nullopt;
@@ -56,7 +57,8 @@ std::optional<Channel> read_channel(GltfCheck& check, const GltfDocument& docume
   const size_t keys = c.input.count * (c.interpolation == Interpolation::cubic ? 3 : 1);
   const bool weights = c.path == "weights";
   c.width = weights ? c.output.count / keys : c.path == "rotation" ? 4 : 3;
-  if (c.output.is_matrix || c.output.components != (weights ? 1 : int(c.width)) || c.output.count != keys * (weights ? c.width : 1) || c.width == 0 || c.width > 4096)
+  if (c.output.is_matrix || c.output.components != (weights ? 1 : int(c.width)) ||
+      c.output.count != keys * (weights ? c.width : 1) || c.width == 0 || c.width > 4096)
     return check.fail(where, "a sampler's values do not fit its times"), std::nullopt;
   return c;
 }
@@ -81,7 +83,8 @@ double key_time(const Channel& c, size_t key) {
 bool check_keys(GltfCheck& check, const Channel& c, const GltfWhere& where) {
   for (size_t k = 0; k < c.input.count; ++k) {
     const double t = key_time(c, k);
-    if (!std::isfinite(t) || t < 0 || (k > 0 && t <= key_time(c, k - 1))) return check.fail(where, "a sampler's times do not grow");
+    if (!std::isfinite(t) || t < 0 || (k > 0 && t <= key_time(c, k - 1)))
+      return check.fail(where, "a sampler's times do not grow");
   }
   for (size_t k = 0; k < c.input.count * (c.interpolation == Interpolation::cubic ? 3 : 1); ++k)
     for (size_t i = 0; i < c.width; ++i)
@@ -93,7 +96,8 @@ void normalize_rotation(std::vector<double>& q) {
   double length = 0;
   for (double x : q) length += x * x;
   length = std::sqrt(length);
-  if (length > 0) for (double& x : q) x /= length;
+  if (length > 0)
+    for (double& x : q) x /= length;
   else q = {0, 0, 0, 1};
 }
 
@@ -120,14 +124,17 @@ std::vector<double> evaluate(const Channel& c, double time) {
       const std::vector<double> out = key(low, 2), in = key(high, 0);
       const double u2 = u * u, u3 = u2 * u;
       for (size_t i = 0; i < c.width; ++i)
-        a[i] = (2 * u3 - 3 * u2 + 1) * a[i] + span * (u3 - 2 * u2 + u) * out[i] + (3 * u2 - 2 * u3) * b[i] + span * (u3 - u2) * in[i];
+        a[i] = (2 * u3 - 3 * u2 + 1) * a[i] + span * (u3 - 2 * u2 + u) * out[i] + (3 * u2 - 2 * u3) * b[i] +
+               span * (u3 - u2) * in[i];
     } else if (rotation) {
       normalize_rotation(a), normalize_rotation(b);
       double cosine = 0;
       for (size_t i = 0; i < 4; ++i) cosine += a[i] * b[i];
-      const double sign = cosine < 0 ? -1 : 1, angle = std::acos(std::min(1.0, std::abs(cosine))), sine = std::sin(angle);
+      const double sign = cosine < 0 ? -1 : 1, angle = std::acos(std::min(1.0, std::abs(cosine))),
+                   sine = std::sin(angle);
       // Nearly equal rotations: the chord is the arc.
-      const double wa = sine > 1e-6 ? std::sin((1 - u) * angle) / sine : 1 - u, wb = sine > 1e-6 ? std::sin(u * angle) / sine : u;
+      const double wa = sine > 1e-6 ? std::sin((1 - u) * angle) / sine : 1 - u,
+                   wb = sine > 1e-6 ? std::sin(u * angle) / sine : u;
       for (size_t i = 0; i < 4; ++i) a[i] = wa * a[i] + sign * wb * b[i];
     } else {
       for (size_t i = 0; i < c.width; ++i) a[i] += u * (b[i] - a[i]);

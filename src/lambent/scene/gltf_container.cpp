@@ -1,4 +1,5 @@
-// glTF 2.0 specification (ISO/IEC 12113), section 4 (GLB); RFC 3986 (percent-encoding); RFC 2397 and 4648 (data URIs, base64).
+// glTF 2.0 specification (ISO/IEC 12113), section 4 (GLB); RFC 3986 (percent-encoding); RFC 2397 and 4648 (data URIs,
+// base64).
 #include <lambent/scene/gltf_container.h>
 
 #include <lambent/core/file.h>
@@ -19,7 +20,8 @@ constexpr size_t glb_header_size = 12, chunk_header_size = 8;
 constexpr int max_depth = 64;
 
 uint32_t load_u32(std::span<const uint8_t> bytes, size_t at) {
-  return uint32_t(bytes[at]) | uint32_t(bytes[at + 1]) << 8 | uint32_t(bytes[at + 2]) << 16 | uint32_t(bytes[at + 3]) << 24;
+  return uint32_t(bytes[at]) | uint32_t(bytes[at + 1]) << 8 | uint32_t(bytes[at + 2]) << 16 |
+         uint32_t(bytes[at + 3]) << 24;
 }
 
 // Whether the text nests so deep that working on it recursively could overflow the stack.
@@ -120,7 +122,8 @@ Result<GltfChunks> split_gltf(std::span<const uint8_t> bytes, const std::string&
   if (length > bytes.size()) {
     return Error{path, "truncated: has " + std::to_string(bytes.size()) + " of " + std::to_string(length) + " bytes"};
   }
-  if (length < glb_header_size + chunk_header_size) return Error{path, "the GLB header gives a length too small for it"};
+  if (length < glb_header_size + chunk_header_size)
+    return Error{path, "the GLB header gives a length too small for it"};
   bytes = bytes.first(length);
   bool have_json = false, have_binary = false;
   size_t at = glb_header_size;
@@ -146,7 +149,8 @@ Result<GltfChunks> split_gltf(std::span<const uint8_t> bytes, const std::string&
 std::string in_quotes(const std::string& text) {
   constexpr size_t longest = 120;
   std::string out = "\"" + text.substr(0, longest);
-  std::replace_if(out.begin(), out.end(), [](unsigned char c) { return c < 0x20 || c == 0x7f; }, '?');
+  std::replace_if(
+      out.begin(), out.end(), [](unsigned char c) { return c < 0x20 || c == 0x7f; }, '?');
   return out + (text.size() > longest ? "...\"" : "\"");
 }
 
@@ -161,11 +165,13 @@ Result<std::vector<uint8_t>> decode_data_uri(const std::string& uri, const std::
   if (!head.ends_with(marker)) return Error{where, "data URI is not base64"};
   if (mime_type) *mime_type = std::string(head.substr(0, head.find(';')));
   std::vector<uint8_t> bytes;
-  if (!base64_decode(std::string_view(uri).substr(comma + 1), bytes)) return Error{where, "data URI holds broken base64"};
+  if (!base64_decode(std::string_view(uri).substr(comma + 1), bytes))
+    return Error{where, "data URI holds broken base64"};
   return bytes;
 }
 
-Result<std::vector<uint8_t>> read_external_file(const std::string& uri, const std::string& folder, const std::string& referrer) {
+Result<std::vector<uint8_t>> read_external_file(const std::string& uri, const std::string& folder,
+                                                const std::string& referrer) {
   namespace fs = std::filesystem;
   auto refuse = [&](const std::string& why) { return Error{referrer, in_quotes(uri) + " " + why}; };
   if (folder.empty()) return refuse("is an external file, which is not allowed here");

@@ -83,8 +83,8 @@ TEST(DataUri, DecodesBase64) {
     EXPECT_EQ(type, "image/png");
   }
   EXPECT_EQ(*decode_data_uri("data:;base64,Zm8", "", nullptr), bytes_of("fo")) << "padding may be left out";
-  for (const char* bad : {"data:;base64,Zm9v!", "data:;base64,Z", "data:;base64,Zm=8", "data:;base64,Zm8==", "data:;base64,Z===",
-                          "data:text/plain,hello", "data:;base64"}) {
+  for (const char* bad : {"data:;base64,Zm9v!", "data:;base64,Z", "data:;base64,Zm=8",
+                          "data:;base64,Zm8==", "data:;base64,Z===", "data:text/plain,hello", "data:;base64"}) {
     EXPECT_FALSE(decode_data_uri(bad, "", nullptr)) << bad;
   }
 }
@@ -116,10 +116,26 @@ TEST_F(ExternalFile, ReadsWhatLiesInside) {
 }
 
 TEST_F(ExternalFile, RefusesToLeaveTheFolder) {
-  for (const char* uri :
-       {"../secret.bin", "%2e%2e/secret.bin", "..%2Fsecret.bin", "sub/../../secret.bin", "sub/../inside.bin", "..\\secret.bin",
-        "/etc/passwd", "%2Fetc/passwd", "file:///etc/passwd", "http://localhost/x", "C:\\x.bin", "c%3A/x.bin", "//host/x",
-        "link_out.bin", "folder_out/secret.bin", "neighbour.bin", "", "inside.bin%00.png", "sub", "."}) {
+  for (const char* uri : {"../secret.bin",
+                          "%2e%2e/secret.bin",
+                          "..%2Fsecret.bin",
+                          "sub/../../secret.bin",
+                          "sub/../inside.bin",
+                          "..\\secret.bin",
+                          "/etc/passwd",
+                          "%2Fetc/passwd",
+                          "file:///etc/passwd",
+                          "http://localhost/x",
+                          "C:\\x.bin",
+                          "c%3A/x.bin",
+                          "//host/x",
+                          "link_out.bin",
+                          "folder_out/secret.bin",
+                          "neighbour.bin",
+                          "",
+                          "inside.bin%00.png",
+                          "sub",
+                          "."}) {
     auto bytes = read(uri);
     ASSERT_FALSE(bytes) << uri;
     EXPECT_EQ(bytes.error().where, "a.gltf");

@@ -10,8 +10,8 @@ bool check_gltf_vector(GltfCheck& check, const GltfAccessor& a, const char* name
   return check.fail(where, std::string(name) + " is not three floats or small integers");
 }
 
-bool read_morphs(GltfCheck& check, const GltfDocument& document, size_t node, size_t mesh, const Json& primitive, size_t count,
-                 const GltfWhere& where, std::vector<GltfMorph>& out) {
+bool read_morphs(GltfCheck& check, const GltfDocument& document, size_t node, size_t mesh, const Json& primitive,
+                 size_t count, const GltfWhere& where, std::vector<GltfMorph>& out) {
   const Json* targets = check.array(primitive, "targets", where);
   if (!targets || targets->empty()) return check.ok();
   const Json& node_json = gltf_item(document.json, "nodes", node);
@@ -24,7 +24,8 @@ bool read_morphs(GltfCheck& check, const GltfDocument& document, size_t node, si
     if (!target.is_object()) return check.fail(where, "a morph target is not an object");
     GltfMorph morph{weights[t], read_attribute(check, document, target, "POSITION", count, where),
                     read_attribute(check, document, target, "NORMAL", count, where)};
-    if (morph.positions && !check_gltf_vector(check, *morph.positions, "a morph target's POSITION", where)) return false;
+    if (morph.positions && !check_gltf_vector(check, *morph.positions, "a morph target's POSITION", where))
+      return false;
     if (morph.normals && !check_gltf_vector(check, *morph.normals, "a morph target's NORMAL", where)) return false;
     for (auto attribute = target.begin(); attribute != target.end(); ++attribute) {
       read_attribute(check, document, target, attribute.key().c_str(), count, where);
@@ -36,8 +37,8 @@ bool read_morphs(GltfCheck& check, const GltfDocument& document, size_t node, si
 
 namespace {
 
-// Zero stands for broken: repair_normals() finds it. What is unit but for rounding stays as it is, so that a saved normal
-// comes back with the same bits.
+// Zero stands for broken: repair_normals() finds it. What is unit but for rounding stays as it is, so that a saved
+// normal comes back with the same bits.
 Vec3 unit_normal(glm::dvec3 n) {
   constexpr double rounding = 1e-6;
   double length = glm::length(n);
@@ -47,9 +48,9 @@ Vec3 unit_normal(glm::dvec3 n) {
 
 }  // namespace
 
-bool read_vertices(GltfCheck& check, const GltfDocument& document, const Json& attributes, const GltfAccessor& positions,
-                   const std::vector<GltfMorph>& morphs, const GltfPlacement& placement, const GltfWhere& where,
-                   std::vector<Vec3>& out_positions, std::vector<Vec3>& out_normals) {
+bool read_vertices(GltfCheck& check, const GltfDocument& document, const Json& attributes,
+                   const GltfAccessor& positions, const std::vector<GltfMorph>& morphs, const GltfPlacement& placement,
+                   const GltfWhere& where, std::vector<Vec3>& out_positions, std::vector<Vec3>& out_normals) {
   auto normals = read_attribute(check, document, attributes, "NORMAL", positions.count, where);
   if (!check.ok() || (normals && !check_gltf_vector(check, *normals, "NORMAL", where))) return false;
   glm::dmat4 world = placement.world;

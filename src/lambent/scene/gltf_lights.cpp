@@ -21,7 +21,8 @@ bool read_light(GltfCheck& check, const Json& json, size_t index, PunctualLight&
   if (!check.ok()) return false;
   for (int c = 0; c < 3; ++c) {
     const double value = color[c] * intensity;
-    if (!(value >= 0 && value <= brightest)) return check.fail(where, "its colour times intensity is negative or too large");
+    if (!(value >= 0 && value <= brightest))
+      return check.fail(where, "its colour times intensity is negative or too large");
     light.intensity[c] = float(value);
   }
   if (type == "point") {
@@ -32,7 +33,9 @@ bool read_light(GltfCheck& check, const Json& json, size_t index, PunctualLight&
     light.kind = PunctualLight::Kind::spot;
     const Json* spot = check.object(json, "spot", where);
     double inner = 0, outer = std::numbers::pi / 4;
-    if (spot) inner = check.number(*spot, "innerConeAngle", inner, where), outer = check.number(*spot, "outerConeAngle", outer, where);
+    if (spot)
+      inner = check.number(*spot, "innerConeAngle", inner, where),
+      outer = check.number(*spot, "outerConeAngle", outer, where);
     if (check.ok() && !(inner >= 0 && inner < outer && outer <= std::numbers::pi / 2 + 1e-6))
       return check.fail(where, "its cone angles are not 0 <= inner < outer <= pi/2");
     light.inner_cone = float(inner), light.outer_cone = float(outer);

@@ -19,7 +19,11 @@ Builder lit_triangle(const Json& light, const Json& node) {
 
 TEST(GltfLights, StandAndShineAsTheirNodesSay) {
   // A quarter turn about +Y takes -Z to -X; the parent moves and scales, which does not change the lamp.
-  Builder b = lit_triangle({{"type", "spot"}, {"color", {1, 0.5, 0.25}}, {"intensity", 8}, {"name", "desk"}, {"spot", {{"innerConeAngle", 0.2}, {"outerConeAngle", 0.6}}}},
+  Builder b = lit_triangle({{"type", "spot"},
+                            {"color", {1, 0.5, 0.25}},
+                            {"intensity", 8},
+                            {"name", "desk"},
+                            {"spot", {{"innerConeAngle", 0.2}, {"outerConeAngle", 0.6}}}},
                            {{"translation", {1, 2, 3}}, {"rotation", {0, std::sqrt(0.5), 0, std::sqrt(0.5)}}});
   b.json["nodes"].push_back({{"children", {1}}, {"translation", {10, 0, 0}}, {"scale", {2, 2, 2}}});
   auto scene = b.load();

@@ -20,8 +20,8 @@ const Json* read_extension(GltfCheck& check, const Json& parent, const char* nam
 }
 
 // `key` names a texture reference, a textureInfo of the specification.
-void read_texture_reference(GltfCheck& check, const Json& parent, const char* key, size_t texture_count, const GltfWhere& where,
-                            GltfTextureUse& out) {
+void read_texture_reference(GltfCheck& check, const Json& parent, const char* key, size_t texture_count,
+                            const GltfWhere& where, GltfTextureUse& out) {
   const Json* info = check.object(parent, key, where);
   if (!info) return;
   out.texture = check.index(*info, "index", texture_count, where);
@@ -42,7 +42,8 @@ void read_texture_reference(GltfCheck& check, const Json& parent, const char* ke
 Vec3 read_color(GltfCheck& check, const Json& parent, const char* key, const GltfWhere& where) {
   double rgba[4] = {1, 1, 1, 1};
   check.numbers(parent, key, rgba, where);
-  return {float(std::clamp(rgba[0], 0.0, 1.0)), float(std::clamp(rgba[1], 0.0, 1.0)), float(std::clamp(rgba[2], 0.0, 1.0))};
+  return {float(std::clamp(rgba[0], 0.0, 1.0)), float(std::clamp(rgba[1], 0.0, 1.0)),
+          float(std::clamp(rgba[2], 0.0, 1.0))};
 }
 
 float read_share(GltfCheck& check, const Json& parent, const char* key, const GltfWhere& where) {
@@ -90,7 +91,8 @@ Wrap read_wrap(GltfCheck& check, const Json& sampler, const char* key, const Glt
   return mode == clamp ? Wrap::clamp : mode == mirror ? Wrap::mirror : Wrap::repeat;
 }
 
-std::span<const uint8_t> image_bytes(GltfCheck& check, const GltfDocument& document, size_t image, const GltfWhere& where) {
+std::span<const uint8_t> image_bytes(GltfCheck& check, const GltfDocument& document, size_t image,
+                                     const GltfWhere& where) {
   const Json& json = gltf_item(document.json, "images", image);
   auto view = check.index(json, "bufferView", gltf_count(document.json, "bufferViews"), where);
   if (!check.ok()) return {};
@@ -125,7 +127,8 @@ class TextureReader {
     if (name.empty()) name = uri;
     if (!check.ok()) return -1;
 
-    auto [place, is_new] = known_.try_emplace({bytes.data(), bytes.size(), wrap_s, wrap_t}, int(scene_.textures.size()));
+    auto [place, is_new] =
+        known_.try_emplace({bytes.data(), bytes.size(), wrap_s, wrap_t}, int(scene_.textures.size()));
     if (!is_new) return place->second;
     Texture decoded;
     auto twin = decoded_.find({bytes.data(), bytes.size()});
@@ -195,7 +198,8 @@ bool read_textures(GltfCheck& check, GltfDocument& document, const std::vector<G
       if (!check.ok()) return false;
     }
     // The scene is still good without these.
-    auto read_extra = [&](const GltfTextureUse& use, const char* what, int& texture, int& set, std::array<float, 6>& transform) {
+    auto read_extra = [&](const GltfTextureUse& use, const char* what, int& texture, int& set,
+                          std::array<float, 6>& transform) {
       if (!use.texture) return true;
       GltfCheck trial = check;
       const int read_texture = read(trial, use, what);
@@ -204,13 +208,16 @@ bool read_textures(GltfCheck& check, GltfDocument& document, const std::vector<G
       return trial.ok();
     };
     const GltfMaterial& from = materials[i];
-    read_extra(from.metallic_roughness, "metallic-roughness", m.metallic_roughness_texture, m.metallic_roughness_set, m.metallic_roughness_transform);
+    read_extra(from.metallic_roughness, "metallic-roughness", m.metallic_roughness_texture, m.metallic_roughness_set,
+               m.metallic_roughness_transform);
     read_extra(from.normal, "normal", m.normal_texture, m.normal_set, m.normal_transform);
     // A lamp of unknown pattern gives no light.
     const bool black = m.emissive == Vec3(0);
-    if (!black && !read_extra(from.emissive, "emissive", m.emissive_texture, m.emissive_set, m.emissive_transform)) m.emissive = Vec3(0);
+    if (!black && !read_extra(from.emissive, "emissive", m.emissive_texture, m.emissive_set, m.emissive_transform))
+      m.emissive = Vec3(0);
   }
-  warn_count(scene, translucent, " material with alpha is treated as opaque", " materials with alpha are treated as opaque");
+  warn_count(scene, translucent, " material with alpha is treated as opaque",
+             " materials with alpha are treated as opaque");
   return true;
 }
 

@@ -20,8 +20,9 @@ struct GltfMaterial {
 // All of the document's materials, in its order.
 std::vector<GltfMaterial> read_materials(GltfCheck& check, const GltfDocument& document);
 
-// Decodes the images of the materials that `used` marks into scene.textures, each once, and sets the textures of scene.materials, whose first ones are the document's. `image_problems` says for each image why its file could not be read
-// (empty: it could).
+// Decodes the images of the materials that `used` marks into scene.textures, each once, and sets the textures of
+// scene.materials, whose first ones are the document's. `image_problems` says for each image why its file could not be
+// read (empty: it could).
 bool read_textures(GltfCheck& check, GltfDocument& document, const std::vector<GltfMaterial>& materials,
                    const std::vector<bool>& used, const std::vector<std::string>& image_problems, Scene& scene);
 

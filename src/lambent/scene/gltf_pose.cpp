@@ -46,7 +46,8 @@ std::vector<size_t> read_parents(GltfCheck& check, const Json& document) {
       auto index = check.integer(child, "a child", count, where);
       if (!index) return {};
       if (parents[*index] != no_parent) {
-        check.fail({"node", *index}, "is a child of two nodes, " + std::to_string(parents[*index]) + " and " + std::to_string(n));
+        check.fail({"node", *index},
+                   "is a child of two nodes, " + std::to_string(parents[*index]) + " and " + std::to_string(n));
         return {};
       }
       parents[*index] = n;
@@ -69,7 +70,8 @@ void append_tree(const Json& document, size_t root, std::vector<size_t>& order) 
   }
 }
 
-bool read_shown(GltfCheck& check, const Json& document, const std::vector<size_t>& parents, std::vector<size_t>& shown) {
+bool read_shown(GltfCheck& check, const Json& document, const std::vector<size_t>& parents,
+                std::vector<size_t>& shown) {
   const size_t scenes = gltf_count(document, "scenes");
   if (scenes == 0) {
     for (size_t n = 0; n < parents.size(); ++n) {
@@ -160,8 +162,8 @@ bool read_pose(GltfCheck& check, const GltfDocument& document, GltfPose& pose) {
   return check.ok();
 }
 
-bool read_placement(GltfCheck& check, const GltfDocument& document, const GltfPose& pose, size_t node, const Json& primitive,
-                    size_t vertex_count, const GltfWhere& where, GltfPlacement& placement) {
+bool read_placement(GltfCheck& check, const GltfDocument& document, const GltfPose& pose, size_t node,
+                    const Json& primitive, size_t vertex_count, const GltfWhere& where, GltfPlacement& placement) {
   placement.world = pose.world[node];
   placement.mirrored = determinant3(placement.world) < 0;
   auto skin = check.index(gltf_item(document.json, "nodes", node), "skin", pose.joints.size(), {"node", node});
@@ -190,16 +192,17 @@ bool read_placement(GltfCheck& check, const GltfDocument& document, const GltfPo
       double j[4] = {}, w[4] = {};
       placement.joint_sets[set].read(i, j), placement.weight_sets[set].read(i, w);
       for (int k = 0; k < 4; ++k) {
-        if (!(w[k] >= 0) || !std::isfinite(w[k])) return check.fail(where, "vertex " + std::to_string(i) + " has a bad weight");
+        if (!(w[k] >= 0) || !std::isfinite(w[k]))
+          return check.fail(where, "vertex " + std::to_string(i) + " has a bad weight");
         if (w[k] > 0 && j[k] >= double(joint_count)) {
-          return check.fail(where, "vertex " + std::to_string(i) + " hangs on joint " + std::to_string(int(j[k])) + " of " +
-                                       std::to_string(joint_count));
+          return check.fail(where, "vertex " + std::to_string(i) + " hangs on joint " + std::to_string(int(j[k])) +
+                                       " of " + std::to_string(joint_count));
         }
       }
     }
   }
-  // NOTE: the specification words the winding rule for the node's transform, which it also says a skinned mesh ignores; what
-  // decides is therefore the transform that takes its place.
+  // NOTE: the specification words the winding rule for the node's transform, which it also says a skinned mesh ignores;
+  // what decides is therefore the transform that takes its place.
   size_t negative = size_t(std::count_if(placement.joints->begin(), placement.joints->end(),
                                          [](const glm::dmat4& m) { return determinant3(m) < 0; }));
   placement.mirrored = negative * 2 > joint_count;

@@ -45,7 +45,8 @@ const Json* GltfCheck::array(const Json& parent, const char* key, const GltfWher
   return nullptr;
 }
 
-std::optional<uint64_t> GltfCheck::integer(const Json& value, const char* name, uint64_t limit, const GltfWhere& where) {
+std::optional<uint64_t> GltfCheck::integer(const Json& value, const char* name, uint64_t limit,
+                                           const GltfWhere& where) {
   std::optional<uint64_t> number;
   if (value.is_number_unsigned()) {
     number = value.get<uint64_t>();
@@ -63,7 +64,8 @@ std::optional<uint64_t> GltfCheck::integer(const Json& value, const char* name, 
   return number;
 }
 
-uint64_t GltfCheck::integer(const Json& parent, const char* key, uint64_t fallback, uint64_t limit, const GltfWhere& where) {
+uint64_t GltfCheck::integer(const Json& parent, const char* key, uint64_t fallback, uint64_t limit,
+                            const GltfWhere& where) {
   const Json* value = member(parent, key, where);
   return value ? integer(*value, key, limit, where).value_or(fallback) : fallback;
 }
@@ -172,7 +174,8 @@ GltfType read_component_type(GltfCheck& check, const Json& parent, const GltfWhe
   return GltfType::none;
 }
 
-void read_sparse(GltfCheck& check, const GltfDocument& document, const Json& sparse, const GltfWhere& where, GltfAccessor& a) {
+void read_sparse(GltfCheck& check, const GltfDocument& document, const Json& sparse, const GltfWhere& where,
+                 GltfAccessor& a) {
   const Json *indices = check.object(sparse, "indices", where), *values = check.object(sparse, "values", where);
   if (!indices || !values) {
     check.fail(where, "sparse lacks indices or values");
@@ -235,7 +238,8 @@ const uint8_t* GltfAccessor::element(size_t i) const {
 double GltfAccessor::component(const uint8_t* element, int c) const {
   if (!element) return 0;
   int rows = is_matrix ? matrix_rows(components) : components;
-  const uint8_t* p = element + size_t(c / rows) * column_size(rows, type, is_matrix) + size_t(c % rows) * component_size(type);
+  const uint8_t* p = element + size_t(c / rows) * column_size(rows, type, is_matrix) +
+                     size_t(c % rows) * component_size(type);
   switch (type) {
     case GltfType::i8: return int8_t(*p);
     case GltfType::u8: return *p;
@@ -276,7 +280,8 @@ uint32_t GltfAccessor::integer(size_t i) const {
   return p ? load_unsigned(p, type) : 0;
 }
 
-std::span<const uint8_t> read_buffer_view(GltfCheck& check, const GltfDocument& document, size_t index, size_t* stride) {
+std::span<const uint8_t> read_buffer_view(GltfCheck& check, const GltfDocument& document, size_t index,
+                                          size_t* stride) {
   const Json& view = gltf_item(document.json, "bufferViews", index);
   GltfWhere where{"buffer view", index};
   auto buffer = check.index(view, "buffer", document.buffers.size(), where);
@@ -335,14 +340,14 @@ GltfAccessor read_accessor(GltfCheck& check, const GltfDocument& document, size_
   return a;
 }
 
-std::optional<GltfAccessor> read_attribute(GltfCheck& check, const GltfDocument& document, const Json& parent, const char* key,
-                                           size_t count, const GltfWhere& where) {
+std::optional<GltfAccessor> read_attribute(GltfCheck& check, const GltfDocument& document, const Json& parent,
+                                           const char* key, size_t count, const GltfWhere& where) {
   auto index = check.index(parent, key, gltf_count(document.json, "accessors"), where);
   if (!index) return std::nullopt;
   GltfAccessor a = read_accessor(check, document, *index);
   if (check.ok() && a.count != count) {
-    check.fail(where, std::string(key) + " has " + std::to_string(a.count) + " elements, but there are " + std::to_string(count) +
-                          " vertices");
+    check.fail(where, std::string(key) + " has " + std::to_string(a.count) + " elements, but there are " +
+                          std::to_string(count) + " vertices");
   }
   if (!check.ok()) return std::nullopt;
   return a;

@@ -74,7 +74,9 @@ struct Builder {
     if (normalized) a["normalized"] = true;
     return accessor(std::move(a));
   }
-  size_t floats(const std::vector<float>& values, const std::string& shape) { return accessor(values, type_f32, shape); }
+  size_t floats(const std::vector<float>& values, const std::string& shape) {
+    return accessor(values, type_f32, shape);
+  }
   size_t indices(const std::vector<uint16_t>& values) { return accessor(values, type_u16, "SCALAR"); }
 
   Json finished() const {
@@ -97,12 +99,14 @@ inline Builder triangle() {
   size_t positions = b.floats({0, 0, 0, 2, 0, 0, 0, 1, 0}, "VEC3");
   size_t normals = b.floats({0, 0, 1, 0, 0, 1, 0, 0, 1}, "VEC3");
   size_t indices = b.indices({0, 1, 2});
-  b.json["meshes"] = {{{"primitives", {{{"attributes", {{"POSITION", positions}, {"NORMAL", normals}}}, {"indices", indices}}}}}};
+  b.json["meshes"] = {
+      {{"primitives", {{{"attributes", {{"POSITION", positions}, {"NORMAL", normals}}}, {"indices", indices}}}}}};
   b.json["nodes"] = {{{"mesh", 0}}};
   return b;
 }
 
-// PNG of 8- or 16-bit samples (stored high byte first) in rows of `channels` (1, 3 or 4), in an uncompressed deflate stream.
+// PNG of 8- or 16-bit samples (stored high byte first) in rows of `channels` (1, 3 or 4), in an uncompressed deflate
+// stream.
 inline Bytes make_png(int width, int height, int channels, int depth, const Bytes& samples) {
   auto crc = [](const uint8_t* p, size_t n) {
     uint32_t c = ~0u;
@@ -165,8 +169,9 @@ inline void write_bytes(const std::string& path, const Bytes& bytes) {
 inline std::string data_folder() {
   const char* given = std::getenv("LAMBENT_DATA");
   std::filesystem::path folder =
-      given ? std::filesystem::path(given)
-            : std::filesystem::path(__FILE__).parent_path().parent_path().parent_path().parent_path() / "../shared/data";
+      given
+          ? std::filesystem::path(given)
+          : std::filesystem::path(__FILE__).parent_path().parent_path().parent_path().parent_path() / "../shared/data";
   std::error_code ignored;
   return std::filesystem::is_directory(folder, ignored) ? folder.string() : "";
 }

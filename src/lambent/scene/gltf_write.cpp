@@ -91,7 +91,8 @@ size_t GlbWriter::add_vectors(std::span<const float> values, int components, boo
                    {"count", count},
                    {"type", "VEC" + std::to_string(components)}};
   if (with_bounds) {
-    add_bounds(accessor, count, components, [&](size_t i, int c) { return double(values[i * size_t(components) + size_t(c)]); });
+    add_bounds(accessor, count, components,
+               [&](size_t i, int c) { return double(values[i * size_t(components) + size_t(c)]); });
   }
   return push("accessors", std::move(accessor));
 }
@@ -99,10 +100,9 @@ size_t GlbWriter::add_vectors(std::span<const float> values, int components, boo
 size_t GlbWriter::add_indices(std::span<const uint32_t> indices) {
   size_t view = add_view(keep(bytes_of(indices)), 4);
   list("bufferViews")[view]["target"] = element_array_buffer;
-  return push("accessors", {{"bufferView", view},
-                            {"componentType", int(GltfType::u32)},
-                            {"count", indices.size()},
-                            {"type", "SCALAR"}});
+  return push(
+      "accessors",
+      {{"bufferView", view}, {"componentType", int(GltfType::u32)}, {"count", indices.size()}, {"type", "SCALAR"}});
 }
 
 size_t GlbWriter::add_copy(const GltfAccessor& from, std::span<const uint32_t> source, bool with_bounds) {
@@ -110,16 +110,15 @@ size_t GlbWriter::add_copy(const GltfAccessor& from, std::span<const uint32_t> s
   std::vector<uint8_t> bytes(source.size() * stride);
   for (size_t i = 0; i < source.size(); ++i) {
     LAMBENT_CHECK(source[i] < from.count);
-    if (const uint8_t* element = from.element(source[i])) std::memcpy(bytes.data() + i * stride, element, from.element_size);
+    if (const uint8_t* element = from.element(source[i]))
+      std::memcpy(bytes.data() + i * stride, element, from.element_size);
   }
   size_t view = add_view(keep(std::move(bytes)), 4);
   Json& view_json = list("bufferViews")[view];
   view_json["target"] = array_buffer;
   if (stride != from.element_size) view_json["byteStride"] = stride;
-  Json accessor = {{"bufferView", view},
-                   {"componentType", int(from.type)},
-                   {"count", source.size()},
-                   {"type", from.shape}};
+  Json accessor = {
+      {"bufferView", view}, {"componentType", int(from.type)}, {"count", source.size()}, {"type", from.shape}};
   if (from.normalized) accessor["normalized"] = true;
   if (with_bounds) {
     add_bounds(accessor, source.size(), from.components,

@@ -14,7 +14,8 @@ class GlbWriter {
   size_t push(const char* key, Json item);
   void use_extension(const char* name);
 
-  // Places bytes, which must outlive write(), in the binary chunk, at a multiple of `alignment` in the file; gives their offset.
+  // Places bytes, which must outlive write(), in the binary chunk, at a multiple of `alignment` in the file; gives
+  // their offset.
   size_t append(std::span<const uint8_t> bytes, size_t alignment);
   // The same for bytes that the writer keeps.
   std::span<const uint8_t> keep(std::vector<uint8_t> bytes);

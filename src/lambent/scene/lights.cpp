@@ -11,7 +11,8 @@ LampArrival arriving(const PunctualLight& light, Vec3 p) {
   const float distance = std::sqrt(distance2);
   LampArrival out{d / distance, distance, light.intensity / distance2};
   if (light.kind == PunctualLight::Kind::spot) {
-    const float cosine = -glm::dot(out.direction, light.direction), outer = std::cos(light.outer_cone), inner = std::cos(light.inner_cone);
+    const float cosine = -glm::dot(out.direction, light.direction), outer = std::cos(light.outer_cone),
+                inner = std::cos(light.inner_cone);
     const float share = std::clamp((cosine - outer) / std::max(inner - outer, 1e-4f), 0.0f, 1.0f);
     out.irradiance *= share * share;
   }

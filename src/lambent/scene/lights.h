@@ -1,19 +1,19 @@
 #pragma once
-// Lamps without a surface: what of them arrives where. Units as glTF has them: intensity I in candela, irradiance in lux, and
-// emission of surfaces in candela a square metre are one system, so a Lambert surface of albedo a under irradiance E sends out
-// a E / pi.
+// Lamps without a surface: what of them arrives where. Units as glTF has them: intensity I in candela, irradiance in
+// lux, and emission of surfaces in candela a square metre are one system, so a Lambert surface of albedo a under
+// irradiance E sends out a E / pi.
 #include <lambent/scene/scene.h>
 
 namespace lambent {
 
 struct LampArrival {
-  Vec3 direction;    // unit, from the point to the lamp
-  float distance;    // infinite for directional ones
-  Vec3 irradiance;   // of a surface at the point that faces the lamp, were nothing in between
+  Vec3 direction;   // unit, from the point to the lamp
+  float distance;   // infinite for directional ones
+  Vec3 irradiance;  // of a surface at the point that faces the lamp, were nothing in between
 };
 
-// Source: KHR_lights_punctual. Inverse square of the distance; spots fall off as clamp((cos t - cos outer) / (cos inner - cos
-// outer))^2. `range` is not read: it is a hint for what a renderer may leave out.
+// Source: KHR_lights_punctual. Inverse square of the distance; spots fall off as clamp((cos t - cos outer) / (cos inner
+// - cos outer))^2. `range` is not read: it is a hint for what a renderer may leave out.
 LampArrival arriving(const PunctualLight& light, Vec3 p);
 
 // Whether light comes from the side of the triangle that a ray meets.

@@ -17,9 +17,9 @@ Result<Scene> load_scene(const std::string& path) {
   if (!file) return file.error();
   std::string folder = std::filesystem::path(path).parent_path().string();
   if (folder.empty()) folder = ".";
-  auto scene = gltf                 ? load_gltf(*file, path, folder)
-               : extension == "obj" ? load_obj(file->bytes(), path, folder)
-                                    : load_ply(file->bytes(), path);
+  auto scene = gltf               ? load_gltf(*file, path, folder)
+             : extension == "obj" ? load_obj(file->bytes(), path, folder)
+                                  : load_ply(file->bytes(), path);
   if (!scene) return scene.error();
   scene->path = path;
   scene->hash = content_hash(file->bytes());

@@ -6,21 +6,24 @@
 namespace lambent {
 
 // Loads .gltf, .glb, .obj (with its .mtl) or .ply, chosen by extension, validates and cleans it:
-//   - every index, count, offset and number is checked; NaN and infinite positions, and a file without a usable triangle, are errors;
+//   - every index, count, offset and number is checked; NaN and infinite positions, and a file without a usable
+//   triangle, are errors;
 //   - missing or broken normals are computed (make_normals in clean.h);
 //   - exact duplicate triangles are dropped, and coincident opposite ones marked two-sided;
-//   - OBJ and PLY carry no sidedness: a connected component that is closed and faces outward is one-sided, others two-sided.
+//   - OBJ and PLY carry no sidedness: a connected component that is closed and faces outward is one-sided, others
+//   two-sided.
 // External buffers and images must lie inside the scene file's folder.
 Result<Scene> load_scene(const std::string& path);
 
-// The loaders behind it, from bytes, for tests and fuzzers. `path` names the file in messages; `folder` is where external
-// files are looked up, and an empty folder refuses all of them.
+// The loaders behind it, from bytes, for tests and fuzzers. `path` names the file in messages; `folder` is where
+// external files are looked up, and an empty folder refuses all of them.
 Result<Scene> load_gltf(std::span<const uint8_t> bytes, const std::string& path, const std::string& folder);
 Result<Scene> load_obj(std::span<const uint8_t> bytes, const std::string& path, const std::string& folder);
 Result<Scene> load_ply(std::span<const uint8_t> bytes, const std::string& path);
 
-// An external file that a scene names, read from `folder`. Refused: absolute paths, "..", URLs, links that lead outside.
-// `uri` is percent-decoded first.
-Result<std::vector<uint8_t>> read_external_file(const std::string& uri, const std::string& folder, const std::string& referrer);
+// An external file that a scene names, read from `folder`. Refused: absolute paths, "..", URLs, links that lead
+// outside. `uri` is percent-decoded first.
+Result<std::vector<uint8_t>> read_external_file(const std::string& uri, const std::string& folder,
+                                                const std::string& referrer);
 
 }  // namespace lambent

@@ -1,4 +1,5 @@
-// glTF 2.0 specification (ISO/IEC 12113): the loader. Sections 3.7.2 (meshes, morph targets) and 3.7.3 (skins) in the rest pose.
+// glTF 2.0 specification (ISO/IEC 12113): the loader. Sections 3.7.2 (meshes, morph targets) and 3.7.3 (skins) in the
+// rest pose.
 #include <lambent/scene/clean.h>
 #include <lambent/scene/gltf_container.h>
 #include <lambent/scene/gltf_geometry.h>
@@ -14,7 +15,8 @@ using Json = nlohmann::json;
 
 namespace {
 
-// What a file may grow to, however small it is. A mesh may be shown by many nodes, and an accessor without bytes is all zeros.
+// What a file may grow to, however small it is. A mesh may be shown by many nodes, and an accessor without bytes is all
+// zeros.
 constexpr uint64_t max_vertices = uint64_t{1} << 28, max_triangles = uint64_t{1} << 29;
 constexpr uint64_t max_zeros = uint64_t{1} << 22, max_parts = uint64_t{1} << 20;
 
@@ -30,7 +32,8 @@ bool check_document(GltfCheck& check, const Json& json) {
   std::string minimum = asset ? check.text(*asset, "minVersion", {}) : "";
   if (!check.ok()) return false;
   if (version.empty()) return check.fail({}, "not glTF: asset.version is missing");
-  if (!version.starts_with("2.")) return check.fail({}, "glTF version " + in_quotes(version) + " is not supported, only 2");
+  if (!version.starts_with("2."))
+    return check.fail({}, "glTF version " + in_quotes(version) + " is not supported, only 2");
   if (!minimum.empty() && minimum != "2.0") {
     return check.fail({}, "asks for glTF " + in_quotes(minimum) + "; only 2.0 is supported");
   }
@@ -44,8 +47,8 @@ bool check_document(GltfCheck& check, const Json& json) {
     }
   }
   check.array(json, "extensionsUsed", {});
-  for (const char* key : {"scenes", "nodes", "meshes", "skins", "accessors", "bufferViews", "buffers", "materials", "textures",
-                          "images", "samplers", "animations", "cameras"}) {
+  for (const char* key : {"scenes", "nodes", "meshes", "skins", "accessors", "bufferViews", "buffers", "materials",
+                          "textures", "images", "samplers", "animations", "cameras"}) {
     const Json* list = check.array(json, key, {});
     for (size_t i = 0; list && i < list->size(); ++i) {
       if (!(*list)[i].is_object()) return check.fail({key, i}, "is not an object");
@@ -108,7 +111,8 @@ bool read_buffers(GltfCheck& check, GltfDocument& document, std::span<const uint
       return check.fail(where, "has no bytes: neither a uri nor a GLB chunk");
     }
     if (length > bytes.size()) {
-      return check.fail(where, "is truncated: has " + std::to_string(bytes.size()) + " of " + std::to_string(length) + " bytes");
+      return check.fail(
+          where, "is truncated: has " + std::to_string(bytes.size()) + " of " + std::to_string(length) + " bytes");
     }
     document.buffers.push_back(bytes.first(length));
   }
@@ -153,15 +157,16 @@ class PrimitiveReader {
       if (!mesh) continue;
       const Json* primitives = check_.array(gltf_item(document_.json, "meshes", *mesh), "primitives", {"mesh", *mesh});
       for (size_t p = 0; primitives && p < primitives->size(); ++p) {
-        if (++visited_ > max_parts) return check_.fail({}, "has more than " + std::to_string(max_parts) + " primitives to show");
+        if (++visited_ > max_parts)
+          return check_.fail({}, "has more than " + std::to_string(max_parts) + " primitives to show");
         if (!read_primitive(n, *mesh, p, (*primitives)[p])) return false;
       }
       if (!check_.ok()) return false;
     }
     if (skipped_) {
-      scene_.warnings.push_back(std::to_string(skipped_) + (skipped_ == 1 ? " primitive of points or lines is"
-                                                                          : " primitives of points or lines are") +
-                                " not lit");
+      scene_.warnings.push_back(
+          std::to_string(skipped_) +
+          (skipped_ == 1 ? " primitive of points or lines is" : " primitives of points or lines are") + " not lit");
     }
     return true;
   }
@@ -190,7 +195,8 @@ class PrimitiveReader {
       indices = read_accessor(check_, document_, *index);
       GltfType type = indices->type;
       bool fitting = type == GltfType::u8 || type == GltfType::u16 || type == GltfType::u32;
-      if (check_.ok() && (indices->components != 1 || !fitting)) check_.fail(where, "indices are not unsigned integers");
+      if (check_.ok() && (indices->components != 1 || !fitting))
+        check_.fail(where, "indices are not unsigned integers");
     }
     if (!check_.ok()) return false;
     const size_t corners = indices ? indices->count : positions.count;
@@ -216,11 +222,14 @@ class PrimitiveReader {
     part.first_vertex = uint32_t(scene_.positions.size()), part.vertex_count = uint32_t(positions.count);
     part.first_triangle = uint32_t(scene_.triangles.size());
     const bool has_own = baked && baked->contains("ownMaterial");
-    auto material = check_.index(has_own ? *baked : primitive, has_own ? "ownMaterial" : "material", gltf_count(document_.json, "materials"), where);
+    auto material = check_.index(has_own ? *baked : primitive, has_own ? "ownMaterial" : "material",
+                                 gltf_count(document_.json, "materials"), where);
     if (!check_.ok()) return false;
     part.material = material ? uint32_t(*material) : default_material();
-    if (!read_vertices(check_, document_, *attributes, positions, targets, placement, where, scene_.positions, scene_.normals) ||
-        !read_colors(*attributes, positions.count, where) || !read_tangents(*attributes, positions.count, placement, where)) {
+    if (!read_vertices(check_, document_, *attributes, positions, targets, placement, where, scene_.positions,
+                       scene_.normals) ||
+        !read_colors(*attributes, positions.count, where) ||
+        !read_tangents(*attributes, positions.count, placement, where)) {
       return false;
     }
     if (!read_triangles(part, mode, indices, triangles, placement.mirrored, where)) return false;
@@ -229,8 +238,8 @@ class PrimitiveReader {
     return true;
   }
 
-  bool check_size(const GltfAccessor& positions, const std::optional<GltfAccessor>& indices, size_t triangles, size_t targets,
-                  const GltfWhere& where) {
+  bool check_size(const GltfAccessor& positions, const std::optional<GltfAccessor>& indices, size_t triangles,
+                  size_t targets, const GltfWhere& where) {
     if (positions.data.empty()) zeros_ += positions.count;
     if (indices && indices->data.empty()) zeros_ += indices->count;
     if (zeros_ > max_zeros) return check_.fail(where, "too many vertices or indices have no bytes in a buffer");
@@ -282,7 +291,8 @@ class PrimitiveReader {
   bool read_tangents(const Json& attributes, size_t count, const GltfPlacement& placement, const GltfWhere& where) {
     auto a = read_attribute(check_, document_, attributes, "TANGENT", count, where);
     if (!check_.ok()) return false;
-    if (a && (a->components != 4 || a->is_matrix || a->type == GltfType::u32)) return check_.fail(where, "TANGENT is not four floats or small integers");
+    if (a && (a->components != 4 || a->is_matrix || a->type == GltfType::u32))
+      return check_.fail(where, "TANGENT is not four floats or small integers");
     if (!attributes.contains("NORMAL")) a.reset();  // void without
     if (!a && scene_.tangents.empty()) return true;
     const size_t first = scene_.positions.size() - count;
@@ -298,8 +308,8 @@ class PrimitiveReader {
     return true;
   }
 
-  bool read_triangles(Part& part, uint64_t mode, const std::optional<GltfAccessor>& indices, size_t count, bool mirrored,
-                      const GltfWhere& where) {
+  bool read_triangles(Part& part, uint64_t mode, const std::optional<GltfAccessor>& indices, size_t count,
+                      bool mirrored, const GltfWhere& where) {
     const bool two_sided = scene_.materials[part.material].double_sided;
     const uint32_t part_number = uint32_t(scene_.parts.size());
     for (size_t t = 0; t < count; ++t) {
@@ -310,8 +320,8 @@ class PrimitiveReader {
       for (int k = 0; k < 3; ++k) {
         v[k] = indices ? indices->integer(corner[k]) : uint32_t(corner[k]);
         if (v[k] >= part.vertex_count) {
-          return check_.fail(where, "index " + std::to_string(corner[k]) + " is " + std::to_string(v[k]) + ", but there are " +
-                                        std::to_string(part.vertex_count) + " vertices");
+          return check_.fail(where, "index " + std::to_string(corner[k]) + " is " + std::to_string(v[k]) +
+                                        ", but there are " + std::to_string(part.vertex_count) + " vertices");
         }
         v[k] += part.first_vertex;
       }
@@ -378,8 +388,8 @@ bool read_scene(GltfCheck& check, GltfDocument& document, std::span<const uint8_
   return true;
 }
 
-Result<Scene> load_document(std::shared_ptr<GltfDocument> document, std::span<const uint8_t> binary, const std::string& path,
-                            const std::string& folder) {
+Result<Scene> load_document(std::shared_ptr<GltfDocument> document, std::span<const uint8_t> binary,
+                            const std::string& path, const std::string& folder) {
   GltfCheck check(path);
   Scene scene;
   scene.path = path;

@@ -42,13 +42,15 @@ Builder rich() {  // something of everything
   Builder b = triangle();
   auto& attributes = primitive(b)["attributes"];
   attributes["TEXCOORD_0"] = b.floats({0, 0, 1, 0, 0, 1}, "VEC2");
-  attributes["COLOR_0"] = b.accessor(std::vector<uint8_t>{1, 2, 3, 4, 5, 6, 7, 8, 9, 10, 11, 12}, type_u8, "VEC4", true);
+  attributes["COLOR_0"] =
+      b.accessor(std::vector<uint8_t>{1, 2, 3, 4, 5, 6, 7, 8, 9, 10, 11, 12}, type_u8, "VEC4", true);
   attributes["JOINTS_0"] = b.accessor(std::vector<uint8_t>{0, 1, 0, 0, 0, 1, 0, 0, 1, 0, 0, 0}, type_u8, "VEC4");
   attributes["WEIGHTS_0"] = b.floats({0.25f, 0.75f, 0, 0, 1, 0, 0, 0, 1, 0, 0, 0}, "VEC4");
   primitive(b)["targets"] = {{{"POSITION", b.floats({0, 0, 1, 0, 0, 2, 0, 0, 3}, "VEC3")}}};
   primitive(b)["material"] = 0;
   b.json["meshes"][0]["weights"] = {0.5};
-  b.json["nodes"] = {{{"mesh", 0}, {"skin", 0}}, {{"translation", {1, 2, 3}}, {"children", {2}}}, {{"scale", {1, 2, 1}}}};
+  b.json["nodes"] = {
+      {{"mesh", 0}, {"skin", 0}}, {{"translation", {1, 2, 3}}, {"children", {2}}}, {{"scale", {1, 2, 1}}}};
   b.json["skins"] = {{{"joints", {1, 2}}}};
   b.json["scenes"] = {{{"nodes", {0, 1}}}};
   b.json["scene"] = 0;
@@ -90,8 +92,8 @@ TEST(HostileGltf, EveryValueOfAnyTypeIsCheckedOrIgnored) {
   // Replaces each value in the document, one at a time, by values of every JSON type.
   const Builder good = rich();
   const Json flat = good.finished().flatten();
-  const std::vector<Json> others = {nullptr,     true,   -1,            1.5,           1e300, uint64_t{1} << 63,
-                                    4000000000u, "text", Json::array(), Json::object()};
+  const std::vector<Json> others = {nullptr,           true,        -1,     1.5,           1e300,
+                                    uint64_t{1} << 63, 4000000000u, "text", Json::array(), Json::object()};
   for (auto item = flat.begin(); item != flat.end(); ++item) {
     for (Json::json_pointer at(item.key()); !at.empty(); at.pop_back()) {
       for (const Json& other : others) {
@@ -161,11 +163,13 @@ TEST(HostileGltf, LyingLengthsAndCounts) {
   EXPECT_EQ(with("/bufferViews/0/byteStride", 256), "t: buffer view 0: byteStride is 256, out of range");
   EXPECT_EQ(with("/accessors/0/count", 4), "t: accessor 0: reaches past the end of buffer view 0");
   EXPECT_EQ(with("/accessors/0/count", 4294967295u), "t: accessor 0: reaches past the end of buffer view 0");
-  EXPECT_EQ(with("/accessors/0/byteOffset", huge), "t: accessor 0: byteOffset is " + std::to_string(huge) + ", out of range");
+  EXPECT_EQ(with("/accessors/0/byteOffset", huge),
+            "t: accessor 0: byteOffset is " + std::to_string(huge) + ", out of range");
   EXPECT_EQ(with("/accessors/0/byteOffset", huge - 1), "t: accessor 0: reaches past the end of buffer view 0");
   EXPECT_EQ(with("/accessors/0/byteOffset", 4), "t: accessor 0: reaches past the end of buffer view 0");
   EXPECT_EQ(with("/accessors/0/type", "VEC9"), "t: accessor 0: type \"VEC9\" does not exist");
-  EXPECT_EQ(with("/accessors/0/type", "VEC2"), "t: mesh 0, primitive 0: POSITION is not three floats or small integers");
+  EXPECT_EQ(with("/accessors/0/type", "VEC2"),
+            "t: mesh 0, primitive 0: POSITION is not three floats or small integers");
   EXPECT_EQ(with("/accessors/0/componentType", 5124), "t: accessor 0: componentType 5124 does not exist");
   EXPECT_EQ(with("/accessors/1/count", 2), "t: mesh 0, primitive 0: NORMAL has 2 elements, but there are 3 vertices");
 }
@@ -228,7 +232,8 @@ TEST(HostileGltf, RequiredExtensionsAndVersions) {
   Builder b = triangle();
   b.json["extensionsRequired"] = {"KHR_materials_unlit", "KHR_draco_mesh_compression"};
   EXPECT_EQ(message(b), "test.glb: needs the extension \"KHR_draco_mesh_compression\", which is not supported");
-  b.json["extensionsRequired"] = {"KHR_materials_unlit", "KHR_lights_punctual", "KHR_texture_transform", "LAMBENT_transfer"};
+  b.json["extensionsRequired"] = {"KHR_materials_unlit", "KHR_lights_punctual", "KHR_texture_transform",
+                                  "LAMBENT_transfer"};
   EXPECT_EQ(message(b), "loaded");
   b.json["asset"]["minVersion"] = "2.1";
   EXPECT_EQ(message(b), "test.glb: asks for glTF \"2.1\"; only 2.0 is supported");

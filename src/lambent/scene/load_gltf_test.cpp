@@ -56,8 +56,8 @@ TEST(LoadGltf, TextFormWithDataUriIsTheSame) {
 }
 
 TEST(LoadGltf, NodeTransformsCompose) {
-  // Child: scale (1, 2, 3), a quarter turn about +Y (x -> -z, z -> x), moved by (10, 0, 0). Parent: a matrix that swaps x and y
-  // and moves by (0, 0, 5); it mirrors.
+  // Child: scale (1, 2, 3), a quarter turn about +Y (x -> -z, z -> x), moved by (10, 0, 0). Parent: a matrix that swaps
+  // x and y and moves by (0, 0, 5); it mirrors.
   Builder b = triangle();
   const double h = std::sqrt(0.5);
   b.json["nodes"] = {{{"mesh", 0}, {"translation", {10, 0, 0}}, {"rotation", {0, h, 0, h}}, {"scale", {1, 2, 3}}},
@@ -110,11 +110,12 @@ TEST(LoadGltf, StripsAndFans) {
   for (int i = 0; i < 5; ++i) p.insert(p.end(), {float(i / 2), float(i % 2), 0});
   size_t strip = b.floats(p, "VEC3");
   size_t fan = b.floats({0, 0, 1, 1, 0, 1, 1, 1, 1, 0, 1, 1}, "VEC3");
-  b.json["meshes"] = {{{"primitives",
-                        {{{"attributes", {{"POSITION", strip}}}, {"mode", 5}},
-                         {{"attributes", {{"POSITION", fan}}}, {"mode", 6}, {"indices", b.indices({1, 2, 3, 0})}},
-                         {{"attributes", {{"POSITION", strip}}}, {"mode", 5}, {"indices", b.indices({0, 2, 1, 1, 4, 2})}},
-                         {{"attributes", {{"POSITION", strip}}}, {"mode", 1}}}}}};
+  b.json["meshes"] = {
+      {{"primitives",
+        {{{"attributes", {{"POSITION", strip}}}, {"mode", 5}},
+         {{"attributes", {{"POSITION", fan}}}, {"mode", 6}, {"indices", b.indices({1, 2, 3, 0})}},
+         {{"attributes", {{"POSITION", strip}}}, {"mode", 5}, {"indices", b.indices({0, 2, 1, 1, 4, 2})}},
+         {{"attributes", {{"POSITION", strip}}}, {"mode", 1}}}}}};
   b.json["nodes"] = {{{"mesh", 0}}};
   Scene s = loaded(b);
   ASSERT_EQ(s.parts.size(), 3u);
@@ -130,7 +131,8 @@ TEST(LoadGltf, StripsAndFans) {
 TEST(LoadGltf, MakesFlatNormalsWhereThereAreNone) {
   Builder b;  // two faces of a roof that share an edge
   size_t p = b.floats({0, 0, 0, 0, 0, 1, 1, 1, 0, 2, 0, 0}, "VEC3");
-  b.json["meshes"] = {{{"primitives", {{{"attributes", {{"POSITION", p}}}, {"indices", b.indices({0, 1, 2, 1, 3, 2})}}}}}};
+  b.json["meshes"] = {
+      {{"primitives", {{{"attributes", {{"POSITION", p}}}, {"indices", b.indices({0, 1, 2, 1, 3, 2})}}}}}};
   b.json["nodes"] = {{{"mesh", 0}}};
   Scene s = loaded(b);
   EXPECT_TRUE(s.parts[0].changed);
@@ -157,7 +159,8 @@ TEST(LoadGltf, QuantisedAttributes) {
       {"NORMAL", padded(std::vector<int8_t>{0, 0, 127, 9, 0, -128, 0, 9, 127, 127, 0, 9}, type_i8, true)},
       {"TEXCOORD_0", b.accessor(std::vector<uint16_t>{0, 65535, 1, 2, 3, 4}, type_u16, "VEC2", true)},
       {"TEXCOORD_1", b.accessor(std::vector<uint16_t>{0, 65535, 1, 2, 3, 4}, type_u16, "VEC2")},
-      {"COLOR_0", b.accessor(std::vector<uint8_t>{0, 51, 255, 9, 1, 2, 3, 9, 255, 255, 255, 9}, type_u8, "VEC4", true)}};
+      {"COLOR_0",
+       b.accessor(std::vector<uint8_t>{0, 51, 255, 9, 1, 2, 3, 9, 255, 255, 255, 9}, type_u8, "VEC4", true)}};
   b.json["nodes"][0]["scale"] = {0.01, 0.01, 0.01};
   Scene s = loaded(b);
   expect_near(s.positions[1], {-3, 0, 0});
@@ -259,17 +262,18 @@ TEST(LoadGltf, SkinnedMeshesStandInTheirRestPose) {
 
 TEST(LoadGltf, Materials) {
   Builder b = triangle();
-  b.json["materials"] = {{{"name", "unused"}},
-                         {{"name", "paint"},
-                          {"doubleSided", true},
-                          {"alphaMode", "BLEND"},
-                          {"emissiveFactor", {0.5, 0, 1}},
-                          {"extensions", {{"KHR_materials_emissive_strength", {{"emissiveStrength", 8}}}}},
-                          {"pbrMetallicRoughness",
-                           {{"baseColorFactor", {0.25, 0.5, 1, 0.5}}, {"metallicFactor", 0.125}, {"roughnessFactor", 0.75}}}},
-                         {{"extensions",
-                           {{"KHR_materials_pbrSpecularGlossiness",
-                             {{"diffuseFactor", {0.1, 0.2, 0.3, 1}}, {"glossinessFactor", 0.25}}}}}}};
+  b.json["materials"] = {
+      {{"name", "unused"}},
+      {{"name", "paint"},
+       {"doubleSided", true},
+       {"alphaMode", "BLEND"},
+       {"emissiveFactor", {0.5, 0, 1}},
+       {"extensions", {{"KHR_materials_emissive_strength", {{"emissiveStrength", 8}}}}},
+       {"pbrMetallicRoughness",
+        {{"baseColorFactor", {0.25, 0.5, 1, 0.5}}, {"metallicFactor", 0.125}, {"roughnessFactor", 0.75}}}},
+      {{"extensions",
+        {{"KHR_materials_pbrSpecularGlossiness",
+          {{"diffuseFactor", {0.1, 0.2, 0.3, 1}}, {"glossinessFactor", 0.25}}}}}}};
   primitive(b)["material"] = 1;
   Scene s = loaded(b);
   ASSERT_EQ(s.materials.size(), 3u);
@@ -368,7 +372,8 @@ TEST(LoadGltf, MetallicRoughnessTextures) {
 }
 
 TEST(LoadGltf, NormalTexturesAndTangents) {
-  // A texel (51, 204, 230) = (-0.6, 0.6, 0.804), seen under a node that turns or mirrors: the normal turns and mirrors with it.
+  // A texel (51, 204, 230) = (-0.6, 0.6, 0.804), seen under a node that turns or mirrors: the normal turns and mirrors
+  // with it.
   const Vec3 local = glm::normalize(Vec3(2 * 51 / 255.0f - 1, 2 * 204 / 255.0f - 1, 2 * 230 / 255.0f - 1));
   for (bool tangents : {false, true})
     for (bool mirrored : {false, true}) {
@@ -385,7 +390,8 @@ TEST(LoadGltf, NormalTexturesAndTangents) {
       ASSERT_EQ(s.materials[0].normal_texture, 0);
       EXPECT_EQ(s.tangents.empty(), !tangents);
       const Vec3 expected(local.z, local.y, mirrored ? local.x : -local.x);
-      EXPECT_LT(glm::length(mapped_normal(s, s.triangles[0], 0.2f, 0.3f, s.normals[0]) - expected), 10 * rounding) << tangents << mirrored;
+      EXPECT_LT(glm::length(mapped_normal(s, s.triangles[0], 0.2f, 0.3f, s.normals[0]) - expected), 10 * rounding)
+          << tangents << mirrored;
     }
   Builder broken = textured(make_png(1, 1, 3, 8, {128, 128, 255}));
   primitive(broken)["attributes"]["TANGENT"] = broken.floats({1, 0, 0, 1, 0, 0, 1, 0, 0}, "VEC3");
@@ -394,7 +400,8 @@ TEST(LoadGltf, NormalTexturesAndTangents) {
 
 TEST(LoadGltf, EmissiveTextures) {
   Builder b = textured(make_png(1, 1, 3, 8, {255, 188, 0}));
-  b.json["materials"][0] = {{"emissiveTexture", {{"index", 0}, {"texCoord", 1}}}, {"emissiveFactor", {1, 0.5, 1}},
+  b.json["materials"][0] = {{"emissiveTexture", {{"index", 0}, {"texCoord", 1}}},
+                            {"emissiveFactor", {1, 0.5, 1}},
                             {"extensions", {{"KHR_materials_emissive_strength", {{"emissiveStrength", 8}}}}}};
   Scene s = loaded(b);
   EXPECT_EQ(s.materials[0].emissive, Vec3(8, 4, 8));

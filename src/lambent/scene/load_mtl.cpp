@@ -23,7 +23,8 @@ struct MtlMaterial {
 };
 using Library = std::map<std::string, MtlMaterial>;
 
-// `Kd r [g b]`; one number stands for three. False if it is no number. The spectral and xyz forms leave `color` as it was.
+// `Kd r [g b]`; one number stands for three. False if it is no number. The spectral and xyz forms leave `color` as it
+// was.
 bool parse_color(std::string_view text, Vec3& color, double highest) {
   double x[3];
   int count = 0;
@@ -108,10 +109,13 @@ std::string uri_from_name(std::string_view name) {
 }
 
 // "a.png" and "./a.png" are one file, to be read once.
-std::string normal_name(const std::string& name) { return std::filesystem::path(name).lexically_normal().generic_string(); }
+std::string normal_name(const std::string& name) {
+  return std::filesystem::path(name).lexically_normal().generic_string();
+}
 
 // The files of one mtllib line: usually one, whose name may hold blanks, or several.
-Result<void> load_library(std::string_view line, Scene& scene, const std::string& folder, Library& library, bool& complete) {
+Result<void> load_library(std::string_view line, Scene& scene, const std::string& folder, Library& library,
+                          bool& complete) {
   std::vector<std::string_view> names{line};
   auto whole = read_external_file(uri_from_name(line), folder, scene.path);
   if (!whole && line.find_first_of(" \t") != line.npos) {
@@ -155,7 +159,8 @@ Result<int> load_texture(Scene& scene, const MtlMaterial& source, const std::str
 }  // namespace
 
 Result<std::vector<uint32_t>> load_materials(Scene& scene, const std::vector<std::string>& libraries,
-                                             const std::vector<std::string>& names, Vec3 fallback, const std::string& folder) {
+                                             const std::vector<std::string>& names, Vec3 fallback,
+                                             const std::string& folder) {
   Library library;
   bool complete = true;
   std::set<std::string> tried;
@@ -171,7 +176,8 @@ Result<std::vector<uint32_t>> load_materials(Scene& scene, const std::vector<std
   std::vector<uint32_t> result;
   for (const std::string& name : names) {
     auto found = library.find(name);
-    if (found == library.end() && !name.empty() && unknown.insert(name).second && unknown.size() == 1) first_unknown = name;
+    if (found == library.end() && !name.empty() && unknown.insert(name).second && unknown.size() == 1)
+      first_unknown = name;
     // All names that no library defines share one material, under a key that no file can spell.
     std::string key = found == library.end() ? std::string("\n") : name;
     auto [place, is_new] = numbers.try_emplace(key, uint32_t(scene.materials.size()));

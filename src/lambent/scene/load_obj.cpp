@@ -1,5 +1,5 @@
-// Wavefront OBJ and MTL: "Advanced Visualizer Manual", appendix B (Wavefront 1993); vertex colours after the coordinates as
-// MeshLab and others write them.
+// Wavefront OBJ and MTL: "Advanced Visualizer Manual", appendix B (Wavefront 1993); vertex colours after the
+// coordinates as MeshLab and others write them.
 #include <lambent/scene/index_table.h>
 #include <lambent/scene/load.h>
 #include <lambent/scene/load_mtl.h>
@@ -172,8 +172,8 @@ Result<void> check_references(const ObjFile& obj) {
   return {};
 }
 
-// Puts the groups' faces into the scene, triangulated, a part a group; a part's vertices are its distinct corners, in the
-// file's order of positions. Returns how many faces had fewer than three corners.
+// Puts the groups' faces into the scene, triangulated, a part a group; a part's vertices are its distinct corners, in
+// the file's order of positions. Returns how many faces had fewer than three corners.
 class ObjAssembler {
  public:
   ObjAssembler(const ObjFile& obj, Scene& scene) : obj_(obj), scene_(scene) {
@@ -199,7 +199,8 @@ class ObjAssembler {
     for (size_t i = 0; i < number.size(); ++i) {
       Corner corner = obj_.corners[triangles_[i / 3][i % 3]];
       uint64_t hash = hash64(uint64_t(corner.v) << 32 | corner.vt, corner.vn);
-      number[i] = table.find_or_insert(hash, uint32_t(corners_.size()), [&](uint32_t k) { return corners_[k] == corner; });
+      number[i] =
+          table.find_or_insert(hash, uint32_t(corners_.size()), [&](uint32_t k) { return corners_[k] == corner; });
       if (number[i] == corners_.size()) corners_.push_back(corner);
     }
     std::vector<uint32_t> order(corners_.size()), place(corners_.size());

@@ -15,7 +15,9 @@ namespace {
 
 using test::bytes_of;
 
-Result<Scene> load(std::string_view text, const std::string& folder = "") { return load_obj(bytes_of(text), "t.obj", folder); }
+Result<Scene> load(std::string_view text, const std::string& folder = "") {
+  return load_obj(bytes_of(text), "t.obj", folder);
+}
 
 Scene must_load(std::string_view text, const std::string& folder = "") {
   auto scene = load(text, folder);
@@ -42,7 +44,9 @@ struct TemporaryFolder {
     path = mkdtemp(name.data());
   }
   ~TemporaryFolder() { std::filesystem::remove_all(path); }
-  void write(const std::string& name, std::string_view text) const { std::ofstream(path / name, std::ios::binary) << text; }
+  void write(const std::string& name, std::string_view text) const {
+    std::ofstream(path / name, std::ios::binary) << text;
+  }
 };
 
 // 2 x 1 pixels, red and blue, RGB, no compression; checksums by the PNG specification.
@@ -110,8 +114,7 @@ TEST(LoadObj, RefusesWithTheLine) {
   EXPECT_EQ(error_of(three + "f 1/1 2/1 3/1\n"), "t.obj:4: texture coordinate 1 of 0 does not exist");
   EXPECT_EQ(error_of(three + "f 1//1 2//2 3//1\nvn 0 0 1\n"), "t.obj:4: normal 2 of 1 does not exist");
   for (const char* face : {"f 1 2 0", "f 1 2 x", "f 1 2 3x", "f 1 2 99999999999999999999", "f 1 2 4294967295",
-                           "f 1 2 -9223372036854775808",
-                           "f 1 2 3/1/1/1", "f 1 2 /3"})
+                           "f 1 2 -9223372036854775808", "f 1 2 3/1/1/1", "f 1 2 /3"})
     EXPECT_EQ(error_of(three + face), "t.obj:4: malformed or out-of-range face corner") << face;
   EXPECT_EQ(error_of("v 0 0\n"), "t.obj:1: a vertex needs three coordinates");
   for (const char* v : {"v nan 0 0", "v 0 inf 0", "v 0 0 -1e39", "v 0 0 1e999", "v 0 2e9 0"})
@@ -168,8 +171,9 @@ TEST(LoadObj, MaterialsAndTextures) {
                "newmtl red\r\nKd 1.5 0.25 -1\r\nKe 2 0 0\r\nnewmtl grey\r\nKd 0.5\r\n"
                "newmtl image\r\nKd 1 1 1\r\nmap_Kd -clamp on -s 2 3 1 -o 0.25 0.5 -bm 1 .\\50% tex.png\r\n");
   folder.write("50% tex.png", tiny_png());
-  std::string text = "mtllib my lib.mtl\nv 0 0 0\nv 1 0 0\nv 0 1 0\nv 0 0 1\nvt 0.1 0.2\n"
-                     "usemtl red\nf 1 2 3\nusemtl grey\nf 1 2 4\nusemtl image\nf 1/1 3/1 4/1\n";
+  std::string text =
+      "mtllib my lib.mtl\nv 0 0 0\nv 1 0 0\nv 0 1 0\nv 0 0 1\nvt 0.1 0.2\n"
+      "usemtl red\nf 1 2 3\nusemtl grey\nf 1 2 4\nusemtl image\nf 1/1 3/1 4/1\n";
   Scene s = must_load(text, folder.path.string());
   EXPECT_TRUE(s.warnings.empty());
   ASSERT_EQ(s.materials.size(), 3u);
@@ -251,10 +255,10 @@ double shoelace(const std::vector<Vec2>& p) {
 
 TEST(LoadObj, ConcavePolygonsKeepTheirArea) {
   std::vector<std::vector<Vec2>> polygons{
-      {{0, 0}, {2, 0}, {0.5f, 0.5f}, {0, 2}},                                                   // arrow head
-      {{0, 0}, {3, 0}, {3, 3}, {2, 3}, {2, 1}, {1, 1}, {1, 3}, {0, 3}},                         // U
-      {{0, 0}, {1, 0}, {2, 0}, {2, 1}, {2, 2}, {1, 2}, {0, 2}, {0, 1}},                         // corners along the sides
-      {{0, 0}, {4, 0}, {4, 4}, {0, 4}, {0, 0}, {1, 1}, {1, 3}, {3, 3}, {3, 1}, {1, 1}},         // a hole, bridged
+      {{0, 0}, {2, 0}, {0.5f, 0.5f}, {0, 2}},                                            // arrow head
+      {{0, 0}, {3, 0}, {3, 3}, {2, 3}, {2, 1}, {1, 1}, {1, 3}, {0, 3}},                  // U
+      {{0, 0}, {1, 0}, {2, 0}, {2, 1}, {2, 2}, {1, 2}, {0, 2}, {0, 1}},                  // corners along the sides
+      {{0, 0}, {4, 0}, {4, 4}, {0, 4}, {0, 0}, {1, 1}, {1, 3}, {3, 3}, {3, 1}, {1, 1}},  // a hole, bridged
   };
   std::vector<Vec2> star, comb;
   for (int i = 0; i < 200; ++i) {
@@ -300,7 +304,12 @@ TEST(Triangulator, EndsWithItsBudget) {
 }
 
 TEST(TakeNumber, ReadsWhatFilesHold) {
-  for (auto [text, expected] : {std::pair{"1.5", 1.5}, {"+2", 2.0}, {"-3e2", -300.0}, {".5", 0.5}, {"5.", 5.0}, {"1e-999", 0.0},
+  for (auto [text, expected] : {std::pair{"1.5", 1.5},
+                                {"+2", 2.0},
+                                {"-3e2", -300.0},
+                                {".5", 0.5},
+                                {"5.", 5.0},
+                                {"1e-999", 0.0},
                                 {"1e999", INFINITY}}) {
     std::string_view rest = text;
     double value = -1;
@@ -323,8 +332,10 @@ struct DataFile {
 TEST(LoadObj, DataFiles) {
   std::string folder = test::data_folder();
   if (folder.empty()) GTEST_SKIP() << "no data folder";
-  for (DataFile file : {DataFile{"bunny.obj", 29'834, 59'664, true}, {"bunny_raw_scan.obj", 35'947 - 1'113, 69'451, false},
-                        {"armadillo.obj", 43'243, 86'482, true}, {"cornell_box.obj", 28, 36, false}}) {
+  for (DataFile file : {DataFile{"bunny.obj", 29'834, 59'664, true},
+                        {"bunny_raw_scan.obj", 35'947 - 1'113, 69'451, false},
+                        {"armadillo.obj", 43'243, 86'482, true},
+                        {"cornell_box.obj", 28, 36, false}}) {
     std::string path = folder + "/meshes/" + file.name;
     auto bytes = MappedFile::open(path);
     ASSERT_TRUE(bytes);
@@ -335,7 +346,8 @@ TEST(LoadObj, DataFiles) {
     std::set<std::tuple<float, float, float>> distinct;
     for (Vec3 p : scene->positions) distinct.insert({p.x, p.y, p.z});
     EXPECT_EQ(distinct.size(), file.positions) << file.name;
-    EXPECT_LT(double(scene->positions.size()), 2.6 * double(file.positions)) << file.name;  // a cube has 3 normals a corner
+    EXPECT_LT(double(scene->positions.size()), 2.6 * double(file.positions))
+        << file.name;  // a cube has 3 normals a corner
     EXPECT_EQ(test::two_sided_count(*scene) == 0, file.closed) << file.name;
     EXPECT_TRUE(scene->warnings.empty());
   }

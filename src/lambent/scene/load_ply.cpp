@@ -17,8 +17,9 @@ constexpr size_t type_size[] = {1, 1, 2, 2, 4, 4, 4, 8};
 bool is_float(Type t) { return t == Type::f32 || t == Type::f64; }
 
 bool type_from_name(std::string_view name, Type& type) {
-  constexpr std::string_view names[][2] = {{"char", "int8"}, {"uchar", "uint8"}, {"short", "int16"},   {"ushort", "uint16"},
-                                           {"int", "int32"}, {"uint", "uint32"}, {"float", "float32"}, {"double", "float64"}};
+  constexpr std::string_view names[][2] = {{"char", "int8"},     {"uchar", "uint8"},   {"short", "int16"},
+                                           {"ushort", "uint16"}, {"int", "int32"},     {"uint", "uint32"},
+                                           {"float", "float32"}, {"double", "float64"}};
   for (size_t i = 0; i < std::size(names); ++i)
     if (name == names[i][0] || name == names[i][1]) return type = Type(i), true;
   return false;
@@ -43,7 +44,7 @@ enum class Format { ascii, little_endian, big_endian };
 struct Header {
   Format format{};
   std::vector<Element> elements;
-  size_t size = 0;   // bytes
+  size_t size = 0;  // bytes
   size_t lines = 0;
 };
 
@@ -63,18 +64,20 @@ Result<Header> parse_header(std::string_view text, const std::string& path) {
       if (trimmed(line) != "ply") return wrong("is not a PLY file");
     } else if (keyword == "format") {
       std::string_view name = take_word(rest), version = take_word(rest);
-      if (name != "ascii" && name != "binary_little_endian" && name != "binary_big_endian") return wrong("unknown format");
+      if (name != "ascii" && name != "binary_little_endian" && name != "binary_big_endian")
+        return wrong("unknown format");
       if (version != "1.0") return wrong("version is not 1.0");
-      header.format = name == "ascii"                  ? Format::ascii
-                      : name == "binary_little_endian" ? Format::little_endian
-                                                       : Format::big_endian;
+      header.format = name == "ascii"                ? Format::ascii
+                    : name == "binary_little_endian" ? Format::little_endian
+                                                     : Format::big_endian;
       has_format = true;
     } else if (keyword == "element") {
       Element element;
       element.name = std::string(take_word(rest)), element.line = header.lines;
       std::string_view count = take_word(rest);
       auto [stop, code] = std::from_chars(count.data(), count.data() + count.size(), element.count);
-      if (code != std::errc() || stop != count.data() + count.size()) return wrong("element count is not a whole number");
+      if (code != std::errc() || stop != count.data() + count.size())
+        return wrong("element count is not a whole number");
       for (const Element& e : header.elements)
         if (e.name == element.name) return wrong(fmt::format("element {} comes twice", short_name(e.name)));
       header.elements.push_back(std::move(element));
@@ -142,7 +145,9 @@ class ValueReader {
   bool can_hold_list(uint64_t count, Type type) const { return can_hold(count, 1, type_size[size_t(type)]); }
 
   // "path:line" in text, else the path.
-  std::string where(const std::string& path) const { return format_ == Format::ascii ? fmt::format("{}:{}", path, line_) : path; }
+  std::string where(const std::string& path) const {
+    return format_ == Format::ascii ? fmt::format("{}:{}", path, line_) : path;
+  }
 
  private:
   bool read_text(double& value) {
@@ -163,11 +168,26 @@ class ValueReader {
 enum Role : uint8_t { x, y, z, nx, ny, nz, red, green, blue, tex_u, tex_v, other, role_count };
 
 Role role_from_name(std::string_view name) {
-  constexpr std::pair<std::string_view, Role> names[] = {
-      {"x", x},         {"y", y},           {"z", z},           {"nx", nx},        {"ny", ny},
-      {"nz", nz},       {"red", red},       {"green", green},   {"blue", blue},    {"diffuse_red", red},
-      {"s", tex_u},     {"t", tex_v},       {"u", tex_u},       {"v", tex_v},      {"diffuse_green", green},
-      {"texture_u", tex_u}, {"texture_v", tex_v}, {"texture_s", tex_u}, {"texture_t", tex_v}, {"diffuse_blue", blue}};
+  constexpr std::pair<std::string_view, Role> names[] = {{"x", x},
+                                                         {"y", y},
+                                                         {"z", z},
+                                                         {"nx", nx},
+                                                         {"ny", ny},
+                                                         {"nz", nz},
+                                                         {"red", red},
+                                                         {"green", green},
+                                                         {"blue", blue},
+                                                         {"diffuse_red", red},
+                                                         {"s", tex_u},
+                                                         {"t", tex_v},
+                                                         {"u", tex_u},
+                                                         {"v", tex_v},
+                                                         {"diffuse_green", green},
+                                                         {"texture_u", tex_u},
+                                                         {"texture_v", tex_v},
+                                                         {"texture_s", tex_u},
+                                                         {"texture_t", tex_v},
+                                                         {"diffuse_blue", blue}};
   for (auto [known, role] : names)
     if (name == known) return role;
   return other;
@@ -258,7 +278,8 @@ class PlyBody {
       double values[role_count];
       for (size_t p = 0; p < roles.size(); ++p) {
         const Property& property = e.properties[p];
-        if (!(property.is_list ? skip_list(property) : reader_.read(property.type, values[roles[p]]))) return ended(e, i);
+        if (!(property.is_list ? skip_list(property) : reader_.read(property.type, values[roles[p]])))
+          return ended(e, i);
       }
       Vec3 position(values[x], values[y], values[z]);
       if (!is_position(position)) {

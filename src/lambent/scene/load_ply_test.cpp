@@ -45,8 +45,8 @@ std::string sample(const std::string& format) {
   if (format == "ascii") {
     out += "7 4 0 1 2 3\n9 3 3 2 4\n2 -5 6 0.25\n";
     for (int v = 0; v < 5; ++v) {
-      out += std::to_string(x[v]) + " " + std::to_string(y[v]) + " " + std::to_string(y[v]) + " 1 0.5 " + std::to_string(51 * v) +
-             " 255 0 0.25 0.75\n";
+      out += std::to_string(x[v]) + " " + std::to_string(y[v]) + " " + std::to_string(y[v]) + " 1 0.5 " +
+             std::to_string(51 * v) + " 255 0 0.25 0.75\n";
     }
     return out;
   }
@@ -59,7 +59,8 @@ std::string sample(const std::string& format) {
   out += raw(uint16_t(2), big) + raw(int16_t(-5), big) + raw(int16_t(6), big) + raw(0.25, big);
   for (int v = 0; v < 5; ++v) {
     out += raw(x[v], big) + raw(y[v], big) + raw(y[v], big) + raw(uint8_t(1), big) + raw(0.5f, big);
-    out += raw(uint8_t(51 * v), big) + raw(uint8_t(255), big) + raw(uint8_t(0), big) + raw(0.25f, big) + raw(0.75f, big);
+    out += raw(uint8_t(51 * v), big) + raw(uint8_t(255), big) + raw(uint8_t(0), big) + raw(0.25f, big) +
+           raw(0.75f, big);
   }
   return out;
 }
@@ -104,16 +105,17 @@ TEST(LoadPly, LineEndsOfAllKinds) {
     for (char c : text) other += c == '\n' ? std::string(end) : std::string(1, c);
     EXPECT_EQ(must_load(other).positions, must_load(text).positions);
   }
-  std::string header = "ply\r\nformat binary_little_endian 1.0\r\nelement vertex 3\r\n"
-                       "property uchar x\r\nproperty char y\r\nproperty short z\r\n"
-                       "element face 1\r\nproperty list uint ushort vertex_index\r\nend_header\r\n";
+  std::string header =
+      "ply\r\nformat binary_little_endian 1.0\r\nelement vertex 3\r\n"
+      "property uchar x\r\nproperty char y\r\nproperty short z\r\n"
+      "element face 1\r\nproperty list uint ushort vertex_index\r\nend_header\r\n";
   std::string body("\0\0\0\0\x0a\0\0\0\0\x0a\0\0\x03\0\0\0\0\0\x01\0\x02\0", 22);
   EXPECT_EQ(must_load(header + body).positions[1], Vec3(10, 0, 0));
 }
 
 std::string triangle(const std::string& vertices, const std::string& faces, const std::string& properties = "") {
-  return "ply\nformat ascii 1.0\nelement vertex 3\nproperty float x\nproperty float y\nproperty float z\n" + properties +
-         "element face 1\nproperty list uchar int vertex_indices\nend_header\n" + vertices + faces;
+  return "ply\nformat ascii 1.0\nelement vertex 3\nproperty float x\nproperty float y\nproperty float z\n" +
+         properties + "element face 1\nproperty list uchar int vertex_indices\nend_header\n" + vertices + faces;
 }
 
 TEST(LoadPly, RefusesWithTheReason) {
@@ -157,9 +159,10 @@ TEST(LoadPly, CountsThatLieAreFoundBeforeAnythingIsSetAside) {
               "t.ply:3: element count is not a whole number");
   }
   // A list of 2^32 - 1 corners in a few bytes.
-  std::string header = "ply\nformat binary_little_endian 1.0\nelement vertex 1\n"
-                       "property uchar x\nproperty uchar y\nproperty uchar z\n"
-                       "element face 1\nproperty list uint uchar vertex_indices\nend_header\n";
+  std::string header =
+      "ply\nformat binary_little_endian 1.0\nelement vertex 1\n"
+      "property uchar x\nproperty uchar y\nproperty uchar z\n"
+      "element face 1\nproperty list uint uchar vertex_indices\nend_header\n";
   EXPECT_EQ(error_of(header + std::string("\0\0\0\xff\xff\xff\xff\0\0\0", 10)), "t.ply: the file ends in face 0");
   EXPECT_EQ(error_of(header + std::string("\0\0\0\xfe\xff\xff\xff\0\0\0", 10)), "t.ply: the file ends in face 0");
 }
@@ -167,9 +170,11 @@ TEST(LoadPly, CountsThatLieAreFoundBeforeAnythingIsSetAside) {
 TEST(LoadPly, NormalsColoursAndStrayVertices) {
   std::string text =
       "ply\nformat ascii 1.0\nelement vertex 5\nproperty float x\nproperty float y\nproperty float z\n"
-      "property float nx\nproperty float ny\nproperty float nz\nproperty float red\nproperty float green\nproperty float blue\n"
+      "property float nx\nproperty float ny\nproperty float nz\nproperty float red\nproperty float green\nproperty "
+      "float blue\n"
       "element face 2\nproperty list uchar int vertex_index\nend_header\n"
-      "9 9 9 0 0 1 0 0 0\n0 0 0 0 0 -2 0.25 0.5 7\n1 0 0 0 0 -1 0 0 0\n8 8 8 0 0 1 0 0 0\n0 1 0 0 0 -1 1 1 1\n3 1 2 4\n3 1 2 2\n";
+      "9 9 9 0 0 1 0 0 0\n0 0 0 0 0 -2 0.25 0.5 7\n1 0 0 0 0 -1 0 0 0\n8 8 8 0 0 1 0 0 0\n0 1 0 0 0 -1 1 1 1\n3 1 2 "
+      "4\n3 1 2 2\n";
   Scene s = must_load(text);
   ASSERT_EQ(s.positions.size(), 3u);
   EXPECT_EQ(s.normals[0], Vec3(0, 0, -1));

@@ -1,4 +1,5 @@
-// Polygon normals: Newell's method (Sutherland, Sproull and Schumacker 1974). Ear clipping: Meisters 1975, "Polygons have ears".
+// Polygon normals: Newell's method (Sutherland, Sproull and Schumacker 1974). Ear clipping: Meisters 1975, "Polygons
+// have ears".
 #include <lambent/scene/clean.h>
 #include <lambent/scene/mesh_file.h>
 
@@ -21,7 +22,8 @@ void drop_unused(Scene& scene) {
     for (uint32_t v = part.first_vertex; v < part.first_vertex + part.vertex_count; ++v)
       if (place[v] != none) place[v] = used++;
     part.first_vertex = first, part.vertex_count = used - first;
-    for (uint32_t t = 0; t < part.triangle_count; ++t) scene.triangles[part.first_triangle + t].part = uint32_t(parts.size());
+    for (uint32_t t = 0; t < part.triangle_count; ++t)
+      scene.triangles[part.first_triangle + t].part = uint32_t(parts.size());
     if (part.triangle_count > 0) parts.push_back(std::move(part));
   }
   scene.parts = std::move(parts);

@@ -7,7 +7,8 @@
 
 namespace lambent {
 
-// Coordinates beyond this (metres) are refused: cross products of edges and their squares stay finite in floats below it.
+// Coordinates beyond this (metres) are refused: cross products of edges and their squares stay finite in floats below
+// it.
 inline constexpr float max_coordinate = 1e9f;
 
 // Face corners of one file; keeps every index that cleaning may create within 32 bits.
@@ -17,20 +18,22 @@ inline constexpr size_t max_corners = size_t{1} << 30;
 inline constexpr float default_albedo = 0.8f;
 
 inline bool is_position(Vec3 p) {
-  return std::abs(p.x) <= max_coordinate && std::abs(p.y) <= max_coordinate && std::abs(p.z) <= max_coordinate;  // not NaN either
+  return std::abs(p.x) <= max_coordinate && std::abs(p.y) <= max_coordinate &&
+         std::abs(p.z) <= max_coordinate;  // not NaN either
 }
 
-// Cuts polygons into triangles, all of one file by one object: convex ones as fans, others by clipping ears in the plane of
-// Newell's normal (Meisters 1975). Fans serve beyond 100,000 corners too, and once the file's ears have taken `budget` point
-// tests, so that time stays bounded whatever the file.
+// Cuts polygons into triangles, all of one file by one object: convex ones as fans, others by clipping ears in the
+// plane of Newell's normal (Meisters 1975). Fans serve beyond 100,000 corners too, and once the file's ears have taken
+// `budget` point tests, so that time stays bounded whatever the file.
 class Triangulator {
  public:
   explicit Triangulator(uint64_t budget = 1'000'000'000) : budget_(budget) {}
 
-  // Cuts the polygon positions[vertices[0]], positions[vertices[1]], ...; appends triples of indices into `vertices`, turning as
-  // it does. Corners that repeat their neighbour count once; triangles with a repeated corner are left out. False if nothing
-  // was appended.
-  bool cut(std::span<const uint32_t> vertices, std::span<const Vec3> positions, std::vector<std::array<uint32_t, 3>>& triangles);
+  // Cuts the polygon positions[vertices[0]], positions[vertices[1]], ...; appends triples of indices into `vertices`,
+  // turning as it does. Corners that repeat their neighbour count once; triangles with a repeated corner are left out.
+  // False if nothing was appended.
+  bool cut(std::span<const uint32_t> vertices, std::span<const Vec3> positions,
+           std::vector<std::array<uint32_t, 3>>& triangles);
 
  private:
   void cut_polygon();
@@ -44,9 +47,9 @@ class Triangulator {
   uint64_t budget_;
 };
 
-// The way from a file's triangles to a usable scene; normals that the file lacks are zero. Turns triangles whose three normals
-// all oppose them, merges duplicates, drops unused vertices and empty parts, makes and repairs normals, infers sidedness, and
-// calls a material single-sided where all its triangles are. Error: no triangle has an area.
+// The way from a file's triangles to a usable scene; normals that the file lacks are zero. Turns triangles whose three
+// normals all oppose them, merges duplicates, drops unused vertices and empty parts, makes and repairs normals, infers
+// sidedness, and calls a material single-sided where all its triangles are. Error: no triangle has an area.
 Result<void> finish_mesh(Scene& scene);
 
 }  // namespace lambent

@@ -49,7 +49,8 @@ bool take_number(std::string_view& text, double& value) {
     // Told apart by the exponent's sign, or by the leading digit where there is no exponent.
     std::string_view number(begin, size_t(stop - begin));
     size_t e = number.find_first_of("eE"), first = number.find_first_not_of('-');
-    bool tiny = e != number.npos ? e + 1 < number.size() && number[e + 1] == '-' : number[first] == '0' || number[first] == '.';
+    bool tiny = e != number.npos ? e + 1 < number.size() && number[e + 1] == '-'
+                                 : number[first] == '0' || number[first] == '.';
     value = tiny ? 0.0 : INFINITY;
   } else if (code != std::errc()) {
     return false;
@@ -90,7 +91,8 @@ Vec3 clamp_color(double r, double g, double b) {
   return {channel(r), channel(g), channel(b)};
 }
 
-LineReader::LineReader(std::span<const uint8_t> bytes) : rest_(reinterpret_cast<const char*>(bytes.data()), bytes.size()) {
+LineReader::LineReader(std::span<const uint8_t> bytes)
+    : rest_(reinterpret_cast<const char*>(bytes.data()), bytes.size()) {
   if (rest_.find('\n') == rest_.npos) separator_ = '\r';
 }
 

@@ -15,8 +15,8 @@ std::string_view trimmed(std::string_view text);
 // Removes the first word and the blanks before it.
 std::string_view take_word(std::string_view& text);
 
-// Reads one decimal number at the front of `text` and removes it; false if there is none. "nan", "inf" and overflow give
-// non-finite values; underflow gives zero.
+// Reads one decimal number at the front of `text` and removes it; false if there is none. "nan", "inf" and overflow
+// give non-finite values; underflow gives zero.
 bool take_number(std::string_view& text, double& value);
 
 // A trimmed name as valid UTF-8 (other bytes are taken for Latin-1), cut to 256 bytes so that copies of it stay small.

@@ -1,5 +1,6 @@
-// Follows: local-deformable-prt, section 5; polar decomposition by Newton's iteration as in N. Higham, "Computing the polar
-// decomposition" (1986); bending and twisting as in A. Barr, "Global and local deformations of solid primitives" (1984).
+// Follows: local-deformable-prt, section 5; polar decomposition by Newton's iteration as in N. Higham, "Computing the
+// polar decomposition" (1986); bending and twisting as in A. Barr, "Global and local deformations of solid primitives"
+// (1984).
 #include <lambent/scene/pose.h>
 
 #include <lambent/core/parallel.h>
@@ -26,7 +27,9 @@ glm::dmat3 least_rotation(glm::dvec3 a, glm::dvec3 b) {
   return glm::dmat3(1.0) + K + K * K / (1 + c);
 }
 
-double frobenius(const glm::dmat3& m) { return std::sqrt(glm::dot(m[0], m[0]) + glm::dot(m[1], m[1]) + glm::dot(m[2], m[2])); }
+double frobenius(const glm::dmat3& m) {
+  return std::sqrt(glm::dot(m[0], m[0]) + glm::dot(m[1], m[1]) + glm::dot(m[2], m[2]));
+}
 
 // The nearest orthogonal matrix, or nothing where F is (nearly) singular.
 std::optional<glm::dmat3> orthogonal_part(glm::dmat3 F) {
@@ -45,14 +48,16 @@ std::optional<glm::dmat3> orthogonal_part(glm::dmat3 F) {
   return F;
 }
 
-// Gradients of the map from rest to pose about each vertex: the mean over the faces around its position, by their rest areas. A face
-// says what becomes of its edges; its normal keeps its length.
-std::vector<glm::dmat3> gradients(const Scene& scene, const std::vector<Vec3>& positions, const std::vector<uint8_t>& mirrored) {
+// Gradients of the map from rest to pose about each vertex: the mean over the faces around its position, by their rest
+// areas. A face says what becomes of its edges; its normal keeps its length.
+std::vector<glm::dmat3> gradients(const Scene& scene, const std::vector<Vec3>& positions,
+                                  const std::vector<uint8_t>& mirrored) {
   const PositionIds places = number_positions(scene.positions);
   std::vector<glm::dmat3> sums(places.count, glm::dmat3(0.0));
   for (const Triangle& t : scene.triangles) {
     auto edges = [&](const std::vector<Vec3>& p, double flip, glm::dmat3& E) {
-      const glm::dvec3 a(p[t.v[0]]), e1 = glm::dvec3(p[t.v[1]]) - a, e2 = glm::dvec3(p[t.v[2]]) - a, n = glm::cross(e1, e2);
+      const glm::dvec3 a(p[t.v[0]]), e1 = glm::dvec3(p[t.v[1]]) - a, e2 = glm::dvec3(p[t.v[2]]) - a,
+                                     n = glm::cross(e1, e2);
       const double area = glm::length(n);
       E = glm::dmat3(e1, e2, area > 0 ? flip * n / area : glm::dvec3(0.0));
       return area;
@@ -124,8 +129,11 @@ Result<size_t> find_animation(const Scene& scene, const std::string& text) {
   const auto [end, status] = std::from_chars(text.data(), text.data() + text.size(), index);
   if (status == std::errc() && end == text.data() + text.size() && index < animations->size()) return index;
   std::string names;
-  for (const GltfAnimation& a : *animations) names += (names.empty() ? "" : ", ") + (a.name.empty() ? std::to_string(names.size()) : "\"" + a.name.substr(0, 40) + "\"");
-  return Error{scene.path, "has no animation \"" + text + "\"; there are " + std::to_string(animations->size()) + ": " + names.substr(0, 300)};
+  for (const GltfAnimation& a : *animations)
+    names += (names.empty() ? "" : ", ") +
+             (a.name.empty() ? std::to_string(names.size()) : "\"" + a.name.substr(0, 40) + "\"");
+  return Error{scene.path, "has no animation \"" + text + "\"; there are " + std::to_string(animations->size()) + ": " +
+                               names.substr(0, 300)};
 }
 
 Result<Pose> pose_scene(const Scene& scene, size_t animation, double time) {
@@ -133,7 +141,8 @@ Result<Pose> pose_scene(const Scene& scene, size_t animation, double time) {
   if (!std::isfinite(time)) return Error{scene.path, "the time is not a finite number"};
   GltfCheck check(scene.path);
   const GltfDocument& rest = *scene.document;
-  if (animation >= gltf_count(rest.json, "animations")) return Error{scene.path, "has no animation " + std::to_string(animation)};
+  if (animation >= gltf_count(rest.json, "animations"))
+    return Error{scene.path, "has no animation " + std::to_string(animation)};
   GltfDocument moved;  // the same bytes, other nodes
   Json nodes;
   if (!animate_nodes(check, rest, animation, time, nodes)) return check.error();
@@ -158,7 +167,8 @@ Result<Pose> pose_scene(const Scene& scene, size_t animation, double time) {
     if (!check.ok()) return check.error();
     if (!mesh) return Error{scene.path, place + " has lost its mesh"};
     const Json* primitives = check.array(gltf_item(moved.json, "meshes", *mesh), "primitives", {"mesh", *mesh});
-    if (!primitives || size_t(part.primitive) >= primitives->size()) return Error{scene.path, place + " has lost its primitive"};
+    if (!primitives || size_t(part.primitive) >= primitives->size())
+      return Error{scene.path, place + " has lost its primitive"};
     const Json& primitive = (*primitives)[size_t(part.primitive)];
     const GltfWhere where{"mesh", *mesh, "primitive", size_t(part.primitive)};
     const Json* attributes = check.object(primitive, "attributes", where);
@@ -176,7 +186,8 @@ Result<Pose> pose_scene(const Scene& scene, size_t animation, double time) {
         !read_vertices(check, moved, *attributes, accessor, morphs, placement, where, positions, normals))
       return check.error();
     if (part.source.empty() && positions.size() != part.vertex_count)
-      return Error{scene.path, place + " was refined (--max-edge), so that its vertices no longer hang on anything that moves"};
+      return Error{scene.path,
+                   place + " was refined (--max-edge), so that its vertices no longer hang on anything that moves"};
     for (size_t v = 0; v < part.vertex_count; ++v) {
       const size_t from = part.source.empty() ? v : part.source[v];
       if (from >= positions.size()) return Error{scene.path, place + " does not fit its mesh"};
@@ -191,7 +202,8 @@ Result<Pose> pose_scene(const Scene& scene, size_t animation, double time) {
 }
 
 Result<Deformation> parse_deformation(const std::string& text) {
-  const Error wrong{"--deform", "expects bend:ANGLE[,along[,towards]] or twist:ANGLE[,along], axes as x, y, z, not \"" + text.substr(0, 80) + "\""};
+  const Error wrong{"--deform", "expects bend:ANGLE[,along[,towards]] or twist:ANGLE[,along], axes as x, y, z, not \"" +
+                                    text.substr(0, 80) + "\""};
   Deformation d;
   size_t at = 0;
   if (text.starts_with("bend:")) at = 5;
@@ -202,12 +214,15 @@ Result<Deformation> parse_deformation(const std::string& text) {
   at = size_t(end - text.data());
   for (int* axis : {&d.along, &d.towards}) {
     if (at == text.size()) break;
-    if (at + 2 > text.size() || text[at] != ',' || text[at + 1] < 'x' || text[at + 1] > 'z' || (axis == &d.towards && d.kind == DeformKind::twist)) return wrong;
+    if (at + 2 > text.size() || text[at] != ',' || text[at + 1] < 'x' || text[at + 1] > 'z' ||
+        (axis == &d.towards && d.kind == DeformKind::twist))
+      return wrong;
     *axis = text[at + 1] - 'x';
     at += 2;
   }
   if (at != text.size() || (d.along >= 0 && d.along == d.towards)) return wrong;
-  if (d.kind == DeformKind::bend && !(std::abs(d.degrees) < 360)) return Error{"--deform", "bends by less than 360 degrees"};
+  if (d.kind == DeformKind::bend && !(std::abs(d.degrees) < 360))
+    return Error{"--deform", "bends by less than 360 degrees"};
   if (!(std::abs(d.degrees) <= 36000)) return Error{"--deform", "twists by at most 36000 degrees"};
   return d;
 }
@@ -219,7 +234,8 @@ Pose deform_scene(const Scene& scene, const Deformation& deformation) {
   if (along < 0) along = size.x >= size.y && size.x >= size.z ? 0 : size.y >= size.z ? 1 : 2;
   if (along == deformation.towards) along = (along + 1) % 3;
   const int towards = deformation.towards >= 0 ? deformation.towards : (along + 1) % 3, across = 3 - along - towards;
-  const double length = std::max(size[along], 1e-30), turn = glm::radians(double(deformation.degrees)) / length;  // radians a metre
+  const double length = std::max(size[along], 1e-30),
+               turn = glm::radians(double(deformation.degrees)) / length;  // radians a metre
   auto map = [&](glm::dvec3 p) {
     p -= centre;
     const double h = p[along], angle = turn * h, c = std::cos(angle), s = std::sin(angle);
@@ -230,14 +246,16 @@ Pose deform_scene(const Scene& scene, const Deformation& deformation) {
       q[u] = c * p[u] - s * p[v], q[v] = s * p[u] + c * p[v];
     } else {
       // The middle line becomes an arc that keeps its length; sin(x)/x and (1 - cos x)/x are taken for x = angle.
-      const double sinc = std::abs(angle) > 1e-8 ? s / angle : 1, versine = std::abs(angle) > 1e-8 ? (1 - c) / angle : 0.5 * angle;
+      const double sinc = std::abs(angle) > 1e-8 ? s / angle : 1,
+                   versine = std::abs(angle) > 1e-8 ? (1 - c) / angle : 0.5 * angle;
       q[along] = h * sinc - p[towards] * s, q[towards] = h * versine + p[towards] * c, q[across] = p[across];
     }
     return q + centre;
   };
   Pose pose;
   const size_t n = scene.positions.size();
-  pose.positions.resize(n), pose.normals.resize(n), pose.rotations.resize(n), pose.mirrored.assign(scene.parts.size(), 0);
+  pose.positions.resize(n), pose.normals.resize(n), pose.rotations.resize(n),
+      pose.mirrored.assign(scene.parts.size(), 0);
   const double step = 1e-6 * std::max({size.x, size.y, size.z, 1e-30});
   parallel_for(n, 4096, [&](size_t begin, size_t end) {
     for (size_t v = begin; v < end; ++v) {

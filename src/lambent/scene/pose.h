@@ -1,6 +1,6 @@
 #pragma once
-// Scenes in other poses: glTF animations, and bending and twisting of anything. What lights a surface locally turns with it, so each
-// vertex gets a rotation too. Source: local-deformable-prt, section 5.
+// Scenes in other poses: glTF animations, and bending and twisting of anything. What lights a surface locally turns
+// with it, so each vertex gets a rotation too. Source: local-deformable-prt, section 5.
 #include <lambent/scene/scene.h>
 
 namespace lambent {
@@ -8,9 +8,10 @@ namespace lambent {
 // The rest scene's vertices, elsewhere.
 struct Pose {
   std::vector<Vec3> positions, normals;  // of each vertex of the scene; normals are unit
-  // Orthogonal matrices from the rest pose to this one: the orthogonal part of the deformation's gradient about the vertex, turned by the
-  // least angle that takes the rest normal to this one. Continuous wherever the gradient is. Where the deformation mirrors, so do they
-  // (lobes may be mirrored as well as turned); where it is flat, it is the least rotation between the normals.
+  // Orthogonal matrices from the rest pose to this one: the orthogonal part of the deformation's gradient about the
+  // vertex, turned by the least angle that takes the rest normal to this one. Continuous wherever the gradient is.
+  // Where the deformation mirrors, so do they (lobes may be mirrored as well as turned); where it is flat, it is the
+  // least rotation between the normals.
   std::vector<Mat3> rotations;
   std::vector<uint8_t> mirrored;  // of each part: its triangles change their winding
 };
@@ -24,14 +25,14 @@ Result<std::vector<AnimationInfo>> list_animations(const Scene& scene);
 // By name, or by number where the text is one and no name. Errors: none there; a static scene.
 Result<size_t> find_animation(const Scene& scene, const std::string& name_or_index);
 
-// Nodes, skins and morph targets at a time in seconds, clamped to the animation's range. Errors: a static scene; parts that were
-// refined (their vertices have no bones); broken animations; a part that is not shown in that pose's file.
+// Nodes, skins and morph targets at a time in seconds, clamped to the animation's range. Errors: a static scene; parts
+// that were refined (their vertices have no bones); broken animations; a part that is not shown in that pose's file.
 Result<Pose> pose_scene(const Scene& scene, size_t animation, double time);
 
 enum class DeformKind { bend, twist };
 struct Deformation {
   DeformKind kind = DeformKind::bend;
-  float degrees = 0;        // over the whole length of the scene along `along`; bend: below 360 in size
+  float degrees = 0;             // over the whole length of the scene along `along`; bend: below 360 in size
   int along = -1, towards = -1;  // axes 0 to 2; -1: the longest, and for bends the next in cyclic order
 };
 // "bend:ANGLE[,along[,towards]]", "twist:ANGLE[,along]", axes as x, y, z. Errors: anything else.

@@ -20,7 +20,8 @@ double distance(const Mat3& a, const Mat3& b) {
 }
 
 // The triangle with one channel on its node.
-Builder animated(const char* path, const std::vector<float>& times, const std::vector<float>& values, const char* shape, const char* how) {
+Builder animated(const char* path, const std::vector<float>& times, const std::vector<float>& values, const char* shape,
+                 const char* how) {
   Builder b = test::triangle();
   const size_t input = b.floats(times, "SCALAR"), output = b.floats(values, shape);
   b.json["animations"] = {{{"name", "go"},
@@ -50,8 +51,10 @@ TEST(Pose, InterpolatesTranslations) {
   const Scene step = loaded(animated("translation", {1, 3}, {0, 0, 0, 4, 2, 0}, "VEC3", "STEP"));
   EXPECT_EQ(at(step, 2.9).positions[0], Vec3(0, 0, 0));
   EXPECT_EQ(at(step, 3).positions[0], Vec3(4, 2, 0));
-  // One cubic piece: value 0, out-tangent 1, in-tangent 3, value 4, over two seconds: Hermite's basis at its middle is 1/2, 1/8, 1/2, -1/8.
-  const Scene cubic = loaded(animated("translation", {1, 3}, {9, 9, 9, 0, 0, 0, 1, 0, 0, 3, 0, 0, 4, 0, 0, 9, 9, 9}, "VEC3", "CUBICSPLINE"));
+  // One cubic piece: value 0, out-tangent 1, in-tangent 3, value 4, over two seconds: Hermite's basis at its middle is
+  // 1/2, 1/8, 1/2, -1/8.
+  const Scene cubic = loaded(
+      animated("translation", {1, 3}, {9, 9, 9, 0, 0, 0, 1, 0, 0, 3, 0, 0, 4, 0, 0, 9, 9, 9}, "VEC3", "CUBICSPLINE"));
   EXPECT_NEAR(at(cubic, 2).positions[0].x, 0.5 * 4 + 2 * (0.125 * 1 - 0.125 * 3), 1e-6);
   EXPECT_NEAR(at(cubic, 1.5).positions[0].x, 2 * (0.140625 * 1 - 0.046875 * 3) + 0.15625 * 4, 1e-6);
 }
@@ -59,7 +62,8 @@ TEST(Pose, InterpolatesTranslations) {
 TEST(Pose, TurnsAlongTheShorterGreatCircle) {
   // Rotations of 0 and 120 degrees about a skew axis, the second with its sign changed and not of unit length.
   const glm::quat q = glm::angleAxis(glm::radians(120.0f), glm::normalize(Vec3(1, 2, -2)));
-  const Scene scene = loaded(animated("rotation", {0, 1}, {0, 0, 0, 1, -3 * q.x, -3 * q.y, -3 * q.z, -3 * q.w}, "VEC4", "LINEAR"));
+  const Scene scene =
+      loaded(animated("rotation", {0, 1}, {0, 0, 0, 1, -3 * q.x, -3 * q.y, -3 * q.z, -3 * q.w}, "VEC4", "LINEAR"));
   for (double t : {0.0, 0.25, 0.5, 1.0}) {
     const Pose p = at(scene, t);
     const Mat3 R = glm::mat3_cast(glm::angleAxis(float(glm::radians(120.0 * t)), glm::normalize(Vec3(1, 2, -2))));
@@ -70,7 +74,8 @@ TEST(Pose, TurnsAlongTheShorterGreatCircle) {
     }
   }
   // A rotation of zero is none.
-  EXPECT_EQ(at(loaded(animated("rotation", {0, 1}, {0, 0, 0, 0, 0, 0, 0, 0}, "VEC4", "LINEAR")), 0.5).positions[1], Vec3(2, 0, 0));
+  EXPECT_EQ(at(loaded(animated("rotation", {0, 1}, {0, 0, 0, 0, 0, 0, 0, 0}, "VEC4", "LINEAR")), 0.5).positions[1],
+            Vec3(2, 0, 0));
 }
 
 TEST(Pose, ScalesToNothingAndMirrors) {
@@ -118,9 +123,13 @@ TEST(Pose, RefusesBrokenAnimations) {
   EXPECT_NE(message(animated("translation", {0, 1}, {0, 0, 0, 1, 0, 0}, "VEC3", "CUBICSPLINE")), "");
   EXPECT_NE(message(animated("translation", {0, 1}, {0, 0, 0, 1, 0, 0}, "VEC3", "WAVES")), "");
   EXPECT_NE(message(animated("translation", {}, {}, "VEC3", "LINEAR")), "");
-  EXPECT_NE(message(animated("weights", {0, 1}, {0, 1}, "SCALAR", "LINEAR")).find('?'), 0u);  // weights without targets: said or ignored
-  for (auto [key, value] : {std::pair<const char*, Json>{"channels", Json()}, {"channels", Json::array({1})}, {"samplers", Json()},
-                            {"samplers", Json::array()}, {"samplers", Json::array({Json::object()})}}) {
+  EXPECT_NE(message(animated("weights", {0, 1}, {0, 1}, "SCALAR", "LINEAR")).find('?'),
+            0u);  // weights without targets: said or ignored
+  for (auto [key, value] : {std::pair<const char*, Json>{"channels", Json()},
+                            {"channels", Json::array({1})},
+                            {"samplers", Json()},
+                            {"samplers", Json::array()},
+                            {"samplers", Json::array({Json::object()})}}) {
     Builder b = good;
     if (value.is_null()) b.json["animations"][0].erase(key);
     else b.json["animations"][0][key] = value;
@@ -208,15 +217,17 @@ TEST(Deform, TwistsAndBendsAsTheFormulasSay) {
 }
 
 TEST(Deform, RefusesOtherTexts) {
-  for (const char* text : {"", "bend", "bend:", "bend:x", "bend:400", "bend:nan", "bend:10,", "bend:10,w", "bend:10,y,y", "bend:10,x,y,z", "twist:10,x,y", "twist:1e9", "melt:3"})
+  for (const char* text : {"", "bend", "bend:", "bend:x", "bend:400", "bend:nan", "bend:10,", "bend:10,w",
+                           "bend:10,y,y", "bend:10,x,y,z", "twist:10,x,y", "twist:1e9", "melt:3"})
     EXPECT_FALSE(parse_deformation(text)) << text;
   EXPECT_EQ(parse_deformation("bend:-30,z,x")->towards, 0);
 }
 
 TEST(Deform, RotationsOfOddGradients) {
   const Vec3 a = glm::normalize(Vec3(1, 2, 3)), b = glm::normalize(Vec3(-2, 1, 0.5f));
-  for (const glm::dmat3& F : {glm::dmat3(0.0), glm::dmat3(NAN), glm::dmat3(glm::dvec3(1, 0, 0), glm::dvec3(1, 0, 0), glm::dvec3(0, 0, 1)),
-                              glm::dmat3(-1.0), glm::dmat3(glm::dvec3(1, 0.5, 0), glm::dvec3(0, 3, 0.2), glm::dvec3(0.1, 0, 0.01))})
+  for (const glm::dmat3& F :
+       {glm::dmat3(0.0), glm::dmat3(NAN), glm::dmat3(glm::dvec3(1, 0, 0), glm::dvec3(1, 0, 0), glm::dvec3(0, 0, 1)),
+        glm::dmat3(-1.0), glm::dmat3(glm::dvec3(1, 0.5, 0), glm::dvec3(0, 3, 0.2), glm::dvec3(0.1, 0, 0.01))})
     for (const Vec3& to : {a, b, -a}) {
       const Mat3 R = pose_rotation(F, a, to);
       EXPECT_LT(distance(glm::transpose(R) * R, Mat3(1.0f)), 1e-5);

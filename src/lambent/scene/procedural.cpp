@@ -29,8 +29,8 @@ void append_quad(Mesh& mesh, Vec3 origin, Vec3 a, Vec3 b, int na, int nb) {
 Mesh icosphere(int levels) {
   const float g = std::numbers::phi_v<float>;
   Mesh mesh;
-  for (Vec3 p : {Vec3(-1, g, 0), Vec3(1, g, 0), Vec3(-1, -g, 0), Vec3(1, -g, 0), Vec3(0, -1, g), Vec3(0, 1, g), Vec3(0, -1, -g),
-                 Vec3(0, 1, -g), Vec3(g, 0, -1), Vec3(g, 0, 1), Vec3(-g, 0, -1), Vec3(-g, 0, 1)})
+  for (Vec3 p : {Vec3(-1, g, 0), Vec3(1, g, 0), Vec3(-1, -g, 0), Vec3(1, -g, 0), Vec3(0, -1, g), Vec3(0, 1, g),
+                 Vec3(0, -1, -g), Vec3(0, 1, -g), Vec3(g, 0, -1), Vec3(g, 0, 1), Vec3(-g, 0, -1), Vec3(-g, 0, 1)})
     mesh.normals.push_back(glm::normalize(p));
   mesh.indices = {0, 11, 5, 0, 5, 1, 0, 1, 7, 0, 7, 10, 0, 10, 11, 1, 5, 9, 5, 11, 4,  11, 10, 2,  10, 7, 6, 7, 1, 8,
                   3, 9,  4, 3, 4, 2, 3, 2, 6, 3, 6, 8,  3, 8,  9,  4, 9, 5, 2, 4,  11, 6,  2,  10, 8,  6, 7, 9, 8, 1};
@@ -40,8 +40,10 @@ Mesh icosphere(int levels) {
     uint32_t first = uint32_t(mesh.normals.size());
     auto middle = [&](uint32_t a, uint32_t b) {
       uint64_t edge = uint64_t(std::min(a, b)) << 32 | std::max(a, b);
-      uint32_t m = table.find_or_insert(hash64(edge), uint32_t(edges.size()), [&](uint32_t k) { return edges[k] == edge; });
-      if (m == edges.size()) edges.push_back(edge), mesh.normals.push_back(glm::normalize(mesh.normals[a] + mesh.normals[b]));
+      uint32_t m =
+          table.find_or_insert(hash64(edge), uint32_t(edges.size()), [&](uint32_t k) { return edges[k] == edge; });
+      if (m == edges.size())
+        edges.push_back(edge), mesh.normals.push_back(glm::normalize(mesh.normals[a] + mesh.normals[b]));
       return first + m;
     };
     std::vector<uint32_t> finer;
@@ -75,8 +77,8 @@ uint32_t add_material(Scene& scene, std::string name, Vec3 albedo) {
   return uint32_t(scene.materials.size() - 1);
 }
 
-void add_mesh(Scene& scene, uint32_t material, std::string name, std::span<const Vec3> positions, std::span<const Vec3> normals,
-              std::span<const uint32_t> indices) {
+void add_mesh(Scene& scene, uint32_t material, std::string name, std::span<const Vec3> positions,
+              std::span<const Vec3> normals, std::span<const uint32_t> indices) {
   LAMBENT_CHECK(normals.size() == positions.size() && indices.size() % 3 == 0 && material < scene.materials.size());
   LAMBENT_CHECK(scene.positions.size() + positions.size() < none && scene.triangles.size() + indices.size() / 3 < none);
   Part part;

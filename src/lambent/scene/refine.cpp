@@ -17,8 +17,8 @@ double length2(Vec3 a, Vec3 b) {
 
 bool precedes(Vec3 a, Vec3 b) { return a.x != b.x ? a.x < b.x : a.y != b.y ? a.y < b.y : a.z < b.z; }
 
-// One pass of splitting. Whether and where an edge is split depends on the positions of its ends alone, and not on their
-// order, so that all triangles on it agree bit for bit, whichever part they are of.
+// One pass of splitting. Whether and where an edge is split depends on the positions of its ends alone, and not on
+// their order, so that all triangles on it agree bit for bit, whichever part they are of.
 class EdgeSplitter {
  public:
   EdgeSplitter(Scene& scene, double max_edge) : scene_(scene), limit2_(max_edge * max_edge) {}
@@ -62,7 +62,8 @@ class EdgeSplitter {
     uint32_t first_middle = uint32_t(out_.positions.size());
     auto middle = [&](uint32_t a, uint32_t b) {
       uint64_t edge = uint64_t(std::min(a, b)) << 32 | std::max(a, b);
-      uint32_t m = table.find_or_insert(hash64(edge), uint32_t(edges_.size()), [&](uint32_t k) { return edges_[k] == edge; });
+      uint32_t m =
+          table.find_or_insert(hash64(edge), uint32_t(edges_.size()), [&](uint32_t k) { return edges_[k] == edge; });
       if (m == edges_.size()) edges_.push_back(edge), add_middle(std::min(a, b), std::max(a, b));
       return first_middle + m;
     };
@@ -119,10 +120,8 @@ class EdgeSplitter {
     // The shorter diagonal of the rest; between equal ones, positions decide, so that coincident triangles agree.
     const std::vector<Vec3>& p = out_.positions;
     double from_a = length2(p[a], p[bc]), from_c = length2(p[c], p[ab]);
-    if (from_a < from_c || (from_a == from_c && precedes(p[a], p[c])))
-      add(a, ab, bc), add(a, bc, c);
-    else
-      add(a, ab, c), add(ab, bc, c);
+    if (from_a < from_c || (from_a == from_c && precedes(p[a], p[c]))) add(a, ab, bc), add(a, bc, c);
+    else add(a, ab, c), add(ab, bc, c);
   }
 
   Scene& scene_;
@@ -133,11 +132,12 @@ class EdgeSplitter {
   Scene out_;
 };
 
-// At least so many triangles result: a path along the longest edge crosses one every max_edge, and no triangle without longer
-// edges covers more than an equilateral one.
+// At least so many triangles result: a path along the longest edge crosses one every max_edge, and no triangle without
+// longer edges covers more than an equilateral one.
 double fewest_triangles(const Scene& scene, const Triangle& t, double max_edge) {
   const std::vector<Vec3>& p = scene.positions;
-  double longest2 = std::max({length2(p[t.v[0]], p[t.v[1]]), length2(p[t.v[1]], p[t.v[2]]), length2(p[t.v[2]], p[t.v[0]])});
+  double longest2 =
+      std::max({length2(p[t.v[0]], p[t.v[1]]), length2(p[t.v[1]], p[t.v[2]]), length2(p[t.v[2]], p[t.v[0]])});
   glm::dvec3 a = p[t.v[0]], area2 = glm::cross(glm::dvec3(p[t.v[1]]) - a, glm::dvec3(p[t.v[2]]) - a);
   return std::max({1.0, std::sqrt(longest2) / max_edge, glm::length(area2) / (std::sqrt(0.75) * max_edge * max_edge)});
 }
@@ -145,8 +145,8 @@ double fewest_triangles(const Scene& scene, const Triangle& t, double max_edge) 
 }  // namespace
 
 void add_ground(Scene& scene) {
-  constexpr int fine_cells = 90, growing_cells = 19;       // 90 + 2 * 19 = 128 cells across
-  constexpr double fine_reach = 1.1, whole_reach = 3.0;    // in radii of the bounding sphere
+  constexpr int fine_cells = 90, growing_cells = 19;     // 90 + 2 * 19 = 128 cells across
+  constexpr double fine_reach = 1.1, whole_reach = 3.0;  // in radii of the bounding sphere
   Bounds box = bounds(scene);
   LAMBENT_CHECK(!box.empty());
   double radius = 0.5 * double(box.diagonal());
@@ -171,7 +171,8 @@ void add_ground(Scene& scene) {
   uint32_t row = uint32_t(ticks.size());
   for (uint32_t j = 0; j < row; ++j) {
     for (uint32_t i = 0; i < row; ++i) {
-      positions.push_back({float(box.centre().x + radius * ticks[i]), box.min.y, float(box.centre().z + radius * ticks[j])});
+      positions.push_back(
+          {float(box.centre().x + radius * ticks[i]), box.min.y, float(box.centre().z + radius * ticks[j])});
       uint32_t v = j * row + i;
       if (i + 1 < row && j + 1 < row) indices.insert(indices.end(), {v, v + row, v + row + 1, v, v + row + 1, v + 1});
     }
@@ -193,15 +194,16 @@ Result<void> split_long_edges(Scene& scene, float max_edge, size_t max_triangles
     }
   }
   auto too_many = [&](double count) {
-    return Error{scene.path, fmt::format("edges of at most {} need {:.3g} triangles or more, the limit is {}", max_edge, count,
-                                         max_triangles)};
+    return Error{scene.path, fmt::format("edges of at most {} need {:.3g} triangles or more, the limit is {}", max_edge,
+                                         count, max_triangles)};
   };
   if (longest2 <= double(max_edge) * double(max_edge)) return {};
   if (fewest > double(max_triangles)) return too_many(fewest);
   // Below a few steps of the float grid, an edge has no middle apart from its ends.
   constexpr float grid_steps = 8 * 0x1p-23f;
   if (max_edge < grid_steps * farthest)
-    return Error{scene.path, fmt::format("edges of at most {} are finer than coordinates of {} can express", max_edge, farthest)};
+    return Error{scene.path,
+                 fmt::format("edges of at most {} are finer than coordinates of {} can express", max_edge, farthest)};
 
   EdgeSplitter splitter(scene, double(max_edge));
   for (splitter.mark(); !splitter.done(); splitter.mark()) {

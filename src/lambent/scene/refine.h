@@ -7,15 +7,15 @@ namespace lambent {
 // Name of the part that add_ground adds.
 inline constexpr const char* ground_name = "ground";
 
-// Adds a square floor, named ground_name, one-sided and of albedo 0.5, at the scene's lowest point. It reaches three radii of
-// the bounding sphere out from the centre; its 128 x 128 cells are finest under the scene and grow outward. The scene must have
-// a triangle.
+// Adds a square floor, named ground_name, one-sided and of albedo 0.5, at the scene's lowest point. It reaches three
+// radii of the bounding sphere out from the centre; its 128 x 128 cells are finest under the scene and grow outward.
+// The scene must have a triangle.
 void add_ground(Scene& scene);
 
-// Splits edges longer than max_edge (world units) at their middle until none is left. Both triangles of an edge split it alike,
-// across parts too, so no cracks appear; new vertices interpolate all attributes. Errors: max_edge not positive, or too fine for
-// the coordinates' precision; more than `max_triangles` triangles would result (mostly found before anything is split; the
-// scene may be left partly split).
+// Splits edges longer than max_edge (world units) at their middle until none is left. Both triangles of an edge split
+// it alike, across parts too, so no cracks appear; new vertices interpolate all attributes. Errors: max_edge not
+// positive, or too fine for the coordinates' precision; more than `max_triangles` triangles would result (mostly found
+// before anything is split; the scene may be left partly split).
 Result<void> split_long_edges(Scene& scene, float max_edge, size_t max_triangles = size_t{1} << 27);
 
 }  // namespace lambent

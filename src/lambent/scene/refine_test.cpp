@@ -69,7 +69,8 @@ TEST(SplitLongEdges, SplitsOnlyWhatIsLong) {
 TEST(SplitLongEdges, MiddlesInterpolateAttributes) {
   constexpr float rounding = 1e-6f;
   Scene s = make_quad({-1, 0, -1}, {0, 0, 2}, {2, 0, 0}, 1, 1, Vec3(0.5f));
-  for (Vec3 p : s.positions) s.texcoords[0].push_back({3 * p.x + 1, p.z}), s.colors.push_back(Vec3(p.x, p.z, 1) * 0.5f + 0.5f);
+  for (Vec3 p : s.positions)
+    s.texcoords[0].push_back({3 * p.x + 1, p.z}), s.colors.push_back(Vec3(p.x, p.z, 1) * 0.5f + 0.5f);
   s.normals[0] = Vec3(1, 0, 0);
   ASSERT_TRUE(split_long_edges(s, 0.3f));
   EXPECT_EQ(test::broken_invariant(s), "");

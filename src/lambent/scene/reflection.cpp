@@ -4,12 +4,14 @@
 namespace lambent {
 namespace {
 
-// Direction of growing first texture coordinate, zero where there is none: solves [ab ac] = [t b] [uv_ab uv_ac] for t, up to scale.
-// w: 1 where the front shows the picture as it is, v pointing down; -1 where it shows it mirrored.
-Vec4 texture_tangent(const Scene& scene, const Triangle& triangle, int set = 0, const std::array<float, 6>& transform = {1, 0, 0, 0, 1, 0}) {
+// Direction of growing first texture coordinate, zero where there is none: solves [ab ac] = [t b] [uv_ab uv_ac] for t,
+// up to scale. w: 1 where the front shows the picture as it is, v pointing down; -1 where it shows it mirrored.
+Vec4 texture_tangent(const Scene& scene, const Triangle& triangle, int set = 0,
+                     const std::array<float, 6>& transform = {1, 0, 0, 0, 1, 0}) {
   if (scene.texcoords[size_t(set)].empty()) return Vec4(0);
   const Vec2 uv = texture_place(scene, triangle, 0, 0, set, transform);
-  const Vec2 p = texture_place(scene, triangle, 1, 0, set, transform) - uv, q = texture_place(scene, triangle, 0, 1, set, transform) - uv;
+  const Vec2 p = texture_place(scene, triangle, 1, 0, set, transform) - uv,
+             q = texture_place(scene, triangle, 0, 1, set, transform) - uv;
   const Vec3 a = scene.positions[triangle.v[0]];
   const Vec3 ab = scene.positions[triangle.v[1]] - a, ac = scene.positions[triangle.v[2]] - a;
   const float area = p.x * q.y - p.y * q.x;
@@ -49,9 +51,11 @@ Vec3 mapped_normal(const Scene& scene, const Triangle& triangle, float u, float 
   if (m.normal_texture < 0) return n;
   Vec4 along = scene.tangents.empty() ? Vec4(0) : interpolate(scene.tangents, triangle, u, v);
   Vec3 t = square_to(Vec3(along), n);
-  if (t == Vec3(0) || along.w == 0) along = texture_tangent(scene, triangle, m.normal_set, m.normal_transform), t = square_to(Vec3(along), n);
+  if (t == Vec3(0) || along.w == 0)
+    along = texture_tangent(scene, triangle, m.normal_set, m.normal_transform), t = square_to(Vec3(along), n);
   if (t == Vec3(0)) return n;
-  const Vec3 texel = sample_linear_texture(scene.textures[size_t(m.normal_texture)], texture_place(scene, triangle, u, v, m.normal_set, m.normal_transform));
+  const Vec3 texel = sample_linear_texture(scene.textures[size_t(m.normal_texture)],
+                                           texture_place(scene, triangle, u, v, m.normal_set, m.normal_transform));
   const Vec3 bent = (2.0f * texel - Vec3(1)) * Vec3(m.normal_scale, m.normal_scale, 1);
   const Vec3 b = glm::cross(n, t) * (along.w > 0 ? 1.0f : -1.0f);
   return normalize_or(t * bent.x + b * bent.y + n * bent.z, n);

@@ -47,8 +47,10 @@ TEST(SurfaceBrdf, DiffuseMaterialsAndOneForAll) {
 TEST(ShadingFrame, FollowsTheFirstTextureCoordinate) {
   const Vec3 up(0, 1, 0);
   // u grows along -Z, then v is sheared and u mirrored: the tangent is where u grows with v held, as solved by hand.
-  for (const auto& [du, dv, tangent] : {std::tuple{Vec2(0, -1), Vec2(1, 0), Vec3(0, 0, -1)}, {Vec2(3, 0), Vec2(0, 5), Vec3(1, 0, 0)},
-                                        {Vec2(-2, 0), Vec2(0, 1), Vec3(-1, 0, 0)}, {Vec2(1, 0), Vec2(1, 1), Vec3(1, 0, -1)}}) {
+  for (const auto& [du, dv, tangent] : {std::tuple{Vec2(0, -1), Vec2(1, 0), Vec3(0, 0, -1)},
+                                        {Vec2(3, 0), Vec2(0, 5), Vec3(1, 0, 0)},
+                                        {Vec2(-2, 0), Vec2(0, 1), Vec3(-1, 0, 0)},
+                                        {Vec2(1, 0), Vec2(1, 1), Vec3(1, 0, -1)}}) {
     const Scene s = mapped_triangle(du, dv);
     const Mat3 f = shading_frame(s, s.triangles[0], up);
     expect_frame(f, up);

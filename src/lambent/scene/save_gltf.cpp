@@ -34,8 +34,9 @@ class MaterialWriter {
     auto known = materials_.find({index, two_sided});
     if (known != materials_.end()) return known->second;
     const Material& m = scene_.materials[index];
-    Vec3 base = glm::clamp(Vec3(finite_or(m.base_color.x, 0), finite_or(m.base_color.y, 0), finite_or(m.base_color.z, 0)),
-                           Vec3(0.0f), Vec3(1.0f));
+    Vec3 base =
+        glm::clamp(Vec3(finite_or(m.base_color.x, 0), finite_or(m.base_color.y, 0), finite_or(m.base_color.z, 0)),
+                   Vec3(0.0f), Vec3(1.0f));
     Json pbr = {{"baseColorFactor", Json::array({base.x, base.y, base.z, 1.0f})},
                 {"metallicFactor", std::clamp(finite_or(m.metallic, 1), 0.0f, 1.0f)},
                 {"roughnessFactor", std::clamp(finite_or(m.roughness, 1), 0.0f, 1.0f)}};
@@ -47,7 +48,8 @@ class MaterialWriter {
     if (m.metallic_roughness_texture >= 0) {
       auto texture = add_texture(size_t(m.metallic_roughness_texture));
       if (!texture) return texture.error();
-      pbr["metallicRoughnessTexture"] = texture_reference(*texture, m.metallic_roughness_set, m.metallic_roughness_transform);
+      pbr["metallicRoughnessTexture"] =
+          texture_reference(*texture, m.metallic_roughness_set, m.metallic_roughness_transform);
     }
     Json json = {{"pbrMetallicRoughness", std::move(pbr)}, {"doubleSided", two_sided}};
     if (!m.name.empty()) json["name"] = m.name;
@@ -98,7 +100,8 @@ class MaterialWriter {
     if (!is_finite(emissive) || !(brightest > 0)) return;
     emissive = glm::max(emissive, Vec3(0.0f));
     if (brightest > 1) {
-      float strength = std::min(0x1p127f, std::exp2(std::ceil(std::log2(brightest))));  // a power of two divides without rounding
+      float strength =
+          std::min(0x1p127f, std::exp2(std::ceil(std::log2(brightest))));  // a power of two divides without rounding
       emissive = glm::min(Vec3(1), emissive / strength);
       json["extensions"]["KHR_materials_emissive_strength"]["emissiveStrength"] = strength;
       out_.use_extension("KHR_materials_emissive_strength");
@@ -259,7 +262,9 @@ class DocumentWriter {
       std::string type = image_mime_type(bytes);
       auto told = image.find("mimeType");
       if (type.empty() && told != image.end() && told->is_string()) type = told->get<std::string>();
-      if (type.empty()) type = "image/" + file_extension(image.contains("uri") && image["uri"].is_string() ? image["uri"].get<std::string>() : "");
+      if (type.empty())
+        type = "image/" +
+               file_extension(image.contains("uri") && image["uri"].is_string() ? image["uri"].get<std::string>() : "");
       auto [view, is_new] = views.try_emplace({bytes.data(), bytes.size()}, 0);
       if (is_new) view->second = out_.add_view(bytes, 4);
       image.erase("uri");
@@ -305,10 +310,10 @@ class DocumentWriter {
       return scene_.parts[p].changed && scene_.parts[p].source.empty();
     });
     const bool skinned = gltf_item(document_.json, "nodes", node).contains("skin");
-    const bool morphs = std::any_of(mesh["primitives"].begin(), mesh["primitives"].end(), [](const Json& p) {
-      return p.contains("targets") && !p["targets"].empty();
-    });
-    // Vertices that are not the document's have no joints or morph targets to move by: the whole node gets its rest pose.
+    const bool morphs = std::any_of(mesh["primitives"].begin(), mesh["primitives"].end(),
+                                    [](const Json& p) { return p.contains("targets") && !p["targets"].empty(); });
+    // Vertices that are not the document's have no joints or morph targets to move by: the whole node gets its rest
+    // pose.
     const glm::dmat4& world = pose_.world[node];
     const double determinant = glm::determinant(glm::dmat3(world));
     const bool singular = determinant == 0 || !std::isfinite(1 / determinant);
@@ -413,7 +418,8 @@ class DocumentWriter {
         Json channels = Json::array();
         for (const Json& channel : animation["channels"]) {
           const Json target = channel.is_object() ? channel.value("target", Json()) : Json();
-          bool drops = target.is_object() && target.value("node", Json()) == node && target.value("path", Json()) == "weights";
+          bool drops = target.is_object() && target.value("node", Json()) == node &&
+                       target.value("path", Json()) == "weights";
           if (!drops) channels.push_back(channel);
         }
         animation["channels"] = channels;

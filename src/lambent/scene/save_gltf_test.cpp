@@ -38,7 +38,8 @@ void expect_same_material(const Material& a, const Material& b, const Scene& sa,
   EXPECT_EQ(a.metallic, b.metallic);
   EXPECT_EQ(a.roughness, b.roughness);
   EXPECT_EQ(a.emissive, b.emissive);
-  auto expect_same_texture = [&](int ia, int ib, const std::array<float, 6>& transform_a, const std::array<float, 6>& transform_b) {
+  auto expect_same_texture = [&](int ia, int ib, const std::array<float, 6>& transform_a,
+                                 const std::array<float, 6>& transform_b) {
     ASSERT_EQ(ia < 0, ib < 0);
     if (ia < 0) return;
     for (size_t i = 0; i < 6; ++i) EXPECT_NEAR(transform_a[i], transform_b[i], normal_rounding);
@@ -78,7 +79,8 @@ void expect_same(const Scene& a, const Scene& b, float tolerance = 0) {
       Vec2 uv_b = b.texcoords[set].empty() ? Vec2(0) : b.texcoords[set][i];
       slid = std::max(slid, glm::length(uv_a - uv_b));
     }
-    if (!a.tangents.empty() && !b.tangents.empty()) turned = std::max(turned, glm::length(a.tangents[i] - b.tangents[i]));
+    if (!a.tangents.empty() && !b.tangents.empty())
+      turned = std::max(turned, glm::length(a.tangents[i] - b.tangents[i]));
     Vec3 color_a = a.colors.empty() ? Vec3(1) : a.colors[i], color_b = b.colors.empty() ? Vec3(1) : b.colors[i];
     faded = std::max(faded, glm::length(color_a - color_b));
   }
@@ -97,7 +99,8 @@ void expect_same(const Scene& a, const Scene& b, float tolerance = 0) {
     EXPECT_EQ(a.parts[p].name, b.parts[p].name);
     EXPECT_EQ(a.parts[p].vertex_count, b.parts[p].vertex_count);
     EXPECT_EQ(a.parts[p].triangle_count, b.parts[p].triangle_count);
-    ASSERT_NO_FATAL_FAILURE(expect_same_material(a.materials[a.parts[p].material], b.materials[b.parts[p].material], a, b));
+    ASSERT_NO_FATAL_FAILURE(
+        expect_same_material(a.materials[a.parts[p].material], b.materials[b.parts[p].material], a, b));
   }
 }
 
@@ -119,10 +122,14 @@ Scene made_scene() {
     m.base_color = {0.1f * float(i), 0.3f, 1.0f / 3};
     m.metallic = 0.3f, m.roughness = 0.7f, m.emissive = i == 1 ? Vec3(0.5f, 11, 0) : Vec3(0.25f, 0, 0.1f * float(i));
     m.base_color_texture = i == 3 ? -1 : i, m.texcoord_set = i % 2;
-    if (i == 1) m.uv_transform = {2 * std::cos(0.3f), 3 * std::sin(0.3f), 0.5f, -2 * std::sin(0.3f), 3 * std::cos(0.3f), -0.25f};
+    if (i == 1)
+      m.uv_transform = {2 * std::cos(0.3f), 3 * std::sin(0.3f), 0.5f, -2 * std::sin(0.3f), 3 * std::cos(0.3f), -0.25f};
     if (i == 2) m.uv_transform = {1, 0, 0, 0, -1, 1};  // upside down
-    if (i >= 2) m.metallic_roughness_texture = 3 - i, m.metallic_roughness_set = 1, m.metallic_roughness_transform = {2, 0, 0.5f, 0, 1, 0};
-    if (i == 1) m.normal_texture = 2, m.normal_set = 1, m.normal_transform = {1, 0, 0.25f, 0, 2, 0}, m.normal_scale = -1.5f;
+    if (i >= 2)
+      m.metallic_roughness_texture = 3 - i, m.metallic_roughness_set = 1,
+      m.metallic_roughness_transform = {2, 0, 0.5f, 0, 1, 0};
+    if (i == 1)
+      m.normal_texture = 2, m.normal_set = 1, m.normal_transform = {1, 0, 0.25f, 0, 2, 0}, m.normal_scale = -1.5f;
     if (i == 3) m.emissive_texture = 1, m.emissive_set = 1, m.emissive_transform = {3, 0, 0, 0, 1, 0.5f};
     s.materials.push_back(m);
   }
@@ -226,8 +233,11 @@ TEST(SaveGlb, EmbedsBuffersAndImages) {
   json["buffers"] = {{{"byteLength", b.binary.size()}, {"uri", "data:;base64," + base64(b.binary)}},
                      {{"byteLength", second.size()}, {"uri", "second.bin"}}};
   json["bufferViews"].push_back({{"buffer", 1}, {"byteOffset", 3}, {"byteLength", 4}});
-  json["images"] = {{{"uri", "a.png"}}, {{"uri", "data:image/jpeg;base64," + base64(jpeg)}}, {{"uri", "c.webp"}},
-                    {{"uri", "missing.png"}}, {{"uri", "a.png"}}};
+  json["images"] = {{{"uri", "a.png"}},
+                    {{"uri", "data:image/jpeg;base64," + base64(jpeg)}},
+                    {{"uri", "c.webp"}},
+                    {{"uri", "missing.png"}},
+                    {{"uri", "a.png"}}};
   write_bytes(folder.file("in.gltf"), bytes_of(json.dump()));
   auto s = load_scene(folder.file("in.gltf"));
   ASSERT_TRUE(s) << s.error().text();
@@ -266,10 +276,12 @@ Builder rich_without_normals() {
   Builder b = triangle();
   Json& p = b.json["meshes"][0]["primitives"][0];
   p["attributes"].erase("NORMAL");
-  p["attributes"]["TEXCOORD_0"] = b.accessor(std::vector<uint8_t>{0, 128, 0, 0, 255, 0, 0, 0, 1, 2, 0, 0}, type_u8, "VEC2", true);
+  p["attributes"]["TEXCOORD_0"] =
+      b.accessor(std::vector<uint8_t>{0, 128, 0, 0, 255, 0, 0, 0, 1, 2, 0, 0}, type_u8, "VEC2", true);
   b.json["bufferViews"].back()["byteStride"] = 4;
   b.json["accessors"].back()["count"] = 3;
-  p["attributes"]["COLOR_0"] = b.accessor(std::vector<uint16_t>{1, 2, 3, 0, 5, 6, 7, 0, 9, 10, 11, 0}, type_u16, "VEC3", true);
+  p["attributes"]["COLOR_0"] =
+      b.accessor(std::vector<uint16_t>{1, 2, 3, 0, 5, 6, 7, 0, 9, 10, 11, 0}, type_u16, "VEC3", true);
   b.json["bufferViews"].back()["byteStride"] = 8;
   b.json["accessors"].back()["count"] = 3;
   p["attributes"]["_MASS"] = b.floats({10, 20, 30}, "SCALAR");
@@ -281,7 +293,8 @@ Builder rich_without_normals() {
                      {{"translation", {1, 2, 3}}, {"rotation", {0, 0, 0.6, 0.8}}},
                      {{"scale", {1, 2, 1}}}};
   b.json["skins"] = {{{"joints", {1, 2}}}};
-  size_t times = b.floats({0, 1}, "SCALAR"), weights = b.floats({0, 1}, "SCALAR"), moves = b.floats({0, 0, 0, 1, 1, 1}, "VEC3");
+  size_t times = b.floats({0, 1}, "SCALAR"), weights = b.floats({0, 1}, "SCALAR"),
+         moves = b.floats({0, 0, 0, 1, 1, 1}, "VEC3");
   b.json["animations"] = {{{"samplers", {{{"input", times}, {"output", weights}}}},
                            {"channels", {{{"sampler", 0}, {"target", {{"node", 0}, {"path", "weights"}}}}}}},
                           {{"samplers", {{{"input", times}, {"output", moves}}}},
@@ -312,7 +325,8 @@ TEST(SaveGlb, CopiedVerticesKeepAllTheirAttributes) {
     const Json& mass = json["accessors"][size_t(primitive["attributes"]["_MASS"])];
     const Json& view = json["bufferViews"][size_t(mass["bufferView"])];
     float values[4];
-    std::memcpy(values, split_gltf(*read_file(round_trip.path()), "")->binary.data() + size_t(view["byteOffset"]), sizeof values);
+    std::memcpy(values, split_gltf(*read_file(round_trip.path()), "")->binary.data() + size_t(view["byteOffset"]),
+                sizeof values);
     EXPECT_EQ(values[2], 30);
     EXPECT_EQ(values[3], 20);
     const Json& joints = json["accessors"][size_t(primitive["attributes"]["JOINTS_0"])];
@@ -437,8 +451,8 @@ TEST(SaveGlb, TextureWithoutItsImageIsAnError) {
 TEST(SaveGlb, RealScenes) {
   std::string data = data_folder();
   if (data.empty()) GTEST_SKIP() << "no data set: set LAMBENT_DATA";
-  for (const char* name : {"CesiumMan.glb", "Fox.glb", "MorphStressTest.gltf", "room.glb", "shaderball.glb", "zdm2_level.glb",
-                           "cornell_box_rounded.glb", "dutch_ship/dutch_ship_medium_1k.gltf"}) {
+  for (const char* name : {"CesiumMan.glb", "Fox.glb", "MorphStressTest.gltf", "room.glb", "shaderball.glb",
+                           "zdm2_level.glb", "cornell_box_rounded.glb", "dutch_ship/dutch_ship_medium_1k.gltf"}) {
     SCOPED_TRACE(name);
     auto s = load_scene(data + "/meshes/" + name);
     ASSERT_TRUE(s) << s.error().text();

@@ -67,9 +67,7 @@ Vec3 sample_bytes(const Texture& texture, Vec2 uv, const std::array<float, 256>&
 
 float srgb_to_linear(float e) { return e <= 0.04045f ? e / 12.92f : std::pow((e + 0.055f) / 1.055f, 2.4f); }
 
-float linear_to_srgb(float l) {
-  return l <= 0.0031308f ? 12.92f * l : 1.055f * std::pow(l, 1.0f / 2.4f) - 0.055f;
-}
+float linear_to_srgb(float l) { return l <= 0.0031308f ? 12.92f * l : 1.055f * std::pow(l, 1.0f / 2.4f) - 0.055f; }
 
 Bounds bounds(const Scene& scene) {
   Bounds box;
@@ -79,7 +77,8 @@ Bounds bounds(const Scene& scene) {
   return box;
 }
 
-Vec2 texture_place(const Scene& scene, const Triangle& triangle, float u, float v, int set, const std::array<float, 6>& m) {
+Vec2 texture_place(const Scene& scene, const Triangle& triangle, float u, float v, int set,
+                   const std::array<float, 6>& m) {
   const std::vector<Vec2>& texcoords = scene.texcoords[size_t(set)];
   Vec2 uv = texcoords.empty() ? Vec2(0.0f) : interpolate(texcoords, triangle, u, v);
   return {m[0] * uv.x + m[1] * uv.y + m[2], m[3] * uv.x + m[4] * uv.y + m[5]};
@@ -103,7 +102,8 @@ Vec3 albedo(const Scene& scene, const Triangle& triangle, float u, float v) {
 Vec3 emission_texel(const Scene& scene, const Triangle& triangle, float u, float v) {
   const Material& m = scene.materials[scene.parts[triangle.part].material];
   if (m.emissive_texture < 0) return Vec3(1.0f);
-  return sample_texture(scene.textures[size_t(m.emissive_texture)], texture_place(scene, triangle, u, v, m.emissive_set, m.emissive_transform));
+  return sample_texture(scene.textures[size_t(m.emissive_texture)],
+                        texture_place(scene, triangle, u, v, m.emissive_set, m.emissive_transform));
 }
 
 Vec3 emission(const Scene& scene, const Triangle& triangle, float u, float v) {

@@ -1,5 +1,6 @@
 #pragma once
-// ONE scene of plain structs and indices, flattened to world space in the rest pose. Loaders fill it, everything reads it.
+// ONE scene of plain structs and indices, flattened to world space in the rest pose. Loaders fill it, everything reads
+// it.
 #include <lambent/core/result.h>
 #include <lambent/core/vec.h>
 
@@ -21,7 +22,8 @@ struct Texture {
   std::string mime_type;         // "image/png" or "image/jpeg"
   std::vector<uint8_t> encoded;  // may be empty for a scene whose document already holds the bytes
   int width = 0, height = 0;
-  std::vector<uint8_t> rgb;  // width * height * 3, first row is v = 0 (glTF: the image's top row); colours are sRGB-encoded
+  std::vector<uint8_t>
+      rgb;  // width * height * 3, first row is v = 0 (glTF: the image's top row); colours are sRGB-encoded
   Wrap wrap_s = Wrap::repeat, wrap_t = Wrap::repeat;
 };
 
@@ -43,7 +45,7 @@ struct Material {
   int normal_set = 0;
   std::array<float, 6> normal_transform{1, 0, 0, 0, 1, 0};
   float normal_scale = 1.0f;
-  Vec3 emissive{0.0f};        // radiance, linear; times the texture
+  Vec3 emissive{0.0f};  // radiance, linear; times the texture
   int emissive_texture = -1;
   int emissive_set = 0;
   std::array<float, 6> emissive_transform{1, 0, 0, 0, 1, 0};
@@ -55,9 +57,9 @@ struct PunctualLight {
   enum class Kind : uint8_t { point, spot, directional };
   std::string name;
   Kind kind = Kind::point;
-  Vec3 position{0.0f};        // not of directional ones
-  Vec3 direction{0, 0, -1};   // unit, the way that spots and directional lights shine
-  Vec3 intensity{1.0f};       // linear; flux per steradian, or, of directional ones, irradiance of a surface that faces it
+  Vec3 position{0.0f};       // not of directional ones
+  Vec3 direction{0, 0, -1};  // unit, the way that spots and directional lights shine
+  Vec3 intensity{1.0f};  // linear; flux per steradian, or, of directional ones, irradiance of a surface that faces it
   float inner_cone = 0, outer_cone = pi / 4;  // radians from the axis: full within the inner, nothing beyond the outer
 };
 
@@ -73,7 +75,8 @@ struct Part {
   uint32_t material = 0;
   uint32_t first_vertex = 0, vertex_count = 0;
   uint32_t first_triangle = 0, triangle_count = 0;
-  // Where it came from in Scene::document; -1 for parts that the document does not have (OBJ, PLY, ground, made scenes).
+  // Where it came from in Scene::document; -1 for parts that the document does not have (OBJ, PLY, ground, made
+  // scenes).
   int node = -1, primitive = -1;
   // True once its vertices or triangles differ from the document's, so that the writer must write them anew.
   bool changed = false;
@@ -88,11 +91,12 @@ struct Scene {
   std::string path;  // for messages and provenance; may be empty
   std::string hash;  // content_hash of the input file's bytes; may be empty
 
-  std::vector<Vec3> positions;              // world space, metres
-  std::vector<Vec3> normals;                // unit, as many as positions
+  std::vector<Vec3> positions;                 // world space, metres
+  std::vector<Vec3> normals;                   // unit, as many as positions
   std::array<std::vector<Vec2>, 2> texcoords;  // each empty, or as many as positions
-  std::vector<Vec3> colors;                 // linear vertex colours: empty, or as many as positions
-  // Along +u of the normal texture; w: the sign of the bitangent cross(n, t) w. Empty, or as many as positions; zero: not given.
+  std::vector<Vec3> colors;                    // linear vertex colours: empty, or as many as positions
+  // Along +u of the normal texture; w: the sign of the bitangent cross(n, t) w. Empty, or as many as positions; zero:
+  // not given.
   std::vector<Vec4> tangents;
 
   std::vector<Triangle> triangles;
@@ -118,18 +122,21 @@ T interpolate(const std::vector<T>& values, const Triangle& t, float u, float v)
   return (1 - u - v) * values[t.v[0]] + u * values[t.v[1]] + v * values[t.v[2]];
 }
 
-// Linear base colour (factor x texture x vertex colour) at a point of a triangle, clamped to [0, 1]; bilinear texture look-up.
+// Linear base colour (factor x texture x vertex colour) at a point of a triangle, clamped to [0, 1]; bilinear texture
+// look-up.
 Vec3 albedo(const Scene& scene, const Triangle& triangle, float u, float v);
 
 // (metallic, roughness): factors times the texture, at a point of a triangle, each in [0, 1].
 Vec2 metallic_roughness(const Scene& scene, const Triangle& triangle, float u, float v);
 
-// Radiance that a point of a triangle sends out of its own: factor times texture. The second: the texture alone, 1 without.
+// Radiance that a point of a triangle sends out of its own: factor times texture. The second: the texture alone, 1
+// without.
 Vec3 emission(const Scene& scene, const Triangle& triangle, float u, float v);
 Vec3 emission_texel(const Scene& scene, const Triangle& triangle, float u, float v);
 
 // Where a texture is looked up: the interpolated coordinates of a set, transformed.
-Vec2 texture_place(const Scene& scene, const Triangle& triangle, float u, float v, int set, const std::array<float, 6>& transform);
+Vec2 texture_place(const Scene& scene, const Triangle& triangle, float u, float v, int set,
+                   const std::array<float, 6>& transform);
 
 // Bilinear look-up at texture coordinates (u, v), decoded to linear.
 Vec3 sample_texture(const Texture& texture, Vec2 uv);

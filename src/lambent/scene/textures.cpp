@@ -10,8 +10,8 @@
 namespace lambent {
 namespace {
 
-// The most pixels that this many encoded bytes can hold, so that a few bytes cannot ask for gigabytes. Deflate expands at most
-// 1032 times; a PNG pixel has at least `bits` bits. A JPEG block of 64 pixels takes at least one bit.
+// The most pixels that this many encoded bytes can hold, so that a few bytes cannot ask for gigabytes. Deflate expands
+// at most 1032 times; a PNG pixel has at least `bits` bits. A JPEG block of 64 pixels takes at least one bit.
 uint64_t most_pixels(std::span<const uint8_t> encoded, bool png) {
   uint64_t size = encoded.size();
   if (!png) return size * 8 * 64;
@@ -40,8 +40,8 @@ Result<void> decode_texture(std::span<const uint8_t> encoded, const std::string&
   if (!stbi_info_from_memory(encoded.data(), size, &width, &height, &channels)) return Error{where, "is broken"};
   if (width <= 0 || height <= 0) return Error{where, "is empty"};
   if (width > max_texture_side || height > max_texture_side) {
-    return Error{where, "measures " + std::to_string(width) + " x " + std::to_string(height) + " pixels; the limit is " +
-                            std::to_string(max_texture_side) + " a side"};
+    return Error{where, "measures " + std::to_string(width) + " x " + std::to_string(height) +
+                            " pixels; the limit is " + std::to_string(max_texture_side) + " a side"};
   }
   if (uint64_t(width) * uint64_t(height) > most_pixels(encoded, type == "image/png")) {
     return Error{where, "is broken: too few bytes for its size"};

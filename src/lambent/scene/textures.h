@@ -14,8 +14,8 @@ inline constexpr int max_texture_side = 16384;
 // "image/png" or "image/jpeg" by the first bytes, else "".
 std::string image_mime_type(std::span<const uint8_t> encoded);
 
-// Fills width, height, rgb and mime_type from a PNG (8 or 16 bits) or JPEG; alpha is dropped. `where` names the image in errors:
-// another format, broken, larger than max_texture_side, or of a size that its bytes cannot hold.
+// Fills width, height, rgb and mime_type from a PNG (8 or 16 bits) or JPEG; alpha is dropped. `where` names the image
+// in errors: another format, broken, larger than max_texture_side, or of a size that its bytes cannot hold.
 Result<void> decode_texture(std::span<const uint8_t> encoded, const std::string& where, Texture& texture);
 
 // The same for a texture that keeps its encoded bytes; `name` becomes its name and names it in errors.

@@ -8,7 +8,8 @@
 namespace lambent {
 namespace {
 
-// A PNG header alone, for an image of the given size: 8 bits, RGB. Its checksum is left out, which decoders look at later.
+// A PNG header alone, for an image of the given size: 8 bits, RGB. Its checksum is left out, which decoders look at
+// later.
 std::vector<uint8_t> png_header(uint32_t width, uint32_t height) {
   std::vector<uint8_t> bytes{0x89, 'P', 'N', 'G', '\r', '\n', 0x1a, '\n', 0, 0, 0, 13, 'I', 'H', 'D', 'R'};
   for (uint32_t side : {width, height})
@@ -24,8 +25,13 @@ TEST(DecodeTexture, RefusesWhatIsNoImage) {
     EXPECT_EQ(texture.error().text(), "a.png: is neither PNG nor JPEG");
   }
   EXPECT_FALSE(decode_texture({0xff, 0xd8, 0xff, 0xe0}, "a"));
-  for (auto [width, height] : {std::pair{0u, 1u}, {1u, 0u}, {16385u, 1u}, {1u, 16385u},
-                               {16384u, 16384u}, {100'000'000u, 100'000'000u}, {4u, 4u}})
+  for (auto [width, height] : {std::pair{0u, 1u},
+                               {1u, 0u},
+                               {16385u, 1u},
+                               {1u, 16385u},
+                               {16384u, 16384u},
+                               {100'000'000u, 100'000'000u},
+                               {4u, 4u}})
     EXPECT_FALSE(decode_texture(png_header(width, height), "a")) << width << " " << height;
 }
 

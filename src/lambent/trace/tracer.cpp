@@ -43,7 +43,8 @@ Result<Tracer> Tracer::build(const Scene& scene) {
     return Error{scene.path, "out of memory for the ray tracer"};
   }
   std::copy(scene.positions.begin(), scene.positions.end(), positions);
-  for (size_t i = 0; i < scene.triangles.size(); ++i) std::memcpy(indices + 3 * i, scene.triangles[i].v, 3 * sizeof(uint32_t));
+  for (size_t i = 0; i < scene.triangles.size(); ++i)
+    std::memcpy(indices + 3 * i, scene.triangles[i].v, 3 * sizeof(uint32_t));
   // A build on many threads may order the leaves differently from run to run, and with them the winner of exact ties.
   run_serially([&] {
     rtcCommitGeometry(mesh);
@@ -59,7 +60,8 @@ Result<Tracer> Tracer::build(const Scene& scene) {
 
 size_t Tracer::bytes() const { return size_t(std::max<ssize_t>(impl_->bytes, 0)); }
 
-// Occlusion: streams of 256 rays were the fastest of Embree's entry points for sorted directions; the COHERENT flag slows it.
+// Occlusion: streams of 256 rays were the fastest of Embree's entry points for sorted directions; the COHERENT flag
+// slows it.
 void Tracer::visible_fan(Vec3 origin, const Directions& d, float* visible) const {
   constexpr size_t batch = 256;
   alignas(64) RTCRay rays[batch];

@@ -8,8 +8,8 @@
 
 namespace lambent {
 
-// Directions in structure-of-arrays form; rays are traced fastest in batches that point alike, so keep them in the order of a
-// space-filling curve.
+// Directions in structure-of-arrays form; rays are traced fastest in batches that point alike, so keep them in the
+// order of a space-filling curve.
 struct Directions {
   const float *x, *y, *z;
   size_t count;
@@ -24,8 +24,8 @@ struct Hit {
 
 class Tracer {
  public:
-  // Builds the acceleration structure; the result does not depend on the number of threads. The scene must outlive it and keep
-  // its triangles. Errors: out of memory.
+  // Builds the acceleration structure; the result does not depend on the number of threads. The scene must outlive it
+  // and keep its triangles. Errors: out of memory.
   static Result<Tracer> build(const Scene& scene);
 
   // visible[i] = 1 where the ray from `origin` along direction i leaves the scene, else 0.

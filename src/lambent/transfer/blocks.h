@@ -1,5 +1,6 @@
 #pragma once
-// Values of receivers in blocks of 16, [block][value][receiver in block]: the layout of everything that is stored at receivers.
+// Values of receivers in blocks of 16, [block][value][receiver in block]: the layout of everything that is stored at
+// receivers.
 #include <lambent/core/half.h>
 #include <lambent/transfer/transfer.h>
 

@@ -6,8 +6,10 @@
 namespace lambent {
 namespace {
 
-constexpr std::pair<DirectionalKind, const char*> names[] = {{DirectionalKind::none, "none"}, {DirectionalKind::sh2, "sh:2"},
-                                                             {DirectionalKind::sh3, "sh:3"}, {DirectionalKind::hl2, "hl2"},
+constexpr std::pair<DirectionalKind, const char*> names[] = {{DirectionalKind::none, "none"},
+                                                             {DirectionalKind::sh2, "sh:2"},
+                                                             {DirectionalKind::sh3, "sh:3"},
+                                                             {DirectionalKind::hl2, "hl2"},
                                                              {DirectionalKind::vector, "vector"}};
 
 }  // namespace
@@ -39,11 +41,9 @@ Vec3 evaluate_directional_light(DirectionalKind kind, std::span<const Vec3> rows
   LAMBENT_CHECK(rows.size() >= size_t(directional_rows(kind)));
   Vec3 sum(0);
   switch (kind) {
-    case DirectionalKind::none:
-      return rows[0];
+    case DirectionalKind::none: return rows[0];
     case DirectionalKind::sh2:
-    case DirectionalKind::sh3:
-      return glm::max(reconstruct_sh(rows.first(size_t(directional_rows(kind))), n), Vec3(0));
+    case DirectionalKind::sh3: return glm::max(reconstruct_sh(rows.first(size_t(directional_rows(kind))), n), Vec3(0));
     case DirectionalKind::hl2: {
       float total = 0;
       for (int k = 0; k < 3; ++k) {

@@ -1,5 +1,5 @@
-// Follows: the formulas of directional_convert.h; R. Ramamoorthi and P. Hanrahan, "An efficient representation for irradiance environment
-// maps", 2001, for three.js' constants.
+// Follows: the formulas of directional_convert.h; R. Ramamoorthi and P. Hanrahan, "An efficient representation for
+// irradiance environment maps", 2001, for three.js' constants.
 #include <lambent/basis/sh_convert.h>
 #include <lambent/core/check.h>
 #include <lambent/transfer/directional_convert.h>
@@ -9,7 +9,8 @@
 namespace lambent {
 
 std::vector<Vec3> three_light_probe(DirectionalKind kind, std::span<const Vec3> rows) {
-  LAMBENT_CHECK((kind == DirectionalKind::sh2 || kind == DirectionalKind::sh3) && rows.size() >= size_t(directional_rows(kind)));
+  LAMBENT_CHECK((kind == DirectionalKind::sh2 || kind == DirectionalKind::sh3) &&
+                rows.size() >= size_t(directional_rows(kind)));
   // Rows are E_lm / pi = A_l L_lm / pi.
   std::vector<Vec3> radiance(rows.begin(), rows.begin() + directional_rows(kind));
   for (size_t k = 0; k < radiance.size(); ++k) radiance[k] *= float(std::numbers::pi / clamped_cosine(sh_band(int(k))));
@@ -24,7 +25,8 @@ std::array<Vec3, 4> godot_lightmap_layers(DirectionalKind kind, std::span<const 
   std::array<Vec3, 4> layers{glm::max(rows[0] * y[0], Vec3(0)), Vec3(0.5f), Vec3(0.5f), Vec3(0.5f)};
   for (size_t k = 1; k < 4; ++k)
     for (int c = 0; c < 3; ++c)
-      if (layers[0][c] > 0) layers[k][c] = std::clamp(0.5f + 0.5f * rows[k][c] * y[k] * axis / (4 * layers[0][c]), 0.0f, 1.0f);
+      if (layers[0][c] > 0)
+        layers[k][c] = std::clamp(0.5f + 0.5f * rows[k][c] * y[k] * axis / (4 * layers[0][c]), 0.0f, 1.0f);
   return layers;
 }
 

@@ -17,7 +17,8 @@ std::vector<Vec3> rows_of(int order, Vec3 s, Vec3 I, Vec3 uniform) {
   return rows;
 }
 
-const Vec3 sun = glm::normalize(Vec3(0.3f, 0.8f, -0.5f)), directions[] = {{1, 0, 0}, {0, -1, 0}, {0, 0, 1}, {0.6f, 0.64f, -0.48f}, {-0.48f, 0.6f, 0.64f}};
+const Vec3 sun = glm::normalize(Vec3(0.3f, 0.8f, -0.5f)),
+           directions[] = {{1, 0, 0}, {0, -1, 0}, {0, 0, 1}, {0.6f, 0.64f, -0.48f}, {-0.48f, 0.6f, 0.64f}};
 
 TEST(DirectionalConvert, ThreeMakesOurIrradiance) {
   for (DirectionalKind kind : {DirectionalKind::sh2, DirectionalKind::sh3}) {
@@ -27,9 +28,10 @@ TEST(DirectionalConvert, ThreeMakesOurIrradiance) {
     c.resize(9, Vec3(0));
     for (Vec3 n : directions) {
       const float x = n.x, y = n.y, z = n.z;
-      const Vec3 e = c[0] * 0.886227f + c[1] * 2.0f * 0.511664f * y + c[2] * 2.0f * 0.511664f * z + c[3] * 2.0f * 0.511664f * x +
-                     c[4] * 2.0f * 0.429043f * x * y + c[5] * 2.0f * 0.429043f * y * z + c[6] * (0.743125f * z * z - 0.247708f) +
-                     c[7] * 2.0f * 0.429043f * x * z + c[8] * 0.429043f * (x * x - y * y);
+      const Vec3 e = c[0] * 0.886227f + c[1] * 2.0f * 0.511664f * y + c[2] * 2.0f * 0.511664f * z +
+                     c[3] * 2.0f * 0.511664f * x + c[4] * 2.0f * 0.429043f * x * y + c[5] * 2.0f * 0.429043f * y * z +
+                     c[6] * (0.743125f * z * z - 0.247708f) + c[7] * 2.0f * 0.429043f * x * z +
+                     c[8] * 0.429043f * (x * x - y * y);
       const Vec3 ours = pi * evaluate_directional_light(kind, rows, Mat3(1.0f), n);
       for (int k = 0; k < 3; ++k) EXPECT_NEAR(e[k], ours[k], 1e-4f * (1 + ours[k]));
     }
@@ -43,7 +45,8 @@ TEST(DirectionalConvert, GodotMakesOurIrradianceOverPi) {
     for (int k = 1; k < 4; ++k)
       for (int c = 0; c < 3; ++c) EXPECT_TRUE(layer[size_t(k)][c] >= 0.25f && layer[size_t(k)][c] <= 0.75f);
     for (Vec3 n : directions) {
-      const Vec3 l0 = layer[0], m1 = (layer[1] - 0.5f) * 2.0f, m2 = (layer[2] - 0.5f) * 2.0f, m3 = (layer[3] - 0.5f) * 2.0f;
+      const Vec3 l0 = layer[0], m1 = (layer[1] - 0.5f) * 2.0f, m2 = (layer[2] - 0.5f) * 2.0f,
+                 m3 = (layer[3] - 0.5f) * 2.0f;
       const Vec3 e = glm::max(l0 + m1 * n.y * (l0 * 4.0f) + m2 * n.z * (l0 * 4.0f) + m3 * n.x * (l0 * 4.0f), Vec3(0));
       const Vec3 ours = evaluate_directional_light(DirectionalKind::sh2, rows, Mat3(1.0f), n);
       for (int k = 0; k < 3; ++k) EXPECT_NEAR(e[k], ours[k], 1e-5f * (1 + ours[k]));

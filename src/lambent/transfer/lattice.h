@@ -1,7 +1,8 @@
 #pragma once
-// Light in free space ("neighbourhood transfer"): at the points of a lattice a transfer matrix that takes the light's coefficients to
-// those of the light that arrives there, over the whole sphere and in world axes, for objects that the bake did not know.
-// A lattice point is a receiver of the transfer; its rows are incident harmonics. Source: general-prt ("Secondary goal").
+// Light in free space ("neighbourhood transfer"): at the points of a lattice a transfer matrix that takes the light's
+// coefficients to those of the light that arrives there, over the whole sphere and in world axes, for objects that the
+// bake did not know. A lattice point is a receiver of the transfer; its rows are incident harmonics. Source:
+// general-prt ("Secondary goal").
 #include <lambent/core/vec.h>
 #include <lambent/transfer/transfer.h>
 
@@ -31,8 +32,8 @@ struct Lattice {
 
 struct LatticeTransfer {
   Lattice lattice;
-  int order = 0;               // m: the transfer has m^2 rows, incident radiance = sum over rows j of (T light)_j y_j(w)
-  Transfer transfer;           // receivers: points, in the order of Lattice::index
+  int order = 0;      // m: the transfer has m^2 rows, incident radiance = sum over rows j of (T light)_j y_j(w)
+  Transfer transfer;  // receivers: points, in the order of Lattice::index
   std::vector<uint8_t> valid;  // by point; 0: it lies inside something and has its neighbours' values
 };
 

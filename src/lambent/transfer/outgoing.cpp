@@ -1,4 +1,5 @@
-// Follows: general-prt, "Final reflection": view-dependent vectors O_j(wo) looked up in a map, or a basis of the outgoing radiance.
+// Follows: general-prt, "Final reflection": view-dependent vectors O_j(wo) looked up in a map, or a basis of the
+// outgoing radiance.
 #include <lambent/basis/hemispherical.h>
 #include <lambent/core/check.h>
 #include <lambent/core/sampling.h>
@@ -27,7 +28,8 @@ void look_up(const ViewMap& map, Vec3 wo, std::span<ViewWeights> out) {
   const ViewWeights* p = map.values.data() + size_t(y * map.grid + x) * size_t(map.rows);
   const ViewWeights* q = p + size_t(map.grid) * size_t(map.rows);
   const float w00 = (1 - fx) * (1 - fy), w10 = fx * (1 - fy), w01 = (1 - fx) * fy, w11 = fx * fy;
-  for (int r = 0; r < map.rows; ++r) out[size_t(r)] = w00 * p[r] + w10 * p[map.rows + r] + w01 * q[r] + w11 * q[map.rows + r];
+  for (int r = 0; r < map.rows; ++r)
+    out[size_t(r)] = w00 * p[r] + w10 * p[map.rows + r] + w01 * q[r] + w11 * q[map.rows + r];
 }
 
 int Outgoing::rows() const {

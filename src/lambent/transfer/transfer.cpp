@@ -6,7 +6,8 @@ namespace lambent {
 WritableTransfer make_transfer(LightBasis light, int rows, int channels, size_t receivers, Precision precision) {
   WritableTransfer w;
   LAMBENT_CHECK(light.count() <= max_columns && rows >= 1 && (channels == 1 || channels == 3));
-  w.transfer.light = std::move(light), w.transfer.rows = rows, w.transfer.channels = channels, w.transfer.receivers = receivers, w.transfer.precision = precision;
+  w.transfer.light = std::move(light), w.transfer.rows = rows, w.transfer.channels = channels,
+  w.transfer.receivers = receivers, w.transfer.precision = precision;
   auto memory = std::make_shared<AlignedVector<uint8_t>>(w.transfer.bytes());
   w.values = memory->data();
   w.transfer.data = *memory;

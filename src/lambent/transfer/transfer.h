@@ -1,7 +1,7 @@
 #pragma once
-// WHAT is stored at each receiver, and the narrow waist between baking and relighting: a matrix T that takes light coefficients
-// to `rows` numbers a receiver, for each colour channel. Diffuse transfer is its one-row case: cosine, visibility, bounces and
-// 1/pi are in it, the receiver's own albedo is not, and exit radiance = albedo * (T light).
+// WHAT is stored at each receiver, and the narrow waist between baking and relighting: a matrix T that takes light
+// coefficients to `rows` numbers a receiver, for each colour channel. Diffuse transfer is its one-row case: cosine,
+// visibility, bounces and 1/pi are in it, the receiver's own albedo is not, and exit radiance = albedo * (T light).
 #include <lambent/basis/directional.h>
 #include <lambent/core/aligned.h>
 #include <lambent/core/result.h>
@@ -19,8 +19,8 @@ enum class Precision { half, single };
 // Receivers are stored in blocks of this many, so that one SIMD stream relights a block.
 inline constexpr size_t transfer_block = 16;
 
-// The COLUMNS of T: what light is a combination of. Harmonics come first, then lobes (lamps in the distance), then the scene's
-// own lamps by group.
+// The COLUMNS of T: what light is a combination of. Harmonics come first, then lobes (lamps in the distance), then the
+// scene's own lamps by group.
 struct LightBasis {
   int order = 0;  // bands of spherical harmonics (basis/sh.h): order^2 columns; 0: none
   LobeKind lobe_kind = LobeKind::von_mises_fisher;
@@ -35,7 +35,7 @@ inline constexpr size_t max_columns = 1024;
 struct Transfer {
   LightBasis light;
   int rows = 1;
-  int channels = 1;      // 1: the same transfer for R, G and B (no coloured bounce); 3: one for each
+  int channels = 1;  // 1: the same transfer for R, G and B (no coloured bounce); 3: one for each
   size_t receivers = 0;
   Precision precision = Precision::half;
   // Layout [block][row][channel][column][receiver in block], little-endian; the last block is padded with zeros.

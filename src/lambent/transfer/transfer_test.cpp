@@ -20,8 +20,8 @@ TEST(Half, RoundsToNearestEvenAndComesBack) {
   }
   EXPECT_EQ(float_to_half(1.0f), 0x3c00);
   EXPECT_EQ(float_to_half(65504.0f), 0x7bff);
-  EXPECT_EQ(float_to_half(65520.0f), 0x7c00);          // halfway to the next: infinity
-  EXPECT_EQ(float_to_half(1.0f + 0x1p-11f), 0x3c00);   // ties go to the even one
+  EXPECT_EQ(float_to_half(65520.0f), 0x7c00);         // halfway to the next: infinity
+  EXPECT_EQ(float_to_half(1.0f + 0x1p-11f), 0x3c00);  // ties go to the even one
   EXPECT_EQ(float_to_half(1.0f + 3 * 0x1p-11f), 0x3c02);
   EXPECT_EQ(float_to_half(0x1p-25f), 0);
   EXPECT_EQ(float_to_half(0x1.8p-25f), 1);

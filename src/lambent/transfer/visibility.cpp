@@ -34,9 +34,9 @@ void encode_visibility(int size, int bits, std::span<const uint8_t> levels, std:
     int count = 0, last = 0;
     for (int t = 0; t < block_texels; ++t)
       if (level[t] != last) where[count] = uint8_t(t), after[count] = level[t], last = level[t], ++count;
-    const BlockSight sight = count == 0                                       ? BlockSight::blocked
-                             : count == 1 && where[0] == 0 && after[0] == top ? BlockSight::clear
-                                                                              : BlockSight::mixed;
+    const BlockSight sight = count == 0                                     ? BlockSight::blocked
+                           : count == 1 && where[0] == 0 && after[0] == top ? BlockSight::clear
+                                                                            : BlockSight::mixed;
     out[flags + size_t(b / 4)] |= uint8_t(int(sight) << b % 4 * 2);
     if (sight != BlockSight::mixed) continue;
     append_varint(out, uint64_t(count));
@@ -66,8 +66,10 @@ void decode_visibility(const Visibility& v, size_t receiver, std::span<uint8_t> 
 }
 
 Result<void> check_visibility(const Visibility& v, const std::string& where) {
-  LAMBENT_CHECK(is_cube_size(v.size) && v.bits >= 1 && v.bits <= max_visibility_bits && v.begin.size() == v.receivers + 1);
-  if (v.begin[0] != 0 || v.begin[v.receivers] != v.data.size()) return Error{where, "visibility holds more or fewer bytes than its receivers have"};
+  LAMBENT_CHECK(is_cube_size(v.size) && v.bits >= 1 && v.bits <= max_visibility_bits &&
+                v.begin.size() == v.receivers + 1);
+  if (v.begin[0] != 0 || v.begin[v.receivers] != v.data.size())
+    return Error{where, "visibility holds more or fewer bytes than its receivers have"};
   for (size_t r = 0; r < v.receivers; ++r) {
     const Error bad{where, "the visibility of receiver " + std::to_string(r) + " is broken"};
     if (v.begin[r] > v.begin[r + 1] || v.begin[r + 1] > v.data.size()) return bad;
@@ -80,7 +82,9 @@ Result<void> check_visibility(const Visibility& v, const std::string& where) {
       if (sight != int(BlockSight::mixed)) continue;
       uint64_t count = 0;
       const size_t before = at;
-      if (!read_varint(record, at, count) || count < 1 || count > uint64_t(block_texels) || at - before != (count < 128 ? 1u : 2u)) return bad;
+      if (!read_varint(record, at, count) || count < 1 || count > uint64_t(block_texels) ||
+          at - before != (count < 128 ? 1u : 2u))
+        return bad;
       if (record.size() - at < count * (v.bits > 1 ? 2 : 1)) return bad;
       for (size_t i = 0; i < count; ++i) {
         if (i > 0 && record[at + i] <= record[at + i - 1]) return bad;
@@ -93,7 +97,8 @@ Result<void> check_visibility(const Visibility& v, const std::string& where) {
   return {};
 }
 
-Visibility make_visibility(int size, int bits, std::vector<std::vector<uint8_t>> pieces, std::span<const uint32_t> lengths) {
+Visibility make_visibility(int size, int bits, std::vector<std::vector<uint8_t>> pieces,
+                           std::span<const uint32_t> lengths) {
   Visibility v;
   v.size = size, v.bits = bits, v.receivers = lengths.size();
   v.begin.reserve(lengths.size() + 1), v.begin.push_back(0);

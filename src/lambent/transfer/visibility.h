@@ -1,9 +1,9 @@
 #pragma once
-// What each receiver sees of the sky, at the texels of a cubemap, as run ends inside each block: lossless. Light, view and materials stay
-// free. Source: locally-adaptive-products, section 4.2.
+// What each receiver sees of the sky, at the texels of a cubemap, as run ends inside each block: lossless. Light, view
+// and materials stay free. Source: locally-adaptive-products, section 4.2.
 //
-// Levels go from 0, blocked, to the highest, clear: 1 for binary visibility, 2^bits - 1 for shares. Texels whose centre lies on or below the
-// receiver's horizon (n . w <= 0) are blocked.
+// Levels go from 0, blocked, to the highest, clear: 1 for binary visibility, 2^bits - 1 for shares. Texels whose centre
+// lies on or below the receiver's horizon (n . w <= 0) are blocked.
 #include <lambent/basis/cubemap.h>
 #include <lambent/core/result.h>
 
@@ -20,9 +20,9 @@ struct Visibility {
   int size = 0;  // of the cube, texels a side of a face
   int bits = 1;  // 1, or 2 to 8
   size_t receivers = 0;
-  // By receiver, one after another: two bits a block (BlockSight), block 0 in the lowest of the first byte, padded to a byte; then each mixed
-  // block's changes: their number as a base-128 varint, then where, a byte each, rising; then, with more than one bit, the new level at each,
-  // a byte. Before its first texel a block's level is 0.
+  // By receiver, one after another: two bits a block (BlockSight), block 0 in the lowest of the first byte, padded to a
+  // byte; then each mixed block's changes: their number as a base-128 varint, then where, a byte each, rising; then,
+  // with more than one bit, the new level at each, a byte. Before its first texel a block's level is 0.
   std::span<const uint8_t> data;
   std::vector<uint64_t> begin;          // by receiver, and the end: places in `data`
   std::shared_ptr<const void> storage;  // keeps `data` alive
@@ -43,7 +43,8 @@ bool read_varint(std::span<const uint8_t> bytes, size_t& at, uint64_t& value);
 // Appends one receiver's record; levels has cube_texels() values up to top().
 void encode_visibility(int size, int bits, std::span<const uint8_t> levels, std::vector<uint8_t>& out);
 
-// Changes of a mixed block: where[i] the first texel of level[i]; level is null for binary ones, whose levels are 1, 0, 1, ...
+// Changes of a mixed block: where[i] the first texel of level[i]; level is null for binary ones, whose levels are 1, 0,
+// 1, ...
 struct BlockChanges {
   const uint8_t* where = nullptr;
   const uint8_t* level = nullptr;
@@ -75,11 +76,13 @@ class VisibilityReader {
 // All levels of one receiver.
 void decode_visibility(const Visibility& v, size_t receiver, std::span<uint8_t> levels);
 
-// Whether data holds what its begins promise, so that the reader may trust it: the first thing done with a stranger's file.
+// Whether data holds what its begins promise, so that the reader may trust it: the first thing done with a stranger's
+// file.
 Result<void> check_visibility(const Visibility& v, const std::string& where);
 
 // One owner of pieces that were encoded apart, in the order of receivers; `lengths` are of their records.
-Visibility make_visibility(int size, int bits, std::vector<std::vector<uint8_t>> pieces, std::span<const uint32_t> lengths);
+Visibility make_visibility(int size, int bits, std::vector<std::vector<uint8_t>> pieces,
+                           std::span<const uint32_t> lengths);
 
 // Numbers for tables: shares of blocks by sight, and mean changes a mixed block.
 struct VisibilityStatistics {

@@ -1,10 +1,12 @@
 #pragma once
-// Transfer as a texture of zonal lobes, for any surface that it is mapped onto. Source: local-deformable-prt, sections 5 and 6.
+// Transfer as a texture of zonal lobes, for any surface that it is mapped onto. Source: local-deformable-prt, sections
+// 5 and 6.
 //
-// Or as a table of grooves (section 4.2, wrinkle model): columns are places across, evenly from border to border, rows depths, evenly from 0.
+// Or as a table of grooves (section 4.2, wrinkle model): columns are places across, evenly from border to border, rows
+// depths, evenly from 0.
 //
-// Receivers are texels, row by row from the first (v = 0); directions are in the frame (T, B, N): along +u, along -v, and outward. A texel
-// (i, j) of a W x H texture is centred at u = (i + 1/2) / W, v = (j + 1/2) / H; textures repeat.
+// Receivers are texels, row by row from the first (v = 0); directions are in the frame (T, B, N): along +u, along -v,
+// and outward. A texel (i, j) of a W x H texture is centred at u = (i + 1/2) / W, v = (j + 1/2) / H; textures repeat.
 #include <lambent/core/file.h>
 #include <lambent/transfer/zonal_transfer.h>
 
@@ -15,22 +17,25 @@ inline constexpr int max_zonal_texture_size = 4096;
 struct ZonalTexture {
   int width = 0, height = 0;
   ZonalTransfer transfer;  // width * height receivers
-  float groove_depth = 0;  // 0: a texture; above: a table of grooves, this deep in its last row, in widths of the groove, up to 10
+  float groove_depth =
+      0;  // 0: a texture; above: a table of grooves, this deep in its last row, in widths of the groove, up to 10
 };
 
-// A file of its own (.lpt): 64 bytes of header, "LMBTLPT1" and ten little-endian u32 (width, height, order, lobes, channels,
-// precision: 2 or 4 bytes, 1 for grooves, their depth as a float, and zeros), then the transfer's values as in memory (zonal_transfer.h).
+// A file of its own (.lpt): 64 bytes of header, "LMBTLPT1" and ten little-endian u32 (width, height, order, lobes,
+// channels, precision: 2 or 4 bytes, 1 for grooves, their depth as a float, and zeros), then the transfer's values as
+// in memory (zonal_transfer.h).
 Result<void> save_zonal_texture(const std::string& path, const ZonalTexture& texture);
 // Read in place. Errors: not such a file, another version, sizes out of range, any length that does not fit.
 Result<ZonalTexture> load_zonal_texture(const std::string& path);
 Result<ZonalTexture> load_zonal_texture(const MappedFile& file, const std::string& path);
 
-// Values for a point of the texture: bands that are stored as they are interpolated bilinearly, lobes from the nearest texel (two lobes'
-// mean means nothing). `values` has receiver_values() numbers.
+// Values for a point of the texture: bands that are stored as they are interpolated bilinearly, lobes from the nearest
+// texel (two lobes' mean means nothing). `values` has receiver_values() numbers.
 void sample_zonal_texture(const ZonalTexture& texture, Vec2 uv, std::span<float> values);
 
-// Values at x in [-1/2, 1/2] across a groove of that depth, from a table of them: bilinear in all numbers, since lobes correspond there; axes are
-// brought back to length 1. Beyond the groove it is the plane, deeper than the table its deepest.
+// Values at x in [-1/2, 1/2] across a groove of that depth, from a table of them: bilinear in all numbers, since lobes
+// correspond there; axes are brought back to length 1. Beyond the groove it is the plane, deeper than the table its
+// deepest.
 void sample_groove(const ZonalTexture& table, float x, float depth, std::span<float> values);
 
 }  // namespace lambent

@@ -33,15 +33,28 @@ TEST(ZonalTexture, ComesBackAndRefusesLies) {
   ASSERT_TRUE(back) << back.error().text();
   EXPECT_EQ(back->width, 5);
   EXPECT_EQ(back->transfer.lobes, 3);
-  EXPECT_TRUE(std::equal(back->transfer.data.begin(), back->transfer.data.end(), w.transfer.data.begin(), w.transfer.data.end()));
+  EXPECT_TRUE(std::equal(back->transfer.data.begin(), back->transfer.data.end(), w.transfer.data.begin(),
+                         w.transfer.data.end()));
   const std::vector<uint8_t> bytes = *read_file(file.path);
   auto accepted = [&](const std::vector<uint8_t>& changed) {
     const std::span<const uint8_t> piece(changed);
     EXPECT_TRUE(write_file_atomically(other.path, {&piece, 1}));
     return bool(load_zonal_texture(other.path));
   };
-  for (size_t length = 0; length < bytes.size(); length += length < 64 ? 9 : 131) EXPECT_FALSE(accepted({bytes.begin(), bytes.begin() + ptrdiff_t(length)})) << length;
-  for (auto [at, value] : {std::pair<size_t, uint8_t>{0, 'X'}, {7, '2'}, {8, 0}, {8, 99}, {11, 1}, {16, 7}, {16, 0}, {20, 9}, {20, 4}, {24, 2}, {28, 3}, {28, 2}}) {
+  for (size_t length = 0; length < bytes.size(); length += length < 64 ? 9 : 131)
+    EXPECT_FALSE(accepted({bytes.begin(), bytes.begin() + ptrdiff_t(length)})) << length;
+  for (auto [at, value] : {std::pair<size_t, uint8_t>{0, 'X'},
+                           {7, '2'},
+                           {8, 0},
+                           {8, 99},
+                           {11, 1},
+                           {16, 7},
+                           {16, 0},
+                           {20, 9},
+                           {20, 4},
+                           {24, 2},
+                           {28, 3},
+                           {28, 2}}) {
     std::vector<uint8_t> changed = bytes;
     changed[at] = value;
     EXPECT_FALSE(accepted(changed)) << at << ' ' << int(value);

@@ -5,8 +5,10 @@
 
 namespace lambent {
 
-WritableZonalTransfer make_zonal_transfer(int order, int lobes, int channels, size_t receivers, Precision precision, int rows) {
-  LAMBENT_CHECK(order >= 1 && order <= max_sh_order && lobes >= 1 && lobes <= max_stored_lobes && (channels == 1 || channels == 3) && rows >= 1);
+WritableZonalTransfer make_zonal_transfer(int order, int lobes, int channels, size_t receivers, Precision precision,
+                                          int rows) {
+  LAMBENT_CHECK(order >= 1 && order <= max_sh_order && lobes >= 1 && lobes <= max_stored_lobes &&
+                (channels == 1 || channels == 3) && rows >= 1);
   WritableZonalTransfer w;
   w.transfer.order = order, w.transfer.lobes = lobes, w.transfer.channels = channels;
   w.transfer.receivers = receivers, w.transfer.precision = precision, w.transfer.rows = rows;
@@ -36,7 +38,8 @@ Vec3 lobe_axis(const ZonalTransfer& t, std::span<const float> values, int lobe) 
 
 std::vector<float> zonal_harmonics(const ZonalTransfer& t, std::span<const float> values, const Mat3& R) {
   LAMBENT_CHECK(values.size() == t.row_values());
-  const size_t C = size_t(sh_count(t.order)), exact = size_t(t.exact_bands()), exact_count = exact * exact, bands = size_t(t.order) - exact;
+  const size_t C = size_t(sh_count(t.order)), exact = size_t(t.exact_bands()), exact_count = exact * exact,
+               bands = size_t(t.order) - exact;
   std::vector<float> sh(size_t(t.channels) * C, 0.0f);
   for (size_t c = 0; c < size_t(t.channels); ++c) {
     const float* from = values.data() + c * exact_count;

@@ -1,10 +1,12 @@
 #pragma once
-// Transfer as zonal lobes: it turns with the surface by turning a few axes. Rows have the meaning of transfer.h: one for diffuse
-// surfaces, several where a last reflection (outgoing.h) makes radiance of them. Source: local-deformable-prt, eq. 11, 16 and section 3.3.
+// Transfer as zonal lobes: it turns with the surface by turning a few axes. Rows have the meaning of transfer.h: one
+// for diffuse surfaces, several where a last reflection (outgoing.h) makes radiance of them. Source:
+// local-deformable-prt, eq. 11, 16 and section 3.3.
 //
-// t_lm = sum_i y_lm(s_i) g_il for the bands from exact_bands() on; the bands below are stored as they are: DC alone for one or two
-// lobes, DC and linear for three or more, which could reproduce them anyhow. Channels share the axes: what blocks the light is the
-// same for all of them, and coloured bounces differ in strength more than in shape; each has coefficients of its own.
+// t_lm = sum_i y_lm(s_i) g_il for the bands from exact_bands() on; the bands below are stored as they are: DC alone for
+// one or two lobes, DC and linear for three or more, which could reproduce them anyhow. Channels share the axes: what
+// blocks the light is the same for all of them, and coloured bounces differ in strength more than in shape; each has
+// coefficients of its own.
 #include <lambent/transfer/transfer.h>
 
 namespace lambent {
@@ -40,7 +42,8 @@ struct WritableZonalTransfer {
   ZonalTransfer transfer;
   uint8_t* values = nullptr;
 };
-WritableZonalTransfer make_zonal_transfer(int order, int lobes, int channels, size_t receivers, Precision precision, int rows = 1);
+WritableZonalTransfer make_zonal_transfer(int order, int lobes, int channels, size_t receivers, Precision precision,
+                                          int rows = 1);
 
 // One receiver's values, row by row.
 void store_receiver(const WritableZonalTransfer& t, size_t receiver, std::span<const float> values);

@@ -22,7 +22,8 @@ TEST(ZonalTransfer, KeepsWhatIsStored) {
         const WritableZonalTransfer w = make_zonal_transfer(6, lobes, channels, 37, precision);
         const size_t per_lobe = 3 + size_t(channels) * (lobes == 1 ? 5 : 4);
         EXPECT_EQ(w.transfer.receiver_values(), size_t(channels) * (lobes == 1 ? 1 : 4) + size_t(lobes) * per_lobe);
-        EXPECT_EQ(w.transfer.data.size(), 3 * 16 * w.transfer.receiver_values() * (precision == Precision::half ? 2 : 4));
+        EXPECT_EQ(w.transfer.data.size(),
+                  3 * 16 * w.transfer.receiver_values() * (precision == Precision::half ? 2 : 4));
         for (size_t r = 0; r < 37; ++r) store_receiver(w, r, random_values(w.transfer, r));
         for (size_t r = 0; r < 37; ++r) EXPECT_EQ(load_receiver(w.transfer, r), random_values(w.transfer, r));
       }
