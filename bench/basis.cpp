@@ -45,7 +45,7 @@ void basis_case(int order) {
   std::vector<Vec3> directions;
   std::vector<Mat3> rotations;
   for (int i = 0; i < inputs; ++i) {
-    directions.push_back(glm::normalize(Vec3(random.next() - 0.5f, random.next() - 0.5f, random.next() - 0.5f)));
+    directions.push_back(normalize(Vec3(random.next() - 0.5f, random.next() - 0.5f, random.next() - 0.5f)));
     rotations.push_back(
         rotation_from_yaw_pitch_roll({360 * random.next(), 180 * random.next() - 90, 360 * random.next()}));
   }
@@ -54,8 +54,8 @@ void basis_case(int order) {
 
   const double evaluate =
       nanoseconds(2000, [&](size_t i) { return evaluate_sh(order, directions[i], out), out.back(); });
-  const double evaluate_double = nanoseconds(
-      2000, [&](size_t i) { return evaluate_sh(order, glm::dvec3(directions[i]), exact), float(exact.back()); });
+  const double evaluate_double =
+      nanoseconds(2000, [&](size_t i) { return evaluate_sh(order, Vec3d(directions[i]), exact), float(exact.back()); });
   report("sh_evaluate", evaluate, evaluate_double, "ns", "the same in double", about(order, {}, evaluate));
 
   const double rotate = nanoseconds(1000, [&](size_t i) { return rotate_sh_zyz(rotations[i], f[i], out), out.back(); });

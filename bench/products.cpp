@@ -33,12 +33,12 @@ void add_grid(Scene& scene, uint32_t material, const char* name, int na, int nb,
   for (int i = 0; i <= na; ++i)
     for (int j = 0; j < columns; ++j) {
       const Place p = f(float(i) / float(na), float(j) / float(nb));
-      positions.push_back(p.position), normals.push_back(glm::normalize(p.normal));
+      positions.push_back(p.position), normals.push_back(normalize(p.normal));
     }
   std::vector<uint32_t> indices;
   auto add = [&](uint32_t a, uint32_t b, uint32_t c) {
-    const Vec3 n = glm::cross(positions[b] - positions[a], positions[c] - positions[a]);
-    if (glm::dot(n, normals[a] + normals[b] + normals[c]) < 0) std::swap(b, c);
+    const Vec3 n = cross(positions[b] - positions[a], positions[c] - positions[a]);
+    if (dot(n, normals[a] + normals[b] + normals[c]) < 0) std::swap(b, c);
     indices.insert(indices.end(), {a, b, c});
   };
   for (int i = 0; i < na; ++i)
@@ -53,7 +53,7 @@ void add_grid(Scene& scene, uint32_t material, const char* name, int na, int nb,
 void add_bar(Scene& scene, uint32_t material, const char* name, Vec3 p, Vec3 q, float r, float s, int along,
              int around) {
   const Vec3 axis = q - p;
-  const Mat3 frame = frame_about(glm::normalize(axis));
+  const Mat3 frame = frame_about(normalize(axis));
   add_grid(scene, material, name, along, around, true, [&](float a, float b) {
     const Vec3 out = std::cos(2 * pi * b) * frame[0] + std::sin(2 * pi * b) * frame[1];
     return Place{p + a * axis + (r + a * (s - r)) * out, out};
@@ -221,7 +221,7 @@ double raw_rays_a_second(const Scene& scene, const Receivers& receivers, const C
         const size_t r = i * step;
         x.clear(), y.clear(), z.clear();
         for (size_t t = 0; t < cube.count(); ++t)
-          if (const Vec3 d = cube.texels.at(t); glm::dot(receivers.normals[r], d) > 0)
+          if (const Vec3 d = cube.texels.at(t); dot(receivers.normals[r], d) > 0)
             x.push_back(d.x), y.push_back(d.y), z.push_back(d.z);
         for (size_t k = 0; k < x.size(); k += 256)
           found += occluded_stream(raw.scene, receivers.origins[r], &x[k], &y[k], &z[k],
@@ -243,8 +243,8 @@ double clipped_psnr(std::span<const Vec3> values, std::span<const Vec3> truth) {
   const float white = std::max(sorted[sorted.size() * 99 / 100], 1e-6f);
   double sum = 0;
   for (size_t i = 0; i < truth.size(); ++i) {
-    const Vec3 d = glm::clamp(values[i] / white, 0.0f, 1.0f) - glm::clamp(truth[i] / white, 0.0f, 1.0f);
-    sum += double(glm::dot(d, d)) / 3;
+    const Vec3 d = clamp(values[i] / white, 0.0f, 1.0f) - clamp(truth[i] / white, 0.0f, 1.0f);
+    sum += double(dot(d, d)) / 3;
   }
   return 10 * std::log10(double(truth.size()) / std::max(sum, 1e-12));
 }

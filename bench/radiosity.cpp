@@ -21,8 +21,7 @@ struct Mapped {
 };
 std::optional<Mapped> map_scene(Scene scene, double texels) {
   double area = 0;
-  for (const Triangle& t : scene.triangles)
-    area += 0.5 * double(glm::length(area_normal(scene, t))) * (1 + t.two_sided);
+  for (const Triangle& t : scene.triangles) area += 0.5 * double(length(area_normal(scene, t))) * (1 + t.two_sided);
   Mapped m{std::move(scene), {}, {}};
   auto atlas = make_atlas(m.scene, {.texels_per_unit = float(std::sqrt(texels / area))});
   if (!atlas) {

@@ -150,7 +150,7 @@ void shading_case() {
                                 for (size_t r = 0; r < rows.size(); ++r) {
                                   const std::vector<float>& v = rows[r];
                                   for (int i = 0; i < z.lobes; ++i) {
-                                    evaluate_sh(order, glm::normalize(rotations[r] * lobe_axis(z, v, i)), y);
+                                    evaluate_sh(order, normalize(rotations[r] * lobe_axis(z, v, i)), y);
                                     const float* g = v.data() + z.exact_values() + size_t(i) * z.lobe_values() + 3;
                                     for (int l = z.exact_bands(); l < order; ++l)
                                       for (int k = l * l; k < (l + 1) * (l + 1); ++k)
@@ -219,8 +219,7 @@ void glossy_case(const std::string& name) {
   };
   auto error = [](const Radiance& a, const Radiance& b, const Radiance& whole) {
     double sum = 0, total = 0;
-    for (size_t i = 0; i < a.size(); ++i)
-      sum += glm::dot(a[i] - b[i], a[i] - b[i]), total += glm::dot(whole[i], whole[i]);
+    for (size_t i = 0; i < a.size(); ++i) sum += dot(a[i] - b[i], a[i] - b[i]), total += dot(whole[i], whole[i]);
     return std::sqrt(sum / total);
   };
   auto map = bake_rows(OutgoingKind::map, 1);

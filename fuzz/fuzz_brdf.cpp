@@ -9,13 +9,13 @@ namespace {
 using namespace lambent;
 
 void check_brdf(const Brdf& brdf) {
-  const Vec3 a = glm::normalize(Vec3(0.3f, -0.5f, 0.4f)), b = glm::normalize(Vec3(-0.9f, 0.2f, 0.1f));
+  const Vec3 a = normalize(Vec3(0.3f, -0.5f, 0.4f)), b = normalize(Vec3(-0.9f, 0.2f, 0.1f));
   for (Vec3 wo : {a, b, Vec3(0, 0, 1)}) {
     const BrdfSample s = sample(brdf, wo, Vec2(0.7f, 0.2f));
     LAMBENT_CHECK(is_finite(s.wi) && is_finite(s.weight) && std::isfinite(s.pdf));
     const BrdfValue v = evaluate_with_pdf(brdf, a, wo);
     LAMBENT_CHECK(is_finite(v.f) && std::isfinite(v.pdf) && std::min({v.f.x, v.f.y, v.f.z, v.pdf}) >= 0);
-    LAMBENT_CHECK(glm::length(v.f - evaluate(brdf, wo, a)) <= 1e-3f * glm::length(v.f));
+    LAMBENT_CHECK(length(v.f - evaluate(brdf, wo, a)) <= 1e-3f * length(v.f));
   }
 }
 

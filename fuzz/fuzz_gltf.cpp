@@ -12,7 +12,7 @@ extern "C" int LLVMFuzzerTestOneInput(const uint8_t* data, size_t size) {
     return 0;
   }
   LAMBENT_CHECK(!scene->triangles.empty() && scene->normals.size() == scene->positions.size());
-  for (Vec3 n : scene->normals) LAMBENT_CHECK(glm::dot(n, n) > 0.99f && glm::dot(n, n) < 1.01f);
+  for (Vec3 n : scene->normals) LAMBENT_CHECK(dot(n, n) > 0.99f && dot(n, n) < 1.01f);
   for (const Triangle& t : scene->triangles) {
     Vec3 n = area_normal(*scene, t), a = albedo(*scene, t, 0.25f, 0.5f);
     LAMBENT_CHECK(a.x >= 0 && a.x <= 1 && (n.x <= 0 || n.x >= 0 || n.x != n.x));
@@ -27,7 +27,7 @@ extern "C" int LLVMFuzzerTestOneInput(const uint8_t* data, size_t size) {
     }
     LAMBENT_CHECK(pose->positions.size() == scene->positions.size() &&
                   pose->rotations.size() == scene->positions.size());
-    for (Vec3 n : pose->normals) LAMBENT_CHECK(glm::dot(n, n) > 0.99f && glm::dot(n, n) < 1.01f);
+    for (Vec3 n : pose->normals) LAMBENT_CHECK(dot(n, n) > 0.99f && dot(n, n) < 1.01f);
   }
   return 0;
 }

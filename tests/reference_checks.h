@@ -17,8 +17,7 @@ inline Environment uniform_environment(float L) {
 // Bright on one side, no symmetry, never zero.
 inline Environment skewed_environment() {
   return make_environment("skewed", 32, 16, [](Vec3 d) {
-    return Vec3(0.3f) +
-           3.0f * std::exp(4 * (glm::dot(d, glm::normalize(Vec3(1, 2, -0.5f))) - 1)) * Vec3(1, 0.8f, 0.5f) +
+    return Vec3(0.3f) + 3.0f * std::exp(4 * (dot(d, normalize(Vec3(1, 2, -0.5f))) - 1)) * Vec3(1, 0.8f, 0.5f) +
            0.2f * std::max(0.0f, d.z) * Vec3(0.2f, 0.4f, 1);
   });
 }
@@ -37,7 +36,7 @@ inline Camera look(Vec3 eye, Vec3 target, float fov = 40) {
 
 // Fails where two independent estimates of one picture differ by more than their noise, pixel by pixel or on the whole.
 inline void expect_same(const ReferenceImage& a, const ReferenceImage& b) {
-  glm::dvec3 difference(0), variance(0);
+  Vec3d difference(0), variance(0);
   for (size_t i = 0; i < a.image.rgb.size(); ++i)
     for (int c = 0; c < 3; ++c) {
       double d = double(a.image.rgb[i][c]) - double(b.image.rgb[i][c]),

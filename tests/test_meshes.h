@@ -51,7 +51,7 @@ inline std::string broken_invariant(const Scene& s) {
   constexpr float unit_error = 1e-5f;  // a few float roundings
   for (size_t v = 0; v < n; ++v) {
     if (!is_finite(s.positions[v])) return "position not finite";
-    if (!(std::abs(glm::length(s.normals[v]) - 1) < unit_error)) return "normal not unit";
+    if (!(std::abs(length(s.normals[v]) - 1) < unit_error)) return "normal not unit";
   }
   return {};
 }
@@ -59,8 +59,8 @@ inline std::string broken_invariant(const Scene& s) {
 inline double total_area(const Scene& s) {
   double area = 0;
   for (const Triangle& t : s.triangles) {
-    glm::dvec3 a = s.positions[t.v[0]], b = s.positions[t.v[1]], c = s.positions[t.v[2]];
-    area += 0.5 * glm::length(glm::cross(b - a, c - a));
+    Vec3d a = s.positions[t.v[0]], b = s.positions[t.v[1]], c = s.positions[t.v[2]];
+    area += 0.5 * length(cross(b - a, c - a));
   }
   return area;
 }

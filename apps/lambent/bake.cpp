@@ -77,10 +77,8 @@ Result<Lattice> parse_lattice(const BakeCommand& o, const Scene& scene) {
     auto b = parse_numbers(o.lattice_box, 6, "--lattice-box");
     if (!b) return b.error();
     box = {{(*b)[0], (*b)[1], (*b)[2]}, {(*b)[3], (*b)[4], (*b)[5]}};
-    if (glm::any(glm::greaterThan(box.min, box.max)))
-      return Error{"--lattice-box", "expects the lower corner first, then the upper"};
-    if (glm::any(glm::greaterThan(glm::max(glm::abs(box.min), glm::abs(box.max)), Vec3(1e9f))))
-      return Error{"--lattice-box", "lies beyond 1e9"};
+    if (!all_at_most(box.min, box.max)) return Error{"--lattice-box", "expects the lower corner first, then the upper"};
+    if (!all_at_most(max(abs(box.min), abs(box.max)), Vec3(1e9f))) return Error{"--lattice-box", "lies beyond 1e9"};
   }
   return Lattice{box.min, box.max, int((*counts)[0]), int((*counts)[1]), int((*counts)[2])};
 }
@@ -101,7 +99,7 @@ Result<std::vector<float>> membrane_alphas(const std::string& text, const Scene&
   for (const auto* map : {&receivers.front, &receivers.back})
     for (size_t v = 0; v < map->size(); ++v) {
       if ((*map)[v] == none) continue;
-      const Vec2 uv = scene.texcoords[0][v] - glm::floor(scene.texcoords[0][v]);
+      const Vec2 uv = scene.texcoords[0][v] - floor(scene.texcoords[0][v]);
       const int x = std::min(int(uv.x * float(picture->width)), picture->width - 1),
                 y = std::min(int(uv.y * float(picture->height)), picture->height - 1);
       const float alpha = luminance(picture->at(x, y));

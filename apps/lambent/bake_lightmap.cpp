@@ -42,7 +42,7 @@ Result<ViewerLook> make_look(const Scene& scene, const Receivers& receivers, Dir
     std::array<Vec3, 9> rows{};
     for (int row = 0; row < relit.rows; ++row) rows[size_t(row)] = relit.at(r, row);
     const Vec3 n = receivers.normals[r], white = evaluate_directional_light(kind, rows, receiver_frame(n), n);
-    radiance[r] = glm::max(radiance[r] * white, Vec3(0)) + glow[r];
+    radiance[r] = max(radiance[r] * white, Vec3(0)) + glow[r];
     brightness[r] = std::max({radiance[r].x, radiance[r].y, radiance[r].z});
   }
   ViewerLook look;

@@ -130,7 +130,7 @@ Result<void> add_indirect(Context& context, const Baked& baked, const Tracer& tr
   relight(*all, light.light, bounced);
   relight(*direct, light.light, straight);
   for (size_t r = 0; r < receivers.count(); ++r) {
-    const Vec3 more = glm::max(bounced.at(r) - straight.at(r), Vec3(0));
+    const Vec3 more = max(bounced.at(r) - straight.at(r), Vec3(0));
     p.relit.set(r, 0, p.relit.at(r) + diffuse_albedo(p.receivers.materials[p.receivers.material_of[r]].brdf) * more);
   }
   return {};

@@ -43,9 +43,9 @@ int run_env(Context& context, const EnvCommand& o) {
   for (int y = 0; y < env->image.height; ++y)
     for (int x = 0; x < env->image.width; ++x) {
       const Vec3 c = env->image.at(x, y);
-      all += double(glm::dot(c, c)) * texel_solid_angle(y, env->image.width, env->image.height);
+      all += double(dot(c, c)) * texel_solid_angle(y, env->image.width, env->image.height);
     }
-  for (Vec3 c : light) kept += double(glm::dot(c, c));
+  for (Vec3 c : light) kept += double(dot(c, c));
   const auto converted = convert_sh(light, *parse_sh_convention(o.convention));
   if (context.json) {
     nlohmann::json coefficients = nlohmann::json::array();

@@ -231,7 +231,7 @@ int run_inspect(Context& context, const std::string& path) {
       if (baked->view) fmt::print("  a fixed view of {} x {} pixels\n", baked->view->width, baked->view->height);
       for (const Lobe& l : t.light.lobes)
         fmt::print("  lobe about ({:.4f}, {:.4f}, {:.4f}), sharpness {:.4g}: {:.2g} degrees across\n", l.axis.x,
-                   l.axis.y, l.axis.z, l.sharpness, std::min(180.0, double(glm::degrees(2 / std::sqrt(l.sharpness)))));
+                   l.axis.y, l.axis.z, l.sharpness, std::min(180.0, double(degrees(2 / std::sqrt(l.sharpness)))));
       if (baked->lattice)
         fmt::print("  light in free space at {} x {} x {} points, order {}, {}\n", baked->lattice->lattice.nx,
                    baked->lattice->lattice.ny, baked->lattice->lattice.nz, baked->lattice->order,

@@ -89,7 +89,7 @@ Result<Insertion> parse_insertion(const std::string& text) {
   if (!n) return n.error();
   Insertion out{text.substr(0, at), {(*n)[0], (*n)[1], (*n)[2]}, scaled ? (*n)[3] : 1};
   if (!(out.scale > 0)) return Error{"--insert", "the scale must be above 0"};
-  if (glm::any(glm::greaterThan(glm::abs(out.foot), Vec3(1e9f)))) return Error{"--insert", "the place lies beyond 1e9"};
+  if (!all_at_most(abs(out.foot), Vec3(1e9f))) return Error{"--insert", "the place lies beyond 1e9"};
   return out;
 }
 
@@ -103,9 +103,8 @@ Result<void> add_insertion(Context& context, const Insertion& insertion, const L
   for (const Vec3& p : object->positions)
     if (!is_finite(p)) return Error{insertion.path, "is too large to be scaled so"};
   const Bounds box = bounds(*object);
-  const Vec3 slack(0.01f * glm::length(lattice.lattice.max - lattice.lattice.min));
-  if (glm::any(glm::lessThan(box.min, lattice.lattice.min - slack)) ||
-      glm::any(glm::greaterThan(box.max, lattice.lattice.max + slack)))
+  const Vec3 slack(0.01f * length(lattice.lattice.max - lattice.lattice.min));
+  if (!all_at_most(lattice.lattice.min - slack, box.min) || !all_at_most(box.max, lattice.lattice.max + slack))
     warn(insertion.path + ": reaches out of the lattice's box; light there is that of the box's border");
   auto tracer = Tracer::build(*object);
   if (!tracer) return tracer.error();

@@ -85,9 +85,9 @@ struct Baker {
         evaluate_sh(options.order, receivers.normals[r], row);
         for (size_t k = 0; k < harmonics(); ++k) row[k] *= float(clamped_cosine(sh_band(int(k))) / std::numbers::pi);
         for (size_t k = 0; k < irradiance.size(); ++k) {
-          const glm::dvec3 axis = glm::normalize(glm::dvec3(options.lobes[k].axis));
-          row[harmonics() + k] = float(
-              evaluate_legendre(irradiance[k], glm::dot(axis, glm::dvec3(receivers.normals[r]))) / std::numbers::pi);
+          const Vec3d axis = normalize(Vec3d(options.lobes[k].axis));
+          row[harmonics() + k] =
+              float(evaluate_legendre(irradiance[k], dot(axis, Vec3d(receivers.normals[r]))) / std::numbers::pi);
         }
         store_receiver(out, r, row);
       }

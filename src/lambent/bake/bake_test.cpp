@@ -73,7 +73,7 @@ TEST(Bake, OpenPlaneIsTheClampedCosine) {
   constexpr float quadrature = 3e-3f;
   Vec3 a(1, 0.3f, 0), c(0.2f, -0.4f, 1);
   const Scene plane = make_quad(Vec3(0), a, c, 2, 2, Vec3(0.8f));
-  const Vec3 n = glm::normalize(glm::cross(a, c));
+  const Vec3 n = normalize(cross(a, c));
   for (bool shadows : {true, false}) {
     const Baking b = bake_scene(
         plane, {.order = 6, .samples = 4096, .bounces = 0, .shadows = shadows, .precision = Precision::single});
@@ -111,10 +111,10 @@ Scene ball_with_port(float rho, float cosine, float& fraction) {
   double all = 0, kept = 0;
   std::vector<Triangle> wall;
   for (const Triangle& t : scene.triangles) {
-    const Vec3 centre = glm::normalize(scene.positions[t.v[0]] + scene.positions[t.v[1]] + scene.positions[t.v[2]]);
-    const double area = glm::length(area_normal(scene, t));
+    const Vec3 centre = normalize(scene.positions[t.v[0]] + scene.positions[t.v[1]] + scene.positions[t.v[2]]);
+    const double area = length(area_normal(scene, t));
     all += area;
-    if (glm::dot(centre, glm::normalize(Vec3(0.3f, 0.8f, -0.5f))) < cosine) kept += area, wall.push_back(t);
+    if (dot(centre, normalize(Vec3(0.3f, 0.8f, -0.5f))) < cosine) kept += area, wall.push_back(t);
   }
   scene.triangles = wall;
   scene.parts[0].triangle_count = uint32_t(wall.size());

@@ -14,7 +14,7 @@ constexpr int most_rows = 9;
 
 // What one unit of E from direction d adds to each row: the row's kernel over that of E, cos / pi.
 void row_weights(DirectionalKind kind, Vec3 d, const Mat3& frame, float* out) {
-  const float scale = 1 / std::max(glm::dot(d, frame[2]), least_cosine);
+  const float scale = 1 / std::max(dot(d, frame[2]), least_cosine);
   switch (kind) {
     case DirectionalKind::none: out[0] = 1; break;
     case DirectionalKind::sh2:
@@ -25,7 +25,7 @@ void row_weights(DirectionalKind kind, Vec3 d, const Mat3& frame, float* out) {
       break;
     }
     case DirectionalKind::hl2:
-      for (int k = 0; k < 3; ++k) out[k] = std::max(0.0f, glm::dot(d, frame * hl2_basis[k])) * scale;
+      for (int k = 0; k < 3; ++k) out[k] = std::max(0.0f, dot(d, frame * hl2_basis[k])) * scale;
       break;
     case DirectionalKind::vector:
       for (int k = 0; k < 3; ++k) out[k] = d[k] * scale;
@@ -58,7 +58,7 @@ void gather_on(const GatherSetup& setup, const Basis& basis, const Lamps& lamps,
     for (size_t j = 0; j < rays; ++j) {
       const Hit& h = hits[j];
       const Vec3 d(dx[j], dy[j], dz[j]);
-      const float cosine = glm::dot(normal, d), share = sets.weights.empty() ? 1.0f : sets.weights[j];
+      const float cosine = dot(normal, d), share = sets.weights.empty() ? 1.0f : sets.weights[j];
       auto add_light = [&](LampLight light) {
         light.value *= share;
         lights.push_back(light);

@@ -39,11 +39,11 @@ Baked bake_rows(const Scene& scene, const Environment* sky, DirectionalKind kind
 
 TEST(DirectionalLightmap, OfASunAreTheClosedForms) {
   Scene scene = plane();
-  const Vec3 s = glm::normalize(Vec3(0.3f, -0.8f, 0.4f)) * -1.0f, I(3, 2, 1);  // to the sun: above the plane's front?
-  const Vec3 normal = scene.normals[0], to_sun = glm::dot(s, normal) > 0 ? s : -s;
+  const Vec3 s = normalize(Vec3(0.3f, -0.8f, 0.4f)) * -1.0f, I(3, 2, 1);  // to the sun: above the plane's front?
+  const Vec3 normal = scene.normals[0], to_sun = dot(s, normal) > 0 ? s : -s;
   scene.lights.push_back(
       {.name = "sun", .kind = PunctualLight::Kind::directional, .direction = -to_sun, .intensity = I});
-  const Vec3 n = glm::normalize(normal + 0.5f * receiver_frame(normal)[0] - 0.2f * receiver_frame(normal)[1]);
+  const Vec3 n = normalize(normal + 0.5f * receiver_frame(normal)[0] - 0.2f * receiver_frame(normal)[1]);
   for (DirectionalKind kind : kinds) {
     const Baked b = bake_rows(scene, nullptr, kind);
     ASSERT_EQ(b.map.all.rows, directional_rows(kind));
@@ -53,15 +53,14 @@ TEST(DirectionalLightmap, OfASunAreTheClosedForms) {
     evaluate_sh(3, to_sun, y);
     for (int k = 0; k < directional_rows(kind); ++k) {
       float expected = 0;
-      if (kind == DirectionalKind::hl2) expected = std::max(0.0f, glm::dot(to_sun, frame * hl2_basis[k])) / pi;
+      if (kind == DirectionalKind::hl2) expected = std::max(0.0f, dot(to_sun, frame * hl2_basis[k])) / pi;
       else if (kind == DirectionalKind::vector) expected = to_sun[k] / pi;
       else expected = float(clamped_cosine(sh_band(k))) * y[k] / pi;
       for (int c = 0; c < 3; ++c) EXPECT_NEAR(rows[size_t(k)][c], I[c] * expected, 1e-4f) << int(kind) << " row " << k;
     }
     // One lamp is what the vector stands for: exact for any normal.
     if (kind == DirectionalKind::vector) {
-      EXPECT_NEAR(evaluate_directional_light(kind, rows, frame, n).x, I.x * std::max(0.0f, glm::dot(n, to_sun)) / pi,
-                  1e-4f);
+      EXPECT_NEAR(evaluate_directional_light(kind, rows, frame, n).x, I.x * std::max(0.0f, dot(n, to_sun)) / pi, 1e-4f);
     }
   }
 }
@@ -79,8 +78,8 @@ TEST(DirectionalLightmap, OfAUniformSkyAboveAPlane) {
     // A receiver in the middle of the plane.
     size_t r = 0;
     for (size_t i = 0; i < b.receivers.count(); ++i)
-      if (glm::length(b.receivers.origins[i] - Vec3(0.6f, -0.05f, 0.5f)) <
-          glm::length(b.receivers.origins[r] - Vec3(0.6f, -0.05f, 0.5f)))
+      if (length(b.receivers.origins[i] - Vec3(0.6f, -0.05f, 0.5f)) <
+          length(b.receivers.origins[r] - Vec3(0.6f, -0.05f, 0.5f)))
         r = i;
     const std::vector<Vec3> rows = b.rows(r);
     if (kind == DirectionalKind::hl2) {
@@ -88,7 +87,7 @@ TEST(DirectionalLightmap, OfAUniformSkyAboveAPlane) {
       for (int k = 0; k < 3; ++k) EXPECT_NEAR(rows[size_t(k)].y, 2 * (1 + 1 / std::sqrt(3.0f)) / 2, 0.02f);
     }
     for (float t : {0.0f, 0.3f, 0.6f}) {
-      const Vec3 n = std::cos(t) * normal + std::sin(t) * glm::normalize(frame[0] + 0.7f * frame[1]);
+      const Vec3 n = std::cos(t) * normal + std::sin(t) * normalize(frame[0] + 0.7f * frame[1]);
       const float expected = (1 + std::cos(t)) / 2;
       // Order 3 holds the half-space's irradiance to 1%, order 2 and the vector to 6%, Half-Life 2's blend of three
       // values of (1 + cos 55) / 2 is all alike: 0.79.

@@ -73,14 +73,13 @@ DirectionSets make_hemicube_set(int order, int samples) {
   for (int j = 0; j < n; ++j)
     for (int i = 0; i < n; ++i) {
       const double x0 = edge(i), x1 = edge(i + 1), y0 = edge(j), y1 = edge(j + 1);
-      pixels.push_back(
-          {glm::normalize(Vec3(float(x0 + x1) / 2, float(y0 + y1) / 2, 1)), over_pixel(top, x0, x1, y0, y1)});
+      pixels.push_back({normalize(Vec3(float(x0 + x1) / 2, float(y0 + y1) / 2, 1)), over_pixel(top, x0, x1, y0, y1)});
     }
   for (int face = 0; face < 4; ++face)
     for (int j = n / 2; j < n; ++j)
       for (int i = 0; i < n; ++i) {
         const double y0 = edge(i), y1 = edge(i + 1), z0 = edge(j), z1 = edge(j + 1);
-        const Vec3 d = glm::normalize(Vec3(1, float(y0 + y1) / 2, float(z0 + z1) / 2));
+        const Vec3 d = normalize(Vec3(1, float(y0 + y1) / 2, float(z0 + z1) / 2));
         const Vec3 turned[4] = {d, {-d.y, d.x, d.z}, {-d.x, -d.y, d.z}, {d.y, -d.x, d.z}};
         pixels.push_back({turned[face], over_pixel(side, y0, y1, z0, z1)});
       }

@@ -286,13 +286,13 @@ void trace_gather_on(const GatherSetup& setup, const Basis& basis, GatherScratch
       fan.visible[j] = h.triangle == none ? share : 0.0f;
       if (h.triangle == none) {
         if (sees_sky)
-          add_light(met_sky(direct->lamps, direction(j), glm::dot(normal, direction(j)), direct->samples, rays), share);
+          add_light(met_sky(direct->lamps, direction(j), dot(normal, direction(j)), direct->samples, rays), share);
         continue;
       }
       if (sees_lamps) {
         const uint32_t lamp = direct->lamps.of_triangle[h.triangle];
         if (lamp != none && emits(setup.scene, setup.scene.triangles[h.triangle], h.front))
-          add_light(met_lamp(setup.scene, direct->lamps, lamp, h, direction(j), glm::dot(normal, direction(j)),
+          add_light(met_lamp(setup.scene, direct->lamps, lamp, h, direction(j), dot(normal, direction(j)),
                              direct->samples, rays),
                     share);
       }

@@ -73,7 +73,7 @@ TEST(Kernels, RotateDirectionsIsTheMatrix) {
   float x[16], y[16], z[16], ox[16], oy[16], oz[16];
   for (int i = 0; i < 16; ++i) x[i] = float(i), y[i] = 1 - float(i), z[i] = 0.5f * float(i);
   rotate_directions(R, x, y, z, 16, ox, oy, oz);
-  for (int i = 0; i < 16; ++i) EXPECT_LT(glm::length(R * Vec3(x[i], y[i], z[i]) - Vec3(ox[i], oy[i], oz[i])), 1e-5f);
+  for (int i = 0; i < 16; ++i) EXPECT_LT(length(R * Vec3(x[i], y[i], z[i]) - Vec3(ox[i], oy[i], oz[i])), 1e-5f);
 }
 
 TEST(Kernels, LobeValuesAreTheLobe) {
@@ -84,15 +84,14 @@ TEST(Kernels, LobeValuesAreTheLobe) {
     const Vec3 d = normalize_or(Vec3(random.next(), random.next(), random.next()) - 0.5f, Vec3(0, 0, 1));
     x[i] = d.x, y[i] = d.y, z[i] = d.z;
   }
-  const Vec3 axis = glm::normalize(Vec3(0.3f, -0.6f, 0.5f));
+  const Vec3 axis = normalize(Vec3(0.3f, -0.6f, 0.5f));
   x[0] = axis.x, y[0] = axis.y, z[0] = axis.z, x[1] = -axis.x, y[1] = -axis.y, z[1] = -axis.z;
   for (LobeKind kind : {LobeKind::von_mises_fisher, LobeKind::cosine_power})
     for (float s : {1.0f, 7.0f, 300.0f, 40000.0f}) {
       lobe_values(kind == LobeKind::cosine_power, axis, s, 2.5f, x.data(), y.data(), z.data(), n, out.data());
       // A cosine's rounding, times the sharpness.
       for (size_t i = 0; i < n; ++i)
-        EXPECT_NEAR(out[i], 2.5 * lobe_value(kind, s, glm::dot(glm::dvec3(axis), glm::dvec3(x[i], y[i], z[i]))),
-                    1e-6 + 5e-7 * s)
+        EXPECT_NEAR(out[i], 2.5 * lobe_value(kind, s, dot(Vec3d(axis), Vec3d(x[i], y[i], z[i]))), 1e-6 + 5e-7 * s)
             << i << " " << s;
     }
   AlignedVector<float> product(n);

@@ -47,7 +47,7 @@ Vec3 mean_emission(const Scene& scene, const Triangle& t) {
     const float root = std::sqrt(u.x);
     sum += emission_texel(scene, t, 1 - root, u.y * root);
   }
-  return m.emissive * glm::max(sum / float(points), Vec3(least_share));
+  return m.emissive * max(sum / float(points), Vec3(least_share));
 }
 
 struct PendingSample {
@@ -72,7 +72,7 @@ Lamps make_lamps(const Scene& scene, const Environment* sky, bool separate) {
     const Triangle& triangle = scene.triangles[t];
     const uint32_t m = scene.parts[triangle.part].material;
     const Material& material = scene.materials[m];
-    const float area = 0.5f * glm::length(area_normal(scene, triangle));
+    const float area = 0.5f * length(area_normal(scene, triangle));
     if (!(largest(material.emissive) > 0) || !(area > 0)) continue;
     if (material_group[m] == none)
       material_group[m] = group_of(material.name.empty() ? "material " + std::to_string(m) : material.name);
@@ -137,11 +137,11 @@ void sample_lamps(const Scene& scene, const Tracer& tracer, const Lamps& lamps, 
       // Uniform over the triangle.
       const float root = std::sqrt(u.x), v = u.y * root;
       const Vec3 to = interpolate(scene.positions, t, 1 - root, v) - origin;
-      const float distance2 = glm::dot(to, to);
+      const float distance2 = dot(to, to);
       if (!(distance2 > 0)) continue;
       const float distance = std::sqrt(distance2);
       const Vec3 d = to / distance;
-      const float cosine = glm::dot(normal, d), facing = -glm::dot(normalize_or(area_normal(scene, t), Vec3(0)), d);
+      const float cosine = dot(normal, d), facing = -dot(normalize_or(area_normal(scene, t), Vec3(0)), d);
       if (!(cosine > 0) || !emits(scene, t, facing > 0) || facing == 0) continue;
       const double density = lamp.density * double(distance2) / double(std::abs(facing));
       add(lamp.group, d, balanced(emission(scene, t, 1 - root, v), cosine, density, samples, rays), lamp.triangle,
@@ -151,15 +151,15 @@ void sample_lamps(const Scene& scene, const Tracer& tracer, const Lamps& lamps, 
   for (size_t l = 0; l < lamps.punctual_group.size(); ++l) {
     if (lamps.punctual_group[l] == none) continue;
     const LampArrival a = arriving(scene.lights[l], origin);
-    add(lamps.punctual_group[l], a.direction, a.irradiance * (std::max(0.0f, glm::dot(normal, a.direction)) / pi), none,
+    add(lamps.punctual_group[l], a.direction, a.irradiance * (std::max(0.0f, dot(normal, a.direction)) / pi), none,
         a.distance);
   }
   if (lamps.sky) {
     const uint32_t key = uint32_t(hash64(hash64(seed, 0x5c1), receiver));
     for (int s = 0; s < samples; ++s) {
       const EnvironmentSample e = sample_environment(lamps.sky_sampler, sobol_owen(uint32_t(s), key));
-      add(lamps.sky_group, e.direction,
-          balanced(e.radiance, glm::dot(normal, e.direction), double(e.pdf), samples, rays), none, INFINITY);
+      add(lamps.sky_group, e.direction, balanced(e.radiance, dot(normal, e.direction), double(e.pdf), samples, rays),
+          none, INFINITY);
     }
   }
   shadow.trace(tracer, origin);
@@ -175,7 +175,7 @@ LampLight met_lamp(const Scene& scene, const Lamps& lamps, uint32_t index, const
                    int samples, size_t rays) {
   const AreaLamp& lamp = lamps.area[index];
   const Triangle& t = scene.triangles[lamp.triangle];
-  const float facing = std::abs(glm::dot(normalize_or(area_normal(scene, t), Vec3(0)), direction));
+  const float facing = std::abs(dot(normalize_or(area_normal(scene, t), Vec3(0)), direction));
   const double density = lamp.density * double(hit.distance) * double(hit.distance) / double(std::max(facing, 1e-30f));
   return {lamp.group, direction, balanced(emission(scene, t, hit.u, hit.v), cosine, density, samples, rays)};
 }

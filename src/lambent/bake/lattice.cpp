@@ -212,7 +212,7 @@ Error too_little_memory(size_t needed, size_t allowed) {
 
 Bounds default_lattice_box(const Scene& scene) {
   const Bounds box = bounds(scene);
-  const Vec3 inset = glm::min(Vec3(1e-3f * box.diagonal()), 0.5f * (box.max - box.min));
+  const Vec3 inset = min(Vec3(1e-3f * box.diagonal()), 0.5f * (box.max - box.min));
   return {box.min + inset, box.max - inset};
 }
 

@@ -160,7 +160,7 @@ TEST(Lattice, SeesAUniformWorldAmongWhiteSurfaces) {
   for (size_t p = 0; p < l.lattice.count(); ++p)
     for (int j = 0; j < 9; ++j)
       // Nothing but the sum of a harmonic over 1,024 low-discrepancy directions, which errs by about 1e-3 of 4 pi.
-      EXPECT_LT(glm::length(relit.at(p, j) - (j ? Vec3(0) : light[0])), 0.02f) << p << " " << j;
+      EXPECT_LT(length(relit.at(p, j) - (j ? Vec3(0) : light[0])), 0.02f) << p << " " << j;
 }
 
 TEST(Lattice, FillsPointsInsideSolids) {
@@ -230,9 +230,9 @@ TEST(Lattice, InterpolatesLinearlyAndHoldsTheBorder) {
       const Vec3 p = lattice.min - 1.0f +
                      Vec3(random.next(), random.next(), random.next()) * (lattice.max - lattice.min + 2.0f);
       interpolate_lattice(lattice, relit, p, out);
-      const Vec3 held = glm::clamp(p, lattice.min, lattice.max);
+      const Vec3 held = clamp(p, lattice.min, lattice.max);
       for (int row = 0; row < 4; ++row)
-        EXPECT_LT(glm::length(out[size_t(row)] - f(held, row)), 1e-4f);  // float roundings of values up to 30
+        EXPECT_LT(length(out[size_t(row)] - f(held, row)), 1e-4f);  // float roundings of values up to 30
     }
   }
 }

@@ -56,12 +56,12 @@ uint32_t add_lamp(Scene& scene, const std::string& name, Vec3 albedo, Vec3 radia
 
 // Mean over the receivers of a part, one-sided: of all channels.
 Vec3 mean_over(const Baking& b, const Relit& lit, size_t part) {
-  glm::dvec3 sum(0);
+  Vec3d sum(0);
   size_t count = 0;
   const auto& patches = std::get<PatchReceivers>(b.receivers.basis);
   for (uint32_t i = b.scene.parts[part].first_triangle;
        i < b.scene.parts[part].first_triangle + b.scene.parts[part].triangle_count; ++i)
-    sum += glm::dvec3(lit.at(patches.front[i].receiver)), ++count;
+    sum += Vec3d(lit.at(patches.front[i].receiver)), ++count;
   return Vec3(sum / double(count));
 }
 
@@ -78,9 +78,8 @@ TEST(Lightmap, FormFactorsOfSquares) {
   const int n = 40;
   for (int i = 0; i < n * n; ++i)
     for (int j = 0; j < n * n; ++j) {
-      const glm::dvec3 p((i % n + 0.5) / n, 0, (i / n + 0.5) / n), q((j % n + 0.5) / n, (j / n + 0.5) / n, 0),
-          d = q - p;
-      const double r2 = glm::dot(d, d);
+      const Vec3d p((i % n + 0.5) / n, 0, (i / n + 0.5) / n), q((j % n + 0.5) / n, (j / n + 0.5) / n, 0), d = q - p;
+      const double r2 = dot(d, d);
       quadrature += d.y * -d.z / (a * r2 * r2) / (double(n) * n * n * n);
     }
   EXPECT_NEAR(quadrature, 0.20004,
@@ -207,10 +206,10 @@ TEST(Lightmap, IntegratingSphereWithAnEmissivePatch) {
   double all = 0, lamp = 0;
   std::vector<Triangle> wall, patch;
   for (Triangle t : scene.triangles) {
-    const Vec3 centre = glm::normalize(scene.positions[t.v[0]] + scene.positions[t.v[1]] + scene.positions[t.v[2]]);
-    const double area = double(glm::length(area_normal(scene, t)));
+    const Vec3 centre = normalize(scene.positions[t.v[0]] + scene.positions[t.v[1]] + scene.positions[t.v[2]]);
+    const double area = double(length(area_normal(scene, t)));
     all += area;
-    if (glm::dot(centre, glm::normalize(Vec3(0.3f, 0.8f, -0.5f))) > 0.8f) lamp += area, patch.push_back(t);
+    if (dot(centre, normalize(Vec3(0.3f, 0.8f, -0.5f))) > 0.8f) lamp += area, patch.push_back(t);
     else wall.push_back(t);
   }
   // Two parts over the same vertices: the second with copies of them.
@@ -243,7 +242,7 @@ TEST(Lightmap, PunctualLightsOverAPlane) {
   // Closed forms: E = I cos / d^2, with a spot's falloff; a directional light's E cos. Exact but for the receiver's
   // hair's breadth.
   Scene scene = make_quad(Vec3(-1, 0, -1), Vec3(0, 0, 2), Vec3(2, 0, 0), 6, 6, Vec3(0.5f));
-  const Vec3 at(0.3f, 0.8f, -0.2f), axis = glm::normalize(Vec3(-0.4f, -1, 0.3f));
+  const Vec3 at(0.3f, 0.8f, -0.2f), axis = normalize(Vec3(-0.4f, -1, 0.3f));
   scene.lights.push_back(
       {.name = "bulb", .kind = PunctualLight::Kind::point, .position = at, .intensity = Vec3(3, 2, 1)});
   scene.lights.push_back({.name = "spot",
@@ -262,10 +261,10 @@ TEST(Lightmap, PunctualLightsOverAPlane) {
   int lit_by_spot = 0;
   for (size_t r = 0; r < b.receivers.count(); ++r) {
     const Vec3 d = at - b.receivers.origins[r];
-    const float distance = glm::length(d), cosine = d.y / distance, point = cosine / (pi * distance * distance);
+    const float distance = length(d), cosine = d.y / distance, point = cosine / (pi * distance * distance);
     for (int c = 0; c < 3; ++c) {
       EXPECT_NEAR(bulb.at(r)[c], scene.lights[0].intensity[c] * point, 1e-4f * scene.lights[0].intensity[c]);
-      const float off_axis = glm::dot(-d / distance, axis);
+      const float off_axis = dot(-d / distance, axis);
       const float t = std::clamp((off_axis - std::cos(0.7f)) / (std::cos(0.3f) - std::cos(0.7f)), 0.0f, 1.0f);
       EXPECT_NEAR(spot.at(r)[c], scene.lights[1].intensity[c] * point * t * t, 1e-4f * scene.lights[1].intensity[c]);
       EXPECT_NEAR(sun.at(r)[c], scene.lights[2].intensity[c] * -axis.y / pi, 1e-5f);
@@ -295,7 +294,7 @@ Scene corner(bool bulb) {
 
 Environment skew_sky() {
   return make_environment("skew", 32, 16, [](Vec3 d) {
-    return Vec3(0.1f) + std::exp(6 * (glm::dot(d, glm::normalize(Vec3(1, 2, 0.5f))) - 1)) * Vec3(1, 0.8f, 0.5f);
+    return Vec3(0.1f) + std::exp(6 * (dot(d, normalize(Vec3(1, 2, 0.5f))) - 1)) * Vec3(1, 0.8f, 0.5f);
   });
 }
 
@@ -381,9 +380,9 @@ TEST(Lightmap, HarmonicsOverTexelsAreTheVertexBakeBetweenVertices) {
     const float u = 0.7f * random.next(), v = (1 - u) * random.next();
     const Vec3 x = look_up(vertices.basis, a, t, u, v), y = look_up(texels.basis, b, t, u, v),
                z = look_up(texels.basis, c, t, u, v);
-    squares += double(glm::dot(x - y, x - y)), total += double(glm::dot(x, x));
-    EXPECT_LT(glm::length(y - z),
-              0.04f * (1 + glm::length(y)));  // the two paths through the code differ by seam smoothing
+    squares += double(dot(x - y, x - y)), total += double(dot(x, x));
+    EXPECT_LT(length(y - z),
+              0.04f * (1 + length(y)));  // the two paths through the code differ by seam smoothing
   }
   EXPECT_LT(std::sqrt(squares / total), 0.03);
 }
@@ -482,7 +481,7 @@ TEST(Lightmap, AnEmissiveTextureIsItsPatternOfLamps) {
       if (with.receivers.origins[r].y > 0.5f) continue;
       const auto other =
           std::min_element(without.receivers.origins.begin(), without.receivers.origins.end(), [&](Vec3 p, Vec3 q) {
-            return glm::length(p - with.receivers.origins[r]) < glm::length(q - with.receivers.origins[r]);
+            return length(p - with.receivers.origins[r]) < length(q - with.receivers.origins[r]);
           });
       const Vec3 truth = b.at(size_t(other - without.receivers.origins.begin()));
       for (int c = 0; c < 3; ++c)

@@ -70,7 +70,7 @@ void trace_lobe(const LobeSets& sets, const Tracer& tracer, Vec3 origin, Vec3 no
   rays.count = rays.half = 0;
   for (size_t i = 0; i < size_t(sets.rays); ++i) {
     const Vec3 d(rays.x[i], rays.y[i], rays.z[i]);
-    const float cosine = glm::dot(normal, d);
+    const float cosine = dot(normal, d);
     if (cosine <= 0) continue;
     const size_t to = rays.count++;
     rays.x[to] = d.x, rays.y[to] = d.y, rays.z[to] = d.z, rays.cosine[to] = cosine;

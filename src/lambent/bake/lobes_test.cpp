@@ -32,13 +32,13 @@ Baking bake_scene(Scene scene, const BakeOptions& options) {
   return b;
 }
 
-const std::vector<Lobe> skew_lobes{{glm::normalize(Vec3(0.3f, 0.8f, -0.5f)), 5000},
-                                   {glm::normalize(Vec3(0.2f, 0.3f, 0.7f)), 3},  // reaches well below the plane
-                                   {glm::normalize(Vec3(-0.9f, 0.2f, 0.1f)), 40},
+const std::vector<Lobe> skew_lobes{{normalize(Vec3(0.3f, 0.8f, -0.5f)), 5000},
+                                   {normalize(Vec3(0.2f, 0.3f, 0.7f)), 3},  // reaches well below the plane
+                                   {normalize(Vec3(-0.9f, 0.2f, 0.1f)), 40},
                                    {Vec3(0, -1, 0), 100000}};
 
 TEST(BakeLobes, OpenPlaneIsTheIntegral) {
-  const Vec3 a(0.1f, 0.2f, 1), b(1, -0.2f, 0), n = glm::normalize(glm::cross(a, b));
+  const Vec3 a(0.1f, 0.2f, 1), b(1, -0.2f, 0), n = normalize(cross(a, b));
   const Mat3 frame = frame_about(n);
   for (LobeKind kind : {LobeKind::von_mises_fisher, LobeKind::cosine_power})
     for (bool shadows : {true, false}) {
@@ -57,11 +57,10 @@ TEST(BakeLobes, OpenPlaneIsTheIntegral) {
         const double s = skew_lobes[k].sharpness, scale = lobe_scale(kind, s);
         double expected = 0;
         if (s > 1000) {
-          expected = std::max(0.0f, glm::dot(skew_lobes[k].axis, n)) * lobe_integral(kind, s) / std::numbers::pi;
+          expected = std::max(0.0f, dot(skew_lobes[k].axis, n)) * lobe_integral(kind, s) / std::numbers::pi;
         } else {
           for (const DirectionNode& node : direction_quadrature(160, 0, 1)) {
-            const double cosine =
-                glm::dot(glm::normalize(glm::dvec3(skew_lobes[k].axis)), glm::dmat3(frame) * node.direction);
+            const double cosine = dot(normalize(Vec3d(skew_lobes[k].axis)), Mat3d(frame) * node.direction);
             expected += node.weight * node.direction.z * scale * lobe_value(kind, s, cosine) / std::numbers::pi;
           }
         }
@@ -89,7 +88,7 @@ TEST(BakeLobes, ASharpLampCastsASharpShadow) {
   add_quad(scene, add_material(scene, "black", Vec3(0)), "awning", Vec3(-1, 1, -20), Vec3(2, 0, 0), Vec3(0, 0, 40), 1,
            1);
   for (Triangle& t : scene.triangles) t.two_sided = true;
-  const Lobe lamp{glm::normalize(Vec3(1, 1, 0)), 1e5f};
+  const Lobe lamp{normalize(Vec3(1, 1, 0)), 1e5f};
   const Baking b = bake_scene(
       std::move(scene), {.order = 2, .lobes = {lamp}, .samples = 64, .bounces = 1, .precision = Precision::single});
   const float lit = float(lobe_integral(LobeKind::von_mises_fisher, lamp.sharpness)) * lamp.axis.y / pi;
@@ -193,7 +192,7 @@ TEST(BakeLobes, MatrixRowsAreTheIntegralsTheyStandFor) {
   ReceiverMaterials materials{{LinearMaterial{Lambert{Vec3(0)}, Lambert{Vec3(1)}}}, {}, {}};
   materials.of_receiver.assign(receivers.count(), 0);
   for (const Vec3& n : receivers.normals) materials.frames.push_back(frame_about(n));
-  const Lobe beam{glm::normalize(Vec3(0.5f, 0.9f, -0.3f)), 1e5f}, broad{glm::normalize(Vec3(-0.7f, 0.4f, 0.2f)), 6};
+  const Lobe beam{normalize(Vec3(0.5f, 0.9f, -0.3f)), 1e5f}, broad{normalize(Vec3(-0.7f, 0.4f, 0.2f)), 6};
   auto baked =
       bake_matrix(scene, *tracer, receivers, materials,
                   {.order = 2, .lobes = {beam, broad}, .samples = 4096, .bounces = 0, .precision = Precision::single},
@@ -205,14 +204,14 @@ TEST(BakeLobes, MatrixRowsAreTheIntegralsTheyStandFor) {
     const auto values = load_receiver(baked->transfer, r);  // [row][column]
     evaluate_cosine_basis(basis, beam.axis * materials.frames[r], z);
     const float strength = float(lobe_integral(LobeKind::von_mises_fisher, beam.sharpness)) *
-                           glm::dot(beam.axis, receivers.normals[r]) / pi;
+                           dot(beam.axis, receivers.normals[r]) / pi;
     for (size_t j = 0; j < 16; ++j) EXPECT_NEAR(values[j * 6 + 4] / strength, z[j], 2e-3f) << j;  // the beam's width
     std::vector<double> expected(16);
     const Vec3 axis = broad.axis * materials.frames[r];
     for (const DirectionNode& node : direction_quadrature(64, 0, 1)) {
       evaluate_cosine_basis(basis, Vec3(node.direction), z);
       const double value = lobe_scale(LobeKind::von_mises_fisher, 6) *
-                           lobe_value(LobeKind::von_mises_fisher, 6, glm::dot(glm::dvec3(axis), node.direction));
+                           lobe_value(LobeKind::von_mises_fisher, 6, dot(Vec3d(axis), node.direction));
       for (size_t j = 0; j < 16; ++j) expected[j] += node.weight * value * node.direction.z * z[j] / std::numbers::pi;
     }
     for (size_t j = 0; j < 16; ++j)
@@ -244,7 +243,7 @@ TEST(BakeLobes, MatrixWithLambertIsTheDiffuseBake) {
     for (size_t r = 0; r < receivers.count(); ++r) {
       evaluate_outgoing(matrix->outgoing, r, receivers.normals[r], weights);
       const Vec3 radiance = reflect_rows(weights, Vec3(1), [&](size_t row) { return b.at(r, int(row)); });
-      EXPECT_LT(glm::length(radiance - a.at(r)), bounces ? 2e-3f : 2e-5f) << r;
+      EXPECT_LT(length(radiance - a.at(r)), bounces ? 2e-3f : 2e-5f) << r;
     }
   }
 }

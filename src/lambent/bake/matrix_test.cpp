@@ -106,14 +106,14 @@ TEST(Matrix, PhongByConvolutionIsTheLobesIntegralOfBandLimitedLight) {
       for (size_t k = 0; k < y.size(); ++k) band_limited[k] += each * y[k] * d.y * radiance_of(d);
     }
     double error = 0;
-    for (const Vec3& view : {glm::normalize(Vec3(0.1f, 1, 0.2f)), glm::normalize(Vec3(-0.8f, 0.7f, 0.1f)),
-                             glm::normalize(Vec3(0.3f, 0.4f, -0.9f))}) {
+    for (const Vec3& view :
+         {normalize(Vec3(0.1f, 1, 0.2f)), normalize(Vec3(-0.8f, 0.7f, 0.1f)), normalize(Vec3(0.3f, 0.4f, -0.9f))}) {
       const Vec3 mirrored(-view.x, view.y, -view.z);
       Vec3 expected = phong.diffuse * irradiance / pi, truth = expected;
       for (int i = 0; i < count; ++i) {
         const Vec3 d = direction(i);
         const float lobe = each * (phong.exponent + 2) / (2 * pi) *
-                           std::pow(std::max(0.0f, glm::dot(d, mirrored)), phong.exponent);
+                           std::pow(std::max(0.0f, dot(d, mirrored)), phong.exponent);
         if (lobe == 0) continue;
         evaluate_sh(m, d, y);
         Vec3 g(0.0f);
@@ -164,8 +164,8 @@ TEST(Matrix, VisibilityAsAFactorGivesTheRowsOfADirectMatrix) {
   EXPECT_GT(total, 100);
   EXPECT_LT(std::sqrt(difference / total), 1e-4);
   std::vector<ViewWeights> wa(size_t(a.rows)), wb(wa.size());
-  evaluate_outgoing(matrix->outgoing, 7, glm::normalize(receivers.normals[7] + Vec3(0.2f, 0.1f, 0.3f)), wa);
-  evaluate_outgoing(outgoing, 7, glm::normalize(receivers.normals[7] + Vec3(0.2f, 0.1f, 0.3f)), wb);
+  evaluate_outgoing(matrix->outgoing, 7, normalize(receivers.normals[7] + Vec3(0.2f, 0.1f, 0.3f)), wa);
+  evaluate_outgoing(outgoing, 7, normalize(receivers.normals[7] + Vec3(0.2f, 0.1f, 0.3f)), wb);
   for (size_t j = 0; j < wa.size(); ++j) EXPECT_EQ(wa[j], wb[j]);
 }
 
@@ -194,7 +194,7 @@ TEST(Matrix, WithLambertIsTheDiffuseBake) {
         evaluate_outgoing(baked->outgoing, r,
                           normalize_or(receivers.normals[r] + Vec3(0.3f, 0.1f, -0.2f), Vec3(0, 1, 0)), weights);
         const Vec3 radiance = reflect_rows(weights, Vec3(1), [&](size_t row) { return b.at(r, int(row)); });
-        worst = std::max(worst, double(glm::length(radiance - a.at(r))));
+        worst = std::max(worst, double(length(radiance - a.at(r))));
       }
       EXPECT_LT(worst, bounces ? 2e-3 : 2e-5) << outgoing_names[int(kind)] << " " << bounces;
     }

@@ -5,9 +5,9 @@
 
 namespace lambent {
 
-double sample_heights(std::span<const float> values, int width, int height, glm::dvec2 uv) {
+double sample_heights(std::span<const float> values, int width, int height, Vec2d uv) {
   if (!std::isfinite(uv.x) || !std::isfinite(uv.y)) return 0;
-  uv = (uv - glm::floor(uv)) * glm::dvec2(width, height) - 0.5;
+  uv = (uv - floor(uv)) * Vec2d(width, height) - 0.5;
   const int i = int(std::floor(uv.x)), j = int(std::floor(uv.y));
   const double fx = uv.x - i, fy = uv.y - j;
   auto at = [&](int a, int b) {
@@ -64,7 +64,7 @@ PatchScene make_patch(const HeightField& field, Vec3 albedo) {
     for (int i = 0; i <= side; ++i) {
       s.positions.push_back({(float(i - n) + 0.5f) * texel, -(float(j - n) + 0.5f) * texel, h(i, j)});
       // Central differences, y against v.
-      s.normals.push_back(glm::normalize(Vec3(h(i - 1, j) - h(i + 1, j), h(i, j + 1) - h(i, j - 1), 2 * texel)));
+      s.normals.push_back(normalize(Vec3(h(i - 1, j) - h(i + 1, j), h(i, j + 1) - h(i, j - 1), 2 * texel)));
     }
   for (int j = 0; j < side; ++j)
     for (int i = 0; i < side; ++i) {

@@ -12,7 +12,7 @@ struct HeightField {
 };
 
 // Bilinear at uv in a picture that repeats; 0 where uv is not finite.
-double sample_heights(std::span<const float> values, int width, int height, glm::dvec2 uv);
+double sample_heights(std::span<const float> values, int width, int height, Vec2d uv);
 
 // A picture's values, box-filtered or interpolated to size x size, times depth. Errors: fewer than 2 x 2 values; values
 // that are not finite; size or depth out of range.

@@ -13,22 +13,21 @@ PathEnd follow_path(const Scene& scene, const Tracer& tracer, const Reflection& 
     if (!hit.front && !triangle.two_sided) break;
     const Vec3 up = area_normal(scene, triangle) * (hit.front ? 1.0f : -1.0f), ng = normalize_or(up, Vec3(0));
     Vec3 n = normalize_or(interpolate(scene.normals, triangle, hit.u, hit.v), ng);
-    if (glm::dot(n, ng) < 0) n = -n;
+    if (dot(n, ng) < 0) n = -n;
     const Mat3 frame = shading_frame(scene, triangle, n);
     // Where the shading normal turns away from the ray while the surface does not, wo is lifted to its horizon.
     constexpr float lowest = 1e-4f;
     Vec3 wo = -end.direction * frame;
-    if (wo.z < lowest) wo = glm::normalize(Vec3(wo.x, wo.y, lowest));
+    if (wo.z < lowest) wo = normalize(Vec3(wo.x, wo.y, lowest));
 
     const BrdfSample next = sample(surface_brdf(scene, reflection, triangle, hit.u, hit.v), wo,
                                    sobol_owen(index, uint32_t(hash64(key, uint64_t(bounce)))));
     if (!(next.pdf > 0)) break;
     end.direction = frame * next.wi, end.throughput *= next.weight;
-    if (glm::dot(ng, end.direction) <= 0 || end.throughput == Vec3(0)) break;
+    if (dot(ng, end.direction) <= 0 || end.throughput == Vec3(0)) break;
     const Vec3 p = interpolate(scene.positions, triangle, hit.u, hit.v);
     // Clear of the surface by more than the rounding of p, which grows with coordinates and edges.
-    const Vec3 size = glm::abs(p) + glm::abs(scene.positions[triangle.v[1]] - p) +
-                      glm::abs(scene.positions[triangle.v[2]] - p);
+    const Vec3 size = abs(p) + abs(scene.positions[triangle.v[1]] - p) + abs(scene.positions[triangle.v[2]] - p);
     hit = tracer.closest(p + ng * (1e-5f * std::max({size.x, size.y, size.z})), end.direction);
     if (hit.triangle == none) {
       end.leaves = true;

@@ -21,11 +21,11 @@ ViewMap make_response(const LinearMaterial& material, const CosineBasis& basis, 
   }
   parallel_for(size_t(grid), 1, [&](size_t begin, size_t end) {
     std::vector<float> z(n);
-    std::vector<glm::dvec4> sum(n);
+    std::vector<Vec4d> sum(n);
     for (size_t y = begin; y < end; ++y)
       for (int x = 0; x < grid; ++x) {
         const Vec3 wo = view_map_direction(grid, x, int(y));
-        std::fill(sum.begin(), sum.end(), glm::dvec4(0.0));
+        std::fill(sum.begin(), sum.end(), Vec4d(0.0));
         for (int s = 0; s < samples; ++s) {
           // The same points for every view, so that noise does not vary from node to node.
           const BrdfSample drawn = sample(material.white, wo, sobol_owen(uint32_t(s), 0x0b5e));
@@ -33,7 +33,7 @@ ViewMap make_response(const LinearMaterial& material, const CosineBasis& basis, 
           const Vec3 a = evaluate(material.black, drawn.wi, wo) * (drawn.wi.z / drawn.pdf);
           const float b = luminance(drawn.weight - a);
           evaluate_cosine_basis(basis, drawn.wi, z);
-          for (size_t j = 0; j < n; ++j) sum[j] += glm::dvec4(a, b) * double(z[j]);
+          for (size_t j = 0; j < n; ++j) sum[j] += Vec4d(a, b) * double(z[j]);
         }
         ViewWeights* out = map.values.data() + (y * size_t(grid) + size_t(x)) * n;
         for (size_t j = 0; j < n; ++j) out[j] = ViewWeights(sum[j] / double(samples));
@@ -100,8 +100,8 @@ FactoredResponse factor_response(const ViewMap& response, int max_rows, double t
             float(d.U[(size_t(i) * 4 + size_t(c)) * size_t(d.k) + size_t(r)] * d.s[size_t(r)] / seen[size_t(i)]);
   f.constant = f.rows == 1;
   for (const ViewWeights& w : f.g.values) {
-    const ViewWeights apart = glm::abs(w - f.g.values[0]);
-    f.constant = f.constant && std::max({apart.x, apart.y, apart.z, apart.w}) < 1e-5f * glm::length(w);
+    const ViewWeights apart = abs(w - f.g.values[0]);
+    f.constant = f.constant && std::max({apart.x, apart.y, apart.z, apart.w}) < 1e-5f * length(w);
   }
   return f;
 }

@@ -75,7 +75,7 @@ double apart(const Relit& a, const Relit& b, size_t receivers) {
   for (size_t r = 0; r < receivers; ++r)
     for (int row = 0; row < a.rows; ++row) {
       const Vec3 d = a.at(r, row) - b.at(r, row);
-      difference += glm::dot(d, d), total += glm::dot(b.at(r, row), b.at(r, row));
+      difference += dot(d, d), total += dot(b.at(r, row), b.at(r, row));
     }
   return std::sqrt(difference / total);
 }
@@ -123,7 +123,7 @@ TEST(SimulatedPaths, CarryCausticsOffCoarseMetal) {
   double of_paths = 0, of_recursion = 0, total = 0;
   for (size_t i = 0; i < chosen.size(); ++i) {
     const Vec3 a = paths.relit.at(chosen[i]) - truth[i].mean, b = recursion.relit.at(chosen[i]) - truth[i].mean;
-    of_paths += glm::dot(a, a), of_recursion += glm::dot(b, b), total += glm::dot(truth[i].mean, truth[i].mean);
+    of_paths += dot(a, a), of_recursion += dot(b, b), total += dot(truth[i].mean, truth[i].mean);
   }
   of_paths = std::sqrt(of_paths / total), of_recursion = std::sqrt(of_recursion / total);
   RecordProperty("paths", std::to_string(of_paths)), RecordProperty("recursion", std::to_string(of_recursion));

@@ -24,9 +24,9 @@ bool is_grey(Vec3 c) { return c.x == c.y && c.y == c.z; }
 // The direction of light that goes on through a boundary of normal n, which d points along, into a relative index of 1
 // / ratio.
 Vec3 refract(Vec3 d, Vec3 n, float ratio) {
-  const float cosine = glm::dot(d, n);
+  const float cosine = dot(d, n);
   const Vec3 along = ratio * (d - cosine * n);
-  return glm::normalize(along + std::sqrt(std::max(0.0f, 1 - glm::dot(along, along))) * n);
+  return normalize(along + std::sqrt(std::max(0.0f, 1 - dot(along, along))) * n);
 }
 
 Vec3 scatter(Vec3 d, float g, Random& random) {
@@ -34,7 +34,7 @@ Vec3 scatter(Vec3 d, float g, Random& random) {
   const float q = (1 - g * g) / (1 - g + 2 * g * u.x);
   const float cosine = std::clamp(std::abs(g) < 1e-3f ? 1 - 2 * u.x : (1 + g * g - q * q) / (2 * g), -1.0f, 1.0f);
   const float sine = std::sqrt(1 - cosine * cosine);
-  return glm::normalize(frame_about(d) * Vec3(sine * std::cos(2 * pi * u.y), sine * std::sin(2 * pi * u.y), cosine));
+  return normalize(frame_about(d) * Vec3(sine * std::cos(2 * pi * u.y), sine * std::sin(2 * pi * u.y), cosine));
 }
 
 struct WalkEnd {
@@ -53,7 +53,7 @@ struct Walker {
   Vec3 beside(const Hit& hit, Vec3 normal, float up) const {
     const Triangle& t = scene.triangles[hit.triangle];
     const Vec3 p = interpolate(scene.positions, t, hit.u, hit.v);
-    const Vec3 size = glm::abs(p) + glm::abs(scene.positions[t.v[1]] - p) + glm::abs(scene.positions[t.v[2]] - p);
+    const Vec3 size = abs(p) + abs(scene.positions[t.v[1]] - p) + abs(scene.positions[t.v[2]] - p);
     return p + normal * (up * 1e-5f * largest(size));
   }
   Vec3 normal(const Hit& hit) const { return normalize_or(area_normal(scene, scene.triangles[hit.triangle]), Vec3(0)); }
@@ -64,7 +64,7 @@ struct Walker {
       p.x -= options.period * std::floor(p.x / options.period), p.y -= options.period * std::ceil(p.y / options.period);
       return p.z <= box.max.z;
     }
-    return glm::all(glm::greaterThanEqual(p, box.min)) && glm::all(glm::lessThanEqual(p, box.max));
+    return all_at_most(box.min, p) && all_at_most(p, box.max);
   }
 
   WalkEnd walk(Vec3 p, Vec3 d, Random& random, size_t& events) const {
@@ -89,8 +89,8 @@ struct Walker {
           ++depth, p = beside(hit, n, -1);
         } else if (--depth > 0) {
           p = beside(hit, n, 1);
-        } else if (eta > 1 && random.next() < fresnel_reflectance(glm::dot(d, n), 1 / eta)) {
-          depth = 1, d = glm::normalize(d - 2 * glm::dot(d, n) * n), p = beside(hit, n, -1);
+        } else if (eta > 1 && random.next() < fresnel_reflectance(dot(d, n), 1 / eta)) {
+          depth = 1, d = normalize(d - 2 * dot(d, n) * n), p = beside(hit, n, -1);
         } else {
           return {WalkEnd::left, beside(hit, n, 1), eta > 1 ? refract(d, n, eta) : d};
         }
@@ -189,7 +189,7 @@ Result<Transfer> bake_subsurface(const Scene& scene, const Tracer& tracer, const
         Hit below = tracer.closest(origin, -up);
         for (int side = 0; side < 8 && (below.triangle == none || !below.front); ++side)
           below = tracer.closest(
-              origin, glm::normalize(frame * Vec3(0.05f * std::cos(float(side)), 0.05f * std::sin(float(side)), -1)));
+              origin, normalize(frame * Vec3(0.05f * std::cos(float(side)), 0.05f * std::sin(float(side)), -1)));
         const size_t first_entry = sum.entries.size();
         if (!buried[r] && below.triangle != none && below.front) {
           const Vec3 start_at = walkers[0].beside(below, walkers[0].normal(below), -1);

@@ -30,7 +30,7 @@ std::array<double, 6> mean_zonal(const Transfer& t, const Receivers& receivers, 
   for (size_t r = 0; r < receivers.count(); ++r) {
     const std::vector<float> row = load_receiver(t, r);
     double y[36];
-    evaluate_sh(6, glm::dvec3(receivers.normals[r]), y);
+    evaluate_sh(6, Vec3d(receivers.normals[r]), y);
     for (int k = 0; k < 36; ++k) {
       const int l = sh_band(k);
       const double value = double(row[size_t(channel) * 36 + size_t(k)]) * y[k];
@@ -42,7 +42,7 @@ std::array<double, 6> mean_zonal(const Transfer& t, const Receivers& receivers, 
 
 std::array<double, 6> zonal_at(double cosine) {
   double y[36];
-  evaluate_sh(6, glm::dvec3(std::sqrt(std::max(0.0, 1 - cosine * cosine)), 0, cosine), y);
+  evaluate_sh(6, Vec3d(std::sqrt(std::max(0.0, 1 - cosine * cosine)), 0, cosine), y);
   return {y[0], y[2], y[6], y[12], y[20], y[30]};
 }
 
@@ -124,16 +124,15 @@ std::array<double, 6> forward_sphere(double sigma_s, double sigma_a, double g, d
   double taken = 0;
   for (int i = 0; i < photons; ++i) {
     const double radius = std::sqrt(uniform()), turn = 2 * std::numbers::pi * uniform();
-    glm::dvec3 p(radius * std::cos(turn), radius * std::sin(turn), std::sqrt(1 - radius * radius)), d(0, 0, -1);
+    Vec3d p(radius * std::cos(turn), radius * std::sin(turn), std::sqrt(1 - radius * radius)), d(0, 0, -1);
     const double cosine = p.z, inside = std::sqrt(1 - (1 - cosine * cosine) / (eta * eta));
     const double rs = (cosine - eta * inside) / (cosine + eta * inside),
                  rp = (eta * cosine - inside) / (eta * cosine + inside);
     if (uniform() < (rs * rs + rp * rp) / 2) continue;
     ++taken;
-    d = glm::normalize(d / eta + (cosine / eta - inside) * p);
+    d = normalize(d / eta + (cosine / eta - inside) * p);
     while (true) {
-      const double along = glm::dot(p, d),
-                   to_wall = -along + std::sqrt(std::max(0.0, along * along + 1 - glm::dot(p, p)));
+      const double along = dot(p, d), to_wall = -along + std::sqrt(std::max(0.0, along * along + 1 - dot(p, p)));
       const double flight = -std::log(1 - uniform()) / (sigma_s + sigma_a);
       if (flight < to_wall) {
         p += flight * d;
@@ -141,14 +140,12 @@ std::array<double, 6> forward_sphere(double sigma_s, double sigma_a, double g, d
         // Henyey and Greenstein's cosine by its inverse, and a spin about d.
         const double q = (1 - g * g) / (1 - g + 2 * g * uniform()), c = (1 + g * g - q * q) / (2 * g),
                      a = 2 * std::numbers::pi * uniform();
-        const glm::dvec3 u =
-            glm::normalize(glm::cross(d, std::abs(d.x) > 0.5 ? glm::dvec3(0, 1, 0) : glm::dvec3(1, 0, 0)));
-        d = glm::normalize(c * d +
-                           std::sqrt(std::max(0.0, 1 - c * c)) * (std::cos(a) * u + std::sin(a) * glm::cross(d, u)));
+        const Vec3d u = normalize(cross(d, std::abs(d.x) > 0.5 ? Vec3d(0, 1, 0) : Vec3d(1, 0, 0)));
+        d = normalize(c * d + std::sqrt(std::max(0.0, 1 - c * c)) * (std::cos(a) * u + std::sin(a) * cross(d, u)));
         continue;
       }
-      p = glm::normalize(p + to_wall * d);
-      const double ci = glm::dot(d, p), s2 = (1 - ci * ci) * eta * eta;
+      p = normalize(p + to_wall * d);
+      const double ci = dot(d, p), s2 = (1 - ci * ci) * eta * eta;
       double reflects = 1;
       if (s2 < 1) {
         const double ct = std::sqrt(1 - s2), a = (eta * ci - ct) / (eta * ci + ct),

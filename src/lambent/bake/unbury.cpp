@@ -86,7 +86,7 @@ size_t move_buried_texels(const Scene& scene, const Tracer& tracer, const Atlas&
         for (const Side& side : texel.sides) {
           const TexelTriangle& own = *map.find(side.triangle, !side.back);
           const ClosestPoint c = closest_point({own.at[0], own.at[1], own.at[2]}, at);
-          const Vec2 away = glm::abs((1 - c.u - c.v) * own.at[0] + c.u * own.at[1] + c.v * own.at[2] - texel.centre);
+          const Vec2 away = abs((1 - c.u - c.v) * own.at[0] + c.u * own.at[1] + c.v * own.at[2] - texel.centre);
           if (std::max(away.x, away.y) < 1 && c.distance < nearest.distance) nearest = c, on = side;
         }
         if (!(nearest.distance < INFINITY)) return false;

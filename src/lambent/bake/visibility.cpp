@@ -48,7 +48,7 @@ struct VisibilityTracer {
       for (int row = 0; row < size; ++row)
         for (int column = 0; column < size; ++column) {
           const size_t texel = cube_texel(size, face, column, row);
-          if (!(glm::dot(n, cube.texels.at(texel)) > 0)) continue;
+          if (!(dot(n, cube.texels.at(texel)) > 0)) continue;
           bool edge = false;
           for (int j = std::max(row - 1, 0); j <= std::min(row + 1, size - 1); ++j)
             for (int i = std::max(column - 1, 0); i <= std::min(column + 1, size - 1); ++i)
@@ -58,8 +58,8 @@ struct VisibilityTracer {
           for (int k = 0; k < fine * fine; ++k) {
             const float u = float(column) + (float(k % fine) + 0.5f) / fine,
                         v = float(row) + (float(k / fine) + 0.5f) / fine;
-            const Vec3 d = glm::normalize(cube_point(face, 2 * u / float(size) - 1, 2 * v / float(size) - 1));
-            if (glm::dot(n, d) > 0) s.x.push_back(d.x), s.y.push_back(d.y), s.z.push_back(d.z);
+            const Vec3 d = normalize(cube_point(face, 2 * u / float(size) - 1, 2 * v / float(size) - 1));
+            if (dot(n, d) > 0) s.x.push_back(d.x), s.y.push_back(d.y), s.z.push_back(d.z);
           }
           s.seen.resize(s.x.size());
           tracer.visible_fan(origin, {s.x.data(), s.y.data(), s.z.data(), s.x.size()}, s.seen.data());

@@ -65,7 +65,7 @@ TEST(BakeVisibility, SharesAreMeansOfAFinerMap) {
       for (int row = 0; row < 16; ++row)
         for (int column = 0; column < 16; ++column) {
           const float u = 2 * (float(column) + 0.5f) / 16 - 1, v = 2 * (float(row) + 0.5f) / 16 - 1;
-          if (glm::dot(n, glm::normalize(cube_point(face, u, v))) < 0.15f)
+          if (dot(n, normalize(cube_point(face, u, v))) < 0.15f)
             continue;  // across the horizon they differ by definition
           int sum = 0;
           for (int k = 0; k < 64; ++k) sum += levels[cube_texel(128, face, column * 8 + k % 8, row * 8 + k / 8)];
@@ -97,7 +97,7 @@ TEST(BakeVisibility, AConvexBodyDoesNotShadowItself) {
     decode_visibility(v, r, levels);
     for (size_t t = 0; t < cube.count(); ++t) {
       // The true faces lie up to half a face's bend above the horizon of the smooth normal.
-      const float cosine = glm::dot(receivers.normals[r], cube.texels.at(t));
+      const float cosine = dot(receivers.normals[r], cube.texels.at(t));
       if (cosine > 0.12f || cosine <= 0) {
         EXPECT_EQ(levels[t], cosine > 0 ? 1 : 0);
       }

@@ -147,9 +147,9 @@ Result<Outgoing> read_outgoing(const GltfChunks& chunks, const json& object, int
   if (!frames) return frames.error();
   for (size_t r = 0; r < receivers; ++r) {
     const Vec3 t = (*frames)[2 * r], n = (*frames)[2 * r + 1];
-    if (!is_finite(t) || !is_finite(n) || glm::dot(t, t) > 2 || glm::dot(n, n) > 2)
+    if (!is_finite(t) || !is_finite(n) || dot(t, t) > 2 || dot(n, n) > 2)
       return Error{where, "a receiver's frame is broken"};
-    o.frames.push_back(Mat3(t, glm::cross(n, t), n));
+    o.frames.push_back(Mat3(t, cross(n, t), n));
   }
   if (o.rows() != rows) return Error{where, "\"rows\" does not fit the outgoing basis"};
   return o;

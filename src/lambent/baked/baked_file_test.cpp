@@ -109,8 +109,7 @@ TEST(BakedFile, MatricesComeBackWithTheirLastReflection) {
     for (size_t r = 0; r < n; ++r) {
       const Vec3 view = normalize_or(o.frames[r] * Vec3(0.3f, -0.5f, 0.6f), Vec3(0));
       evaluate_outgoing(o, r, view, a), evaluate_outgoing(*back->outgoing, r, view, b);
-      for (size_t k = 0; k < a.size(); ++k)
-        EXPECT_LT(glm::length(a[k] - b[k]), mapped ? 2e-3f : 1e-5f);  // maps are halves
+      for (size_t k = 0; k < a.size(); ++k) EXPECT_LT(length(a[k] - b[k]), mapped ? 2e-3f : 1e-5f);  // maps are halves
     }
     const std::vector<uint8_t> bytes = *read_file(file.path);
     for (size_t length = 0; length < bytes.size(); length += 997) {
@@ -525,7 +524,7 @@ TEST(BakedFile, LobesComeBackAndTheirHeadersMayNotLie) {
   Small s = small_bake(1, Precision::half);
   const LightBasis light{2,
                          LobeKind::cosine_power,
-                         {{Vec3(0, 1, 0), 50}, {glm::normalize(Vec3(0.3f, -0.5f, 0.8f)), 77777.5f}},
+                         {{Vec3(0, 1, 0), 50}, {normalize(Vec3(0.3f, -0.5f, 0.8f)), 77777.5f}},
                          {"desk", "roof"}};
   const WritableTransfer w = make_transfer(light, 1, 1, s.receivers.count(), Precision::half);
   const TemporaryFile file("lobes.glb"), lying("lobes_lying.glb");

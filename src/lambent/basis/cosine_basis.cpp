@@ -48,7 +48,7 @@ void evaluate_cosine_basis(const CosineBasis& basis, Vec3 d, std::span<float> ou
   const size_t n = size_t(basis.count());
   LAMBENT_CHECK(out.size() >= n);
   double y[sh_count(max_incident_order)];
-  evaluate_sh(basis.order, glm::dvec3(d), {y, n});
+  evaluate_sh(basis.order, Vec3d(d), {y, n});
   for (size_t j = 0; j < n; ++j) {
     double sum = 0;
     for (size_t k = 0; k <= j; ++k) sum += basis.from_sh[j * n + k] * y[k];

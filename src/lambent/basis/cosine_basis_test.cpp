@@ -18,7 +18,7 @@ TEST(CosineBasis, IsOrthonormalUnderTheCosine) {
   for (int i = 0; i < rings; ++i)
     for (int j = 0; j < spokes; ++j) {
       const double h = (i + 0.5) / rings, r = std::sqrt(1 - h * h), phi = 2 * std::numbers::pi * (j + 0.5) / spokes;
-      evaluate_cosine_basis(basis, Vec3(glm::dvec3(r * std::cos(phi), r * std::sin(phi), h)), z);
+      evaluate_cosine_basis(basis, Vec3(Vec3d(r * std::cos(phi), r * std::sin(phi), h)), z);
       for (size_t a = 0; a < n; ++a)
         for (size_t b = 0; b < n; ++b) gram[a * n + b] += double(z[a]) * z[b] * 2 * h / (rings * spokes);
     }

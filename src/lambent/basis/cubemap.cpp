@@ -18,7 +18,7 @@ Vec3 cube_point(int face, float u, float v) {
 }
 
 CubePlace cube_place(Vec3 d) {
-  const Vec3 a = glm::abs(d);
+  const Vec3 a = abs(d);
   if (a.x >= a.y && a.x >= a.z)
     return d.x > 0 ? CubePlace{0, -d.z / a.x, -d.y / a.x} : CubePlace{1, d.z / a.x, -d.y / a.x};
   if (a.y >= a.z) return d.y > 0 ? CubePlace{2, d.x / a.y, d.z / a.y} : CubePlace{3, d.x / a.y, -d.z / a.y};
@@ -43,7 +43,7 @@ Cube make_cube(int size) {
     for (int block = 0; block < side * side; ++block) {
       const float column = float(block % side * block_side), row = float(block / side * block_side);
       auto direction = [&](float x, float y) {
-        return glm::normalize(cube_point(face, coordinate(column + x), coordinate(row + y)));
+        return normalize(cube_point(face, coordinate(column + x), coordinate(row + y)));
       };
       for (int t = 0; t < block_texels; ++t)
         cube.texels.push(direction(float(t % block_side) + 0.5f, float(t / block_side) + 0.5f));
@@ -56,7 +56,7 @@ Cube make_cube(int size) {
       const Vec3 middle = cube.nodes[0].at(cube.reach.size());
       float least = 1;
       for (float x : {0.0f, 16.0f})
-        for (float y : {0.0f, 16.0f}) least = std::min(least, glm::dot(middle, direction(x, y)));
+        for (float y : {0.0f, 16.0f}) least = std::min(least, dot(middle, direction(x, y)));
       cube.reach.push_back(std::acos(least));
       cube.widest = std::max(cube.widest, cube.reach.back());
     }

@@ -38,7 +38,7 @@ TEST(Cubemap, PlacesAreDirectionsAgain) {
     const Vec3 d = square_to_sphere(random.next2());
     const CubePlace p = cube_place(d);
     EXPECT_LE(std::max(std::abs(p.u), std::abs(p.v)), 1.0f);
-    EXPECT_LT(glm::length(glm::normalize(cube_point(p.face, p.u, p.v)) - d), 1e-6f);
+    EXPECT_LT(length(normalize(cube_point(p.face, p.u, p.v)) - d), 1e-6f);
   }
 }
 
@@ -56,7 +56,7 @@ TEST(Cubemap, BlocksHoldTheirTexels) {
           EXPECT_EQ(p.face, face);
           EXPECT_NEAR((p.u + 1) / 2 * float(size), float(column) + 0.5f, 1e-3f);
           EXPECT_NEAR((p.v + 1) / 2 * float(size), float(row) + 0.5f, 1e-3f);
-          EXPECT_LE(std::acos(glm::dot(cube.texels.at(t), cube.nodes[0].at(t / block_texels))),
+          EXPECT_LE(std::acos(dot(cube.texels.at(t), cube.nodes[0].at(t / block_texels))),
                     cube.reach[t / block_texels]);
         }
     for (int n : seen) EXPECT_EQ(n, 1);

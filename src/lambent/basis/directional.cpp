@@ -9,7 +9,7 @@
 namespace lambent {
 
 bool is_lobe(LobeKind kind, const Lobe& lobe) {
-  return std::abs(glm::length(lobe.axis) - 1) < 1e-4f && lobe.sharpness >= min_sharpness(kind) &&
+  return std::abs(length(lobe.axis) - 1) < 1e-4f && lobe.sharpness >= min_sharpness(kind) &&
          lobe.sharpness <= max_sharpness;
 }
 
@@ -30,7 +30,7 @@ namespace {
 int moments_needed(float sharpest) { return 640 + int(6 * std::sqrt(sharpest)); }
 
 // A float's rounding of a unit axis would show in sharp lobes.
-glm::dvec3 axis_of(const Lobe& lobe) { return glm::normalize(glm::dvec3(lobe.axis)); }
+Vec3d axis_of(const Lobe& lobe) { return normalize(Vec3d(lobe.axis)); }
 
 // I_l of the unscaled lobe, l < count.
 std::vector<double> moments(LobeKind kind, double s, int count) {
@@ -61,15 +61,14 @@ std::vector<double> moments(LobeKind kind, double s, int count) {
 // The integral of the product of two unscaled lobes.
 double lobe_product(LobeKind kind, const Lobe& p, const Lobe& q, std::span<const double> Ip,
                     std::span<const double> Iq) {
-  const glm::dvec3 a = axis_of(p), b = axis_of(q);
+  const Vec3d a = axis_of(p), b = axis_of(q);
   if (kind == LobeKind::von_mises_fisher) {
     // exp((s a + s' b).d - s - s') is a lobe about the sum.
-    const double sum = double(p.sharpness) + q.sharpness,
-                 k = glm::length(double(p.sharpness) * a + double(q.sharpness) * b);
+    const double sum = double(p.sharpness) + q.sharpness, k = length(double(p.sharpness) * a + double(q.sharpness) * b);
     return k < 1e-6 ? 4 * std::numbers::pi * std::exp(-sum)
                     : 2 * std::numbers::pi * std::exp(k - sum) * -std::expm1(-2 * k) / k;
   }
-  const double x = std::clamp(glm::dot(a, b), -1.0, 1.0);
+  const double x = std::clamp(dot(a, b), -1.0, 1.0);
   double p0 = 1, p1 = x, result = Ip[0] * Iq[0] + 3 * Ip[1] * Iq[1] * x;
   for (size_t l = 2; l < Ip.size(); ++l) {
     const double k = double(l), next = ((2 * k - 1) * x * p1 - (k - 1) * p0) / k;
@@ -182,13 +181,12 @@ DirectionalBasis make_directional_basis(int sh_order, LobeKind kind, std::vector
   return basis;
 }
 
-void evaluate_directional(const DirectionalBasis& basis, glm::dvec3 d, std::span<double> out) {
+void evaluate_directional(const DirectionalBasis& basis, Vec3d d, std::span<double> out) {
   LAMBENT_CHECK(out.size() >= basis.count());
   size_t i = size_t(sh_count(basis.sh_order));
   if (basis.sh_order > 0) evaluate_sh(basis.sh_order, d, out);
   for (const Lobe& lobe : basis.lobes)
-    out[i++] = lobe_scale(basis.kind, lobe.sharpness) *
-               lobe_value(basis.kind, lobe.sharpness, glm::dot(axis_of(lobe), d));
+    out[i++] = lobe_scale(basis.kind, lobe.sharpness) * lobe_value(basis.kind, lobe.sharpness, dot(axis_of(lobe), d));
 }
 
 std::vector<double> apply_directional_dual(const DirectionalBasis& basis, std::span<const double> integrals) {
@@ -200,7 +198,7 @@ std::vector<double> apply_directional_dual(const DirectionalBasis& basis, std::s
   return result;
 }
 
-void evaluate_directional_dual(const DirectionalBasis& basis, glm::dvec3 d, std::span<double> out) {
+void evaluate_directional_dual(const DirectionalBasis& basis, Vec3d d, std::span<double> out) {
   std::vector<double> values(basis.count());
   evaluate_directional(basis, d, values);
   const std::vector<double> dual = apply_directional_dual(basis, values);
@@ -208,7 +206,7 @@ void evaluate_directional_dual(const DirectionalBasis& basis, glm::dvec3 d, std:
   std::copy(dual.begin(), dual.end(), out.begin());
 }
 
-std::vector<double> project_directional(const DirectionalBasis& basis, const std::function<double(glm::dvec3)>& f,
+std::vector<double> project_directional(const DirectionalBasis& basis, const std::function<double(Vec3d)>& f,
                                         int exact_order) {
   std::vector<double> integrals(basis.count()), values(basis.count());
   for (const DirectionNode& node : direction_quadrature(std::max(basis.sh_order, exact_order))) {
@@ -219,7 +217,7 @@ std::vector<double> project_directional(const DirectionalBasis& basis, const std
   return apply_directional_dual(basis, integrals);
 }
 
-double reconstruct_directional(const DirectionalBasis& basis, std::span<const double> coefficients, glm::dvec3 d) {
+double reconstruct_directional(const DirectionalBasis& basis, std::span<const double> coefficients, Vec3d d) {
   LAMBENT_CHECK(coefficients.size() == basis.count());
   std::vector<double> values(basis.count());
   evaluate_directional(basis, d, values);

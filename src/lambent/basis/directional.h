@@ -59,15 +59,15 @@ struct DirectionalBasis {
 DirectionalBasis make_directional_basis(int sh_order, LobeKind kind, std::vector<Lobe> lobes, double cutoff = 1e-10);
 
 // The functions and their duals at the unit direction d; out has count() values.
-void evaluate_directional(const DirectionalBasis& basis, glm::dvec3 d, std::span<double> out);
-void evaluate_directional_dual(const DirectionalBasis& basis, glm::dvec3 d, std::span<double> out);
+void evaluate_directional(const DirectionalBasis& basis, Vec3d d, std::span<double> out);
+void evaluate_directional_dual(const DirectionalBasis& basis, Vec3d d, std::span<double> out);
 
 // The least-squares coefficients of f, by quadrature of exact_order nodes in z and twice as many about it.
-std::vector<double> project_directional(const DirectionalBasis& basis, const std::function<double(glm::dvec3)>& f,
+std::vector<double> project_directional(const DirectionalBasis& basis, const std::function<double(Vec3d)>& f,
                                         int exact_order = 64);
 // The same from the integrals of f b_i.
 std::vector<double> apply_directional_dual(const DirectionalBasis& basis, std::span<const double> integrals);
-double reconstruct_directional(const DirectionalBasis& basis, std::span<const double> coefficients, glm::dvec3 d);
+double reconstruct_directional(const DirectionalBasis& basis, std::span<const double> coefficients, Vec3d d);
 
 // The part of the function that spherical harmonics of `order` can hold: order^2 coefficients, in closed form
 // (Funk-Hecke). With it lamps light what was baked for harmonics.

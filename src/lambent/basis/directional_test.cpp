@@ -34,9 +34,9 @@ TEST(Directional, DirectionsAreSpreadEvenly) {
   for (size_t i = 0; i < directions.size(); ++i) {
     mean += directions[i] / 200.0f;
     for (int c = 0; c < 3; ++c) second[c] += double(directions[i][c]) * directions[i][c] / 200;
-    for (size_t j = 0; j < i; ++j) nearest = std::min(nearest, double(glm::distance(directions[i], directions[j])));
+    for (size_t j = 0; j < i; ++j) nearest = std::min(nearest, double(distance(directions[i], directions[j])));
   }
-  EXPECT_LT(glm::length(mean), 0.01f);
+  EXPECT_LT(length(mean), 0.01f);
   for (double s : second) EXPECT_NEAR(s, 1.0 / 3, 0.005);
   EXPECT_GT(nearest, 0.75 * std::sqrt(4 * std::numbers::pi / 200));  // against the side of a square of equal share
 }
@@ -95,22 +95,22 @@ TEST(Directional, ReproducesTheSpan) {
     std::vector<double> c(basis.count());
     for (double& x : c) x = 2 * random.next() - 1;
     const auto again = project_directional(
-        basis, [&](glm::dvec3 d) { return reconstruct_directional(basis, c, d); }, 96);
+        basis, [&](Vec3d d) { return reconstruct_directional(basis, c, d); }, 96);
     for (size_t i = 0; i < c.size(); ++i) EXPECT_NEAR(again[i], c[i], tolerance) << i;
   }
 }
 
 // Harmonics alone blur a lamp; with the lamp in the basis the sky stays as good and the lamp becomes exact.
 TEST(Directional, HarmonicsAndLampsHoldASkyWithALamp) {
-  const Vec3 lamp = glm::normalize(Vec3(0.3f, -0.5f, 0.8f));
+  const Vec3 lamp = normalize(Vec3(0.3f, -0.5f, 0.8f));
   const auto mixed = make_directional_basis(4, LobeKind::von_mises_fisher, {{lamp, 200}});
-  auto sky = [&](glm::dvec3 d) {
-    return 1 + 0.5 * d.z - 0.3 * d.x * d.y + 30 * std::exp(200 * (glm::dot(glm::normalize(glm::dvec3(lamp)), d) - 1));
+  auto sky = [&](Vec3d d) {
+    return 1 + 0.5 * d.z - 0.3 * d.x * d.y + 30 * std::exp(200 * (dot(normalize(Vec3d(lamp)), d) - 1));
   };
   const auto c = project_directional(mixed, sky), harmonics = project_sh(4, sky);
   double worst = 0, worst_harmonics = 0;
   for (Vec3 v : even_directions(500)) {
-    const glm::dvec3 d = glm::normalize(glm::dvec3(v));
+    const Vec3d d = normalize(Vec3d(v));
     double y[16], sum = 0;
     evaluate_sh(4, d, y);
     for (size_t i = 0; i < 16; ++i) sum += harmonics[i] * y[i];
@@ -128,10 +128,10 @@ TEST(Directional, EqualLobesShareTheirCoefficient) {
   const Lobe lobe{Vec3(0, 1, 0), 10};
   const auto basis = make_directional_basis(0, LobeKind::von_mises_fisher, {lobe, lobe, {Vec3(1, 0, 0), 10}});
   EXPECT_EQ(basis.rank, 2);
-  const auto c = project_directional(basis, [&](glm::dvec3 d) { return std::exp(10 * (d.y - 1)); });
+  const auto c = project_directional(basis, [&](Vec3d d) { return std::exp(10 * (d.y - 1)); });
   EXPECT_NEAR(c[0], c[1], tolerance);
   EXPECT_NEAR(c[2], 0, tolerance);
-  EXPECT_NEAR(reconstruct_directional(basis, c, glm::dvec3(0, 1, 0)), 1, 1e-6);
+  EXPECT_NEAR(reconstruct_directional(basis, c, Vec3d(0, 1, 0)), 1, 1e-6);
 }
 
 TEST(Directional, SamplesHaveTheDensityOfTheLobe) {
@@ -145,8 +145,8 @@ TEST(Directional, SamplesHaveTheDensityOfTheLobe) {
       std::vector<double> mean(36), y(36);
       for (uint32_t i = 0; i < 4096; ++i) {
         const Vec3 d = sample_lobe(kind, s, sobol_owen(i, 7));
-        ASSERT_NEAR(glm::length(d), 1, 1e-6);
-        evaluate_sh(6, glm::normalize(glm::dvec3(d)), y);
+        ASSERT_NEAR(length(d), 1, 1e-6);
+        evaluate_sh(6, normalize(Vec3d(d)), y);
         for (size_t k = 0; k < 36; ++k) mean[k] += y[k] / 4096;
       }
       for (size_t k = 0; k < 36; ++k)
@@ -162,13 +162,12 @@ TEST(Directional, SamplesHaveTheDensityOfTheLobe) {
 }
 
 TEST(Directional, LobesMatchQuadrature) {
-  const Vec3 a = glm::normalize(Vec3(0.2f, -0.7f, 0.4f));
+  const Vec3 a = normalize(Vec3(0.2f, -0.7f, 0.4f));
   for (LobeKind kind : {LobeKind::cosine_power, LobeKind::von_mises_fisher})
     for (float s : {2.0f, 17.0f, 60.0f}) {
       double integral = 0, square = 0;
       for (const DirectionNode& node : direction_quadrature(128)) {
-        const double value = lobe_scale(kind, s) *
-                             lobe_value(kind, s, glm::dot(glm::normalize(glm::dvec3(a)), node.direction));
+        const double value = lobe_scale(kind, s) * lobe_value(kind, s, dot(normalize(Vec3d(a)), node.direction));
         integral += node.weight * value, square += node.weight * value * value;
       }
       constexpr double edge = 1e-5;  // of a squared cosine at 90 degrees, where its second derivative jumps
@@ -177,11 +176,11 @@ TEST(Directional, LobesMatchQuadrature) {
       const auto series = lobe_irradiance(kind, s);
       for (double x : {-0.97, -0.4, -0.05, 0.0, 0.1, 0.6, 1.0}) {
         // The zone above the plane alone, so that the cosine's kink is no node's business.
-        const glm::dvec3 axis(std::sqrt(1 - x * x) * 0.6, std::sqrt(1 - x * x) * 0.8, x);
+        const Vec3d axis(std::sqrt(1 - x * x) * 0.6, std::sqrt(1 - x * x) * 0.8, x);
         double irradiance = 0;
         for (const DirectionNode& node : direction_quadrature(128, 0, 1))
           irradiance += node.weight * node.direction.z * lobe_scale(kind, s) *
-                        lobe_value(kind, s, glm::dot(axis, node.direction));
+                        lobe_value(kind, s, dot(axis, node.direction));
         EXPECT_NEAR(evaluate_legendre(series, x), irradiance, edge) << int(kind) << " " << s << " " << x;
       }
     }
@@ -194,7 +193,7 @@ TEST(Directional, LobesMatchQuadrature) {
 
 TEST(Directional, OverlapIsTheGramMatrix) {
   for (LobeKind kind : {LobeKind::cosine_power, LobeKind::von_mises_fisher}) {
-    const Lobe a{Vec3(0, 0, 1), 30}, b{glm::normalize(Vec3(0.1f, 0.2f, 1)), 50};
+    const Lobe a{Vec3(0, 0, 1), 30}, b{normalize(Vec3(0.1f, 0.2f, 1)), 50};
     EXPECT_NEAR(lobe_overlap(kind, a, b), make_directional_basis(0, kind, {a, b}).gram[1], 1e-12);
     EXPECT_NEAR(lobe_overlap(kind, a, a), 1, 1e-9);
   }

@@ -13,19 +13,19 @@ namespace {
 // The direction at 2z - 1: its radius sqrt(1 - (2z-1)^2) over sqrt(1 - z^2) is 2 sqrt(z / (1 + z)), which the pole does
 // not disturb.
 template <class T>
-void evaluate(int order, glm::vec<3, T> d, std::span<T> out) {
+void evaluate(int order, Vector<T, 3> d, std::span<T> out) {
   LAMBENT_CHECK(order >= 1 && out.size() >= size_t(sh_count(order)));
   if (!(d.z >= 0)) {
     std::fill(out.begin(), out.begin() + sh_count(order), T(0));
     return;
   }
   const T scale = 2 * std::sqrt(d.z / (1 + d.z));
-  evaluate_sh(order, glm::vec<3, T>(scale * d.x, scale * d.y, 2 * d.z - 1), out);
+  evaluate_sh(order, Vector<T, 3>(scale * d.x, scale * d.y, 2 * d.z - 1), out);
   for (int i = 0; i < sh_count(order); ++i) out[size_t(i)] *= std::numbers::sqrt2_v<T>;
 }
 
 template <class Evaluate>
-std::vector<double> project(int order, const std::function<double(glm::dvec3)>& f, int exact_order, Evaluate evaluate) {
+std::vector<double> project(int order, const std::function<double(Vec3d)>& f, int exact_order, Evaluate evaluate) {
   std::vector<double> result(size_t(sh_count(order))), y(result.size());
   for (const DirectionNode& node : direction_quadrature(std::max(order, exact_order), 0, 1)) {
     evaluate(order, node.direction, y);
@@ -38,10 +38,10 @@ std::vector<double> project(int order, const std::function<double(glm::dvec3)>& 
 }  // namespace
 
 void evaluate_hsh(int order, Vec3 d, std::span<float> out) { evaluate<float>(order, d, out); }
-void evaluate_hsh(int order, glm::dvec3 d, std::span<double> out) { evaluate<double>(order, d, out); }
+void evaluate_hsh(int order, Vec3d d, std::span<double> out) { evaluate<double>(order, d, out); }
 
-std::vector<double> project_hsh(int order, const std::function<double(glm::dvec3)>& f, int exact_order) {
-  return project(order, f, exact_order, [](int n, glm::dvec3 d, std::span<double> y) { evaluate_hsh(n, d, y); });
+std::vector<double> project_hsh(int order, const std::function<double(Vec3d)>& f, int exact_order) {
+  return project(order, f, exact_order, [](int n, Vec3d d, std::span<double> y) { evaluate_hsh(n, d, y); });
 }
 
 float reconstruct_hsh(std::span<const float> c, Vec3 d) {
@@ -52,8 +52,8 @@ float reconstruct_hsh(std::span<const float> c, Vec3 d) {
   return sum;
 }
 
-std::vector<double> project_sh_hemisphere(int order, const std::function<double(glm::dvec3)>& f, int exact_order) {
-  return project(order, f, exact_order, [](int n, glm::dvec3 d, std::span<double> y) { evaluate_sh(n, d, y); });
+std::vector<double> project_sh_hemisphere(int order, const std::function<double(Vec3d)>& f, int exact_order) {
+  return project(order, f, exact_order, [](int n, Vec3d d, std::span<double> y) { evaluate_sh(n, d, y); });
 }
 
 HemisphereFit make_hemisphere_fit(int order, double cutoff) {
@@ -80,7 +80,7 @@ std::vector<double> fit_hemisphere(const HemisphereFit& fit, std::span<const dou
   return result;
 }
 
-std::vector<double> project_hemisphere(const HemisphereFit& fit, const std::function<double(glm::dvec3)>& f,
+std::vector<double> project_hemisphere(const HemisphereFit& fit, const std::function<double(Vec3d)>& f,
                                        int exact_order) {
   return fit_hemisphere(fit, project_sh_hemisphere(fit.order, f, exact_order));
 }

@@ -9,10 +9,10 @@ namespace lambent {
 // and not closed under rotations except about z. Zero below. They shrink like sqrt z towards the horizon where m is not
 // 0. Source: P. Gautron et al. 2004, "A novel hemispherical basis for accurate and efficient rendering".
 void evaluate_hsh(int order, Vec3 d, std::span<float> out);
-void evaluate_hsh(int order, glm::dvec3 d, std::span<double> out);
+void evaluate_hsh(int order, Vec3d d, std::span<double> out);
 // Coefficients of f by quadrature of exact_order nodes in z and twice as many about it; f is called above the horizon
 // only.
-std::vector<double> project_hsh(int order, const std::function<double(glm::dvec3)>& f, int exact_order = 64);
+std::vector<double> project_hsh(int order, const std::function<double(Vec3d)>& f, int exact_order = 64);
 float reconstruct_hsh(std::span<const float> coefficients, Vec3 d);
 
 // Spherical harmonics that need to fit on the hemisphere only, by least squares. Restricted to it they are neither
@@ -29,9 +29,9 @@ struct HemisphereFit {
 HemisphereFit make_hemisphere_fit(int order, double cutoff = 1e-6);
 // From the integrals b, which are also the coefficients of f extended by zero.
 std::vector<double> fit_hemisphere(const HemisphereFit& fit, std::span<const double> integrals);
-std::vector<double> project_hemisphere(const HemisphereFit& fit, const std::function<double(glm::dvec3)>& f,
+std::vector<double> project_hemisphere(const HemisphereFit& fit, const std::function<double(Vec3d)>& f,
                                        int exact_order = 64);
 // The integrals b alone.
-std::vector<double> project_sh_hemisphere(int order, const std::function<double(glm::dvec3)>& f, int exact_order = 64);
+std::vector<double> project_sh_hemisphere(int order, const std::function<double(Vec3d)>& f, int exact_order = 64);
 
 }  // namespace lambent

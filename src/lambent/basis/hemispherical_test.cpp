@@ -13,11 +13,9 @@ constexpr double double_rounding = 1e-11;
 constexpr double float_rounding = 2e-5;
 
 // Smooth, without symmetry, and far from zero at the horizon.
-double asymmetric(glm::dvec3 d) {
-  return 1.2 + std::exp(2 * glm::dot(d, glm::normalize(glm::dvec3(0.8, -0.3, 0.4)))) - 0.5 * d.y;
-}
+double asymmetric(Vec3d d) { return 1.2 + std::exp(2 * dot(d, normalize(Vec3d(0.8, -0.3, 0.4)))) - 0.5 * d.y; }
 
-double value(std::span<const double> c, glm::dvec3 d, bool hemispherical) {
+double value(std::span<const double> c, Vec3d d, bool hemispherical) {
   std::vector<double> y(c.size());
   const int order = sh_order(c.size());
   hemispherical ? evaluate_hsh(order, d, y) : evaluate_sh(order, d, y);
@@ -27,7 +25,7 @@ double value(std::span<const double> c, glm::dvec3 d, bool hemispherical) {
 }
 
 // Root mean square over the hemisphere of the error of a reconstruction.
-double error(std::span<const double> c, const std::function<double(glm::dvec3)>& f, bool hemispherical) {
+double error(std::span<const double> c, const std::function<double(Vec3d)>& f, bool hemispherical) {
   double sum = 0;
   for (const DirectionNode& node : direction_quadrature(40, 0, 1)) {
     const double e = value(c, node.direction, hemispherical) - f(node.direction);
@@ -50,7 +48,7 @@ TEST(Hemispherical, HarmonicsAreOrthonormalOnTheHemisphere) {
 }
 
 TEST(Hemispherical, LowHarmonicsAreTheKnownFunctions) {
-  const glm::dvec3 d = glm::normalize(glm::dvec3(0.4, -0.7, 0.5));
+  const Vec3d d = normalize(Vec3d(0.4, -0.7, 0.5));
   double y[4];
   evaluate_hsh(2, d, y);
   const double pi = std::numbers::pi, phi = std::atan2(d.y, d.x), r = std::sqrt(d.z * (1 - d.z));
@@ -58,7 +56,7 @@ TEST(Hemispherical, LowHarmonicsAreTheKnownFunctions) {
   EXPECT_NEAR(y[1], -std::sqrt(6 / pi) * r * std::sin(phi), 1e-14);
   EXPECT_NEAR(y[2], std::sqrt(3 / (2 * pi)) * (2 * d.z - 1), 1e-14);
   EXPECT_NEAR(y[3], -std::sqrt(6 / pi) * r * std::cos(phi), 1e-14);
-  evaluate_hsh(2, glm::dvec3(d.x, d.y, -d.z), y);
+  evaluate_hsh(2, Vec3d(d.x, d.y, -d.z), y);
   for (double v : y) EXPECT_EQ(v, 0) << "below the horizon";
 }
 
@@ -68,16 +66,16 @@ TEST(Hemispherical, HarmonicsReproduceTheirSpan) {
   std::vector<double> c(36);
   for (double& x : c) x = 2 * random.next() - 1;
   const auto again = project_hsh(
-      order, [&](glm::dvec3 d) { return value(c, d, true); }, 2 * order);
+      order, [&](Vec3d d) { return value(c, d, true); }, 2 * order);
   std::vector<float> single(again.begin(), again.end());
   for (size_t i = 0; i < c.size(); ++i) EXPECT_NEAR(again[i], c[i], double_rounding) << i;
-  const Vec3 d = glm::normalize(Vec3(-0.2f, 0.5f, 0.9f));
+  const Vec3 d = normalize(Vec3(-0.2f, 0.5f, 0.9f));
   EXPECT_NEAR(reconstruct_hsh(single, d), value(c, d, true), float_rounding);
   EXPECT_EQ(reconstruct_hsh(single, -d), 0);
 }
 
 TEST(Hemispherical, HarmonicsConvergeToAFunctionThatIsZeroAtTheHorizon) {
-  auto f = [](glm::dvec3 d) { return d.z * std::exp(d.x - 0.5 * d.y); };
+  auto f = [](Vec3d d) { return d.z * std::exp(d.x - 0.5 * d.y); };
   double before = 1;
   for (int order : {2, 4, 8}) {
     const double e = error(project_hsh(order, f), f, true);
@@ -105,7 +103,7 @@ TEST(Hemispherical, LeastSquaresReproducesBandLimitedFunctions) {
   Random random(8);
   std::vector<double> c(25);
   for (double& x : c) x = 2 * random.next() - 1;
-  const auto f = [&](glm::dvec3 d) { return value(c, d, false); };
+  const auto f = [&](Vec3d d) { return value(c, d, false); };
   const HemisphereFit exact = make_hemisphere_fit(order, 1e-13);
   EXPECT_EQ(exact.rank, 25);
   const auto again = project_hemisphere(exact, f, 2 * order);

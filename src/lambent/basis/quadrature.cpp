@@ -36,7 +36,7 @@ std::vector<DirectionNode> direction_quadrature(int exact_order, double z_from, 
     const double r = std::sqrt(std::max(0.0, 1 - z * z));
     for (int j = 0; j < turns; ++j) {
       const double phi = 2 * std::numbers::pi * (j + 0.5) / turns;
-      nodes.push_back({glm::dvec3(r * std::cos(phi), r * std::sin(phi), z), weight * 2 * std::numbers::pi / turns});
+      nodes.push_back({Vec3d(r * std::cos(phi), r * std::sin(phi), z), weight * 2 * std::numbers::pi / turns});
     }
   }
   return nodes;

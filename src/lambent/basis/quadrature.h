@@ -13,7 +13,7 @@ struct QuadratureNode {
 std::vector<QuadratureNode> gauss_legendre(int count, double from = -1, double to = 1);
 
 struct DirectionNode {
-  glm::dvec3 direction;
+  Vec3d direction;
   double weight;  // solid angle, sr
 };
 // A product rule on the zone z_from <= z <= z_to (Gauss in z, even spacing about it), exact there for products of two

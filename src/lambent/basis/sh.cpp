@@ -53,9 +53,9 @@ const ShTables& sh_tables() {
 }
 
 void evaluate_sh(int order, Vec3 d, std::span<float> out) { evaluate<float>(order, d.x, d.y, d.z, out); }
-void evaluate_sh(int order, glm::dvec3 d, std::span<double> out) { evaluate<double>(order, d.x, d.y, d.z, out); }
+void evaluate_sh(int order, Vec3d d, std::span<double> out) { evaluate<double>(order, d.x, d.y, d.z, out); }
 
-std::vector<double> project_sh(int order, const std::function<double(glm::dvec3)>& f, int exact_order) {
+std::vector<double> project_sh(int order, const std::function<double(Vec3d)>& f, int exact_order) {
   const int nodes = std::max(order, exact_order) + 1, turns = 2 * nodes;
   std::vector<double> result(size_t(sh_count(order))), y(result.size());
   for (int i = 0; i < nodes; ++i) {
@@ -75,7 +75,7 @@ std::vector<double> project_sh(int order, const std::function<double(glm::dvec3)
     double weight = 2 / ((1 - z * z) * slope * slope) * (2 * std::numbers::pi / turns), r = std::sqrt(1 - z * z);
     for (int j = 0; j < turns; ++j) {
       double phi = 2 * std::numbers::pi * (j + 0.5) / turns;
-      glm::dvec3 d(r * std::cos(phi), r * std::sin(phi), z);
+      Vec3d d(r * std::cos(phi), r * std::sin(phi), z);
       evaluate_sh(order, d, y);
       double value = f(d) * weight;
       for (size_t k = 0; k < y.size(); ++k) result[k] += value * y[k];

@@ -23,11 +23,11 @@ constexpr int sh_band(int index) {
 
 // Values of the first order^2 harmonics at the unit direction d, into out[0 .. order^2); of none for order 0.
 void evaluate_sh(int order, Vec3 d, std::span<float> out);
-void evaluate_sh(int order, glm::dvec3 d, std::span<double> out);
+void evaluate_sh(int order, Vec3d d, std::span<double> out);
 
 // Coefficients of a function of direction by quadrature that is exact for functions within `exact_order` bands
 // (Gauss-Legendre in z, even spacing about it).
-std::vector<double> project_sh(int order, const std::function<double(glm::dvec3)>& f, int exact_order = 64);
+std::vector<double> project_sh(int order, const std::function<double(Vec3d)>& f, int exact_order = 64);
 
 // Value at d of the function with these coefficients (as many as a square number).
 float reconstruct_sh(std::span<const float> coefficients, Vec3 d);

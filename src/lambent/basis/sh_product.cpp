@@ -130,7 +130,7 @@ std::vector<double> sh_product_matrix(const TriplingTensor& t, std::span<const d
   return T;
 }
 
-std::vector<double> project_sh_pair(int order_in, int order_out, const std::function<double(glm::dvec3, glm::dvec3)>& T,
+std::vector<double> project_sh_pair(int order_in, int order_out, const std::function<double(Vec3d, Vec3d)>& T,
                                     int exact_order) {
   const size_t rows = size_t(sh_count(order_in)), columns = size_t(sh_count(order_out));
   const std::vector<DirectionNode> nodes = direction_quadrature(std::max({order_in, order_out, exact_order}));

@@ -42,7 +42,7 @@ std::vector<double> sh_product_matrix(const TriplingTensor& tensor, std::span<co
 
 // T_mn = the integral of T(wi, wo) y_m(wi) y_n(wo) over both spheres, order_in^2 x order_out^2, row-major: the matrix
 // of a two-direction function such as a reflectance. Exact for functions within `exact_order` bands in each direction.
-std::vector<double> project_sh_pair(int order_in, int order_out,
-                                    const std::function<double(glm::dvec3 wi, glm::dvec3 wo)>& T, int exact_order = 32);
+std::vector<double> project_sh_pair(int order_in, int order_out, const std::function<double(Vec3d wi, Vec3d wo)>& T,
+                                    int exact_order = 32);
 
 }  // namespace lambent

@@ -170,7 +170,7 @@ ProductGrid make_product_grid(int a, int b, int c) {
   std::array<double, sh_count(max_sh_order)> y;
   for (size_t i = 0; i < rule.size(); ++i) {
     const double z = rule[i].x, weight = rule[i].weight * 2 * std::numbers::pi / double(4 * g.quarter);
-    evaluate_sh(std::max(table, c), glm::dvec3(std::sqrt(1 - z * z), 0, z), y);
+    evaluate_sh(std::max(table, c), Vec3d(std::sqrt(1 - z * z), 0, z), y);
     size_t row = 0;
     for (int m = 0; m < table; ++m)
       for (int l = m; l < table; ++l) g.legendre[row++ * g.nodes + i] = float(y[size_t(sh_index(l, m))]);
@@ -230,8 +230,7 @@ void multiply_quadratic(const float* f, const float* g, float* out) {
               rz = a.xy * b.xy;
   const Vec3 squares = a.vector * b.vector + k * Vec3(qx + ry + rz, qy + rx + rz, qz + rx + ry);
   const float contraction = qx + qy + qz + 2 * (rx + ry + rz);
-  const float constant = a.constant * b.constant + (1.0f / 3) * glm::dot(a.vector, b.vector) +
-                         (2.0f / 15) * contraction;
+  const float constant = a.constant * b.constant + (1.0f / 3) * dot(a.vector, b.vector) + (2.0f / 15) * contraction;
   const Vec3 vector = a.constant * b.vector + b.constant * a.vector + 0.4f * (times(a, b.vector) + times(b, a.vector));
   const float third = (1.0f / 3) * (squares.x + squares.y + squares.z);
   const float xx = a.constant * b.xx + b.constant * a.xx + squares.x - third;

@@ -21,7 +21,7 @@ std::vector<T> random_coefficients(int order, uint64_t seed) {
   return c;
 }
 
-double value_at(std::span<const double> c, glm::dvec3 d) {
+double value_at(std::span<const double> c, Vec3d d) {
   std::vector<double> y(c.size());
   evaluate_sh(sh_order(c.size()), d, y);
   double sum = 0;
@@ -87,7 +87,7 @@ TEST(ShProduct, TensorIsRightAtOrderTwelve) {
   // sum over i of y_i(d) y_i(e) = K(d.e), so the sum of C^2 is the double integral of K^3 = 8 pi^2 int K(z)^3 dz.
   for (auto [z, w] : gauss_legendre(24)) {
     double y[sh_count(12)], kernel = 0;
-    evaluate_sh(12, glm::dvec3(std::sqrt(1 - z * z), 0, z), y);
+    evaluate_sh(12, Vec3d(std::sqrt(1 - z * z), 0, z), y);
     for (int l = 0; l < 12; ++l) kernel += std::sqrt((2 * l + 1) / (4 * std::numbers::pi)) * y[sh_index(l, 0)];
     exact += 8 * std::numbers::pi * std::numbers::pi * w * kernel * kernel * kernel;
   }
@@ -103,7 +103,7 @@ TEST(ShProduct, IsExactWithAllItsBandsAndProjectsWithFewer) {
     multiply_sh_plain(make_tripling_tensor(na, nb, full), a, b, product);
     Random random(9);
     for (int i = 0; i < 20; ++i) {
-      const glm::dvec3 d = glm::normalize(glm::dvec3(random.next() - 0.4, 0.7 - random.next(), random.next() - 0.5));
+      const Vec3d d = normalize(Vec3d(random.next() - 0.4, 0.7 - random.next(), random.next() - 0.5));
       EXPECT_NEAR(value_at(product, d), value_at(a, d) * value_at(b, d), coefficient_tolerance) << na << " " << nb;
     }
     std::vector<double> fewer(size_t(sh_count(full - 1)));
@@ -150,7 +150,7 @@ TEST(ShProduct, FastWorksInPlaceOnEverySimdTarget) {
 
 // A visibility with sharp edges and no symmetry. Sums over the nodes stand for integrals throughout, so that what
 // follows holds to rounding: y_i y_j is a sum of the first 2n - 1 bands at each node.
-double visibility(glm::dvec3 d) { return d.z > 0.2 * d.x && (d.y < 0.4 || d.x > 0.3) ? 1 : 0; }
+double visibility(Vec3d d) { return d.z > 0.2 * d.x && (d.y < 0.4 || d.x > 0.3) ? 1 : 0; }
 
 TEST(ShProduct, MatrixIsExactWithTwiceTheBands) {
   const int n = 4, nodes = 24;
@@ -222,7 +222,7 @@ TEST(ShProduct, DoubleProjectionFindsTheMatrixOfABandLimitedFunction) {
   const int in = 3, out = 4;
   std::vector<double> M(9 * 16);
   for (size_t i = 0; i < M.size(); ++i) M[i] = std::sin(double(i * i + 1));
-  auto T = [&](glm::dvec3 wi, glm::dvec3 wo) {
+  auto T = [&](Vec3d wi, Vec3d wo) {
     double yi[9], yo[16], sum = 0;
     evaluate_sh(in, wi, yi), evaluate_sh(out, wo, yo);
     for (size_t m = 0; m < 9; ++m)
@@ -233,7 +233,7 @@ TEST(ShProduct, DoubleProjectionFindsTheMatrixOfABandLimitedFunction) {
   for (size_t i = 0; i < M.size(); ++i) EXPECT_NEAR(again[i], M[i], coefficient_tolerance) << i;
   // A function of the angle between the two directions is diagonal with one value a band (Funk-Hecke): 3/4 + z^2/4
   // here.
-  auto zonal_T = [](glm::dvec3 a, glm::dvec3 b) { return 0.75 + 0.25 * glm::dot(a, b) * glm::dot(a, b); };
+  auto zonal_T = [](Vec3d a, Vec3d b) { return 0.75 + 0.25 * dot(a, b) * dot(a, b); };
   const std::vector<double> zonal = project_sh_pair(3, 3, zonal_T, 5);
   const double band[3] = {10 * std::numbers::pi / 3, 0, 2 * std::numbers::pi / 15};
   for (int m = 0; m < 9; ++m)

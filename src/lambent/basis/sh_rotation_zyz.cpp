@@ -153,9 +153,9 @@ const std::vector<double>& quarter_turn_blocks() {
     constexpr size_t count = sh_count(max_sh_order);
     std::vector<double> y(nodes.size() * count), turned(y.size()), result;
     for (size_t s = 0; s < nodes.size(); ++s) {
-      const glm::dvec3 d = nodes[s].direction;
+      const Vec3d d = nodes[s].direction;
       evaluate_sh(max_sh_order, d, std::span(y).subspan(s * count, count));
-      evaluate_sh(max_sh_order, glm::dvec3(d.x, d.z, -d.y), std::span(turned).subspan(s * count, count));
+      evaluate_sh(max_sh_order, Vec3d(d.x, d.z, -d.y), std::span(turned).subspan(s * count, count));
       for (size_t i = 0; i < count; ++i) y[s * count + i] *= nodes[s].weight;
     }
     for (int l = 2; l < max_sh_order; ++l)

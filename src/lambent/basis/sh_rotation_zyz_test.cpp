@@ -20,21 +20,21 @@ std::vector<float> random_coefficients(int order, uint64_t seed = 5) {
   return c;
 }
 
-glm::dmat3 about_z(double t) {
-  return {glm::dvec3(std::cos(t), std::sin(t), 0), glm::dvec3(-std::sin(t), std::cos(t), 0), glm::dvec3(0, 0, 1)};
+Mat3d about_z(double t) {
+  return {Vec3d(std::cos(t), std::sin(t), 0), Vec3d(-std::sin(t), std::cos(t), 0), Vec3d(0, 0, 1)};
 }
-glm::dmat3 about_y(double t) {
-  return {glm::dvec3(std::cos(t), 0, -std::sin(t)), glm::dvec3(0, 1, 0), glm::dvec3(std::sin(t), 0, std::cos(t))};
+Mat3d about_y(double t) {
+  return {Vec3d(std::cos(t), 0, -std::sin(t)), Vec3d(0, 1, 0), Vec3d(std::sin(t), 0, std::cos(t))};
 }
 
 // Skew ones, and those where Euler angles are awkward: the identity, half turns, b next to 0 and 180 degrees.
-std::vector<glm::dmat3> rotations() {
-  std::vector<glm::dmat3> all{glm::dmat3(1.0),
-                              about_z(1.1),
-                              about_y(std::numbers::pi),
-                              about_y(std::numbers::pi) * about_z(0.7),
-                              about_y(std::numbers::pi / 2),
-                              about_z(-2.0) * about_y(-1.2) * about_z(0.3)};
+std::vector<Mat3d> rotations() {
+  std::vector<Mat3d> all{Mat3d(1.0),
+                         about_z(1.1),
+                         about_y(std::numbers::pi),
+                         about_y(std::numbers::pi) * about_z(0.7),
+                         about_y(std::numbers::pi / 2),
+                         about_z(-2.0) * about_y(-1.2) * about_z(0.3)};
   for (double b : {1e-3, 1e-5, 3e-8, 1e-20, std::numbers::pi - 1e-5})
     all.push_back(about_z(0.8) * about_y(b) * about_z(-2.3));
   Random random(11);
@@ -46,10 +46,10 @@ std::vector<glm::dmat3> rotations() {
 }
 
 TEST(ShRotationZyz, EulerAnglesGiveTheMatrixBack) {
-  for (const glm::dmat3& R : rotations()) {
+  for (const Mat3d& R : rotations()) {
     const EulerZyz e = euler_zyz(Mat3(R));
     const double a = std::atan2(e.sin_a, e.cos_a), b = std::atan2(e.sin_b, e.cos_b), c = std::atan2(e.sin_c, e.cos_c);
-    const glm::dmat3 again = about_z(a) * about_y(b) * about_z(c);
+    const Mat3d again = about_z(a) * about_y(b) * about_z(c);
     EXPECT_NEAR(double(e.sin_c) * e.sin_c + double(e.cos_c) * e.cos_c, 1, float_rounding);
     EXPECT_GE(e.sin_b, 0);
     for (int i = 0; i < 3; ++i)
@@ -59,7 +59,7 @@ TEST(ShRotationZyz, EulerAnglesGiveTheMatrixBack) {
 
 TEST(ShRotationZyz, AgreesWithTheDenseRotationAtEveryOrderAndSimdTarget) {
   for (int order = 1; order <= max_sh_order; ++order)
-    for (const glm::dmat3& R : rotations()) {
+    for (const Mat3d& R : rotations()) {
       const std::vector<float> f = random_coefficients(order);
       std::vector<float> dense(f.size());
       rotate_sh(make_sh_rotation(order, Mat3(R)), f, dense);
@@ -78,10 +78,10 @@ TEST(ShRotationZyz, AgreesWithTheDenseRotationAtEveryOrderAndSimdTarget) {
 TEST(ShRotationZyz, AgreesWithResampling) {
   const int order = 7;
   const std::vector<float> f = random_coefficients(order);
-  const glm::dmat3 R = rotations().back(), back = glm::transpose(R);
+  const Mat3d R = rotations().back(), back = transpose(R);
   const auto expected = project_sh(
       order,
-      [&](glm::dvec3 d) {
+      [&](Vec3d d) {
         double y[sh_count(order)], sum = 0;
         evaluate_sh(order, back * d, y);
         for (size_t i = 0; i < f.size(); ++i) sum += f[i] * y[i];
@@ -119,7 +119,7 @@ bool operator<(Counted a, Counted b) { return a.value < b.value; }
 
 // Rotates f in double; angles go in directly. Returns the multiplications made.
 int count_rotation(int order, double a, double b, double c, std::vector<double>& f) {
-  const glm::dmat3 R = about_z(a) * about_y(b) * about_z(c);
+  const Mat3d R = about_z(a) * about_y(b) * about_z(c);
   Counted rows[9], angles[6] = {Counted(std::cos(a)), Counted(std::sin(a)), Counted(std::cos(b)),
                                 Counted(std::sin(b)), Counted(std::cos(c)), Counted(std::sin(c))};
   for (int i = 0; i < 9; ++i) rows[i] = Counted(R[i % 3][i / 3]);
@@ -152,11 +152,11 @@ TEST(ShRotationZyz, CountedCodeIsExactToDoublePrecision) {
   for (auto [a, b, c] : {std::array{0.4, 1.1, -2.0}, std::array{1.57, 1e-4, 3.1415}}) {
     std::vector<double> g = f, y(f.size()), turned(f.size());
     count_rotation(order, a, b, c, g);
-    const glm::dmat3 R = about_z(a) * about_y(b) * about_z(c);
+    const Mat3d R = about_z(a) * about_y(b) * about_z(c);
     for (int i = 0; i < 20; ++i) {
-      const glm::dvec3 d = glm::normalize(glm::dvec3(random.next(), random.next() - 0.3, 0.5 - random.next()));
+      const Vec3d d = normalize(Vec3d(random.next(), random.next() - 0.3, 0.5 - random.next()));
       evaluate_sh(order, d, y);
-      evaluate_sh(order, glm::transpose(R) * d, turned);
+      evaluate_sh(order, transpose(R) * d, turned);
       double before = 0, after = 0;
       for (size_t k = 0; k < f.size(); ++k) before += f[k] * turned[k], after += g[k] * y[k];
       EXPECT_NEAR(after, before, f.size() * double_rounding);

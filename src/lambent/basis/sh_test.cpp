@@ -24,7 +24,7 @@ std::vector<float> asymmetric_coefficients(int order, uint64_t seed = 7) {
 }
 
 TEST(Sh, LowBandsAreTheKnownPolynomials) {
-  glm::dvec3 d = glm::normalize(glm::dvec3(0.3, -0.7, 0.55));
+  Vec3d d = normalize(Vec3d(0.3, -0.7, 0.55));
   double y[9];
   evaluate_sh(3, d, y);
   const double k0 = 0.28209479177387814, k1 = 0.48860251190291992, k2 = 1.0925484305920792, k20 = 0.31539156525252005,
@@ -47,13 +47,13 @@ TEST(Sh, IsOrthonormalAtEveryOrder) {
   for (int i : {0, 1, 3, 6, 35, 36, 77, 143, 144, 200, n - 1}) {
     std::vector<double> y(static_cast<size_t>(n));
     auto c = project_sh(
-        order, [&](glm::dvec3 d) { return evaluate_sh(order, d, y), y[size_t(i)]; }, 2 * order);
+        order, [&](Vec3d d) { return evaluate_sh(order, d, y), y[size_t(i)]; }, 2 * order);
     for (int j = 0; j < n; ++j) EXPECT_NEAR(c[size_t(j)], i == j ? 1 : 0, 1e-12) << i << " " << j;
   }
 }
 
 TEST(Sh, SatisfiesTheAdditionTheorem) {
-  Vec3 a = glm::normalize(Vec3(1, 2, -0.5f));
+  Vec3 a = normalize(Vec3(1, 2, -0.5f));
   float y[sh_count(max_sh_order)];
   evaluate_sh(max_sh_order, a, y);
   for (int l = 0; l < max_sh_order; ++l) {
@@ -67,7 +67,7 @@ TEST(Sh, ProjectsAndReconstructsABandLimitedFunction) {
   for (int order = 1; order <= max_sh_order; ++order) {
     auto c = asymmetric_coefficients(order);
     auto back = project_sh(
-        order, [&](glm::dvec3 d) { return reconstruct_sh(c, Vec3(d)); }, 2 * order);
+        order, [&](Vec3d d) { return reconstruct_sh(c, Vec3(d)); }, 2 * order);
     for (size_t i = 0; i < c.size(); ++i) EXPECT_NEAR(back[i], c[i], 10 * float_rounding);
   }
 }
@@ -81,8 +81,7 @@ TEST(Sh, RotationAgreesWithResampling) {
       rotate_sh(make_sh_rotation(order, R), c, turned);
       for (int k = 0; k < 20; ++k) {
         Vec3 s = square_to_sphere(sobol_owen(uint32_t(k), 3));
-        EXPECT_NEAR(reconstruct_sh(turned, s), reconstruct_sh(c, glm::transpose(R) * s),
-                    order * order * float_rounding);
+        EXPECT_NEAR(reconstruct_sh(turned, s), reconstruct_sh(c, transpose(R) * s), order * order * float_rounding);
       }
     }
 }
@@ -107,7 +106,7 @@ TEST(Sh, ZyzRotatorAgreesWithDenseBlocks) {
 TEST(Sh, RotatesLinearBandAsAVector) {
   // The linear part of a function points along (-f11, -f1-1, f10).
   Mat3 R = skew_rotation(11);
-  Vec3 v = glm::normalize(Vec3(0.2f, -0.9f, 0.4f)), w = R * v;
+  Vec3 v = normalize(Vec3(0.2f, -0.9f, 0.4f)), w = R * v;
   std::vector<float> c{0, -v.y, v.z, -v.x}, turned(4);
   rotate_sh(make_sh_rotation(2, R), c, turned);
   EXPECT_NEAR(-turned[3], w.x, 1e-6);
@@ -122,7 +121,7 @@ TEST(Sh, ClampedCosineMatchesQuadrature) {
   for (int l = 0; l < 7; ++l) EXPECT_NEAR(clamped_cosine(l), known[l], 1e-14);
   // The kink at the horizon limits the quadrature: 400 nodes leave about 1e-4.
   auto c = project_sh(
-      12, [](glm::dvec3 d) { return std::max(0.0, d.z); }, 400);
+      12, [](Vec3d d) { return std::max(0.0, d.z); }, 400);
   for (int l = 0; l < 12; ++l)
     EXPECT_NEAR(c[size_t(sh_index(l, 0))], clamped_cosine(l) * std::sqrt((2 * l + 1) / (4 * std::numbers::pi)), 1e-4)
         << l;
@@ -143,7 +142,7 @@ TEST(ShWindow, FixedWindowsFallFromOne) {
 
 TEST(ShWindow, AutomaticLiftsNegativeIrradianceAndLeavesSmoothLightAlone) {
   // A delta light's order-6 irradiance dips below zero.
-  Vec3 sun = glm::normalize(Vec3(0.4f, 0.8f, -0.2f));
+  Vec3 sun = normalize(Vec3(0.4f, 0.8f, -0.2f));
   std::vector<float> y(36);
   evaluate_sh(6, sun, y);
   std::vector<Vec3> light;

@@ -67,11 +67,11 @@ std::vector<float> closest_lobe(std::span<const float> sh, Vec3 axis) {
   return g;
 }
 
-double evaluate_zonal(const ZonalSum& sum, glm::dvec3 d) {
+double evaluate_zonal(const ZonalSum& sum, Vec3d d) {
   double value = 0, g[max_sh_order];
   for (size_t i = 0; i < sum.axes.size(); ++i) {
     std::copy_n(sum.lobe(i).data(), sum.order, g);
-    value += evaluate_lobe({g, size_t(sum.order)}, glm::dot(glm::dvec3(sum.axes[i]), d));
+    value += evaluate_lobe({g, size_t(sum.order)}, dot(Vec3d(sum.axes[i]), d));
   }
   return value;
 }

@@ -47,7 +47,7 @@ struct ZonalSum {
   }
 };
 // Its value in a direction, without forming the harmonics.
-double evaluate_zonal(const ZonalSum& sum, glm::dvec3 d);
+double evaluate_zonal(const ZonalSum& sum, Vec3d d);
 // Its order^2 spherical harmonics (eq. 7).
 std::vector<float> zonal_to_sh(const ZonalSum& sum);
 // (Rf)(s) = f(R^-1 s): turns the axes and leaves the coefficients alone (eq. 10).

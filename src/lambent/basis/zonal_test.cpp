@@ -12,8 +12,8 @@ const Mat3 skew = rotation_from_yaw_pitch_roll({37, -52, 113});
 Vec3 random_axis(Random& random) {
   Vec3 v;
   do v = 2.0f * Vec3(random.next(), random.next(), random.next()) - 1.0f;
-  while (glm::dot(v, v) > 1 || glm::dot(v, v) < 0.01f);
-  return glm::normalize(v);
+  while (dot(v, v) > 1 || dot(v, v) < 0.01f);
+  return normalize(v);
 }
 
 ZonalSum random_sum(int order, int lobes, uint64_t key) {
@@ -30,7 +30,7 @@ double bump(double z) { return z > 0.2 ? (z - 0.2) * std::exp(z) : 0.1 * z; }
 TEST(Zonal, ProjectsToTheHarmonicsAboutThePole) {
   auto smooth = [](double z) { return std::exp(1.3 * z) + z * z * z; };
   std::vector<double> g = project_zonal(8, smooth);
-  const std::vector<double> sh = project_sh(8, [&](glm::dvec3 d) { return smooth(d.z); });
+  const std::vector<double> sh = project_sh(8, [&](Vec3d d) { return smooth(d.z); });
   lobe_to_zonal(g);
   for (int l = 0; l < 8; ++l) EXPECT_NEAR(g[size_t(l)], sh[size_t(sh_index(l, 0))], 1e-12) << l;
 }
@@ -48,7 +48,7 @@ TEST(Zonal, ScalesThereAndBack) {
 TEST(Zonal, HasTheHarmonicsOfItsValues) {
   const ZonalSum sum = random_sum(6, 3, 1);
   const std::vector<double> projected = project_sh(
-      6, [&](glm::dvec3 d) { return evaluate_zonal(sum, d); }, 8);
+      6, [&](Vec3d d) { return evaluate_zonal(sum, d); }, 8);
   const std::vector<float> sh = zonal_to_sh(sum);
   for (size_t k = 0; k < sh.size(); ++k)
     EXPECT_NEAR(sh[k], projected[k], 2e-6) << k;  // float rounding of values up to 3
@@ -67,8 +67,8 @@ TEST(Zonal, RotatesAsTheHarmonicsItStandsFor) {
     }
     EXPECT_LT(error, 1e-6 * std::max(1.0, std::sqrt(norm))) << order;
     // And as the function does.
-    const glm::dvec3 d = glm::normalize(glm::dvec3(0.3, -0.8, 0.4));
-    EXPECT_NEAR(evaluate_zonal(rotate_zonal(sum, skew), glm::dmat3(skew) * d), evaluate_zonal(sum, d), 1e-5);
+    const Vec3d d = normalize(Vec3d(0.3, -0.8, 0.4));
+    EXPECT_NEAR(evaluate_zonal(rotate_zonal(sum, skew), Mat3d(skew) * d), evaluate_zonal(sum, d), 1e-5);
   }
 }
 
@@ -87,7 +87,7 @@ TEST(Zonal, ConvolvesAsTheIntegralDoes) {
     double integral = 0;
     for (const DirectionNode& node : direction_quadrature(order))
       integral += node.weight * reconstruct_sh(f, Vec3(node.direction)) *
-                  evaluate_lobe(lobe, glm::dot(glm::dvec3(s), node.direction));
+                  evaluate_lobe(lobe, dot(Vec3d(s), node.direction));
     EXPECT_NEAR(reconstruct_sh(out, s), integral, 2e-5);
   }
 }

@@ -119,15 +119,15 @@ class NumberReader {
 constexpr size_t most_wavelengths = 1000, most_samples = 20000;
 
 // What each wavelength of a flat reflectance of 1 adds to (1, 1, 1): trapezoids of illuminant times matching functions.
-std::vector<glm::dvec3> rgb_weights(const std::vector<double>& nm) {
-  std::vector<glm::dvec3> weights(nm.size());
-  glm::dvec3 white(0);
+std::vector<Vec3d> rgb_weights(const std::vector<double>& nm) {
+  std::vector<Vec3d> weights(nm.size());
+  Vec3d white(0);
   for (size_t i = 0; i < nm.size(); ++i) {
     const double width = (nm[std::min(i + 1, nm.size() - 1)] - nm[i ? i - 1 : 0]) / 2;
     weights[i] = rec709_from_xyz(cie_matching_functions(nm[i]) * (illuminant_d65(nm[i]) * width));
     white += weights[i];
   }
-  for (glm::dvec3& w : weights) w /= white;
+  for (Vec3d& w : weights) w /= white;
   return weights;
 }
 
@@ -152,7 +152,7 @@ Result<MeasuredTable> load_cornell(std::span<const uint8_t> bytes, const std::st
     if (!(nm[i] > (i ? nm[i - 1] : 0) && nm[i] < 1e5)) return wrong("the wavelengths do not rise");
   }
   if (!covers_visible_light(nm)) return wrong("the wavelengths do not cover 440 to 640 nm in steps of at most 40 nm");
-  const std::vector<glm::dvec3> weights = rgb_weights(nm);
+  const std::vector<Vec3d> weights = rgb_weights(nm);
 
   std::vector<MeasuredSample> samples;
   std::vector<double> row(4 + nm.size());
@@ -173,7 +173,7 @@ Result<MeasuredTable> load_cornell(std::span<const uint8_t> bytes, const std::st
     for (int k : {1, 3})
       if (!(std::abs(row[size_t(k)]) <= turns)) return wrong("a phi is not between -8 and 8");
     if (samples.size() == most_samples) return wrong("more than 20000 measurements");
-    glm::dvec3 rgb(0);
+    Vec3d rgb(0);
     for (size_t i = 0; i < nm.size(); ++i) {
       const double f = row[4 + i];
       if (f < 0) return wrong("a reflectance is negative");
@@ -181,11 +181,11 @@ Result<MeasuredTable> load_cornell(std::span<const uint8_t> bytes, const std::st
       rgb += f * weights[i];
     }
     auto direction = [](double theta, double phi) {
-      return Vec3(glm::dvec3(std::sin(theta) * std::cos(phi), std::sin(theta) * std::sin(phi), std::cos(theta)));
+      return Vec3(Vec3d(std::sin(theta) * std::cos(phi), std::sin(theta) * std::sin(phi), std::cos(theta)));
     };
     const Vec3 wi = direction(row[0], row[1]), wo = direction(row[2], row[3]);
-    if (glm::length(wi + wo) < 1e-3f) continue;  // both level and opposite: no half vector
-    samples.push_back({half_difference(wi, wo), Vec3(glm::max(rgb, 0.0))});
+    if (length(wi + wo) < 1e-3f) continue;  // both level and opposite: no half vector
+    samples.push_back({half_difference(wi, wo), Vec3(max(rgb, 0.0))});
   }
 }
 
@@ -207,7 +207,7 @@ Vec3 nearest_mean(std::span<const Vec3> places, std::span<const Vec3> logarithms
   size_t count = 0;
   for (size_t i = 0; i < places.size(); ++i) {
     const Vec3 to = places[i] - x;
-    const float d2 = glm::dot(to, to);
+    const float d2 = dot(to, to);
     if (count == best.size() && !(d2 < best[count - 1].first)) continue;
     size_t at = count < best.size() ? count++ : count - 1;
     for (; at > 0 && d2 < best[at - 1].first; --at) best[at] = best[at - 1];
@@ -216,12 +216,12 @@ Vec3 nearest_mean(std::span<const Vec3> places, std::span<const Vec3> logarithms
   // With no more samples than neighbours, all count.
   const bool few = count <= neighbours;
   const float radius = few ? 2 * std::sqrt(best[count - 1].first) + 1 : std::sqrt(best[count - 1].first);
-  glm::dvec3 sum(0);
+  Vec3d sum(0);
   double total = 0;
   for (size_t k = 0; k < (few ? count : count - 1); ++k) {
     const float distance = std::max(std::sqrt(best[k].first), 1e-6f * radius);
     const double w = std::pow(double(std::max(radius - distance, 0.0f)) / (double(radius) * distance), 2);
-    sum += w * glm::dvec3(logarithms[best[k].second]), total += w;
+    sum += w * Vec3d(logarithms[best[k].second]), total += w;
   }
   if (!(total > 0)) return logarithms[best[0].second];  // all at one distance
   return Vec3(sum / total);
@@ -234,7 +234,7 @@ MeasuredTable resample_measured(std::span<const MeasuredSample> samples, int the
   constexpr float darkest = 1e-5f;  // what logarithms take 0 for
   std::vector<Vec3> places, logarithms;
   for (const MeasuredSample& s : samples)
-    places.push_back(place(s.angles)), logarithms.push_back(glm::log(glm::max(s.f, Vec3(darkest))));
+    places.push_back(place(s.angles)), logarithms.push_back(log(max(s.f, Vec3(darkest))));
   MeasuredTable t;
   t.theta_h = theta_h, t.theta_d = theta_d, t.phi_d = phi_d;
   t.f.resize(size_t(theta_h) * size_t(theta_d) * size_t(phi_d));
@@ -242,7 +242,7 @@ MeasuredTable resample_measured(std::span<const MeasuredSample> samples, int the
     for (int h = int(begin); h < int(end); ++h)
       for (int d = 0; d < theta_d; ++d)
         for (int p = 0; p < (phi_d + 1) / 2; ++p) {
-          const Vec3 f = glm::exp(nearest_mean(places, logarithms, place(cell_angles(t, h, d, p))));
+          const Vec3 f = exp(nearest_mean(places, logarithms, place(cell_angles(t, h, d, p))));
           t.f[t.index(h, d, p)] = t.f[t.index(h, d, phi_d - 1 - p)] = f;
         }
   });

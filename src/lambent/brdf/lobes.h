@@ -35,7 +35,7 @@ inline bool take_first(float share, Vec2& u) {
   return first;
 }
 
-inline Vec3 reflect_about(Vec3 h, Vec3 w) { return 2 * glm::dot(w, h) * h - w; }
+inline Vec3 reflect_about(Vec3 h, Vec3 w) { return 2 * dot(w, h) * h - w; }
 
 // Half vectors whose slopes h_x/h_z and h_y/h_z are Gaussian of variances alpha^2 / 2: Beckmann's normals weighted by
 // their cosine. Density per steradian of h: exp(-(h_x^2/a_x^2 + h_y^2/a_y^2) / h_z^2) / (pi a_x a_y h_z^3).

@@ -32,10 +32,10 @@ Vec3 look_up(const MeasuredTable& t, const HalfDifference& a) {
             d = tap(std::min(a.theta_d * (2 / pi), 1.0f), t.theta_d, false);
   const Tap p = tap(std::min(a.phi_d / pi, 1.0f), t.phi_d, true);
   auto along_phi = [&](int hi, int di) {
-    return glm::mix(t.f[t.index(hi, di, p.first)], t.f[t.index(hi, di, p.second)], p.share);
+    return mix(t.f[t.index(hi, di, p.first)], t.f[t.index(hi, di, p.second)], p.share);
   };
-  auto along_d = [&](int hi) { return glm::mix(along_phi(hi, d.first), along_phi(hi, d.second), d.share); };
-  return glm::mix(along_d(h.first), along_d(h.second), h.share);
+  auto along_d = [&](int hi) { return mix(along_phi(hi, d.first), along_phi(hi, d.second), d.share); };
+  return mix(along_d(h.first), along_d(h.second), h.share);
 }
 
 // 1 - cos(theta_h) at the edge between cells i - 1 and i of n. It keeps its digits near 0, where the cosine would lose
@@ -53,14 +53,14 @@ int half_cell(const MeasuredTable& t, float theta_h) {
 
 HalfDifference half_difference(Vec3 wi, Vec3 wo) {
   const Vec3 sum = wi + wo, difference = wi - wo;  // difference is square to h
-  const Vec3 h = sum / glm::length(sum);
+  const Vec3 h = sum / length(sum);
   const float s = std::hypot(h.x, h.y);
   // Frame about h: `along` is where theta_h grows, `across` is square to it and level.
   const Vec3 along = s > 0 ? Vec3(h.x * h.z, h.y * h.z, -s * s) / s : Vec3(1, 0, 0);
   const Vec3 across = s > 0 ? Vec3(-h.y, h.x, 0) / s : Vec3(0, 1, 0);
-  float x = glm::dot(difference, along), y = glm::dot(difference, across);
+  float x = dot(difference, along), y = dot(difference, across);
   if (y < 0 || (y == 0 && x < 0)) x = -x, y = -y;  // swapping wi and wo changes both signs
-  return {std::atan2(s, h.z), std::atan2(glm::length(difference), glm::length(sum)), std::atan2(y, x)};
+  return {std::atan2(s, h.z), std::atan2(length(difference), length(sum)), std::atan2(y, x)};
 }
 
 DirectionPair directions(const HalfDifference& a) {
@@ -109,8 +109,7 @@ void prepare_sampling(MeasuredTable& t) {
 BrdfValue value_above(const Measured& b, Vec3 wi, Vec3 wo) {
   const MeasuredTable& t = *b.table;
   const HalfDifference a = half_difference(wi, wo);
-  const float lobe = t.lobe[size_t(half_cell(t, a.theta_h))] /
-                     (2 * glm::length(wi + wo));  // |wi + wo| = 2 cos(theta_d)
+  const float lobe = t.lobe[size_t(half_cell(t, a.theta_h))] / (2 * length(wi + wo));  // |wi + wo| = 2 cos(theta_d)
   return {look_up(t, a), cosine_share * wi.z / pi + (1 - cosine_share) * lobe};
 }
 

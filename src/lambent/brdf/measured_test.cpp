@@ -16,7 +16,7 @@ namespace lambent {
 namespace {
 
 Vec3 direction(double theta, double phi) {
-  return Vec3(glm::dvec3(std::sin(theta) * std::cos(phi), std::sin(theta) * std::sin(phi), std::cos(theta)));
+  return Vec3(Vec3d(std::sin(theta) * std::cos(phi), std::sin(theta) * std::sin(phi), std::cos(theta)));
 }
 
 std::span<const uint8_t> as_bytes(const std::string& text) { return test::bytes_of(text); }
@@ -64,11 +64,11 @@ TEST(HalfDifference, KnownPairs) {
 TEST(Color, WhiteOfD65AndTheMatchingFunctions) {
   // D65 under the CIE 1931 observer: x = 0.3127, y = 0.3290. The lobes fit the observer to 1 % of its peaks.
   constexpr double fit = 2e-3;
-  glm::dvec3 sum(0);
+  Vec3d sum(0);
   for (double nm = 380; nm <= 780; nm += 5) sum += illuminant_d65(nm) * cie_matching_functions(nm);
   EXPECT_NEAR(sum.x / (sum.x + sum.y + sum.z), 0.3127, fit);
   EXPECT_NEAR(sum.y / (sum.x + sum.y + sum.z), 0.3290, fit);
-  const glm::dvec3 white = rec709_from_xyz({0.95047, 1, 1.08883});
+  const Vec3d white = rec709_from_xyz({0.95047, 1, 1.08883});
   for (int c = 0; c < 3; ++c) EXPECT_NEAR(white[c], 1, 3e-4);  // the standard rounds its white to four digits
   EXPECT_EQ(illuminant_d65(560), 100);
   EXPECT_NEAR(illuminant_d65(565), (100 + 96.3342) / 2, 1e-9);
@@ -190,8 +190,8 @@ std::string cornell_file(const Brdf& brdf, const std::function<double(double)>& 
   for (int i = 1; i <= 8; ++i)
     for (int j = 0; j < 10; ++j)
       for (int k = 0; k <= 18; ++k) {
-        const double ti = glm::radians(10.0 * i), to = glm::radians(std::min(8.2 * j + 0.06 * j * j, 79.0)),
-                     po = glm::radians(-10.0 * k);
+        const double ti = radians(10.0 * i), to = radians(std::min(8.2 * j + 0.06 * j * j, 79.0)),
+                     po = radians(-10.0 * k);
         if (j == 0 && k > 0) continue;
         const float f = evaluate(brdf, direction(ti, 0), direction(to, po)).x;
         text += fmt::format("{:.6f} {:.6f} {:.6f} {:.6f}", ti, 0.0, to, po);
@@ -308,14 +308,14 @@ TEST(LoadCornell, MeasuredPaints) {
     // Paints keep their energy, as far as the samples tell: each albedo by draws, at most 1 and not nearly black.
     for (double degrees : {10.0, 30.0, 50.0, 70.0}) {
       Random random(5);
-      glm::dvec3 sum(0);
+      Vec3d sum(0);
       double squares = 0;
       constexpr int draws = 20000;
       for (int i = 0; i < draws; ++i) {
-        const Vec3 w = sample(brdf, direction(glm::radians(degrees), 0.3), random.next2()).weight;
-        sum += glm::dvec3(w), squares += double(luminance(w)) * double(luminance(w));
+        const Vec3 w = sample(brdf, direction(radians(degrees), 0.3), random.next2()).weight;
+        sum += Vec3d(w), squares += double(luminance(w)) * double(luminance(w));
       }
-      const glm::dvec3 albedo = sum / double(draws);
+      const Vec3d albedo = sum / double(draws);
       const double mean = double(luminance(Vec3(albedo))), deviation = std::sqrt(squares / draws - mean * mean);
       std::printf("%s, eye at %.0f degrees: albedo %.3f %.3f %.3f, deviation of a draw %.2f of the mean\n", name,
                   degrees, albedo.x, albedo.y, albedo.z, deviation / mean);

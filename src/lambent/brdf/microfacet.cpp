@@ -9,7 +9,7 @@
 namespace lambent {
 namespace {
 
-Vec2 widths(Vec2 alpha) { return glm::max(alpha, Vec2(min_alpha)); }
+Vec2 widths(Vec2 alpha) { return max(alpha, Vec2(min_alpha)); }
 
 float fifth_power(float x) {
   const float x2 = x * x;
@@ -42,7 +42,7 @@ struct GgxLobe {
 // root_o).
 GgxLobe ggx_lobe(Vec2 alpha, Vec3 wi, Vec3 wo) {
   const Vec3 sum = wi + wo;
-  const float length = glm::length(sum);
+  const float length = lambent::length(sum);
   const Vec3 h = sum / length;
   const float x = h.x / alpha.x, y = h.y / alpha.y, s = x * x + y * y + h.z * h.z;
   const float d = 1 / (pi * alpha.x * alpha.y * s * s), root_i = half_root(alpha, wi), root_o = half_root(alpha, wo);
@@ -52,7 +52,7 @@ GgxLobe ggx_lobe(Vec2 alpha, Vec3 wi, Vec3 wo) {
 // Normals visible from wo: the surface is stretched so that it is a hemisphere, on which they are the bisectors of wo
 // with a direction uniform over a spherical cap.
 Vec3 draw_visible_normal(Vec2 alpha, Vec3 wo, Vec2 u) {
-  const Vec3 w = glm::normalize(Vec3(alpha.x * wo.x, alpha.y * wo.y, wo.z));
+  const Vec3 w = normalize(Vec3(alpha.x * wo.x, alpha.y * wo.y, wo.z));
   const float phi = 2 * pi * u.x, z = (1 - u.y) * (1 + w.z) - w.z, r = std::sqrt(std::clamp(1 - z * z, 0.0f, 1.0f));
   const Vec3 h = Vec3(r * std::cos(phi), r * std::sin(phi), z) + w;
   return normalize_or(Vec3(alpha.x * h.x, alpha.y * h.y, h.z), Vec3(0, 0, 1));
@@ -66,7 +66,7 @@ struct Layers {
 Layers layers(const MetallicRoughness& b) {
   constexpr float dielectric = 0.04f;
   return {widths(Vec2(b.roughness * b.roughness)), b.base_color * (1 - b.metallic),
-          glm::mix(Vec3(dielectric), b.base_color, b.metallic)};
+          mix(Vec3(dielectric), b.base_color, b.metallic)};
 }
 float diffuse_share(const Layers& l, Vec3 wo) {
   const Vec3 f = schlick(l.f0, wo.z);
@@ -82,7 +82,7 @@ float gaussian_slope_density(Vec2 alpha, Vec3 h) {
 
 Vec3 draw_gaussian_slopes(Vec2 alpha, Vec2 u) {
   const float r = std::sqrt(-std::log(1 - u.y)), phi = 2 * pi * u.x;
-  return glm::normalize(Vec3(alpha.x * r * std::cos(phi), alpha.y * r * std::sin(phi), 1));
+  return normalize(Vec3(alpha.x * r * std::cos(phi), alpha.y * r * std::sin(phi), 1));
 }
 
 BrdfValue value_above(const Ggx& b, Vec3 wi, Vec3 wo) {
@@ -108,7 +108,7 @@ Vec3 draw(const MetallicRoughness& b, Vec3 wo, Vec2 u) {
 
 BrdfValue value_above(const CookTorrance& b, Vec3 wi, Vec3 wo) {
   const Vec3 sum = wi + wo;
-  const float length = glm::length(sum), cosine = length / 2;
+  const float length = lambent::length(sum), cosine = length / 2;
   const Vec3 h = sum / length;
   const float slopes = gaussian_slope_density(widths(Vec2(b.m)), h);  // D h_z
   const float g = std::min(1.0f, 2 * h.z * std::min(wi.z, wo.z) / cosine);

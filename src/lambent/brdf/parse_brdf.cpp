@@ -128,7 +128,7 @@ Result<Brdf> parse_brdf(std::string_view text) {
   }
   if (name == "ggx") {
     Ggx b;
-    Vec2 roughness = glm::sqrt(b.alpha);
+    Vec2 roughness = sqrt(b.alpha);
     s.pair("roughness", roughness), s.color("f0", b.f0);
     b.alpha = roughness * roughness;
     return s.finish(b);

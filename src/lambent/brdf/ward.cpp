@@ -7,13 +7,13 @@
 namespace lambent {
 namespace {
 
-Vec2 widths(const Ward& b) { return glm::max(b.alpha, Vec2(min_alpha)); }
+Vec2 widths(const Ward& b) { return max(b.alpha, Vec2(min_alpha)); }
 
 }  // namespace
 
 BrdfValue value_above(const Ward& b, Vec3 wi, Vec3 wo) {
   const Vec3 sum = wi + wo;
-  const float length = glm::length(sum), cosine = length / 2;  // cosine: wi . h
+  const float length = lambent::length(sum), cosine = length / 2;  // cosine: wi . h
   const Vec3 h = sum / length;
   const float density = gaussian_slope_density(widths(b), h) / (4 * cosine),
               diffuse = first_share(b.diffuse, b.specular);

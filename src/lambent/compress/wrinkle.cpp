@@ -108,10 +108,10 @@ class TableFit {
     });
     const float* t = &targets_[(d * fine_ + x) * C];
     for (size_t k = from; k < C; ++k) residual[k] = -double(t[k]);
-    std::vector<glm::dvec3> axes(lobes_);
+    std::vector<Vec3d> axes(lobes_);
     for (size_t i = 0; i < lobes_; ++i) {
       const double* v = &at[i * lobe_values()];
-      axes[i] = glm::normalize(glm::dvec3(v[0], v[1], v[2]));
+      axes[i] = normalize(Vec3d(v[0], v[1], v[2]));
       evaluate_sh(order_, axes[i], {&y[i * C], C});
       for (int l = first_; l < order_; ++l)
         for (size_t k = size_t(l * l); k < size_t((l + 1) * (l + 1)); ++k)
@@ -122,16 +122,15 @@ class TableFit {
     for (size_t i = 0; i < lobes_; ++i) {
       const double* v = &at[i * lobe_values()];
       double* g = out + i * lobe_values();
-      const double length = glm::length(glm::dvec3(v[0], v[1], v[2]));
+      const double length = lambent::length(Vec3d(v[0], v[1], v[2]));
       // Along two tangents, by differences; the normalisation leaves nothing along the axis itself (eq. 21).
-      const glm::dvec3 u =
-          glm::normalize(std::abs(axes[i].x) < 0.7 ? glm::cross(axes[i], {1, 0, 0}) : glm::cross(axes[i], {0, 1, 0}));
-      glm::dvec3 slope(0.0);
-      for (const glm::dvec3& tangent : {u, glm::cross(axes[i], u)}) {
+      const Vec3d u = normalize(std::abs(axes[i].x) < 0.7 ? cross(axes[i], {1, 0, 0}) : cross(axes[i], {0, 1, 0}));
+      Vec3d slope(0.0);
+      for (const Vec3d& tangent : {u, cross(axes[i], u)}) {
         constexpr double h = 1e-5;
         double change = 0;
         for (double side : {h, -h}) {
-          evaluate_sh(order_, glm::normalize(axes[i] + side * tangent), step);
+          evaluate_sh(order_, normalize(axes[i] + side * tangent), step);
           for (int l = first_; l < order_; ++l)
             for (size_t k = size_t(l * l); k < size_t((l + 1) * (l + 1)); ++k)
               change += residual[k] * v[3 + l - first_] * step[k] / (2 * side);
@@ -224,7 +223,7 @@ std::vector<float> simulate_wrinkle(int order, int count, float depth, float alb
             // theta from the groove's axis y.
             const double s = std::sin(theta.x),
                          weight = psi.weight * theta.weight * s * s * std::cos(psi.x - normal) / pi_d;
-            evaluate_sh(order, glm::dvec3(s * std::cos(psi.x), std::cos(theta.x), s * std::sin(psi.x)), y);
+            evaluate_sh(order, Vec3d(s * std::cos(psi.x), std::cos(theta.x), s * std::sin(psi.x)), y);
             for (size_t k = 0; k < C; ++k) direct[r * C + k] += weight * y[k];
           }
       // A long strip seen under d psi fills the share 1/2 cos d psi of a diffuse surface's view.
@@ -268,7 +267,7 @@ Result<WrinkleTable> make_wrinkle_table(const WrinkleOptions& o) {
   WritableZonalTransfer out = make_zonal_transfer(o.order, o.lobes, 1, n * n, Precision::single);
   const int exact = out.transfer.exact_bands();
   ZonalBatch batch = make_zonal_batch(o.order, exact, 1, o.lobes);  // all lanes alike
-  using Axes = std::vector<glm::dvec3>;
+  using Axes = std::vector<Vec3d>;
   std::vector<Axes> above(n), row(n);
   auto refine = [&](const std::vector<float>& t, const Axes& from, int iterations, Axes& to, std::vector<float>& g) {
     for (size_t k = 0; k < C; ++k) std::fill_n(batch.target(0, int(k)), zonal_lanes, double(t[k]));
@@ -310,13 +309,13 @@ Result<WrinkleTable> make_wrinkle_table(const WrinkleOptions& o) {
       else if (x > 0) attempt(Axes(row[x - 1]));
       else {
         // The linear lobe, and others symmetric about it in the cross-section and along the groove.
-        const glm::dvec3 axis(linear_axis(t)), along(0, 1, 0), across = glm::normalize(glm::cross(along, axis));
+        const Vec3d axis(linear_axis(t)), along(0, 1, 0), across = normalize(cross(along, axis));
         for (double angle = 0.2; angle < 1.5; angle += 0.1)
-          for (const glm::dvec3& side : {across, along}) {
+          for (const Vec3d& side : {across, along}) {
             Axes from{axis};
             for (size_t i = 1; i < N; ++i) {
               const double a = angle * double((i + 1) / 2) * (i % 2 ? 1 : -1);
-              from.push_back(glm::normalize(axis * std::cos(a) + side * std::sin(a)));
+              from.push_back(normalize(axis * std::cos(a) + side * std::sin(a)));
             }
             attempt(from);
           }

@@ -38,7 +38,7 @@ TEST(Wrinkle, IsWhatTheBakeOfALongGrooveFinds) {
       // Finer in the middle, where it is looked at.
       const float s = 2 * float(j) / along - 1;
       positions.push_back({x, length * s * s * s, -depth * c * c});
-      normals.push_back(glm::normalize(Vec3(-slope, 0, 1)));
+      normals.push_back(normalize(Vec3(-slope, 0, 1)));
     }
   for (uint32_t j = 0; j < along; ++j)
     for (uint32_t i = 0; i < across; ++i) {

@@ -91,12 +91,12 @@ class BlockFit {
       for (size_t lane = 0; lane < zonal_lanes; ++lane)
         for (size_t i = 0; i < N_; ++i) {
           const double* a = &s_.axes[(std::min(receivers_[lane], count_ - 1) * N_ + i) * 3];
-          glm::dvec3 axis;
+          Vec3d axis;
           for (int k = 0; k < 3; ++k) {
             const float stored = float(a[k]);
             axis[k] = z.precision == Precision::half ? half_to_float(float_to_half(stored)) : stored;
           }
-          axis = glm::normalize(axis);
+          axis = normalize(axis);
           for (int k = 0; k < 3; ++k) s_.batch.axis(int(i), k)[lane] = axis[k];
         }
       if (z.order > exact) refine_zonal(s_.batch, {0, 0, options_.ridge});

@@ -36,8 +36,8 @@ Transfer smooth_signals(int channels, size_t count) {
     std::vector<float> v;
     for (int c = 0; c < channels; ++c) {
       ZonalSum sum{6,
-                   {glm::normalize(Vec3(std::cos(u), std::sin(0.7f * u), 0.3f)),
-                    glm::normalize(Vec3(0.2f, std::cos(1.3f * u), std::sin(u)))},
+                   {normalize(Vec3(std::cos(u), std::sin(0.7f * u), 0.3f)),
+                    normalize(Vec3(0.2f, std::cos(1.3f * u), std::sin(u)))},
                    {}};
       for (int l = 0; l < 6; ++l) sum.coefficients.push_back(cosine[size_t(l)] * (1 + 0.2f * float(c)));
       for (int l = 0; l < 6; ++l) sum.coefficients.push_back(-0.3f / float(l + 1 + c));
@@ -126,8 +126,7 @@ TEST(ZonalFit, LobesKeepTheirNumbersAlongTheCurve) {
   size_t kept = 0;
   for (size_t r = 1; r < 500; ++r)
     for (int i = 0; i < 3; ++i)
-      kept += glm::dot(lobe_axis(*fit, load_receiver(*fit, r - 1), i), lobe_axis(*fit, load_receiver(*fit, r), i)) >
-              0.9f;
+      kept += dot(lobe_axis(*fit, load_receiver(*fit, r - 1), i), lobe_axis(*fit, load_receiver(*fit, r), i)) > 0.9f;
   EXPECT_GT(kept, 1440u);  // of 1497
 }
 

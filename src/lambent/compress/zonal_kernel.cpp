@@ -480,8 +480,8 @@ ZonalStarts make_zonal_starts(int order, int n) {
   ZonalStarts s;
   s.order = order;
   const size_t C = size_t(sh_count(order));
-  auto add = [&](glm::dvec3 v) {
-    v = glm::normalize(v);
+  auto add = [&](Vec3d v) {
+    v = normalize(v);
     s.directions.insert(s.directions.end(), {v.x, v.y, v.z});
     s.y.resize(s.y.size() + C);
     evaluate_sh(order, v, std::span(s.y).last(C));
@@ -505,10 +505,10 @@ void choose_start(ZonalBatch& batch, const ZonalStarts& starts) {
   if (batch.order < 2) return;
   double y[sh_count(max_sh_order)];
   for (size_t lane = 0; lane < zonal_lanes; ++lane) {
-    glm::dvec3 axis(0.0);
+    Vec3d axis(0.0);
     for (int c = 0; c < batch.channels; ++c)
-      axis += glm::dvec3(-batch.target(c, 3)[lane], -batch.target(c, 1)[lane], batch.target(c, 2)[lane]);
-    const double length = glm::length(axis);
+      axis += Vec3d(-batch.target(c, 3)[lane], -batch.target(c, 1)[lane], batch.target(c, 2)[lane]);
+    const double length = lambent::length(axis);
     if (!(length > 0)) continue;
     axis /= length;
     evaluate_sh(batch.order, axis, y);
@@ -531,7 +531,7 @@ void zonal_residual(const ZonalBatch& batch, double* out) {
   for (size_t lane = 0; lane < zonal_lanes; ++lane)
     for (size_t i = 0; i < size_t(batch.lobes); ++i) {
       const double* s = batch.axes.data() + 3 * i * zonal_lanes + lane;
-      evaluate_sh(batch.order, glm::dvec3(s[0], s[zonal_lanes], s[2 * zonal_lanes]), y);
+      evaluate_sh(batch.order, Vec3d(s[0], s[zonal_lanes], s[2 * zonal_lanes]), y);
       for (size_t c = 0; c < size_t(batch.channels); ++c)
         for (int l = batch.first_band; l < batch.order; ++l) {
           const size_t band = c * size_t(batch.bands()) + size_t(l - batch.first_band);

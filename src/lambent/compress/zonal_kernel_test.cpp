@@ -15,7 +15,7 @@ ZonalBatch random_batch(int order, int first_band, int channels, int lobes, uint
   for (size_t lane = 0; lane < zonal_lanes; ++lane)
     for (int i = 0; i < lobes; ++i) {
       const float z = 2 * random.next() - 1, phi = 2 * pi * random.next(), r = std::sqrt(1 - z * z);
-      const glm::dvec3 s = glm::normalize(glm::dvec3(r * std::cos(phi), r * std::sin(phi), z));
+      const Vec3d s = normalize(Vec3d(r * std::cos(phi), r * std::sin(phi), z));
       for (int k = 0; k < 3; ++k) b.axis(i, k)[lane] = s[k];
     }
   return b;
@@ -35,12 +35,12 @@ double squared_error(ZonalBatch& b, size_t lane) {
 }
 
 void turn_axis(ZonalBatch& b, size_t lane, int angle, double by) {
-  glm::dvec3 s(b.axis(angle / 2, 0)[lane], b.axis(angle / 2, 1)[lane], b.axis(angle / 2, 2)[lane]);
+  Vec3d s(b.axis(angle / 2, 0)[lane], b.axis(angle / 2, 1)[lane], b.axis(angle / 2, 2)[lane]);
   // frame_about in double.
   const double sign = std::copysign(1.0, s.z), a = -1 / (sign + s.z), c = s.x * s.y * a;
-  const glm::dvec3 tangent = angle % 2 ? glm::dvec3(c, sign + s.y * s.y * a, -s.y)
-                                       : glm::dvec3(1 + sign * s.x * s.x * a, sign * c, -sign * s.x);
-  s = glm::normalize(s * std::cos(by) + tangent * std::sin(by));
+  const Vec3d tangent = angle % 2 ? Vec3d(c, sign + s.y * s.y * a, -s.y)
+                                  : Vec3d(1 + sign * s.x * s.x * a, sign * c, -sign * s.x);
+  s = normalize(s * std::cos(by) + tangent * std::sin(by));
   for (int k = 0; k < 3; ++k) b.axis(angle / 2, k)[lane] = s[k];
 }
 
@@ -124,13 +124,13 @@ TEST(ZonalKernel, DerivativesAreThoseOfDifferences) {
               ZonalBatch moved = b;
               const double far = 1e-4;
               if (a == 1) {  // two angles of one axis: the frame turns with the first, so go along their diagonal
-                const glm::dvec3 axis(b.axis(0, 0)[lane], b.axis(0, 1)[lane], b.axis(0, 2)[lane]);
+                const Vec3d axis(b.axis(0, 0)[lane], b.axis(0, 1)[lane], b.axis(0, 2)[lane]);
                 const double sign = std::copysign(1.0, axis.z), q = -1 / (sign + axis.z), c = axis.x * axis.y * q;
-                const glm::dvec3 u(1 + sign * axis.x * axis.x * q, sign * c, -sign * axis.x),
+                const Vec3d u(1 + sign * axis.x * axis.x * q, sign * c, -sign * axis.x),
                     v(c, sign + axis.y * axis.y * q, -axis.y);
-                const glm::dvec3 along = (u * double(sa) + v * double(sb)) * (far);
-                const double length = glm::length(along);
-                const glm::dvec3 to = axis * std::cos(length) + along / length * std::sin(length);
+                const Vec3d along = (u * double(sa) + v * double(sb)) * (far);
+                const double length = lambent::length(along);
+                const Vec3d to = axis * std::cos(length) + along / length * std::sin(length);
                 for (int k = 0; k < 3; ++k) moved.axis(0, k)[lane] = to[k];
               } else {
                 turn_axis(moved, lane, 0, sa * far), turn_axis(moved, lane, int(a), sb * far);
@@ -182,9 +182,9 @@ TEST(ZonalKernel, StartsFromTheBestOfItsDirections) {
     compare();
   }
   for (size_t lane = 0; lane < zonal_lanes; ++lane) {
-    glm::dvec3 axis(0.0);
-    for (int c = 0; c < 2; ++c) axis += glm::dvec3(-b.target(c, 3)[lane], -b.target(c, 1)[lane], b.target(c, 2)[lane]);
-    axis = glm::normalize(axis);
+    Vec3d axis(0.0);
+    for (int c = 0; c < 2; ++c) axis += Vec3d(-b.target(c, 3)[lane], -b.target(c, 1)[lane], b.target(c, 2)[lane]);
+    axis = normalize(axis);
     for (int k = 0; k < 3; ++k) b.axis(0, k)[lane] = axis[k];
   }
   compare();

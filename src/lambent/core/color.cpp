@@ -5,7 +5,7 @@
 
 namespace lambent {
 
-glm::dvec3 cie_matching_functions(double nm) {
+Vec3d cie_matching_functions(double nm) {
   auto lobe = [nm](double height, double centre, double below, double above) {
     double t = (nm - centre) / (nm < centre ? below : above);
     return height * std::exp(-0.5 * t * t);
@@ -15,7 +15,7 @@ glm::dvec3 cie_matching_functions(double nm) {
           lobe(1.217, 437.0, 11.8, 36.0) + lobe(0.681, 459.0, 26.0, 13.8)};
 }
 
-glm::dvec3 rec709_from_xyz(glm::dvec3 c) {
+Vec3d rec709_from_xyz(Vec3d c) {
   return {3.2409699 * c.x - 1.5373832 * c.y - 0.4986108 * c.z, -0.9692436 * c.x + 1.8759675 * c.y + 0.0415551 * c.z,
           0.0556301 * c.x - 0.2039770 * c.y + 1.0569715 * c.z};
 }

@@ -34,8 +34,8 @@ TEST(Sampling, WarpsHaveTheirMoments) {
   const int n = 4096;
   for (uint32_t i = 0; i < n; ++i) {
     const Vec3 a = square_to_cosine_hemisphere(sobol_owen(i, 1)), b = square_to_sphere(sobol_owen(i, 2));
-    EXPECT_NEAR(glm::length(a), 1, 1e-5f);
-    EXPECT_NEAR(glm::length(b), 1, 1e-5f);
+    EXPECT_NEAR(length(a), 1, 1e-5f);
+    EXPECT_NEAR(length(b), 1, 1e-5f);
     cosine += a / float(n), cosine_z2 += a.z * a.z / float(n);
     sphere += b / float(n), sphere_squared += b * b / float(n);
   }
@@ -66,20 +66,20 @@ TEST(Sampling, DiskGoesBackToTheSquare) {
 TEST(Vec, YawTurnsXTowardsMinusZ) {
   // A right-handed turn about +Y takes +Z to +X and +X to -Z.
   const Mat3 yaw = rotation_from_yaw_pitch_roll({90, 0, 0});
-  EXPECT_NEAR(glm::length(yaw * Vec3(0, 0, 1) - Vec3(1, 0, 0)), 0, 1e-6f);
+  EXPECT_NEAR(length(yaw * Vec3(0, 0, 1) - Vec3(1, 0, 0)), 0, 1e-6f);
   const Mat3 pitch = rotation_from_yaw_pitch_roll({0, 90, 0});
-  EXPECT_NEAR(glm::length(pitch * Vec3(0, 1, 0) - Vec3(0, 0, 1)), 0, 1e-6f);
+  EXPECT_NEAR(length(pitch * Vec3(0, 1, 0) - Vec3(0, 0, 1)), 0, 1e-6f);
   const Mat3 roll = rotation_from_yaw_pitch_roll({0, 0, 90});
-  EXPECT_NEAR(glm::length(roll * Vec3(1, 0, 0) - Vec3(0, 1, 0)), 0, 1e-6f);
+  EXPECT_NEAR(length(roll * Vec3(1, 0, 0) - Vec3(0, 1, 0)), 0, 1e-6f);
   const Mat3 all = rotation_from_yaw_pitch_roll({20, 30, 40});
-  EXPECT_NEAR(glm::determinant(all), 1, 1e-5f);
+  EXPECT_NEAR(determinant(all), 1, 1e-5f);
 }
 
 TEST(Vec, FramesAreRightHandedAndOrthonormal) {
   for (uint32_t i = 0; i < 200; ++i) {
     const Mat3 f = frame_about(square_to_sphere(sobol_owen(i, 3)));
-    EXPECT_NEAR(glm::dot(f[0], f[1]), 0, 1e-6f);
-    EXPECT_NEAR(glm::length(glm::cross(f[0], f[1]) - f[2]), 0, 1e-5f);
+    EXPECT_NEAR(dot(f[0], f[1]), 0, 1e-6f);
+    EXPECT_NEAR(length(cross(f[0], f[1]) - f[2]), 0, 1e-5f);
   }
 }
 

@@ -53,14 +53,14 @@ Vec2 square_to_disk(Vec2 u) {
 }
 
 Vec2 disk_to_square(Vec2 d) {
-  const float r = glm::length(d);
+  const float r = length(d);
   if (r == 0) return Vec2(0.5f);
   // Within the quarter of the disk about an axis, the coordinate along it is +-r and the other that times 4 phi / pi,
   // phi from the axis.
   float a, b;
   if (std::abs(d.x) > std::abs(d.y)) a = std::copysign(r, d.x), b = a * (4 / pi) * std::atan(d.y / d.x);
   else b = std::copysign(r, d.y), a = b * (4 / pi) * std::atan(d.x / d.y);
-  return glm::clamp(0.5f * (Vec2(a, b) + 1.0f), Vec2(0), Vec2(1));
+  return clamp(0.5f * (Vec2(a, b) + 1.0f), Vec2(0), Vec2(1));
 }
 
 Vec3 square_to_cosine_hemisphere(Vec2 u) {

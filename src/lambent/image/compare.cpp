@@ -70,7 +70,7 @@ Image difference_picture(const Image& a, const Image& b, float exposure, float w
   for (Image& panel : panels) panel = Image(a.width, a.height + 2 * strip);
   for (int y = 0; y < a.height; ++y)
     for (int x = 0; x < a.width; ++x) {
-      Vec3 va = shown_a.at(x, y), vb = shown_b.at(x, y), d = glm::abs(va - vb);
+      Vec3 va = shown_a.at(x, y), vb = shown_b.at(x, y), d = abs(va - vb);
       for (int c = 0; c < 3; ++c)
         panels[0].at(x, y + strip)[c] = srgb_decode(va[c]), panels[1].at(x, y + strip)[c] = srgb_decode(vb[c]);
       panels[2].at(x, y + strip) = false_color(std::max({d.x, d.y, d.z}) / white);

@@ -30,26 +30,26 @@ double mean(const std::vector<float>& values) {
 struct SlowFlip {
   double ppd;
   int width, height;
-  using Field = std::vector<glm::dvec3>;
+  using Field = std::vector<Vec3d>;
 
   static constexpr double m[3][3] = {
       {0.41239080, 0.35758434, 0.18048079}, {0.21263901, 0.71516868, 0.07219232}, {0.01933082, 0.11919478, 0.95053215}};
   static constexpr double inv[3][3] = {{3.24096994, -1.53738318, -0.49861076},
                                        {-0.96924364, 1.87596750, 0.04155506},
                                        {0.05563008, -0.20397696, 1.05697151}};
-  static glm::dvec3 apply(const double (&a)[3][3], glm::dvec3 v) {
+  static Vec3d apply(const double (&a)[3][3], Vec3d v) {
     return {a[0][0] * v.x + a[0][1] * v.y + a[0][2] * v.z, a[1][0] * v.x + a[1][1] * v.y + a[1][2] * v.z,
             a[2][0] * v.x + a[2][1] * v.y + a[2][2] * v.z};
   }
-  static glm::dvec3 white() { return apply(m, glm::dvec3(1)); }
+  static Vec3d white() { return apply(m, Vec3d(1)); }
 
-  static glm::dvec3 hunt_lab(glm::dvec3 linear) {
-    glm::dvec3 t = apply(m, linear) / white();
+  static Vec3d hunt_lab(Vec3d linear) {
+    Vec3d t = apply(m, linear) / white();
     for (int k = 0; k < 3; ++k) t[k] = t[k] > 216.0 / 24389 ? std::cbrt(t[k]) : (24389.0 / 27 * t[k] + 16) / 116;
     double L = 116 * t.y - 16;
     return {L, 0.01 * L * 500 * (t.x - t.y), 0.01 * L * 200 * (t.y - t.z)};
   }
-  static double hyab(glm::dvec3 a, glm::dvec3 b) { return std::abs(a.x - b.x) + std::hypot(a.y - b.y, a.z - b.z); }
+  static double hyab(Vec3d a, Vec3d b) { return std::abs(a.x - b.x) + std::hypot(a.y - b.y, a.z - b.z); }
 
   template <class Weight>  // of offset (x, y) in pixels
   double filter(const Field& f, int k, int px, int py, int radius, Weight weight, bool by_sign) const {
@@ -71,20 +71,20 @@ struct SlowFlip {
   Field opponent(const Image& image) const {
     Field out;
     for (Vec3 c : image.rgb) {
-      glm::dvec3 linear;
+      Vec3d linear;
       for (int k = 0; k < 3; ++k)
         linear[k] = c[k] <= 0.04045 ? c[k] / 12.92 : std::pow((double(c[k]) + 0.055) / 1.055, 2.4);
-      glm::dvec3 t = apply(m, linear) / white();
+      Vec3d t = apply(m, linear) / white();
       out.push_back({116 * t.y - 16, 500 * (t.x - t.y), 200 * (t.y - t.z)});
     }
     return out;
   }
 
-  glm::dvec3 perceived(const Field& f, int px, int py) const {
+  Vec3d perceived(const Field& f, int px, int py) const {
     static constexpr double parameters[3][4] = {{1, 0.0047, 0, 1e-5}, {1, 0.0053, 0, 1e-5}, {34.1, 0.04, 13.5, 0.025}};
     const double pi2 = std::pow(std::acos(-1.0), 2);
     int radius = int(std::ceil(3 * std::sqrt(0.04 / (2 * pi2)) * ppd));
-    glm::dvec3 c;
+    Vec3d c;
     for (int k = 0; k < 3; ++k) {
       auto [a1, b1, a2, b2] = parameters[k];
       c[k] = filter(
@@ -97,12 +97,12 @@ struct SlowFlip {
           false);
     }
     double y = (c.x + 16) / 116;
-    glm::dvec3 linear = apply(inv, glm::dvec3(y + c.y / 500, y, y - c.z / 200) * white());
-    return hunt_lab(glm::clamp(linear, glm::dvec3(0), glm::dvec3(1)));
+    Vec3d linear = apply(inv, Vec3d(y + c.y / 500, y, y - c.z / 200) * white());
+    return hunt_lab(clamp(linear, Vec3d(0), Vec3d(1)));
   }
 
   // Edge and point strength.
-  glm::dvec2 features(const Field& f, int px, int py) const {
+  Vec2d features(const Field& f, int px, int py) const {
     double s = 0.5 * 0.082 * ppd;
     int radius = int(std::ceil(3 * s));
     auto g = [s](double x, double y) { return std::exp(-(x * x + y * y) / (2 * s * s)); };
@@ -124,7 +124,7 @@ struct SlowFlip {
 
   double error(const Field& a, const Field& b, int px, int py) const {
     double color = redistribute(hyab(perceived(a, px, py), perceived(b, px, py)));
-    glm::dvec2 fa = features(a, px, py), fb = features(b, px, py);
+    Vec2d fa = features(a, px, py), fb = features(b, px, py);
     double feature = std::sqrt(std::max(std::abs(fa.x - fb.x), std::abs(fa.y - fb.y)) / std::sqrt(2.0));
     return std::pow(color, 1 - feature);
   }
@@ -195,7 +195,7 @@ TEST(Flip, GrowsWithNoiseAndBlur) {
   for (float amplitude : {0.05f, 0.1f, 0.2f, 0.4f}) {
     Image test = scene;
     for (size_t i = 0; i < test.rgb.size(); ++i)
-      test.rgb[i] = glm::clamp(test.rgb[i] + amplitude * (grain.rgb[i] - Vec3(0.5f)), Vec3(0), Vec3(1));
+      test.rgb[i] = clamp(test.rgb[i] + amplitude * (grain.rgb[i] - Vec3(0.5f)), Vec3(0), Vec3(1));
     double now = mean(flip_map(scene, test));
     EXPECT_GT(now, last) << amplitude;
     last = now;

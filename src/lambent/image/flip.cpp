@@ -74,16 +74,16 @@ Kernel make_kernel(int radius, F f) {
 
 // --- Colour spaces
 
-using Matrix = glm::dmat3;
+using Matrix = Mat3d;
 
 // Rec. 709 to XYZ, rows X, Y, Z.
-const Matrix xyz_from_rgb = glm::transpose(
+const Matrix xyz_from_rgb = transpose(
     Matrix(0.41239080, 0.35758434, 0.18048079, 0.21263901, 0.71516868, 0.07219232, 0.01933082, 0.11919478, 0.95053215));
 const Mat3 relative_xyz_from_rgb = [] {  // white is (1, 1, 1)
-  glm::dvec3 white = xyz_from_rgb * glm::dvec3(1);
+  Vec3d white = xyz_from_rgb * Vec3d(1);
   return Mat3(Matrix(1 / white.x, 0, 0, 0, 1 / white.y, 0, 0, 0, 1 / white.z) * xyz_from_rgb);
 }();
-const Mat3 rgb_from_relative_xyz = Mat3(glm::inverse(glm::dmat3(relative_xyz_from_rgb)));
+const Mat3 rgb_from_relative_xyz = Mat3(inverse(Mat3d(relative_xyz_from_rgb)));
 
 // A linear version of CIELAB: luminance, red-green, blue-yellow.
 Vec3 ycxcz_from_xyz(Vec3 t) { return {116 * t.y - 16, 500 * (t.x - t.y), 200 * (t.y - t.z)}; }
@@ -183,7 +183,7 @@ Prepared prepare(const Image& displayed, float pixels_per_degree) {
   parallel_for(out.lab.size(), 4096, [&](size_t begin, size_t end) {
     for (size_t i = begin; i < end; ++i) {
       Vec3 opponent(channels[0].values[i], channels[1].values[i], channels[2].values[i]);
-      Vec3 linear = glm::clamp(rgb_from_relative_xyz * xyz_from_ycxcz(opponent), Vec3(0), Vec3(1));
+      Vec3 linear = clamp(rgb_from_relative_xyz * xyz_from_ycxcz(opponent), Vec3(0), Vec3(1));
       out.lab[i] = hunt_adjusted(cielab(linear));
     }
   });

@@ -359,7 +359,7 @@ Vec3 false_color(float x) {
   float X = 0.95047f * inverse(fy + a / 500), Y = inverse(fy), Z = 1.08883f * inverse(fy - b / 200);
   Vec3 rgb(3.2404542f * X - 1.5371385f * Y - 0.4985314f * Z, -0.9692660f * X + 1.8760108f * Y + 0.0415560f * Z,
            0.0556434f * X - 0.2040259f * Y + 1.0572252f * Z);
-  return glm::clamp(rgb, Vec3(0), Vec3(1));
+  return clamp(rgb, Vec3(0), Vec3(1));
 }
 
 }  // namespace lambent

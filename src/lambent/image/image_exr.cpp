@@ -213,17 +213,15 @@ std::string one_line(std::string text, const std::string& path) {
 
 // --- Colour
 
-using Matrix = glm::dmat3;
-
 // RGB -> XYZ with the white's Y = 1.
-Result<Matrix> xyz_from_rgb(Vec2 red, Vec2 green, Vec2 blue, Vec2 white) {
-  auto xyz = [](Vec2 c) { return glm::dvec3(c.x, c.y, 1.0 - double(c.x) - double(c.y)); };
-  Matrix primaries(xyz(red), xyz(green), xyz(blue));
-  double determinant = glm::determinant(primaries);
+Result<Mat3d> xyz_from_rgb(Vec2 red, Vec2 green, Vec2 blue, Vec2 white) {
+  auto xyz = [](Vec2 c) { return Vec3d(c.x, c.y, 1.0 - double(c.x) - double(c.y)); };
+  Mat3d primaries(xyz(red), xyz(green), xyz(blue));
+  double determinant = lambent::determinant(primaries);
   if (!(std::abs(determinant) > 1e-6) || !(std::abs(white.y) > 1e-6f) || !std::isfinite(determinant))
     return Error{"", "chromaticities do not span a colour space"};
-  glm::dvec3 scale = glm::inverse(primaries) * (xyz(white) / double(white.y));
-  return Matrix(primaries[0] * scale[0], primaries[1] * scale[1], primaries[2] * scale[2]);
+  Vec3d scale = inverse(primaries) * (xyz(white) / double(white.y));
+  return Mat3d(primaries[0] * scale[0], primaries[1] * scale[1], primaries[2] * scale[2]);
 }
 
 constexpr Vec2 rec709_red{0.64f, 0.33f}, rec709_green{0.30f, 0.60f}, rec709_blue{0.15f, 0.06f}, d65{0.3127f, 0.3290f};
@@ -281,13 +279,13 @@ Result<Mat3> rec709_from_primaries(Vec2 red, Vec2 green, Vec2 blue, Vec2 white) 
   auto source = xyz_from_rgb(red, green, blue, white),
        target = xyz_from_rgb(rec709_red, rec709_green, rec709_blue, d65);
   if (!source) return source.error();
-  const Matrix cone = glm::transpose(Matrix(0.8951, 0.2664, -0.1614, -0.7502, 1.7135, 0.0367, 0.0389, -0.0685, 1.0296));
-  const glm::dvec3 ones(1);
-  glm::dvec3 from = cone * (*source * ones), to = cone * (*target * ones);
+  const Mat3d cone = transpose(Mat3d(0.8951, 0.2664, -0.1614, -0.7502, 1.7135, 0.0367, 0.0389, -0.0685, 1.0296));
+  const Vec3d ones(1);
+  Vec3d from = cone * (*source * ones), to = cone * (*target * ones);
   for (int i = 0; i < 3; ++i)
     if (!(from[i] > 1e-6)) return Error{"", "white point is not a colour"};
-  Matrix adapt = glm::inverse(cone) * Matrix(to.x / from.x, 0, 0, 0, to.y / from.y, 0, 0, 0, to.z / from.z) * cone;
-  return Mat3(glm::inverse(*target) * adapt * *source);
+  Mat3d adapt = inverse(cone) * Mat3d(to.x / from.x, 0, 0, 0, to.y / from.y, 0, 0, 0, to.z / from.z) * cone;
+  return Mat3(inverse(*target) * adapt * *source);
 }
 
 Result<Image> load_exr(std::span<const uint8_t> bytes, const std::string& path) {

@@ -59,7 +59,7 @@ void add_part(int size, int face, int column, int row, const Polygon& p, Parts& 
   if (!(twice > 0)) return;
   const float third = 1 / (3 * twice), scale = 2 / float(size);
   const Vec3 point = cube_point(face, (x0 + cx * third) * scale - 1, (y0 + cy * third) * scale - 1);
-  const float inverse = 1 / std::sqrt(glm::dot(point, point)), solid_angle = 0.5f * twice * inverse * inverse * inverse;
+  const float inverse = 1 / std::sqrt(dot(point, point)), solid_angle = 0.5f * twice * inverse * inverse * inverse;
   out.at[out.count++] = {cube_texel(size, face, column, row), solid_angle, point * inverse};
   out.total += solid_angle;
 }
@@ -109,9 +109,9 @@ void add_over_edges(int size, const Corner* const (&corners)[4], Parts& out) {
     Polygon p, inside, outside;
     bool near = true;
     for (const Corner* c : corners) {
-      const float along = glm::dot(axis, c->d);
+      const float along = dot(axis, c->d);
       near &= along > 0.4f;  // on the face it would be 0.577 at least
-      p.add(0, (glm::dot(u, c->d) / along + 1) * 0.5f * end, (glm::dot(v, c->d) / along + 1) * 0.5f * end);
+      p.add(0, (dot(u, c->d) / along + 1) * 0.5f * end, (dot(v, c->d) / along + 1) * 0.5f * end);
     }
     if (!near) continue;
     for (int axis_of_face = 0; axis_of_face < 2; ++axis_of_face) {
@@ -210,7 +210,7 @@ CubeLight cube_light(const Environment& env, int size, const Mat3& rotation) {
           total.energy += sums[piece][t].energy, total.moment += sums[piece][t].moment;
         const auto place = [&](int k) { return (2 * float(k) + 1) / float(size) - 1; };
         light.energy[t] = total.energy;
-        light.direction[t] = normalize_or(total.moment, glm::normalize(cube_point(face, place(column), place(row))));
+        light.direction[t] = normalize_or(total.moment, normalize(cube_point(face, place(column), place(row))));
       }
   });
   return light;
@@ -225,10 +225,10 @@ Environment reduced(const Environment& env, int width) {
   out.image = Image(w / factor, h / factor);
   for (int y = 0; y < h / factor; ++y)
     for (int x = 0; x < w / factor; ++x) {
-      glm::dvec3 sum(0);
+      Vec3d sum(0);
       for (int j = 0; j < factor; ++j)
         for (int i = 0; i < factor; ++i)
-          sum += glm::dvec3(env.image.at(x * factor + i, y * factor + j)) * texel_solid_angle(y * factor + j, w, h);
+          sum += Vec3d(env.image.at(x * factor + i, y * factor + j)) * texel_solid_angle(y * factor + j, w, h);
       out.image.at(x, y) = Vec3(sum / texel_solid_angle(y, w / factor, h / factor));
     }
   return out;

@@ -15,11 +15,11 @@ Environment sunny(int width) {
   return env;
 }
 
-glm::dvec3 energy(const Environment& env) {
-  glm::dvec3 sum(0);
+Vec3d energy(const Environment& env) {
+  Vec3d sum(0);
   for (int y = 0; y < env.image.height; ++y)
     for (int x = 0; x < env.image.width; ++x)
-      sum += glm::dvec3(env.image.at(x, y)) * texel_solid_angle(y, env.image.width, env.image.height);
+      sum += Vec3d(env.image.at(x, y)) * texel_solid_angle(y, env.image.width, env.image.height);
   return sum;
 }
 
@@ -29,9 +29,9 @@ TEST(CubeLight, LosesNoEnergyAtAnySizeOrRotation) {
       for (Vec3 turn : {Vec3(0), Vec3(33, 20, -71)}) {
         const Environment env = sunny(width);
         const CubeLight light = cube_light(env, size, rotation_from_yaw_pitch_roll(turn));
-        glm::dvec3 sum(0);
-        for (Vec3 e : light.energy) sum += glm::dvec3(e);
-        const glm::dvec3 whole = energy(env);
+        Vec3d sum(0);
+        for (Vec3 e : light.energy) sum += Vec3d(e);
+        const Vec3d whole = energy(env);
         for (int c = 0; c < 3; ++c) EXPECT_NEAR(sum[c] / whole[c], 1, 2e-6) << width << " " << size;
       }
 }
@@ -54,14 +54,13 @@ TEST(CubeLight, EachTexelHasItsShare) {
       make_environment("steep", 64, 32, [](Vec3 d) { return Vec3(std::exp(3 * d.x), 1 + d.y, d.z * d.z); });
   const Mat3 R = rotation_from_yaw_pitch_roll({50, -30, 15});
   const CubeLight light = cube_light(env, 16, R);
-  std::vector<glm::dvec3> drawn(cube_texels(16), glm::dvec3(0));
+  std::vector<Vec3d> drawn(cube_texels(16), Vec3d(0));
   const int draws = 1 << 22;
   for (int i = 0; i < draws; ++i) {
     const Vec3 d = square_to_sphere(sobol_owen(uint32_t(i), 5));
     const CubePlace p = cube_place(R * d);
     auto cell = [](float u) { return std::min(int((u + 1) * 8), 15); };
-    drawn[cube_texel(16, p.face, cell(p.u), cell(p.v))] += glm::dvec3(radiance(env, d)) *
-                                                           (4 * std::numbers::pi / draws);
+    drawn[cube_texel(16, p.face, cell(p.u), cell(p.v))] += Vec3d(radiance(env, d)) * (4 * std::numbers::pi / draws);
   }
   double difference = 0, total = 0;
   for (size_t t = 0; t < drawn.size(); ++t)
@@ -77,11 +76,11 @@ TEST(CubeLight, GivesThePlanesIrradiance) {
   Random random(9);
   for (int i = 0; i < 200; ++i) {
     const Vec3 n = square_to_sphere(random.next2());
-    if (std::abs(glm::dot(n, texel_direction(512 / 3, 512 / 9, 512, 256))) < 0.03f)
+    if (std::abs(dot(n, texel_direction(512 / 3, 512 / 9, 512, 256))) < 0.03f)
       continue;  // the sun stands on the horizon
-    glm::dvec3 sum(0);
+    Vec3d sum(0);
     for (size_t t = 0; t < light.energy.size(); ++t)
-      sum += glm::dvec3(light.energy[t] * std::max(0.0f, glm::dot(light.direction[t], n)));
+      sum += Vec3d(light.energy[t] * std::max(0.0f, dot(light.direction[t], n)));
     const Vec3 truth = irradiance(env, n);
     for (int c = 0; c < 3; ++c) EXPECT_NEAR(sum[c] / double(truth[c]), 1, 1e-3);
   }
@@ -90,7 +89,7 @@ TEST(CubeLight, GivesThePlanesIrradiance) {
 TEST(CubeLight, ReducingKeepsEnergyAndSaysWhereOneTexelHasItAll) {
   const Environment env = sunny(512), half = reduced(env, 256);
   EXPECT_EQ(half.image.width, 256);
-  const glm::dvec3 before = energy(env), after = energy(half);
+  const Vec3d before = energy(env), after = energy(half);
   for (int c = 0; c < 3; ++c) EXPECT_NEAR(after[c] / before[c], 1, 1e-6);
   EXPECT_EQ(reduced(env, 512).image.width, 512);
   Environment dark = make_environment("dark", 256, 128, [](Vec3) { return Vec3(0); });

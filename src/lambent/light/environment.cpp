@@ -19,7 +19,7 @@ int cell(float x, int count) {
 }
 
 // Integral of the direction over a texel, without the factor of the azimuth: (equatorial, vertical) for rows y.
-glm::dvec2 row_moments(int y, int height) {
+Vec2d row_moments(int y, int height) {
   double top = pi_d * y / height, bottom = pi_d * (y + 1) / height;
   auto equatorial = [](double t) { return 0.5 * (t - std::sin(t) * std::cos(t)); };  // of sin^2
   return {equatorial(bottom) - equatorial(top),
@@ -112,8 +112,8 @@ double texel_solid_angle(int y, int width, int height) {
   return 2 * pi_d / width * 2 * std::sin(pi_d * (y + 0.5) / height) * std::sin(0.5 * pi_d / height);
 }
 
-glm::dvec3 texel_moment(int x, int y, int width, int height) {
-  const glm::dvec2 moments = row_moments(y, height);
+Vec3d texel_moment(int x, int y, int width, int height) {
+  const Vec2d moments = row_moments(y, height);
   const double phi = 2 * pi_d * ((x + 0.5) / width - 0.5), column = 2 * std::sin(pi_d / width);
   return {moments.x * column * std::cos(phi), 2 * pi_d / width * moments.y, moments.x * column * std::sin(phi)};
 }
@@ -141,17 +141,17 @@ Environment rotated(const Environment& env, const Mat3& R, int supersample) {
   Environment out;
   int width = env.image.width, height = env.image.height;
   out.name = env.name, out.warnings = env.warnings, out.image = Image(width, height);
-  Mat3 inverse = glm::transpose(R);
+  Mat3 inverse = transpose(R);
   parallel_for(size_t(height), 4, [&](size_t begin, size_t end) {
     for (size_t row = begin; row < end; ++row) {
       double top = std::cos(pi_d * double(row) / height), bottom = std::cos(pi_d * double(row + 1) / height);
       for (int x = 0; x < width; ++x) {
-        glm::dvec3 sum(0);
+        Vec3d sum(0);
         for (int j = 0; j < supersample; ++j) {
           double c = top + (bottom - top) * (j + 0.5) / supersample, s = std::sqrt(std::max(0.0, 1 - c * c));
           for (int i = 0; i < supersample; ++i) {
             double phi = 2 * pi_d * ((x + (i + 0.5) / supersample) / width - 0.5);
-            sum += glm::dvec3(radiance(env, inverse * Vec3(s * std::cos(phi), c, s * std::sin(phi))));
+            sum += Vec3d(radiance(env, inverse * Vec3(s * std::cos(phi), c, s * std::sin(phi))));
           }
         }
         out.image.at(x, int(row)) = Vec3(sum / double(supersample * supersample));
@@ -174,19 +174,19 @@ Vec3 irradiance(const Environment& env, Vec3 n) {
   int width = env.image.width, height = env.image.height;
   // Integral of cos(phi) or sin(phi) over a column: its centre's value times this.
   double column = 2 * std::sin(pi_d / width);
-  std::vector<glm::dvec2> columns;
+  std::vector<Vec2d> columns;
   for (int x = 0; x < width; ++x) {
     double phi = 2 * pi_d * ((x + 0.5) / width - 0.5);
-    columns.push_back(column * glm::dvec2(std::cos(phi), std::sin(phi)));
+    columns.push_back(column * Vec2d(std::cos(phi), std::sin(phi)));
   }
-  glm::dvec3 sum(0);
+  Vec3d sum(0);
   for (int y = 0; y < height; ++y) {
-    glm::dvec2 moments = row_moments(y, height);
+    Vec2d moments = row_moments(y, height);
     double vertical = 2 * pi_d / width * moments.y * double(n.y);
     for (int x = 0; x < width; ++x) {
-      const glm::dvec2& c = columns[size_t(x)];
+      const Vec2d& c = columns[size_t(x)];
       double cosine = vertical + moments.x * (double(n.x) * c.x + double(n.z) * c.y);
-      if (cosine > 0) sum += cosine * glm::dvec3(env.image.at(x, y));
+      if (cosine > 0) sum += cosine * Vec3d(env.image.at(x, y));
     }
   }
   return Vec3(sum);

@@ -38,7 +38,7 @@ Vec2 latlong_uv(Vec3 direction);
 // Exact solid angle of a texel in row y: (2 pi / width)(cos theta_top - cos theta_bottom). They sum to 4 pi.
 double texel_solid_angle(int y, int width, int height);
 // Integral of the unit direction over a texel, exact: its solid angle times the mean direction.
-glm::dvec3 texel_moment(int x, int y, int width, int height);
+Vec3d texel_moment(int x, int y, int width, int height);
 
 // Radiance from direction d (unit): the texel it falls in, or interpolated bilinearly between texel centres (around the
 // seam; above the first and below the last row's centres that row alone).

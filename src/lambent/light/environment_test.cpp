@@ -97,8 +97,8 @@ TEST(Irradiance, ClosedForms) {
   Environment front = make_environment("front", 256, 128, [](Vec3 d) { return d.z > 0 ? Vec3(1) : Vec3(0); });
   constexpr float horizon_texels = 1e-4f;  // relative; texels that the plane's horizon cuts through
   for (float degrees : {0.0f, 17.0f, 45.0f, 90.0f, 120.0f, 180.0f}) {
-    float t = glm::radians(degrees);
-    Vec3 n = glm::normalize(Vec3(std::sin(t) * 0.8f, std::cos(t), std::sin(t) * 0.6f));
+    float t = radians(degrees);
+    Vec3 n = normalize(Vec3(std::sin(t) * 0.8f, std::cos(t), std::sin(t) * 0.6f));
     expect_near(irradiance(*uniform, n) / (pi * Vec3(2, 3, 0.25f)), Vec3(1), horizon_texels);
     EXPECT_NEAR(irradiance(upper, n).x, pi * (1 + std::cos(t)) / 2, pi * horizon_texels) << degrees;
     EXPECT_NEAR(irradiance(front, n).x, pi * (1 + n.z) / 2, pi * horizon_texels) << degrees;
@@ -123,7 +123,7 @@ TEST(Rotated, IrradianceTurnsAlong) {
   Mat3 R = rotation_from_yaw_pitch_roll({35, -50, 110});
   Environment turned = rotated(env, R);
   constexpr float resampling = 0.01f;
-  for (Vec3 n : {Vec3(1, 0, 0), Vec3(0, 1, 0), glm::normalize(Vec3(1, -2, 3))})
+  for (Vec3 n : {Vec3(1, 0, 0), Vec3(0, 1, 0), normalize(Vec3(1, -2, 3))})
     expect_near(irradiance(turned, R * n), irradiance(env, n), resampling);
 }
 
@@ -253,14 +253,14 @@ TEST(EnvironmentSampler, UniformWithinATexel) {
   env.image.at(2, 0) =
       Vec3(1);  // phi in [0, 90], theta in [0, 90] degrees: an octant, whose mean direction is (1, 1, 1) / 2
   EnvironmentSampler sampler = make_environment_sampler(env);
-  glm::dvec3 sum(0);
+  Vec3d sum(0);
   constexpr int side = 200;
   for (int j = 0; j < side; ++j)
     for (int i = 0; i < side; ++i) {
       EnvironmentSample s = sample_environment(sampler, {(float(i) + 0.5f) / side, (float(j) + 0.5f) / side});
       EXPECT_TRUE(s.direction.x >= -1e-6f && s.direction.y >= -1e-6f && s.direction.z >= -1e-6f);
       ASSERT_NEAR(s.pdf, 2 / pi, 1e-6f);
-      sum += glm::dvec3(s.direction);
+      sum += Vec3d(s.direction);
     }
   constexpr float midpoint_rule = 1e-4f;
   expect_near(Vec3(sum / double(side * side)), Vec3(0.5f), midpoint_rule);
@@ -272,15 +272,15 @@ TEST(EnvironmentSampler, EstimatesThePowerOfNegativeLightToo) {
   // Luminance cancels here, yet blue must not be missed.
   env.image.at(4, 4) = Vec3(-0.0722f, 0, 0.2126f) * 3000.0f;
   EnvironmentSampler sampler = make_environment_sampler(env);
-  glm::dvec3 exact(0), estimate(0), squares(0);
+  Vec3d exact(0), estimate(0), squares(0);
   for (int y = 0; y < 12; ++y)
-    for (int x = 0; x < 24; ++x) exact += glm::dvec3(env.image.at(x, y)) * texel_solid_angle(y, 24, 12);
+    for (int x = 0; x < 24; ++x) exact += Vec3d(env.image.at(x, y)) * texel_solid_angle(y, 24, 12);
   constexpr int draws = 200000;
   Random random(2);
   for (int i = 0; i < draws; ++i) {
     EnvironmentSample s = sample_environment(sampler, random.next2());
     ASSERT_GT(s.pdf, 0);
-    glm::dvec3 value = glm::dvec3(s.radiance) / double(s.pdf);
+    Vec3d value = Vec3d(s.radiance) / double(s.pdf);
     estimate += value / double(draws), squares += value * value / double(draws);
   }
   constexpr double sigmas = 4;
@@ -295,7 +295,7 @@ TEST(EnvironmentSampler, SampleAgreesWithLookUps) {
   int different = 0;
   for (int i = 0; i < 20000; ++i) {
     EnvironmentSample s = sample_environment(sampler, random.next2());
-    EXPECT_NEAR(glm::length(s.direction), 1, 1e-6f);
+    EXPECT_NEAR(length(s.direction), 1, 1e-6f);
     different += radiance(env, s.direction) != s.radiance || environment_pdf(sampler, s.direction) != s.pdf;
   }
   constexpr int on_borders = 10;  // directions rounded across the border between two texels

@@ -65,12 +65,12 @@ std::vector<Lobe> find_lamps(const Environment& env, int count) {
     for (size_t k = 0; k < region.size(); ++k) grow(region[k], edge);
     for (size_t k = 0, inside = region.size(); k < inside; ++k) grow(region[k], 0);  // the rim
     double strength = 0;
-    glm::dvec3 moment(0);
+    Vec3d moment(0);
     for (size_t texel : region) {
       strength += brightness(texel) * texel_solid_angle(int(texel / size_t(w)), w, h);
       moment += brightness(texel) * texel_moment(int(texel % size_t(w)), int(texel / size_t(w)), w, h);
     }
-    const double length = glm::length(moment), sharpness = sharpness_of(length / strength);
+    const double length = lambent::length(moment), sharpness = sharpness_of(length / strength);
     if (sharpness >= least_sharpness) lamps.push_back({strength, {Vec3(moment / length), float(sharpness)}});
   }
   std::stable_sort(lamps.begin(), lamps.end(), [](const Lamp& a, const Lamp& b) { return a.strength > b.strength; });

@@ -18,7 +18,7 @@ struct Disc {
 Environment discs(const std::vector<Disc>& list, int width = 1024) {
   return make_environment("discs", width, width / 2, [&](Vec3 d) {
     for (const Disc& disc : list)
-      if (glm::dot(d, disc.axis) > std::cos(disc.radius)) return disc.radiance;
+      if (dot(d, disc.axis) > std::cos(disc.radius)) return disc.radiance;
     return Vec3(0.2f, 0.25f, 0.3f) * (1 + 0.5f * d.x - 0.3f * d.z);
   });
 }
@@ -27,16 +27,16 @@ float strength(const Disc& d) { return (d.radiance.x + d.radiance.y + d.radiance
 
 TEST(EnvironmentLamps, AreFoundWhereTheyStand) {
   // The second crosses the seam of the map, the third lies on the zenith.
-  const std::vector<Disc> list{{glm::normalize(Vec3(0.3f, 0.8f, -0.5f)), 0.06f, Vec3(90, 80, 70)},
-                               {glm::normalize(Vec3(-1, 0.2f, 0.01f)), 0.09f, Vec3(5, 20, 10)},
-                               {glm::normalize(Vec3(0.01f, 1, 0.02f)), 0.08f, Vec3(3, 3, 30)},
-                               {glm::normalize(Vec3(0.5f, -0.4f, 0.6f)), 0.03f, Vec3(60, 60, 0)}};
+  const std::vector<Disc> list{{normalize(Vec3(0.3f, 0.8f, -0.5f)), 0.06f, Vec3(90, 80, 70)},
+                               {normalize(Vec3(-1, 0.2f, 0.01f)), 0.09f, Vec3(5, 20, 10)},
+                               {normalize(Vec3(0.01f, 1, 0.02f)), 0.08f, Vec3(3, 3, 30)},
+                               {normalize(Vec3(0.5f, -0.4f, 0.6f)), 0.03f, Vec3(60, 60, 0)}};
   for (size_t i = 1; i < list.size(); ++i) ASSERT_GT(strength(list[i - 1]), strength(list[i]));
   const auto lamps = find_lamps(discs(list), 10);
   ASSERT_EQ(lamps.size(), list.size());
   for (size_t i = 0; i < list.size(); ++i) {
     constexpr float texel = 2 * pi / 1024;
-    EXPECT_LT(glm::distance(lamps[i].axis, list[i].axis), texel / 2) << i;
+    EXPECT_LT(distance(lamps[i].axis, list[i].axis), texel / 2) << i;
     // A disc's mean cosine is (1 + cos radius) / 2; that of a sharp lobe 1 - 1/s.
     const float expected = 2 / (1 - std::cos(list[i].radius));
     EXPECT_NEAR(lamps[i].sharpness / expected, 1, 2 * texel / list[i].radius) << i;  // texels on the rim
@@ -57,12 +57,12 @@ TEST(EnvironmentLamps, AreNoneWhereNothingStandsOut) {
 TEST(EnvironmentLamps, HaveTheSharpnessOfALobe) {
   // An environment that is one lobe on black: what is brighter than a fifth of the peak is found, which is narrower.
   for (float s : {8.0f, 100.0f, 2000.0f}) {
-    const Vec3 axis = glm::normalize(Vec3(0.4f, 0.3f, -0.7f));
+    const Vec3 axis = normalize(Vec3(0.4f, 0.3f, -0.7f));
     const auto basis = make_directional_basis(0, LobeKind::von_mises_fisher, {{axis, s}});
     const std::vector<Vec3> one{Vec3(1)};
     const auto lamps = find_lamps(reconstruct_environment(basis, one, 4096), 3);
     ASSERT_GE(lamps.size(), 1u);
-    EXPECT_LT(glm::distance(lamps[0].axis, axis), 0.05f / std::sqrt(s));
+    EXPECT_LT(distance(lamps[0].axis, axis), 0.05f / std::sqrt(s));
     // Cut where it has fallen to c a sharp lobe's mean of 1 - cos is (1 - c + c ln c) / (1 - c) / s. That is a texel
     // beyond where it has fallen to 1/5; not so sharp ones are cut earlier, at four times the mean.
     const float radius = std::sqrt(2 * std::log(5.0f) / s) + 2 * pi / 4096, c = std::exp(-0.5f * s * radius * radius);
@@ -79,20 +79,20 @@ TEST(EnvironmentLamps, TheSunIsOneWhereverItStands) {
       ASSERT_TRUE(sky);
       const auto lamps = find_lamps(*sky, 5);
       ASSERT_EQ(lamps.size(), 1u) << azimuth << " " << width;
-      const float e = glm::radians(40.0f), a = glm::radians(azimuth);
-      EXPECT_LT(glm::distance(lamps[0].axis, Vec3(std::cos(e) * std::cos(a), std::sin(e), std::cos(e) * std::sin(a))),
+      const float e = radians(40.0f), a = radians(azimuth);
+      EXPECT_LT(distance(lamps[0].axis, Vec3(std::cos(e) * std::cos(a), std::sin(e), std::cos(e) * std::sin(a))),
                 0.5f * 2 * pi / float(width));
     }
 }
 
 TEST(EnvironmentLamps, AreNotTwiceTheSame) {
   // A sun in a glow that is cut off at its edge: a disc and a ring with the same axis.
-  const Vec3 axis = glm::normalize(Vec3(0.2f, 0.5f, 0.6f));
+  const Vec3 axis = normalize(Vec3(0.2f, 0.5f, 0.6f));
   for (float glow : {0.066f, 0.2f}) {
     const auto lamps =
         find_lamps(make_environment("glow", 1024, 512,
                                     [&](Vec3 d) {
-                                      const float angle = std::acos(std::min(1.0f, glm::dot(d, axis)));
+                                      const float angle = std::acos(std::min(1.0f, dot(d, axis)));
                                       return Vec3(angle < 0.06f ? 1000.0f : angle < glow ? 100.0f : 0.1f);
                                     }),
                    4);
@@ -103,10 +103,9 @@ TEST(EnvironmentLamps, AreNotTwiceTheSame) {
 }
 
 DirectionalBasis mixed_basis(float sharpest) {
-  return make_directional_basis(4, LobeKind::von_mises_fisher,
-                                {{glm::normalize(Vec3(0.3f, 0.8f, -0.5f)), sharpest},
-                                 {glm::normalize(Vec3(-0.7f, -0.1f, 0.4f)), 30},
-                                 {Vec3(0, 1, 0), 60}});
+  return make_directional_basis(
+      4, LobeKind::von_mises_fisher,
+      {{normalize(Vec3(0.3f, 0.8f, -0.5f)), sharpest}, {normalize(Vec3(-0.7f, -0.1f, 0.4f)), 30}, {Vec3(0, 1, 0), 60}});
 }
 
 std::vector<Vec3> uneven(size_t count) {
@@ -133,14 +132,14 @@ TEST(ProjectLobes, IntegratesLobesOfAnySharpnessOverTexels) {
     for (float s : {2.0f, 40.0f, 1500.0f, 1e5f}) {
       // Within half a standard deviation of the texel's corner or edge if sharp.
       const Vec3 axis =
-          glm::normalize(latlong_direction(Vec2((float(x) + 0.02f / std::sqrt(s)) / w, (float(y) + 0.3f) / h)));
+          normalize(latlong_direction(Vec2((float(x) + 0.02f / std::sqrt(s)) / w, (float(y) + 0.3f) / h)));
       Environment env = make_environment("texel", w, h, [](Vec3) { return Vec3(0); });
       env.image.at(x, y) = Vec3(2, 1, 0.5f);
       const auto basis = make_directional_basis(0, kind, {{axis, s}});
       const Vec3 light = project_environment(env, basis)[0];
       double sum = 0;
       const int fine = 3000;
-      const glm::dvec3 a = glm::normalize(glm::dvec3(axis));
+      const Vec3d a = normalize(Vec3d(axis));
       for (int j = 0; j < fine; ++j) {
         const double theta = std::numbers::pi * (y + (j + 0.5) / fine) / h, sine = std::sin(theta);
         for (int i = 0; i < fine; ++i) {
@@ -159,20 +158,20 @@ TEST(ProjectLobes, AreTurnedWithTheEnvironment) {
   const Mat3 R = rotation_from_yaw_pitch_roll({40, 25, -70});
   const auto basis = mixed_basis(400);
   const Environment env =
-      discs({{glm::normalize(Vec3(0.3f, 0.5f, -0.5f)), 0.2f, Vec3(9, 8, 7)}, {Vec3(0, 0, 1), 0.3f, Vec3(1, 5, 3)}});
+      discs({{normalize(Vec3(0.3f, 0.5f, -0.5f)), 0.2f, Vec3(9, 8, 7)}, {Vec3(0, 0, 1), 0.3f, Vec3(1, 5, 3)}});
   const auto turned = project_environment(env, basis, R), resampled = project_environment(rotated(env, R, 6), basis);
   // Resampling blurs the discs' rims by a texel.
   for (size_t i = 0; i < turned.size(); ++i)
     for (int c = 0; c < 3; ++c) EXPECT_NEAR(turned[i][c], resampled[i][c], 0.01f) << i;
   const auto still = project_environment(env, basis);
   double moved = 0;
-  for (size_t i = 0; i < still.size(); ++i) moved += glm::length(still[i] - turned[i]);
+  for (size_t i = 0; i < still.size(); ++i) moved += length(still[i] - turned[i]);
   EXPECT_GT(moved, 1);
 }
 
 TEST(ProjectLobes, ReconstructsEnergyAtAnyWidth) {
   // Sharper than texels are wide, at the pole and elsewhere.
-  for (Vec3 axis : {Vec3(0, 1, 0), glm::normalize(Vec3(0.3f, -0.2f, 0.8f))}) {
+  for (Vec3 axis : {Vec3(0, 1, 0), normalize(Vec3(0.3f, -0.2f, 0.8f))}) {
     const auto basis = make_directional_basis(0, LobeKind::von_mises_fisher, {{axis, max_sharpness}});
     const std::vector<Vec3> one{Vec3(1)};
     for (int width : {64, 1024, 0}) {

@@ -13,7 +13,7 @@ constexpr double pi_d = std::numbers::pi;
 
 // Beyond `reach` a lobe has fallen below exp(-30) of its peak, less than a part in 10^12.
 struct PlacedLobe {
-  glm::dvec3 axis;
+  Vec3d axis;
   double sharpness, reach;
 };
 
@@ -21,7 +21,7 @@ PlacedLobe place(LobeKind kind, const Lobe& lobe, const Mat3& rotation) {
   const double s = lobe.sharpness,
                cosine = kind == LobeKind::cosine_power ? std::exp(-30 / s) : std::max(-1.0, 1 - 30 / s);
   // The environment turned by R meets the lobe about a as the environment itself meets the lobe about R^-1 a.
-  return {glm::normalize(glm::transpose(glm::dmat3(rotation)) * glm::dvec3(lobe.axis)), s, std::acos(cosine)};
+  return {normalize(transpose(Mat3d(rotation)) * Vec3d(lobe.axis)), s, std::acos(cosine)};
 }
 
 // Gauss nodes across `width` radians about 0, so many that a lobe of this sharpness is integrated to one part in 10^5
@@ -73,16 +73,16 @@ std::vector<Vec3> project_environment(const Environment& env, int order) {
   const int w = env.image.width, h = env.image.height, split = std::max(1, (1024 + w - 1) / w);
   const size_t coefficients = size_t(sh_count(order));
   // One partial sum a row of texels, added in order afterwards.
-  std::vector<glm::dvec3> rows(coefficients * size_t(h), glm::dvec3(0));
+  std::vector<Vec3d> rows(coefficients * size_t(h), Vec3d(0));
   parallel_for(size_t(h), 1, [&](size_t begin, size_t end) {
     std::vector<float> y(coefficients);
     for (size_t row = begin; row < end; ++row) {
-      glm::dvec3* sum = rows.data() + row * coefficients;
+      Vec3d* sum = rows.data() + row * coefficients;
       for (int s = 0; s < split; ++s) {
         const int fine_row = int(row) * split + s;
         const double solid_angle = texel_solid_angle(fine_row, w * split, h * split);
         for (int x = 0; x < w; ++x) {
-          const glm::dvec3 energy = glm::dvec3(env.image.at(x, int(row))) * solid_angle;
+          const Vec3d energy = Vec3d(env.image.at(x, int(row))) * solid_angle;
           for (int i = 0; i < split; ++i) {
             evaluate_sh(order, texel_direction(x * split + i, fine_row, w * split, h * split), y);
             for (size_t k = 0; k < coefficients; ++k) sum[k] += energy * double(y[k]);
@@ -93,7 +93,7 @@ std::vector<Vec3> project_environment(const Environment& env, int order) {
   });
   std::vector<Vec3> light(coefficients);
   for (size_t k = 0; k < coefficients; ++k) {
-    glm::dvec3 sum(0);
+    Vec3d sum(0);
     for (size_t row = 0; row < size_t(h); ++row) sum += rows[row * coefficients + k];
     light[k] = Vec3(sum);
   }
@@ -110,12 +110,12 @@ std::vector<Vec3> project_environment(const Environment& env, const DirectionalB
   std::vector<PlacedLobe> placed;
   for (const Lobe& lobe : basis.lobes) placed.push_back(place(basis.kind, lobe, rotation));
   // One partial sum a row of texels, added in order afterwards.
-  std::vector<glm::dvec3> rows(lobes * size_t(h), glm::dvec3(0));
+  std::vector<Vec3d> rows(lobes * size_t(h), Vec3d(0));
   parallel_for(size_t(h), 4, [&](size_t begin, size_t end) {
     for (size_t y = begin; y < end; ++y)
       for (size_t k = 0; k < lobes; ++k)
         integrate_lobe_over_row(basis.kind, placed[k], int(y), w, h, [&](int x, double integral) {
-          rows[y * lobes + k] += glm::dvec3(env.image.at(x, int(y))) * integral;
+          rows[y * lobes + k] += Vec3d(env.image.at(x, int(y))) * integral;
         });
   });
   std::vector<Vec3> light(basis.count());

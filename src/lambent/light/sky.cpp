@@ -99,30 +99,29 @@ SkyModel make_model(double elevation, double turbidity) {
   return m;
 }
 
-Vec3 sky_radiance(const SkyModel& m, Vec3 d, glm::dvec3 sun) {
+Vec3 sky_radiance(const SkyModel& m, Vec3 d, Vec3d sun) {
   double theta = std::acos(std::clamp(double(d.y), 0.0, 1.0)),
-         gamma = std::acos(std::clamp(glm::dot(glm::dvec3(d), sun), -1.0, 1.0));
+         gamma = std::acos(std::clamp(dot(Vec3d(d), sun), -1.0, 1.0));
   double Y = std::max(0.0, m.scale_Y * perez(m.perez_Y, theta, gamma)) / unit;
   double x = std::clamp(m.scale_x * perez(m.perez_x, theta, gamma), 0.05, 0.7);
   double y = std::clamp(m.scale_y * perez(m.perez_y, theta, gamma), 0.05, 0.7);
-  return Vec3(glm::max(rec709_from_xyz({x / y * Y, Y, (1 - x - y) / y * Y}), glm::dvec3(0)));
+  return Vec3(max(rec709_from_xyz({x / y * Y, Y, (1 - x - y) / y * Y}), Vec3d(0)));
 }
 
 // Deposits the disc: points of equal solid angle each give their share of the irradiance to the texel they fall in.
-void add_sun(Image& image, glm::dvec3 sun, Vec3 irradiance) {
+void add_sun(Image& image, Vec3d sun, Vec3 irradiance) {
   const int side =
       std::clamp(image.width / 4, 64, 1024);  // several points in each texel, also in the thin ones at the zenith
-  glm::dvec3 aside = glm::normalize(std::abs(sun.y) < 0.9 ? glm::cross(sun, glm::dvec3(0, 1, 0))
-                                                          : glm::cross(sun, glm::dvec3(1, 0, 0)));
-  glm::dvec3 up = glm::cross(aside, sun);
+  Vec3d aside = normalize(std::abs(sun.y) < 0.9 ? cross(sun, Vec3d(0, 1, 0)) : cross(sun, Vec3d(1, 0, 0)));
+  Vec3d up = cross(aside, sun);
   std::vector<int> points(image.rgb.size());
   for (int j = 0; j < side; ++j)
     for (int i = 0; i < side; ++i) {
-      glm::dvec2 p(square_to_disk({(float(i) + 0.5f) / float(side), (float(j) + 0.5f) / float(side)}));
-      double r = glm::length(p),
+      Vec2d p(square_to_disk({(float(i) + 0.5f) / float(side), (float(j) + 0.5f) / float(side)}));
+      double r = length(p),
              angle = 2 * std::asin(r * std::sin(sun_radius / 2));  // equal areas of the disc and the cap
-      glm::dvec2 around = p / r;                                   // never 0: points lie off the centre
-      glm::dvec3 d = std::cos(angle) * sun + std::sin(angle) * (around.x * aside + around.y * up);
+      Vec2d around = p / r;                                        // never 0: points lie off the centre
+      Vec3d d = std::cos(angle) * sun + std::sin(angle) * (around.x * aside + around.y * up);
       if (d.y <= 0) continue;
       Vec2 uv = latlong_uv(Vec3(d));
       int x = std::min(int(uv.x * float(image.width)), image.width - 1);
@@ -132,7 +131,7 @@ void add_sun(Image& image, glm::dvec3 sun, Vec3 irradiance) {
   for (size_t i = 0; i < points.size(); ++i)
     if (points[i] > 0) {
       double solid_angle = texel_solid_angle(int(i / size_t(image.width)), image.width, image.height);
-      image.rgb[i] += Vec3(glm::dvec3(irradiance) * (double(points[i]) / (double(side) * side) / solid_angle));
+      image.rgb[i] += Vec3(Vec3d(irradiance) * (double(points[i]) / (double(side) * side) / solid_angle));
     }
 }
 
@@ -142,14 +141,14 @@ Vec3 sun_irradiance(float elevation, float turbidity) {
   const double solid_angle = 2 * pi_d * (1 - std::cos(sun_radius));
   constexpr double lumens_a_watt = 683, radiance_si = 1e4 * 1e-3;  // W / (cm^2 um) to W / (m^2 nm)
   double m = air_mass(double(elevation));
-  glm::dvec3 xyz(0);
+  Vec3d xyz(0);
   double nm = first_wavelength;
   for (const SpectrumRow& row : spectrum) {
     xyz += cie_matching_functions(nm) * (row.radiance * transmittance(row, nm / 1000, m, double(turbidity)));
     nm += wavelength_step;
   }
   xyz *= wavelength_step * radiance_si * solid_angle * lumens_a_watt / unit;
-  return Vec3(glm::max(rec709_from_xyz(xyz), glm::dvec3(0)));
+  return Vec3(max(rec709_from_xyz(xyz), Vec3d(0)));
 }
 
 Result<Environment> make_sky(const SkyOptions& o) {
@@ -162,10 +161,10 @@ Result<Environment> make_sky(const SkyOptions& o) {
   if (o.width < 8 || o.width > 16384 || o.width % 2) return Error{"sky", "width must be even and lie in [8, 16384]"};
 
   double e = radians(double(o.elevation)), a = radians(std::fmod(double(o.azimuth), 360.0));
-  glm::dvec3 sun(std::cos(e) * std::cos(a), std::sin(e), std::cos(e) * std::sin(a));
+  Vec3d sun(std::cos(e) * std::cos(a), std::sin(e), std::cos(e) * std::sin(a));
   // A sun below the horizon leaves the sky that of one on it.
   double seen = std::max(e, 0.0);
-  glm::dvec3 sun_of_sky(std::cos(seen) * std::cos(a), std::sin(seen), std::cos(seen) * std::sin(a));
+  Vec3d sun_of_sky(std::cos(seen) * std::cos(a), std::sin(seen), std::cos(seen) * std::sin(a));
   SkyModel model = make_model(double(o.elevation), double(o.turbidity));
   Environment env;
   env.name = "sky", env.image = Image(o.width, o.width / 2);

@@ -12,22 +12,22 @@ Environment sky(SkyOptions options) {
 }
 
 Vec3 mean_above(const Environment& env) {
-  glm::dvec3 sum(0);
+  Vec3d sum(0);
   double weight = 0;
   for (int y = 0; y < env.image.height / 2; ++y)
     for (int x = 0; x < env.image.width; ++x) {
       double w = texel_solid_angle(y, env.image.width, env.image.height);
-      sum += w * glm::dvec3(env.image.at(x, y)), weight += w;
+      sum += w * Vec3d(env.image.at(x, y)), weight += w;
     }
   return Vec3(sum / weight);
 }
 
 // Sum of radiance x solid angle of a map: the irradiance of its directions without the cosine.
-glm::dvec3 power(const Environment& env, int rows) {
-  glm::dvec3 sum(0);
+Vec3d power(const Environment& env, int rows) {
+  Vec3d sum(0);
   for (int y = 0; y < rows; ++y)
     for (int x = 0; x < env.image.width; ++x)
-      sum += glm::dvec3(env.image.at(x, y)) * texel_solid_angle(y, env.image.width, env.image.height);
+      sum += Vec3d(env.image.at(x, y)) * texel_solid_angle(y, env.image.width, env.image.height);
   return sum;
 }
 
@@ -59,7 +59,7 @@ TEST(Sky, BlueAboveAndBrighterAroundTheSun) {
   Environment env = sky(options);
   Vec3 zenith = radiance(env, {0, 1, 0});
   EXPECT_GT(zenith.z, 1.5f * zenith.x);
-  float e = glm::radians(40.0f), a = glm::radians(120.0f);
+  float e = radians(40.0f), a = radians(120.0f);
   Vec3 toward(std::cos(e) * std::cos(a), std::sin(e), std::cos(e) * std::sin(a)), away(-toward.x, toward.y, -toward.z);
   Vec3 mirrored(toward.x, toward.y, -toward.z);
   EXPECT_GT(luminance(radiance(env, toward)), 2 * luminance(radiance(env, away)));
@@ -74,13 +74,13 @@ TEST(Sky, DiscStandsWhereAskedAndItsEnergyIsExactAtAnySize) {
       SkyOptions without = with;
       without.sun = false;
       Environment a = sky(with), b = sky(without);
-      glm::dvec3 disc = power(a, width / 4) - power(b, width / 4);
+      Vec3d disc = power(a, width / 4) - power(b, width / 4);
       Vec3 expected = sun_irradiance(elevation, 3);
       constexpr double float_texels =
           1e-5;  // relative: the texels hold floats, and the disc is a difference of sums of them
       for (int k = 0; k < 3; ++k)
         EXPECT_NEAR(disc[k] / double(expected[k]), 1, float_texels) << width << " " << elevation;
-      float e = glm::radians(elevation), phi = glm::radians(200.0f);
+      float e = radians(elevation), phi = radians(200.0f);
       Vec3 toward(std::cos(e) * std::cos(phi), std::sin(e), std::cos(e) * std::sin(phi));
       EXPECT_GT(luminance(radiance(a, toward)), luminance(radiance(b, toward)) * 1.5f) << width << " " << elevation;
     }
@@ -108,7 +108,7 @@ TEST(Sky, GroundIsLambert) {
     for (int x = 0; x < 256; ++x) above.image.at(x, y) = Vec3(0);
   Vec3 expected = options.ground * irradiance(above, {0, 1, 0}) / pi;
   constexpr float relative = 1e-5f;
-  for (Vec3 d : {Vec3(0, -1, 0), glm::normalize(Vec3(1, -0.1f, 2))})
+  for (Vec3 d : {Vec3(0, -1, 0), normalize(Vec3(1, -0.1f, 2))})
     for (int k = 0; k < 3; ++k) EXPECT_NEAR(radiance(env, d)[k] / expected[k], 1, relative);
   SkyOptions shade = options;
   shade.sun = false;

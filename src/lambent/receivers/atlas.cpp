@@ -21,7 +21,7 @@ std::array<Vec2, 3> at_corners(const std::vector<Vec2>& at, const Triangle& t) {
 }
 
 double area2(const std::array<Vec2, 3>& t) {
-  const glm::dvec2 a = glm::dvec2(t[1]) - glm::dvec2(t[0]), b = glm::dvec2(t[2]) - glm::dvec2(t[0]);
+  const Vec2d a = Vec2d(t[1]) - Vec2d(t[0]), b = Vec2d(t[2]) - Vec2d(t[0]);
   return std::abs(a.x * b.y - a.y * b.x) / 2;
 }
 
@@ -34,7 +34,7 @@ std::string size_text(int64_t w, int64_t h) { return std::to_string(w) + "x" + s
 
 double surface_area(const Scene& scene) {
   double sum = 0;
-  for (const Triangle& t : scene.triangles) sum += 0.5 * double(glm::length(area_normal(scene, t)));
+  for (const Triangle& t : scene.triangles) sum += 0.5 * double(length(area_normal(scene, t)));
   return sum;
 }
 
@@ -59,7 +59,7 @@ Result<bool> reuse_texcoords(const Scene& scene, const AtlasOptions& o, Atlas& a
   };
   double covered = 0, surface = 0;
   for (const Triangle& t : scene.triangles) {
-    const double area = 0.5 * double(glm::length(area_normal(scene, t)));
+    const double area = 0.5 * double(length(area_normal(scene, t)));
     if (!(area > 0)) continue;
     for (uint32_t v : t.v)
       if (!(uv[v].x >= 0 && uv[v].x <= 1 && uv[v].y >= 0 && uv[v].y <= 1)) return refuse("it leaves [0, 1]");
@@ -89,8 +89,7 @@ Result<bool> reuse_texcoords(const Scene& scene, const AtlasOptions& o, Atlas& a
   double touched = 0;
   for (const Triangle& t : scene.triangles) {
     const auto corners = at_corners(at, t);
-    touched += area2(corners) +
-               2 * double(glm::length(corners[1] - corners[0]) + glm::length(corners[2] - corners[1])) + 9;
+    touched += area2(corners) + 2 * double(length(corners[1] - corners[0]) + length(corners[2] - corners[1])) + 9;
   }
   if (touched > 64.0 * atlas.width * atlas.height + 64.0 * double(scene.triangles.size()))
     return refuse("its triangles are too thin for the atlas's texels");
@@ -115,7 +114,7 @@ Result<bool> reuse_texcoords(const Scene& scene, const AtlasOptions& o, Atlas& a
     Vec3& first = place[size_t(std::clamp(int(p.y), 0, atlas.height - 1)) * size_t(atlas.width) +
                         size_t(std::clamp(int(p.x), 0, atlas.width - 1))];
     if (!std::isfinite(first.x)) first = here;
-    else apart += glm::length(here - first) * atlas.texels_per_unit > neighbours_within;
+    else apart += length(here - first) * atlas.texels_per_unit > neighbours_within;
   }
   if (1000 * apart > scene.triangles.size()) return refuse("the atlas's texels are too coarse for it");
   if (layers == 2) {

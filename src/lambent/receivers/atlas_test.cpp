@@ -38,7 +38,7 @@ TEST(Charts, AreConnectedFlatEnoughAndKeepLengths) {
   for (size_t i = 0; i < scene.triangles.size(); ++i) {
     const uint32_t c = charts.of_triangle[i];
     ASSERT_NE(c, none);
-    const double area = 0.5 * double(glm::length(area_normal(scene, scene.triangles[i]))),
+    const double area = 0.5 * double(length(area_normal(scene, scene.triangles[i]))),
                  projected = flat_area(flat.corners[i]);
     // An orthogonal projection shrinks areas by the cosine, and keeps the orientation.
     EXPECT_LE(projected, area * (1 + 1e-4));
@@ -112,13 +112,12 @@ TEST(Raster, ClosestPointIsTheClosest) {
     const Vec2 p(3 * random.next() - 1, 3 * random.next() - 1);
     const ClosestPoint c = closest_point(t, p);
     const Vec2 at = (1 - c.u - c.v) * t[0] + c.u * t[1] + c.v * t[2];
-    EXPECT_NEAR(glm::length(at - p), c.distance, 1e-5f);
+    EXPECT_NEAR(length(at - p), c.distance, 1e-5f);
     EXPECT_GE(std::min({c.u, c.v, 1 - c.u - c.v}), -1e-5f);
     float brute = INFINITY;
     for (int a = 0; a <= 100; ++a)
       for (int b = 0; a + b <= 100; ++b)
-        brute = std::min(brute,
-                         glm::length(t[0] + (t[1] - t[0]) * (float(a) / 100) + (t[2] - t[0]) * (float(b) / 100) - p));
+        brute = std::min(brute, length(t[0] + (t[1] - t[0]) * (float(a) / 100) + (t[2] - t[0]) * (float(b) / 100) - p));
     EXPECT_LE(c.distance, brute + 1e-5f);
     EXPECT_GE(c.distance, brute - 0.02f);  // the grid is 1/100 of edges up to sqrt(2) long
   }
@@ -157,8 +156,8 @@ TEST(Atlas, GivesEverySideItsOwnTexels) {
     const TexelTriangle* t = texels.find(i, true);
     for (int k = 0; k < 3; ++k) {
       const float space =
-          glm::length(scene.positions[scene.triangles[i].v[k]] - scene.positions[scene.triangles[i].v[(k + 1) % 3]]);
-      const float place = glm::length(t->at[k] - t->at[(k + 1) % 3]);
+          length(scene.positions[scene.triangles[i].v[k]] - scene.positions[scene.triangles[i].v[(k + 1) % 3]]);
+      const float place = length(t->at[k] - t->at[(k + 1) % 3]);
       EXPECT_LE(place, 20 * space * 1.001f + 1e-3f);
       EXPECT_GE(place, 20 * space * (chart_cosine - 0.001f) - 1e-3f);
     }
@@ -357,7 +356,7 @@ TEST(Seams, AgreeAfterSmoothingAndNoticeNothingElse) {
     double sum = 0;
     int count = 0;
     for (const auto& [edge, at] : middles) {
-      if (at.size() != 2 || glm::length(at[0] - at[1]) < 1e-3f) continue;
+      if (at.size() != 2 || length(at[0] - at[1]) < 1e-3f) continue;
       double value[2] = {0, 0};
       for (int s = 0; s < 2; ++s)
         texels.spread_at(at[size_t(s)],

@@ -49,8 +49,8 @@ std::vector<Vec3> face_normals(const Scene& scene, std::vector<float>* areas) {
   if (areas) areas->assign(scene.triangles.size(), 0.0f);
   for (size_t i = 0; i < scene.triangles.size(); ++i) {
     const Vec3 n = area_normal(scene, scene.triangles[i]);
-    if (glm::dot(n, n) > 0) normals[i] = normalize_or(n, Vec3(0));
-    if (areas) (*areas)[i] = normals[i] == Vec3(0) ? 0.0f : glm::length(n);
+    if (dot(n, n) > 0) normals[i] = normalize_or(n, Vec3(0));
+    if (areas) (*areas)[i] = normals[i] == Vec3(0) ? 0.0f : length(n);
   }
   return normals;
 }
@@ -90,7 +90,7 @@ Charts make_charts(const Scene& scene, const std::vector<uint8_t>& layers) {
       charts.of_triangle[t] = chart;
       for (uint32_t next : neighbours[t]) {
         if (next == none || charts.of_triangle[next] != none || layer(next) != layer(seed)) continue;
-        const float cosine = glm::dot(normals[next], normals[seed]);
+        const float cosine = dot(normals[next], normals[seed]);
         if (cosine >= chart_cosine) queue.push({cosine, next});
       }
     }
@@ -115,7 +115,7 @@ FlatCharts flatten(const Scene& scene, const Charts& charts) {
     const Vec3 origin = scene.positions[scene.triangles[seed].v[0]];
     auto project = [&](uint32_t v) {
       const Vec3 d = scene.positions[v] - origin;
-      return Vec2(glm::dot(d, frame[0]), glm::dot(d, frame[1]));
+      return Vec2(dot(d, frame[0]), dot(d, frame[1]));
     };
     // The least box among those along an edge of the seed, or along its plane's axes.
     Vec2 best_axis(1, 0), best_low(0), best_high(0);
@@ -124,14 +124,14 @@ FlatCharts flatten(const Scene& scene, const Charts& charts) {
       Vec2 axis(1, 0);
       if (k < 3) {
         const Vec2 e = project(scene.triangles[seed].v[(k + 1) % 3]) - project(scene.triangles[seed].v[k]);
-        if (!(glm::dot(e, e) > 0)) continue;
-        axis = glm::normalize(e);
+        if (!(dot(e, e) > 0)) continue;
+        axis = normalize(e);
       }
       Vec2 low(INFINITY), high(-INFINITY);
       for (size_t i = begin; i < end; ++i)
         for (uint32_t v : scene.triangles[order[i]].v) {
-          const Vec2 p = project(v), q(glm::dot(p, axis), axis.x * p.y - axis.y * p.x);
-          low = glm::min(low, q), high = glm::max(high, q);
+          const Vec2 p = project(v), q(dot(p, axis), axis.x * p.y - axis.y * p.x);
+          low = min(low, q), high = max(high, q);
         }
       const float area = (high.x - low.x) * (high.y - low.y);
       if (area < best) best = area, best_axis = axis, best_low = low, best_high = high;
@@ -142,7 +142,7 @@ FlatCharts flatten(const Scene& scene, const Charts& charts) {
     for (size_t i = begin; i < end; ++i)
       for (size_t k = 0; k < 3; ++k) {
         const Vec2 p = project(scene.triangles[order[i]].v[k]);
-        const Vec2 q = Vec2(glm::dot(p, best_axis), best_axis.x * p.y - best_axis.y * p.x) - best_low;
+        const Vec2 q = Vec2(dot(p, best_axis), best_axis.x * p.y - best_axis.y * p.x) - best_low;
         flat.corners[order[i]][k] = turn ? Vec2(q.y, extent.x - q.x) : q;
       }
   }

@@ -21,8 +21,7 @@ struct Point {
 
 float longest_edge(const Scene& s, const Triangle& t) {
   float longest = 0;
-  for (int k = 0; k < 3; ++k)
-    longest = std::max(longest, glm::length(s.positions[t.v[k]] - s.positions[t.v[(k + 1) % 3]]));
+  for (int k = 0; k < 3; ++k) longest = std::max(longest, length(s.positions[t.v[k]] - s.positions[t.v[(k + 1) % 3]]));
   return longest;
 }
 
@@ -33,7 +32,7 @@ int cuts_of(const At&, float longest, float cell) {
 }
 int cuts_of(const TexelTriangle& at, float longest, float cell) {
   float texels = 0;
-  for (int k = 0; k < 3; ++k) texels = std::max(texels, glm::length(at.at[k] - at.at[(k + 1) % 3]));
+  for (int k = 0; k < 3; ++k) texels = std::max(texels, length(at.at[k] - at.at[(k + 1) % 3]));
   return std::clamp(int(std::ceil(std::max(longest / cell, 2 * texels))), 1, most_cuts);
 }
 
@@ -47,9 +46,9 @@ std::vector<Point> quadrature(const Scene& scene, const Basis& basis, const std:
       if (!at) continue;
       const Triangle& t = scene.triangles[i];
       const Vec3 n = area_normal(scene, t);
-      const double area = 0.5 * double(glm::length(n));
+      const double area = 0.5 * double(length(n));
       if (!(area > 0)) continue;
-      const Vec3 side = glm::normalize(n) * (front ? 1.0f : -1.0f);
+      const Vec3 side = normalize(n) * (front ? 1.0f : -1.0f);
       const int cuts = cuts_of(*at, longest_edge(scene, t), cell);
       auto add = [&](float u, float v) {
         Point p;

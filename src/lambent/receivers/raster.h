@@ -39,20 +39,20 @@ struct ClosestPoint {
   float u, v, distance;
 };
 inline ClosestPoint closest_point(const std::array<Vec2, 3>& t, Vec2 p) {
-  const glm::dvec2 a(t[0]), ab = glm::dvec2(t[1]) - a, ac = glm::dvec2(t[2]) - a, ap = glm::dvec2(p) - a;
+  const Vec2d a(t[0]), ab = Vec2d(t[1]) - a, ac = Vec2d(t[2]) - a, ap = Vec2d(p) - a;
   const double area = ab.x * ac.y - ab.y * ac.x;
   if (area != 0) {
     const double u = (ap.x * ac.y - ap.y * ac.x) / area, v = (ab.x * ap.y - ab.y * ap.x) / area;
     if (u >= 0 && v >= 0 && u + v <= 1) return {float(u), float(v), 0.0f};
   }
   ClosestPoint best{0, 0, INFINITY};
-  auto along = [&](glm::dvec2 from, glm::dvec2 to, auto weights) {
-    const glm::dvec2 d = to - from, q = glm::dvec2(p) - from;
-    const double length2 = glm::dot(d, d), s = length2 > 0 ? std::clamp(glm::dot(q, d) / length2, 0.0, 1.0) : 0.0;
-    const float distance = float(glm::length(q - s * d));
+  auto along = [&](Vec2d from, Vec2d to, auto weights) {
+    const Vec2d d = to - from, q = Vec2d(p) - from;
+    const double length2 = dot(d, d), s = length2 > 0 ? std::clamp(dot(q, d) / length2, 0.0, 1.0) : 0.0;
+    const float distance = float(length(q - s * d));
     if (distance < best.distance) best = weights(float(s)), best.distance = distance;
   };
-  const glm::dvec2 b = a + ab, c = a + ac;
+  const Vec2d b = a + ab, c = a + ac;
   along(a, b, [](float s) { return ClosestPoint{s, 0, 0}; });
   along(a, c, [](float s) { return ClosestPoint{0, s, 0}; });
   along(b, c, [](float s) { return ClosestPoint{1 - s, s, 0}; });

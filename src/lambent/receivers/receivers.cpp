@@ -43,9 +43,9 @@ uint64_t spread_bits(uint64_t x) {  // 21 bits, two zeros between each
 }
 
 uint64_t morton(Vec3 p, const Bounds& box) {
-  Vec3 size = glm::max(box.max - box.min, Vec3(1e-30f));
+  Vec3 size = max(box.max - box.min, Vec3(1e-30f));
   float largest = std::max({size.x, size.y, size.z});
-  Vec3 q = glm::clamp((p - box.min) / largest, 0.0f, 1.0f) * 2097151.0f;
+  Vec3 q = clamp((p - box.min) / largest, 0.0f, 1.0f) * 2097151.0f;
   return spread_bits(uint64_t(q.x)) | spread_bits(uint64_t(q.y)) << 1 | spread_bits(uint64_t(q.z)) << 2;
 }
 
@@ -62,7 +62,7 @@ std::vector<uint32_t> curve_order(const std::vector<Vec3>& points, const Bounds&
 }
 
 float receiver_lift(Vec3 p, float size, float diagonal) {
-  const Vec3 magnitude = glm::abs(p);
+  const Vec3 magnitude = abs(p);
   const float smallest = rounding * (std::max({magnitude.x, magnitude.y, magnitude.z}) + diagonal);
   return std::max(std::min(lift * size, lift_limit * diagonal), smallest);
 }
@@ -72,18 +72,18 @@ Receivers make_vertex_receivers(const Scene& scene) {
   std::vector<VertexGeometry> geometry(vertices);
   for (const Triangle& t : scene.triangles) {
     const Vec3 normal = area_normal(scene, t);
-    if (!(glm::dot(normal, normal) > 0)) continue;  // degenerate: no ray meets it, no light falls on it
+    if (!(dot(normal, normal) > 0)) continue;  // degenerate: no ray meets it, no light falls on it
     for (int k = 0; k < 3; ++k) {
       const Vec3 p = scene.positions[t.v[k]];
       const Vec3 e1 = scene.positions[t.v[(k + 1) % 3]] - p, e2 = scene.positions[t.v[(k + 2) % 3]] - p;
-      const float l1 = glm::length(e1), l2 = glm::length(e2);
+      const float l1 = length(e1), l2 = length(e2);
       VertexGeometry& g = geometry[t.v[k]];
       g.used = true, g.two_sided |= t.two_sided;
       g.face_normal += normal;
       if (!(l1 > 0 && l2 > 0)) continue;
       g.edge = std::min({g.edge, l1, l2});
       // The bisector of unit vectors a, b is (a + b) / 2 cos(half); times 2 sin(half) that is (a + b) tan(half).
-      const float cosine = std::clamp(glm::dot(e1, e2) / (l1 * l2), -1.0f, 1.0f);
+      const float cosine = std::clamp(dot(e1, e2) / (l1 * l2), -1.0f, 1.0f);
       const float tan_half = std::sqrt((1 - cosine) / std::max(1 + cosine, 1e-6f));
       g.inward += (e1 / l1 + e2 / l2) * tan_half;
     }
@@ -96,7 +96,7 @@ Receivers make_vertex_receivers(const Scene& scene) {
     const VertexGeometry& g = geometry[v];
     if (!g.used) continue;
     Vec3 n = scene.normals[v];
-    if (glm::dot(n, g.face_normal) < 0) n = -n;
+    if (dot(n, g.face_normal) < 0) n = -n;
     sides.push_back({v, false, n});
     if (g.two_sided) sides.push_back({v, true, -n}), any_back = true;
   }
@@ -126,7 +126,7 @@ Receivers make_vertex_receivers(const Scene& scene) {
       const Side& s = sides[by_place[i]];
       const VertexGeometry& g = geometry[s.vertex];
       size_t w = first;
-      while (w < welded.size() && glm::dot(welded[w].normal, s.normal) < same_normal) ++w;
+      while (w < welded.size() && dot(welded[w].normal, s.normal) < same_normal) ++w;
       if (w == welded.size()) welded.push_back({scene.positions[s.vertex], s.normal, Vec3(0), INFINITY});
       welded[w].inward += g.inward, welded[w].edge = std::min(welded[w].edge, g.edge);
       receiver_of_side[by_place[i]] = uint32_t(w);
@@ -147,7 +147,7 @@ Receivers make_vertex_receivers(const Scene& scene) {
     const Welded& w = welded[order[i]];
     rank[order[i]] = uint32_t(i);
     const float edge = std::isfinite(w.edge) ? w.edge : 0.0f;
-    const Vec3 inward = w.inward - w.normal * glm::dot(w.inward, w.normal);
+    const Vec3 inward = w.inward - w.normal * dot(w.inward, w.normal);
     // A border's sum is at most 2 long (a half-plane); a full ring's is about 0, and the inset fades with it.
     r.origins[i] = w.position + w.normal * receiver_lift(w.position, edge, diagonal) +
                    inward * (0.5f * std::min(inset * edge, inset_limit * diagonal));
@@ -190,7 +190,7 @@ Receivers make_patch_receivers(const Scene& scene) {
   for (uint32_t i = 0; i < scene.triangles.size(); ++i) {
     const Triangle& t = scene.triangles[i];
     const Vec3 n = area_normal(scene, t);
-    if (!(glm::dot(n, n) > 0)) continue;
+    if (!(dot(n, n) > 0)) continue;
     const Vec3 centre = (scene.positions[t.v[0]] + scene.positions[t.v[1]] + scene.positions[t.v[2]]) / 3.0f;
     for (int back = 0; back <= int(t.two_sided); ++back) sides.push_back({i, back == 1}), centres.push_back(centre);
     any_back |= t.two_sided;
@@ -203,10 +203,10 @@ Receivers make_patch_receivers(const Scene& scene) {
   Receivers r;
   for (uint32_t i : curve_order(centres, box)) {
     const Triangle& t = scene.triangles[sides[i].triangle];
-    const Vec3 n = glm::normalize(area_normal(scene, t)) * (sides[i].back ? -1.0f : 1.0f);
+    const Vec3 n = normalize(area_normal(scene, t)) * (sides[i].back ? -1.0f : 1.0f);
     float edge = INFINITY;
     for (int k = 0; k < 3; ++k)
-      edge = std::min(edge, glm::length(scene.positions[t.v[k]] - scene.positions[t.v[(k + 1) % 3]]));
+      edge = std::min(edge, length(scene.positions[t.v[k]] - scene.positions[t.v[(k + 1) % 3]]));
     (sides[i].back ? patches.back : patches.front)[sides[i].triangle] = {uint32_t(r.count()), t.part};
     r.origins.push_back(centres[i] + n * receiver_lift(centres[i], edge, diagonal));
     r.normals.push_back(n);

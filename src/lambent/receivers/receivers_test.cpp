@@ -20,7 +20,7 @@ TEST(Receivers, ShareWhatHasOnePositionAndNormal) {
   EXPECT_TRUE(r.back.empty());
   for (size_t v = 0; v < scene.positions.size(); ++v) {
     ASSERT_LT(r.front[v], r.count());
-    EXPECT_LT(glm::length(r.origins[r.front[v]] - scene.positions[v]), 0.01f);
+    EXPECT_LT(length(r.origins[r.front[v]] - scene.positions[v]), 0.01f);
     EXPECT_EQ(r.normals[r.front[v]], scene.normals[v]);
   }
 }
@@ -35,7 +35,7 @@ TEST(Receivers, LieOffTheirSurfaceAndInsideItsBorder) {
     EXPECT_LT(std::max(o.x, o.z), 1);
     const bool inner = p.x > 0.1f && p.x < 0.9f && p.z > 0.1f && p.z < 0.9f;
     if (inner) {
-      EXPECT_LT(glm::length(Vec2(o.x - p.x, o.z - p.z)), 1e-5f);  // surrounded: only lifted
+      EXPECT_LT(length(Vec2(o.x - p.x, o.z - p.z)), 1e-5f);  // surrounded: only lifted
     }
   }
 }

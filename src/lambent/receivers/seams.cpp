@@ -71,8 +71,8 @@ size_t smooth_seams(const Scene& scene, const TexelReceivers& texels, float* val
       ++end;
     if (end - begin != 2) continue;
     const EdgeSide &x = edges[begin], &y = edges[begin + 1];
-    if ((x.at_a == y.at_a && x.at_b == y.at_b) || glm::dot(normal(x), normal(y)) < cosine) continue;
-    const float length = std::max(glm::length(x.at_b - x.at_a), glm::length(y.at_b - y.at_a));
+    if ((x.at_a == y.at_a && x.at_b == y.at_b) || dot(normal(x), normal(y)) < cosine) continue;
+    const float length = std::max(distance(x.at_a, x.at_b), distance(y.at_a, y.at_b));
     const int points = std::clamp(int(length / spacing), 1, most_points);
     for (int p = 0; p <= points; ++p) {
       const float s = float(p) / float(points);

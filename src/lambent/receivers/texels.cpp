@@ -20,7 +20,7 @@ TexelReceivers texel_receivers(const Scene& scene, int width, int height, const 
   for (size_t i = 0; i < scene.triangles.size(); ++i) {
     const Triangle& t = scene.triangles[i];
     const Vec3 n = area_normal(scene, t);
-    if (!(glm::dot(n, n) > 0)) continue;
+    if (!(dot(n, n) > 0)) continue;
     map.front[i] = {{front[t.v[0]], front[t.v[1]], front[t.v[2]]}, t.part};
     if (!back.empty() && t.two_sided) map.back[i] = {{back[t.v[0]], back[t.v[1]], back[t.v[2]]}, t.part};
   }
@@ -32,11 +32,11 @@ void place_texel(const Scene& scene, Receivers& receivers, size_t r, const Texel
   const Triangle& t = scene.triangles[at.triangle];
   const Vec3 face = normalize_or(area_normal(scene, t), Vec3(0, 1, 0)) * (back ? -1.0f : 1.0f);
   Vec3 n = normalize_or(interpolate(scene.normals, t, at.u, at.v), face);
-  if (glm::dot(n, face) < 0) n = -n;
+  if (dot(n, face) < 0) n = -n;
   Vec3 p = interpolate(scene.positions, t, at.u, at.v);
   const Vec3 inward = (scene.positions[t.v[0]] + scene.positions[t.v[1]] + scene.positions[t.v[2]]) / 3.0f - p;
   if (std::min({at.u, at.v, 1 - at.u - at.v}) < border_inset)
-    p += inward * std::min(0.5f, border_inset * texel / std::max(glm::length(inward), 1e-30f));
+    p += inward * std::min(0.5f, border_inset * texel / std::max(length(inward), 1e-30f));
   receivers.origins[r] = p + face * receiver_lift(p, texel, diagonal);
   receivers.normals[r] = n, receivers.places[r] = at;
 }

@@ -52,11 +52,11 @@ Vec3 light_from_lamps(const Integrator& integrator, const PathVertex& vertex, co
   auto reaches = [&](Vec3 d, float distance) {
     Hit hit;
     if (!integrator.intersector.nearest(vertex.position, d, hit)) return true;
-    return glm::length(surface_point(*integrator.scene, hit).position - vertex.position) >= distance * (1 - margin);
+    return length(surface_point(*integrator.scene, hit).position - vertex.position) >= distance * (1 - margin);
   };
   const EmitterSample e = sample_emitter(integrator.emitters, vertex.position, samples.pair(lamp_pairs + 2 * depth).x,
                                          samples.pair(lamp_pairs + 2 * depth + 1));
-  if (e.pdf > 0 && glm::dot(vertex.ng, e.direction) > 0) {
+  if (e.pdf > 0 && dot(vertex.ng, e.direction) > 0) {
     const Vec3 wi = e.direction * vertex.frame, f = evaluate(vertex.brdf, wi, vertex.wo);
     if (!black(f) && reaches(e.direction, e.distance)) {
       const float weight =
@@ -66,7 +66,7 @@ Vec3 light_from_lamps(const Integrator& integrator, const PathVertex& vertex, co
   }
   for (const PunctualLight& light : integrator.scene->lights) {
     const LampArrival a = arriving(light, vertex.position);
-    if (black(a.irradiance) || glm::dot(vertex.ng, a.direction) <= 0) continue;
+    if (black(a.irradiance) || dot(vertex.ng, a.direction) <= 0) continue;
     const Vec3 wi = a.direction * vertex.frame, f = evaluate(vertex.brdf, wi, vertex.wo);
     if (!black(f) && reaches(a.direction, a.distance)) sum += f * a.irradiance * wi.z;
   }
@@ -103,12 +103,12 @@ bool make_vertex(const Integrator& integrator, const Hit& hit, Vec3 d, PathVerte
   const Scene& scene = *integrator.scene;
   const Triangle& triangle = scene.triangles[hit.triangle];
   SurfacePoint s = surface_point(scene, hit);
-  bool front = glm::dot(s.ng, d) < 0;
+  bool front = dot(s.ng, d) < 0;
   if (!front && !triangle.two_sided) return false;
   vertex.ng = front ? s.ng : -s.ng;
   vertex.position = s.position + vertex.ng * s.offset;
   Vec3 n = normalize_or(interpolate(scene.normals, triangle, hit.u, hit.v), s.ng);
-  if (glm::dot(n, s.ng) < 0) n = -n;
+  if (dot(n, s.ng) < 0) n = -n;
   if (integrator.reflection.normal_maps) n = mapped_normal(scene, triangle, hit.u, hit.v, n);
   if (!front) n = -n;
   vertex.frame = shading_frame(scene, triangle, n);
@@ -116,7 +116,7 @@ bool make_vertex(const Integrator& integrator, const Hit& hit, Vec3 d, PathVerte
   // so that such places are not black.
   vertex.wo = -d * vertex.frame;
   constexpr float lowest = 1e-4f;
-  if (vertex.wo.z < lowest) vertex.wo = glm::normalize(Vec3(vertex.wo.x, vertex.wo.y, lowest));
+  if (vertex.wo.z < lowest) vertex.wo = normalize(Vec3(vertex.wo.x, vertex.wo.y, lowest));
   vertex.brdf = surface_brdf(scene, integrator.reflection, triangle, hit.u, hit.v);
   return true;
 }
@@ -130,7 +130,7 @@ Vec3 exit_radiance_estimate(const Integrator& integrator, PathVertex vertex, con
     const Vec3 wo = vertex.wo;
     if (strategy != Strategy::brdf_only) {
       EnvironmentSample light = sample_environment(integrator.sampler, samples.pair(uint32_t(2 * depth + 1)));
-      if (light.pdf > 0 && glm::dot(vertex.ng, light.direction) > 0) {
+      if (light.pdf > 0 && dot(vertex.ng, light.direction) > 0) {
         Vec3 wi = light.direction * vertex.frame;
         const auto [f, density] = evaluate_with_pdf(vertex.brdf, wi, wo);
         if (!black(f) && !integrator.intersector.occluded(vertex.position, light.direction)) {
@@ -146,7 +146,7 @@ Vec3 exit_radiance_estimate(const Integrator& integrator, PathVertex vertex, con
     BrdfSample next = sample(vertex.brdf, wo, samples.pair(uint32_t(2 * depth + 2)));
     if (!(next.pdf > 0)) break;
     Vec3 d = vertex.frame * next.wi;
-    if (glm::dot(vertex.ng, d) <= 0) break;
+    if (dot(vertex.ng, d) <= 0) break;
     throughput *= next.weight;
     if (black(throughput)) break;
     Hit hit;

@@ -116,10 +116,10 @@ SurfacePoint surface_point(const Scene& scene, const Hit& hit) {
   const Triangle& t = scene.triangles[hit.triangle];
   Vec3 a = scene.positions[t.v[0]], b = scene.positions[t.v[1]], c = scene.positions[t.v[2]];
   // Double precision: the only rounding left is the last one, to float.
-  glm::dvec3 ab = glm::dvec3(b) - glm::dvec3(a), ac = glm::dvec3(c) - glm::dvec3(a);
-  glm::dvec3 p = glm::dvec3(a) + double(hit.u) * ab + double(hit.v) * ac, n = glm::cross(ab, ac);
-  double length = glm::length(n);
-  Vec3 largest = glm::max(glm::max(glm::abs(a), glm::abs(b)), glm::abs(c));
+  Vec3d ab = Vec3d(b) - Vec3d(a), ac = Vec3d(c) - Vec3d(a);
+  Vec3d p = Vec3d(a) + double(hit.u) * ab + double(hit.v) * ac, n = cross(ab, ac);
+  double length = lambent::length(n);
+  Vec3 largest = max(max(abs(a), abs(b)), abs(c));
   SurfacePoint s;
   s.position = Vec3(p);
   s.ng = length > 0 ? Vec3(n / length) : Vec3(0, 0, 1);

@@ -24,7 +24,7 @@ EmitterSampler make_emitter_sampler(const Scene& scene) {
   s.scene = &scene;
   s.cdf.push_back(0);
   for (uint32_t i = 0; i < scene.triangles.size(); ++i) {
-    const double area = 0.5 * double(glm::length(area_normal(scene, scene.triangles[i]))),
+    const double area = 0.5 * double(length(area_normal(scene, scene.triangles[i]))),
                  w = weight(material_emission(scene, scene.triangles[i]));
     if (!(area * w > 0)) continue;
     s.triangles.push_back(i), s.cdf.push_back(s.cdf.back() + area * w);
@@ -43,11 +43,11 @@ EmitterSample sample_emitter(const EmitterSampler& s, Vec3 point, float pick, Ve
   const SurfacePoint at = surface_point(*s.scene, hit);
   const Vec3 to = at.position - point;
   EmitterSample sample;
-  sample.distance = glm::length(to);
+  sample.distance = length(to);
   if (!(sample.distance > 0)) return {};
   sample.direction = to / sample.distance;
   sample.radiance = emitted(*s.scene, hit, sample.direction);
-  const float facing = std::abs(glm::dot(at.ng, sample.direction));
+  const float facing = std::abs(dot(at.ng, sample.direction));
   if (sample.radiance == Vec3(0) || !(facing > 0)) return {};
   sample.pdf = float(area_density(s, material_emission(*s.scene, t)) * double(sample.distance) *
                      double(sample.distance) / double(facing));
@@ -56,7 +56,7 @@ EmitterSample sample_emitter(const EmitterSampler& s, Vec3 point, float pick, Ve
 
 Vec3 emitted(const Scene& scene, const Hit& hit, Vec3 d) {
   const Triangle& t = scene.triangles[hit.triangle];
-  const bool front = glm::dot(area_normal(scene, t), d) < 0;
+  const bool front = dot(area_normal(scene, t), d) < 0;
   return front || t.two_sided ? emission(scene, t, hit.u, hit.v) : Vec3(0);
 }
 
@@ -64,8 +64,8 @@ float emitter_pdf(const EmitterSampler& s, const Hit& hit, Vec3 point, Vec3 d) {
   const Triangle& t = s.scene->triangles[hit.triangle];
   const SurfacePoint at = surface_point(*s.scene, hit);
   const Vec3 to = at.position - point;
-  const double facing = double(std::abs(glm::dot(at.ng, d)));
-  return facing > 0 ? float(area_density(s, material_emission(*s.scene, t)) * double(glm::dot(to, to)) / facing) : 0.0f;
+  const double facing = double(std::abs(dot(at.ng, d)));
+  return facing > 0 ? float(area_density(s, material_emission(*s.scene, t)) * double(dot(to, to)) / facing) : 0.0f;
 }
 
 }  // namespace lambent::reference

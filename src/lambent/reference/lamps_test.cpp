@@ -51,17 +51,17 @@ TEST(PathTracerLamps, EachWayToFindALampAgrees) {
   add_quad(scene, lamp, "lamp", Vec3(-0.5f, 1, -0.4f), Vec3(0.9f, 0.2f, 0.1f), Vec3(0, 0.1f, 0.8f), 1, 1);
   add_box(scene, grey, "block", Vec3(-0.3f, 0.4f, -0.2f), Vec3(0.1f, 0.6f, 0.3f), 1);
   const Environment env = black();
-  const Vec3 at(-0.2f, 1e-4f, 0.1f), n = glm::normalize(Vec3(0.1f, 1, -0.05f));
-  glm::dvec3 means[3], variances[3];
+  const Vec3 at(-0.2f, 1e-4f, 0.1f), n = normalize(Vec3(0.1f, 1, -0.05f));
+  Vec3d means[3], variances[3];
   const Strategy strategies[] = {Strategy::combined, Strategy::light_only, Strategy::brdf_only};
   for (int s = 0; s < 3; ++s) {
     auto integrator = reference::make_integrator(scene, env, 2, strategies[s], {}, true);
     ASSERT_TRUE(integrator);
-    glm::dvec3 sum(0), squares(0);
+    Vec3d sum(0), squares(0);
     const uint32_t paths = 1 << 16;
     for (uint32_t i = 0; i < paths; ++i) {
-      const glm::dvec3 x(reference::exit_radiance_estimate(*integrator, reference::white_vertex(at, n),
-                                                           reference::PathSamples(9, i, paths)));
+      const Vec3d x(reference::exit_radiance_estimate(*integrator, reference::white_vertex(at, n),
+                                                      reference::PathSamples(9, i, paths)));
       sum += x, squares += x * x;
     }
     means[s] = sum / double(paths), variances[s] = (squares / double(paths) - means[s] * means[s]) / double(paths);
@@ -89,8 +89,7 @@ TEST(PathTracerLamps, DensitiesOfDrawnPointsAreWhatTheHitsSay) {
     if (!(s.pdf > 0)) continue;
     reference::Hit hit;
     ASSERT_TRUE(intersector->nearest(p, s.direction, hit));
-    if (std::abs(glm::length(reference::surface_point(scene, hit).position - p) - s.distance) > 1e-4f)
-      continue;  // hidden
+    if (std::abs(length(reference::surface_point(scene, hit).position - p) - s.distance) > 1e-4f) continue;  // hidden
     EXPECT_EQ(reference::emitted(scene, hit, s.direction), s.radiance);
     EXPECT_NEAR(reference::emitter_pdf(sampler, hit, p, s.direction) / s.pdf, 1, 1e-3f);
     ++compared;
@@ -103,7 +102,7 @@ TEST(PathTracerLamps, PunctualLightsByTheInverseSquare) {
   const Vec3 lamp(0.3f, 0.8f, -0.2f), at(-0.4f, 1e-5f, 0.5f), up(0, 1, 0);
   scene.lights.push_back({.name = "bulb", .position = lamp, .intensity = Vec3(3, 2, 1)});
   const Vec3 d = lamp - at;
-  const float d2 = glm::dot(d, d), expected = d.y / std::sqrt(d2) / d2 / pi;
+  const float d2 = dot(d, d), expected = d.y / std::sqrt(d2) / d2 / pi;
   EXPECT_NEAR(exit_radiance(scene, black(), at, up, 0, 16, 1, true).x, 3 * expected, 1e-5f);
   EXPECT_EQ(exit_radiance(scene, black(), at, up, 0, 16, 1, false).x, 0);
   // A wall in between.

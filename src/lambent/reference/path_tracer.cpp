@@ -11,15 +11,15 @@ namespace {
 
 // Sums in double precision, so that a million paths in a bright sun lose nothing.
 struct Moments {
-  glm::dvec3 sum{0.0}, squares{0.0};
-  void add(glm::dvec3 x) { sum += x, squares += x * x; }
+  Vec3d sum{0.0}, squares{0.0};
+  void add(Vec3d x) { sum += x, squares += x * x; }
   void add(const Moments& m) { sum += m.sum, squares += m.squares; }
   Vec3 mean(int n) const { return Vec3(sum / double(n)); }
   // Of the mean of n independent numbers.
   Vec3 variance(int n) const {
     if (n < 2) return Vec3(INFINITY);
-    glm::dvec3 m = sum / double(n);
-    return Vec3(glm::max(squares / double(n) - m * m, 0.0) / double(n - 1));
+    Vec3d m = sum / double(n);
+    return Vec3(max(squares / double(n) - m * m, 0.0) / double(n - 1));
   }
 };
 
@@ -53,7 +53,7 @@ Result<ReferenceImage> render(const Integrator& integrator, const Camera& camera
       } else if (options.background) {
         value = radiance_bilinear(*integrator.environment, d);
       }
-      moments.add(glm::dvec3(value));
+      moments.add(Vec3d(value));
     }
     result.image.rgb[pixel] = moments.mean(options.spp);
     result.variance[pixel] = moments.variance(options.spp);
@@ -105,7 +105,7 @@ std::vector<ExitRadiance> exit_radiances(const Scene& scene, const Environment& 
       const reference::PathVertex receiver = reference::white_vertex(origins[point], normals[point]);
       const uint64_t key = hash64(hash64(seed), point);
       for (size_t i = first; i < std::min(first + block, total); ++i)
-        moments[m].add(glm::dvec3(reference::exit_radiance_estimate(
+        moments[m].add(Vec3d(reference::exit_radiance_estimate(
             *integrator, receiver, reference::PathSamples(key, uint32_t(i), uint32_t(paths)))));
     }
   });

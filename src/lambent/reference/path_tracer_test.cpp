@@ -48,10 +48,10 @@ TEST(PathTracer, ConvexBodyUnderUniformLight) {
   auto result = path_trace(scene, uniform(L), look({1, 2, 3}, Vec3(0)), picture(24, 64, 2));
   ASSERT_TRUE(result);
   int covered = 0;
-  glm::dvec3 sum(0), variance(0);
+  Vec3d sum(0), variance(0);
   for (size_t i = 0; i < result->image.rgb.size(); ++i) {
     if (result->image.alpha[i] < 1) continue;
-    ++covered, sum += glm::dvec3(result->image.rgb[i]), variance += glm::dvec3(result->variance[i]);
+    ++covered, sum += Vec3d(result->image.rgb[i]), variance += Vec3d(result->variance[i]);
     for (int c = 0; c < 3; ++c)
       EXPECT_NEAR(result->image.rgb[i][c], albedo[c] * L,
                   sigmas * std::sqrt(result->variance[i][c]) + terminator * albedo[c] * L);
@@ -129,14 +129,13 @@ TEST(PathTracer, SphereWithAPort) {
   double open = 0;  // solid angle of the port from the centre (Van Oosterom and Strackee 1983)
   std::erase_if(scene.triangles, [&](const Triangle& t) {
     Vec3 a = scene.positions[t.v[0]], b = scene.positions[t.v[1]], c = scene.positions[t.v[2]];
-    if (glm::normalize(a + b + c).y < 0.8f) return false;
-    open += 2 *
-            std::atan2(std::abs(glm::dot(a, glm::cross(b, c))), 1 + glm::dot(a, b) + glm::dot(b, c) + glm::dot(c, a));
+    if (normalize(a + b + c).y < 0.8f) return false;
+    open += 2 * std::atan2(std::abs(dot(a, cross(b, c))), 1 + dot(a, b) + dot(b, c) + dot(c, a));
     return true;
   });
   const double f = open / (4 * pi), kept = rho * (1 - f);
   ASSERT_NEAR(f, 0.1, 0.01);
-  const std::vector<Vec3> n{{0, 1, 0}, glm::normalize(Vec3(1, 0.3f, 0.2f)), glm::normalize(Vec3(-1, 0.2f, 2))};
+  const std::vector<Vec3> n{{0, 1, 0}, normalize(Vec3(1, 0.3f, 0.2f)), normalize(Vec3(-1, 0.2f, 2))};
   std::vector<Vec3> at;
   for (Vec3 v : n) at.push_back(v * -0.998f);
   for (int k : {0, 1, 2, 30}) {
@@ -166,7 +165,7 @@ TEST(PathTracer, LightComesFromWhereTheMapSaysOntoFacesThatFaceIt) {
       n[axis] = side;
       // Clear of the equator of n by more than a texel; not round about n.
       Environment env = make_environment("one-sided", 32, 16, [&](Vec3 d) {
-        return glm::dot(d, n) > 0.3f ? Vec3(1, 2 + d[(axis + 1) % 3], 3 + d[(axis + 2) % 3]) : Vec3(0);
+        return dot(d, n) > 0.3f ? Vec3(1, 2 + d[(axis + 1) % 3], 3 + d[(axis + 2) % 3]) : Vec3(0);
       });
       Vec3 expected = irradiance(env, n) * a / pi;
       ASSERT_GT(expected.x, 0.3f);
@@ -188,9 +187,9 @@ TEST(PathTracer, PictureIsUprightAndNotMirrored) {
   // lower left.
   Scene scene;
   add_sphere(scene, add_material(scene, "white", Vec3(1)), "ball", {1, 1, -5}, 0.3f, 2);
-  const Vec3 spot = glm::normalize(Vec3(-1, -1, -5));
+  const Vec3 spot = normalize(Vec3(-1, -1, -5));
   Environment env =
-      make_environment("spot", 256, 128, [&](Vec3 d) { return Vec3(glm::dot(d, spot) > 0.995f ? 1.0f : 0.0f); });
+      make_environment("spot", 256, 128, [&](Vec3 d) { return Vec3(dot(d, spot) > 0.995f ? 1.0f : 0.0f); });
   ReferenceOptions options = picture(40, 4, 0);
   auto covered = path_trace(scene, env, look(Vec3(0), {0, 0, -1}, 60), options);
   options.background = true;
@@ -293,7 +292,7 @@ TEST(PathTracer, ShadowsReachTheContact) {
   for (float size : {0.01f, 1.0f, 550.0f}) {
     Scene scaled = scene;
     move(scaled, R * size, Vec3(0));
-    for (Vec3& n : scaled.normals) n = glm::normalize(n);
+    for (Vec3& n : scaled.normals) n = normalize(n);
     auto result = path_trace(scaled, uniform(1), look(R * Vec3(0, 3, 0.1f) * size, Vec3(0), 20), picture(16, 16, 3));
     ASSERT_TRUE(result);
     for (size_t i = 0; i < result->image.rgb.size(); ++i) {

@@ -40,22 +40,21 @@ std::vector<Named> models() {
 // A sheet in the plane y = 0 whose texture coordinate u grows along `tangent`.
 Scene sheet(Vec3 tangent) {
   Scene s = make_quad({-1, 0, 1}, {2, 0, 0}, {0, 0, -2}, 1, 1, Vec3(0.5f));
-  for (Vec3 p : s.positions)
-    s.texcoords[0].push_back({glm::dot(p, tangent), glm::dot(p, glm::cross(Vec3(0, 1, 0), tangent))});
+  for (Vec3 p : s.positions) s.texcoords[0].push_back({dot(p, tangent), dot(p, cross(Vec3(0, 1, 0), tangent))});
   return s;
 }
 
 // Radiance that leaves the sheet towards wo (world), by summing over the map's texels, each divided.
-glm::dvec3 radiance_by_quadrature(const Brdf& brdf, const Mat3& frame, const Environment& env, Vec3 wo) {
+Vec3d radiance_by_quadrature(const Brdf& brdf, const Mat3& frame, const Environment& env, Vec3 wo) {
   constexpr int fine = 24;
   const int width = env.image.width * fine, height = env.image.height * fine;
-  glm::dvec3 sum(0);
+  Vec3d sum(0);
   for (int y = 0; y < height; ++y)
     for (int x = 0; x < width; ++x) {
       const Vec3 d = texel_direction(x, y, width, height), wi = d * frame;
       if (wi.z <= 0) continue;
       const Vec3 f = evaluate(brdf, wi, wo * frame);
-      sum += glm::dvec3(f * env.image.at(x / fine, y / fine)) * (double(wi.z) * texel_solid_angle(y, width, height));
+      sum += Vec3d(f * env.image.at(x / fine, y / fine)) * (double(wi.z) * texel_solid_angle(y, width, height));
     }
   return sum;
 }
@@ -65,16 +64,16 @@ TEST(ReferenceReflection, SheetAgreesWithQuadrature) {
   // these lobes.
   constexpr double quadrature = 2e-3;
   const Environment env = test::skewed_environment();
-  const Vec3 tangent = glm::normalize(Vec3(2, 0, -1));
-  const Mat3 frame(tangent, glm::cross(Vec3(0, 1, 0), tangent), Vec3(0, 1, 0));
-  const Vec3 eye = 5.0f * glm::normalize(Vec3(-1, 1.2f, 0.8f));
+  const Vec3 tangent = normalize(Vec3(2, 0, -1));
+  const Mat3 frame(tangent, cross(Vec3(0, 1, 0), tangent), Vec3(0, 1, 0));
+  const Vec3 eye = 5.0f * normalize(Vec3(-1, 1.2f, 0.8f));
   const Scene scene = sheet(tangent);
   for (const auto& [name, brdf] : models()) {
     ReferenceOptions options = test::small_picture(1, 16384, 1);
     options.reflection.everywhere = brdf;
     auto result = path_trace(scene, env, test::look(eye, Vec3(0), 0.05f), options);
     ASSERT_TRUE(result);
-    const glm::dvec3 expected = radiance_by_quadrature(brdf, frame, env, glm::normalize(eye));
+    const Vec3d expected = radiance_by_quadrature(brdf, frame, env, normalize(eye));
     for (int c = 0; c < 3; ++c)
       EXPECT_NEAR(result->image.rgb[0][c], expected[c],
                   sigmas * std::sqrt(result->variance[0][c]) + quadrature * expected[c])
@@ -86,9 +85,9 @@ TEST(ReferenceReflection, TangentMatters) {
   // Light from where h would be tilted by 20 degrees, square to the plane of the eye and the normal. With the tangent
   // turned by a right angle the lobe lies across or along that tilt: anisotropic models look very different, others the
   // same but for noise (below 1 %).
-  const Vec3 spot = glm::reflect(glm::normalize(Vec3(3, -3, 0)), Vec3(0, std::cos(0.35f), std::sin(0.35f)));
+  const Vec3 spot = reflect(normalize(Vec3(3, -3, 0)), Vec3(0, std::cos(0.35f), std::sin(0.35f)));
   const Environment env =
-      make_environment("spot", 64, 32, [&](Vec3 d) { return Vec3(std::exp(40 * (glm::dot(d, spot) - 1))); });
+      make_environment("spot", 64, 32, [&](Vec3 d) { return Vec3(std::exp(40 * (dot(d, spot) - 1))); });
   for (const auto& [name, brdf] : models()) {
     const bool anisotropic = std::string(name) == "GGX" || std::string(name) == "Ward";
     Vec3 seen[2];

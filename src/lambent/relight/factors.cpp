@@ -37,7 +37,7 @@ void relight_factors(const Transfer& visibility, const Outgoing& outgoing, std::
           incident[j][int(c)] = sum;
         }
       // Into the receiver's frame, and from harmonics to the incident basis.
-      incident = rotate_sh(make_sh_rotation(m, glm::transpose(outgoing.frames[r])), incident);
+      incident = rotate_sh(make_sh_rotation(m, transpose(outgoing.frames[r])), incident);
       for (size_t j = 0; j < J; ++j) {
         Vec3 sum(0.0f);
         for (size_t k = 0; k <= j; ++k) sum += float(basis.from_sh[j * J + k]) * incident[k];

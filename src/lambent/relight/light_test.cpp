@@ -9,13 +9,13 @@ namespace {
 // A skew gradient with a lamp on it.
 Environment lit() {
   return make_environment("lit", 256, 128, [](Vec3 d) {
-    const float lamp = std::exp(60 * (glm::dot(d, glm::normalize(Vec3(0.4f, 0.8f, -0.3f))) - 1));
+    const float lamp = std::exp(60 * (dot(d, normalize(Vec3(0.4f, 0.8f, -0.3f))) - 1));
     return Vec3(1 + 0.3f * d.x, 1 - 0.5f * d.y * d.z, 0.7f) + Vec3(20, 15, 9) * lamp;
   });
 }
 
 const LightBasis columns{
-    4, LobeKind::von_mises_fisher, {{glm::normalize(Vec3(0.4f, 0.8f, -0.3f)), 60}, {Vec3(-1, 0, 0), 20}}, {"desk"}};
+    4, LobeKind::von_mises_fisher, {{normalize(Vec3(0.4f, 0.8f, -0.3f)), 60}, {Vec3(-1, 0, 0), 20}}, {"desk"}};
 
 TEST(ProjectLight, HarmonicsAloneAreWhatTheyAlwaysWere) {
   const Mat3 R = rotation_from_yaw_pitch_roll({30, -20, 10});
@@ -52,7 +52,7 @@ TEST(ProjectLight, WindowsTheHarmonicsAlone) {
                         windowed = project_light(lit(), columns, Mat3(1.0f), 0, ShWindow::hann);
   const auto factors = sh_window(ShWindow::hann, 4);
   for (size_t i = 0; i < 16; ++i)
-    EXPECT_LT(glm::distance(windowed.light[i], plain.light[i] * factors[size_t(sh_band(int(i)))]), 1e-6f);
+    EXPECT_LT(distance(windowed.light[i], plain.light[i] * factors[size_t(sh_band(int(i)))]), 1e-6f);
   for (size_t i = 16; i < 19; ++i) EXPECT_EQ(windowed.light[i], plain.light[i]);
 }
 

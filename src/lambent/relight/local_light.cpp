@@ -16,7 +16,7 @@ void light_at(const LocalLight& light, Vec3 place, std::span<Vec3> out) {
   double P[max_sh_order + 1];
   for (const SphereLamp& lamp : light.lamps) {
     const Vec3 to = lamp.centre - place;
-    const double d2 = std::max(double(glm::dot(to, to)), 1e-30),
+    const double d2 = std::max(double(dot(to, to)), 1e-30),
                  sine2 = std::min(1.0, double(lamp.radius) * lamp.radius / d2);
     const double cosine = sine2 < 1 ? std::sqrt(1 - sine2) : -1;
     evaluate_legendre(cosine, {P, size_t(order) + 1});

@@ -19,12 +19,12 @@ TEST(LocalLight, ALampIsACapOfDirections) {
     std::vector<Vec3> out(49), added(49);
     light_at({std::vector<Vec3>(49, Vec3(0.0f)), {lamp}, {}}, place, out);
     light_at({std::vector<Vec3>(49, Vec3(0.25f)), {lamp}, {}}, place, added);
-    const double d = glm::length(glm::dvec3(lamp.centre - place)), edge = std::sqrt(1 - std::pow(lamp.radius / d, 2));
+    const double d = length(Vec3d(lamp.centre - place)), edge = std::sqrt(1 - std::pow(lamp.radius / d, 2));
     const double kinks[] = {edge};
     const std::vector<double> cap = project_zonal(
         7, [&](double x) { return x > edge ? 1.0 : 0.0; }, kinks);
     float y[49];
-    evaluate_sh(7, glm::normalize(lamp.centre - place), y);
+    evaluate_sh(7, normalize(lamp.centre - place), y);
     const double size = std::abs(cap[0]) + 1e-12;
     for (int k = 0; k < 49; ++k) EXPECT_EQ(added[size_t(k)], out[size_t(k)] + 0.25f) << k;
     for (int k = 0; k < 49; ++k)
@@ -62,7 +62,7 @@ TEST(LocalLight, LightsAPlaneByTheInverseSquare) {
   relight_zonal(plane.transfer, nullptr, make_light_field({std::vector<Vec3>(36, Vec3(0)), {lamp}, {}}, places), relit);
   for (size_t r = 0; r < 40; ++r) {
     const Vec3 to = lamp.centre - places[r];
-    const float d = glm::length(to), cosine = to.z / d, truth = 3 * lamp.radius * lamp.radius / (d * d) * cosine;
+    const float d = length(to), cosine = to.z / d, truth = 3 * lamp.radius * lamp.radius / (d * d) * cosine;
     if (cosine < lamp.radius / d) continue;  // partly below the horizon
     EXPECT_NEAR(relit.at(r).x, truth, 0.05f * truth + 0.01f) << r;
     EXPECT_NEAR(relit.at(r).y, relit.at(r).x * 2 / 3, 1e-5);
@@ -99,7 +99,7 @@ TEST(LocalLight, EveryReceiverHasItsOwn) {
           const Vec3 truth = shade_zonal(
               w.transfer, std::span(values).subspan(size_t(row) * w.transfer.row_values(), w.transfer.row_values()),
               rotations[r], at);
-          EXPECT_LT(glm::length(out.at(r, row) - truth), 1e-4f * (1 + glm::length(truth))) << r;
+          EXPECT_LT(length(out.at(r, row) - truth), 1e-4f * (1 + length(truth))) << r;
         }
       }
     }

@@ -179,7 +179,7 @@ HWY_EXPORT(SumSeen);
 Terms make_terms(const Brdf& brdf, const Mat3& frame, Vec3 wo_world) {
   Terms t;
   t.frame = frame, t.brdf = &brdf;
-  t.wo = Vec3(glm::dot(frame[0], wo_world), glm::dot(frame[1], wo_world), glm::dot(frame[2], wo_world));
+  t.wo = Vec3(dot(frame[0], wo_world), dot(frame[1], wo_world), dot(frame[2], wo_world));
   t.mirror = 2 * t.wo.z * frame[2] - wo_world;
   if (const auto* b = std::get_if<Lambert>(&brdf)) {
     t.lambert = b->albedo / pi;
@@ -194,7 +194,7 @@ Terms make_terms(const Brdf& brdf, const Mat3& frame, Vec3 wo_world) {
     t.colour[0] = b->f0, t.colour[1] = Vec3(1), t.alpha = widths(b->alpha);
     t.kind = Terms::Kind::ggx, t.count = 2;
   } else if (const auto* b = std::get_if<MetallicRoughness>(&brdf)) {
-    const Vec3 f0 = glm::mix(Vec3(0.04f), b->base_color, b->metallic);
+    const Vec3 f0 = mix(Vec3(0.04f), b->base_color, b->metallic);
     t.colour[0] = f0, t.colour[1] = Vec3(1), t.colour[2] = b->base_color * ((1 - b->metallic) / pi) * (Vec3(1) - f0);
     t.alpha = widths(Vec2(b->roughness * b->roughness)), t.layered = true;
     t.kind = Terms::Kind::ggx, t.count = 3;
@@ -212,7 +212,7 @@ void evaluate_terms(const Terms& t, const float* x, const float* y, const float*
   if (t.kind != Terms::Kind::other) return HWY_DYNAMIC_DISPATCH(EvaluateTerms)(t, x, y, z, count, out, stride);
   for (size_t i = 0; i < count; ++i) {
     const Vec3 w(x[i], y[i], z[i]),
-        f = evaluate(*t.brdf, Vec3(glm::dot(t.frame[0], w), glm::dot(t.frame[1], w), glm::dot(t.frame[2], w)), t.wo);
+        f = evaluate(*t.brdf, Vec3(dot(t.frame[0], w), dot(t.frame[1], w), dot(t.frame[2], w)), t.wo);
     for (size_t k = 0; k < 3; ++k) out[k * stride + i] = f[int(k)];
   }
 }

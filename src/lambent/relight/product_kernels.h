@@ -21,7 +21,7 @@ struct Terms {
 inline constexpr size_t sum_width = 12, nodes_each[3] = {1, 4, 16}, coarse_each = 21;
 
 // Roughness as it is evaluated.
-inline Vec2 widths(Vec2 alpha) { return glm::max(alpha, Vec2(min_alpha)); }
+inline Vec2 widths(Vec2 alpha) { return max(alpha, Vec2(min_alpha)); }
 
 Terms make_terms(const Brdf& brdf, const Mat3& frame, Vec3 wo_world);
 

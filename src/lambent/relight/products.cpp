@@ -169,17 +169,17 @@ Vec3 shade_blocks_with(Scratch& s, const BlockLight& light, const Visibility& vi
     };
     int samples = 0;
     if (t.count > 0) {
-      samples = sample_class(material, glm::dot(t.mirror, cube.nodes[0].at(b)));
+      samples = sample_class(material, dot(t.mirror, cube.nodes[0].at(b)));
       if (material.by_values && samples < 4) {
         evaluate_terms(t, &cube.nodes[2].x[16 * b], &cube.nodes[2].y[16 * b], &cube.nodes[2].z[16 * b], 16, s.nodes,
                        16);
         samples = class_by_values(t, material, cube, s.nodes, &s.middles[b], stride);
       }
       // Samples below the horizon say nothing about the block's part above it.
-      if (!clear && t.kind != Terms::Kind::phong && samples == 1 && glm::dot(n, cube.nodes[0].at(b)) <= 0) samples = 4;
+      if (!clear && t.kind != Terms::Kind::phong && samples == 1 && dot(n, cube.nodes[0].at(b)) <= 0) samples = 4;
       // Nor do nodes below it, where the model's values break off.
       if (!clear && t.kind != Terms::Kind::phong && samples > 1 &&
-          glm::dot(n, cube.nodes[0].at(b)) < std::sin(cube.reach[b]))
+          dot(n, cube.nodes[0].at(b)) < std::sin(cube.reach[b]))
         samples = 4;
     }
     if (samples == 1) {
@@ -344,14 +344,14 @@ Vec3 shade_standard_scalar(const BlockLight& light, const Visibility& visibility
   const size_t count = light.cube->count();
   std::vector<uint8_t> levels(count);
   decode_visibility(visibility, receiver, levels);
-  auto local = [&](Vec3 w) { return Vec3(glm::dot(frame[0], w), glm::dot(frame[1], w), glm::dot(frame[2], w)); };
+  auto local = [&](Vec3 w) { return Vec3(dot(frame[0], w), dot(frame[1], w), dot(frame[2], w)); };
   const Vec3 view = local(wo);
-  glm::dvec3 sum(0);
+  Vec3d sum(0);
   for (size_t t = 0; t < count; ++t) {
     const float* p = light.texels.data() + t / block_texels * 6 * block_texels + t % block_texels;
     const Vec3 wi = local(Vec3(p[0], p[256], p[512]));
-    sum += glm::dvec3(evaluate(material.brdf, wi, view) * Vec3(p[768], p[1024], p[1280]) *
-                      (wi.z * float(levels[t]) / float(visibility.top())));
+    sum += Vec3d(evaluate(material.brdf, wi, view) * Vec3(p[768], p[1024], p[1280]) *
+                 (wi.z * float(levels[t]) / float(visibility.top())));
   }
   return Vec3(sum);
 }
@@ -381,7 +381,7 @@ void project_haar(const HaarLight& light, const Visibility& visibility, size_t r
   const size_t count = light.cube->count(), area = size_t(size) * size_t(size);
   s.levels.resize(count), s.faces.resize(4 * count);
   decode_visibility(visibility, receiver, s.levels);
-  auto local = [&](Vec3 w) { return Vec3(glm::dot(frame[0], w), glm::dot(frame[1], w), glm::dot(frame[2], w)); };
+  auto local = [&](Vec3 w) { return Vec3(dot(frame[0], w), dot(frame[1], w), dot(frame[2], w)); };
   const Vec3 view = local(wo);
   for (int f = 0; f < 6; ++f)
     for (int y = 0; y < size; ++y)
@@ -403,7 +403,7 @@ void project_haar(const HaarLight& light, const Visibility& visibility, size_t r
 }
 
 Vec3 multiply_haar(const HaarLight& light, const HaarScratch& s, size_t* visited) {
-  glm::dvec3 sum(0);
+  Vec3d sum(0);
   for (size_t c = 0; c < 3; ++c)
     for (size_t f = 0; f < 6; ++f)
       sum[int(c)] += haar_triple_product(light.trees[c][f], s.brdf[c][f], s.visibility[f], visited);

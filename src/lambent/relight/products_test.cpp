@@ -25,7 +25,7 @@ Point random_point(Random& random) {
   Mat3 frame = frame_about(n);
   Vec3 wo;
   do wo = square_to_sphere(random.next2());
-  while (glm::dot(wo, n) < 0.2f);
+  while (dot(wo, n) < 0.2f);
   return {frame, wo};
 }
 
@@ -43,10 +43,10 @@ Visibility random_visibility(const Cube& cube, int bits, std::span<const Point> 
       const Vec3 d = cube.texels.at(t);
       float seen = 1;
       for (int i = 0; i < 5; ++i) {
-        const float beyond = cosines[i] - glm::dot(balls[i], d);
+        const float beyond = cosines[i] - dot(balls[i], d);
         seen *= bits == 1 ? float(beyond > 0) : std::clamp(beyond * 60 + 0.5f, 0.0f, 1.0f);
       }
-      levels[t] = glm::dot(p.frame[2], d) > 0 ? uint8_t(seen * float(top) + 0.5f) : uint8_t(0);
+      levels[t] = dot(p.frame[2], d) > 0 ? uint8_t(seen * float(top) + 0.5f) : uint8_t(0);
     }
     const size_t before = pieces[0].size();
     encode_visibility(cube.size, bits, levels, pieces[0]);
@@ -81,7 +81,7 @@ const Brdf models[] = {Lambert{Vec3(0.8f, 0.5f, 0.2f)},
                        MetallicRoughness{Vec3(0.7f, 0.5f, 0.2f), 0.3f, 0.4f}};
 
 double largest_error(Vec3 value, Vec3 truth) {
-  return glm::length(glm::dvec3(value) - glm::dvec3(truth)) / (1e-3 + glm::length(glm::dvec3(truth)));
+  return length(Vec3d(value) - Vec3d(truth)) / (1e-3 + length(Vec3d(truth)));
 }
 
 // The SIMD forms of all models against evaluate() of brdf.h, texel by texel.
@@ -260,9 +260,9 @@ TEST(Products, AWhitePlaneShowsItsIrradiance) {
   Random random(16);
   for (int i = 0; i < 50; ++i) {
     const Vec3 n = square_to_sphere(random.next2());
-    if (std::abs(glm::dot(n, texel_direction(100, 60, 512, 256))) < 0.03f) continue;  // the sun stands on the horizon
+    if (std::abs(dot(n, texel_direction(100, 60, 512, 256))) < 0.03f) continue;  // the sun stands on the horizon
     std::vector<uint8_t> levels(light.cube->count());
-    for (size_t t = 0; t < levels.size(); ++t) levels[t] = glm::dot(n, light.cube->texels.at(t)) > 0;
+    for (size_t t = 0; t < levels.size(); ++t) levels[t] = dot(n, light.cube->texels.at(t)) > 0;
     std::vector<std::vector<uint8_t>> pieces(1);
     encode_visibility(64, 1, levels, pieces[0]);
     const uint32_t length = uint32_t(pieces[0].size());

@@ -117,17 +117,14 @@ void relight(const CpcaTransfer& t, std::span<const Vec3> light, Relit& out) {
   for (size_t c = 0; c < 3; ++c)
     for (size_t k = 0; k < C; ++k) by_channel[c * C + k] = light[k][int(c)];
   parallel_for(size_t(t.clusters) * (1 + rank), 64, [&](size_t begin, size_t end) {
-    for (size_t v = begin; v < end; ++v)
-      HWY_DYNAMIC_DISPATCH(LightVector)
-      (t.vectors.data() + v * rows * channels * C, rows, channels, C, by_channel.data(),
-       out.scratch.data() + v * padded);
+    for (size_t v = begin; v < end; ++v) HWY_DYNAMIC_DISPATCH(LightVector)
+    (t.vectors.data() + v * rows * channels * C, rows, channels, C, by_channel.data(), out.scratch.data() + v * padded);
   });
   parallel_for(blocks, 64, [&](size_t begin, size_t end) {
     AlignedVector<float> own(transfer_block * padded);
-    for (size_t b = begin; b < end; ++b)
-      HWY_DYNAMIC_DISPATCH(RelightBlock)
-      (t, out.scratch.data(), padded, b * transfer_block, std::min(transfer_block, t.receivers - b * transfer_block),
-       own.data(), out.values.data() + b * rows * 3 * transfer_block);
+    for (size_t b = begin; b < end; ++b) HWY_DYNAMIC_DISPATCH(RelightBlock)
+    (t, out.scratch.data(), padded, b * transfer_block, std::min(transfer_block, t.receivers - b * transfer_block),
+     own.data(), out.values.data() + b * rows * 3 * transfer_block);
   });
 }
 

@@ -83,7 +83,7 @@ TEST(FixLight, KeepsWhatRelightingGives) {
   const Vec3 half_red(0.5f, 1, 1);  // what is left of the light is its brightness
   relight(fixed, {&half_red, 1}, b);
   for (size_t r = 0; r < 50; ++r)
-    for (int row = 0; row < 4; ++row) EXPECT_LT(glm::length(b.at(r, row) - half_red * a.at(r, row)), 1e-6f);
+    for (int row = 0; row < 4; ++row) EXPECT_LT(length(b.at(r, row) - half_red * a.at(r, row)), 1e-6f);
 }
 
 TEST(Relight, IsTheSameOnOneThreadAndDoesNotMoveItsOutput) {

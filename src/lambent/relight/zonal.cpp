@@ -311,7 +311,7 @@ Grid make_grid(int order) {
   double y[sh_count(max_sh_order)];
   for (int i = 0; i < ZonalLight::height; ++i) {
     const double theta = std::numbers::pi * i / (ZonalLight::height - 1);
-    evaluate_sh(order, glm::dvec3(std::sin(theta), 0, std::cos(theta)), y);
+    evaluate_sh(order, Vec3d(std::sin(theta), 0, std::cos(theta)), y);
     for (int l = 0; l < order; ++l)
       for (int m = 0; m < order; ++m) g.polar.push_back(m <= l ? float(y[sh_index(l, m)]) : 0.0f);
   }
@@ -429,7 +429,7 @@ Vec3 shade_zonal(const ZonalTransfer& t, std::span<const float> values, const Ma
   for (int c = 0; c < 3; ++c) {
     const float* f = values.data() + (t.channels == 3 ? size_t(c) * exact_count : 0);
     sum[c] = f[0] * light[0][c];
-    if (exact == 2) sum[c] += glm::dot(R * Vec3(-f[3], -f[1], f[2]), Vec3(-light[3][c], -light[1][c], light[2][c]));
+    if (exact == 2) sum[c] += dot(R * Vec3(-f[3], -f[1], f[2]), Vec3(-light[3][c], -light[1][c], light[2][c]));
   }
   float y[sh_count(max_sh_order)];
   for (int i = 0; i < t.lobes; ++i) {

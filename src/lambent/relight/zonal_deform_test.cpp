@@ -22,7 +22,7 @@ Scene bumpy_sheet() {
       const float x = 2 * float(i) / n - 1, z = 2 * float(j) / n - 1, e = 1e-3f;
       positions.push_back({x, height(x, z), z});
       normals.push_back(
-          glm::normalize(Vec3(height(x - e, z) - height(x + e, z), 2 * e, height(x, z - e) - height(x, z + e))));
+          normalize(Vec3(height(x - e, z) - height(x + e, z), 2 * e, height(x, z - e) - height(x, z + e))));
     }
   for (uint32_t i = 0; i < n; ++i)
     for (uint32_t j = 0; j < n; ++j) {
@@ -129,8 +129,8 @@ TEST(ZonalDeform, LobesOfAMatrixFollowTheGlossySheet) {
     for (size_t v = 0; v < flat.positions.size(); ++v) {
       if (std::max(std::abs(flat.positions[v].x), std::abs(flat.positions[v].z)) > 0.95f) continue;
       const uint32_t there = bent_receivers.front[v], here = receivers.front[v];
-      const Vec3 view = glm::normalize(Vec3(0.5f, 6, 1) - bent.positions[v]);
-      if (glm::dot(view, bent_receivers.normals[there]) < 0.2f) continue;
+      const Vec3 view = normalize(Vec3(0.5f, 6, 1) - bent.positions[v]);
+      if (dot(view, bent_receivers.normals[there]) < 0.2f) continue;
       auto radiance = [&](const Outgoing& o, uint32_t r, std::vector<ViewWeights>& w, const Relit& rows) {
         evaluate_outgoing(o, r, view, w);
         return reflect_rows(w, Vec3(1), [&](size_t row) { return rows.at(r, int(row)); }).x;

@@ -101,8 +101,8 @@ TEST(RelightZonal, TheTableIsNearlyAsGoodAsTheDirectSum) {
             relight_zonal(c.w.transfer, f, light, table);
             double error = 0, total = 0;
             for (size_t r = 0; r < 203; ++r) {
-              const glm::dvec3 a = direct.at(r), b = table.at(r);
-              error += glm::dot(a - b, a - b), total += glm::dot(a, a);
+              const Vec3d a = direct.at(r), b = table.at(r);
+              error += dot(a - b, a - b), total += dot(a, a);
             }
             // Linear interpolation over h = pi / 31 misses up to h^2 / 8 times the second derivative, n^2 at most, and
             // on the mean over a cell half of that.
@@ -159,8 +159,8 @@ TEST(RelightZonal, RowsAreReceiversThatTurnTogether) {
     for (int row = 0; row < rows; ++row) {
       const Vec3 truth = shade_zonal(alone.w.transfer, load_receiver(alone.w.transfer, r * 3 + size_t(row)),
                                      rotations[r], alone.light);
-      EXPECT_LT(glm::length(direct.at(r, row) - truth), 1e-4f * (1 + glm::length(truth)));
-      EXPECT_LT(glm::length(table.at(r, row) - truth), 0.05f * (1 + glm::length(truth)));
+      EXPECT_LT(length(direct.at(r, row) - truth), 1e-4f * (1 + length(truth)));
+      EXPECT_LT(length(table.at(r, row) - truth), 0.05f * (1 + length(truth)));
     }
 }
 

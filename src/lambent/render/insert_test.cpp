@@ -80,8 +80,8 @@ double error_of_balls(const Room& room, const Transfer& transfer, const Lattice&
     const auto truth =
         exit_radiances(room.scene, env, ball.receivers.origins, ball.receivers.normals, surface_bounces + 1, 2048, 7);
     for (size_t r = 0; r < truth.size(); ++r) {
-      const glm::dvec3 d = glm::dvec3(drawn.relit.at(first + r)) - glm::dvec3(truth[r].mean), t(truth[r].mean);
-      difference += glm::dot(d, d), total += glm::dot(t, t);
+      const Vec3d d = Vec3d(drawn.relit.at(first + r)) - Vec3d(truth[r].mean), t(truth[r].mean);
+      difference += dot(d, d), total += dot(t, t);
     }
   }
   return std::sqrt(difference / total);
@@ -160,7 +160,7 @@ TEST(Insert, DrawsADiffuseObjectAmongGlossyRows) {
         evaluate_outgoing(*alone.outgoing, r, view, unchanged);
         EXPECT_EQ(radiance, reflect_rows(unchanged, colour, [&](size_t row) { return alone.relit.at(r, int(row)); }));
       } else {
-        EXPECT_LT(glm::length(radiance - colour * plain.relit.at(r)), 1e-5f);
+        EXPECT_LT(length(radiance - colour * plain.relit.at(r)), 1e-5f);
       }
     }
   }

@@ -21,21 +21,19 @@ struct Bumps {
     const Mat3 turn = rotation_from_yaw_pitch_roll({30, 20, -15});
     a = turn * Vec3(2, 0, 0), b = turn * Vec3(0, 1.5f, 0);
   }
-  Vec3 n() const { return glm::normalize(glm::cross(a, b)); }
+  Vec3 n() const { return normalize(cross(a, b)); }
   // In the frame (a, b, n) / lengths: (-dh/ds / |a|, -dh/dt / |b|, 1).
   Vec3 local(float s, float t) const {
     const float w = 2 * pi * k;
-    return glm::normalize(Vec3(-height * w * std::cos(w * s) * std::sin(w * t) / glm::length(a),
-                               -height * w * std::sin(w * s) * std::cos(w * t) / glm::length(b), 1));
+    return normalize(Vec3(-height * w * std::cos(w * s) * std::sin(w * t) / length(a),
+                          -height * w * std::sin(w * s) * std::cos(w * t) / length(b), 1));
   }
   Vec3 normal(float s, float t) const {
     const Vec3 l = local(s, t);
-    return l.x * glm::normalize(a) + l.y * glm::normalize(b) + l.z * n();
+    return l.x * normalize(a) + l.y * normalize(b) + l.z * n();
   }
   // Places (s, t) of a point of the plane.
-  Vec2 place(Vec3 p) const {
-    return {glm::dot(p - origin, a) / glm::dot(a, a), glm::dot(p - origin, b) / glm::dot(b, b)};
-  }
+  Vec2 place(Vec3 p) const { return {dot(p - origin, a) / dot(a, a), dot(p - origin, b) / dot(b, b)}; }
 };
 
 // The quad, its normal texture and coordinates: the picture upright, or mirrored in u; with or without tangents.
@@ -56,7 +54,7 @@ Scene bumpy(const Bumps& bumps, bool mirrored = false, bool tangents = false) {
   for (Vec3 p : scene.positions) {
     const Vec2 at = bumps.place(p);
     scene.texcoords[0].push_back({mirrored ? 1 - at.x : at.x, 1 - at.y});
-    if (tangents) scene.tangents.push_back(Vec4(glm::normalize(mirrored ? -bumps.a : bumps.a), mirrored ? -1 : 1));
+    if (tangents) scene.tangents.push_back(Vec4(normalize(mirrored ? -bumps.a : bumps.a), mirrored ? -1 : 1));
   }
   return scene;
 }
@@ -89,7 +87,7 @@ double difference(const Image& x, const Image& y) {
   size_t count = 0;
   for (size_t i = 0; i < x.rgb.size(); ++i) {
     if (y.alpha[i] < 1) continue;
-    square += double(glm::dot(x.rgb[i] - y.rgb[i], x.rgb[i] - y.rgb[i])) / 3,
+    square += double(dot(x.rgb[i] - y.rgb[i], x.rgb[i] - y.rgb[i])) / 3,
         mean += double(y.rgb[i].x + y.rgb[i].y + y.rgb[i].z) / 3;
     ++count;
   }
@@ -110,7 +108,7 @@ Image picture(const Bumps& bumps, F leaving) {
       for (int k = 0; k < grid * grid; ++k) {
         const Vec3 d =
             rays.direction(float(x) + (float(k % grid) + 0.5f) / grid, float(y) + (float(k / grid) + 0.5f) / grid);
-        const Vec3 p = rays.eye + d * (glm::dot(bumps.origin - rays.eye, bumps.n()) / glm::dot(d, bumps.n()));
+        const Vec3 p = rays.eye + d * (dot(bumps.origin - rays.eye, bumps.n()) / dot(d, bumps.n()));
         const Vec2 at = bumps.place(p);
         if (at.x < 0 || at.x > 1 || at.y < 0 || at.y > 1) continue;
         ++covered;
@@ -131,8 +129,7 @@ TEST(NormalMap, NormalsAreThoseOfTheBumps) {
       for (const Triangle& t : scene.triangles)
         for (Vec2 uv : {Vec2(0.2f, 0.3f), Vec2(0.6f, 0.1f), Vec2(0.05f, 0.8f)}) {
           const Vec2 at = bumps.place(interpolate(scene.positions, t, uv.x, uv.y));
-          worst =
-              std::max(worst, glm::length(mapped_normal(scene, t, uv.x, uv.y, bumps.n()) - bumps.normal(at.x, at.y)));
+          worst = std::max(worst, length(mapped_normal(scene, t, uv.x, uv.y, bumps.n()) - bumps.normal(at.x, at.y)));
         }
       EXPECT_LT(worst, eight_bits) << mirrored << tangents;
     }
@@ -142,8 +139,8 @@ TEST(NormalMap, NormalsAreThoseOfTheBumps) {
   const Triangle& t = scene.triangles[4];
   const Vec2 at = bumps.place(interpolate(scene.positions, t, 0.2f, 0.3f));
   const Vec3 l = bumps.local(at.x, at.y) * Vec3(0.5f, 0.5f, 1),
-             world = glm::normalize(l.x * glm::normalize(bumps.a) + l.y * glm::normalize(bumps.b) + l.z * bumps.n());
-  EXPECT_LT(glm::length(mapped_normal(scene, t, 0.2f, 0.3f, bumps.n()) - world), eight_bits);
+             world = normalize(l.x * normalize(bumps.a) + l.y * normalize(bumps.b) + l.z * bumps.n());
+  EXPECT_LT(length(mapped_normal(scene, t, 0.2f, 0.3f, bumps.n()) - world), eight_bits);
   // No texture, no coordinates, coordinates that do not vary: the surface's own.
   for (Vec2& uv : scene.texcoords[0]) uv = Vec2(0.5f);
   EXPECT_EQ(mapped_normal(scene, t, 0.2f, 0.3f, bumps.n()), bumps.n());
@@ -154,13 +151,12 @@ TEST(NormalMap, NormalsAreThoseOfTheBumps) {
 TEST(NormalMap, ALampOnBumpsIsItsFormula) {
   const Bumps bumps;
   Scene scene = bumpy(bumps);
-  const Vec3 I(3, 2, 1),
-      to_sun = glm::normalize(bumps.n() + 0.5f * glm::normalize(bumps.a) - 0.3f * glm::normalize(bumps.b));
+  const Vec3 I(3, 2, 1), to_sun = normalize(bumps.n() + 0.5f * normalize(bumps.a) - 0.3f * normalize(bumps.b));
   scene.lights.push_back(
       {.name = "sun", .kind = PunctualLight::Kind::directional, .direction = -to_sun, .intensity = I});
   const Vec3 lit = 0.5f * I / pi;
-  const Image formula = picture(bumps, [&](Vec3 n) { return lit * std::max(0.0f, glm::dot(n, to_sun)); });
-  const Image flat = picture(bumps, [&](Vec3) { return lit * glm::dot(bumps.n(), to_sun); });
+  const Image formula = picture(bumps, [&](Vec3 n) { return lit * std::max(0.0f, dot(n, to_sun)); });
+  const Image flat = picture(bumps, [&](Vec3) { return lit * dot(bumps.n(), to_sun); });
   EXPECT_GT(difference(flat, formula), 0.2);  // the bumps show
   for (bool mirrored : {false, true}) {
     Scene drawn = bumpy(bumps, mirrored);
@@ -179,9 +175,9 @@ TEST(NormalMap, UnderASkyAsThePathTracerHasIt) {
   const Bumps bumps;
   Scene scene = bumpy(bumps);
   scene.materials[0].base_color = Vec3(0.8f, 0.5f, 0.3f);
-  const Vec3 bright = glm::normalize(bumps.n() + 0.7f * glm::normalize(bumps.a));
+  const Vec3 bright = normalize(bumps.n() + 0.7f * normalize(bumps.a));
   const Environment sky = make_environment("lobe", 64, 32, [&](Vec3 d) {
-    return Vec3(0.2f, 0.3f, 0.5f) + std::exp(8 * (glm::dot(d, bright) - 1)) * Vec3(4, 3, 2);
+    return Vec3(0.2f, 0.3f, 0.5f) + std::exp(8 * (dot(d, bright) - 1)) * Vec3(4, 3, 2);
   });
   auto traced =
       path_trace(scene, sky, facing(bumps), {.width = 96, .height = 72, .spp = 256, .bounces = 0, .background = false});
@@ -208,7 +204,7 @@ TEST(NormalMap, UnderASkyAsThePathTracerHasIt) {
       mean[c] += double(light[c]) / many * 2 * pi;
       for (int k = 0; k < 3; ++k) {
         moment[c][k] += double(light[c] * d[k]) / many * 2 * pi;
-        three[c][k] += double(light[c] * std::max(0.0f, glm::dot(d, frame * hl2_basis[k]))) / many * 2 * pi;
+        three[c][k] += double(light[c] * std::max(0.0f, dot(d, frame * hl2_basis[k]))) / many * 2 * pi;
       }
     }
   }
@@ -218,7 +214,7 @@ TEST(NormalMap, UnderASkyAsThePathTracerHasIt) {
       Vec3 sum(0);
       float weights[3], total = 0;
       for (int k = 0; k < 3; ++k) {
-        const float cosine = std::max(0.0f, glm::dot(n, frame * hl2_basis[k]));
+        const float cosine = std::max(0.0f, dot(n, frame * hl2_basis[k]));
         total += weights[k] = cosine * cosine;
       }
       for (int c = 0; c < 3; ++c) {
@@ -243,7 +239,7 @@ TEST(NormalMap, BacksHaveTheNegatedNormal) {
   const Bumps bumps;
   Scene scene = bumpy(bumps);
   for (Triangle& t : scene.triangles) t.two_sided = true;
-  const Vec3 to_sun = glm::normalize(-bumps.n() + 0.5f * glm::normalize(bumps.a));
+  const Vec3 to_sun = normalize(-bumps.n() + 0.5f * normalize(bumps.a));
   scene.lights.push_back(
       {.name = "sun", .kind = PunctualLight::Kind::directional, .direction = -to_sun, .intensity = Vec3(2)});
   Camera camera = facing(bumps);

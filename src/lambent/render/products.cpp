@@ -23,7 +23,7 @@ ProductReceivers make_product_receivers(const Scene& scene, const std::vector<ui
         if (r == none || done[r]) continue;
         done[r] = 1;
         Vec3 n = scene.normals[v];
-        if ((glm::dot(n, face_normal[v]) < 0) != (side == &back)) n = -n;
+        if ((dot(n, face_normal[v]) < 0) != (side == &back)) n = -n;
         out.positions[r] = scene.positions[v], out.frames[r] = shading_frame(scene, t, n);
         if (!varied) continue;
         out.material_of[r] = r;
@@ -39,19 +39,19 @@ std::vector<uint32_t> seen_receivers(const Scene& scene, const std::vector<uint3
   // Planes through the eye and the picture's sides, inward.
   const Vec3 right = rays.dx * float(width), down = rays.dy * float(height), corner = rays.corner;
   const Vec3 forward = corner + 0.5f * (right + down);
-  Vec3 planes[4] = {glm::cross(corner, down), glm::cross(corner + right, down), glm::cross(corner, right),
-                    glm::cross(corner + down, right)};
+  Vec3 planes[4] = {cross(corner, down), cross(corner + right, down), cross(corner, right),
+                    cross(corner + down, right)};
   for (Vec3& p : planes)
-    if (glm::dot(p, forward) < 0) p = -p;
+    if (dot(p, forward) < 0) p = -p;
   std::vector<uint8_t> wanted(count, 0);
   for (const Triangle& t : scene.triangles) {
     const Vec3 a = scene.positions[t.v[0]] - rays.eye, b = scene.positions[t.v[1]] - rays.eye,
                c = scene.positions[t.v[2]] - rays.eye;
-    const bool is_front = glm::dot(area_normal(scene, t), a) < 0;
+    const bool is_front = dot(area_normal(scene, t), a) < 0;
     const auto& side = is_front ? front : back;
     if (side.empty()) continue;
     bool outside = false;
-    for (const Vec3& p : planes) outside |= std::max({glm::dot(p, a), glm::dot(p, b), glm::dot(p, c)}) < 0;
+    for (const Vec3& p : planes) outside |= std::max({dot(p, a), dot(p, b), dot(p, c)}) < 0;
     if (outside) continue;
     for (uint32_t v : t.v)
       if (side[v] != none) wanted[side[v]] = 1;

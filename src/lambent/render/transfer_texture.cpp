@@ -13,29 +13,29 @@ Mat3 texture_frame(const Scene& scene, const Triangle& t, Vec3 normal) {
   if (!(std::abs(area) > 0) || !std::isfinite(area)) return frame_about(normal);
   // dP/du across the normal; the sign of the area says whether +u, -v and the normal are right-handed.
   Vec3 along = (e1 * d2.y - e2 * d1.y) / area;
-  along -= normal * glm::dot(normal, along);
-  if (!(glm::dot(along, along) > 0)) return frame_about(normal);
+  along -= normal * dot(normal, along);
+  if (!(dot(along, along) > 0)) return frame_about(normal);
   along = normalize_or(along, frame_about(normal)[0]);
-  Vec3 up = glm::cross(normal, along);
+  Vec3 up = cross(normal, along);
   const Vec3 dv = (e2 * d1.x - e1 * d2.x) / area;
-  if (glm::dot(up, dv) > 0) up = -up;
+  if (dot(up, dv) > 0) up = -up;
   return {along, up, normal};
 }
 
 Mat3 groove_frame(const Scene& scene, const Triangle& t, Vec2 tile, Vec3 normal) {
   const std::vector<Vec2>& uv = scene.texcoords[0];
   if (uv.empty()) return frame_about(normal);
-  using glm::dvec2, glm::dvec3;  // edges and coordinates of any size, to the fourth power
-  const dvec3 p(scene.positions[t.v[0]]), e1 = dvec3(scene.positions[t.v[1]]) - p,
-                                          e2 = dvec3(scene.positions[t.v[2]]) - p, a = glm::cross(e1, e2);
-  const dvec2 d1(uv[t.v[1]] - uv[t.v[0]]), d2(uv[t.v[2]] - uv[t.v[0]]);
+  // Doubles: edges and coordinates of any size, to the fourth power.
+  const Vec3d p(scene.positions[t.v[0]]), e1 = Vec3d(scene.positions[t.v[1]]) - p,
+                                          e2 = Vec3d(scene.positions[t.v[2]]) - p, a = cross(e1, e2);
+  const Vec2d d1(uv[t.v[1]] - uv[t.v[0]]), d2(uv[t.v[2]] - uv[t.v[0]]);
   // The gradient of tile . uv over the triangle, in the plane of the normal.
-  dvec3 across = glm::dot(dvec2(tile), d1) * glm::cross(e2, a) - glm::dot(dvec2(tile), d2) * glm::cross(e1, a);
-  across -= dvec3(normal) * glm::dot(dvec3(normal), across);
-  const double length = glm::length(across);
+  Vec3d across = dot(Vec2d(tile), d1) * cross(e2, a) - dot(Vec2d(tile), d2) * cross(e1, a);
+  across -= Vec3d(normal) * dot(Vec3d(normal), across);
+  const double length = lambent::length(across);
   if (!(length > 0 && std::isfinite(length))) return frame_about(normal);
   const Vec3 x(across / length);
-  return {x, glm::cross(normal, x), normal};
+  return {x, cross(normal, x), normal};
 }
 
 Result<Image> render_transfer_texture(const Scene& scene, const Tracer& tracer, const ZonalTexture& texture,
@@ -53,7 +53,7 @@ Result<Image> render_transfer_texture(const Scene& scene, const Tracer& tracer, 
           const Vec2 uv = placed ? interpolate(scene.texcoords[0], t, hit.u, hit.v) : Vec2(0.0f);
           Mat3 frame;
           if (texture.groove_depth > 0) {
-            const float phase = glm::dot(uv, use.tile), x = (phase - std::floor(phase) - 0.5f) / use.groove_width;
+            const float phase = dot(uv, use.tile), x = (phase - std::floor(phase) - 0.5f) / use.groove_width;
             sample_groove(texture, placed ? x : 1, use.groove_depth * (use.groove_map ? use.groove_map(uv) : 1),
                           values);
             frame = groove_frame(scene, t, use.tile, normal);

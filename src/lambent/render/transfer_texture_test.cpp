@@ -22,12 +22,12 @@ TEST(TransferTexture, FramesFollowTheTexture) {
   s.texcoords[0] = {{0, 1}, {1, 1}, {0, 0}};
   s.triangles.push_back({{0, 1, 2}, 0, false});
   const Mat3 f = texture_frame(s, s.triangles[0], Vec3(0, 1, 0));
-  EXPECT_LT(glm::length(f[0] - Vec3(1, 0, 0)) + glm::length(f[1] - Vec3(0, 0, -1)), 1e-6f);
+  EXPECT_LT(length(f[0] - Vec3(1, 0, 0)) + length(f[1] - Vec3(0, 0, -1)), 1e-6f);
   for (Vec2& uv : s.texcoords[0]) uv.x = -uv.x;  // mirrored
   const Mat3 m = texture_frame(s, s.triangles[0], Vec3(0, 1, 0));
-  EXPECT_LT(glm::length(m[0] - Vec3(-1, 0, 0)) + glm::length(m[1] - Vec3(0, 0, -1)), 1e-6f);
+  EXPECT_LT(length(m[0] - Vec3(-1, 0, 0)) + length(m[1] - Vec3(0, 0, -1)), 1e-6f);
   for (Vec2& uv : s.texcoords[0]) uv = Vec2(0.5f);
-  EXPECT_LT(glm::length(texture_frame(s, s.triangles[0], Vec3(0, 1, 0))[2] - Vec3(0, 1, 0)), 1e-6f);
+  EXPECT_LT(length(texture_frame(s, s.triangles[0], Vec3(0, 1, 0))[2] - Vec3(0, 1, 0)), 1e-6f);
 }
 
 TEST(TransferTexture, GroovesLieAlikeAtAnyScale) {
@@ -38,10 +38,8 @@ TEST(TransferTexture, GroovesLieAlikeAtAnyScale) {
     s.texcoords[0] = {{0, 1}, {1e-3f, 1}, {0, 1 - 1e-3f}};
     s.triangles.push_back({{0, 1, 2}, 0, false});
     // v falls along -z.
-    EXPECT_LT(glm::length(groove_frame(s, s.triangles[0], Vec2(0, 12), Vec3(0, 1, 0))[0] - Vec3(0, 0, 1)), 1e-4f)
-        << scale;
-    EXPECT_LT(glm::length(groove_frame(s, s.triangles[0], Vec2(-5, 0), Vec3(0, 1, 0))[0] - Vec3(-1, 0, 0)), 1e-4f)
-        << scale;
+    EXPECT_LT(length(groove_frame(s, s.triangles[0], Vec2(0, 12), Vec3(0, 1, 0))[0] - Vec3(0, 0, 1)), 1e-4f) << scale;
+    EXPECT_LT(length(groove_frame(s, s.triangles[0], Vec2(-5, 0), Vec3(0, 1, 0))[0] - Vec3(-1, 0, 0)), 1e-4f) << scale;
   }
 }
 
@@ -85,7 +83,7 @@ TEST(TransferTexture, ShadesAFlatWallAsTheReliefItself) {
   auto wall_tracer = Tracer::build(wall);
   Camera camera;
   camera.target = R * Vec3(0.5f, -0.5f, 0), camera.eye = R * Vec3(0.5f, -0.5f, 1000), camera.up = R * Vec3(0, 1, 0);
-  camera.fov = 2 * glm::degrees(std::atan(0.5f / 1000));  // the wall fills the picture, pixel by texel
+  camera.fov = 2 * degrees(std::atan(0.5f / 1000));  // the wall fills the picture, pixel by texel
   RenderOptions options;
   options.width = options.height = n, options.samples = 64;
   const std::vector<Vec3> turned = rotate_sh(make_sh_rotation(6, R), light);
@@ -95,7 +93,7 @@ TEST(TransferTexture, ShadesAFlatWallAsTheReliefItself) {
   for (int j = 0; j < n; ++j)
     for (int i = 0; i < n; ++i) {
       const Vec3 truth = relit.at(size_t(j * n + i)), seen = image->at(i, j);
-      error += glm::dot(seen - truth, seen - truth), total += glm::dot(truth, truth);
+      error += dot(seen - truth, seen - truth), total += dot(truth, truth);
     }
   // Exact bands are blended over a pixel's area; the lobes are exact.
   EXPECT_LT(std::sqrt(error / total), 0.08);
@@ -106,7 +104,7 @@ double relative_rms(const Image& ours, const Image& truth) {
   double error = 0, total = 0;
   for (size_t i = 0; i < ours.rgb.size(); ++i) {
     const Vec3 d = ours.rgb[i] - truth.rgb[i];
-    error += glm::dot(d, d), total += glm::dot(truth.rgb[i], truth.rgb[i]);
+    error += dot(d, d), total += dot(truth.rgb[i], truth.rgb[i]);
   }
   return std::sqrt(error / total);
 }
@@ -121,7 +119,7 @@ Scene tiled_sheet(int cells) {
 Camera from_above(float y) {
   Camera camera;
   camera.up = Vec3(0, 0, -1), camera.target = Vec3(0, y, 0), camera.eye = Vec3(0, y + 300, 0);
-  camera.fov = 2 * glm::degrees(std::atan(0.5f / 300));
+  camera.fov = 2 * degrees(std::atan(0.5f / 300));
   return camera;
 }
 
@@ -226,7 +224,7 @@ TEST(TransferTexture, NearLampsLightItAsTheyDoTheDisplacedGeometry) {
   auto tracer = Tracer::build(sheet);
   // From below the lamp, which would stand before the sheet.
   Camera camera = from_above(0);
-  camera.eye.y = 0.8f, camera.fov = 2 * glm::degrees(std::atan(0.5f / 0.8f));
+  camera.eye.y = 0.8f, camera.fov = 2 * degrees(std::atan(0.5f / 0.8f));
   RenderOptions options;
   options.width = options.height = 48, options.samples = 64;
   const SphereLamp lamp{{0.8f, 1.6f, 0.3f}, 0.7f, {5, 4, 3}};

@@ -47,8 +47,8 @@ TEST(AppendScene, PlacesTheMiddleOfTheBottom) {
   add_box(s, add_material(s, "grey", Vec3(0.5f)), "box", Vec3(1, 2, 3), Vec3(3, 6, 9), 2);
   place_scene(s, Vec3(-5, 7, 11), 0.5f);
   const Bounds box = bounds(s);
-  EXPECT_LT(glm::length(box.min - Vec3(-5.5f, 7, 9.5f)), 1e-5f);
-  EXPECT_LT(glm::length(box.max - Vec3(-4.5f, 9, 12.5f)), 1e-5f);
+  EXPECT_LT(length(box.min - Vec3(-5.5f, 7, 9.5f)), 1e-5f);
+  EXPECT_LT(length(box.max - Vec3(-4.5f, 9, 12.5f)), 1e-5f);
 }
 
 }  // namespace

@@ -10,7 +10,7 @@
 namespace lambent {
 namespace {
 
-using DVec3 = glm::dvec3;
+using DVec3 = Vec3d;
 
 // Corner k of triangle t is number 3 t + k; its edge runs from it to the next corner of the triangle.
 uint32_t next_corner(uint32_t corner) { return corner % 3 == 2 ? corner - 2 : corner + 1; }
@@ -66,13 +66,13 @@ struct UnionFind {
 
 DVec3 wide_area_normal(const Scene& s, const Triangle& t) {
   DVec3 a = s.positions[t.v[0]];
-  return glm::cross(DVec3(s.positions[t.v[1]]) - a, DVec3(s.positions[t.v[2]]) - a);
+  return cross(DVec3(s.positions[t.v[1]]) - a, DVec3(s.positions[t.v[2]]) - a);
 }
 
 // Unit normal, or zero for a triangle without an area.
 DVec3 face_normal(const Scene& s, const Triangle& t) {
   DVec3 n = wide_area_normal(s, t);
-  double length = glm::length(n);
+  double length = lambent::length(n);
   return length > 0 ? n / length : DVec3(0);
 }
 
@@ -80,14 +80,14 @@ DVec3 face_normal(const Scene& s, const Triangle& t) {
 double corner_angle(const Scene& s, const Triangle& t, int k) {
   DVec3 p = s.positions[t.v[k]];
   DVec3 a = DVec3(s.positions[t.v[(k + 1) % 3]]) - p, b = DVec3(s.positions[t.v[(k + 2) % 3]]) - p;
-  return std::atan2(glm::length(glm::cross(a, b)), glm::dot(a, b));
+  return std::atan2(length(cross(a, b)), dot(a, b));
 }
 
 // Below this a sum of unit normals, weighted by angles of order one, has cancelled out.
 constexpr double cancelled = 1e-9;
 
 Vec3 unit_or(DVec3 sum, DVec3 fallback) {
-  double length = glm::length(sum);
+  double length = lambent::length(sum);
   DVec3 n = length > cancelled ? sum / length : fallback;
   return n == DVec3(0) ? Vec3(0, 1, 0) : Vec3(n);
 }
@@ -101,7 +101,7 @@ void join_over_edge(UnionFind& groups, std::span<const Edge> edges, const std::v
     return (corner_ids[e.corner] == low) == at_low ? e.corner : next_corner(e.corner);
   };
   auto try_join = [&](Edge a, Edge b) {
-    if (glm::dot(faces[a.corner / 3], faces[b.corner / 3]) <= cos_crease) return;
+    if (dot(faces[a.corner / 3], faces[b.corner / 3]) <= cos_crease) return;
     groups.join(end_corner(a, true), end_corner(b, true));
     groups.join(end_corner(a, false), end_corner(b, false));
   };
@@ -109,13 +109,13 @@ void join_over_edge(UnionFind& groups, std::span<const Edge> edges, const std::v
   if (edges.size() == 2) return try_join(edges[0], edges[1]);
   DVec3 x = faces[edges[0].corner / 3], y(0);
   for (Edge e : edges) {  // the face most nearly at a right angle to the first spans the circle's plane best
-    DVec3 n = faces[e.corner / 3], aside = n - x * glm::dot(n, x);
-    if (glm::dot(aside, aside) > glm::dot(y, y)) y = aside;
+    DVec3 n = faces[e.corner / 3], aside = n - x * dot(n, x);
+    if (dot(aside, aside) > dot(y, y)) y = aside;
   }
   std::vector<std::pair<double, Edge>> around;
   for (Edge e : edges) {
     DVec3 n = faces[e.corner / 3];
-    around.push_back({std::atan2(glm::dot(n, y) / std::max(glm::length(y), 1e-300), glm::dot(n, x)), e});
+    around.push_back({std::atan2(dot(n, y) / std::max(length(y), 1e-300), dot(n, x)), e});
   }
   std::sort(around.begin(), around.end(), [](const auto& a, const auto& b) {
     return a.first != b.first ? a.first < b.first : a.second.corner < b.second.corner;
@@ -146,7 +146,7 @@ PartNormals part_normals(Scene& scene, const Part& part, double crease_degrees) 
 
   // Corners at one position that are connected over smooth edges form a group with one normal.
   UnionFind groups(corner_count);
-  double cos_crease = std::cos(glm::radians(crease_degrees));
+  double cos_crease = std::cos(radians(crease_degrees));
   visit_edges(corner_ids, positions.count, no_area, [&](std::span<const Edge> edges, uint32_t low) {
     join_over_edge(groups, edges, corner_ids, low, faces, cos_crease);
   });
@@ -274,7 +274,7 @@ void repair_normals(Scene& scene) {
   bool any = false;
   for (size_t v = 0; v < scene.normals.size(); ++v) {
     DVec3 n = scene.normals[v];
-    double length2 = glm::dot(n, n);
+    double length2 = dot(n, n);
     broken[v] = !(length2 > shortest * shortest) || !std::isfinite(length2);
     any = any || broken[v];
     if (!broken[v] && std::abs(length2 - 1) > unit_error) scene.normals[v] = Vec3(n / std::sqrt(length2));
@@ -366,8 +366,8 @@ void infer_sidedness(Scene& scene) {
     uint32_t component = component_of(t);
     const Triangle& triangle = scene.triangles[t];
     DVec3 normal = wide_area_normal(scene, triangle), apex = centroid[component] / corners[component];
-    volume[component] += glm::dot(DVec3(scene.positions[triangle.v[0]]) - apex, normal) / 6;
-    area[component] += glm::length(normal) / 2;
+    volume[component] += dot(DVec3(scene.positions[triangle.v[0]]) - apex, normal) / 6;
+    area[component] += length(normal) / 2;
   }
   for (size_t t = 0; t < scene.triangles.size(); ++t) {
     uint32_t c = component_of(t);

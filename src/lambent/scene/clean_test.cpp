@@ -19,7 +19,7 @@ TEST(MakeNormals, SplitsACubeIntoFaces) {
     EXPECT_EQ(s.positions.size(), 24u);  // four corners a face
     EXPECT_EQ(s.triangles.size(), 12u);
     for (const Triangle& t : s.triangles)
-      for (uint32_t v : t.v) EXPECT_EQ(s.normals[v], glm::normalize(area_normal(s, t)));
+      for (uint32_t v : t.v) EXPECT_EQ(s.normals[v], normalize(area_normal(s, t)));
     ASSERT_EQ(s.parts[0].source.size(), 24u);
     EXPECT_TRUE(s.parts[0].changed);
     Scene before = bare_cube();
@@ -38,7 +38,7 @@ TEST(MakeNormals, SmoothSphereIsNearlyRadial) {
   s.normals.assign(count, Vec3(0));
   make_normals(s, 0, false);
   EXPECT_EQ(s.positions.size(), count);
-  for (size_t v = 0; v < count; ++v) EXPECT_GT(glm::dot(s.normals[v], glm::normalize(s.positions[v])), least_cosine);
+  for (size_t v = 0; v < count; ++v) EXPECT_GT(dot(s.normals[v], normalize(s.positions[v])), least_cosine);
 }
 
 TEST(MakeNormals, JoinsSeamsAndIsTheSameWithoutIndices) {
@@ -58,8 +58,7 @@ TEST(MakeNormals, JoinsSeamsAndIsTheSameWithoutIndices) {
   ASSERT_EQ(loose.positions.size(), 3 * loose.triangles.size());
   for (size_t t = 0; t < shared.triangles.size(); ++t) {
     for (int k = 0; k < 3; ++k) {
-      EXPECT_LT(glm::distance(shared.normals[shared.triangles[t].v[k]], loose.normals[loose.triangles[t].v[k]]),
-                rounding);
+      EXPECT_LT(distance(shared.normals[shared.triangles[t].v[k]], loose.normals[loose.triangles[t].v[k]]), rounding);
     }
   }
 }
@@ -70,8 +69,7 @@ TEST(MakeNormals, WeightsByCornerAngle) {
   Scene s = bare_cube();
   s.normals.assign(8, Vec3(0));
   repair_normals(s);
-  for (int v = 0; v < 8; ++v)
-    EXPECT_LT(glm::distance(s.normals[size_t(v)], glm::normalize(s.positions[size_t(v)])), rounding);
+  for (int v = 0; v < 8; ++v) EXPECT_LT(distance(s.normals[size_t(v)], normalize(s.positions[size_t(v)])), rounding);
 }
 
 TEST(MakeNormals, ManyFacesOnOneEdge) {
@@ -132,14 +130,14 @@ TEST(MakeNormals, TrianglesWithoutAreaCountForNothing) {
 
 TEST(RepairNormals, ReplacesTheBrokenAndScalesTheRest) {
   Scene s = make_quad({0, 0, 0}, {1, 0, 0}, {0, 1, 0}, 2, 2, Vec3(0.5f));
-  const Vec3 tilted = glm::normalize(Vec3(0.1f, 0.2f, 1));
+  const Vec3 tilted = normalize(Vec3(0.1f, 0.2f, 1));
   s.normals[0] = Vec3(0), s.normals[1] = Vec3(NAN, 0, 1), s.normals[2] = Vec3(1e-40f, 0, 0),
   s.normals[3] = Vec3(INFINITY, 0, 0);
   s.normals[4] = 3.0f * tilted, s.normals[5] = tilted;
   repair_normals(s);
   for (size_t v : {0, 1, 2, 3}) EXPECT_EQ(s.normals[v], Vec3(0, 0, 1));
   constexpr float rounding = 1e-6f;
-  EXPECT_LT(glm::distance(s.normals[4], tilted), rounding);
+  EXPECT_LT(distance(s.normals[4], tilted), rounding);
   EXPECT_EQ(s.normals[5], tilted);  // unit already: kept bit for bit
   EXPECT_TRUE(s.parts[0].changed);
   EXPECT_EQ(s.parts[0].source.size(), 9u);

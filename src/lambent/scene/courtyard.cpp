@@ -99,7 +99,7 @@ Arc line(Vec2 a, Vec2 b) { return {a, a + (b - a) / 3.0f, b - (b - a) / 3.0f, b}
 void add_turned(Builder& b, Vec3 foot, std::span<const Arc> profile, int around, float cell) {
   int n = std::max(8, int(std::lround(float(around) * b.detail)));
   for (const Arc& c : profile) {
-    int steps = b.cells(glm::length(c[1] - c[0]) + glm::length(c[2] - c[1]) + glm::length(c[3] - c[2]), cell);
+    int steps = b.cells(length(c[1] - c[0]) + length(c[2] - c[1]) + length(c[3] - c[2]), cell);
     add_surface(b, steps, n, true, [&](int i, int j) {
       float t = float(i) / float(steps), s = 1 - t, turn = 2 * pi * float(j) / float(n);
       Vec2 p = s * s * s * c[0] + 3 * s * s * t * c[1] + 3 * s * t * t * c[2] + t * t * t * c[3];
@@ -132,7 +132,7 @@ void add_arcade(Builder& b) {
       if (k <= up + across) return Vec2(side - 2 * side * float(k - up) / float(across), rise);
       return Vec2(-side, rise * float(along - k) / float(up));
     };
-    auto arch = [&](int k) { return glm::normalize(outline(k)) * arch_radius; };
+    auto arch = [&](int k) { return normalize(outline(k)) * arch_radius; };
     auto wall = [&](int i, int k) { return arch(k) + (outline(k) - arch(k)) * (float(i) / float(radial)); };
     auto at = [&](Vec2 p, float z) { return Vec3(centre + p.x, spring + p.y, z); };
     add_surface(b, radial, along, false, [&](int i, int k) { return Point{at(wall(i, k), arcade_front), {0, 0, 1}}; });
@@ -177,8 +177,8 @@ void add_column(Builder& b, float x) {
 void add_knot(Builder& b) {
   constexpr float major = 0.36f, minor = 0.165f, tube = 0.105f;
   int along = b.cells(5.4f, 0.018f), around = b.cells(2 * pi * tube, 0.021f);
-  Vec3 axis = glm::normalize(Vec3(0.30f, 0.16f, 1)), side = glm::normalize(glm::cross(Vec3(0, 1, 0), axis));
-  Mat3 stand(side, glm::cross(axis, side), axis);
+  Vec3 axis = normalize(Vec3(0.30f, 0.16f, 1)), side = normalize(cross(Vec3(0, 1, 0), axis));
+  Mat3 stand(side, cross(axis, side), axis);
   size_t first = b.positions.size();
   add_surface(b, around, along, true, [&](int i, int j) {
     float t = 2 * pi * float(j) / float(along) + pi / 2;
@@ -186,8 +186,8 @@ void add_knot(Builder& b) {
     float r = major + minor * c3;
     Vec3 out(c2 * c3, s2 * c3, s3);  // the torus's normal
     Vec3 tangent =
-        glm::normalize(Vec3(-3 * minor * s3 * c2 - 2 * r * s2, -3 * minor * s3 * s2 + 2 * r * c2, 3 * minor * c3));
-    Vec3 across = glm::cross(tangent, out);
+        normalize(Vec3(-3 * minor * s3 * c2 - 2 * r * s2, -3 * minor * s3 * s2 + 2 * r * c2, 3 * minor * c3));
+    Vec3 across = cross(tangent, out);
     float turn = 2 * pi * float(i) / float(around);
     Vec3 n = std::cos(turn) * out + std::sin(turn) * across;
     return Point{stand * (Vec3(r * c2, r * s2, minor * s3) + tube * n), stand * n};

@@ -9,7 +9,7 @@ namespace {
 // Vertices that share a place and nearly a normal get one number; those shade smoothly into each other.
 std::vector<uint32_t> number_smooth(const std::vector<uint32_t>& place, const std::vector<Vec3>& normals) {
   std::vector<Vec3> rounded;
-  for (Vec3 n : normals) rounded.push_back(glm::round(n * 4096.0f));
+  for (Vec3 n : normals) rounded.push_back(round(n * 4096.0f));
   const std::vector<uint32_t> direction = number_positions(rounded).ids;
   std::unordered_map<uint64_t, uint32_t> numbers;
   std::vector<uint32_t> out;
@@ -30,7 +30,7 @@ Result<void> displace(Scene& scene, const std::function<float(Vec2)>& height, Ve
   std::vector<Vec3> normals(n, Vec3(0.0f));  // by place
   for (const Triangle& t : scene.triangles) {
     const Vec2 d1 = (uv[t.v[1]] - uv[t.v[0]]) * tile, d2 = (uv[t.v[2]] - uv[t.v[0]]) * tile;
-    const double a = glm::length(area_normal(scene, t)), c = std::abs(double(d1.x) * d2.y - double(d1.y) * d2.x);
+    const double a = length(area_normal(scene, t)), c = std::abs(double(d1.x) * d2.y - double(d1.y) * d2.x);
     for (uint32_t v : t.v) area[place[v]] += a, covered[place[v]] += c;
   }
   std::vector<float> moves(n);

@@ -17,7 +17,7 @@ TEST(Displace, MovesAlongNormalsByTheTexturesOwnScale) {
       s, [](Vec2 uv) { return 0.1f * uv.x; }, Vec2(2)));
   for (size_t v = 0; v < s.positions.size(); ++v) {
     EXPECT_NEAR(s.positions[v].y, 0.1f * s.positions[v].x, 1e-5f);
-    EXPECT_LT(glm::length(s.normals[v] - glm::normalize(Vec3(-0.1f, 1, 0))), 1e-4f);
+    EXPECT_LT(length(s.normals[v] - normalize(Vec3(-0.1f, 1, 0))), 1e-4f);
   }
 }
 
@@ -41,7 +41,7 @@ TEST(Displace, KeepsSeamsClosed) {
   int at_seam = 0;
   for (size_t v = 0; v < n; ++v)
     for (size_t w = n; w < 2 * n; ++w)
-      if (std::abs(s.positions[v].x - 1) < 0.01f && glm::length(s.positions[v] - s.positions[w]) < 0.2f &&
+      if (std::abs(s.positions[v].x - 1) < 0.01f && length(s.positions[v] - s.positions[w]) < 0.2f &&
           std::abs(s.positions[v].z - s.positions[w].z) < 0.01f) {
         EXPECT_EQ(s.positions[v], s.positions[w]);
         EXPECT_EQ(s.normals[v], s.normals[w]);

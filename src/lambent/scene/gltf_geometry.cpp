@@ -39,9 +39,9 @@ namespace {
 
 // Zero stands for broken: repair_normals() finds it. What is unit but for rounding stays as it is, so that a saved
 // normal comes back with the same bits.
-Vec3 unit_normal(glm::dvec3 n) {
+Vec3 unit_normal(Vec3d n) {
   constexpr double rounding = 1e-6;
-  double length = glm::length(n);
+  double length = lambent::length(n);
   if (!(length > 0) || !std::isfinite(length)) return Vec3(0.0f);
   return Vec3(std::abs(length - 1) < rounding ? n : n / length);
 }
@@ -53,16 +53,16 @@ bool read_vertices(GltfCheck& check, const GltfDocument& document, const Json& a
                    const GltfWhere& where, std::vector<Vec3>& out_positions, std::vector<Vec3>& out_normals) {
   auto normals = read_attribute(check, document, attributes, "NORMAL", positions.count, where);
   if (!check.ok() || (normals && !check_gltf_vector(check, *normals, "NORMAL", where))) return false;
-  glm::dmat4 world = placement.world;
-  glm::dmat3 turn = normal_matrix(world);
+  Mat4d world = placement.world;
+  Mat3d turn = normal_matrix(world);
   for (size_t i = 0; i < positions.count; ++i) {
     if (placement.joints) world = placement.at(i), turn = normal_matrix(world);
-    glm::dvec3 p = positions.read3(i), n = normals ? normals->read3(i) : glm::dvec3(0);
+    Vec3d p = positions.read3(i), n = normals ? normals->read3(i) : Vec3d(0);
     for (const GltfMorph& morph : morphs) {
       if (morph.positions) p += morph.weight * morph.positions->read3(i);
       if (normals && morph.normals) n += morph.weight * morph.normals->read3(i);
     }
-    Vec3 position(glm::dvec3(world * glm::dvec4(p, 1)));
+    Vec3 position(Vec3d(world * Vec4d(p, 1)));
     if (!is_finite(position)) return check.fail(where, "vertex " + std::to_string(i) + " is not at a finite position");
     n = turn * n;
     out_positions.push_back(position);

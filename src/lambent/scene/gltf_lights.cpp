@@ -65,10 +65,10 @@ bool read_lights(GltfCheck& check, const GltfDocument& document, const GltfPose&
     if (!read_light(check, (*lights)[*index], *index, light)) return false;
     if (light.name.empty()) light.name = check.text(node, "name", where);
     if (light.name.empty()) light.name = "light " + std::to_string(*index);
-    const glm::dmat4& world = pose.world[n];
-    light.position = Vec3(glm::dvec3(world[3]));
-    const glm::dvec3 forward = -glm::dvec3(world[2]);
-    const double length = glm::length(forward);
+    const Mat4d& world = pose.world[n];
+    light.position = Vec3(Vec3d(world[3]));
+    const Vec3d forward = -Vec3d(world[2]);
+    const double length = lambent::length(forward);
     if (!is_finite(light.position)) return check.fail(where, "its light is not at a finite position");
     light.direction = length > 0 && std::isfinite(length) ? Vec3(forward / length) : Vec3(0, 0, -1);
     scene.lights.push_back(std::move(light));

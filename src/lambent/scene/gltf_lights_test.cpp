@@ -33,7 +33,7 @@ TEST(GltfLights, StandAndShineAsTheirNodesSay) {
   EXPECT_EQ(l.name, "desk");
   EXPECT_EQ(l.kind, PunctualLight::Kind::spot);
   EXPECT_EQ(l.position, Vec3(12, 4, 6));
-  EXPECT_LT(glm::length(l.direction - Vec3(-1, 0, 0)), 1e-6f);
+  EXPECT_LT(length(l.direction - Vec3(-1, 0, 0)), 1e-6f);
   EXPECT_EQ(l.intensity, Vec3(8, 4, 2));
   EXPECT_FLOAT_EQ(l.inner_cone, 0.2f);
   EXPECT_FLOAT_EQ(l.outer_cone, 0.6f);
@@ -41,7 +41,7 @@ TEST(GltfLights, StandAndShineAsTheirNodesSay) {
   const LampArrival on = arriving(l, Vec3(10, 4, 6)), off = arriving(l, Vec3(11, 4, 7));
   EXPECT_FLOAT_EQ(on.irradiance.x, 2);
   EXPECT_FLOAT_EQ(on.distance, 2);
-  EXPECT_LT(glm::length(on.direction - Vec3(1, 0, 0)), 1e-6f);
+  EXPECT_LT(length(on.direction - Vec3(1, 0, 0)), 1e-6f);
   EXPECT_EQ(off.irradiance, Vec3(0));
 }
 

@@ -13,10 +13,10 @@ namespace {
 
 constexpr size_t no_parent = SIZE_MAX;
 
-glm::dmat4 local_matrix(GltfCheck& check, const Json& node, const GltfWhere& where) {
+Mat4d local_matrix(GltfCheck& check, const Json& node, const GltfWhere& where) {
   double m[16];
   if (check.numbers(node, "matrix", m, where)) {
-    glm::dmat4 matrix;
+    Mat4d matrix;
     for (int i = 0; i < 16; ++i) matrix[i / 4][i % 4] = m[i];
     return matrix;
   }
@@ -24,13 +24,13 @@ glm::dmat4 local_matrix(GltfCheck& check, const Json& node, const GltfWhere& whe
   check.numbers(node, "translation", t, where);
   check.numbers(node, "rotation", r, where);
   check.numbers(node, "scale", s, where);
-  glm::dquat q(r[3], r[0], r[1], r[2]);
-  double length = glm::length(q);
+  const double length = std::sqrt((r[3] * r[3] + r[0] * r[0]) + (r[1] * r[1] + r[2] * r[2]));
   // Stored quaternions are unit up to rounding; scaling by that error would let long chains drift.
+  Vec4d q(r[0], r[1], r[2], r[3]);
   if (length > 0) q /= length;
-  glm::dmat4 matrix = glm::mat4_cast(q);
+  Mat4d matrix(rotation_from_quaternion(q));
   for (int c = 0; c < 3; ++c) matrix[c] *= s[c];
-  matrix[3] = glm::dvec4(t[0], t[1], t[2], 1);
+  matrix[3] = Vec4d(t[0], t[1], t[2], 1);
   return matrix;
 }
 
@@ -110,12 +110,12 @@ bool read_joints(GltfCheck& check, const GltfDocument& document, size_t index, G
     }
   }
   if (!check.ok()) return false;
-  std::vector<glm::dmat4>& matrices = pose.joints[index];
+  std::vector<Mat4d>& matrices = pose.joints[index];
   matrices.reserve(joints->size());
   for (size_t j = 0; j < joints->size(); ++j) {
     auto node = check.integer((*joints)[j], "a joint", pose.world.size(), where);
     if (!node) return false;
-    glm::dmat4 inverse_bind(1.0);
+    Mat4d inverse_bind(1.0);
     if (bind_index) {
       double m[16] = {};
       bind.read(j, m);
@@ -126,9 +126,7 @@ bool read_joints(GltfCheck& check, const GltfDocument& document, size_t index, G
   return true;
 }
 
-double determinant3(const glm::dmat4& m) {
-  return glm::dot(glm::dvec3(m[0]), glm::cross(glm::dvec3(m[1]), glm::dvec3(m[2])));
-}
+double determinant3(const Mat4d& m) { return dot(Vec3d(m[0]), cross(Vec3d(m[1]), Vec3d(m[2]))); }
 
 }  // namespace
 
@@ -144,9 +142,9 @@ bool read_pose(GltfCheck& check, const GltfDocument& document, GltfPose& pose) {
     if (parents[n] == no_parent) append_tree(json, n, order);
   }
   if (order.size() != count) return check.fail({}, "the node hierarchy has a cycle");
-  pose.world.assign(count, glm::dmat4(1.0));
+  pose.world.assign(count, Mat4d(1.0));
   for (size_t n : order) {
-    glm::dmat4 local = local_matrix(check, gltf_item(json, "nodes", n), {"node", n});
+    Mat4d local = local_matrix(check, gltf_item(json, "nodes", n), {"node", n});
     pose.world[n] = parents[n] == no_parent ? local : pose.world[parents[n]] * local;
   }
   if (!check.ok() || !read_shown(check, json, parents, pose.shown)) return false;
@@ -204,14 +202,14 @@ bool read_placement(GltfCheck& check, const GltfDocument& document, const GltfPo
   // NOTE: the specification words the winding rule for the node's transform, which it also says a skinned mesh ignores;
   // what decides is therefore the transform that takes its place.
   size_t negative = size_t(std::count_if(placement.joints->begin(), placement.joints->end(),
-                                         [](const glm::dmat4& m) { return determinant3(m) < 0; }));
+                                         [](const Mat4d& m) { return determinant3(m) < 0; }));
   placement.mirrored = negative * 2 > joint_count;
   return true;
 }
 
-glm::dmat4 GltfPlacement::at(size_t vertex) const {
+Mat4d GltfPlacement::at(size_t vertex) const {
   if (!joints) return world;
-  glm::dmat4 sum(0.0);
+  Mat4d sum(0.0);
   double total = 0;
   for (size_t set = 0; set < joint_sets.size(); ++set) {
     double j[4] = {}, w[4] = {};
@@ -223,10 +221,10 @@ glm::dmat4 GltfPlacement::at(size_t vertex) const {
   return total > 0 ? sum / total : joints->front();
 }
 
-glm::dmat3 normal_matrix(const glm::dmat4& m) {
-  glm::dvec3 a(m[0]), b(m[1]), c(m[2]);
-  glm::dmat3 cofactors(glm::cross(b, c), glm::cross(c, a), glm::cross(a, b));
-  return glm::dot(a, cofactors[0]) < 0 ? -cofactors : cofactors;
+Mat3d normal_matrix(const Mat4d& m) {
+  Vec3d a(m[0]), b(m[1]), c(m[2]);
+  Mat3d cofactors(cross(b, c), cross(c, a), cross(a, b));
+  return dot(a, cofactors[0]) < 0 ? -cofactors : cofactors;
 }
 
 }  // namespace lambent

@@ -269,7 +269,7 @@ void GltfAccessor::read(size_t i, std::span<double> out) const {
   }
 }
 
-glm::dvec3 GltfAccessor::read3(size_t i) const {
+Vec3d GltfAccessor::read3(size_t i) const {
   double v[3] = {};
   read(i, v);
   return {v[0], v[1], v[2]};

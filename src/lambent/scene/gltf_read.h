@@ -2,8 +2,6 @@
 // Reading glTF JSON and accessors that nobody has checked; shared by the loader and the writer.
 #include <lambent/scene/gltf.h>
 
-#include <glm/gtc/quaternion.hpp>
-
 #include <optional>
 
 namespace lambent {
@@ -72,7 +70,7 @@ struct GltfAccessor {
 
   const uint8_t* element(size_t i) const;            // raw bytes; null for zeros
   void read(size_t i, std::span<double> out) const;  // as numbers, normalised integers scaled; as many as fit `out`
-  glm::dvec3 read3(size_t i) const;
+  Vec3d read3(size_t i) const;
   uint32_t integer(size_t i) const;                       // of a scalar of unsigned type
   double component(const uint8_t* element, int c) const;  // as stored, not scaled
 };
@@ -86,10 +84,9 @@ std::optional<GltfAccessor> read_attribute(GltfCheck& check, const GltfDocument&
 
 // Where nodes stand in the rest pose, and what of them is shown.
 struct GltfPose {
-  std::vector<glm::dmat4> world;  // of each node
-  std::vector<size_t> shown;      // nodes of the default scene (or all, where there is none), depth first
-  std::vector<std::vector<glm::dmat4>>
-      joints;  // of each skin that a shown mesh uses: joint to world times inverse bind
+  std::vector<Mat4d> world;                // of each node
+  std::vector<size_t> shown;               // nodes of the default scene (or all, where there is none), depth first
+  std::vector<std::vector<Mat4d>> joints;  // of each skin that a shown mesh uses: joint to world times inverse bind
 };
 bool read_pose(GltfCheck& check, const GltfDocument& document, GltfPose& pose);
 
@@ -99,17 +96,17 @@ bool read_lights(GltfCheck& check, const GltfDocument& document, const GltfPose&
 // Takes vertices of one primitive of one node to the world: by the node's transform, or by the joints alone where it is
 // skinned.
 struct GltfPlacement {
-  glm::dmat4 world{1.0};
-  bool mirrored = false;                            // triangles change their winding
-  const std::vector<glm::dmat4>* joints = nullptr;  // null: not skinned
+  Mat4d world{1.0};
+  bool mirrored = false;                       // triangles change their winding
+  const std::vector<Mat4d>* joints = nullptr;  // null: not skinned
   std::vector<GltfAccessor> joint_sets, weight_sets;
-  glm::dmat4 at(size_t vertex) const;
+  Mat4d at(size_t vertex) const;
 };
 bool read_placement(GltfCheck& check, const GltfDocument& document, const GltfPose& pose, size_t node,
                     const nlohmann::json& primitive, size_t vertex_count, const GltfWhere& where,
                     GltfPlacement& placement);
 
 // The inverse transpose of the upper 3 x 3 part up to a positive factor; finite for singular matrices too.
-glm::dmat3 normal_matrix(const glm::dmat4& m);
+Mat3d normal_matrix(const Mat4d& m);
 
 }  // namespace lambent

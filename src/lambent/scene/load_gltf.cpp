@@ -283,7 +283,7 @@ class PrimitiveReader {
     scene_.colors.resize(first + count, Vec3(1.0f));
     for (size_t i = 0; a && i < count; ++i) {
       Vec3 color(a->read3(i));
-      if (is_finite(color)) scene_.colors[first + i] = glm::max(color, Vec3(0.0f));
+      if (is_finite(color)) scene_.colors[first + i] = max(color, Vec3(0.0f));
     }
     return true;
   }
@@ -300,10 +300,10 @@ class PrimitiveReader {
     for (size_t i = 0; a && i < count; ++i) {
       double t[4] = {};
       a->read(i, t);
-      const glm::dmat3 world(placement.joints ? placement.at(i) : placement.world);
-      const Vec3 along = normalize_or(Vec3(world * glm::dvec3(t[0], t[1], t[2])), Vec3(0.0f));
+      const Mat3d world(placement.joints ? placement.at(i) : placement.world);
+      const Vec3 along = normalize_or(Vec3(world * Vec3d(t[0], t[1], t[2])), Vec3(0.0f));
       if (along == Vec3(0) || !(std::abs(t[3]) > 0)) continue;
-      scene_.tangents[first + i] = Vec4(along, (t[3] > 0) == (glm::determinant(world) > 0) ? 1.0f : -1.0f);
+      scene_.tangents[first + i] = Vec4(along, (t[3] > 0) == (determinant(world) > 0) ? 1.0f : -1.0f);
     }
     return true;
   }
@@ -370,7 +370,7 @@ bool read_scene(GltfCheck& check, GltfDocument& document, std::span<const uint8_
   bool usable = false;
   for (size_t t = 0; t < scene.triangles.size() && !usable; ++t) {
     Vec3 n = area_normal(scene, scene.triangles[t]);
-    usable = glm::dot(n, n) > 0;
+    usable = dot(n, n) > 0;
   }
   if (!usable) return check.fail({}, "no triangles that have an area");
 

@@ -35,7 +35,7 @@ void expect_valid(const Result<Scene>& loaded) {
     ASSERT_TRUE(is_finite(c));
   }
   for (const Part& p : s.parts) ASSERT_LT(p.material, s.materials.size());
-  for (Vec3 n : s.normals) ASSERT_NEAR(glm::dot(n, n), 1.0f, 1e-5f);  // unit up to float rounding
+  for (Vec3 n : s.normals) ASSERT_NEAR(dot(n, n), 1.0f, 1e-5f);  // unit up to float rounding
 }
 
 Builder rich() {  // something of everything

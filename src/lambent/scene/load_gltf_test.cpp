@@ -71,7 +71,7 @@ TEST(LoadGltf, NodeTransformsCompose) {
   expect_near(s.positions[2], {2, 10, 5}, 10 * rounding);
   // The normal +z turns to +x, and the swap makes +y of it: it stays the side it was, so the winding changes.
   expect_near(s.normals[0], {0, 1, 0});
-  expect_near(glm::normalize(area_normal(s, s.triangles[0])), {0, 1, 0});
+  expect_near(normalize(area_normal(s, s.triangles[0])), {0, 1, 0});
 }
 
 TEST(LoadGltf, NormalsFollowTheInverseTranspose) {
@@ -79,7 +79,7 @@ TEST(LoadGltf, NormalsFollowTheInverseTranspose) {
   primitive(b)["attributes"]["NORMAL"] = b.floats({1, 1, 0, 1, 1, 0, 1, 1, 0}, "VEC3");
   b.json["nodes"][0]["scale"] = {1, 4, -1};
   Scene s = loaded(b);
-  expect_near(s.normals[0], glm::normalize(Vec3(1, 0.25f, 0)));
+  expect_near(s.normals[0], normalize(Vec3(1, 0.25f, 0)));
 }
 
 TEST(LoadGltf, OneMeshOnTwoNodesMakesTwoParts) {
@@ -138,7 +138,7 @@ TEST(LoadGltf, MakesFlatNormalsWhereThereAreNone) {
   EXPECT_TRUE(s.parts[0].changed);
   EXPECT_EQ(s.parts[0].source.size(), s.positions.size());
   for (const Triangle& t : s.triangles) {
-    Vec3 face = glm::normalize(area_normal(s, t));
+    Vec3 face = normalize(area_normal(s, t));
     for (uint32_t v : t.v) expect_near(s.normals[v], face);
   }
 }
@@ -167,7 +167,7 @@ TEST(LoadGltf, QuantisedAttributes) {
   expect_near(s.positions[2], {0, 2, 0.07f});
   expect_near(s.normals[0], {0, 0, 1});
   expect_near(s.normals[1], {0, -1, 0});
-  expect_near(s.normals[2], glm::normalize(Vec3(1, 1, 0)));
+  expect_near(s.normals[2], normalize(Vec3(1, 1, 0)));
   EXPECT_EQ(s.texcoords[0][0], Vec2(0, 1));
   EXPECT_FLOAT_EQ(s.texcoords[0][2].y, 4.0f / 65535.0f);
   EXPECT_EQ(s.texcoords[1][0], Vec2(0, 65535));
@@ -214,7 +214,7 @@ TEST(LoadGltf, MorphTargetsAtTheirDefaultWeights) {
   b.json["nodes"][0]["weights"] = {-1, 0.5};
   Scene s = loaded(b);
   expect_near(s.positions[2], {2, 1, -3});
-  expect_near(s.normals[2], glm::normalize(Vec3(1, 0, 1)));
+  expect_near(s.normals[2], normalize(Vec3(1, 0, 1)));
   EXPECT_FALSE(s.parts[0].changed);
   b.json["nodes"][0]["weights"] = {1};
   EXPECT_EQ(message(b), "test.glb: node 0: weights is not 2 numbers");
@@ -374,7 +374,7 @@ TEST(LoadGltf, MetallicRoughnessTextures) {
 TEST(LoadGltf, NormalTexturesAndTangents) {
   // A texel (51, 204, 230) = (-0.6, 0.6, 0.804), seen under a node that turns or mirrors: the normal turns and mirrors
   // with it.
-  const Vec3 local = glm::normalize(Vec3(2 * 51 / 255.0f - 1, 2 * 204 / 255.0f - 1, 2 * 230 / 255.0f - 1));
+  const Vec3 local = normalize(Vec3(2 * 51 / 255.0f - 1, 2 * 204 / 255.0f - 1, 2 * 230 / 255.0f - 1));
   for (bool tangents : {false, true})
     for (bool mirrored : {false, true}) {
       Builder b = textured(make_png(1, 1, 3, 8, {51, 204, 230}));
@@ -390,7 +390,7 @@ TEST(LoadGltf, NormalTexturesAndTangents) {
       ASSERT_EQ(s.materials[0].normal_texture, 0);
       EXPECT_EQ(s.tangents.empty(), !tangents);
       const Vec3 expected(local.z, local.y, mirrored ? local.x : -local.x);
-      EXPECT_LT(glm::length(mapped_normal(s, s.triangles[0], 0.2f, 0.3f, s.normals[0]) - expected), 10 * rounding)
+      EXPECT_LT(length(mapped_normal(s, s.triangles[0], 0.2f, 0.3f, s.normals[0]) - expected), 10 * rounding)
           << tangents << mirrored;
     }
   Builder broken = textured(make_png(1, 1, 3, 8, {128, 128, 255}));

@@ -277,7 +277,7 @@ TEST(LoadObj, ConcavePolygonsKeepTheirArea) {
       double area = shoelace(p);
       EXPECT_NEAR(test::total_area(s), std::abs(area), rounding * std::abs(area)) << p.size();
       Vec3 up = Vec3(-0.8f, 0, 0.6f) * (area > 0 ? 1.0f : -1.0f);
-      for (const Triangle& t : s.triangles) EXPECT_GE(glm::dot(area_normal(s, t), up), -1e-5f);
+      for (const Triangle& t : s.triangles) EXPECT_GE(dot(area_normal(s, t), up), -1e-5f);
     }
   }
 }

@@ -76,7 +76,7 @@ TEST(LoadPly, AllFormatsGiveTheSame) {
     // 51 of 255 is 0.2; decoded by the sRGB formula.
     EXPECT_NEAR(s.colors[1].x, std::pow((0.2f + 0.055f) / 1.055f, 2.4f), rounding);
     EXPECT_NEAR(s.colors[1].y, 1, rounding);
-    for (Vec3 n : s.normals) EXPECT_LT(glm::distance(n, glm::normalize(Vec3(0, -1, 1))), rounding);
+    for (Vec3 n : s.normals) EXPECT_LT(distance(n, normalize(Vec3(0, -1, 1))), rounding);
     EXPECT_EQ(s.parts.size(), 1u);
     EXPECT_EQ(s.parts[0].name, "t");
     EXPECT_EQ(s.materials[0].base_color, Vec3(1));

@@ -8,7 +8,7 @@ namespace {
 
 constexpr size_t max_ear_corners = 100'000;
 
-double cross2(glm::dvec2 a, glm::dvec2 b) { return a.x * b.y - a.y * b.x; }
+double cross2(Vec2d a, Vec2d b) { return a.x * b.y - a.y * b.x; }
 
 // Drops vertices that no triangle uses, and parts without triangles.
 void drop_unused(Scene& scene) {
@@ -65,8 +65,8 @@ void Triangulator::cut_polygon() {
   if (n < 3) return;
   if (n == 3) return cuts_.push_back({0, 1, 2});
 
-  glm::dvec3 normal(0);
-  for (uint32_t i = 0; i < n; ++i) normal += glm::cross(polygon_[i] - polygon_[0], polygon_[(i + 1) % n] - polygon_[0]);
+  Vec3d normal(0);
+  for (uint32_t i = 0; i < n; ++i) normal += cross(polygon_[i] - polygon_[0], polygon_[(i + 1) % n] - polygon_[0]);
   int axis = std::abs(normal.x) > std::abs(normal.y) ? 0 : 1;
   if (std::abs(normal.z) > std::abs(normal[axis])) axis = 2;
   int u = (axis + 1) % 3, v = (axis + 2) % 3;
@@ -104,7 +104,7 @@ void Triangulator::cut_polygon() {
 bool Triangulator::is_ear(uint32_t i) {
   budget_ -= std::min<uint64_t>(budget_, 1);
   if (is_reflex_[i]) return false;
-  glm::dvec2 a = points_[previous_[i]], b = points_[i], c = points_[next_[i]];
+  Vec2d a = points_[previous_[i]], b = points_[i], c = points_[next_[i]];
   for (size_t k = 0; k < reflex_.size(); ++k) {
     uint32_t r = reflex_[k];
     if (!is_reflex_[r]) {
@@ -113,7 +113,7 @@ bool Triangulator::is_ear(uint32_t i) {
       continue;
     }
     budget_ -= std::min<uint64_t>(budget_, 1);
-    glm::dvec2 p = points_[r];
+    Vec2d p = points_[r];
     if (p == a || p == b || p == c) continue;
     if (cross2(b - a, p - a) >= 0 && cross2(c - b, p - b) >= 0 && cross2(a - c, p - c) >= 0) return false;
   }
@@ -123,13 +123,13 @@ bool Triangulator::is_ear(uint32_t i) {
 Result<void> finish_mesh(Scene& scene) {
   bool usable = false;
   for (Triangle& t : scene.triangles) {
-    glm::dvec3 a = scene.positions[t.v[0]], b = scene.positions[t.v[1]], c = scene.positions[t.v[2]];
-    glm::dvec3 winding = glm::cross(b - a, c - a);
-    usable = usable || winding != glm::dvec3(0);
+    Vec3d a = scene.positions[t.v[0]], b = scene.positions[t.v[1]], c = scene.positions[t.v[2]];
+    Vec3d winding = cross(b - a, c - a);
+    usable = usable || winding != Vec3d(0);
     bool opposed = true;
     for (uint32_t v : t.v) {
       Vec3 n = scene.normals[v];
-      opposed = opposed && is_direction(n) && glm::dot(winding, glm::dvec3(n)) < 0;
+      opposed = opposed && is_direction(n) && dot(winding, Vec3d(n)) < 0;
     }
     if (opposed) std::swap(t.v[1], t.v[2]);
   }

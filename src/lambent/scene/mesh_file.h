@@ -39,8 +39,8 @@ class Triangulator {
   void cut_polygon();
   bool is_ear(uint32_t i);
   std::vector<uint32_t> loop_;                 // indices into `vertices`, neighbours distinct
-  std::vector<glm::dvec3> polygon_;            // positions of loop_
-  std::vector<glm::dvec2> points_;             // polygon_, projected
+  std::vector<Vec3d> polygon_;                 // positions of loop_
+  std::vector<Vec2d> points_;                  // polygon_, projected
   std::vector<std::array<uint32_t, 3>> cuts_;  // of indices into loop_
   std::vector<uint32_t> next_, previous_, reflex_;
   std::vector<uint8_t> is_reflex_;

@@ -16,31 +16,29 @@ namespace {
 using Json = nlohmann::json;
 
 // The least rotation that takes unit a to unit b. Where they are (nearly) opposite, by way of a direction across.
-glm::dmat3 least_rotation(glm::dvec3 a, glm::dvec3 b) {
-  const double c = glm::dot(a, b);
+Mat3d least_rotation(Vec3d a, Vec3d b) {
+  const double c = dot(a, b);
   if (c < -1 + 1e-6) {
-    const glm::dvec3 across = glm::normalize(glm::cross(a, glm::dvec3(frame_about(Vec3(a))[1])));
+    const Vec3d across = normalize(cross(a, Vec3d(frame_about(Vec3(a))[1])));
     return least_rotation(across, b) * least_rotation(a, across);
   }
-  const glm::dvec3 v = glm::cross(a, b);
-  const glm::dmat3 K(glm::dvec3(0, v.z, -v.y), glm::dvec3(-v.z, 0, v.x), glm::dvec3(v.y, -v.x, 0));
-  return glm::dmat3(1.0) + K + K * K / (1 + c);
+  const Vec3d v = cross(a, b);
+  const Mat3d K(Vec3d(0, v.z, -v.y), Vec3d(-v.z, 0, v.x), Vec3d(v.y, -v.x, 0));
+  return Mat3d(1.0) + K + K * K / (1 + c);
 }
 
-double frobenius(const glm::dmat3& m) {
-  return std::sqrt(glm::dot(m[0], m[0]) + glm::dot(m[1], m[1]) + glm::dot(m[2], m[2]));
-}
+double frobenius(const Mat3d& m) { return std::sqrt(dot(m[0], m[0]) + dot(m[1], m[1]) + dot(m[2], m[2])); }
 
 // The nearest orthogonal matrix, or nothing where F is (nearly) singular.
-std::optional<glm::dmat3> orthogonal_part(glm::dmat3 F) {
+std::optional<Mat3d> orthogonal_part(Mat3d F) {
   const double size = frobenius(F);
   if (!(size > 0) || !std::isfinite(size)) return std::nullopt;
   F /= size;
-  if (std::abs(glm::determinant(F)) < 1e-9) return std::nullopt;
+  if (std::abs(determinant(F)) < 1e-9) return std::nullopt;
   for (int i = 0; i < 30; ++i) {
-    const glm::dmat3 inverse = glm::transpose(glm::inverse(F));
+    const Mat3d inverse = transpose(lambent::inverse(F));
     const double scale = std::sqrt(frobenius(inverse) / frobenius(F));
-    const glm::dmat3 next = 0.5 * (scale * F + inverse / scale);
+    const Mat3d next = 0.5 * (scale * F + inverse / scale);
     const double change = frobenius(next - F);
     F = next;
     if (change < 1e-13) break;
@@ -50,45 +48,44 @@ std::optional<glm::dmat3> orthogonal_part(glm::dmat3 F) {
 
 // Gradients of the map from rest to pose about each vertex: the mean over the faces around its position, by their rest
 // areas. A face says what becomes of its edges; its normal keeps its length.
-std::vector<glm::dmat3> gradients(const Scene& scene, const std::vector<Vec3>& positions,
-                                  const std::vector<uint8_t>& mirrored) {
+std::vector<Mat3d> gradients(const Scene& scene, const std::vector<Vec3>& positions,
+                             const std::vector<uint8_t>& mirrored) {
   const PositionIds places = number_positions(scene.positions);
-  std::vector<glm::dmat3> sums(places.count, glm::dmat3(0.0));
+  std::vector<Mat3d> sums(places.count, Mat3d(0.0));
   for (const Triangle& t : scene.triangles) {
-    auto edges = [&](const std::vector<Vec3>& p, double flip, glm::dmat3& E) {
-      const glm::dvec3 a(p[t.v[0]]), e1 = glm::dvec3(p[t.v[1]]) - a, e2 = glm::dvec3(p[t.v[2]]) - a,
-                                     n = glm::cross(e1, e2);
-      const double area = glm::length(n);
-      E = glm::dmat3(e1, e2, area > 0 ? flip * n / area : glm::dvec3(0.0));
+    auto edges = [&](const std::vector<Vec3>& p, double flip, Mat3d& E) {
+      const Vec3d a(p[t.v[0]]), e1 = Vec3d(p[t.v[1]]) - a, e2 = Vec3d(p[t.v[2]]) - a, n = cross(e1, e2);
+      const double area = length(n);
+      E = Mat3d(e1, e2, area > 0 ? flip * n / area : Vec3d(0.0));
       return area;
     };
-    glm::dmat3 rest, now;
+    Mat3d rest, now;
     const double area = edges(scene.positions, 1, rest);
     edges(positions, mirrored[t.part] ? -1 : 1, now);
     if (!(area > 0)) continue;
-    const glm::dmat3 F = now * glm::inverse(rest);
+    const Mat3d F = now * inverse(rest);
     if (!std::isfinite(frobenius(F))) continue;
     for (uint32_t v : t.v) sums[places.ids[v]] += area * F;
   }
-  std::vector<glm::dmat3> result(scene.positions.size());
+  std::vector<Mat3d> result(scene.positions.size());
   for (size_t v = 0; v < result.size(); ++v) result[v] = sums[places.ids[v]];
   return result;
 }
 
 // Where a pose has no normal of its own, the rest normal is carried along.
-Vec3 carried_normal(const glm::dmat3& F, Vec3 normal) {
-  const glm::dmat3 cofactors(glm::cross(F[1], F[2]), glm::cross(F[2], F[0]), glm::cross(F[0], F[1]));
-  const glm::dvec3 n = (glm::determinant(F) < 0 ? -1.0 : 1.0) * (cofactors * glm::dvec3(normal));
-  const double length = glm::length(n);
+Vec3 carried_normal(const Mat3d& F, Vec3 normal) {
+  const Mat3d cofactors(cross(F[1], F[2]), cross(F[2], F[0]), cross(F[0], F[1]));
+  const Vec3d n = (determinant(F) < 0 ? -1.0 : 1.0) * (cofactors * Vec3d(normal));
+  const double length = lambent::length(n);
   return length > 0 && std::isfinite(length) ? Vec3(n / length) : normal;
 }
 
 void finish_pose(const Scene& scene, Pose& pose) {
-  const std::vector<glm::dmat3> F = gradients(scene, pose.positions, pose.mirrored);
+  const std::vector<Mat3d> F = gradients(scene, pose.positions, pose.mirrored);
   pose.rotations.resize(scene.positions.size());
   parallel_for(scene.positions.size(), 4096, [&](size_t begin, size_t end) {
     for (size_t v = begin; v < end; ++v) {
-      const float length = glm::length(pose.normals[v]);
+      const float length = lambent::length(pose.normals[v]);
       pose.normals[v] = length > 0.5f ? pose.normals[v] / length : carried_normal(F[v], scene.normals[v]);
       pose.rotations[v] = pose_rotation(F[v], scene.normals[v], pose.normals[v]);
     }
@@ -105,10 +102,10 @@ Result<std::vector<GltfAnimation>> animations_of(const Scene& scene) {
 
 }  // namespace
 
-Mat3 pose_rotation(const glm::dmat3& F, Vec3 rest_normal, Vec3 normal) {
-  const glm::dvec3 a = glm::normalize(glm::dvec3(rest_normal)), b = glm::normalize(glm::dvec3(normal));
-  const std::optional<glm::dmat3> R = orthogonal_part(F);
-  return Mat3(R ? least_rotation(glm::normalize(*R * a), b) * *R : least_rotation(a, b));
+Mat3 pose_rotation(const Mat3d& F, Vec3 rest_normal, Vec3 normal) {
+  const Vec3d a = normalize(Vec3d(rest_normal)), b = normalize(Vec3d(normal));
+  const std::optional<Mat3d> R = orthogonal_part(F);
+  return Mat3(R ? least_rotation(normalize(*R * a), b) * *R : least_rotation(a, b));
 }
 
 Result<std::vector<AnimationInfo>> list_animations(const Scene& scene) {
@@ -229,17 +226,17 @@ Result<Deformation> parse_deformation(const std::string& text) {
 
 Pose deform_scene(const Scene& scene, const Deformation& deformation) {
   const Bounds box = bounds(scene);
-  const glm::dvec3 centre(box.centre()), size(box.max - box.min);
+  const Vec3d centre(box.centre()), size(box.max - box.min);
   int along = deformation.along;
   if (along < 0) along = size.x >= size.y && size.x >= size.z ? 0 : size.y >= size.z ? 1 : 2;
   if (along == deformation.towards) along = (along + 1) % 3;
   const int towards = deformation.towards >= 0 ? deformation.towards : (along + 1) % 3, across = 3 - along - towards;
   const double length = std::max(size[along], 1e-30),
-               turn = glm::radians(double(deformation.degrees)) / length;  // radians a metre
-  auto map = [&](glm::dvec3 p) {
+               turn = radians(double(deformation.degrees)) / length;  // radians a metre
+  auto map = [&](Vec3d p) {
     p -= centre;
     const double h = p[along], angle = turn * h, c = std::cos(angle), s = std::sin(angle);
-    glm::dvec3 q = p;
+    Vec3d q = p;
     if (deformation.kind == DeformKind::twist) {
       // Right-handed about the axis.
       const int u = (along + 1) % 3, v = (along + 2) % 3;
@@ -259,10 +256,10 @@ Pose deform_scene(const Scene& scene, const Deformation& deformation) {
   const double step = 1e-6 * std::max({size.x, size.y, size.z, 1e-30});
   parallel_for(n, 4096, [&](size_t begin, size_t end) {
     for (size_t v = begin; v < end; ++v) {
-      const glm::dvec3 p(scene.positions[v]);
-      glm::dmat3 F;
+      const Vec3d p(scene.positions[v]);
+      Mat3d F;
       for (int k = 0; k < 3; ++k) {
-        glm::dvec3 h(0.0);
+        Vec3d h(0.0);
         h[k] = step;
         F[k] = (map(p + h) - map(p - h)) / (2 * step);
       }

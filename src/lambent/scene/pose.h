@@ -44,6 +44,6 @@ Pose deform_scene(const Scene& scene, const Deformation& deformation);
 Scene posed(const Scene& scene, const Pose& pose);
 
 // The rotation described at Pose::rotations, from the gradient F and unit normals before and after.
-Mat3 pose_rotation(const glm::dmat3& F, Vec3 rest_normal, Vec3 normal);
+Mat3 pose_rotation(const Mat3d& F, Vec3 rest_normal, Vec3 normal);
 
 }  // namespace lambent

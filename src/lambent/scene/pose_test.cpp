@@ -2,8 +2,6 @@
 #include <lambent/scene/pose.h>
 #include <lambent/scene/procedural.h>
 
-#include <glm/gtc/quaternion.hpp>
-
 #include <gtest/gtest.h>
 
 namespace lambent {
@@ -61,15 +59,15 @@ TEST(Pose, InterpolatesTranslations) {
 
 TEST(Pose, TurnsAlongTheShorterGreatCircle) {
   // Rotations of 0 and 120 degrees about a skew axis, the second with its sign changed and not of unit length.
-  const glm::quat q = glm::angleAxis(glm::radians(120.0f), glm::normalize(Vec3(1, 2, -2)));
+  const Vec4 q(std::sin(radians(60.0f)) * normalize(Vec3(1, 2, -2)), std::cos(radians(60.0f)));
   const Scene scene =
       loaded(animated("rotation", {0, 1}, {0, 0, 0, 1, -3 * q.x, -3 * q.y, -3 * q.z, -3 * q.w}, "VEC4", "LINEAR"));
   for (double t : {0.0, 0.25, 0.5, 1.0}) {
     const Pose p = at(scene, t);
-    const Mat3 R = glm::mat3_cast(glm::angleAxis(float(glm::radians(120.0 * t)), glm::normalize(Vec3(1, 2, -2))));
+    const Mat3 R = rotation_about(normalize(Vec3(1, 2, -2)), float(radians(120.0 * t)));
     for (size_t v = 0; v < 3; ++v) {
-      EXPECT_LT(glm::length(p.positions[v] - R * scene.positions[v]), 1e-5);
-      EXPECT_LT(glm::length(p.normals[v] - R * scene.normals[v]), 1e-5);
+      EXPECT_LT(length(p.positions[v] - R * scene.positions[v]), 1e-5);
+      EXPECT_LT(length(p.normals[v] - R * scene.normals[v]), 1e-5);
       EXPECT_LT(distance(p.rotations[v], R), 1e-5);
     }
   }
@@ -83,8 +81,8 @@ TEST(Pose, ScalesToNothingAndMirrors) {
   const Pose flat = at(scene, 0.5), mirrored = at(scene, 1);
   for (size_t v = 0; v < 3; ++v) {
     EXPECT_TRUE(is_finite(flat.normals[v]));
-    EXPECT_LT(std::abs(glm::length(flat.normals[v]) - 1), 1e-5);
-    EXPECT_LT(distance(glm::transpose(flat.rotations[v]) * flat.rotations[v], Mat3(1.0f)), 1e-5);
+    EXPECT_LT(std::abs(length(flat.normals[v]) - 1), 1e-5);
+    EXPECT_LT(distance(transpose(flat.rotations[v]) * flat.rotations[v], Mat3(1.0f)), 1e-5);
     EXPECT_LT(distance(mirrored.rotations[v], Mat3(Vec3(-1, 0, 0), Vec3(0, 1, 0), Vec3(0, 0, 1))), 1e-5);
   }
   EXPECT_EQ(mirrored.mirrored[0], 1);
@@ -178,11 +176,11 @@ TEST(Pose, PosesTheSharedModels) {
         ASSERT_TRUE(pose) << pose.error().text();
         for (size_t v = 0; v < scene->positions.size(); ++v) {
           ASSERT_TRUE(is_finite(pose->positions[v]));
-          ASSERT_LT(std::abs(glm::length(pose->normals[v]) - 1), 1e-4);
+          ASSERT_LT(std::abs(length(pose->normals[v]) - 1), 1e-4);
           // An orthogonal matrix that takes the normal along.
-          ASSERT_LT(distance(glm::transpose(pose->rotations[v]) * pose->rotations[v], Mat3(1.0f)), 1e-4);
-          ASSERT_LT(glm::length(pose->rotations[v] * scene->normals[v] - pose->normals[v]), 1e-3);
-          moved = std::max(moved, glm::length(pose->positions[v] - scene->positions[v]));
+          ASSERT_LT(distance(transpose(pose->rotations[v]) * pose->rotations[v], Mat3(1.0f)), 1e-4);
+          ASSERT_LT(length(pose->rotations[v] * scene->normals[v] - pose->normals[v]), 1e-3);
+          moved = std::max(moved, length(pose->positions[v] - scene->positions[v]));
         }
       }
       EXPECT_GT(moved, 0.01f * bounds(*scene).diagonal()) << name << ' ' << a;
@@ -201,15 +199,15 @@ TEST(Deform, TwistsAndBendsAsTheFormulasSay) {
     // Twist: a quarter turn from end to end; heights stay, distances from the axis too.
     EXPECT_NEAR(twist.positions[v].y, p.y, 1e-4);
     const Mat3 R = rotation_from_yaw_pitch_roll({90 * (p.y - 3) / 6, 0, 0});
-    EXPECT_LT(glm::length(twist.positions[v] - R * p), 1e-4);
+    EXPECT_LT(length(twist.positions[v] - R * p), 1e-4);
     twisted = std::max(twisted, distance(twist.rotations[v], R));
-    EXPECT_LT(glm::length(twist.rotations[v] * scene.normals[v] - twist.normals[v]), 1e-4);
+    EXPECT_LT(length(twist.rotations[v] * scene.normals[v] - twist.normals[v]), 1e-4);
     // Bend: the middle line is half a circle of length 6 about (6 / pi, 3, 0), and each cross-section turns rigidly.
     const float angle = pi * (p.y - 3) / 6, radius = 6 / pi;
     const Vec3 on_arc(radius * (1 - std::cos(angle)), 3 + radius * std::sin(angle), 0);
     const Mat3 B(Vec3(std::cos(angle), -std::sin(angle), 0), Vec3(std::sin(angle), std::cos(angle), 0), Vec3(0, 0, 1));
-    EXPECT_LT(glm::length(bend.positions[v] - (on_arc + B * Vec3(p.x, 0, p.z))), 1e-4);
-    EXPECT_LT(glm::length(bend.normals[v] - B * scene.normals[v]), 1e-4);
+    EXPECT_LT(length(bend.positions[v] - (on_arc + B * Vec3(p.x, 0, p.z))), 1e-4);
+    EXPECT_LT(length(bend.normals[v] - B * scene.normals[v]), 1e-4);
     EXPECT_LT(distance(bend.rotations[v], B), 1e-4);
   }
   EXPECT_LT(twisted, 0.5);  // shear bends the polar rotation and the normals away from it
@@ -224,14 +222,13 @@ TEST(Deform, RefusesOtherTexts) {
 }
 
 TEST(Deform, RotationsOfOddGradients) {
-  const Vec3 a = glm::normalize(Vec3(1, 2, 3)), b = glm::normalize(Vec3(-2, 1, 0.5f));
-  for (const glm::dmat3& F :
-       {glm::dmat3(0.0), glm::dmat3(NAN), glm::dmat3(glm::dvec3(1, 0, 0), glm::dvec3(1, 0, 0), glm::dvec3(0, 0, 1)),
-        glm::dmat3(-1.0), glm::dmat3(glm::dvec3(1, 0.5, 0), glm::dvec3(0, 3, 0.2), glm::dvec3(0.1, 0, 0.01))})
+  const Vec3 a = normalize(Vec3(1, 2, 3)), b = normalize(Vec3(-2, 1, 0.5f));
+  for (const Mat3d& F : {Mat3d(0.0), Mat3d(NAN), Mat3d(Vec3d(1, 0, 0), Vec3d(1, 0, 0), Vec3d(0, 0, 1)), Mat3d(-1.0),
+                         Mat3d(Vec3d(1, 0.5, 0), Vec3d(0, 3, 0.2), Vec3d(0.1, 0, 0.01))})
     for (const Vec3& to : {a, b, -a}) {
       const Mat3 R = pose_rotation(F, a, to);
-      EXPECT_LT(distance(glm::transpose(R) * R, Mat3(1.0f)), 1e-5);
-      EXPECT_LT(glm::length(R * a - to), 1e-4);
+      EXPECT_LT(distance(transpose(R) * R, Mat3(1.0f)), 1e-5);
+      EXPECT_LT(length(R * a - to), 1e-4);
     }
 }
 

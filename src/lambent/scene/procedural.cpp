@@ -13,7 +13,7 @@ struct Mesh {
 void append_quad(Mesh& mesh, Vec3 origin, Vec3 a, Vec3 b, int na, int nb) {
   LAMBENT_CHECK(na >= 1 && nb >= 1);
   uint32_t first = uint32_t(mesh.positions.size()), row = uint32_t(na) + 1;
-  Vec3 normal = normalize_or(glm::cross(a, b), {0, 1, 0});
+  Vec3 normal = normalize_or(cross(a, b), {0, 1, 0});
   for (int j = 0; j <= nb; ++j) {
     for (int i = 0; i <= na; ++i) {
       mesh.positions.push_back(origin + (float(i) / float(na)) * a + (float(j) / float(nb)) * b);
@@ -31,7 +31,7 @@ Mesh icosphere(int levels) {
   Mesh mesh;
   for (Vec3 p : {Vec3(-1, g, 0), Vec3(1, g, 0), Vec3(-1, -g, 0), Vec3(1, -g, 0), Vec3(0, -1, g), Vec3(0, 1, g),
                  Vec3(0, -1, -g), Vec3(0, 1, -g), Vec3(g, 0, -1), Vec3(g, 0, 1), Vec3(-g, 0, -1), Vec3(-g, 0, 1)})
-    mesh.normals.push_back(glm::normalize(p));
+    mesh.normals.push_back(normalize(p));
   mesh.indices = {0, 11, 5, 0, 5, 1, 0, 1, 7, 0, 7, 10, 0, 10, 11, 1, 5, 9, 5, 11, 4,  11, 10, 2,  10, 7, 6, 7, 1, 8,
                   3, 9,  4, 3, 4, 2, 3, 2, 6, 3, 6, 8,  3, 8,  9,  4, 9, 5, 2, 4,  11, 6,  2,  10, 8,  6, 7, 9, 8, 1};
   for (int level = 0; level < levels; ++level) {
@@ -43,7 +43,7 @@ Mesh icosphere(int levels) {
       uint32_t m =
           table.find_or_insert(hash64(edge), uint32_t(edges.size()), [&](uint32_t k) { return edges[k] == edge; });
       if (m == edges.size())
-        edges.push_back(edge), mesh.normals.push_back(glm::normalize(mesh.normals[a] + mesh.normals[b]));
+        edges.push_back(edge), mesh.normals.push_back(normalize(mesh.normals[a] + mesh.normals[b]));
       return first + m;
     };
     std::vector<uint32_t> finer;

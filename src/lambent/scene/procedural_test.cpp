@@ -10,13 +10,13 @@ namespace {
 size_t corners_against_winding(const Scene& s) {
   size_t count = 0;
   for (const Triangle& t : s.triangles)
-    for (uint32_t v : t.v) count += !(glm::dot(area_normal(s, t), s.normals[v]) > 0);
+    for (uint32_t v : t.v) count += !(dot(area_normal(s, t), s.normals[v]) > 0);
   return count;
 }
 
 double volume(const Scene& s) {
   double sum = 0;
-  for (const Triangle& t : s.triangles) sum += double(glm::dot(s.positions[t.v[0]], area_normal(s, t))) / 6;
+  for (const Triangle& t : s.triangles) sum += double(dot(s.positions[t.v[0]], area_normal(s, t))) / 6;
   return sum;
 }
 
@@ -26,10 +26,10 @@ TEST(Procedural, QuadHasItsAreaAndSide) {
   Scene s = make_quad({1, 2, 3}, a, b, 4, 7, Vec3(0.3f));
   EXPECT_EQ(test::broken_invariant(s), "");
   EXPECT_EQ(s.triangles.size(), 2u * 4 * 7);
-  double area = double(glm::length(glm::cross(a, b)));
+  double area = double(length(cross(a, b)));
   EXPECT_NEAR(test::total_area(s), area, rounding * area);
   EXPECT_EQ(corners_against_winding(s), 0u);
-  EXPECT_GT(glm::dot(s.normals[0], glm::cross(a, b)), 0);
+  EXPECT_GT(dot(s.normals[0], cross(a, b)), 0);
 }
 
 TEST(Procedural, BoxIsClosedAndTurned) {
@@ -56,7 +56,7 @@ TEST(Procedural, SphereIsExactAndNearlyFull) {
     EXPECT_EQ(test::unmatched_edges(s), 0u);
     EXPECT_EQ(corners_against_winding(s), 0u);
     for (size_t v = 0; v < s.positions.size(); ++v)
-      EXPECT_LT(glm::distance(s.positions[v], (inward ? -2.0f : 2.0f) * s.normals[v]), rounding);
+      EXPECT_LT(distance(s.positions[v], (inward ? -2.0f : 2.0f) * s.normals[v]), rounding);
     // Flat triangles cut off a share of the order of (edge / radius)^2 / 4, edges being 0.07 radii here.
     double full = 4.0 / 3 * double(pi) * 8;
     EXPECT_NEAR(volume(s), inward ? -full : full, 0.003 * full);
@@ -72,7 +72,7 @@ TEST(Courtyard, IsSoundAndOfTheStatedSize) {
   EXPECT_EQ(test::two_sided_count(s), 0u);
   Bounds box = bounds(s);
   EXPECT_LT(box.diagonal(), 12);
-  for (const Triangle& t : s.triangles) EXPECT_GT(glm::length(area_normal(s, t)), 1e-9f);  // no slivers without an area
+  for (const Triangle& t : s.triangles) EXPECT_GT(length(area_normal(s, t)), 1e-9f);  // no slivers without an area
   for (const Material& m : s.materials) {
     EXPECT_LT(std::max({m.base_color.x, m.base_color.y, m.base_color.z}), 0.9f);
     EXPECT_FALSE(m.double_sided);

@@ -11,8 +11,8 @@ namespace lambent {
 namespace {
 
 double length2(Vec3 a, Vec3 b) {
-  glm::dvec3 d = glm::dvec3(a) - glm::dvec3(b);
-  return glm::dot(d, d);
+  Vec3d d = Vec3d(a) - Vec3d(b);
+  return dot(d, d);
 }
 
 bool precedes(Vec3 a, Vec3 b) { return a.x != b.x ? a.x < b.x : a.y != b.y ? a.y < b.y : a.z < b.z; }
@@ -138,8 +138,8 @@ double fewest_triangles(const Scene& scene, const Triangle& t, double max_edge) 
   const std::vector<Vec3>& p = scene.positions;
   double longest2 =
       std::max({length2(p[t.v[0]], p[t.v[1]]), length2(p[t.v[1]], p[t.v[2]]), length2(p[t.v[2]], p[t.v[0]])});
-  glm::dvec3 a = p[t.v[0]], area2 = glm::cross(glm::dvec3(p[t.v[1]]) - a, glm::dvec3(p[t.v[2]]) - a);
-  return std::max({1.0, std::sqrt(longest2) / max_edge, glm::length(area2) / (std::sqrt(0.75) * max_edge * max_edge)});
+  Vec3d a = p[t.v[0]], area2 = cross(Vec3d(p[t.v[1]]) - a, Vec3d(p[t.v[2]]) - a);
+  return std::max({1.0, std::sqrt(longest2) / max_edge, length(area2) / (std::sqrt(0.75) * max_edge * max_edge)});
 }
 
 }  // namespace
@@ -188,7 +188,7 @@ Result<void> split_long_edges(Scene& scene, float max_edge, size_t max_triangles
   for (const Triangle& t : scene.triangles) {
     fewest += fewest_triangles(scene, t, double(max_edge));
     for (int k = 0; k < 3; ++k) {
-      Vec3 p = scene.positions[t.v[k]], size = glm::abs(p);
+      Vec3 p = scene.positions[t.v[k]], size = abs(p);
       farthest = std::max({farthest, size.x, size.y, size.z});
       longest2 = std::max(longest2, length2(p, scene.positions[t.v[(k + 1) % 3]]));
     }

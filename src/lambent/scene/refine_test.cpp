@@ -14,8 +14,8 @@ double longest_edge(const Scene& s) {
   double longest = 0;
   for (const Triangle& t : s.triangles) {
     for (int k = 0; k < 3; ++k) {
-      glm::dvec3 a = s.positions[t.v[k]], b = s.positions[t.v[(k + 1) % 3]];
-      longest = std::max(longest, glm::length(a - b));
+      Vec3d a = s.positions[t.v[k]], b = s.positions[t.v[(k + 1) % 3]];
+      longest = std::max(longest, length(a - b));
     }
   }
   return longest;
@@ -29,7 +29,7 @@ Scene prism_of_parts() {
   add_quad(s, m, "0", a, x, z, 1, 1), add_quad(s, m, "1", a + y, z, x, 1, 1), add_quad(s, m, "2", a, z, y, 1, 1);
   add_quad(s, m, "3", a + x, y, z, 1, 1), add_quad(s, m, "4", a, y, x, 1, 1), add_quad(s, m, "5", a + z, x, y, 1, 1);
   // Far corners are reached by different sums: give equal corners equal bits.
-  for (Vec3& p : s.positions) p = glm::round(p * 1024.0f) / 1024.0f;
+  for (Vec3& p : s.positions) p = round(p * 1024.0f) / 1024.0f;
   return s;
 }
 
@@ -76,8 +76,8 @@ TEST(SplitLongEdges, MiddlesInterpolateAttributes) {
   EXPECT_EQ(test::broken_invariant(s), "");
   for (size_t v = 0; v < s.positions.size(); ++v) {
     Vec3 p = s.positions[v];
-    EXPECT_LT(glm::distance(s.texcoords[0][v], Vec2(3 * p.x + 1, p.z)), rounding);
-    EXPECT_LT(glm::distance(s.colors[v], Vec3(p.x, p.z, 1) * 0.5f + 0.5f), rounding);
+    EXPECT_LT(distance(s.texcoords[0][v], Vec2(3 * p.x + 1, p.z)), rounding);
+    EXPECT_LT(distance(s.colors[v], Vec3(p.x, p.z, 1) * 0.5f + 0.5f), rounding);
   }
 }
 

@@ -21,11 +21,11 @@ Vec4 texture_tangent(const Scene& scene, const Triangle& triangle, int set = 0,
 // The part of v that is square to n, as a unit vector; zero where v is (nearly) along n.
 Vec3 square_to(Vec3 v, Vec3 n) {
   constexpr float least_sine = 0.01f;  // below it rounding would turn the frame askew
-  const float length = glm::length(v);
+  const float length = lambent::length(v);
   if (!(length > 0 && std::isfinite(length))) return Vec3(0);
   v /= length;
-  const Vec3 t = v - n * glm::dot(v, n);
-  const float sine = glm::length(t);
+  const Vec3 t = v - n * dot(v, n);
+  const float sine = lambent::length(t);
   return sine > least_sine ? t / sine : Vec3(0);
 }
 
@@ -41,9 +41,9 @@ Brdf surface_brdf(const Scene& scene, const Reflection& reflection, const Triang
 
 Mat3 shading_frame(const Scene& scene, const Triangle& triangle, Vec3 n) {
   Vec3 t = square_to(Vec3(texture_tangent(scene, triangle)), n);
-  if (t == Vec3(0)) t = square_to(glm::cross(Vec3(0, 1, 0), n), n);
+  if (t == Vec3(0)) t = square_to(cross(Vec3(0, 1, 0), n), n);
   if (t == Vec3(0)) t = square_to(Vec3(1, 0, 0), n);
-  return {t, glm::cross(n, t), n};
+  return {t, cross(n, t), n};
 }
 
 Vec3 mapped_normal(const Scene& scene, const Triangle& triangle, float u, float v, Vec3 n) {
@@ -57,7 +57,7 @@ Vec3 mapped_normal(const Scene& scene, const Triangle& triangle, float u, float 
   const Vec3 texel = sample_linear_texture(scene.textures[size_t(m.normal_texture)],
                                            texture_place(scene, triangle, u, v, m.normal_set, m.normal_transform));
   const Vec3 bent = (2.0f * texel - Vec3(1)) * Vec3(m.normal_scale, m.normal_scale, 1);
-  const Vec3 b = glm::cross(n, t) * (along.w > 0 ? 1.0f : -1.0f);
+  const Vec3 b = cross(n, t) * (along.w > 0 ? 1.0f : -1.0f);
   return normalize_or(t * bent.x + b * bent.y + n * bent.z, n);
 }
 

@@ -11,9 +11,9 @@ namespace {
 void expect_frame(const Mat3& f, Vec3 n) {
   constexpr float rounding = 2e-5f;  // a tangent at the least allowed angle magnifies rounding a hundred times
   EXPECT_EQ(f[2], n);
-  EXPECT_NEAR(glm::length(f[0]), 1, rounding);
-  EXPECT_NEAR(glm::dot(f[0], n), 0, rounding);
-  EXPECT_LT(glm::length(glm::cross(n, f[0]) - f[1]), rounding);
+  EXPECT_NEAR(length(f[0]), 1, rounding);
+  EXPECT_NEAR(dot(f[0], n), 0, rounding);
+  EXPECT_LT(length(cross(n, f[0]) - f[1]), rounding);
 }
 
 // One triangle on a plane, with texture coordinates uv = M (position).
@@ -23,7 +23,7 @@ Scene mapped_triangle(Vec2 du, Vec2 dv) {
   const Vec3 p[] = {{0, 0, 0}, {2, 0, 0.3f}, {0.5f, 0, -1}}, n[] = {{0, 1, 0}, {0, 1, 0}, {0, 1, 0}};
   const uint32_t corners[] = {0, 1, 2};
   add_mesh(s, material, "t", p, n, corners);
-  for (Vec3 x : p) s.texcoords[0].push_back({glm::dot(du, Vec2(x.x, x.z)), glm::dot(dv, Vec2(x.x, x.z))});
+  for (Vec3 x : p) s.texcoords[0].push_back({dot(du, Vec2(x.x, x.z)), dot(dv, Vec2(x.x, x.z))});
   return s;
 }
 
@@ -54,14 +54,14 @@ TEST(ShadingFrame, FollowsTheFirstTextureCoordinate) {
     const Scene s = mapped_triangle(du, dv);
     const Mat3 f = shading_frame(s, s.triangles[0], up);
     expect_frame(f, up);
-    EXPECT_LT(glm::length(f[0] - glm::normalize(tangent)), 1e-5f) << tangent.x << " " << tangent.z;
+    EXPECT_LT(length(f[0] - normalize(tangent)), 1e-5f) << tangent.x << " " << tangent.z;
   }
   // A tilted normal: the tangent is made square to it and stays in the plane of both.
-  const Vec3 n = glm::normalize(Vec3(0.3f, 1, 0.2f));
+  const Vec3 n = normalize(Vec3(0.3f, 1, 0.2f));
   const Scene s = mapped_triangle({1, 0}, {0, 1});
   const Mat3 f = shading_frame(s, s.triangles[0], n);
   expect_frame(f, n);
-  EXPECT_NEAR(glm::dot(f[0], glm::cross(n, Vec3(1, 0, 0))), 0, 1e-6f);
+  EXPECT_NEAR(dot(f[0], cross(n, Vec3(1, 0, 0))), 0, 1e-6f);
   EXPECT_GT(f[0].x, 0);
 }
 
@@ -73,16 +73,16 @@ TEST(ShadingFrame, WithoutTextureCoordinatesIsLevel) {
   for (Vec2& uv : broken.texcoords[0]) uv = Vec2(NAN, INFINITY);
   Random random(1);
   for (int i = 0; i < 1000; ++i) {
-    const Vec3 n = glm::normalize(square_to_sphere(random.next2()));
+    const Vec3 n = normalize(square_to_sphere(random.next2()));
     for (const Scene* s : {&bare, &flat, &broken}) {
       const Mat3 f = shading_frame(*s, s->triangles[0], n);
       expect_frame(f, n);
       EXPECT_NEAR(f[0].y, 0, 1e-6f);
       // Continuous: a small turn of n turns it little, but near the poles.
-      const Vec3 near = glm::normalize(n + 1e-3f * square_to_sphere(random.next2()));
+      const Vec3 near = normalize(n + 1e-3f * square_to_sphere(random.next2()));
       const float sine = std::hypot(n.x, n.z);
       if (sine > 0.05f) {
-        EXPECT_LT(glm::length(shading_frame(*s, s->triangles[0], near)[0] - f[0]), 2e-3f / sine);
+        EXPECT_LT(length(shading_frame(*s, s->triangles[0], near)[0] - f[0]), 2e-3f / sine);
       }
     }
   }

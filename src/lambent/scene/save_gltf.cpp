@@ -34,9 +34,8 @@ class MaterialWriter {
     auto known = materials_.find({index, two_sided});
     if (known != materials_.end()) return known->second;
     const Material& m = scene_.materials[index];
-    Vec3 base =
-        glm::clamp(Vec3(finite_or(m.base_color.x, 0), finite_or(m.base_color.y, 0), finite_or(m.base_color.z, 0)),
-                   Vec3(0.0f), Vec3(1.0f));
+    Vec3 base = clamp(Vec3(finite_or(m.base_color.x, 0), finite_or(m.base_color.y, 0), finite_or(m.base_color.z, 0)),
+                      Vec3(0.0f), Vec3(1.0f));
     Json pbr = {{"baseColorFactor", Json::array({base.x, base.y, base.z, 1.0f})},
                 {"metallicFactor", std::clamp(finite_or(m.metallic, 1), 0.0f, 1.0f)},
                 {"roughnessFactor", std::clamp(finite_or(m.roughness, 1), 0.0f, 1.0f)}};
@@ -98,11 +97,11 @@ class MaterialWriter {
   void add_emission(Json& json, Vec3 emissive) {
     float brightest = std::max({emissive.x, emissive.y, emissive.z});
     if (!is_finite(emissive) || !(brightest > 0)) return;
-    emissive = glm::max(emissive, Vec3(0.0f));
+    emissive = max(emissive, Vec3(0.0f));
     if (brightest > 1) {
       float strength =
           std::min(0x1p127f, std::exp2(std::ceil(std::log2(brightest))));  // a power of two divides without rounding
-      emissive = glm::min(Vec3(1), emissive / strength);
+      emissive = min(Vec3(1), emissive / strength);
       json["extensions"]["KHR_materials_emissive_strength"]["emissiveStrength"] = strength;
       out_.use_extension("KHR_materials_emissive_strength");
     }
@@ -152,9 +151,9 @@ class MaterialWriter {
 };
 
 // Takes a unit normal of the world back into the frame that `m` leads out of.
-Vec3 local_normal(const glm::dmat4& m, Vec3 world) {
-  glm::dvec3 n = glm::transpose(glm::dmat3(m)) * glm::dvec3(world);
-  double length = glm::length(n);
+Vec3 local_normal(const Mat4d& m, Vec3 world) {
+  Vec3d n = transpose(Mat3d(m)) * Vec3d(world);
+  double length = lambent::length(n);
   return length > 0 && std::isfinite(length) ? Vec3(n / length) : world;
 }
 
@@ -175,15 +174,15 @@ size_t add_triangles(GlbWriter& out, const Scene& scene, const Part& part, bool 
 
 // Replaces the geometry of `primitive` by the part's as it stands in the world, in the frame that `frame` leads out of.
 // Attributes are written where they say something, or where the primitive had them before.
-void write_geometry(GlbWriter& out, const Scene& scene, const Part& part, const glm::dmat4& frame, Json& primitive) {
+void write_geometry(GlbWriter& out, const Scene& scene, const Part& part, const Mat4d& frame, Json& primitive) {
   const Json before = primitive.contains("attributes") ? primitive["attributes"] : Json::object();
-  const glm::dmat4 inverse = glm::inverse(frame);
-  const bool is_identity = frame == glm::dmat4(1.0);
+  const Mat4d inverse = inverse_affine(frame);
+  const bool is_identity = frame == Mat4d(1.0);
   const size_t first = part.first_vertex, count = part.vertex_count;
   std::vector<Vec3> positions(scene.positions.begin() + first, scene.positions.begin() + first + count);
   std::vector<Vec3> normals(scene.normals.begin() + first, scene.normals.begin() + first + count);
   if (!is_identity) {
-    for (Vec3& p : positions) p = Vec3(glm::dvec3(inverse * glm::dvec4(p, 1)));
+    for (Vec3& p : positions) p = Vec3(Vec3d(inverse * Vec4d(p, 1)));
     for (Vec3& n : normals) n = local_normal(frame, n);
   }
   Json attributes = {{"POSITION", out.add_vectors(floats(positions), 3, true)},
@@ -200,12 +199,12 @@ void write_geometry(GlbWriter& out, const Scene& scene, const Part& part, const 
     bool says = std::any_of(colors.begin(), colors.end(), [](Vec3 c) { return c != Vec3(1.0f); });
     if (says || before.contains("COLOR_0")) attributes["COLOR_0"] = out.add_vectors(floats(colors), 3, false);
   }
-  const bool mirrored = glm::determinant(glm::dmat3(frame)) < 0;
+  const bool mirrored = determinant(Mat3d(frame)) < 0;
   if (!scene.tangents.empty()) {
     std::vector<Vec4> tangents(scene.tangents.begin() + first, scene.tangents.begin() + first + count);
     for (Vec4& t : tangents) {
-      const glm::dvec3 local = glm::dmat3(inverse) * glm::dvec3(t);
-      const double length = glm::length(local);
+      const Vec3d local = Mat3d(inverse) * Vec3d(t);
+      const double length = lambent::length(local);
       t = Vec4(length > 0 && std::isfinite(length) ? Vec3(local / length) : Vec3(0), mirrored ? -t.w : t.w);
     }
     // A tangent that is missing may not be written: then viewers make all of them.
@@ -314,8 +313,8 @@ class DocumentWriter {
                                     [](const Json& p) { return p.contains("targets") && !p["targets"].empty(); });
     // Vertices that are not the document's have no joints or morph targets to move by: the whole node gets its rest
     // pose.
-    const glm::dmat4& world = pose_.world[node];
-    const double determinant = glm::determinant(glm::dmat3(world));
+    const Mat4d& world = pose_.world[node];
+    const double determinant = lambent::determinant(Mat3d(world));
     const bool singular = determinant == 0 || !std::isfinite(1 / determinant);
     const bool still = new_vertices && (skinned || morphs || singular);
     const bool apart = new_vertices && (skinned || singular);  // then it stands in the world, on a node of its own
@@ -326,7 +325,7 @@ class DocumentWriter {
       auto extensions = primitive.find("extensions");
       if (extensions != primitive.end() && extensions->is_object()) extensions->erase("KHR_draco_mesh_compression");
       if (still || part.source.empty()) {
-        write_geometry(out_, scene_, part, apart ? glm::dmat4(1.0) : world, primitive);
+        write_geometry(out_, scene_, part, apart ? Mat4d(1.0) : world, primitive);
       } else {
         copy_geometry(node, part, primitive);
       }
@@ -402,7 +401,7 @@ class DocumentWriter {
     std::vector<Vec3> normals(part.vertex_count);
     for (size_t i = 0; i < normals.size(); ++i) {
       normals[i] = before.count ? Vec3(before.read3(part.source[i])) : Vec3(0.0f);
-      if (!(glm::dot(normals[i], normals[i]) > 0) || !is_finite(normals[i])) {
+      if (!(dot(normals[i], normals[i]) > 0) || !is_finite(normals[i])) {
         normals[i] = local_normal(placement.at(part.source[i]), scene_.normals[part.first_vertex + i]);
       }
     }
@@ -472,7 +471,7 @@ Result<void> save_glb(const std::string& path, const Scene& scene, std::span<con
     const Part& part = scene.parts[p];
     if (part.node >= 0 || part.vertex_count == 0) continue;
     Json primitive = Json::object();
-    write_geometry(out, scene, part, glm::dmat4(1.0), primitive);
+    write_geometry(out, scene, part, Mat4d(1.0), primitive);
     if (part.material < document_materials) {
       primitive["material"] = part.material;
     } else {

@@ -72,17 +72,16 @@ void expect_same(const Scene& a, const Scene& b, float tolerance = 0) {
   const float reach = bounds(a).diagonal();
   float moved = 0, turned = 0, slid = 0, faded = 0;
   for (size_t i = 0; i < a.positions.size(); ++i) {
-    moved = std::max(moved, glm::length(a.positions[i] - b.positions[i]));
-    turned = std::max(turned, glm::length(a.normals[i] - b.normals[i]));
+    moved = std::max(moved, length(a.positions[i] - b.positions[i]));
+    turned = std::max(turned, length(a.normals[i] - b.normals[i]));
     for (size_t set = 0; set < 2; ++set) {  // absent and all zero are the same
       Vec2 uv_a = a.texcoords[set].empty() ? Vec2(0) : a.texcoords[set][i];
       Vec2 uv_b = b.texcoords[set].empty() ? Vec2(0) : b.texcoords[set][i];
-      slid = std::max(slid, glm::length(uv_a - uv_b));
+      slid = std::max(slid, length(uv_a - uv_b));
     }
-    if (!a.tangents.empty() && !b.tangents.empty())
-      turned = std::max(turned, glm::length(a.tangents[i] - b.tangents[i]));
+    if (!a.tangents.empty() && !b.tangents.empty()) turned = std::max(turned, length(a.tangents[i] - b.tangents[i]));
     Vec3 color_a = a.colors.empty() ? Vec3(1) : a.colors[i], color_b = b.colors.empty() ? Vec3(1) : b.colors[i];
-    faded = std::max(faded, glm::length(color_a - color_b));
+    faded = std::max(faded, length(color_a - color_b));
   }
   EXPECT_LE(moved, tolerance * reach);
   EXPECT_LE(turned, std::max(normal_rounding, 4 * tolerance));
@@ -141,7 +140,7 @@ Scene made_scene() {
     part.first_triangle = uint32_t(s.triangles.size()), part.triangle_count = 2;
     for (uint32_t i = 0; i < part.vertex_count; ++i) {
       s.positions.push_back({random.next(), random.next(), random.next()});
-      s.normals.push_back(glm::normalize(Vec3(random.next() - 0.5f, random.next() - 0.5f, random.next() + 0.1f)));
+      s.normals.push_back(normalize(Vec3(random.next() - 0.5f, random.next() - 0.5f, random.next() + 0.1f)));
       s.texcoords[0].push_back(p == 0 ? Vec2(0.0f) : random.next2());
       s.texcoords[1].push_back(random.next2());
       s.tangents.push_back(Vec4(frame_about(s.normals.back())[0], p % 2 ? 1 : -1));
@@ -368,7 +367,7 @@ TEST(SaveGlb, NewVerticesStandStillInTheirRestPose) {
     EXPECT_FALSE(json["nodes"][0].contains("skin"));
     for (size_t i = 0; i < 4; ++i) {
       EXPECT_EQ(again.positions[again.parts[1].first_vertex + i], s.positions[i]);
-      EXPECT_LE(glm::length(again.normals[again.parts[1].first_vertex + i] - s.normals[i]), normal_rounding);
+      EXPECT_LE(length(again.normals[again.parts[1].first_vertex + i] - s.normals[i]), normal_rounding);
     }
     EXPECT_EQ(again.triangles[1].v[2], again.parts[1].first_vertex + 3);
   }

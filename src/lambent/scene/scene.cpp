@@ -58,9 +58,9 @@ Vec3 sample_bytes(const Texture& texture, Vec2 uv, const std::array<float, 256>&
     const uint8_t* p = texture.rgb.data() + (y * size_t(texture.width) + x) * 3;
     return Vec3(linear[p[0]], linear[p[1]], linear[p[2]]);
   };
-  Vec3 top = glm::mix(texel(s.first, t.first), texel(s.second, t.first), s.share);
-  Vec3 bottom = glm::mix(texel(s.first, t.second), texel(s.second, t.second), s.share);
-  return glm::mix(top, bottom, t.share);
+  Vec3 top = mix(texel(s.first, t.first), texel(s.second, t.first), s.share);
+  Vec3 bottom = mix(texel(s.first, t.second), texel(s.second, t.second), s.share);
+  return mix(top, bottom, t.share);
 }
 
 }  // namespace
@@ -96,7 +96,7 @@ Vec3 albedo(const Scene& scene, const Triangle& triangle, float u, float v) {
                             texture_place(scene, triangle, u, v, material.texcoord_set, material.uv_transform));
   }
   if (!scene.colors.empty()) color *= interpolate(scene.colors, triangle, u, v);
-  return glm::clamp(color, Vec3(0.0f), Vec3(1.0f));
+  return clamp(color, Vec3(0.0f), Vec3(1.0f));
 }
 
 Vec3 emission_texel(const Scene& scene, const Triangle& triangle, float u, float v) {
@@ -119,7 +119,7 @@ Vec2 metallic_roughness(const Scene& scene, const Triangle& triangle, float u, f
         texture_place(scene, triangle, u, v, material.metallic_roughness_set, material.metallic_roughness_transform));
     value *= Vec2(texel.z, texel.y);
   }
-  return glm::clamp(value, Vec2(0.0f), Vec2(1.0f));
+  return clamp(value, Vec2(0.0f), Vec2(1.0f));
 }
 
 }  // namespace lambent

@@ -113,7 +113,7 @@ Bounds bounds(const Scene& scene);  // of the vertices that triangles use
 
 // Cross product of two edges: twice the area along the geometric normal.
 inline Vec3 area_normal(const Scene& s, const Triangle& t) {
-  return glm::cross(s.positions[t.v[1]] - s.positions[t.v[0]], s.positions[t.v[2]] - s.positions[t.v[0]]);
+  return cross(s.positions[t.v[1]] - s.positions[t.v[0]], s.positions[t.v[2]] - s.positions[t.v[0]]);
 }
 
 // Barycentric interpolation at weight (1-u-v, u, v) of the triangle's corners.

@@ -43,18 +43,18 @@ Vec3 evaluate_directional_light(DirectionalKind kind, std::span<const Vec3> rows
   switch (kind) {
     case DirectionalKind::none: return rows[0];
     case DirectionalKind::sh2:
-    case DirectionalKind::sh3: return glm::max(reconstruct_sh(rows.first(size_t(directional_rows(kind))), n), Vec3(0));
+    case DirectionalKind::sh3: return max(reconstruct_sh(rows.first(size_t(directional_rows(kind))), n), Vec3(0));
     case DirectionalKind::hl2: {
       float total = 0;
       for (int k = 0; k < 3; ++k) {
-        const float cosine = std::max(0.0f, glm::dot(n, frame * hl2_basis[k])), w = cosine * cosine;
+        const float cosine = std::max(0.0f, dot(n, frame * hl2_basis[k])), w = cosine * cosine;
         sum += w * rows[size_t(k)], total += w;
       }
       return total > 0 ? sum / total : Vec3(0);
     }
     case DirectionalKind::vector:
       for (int k = 0; k < 3; ++k) sum += n[k] * rows[size_t(k)];
-      return glm::max(sum, Vec3(0));
+      return max(sum, Vec3(0));
   }
   return sum;
 }

@@ -20,9 +20,9 @@ std::vector<Vec3> three_light_probe(DirectionalKind kind, std::span<const Vec3> 
 std::array<Vec3, 4> godot_lightmap_layers(DirectionalKind kind, std::span<const Vec3> rows) {
   LAMBENT_CHECK((kind == DirectionalKind::sh2 || kind == DirectionalKind::sh3) && rows.size() >= 4);
   float y[4];
-  evaluate_sh(2, glm::normalize(Vec3(1)), y);
+  evaluate_sh(2, normalize(Vec3(1)), y);
   const float axis = std::sqrt(3.0f);  // of (1, 1, 1): makes a row's factor of x, y or z
-  std::array<Vec3, 4> layers{glm::max(rows[0] * y[0], Vec3(0)), Vec3(0.5f), Vec3(0.5f), Vec3(0.5f)};
+  std::array<Vec3, 4> layers{max(rows[0] * y[0], Vec3(0)), Vec3(0.5f), Vec3(0.5f), Vec3(0.5f)};
   for (size_t k = 1; k < 4; ++k)
     for (int c = 0; c < 3; ++c)
       if (layers[0][c] > 0)

@@ -17,7 +17,7 @@ std::vector<Vec3> rows_of(int order, Vec3 s, Vec3 I, Vec3 uniform) {
   return rows;
 }
 
-const Vec3 sun = glm::normalize(Vec3(0.3f, 0.8f, -0.5f)),
+const Vec3 sun = normalize(Vec3(0.3f, 0.8f, -0.5f)),
            directions[] = {{1, 0, 0}, {0, -1, 0}, {0, 0, 1}, {0.6f, 0.64f, -0.48f}, {-0.48f, 0.6f, 0.64f}};
 
 TEST(DirectionalConvert, ThreeMakesOurIrradiance) {
@@ -47,7 +47,7 @@ TEST(DirectionalConvert, GodotMakesOurIrradianceOverPi) {
     for (Vec3 n : directions) {
       const Vec3 l0 = layer[0], m1 = (layer[1] - 0.5f) * 2.0f, m2 = (layer[2] - 0.5f) * 2.0f,
                  m3 = (layer[3] - 0.5f) * 2.0f;
-      const Vec3 e = glm::max(l0 + m1 * n.y * (l0 * 4.0f) + m2 * n.z * (l0 * 4.0f) + m3 * n.x * (l0 * 4.0f), Vec3(0));
+      const Vec3 e = max(l0 + m1 * n.y * (l0 * 4.0f) + m2 * n.z * (l0 * 4.0f) + m3 * n.x * (l0 * 4.0f), Vec3(0));
       const Vec3 ours = evaluate_directional_light(DirectionalKind::sh2, rows, Mat3(1.0f), n);
       for (int k = 0; k < 3; ++k) EXPECT_NEAR(e[k], ours[k], 1e-5f * (1 + ours[k]));
     }

@@ -12,15 +12,15 @@ const char* const outgoing_names[6] = {"map", "svd", "sh", "hemisphere", "hsh", 
 Vec3 view_map_direction(int grid, int x, int y) {
   const Vec2 disk = square_to_disk({float(x) / float(grid - 1), float(y) / float(grid - 1)});
   constexpr float lowest = 2e-3f;  // the horizon itself reflects nothing that could be measured
-  const float z = std::max(1 - glm::dot(disk, disk), lowest), r = std::sqrt(1 - z * z);
-  const Vec2 flat = normalize_or(Vec3(disk, 0), Vec3(0));
+  const float z = std::max(1 - dot(disk, disk), lowest), r = std::sqrt(1 - z * z);
+  const Vec2 flat(normalize_or(Vec3(disk, 0), Vec3(0)));
   return {flat * r, z};
 }
 
 void look_up(const ViewMap& map, Vec3 wo, std::span<ViewWeights> out) {
   LAMBENT_CHECK(map.grid >= 2 && out.size() >= size_t(map.rows));
   const float z = std::clamp(wo.z, 0.0f, 1.0f);
-  const Vec2 flat = normalize_or(Vec3(wo.x, wo.y, 0), Vec3(0));
+  const Vec2 flat(normalize_or(Vec3(wo.x, wo.y, 0), Vec3(0)));
   const Vec2 square = disk_to_square(flat * std::sqrt(1 - z));
   const float last = float(map.grid - 1), sx = square.x * last, sy = square.y * last;
   const int x = std::min(int(sx), map.grid - 2), y = std::min(int(sy), map.grid - 2);
@@ -70,7 +70,7 @@ std::vector<float> row_weights(const Outgoing& o) {
       for (int x = 0; x < map.grid; ++x) {
         const double seen = view_map_direction(map.grid, x, y).z;  // the map has equal areas
         total += seen;
-        for (double& s : sum) s += seen * glm::dot(*w, *w), ++w;
+        for (double& s : sum) s += seen * dot(*w, *w), ++w;
       }
   }
   for (size_t r = 0; r < sum.size(); ++r) weights[r] = float(sum[r] / total);

@@ -26,7 +26,7 @@ enum class OutgoingKind {
 extern const char* const outgoing_names[6];  // by kind
 
 // a and b as (a.r, a.g, a.b, b).
-using ViewWeights = glm::vec4;
+using ViewWeights = Vec4;
 
 // A table over directions of the upper hemisphere: nodes of a grid over the unit square, mapped to the disk (Shirley
 // and Chiu) and on to the hemisphere with equal areas; the border of the square is the horizon. Bilinear between nodes.

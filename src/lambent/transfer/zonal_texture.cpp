@@ -88,7 +88,7 @@ void sample_zonal_texture(const ZonalTexture& texture, Vec2 uv, std::span<float>
   const ZonalTransfer& t = texture.transfer;
   LAMBENT_CHECK(values.size() == t.receiver_values());
   if (!std::isfinite(uv.x) || !std::isfinite(uv.y)) uv = Vec2(0.0f);
-  uv -= glm::floor(uv);
+  uv -= floor(uv);
   const float x = uv.x * float(texture.width), y = uv.y * float(texture.height);
   auto wrap = [](int i, int n) { return (i + n) % n; };
   auto texel = [&](int i, int j) {

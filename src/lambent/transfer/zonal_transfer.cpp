@@ -52,7 +52,7 @@ std::vector<float> zonal_harmonics(const ZonalTransfer& t, std::span<const float
   }
   float y[sh_count(max_sh_order)];
   for (int i = 0; i < t.lobes; ++i) {
-    evaluate_sh(t.order, glm::normalize(R * lobe_axis(t, values, i)), y);
+    evaluate_sh(t.order, normalize(R * lobe_axis(t, values, i)), y);
     const float* g = values.data() + t.exact_values() + size_t(i) * t.lobe_values() + 3;
     for (size_t c = 0; c < size_t(t.channels); ++c)
       for (size_t l = exact; l < size_t(t.order); ++l)
