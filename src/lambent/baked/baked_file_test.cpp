@@ -48,27 +48,39 @@ Small small_bake(int channels, Precision precision) {
   return s;
 }
 
+Baked baked_of(const Small& s) { return make_baked(s.scene, s.receivers, s.transfer.transfer, DiffuseRows{}); }
+Baked with_provenance(Baked baked, const std::string& text) {
+  baked.provenance = text;
+  return baked;
+}
+Baked with_errors(Baked baked, std::vector<float> errors) {
+  baked.surface.fit_errors = std::move(errors);
+  return baked;
+}
+
 TEST(BakedFile, ComesBackAsItWas) {
   for (Precision precision : {Precision::half, Precision::single})
     for (int channels : {1, 3}) {
       const TemporaryFile file("round_trip.glb");
       const Small s = small_bake(channels, precision);
-      ASSERT_TRUE(save_baked(file.path, s.scene, s.receivers, s.transfer.transfer, R"({"options":{"order":3}})"));
+      ASSERT_TRUE(save_baked(file.path, with_provenance(baked_of(s), R"({"options":{"order":3}})")));
       EXPECT_TRUE(is_baked(file.path));
       auto back = load_baked(file.path);
       ASSERT_TRUE(back) << back.error().text();
       EXPECT_EQ(back->scene.positions, s.scene.positions);
       EXPECT_EQ(back->scene.normals, s.scene.normals);
       EXPECT_EQ(back->scene.triangles.size(), s.scene.triangles.size());
-      EXPECT_EQ(back->front, s.receivers.front);
-      EXPECT_EQ(back->back, s.receivers.back);
-      EXPECT_EQ(back->transfer.light.order, 3);
-      EXPECT_EQ(back->transfer.channels, channels);
-      EXPECT_EQ(back->transfer.precision, precision);
-      EXPECT_TRUE(std::equal(back->transfer.data.begin(), back->transfer.data.end(), s.transfer.transfer.data.begin(),
+      EXPECT_EQ(vertices_of(*back)->front, s.receivers.front);
+      EXPECT_EQ(vertices_of(*back)->back, s.receivers.back);
+      EXPECT_EQ(std::get<Transfer>(back->surface.store).light.order, 3);
+      EXPECT_EQ(std::get<Transfer>(back->surface.store).channels, channels);
+      EXPECT_EQ(std::get<Transfer>(back->surface.store).precision, precision);
+      EXPECT_TRUE(std::equal(std::get<Transfer>(back->surface.store).data.begin(),
+                             std::get<Transfer>(back->surface.store).data.end(), s.transfer.transfer.data.begin(),
                              s.transfer.transfer.data.end()));
       EXPECT_EQ(back->provenance, R"({"options":{"order":3}})");
-      EXPECT_EQ(reinterpret_cast<uintptr_t>(back->transfer.data.data()) % 64, 0u);  // in place, fit for SIMD
+      EXPECT_EQ(reinterpret_cast<uintptr_t>(std::get<Transfer>(back->surface.store).data.data()) % 64,
+                0u);  // in place, fit for SIMD
     }
 }
 
@@ -98,17 +110,18 @@ TEST(BakedFile, MatricesComeBackWithTheirLastReflection) {
       store_receiver(w, r, values);
     }
     const TemporaryFile file("matrix.glb"), cut("matrix_cut.glb");
-    ASSERT_TRUE(save_baked(file.path, s.scene, s.receivers, w.transfer, "{}", {.outgoing = &o}));
+    ASSERT_TRUE(save_baked(file.path, make_baked(s.scene, s.receivers, w.transfer, o)));
     auto back = load_baked(file.path);
     ASSERT_TRUE(back) << back.error().text();
-    ASSERT_TRUE(back->outgoing);
-    EXPECT_EQ(back->transfer.rows, o.rows());
-    EXPECT_TRUE(std::equal(back->transfer.data.begin(), back->transfer.data.end(), w.transfer.data.begin(),
+    ASSERT_TRUE(outgoing_of(back->surface));
+    EXPECT_EQ(std::get<Transfer>(back->surface.store).rows, o.rows());
+    EXPECT_TRUE(std::equal(std::get<Transfer>(back->surface.store).data.begin(),
+                           std::get<Transfer>(back->surface.store).data.end(), w.transfer.data.begin(),
                            w.transfer.data.end()));
     std::vector<ViewWeights> a(size_t(o.rows())), b(a.size());
     for (size_t r = 0; r < n; ++r) {
       const Vec3 view = normalize_or(o.frames[r] * Vec3(0.3f, -0.5f, 0.6f), Vec3(0));
-      evaluate_outgoing(o, r, view, a), evaluate_outgoing(*back->outgoing, r, view, b);
+      evaluate_outgoing(o, r, view, a), evaluate_outgoing(*outgoing_of(back->surface), r, view, b);
       for (size_t k = 0; k < a.size(); ++k) EXPECT_LT(length(a[k] - b[k]), mapped ? 2e-3f : 1e-5f);  // maps are halves
     }
     const std::vector<uint8_t> bytes = *read_file(file.path);
@@ -172,10 +185,10 @@ TEST(BakedFile, KeepsTexelsAndPatchesAndWhatViewersShow) {
     const Mapped m = small_map(texels);
     const Image picture(4, 4);
     const ViewerLook look{*encode_png(picture, 0, ""), 3.5f};
-    ASSERT_TRUE(save_baked(file.path, m.scene, m.receivers, m.transfer.transfer, "{}", {.look = &look}));
+    ASSERT_TRUE(save_baked(file.path, make_baked(m.scene, m.receivers, m.transfer.transfer, DiffuseRows{}), &look));
     auto back = load_baked(file.path);
     ASSERT_TRUE(back) << back.error().text();
-    EXPECT_EQ(back->transfer.light.groups, std::vector<std::string>{"lamp"});
+    EXPECT_EQ(std::get<Transfer>(back->surface.store).light.groups, std::vector<std::string>{"lamp"});
     ASSERT_EQ(back->scene.triangles.size(), m.scene.triangles.size());  // backs for viewers are left out
     EXPECT_EQ(back->scene.positions, m.scene.positions);
     EXPECT_EQ(look_ups(back->scene, back->basis), look_ups(m.scene, m.receivers.basis));
@@ -210,8 +223,8 @@ TEST(BakedFile, KeepsTexelsAndPatchesAndWhatViewersShow) {
     // Baked again from the baked file: still the scene's own materials.
     const TemporaryFile again("again.glb");
     Mapped second{std::move(back->scene), m.receivers, m.transfer};
-    ASSERT_TRUE(
-        save_baked(again.path, second.scene, second.receivers, second.transfer.transfer, "{}", {.look = &look}));
+    ASSERT_TRUE(save_baked(again.path,
+                           make_baked(second.scene, second.receivers, second.transfer.transfer, DiffuseRows{}), &look));
     auto twice = load_baked(again.path);
     ASSERT_TRUE(twice) << twice.error().text();
     EXPECT_EQ(twice->scene.materials[twice->scene.parts[1].material].base_color, Vec3(0.2f, 0.5f, 0.7f));
@@ -222,7 +235,7 @@ TEST(BakedFile, KeepsTexelsAndPatchesAndWhatViewersShow) {
 TEST(BakedFile, RefusesSurfacesThatLie) {
   const TemporaryFile whole("surface.glb"), lying("lying.glb");
   const Mapped m = small_map(true);
-  ASSERT_TRUE(save_baked(whole.path, m.scene, m.receivers, m.transfer.transfer, "{}"));
+  ASSERT_TRUE(save_baked(whole.path, make_baked(m.scene, m.receivers, m.transfer.transfer, DiffuseRows{})));
   const std::vector<uint8_t> bytes = *read_file(whole.path);
   const auto& texels = std::get<TexelReceivers>(m.receivers.basis);
   const std::string width = "\"width\":" + std::to_string(texels.width);
@@ -283,21 +296,25 @@ TEST(BakedFile, LightInFreeSpaceComesBack) {
   const TemporaryFile file("lattice.glb"), cut("lattice_cut.glb");
   const Small s = small_bake(1, Precision::single);
   const LatticeTransfer l = small_lattice();
-  ASSERT_TRUE(save_baked(file.path, s.scene, s.receivers, s.transfer.transfer, "{}", {.lattice = &l}));
+  Baked baked = baked_of(s);
+  baked.more.push_back(lattice_field(l));
+  ASSERT_TRUE(save_baked(file.path, baked));
   auto back = load_baked(file.path);
   ASSERT_TRUE(back) << back.error().text();
-  ASSERT_TRUE(back->lattice);
-  EXPECT_EQ(back->lattice->lattice.min, l.lattice.min);
-  EXPECT_EQ(back->lattice->lattice.max, l.lattice.max);
-  EXPECT_EQ(back->lattice->lattice.count(), 6u);
-  EXPECT_EQ(back->lattice->lattice.nx, 3);
-  EXPECT_EQ(back->lattice->order, 2);
-  EXPECT_EQ(back->lattice->valid, l.valid);
-  EXPECT_EQ(back->lattice->transfer.channels, 3);
-  EXPECT_EQ(back->lattice->transfer.columns(), 9u);
-  EXPECT_TRUE(std::equal(back->lattice->transfer.data.begin(), back->lattice->transfer.data.end(),
-                         l.transfer.data.begin(), l.transfer.data.end()));
-  EXPECT_EQ(reinterpret_cast<uintptr_t>(back->lattice->transfer.data.data()) % 64, 0u);
+  ASSERT_TRUE(lattice_of(*back));
+  const auto& place = std::get<LatticePlacement>(lattice_of(*back)->where);
+  const auto& free_space = std::get<Transfer>(lattice_of(*back)->store);
+  EXPECT_EQ(place.lattice.min, l.lattice.min);
+  EXPECT_EQ(place.lattice.max, l.lattice.max);
+  EXPECT_EQ(place.lattice.count(), 6u);
+  EXPECT_EQ(place.lattice.nx, 3);
+  EXPECT_EQ(std::get<IncidentRows>(lattice_of(*back)->rows).order, 2);
+  EXPECT_EQ(place.valid, l.valid);
+  EXPECT_EQ(free_space.channels, 3);
+  EXPECT_EQ(free_space.columns(), 9u);
+  EXPECT_TRUE(
+      std::equal(free_space.data.begin(), free_space.data.end(), l.transfer.data.begin(), l.transfer.data.end()));
+  EXPECT_EQ(reinterpret_cast<uintptr_t>(free_space.data.data()) % 64, 0u);
 
   expect_refused(file.path, "\"lattice\":{",
                  {{"\"points\":[3,1,2]", "\"points\":[3,2,2]"},
@@ -335,19 +352,18 @@ TEST(BakedFile, ClustersComeBack) {
   for (size_t r = 0; r < n; ++r)
     c.cluster_of.push_back(uint16_t(random.next() * 4)), c.weights.push_back(float_to_half(random.next())),
         c.weights.push_back(0);
-  ASSERT_TRUE(save_baked(file.path, s.scene, s.receivers, c, "{}"));
+  ASSERT_TRUE(save_baked(file.path, make_baked(s.scene, s.receivers, c, DiffuseRows{})));
   auto back = load_baked(file.path);
   ASSERT_TRUE(back) << back.error().text();
-  ASSERT_TRUE(back->cpca);
-  EXPECT_EQ(back->transfer.receivers, 0u);
-  EXPECT_EQ(receivers_of(*back), n);
-  EXPECT_EQ(light_of(*back).order, 3);
-  EXPECT_EQ(back->front, s.receivers.front);
-  EXPECT_EQ(back->cpca->clusters, 4);
-  EXPECT_EQ(back->cpca->rank, 2);
-  EXPECT_EQ(back->cpca->vectors, c.vectors);
-  EXPECT_EQ(back->cpca->cluster_of, c.cluster_of);
-  EXPECT_EQ(back->cpca->weights, c.weights);
+  ASSERT_TRUE(std::holds_alternative<CpcaTransfer>(back->surface.store));
+  EXPECT_EQ(receivers_of(back->surface.store), n);
+  EXPECT_EQ(light_of(back->surface.store).order, 3);
+  EXPECT_EQ(vertices_of(*back)->front, s.receivers.front);
+  EXPECT_EQ(std::get<CpcaTransfer>(back->surface.store).clusters, 4);
+  EXPECT_EQ(std::get<CpcaTransfer>(back->surface.store).rank, 2);
+  EXPECT_EQ(std::get<CpcaTransfer>(back->surface.store).vectors, c.vectors);
+  EXPECT_EQ(std::get<CpcaTransfer>(back->surface.store).cluster_of, c.cluster_of);
+  EXPECT_EQ(std::get<CpcaTransfer>(back->surface.store).weights, c.weights);
   expect_refused(file.path, "\"cpca\":{",
                  {{"\"clusters\":4", "\"clusters\":3"},
                   {"\"clusters\":4", "\"clusters\":0"},
@@ -356,10 +372,10 @@ TEST(BakedFile, ClustersComeBack) {
                   {"\"clusterOf\"", "\"clusterof\""},
                   {"\"weights\"", "\"weighty\""}});
   c.cluster_of[1] = 4;
-  ASSERT_TRUE(save_baked(file.path, s.scene, s.receivers, c, "{}"));
+  ASSERT_TRUE(save_baked(file.path, make_baked(s.scene, s.receivers, c, DiffuseRows{})));
   EXPECT_FALSE(load_baked(file.path));
   c.cluster_of[1] = 3, c.vectors[5] = NAN;
-  ASSERT_TRUE(save_baked(file.path, s.scene, s.receivers, c, "{}"));
+  ASSERT_TRUE(save_baked(file.path, make_baked(s.scene, s.receivers, c, DiffuseRows{})));
   EXPECT_FALSE(load_baked(file.path));
 }
 
@@ -368,16 +384,17 @@ TEST(BakedFile, FixedViewsComeBack) {
   const Small s = small_bake(1, Precision::half);
   const WritableTransfer w = make_transfer({.order = 2}, 1, 3, 6, Precision::half);
   FixedView view{Camera{Vec3(1, 2, 3), Vec3(0, 0.5f, 0), Vec3(0, 1, 0), 33}, 3, 2, {0, 0.25f, 1, 1, 0.5f, 0}};
-  ASSERT_TRUE(save_baked(file.path, s.scene, {}, w.transfer, "{}", {.view = &view}));
+  ASSERT_TRUE(save_baked(file.path, make_baked(s.scene, view, w.transfer)));
   auto back = load_baked(file.path);
   ASSERT_TRUE(back) << back.error().text();
-  ASSERT_TRUE(back->view);
-  EXPECT_EQ(back->view->width, 3);
-  EXPECT_EQ(back->view->height, 2);
-  EXPECT_EQ(back->view->camera.eye, view.camera.eye);
-  EXPECT_EQ(back->view->camera.target, view.camera.target);
-  EXPECT_EQ(back->view->camera.fov, 33);
-  EXPECT_EQ(back->view->coverage, view.coverage);
+  ASSERT_TRUE(std::holds_alternative<FixedView>(back->surface.where));
+  const auto& seen = std::get<FixedView>(back->surface.where);
+  EXPECT_EQ(seen.width, 3);
+  EXPECT_EQ(seen.height, 2);
+  EXPECT_EQ(seen.camera.eye, view.camera.eye);
+  EXPECT_EQ(seen.camera.target, view.camera.target);
+  EXPECT_EQ(seen.camera.fov, 33);
+  EXPECT_EQ(seen.coverage, view.coverage);
   EXPECT_EQ(back->scene.triangles.size(), s.scene.triangles.size());
   expect_refused(file.path, "\"view\":{",
                  {{"\"width\":3", "\"width\":2"},
@@ -387,22 +404,22 @@ TEST(BakedFile, FixedViewsComeBack) {
                   {"\"target\":[0.0", "\"target\":[9e9"},
                   {"\"coverage\"", "\"coverall\""}});
   view.coverage[2] = 1.5f;
-  ASSERT_TRUE(save_baked(file.path, s.scene, {}, w.transfer, "{}", {.view = &view}));
+  ASSERT_TRUE(save_baked(file.path, make_baked(s.scene, view, w.transfer)));
   EXPECT_FALSE(load_baked(file.path));
 }
 
 TEST(BakedFile, IsTheSameBytesEveryTime) {
   const TemporaryFile a("a.glb"), b("b.glb");
   const Small s = small_bake(3, Precision::half);
-  ASSERT_TRUE(save_baked(a.path, s.scene, s.receivers, s.transfer.transfer, "{}"));
-  ASSERT_TRUE(save_baked(b.path, s.scene, s.receivers, s.transfer.transfer, "{}"));
+  ASSERT_TRUE(save_baked(a.path, baked_of(s)));
+  ASSERT_TRUE(save_baked(b.path, baked_of(s)));
   EXPECT_EQ(*read_file(a.path), *read_file(b.path));
 }
 
 TEST(BakedFile, RefusesEveryTruncation) {
   const TemporaryFile whole("whole.glb"), cut("cut.glb");
   const Small s = small_bake(1, Precision::half);
-  ASSERT_TRUE(save_baked(whole.path, s.scene, s.receivers, s.transfer.transfer, "{}"));
+  ASSERT_TRUE(save_baked(whole.path, baked_of(s)));
   const std::vector<uint8_t> bytes = *read_file(whole.path);
   // Every length at the front, where the headers are; then every 61st.
   for (size_t length = 0; length < bytes.size(); length += length < 256 ? 1 : 61) {
@@ -415,7 +432,7 @@ TEST(BakedFile, RefusesEveryTruncation) {
 TEST(BakedFile, RefusesHeadersThatLie) {
   const TemporaryFile whole("whole.glb");
   const Small s = small_bake(1, Precision::half);
-  ASSERT_TRUE(save_baked(whole.path, s.scene, s.receivers, s.transfer.transfer, "{}"));
+  ASSERT_TRUE(save_baked(whole.path, baked_of(s)));
   const std::string receivers = "\"receivers\":" + std::to_string(s.receivers.count());
   expect_refused(whole.path, "",
                  {{"\"version\":1}", "\"version\":2}"},
@@ -440,19 +457,19 @@ TEST(BakedFile, KeepsZonalTransferAndRefusesLiesAboutIt) {
   }
   std::vector<float> errors(s.receivers.count());
   for (float& e : errors) e = random.next();
-  ASSERT_TRUE(save_baked(file.path, s.scene, s.receivers, w.transfer, "{}", {.fit_errors = errors}));
+  ASSERT_TRUE(save_baked(file.path, with_errors(make_baked(s.scene, s.receivers, w.transfer, DiffuseRows{}), errors)));
   auto back = load_baked(file.path);
   ASSERT_TRUE(back) << back.error().text();
-  ASSERT_TRUE(back->zonal);
-  EXPECT_EQ(back->fit_errors, errors);
-  EXPECT_EQ(back->transfer.receivers, 0u);
-  EXPECT_EQ(back->front, s.receivers.front);
-  EXPECT_EQ(back->zonal->order, 6);
-  EXPECT_EQ(back->zonal->lobes, 4);
-  EXPECT_EQ(back->zonal->channels, 3);
-  EXPECT_TRUE(
-      std::equal(back->zonal->data.begin(), back->zonal->data.end(), w.transfer.data.begin(), w.transfer.data.end()));
-  EXPECT_EQ(reinterpret_cast<uintptr_t>(back->zonal->data.data()) % 64, 0u);
+  ASSERT_TRUE(std::holds_alternative<ZonalTransfer>(back->surface.store));
+  EXPECT_EQ(back->surface.fit_errors, errors);
+  EXPECT_EQ(vertices_of(*back)->front, s.receivers.front);
+  EXPECT_EQ(std::get<ZonalTransfer>(back->surface.store).order, 6);
+  EXPECT_EQ(std::get<ZonalTransfer>(back->surface.store).lobes, 4);
+  EXPECT_EQ(std::get<ZonalTransfer>(back->surface.store).channels, 3);
+  EXPECT_TRUE(std::equal(std::get<ZonalTransfer>(back->surface.store).data.begin(),
+                         std::get<ZonalTransfer>(back->surface.store).data.end(), w.transfer.data.begin(),
+                         w.transfer.data.end()));
+  EXPECT_EQ(reinterpret_cast<uintptr_t>(std::get<ZonalTransfer>(back->surface.store).data.data()) % 64, 0u);
   const std::pair<std::string, std::string> lies[] = {
       {"\"lobeCount\":4", "\"lobeCount\":5"}, {"\"lobeCount\":4", "\"lobeCount\":0"},
       {"\"lobeCount\":4", "\"lobeCount\":9"}, {"\"lobeCount\":4", "\"lobeCoun?\":4"},
@@ -484,20 +501,21 @@ TEST(BakedFile, LobesOfAMatrixComeBackWithTheirLastReflection) {
     store_receiver(w, r, v);
   }
   const std::vector<float> errors(n, 0.5f);
-  ASSERT_TRUE(save_baked(file.path, s.scene, s.receivers, w.transfer, "{}", {.outgoing = &o, .fit_errors = errors}));
+  ASSERT_TRUE(save_baked(file.path, with_errors(make_baked(s.scene, s.receivers, w.transfer, o), errors)));
   auto back = load_baked(file.path);
   ASSERT_TRUE(back) << back.error().text();
-  ASSERT_TRUE(back->zonal && back->outgoing);
-  EXPECT_EQ(back->zonal->rows, 2);
-  EXPECT_EQ(back->outgoing->maps[0].values, o.maps[0].values);
-  EXPECT_EQ(back->fit_errors, errors);
-  EXPECT_TRUE(
-      std::equal(back->zonal->data.begin(), back->zonal->data.end(), w.transfer.data.begin(), w.transfer.data.end()));
+  ASSERT_TRUE(std::holds_alternative<ZonalTransfer>(back->surface.store) && outgoing_of(back->surface));
+  EXPECT_EQ(std::get<ZonalTransfer>(back->surface.store).rows, 2);
+  EXPECT_EQ(outgoing_of(back->surface)->maps[0].values, o.maps[0].values);
+  EXPECT_EQ(back->surface.fit_errors, errors);
+  EXPECT_TRUE(std::equal(std::get<ZonalTransfer>(back->surface.store).data.begin(),
+                         std::get<ZonalTransfer>(back->surface.store).data.end(), w.transfer.data.begin(),
+                         w.transfer.data.end()));
   // What a matrix of another kind may have, told of the right type and of none.
   Outgoing harmonics;
   harmonics.kind = OutgoingKind::sh, harmonics.order = 1, harmonics.frames = o.frames;
   const TemporaryFile other("glossy_sh.glb");
-  ASSERT_TRUE(save_baked(other.path, s.scene, s.receivers, w.transfer, "{}", {.outgoing = &harmonics}));
+  ASSERT_TRUE(save_baked(other.path, make_baked(s.scene, s.receivers, w.transfer, harmonics)));
   ASSERT_TRUE(load_baked(other.path));
   expect_refused(other.path, "\"transfer\":{", {{"\"hasB\":true", "\"hasB\":7   "}});
   expect_refused(file.path, "\"transfer\":{",
@@ -514,7 +532,7 @@ TEST(BakedFile, ErrorsOfFitsAreFinite) {
   const Small s = small_bake(3, Precision::half);
   const WritableZonalTransfer w = make_zonal_transfer(3, 1, 1, s.receivers.count(), Precision::half);
   const std::vector<float> errors(s.receivers.count(), NAN);
-  ASSERT_TRUE(save_baked(file.path, s.scene, s.receivers, w.transfer, "{}", {.fit_errors = errors}));
+  ASSERT_TRUE(save_baked(file.path, with_errors(make_baked(s.scene, s.receivers, w.transfer, DiffuseRows{}), errors)));
   auto result = load_baked(file.path);
   ASSERT_FALSE(result);
   EXPECT_NE(result.error().text().find("not finite"), std::string::npos);
@@ -528,10 +546,10 @@ TEST(BakedFile, LobesComeBackAndTheirHeadersMayNotLie) {
                          {"desk", "roof"}};
   const WritableTransfer w = make_transfer(light, 1, 1, s.receivers.count(), Precision::half);
   const TemporaryFile file("lobes.glb"), lying("lobes_lying.glb");
-  ASSERT_TRUE(save_baked(file.path, s.scene, s.receivers, w.transfer, "{}"));
+  ASSERT_TRUE(save_baked(file.path, make_baked(s.scene, s.receivers, w.transfer, DiffuseRows{})));
   auto back = load_baked(file.path);
   ASSERT_TRUE(back) << back.error().text();
-  const LightBasis& got = back->transfer.light;
+  const LightBasis& got = std::get<Transfer>(back->surface.store).light;
   EXPECT_EQ(got.order, 2);
   EXPECT_EQ(got.lobe_kind, LobeKind::cosine_power);
   EXPECT_EQ(got.groups, light.groups);
@@ -590,17 +608,17 @@ TEST(BakedFile, VisibilityComesBackAsItWas) {
     const TemporaryFile file("blocks.glb");
     const Small s = small_bake(1, Precision::half);
     const Visibility v = small_visibility(s.receivers.count(), bits);
-    ASSERT_TRUE(save_baked(file.path, s.scene, s.receivers, v, "{}"));
+    ASSERT_TRUE(save_baked(file.path, make_baked(s.scene, s.receivers, v, SightRows{})));
     auto back = load_baked(file.path);
     ASSERT_TRUE(back) << back.error().text();
-    ASSERT_TRUE(back->visibility);
-    EXPECT_EQ(back->visibility->size, 16);
-    EXPECT_EQ(back->visibility->bits, bits);
-    EXPECT_EQ(back->visibility->begin, v.begin);
-    EXPECT_TRUE(std::equal(v.data.begin(), v.data.end(), back->visibility->data.begin(), back->visibility->data.end()));
-    EXPECT_EQ(back->front, s.receivers.front);
-    EXPECT_EQ(back->back, s.receivers.back);
-    EXPECT_EQ(back->transfer.receivers, 0u);
+    ASSERT_TRUE(std::holds_alternative<Visibility>(back->surface.store));
+    const auto& kept = std::get<Visibility>(back->surface.store);
+    EXPECT_EQ(kept.size, 16);
+    EXPECT_EQ(kept.bits, bits);
+    EXPECT_EQ(kept.begin, v.begin);
+    EXPECT_TRUE(std::equal(v.data.begin(), v.data.end(), kept.data.begin(), kept.data.end()));
+    EXPECT_EQ(vertices_of(*back)->front, s.receivers.front);
+    EXPECT_EQ(vertices_of(*back)->back, s.receivers.back);
   }
 }
 
@@ -608,7 +626,8 @@ TEST(BakedFile, VisibilityComesBackAsItWas) {
 TEST(BakedFile, BrokenVisibilityIsRefusedOrHarmless) {
   const TemporaryFile file("blocks_broken.glb");
   const Small s = small_bake(1, Precision::half);
-  ASSERT_TRUE(save_baked(file.path, s.scene, s.receivers, small_visibility(s.receivers.count(), 6), "{}"));
+  ASSERT_TRUE(
+      save_baked(file.path, make_baked(s.scene, s.receivers, small_visibility(s.receivers.count(), 6), SightRows{})));
   const std::vector<uint8_t> whole = *read_file(file.path);
   const std::string text(whole.begin(), whole.end());
   auto refuses = [&](const std::string& from, const std::string& to, const char* why) {
@@ -640,9 +659,10 @@ TEST(BakedFile, BrokenVisibilityIsRefusedOrHarmless) {
       ++refused;
       continue;
     }
-    if (!baked->visibility) continue;
-    std::vector<uint8_t> levels(cube_texels(baked->visibility->size));
-    for (size_t r = 0; r < baked->visibility->receivers; ++r) decode_visibility(*baked->visibility, r, levels);
+    const auto* read = std::get_if<Visibility>(&baked->surface.store);
+    if (!read) continue;
+    std::vector<uint8_t> levels(cube_texels(read->size));
+    for (size_t r = 0; r < read->receivers; ++r) decode_visibility(*read, r, levels);
   }
   EXPECT_GT(refused, 500u);
 }

@@ -1,23 +1,109 @@
 #pragma once
-// What the reader and the writer of LAMBENT_transfer share (docs/file-format.md).
-#include <lambent/basis/directional.h>
+// What the reader and the writer of LAMBENT_transfer share (docs/file-format.md): the JSON of the extension with its
+// bulk data, and a codec for each store, meaning and placement.
+#include <lambent/core/file.h>
+#include <lambent/core/glb.h>
+#include <lambent/transfer/field.h>
 
-#include <array>
 #include <bit>
-#include <string>
-#include <utility>
+#include <cstring>
+#include <deque>
+#include <vector>
 
 namespace lambent {
 
 static_assert(std::endian::native == std::endian::little, "the file and its in-place reader are little-endian");
 
 inline constexpr const char* extension_name = "LAMBENT_transfer";
-inline const std::array<std::pair<LobeKind, std::string>, 2> lobe_names{
-    {{LobeKind::cosine_power, "cosine_power"}, {LobeKind::von_mises_fisher, "von_mises_fisher"}}};
 
-// What parts hold, by the kind of receivers: vertices, a receiver a vertex; patches, a receiver a triangle; texels, a
-// place in the atlas a vertex, two floats.
-enum class SurfaceKind { vertices, texels, patches };
-inline constexpr const char* surface_kind_names[] = {"vertices", "texels", "patches"};
+// One triangle primitive of one node: its run of the placement's vertices (of patches, triangles).
+struct BakedPart {
+  int node = -1, primitive = -1;
+  size_t first = 0, count = 0;
+};
+
+// Bulk data on its way into a file. add() gives what stands for the data's buffer view in JSON until the views have
+// their numbers, which resolve_views() puts in.
+class BlobWriter {
+ public:
+  struct Blob {
+    std::span<const uint8_t> bytes;
+    size_t alignment;
+  };
+  nlohmann::json add(std::span<const uint8_t> bytes, size_t alignment = 4);  // bytes must outlive the write
+  template <class T>
+  nlohmann::json add_copy(const std::vector<T>& values) {
+    kept_.emplace_back(values.size() * sizeof(T));
+    if (!values.empty()) std::memcpy(kept_.back().data(), values.data(), kept_.back().size());
+    return add(kept_.back());
+  }
+  std::vector<Blob> blobs;
+
+ private:
+  std::deque<std::vector<uint8_t>> kept_;
+};
+void resolve_views(nlohmann::json& value, int first_view);
+
+// A stranger's JSON and bulk data. All errors name `where`.
+struct BlobReader {
+  const GltfChunks& chunks;
+  const MappedFile& file;
+};
+
+// A non-negative integer member, at most `limit`.
+Result<size_t> read_count(const nlohmann::json& object, const char* key, size_t limit, const std::string& where);
+// Exactly so many numbers, all within 1e9.
+Result<std::vector<float>> read_numbers(const nlohmann::json& object, const char* key, size_t count,
+                                        const std::string& where);
+// The bytes of a buffer view of the (single) binary chunk.
+Result<std::span<const uint8_t>> view_bytes(const BlobReader& in, size_t index, const std::string& where);
+// Those of the view that member `key` names, as values of type T.
+template <class T>
+Result<std::vector<T>> read_all_values(const BlobReader& in, const nlohmann::json& object, const char* key,
+                                       const std::string& where) {
+  auto index = read_count(object, key, 0x7fffffff, where);
+  if (!index) return index.error();
+  auto bytes = view_bytes(in, *index, where);
+  if (!bytes) return bytes.error();
+  if (bytes->size() % sizeof(T))
+    return Error{where, std::string("\"") + key + "\" holds " + std::to_string(bytes->size()) +
+                            " bytes, which is no whole number of values"};
+  std::vector<T> values(bytes->size() / sizeof(T));
+  if (!values.empty()) std::memcpy(static_cast<void*>(values.data()), bytes->data(), bytes->size());
+  return values;
+}
+// Exactly `count` of them.
+template <class T>
+Result<std::vector<T>> read_values(const BlobReader& in, const nlohmann::json& object, const char* key, size_t count,
+                                   const std::string& where) {
+  auto values = read_all_values<T>(in, object, key, where);
+  if (values && values->size() != count)
+    return Error{where, std::string("\"") + key + "\" holds " + std::to_string(values->size() * sizeof(T)) +
+                            " bytes where " + std::to_string(count * sizeof(T)) + " are due"};
+  return values;
+}
+
+// Store and meaning, the extension's "transfer". The kind is named by both: diffuse, matrix, zonal, factors, blocks.
+nlohmann::json encode_transfer(const Field& field, BlobWriter& out);
+Result<Field> decode_transfer(const BlobReader& in, const nlohmann::json& transfer, const std::string& where);
+
+// A dense store's data and header, whose light, rows and receivers are known from elsewhere.
+nlohmann::json encode_dense(const Transfer& t, BlobWriter& out);
+Result<void> decode_dense(const BlobReader& in, const nlohmann::json& object, Transfer& t, const std::string& where);
+
+nlohmann::json encode_outgoing(const Outgoing& o, BlobWriter& out);
+Result<Outgoing> decode_outgoing(const BlobReader& in, const nlohmann::json& object, int rows, size_t receivers,
+                                 const std::string& where);
+
+// The extension's "parts" (without their node and primitive), "surface" and "view".
+void encode_placement(const Placement& where, std::span<const BakedPart> parts, nlohmann::json& extension,
+                      BlobWriter& out);
+Result<Placement> decode_placement(const BlobReader& in, const nlohmann::json& extension, size_t receivers,
+                                   std::vector<BakedPart>& parts, const std::string& where);
+
+// Light in free space, the extension's "lattice".
+nlohmann::json encode_lattice(const Field& field, BlobWriter& out);
+Result<Field> decode_lattice(const BlobReader& in, const nlohmann::json& object, const LightBasis& light,
+                             const std::string& where);
 
 }  // namespace lambent

@@ -32,9 +32,9 @@ std::span<const uint8_t> bytes_of(const std::vector<T>& v) {
 
 }  // namespace
 
-LookWriter::LookWriter(const Scene& scene, const Receivers& receivers, const ViewerLook* look)
+LookWriter::LookWriter(const Scene& scene, const SpatialBasis& basis, const ViewerLook* look)
     : scene_(scene), look_(look) {
-  const auto* texels = std::get_if<TexelReceivers>(&receivers.basis);
+  const auto* texels = std::get_if<TexelReceivers>(&basis);
   if (!texels) look_ = nullptr;
   if (!look_) return;
   const Vec2 size(float(texels->width), float(texels->height));

@@ -9,7 +9,7 @@ namespace lambent {
 // texels.
 class LookWriter {
  public:
-  LookWriter(const Scene& scene, const Receivers& receivers, const ViewerLook* look);
+  LookWriter(const Scene& scene, const SpatialBasis& basis, const ViewerLook* look);
   void add_blobs(std::vector<GltfBlob>& blobs);
   void write(nlohmann::json& document, const GltfPlaces& places) const;
 

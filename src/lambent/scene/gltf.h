@@ -1,6 +1,7 @@
 #pragma once
 // The glTF 2.0 container: keeping a document, writing GLB.
 #include <lambent/core/file.h>
+#include <lambent/core/glb.h>
 #include <lambent/scene/scene.h>
 
 #include <nlohmann/json.hpp>
@@ -22,14 +23,6 @@ struct GltfDocument {
   std::deque<std::vector<uint8_t>> owned;         // storage behind the spans that is not mapped
   MappedFile mapping;                             // storage behind the rest
 };
-
-// Splits GLB (or plain .gltf) bytes into JSON and the binary chunk. Errors: not glTF, version not 2, truncated, lengths
-// that do not fit, JSON that does not parse or nests deeper than 64.
-struct GltfChunks {
-  nlohmann::json json;
-  std::span<const uint8_t> binary;
-};
-Result<GltfChunks> split_gltf(std::span<const uint8_t> bytes, const std::string& path);
 
 // As load_gltf, but buffers that lie in the mapping are used in place, not copied; the document keeps the mapping.
 Result<Scene> load_gltf(const MappedFile& file, const std::string& path, const std::string& folder);

@@ -1,0 +1,111 @@
+#include <lambent/baked/fields.h>
+
+#include <lambent/basis/sh.h>
+#include <lambent/core/check.h>
+
+namespace lambent {
+
+using nlohmann::json;
+
+namespace {
+
+constexpr size_t most_terms = 65;  // direct light and 64 bounces
+
+bool is_surface(const Placement& where) { return !std::holds_alternative<FixedView>(where); }
+
+// Kinds that stand on vertices alone, and meanings that other placements have.
+Result<void> check_placement(Field& field, const std::string& where) {
+  const bool at_vertices = std::holds_alternative<VertexPlacement>(field.where);
+  if (std::holds_alternative<ZonalTransfer>(field.store) && !at_vertices)
+    return Error{where, "zonal transfer is baked at vertices"};
+  if (std::holds_alternative<Visibility>(field.store) && !at_vertices)
+    return Error{where, "visibility in blocks is baked at vertices"};
+  if (!is_surface(field.where)) {
+    if (!std::holds_alternative<DiffuseRows>(field.rows)) return Error{where, "a fixed view has one row a pixel"};
+    field.rows = PixelRows{};
+  }
+  if (!is_consistent(field)) return Error{where, "receivers and rows do not fit one another"};
+  return {};
+}
+
+Result<std::vector<Transfer>> read_terms(const BlobReader& in, const json& list, const Field& surface,
+                                         const std::string& where) {
+  if (!list.is_array() || list.size() > most_terms) return Error{where, "\"terms\" is not a list, or too long a one"};
+  std::vector<Transfer> terms;
+  for (const json& object : list) {
+    Transfer t{light_of(surface.store), rows_of(surface.store), 1, receivers_of(surface.store)};
+    if (!object.is_object()) return Error{where, "a term is not an object"};
+    if (auto ok = decode_dense(in, object, t, where + ": terms"); !ok) return ok.error();
+    terms.push_back(std::move(t));
+  }
+  return terms;
+}
+
+}  // namespace
+
+bool has_extension(const json& document) {
+  const auto extensions = document.find("extensions");
+  return extensions != document.end() && extensions->is_object() && extensions->contains(extension_name);
+}
+
+Result<BakedFields> read_fields(const MappedFile& file, const std::string& path) {
+  if (file.bytes().empty()) return Error{path, "is empty"};
+  auto chunks = split_gltf(file.bytes(), path);
+  if (!chunks) return chunks.error();
+  return read_fields(file, *chunks, path);
+}
+
+Result<BakedFields> read_fields(const MappedFile& file, const GltfChunks& chunks, const std::string& path) {
+  if (!has_extension(chunks.json))
+    return Error{path, "is not a baked file: it has no LAMBENT_transfer extension (make one with `lambent bake`)"};
+  const json& extension = chunks.json["extensions"][extension_name];
+  const std::string where = path + ": " + extension_name;
+  auto version = read_count(extension, "version", 0x7fffffff, where);
+  if (!version) return version.error();
+  if (*version != size_t(baked_file_version))
+    return Error{path, "was baked with file version " + std::to_string(*version) + "; this program reads version " +
+                           std::to_string(baked_file_version)};
+  const auto t = extension.find("transfer");
+  if (t == extension.end() || !t->is_object()) return Error{where, "\"transfer\" is missing"};
+  const BlobReader in{chunks, file};
+  auto surface = decode_transfer(in, *t, where);
+  if (!surface) return surface.error();
+  BakedFields fields{std::move(*surface), {}, {}, {}, "{}"};
+  auto placement = decode_placement(in, extension, receivers_of(fields.surface.store), fields.parts, where);
+  if (!placement) return placement.error();
+  fields.surface.where = std::move(*placement);
+  if (auto ok = check_placement(fields.surface, where); !ok) return ok.error();
+  if (const auto object = extension.find("lattice");
+      object != extension.end() && !std::holds_alternative<Visibility>(fields.surface.store)) {
+    auto lattice = decode_lattice(in, *object, light_of(fields.surface.store), where + ": lattice");
+    if (!lattice) return lattice.error();
+    fields.more.push_back(std::move(*lattice));
+  }
+  if (const auto list = extension.find("terms"); list != extension.end()) {
+    auto terms = read_terms(in, *list, fields.surface, where);
+    if (!terms) return terms.error();
+    fields.terms = std::move(*terms);
+  }
+  if (const auto provenance = extension.find("provenance"); provenance != extension.end())
+    fields.provenance = provenance->dump(-1, ' ', false, json::error_handler_t::replace);
+  return fields;
+}
+
+json encode_fields(const BakedFields& fields, BlobWriter& out) {
+  LAMBENT_CHECK(is_consistent(fields.surface));
+  json extension{{"version", baked_file_version}, {"transfer", encode_transfer(fields.surface, out)}};
+  encode_placement(fields.surface.where, fields.parts, extension, out);
+  for (const Field& field : fields.more) {
+    LAMBENT_CHECK(is_consistent(field) && light_of(field.store).count() == light_of(fields.surface.store).count());
+    extension["lattice"] = encode_lattice(field, out);
+  }
+  for (const Transfer& term : fields.terms) {
+    LAMBENT_CHECK(term.receivers == receivers_of(fields.surface.store) && term.rows == rows_of(fields.surface.store));
+    extension["terms"].push_back(encode_dense(term, out));
+  }
+  extension["provenance"] = json::parse(fields.provenance, nullptr, false);
+  LAMBENT_CHECK(!extension["provenance"].is_discarded());
+  return extension;
+}
+
+}  // namespace lambent

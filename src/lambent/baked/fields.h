@@ -1,0 +1,31 @@
+#pragma once
+// What a baked file holds beside its scene, read without it: the surface's field, others beside it, and whose vertices
+// they are. This is all that an engine needs to relight; the format is in docs/file-format.md.
+#include <lambent/baked/extension.h>
+
+namespace lambent {
+
+inline constexpr int baked_file_version = 1;
+
+struct BakedFields {
+  Field surface;
+  std::vector<BakedPart> parts;  // runs of the placement's vertices (of patches, triangles); none of a fixed view
+  std::vector<Field> more;       // for the same light: light in free space, where it was baked
+  // Terms of the surface's Neumann series, one by one, where they were kept: light that has met k surfaces between lamp
+  // and receiver, k = 0, 1, ...; placed and meant as the surface's. Their sum is the surface's store.
+  std::vector<Transfer> terms;
+  std::string provenance = "{}";  // JSON text: the request, inputs and their hashes, version, what the bake reported
+};
+
+// Data are read in place and keep the mapping alive. Errors: not a baked file, another version, anything that does not
+// fit; all in one line that names the file.
+Result<BakedFields> read_fields(const MappedFile& file, const std::string& path);
+Result<BakedFields> read_fields(const MappedFile& file, const GltfChunks& chunks, const std::string& path);
+
+// The extension's JSON, with references to `out`'s blobs for bulk data; parts are to get their nodes and primitives.
+nlohmann::json encode_fields(const BakedFields& fields, BlobWriter& out);
+
+// Whether JSON is of a glTF with our extension.
+bool has_extension(const nlohmann::json& document);
+
+}  // namespace lambent

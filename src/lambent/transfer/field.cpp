@@ -1,0 +1,96 @@
+#include <lambent/transfer/field.h>
+
+#include <algorithm>
+
+namespace lambent {
+namespace {
+
+template <class... F>
+struct Overloaded : F... {
+  using F::operator()...;
+};
+
+size_t most_receivers(const std::vector<uint32_t>& a, const std::vector<uint32_t>& b) {
+  size_t most = 0;
+  for (const auto* list : {&a, &b})
+    for (uint32_t r : *list)
+      if (r != no_receiver) most = std::max(most, size_t(r) + 1);
+  return most;
+}
+
+}  // namespace
+
+LightBasis light_of(const Store& store) {
+  return std::visit(Overloaded{[](const Transfer& t) { return t.light; }, [](const CpcaTransfer& t) { return t.light; },
+                               [](const ZonalTransfer& t) { return LightBasis{.order = t.order}; },
+                               [](const FactoredTransfer& t) { return LightBasis{.order = t.light_order()}; },
+                               [](const Visibility&) { return LightBasis{}; }},
+                    store);
+}
+
+size_t receivers_of(const Store& store) {
+  return std::visit(Overloaded{[](const FactoredTransfer& t) { return t.visibility.receivers; },
+                               [](const auto& t) { return t.receivers; }},
+                    store);
+}
+
+size_t bytes_of(const Store& store) {
+  return std::visit(Overloaded{[](const FactoredTransfer& t) { return t.visibility.bytes(); },
+                               [](const auto& t) { return t.bytes(); }},
+                    store);
+}
+
+int rows_of(const Store& store) {
+  return std::visit(Overloaded{[](const FactoredTransfer&) { return 1; }, [](const Visibility&) { return 0; },
+                               [](const auto& t) { return t.rows; }},
+                    store);
+}
+
+int channels_of(const Store& store) {
+  return std::visit(Overloaded{[](const FactoredTransfer&) { return 1; }, [](const Visibility&) { return 0; },
+                               [](const auto& t) { return t.channels; }},
+                    store);
+}
+
+const char* name_of(const Store& store) {
+  static constexpr const char* names[] = {"dense", "clusters", "lobes", "factors", "blocks"};
+  return names[store.index()];
+}
+
+DirectionalKind directional_of(const Field& field) {
+  const auto* rows = std::get_if<DirectionalRows>(&field.rows);
+  return rows ? rows->kind : DirectionalKind::none;
+}
+
+Field lattice_field(LatticeTransfer l) {
+  return {LatticePlacement{l.lattice, std::move(l.valid)}, std::move(l.transfer), IncidentRows{l.order}};
+}
+
+bool is_consistent(const Field& field) {
+  const size_t n = receivers_of(field.store);
+  const bool placed = std::visit(
+      Overloaded{[&](const VertexPlacement& p) { return most_receivers(p.front, p.back) <= n; },
+                 [&](const TexelPlacement& p) {
+                   return p.texels.size() == size_t(p.width) * size_t(p.height) && most_receivers(p.texels, {}) <= n;
+                 },
+                 [&](const PatchPlacement& p) { return most_receivers(p.front, p.back) <= n; },
+                 [&](const LatticePlacement& p) { return p.lattice.count() == n && p.valid.size() == n; },
+                 [&](const FixedView& p) { return size_t(p.width) * size_t(p.height) == n && p.coverage.size() == n; }},
+      field.where);
+  const int rows = rows_of(field.store);
+  const auto* factored = std::get_if<FactoredTransfer>(&field.store);
+  const bool meant = std::visit(
+      Overloaded{[&](const DiffuseRows&) { return rows == 1 && !factored; },
+                 [&](const DirectionalRows& r) { return rows == directional_rows(r.kind) && !factored; },
+                 [&](const Outgoing& o) {
+                   return factored ? o.kind == OutgoingKind::map && o.order == factored->incident_order &&
+                                         factored->light_order() >= 1
+                                   : rows == o.rows();
+                 },
+                 [&](const IncidentRows& r) { return rows == r.order * r.order && !factored; },
+                 [&](const PixelRows&) { return rows == 1 && !factored; }, [&](const SightRows&) { return rows == 0; }},
+      field.rows);
+  return placed && meant && (field.fit_errors.empty() || field.fit_errors.size() == n);
+}
+
+}  // namespace lambent
