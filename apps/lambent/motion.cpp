@@ -1,37 +1,6 @@
 #include "motion.h"
 
-#include <charconv>
-
 namespace lambent::tool {
-namespace {
-
-constexpr size_t max_frames = 64;
-
-// A:B[:STEP], in seconds.
-Result<std::vector<double>> parse_frames(const std::string& text) {
-  const Error wrong{"--frames", "expects FROM:TO[:STEP] in seconds, at most " + std::to_string(max_frames) +
-                                    " of them, not \"" + text + "\""};
-  double n[3] = {0, 0, 0};
-  size_t count = 0;
-  const char* p = text.data();
-  const char* end = p + text.size();
-  for (; count < 3; ++p) {
-    const auto [next, status] = std::from_chars(p, end, n[count]);
-    if (status != std::errc() || !std::isfinite(n[count])) return wrong;
-    ++count, p = next;
-    if (p == end || *p != ':') break;
-  }
-  if (p != end || count < 2 || n[1] < n[0]) return wrong;
-  if (count == 2) n[2] = (n[1] - n[0]) / 5;
-  if (n[1] == n[0]) return std::vector<double>{n[0]};
-  if (!(n[2] > 0) || (n[1] - n[0]) / n[2] >= double(max_frames)) return wrong;
-  std::vector<double> times;
-  for (size_t i = 0; n[0] + double(i) * n[2] <= n[1] + 1e-9 * n[2]; ++i) times.push_back(n[0] + double(i) * n[2]);
-  return times;
-}
-
-}  // namespace
-
 void MotionOptions::add_to(CLI::App& c, bool with_frames) {
   auto* named = c.add_option("--animation", animation, "Pose the scene by this glTF animation, by name or number");
   auto* at = c.add_option("--time", time, "At this time, seconds")->needs(named);
