@@ -19,21 +19,24 @@ double seconds_since(Clock::time_point start) { return std::chrono::duration<dou
 struct MatrixBaker : MatrixGather {
   Progress* progress;
   BakeReport& report;
-  std::vector<ViewMap> responses{};
 
-  void make_responses() {
-    ProgressStage stage(progress, "materials", materials.materials.size());
-    responses.resize(materials.materials.size()), scatter.resize(responses.size());
-    parallel_for(responses.size(), 1, [&](size_t begin, size_t end) {
-      for (size_t m = begin; m < end; ++m) {
-        responses[m] = make_response(materials.materials[m], basis, matrix.grid, matrix.response_samples);
-        scatter[m] = factor_response(responses[m], matrix.scatter_rows, matrix.scatter_error);
+  // How materials answer light, and the rows with which they scatter. Errors: cancelled.
+  Result<LastReflection> prepare() {
+    auto responses = make_responses(materials.materials, basis, matrix.grid, matrix.response_samples, progress);
+    if (!responses) return responses.error();
+    ProgressStage stage(progress, "scattering", responses->size());
+    scatter.resize(responses->size());
+    if (options.bounces > 0 && !matrix.simulate_paths)
+      parallel_for(responses->size(), 1, [&](size_t m, size_t) {
+        if (stage.cancelled()) return;
+        scatter[m] = factor_response((*responses)[m], matrix.scatter_rows, matrix.scatter_error);
         stage.advance();
-      }
-    });
+      });
+    if (stage.cancelled()) return Error{"", "cancelled"};
     first_row.assign(1, 0);
     for (size_t r = 0; r < n(); ++r)
       first_row.push_back(first_row.back() + size_t(scatter[materials.of_receiver[r]].rows));
+    return make_last_reflection(*responses, materials, matrix, basis, setup.channels, progress);
   }
 
   MatrixBake finish(const std::vector<uint8_t>& buried, double error, WritableTransfer&& out,
@@ -110,9 +113,9 @@ struct MatrixBaker : MatrixGather {
   }
 
   Result<MatrixBake> run() {
-    make_responses();
-    const LastReflection last = make_last_reflection(responses, materials, matrix, basis, setup.channels);
-    return options.bounces == 0 || matrix.simulate_paths ? run_apart(last) : run_bounced(last);
+    const auto last = prepare();
+    if (!last) return last.error();
+    return options.bounces == 0 || matrix.simulate_paths ? run_apart(*last) : run_bounced(*last);
   }
 };
 
