@@ -31,6 +31,11 @@ export const diffuseKind: TransferKind = {
   load: async (source) => {
     if (source.extension.surface?.kind === 'texels') return loadLightmap(source);
     const header = readHeader(source.extension);
-    return VertexTransfer.load(source, header, { kind: 'diffuse', count: shCount(header.order), valueChannels: header.channels, shader });
+    return VertexTransfer.load(source, header, {
+      kind: 'diffuse',
+      count: shCount(header.order),
+      valueChannels: header.channels,
+      shader,
+    });
   },
 };
