@@ -188,9 +188,8 @@ export function writeScene(folder: string): string {
     for (let i = 0; i < turns; ++i) {
       const t = (Math.PI * j) / rows,
         p = (2 * Math.PI * (i + 0.2 * jitter())) / turns;
-      lines.push(
-        `v ${centre[0]! + radius * Math.sin(t) * Math.cos(p)} ${centre[1]! + radius * Math.cos(t)} ${centre[2]! + radius * Math.sin(t) * Math.sin(p)}`,
-      );
+      const ray = [Math.sin(t) * Math.cos(p), Math.cos(t), Math.sin(t) * Math.sin(p)];
+      lines.push('v ' + ray.map((v, k) => centre[k]! + radius * v).join(' '));
     }
   const ball = (i: number, j: number): number => vertices + j * turns + (i % turns) + 1;
   for (let j = 0; j < rows; ++j)

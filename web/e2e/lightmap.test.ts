@@ -77,7 +77,7 @@ describe.skipIf(!haveTool || !haveBrowser)('a lightmap', () => {
   });
 
   for (const kind of ['sh:2', 'sh:3', 'hl2', 'vector'])
-    it(`is lit as render lights it where a normal texture bends its normals, and glows by a texture: ${kind}`, async () => {
+    it(`is lit as render lights it where a normal texture bends normals, and glows by a texture: ${kind}`, async () => {
       const view = '1.6,1.5,2.2,-0.1,0.4,-0.2,40',
         name = kind.replace(':', '');
       writeBumpy(at('bumpy.gltf'));
@@ -111,7 +111,7 @@ describe.skipIf(!haveTool || !haveBrowser)('a lightmap', () => {
       expect(db).toBeGreaterThan(40);
     });
 
-  it('is refused in words where the graphics card cannot draw into half floats, or takes no atlas so large', async () => {
+  it('is refused in words where the card cannot draw into half floats, or takes no atlas so large', async () => {
     const server = await serve(at('lit.glb'), '--env', at('light.hdr'));
     expect(
       await complaint(browser, server.address, ['EXT_color_buffer_float', 'EXT_color_buffer_half_float'], {}),

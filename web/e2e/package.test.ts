@@ -37,7 +37,8 @@ describe.skipIf(!haveTool || !haveBrowser)('the package', () => {
     for (const [baked, lambert] of values)
       baked!.forEach((v, c) => (worst = Math.max(worst, Math.abs(v - lambert![c]!) / means[1]!)));
     console.log(
-      `mean radiance: baked ${means[0]!.toFixed(5)}, Lambert ${means[1]!.toFixed(5)}, Standard ${means[2]!.toFixed(5)}; largest difference ${(100 * worst).toFixed(2)} % of the mean`,
+      `mean radiance: baked ${means[0]!.toFixed(5)}, Lambert ${means[1]!.toFixed(5)}, ` +
+        `Standard ${means[2]!.toFixed(5)}; largest difference ${(100 * worst).toFixed(2)} % of the mean`,
     );
     expect(means[0]).toBeGreaterThan(0.01);
     expect(Math.abs(means[0]! / means[1]! - 1)).toBeLessThan(0.005);

@@ -101,7 +101,8 @@ describe.skipIf(!haveTool || !haveBrowser)('zonal lobes', () => {
     const off = shown.map(([receiver, value]) => Math.abs(value / gain - errors[receiver]!)).sort((a, b) => a - b),
       mean = errors.reduce((a, b) => a + b) / errors.length;
     console.log(
-      `errors of a fit: mean ${(100 * mean).toFixed(2)} %, shown within ${((100 * off[off.length >> 1]!) / mean).toFixed(1)} % of that at half of ${off.length} vertices`,
+      `errors of a fit: mean ${(100 * mean).toFixed(2)} %, ` +
+        `shown within ${((100 * off[off.length >> 1]!) / mean).toFixed(1)} % of that at half of ${off.length} vertices`,
     );
     expect(off.length).toBeGreaterThan(1000);
     expect(mean).toBeGreaterThan(0.01);
@@ -127,7 +128,8 @@ describe.skipIf(!haveTool || !haveBrowser)('zonal lobes', () => {
     const turned = psnr(at('page_bent.png'), at('render_bent.png')),
       stiff = psnr(at('page_stiff.png'), at('render_bent.png'));
     console.log(
-      `skin: at rest ${rest.toFixed(1)} dB; bent ${turned.toFixed(1)} dB, transfer as baked ${stiff.toFixed(1)} dB (${folder})`,
+      `skin: at rest ${rest.toFixed(1)} dB; bent ${turned.toFixed(1)} dB, ` +
+        `transfer as baked ${stiff.toFixed(1)} dB (${folder})`,
     );
     expect(turned).toBeGreaterThan(rest - 1);
     expect(turned).toBeGreaterThan(38);
@@ -191,7 +193,8 @@ describe.skipIf(!haveTool || !haveBrowser)('zonal lobes', () => {
     ) as [number, number, number];
     const moved = psnr(at('page_gloss_rest.png'), at('render_gloss_bent.png'));
     console.log(
-      `glossy lobes: ${scene.toFixed(1)} dB; skin at rest ${rest.toFixed(1)} dB, bent ${turned.toFixed(1)} dB (${folder})`,
+      `glossy lobes: ${scene.toFixed(1)} dB; ` +
+        `skin at rest ${rest.toFixed(1)} dB, bent ${turned.toFixed(1)} dB (${folder})`,
     );
     expect(scene).toBeGreaterThan(40);
     expect(turned).toBeGreaterThan(rest - 1);

@@ -58,7 +58,8 @@ export function describeLobes(lobes: readonly Lobe[]): string {
       ({ axis, energy }) =>
         `${total > 0 ? Math.round((100 * energy) / total) : 0} % about (${axis.toArray().map(number).join(', ')})`,
     );
-  return `${lobes.length === 1 ? '1 lobe' : `${lobes.length} lobes`} of energy ${Number(total.toPrecision(3))}: ${parts.join('; ')}`;
+  const count = lobes.length === 1 ? '1 lobe' : `${lobes.length} lobes`;
+  return `${count} of energy ${Number(total.toPrecision(3))}: ${parts.join('; ')}`;
 }
 
 /** The greatest absolute value of a lobe. */

@@ -41,7 +41,8 @@ export class SkyMaterial extends ShaderMaterial {
         /* glsl */ `
   vec4 far = unproject * vec4( place, 1.0, 1.0 ), near = unproject * vec4( place, - 1.0, 1.0 );
   vec3 d = turnBack * normalize( far.xyz / far.w - near.xyz / near.w );
-  gl_FragColor = vec4( texture2D( map, vec2( atan( d.z, d.x ) / PI2 + 0.5, atan( length( d.xz ), d.y ) / PI ) ).rgb, 1.0 );`,
+  vec2 place = vec2( atan( d.z, d.x ) / PI2 + 0.5, atan( length( d.xz ), d.y ) / PI );
+  gl_FragColor = vec4( texture2D( map, place ).rgb, 1.0 );`,
       ),
     );
     Object.assign(this.uniforms, { map: this.map, unproject: this.unproject, turnBack: this.turnBack });

@@ -18,7 +18,8 @@ vec3 prtRadiance( const in uint receiver ) {
     #else
       vec4 green = red, blue = red;
     #endif
-    sum += vec3( dot( red, prtLight[ k ] ), dot( green, prtLight[ PRT_QUADS + k ] ), dot( blue, prtLight[ 2 * PRT_QUADS + k ] ) );
+    sum += vec3( dot( red, prtLight[ k ] ), dot( green, prtLight[ PRT_QUADS + k ] ),
+                 dot( blue, prtLight[ 2 * PRT_QUADS + k ] ) );
   }
   return sum;
 }

@@ -39,7 +39,8 @@ export function transferExtension(document: unknown): TransferExtension {
     throw new LambentError('holds no "transfer" with a kind');
   if (!transferKind(transfer['kind']))
     throw new LambentError(
-      `holds transfer of kind "${transfer['kind']}", which this version does not know (it knows ${knownKinds().join(', ')})`,
+      `holds transfer of kind "${transfer['kind']}", which this version does not know ` +
+        `(it knows ${knownKinds().join(', ')})`,
     );
   if (!Array.isArray(parts) || !parts.every((p) => isObject(p) && isIndex(p['node']) && isIndex(p['primitive'])))
     throw new LambentError('holds no list of "parts"');
@@ -57,7 +58,8 @@ export function checkBakedFile(bytes: ArrayBuffer): unknown {
   const length = bytes.byteLength >= 12 ? view.getUint32(8, true) : Infinity;
   if (bytes.byteLength < 20 || length > bytes.byteLength)
     throw new LambentError(
-      `is cut off: ${bytes.byteLength.toLocaleString('en')} bytes of ${Number.isFinite(length) ? length.toLocaleString('en') : 'more'} are there`,
+      `is cut off: ${bytes.byteLength.toLocaleString('en')} bytes of ` +
+        `${Number.isFinite(length) ? length.toLocaleString('en') : 'more'} are there`,
     );
   if (view.getUint32(4, true) !== 2) throw new LambentError(`is a GLB of version ${view.getUint32(4, true)}, not 2`);
   const jsonLength = view.getUint32(12, true);

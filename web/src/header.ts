@@ -39,7 +39,8 @@ export function readHeader(
     );
   if (isMore(groups) && surfaceKind === 'vertices')
     throw new LambentError(
-      'holds the light of the scene\'s own lamps at vertices, where this version draws it over an atlas; "lambent render" draws it',
+      "holds the light of the scene's own lamps at vertices, where this version draws it over an atlas; " +
+        '"lambent render" draws it',
     );
   if (view !== undefined)
     throw new LambentError('holds a fixed view (--fix-view), a picture and no surfaces; "lambent render" draws it');
@@ -47,11 +48,13 @@ export function readHeader(
     throw new LambentError('holds clusters (--compress cpca), which this version does not draw; "lambent render" does');
   if (directional !== undefined && (surfaceKind === 'vertices' || !isDirectional(directional)))
     throw new LambentError(
-      `holds directional light ("${text(directional)}"), which this version does not draw ${isDirectional(directional) ? 'but over an atlas' : 'at all'}; "lambent render" does`,
+      `holds directional light ("${text(directional)}"), which this version does not draw ` +
+        `${isDirectional(directional) ? 'but over an atlas' : 'at all'}; "lambent render" does`,
     );
   if (where !== surfaceKind)
     throw new LambentError(
-      `holds transfer over ${where}, where this version draws vertices and, for diffuse transfer, texels; "lambent render" draws it`,
+      `holds transfer over ${where}, where this version draws vertices and, for diffuse transfer, texels; ` +
+        '"lambent render" draws it',
     );
   if (precision !== 'half' && precision !== 'single') throw new LambentError('"precision" must be half or single');
   if (!isIndex(order, maxShOrder) || (order < 1 && !isMore(groups))) throw new LambentError('"order" is out of range');

@@ -37,7 +37,8 @@ void main() {
   radiance = vec4( 0.0, 0.0, 0.0, 1.0 );
   if ( receiver == 0xffffffffu ) return;
   int r = int( receiver );
-  ivec3 at = ivec3( ( r & ( PRT_COLUMNS - 1 ) ) * PRT_TEXELS, ( r / PRT_COLUMNS ) & ( PRT_ROWS - 1 ), r / ( PRT_COLUMNS * PRT_ROWS ) );
+  ivec3 at = ivec3( ( r & ( PRT_COLUMNS - 1 ) ) * PRT_TEXELS, ( r / PRT_COLUMNS ) & ( PRT_ROWS - 1 ),
+                    r / ( PRT_COLUMNS * PRT_ROWS ) );
   at.x += row * PRT_CHANNELS * PRT_QUADS;
   for ( int k = 0; k < PRT_QUADS; ++ k ) {
     vec4 red = texelFetch( prtTransfer, at + ivec3( k, 0, 0 ), 0 ), green = red, blue = red;
@@ -45,7 +46,8 @@ void main() {
       green = texelFetch( prtTransfer, at + ivec3( PRT_QUADS + k, 0, 0 ), 0 );
       blue = texelFetch( prtTransfer, at + ivec3( 2 * PRT_QUADS + k, 0, 0 ), 0 );
     #endif
-    radiance.rgb += vec3( dot( red, prtLight[ k ] ), dot( green, prtLight[ PRT_QUADS + k ] ), dot( blue, prtLight[ 2 * PRT_QUADS + k ] ) );
+    radiance.rgb += vec3( dot( red, prtLight[ k ] ), dot( green, prtLight[ PRT_QUADS + k ] ),
+                          dot( blue, prtLight[ 2 * PRT_QUADS + k ] ) );
   }
 }`;
 
@@ -109,7 +111,8 @@ export class DrawnPicture {
     const { width, height } = this.target;
     if (Math.max(width, height) > renderer.capabilities.maxTextureSize)
       throw new LambentError(
-        `${this.what.size} of ${width} x ${height} texels, where this graphics card takes ${renderer.capabilities.maxTextureSize}`,
+        `${this.what.size} of ${width} x ${height} texels, ` +
+          `where this graphics card takes ${renderer.capabilities.maxTextureSize}`,
       );
     if (!renderer.extensions.has('EXT_color_buffer_float') && !renderer.extensions.has('EXT_color_buffer_half_float'))
       throw new LambentError(

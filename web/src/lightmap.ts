@@ -99,16 +99,22 @@ const evaluations: Record<Directional, string> = {
   hl2: `
   // Half-Life 2's directions in the frame about the surface's normal (frame_about of core/vec.h).
   float side = N.z < 0.0 ? - 1.0 : 1.0, a = - 1.0 / ( side + N.z ), b = N.x * N.y * a;
-  mat3 frame = mat3( vec3( 1.0 + side * N.x * N.x * a, side * b, - side * N.x ), vec3( b, side + N.y * N.y * a, - N.y ), N );
-  vec3 cosines = max( n * ( frame * mat3( - 0.40824829, - 0.70710678, 0.57735027, - 0.40824829, 0.70710678, 0.57735027, 0.81649658, 0.0, 0.57735027 ) ), vec3( 0.0 ) );
+  mat3 frame = mat3( vec3( 1.0 + side * N.x * N.x * a, side * b, - side * N.x ),
+                     vec3( b, side + N.y * N.y * a, - N.y ), N );
+  mat3 axes = mat3( - 0.40824829, - 0.70710678, 0.57735027, - 0.40824829, 0.70710678, 0.57735027,
+                    0.81649658, 0.0, 0.57735027 );
+  vec3 cosines = max( n * ( frame * axes ), vec3( 0.0 ) );
   vec3 w = cosines * cosines;
   float total = w.x + w.y + w.z;
-  return total > 0.0 ? ( w.x * prtRowAt( place, 0 ) + w.y * prtRowAt( place, 1 ) + w.z * prtRowAt( place, 2 ) ) / total : vec3( 0.0 );`,
+  if ( ! ( total > 0.0 ) ) return vec3( 0.0 );
+  return ( w.x * prtRowAt( place, 0 ) + w.y * prtRowAt( place, 1 ) + w.z * prtRowAt( place, 2 ) ) / total;`,
 };
 const evaluation = (kind: Directional): string =>
   kind !== 'sh:2' && kind !== 'sh:3'
     ? evaluations[kind]
-    : `vec3 sum = vec3( 0.0 );\n  ${glslHarmonics(Number(kind[3]), (i, y) => `sum += ( ${y} ) * prtRowAt( place, ${i} );`)}\n  return max( sum, vec3( 0.0 ) );`;
+    : `vec3 sum = vec3( 0.0 );
+  ${glslHarmonics(Number(kind[3]), (i, y) => `sum += ( ${y} ) * prtRowAt( place, ${i} );`)}
+  return max( sum, vec3( 0.0 ) );`;
 
 const fragmentDeclarations = (kind: Directional): string => /* glsl */ `
 uniform highp sampler2D prtAtlas;
@@ -175,7 +181,8 @@ vec3 prtExitRadiance() {
         t = prtSquareTo( along.xyz, n );
       }
       if ( t != vec3( 0.0 ) ) {
-        vec3 texel = ( 2.0 * texture( prtNormalMap, vPrtNormalPlace ).xyz - 1.0 ) * vec3( prtNormalScale, prtNormalScale, 1.0 );
+        vec3 texel = 2.0 * texture( prtNormalMap, vPrtNormalPlace ).xyz - 1.0;
+        texel.xy *= prtNormalScale;
         bent = normalize( t * texel.x + cross( n, t ) * ( along.w > 0.0 ? texel.y : - texel.y ) + n * texel.z );
       }
     #endif

@@ -176,7 +176,8 @@ uint prtPick( const in ivec2 texel, out int row ) {
     );
     if (maxVertexTextures < wanted)
       throw new LambentError(
-        `is relit in vertex shaders, which must read textures, ${wanted} at once; this graphics card reads ${maxVertexTextures} there`,
+        `is relit in vertex shaders, which must read textures, ${wanted} at once; ` +
+          `this graphics card reads ${maxVertexTextures} there`,
       );
   }
 

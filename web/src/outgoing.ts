@@ -69,7 +69,8 @@ function weighRows({ kind, order, hasB }: Outgoing): string {
   vec2 size = vec2( textureSize( prtMaps, 0 ) );
   for ( int row = 0; row < PRT_SUM_ROWS; ++ row ) {
     int tile = view_map * PRT_SUM_ROWS + row;
-    vec4 w = textureLod( prtMaps, ( vec2( float( tile % PRT_ACROSS ), float( tile / PRT_ACROSS ) ) * float( PRT_GRID ) + place ) / size, 0.0 );
+    vec2 corner = vec2( float( tile % PRT_ACROSS ), float( tile / PRT_ACROSS ) ) * float( PRT_GRID );
+    vec4 w = textureLod( prtMaps, ( corner + place ) / size, 0.0 );
     vec3 x = prtRow( r, row );
     gloss += w.rgb * x, coloured += w.a * x;
   }`;
@@ -82,7 +83,10 @@ function weighRows({ kind, order, hasB }: Outgoing): string {
   const scale = kind === 'hsh' ? `${Math.SQRT2} * ` : '';
   return `
   vec3 n = ${kind === 'hsh' ? 'vec3( 2.0 * sqrt( wo.z / ( 1.0 + wo.z ) ) * wo.xy, 2.0 * wo.z - 1.0 )' : 'wo'};
-  ${glslHarmonics(order, (i, y) => `gloss += ( ${scale}${y} ) * prtRow( r, ${i} );${hasB ? ` coloured += ( ${scale}${y} ) * prtRow( r, ${n + i} );` : ''}`)}`;
+  ${glslHarmonics(order, (i, y) => {
+    const gloss = `gloss += ( ${scale}${y} ) * prtRow( r, ${i} );`;
+    return hasB ? `${gloss} coloured += ( ${scale}${y} ) * prtRow( r, ${n + i} );` : gloss;
+  })}`;
 }
 
 /**

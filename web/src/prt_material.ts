@@ -93,7 +93,8 @@ uniform vec4 prtLight[ 3 * PRT_LIGHT_QUADS ];
 // Values 4k .. 4k + 3 of a receiver.
 vec4 prtValues( const in uint receiver, const in int k ) {
   int r = int( receiver );
-  ivec3 at = ivec3( ( r & ( PRT_COLUMNS - 1 ) ) * PRT_TEXELS, ( r / PRT_COLUMNS ) & ( PRT_ROWS - 1 ), r / ( PRT_COLUMNS * PRT_ROWS ) );
+  ivec3 at = ivec3( ( r & ( PRT_COLUMNS - 1 ) ) * PRT_TEXELS, ( r / PRT_COLUMNS ) & ( PRT_ROWS - 1 ),
+                    r / ( PRT_COLUMNS * PRT_ROWS ) );
   return texelFetch( prtTransfer, at + ivec3( k, 0, 0 ), 0 );
 }
 
@@ -104,7 +105,8 @@ vec4 prtValues( const in uint receiver, const in int k ) {
     uniform highp sampler2D prtRestBones;
     mat3 prtRestBone( const in float i ) {
       int size = textureSize( prtRestBones, 0 ).x, j = int( i ) * 4, x = j % size, y = j / size;
-      return mat3( texelFetch( prtRestBones, ivec2( x, y ), 0 ).xyz, texelFetch( prtRestBones, ivec2( x + 1, y ), 0 ).xyz,
+      return mat3( texelFetch( prtRestBones, ivec2( x, y ), 0 ).xyz,
+                   texelFetch( prtRestBones, ivec2( x + 1, y ), 0 ).xyz,
                    texelFetch( prtRestBones, ivec2( x + 2, y ), 0 ).xyz );
     }
   #else
@@ -126,7 +128,8 @@ vec4 prtValues( const in uint receiver, const in int k ) {
 const turnBody = /* glsl */ `
   #ifdef PRT_TURNS
     #ifdef USE_SKINNING
-      mat3 prtNow = skinWeight.x * mat3( boneMatX ) + skinWeight.y * mat3( boneMatY ) + skinWeight.z * mat3( boneMatZ ) + skinWeight.w * mat3( boneMatW );
+      mat3 prtNow = skinWeight.x * mat3( boneMatX ) + skinWeight.y * mat3( boneMatY ) +
+                    skinWeight.z * mat3( boneMatZ ) + skinWeight.w * mat3( boneMatW );
       mat3 prtThen = skinWeight.x * prtRestBone( skinIndex.x ) + skinWeight.y * prtRestBone( skinIndex.y )
                    + skinWeight.z * prtRestBone( skinIndex.z ) + skinWeight.w * prtRestBone( skinIndex.w );
       prtFrame = prtOrthogonal( prtNow * inverse( prtThen ) );

@@ -85,14 +85,19 @@ precision highp float;
 uniform vec4 prtLight[ 3 * PRT_LIGHT_QUADS ];
 out vec4 band;
 vec3 prtLightAt( const in int k ) {
-  return vec3( prtLight[ k >> 2 ][ k & 3 ], prtLight[ PRT_LIGHT_QUADS + ( k >> 2 ) ][ k & 3 ], prtLight[ 2 * PRT_LIGHT_QUADS + ( k >> 2 ) ][ k & 3 ] );
+  int quad = k >> 2, at = k & 3;
+  return vec3( prtLight[ quad ][ at ], prtLight[ PRT_LIGHT_QUADS + quad ][ at ],
+               prtLight[ 2 * PRT_LIGHT_QUADS + quad ][ at ] );
 }
 void main() {
   ivec2 at = ivec2( gl_FragCoord.xy );
   int l = ${exact} + at.y / ${tableHeight};
-  float phi = 6.28318531 * float( at.x ) / ${tableWidth}.0, theta = 3.14159265 * float( at.y % ${tableHeight} ) / ${tableHeight - 1}.0;
+  float phi = 6.28318531 * float( at.x ) / ${tableWidth}.0;
+  float theta = 3.14159265 * float( at.y % ${tableHeight} ) / ${tableHeight - 1}.0;
   vec3 n = vec3( sin( theta ) * cos( phi ), sin( theta ) * sin( phi ), cos( theta ) ), sum = vec3( 0.0 );
-  ${glslHarmonics(order, (index, y) => (shBand(index) < exact ? '' : `if ( l == ${shBand(index)} ) sum += ( ${y} ) * prtLightAt( ${index} );`))}
+  ${glslHarmonics(order, (index, y) =>
+    shBand(index) < exact ? '' : `if ( l == ${shBand(index)} ) sum += ( ${y} ) * prtLightAt( ${index} );`,
+  )}
   band = vec4( sum, 1.0 );
 }`;
 
@@ -111,14 +116,17 @@ varying vec3 vPrtPosition, vPrtNormal;
 varying vec2 vPrtPlace;
 mat3 prtFrame = mat3( 1.0 );
 vec3 prtBand( const in vec3 n, const in int l ) {
-  vec2 at = vec2( atan( n.y, n.x ) * ${0.5 / Math.PI}, acos( clamp( n.z, - 1.0, 1.0 ) ) * ${(tableHeight - 1) / Math.PI} );
-  return textureLod( prtTable, vec2( at.x + ${0.5 / tableWidth}, ( at.y + float( ${tableHeight} * l ) + 0.5 ) / ${tableHeight * Math.max(1, bands)}.0 ), 0.0 ).rgb;
+  vec2 at = vec2( atan( n.y, n.x ) * ${0.5 / Math.PI},
+                  acos( clamp( n.z, - 1.0, 1.0 ) ) * ${(tableHeight - 1) / Math.PI} );
+  float y = ( at.y + float( ${tableHeight} * l ) + 0.5 ) / ${tableHeight * Math.max(1, bands)}.0;
+  return textureLod( prtTable, vec2( at.x + ${0.5 / tableWidth}, y ), 0.0 ).rgb;
 }
 ${zonalSum(order, lobes, channels, true)}
 vec4 prtTexel( const in ivec2 place, const in int k ) {
   ivec2 p = ivec2( ( place.x + ${width} ) % ${width}, ( place.y + ${height} ) % ${height} );
   int r = p.y * ${width} + p.x;
-  ivec3 at = ivec3( ( r & ${layout.columns - 1} ) * ${layout.texels}, ( r / ${layout.columns} ) & ${layout.rows - 1}, r / ${layout.columns * layout.rows} );
+  ivec3 at = ivec3( ( r & ${layout.columns - 1} ) * ${layout.texels}, ( r / ${layout.columns} ) & ${layout.rows - 1},
+                    r / ${layout.columns * layout.rows} );
   return texelFetch( prtTransfer, at + ivec3( k, 0, 0 ), 0 );
 }
 vec3 prtExitRadiance() {
@@ -136,14 +144,18 @@ vec3 prtExitRadiance() {
     prtFrame = mat3( along, dot( up, down ) > 0.0 ? - up : up, n );
   } else {
     float side = n.z < 0.0 ? - 1.0 : 1.0, a = - 1.0 / ( side + n.z ), b = n.x * n.y * a;
-    prtFrame = mat3( vec3( 1.0 + side * n.x * n.x * a, side * b, - side * n.x ), vec3( b, side + n.y * n.y * a, - n.y ), n );
+    prtFrame = mat3( vec3( 1.0 + side * n.x * n.x * a, side * b, - side * n.x ),
+                     vec3( b, side + n.y * n.y * a, - n.y ), n );
   }
-  vec2 place = fract( vPrtPlace * prtTile ) * vec2( ${width}.0, ${height}.0 ), corner = floor( place - 0.5 ), f = place - 0.5 - corner;
+  vec2 place = fract( vPrtPlace * prtTile ) * vec2( ${width}.0, ${height}.0 );
+  vec2 corner = floor( place - 0.5 ), f = place - 0.5 - corner;
   ivec2 c = ivec2( corner ), nearest = ivec2( place );
   vec4 v[ PRT_QUADS ];
   for ( int k = 0; k < PRT_QUADS; ++ k ) v[ k ] = prtTexel( nearest, k );
   for ( int k = 0; k < ${exactQuads}; ++ k ) {
-    vec4 mean = mix( mix( prtTexel( c, k ), prtTexel( c + ivec2( 1, 0 ), k ), f.x ), mix( prtTexel( c + ivec2( 0, 1 ), k ), prtTexel( c + ivec2( 1, 1 ), k ), f.x ), f.y );
+    vec4 low = mix( prtTexel( c, k ), prtTexel( c + ivec2( 1, 0 ), k ), f.x );
+    vec4 high = mix( prtTexel( c + ivec2( 0, 1 ), k ), prtTexel( c + ivec2( 1, 1 ), k ), f.x );
+    vec4 mean = mix( low, high, f.y );
     ${
       exactValues % 4 === 0
         ? 'v[ k ] = mean;'

@@ -41,7 +41,8 @@ export class UnshadowedMaterial extends MeshBasicMaterial {
 
   override onBeforeCompile(shader: WebGLProgramParametersWithUniforms): void {
     shader.uniforms['irradianceLight'] = this.light;
-    const declarations = `uniform vec3 irradianceLight[ ${irradianceIndices(this.order).length} ];\nvarying vec3 vEven;\nvarying vec3 vOdd;\n`;
+    const count = irradianceIndices(this.order).length;
+    const declarations = `uniform vec3 irradianceLight[ ${count} ];\nvarying vec3 vEven;\nvarying vec3 vOdd;\n`;
     const body = `
   vec3 n = normalize( ( vec4( transformedNormal, 0.0 ) * viewMatrix ).xyz );
   vec3 even = vec3( 0.0 ), odd = vec3( 0.0 );

@@ -224,7 +224,8 @@ export class VertexTransfer implements BakedTransfer {
     );
     if (renderer.capabilities.maxVertexTextures < wanted)
       throw new LambentError(
-        `is relit in vertex shaders, which must read textures, ${wanted} at once; this graphics card reads ${renderer.capabilities.maxVertexTextures} there`,
+        `is relit in vertex shaders, which must read textures, ${wanted} at once; ` +
+          `this graphics card reads ${renderer.capabilities.maxVertexTextures} there`,
       );
   }
 

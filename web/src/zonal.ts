@@ -50,7 +50,8 @@ export function zonalSum(order: number, lobes: number, channels: 1 | 3, table = 
       const at = channels === 3 ? 4 * c : 0,
         of = (k: number): string => `prtLight[ ${lightQuads * c + (k >> 2)} ].${swizzle(k)}`;
       lines.push(
-        `sum[ ${c} ] += dot( prtFrame * vec3( - ${value(at + 3)}, - ${value(at + 1)}, ${value(at + 2)} ), vec3( - ${of(3)}, - ${of(1)}, ${of(2)} ) );`,
+        `sum[ ${c} ] += dot( prtFrame * vec3( - ${value(at + 3)}, - ${value(at + 1)}, ${value(at + 2)} ),
+                     vec3( - ${of(3)}, - ${of(1)}, ${of(2)} ) );`,
       );
     }
   }
@@ -140,7 +141,8 @@ export const zonalKind: TransferKind = {
       const last = await loadLastReflection(source, header.receivers);
       if (last.rows * lobes > maxGlossyLobes)
         throw new LambentError(
-          `has ${last.rows} rows of ${lobes} lobes, where this version draws ${maxGlossyLobes} lobes in all; "lambent render" draws it`,
+          `has ${last.rows} rows of ${lobes} lobes, where this version draws ${maxGlossyLobes} lobes in all; ` +
+            '"lambent render" draws it',
         );
       return VertexTransfer.load(source, header, {
         kind: 'zonal',

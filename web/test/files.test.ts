@@ -14,7 +14,7 @@ describe('the transfer texture', () => {
     { count: 256, channels: 3, precision: 'half', receivers: 5000 }, // more than one layer
     { count: 1, channels: 1, precision: 'half', receivers: 1 },
   ] as BlockHeader[])
-    it(`holds every value where the shader looks: ${header.count} values, ${header.channels} channels, ${header.receivers} receivers`, () => {
+    it(`holds every value where the shader looks: ${JSON.stringify(header)}`, () => {
       const { count, channels, receivers } = header,
         blocks = Math.ceil(receivers / 16),
         next = random(count);
