@@ -7,10 +7,10 @@ export default tseslint.config(
   ...tseslint.configs.recommendedTypeChecked,
   ...tseslint.configs.stylistic,
   {
-    languageOptions: { parserOptions: { project: ['./tsconfig.json', './tsconfig.node.json'], tsconfigRootDir: import.meta.dirname } },
+    languageOptions: {
+      parserOptions: { project: ['./tsconfig.json', './tsconfig.node.json'], tsconfigRootDir: import.meta.dirname },
+    },
     rules: {
-      'no-sequences': 'off',
-      '@typescript-eslint/no-unused-expressions': 'off', // a = 1, b = 2 in one statement
       '@typescript-eslint/no-non-null-assertion': 'off', // indexed access is checked; bounds are ours
       '@typescript-eslint/prefer-for-of': 'off',
       'max-lines': ['error', 600],

@@ -1,3 +1,5 @@
 import { defineConfig } from 'vitest/config';
 
-export default defineConfig({ test: { include: ['bench/**/*.bench.ts'], fileParallelism: false, testTimeout: 600_000, hookTimeout: 240_000 } });
+export default defineConfig({
+  test: { include: ['bench/**/*.bench.ts'], fileParallelism: false, testTimeout: 600_000, hookTimeout: 240_000 },
+});

@@ -7,18 +7,52 @@ import { afterAll, beforeAll, describe, expect, it } from 'vitest';
 import { haveTool, lambent, makeFolder } from '../test/tool.ts';
 import { haveBrowser, launch, openFixture, psnr, writeScene } from './browser.ts';
 
-const camera = '3.1,2.6,4.3,-0.3,0.8,0,38', size = [640, 480];
+const camera = '3.1,2.6,4.3,-0.3,0.8,0,38',
+  size = [640, 480];
 
 describe.skipIf(!haveTool || !haveBrowser)('an exported lightmap', () => {
-  const folder = makeFolder(), at = (name: string): string => join(folder, name);
+  const folder = makeFolder(),
+    at = (name: string): string => join(folder, name);
   let browser: Browser, server: ViteDevServer, page: Page;
 
   beforeAll(async () => {
-    const scene = writeScene(folder), common = ['--transfer', 'lightmap', '--texels-per-unit', '12', '--samples', '128', '--bounces', '2', '--sky', 'sky:elevation=25,azimuth=70'];
-    for (const [name, kind] of [['flat', 'none'], ['probes', 'sh:2']] as const) {
+    const scene = writeScene(folder),
+      common = [
+        '--transfer',
+        'lightmap',
+        '--texels-per-unit',
+        '12',
+        '--samples',
+        '128',
+        '--bounces',
+        '2',
+        '--sky',
+        'sky:elevation=25,azimuth=70',
+      ];
+    for (const [name, kind] of [
+      ['flat', 'none'],
+      ['probes', 'sh:2'],
+    ] as const) {
       lambent('bake', scene, ...common, '--directional', kind, '-o', at(`${name}.glb`));
       lambent('export', at(`${name}.glb`), '--three', at(name));
-      lambent('render', at(`${name}.glb`), '--show', 'radiosity', '--camera', camera, '--size', size.join('x'), '--spp', '64', '--background', 'none', '--exposure', '-2', '-o', at(`${name}.png`));
+      lambent(
+        'render',
+        at(`${name}.glb`),
+        '--show',
+        'radiosity',
+        '--camera',
+        camera,
+        '--size',
+        size.join('x'),
+        '--spp',
+        '64',
+        '--background',
+        'none',
+        '--exposure',
+        '-2',
+        '-o',
+        at(`${name}.png`),
+      );
     }
     browser = await launch();
     ({ page, server } = await openFixture(browser, folder));
@@ -29,8 +63,10 @@ describe.skipIf(!haveTool || !haveBrowser)('an exported lightmap', () => {
   });
 
   const shown = async (name: string, pictures: string[]): Promise<string> => {
-    const data = await page.evaluate(([path, pictures, camera, size]) => window.scenes.lightmapped(path, pictures, camera, size, -2),
-      [`/files/${name}.glb`, pictures.map((p) => `/files/${p}`), camera.split(',').map(Number), size] as const);
+    const data = await page.evaluate(
+      ([path, pictures, camera, size]) => window.scenes.lightmapped(path, pictures, camera, size, -2),
+      [`/files/${name}.glb`, pictures.map((p) => `/files/${p}`), camera.split(',').map(Number), size] as const,
+    );
     const path = at(`three_${pictures[0]!.replace(/\.exr$/, '')}.png`);
     writeFileSync(path, Buffer.from(data.replace(/.*,/, ''), 'base64'));
     return path;
@@ -38,7 +74,13 @@ describe.skipIf(!haveTool || !haveBrowser)('an exported lightmap', () => {
 
   it('is the irradiance of a lightMap, or coefficients of a LightProbe a texel', async () => {
     const flat = psnr(await shown('flat', ['flat.exr']), at('flat.png'));
-    const probes = psnr(await shown('probes', [0, 1, 2, 3].map((k) => `probes.${k}.exr`)), at('probes.png'));
+    const probes = psnr(
+      await shown(
+        'probes',
+        [0, 1, 2, 3].map((k) => `probes.${k}.exr`),
+      ),
+      at('probes.png'),
+    );
     console.log(`lightMap ${flat.toFixed(1)} dB, LightProbe a texel ${probes.toFixed(1)} dB (${folder})`);
     expect(flat).toBeGreaterThan(40);
     expect(probes).toBeGreaterThan(40);

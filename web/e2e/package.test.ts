@@ -8,7 +8,8 @@ import { haveTool, lambent, makeFolder, writeLopsidedHdr } from '../test/tool.ts
 import { haveBrowser, launch, openFixture, writeBall, writeScene } from './browser.ts';
 
 describe.skipIf(!haveTool || !haveBrowser)('the package', () => {
-  const folder = makeFolder(), at = (name: string): string => join(folder, name);
+  const folder = makeFolder(),
+    at = (name: string): string => join(folder, name);
   let browser: Browser, server: ViteDevServer, page: Page;
 
   beforeAll(async () => {
@@ -26,11 +27,19 @@ describe.skipIf(!haveTool || !haveBrowser)('the package', () => {
   });
 
   it('is as bright as the materials of three.js under a probe of the same light', async () => {
-    const values = await page.evaluate(() => window.scenes.mixed('/files/ball.glb', '/files/site~data~environment-0.exr'));
-    const means = [0, 1, 2].map((which) => values.reduce((sum, v) => sum + v[which]!.reduce((a, b) => a + b), 0) / values.length / 3);
+    const values = await page.evaluate(() =>
+      window.scenes.mixed('/files/ball.glb', '/files/site~data~environment-0.exr'),
+    );
+    const means = [0, 1, 2].map(
+      (which) => values.reduce((sum, v) => sum + v[which]!.reduce((a, b) => a + b), 0) / values.length / 3,
+    );
     let worst = 0;
-    for (const [baked, lambert] of values) baked!.forEach((v, c) => (worst = Math.max(worst, Math.abs(v - lambert![c]!) / means[1]!)));
-    console.log(`mean radiance: baked ${means[0]!.toFixed(5)}, Lambert ${means[1]!.toFixed(5)}, Standard ${means[2]!.toFixed(5)}; largest difference ${(100 * worst).toFixed(2)} % of the mean`);
+    for (const [baked, lambert] of values)
+      baked!.forEach((v, c) => (worst = Math.max(worst, Math.abs(v - lambert![c]!) / means[1]!)));
+    console.log(
+      `mean radiance: baked ${means[0]!.toFixed(5)}, Lambert ${means[1]!.toFixed(5)}, ` +
+        `Standard ${means[2]!.toFixed(5)}; largest difference ${(100 * worst).toFixed(2)} % of the mean`,
+    );
     expect(means[0]).toBeGreaterThan(0.01);
     expect(Math.abs(means[0]! / means[1]! - 1)).toBeLessThan(0.005);
     expect(worst).toBeLessThan(0.04); // facets of 4.5 degrees, and normals half a pixel apart
@@ -47,19 +56,29 @@ describe.skipIf(!haveTool || !haveBrowser)('the package', () => {
   });
 
   it('refuses transfer that does not fit, in a sentence', async () => {
-    const file = readFileSync(at('scene.glb')), jsonLength = file.readUInt32LE(12), json = file.subarray(20, 20 + jsonLength).toString();
+    const file = readFileSync(at('scene.glb')),
+      jsonLength = file.readUInt32LE(12),
+      json = file.subarray(20, 20 + jsonLength).toString();
     /** The file with its JSON changed, and as long as it was. */
     const write = (name: string, from: RegExp, to: string): void => {
       const changed = json.replace(from, to);
       expect(changed).not.toBe(json);
       expect(changed.trimEnd().length).toBeLessThanOrEqual(jsonLength);
-      writeFileSync(at(name), Buffer.concat([file.subarray(0, 20), Buffer.from(changed.trimEnd().padEnd(jsonLength)), file.subarray(20 + jsonLength)]));
+      writeFileSync(
+        at(name),
+        Buffer.concat([
+          file.subarray(0, 20),
+          Buffer.from(changed.trimEnd().padEnd(jsonLength)),
+          file.subarray(20 + jsonLength),
+        ]),
+      );
     };
     write('order.glb', /"order":6,"precision":"half","receivers"/, '"order":5,"precision":"half","receivers"');
     write('kind.glb', /"kind":"diffuse"/, '"kind":"zigzag"');
     write('few.glb', /"precision":"half","receivers":\d+/, '"precision":"half","receivers":9');
     write('node.glb', /"node":0,"primitive":0/, '"node":9,"primitive":0');
-    const say = (name: string): Promise<string> => page.evaluate((path) => window.scenes.refusal(path), `/files/${name}`);
+    const say = (name: string): Promise<string> =>
+      page.evaluate((path) => window.scenes.refusal(path), `/files/${name}`);
     expect(await say('order.glb')).toMatch(/holds \d+ bytes of transfer where its header makes \d+/);
     expect(await say('kind.glb')).toMatch(/kind "zigzag".*diffuse/);
     expect(await say('few.glb')).toMatch(/bytes of transfer where its header makes 3456|receiver \d+ is out of range/);

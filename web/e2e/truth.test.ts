@@ -5,10 +5,12 @@ import { afterAll, beforeAll, describe, expect, it } from 'vitest';
 import { haveTool, lambent, makeFolder, writeLopsidedHdr } from '../test/tool.ts';
 import { haveBrowser, launch, open, psnr, serve, writeScene, type Server } from './browser.ts';
 
-const camera = '3.1,2.6,4.3,-0.3,0.8,0,38', rotate = '40,-25,70';
+const camera = '3.1,2.6,4.3,-0.3,0.8,0,38',
+  rotate = '40,-25,70';
 
 describe.skipIf(!haveTool || !haveBrowser)('the picture', () => {
-  const folder = makeFolder(), at = (name: string): string => join(folder, name);
+  const folder = makeFolder(),
+    at = (name: string): string => join(folder, name);
   let browser: Browser, server: Server;
 
   beforeAll(async () => {
@@ -17,7 +19,15 @@ describe.skipIf(!haveTool || !haveBrowser)('the picture', () => {
     lambent('bake', scene, '--samples', '1024', '--bounces', '2', '-o', at('scene.glb'));
     lambent('bake', scene, '--shadows', 'off', '-o', at('open.glb'));
     browser = await launch();
-    server = await serve(at('scene.glb'), '--compare', at('open.glb'), '--env', at('light.hdr'), '--env', 'sky:elevation=30,azimuth=200');
+    server = await serve(
+      at('scene.glb'),
+      '--compare',
+      at('open.glb'),
+      '--env',
+      at('light.hdr'),
+      '--env',
+      'sky:elevation=30,azimuth=200',
+    );
   });
   afterAll(async () => {
     await browser?.close();
@@ -29,37 +39,98 @@ describe.skipIf(!haveTool || !haveBrowser)('the picture', () => {
     const page = await open(browser, server.address, `ui=off&camera=${camera}&${fragment}`, 640, 480);
     await page.screenshot({ path: at(`${name}_page.png`) });
     await page.close();
-    lambent('render', at(baked), '--camera', camera, '--size', '640x480', '--spp', '256', ...args, '-o', at(`${name}_render.png`));
+    lambent(
+      'render',
+      at(baked),
+      '--camera',
+      camera,
+      '--size',
+      '640x480',
+      '--spp',
+      '256',
+      ...args,
+      '-o',
+      at(`${name}_render.png`),
+    );
     const db = psnr(at(`${name}_page.png`), at(`${name}_render.png`));
     console.log(`${name}: ${db.toFixed(1)} dB (${folder})`);
     return db;
   }
-  const none = ['--background', 'none'], light = ['--env', at('light.hdr')];
+  const none = ['--background', 'none'],
+    light = ['--env', at('light.hdr')];
 
   it('is that of render', async () => {
     expect(await compare('plain', 'scene.glb', 'background=none', [...light, ...none])).toBeGreaterThan(40);
   });
   it('is that of render under light turned about a skew axis', async () => {
-    expect(await compare('turned', 'scene.glb', `background=none&rotate=${rotate}`, [...light, ...none, '--env-rotate', rotate])).toBeGreaterThan(40);
+    expect(
+      await compare('turned', 'scene.glb', `background=none&rotate=${rotate}`, [
+        ...light,
+        ...none,
+        '--env-rotate',
+        rotate,
+      ]),
+    ).toBeGreaterThan(40);
   });
   it('is that of render with fewer bands, a window and another exposure', async () => {
-    expect(await compare('windowed', 'scene.glb', `background=none&rotate=${rotate}&order=4&window=hann&exposure=-1.5`,
-      [...light, ...none, '--env-rotate', rotate, '--light-order', '4', '--window', 'hann', '--exposure', '-1.5'])).toBeGreaterThan(40);
+    expect(
+      await compare('windowed', 'scene.glb', `background=none&rotate=${rotate}&order=4&window=hann&exposure=-1.5`, [
+        ...light,
+        ...none,
+        '--env-rotate',
+        rotate,
+        '--light-order',
+        '4',
+        '--window',
+        'hann',
+        '--exposure',
+        '-1.5',
+      ]),
+    ).toBeGreaterThan(40);
   });
   it('is that of render under a sky, with the automatic window', async () => {
-    expect(await compare('sky', 'scene.glb', `background=none&env=1&window=auto&rotate=${rotate}&exposure=-1`,
-      ['--env', 'sky:elevation=30,azimuth=200', ...none, '--env-rotate', rotate, '--window', 'auto', '--exposure', '-1'])).toBeGreaterThan(40);
+    expect(
+      await compare('sky', 'scene.glb', `background=none&env=1&window=auto&rotate=${rotate}&exposure=-1`, [
+        '--env',
+        'sky:elevation=30,azimuth=200',
+        ...none,
+        '--env-rotate',
+        rotate,
+        '--window',
+        'auto',
+        '--exposure',
+        '-1',
+      ]),
+    ).toBeGreaterThan(40);
   });
   it('has the environment behind it as render has', async () => {
-    expect(await compare('behind', 'scene.glb', `rotate=${rotate}`, [...light, '--env-rotate', rotate])).toBeGreaterThan(40);
+    expect(
+      await compare('behind', 'scene.glb', `rotate=${rotate}`, [...light, '--env-rotate', rotate]),
+    ).toBeGreaterThan(40);
   });
   it('without shadows, from normals alone, is that of a bake without shadows', async () => {
-    expect(await compare('unshadowed', 'open.glb', `background=none&view=unshadowed&rotate=${rotate}`, [...light, ...none, '--env-rotate', rotate])).toBeGreaterThan(40);
+    expect(
+      await compare('unshadowed', 'open.glb', `background=none&view=unshadowed&rotate=${rotate}`, [
+        ...light,
+        ...none,
+        '--env-rotate',
+        rotate,
+      ]),
+    ).toBeGreaterThan(40);
   });
   it('of the second file is that of render', async () => {
-    expect(await compare('second', 'open.glb', `background=none&view=compare&rotate=${rotate}`, [...light, ...none, '--env-rotate', rotate])).toBeGreaterThan(40);
+    expect(
+      await compare('second', 'open.glb', `background=none&view=compare&rotate=${rotate}`, [
+        ...light,
+        ...none,
+        '--env-rotate',
+        rotate,
+      ]),
+    ).toBeGreaterThan(40);
   });
   it('is not that of another light: the comparison can fail', async () => {
-    expect(await compare('other', 'scene.glb', 'background=none', [...light, ...none, '--env-rotate', rotate])).toBeLessThan(30);
+    expect(
+      await compare('other', 'scene.glb', 'background=none', [...light, ...none, '--env-rotate', rotate]),
+    ).toBeLessThan(30);
   });
 });

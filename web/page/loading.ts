@@ -1,9 +1,26 @@
 // Everything that comes from files: the manifest beside the page, baked scenes, environments. Errors are sentences.
-import { DataTexture, DataUtils, FloatType, HalfFloatType, LinearFilter, RepeatWrapping, RGBAFormat, type Texture } from 'three';
+import {
+  DataTexture,
+  DataUtils,
+  FloatType,
+  HalfFloatType,
+  LinearFilter,
+  RepeatWrapping,
+  RGBAFormat,
+  type Texture,
+} from 'three';
 import { EXRLoader } from 'three/addons/loaders/EXRLoader.js';
 import { GLTFLoader, type GLTF } from 'three/addons/loaders/GLTFLoader.js';
 import { HDRLoader } from 'three/addons/loaders/HDRLoader.js';
-import { checkBakedFile, LambentError, LambentTransferPlugin, latLongMap, Lighting, projectLatLong, type LatLongMap } from '../src/index.js';
+import {
+  checkBakedFile,
+  LambentError,
+  LambentTransferPlugin,
+  latLongMap,
+  Lighting,
+  projectLatLong,
+  type LatLongMap,
+} from '../src/index.js';
 
 /** lambent.json beside the page, as `lambent view` and `lambent export` write it; paths are relative to it. */
 export interface Manifest {
@@ -35,25 +52,35 @@ export async function loadManifest(): Promise<Manifest | undefined> {
 }
 
 /** A whole file, telling the share that has come. */
-export async function fetchFile(path: string, onProgress: (share: number, bytes: number) => void): Promise<ArrayBuffer> {
+export async function fetchFile(
+  path: string,
+  onProgress: (share: number, bytes: number) => void,
+): Promise<ArrayBuffer> {
   const answer = await fetch(path).catch(() => {
     throw new LambentError('cannot be reached: is "lambent view" still running?');
   });
   if (!answer.ok || !answer.body) throw new LambentError(`cannot be had: the server says ${answer.status}`);
-  const total = Number(answer.headers.get('content-length') ?? 0), reader = answer.body.getReader(), pieces: Uint8Array[] = [];
+  const total = Number(answer.headers.get('content-length') ?? 0),
+    reader = answer.body.getReader(),
+    pieces: Uint8Array[] = [];
   let done = 0;
   for (;;) {
     const piece = await reader.read().catch(() => {
       throw new LambentError(`broke off after ${done.toLocaleString('en')} bytes`);
     });
     if (piece.done) break;
-    pieces.push(piece.value), done += piece.value.length;
+    pieces.push(piece.value);
+    done += piece.value.length;
     onProgress(total > 0 ? done / total : 0, done);
   }
-  if (total > 0 && done < total) throw new LambentError(`broke off after ${done.toLocaleString('en')} of ${total.toLocaleString('en')} bytes`);
+  if (total > 0 && done < total)
+    throw new LambentError(`broke off after ${done.toLocaleString('en')} of ${total.toLocaleString('en')} bytes`);
   const bytes = new Uint8Array(done);
   let at = 0;
-  for (const piece of pieces) bytes.set(piece, at), at += piece.length;
+  for (const piece of pieces) {
+    bytes.set(piece, at);
+    at += piece.length;
+  }
   return bytes.buffer;
 }
 
@@ -78,7 +105,9 @@ export function readMap(bytes: ArrayBuffer): LatLongMap {
   if (!isExr && !isHdr) throw new LambentError('is no environment: .hdr or .exr is wanted');
   let read: object;
   try {
-    read = isExr ? new EXRLoader().setDataType(FloatType).parse(bytes) : new HDRLoader().setDataType(FloatType).parse(bytes);
+    read = isExr
+      ? new EXRLoader().setDataType(FloatType).parse(bytes)
+      : new HDRLoader().setDataType(FloatType).parse(bytes);
   } catch (error) {
     throw new LambentError(`cannot be read: ${error instanceof Error ? error.message : String(error)}`);
   }
@@ -98,22 +127,32 @@ export function mapTexture(map: LatLongMap): DataTexture {
       data[4 * i + c] = DataUtils.toHalfFloat(value > 0 ? Math.min(value, 65504) : 0);
     }
   const texture = new DataTexture(data, map.width, map.height, RGBAFormat, HalfFloatType);
-  texture.minFilter = texture.magFilter = LinearFilter, texture.wrapS = RepeatWrapping, texture.generateMipmaps = false;
+  texture.minFilter = texture.magFilter = LinearFilter;
+  texture.wrapS = RepeatWrapping;
+  texture.generateMipmaps = false;
   texture.needsUpdate = true;
   return texture;
 }
 
-export const makeEnvironment = (name: string, map: LatLongMap): EnvironmentFile =>
-  ({ name, lighting: new Lighting(projectLatLong(map, 16)), background: mapTexture(map) });
+export const makeEnvironment = (name: string, map: LatLongMap): EnvironmentFile => ({
+  name,
+  lighting: new Lighting(projectLatLong(map, 16)),
+  background: mapTexture(map),
+});
 
 /** Light for a page that was given none: a plain sky over darker ground, with a broad sun in the east. */
 export function plainSky(): LatLongMap {
-  const width = 256, height = 128, data = new Float32Array(3 * width * height), sun = [0.62, 0.55, 0.56];
+  const width = 256,
+    height = 128,
+    data = new Float32Array(3 * width * height),
+    sun = [0.62, 0.55, 0.56];
   for (let y = 0; y < height; ++y)
     for (let x = 0; x < width; ++x) {
-      const phi = 2 * Math.PI * ((x + 0.5) / width - 0.5), theta = (Math.PI * (y + 0.5)) / height;
+      const phi = 2 * Math.PI * ((x + 0.5) / width - 0.5),
+        theta = (Math.PI * (y + 0.5)) / height;
       const d = [Math.sin(theta) * Math.cos(phi), Math.cos(theta), Math.sin(theta) * Math.sin(phi)];
-      const towards = d[0]! * sun[0]! + d[1]! * sun[1]! + d[2]! * sun[2]!, up = d[1]!;
+      const towards = d[0]! * sun[0]! + d[1]! * sun[1]! + d[2]! * sun[2]!,
+        up = d[1]!;
       const glow = 9 * Math.exp(40 * (towards - 1));
       const sky = up > 0 ? [0.35 + 0.25 * (1 - up), 0.45 + 0.2 * (1 - up), 0.7] : [0.16, 0.14, 0.12];
       for (let c = 0; c < 3; ++c) data[3 * (y * width + x) + c] = sky[c]! + (up > 0 ? glow * [1, 0.85, 0.6][c]! : 0);

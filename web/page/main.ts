@@ -1,7 +1,17 @@
 // The page: controls, the wipe, files that are opened or dropped, and every message a user may see.
 import { Euler, MathUtils, Vector3 } from 'three';
 import { LambentError, shBand, shIndex, shWindows, type ShWindow } from '../src/index.js';
-import { fetchFile, loadManifest, makeEnvironment, mapTexture, plainSky, readBaked, readMap, type EnvironmentFile, type Manifest } from './loading.js';
+import {
+  fetchFile,
+  loadManifest,
+  makeEnvironment,
+  mapTexture,
+  plainSky,
+  readBaked,
+  readMap,
+  type EnvironmentFile,
+  type Manifest,
+} from './loading.js';
 import { defaultState, formatState, parseState, type State, type View } from './state.js';
 import { falseColorEnd, fitErrorEnd, Viewer } from './viewer.js';
 
@@ -17,7 +27,11 @@ function showProblem(text: string): void {
 }
 const hideProblem = (): void => void (get('problem').hidden = true);
 const sentence = (name: string, error: unknown): string =>
-  error instanceof LambentError ? (name ? `${name} ${error.message}` : error.message) : `${name ? name + ': ' : ''}${error instanceof Error ? error.message : String(error)}`;
+  error instanceof LambentError
+    ? name
+      ? `${name} ${error.message}`
+      : error.message
+    : `${name ? name + ': ' : ''}${error instanceof Error ? error.message : String(error)}`;
 
 function showLoading(what: string, share?: number): void {
   get('loading-what').textContent = what;
@@ -29,7 +43,12 @@ function showLoading(what: string, share?: number): void {
 
 const megabytes = (bytes: number): string => `${(bytes / 1e6).toPrecision(3)} MB`;
 const names: Record<View, string> = {
-  baked: 'Baked', compare: 'Second file', unshadowed: 'Unshadowed', coefficient: 'One coefficient', error: 'Error of the fit', reference: 'Reference',
+  baked: 'Baked',
+  compare: 'Second file',
+  unshadowed: 'Unshadowed',
+  coefficient: 'One coefficient',
+  error: 'Error of the fit',
+  reference: 'Reference',
 };
 
 class Page {
@@ -59,7 +78,11 @@ class Page {
     const { manifest, state, viewer } = this;
     for (const { name, file } of manifest?.environments ?? [])
       this.environments.push({ name, load: async () => makeEnvironment(name, readMap(await this.fetch(name, file))) });
-    if (this.environments.length === 0) this.environments.push({ name: 'plain sky', load: () => Promise.resolve(makeEnvironment('plain sky', plainSky())) });
+    if (this.environments.length === 0)
+      this.environments.push({
+        name: 'plain sky',
+        load: () => Promise.resolve(makeEnvironment('plain sky', plainSky())),
+      });
     this.listEnvironments();
     this.setRotation(state.rotate);
     await this.chooseEnvironment(Math.min(state.env, this.environments.length - 1));
@@ -70,8 +93,10 @@ class Page {
       return;
     }
     await this.openBaked(manifest.name, await this.fetch(manifest.name, manifest.baked));
-    if (manifest.compare) await this.useModel('compare', 'the second file', await this.fetch('the second file', manifest.compare));
-    if (manifest.reference) viewer.setReference(mapTexture(readMap(await this.fetch('the reference', manifest.reference))));
+    if (manifest.compare)
+      await this.useModel('compare', 'the second file', await this.fetch('the second file', manifest.compare));
+    if (manifest.reference)
+      viewer.setReference(mapTexture(readMap(await this.fetch('the reference', manifest.reference))));
     get('loading').hidden = true;
     this.show();
   }
@@ -89,12 +114,17 @@ class Page {
     select('view').replaceChildren(...possible.map((v) => option(v, names[v])));
     select('against').replaceChildren(option('', 'nothing'), ...possible.map((v) => option(v, names[v].toLowerCase())));
     select('window').replaceChildren(...shWindows.map((w) => option(w, w)));
-    select('view').value = state.view, select('against').value = state.against ?? '', select('window').value = state.window;
+    select('view').value = state.view;
+    select('against').value = state.against ?? '';
+    select('window').value = state.window;
     const all = Math.max(1, viewer.bakedScene?.transfer.order ?? 1); // none where there are lamps alone
     state.coefficient = Math.min(state.coefficient, all * all - 1);
-    input('order').max = String(all), input('order').value = String(state.order || all);
-    input('coefficient').max = String(all * all - 1), input('coefficient').value = String(state.coefficient);
-    input('exposure').value = String(state.exposure), input('background').checked = state.background;
+    input('order').max = String(all);
+    input('order').value = String(state.order || all);
+    input('coefficient').max = String(all * all - 1);
+    input('coefficient').value = String(state.coefficient);
+    input('exposure').value = String(state.exposure);
+    input('background').checked = state.background;
     get('play').hidden = !viewer.hasAnimation;
     document.body.classList.toggle('bare', !state.ui);
     this.apply();
@@ -102,42 +132,75 @@ class Page {
 
   private apply(): void {
     const { state, viewer } = this;
-    viewer.view = state.view, viewer.against = state.against, viewer.wipe = state.wipe, viewer.exposure = state.exposure;
-    viewer.order = state.order, viewer.window = state.window, viewer.coefficient = state.coefficient, viewer.showBackground = state.background;
+    viewer.view = state.view;
+    viewer.against = state.against;
+    viewer.wipe = state.wipe;
+    viewer.exposure = state.exposure;
+    viewer.order = state.order;
+    viewer.window = state.window;
+    viewer.coefficient = state.coefficient;
+    viewer.showBackground = state.background;
     viewer.changeLight();
-    get('exposure-value').textContent = `${state.exposure > 0 ? '+' : ''}${state.exposure.toFixed(1)}`.replace('-', '−');
+    get('exposure-value').textContent = `${state.exposure > 0 ? '+' : ''}${state.exposure.toFixed(1)}`.replace(
+      '-',
+      '−',
+    );
     get('order-value').textContent = `${viewer.bands} of ${viewer.bakedScene?.transfer.order ?? 1}`;
     const usesCoefficient = [state.view, state.against].includes('coefficient');
-    const l = shBand(state.coefficient), m = state.coefficient - shIndex(l, 0);
+    const l = shBand(state.coefficient),
+      m = state.coefficient - shIndex(l, 0);
     const usesError = [state.view, state.against].includes('error');
-    get('coefficient-row').hidden = !usesCoefficient, get('scale').hidden = !usesCoefficient && !usesError;
+    get('coefficient-row').hidden = !usesCoefficient;
+    get('scale').hidden = !usesCoefficient && !usesError;
     get('coefficient-name').textContent = `l ${l}, m ${m}`;
     const end = falseColorEnd / 2 ** state.exposure;
-    get('scale-low').textContent = `−${end.toPrecision(2)}`, get('scale-high').textContent = `+${end.toPrecision(2)}`;
+    get('scale-low').textContent = `−${end.toPrecision(2)}`;
+    get('scale-high').textContent = `+${end.toPrecision(2)}`;
     if (usesError && !usesCoefficient) // the scale's dark half is not used
-      get('scale-low').textContent = 'grey: 0 %', get('scale-high').textContent = `${(100 * fitErrorEnd / 2 ** state.exposure).toPrecision(2)} %`;
+    {
+      get('scale-low').textContent = 'grey: 0 %';
+      get('scale-high').textContent = `${((100 * fitErrorEnd) / 2 ** state.exposure).toPrecision(2)} %`;
+    }
     const wipe = get('wipe');
     wipe.hidden = !state.against;
     wipe.style.left = `${100 * state.wipe}%`;
     wipe.setAttribute('aria-valuenow', String(Math.round(100 * state.wipe)));
-    get('left-name').textContent = names[state.view], get('right-name').textContent = state.against ? names[state.against] : '';
+    get('left-name').textContent = names[state.view];
+    get('right-name').textContent = state.against ? names[state.against] : '';
     this.saveSoon();
   }
 
   private connect(): void {
     const { state, viewer } = this;
-    const on = (id: string, event: string, change: () => void): void => get(id).addEventListener(event, () => (change(), this.apply()));
+    const on = (id: string, event: string, change: () => void): void =>
+      get(id).addEventListener(event, () => (change(), this.apply()));
     on('exposure', 'input', () => (state.exposure = Number(input('exposure').value)));
-    on('order', 'input', () => (state.order = input('order').value === input('order').max ? 0 : Number(input('order').value)));
+    on(
+      'order',
+      'input',
+      () => (state.order = input('order').value === input('order').max ? 0 : Number(input('order').value)),
+    );
     on('window', 'change', () => (state.window = select('window').value as ShWindow));
     on('view', 'change', () => (state.view = select('view').value as View));
     on('against', 'change', () => {
       if (select('against').value) state.against = select('against').value as View;
       else delete state.against;
     });
-    on('coefficient', 'input', () => (state.coefficient = MathUtils.clamp(Math.floor(Number(input('coefficient').value)) || 0, 0, Number(input('coefficient').max))));
+    on(
+      'coefficient',
+      'input',
+      () =>
+        (state.coefficient = MathUtils.clamp(
+          Math.floor(Number(input('coefficient').value)) || 0,
+          0,
+          Number(input('coefficient').max),
+        )),
+    );
     on('background', 'change', () => (state.background = input('background').checked));
-    get('env').addEventListener('change', () => void this.attempt('', () => this.chooseEnvironment(select('env').selectedIndex)));
+    get('env').addEventListener(
+      'change',
+      () => void this.attempt('', () => this.chooseEnvironment(select('env').selectedIndex)),
+    );
     get('turn').addEventListener('click', () => {
       viewer.orbit.lightFirst = !viewer.orbit.lightFirst;
       get('turn').setAttribute('aria-pressed', String(viewer.orbit.lightFirst));
@@ -149,7 +212,8 @@ class Page {
       viewer.play(on);
       if (on) delete state.time;
       else if (viewer.animationTime !== undefined) state.time = viewer.animationTime;
-      if (!on) get('lobes').textContent = viewer.lobes ?? ''; // not while it plays: a status that changes each frame is noise
+      // Not while it plays: a status that changes each frame is noise.
+      if (!on) get('lobes').textContent = viewer.lobes ?? '';
       this.saveSoon();
     });
     get('reset-view').addEventListener('click', () => this.setCamera(this.manifest?.camera));
@@ -162,7 +226,13 @@ class Page {
       input('file').value = '';
     });
     for (const event of ['dragenter', 'dragover', 'dragleave', 'drop'])
-      addEventListener(event, (e) => (e.preventDefault(), document.body.classList.toggle('dropping', event.startsWith('drage') || event === 'dragover')));
+      addEventListener(
+        event,
+        (e) => (
+          e.preventDefault(),
+          document.body.classList.toggle('dropping', event.startsWith('drage') || event === 'dragover')
+        ),
+      );
     addEventListener('drop', (e) => {
       const file = e.dataTransfer?.files[0];
       if (file) this.openFile(file);
@@ -176,18 +246,23 @@ class Page {
   }
 
   private connectWipe(): void {
-    const wipe = get('wipe'), move = (share: number): void => ((this.state.wipe = MathUtils.clamp(share, 0, 1)), this.apply());
+    const wipe = get('wipe'),
+      move = (share: number): void => ((this.state.wipe = MathUtils.clamp(share, 0, 1)), this.apply());
     wipe.addEventListener('pointerdown', (e) => wipe.setPointerCapture(e.pointerId));
     wipe.addEventListener('pointermove', (e) => wipe.hasPointerCapture(e.pointerId) && move(e.clientX / innerWidth));
     wipe.addEventListener('keydown', (e) => {
       const step = { ArrowLeft: -0.02, ArrowRight: 0.02, Home: -1, End: 1 }[e.key];
-      if (step !== undefined) move(this.state.wipe + step), e.preventDefault();
+      if (step !== undefined) {
+        move(this.state.wipe + step);
+        e.preventDefault();
+      }
     });
   }
 
   /** A double click, or the key L under the pointer, in the picture's middle where there is none. */
   private connectLobes(): void {
-    const { viewer } = this, picture = get('picture');
+    const { viewer } = this,
+      picture = get('picture');
     let at: { x: number; y: number } | undefined;
     const pick = (x: number, y: number): void => {
       if (!viewer.hasLobes) return;
@@ -198,8 +273,12 @@ class Page {
     picture.addEventListener('pointerleave', () => (at = undefined));
     picture.addEventListener('dblclick', (e) => pick(e.offsetX, e.offsetY));
     picture.addEventListener('keydown', (e) => {
-      if (e.key.toLowerCase() === 'l' && !e.ctrlKey && !e.metaKey && !e.altKey) pick(at?.x ?? picture.clientWidth / 2, at?.y ?? picture.clientHeight / 2);
-      else if (e.key === 'Escape') viewer.clearLobes(), (get('lobes').textContent = '');
+      if (e.key.toLowerCase() === 'l' && !e.ctrlKey && !e.metaKey && !e.altKey)
+        pick(at?.x ?? picture.clientWidth / 2, at?.y ?? picture.clientHeight / 2);
+      else if (e.key === 'Escape') {
+        viewer.clearLobes();
+        get('lobes').textContent = '';
+      }
     });
   }
 
@@ -212,7 +291,10 @@ class Page {
         this.show();
       } else {
         const environment = makeEnvironment(file.name, readMap(bytes));
-        this.environments.push({ name: file.name, load: () => Promise.resolve(makeEnvironment(file.name, readMap(bytes))) });
+        this.environments.push({
+          name: file.name,
+          load: () => Promise.resolve(makeEnvironment(file.name, readMap(bytes))),
+        });
         this.listEnvironments();
         this.useEnvironment(this.environments.length - 1, environment);
       }
@@ -221,11 +303,14 @@ class Page {
   }
 
   private async openBaked(name: string, bytes: ArrayBuffer): Promise<void> {
-    const { viewer } = this, first = !viewer.bakedScene;
+    const { viewer } = this,
+      first = !viewer.bakedScene;
     await this.useModel('baked', name, bytes);
     get('name').textContent = document.title = name;
-    get('hint').hidden = false, get('invitation').hidden = true;
-    get('lobes').textContent = '', get('lobes-how').hidden = !viewer.hasLobes;
+    get('hint').hidden = false;
+    get('invitation').hidden = true;
+    get('lobes').textContent = '';
+    get('lobes-how').hidden = !viewer.hasLobes;
     this.setCamera(first ? this.state.camera : undefined);
     if (first && this.state.time !== undefined) viewer.pose(this.state.time);
     get('loading').hidden = true;
@@ -240,12 +325,17 @@ class Page {
       ['A receiver', `${Math.round(t.fileBytes / t.receivers)} bytes`],
     ];
     const zonal = (viewer.bakedScene!.provenance as { zonal?: { lobes?: unknown; rms?: unknown } } | undefined)?.zonal;
-    if (typeof zonal?.lobes === 'number' && typeof zonal.rms === 'number') rows.push(['Lobes', `${zonal.lobes} a receiver`], ['Fit error', `${(100 * zonal.rms).toPrecision(3)} % RMS`]);
-    get('statistics').replaceChildren(...rows.flatMap(([term, text]) => {
-      const dt = document.createElement('dt'), dd = document.createElement('dd');
-      dt.textContent = term, dd.textContent = text;
-      return [dt, dd];
-    }));
+    if (typeof zonal?.lobes === 'number' && typeof zonal.rms === 'number')
+      rows.push(['Lobes', `${zonal.lobes} a receiver`], ['Fit error', `${(100 * zonal.rms).toPrecision(3)} % RMS`]);
+    get('statistics').replaceChildren(
+      ...rows.flatMap(([term, text]) => {
+        const dt = document.createElement('dt'),
+          dd = document.createElement('dd');
+        dt.textContent = term;
+        dd.textContent = text;
+        return [dt, dd];
+      }),
+    );
   }
 
   private async useModel(role: 'baked' | 'compare', name: string, bytes: ArrayBuffer): Promise<void> {
@@ -258,9 +348,11 @@ class Page {
 
   private fetch(name: string, file: string): Promise<ArrayBuffer> {
     showLoading(`Loading ${name}`);
-    return fetchFile(file, (share, bytes) => showLoading(`Loading ${name}: ${megabytes(bytes)}`, share)).catch((error: unknown) => {
-      throw new LambentError(sentence(name, error));
-    });
+    return fetchFile(file, (share, bytes) => showLoading(`Loading ${name}: ${megabytes(bytes)}`, share)).catch(
+      (error: unknown) => {
+        throw new LambentError(sentence(name, error));
+      },
+    );
   }
 
   private listEnvironments(): void {
@@ -297,7 +389,8 @@ class Page {
   }
 
   private current(): State {
-    const { camera, orbit } = this.viewer, turn = new Euler().setFromQuaternion(orbit.light, 'YXZ');
+    const { camera, orbit } = this.viewer,
+      turn = new Euler().setFromQuaternion(orbit.light, 'YXZ');
     return {
       ...this.state,
       camera: [...camera.position.toArray(), ...orbit.target.toArray(), camera.fov],

@@ -1,7 +1,14 @@
 // A loaded file and the materials its meshes wear in each view. Those beyond the baked ones are made when first wanted.
 import type { Material, Mesh, Object3D } from 'three';
 import type { GLTF } from 'three/addons/loaders/GLTFLoader.js';
-import { bakedScene, diffuseParameters, LambentError, UnshadowedMaterial, type BakedScene, type Lighting } from '../src/index.js';
+import {
+  bakedScene,
+  diffuseParameters,
+  LambentError,
+  UnshadowedMaterial,
+  type BakedScene,
+  type Lighting,
+} from '../src/index.js';
 
 export type Look = 'baked' | 'unshadowed' | 'coefficient' | 'error';
 
@@ -16,7 +23,8 @@ export class Model {
   constructor(gltf: GLTF) {
     const baked = bakedScene(gltf);
     if (!baked) throw new LambentError('holds no transfer');
-    this.root = gltf.scene, this.baked = baked;
+    this.root = gltf.scene;
+    this.baked = baked;
     this.own = this.meshes.map((mesh) => mesh.material as Material);
   }
 
@@ -25,12 +33,20 @@ export class Model {
   }
 
   /** Gains scale false colour; `index` says which coefficient. */
-  wear(look: Look, lighting: Lighting | undefined, index: number, gain: { value: number }, errorGain: { value: number }): void {
+  wear(
+    look: Look,
+    lighting: Lighting | undefined,
+    index: number,
+    gain: { value: number },
+    errorGain: { value: number },
+  ): void {
     let materials = this.own;
     if (look === 'unshadowed') {
       if (!this.unshadowed) {
         const made = new Map<Material, UnshadowedMaterial>();
-        for (const m of this.own) if (!made.has(m)) made.set(m, new UnshadowedMaterial(Math.max(1, this.baked.transfer.order), diffuseParameters(m)));
+        for (const m of this.own)
+          if (!made.has(m))
+            made.set(m, new UnshadowedMaterial(Math.max(1, this.baked.transfer.order), diffuseParameters(m)));
         this.unshadowed = this.own.map((m) => made.get(m)!);
         if (lighting) this.relight(lighting);
       }

@@ -1,4 +1,5 @@
-// The hand: dragging orbits, Shift-dragging turns the light, the wheel or two fingers zoom and shift; arrow keys do the same.
+// The hand: dragging orbits, Shift-dragging turns the light, the wheel or two fingers zoom and shift; arrow keys do the
+// same.
 import { MathUtils, PerspectiveCamera, Quaternion, Vector3 } from 'three';
 
 const radiansAHeight = 2.6; // for a drag over the whole height of the picture
@@ -25,8 +26,13 @@ export class Orbit {
   ) {
     canvas.addEventListener('pointerdown', (e) => this.onDown(e));
     canvas.addEventListener('pointermove', (e) => this.onMove(e));
-    for (const end of ['pointerup', 'pointercancel'] as const) canvas.addEventListener(end, (e) => this.pointers.delete(e.pointerId));
-    canvas.addEventListener('wheel', (e) => (e.preventDefault(), this.zoom(Math.exp(MathUtils.clamp(e.deltaY, -120, 120) * 0.0015))), { passive: false });
+    for (const end of ['pointerup', 'pointercancel'] as const)
+      canvas.addEventListener(end, (e) => this.pointers.delete(e.pointerId));
+    canvas.addEventListener(
+      'wheel',
+      (e) => (e.preventDefault(), this.zoom(Math.exp(MathUtils.clamp(e.deltaY, -120, 120) * 0.0015))),
+      { passive: false },
+    );
     canvas.addEventListener('contextmenu', (e) => e.preventDefault());
     canvas.addEventListener('keydown', (e) => this.onKey(e));
   }
@@ -43,15 +49,23 @@ export class Orbit {
 
   /** By shares of the picture's height, +x to the right, +y down. */
   turnCamera(x: number, y: number): void {
-    const offset = this.camera.position.clone().sub(this.target), radius = offset.length();
-    const polar = MathUtils.clamp(Math.acos(MathUtils.clamp(offset.y / radius, -1, 1)) - y * radiansAHeight, 1e-3, Math.PI - 1e-3);
+    const offset = this.camera.position.clone().sub(this.target),
+      radius = offset.length();
+    const polar = MathUtils.clamp(
+      Math.acos(MathUtils.clamp(offset.y / radius, -1, 1)) - y * radiansAHeight,
+      1e-3,
+      Math.PI - 1e-3,
+    );
     const azimuth = Math.atan2(offset.x, offset.z) - x * radiansAHeight;
-    offset.set(Math.sin(polar) * Math.sin(azimuth), Math.cos(polar), Math.sin(polar) * Math.cos(azimuth)).multiplyScalar(radius);
+    offset
+      .set(Math.sin(polar) * Math.sin(azimuth), Math.cos(polar), Math.sin(polar) * Math.cos(azimuth))
+      .multiplyScalar(radius);
     this.look(offset.add(this.target), this.target.clone());
   }
 
   turnLight(x: number, y: number): void {
-    const right = new Vector3().setFromMatrixColumn(this.camera.matrixWorld, 0), up = new Vector3().setFromMatrixColumn(this.camera.matrixWorld, 1);
+    const right = new Vector3().setFromMatrixColumn(this.camera.matrixWorld, 0),
+      up = new Vector3().setFromMatrixColumn(this.camera.matrixWorld, 1);
     const turn = new Quaternion().setFromAxisAngle(up, x * radiansAHeight);
     turn.multiply(new Quaternion().setFromAxisAngle(right, y * radiansAHeight));
     this.light.premultiply(turn).normalize();
@@ -85,12 +99,15 @@ export class Orbit {
   private onMove(e: PointerEvent): void {
     const before = this.pointers.get(e.pointerId);
     if (!before) return;
-    const height = this.canvas.clientHeight, x = (e.clientX - before.x) / height, y = (e.clientY - before.y) / height;
+    const height = this.canvas.clientHeight,
+      x = (e.clientX - before.x) / height,
+      y = (e.clientY - before.y) / height;
     const others = [...this.pointers].filter(([id]) => id !== e.pointerId).map(([, p]) => p);
     this.pointers.set(e.pointerId, { x: e.clientX, y: e.clientY });
     if (others.length > 0) {
       // Of two fingers one moves at a time: half the shift, and the change of their distance.
-      const other = others[0]!, apart = (p: { x: number; y: number }): number => Math.hypot(p.x - other.x, p.y - other.y);
+      const other = others[0]!,
+        apart = (p: { x: number; y: number }): number => Math.hypot(p.x - other.x, p.y - other.y);
       this.shift(x / 2, y / 2);
       if (apart(before) > 10) this.zoom(apart(before) / Math.max(10, apart({ x: e.clientX, y: e.clientY })));
     } else if (e.buttons & 6 || e.ctrlKey) {
@@ -101,7 +118,12 @@ export class Orbit {
   }
 
   private onKey(e: KeyboardEvent): void {
-    const arrows: Record<string, [number, number]> = { ArrowLeft: [-1, 0], ArrowRight: [1, 0], ArrowUp: [0, -1], ArrowDown: [0, 1] };
+    const arrows: Record<string, [number, number]> = {
+      ArrowLeft: [-1, 0],
+      ArrowRight: [1, 0],
+      ArrowUp: [0, -1],
+      ArrowDown: [0, 1],
+    };
     const arrow = arrows[e.key];
     if (arrow) this.turn(arrow[0] * keyStep, arrow[1] * keyStep, e.shiftKey !== this.lightFirst);
     else if (e.key === '+' || e.key === '=') this.zoom(0.9);

@@ -12,7 +12,9 @@ void main() {
 
 /** A shader that fills the screen: `body` sets gl_FragColor to linear radiance at `place` in [-1, 1]^2. */
 const fillScreen = (declarations: string, body: string): object => ({
-  depthTest: false, depthWrite: false, vertexShader,
+  depthTest: false,
+  depthWrite: false,
+  vertexShader,
   fragmentShader: `
 #include <common>
 varying vec2 place;
@@ -33,10 +35,16 @@ export class SkyMaterial extends ShaderMaterial {
   readonly turnBack = uniform(new Matrix3());
 
   constructor() {
-    super(fillScreen('uniform sampler2D map;\nuniform mat4 unproject;\nuniform mat3 turnBack;', /* glsl */ `
+    super(
+      fillScreen(
+        'uniform sampler2D map;\nuniform mat4 unproject;\nuniform mat3 turnBack;',
+        /* glsl */ `
   vec4 far = unproject * vec4( place, 1.0, 1.0 ), near = unproject * vec4( place, - 1.0, 1.0 );
   vec3 d = turnBack * normalize( far.xyz / far.w - near.xyz / near.w );
-  gl_FragColor = vec4( texture2D( map, vec2( atan( d.z, d.x ) / PI2 + 0.5, atan( length( d.xz ), d.y ) / PI ) ).rgb, 1.0 );`));
+  vec2 place = vec2( atan( d.z, d.x ) / PI2 + 0.5, atan( length( d.xz ), d.y ) / PI );
+  gl_FragColor = vec4( texture2D( map, place ).rgb, 1.0 );`,
+      ),
+    );
     Object.assign(this.uniforms, { map: this.map, unproject: this.unproject, turnBack: this.turnBack });
   }
 }
@@ -48,9 +56,14 @@ export class PictureMaterial extends ShaderMaterial {
   readonly stretch = uniform(1);
 
   constructor() {
-    super(fillScreen('uniform sampler2D map;\nuniform float stretch;', /* glsl */ `
+    super(
+      fillScreen(
+        'uniform sampler2D map;\nuniform float stretch;',
+        /* glsl */ `
   vec2 uv = vec2( 0.5 + 0.5 * place.x * stretch, 0.5 - 0.5 * place.y );
-  gl_FragColor = vec4( abs( uv.x - 0.5 ) <= 0.5 ? texture2D( map, uv ).rgb : vec3( 0.0 ), 1.0 );`));
+  gl_FragColor = vec4( abs( uv.x - 0.5 ) <= 0.5 ? texture2D( map, uv ).rgb : vec3( 0.0 ), 1.0 );`,
+      ),
+    );
     Object.assign(this.uniforms, { map: this.map, stretch: this.stretch });
   }
 }

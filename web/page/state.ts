@@ -22,7 +22,16 @@ export interface State {
 }
 
 export const defaultState = (): State => ({
-  rotate: [0, 0, 0], env: 0, exposure: 0, order: 0, window: 'none', view: 'baked', wipe: 0.5, coefficient: 3, background: true, ui: true,
+  rotate: [0, 0, 0],
+  env: 0,
+  exposure: 0,
+  order: 0,
+  window: 'none',
+  view: 'baked',
+  wipe: 0.5,
+  coefficient: 3,
+  background: true,
+  ui: true,
 });
 
 const numbers = (text: string | null, count: number): number[] | undefined => {
@@ -32,13 +41,15 @@ const numbers = (text: string | null, count: number): number[] | undefined => {
 
 /** `fragment` over `base`; what cannot be read is left as it is. */
 export function parseState(fragment: string, base: State): State {
-  const from = new URLSearchParams(fragment.replace(/^#/, '')), state = { ...base };
+  const from = new URLSearchParams(fragment.replace(/^#/, '')),
+    state = { ...base };
   const one = (key: string, low: number, high: number): number | undefined => {
     const value = numbers(from.get(key), 1)?.[0];
     return value === undefined ? undefined : Math.min(high, Math.max(low, value));
   };
   const camera = numbers(from.get('camera'), 7);
-  if (camera && camera[6]! > 0 && camera[6]! < 180 && [0, 1, 2].some((i) => camera[i] !== camera[i + 3])) state.camera = camera;
+  if (camera && camera[6]! > 0 && camera[6]! < 180 && [0, 1, 2].some((i) => camera[i] !== camera[i + 3]))
+    state.camera = camera;
   state.rotate = numbers(from.get('rotate'), 3) ?? state.rotate;
   state.env = Math.floor(one('env', 0, 1e6) ?? state.env);
   state.exposure = one('exposure', -20, 20) ?? state.exposure;
@@ -59,7 +70,8 @@ export function parseState(fragment: string, base: State): State {
 const short = (x: number): string => String(Number(x.toPrecision(6)));
 
 export function formatState(state: State): string {
-  const base = defaultState(), parts: string[] = [];
+  const base = defaultState(),
+    parts: string[] = [];
   const put = (key: string, text: string): void => void parts.push(`${key}=${text}`);
   if (state.camera) put('camera', state.camera.map(short).join(','));
   if (state.rotate.some((r) => Math.abs(r) > 1e-4)) put('rotate', state.rotate.map(short).join(','));
@@ -68,7 +80,10 @@ export function formatState(state: State): string {
   if (state.order !== base.order) put('order', String(state.order));
   if (state.window !== base.window) put('window', state.window);
   if (state.view !== base.view) put('view', state.view);
-  if (state.against) put('against', state.against), put('wipe', short(state.wipe));
+  if (state.against) {
+    put('against', state.against);
+    put('wipe', short(state.wipe));
+  }
   if (state.coefficient !== base.coefficient) put('coefficient', String(state.coefficient));
   if (state.time !== undefined) put('time', short(state.time));
   if (!state.background) put('background', 'none');

@@ -1,7 +1,21 @@
 // The picture: a baked scene, its light and what it is compared with. Draws when something has changed, and only then.
 import {
-  AnimationMixer, Box3, LinearToneMapping, Matrix4, PerspectiveCamera, Quaternion, Raycaster, Scene, Sphere, Vector2, Vector3, WebGLRenderer,
-  type AnimationAction, type DataTexture, type Mesh, type Object3D,
+  AnimationMixer,
+  Box3,
+  LinearToneMapping,
+  Matrix4,
+  PerspectiveCamera,
+  Quaternion,
+  Raycaster,
+  Scene,
+  Sphere,
+  Vector2,
+  Vector3,
+  WebGLRenderer,
+  type AnimationAction,
+  type DataTexture,
+  type Mesh,
+  type Object3D,
 } from 'three';
 import type { GLTF } from 'three/addons/loaders/GLTFLoader.js';
 import { FullScreenQuad } from 'three/addons/postprocessing/Pass.js';
@@ -58,19 +72,27 @@ export class Viewer {
   private request = 0;
   private lastFrame = 0;
 
-  constructor(private readonly canvas: HTMLCanvasElement, private readonly callbacks: ViewerCallbacks) {
+  constructor(
+    private readonly canvas: HTMLCanvasElement,
+    private readonly callbacks: ViewerCallbacks,
+  ) {
     try {
       this.renderer = new WebGLRenderer({ canvas, antialias: true, powerPreference: 'high-performance' });
     } catch {
       throw new LambentError('This browser gives the page no WebGL 2, which it draws with.');
     }
     this.renderer.debug.onShaderError = (context, program) =>
-      callbacks.onProblem(`The graphics driver refuses a shader: ${context.getProgramInfoLog(program) ?? 'no reason given'}`);
+      callbacks.onProblem(
+        `The graphics driver refuses a shader: ${context.getProgramInfoLog(program) ?? 'no reason given'}`,
+      );
     this.renderer.autoClear = false;
     this.renderer.toneMapping = LinearToneMapping; // exposure, then the sRGB curve: as `lambent render` writes a PNG
     this.renderer.setClearColor(0x000000, 1);
-    canvas.addEventListener('webglcontextlost', () => callbacks.onProblem('The graphics card was taken away from this page. The picture returns with it.'));
-    canvas.addEventListener('webglcontextrestored', () => (callbacks.onRecovered(), this.changeLight())); // what was drawn into textures is gone
+    canvas.addEventListener('webglcontextlost', () =>
+      callbacks.onProblem('The graphics card was taken away from this page. The picture returns with it.'),
+    );
+    // What was drawn into textures is gone.
+    canvas.addEventListener('webglcontextrestored', () => (callbacks.onRecovered(), this.changeLight()));
     this.orbit = new Orbit(this.camera, canvas, {
       onChange: () => (this.changeLight(), callbacks.onChange()),
       onUse: (what) => callbacks.onUse(what),
@@ -78,11 +100,18 @@ export class Viewer {
     new ResizeObserver(() => this.invalidate()).observe(canvas);
   }
 
-  /** Takes a loaded file in, in place of the one that was there; throws LambentError where the graphics card cannot draw it. */
+  /**
+   * Takes a loaded file in, in place of the one that was there; throws LambentError where the graphics card cannot draw
+   * it.
+   */
   setModel(role: 'baked' | 'compare', gltf: GLTF): void {
-    const model = new Model(gltf), old = this[role];
+    const model = new Model(gltf),
+      old = this[role];
     model.baked.transfer.check(this.renderer);
-    if (old) this.scene.remove(old.root), old.dispose();
+    if (old) {
+      this.scene.remove(old.root);
+      old.dispose();
+    }
     this[role] = model;
     this.scene.add(model.root);
     if (role === 'baked') {
@@ -120,7 +149,10 @@ export class Viewer {
     this.invalidate();
   }
 
-  /** From the front right and a little above, all of it in view: the camera of `lambent render --camera auto`, from farther off where the page is narrow. */
+  /**
+   * From the front right and a little above, all of it in view: the camera of `lambent render --camera auto`, from
+   * farther off where the page is narrow.
+   */
   frameAll(): void {
     const root = this.baked?.root;
     if (!root) return;
@@ -129,7 +161,8 @@ export class Viewer {
     root.traverse((o) => void ((o as Mesh).isMesh && !isGround(o) && box.expandByObject(o, true)));
     if (box.isEmpty()) box.setFromObject(root, true);
     this.camera.fov = 35;
-    const centre = box.getCenter(new Vector3()), radius = Math.max(box.getSize(new Vector3()).length() / 2, 1e-6);
+    const centre = box.getCenter(new Vector3()),
+      radius = Math.max(box.getSize(new Vector3()).length() / 2, 1e-6);
     const narrow = Math.max(1, this.canvas.clientHeight / Math.max(1, this.canvas.clientWidth));
     const distance = (radius / Math.sin((35 * Math.PI) / 360)) * 0.95 * narrow;
     this.orbit.look(new Vector3(0.55, 0.4, 1).normalize().multiplyScalar(distance).add(centre), centre);
@@ -164,9 +197,13 @@ export class Viewer {
   get hasLobes(): boolean {
     return this.baked?.baked.transfer.lobesAt !== undefined;
   }
-  /** Shows the lobes under a point of the canvas, in pixels, and says what they are; takes them away where there are none. */
+  /**
+   * Shows the lobes under a point of the canvas, in pixels, and says what they are; takes them away where there are
+   * none.
+   */
   pickLobes(x: number, y: number): string | undefined {
-    const { canvas, baked } = this, ray = new Raycaster();
+    const { canvas, baked } = this,
+      ray = new Raycaster();
     if (!baked) return undefined;
     ray.setFromCamera(new Vector2((2 * x) / canvas.clientWidth - 1, 1 - (2 * y) / canvas.clientHeight), this.camera);
     this.invalidate();
@@ -202,10 +239,15 @@ export class Viewer {
     this.fitToCanvas();
     if (this.lightChanged) this.relight();
     renderer.toneMappingExposure = 2 ** this.exposure;
-    this.gain.value = 2 ** this.exposure / falseColorEnd, this.errorGain.value = 2 ** this.exposure / fitErrorEnd;
-    sky.turnBack.value.setFromMatrix4(new Matrix4().makeRotationFromQuaternion(new Quaternion().copy(this.orbit.light).invert()));
+    this.gain.value = 2 ** this.exposure / falseColorEnd;
+    this.errorGain.value = 2 ** this.exposure / fitErrorEnd;
+    sky.turnBack.value.setFromMatrix4(
+      new Matrix4().makeRotationFromQuaternion(new Quaternion().copy(this.orbit.light).invert()),
+    );
     sky.unproject.value.copy(camera.matrixWorld).multiply(camera.projectionMatrixInverse);
-    const ratio = renderer.getPixelRatio(), width = this.canvas.width / ratio, height = this.canvas.height / ratio;
+    const ratio = renderer.getPixelRatio(),
+      width = this.canvas.width / ratio,
+      height = this.canvas.height / ratio;
     const split = Math.round(this.wipe * this.canvas.width) / ratio;
     renderer.setScissorTest(this.against !== undefined);
     if (this.against !== undefined) renderer.setScissor(0, 0, split, height);
@@ -217,12 +259,15 @@ export class Viewer {
 
   private fitToCanvas(): void {
     const { canvas, camera, bounds } = this;
-    const width = Math.max(1, canvas.clientWidth), height = Math.max(1, canvas.clientHeight), ratio = Math.min(2, window.devicePixelRatio || 1);
+    const width = Math.max(1, canvas.clientWidth),
+      height = Math.max(1, canvas.clientHeight),
+      ratio = Math.min(2, window.devicePixelRatio || 1);
     if (canvas.width !== Math.floor(width * ratio) || canvas.height !== Math.floor(height * ratio)) {
       this.renderer.setPixelRatio(ratio);
       this.renderer.setSize(width, height, false);
     }
-    const distance = camera.position.distanceTo(bounds.center), reach = 1.1 * bounds.radius; // a little more, for what is animated
+    const distance = camera.position.distanceTo(bounds.center),
+      reach = 1.1 * bounds.radius; // a little more, for what is animated
     camera.aspect = width / height;
     camera.far = distance + reach;
     camera.near = Math.max(distance - reach, 5e-4 * camera.far);
@@ -234,7 +279,8 @@ export class Viewer {
     if (!lighting) return;
     this.lightChanged = false;
     lighting.rotation.copy(this.orbit.light);
-    lighting.bands = this.bands, lighting.window = this.window;
+    lighting.bands = this.bands;
+    lighting.window = this.window;
     this.baked?.relight(lighting);
     this.compare?.relight(lighting);
   }
@@ -256,7 +302,13 @@ export class Viewer {
     const shown = view === 'compare' ? this.compare : this.baked;
     if (!shown) return;
     for (const model of [this.baked, this.compare]) if (model) model.root.visible = model === shown;
-    shown.wear(view === 'compare' ? 'baked' : view, this.environment?.lighting, this.coefficient, this.gain, this.errorGain);
+    shown.wear(
+      view === 'compare' ? 'baked' : view,
+      this.environment?.lighting,
+      this.coefficient,
+      this.gain,
+      this.errorGain,
+    );
     renderer.render(this.scene, this.camera);
     const glyphs = shown === this.baked ? this.glyphs.place(this.camera) : undefined;
     if (!glyphs) return;

@@ -18,7 +18,8 @@ vec3 prtRadiance( const in uint receiver ) {
     #else
       vec4 green = red, blue = red;
     #endif
-    sum += vec3( dot( red, prtLight[ k ] ), dot( green, prtLight[ PRT_QUADS + k ] ), dot( blue, prtLight[ 2 * PRT_QUADS + k ] ) );
+    sum += vec3( dot( red, prtLight[ k ] ), dot( green, prtLight[ PRT_QUADS + k ] ),
+                 dot( blue, prtLight[ 2 * PRT_QUADS + k ] ) );
   }
   return sum;
 }
@@ -31,6 +32,11 @@ export const diffuseKind: TransferKind = {
   load: async (source) => {
     if (source.extension.surface?.kind === 'texels') return loadLightmap(source);
     const header = readHeader(source.extension);
-    return VertexTransfer.load(source, header, { kind: 'diffuse', count: shCount(header.order), valueChannels: header.channels, shader });
+    return VertexTransfer.load(source, header, {
+      kind: 'diffuse',
+      count: shCount(header.order),
+      valueChannels: header.channels,
+      shader,
+    });
   },
 };

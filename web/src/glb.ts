@@ -1,5 +1,5 @@
-// The outside of a baked file: is it a whole GLB, and does it hold transfer that we know? Asked before three's loader is, whose
-// messages are for developers.
+// The outside of a baked file: is it a whole GLB, and does it hold transfer that we know? Asked before three's loader
+// is, whose messages are for developers.
 import { LambentError } from './errors.js';
 import { knownKinds, transferKind } from './kinds.js';
 
@@ -17,23 +17,35 @@ export interface TransferExtension {
   provenance?: unknown;
 }
 
-const isObject = (value: unknown): value is Record<string, unknown> => typeof value === 'object' && value !== null && !Array.isArray(value);
+const isObject = (value: unknown): value is Record<string, unknown> =>
+  typeof value === 'object' && value !== null && !Array.isArray(value);
 export const isIndex = (value: unknown, limit = 0xffffffff): value is number =>
   typeof value === 'number' && Number.isInteger(value) && value >= 0 && value <= limit;
 
-/** The extension of a glTF document. Throws LambentError where it is missing, of another version, or of a kind we do not know. */
+/**
+ * The extension of a glTF document. Throws LambentError where it is missing, of another version, or of a kind we do not
+ * know.
+ */
 export function transferExtension(document: unknown): TransferExtension {
   const extensions = isObject(document) ? document['extensions'] : undefined;
   const extension = isObject(extensions) ? extensions[extensionName] : undefined;
-  if (!isObject(extension)) throw new LambentError('is not a baked file: it has no LAMBENT_transfer extension (make one with "lambent bake")');
-  if (extension['version'] !== 1) throw new LambentError(`was baked with file version ${String(extension['version'])}; this program reads version 1`);
-  const transfer = extension['transfer'], parts = extension['parts'];
-  if (!isObject(transfer) || typeof transfer['kind'] !== 'string') throw new LambentError('holds no "transfer" with a kind');
+  if (!isObject(extension))
+    throw new LambentError('is not a baked file: it has no LAMBENT_transfer extension (make one with "lambent bake")');
+  if (extension['version'] !== 1)
+    throw new LambentError(`was baked with file version ${String(extension['version'])}; this program reads version 1`);
+  const transfer = extension['transfer'],
+    parts = extension['parts'];
+  if (!isObject(transfer) || typeof transfer['kind'] !== 'string')
+    throw new LambentError('holds no "transfer" with a kind');
   if (!transferKind(transfer['kind']))
-    throw new LambentError(`holds transfer of kind "${transfer['kind']}", which this version does not know (it knows ${knownKinds().join(', ')})`);
+    throw new LambentError(
+      `holds transfer of kind "${transfer['kind']}", which this version does not know ` +
+        `(it knows ${knownKinds().join(', ')})`,
+    );
   if (!Array.isArray(parts) || !parts.every((p) => isObject(p) && isIndex(p['node']) && isIndex(p['primitive'])))
     throw new LambentError('holds no list of "parts"');
-  if (extension['surface'] !== undefined && !isObject(extension['surface'])) throw new LambentError('holds a "surface" that is none');
+  if (extension['surface'] !== undefined && !isObject(extension['surface']))
+    throw new LambentError('holds a "surface" that is none');
   return extension as unknown as TransferExtension;
 }
 
@@ -41,13 +53,18 @@ export function transferExtension(document: unknown): TransferExtension {
 export function checkBakedFile(bytes: ArrayBuffer): unknown {
   if (bytes.byteLength === 0) throw new LambentError('is empty');
   const view = new DataView(bytes);
-  if (bytes.byteLength < 4 || view.getUint32(0, true) !== 0x46546c67) throw new LambentError('is not a glTF binary (.glb)');
+  if (bytes.byteLength < 4 || view.getUint32(0, true) !== 0x46546c67)
+    throw new LambentError('is not a glTF binary (.glb)');
   const length = bytes.byteLength >= 12 ? view.getUint32(8, true) : Infinity;
   if (bytes.byteLength < 20 || length > bytes.byteLength)
-    throw new LambentError(`is cut off: ${bytes.byteLength.toLocaleString('en')} bytes of ${Number.isFinite(length) ? length.toLocaleString('en') : 'more'} are there`);
+    throw new LambentError(
+      `is cut off: ${bytes.byteLength.toLocaleString('en')} bytes of ` +
+        `${Number.isFinite(length) ? length.toLocaleString('en') : 'more'} are there`,
+    );
   if (view.getUint32(4, true) !== 2) throw new LambentError(`is a GLB of version ${view.getUint32(4, true)}, not 2`);
   const jsonLength = view.getUint32(12, true);
-  if (view.getUint32(16, true) !== 0x4e4f534a || jsonLength > length - 20) throw new LambentError('does not begin with its JSON chunk');
+  if (view.getUint32(16, true) !== 0x4e4f534a || jsonLength > length - 20)
+    throw new LambentError('does not begin with its JSON chunk');
   let document: unknown;
   try {
     document = JSON.parse(new TextDecoder('utf-8', { fatal: true }).decode(new Uint8Array(bytes, 20, jsonLength)));

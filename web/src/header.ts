@@ -19,33 +19,66 @@ export interface TransferHeader {
 /** Rows of a lightmap for the normals of a normal map (docs/lightmaps.md). */
 export const directionalRows = { none: 1, 'sh:2': 4, 'sh:3': 9, hl2: 3, vector: 3 } as const;
 export type Directional = keyof typeof directionalRows;
-const isDirectional = (value: unknown): value is Directional => typeof value === 'string' && Object.hasOwn(directionalRows, value);
+const isDirectional = (value: unknown): value is Directional =>
+  typeof value === 'string' && Object.hasOwn(directionalRows, value);
 
 /** What every kind has in its header; refuses by name what this version does not draw. */
-export function readHeader({ transfer, surface, view }: TransferExtension, surfaceKind: 'vertices' | 'texels' = 'vertices'): TransferHeader {
+export function readHeader(
+  { transfer, surface, view }: TransferExtension,
+  surfaceKind: 'vertices' | 'texels' = 'vertices',
+): TransferHeader {
   const { basis, order, channels, precision, receivers, bufferView, lobes, groups, directional, cpca } = transfer;
-  const text = (value: unknown): string => (typeof value === 'string' ? value : 'something else'), where = text(surface?.kind ?? 'vertices');
+  const text = (value: unknown): string => (typeof value === 'string' ? value : 'something else'),
+    where = text(surface?.kind ?? 'vertices');
   const isMore = (list: unknown): boolean => list !== undefined && !(Array.isArray(list) && list.length === 0);
-  if (basis !== 'sh') throw new LambentError(`holds light in the basis "${String(basis)}", which this version does not know`);
-  if (isMore(lobes)) throw new LambentError('holds lobes of light (lamps, or --light directional), which this version does not draw; "lambent render" does');
+  if (basis !== 'sh')
+    throw new LambentError(`holds light in the basis "${String(basis)}", which this version does not know`);
+  if (isMore(lobes))
+    throw new LambentError(
+      'holds lobes of light (lamps, or --light directional), which this version does not draw; "lambent render" does',
+    );
   if (isMore(groups) && surfaceKind === 'vertices')
-    throw new LambentError("holds the light of the scene's own lamps at vertices, where this version draws it over an atlas; \"lambent render\" draws it");
-  if (view !== undefined) throw new LambentError('holds a fixed view (--fix-view), a picture and no surfaces; "lambent render" draws it');
-  if (cpca !== undefined) throw new LambentError('holds clusters (--compress cpca), which this version does not draw; "lambent render" does');
+    throw new LambentError(
+      "holds the light of the scene's own lamps at vertices, where this version draws it over an atlas; " +
+        '"lambent render" draws it',
+    );
+  if (view !== undefined)
+    throw new LambentError('holds a fixed view (--fix-view), a picture and no surfaces; "lambent render" draws it');
+  if (cpca !== undefined)
+    throw new LambentError('holds clusters (--compress cpca), which this version does not draw; "lambent render" does');
   if (directional !== undefined && (surfaceKind === 'vertices' || !isDirectional(directional)))
-    throw new LambentError(`holds directional light ("${text(directional)}"), which this version does not draw ${isDirectional(directional) ? 'but over an atlas' : 'at all'}; "lambent render" does`);
+    throw new LambentError(
+      `holds directional light ("${text(directional)}"), which this version does not draw ` +
+        `${isDirectional(directional) ? 'but over an atlas' : 'at all'}; "lambent render" does`,
+    );
   if (where !== surfaceKind)
-    throw new LambentError(`holds transfer over ${where}, where this version draws vertices and, for diffuse transfer, texels; "lambent render" draws it`);
+    throw new LambentError(
+      `holds transfer over ${where}, where this version draws vertices and, for diffuse transfer, texels; ` +
+        '"lambent render" draws it',
+    );
   if (precision !== 'half' && precision !== 'single') throw new LambentError('"precision" must be half or single');
   if (!isIndex(order, maxShOrder) || (order < 1 && !isMore(groups))) throw new LambentError('"order" is out of range');
   if (channels !== 1 && channels !== 3) throw new LambentError('"channels" is out of range');
   if (!isIndex(receivers, noReceiver - 1) || receivers < 1) throw new LambentError('"receivers" is out of range');
   if (!isIndex(bufferView)) throw new LambentError('"bufferView" is missing');
-  return { order, channels, precision, receivers, bufferView, directional: isDirectional(directional) ? directional : 'none' };
+  return {
+    order,
+    channels,
+    precision,
+    receivers,
+    bufferView,
+    directional: isDirectional(directional) ? directional : 'none',
+  };
 }
 
 /** `count` of u32, all of them receivers or none; `message` where there are not so many. */
-export async function readReceivers(source: TransferSource, view: unknown, count: number, receivers: number, message: string): Promise<Uint32Array> {
+export async function readReceivers(
+  source: TransferSource,
+  view: unknown,
+  count: number,
+  receivers: number,
+  message: string,
+): Promise<Uint32Array> {
   if (!isIndex(view)) throw new LambentError('a part has no buffer view of receivers');
   const bytes = await source.bufferView(view);
   if (bytes.byteLength !== 4 * count) throw new LambentError(message);
@@ -57,10 +90,15 @@ export async function readReceivers(source: TransferSource, view: unknown, count
 /** A geometry of its own, which shares all attributes, since nodes that share a mesh have receivers of their own. */
 export function shareGeometry(shared: BufferGeometry): BufferGeometry {
   const geometry = new BufferGeometry();
-  geometry.name = shared.name, geometry.index = shared.index, geometry.userData = shared.userData;
-  geometry.groups = shared.groups, geometry.drawRange = shared.drawRange;
-  geometry.morphAttributes = shared.morphAttributes, geometry.morphTargetsRelative = shared.morphTargetsRelative;
-  geometry.boundingBox = shared.boundingBox, geometry.boundingSphere = shared.boundingSphere;
+  geometry.name = shared.name;
+  geometry.index = shared.index;
+  geometry.userData = shared.userData;
+  geometry.groups = shared.groups;
+  geometry.drawRange = shared.drawRange;
+  geometry.morphAttributes = shared.morphAttributes;
+  geometry.morphTargetsRelative = shared.morphTargetsRelative;
+  geometry.boundingBox = shared.boundingBox;
+  geometry.boundingSphere = shared.boundingSphere;
   for (const [name, attribute] of Object.entries(shared.attributes)) geometry.setAttribute(name, attribute);
   return geometry;
 }

@@ -9,7 +9,13 @@ registerTransferKind(matrixKind);
 
 export { LambentError } from './errors.js';
 export { checkBakedFile, extensionName } from './glb.js';
-export { knownKinds, registerTransferKind, type BakedTransfer, type TransferKind, type TransferSource } from './kinds.js';
+export {
+  knownKinds,
+  registerTransferKind,
+  type BakedTransfer,
+  type TransferKind,
+  type TransferSource,
+} from './kinds.js';
 export { latLongMap, Lighting } from './lighting.js';
 export { lobeValue, type Lobe } from './lobes.js';
 export { bakedScene, LambentTransferPlugin, type BakedScene } from './plugin.js';

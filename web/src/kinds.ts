@@ -11,7 +11,9 @@ export interface TransferSource {
   bufferView(index: number): Promise<ArrayBuffer>;
   /** The mesh that draws a part. Throws LambentError where the file has none. */
   mesh(part: TransferExtension['parts'][number]): Mesh;
-  /** The scene's own material of a part whose mesh wears one for other viewers; its mesh's material where it does not. */
+  /**
+   * The scene's own material of a part whose mesh wears one for other viewers; its mesh's material where it does not.
+   */
   ownMaterial(part: TransferExtension['parts'][number]): Promise<Material>;
 }
 
@@ -30,16 +32,23 @@ export interface BakedTransfer {
   check(renderer: WebGLRenderer): void;
   /** Shows the meshes under this light. Writes a few hundred bytes of uniforms and nothing else. */
   relight(lighting: Lighting): void;
-  /** The scene's own lamps, where the file has them: a colour that scales each, by name. Counts at the next relight(). */
+  /**
+   * The scene's own lamps, where the file has them: a colour that scales each, by name. Counts at the next relight().
+   */
   readonly lamps?: Map<string, Color>;
   /**
-   * Materials that show one coefficient of transfer in false colour, one a mesh in the order of `meshes`; `gain` is a shared uniform.
-   * Made on demand; the caller disposes of them.
+   * Materials that show one coefficient of transfer in false colour, one a mesh in the order of `meshes`; `gain` is a
+   * shared uniform. Made on demand; the caller disposes of them.
    */
   coefficientMaterials(index: number, gain: { value: number }): Material[];
-  /** Where the file has the errors of a fit: materials that show them in false colour, as coefficientMaterials() does. */
+  /**
+   * Where the file has the errors of a fit: materials that show them in false colour, as coefficientMaterials() does.
+   */
   readonly fitErrorMaterials?: (gain: { value: number }) => Material[];
-  /** Zonal transfer: the lobes of a vertex as the surface stands now, or of its back; undefined where it has no receiver. */
+  /**
+   * Zonal transfer: the lobes of a vertex as the surface stands now, or of its back; undefined where it has no
+   * receiver.
+   */
   readonly lobesAt?: (mesh: Mesh, vertex: number, back: boolean) => Lobe[] | undefined;
   dispose(): void;
 }

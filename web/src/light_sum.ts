@@ -1,8 +1,21 @@
-// T . light on the graphics card: a half-float picture with a texel for each row of each receiver, drawn when the light changes and only
-// looked up until then. Who makes one says which texel is whose.
+// T . light on the graphics card: a half-float picture with a texel for each row of each receiver, drawn when the light
+// changes and only looked up until then. Who makes one says which texel is whose.
 import {
-  Camera, GLSL3, HalfFloatType, Mesh, PlaneGeometry, RawShaderMaterial, RGBAFormat, Scene, WebGLRenderTarget, type DataArrayTexture,
-  type IUniform, type LinearFilter, type Material, type NearestFilter, type WebGLRenderer,
+  Camera,
+  GLSL3,
+  HalfFloatType,
+  Mesh,
+  PlaneGeometry,
+  RawShaderMaterial,
+  RGBAFormat,
+  Scene,
+  WebGLRenderTarget,
+  type DataArrayTexture,
+  type IUniform,
+  type LinearFilter,
+  type Material,
+  type NearestFilter,
+  type WebGLRenderer,
 } from 'three';
 import type { BlockLayout } from './block_texture.js';
 import { LambentError } from './errors.js';
@@ -24,7 +37,8 @@ void main() {
   radiance = vec4( 0.0, 0.0, 0.0, 1.0 );
   if ( receiver == 0xffffffffu ) return;
   int r = int( receiver );
-  ivec3 at = ivec3( ( r & ( PRT_COLUMNS - 1 ) ) * PRT_TEXELS, ( r / PRT_COLUMNS ) & ( PRT_ROWS - 1 ), r / ( PRT_COLUMNS * PRT_ROWS ) );
+  ivec3 at = ivec3( ( r & ( PRT_COLUMNS - 1 ) ) * PRT_TEXELS, ( r / PRT_COLUMNS ) & ( PRT_ROWS - 1 ),
+                    r / ( PRT_COLUMNS * PRT_ROWS ) );
   at.x += row * PRT_CHANNELS * PRT_QUADS;
   for ( int k = 0; k < PRT_QUADS; ++ k ) {
     vec4 red = texelFetch( prtTransfer, at + ivec3( k, 0, 0 ), 0 ), green = red, blue = red;
@@ -32,7 +46,8 @@ void main() {
       green = texelFetch( prtTransfer, at + ivec3( PRT_QUADS + k, 0, 0 ), 0 );
       blue = texelFetch( prtTransfer, at + ivec3( 2 * PRT_QUADS + k, 0, 0 ), 0 );
     #endif
-    radiance.rgb += vec3( dot( red, prtLight[ k ] ), dot( green, prtLight[ PRT_QUADS + k ] ), dot( blue, prtLight[ 2 * PRT_QUADS + k ] ) );
+    radiance.rgb += vec3( dot( red, prtLight[ k ] ), dot( green, prtLight[ PRT_QUADS + k ] ),
+                          dot( blue, prtLight[ 2 * PRT_QUADS + k ] ) );
   }
 }`;
 
@@ -60,13 +75,24 @@ export class DrawnPicture {
   private changed = true;
 
   constructor(
-    width: number, height: number, filter: SumOptions['filter'], private readonly what: SumOptions['what'],
+    width: number,
+    height: number,
+    filter: SumOptions['filter'],
+    private readonly what: SumOptions['what'],
     drawing: { fragmentShader: string; defines: Record<string, number>; uniforms: Record<string, IUniform> },
   ) {
     this.target = new WebGLRenderTarget(width, height, {
-      type: HalfFloatType, format: RGBAFormat, minFilter: filter, magFilter: filter, depthBuffer: false, generateMipmaps: false,
+      type: HalfFloatType,
+      format: RGBAFormat,
+      minFilter: filter,
+      magFilter: filter,
+      depthBuffer: false,
+      generateMipmaps: false,
     });
-    this.quad = new Mesh(new PlaneGeometry(2, 2), new RawShaderMaterial({ glslVersion: GLSL3, vertexShader, depthTest: false, depthWrite: false, ...drawing }));
+    this.quad = new Mesh(
+      new PlaneGeometry(2, 2),
+      new RawShaderMaterial({ glslVersion: GLSL3, vertexShader, depthTest: false, depthWrite: false, ...drawing }),
+    );
     this.quad.frustumCulled = false;
     this.scene.add(this.quad);
   }
@@ -84,9 +110,14 @@ export class DrawnPicture {
   check(renderer: WebGLRenderer): void {
     const { width, height } = this.target;
     if (Math.max(width, height) > renderer.capabilities.maxTextureSize)
-      throw new LambentError(`${this.what.size} of ${width} x ${height} texels, where this graphics card takes ${renderer.capabilities.maxTextureSize}`);
+      throw new LambentError(
+        `${this.what.size} of ${width} x ${height} texels, ` +
+          `where this graphics card takes ${renderer.capabilities.maxTextureSize}`,
+      );
     if (!renderer.extensions.has('EXT_color_buffer_float') && !renderer.extensions.has('EXT_color_buffer_half_float'))
-      throw new LambentError(`${this.what.use}, which needs a graphics card that draws into half-float textures (EXT_color_buffer_float)`);
+      throw new LambentError(
+        `${this.what.use}, which needs a graphics card that draws into half-float textures (EXT_color_buffer_float)`,
+      );
   }
 
   /** Before what shows it is drawn; the renderer is left as it was. */
@@ -94,14 +125,18 @@ export class DrawnPicture {
     if (!this.changed) return;
     this.check(renderer);
     this.changed = false;
-    const before = renderer.getRenderTarget(), face = renderer.getActiveCubeFace(), level = renderer.getActiveMipmapLevel();
+    const before = renderer.getRenderTarget(),
+      face = renderer.getActiveCubeFace(),
+      level = renderer.getActiveMipmapLevel();
     renderer.setRenderTarget(this.target);
     renderer.render(this.scene, this.camera);
     renderer.setRenderTarget(before, face, level);
   }
 
   dispose(): void {
-    this.target.dispose(), this.quad.geometry.dispose(), this.quad.material.dispose();
+    this.target.dispose();
+    this.quad.geometry.dispose();
+    this.quad.material.dispose();
   }
 }
 
@@ -127,7 +162,13 @@ export class LightSum extends DrawnPicture {
     const light = new Float32Array(12 * layout.quads);
     super(width, height, filter, what, {
       fragmentShader: fragmentShader(pick),
-      defines: { PRT_QUADS: layout.quads, PRT_TEXELS: layout.texels, PRT_COLUMNS: layout.columns, PRT_ROWS: layout.rows, PRT_CHANNELS: channels },
+      defines: {
+        PRT_QUADS: layout.quads,
+        PRT_TEXELS: layout.texels,
+        PRT_COLUMNS: layout.columns,
+        PRT_ROWS: layout.rows,
+        PRT_CHANNELS: channels,
+      },
       uniforms: { prtTransfer: { value: transfer }, prtLight: { value: light }, ...uniforms },
     });
     this.light = light;

@@ -21,14 +21,19 @@ export function latLongMap(texture: Texture): LatLongMap {
   const image = texture.image as { data?: ArrayLike<number>; width: number; height: number } | null | undefined;
   const isFloat = texture.type === FloatType;
   if (!image?.data || !(image.width > 0 && image.height > 0) || !(isFloat || texture.type === HalfFloatType))
-    throw new LambentError('an environment must be a float or half-float data texture, as HDRLoader and EXRLoader make');
-  const { width, height } = image, channels = image.data.length / (width * height);
+    throw new LambentError(
+      'an environment must be a float or half-float data texture, as HDRLoader and EXRLoader make',
+    );
+  const { width, height } = image,
+    channels = image.data.length / (width * height);
   if (channels !== 3 && channels !== 4) throw new LambentError('an environment must have three or four channels');
   const data = isFloat ? image.data : halfToFloat(image.data);
   if (texture.flipY) return { data, width, height, channels };
   // The first row in memory is the lowest.
-  const row = width * channels, flipped = new Float32Array(data.length);
-  for (let y = 0; y < height; ++y) for (let i = 0; i < row; ++i) flipped[y * row + i] = data[(height - 1 - y) * row + i]!;
+  const row = width * channels,
+    flipped = new Float32Array(data.length);
+  for (let y = 0; y < height; ++y)
+    for (let i = 0; i < row; ++i) flipped[y * row + i] = data[(height - 1 - y) * row + i]!;
   return { data: flipped, width, height, channels };
 }
 
@@ -48,7 +53,8 @@ export class Lighting {
   /** `radiance`: order^2 RGB coefficients, [coefficient][3], in lambent's convention (docs/conventions.md). */
   constructor(readonly radiance: ArrayLike<number>) {
     this.order = this.bands = shOrder(radiance.length / 3);
-    for (let i = 0; i < radiance.length; ++i) if (!Number.isFinite(radiance[i]!)) throw new LambentError('a light coefficient is not a finite number');
+    for (let i = 0; i < radiance.length; ++i)
+      if (!Number.isFinite(radiance[i]!)) throw new LambentError('a light coefficient is not a finite number');
   }
 
   /** From an equirectangular texture in memory, as three's HDRLoader and EXRLoader make it; `order` bands are kept. */

@@ -1,16 +1,39 @@
-// Diffuse transfer over the texels of an atlas (docs/lightmaps.md): columns of harmonics, then of the scene's own lamps. Light is summed
-// once into a half-float picture of the atlas, on the graphics card, when it changes; pixels look that up bilinearly. Directional lightmaps have
-// several rows, one below the other, which pixels evaluate for the normal of the scene's normal map.
+// Diffuse transfer over the texels of an atlas (docs/lightmaps.md): columns of harmonics, then of the scene's own
+// lamps. Light is summed once into a half-float picture of the atlas, on the graphics card, when it changes; pixels
+// look that up bilinearly. Directional lightmaps have several rows, one below the other, which pixels evaluate for the
+// normal of the scene's normal map.
 import {
-  Color, DataTexture, Float32BufferAttribute, LinearFilter, MeshBasicMaterial, NearestFilter, RedIntegerFormat, UnsignedIntType, type BufferAttribute, type BufferGeometry,
-  type DataArrayTexture, type InterleavedBufferAttribute, type Material, type Mesh, type MeshStandardMaterial, type Texture, type WebGLProgramParametersWithUniforms,
+  Color,
+  DataTexture,
+  Float32BufferAttribute,
+  LinearFilter,
+  MeshBasicMaterial,
+  NearestFilter,
+  RedIntegerFormat,
+  UnsignedIntType,
+  type BufferAttribute,
+  type BufferGeometry,
+  type DataArrayTexture,
+  type InterleavedBufferAttribute,
+  type Material,
+  type Mesh,
+  type MeshStandardMaterial,
+  type Texture,
+  type WebGLProgramParametersWithUniforms,
   type WebGLRenderer,
 } from 'three';
 import { blockTexture, packBlocks, type BlockLayout } from './block_texture.js';
 import { LambentError } from './errors.js';
 import { isIndex } from './glb.js';
 import { glslHarmonics } from './glsl_harmonics.js';
-import { directionalRows, readHeader, readReceivers, shareGeometry, type Directional, type TransferHeader } from './header.js';
+import {
+  directionalRows,
+  readHeader,
+  readReceivers,
+  shareGeometry,
+  type Directional,
+  type TransferHeader,
+} from './header.js';
 import type { BakedTransfer, TransferSource } from './kinds.js';
 import type { Lighting } from './lighting.js';
 import { afterAll, LightSum, maxColumns } from './light_sum.js';
@@ -63,23 +86,35 @@ const vertexBody = /* glsl */ `
     vPrtEmissivePlace = ( prtEmissiveTransform * vec3( lambentEmissivePlace, 1.0 ) ).xy;
   #endif
 `;
-/** E(n) / pi of the rows at a pixel, n the bent normal and N the surface's own, on the side that is seen (transfer/directional.cpp). */
+/**
+ * E(n) / pi of the rows at a pixel, n the bent normal and N the surface's own, on the side that is seen
+ * (transfer/directional.cpp).
+ */
 const evaluations: Record<Directional, string> = {
   none: 'return prtRowAt( place, 0 );',
-  'sh:2': '', 'sh:3': '', // below
-  vector: 'return max( n.x * prtRowAt( place, 0 ) + n.y * prtRowAt( place, 1 ) + n.z * prtRowAt( place, 2 ), vec3( 0.0 ) );',
+  'sh:2': '',
+  'sh:3': '', // below
+  vector:
+    'return max( n.x * prtRowAt( place, 0 ) + n.y * prtRowAt( place, 1 ) + n.z * prtRowAt( place, 2 ), vec3( 0.0 ) );',
   hl2: `
   // Half-Life 2's directions in the frame about the surface's normal (frame_about of core/vec.h).
   float side = N.z < 0.0 ? - 1.0 : 1.0, a = - 1.0 / ( side + N.z ), b = N.x * N.y * a;
-  mat3 frame = mat3( vec3( 1.0 + side * N.x * N.x * a, side * b, - side * N.x ), vec3( b, side + N.y * N.y * a, - N.y ), N );
-  vec3 cosines = max( n * ( frame * mat3( - 0.40824829, - 0.70710678, 0.57735027, - 0.40824829, 0.70710678, 0.57735027, 0.81649658, 0.0, 0.57735027 ) ), vec3( 0.0 ) );
+  mat3 frame = mat3( vec3( 1.0 + side * N.x * N.x * a, side * b, - side * N.x ),
+                     vec3( b, side + N.y * N.y * a, - N.y ), N );
+  mat3 axes = mat3( - 0.40824829, - 0.70710678, 0.57735027, - 0.40824829, 0.70710678, 0.57735027,
+                    0.81649658, 0.0, 0.57735027 );
+  vec3 cosines = max( n * ( frame * axes ), vec3( 0.0 ) );
   vec3 w = cosines * cosines;
   float total = w.x + w.y + w.z;
-  return total > 0.0 ? ( w.x * prtRowAt( place, 0 ) + w.y * prtRowAt( place, 1 ) + w.z * prtRowAt( place, 2 ) ) / total : vec3( 0.0 );`,
+  if ( ! ( total > 0.0 ) ) return vec3( 0.0 );
+  return ( w.x * prtRowAt( place, 0 ) + w.y * prtRowAt( place, 1 ) + w.z * prtRowAt( place, 2 ) ) / total;`,
 };
 const evaluation = (kind: Directional): string =>
-  kind !== 'sh:2' && kind !== 'sh:3' ? evaluations[kind]
-    : `vec3 sum = vec3( 0.0 );\n  ${glslHarmonics(Number(kind[3]), (i, y) => `sum += ( ${y} ) * prtRowAt( place, ${i} );`)}\n  return max( sum, vec3( 0.0 ) );`;
+  kind !== 'sh:2' && kind !== 'sh:3'
+    ? evaluations[kind]
+    : `vec3 sum = vec3( 0.0 );
+  ${glslHarmonics(Number(kind[3]), (i, y) => `sum += ( ${y} ) * prtRowAt( place, ${i} );`)}
+  return max( sum, vec3( 0.0 ) );`;
 
 const fragmentDeclarations = (kind: Directional): string => /* glsl */ `
 uniform highp sampler2D prtAtlas;
@@ -146,7 +181,8 @@ vec3 prtExitRadiance() {
         t = prtSquareTo( along.xyz, n );
       }
       if ( t != vec3( 0.0 ) ) {
-        vec3 texel = ( 2.0 * texture( prtNormalMap, vPrtNormalPlace ).xyz - 1.0 ) * vec3( prtNormalScale, prtNormalScale, 1.0 );
+        vec3 texel = 2.0 * texture( prtNormalMap, vPrtNormalPlace ).xyz - 1.0;
+        texel.xy *= prtNormalScale;
         bent = normalize( t * texel.x + cross( n, t ) * ( along.w > 0.0 ? texel.y : - texel.y ) + n * texel.z );
       }
     #endif
@@ -182,26 +218,47 @@ interface Surface {
   emissive?: Placed;
 }
 /** Names the attributes that the shader reads, whichever set they are. */
-function readSurface(geometry: BufferGeometry, own: Material & Partial<MeshStandardMaterial>, directional: Directional): Surface {
-  const surface: Surface = { twoSided: geometry.hasAttribute('lambentPlaceBack'), emission: { value: new Color(0, 0, 0) } };
-  const normals = directional === 'none' ? undefined : placed(own.normalMap, geometry), emissive = placed(own.emissiveMap, geometry);
+function readSurface(
+  geometry: BufferGeometry,
+  own: Material & Partial<MeshStandardMaterial>,
+  directional: Directional,
+): Surface {
+  const surface: Surface = {
+    twoSided: geometry.hasAttribute('lambentPlaceBack'),
+    emission: { value: new Color(0, 0, 0) },
+  };
+  const normals = directional === 'none' ? undefined : placed(own.normalMap, geometry),
+    emissive = placed(own.emissiveMap, geometry);
   if (normals) {
     geometry.setAttribute('lambentNormalPlace', normals.place);
     const tangents = geometry.hasAttribute('tangent');
     if (tangents) geometry.setAttribute('lambentTangent', geometry.getAttribute('tangent'));
     surface.normals = { ...normals, scale: own.normalScale?.x ?? 1, tangents };
   }
-  if (emissive) geometry.setAttribute('lambentEmissivePlace', emissive.place), (surface.emissive = emissive);
+  if (emissive) {
+    geometry.setAttribute('lambentEmissivePlace', emissive.place);
+    surface.emissive = emissive;
+  }
   return surface;
 }
 
 class LightmapMaterial extends MeshBasicMaterial {
-  constructor(readonly atlas: LightSum, readonly directional: Directional, readonly surface: Surface, source: Material, readonly gain?: { value: number }) {
+  constructor(
+    readonly atlas: LightSum,
+    readonly directional: Directional,
+    readonly surface: Surface,
+    source: Material,
+    readonly gain?: { value: number },
+  ) {
     super(gain ? { side: source.side } : diffuseParameters(source));
     const { twoSided, normals, emissive } = surface;
     this.defines = {
-      PRT_ATLAS_ROWS: directionalRows[directional], ...(twoSided && { PRT_TWO_SIDED: '' }), ...(gain && { PRT_FALSE_COLOR: '' }),
-      ...(directional !== 'none' && { PRT_DIRECTIONAL: '' }), ...(normals && { PRT_NORMAL_MAP: '' }), ...(normals?.tangents && { PRT_TANGENTS: '' }),
+      PRT_ATLAS_ROWS: directionalRows[directional],
+      ...(twoSided && { PRT_TWO_SIDED: '' }),
+      ...(gain && { PRT_FALSE_COLOR: '' }),
+      ...(directional !== 'none' && { PRT_DIRECTIONAL: '' }),
+      ...(normals && { PRT_NORMAL_MAP: '' }),
+      ...(normals?.tangents && { PRT_TANGENTS: '' }),
       ...(emissive && { PRT_EMISSIVE_MAP: '' }),
     };
     if (gain) this.toneMapped = false;
@@ -213,13 +270,34 @@ class LightmapMaterial extends MeshBasicMaterial {
 
   override onBeforeCompile(shader: WebGLProgramParametersWithUniforms): void {
     const { emission, normals, emissive } = this.surface;
-    Object.assign(shader.uniforms, { prtAtlas: { value: this.atlas.target.texture }, prtEmission: emission }, this.gain && { prtGain: this.gain },
-      normals && { prtNormalMap: { value: normals.texture }, prtNormalScale: { value: normals.scale }, prtNormalTransform: { value: normals.texture.matrix } },
-      emissive && { prtEmissiveMap: { value: emissive.texture }, prtEmissiveTransform: { value: emissive.texture.matrix } });
-    shader.vertexShader = vertexDeclarations + replaceOnce(shader.vertexShader, '#include <fog_vertex>', '#include <fog_vertex>' + vertexBody);
-    shader.fragmentShader = useExitRadiance(shader.fragmentShader, fragmentDeclarations(this.directional), this.gain !== undefined);
+    Object.assign(
+      shader.uniforms,
+      { prtAtlas: { value: this.atlas.target.texture }, prtEmission: emission },
+      this.gain && { prtGain: this.gain },
+      normals && {
+        prtNormalMap: { value: normals.texture },
+        prtNormalScale: { value: normals.scale },
+        prtNormalTransform: { value: normals.texture.matrix },
+      },
+      emissive && {
+        prtEmissiveMap: { value: emissive.texture },
+        prtEmissiveTransform: { value: emissive.texture.matrix },
+      },
+    );
+    shader.vertexShader =
+      vertexDeclarations +
+      replaceOnce(shader.vertexShader, '#include <fog_vertex>', '#include <fog_vertex>' + vertexBody);
+    shader.fragmentShader = useExitRadiance(
+      shader.fragmentShader,
+      fragmentDeclarations(this.directional),
+      this.gain !== undefined,
+    );
     if (!this.gain)
-      shader.fragmentShader = replaceOnce(shader.fragmentShader, '#include <opaque_fragment>', 'outgoingLight += prtEmitted();\n#include <opaque_fragment>');
+      shader.fragmentShader = replaceOnce(
+        shader.fragmentShader,
+        '#include <opaque_fragment>',
+        'outgoingLight += prtEmitted();\n#include <opaque_fragment>',
+      );
   }
 
   override customProgramCacheKey(): string {
@@ -243,19 +321,37 @@ class LightmapTransfer implements BakedTransfer {
   private readonly ofCoefficients = new Set<LightSum>();
   private readonly glow: { emission: { value: Color }; own: Color; lamp: string }[] = [];
 
-  constructor(header: TransferHeader, groups: string[], values: ArrayBuffer, private readonly receiversOf: DataTexture, readonly meshes: Mesh[], owns: Material[]) {
-    this.order = header.order, this.channels = header.channels, this.receivers = header.receivers, this.fileBytes = values.byteLength;
+  constructor(
+    header: TransferHeader,
+    groups: string[],
+    values: ArrayBuffer,
+    private readonly receiversOf: DataTexture,
+    readonly meshes: Mesh[],
+    owns: Material[],
+  ) {
+    this.order = header.order;
+    this.channels = header.channels;
+    this.receivers = header.receivers;
+    this.fileBytes = values.byteLength;
     for (const name of groups) this.lamps.set(name, new Color(1, 1, 1));
     this.directional = header.directional;
-    const count = shCount(header.order) + groups.length, rows = directionalRows[header.directional];
+    const count = shCount(header.order) + groups.length,
+      rows = directionalRows[header.directional];
     const { layout, data } = packBlocks({ ...header, count, channels: rows * header.channels }, values);
-    this.layout = layout, this.transfer = blockTexture(layout, data);
+    this.layout = layout;
+    this.transfer = blockTexture(layout, data);
     this.atlas = this.makeAtlas();
     const { width, height } = receiversOf.image;
     let gpuBytes = data.byteLength + this.atlas.bytes + 4 * width * height;
     meshes.forEach((mesh, i) => {
-      const own = owns[i]! as Material & Partial<MeshStandardMaterial>, surface = readSurface(mesh.geometry, own, header.directional);
-      if (own.emissive) this.glow.push({ emission: surface.emission, own: own.emissive.clone().multiplyScalar(own.emissiveIntensity ?? 1), lamp: own.name });
+      const own = owns[i]! as Material & Partial<MeshStandardMaterial>,
+        surface = readSurface(mesh.geometry, own, header.directional);
+      if (own.emissive)
+        this.glow.push({
+          emission: surface.emission,
+          own: own.emissive.clone().multiplyScalar(own.emissiveIntensity ?? 1),
+          lamp: own.name,
+        });
       const material = new LightmapMaterial(this.atlas, header.directional, surface, own);
       material.vertexColors = mesh.geometry.hasAttribute('color');
       this.materials.push(material);
@@ -267,9 +363,16 @@ class LightmapTransfer implements BakedTransfer {
 
   /** Exit radiance of white at every texel, under one light. */
   private makeAtlas(): LightSum {
-    const { width, height } = this.receiversOf.image, rows = directionalRows[this.directional];
+    const { width, height } = this.receiversOf.image,
+      rows = directionalRows[this.directional];
     return new LightSum({
-      layout: this.layout, channels: this.channels, transfer: this.transfer, width, height: rows * height, filter: LinearFilter, uniforms: { prtReceivers: { value: this.receiversOf } },
+      layout: this.layout,
+      channels: this.channels,
+      transfer: this.transfer,
+      width,
+      height: rows * height,
+      filter: LinearFilter,
+      uniforms: { prtReceivers: { value: this.receiversOf } },
       what: { size: 'has an atlas', use: 'is a lightmap' },
       pick: `
 uniform highp usampler2D prtReceivers;
@@ -300,15 +403,24 @@ uint prtPick( const in ivec2 texel, out int row ) {
     const atlas = this.makeAtlas();
     atlas.set(new Float64Array(3 * (shCount(this.order) + this.lamps.size)).fill(1, 3 * index, 3 * index + 3));
     this.ofCoefficients.add(atlas);
-    const made = this.meshes.map((_, i) =>
-      new LightmapMaterial(atlas, this.directional, { ...this.materials[i]!.surface, emission: { value: new Color(0, 0, 0) } }, this.materials[i]!, gain));
+    const made = this.meshes.map(
+      (_, i) =>
+        new LightmapMaterial(
+          atlas,
+          this.directional,
+          { ...this.materials[i]!.surface, emission: { value: new Color(0, 0, 0) } },
+          this.materials[i]!,
+          gain,
+        ),
+    );
     afterAll(made, () => (this.ofCoefficients.delete(atlas), atlas.dispose()));
     return made;
   }
 
   dispose(): void {
     for (const atlas of [this.atlas, ...this.ofCoefficients]) atlas.dispose();
-    this.transfer.dispose(), this.receiversOf.dispose();
+    this.transfer.dispose();
+    this.receiversOf.dispose();
     for (const material of this.materials) material.dispose();
     for (const mesh of this.meshes) mesh.geometry.dispose();
   }
@@ -320,27 +432,47 @@ async function readPlaces(source: TransferSource, view: unknown, vertices: numbe
   const bytes = await source.bufferView(view);
   if (bytes.byteLength !== 8 * vertices) throw new LambentError('a part does not have one place in the atlas a vertex');
   const places = new Float32Array(bytes);
-  for (const x of places) if (!Number.isFinite(x)) throw new LambentError('a place in the atlas is not a finite number');
+  for (const x of places)
+    if (!Number.isFinite(x)) throw new LambentError('a place in the atlas is not a finite number');
   return new Float32BufferAttribute(places, 2);
 }
 
 export async function loadLightmap(source: TransferSource): Promise<BakedTransfer> {
-  const { extension } = source, header = readHeader(extension, 'texels');
-  const groups = extension.transfer['groups'] ?? [], { width, height, texels } = extension.surface!;
-  if (!Array.isArray(groups) || !groups.every((name) => typeof name === 'string')) throw new LambentError('"groups" is no list of names');
+  const { extension } = source,
+    header = readHeader(extension, 'texels');
+  const groups = extension.transfer['groups'] ?? [],
+    { width, height, texels } = extension.surface!;
+  if (!Array.isArray(groups) || !groups.every((name) => typeof name === 'string'))
+    throw new LambentError('"groups" is no list of names');
   const columns = shCount(header.order) + groups.length;
-  if (columns > maxColumns) throw new LambentError(`has ${columns} columns of light over an atlas, where this version draws ${maxColumns}`);
-  if (!isIndex(width, maxSide) || !isIndex(height, maxSide) || width < 1 || height < 1) throw new LambentError('the size of the atlas is out of range');
-  const map = await readReceivers(source, texels, width * height, header.receivers, 'the atlas does not have one receiver a texel');
+  if (columns > maxColumns)
+    throw new LambentError(`has ${columns} columns of light over an atlas, where this version draws ${maxColumns}`);
+  if (!isIndex(width, maxSide) || !isIndex(height, maxSide) || width < 1 || height < 1)
+    throw new LambentError('the size of the atlas is out of range');
+  const map = await readReceivers(
+    source,
+    texels,
+    width * height,
+    header.receivers,
+    'the atlas does not have one receiver a texel',
+  );
   const receivers = new DataTexture(map, width, height, RedIntegerFormat, UnsignedIntType);
-  receivers.internalFormat = 'R32UI', receivers.minFilter = receivers.magFilter = NearestFilter, receivers.needsUpdate = true;
-  const values = await source.bufferView(header.bufferView), meshes: Mesh[] = [], owns: Material[] = [];
+  receivers.internalFormat = 'R32UI';
+  receivers.minFilter = receivers.magFilter = NearestFilter;
+  receivers.needsUpdate = true;
+  const values = await source.bufferView(header.bufferView),
+    meshes: Mesh[] = [],
+    owns: Material[] = [];
   for (const part of extension.parts) {
-    const mesh = source.mesh(part), geometry = shareGeometry(mesh.geometry), vertices = geometry.getAttribute('position').count;
+    const mesh = source.mesh(part),
+      geometry = shareGeometry(mesh.geometry),
+      vertices = geometry.getAttribute('position').count;
     geometry.setAttribute('lambentPlace', await readPlaces(source, part.front, vertices));
-    if (part.back !== undefined) geometry.setAttribute('lambentPlaceBack', await readPlaces(source, part.back, vertices));
+    if (part.back !== undefined)
+      geometry.setAttribute('lambentPlaceBack', await readPlaces(source, part.back, vertices));
     mesh.geometry = geometry;
-    meshes.push(mesh), owns.push(await source.ownMaterial(part));
+    meshes.push(mesh);
+    owns.push(await source.ownMaterial(part));
   }
   return new LightmapTransfer(header, groups, values, receivers, meshes, owns);
 }

@@ -24,11 +24,22 @@ export function lobeValue(bands: readonly number[], cosine: number): number {
   return bands.reduce((sum, g, l) => sum + ((g * (2 * l + 1)) / (4 * Math.PI)) * p[l]!, 0);
 }
 
-/** Lobes as they were baked, out of the values of one receiver (zonal.ts has their layout); `exact` bands are none of theirs. */
-export function readLobes(values: ArrayLike<number>, order: number, exact: number, lobes: number, channels: 1 | 3): Lobe[] {
-  const upper = order - exact, first = channels * shCount(exact);
+/**
+ * Lobes as they were baked, out of the values of one receiver (zonal.ts has their layout); `exact` bands are none of
+ * theirs.
+ */
+export function readLobes(
+  values: ArrayLike<number>,
+  order: number,
+  exact: number,
+  lobes: number,
+  channels: 1 | 3,
+): Lobe[] {
+  const upper = order - exact,
+    first = channels * shCount(exact);
   return Array.from({ length: lobes }, (_, i) => {
-    const at = first + i * (3 + channels * upper), axis = new Vector3(values[at], values[at + 1], values[at + 2]);
+    const at = first + i * (3 + channels * upper),
+      axis = new Vector3(values[at], values[at + 1], values[at + 2]);
     if (axis.lengthSq() > 0) axis.normalize();
     else axis.set(0, 0, 1);
     const bands = Array.from({ length: order }, (_, l) => {
@@ -54,11 +65,18 @@ export function orthogonalPart(gradient: Matrix3): Matrix3 {
 /** prtFrame of the shader: how the surface stands at a vertex, against the pose that was baked. */
 export function surfaceFrame(mesh: Mesh, vertex: number, rest: { bones: DataTexture } | { inverse: Matrix3 }): Matrix3 {
   if ('inverse' in rest) return orthogonalPart(new Matrix3().setFromMatrix4(mesh.matrixWorld).multiply(rest.inverse));
-  const { skeleton } = mesh as SkinnedMesh, index = mesh.geometry.getAttribute('skinIndex'), weight = mesh.geometry.getAttribute('skinWeight');
+  const { skeleton } = mesh as SkinnedMesh,
+    index = mesh.geometry.getAttribute('skinIndex'),
+    weight = mesh.geometry.getAttribute('skinWeight');
   const blend = (matrices: ArrayLike<number>): Matrix3 => {
-    const sum = new Matrix3().multiplyScalar(0), bone = new Matrix3();
+    const sum = new Matrix3().multiplyScalar(0),
+      bone = new Matrix3();
     for (let j = 0; j < 4; ++j) {
-      bone.setFromMatrix4(new Matrix4().fromArray(Array.from({ length: 16 }, (_, k) => matrices[16 * index.getComponent(vertex, j) + k]!)));
+      bone.setFromMatrix4(
+        new Matrix4().fromArray(
+          Array.from({ length: 16 }, (_, k) => matrices[16 * index.getComponent(vertex, j) + k]!),
+        ),
+      );
       bone.elements.forEach((value, k) => (sum.elements[k]! += weight.getComponent(vertex, j) * value));
     }
     return sum;

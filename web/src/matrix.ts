@@ -1,10 +1,20 @@
-// Transfer matrices (docs/matrices.md; docs/file-format.md, kind "matrix"): radiance = sum over rows (a(wo) + colour b(wo)) X, X = T . light.
-// X is drawn into a picture when the light changes (light_sum.ts); each frame the vertex shader weighs its rows by the view, in the frame of its
-// receiver: by a look-up in the material's map (map, svd), or by harmonics of the outgoing direction.
+// Transfer matrices (docs/matrices.md; docs/file-format.md, kind "matrix"): radiance = sum over rows (a(wo) + colour
+// b(wo)) X, X = T . light. X is drawn into a picture when the light changes (light_sum.ts); each frame the vertex
+// shader weighs its rows by the view, in the frame of its receiver: by a look-up in the material's map (map, svd), or
+// by harmonics of the outgoing direction.
 //
-// Budget a receiver: the transfer (packed as in block_texture.ts: rows * channels * ceil(order^2 / 4) * 8 bytes in half floats), 8 bytes a row for X,
-// 32 for its frame and map; and 8 bytes a row and node of each map, 4 bytes a vertex (8 where surfaces have two sides).
-import { MeshBasicMaterial, NearestFilter, type DataArrayTexture, type Material, type Mesh, type WebGLProgramParametersWithUniforms, type WebGLRenderer } from 'three';
+// Budget a receiver: the transfer (packed as in block_texture.ts: rows * channels * ceil(order^2 / 4) * 8 bytes in half
+// floats), 8 bytes a row for X, 32 for its frame and map; and 8 bytes a row and node of each map, 4 bytes a vertex (8
+// where surfaces have two sides).
+import {
+  MeshBasicMaterial,
+  NearestFilter,
+  type DataArrayTexture,
+  type Material,
+  type Mesh,
+  type WebGLProgramParametersWithUniforms,
+  type WebGLRenderer,
+} from 'three';
 import { blockTexture, packBlocks, type BlockLayout } from './block_texture.js';
 import { LambentError } from './errors.js';
 import { readHeader, type TransferHeader } from './header.js';
@@ -12,8 +22,19 @@ import type { BakedTransfer, TransferKind, TransferSource } from './kinds.js';
 import type { Lighting } from './lighting.js';
 import { afterAll, LightSum } from './light_sum.js';
 import {
-  checkReflection, glossFragmentDeclarations, glossVaryings, glossVertexBody, glslReflect, loadLastReflection, readOutgoing, reflectionBytes, reflectionDefines, reflectionKey,
-  reflectionUniforms, rowWidth, type LastReflection,
+  checkReflection,
+  glossFragmentDeclarations,
+  glossVaryings,
+  glossVertexBody,
+  glslReflect,
+  loadLastReflection,
+  readOutgoing,
+  reflectionBytes,
+  reflectionDefines,
+  reflectionKey,
+  reflectionUniforms,
+  rowWidth,
+  type LastReflection,
 } from './outgoing.js';
 import { diffuseParameters, replaceOnce, useExitRadiance } from './prt_material.js';
 import { shCount } from './sh.js';
@@ -35,9 +56,19 @@ vec3 prtRow( const in int r, const in int row ) {
 ${glslReflect(shared.outgoing, false)}`;
 
 class MatrixMaterial extends MeshBasicMaterial {
-  constructor(readonly sum: LightSum, readonly shared: LastReflection, twoSided: boolean, source: Material, readonly gain?: { value: number }) {
+  constructor(
+    readonly sum: LightSum,
+    readonly shared: LastReflection,
+    twoSided: boolean,
+    source: Material,
+    readonly gain?: { value: number },
+  ) {
     super(gain ? { side: source.side } : diffuseParameters(source));
-    this.defines = { ...reflectionDefines(shared), ...(twoSided && { PRT_TWO_SIDED: '' }), ...(gain && { PRT_FALSE_COLOR: '' }) };
+    this.defines = {
+      ...reflectionDefines(shared),
+      ...(twoSided && { PRT_TWO_SIDED: '' }),
+      ...(gain && { PRT_FALSE_COLOR: '' }),
+    };
     if (gain) this.toneMapped = false;
   }
 
@@ -46,9 +77,21 @@ class MatrixMaterial extends MeshBasicMaterial {
   }
 
   override onBeforeCompile(shader: WebGLProgramParametersWithUniforms): void {
-    Object.assign(shader.uniforms, { prtRows: { value: this.sum.target.texture } }, reflectionUniforms(this.shared), this.gain && { prtGain: this.gain });
-    shader.vertexShader = vertexDeclarations(this.shared) + replaceOnce(shader.vertexShader, '#include <fog_vertex>', '#include <fog_vertex>' + glossVertexBody);
-    shader.fragmentShader = useExitRadiance(shader.fragmentShader, glossFragmentDeclarations, this.gain !== undefined, true);
+    Object.assign(
+      shader.uniforms,
+      { prtRows: { value: this.sum.target.texture } },
+      reflectionUniforms(this.shared),
+      this.gain && { prtGain: this.gain },
+    );
+    shader.vertexShader =
+      vertexDeclarations(this.shared) +
+      replaceOnce(shader.vertexShader, '#include <fog_vertex>', '#include <fog_vertex>' + glossVertexBody);
+    shader.fragmentShader = useExitRadiance(
+      shader.fragmentShader,
+      glossFragmentDeclarations,
+      this.gain !== undefined,
+      true,
+    );
   }
 
   override customProgramCacheKey(): string {
@@ -69,14 +112,28 @@ class MatrixTransfer implements BakedTransfer {
   private readonly materials = new Map<string, MatrixMaterial>();
   private readonly ofCoefficients = new Set<LightSum>();
 
-  constructor(header: TransferHeader, private readonly shared: LastReflection, values: ArrayBuffer, readonly meshes: Mesh[]) {
-    this.order = header.order, this.channels = header.channels, this.receivers = header.receivers, this.fileBytes = values.byteLength;
-    const { layout, data } = packBlocks({ ...header, count: shCount(header.order), channels: shared.rows * header.channels }, values);
-    this.layout = layout, this.transfer = blockTexture(layout, data);
+  constructor(
+    header: TransferHeader,
+    private readonly shared: LastReflection,
+    values: ArrayBuffer,
+    readonly meshes: Mesh[],
+  ) {
+    this.order = header.order;
+    this.channels = header.channels;
+    this.receivers = header.receivers;
+    this.fileBytes = values.byteLength;
+    const { layout, data } = packBlocks(
+      { ...header, count: shCount(header.order), channels: shared.rows * header.channels },
+      values,
+    );
+    this.layout = layout;
+    this.transfer = blockTexture(layout, data);
     this.sum = this.makeSum();
     let gpuBytes = data.byteLength + this.sum.bytes + reflectionBytes(shared);
     for (const mesh of meshes) {
-      const twoSided = mesh.geometry.hasAttribute('lambentReceiverBack'), source = mesh.material as Material, key = `${source.uuid} ${twoSided}`;
+      const twoSided = mesh.geometry.hasAttribute('lambentReceiverBack'),
+        source = mesh.material as Material,
+        key = `${source.uuid} ${twoSided}`;
       gpuBytes += mesh.geometry.getAttribute('position').count * (twoSided ? 8 : 4);
       const material = this.materials.get(key) ?? new MatrixMaterial(this.sum, shared, twoSided, source);
       this.materials.set(key, material);
@@ -86,10 +143,19 @@ class MatrixTransfer implements BakedTransfer {
   }
 
   private makeSum(): LightSum {
-    const { rows } = this.shared, texels = rows * this.receivers;
+    const { rows } = this.shared,
+      texels = rows * this.receivers;
     return new LightSum({
-      layout: this.layout, channels: this.channels, transfer: this.transfer, width: rowWidth, height: Math.ceil(texels / rowWidth), filter: NearestFilter,
-      what: { size: `has ${this.receivers.toLocaleString('en')} receivers of ${rows} rows, which take a texture`, use: 'is glossy' },
+      layout: this.layout,
+      channels: this.channels,
+      transfer: this.transfer,
+      width: rowWidth,
+      height: Math.ceil(texels / rowWidth),
+      filter: NearestFilter,
+      what: {
+        size: `has ${this.receivers.toLocaleString('en')} receivers of ${rows} rows, which take a texture`,
+        use: 'is glossy',
+      },
       pick: `
 uint prtPick( const in ivec2 texel, out int row ) {
   int i = texel.y * ${rowWidth} + texel.x;
@@ -103,9 +169,16 @@ uint prtPick( const in ivec2 texel, out int row ) {
     this.sum.check(renderer);
     checkReflection(this.shared, renderer);
     const { maxVertexTextures } = renderer.capabilities;
-    const wanted = Math.max(...this.meshes.map((mesh) => 3 + Number('isSkinnedMesh' in mesh) + Number(Object.keys(mesh.geometry.morphAttributes).length > 0)));
+    const wanted = Math.max(
+      ...this.meshes.map(
+        (mesh) => 3 + Number('isSkinnedMesh' in mesh) + Number(Object.keys(mesh.geometry.morphAttributes).length > 0),
+      ),
+    );
     if (maxVertexTextures < wanted)
-      throw new LambentError(`is relit in vertex shaders, which must read textures, ${wanted} at once; this graphics card reads ${maxVertexTextures} there`);
+      throw new LambentError(
+        `is relit in vertex shaders, which must read textures, ${wanted} at once; ` +
+          `this graphics card reads ${maxVertexTextures} there`,
+      );
   }
 
   relight(lighting: Lighting): void {
@@ -117,23 +190,38 @@ uint prtPick( const in ivec2 texel, out int row ) {
     const sum = this.makeSum();
     sum.set(new Float64Array(3 * shCount(this.order)).fill(1, 3 * index, 3 * index + 3));
     this.ofCoefficients.add(sum);
-    const made = this.meshes.map((mesh) => new MatrixMaterial(sum, this.shared, mesh.geometry.hasAttribute('lambentReceiverBack'), mesh.material as Material, gain));
+    const made = this.meshes.map(
+      (mesh) =>
+        new MatrixMaterial(
+          sum,
+          this.shared,
+          mesh.geometry.hasAttribute('lambentReceiverBack'),
+          mesh.material as Material,
+          gain,
+        ),
+    );
     afterAll(made, () => (this.ofCoefficients.delete(sum), sum.dispose()));
     return made;
   }
 
   dispose(): void {
     for (const sum of [this.sum, ...this.ofCoefficients]) sum.dispose();
-    this.transfer.dispose(), this.shared.frames.dispose(), this.shared.maps.dispose();
+    this.transfer.dispose();
+    this.shared.frames.dispose();
+    this.shared.maps.dispose();
     for (const material of this.materials.values()) material.dispose();
     for (const mesh of this.meshes) mesh.geometry.dispose();
   }
 }
 
 async function load(source: TransferSource): Promise<BakedTransfer> {
-  const header = readHeader(source.extension), { rows } = readOutgoing(source.extension.transfer), { receivers } = header;
+  const header = readHeader(source.extension),
+    { rows } = readOutgoing(source.extension.transfer),
+    { receivers } = header;
   if (rows * header.channels * Math.ceil(shCount(header.order) / 4) > 2048)
-    throw new LambentError(`has ${rows} rows of order ${header.order}, more than textures hold; "lambent render" draws it`);
+    throw new LambentError(
+      `has ${rows} rows of order ${header.order}, more than textures hold; "lambent render" draws it`,
+    );
   const shared = await loadLastReflection(source, receivers);
   const values = await source.bufferView(header.bufferView);
   const meshes = await Promise.all(source.extension.parts.map((part) => bindPart(source, part, receivers)));

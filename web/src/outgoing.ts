@@ -1,9 +1,18 @@
-// The last reflection (docs/matrices.md; docs/file-format.md, "outgoing"): radiance = sum over rows (a(wo) + colour b(wo)) X, X = T . light, in the frame of
-// each receiver: by a look-up in the material's map (map, svd), or by harmonics of the outgoing direction. Rows are of a matrix (matrix.ts) or of
-// lobes (zonal.ts).
+// The last reflection (docs/matrices.md; docs/file-format.md, "outgoing"): radiance = sum over rows (a(wo) + colour
+// b(wo)) X, X = T . light, in the frame of each receiver: by a look-up in the material's map (map, svd), or by
+// harmonics of the outgoing direction. Rows are of a matrix (matrix.ts) or of lobes (zonal.ts).
 //
 // Budget: 32 bytes a receiver for its frame and map, and 8 bytes a row and node of each map.
-import { ClampToEdgeWrapping, DataTexture, FloatType, HalfFloatType, LinearFilter, NearestFilter, RGBAFormat, type WebGLRenderer } from 'three';
+import {
+  ClampToEdgeWrapping,
+  DataTexture,
+  FloatType,
+  HalfFloatType,
+  LinearFilter,
+  NearestFilter,
+  RGBAFormat,
+  type WebGLRenderer,
+} from 'three';
 import { LambentError } from './errors.js';
 import { isIndex } from './glb.js';
 import { glslHarmonics } from './glsl_harmonics.js';
@@ -38,12 +47,14 @@ export function mapLayout(grid: number, maps: number, rows: number): { across: n
 
 /** [map][y][x][row][4] to tiles. */
 export function packMaps(grid: number, maps: number, rows: number, values: Uint16Array): Uint16Array {
-  const { across, width, height } = mapLayout(grid, maps, rows), out = new Uint16Array(4 * width * height);
+  const { across, width, height } = mapLayout(grid, maps, rows),
+    out = new Uint16Array(4 * width * height);
   for (let m = 0, from = 0; m < maps; ++m)
     for (let y = 0; y < grid; ++y)
       for (let x = 0; x < grid; ++x)
         for (let r = 0; r < rows; ++r, from += 4) {
-          const tile = m * rows + r, to = 4 * ((Math.floor(tile / across) * grid + y) * width + (tile % across) * grid + x);
+          const tile = m * rows + r,
+            to = 4 * ((Math.floor(tile / across) * grid + y) * width + (tile % across) * grid + x);
           for (let c = 0; c < 4; ++c) out[to + c] = values[from + c]!;
         }
   return out;
@@ -58,7 +69,8 @@ function weighRows({ kind, order, hasB }: Outgoing): string {
   vec2 size = vec2( textureSize( prtMaps, 0 ) );
   for ( int row = 0; row < PRT_SUM_ROWS; ++ row ) {
     int tile = view_map * PRT_SUM_ROWS + row;
-    vec4 w = textureLod( prtMaps, ( vec2( float( tile % PRT_ACROSS ), float( tile / PRT_ACROSS ) ) * float( PRT_GRID ) + place ) / size, 0.0 );
+    vec2 corner = vec2( float( tile % PRT_ACROSS ), float( tile / PRT_ACROSS ) ) * float( PRT_GRID );
+    vec4 w = textureLod( prtMaps, ( corner + place ) / size, 0.0 );
     vec3 x = prtRow( r, row );
     gloss += w.rgb * x, coloured += w.a * x;
   }`;
@@ -71,10 +83,16 @@ function weighRows({ kind, order, hasB }: Outgoing): string {
   const scale = kind === 'hsh' ? `${Math.SQRT2} * ` : '';
   return `
   vec3 n = ${kind === 'hsh' ? 'vec3( 2.0 * sqrt( wo.z / ( 1.0 + wo.z ) ) * wo.xy, 2.0 * wo.z - 1.0 )' : 'wo'};
-  ${glslHarmonics(order, (i, y) => `gloss += ( ${scale}${y} ) * prtRow( r, ${i} );${hasB ? ` coloured += ( ${scale}${y} ) * prtRow( r, ${n + i} );` : ''}`)}`;
+  ${glslHarmonics(order, (i, y) => {
+    const gloss = `gloss += ( ${scale}${y} ) * prtRow( r, ${i} );`;
+    return hasB ? `${gloss} coloured += ( ${scale}${y} ) * prtRow( r, ${n + i} );` : gloss;
+  })}`;
 }
 
-/** GLSL: prtReflect( receiver, view, out gloss, out coloured ), from vec3 prtRow( receiver, row ); with `turns`, frames turned by prtFrame. */
+/**
+ * GLSL: prtReflect( receiver, view, out gloss, out coloured ), from vec3 prtRow( receiver, row ); with `turns`, frames
+ * turned by prtFrame.
+ */
 export const glslReflect = (outgoing: Outgoing, turns: boolean): string => /* glsl */ `
 uniform highp sampler2D prtFrames;
 uniform highp sampler2D prtMaps;
@@ -138,38 +156,77 @@ export interface LastReflection {
 }
 
 export const reflectionDefines = ({ outgoing, rows }: LastReflection): Record<string, number> => ({
-  PRT_SUM_ROWS: rows, PRT_GRID: outgoing.grid, PRT_ACROSS: mapLayout(outgoing.grid, outgoing.maps, rows).across });
-export const reflectionUniforms = ({ frames, maps }: LastReflection): Record<string, { value: DataTexture }> => ({ prtFrames: { value: frames }, prtMaps: { value: maps } });
-export const reflectionKey = ({ outgoing: { kind, order, hasB } }: LastReflection): string => `${kind} ${order} ${hasB}`; // the rest is in the defines
-export const reflectionBytes = ({ frames, maps }: LastReflection): number => frames.image.data!.byteLength + maps.image.data!.byteLength;
+  PRT_SUM_ROWS: rows,
+  PRT_GRID: outgoing.grid,
+  PRT_ACROSS: mapLayout(outgoing.grid, outgoing.maps, rows).across,
+});
+export const reflectionUniforms = ({ frames, maps }: LastReflection): Record<string, { value: DataTexture }> => ({
+  prtFrames: { value: frames },
+  prtMaps: { value: maps },
+});
+export const reflectionKey = ({ outgoing: { kind, order, hasB } }: LastReflection): string =>
+  `${kind} ${order} ${hasB}`; // the rest is in the defines
+export const reflectionBytes = ({ frames, maps }: LastReflection): number =>
+  frames.image.data!.byteLength + maps.image.data!.byteLength;
 
-export function checkReflection({ frames, maps }: LastReflection, { capabilities: { maxTextureSize } }: WebGLRenderer): void {
+export function checkReflection(
+  { frames, maps }: LastReflection,
+  { capabilities: { maxTextureSize } }: WebGLRenderer,
+): void {
   for (const { image } of [frames, maps])
     if (Math.max(image.width, image.height) > maxTextureSize)
-      throw new LambentError(`takes a texture of ${image.width} x ${image.height} texels, where this graphics card takes ${maxTextureSize}`);
+      throw new LambentError(
+        `takes a texture of ${image.width} x ${image.height} texels, where this graphics card takes ${maxTextureSize}`,
+      );
 }
 
 const isKind = (value: unknown): value is Outgoing['kind'] => kinds.some((kind) => kind === value);
 
 /** What a matrix has beside its header; refuses what does not fit. */
-export function readOutgoing(transfer: TransferSource['extension']['transfer']): { outgoing: Outgoing; rows: number; views: Record<string, unknown> } {
+export function readOutgoing(transfer: TransferSource['extension']['transfer']): {
+  outgoing: Outgoing;
+  rows: number;
+  views: Record<string, unknown>;
+} {
   const { rows, outgoing: given } = transfer;
   if (typeof given !== 'object' || given === null) throw new LambentError('holds a matrix and no "outgoing"');
-  const views = given as Record<string, unknown>, { kind, order, hasB, grid, mapCount } = views;
-  if (!isKind(kind)) throw new LambentError(`holds the outgoing basis "${String(kind)}", which this version does not know`);
+  const views = given as Record<string, unknown>,
+    { kind, order, hasB, grid, mapCount } = views;
+  if (!isKind(kind))
+    throw new LambentError(`holds the outgoing basis "${String(kind)}", which this version does not know`);
   if (!isIndex(order, maxShOrder) || order < 1) throw new LambentError('the outgoing "order" is out of range');
   if (!isIndex(rows, 2 * maxShOrder * maxShOrder) || rows < 1) throw new LambentError('"rows" is out of range');
   if (hasB !== undefined && typeof hasB !== 'boolean') throw new LambentError('"hasB" is neither true nor false');
   const isMapped = kind === 'map' || kind === 'svd';
-  if (isMapped && (!isIndex(grid, 256) || grid < 2 || !isIndex(mapCount, 65535) || mapCount < 1)) throw new LambentError('view maps have no size');
-  const outgoing: Outgoing = { kind, order, hasB: hasB !== false, grid: isMapped ? (grid as number) : 2, maps: isMapped ? (mapCount as number) : 0 };
+  if (isMapped && (!isIndex(grid, 256) || grid < 2 || !isIndex(mapCount, 65535) || mapCount < 1))
+    throw new LambentError('view maps have no size');
+  const outgoing: Outgoing = {
+    kind,
+    order,
+    hasB: hasB !== false,
+    grid: isMapped ? (grid as number) : 2,
+    maps: isMapped ? (mapCount as number) : 0,
+  };
   if (outgoingRows(outgoing, rows) !== rows) throw new LambentError('"rows" does not fit the outgoing basis');
   return { outgoing, rows, views };
 }
 
-function texture(data: Float32Array | Uint16Array, width: number, height: number, filter: typeof NearestFilter | typeof LinearFilter): DataTexture {
-  const made = new DataTexture(data, width, height, RGBAFormat, data instanceof Uint16Array ? HalfFloatType : FloatType);
-  made.minFilter = made.magFilter = filter, made.wrapS = made.wrapT = ClampToEdgeWrapping, made.generateMipmaps = false;
+function texture(
+  data: Float32Array | Uint16Array,
+  width: number,
+  height: number,
+  filter: typeof NearestFilter | typeof LinearFilter,
+): DataTexture {
+  const made = new DataTexture(
+    data,
+    width,
+    height,
+    RGBAFormat,
+    data instanceof Uint16Array ? HalfFloatType : FloatType,
+  );
+  made.minFilter = made.magFilter = filter;
+  made.wrapS = made.wrapT = ClampToEdgeWrapping;
+  made.generateMipmaps = false;
   made.needsUpdate = true;
   return made;
 }
@@ -181,21 +238,32 @@ export async function loadLastReflection(source: TransferSource, receivers: numb
     const index = views[name];
     if (!isIndex(index)) throw new LambentError(`the last reflection has no "${name}"`);
     const found = await source.bufferView(index);
-    if (found.byteLength !== bytes) throw new LambentError(`the last reflection's "${name}" holds ${found.byteLength} bytes where its header makes ${bytes}`);
+    if (found.byteLength !== bytes)
+      throw new LambentError(
+        `the last reflection's "${name}" holds ${found.byteLength} bytes where its header makes ${bytes}`,
+      );
     return found;
   };
-  const frames = new Float32Array(await view('frames', 24 * receivers)), isMapped = outgoing.maps > 0;
+  const frames = new Float32Array(await view('frames', 24 * receivers)),
+    isMapped = outgoing.maps > 0;
   const mapOf = isMapped ? new Uint16Array(await view('mapOf', 2 * receivers)) : undefined;
   for (const m of mapOf ?? []) if (m >= outgoing.maps) throw new LambentError(`view map ${m} does not exist`);
   const placed = new Float32Array(4 * rowWidth * Math.ceil((2 * receivers) / rowWidth));
   for (let r = 0; r < receivers; ++r) {
-    placed.set(frames.subarray(6 * r, 6 * r + 3), 8 * r), placed.set(frames.subarray(6 * r + 3, 6 * r + 6), 8 * r + 4);
+    placed.set(frames.subarray(6 * r, 6 * r + 3), 8 * r);
+    placed.set(frames.subarray(6 * r + 3, 6 * r + 6), 8 * r + 4);
     placed[8 * r + 3] = mapOf?.[r] ?? 0;
   }
   let maps = texture(new Uint16Array(4), 1, 1, NearestFilter);
   if (isMapped) {
-    const { grid, maps: count } = outgoing, { width, height } = mapLayout(grid, count, rows);
-    maps = texture(packMaps(grid, count, rows, new Uint16Array(await view('maps', 8 * count * grid * grid * rows))), width, height, LinearFilter);
+    const { grid, maps: count } = outgoing,
+      { width, height } = mapLayout(grid, count, rows);
+    maps = texture(
+      packMaps(grid, count, rows, new Uint16Array(await view('maps', 8 * count * grid * grid * rows))),
+      width,
+      height,
+      LinearFilter,
+    );
   }
   return { outgoing, rows, frames: texture(placed, rowWidth, placed.length / 4 / rowWidth, NearestFilter), maps };
 }

@@ -1,5 +1,5 @@
-// The GLTFLoader plugin: `new GLTFLoader().register((parser) => new LambentTransferPlugin(parser))`. A file with our extension
-// comes with `gltf.userData.lambent`, a BakedScene; files without it are left alone.
+// The GLTFLoader plugin: `new GLTFLoader().register((parser) => new LambentTransferPlugin(parser))`. A file with our
+// extension comes with `gltf.userData.lambent`, a BakedScene; files without it are left alone.
 import type { Material, Mesh, Object3D } from 'three';
 import type { GLTF, GLTFLoaderPlugin, GLTFParser } from 'three/addons/loaders/GLTFLoader.js';
 import { LambentError } from './errors.js';
@@ -16,7 +16,8 @@ export interface BakedScene {
 }
 
 /** The baked scene of a loaded file, or undefined. */
-export const bakedScene = (gltf: { userData: Record<string, unknown> }): BakedScene | undefined => gltf.userData['lambent'] as BakedScene | undefined;
+export const bakedScene = (gltf: { userData: Record<string, unknown> }): BakedScene | undefined =>
+  gltf.userData['lambent'] as BakedScene | undefined;
 
 interface Association {
   nodes?: number;
@@ -49,7 +50,8 @@ interface Document {
 /** Our extension of a primitive, by "node primitive"; empty where it has none. */
 function primitiveOf(document: Document, key: string): Record<string, unknown> {
   const [node, primitive] = key.split(' ').map(Number) as [number, number];
-  const extension = document.meshes?.[document.nodes?.[node]?.mesh ?? -1]?.primitives?.[primitive]?.extensions?.[extensionName];
+  const extension =
+    document.meshes?.[document.nodes?.[node]?.mesh ?? -1]?.primitives?.[primitive]?.extensions?.[extensionName];
   return typeof extension === 'object' && extension !== null ? (extension as Record<string, unknown>) : {};
 }
 
@@ -77,7 +79,8 @@ export class LambentTransferPlugin implements GLTFLoaderPlugin {
       ownMaterial: async (part) => {
         const own = primitiveOf(document, `${part.node} ${part.primitive}`)['ownMaterial'];
         if (own === undefined) return source.mesh(part).material as Material;
-        if (!isIndex(own, (document.materials?.length ?? 0) - 1)) throw new LambentError('a primitive\'s "ownMaterial" does not exist');
+        if (!isIndex(own, (document.materials?.length ?? 0) - 1))
+          throw new LambentError('a primitive\'s "ownMaterial" does not exist');
         return (await this.parser.getDependency('material', own)) as Material;
       },
     };

@@ -1,7 +1,12 @@
-// A MeshBasicMaterial whose "white" is the exit radiance of the vertex's receiver, transfer . light, so that colour, texture, vertex
-// colours, fog, clipping, skinning and tone mapping are three's own.
+// A MeshBasicMaterial whose "white" is the exit radiance of the vertex's receiver, transfer . light, so that colour,
+// texture, vertex colours, fog, clipping, skinning and tone mapping are three's own.
 import {
-  MeshBasicMaterial, type DataArrayTexture, type DataTexture, type Material, type Matrix3, type MeshBasicMaterialParameters,
+  MeshBasicMaterial,
+  type DataArrayTexture,
+  type DataTexture,
+  type Material,
+  type Matrix3,
+  type MeshBasicMaterialParameters,
   type WebGLProgramParametersWithUniforms,
 } from 'three';
 import type { BlockLayout } from './block_texture.js';
@@ -20,9 +25,18 @@ export const whiteLine = 'reflectedLight.indirectDiffuse += vec3( 1.0 );';
 export function diffuseParameters(source: Material): MeshBasicMaterialParameters {
   const from = source as Partial<MeshBasicMaterial> & Material;
   return {
-    name: source.name, side: source.side, transparent: source.transparent, opacity: source.opacity, alphaTest: source.alphaTest,
-    depthWrite: source.depthWrite, depthTest: source.depthTest, vertexColors: source.vertexColors, visible: source.visible,
-    ...(from.color && { color: from.color }), ...(from.map && { map: from.map }), ...(from.alphaMap && { alphaMap: from.alphaMap }),
+    name: source.name,
+    side: source.side,
+    transparent: source.transparent,
+    opacity: source.opacity,
+    alphaTest: source.alphaTest,
+    depthWrite: source.depthWrite,
+    depthTest: source.depthTest,
+    vertexColors: source.vertexColors,
+    visible: source.visible,
+    ...(from.color && { color: from.color }),
+    ...(from.map && { map: from.map }),
+    ...(from.alphaMap && { alphaMap: from.alphaMap }),
   };
 }
 
@@ -39,7 +53,10 @@ export interface PrtUniforms {
 export interface PrtShader {
   /** Of programs: the same for the same GLSL. */
   key: string;
-  /** Defines vec3 prtRadiance( uint receiver ), from prtValues( receiver, k ), prtLight and prtFrame; with `gloss`, prtReflect in its place (outgoing.ts). */
+  /**
+   * Defines vec3 prtRadiance( uint receiver ), from prtValues( receiver, k ), prtLight and prtFrame; with `gloss`,
+   * prtReflect in its place (outgoing.ts).
+   */
   radiance: string;
   gloss?: boolean;
   /** Whether prtFrame is asked for. */
@@ -52,7 +69,10 @@ export interface PrtOptions {
   layout: BlockLayout;
   channels: 1 | 3;
   shader: PrtShader;
-  /** The pose that was baked, where the kind turns: bone matrices, four texels a bone as in three's own bone texture, or the inverse of the mesh's. */
+  /**
+   * The pose that was baked, where the kind turns: bone matrices, four texels a bone as in three's own bone texture, or
+   * the inverse of the mesh's.
+   */
   rest?: { bones: DataTexture } | { inverse: Matrix3 };
   /** Vertices have receivers on their back as well. */
   twoSided: boolean;
@@ -73,7 +93,8 @@ uniform vec4 prtLight[ 3 * PRT_LIGHT_QUADS ];
 // Values 4k .. 4k + 3 of a receiver.
 vec4 prtValues( const in uint receiver, const in int k ) {
   int r = int( receiver );
-  ivec3 at = ivec3( ( r & ( PRT_COLUMNS - 1 ) ) * PRT_TEXELS, ( r / PRT_COLUMNS ) & ( PRT_ROWS - 1 ), r / ( PRT_COLUMNS * PRT_ROWS ) );
+  ivec3 at = ivec3( ( r & ( PRT_COLUMNS - 1 ) ) * PRT_TEXELS, ( r / PRT_COLUMNS ) & ( PRT_ROWS - 1 ),
+                    r / ( PRT_COLUMNS * PRT_ROWS ) );
   return texelFetch( prtTransfer, at + ivec3( k, 0, 0 ), 0 );
 }
 
@@ -84,13 +105,15 @@ vec4 prtValues( const in uint receiver, const in int k ) {
     uniform highp sampler2D prtRestBones;
     mat3 prtRestBone( const in float i ) {
       int size = textureSize( prtRestBones, 0 ).x, j = int( i ) * 4, x = j % size, y = j / size;
-      return mat3( texelFetch( prtRestBones, ivec2( x, y ), 0 ).xyz, texelFetch( prtRestBones, ivec2( x + 1, y ), 0 ).xyz,
+      return mat3( texelFetch( prtRestBones, ivec2( x, y ), 0 ).xyz,
+                   texelFetch( prtRestBones, ivec2( x + 1, y ), 0 ).xyz,
                    texelFetch( prtRestBones, ivec2( x + 2, y ), 0 ).xyz );
     }
   #else
     uniform mat3 prtRestInverse;
   #endif
-  // The orthogonal part of a gradient: Higham's iteration, whose error squares at each step. Flat gradients keep the axes.
+  // The orthogonal part of a gradient: Higham's iteration, whose error squares at each step. Flat gradients keep the
+  // axes.
   mat3 prtOrthogonal( const in mat3 gradient ) {
     mat3 q = gradient;
     for ( int i = 0; i < 6; ++ i ) {
@@ -105,7 +128,8 @@ vec4 prtValues( const in uint receiver, const in int k ) {
 const turnBody = /* glsl */ `
   #ifdef PRT_TURNS
     #ifdef USE_SKINNING
-      mat3 prtNow = skinWeight.x * mat3( boneMatX ) + skinWeight.y * mat3( boneMatY ) + skinWeight.z * mat3( boneMatZ ) + skinWeight.w * mat3( boneMatW );
+      mat3 prtNow = skinWeight.x * mat3( boneMatX ) + skinWeight.y * mat3( boneMatY ) +
+                    skinWeight.z * mat3( boneMatZ ) + skinWeight.w * mat3( boneMatW );
       mat3 prtThen = skinWeight.x * prtRestBone( skinIndex.x ) + skinWeight.y * prtRestBone( skinIndex.y )
                    + skinWeight.z * prtRestBone( skinIndex.z ) + skinWeight.w * prtRestBone( skinIndex.w );
       prtFrame = prtOrthogonal( prtNow * inverse( prtThen ) );
@@ -149,14 +173,25 @@ vec3 prtExitRadiance() {
 `;
 
 /**
- * three's own fragment shader with prtExitRadiance() for white. `addsGloss`: and with prtGloss(), which base colour does not tint; then both may
- * be negative, and only their sum is clamped.
+ * three's own fragment shader with prtExitRadiance() for white. `addsGloss`: and with prtGloss(), which base colour
+ * does not tint; then both may be negative, and only their sum is clamped.
  */
-export function useExitRadiance(fragmentShader: string, declarations: string, falseColor: boolean, addsGloss = false): string {
+export function useExitRadiance(
+  fragmentShader: string,
+  declarations: string,
+  falseColor: boolean,
+  addsGloss = false,
+): string {
   const radiance = addsGloss ? 'prtExitRadiance()' : 'max( prtExitRadiance(), vec3( 0.0 ) )';
-  const lit = falseColorScale + declarations + replaceOnce(fragmentShader, whiteLine, `reflectedLight.indirectDiffuse += ${radiance};`);
-  const last = falseColor ? `outgoingLight = prtScale( prtGain * luminance( prtExitRadiance()${addsGloss ? ' + prtGloss()' : ''} ) );`
-    : addsGloss ? 'outgoingLight = max( outgoingLight + prtGloss(), vec3( 0.0 ) );' : '';
+  const lit =
+    falseColorScale +
+    declarations +
+    replaceOnce(fragmentShader, whiteLine, `reflectedLight.indirectDiffuse += ${radiance};`);
+  const last = falseColor
+    ? `outgoingLight = prtScale( prtGain * luminance( prtExitRadiance()${addsGloss ? ' + prtGloss()' : ''} ) );`
+    : addsGloss
+      ? 'outgoingLight = max( outgoingLight + prtGloss(), vec3( 0.0 ) );'
+      : '';
   return last ? replaceOnce(lit, '#include <opaque_fragment>', `${last}\n#include <opaque_fragment>`) : lit;
 }
 
@@ -169,18 +204,38 @@ export class PrtMaterial extends MeshBasicMaterial {
     super(parameters);
     const { order, layout, channels, twoSided, falseColor, shader } = options;
     this.defines = {
-      PRT_LIGHT_QUADS: Math.ceil((order * order) / 4), PRT_QUADS: layout.quads, PRT_TEXELS: layout.texels, PRT_COLUMNS: layout.columns, PRT_ROWS: layout.rows, PRT_CHANNELS: channels,
-      ...(twoSided && { PRT_TWO_SIDED: '' }), ...(falseColor && { PRT_FALSE_COLOR: '' }), ...(shader.turns && { PRT_TURNS: '' }), ...shader.defines,
+      PRT_LIGHT_QUADS: Math.ceil((order * order) / 4),
+      PRT_QUADS: layout.quads,
+      PRT_TEXELS: layout.texels,
+      PRT_COLUMNS: layout.columns,
+      PRT_ROWS: layout.rows,
+      PRT_CHANNELS: channels,
+      ...(twoSided && { PRT_TWO_SIDED: '' }),
+      ...(falseColor && { PRT_FALSE_COLOR: '' }),
+      ...(shader.turns && { PRT_TURNS: '' }),
+      ...shader.defines,
     };
     if (falseColor) this.toneMapped = false;
   }
 
   override onBeforeCompile(shader: WebGLProgramParametersWithUniforms): void {
     const { falseColor, rest, shader: kind } = this.options;
-    Object.assign(shader.uniforms, this.prtUniforms, falseColor && { prtGain: falseColor.gain }, rest && ('bones' in rest ? { prtRestBones: { value: rest.bones } } : { prtRestInverse: { value: rest.inverse } }));
-    const declarations = vertexDeclarations + (kind.gloss ? glossVaryings : '') + kind.radiance, body = turnBody + (kind.gloss ? glossVertexBody : radianceBody);
-    shader.vertexShader = declarations + replaceOnce(shader.vertexShader, '#include <fog_vertex>', '#include <fog_vertex>' + body);
-    shader.fragmentShader = useExitRadiance(shader.fragmentShader, kind.gloss ? glossFragmentDeclarations : fragmentDeclarations, falseColor !== undefined, kind.gloss);
+    Object.assign(
+      shader.uniforms,
+      this.prtUniforms,
+      falseColor && { prtGain: falseColor.gain },
+      rest && ('bones' in rest ? { prtRestBones: { value: rest.bones } } : { prtRestInverse: { value: rest.inverse } }),
+    );
+    const declarations = vertexDeclarations + (kind.gloss ? glossVaryings : '') + kind.radiance,
+      body = turnBody + (kind.gloss ? glossVertexBody : radianceBody);
+    shader.vertexShader =
+      declarations + replaceOnce(shader.vertexShader, '#include <fog_vertex>', '#include <fog_vertex>' + body);
+    shader.fragmentShader = useExitRadiance(
+      shader.fragmentShader,
+      kind.gloss ? glossFragmentDeclarations : fragmentDeclarations,
+      falseColor !== undefined,
+      kind.gloss,
+    );
   }
 
   override customProgramCacheKey(): string {

@@ -1,7 +1,7 @@
-// Real spherical harmonics: orthonormal, with the Condon-Shortley sign, coefficient index l(l+1)+m, at raw (x, y, z) with +z as
-// the pole. ORDER n means n bands, l = 0 .. n-1, and n^2 coefficients (docs/conventions.md).
-// Source: P.-P. Sloan, "Stupid spherical harmonics tricks" (2008); normalised Legendre recurrences, with sin^m cos/sin(m phi)
-// taken from powers of (x + iy), so that no angle is computed.
+// Real spherical harmonics: orthonormal, with the Condon-Shortley sign, coefficient index l(l+1)+m, at raw (x, y, z)
+// with +z as the pole. ORDER n means n bands, l = 0 .. n-1, and n^2 coefficients (docs/conventions.md). Source: P.-P.
+// Sloan, "Stupid spherical harmonics tricks" (2008); normalised Legendre recurrences, with sin^m cos/sin(m phi) taken
+// from powers of (x + iy), so that no angle is computed.
 
 export const maxShOrder = 16;
 
@@ -12,13 +12,14 @@ export const shBand = (index: number): number => Math.floor(Math.sqrt(index));
 /** Order of a vector of so many coefficients; throws where that is no square from 1 to 256. */
 export function shOrder(count: number): number {
   const order = Math.round(Math.sqrt(count));
-  if (order < 1 || order > maxShOrder || order * order !== count) throw new RangeError(`${count} coefficients are no whole number of bands`);
+  if (order < 1 || order > maxShOrder || order * order !== count)
+    throw new RangeError(`${count} coefficients are no whole number of bands`);
   return order;
 }
 
 /**
- * Factors of the recurrences for q(l, m), the normalised Legendre function divided by sin^m:
- * q(m, m) = diagonal[m], q(l, m) = a(l, m) z q(l-1, m) + b(l, m) q(l-2, m). The sign and the root of 2 are in the diagonal.
+ * Factors of the recurrences for q(l, m), the normalised Legendre function divided by sin^m: q(m, m) = diagonal[m],
+ * q(l, m) = a(l, m) z q(l-1, m) + b(l, m) q(l-2, m). The sign and the root of 2 are in the diagonal.
  */
 export interface LegendreFactors {
   diagonal: number[];
@@ -41,25 +42,36 @@ export const legendre: LegendreFactors = (() => {
     for (let l = 1; l < maxShOrder; ++l) for (let m = 0; m < l; ++m) values[l * maxShOrder + m] = f(l, m);
     return values;
   };
-  const tableA = table(a), tableB = table(b);
+  const tableA = table(a),
+    tableB = table(b);
   return { diagonal, a: (l, m) => tableA[l * maxShOrder + m]!, b: (l, m) => tableB[l * maxShOrder + m]! };
 })();
 
 /** Values of the first order^2 harmonics at the unit direction (x, y, z), into out. */
-export function evaluateSh(order: number, x: number, y: number, z: number, out: Float64Array | Float32Array | number[]): void {
-  let c = 1, s = 0; // real and imaginary part of (x + iy)^m
+export function evaluateSh(
+  order: number,
+  x: number,
+  y: number,
+  z: number,
+  out: Float64Array | Float32Array | number[],
+): void {
+  let c = 1,
+    s = 0; // real and imaginary part of (x + iy)^m
   for (let m = 0; m < order; ++m) {
-    let q1 = legendre.diagonal[m]!, q2 = 0;
+    let q1 = legendre.diagonal[m]!,
+      q2 = 0;
     for (let l = m; l < order; ++l) {
       if (l > m) {
         const q = z * legendre.a(l, m) * q1 + legendre.b(l, m) * q2;
-        q2 = q1, q1 = q;
+        q2 = q1;
+        q1 = q;
       }
       out[shIndex(l, m)] = q1 * c;
       if (m > 0) out[shIndex(l, -m)] = q1 * s;
     }
     const next = c * x - s * y;
-    s = c * y + s * x, c = next;
+    s = c * y + s * x;
+    c = next;
   }
 }
 

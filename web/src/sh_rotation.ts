@@ -1,6 +1,6 @@
-// Rotation of spherical harmonics of any order, (Rf)(s) = f(R^-1 s): one dense block a band.
-// Follows: J. Ivanic and K. Ruedenberg, "Rotation matrices for real spherical harmonics. Direct determination by recursion",
-// J. Phys. Chem. 100 (1996) with the corrections of 102 (1998). Their harmonics lack the Condon-Shortley sign: element (m, n) takes
+// Rotation of spherical harmonics of any order, (Rf)(s) = f(R^-1 s): one dense block a band. Follows: J. Ivanic and K.
+// Ruedenberg, "Rotation matrices for real spherical harmonics. Direct determination by recursion", J. Phys. Chem. 100
+// (1996) with the corrections of 102 (1998). Their harmonics lack the Condon-Shortley sign: element (m, n) takes
 // (-1)^(m+n) at the end.
 import { shCount } from './sh.js';
 
@@ -32,7 +32,8 @@ function p(i: number, a: number, n: number, l: number, first: Block, below: Bloc
 }
 
 function element(l: number, m: number, n: number, first: Block, below: Block): number {
-  const am = Math.abs(m), isZero = m === 0 ? 1 : 0;
+  const am = Math.abs(m),
+    isZero = m === 0 ? 1 : 0;
   const denominator = Math.abs(n) < l ? (l + n) * (l - n) : 2 * l * (2 * l - 1);
   const u = Math.sqrt(((l + m) * (l - m)) / denominator);
   const v = 0.5 * Math.sqrt(((1 + isZero) * (l + am - 1) * (l + am)) / denominator) * (1 - 2 * isZero);
@@ -57,7 +58,8 @@ export function makeShRotation(order: number, R: ArrayLike<number>): ShRotation 
   const axis = [1, 2, 0]; // m = -1, 0, 1 are y, z, x
   const first = new Block(1);
   for (let m = -1; m <= 1; ++m) for (let n = -1; n <= 1; ++n) first.set(m, n, R[3 * axis[m + 1]! + axis[n + 1]!]!);
-  let band = new Block(0), at = 0;
+  let band = new Block(0),
+    at = 0;
   band.set(0, 0, 1);
   for (let l = 0; l < order; ++l) {
     if (l === 1) band = first;
@@ -66,7 +68,8 @@ export function makeShRotation(order: number, R: ArrayLike<number>): ShRotation 
       for (let m = -l; m <= l; ++m) for (let n = -l; n <= l; ++n) next.set(m, n, element(l, m, n, first, band));
       band = next;
     }
-    for (let m = -l; m <= l; ++m) for (let n = -l; n <= l; ++n) blocks[at++] = (m + n) % 2 ? -band.at(m, n) : band.at(m, n);
+    for (let m = -l; m <= l; ++m)
+      for (let n = -l; n <= l; ++n) blocks[at++] = (m + n) % 2 ? -band.at(m, n) : band.at(m, n);
   }
   return { order, blocks };
 }
@@ -76,15 +79,23 @@ export function rotateSh(rotation: ShRotation, light: ArrayLike<number>, out: Fl
   if (light.length < 3 * shCount(rotation.order)) throw new RangeError('the light has fewer bands than the rotation');
   let at = 0;
   for (let l = 0; l < rotation.order; ++l) {
-    const n = 2 * l + 1, base = l * l;
+    const n = 2 * l + 1,
+      base = l * l;
     for (let row = 0; row < n; ++row, at += n) {
-      let r = 0, g = 0, b = 0;
+      let r = 0,
+        g = 0,
+        b = 0;
       for (let k = 0; k < n; ++k) {
-        const f = rotation.blocks[at + k]!, i = 3 * (base + k);
-        r += f * light[i]!, g += f * light[i + 1]!, b += f * light[i + 2]!;
+        const f = rotation.blocks[at + k]!,
+          i = 3 * (base + k);
+        r += f * light[i]!;
+        g += f * light[i + 1]!;
+        b += f * light[i + 2]!;
       }
       const o = 3 * (base + row);
-      out[o] = r, out[o + 1] = g, out[o + 2] = b;
+      out[o] = r;
+      out[o + 1] = g;
+      out[o + 2] = b;
     }
   }
 }

@@ -1,11 +1,18 @@
-// Transfer as a texture of zonal lobes (`lambent patch`, .lpt; docs/zonal.md) on any mesh with texture coordinates: relief that shades itself, still or
-// bending. Follows: Sloan, Luna and Snyder, "Local, Deformable Precomputed Radiance Transfer" (2005), sections 5 and 6: each pixel takes the exact bands
-// bilinearly and the lobes of the nearest texel, turns them into its own frame, and looks the light's bands up by direction (eq. 24 and 25).
+// Transfer as a texture of zonal lobes (`lambent patch`, .lpt; docs/zonal.md) on any mesh with texture coordinates:
+// relief that shades itself, still or bending. Follows: Sloan, Luna and Snyder, "Local, Deformable Precomputed Radiance
+// Transfer" (2005), sections 5 and 6: each pixel takes the exact bands bilinearly and the lobes of the nearest texel,
+// turns them into its own frame, and looks the light's bands up by direction (eq. 24 and 25).
 //
-// Budget: as a vertex has in block_texture.ts, a texel for a receiver; 8 * 128 * 64 * (order - 2) bytes for the table, drawn on the graphics card when the
-// light changes.
+// Budget: as a vertex has in block_texture.ts, a texel for a receiver; 8 * 128 * 64 * (order - 2) bytes for the table,
+// drawn on the graphics card when the light changes.
 import {
-  LinearFilter, MeshBasicMaterial, RepeatWrapping, Vector2, type DataArrayTexture, type MeshBasicMaterialParameters, type WebGLProgramParametersWithUniforms,
+  LinearFilter,
+  MeshBasicMaterial,
+  RepeatWrapping,
+  Vector2,
+  type DataArrayTexture,
+  type MeshBasicMaterialParameters,
+  type WebGLProgramParametersWithUniforms,
   type WebGLRenderer,
 } from 'three';
 import { blockTexture, packBlocks, type BlockLayout } from './block_texture.js';
@@ -17,7 +24,9 @@ import { replaceOnce, useExitRadiance } from './prt_material.js';
 import { maxShOrder, shBand, shCount } from './sh.js';
 import { exactZonalBands, maxLobes, zonalSum, zonalValues } from './zonal.js';
 
-const maxSide = 4096, tableWidth = 128, tableHeight = 64;
+const maxSide = 4096,
+  tableWidth = 128,
+  tableHeight = 64;
 
 export interface TransferTexture {
   width: number;
@@ -31,16 +40,27 @@ export interface TransferTexture {
 
 /** The bytes of a .lpt file (transfer/zonal_texture.h). Throws LambentError, one sentence, where they are none. */
 export function readTransferTexture(bytes: ArrayBuffer): TransferTexture {
-  const view = new DataView(bytes), magic = bytes.byteLength >= 64 ? new TextDecoder('latin1').decode(new Uint8Array(bytes, 0, 8)) : '';
-  if (!magic.startsWith('LMBTLPT')) throw new LambentError('is not a texture of zonal lobes (make one with "lambent patch")');
+  const view = new DataView(bytes),
+    magic = bytes.byteLength >= 64 ? new TextDecoder('latin1').decode(new Uint8Array(bytes, 0, 8)) : '';
+  if (!magic.startsWith('LMBTLPT'))
+    throw new LambentError('is not a texture of zonal lobes (make one with "lambent patch")');
   if (magic !== 'LMBTLPT1') throw new LambentError('is a texture of zonal lobes of another version');
-  const [width, height, order, lobes, channels, valueBytes] = [0, 1, 2, 3, 4, 5].map((k) => view.getUint32(8 + 4 * k, true)) as [number, number, number, number, number, number];
+  const [width, height, order, lobes, channels, valueBytes] = [0, 1, 2, 3, 4, 5].map((k) =>
+    view.getUint32(8 + 4 * k, true),
+  ) as [number, number, number, number, number, number];
   if (view.getUint32(32, true) !== 0) throw new LambentError('is a table of grooves, which this viewer does not draw');
   const within = (x: number, most: number): boolean => x >= 1 && x <= most;
-  if (!within(width, maxSide) || !within(height, maxSide)) throw new LambentError('its width or height is out of range');
-  if (!within(order, maxShOrder) || !within(lobes, maxLobes) || (channels !== 1 && channels !== 3)) throw new LambentError('its order, lobes or channels are out of range');
+  if (!within(width, maxSide) || !within(height, maxSide))
+    throw new LambentError('its width or height is out of range');
+  if (!within(order, maxShOrder) || !within(lobes, maxLobes) || (channels !== 1 && channels !== 3))
+    throw new LambentError('its order, lobes or channels are out of range');
   if (valueBytes !== 2 && valueBytes !== 4) throw new LambentError('its precision is not known to this program');
-  const header = { count: zonalValues(order, lobes, channels), channels: 1, precision: valueBytes === 2 ? 'half' : 'single', receivers: width * height } as const;
+  const header = {
+    count: zonalValues(order, lobes, channels),
+    channels: 1,
+    precision: valueBytes === 2 ? 'half' : 'single',
+    receivers: width * height,
+  } as const;
   const { layout, data } = packBlocks(header, bytes.slice(64));
   return { width, height, order, lobes, channels, layout, texture: blockTexture(layout, data) };
 }
@@ -65,19 +85,27 @@ precision highp float;
 uniform vec4 prtLight[ 3 * PRT_LIGHT_QUADS ];
 out vec4 band;
 vec3 prtLightAt( const in int k ) {
-  return vec3( prtLight[ k >> 2 ][ k & 3 ], prtLight[ PRT_LIGHT_QUADS + ( k >> 2 ) ][ k & 3 ], prtLight[ 2 * PRT_LIGHT_QUADS + ( k >> 2 ) ][ k & 3 ] );
+  int quad = k >> 2, at = k & 3;
+  return vec3( prtLight[ quad ][ at ], prtLight[ PRT_LIGHT_QUADS + quad ][ at ],
+               prtLight[ 2 * PRT_LIGHT_QUADS + quad ][ at ] );
 }
 void main() {
   ivec2 at = ivec2( gl_FragCoord.xy );
   int l = ${exact} + at.y / ${tableHeight};
-  float phi = 6.28318531 * float( at.x ) / ${tableWidth}.0, theta = 3.14159265 * float( at.y % ${tableHeight} ) / ${tableHeight - 1}.0;
+  float phi = 6.28318531 * float( at.x ) / ${tableWidth}.0;
+  float theta = 3.14159265 * float( at.y % ${tableHeight} ) / ${tableHeight - 1}.0;
   vec3 n = vec3( sin( theta ) * cos( phi ), sin( theta ) * sin( phi ), cos( theta ) ), sum = vec3( 0.0 );
-  ${glslHarmonics(order, (index, y) => (shBand(index) < exact ? '' : `if ( l == ${shBand(index)} ) sum += ( ${y} ) * prtLightAt( ${index} );`))}
+  ${glslHarmonics(order, (index, y) =>
+    shBand(index) < exact ? '' : `if ( l == ${shBand(index)} ) sum += ( ${y} ) * prtLightAt( ${index} );`,
+  )}
   band = vec4( sum, 1.0 );
 }`;
 
 const fragmentDeclarations = ({ order, lobes, channels, layout, width, height }: TransferTexture): string => {
-  const exact = exactZonalBands(order, lobes), bands = order - exact, exactQuads = Math.ceil((channels * shCount(exact)) / 4), exactValues = channels * shCount(exact);
+  const exact = exactZonalBands(order, lobes),
+    bands = order - exact,
+    exactQuads = Math.ceil((channels * shCount(exact)) / 4),
+    exactValues = channels * shCount(exact);
   return /* glsl */ `
 #define PRT_QUADS ${layout.quads}
 uniform highp sampler2DArray prtTransfer;
@@ -88,14 +116,17 @@ varying vec3 vPrtPosition, vPrtNormal;
 varying vec2 vPrtPlace;
 mat3 prtFrame = mat3( 1.0 );
 vec3 prtBand( const in vec3 n, const in int l ) {
-  vec2 at = vec2( atan( n.y, n.x ) * ${0.5 / Math.PI}, acos( clamp( n.z, - 1.0, 1.0 ) ) * ${(tableHeight - 1) / Math.PI} );
-  return textureLod( prtTable, vec2( at.x + ${0.5 / tableWidth}, ( at.y + float( ${tableHeight} * l ) + 0.5 ) / ${tableHeight * Math.max(1, bands)}.0 ), 0.0 ).rgb;
+  vec2 at = vec2( atan( n.y, n.x ) * ${0.5 / Math.PI},
+                  acos( clamp( n.z, - 1.0, 1.0 ) ) * ${(tableHeight - 1) / Math.PI} );
+  float y = ( at.y + float( ${tableHeight} * l ) + 0.5 ) / ${tableHeight * Math.max(1, bands)}.0;
+  return textureLod( prtTable, vec2( at.x + ${0.5 / tableWidth}, y ), 0.0 ).rgb;
 }
 ${zonalSum(order, lobes, channels, true)}
 vec4 prtTexel( const in ivec2 place, const in int k ) {
   ivec2 p = ivec2( ( place.x + ${width} ) % ${width}, ( place.y + ${height} ) % ${height} );
   int r = p.y * ${width} + p.x;
-  ivec3 at = ivec3( ( r & ${layout.columns - 1} ) * ${layout.texels}, ( r / ${layout.columns} ) & ${layout.rows - 1}, r / ${layout.columns * layout.rows} );
+  ivec3 at = ivec3( ( r & ${layout.columns - 1} ) * ${layout.texels}, ( r / ${layout.columns} ) & ${layout.rows - 1},
+                    r / ${layout.columns * layout.rows} );
   return texelFetch( prtTransfer, at + ivec3( k, 0, 0 ), 0 );
 }
 vec3 prtExitRadiance() {
@@ -113,36 +144,60 @@ vec3 prtExitRadiance() {
     prtFrame = mat3( along, dot( up, down ) > 0.0 ? - up : up, n );
   } else {
     float side = n.z < 0.0 ? - 1.0 : 1.0, a = - 1.0 / ( side + n.z ), b = n.x * n.y * a;
-    prtFrame = mat3( vec3( 1.0 + side * n.x * n.x * a, side * b, - side * n.x ), vec3( b, side + n.y * n.y * a, - n.y ), n );
+    prtFrame = mat3( vec3( 1.0 + side * n.x * n.x * a, side * b, - side * n.x ),
+                     vec3( b, side + n.y * n.y * a, - n.y ), n );
   }
-  vec2 place = fract( vPrtPlace * prtTile ) * vec2( ${width}.0, ${height}.0 ), corner = floor( place - 0.5 ), f = place - 0.5 - corner;
+  vec2 place = fract( vPrtPlace * prtTile ) * vec2( ${width}.0, ${height}.0 );
+  vec2 corner = floor( place - 0.5 ), f = place - 0.5 - corner;
   ivec2 c = ivec2( corner ), nearest = ivec2( place );
   vec4 v[ PRT_QUADS ];
   for ( int k = 0; k < PRT_QUADS; ++ k ) v[ k ] = prtTexel( nearest, k );
   for ( int k = 0; k < ${exactQuads}; ++ k ) {
-    vec4 mean = mix( mix( prtTexel( c, k ), prtTexel( c + ivec2( 1, 0 ), k ), f.x ), mix( prtTexel( c + ivec2( 0, 1 ), k ), prtTexel( c + ivec2( 1, 1 ), k ), f.x ), f.y );
-    ${exactValues % 4 === 0 ? 'v[ k ] = mean;' : `bvec4 exact = lessThan( ivec4( 4 * k ) + ivec4( 0, 1, 2, 3 ), ivec4( ${exactValues} ) );
-    v[ k ] = mix( v[ k ], mean, vec4( exact ) );`}
+    vec4 low = mix( prtTexel( c, k ), prtTexel( c + ivec2( 1, 0 ), k ), f.x );
+    vec4 high = mix( prtTexel( c + ivec2( 0, 1 ), k ), prtTexel( c + ivec2( 1, 1 ), k ), f.x );
+    vec4 mean = mix( low, high, f.y );
+    ${
+      exactValues % 4 === 0
+        ? 'v[ k ] = mean;'
+        : `bvec4 exact = lessThan( ivec4( 4 * k ) + ivec4( 0, 1, 2, 3 ), ivec4( ${exactValues} ) );
+    v[ k ] = mix( v[ k ], mean, vec4( exact ) );`
+    }
   }
   return prtSum( v );
 }
 `;
 };
 
-/** What shows a transfer texture: white is its exit radiance, and all else a MeshBasicMaterial's own. Meshes need texture coordinates and normals. */
+/**
+ * What shows a transfer texture: white is its exit radiance, and all else a MeshBasicMaterial's own. Meshes need
+ * texture coordinates and normals.
+ */
 export class TransferTextureMaterial extends MeshBasicMaterial {
   /** Repetitions of the texture over the unit of texture coordinates. */
   readonly tile = new Vector2(1, 1);
   private readonly light: Float32Array;
   private readonly table: DrawnPicture;
 
-  constructor(readonly transfer: TransferTexture, parameters: MeshBasicMaterialParameters = {}) {
+  constructor(
+    readonly transfer: TransferTexture,
+    parameters: MeshBasicMaterialParameters = {},
+  ) {
     super(parameters);
-    const { order, lobes } = transfer, exact = exactZonalBands(order, lobes), quads = Math.ceil(shCount(order) / 4);
+    const { order, lobes } = transfer,
+      exact = exactZonalBands(order, lobes),
+      quads = Math.ceil(shCount(order) / 4);
     this.light = new Float32Array(12 * quads);
-    this.table = new DrawnPicture(tableWidth, tableHeight * Math.max(1, order - exact), LinearFilter, { size: 'takes a table', use: 'is lit by a table of directions' }, {
-      fragmentShader: tableShader(order, exact), defines: { PRT_LIGHT_QUADS: quads }, uniforms: { prtLight: { value: this.light } },
-    });
+    this.table = new DrawnPicture(
+      tableWidth,
+      tableHeight * Math.max(1, order - exact),
+      LinearFilter,
+      { size: 'takes a table', use: 'is lit by a table of directions' },
+      {
+        fragmentShader: tableShader(order, exact),
+        defines: { PRT_LIGHT_QUADS: quads },
+        uniforms: { prtLight: { value: this.light } },
+      },
+    );
     this.table.target.texture.wrapS = RepeatWrapping;
     this.defines = { PRT_TRANSFER_TEXTURE: '' };
   }
@@ -164,9 +219,14 @@ export class TransferTextureMaterial extends MeshBasicMaterial {
 
   override onBeforeCompile(shader: WebGLProgramParametersWithUniforms): void {
     Object.assign(shader.uniforms, {
-      prtTransfer: { value: this.transfer.texture }, prtTable: { value: this.table.target.texture }, prtTile: { value: this.tile }, prtLight: { value: this.light },
+      prtTransfer: { value: this.transfer.texture },
+      prtTable: { value: this.table.target.texture },
+      prtTile: { value: this.tile },
+      prtLight: { value: this.light },
     });
-    shader.vertexShader = vertexDeclarations + replaceOnce(shader.vertexShader, '#include <fog_vertex>', '#include <fog_vertex>' + vertexBody);
+    shader.vertexShader =
+      vertexDeclarations +
+      replaceOnce(shader.vertexShader, '#include <fog_vertex>', '#include <fog_vertex>' + vertexBody);
     shader.fragmentShader = useExitRadiance(shader.fragmentShader, fragmentDeclarations(this.transfer), false);
   }
 

@@ -1,6 +1,6 @@
-// What baking is compared with: a diffuse surface under the same light, but with nothing in its way. Exit radiance of white is
-// sum_lm A_l / pi L_lm y_lm(n), by the Funk-Hecke theorem (docs/theory.md), summed at the vertex so that it is interpolated as baked
-// transfer is. A_l vanishes for odd l beyond 1; what is left is generated without loops.
+// What baking is compared with: a diffuse surface under the same light, but with nothing in its way. Exit radiance of
+// white is sum_lm A_l / pi L_lm y_lm(n), by the Funk-Hecke theorem (docs/theory.md), summed at the vertex so that it is
+// interpolated as baked transfer is. A_l vanishes for odd l beyond 1; what is left is generated without loops.
 import { MeshBasicMaterial, type WebGLProgramParametersWithUniforms, type MeshBasicMaterialParameters } from 'three';
 import { glslHarmonics } from './glsl_harmonics.js';
 import type { Lighting } from './lighting.js';
@@ -34,23 +34,35 @@ export class UnshadowedMaterial extends MeshBasicMaterial {
   relight(lighting: Lighting): void {
     const light = lighting.coefficients(this.order);
     irradianceIndices(this.order).forEach((index, at) => {
-      for (let c = 0; c < 3; ++c) this.light.value[3 * at + c] = (light[3 * index + c]! * clampedCosine(shBand(index))) / Math.PI;
+      for (let c = 0; c < 3; ++c)
+        this.light.value[3 * at + c] = (light[3 * index + c]! * clampedCosine(shBand(index))) / Math.PI;
     });
   }
 
   override onBeforeCompile(shader: WebGLProgramParametersWithUniforms): void {
     shader.uniforms['irradianceLight'] = this.light;
-    const declarations = `uniform vec3 irradianceLight[ ${irradianceIndices(this.order).length} ];\nvarying vec3 vEven;\nvarying vec3 vOdd;\n`;
+    const count = irradianceIndices(this.order).length;
+    const declarations = `uniform vec3 irradianceLight[ ${count} ];\nvarying vec3 vEven;\nvarying vec3 vOdd;\n`;
     const body = `
   vec3 n = normalize( ( vec4( transformedNormal, 0.0 ) * viewMatrix ).xyz );
   vec3 even = vec3( 0.0 ), odd = vec3( 0.0 );
   ${glslIrradiance(this.order)}
   vEven = even; vOdd = odd;`;
-    const withNormals = replaceOnce(shader.vertexShader, '#if defined ( USE_ENVMAP ) || defined ( USE_SKINNING )', '#if 1');
-    shader.vertexShader = declarations + replaceOnce(withNormals, '#include <fog_vertex>', '#include <fog_vertex>' + body);
+    const withNormals = replaceOnce(
+      shader.vertexShader,
+      '#if defined ( USE_ENVMAP ) || defined ( USE_SKINNING )',
+      '#if 1',
+    );
+    shader.vertexShader =
+      declarations + replaceOnce(withNormals, '#include <fog_vertex>', '#include <fog_vertex>' + body);
     // On the back the normal is the other way, and odd harmonics change sign.
-    shader.fragmentShader = 'varying vec3 vEven;\nvarying vec3 vOdd;\n' + replaceOnce(shader.fragmentShader, whiteLine,
-      'reflectedLight.indirectDiffuse += max( gl_FrontFacing ? vEven + vOdd : vEven - vOdd, vec3( 0.0 ) );');
+    shader.fragmentShader =
+      'varying vec3 vEven;\nvarying vec3 vOdd;\n' +
+      replaceOnce(
+        shader.fragmentShader,
+        whiteLine,
+        'reflectedLight.indirectDiffuse += max( gl_FrontFacing ? vEven + vOdd : vEven - vOdd, vec3( 0.0 ) );',
+      );
   }
 
   override customProgramCacheKey(): string {

@@ -1,7 +1,19 @@
-// Transfer at vertices, whatever its kind: a texture of every receiver's values, receivers as attributes, and light as uniforms.
+// Transfer at vertices, whatever its kind: a texture of every receiver's values, receivers as attributes, and light as
+// uniforms.
 import {
-  DataTexture, DataUtils, FloatType, Matrix3, RedFormat, RGBAFormat, Uint32BufferAttribute, type DataArrayTexture, type Material, type Mesh, type Object3D,
-  type SkinnedMesh, type WebGLRenderer,
+  DataTexture,
+  DataUtils,
+  FloatType,
+  Matrix3,
+  RedFormat,
+  RGBAFormat,
+  Uint32BufferAttribute,
+  type DataArrayTexture,
+  type Material,
+  type Mesh,
+  type Object3D,
+  type SkinnedMesh,
+  type WebGLRenderer,
 } from 'three';
 import { blockTexture, packBlocks } from './block_texture.js';
 import { LambentError } from './errors.js';
@@ -16,8 +28,14 @@ import { diffuseParameters, PrtMaterial, type PrtOptions, type PrtShader, type P
 import { shCount } from './sh.js';
 
 /** The part's mesh, its vertices with their receivers. */
-export async function bindPart(source: TransferSource, part: TransferExtension['parts'][number], receivers: number): Promise<Mesh> {
-  const mesh = source.mesh(part), geometry = shareGeometry(mesh.geometry), vertices = geometry.getAttribute('position').count;
+export async function bindPart(
+  source: TransferSource,
+  part: TransferExtension['parts'][number],
+  receivers: number,
+): Promise<Mesh> {
+  const mesh = source.mesh(part),
+    geometry = shareGeometry(mesh.geometry),
+    vertices = geometry.getAttribute('position').count;
   const add = async (name: string, view: unknown): Promise<void> => {
     const map = await readReceivers(source, view, vertices, receivers, 'a part does not have one receiver a vertex');
     geometry.setAttribute(name, new Uint32BufferAttribute(map, 1));
@@ -28,11 +46,16 @@ export async function bindPart(source: TransferSource, part: TransferExtension['
   return mesh;
 }
 
-/** Bone matrices as they stand on loading (world matrices are up to date), which is the pose that was baked; laid out as three's bone texture. */
+/**
+ * Bone matrices as they stand on loading (world matrices are up to date), which is the pose that was baked; laid out as
+ * three's bone texture.
+ */
 function restBones(mesh: SkinnedMesh): DataTexture {
   mesh.skeleton.update();
-  const matrices = mesh.skeleton.boneMatrices!, bones = mesh.skeleton.bones.length;
-  const size = Math.max(4, Math.ceil(Math.sqrt(4 * bones) / 4) * 4), data = new Float32Array(4 * size * size);
+  const matrices = mesh.skeleton.boneMatrices!,
+    bones = mesh.skeleton.bones.length;
+  const size = Math.max(4, Math.ceil(Math.sqrt(4 * bones) / 4) * 4),
+    data = new Float32Array(4 * size * size);
   data.set(matrices.subarray(0, 16 * bones));
   const texture = new DataTexture(data, size, size, RGBAFormat, FloatType);
   texture.needsUpdate = true;
@@ -41,7 +64,8 @@ function restBones(mesh: SkinnedMesh): DataTexture {
 
 const errorWidth = 2048;
 function errorTexture(errors: Float32Array): DataTexture {
-  const height = Math.ceil(errors.length / errorWidth), data = new Float32Array(errorWidth * height);
+  const height = Math.ceil(errors.length / errorWidth),
+    data = new Float32Array(errorWidth * height);
   data.set(errors);
   const texture = new DataTexture(data, errorWidth, height, RedFormat, FloatType);
   texture.needsUpdate = true;
@@ -49,7 +73,8 @@ function errorTexture(errors: Float32Array): DataTexture {
 }
 /** In place of a kind's own: the error of the receiver's fit. */
 const errorShader = ({ turns }: PrtShader): PrtShader => ({
-  key: 'fit error', turns,
+  key: 'fit error',
+  turns,
   radiance: `
 uniform highp sampler2D prtErrors;
 vec3 prtRadiance( const in uint receiver ) {
@@ -93,23 +118,47 @@ export class VertexTransfer implements BakedTransfer {
   private readonly materials = new Map<string, PrtMaterial>();
   private readonly quads: number; // of the light, a channel
 
-  private constructor(header: TransferHeader, { kind, count, valueChannels, shader, readLobes, fitErrors, last }: VertexKind, values: ArrayBuffer, readonly meshes: Mesh[]) {
-    this.kind = kind, this.order = header.order, this.channels = header.channels, this.receivers = header.receivers, this.fileBytes = values.byteLength;
-    const { layout, data } = packBlocks({ count, channels: valueChannels, precision: header.precision, receivers: header.receivers }, values);
+  private constructor(
+    header: TransferHeader,
+    { kind, count, valueChannels, shader, readLobes, fitErrors, last }: VertexKind,
+    values: ArrayBuffer,
+    readonly meshes: Mesh[],
+  ) {
+    this.kind = kind;
+    this.order = header.order;
+    this.channels = header.channels;
+    this.receivers = header.receivers;
+    this.fileBytes = values.byteLength;
+    const { layout, data } = packBlocks(
+      { count, channels: valueChannels, precision: header.precision, receivers: header.receivers },
+      values,
+    );
     this.last = last;
     this.quads = Math.ceil(shCount(header.order) / 4);
     this.texture = blockTexture(layout, data);
-    this.uniforms = { prtTransfer: { value: this.texture }, prtLight: { value: new Float32Array(12 * this.quads) }, ...(last && reflectionUniforms(last)) };
+    this.uniforms = {
+      prtTransfer: { value: this.texture },
+      prtLight: { value: new Float32Array(12 * this.quads) },
+      ...(last && reflectionUniforms(last)),
+    };
     let gpuBytes = data.byteLength + (last ? reflectionBytes(last) : 0);
     for (const mesh of meshes) {
       const twoSided = mesh.geometry.hasAttribute('lambentReceiverBack');
       const rest = shader.turns ? this.restOf(mesh) : undefined;
       const vertices = mesh.geometry.getAttribute('position').count;
-      const options: PrtOptions = { order: header.order, layout, channels: header.channels, shader, twoSided, ...(rest && { rest }) };
+      const options: PrtOptions = {
+        order: header.order,
+        layout,
+        channels: header.channels,
+        shader,
+        twoSided,
+        ...(rest && { rest }),
+      };
       gpuBytes += vertices * (twoSided ? 8 : 4);
       this.optionsOf.push(options);
       // Meshes of one material share its edition, unless each turns by itself.
-      const source = mesh.material as Material, key = `${source.uuid} ${twoSided} ${rest ? mesh.uuid : ''}`;
+      const source = mesh.material as Material,
+        key = `${source.uuid} ${twoSided} ${rest ? mesh.uuid : ''}`;
       const material = this.materials.get(key) ?? new PrtMaterial(this.uniforms, options, diffuseParameters(source));
       this.materials.set(key, material);
       mesh.material = material;
@@ -118,14 +167,24 @@ export class VertexTransfer implements BakedTransfer {
     if (fitErrors)
       this.fitErrorMaterials = (gain) => {
         const uniforms = { ...this.uniforms, prtErrors: { value: (this.errors ??= errorTexture(fitErrors)) } };
-        return meshes.map((mesh, i) => new PrtMaterial(uniforms, { ...this.optionsOf[i]!, shader: errorShader(shader), falseColor: { gain } }, { side: (mesh.material as Material).side }));
+        return meshes.map(
+          (mesh, i) =>
+            new PrtMaterial(
+              uniforms,
+              { ...this.optionsOf[i]!, shader: errorShader(shader), falseColor: { gain } },
+              { side: (mesh.material as Material).side },
+            ),
+        );
       };
     if (readLobes)
       this.lobesAt = (mesh, vertex, back) => {
         const receiver = mesh.geometry.getAttribute(back ? 'lambentReceiverBack' : 'lambentReceiver').getX(vertex);
         if (receiver === noReceiver) return undefined;
-        const stride = 4 * layout.texels, values = Array.from(data.subarray(stride * receiver, stride * receiver + count)); // block_texture.ts
-        const lobes = readLobes(data instanceof Uint16Array ? values.map((bits) => DataUtils.fromHalfFloat(bits)) : values);
+        const stride = 4 * layout.texels,
+          values = Array.from(data.subarray(stride * receiver, stride * receiver + count)); // block_texture.ts
+        const lobes = readLobes(
+          data instanceof Uint16Array ? values.map((bits) => DataUtils.fromHalfFloat(bits)) : values,
+        );
         const frame = surfaceFrame(mesh, vertex, this.optionsOf[meshes.indexOf(mesh)]!.rest!);
         for (const lobe of lobes) lobe.axis.applyMatrix3(frame);
         return lobes;
@@ -152,11 +211,22 @@ export class VertexTransfer implements BakedTransfer {
 
   check(renderer: WebGLRenderer): void {
     if (this.last) checkReflection(this.last, renderer);
-    // Transfer, frames and view maps, bones as they are and as they were, and three's own of morph targets. All else is within what WebGL 2 promises.
-    const wanted = Math.max(...this.meshes.map((mesh) =>
-      1 + (this.last ? 2 : 0) + ('isSkinnedMesh' in mesh ? 1 + Number(this.bones.size > 0) : 0) + Number(Object.keys(mesh.geometry.morphAttributes).length > 0)));
+    // Transfer, frames and view maps, bones as they are and as they were, and three's own of morph targets. All else is
+    // within what WebGL 2 promises.
+    const wanted = Math.max(
+      ...this.meshes.map(
+        (mesh) =>
+          1 +
+          (this.last ? 2 : 0) +
+          ('isSkinnedMesh' in mesh ? 1 + Number(this.bones.size > 0) : 0) +
+          Number(Object.keys(mesh.geometry.morphAttributes).length > 0),
+      ),
+    );
     if (renderer.capabilities.maxVertexTextures < wanted)
-      throw new LambentError(`is relit in vertex shaders, which must read textures, ${wanted} at once; this graphics card reads ${renderer.capabilities.maxVertexTextures} there`);
+      throw new LambentError(
+        `is relit in vertex shaders, which must read textures, ${wanted} at once; ` +
+          `this graphics card reads ${renderer.capabilities.maxVertexTextures} there`,
+      );
   }
 
   relight(lighting: Lighting): void {
@@ -167,11 +237,21 @@ export class VertexTransfer implements BakedTransfer {
     const light = new Float64Array(3 * shCount(this.order)).fill(1, 3 * index, 3 * index + 3);
     const uniforms = { ...this.uniforms, prtLight: { value: new Float32Array(12 * this.quads) } };
     packLight(uniforms.prtLight.value, light);
-    return this.meshes.map((mesh, i) => new PrtMaterial(uniforms, { ...this.optionsOf[i]!, falseColor: { gain } }, { side: (mesh.material as Material).side }));
+    return this.meshes.map(
+      (mesh, i) =>
+        new PrtMaterial(
+          uniforms,
+          { ...this.optionsOf[i]!, falseColor: { gain } },
+          { side: (mesh.material as Material).side },
+        ),
+    );
   }
 
   dispose(): void {
-    this.texture.dispose(), this.errors?.dispose(), this.last?.frames.dispose(), this.last?.maps.dispose();
+    this.texture.dispose();
+    this.errors?.dispose();
+    this.last?.frames.dispose();
+    this.last?.maps.dispose();
     for (const texture of this.bones.values()) texture.dispose();
     for (const material of this.materials.values()) material.dispose();
     for (const mesh of this.meshes) mesh.geometry.dispose();

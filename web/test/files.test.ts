@@ -14,17 +14,23 @@ describe('the transfer texture', () => {
     { count: 256, channels: 3, precision: 'half', receivers: 5000 }, // more than one layer
     { count: 1, channels: 1, precision: 'half', receivers: 1 },
   ] as BlockHeader[])
-    it(`holds every value where the shader looks: ${header.count} values, ${header.channels} channels, ${header.receivers} receivers`, () => {
-      const { count, channels, receivers } = header, blocks = Math.ceil(receivers / 16), next = random(count);
-      const length = blocks * channels * count * 16, values = header.precision === 'half' ? new Uint16Array(length) : new Float32Array(length);
+    it(`holds every value where the shader looks: ${JSON.stringify(header)}`, () => {
+      const { count, channels, receivers } = header,
+        blocks = Math.ceil(receivers / 16),
+        next = random(count);
+      const length = blocks * channels * count * 16,
+        values = header.precision === 'half' ? new Uint16Array(length) : new Float32Array(length);
       for (let i = 0; i < length; ++i) values[i] = Math.floor(65000 * next());
       const { layout, data } = packBlocks(header, values.buffer);
       expect(data.length).toBe(4 * layout.width * layout.height * layout.layers);
       expect(Math.max(layout.width, layout.height)).toBeLessThanOrEqual(2048);
       for (let i = 0; i < 5000; ++i) {
-        const r = Math.floor(next() * receivers), c = Math.floor(next() * channels), k = Math.floor(next() * count);
+        const r = Math.floor(next() * receivers),
+          c = Math.floor(next() * channels),
+          k = Math.floor(next() * count);
         const x = (r % layout.columns) * layout.texels + c * layout.quads + (k >> 2);
-        const y = Math.floor(r / layout.columns) % layout.rows, layer = Math.floor(r / (layout.columns * layout.rows));
+        const y = Math.floor(r / layout.columns) % layout.rows,
+          layer = Math.floor(r / (layout.columns * layout.rows));
         const texel = data[4 * ((layer * layout.height + y) * layout.width + x) + (k & 3)];
         expect(texel).toBe(values[(((r >> 4) * channels + c) * count + k) * 16 + (r & 15)]);
       }
@@ -32,7 +38,12 @@ describe('the transfer texture', () => {
 
   it('keeps to what WebGL2 promises for two million receivers of any order', () => {
     for (let order = 1; order <= 16; ++order) {
-      const { width, height, layers } = blockLayout({ count: order * order, channels: 3, precision: 'half', receivers: 2_000_000 });
+      const { width, height, layers } = blockLayout({
+        count: order * order,
+        channels: 3,
+        precision: 'half',
+        receivers: 2_000_000,
+      });
       expect(Math.max(width, height)).toBeLessThanOrEqual(2048);
       expect(layers).toBeLessThanOrEqual(256);
     }
@@ -44,36 +55,56 @@ describe('the transfer texture', () => {
   });
 
   it('refuses a length that does not fit', () => {
-    expect(() => packBlocks({ count: 4, channels: 1, precision: 'half', receivers: 17 }, new ArrayBuffer(128))).toThrow(/128 bytes.*256/);
+    expect(() => packBlocks({ count: 4, channels: 1, precision: 'half', receivers: 17 }, new ArrayBuffer(128))).toThrow(
+      /128 bytes.*256/,
+    );
   });
 
   it('uploads bits of half floats as they are', () => {
-    const half = DataUtils.toHalfFloat(-0.3125), values = new Uint16Array(16).fill(half);
+    const half = DataUtils.toHalfFloat(-0.3125),
+      values = new Uint16Array(16).fill(half);
     expect(packBlocks({ count: 1, channels: 1, precision: 'half', receivers: 16 }, values.buffer).data[0]).toBe(half);
   });
 });
 
 describe('zonal values', () => {
   // docs/zonal.md: bytes a vertex in half floats, grey, order 6.
-  it('take the bytes of the docs', () => expect([1, 2, 3, 4, 5, 6].map((lobes) => 2 * zonalValues(6, lobes, 1))).toEqual([18, 34, 50, 64, 78, 92]));
+  it('take the bytes of the docs', () =>
+    expect([1, 2, 3, 4, 5, 6].map((lobes) => 2 * zonalValues(6, lobes, 1))).toEqual([18, 34, 50, 64, 78, 92]));
 });
 
 describe('view maps', () => {
   it('lie as tiles where the shader looks', () => {
-    const grid = 64, maps = 5, rows = 25, next = random(3), values = Uint16Array.from({ length: 4 * maps * grid * grid * rows }, () => Math.floor(65535 * next()));
-    const { across, width, height } = mapLayout(grid, maps, rows), out = packMaps(grid, maps, rows, values);
+    const grid = 64,
+      maps = 5,
+      rows = 25,
+      next = random(3),
+      values = Uint16Array.from({ length: 4 * maps * grid * grid * rows }, () => Math.floor(65535 * next()));
+    const { across, width, height } = mapLayout(grid, maps, rows),
+      out = packMaps(grid, maps, rows, values);
     expect(out.length).toBe(4 * width * height);
     expect(width).toBeLessThanOrEqual(4096);
     for (let i = 0; i < 2000; ++i) {
-      const [m, y, x, r, c] = [maps, grid, grid, rows, 4].map((n) => Math.floor(next() * n)) as [number, number, number, number, number], tile = m * rows + r;
-      const px = (tile % across) * grid + x, py = Math.floor(tile / across) * grid + y;
+      const [m, y, x, r, c] = [maps, grid, grid, rows, 4].map((n) => Math.floor(next() * n)) as [
+          number,
+          number,
+          number,
+          number,
+          number,
+        ],
+        tile = m * rows + r;
+      const px = (tile % across) * grid + x,
+        py = Math.floor(tile / across) * grid + y;
       expect(out[4 * (py * width + px) + c]).toBe(values[4 * (((m * grid + y) * grid + x) * rows + r) + c]);
     }
   });
 
   it('are refused where they do not fit', () => {
     const map = { kind: 'map', order: 5, grid: 64, mapCount: 3, maps: 1, mapOf: 2, frames: 3 };
-    const read = (outgoing: unknown, rows: unknown = 25) => () => readOutgoing({ kind: 'matrix', rows, outgoing });
+    const read =
+      (outgoing: unknown, rows: unknown = 25) =>
+      () =>
+        readOutgoing({ kind: 'matrix', rows, outgoing });
     expect(read(map)()).toMatchObject({ rows: 25, outgoing: { kind: 'map', grid: 64, maps: 3 } });
     expect(read({ kind: 'sh', order: 4 }, 32)()).toMatchObject({ rows: 32, outgoing: { hasB: true } });
     expect(read(undefined)).toThrow(/no "outgoing"/);
@@ -90,14 +121,17 @@ describe('view maps', () => {
 
 /** A GLB with this JSON and no binary chunk. */
 function glb(json: unknown): ArrayBuffer {
-  const text = JSON.stringify(json).padEnd(Math.ceil(JSON.stringify(json).length / 4) * 4), bytes = new Uint8Array(20 + text.length), view = new DataView(bytes.buffer);
+  const text = JSON.stringify(json).padEnd(Math.ceil(JSON.stringify(json).length / 4) * 4),
+    bytes = new Uint8Array(20 + text.length),
+    view = new DataView(bytes.buffer);
   [0x46546c67, 2, bytes.length, text.length, 0x4e4f534a].forEach((v, i) => view.setUint32(4 * i, v, true));
   bytes.set(new TextEncoder().encode(text), 20);
   return bytes.buffer;
 }
 
 describe('files that are not what they should be', () => {
-  const transfer = { kind: 'diffuse' }, extension = (e: object) => glb({ extensions: { LAMBENT_transfer: { version: 1, transfer, parts: [], ...e } } });
+  const transfer = { kind: 'diffuse' },
+    extension = (e: object) => glb({ extensions: { LAMBENT_transfer: { version: 1, transfer, parts: [], ...e } } });
   const cases: [string, ArrayBuffer, RegExp][] = [
     ['empty', new ArrayBuffer(0), /is empty/],
     ['text', new TextEncoder().encode('hello, world, this is text').buffer, /not a glTF binary/],
@@ -110,8 +144,17 @@ describe('files that are not what they should be', () => {
   for (const [name, bytes, message] of cases) it(name, () => expect(() => checkBakedFile(bytes)).toThrow(message));
 
   it('what is not drawn yet, by name', () => {
-    const header = { kind: 'diffuse', basis: 'sh', order: 3, channels: 1, precision: 'half', receivers: 5, bufferView: 0 };
-    const read = (more: object, surface?: { kind: string }) => () => readHeader({ version: 1, transfer: { ...header, ...more }, parts: [], ...(surface && { surface }) });
+    const header = {
+      kind: 'diffuse',
+      basis: 'sh',
+      order: 3,
+      channels: 1,
+      precision: 'half',
+      receivers: 5,
+      bufferView: 0,
+    };
+    const read = (more: object, surface?: { kind: string }) => () =>
+      readHeader({ version: 1, transfer: { ...header, ...more }, parts: [], ...(surface && { surface }) });
     expect(read({})()).toMatchObject({ order: 3, channels: 1, receivers: 5 });
     expect(read({ lobes: [[0, 0, 1, 50]] })).toThrow(/lobes of light/);
     expect(read({ groups: ['all'] })).toThrow(/own lamps/);
@@ -124,11 +167,13 @@ describe('files that are not what they should be', () => {
   it('cut off anywhere', () => {
     const whole = extension({});
     checkBakedFile(whole);
-    for (let length = 0; length < whole.byteLength; ++length) expect(() => checkBakedFile(whole.slice(0, length)), `${length}`).toThrow(/empty|not a glTF|cut off/);
+    for (let length = 0; length < whole.byteLength; ++length)
+      expect(() => checkBakedFile(whole.slice(0, length)), `${length}`).toThrow(/empty|not a glTF|cut off/);
   });
 
   it('with any byte of the header changed never throws anything but a sentence', () => {
-    const whole = new Uint8Array(extension({})), next = random(77);
+    const whole = new Uint8Array(extension({})),
+      next = random(77);
     for (let i = 0; i < 4000; ++i) {
       const broken = whole.slice();
       for (let k = 0; k < 1 + (i % 3); ++k) broken[Math.floor(next() * broken.length)] = Math.floor(next() * 256);

@@ -1,14 +1,19 @@
-// The command-line tool, where it is built (LAMBENT_TOOL, or build/release/bin/lambent): the other half of every truth test.
+// The command-line tool, where it is built (LAMBENT_TOOL, or build/release/bin/lambent): the other half of every truth
+// test.
 import { execFileSync } from 'node:child_process';
 import { existsSync, mkdirSync, mkdtempSync, writeFileSync } from 'node:fs';
 import { join } from 'node:path';
 import { fileURLToPath } from 'node:url';
 
-export const toolPath = process.env['LAMBENT_TOOL'] ?? fileURLToPath(new URL('../../build/release/bin/lambent', import.meta.url));
+export const toolPath =
+  process.env['LAMBENT_TOOL'] ?? fileURLToPath(new URL('../../build/release/bin/lambent', import.meta.url));
 export const haveTool = existsSync(toolPath);
 if (!haveTool) console.warn(`skipped what compares with the tool: ${toolPath} is not built`);
 
-/** A new folder under build/web-tests, which scripts/web empties before and leaves after: a failed test's pictures can be looked at. */
+/**
+ * A new folder under build/web-tests, which scripts/web empties before and leaves after: a failed test's pictures can
+ * be looked at.
+ */
 export function makeFolder(): string {
   const all = fileURLToPath(new URL('../../build/web-tests/', import.meta.url));
   mkdirSync(all, { recursive: true });
@@ -31,19 +36,31 @@ export function random(seed: number): () => number {
 }
 
 /** An .hdr of RGBE texels without runs; f gives mantissas and exponent of texel (x, y). */
-export function writeHdr(path: string, width: number, height: number, f: (x: number, y: number) => [number, number, number, number]): void {
+export function writeHdr(
+  path: string,
+  width: number,
+  height: number,
+  f: (x: number, y: number) => [number, number, number, number],
+): void {
   const texels = Buffer.alloc(4 * width * height);
   for (let y = 0; y < height; ++y) for (let x = 0; x < width; ++x) texels.set(f(x, y), 4 * (y * width + x));
-  writeFileSync(path, Buffer.concat([Buffer.from(`#?RADIANCE\nFORMAT=32-bit_rle_rgbe\n\n-Y ${height} +X ${width}\n`), texels]));
+  writeFileSync(
+    path,
+    Buffer.concat([Buffer.from(`#?RADIANCE\nFORMAT=32-bit_rle_rgbe\n\n-Y ${height} +X ${width}\n`), texels]),
+  );
 }
 
 /** An asymmetric map: a bright warm blob, a broad cool one elsewhere, and unevenness of every texel. */
 export function writeLopsidedHdr(path: string, width = 96, height = 48, seed = 5): void {
   const noise = random(seed);
   writeHdr(path, width, height, (x, y) => {
-    const u = (x + 0.5) / width, v = (y + 0.5) / height;
-    const warm = Math.exp(-((u - 0.81) ** 2 + (v - 0.3) ** 2) / 0.004), cool = Math.exp(-((u - 0.37) ** 2 + (v - 0.55) ** 2) / 0.03);
-    const c = [3 * warm + 0.3 * cool + 0.05, 2 * warm + 0.6 * cool + 0.06, warm + 1.2 * cool + 0.04].map((k) => k * (0.6 + 0.8 * noise()));
+    const u = (x + 0.5) / width,
+      v = (y + 0.5) / height;
+    const warm = Math.exp(-((u - 0.81) ** 2 + (v - 0.3) ** 2) / 0.004),
+      cool = Math.exp(-((u - 0.37) ** 2 + (v - 0.55) ** 2) / 0.03);
+    const c = [3 * warm + 0.3 * cool + 0.05, 2 * warm + 0.6 * cool + 0.06, warm + 1.2 * cool + 0.04].map(
+      (k) => k * (0.6 + 0.8 * noise()),
+    );
     const exponent = Math.ceil(Math.log2(Math.max(...c)));
     const mantissa = c.map((k) => Math.max(1, Math.min(255, Math.floor(k * 2 ** (8 - exponent)))));
     return [mantissa[0]!, mantissa[1]!, mantissa[2]!, exponent + 128];

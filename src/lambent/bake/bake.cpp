@@ -1,9 +1,10 @@
 // Follows: general-prt. T0 holds direct light with shadows; X_{k+1} = T0 + B X_k sums the Neumann series term by term,
 // so X_k is the transfer of up to k bounces. It is also the radiosity equation's Jacobi step.
 #include <lambent/bake/bake.h>
-#include <lambent/bake/gather.h>
-#include <lambent/bake/kept_rows.h>
+#include <lambent/bake/columns.h>
 #include <lambent/bake/lobes.h>
+#include <lambent/bake/operator.h>
+#include <lambent/bake/solve.h>
 #include <lambent/core/parallel.h>
 #include <lambent/core/pool.h>
 
@@ -18,8 +19,6 @@ double seconds_since(std::chrono::steady_clock::time_point start) {
 
 size_t row_width(size_t coefficients, int channels) { return pad_lanes(coefficients * size_t(channels)); }
 
-size_t checked_count(size_t receivers) { return (receivers + check_every - 1) / check_every; }
-
 // Solution vectors: T0, X and the next X; T0 of half the rays at the checked receivers.
 size_t solution_bytes(size_t receivers, size_t coefficients, int channels) {
   return 4 *
@@ -33,18 +32,6 @@ size_t table_bytes(size_t receivers, size_t triangles, size_t coefficients, size
          size_t(thread_count()) * (48 * receivers + 48 * entries + 100 * samples);
 }
 
-// Luminance-free measure of how far `part` of the rays is from all of them.
-struct ErrorSum {
-  double difference = 0, total = 0;
-  void add(const float* half, const float* full, size_t n) {
-    for (size_t k = 0; k < n; ++k) {
-      difference += double(half[k] - full[k]) * (half[k] - full[k]);
-      total += double(full[k]) * full[k];
-    }
-  }
-  double relative() const { return total > 0 ? std::sqrt(difference / total) : 0.0; }
-};
-
 struct Baker {
   const Scene& scene;
   const Receivers& receivers;
@@ -55,7 +42,6 @@ struct Baker {
   const LobeSets lobes = make_lobe_sets(options.lobe_kind, options.lobes, options.samples, options.seed);
   Pool<LobeRays> lobe_rays{[this] { return std::make_unique<LobeRays>(make_lobe_rays(lobes)); }};
   Pool<GatherScratch, DeleteScratch> scratch{[this] { return make_gather_scratch(setup); }};
-  Pool<GatherBlock> gathered{[] { return std::make_unique<GatherBlock>(); }};
 
   size_t n() const { return receivers.count(); }
   size_t harmonics() const { return setup.coefficients(); }
@@ -100,7 +86,7 @@ struct Baker {
     const auto start = std::chrono::steady_clock::now();
     WritableTransfer out = make_transfer(options.light(), 1, 1, n(), options.precision);
     std::vector<uint8_t> buried(n());
-    std::vector<ErrorSum> errors((n() + gather_block - 1) / gather_block);
+    ErrorSums errors(n());
     {
       ProgressStage stage(progress, "tracing", n());
       parallel_for(n(), gather_block, [&](size_t begin, size_t end) {
@@ -113,8 +99,7 @@ struct Baker {
           const float* row = rows.data() + (r - begin) * coefficients();
           store_receiver(out, r, {row, coefficients()});
           if (r % check_every == 0 && !buried[r])
-            errors[begin / gather_block].add(half_rows.data() + (r - begin) / check_every * coefficients(), row,
-                                             coefficients());
+            errors.add(r, half_rows.data() + (r - begin) / check_every * coefficients(), row, coefficients());
         }
         stage.advance(end - begin);
       });
@@ -128,112 +113,57 @@ struct Baker {
       }
       store_receiver(out, step.receiver, mean);
     }
-    finish_report(buried, errors, start);
-    report.rays = n() * rays_each();
+    for (uint8_t b : buried) report.buried += b;
+    report.error = has_halves() ? errors.relative() : -1;
+    report.trace_seconds = seconds_since(start), report.rays = n() * rays_each();
     return std::move(out.transfer);
   }
 
   Result<Transfer> bounced() {
-    auto start = std::chrono::steady_clock::now();
     const size_t C = coefficients(), channels = size_t(setup.channels), width = row_width(C, setup.channels);
-    const size_t blocks = (n() + gather_block - 1) / gather_block;
     std::vector<float> T0(n() * C), T0_half(checked_count(n()) * C);
-    std::vector<uint8_t> buried(n());
     const size_t fixed = solution_bytes(n(), C, setup.channels) +
                          table_bytes(n(), scene.triangles.size(), C, size_t(options.samples)) +
                          lobe_set_bytes(options.samples, lobes.count());
-    const size_t budget = options.memory > fixed ? options.memory - fixed : 0;
-    KeptRows kept(blocks, budget, most_bytes(size_t(options.samples), n(), setup.channels));
+    auto B = GatherOperator::trace(
+        setup,
+        {.sky = {T0.data(), T0_half.data(), C, &lobes, nullptr},
+         .more = [&](size_t first, size_t count, const GatherSky& sky) { trace_sharp_lobes(first, count, sky); },
+         .halves = true,
+         .memory = options.memory > fixed ? options.memory - fixed : 0},
+        progress);
+    if (!B) return B.error();
+    report.trace_seconds = B->report().seconds, report.buried = B->report().buried;
+    report.operator_bytes = B->report().bytes, report.operator_kept = B->report().kept;
+    report.working_memory = fixed + report.operator_bytes;
 
-    auto sky_of = [&](size_t begin) {
-      return GatherSky{T0.data() + begin * C, T0_half.data() + begin / check_every * C, C, &lobes,
-                       buried.data() + begin};
-    };
-    {
-      ProgressStage stage(progress, "tracing", n());
-      parallel_for(n(), gather_block, [&](size_t begin, size_t end) {
-        if (stage.cancelled()) return;
-        auto block = gathered.borrow();
-        const GatherSky sky = sky_of(begin);
-        trace_gather(setup, *scratch.borrow(), begin, end - begin, block.get(), &sky);
-        trace_sharp_lobes(begin, end - begin, sky);
-        kept.keep(begin / gather_block, *block);
-        stage.advance(end - begin);
-      });
-      if (stage.cancelled()) return Error{"", "cancelled"};
-    }
-    report.rays = n() * rays_each();
-    report.operator_bytes = kept.bytes(), report.operator_kept = kept.fraction();
-    const auto fill = make_fill_steps(scene, receivers.basis, buried);
-    fill_buried(fill, T0.data(), C, C);
-    report.trace_seconds = seconds_since(start);
-    start = std::chrono::steady_clock::now();
-
-    // X = T0, the same in every channel, [receiver][coefficient][channel].
-    AlignedVector<float> X(n() * width, 0.0f), next(n() * width, 0.0f);
-    auto add_T0 = [&](const float* t, float* x) {
+    // T0 is the same in every channel; x is [receiver][coefficient][channel].
+    const auto start = std::chrono::steady_clock::now();
+    auto expand = [&](const float* t, float* x) {
       for (size_t k = 0; k < C; ++k)
-        for (size_t c = 0; c < channels; ++c) x[k * channels + c] += t[k];
+        for (size_t c = 0; c < channels; ++c) x[k * channels + c] = t[k];
+      std::fill(x + C * channels, x + width, 0.0f);
     };
-    parallel_for(n(), gather_block, [&](size_t begin, size_t end) {
-      for (size_t r = begin; r < end; ++r) add_T0(T0.data() + r * C, X.data() + r * width);
-    });
-
-    std::vector<ErrorSum> errors(blocks);
-    for (int bounce = 1; bounce <= options.bounces; ++bounce) {
-      const bool last = bounce == options.bounces;
-      ProgressStage stage(progress, "bounce " + std::to_string(bounce), n());
-      parallel_for(n(), gather_block, [&](size_t begin, size_t end) {
-        if (stage.cancelled()) return;
-        const size_t b = begin / gather_block;
-        const KeptRows::Block* found = kept.find(b);
-        auto again = gathered.borrow();
-        if (!found) trace_gather(setup, *scratch.borrow(), begin, end - begin, again.get(), nullptr);
-        const KeptRows::Block block = found ? *found : KeptRows::Block{again->rows.view(), again->half_rows.view()};
-        multiply_rows(block.rows, setup.channels, X.data(), width, setup.row_scale(size_t(options.samples)),
-                      next.data() + begin * width);
-        for (size_t r = begin; r < end; ++r) add_T0(T0.data() + r * C, next.data() + r * width);
-        if (last && has_halves()) {
-          AlignedVector<float> half(block.half_rows.row_count * width);
-          multiply_rows(block.half_rows, setup.channels, X.data(), width, setup.row_scale(setup.sets.half),
-                        half.data());
-          for (size_t r = begin, i = 0; r < end; r += check_every, ++i) {
-            add_T0(T0_half.data() + r / check_every * C, half.data() + i * width);
-            if (!buried[r]) errors[b].add(half.data() + i * width, next.data() + r * width, width);
-          }
-        }
-        stage.advance(end - begin);
+    Source source{[&](size_t r, float* x) { expand(T0.data() + r * C, x); }};
+    if (has_halves()) source.set_half = [&](size_t r, float* x) { expand(T0_half.data() + r / check_every * C, x); };
+    auto solution = bounce(*B, source, width, options.bounces, progress);
+    if (!solution) return solution.error();
+    auto store = [&](const AlignedVector<float>& x) {
+      return store_columns(options.light(), x.data(), 1, setup.channels, n(), width, options.precision);
+    };
+    Transfer result = store(solution->x);
+    report.error = solution->error;
+    if (options.keep_terms) {
+      solution->x = {};
+      auto ok = bounce_terms(*B, source, width, options.bounces, progress, [&](int, const auto& x) -> Result<void> {
+        report.terms.push_back(store(x));
+        return {};
       });
-      if (stage.cancelled()) return Error{"", "cancelled"};
-      report.rays += size_t(double(n()) * (1 - report.operator_kept) + 0.5) * size_t(options.samples);
-      fill_buried(fill, next.data(), width, width);
-      std::swap(X, next);
+      if (!ok) return ok.error();
     }
-
-    WritableTransfer out = make_transfer(options.light(), 1, setup.channels, n(), options.precision);
-    parallel_for(n(), gather_block, [&](size_t begin, size_t end) {
-      std::vector<float> row(C * channels);
-      for (size_t r = begin; r < end; ++r) {
-        for (size_t c = 0; c < channels; ++c)
-          for (size_t k = 0; k < C; ++k) row[c * C + k] = X[r * width + k * channels + c];
-        store_receiver(out, r, row);
-      }
-    });
+    report.rays = n() * (rays_each() - size_t(options.samples)) + B->report().rays;
     report.bounce_seconds = seconds_since(start);
-    report.working_memory = fixed + kept.bytes();
-    const double trace_seconds = report.trace_seconds;
-    finish_report(buried, errors, start);
-    report.trace_seconds = trace_seconds;
-    return std::move(out.transfer);
-  }
-
-  void finish_report(const std::vector<uint8_t>& buried, const std::vector<ErrorSum>& errors,
-                     std::chrono::steady_clock::time_point start) {
-    for (uint8_t b : buried) report.buried += b;
-    report.trace_seconds = seconds_since(start);
-    ErrorSum all;
-    for (const ErrorSum& e : errors) all.difference += e.difference, all.total += e.total;
-    report.error = has_halves() ? all.relative() : -1;
+    return result;
   }
 };
 
@@ -287,6 +217,7 @@ Result<Transfer> bake(const Scene& scene, const Tracer& tracer, const Receivers&
                                  " bytes of working memory, and was allowed " + std::to_string(options.memory)};
   auto result = !options.shadows ? baker.unshadowed() : options.bounces > 0 ? baker.bounced() : baker.direct();
   if (!result) return result;
+  if (options.keep_terms && r.terms.empty()) r.terms = {*result};
   r.receivers = receivers.count(), r.bytes = result->bytes();
   return result;
 }

@@ -7,6 +7,7 @@
 #include <lambent/transfer/transfer.h>
 
 #include <cstdint>
+#include <vector>
 
 namespace lambent {
 
@@ -21,6 +22,7 @@ struct BakeOptions {
   size_t memory = size_t{4} << 30;  // bytes of working memory beyond scene and result; less means rays traced again
   uint32_t seed = 1;                // of the ray directions
   Precision precision = Precision::half;  // of the stored transfer
+  bool keep_terms = false;                // BakeReport::terms, in as much time again as the bounces take
 
   LightBasis light() const { return {order, lobe_kind, lobes, {}}; }
 };
@@ -40,6 +42,9 @@ struct BakeReport {
   // sqrt(sum |half - full|^2 / sum |full|^2). Halves of one low-discrepancy set lean to either side of it, so this
   // overestimates a little. Negative if too few samples to tell.
   double error = -1;
+  // Where options.keep_terms says so, the result's terms: direct transfer, that of light reflected once, twice, ... E,
+  // B E, B^2 E. They add up to the result, but for rounding. Source: radiosity, "Neumann series".
+  std::vector<Transfer> terms;
 };
 
 // Least working memory (BakeOptions::memory) with which such a bake can run.

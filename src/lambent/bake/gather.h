@@ -6,6 +6,7 @@
 // (alpha = e + B alpha).
 #include <lambent/bake/directions.h>
 #include <lambent/bake/kernels.h>
+#include <lambent/bake/linear.h>
 #include <lambent/bake/lamps.h>
 #include <lambent/bake/lobes.h>
 #include <lambent/core/aligned.h>
@@ -16,11 +17,6 @@
 #include <vector>
 
 namespace lambent {
-
-// Receivers whose half-sample rows are kept too, to estimate the error: one in this many.
-inline constexpr size_t check_every = 16;
-// Receivers traced and multiplied as one piece of work.
-inline constexpr size_t gather_block = 64;
 
 // Rows of the sparse matrix B of neighbouring receivers, stored by columns (kernels.h): neighbours see the same
 // surfaces, so a column serves many of them. Weights are halves, `channels` an entry. Memory is someone else's: a

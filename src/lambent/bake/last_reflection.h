@@ -11,9 +11,10 @@ struct LastReflection {
   int rows = 0, channels = 1;
   std::vector<std::array<std::vector<float>, 3>> h;  // by material, by channel
 };
-// `channels`: of X.
-LastReflection make_last_reflection(const std::vector<ViewMap>& responses, const ReceiverMaterials& materials,
-                                    const MatrixOptions& options, const CosineBasis& basis, int channels);
+// `channels`: of X. Errors: cancelled.
+Result<LastReflection> make_last_reflection(const std::vector<ViewMap>& responses, const ReceiverMaterials& materials,
+                                            const MatrixOptions& options, const CosineBasis& basis, int channels,
+                                            Progress* progress);
 
 // X of a receiver, [order^2][channel][width], as the rows that are kept.
 void store_rows(const LastReflection& last, const ReceiverMaterials& materials, const WritableTransfer& out,

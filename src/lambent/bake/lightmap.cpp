@@ -1,4 +1,5 @@
 // Follows: radiosity ("One Last Practical Detail": irradiance is stored, albedo multiplied when shading).
+#include <lambent/bake/columns.h>
 #include <lambent/bake/kernels.h>
 #include <lambent/bake/lightmap.h>
 #include <lambent/core/parallel.h>
@@ -29,6 +30,8 @@ Result<void> check_options(const Scene& scene, const Lamps& lamps, const Lightma
   if (!(o.converge >= 0 && o.converge < 1)) return Error{"converge", "must lie between 0 and 1"};
   if (o.directional != DirectionalKind::none && o.order > 0)
     return Error{"directional", "lightmaps hold lamps alone: leave the order out"};
+  if (o.keep_terms && (o.converge > 0 || o.directional != DirectionalKind::none))
+    return Error{"terms", "are kept of counted bounces, and not of directional lightmaps"};
   for (const AreaLamp& lamp : lamps.area)
     if (!(largest(lamp.radiance) <= brightest_lamp))
       return Error{scene.path, too_bright("a lamp of the group", lamps.names[lamp.group], largest(lamp.radiance))};
@@ -43,10 +46,9 @@ Result<void> check_options(const Scene& scene, const Lamps& lamps, const Lightma
   return {};
 }
 
-// x, [receiver][row][column][channel], as a Transfer.
+// x, [receiver][row][column][channel], as a Transfer. Errors: values that half floats do not hold.
 Result<Transfer> to_transfer(const LightBasis& light, const AlignedVector<float>& x, size_t rows, size_t receivers,
                              size_t width, Precision precision) {
-  const size_t columns = light.count();
   const float brightest = std::transform_reduce(
       x.begin(), x.end(), 0.0f, [](float a, float b) { return std::max(a, b); }, [](float v) { return std::abs(v); });
   if (precision == Precision::half && !(brightest <= 65504.0f))
@@ -55,17 +57,31 @@ Result<Transfer> to_transfer(const LightBasis& light, const AlignedVector<float>
         fmt::format(
             "its values go up to {:.3g}, and half floats to 65504: dim the lamps, or keep it in single precision",
             brightest)};
-  WritableTransfer out = make_transfer(light, int(rows), 3, receivers, precision);
-  parallel_for(receivers, transfer_block, [&](size_t begin, size_t end) {
-    std::vector<float> values(rows * 3 * columns);
-    for (size_t r = begin; r < end; ++r) {
-      for (size_t row = 0; row < rows; ++row)
-        for (size_t k = 0; k < columns; ++k)
-          for (size_t c = 0; c < 3; ++c) values[(row * 3 + c) * columns + k] = x[(r * rows + row) * width + 3 * k + c];
-      store_receiver(out, r, values);
-    }
+  return store_columns(light, x.data(), rows, 3, receivers, width, precision);
+}
+
+Result<AlignedVector<float>> solution(const GatherOperator& op, const AlignedVector<float>& e, size_t width,
+                                      const LightmapOptions& o, SolveReport& report, Progress* progress) {
+  if (o.converge > 0) return solve(op, e.data(), width, {o.solver, o.converge, 200}, &report, progress);
+  const int bounces = std::max(o.bounces - (o.directional != DirectionalKind::none), 0);
+  auto bounced = bounce(op, source_of(e.data(), width), width, bounces, progress);
+  if (!bounced) return bounced.error();
+  return std::move(bounced->x);
+}
+
+// [receiver][row][width]
+Result<AlignedVector<float>> directional_rows_of(const GatherSetup& setup, const Lamps& lamps, const LightmapOptions& o,
+                                                 const float* x, size_t width, Progress* progress) {
+  const size_t n = setup.receivers.count(), rows = size_t(directional_rows(o.directional));
+  AlignedVector<float> wide(n * rows * width, 0.0f);
+  ProgressStage stage(progress, "directions", n);
+  parallel_for(n, gather_block, [&](size_t begin, size_t end) {
+    for (size_t r = begin; r < end && !stage.cancelled(); ++r)
+      gather_directional(setup, lamps, o.lamp_samples, o.directional, x, width, r, 1, wide.data() + r * rows * width);
+    stage.advance(end - begin);
   });
-  return std::move(out.transfer);
+  if (stage.cancelled()) return Error{"", "cancelled"};
+  return wide;
 }
 
 double seconds_since(std::chrono::steady_clock::time_point start) {
@@ -121,39 +137,44 @@ Result<Lightmap> bake_lightmap(const Scene& scene, const Tracer& tracer, const R
   const auto start = std::chrono::steady_clock::now();
   const bool directional = o.directional != DirectionalKind::none;
   // A directional lightmap's last bounce is gathered with its directions.
-  auto x = o.converge > 0 ? solve(*op, e.data(), width, {o.solver, o.converge, 200}, &r.solve, progress)
-                          : bounce(*op, e.data(), width, std::max(o.bounces - directional, 0), progress);
+  auto x = solution(*op, e, width, o, r.solve, progress);
   if (!x) return x.error();
   const size_t rows = size_t(directional_rows(o.directional));
   if (directional) {
-    AlignedVector<float> wide(n * rows * width, 0.0f);
-    ProgressStage stage(progress, "directions", n);
-    parallel_for(n, gather_block, [&](size_t begin, size_t end) {
-      if (stage.cancelled()) return;
-      gather_directional(setup, lamps, o.lamp_samples, o.directional, bounces ? x->data() : nullptr, width, begin,
-                         end - begin, wide.data() + begin * rows * width);
-      stage.advance(end - begin);
-    });
-    if (stage.cancelled()) return Error{"", "cancelled"};
-    op->fill(wide.data(), rows * width);
-    *x = std::move(wide);
+    auto wide = directional_rows_of(setup, lamps, o, bounces ? x->data() : nullptr, width, progress);
+    if (!wide) return wide.error();
+    *x = std::move(*wide);
+    op->fill(x->data(), rows * width);
   }
   r.bounce_seconds = seconds_since(start);
-  if (const auto* texels = std::get_if<TexelReceivers>(&receivers.basis)) {
-    smooth_seams(scene, *texels, x->data(), rows * width, rows == 1 ? 3 * light.count() : rows * width);
-    if (direct_apart) smooth_seams(scene, *texels, e.data(), width, 3 * light.count());
+
+  auto stored = [&](AlignedVector<float>& values, size_t rows_each) {
+    if (const auto* texels = std::get_if<TexelReceivers>(&receivers.basis))
+      smooth_seams(scene, *texels, values.data(), rows_each * width,
+                   rows_each == 1 ? 3 * light.count() : rows_each * width);
+    return to_transfer(light, values, rows_each, n, width, o.precision);
+  };
+  auto all = stored(*x, rows);
+  if (!all) return all.error();
+  Lightmap map{std::move(*all), std::nullopt, {}};
+  if (o.keep_terms) {
+    *x = {};
+    auto take = [&](int, AlignedVector<float> term) -> Result<void> {
+      auto transfer = stored(term, 1);
+      if (!transfer) return transfer.error();
+      map.terms.push_back(std::move(*transfer));
+      return {};
+    };
+    if (auto ok = bounce_terms(*op, source_of(e.data(), width), width, o.bounces, progress, take); !ok)
+      return ok.error();
+  }
+  if (direct_apart) {
+    auto direct_light = stored(e, 1);
+    if (!direct_light) return direct_light.error();
+    map.direct = std::move(*direct_light);
   }
   r.receivers = n, r.buried = op->report().buried, r.rays = op->report().rays;
   r.operator_bytes = op->report().bytes, r.operator_kept = bounces ? op->report().kept : 1;
-
-  auto all = to_transfer(light, *x, rows, n, width, o.precision);
-  if (!all) return all.error();
-  Lightmap map{std::move(*all), std::nullopt};
-  if (direct_apart) {
-    auto direct = to_transfer(light, e, 1, n, width, o.precision);
-    if (!direct) return direct.error();
-    map.direct = std::move(*direct);
-  }
   return map;
 }
 

@@ -3,6 +3,7 @@
 // of a distant light (a PRT lightmap); the operator and the rays are those of bake.h. Relit with coefficient 1 a group,
 // it is exit radiance of white receivers, irradiance / pi; other coefficients dim and tint the groups.
 #include <lambent/bake/directional.h>
+#include <lambent/bake/operator.h>
 #include <lambent/bake/solve.h>
 #include <lambent/transfer/transfer.h>
 
@@ -25,11 +26,14 @@ struct LightmapOptions {
   GatherKind gather = GatherKind::rays;  // hemicube: `samples` is rounded to 3 n^2
   uint32_t seed = 1;
   Precision precision = Precision::half;
+  bool keep_terms = false;  // Lightmap::terms; of counted bounces of lightmaps that are not directional
 };
 
 struct Lightmap {
   Transfer all;                    // direct and bounced
   std::optional<Transfer> direct;  // alone, where asked for, in one row: all - direct is the indirect part
+  // Where keep_terms says so, direct light, that reflected once, twice, ...: E, B E, B^2 E; they add up to `all`.
+  std::vector<Transfer> terms;
 };
 
 struct LightmapReport {

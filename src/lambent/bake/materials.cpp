@@ -1,6 +1,5 @@
 #include <lambent/bake/materials.h>
 #include <lambent/core/check.h>
-#include <lambent/core/parallel.h>
 
 #include <map>
 
@@ -45,15 +44,13 @@ ReceiverMaterials make_receiver_materials(const Scene& scene, const Receivers& r
   return out;
 }
 
-Outgoing make_map_outgoing(const ReceiverMaterials& materials, int incident_order, const MatrixOptions& options) {
+Outgoing make_map_outgoing(const ReceiverMaterials& materials, int incident_order, const MatrixOptions& options,
+                           Progress* progress) {
   Outgoing o;
   o.kind = OutgoingKind::map, o.order = incident_order, o.map_of = materials.of_receiver, o.frames = materials.frames;
-  const CosineBasis basis = make_cosine_basis(incident_order);
-  o.maps.resize(materials.materials.size());
-  parallel_for(o.maps.size(), 1, [&](size_t begin, size_t end) {
-    for (size_t m = begin; m < end; ++m)
-      o.maps[m] = make_response(materials.materials[m], basis, options.grid, options.response_samples);
-  });
+  auto maps = make_responses(materials.materials, make_cosine_basis(incident_order), options.grid,
+                             options.response_samples, progress);
+  if (maps) o.maps = std::move(*maps);
   return o;
 }
 

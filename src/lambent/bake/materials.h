@@ -10,7 +10,8 @@ namespace lambent {
 // (transfer/outgoing.h).
 ReceiverMaterials make_receiver_materials(const Scene& scene, const Receivers& receivers, const Reflection& reflection);
 
-// The last reflection of incident light as it is, of kind map.
-Outgoing make_map_outgoing(const ReceiverMaterials& materials, int incident_order, const MatrixOptions& options = {});
+// The last reflection of incident light as it is, of kind map. Without maps when cancelled.
+Outgoing make_map_outgoing(const ReceiverMaterials& materials, int incident_order, const MatrixOptions& options = {},
+                           Progress* progress = nullptr);
 
 }  // namespace lambent

@@ -1,14 +1,13 @@
 // Follows: general-prt (transfer matrices, the recursion over bounces, the last reflection).
 #include <lambent/bake/kernels.h>
 #include <lambent/bake/last_reflection.h>
-#include <lambent/bake/matrix_gather.h>
+#include <lambent/bake/matrix_rows.h>
+#include <lambent/bake/solve.h>
 #include <lambent/core/check.h>
 #include <lambent/core/parallel.h>
 #include <lambent/core/sampling.h>
 
-#include <atomic>
 #include <chrono>
-#include <map>
 #include <variant>
 
 namespace lambent {
@@ -20,246 +19,103 @@ double seconds_since(Clock::time_point start) { return std::chrono::duration<dou
 struct MatrixBaker : MatrixGather {
   Progress* progress;
   BakeReport& report;
-  std::vector<ViewMap> responses{};
 
-  // out[row][channel][width] = H x, x[J][channel][width].
-  static void apply(std::span<const float> h, size_t rows, size_t J, size_t wc, const float* x, float* out) {
-    std::fill(out, out + rows * wc, 0.0f);
-    for (size_t r = 0; r < rows; ++r)
-      for (size_t j = 0; j < J; ++j) {
-        const float f = h[r * J + j];
-        if (f == 0) continue;
-        for (size_t i = 0; i < wc; ++i) out[r * wc + i] += f * x[j * wc + i];
-      }
-  }
-
-  void make_responses() {
-    ProgressStage stage(progress, "materials", materials.materials.size());
-    responses.resize(materials.materials.size()), scatter.resize(responses.size());
-    parallel_for(responses.size(), 1, [&](size_t begin, size_t end) {
-      for (size_t m = begin; m < end; ++m) {
-        responses[m] = make_response(materials.materials[m], basis, matrix.grid, matrix.response_samples);
-        scatter[m] = factor_response(responses[m], matrix.scatter_rows, matrix.scatter_error);
+  // How materials answer light, and the rows with which they scatter. Errors: cancelled.
+  Result<LastReflection> prepare() {
+    auto responses = make_responses(materials.materials, basis, matrix.grid, matrix.response_samples, progress);
+    if (!responses) return responses.error();
+    ProgressStage stage(progress, "scattering", responses->size());
+    scatter.resize(responses->size());
+    if (options.bounces > 0 && !matrix.simulate_paths)
+      parallel_for(responses->size(), 1, [&](size_t m, size_t) {
+        if (stage.cancelled()) return;
+        scatter[m] = factor_response((*responses)[m], matrix.scatter_rows, matrix.scatter_error);
         stage.advance();
-      }
-    });
+      });
+    if (stage.cancelled()) return Error{"", "cancelled"};
     first_row.assign(1, 0);
     for (size_t r = 0; r < n(); ++r)
       first_row.push_back(first_row.back() + size_t(scatter[materials.of_receiver[r]].rows));
+    return make_last_reflection(*responses, materials, matrix, basis, setup.channels, progress);
   }
 
-  // T0 in every channel.
-  void expand(const float* t, float* x) const {
-    for (size_t j = 0; j < J(); ++j)
-      for (size_t c = 0; c < channels(); ++c) std::copy_n(t + j * width(), width(), x + (j * channels() + c) * width());
-  }
-
-  // Sums of squares by block, added up in order.
-  struct ErrorSums {
-    std::vector<double> differences, totals;
-    explicit ErrorSums(size_t blocks) : differences(blocks, 0.0), totals(blocks, 0.0) {}
-    void add(size_t block, const float* half, const float* full, size_t count) {
-      for (size_t i = 0; i < count; ++i)
-        differences[block] += double(half[i] - full[i]) * (half[i] - full[i]),
-            totals[block] += double(full[i]) * full[i];
-    }
-    double relative() const {
-      double difference = 0, total = 0;
-      for (size_t b = 0; b < differences.size(); ++b) difference += differences[b], total += totals[b];
-      return total > 0 ? std::sqrt(difference / total) : 0;
-    }
-  };
-
-  MatrixBake finish(const std::vector<uint8_t>& buried, const ErrorSums& errors, WritableTransfer&& out,
+  MatrixBake finish(const std::vector<uint8_t>& buried, double error, WritableTransfer&& out,
                     const LastReflection& last) const {
-    report.error = has_halves() ? errors.relative() : -1;
+    report.error = has_halves() ? error : -1;
     report.receivers = n(), report.bytes = out.transfer.bytes();
     for (uint8_t x : buried) report.buried += x;
     return {std::move(out.transfer), last.outgoing};
   }
 
-  // Every receiver by itself: nothing is kept from one to the next.
-  Result<MatrixBake> run_simulated() {
-    make_responses();
+  // Every receiver by itself, nothing kept from one to the next: direct light, and simulated paths.
+  Result<MatrixBake> run_apart(const LastReflection& last) {
     const auto start = Clock::now();
-    const LastReflection last = make_last_reflection(responses, materials, matrix, basis, setup.channels);
     WritableTransfer out = make_transfer(options.light(), last.rows, last.channels, n(), options.precision);
+    const bool paths = options.bounces > 0;
     std::vector<uint8_t> buried(n());
-    ErrorSums errors((n() + gather_block - 1) / gather_block);
+    ErrorSums errors(n());
     auto receive = [&](MatrixScratch& s, size_t r) {
       MatrixHits hits;
-      const bool inside = trace(s, r, &hits);
-      AlignedVector<float> t0(J() * width()), x(J() * channels() * width());
-      auto gather = [&](size_t limit) {
-        direct(s, limit, t0.data());
-        expand(t0.data(), x.data());
-        simulated(s, r, hits.hits, limit, x.data());
+      const bool moved = buried[r];
+      buried[r] = trace(s, r, paths ? &hits : nullptr);
+      AlignedVector<float> x(J() * wc()), half(x.size());
+      const bool checked = r % check_every == 0;
+      direct_light(s, r, s.full.data(), checked ? s.half.data() : nullptr);
+      auto gather = [&](const AlignedVector<float>& t0, size_t limit, AlignedVector<float>& sum) {
+        expand(t0.data(), sum.data());
+        if (paths) simulated(s, r, hits.hits, limit, sum.data());
       };
-      AlignedVector<float> half;
-      const bool checked = has_halves() && r % check_every == 0 && !inside;
-      if (checked) gather(setup.sets.half), half = x;
-      gather(rays());
-      if (checked) errors.add(r / gather_block, half.data(), x.data(), x.size());
+      gather(s.full, rays(), x);
       store_rows(last, materials, out, r, x.data(), channels(), width());
-      return inside;
+      if (!checked || !has_halves() || buried[r] || moved) return;
+      gather(s.half, setup.sets.half, half);
+      errors.add(r, half.data(), x.data(), x.size());
     };
     {
-      ProgressStage stage(progress, "paths", n());
+      ProgressStage stage(progress, paths ? "paths" : "tracing", n());
       parallel_for(n(), gather_block, [&](size_t begin, size_t end) {
         auto s = scratch.borrow();
-        for (size_t r = begin; r < end && !stage.cancelled(); ++r) buried[r] = receive(*s, r);
+        for (size_t r = begin; r < end && !stage.cancelled(); ++r) receive(*s, r);
         stage.advance(end - begin);
       });
       if (stage.cancelled()) return Error{"", "cancelled"};
     }
     auto s = scratch.borrow();
-    for (const FillStep& step : make_fill_steps(scene, receivers.basis, buried)) {
+    for (const FillStep& step : make_fill_steps(scene, receivers.basis, std::vector<uint8_t>(buried))) {
       receivers.origins[step.receiver] = receivers.origins[step.sources[0]];
-      (void)receive(*s, step.receiver);
+      receive(*s, step.receiver);
     }
-    report.rays = n() * rays();
+    report.rays = n() * (rays() + size_t(lobes.rays) * lobes.sharp.size());
     report.trace_seconds = seconds_since(start);
     report.working_memory = matrix_memory(n(), int(channels()), options, matrix);
-    return finish(buried, errors, std::move(out), last);
+    return finish(buried, errors.relative(), std::move(out), last);
+  }
+
+  Result<MatrixBake> run_bounced(const LastReflection& last) {
+    auto start = Clock::now();
+    WritableTransfer out = make_transfer(options.light(), last.rows, last.channels, n(), options.precision);
+    const size_t fixed = matrix_memory(n(), int(channels()), options, matrix);
+    MatrixRows G(*this, options.memory > fixed ? options.memory - fixed : 0);
+    if (auto ok = G.trace(progress); !ok) return ok.error();
+    report.operator_bytes = G.bytes(), report.operator_kept = G.kept();
+    report.trace_seconds = seconds_since(start);
+    start = Clock::now();
+    Source source{[&](size_t r, float* x) { expand(G.T0(r), x); }};
+    if (has_halves()) source.set_half = [&](size_t r, float* x) { expand(G.T0_half(r), x); };
+    auto solution = bounce(G, source, J() * wc(), options.bounces, progress, [&](size_t r, size_t, const float* x) {
+      store_rows(last, materials, out, r, x, channels(), width());
+    });
+    if (!solution) return solution.error();
+    report.rays = n() * (rays() + size_t(lobes.rays) * lobes.sharp.size()) + G.rays_again();
+    report.bounce_seconds = seconds_since(start);
+    report.working_memory = fixed + G.bytes();
+    return finish(G.buried(), solution->error, std::move(out), last);
   }
 
   Result<MatrixBake> run() {
-    make_responses();
-    const size_t wc = channels() * width(), blocks = (n() + gather_block - 1) / gather_block;
-    const bool bounces = options.bounces > 0;
-    auto start = Clock::now();
-    // Bounces need the direct rows of all receivers at once; without them each is stored as it comes.
-    const size_t held = bounces ? n() : 0;
-    AlignedVector<float> T0(held * J() * width());
-    std::vector<float> T0_half((held + check_every - 1) / check_every * J() * width());
-    const LastReflection last = make_last_reflection(responses, materials, matrix, basis, setup.channels);
-    WritableTransfer out = make_transfer(options.light(), last.rows, last.channels, n(), options.precision);
-    ErrorSums errors(blocks);
-    std::vector<uint8_t> buried(n());
-    std::vector<MatrixHits> kept(blocks);
-    std::vector<uint8_t> is_kept(blocks, 0);
-    const size_t fixed = matrix_memory(n(), int(channels()), options, matrix);
-    const size_t budget = options.memory > fixed ? options.memory - fixed : 0;
-    std::atomic<size_t> used{0};
-
-    auto trace_receiver = [&](MatrixScratch& s, size_t r, MatrixHits* hits) {
-      const bool moved = buried[r];
-      buried[r] = trace(s, r, hits);
-      const bool checked = r % check_every == 0;
-      float* full = bounces ? T0.data() + r * J() * width() : s.full.data();
-      float* half = !checked ? nullptr : bounces ? T0_half.data() + r / check_every * J() * width() : s.half.data();
-      direct(s, rays(), full);
-      if (half) direct(s, std::min(setup.sets.half, rays()), half);
-      direct_sharp_lobes(s, r, full, half);
-      if (hits) hits->ends.push_back(uint32_t(hits->hits.size()));
-      if (bounces) return;
-      store_rows(last, materials, out, r, full, channels(), width());
-      if (checked && !buried[r] && !moved) errors.add(r / gather_block, half, full, J() * width());
-    };
-    // Which blocks are kept depends on the scheduling, the result does not: the others are traced again, alike.
-    auto keep = [&](size_t block, MatrixHits&& hits) {
-      const size_t bytes = hits.bytes();
-      if (used.fetch_add(bytes) + bytes <= budget) kept[block] = std::move(hits), is_kept[block] = 1;
-      else used.fetch_sub(bytes);
-    };
-    {
-      ProgressStage stage(progress, "tracing", n());
-      parallel_for(n(), gather_block, [&](size_t begin, size_t end) {
-        if (stage.cancelled()) return;
-        auto s = scratch.borrow();
-        MatrixHits hits;
-        for (size_t r = begin; r < end; ++r) trace_receiver(*s, r, bounces ? &hits : nullptr);
-        if (bounces) keep(begin / gather_block, std::move(hits));
-        stage.advance(end - begin);
-      });
-      if (stage.cancelled()) return Error{"", "cancelled"};
-    }
-    report.rays = n() * (rays() + size_t(lobes.rays) * lobes.sharp.size());
-    move_buried(buried, trace_receiver, bounces, kept, is_kept, used);
-    report.operator_bytes = used;
-    report.operator_kept = bounces ? double(std::count(is_kept.begin(), is_kept.end(), uint8_t(1))) / double(blocks)
-                                   : 1;
-    report.trace_seconds = seconds_since(start);
-    start = Clock::now();
-
-    auto scatter_rows = [&](size_t r, const float* x, float* Y) {
-      const FactoredResponse& f = scatter[materials.of_receiver[r]];
-      apply(f.h, size_t(f.rows), J(), wc, x, Y + first_row[r] * wc);
-    };
-
-    AlignedVector<float> Y, next;
-    if (bounces) Y.resize(first_row.back() * wc), next.resize(Y.size());
-    parallel_for(held, gather_block, [&](size_t begin, size_t end) {
-      AlignedVector<float> x(J() * wc);
-      for (size_t r = begin; r < end; ++r) {
-        expand(T0.data() + r * J() * width(), x.data());
-        scatter_rows(r, x.data(), Y.data());
-      }
-    });
-
-    for (int bounce = 1; bounce <= options.bounces; ++bounce) {
-      const bool is_last = bounce == options.bounces;
-      ProgressStage stage(progress, "bounce " + std::to_string(bounce), n());
-      parallel_for(n(), gather_block, [&](size_t begin, size_t end) {
-        if (stage.cancelled()) return;
-        auto s = scratch.borrow();
-        const size_t b = begin / gather_block;
-        MatrixHits again;
-        if (!is_kept[b])
-          for (size_t r = begin; r < end; ++r)
-            (void)trace(*s, r, &again), again.ends.push_back(uint32_t(again.hits.size()));
-        const MatrixHits& hits = is_kept[b] ? kept[b] : again;
-        AlignedVector<float> x(J() * wc);
-        for (size_t r = begin; r < end; ++r) {
-          (void)aim(*s, r);
-          const size_t first = r == begin ? 0 : hits.ends[r - begin - 1];
-          const std::span<const MatrixHit> mine(hits.hits.data() + first, hits.ends[r - begin] - first);
-          expand(T0.data() + r * J() * width(), x.data());
-          scattered(*s, mine, rays(), Y.data(), x.data());
-          if (!is_last) {
-            scatter_rows(r, x.data(), next.data());
-            continue;
-          }
-          store_rows(last, materials, out, r, x.data(), channels(), width());
-          if (has_halves() && r % check_every == 0 && !buried[r]) {
-            AlignedVector<float> half(J() * wc);
-            expand(T0_half.data() + r / check_every * J() * width(), half.data());
-            scattered(*s, mine, setup.sets.half, Y.data(), half.data());
-            errors.add(b, half.data(), x.data(), half.size());
-          }
-        }
-        stage.advance(end - begin);
-      });
-      if (stage.cancelled()) return Error{"", "cancelled"};
-      report.rays += size_t(double(n()) * (1 - report.operator_kept) + 0.5) * rays();
-      std::swap(Y, next);
-    }
-    report.bounce_seconds = seconds_since(start);
-    report.working_memory = fixed + used;
-    return finish(buried, errors, std::move(out), last);
-  }
-
-  // A buried receiver looks out from where its nearest clear neighbour along the mesh lies.
-  template <class TraceReceiver>
-  void move_buried(const std::vector<uint8_t>& was_buried, TraceReceiver& trace_receiver, bool bounces,
-                   std::vector<MatrixHits>& kept, std::vector<uint8_t>& is_kept, std::atomic<size_t>& used) {
-    const std::vector<uint8_t> buried = was_buried;
-    const auto steps = make_fill_steps(scene, receivers.basis, buried);
-    if (steps.empty()) return;
-    for (const FillStep& step : steps) receivers.origins[step.receiver] = receivers.origins[step.sources[0]];
-    auto s = scratch.borrow();
-    if (!bounces) {
-      for (const FillStep& step : steps) trace_receiver(*s, step.receiver, nullptr);
-      return;
-    }
-    std::map<size_t, bool> touched;
-    for (const FillStep& step : steps) touched[step.receiver / gather_block] = true;
-    for (const auto& [block, yes] : touched) {
-      const size_t begin = block * gather_block, end = std::min(n(), begin + gather_block);
-      MatrixHits hits;
-      for (size_t r = begin; r < end; ++r) trace_receiver(*s, r, &hits);
-      if (is_kept[block]) used += hits.bytes(), used -= kept[block].bytes(), kept[block] = std::move(hits);
-    }
+    const auto last = prepare();
+    if (!last) return last.error();
+    return options.bounces == 0 || matrix.simulate_paths ? run_apart(*last) : run_bounced(*last);
   }
 };
 
@@ -290,6 +146,7 @@ Result<void> check_options(const BakeOptions& o, const MatrixOptions& m, const R
         within("order and incident-order together", o.order + m.incident_order, 2, max_sh_order + 1),
         within("svd rows", m.svd_rows, 1, sh_count(m.incident_order)), within("grid", m.grid, 8, 256)})
     if (!ok) return ok.error();
+  if (o.keep_terms) return Error{"terms", "are not kept of transfer matrices"};
   // A path seldom meets a lamp by chance.
   if (m.simulate_paths && o.bounces > 0 && !o.lobes.empty())
     return Error{"lobes", "bounces by simulated paths are of harmonics alone"};
@@ -334,7 +191,7 @@ Result<MatrixBake> bake_matrix(const Scene& scene, const Tracer& tracer, const R
     return Error{scene.path, "baking needs at least " + std::to_string(needed) +
                                  " bytes of working memory, and was allowed " + std::to_string(options.memory)};
   MatrixBaker baker{{scene, receivers, materials, options, matrix, std::move(setup)}, progress, r};
-  return matrix.simulate_paths && options.bounces > 0 ? baker.run_simulated() : baker.run();
+  return baker.run();
 }
 
 }  // namespace lambent

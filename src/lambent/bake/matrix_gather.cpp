@@ -109,6 +109,11 @@ void MatrixGather::direct_sharp_lobes(MatrixScratch& s, size_t r, float* out, fl
   }
 }
 
+void MatrixGather::expand(const float* t, float* x) const {
+  for (size_t j = 0; j < J(); ++j)
+    for (size_t c = 0; c < channels(); ++c) std::copy_n(t + j * width(), width(), x + (j * channels() + c) * width());
+}
+
 void MatrixGather::scattered(MatrixScratch& s, std::span<const MatrixHit> hits, size_t limit, const float* Y,
                              float* out) const {
   const size_t w = width(), wc = channels() * w;

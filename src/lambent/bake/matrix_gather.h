@@ -61,6 +61,8 @@ struct MatrixGather {
   size_t C() const { return harmonics() + lobes.count(); }  // columns
   size_t channels() const { return size_t(setup.channels); }
   size_t width() const { return pad_lanes(C()); }  // floats of a row of one channel
+  size_t wc() const { return channels() * width(); }
+  size_t t0_width() const { return J() * width(); }
   size_t V_count() const { return setup.coefficients(); }
   size_t rays() const { return size_t(setup.sets.samples); }
   bool has_halves() const { return setup.sets.half < rays(); }
@@ -75,6 +77,14 @@ struct MatrixGather {
   // Direct light of the sharp lobes, by rays of their own: X0_jk = 1/pi integral of V b_k z_j cos, into out and, if
   // given, half_out.
   void direct_sharp_lobes(MatrixScratch& s, size_t r, float* out, float* half_out) const;
+  // All direct light of a receiver that was traced, [J][width]; half may be null.
+  void direct_light(MatrixScratch& s, size_t r, float* full, float* half) const {
+    direct(s, rays(), full);
+    if (half) direct(s, std::min(setup.sets.half, rays()), half);
+    direct_sharp_lobes(s, r, full, half);
+  }
+  // The same in every channel, [J][channel][width].
+  void expand(const float* t, float* x) const;
   // Light that the hits of rays below `limit` scatter to receiver r, added to out[J][channel][width]; Y holds scattered
   // rows.
   void scattered(MatrixScratch& s, std::span<const MatrixHit> hits, size_t limit, const float* Y, float* out) const;

@@ -8,78 +8,98 @@
 
 namespace lambent {
 
-Result<GatherOperator> GatherOperator::trace(const GatherSetup& setup, const GatherDirect* direct, float* sky_rows,
-                                             bool hits, size_t memory, Progress* progress) {
+void GatherOperator::trace_block(const GatherWanted& wanted, size_t begin, size_t end) {
+  auto block = traced_->blocks.borrow();
+  auto scratch = traced_->scratch.borrow();
+  std::vector<float> unwanted(wanted.sky.rows ? 0 : (end - begin) * setup_->coefficients());
+  GatherSky sky = wanted.sky;
+  if (sky.rows) sky.rows += begin * sky.stride;
+  else sky = {unwanted.data(), nullptr, setup_->coefficients(), nullptr, nullptr};
+  if (sky.half_rows) sky.half_rows += checked_count(begin) * sky.stride;
+  sky.buried = buried_.data() + begin;
+  std::optional<GatherDirect> direct;
+  if (const GatherDirect* d = wanted.direct)
+    direct.emplace(GatherDirect{d->lamps, d->samples, d->rows + begin * d->width, d->width});
+  trace_gather(*setup_, *scratch, begin, end - begin, wanted.hits ? block.get() : nullptr, &sky,
+               direct ? &*direct : nullptr);
+  if (wanted.more) wanted.more(begin, end - begin, sky);
+  if (!wanted.hits) return;
+  if (!wanted.halves) block->half_rows = {};
+  traced_->kept.keep(begin / gather_block, *block);
+}
+
+Result<GatherOperator> GatherOperator::trace(const GatherSetup& setup, const GatherWanted& wanted, Progress* progress) {
   const auto start = std::chrono::steady_clock::now();
   GatherOperator op;
   op.setup_ = &setup;
   const size_t n = setup.receivers.count();
   op.buried_.assign(n, 0);
-  op.kept_ = std::make_shared<KeptRows>(op.blocks(), hits ? memory : 0,
-                                        most_bytes(size_t(setup.sets.samples), n, setup.channels));
-  op.gathered_ = std::make_shared<Pool<GatherBlock>>([] { return std::make_unique<GatherBlock>(); });
-  op.scratch_ = std::make_shared<Pool<GatherScratch, DeleteScratch>>([&setup] { return make_gather_scratch(setup); });
+  op.traced_ = std::shared_ptr<Traced>(new Traced{
+      KeptRows(op.blocks(), wanted.hits ? wanted.memory : 0, most_bytes(size_t(setup.sets.samples), n, setup.channels)),
+      Pool<GatherBlock>([] { return std::make_unique<GatherBlock>(); }),
+      Pool<GatherScratch, DeleteScratch>([&setup] { return make_gather_scratch(setup); })});
   ProgressStage stage(progress, "tracing", n);
   parallel_for(n, gather_block, [&](size_t begin, size_t end) {
     if (stage.cancelled()) return;
-    auto block = op.gathered_->borrow();
-    std::vector<float> unwanted(sky_rows ? 0 : (end - begin) * setup.coefficients());
-    const GatherSky sky{sky_rows ? sky_rows + begin * setup.coefficients() : unwanted.data(), nullptr,
-                        setup.coefficients(), nullptr, op.buried_.data() + begin};
-    auto scratch = op.scratch_->borrow();
-    if (direct) {
-      const GatherDirect here{direct->lamps, direct->samples, direct->rows + begin * direct->width, direct->width};
-      trace_gather(setup, *scratch, begin, end - begin, hits ? block.get() : nullptr, &sky, &here);
-    } else {
-      trace_gather(setup, *scratch, begin, end - begin, hits ? block.get() : nullptr, &sky);
-    }
+    op.trace_block(wanted, begin, end);
     stage.advance(end - begin);
-    if (!hits) return;
-    block->half_rows = {};
-    op.kept_->keep(begin / gather_block, *block);
   });
   if (stage.cancelled()) return Error{"", "cancelled"};
   op.fill_ = make_fill_steps(setup.scene, setup.receivers.basis, op.buried_);
-  if (direct) fill_buried(op.fill_, direct->rows, direct->width, 3 * direct->lamps.groups());
-  if (sky_rows) fill_buried(op.fill_, sky_rows, setup.coefficients(), setup.coefficients());
+  if (const GatherDirect* d = wanted.direct) fill_buried(op.fill_, d->rows, d->width, 3 * d->lamps.groups());
+  if (wanted.sky.rows) fill_buried(op.fill_, wanted.sky.rows, wanted.sky.stride, wanted.sky.stride);
   for (uint8_t b : op.buried_) op.report_.buried += b;
-  op.report_.rays = n * size_t(setup.sets.samples), op.report_.bytes = op.kept_->bytes();
-  op.report_.kept = op.kept_->fraction();
+  op.report_.rays = n * size_t(setup.sets.samples), op.report_.bytes = op.traced_->kept.bytes();
+  op.report_.kept = op.traced_->kept.fraction();
   op.report_.seconds = std::chrono::duration<double>(std::chrono::steady_clock::now() - start).count();
   return op;
 }
 
+Result<GatherOperator> GatherOperator::trace(const GatherSetup& setup, const GatherDirect* direct, float* sky,
+                                             bool hits, size_t memory, Progress* progress) {
+  return trace(
+      setup,
+      {.direct = direct, .sky = {sky, nullptr, setup.coefficients(), nullptr, nullptr}, .hits = hits, .memory = memory},
+      progress);
+}
+
+GatherOperator::Report GatherOperator::report() const {
+  Report r = report_;
+  r.rays += traced_->rays;
+  return r;
+}
+
 void GatherOperator::with_rows(size_t b, auto f) const {
-  if (const KeptRows::Block* kept = kept_->find(b)) return f(kept->rows);
-  const size_t begin = b * gather_block;
-  auto again = gathered_->borrow();
-  trace_gather(*setup_, *scratch_->borrow(), begin, std::min(gather_block, rows() - begin), again.get(), nullptr);
-  f(again->rows.view());
+  if (const KeptRows::Block* kept = traced_->kept.find(b)) return f(*kept);
+  const size_t begin = b * gather_block, count = std::min(gather_block, rows() - begin);
+  auto again = traced_->blocks.borrow();
+  trace_gather(*setup_, *traced_->scratch.borrow(), begin, count, again.get(), nullptr);
+  traced_->rays += count * size_t(setup_->sets.samples);
+  f(KeptRows::Block{again->rows.view(), again->half_rows.view()});
 }
 
-void GatherOperator::apply_block(size_t b, const float* x, size_t width, float* y) const {
-  with_rows(b, [&](const SparseRows& rows) {
-    multiply_rows(rows, setup_->channels, x, width, setup_->row_scale(size_t(setup_->sets.samples)), y);
+void GatherOperator::add_rows(size_t first, size_t count, const float* x, size_t width, float* y, float* half) const {
+  LAMBENT_CHECK(first % gather_block == 0 && count <= gather_block);
+  AlignedVector<float> sums(count * width);
+  auto add = [&](const SparseRows& rows, size_t rays, float* out) {
+    multiply_rows(rows, setup_->channels, x, width, setup_->row_scale(rays), sums.data());
+    for (size_t i = 0; i < rows.row_count * width; ++i) out[i] += sums[i];
+  };
+  with_rows(first / gather_block, [&](const KeptRows::Block& block) {
+    add(block.rows, size_t(setup_->sets.samples), y);
+    if (half) add(block.half_rows, setup_->sets.half, half);
   });
 }
 
-void GatherOperator::apply(const float* x, size_t width, float* y) const {
-  parallel_for(blocks(), 1, [&](size_t begin, size_t end) {
-    for (size_t b = begin; b < end; ++b) apply_block(b, x, width, y + b * gather_block * width);
-  });
-  fill(y, width);
-  report_.rays += size_t(double(rows()) * (1 - report_.kept) + 0.5) * size_t(setup_->sets.samples);
-}
-
-GatherOperator::Push GatherOperator::transposed() const {
-  Push push;
+std::optional<TransposedRows> GatherOperator::transposed() const {
+  TransposedRows push;
   push.channels = setup_->channels;
   push.first.assign(rows() + 1, 0);
   const size_t channels = size_t(push.channels);
   auto each_entry = [&](auto f) {
     for (size_t b = 0; b < blocks(); ++b)
-      with_rows(b, [&](const SparseRows& rows) {
-        const SparseEntries& s = rows.entries;
+      with_rows(b, [&](const KeptRows::Block& block) {
+        const SparseEntries& s = block.rows.entries;
         for (size_t k = 0, e = 0; k < s.column_count; ++k)
           for (; e < s.ends[k]; ++e) {
             const size_t row = b * gather_block + s.rows[e];

@@ -5,11 +5,25 @@
 // floats.
 #include <lambent/bake/kept_rows.h>
 #include <lambent/core/pool.h>
-#include <lambent/core/progress.h>
+#include <lambent/core/result.h>
+
+#include <atomic>
+#include <functional>
 
 namespace lambent {
 
-class GatherOperator {
+// What tracing is to yield. Buried receivers' rows of `direct` and `sky` come from their neighbours.
+struct GatherWanted {
+  const GatherDirect* direct = nullptr;  // rows for all receivers
+  GatherSky sky{};                       // for all receivers, `buried` not read; rows may be null
+  // More columns of the sky rows of receivers [first, first + count), before they are filled.
+  std::function<void(size_t first, size_t count, const GatherSky& sky)> more{};
+  bool hits = true;     // hit rows; with none the operator is not to be applied
+  bool halves = false;  // and those of half of the rays
+  size_t memory = 0;    // bytes of hit rows kept, at most
+};
+
+class GatherOperator final : public LinearOperator {
  public:
   struct Report {
     size_t rays = 0, bytes = 0;  // traced so far; of the rows kept
@@ -18,46 +32,39 @@ class GatherOperator {
     double seconds = 0;  // of the first tracing
   };
 
-  // Traces all receivers. By the same rays, on the way: `direct` (may be null; rows for all receivers) and the sky
-  // rows, T0, into `sky` (may be null; [receiver][coefficient]); buried receivers' rows of both come from their
-  // neighbours. At most `memory` bytes of hit rows are kept; with no `hits` none are made, and the operator is not to
-  // be applied. The setup must outlive the operator. Errors: cancelled.
+  // Traces all receivers. The setup must outlive the operator. Errors: cancelled.
+  static Result<GatherOperator> trace(const GatherSetup& setup, const GatherWanted& wanted,
+                                      Progress* progress = nullptr);
+  // `direct` and `sky` ([receiver][coefficient]) may be null.
   static Result<GatherOperator> trace(const GatherSetup& setup, const GatherDirect* direct, float* sky, bool hits,
                                       size_t memory, Progress* progress = nullptr);
 
-  size_t rows() const { return setup_->receivers.count(); }
+  size_t rows() const override { return setup_->receivers.count(); }
   size_t blocks() const { return (rows() + gather_block - 1) / gather_block; }
-  const Report& report() const { return report_; }
+  Report report() const;
   const std::vector<uint8_t>& buried() const { return buried_; }
 
-  // y = F B x; not in place. All cores; sums in a fixed order.
-  void apply(const float* x, size_t width, float* y) const;
-  // Rows of B x of one block, without F; y has room for gather_block rows.
-  void apply_block(size_t block, const float* x, size_t width, float* y) const;
-  // x = F x.
-  void fill(float* x, size_t width) const { fill_buried(fill_, x, width, width); }
-  // The matrix of x = e + A' x transposed, as lists: for receiver j, all (i, weight) with A'_ij. Rows of A' are those
-  // of B, but for buried receivers, whose rows are the means of F. For solvers that push light; takes memory of its
-  // own, 8 bytes an entry.
-  struct Push {
-    std::vector<size_t> first;  // of column j, into the two below; one more at the end
-    std::vector<uint32_t> row;
-    std::vector<float> weight;  // [entry][channel]
-    int channels = 1;
-  };
-  Push transposed() const;
+  void add_rows(size_t first, size_t count, const float* x, size_t width, float* y, float* half) const override;
+  bool is_filled(size_t row) const override { return buried_[row]; }
+  void fill(float* x, size_t width) const override { fill_buried(fill_, x, width, width); }
+  std::optional<TransposedRows> transposed() const override;
 
  private:
-  const GatherSetup* setup_ = nullptr;
+  struct Traced {
+    KeptRows kept;
+    Pool<GatherBlock> blocks;
+    Pool<GatherScratch, DeleteScratch> scratch;
+    std::atomic<size_t> rays{0};
+  };
   // Calls f with the rows of a block, kept or traced again.
   void with_rows(size_t block, auto f) const;
+  void trace_block(const GatherWanted& wanted, size_t begin, size_t end);
 
+  const GatherSetup* setup_ = nullptr;
   std::vector<uint8_t> buried_;
   std::vector<FillStep> fill_;
-  std::shared_ptr<KeptRows> kept_;
-  std::shared_ptr<Pool<GatherBlock>> gathered_;
-  std::shared_ptr<Pool<GatherScratch, DeleteScratch>> scratch_;
-  mutable Report report_;
+  std::shared_ptr<Traced> traced_;
+  Report report_;
 };
 
 }  // namespace lambent

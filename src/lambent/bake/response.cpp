@@ -9,37 +9,135 @@
 
 namespace lambent {
 
-ViewMap make_response(const LinearMaterial& material, const CosineBasis& basis, int grid, int samples) {
-  const size_t n = size_t(basis.count());
-  ViewMap map{grid, int(n), std::vector<ViewWeights>(size_t(grid) * size_t(grid) * n, ViewWeights(0.0f))};
-  const auto* black = std::get_if<Lambert>(&material.black);
-  const auto* white = std::get_if<Lambert>(&material.white);
-  if (black && white) {  // exact: z_0 = 1, and the others are orthogonal to it
-    for (size_t i = 0; i < map.values.size(); i += n)
-      map.values[i] = ViewWeights(black->albedo, white->albedo.x - black->albedo.x);
-    return map;
-  }
-  parallel_for(size_t(grid), 1, [&](size_t begin, size_t end) {
-    std::vector<float> z(n);
-    std::vector<Vec4d> sum(n);
-    for (size_t y = begin; y < end; ++y)
-      for (int x = 0; x < grid; ++x) {
-        const Vec3 wo = view_map_direction(grid, x, int(y));
-        std::fill(sum.begin(), sum.end(), Vec4d(0.0));
-        for (int s = 0; s < samples; ++s) {
-          // The same points for every view, so that noise does not vary from node to node.
-          const BrdfSample drawn = sample(material.white, wo, sobol_owen(uint32_t(s), 0x0b5e));
-          if (!(drawn.pdf > 0)) continue;
-          const Vec3 a = evaluate(material.black, drawn.wi, wo) * (drawn.wi.z / drawn.pdf);
-          const float b = luminance(drawn.weight - a);
-          evaluate_cosine_basis(basis, drawn.wi, z);
-          for (size_t j = 0; j < n; ++j) sum[j] += Vec4d(a, b) * double(z[j]);
-        }
-        ViewWeights* out = map.values.data() + (y * size_t(grid) + size_t(x)) * n;
-        for (size_t j = 0; j < n; ++j) out[j] = ViewWeights(sum[j] / double(samples));
+namespace {
+
+bool is_isotropic(const Brdf& brdf) {
+  if (const auto* g = std::get_if<Ggx>(&brdf)) return g->alpha.x == g->alpha.y;
+  if (const auto* w = std::get_if<Ward>(&brdf)) return w->alpha.x == w->alpha.y;
+  return true;
+}
+
+// Where a node's O comes from: a view that is integrated, and how it is turned or mirrored from there.
+struct NodeSource {
+  size_t view;
+  float cosine = 1, sine = 0;  // turned about z
+  bool mirror_x = false, mirror_y = false;
+};
+struct Views {
+  std::vector<Vec3> directions;
+  std::vector<NodeSource> nodes;  // [y][x]
+};
+
+// Nodes lie on squares about the middle, which the map takes to circles of one height: ring k has nodes whose farther
+// coordinate is k steps from the middle.
+Views make_views(int grid, bool isotropic) {
+  Views v;
+  const int last = grid - 1, rings = grid / 2 + grid % 2;
+  if (isotropic)
+    for (int k = 0; k < rings; ++k) {  // towards +x
+      const float z = view_map_direction(grid, grid / 2 + k, grid / 2).z;
+      v.directions.push_back({std::sqrt(std::max(0.0f, 1 - z * z)), 0, z});
+    }
+  for (int y = 0; y < grid; ++y)
+    for (int x = 0; x < grid; ++x) {
+      const int far_x = std::max(x, last - x), far_y = std::max(y, last - y);
+      const Vec3 wo = view_map_direction(grid, x, y);
+      if (isotropic) {
+        const Vec3 flat = normalize_or(Vec3(wo.x, wo.y, 0), Vec3(1, 0, 0));
+        v.nodes.push_back({size_t(std::max(far_x, far_y) - grid / 2), flat.x, flat.y});
+      } else {
+        const size_t view = size_t((far_y - grid / 2) * rings + far_x - grid / 2);
+        v.nodes.push_back({view, 1, 0, x != far_x, y != far_y});
       }
+    }
+  if (!isotropic)
+    for (int y = grid / 2; y < grid; ++y)
+      for (int x = grid / 2; x < grid; ++x) v.directions.push_back(view_map_direction(grid, x, y));
+  return v;
+}
+
+// O(wo) by the same points for every view, so that noise does not vary from node to node: moments of harmonics, then
+// the basis, once.
+std::vector<Vec4d> integrate_view(const LinearMaterial& material, const CosineBasis& basis, Vec3 wo, int samples) {
+  const size_t n = size_t(basis.count());
+  std::vector<Vec4d> moments(n, Vec4d(0.0)), out(n, Vec4d(0.0));
+  double y[sh_count(max_incident_order)];
+  for (int s = 0; s < samples; ++s) {
+    const BrdfSample drawn = sample(material.white, wo, sobol_owen(uint32_t(s), 0x0b5e));
+    if (!(drawn.pdf > 0)) continue;
+    const Vec3 a = evaluate(material.black, drawn.wi, wo) * (drawn.wi.z / drawn.pdf);
+    const Vec4d value(a, luminance(drawn.weight - a));
+    evaluate_sh(basis.order, Vec3d(drawn.wi), {y, n});
+    for (size_t k = 0; k < n; ++k) moments[k] += value * y[k];
+  }
+  for (size_t j = 0; j < n; ++j)
+    for (size_t k = 0; k <= j; ++k) out[j] += moments[k] * (basis.from_sh[j * n + k] / double(samples));
+  return out;
+}
+
+// O of a node from that of its view: rows (l, m) and (l, -m) go with cos and sin of m times the azimuth.
+void place_node(const NodeSource& from, const std::vector<Vec4d>& O, int order, bool isotropic, ViewWeights* out) {
+  double c = 1, s = 0;  // of m times the angle
+  for (int m = 0; m < order; ++m) {
+    const double even_x = from.mirror_x && m % 2 ? -1 : 1,
+                 odd = (from.mirror_x ? -even_x : 1.0) * (from.mirror_y ? -1 : 1);
+    for (int l = m; l < order; ++l) {
+      const Vec4d &p = O[size_t(sh_index(l, m))], &q = O[size_t(sh_index(l, -m))];
+      if (m == 0) {
+        out[sh_index(l, 0)] = ViewWeights(p);
+        continue;
+      }
+      out[sh_index(l, m)] = ViewWeights(p * (isotropic ? c : even_x));
+      out[sh_index(l, -m)] = ViewWeights(isotropic ? p * s : q * odd);
+    }
+    const double next = c * double(from.cosine) - s * double(from.sine);
+    s = s * double(from.cosine) + c * double(from.sine), c = next;
+  }
+}
+
+}  // namespace
+
+Result<std::vector<ViewMap>> make_responses(std::span<const LinearMaterial> materials, const CosineBasis& basis,
+                                            int grid, int samples, Progress* progress) {
+  const size_t n = size_t(basis.count()), nodes = size_t(grid) * size_t(grid);
+  const Views around[2] = {make_views(grid, false), make_views(grid, true)};
+  std::vector<ViewMap> maps(materials.size(), ViewMap{grid, int(n), {}});
+  struct Task {
+    size_t material, view;
+  };
+  std::vector<Task> tasks;
+  std::vector<uint8_t> isotropic(materials.size());
+  std::vector<std::vector<std::vector<Vec4d>>> O(materials.size());  // [material][view][row]
+  for (size_t m = 0; m < materials.size(); ++m) {
+    const auto* black = std::get_if<Lambert>(&materials[m].black);
+    const auto* white = std::get_if<Lambert>(&materials[m].white);
+    maps[m].values.resize(nodes * n, ViewWeights(0.0f));
+    if (black && white) {  // exact: z_0 = 1, and the others are orthogonal to it
+      for (size_t i = 0; i < nodes; ++i)
+        maps[m].values[i * n] = ViewWeights(black->albedo, white->albedo.x - black->albedo.x);
+      continue;
+    }
+    isotropic[m] = is_isotropic(materials[m].black) && is_isotropic(materials[m].white);
+    O[m].resize(around[isotropic[m]].directions.size());
+    for (size_t v = 0; v < O[m].size(); ++v) tasks.push_back({m, v});
+  }
+  ProgressStage stage(progress, "materials", tasks.size());
+  parallel_for(tasks.size(), 1, [&](size_t begin, size_t) {
+    if (stage.cancelled()) return;
+    const auto [m, v] = tasks[begin];
+    O[m][v] = integrate_view(materials[m], basis, around[isotropic[m]].directions[v], samples);
+    stage.advance();
   });
-  return map;
+  if (stage.cancelled()) return Error{"", "cancelled"};
+  parallel_for(materials.size() * nodes, size_t(grid), [&](size_t begin, size_t end) {
+    for (size_t i = begin; i < end; ++i) {
+      const size_t m = i / nodes;
+      if (O[m].empty()) continue;
+      const NodeSource& from = around[isotropic[m]].nodes[i % nodes];
+      place_node(from, O[m][from.view], basis.order, isotropic[m], maps[m].values.data() + i % nodes * n);
+    }
+  });
+  return maps;
 }
 
 std::vector<double> phong_convolution(float exponent, int order) {

@@ -4,6 +4,8 @@
 // basis. Source: general-prt, "Final reflection"; separable BRDFs by SVD; local-deformable-prt eq. 14-15.
 #include <lambent/basis/cosine_basis.h>
 #include <lambent/brdf/brdf.h>
+#include <lambent/core/progress.h>
+#include <lambent/core/result.h>
 #include <lambent/transfer/outgoing.h>
 
 namespace lambent {
@@ -14,8 +16,11 @@ struct LinearMaterial {
   Brdf black, white;
 };
 
-// O_j over a grid of views, rows = order^2. `samples` directions a view, drawn from the BRDF.
-ViewMap make_response(const LinearMaterial& material, const CosineBasis& basis, int grid, int samples);
+// O_j of each material over a grid of views, rows = order^2. `samples` directions a view, drawn from the BRDF. Where
+// reflection is isotropic, O is integrated for one view of each height, with what is odd about its plane left out, and
+// turned to the others; else for the views of one quadrant, and mirrored. Errors: cancelled.
+Result<std::vector<ViewMap>> make_responses(std::span<const LinearMaterial> materials, const CosineBasis& basis,
+                                            int grid, int samples, Progress* progress = nullptr);
 
 // O = sum_r g_r(wo) h_rj: the rows h and the weights g, by singular values of O weighed by the cosine of the view. At
 // most max_rows, and as few as leave a relative error (root of the weighed sum of squares) of `tolerance`.

@@ -1,9 +1,9 @@
 // Follows: radiosity ("Jacobi, Gauss-Seidel, Southwell", "Krylov subspace methods"); Saad and Schultz, "GMRES", 1986;
 // Cohen, Chen, Wallace and Greenberg, "A progressive refinement approach", 1988 (Southwell's relaxation as shooting).
+#include <lambent/bake/kernels.h>
 #include <lambent/bake/solve.h>
 #include <lambent/core/check.h>
 #include <lambent/core/parallel.h>
-#include <lambent/bake/kernels.h>
 
 #include <array>
 #include <bit>
@@ -14,6 +14,8 @@ namespace {
 constexpr size_t rows_a_piece = 1024;
 constexpr size_t phases = 16;
 constexpr int restart = 8;
+constexpr uint32_t no_row = UINT32_MAX;
+constexpr size_t solve_units = 1000;  // of progress
 
 // Sums of a b over all rows, lane by lane, in a fixed order.
 std::vector<double> dots(const float* a, const float* b, size_t n, size_t width) {
@@ -44,29 +46,85 @@ double greatest_ratio(const std::vector<double>& squares, const std::vector<doub
   return worst;
 }
 
+// One step, all rows of e + A x: `next` keeps them, or `last` takes them. Without e, A x alone.
+struct Step {
+  const LinearOperator& op;
+  const Source* e;
+  size_t width;
+  const Progress* progress;
+  ProgressStage* stage = nullptr;  // advanced by rows
+  ErrorSums* errors = nullptr;
+  const TakeRows* last = nullptr;
+
+  // y = rows [first, first + count) of e + A x, a piece of the operator's.
+  void set_rows(size_t first, size_t count, const float* x, float* y, float* half = nullptr) const {
+    for (size_t r = first; r < first + count; ++r)
+      if (e) e->set(r, y + (r - first) * width);
+      else std::fill_n(y + (r - first) * width, width, 0.0f);
+    op.add_rows(first, count, x, width, y, half);
+  }
+
+  void rows(size_t first, size_t count, const float* x, float* y, float* half, float* next) const {
+    const size_t checked = (first + check_every - 1) / check_every * check_every;
+    const bool halves = errors && checked < first + count;
+    for (size_t r = checked; halves && r < first + count; r += check_every)
+      e->set_half(r, half + (r - checked) / check_every * width);
+    set_rows(first, count, x, y, halves ? half : nullptr);
+    for (size_t r = checked; halves && r < first + count; r += check_every)
+      if (!op.is_filled(r)) errors->add(r, half + (r - checked) / check_every * width, y + (r - first) * width, width);
+    if (last && *last) (*last)(first, count, y);
+    else op.keep(first, count, y, width, next);
+  }
+
+  void run(const float* x, float* next) const {
+    parallel_for(op.rows(), gather_block, [&](size_t begin, size_t end) {
+      const size_t most = std::min(op.piece(), end - begin);
+      AlignedVector<float> y(most * width), half(errors ? checked_count(most) * width : 0);
+      for (size_t first = begin; first < end; first += most) {
+        if (is_cancelled(progress)) return;
+        rows(first, std::min(most, end - first), x, y.data(), half.data(), next);
+      }
+      if (stage) stage->advance(end - begin);
+    });
+    if (next) op.fill(next, width);
+  }
+};
+
+// x = F e
+AlignedVector<float> first_iterate(const LinearOperator& op, const Source& e, size_t width) {
+  AlignedVector<float> x(op.size(width), 0.0f);
+  parallel_for(op.rows(), gather_block, [&](size_t begin, size_t end) {
+    AlignedVector<float> y(width);
+    for (size_t r = begin; r < end; ++r) e.set(r, y.data()), op.keep(r, 1, y.data(), width, x.data());
+  });
+  op.fill(x.data(), width);
+  return x;
+}
+
 struct Problem {
-  const GatherOperator& op;
+  const LinearOperator& op;
   const float* e;
   size_t width;
   const SolveOptions& options;
   SolveReport& report;
+  Progress* progress;
   ProgressStage& stage;
+  Source source = source_of(e, width);
+  size_t shown = 0;  // of the stage's solve_units
   std::vector<double> norms = dots(e, e, op.rows(), width);
 
   size_t n() const { return op.rows(); }
   AlignedVector<float> copy_of_e() const { return AlignedVector<float>(e, e + n() * width); }
+  // Each step of most solvers takes about the same factor off the residual.
   bool done(double applications, double residual) {
     report.steps.push_back({applications, residual});
-    stage.advance();
+    const double share = std::max(residual > 0 ? std::log(residual) / std::log(std::min(options.tolerance, 0.5)) : 1.0,
+                                  applications / options.most);
+    const size_t reached = size_t(double(solve_units) * std::clamp(share, 0.0, 1.0));
+    stage.advance(std::max(reached, shown) - shown), shown = std::max(reached, shown);
     return report.converged = residual <= options.tolerance;
   }
-  // next = e + A x
-  void step(const float* x, float* next) const {
-    op.apply(x, width, next);
-    each_row(n(), [&](size_t r) {
-      for (size_t k = 0; k < width; ++k) next[r * width + k] += e[r * width + k];
-    });
-  }
+  void step(const float* x, float* next) const { Step{op, &source, width, progress}.run(x, next); }
   // |next - x| / |e|
   double change(const float* x, float* next) const {
     AlignedVector<float> d(n() * width);
@@ -89,30 +147,32 @@ struct Problem {
 
   AlignedVector<float> gauss_seidel() {
     AlignedVector<float> x = copy_of_e();
-    const size_t blocks = op.blocks();
+    const size_t blocks = (n() + gather_block - 1) / gather_block;
     std::vector<double> squares(blocks * width);
     for (int k = 1; k <= options.most && !stage.cancelled(); ++k) {
       for (size_t phase = 0; phase < phases; ++phase) {
         const size_t count = blocks > phase ? (blocks - phase - 1) / phases + 1 : 0;
         // All blocks of a phase read x before any of them writes it.
         AlignedVector<float> fresh(count * gather_block * width);
-        parallel_for(count, 1, [&](size_t begin, size_t end) {
-          for (size_t i = begin; i < end; ++i)
-            op.apply_block(phase + i * phases, x.data(), width, fresh.data() + i * gather_block * width);
+        const Step next{op, &source, width, progress};
+        parallel_for(count * gather_block, op.piece(), [&](size_t begin, size_t) {
+          const size_t first = (phase + begin / gather_block * phases) * gather_block + begin % gather_block;
+          if (first >= n() || stage.cancelled()) return;
+          next.set_rows(first, std::min(op.piece(), n() - first), x.data(), fresh.data() + begin * width);
         });
+        if (stage.cancelled()) return x;
         parallel_for(count, 1, [&](size_t begin, size_t end) {
           for (size_t i = begin; i < end; ++i) {
             const size_t b = phase + i * phases, first = b * gather_block;
             double* s = squares.data() + b * width;
             std::fill(s, s + width, 0.0);
             for (size_t r = first; r < std::min(first + gather_block, n()); ++r) {
-              if (op.buried()[r]) continue;
+              if (op.is_filled(r)) continue;
               float* row = x.data() + r * width;
               const float* y = fresh.data() + (i * gather_block + r - first) * width;
               for (size_t c = 0; c < width; ++c) {
-                const float value = e[r * width + c] + y[c];
-                s[c] += double(value - row[c]) * double(value - row[c]);
-                row[c] = value;
+                s[c] += double(y[c] - row[c]) * double(y[c] - row[c]);
+                row[c] = y[c];
               }
             }
           }
@@ -127,7 +187,7 @@ struct Problem {
     return x;
   }
 
-  AlignedVector<float> southwell();
+  AlignedVector<float> southwell(const TransposedRows& push);
   AlignedVector<float> gmres();
 };
 
@@ -140,11 +200,11 @@ class ResidualQueue {
     const uint8_t b = uint8_t(std::bit_cast<uint32_t>(magnitude) >> 23);
     if (b > bucket_[i]) bucket_[i] = b, buckets_[b].push_back(i), top_ = std::max(top_, b);
   }
-  // A receiver whose residual is within a factor of two of the greatest; none when all are zero.
+  // A row whose residual is within a factor of two of the greatest; no_row when all are zero.
   uint32_t pop() {
     while (true) {
       while (top_ > 0 && buckets_[top_].empty()) --top_;
-      if (top_ == 0) return none;
+      if (top_ == 0) return no_row;
       const uint32_t i = buckets_[top_].back();
       buckets_[top_].pop_back();
       if (bucket_[i] != top_) continue;
@@ -159,12 +219,11 @@ class ResidualQueue {
   uint8_t top_ = 0;
 };
 
-AlignedVector<float> Problem::southwell() {
-  const GatherOperator::Push push = op.transposed();
+AlignedVector<float> Problem::southwell(const TransposedRows& push) {
   const size_t channels = size_t(push.channels), entries = std::max<size_t>(push.row.size(), 1);
   AlignedVector<float> x(n() * width, 0.0f), r = copy_of_e();
   for (size_t i = 0; i < n(); ++i)  // their equations are x_i = mean of neighbours
-    if (op.buried()[i]) std::fill(r.begin() + ptrdiff_t(i * width), r.begin() + ptrdiff_t((i + 1) * width), 0.0f);
+    if (op.is_filled(i)) std::fill(r.begin() + ptrdiff_t(i * width), r.begin() + ptrdiff_t((i + 1) * width), 0.0f);
   auto magnitude = [&](size_t i) {
     float sum = 0;
     for (size_t k = 0; k < width; ++k) sum += std::abs(r[i * width + k]);
@@ -176,7 +235,7 @@ AlignedVector<float> Problem::southwell() {
   size_t touched = 0, next_look = 0;
   while (touched <= size_t(options.most) * entries) {
     const uint32_t j = queue.pop();
-    if (j == none) break;
+    if (j == no_row) break;
     float* own = r.data() + size_t(j) * width;
     for (size_t k = 0; k < width; ++k) delta[k] = own[k], x[size_t(j) * width + k] += own[k], own[k] = 0;
     for (size_t at = push.first[j]; at < push.first[j + 1]; ++at) {
@@ -229,7 +288,7 @@ AlignedVector<float> Problem::gmres() {
     bool finished = false;
     while (m < restart && applications < options.most && !finished && !stage.cancelled()) {
       const AlignedVector<float>& v = V.back();
-      op.apply(v.data(), width, w.data());
+      op.apply(v.data(), width, w.data(), progress);
       ++applications;
       each_row(n(), [&](size_t i) {
         for (size_t k = i * width; k < (i + 1) * width; ++k) w[k] = v[k] - w[k];
@@ -288,37 +347,76 @@ AlignedVector<float> Problem::gmres() {
 
 }  // namespace
 
-Result<AlignedVector<float>> solve(const GatherOperator& op, const float* e, size_t width, const SolveOptions& options,
+Source source_of(const float* e, size_t width) {
+  return {[=](size_t row, float* y) { std::copy_n(e + row * width, width, y); }};
+}
+
+void ErrorSums::add(size_t row, const float* half, const float* full, size_t count) {
+  Sum& sum = sums_[row / gather_block];
+  for (size_t i = 0; i < count; ++i) {
+    sum.difference += double(half[i] - full[i]) * (half[i] - full[i]);
+    sum.total += double(full[i]) * full[i];
+  }
+}
+
+double ErrorSums::relative() const {
+  Sum all;
+  for (const Sum& s : sums_) all.difference += s.difference, all.total += s.total;
+  return all.total > 0 ? std::sqrt(all.difference / all.total) : 0.0;
+}
+
+Result<AlignedVector<float>> solve(const LinearOperator& op, const float* e, size_t width, const SolveOptions& options,
                                    SolveReport* report, Progress* progress) {
-  LAMBENT_CHECK(width % lane_multiple == 0 && options.most >= 1);
+  LAMBENT_CHECK(width % lane_multiple == 0 && options.most >= 1 && op.size(width) == op.rows() * width);
   if (!(options.tolerance > 0)) return Error{"tolerance", "must be positive"};
   SolveReport unwanted;
   SolveReport& r = report ? *report : unwanted;
   r = {};
-  ProgressStage stage(progress, "solving", size_t(options.most));
-  Problem problem{op, e, width, options, r, stage};
-  AlignedVector<float> x = options.solver == Solver::jacobi       ? problem.jacobi()
-                         : options.solver == Solver::gauss_seidel ? problem.gauss_seidel()
-                         : options.solver == Solver::southwell    ? problem.southwell()
-                                                                  : problem.gmres();
+  ProgressStage stage(progress, "solving", solve_units);
+  Problem problem{op, e, width, options, r, progress, stage};
+  AlignedVector<float> x;
+  switch (options.solver) {
+    case Solver::jacobi: x = problem.jacobi(); break;
+    case Solver::gauss_seidel: x = problem.gauss_seidel(); break;
+    case Solver::gmres: x = problem.gmres(); break;
+    case Solver::southwell:
+      auto transposed = op.transposed();
+      if (!transposed) return Error{"solver", "southwell wants rows that are known by their entries"};
+      x = problem.southwell(*transposed);
+  }
   if (stage.cancelled()) return Error{"", "cancelled"};
   return x;
 }
 
-Result<AlignedVector<float>> bounce(const GatherOperator& op, const float* e, size_t width, int bounces,
-                                    Progress* progress) {
-  AlignedVector<float> x(e, e + op.rows() * width), next(x.size());
-  ProgressStage stage(progress, "bounces", size_t(bounces));
-  for (int k = 0; k < bounces; ++k) {
+Result<Bounced> bounce(const LinearOperator& op, const Source& e, size_t width, int bounces, Progress* progress,
+                       const TakeRows& last) {
+  Bounced out{first_iterate(op, e, width)};
+  AlignedVector<float> next;
+  ErrorSums errors(op.rows());
+  for (int k = 1; k <= bounces; ++k) {
+    ProgressStage stage(progress, "bounce " + std::to_string(k), op.rows());
+    Step step{op, &e, width, progress, &stage};
+    if (k == bounces) step.errors = e.set_half ? &errors : nullptr, step.last = &last;
+    const bool kept = k < bounces || !last;
+    if (kept) next.resize(out.x.size());
+    step.run(out.x.data(), kept ? next.data() : nullptr);
     if (stage.cancelled()) return Error{"", "cancelled"};
-    op.apply(x.data(), width, next.data());
-    each_row(op.rows(), [&](size_t r) {
-      for (size_t i = r * width; i < (r + 1) * width; ++i) next[i] += e[i];
-    });
-    std::swap(x, next);
-    stage.advance();
+    if (kept) std::swap(out.x, next);
   }
-  return x;
+  if (e.set_half && bounces > 0) out.error = errors.relative();
+  return out;
+}
+
+Result<void> bounce_terms(const LinearOperator& op, const Source& e, size_t width, int bounces, Progress* progress,
+                          const std::function<Result<void>(int k, const AlignedVector<float>& x)>& take) {
+  AlignedVector<float> x = first_iterate(op, e, width), next(x.size());
+  for (int k = 0;; ++k) {
+    if (auto ok = take(k, x); !ok || k == bounces) return ok;
+    ProgressStage stage(progress, "term " + std::to_string(k + 1), op.rows());
+    Step{op, nullptr, width, progress, &stage}.run(x.data(), next.data());
+    if (stage.cancelled()) return Error{"", "cancelled"};
+    std::swap(x, next);
+  }
 }
 
 }  // namespace lambent

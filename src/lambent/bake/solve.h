@@ -1,9 +1,10 @@
 #pragma once
-// Solvers of the discrete radiosity equation x = e + A x, A the gather operator (F B, operator.h), for many columns at
-// once. Source: radiosity, "Discrete Radiosity Equation", "Iterative Linear Solver".
-#include <lambent/bake/operator.h>
+// Solvers of x = e + A x (linear.h), for many columns at once: counted bounces, their terms one by one, and solutions
+// of the discrete radiosity equation. Source: radiosity, "Discrete Radiosity Equation", "Iterative Linear Solver".
+#include <lambent/bake/linear.h>
+#include <lambent/core/result.h>
 
-#include <string>
+#include <functional>
 
 namespace lambent {
 
@@ -37,13 +38,48 @@ struct SolveReport {
   bool converged = false;
 };
 
-// e and the result are [receiver][width], width a multiple of lane_multiple; e must be filled (F e = e). Not converging
-// within `most` is no error: the report says so, and the last iterate is returned. Errors: cancelled.
-Result<AlignedVector<float>> solve(const GatherOperator& op, const float* e, size_t width, const SolveOptions& options,
+// e and the result are [row][width], width a multiple of lane_multiple; e must be filled (F e = e). Not converging
+// within `most` is no error: the report says so, and the last iterate is returned. Errors: cancelled; southwell of an
+// operator that is not known by its entries.
+Result<AlignedVector<float>> solve(const LinearOperator& op, const float* e, size_t width, const SolveOptions& options,
                                    SolveReport* report = nullptr, Progress* progress = nullptr);
 
-// The sum of the first terms: x_0 = e, x_{k+1} = e + A x_k, `bounces` times.
-Result<AlignedVector<float>> bounce(const GatherOperator& op, const float* e, size_t width, int bounces,
-                                    Progress* progress = nullptr);
+// e, row by row.
+struct Source {
+  std::function<void(size_t row, float* y)> set;  // all of y
+  // By the first half of the rays, of rows divisible by check_every; null: no error is estimated.
+  std::function<void(size_t row, float* y)> set_half{};
+};
+Source source_of(const float* e, size_t width);
+
+// Relative RMS error, from half-sample rows: sqrt(sum |half - full|^2 / sum |full|^2). Sums are kept by block of rows
+// and added up in order.
+class ErrorSums {
+ public:
+  explicit ErrorSums(size_t rows) : sums_((rows + gather_block - 1) / gather_block) {}
+  void add(size_t row, const float* half, const float* full, size_t count);
+  double relative() const;
+
+ private:
+  struct Sum {
+    double difference = 0, total = 0;
+  };
+  std::vector<Sum> sums_;
+};
+
+struct Bounced {
+  AlignedVector<float> x;
+  double error = -1;  // of the rows of the last step; negative: not estimated
+};
+// Takes rows [first, first + count) of the last step in place of x, from any thread.
+using TakeRows = std::function<void(size_t first, size_t count, const float* y)>;
+
+// The sum of the first terms: x_0 = F e, x_{k+1} = F (e + A x_k), `bounces` times. Errors: cancelled.
+Result<Bounced> bounce(const LinearOperator& op, const Source& e, size_t width, int bounces,
+                       Progress* progress = nullptr, const TakeRows& last = {});
+
+// The terms themselves: take(k, (F A)^k F e) for k = 0 ... bounces, in order. Errors: cancelled; those of take.
+Result<void> bounce_terms(const LinearOperator& op, const Source& e, size_t width, int bounces, Progress* progress,
+                          const std::function<Result<void>(int k, const AlignedVector<float>& x)>& take);
 
 }  // namespace lambent

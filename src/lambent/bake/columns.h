@@ -1,0 +1,11 @@
+#pragma once
+// Solution vectors as they are stored.
+#include <lambent/transfer/transfer.h>
+
+namespace lambent {
+
+// x, [receiver][row][column][channel] with `width` floats a row, as a Transfer.
+Transfer store_columns(const LightBasis& light, const float* x, size_t rows, int channels, size_t receivers,
+                       size_t width, Precision precision);
+
+}  // namespace lambent

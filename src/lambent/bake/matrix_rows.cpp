@@ -1,0 +1,98 @@
+// Follows: general-prt (the recursion over bounces with glossy scattering at the hits).
+#include <lambent/bake/matrix_rows.h>
+#include <lambent/core/parallel.h>
+
+#include <set>
+
+namespace lambent {
+
+MatrixRows::MatrixRows(MatrixGather& gather, size_t budget)
+    : gather_(gather),
+      budget_(budget),
+      T0_(gather.n() * gather.t0_width()),
+      T0_half_(checked_count(gather.n()) * gather.t0_width()),
+      buried_(gather.n()),
+      is_kept_((gather.n() + gather_block - 1) / gather_block),
+      kept_(is_kept_.size()) {}
+
+void MatrixRows::trace_receiver(MatrixScratch& s, size_t r, MatrixHits& hits) {
+  buried_[r] = gather_.trace(s, r, &hits);
+  float* full = T0_.data() + r * gather_.t0_width();
+  float* half = r % check_every ? nullptr : T0_half_.data() + r / check_every * gather_.t0_width();
+  gather_.direct_light(s, r, full, half);
+  hits.ends.push_back(uint32_t(hits.hits.size()));
+}
+
+// Which blocks are kept depends on the scheduling, the result does not: the others are traced again, alike.
+void MatrixRows::trace_block(size_t block) {
+  auto s = gather_.scratch.borrow();
+  MatrixHits hits;
+  for (size_t r = block * gather_block; r < std::min(rows(), (block + 1) * gather_block); ++r)
+    trace_receiver(*s, r, hits);
+  const size_t bytes = hits.bytes();
+  if (is_kept_[block]) used_ += bytes, used_ -= kept_[block].bytes(), kept_[block] = std::move(hits);
+  else if (used_.fetch_add(bytes) + bytes <= budget_) kept_[block] = std::move(hits), is_kept_[block] = 1;
+  else used_ -= bytes;
+}
+
+Result<void> MatrixRows::trace(Progress* progress) {
+  ProgressStage stage(progress, "tracing", rows());
+  parallel_for(rows(), gather_block, [&](size_t begin, size_t end) {
+    if (stage.cancelled()) return;
+    trace_block(begin / gather_block);
+    stage.advance(end - begin);
+  });
+  if (stage.cancelled()) return Error{"", "cancelled"};
+  move_buried();
+  return {};
+}
+
+// A buried receiver looks out from where its nearest clear neighbour along the mesh lies.
+void MatrixRows::move_buried() {
+  std::set<size_t> touched;
+  for (const FillStep& step : make_fill_steps(gather_.scene, gather_.receivers.basis, buried_)) {
+    gather_.receivers.origins[step.receiver] = gather_.receivers.origins[step.sources[0]];
+    touched.insert(step.receiver / gather_block);
+  }
+  const std::vector<size_t> blocks(touched.begin(), touched.end());
+  parallel_for(blocks.size(), 1, [&](size_t begin, size_t) { trace_block(blocks[begin]); });
+}
+
+double MatrixRows::kept() const {
+  return double(std::count(is_kept_.begin(), is_kept_.end(), uint8_t(1))) / double(is_kept_.size());
+}
+
+void MatrixRows::add_rows(size_t r, size_t, const float* Y, size_t, float* y, float* half) const {
+  const size_t b = r / gather_block, i = r % gather_block;
+  auto s = gather_.scratch.borrow();
+  MatrixHits again;
+  std::span<const MatrixHit> mine;
+  if (is_kept_[b]) {
+    const MatrixHits& hits = kept_[b];
+    const size_t first = i == 0 ? 0 : hits.ends[i - 1];
+    mine = {hits.hits.data() + first, hits.ends[i] - first};
+    (void)gather_.aim(*s, r);
+  } else {
+    (void)gather_.trace(*s, r, &again);
+    mine = again.hits, again_ += gather_.rays();
+  }
+  gather_.scattered(*s, mine, gather_.rays(), Y, y);
+  if (half) gather_.scattered(*s, mine, gather_.setup.sets.half, Y, half);
+}
+
+void MatrixRows::keep(size_t first, size_t count, const float* y, size_t width, float* x) const {
+  const size_t J = gather_.J(), wc = gather_.wc();
+  for (size_t r = first; r < first + count; ++r, y += width) {
+    const FactoredResponse& f = gather_.scatter[gather_.materials.of_receiver[r]];
+    float* out = x + gather_.first_row[r] * wc;
+    std::fill_n(out, size_t(f.rows) * wc, 0.0f);
+    for (size_t row = 0; row < size_t(f.rows); ++row)
+      for (size_t j = 0; j < J; ++j) {
+        const float h = f.h[row * J + j];
+        if (h == 0) continue;
+        for (size_t k = 0; k < wc; ++k) out[row * wc + k] += h * y[j * wc + k];
+      }
+  }
+}
+
+}  // namespace lambent

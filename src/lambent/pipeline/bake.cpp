@@ -1,0 +1,358 @@
+#include <lambent/pipeline/bake.h>
+
+#include <lambent/bake/bake.h>
+#include <lambent/bake/materials.h>
+#include <lambent/bake/unbury.h>
+#include <lambent/compress/parametric.h>
+#include <lambent/light/environment.h>
+#include <lambent/pipeline/bake_lightmap.h>
+#include <lambent/pipeline/bake_parse.h>
+#include <lambent/pipeline/parse.h>
+#include <lambent/pipeline/place_receivers.h>
+#include <lambent/pipeline/text.h>
+#include <lambent/relight/fix_light.h>
+#include <lambent/relight/light.h>
+#include <lambent/render/render.h>
+
+#include <fmt/format.h>
+
+#include <chrono>
+#include <filesystem>
+
+namespace lambent {
+namespace {
+
+using Clock = std::chrono::steady_clock;
+double seconds_since(Clock::time_point start) { return std::chrono::duration<double>(Clock::now() - start).count(); }
+
+// A bake under way.
+struct Bake {
+  const BakeRequest& request;
+  const BakePlan& plan;
+  const Job& job;
+  Scene scene;
+  PlacedReceivers placed;
+  Tracer tracer;
+  double load_seconds = 0, build_seconds = 0;
+  BakeReport report{};
+  // What it has made so far; a dense store may still become a smaller one.
+  Store store{};
+  Rows rows = DiffuseRows{};
+  std::optional<FixedView> view{};
+  std::vector<float> fit_errors{};
+  std::vector<Transfer> terms{};
+  std::vector<Field> more{};
+  Summary summary{};
+  nlohmann::json told = nlohmann::json::object();  // of the report, for provenance
+
+  const Receivers& receivers() const { return placed.receivers; }
+  Transfer& dense() { return std::get<Transfer>(store); }
+  const Outgoing* outgoing() const { return std::get_if<Outgoing>(&rows); }
+  void line(const std::string& label, std::string text) { summary.lines.emplace_back(label, std::move(text)); }
+};
+
+Result<void> bake_diffuse(Bake& b) {
+  if (b.request.subsurface.empty()) {
+    auto transfer = bake(b.scene, b.tracer, b.receivers(), b.plan.bake, &b.report, b.job.progress);
+    if (!transfer) return transfer.error();
+    b.store = std::move(*transfer);
+    return {};
+  }
+  SubsurfaceReport walks;
+  auto transfer = bake_subsurface(b.scene, b.tracer, b.receivers(), b.plan.bake, b.plan.subsurface, &b.report, &walks,
+                                  b.job.progress);
+  if (!transfer) return transfer.error();
+  if (walks.lost > 0.005)
+    b.job.warn(
+        fmt::format("{:.1f}% of the walks through the medium were lost, and their light with them: surfaces are "
+                    "not closed, or the medium is too dense",
+                    100 * walks.lost));
+  b.store = std::move(*transfer);
+  b.summary.json["subsurface"] = {{"events", walks.events}, {"lost", walks.lost}};
+  b.line("medium", fmt::format("{:.1f} events a walk", walks.events));
+  return {};
+}
+
+Result<void> bake_glossy(Bake& b) {
+  auto baked = bake_matrix(b.scene, b.tracer, b.receivers(),
+                           make_receiver_materials(b.scene, b.receivers(), b.plan.reflection), b.plan.bake,
+                           b.plan.matrix, &b.report, b.job.progress);
+  if (!baked) return baked.error();
+  b.store = std::move(baked->transfer), b.rows = std::move(baked->outgoing);
+  return {};
+}
+
+// Visibility times cosine is diffuse transfer of direct light, of as many bands as make the product with light exact.
+Result<void> bake_factors(Bake& b) {
+  BakeOptions visibility = b.plan.bake;
+  visibility.order += b.plan.matrix.incident_order - 1, visibility.bounces = 0;
+  auto transfer = bake(b.scene, b.tracer, b.receivers(), visibility, &b.report, b.job.progress);
+  if (!transfer) return transfer.error();
+  b.rows = make_map_outgoing(make_receiver_materials(b.scene, b.receivers(), b.plan.reflection),
+                             b.plan.matrix.incident_order, b.plan.matrix);
+  b.store = FactoredTransfer{std::move(*transfer), b.plan.matrix.incident_order};
+  return {};
+}
+
+Result<void> fit_lobes(Bake& b) {
+  ZonalFitOptions options = b.plan.zonal;
+  if (const Outgoing* outgoing = b.outgoing()) options.row_weights = row_weights(*outgoing);
+  ZonalFitReport fit;
+  auto zonal = fit_zonal(b.dense(), options, &fit, b.job.progress);
+  if (!zonal) return zonal.error();
+  b.summary.json["zonal"] = {{"lobes", zonal->lobes}, {"rms", fit.rms}, {"seconds", fit.seconds}};
+  b.told["zonal"] = {{"lobes", zonal->lobes}, {"rms", fit.rms}};
+  b.line("lobes", fmt::format("{}, fitted in {}, with an error of {:.2f}% RMS", zonal->lobes,
+                              human_seconds(fit.seconds), 100 * fit.rms));
+  b.store = std::move(*zonal), b.fit_errors = std::move(fit.errors);
+  return {};
+}
+
+Result<void> make_membrane(Bake& b) {
+  auto alphas = membrane_alphas(b.request.membrane, b.scene, b.receivers());
+  if (!alphas) return alphas.error();
+  b.store = membrane_transfer(b.request.order, b.receivers().normals, *alphas, b.plan.bake.precision);
+  b.report.receivers = b.receivers().count();
+  b.line("lobes", "one a receiver: a membrane");
+  return {};
+}
+
+Result<void> bake_blocks(Bake& b) {
+  VisibilityReport report;
+  auto visibility = bake_visibility(b.tracer, b.receivers(), b.plan.visibility, &report, b.job.progress);
+  if (!visibility) return visibility.error();
+  b.report.receivers = b.receivers().count(), b.report.rays = report.rays, b.report.trace_seconds = report.seconds;
+  const VisibilityStatistics s = visibility_statistics(*visibility);
+  b.summary.json.update(
+      {{"blocked", s.blocked}, {"clear", s.clear}, {"mixed", s.mixed}, {"changes_per_mixed_block", s.changes}});
+  b.line("blocks", fmt::format("{:.1f} % blocked, {:.1f} % clear, {:.1f} % mixed with {:.1f} changes each; cube {}, {} "
+                               "bit{}",
+                               100 * s.blocked, 100 * s.clear, 100 * s.mixed, s.changes, visibility->size,
+                               visibility->bits, visibility->bits == 1 ? "" : "s"));
+  b.store = std::move(*visibility), b.rows = SightRows{};
+  return {};
+}
+
+Result<void> bake_surface(Bake& b) {
+  switch (b.plan.kind) {
+    case BakeKind::diffuse: return bake_diffuse(b);
+    case BakeKind::matrix: return bake_glossy(b);
+    case BakeKind::factors: return bake_factors(b);
+    case BakeKind::membrane: return make_membrane(b);
+    case BakeKind::blocks: return bake_blocks(b);
+    case BakeKind::lightmap: return Error{"", "a lightmap is baked by bake_lightmap_request()"};
+    case BakeKind::zonal:
+    case BakeKind::glossy_zonal: break;
+  }
+  auto ok = b.plan.kind == BakeKind::zonal ? bake_diffuse(b) : bake_glossy(b);
+  return ok ? fit_lobes(b) : ok;
+}
+
+Result<void> bake_free_space(Bake& b, const Lattice& lattice) {
+  LatticeReport report;
+  auto baked = bake_lattice(b.scene, b.tracer, b.receivers(), b.dense(), b.outgoing(), lattice, b.plan.lattice, &report,
+                            b.job.progress);
+  if (!baked) return baked.error();
+  b.more.push_back(lattice_field(std::move(*baked)));
+  b.told["lattice_invalid"] = report.invalid;
+  b.summary.json["lattice"] = {{"points", report.points},
+                               {"invalid", report.invalid},
+                               {"rays", report.rays},
+                               {"seconds", report.seconds},
+                               {"bytes", report.bytes}};
+  b.line("lattice",
+         fmt::format(
+             "{} points, order {}, {} in {}{}", human_count(report.points), b.plan.lattice.order,
+             human_bytes(double(report.bytes)), human_seconds(report.seconds),
+             report.invalid ? "; " + human_count(report.invalid) + " inside something, filled from neighbours" : ""));
+  return {};
+}
+
+// A baked file is a GLB: told before the work where it can be.
+Result<void> check_picture_bytes(const Bake& b, const PixelView& view) {
+  const size_t columns = b.plan.bake.light().count();
+  const size_t bytes = 3 * size_t(view.width) * size_t(view.height) * columns *
+                       (b.plan.bake.precision == Precision::half ? 2 : 4);
+  if (bytes < size_t{1} << 32) return {};
+  return Error{"--size", fmt::format("{} pixels of {} columns take {} bytes, and a baked file holds 4 GiB",
+                                     b.request.size, columns, bytes)};
+}
+
+Result<void> fix_the_view(Bake& b, const PixelView& view) {
+  RenderOptions options;
+  options.width = view.width, options.height = view.height, options.samples = b.request.spp;
+  options.outgoing = b.outgoing();
+  auto pixels = fix_view(b.scene, b.tracer, b.receivers().basis, b.dense(), view.camera, options, b.job.progress);
+  if (!pixels) return pixels.error();
+  b.view = FixedView{view.camera, view.width, view.height, std::move(pixels->coverage)};
+  b.store = std::move(pixels->transfer), b.rows = DiffuseRows{};
+  return {};
+}
+
+Result<void> fix_the_light(Bake& b) {
+  auto env = load_environment(b.request.fix_light);
+  if (!env) return env.error();
+  for (const std::string& w : env->warnings) b.job.warn(w);
+  b.store = fix_light(b.dense(), project_light(*env, b.dense().light).light, env->name);
+  return {};
+}
+
+Result<void> make_clusters(Bake& b) {
+  const auto start = Clock::now();
+  double error = 0;
+  auto clusters = compress_cpca(b.dense(), b.plan.cpca, &error, b.job.progress);
+  if (!clusters) return clusters.error();
+  const double seconds = seconds_since(start);
+  b.summary.json["cpca"] = {
+      {"clusters", clusters->clusters}, {"rank", clusters->rank}, {"error", error}, {"seconds", seconds}};
+  b.told["cpca_error"] = error;
+  b.line("clusters", fmt::format("{} of rank {}, found in {}, with an error of {:.2f}% RMS", clusters->clusters,
+                                 clusters->rank, human_seconds(seconds), 100 * error));
+  b.store = std::move(*clusters);
+  return {};
+}
+
+// What all kinds say, before what each has said of itself.
+void summarize(Bake& b) {
+  const BakeReport& r = b.report;
+  const LightBasis light = light_of(b.store);
+  const size_t bytes = bytes_of(b.store), receivers = receivers_of(b.store);
+  const double each = double(bytes) / double(std::max<size_t>(receivers, 1));
+  const double rate = r.trace_seconds > 0 ? double(r.rays) / r.trace_seconds : 0.0;
+  b.summary.json.update({{"receivers", r.receivers},
+                         {"buried", r.buried},
+                         {"vertices", b.scene.positions.size()},
+                         {"triangles", b.scene.triangles.size()},
+                         {"rays", r.rays},
+                         {"order", light.order},
+                         {"lobes", light.lobes.size()},
+                         {"channels", channels_of(b.store)},
+                         {"rows", rows_of(b.store)},
+                         {"seconds",
+                          {{"load", b.load_seconds},
+                           {"build", b.build_seconds},
+                           {"trace", r.trace_seconds},
+                           {"bounce", r.bounce_seconds}}},
+                         {"rays_per_second", rate},
+                         {"bytes", bytes},
+                         {"bytes_per_receiver", each},
+                         {"operator_bytes", r.operator_bytes},
+                         {"operator_kept", r.operator_kept},
+                         {"working_memory", r.working_memory},
+                         {"error", r.error >= 0 ? nlohmann::json(r.error) : nlohmann::json()}});
+  if (b.view) b.summary.json["pixels"] = receivers;
+  std::vector<std::pair<std::string, std::string>> lines;
+  lines.emplace_back("receivers",
+                     fmt::format("{} ({} vertices, {} triangles{})", human_count(r.receivers),
+                                 human_count(b.scene.positions.size()), human_count(b.scene.triangles.size()),
+                                 r.buried ? "; " + human_count(r.buried) + " buried, filled from neighbours" : ""));
+  if (r.rays > 0)
+    lines.emplace_back("rays", fmt::format("{} ({:.1f} million a second)", human_count(r.rays), rate / 1e6));
+  lines.emplace_back("time", fmt::format("load {}, build {}, trace {}, bounce {}", human_seconds(b.load_seconds),
+                                         human_seconds(b.build_seconds), human_seconds(r.trace_seconds),
+                                         human_seconds(r.bounce_seconds)));
+  const int rows = rows_of(b.store), channels = channels_of(b.store);
+  std::string shape = light.count() == 0
+                        ? std::string()
+                        : fmt::format(" ({}, {} row{}, {} channel{}, {})", describe_light(light), rows,
+                                      rows == 1 ? "" : "s", channels, channels == 1 ? "" : "s", b.request.precision);
+  lines.emplace_back("size", fmt::format("{} a {}, {} in all{}", human_bytes(each), b.view ? "pixel" : "receiver",
+                                         human_bytes(double(bytes)), shape));
+  b.summary.lines.insert(b.summary.lines.begin(), lines.begin(), lines.end());
+  if (r.operator_kept < 1)
+    b.line("memory", fmt::format("{:.0f}% of the gather operator fitted; the rest was traced again for each bounce",
+                                 100 * r.operator_kept));
+  if (r.error >= 0) b.line("error", fmt::format("{:.2f}% RMS, estimated from half-sample gathers", 100 * r.error));
+}
+
+Result<Bake> begin(const BakeRequest& request, const BakePlan& plan, const Job& job) {
+  auto start = Clock::now();
+  auto scene = load_scene_of(request, job);
+  if (!scene) return scene.error();
+  auto placed = place_receivers(*scene, request, job);
+  if (!placed) return placed.error();
+  const double load_seconds = seconds_since(start);
+  start = Clock::now();
+  auto tracer = Tracer::build(*scene);
+  if (!tracer) return tracer.error();
+  Bake b{request, plan, job, std::move(*scene), std::move(*placed), std::move(*tracer)};
+  b.load_seconds = load_seconds, b.build_seconds = seconds_since(start);
+  return b;
+}
+
+// Stages after the surfaces' own, in their order; each takes a dense store.
+Result<void> bake_beside(Bake& b, const std::optional<Lattice>& lattice, const std::optional<PixelView>& view) {
+  if (lattice)
+    if (auto ok = bake_free_space(b, *lattice); !ok) return ok;
+  if (view)
+    if (auto ok = fix_the_view(b, *view); !ok) return ok;
+  if (!b.request.fix_light.empty())
+    if (auto ok = fix_the_light(b); !ok) return ok;
+  return b.request.compress.empty() ? Result<void>() : make_clusters(b);
+}
+
+Result<BakeOutcome> bake_plain(const BakeRequest& request, const BakePlan& plan, const Job& job) {
+  auto begun = begin(request, plan, job);
+  if (!begun) return begun.error();
+  Bake& b = *begun;
+  std::optional<Lattice> lattice;
+  if (!request.lattice.empty()) {
+    auto parsed = lattice_of_request(request, b.scene);
+    if (!parsed) return parsed.error();
+    if (auto ok = check_lattice(*parsed, plan.bake.order, plan.lattice); !ok) return ok.error();
+    lattice = *parsed;
+  }
+  std::optional<PixelView> view;
+  if (!request.fix_view.empty()) {
+    auto made = make_view(request.fix_view, request.size, b.scene, "--fix-view");
+    if (!made) return made.error();
+    if (auto ok = check_picture_bytes(b, *made); !ok) return ok.error();
+    view = *made;
+  }
+  if (b.placed.atlas) move_buried_texels(b.scene, b.tracer, *b.placed.atlas, b.placed.receivers);
+  if (auto ok = bake_surface(b); !ok) return ok.error();
+  if (auto ok = bake_beside(b, lattice, view); !ok) return ok.error();
+  summarize(b);
+  b.told["receivers"] = b.report.receivers, b.told["buried"] = b.report.buried;
+  if (b.report.error >= 0) b.told["error"] = b.report.error;
+  BakeOutcome out;
+  out.summary = std::move(b.summary);
+  out.baked = b.view ? make_baked(std::move(b.scene), std::move(*b.view), std::move(b.store))
+                     : make_baked(std::move(b.scene), b.receivers(), std::move(b.store), std::move(b.rows));
+  out.baked.surface.fit_errors = std::move(b.fit_errors);
+  out.baked.more = std::move(b.more), out.baked.terms = std::move(b.terms);
+  out.baked.provenance = provenance_of(request, out.baked.scene, std::move(b.told));
+  return out;
+}
+
+}  // namespace
+
+Result<BakeOutcome> bake(const BakeRequest& asked, const Job& job) {
+  auto request = resolved(asked);
+  if (!request) return request.error();
+  auto plan = plan_of(*request, job);
+  if (!plan) return plan.error();
+  return plan->kind == BakeKind::lightmap ? bake_lightmap_request(*request, *plan, job)
+                                          : bake_plain(*request, *plan, job);
+}
+
+Result<Summary> bake_to_file(const BakeRequest& request, const Job& job) {
+  if (auto ok = check_output(request.output, {"glb"}); !ok) return ok.error();
+  auto outcome = bake(request, job);
+  if (!outcome) return outcome.error();
+  const auto start = Clock::now();
+  nlohmann::json pictures = nlohmann::json::array();
+  const std::string stem = request.output.substr(0, request.output.find_last_of('.'));
+  for (const auto& [name, picture] : outcome->pictures) {
+    pictures.push_back(stem + name);
+    if (auto ok = save_image(stem + name, picture); !ok) return ok.error();
+  }
+  if (auto ok = save_baked(request.output, outcome->baked, outcome->look ? &*outcome->look : nullptr); !ok)
+    return ok.error();
+  Summary summary = std::move(outcome->summary);
+  summary.json["output"] = request.output, summary.json["seconds"]["save"] = seconds_since(start);
+  if (!pictures.empty()) summary.json["pictures"] = std::move(pictures);
+  return summary;
+}
+
+}  // namespace lambent

@@ -1,0 +1,249 @@
+#include <lambent/pipeline/bake_parse.h>
+
+#include <lambent/brdf/parse_brdf.h>
+#include <lambent/light/lamps.h>
+#include <lambent/pipeline/parse.h>
+#include <lambent/scene/load.h>
+#include <lambent/scene/refine.h>
+
+#include <fmt/format.h>
+
+#include <charconv>
+#include <map>
+
+namespace lambent {
+namespace {
+
+constexpr int max_lamps = 64, max_directional = 256;
+constexpr const char* light_syntax = "sh:BANDS, sh:BANDS+lamps:COUNT@ENV, or directional:COUNT";
+
+// KIND or KIND:N, where N is the number of rows (svd) or bands (sh, hemisphere, hsh).
+Result<void> parse_outgoing(const std::string& text, MatrixOptions& matrix) {
+  const size_t colon = text.find(':');
+  const std::string name = text.substr(0, colon);
+  const auto kind = std::find(std::begin(outgoing_names), std::end(outgoing_names), name);
+  if (kind == std::end(outgoing_names))
+    return Error{"--outgoing",
+                 "must be map, phong, svd:ROWS, sh:BANDS, hemisphere:BANDS or hsh:BANDS, not \"" + text + "\""};
+  matrix.outgoing = OutgoingKind(kind - std::begin(outgoing_names));
+  // Fewer rows than the default where incident light has no more.
+  matrix.svd_rows = std::min(matrix.svd_rows, sh_count(matrix.incident_order));
+  if (colon == std::string::npos) return {};
+  if (matrix.outgoing == OutgoingKind::map || matrix.outgoing == OutgoingKind::phong)
+    return Error{"--outgoing", name + " takes no number: --incident-order says how many rows it has"};
+  auto number = parse_numbers(text.substr(colon + 1), 1, "--outgoing");
+  if (!number) return number.error();
+  const float n = (*number)[0];
+  if (n != std::floor(n) || n < 1 || n > 64)
+    return Error{"--outgoing", "expects a whole number from 1 to 64 after the colon, not \"" + text + "\""};
+  (matrix.outgoing == OutgoingKind::svd ? matrix.svd_rows : matrix.outgoing_order) = int(n);
+  return {};
+}
+
+Result<int> parse_whole(const std::string& text, int least, int most, const std::string& what) {
+  int value = 0;
+  const auto [end, status] = std::from_chars(text.data(), text.data() + text.size(), value);
+  if (status != std::errc() || end != text.data() + text.size() || value < least || value > most)
+    return Error{"--light",
+                 fmt::format("{} must be a whole number from {} to {}, not \"{}\"", what, least, most, text)};
+  return value;
+}
+
+// Sets the columns of light that `text` asks for; loads the environment it names, if any.
+Result<void> parse_light(const std::string& text, BakeOptions& bake, const Job& job) {
+  if (text.starts_with("directional:")) {
+    auto count = parse_whole(text.substr(12), 4, max_directional, "the count after directional:");
+    if (!count) return count.error();
+    bake.order = 0, bake.lobes = even_lobes(*count);
+    return {};
+  }
+  if (!text.starts_with("sh:"))
+    return Error{"--light", "must be " + std::string(light_syntax) + ", not \"" + text + "\""};
+  const size_t plus = text.find('+');
+  auto order =
+      parse_whole(text.substr(3, plus == std::string::npos ? plus : plus - 3), 1, max_sh_order, "the bands after sh:");
+  if (!order) return order.error();
+  bake.order = *order;
+  if (plus == std::string::npos) return {};
+  const std::string lamps = text.substr(plus + 1);
+  const size_t at = lamps.find('@');
+  if (!lamps.starts_with("lamps:") || at == std::string::npos || at + 1 == lamps.size())
+    return Error{"--light", "expects lamps:COUNT@ENV after the plus sign, not \"" + lamps + "\""};
+  auto count = parse_whole(lamps.substr(6, at - 6), 1, max_lamps, "the count after lamps:");
+  if (!count) return count.error();
+  const std::string name = lamps.substr(at + 1);
+  auto env = load_environment(name);
+  if (!env) return env.error();
+  for (const std::string& w : env->warnings) job.warn(w);
+  bake.lobes = find_lamps(*env, *count);
+  if (const size_t found = bake.lobes.size(); found < size_t(*count))
+    job.warn(fmt::format("{}: has {}{} out, not {}", name, found,
+                         found == 1 ? " lamp that stands" : " lamps that stand", *count));
+  return {};
+}
+
+// "k" or "converge:EPS".
+Result<void> parse_bounces(const std::string& text, int& count, double& converge) {
+  const std::string prefix = "converge:";
+  if (text.starts_with(prefix)) {
+    auto n = parse_numbers(text.substr(prefix.size()), 1, "--bounces");
+    if (!n) return n.error();
+    converge = double((*n)[0]);
+    if (converge > 0 && converge < 1) return {};
+    return Error{"--bounces", "converge needs a residual between 0 and 1, not " + text.substr(prefix.size())};
+  }
+  const char* end = text.data() + text.size();
+  const auto [stop, status] = std::from_chars(text.data(), end, count);
+  if (status != std::errc() || stop != end || count < 0 || count > 64)
+    return Error{"--bounces", "expects a number from 0 to 64, or converge:EPS, not \"" + text + "\""};
+  return {};
+}
+
+Result<int> parse_visibility(const std::string& text) {
+  if (text == "binary") return 1;
+  int bits = 0;
+  const char* end = text.data() + text.size();
+  if (text.starts_with("bits:"))
+    if (const auto [stop, status] = std::from_chars(text.data() + 5, end, bits);
+        status == std::errc() && stop == end && bits >= 2 && bits <= max_visibility_bits)
+      return bits;
+  return Error{"--visibility",
+               fmt::format("must be binary, or bits:N with N from 2 to {}, not \"{}\"", max_visibility_bits, text)};
+}
+
+const std::map<std::string, Solver> solver_names{{"jacobi", Solver::jacobi},
+                                                 {"gauss-seidel", Solver::gauss_seidel},
+                                                 {"southwell", Solver::southwell},
+                                                 {"gmres", Solver::gmres}};
+
+LightmapOptions lightmap_options(const BakeRequest& r, const BakeOptions& bake, double converge) {
+  LightmapOptions o;
+  o.order = r.order, o.samples = r.samples, o.lamp_samples = r.lamp_samples, o.bounces = bake.bounces;
+  o.converge = converge, o.solver = solver_names.at(r.solver), o.directional = *directional_kind(r.directional);
+  o.memory = r.memory, o.gather = r.gather == "hemicube" ? GatherKind::hemicube : GatherKind::rays;
+  o.seed = r.seed, o.precision = bake.precision;
+  return o;
+}
+
+// Limits that only several options together have.
+Result<void> check_orders(const BakePlan& plan, const BakeRequest& r) {
+  const bool glossy = plan.kind == BakeKind::matrix || plan.kind == BakeKind::glossy_zonal;
+  const int order = plan.bake.order;
+  if (plan.kind == BakeKind::factors) {
+    if (!plan.bake.lobes.empty()) return Error{"--light", "--factors multiplies harmonics: leave lobes out"};
+    if (order + r.incident_order - 1 > max_sh_order)
+      return Error{"--factors", fmt::format("needs the bands of the light and of incident light, less one, and {} is "
+                                            "all there are",
+                                            max_sh_order)};
+  }
+  if (glossy && order == 0) return Error{"--light", "directional light cannot be baked with --transfer matrix"};
+  if (glossy && order + r.incident_order > max_sh_order + 1)
+    return Error{"--incident-order", fmt::format("and the bands of the light may be {} together", max_sh_order + 1)};
+  if (!plan.bake.lobes.empty() && !r.lattice.empty())
+    return Error{"--light", "lobes do not light free space: leave --lattice out"};
+  if (!plan.bake.lobes.empty() && plan.matrix.simulate_paths && plan.bake.bounces > 0)
+    return Error{"--light", "lobes do not bounce along --simulate paths: leave it out, or bake with --bounces 0"};
+  if (!r.lattice.empty() && order + r.lattice_order > max_sh_order + 1)
+    return Error{"--lattice-order", fmt::format("and the bands of the light may be {} together", max_sh_order + 1)};
+  return {};
+}
+
+}  // namespace
+
+Result<BakePlan> plan_of(const BakeRequest& r, const Job& job) {
+  BakePlan plan;
+  plan.kind = kind_of(r);
+  BakeOptions& b = plan.bake;
+  b.samples = r.samples, b.memory = r.memory, b.seed = r.seed, b.shadows = r.shadows == "on";
+  const Precision precision = r.precision == "half" ? Precision::half : Precision::single;
+  const bool lobes = plan.kind == BakeKind::zonal || plan.kind == BakeKind::glossy_zonal;
+  b.precision = lobes ? Precision::single : precision;  // lobes are rounded once, when they are fitted
+  double converge = 0;
+  if (auto ok = parse_bounces(r.bounces, b.bounces, converge); !ok) return ok.error();
+  b.order = r.order;
+  if (!r.light.empty())
+    if (auto ok = parse_light(r.light, b, job); !ok) return ok.error();
+  plan.matrix.incident_order = r.incident_order, plan.matrix.grid = r.view_map;
+  plan.matrix.simulate_paths = r.simulate == "paths";
+  if (auto ok = parse_outgoing(r.outgoing, plan.matrix); !ok) return ok.error();
+  plan.zonal.lobes = r.lobes, plan.zonal.precision = precision;
+  plan.lattice = {r.lattice_order, r.samples, r.memory, r.seed, precision};
+  if (!r.compress.empty())
+    if (auto ok = parse_cpca(r.compress, plan.cpca); !ok) return ok.error();
+  if (!r.subsurface.empty()) {
+    auto medium = parse_medium(r.subsurface);
+    if (!medium) return Error{"--subsurface", medium.error().text()};
+    plan.subsurface.medium = *medium;
+  }
+  auto reflection = parse_reflection(r.brdf);
+  if (!reflection) return reflection.error();
+  plan.reflection = std::move(*reflection);
+  plan.lightmap = lightmap_options(r, b, converge);
+  auto bits = parse_visibility(r.visibility);
+  if (!bits) return bits.error();
+  plan.visibility = {r.cube, *bits, r.memory};
+  if (auto ok = check_orders(plan, r); !ok) return ok.error();
+  return plan;
+}
+
+Result<Scene> load_scene_of(const BakeRequest& r, const Job& job) {
+  auto scene = load_scene(r.scene);
+  if (!scene) return scene;
+  for (const std::string& text : r.emit) {
+    auto lamp = parse_named_color(text, "--emit");
+    if (!lamp) return lamp.error();
+    bool found = false;
+    for (Material& m : scene->materials)
+      if (m.name == lamp->name) m.emissive = lamp->color, m.emissive_texture = -1, found = true;
+    if (!found) return Error{"--emit", "the scene has no material \"" + lamp->name + "\""};
+  }
+  for (Material& m : scene->materials) m.base_color = min(m.base_color, Vec3(r.max_albedo));
+  if (r.ground) add_ground(*scene);
+  if (r.max_edge > 0)
+    if (auto ok = split_long_edges(*scene, r.max_edge); !ok) return ok.error();
+  for (const std::string& w : scene->warnings) job.warn(w);
+  return scene;
+}
+
+Result<Lattice> lattice_of_request(const BakeRequest& r, const Scene& scene) {
+  auto counts = parse_numbers(r.lattice, 3, "--lattice");
+  if (!counts) return counts.error();
+  for (float n : *counts)
+    if (n != std::floor(n) || n < 1 || n > float(max_lattice_points))
+      return Error{"--lattice",
+                   fmt::format("expects three whole numbers from 1 to {}, not \"{}\"", max_lattice_points, r.lattice)};
+  Bounds box = default_lattice_box(scene);
+  if (!r.lattice_box.empty()) {
+    auto b = parse_numbers(r.lattice_box, 6, "--lattice-box");
+    if (!b) return b.error();
+    box.min = {(*b)[0], (*b)[1], (*b)[2]}, box.max = {(*b)[3], (*b)[4], (*b)[5]};
+    if (!all_at_most(box.min, box.max)) return Error{"--lattice-box", "expects the lower corner first, then the upper"};
+    if (!all_at_most(max(abs(box.min), abs(box.max)), Vec3(1e9f))) return Error{"--lattice-box", "lies beyond 1e9"};
+  }
+  return Lattice{box.min, box.max, int((*counts)[0]), int((*counts)[1]), int((*counts)[2])};
+}
+
+Result<std::vector<float>> membrane_alphas(const std::string& text, const Scene& scene, const Receivers& receivers) {
+  if (auto number = parse_numbers(text, 1, "--membrane")) {
+    if (!((*number)[0] >= 0 && (*number)[0] <= 1))
+      return Error{"--membrane", "lets through a share from 0 to 1, not " + text};
+    return std::vector<float>(receivers.count(), (*number)[0]);
+  }
+  auto picture = load_image(text);
+  if (!picture) return picture.error();
+  if (scene.texcoords[0].empty())
+    return Error{scene.path, "has no texture coordinates to look the membrane's picture up by"};
+  std::vector<float> alphas(receivers.count());
+  for (const auto* map : {&receivers.front, &receivers.back})
+    for (size_t v = 0; v < map->size(); ++v) {
+      if ((*map)[v] == none) continue;
+      const Vec2 uv = scene.texcoords[0][v] - floor(scene.texcoords[0][v]);
+      const int x = std::min(int(uv.x * float(picture->width)), picture->width - 1);
+      const int y = std::min(int(uv.y * float(picture->height)), picture->height - 1);
+      const float alpha = luminance(picture->at(x, y));
+      alphas[(*map)[v]] = std::isfinite(alpha) ? std::clamp(alpha, 0.0f, 1.0f) : 0.0f;
+    }
+  return alphas;
+}
+
+}  // namespace lambent

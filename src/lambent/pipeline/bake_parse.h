@@ -1,0 +1,40 @@
+#pragma once
+// The small syntaxes of a bake request, read into the options of the stages.
+#include <lambent/bake/lattice.h>
+#include <lambent/bake/lightmap.h>
+#include <lambent/bake/matrix.h>
+#include <lambent/bake/subsurface.h>
+#include <lambent/bake/visibility.h>
+#include <lambent/compress/cpca.h>
+#include <lambent/compress/zonal_fit.h>
+#include <lambent/pipeline/bake.h>
+#include <lambent/scene/reflection.h>
+
+namespace lambent {
+
+struct BakePlan {
+  BakeKind kind = BakeKind::diffuse;
+  BakeOptions bake;
+  MatrixOptions matrix;
+  ZonalFitOptions zonal;
+  LatticeOptions lattice;
+  CpcaOptions cpca;
+  SubsurfaceOptions subsurface;
+  LightmapOptions lightmap;
+  VisibilityOptions visibility;
+  Reflection reflection;
+};
+
+// Errors name the option. Loads the environment that --light names.
+Result<BakePlan> plan_of(const BakeRequest& request, const Job& job);
+
+// Scenes as the request prepares them; warnings go to the job.
+Result<Scene> load_scene_of(const BakeRequest& request, const Job& job);
+
+Result<Lattice> lattice_of_request(const BakeRequest& request, const Scene& scene);
+
+// What share of the light a sheet lets through at each receiver: one number, or a picture's luminance at its texture
+// coordinates.
+Result<std::vector<float>> membrane_alphas(const std::string& text, const Scene& scene, const Receivers& receivers);
+
+}  // namespace lambent

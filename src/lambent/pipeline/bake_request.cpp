@@ -1,0 +1,270 @@
+#include <lambent/pipeline/bake_request.h>
+
+#include <lambent/baked/fields.h>
+#include <lambent/basis/cosine_basis.h>
+#include <lambent/basis/sh.h>
+
+#include <filesystem>
+
+namespace lambent {
+
+namespace {
+
+using R = BakeRequest;
+
+constexpr KindMask bit(BakeKind kind) { return KindMask(1) << int(kind); }
+constexpr KindMask D = bit(BakeKind::diffuse), M = bit(BakeKind::matrix), F = bit(BakeKind::factors),
+                   Z = bit(BakeKind::zonal), G = bit(BakeKind::glossy_zonal), S = bit(BakeKind::membrane),
+                   L = bit(BakeKind::lightmap), K = bit(BakeKind::blocks);
+constexpr KindMask every = D | M | F | Z | G | S | L | K, traced = D | M | F | Z | G | L, glossy = M | F | G;
+
+const Option<R> table[] = {
+    {"scene", &R::scene, "Files", every, "Scene: .gltf, .glb, .obj or .ply", 0, 0, nullptr, nullptr, true, true},
+    {"output", &R::output, "Files", every, "Baked file to write (.glb)", 0, 0, nullptr, nullptr, false},
+    {"transfer", &R::transfer, "What is baked", every,
+     "diffuse: a vector a receiver for distant light; matrix: incident light in every direction, for glossy materials; "
+     "zonal: lobes, for what moves, glossy too with --brdf or --outgoing; lightmap: the light of the scene's own "
+     "lamps; "
+     "blocks: visibility for sharp shadows and highlights, with materials chosen when it is drawn",
+     0, 0, "diffuse|matrix|zonal|lightmap|blocks"},
+    {"order", &R::order, "What is baked", every & ~K,
+     "Bands of the light's spherical harmonics; 6 if nothing is said, of lightmaps none", 1, max_sh_order},
+    {"light", &R::light, "What is baked", D | M | F,
+     "What light is made of, in place of --order: sh:BANDS, sh:BANDS+lamps:COUNT@ENV, or directional:COUNT", 0, 0,
+     nullptr, nullptr, true, true},
+    {"precision", &R::precision, "What is baked", every & ~K, "Of the stored transfer", 0, 0, "half|single"},
+    {"receivers", &R::receivers, "What is baked", every,
+     "Where light is received: vertices, texels of an atlas, or patches (triangles); texels for lightmaps, else "
+     "vertices",
+     0, 0, "vertices|texels|patches"},
+    {"texels-per-unit", &R::texels_per_unit, "What is baked", D | L,
+     "Texels along one scene unit; the atlas is as large as that needs", 1e-9, 1e9, nullptr, "receivers=texels"},
+    {"atlas", &R::atlas, "What is baked", D | L,
+     "WIDTHxHEIGHT of the atlas; texels are as small as that allows (1024x1024 if nothing is said)", 0, 0, nullptr,
+     "receivers=texels"},
+
+    {"samples", &R::samples, "How well", traced, "Rays a receiver", 1, 1 << 20},
+    {"bounces", &R::bounces, "How well", D | M | Z | G | L,
+     "Reflections between surfaces, 0 to 64; lightmaps also converge:EPS, as many as leave that residual"},
+    {"shadows", &R::shadows, "How well", D | Z, "off: open light everywhere, no shadows and no bounces", 0, 0,
+     "on|off"},
+    {"terms", &R::terms, "How well", D | L, "Keep direct light and each bounce one by one too, for `render --show`"},
+    {"memory", &R::memory, "How well", traced | K,
+     "Working memory beyond scene and result, bytes; e.g. 500MB, 2GiB (4GiB); less means rays traced again", 0, 0,
+     nullptr, nullptr, false},
+    {"seed", &R::seed, "How well", traced, "Of the ray directions"},
+
+    {"ground", &R::ground, "Scene", every, "Add a tessellated floor under the scene"},
+    {"max-edge", &R::max_edge, "Scene", every, "Split edges longer than this many scene units", 1e-9, 1e9},
+    {"emit", &R::emit, "Scene", every, "MATERIAL=R,G,B: make a material a lamp of this radiance"},
+    {"max-albedo", &R::max_albedo, "Scene", every, "Darken base colours to at most this, channel by channel", 0, 1},
+
+    {"brdf", &R::brdf, "Glossy transfer", glossy,
+     "How surfaces reflect: diffuse (by base colour), materials (glTF's metallic-roughness), or one model for all, as "
+     "`render --brdf` takes it",
+     0, 0, nullptr, nullptr, true, true},
+    {"outgoing", &R::outgoing, "Glossy transfer", M | G,
+     "Rows for the last reflection: map, phong, svd:ROWS, sh:BANDS, hemisphere:BANDS, hsh:BANDS"},
+    {"incident-order", &R::incident_order, "Glossy transfer", glossy, "Bands of incident light", 1, max_incident_order},
+    {"view-map", &R::view_map, "Glossy transfer", glossy,
+     "Nodes a side of the maps that the last reflection is looked up in by view", 8, 256, nullptr, "outgoing=map|svd"},
+    {"simulate", &R::simulate, "Glossy transfer", M | G,
+     "Bounces by the recursion over receivers, or by paths (caustics, coarse meshes; noisier)", 0, 0,
+     "recursion|paths"},
+    {"factors", &R::factors, "Glossy transfer", F,
+     "With --transfer matrix: keep visibility, light and BRDF as factors; direct light alone, a tenth of the size"},
+
+    {"lobes", &R::lobes, "Lobes, media, sheets", Z | G, "Lobes a receiver; of glossy lobes, a row", 1,
+     max_stored_lobes},
+    {"subsurface", &R::subsurface, "Lobes, media, sheets", D | Z,
+     "Light through a medium: sigma_s=S,sigma_a=A[,g=G][,eta=E] per unit, S and A one number or R,G,B; or NAME[:MM], a "
+     "measured one (marble, skin, wholemilk, ...) where a unit is MM millimetres (1000)"},
+    {"membrane", &R::membrane, "Lobes, media, sheets", S,
+     "No simulation: thin sheets that let this share of the light through, 0 to 1, or a picture of it", 0, 0, nullptr,
+     nullptr, true, true},
+
+    {"direct", &R::direct, "Lightmaps", L,
+     "separate writes direct light to a picture of its own as well, and leaves it out of the others", 0, 0,
+     "included|separate"},
+    {"directional", &R::directional, "Lightmaps", L,
+     "For normal maps: sh:2 or sh:3 (harmonics of irradiance), hl2 (Half-Life 2's three directions), vector", 0, 0,
+     "none|sh:2|sh:3|hl2|vector"},
+    {"solver", &R::solver, "Lightmaps", L, "With --bounces converge:EPS", 0, 0, "jacobi|gauss-seidel|southwell|gmres",
+     "bounces=converge:"},
+    {"gather", &R::gather, "Lightmaps", L,
+     "Bounces by cosine-distributed rays, or through a hemicube's pixels, 3 n^2 as near to --samples as can be", 0, 0,
+     "rays|hemicube"},
+    {"sky", &R::sky, "Lightmaps", L, "An environment (as --env of render) as one more lamp, named sky", 0, 0, nullptr,
+     nullptr, true, true},
+    {"light-groups", &R::light_groups, "Lightmaps", L,
+     "A column for each material that glows, each lamp by name, and the sky"},
+    {"lamp-samples", &R::lamp_samples, "Lightmaps", L, "Samples a receiver towards each group's lamps", 1, 1 << 16},
+
+    {"cube", &R::cube, "Blocks", K, "Texels a side of a cubemap's face: 16, 32, 64, 128 or 256", 16, 256},
+    {"visibility", &R::visibility, "Blocks", K, "binary, or bits:N, shares of texels in 2^N levels, for harsh light"},
+
+    {"compress", &R::compress, "Smaller and special", D | M,
+     "cpca:CLUSTERS,RANK: store clusters, and a few weights a receiver"},
+    {"fix-light", &R::fix_light, "Smaller and special", D | M,
+     "Bake this environment in, so that only its brightness is left: a surface light field", 0, 0, nullptr, nullptr,
+     true, true},
+    {"fix-view", &R::fix_view, "Smaller and special", D | M,
+     "EYE,TARGET,FOV or auto: bake this camera in, one row a pixel: image relighting"},
+    {"size", &R::size, "Smaller and special", D | M, "Of --fix-view: WIDTHxHEIGHT in pixels", 0, 0, nullptr,
+     "fix-view"},
+    {"spp", &R::spp, "Smaller and special", D | M, "Of --fix-view: rays a pixel", 1, 4096, nullptr, "fix-view"},
+
+    {"lattice", &R::lattice, "Free space", D | M,
+     "NX,NY,NZ: also bake light in free space at so many points, for `render --insert`"},
+    {"lattice-box", &R::lattice_box, "Free space", D | M, "X0,Y0,Z0,X1,Y1,Z1: where, if not throughout the scene's box",
+     0, 0, nullptr, "lattice"},
+    {"lattice-order", &R::lattice_order, "Free space", D | M, "Bands of the light that arrives there", 1, max_sh_order,
+     nullptr, "lattice"},
+};
+
+// Pairs that contradict one another, beyond what the table says.
+struct Conflict {
+  const char *option, *other, *why;  // conditions as Option::needs
+};
+constexpr Conflict conflicts[] = {
+    {"order", "light", "and --light both say how many bands there are: give one"},
+    {"compress", "fix-view", "makes clusters of receivers on surfaces, and --fix-view has pixels: give one"},
+    {"lattice", "fix-view", "would light what a fixed view leaves no room for: give one"},
+    {"lattice", "fix-light", "is lit by any distant light, and --fix-light leaves one: give one"},
+    {"lattice", "shadows=off", "is always baked with shadows"},
+    {"lattice", "subsurface", "does not know media: --subsurface is for surfaces alone"},
+    {"lattice", "light=directional", "is lit by harmonics alone: leave --light directional out"},
+    {"subsurface", "shadows=off", "is always baked with shadows"},
+    {"subsurface", "light=directional", "is of harmonics alone"},
+    {"directional", "direct=separate", "leaves no direct light apart: --direct separate goes with --directional none"},
+    {"directional", "order", "holds lamps alone: leave --order out"},
+    {"terms", "compress", "are kept of plain transfer: leave --compress out"},
+    {"terms", "fix-view", "are kept on surfaces: leave --fix-view out"},
+    {"terms", "fix-light", "are kept for any light: leave --fix-light out"},
+    {"terms", "subsurface", "are those of light between surfaces: leave --subsurface out"},
+    {"terms", "shadows=off", "are direct light alone without shadows"},
+    {"terms", "bounces=converge:", "are counted: give --bounces a number"},
+    {"terms", "direct=separate", "have direct light apart already"},
+    {"terms", "directional=sh|hl2|vector", "are not kept of directional lightmaps"},
+    {"atlas", "texels-per-unit", "excludes --texels-per-unit"},
+};
+
+// Given options that conflict; a default conflicts with nothing.
+Result<void> check_conflicts(const BakeRequest& r) {
+  auto said = [&](const std::string& condition) {
+    const std::string name = condition.substr(0, condition.find('='));
+    return r.given.contains(json_name(name)) && holds(bake_options(), r, condition);
+  };
+  for (const Conflict& c : conflicts) {
+    if (std::string(c.option) == "directional" && r.directional == "none") continue;
+    if (said(c.option) && said(c.other)) return Error{std::string("--") + c.option, c.why};
+  }
+  return {};
+}
+
+Result<void> check_kind(const BakeRequest& r, BakeKind kind) {
+  if (kind != BakeKind::diffuse && kind != BakeKind::lightmap && r.receivers != "vertices")
+    return Error{"--receivers", std::string(bake_kind_names[int(kind)]) + " are received at vertices"};
+  if (!r.lattice.empty() && r.receivers != "vertices")
+    return Error{"--receivers", "--lattice needs a bake at vertices"};
+  if (r.shadows == "off" && r.given.contains("bounces") && r.bounces != "0")
+    return Error{"--shadows", "off has no bounces: leave --bounces out, or set it to 0"};
+  if (kind != BakeKind::lightmap && r.bounces.starts_with("converge:"))
+    return Error{"--bounces", "converge:EPS is for lightmaps"};
+  if (kind == BakeKind::blocks && (r.cube & (r.cube - 1)) != 0)
+    return Error{"--cube", "must be 16, 32, 64, 128 or 256, not " + std::to_string(r.cube)};
+  return {};
+}
+
+}  // namespace
+
+std::span<const Option<BakeRequest>> bake_options() { return table; }
+
+BakeKind kind_of(const BakeRequest& r) {
+  if (r.transfer == "matrix") return r.factors ? BakeKind::factors : BakeKind::matrix;
+  if (r.transfer == "zonal")
+    return r.given.contains("brdf") || r.given.contains("outgoing") ? BakeKind::glossy_zonal : BakeKind::zonal;
+  if (r.transfer == "lightmap") return BakeKind::lightmap;
+  if (r.transfer == "blocks") return BakeKind::blocks;
+  return r.membrane.empty() ? BakeKind::diffuse : BakeKind::membrane;
+}
+
+Result<BakeRequest> resolved(BakeRequest r) {
+  if (auto ok = check_values(bake_options(), r, r.given); !ok) return ok.error();
+  const BakeKind kind = kind_of(r);
+  if (r.receivers.empty()) r.receivers = kind == BakeKind::lightmap ? "texels" : "vertices";
+  if (auto ok = check_given(bake_options(), r, r.given, int(kind), bake_kind_names); !ok) return ok.error();
+  if (auto ok = check_conflicts(r); !ok) return ok.error();
+  if (auto ok = check_kind(r, kind); !ok) return ok.error();
+  if (kind == BakeKind::factors || r.shadows == "off") r.bounces = "0";
+  if (r.order == 0 && r.light.empty() && kind != BakeKind::lightmap && kind != BakeKind::blocks) r.order = 6;
+  if (r.receivers == "texels" && r.atlas.empty() && !(r.texels_per_unit > 0)) r.atlas = "1024x1024";
+  if (r.shadows == "on") r.given.erase("shadows");
+  return r;
+}
+
+nlohmann::json to_json(const BakeRequest& request) {
+  const BakeKind kind = kind_of(request);
+  nlohmann::json out = request_json(bake_options(), request, int(kind));
+  if (request.shadows == "off") out.erase("bounces");
+  return out;
+}
+
+Result<BakeRequest> bake_request_from_json(const nlohmann::json& object) {
+  BakeRequest request;
+  if (auto ok = read_request(bake_options(), object, request, request.given); !ok) return ok.error();
+  return request;
+}
+
+Result<BakeRequest> load_bake_request(const std::string& path) {
+  auto bytes = read_file(path);
+  if (!bytes) return bytes.error();
+  const nlohmann::json object = nlohmann::json::parse(bytes->begin(), bytes->end(), nullptr, false);
+  if (object.is_discarded()) return Error{path, "is not JSON"};
+  auto request = bake_request_from_json(object);
+  if (!request) return Error{path, "\"" + request.error().where + "\" " + request.error().message};
+  return request;
+}
+
+namespace {
+
+// A file named in a provenance: where we are, or beside the baked file.
+std::string found(const std::string& value, const std::filesystem::path& folder) {
+  const size_t prefix = value.find_last_of("@:");
+  const std::string start = prefix == std::string::npos ? "" : value.substr(0, prefix + 1),
+                    name = value.substr(start.size());
+  std::error_code status;
+  if (name.empty() || std::filesystem::exists(name, status) || !std::filesystem::exists(folder / name, status))
+    return value;
+  return start + (folder / name).string();
+}
+
+}  // namespace
+
+Result<BakeRequest> request_of_baked_file(const std::string& path, const std::string& scene) {
+  auto file = MappedFile::open(path);
+  if (!file) return file.error();
+  auto fields = read_fields(*file, path);
+  if (!fields) return fields.error();
+  const auto provenance = nlohmann::json::parse(fields->provenance, nullptr, false);
+  const auto object = provenance.is_object() ? provenance.find("request") : provenance.end();
+  if (!provenance.is_object() || object == provenance.end())
+    return Error{path, "does not say by which request it was baked: it is of an older version or was made otherwise"};
+  auto request = bake_request_from_json(*object);
+  if (!request) return Error{path, "its request: \"" + request.error().where + "\" " + request.error().message};
+  const std::filesystem::path folder = std::filesystem::path(path).parent_path();
+  for (const Option<BakeRequest>& o : bake_options())
+    if (const auto* member = std::get_if<std::string BakeRequest::*>(&o.member); member && o.is_path)
+      (*request).*(*member) = found((*request).*(*member), folder);
+  if (!scene.empty()) request->scene = scene;
+  auto input = read_file(request->scene);
+  if (!input) return input.error();
+  const auto hash = provenance.contains("input") && provenance["input"].is_object()
+                      ? provenance["input"].value("xxh3_128", nlohmann::json())
+                      : nlohmann::json();
+  if (hash.is_string() && hash != content_hash(*input))
+    return Error{request->scene, "is not the scene that " + path + " was baked of"};
+  return request;
+}
+
+}  // namespace lambent

@@ -1,0 +1,47 @@
+#include <lambent/pipeline/place_receivers.h>
+
+#include <lambent/pipeline/parse.h>
+#include <lambent/pipeline/version.h>
+
+#include <filesystem>
+
+namespace lambent {
+
+Result<PlacedReceivers> place_receivers(Scene& scene, const BakeRequest& request, const Job& job) {
+  if (request.receivers == "vertices") return PlacedReceivers{make_vertex_receivers(scene), std::nullopt};
+  if (request.receivers == "patches") return PlacedReceivers{make_patch_receivers(scene), std::nullopt};
+  AtlasOptions options{.texels_per_unit = request.texels_per_unit};
+  if (!request.atlas.empty()) {
+    auto size = parse_size(request.atlas, "--atlas");
+    if (!size) return size.error();
+    options.width = (*size)[0], options.height = (*size)[1];
+  }
+  auto atlas = make_atlas(scene, options);
+  if (!atlas) return atlas.error();
+  if (!atlas->remark.empty()) job.warn(atlas->remark);
+  Receivers receivers = make_texel_receivers(scene, *atlas);
+  return PlacedReceivers{std::move(receivers), std::move(*atlas)};
+}
+
+std::string provenance_of(const BakeRequest& request, const Scene& scene, nlohmann::json report) {
+  nlohmann::json out{{"generator", std::string("lambent ") + version},
+                     {"input", {{"name", without_folder(scene.path)}, {"xxh3_128", scene.hash}}},
+                     {"request", to_json(request)},
+                     {"report", std::move(report)}};
+  // Environments, pictures and tables that the request names.
+  for (const Option<BakeRequest>& o : bake_options()) {
+    const auto* member = std::get_if<std::string BakeRequest::*>(&o.member);
+    if (!member || !o.is_path || std::string(o.name) == "scene" || !out["request"].contains(json_name(o.name)))
+      continue;
+    const std::string& value = request.*(*member);
+    const size_t prefix = value.find_last_of("@:");
+    const std::string path = prefix == std::string::npos ? value : value.substr(prefix + 1);
+    std::error_code status;
+    if (!std::filesystem::is_regular_file(path, status)) continue;
+    if (auto bytes = read_file(path))
+      out["inputs"].push_back({{"name", without_folder(path)}, {"xxh3_128", content_hash(*bytes)}});
+  }
+  return out.dump(-1, ' ', false, nlohmann::json::error_handler_t::replace);
+}
+
+}  // namespace lambent

@@ -1,0 +1,7 @@
+#include <lambent/pipeline/version.h>
+
+namespace lambent {
+
+const char* const version = LAMBENT_VERSION;
+
+}  // namespace lambent
