@@ -1,0 +1,201 @@
+#include <lambent/brdf/parse_brdf.h>
+#include <lambent/core/file.h>
+#include <lambent/pipeline/parse.h>
+#include <lambent/scene/refine.h>
+
+#include <fmt/format.h>
+#include <unistd.h>
+
+#include <algorithm>
+#include <charconv>
+#include <cmath>
+#include <filesystem>
+
+namespace lambent {
+
+Result<std::vector<float>> parse_numbers(const std::string& text, size_t count, const std::string& option) {
+  std::vector<float> values;
+  const char* p = text.data();
+  const char* end = p + text.size();
+  while (true) {
+    float value = 0;
+    auto [next, status] = std::from_chars(p, end, value);
+    if (status != std::errc() || !std::isfinite(value)) break;
+    values.push_back(value), p = next;
+    if (p == end || *p != ',') break;
+    ++p;
+  }
+  if (p != end || values.size() != count)
+    return Error{option, "expects " + std::to_string(count) + " numbers separated by commas, not \"" + text + "\""};
+  return values;
+}
+
+Result<NamedColor> parse_named_color(const std::string& text, const std::string& option) {
+  const size_t at = text.rfind('=');
+  if (at == std::string::npos || at == 0) return Error{option, "expects NAME=R,G,B, not \"" + text + "\""};
+  auto n = parse_numbers(text.substr(at + 1), 3, option);
+  if (!n) return n.error();
+  if ((*n)[0] < 0 || (*n)[1] < 0 || (*n)[2] < 0) return Error{option, "a colour may not be negative"};
+  return NamedColor{text.substr(0, at), {(*n)[0], (*n)[1], (*n)[2]}};
+}
+
+Result<std::array<int, 2>> parse_size(const std::string& text, const std::string& option) {
+  std::array<int, 2> size{};
+  const size_t x = text.find('x');
+  auto number = [&](const std::string& digits, int& value) {
+    auto [end, status] = std::from_chars(digits.data(), digits.data() + digits.size(), value);
+    return status == std::errc() && end == digits.data() + digits.size() && value >= 1 && value <= 16384;
+  };
+  if (x == std::string::npos || !number(text.substr(0, x), size[0]) || !number(text.substr(x + 1), size[1]))
+    return Error{option, "expects WIDTHxHEIGHT, each from 1 to 16384, not \"" + text + "\""};
+  return size;
+}
+
+Result<std::optional<Camera>> parse_camera(const std::string& text) {
+  if (text == "auto") return std::optional<Camera>();
+  auto n = parse_numbers(text, 7, "--camera");
+  if (!n) return n.error();
+  Camera camera;
+  camera.eye = {(*n)[0], (*n)[1], (*n)[2]}, camera.target = {(*n)[3], (*n)[4], (*n)[5]}, camera.fov = (*n)[6];
+  if (!(camera.fov > 0 && camera.fov < 180))
+    return Error{"--camera", "field of view must lie between 0 and 180 degrees"};
+  if (camera.eye == camera.target) return Error{"--camera", "eye and target are the same point"};
+  return std::optional<Camera>(camera);
+}
+
+namespace {
+
+// What there is to look at: everything but an added floor, unless there is nothing else.
+Bounds subject_bounds(const Scene& scene) {
+  Bounds box;
+  for (const Triangle& t : scene.triangles)
+    if (scene.parts[t.part].name != ground_name)
+      for (uint32_t v : t.v) box.extend(scene.positions[v]);
+  return box.empty() ? bounds(scene) : box;
+}
+
+}  // namespace
+
+Result<View> parse_view(const std::string& camera_text, const std::string& size_text, const Scene& scene) {
+  View view;
+  auto size = parse_size(size_text, "--size");
+  if (!size) return size.error();
+  view.width = (*size)[0], view.height = (*size)[1];
+  auto camera = parse_camera(camera_text);
+  if (!camera) return camera.error();
+  view.camera = *camera ? **camera : camera_around(subject_bounds(scene));
+  return view;
+}
+
+Result<Mat3> parse_rotation(const std::string& text, const std::string& option) {
+  if (text.empty()) return Mat3(1.0f);
+  auto n = parse_numbers(text, 3, option);
+  if (!n) return n.error();
+  return rotation_from_yaw_pitch_roll({(*n)[0], (*n)[1], (*n)[2]});
+}
+
+const std::map<std::string, ShWindow> window_names{
+    {"none", ShWindow::none}, {"hann", ShWindow::hann}, {"lanczos", ShWindow::lanczos}, {"auto", ShWindow::automatic}};
+
+Result<ShWindow> parse_window(const std::string& text) {
+  const auto found = window_names.find(text);
+  if (found == window_names.end())
+    return Error{"--window", "must be none, hann, lanczos or auto, not \"" + text + "\""};
+  return found->second;
+}
+
+Result<std::vector<SphereLamp>> parse_sphere_lamps(const std::vector<std::string>& texts) {
+  std::vector<SphereLamp> lamps;
+  for (const std::string& text : texts) {
+    auto n = parse_numbers(text, 7, "--sphere-lamp");
+    if (!n) return n.error();
+    const std::vector<float>& v = *n;
+    const SphereLamp lamp{{v[0], v[1], v[2]}, v[3], {v[4], v[5], v[6]}};
+    if (!(lamp.radius > 0)) return Error{"--sphere-lamp", "the radius must be above 0"};
+    for (float x : v)
+      if (std::abs(x) > 1e9f) return Error{"--sphere-lamp", "numbers must lie within 1e9"};
+    lamps.push_back(lamp);
+  }
+  return lamps;
+}
+
+Result<std::vector<double>> parse_frames(const std::string& text) {
+  constexpr size_t max_frames = 64;
+  const Error wrong{"--frames", "expects FROM:TO[:STEP] in seconds, at most " + std::to_string(max_frames) +
+                                    " of them, not \"" + text + "\""};
+  double n[3] = {0, 0, 0};
+  size_t count = 0;
+  const char* p = text.data();
+  const char* end = p + text.size();
+  for (; count < 3; ++p) {
+    const auto [next, status] = std::from_chars(p, end, n[count]);
+    if (status != std::errc() || !std::isfinite(n[count])) return wrong;
+    ++count, p = next;
+    if (p == end || *p != ':') break;
+  }
+  if (p != end || count < 2 || n[1] < n[0]) return wrong;
+  if (count == 2) n[2] = (n[1] - n[0]) / 5;
+  if (n[1] == n[0]) return std::vector<double>{n[0]};
+  if (!(n[2] > 0) || (n[1] - n[0]) / n[2] >= double(max_frames)) return wrong;
+  std::vector<double> times;
+  for (size_t i = 0; n[0] + double(i) * n[2] <= n[1] + 1e-9 * n[2]; ++i) times.push_back(n[0] + double(i) * n[2]);
+  return times;
+}
+
+Result<Insertion> parse_insertion(const std::string& text) {
+  const size_t at = text.rfind('@');
+  if (at == std::string::npos || at == 0)
+    return Error{"--insert", "expects FILE@X,Y,Z or FILE@X,Y,Z,SCALE, not \"" + text + "\""};
+  const std::string place = text.substr(at + 1);
+  const bool scaled = std::count(place.begin(), place.end(), ',') == 3;
+  auto n = parse_numbers(place, scaled ? 4 : 3, "--insert");
+  if (!n) return n.error();
+  Insertion out{text.substr(0, at), {(*n)[0], (*n)[1], (*n)[2]}, scaled ? (*n)[3] : 1};
+  if (!(out.scale > 0)) return Error{"--insert", "the scale must be above 0"};
+  if (!all_at_most(abs(out.foot), Vec3(1e9f))) return Error{"--insert", "the place lies beyond 1e9"};
+  return out;
+}
+
+Result<Reflection> parse_reflection(const std::string& text) {
+  Reflection reflection;
+  if (text == "diffuse") return reflection;
+  if (text == "materials") {
+    reflection.model = Reflection::Model::materials;
+    return reflection;
+  }
+  auto brdf = parse_brdf(text);
+  if (!brdf) return text.starts_with("measured:") ? brdf.error() : Error{"--brdf", brdf.error().text()};
+  reflection.everywhere = std::move(*brdf);
+  return reflection;
+}
+
+Result<void> parse_cpca(const std::string& text, CpcaOptions& options) {
+  const std::string where = "--compress";
+  if (!text.starts_with("cpca:")) return Error{where, "must be cpca:CLUSTERS,RANK, not \"" + text + "\""};
+  auto n = parse_numbers(text.substr(5), 2, where);
+  if (!n) return n.error();
+  const float most[] = {float(max_cpca_clusters), float(max_cpca_rank)};
+  for (size_t k = 0; k < 2; ++k)
+    if ((*n)[k] != std::floor((*n)[k]) || (*n)[k] < float(1 - k) || (*n)[k] > most[k])
+      return Error{where, fmt::format("expects from 1 to {} clusters of rank 0 to {}, not \"{}\"", max_cpca_clusters,
+                                      max_cpca_rank, text)};
+  options.clusters = int((*n)[0]), options.rank = int((*n)[1]);
+  return {};
+}
+
+Result<void> check_output(const std::string& path, std::initializer_list<const char*> extensions) {
+  const std::string extension = file_extension(path);
+  std::string known;
+  bool fits = false;
+  for (const char* e : extensions) fits |= extension == e, known += (known.empty() ? "." : ", .") + std::string(e);
+  if (!fits) return Error{path, "cannot be written: the name must end in " + known};
+  std::string folder = std::filesystem::path(path).parent_path().string();
+  if (folder.empty()) folder = ".";
+  std::error_code status;
+  if (!std::filesystem::is_directory(folder, status)) return Error{path, "cannot be written: no folder " + folder};
+  if (::access(folder.c_str(), W_OK) != 0) return Error{path, "cannot be written: folder " + folder + " is read-only"};
+  if (std::filesystem::is_directory(path, status)) return Error{path, "is a folder"};
+  return {};
+}
+
+}  // namespace lambent
