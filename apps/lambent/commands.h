@@ -22,5 +22,6 @@ void add_demo(CLI::App& app, Run& run);
 void add_view(CLI::App& app, Run& run);
 void add_export(CLI::App& app, Run& run);
 void add_bench(CLI::App& app, Run& run);
+void add_options(CLI::App& app, Run& run);
 
 }  // namespace lambent::tool

@@ -7,6 +7,7 @@
 #include <lambent/image/compare.h>
 #include <lambent/light/project.h>
 #include <lambent/light/sky.h>
+#include <lambent/pipeline/version.h>
 #include <lambent/reference/path_tracer.h>
 #include <lambent/relight/relight.h>
 #include <lambent/render/render.h>
@@ -74,12 +75,14 @@ int run_demo(Context& context, const DemoCommand& o) {
   BakeReport report;
   auto transfer = bake(scene, *tracer, receivers, options, &report, &context.progress);
   if (!transfer) return fail(transfer.error());
-  const nlohmann::json provenance{
-      {"generator", "lambent " LAMBENT_VERSION},
-      {"input", "courtyard (built in)"},
-      {"options", {{"order", options.order}, {"samples", options.samples}, {"bounces", options.bounces}}}};
-  if (auto ok = save_baked(at("courtyard.glb"), scene, receivers, *transfer, provenance.dump()); !ok)
-    return fail(ok.error());
+  Baked baked = make_baked(scene, receivers, *transfer, DiffuseRows{});
+  baked.provenance =
+      nlohmann::json{
+          {"generator", std::string("lambent ") + version},
+          {"input", "courtyard (built in)"},
+          {"options", {{"order", options.order}, {"samples", options.samples}, {"bounces", options.bounces}}}}
+          .dump();
+  if (auto ok = save_baked(at("courtyard.glb"), baked); !ok) return fail(ok.error());
 
   std::vector<Row> rows;
   std::vector<Image> relit_pictures;

@@ -1,6 +1,7 @@
 #include "commands.h"
 
 #include <lambent/core/parallel.h>
+#include <lambent/pipeline/version.h>
 
 #include <fmt/format.h>
 
@@ -10,7 +11,7 @@ using namespace lambent;
 
 int main(int argc, char** argv) {
   CLI::App app{"lambent: bake how a scene shadows and scatters light, once; relight it for ever.", "lambent"};
-  app.set_version_flag("--version", LAMBENT_VERSION);
+  app.set_version_flag("--version", version);
   app.require_subcommand(1);
   app.fallthrough();
   tool::Context context;
@@ -31,6 +32,7 @@ int main(int argc, char** argv) {
   tool::add_view(app, run);
   tool::add_export(app, run);
   tool::add_bench(app, run);
+  tool::add_options(app, run);
 
   try {
     app.parse(argc, argv);

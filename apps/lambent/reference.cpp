@@ -41,8 +41,8 @@ int run_reference(Context& context, ReferenceCommand o) {
   if (!o.light_basis.empty()) {
     auto baked = load_baked(o.light_basis);
     if (!baked) return fail(baked.error());
-    if (baked->visibility) return fail({o.light_basis, "holds no light basis: it takes all of any environment"});
-    basis = light_of(*baked);
+    basis = light_of(baked->surface.store);
+    if (basis.count() == 0) return fail({o.light_basis, "holds no light basis: it takes all of any environment"});
   }
   const bool displaced = !o.displace.heights.empty();
   SceneOptions prepared = o.scene;

@@ -2,6 +2,8 @@
 // What all commands share: results on stdout, progress and messages on stderr, Ctrl-C, exit codes.
 #include <lambent/core/progress.h>
 #include <lambent/core/result.h>
+#include <lambent/pipeline/bake.h>
+#include <lambent/pipeline/text.h>
 
 #include <nlohmann/json.hpp>
 
@@ -26,9 +28,7 @@ void warn(const std::vector<std::string>& messages);
 
 void print_json(const nlohmann::json& value);
 
-// "1.5 MB", "830 bytes"; "12.3 s", "2 min 5 s"; 1234567 -> "1,234,567".
-std::string human_bytes(double bytes);
-std::string human_seconds(double seconds);
-std::string human_count(size_t count);
+// The lines, indented under whatever was said before; or the JSON.
+void print_summary(const Context& context, const Summary& summary);
 
 }  // namespace lambent::tool

@@ -55,7 +55,7 @@ Result<void> bake_diffuse(Bake& b) {
   if (b.request.subsurface.empty()) {
     auto transfer = bake(b.scene, b.tracer, b.receivers(), b.plan.bake, &b.report, b.job.progress);
     if (!transfer) return transfer.error();
-    b.store = std::move(*transfer);
+    b.store = std::move(*transfer), b.terms = std::move(b.report.terms);
     return {};
   }
   SubsurfaceReport walks;
@@ -169,7 +169,7 @@ Result<void> bake_free_space(Bake& b, const Lattice& lattice) {
 }
 
 // A baked file is a GLB: told before the work where it can be.
-Result<void> check_picture_bytes(const Bake& b, const PixelView& view) {
+Result<void> check_picture_bytes(const Bake& b, const View& view) {
   const size_t columns = b.plan.bake.light().count();
   const size_t bytes = 3 * size_t(view.width) * size_t(view.height) * columns *
                        (b.plan.bake.precision == Precision::half ? 2 : 4);
@@ -178,7 +178,7 @@ Result<void> check_picture_bytes(const Bake& b, const PixelView& view) {
                                      b.request.size, columns, bytes)};
 }
 
-Result<void> fix_the_view(Bake& b, const PixelView& view) {
+Result<void> fix_the_view(Bake& b, const View& view) {
   RenderOptions options;
   options.width = view.width, options.height = view.height, options.samples = b.request.spp;
   options.outgoing = b.outgoing();
@@ -241,6 +241,7 @@ void summarize(Bake& b) {
                          {"working_memory", r.working_memory},
                          {"error", r.error >= 0 ? nlohmann::json(r.error) : nlohmann::json()}});
   if (b.view) b.summary.json["pixels"] = receivers;
+  if (!b.terms.empty()) b.summary.json["terms"] = b.terms.size();
   std::vector<std::pair<std::string, std::string>> lines;
   lines.emplace_back("receivers",
                      fmt::format("{} ({} vertices, {} triangles{})", human_count(r.receivers),
@@ -281,7 +282,7 @@ Result<Bake> begin(const BakeRequest& request, const BakePlan& plan, const Job& 
 }
 
 // Stages after the surfaces' own, in their order; each takes a dense store.
-Result<void> bake_beside(Bake& b, const std::optional<Lattice>& lattice, const std::optional<PixelView>& view) {
+Result<void> bake_beside(Bake& b, const std::optional<Lattice>& lattice, const std::optional<View>& view) {
   if (lattice)
     if (auto ok = bake_free_space(b, *lattice); !ok) return ok;
   if (view)
@@ -302,10 +303,10 @@ Result<BakeOutcome> bake_plain(const BakeRequest& request, const BakePlan& plan,
     if (auto ok = check_lattice(*parsed, plan.bake.order, plan.lattice); !ok) return ok.error();
     lattice = *parsed;
   }
-  std::optional<PixelView> view;
+  std::optional<View> view;
   if (!request.fix_view.empty()) {
-    auto made = make_view(request.fix_view, request.size, b.scene, "--fix-view");
-    if (!made) return made.error();
+    auto made = parse_view(request.fix_view, request.size, b.scene);
+    if (!made) return Error{made.error().where == "--camera" ? "--fix-view" : made.error().where, made.error().message};
     if (auto ok = check_picture_bytes(b, *made); !ok) return ok.error();
     view = *made;
   }

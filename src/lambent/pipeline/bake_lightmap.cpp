@@ -107,9 +107,11 @@ Result<BakeOutcome> bake_lightmap_request(const BakeRequest& request, const Bake
   auto look = lightmap_look(*map, *scene, placed->receivers, plan.lightmap.directional);
   if (!look) return look.error();
   out.look = std::move(*look);
+  std::vector<Transfer> terms = std::move(map->terms);
   const DirectionalKind kind = plan.lightmap.directional;
   out.baked = make_baked(std::move(*scene), placed->receivers, std::move(map->all),
                          kind == DirectionalKind::none ? Rows(DiffuseRows{}) : Rows(DirectionalRows{kind}));
+  out.baked.terms = std::move(terms);
   out.baked.provenance = provenance_of(request, out.baked.scene,
                                        {{"receivers", report.receivers}, {"moved", moved}, {"buried", report.buried}});
   return out;

@@ -121,7 +121,7 @@ LightmapOptions lightmap_options(const BakeRequest& r, const BakeOptions& bake, 
   o.order = r.order, o.samples = r.samples, o.lamp_samples = r.lamp_samples, o.bounces = bake.bounces;
   o.converge = converge, o.solver = solver_names.at(r.solver), o.directional = *directional_kind(r.directional);
   o.memory = r.memory, o.gather = r.gather == "hemicube" ? GatherKind::hemicube : GatherKind::rays;
-  o.seed = r.seed, o.precision = bake.precision;
+  o.seed = r.seed, o.precision = bake.precision, o.keep_terms = r.terms;
   return o;
 }
 
@@ -155,6 +155,7 @@ Result<BakePlan> plan_of(const BakeRequest& r, const Job& job) {
   plan.kind = kind_of(r);
   BakeOptions& b = plan.bake;
   b.samples = r.samples, b.memory = r.memory, b.seed = r.seed, b.shadows = r.shadows == "on";
+  b.keep_terms = r.terms;
   const Precision precision = r.precision == "half" ? Precision::half : Precision::single;
   const bool lobes = plan.kind == BakeKind::zonal || plan.kind == BakeKind::glossy_zonal;
   b.precision = lobes ? Precision::single : precision;  // lobes are rounded once, when they are fitted

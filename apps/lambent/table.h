@@ -1,0 +1,44 @@
+#pragma once
+// Options of a command from the table of its request (pipeline/options.h).
+#include <lambent/pipeline/options.h>
+
+#include <CLI/CLI.hpp>
+
+namespace lambent::tool {
+
+// Adds every option of the table but those in `apart` to the command, in the table's groups; what is said goes into
+// `request`, and its name into `given` once the command line has been read.
+template <class R>
+void add_table(CLI::App& command, std::span<const Option<R>> table, R& request, GivenOptions& given,
+               std::initializer_list<std::string> apart = {}) {
+  for (const Option<R>& o : table) {
+    if (std::find(apart.begin(), apart.end(), o.name) != apart.end()) continue;
+    const std::string name = std::string(o.name) == "output" ? "-o,--output" : std::string("--") + o.name;
+    std::string help = o.help;
+    if (o.choices) help += " {" + value_text(0, 0, o.choices) + "}";
+    CLI::Option* option = std::visit(
+        [&](auto member) -> CLI::Option* {
+          using T = std::remove_cvref_t<decltype(request.*member)>;
+          if constexpr (std::is_same_v<T, bool>) return command.add_flag(name, request.*member, help);
+          else if constexpr (std::is_same_v<T, size_t>)
+            return command.add_option(name, request.*member, help)->transform(CLI::AsSizeValue(false));
+          else return command.add_option(name, request.*member, help);
+        },
+        o.member);
+    option->group(o.group);
+    // What most people leave as it is, said once.
+    std::visit(
+        [&](auto member) {
+          using T = std::remove_cvref_t<decltype(request.*member)>;
+          if constexpr (std::is_same_v<T, std::string>) {
+            if (!(request.*member).empty()) option->default_str(request.*member);
+          } else if constexpr (std::is_arithmetic_v<T> && !std::is_same_v<T, bool> && !std::is_same_v<T, size_t>) {
+            if (options_detail::is_set(request.*member, o.low, o.high)) option->capture_default_str();
+          }
+        },
+        o.member);
+    option->each([&given, key = json_name(o.name)](const std::string&) { given.insert(key); });
+  }
+}
+
+}  // namespace lambent::tool

@@ -1,0 +1,96 @@
+// What a bake would take, from a little of it.
+#include <lambent/bake/gather.h>
+#include <lambent/core/parallel.h>
+#include <lambent/pipeline/bake_parse.h>
+#include <lambent/pipeline/place_receivers.h>
+#include <lambent/pipeline/text.h>
+
+#include <fmt/format.h>
+
+#include <atomic>
+#include <chrono>
+
+namespace lambent {
+namespace {
+
+using Clock = std::chrono::steady_clock;
+double seconds_since(Clock::time_point start) { return std::chrono::duration<double>(Clock::now() - start).count(); }
+
+// Rows and columns that will be stored.
+size_t stored_bytes(const BakePlan& plan, const BakeRequest& r, size_t receivers, size_t groups) {
+  const size_t value = r.precision == "half" ? 2 : 4, columns = plan.bake.light().count();
+  const size_t incident = size_t(sh_count(r.incident_order));
+  switch (plan.kind) {
+    case BakeKind::diffuse: return receivers * columns * 3 * value;
+    case BakeKind::lightmap:
+      return receivers * (columns + groups) * size_t(directional_rows(plan.lightmap.directional)) * 3 * value;
+    case BakeKind::factors: return receivers * size_t(sh_count(plan.bake.order + r.incident_order - 1)) * value;
+    case BakeKind::matrix: {
+      const OutgoingKind kind = plan.matrix.outgoing;
+      const size_t rows = kind == OutgoingKind::map ? incident
+                        : kind == OutgoingKind::svd ? size_t(plan.matrix.svd_rows)
+                                                    : 2 * size_t(sh_count(plan.matrix.outgoing_order));
+      return receivers * rows * columns * 3 * value;
+    }
+    case BakeKind::zonal:
+    case BakeKind::glossy_zonal: return receivers * (4 + size_t(r.lobes) * size_t(3 + 3 * plan.bake.order)) * value;
+    case BakeKind::membrane: return receivers * size_t(4 + plan.bake.order) * value;
+    case BakeKind::blocks: return expected_visibility_bytes(receivers, plan.visibility);
+  }
+  return 0;
+}
+
+// Seconds for all receivers by those that a few blocks, evenly apart, take: tracing, and a product with each block's
+// rows.
+double expected_seconds(const Scene& scene, const Tracer& tracer, const Receivers& receivers, const BakePlan& plan,
+                        const BakeRequest& r) {
+  constexpr size_t most_blocks = 24;
+  const size_t blocks = (receivers.count() + gather_block - 1) / gather_block, sampled = std::min(blocks, most_blocks);
+  const int order = std::max(1, plan.bake.order);
+  const GatherSetup setup = make_gather_setup(scene, tracer, receivers, order, r.samples, r.seed);
+  std::atomic<size_t> done{0};
+  const auto start = Clock::now();
+  parallel_for(sampled, 1, [&](size_t begin, size_t end) {
+    const ScratchPointer scratch = make_gather_scratch(setup);
+    GatherBlock block;
+    for (size_t i = begin; i < end; ++i) {
+      const size_t first = i * blocks / sampled * gather_block,
+                   count = std::min(gather_block, receivers.count() - first);
+      std::vector<float> rows(count * setup.coefficients());
+      std::vector<uint8_t> buried(count);
+      const GatherSky sky{rows.data(), nullptr, setup.coefficients(), nullptr, buried.data()};
+      trace_gather(setup, *scratch, first, count, &block, &sky);
+      done += count;
+    }
+  });
+  return seconds_since(start) * double(receivers.count()) / double(std::max<size_t>(done, 1));
+}
+
+}  // namespace
+
+Result<Summary> plan_bake(const BakeRequest& asked, const Job& job) {
+  auto request = resolved(asked);
+  if (!request) return request.error();
+  auto plan = plan_of(*request, job);
+  if (!plan) return plan.error();
+  auto scene = load_scene_of(*request, job);
+  if (!scene) return scene.error();
+  const size_t groups = plan->kind == BakeKind::lightmap ? make_lamps(*scene, nullptr, request->light_groups).groups()
+                                                         : 0;
+  auto placed = place_receivers(*scene, *request, job);
+  if (!placed) return placed.error();
+  auto tracer = Tracer::build(*scene);
+  if (!tracer) return tracer.error();
+  const size_t receivers = placed->receivers.count(), bytes = stored_bytes(*plan, *request, receivers, groups);
+  const bool traced = request->shadows == "on" && plan->kind != BakeKind::membrane && receivers > 0;
+  const double seconds = traced ? expected_seconds(*scene, *tracer, placed->receivers, *plan, *request) : 0;
+  Summary s;
+  s.json = {{"request", to_json(*request)}, {"receivers", receivers}, {"bytes", bytes}, {"seconds", seconds}};
+  s.lines = {{"request", s.json["request"].dump()},
+             {"receivers", human_count(receivers)},
+             {"size", "at most about " + human_bytes(double(bytes))},
+             {"time", fmt::format("about {} of tracing on {} threads", human_seconds(seconds), thread_count())}};
+  return s;
+}
+
+}  // namespace lambent
