@@ -2,6 +2,7 @@ add_executable(lambent-tests ${lambent_tests})
 target_link_libraries(lambent-tests PRIVATE lambent GTest::gtest GTest::gtest_main nlohmann_json::nlohmann_json
   fmt::fmt OpenEXR::OpenEXR TBB::tbb)
 target_include_directories(lambent-tests PRIVATE ${CMAKE_CURRENT_SOURCE_DIR}/tests)
+target_compile_definitions(lambent-tests PRIVATE LAMBENT_GOLDEN="${CMAKE_CURRENT_SOURCE_DIR}/tests/golden")
 target_compile_options(lambent-tests PRIVATE -Wall -Wextra -Wno-missing-field-initializers)
 # Tests are half of what is compiled, and what is hot in them is the library: less optimised they build in two thirds of the time. Under
 # the sanitizers, where their own loops count too, only those of readers and writers.

@@ -22,6 +22,8 @@ void add_table(CLI::App& command, std::span<const Option<R>> table, R& request, 
           if constexpr (std::is_same_v<T, bool>) return command.add_flag(name, request.*member, help);
           else if constexpr (std::is_same_v<T, size_t>)
             return command.add_option(name, request.*member, help)->transform(CLI::AsSizeValue(false));
+          else if constexpr (std::is_same_v<T, std::vector<std::string>>)  // one each time that it is said
+            return command.add_option(name, request.*member, help)->allow_extra_args(false);
           else return command.add_option(name, request.*member, help);
         },
         o.member);

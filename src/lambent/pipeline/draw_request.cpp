@@ -120,6 +120,8 @@ GivenOptions said_in(const R& request) {
 
 std::span<const Option<DrawRequest>> draw_options() { return table; }
 
+bool is_given(const DrawRequest& request, const std::string& option) { return said_in(request).contains(option); }
+
 DrawKind kind_of(const Field& surface) {
   if (std::holds_alternative<SightRows>(surface.rows)) return DrawKind::blocks;
   if (std::holds_alternative<PixelRows>(surface.rows)) return DrawKind::fixed_view;
@@ -201,7 +203,7 @@ Result<void> check_draw(const DrawRequest& request, const Baked& baked) {
   if (light.order == 0 && request.light_order > 0)
     return Error{"--light-order", "counts bands of harmonics, and the file is baked for none"};
   const Outgoing* outgoing = outgoing_of(baked.surface);
-  if (said_in(request).contains("brdf") && (!outgoing || outgoing->kind != OutgoingKind::map))
+  if (is_given(request, "brdf") && (!outgoing || outgoing->kind != OutgoingKind::map))
     return Error{request.baked,
                  "--brdf needs a bake that kept incident light: lambent bake --transfer matrix --outgoing map"};
   if (request.insert.empty()) return {};

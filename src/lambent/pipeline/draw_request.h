@@ -41,6 +41,9 @@ inline constexpr const char* draw_kind_names[] = {"diffuse transfer", "clusters"
 std::span<const Option<DrawRequest>> draw_options();
 DrawKind kind_of(const Field& surface);
 
+// Whether an option, by its name in JSON, was said or differs from its default.
+bool is_given(const DrawRequest& request, const std::string& option);
+
 // What --show asks for: product, radiosity, albedo; emission, bounce:K, sum:K.
 struct Show {
   RenderOptions::Show colour = RenderOptions::Show::product;
