@@ -3,32 +3,14 @@
 #include "terminal.h"
 
 #include <lambent/bake/subsurface.h>
-#include <lambent/basis/sh.h>
-#include <lambent/compress/cpca.h>
-#include <lambent/core/camera.h>
 #include <lambent/light/environment.h>
-#include <lambent/scene/reflection.h>
+#include <lambent/pipeline/parse.h>
 #include <lambent/scene/scene.h>
 #include <lambent/transfer/transfer.h>
 
 #include <CLI/CLI.hpp>
 
-#include <optional>
-
 namespace lambent::tool {
-
-// Strictly `count` finite numbers, separated by commas.
-Result<std::vector<float>> parse_numbers(const std::string& text, size_t count, const std::string& what);
-
-// "NAME=R,G,B": a name (which may hold '=') and three numbers.
-struct NamedColor {
-  std::string name;
-  Vec3 color;
-};
-Result<NamedColor> parse_named_color(const std::string& text, const std::string& option);
-
-// WIDTHxHEIGHT, each from 1 to 16384.
-Result<std::array<int, 2>> parse_size(const std::string& text, const std::string& option);
 
 struct SceneOptions {
   std::string path;
@@ -46,37 +28,25 @@ struct ViewOptions {
   float exposure = 0;
   void add_to(CLI::App& command);
 };
-struct View {
-  Camera camera;
-  int width = 0, height = 0;
-};
 Result<View> make_view(const ViewOptions& options, const Scene& scene);
-// What --camera says: seven numbers, or nothing for "auto".
-Result<std::optional<Camera>> parse_camera(const std::string& text);
 
 struct LightOptions {
   std::string env, rotate;
   void add_to(CLI::App& command, bool required = true);
 };
 Result<Environment> load_light(const LightOptions& options);
-Result<Mat3> light_rotation(const LightOptions& options);
+inline Result<Mat3> light_rotation(const LightOptions& options) {
+  return parse_rotation(options.rotate, "--env-rotate");
+}
 
 struct BrdfOptions {
   std::string brdf = "diffuse";
   CLI::Option* add_to(CLI::App& command);
 };
-Result<Reflection> load_reflection(const BrdfOptions& options);
-
-// cpca:CLUSTERS,RANK.
-Result<void> parse_cpca(const std::string& text, CpcaOptions& options);
-
-extern const std::map<std::string, ShWindow> window_names;
+inline Result<Reflection> load_reflection(const BrdfOptions& options) { return parse_reflection(options.brdf); }
 
 // "order 6", "order 5 and 8 lobes", "36 lobes".
 std::string describe_light(const LightBasis& light);
-
-// Before long work: the folder of `path` exists and can be written, and the extension is one of those given.
-Result<void> check_output(const std::string& path, std::initializer_list<const char*> extensions);
 
 // Of --subsurface: what it takes, and a warning where walks came to nothing.
 inline constexpr const char* subsurface_help =

@@ -93,7 +93,7 @@ void add_reference(CLI::App& app, Run& run) {
   o->scene.add_to(*c);
   o->light.add_to(*c, false);
   o->view.add_to(*c);
-  o->motion.add_to(*c, false);
+  o->motion.add_to(*c);
   o->displace.add_to(*c);
   o->brdf.add_to(*c);
   c->add_option("--light-order", o->light_order,

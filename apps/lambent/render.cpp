@@ -72,27 +72,6 @@ std::vector<Vec3> receiver_places(const std::vector<Vec3>& positions, const Bake
   return places;
 }
 
-struct Insertion {
-  std::string path;
-  Vec3 foot;
-  float scale = 1;
-};
-
-// FILE@X,Y,Z or FILE@X,Y,Z,SCALE.
-Result<Insertion> parse_insertion(const std::string& text) {
-  const size_t at = text.rfind('@');
-  if (at == std::string::npos || at == 0)
-    return Error{"--insert", "expects FILE@X,Y,Z or FILE@X,Y,Z,SCALE, not \"" + text + "\""};
-  const std::string place = text.substr(at + 1);
-  const bool scaled = std::count(place.begin(), place.end(), ',') == 3;
-  auto n = parse_numbers(place, scaled ? 4 : 3, "--insert");
-  if (!n) return n.error();
-  Insertion out{text.substr(0, at), {(*n)[0], (*n)[1], (*n)[2]}, scaled ? (*n)[3] : 1};
-  if (!(out.scale > 0)) return Error{"--insert", "the scale must be above 0"};
-  if (!all_at_most(abs(out.foot), Vec3(1e9f))) return Error{"--insert", "the place lies beyond 1e9"};
-  return out;
-}
-
 // Adds the object to what is drawn, lit by the lattice. It must be loaded and baked alone where it stands.
 Result<void> add_insertion(Context& context, const Insertion& insertion, const LatticeTransfer& lattice,
                            const Relit& light, RelitScene& drawn) {

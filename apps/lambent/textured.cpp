@@ -32,21 +32,6 @@ void TexturedFlags::add_to(CLI::App& c) {
       ->needs(given);
 }
 
-Result<std::vector<SphereLamp>> parse_sphere_lamps(const std::vector<std::string>& texts) {
-  std::vector<SphereLamp> lamps;
-  for (const std::string& text : texts) {
-    auto n = parse_numbers(text, 7, "--sphere-lamp");
-    if (!n) return n.error();
-    const std::vector<float>& v = *n;
-    const SphereLamp lamp{{v[0], v[1], v[2]}, v[3], {v[4], v[5], v[6]}};
-    if (!(lamp.radius > 0)) return Error{"--sphere-lamp", "the radius must be above 0"};
-    for (float x : v)
-      if (std::abs(x) > 1e9f) return Error{"--sphere-lamp", "numbers must lie within 1e9"};
-    lamps.push_back(lamp);
-  }
-  return lamps;
-}
-
 int run_textured(Context& context, const TexturedRender& o) {
   if (auto ok = check_output(o.view.output, {"png", "exr"}); !ok) return fail(ok.error());
   auto rotation = light_rotation(o.light);

@@ -31,7 +31,4 @@ struct TexturedRender {
 // Any mesh, animated or not, with a transfer texture on it.
 int run_textured(Context& context, const TexturedRender& o);
 
-// Each X,Y,Z,RADIUS,R,G,B.
-Result<std::vector<SphereLamp>> parse_sphere_lamps(const std::vector<std::string>& texts);
-
 }  // namespace lambent::tool

@@ -24,7 +24,7 @@ using KindMask = uint32_t;
 template <class R>
 struct Option {
   const char* name;  // "view-map": --view-map on the command line, "view_map" in JSON
-  std::variant<bool R::*, int R::*, uint32_t R::*, size_t R::*, float R::*, std::string R::*,
+  std::variant<bool R::*, int R::*, uint32_t R::*, size_t R::*, float R::*, double R::*, std::string R::*,
                std::vector<std::string> R::*>
       member;
   const char* group;  // its heading in --help

@@ -6,6 +6,7 @@
 
 #include <bit>
 #include <mutex>
+#include <optional>
 
 namespace lambent {
 namespace {
@@ -410,18 +411,27 @@ Vec3 multiply_haar(const HaarLight& light, const HaarScratch& s, size_t* visited
   return Vec3(sum);
 }
 
+struct ProductScratch::Pools {
+  Pool<Scratch> products{[] { return std::make_unique<Scratch>(); }};
+  Pool<HaarScratch> haar{[] { return std::make_unique<HaarScratch>(); }};
+};
+ProductScratch::ProductScratch() : pools_(std::make_unique<Pools>()) {}
+ProductScratch::ProductScratch(ProductScratch&&) noexcept = default;
+ProductScratch::~ProductScratch() = default;
+
 void shade_receivers(Product product, const BlockLight& light, const HaarLight* haar, const Visibility& visibility,
                      const ProductReceivers& receivers, std::span<const uint32_t> seen, Vec3 eye, Relit& out,
-                     Breakdown* breakdown) {
+                     Breakdown* breakdown, ProductScratch* scratch) {
   LAMBENT_CHECK(light.cube && light.cube->size == visibility.size && (product != Product::haar || haar) &&
                 receivers.positions.size() == visibility.receivers);
   out.rows = 1;
   out.values.assign((visibility.receivers + transfer_block - 1) / transfer_block * 3 * transfer_block, 0.0f);
   std::mutex mutex;
-  Pool<Scratch> pool([] { return std::make_unique<Scratch>(); });
-  Pool<HaarScratch> haar_pool([] { return std::make_unique<HaarScratch>(); });
+  std::optional<ProductScratch> own;
+  if (!scratch) scratch = &own.emplace();
+  ProductScratch::Pools& pools = scratch->pools();
   parallel_for(seen.size(), 64, [&](size_t begin, size_t end) {
-    const auto s = pool.borrow();
+    const auto s = pools.products.borrow();
     Breakdown tally;
     for (size_t i = begin; i < end; ++i) {
       const size_t r = seen[i];
@@ -434,7 +444,7 @@ void shade_receivers(Product product, const BlockLight& light, const HaarLight* 
       } else if (product == Product::standard) {
         value = shade_standard_with(*s, light, visibility, r, material, frame, wo);
       } else {
-        const auto h = haar_pool.borrow();
+        const auto h = pools.haar.borrow();
         project_haar(*haar, visibility, r, material, frame, wo, *h);
         value = multiply_haar(*haar, *h);
       }

@@ -102,9 +102,23 @@ struct ProductReceivers {
 };
 enum class Product { blocks, standard, haar };
 
-// Exit radiance of the receivers in `seen` towards the eye, row 0 of `out`; others are left 0. All cores.
+// What threads at work need, kept from frame to frame.
+class ProductScratch {
+ public:
+  ProductScratch();
+  ProductScratch(ProductScratch&&) noexcept;
+  ~ProductScratch();
+  struct Pools;
+  Pools& pools() { return *pools_; }
+
+ private:
+  std::unique_ptr<Pools> pools_;
+};
+
+// Exit radiance of the receivers in `seen` towards the eye, row 0 of `out`; others are left 0. All cores. Sizes `out`
+// and `scratch` on first use and allocates nothing after that.
 void shade_receivers(Product product, const BlockLight& light, const HaarLight* haar, const Visibility& visibility,
                      const ProductReceivers& receivers, std::span<const uint32_t> seen, Vec3 eye, Relit& out,
-                     Breakdown* breakdown = nullptr);
+                     Breakdown* breakdown = nullptr, ProductScratch* scratch = nullptr);
 
 }  // namespace lambent

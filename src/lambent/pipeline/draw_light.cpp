@@ -1,0 +1,73 @@
+#include <lambent/pipeline/draw_light.h>
+
+#include <fmt/format.h>
+#include <fmt/ranges.h>
+
+#include <algorithm>
+
+namespace lambent {
+
+Result<Surroundings> surroundings_of(const DrawRequest& request, const Job& job) {
+  auto rotation = parse_rotation(request.env_rotate, "--env-rotate");
+  if (!rotation) return rotation.error();
+  Surroundings around{.env = {}, .rotation = *rotation, .seen = request.background == "env"};
+  if (request.env.empty()) return around;
+  auto env = load_environment(request.env);
+  if (!env) return env.error();
+  for (const std::string& warning : env->warnings) job.warn(warning);
+  around.env = std::move(*env);
+  if (around.seen && !request.env_rotate.empty()) around.turned = rotated(*around.env, around.rotation);
+  return around;
+}
+
+namespace {
+
+// What the scene's own lamps are scaled by: as they are unless told otherwise.
+Result<std::vector<Vec3>> lamps_of(const DrawRequest& request, const LightBasis& basis) {
+  std::vector<Vec3> lamps(basis.groups.size(), Vec3(1.0f));
+  for (const std::string& text : request.lamp) {
+    auto lamp = parse_named_color(text, "--lamp");
+    if (!lamp) return lamp.error();
+    const auto group = std::find(basis.groups.begin(), basis.groups.end(), lamp->name);
+    if (group == basis.groups.end())
+      return Error{"--lamp", "the file has no group \"" + lamp->name + "\"; it has " +
+                                 (basis.groups.empty() ? "none" : fmt::format("{}", fmt::join(basis.groups, ", ")))};
+    lamps[size_t(group - basis.groups.begin())] = lamp->color;
+  }
+  return lamps;
+}
+
+}  // namespace
+
+Result<ColumnLight> column_light(const DrawRequest& request, const Surroundings& around, const LightBasis& basis) {
+  auto window = parse_window(request.window);
+  if (!window) return window.error();
+  auto near = parse_sphere_lamps(request.sphere_lamp);
+  if (!near) return near.error();
+  auto lamps = lamps_of(request, basis);
+  if (!lamps) return lamps.error();
+  ColumnLight out{std::move(*lamps), {}, std::move(*near)};
+  if (around.env) {
+    out.projection = project_light(*around.env, basis, around.rotation, request.light_order, *window);
+  } else {
+    out.projection.light.assign(basis.count(), Vec3(0.0f));
+    const int order = request.light_order ? std::min(request.light_order, basis.order) : basis.order;
+    out.projection.window = sh_window(*window, order);
+  }
+  std::copy(out.lamps.begin(), out.lamps.end(), out.projection.light.end() - ptrdiff_t(out.lamps.size()));
+  return out;
+}
+
+std::vector<Vec3> seen_emission(const Scene& scene, const LightBasis& basis, const std::vector<Vec3>& lamps) {
+  std::vector<Vec3> emission;
+  if (basis.groups.empty()) return emission;
+  const bool one = basis.groups.size() == 1 && basis.groups[0] == std::string("all");
+  for (const Material& m : scene.materials) {
+    const auto group = one ? basis.groups.begin() : std::find(basis.groups.begin(), basis.groups.end(), m.name);
+    emission.push_back(group == basis.groups.end() ? Vec3(0)
+                                                   : m.emissive * lamps[size_t(group - basis.groups.begin())]);
+  }
+  return emission;
+}
+
+}  // namespace lambent

@@ -1,0 +1,34 @@
+#pragma once
+// The light of a drawing.
+#include <lambent/light/environment.h>
+#include <lambent/pipeline/bake.h>
+#include <lambent/pipeline/draw_request.h>
+#include <lambent/relight/light.h>
+#include <lambent/relight/local_light.h>
+
+namespace lambent {
+
+// The environment, turned, and whether it is seen behind the scene.
+struct Surroundings {
+  std::optional<Environment> env;  // as loaded; none: nothing shines from afar
+  Mat3 rotation{1.0f};
+  std::optional<Environment> turned = std::nullopt;  // where it is seen and turned
+  bool seen = false;
+  const Environment* background() const { return !seen || !env ? nullptr : turned ? &*turned : &*env; }
+};
+Result<Surroundings> surroundings_of(const DrawRequest& request, const Job& job);
+
+// A coefficient a column, by the environment and by what the scene's own lamps are scaled by.
+struct ColumnLight {
+  std::vector<Vec3> lamps;     // by group
+  LightProjection projection;  // lamps are in its columns
+  std::vector<SphereLamp> near;
+  // Of each place its own, distant light included.
+  LocalLight local() const { return {projection.light, near, projection.window}; }
+};
+Result<ColumnLight> column_light(const DrawRequest& request, const Surroundings& around, const LightBasis& basis);
+
+// What each material's surfaces emit, as they are seen; empty without groups.
+std::vector<Vec3> seen_emission(const Scene& scene, const LightBasis& basis, const std::vector<Vec3>& lamps);
+
+}  // namespace lambent

@@ -1,0 +1,215 @@
+#include <lambent/pipeline/draw_request.h>
+
+#include <lambent/core/file.h>
+
+#include <charconv>
+
+namespace lambent {
+namespace {
+
+using R = DrawRequest;
+
+constexpr KindMask bit(DrawKind kind) { return KindMask(1) << int(kind); }
+constexpr KindMask D = bit(DrawKind::diffuse), C = bit(DrawKind::clusters), Z = bit(DrawKind::lobes),
+                   M = bit(DrawKind::matrix), F = bit(DrawKind::factors), L = bit(DrawKind::lamps),
+                   K = bit(DrawKind::blocks), V = bit(DrawKind::fixed_view), T = bit(DrawKind::texture);
+constexpr KindMask every = D | C | Z | M | F | L | K | V | T;
+
+const Option<R> table[] = {
+    {"baked", &R::baked, "Files", every, "Baked file, from `lambent bake`; with --transfer-texture, any scene", 0, 0,
+     nullptr, nullptr, true, true},
+    {"output", &R::output, "Files", every, "Picture to write: .png (8-bit sRGB) or .exr (linear)", 0, 0, nullptr,
+     nullptr, false},
+
+    {"env", &R::env, "Light", every,
+     "Environment: a .hdr or .exr file, uniform:R,G,B, or sky:elevation=35,azimuth=45,turbidity=3", 0, 0, nullptr,
+     nullptr, true, true},
+    {"env-rotate", &R::env_rotate, "Light", every, "YAW,PITCH,ROLL: turn the environment, degrees about +Y, +X, +Z", 0,
+     0, nullptr, "env"},
+    {"window", &R::window, "Light", every & ~(L | K),
+     "Against ringing of the harmonics: none, hann, lanczos, or auto (as weak as keeps open surfaces from going dark)",
+     0, 0, "none|hann|lanczos|auto"},
+    {"light-order", &R::light_order, "Light", every & ~(L | K),
+     "Use only this many bands of the baked ones; lobes are kept", 1, max_sh_order},
+    {"lamp", &R::lamp, "Light", D | C | M | L | V,
+     "NAME=R,G,B: scale a group of lamps by this colour (files baked with --light-groups); may be given again"},
+    {"sphere-lamp", &R::sphere_lamp, "Light", Z | T,
+     "X,Y,Z,RADIUS,R,G,B: a near lamp, a sphere of that radiance; may be given again"},
+
+    {"camera", &R::camera, "View", every & ~V, "EX,EY,EZ,TX,TY,TZ,FOV: eye, target, vertical degrees; or auto"},
+    {"size", &R::size, "View", every & ~V, "Picture size, WIDTHxHEIGHT pixels"},
+    {"spp", &R::spp, "View", every & ~V, "Rays a pixel", 1, 4096},
+    {"background", &R::background, "View", every, "What lies behind the scene: env, or none (transparent)", 0, 0,
+     "env|none"},
+    {"exposure", &R::exposure, "View", every, "Stops that a PNG is brightened by", -100, 100},
+
+    {"show", &R::show, "What is shown", every & ~(K | V),
+     "product of light and colour; radiosity: the light alone, as if everything were white; albedo: the colour alone; "
+     "emission: lamps that are seen, alone; bounce:K: light after K reflections between surfaces, alone; sum:K: lamps, "
+     "and light after 0 to K reflections (files baked with --terms)"},
+    {"brdf", &R::brdf, "What is shown", C | Z | M | F | K,
+     "Other materials: diffuse (by base colour), materials (glTF's metallic-roughness), or one model for all, as "
+     "`bake --brdf` takes it; for bakes that kept incident light, and blocks",
+     0, 0, nullptr, nullptr, true, true},
+    {"insert", &R::insert, "What is shown", D | C | Z | M,
+     "FILE@X,Y,Z[,SCALE]: put a small diffuse object there, lit by the scene's lattice; may be given again"},
+
+    {"animation", &R::animation, "Motion", every & ~(K | V),
+     "Pose the scene by this glTF animation, by name or number"},
+    {"time", &R::time, "Motion", every & ~(K | V), "At this time, seconds", 0, 0, nullptr, "animation"},
+    {"frames", &R::frames, "Motion", every & ~(K | V),
+     "FROM:TO[:STEP]: at these times, seconds, as a strip of pictures", 0, 0, nullptr, "animation"},
+    {"deform", &R::deform, "Motion", every & ~(K | V),
+     "bend:ANGLE[,along[,towards]] or twist:ANGLE[,along]: degrees from end to end, axes x, y or z"},
+
+    {"method", &R::method, "Blocks", K,
+     "By blocks, standard (every texel), haar or haar:FRACTION (wavelets, kept coefficients)"},
+    {"brdf-samples", &R::brdf_samples, "Blocks", K,
+     "How many BRDF samples a block gets: bounded, by the error; paper, by its appendix A; full, 256", 0, 0,
+     "bounded|paper|full", "method=blocks"},
+    {"tolerance", &R::tolerance, "Blocks", K, "Error of BRDF x pi that bounded leaves", 1e-4, 10, nullptr,
+     "brdf-samples=bounded"},
+    {"indirect", &R::indirect, "Blocks", K, "sh adds light that has bounced, by a diffuse bake in harmonics", 0, 0,
+     "none|sh"},
+
+    {"transfer-texture", &R::transfer_texture, "Transfer textures", T,
+     "Shade the scene by this texture of zonal lobes, from `lambent patch`", 0, 0, nullptr, nullptr, true, true},
+    {"tile", &R::tile, "Transfer textures", T,
+     "U,V: its repetitions over the unit of texture coordinates; of grooves, across which they lie: 12,0 makes 12 "
+     "along "
+     "v"},
+    {"groove-depth", &R::groove_depth, "Transfer textures", T,
+     "Of grooves, in their widths; if not the deepest that the table has", 1e-6, 10},
+    {"groove-width", &R::groove_width, "Transfer textures", T, "Of grooves, as a share of a repetition", 1e-3, 1},
+    {"groove-map", &R::groove_map, "Transfer textures", T,
+     "A picture over the texture coordinates, white where grooves have their full depth", 0, 0, nullptr, nullptr, true,
+     true},
+};
+
+// Pairs that leave one without effect, beyond what the table says; conditions as Option::needs.
+struct Conflict {
+  const char *option, *other, *why;
+};
+constexpr Conflict conflicts[] = {
+    {"time", "frames", "and --frames both say when: give one"},
+    {"deform", "animation", "and --animation both move the scene: give one"},
+    {"insert", "animation", "draws the scene at rest: leave the animation out"},
+    {"insert", "deform", "draws the scene at rest: leave --deform out"},
+    {"insert", "show=emission|bounce:|sum:", "is lit by all light at once: no --show of a part of it"},
+    {"tolerance", "method=standard|haar", "needs --method blocks"},
+    {"lamp", "show=albedo", "lights what --show albedo shows no light of"},
+    {"sphere-lamp", "show=albedo|emission", "lights what --show leaves out"},
+    {"window", "show=albedo|emission", "shapes light that --show leaves out"},
+    {"light-order", "show=albedo|emission", "shapes light that --show leaves out"},
+    {"brdf", "show=albedo|emission", "reflects light that --show leaves out"},
+};
+
+GivenOptions said_in(const R& request) {
+  GivenOptions said = request.given;
+  const R untouched;
+  for (const Option<R>& o : table)
+    std::visit(
+        [&](auto member) {
+          if (request.*member != untouched.*member) said.insert(json_name(o.name));
+        },
+        o.member);
+  return said;
+}
+
+}  // namespace
+
+std::span<const Option<DrawRequest>> draw_options() { return table; }
+
+DrawKind kind_of(const Field& surface) {
+  if (std::holds_alternative<SightRows>(surface.rows)) return DrawKind::blocks;
+  if (std::holds_alternative<PixelRows>(surface.rows)) return DrawKind::fixed_view;
+  if (std::holds_alternative<ZonalTransfer>(surface.store)) return DrawKind::lobes;
+  if (std::holds_alternative<FactoredTransfer>(surface.store)) return DrawKind::factors;
+  if (std::holds_alternative<CpcaTransfer>(surface.store)) return DrawKind::clusters;
+  if (outgoing_of(surface)) return DrawKind::matrix;
+  const LightBasis light = light_of(surface.store);
+  return light.order > 0 || !light.lobes.empty() ? DrawKind::diffuse : DrawKind::lamps;
+}
+
+Result<Show> parse_show(const std::string& text) {
+  if (text == "product") return Show{};
+  if (text == "radiosity") return Show{RenderOptions::Show::radiosity};
+  if (text == "albedo") return Show{RenderOptions::Show::albedo};
+  if (text == "emission") return Show{.part = Show::Part::emission};
+  for (const auto& [start, part] : {std::pair("bounce:", Show::Part::bounce), std::pair("sum:", Show::Part::sum)})
+    if (text.starts_with(start)) {
+      Show show{.part = part};
+      const char* digits = text.data() + std::string(start).size();
+      const char* end = text.data() + text.size();
+      if (const auto [stop, status] = std::from_chars(digits, end, show.term);
+          status == std::errc() && stop == end && show.term >= 0)
+        return show;
+    }
+  return Error{"--show",
+               "must be product, radiosity, albedo, emission, bounce:K or sum:K with K from 0, not \"" + text + "\""};
+}
+
+namespace {
+
+Result<void> check_show(const DrawRequest& request, const Show& show, const Baked& baked) {
+  if (show.part == Show::Part::emission && light_of(baked.surface.store).groups.empty())
+    return Error{request.baked, "has no lamps of its own that --show emission could show"};
+  if (show.part != Show::Part::bounce && show.part != Show::Part::sum) return {};
+  if (baked.terms.empty())
+    return Error{request.baked, "does not keep its reflections one by one: `lambent bake --terms` makes files that do"};
+  if (size_t(show.term) >= baked.terms.size())
+    return Error{"--show", "the file keeps terms 0 to " + std::to_string(baked.terms.size() - 1) + ", not " +
+                               std::to_string(show.term)};
+  return {};
+}
+
+}  // namespace
+
+Result<void> check_draw(const DrawRequest& request, DrawKind kind) {
+  const GivenOptions said = said_in(request);
+  if (auto ok = check_values(draw_options(), request, said); !ok) return ok;
+  if (auto ok = check_given(draw_options(), request, said, int(kind), draw_kind_names); !ok) return ok;
+  for (const Conflict& c : conflicts)
+    if (said.contains(json_name(c.option)) && holds(draw_options(), request, c.other) &&
+        said.contains(json_name(std::string(c.other).substr(0, std::string(c.other).find('=')))))
+      return Error{std::string("--") + c.option, c.why};
+  if (request.exposure != 0 && file_extension(request.output) == "exr")
+    return Error{"--exposure", "brightens a PNG; an EXR keeps radiance as it is"};
+  auto show = parse_show(request.show);
+  if (!show) return show.error();
+  if (kind == DrawKind::texture && show->part != Show::Part::all)
+    return Error{"--show", "of a transfer texture is product, radiosity or albedo"};
+  const bool distant = kind == DrawKind::texture || kind == DrawKind::blocks;
+  if (distant && show->colour != RenderOptions::Show::albedo && request.env.empty() && request.sphere_lamp.empty())
+    return Error{"--env", "is needed: an environment to light the scene by"};
+  return {};
+}
+
+Result<void> check_draw(const DrawRequest& request, const Baked& baked) {
+  const DrawKind kind = kind_of(baked.surface);
+  if (auto ok = check_draw(request, kind); !ok) return ok;
+  if (kind == DrawKind::blocks) return {};
+  auto show = parse_show(request.show);
+  if (!show) return show.error();
+  if (auto ok = check_show(request, *show, baked); !ok) return ok;
+  const LightBasis light = light_of(baked.surface.store);
+  const bool lit = show->part != Show::Part::emission && show->colour != RenderOptions::Show::albedo;
+  if (lit && (light.order > 0 || !light.lobes.empty()) && request.env.empty() && request.sphere_lamp.empty())
+    return Error{"--env", "is needed: the file is baked for distant light"};
+  if (light.order == 0 && request.window != "none")
+    return Error{"--window", "shapes harmonics, and the file is baked for none"};
+  if (light.order == 0 && request.light_order > 0)
+    return Error{"--light-order", "counts bands of harmonics, and the file is baked for none"};
+  const Outgoing* outgoing = outgoing_of(baked.surface);
+  if (said_in(request).contains("brdf") && (!outgoing || outgoing->kind != OutgoingKind::map))
+    return Error{request.baked,
+                 "--brdf needs a bake that kept incident light: lambent bake --transfer matrix --outgoing map"};
+  if (request.insert.empty()) return {};
+  if (!lattice_of(baked))
+    return Error{request.baked, "has no light in free space for --insert: bake it with --lattice"};
+  if (!vertices_of(baked) || std::holds_alternative<DirectionalRows>(baked.surface.rows))
+    return Error{request.baked, "objects can only be inserted into bakes at vertices"};
+  return {};
+}
+
+}  // namespace lambent

@@ -1,0 +1,60 @@
+#pragma once
+// What a drawing is asked for: the options of `lambent render`.
+#include <lambent/baked/baked_file.h>
+#include <lambent/pipeline/options.h>
+#include <lambent/pipeline/parse.h>
+#include <lambent/render/render.h>
+
+namespace lambent {
+
+struct DrawRequest {
+  std::string baked, output;
+  // Light
+  std::string env, env_rotate, window = "none";
+  int light_order = 0;  // bands; 0: all that there are
+  std::vector<std::string> lamp, sphere_lamp;
+  // View
+  std::string camera = "auto", size = "512x512", background = "env";
+  int spp = 16;
+  float exposure = 0;
+  // What is shown
+  std::string show = "product", brdf = "diffuse";
+  std::vector<std::string> insert;
+  // Motion
+  std::string animation, frames, deform;
+  double time = 0;
+  // Blocks
+  std::string method = "blocks", brdf_samples = "bounded", indirect = "none";
+  float tolerance = 0.2f;
+  // Transfer textures
+  std::string transfer_texture, tile = "1,1", groove_map;
+  float groove_depth = 0, groove_width = 1;  // depth 0: the table's deepest
+
+  GivenOptions given;  // by JSON name; what differs from its default counts as given too
+};
+
+// By what the rows mean and the store can do.
+enum class DrawKind { diffuse, clusters, lobes, matrix, factors, lamps, blocks, fixed_view, texture };
+inline constexpr const char* draw_kind_names[] = {"diffuse transfer", "clusters",    "lobes",
+                                                  "matrices",         "factors",     "lightmaps and fixed light",
+                                                  "blocks",           "fixed views", "transfer textures"};
+std::span<const Option<DrawRequest>> draw_options();
+DrawKind kind_of(const Field& surface);
+
+// What --show asks for: product, radiosity, albedo; emission, bounce:K, sum:K.
+struct Show {
+  RenderOptions::Show colour = RenderOptions::Show::product;
+  // All light; that of lamps that are seen and nothing else; that of one term of the Neumann series; that of lamps that
+  // are seen and of the terms up to one.
+  enum class Part { all, emission, bounce, sum } part = Part::all;
+  int term = 0;
+};
+Result<Show> parse_show(const std::string& text);
+
+// Every option that was given goes with the kind and has an effect, or is refused by name. Errors begin with the
+// option.
+Result<void> check_draw(const DrawRequest& request, DrawKind kind);
+// And with what this file holds. Errors begin with the option, or name the file where that lacks what is asked for.
+Result<void> check_draw(const DrawRequest& request, const Baked& baked);
+
+}  // namespace lambent

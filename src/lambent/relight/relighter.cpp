@@ -1,0 +1,186 @@
+#include <lambent/basis/sh.h>
+#include <lambent/relight/factors.h>
+#include <lambent/relight/relighter.h>
+
+#include <bit>
+#include <numeric>
+#include <variant>
+
+namespace lambent {
+namespace {
+
+Error wrong(std::string message) { return {"relighter", std::move(message)}; }
+
+// Light as columns, and a frame that no store but lobes can use.
+struct Columns {
+  std::vector<Vec3> light;
+  bool ready = false;
+  void set(std::span<const Vec3> columns) { light.assign(columns.begin(), columns.end()), ready = true; }
+};
+Result<void> at_rest(const RelightFrame& frame) {
+  if (frame.frames) return wrong("this transfer cannot turn with the surface; that of lobes can");
+  if (frame.light) return wrong("this transfer takes one light for all receivers; that of lobes takes one for each");
+  return {};
+}
+
+// Dense or in clusters.
+template <class Store>
+struct OfColumns : Columns {
+  const Store& store;
+  explicit OfColumns(const Store& s) : store(s) {}
+  Result<void> relight(const RelightFrame& frame, Relit& out) {
+    if (auto ok = at_rest(frame); !ok) return ok;
+    lambent::relight(store, light, out);
+    return {};
+  }
+};
+
+struct OfLobes : Columns {
+  const ZonalTransfer& store;
+  bool direct;
+  ZonalLight table;
+  OfLobes(const ZonalTransfer& s, bool directly) : store(s), direct(directly) {}
+  void set(std::span<const Vec3> columns) {
+    Columns::set(columns);
+    if (!direct) specialise_light(store, columns, table);
+  }
+  Result<void> relight(const RelightFrame& frame, Relit& out) {
+    if (frame.frames && frame.frames->receivers != store.receivers)
+      return wrong("has frames for " + std::to_string(frame.frames->receivers) + " of " +
+                   std::to_string(store.receivers) + " receivers");
+    if (frame.light && (frame.light->receivers != store.receivers || frame.light->order < store.order))
+      return wrong("the light field has other receivers, or fewer bands than the lobes");
+    if (frame.light) relight_zonal(store, frame.frames, *frame.light, out);
+    else if (direct) relight_zonal(store, frame.frames, light, out);
+    else relight_zonal(store, frame.frames, table, out);
+    return {};
+  }
+};
+
+struct OfFactors : Columns {
+  const FactoredTransfer& store;
+  const Outgoing& outgoing;
+  FactorLight product;
+  OfFactors(const FactoredTransfer& s, const Outgoing& o) : store(s), outgoing(o) {}
+  void set(std::span<const Vec3> columns) {
+    ready = true;
+    lambent::set_light(product, store.light_order(), store.incident_order, columns);
+  }
+  Result<void> relight(const RelightFrame& frame, Relit& out) {
+    if (auto ok = at_rest(frame); !ok) return ok;
+    relight_factors(store.visibility, outgoing, product, out);
+    return {};
+  }
+};
+
+struct OfBlocks {
+  const Visibility& store;
+  RelighterOptions options;
+  bool ready = false;
+  BlockLight light = {};
+  std::optional<HaarLight> haar = std::nullopt;
+  ProductScratch scratch = {};
+  std::vector<uint32_t> all = {};
+  Result<void> set(const CubeLight& cube) {
+    if (cube.size != store.size)
+      return wrong("the light is on a cube of " + std::to_string(cube.size) +
+                   " texels a side, the visibility on one of " + std::to_string(store.size));
+    ready = true;
+    lambent::set_light(light, cube);
+    if (options.product == Product::haar) haar = make_haar_light(cube, options.haar_fraction);
+    return {};
+  }
+  Result<void> relight(const RelightFrame& frame, Relit& out) {
+    if (auto ok = at_rest(frame); !ok) return ok;
+    if (!frame.seen && all.empty()) all.resize(store.receivers), std::iota(all.begin(), all.end(), 0u);
+    const std::span<const uint32_t> seen = frame.seen ? *frame.seen : all;
+    for (uint32_t r : seen)
+      if (r >= store.receivers) return wrong("receiver " + std::to_string(r) + " is out of range");
+    shade_receivers(options.product, light, haar ? &*haar : nullptr, store, options.receivers, seen, frame.eye, out,
+                    frame.breakdown, &scratch);
+    return {};
+  }
+};
+
+Result<void> check_products(const Visibility& v, const RelighterOptions& o) {
+  const ProductReceivers& r = o.receivers;
+  if (r.positions.size() != v.receivers || r.frames.size() != v.receivers || r.material_of.size() != v.receivers)
+    return wrong("visibility in blocks wants a position, a frame and a material for each receiver");
+  for (uint32_t m : r.material_of)
+    if (m >= r.materials.size()) return wrong("material " + std::to_string(m) + " does not exist");
+  if (o.product == Product::haar && !std::has_single_bit(unsigned(v.size)))
+    return wrong("Haar wavelets want a cube of 2^k texels a side");
+  if (!(o.haar_fraction > 0 && o.haar_fraction <= 1)) return wrong("the share of Haar coefficients is out of range");
+  return {};
+}
+
+using AnyStore = std::variant<OfColumns<Transfer>, OfColumns<CpcaTransfer>, OfLobes, OfFactors, OfBlocks>;
+
+struct Make {
+  const Field& field;
+  RelighterOptions& options;
+  AnyStore operator()(const Transfer& t) const { return OfColumns<Transfer>(t); }
+  AnyStore operator()(const CpcaTransfer& t) const { return OfColumns<CpcaTransfer>(t); }
+  AnyStore operator()(const ZonalTransfer& t) const { return OfLobes(t, options.direct_lobes); }
+  AnyStore operator()(const FactoredTransfer& t) const { return OfFactors(t, *outgoing_of(field)); }
+  AnyStore operator()(const Visibility& v) const { return OfBlocks{v, std::move(options)}; }
+};
+
+}  // namespace
+
+struct Relighter::State {
+  const Field& field;
+  AnyStore store;
+};
+
+Relighter::Relighter(std::unique_ptr<State> state) : state_(std::move(state)) {}
+Relighter::Relighter(Relighter&&) noexcept = default;
+Relighter& Relighter::operator=(Relighter&&) noexcept = default;
+Relighter::~Relighter() = default;
+
+Result<Relighter> Relighter::make(const Field& field, RelighterOptions options) {
+  if (!is_consistent(field)) return wrong("placement, store and rows of the field do not fit one another");
+  if (const auto* v = std::get_if<Visibility>(&field.store))
+    if (auto ok = check_products(*v, options); !ok) return ok.error();
+  return Relighter(std::make_unique<State>(State{field, std::visit(Make{field, options}, field.store)}));
+}
+
+LightBasis Relighter::light() const { return light_of(state_->field.store); }
+size_t Relighter::receivers() const { return receivers_of(state_->field.store); }
+int Relighter::rows() const {
+  const auto* factors = std::get_if<FactoredTransfer>(&state_->field.store);
+  return factors ? sh_count(factors->incident_order) : std::max(1, rows_of(state_->field.store));
+}
+
+Result<void> Relighter::set_light(std::span<const Vec3> columns) {
+  const size_t count = light().count();
+  return std::visit(
+      [&](auto& s) -> Result<void> {
+        if constexpr (std::is_base_of_v<Columns, std::remove_reference_t<decltype(s)>>) {
+          if (columns.size() != count)
+            return wrong("the light has " + std::to_string(columns.size()) + " coefficients where the transfer has " +
+                         std::to_string(count) + " columns");
+          s.set(columns);
+          return {};
+        } else {
+          return wrong("visibility in blocks takes light on a cube");
+        }
+      },
+      state_->store);
+}
+
+Result<void> Relighter::set_light(const CubeLight& light) {
+  if (auto* blocks = std::get_if<OfBlocks>(&state_->store)) return blocks->set(light);
+  return wrong("this transfer takes a coefficient a column; visibility in blocks takes light on a cube");
+}
+
+Result<void> Relighter::relight(const RelightFrame& frame, Relit& out) {
+  return std::visit(
+      [&](auto& s) -> Result<void> {
+        if (!s.ready && !frame.light) return wrong("no light was set");
+        return s.relight(frame, out);
+      },
+      state_->store);
+}
+
+}  // namespace lambent
