@@ -136,6 +136,9 @@ Result<void> check_orders(const BakePlan& plan, const BakeRequest& r) {
                                             "all there are",
                                             max_sh_order)};
   }
+  if (glossy && plan.matrix.outgoing == OutgoingKind::svd && plan.matrix.svd_rows > sh_count(r.incident_order))
+    return Error{"--outgoing", fmt::format("svd:{} is more rows than the {} that --incident-order {} has",
+                                           plan.matrix.svd_rows, sh_count(r.incident_order), r.incident_order)};
   if (glossy && order == 0) return Error{"--light", "directional light cannot be baked with --transfer matrix"};
   if (glossy && order + r.incident_order > max_sh_order + 1)
     return Error{"--incident-order", fmt::format("and the bands of the light may be {} together", max_sh_order + 1)};

@@ -125,8 +125,8 @@ const std::map<std::string, Change> changes{
     {"emit", {nlohmann::json::array({"grey=1,2,3"})}},
     {"max_albedo", {0.3}},
     {"brdf", {"ggx:roughness=0.4"}},
-    {"outgoing", {"sh:2"}},
-    {"incident_order", {1}},
+    {"outgoing", {"svd:3"}},
+    {"incident_order", {4}},
     {"view_map", {12}},
     {"simulate", {"paths"}},
     {"factors", {true}},
@@ -164,8 +164,7 @@ TEST_F(Requests, EveryOptionHasAnEffectOrIsRefusedByName) {
       if (name == "light") before.erase("order");
       for (const auto& [key, value] : change.with.items()) before[key] = value;
       if (change.with.contains("receivers") && (o.kinds >> k & 1)) before.erase(name);
-      if (name == "fix_view" || name == "size") before["size"] = name == "size" ? "16x12" : "16x12";
-      if (name == "fix_view") before.erase("size");
+      if (name == "size") before["size"] = "16x12";
       nlohmann::json after = before;
       after[name] = change.value;
       if (name == "fix_view") after["size"] = "16x12";
@@ -179,14 +178,18 @@ TEST_F(Requests, EveryOptionHasAnEffectOrIsRefusedByName) {
         auto refused = resolved(changed);
         ASSERT_FALSE(refused);
         EXPECT_EQ(refused.error().where.substr(0, 2), "--");
-        if (change.with.empty()) EXPECT_EQ(refused.error().where, std::string("--") + o.name);
+        if (change.with.empty()) {
+          EXPECT_EQ(refused.error().where, std::string("--") + o.name);
+        }
         continue;
       }
       auto with = bake(changed);
-      ASSERT_TRUE(with) << with.error().text();
-      if (!o.recorded || kind_of(changed) != BakeKind(k)) continue;
+      EXPECT_TRUE(with) << with.error().text();
+      if (!with) continue;
+      if (!o.recorded || kind_of(changed) != BakeKind(k) || name == "factors") continue;  // which is the kind itself
       auto without = bake(must_read(before));
-      ASSERT_TRUE(without) << without.error().text();
+      EXPECT_TRUE(without) << without.error().text();
+      if (!without) continue;
       EXPECT_NE(fingerprint(std::move(*with)), fingerprint(std::move(*without)));
     }
 }
@@ -275,7 +278,12 @@ TEST_F(Requests, PlansSayReceiversAndBytesBeforeTheWork) {
   }
 }
 
-#if !defined(__SANITIZE_ADDRESS__) && !(defined(__has_feature) && __has_feature(address_sanitizer))
+#if defined(__has_feature)
+#define LAMBENT_HAS_FEATURE(x) __has_feature(x)
+#else
+#define LAMBENT_HAS_FEATURE(x) 0
+#endif
+#if !defined(__SANITIZE_ADDRESS__) && !LAMBENT_HAS_FEATURE(address_sanitizer)  // whose allocator counts otherwise
 TEST_F(Requests, TwoHundredLeaveMemoryWhereItWas) {
   const BakeRequest request = must_read(least(BakeKind::diffuse));
   size_t before = 0;
