@@ -124,12 +124,12 @@ expect 2 'factors' bake corner.obj --transfer matrix --factors --order 12 --inci
 expect 0 'pixel' bake corner.obj --max-edge 0.5 --samples 64 --order 4 --fix-view 3,2,4,1,0.5,0,40 --size 24x18 --spp 4 -o view.glb
 expect 0 'fixed view of 24 x 18' inspect view.glb
 "$tool" bake corner.obj --max-edge 0.5 --samples 64 --order 4 -o whole.glb >/dev/null 2>&1
-expect 0 'relit 432' render view.glb --env sky:elevation=30 --env-rotate 20,30,40 --background none -o view.exr
+expect 0 'relit +432' render view.glb --env sky:elevation=30 --env-rotate 20,30,40 --background none -o view.exr
 expect 0 'relit' render whole.glb --env sky:elevation=30 --env-rotate 20,30,40 --background none --camera 3,2,4,1,0.5,0,40 --size 24x18 --spp 4 -o whole.exr
 expect 0 'PSNR +(6[0-9]|[7-9][0-9]|inf)' compare view.exr whole.exr
-expect 1 'view is fixed' render view.glb --env sky:elevation=30 --camera auto -o x.png
+expect 2 'camera: does not go with fixed views' render view.glb --env sky:elevation=30 --camera auto -o x.png
 expect 0 'rows?' bake corner.obj --transfer matrix --brdf ggx:roughness=0.5 --order 3 --incident-order 3 --samples 64 --bounces 0 --fix-view auto --size 8x8 -o view.glb
-expect 0 'relit 64' render view.glb --env uniform:1,1,1 -o glossy_view.png
+expect 0 'relit +64' render view.glb --env uniform:1,1,1 -o glossy_view.png
 expect 2 'fix-view' bake corner.obj --fix-view 1,2 -o x.glb
 expect 2 '4 GiB' bake corner.obj --fix-view auto --size 9000x9000 -o x.glb
 expect 2 'fix-view' bake corner.obj --fix-view auto --compress cpca:2,2 -o x.glb
@@ -197,6 +197,14 @@ expect 0 'lamps' bake box.obj --transfer lightmap --directional sh:2 --atlas 64x
 expect 0 'sh2_godot.3.exr' export sh2.glb --godot sh2_godot
 expect 0 'sh2_three.3.exr' export sh2.glb --three sh2_three
 for picture in map_three.exr map_godot.exr sh2_godot.0.exr sh2_three.0.exr; do [ -s $picture ] && ok || bad "$picture is missing"; done
+# Reflections one by one.
+expect 0 'receivers' bake box.obj --transfer lightmap --light-groups --atlas 64x64 --samples 64 --bounces 2 --terms -o terms.glb
+for part in emission bounce:0 bounce:1 bounce:2 sum:2 product; do expect 0 'relit' render terms.glb $view --show $part -o terms_${part/:/_}.exr; done
+cmp -s terms_sum_2.exr terms_product.exr && ok || bad "all reflections together are not the picture"
+cmp -s terms_bounce_1.exr terms_bounce_2.exr && bad "two reflections are the same picture" || ok
+expect 2 'terms 0 to 2, not 3' render terms.glb $view --show sum:3 -o x.png
+expect 0 'holds lamps alone' render map.glb $view --env uniform:1 -o lone.png
+expect 2 'window: does not go with lamps alone' render map.glb $view --window hann -o x.png
 expect 2 'no group' render map.glb $view --lamp chandelier=1,1,1 -o x.png
 expect 0 'applications' bake box.obj --transfer lightmap --atlas 64x48 --samples 64 --bounces converge:1e-3 --solver southwell --direct separate --json -o map2.glb
 for picture in map2.direct.exr map2.indirect.exr; do [ -s $picture ] && ok || bad "$picture is missing"; done
@@ -311,7 +319,7 @@ expect 0 'relit' render lobes.glb --sphere-lamp 3,3,3,0.5,9,9,9 --env uniform:0.
 expect 0 'paths' reference card.obj --displace sky.png --depth 0.2 --tile 2,2 --heights 16 --env uniform:1 --size 16x16 --spp 1 -o displaced.exr
 expect 1 'no texture coordinates' reference corner.obj --displace sky.png --env uniform:1 --size 16x16 -o x.exr
 expect 1 'no grooves' render card.obj --transfer-texture relief.lpt --groove-depth 0.5 --env uniform:1 -o x.png
-expect 1 'sphere-lamp' render corner.glb --sphere-lamp 3,3,3,0.5,9,9,9 --env uniform:1 -o x.png
+expect 2 'sphere-lamp: does not go with diffuse' render corner.glb --sphere-lamp 3,3,3,0.5,9,9,9 --env uniform:1 -o x.png
 expect 2 'radius' render lobes.glb --sphere-lamp 3,3,3,0,9,9,9 -o x.png
 expect 2 'sphere-lamp' render lobes.glb --sphere-lamp 3,3,3,nan,9,9,9 -o x.png
 expect 2 'not both' patch sky.png --groove 1 -o x.lpt
@@ -323,7 +331,8 @@ expect 2 'depth' patch --groove nan -o x.lpt
 expect 2 'precision' patch --groove 1 --precision half -o x.lpt
 expect 2 'below 1' patch --groove 1 --albedo 1 -o x.lpt
 expect 2 'shadows' bake corner.obj --transfer zonal --outgoing svd:2 --shadows off -o x.glb
-expect 2 'goes with none' render card.obj --transfer-texture relief.lpt --env uniform:1 --lamp x=1,1,1 -o x.png
+expect 0 'what was baked is left out' render corner.glb --transfer-texture relief.lpt --env uniform:1 --size 8x8 -o card.png
+expect 2 'lamp: does not go with transfer textures' render card.obj --transfer-texture relief.lpt --env uniform:1 --lamp x=1,1,1 -o x.png
 expect 0 'paths' reference card.obj --ground --displace sky.png --heights 8 --env uniform:1 --size 8x8 --spp 1 -o displaced.exr
 expect 0 'paths' reference corner.obj --light-basis clusters.glb --env uniform:1 --size 8x8 --spp 1 -o basis.exr
 # The web viewer, where it has been built: the folder is there whole or not at all, and nothing of others' is replaced.
@@ -355,6 +364,10 @@ expect 2 'order' bake corner.obj --order 0 -o x.glb
 expect 2 'order' bake corner.obj --order 1000 -o x.glb
 expect 2 'samples' bake corner.obj --samples -4 -o x.glb
 expect 2 'bounces' bake corner.obj --shadows off --bounces 3 -o x.glb
+expect 2 'exposure: brightens a PNG' render corner.glb --env uniform:1 --exposure 1 -o x.exr
+expect 2 'show: must be' render corner.glb --env uniform:1 --show bounce:-1 -o x.png
+expect 1 'corner.glb: .*bake --terms' render corner.glb --env uniform:1 --show bounce:1 -o x.png
+expect 1 'no lamps of its own' render corner.glb --show emission -o x.png
 expect 2 'camera' render corner.glb --env uniform:1 --camera 1,2,3 -o x.png
 expect 2 'size' render corner.glb --env uniform:1 --size 0x10 -o x.png
 expect 2 'rotate' render corner.glb --env uniform:1 --env-rotate nan,0,0 -o x.png
@@ -422,7 +435,9 @@ done
 expect 0 'shaded' render blocks.glb "${view[@]}" --indirect sh -o indirect.png
 expect 0 'frames_per_second' relight blocks.glb --env sky:elevation=50 --turntable --spin-light --frames 3 --json
 expect 1 'lambent bake --transfer blocks' relight corner.glb --env uniform:1
-expect 1 'lambent bake --transfer blocks' render corner.glb --env uniform:1 --method haar -o x.png
+expect 2 'method: does not go with diffuse transfer: it is for blocks' render corner.glb --env uniform:1 --method haar -o x.png
+expect 2 'tolerance: needs --method blocks' render blocks.glb --env uniform:1 --method haar --tolerance 0.1 -o x.png
+expect 2 'window: does not go with blocks' render blocks.glb --env uniform:1 --window hann -o x.png
 expect 2 '\-\-method' render blocks.glb --env uniform:1 --method wavelets -o x.png
 expect 2 '\-\-visibility' bake corner.obj --transfer blocks --visibility bits:9 -o x.glb
 expect 2 '\-\-cube needs' bake corner.obj --cube 64 -o x.glb

@@ -36,7 +36,7 @@ struct DrawRequest {
 // By what the rows mean and the store can do.
 enum class DrawKind { diffuse, clusters, lobes, matrix, factors, lamps, blocks, fixed_view, texture };
 inline constexpr const char* draw_kind_names[] = {"diffuse transfer", "clusters",    "lobes",
-                                                  "matrices",         "factors",     "lightmaps and fixed light",
+                                                  "matrices",         "factors",     "lamps alone (lightmaps, fixed light)",
                                                   "blocks",           "fixed views", "transfer textures"};
 std::span<const Option<DrawRequest>> draw_options();
 DrawKind kind_of(const Field& surface);
