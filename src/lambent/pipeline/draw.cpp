@@ -191,7 +191,7 @@ Result<Drawing> draw_columns(const Baked& baked, const DrawRequest& request, con
     d.insertions.push_back(std::move(*insertion));
   }
   d.rows = baked.surface.rows;
-  if (is_given(request, "brdf")) {
+  if (!request.brdf.empty()) {
     auto reflection = parse_reflection(request.brdf);
     if (!reflection) return reflection.error();
     auto changed = change_materials(baked, *reflection);

@@ -38,7 +38,7 @@ Result<ProductMethod> parse_method(const std::string& text) {
 Result<BlockShading> make_block_shading(const Baked& baked, const DrawRequest& request) {
   auto method = parse_method(request.method);
   if (!method) return method.error();
-  auto reflection = parse_reflection(request.brdf);
+  auto reflection = parse_reflection(request.brdf.empty() ? "diffuse" : request.brdf);
   if (!reflection) return reflection.error();
   const VertexPlacement* at = vertices_of(baked);
   if (!at) return Error{request.baked, "has visibility elsewhere than at vertices"};

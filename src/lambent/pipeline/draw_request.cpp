@@ -48,8 +48,9 @@ const Option<R> table[] = {
      "emission: lamps that are seen, alone; bounce:K: light after K reflections between surfaces, alone; sum:K: lamps, "
      "and light after 0 to K reflections (files baked with --terms)"},
     {"brdf", &R::brdf, "What is shown", C | Z | M | F | K,
-     "Other materials: diffuse (by base colour), materials (glTF's metallic-roughness), or one model for all, as "
-     "`bake --brdf` takes it; for bakes that kept incident light, and blocks",
+     "Other materials than were baked, or those of blocks: diffuse (by base colour), materials (glTF's "
+     "metallic-roughness), or one model for all, as `bake --brdf` takes it; for bakes that kept incident light, and "
+     "blocks",
      0, 0, nullptr, nullptr, true, true},
     {"insert", &R::insert, "What is shown", D | C | Z | M,
      "FILE@X,Y,Z[,SCALE]: put a small diffuse object there, lit by the scene's lattice; may be given again"},
@@ -203,7 +204,7 @@ Result<void> check_draw(const DrawRequest& request, const Baked& baked) {
   if (light.order == 0 && request.light_order > 0)
     return Error{"--light-order", "counts bands of harmonics, and the file is baked for none"};
   const Outgoing* outgoing = outgoing_of(baked.surface);
-  if (is_given(request, "brdf") && (!outgoing || outgoing->kind != OutgoingKind::map))
+  if (!request.brdf.empty() && (!outgoing || outgoing->kind != OutgoingKind::map))
     return Error{request.baked,
                  "--brdf needs a bake that kept incident light: lambent bake --transfer matrix --outgoing map"};
   if (request.insert.empty()) return {};

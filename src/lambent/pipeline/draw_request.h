@@ -18,7 +18,8 @@ struct DrawRequest {
   int spp = 16;
   float exposure = 0;
   // What is shown
-  std::string show = "product", brdf = "diffuse";
+  std::string show = "product";
+  std::string brdf;  // "": as baked; of blocks, which know none, diffuse
   std::vector<std::string> insert;
   // Motion
   std::string animation, frames, deform;
@@ -35,9 +36,10 @@ struct DrawRequest {
 
 // By what the rows mean and the store can do.
 enum class DrawKind { diffuse, clusters, lobes, matrix, factors, lamps, blocks, fixed_view, texture };
-inline constexpr const char* draw_kind_names[] = {"diffuse transfer", "clusters",    "lobes",
-                                                  "matrices",         "factors",     "lamps alone (lightmaps, fixed light)",
-                                                  "blocks",           "fixed views", "transfer textures"};
+inline constexpr const char* draw_kind_names[] = {
+    "diffuse transfer", "clusters",    "lobes",
+    "matrices",         "factors",     "lamps alone (lightmaps, fixed light)",
+    "blocks",           "fixed views", "transfer textures"};
 std::span<const Option<DrawRequest>> draw_options();
 DrawKind kind_of(const Field& surface);
 
