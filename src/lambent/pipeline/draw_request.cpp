@@ -1,7 +1,9 @@
 #include <lambent/pipeline/draw_request.h>
 
 #include <lambent/core/file.h>
+#include <lambent/pipeline/draw_light.h>
 
+#include <algorithm>
 #include <charconv>
 
 namespace lambent {
@@ -155,7 +157,9 @@ Result<Show> parse_show(const std::string& text) {
 namespace {
 
 Result<void> check_show(const DrawRequest& request, const Show& show, const Baked& baked) {
-  if (show.part == Show::Part::emission && light_of(baked.surface.store).groups.empty())
+  const LightBasis light = light_of(baked.surface.store);
+  const std::vector<Vec3> lamps = seen_emission(baked.scene, light, std::vector<Vec3>(light.groups.size(), Vec3(1.0f)));
+  if (show.part == Show::Part::emission && std::all_of(lamps.begin(), lamps.end(), [](Vec3 e) { return e == Vec3(0); }))
     return Error{request.baked, "has no lamps of its own that --show emission could show"};
   if (show.part != Show::Part::bounce && show.part != Show::Part::sum) return {};
   if (baked.terms.empty())
