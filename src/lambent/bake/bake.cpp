@@ -36,7 +36,7 @@ struct Baker {
   const Scene& scene;
   const Receivers& receivers;
   const BakeOptions& options;
-  const GatherSetup setup;
+  GatherSetup setup;
   Progress* progress;
   BakeReport& report;
   const LobeSets lobes = make_lobe_sets(options.lobe_kind, options.lobes, options.samples, options.seed);
@@ -53,7 +53,7 @@ struct Baker {
   void trace_sharp_lobes(size_t first, size_t count, const GatherSky& sky) {
     if (lobes.sharp.empty()) return;
     auto rays = lobe_rays.borrow();
-    for (size_t r = first; r < first + count; ++r) {
+    for (size_t r = first; r < first + count && !is_cancelled(progress); ++r) {
       float* half = checked_row(sky, first, r);
       trace_lobes(lobes, setup.tracer, receivers.origins[r], receivers.normals[r], r, *rays,
                   sky.rows + (r - first) * sky.stride + harmonics(), half ? half + harmonics() : nullptr);
@@ -211,6 +211,7 @@ Result<Transfer> bake(const Scene& scene, const Tracer& tracer, const Receivers&
       make_gather_setup(scene, tracer, receivers, options.order, options.shadows ? options.samples : 1, options.seed),
       progress,
       r};
+  baker.setup.progress = progress;
   const size_t least = least_memory(receivers.count(), baker.setup.channels == 3, options);
   if (options.memory < least)
     return Error{scene.path, "baking needs at least " + std::to_string(least) +

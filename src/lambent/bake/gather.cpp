@@ -257,7 +257,7 @@ void trace_gather_on(const GatherSetup& setup, const Basis& basis, GatherScratch
   Fan& fan = scratch.fan;
   const std::vector<Hit>& hits = scratch.hits;
   scratch.rows.begin_block(), scratch.half_rows.begin_block();
-  for (size_t i = 0; i < count; ++i) {
+  for (size_t i = 0; i < count && !is_cancelled(setup.progress); ++i) {
     const size_t r = first + i;
     const bool checked = block && r % check_every == 0;
     setup.tracer.closest_fan(setup.receivers.origins[r], fan.aim(setup.receivers.normals[r], setup.seed, r),
@@ -337,7 +337,7 @@ void trace_sky(const GatherSetup& setup, GatherScratch& scratch, size_t first, s
   const DirectionSets& sets = setup.sets;
   const size_t rays = size_t(sets.samples);
   Fan& fan = scratch.fan;
-  for (size_t i = 0; i < count; ++i) {
+  for (size_t i = 0; i < count && !is_cancelled(setup.progress); ++i) {
     const size_t r = first + i;
     const Vec3 origin = setup.receivers.origins[r];
     setup.tracer.visible_fan(origin, fan.aim(setup.receivers.normals[r], setup.seed, r), fan.visible.data());

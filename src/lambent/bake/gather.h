@@ -52,6 +52,7 @@ struct GatherSetup {
   float weight_unit;              // stored weight = sum of albedo x interpolation weight over rays, x weight_unit
   std::vector<Vec3> part_albedo;  // of parts with one albedo all over
   std::vector<uint8_t> part_varies;
+  const Progress* progress = nullptr;  // tracing looks at it receiver by receiver, and ends early when cancelled
 
   size_t coefficients() const { return size_t(sh_count(sets.order)); }
   // What a stored weight has to be multiplied by, given how many rays the row averages.

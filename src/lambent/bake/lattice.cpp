@@ -273,7 +273,7 @@ Result<LatticeTransfer> bake_lattice(const Scene& scene, const Tracer& tracer, c
     parallel_for(lattice.count(), transfer_block, [&](size_t begin, size_t end) {
       if (stage.cancelled()) return;
       auto s = baker.scratch.borrow();
-      for (size_t p = begin; p < end; ++p) result.valid[p] = baker.gather(*s, p, out);
+      for (size_t p = begin; p < end && !stage.cancelled(); ++p) result.valid[p] = baker.gather(*s, p, out);
       stage.advance(end - begin);
     });
     if (stage.cancelled()) return Error{"", "cancelled"};

@@ -76,6 +76,7 @@ Result<AlignedVector<float>> directional_rows_of(const GatherSetup& setup, const
   AlignedVector<float> wide(n * rows * width, 0.0f);
   ProgressStage stage(progress, "directions", n);
   parallel_for(n, gather_block, [&](size_t begin, size_t end) {
+    if (stage.cancelled()) return;
     for (size_t r = begin; r < end && !stage.cancelled(); ++r)
       gather_directional(setup, lamps, o.lamp_samples, o.directional, x, width, r, 1, wide.data() + r * rows * width);
     stage.advance(end - begin);
@@ -117,6 +118,7 @@ Result<Lightmap> bake_lightmap(const Scene& scene, const Tracer& tracer, const R
   GatherSetup setup =
       make_gather_setup(scene, tracer, receivers, order, cube.samples ? cube.samples : o.samples, o.seed);
   if (cube.samples) setup.sets = std::move(cube);
+  setup.progress = progress;
   const LightBasis light{.order = o.order, .groups = lamps.names};
 
   // e: [harmonics | groups][channel]
@@ -148,10 +150,11 @@ Result<Lightmap> bake_lightmap(const Scene& scene, const Tracer& tracer, const R
   }
   r.bounce_seconds = seconds_since(start);
 
-  auto stored = [&](AlignedVector<float>& values, size_t rows_each) {
+  auto stored = [&](AlignedVector<float>& values, size_t rows_each) -> Result<Transfer> {
     if (const auto* texels = std::get_if<TexelReceivers>(&receivers.basis))
       smooth_seams(scene, *texels, values.data(), rows_each * width,
-                   rows_each == 1 ? 3 * light.count() : rows_each * width);
+                   rows_each == 1 ? 3 * light.count() : rows_each * width, 0.95f, 0.05f, progress);
+    if (is_cancelled(progress)) return Error{"", "cancelled"};
     return to_transfer(light, values, rows_each, n, width, o.precision);
   };
   auto all = stored(*x, rows);

@@ -24,15 +24,16 @@ struct MatrixBaker : MatrixGather {
   Result<LastReflection> prepare() {
     auto responses = make_responses(materials.materials, basis, matrix.grid, matrix.response_samples, progress);
     if (!responses) return responses.error();
-    ProgressStage stage(progress, "scattering", responses->size());
     scatter.resize(responses->size());
-    if (options.bounces > 0 && !matrix.simulate_paths)
+    if (options.bounces > 0 && !matrix.simulate_paths) {
+      ProgressStage stage(progress, "scattering", responses->size());
       parallel_for(responses->size(), 1, [&](size_t m, size_t) {
         if (stage.cancelled()) return;
         scatter[m] = factor_response((*responses)[m], matrix.scatter_rows, matrix.scatter_error);
         stage.advance();
       });
-    if (stage.cancelled()) return Error{"", "cancelled"};
+      if (stage.cancelled()) return Error{"", "cancelled"};
+    }
     first_row.assign(1, 0);
     for (size_t r = 0; r < n(); ++r)
       first_row.push_back(first_row.back() + size_t(scatter[materials.of_receiver[r]].rows));
@@ -74,16 +75,23 @@ struct MatrixBaker : MatrixGather {
     {
       ProgressStage stage(progress, paths ? "paths" : "tracing", n());
       parallel_for(n(), gather_block, [&](size_t begin, size_t end) {
+        if (stage.cancelled()) return;
         auto s = scratch.borrow();
         for (size_t r = begin; r < end && !stage.cancelled(); ++r) receive(*s, r);
         stage.advance(end - begin);
       });
       if (stage.cancelled()) return Error{"", "cancelled"};
     }
-    auto s = scratch.borrow();
-    for (const FillStep& step : make_fill_steps(scene, receivers.basis, std::vector<uint8_t>(buried))) {
-      receivers.origins[step.receiver] = receivers.origins[step.sources[0]];
-      receive(*s, step.receiver);
+    const std::vector<FillStep> steps = make_fill_steps(scene, receivers.basis, buried);
+    for (const FillStep& step : steps) receivers.origins[step.receiver] = receivers.origins[step.sources[0]];
+    if (!steps.empty()) {
+      ProgressStage stage(progress, "moving buried", steps.size());
+      parallel_for(steps.size(), 1, [&](size_t i, size_t) {
+        if (stage.cancelled()) return;
+        receive(*scratch.borrow(), steps[i].receiver);
+        stage.advance();
+      });
+      if (stage.cancelled()) return Error{"", "cancelled"};
     }
     report.rays = n() * (rays() + size_t(lobes.rays) * lobes.sharp.size());
     report.trace_seconds = seconds_since(start);
@@ -185,6 +193,7 @@ Result<MatrixBake> bake_matrix(const Scene& scene, const Tracer& tracer, const R
                                         options.samples, options.seed);
   for (const LinearMaterial& m : materials.materials)
     if (tints(m.black)) setup.channels = 3;
+  setup.progress = progress;
   if (options.bounces == 0) setup.channels = 1;  // direct light meets no coloured surface on its way
   const size_t needed = matrix_memory(receivers.count(), setup.channels, options, matrix);
   if (needed > options.memory)

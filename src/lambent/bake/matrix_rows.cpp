@@ -27,8 +27,10 @@ void MatrixRows::trace_receiver(MatrixScratch& s, size_t r, MatrixHits& hits) {
 void MatrixRows::trace_block(size_t block) {
   auto s = gather_.scratch.borrow();
   MatrixHits hits;
-  for (size_t r = block * gather_block; r < std::min(rows(), (block + 1) * gather_block); ++r)
+  for (size_t r = block * gather_block; r < std::min(rows(), (block + 1) * gather_block); ++r) {
+    if (is_cancelled(gather_.setup.progress)) return;
     trace_receiver(*s, r, hits);
+  }
   const size_t bytes = hits.bytes();
   if (is_kept_[block]) used_ += bytes, used_ -= kept_[block].bytes(), kept_[block] = std::move(hits);
   else if (used_.fetch_add(bytes) + bytes <= budget_) kept_[block] = std::move(hits), is_kept_[block] = 1;
@@ -43,19 +45,26 @@ Result<void> MatrixRows::trace(Progress* progress) {
     stage.advance(end - begin);
   });
   if (stage.cancelled()) return Error{"", "cancelled"};
-  move_buried();
+  move_buried(progress);
+  if (is_cancelled(progress)) return Error{"", "cancelled"};
   return {};
 }
 
 // A buried receiver looks out from where its nearest clear neighbour along the mesh lies.
-void MatrixRows::move_buried() {
+void MatrixRows::move_buried(Progress* progress) {
   std::set<size_t> touched;
   for (const FillStep& step : make_fill_steps(gather_.scene, gather_.receivers.basis, buried_)) {
     gather_.receivers.origins[step.receiver] = gather_.receivers.origins[step.sources[0]];
     touched.insert(step.receiver / gather_block);
   }
   const std::vector<size_t> blocks(touched.begin(), touched.end());
-  parallel_for(blocks.size(), 1, [&](size_t begin, size_t) { trace_block(blocks[begin]); });
+  if (blocks.empty()) return;
+  ProgressStage stage(progress, "moving buried", blocks.size());
+  parallel_for(blocks.size(), 1, [&](size_t begin, size_t) {
+    if (stage.cancelled()) return;
+    trace_block(blocks[begin]);
+    stage.advance();
+  });
 }
 
 double MatrixRows::kept() const {

@@ -32,7 +32,7 @@ class MatrixRows final : public LinearOperator {
  private:
   void trace_receiver(MatrixScratch& s, size_t r, MatrixHits& hits);
   void trace_block(size_t block);
-  void move_buried();
+  void move_buried(Progress* progress);
 
   MatrixGather& gather_;
   const size_t budget_;

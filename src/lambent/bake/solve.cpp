@@ -121,7 +121,7 @@ struct Problem {
     const double share = std::max(residual > 0 ? std::log(residual) / std::log(std::min(options.tolerance, 0.5)) : 1.0,
                                   applications / options.most);
     const size_t reached = size_t(double(solve_units) * std::clamp(share, 0.0, 1.0));
-    stage.advance(std::max(reached, shown) - shown), shown = std::max(reached, shown);
+    if (reached > shown) stage.advance(reached - shown), shown = reached;
     return report.converged = residual <= options.tolerance;
   }
   void step(const float* x, float* next) const { Step{op, &source, width, progress}.run(x, next); }
@@ -262,79 +262,95 @@ AlignedVector<float> Problem::southwell(const TransposedRows& push) {
   return x;
 }
 
-// Each lane is a system of its own over the same A; they share its applications. (I - A) x = e from x = 0.
+// A Krylov space of each lane, of its own but over shared applications of A: an orthonormal basis V, the rotated
+// Hessenberg matrices R and right-hand sides g, lane by lane.
+struct Krylov {
+  using Lanes = std::vector<double>;
+  size_t n, width;
+  std::vector<AlignedVector<float>> V{};
+  std::vector<std::array<Lanes, restart + 1>> R{};
+  std::array<Lanes, restart + 1> g{};
+  std::vector<Lanes> cosine{}, sine{};
+
+  // V's next vector: v over its length.
+  Lanes append(const AlignedVector<float>& v) {
+    Lanes length = dots(v.data(), v.data(), n, width);
+    for (double& l : length) l = std::sqrt(l);
+    std::vector<float> inverse(width);
+    for (size_t k = 0; k < width; ++k) inverse[k] = length[k] > 0 ? float(1 / length[k]) : 0.0f;
+    V.emplace_back(v.size());
+    each_row(n, [&](size_t i) {
+      for (size_t k = 0; k < width; ++k) V.back()[i * width + k] = v[i * width + k] * inverse[k];
+    });
+    return length;
+  }
+  void begin(const AlignedVector<float>& residual) { g.fill(Lanes(width, 0.0)), g[0] = append(residual); }
+
+  // One dimension more, by w, which is overwritten; squares of the least residuals.
+  Lanes extend(AlignedVector<float>& w) {
+    const size_t m = R.size();
+    auto& h = R.emplace_back();
+    for (size_t j = 0; j <= m; ++j) {  // modified Gram-Schmidt
+      h[j] = dots(w.data(), V[j].data(), n, width);
+      const std::vector<float> share(h[j].begin(), h[j].end());
+      each_row(n, [&](size_t i) {
+        for (size_t k = 0; k < width; ++k) w[i * width + k] -= share[k] * V[j][i * width + k];
+      });
+    }
+    const Lanes length = append(w);
+    cosine.emplace_back(width, 1.0), sine.emplace_back(width, 0.0);
+    Lanes squares(width, 0.0);
+    for (size_t k = 0; k < width; ++k) {
+      for (size_t j = 0; j < m; ++j) {
+        const double a = h[j][k], b = h[j + 1][k], c = cosine[j][k], s = sine[j][k];
+        h[j][k] = c * a + s * b, h[j + 1][k] = -s * a + c * b;
+      }
+      const double a = h[m][k], b = length[k], d = std::hypot(a, b);
+      if (d > 0) cosine[m][k] = a / d, sine[m][k] = b / d;
+      h[m][k] = d;
+      const double top = g[m][k];
+      g[m][k] = cosine[m][k] * top, g[m + 1][k] = -sine[m][k] * top;
+      squares[k] = g[m + 1][k] * g[m + 1][k];
+    }
+    return squares;
+  }
+
+  // x += V y, y = R^-1 g
+  void add_to(AlignedVector<float>& x) const {
+    const size_t m = R.size();
+    std::vector<std::vector<float>> y(m, std::vector<float>(width));
+    for (size_t k = 0; k < width; ++k)
+      for (size_t i = m; i-- > 0;) {
+        double sum = g[i][k];
+        for (size_t j = i + 1; j < m; ++j) sum -= R[j][i][k] * double(y[j][k]);
+        const double d = R[i][i][k];
+        y[i][k] = d > 0 ? float(sum / d) : 0.0f;
+      }
+    for (size_t j = 0; j < m; ++j)
+      each_row(n, [&](size_t i) {
+        for (size_t k = 0; k < width; ++k) x[i * width + k] += y[j][k] * V[j][i * width + k];
+      });
+  }
+};
+
+// (I - A) x = e from x = 0.
 AlignedVector<float> Problem::gmres() {
   AlignedVector<float> x(n() * width, 0.0f), r = copy_of_e(), w(x.size());
   int applications = 0;
   while (applications < options.most && !stage.cancelled()) {
-    std::vector<AlignedVector<float>> V;
-    std::vector<double> beta = dots(r.data(), r.data(), n(), width);
-    for (double& b : beta) b = std::sqrt(b);
-    auto append_scaled = [&](const AlignedVector<float>& v, const std::vector<double>& length) {
-      V.emplace_back(v.size());
-      std::vector<float> inverse(width);
-      for (size_t k = 0; k < width; ++k) inverse[k] = length[k] > 0 ? float(1 / length[k]) : 0.0f;
-      each_row(n(), [&](size_t i) {
-        for (size_t k = 0; k < width; ++k) V.back()[i * width + k] = v[i * width + k] * inverse[k];
-      });
-    };
-    append_scaled(r, beta);
-    // R of the rotated Hessenberg matrices, right-hand sides g, rotations; all lane by lane.
-    std::vector<std::array<std::vector<double>, restart + 1>> R;
-    std::array<std::vector<double>, restart + 1> g;
-    g.fill(std::vector<double>(width, 0.0)), g[0] = beta;
-    std::vector<std::vector<double>> cosine, sine;
-    int m = 0;
+    Krylov space{n(), width};
+    space.begin(r);
     bool finished = false;
-    while (m < restart && applications < options.most && !finished && !stage.cancelled()) {
-      const AlignedVector<float>& v = V.back();
+    for (int m = 0; m < restart && applications < options.most && !finished && !stage.cancelled(); ++m) {
+      const AlignedVector<float>& v = space.V.back();
       op.apply(v.data(), width, w.data(), progress);
       ++applications;
       each_row(n(), [&](size_t i) {
         for (size_t k = i * width; k < (i + 1) * width; ++k) w[k] = v[k] - w[k];
       });
-      R.emplace_back();
-      auto& h = R.back();
-      for (int j = 0; j <= m; ++j) {  // modified Gram-Schmidt
-        h[size_t(j)] = dots(w.data(), V[size_t(j)].data(), n(), width);
-        std::vector<float> share(h[size_t(j)].begin(), h[size_t(j)].end());
-        each_row(n(), [&](size_t i) {
-          for (size_t k = 0; k < width; ++k) w[i * width + k] -= share[k] * V[size_t(j)][i * width + k];
-        });
-      }
-      std::vector<double> length = dots(w.data(), w.data(), n(), width);
-      for (double& l : length) l = std::sqrt(l);
-      append_scaled(w, length);
-      cosine.emplace_back(width, 1.0), sine.emplace_back(width, 0.0);
-      std::vector<double> squares(width, 0.0);
-      for (size_t k = 0; k < width; ++k) {
-        for (int j = 0; j < m; ++j) {
-          const double a = h[size_t(j)][k], b = h[size_t(j) + 1][k], c = cosine[size_t(j)][k], s = sine[size_t(j)][k];
-          h[size_t(j)][k] = c * a + s * b, h[size_t(j) + 1][k] = -s * a + c * b;
-        }
-        const double a = h[size_t(m)][k], b = length[k], d = std::hypot(a, b);
-        if (d > 0) cosine[size_t(m)][k] = a / d, sine[size_t(m)][k] = b / d;
-        h[size_t(m)][k] = d;
-        const double top = g[size_t(m)][k];
-        g[size_t(m)][k] = cosine[size_t(m)][k] * top, g[size_t(m) + 1][k] = -sine[size_t(m)][k] * top;
-        squares[k] = g[size_t(m) + 1][k] * g[size_t(m) + 1][k];
-      }
-      ++m;
-      finished = done(applications, greatest_ratio(squares, norms));
+      finished = done(applications, greatest_ratio(space.extend(w), norms));
     }
-    // y = R^-1 g, x += V y
-    std::vector<std::vector<float>> y(R.size(), std::vector<float>(width));
-    for (size_t k = 0; k < width; ++k)
-      for (int i = m - 1; i >= 0; --i) {
-        double sum = g[size_t(i)][k];
-        for (int j = i + 1; j < m; ++j) sum -= R[size_t(j)][size_t(i)][k] * double(y[size_t(j)][k]);
-        const double d = R[size_t(i)][size_t(i)][k];
-        y[size_t(i)][k] = d > 0 ? float(sum / d) : 0.0f;
-      }
-    for (int j = 0; j < m; ++j)
-      each_row(n(), [&](size_t i) {
-        for (size_t k = 0; k < width; ++k) x[i * width + k] += y[size_t(j)][k] * V[size_t(j)][i * width + k];
-      });
+    space.add_to(x);
     if (finished || applications >= options.most) break;
     step(x.data(), w.data());  // a fresh residual for the next cycle
     ++applications;

@@ -40,12 +40,19 @@ struct Side {
 
 }  // namespace
 
-size_t move_buried_texels(const Scene& scene, const Tracer& tracer, const Atlas& atlas, Receivers& receivers) {
+size_t move_buried_texels(const Scene& scene, const Tracer& tracer, const Atlas& atlas, Receivers& receivers,
+                          Progress* progress) {
   const TexelReceivers& map = std::get<TexelReceivers>(receivers.basis);
   std::vector<uint8_t> buried(receivers.count(), 0), moved(receivers.count(), 0);
-  parallel_for(receivers.count(), gather_block, [&](size_t begin, size_t end) {
-    for (size_t r = begin; r < end; ++r) buried[r] = lies_inside(tracer, receivers, r);
-  });
+  {
+    ProgressStage stage(progress, "texels inside", receivers.count());
+    parallel_for(receivers.count(), gather_block, [&](size_t begin, size_t end) {
+      if (stage.cancelled()) return;
+      for (size_t r = begin; r < end; ++r) buried[r] = lies_inside(tracer, receivers, r);
+      stage.advance(end - begin);
+    });
+    if (stage.cancelled()) return 0;
+  }
 
   // Each buried texel's centre in the atlas, and the sides of triangles that its tent reaches.
   struct Texel {
@@ -73,8 +80,10 @@ size_t move_buried_texels(const Scene& scene, const Tracer& tracer, const Atlas&
     }
 
   const float texel_size = 1 / std::max(atlas.texels_per_unit, 1e-30f), diagonal = bounds(scene).diagonal();
+  ProgressStage stage(progress, "moving texels", texels.size());
   parallel_for(texels.size(), 16, [&](size_t begin, size_t end) {
-    for (size_t i = begin; i < end; ++i) {
+    if (stage.cancelled()) return;
+    for (size_t i = begin; i < end && !stage.cancelled(); ++i) {
       const Texel& texel = texels[i];
       const size_t r = texel.receiver;
       const Vec3 origin = receivers.origins[r], normal = receivers.normals[r];
@@ -115,6 +124,7 @@ size_t move_buried_texels(const Scene& scene, const Tracer& tracer, const Atlas&
       moved[r] = search();
       if (!moved[r]) receivers.origins[r] = origin, receivers.normals[r] = normal, receivers.places[r] = place;
     }
+    stage.advance(end - begin);
   });
   size_t count = 0;
   for (uint8_t m : moved) count += m;

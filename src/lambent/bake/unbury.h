@@ -10,6 +10,8 @@ namespace lambent {
 // Moves every texel whose sample point is buried (most rays meet backs of one-sided surfaces) to the nearest point
 // within its tent, one texel either way, from which they do not. Texels with no such point stay, and are filled from
 // their neighbours after the bake (make_fill_steps); nothing that is seen looks at them. Returns how many moved.
-size_t move_buried_texels(const Scene& scene, const Tracer& tracer, const Atlas& atlas, Receivers& receivers);
+// Left unfinished when cancelled.
+size_t move_buried_texels(const Scene& scene, const Tracer& tracer, const Atlas& atlas, Receivers& receivers,
+                          Progress* progress = nullptr);
 
 }  // namespace lambent

@@ -102,7 +102,7 @@ Result<Visibility> bake_visibility(const Tracer& tracer, const Receivers& receiv
       const auto s = pool.borrow();
       std::vector<uint8_t>& out = pieces[begin / piece_receivers];
       size_t traced = 0;
-      for (size_t r = begin; r < end; ++r) {
+      for (size_t r = begin; r < end && !stage.cancelled(); ++r) {
         traced += work.trace_centres(receivers.origins[r], receivers.normals[r], *s);
         if (options.bits > 1) traced += work.refine(receivers.origins[r], receivers.normals[r], *s);
         const size_t before = out.size();

@@ -65,6 +65,7 @@ struct Cluster {
 struct Compressor {
   const Transfer& transfer;
   const CpcaOptions& options;
+  ProgressStage& stage;  // advanced by receivers: those of a cluster when it is fitted, each when it is assigned
   size_t n = transfer.receivers, D = transfer.receiver_values(), stride = padded(D);
   std::vector<float> values = std::vector<float>(n * stride, 0.0f);  // [receiver][stride]
   std::vector<Cluster> clusters = std::vector<Cluster>(size_t(options.clusters));
@@ -95,7 +96,7 @@ struct Compressor {
       for (size_t k = 0; k < D; ++k) Q.back()[k] = random.next() - 0.5f;
     }
     std::vector<float> centred(stride);
-    for (int step = 0; step < power_steps; ++step) {
+    for (int step = 0; step < power_steps && !stage.cancelled(); ++step) {
       std::vector<std::vector<float>> Y(Q.size(), std::vector<float>(stride, 0.0f));
       for (uint32_t r : members) {
         for (size_t k = 0; k < stride; ++k) centred[k] = value(r)[k] - cluster.mean[k];
@@ -132,13 +133,15 @@ struct Compressor {
     std::vector<std::vector<uint32_t>> members(clusters.size());
     for (size_t r = 0; r < n; ++r) members[cluster_of[r]].push_back(uint32_t(r));
     parallel_for(clusters.size(), 1, [&](size_t begin, size_t end) {
-      for (size_t c = begin; c < end; ++c) fit(c, members[c]);
+      if (stage.cancelled()) return;
+      for (size_t c = begin; c < end; ++c) fit(c, members[c]), stage.advance(members[c].size());
     });
   }
 
   // Each receiver to whichever of the clusters with the nearest means leaves least error.
   void assign() {
     parallel_for(n, 64, [&](size_t begin, size_t end) {
+      if (stage.cancelled()) return;
       std::vector<std::pair<float, uint16_t>> near(clusters.size());
       std::vector<float> centred(stride);
       for (size_t r = begin; r < end; ++r) {
@@ -156,6 +159,7 @@ struct Compressor {
             least = e, best = near[i].second;
         cluster_of[r] = best;
       }
+      stage.advance(end - begin);
     });
   }
 };
@@ -171,15 +175,12 @@ Result<CpcaTransfer> compress_cpca(const Transfer& transfer, const CpcaOptions& 
     return Error{"rank", "must lie between 0 and 64, not " + std::to_string(options.rank)};
   if (options.iterations < 1 || options.iterations > 64)
     return Error{"iterations", "must lie between 1 and 64, not " + std::to_string(options.iterations)};
-  Compressor c{transfer, options};
+  ProgressStage stage(progress, "clustering", transfer.receivers * size_t(2 * options.iterations + 1));
+  Compressor c{transfer, options, stage};
   c.unpack();
   c.fit_all();
-  ProgressStage stage(progress, "clustering", size_t(options.iterations));
-  for (int i = 0; i < options.iterations; ++i) {
-    if (stage.cancelled()) return Error{"", "cancelled"};
-    c.assign(), c.fit_all();
-    stage.advance();
-  }
+  for (int i = 0; i < options.iterations && !stage.cancelled(); ++i) c.assign(), c.fit_all();
+  if (stage.cancelled()) return Error{"", "cancelled"};
 
   CpcaTransfer out;
   out.light = transfer.light, out.rows = transfer.rows, out.channels = transfer.channels,

@@ -5,6 +5,8 @@
 #include <lambent/compress/zonal_kernel.h>
 #include <lambent/core/parallel.h>
 
+#include <optional>
+
 namespace lambent {
 namespace {
 
@@ -160,7 +162,7 @@ double dot(const std::vector<double>& a, const std::vector<double>& b) {
 
 // Quasi-Newton steps with a short memory (L-BFGS; Nocedal and Wright, "Numerical Optimization", algorithm 7.4), which
 // scale axes against coefficients by themselves; the paper took conjugate gradients.
-void minimise(const TableFit& f, std::vector<double>& p, int iterations) {
+void minimise(const TableFit& f, std::vector<double>& p, int iterations, ProgressStage& stage) {
   constexpr size_t memory = 12;
   struct Step {
     std::vector<double> s, y;
@@ -169,7 +171,8 @@ void minimise(const TableFit& f, std::vector<double>& p, int iterations) {
   std::vector<Step> steps;
   std::vector<double> g, next_g, next(p.size());
   double psi = f(p, g);
-  for (int i = 0; i < iterations; ++i) {
+  for (int i = 0; i < iterations && !stage.cancelled(); ++i) {
+    stage.advance();
     std::vector<double> q = g, alpha(steps.size());
     for (size_t k = steps.size(); k-- > 0;) {
       alpha[k] = steps[k].rho * dot(steps[k].s, q);
@@ -184,7 +187,7 @@ void minimise(const TableFit& f, std::vector<double>& p, int iterations) {
     }
     const double slope = dot(g, q);
     double length = 1, next_psi = psi;
-    for (int halving = 0; halving < 30; ++halving, length *= 0.5) {
+    for (int halving = 0; halving < 30 && !stage.cancelled(); ++halving, length *= 0.5) {
       for (size_t j = 0; j < p.size(); ++j) next[j] = p[j] - length * q[j];
       next_psi = f(next, next_g);
       if (next_psi <= psi - 1e-4 * length * slope) break;
@@ -255,7 +258,9 @@ std::vector<float> simulate_wrinkle(int order, int count, float depth, float alb
   return {X.begin(), X.end()};
 }
 
-Result<WrinkleTable> make_wrinkle_table(const WrinkleOptions& o) {
+namespace {
+
+Result<void> check_options(const WrinkleOptions& o) {
   if (o.order < 3 || o.order > max_sh_order)
     return Error{"order", "must lie between 3 and " + std::to_string(max_sh_order)};
   if (o.lobes < 3 || o.lobes > max_zonal_lobes)
@@ -263,11 +268,48 @@ Result<WrinkleTable> make_wrinkle_table(const WrinkleOptions& o) {
   if (o.size < 3 || o.size > 256) return Error{"size", "must lie between 3 and 256"};
   if (!(o.max_depth > 0 && o.max_depth <= 10)) return Error{"depth", "must be above 0 and at most 10"};
   if (!(o.albedo >= 0 && o.albedo < 1)) return Error{"albedo", "must lie from 0 to below 1"};
+  return {};
+}
+
+using Axes = std::vector<Vec3d>;
+
+// The linear lobe, and others symmetric about it in the cross-section and along the groove.
+std::vector<Axes> first_axes(const std::vector<float>& t, size_t lobes) {
+  const Vec3d axis(linear_axis(t)), along(0, 1, 0), across = normalize(cross(along, axis));
+  std::vector<Axes> all;
+  for (double angle = 0.2; angle < 1.5; angle += 0.1)
+    for (const Vec3d& side : {across, along}) {
+      Axes& from = all.emplace_back(Axes{axis});
+      for (size_t i = 1; i < lobes; ++i) {
+        const double a = angle * double((i + 1) / 2) * (i % 2 ? 1 : -1);
+        from.push_back(normalize(axis * std::cos(a) + side * std::sin(a)));
+      }
+    }
+  return all;
+}
+
+// [depth][place][order^2], twice as fine as the table. Errors: cancelled.
+Result<std::vector<float>> simulate_all(const WrinkleOptions& o, Progress* progress) {
+  const int fine = 2 * o.size - 1;
+  std::vector<float> all;
+  ProgressStage stage(progress, "grooves", size_t(fine));
+  for (int d = 0; d < fine && !stage.cancelled(); ++d) {
+    const std::vector<float> row = simulate_wrinkle(o.order, fine, o.max_depth * float(d) / float(fine - 1), o.albedo);
+    all.insert(all.end(), row.begin(), row.end());
+    stage.advance();
+  }
+  if (stage.cancelled()) return Error{"", "cancelled"};
+  return all;
+}
+
+}  // namespace
+
+Result<WrinkleTable> make_wrinkle_table(const WrinkleOptions& o, Progress* progress) {
+  if (auto ok = check_options(o); !ok) return ok.error();
   const size_t n = size_t(o.size), C = size_t(sh_count(o.order)), N = size_t(o.lobes);
   WritableZonalTransfer out = make_zonal_transfer(o.order, o.lobes, 1, n * n, Precision::single);
   const int exact = out.transfer.exact_bands();
   ZonalBatch batch = make_zonal_batch(o.order, exact, 1, o.lobes);  // all lanes alike
-  using Axes = std::vector<Vec3d>;
   std::vector<Axes> above(n), row(n);
   auto refine = [&](const std::vector<float>& t, const Axes& from, int iterations, Axes& to, std::vector<float>& g) {
     for (size_t k = 0; k < C; ++k) std::fill_n(batch.target(0, int(k)), zonal_lanes, double(t[k]));
@@ -283,20 +325,19 @@ Result<WrinkleTable> make_wrinkle_table(const WrinkleOptions& o) {
   };
   // Fits of their own first, each going on from its neighbours', from the deepest groove up.
   const size_t fine = 2 * n - 1;
-  std::vector<float> simulated;  // [depth][place][order^2], twice as fine
-  for (size_t d = 0; d < fine; ++d) {
-    const std::vector<float> row_of =
-        simulate_wrinkle(o.order, int(fine), o.max_depth * float(d) / float(fine - 1), o.albedo);
-    simulated.insert(simulated.end(), row_of.begin(), row_of.end());
-  }
+  auto simulated = simulate_all(o, progress);
+  if (!simulated) return simulated.error();
   auto target = [&](size_t d, size_t x) {  // of an entry
-    const auto at = simulated.begin() + ptrdiff_t((2 * d * fine + 2 * x) * C);
+    const auto at = simulated->begin() + ptrdiff_t((2 * d * fine + 2 * x) * C);
     return std::vector<float>(at, at + ptrdiff_t(C));
   };
   const size_t lobe = 3 + size_t(o.order - exact);
   std::vector<double> p(n * n * N * lobe);
+  std::optional<ProgressStage> stage(std::in_place, progress, "fitting lobes", n * n);
   for (size_t d = n; d-- > 0;) {
     for (size_t x = 0; x < n; ++x) {
+      if (stage->cancelled()) return Error{"", "cancelled"};
+      stage->advance();
       const std::vector<float> t = target(d, x);
       double best = INFINITY;
       std::vector<float> g, best_g;
@@ -307,19 +348,8 @@ Result<WrinkleTable> make_wrinkle_table(const WrinkleOptions& o) {
       };
       if (!above[x].empty()) attempt(Axes(above[x]));
       else if (x > 0) attempt(Axes(row[x - 1]));
-      else {
-        // The linear lobe, and others symmetric about it in the cross-section and along the groove.
-        const Vec3d axis(linear_axis(t)), along(0, 1, 0), across = normalize(cross(along, axis));
-        for (double angle = 0.2; angle < 1.5; angle += 0.1)
-          for (const Vec3d& side : {across, along}) {
-            Axes from{axis};
-            for (size_t i = 1; i < N; ++i) {
-              const double a = angle * double((i + 1) / 2) * (i % 2 ? 1 : -1);
-              from.push_back(normalize(axis * std::cos(a) + side * std::sin(a)));
-            }
-            attempt(from);
-          }
-      }
+      else
+        for (const Axes& from : first_axes(t, N)) attempt(from);
       for (size_t i = 0; i < N; ++i) {
         double* v = &p[((d * n + x) * N + i) * lobe];
         for (int k = 0; k < 3; ++k) v[k] = row[x][i][k];
@@ -328,7 +358,10 @@ Result<WrinkleTable> make_wrinkle_table(const WrinkleOptions& o) {
     }
     above = row;
   }
-  if (exact < o.order) minimise(TableFit(o.order, exact, N, n, simulated), p, o.iterations);
+  stage.emplace(progress, "fitting the table", size_t(o.iterations));
+  if (exact < o.order) minimise(TableFit(o.order, exact, N, n, *simulated), p, o.iterations, *stage);
+  if (stage->cancelled()) return Error{"", "cancelled"};
+  stage.reset();
 
   double error = 0, total = 0;
   for (size_t d = 0; d < n; ++d)

@@ -1,6 +1,7 @@
 #pragma once
 // The wrinkle: a groove of cosine shape in a plane, as a table of zonal lobes over the place across it and its depth.
 // Source: local-deformable-prt, section 4.2 (wrinkle model).
+#include <lambent/core/progress.h>
 #include <lambent/transfer/zonal_texture.h>
 
 namespace lambent {
@@ -25,6 +26,6 @@ struct WrinkleTable {
 };
 // Lobes of neighbours correspond, and all entries are fitted together to what lies between them, so that the table can
 // be interpolated. Errors: options out of range.
-Result<WrinkleTable> make_wrinkle_table(const WrinkleOptions& options);
+Result<WrinkleTable> make_wrinkle_table(const WrinkleOptions& options, Progress* progress = nullptr);
 
 }  // namespace lambent

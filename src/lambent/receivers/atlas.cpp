@@ -217,7 +217,7 @@ Result<Fit> fit_size(const Layout& layout, const AtlasOptions& o) {
 }
 
 // Triangles that cover texels of their chart which others cover already, at this density; they move one layer up.
-size_t part_overlaps(const Layout& layout, double density, std::vector<uint8_t>& layers) {
+size_t part_overlaps(const Layout& layout, double density, std::vector<uint8_t>& layers, ProgressStage& stage) {
   const size_t triangles = layout.charts.of_triangle.size();
   std::vector<uint32_t> first(layout.charts.count + 1, 0), members(triangles);
   for (uint32_t c : layout.charts.of_triangle)
@@ -228,7 +228,8 @@ size_t part_overlaps(const Layout& layout, double density, std::vector<uint8_t>&
     if (layout.charts.of_triangle[t] != none) members[next[layout.charts.of_triangle[t]]++] = t;
   size_t moved = 0;
   std::vector<uint8_t> taken;
-  for (uint32_t c = 0; c < layout.charts.count; ++c) {
+  for (uint32_t c = 0; c < layout.charts.count && !stage.cancelled(); ++c) {
+    stage.advance(first[c + 1] - first[c]);
     if (first[c + 1] - first[c] < 2) continue;
     const int w = int(std::ceil(double(layout.flat.size[c].x) * density)) + 1,
               h = int(std::ceil(double(layout.flat.size[c].y) * density)) + 1;
@@ -313,7 +314,7 @@ Result<void> check_options(const Scene& scene, const AtlasOptions& o) {
 
 }  // namespace
 
-Result<Atlas> make_atlas(Scene& scene, const AtlasOptions& o) {
+Result<Atlas> make_atlas(Scene& scene, const AtlasOptions& o, Progress* progress) {
   if (auto ok = check_options(scene, o); !ok) return ok.error();
   Atlas atlas;
   if (o.reuse) {
@@ -331,12 +332,16 @@ Result<Atlas> make_atlas(Scene& scene, const AtlasOptions& o) {
   std::vector<uint8_t> layers(scene.triangles.size(), 0);
   Fit fit;
   for (int round = 0;; ++round) {
+    ProgressStage stage(progress, "charts, round " + std::to_string(round + 1), scene.triangles.size());
     layout.cut(scene, layers);
+    if (stage.cancelled()) return Error{"", "cancelled"};
     auto fitted = o.texels_per_unit > 0 ? fit_density(layout, o) : fit_size(layout, o);
     if (!fitted) return fitted.error();
     fit = std::move(*fitted);
     if (auto ok = check_texels(fit.width, o.height ? o.height : fit.packing.height, o); !ok) return ok.error();
-    if (round == most_layers || part_overlaps(layout, fit.density, layers) == 0) break;
+    const size_t parted = round == most_layers ? 0 : part_overlaps(layout, fit.density, layers, stage);
+    if (stage.cancelled()) return Error{"", "cancelled"};
+    if (parted == 0) break;
   }
   atlas.charts = layout.charts.count, atlas.texels_per_unit = float(fit.density);
   atlas.width = fit.width;

@@ -1,5 +1,6 @@
 #pragma once
 // A lightmap's atlas: where in a picture each side of each triangle has its texels.
+#include <lambent/core/progress.h>
 #include <lambent/core/result.h>
 #include <lambent/receivers/receivers.h>
 
@@ -27,8 +28,8 @@ struct Atlas {
 // charts (charts.h), packs them, splits vertices where charts part and writes TEXCOORD_1: front / (width, height).
 // Backs of two-sided triangles get places of their own. Splitting changes the scene's vertices. Errors: options out of
 // range; an atlas too small or too large (says the size needed); a material whose base colour, normals or emission read
-// TEXCOORD_1, which then cannot be replaced.
-Result<Atlas> make_atlas(Scene& scene, const AtlasOptions& options);
+// TEXCOORD_1, which then cannot be replaced; cancelled.
+Result<Atlas> make_atlas(Scene& scene, const AtlasOptions& options, Progress* progress = nullptr);
 
 // A receiver for every texel whose tent reaches the surface: at its centre, or, for texels partly covered, at the
 // surface's point closest to it, moved a hair inwards.

@@ -32,7 +32,8 @@ struct EdgeSide {
 }  // namespace
 
 size_t smooth_seams(const Scene& scene, const TexelReceivers& texels, float* values, size_t stride, size_t width,
-                    float cosine, float keep) {
+                    float cosine, float keep, Progress* progress) {
+  ProgressStage stage(progress, "seams", most_steps);
   const std::vector<uint32_t> ids = number_positions(scene.positions).ids;
   std::vector<EdgeSide> edges;
   for (uint32_t i = 0; i < scene.triangles.size(); ++i)
@@ -111,7 +112,8 @@ size_t smooth_seams(const Scene& scene, const TexelReceivers& texels, float* val
   };
   std::vector<double> rr = squares(r, r);
   const std::vector<double> first = rr;
-  for (int step = 0; step < most_steps; ++step) {
+  for (int step = 0; step < most_steps && !stage.cancelled(); ++step) {
+    stage.advance();
     normal_product(p, Ap);
     for (size_t i = 0; i < n * width; ++i) Ap[i] += double(keep) * p[i];
     const std::vector<double> pAp = squares(p, Ap);

@@ -36,7 +36,7 @@ Result<void> trace_pixels(const Scene& scene, const Tracer& tracer, const Camera
     const VisitPixel visit = make_visit();
     std::vector<PixelRay> rays(size_t(options.samples));
     for (int y = int(begin); y < int(end); ++y)
-      for (int x = 0; x < options.width; ++x) {
+      for (int x = 0; x < options.width && !stage.cancelled(); ++x) {
         const uint32_t key = uint32_t(hash64(uint64_t(y) << 32 | uint64_t(x), 0xf11));
         for (int s = 0; s < options.samples; ++s) {
           const Vec2 jitter = sobol_owen(uint32_t(s), key);

@@ -8,6 +8,23 @@
 #include <cstring>
 
 namespace lambent {
+namespace {
+
+constexpr size_t build_units = 1000;  // of progress
+
+struct Build {
+  ProgressStage stage;
+  size_t done = 0;
+  // Called by the thread that builds. False: stop.
+  static bool advance(void* user, double share) {
+    Build& b = *static_cast<Build*>(user);
+    const size_t reached = size_t(std::clamp(share, 0.0, 1.0) * double(build_units));
+    if (reached > b.done) b.stage.advance(reached - b.done), b.done = reached;
+    return !b.stage.cancelled();
+  }
+};
+
+}  // namespace
 
 struct Tracer::Impl {
   RTCDevice device = nullptr;
@@ -19,7 +36,7 @@ struct Tracer::Impl {
   }
 };
 
-Result<Tracer> Tracer::build(const Scene& scene) {
+Result<Tracer> Tracer::build(const Scene& scene, Progress* progress) {
   auto impl = std::make_shared<Impl>();
   impl->device = rtcNewDevice(nullptr);
   if (!impl->device) return Error{scene.path, "the ray tracer could not start"};
@@ -45,6 +62,8 @@ Result<Tracer> Tracer::build(const Scene& scene) {
   std::copy(scene.positions.begin(), scene.positions.end(), positions);
   for (size_t i = 0; i < scene.triangles.size(); ++i)
     std::memcpy(indices + 3 * i, scene.triangles[i].v, 3 * sizeof(uint32_t));
+  Build building{{progress, "ray tree", build_units}};
+  rtcSetSceneProgressMonitorFunction(impl->scene, Build::advance, &building);
   // A build on many threads may order the leaves differently from run to run, and with them the winner of exact ties.
   run_serially([&] {
     rtcCommitGeometry(mesh);
@@ -52,6 +71,8 @@ Result<Tracer> Tracer::build(const Scene& scene) {
     rtcReleaseGeometry(mesh);
     rtcCommitScene(impl->scene);
   });
+  rtcSetSceneProgressMonitorFunction(impl->scene, nullptr, nullptr);
+  if (is_cancelled(progress)) return Error{"", "cancelled"};
   if (rtcGetDeviceError(impl->device) != RTC_ERROR_NONE) return Error{scene.path, "out of memory for the ray tracer"};
   Tracer tracer;
   tracer.impl_ = std::move(impl);

@@ -1,5 +1,6 @@
 #pragma once
 // Rays against the scene: the only place of the baker and the renderer that knows Embree.
+#include <lambent/core/progress.h>
 #include <lambent/core/result.h>
 #include <lambent/scene/scene.h>
 
@@ -25,8 +26,8 @@ struct Hit {
 class Tracer {
  public:
   // Builds the acceleration structure; the result does not depend on the number of threads. The scene must outlive it
-  // and keep its triangles. Errors: out of memory.
-  static Result<Tracer> build(const Scene& scene);
+  // and keep its triangles. Errors: out of memory; cancelled.
+  static Result<Tracer> build(const Scene& scene, Progress* progress = nullptr);
 
   // visible[i] = 1 where the ray from `origin` along direction i leaves the scene, else 0.
   void visible_fan(Vec3 origin, const Directions& directions, float* visible) const;

@@ -1,0 +1,69 @@
+#include <lambent/bake/response.h>
+#include <lambent/brdf/load_measured.h>
+#include <lambent/brdf/measured.h>
+#include <lambent/core/sampling.h>
+
+#include <gtest/gtest.h>
+
+namespace lambent {
+namespace {
+
+// O_j(wo) = integral of f z_j cos by cosine-distributed points: no use of the BRDF's own sampling, of symmetries or of
+// moments.
+std::vector<Vec4d> plain_response(const LinearMaterial& m, const CosineBasis& basis, Vec3 wo, uint32_t points) {
+  std::vector<Vec4d> O(size_t(basis.count()), Vec4d(0.0));
+  std::vector<float> z(O.size());
+  for (uint32_t i = 0; i < points; ++i) {
+    const Vec3 wi = square_to_cosine_hemisphere(sobol_owen(i, 77));
+    const Vec3 a = evaluate(m.black, wi, wo) * pi, both = evaluate(m.white, wi, wo) * pi;
+    evaluate_cosine_basis(basis, wi, z);
+    for (size_t j = 0; j < z.size(); ++j) O[j] += Vec4d(a, luminance(both - a)) * (double(z[j]) / points);
+  }
+  return O;
+}
+
+LinearMaterial same(const Brdf& brdf) { return {brdf, brdf}; }
+
+TEST(Response, IsTheIntegralInEveryView) {
+  auto table = std::make_shared<MeasuredTable>();
+  table->theta_h = 30, table->theta_d = 8, table->phi_d = 8;
+  for (int h = 0; h < table->theta_h; ++h)
+    for (int d = 0; d < table->theta_d; ++d)
+      for (int p = 0; p < table->phi_d; ++p) {
+        const float slope = std::tan(std::min(cell_angles(*table, h, d, p).theta_h, 1.5f)) / 0.4f;
+        table->f.push_back(Vec3(0.15f, 0.1f, 0.05f) + Vec3(0.5f, 0.4f, 0.6f) * std::exp(-slope * slope));
+      }
+  prepare_sampling(*table);
+  const MetallicRoughness black{Vec3(0), 0.3f, 0.6f}, white{Vec3(1), 0.3f, 0.6f};
+  const std::vector<LinearMaterial> materials{
+      {Lambert{Vec3(0)}, Lambert{Vec3(1)}},
+      same(Phong{Vec3(0.3f, 0.2f, 0.1f), Vec3(0.7f, 0.6f, 0.2f), 8}),
+      same(Ggx{Vec3(0.9f, 0.6f, 0.3f), Vec2(0.5f)}),
+      same(Ggx{Vec3(0.9f, 0.6f, 0.3f), Vec2(0.3f, 0.8f)}),
+      same(Ward{Vec3(0.3f, 0.2f, 0.1f), Vec3(0.7f, 0.5f, 0.3f), Vec2(0.6f, 0.25f)}),
+      same(CookTorrance{Vec3(0.3f), Vec3(0.6f), Vec3(0.5f), 0.4f}),
+      {black, white},
+      same(Measured{table}),
+  };
+  const CosineBasis basis = make_cosine_basis(4);
+  for (int grid : {8, 9}) {  // without a node in the middle, and with one
+    auto maps = make_responses(materials, basis, grid, 4096);
+    ASSERT_TRUE(maps);
+    ASSERT_EQ(maps->size(), materials.size());
+    for (size_t m = 0; m < materials.size(); ++m)
+      // One node of each quadrant and the ones next to the middle, on both diagonals; the horizon apart.
+      for (const auto& [x, y] : {std::pair(2, 3), std::pair(5, 2), std::pair(1, 6), std::pair(6, 5), std::pair(4, 4),
+                                 std::pair(3, 4), std::pair(2, 2), std::pair(5, 5)}) {
+        const Vec3 wo = view_map_direction(grid, x, y);
+        const std::vector<Vec4d> expected = plain_response(materials[m], basis, wo, 1 << 15);
+        for (size_t j = 0; j < expected.size(); ++j)
+          for (int c = 0; c < 4; ++c)
+            EXPECT_NEAR(double((*maps)[m].values[(size_t(y) * size_t(grid) + size_t(x)) * expected.size() + j][c]),
+                        expected[j][c], 0.004)
+                << "material " << m << " view " << x << ", " << y << " of " << grid << " row " << j << " part " << c;
+      }
+  }
+}
+
+}  // namespace
+}  // namespace lambent
