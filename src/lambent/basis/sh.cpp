@@ -1,59 +1,9 @@
-// Follows: P.-P. Sloan, "Stupid spherical harmonics tricks" (2008); normalised Legendre recurrences as in any text on
-// geodesy, with sin^m(theta) cos/sin(m phi) taken from powers of (x + iy) so that no angle is computed.
-#include <lambent/basis/sh_tables.h>
+#include <lambent/basis/sh.h>
 #include <lambent/core/check.h>
 
 #include <array>
 
 namespace lambent {
-namespace {
-
-constexpr int n_max = max_sh_order;
-
-ShTables make_tables() {
-  ShTables t{};
-  double q = std::sqrt(1 / (4 * std::numbers::pi));
-  for (int m = 0; m < n_max; ++m) {
-    t.diagonal[m] = q * (m > 0 ? std::numbers::sqrt2 : 1.0) * (m % 2 ? -1.0 : 1.0);  // sqrt 2 and Condon-Shortley sign
-    q *= std::sqrt((2.0 * m + 3) / (2.0 * m + 2));
-    for (int l = m + 1; l < n_max; ++l) {
-      double l2 = double(l) * l, m2 = double(m) * m, k = double(l - 1) * (l - 1);
-      t.a[l][m] = std::sqrt((4 * l2 - 1) / (l2 - m2));
-      t.b[l][m] = l > m + 1 ? -std::sqrt((2.0 * l + 1) * (k - m2) / ((2.0 * l - 3) * (l2 - m2))) : 0.0;
-    }
-  }
-  return t;
-}
-
-template <class T>
-void evaluate(int order, T x, T y, T z, std::span<T> out) {
-  LAMBENT_CHECK(order >= 0 && order <= n_max && out.size() >= size_t(sh_count(order)));
-  const ShTables& t = sh_tables();
-  T c = 1, s = 0;  // real and imaginary part of (x + iy)^m
-  for (int m = 0; m < order; ++m) {
-    T q1 = T(t.diagonal[m]), q2 = 0;
-    for (int l = m; l < order; ++l) {
-      if (l > m) {
-        T q = z * T(t.a[l][m]) * q1 + T(t.b[l][m]) * q2;
-        q2 = q1, q1 = q;
-      }
-      out[size_t(sh_index(l, m))] = q1 * c;
-      if (m > 0) out[size_t(sh_index(l, -m))] = q1 * s;
-    }
-    T next = c * x - s * y;
-    s = c * y + s * x, c = next;
-  }
-}
-
-}  // namespace
-
-const ShTables& sh_tables() {
-  static const ShTables t = make_tables();
-  return t;
-}
-
-void evaluate_sh(int order, Vec3 d, std::span<float> out) { evaluate<float>(order, d.x, d.y, d.z, out); }
-void evaluate_sh(int order, Vec3d d, std::span<double> out) { evaluate<double>(order, d.x, d.y, d.z, out); }
 
 std::vector<double> project_sh(int order, const std::function<double(Vec3d)>& f, int exact_order) {
   const int nodes = std::max(order, exact_order) + 1, turns = 2 * nodes;
@@ -86,12 +36,12 @@ std::vector<double> project_sh(int order, const std::function<double(Vec3d)>& f,
 
 int sh_order(size_t coefficient_count) {
   int order = int(std::lround(std::sqrt(double(coefficient_count))));
-  LAMBENT_CHECK(order >= 1 && order <= n_max && size_t(sh_count(order)) == coefficient_count);
+  LAMBENT_CHECK(order >= 1 && order <= max_sh_order && size_t(sh_count(order)) == coefficient_count);
   return order;
 }
 
 float reconstruct_sh(std::span<const float> c, Vec3 d) {
-  std::array<float, sh_count(n_max)> y;
+  std::array<float, sh_count(max_sh_order)> y;
   evaluate_sh(sh_order(c.size()), d, y);
   float sum = 0;
   for (size_t i = 0; i < c.size(); ++i) sum += c[i] * y[i];
@@ -99,7 +49,7 @@ float reconstruct_sh(std::span<const float> c, Vec3 d) {
 }
 
 Vec3 reconstruct_sh(std::span<const Vec3> c, Vec3 d) {
-  std::array<float, sh_count(n_max)> y;
+  std::array<float, sh_count(max_sh_order)> y;
   evaluate_sh(sh_order(c.size()), d, y);
   Vec3 sum(0.0f);
   for (size_t i = 0; i < c.size(); ++i) sum += c[i] * y[i];

@@ -24,6 +24,11 @@ constexpr int sh_band(int index) {
 // Values of the first order^2 harmonics at the unit direction d, into out[0 .. order^2); of none for order 0.
 void evaluate_sh(int order, Vec3 d, std::span<float> out);
 void evaluate_sh(int order, Vec3d d, std::span<double> out);
+// The same for many unit directions (x[i], y[i], z[i]) in SIMD lanes, to the same bits: harmonic k of direction i goes
+// to out[k * stride + i], stride >= x.size(); out may not overlap the directions. Fastest where out stays in the
+// first-level cache, begins on a cache line and the stride is a multiple of 16 but not of 1024 (docs/products.md).
+void evaluate_sh(int order, std::span<const float> x, std::span<const float> y, std::span<const float> z, size_t stride,
+                 std::span<float> out);
 
 // Coefficients of a function of direction by quadrature that is exact for functions within `exact_order` bands
 // (Gauss-Legendre in z, even spacing about it).

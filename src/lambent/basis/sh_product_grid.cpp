@@ -1,12 +1,20 @@
-// multiply_sh: orders 2 and 3 in closed form, all others on a grid. A degree of a + b + c - 3 in z (all orders) needs
-// (a + b + c - 1) / 2 Gauss-Legendre nodes, rounded down; the same azimuthal frequency needs a + b + c - 2 equal steps.
-// Steps come in fours, phi, -phi, pi - phi, pi + phi, which share one set of sums over even and odd cosines and sines.
-// SIMD lanes hold nodes of z on the way out and degrees on the way back.
+// multiply_sh: order 2 in closed form, 3 and 4 on pairs of opposite points, all others on a grid.
+//
+// Pairs: at d and -d bands of even degree agree and those of odd degree are opposite, so a function is its even part e
+// and odd part o at half of the points, and a product has the parts e e' + o o' and e o' + o e'. Lebedev's rules of 26
+// points (exact to degree 7) and 38 (degree 9) have weights in closed form; products need degree 6 and 9.
+//
+// Grid: a degree of a + b + c - 3 in z (all orders) needs (a + b + c - 1) / 2 Gauss-Legendre nodes, rounded down; the
+// same azimuthal frequency needs a + b + c - 2 equal steps. Steps come in fours, phi, -phi, pi - phi, pi + phi, which
+// share one set of sums over even and odd cosines and sines. SIMD lanes hold nodes of z on the way out and degrees on
+// the way back.
 #include <lambent/basis/quadrature.h>
 #include <lambent/basis/sh_product.h>
+#include <lambent/basis/sh_tables.h>
 #include <lambent/core/check.h>
 
 #include <array>
+#include <cstring>
 #include <memory>
 #include <mutex>
 
@@ -14,6 +22,7 @@
 #define HWY_TARGET_INCLUDE "lambent/basis/sh_product_grid.cpp"
 #include <hwy/foreach_target.h>
 #include <hwy/highway.h>
+#include <lambent/basis/everywhere-inl.h>
 
 #ifndef LAMBENT_SH_PRODUCT_GRID
 #define LAMBENT_SH_PRODUCT_GRID
@@ -21,6 +30,76 @@ namespace lambent {
 namespace {
 
 constexpr size_t grid_lanes = 8;
+
+// Coefficients by the parity of their band, the first `evens` or `odds` of a list for the order. Sums over pairs come
+// out in three vectors: of even bands 0, 8, -, -, 4 .. 7, of odd ones -, 1, 2, 3 and -, 9 .. 15.
+template <int order>
+struct PairSizes {
+  static constexpr size_t pairs = order == 3 ? 13 : 19, padded = (pairs + grid_lanes - 1) / grid_lanes * grid_lanes;
+  static constexpr int evens = 6, odds = order == 3 ? 3 : 10, vectors = order == 3 ? 2 : 3;
+};
+constexpr int even_coefficients[] = {0, 4, 5, 6, 7, 8}, odd_coefficients[] = {1, 2, 3, 9, 10, 11, 12, 13, 14, 15};
+constexpr int pair_sums[3 * grid_lanes] = {0,  8,  -1, -1, 4,  5, 6,  7,  -1, 1,  2,  3,
+                                           -1, -1, -1, -1, -1, 9, 10, 11, 12, 13, 14, 15};
+
+template <int order>
+struct ProductPairs {
+  using Sizes = PairSizes<order>;
+  alignas(64) float values[(Sizes::evens + Sizes::odds) * Sizes::padded]{};  // [even, then odd coefficient][pair]
+  alignas(64) float back[Sizes::pairs * Sizes::vectors * grid_lanes]{};      // [pair][sum], weights included
+};
+
+// The recurrence of sh_tables.h, for the compiler.
+template <int order>
+constexpr std::array<double, sh_count(order)> harmonics(double x, double y, double z) {
+  std::array<double, sh_count(order)> values{};
+  double c = 1, s = 0;
+  for (int m = 0; m < order; ++m) {
+    double q = sh_tables().diagonal[m], below = 0;
+    for (int l = m; l < order; ++l) {
+      if (l > m) {
+        const double next = sh_tables().a[l][m] * z * q + sh_tables().b[l][m] * below;
+        below = q, q = next;
+      }
+      values[size_t(sh_index(l, -m))] = q * s, values[size_t(sh_index(l, m))] = q * c;
+    }
+    const double next = c * x - s * y;
+    s = c * y + s * x, c = next;
+  }
+  return values;
+}
+
+// From one of each two opposite points of Lebedev's rule; the weights of a rule sum to 1. Source: V. I. Lebedev,
+// "Quadratures on a sphere", USSR Comput. Math. Math. Phys. 16 (1976).
+template <int order>
+constexpr ProductPairs<order> make_product_pairs() {
+  using Sizes = PairSizes<order>;
+  ProductPairs<order> t;
+  size_t pair = 0;
+  auto add = [&](double x, double y, double z, double weight) {
+    const auto values = harmonics<order>(x, y, z);
+    for (size_t i = 0; i < Sizes::evens; ++i)
+      t.values[i * Sizes::padded + pair] = float(values[size_t(even_coefficients[i])]);
+    for (size_t i = 0; i < Sizes::odds; ++i)
+      t.values[(Sizes::evens + i) * Sizes::padded + pair] = float(values[size_t(odd_coefficients[i])]);
+    for (size_t i = 0, n = Sizes::vectors * grid_lanes; i < n; ++i)
+      if (pair_sums[i] >= 0) t.back[pair * n + i] = float(8 * std::numbers::pi * weight * values[size_t(pair_sums[i])]);
+    ++pair;
+  };
+  const double axis = order == 3 ? 1.0 / 21 : 1.0 / 105, r = constant_sqrt(1.0 / 3), h = constant_sqrt(0.5);
+  add(1, 0, 0, axis), add(0, 1, 0, axis), add(0, 0, 1, axis);
+  for (double x : {-r, r})
+    for (double y : {-r, r}) add(x, y, r, 9.0 / 280);
+  const double p = order == 3 ? h : constant_sqrt((1 + r) / 2), q = order == 3 ? h : constant_sqrt((1 - r) / 2);
+  const double edge = order == 3 ? 4.0 / 105 : 1.0 / 35;
+  for (double sign : {-1.0, 1.0}) {
+    add(p, sign * q, 0, edge), add(0, p, sign * q, edge), add(sign * q, 0, p, edge);
+    if (order > 3) add(q, sign * p, 0, edge), add(0, q, sign * p, edge), add(sign * p, 0, q, edge);
+  }
+  return t;
+}
+template <int order>
+inline constexpr ProductPairs<order> product_pairs = make_product_pairs<order>();
 
 struct ProductGrid {
   int a, b, c;                    // orders
@@ -137,9 +216,66 @@ void MultiplyOnGrid(const ProductGrid& g, const float* a, const float* b, float*
     }
 }
 
+// Adds what the pairs from p on have to the sums, of which there are two sets in turn, so that they wait less for one
+// another.
+template <int order, size_t p>
+HWY_INLINE void AddPairs(const V* HWY_RESTRICT even, const V* HWY_RESTRICT odd, V* HWY_RESTRICT sums,
+                         V* HWY_RESTRICT next) {
+  using Sizes = PairSizes<order>;
+  if constexpr (p < Sizes::pairs) {
+    const F d;
+    constexpr size_t lanes = hn::MaxLanes(F()), width = grid_lanes / lanes;
+    const V e = Everywhere<p>(d, even), o = Everywhere<p>(d, odd);
+    const float* back = product_pairs<order>.back + p * Sizes::vectors * grid_lanes;
+    for (size_t v = 0; v < Sizes::vectors * width; ++v)
+      sums[v] = hn::MulAdd(v < width ? e : o, hn::Load(d, back + v * lanes), sums[v]);
+    AddPairs<order, p + 1>(even, odd, next, sums);
+  }
+}
+
+template <int order>
+HWY_INLINE void MultiplyOnPairs(const float* a, const float* b, float* out) {
+  using Sizes = PairSizes<order>;
+  const F d;
+  constexpr size_t lanes = hn::MaxLanes(F()), parts = Sizes::padded / lanes, width = grid_lanes / lanes;
+  V ea[parts], eb[parts], oa[parts], ob[parts];
+  for (size_t p = 0; p < parts; ++p) ea[p] = eb[p] = oa[p] = ob[p] = hn::Zero(d);
+  const float* row = product_pairs<order>.values;
+  for (int i = 0; i < Sizes::evens; ++i, row += Sizes::padded) {
+    const V ca = hn::Set(d, a[even_coefficients[i]]), cb = hn::Set(d, b[even_coefficients[i]]);
+    for (size_t p = 0; p < parts; ++p) {
+      const V y = hn::Load(d, row + p * lanes);
+      ea[p] = hn::MulAdd(ca, y, ea[p]), eb[p] = hn::MulAdd(cb, y, eb[p]);
+    }
+  }
+  for (int i = 0; i < Sizes::odds; ++i, row += Sizes::padded) {
+    const V ca = hn::Set(d, a[odd_coefficients[i]]), cb = hn::Set(d, b[odd_coefficients[i]]);
+    for (size_t p = 0; p < parts; ++p) {
+      const V y = hn::Load(d, row + p * lanes);
+      oa[p] = hn::MulAdd(ca, y, oa[p]), ob[p] = hn::MulAdd(cb, y, ob[p]);
+    }
+  }
+  V even[parts], odd[parts];
+  for (size_t p = 0; p < parts; ++p) {
+    even[p] = hn::MulAdd(ea[p], eb[p], hn::Mul(oa[p], ob[p]));
+    odd[p] = hn::MulAdd(ea[p], ob[p], hn::Mul(oa[p], eb[p]));
+  }
+  V first[Sizes::vectors * width], second[Sizes::vectors * width];
+  for (size_t v = 0; v < Sizes::vectors * width; ++v) first[v] = second[v] = hn::Zero(d);
+  AddPairs<order, 0>(even, odd, first, second);
+  HWY_ALIGN float result[Sizes::vectors * grid_lanes];
+  for (size_t v = 0; v < Sizes::vectors * width; ++v) hn::Store(hn::Add(first[v], second[v]), d, result + v * lanes);
+  out[0] = result[0], out[8] = result[1];  // as pair_sums says; a loop over it would become a slow scatter
+  std::memcpy(out + 4, result + 4, 4 * sizeof(float));
+  std::memcpy(out + 1, result + 9, 3 * sizeof(float));
+  if (order == 4) std::memcpy(out + 9, result + 17, 7 * sizeof(float));
+}
+
+void MultiplyOrder3(const float* a, const float* b, float* out) { MultiplyOnPairs<3>(a, b, out); }
+void MultiplyOrder4(const float* a, const float* b, float* out) { MultiplyOnPairs<4>(a, b, out); }
+
 void MultiplySh(const ProductGrid& g, const float* a, const float* b, float* out) {
   switch (g.a == g.b && g.b == g.c ? g.a : 0) {
-    case 4: return MultiplyOnGrid<4>(g, a, b, out);
     case 5: return MultiplyOnGrid<5>(g, a, b, out);
     case 6: return MultiplyOnGrid<6>(g, a, b, out);
     case 7: return MultiplyOnGrid<7>(g, a, b, out);
@@ -158,6 +294,8 @@ namespace lambent {
 namespace {
 
 HWY_EXPORT(MultiplySh);
+HWY_EXPORT(MultiplyOrder3);
+HWY_EXPORT(MultiplyOrder4);
 
 ProductGrid make_product_grid(int a, int b, int c) {
   ProductGrid g{a, b, c, 0, 0, 0, {}, {}, {}};
@@ -198,66 +336,15 @@ const ProductGrid& product_grid(int a, int b, int c) {
   return *slot.grid;
 }
 
-// f = constant + vector . d + d . tensor d for functions of order up to 3; the tensor is symmetric and traceless.
-struct Quadratic {
-  float constant = 0;
-  Vec3 vector{0.0f};
-  float xx = 0, yy = 0, zz = 0, xy = 0, yz = 0, xz = 0;
-};
-// The factors of 1, x, xy and (3 z^2 - 1) / 2 in y_00, y_11, y_2-2 and y_20.
-constexpr float k0 = 0.28209479f, k1 = 0.48860251f, k2 = 1.09254843f, k20 = 0.63078313f;
-
-Quadratic quadratic(const float* f) {
-  const float half = 0.5f * k2, axis = -0.5f * k20 * f[6];
-  return {k0 * f[0],          k1 * Vec3(-f[3], -f[1], f[2]),
-          axis + half * f[8], axis - half * f[8],
-          k20 * f[6],         half * f[4],
-          -half * f[5],       -half * f[7]};
-}
-
-// With <> the mean over the sphere, <di dj> = 1/3 delta and <di dj dk dl> = 1/15 (three pairs of deltas), the product's
-// parts are
-//   constant  c c' + v.v'/3 + 2/15 Q:Q'       vector  c v' + c' v + 2/5 (Q v' + Q' v)
-//   tensor    c Q' + c' Q + traceless symmetric part of (v v' + 4/7 Q Q').
-void multiply_quadratic(const float* f, const float* g, float* out) {
-  const Quadratic a = quadratic(f), b = quadratic(g);
-  auto times = [](const Quadratic& q, Vec3 v) {
-    return Vec3(q.xx * v.x + q.xy * v.y + q.xz * v.z, q.xy * v.x + q.yy * v.y + q.yz * v.z,
-                q.xz * v.x + q.yz * v.y + q.zz * v.z);
-  };
-  const float k = 4.0f / 7;
-  const float qx = a.xx * b.xx, qy = a.yy * b.yy, qz = a.zz * b.zz, rx = a.yz * b.yz, ry = a.xz * b.xz,
-              rz = a.xy * b.xy;
-  const Vec3 squares = a.vector * b.vector + k * Vec3(qx + ry + rz, qy + rx + rz, qz + rx + ry);
-  const float contraction = qx + qy + qz + 2 * (rx + ry + rz);
-  const float constant = a.constant * b.constant + (1.0f / 3) * dot(a.vector, b.vector) + (2.0f / 15) * contraction;
-  const Vec3 vector = a.constant * b.vector + b.constant * a.vector + 0.4f * (times(a, b.vector) + times(b, a.vector));
-  const float third = (1.0f / 3) * (squares.x + squares.y + squares.z);
-  const float xx = a.constant * b.xx + b.constant * a.xx + squares.x - third;
-  const float yy = a.constant * b.yy + b.constant * a.yy + squares.y - third;
-  const float zz = a.constant * b.zz + b.constant * a.zz + squares.z - third;
-  // (Q Q')_xy = xx xy' + xy yy' + xz yz', and so on; halves of the symmetric parts.
-  const float xy = a.constant * b.xy + b.constant * a.xy +
-                   0.5f * (a.vector.x * b.vector.y + a.vector.y * b.vector.x +
-                           k * ((a.xx + a.yy) * b.xy + a.xy * (b.xx + b.yy) + a.xz * b.yz + a.yz * b.xz));
-  const float yz = a.constant * b.yz + b.constant * a.yz +
-                   0.5f * (a.vector.y * b.vector.z + a.vector.z * b.vector.y +
-                           k * ((a.yy + a.zz) * b.yz + a.yz * (b.yy + b.zz) + a.xy * b.xz + a.xz * b.xy));
-  const float xz = a.constant * b.xz + b.constant * a.xz +
-                   0.5f * (a.vector.x * b.vector.z + a.vector.z * b.vector.x +
-                           k * ((a.xx + a.zz) * b.xz + a.xz * (b.xx + b.zz) + a.xy * b.yz + a.yz * b.xy));
-  out[0] = constant * (1 / k0);
-  out[1] = vector.y * (-1 / k1), out[2] = vector.z * (1 / k1), out[3] = vector.x * (-1 / k1);
-  out[4] = xy * (2 / k2), out[5] = yz * (-2 / k2), out[6] = zz * (1 / k20), out[7] = xz * (-2 / k2),
-  out[8] = (xx - yy) * (1 / k2);
-}
-
-// The same without quadratic parts.
+// Order 2: (a + v.d)(b + w.d) with <di dj> = 1/3 delta, and y_00 in front of every term. Four floats at once, as every
+// target has them: choosing one at run time would take longer.
 void multiply_linear(const float* f, const float* g, float* out) {
-  const float a = f[0], b = g[0];
-  const float dot = f[1] * g[1] + f[2] * g[2] + f[3] * g[3];
-  const float x = a * g[1] + b * f[1], y = a * g[2] + b * f[2], z = a * g[3] + b * f[3];
-  out[0] = k0 * (a * b + dot), out[1] = k0 * x, out[2] = k0 * y, out[3] = k0 * z;
+  typedef float Four __attribute__((vector_size(16)));
+  Four a, b;
+  std::memcpy(&a, f, sizeof a), std::memcpy(&b, g, sizeof b);
+  const Four product = a * b, rest = {product[1] + product[2] + (product[3] - product[0]), 0, 0, 0};
+  const Four result = 0.28209479f * (a[0] * b + b[0] * a + rest);
+  std::memcpy(out, &result, sizeof result);
 }
 
 // As sh_order, by a table: a square root would be a good part of a small product.
@@ -271,15 +358,28 @@ int order_of(size_t count) {
   return orders[count];
 }
 
+// Each apart, so that a small product does not save registers for a big one.
+[[gnu::noinline]] void multiply_order_3(const float* a, const float* b, float* out) {
+  HWY_DYNAMIC_DISPATCH(MultiplyOrder3)(a, b, out);
+}
+[[gnu::noinline]] void multiply_order_4(const float* a, const float* b, float* out) {
+  HWY_DYNAMIC_DISPATCH(MultiplyOrder4)(a, b, out);
+}
+[[gnu::noinline]] void multiply_on_grid(std::span<const float> a, std::span<const float> b, std::span<float> out) {
+  const ProductGrid& g = product_grid(order_of(a.size()), order_of(b.size()), order_of(out.size()));
+  HWY_DYNAMIC_DISPATCH(MultiplySh)(g, a.data(), b.data(), out.data());
+}
+
 }  // namespace
 
 void multiply_sh(std::span<const float> a, std::span<const float> b, std::span<float> out) {
-  if (a.size() == b.size() && a.size() == out.size()) {
-    if (a.size() == 4) return multiply_linear(a.data(), b.data(), out.data());
-    if (a.size() == 9) return multiply_quadratic(a.data(), b.data(), out.data());
+  const size_t count = out.size();
+  if (a.size() == count && b.size() == count) {
+    if (count == 4) return multiply_linear(a.data(), b.data(), out.data());
+    if (count == 9) return multiply_order_3(a.data(), b.data(), out.data());
+    if (count == 16) return multiply_order_4(a.data(), b.data(), out.data());
   }
-  const ProductGrid& g = product_grid(order_of(a.size()), order_of(b.size()), order_of(out.size()));
-  HWY_DYNAMIC_DISPATCH(MultiplySh)(g, a.data(), b.data(), out.data());
+  multiply_on_grid(a, b, out);
 }
 
 }  // namespace lambent

@@ -21,17 +21,11 @@ constexpr int class_source(int l, int c) {
 
 // Blocks of the +90 degree turn for l = 2 .. max_sh_order - 1, classes 0 .. 3, row-major, one after another.
 const std::vector<double>& quarter_turn_blocks();
-constexpr int block_offset(int l) {
-  int offset = 0;
-  for (int k = 2; k < l; ++k) offset += k * k + k + 1;
-  return offset;
-}
 
-// Bands first .. order - 1, here and below; first >= 2.
+// Bands 2 .. order - 1, here and below.
 template <class T>
-void quarter_turn(int first, int order, const T* blocks, bool back, const T* in, T* out) {
-  const T* block = blocks + block_offset(first);
-  for (int l = first; l < order; ++l)
+void quarter_turn(int order, const T* block, bool back, const T* in, T* out) {
+  for (int l = 2; l < order; ++l)
     for (int c = 0; c < 4; ++c) {
       const int source = class_source(l, c), n = class_size(l, c), centre = l * (l + 1);
       const int from = back ? c : source, to = back ? source : c;
@@ -53,7 +47,7 @@ void quarter_turn(int first, int order, const T* blocks, bool back, const T* in,
 // Two multiplications a multiple: cos(m+1)t + cos(m-1)t = 2 cos t cos mt, or cos(m+1)t - cos(m-1)t = -2 sin t sin mt,
 // whichever has the greater factor: each loses digits where its factor is small.
 template <class T>
-void turn_about_z(int first, int order, T cosine, T sine, T* f) {
+void turn_about_z(int order, T cosine, T sine, T* f) {
   auto size = [](T x) { return x < T(0) ? -x : x; };
   const bool by_sine = size(cosine) < size(sine);
   const T twice_cosine = cosine + cosine, twice_sine = sine + sine;
@@ -64,7 +58,7 @@ void turn_about_z(int first, int order, T cosine, T sine, T* f) {
       const T next_s = by_sine ? twice_cosine * s - s0 : s0 + twice_sine * c;
       c0 = c, s0 = s, c = next_c, s = next_s;
     }
-    for (int l = m < first ? first : m; l < order; ++l) {
+    for (int l = m < 2 ? 2 : m; l < order; ++l) {
       T& plus = f[l * (l + 1) + m];
       T& minus = f[l * (l + 1) - m];
       const T p = plus;
@@ -76,12 +70,12 @@ void turn_about_z(int first, int order, T cosine, T sine, T* f) {
 
 // angles are (cos, sin) of a, b, c; f has order^2 values and is rotated in place, scratch as many.
 template <class T>
-void rotate_bands(int first, int order, const T angles[6], const T* blocks, T* f, T* scratch) {
-  turn_about_z(first, order, angles[4], angles[5], f);
-  quarter_turn(first, order, blocks, false, f, scratch);
-  turn_about_z(first, order, angles[2], angles[3], scratch);
-  quarter_turn(first, order, blocks, true, scratch, f);
-  turn_about_z(first, order, angles[0], angles[1], f);
+void rotate_bands(int order, const T angles[6], const T* blocks, T* f, T* scratch) {
+  turn_about_z(order, angles[4], angles[5], f);
+  quarter_turn(order, blocks, false, f, scratch);
+  turn_about_z(order, angles[2], angles[3], scratch);
+  quarter_turn(order, blocks, true, scratch, f);
+  turn_about_z(order, angles[0], angles[1], f);
 }
 
 // All bands; R row-major, for the linear band, whose functions point along (-x, -y, z).
@@ -93,7 +87,7 @@ void rotate(int order, const T R[9], const T angles[6], const T* blocks, T* f, T
     f[1] = R[3] * x + R[4] * y - R[5] * z;
     f[2] = R[8] * z - R[6] * x - R[7] * y;
   }
-  if (order > 2) rotate_bands(2, order, angles, blocks, f, scratch);
+  if (order > 2) rotate_bands(order, angles, blocks, f, scratch);
 }
 
 }  // namespace lambent::zyz

@@ -1,6 +1,6 @@
-// Follows: local-deformable-prt (rotation by z-x-z-x-z). In SIMD lanes each class of a band (sh_rotation_zyz-inl.h), at
-// most four harmonics up to order 8, is one vector of four lanes, padded with zeros in the blocks: a turn about z has
-// no shuffles, and a quarter turn about x broadcasts lane after lane.
+// Follows: local-deformable-prt (rotation by z-x-z-x-z). In SIMD lanes each class of a band (sh_rotation_zyz-inl.h) is
+// one vector padded with zeros in the blocks, of four lanes up to band 7 and of eight above: a turn about z has no
+// shuffles, and a quarter turn about x broadcasts lane after lane.
 #include <lambent/basis/quadrature.h>
 #include <lambent/basis/sh_rotation_zyz-inl.h>
 #include <lambent/basis/sh_rotation_zyz.h>
@@ -14,6 +14,26 @@
 #define HWY_TARGET_INCLUDE "lambent/basis/sh_rotation_zyz.cpp"
 #include <hwy/foreach_target.h>
 #include <hwy/highway.h>
+#include <lambent/basis/everywhere-inl.h>
+
+#ifndef LAMBENT_SH_ROTATION_ZYZ
+#define LAMBENT_SH_ROTATION_ZYZ
+namespace lambent {
+namespace {
+
+constexpr int narrow_order = 8;  // bands below have classes of at most four
+
+// Blocks of the quarter turn, [forth and back][class][column][row] for each band: all as they are, and padded to 4 x 4
+// and 8 x 8. Classes have the sines of even m from m = 0 on when padded.
+struct RotationTables {
+  std::vector<float> blocks;
+  AlignedVector<float> narrow, wide;
+};
+constexpr size_t narrow_band = 8 * 4 * 4, wide_band = 8 * 8 * 8;
+
+}  // namespace
+}  // namespace lambent
+#endif
 
 HWY_BEFORE_NAMESPACE();
 namespace lambent {
@@ -23,12 +43,12 @@ namespace hn = hwy::HWY_NAMESPACE;
 
 #if HWY_TARGET == HWY_SCALAR
 // Without vectors this is the plain code.
-void RotateBands(int order, const EulerZyz& e, const float* blocks, const float*, const float* in, float* out) {
+void RotateBands(int order, const EulerZyz& e, const RotationTables& tables, const float* in, float* out) {
   const size_t count = size_t(sh_count(order));
   const float angles[6] = {e.cos_a, e.sin_a, e.cos_b, e.sin_b, e.cos_c, e.sin_c};
   float f[sh_count(max_sh_order)], scratch[sh_count(max_sh_order)];
   std::copy(in, in + count, f);
-  zyz::rotate_bands(2, order, angles, blocks, f, scratch);
+  zyz::rotate_bands(order, angles, tables.blocks.data(), f, scratch);
   std::copy(f + 4, f + count, out + 4);
 }
 #else
@@ -117,23 +137,132 @@ HWY_INLINE void RotateBand(const Turn turns[3], const float* HWY_RESTRICT column
   std::memcpy(out + l * l, sines + 7 - l, l * sizeof(float));
 }
 
-// Bands 2 and up, order 3 .. simd_order.
-void RotateBands(int order, const EulerZyz& e, const float*, const float* columns, const float* in, float* out) {
+// Bands 8 and up: the same with eight lanes a class, or twice four.
+using F8 = hn::CappedTag<float, 8>;
+using V8 = hn::Vec<F8>;
+constexpr size_t wide_lanes = hn::MaxLanes(F8()), wide_parts = 8 / wide_lanes;
+
+struct WideTurn {
+  V8 even_cos[wide_parts], even_sin[wide_parts], odd_cos[wide_parts], odd_sin[wide_parts];  // m = 0 2 .. 14, 1 3 .. 15
+};
+HWY_INLINE void Widen(const Turn& t, WideTurn& w) {
+  const F4 d;
+  // e^{8it} is the square of e^{4it}, which is lane 2 of the even ones.
+  const V4 c4 = hn::Broadcast<2>(t.even_cos), s4 = hn::Broadcast<2>(t.even_sin);
+  const V4 c8 = hn::NegMulAdd(s4, s4, hn::Mul(c4, c4)), s8 = hn::Mul(hn::Add(s4, s4), c4);
+  auto join = [](auto low, auto high, V8* out) {
+    if constexpr (wide_parts == 1) out[0] = hn::Combine(F8(), high, low);
+    else out[0] = low, out[1] = high;
+  };
+  join(t.even_cos, hn::NegMulAdd(t.even_sin, s8, hn::Mul(t.even_cos, c8)), w.even_cos);
+  join(t.even_sin, hn::MulAdd(t.even_cos, s8, hn::Mul(t.even_sin, c8)), w.even_sin);
+  join(t.odd_cos, hn::NegMulAdd(t.odd_sin, s8, hn::Mul(t.odd_cos, c8)), w.odd_cos);
+  join(t.odd_sin, hn::MulAdd(t.odd_cos, s8, hn::Mul(t.odd_sin, c8)), w.odd_sin);
+}
+
+// f is [class][part].
+HWY_INLINE void TurnAboutZ(const WideTurn& t, V8 f[4][wide_parts]) {
+  auto turn = [](V8 c, V8 s, V8& plus, V8& minus) {
+    const V8 p = plus;
+    plus = hn::NegMulAdd(minus, s, hn::Mul(p, c)), minus = hn::MulAdd(p, s, hn::Mul(minus, c));
+  };
+  for (size_t p = 0; p < wide_parts; ++p) {
+    turn(t.even_cos[p], t.even_sin[p], f[0][p], f[2][p]);
+    turn(t.odd_cos[p], t.odd_sin[p], f[1][p], f[3][p]);
+  }
+}
+
+// Columns k .. end - 1 of a padded block.
+template <size_t k, size_t end>
+HWY_INLINE void AddColumns(const float* HWY_RESTRICT column, const V8* v, V8* sum) {
+  if constexpr (k < end) {
+    const F8 d;
+    const V8 value = Everywhere<k>(d, v);
+    for (size_t p = 0; p < wide_parts; ++p)
+      sum[p] = hn::MulAdd(hn::Load(d, column + k * 8 + p * wide_lanes), value, sum[p]);
+    AddColumns<k + 1, end>(column, v, sum);
+  }
+}
+template <int l, int c>  // of a source of class c
+HWY_INLINE void Columns(const float* HWY_RESTRICT column, const V8* v, V8* sum) {
+  const F8 d;
+  constexpr size_t first = c == 2;
+  const V8 value = Everywhere<first>(d, v);
+  for (size_t p = 0; p < wide_parts; ++p) sum[p] = hn::Mul(hn::Load(d, column + first * 8 + p * wide_lanes), value);
+  AddColumns<first + 1, first + zyz::class_size(l, c)>(column, v, sum);
+}
+
+// Band l to `out` from around in + l (l + 1), but for m >= 0 from `plus`, where 16 values can be read; all may overlap.
+template <int l>
+HWY_INLINE void RotateWideBand(const WideTurn turns[3], const float* HWY_RESTRICT columns, const float* plus,
+                               const float* in, float* out) {
+  const F8 d;
+  V8 f[4][wide_parts], g[4][wide_parts];
+  for (size_t p = 0; p < wide_parts; ++p) {
+    hn::LoadInterleaved2(d, plus + 2 * p * wide_lanes, f[0][p], f[1][p]);
+    hn::LoadInterleaved2(d, in + l * (l + 1) + 1 - 2 * (p + 1) * wide_lanes, f[3][p], f[2][p]);
+    f[2][p] = hn::Reverse(d, f[2][p]), f[3][p] = hn::Reverse(d, f[3][p]);
+  }
+  const float* table = columns + size_t(l - narrow_order) * wide_band;
+  constexpr int source[4] = {zyz::class_source(l, 0), zyz::class_source(l, 1), zyz::class_source(l, 2),
+                             zyz::class_source(l, 3)};
+  TurnAboutZ(turns[2], f);
+  Columns<l, source[0]>(table, f[source[0]], g[0]);
+  Columns<l, source[1]>(table + 64, f[source[1]], g[1]);
+  Columns<l, source[2]>(table + 2 * 64, f[source[2]], g[2]);
+  Columns<l, source[3]>(table + 3 * 64, f[source[3]], g[3]);
+  TurnAboutZ(turns[1], g);
+  Columns<l, 0>(table + 4 * 64, g[0], f[source[0]]);
+  Columns<l, 1>(table + 5 * 64, g[1], f[source[1]]);
+  Columns<l, 2>(table + 6 * 64, g[2], f[source[2]]);
+  Columns<l, 3>(table + 7 * 64, g[3], f[source[3]]);
+  TurnAboutZ(turns[0], f);
+  HWY_ALIGN float cosines[16], sines[16];  // sines of m = 15 .. 0
+  for (size_t p = 0; p < wide_parts; ++p) {
+    hn::StoreInterleaved2(f[0][p], f[1][p], d, cosines + 2 * p * wide_lanes);
+    hn::StoreInterleaved2(hn::Reverse(d, f[3][p]), hn::Reverse(d, f[2][p]), d, sines + 16 - 2 * (p + 1) * wide_lanes);
+  }
+  std::memcpy(out + l * (l + 1), cosines, (l + 1) * sizeof(float));
+  std::memcpy(out + l * l, sines + 15 - l, l * sizeof(float));
+}
+
+template <int l>
+void RotateWideBands(int order, const WideTurn turns[3], const float* columns, const float* in, float* out) {
+  if constexpr (l < max_sh_order) {
+    const float* plus = in + l * (l + 1);
+    if (l < order - 1) {
+      RotateWideBand<l>(turns, columns, plus, in, out);
+      RotateWideBands<l + 1>(order, turns, columns, in, out);
+    } else {  // beyond the last band nothing can be read
+      float last[16] = {};
+      std::memcpy(last, plus, (l + 1) * sizeof(float));
+      RotateWideBand<l>(turns, columns, last, in, out);
+    }
+  }
+}
+
+// Bands 2 and up.
+void RotateBands(int order, const EulerZyz& e, const RotationTables& tables, const float* in, float* out) {
+  const float* narrow = tables.narrow.data();
   if (order <= 4) {
     const Turn turns[3] = {MakeTurn<true>(e.cos_a, e.sin_a), MakeTurn<true>(e.cos_b, e.sin_b),
                            MakeTurn<true>(e.cos_c, e.sin_c)};
-    RotateBand<2>(turns, columns, in, out);
-    if (order > 3) RotateBand<3>(turns, columns, in, out);
+    RotateBand<2>(turns, narrow, in, out);
+    if (order > 3) RotateBand<3>(turns, narrow, in, out);
     return;
   }
   const Turn turns[3] = {MakeTurn<false>(e.cos_a, e.sin_a), MakeTurn<false>(e.cos_b, e.sin_b),
                          MakeTurn<false>(e.cos_c, e.sin_c)};
-  RotateBand<2>(turns, columns, in, out);
-  RotateBand<3>(turns, columns, in, out);
-  RotateBand<4>(turns, columns, in, out);
-  if (order > 5) RotateBand<5>(turns, columns, in, out);
-  if (order > 6) RotateBand<6>(turns, columns, in, out);
-  if (order > 7) RotateBand<7>(turns, columns, in, out);
+  RotateBand<2>(turns, narrow, in, out);
+  RotateBand<3>(turns, narrow, in, out);
+  RotateBand<4>(turns, narrow, in, out);
+  if (order > 5) RotateBand<5>(turns, narrow, in, out);
+  if (order > 6) RotateBand<6>(turns, narrow, in, out);
+  if (order > 7) RotateBand<7>(turns, narrow, in, out);
+  if (order <= narrow_order) return;
+  WideTurn wide[3];
+  for (int i = 0; i < 3; ++i) Widen(turns[i], wide[i]);
+  RotateWideBands<narrow_order>(order, wide, tables.wide.data(), in, out);
 }
 #endif
 
@@ -179,31 +308,33 @@ namespace {
 
 HWY_EXPORT(RotateBands);
 
-constexpr int simd_order = 8;
-
-struct Tables {
-  std::vector<float> blocks;
-  AlignedVector<float> columns;  // [l - 2][forth and back][class][column][row], padded to 4 x 4
-  Tables() : columns(size_t(simd_order - 2) * 8 * 16) {
-    const std::vector<double>& exact = zyz::quarter_turn_blocks();
-    blocks.assign(exact.begin(), exact.end());
-    const float* block = blocks.data();
-    auto lane = [](int c, int k) { return c == 2 ? k + 1 : k; };
-    for (int l = 2; l < simd_order; ++l)
-      for (int c = 0; c < 4; ++c) {
-        const int n = zyz::class_size(l, c), source = zyz::class_source(l, c);
-        float* forth = columns.data() + (size_t(l - 2) * 8 + size_t(c)) * 16;
-        for (int r = 0; r < n; ++r)
-          for (int k = 0; k < n; ++k) {
-            const float value = *block++;
-            forth[lane(source, k) * 4 + lane(c, r)] = value;
-            forth[4 * 16 + lane(c, r) * 4 + lane(source, k)] = value;
-          }
-      }
+RotationTables make_tables() {
+  const std::vector<double>& exact = zyz::quarter_turn_blocks();
+  RotationTables t;
+  t.blocks.assign(exact.begin(), exact.end());
+  t.narrow.resize((narrow_order - 2) * narrow_band), t.wide.resize((max_sh_order - narrow_order) * wide_band);
+  const float* block = t.blocks.data();
+  auto lane = [](int c, int k) { return c == 2 ? k + 1 : k; };
+  for (int l = 2; l < max_sh_order; ++l) {
+    const int lanes = l < narrow_order ? 4 : 8;
+    float* band = l < narrow_order ? t.narrow.data() + size_t(l - 2) * narrow_band
+                                   : t.wide.data() + size_t(l - narrow_order) * wide_band;
+    for (int c = 0; c < 4; ++c) {
+      const int n = zyz::class_size(l, c), source = zyz::class_source(l, c);
+      float* forth = band + c * lanes * lanes;
+      float* back = band + (4 + c) * lanes * lanes;
+      for (int r = 0; r < n; ++r)
+        for (int k = 0; k < n; ++k) {
+          const float value = *block++;
+          forth[lane(source, k) * lanes + lane(c, r)] = value;
+          back[lane(c, r) * lanes + lane(source, k)] = value;
+        }
+    }
   }
-};
-const Tables& tables() {
-  static const Tables t;
+  return t;
+}
+const RotationTables& tables() {
+  static const RotationTables t = make_tables();
   return t;
 }
 
@@ -235,15 +366,7 @@ void rotate_sh_zyz(const Mat3& R, std::span<const float> in, std::span<float> ou
   }
   if (order < 3) return;
   const EulerZyz e = euler_zyz(R);
-  const Tables& t = tables();
-  HWY_DYNAMIC_DISPATCH(RotateBands)
-  (std::min(order, simd_order), e, t.blocks.data(), t.columns.data(), in.data(), out.data());
-  if (order <= simd_order) return;
-  float f[sh_count(max_sh_order)], scratch[sh_count(max_sh_order)];
-  const float angles[6] = {e.cos_a, e.sin_a, e.cos_b, e.sin_b, e.cos_c, e.sin_c};
-  std::copy(in.begin() + sh_count(simd_order), in.end(), f + sh_count(simd_order));
-  zyz::rotate_bands(simd_order, order, angles, t.blocks.data(), f, scratch);
-  std::copy(f + sh_count(simd_order), f + in.size(), out.begin() + sh_count(simd_order));
+  HWY_DYNAMIC_DISPATCH(RotateBands)(order, e, tables(), in.data(), out.data());
 }
 
 void rotate_sh_zyz(const Mat3& R, std::span<const Vec3> in, std::span<Vec3> out) {

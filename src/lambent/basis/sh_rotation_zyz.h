@@ -15,7 +15,7 @@ struct EulerZyz {
 EulerZyz euler_zyz(const Mat3& R);
 
 // (Rf)(s) = f(R^-1 s) for the rotation R; order^2 values, in may be out. Nothing is allocated but tables at the first
-// call. Bands up to 7 run in SIMD lanes, those above by the plain code of sh_rotation_zyz-inl.h.
+// call.
 void rotate_sh_zyz(const Mat3& R, std::span<const float> in, std::span<float> out);
 void rotate_sh_zyz(const Mat3& R, std::span<const Vec3> in, std::span<Vec3> out);
 

@@ -1,9 +1,14 @@
 #include <lambent/basis/sh.h>
 #include <lambent/basis/sh_convert.h>
+#include <lambent/basis/sh_tables.h>
+#include <lambent/core/aligned.h>
 #include <lambent/core/random.h>
 #include <lambent/core/sampling.h>
 
 #include <gtest/gtest.h>
+#include <hwy/targets.h>
+
+#include <bit>
 
 namespace lambent {
 namespace {
@@ -39,6 +44,118 @@ TEST(Sh, LowBandsAreTheKnownPolynomials) {
                               -k2 * d.x * d.z,
                               k22 * (d.x * d.x - d.y * d.y)};
   for (int i = 0; i < 9; ++i) EXPECT_NEAR(y[i], expected[i], 1e-14) << i;
+}
+
+// No symmetry, and the poles, the axes, the equator and zeros of either sign.
+std::vector<Vec3> awkward_directions() {
+  std::vector<Vec3> all{{0, 0, 1},     {0, 0, -1},     {1, 0, 0},     {-1, 0, 0},       {0, 1, 0},           {0, -1, 0},
+                        {-0.0f, 0, 1}, {0, -0.0f, -1}, {1, -0.0f, 0}, {0.6f, -0.8f, 0}, {-0.8f, 0.6f, -0.0f}};
+  for (uint32_t k = 0; k < 32; ++k) all.push_back(square_to_sphere(sobol_owen(k, 23)));
+  return all;
+}
+
+// The recurrence as a loop: what every faster form must equal to the last bit.
+template <class T>
+std::vector<T> plain_harmonics(int order, Vector<T, 3> d) {
+  std::vector<T> out(size_t(sh_count(order)));
+  const ShTables& t = sh_tables();
+  T c = 1, s = 0;
+  for (int m = 0; m < order; ++m) {
+    T q1 = T(t.diagonal[m]), q2 = 0;
+    for (int l = m; l < order; ++l) {
+      if (l > m) {
+        const T q = d.z * T(t.a[l][m]) * q1 + T(t.b[l][m]) * q2;
+        q2 = q1, q1 = q;
+      }
+      out[size_t(sh_index(l, m))] = q1 * c;
+      if (m > 0) out[size_t(sh_index(l, -m))] = q1 * s;
+    }
+    const T next = c * d.x - s * d.y;
+    s = c * d.y + s * d.x, c = next;
+  }
+  return out;
+}
+template <class T>
+bool same_bits(T a, T b) {
+  using Bits = std::conditional_t<sizeof(T) == 4, uint32_t, uint64_t>;
+  return (a == 0 && b == 0) || std::bit_cast<Bits>(a) == std::bit_cast<Bits>(b);
+}
+
+TEST(Sh, TablesAreRoundedAsSquareRootsAre) {
+  const ShTables& t = sh_tables();
+  double q = std::sqrt(1 / (4 * std::numbers::pi));
+  for (int m = 0; m < max_sh_order; ++m) {
+    EXPECT_EQ(t.diagonal[m], q * (m > 0 ? std::numbers::sqrt2 : 1.0) * (m % 2 ? -1.0 : 1.0)) << m;
+    q *= std::sqrt((2.0 * m + 3) / (2.0 * m + 2));
+    for (int l = m + 1; l < max_sh_order; ++l) {
+      const double l2 = double(l) * l, m2 = double(m) * m, k = double(l - 1) * (l - 1);
+      EXPECT_EQ(t.a[l][m], std::sqrt((4 * l2 - 1) / (l2 - m2))) << l << " " << m;
+      if (l > m + 1) EXPECT_EQ(t.b[l][m], -std::sqrt((2.0 * l + 1) * (k - m2) / ((2.0 * l - 3) * (l2 - m2))));
+    }
+  }
+}
+
+TEST(Sh, AgreesWithAssociatedLegendreFunctionsInDouble) {
+  // Values from the standard library's P_l^m (which has no Condon-Shortley sign) and angles.
+  for (Vec3 single : awkward_directions()) {
+    const Vec3d d = normalize(Vec3d(single));
+    const double theta = std::acos(std::clamp(d.z, -1.0, 1.0)), phi = std::atan2(d.y, d.x);
+    std::vector<double> exact(size_t(sh_count(max_sh_order)));
+    std::vector<float> rounded(exact.size());
+    evaluate_sh(max_sh_order, d, exact), evaluate_sh(max_sh_order, Vec3(d), rounded);
+    for (int l = 0; l < max_sh_order; ++l)
+      for (int m = -l; m <= l; ++m) {
+        const unsigned k = unsigned(std::abs(m));
+        const double legendre = std::sph_legendre(unsigned(l), k, theta);  // with its (-1)^m
+        const double y = m == 0 ? legendre
+                       : m > 0  ? std::numbers::sqrt2 * legendre * std::cos(k * phi)
+                                : std::numbers::sqrt2 * legendre * std::sin(k * phi);
+        const size_t i = size_t(sh_index(l, m));
+        ASSERT_NEAR(exact[i], y, 1e-7) << l << " " << m;  // acos next to the poles
+        ASSERT_NEAR(rounded[i], exact[i], float_rounding) << l << " " << m;
+      }
+  }
+}
+
+TEST(Sh, EveryOrderGivesTheBitsOfTheLoop) {
+  for (int order = 0; order <= max_sh_order; ++order)
+    for (Vec3 d : awkward_directions()) {
+      const size_t count = size_t(sh_count(order));
+      std::vector<float> y(count + 1, 7);
+      std::vector<double> exact(count + 1, 7);
+      evaluate_sh(order, d, std::span(y)), evaluate_sh(order, Vec3d(d), std::span(exact));
+      const auto plain = plain_harmonics<float>(order, d);
+      const auto plain_exact = plain_harmonics<double>(order, Vec3d(d));
+      for (size_t i = 0; i < count; ++i) {
+        ASSERT_TRUE(same_bits(y[i], plain[i])) << order << " " << i << ": " << y[i] << " " << plain[i];
+        ASSERT_TRUE(same_bits(exact[i], plain_exact[i])) << order << " " << i;
+      }
+      EXPECT_EQ(y[count], 7) << "nothing is written beyond the last";
+      EXPECT_EQ(exact[count], 7);
+    }
+}
+
+TEST(Sh, ManyDirectionsGiveTheBitsOfOneOnEverySimdTarget) {
+  const std::vector<Vec3> all = awkward_directions();
+  for (int order : {0, 1, 2, 3, 4, 5, 6, 9, 16})
+    for (size_t count : {size_t(0), size_t(1), size_t(16), all.size()})
+      for (int64_t target : hwy::SupportedAndGeneratedTargets()) {
+        hwy::SetSupportedTargetsForTest(target);
+        std::vector<float> x, y, z;
+        for (size_t i = 0; i < count; ++i) x.push_back(all[i].x), y.push_back(all[i].y), z.push_back(all[i].z);
+        const size_t stride = count + 3, values = size_t(sh_count(order));
+        std::vector<float> out(values * stride, 7);
+        evaluate_sh(order, x, y, z, stride, out);
+        hwy::SetSupportedTargetsForTest(0);
+        for (size_t i = 0; i < count; ++i) {
+          const auto plain = plain_harmonics<float>(order, all[i]);
+          for (size_t k = 0; k < values; ++k)
+            ASSERT_TRUE(same_bits(out[k * stride + i], plain[k]))
+                << hwy::TargetName(target) << " " << order << " " << k;
+        }
+        for (size_t k = 0; k < values; ++k)
+          for (size_t i = count; i < stride; ++i) ASSERT_EQ(out[k * stride + i], 7);
+      }
 }
 
 TEST(Sh, IsOrthonormalAtEveryOrder) {
