@@ -1,8 +1,10 @@
 include(CMakePackageConfigHelpers)
 install(TARGETS lambent EXPORT lambentTargets ARCHIVE DESTINATION ${CMAKE_INSTALL_LIBDIR})
 install(TARGETS lambent-tool RUNTIME DESTINATION ${CMAKE_INSTALL_BINDIR})
-install(DIRECTORY build/web/ DESTINATION ${CMAKE_INSTALL_DATADIR}/lambent/web OPTIONAL)  # the page, where scripts/web has built it
-install(DIRECTORY src/lambent DESTINATION ${CMAKE_INSTALL_INCLUDEDIR} FILES_MATCHING PATTERN "*.h" PATTERN "*-inl.h" EXCLUDE)
+# The page, where scripts/web has built it.
+install(DIRECTORY build/web/ DESTINATION ${CMAKE_INSTALL_DATADIR}/lambent/web OPTIONAL)
+install(DIRECTORY src/lambent DESTINATION ${CMAKE_INSTALL_INCLUDEDIR}
+  FILES_MATCHING PATTERN "*.h" PATTERN "*-inl.h" EXCLUDE)
 install(EXPORT lambentTargets NAMESPACE lambent:: DESTINATION ${CMAKE_INSTALL_LIBDIR}/cmake/lambent)
 configure_package_config_file(cmake/lambentConfig.cmake.in ${CMAKE_CURRENT_BINARY_DIR}/lambentConfig.cmake
   INSTALL_DESTINATION ${CMAKE_INSTALL_LIBDIR}/cmake/lambent)

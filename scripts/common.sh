@@ -2,8 +2,8 @@
 set -euo pipefail
 cd "$(dirname "${BASH_SOURCE[0]}")/.."
 
-build_packages="g++ cmake ninja-build ccache pkg-config libembree-dev libtbb-dev libhwy-dev libeigen3-dev libopenexr-dev libstb-dev
-  libxxhash-dev nlohmann-json3-dev libfmt-dev libcli11-dev libcpp-httplib-dev libgtest-dev"
+build_packages="g++ cmake ninja-build ccache pkg-config libembree-dev libtbb-dev libhwy-dev libeigen3-dev libopenexr-dev
+  libstb-dev libxxhash-dev nlohmann-json3-dev libfmt-dev libcli11-dev libcpp-httplib-dev libgtest-dev"
 sanitize_packages="clang-14 libclang-rt-14-dev"
 
 # Installs the Debian packages named, if any is missing. Needs root or sudo only then.
@@ -22,7 +22,8 @@ need() {
   fi
   local log
   log=$(mktemp)
-  if ! { $sudo apt-get update && DEBIAN_FRONTEND=noninteractive $sudo apt-get install -y --no-install-recommends "${missing[@]}"; } >"$log" 2>&1; then
+  if ! { $sudo apt-get update && DEBIAN_FRONTEND=noninteractive $sudo apt-get install -y \
+    --no-install-recommends "${missing[@]}"; } >"$log" 2>&1; then
     tail -n 20 "$log" >&2
     echo "The packages could not be installed; the whole log is $log" >&2
     exit 1
@@ -37,7 +38,7 @@ build() {
   mkdir -p build
   local log="build/$preset.log"
   echo "Building ($preset)" >&2
-  if ! { cmake --preset "$preset" && cmake --build --preset "$preset" ${@:+--target "$@"}; } >"$log" 2>&1; then
+  if ! { cmake --preset "$preset" && nice cmake --build --preset "$preset" ${@:+--target "$@"}; } >"$log" 2>&1; then
     tail -n 40 "$log" >&2
     echo "The build failed; the whole log is $log" >&2
     exit 1

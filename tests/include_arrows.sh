@@ -1,12 +1,14 @@
 #!/usr/bin/env bash
-# Fails if a folder of src/lambent includes one that the architecture does not let it (docs/architecture.md), or if a library is
-# included outside the one place for it.
+# Fails if a folder of src/lambent includes one that the architecture does not let it (docs/architecture.md), or if a
+# library is included outside the one place for it.
 set -euo pipefail
 cd "$1/src/lambent"
 declare -A allowed=(
   [core]="" [basis]="" [image]="" [brdf]="basis" [light]="basis image" [scene]="brdf light image" [receivers]="scene"
-  [trace]="scene" [transfer]="basis" [baked]="transfer scene receivers basis" [bake]="trace receivers scene brdf light basis transfer"
-  [compress]="transfer basis brdf" [relight]="transfer basis brdf light" [render]="relight transfer trace receivers scene light image" [reference]="scene brdf light image"
+  [trace]="scene" [transfer]="basis" [baked]="transfer scene receivers basis"
+  [bake]="trace receivers scene brdf light basis transfer" [compress]="transfer basis brdf"
+  [relight]="transfer basis brdf light" [render]="relight transfer trace receivers scene light image"
+  [reference]="scene brdf light image"
   [pipeline]="basis image brdf light scene receivers trace transfer baked bake compress relight render reference"
 )
 bad=0

@@ -15,10 +15,12 @@ find_package(lambent 0.1 REQUIRED)
 add_executable(user bake_and_relight.cpp)
 target_link_libraries(user PRIVATE lambent::lambent)
 C
-{ cmake -S "$prefix/user" -B "$prefix/user/build" -G Ninja -DCMAKE_PREFIX_PATH="$prefix/installed" && cmake --build "$prefix/user/build"; } \
+{ cmake -S "$prefix/user" -B "$prefix/user/build" -G Ninja -DCMAKE_PREFIX_PATH="$prefix/installed" && cmake \
+  --build "$prefix/user/build"; } \
   >"$prefix/log" 2>&1 || { cat "$prefix/log"; exit 1; }
 printf 'v 0 0 0\nv 1 0 0\nv 0 0 -1\nf 1 2 3\n' >"$prefix/a.obj"
 "$prefix/user/build/user" "$prefix/a.obj" uniform:1 "$prefix/a.png"
 [ -s "$prefix/a.png" ] || { echo "the installed library wrote no picture"; exit 1; }
-[ "$(wc -l <"$source_dir/examples/bake_and_relight.cpp")" -lt 60 ] || { echo "the example is longer than 60 lines"; exit 1; }
+[ "$(wc -l <"$source_dir/examples/bake_and_relight.cpp")" -lt 60 ] ||
+  { echo "the example is longer than 60 lines"; exit 1; }
 echo "package test passed"

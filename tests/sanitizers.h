@@ -1,5 +1,6 @@
 #pragma once
-// Tests of accuracy that take long, and whose code shorter tests run too, are left to the release build.
+// Tests of accuracy that take long, and whose code shorter tests or tests/command_line.sh run too, are left to the
+// release build.
 #include <gtest/gtest.h>
 
 #if defined(__SANITIZE_ADDRESS__)

@@ -3,7 +3,7 @@
 // has order^2 values a channel; zonal transfer, whose channels share their axes, counts as one channel.
 //
 // Texel (x, y, layer) of receiver r and channel c, k = 0 .. quads-1, quads = ceil(count / 4):
-//   x = (r mod columns) * channels * quads + c * quads + k,   y = (r / columns) mod rows,   layer = r / (columns * rows)
+//   x = (r mod columns) * channels * quads + c * quads + k,  y = (r / columns) mod rows,  layer = r / (columns * rows)
 // with powers of two for columns and rows. Width and height stay within the 2048, layers within the 256, that WebGL2
 // promises.
 //

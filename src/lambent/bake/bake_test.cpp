@@ -192,12 +192,28 @@ TEST(Bake, BuriedVerticesTakeTheirNeighboursLight) {
     const Baking b = bake_scene(scene, {.order = 2, .samples = 256, .bounces = bounces});
     EXPECT_GE(b.report.buried, 49u);  // 7 x 7 floor vertices inside the box
     const Relit lit = relit_under(b.transfer, uniform_light(2));
+    // The vertices about the box, a = 0.07 from its walls, which are h = 0.3 high. An endless wall would leave of even
+    // light (1 + a / sqrt(a^2 + h^2)) / 2; these end, and reflect half of what they receive.
+    float least = 1, most = 0;
     for (size_t v = 0; v < b.scene.positions.size(); ++v) {
       const Vec3 p = b.scene.positions[v];
-      if (p.y == 0 && std::abs(p.x) < 0.31f && std::abs(p.z) < 0.31f) {
-        EXPECT_GT(lit.at(b.receivers.front[v]).x, 0.2f);
-      }
+      if (p.y != 0 || std::abs(std::max(std::abs(p.x), std::abs(p.z)) - 0.4f) > 0.01f) continue;
+      const float around = lit.at(b.receivers.front[v]).x;
+      least = std::min(least, around), most = std::max(most, around);
     }
+    constexpr float noise = 0.02f;  // 256^-0.75, and half floats
+    EXPECT_GT(least, 0.5f * (1 + 0.07f / std::hypot(0.07f, 0.3f)) - noise);
+    EXPECT_LT(most, 1);
+    // Means of means of those: none is darker or lighter than all of them.
+    int inside = 0;
+    for (size_t v = 0; v < b.scene.positions.size(); ++v) {
+      const Vec3 p = b.scene.positions[v];
+      if (p.y != 0 || std::abs(p.x) > 0.31f || std::abs(p.z) > 0.31f) continue;
+      EXPECT_GE(lit.at(b.receivers.front[v]).x, least * (1 - half_rounding));
+      EXPECT_LE(lit.at(b.receivers.front[v]).x, most * (1 + half_rounding));
+      ++inside;
+    }
+    EXPECT_EQ(inside, 49);
   }
 }
 

@@ -132,7 +132,11 @@ TEST(Patch, OfAMeshIsThatOfItsHeights) {
       }
       for (size_t c = 0; c < 36; ++c)
         error += std::pow(u[c] - v[c], 2), unbounced += std::pow(u[c] - w[c], 2), total += u[c] * u[c];
-      EXPECT_NEAR(heights.heights[size_t(2 * j * 2 * n + 2 * i)], field.heights[size_t(j * n + i)] - least, 0.03);
+      // The mesh's texel lies a quarter into the cell, on the triangle of its first corner and that corner's
+      // neighbours.
+      const auto corner = [&](int y, int x) { return field.heights[size_t(y * n + x)]; };
+      EXPECT_NEAR(heights.heights[size_t(2 * j * 2 * n + 2 * i)],
+                  corner(j, i) / 2 + corner(j, i + 1) / 4 + corner(j + 1, i) / 4 - least, 1e-6);
     }
   EXPECT_LT(std::sqrt(error / total), 0.015);      // curvature within a cell, noise
   EXPECT_GT(std::sqrt(unbounced / total), 0.025);  // so that bounces are held
@@ -152,8 +156,10 @@ TEST(Patch, MakesHeightFieldsOfPictures) {
   const std::vector<float> values{0, 1, 2, 3};
   auto field = make_height_field(values, 2, 2, 2, 0.5f);
   ASSERT_TRUE(field);
-  for (float h : field->heights) EXPECT_NEAR(h, 0.75f, 0.51f);
-  EXPECT_LT(field->heights[0], field->heights[3]);
+  // Over its own texel a pixel's tent has the mean 3/4, and 1/4 is its neighbours', which repeat: values x + 2 y become
+  // those of x, y = 1/4 and 3/4. All of it is exact in binary.
+  for (int k = 0; k < 4; ++k)
+    EXPECT_EQ(field->heights[size_t(k)], 0.5f * ((k % 2 ? 0.75f : 0.25f) + 2 * (k / 2 ? 0.75f : 0.25f))) << k;
   EXPECT_FALSE(make_height_field(std::vector<float>{1}, 1, 1, 8, 1));
   EXPECT_FALSE(make_height_field(std::vector<float>{1, NAN, 0, 0}, 2, 2, 8, 1));
   EXPECT_FALSE(make_height_field(values, 2, 2, 1, 1));

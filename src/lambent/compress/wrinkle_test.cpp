@@ -27,6 +27,7 @@ TEST(Wrinkle, NoGrooveIsAnOpenPlane) {
 
 // The cross-section's simulation against the baker, on a long groove.
 TEST(Wrinkle, IsWhatTheBakeOfALongGrooveFinds) {
+  SKIP_UNDER_SANITIZERS();
   constexpr int across = 192, along = 40;
   constexpr float depth = 0.7f, length = 60;
   std::vector<Vec3> positions, normals;
@@ -92,7 +93,23 @@ TEST(Wrinkle, LobesCorrespondSoThatTheTableInterpolates) {
     between[together] = std::sqrt(error / total);
     std::printf("%s: entries %.4f, between %.4f, exact vectors between %.4f\n", together ? "together" : "apart",
                 table->rms, between[together], std::sqrt(plain / total));
-    EXPECT_LT(table->rms, 0.07);
+    // What it reports is the error at its own entries; three lobes in place of 35 harmonics leave 0.0553 each fitted by
+    // itself (it prints both), and together hardly more.
+    double own = 0, all = 0;
+    for (int row = 0; row < 32; ++row) {
+      const std::vector<float> exact = simulate_wrinkle(6, 32, float(row) / 31, 0.5f);
+      for (int place = 0; place < 32; ++place) {
+        std::vector<float> values(table->texture.transfer.receiver_values());
+        sample_groove(table->texture, float(place) / 31 - 0.5f, float(row) / 31, values);
+        const std::vector<float> fit = zonal_harmonics(table->texture.transfer, values);
+        for (size_t k = 0; k < 36; ++k) {
+          const double t = exact[size_t(place) * 36 + k];
+          own += std::pow(fit[k] - t, 2), all += t * t;
+        }
+      }
+    }
+    EXPECT_NEAR(table->rms, std::sqrt(own / all), 1e-4);  // the places are rounded, and between entries it is linear
+    EXPECT_LT(table->rms, 0.06);
     if (together) {
       EXPECT_LT(between[1], table->rms + std::sqrt(plain / total));
     }

@@ -7,6 +7,8 @@
 #include <lambent/scene/append.h>
 #include <lambent/scene/procedural.h>
 
+#include "sanitizers.h"
+
 #include <gtest/gtest.h>
 
 namespace lambent {
@@ -88,6 +90,7 @@ double error_of_balls(const Room& room, const Transfer& transfer, const Lattice&
 }
 
 TEST(Insert, LightsATinyBallAsThePathTracerDoes) {
+  SKIP_UNDER_SANITIZERS();
   const Room room;
   auto transfer = bake(room.scene, room.tracer, room.receivers, {.order = light_order, .samples = 1024, .bounces = 2});
   ASSERT_TRUE(transfer);

@@ -7,6 +7,8 @@
 #include <lambent/scene/procedural.h>
 #include <lambent/scene/reflection.h>
 
+#include "sanitizers.h"
+
 #include <gtest/gtest.h>
 
 namespace lambent {
@@ -172,6 +174,7 @@ TEST(NormalMap, ALampOnBumpsIsItsFormula) {
 }
 
 TEST(NormalMap, UnderASkyAsThePathTracerHasIt) {
+  SKIP_UNDER_SANITIZERS();
   const Bumps bumps;
   Scene scene = bumpy(bumps);
   scene.materials[0].base_color = Vec3(0.8f, 0.5f, 0.3f);

@@ -6,6 +6,8 @@
 #include <lambent/render/render.h>
 #include <lambent/scene/procedural.h>
 
+#include "sanitizers.h"
+
 #include <gtest/gtest.h>
 
 namespace lambent {
@@ -72,6 +74,7 @@ double psnr_of(const Image& a, const Image& b) {
 }
 
 TEST(ProductPictures, SharpShadowsAreThoseOfThePathTracer) {
+  SKIP_UNDER_SANITIZERS();
   const Scene scene = ball_on_floor(60, 3);
   const Environment env = sun_and_sky();
   for (const Brdf& brdf : {Brdf(Lambert{Vec3(0.6f, 0.5f, 0.4f)}), Brdf(Phong{Vec3(0.4f), Vec3(0.3f), 30})}) {

@@ -10,6 +10,8 @@
 #include <lambent/scene/pose.h>
 #include <lambent/scene/procedural.h>
 
+#include "sanitizers.h"
+
 #include <gtest/gtest.h>
 
 namespace lambent {
@@ -144,6 +146,7 @@ WavyRelief wavy_relief(int n) {
 // Sheets of relief for real, flat and bent, path-traced: other geometry, other rays, other reconstruction of the same
 // light. A texture has no parallax, so each is looked at along its normals.
 TEST(TransferTexture, ShadesSheetsAsTheirDisplacedGeometry) {
+  SKIP_UNDER_SANITIZERS();
   const WavyRelief wavy = wavy_relief(24);
   const Scene sheet = tiled_sheet(24 * 5);
   const std::vector<Vec3> light = project_environment(*make_sky(*parse_sky("elevation=35,azimuth=60,turbidity=3")), 6);
@@ -176,6 +179,7 @@ TEST(TransferTexture, ShadesSheetsAsTheirDisplacedGeometry) {
 // Grooves from the table against grooves of triangles, path-traced: across u and across v, of two depths, wide and
 // narrow, flat and bent.
 TEST(TransferTexture, GroovesAreThoseOfDisplacedGeometry) {
+  SKIP_UNDER_SANITIZERS();
   auto table = make_wrinkle_table({});
   ASSERT_TRUE(table);
   const std::vector<Vec3> light = project_environment(*make_sky(*parse_sky("elevation=35,azimuth=60,turbidity=3")), 6);

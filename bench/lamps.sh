@@ -1,12 +1,12 @@
 #!/usr/bin/env bash
-# Light bases of about equal size, each judged under the whole environment: one JSON object for each environment and basis. The
-# scene is made here; environments are a clear sky with sun and, with the data folder (LAMBENT_DATA, or ../shared/data), some of its
-# maps. `own` is the error against the path tracer under the basis's own projection of the light: what the bake adds.
-#   SAMPLES=2048 SPP=512 SIZE=160x120 EDGE=0.05 scripts/bench-lamps          pictures go to out/lamps/
-set -euo pipefail
-cd "$(dirname "$0")/.."
-data=${LAMBENT_DATA:-../shared/data}
-tool=build/release/bin/lambent out=out/lamps samples=${SAMPLES:-2048} spp=${SPP:-512} size=${SIZE:-160x120} edge=${EDGE:-0.05}
+# Light bases of about equal size, each judged under the whole environment: one JSON object for each environment and
+# basis. The scene is made here; environments are a clear sky with sun and, with the data folder (LAMBENT_DATA, or
+# ../shared/data), some of its maps. `own` is the error against the path tracer under the basis's own projection of the
+# light: what the bake adds.
+#   SAMPLES=2048 SPP=512 SIZE=160x120 EDGE=0.05 scripts/bench lamps          pictures go to out/lamps/
+source "$(dirname "$0")/common.sh"
+out=out/lamps samples=${SAMPLES:-2048} spp=${SPP:-512} size=${SIZE:-160x120}
+edge=${EDGE:-0.05}
 mkdir -p $out
 # A floor, a wall at the back and one at the left, a low step and two pillars.
 python3 - >$out/yard.obj <<'P'
@@ -35,7 +35,8 @@ truth() {  # truth OUT OPTIONS...
   local to=$1 half
   shift
   for half in 1 2; do
-    $tool reference $out/yard.obj --max-edge "$edge" --bounces 2 --spp $((spp / 2)) --seed $half "${shot[@]}" "$@" -o "${to}_$half.exr" >/dev/null
+    $tool reference $out/yard.obj --max-edge "$edge" --bounces 2 --spp $((spp / 2)) --seed $half "${shot[@]}" "$@" \
+      -o "${to}_$half.exr" >/dev/null
   done
   $tool compare "${to}_1.exr" "${to}_2.exr" -o "$to.exr" --mean --json >"$to.json"
 }
@@ -47,23 +48,30 @@ for env in "${envs[@]}"; do
   name=$(basename "${env%%:*}" .hdr)
   truth "$out/$name" --env "$env"
   # Exposed so that the picture's mean is a fifth.
-  exposure=$(python3 -c 'import json, math, sys; print(max(-20, min(20, math.log2(0.2 / json.load(open(sys.argv[1]))["mean_a"]))))' "$out/$name.json")
+  exposure=$(exposure_of "$out/$name.json")
   for light in "sh:5+lamps:11@$env" sh:6 directional:36 sh:10; do
     to=$out/${name}_$(tr ':+' '__' <<<"${light%%@*}")
-    $tool bake $out/yard.obj --max-edge "$edge" --bounces 2 --samples "$samples" --light "$light" -o "$to.glb" --json >"${to}_bake.json" 2>/dev/null
+    $tool bake $out/yard.obj --max-edge "$edge" --bounces 2 --samples "$samples" --light "$light" -o "$to.glb" --json \
+      >"${to}_bake.json" 2>/dev/null
     $tool render "$to.glb" --env "$env" "${shot[@]}" --spp 64 -o "$to.exr" >/dev/null
     $tool compare "$to.exr" "$out/$name.exr" --exposure="$exposure" -o "${to}_error.png" --json >"${to}_full.json"
     truth "${to}_own" --env "$env" --light-basis "$to.glb"
-    $tool compare "$to.exr" "${to}_own.exr" --exposure="$exposure" -o "${to}_own_error.png" --json >"${to}_own_difference.json"
+    $tool compare "$to.exr" "${to}_own.exr" --exposure="$exposure" -o "${to}_own_error.png" --json \
+      >"${to}_own_difference.json"
     $tool compare "${to}_own_1.exr" "${to}_own_2.exr" --exposure="$exposure" --json >"${to}_noise.json"
     python3 - "$name" "${light%%@*}" "$to" <<'P'
 import json, sys
 name, light, to = sys.argv[1:4]
-bake, full, own, noise = (json.load(open(to + end)) for end in ("_bake.json", "_full.json", "_own_difference.json", "_noise.json"))
-print(json.dumps({"name": "lamps", "env": name, "light": light, "columns": bake["order"] ** 2 + bake["lobes"], "ours": full["psnr"], "limit": own["psnr"],
-                  "ratio": full["psnr"] / own["psnr"], "unit": "dB", "limit_is": "the bake against its own light", "flip": full["flip"],
-                  "relative_rmse": full["relative_mse"] ** 0.5, "own_noise_psnr": noise["psnr"] + 6.02, "receivers": bake["receivers"],
-                  "bake_seconds": bake["seconds"]["trace"] + bake["seconds"]["bounce"], "bake_error": bake["error"]}), flush=True)
+bake, full, own, noise = (json.load(open(to + end)) for end in ("_bake.json", "_full.json", "_own_difference.json",
+                                                                "_noise.json"))
+print(json.dumps({"name": "lamps", "env": name, "light": light, "columns": bake["order"] ** 2 + bake["lobes"],
+                  "ours": full["psnr"], "limit": own["psnr"],
+                  "ratio": full["psnr"] / own["psnr"], "unit": "dB", "limit_is": "the bake against its own light",
+                  "flip": full["flip"],
+                  "relative_rmse": full["relative_mse"] ** 0.5, "own_noise_psnr": noise["psnr"] + 6.02,
+                  "receivers": bake["receivers"],
+                  "bake_seconds": bake["seconds"]["trace"] + bake["seconds"]["bounce"], "bake_error": bake["error"]}),
+                  flush=True)
 P
   done
 done

@@ -1,6 +1,6 @@
 #!/usr/bin/env python3
 """Draws the convergence of the radiosity solvers, from the JSON lines of `scripts/bench solvers`, as SVG.
-    scripts/bench solvers >solvers.jsonl && scripts/plot-solvers solvers.jsonl docs/solvers.svg"""
+    scripts/bench solvers >solvers.jsonl && bench/plot_solvers.py solvers.jsonl docs/solvers.svg"""
 import json
 import math
 import sys
@@ -29,7 +29,8 @@ def y(residual):
     return top + max(0, min(1, math.log10(max(residual, 1e-30)) / y_low)) * (height - top - bottom)
 
 
-out = [f'<svg xmlns="http://www.w3.org/2000/svg" viewBox="0 0 {width} {height}" font-family="sans-serif" font-size="13">',
+out = [f'<svg xmlns="http://www.w3.org/2000/svg" viewBox="0 0 {width} {height}" '
+       'font-family="sans-serif" font-size="13">',
        f'<rect width="{width}" height="{height}" fill="white"/>']
 for decade in range(0, y_low - 1, -1):
     at = y(10.0 ** decade)
@@ -37,8 +38,11 @@ for decade in range(0, y_low - 1, -1):
     out.append(f'<text x="{left - 8}" y="{at + 4:.1f}" text-anchor="end">1e{decade}</text>')
 for tick in range(0, int(x_end) + 1, 5):
     out.append(f'<text x="{x(tick):.1f}" y="{height - bottom + 18}" text-anchor="middle">{tick}</text>')
-out.append(f'<text x="{(left + width - right) / 2}" y="{height - 10}" text-anchor="middle">applications of the gather operator</text>')
-out.append(f'<text x="16" y="{(top + height - bottom) / 2}" text-anchor="middle" transform="rotate(-90 16 {(top + height - bottom) / 2})">relative residual</text>')
+out.append(f'<text x="{(left + width - right) / 2}" y="{height - 10}" text-anchor="middle">'
+           'applications of the gather operator</text>')
+middle = (top + height - bottom) / 2
+out.append(f'<text x="16" y="{middle}" text-anchor="middle" transform="rotate(-90 16 {middle})">'
+           'relative residual</text>')
 for i, (name, steps) in enumerate(curves.items()):
     points = " ".join(f"{x(a):.1f},{y(r):.1f}" for a, r in steps)
     out.append(f'<polyline points="{points}" fill="none" stroke="{colors[name]}" stroke-width="2"/>')

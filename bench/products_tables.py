@@ -1,5 +1,5 @@
 #!/usr/bin/env python3
-"""Tables in markdown of what `scripts/bench products` printed: scripts/products-tables FILE, or standard input."""
+"""Tables in markdown of what `scripts/bench products` printed: bench/products_tables.py FILE, or standard input."""
 import json
 import sys
 
@@ -20,7 +20,8 @@ for line in open(sys.argv[1]) if len(sys.argv) > 1 else sys.stdin:
 def table(title, heads, lines):
     print(f"\n{title}\n\n| " + " | ".join(heads) + " |\n|" + "---|" * len(heads))
     for cells in lines:
-        print("| " + " | ".join(c if isinstance(c, str) else f"{c:,.3g}" if abs(c) < 1000 else f"{c:,.0f}" for c in cells) + " |")
+        shown = (c if isinstance(c, str) else f"{c:,.3g}" if abs(c) < 1000 else f"{c:,.0f}" for c in cells)
+        print("| " + " | ".join(shown) + " |")
 
 
 def of(name):
@@ -39,11 +40,14 @@ table("New environment", ["cube", "light", "project, ms", "three forms, ms", "ai
 for title, sampling in (("bounded", "bounded"), ("appendix A", "appendix_a")):
     table(f"Tables 1 and 2, {title}: % of blocks that are not blocked, by line of Algorithm 1 and by samples",
           ["scene", "material", "line 6", "line 9", "line 11", "1", "4", "16", "256"],
-          [(s, m, j[sampling]["line_6"], j[sampling]["line_9"], j[sampling]["line_11"], *j[sampling]["samples_1_4_16_256"])
+          [(s, m, j[sampling]["line_6"], j[sampling]["line_9"], j[sampling]["line_11"],
+            *j[sampling]["samples_1_4_16_256"])
            for s, m, j in of("table_1_2")])
 bakes = {s: j for s, _, j in of("bake")}
-table("Table 3: database and bake", ["scene", "vertices", "MB", "bytes a vertex", "changes a mixed block", "bake, s", "of raw Embree"],
-      [(s, f"{j['receivers']:,}", j["MB"], j["ours"], j["changes_per_mixed_block"], bakes[s]["seconds"], bakes[s]["ratio"])
+table("Table 3: database and bake", ["scene", "vertices", "MB", "bytes a vertex", "changes a mixed block", "bake, s",
+                                     "of raw Embree"],
+      [(s, f"{j['receivers']:,}", j["MB"], j["ours"], j["changes_per_mixed_block"], bakes[s]["seconds"],
+        bakes[s]["ratio"])
        for s, _, j in of("database") if s in bakes])
 table("Speed: ns a shaded vertex and core", ["scene", "material", "blocks", "times SIMD", "times scalar", "appendix A"],
       [(s, m, j["ours"], peer(s, "blocks_vs_simd", m), peer(s, "blocks_vs_scalar", m), j["appendix_a_ns"])
