@@ -1,5 +1,6 @@
 #include <lambent/baked/baked_file.h>
 
+#include <lambent/baked/extension.h>
 #include <lambent/baked/viewer_look.h>
 #include <lambent/core/check.h>
 #include <lambent/scene/gltf.h>

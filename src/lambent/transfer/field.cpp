@@ -46,6 +46,12 @@ int rows_of(const Store& store) {
                     store);
 }
 
+int rows_relit(const Store& store) {
+  return std::visit(Overloaded{[](const FactoredTransfer& t) { return t.incident_order * t.incident_order; },
+                               [](const Visibility&) { return 1; }, [](const auto& t) { return t.rows; }},
+                    store);
+}
+
 int channels_of(const Store& store) {
   return std::visit(Overloaded{[](const FactoredTransfer&) { return 1; }, [](const Visibility&) { return 0; },
                                [](const auto& t) { return t.channels; }},

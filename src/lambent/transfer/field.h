@@ -60,6 +60,7 @@ LightBasis light_of(const Store& store);  // the columns; none of visibility, wh
 size_t receivers_of(const Store& store);
 size_t bytes_of(const Store& store);
 int rows_of(const Store& store);  // that are stored; 0 of visibility
+int rows_relit(const Store& store);  // that relighting makes of those; of visibility 1
 int channels_of(const Store& store);
 const char* name_of(const Store& store);  // "dense", "clusters", "lobes", "factors", "blocks"
 
