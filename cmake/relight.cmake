@@ -54,7 +54,6 @@ set(lambent_relight_sources
   src/lambent/transfer/outgoing.cpp
   src/lambent/transfer/transfer.cpp
   src/lambent/transfer/visibility.cpp
-  src/lambent/transfer/zonal_texture.cpp
   src/lambent/transfer/zonal_transfer.cpp
 )
 add_library(lambent_relight STATIC ${lambent_relight_sources})
@@ -75,3 +74,6 @@ else()
   target_link_libraries(lambent_relight PRIVATE TBB::tbb)
 endif()
 target_compile_definitions(lambent_relight PRIVATE LAMBENT_TBB=${LAMBENT_TBB})
+if(EMSCRIPTEN)
+  target_compile_options(lambent_relight PRIVATE -msimd128)
+endif()

@@ -81,9 +81,11 @@ typedef struct lambent_info {
   int sh_order;          /**< bands of harmonics: the first sh_order^2 columns */
   int lobes;             /**< columns that are lobes */
   int groups;            /**< columns that are lamps of the scene, by group */
-  int width, height;     /**< of an atlas or a picture; else 0 */
-  float box_min[3], box_max[3]; /**< of a lattice: its corners, metres; else 0 */
-  int points[3];                /**< of a lattice: points along x, y, z, x fastest; else 0 */
+  int width;             /**< of an atlas or a picture, texels or pixels; else 0 */
+  int height;            /**< the same */
+  float box_min[3];      /**< of a lattice: its least corner, metres; else 0 */
+  float box_max[3];      /**< and its greatest */
+  int points[3];         /**< of a lattice: points along x, y, z, x fastest; else 0 */
 } lambent_info;
 
 /** How many fields a file has: 0 is the surface's, then light in free space (a lattice) where it was baked. */
@@ -97,10 +99,13 @@ lambent_code lambent_describe(const lambent_file* file, size_t field, lambent_in
 /** A triangle primitive of the file's scene. Arrays live as long as the file. */
 typedef struct lambent_part {
   size_t size;           /**< set by the caller, to sizeof(lambent_part) */
-  int node, primitive;   /**< indices in the glTF: of the node, and of the primitive within its mesh */
+  int node;              /**< index of the node in the glTF */
+  int primitive;         /**< index of the primitive within the node's mesh */
   size_t count;          /**< vertices; where placement is "patches", triangles */
-  const uint32_t *front, *back; /**< receiver of each, by side; null of texels, or where a side receives nothing */
-  const float *front_uv, *back_uv; /**< of texels: place of each vertex in the atlas, in texels, (x, y); else null */
+  const uint32_t* front; /**< receiver of each, on the side from which it is counter-clockwise; null of texels */
+  const uint32_t* back;  /**< on the other side; null also where the whole scene is one-sided */
+  const float* front_uv; /**< of texels: place of each vertex in the atlas, in texels, (x, y); else null */
+  const float* back_uv;  /**< on the other side */
 } lambent_part;
 
 /** Of the surface. Errors: LAMBENT_ARGUMENT: a part that is not there, or part->size not set. */

@@ -6,6 +6,7 @@
 
 namespace lambent {
 
+// The version that is written, and the only one that is read.
 inline constexpr int baked_file_version = 1;
 
 // One triangle primitive of one node: its run of the placement's vertices (of patches, triangles).
@@ -14,6 +15,7 @@ struct BakedPart {
   size_t first = 0, count = 0;
 };
 
+// All of a baked file but its scene.
 struct BakedFields {
   Field surface;
   std::vector<BakedPart> parts;  // runs of the placement's vertices (of patches, triangles); none of a fixed view

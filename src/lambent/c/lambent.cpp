@@ -8,6 +8,7 @@
 #include <lambent/light/sky.h>
 #include <lambent/relight/light.h>
 #include <lambent/relight/relighter.h>
+#include <lambent/core/overloaded.h>
 
 #include <algorithm>
 #include <cstdio>
@@ -17,11 +18,6 @@
 using namespace lambent;
 
 namespace {
-
-template <class... F>
-struct Overloaded : F... {
-  using F::operator()...;
-};
 
 struct OpenFile {
   BakedFields fields;
@@ -302,12 +298,12 @@ lambent_code lambent_read(const lambent_file* file, size_t index, size_t receive
           return fail(LAMBENT_UNSUPPORTED, "visibility in blocks is no list of numbers");
         if (count != values_of(store))
           return wrong("a receiver has " + std::to_string(values_of(store)) + " values, not " + std::to_string(count));
-        std::visit(Overloaded{[](const Visibility&) {},
-                              [&](const FactoredTransfer& t) {
-                                std::ranges::copy(load_receiver(t.visibility, receiver), values);
-                              },
-                              [&](const auto& t) { std::ranges::copy(load_receiver(t, receiver), values); }},
-                   store);
+        const std::vector<float> all =
+            std::visit(Overloaded{[](const Visibility&) { return std::vector<float>(); },
+                                  [&](const FactoredTransfer& t) { return load_receiver(t.visibility, receiver); },
+                                  [&](const auto& t) { return load_receiver(t, receiver); }},
+                       store);
+        std::copy(all.begin(), all.end(), values);
         return LAMBENT_OK;
       },
       file, values);

@@ -33,6 +33,7 @@ struct RelightFrame {
   Breakdown* breakdown = nullptr;  // of blocks; added to
 };
 
+// See above; errors name what does not fit, in a line.
 class Relighter {
  public:
   // The field is not copied: it must outlive the relighter and stay where it is. Errors: parts of the field that do not

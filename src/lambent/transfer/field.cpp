@@ -1,14 +1,10 @@
 #include <lambent/transfer/field.h>
+#include <lambent/core/overloaded.h>
 
 #include <algorithm>
 
 namespace lambent {
 namespace {
-
-template <class... F>
-struct Overloaded : F... {
-  using F::operator()...;
-};
 
 size_t most_receivers(const std::vector<uint32_t>& a, const std::vector<uint32_t>& b) {
   size_t most = 0;
