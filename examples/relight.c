@@ -31,8 +31,8 @@ int main(int argc, char** argv) {
   if (lambent_relighter_new(file, 0, &relighter)) return complain();
   lambent_close(file); /* the relighter keeps what it needs */
   if (info.sh_order || info.lobes)
-    if (lambent_set_sky(relighter, argc > 2 ? (float)atof(argv[2]) : 35, argc > 3 ? (float)atof(argv[3]) : 45, 3, 0.2f, 1,
-                        NULL))
+    if (lambent_set_sky(relighter, argc > 2 ? (float)atof(argv[2]) : 35, argc > 3 ? (float)atof(argv[3]) : 45, 3, 0.2f,
+                        1, NULL))
       return complain();
 
   /* T . light: once a frame, as often as the light changes. */

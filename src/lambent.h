@@ -137,9 +137,10 @@ typedef enum lambent_sh {
   LAMBENT_SH_GODOT = 3,   /**< radiance over pi, without the sign */
   LAMBENT_SH_GLTF = 4     /**< irradiance, with the sign; order 3 at most */
 } lambent_sh;
-/** Distant light as harmonics of `order` bands, order^2 times r, g, b. Bands that the file lacks are left out, those that
- * are not given are 0, and so are lobes. Errors: LAMBENT_ARGUMENT; LAMBENT_UNSUPPORTED: the file has no harmonics. */
-lambent_code lambent_set_sh(lambent_relighter* relighter, const float* rgb, int order, lambent_sh convention);
+/** Distant light as harmonics of `order` bands, order^2 times r, g, b, of a convention of lambent_sh. Bands that the
+ * file lacks are left out, those that are not given are 0, and so are lobes. Errors: LAMBENT_ARGUMENT;
+ * LAMBENT_UNSUPPORTED: the file has no harmonics. */
+lambent_code lambent_set_sh(lambent_relighter* relighter, const float* rgb, int order, int convention);
 
 /** Distant light as a lat-long picture of radiance, height x width x (r, g, b) from the top: the top row is +Y, the
  * centre +X, three quarters to the right +Z. Projected onto the file's columns; `rotation` (3 x 3, null: none) turns
@@ -147,10 +148,11 @@ lambent_code lambent_set_sh(lambent_relighter* relighter, const float* rgb, int 
  * LAMBENT_UNSUPPORTED: the file has no columns for distant light. */
 lambent_code lambent_set_environment(lambent_relighter* relighter, const float* rgb, int width, int height,
                                      const float* rotation);
-/** Distant light as a clear sky (light/sky.h): elevation [-2, 90] and azimuth (from +X towards +Z) of the sun in degrees,
- * turbidity [1.7, 10], ground albedo [0, 1], with its sun or without (0). Errors: as lambent_set_environment(). */
-lambent_code lambent_set_sky(lambent_relighter* relighter, float elevation, float azimuth, float turbidity, float ground,
-                             int sun, const float* rotation);
+/** Distant light as a clear sky (light/sky.h): elevation [-2, 90] and azimuth (from +X towards +Z) of the sun in
+ * degrees, turbidity [1.7, 10], ground albedo [0, 1], with its sun or without (0). Errors: as
+ * lambent_set_environment(). */
+lambent_code lambent_set_sky(lambent_relighter* relighter, float elevation, float azimuth, float turbidity,
+                             float ground, int sun, const float* rotation);
 /** A group of the scene's lamps by name, times this colour; 1, 1, 1 until told otherwise. Errors: LAMBENT_ARGUMENT: no
  * such group. */
 lambent_code lambent_set_lamp(lambent_relighter* relighter, const char* group, const float* rgb);
@@ -158,9 +160,9 @@ lambent_code lambent_set_lamp(lambent_relighter* relighter, const char* group, c
  * LAMBENT_ARGUMENT: another number; LAMBENT_UNSUPPORTED: the transfer is not lobes. */
 lambent_code lambent_set_rotations(lambent_relighter* relighter, const float* rotations, size_t receivers);
 
-/** T . light: row after row of r, g, b for each receiver, which begins at rgb[receiver * stride]; of diffuse transfer the
- * exit radiance of a white surface. `floats` is how many there is room for, stride 3 rows at least. Fastest with one
- * row, stride 3 and memory on a 64-byte boundary. Errors: LAMBENT_ARGUMENT; LAMBENT_NO_LIGHT. */
+/** T . light: row after row of r, g, b for each receiver, which begins at rgb[receiver * stride]; of diffuse transfer
+ * the exit radiance of a white surface. `floats` is how many there is room for, stride 3 rows at least. Fastest with
+ * one row, stride 3 and memory on a 64-byte boundary. Errors: LAMBENT_ARGUMENT; LAMBENT_NO_LIGHT. */
 lambent_code lambent_relight(lambent_relighter* relighter, float* rgb, size_t floats, size_t stride);
 
 #ifdef __cplusplus

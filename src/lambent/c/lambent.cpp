@@ -74,7 +74,7 @@ lambent_code guarded(const Body& body) noexcept {
 // And only where none of the pointers that it will follow is null.
 template <class Body, class... P>
 lambent_code guarded_with(const Body& body, const P*... pointers) noexcept {
-  if (((pointers == nullptr) || ...)) {
+  if ((!pointers || ...)) {
     std::snprintf(last_error, sizeof last_error, "a handle or a pointer is null");
     return LAMBENT_NULL;
   }
@@ -345,7 +345,7 @@ lambent_code lambent_set_columns(lambent_relighter* relighter, const float* rgb,
       relighter, rgb);
 }
 
-lambent_code lambent_set_sh(lambent_relighter* relighter, const float* rgb, int order, lambent_sh convention) {
+lambent_code lambent_set_sh(lambent_relighter* relighter, const float* rgb, int order, int convention) {
   return guarded_with(
       [&] {
         const bool three_bands = convention == LAMBENT_SH_UNITY || convention == LAMBENT_SH_GLTF;
