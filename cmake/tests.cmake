@@ -1,8 +1,9 @@
 add_executable(lambent-tests ${lambent_tests})
 target_link_libraries(lambent-tests PRIVATE lambent GTest::gtest GTest::gtest_main nlohmann_json::nlohmann_json
   fmt::fmt OpenEXR::OpenEXR TBB::tbb)
+set(lambent_golden ${CMAKE_CURRENT_SOURCE_DIR}/tests/golden)
+target_compile_definitions(lambent-tests PRIVATE LAMBENT_GOLDEN="${lambent_golden}")
 target_include_directories(lambent-tests PRIVATE ${CMAKE_CURRENT_SOURCE_DIR}/tests)
-target_compile_definitions(lambent-tests PRIVATE LAMBENT_GOLDEN="${CMAKE_CURRENT_SOURCE_DIR}/tests/golden")
 target_compile_options(lambent-tests PRIVATE -Wall -Wextra -Wno-missing-field-initializers)
 # Most of what a test compiles are these headers.
 target_precompile_headers(lambent-tests PRIVATE <gtest/gtest.h> <algorithm> <cmath> <filesystem> <functional> <map>
@@ -20,6 +21,20 @@ foreach(shard RANGE ${last})
   set_tests_properties(unit_${shard} PROPERTIES
     ENVIRONMENT "GTEST_TOTAL_SHARDS=${lambent_shards};GTEST_SHARD_INDEX=${shard}")
 endforeach()
+# Of the library that engines embed, without the other.
+add_executable(c_api tests/c_api.c)
+target_compile_options(c_api PRIVATE -Wall -Wextra -pedantic)
+add_executable(relight_memory tests/relight_memory.cpp)
+foreach(name c_api relight_memory)
+  target_link_libraries(${name} PRIVATE lambent_relight)
+endforeach()
+add_test(NAME c_api COMMAND c_api ${lambent_golden})
+if(NOT LAMBENT_SANITIZE)  # which has an allocator of its own
+  add_test(NAME relight_memory COMMAND relight_memory ${lambent_golden})
+  add_test(NAME wasm COMMAND ${CMAKE_CURRENT_SOURCE_DIR}/scripts/wasm --if-there)
+  set_tests_properties(wasm PROPERTIES ENVIRONMENT LAMBENT_RELIGHT=$<TARGET_FILE:relight>)
+endif()
+
 add_test(NAME include_arrows COMMAND ${CMAKE_CURRENT_SOURCE_DIR}/tests/include_arrows.sh ${CMAKE_CURRENT_SOURCE_DIR})
 add_test(NAME command_line COMMAND ${CMAKE_CURRENT_SOURCE_DIR}/tests/command_line.sh $<TARGET_FILE:lambent-tool>)
 set_tests_properties(command_line PROPERTIES COST 1000)  # the longest: first, beside the others

@@ -1,9 +1,5 @@
 // Bakes a scene's light transport and relights it under an environment:  bake_and_relight SCENE ENVIRONMENT PICTURE.png
-#include <lambent/bake/bake.h>
-#include <lambent/light/project.h>
-#include <lambent/relight/relight.h>
-#include <lambent/render/render.h>
-#include <lambent/scene/load.h>
+#include <lambent/lambent.h>
 
 #include <cstdio>
 

@@ -11,6 +11,7 @@
 
 namespace lambent {
 
+// What a diffuse bake is asked for.
 struct BakeOptions {
   int order = 6;  // SH bands of the light, [1, 16]: order^2 coefficients; 0 with lobes alone
   LobeKind lobe_kind = LobeKind::von_mises_fisher;
@@ -30,6 +31,7 @@ struct BakeOptions {
 // What is wrong with the light basis of these options.
 Result<void> check_light_basis(const BakeOptions& options, int least_order);
 
+// What it says of itself.
 struct BakeReport {
   size_t receivers = 0, buried = 0;  // buried: inside something, filled from their neighbours
   size_t rays = 0;                   // traced in all

@@ -12,6 +12,7 @@
 
 namespace lambent {
 
+// What a bake of free space is asked for.
 struct LatticeOptions {
   int order = 4;       // m, bands of incident light; light's order + m <= max_sh_order + 1. A diffuse object needs 3,
                        // self-shadows more
@@ -21,6 +22,7 @@ struct LatticeOptions {
   Precision precision = Precision::half;
 };
 
+// What it says of itself.
 struct LatticeReport {
   size_t points = 0, invalid = 0;  // invalid: inside something, filled from their neighbours
   size_t rays = 0;

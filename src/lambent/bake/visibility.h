@@ -8,6 +8,7 @@
 
 namespace lambent {
 
+// What a bake of visibility is asked for.
 struct VisibilityOptions {
   int size = 64;  // of the cube
   // 1: binary. More: the share of a texel that is seen, in 2^bits levels, from one ray at the centre and, where a
@@ -16,6 +17,7 @@ struct VisibilityOptions {
   size_t memory = size_t{4} << 30;  // bytes that the result may take, by an estimate made before it starts
 };
 
+// What it says of itself.
 struct VisibilityReport {
   size_t rays = 0, bytes = 0;
   double seconds = 0;

@@ -1,9 +1,11 @@
 #include <lambent/baked/baked_file.h>
 
+#include <lambent/baked/extension.h>
 #include <lambent/baked/viewer_look.h>
 #include <lambent/core/check.h>
 #include <lambent/scene/gltf.h>
 #include <lambent/scene/load.h>
+#include <lambent/core/overloaded.h>
 
 #include <algorithm>
 #include <filesystem>
@@ -14,11 +16,6 @@ namespace lambent {
 using nlohmann::json;
 
 namespace {
-
-template <class... F>
-struct Overloaded : F... {
-  using F::operator()...;
-};
 
 std::vector<Vec2> places_of(const Scene& scene, const std::vector<TexelTriangle>& side) {
   if (side.empty()) return {};

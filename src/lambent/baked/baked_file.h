@@ -19,6 +19,7 @@ struct Baked : BakedFields {
 Baked make_baked(Scene scene, const Receivers& receivers, Store store, Rows rows);
 Baked make_baked(Scene scene, FixedView view, Store store);
 
+// Receivers as a placement, and back: how values between the placement's receivers interpolate over the scene.
 Placement placement_of(const Scene& scene, const Receivers& receivers);
 SpatialBasis spatial_basis(const Scene& scene, const Placement& where);
 

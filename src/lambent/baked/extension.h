@@ -1,9 +1,8 @@
 #pragma once
 // What the reader and the writer of LAMBENT_transfer share (docs/file-format.md): the JSON of the extension with its
 // bulk data, and a codec for each store, meaning and placement.
-#include <lambent/core/file.h>
+#include <lambent/baked/fields.h>
 #include <lambent/core/glb.h>
-#include <lambent/transfer/field.h>
 
 #include <bit>
 #include <cstring>
@@ -15,12 +14,6 @@ namespace lambent {
 static_assert(std::endian::native == std::endian::little, "the file and its in-place reader are little-endian");
 
 inline constexpr const char* extension_name = "LAMBENT_transfer";
-
-// One triangle primitive of one node: its run of the placement's vertices (of patches, triangles).
-struct BakedPart {
-  int node = -1, primitive = -1;
-  size_t first = 0, count = 0;
-};
 
 // Bulk data on its way into a file. add() gives what stands for the data's buffer view in JSON until the views have
 // their numbers, which resolve_views() puts in.
@@ -105,5 +98,12 @@ Result<Placement> decode_placement(const BlobReader& in, const nlohmann::json& e
 nlohmann::json encode_lattice(const Field& field, BlobWriter& out);
 Result<Field> decode_lattice(const BlobReader& in, const nlohmann::json& object, const LightBasis& light,
                              const std::string& where);
+
+// The extension's JSON, with references to `out`'s blobs for bulk data; parts are to get their nodes and primitives.
+nlohmann::json encode_fields(const BakedFields& fields, BlobWriter& out);
+Result<BakedFields> read_fields(const MappedFile& file, const GltfChunks& chunks, const std::string& path);
+
+// Whether JSON is of a glTF with our extension.
+bool has_extension(const nlohmann::json& document);
 
 }  // namespace lambent

@@ -1,4 +1,4 @@
-#include <lambent/baked/fields.h>
+#include <lambent/baked/extension.h>
 
 #include <lambent/basis/sh.h>
 #include <lambent/core/check.h>
@@ -46,6 +46,12 @@ Result<std::vector<Transfer>> read_terms(const BlobReader& in, const json& list,
 bool has_extension(const json& document) {
   const auto extensions = document.find("extensions");
   return extensions != document.end() && extensions->is_object() && extensions->contains(extension_name);
+}
+
+Result<BakedFields> read_fields(const std::string& path) {
+  auto file = MappedFile::open(path);
+  if (!file) return file.error();
+  return read_fields(*file, path);
 }
 
 Result<BakedFields> read_fields(const MappedFile& file, const std::string& path) {

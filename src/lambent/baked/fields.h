@@ -1,12 +1,21 @@
 #pragma once
 // What a baked file holds beside its scene, read without it: the surface's field, others beside it, and whose vertices
 // they are. This is all that an engine needs to relight; the format is in docs/file-format.md.
-#include <lambent/baked/extension.h>
+#include <lambent/core/file.h>
+#include <lambent/transfer/field.h>
 
 namespace lambent {
 
+// The version that is written, and the only one that is read.
 inline constexpr int baked_file_version = 1;
 
+// One triangle primitive of one node: its run of the placement's vertices (of patches, triangles).
+struct BakedPart {
+  int node = -1, primitive = -1;
+  size_t first = 0, count = 0;
+};
+
+// All of a baked file but its scene.
 struct BakedFields {
   Field surface;
   std::vector<BakedPart> parts;  // runs of the placement's vertices (of patches, triangles); none of a fixed view
@@ -20,12 +29,6 @@ struct BakedFields {
 // Data are read in place and keep the mapping alive. Errors: not a baked file, another version, anything that does not
 // fit; all in one line that names the file.
 Result<BakedFields> read_fields(const MappedFile& file, const std::string& path);
-Result<BakedFields> read_fields(const MappedFile& file, const GltfChunks& chunks, const std::string& path);
-
-// The extension's JSON, with references to `out`'s blobs for bulk data; parts are to get their nodes and primitives.
-nlohmann::json encode_fields(const BakedFields& fields, BlobWriter& out);
-
-// Whether JSON is of a glTF with our extension.
-bool has_extension(const nlohmann::json& document);
+Result<BakedFields> read_fields(const std::string& path);
 
 }  // namespace lambent

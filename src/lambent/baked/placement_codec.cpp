@@ -1,5 +1,6 @@
 #include <lambent/baked/extension.h>
 #include <lambent/basis/sh.h>
+#include <lambent/core/overloaded.h>
 
 #include <algorithm>
 
@@ -8,11 +9,6 @@ namespace lambent {
 using nlohmann::json;
 
 namespace {
-
-template <class... F>
-struct Overloaded : F... {
-  using F::operator()...;
-};
 
 // What parts hold: vertices, a receiver a vertex; patches, a receiver a triangle; texels, a place in the atlas a
 // vertex.

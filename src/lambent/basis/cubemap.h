@@ -13,7 +13,9 @@
 
 namespace lambent {
 
-inline constexpr int block_side = 16, block_texels = block_side * block_side;
+// Texels a side of a block and in it; texels a side of a cube at most.
+inline constexpr int block_side = 16;
+inline constexpr int block_texels = block_side * block_side;
 inline constexpr int max_cube_size = 256;
 
 // Sizes that are whole blocks: multiples of 16 up to max_cube_size.
@@ -47,6 +49,7 @@ struct DirectionArray {
 // Points a side at which a function on a block is sampled for 1, 4 or 16 values, and what interpolates between them.
 inline constexpr int node_sides[3] = {1, 2, 4};
 
+// What is known of a cube of so many texels a side, whatever lies on it.
 struct Cube {
   int size = 0;
   DirectionArray texels;                // centres
@@ -60,6 +63,7 @@ struct Cube {
   int blocks() const { return cube_blocks(size); }
   size_t count() const { return cube_texels(size); }
 };
+// `size` texels a side, which is_cube_size() takes.
 Cube make_cube(int size);
 
 }  // namespace lambent

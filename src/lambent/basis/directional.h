@@ -7,11 +7,13 @@
 
 namespace lambent {
 
+// Its shape, at angle t to the axis.
 enum class LobeKind {
   cosine_power,      // max(0, cos t)^s, s >= 1: nothing beyond 90 degrees
   von_mises_fisher,  // exp(s (cos t - 1)), s > 0: smooth everywhere
 };
 
+// A function of the angle to an axis.
 struct Lobe {
   Vec3 axis;        // unit
   float sharpness;  // s above

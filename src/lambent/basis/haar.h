@@ -13,12 +13,14 @@
 
 namespace lambent {
 
+// A function on the square, by its wavelets.
 struct HaarTree {
   int levels = 0;
   // The constant's, then three a square: squares level by level, along a Morton curve in each.
   std::vector<float> coefficients;
   std::vector<uint8_t> occupied;  // by square: whether it or a square inside it has a coefficient that is not 0
 };
+// Squares with wavelets, and coefficients, of so many levels.
 constexpr size_t haar_squares(int levels) { return ((size_t(1) << 2 * levels) - 1) / 3; }
 constexpr size_t haar_count(int levels) { return size_t(1) << 2 * levels; }
 

@@ -11,8 +11,10 @@
 
 namespace lambent {
 
+// Bands at most.
 inline constexpr int max_sh_order = 16;
 
+// Coefficients of an order; the index of (l, m); the band of an index.
 constexpr int sh_count(int order) { return order * order; }
 constexpr int sh_index(int l, int m) { return l * (l + 1) + m; }
 constexpr int sh_band(int index) {

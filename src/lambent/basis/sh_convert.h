@@ -11,6 +11,7 @@
 
 namespace lambent {
 
+// Whose coefficients.
 enum class ShConvention {
   lambent,   // also Sloan, DirectXMath, Filament radiance, pbrt, Unreal, Babylon: radiance, Condon-Shortley
   three,     // three.js LightProbe: radiance, no Condon-Shortley
@@ -19,6 +20,7 @@ enum class ShConvention {
   gltf_ibl,  // EXT_lights_image_based: irradiance A.L, Condon-Shortley; order 3
 };
 
+// "lambent", "three", "unity", "godot" or "gltf-ibl"; nothing for others.
 std::optional<ShConvention> parse_sh_convention(const std::string& name);
 
 // Converts n^2 coefficients, n >= 1; conventions of order 3 keep the first 9 (fewer if there are fewer).

@@ -67,6 +67,7 @@ struct Measured {
   std::shared_ptr<const MeasuredTable> table;
 };
 
+// Any of the models.
 using Brdf = std::variant<Lambert, Phong, Ggx, CookTorrance, Ward, MetallicRoughness, Measured>;
 
 // f(wi, wo), per steradian, without the cosine.
@@ -83,11 +84,13 @@ struct BrdfValue {
 };
 BrdfValue evaluate_with_pdf(const Brdf& brdf, Vec3 wi, Vec3 wo);
 
+// A direction of light drawn for a view, with what came of it.
 struct BrdfSample {
   Vec3 wi;
   Vec3 weight;  // f cos(theta_i) / pdf
   float pdf;    // per steradian; 0 when nothing was drawn (the direction would lie below the surface)
 };
+// u lies in [0, 1)^2.
 BrdfSample sample(const Brdf& brdf, Vec3 wo, Vec2 u);
 
 }  // namespace lambent

@@ -1,10 +1,10 @@
+#include <lambent/core/aligned.h>
 #include <lambent/core/file.h>
 
 #include <fcntl.h>
 #include <sys/mman.h>
 #include <sys/stat.h>
 #include <unistd.h>
-#include <xxhash.h>
 
 #include <algorithm>
 #include <atomic>
@@ -55,6 +55,15 @@ Result<MappedFile> MappedFile::open(const std::string& path) {
                                                 [size](const uint8_t* q) { ::munmap(const_cast<uint8_t*>(q), size); });
   }
   ::close(*fd);
+  return file;
+}
+
+MappedFile MappedFile::copy_of(std::span<const uint8_t> bytes) {
+  MappedFile file;
+  file.size_ = bytes.size();
+  if (bytes.empty()) return file;
+  auto storage = std::make_shared<AlignedVector<uint8_t>>(bytes.begin(), bytes.end());
+  file.data_ = std::shared_ptr<const uint8_t>(storage, storage->data());
   return file;
 }
 
@@ -130,15 +139,6 @@ std::string file_extension(const std::string& path) {
   std::string ext = path.substr(dot + 1);
   std::transform(ext.begin(), ext.end(), ext.begin(), [](unsigned char c) { return char(std::tolower(c)); });
   return ext;
-}
-
-std::string content_hash(std::span<const uint8_t> bytes) {
-  XXH128_canonical_t digest;
-  XXH128_canonicalFromHash(&digest, XXH3_128bits(bytes.data(), bytes.size()));
-  std::string text;
-  char hex[3];
-  for (unsigned char byte : digest.digest) std::snprintf(hex, sizeof hex, "%02x", byte), text += hex;
-  return text;
 }
 
 }  // namespace lambent

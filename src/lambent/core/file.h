@@ -14,7 +14,10 @@ namespace lambent {
 // A whole file mapped read-only; the bytes live as long as the object (copies share the mapping).
 class MappedFile {
  public:
+  // Errors: missing, a folder or no plain file, the system's.
   static Result<MappedFile> open(const std::string& path);
+  // A copy of bytes that came from elsewhere, on a 64-byte boundary.
+  static MappedFile copy_of(std::span<const uint8_t> bytes);
   std::span<const uint8_t> bytes() const { return {data_.get(), size_}; }
 
  private:

@@ -8,6 +8,7 @@
 
 namespace lambent {
 
+// Made by whoever wants to see progress, or to stop the work.
 class Progress {
  public:
   // report(stage, fraction in [0,1]) is called from any thread, one call at a time, at least once when a stage begins
@@ -31,6 +32,7 @@ class Progress {
   std::atomic<bool> cancelled_{false};
 };
 
+// False where there is nobody to stop it.
 inline bool is_cancelled(const Progress* p) { return p && p->cancelled(); }
 
 // One stage of work; ends when it goes out of scope.

@@ -14,6 +14,7 @@ struct Error {
   std::string text() const { return where.empty() ? message : where + ": " + message; }
 };
 
+// A value, or why there is none. Only what is there may be asked for: look first.
 template <class T>
 class [[nodiscard]] Result {
  public:

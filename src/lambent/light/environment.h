@@ -12,6 +12,7 @@
 
 namespace lambent {
 
+// Distant light, as above.
 struct Environment {
   std::string name;                   // of a file: its stem
   Image image;                        // radiance, finite, no alpha; non-negative but for band-limited ones

@@ -4,6 +4,7 @@
 
 namespace lambent {
 
+// What a sky is asked for.
 struct SkyOptions {
   float elevation = 35.0f;  // degrees of the sun's centre above the horizon, [-2, 90]
   float azimuth = 45.0f;    // degrees of the sun from +X towards +Z, any

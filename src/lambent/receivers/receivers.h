@@ -104,6 +104,7 @@ struct PatchReceivers {
   }
 };
 
+// How values at receivers make a function on surfaces.
 using SpatialBasis = std::variant<CornerReceivers, TexelReceivers, PatchReceivers>;
 
 // The point of a triangle's side that a texel stands for.
@@ -112,6 +113,7 @@ struct TexelPlace {
   float u, v;
 };
 
+// Where light is received, and how values between the places interpolate.
 struct Receivers {
   // Where rays start: the place moved off its surface by a hair, and, where its faces do not surround it (borders,
   // creases), a hair towards them, so that a wall's foot does not lie in the wall.
@@ -131,6 +133,7 @@ Receivers make_vertex_receivers(const Scene& scene);
 // Gathered at the middle of each triangle.
 Receivers make_patch_receivers(const Scene& scene);
 
+// From the receiver of each vertex, by side (`back` may be empty).
 CornerReceivers corner_receivers(const Scene& scene, const std::vector<uint32_t>& front,
                                  const std::vector<uint32_t>& back);
 

@@ -5,6 +5,7 @@
 
 namespace lambent {
 
+// A light as coefficients, and the functions that they belong to.
 struct LightProjection {
   std::vector<Vec3> light;    // one coefficient a column; of the scene's own lamps (groups) 0
   std::vector<float> window;  // factors a band that the harmonics were multiplied by

@@ -18,6 +18,7 @@ struct SphereLamp {
   Vec3 radiance{1.0f};
 };
 
+// Distant light, and lamps that are near.
 struct LocalLight {
   std::vector<Vec3> distant;  // coefficients of radiance, order^2 of them
   std::vector<SphereLamp> lamps;

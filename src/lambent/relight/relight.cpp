@@ -20,14 +20,55 @@ inline auto LoadValues(const F d, const hwy::float16_t* p) {
   return hn::PromoteTo(d, hn::LoadU(hn::Rebind<hwy::float16_t, F>(), p));
 }
 
+constexpr size_t B = transfer_block;
+
+// Where sums go: a row of a block, 3 x 16 numbers, after another. Into a Relit, past the caches.
+struct Planar {
+  float* out;
+  template <class V>
+  void put(V sums, size_t at) {
+    hn::Stream(sums, F(), out + at);
+  }
+  void next() { out += 3 * B; }
+};
+
+// Into the caller's memory, [receiver][row][r, g, b].
+struct Interleaved {
+  float* out;
+  size_t stride, rows, receivers;  // receivers that are left, this block's included
+  size_t row = 0;
+  alignas(64) float planar[3 * B] = {};
+
+  template <class V>
+  void put(V sums, size_t at) {
+    hn::Store(sums, F(), planar + at);
+  }
+  void next() {
+    const F d;
+    if (rows == 1 && stride == 3 && receivers >= B) {
+      alignas(64) float mixed[3 * B];
+      for (size_t part = 0; part < B; part += hn::Lanes(d))
+        hn::StoreInterleaved3(hn::Load(d, planar + part), hn::Load(d, planar + B + part),
+                              hn::Load(d, planar + 2 * B + part), d, mixed + 3 * part);
+      if (reinterpret_cast<uintptr_t>(out) % 64 == 0)
+        for (size_t i = 0; i < 3 * B; i += hn::Lanes(d)) hn::Stream(hn::Load(d, mixed + i), d, out + i);
+      else std::copy(mixed, mixed + 3 * B, out);
+    } else {
+      for (size_t i = 0; i < std::min(B, receivers); ++i)
+        for (size_t c = 0; c < 3; ++c) out[i * stride + 3 * row + c] = planar[c * B + i];
+    }
+    if (++row < rows) return;
+    row = 0, out += B * stride, receivers -= std::min(B, receivers);
+  }
+};
+
 // light is [channel][column]. A sum is kept in registers while its columns stream by, in memory order: reading several
 // channels at once would confuse the hardware's prefetching. Even and odd columns are summed apart, to hide the latency
 // of adding.
-template <class Value>
-void RelightGrey(const Value* t, size_t pieces, size_t columns, const float* light, float* out) {
+template <class Value, class Sink>
+void RelightGrey(const Value* t, size_t pieces, size_t columns, const float* light, Sink& out) {
   const F d;
-  constexpr size_t B = 16;
-  for (size_t b = 0; b < pieces; ++b, t += columns * B, out += 3 * B) {
+  for (size_t b = 0; b < pieces; ++b, t += columns * B, out.next()) {
     for (size_t part = 0; part < B; part += hn::Lanes(d)) {
       auto r0 = hn::Zero(d), g0 = r0, b0 = r0, r1 = r0, g1 = r0, b1 = r0;
       const Value* p = t + part;
@@ -47,21 +88,19 @@ void RelightGrey(const Value* t, size_t pieces, size_t columns, const float* lig
         g0 = hn::MulAdd(last, hn::Set(d, light[columns + k]), g0);
         b0 = hn::MulAdd(last, hn::Set(d, light[2 * columns + k]), b0);
       }
-      hn::Stream(hn::Add(r0, r1), d, out + part);
-      hn::Stream(hn::Add(g0, g1), d, out + B + part);
-      hn::Stream(hn::Add(b0, b1), d, out + 2 * B + part);
+      out.put(hn::Add(r0, r1), part);
+      out.put(hn::Add(g0, g1), B + part);
+      out.put(hn::Add(b0, b1), 2 * B + part);
     }
   }
-  hwy::FlushStream();
 }
 
-template <class Value>
-void RelightColoured(const Value* t, size_t pieces, size_t columns, const float* light, float* out) {
+template <class Value, class Sink>
+void RelightColoured(const Value* t, size_t pieces, size_t columns, const float* light, Sink& out) {
   const F d;
-  constexpr size_t B = 16;
-  for (size_t b = 0; b < pieces; ++b) {
+  for (size_t b = 0; b < pieces; ++b, out.next()) {
     const float* l = light;
-    for (int channel = 0; channel < 3; ++channel, t += columns * B, l += columns, out += B) {
+    for (size_t channel = 0; channel < 3; ++channel, t += columns * B, l += columns) {
       for (size_t part = 0; part < B; part += hn::Lanes(d)) {
         auto s0 = hn::Zero(d), s1 = s0, s2 = s0, s3 = s0;
         const Value* p = t + part;
@@ -73,24 +112,32 @@ void RelightColoured(const Value* t, size_t pieces, size_t columns, const float*
           s3 = hn::MulAdd(LoadValues(d, p + 3 * B), hn::Set(d, l[k + 3]), s3);
         }
         for (; k < columns; ++k, p += B) s0 = hn::MulAdd(LoadValues(d, p), hn::Set(d, l[k]), s0);
-        hn::Stream(hn::Add(hn::Add(s0, s1), hn::Add(s2, s3)), d, out + part);
+        out.put(hn::Add(hn::Add(s0, s1), hn::Add(s2, s3)), channel * B + part);
       }
     }
   }
+}
+
+template <class Sink>
+void RelightPieces(const Transfer& t, size_t block, size_t pieces, const float* light, Sink out) {
+  const uint8_t* data = t.data.data() + block * t.block_values() * t.value_bytes();
+  auto run = [&](const auto* values) {
+    if (t.channels == 1) RelightGrey(values, pieces, t.columns(), light, out);
+    else RelightColoured(values, pieces, t.columns(), light, out);
+  };
+  if (t.precision == Precision::half) run(reinterpret_cast<const hwy::float16_t*>(data));
+  else run(reinterpret_cast<const float*>(data));
   hwy::FlushStream();
 }
 
-template <class Value>
-void RelightPieces(const Value* t, size_t pieces, size_t columns, int channels, const float* light, float* out) {
-  if (channels == 1) RelightGrey(t, pieces, columns, light, out);
-  else RelightColoured(t, pieces, columns, light, out);
+// To the loops, a block's row is a block.
+void RelightToRelit(const Transfer& t, size_t begin, size_t end, const float* light, float* out) {
+  const size_t rows = size_t(t.rows);
+  RelightPieces(t, begin, (end - begin) * rows, light, Planar{out + begin * rows * 3 * B});
 }
-
-void RelightHalf(const uint8_t* t, size_t pieces, size_t columns, int channels, const float* light, float* out) {
-  RelightPieces(reinterpret_cast<const hwy::float16_t*>(t), pieces, columns, channels, light, out);
-}
-void RelightSingle(const uint8_t* t, size_t pieces, size_t columns, int channels, const float* light, float* out) {
-  RelightPieces(reinterpret_cast<const float*>(t), pieces, columns, channels, light, out);
+void RelightToMemory(const Transfer& t, size_t begin, size_t end, const float* light, float* out, size_t stride) {
+  RelightPieces(t, begin, (end - begin) * size_t(t.rows), light,
+                Interleaved{out + begin * B * stride, stride, size_t(t.rows), t.receivers - begin * B});
 }
 
 }  // namespace HWY_NAMESPACE
@@ -100,25 +147,51 @@ HWY_AFTER_NAMESPACE();
 #if HWY_ONCE
 namespace lambent {
 
-HWY_EXPORT(RelightHalf);
-HWY_EXPORT(RelightSingle);
+HWY_EXPORT(RelightToRelit);
+HWY_EXPORT(RelightToMemory);
 
-void relight(const Transfer& t, std::span<const Vec3> light, Relit& out) {
-  const size_t C = t.columns(), rows = size_t(t.rows);
+namespace {
+
+// body(begin, end, light [channel][column]) for runs of blocks.
+template <class Body>
+void for_blocks(const Transfer& t, std::span<const Vec3> light, const Body& body) {
+  const size_t C = t.columns();
   LAMBENT_CHECK(light.size() >= C && C <= max_columns && t.data.size() == t.bytes());
   float planar[3 * max_columns];
   for (size_t k = 0; k < C; ++k)
-    for (int c = 0; c < 3; ++c) planar[size_t(c) * C + k] = light[k][c];
+    for (size_t c = 0; c < 3; ++c) planar[c * C + k] = light[k][c];
+  const size_t grain = std::max<size_t>(1, (size_t{1} << 20) / (t.block_values() * t.value_bytes()));
+  parallel_for(t.blocks(), grain, [&](size_t begin, size_t end) { body(begin, end, planar); });
+}
+
+}  // namespace
+
+void relight(const Transfer& t, std::span<const Vec3> light, Relit& out) {
   out.rows = t.rows;
-  out.values.resize(t.blocks() * rows * 3 * transfer_block);
-  const size_t block_bytes = t.block_values() * t.value_bytes();
-  const size_t grain = std::max<size_t>(1, (size_t{1} << 20) / block_bytes);
-  parallel_for(t.blocks(), grain, [&](size_t begin, size_t end) {
-    const uint8_t* data = t.data.data() + begin * block_bytes;
-    float* values = out.values.data() + begin * rows * 3 * transfer_block;
-    const size_t pieces = (end - begin) * rows;  // to the loop, a block's row is a block
-    if (t.precision == Precision::half) HWY_DYNAMIC_DISPATCH(RelightHalf)(data, pieces, C, t.channels, planar, values);
-    else HWY_DYNAMIC_DISPATCH(RelightSingle)(data, pieces, C, t.channels, planar, values);
+  out.values.resize(t.blocks() * size_t(t.rows) * 3 * transfer_block);
+  for_blocks(t, light, [&](size_t begin, size_t end, const float* planar) {
+    HWY_DYNAMIC_DISPATCH(RelightToRelit)(t, begin, end, planar, out.values.data());
+  });
+}
+
+void relight(const Transfer& t, std::span<const Vec3> light, std::span<float> out, size_t stride) {
+  const size_t each = 3 * size_t(t.rows);
+  LAMBENT_CHECK(stride >= each && (t.receivers == 0 || out.size() >= (t.receivers - 1) * stride + each));
+  for_blocks(t, light, [&](size_t begin, size_t end, const float* planar) {
+    HWY_DYNAMIC_DISPATCH(RelightToMemory)(t, begin, end, planar, out.data(), stride);
+  });
+}
+
+void interleave(const Relit& relit, size_t receivers, std::span<float> out, size_t stride) {
+  const size_t each = 3 * size_t(relit.rows);
+  LAMBENT_CHECK(stride >= each && (receivers == 0 || out.size() >= (receivers - 1) * stride + each));
+  parallel_for(receivers, 4096, [&](size_t begin, size_t end) {
+    for (size_t r = begin; r < end; ++r)
+      for (int row = 0; row < relit.rows; ++row) {
+        const Vec3 v = relit.at(r, row);
+        float* o = out.data() + r * stride + 3 * size_t(row);
+        o[0] = v.x, o[1] = v.y, o[2] = v.z;
+      }
   });
 }
 

@@ -17,57 +17,62 @@ namespace HWY_NAMESPACE {
 namespace hn = hwy::HWY_NAMESPACE;
 
 // lit is [cluster][1 + rank][padded]; receivers [first, first + count) of one block of the output, which is
-// [value][transfer_block]. `own` holds transfer_block x padded floats.
-void RelightBlock(const CpcaTransfer& t, const float* lit, size_t padded, size_t first, size_t count, float* own,
-                  float* out) {
+// [value][transfer_block]. Values go in tiles, so that a block of them fits the stack.
+void RelightBlock(const CpcaTransfer& t, const float* lit, size_t padded, size_t first, size_t count, float* out) {
+  constexpr size_t tile = 256;
+  alignas(64) float own[transfer_block * tile];
   const hn::CappedTag<float, 16> d;
-  const size_t rank = size_t(t.rank), each = 3 * size_t(t.rows), N = hn::Lanes(d);
-  std::fill(own + count * padded, own + transfer_block * padded, 0.0f);
-  float weights[max_cpca_rank];
-  for (size_t i = 0; i < count; ++i) {
-    const float* mean = lit + size_t(t.cluster_of[first + i]) * (1 + rank) * padded;
-    for (size_t k = 0; k < rank; ++k) weights[k] = half_to_float(t.weights[(first + i) * rank + k]);
-    size_t e = 0;  // four sums at a time hide the latency of adding
-    for (; e + 4 * N <= padded; e += 4 * N) {
-      const float* L = mean + e;
-      auto s0 = hn::Load(d, L), s1 = hn::Load(d, L + N), s2 = hn::Load(d, L + 2 * N), s3 = hn::Load(d, L + 3 * N);
-      for (size_t k = 0; k < rank; ++k) {
-        const auto w = hn::Set(d, weights[k]);
-        L += padded;
-        s0 = hn::MulAdd(w, hn::Load(d, L), s0), s1 = hn::MulAdd(w, hn::Load(d, L + N), s1);
-        s2 = hn::MulAdd(w, hn::Load(d, L + 2 * N), s2), s3 = hn::MulAdd(w, hn::Load(d, L + 3 * N), s3);
+  const size_t rank = size_t(t.rank), all = 3 * size_t(t.rows), N = hn::Lanes(d);
+  std::fill(own + count * tile, own + transfer_block * tile, 0.0f);
+  float weights[transfer_block][max_cpca_rank];
+  for (size_t i = 0; i < count; ++i)
+    for (size_t k = 0; k < rank; ++k) weights[i][k] = half_to_float(t.weights[(first + i) * rank + k]);
+  for (size_t at = 0; at < padded; at += tile, out += tile * transfer_block) {
+    const size_t width = std::min(tile, padded - at), each = std::min(tile, all - at);
+    for (size_t i = 0; i < count; ++i) {
+      const float* mean = lit + size_t(t.cluster_of[first + i]) * (1 + rank) * padded + at;
+      size_t e = 0;  // four sums at a time hide the latency of adding
+      for (; e + 4 * N <= width; e += 4 * N) {
+        const float* L = mean + e;
+        auto s0 = hn::Load(d, L), s1 = hn::Load(d, L + N), s2 = hn::Load(d, L + 2 * N), s3 = hn::Load(d, L + 3 * N);
+        for (size_t k = 0; k < rank; ++k) {
+          const auto w = hn::Set(d, weights[i][k]);
+          L += padded;
+          s0 = hn::MulAdd(w, hn::Load(d, L), s0), s1 = hn::MulAdd(w, hn::Load(d, L + N), s1);
+          s2 = hn::MulAdd(w, hn::Load(d, L + 2 * N), s2), s3 = hn::MulAdd(w, hn::Load(d, L + 3 * N), s3);
+        }
+        float* o = own + i * tile + e;
+        hn::Store(s0, d, o), hn::Store(s1, d, o + N), hn::Store(s2, d, o + 2 * N), hn::Store(s3, d, o + 3 * N);
       }
-      float* o = own + i * padded + e;
-      hn::Store(s0, d, o), hn::Store(s1, d, o + N), hn::Store(s2, d, o + 2 * N), hn::Store(s3, d, o + 3 * N);
+      for (; e < width; e += N) {
+        const float* L = mean + e;
+        auto sum = hn::Load(d, L);
+        for (size_t k = 0; k < rank; ++k) sum = hn::MulAdd(hn::Set(d, weights[i][k]), hn::Load(d, L += padded), sum);
+        hn::Store(sum, d, own + i * tile + e);
+      }
     }
-    for (; e < padded; e += N) {
-      const float* L = mean + e;
-      auto sum = hn::Load(d, L);
-      for (size_t k = 0; k < rank; ++k) sum = hn::MulAdd(hn::Set(d, weights[k]), hn::Load(d, L += padded), sum);
-      hn::Store(sum, d, own + i * padded + e);
-    }
-  }
-  // Receivers become lanes, by squares of four.
+    // Receivers become lanes, by squares of four.
 #if HWY_TARGET == HWY_SCALAR
-  for (size_t e = 0; e < each; ++e)
-    for (size_t i = 0; i < transfer_block; ++i) out[e * transfer_block + i] = own[i * padded + e];
+    for (size_t e = 0; e < each; ++e)
+      for (size_t i = 0; i < transfer_block; ++i) out[e * transfer_block + i] = own[i * tile + e];
 #else
-  const hn::FixedTag<float, 4> d4;
-  for (size_t e = 0; e < each; e += 4)
-    for (size_t i = 0; i < transfer_block; i += 4) {
-      const float* p = own + i * padded + e;
-      const auto a = hn::Load(d4, p), b = hn::Load(d4, p + padded), c = hn::Load(d4, p + 2 * padded),
-                 f = hn::Load(d4, p + 3 * padded);
-      const auto ac0 = hn::InterleaveLower(d4, a, c), bf0 = hn::InterleaveLower(d4, b, f),
-                 ac1 = hn::InterleaveUpper(d4, a, c), bf1 = hn::InterleaveUpper(d4, b, f);
-      float* q = out + e * transfer_block + i;
-      hn::Stream(hn::InterleaveLower(d4, ac0, bf0), d4, q);
-      if (e + 1 < each) hn::Stream(hn::InterleaveUpper(d4, ac0, bf0), d4, q + transfer_block);
-      if (e + 2 < each) hn::Stream(hn::InterleaveLower(d4, ac1, bf1), d4, q + 2 * transfer_block);
-      if (e + 3 < each) hn::Stream(hn::InterleaveUpper(d4, ac1, bf1), d4, q + 3 * transfer_block);
-    }
-  hwy::FlushStream();
+    const hn::FixedTag<float, 4> d4;
+    for (size_t e = 0; e < each; e += 4)
+      for (size_t i = 0; i < transfer_block; i += 4) {
+        const float* p = own + i * tile + e;
+        const auto a = hn::Load(d4, p), b = hn::Load(d4, p + tile), c = hn::Load(d4, p + 2 * tile),
+                   f = hn::Load(d4, p + 3 * tile);
+        const auto ac0 = hn::InterleaveLower(d4, a, c), bf0 = hn::InterleaveLower(d4, b, f),
+                   ac1 = hn::InterleaveUpper(d4, a, c), bf1 = hn::InterleaveUpper(d4, b, f);
+        float* q = out + e * transfer_block + i;
+        hn::Stream(hn::InterleaveLower(d4, ac0, bf0), d4, q);
+        if (e + 1 < each) hn::Stream(hn::InterleaveUpper(d4, ac0, bf0), d4, q + transfer_block);
+        if (e + 2 < each) hn::Stream(hn::InterleaveLower(d4, ac1, bf1), d4, q + 2 * transfer_block);
+        if (e + 3 < each) hn::Stream(hn::InterleaveUpper(d4, ac1, bf1), d4, q + 3 * transfer_block);
+      }
 #endif
+  }
+  hwy::FlushStream();
 }
 
 // Vector v, [row][channel][C], times light, [channel][C], into out[row][r, g, b].
@@ -106,25 +111,25 @@ HWY_EXPORT(LightVector);
 
 void relight(const CpcaTransfer& t, std::span<const Vec3> light, Relit& out) {
   const size_t C = t.light.count(), rows = size_t(t.rows), rank = size_t(t.rank), channels = size_t(t.channels);
-  LAMBENT_CHECK(light.size() >= C && t.cluster_of.size() == t.receivers && t.weights.size() == t.receivers * rank);
+  LAMBENT_CHECK(light.size() >= C && C <= max_columns && t.cluster_of.size() == t.receivers &&
+                t.weights.size() == t.receivers * rank);
   const size_t blocks = (t.receivers + transfer_block - 1) / transfer_block;
   out.rows = t.rows;
   out.values.resize(blocks * rows * 3 * transfer_block);
   // Once a frame: each cluster's vectors times the light, [cluster][1 + rank][row][r, g, b].
   const size_t padded = (3 * rows + 15) / 16 * 16;
   out.scratch.resize(size_t(t.clusters) * (1 + rank) * padded);
-  std::vector<float> by_channel(3 * C);
+  float by_channel[3 * max_columns];
   for (size_t c = 0; c < 3; ++c)
-    for (size_t k = 0; k < C; ++k) by_channel[c * C + k] = light[k][int(c)];
+    for (size_t k = 0; k < C; ++k) by_channel[c * C + k] = light[k][c];
   parallel_for(size_t(t.clusters) * (1 + rank), 64, [&](size_t begin, size_t end) {
     for (size_t v = begin; v < end; ++v) HWY_DYNAMIC_DISPATCH(LightVector)
-    (t.vectors.data() + v * rows * channels * C, rows, channels, C, by_channel.data(), out.scratch.data() + v * padded);
+    (t.vectors.data() + v * rows * channels * C, rows, channels, C, by_channel, out.scratch.data() + v * padded);
   });
   parallel_for(blocks, 64, [&](size_t begin, size_t end) {
-    AlignedVector<float> own(transfer_block * padded);
     for (size_t b = begin; b < end; ++b) HWY_DYNAMIC_DISPATCH(RelightBlock)
     (t, out.scratch.data(), padded, b * transfer_block, std::min(transfer_block, t.receivers - b * transfer_block),
-     own.data(), out.values.data() + b * rows * 3 * transfer_block);
+     out.values.data() + b * rows * 3 * transfer_block);
   });
 }
 

@@ -33,6 +33,13 @@ struct OfColumns : Columns {
     lambent::relight(store, light, out);
     return {};
   }
+  // Dense transfer needs nothing between.
+  Result<void> relight(const RelightFrame& frame, std::span<float> out,
+                       size_t stride) requires(std::is_same_v<Store, Transfer>) {
+    if (auto ok = at_rest(frame); !ok) return ok;
+    lambent::relight(store, light, out, stride);
+    return {};
+  }
 };
 
 struct OfLobes : Columns {
@@ -131,6 +138,7 @@ struct Make {
 struct Relighter::State {
   const Field& field;
   AnyStore store;
+  Relit between = {};
 };
 
 Relighter::Relighter(std::unique_ptr<State> state) : state_(std::move(state)) {}
@@ -145,12 +153,10 @@ Result<Relighter> Relighter::make(const Field& field, RelighterOptions options) 
   return Relighter(std::make_unique<State>(State{field, std::visit(Make{field, options}, field.store)}));
 }
 
+const Field& Relighter::field() const { return state_->field; }
 LightBasis Relighter::light() const { return light_of(state_->field.store); }
 size_t Relighter::receivers() const { return receivers_of(state_->field.store); }
-int Relighter::rows() const {
-  const auto* factors = std::get_if<FactoredTransfer>(&state_->field.store);
-  return factors ? sh_count(factors->incident_order) : std::max(1, rows_of(state_->field.store));
-}
+int Relighter::rows() const { return rows_relit(state_->field.store); }
 
 Result<void> Relighter::set_light(std::span<const Vec3> columns) {
   const size_t count = light().count();
@@ -179,6 +185,25 @@ Result<void> Relighter::relight(const RelightFrame& frame, Relit& out) {
       [&](auto& s) -> Result<void> {
         if (!s.ready && !frame.light) return wrong("no light was set");
         return s.relight(frame, out);
+      },
+      state_->store);
+}
+
+Result<void> Relighter::relight(const RelightFrame& frame, std::span<float> out, size_t stride) {
+  const size_t each = 3 * size_t(rows()), n = receivers();
+  if (stride < each) return wrong("a receiver has " + std::to_string(each) + " numbers, more than the stride");
+  if (n > 0 && (n - 1 > (SIZE_MAX - each) / stride || out.size() < (n - 1) * stride + each))
+    return wrong("there is no room for " + std::to_string(n) + " receivers");
+  return std::visit(
+      [&](auto& s) -> Result<void> {
+        if (!s.ready && !frame.light) return wrong("no light was set");
+        if constexpr (requires { s.relight(frame, out, stride); }) {
+          return s.relight(frame, out, stride);
+        } else {
+          auto done = s.relight(frame, state_->between);
+          if (done) interleave(state_->between, n, out, stride);
+          return done;
+        }
       },
       state_->store);
 }

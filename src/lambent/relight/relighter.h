@@ -33,6 +33,7 @@ struct RelightFrame {
   Breakdown* breakdown = nullptr;  // of blocks; added to
 };
 
+// See above; errors name what does not fit, in a line.
 class Relighter {
  public:
   // The field is not copied: it must outlive the relighter and stay where it is. Errors: parts of the field that do not
@@ -43,6 +44,7 @@ class Relighter {
   Relighter& operator=(Relighter&&) noexcept;
   ~Relighter();
 
+  const Field& field() const;
   LightBasis light() const;  // the columns that set_light() takes; none of visibility in blocks
   size_t receivers() const;
   int rows() const;  // of what relight() gives: what the field's Rows mean; of visibility one, exit radiance
@@ -56,6 +58,10 @@ class Relighter {
   // `out` and what is needed between, later ones allocate nothing. Errors: no light set; frames, a light field or seen
   // receivers that do not fit the field, or that its store cannot use.
   Result<void> relight(const RelightFrame& frame, Relit& out);
+
+  // The same into memory of the caller's, [receiver][row][r, g, b]: receiver r begins at out[r * stride], in floats.
+  // Errors: those above; a stride below 3 rows(); too little room.
+  Result<void> relight(const RelightFrame& frame, std::span<float> out, size_t stride);
 
  private:
   struct State;

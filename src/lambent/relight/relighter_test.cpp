@@ -281,7 +281,7 @@ TEST(Relighter, OfBlocks) {
     Breakdown breakdown;
     ASSERT_EQ(message(relighter.relight({.eye = eye, .seen = seen, .breakdown = &breakdown}, out)), "");
     for (uint32_t r = 0; r < count; ++r) EXPECT_EQ(out.at(r), r == 3 || r == 20 ? direct.at(r) : Vec3(0));
-    if (product == Product::blocks) EXPECT_GT(breakdown.triple + breakdown.light_brdf, 0u);
+    EXPECT_EQ(breakdown.triple + breakdown.light_brdf > 0, product == Product::blocks);
   }
   // Materials and places that do not fit, light of the wrong kind, a receiver that is not there.
   EXPECT_FALSE(Relighter::make(b.field));
@@ -314,6 +314,49 @@ TEST(Relighter, RefusesWhatAStoreCannotUse) {
   Field wrong = field;
   wrong.rows = DiffuseRows{};
   EXPECT_FALSE(Relighter::make(wrong));
+}
+
+// The caller's memory has what a Relit has, and nothing else is touched: aligned or not, tight or with gaps.
+TEST(Relighter, FillsTheCallersMemory) {
+  for (int channels : {1, 3})
+    for (int rows : {1, 4}) {
+      Field field = dense_field(channels, Precision::half);
+      if (rows == 1) {
+        const WritableTransfer w = make_transfer({.order = 3}, 1, channels, count, Precision::half);
+        std::vector<float> values(w.transfer.receiver_values());
+        for (size_t r = 0; r < count; ++r) {
+          for (size_t k = 0; k < values.size(); ++k) values[k] = std::sin(float(r * 31 + k));
+          store_receiver(w, r, values);
+        }
+        field.store = w.transfer, field.rows = DiffuseRows{};
+      }
+      Relighter relighter = make(field);
+      const std::vector<Vec3> light = random_light(relighter.light().count());
+      ASSERT_EQ(message(relighter.set_light(light)), "");
+      Relit expected;
+      ASSERT_EQ(message(relighter.relight({}, expected)), "");
+      const size_t each = 3 * size_t(rows);
+      for (size_t stride : {each, each + 1})
+        for (size_t offset : {size_t(0), size_t(3)}) {
+          AlignedVector<float> memory(offset + count * stride + 8, -7.0f);
+          ASSERT_EQ(
+              message(relighter.relight({}, std::span(memory).subspan(offset, (count - 1) * stride + each), stride)),
+              "");
+          std::vector<bool> touched(memory.size(), false);
+          for (size_t r = 0; r < count; ++r)
+            for (size_t i = 0; i < each; ++i) {
+              EXPECT_EQ(memory[offset + r * stride + i], expected.at(r, int(i / 3))[i % 3]) << r << ' ' << i;
+              touched[offset + r * stride + i] = true;
+            }
+          for (size_t i = 0; i < memory.size(); ++i)
+            if (!touched[i]) {
+              EXPECT_EQ(memory[i], -7.0f);
+            }
+          EXPECT_NE(message(relighter.relight({}, std::span(memory).first((count - 1) * stride + each - 1), stride)),
+                    "");
+          EXPECT_NE(message(relighter.relight({}, memory, each - 1)), "");
+        }
+    }
 }
 
 TEST(Relighter, MovesWithItsState) {

@@ -361,14 +361,17 @@ void shade_directly(const ZonalTransfer& t, const ReceiverFrames* frames, const 
 
 }  // namespace
 
-ReceiverFrames make_receiver_frames(std::span<const Mat3> rotations) {
-  ReceiverFrames f;
-  f.receivers = rotations.size();
-  f.values.assign((rotations.size() + block - 1) / block * 9 * block, 0.0f);
+void set_receiver_frames(ReceiverFrames& out, std::span<const Mat3> rotations) {
+  out.receivers = rotations.size();
+  out.values.resize((rotations.size() + block - 1) / block * 9 * block);
   for (size_t r = 0; r < rotations.size(); ++r)
-    for (size_t k = 0; k < 9; ++k)
-      f.values[(r / block * 9 + k) * block + r % block] = rotations[r][int(k / 3)][int(k % 3)];
-  return f;
+    for (size_t k = 0; k < 9; ++k) out.values[(r / block * 9 + k) * block + r % block] = rotations[r][k / 3][k % 3];
+}
+
+ReceiverFrames make_receiver_frames(std::span<const Mat3> rotations) {
+  ReceiverFrames frames;
+  set_receiver_frames(frames, rotations);
+  return frames;
 }
 
 void relight_zonal(const ZonalTransfer& t, const ReceiverFrames* frames, std::span<const Vec3> light, Relit& out) {

@@ -15,6 +15,8 @@ struct ReceiverFrames {
   AlignedVector<float> values;
 };
 ReceiverFrames make_receiver_frames(std::span<const Mat3> rotations);
+// The same into frames that are there; of as many receivers it allocates nothing.
+void set_receiver_frames(ReceiverFrames& out, std::span<const Mat3> rotations);
 
 // T . light for every row: for diffuse transfer exit radiance of white receivers, as relight() gives it for plain
 // transfer. `light`: order^2 coefficients of radiance at least. `frames` may be null: as baked. Directly, by equation

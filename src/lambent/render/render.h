@@ -14,6 +14,7 @@
 
 namespace lambent {
 
+// What a picture is asked for, beside its camera.
 struct RenderOptions {
   int width = 512, height = 512;            // pixels
   int samples = 16;                         // rays a pixel, [1, 4096], box filter

@@ -6,6 +6,7 @@
 
 namespace lambent {
 
+// What arrives of a lamp at a place.
 struct LampArrival {
   Vec3 direction;   // unit, from the point to the lamp
   float distance;   // infinite for directional ones

@@ -18,6 +18,7 @@ struct Reflection {
   bool normal_maps = true;         // materials' normal textures bend the shading normal, where single points are shaded
 };
 
+// At barycentric (u, v) of the triangle, textures included.
 Brdf surface_brdf(const Scene& scene, const Reflection& reflection, const Triangle& triangle, float u, float v);
 
 // Columns (t, b, n), right-handed and orthonormal, about the unit shading normal n; what wi and wo of a BRDF refer to.

@@ -12,8 +12,10 @@
 
 namespace lambent {
 
+// No such vertex, part, material, receiver, ...
 inline constexpr uint32_t none = 0xffffffffu;
 
+// What a texture is beyond [0, 1].
 enum class Wrap : uint8_t { repeat, clamp, mirror };
 
 // A texture: kept encoded (PNG or JPEG) to be written back as it came, and decoded to bytes for look-ups.
@@ -63,6 +65,7 @@ struct PunctualLight {
   float inner_cone = 0, outer_cone = pi / 4;  // radians from the axis: full within the inner, nothing beyond the outer
 };
 
+// A triangle of the scene.
 struct Triangle {
   uint32_t v[3];  // vertex indices, counter-clockwise seen from the front
   uint32_t part;
@@ -143,6 +146,7 @@ Vec3 sample_texture(const Texture& texture, Vec2 uv);
 // The same for a texture whose bytes are linear: byte / 255.
 Vec3 sample_linear_texture(const Texture& texture, Vec2 uv);
 
+// The sRGB transfer curve and its inverse.
 float srgb_to_linear(float encoded);
 float linear_to_srgb(float linear);
 

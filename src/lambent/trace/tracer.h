@@ -16,6 +16,7 @@ struct Directions {
   size_t count;
 };
 
+// Where a ray met the scene.
 struct Hit {
   uint32_t triangle = none;  // index into Scene::triangles, or `none` for a miss
   float u = 0, v = 0;        // weights of corners 1 and 2
@@ -23,6 +24,7 @@ struct Hit {
   float distance = 0;
 };
 
+// Rays against a scene; it does not change once it is built, and any number of threads may trace.
 class Tracer {
  public:
   // Builds the acceleration structure; the result does not depend on the number of threads. The scene must outlive it

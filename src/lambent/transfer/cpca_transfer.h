@@ -4,8 +4,11 @@
 
 namespace lambent {
 
-inline constexpr int max_cpca_clusters = 65535, max_cpca_rank = 64;
+// Limits of the file.
+inline constexpr int max_cpca_clusters = 65535;
+inline constexpr int max_cpca_rank = 64;
 
+// T of a receiver = the mean of its cluster + a weighted sum of the cluster's components.
 struct CpcaTransfer {
   LightBasis light;
   int rows = 1, channels = 1;

@@ -1,14 +1,10 @@
 #include <lambent/transfer/field.h>
+#include <lambent/core/overloaded.h>
 
 #include <algorithm>
 
 namespace lambent {
 namespace {
-
-template <class... F>
-struct Overloaded : F... {
-  using F::operator()...;
-};
 
 size_t most_receivers(const std::vector<uint32_t>& a, const std::vector<uint32_t>& b) {
   size_t most = 0;
@@ -43,6 +39,12 @@ size_t bytes_of(const Store& store) {
 int rows_of(const Store& store) {
   return std::visit(Overloaded{[](const FactoredTransfer&) { return 1; }, [](const Visibility&) { return 0; },
                                [](const auto& t) { return t.rows; }},
+                    store);
+}
+
+int rows_relit(const Store& store) {
+  return std::visit(Overloaded{[](const FactoredTransfer& t) { return t.incident_order * t.incident_order; },
+                               [](const Visibility&) { return 1; }, [](const auto& t) { return t.rows; }},
                     store);
 }
 

@@ -20,6 +20,7 @@
 
 namespace lambent {
 
+// This side receives nothing.
 inline constexpr uint32_t no_receiver = 0xffffffffu;
 
 // WHERE. Vertices and triangles are the scene's, parts one after another; `back` is empty where the whole scene is
@@ -56,10 +57,12 @@ struct FactoredTransfer {
 };
 using Store = std::variant<Transfer, CpcaTransfer, ZonalTransfer, FactoredTransfer, Visibility>;
 
+// Of any store.
 LightBasis light_of(const Store& store);  // the columns; none of visibility, which takes all of any environment
 size_t receivers_of(const Store& store);
 size_t bytes_of(const Store& store);
-int rows_of(const Store& store);  // that are stored; 0 of visibility
+int rows_of(const Store& store);     // that are stored; 0 of visibility
+int rows_relit(const Store& store);  // that relighting makes of those; of visibility 1
 int channels_of(const Store& store);
 const char* name_of(const Store& store);  // "dense", "clusters", "lobes", "factors", "blocks"
 
@@ -75,6 +78,7 @@ struct PixelRows {};  // one: what the pixel shows
 struct SightRows {};  // of visibility: nothing is summed before light, view and material are known
 using Rows = std::variant<DiffuseRows, DirectionalRows, Outgoing, IncidentRows, PixelRows, SightRows>;
 
+// What is baked: where, how and what it means.
 struct Field {
   Placement where;
   Store store;

@@ -30,6 +30,7 @@ struct Lattice {
   }
 };
 
+// A lattice with its transfer.
 struct LatticeTransfer {
   Lattice lattice;
   int order = 0;      // m: the transfer has m^2 rows, incident radiance = sum over rows j of (T light)_j y_j(w)

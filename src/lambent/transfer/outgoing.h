@@ -14,6 +14,7 @@
 
 namespace lambent {
 
+// What the rows are, and so what O is made of.
 enum class OutgoingKind {
   map,  // rows: incident light in the basis of basis/cosine_basis.h; O is looked up by view. Materials can still be
         // changed
@@ -39,6 +40,7 @@ struct ViewMap {
 Vec3 view_map_direction(int grid, int x, int y);
 void look_up(const ViewMap& map, Vec3 wo, std::span<ViewWeights> out);
 
+// The last reflection at every receiver: how rows become radiance towards the eye.
 struct Outgoing {
   OutgoingKind kind = OutgoingKind::map;
   int order = 0;  // of the rows' basis (map, phong: incident; sh, hemisphere, hsh: outgoing)

@@ -14,6 +14,7 @@
 
 namespace lambent {
 
+// Of stored values: IEEE 754 binary16 or binary32.
 enum class Precision { half, single };
 
 // Receivers are stored in blocks of this many, so that one SIMD stream relights a block.
@@ -32,6 +33,7 @@ struct LightBasis {
 // Columns that relighting takes at most.
 inline constexpr size_t max_columns = 1024;
 
+// T, dense.
 struct Transfer {
   LightBasis light;
   int rows = 1;
@@ -55,6 +57,7 @@ struct WritableTransfer {
   Transfer transfer;
   uint8_t* values = nullptr;
 };
+// light: max_columns at most; rows at least 1; channels 1 or 3.
 WritableTransfer make_transfer(LightBasis light, int rows, int channels, size_t receivers, Precision precision);
 
 // Writes one receiver's values, [row][channel][column].

@@ -14,8 +14,10 @@
 
 namespace lambent {
 
+// Of a level.
 inline constexpr int max_visibility_bits = 8;
 
+// What all receivers see.
 struct Visibility {
   int size = 0;  // of the cube, texels a side of a face
   int bits = 1;  // 1, or 2 to 8
@@ -33,6 +35,7 @@ struct Visibility {
   size_t bytes() const { return data.size() + begin.size() * sizeof(uint64_t); }
 };
 
+// Of a block of texels: nothing is seen, or all, or part.
 enum class BlockSight : uint8_t { blocked, clear, mixed };
 
 // Base-128: seven bits a byte, lowest first, the top bit set on all but the last.

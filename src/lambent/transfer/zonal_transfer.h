@@ -11,11 +11,13 @@
 
 namespace lambent {
 
+// Lobes of a row, at most.
 inline constexpr int max_stored_lobes = 8;
 
 // Bands that `lobes` lobes leave to exact storage.
 constexpr int exact_zonal_bands(int order, int lobes) { return std::min(order, lobes >= 3 ? 2 : 1); }
 
+// T as lobes.
 struct ZonalTransfer {
   int order = 0;  // bands of the light's harmonics, [1, 16]
   int lobes = 0;  // a row, [1, 8]
@@ -38,10 +40,12 @@ struct ZonalTransfer {
   size_t bytes() const { return blocks() * receiver_values() * transfer_block * value_bytes(); }
 };
 
+// A transfer with writable zeroed storage; `values` points at it.
 struct WritableZonalTransfer {
   ZonalTransfer transfer;
   uint8_t* values = nullptr;
 };
+// Zeroed.
 WritableZonalTransfer make_zonal_transfer(int order, int lobes, int channels, size_t receivers, Precision precision,
                                           int rows = 1);
 

@@ -1,0 +1,53 @@
+# The public headers: what is installed, documented and kept stable. All others are the library's own.
+set(lambent_relight_headers
+  lambent.h
+  lambent/baked/fields.h
+  lambent/basis/cubemap.h
+  lambent/basis/directional.h
+  lambent/basis/haar.h
+  lambent/basis/sh.h
+  lambent/basis/sh_convert.h
+  lambent/brdf/brdf.h
+  lambent/core/aligned.h
+  lambent/core/camera.h
+  lambent/core/file.h
+  lambent/core/parallel.h
+  lambent/core/result.h
+  lambent/core/vec.h
+  lambent/image/image.h
+  lambent/light/cube_light.h
+  lambent/light/environment.h
+  lambent/light/project.h
+  lambent/light/sky.h
+  lambent/relight/lattice.h
+  lambent/relight/light.h
+  lambent/relight/local_light.h
+  lambent/relight/products.h
+  lambent/relight/relight.h
+  lambent/relight/relighter.h
+  lambent/relight/zonal.h
+  lambent/transfer/cpca_transfer.h
+  lambent/transfer/directional.h
+  lambent/transfer/field.h
+  lambent/transfer/lattice.h
+  lambent/transfer/outgoing.h
+  lambent/transfer/transfer.h
+  lambent/transfer/visibility.h
+  lambent/transfer/zonal_transfer.h
+)
+set(lambent_headers
+  lambent/lambent.h
+  lambent/bake/bake.h
+  lambent/bake/lattice.h
+  lambent/bake/visibility.h
+  lambent/baked/baked_file.h
+  lambent/core/progress.h
+  lambent/receivers/receivers.h
+  lambent/render/products.h
+  lambent/render/render.h
+  lambent/scene/lights.h
+  lambent/scene/load.h
+  lambent/scene/reflection.h
+  lambent/scene/scene.h
+  lambent/trace/tracer.h
+)

@@ -1,0 +1,21 @@
+#pragma once
+// All that a program needs to bake, keep, relight and draw. From C, or to relight alone: lambent.h, one folder up, and
+// relight/relighter.h.
+#include <lambent/bake/bake.h>
+#include <lambent/bake/lattice.h>
+#include <lambent/bake/visibility.h>
+#include <lambent/baked/baked_file.h>
+#include <lambent/basis/sh.h>
+#include <lambent/basis/sh_convert.h>
+#include <lambent/light/environment.h>
+#include <lambent/light/project.h>
+#include <lambent/light/sky.h>
+#include <lambent/receivers/receivers.h>
+#include <lambent/relight/lattice.h>
+#include <lambent/relight/light.h>
+#include <lambent/relight/relighter.h>
+#include <lambent/render/products.h>
+#include <lambent/render/render.h>
+#include <lambent/scene/load.h>
+#include <lambent/trace/tracer.h>
+#include <lambent/transfer/field.h>
