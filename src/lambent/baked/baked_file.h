@@ -5,6 +5,8 @@
 #include <lambent/receivers/receivers.h>
 #include <lambent/scene/scene.h>
 
+#include <optional>
+
 namespace lambent {
 
 static_assert(none == no_receiver);
@@ -45,6 +47,9 @@ Result<void> save_baked(const std::string& path, const Baked& baked, const Viewe
 // The scene comes without what an earlier bake had put into its file. Errors: as read_fields() and load_gltf().
 Result<Baked> load_baked(const std::string& path);
 Result<Baked> load_baked(const MappedFile& file, const std::string& path);
+
+// What save_baked() was given to show; nullopt where the file has none.
+std::optional<ViewerLook> load_look(const MappedFile& file, const std::string& path);
 
 // Whether the file is a glTF with our extension; false for anything else, unreadable files too.
 bool is_baked(const std::string& path);

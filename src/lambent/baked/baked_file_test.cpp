@@ -5,6 +5,7 @@
 #include <lambent/image/image.h>
 #include <lambent/receivers/atlas.h>
 #include <lambent/scene/gltf.h>
+#include <lambent/scene/load.h>
 #include <lambent/scene/procedural.h>
 
 #include <gtest/gtest.h>
@@ -230,6 +231,81 @@ TEST(BakedFile, KeepsTexelsAndPatchesAndWhatViewersShow) {
     EXPECT_EQ(twice->scene.materials[twice->scene.parts[1].material].base_color, Vec3(0.2f, 0.5f, 0.7f));
     EXPECT_EQ(twice->scene.triangles.size(), m.scene.triangles.size());
   }
+}
+
+std::vector<uint8_t> file_bytes(const std::string& path) { return *read_file(path); }
+
+// The file of a bake into which that of another has gone, whatever was baked and shown before.
+TEST(BakedFile, AnEarlierBakeLeavesNothing) {
+  const TemporaryFile plain("plain.glb"), first("first.glb"), second("second.glb");
+  for (bool texels : {true, false}) {
+    SCOPED_TRACE(texels);
+    Mapped m = small_map(texels);
+    // One part wears no material, and one has both sets of texture coordinates already.
+    ASSERT_TRUE(save_glb(plain.path, m.scene, {}, [](nlohmann::json& document, const GltfPlaces&) {
+      document["meshes"][0]["primitives"][0].erase("material");
+      auto& attributes = document["meshes"][1]["primitives"][0]["attributes"];
+      document["accessors"].push_back({{"componentType", 5126},
+                                       {"count", document["accessors"][attributes["NORMAL"].get<size_t>()]["count"]},
+                                       {"type", "VEC2"}});
+      attributes["TEXCOORD_0"] = attributes["TEXCOORD_1"] = document["accessors"].size() - 1;
+    }));
+    ASSERT_TRUE(save_glb(plain.path, *load_scene(plain.path), {}, {}));  // without what we have replaced
+    auto scene = load_scene(plain.path);
+    ASSERT_TRUE(scene) << scene.error().text();
+    const nlohmann::json original = scene->document->json;
+    ASSERT_EQ(scene->positions.size(), m.scene.positions.size());
+    const ViewerLook look{*encode_png(Image(4, 4), 0, ""), 3.5f};
+    for (const ViewerLook* shown : {&look, static_cast<const ViewerLook*>(nullptr)}) {
+      const auto bake = [&](const Scene& from, const std::string& to) {
+        auto saved = save_baked(to, make_baked(from, m.receivers, m.transfer.transfer, DiffuseRows{}), shown);
+        ASSERT_TRUE(saved) << saved.error().text();
+      };
+      bake(*scene, first.path);
+      auto back = load_baked(first.path);
+      ASSERT_TRUE(back) << back.error().text();
+      nlohmann::json left = back->scene.document->json;
+      for (const char* key : {"accessors", "bufferViews", "buffers"}) left.erase(key);
+      nlohmann::json due = original;
+      for (const char* key : {"accessors", "bufferViews", "buffers"}) due.erase(key);
+      EXPECT_EQ(left, due);
+      bake(back->scene, second.path);
+      EXPECT_EQ(file_bytes(second.path), file_bytes(first.path));
+      // What was shown can be shown again.
+      const auto mapped = MappedFile::open(first.path);
+      const auto seen = load_look(*mapped, first.path);
+      ASSERT_EQ(seen.has_value(), texels && shown);
+      if (!seen) continue;
+      EXPECT_EQ(seen->png, look.png);
+      EXPECT_EQ(seen->strength, look.strength);
+    }
+  }
+}
+
+// Files as they were written before there was a record of what is to be undone.
+TEST(BakedFile, OldFilesAreLeftNoLarger) {
+  const auto golden = std::filesystem::path(__FILE__).parent_path() / "../../../tests/golden";
+  size_t files = 0;
+  for (const auto& entry : std::filesystem::directory_iterator(golden)) {
+    if (entry.path().extension() != ".glb") continue;
+    SCOPED_TRACE(entry.path().filename().string());
+    ++files;
+    auto baked = load_baked(entry.path().string());
+    ASSERT_TRUE(baked) << baked.error().text();
+    EXPECT_EQ(baked->scene.document->json.dump().find("LAMBENT"), std::string::npos);
+    const auto mapped = MappedFile::open(entry.path().string());
+    const auto look = load_look(*mapped, entry.path().string());
+    const TemporaryFile again("again.glb"), third("third.glb");
+    ASSERT_TRUE(save_baked(again.path, *baked, look ? &*look : nullptr));
+    EXPECT_LE(std::filesystem::file_size(again.path), std::filesystem::file_size(entry.path()));
+    auto back = load_baked(again.path);
+    ASSERT_TRUE(back) << back.error().text();
+    EXPECT_EQ(back->scene.positions, baked->scene.positions);
+    EXPECT_EQ(back->scene.texcoords[0], baked->scene.texcoords[0]);
+    ASSERT_TRUE(save_baked(third.path, *back, look ? &*look : nullptr));
+    EXPECT_EQ(file_bytes(third.path), file_bytes(again.path));
+  }
+  EXPECT_GT(files, 20u);
 }
 
 TEST(BakedFile, RefusesSurfacesThatLie) {

@@ -25,6 +25,8 @@ void use_extension(json& document, const char* name) {
   if (std::find(used.begin(), used.end(), name) == used.end()) used.push_back(name);
 }
 
+std::string texcoord(size_t set) { return "TEXCOORD_" + std::to_string(set); }
+
 template <class T>
 std::span<const uint8_t> bytes_of(const std::vector<T>& v) {
   return {reinterpret_cast<const uint8_t*>(v.data()), v.size() * sizeof(T)};
@@ -65,7 +67,7 @@ void LookWriter::add_blobs(std::vector<GltfBlob>& blobs) {
 
 // A copy of the material that glows with the texture; lamps with their own emission, which, of those with a texture, is
 // in ours.
-size_t LookWriter::lit_material(json& document, const json& original, size_t texture) const {
+size_t LookWriter::lit_material(json& document, const json& original, size_t texture, size_t set) const {
   json lit = {
       {"pbrMetallicRoughness", {{"baseColorFactor", {0, 0, 0, 1}}, {"metallicFactor", 0}, {"roughnessFactor", 1}}},
       {"doubleSided", false}};
@@ -87,7 +89,7 @@ size_t LookWriter::lit_material(json& document, const json& original, size_t tex
       extensions["KHR_materials_emissive_strength"] = given["KHR_materials_emissive_strength"];
   } else {
     lit["emissiveFactor"] = {1, 1, 1};
-    lit["emissiveTexture"] = {{"index", texture}, {"texCoord", 1}};
+    lit["emissiveTexture"] = {{"index", texture}, {"texCoord", set}};
     extensions["KHR_materials_emissive_strength"] = {{"emissiveStrength", look_->strength}};
   }
   return push(document, "materials", std::move(lit));
@@ -95,22 +97,14 @@ size_t LookWriter::lit_material(json& document, const json& original, size_t tex
 
 void LookWriter::write(json& document, const GltfPlaces& places) const {
   if (!look_) return;
-  for (json& mesh : list(document, "meshes")) {  // what an earlier bake left
-    json kept = json::array();
-    for (json& primitive : mesh["primitives"])
-      if (!(primitive.contains("extensions") && primitive["extensions"].contains("LAMBENT_transfer") &&
-            primitive["extensions"]["LAMBENT_transfer"].contains("viewerOnly")))
-        kept.push_back(std::move(primitive));
-    mesh["primitives"] = std::move(kept);
-  }
   const int first_view = places.first_view + int(first_blob_);
   const size_t image =
       push(document, "images", {{"bufferView", first_view}, {"mimeType", "image/png"}, {"name", "lightmap"}});
   const size_t sampler =
       push(document, "samplers", {{"magFilter", 9729}, {"minFilter", 9729}, {"wrapS", 33071}, {"wrapT", 33071}});
   const size_t texture = push(document, "textures", {{"source", image}, {"sampler", sampler}});
-  std::optional<size_t> plain;  // what primitives without a material have, spelt out
-  std::map<size_t, size_t> lit;
+  std::optional<size_t> plain;                      // what primitives without a material have, spelt out
+  std::map<std::pair<size_t, size_t>, size_t> lit;  // by own material and set of texture coordinates
   int view = first_view + 1 + int(fronts_.size());  // of the backs
   auto places_accessor = [&](int buffer_view, size_t count) {
     return push(document, "accessors",
@@ -121,33 +115,67 @@ void LookWriter::write(json& document, const GltfPlaces& places) const {
     if (part.vertex_count == 0) continue;
     json& mesh = document["meshes"][document["nodes"][size_t(places.part_nodes[p])]["mesh"].get<size_t>()];
     json& primitive = mesh["primitives"][size_t(places.part_primitives[p])];
-    // Baked before, or fresh; our loader takes this material, and leaves out the primitives of backs.
-    const json& holder = primitive.contains("extensions") && primitive["extensions"].contains("LAMBENT_transfer")
-                           ? primitive["extensions"]["LAMBENT_transfer"]
-                           : primitive;
-    const char* key = &holder == &primitive ? "material" : "ownMaterial";
-    if (!holder.contains(key) && !plain) plain = push(document, "materials", {{"name", "default"}});
-    const size_t original = holder.contains(key) ? holder[key].get<size_t>() : *plain;
-    auto [material, is_new] = lit.try_emplace(original, 0);
-    if (is_new) material->second = lit_material(document, json(document["materials"][original]), texture);
-    primitive["extensions"]["LAMBENT_transfer"] = {{"ownMaterial", original}};
-    primitive["material"] = material->second;
+    json& attributes = primitive["attributes"];
+    json& ours = primitive["extensions"][extension_name];
+    if (ours.is_null()) {  // fresh, and not shared with an earlier part
+      ours = json::object();
+      size_t set = 1;
+      while (attributes.contains(texcoord(set))) ++set;
+      if (set != 1) ours["texCoord"] = set;
+      if (!primitive.contains("material")) {
+        if (!plain) plain = push(document, "materials", {{"name", "default"}});
+        primitive["material"] = *plain, ours["ownIsDefault"] = true;
+      }
+      const size_t own = primitive["material"].get<size_t>();
+      ours["ownMaterial"] = own;
+      auto [material, is_new] = lit.try_emplace({own, set}, 0);
+      if (is_new) material->second = lit_material(document, json(document["materials"][own]), texture, set);
+      primitive["material"] = material->second;
+    }
     const size_t front = places_accessor(first_view + 1 + int(p), part.vertex_count);
-    primitive["attributes"]["TEXCOORD_1"] = front;
-    if (!primitive["attributes"].contains("TEXCOORD_0")) primitive["attributes"]["TEXCOORD_0"] = front;
+    attributes[texcoord(ours.value("texCoord", size_t{1}))] = front;
+    if (!attributes.contains("TEXCOORD_0")) attributes["TEXCOORD_0"] = front;
     if (backs_[p].indices.empty()) continue;
     const size_t at = places_accessor(view, part.vertex_count);
     const size_t indices = push(
         document, "accessors",
         {{"bufferView", view + 1}, {"componentType", 5125}, {"count", backs_[p].indices.size()}, {"type", "SCALAR"}});
     view += 2;
-    json back = {
-        {"attributes", {{"POSITION", primitive["attributes"]["POSITION"]}, {"TEXCOORD_0", at}, {"TEXCOORD_1", at}}},
-        {"indices", indices},
-        {"material", material->second}};
-    back["extensions"]["LAMBENT_transfer"] = {{"viewerOnly", true}};
+    const size_t set = ours.value("texCoord", size_t{1});
+    json back = {{"attributes", {{"POSITION", attributes["POSITION"]}}},
+                 {"indices", indices},
+                 {"material", lit.at({ours["ownMaterial"].get<size_t>(), set})}};
+    for (size_t k = 0; k <= set; ++k) back["attributes"][texcoord(k)] = at;
+    back["extensions"][extension_name] = {{"viewerOnly", true}};
     mesh["primitives"].push_back(std::move(back));
   }
+}
+
+std::optional<ViewerLook> load_look(const MappedFile& file, const std::string& path) {
+  auto chunks = split_gltf(file.bytes(), path);
+  if (!chunks) return std::nullopt;
+  const json nothing;
+  const auto member = [&](const json& parent, const char* key) -> const json& {
+    return parent.is_object() && parent.contains(key) ? parent[key] : nothing;
+  };
+  const auto item = [&](const char* key, const json& index) -> const json& {
+    const json& all = member(chunks->json, key);
+    return all.is_array() && index.is_number_unsigned() && index.get<size_t>() < all.size() ? all[index.get<size_t>()]
+                                                                                            : nothing;
+  };
+  for (const json& mesh : member(chunks->json, "meshes"))
+    for (const json& primitive : member(mesh, "primitives")) {
+      if (!member(member(member(primitive, "extensions"), extension_name), "ownMaterial").is_number()) continue;
+      const json& material = item("materials", member(primitive, "material"));
+      const json& strength =
+          member(member(member(material, "extensions"), "KHR_materials_emissive_strength"), "emissiveStrength");
+      const json& texture = item("textures", member(member(material, "emissiveTexture"), "index"));
+      const json& view = member(item("images", member(texture, "source")), "bufferView");
+      if (!strength.is_number() || !view.is_number_unsigned()) continue;  // a lamp's
+      auto png = view_bytes({*chunks, file}, view.get<size_t>(), path);
+      if (png) return ViewerLook{{png->begin(), png->end()}, strength.get<float>()};
+    }
+  return std::nullopt;
 }
 
 }  // namespace lambent

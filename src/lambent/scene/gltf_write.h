@@ -27,6 +27,11 @@ class GlbWriter {
   // Elements source[0], source[1], ... of an accessor, in its own type.
   size_t add_copy(const GltfAccessor& from, std::span<const uint32_t> source, bool with_bounds);
 
+  // Leaves out accessors and buffer views that nothing refers to and bytes that no view has; what stays keeps its order
+  // and its alignment, up to 64 bytes. Does nothing where an extension is in use whose references are not known, or a
+  // reference is none.
+  void compact();
+
   size_t size() const { return size_; }  // of the binary chunk
   Result<void> write(const std::string& path) const;
 
@@ -35,6 +40,16 @@ class GlbWriter {
     size_t offset;
     std::span<const uint8_t> bytes;
   };
+  struct Range {
+    size_t begin = 0, end = 0;
+  };
+  struct Move {
+    size_t from, to;  // of bytes from here on, up to the next
+  };
+  static constexpr size_t run_alignment = 64;
+  // Lays the ranges closer together; gives where they went, rising.
+  std::vector<Move> keep_bytes(std::vector<Range> ranges);
+
   std::vector<Piece> pieces_;
   std::deque<std::vector<uint8_t>> kept_;
   size_t size_ = 0, alignment_ = 64;

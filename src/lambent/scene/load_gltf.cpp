@@ -5,6 +5,7 @@
 #include <lambent/scene/gltf_geometry.h>
 #include <lambent/scene/gltf_materials.h>
 #include <lambent/scene/gltf_read.h>
+#include <lambent/scene/gltf_unbake.h>
 #include <lambent/scene/load.h>
 
 #include <map>
@@ -179,11 +180,7 @@ class PrimitiveReader {
     GltfWhere where{"mesh", mesh, "primitive", number};
     const uint64_t mode = check_.integer(primitive, "mode", triangle_list, triangle_fan + 1, where);
     const Json* attributes = check_.object(primitive, "attributes", where);
-    // What a bake left for other viewers: primitives of backs, and materials in place of the scene's own.
-    const Json* extensions = check_.object(primitive, "extensions", where);
-    const Json* baked = extensions ? check_.object(*extensions, "LAMBENT_transfer", where) : nullptr;
     if (!check_.ok()) return false;
-    if (baked && check_.boolean(*baked, "viewerOnly", false, where)) return true;
     if (mode < triangle_list) return ++skipped_, true;
     if (!attributes) return check_.fail(where, "has no attributes");
     auto position_index = check_.index(*attributes, "POSITION", gltf_count(document_.json, "accessors"), where);
@@ -221,9 +218,7 @@ class PrimitiveReader {
     part.node = int(node), part.primitive = int(number);
     part.first_vertex = uint32_t(scene_.positions.size()), part.vertex_count = uint32_t(positions.count);
     part.first_triangle = uint32_t(scene_.triangles.size());
-    const bool has_own = baked && baked->contains("ownMaterial");
-    auto material = check_.index(has_own ? *baked : primitive, has_own ? "ownMaterial" : "material",
-                                 gltf_count(document_.json, "materials"), where);
+    auto material = check_.index(primitive, "material", gltf_count(document_.json, "materials"), where);
     if (!check_.ok()) return false;
     part.material = material ? uint32_t(*material) : default_material();
     if (!read_vertices(check_, document_, *attributes, positions, targets, placement, where, scene_.positions,
@@ -356,8 +351,9 @@ bool read_scene(GltfCheck& check, GltfDocument& document, std::span<const uint8_
                 Scene& scene) {
   UriReader files(document, folder);
   std::vector<std::string> image_problems;
-  if (!check_document(check, document.json) || !read_buffers(check, document, binary, files) ||
-      !read_images(check, document, files, image_problems)) {
+  if (!check_document(check, document.json)) return false;
+  unbake(document.json);
+  if (!read_buffers(check, document, binary, files) || !read_images(check, document, files, image_problems)) {
     return false;
   }
   std::vector<GltfMaterial> materials = read_materials(check, document);

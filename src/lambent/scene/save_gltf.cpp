@@ -488,6 +488,7 @@ Result<void> save_glb(const std::string& path, const Scene& scene, std::span<con
     places.part_primitives[p] = 0;
   }
 
+  if (scene.document) out.compact();
   places.first_view = int(gltf_count(out.json, "bufferViews"));
   for (const GltfBlob& blob : blobs) out.add_view(blob.bytes, blob.alignment);
   // All binary data is in place: one buffer, which keeps what a lone original had to say about itself.

@@ -232,6 +232,8 @@ TEST(SaveGlb, EmbedsBuffersAndImages) {
   json["buffers"] = {{{"byteLength", b.binary.size()}, {"uri", "data:;base64," + base64(b.binary)}},
                      {{"byteLength", second.size()}, {"uri", "second.bin"}}};
   json["bufferViews"].push_back({{"buffer", 1}, {"byteOffset", 3}, {"byteLength", 4}});
+  json["accessors"].push_back({{"bufferView", 3}, {"componentType", type_u8}, {"count", 3}, {"type", "SCALAR"}});
+  json["meshes"][0]["primitives"][0]["attributes"]["_OTHER"] = json["accessors"].size() - 1;
   json["images"] = {{{"uri", "a.png"}},
                     {{"uri", "data:image/jpeg;base64," + base64(jpeg)}},
                     {{"uri", "c.webp"}},
