@@ -1,5 +1,6 @@
-# lambent_relight: baked files without their scene, light, T . light. What an engine embeds, and what compiles to WebAssembly: it needs
-# the headers of Highway, Eigen and nlohmann-json to be built, and Highway alone to be linked. tests/include_arrows.sh reads this list.
+# lambent_relight: baked files without their scene, light, T . light. What an engine embeds, and what compiles to
+# WebAssembly: it needs the headers of Highway, Eigen and nlohmann-json to be built, and Highway alone to be linked.
+# tests/include_arrows.sh reads this list.
 set(lambent_relight_sources
   src/lambent/baked/blobs.cpp
   src/lambent/baked/fields.cpp
@@ -15,6 +16,7 @@ set(lambent_relight_sources
   src/lambent/basis/quadrature.cpp
   src/lambent/basis/sh.cpp
   src/lambent/basis/sh_convert.cpp
+  src/lambent/basis/sh_evaluate.cpp
   src/lambent/basis/sh_product.cpp
   src/lambent/basis/sh_product_grid.cpp
   src/lambent/basis/sh_rotation.cpp
@@ -56,6 +58,8 @@ set(lambent_relight_sources
   src/lambent/transfer/visibility.cpp
   src/lambent/transfer/zonal_transfer.cpp
 )
+# One direction and many give the same bits, on every instruction set: no fused multiply-adds of the compiler's own.
+set_source_files_properties(src/lambent/basis/sh_evaluate.cpp PROPERTIES COMPILE_OPTIONS -ffp-contract=off)
 add_library(lambent_relight STATIC ${lambent_relight_sources})
 add_library(lambent::relight ALIAS lambent_relight)
 set_target_properties(lambent_relight PROPERTIES EXPORT_NAME relight)
