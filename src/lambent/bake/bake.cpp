@@ -36,7 +36,7 @@ struct Baker {
   const Scene& scene;
   const Receivers& receivers;
   const BakeOptions& options;
-  GatherSetup setup;
+  const GatherSetup setup;
   Progress* progress;
   BakeReport& report;
   const LobeSets lobes = make_lobe_sets(options.lobe_kind, options.lobes, options.samples, options.seed);
@@ -204,14 +204,13 @@ Result<Transfer> bake(const Scene& scene, const Tracer& tracer, const Receivers&
   BakeReport unwanted;
   BakeReport& r = report ? *report : unwanted;
   r = {};
-  Baker baker{
-      scene,
-      receivers,
-      options,
-      make_gather_setup(scene, tracer, receivers, options.order, options.shadows ? options.samples : 1, options.seed),
-      progress,
-      r};
-  baker.setup.progress = progress;
+  Baker baker{scene,
+              receivers,
+              options,
+              make_gather_setup(scene, tracer, receivers, options.order, options.shadows ? options.samples : 1,
+                                options.seed, square_to_cosine_hemisphere, progress),
+              progress,
+              r};
   const size_t least = least_memory(receivers.count(), baker.setup.channels == 3, options);
   if (options.memory < least)
     return Error{scene.path, "baking needs at least " + std::to_string(least) +

@@ -1,5 +1,6 @@
 #include <lambent/bake/directions.h>
 #include <lambent/bake/kernels.h>
+#include <lambent/core/parallel.h>
 #include <lambent/core/random.h>
 
 #include <algorithm>
@@ -29,23 +30,31 @@ std::vector<Vec2> sorted_points(size_t count, size_t half, uint32_t key) {
   return points;
 }
 
-DirectionSets make_direction_sets(int order, int samples, int sets, uint32_t seed, DirectionWarp warp) {
+DirectionSets make_direction_sets(int order, int samples, int sets, uint32_t seed, DirectionWarp warp,
+                                  Progress* progress) {
   DirectionSets s{order, samples, sets, pad_lanes(size_t(samples)), 0, {}, {}, {}, {}, {}};
   const size_t n = size_t(samples), coefficients = size_t(sh_count(order));
   s.half = n >= 2 * lane_multiple ? pad_lanes(n / 2) : n;
   s.x.assign(s.stride * size_t(sets), 0), s.y = s.x, s.z.assign(s.stride * size_t(sets), 1);
   s.table.assign(s.stride * size_t(sets) * coefficients, 0);
-  float y[sh_count(max_sh_order)];
-  for (int set = 0; set < sets; ++set) {
+  constexpr size_t piece = 4096;
+  ProgressStage stage(progress, "directions", size_t(sets) * n);
+  parallel_for(size_t(sets), 1, [&](size_t set, size_t) {
+    if (stage.cancelled()) return;
+    float y[sh_count(max_sh_order)];
     const std::vector<Vec2> points = sorted_points(n, s.half, uint32_t(hash64(seed, uint64_t(set))));
-    const size_t base = size_t(set) * s.stride;
+    const size_t base = set * s.stride;
     for (size_t i = 0; i < n; ++i) {
+      if (i % piece == 0) {
+        if (stage.cancelled()) return;
+        stage.advance(std::min(piece, n - i));
+      }
       const Vec3 d = warp(points[i]);
       s.x[base + i] = d.x, s.y[base + i] = d.y, s.z[base + i] = d.z;
       evaluate_sh(order, d, y);
-      for (size_t k = 0; k < coefficients; ++k) s.table[(size_t(set) * coefficients + k) * s.stride + i] = y[k];
+      for (size_t k = 0; k < coefficients; ++k) s.table[(set * coefficients + k) * s.stride + i] = y[k];
     }
-  }
+  });
   return s;
 }
 

@@ -3,6 +3,7 @@
 // unless another warp is given. A receiver takes one set, turned into its frame by a rotation of its own; sums over its
 // visible directions are formed in the set's frame and turned back as spherical harmonics.
 #include <lambent/basis/sh.h>
+#include <lambent/core/progress.h>
 #include <lambent/core/sampling.h>
 #include <lambent/trace/tracer.h>
 
@@ -27,9 +28,10 @@ using DirectionWarp = Vec3 (*)(Vec2);
 // space-filling curve.
 std::vector<Vec2> sorted_points(size_t count, size_t half, uint32_t key);
 
-// Sobol' points, Owen-scrambled anew for every set, sorted within each half along a space-filling curve.
+// Sobol' points, Owen-scrambled anew for every set, sorted within each half along a space-filling curve. Left
+// unfinished when cancelled.
 DirectionSets make_direction_sets(int order, int samples, int sets, uint32_t seed,
-                                  DirectionWarp warp = square_to_cosine_hemisphere);
+                                  DirectionWarp warp = square_to_cosine_hemisphere, Progress* progress = nullptr);
 
 // One set of the pixels of a hemicube, as many as are nearest to `samples`: 3 n^2 for a top face of n x n, n even; rays
 // go through their centres, and each weighs its delta form factor, cos / pi integrated over the whole pixel in closed

@@ -206,9 +206,10 @@ ScratchPointer make_gather_scratch(const GatherSetup& setup) {
 }
 
 GatherSetup make_gather_setup(const Scene& scene, const Tracer& tracer, const Receivers& receivers, int order,
-                              int samples, uint32_t seed, DirectionWarp warp) {
-  GatherSetup setup{scene, tracer, receivers, make_direction_sets(order, samples, set_count, seed, warp), seed, 1,
-                    1.0f,  {},     {}};
+                              int samples, uint32_t seed, DirectionWarp warp, Progress* progress) {
+  GatherSetup setup{scene, tracer,  receivers, make_direction_sets(order, samples, set_count, seed, warp, progress),
+                    seed,  1,       1.0f,      {},
+                    {},    progress};
   // Weights are sums over rays: halves hold 65504.
   setup.weight_unit = std::min(1.0f, 16384.0f / float(samples));
   bool coloured = false;
@@ -347,13 +348,6 @@ void trace_sky(const GatherSetup& setup, GatherScratch& scratch, size_t first, s
     sky.buried[i] = 4 * seen < rays && is_buried(setup.tracer, setup.receivers.basis, origin,
                                                  {fan.x.data(), fan.y.data(), fan.z.data(), rays});
   }
-}
-
-void multiply_rows(const SparseRows& block, int channels, const float* x, size_t width, float scale, float* y) {
-  const size_t values = block.row_count * width;
-  std::fill(y, y + values, 0.0f);
-  multiply_entries(block.entries, channels, x, width, y);
-  for (size_t i = 0; i < values; ++i) y[i] *= scale;
 }
 
 std::vector<FillStep> make_fill_steps(const Scene& scene, const SpatialBasis& basis,

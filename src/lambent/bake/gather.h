@@ -52,7 +52,7 @@ struct GatherSetup {
   float weight_unit;              // stored weight = sum of albedo x interpolation weight over rays, x weight_unit
   std::vector<Vec3> part_albedo;  // of parts with one albedo all over
   std::vector<uint8_t> part_varies;
-  const Progress* progress = nullptr;  // tracing looks at it receiver by receiver, and ends early when cancelled
+  Progress* progress = nullptr;  // tracing looks at it receiver by receiver, and ends early when cancelled
 
   size_t coefficients() const { return size_t(sh_count(sets.order)); }
   // What a stored weight has to be multiplied by, given how many rays the row averages.
@@ -62,7 +62,8 @@ struct GatherSetup {
 // `sets` of the setup may be replaced by make_hemicube_set(): its rows then are those of a hemicube ray cast at its
 // pixels' centres, which stand for the integral over the cosine that random rays estimate.
 GatherSetup make_gather_setup(const Scene& scene, const Tracer& tracer, const Receivers& receivers, int order,
-                              int samples, uint32_t seed, DirectionWarp warp = square_to_cosine_hemisphere);
+                              int samples, uint32_t seed, DirectionWarp warp = square_to_cosine_hemisphere,
+                              Progress* progress = nullptr);
 
 // What tracing receivers [first, first + count) yields beside the hit rows. Spans are indexed from `first`.
 struct GatherSky {
@@ -102,10 +103,6 @@ void trace_sky(const GatherSetup& setup, GatherScratch& scratch, size_t first, s
 // A second look at a receiver that sees little sky, when only occlusion was traced: do most of a sample of the fan's
 // rays meet backs of one-sided surfaces?
 bool is_buried(const Tracer& tracer, const SpatialBasis& basis, Vec3 origin, const Directions& fan);
-
-// y[row] = scale * (row of B) x, for the block's rows; x and y are [receiver][column x channel], `width` padded floats
-// a row.
-void multiply_rows(const SparseRows& rows, int channels, const float* x, size_t width, float scale, float* y);
 
 // Values of buried receivers are taken from their neighbours (neighbours_of).
 struct FillStep {

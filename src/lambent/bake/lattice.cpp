@@ -252,7 +252,7 @@ Result<LatticeTransfer> bake_lattice(const Scene& scene, const Tracer& tracer, c
   if (auto ok = check_lattice(lattice, surface.light.order, options); !ok) return ok.error();
   const auto start = std::chrono::steady_clock::now();
   const GatherSetup setup = make_gather_setup(scene, tracer, receivers, surface.light.order + options.order - 1,
-                                              options.samples, options.seed, square_to_sphere);
+                                              options.samples, options.seed, square_to_sphere, progress);
   const int channels = setup.channels == 3 || surface.channels == 3 || (outgoing && is_coloured(*outgoing)) ? 3 : 1;
 
   const size_t wc = size_t(channels) * pad_lanes(surface.columns()), J = size_t(sh_count(options.order)),

@@ -115,10 +115,9 @@ Result<Lightmap> bake_lightmap(const Scene& scene, const Tracer& tracer, const R
                width = pad_lanes(3 * (harmonics + lamps.groups()));
   const int order = std::max(o.order, 1);
   DirectionSets cube = o.gather == GatherKind::hemicube ? make_hemicube_set(order, o.samples) : DirectionSets{};
-  GatherSetup setup =
-      make_gather_setup(scene, tracer, receivers, order, cube.samples ? cube.samples : o.samples, o.seed);
+  GatherSetup setup = make_gather_setup(scene, tracer, receivers, order, cube.samples ? cube.samples : o.samples,
+                                        o.seed, square_to_cosine_hemisphere, progress);
   if (cube.samples) setup.sets = std::move(cube);
-  setup.progress = progress;
   const LightBasis light{.order = o.order, .groups = lamps.names};
 
   // e: [harmonics | groups][channel]

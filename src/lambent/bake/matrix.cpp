@@ -190,10 +190,9 @@ Result<MatrixBake> bake_matrix(const Scene& scene, const Tracer& tracer, const R
   BakeReport& r = report ? *report : unwanted;
   r = {};
   GatherSetup setup = make_gather_setup(scene, tracer, receivers, options.order + matrix.incident_order - 1,
-                                        options.samples, options.seed);
+                                        options.samples, options.seed, square_to_cosine_hemisphere, progress);
   for (const LinearMaterial& m : materials.materials)
     if (tints(m.black)) setup.channels = 3;
-  setup.progress = progress;
   if (options.bounces == 0) setup.channels = 1;  // direct light meets no coloured surface on its way
   const size_t needed = matrix_memory(receivers.count(), setup.channels, options, matrix);
   if (needed > options.memory)

@@ -37,7 +37,8 @@ Result<GatherOperator> GatherOperator::trace(const GatherSetup& setup, const Gat
   op.traced_ = std::shared_ptr<Traced>(new Traced{
       KeptRows(op.blocks(), wanted.hits ? wanted.memory : 0, most_bytes(size_t(setup.sets.samples), n, setup.channels)),
       Pool<GatherBlock>([] { return std::make_unique<GatherBlock>(); }),
-      Pool<GatherScratch, DeleteScratch>([&setup] { return make_gather_scratch(setup); })});
+      Pool<GatherScratch, DeleteScratch>([&setup] { return make_gather_scratch(setup); }),
+      Pool<AlignedVector<float>>([] { return std::make_unique<AlignedVector<float>>(); })});
   ProgressStage stage(progress, "tracing", n);
   parallel_for(n, gather_block, [&](size_t begin, size_t end) {
     if (stage.cancelled()) return;
@@ -80,10 +81,12 @@ void GatherOperator::with_rows(size_t b, auto f) const {
 
 void GatherOperator::add_rows(size_t first, size_t count, const float* x, size_t width, float* y, float* half) const {
   LAMBENT_CHECK(first % gather_block == 0 && count <= gather_block);
-  AlignedVector<float> sums(count * width);
+  const auto sums = traced_->sums.borrow();
   auto add = [&](const SparseRows& rows, size_t rays, float* out) {
-    multiply_rows(rows, setup_->channels, x, width, setup_->row_scale(rays), sums.data());
-    for (size_t i = 0; i < rows.row_count * width; ++i) out[i] += sums[i];
+    const float scale = setup_->row_scale(rays);
+    sums->assign(rows.row_count * width, 0.0f);
+    multiply_entries(rows.entries, setup_->channels, x, width, sums->data());
+    for (size_t i = 0; i < sums->size(); ++i) out[i] += scale * (*sums)[i];
   };
   with_rows(first / gather_block, [&](const KeptRows::Block& block) {
     add(block.rows, size_t(setup_->sets.samples), y);

@@ -54,6 +54,7 @@ class GatherOperator final : public LinearOperator {
     KeptRows kept;
     Pool<GatherBlock> blocks;
     Pool<GatherScratch, DeleteScratch> scratch;
+    Pool<AlignedVector<float>> sums;  // of a block's entries, not yet scaled
     std::atomic<size_t> rays{0};
   };
   // Calls f with the rows of a block, kept or traced again.

@@ -4,6 +4,7 @@
 #include <lambent/bake/solve.h>
 #include <lambent/core/check.h>
 #include <lambent/core/parallel.h>
+#include <lambent/core/pool.h>
 
 #include <array>
 #include <bit>
@@ -77,12 +78,14 @@ struct Step {
   }
 
   void run(const float* x, float* next) const {
+    Pool<AlignedVector<float>> buffers([] { return std::make_unique<AlignedVector<float>>(); });
     parallel_for(op.rows(), gather_block, [&](size_t begin, size_t end) {
       const size_t most = std::min(op.piece(), end - begin);
-      AlignedVector<float> y(most * width), half(errors ? checked_count(most) * width : 0);
+      const auto y = buffers.borrow(), half = buffers.borrow();
+      y->resize(most * width), half->resize(errors ? checked_count(most) * width : 0);
       for (size_t first = begin; first < end; first += most) {
         if (is_cancelled(progress)) return;
-        rows(first, std::min(most, end - first), x, y.data(), half.data(), next);
+        rows(first, std::min(most, end - first), x, y->data(), half->data(), next);
       }
       if (stage) stage->advance(end - begin);
     });
