@@ -1,6 +1,7 @@
 #include <lambent/pipeline/draw.h>
 
 #include <lambent/bake/materials.h>
+#include <lambent/core/overloaded.h>
 #include <lambent/pipeline/draw_blocks.h>
 #include <lambent/pipeline/draw_insert.h>
 #include <lambent/pipeline/draw_light.h>
@@ -129,11 +130,6 @@ Result<RelitScene> with_insertions(ColumnDrawing& d, Relit relit) {
       return ok.error();
   return drawn;
 }
-
-template <class... F>
-struct Overloaded : F... {
-  using F::operator()...;
-};
 
 // O(view): what the rows mean says how.
 Result<Image> shade(ColumnDrawing& d, const std::optional<Pose>& pose, Relit relit, const View& view) {

@@ -160,7 +160,9 @@ template <class R>
 Result<void> read_request(std::span<const Option<R>> table, const nlohmann::json& object, R& request,
                           GivenOptions& given) {
   if (!object.is_object()) return Error{"", "the request is not a JSON object"};
-  for (const auto& [key, value] : object.items()) {
+  for (const auto& item : object.items()) {
+    const std::string& key = item.key();
+    const nlohmann::json& value = item.value();
     const auto o =
         std::find_if(table.begin(), table.end(), [&](const Option<R>& x) { return json_name(x.name) == key; });
     if (o == table.end()) return Error{key, "is no field of such a request"};
