@@ -1,6 +1,6 @@
-add_executable(lambent-tests ${lambent_tests})
+add_executable(lambent-tests ${lambent_tests} ${tool_tests} apps/lambent/serve.cpp)
 target_link_libraries(lambent-tests PRIVATE lambent GTest::gtest GTest::gtest_main nlohmann_json::nlohmann_json
-  fmt::fmt OpenEXR::OpenEXR TBB::tbb)
+  fmt::fmt OpenEXR::OpenEXR TBB::tbb CLI11::CLI11 PkgConfig::httplib)
 target_include_directories(lambent-tests PRIVATE ${CMAKE_CURRENT_SOURCE_DIR}/tests)
 target_compile_options(lambent-tests PRIVATE -Wall -Wextra -Wno-missing-field-initializers)
 # Tests are half of what is compiled, and what is hot in them is the library: less optimised they build in two thirds of the time. Under

@@ -7,6 +7,7 @@ declare -A allowed=(
   [core]="" [basis]="" [image]="" [brdf]="basis" [light]="basis image" [scene]="brdf light image" [receivers]="scene"
   [trace]="scene" [transfer]="basis" [baked]="transfer scene receivers basis" [bake]="trace receivers scene brdf light basis transfer"
   [compress]="transfer basis brdf" [relight]="transfer basis brdf light" [render]="relight transfer trace receivers scene light image" [reference]="scene brdf light image"
+  [pipeline]="basis image brdf light scene receivers trace transfer bake compress baked relight render reference"
 )
 bad=0
 for folder in */; do

@@ -198,15 +198,6 @@ Result<Reflection> load_reflection(const BrdfOptions& options) {
   return reflection;
 }
 
-std::string describe_light(const LightBasis& light) {
-  std::string text = light.order > 0 ? "order " + std::to_string(light.order) : "";
-  auto add = [&](size_t count, const std::string& what) {
-    if (count > 0) text += (text.empty() ? "" : " and ") + std::to_string(count) + " " + what + (count == 1 ? "" : "s");
-  };
-  add(light.lobes.size(), "lobe"), add(light.groups.size(), "lamp group");
-  return text;
-}
-
 Result<void> check_output(const std::string& path, std::initializer_list<const char*> extensions) {
   const std::string extension = file_extension(path);
   std::string known;

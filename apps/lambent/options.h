@@ -72,9 +72,6 @@ Result<void> parse_cpca(const std::string& text, CpcaOptions& options);
 
 extern const std::map<std::string, ShWindow> window_names;
 
-// "order 6", "order 5 and 8 lobes", "36 lobes".
-std::string describe_light(const LightBasis& light);
-
 // Before long work: the folder of `path` exists and can be written, and the extension is one of those given.
 Result<void> check_output(const std::string& path, std::initializer_list<const char*> extensions);
 

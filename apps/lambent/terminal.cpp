@@ -83,24 +83,10 @@ void print_json(const nlohmann::json& value) {
   fmt::print("{}\n", value.dump(2, ' ', false, nlohmann::json::error_handler_t::replace));
 }
 
-std::string human_bytes(double bytes) {
-  if (bytes < 1000) return fmt::format("{:.0f} bytes", bytes);
-  const char* units[] = {"kB", "MB", "GB", "TB"};
-  int unit = -1;
-  while (bytes >= 1000 && unit < 3) bytes /= 1000, ++unit;
-  return fmt::format("{:.3g} {}", bytes, units[unit]);
-}
-
 std::string human_seconds(double s) {
   if (s < 10) return fmt::format("{:.2f} s", s);
   if (s < 120) return fmt::format("{:.0f} s", s);
   return fmt::format("{} min {} s", int(s) / 60, int(s) % 60);
-}
-
-std::string human_count(size_t count) {
-  std::string digits = std::to_string(count);
-  for (int i = int(digits.size()) - 3; i > 0; i -= 3) digits.insert(size_t(i), ",");
-  return digits;
 }
 
 }  // namespace lambent::tool

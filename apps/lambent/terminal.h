@@ -2,6 +2,7 @@
 // What all commands share: results on stdout, progress and messages on stderr, Ctrl-C, exit codes.
 #include <lambent/core/progress.h>
 #include <lambent/core/result.h>
+#include <lambent/pipeline/describe.h>
 
 #include <nlohmann/json.hpp>
 
@@ -26,9 +27,7 @@ void warn(const std::vector<std::string>& messages);
 
 void print_json(const nlohmann::json& value);
 
-// "1.5 MB", "830 bytes"; "12.3 s", "2 min 5 s"; 1234567 -> "1,234,567".
-std::string human_bytes(double bytes);
+// "12.3 s", "2 min 5 s".
 std::string human_seconds(double seconds);
-std::string human_count(size_t count);
 
 }  // namespace lambent::tool

@@ -2,7 +2,7 @@
 import { BufferGeometry } from 'three';
 import { LambentError } from './errors.js';
 import { isIndex, type TransferExtension } from './glb.js';
-import type { TransferSource } from './kinds.js';
+import { axesOf, isDrawn, type TransferSource } from './kinds.js';
 import { maxShOrder } from './sh.js';
 
 export const noReceiver = 0xffffffff;
@@ -22,7 +22,8 @@ export type Directional = keyof typeof directionalRows;
 const isDirectional = (value: unknown): value is Directional => typeof value === 'string' && Object.hasOwn(directionalRows, value);
 
 /** What every kind has in its header; refuses by name what this version does not draw. */
-export function readHeader({ transfer, surface, view }: TransferExtension, surfaceKind: 'vertices' | 'texels' = 'vertices'): TransferHeader {
+export function readHeader(extension: TransferExtension, surfaceKind: 'vertices' | 'texels' = 'vertices'): TransferHeader {
+  const { transfer, surface, view } = extension;
   const { basis, order, channels, precision, receivers, bufferView, lobes, groups, directional, cpca } = transfer;
   const text = (value: unknown): string => (typeof value === 'string' ? value : 'something else'), where = text(surface?.kind ?? 'vertices');
   const isMore = (list: unknown): boolean => list !== undefined && !(Array.isArray(list) && list.length === 0);
@@ -36,6 +37,7 @@ export function readHeader({ transfer, surface, view }: TransferExtension, surfa
     throw new LambentError(`holds directional light ("${text(directional)}"), which this version does not draw ${isDirectional(directional) ? 'but over an atlas' : 'at all'}; "lambent render" does`);
   if (where !== surfaceKind)
     throw new LambentError(`holds transfer over ${where}, where this version draws vertices and, for diffuse transfer, texels; "lambent render" draws it`);
+  if (!isDrawn(extension)) throw new LambentError(`holds ${axesOf(extension).join(', ')}, which this version does not draw; "lambent render" does`);
   if (precision !== 'half' && precision !== 'single') throw new LambentError('"precision" must be half or single');
   if (!isIndex(order, maxShOrder) || (order < 1 && !isMore(groups))) throw new LambentError('"order" is out of range');
   if (channels !== 1 && channels !== 3) throw new LambentError('"channels" is out of range');
