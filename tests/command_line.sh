@@ -188,6 +188,21 @@ expect 1 'clusters.glb' compress clusters.glb --zonal 2 -o x.glb
 expect 2 'cpca' bake corner.obj --compress cpca:0,3 -o x.glb
 expect 2 'cpca' bake corner.obj --compress zip -o x.glb
 expect 2 'cpca' compress whole.glb -o x.glb
+# No file grows: what it was made of is gone, or nothing is written. Twice is the same, and in place of itself too.
+smaller() {  # smaller NEW OLD
+  [ "$(stat -c %s "$1")" -le "$(stat -c %s "$2")" ] && ok ||
+    bad "$1 has $(stat -c %s "$1") bytes, $2 only $(stat -c %s "$2")"
+}
+smaller clusters2.glb whole.glb
+expect 0 'before' compress whole.glb --zonal 2 -o lobes2.glb
+smaller lobes2.glb whole.glb
+grep -q "$(stat -c %s whole.glb | cut -c1-2)" stdout && ok || bad "not the file's size before: $(cat stdout)"
+expect 1 'would grow.*[0-9]+ bytes, and [0-9]+' compress whole.glb --cpca 64,16 -o x.glb
+expect 1 'would grow' compress whole.glb --zonal 8 --precision single -o x.glb
+absent x.glb
+cp whole.glb itself.glb
+expect 0 'clusters' compress itself.glb --cpca 4,3 -o itself.glb
+cmp -s itself.glb clusters2.glb && ok || bad "compressed in place of itself a file differs"
 expect 0 'lamp group' bake corner.obj --samples 64 --light sh:3+lamps:1@$sun --fix-light $sun -o fixed.glb
 expect 0 'relit' render fixed.glb --size 24x24 -o fixed.png
 for thread_count in 1 2; do "$tool" bake corner.obj --max-edge 0.3 --samples 64 --light sh:4+lamps:3@$sun \
@@ -237,8 +252,8 @@ expect 0 'texels' export map.glb --godot map_godot
 expect 0 'lamps' bake box.obj --transfer lightmap --directional sh:2 --atlas 64x64 --samples 64 -o sh2.glb
 expect 0 'sh2_godot.3.exr' export sh2.glb --godot sh2_godot
 expect 0 'sh2_three.3.exr' export sh2.glb --three sh2_three
-for picture in map_three.exr map_godot.exr sh2_godot.0.exr sh2_three.0.exr; do [ \
-  -s $picture ] && ok || bad "$picture is missing"; done
+for picture in map_three.lamp.exr map_three.sky.exr map_godot.lamp.exr map_godot.sky.exr sh2_godot.0.exr \
+  sh2_three.0.exr; do [ -s $picture ] && ok || bad "$picture is missing"; done
 # Reflections one by one.
 expect 0 'receivers' bake box.obj --transfer lightmap --light-groups --atlas 64x64 --samples 64 --bounces 2 --terms \
   -o terms.glb
@@ -268,6 +283,14 @@ expect 1 'sh:2 or sh:3' export hl2.glb --godot x
 expect 0 'receivers' bake box.obj --receivers texels --atlas 64x64 --order 3 --samples 64 -o prt.glb
 expect 1 'no lamps' export prt.glb --three x
 expect 0 'relit' render prt.glb --env sky:elevation=30 $view -o prt.exr
+# Pictures of light groups add up to that of all; clusters are lamps too, and so are those beside harmonics.
+expect 0 'texels' bake box.obj --transfer lightmap --sky uniform:0.3,0.4,0.6 --texels-per-unit 20 --samples 512 \
+  --bounces 2 -o whole_map.glb
+expect 0 'whole_three.exr' export whole_map.glb --three whole_three
+expect 0 'rank' compress map.glb --cpca 200,2 -o map_clusters.glb
+smaller map_clusters.glb map.glb
+expect 0 'clusters_three.sky.exr' export map_clusters.glb --three clusters_three
+expect 0 'PSNR +(inf|[3-9][0-9])' compare clusters_three.sky.exr map_three.sky.exr
 for thread_count in 1 2; do "$tool" bake box.obj --transfer lightmap --atlas 64x64 --samples 64 \
   --threads $thread_count -o map_$thread_count.glb >/dev/null 2>&1; done
 cmp -s map_1.glb map_2.glb && ok || bad "1 and 2 threads give different lightmaps"
@@ -289,8 +312,8 @@ alike 40 "lobes and harmonics" lobes.exr a.exr
 expect 0 'relit' render lobes.glb --env sky:elevation=40 --deform twist:50,y --size 40x40 -o twisted.png
 expect 0 'cannot turn' render corner.glb --env sky:elevation=40 --deform bend:50,x,y --size 40x40 -o bent.png
 expect 0 'lobes' bake corner.obj --max-edge 0.5 --samples 64 --transfer zonal --lobes 2 -o direct.glb
-expect 0 'rows' bake corner.obj --max-edge 0.5 --samples 64 --order 4 --bounces 1 --brdf cook-torrance:roughness=0.3 \
-  --transfer matrix --outgoing svd:3 --view-map 32 -o rows.glb
+expect 0 'rows' bake corner.obj --max-edge 0.5 --samples 64 --order 5 --bounces 1 \
+  --brdf cook-torrance:roughness=0.3 --transfer matrix --outgoing svd:3 --view-map 32 -o rows.glb
 expect 0 '"rows": 3' compress rows.glb --zonal 3 -o glossy.glb --json
 expect 0 'each of 3 rows' inspect glossy.glb
 expect 0 'relit' render rows.glb --env sky:elevation=40 --camera 3,0.8,4,1,0.4,0.7,40 --size 48x32 -o rows.exr \

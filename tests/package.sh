@@ -76,7 +76,8 @@ diff <("$build/bin/relight" "$source_dir/tests/golden/diffuse.glb") "$prefix/rel
   { echo "the installed library relights differently"; exit 1; }
 if [ -x "$prefix/user/build/glm_user" ]; then
   for program in glm_user glm_user_ctor_init; do
-    [ "$("$prefix/user/build/$program")" = "1.00 0.00" ] || { echo "$program: $("$prefix/user/build/$program")"; exit 1; }
+    said=$("$prefix/user/build/$program")
+    [ "$said" = "1.00 0.00" ] || { echo "$program: $said"; exit 1; }
   done
 else
   echo "package: no GLM here (libglm-dev): its user was left out"

@@ -55,7 +55,7 @@ void add_bake(CLI::App& app, Run& run) {
   auto* from = c->add_option("--request", o->from_json, "The options below as a JSON file; options here go over it");
   c->add_option("--again", o->again, "Bake as this baked file was: the same bytes")->excludes(from);
   c->add_flag("--dry-run", o->plan, "Say the request, receivers, bytes and the time it would take, and bake nothing");
-  add_table(*c, bake_options(), o->request, o->request.given, {"scene"});
+  add_table(*c, bake_options(), o->request, o->request.given, [](const std::string& name) { return name != "scene"; });
   c->callback([o, &run] { run = [o](Context& context) { return run_bake(context, *o); }; });
 }
 

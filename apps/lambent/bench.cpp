@@ -1,8 +1,10 @@
 // `lambent bench solvers`: the same radiosity system by every solver, residual against applications of the operator.
-#include "bake_lightmap.h"
 #include "commands.h"
+#include "table.h"
 
 #include <lambent/bake/kernels.h>
+#include <lambent/pipeline/bake_lightmap.h>
+#include <lambent/pipeline/place_receivers.h>
 #include <lambent/scene/procedural.h>
 
 #include <fmt/format.h>
@@ -13,13 +15,9 @@ namespace lambent::tool {
 namespace {
 
 struct SolversCommand {
-  SceneOptions scene;
-  ReceiverFlags receivers;
-  std::string sky;
-  int samples = 1024, lamp_samples = 64, most = 200;
+  BakeRequest request;  // scene, receivers, sky, samples, memory, seed
+  int most = 200;
   double tolerance = 1e-3, fine = 1e-6;
-  uint64_t memory = uint64_t{4} << 30;
-  uint32_t seed = 1;
 };
 
 // A closed room of albedo 0.8 with a block and a small lamp: light stays long, so solvers differ.
@@ -41,29 +39,32 @@ std::optional<double> applications_to(const SolveReport& report, double toleranc
 }
 
 int run_solvers(Context& context, const SolversCommand& o) {
-  Result<Scene> scene = o.scene.path.empty() ? make_closed_room() : load_prepared_scene(o.scene);
+  const BakeRequest& r = o.request;
+  const Job job{&context.progress, [](const std::string& message) { warn(message); }};
+  if (auto ok = check_values(bake_options(), r, r.given); !ok) return fail(ok.error());
+  Result<Scene> scene = r.scene.empty() ? make_closed_room() : load_scene_of(r, job);
   if (!scene) return fail(scene.error());
   std::optional<Environment> sky;
-  if (!o.sky.empty()) {
-    auto env = load_environment(o.sky);
+  if (!r.sky.empty()) {
+    auto env = load_environment(r.sky);
     if (!env) return fail(env.error());
     warn(env->warnings);
     sky = std::move(*env);
   }
   const Lamps lamps = make_lamps(*scene, sky ? &*sky : nullptr, false);
   if (lamps.groups() == 0) return fail({scene->path, "nothing gives light: no emissive material, no lamp, no sky"});
-  auto placed = place_receivers(*scene, o.receivers, "vertices");
+  auto placed = place_receivers(*scene, r, job);
   if (!placed) return fail(placed.error());
   const Receivers& receivers = placed->receivers;
   if (receivers.count() == 0) return fail({scene->path, "nothing to bake: no triangle has an area"});
   auto tracer = Tracer::build(*scene);
   if (!tracer) return fail(tracer.error());
 
-  const GatherSetup setup = make_gather_setup(*scene, *tracer, receivers, 1, o.samples, o.seed);
+  const GatherSetup setup = make_gather_setup(*scene, *tracer, receivers, 1, r.samples, r.seed);
   const size_t width = pad_lanes(3 * lamps.groups());
   AlignedVector<float> e(receivers.count() * width, 0.0f);
-  const GatherDirect direct{lamps, o.lamp_samples, e.data(), width};
-  auto op = GatherOperator::trace(setup, &direct, nullptr, true, o.memory, &context.progress);
+  const GatherDirect direct{lamps, r.lamp_samples, e.data(), width};
+  auto op = GatherOperator::trace(setup, &direct, nullptr, true, r.memory, &context.progress);
   if (!op) return fail(op.error());
 
   nlohmann::json all = nlohmann::json::array();
@@ -88,14 +89,14 @@ int run_solvers(Context& context, const SolversCommand& o) {
     table += fmt::format("{:14}{:>16}{:>10.3f}{:>16}\n", name, shown(coarse_count), seconds, shown(fine_count));
   }
   if (context.json)
-    print_json({{"scene", o.scene.path.empty() ? "closed room" : o.scene.path},
+    print_json({{"scene", r.scene.empty() ? "closed room" : r.scene},
                 {"receivers", receivers.count()},
-                {"samples", o.samples},
+                {"samples", r.samples},
                 {"tolerance", o.tolerance},
                 {"solvers", all}});
   else
     fmt::print("{} receivers, {} rays each; applications of the operator until the residual is reached\n{}",
-               receivers.count(), o.samples, table);
+               receivers.count(), r.samples, table);
   return success;
 }
 
@@ -106,15 +107,16 @@ void add_bench(CLI::App& app, Run& run) {
   CLI::App* bench = app.add_subcommand("bench", "Measure choices on a scene of yours");
   bench->require_subcommand(1);
   CLI::App* c = bench->add_subcommand("solvers", "The scene's radiosity by every solver: residual against work");
-  o->scene.add_to(*c);
-  c->get_option("scene")->required(false)->description(
-      "Scene: .gltf, .glb, .obj or .ply; a closed room of albedo 0.8 if there is none");
-  o->receivers.add_to(*c);
-  c->add_option("--sky", o->sky, "An environment (as --env of render) as one more lamp");
-  c->add_option("--samples", o->samples, "Rays a receiver")->check(CLI::Range(1, 1 << 20))->capture_default_str();
-  c->add_option("--lamp-samples", o->lamp_samples, "Samples a receiver towards the lamps")
-      ->check(CLI::Range(1, 1 << 16))
-      ->capture_default_str();
+  o->request.receivers = "vertices", o->request.lamp_samples = 64;
+  c->add_option("scene", o->request.scene,
+                "Scene: .gltf, .glb, .obj or .ply; a closed room of albedo 0.8 if there is none");
+  add_table(*c, bake_options(), o->request, o->request.given,
+            [](const std::string& name) {
+              for (const char* taken : {"receivers", "texels-per-unit", "atlas", "sky", "samples", "lamp-samples",
+                                        "memory", "seed", "ground", "max-edge", "emit", "max-albedo"})
+                if (name == taken) return true;
+              return false;
+            });
   c->add_option("--residual", o->tolerance, "Of the solution that is timed")
       ->check(CLI::Range(1e-7, 0.5))
       ->capture_default_str();
@@ -124,10 +126,6 @@ void add_bench(CLI::App& app, Run& run) {
   c->add_option("--most", o->most, "Applications of the operator at most")
       ->check(CLI::Range(1, 10000))
       ->capture_default_str();
-  c->add_option("--memory", o->memory, "Working memory for the operator; e.g. 500MB, 2GiB")
-      ->transform(CLI::AsSizeValue(false))
-      ->default_str("4GiB");
-  c->add_option("--seed", o->seed, "Of the ray directions")->capture_default_str();
   c->callback([o, &run] { run = [o](Context& context) { return run_solvers(context, *o); }; });
 }
 

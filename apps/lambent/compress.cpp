@@ -9,6 +9,7 @@
 #include <fmt/format.h>
 
 #include <chrono>
+#include <filesystem>
 
 namespace lambent::tool {
 namespace {
@@ -38,84 +39,104 @@ Result<Image> paint_errors(const Baked& baked, const std::vector<float>& errors,
   }
   RenderOptions options;
   options.width = view->width, options.height = view->height, options.show = RenderOptions::Show::radiosity;
-  auto image = render(baked.scene, *tracer, corner_receivers(baked.scene, baked.front, baked.back), relit, view->camera,
-                      options, progress);
+  auto image =
+      render(baked.scene, *tracer, std::get<CornerReceivers>(baked.basis), relit, view->camera, options, progress);
   if (!image) return image;
   image->alpha.clear();
   draw_text(*image, 6, 6, fmt::format("white: {:.3g}%", 100 * o.white), Vec3(1.0f));
   return image;
 }
 
-int compress_to_clusters(Context& context, const CompressCommand& o, const Baked& baked) {
+nlohmann::json provenance_of(const Baked& baked) {
+  auto provenance = nlohmann::json::parse(baked.provenance, nullptr, false);
+  return provenance.is_object() ? provenance : nlohmann::json::object();
+}
+
+// What of a field counts as its size in a file: the store, and the errors of a fit.
+size_t size_of(const Field& field) { return bytes_of(field.store) + field.fit_errors.size() * sizeof(float); }
+
+// Puts the smaller store into the place of the larger, and writes the file as viewers know it.
+Result<void> save_smaller(const CompressCommand& o, Baked& baked, Field smaller, const nlohmann::json& provenance) {
+  const size_t before = size_of(baked.surface), after = size_of(smaller);
+  if (after > before)
+    return Error{o.baked,
+                 fmt::format("would grow: as {} its transfer takes {} bytes, and {} as it is{}", name_of(smaller.store),
+                             after, before,
+                             std::holds_alternative<ZonalTransfer>(smaller.store)
+                                 ? "; for surfaces that move, `bake --transfer zonal` makes lobes of any number"
+                                 : "")};
+  auto file = MappedFile::open(o.baked);
+  if (!file) return file.error();
+  const std::optional<ViewerLook> look = load_look(*file, o.baked);
+  baked.surface = std::move(smaller), baked.provenance = provenance.dump(), baked.terms.clear();
+  return save_baked(o.output, baked, look ? &*look : nullptr);
+}
+
+// Of the files, as they lie on the disk.
+struct Sizes {
+  double before = 0, after = 0;
+};
+Sizes sizes_of(const CompressCommand& o, uintmax_t before) {
+  std::error_code ignored;
+  return {double(before), double(std::filesystem::file_size(o.output, ignored))};
+}
+
+int compress_to_clusters(Context& context, const CompressCommand& o, Baked& baked, uintmax_t size_before) {
   CpcaOptions options;
   if (auto ok = parse_cpca("cpca:" + o.cpca, options); !ok) return fail({"--cpca", ok.error().message});
-  if (baked.zonal || baked.cpca || baked.view || baked.factors)
+  const auto* dense = std::get_if<Transfer>(&baked.surface.store);
+  if (!dense || std::holds_alternative<FixedView>(baked.surface.where))
     return fail({o.baked, "holds no plain transfer at receivers on surfaces, which is what clusters are made of"});
   double error = 0;
   const auto start = std::chrono::steady_clock::now();
-  auto clusters = compress_cpca(baked.transfer, options, &error, &context.progress);
+  auto clusters = compress_cpca(*dense, options, &error, &context.progress);
   if (!clusters) return fail({o.baked, clusters.error().text()});
   const double seconds = std::chrono::duration<double>(std::chrono::steady_clock::now() - start).count();
-  auto provenance = nlohmann::json::parse(baked.provenance, nullptr, false);
-  if (!provenance.is_object()) provenance = nlohmann::json::object();
-  provenance["cpca"] = {{"clusters", clusters->clusters}, {"rank", clusters->rank}, {"error", error}};
-  Receivers receivers;
-  receivers.front = baked.front, receivers.back = baked.back, receivers.basis = baked.basis;
-  const BakedExtras extras{.outgoing = baked.outgoing ? &*baked.outgoing : nullptr,
-                           .directional = baked.directional,
-                           .lattice = baked.lattice ? &*baked.lattice : nullptr};
-  if (auto ok = save_baked(o.output, baked.scene, receivers, *clusters, provenance.dump(), extras); !ok)
-    return fail(ok.error());
-  const double n = double(clusters->receivers), bytes = double(clusters->bytes()),
-               before = double(baked.transfer.bytes());
+  const size_t receivers = clusters->receivers;
+  const int count = clusters->clusters, rank = clusters->rank;
+  nlohmann::json provenance = provenance_of(baked);
+  provenance["cpca"] = {{"clusters", count}, {"rank", rank}, {"error", error}};
+  if (!baked.terms.empty()) warn(o.baked + ": the terms of its series are left out: clusters have none");
+  Field field{baked.surface.where, std::move(*clusters), baked.surface.rows};
+  if (auto ok = save_smaller(o, baked, std::move(field), provenance); !ok) return fail(ok.error());
+  const Sizes sizes = sizes_of(o, size_before);
   if (context.json)
     print_json({{"output", o.output},
-                {"receivers", clusters->receivers},
-                {"clusters", clusters->clusters},
-                {"rank", clusters->rank},
+                {"receivers", receivers},
+                {"clusters", count},
+                {"rank", rank},
                 {"error", error},
                 {"seconds", seconds},
-                {"bytes", bytes},
-                {"bytes_per_receiver", bytes / n},
-                {"bytes_per_receiver_before", before / n}});
+                {"bytes", sizes.after},
+                {"bytes_before", sizes.before}});
   else
     fmt::print(
-        "{}\n  error      {:.2f}% RMS of the transfer\n  time       {} for {} receivers\n  size       {} a receiver, "
-        "{} before ({} clusters of rank {})\n",
-        o.output, 100 * error, human_seconds(seconds), human_count(clusters->receivers), human_bytes(bytes / n),
-        human_bytes(before / n), clusters->clusters, clusters->rank);
+        "{}\n  error      {:.2f}% RMS of the transfer\n  time       {} for {} receivers\n  size       {}, {} before "
+        "({} "
+        "clusters of rank {})\n",
+        o.output, 100 * error, human_seconds(seconds), human_count(receivers), human_bytes(sizes.after),
+        human_bytes(sizes.before), count, rank);
   return success;
 }
 
-int run_compress(Context& context, CompressCommand o) {
-  if (auto ok = check_output(o.output, {"glb"}); !ok) return fail(ok.error());
-  if (!o.error_picture.empty())
-    if (auto ok = check_output(o.error_picture, {"png", "exr"}); !ok) return fail(ok.error());
-  o.zonal.precision = o.precision == "half" ? Precision::half : Precision::single;
-  auto baked = load_baked(o.baked);
-  if (!baked) return fail(baked.error());
-  if (baked->visibility) return fail({o.baked, "holds no transfer to compress, but visibility in blocks"});
-  if (!o.cpca.empty()) return compress_to_clusters(context, o, *baked);
-  if (baked->zonal || baked->cpca || baked->view || baked->factors || baked->directional != DirectionalKind::none ||
-      baked->front.empty())
+int compress_to_lobes(Context& context, CompressCommand& o, Baked& baked, uintmax_t size_before) {
+  const auto* dense = std::get_if<Transfer>(&baked.surface.store);
+  if (!dense || !vertices_of(baked) || directional_of(baked.surface) != DirectionalKind::none)
     return fail({o.baked, "holds no transfer of spherical harmonics at vertices, which is what lobes are fitted to"});
-  if (baked->lattice) warn(o.baked + ": light in free space is left out: lobes have none");
+  if (lattice_of(baked)) warn(o.baked + ": light in free space is left out: lobes have none");
+  if (!baked.terms.empty()) warn(o.baked + ": the terms of its series are left out: lobes have none");
   ZonalFitReport report;
-  if (baked->outgoing) o.zonal.row_weights = row_weights(*baked->outgoing);
-  auto fit = fit_zonal(baked->transfer, o.zonal, &report, &context.progress);
+  if (const Outgoing* outgoing = outgoing_of(baked.surface)) o.zonal.row_weights = row_weights(*outgoing);
+  auto fit = fit_zonal(*dense, o.zonal, &report, &context.progress);
   if (!fit) return fail({o.baked, fit.error().text()});
-
-  auto provenance = nlohmann::json::parse(baked->provenance, nullptr, false);
-  if (!provenance.is_object()) provenance = nlohmann::json::object();
+  nlohmann::json provenance = provenance_of(baked);
   provenance["zonal"] = {{"lobes", fit->lobes},    {"starts", o.zonal.starts}, {"retry", o.zonal.retry},
                          {"ridge", o.zonal.ridge}, {"seed", o.zonal.seed},     {"rms", report.rms}};
-  Receivers receivers;
-  receivers.front = baked->front, receivers.back = baked->back;
-  const BakedExtras extras{.outgoing = baked->outgoing ? &*baked->outgoing : nullptr, .fit_errors = report.errors};
-  if (auto ok = save_baked(o.output, baked->scene, receivers, *fit, provenance.dump(), extras); !ok)
-    return fail(ok.error());
+  baked.more.clear();
+  Field field{baked.surface.where, *fit, baked.surface.rows, report.errors};
+  if (auto ok = save_smaller(o, baked, std::move(field), provenance); !ok) return fail(ok.error());
   if (!o.error_picture.empty()) {
-    auto image = paint_errors(*baked, report.errors, o, &context.progress);
+    auto image = paint_errors(baked, report.errors, o, &context.progress);
     if (!image) return fail(image.error());
     if (auto ok = save_image(o.error_picture, *image); !ok) return fail(ok.error());
   }
@@ -123,8 +144,7 @@ int run_compress(Context& context, CompressCommand o) {
   std::vector<float> sorted = report.errors;
   std::sort(sorted.begin(), sorted.end());
   const double median = sorted.empty() ? 0 : sorted[sorted.size() / 2], worst = sorted.empty() ? 0 : sorted.back();
-  const double bytes = double(fit->receiver_values() * fit->value_bytes());
-  const double before = double(baked->transfer.receiver_values() * baked->transfer.value_bytes());
+  const Sizes sizes = sizes_of(o, size_before);
   if (context.json)
     print_json({{"output", o.output},
                 {"receivers", fit->receivers},
@@ -136,19 +156,33 @@ int run_compress(Context& context, CompressCommand o) {
                 {"worst", worst},
                 {"seconds", report.seconds},
                 {"retried", report.retried},
-                {"bytes", fit->bytes()},
-                {"bytes_per_receiver", bytes},
-                {"bytes_per_receiver_before", before}});
+                {"bytes", sizes.after},
+                {"bytes_before", sizes.before}});
   else
     fmt::print(
         "{}\n  error      {:.2f}% RMS of the transfer; receivers: median {:.2f}%, worst {:.1f}%\n  time       {} for "
         "{} receivers\n"
-        "  size       {} a receiver, {} before ({} lobes{}, order {}, {} channel{})\n",
+        "  size       {}, {} before ({} lobes{}, order {}, {} channel{})\n",
         o.output, 100 * report.rms, 100 * median, 100 * worst, human_seconds(report.seconds),
-        human_count(fit->receivers), human_bytes(bytes), human_bytes(before), fit->lobes,
+        human_count(fit->receivers), human_bytes(sizes.after), human_bytes(sizes.before), fit->lobes,
         fit->rows > 1 ? fmt::format(" in each of {} rows", fit->rows) : "", fit->order, fit->channels,
         fit->channels == 1 ? "" : "s");
   return success;
+}
+
+int run_compress(Context& context, CompressCommand o) {
+  if (auto ok = check_output(o.output, {"glb"}); !ok) return fail(ok.error());
+  if (!o.error_picture.empty())
+    if (auto ok = check_output(o.error_picture, {"png", "exr"}); !ok) return fail(ok.error());
+  o.zonal.precision = o.precision == "half" ? Precision::half : Precision::single;
+  auto baked = load_baked(o.baked);
+  if (!baked) return fail(baked.error());
+  std::error_code ignored;
+  const uintmax_t before = std::filesystem::file_size(o.baked, ignored);  // the output may take its place
+  if (std::holds_alternative<Visibility>(baked->surface.store))
+    return fail({o.baked, "holds no transfer to compress, but visibility in blocks"});
+  return o.cpca.empty() ? compress_to_lobes(context, o, *baked, before)
+                        : compress_to_clusters(context, o, *baked, before);
 }
 
 }  // namespace

@@ -3,6 +3,7 @@
 
 #include <lambent/baked/baked_file.h>
 #include <lambent/core/file.h>
+#include <lambent/pipeline/describe.h>
 #include <lambent/receivers/receivers.h>
 #include <lambent/scene/load.h>
 #include <lambent/transfer/zonal_texture.h>
@@ -107,58 +108,20 @@ int inspect_texture(Context& context, const std::string& path) {
   return success;
 }
 
-int inspect_zonal(Context& context, const std::string& path, const Baked& baked) {
-  const ZonalTransfer& t = *baked.zonal;
-  const nlohmann::json outgoing = baked.outgoing ? nlohmann::json(outgoing_names[int(baked.outgoing->kind)])
-                                                 : nlohmann::json();
-  const nlohmann::json d{{"file", path},
-                         {"kind", "baked"},
-                         {"scene", describe_scene(baked.scene)},
-                         {"transfer",
-                          {{"kind", "zonal"},
-                           {"order", t.order},
-                           {"lobes", t.lobes},
-                           {"rows", t.rows},
-                           {"outgoing", outgoing},
-                           {"channels", t.channels},
-                           {"receivers", t.receivers},
-                           {"bytes", t.bytes()},
-                           {"precision", t.precision == Precision::half ? "half" : "single"}}},
-                         {"provenance", nlohmann::json::parse(baked.provenance, nullptr, false)}};
+int inspect_baked(Context& context, const std::string& path) {
+  auto baked = load_baked(path);
+  if (!baked) return fail(baked.error());
+  nlohmann::json d{{"file", path},
+                   {"kind", "baked"},
+                   {"scene", describe_scene(baked->scene)},
+                   {"transfer", describe(baked->surface)},
+                   {"provenance", nlohmann::json::parse(baked->provenance, nullptr, false)}};
+  if (const Field* lattice = lattice_of(*baked)) d["lattice"] = describe(*lattice);
+  if (!baked->terms.empty()) d["terms"] = baked->terms.size();
   if (context.json) return print_json(d), success;
-  fmt::print(
-      "{}\n  baked: {} zonal lobes{}, order {}, {} channel{}, {} receivers, {} ({})\n", path, t.lobes,
-      baked.outgoing ? fmt::format(" in each of {} rows ({})", t.rows, outgoing_names[int(baked.outgoing->kind)]) : "",
-      t.order, t.channels, t.channels == 1 ? "" : "s", human_count(t.receivers), human_bytes(double(t.bytes())),
-      t.precision == Precision::half ? "half" : "single");
-  print_scene(d["scene"]);
-  fmt::print("  provenance {}\n", d["provenance"].dump(-1, ' ', false, nlohmann::json::error_handler_t::replace));
-  return success;
-}
-
-int inspect_visibility(Context& context, const std::string& path, const Baked& baked) {
-  const Visibility& v = *baked.visibility;
-  const VisibilityStatistics s = visibility_statistics(v);
-  const nlohmann::json d{{"file", path},
-                         {"kind", "baked"},
-                         {"scene", describe_scene(baked.scene)},
-                         {"transfer",
-                          {{"kind", "blocks"},
-                           {"cube", v.size},
-                           {"bits", v.bits},
-                           {"receivers", v.receivers},
-                           {"bytes", v.data.size()},
-                           {"blocked", s.blocked},
-                           {"clear", s.clear},
-                           {"mixed", s.mixed},
-                           {"changes_per_mixed_block", s.changes}}},
-                         {"provenance", nlohmann::json::parse(baked.provenance, nullptr, false)}};
-  if (context.json) return print_json(d), success;
-  fmt::print(
-      "{}\n  baked: visibility in blocks, cube {}, {} bit{}, {} receivers, {}; {:.1f} % of blocks mixed, with {:.1f} "
-      "changes each\n",
-      path, v.size, v.bits, v.bits == 1 ? "" : "s", human_count(v.receivers), human_bytes(double(v.data.size())),
-      100 * s.mixed, s.changes);
+  fmt::print("{}\n  baked: {}\n", path, describe_in_words(baked->surface));
+  if (const Field* lattice = lattice_of(*baked)) fmt::print("  beside it: {}\n", describe_in_words(*lattice));
+  if (!baked->terms.empty()) fmt::print("  {} terms of the series\n", baked->terms.size());
   print_scene(d["scene"]);
   fmt::print("  provenance {}\n", d["provenance"].dump(-1, ' ', false, nlohmann::json::error_handler_t::replace));
   return success;
@@ -169,78 +132,7 @@ int run_inspect(Context& context, const std::string& path) {
   if (extension == "lpt") return inspect_texture(context, path);
   if (std::set<std::string>{"hdr", "exr", "png", "jpg", "jpeg"}.contains(extension))
     return inspect_picture(context, path);
-  if ((extension == "glb" || extension == "gltf") && is_baked(path)) {
-    auto baked = load_baked(path);
-    if (!baked) return fail(baked.error());
-    if (baked->visibility) return inspect_visibility(context, path, *baked);
-    if (baked->zonal) return inspect_zonal(context, path, *baked);
-    Transfer t = baked->transfer;
-    t.light = light_of(*baked);
-    if (baked->cpca)
-      t.light = baked->cpca->light, t.rows = baked->cpca->rows, t.channels = baked->cpca->channels,
-      t.receivers = baked->cpca->receivers;
-    const size_t bytes = baked->cpca ? baked->cpca->bytes() : baked->transfer.bytes();
-    nlohmann::json lobes = nlohmann::json::array();
-    for (const Lobe& l : t.light.lobes) lobes.push_back({{"axis", vector_json(l.axis)}, {"sharpness", l.sharpness}});
-    nlohmann::json d{{"file", path},
-                     {"kind", "baked"},
-                     {"scene", describe_scene(baked->scene)},
-                     {"transfer",
-                      {{"kind", baked->factors    ? "factors"
-                                : baked->outgoing ? "matrix"
-                                                  : "diffuse"},
-                       {"order", t.light.order},
-                       {"lobes", lobes},
-                       {"groups", t.light.groups},
-                       {"columns", t.columns()},
-                       {"rows", t.rows},
-                       {"channels", t.channels},
-                       {"receivers", t.receivers},
-                       {"bytes", bytes},
-                       {"precision", t.precision == Precision::half ? "half" : "single"}}},
-                     {"provenance", nlohmann::json::parse(baked->provenance, nullptr, false)}};
-    if (baked->cpca) d["transfer"]["cpca"] = {{"clusters", baked->cpca->clusters}, {"rank", baked->cpca->rank}};
-    if (baked->view) {
-      const FixedView& v = *baked->view;
-      d["view"] = {{"width", v.width},
-                   {"height", v.height},
-                   {"eye", vector_json(v.camera.eye)},
-                   {"target", vector_json(v.camera.target)},
-                   {"fov", v.camera.fov}};
-    }
-    if (baked->lattice) {
-      const LatticeTransfer& l = *baked->lattice;
-      d["lattice"] = {{"points", {l.lattice.nx, l.lattice.ny, l.lattice.nz}},
-                      {"order", l.order},
-                      {"min", vector_json(l.lattice.min)},
-                      {"max", vector_json(l.lattice.max)},
-                      {"invalid", std::count(l.valid.begin(), l.valid.end(), uint8_t(0))},
-                      {"bytes", l.transfer.bytes()}};
-    }
-    if (context.json) {
-      print_json(d);
-    } else {
-      fmt::print("{}\n  baked: {}, {}, {} column{}, {} row{}, {} channel{}, {} receivers, {} ({})\n", path,
-                 baked->factors    ? "factors"
-                 : baked->outgoing ? std::string("matrix, outgoing ") + outgoing_names[int(baked->outgoing->kind)]
-                                   : "diffuse",
-                 describe_light(t.light), t.columns(), t.columns() == 1 ? "" : "s", t.rows, t.rows == 1 ? "" : "s",
-                 t.channels, t.channels == 1 ? "" : "s", human_count(t.receivers), human_bytes(double(bytes)),
-                 t.precision == Precision::half ? "half" : "single");
-      if (baked->cpca) fmt::print("  in {} clusters of rank {}\n", baked->cpca->clusters, baked->cpca->rank);
-      if (baked->view) fmt::print("  a fixed view of {} x {} pixels\n", baked->view->width, baked->view->height);
-      for (const Lobe& l : t.light.lobes)
-        fmt::print("  lobe about ({:.4f}, {:.4f}, {:.4f}), sharpness {:.4g}: {:.2g} degrees across\n", l.axis.x,
-                   l.axis.y, l.axis.z, l.sharpness, std::min(180.0, double(degrees(2 / std::sqrt(l.sharpness)))));
-      if (baked->lattice)
-        fmt::print("  light in free space at {} x {} x {} points, order {}, {}\n", baked->lattice->lattice.nx,
-                   baked->lattice->lattice.ny, baked->lattice->lattice.nz, baked->lattice->order,
-                   human_bytes(double(baked->lattice->transfer.bytes())));
-      print_scene(d["scene"]);
-      fmt::print("  provenance {}\n", d["provenance"].dump(-1, ' ', false, nlohmann::json::error_handler_t::replace));
-    }
-    return success;
-  }
+  if ((extension == "glb" || extension == "gltf") && is_baked(path)) return inspect_baked(context, path);
   auto scene = load_scene(path);
   if (!scene) return fail(scene.error());
   nlohmann::json d = describe_scene(*scene);

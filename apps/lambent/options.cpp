@@ -91,15 +91,6 @@ CLI::Option* BrdfOptions::add_to(CLI::App& command) {
       ->capture_default_str();
 }
 
-std::string describe_light(const LightBasis& light) {
-  std::string text = light.order > 0 ? "order " + std::to_string(light.order) : "";
-  auto add = [&](size_t count, const std::string& what) {
-    if (count > 0) text += (text.empty() ? "" : " and ") + std::to_string(count) + " " + what + (count == 1 ? "" : "s");
-  };
-  add(light.lobes.size(), "lobe"), add(light.groups.size(), "lamp group");
-  return text;
-}
-
 void warn_of_lost_walks(const SubsurfaceReport& walks) {
   if (walks.lost > 0.005)
     warn(

@@ -45,8 +45,6 @@ struct BrdfOptions {
 };
 inline Result<Reflection> load_reflection(const BrdfOptions& options) { return parse_reflection(options.brdf); }
 
-// "order 6", "order 5 and 8 lobes", "36 lobes".
-std::string describe_light(const LightBasis& light);
 
 // Of --subsurface: what it takes, and a warning where walks came to nothing.
 inline constexpr const char* subsurface_help =

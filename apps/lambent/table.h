@@ -4,15 +4,17 @@
 
 #include <CLI/CLI.hpp>
 
+#include <functional>
+
 namespace lambent::tool {
 
-// Adds every option of the table but those in `apart` to the command, in the table's groups; what is said goes into
-// `request`, and its name into `given` once the command line has been read.
+// Adds the options of the table that `takes` to the command, in the table's groups; what is said goes into `request`, and
+// its name into `given` once the command line has been read.
 template <class R>
 void add_table(CLI::App& command, std::span<const Option<R>> table, R& request, GivenOptions& given,
-               std::initializer_list<std::string> apart = {}) {
+               const std::function<bool(const std::string&)>& takes) {
   for (const Option<R>& o : table) {
-    if (std::find(apart.begin(), apart.end(), o.name) != apart.end()) continue;
+    if (!takes(o.name)) continue;
     const std::string name = std::string(o.name) == "output" ? "-o,--output" : std::string("--") + o.name;
     std::string help = o.help;
     if (o.choices) help += " {" + value_text(0, 0, o.choices) + "}";

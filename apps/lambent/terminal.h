@@ -3,6 +3,7 @@
 #include <lambent/core/progress.h>
 #include <lambent/core/result.h>
 #include <lambent/pipeline/bake.h>
+#include <lambent/pipeline/describe.h>
 #include <lambent/pipeline/text.h>
 
 #include <nlohmann/json.hpp>

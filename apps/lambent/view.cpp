@@ -1,8 +1,7 @@
 #include "commands.h"
-#include "web.h"
+#include "serve.h"
 
 #include <fmt/format.h>
-#include <httplib.h>
 #include <spawn.h>
 
 #include <chrono>
@@ -16,40 +15,6 @@ struct ViewCommand {
   int port = 0;
   bool no_browser = false;
 };
-
-// One table of files and nothing else: a path is looked up, never opened. Answers only requests that name this machine,
-// so that a foreign page cannot have its own name point here and read them.
-void answer_from(httplib::Server& server, const WebFiles& files, const int& port) {
-  server.set_pre_routing_handler([&port](const httplib::Request& request, httplib::Response& response) {
-    const std::string host = request.get_header_value("Host"), tail = ":" + std::to_string(port);
-    if (host == "127.0.0.1" + tail || host == "localhost" + tail) return httplib::Server::HandlerResponse::Unhandled;
-    response.status = 403;
-    response.set_content("This server answers its own machine only.\n", "text/plain");
-    return httplib::Server::HandlerResponse::Handled;
-  });
-  server.Get(".*", [&files](const httplib::Request& request, httplib::Response& response) {
-    const auto file = files.find(request.path == "/" ? "index.html" : request.path.substr(1));
-    if (file == files.end()) {
-      response.status = 404;
-      response.set_content("There is no such file.\n", "text/plain");
-      return;
-    }
-    const std::string_view bytes = file->second.bytes();
-    response.set_content_provider(bytes.size(), file->second.type,
-                                  [bytes](size_t offset, size_t length, httplib::DataSink& sink) {
-                                    return sink.write(bytes.data() + offset, std::min<size_t>(length, 1 << 16));
-                                  });
-  });
-  server.set_default_headers({{"X-Content-Type-Options", "nosniff"},
-                              {"Cache-Control", "no-store"},
-                              {"Cross-Origin-Resource-Policy", "same-origin"}});
-  server.set_payload_max_length(0);
-  // The library's default lets two programs share a port, and each would get half of the other's requests.
-  server.set_socket_options([](socket_t socket) {
-    const int yes = 1;
-    ::setsockopt(socket, SOL_SOCKET, SO_REUSEADDR, &yes, sizeof yes);
-  });
-}
 
 void open_browser(const std::string& address) {
   const auto is_set = [](const char* name) {

@@ -4,6 +4,7 @@
 
 #include <lambent/baked/baked_file.h>
 #include <lambent/image/image.h>
+#include <lambent/pipeline/browser.h>
 
 #include <algorithm>
 #include <filesystem>
@@ -60,10 +61,7 @@ Result<void> add_baked(WebFiles& files, const std::string& path, const std::stri
   if (!file) return file.error();
   auto whole = load_baked(*file, path);
   if (!whole) return whole.error();
-  if (whole->visibility)
-    return Error{
-        path,
-        "is of visibility in blocks, which the web viewer cannot draw: see `lambent render` and `lambent relight`"};
+  if (auto ok = check_for_browser(whole->surface, path); !ok) return ok.error();
   files[name] = {media_type("glb"), std::move(*file)};
   return {};
 }
@@ -76,12 +74,6 @@ Result<void> add_map(WebFiles& files, const Image& image, const std::string& pat
 }
 
 }  // namespace
-
-std::string_view WebFile::bytes() const {
-  if (const auto* text = std::get_if<std::string>(&content)) return *text;
-  const auto mapped = std::get<MappedFile>(content).bytes();
-  return {reinterpret_cast<const char*>(mapped.data()), mapped.size()};
-}
 
 void WebOptions::add_to(CLI::App& command) {
   command.add_option("baked", baked, "Baked file, from `lambent bake`")->required();
@@ -114,12 +106,12 @@ Result<WebFiles> web_files(const WebOptions& options) {
     manifest["rotate"] = *turn;
   }
   WebFiles files;
-  if (auto ok = add_page(files); !ok) return ok.error();
   if (auto ok = add_baked(files, options.baked, "data/scene.glb"); !ok) return ok.error();
   if (!options.compare.empty()) {
     if (auto ok = add_baked(files, options.compare, "data/compare.glb"); !ok) return ok.error();
     manifest["compare"] = "data/compare.glb";
   }
+  if (auto ok = add_page(files); !ok) return ok.error();
   if (!options.reference.empty()) {
     auto image = load_image(options.reference);
     if (!image) return image.error();

@@ -7,6 +7,7 @@
 
 #include <map>
 #include <string>
+#include <string_view>
 #include <variant>
 #include <vector>
 
@@ -23,7 +24,11 @@ struct WebOptions {
 struct WebFile {
   std::string type;  // media type
   std::variant<MappedFile, std::string> content;
-  std::string_view bytes() const;
+  std::string_view bytes() const {
+    if (const auto* text = std::get_if<std::string>(&content)) return *text;
+    const auto mapped = std::get<MappedFile>(content).bytes();
+    return {reinterpret_cast<const char*>(mapped.data()), mapped.size()};
+  }
 };
 
 // By path relative to the page: index.html and what it needs; lambent.json, which says what to show; data/….

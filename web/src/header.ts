@@ -2,7 +2,7 @@
 import { BufferGeometry } from 'three';
 import { LambentError } from './errors.js';
 import { isIndex, type TransferExtension } from './glb.js';
-import type { TransferSource } from './kinds.js';
+import { axesOf, isDrawn, type TransferSource } from './kinds.js';
 import { maxShOrder } from './sh.js';
 
 export const noReceiver = 0xffffffff;
@@ -23,10 +23,8 @@ const isDirectional = (value: unknown): value is Directional =>
   typeof value === 'string' && Object.hasOwn(directionalRows, value);
 
 /** What every kind has in its header; refuses by name what this version does not draw. */
-export function readHeader(
-  { transfer, surface, view }: TransferExtension,
-  surfaceKind: 'vertices' | 'texels' = 'vertices',
-): TransferHeader {
+export function readHeader(extension: TransferExtension, surfaceKind: 'vertices' | 'texels' = 'vertices'): TransferHeader {
+  const { transfer, surface, view } = extension;
   const { basis, order, channels, precision, receivers, bufferView, lobes, groups, directional, cpca } = transfer;
   const text = (value: unknown): string => (typeof value === 'string' ? value : 'something else'),
     where = text(surface?.kind ?? 'vertices');
@@ -56,6 +54,8 @@ export function readHeader(
       `holds transfer over ${where}, where this version draws vertices and, for diffuse transfer, texels; ` +
         '"lambent render" draws it',
     );
+  if (!isDrawn(extension))
+    throw new LambentError(`holds ${axesOf(extension).join(', ')}, which this version does not draw; "lambent render" does`);
   if (precision !== 'half' && precision !== 'single') throw new LambentError('"precision" must be half or single');
   if (!isIndex(order, maxShOrder) || (order < 1 && !isMore(groups))) throw new LambentError('"order" is out of range');
   if (channels !== 1 && channels !== 3) throw new LambentError('"channels" is out of range');

@@ -53,6 +53,34 @@ export interface BakedTransfer {
   dispose(): void;
 }
 
+/** What the page draws: store, meaning of the rows, placement. src/lambent/pipeline/browser.cpp holds the same, and a test compares the two. */
+export const drawn = [
+  ['dense', 'diffuse', 'vertices'],
+  ['dense', 'diffuse', 'texels'],
+  ['dense', 'directional', 'texels'],
+  ['dense', 'outgoing', 'vertices'],
+  ['lobes', 'diffuse', 'vertices'],
+  ['lobes', 'outgoing', 'vertices'],
+] as const;
+
+/** Of what is drawn: columns of an atlas's light; lobes of all rows of a receiver; of a matrix, texels a receiver. */
+export const limits = { columns: 256, lobes: 64, texels: 2048 } as const;
+
+/** Store, meaning and placement of a file's transfer, as the table has them. */
+export function axesOf({ transfer, surface, view }: TransferExtension): [store: string, rows: string, where: string] {
+  const stores: Record<string, string> = { zonal: 'lobes', factors: 'factors', blocks: 'blocks' };
+  const isDirectional = transfer['directional'] !== undefined && transfer['directional'] !== 'none';
+  return [
+    transfer['cpca'] !== undefined ? 'clusters' : (stores[transfer.kind] ?? 'dense'),
+    view !== undefined ? 'pixels' : transfer.kind === 'blocks' ? 'sight' : transfer['outgoing'] !== undefined ? 'outgoing' : isDirectional ? 'directional' : 'diffuse',
+    view !== undefined ? 'view' : typeof surface?.kind === 'string' ? surface.kind : 'vertices',
+  ];
+}
+export const isDrawn = (extension: TransferExtension): boolean => {
+  const axes = axesOf(extension);
+  return drawn.some((kind) => kind.every((name, i) => name === axes[i]));
+};
+
 export interface TransferKind {
   name: string;
   load(source: TransferSource): Promise<BakedTransfer>;

@@ -19,9 +19,10 @@ import {
 } from 'three';
 import type { BlockLayout } from './block_texture.js';
 import { LambentError } from './errors.js';
+import { limits } from './kinds.js';
 
 /** Columns of light at most: uniforms of 192 vec4 of the 224 that WebGL 2 promises. */
-export const maxColumns = 256;
+export const maxColumns = limits.columns;
 
 const vertexShader = 'in vec3 position;\nvoid main() { gl_Position = vec4( position, 1.0 ); }';
 const fragmentShader = (pick: string): string => /* glsl */ `

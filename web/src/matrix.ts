@@ -18,7 +18,7 @@ import {
 import { blockTexture, packBlocks, type BlockLayout } from './block_texture.js';
 import { LambentError } from './errors.js';
 import { readHeader, type TransferHeader } from './header.js';
-import type { BakedTransfer, TransferKind, TransferSource } from './kinds.js';
+import { limits, type BakedTransfer, type TransferKind, type TransferSource } from './kinds.js';
 import type { Lighting } from './lighting.js';
 import { afterAll, LightSum } from './light_sum.js';
 import {
@@ -218,7 +218,7 @@ async function load(source: TransferSource): Promise<BakedTransfer> {
   const header = readHeader(source.extension),
     { rows } = readOutgoing(source.extension.transfer),
     { receivers } = header;
-  if (rows * header.channels * Math.ceil(shCount(header.order) / 4) > 2048)
+  if (rows * header.channels * Math.ceil(shCount(header.order) / 4) > limits.texels)
     throw new LambentError(
       `has ${rows} rows of order ${header.order}, more than textures hold; "lambent render" draws it`,
     );

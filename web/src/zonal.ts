@@ -6,7 +6,7 @@ import { LambentError } from './errors.js';
 import { isIndex } from './glb.js';
 import { glslHarmonics } from './glsl_harmonics.js';
 import { readHeader } from './header.js';
-import type { TransferKind } from './kinds.js';
+import { limits, type TransferKind } from './kinds.js';
 import { readLobes } from './lobes.js';
 import { glslReflect, loadLastReflection, reflectionDefines, reflectionKey, type LastReflection } from './outgoing.js';
 import type { PrtShader } from './prt_material.js';
@@ -118,8 +118,6 @@ vec3 prtRow( const in int r, const in int row ) {
 ${glslReflect(last.outgoing, true)}`,
 });
 
-const maxGlossyLobes = 64; // of all rows
-
 export const zonalKind: TransferKind = {
   name: 'zonal',
   load: async (source) => {
@@ -139,9 +137,9 @@ export const zonalKind: TransferKind = {
     }
     if (source.extension.transfer['outgoing'] !== undefined) {
       const last = await loadLastReflection(source, header.receivers);
-      if (last.rows * lobes > maxGlossyLobes)
+      if (last.rows * lobes > limits.lobes)
         throw new LambentError(
-          `has ${last.rows} rows of ${lobes} lobes, where this version draws ${maxGlossyLobes} lobes in all; ` +
+          `has ${last.rows} rows of ${lobes} lobes, where this version draws ${limits.lobes} lobes in all; ` +
             '"lambent render" draws it',
         );
       return VertexTransfer.load(source, header, {

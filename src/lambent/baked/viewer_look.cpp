@@ -3,6 +3,8 @@
 // viewer multiplies it by lights of its own. (KHR_materials_unlit would end at 1 and escape tone mapping.)
 #include <lambent/baked/viewer_look.h>
 
+#include <lambent/baked/extension.h>
+
 #include <algorithm>
 #include <map>
 #include <optional>

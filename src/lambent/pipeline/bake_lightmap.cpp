@@ -15,13 +15,6 @@ namespace {
 using Clock = std::chrono::steady_clock;
 double seconds_since(Clock::time_point start) { return std::chrono::duration<double>(Clock::now() - start).count(); }
 
-// {converged, steps: [{applications, residual}]}
-nlohmann::json convergence(const SolveReport& report) {
-  nlohmann::json steps = nlohmann::json::array();
-  for (const SolveStep& s : report.steps) steps.push_back({{"applications", s.applications}, {"residual", s.residual}});
-  return {{"converged", report.converged}, {"steps", steps}};
-}
-
 struct Seconds {
   double load = 0, build = 0;
 };
@@ -115,6 +108,12 @@ Result<BakeOutcome> bake_lightmap_request(const BakeRequest& request, const Bake
   out.baked.provenance = provenance_of(request, out.baked.scene,
                                        {{"receivers", report.receivers}, {"moved", moved}, {"buried", report.buried}});
   return out;
+}
+
+nlohmann::json convergence(const SolveReport& report) {
+  nlohmann::json steps = nlohmann::json::array();
+  for (const SolveStep& s : report.steps) steps.push_back({{"applications", s.applications}, {"residual", s.residual}});
+  return {{"converged", report.converged}, {"steps", steps}};
 }
 
 }  // namespace lambent

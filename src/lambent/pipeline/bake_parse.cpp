@@ -2,6 +2,7 @@
 
 #include <lambent/brdf/parse_brdf.h>
 #include <lambent/light/lamps.h>
+#include <lambent/pipeline/bake_lightmap.h>
 #include <lambent/pipeline/parse.h>
 #include <lambent/scene/load.h>
 #include <lambent/scene/refine.h>
@@ -111,11 +112,6 @@ Result<int> parse_visibility(const std::string& text) {
                fmt::format("must be binary, or bits:N with N from 2 to {}, not \"{}\"", max_visibility_bits, text)};
 }
 
-const std::map<std::string, Solver> solver_names{{"jacobi", Solver::jacobi},
-                                                 {"gauss-seidel", Solver::gauss_seidel},
-                                                 {"southwell", Solver::southwell},
-                                                 {"gmres", Solver::gmres}};
-
 LightmapOptions lightmap_options(const BakeRequest& r, const BakeOptions& bake, double converge) {
   LightmapOptions o;
   o.order = r.order, o.samples = r.samples, o.lamp_samples = r.lamp_samples, o.bounces = bake.bounces;
@@ -152,6 +148,11 @@ Result<void> check_orders(const BakePlan& plan, const BakeRequest& r) {
 }
 
 }  // namespace
+
+const std::map<std::string, Solver> solver_names{{"jacobi", Solver::jacobi},
+                                                 {"gauss-seidel", Solver::gauss_seidel},
+                                                 {"southwell", Solver::southwell},
+                                                 {"gmres", Solver::gmres}};
 
 Result<BakePlan> plan_of(const BakeRequest& r, const Job& job) {
   BakePlan plan;

@@ -1,0 +1,60 @@
+#include <lambent/pipeline/browser.h>
+
+#include <lambent/pipeline/describe.h>
+
+#include <fmt/format.h>
+
+#include <algorithm>
+#include <string_view>
+
+namespace lambent {
+namespace {
+
+constexpr DrawnKind kinds[] = {
+    {"dense", "diffuse", "vertices"},  {"dense", "diffuse", "texels"},   {"dense", "directional", "texels"},
+    {"dense", "outgoing", "vertices"}, {"lobes", "diffuse", "vertices"}, {"lobes", "outgoing", "vertices"},
+};
+
+// What a kind that is not drawn is, for those who made it.
+std::string why_not(const Field& field) {
+  using std::string;
+  if (std::holds_alternative<FixedView>(field.where)) return "is of a fixed view, a picture without surfaces";
+  if (std::holds_alternative<Visibility>(field.store)) return "is of visibility in blocks";
+  if (std::holds_alternative<CpcaTransfer>(field.store)) return "holds clusters";
+  if (std::holds_alternative<FactoredTransfer>(field.store)) return "holds factors";
+  if (std::holds_alternative<DirectionalRows>(field.rows))
+    return string("holds directional rows at ") + name_of(field.where);
+  return string("holds ") + name_of(field.store) + " transfer, " + name_of(field.rows) + ", at " + name_of(field.where);
+}
+
+}  // namespace
+
+std::span<const DrawnKind> drawn_kinds() { return kinds; }
+
+Result<void> check_for_browser(const Field& field, const std::string& path) {
+  const auto refuse = [&](const std::string& why) {
+    return Error{path, why + ", which the web page does not draw: see `lambent render`"};
+  };
+  const std::string_view store = name_of(field.store), rows = name_of(field.rows), where = name_of(field.where);
+  if (std::none_of(std::begin(kinds), std::end(kinds),
+                   [&](const DrawnKind& k) { return store == k.store && rows == k.rows && where == k.where; }))
+    return refuse(why_not(field));
+  const LightBasis light = light_of(field.store);
+  if (!light.lobes.empty()) return refuse("holds lobes of light");
+  const bool texels = std::holds_alternative<TexelPlacement>(field.where);
+  if (!light.groups.empty() && !texels) return refuse("holds the light of lamps at vertices");
+  if (texels && light.count() > max_drawn_columns)
+    return refuse(fmt::format("has {} columns of light, more than {}", light.count(), max_drawn_columns));
+  if (const auto* lobes = std::get_if<ZonalTransfer>(&field.store);
+      lobes && outgoing_of(field) && size_t(lobes->rows) * size_t(lobes->lobes) > max_drawn_lobes)
+    return refuse(
+        fmt::format("has {} rows of {} lobes, more than {} in all", lobes->rows, lobes->lobes, max_drawn_lobes));
+  if (const auto* dense = std::get_if<Transfer>(&field.store); dense && outgoing_of(field)) {
+    const size_t texels_needed = size_t(dense->rows) * size_t(dense->channels) * ((dense->columns() + 3) / 4);
+    if (texels_needed > max_drawn_texels)
+      return refuse(fmt::format("has {} rows of {} columns, more than a texture holds", dense->rows, dense->columns()));
+  }
+  return {};
+}
+
+}  // namespace lambent

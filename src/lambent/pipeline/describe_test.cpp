@@ -1,0 +1,112 @@
+#include <lambent/pipeline/browser.h>
+#include <lambent/pipeline/describe.h>
+
+#include <gtest/gtest.h>
+
+#include <filesystem>
+#include <fstream>
+#include <regex>
+#include <set>
+#include <sstream>
+
+namespace lambent {
+namespace {
+
+// One field of every store with every meaning and placement that there are names for; only their headers count here.
+std::vector<Field> all_fields() {
+  const Store stores[] = {Transfer{{.order = 3}, 1, 3, 7}, CpcaTransfer{.light = {.order = 2}, .receivers = 7},
+                          ZonalTransfer{.order = 3, .lobes = 2, .receivers = 7},
+                          FactoredTransfer{Transfer{{.order = 5}, 1, 1, 7}, 2},
+                          Visibility{.size = 16, .bits = 1, .receivers = 0, .begin = {0}}};
+  const Rows rows[] = {DiffuseRows{},        DirectionalRows{DirectionalKind::sh2},
+                       Outgoing{.order = 1}, IncidentRows{2},
+                       PixelRows{},          SightRows{}};
+  const Placement places[] = {VertexPlacement{}, TexelPlacement{4, 5}, PatchPlacement{},
+                              LatticePlacement{{Vec3(0), Vec3(1), 7, 1, 1}, {}}, FixedView{{}, 7, 1}};
+  std::vector<Field> all;
+  for (const Store& store : stores)
+    for (const Rows& meaning : rows)
+      for (const Placement& where : places) all.push_back({where, store, meaning});
+  return all;
+}
+
+TEST(Describe, NamesEveryAxis) {
+  std::set<std::string> words;
+  for (const Field& field : all_fields()) {
+    const nlohmann::json d = describe(field);
+    EXPECT_EQ(d["store"], name_of(field.store));
+    EXPECT_EQ(d["where"], name_of(field.where));
+    EXPECT_EQ(d["meaning"], name_of(field.rows));
+    EXPECT_EQ(d["receivers"], receivers_of(field.store));
+    EXPECT_EQ(d["bytes"], bytes_of(field.store));
+    EXPECT_NE(describe_in_words(field).find(" receivers, "), std::string::npos);
+    words.insert(d["store"].get<std::string>() + d["where"].get<std::string>() + d["meaning"].get<std::string>());
+  }
+  EXPECT_EQ(words.size(), 5u * 6u * 5u);
+}
+
+TEST(Describe, SaysWhatAFieldIs) {
+  const Transfer dense{{.order = 2, .groups = {"a", "b"}}, 1, 3, 1234};
+  EXPECT_EQ(describe_in_words({VertexPlacement{}, dense, DiffuseRows{}}),
+            "diffuse, order 2 and 2 lamp groups, 6 columns, 1 row, 3 channels, 1,234 receivers, 44.9 kB (half)");
+  EXPECT_EQ(describe({TexelPlacement{8, 4}, dense, DiffuseRows{}})["atlas"], nlohmann::json({8, 4}));
+  EXPECT_EQ(describe({VertexPlacement{}, dense, DiffuseRows{}})["groups"], nlohmann::json({"a", "b"}));
+}
+
+std::string page_source() {
+  const auto path = std::filesystem::path(__FILE__).parent_path() / "../../../web/src/kinds.ts";
+  std::stringstream text;
+  text << std::ifstream(path).rdbuf();
+  return text.str();
+}
+
+TEST(Browser, DrawsWhatThePageSaysThatItDraws) {
+  const std::string source = page_source();
+  const size_t begin = source.find("export const drawn ="), end = source.find("] as const", begin);
+  ASSERT_NE(begin, std::string::npos);
+  ASSERT_NE(end, std::string::npos);
+  const std::string table = source.substr(begin, end - begin);
+  std::set<std::string> page, ours;
+  const std::regex row(R"(\['(\w+)', '(\w+)', '(\w+)'\])");
+  for (std::sregex_iterator at(table.begin(), table.end(), row), stop; at != stop; ++at)
+    page.insert((*at)[1].str() + " " + (*at)[2].str() + " " + (*at)[3].str());
+  for (const DrawnKind& kind : drawn_kinds()) ours.insert(std::string(kind.store) + " " + kind.rows + " " + kind.where);
+  EXPECT_EQ(page, ours);
+  EXPECT_EQ(page.size(), drawn_kinds().size());
+  for (const auto& [name, value] : {std::pair("columns", max_drawn_columns), std::pair("lobes", max_drawn_lobes),
+                                    std::pair("texels", max_drawn_texels)}) {
+    std::smatch found;
+    ASSERT_TRUE(std::regex_search(source, found, std::regex("limits = \\{[^}]*\\b" + std::string(name) + ": (\\d+)")))
+        << name;
+    EXPECT_EQ(size_t(std::stoul(found[1].str())), value);
+  }
+}
+
+TEST(Browser, RefusesAllElseByName) {
+  size_t drawn = 0;
+  for (const Field& field : all_fields()) {
+    const auto ok = check_for_browser(field, "file.glb");
+    drawn += bool(ok);
+    if (ok) continue;
+    EXPECT_EQ(ok.error().where, "file.glb");
+  }
+  EXPECT_EQ(drawn, drawn_kinds().size());
+  const auto why = [](Placement where, Store store, Rows rows) {
+    const auto ok = check_for_browser({std::move(where), std::move(store), std::move(rows)}, "f");
+    return ok ? std::string() : ok.error().message;
+  };
+  const auto has = [](const std::string& text, const char* part) { return text.find(part) != std::string::npos; };
+  EXPECT_TRUE(has(why(VertexPlacement{}, CpcaTransfer{}, DiffuseRows{}), "clusters"));
+  EXPECT_TRUE(has(why(FixedView{}, Transfer{}, PixelRows{}), "fixed view"));
+  EXPECT_TRUE(has(why(VertexPlacement{}, Visibility{}, SightRows{}), "blocks"));
+  EXPECT_TRUE(has(why(VertexPlacement{}, FactoredTransfer{}, Outgoing{}), "factors"));
+  EXPECT_TRUE(has(why(VertexPlacement{}, Transfer{{.lobes = {{}}}}, DiffuseRows{}), "lobes of light"));
+  EXPECT_TRUE(has(why(VertexPlacement{}, Transfer{{.groups = {"a"}}}, DiffuseRows{}), "lamps"));
+  EXPECT_EQ(why(TexelPlacement{}, Transfer{{.groups = {"a"}}}, DiffuseRows{}), "");
+  EXPECT_TRUE(has(why(TexelPlacement{}, Transfer{{.order = 16, .groups = {"a"}}}, DiffuseRows{}), "257 columns"));
+  EXPECT_TRUE(has(why(VertexPlacement{}, ZonalTransfer{.order = 3, .lobes = 8, .rows = 9}, Outgoing{}), "9 rows of 8"));
+  EXPECT_TRUE(has(why(VertexPlacement{}, Transfer{{.order = 16}, 16, 3}, Outgoing{}), "more than a texture"));
+}
+
+}  // namespace
+}  // namespace lambent
