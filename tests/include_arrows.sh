@@ -22,8 +22,8 @@ for folder in */; do
     done < <(sed -n 's/^#include <lambent\/\([a-z]*\)\/.*/\1/p' "$file")
   done
 done
-# What lambent_relight is made of (cmake/relight.cmake), with every header that it includes on the way, lies in these folders, and
-# includes no other library than these.
+# What lambent_relight is made of (cmake/relight.cmake), with every header that it includes on the way, lies in these
+# folders, and includes no other library than these.
 relight_folders=" baked basis brdf c core image light relight transfer "
 relight_libraries="^(hwy|Eigen|nlohmann|tbb|fcntl.h|unistd.h|sys/)"
 declare -A seen=()

@@ -1,6 +1,6 @@
 #!/usr/bin/env bash
-# Installs the build into a temporary prefix and builds programs against the package, as users of the library do: C and C++, with the
-# component `relight` alone and with everything.
+# Installs the build into a temporary prefix and builds programs against the package, as users of the library do: C and
+# C++, with the component `relight` alone and with everything.
 set -euo pipefail
 build=$1
 source_dir=$(cd "$(dirname "$0")/.." && pwd)

@@ -110,13 +110,12 @@ void add_bench(CLI::App& app, Run& run) {
   o->request.receivers = "vertices", o->request.lamp_samples = 64;
   c->add_option("scene", o->request.scene,
                 "Scene: .gltf, .glb, .obj or .ply; a closed room of albedo 0.8 if there is none");
-  add_table(*c, bake_options(), o->request, o->request.given,
-            [](const std::string& name) {
-              for (const char* taken : {"receivers", "texels-per-unit", "atlas", "sky", "samples", "lamp-samples",
-                                        "memory", "seed", "ground", "max-edge", "emit", "max-albedo"})
-                if (name == taken) return true;
-              return false;
-            });
+  add_table(*c, bake_options(), o->request, o->request.given, [](const std::string& name) {
+    for (const char* taken : {"receivers", "texels-per-unit", "atlas", "sky", "samples", "lamp-samples", "memory",
+                              "seed", "ground", "max-edge", "emit", "max-albedo"})
+      if (name == taken) return true;
+    return false;
+  });
   c->add_option("--residual", o->tolerance, "Of the solution that is timed")
       ->check(CLI::Range(1e-7, 0.5))
       ->capture_default_str();

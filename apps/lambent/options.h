@@ -45,7 +45,6 @@ struct BrdfOptions {
 };
 inline Result<Reflection> load_reflection(const BrdfOptions& options) { return parse_reflection(options.brdf); }
 
-
 // Of --subsurface: what it takes, and a warning where walks came to nothing.
 inline constexpr const char* subsurface_help =
     "Light through a medium: sigma_s=S,sigma_a=A[,g=G][,eta=E] per unit, S and A one number or R,G,B; or NAME[:MM], a "

@@ -8,8 +8,8 @@
 
 namespace lambent::tool {
 
-// Adds the options of the table that `takes` to the command, in the table's groups; what is said goes into `request`, and
-// its name into `given` once the command line has been read.
+// Adds the options of the table that `takes` to the command, in the table's groups; what is said goes into `request`,
+// and its name into `given` once the command line has been read.
 template <class R>
 void add_table(CLI::App& command, std::span<const Option<R>> table, R& request, GivenOptions& given,
                const std::function<bool(const std::string&)>& takes) {

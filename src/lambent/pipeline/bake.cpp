@@ -89,7 +89,8 @@ Result<void> bake_factors(Bake& b) {
   auto transfer = bake(b.scene, b.tracer, b.receivers(), visibility, &b.report, b.job.progress);
   if (!transfer) return transfer.error();
   b.rows = make_map_outgoing(make_receiver_materials(b.scene, b.receivers(), b.plan.reflection),
-                             b.plan.matrix.incident_order, b.plan.matrix);
+                             b.plan.matrix.incident_order, b.plan.matrix, b.job.progress);
+  if (is_cancelled(b.job.progress)) return Error{"", "cancelled"};
   b.store = FactoredTransfer{std::move(*transfer), b.plan.matrix.incident_order};
   return {};
 }
@@ -274,7 +275,7 @@ Result<Bake> begin(const BakeRequest& request, const BakePlan& plan, const Job& 
   if (!placed) return placed.error();
   const double load_seconds = seconds_since(start);
   start = Clock::now();
-  auto tracer = Tracer::build(*scene);
+  auto tracer = Tracer::build(*scene, job.progress);
   if (!tracer) return tracer.error();
   Bake b{request, plan, job, std::move(*scene), std::move(*placed), std::move(*tracer)};
   b.load_seconds = load_seconds, b.build_seconds = seconds_since(start);
@@ -310,7 +311,7 @@ Result<BakeOutcome> bake_plain(const BakeRequest& request, const BakePlan& plan,
     if (auto ok = check_picture_bytes(b, *made); !ok) return ok.error();
     view = *made;
   }
-  if (b.placed.atlas) move_buried_texels(b.scene, b.tracer, *b.placed.atlas, b.placed.receivers);
+  if (b.placed.atlas) move_buried_texels(b.scene, b.tracer, *b.placed.atlas, b.placed.receivers, job.progress);
   if (auto ok = bake_surface(b); !ok) return ok.error();
   if (auto ok = bake_beside(b, lattice, view); !ok) return ok.error();
   summarize(b);

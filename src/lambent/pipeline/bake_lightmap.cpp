@@ -84,10 +84,11 @@ Result<BakeOutcome> bake_lightmap_request(const BakeRequest& request, const Bake
   if (!placed) return placed.error();
   Seconds seconds{seconds_since(start), 0};
   start = Clock::now();
-  auto tracer = Tracer::build(*scene);
+  auto tracer = Tracer::build(*scene, job.progress);
   if (!tracer) return tracer.error();
   seconds.build = seconds_since(start);
-  const size_t moved = placed->atlas ? move_buried_texels(*scene, *tracer, *placed->atlas, placed->receivers) : 0;
+  const size_t moved =
+      placed->atlas ? move_buried_texels(*scene, *tracer, *placed->atlas, placed->receivers, job.progress) : 0;
 
   LightmapReport report;
   // Splitting changed vertex numbers, not triangles: the lamps still fit.

@@ -16,7 +16,7 @@ Result<PlacedReceivers> place_receivers(Scene& scene, const BakeRequest& request
     if (!size) return size.error();
     options.width = (*size)[0], options.height = (*size)[1];
   }
-  auto atlas = make_atlas(scene, options);
+  auto atlas = make_atlas(scene, options, job.progress);
   if (!atlas) return atlas.error();
   if (!atlas->remark.empty()) job.warn(atlas->remark);
   Receivers receivers = make_texel_receivers(scene, *atlas);

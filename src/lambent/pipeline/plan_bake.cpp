@@ -79,7 +79,7 @@ Result<Summary> plan_bake(const BakeRequest& asked, const Job& job) {
                                                          : 0;
   auto placed = place_receivers(*scene, *request, job);
   if (!placed) return placed.error();
-  auto tracer = Tracer::build(*scene);
+  auto tracer = Tracer::build(*scene, job.progress);
   if (!tracer) return tracer.error();
   const size_t receivers = placed->receivers.count(), bytes = stored_bytes(*plan, *request, receivers, groups);
   const bool traced = request->shadows == "on" && plan->kind != BakeKind::membrane && receivers > 0;
