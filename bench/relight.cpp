@@ -121,8 +121,12 @@ void c_case() {
     std::fprintf(stderr, "%s\n", lambent_error());
     return;
   }
-  const double bandwidth = read_bandwidth(w.transfer.data);
-  const double seconds = least_seconds(15, [&] { lambent_relight(relighter, rgb.data(), rgb.size(), 3); });
+  // In turns, so that both meet the machine as it is.
+  double bandwidth = 0, seconds = 1e300;
+  for (int i = 0; i < 5; ++i) {
+    bandwidth = std::max(bandwidth, read_bandwidth(w.transfer.data));
+    seconds = std::min(seconds, least_seconds(7, [&] { lambent_relight(relighter, rgb.data(), rgb.size(), 3); }));
+  }
   const double bytes = double(w.transfer.bytes());
   report("relight_c_1M_half", bytes / seconds / 1e9, bandwidth / 1e9, "GB/s", "reading the same memory",
          {{"receivers", receivers},
