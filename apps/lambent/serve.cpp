@@ -46,6 +46,7 @@ void answer_from(httplib::Server& server, const WebFiles& files, const int& port
   server.Get(".*", [&files](const httplib::Request& request, httplib::Response& response) {
     const auto file = find(files, request);
     const std::string_view bytes = file->second.bytes();
+    if (bytes.empty()) return response.set_content("", file->second.type);  // the library waits for a piece of it
     response.set_content_provider(
         bytes.size(), file->second.type, [bytes](size_t offset, size_t length, httplib::DataSink& sink) {
           if (offset > bytes.size()) return false;
