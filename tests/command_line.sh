@@ -2,6 +2,7 @@
 # The command-line tool as a user meets it: exit codes, one line an error, nothing half-written, pictures that agree.
 set -uo pipefail
 tool=$1
+source_dir=$(cd "$(dirname "$0")/.." && pwd)
 dir=$(mktemp -d)
 trap 'rm -rf "$dir"' EXIT
 cd "$dir"
@@ -97,9 +98,30 @@ expect 0 'lattice' bake corner.obj --transfer matrix --brdf ggx:roughness=0.5 --
   --incident-order 3 --bounces 1 --samples 64 --lattice 2,2,2 -o glossy.glb
 expect 0 'relit' render glossy.glb --env sky:elevation=40 --insert pyramid.obj@1,0.1,1,0.5 --size 40x40 -o inserted.png
 expect 0 'simulate' bake --help
+# The page of options is the table's, and requests in JSON bake what options do; again is the same file.
+"$tool" options | cmp -s - "$source_dir/docs/options.md" && ok ||
+  bad "docs/options.md is not what \`lambent options\` prints"
+printf '{"scene": "corner.obj", "order": 3, "samples": 64, "max_edge": 0.5, "output": "request.glb"}' >request.json
+expect 0 'receivers' bake --request request.json
+expect 0 'receivers' bake corner.obj --order 3 --samples 64 --max-edge 0.5 -o said.glb
+cmp -s request.glb said.glb && ok || bad "a request in JSON bakes another file than the options"
+expect 0 'receivers' bake --again request.glb -o again.glb
+cmp -s request.glb again.glb && ok || bad "a bake done again differs"
+expect 0 '"receivers"' bake --request request.json --dry-run --json
+printf '{"sample": 1}' >wrong.json
+expect 1 'wrong.json: "sample" is no field' bake --request wrong.json -o x.glb
+for option in samples seed precision lattice; do
+  value=2; [ $option = precision ] && value=half; [ $option = lattice ] && value=1,1,1
+  expect 2 "$option: does not go with blocks" bake corner.obj --transfer blocks --$option $value -o x.glb
+done
+expect 2 'solver: does not go with diffuse' bake corner.obj --solver gmres -o x.glb
+expect 2 'sky: does not go with diffuse' bake corner.obj --sky uniform:1 -o x.glb
+expect 2 'light-groups: does not go with diffuse' bake corner.obj --light-groups -o x.glb
+expect 2 'bounces: does not go with membranes' bake corner.obj --membrane 0.5 --bounces 1 -o x.glb
+absent x.glb
 expect 0 'receivers' bake corner.obj --transfer matrix --simulate paths --order 3 --incident-order 3 --samples 64 \
   -o paths.glb
-expect 2 'needs --transfer matrix' bake corner.obj --simulate paths -o x.glb
+expect 2 'simulate: does not go with diffuse transfer: it is for matrix' bake corner.obj --simulate paths -o x.glb
 expect 0 'lattice' bake corner.obj --transfer matrix --outgoing sh:3 --order 3 --incident-order 3 --bounces 0 \
   --samples 64 --lattice 1,1,1 -o rows.glb
 expect 1 'rows.glb.*kind sh' render rows.glb --env sky:elevation=40 --insert pyramid.obj@1,0.1,1 -o x.png
@@ -154,7 +176,7 @@ expect 0 'relit' render phong.glb --env sky:elevation=30 --size 16x16 -o phong.p
 expect 1 'phong' bake corner.obj --samples 64 --transfer matrix --brdf ggx:roughness=0.5 --outgoing phong --order 3 \
   -o x.glb
 expect 1 'plain transfer' compress factors.glb --cpca 4,3 -o x.glb
-expect 2 'direct light' bake corner.obj --transfer matrix --factors --bounces 2 -o x.glb
+expect 2 'bounces: does not go with factors' bake corner.obj --transfer matrix --factors --bounces 2 -o x.glb
 expect 2 'factors' bake corner.obj --factors -o x.glb
 expect 2 'factors' bake corner.obj --transfer matrix --factors --order 12 --incident-order 6 -o x.glb
 # A fixed view is image relighting: the picture that the whole bake makes of that view.
@@ -173,7 +195,7 @@ expect 0 'relit +64' render view.glb --env uniform:1,1,1 -o glossy_view.png
 expect 2 'fix-view' bake corner.obj --fix-view 1,2 -o x.glb
 expect 2 '4 GiB' bake corner.obj --fix-view auto --size 9000x9000 -o x.glb
 expect 2 'fix-view' bake corner.obj --fix-view auto --compress cpca:2,2 -o x.glb
-expect 2 '\-\-size requires --fix-view' bake corner.obj --size 8x8 -o x.glb
+expect 2 'size: needs --fix-view' bake corner.obj --size 8x8 -o x.glb
 # Clusters, from the bake or from its file.
 expect 0 'clusters +4 of rank 3' bake corner.obj --max-edge 0.3 --samples 64 --compress cpca:4,3 -o clusters.glb
 expect 0 'in 4 clusters of rank 3' inspect clusters.glb
@@ -324,7 +346,7 @@ alike 35 "glossy lobes and the matrix that they stand for" glossy.exr rows.exr
 expect 0 'relit' render glossy.glb --env sky:elevation=40 --deform twist:50,y --size 24x24 -o glossy.png
 expect 0 'lobes' bake corner.obj --max-edge 0.5 --samples 64 --order 4 --bounces 0 --transfer zonal --lobes 2 \
   --outgoing svd:2 -o direct_glossy.glb
-expect 2 'needs' bake corner.obj --transfer zonal --view-map 32 -o x.glb
+expect 2 'view-map: does not go with zonal transfer' bake corner.obj --transfer zonal --view-map 32 -o x.glb
 expect 0 'paths' reference corner.obj --env uniform:1 --deform twist:50 --size 16x16 --spp 1 -o twisted.exr
 expect 0 'membrane' bake corner.obj --membrane 0.4 -o membrane.glb
 expect 0 'RMS' patch sky.png --size 8 --samples 64 --lobes 3 -o relief.lpt
@@ -475,11 +497,11 @@ for light in sh: sh:0 sh:17 sh:x sh:3x harmonics:3 directional: directional:3 di
 done
 expect 2 'give one' bake corner.obj --order 3 --light sh:3 -o x.glb
 expect 2 'light' bake corner.obj --transfer matrix --light directional:9 -o x.glb
-expect 2 'free space' bake corner.obj --light directional:9 --lattice 2,2,2 -o x.glb
+expect 2 'lattice: is lit by harmonics alone' bake corner.obj --light directional:9 --lattice 2,2,2 -o x.glb
 expect 2 'together' bake corner.obj --light sh:12 --lattice 2,2,2 --lattice-order 6 -o x.glb
 expect 2 'simulate paths' bake corner.obj --transfer matrix --simulate paths --light sh:3+lamps:1@$sun -o x.glb
-expect 2 'by --order' bake corner.obj --transfer zonal --light directional:9 -o x.glb
-expect 2 'scene is required' bake
+expect 2 'light: does not go with zonal transfer' bake corner.obj --transfer zonal --light directional:9 -o x.glb
+expect 2 'scene: is needed' bake
 expect 2 'subcommand is required' nonsense
 
 # Files that are not what they should be: exit 1, one line that names the file.
@@ -536,7 +558,7 @@ expect 2 'tolerance: needs --method blocks' render blocks.glb --env uniform:1 --
 expect 2 'window: does not go with blocks' render blocks.glb --env uniform:1 --window hann -o x.png
 expect 2 '\-\-method' render blocks.glb --env uniform:1 --method wavelets -o x.png
 expect 2 '\-\-visibility' bake corner.obj --transfer blocks --visibility bits:9 -o x.glb
-expect 2 '\-\-cube needs' bake corner.obj --cube 64 -o x.glb
+expect 2 'cube: does not go with diffuse transfer: it is for blocks' bake corner.obj --cube 64 -o x.glb
 expect 1 'more than --memory' bake corner.obj --max-edge 0.02 --transfer blocks --memory 1KB -o x.glb
 absent x.glb
 absent x.png

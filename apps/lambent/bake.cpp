@@ -3,6 +3,7 @@
 #include "table.h"
 
 #include <lambent/pipeline/bake.h>
+#include <lambent/pipeline/draw_request.h>
 
 #include <fmt/format.h>
 
@@ -30,8 +31,8 @@ Result<BakeRequest> asked(const BakeCommand& o) {
 int run_bake(Context& context, const BakeCommand& o) {
   auto request = asked(o);
   if (!request) return fail(request.error());
-  if (request->scene.empty()) return fail({"scene", "is needed: a .gltf, .glb, .obj or .ply"});
-  if (request->output.empty() && !o.plan) return fail({"--output", "is needed: the baked file to write"});
+  if (request->scene.empty()) return fail({"scene", "is needed: a .gltf, .glb, .obj or .ply", true});
+  if (request->output.empty() && !o.plan) return fail({"--output", "is needed: the baked file to write", true});
   const Job job{&context.progress, [](const std::string& message) { warn(message); }};
   auto summary = o.plan ? plan_bake(*request, job) : bake_to_file(*request, job);
   if (!summary) return fail(summary.error());
@@ -64,7 +65,10 @@ void add_options(CLI::App& app, Run& run) {
   c->group("");
   c->callback([&run] {
     run = [](Context&) {
-      fmt::print("{}", options_markdown(bake_options(), bake_kind_names));
+      fmt::print(
+          "# Options and kinds\n\nMade by `lambent options`. An option that a kind would leave aside is refused by "
+          "name, and a test says every\noption to every kind.\n\n## bake\n\n{}\n## render\n\n{}",
+          options_markdown(bake_options(), bake_kind_names), options_markdown(draw_options(), draw_kind_names));
       return success;
     };
   });

@@ -83,7 +83,7 @@ Sizes sizes_of(const CompressCommand& o, uintmax_t before) {
 
 int compress_to_clusters(Context& context, const CompressCommand& o, Baked& baked, uintmax_t size_before) {
   CpcaOptions options;
-  if (auto ok = parse_cpca("cpca:" + o.cpca, options); !ok) return fail({"--cpca", ok.error().message});
+  if (auto ok = parse_cpca("cpca:" + o.cpca, options); !ok) return fail({"--cpca", ok.error().message, true});
   const auto* dense = std::get_if<Transfer>(&baked.surface.store);
   if (!dense || std::holds_alternative<FixedView>(baked.surface.where))
     return fail({o.baked, "holds no plain transfer at receivers on surfaces, which is what clusters are made of"});

@@ -22,7 +22,7 @@ Result<void> change_materials(Scene& scene, const SceneOptions& options) {
     bool found = false;
     for (Material& m : scene.materials)
       if (m.name == lamp->name) m.emissive = lamp->color, m.emissive_texture = -1, found = true;
-    if (!found) return Error{"--emit", "the scene has no material \"" + lamp->name + "\""};
+    if (!found) return Error{"--emit", "the scene has no material \"" + lamp->name + "\"", true};
   }
   for (Material& m : scene.materials) m.base_color = min(m.base_color, Vec3(options.max_albedo));
   return {};

@@ -46,7 +46,7 @@ Result<PatchScene> load_mesh_patch(const PatchCommand& o, double& jump) {
 
 int run_grooves(Context& context, const PatchCommand& o) {
   auto table = make_wrinkle_table({o.bake.order, o.zonal.lobes, o.size, o.groove, o.albedo});
-  if (!table) return fail({"--groove", table.error().text()});
+  if (!table) return fail({"--groove", table.error().text(), true});
   if (auto ok = save_zonal_texture(o.output, table->texture); !ok) return fail(ok.error());
   const ZonalTransfer& t = table->texture.transfer;
   if (context.json)
@@ -72,7 +72,7 @@ int run_patch(Context& context, PatchCommand o) {
   SubsurfaceReport walks;
   if (!o.subsurface.empty()) {
     auto medium = parse_medium(o.subsurface);
-    if (!medium) return fail({"--subsurface", medium.error().text()});
+    if (!medium) return fail({"--subsurface", medium.error().text(), true});
     subsurface.medium = *medium;
   }
   double jump = 1;

@@ -54,7 +54,7 @@ int run_reference(Context& context, ReferenceCommand o) {
   if (poses->front()) *scene = posed(*scene, *poses->front());
   auto view = make_view(o.view, *scene);  // of the scene before it is displaced, as render looks at it
   if (!view) return fail(view.error());
-  if (o.light.env.empty() && !o.options.lamps) return fail({"--env", "is needed, or --lamps"});
+  if (o.light.env.empty() && !o.options.lamps) return fail({"--env", "is needed, or --lamps", true});
   if (o.light.env.empty()) o.light.env = "uniform:0";
   if (displaced)
     if (auto ok = displace_scene(*scene, o.displace); !ok) return fail(ok.error());

@@ -69,7 +69,7 @@ Context::Context() : progress(::isatty(2) ? Progress::Report(ProgressLine()) : P
 
 int fail(const Error& error) {
   fmt::print(stderr, "{} {}\n", colour_allowed() ? "\033[31mlambent:\033[0m" : "lambent:", error.text());
-  return error.where.starts_with("--") ? bad_usage : failure;
+  return error.usage ? bad_usage : failure;
 }
 
 void warn(const std::string& message) {

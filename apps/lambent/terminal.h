@@ -22,7 +22,7 @@ struct Context {
   Context();  // progress goes to stderr if that is a terminal; Ctrl-C and SIGTERM cancel it
 };
 
-// "lambent: where: message" on stderr; returns `failure`, or `bad_usage` where the place is an option.
+// "lambent: where: message" on stderr; returns `failure`, or `bad_usage` where the error is one of usage.
 int fail(const Error& error);
 void warn(const std::string& message);
 void warn(const std::vector<std::string>& messages);

@@ -39,7 +39,8 @@ int run_view(Context& context, const ViewCommand& o) {
   if (port == 0) port = server.bind_to_any_port("127.0.0.1");
   else if (!server.bind_to_port("127.0.0.1", port)) port = -1;
   if (port < 0)
-    return fail({"--port", o.port ? "port " + std::to_string(o.port) + " is taken or not allowed" : "no port is free"});
+    return fail(
+        {"--port", o.port ? "port " + std::to_string(o.port) + " is taken or not allowed" : "no port is free", true});
   std::thread serving([&server] { server.listen_after_bind(); });
   const std::string address = fmt::format("http://127.0.0.1:{}/", port);
   if (context.json) print_json({{"address", address}});

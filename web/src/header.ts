@@ -23,7 +23,10 @@ const isDirectional = (value: unknown): value is Directional =>
   typeof value === 'string' && Object.hasOwn(directionalRows, value);
 
 /** What every kind has in its header; refuses by name what this version does not draw. */
-export function readHeader(extension: TransferExtension, surfaceKind: 'vertices' | 'texels' = 'vertices'): TransferHeader {
+export function readHeader(
+  extension: TransferExtension,
+  surfaceKind: 'vertices' | 'texels' = 'vertices',
+): TransferHeader {
   const { transfer, surface, view } = extension;
   const { basis, order, channels, precision, receivers, bufferView, lobes, groups, directional, cpca } = transfer;
   const text = (value: unknown): string => (typeof value === 'string' ? value : 'something else'),
@@ -55,7 +58,9 @@ export function readHeader(extension: TransferExtension, surfaceKind: 'vertices'
         '"lambent render" draws it',
     );
   if (!isDrawn(extension))
-    throw new LambentError(`holds ${axesOf(extension).join(', ')}, which this version does not draw; "lambent render" does`);
+    throw new LambentError(
+      `holds ${axesOf(extension).join(', ')}, which this version does not draw; "lambent render" does`,
+    );
   if (precision !== 'half' && precision !== 'single') throw new LambentError('"precision" must be half or single');
   if (!isIndex(order, maxShOrder) || (order < 1 && !isMore(groups))) throw new LambentError('"order" is out of range');
   if (channels !== 1 && channels !== 3) throw new LambentError('"channels" is out of range');

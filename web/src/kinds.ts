@@ -72,7 +72,15 @@ export function axesOf({ transfer, surface, view }: TransferExtension): [store: 
   const isDirectional = transfer['directional'] !== undefined && transfer['directional'] !== 'none';
   return [
     transfer['cpca'] !== undefined ? 'clusters' : (stores[transfer.kind] ?? 'dense'),
-    view !== undefined ? 'pixels' : transfer.kind === 'blocks' ? 'sight' : transfer['outgoing'] !== undefined ? 'outgoing' : isDirectional ? 'directional' : 'diffuse',
+    view !== undefined
+      ? 'pixels'
+      : transfer.kind === 'blocks'
+        ? 'sight'
+        : transfer['outgoing'] !== undefined
+          ? 'outgoing'
+          : isDirectional
+            ? 'directional'
+            : 'diffuse',
     view !== undefined ? 'view' : typeof surface?.kind === 'string' ? surface.kind : 'vertices',
   ];
 }

@@ -38,6 +38,35 @@ struct Side {
   bool back;
 };
 
+// A buried texel's centre in the atlas, and the sides of triangles that its tent reaches.
+struct Texel {
+  uint32_t receiver;
+  Vec2 centre;
+  std::vector<Side> sides;
+};
+
+std::vector<Texel> buried_texels(const Scene& scene, const TexelReceivers& map, const std::vector<uint8_t>& buried) {
+  std::vector<Texel> texels;
+  std::vector<uint32_t> index(buried.size(), none);
+  for (size_t k = 0; k < map.texels.size(); ++k) {
+    const uint32_t r = map.texels[k];
+    if (r == none || !buried[r]) continue;
+    index[r] = uint32_t(texels.size());
+    texels.push_back({r, Vec2(float(k % size_t(map.width)) + 0.5f, float(k / size_t(map.width)) + 0.5f), {}});
+  }
+  if (texels.empty()) return texels;
+  for (uint32_t t = 0; t < scene.triangles.size(); ++t)
+    for (const bool back : {false, true}) {
+      const TexelTriangle* own = map.find(t, !back);
+      if (!own) continue;
+      each_texel({own->at[0], own->at[1], own->at[2]}, 1, map.width, map.height, [&](int i, int j) {
+        const uint32_t r = map.texels[size_t(j) * size_t(map.width) + size_t(i)];
+        if (r != none && index[r] != none) texels[index[r]].sides.push_back({t, back});
+      });
+    }
+  return texels;
+}
+
 }  // namespace
 
 size_t move_buried_texels(const Scene& scene, const Tracer& tracer, const Atlas& atlas, Receivers& receivers,
@@ -54,31 +83,8 @@ size_t move_buried_texels(const Scene& scene, const Tracer& tracer, const Atlas&
     if (stage.cancelled()) return 0;
   }
 
-  // Each buried texel's centre in the atlas, and the sides of triangles that its tent reaches.
-  struct Texel {
-    uint32_t receiver;
-    Vec2 centre;
-    std::vector<Side> sides;
-  };
-  std::vector<Texel> texels;
-  std::vector<uint32_t> index(receivers.count(), none);
-  for (size_t k = 0; k < map.texels.size(); ++k) {
-    const uint32_t r = map.texels[k];
-    if (r == none || !buried[r]) continue;
-    index[r] = uint32_t(texels.size());
-    texels.push_back({r, Vec2(float(k % size_t(map.width)) + 0.5f, float(k / size_t(map.width)) + 0.5f), {}});
-  }
+  const std::vector<Texel> texels = buried_texels(scene, map, buried);
   if (texels.empty()) return 0;
-  for (uint32_t t = 0; t < scene.triangles.size(); ++t)
-    for (const bool back : {false, true}) {
-      const TexelTriangle* own = map.find(t, !back);
-      if (!own) continue;
-      each_texel({own->at[0], own->at[1], own->at[2]}, 1, map.width, map.height, [&](int i, int j) {
-        const uint32_t r = map.texels[size_t(j) * size_t(map.width) + size_t(i)];
-        if (r != none && index[r] != none) texels[index[r]].sides.push_back({t, back});
-      });
-    }
-
   const float texel_size = 1 / std::max(atlas.texels_per_unit, 1e-30f), diagonal = bounds(scene).diagonal();
   ProgressStage stage(progress, "moving texels", texels.size());
   parallel_for(texels.size(), 16, [&](size_t begin, size_t end) {

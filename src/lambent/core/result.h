@@ -11,6 +11,7 @@ namespace lambent {
 struct Error {
   std::string where;
   std::string message;
+  bool usage = false;  // what was asked for is wrong, not what was found: commands exit with 2 and not 1
   std::string text() const { return where.empty() ? message : where + ": " + message; }
 };
 

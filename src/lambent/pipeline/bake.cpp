@@ -175,8 +175,10 @@ Result<void> check_picture_bytes(const Bake& b, const View& view) {
   const size_t bytes = 3 * size_t(view.width) * size_t(view.height) * columns *
                        (b.plan.bake.precision == Precision::half ? 2 : 4);
   if (bytes < size_t{1} << 32) return {};
-  return Error{"--size", fmt::format("{} pixels of {} columns take {} bytes, and a baked file holds 4 GiB",
-                                     b.request.size, columns, bytes)};
+  return Error{"--size",
+               fmt::format("{} pixels of {} columns take {} bytes, and a baked file holds 4 GiB", b.request.size,
+                           columns, bytes),
+               true};
 }
 
 Result<void> fix_the_view(Bake& b, const View& view) {
@@ -307,7 +309,8 @@ Result<BakeOutcome> bake_plain(const BakeRequest& request, const BakePlan& plan,
   std::optional<View> view;
   if (!request.fix_view.empty()) {
     auto made = parse_view(request.fix_view, request.size, b.scene);
-    if (!made) return Error{made.error().where == "--camera" ? "--fix-view" : made.error().where, made.error().message};
+    if (!made)
+      return Error{made.error().where == "--camera" ? "--fix-view" : made.error().where, made.error().message, true};
     if (auto ok = check_picture_bytes(b, *made); !ok) return ok.error();
     view = *made;
   }

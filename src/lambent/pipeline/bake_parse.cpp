@@ -25,18 +25,18 @@ Result<void> parse_outgoing(const std::string& text, MatrixOptions& matrix) {
   const auto kind = std::find(std::begin(outgoing_names), std::end(outgoing_names), name);
   if (kind == std::end(outgoing_names))
     return Error{"--outgoing",
-                 "must be map, phong, svd:ROWS, sh:BANDS, hemisphere:BANDS or hsh:BANDS, not \"" + text + "\""};
+                 "must be map, phong, svd:ROWS, sh:BANDS, hemisphere:BANDS or hsh:BANDS, not \"" + text + "\"", true};
   matrix.outgoing = OutgoingKind(kind - std::begin(outgoing_names));
   // Fewer rows than the default where incident light has no more.
   matrix.svd_rows = std::min(matrix.svd_rows, sh_count(matrix.incident_order));
   if (colon == std::string::npos) return {};
   if (matrix.outgoing == OutgoingKind::map || matrix.outgoing == OutgoingKind::phong)
-    return Error{"--outgoing", name + " takes no number: --incident-order says how many rows it has"};
+    return Error{"--outgoing", name + " takes no number: --incident-order says how many rows it has", true};
   auto number = parse_numbers(text.substr(colon + 1), 1, "--outgoing");
   if (!number) return number.error();
   const float n = (*number)[0];
   if (n != std::floor(n) || n < 1 || n > 64)
-    return Error{"--outgoing", "expects a whole number from 1 to 64 after the colon, not \"" + text + "\""};
+    return Error{"--outgoing", "expects a whole number from 1 to 64 after the colon, not \"" + text + "\"", true};
   (matrix.outgoing == OutgoingKind::svd ? matrix.svd_rows : matrix.outgoing_order) = int(n);
   return {};
 }
@@ -45,8 +45,8 @@ Result<int> parse_whole(const std::string& text, int least, int most, const std:
   int value = 0;
   const auto [end, status] = std::from_chars(text.data(), text.data() + text.size(), value);
   if (status != std::errc() || end != text.data() + text.size() || value < least || value > most)
-    return Error{"--light",
-                 fmt::format("{} must be a whole number from {} to {}, not \"{}\"", what, least, most, text)};
+    return Error{"--light", fmt::format("{} must be a whole number from {} to {}, not \"{}\"", what, least, most, text),
+                 true};
   return value;
 }
 
@@ -59,7 +59,7 @@ Result<void> parse_light(const std::string& text, BakeOptions& bake, const Job& 
     return {};
   }
   if (!text.starts_with("sh:"))
-    return Error{"--light", "must be " + std::string(light_syntax) + ", not \"" + text + "\""};
+    return Error{"--light", "must be " + std::string(light_syntax) + ", not \"" + text + "\"", true};
   const size_t plus = text.find('+');
   auto order =
       parse_whole(text.substr(3, plus == std::string::npos ? plus : plus - 3), 1, max_sh_order, "the bands after sh:");
@@ -69,7 +69,7 @@ Result<void> parse_light(const std::string& text, BakeOptions& bake, const Job& 
   const std::string lamps = text.substr(plus + 1);
   const size_t at = lamps.find('@');
   if (!lamps.starts_with("lamps:") || at == std::string::npos || at + 1 == lamps.size())
-    return Error{"--light", "expects lamps:COUNT@ENV after the plus sign, not \"" + lamps + "\""};
+    return Error{"--light", "expects lamps:COUNT@ENV after the plus sign, not \"" + lamps + "\"", true};
   auto count = parse_whole(lamps.substr(6, at - 6), 1, max_lamps, "the count after lamps:");
   if (!count) return count.error();
   const std::string name = lamps.substr(at + 1);
@@ -91,12 +91,12 @@ Result<void> parse_bounces(const std::string& text, int& count, double& converge
     if (!n) return n.error();
     converge = double((*n)[0]);
     if (converge > 0 && converge < 1) return {};
-    return Error{"--bounces", "converge needs a residual between 0 and 1, not " + text.substr(prefix.size())};
+    return Error{"--bounces", "converge needs a residual between 0 and 1, not " + text.substr(prefix.size()), true};
   }
   const char* end = text.data() + text.size();
   const auto [stop, status] = std::from_chars(text.data(), end, count);
   if (status != std::errc() || stop != end || count < 0 || count > 64)
-    return Error{"--bounces", "expects a number from 0 to 64, or converge:EPS, not \"" + text + "\""};
+    return Error{"--bounces", "expects a number from 0 to 64, or converge:EPS, not \"" + text + "\"", true};
   return {};
 }
 
@@ -109,7 +109,8 @@ Result<int> parse_visibility(const std::string& text) {
         status == std::errc() && stop == end && bits >= 2 && bits <= max_visibility_bits)
       return bits;
   return Error{"--visibility",
-               fmt::format("must be binary, or bits:N with N from 2 to {}, not \"{}\"", max_visibility_bits, text)};
+               fmt::format("must be binary, or bits:N with N from 2 to {}, not \"{}\"", max_visibility_bits, text),
+               true};
 }
 
 LightmapOptions lightmap_options(const BakeRequest& r, const BakeOptions& bake, double converge) {
@@ -126,24 +127,30 @@ Result<void> check_orders(const BakePlan& plan, const BakeRequest& r) {
   const bool glossy = plan.kind == BakeKind::matrix || plan.kind == BakeKind::glossy_zonal;
   const int order = plan.bake.order;
   if (plan.kind == BakeKind::factors) {
-    if (!plan.bake.lobes.empty()) return Error{"--light", "--factors multiplies harmonics: leave lobes out"};
+    if (!plan.bake.lobes.empty()) return Error{"--light", "--factors multiplies harmonics: leave lobes out", true};
     if (order + r.incident_order - 1 > max_sh_order)
-      return Error{"--factors", fmt::format("needs the bands of the light and of incident light, less one, and {} is "
-                                            "all there are",
-                                            max_sh_order)};
+      return Error{"--factors",
+                   fmt::format("needs the bands of the light and of incident light, less one, and {} is "
+                               "all there are",
+                               max_sh_order),
+                   true};
   }
   if (glossy && plan.matrix.outgoing == OutgoingKind::svd && plan.matrix.svd_rows > sh_count(r.incident_order))
-    return Error{"--outgoing", fmt::format("svd:{} is more rows than the {} that --incident-order {} has",
-                                           plan.matrix.svd_rows, sh_count(r.incident_order), r.incident_order)};
-  if (glossy && order == 0) return Error{"--light", "directional light cannot be baked with --transfer matrix"};
+    return Error{"--outgoing",
+                 fmt::format("svd:{} is more rows than the {} that --incident-order {} has", plan.matrix.svd_rows,
+                             sh_count(r.incident_order), r.incident_order),
+                 true};
+  if (glossy && order == 0) return Error{"--light", "directional light cannot be baked with --transfer matrix", true};
   if (glossy && order + r.incident_order > max_sh_order + 1)
-    return Error{"--incident-order", fmt::format("and the bands of the light may be {} together", max_sh_order + 1)};
+    return Error{"--incident-order", fmt::format("and the bands of the light may be {} together", max_sh_order + 1),
+                 true};
   if (!plan.bake.lobes.empty() && !r.lattice.empty())
-    return Error{"--light", "lobes do not light free space: leave --lattice out"};
+    return Error{"--light", "lobes do not light free space: leave --lattice out", true};
   if (!plan.bake.lobes.empty() && plan.matrix.simulate_paths && plan.bake.bounces > 0)
-    return Error{"--light", "lobes do not bounce along --simulate paths: leave it out, or bake with --bounces 0"};
+    return Error{"--light", "lobes do not bounce along --simulate paths: leave it out, or bake with --bounces 0", true};
   if (!r.lattice.empty() && order + r.lattice_order > max_sh_order + 1)
-    return Error{"--lattice-order", fmt::format("and the bands of the light may be {} together", max_sh_order + 1)};
+    return Error{"--lattice-order", fmt::format("and the bands of the light may be {} together", max_sh_order + 1),
+                 true};
   return {};
 }
 
@@ -177,7 +184,7 @@ Result<BakePlan> plan_of(const BakeRequest& r, const Job& job) {
     if (auto ok = parse_cpca(r.compress, plan.cpca); !ok) return ok.error();
   if (!r.subsurface.empty()) {
     auto medium = parse_medium(r.subsurface);
-    if (!medium) return Error{"--subsurface", medium.error().text()};
+    if (!medium) return Error{"--subsurface", medium.error().text(), true};
     plan.subsurface.medium = *medium;
   }
   auto reflection = parse_reflection(r.brdf);
@@ -200,7 +207,7 @@ Result<Scene> load_scene_of(const BakeRequest& r, const Job& job) {
     bool found = false;
     for (Material& m : scene->materials)
       if (m.name == lamp->name) m.emissive = lamp->color, m.emissive_texture = -1, found = true;
-    if (!found) return Error{"--emit", "the scene has no material \"" + lamp->name + "\""};
+    if (!found) return Error{"--emit", "the scene has no material \"" + lamp->name + "\"", true};
   }
   for (Material& m : scene->materials) m.base_color = min(m.base_color, Vec3(r.max_albedo));
   if (r.ground) add_ground(*scene);
@@ -216,14 +223,17 @@ Result<Lattice> lattice_of_request(const BakeRequest& r, const Scene& scene) {
   for (float n : *counts)
     if (n != std::floor(n) || n < 1 || n > float(max_lattice_points))
       return Error{"--lattice",
-                   fmt::format("expects three whole numbers from 1 to {}, not \"{}\"", max_lattice_points, r.lattice)};
+                   fmt::format("expects three whole numbers from 1 to {}, not \"{}\"", max_lattice_points, r.lattice),
+                   true};
   Bounds box = default_lattice_box(scene);
   if (!r.lattice_box.empty()) {
     auto b = parse_numbers(r.lattice_box, 6, "--lattice-box");
     if (!b) return b.error();
     box.min = {(*b)[0], (*b)[1], (*b)[2]}, box.max = {(*b)[3], (*b)[4], (*b)[5]};
-    if (!all_at_most(box.min, box.max)) return Error{"--lattice-box", "expects the lower corner first, then the upper"};
-    if (!all_at_most(max(abs(box.min), abs(box.max)), Vec3(1e9f))) return Error{"--lattice-box", "lies beyond 1e9"};
+    if (!all_at_most(box.min, box.max))
+      return Error{"--lattice-box", "expects the lower corner first, then the upper", true};
+    if (!all_at_most(max(abs(box.min), abs(box.max)), Vec3(1e9f)))
+      return Error{"--lattice-box", "lies beyond 1e9", true};
   }
   return Lattice{box.min, box.max, int((*counts)[0]), int((*counts)[1]), int((*counts)[2])};
 }
@@ -231,7 +241,7 @@ Result<Lattice> lattice_of_request(const BakeRequest& r, const Scene& scene) {
 Result<std::vector<float>> membrane_alphas(const std::string& text, const Scene& scene, const Receivers& receivers) {
   if (auto number = parse_numbers(text, 1, "--membrane")) {
     if (!((*number)[0] >= 0 && (*number)[0] <= 1))
-      return Error{"--membrane", "lets through a share from 0 to 1, not " + text};
+      return Error{"--membrane", "lets through a share from 0 to 1, not " + text, true};
     return std::vector<float>(receivers.count(), (*number)[0]);
   }
   auto picture = load_image(text);

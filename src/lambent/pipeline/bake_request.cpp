@@ -162,22 +162,22 @@ Result<void> check_conflicts(const BakeRequest& r) {
   };
   for (const Conflict& c : conflicts) {
     if (std::string(c.option) == "directional" && r.directional == "none") continue;
-    if (said(c.option) && said(c.other)) return Error{std::string("--") + c.option, c.why};
+    if (said(c.option) && said(c.other)) return Error{std::string("--") + c.option, c.why, true};
   }
   return {};
 }
 
 Result<void> check_kind(const BakeRequest& r, BakeKind kind) {
   if (kind != BakeKind::diffuse && kind != BakeKind::lightmap && r.receivers != "vertices")
-    return Error{"--receivers", std::string(bake_kind_names[int(kind)]) + " are received at vertices"};
+    return Error{"--receivers", std::string(bake_kind_names[int(kind)]) + " are received at vertices", true};
   if (!r.lattice.empty() && r.receivers != "vertices")
-    return Error{"--receivers", "--lattice needs a bake at vertices"};
+    return Error{"--receivers", "--lattice needs a bake at vertices", true};
   if (r.shadows == "off" && r.given.contains("bounces") && r.bounces != "0")
-    return Error{"--shadows", "off has no bounces: leave --bounces out, or set it to 0"};
+    return Error{"--shadows", "off has no bounces: leave --bounces out, or set it to 0", true};
   if (kind != BakeKind::lightmap && r.bounces.starts_with("converge:"))
-    return Error{"--bounces", "converge:EPS is for lightmaps"};
+    return Error{"--bounces", "converge:EPS is for lightmaps", true};
   if (kind == BakeKind::blocks && (r.cube & (r.cube - 1)) != 0)
-    return Error{"--cube", "must be 16, 32, 64, 128 or 256, not " + std::to_string(r.cube)};
+    return Error{"--cube", "must be 16, 32, 64, 128 or 256, not " + std::to_string(r.cube), true};
   return {};
 }
 

@@ -32,7 +32,8 @@ Result<ProductMethod> parse_method(const std::string& text) {
       return ProductMethod{Product::haar, double((*n)[0])};
   return Error{
       "--method",
-      "must be blocks, standard, haar, or haar:FRACTION with a fraction above 0 and up to 1, not \"" + text + "\""};
+      "must be blocks, standard, haar, or haar:FRACTION with a fraction above 0 and up to 1, not \"" + text + "\"",
+      true};
 }
 
 Result<BlockShading> make_block_shading(const Baked& baked, const DrawRequest& request) {
@@ -86,7 +87,7 @@ Result<void> add_indirect(BlockShading& s, const Tracer& tracer, const Surroundi
   const VertexPlacement& at = *vertices_of(*s.baked);
   const Receivers receivers = make_vertex_receivers(scene);
   if (receivers.front != at.front || receivers.back != at.back)
-    return Error{"--indirect", "the file's receivers are not those of its scene"};
+    return Error{"--indirect", "the file's receivers are not those of its scene", true};
   BakeOptions options{.order = 5, .samples = 512, .precision = Precision::single};
   auto all = bake(scene, tracer, receivers, options, nullptr, job.progress);
   if (!all) return all.error();

@@ -30,8 +30,10 @@ Result<std::vector<Vec3>> lamps_of(const DrawRequest& request, const LightBasis&
     if (!lamp) return lamp.error();
     const auto group = std::find(basis.groups.begin(), basis.groups.end(), lamp->name);
     if (group == basis.groups.end())
-      return Error{"--lamp", "the file has no group \"" + lamp->name + "\"; it has " +
-                                 (basis.groups.empty() ? "none" : fmt::format("{}", fmt::join(basis.groups, ", ")))};
+      return Error{"--lamp",
+                   "the file has no group \"" + lamp->name + "\"; it has " +
+                       (basis.groups.empty() ? "none" : fmt::format("{}", fmt::join(basis.groups, ", "))),
+                   true};
     lamps[size_t(group - basis.groups.begin())] = lamp->color;
   }
   return lamps;

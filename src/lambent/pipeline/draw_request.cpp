@@ -151,7 +151,8 @@ Result<Show> parse_show(const std::string& text) {
         return show;
     }
   return Error{"--show",
-               "must be product, radiosity, albedo, emission, bounce:K or sum:K with K from 0, not \"" + text + "\""};
+               "must be product, radiosity, albedo, emission, bounce:K or sum:K with K from 0, not \"" + text + "\"",
+               true};
 }
 
 namespace {
@@ -165,8 +166,10 @@ Result<void> check_show(const DrawRequest& request, const Show& show, const Bake
   if (baked.terms.empty())
     return Error{request.baked, "does not keep its reflections one by one: `lambent bake --terms` makes files that do"};
   if (size_t(show.term) >= baked.terms.size())
-    return Error{"--show", "the file keeps terms 0 to " + std::to_string(baked.terms.size() - 1) + ", not " +
-                               std::to_string(show.term)};
+    return Error{
+        "--show",
+        "the file keeps terms 0 to " + std::to_string(baked.terms.size() - 1) + ", not " + std::to_string(show.term),
+        true};
   return {};
 }
 
@@ -179,16 +182,16 @@ Result<void> check_draw(const DrawRequest& request, DrawKind kind) {
   for (const Conflict& c : conflicts)
     if (said.contains(json_name(c.option)) && holds(draw_options(), request, c.other) &&
         said.contains(json_name(std::string(c.other).substr(0, std::string(c.other).find('=')))))
-      return Error{std::string("--") + c.option, c.why};
+      return Error{std::string("--") + c.option, c.why, true};
   if (request.exposure != 0 && file_extension(request.output) == "exr")
-    return Error{"--exposure", "brightens a PNG; an EXR keeps radiance as it is"};
+    return Error{"--exposure", "brightens a PNG; an EXR keeps radiance as it is", true};
   auto show = parse_show(request.show);
   if (!show) return show.error();
   if (kind == DrawKind::texture && show->part != Show::Part::all)
-    return Error{"--show", "of a transfer texture is product, radiosity or albedo"};
+    return Error{"--show", "of a transfer texture is product, radiosity or albedo", true};
   const bool distant = kind == DrawKind::texture || kind == DrawKind::blocks;
   if (distant && show->colour != RenderOptions::Show::albedo && request.env.empty() && request.sphere_lamp.empty())
-    return Error{"--env", "is needed: an environment to light the scene by"};
+    return Error{"--env", "is needed: an environment to light the scene by", true};
   return {};
 }
 
@@ -202,11 +205,11 @@ Result<void> check_draw(const DrawRequest& request, const Baked& baked) {
   const LightBasis light = light_of(baked.surface.store);
   const bool lit = show->part != Show::Part::emission && show->colour != RenderOptions::Show::albedo;
   if (lit && (light.order > 0 || !light.lobes.empty()) && request.env.empty() && request.sphere_lamp.empty())
-    return Error{"--env", "is needed: the file is baked for distant light"};
+    return Error{"--env", "is needed: the file is baked for distant light", true};
   if (light.order == 0 && request.window != "none")
-    return Error{"--window", "shapes harmonics, and the file is baked for none"};
+    return Error{"--window", "shapes harmonics, and the file is baked for none", true};
   if (light.order == 0 && request.light_order > 0)
-    return Error{"--light-order", "counts bands of harmonics, and the file is baked for none"};
+    return Error{"--light-order", "counts bands of harmonics, and the file is baked for none", true};
   const Outgoing* outgoing = outgoing_of(baked.surface);
   if (!request.brdf.empty() && (!outgoing || outgoing->kind != OutgoingKind::map))
     return Error{request.baked,

@@ -54,9 +54,9 @@ std::string without_folder(const std::string& text) {
 namespace options_detail {
 
 Result<void> check_number(double value, double low, double high, const std::string& name) {
-  if (!std::isfinite(value)) return Error{name, "is not a finite number"};
+  if (!std::isfinite(value)) return Error{name, "is not a finite number", true};
   if (low < high && !(value >= low && value <= high))
-    return Error{name, fmt::format("must lie between {:.10g} and {:.10g}, not {:.10g}", low, high, value)};
+    return Error{name, fmt::format("must lie between {:.10g} and {:.10g}, not {:.10g}", low, high, value), true};
   return {};
 }
 
@@ -64,7 +64,7 @@ Result<void> check_choice(const std::string& value, const char* choices, const s
   if (!choices) return {};
   const std::vector<std::string> list = choices_of(choices);
   if (std::find(list.begin(), list.end(), value) != list.end()) return {};
-  return Error{name, fmt::format("must be one of {}, not \"{}\"", fmt::join(list, ", "), value)};
+  return Error{name, fmt::format("must be one of {}, not \"{}\"", fmt::join(list, ", "), value), true};
 }
 
 std::string wrong_type(const std::string& expected, const nlohmann::json& value) {

@@ -60,24 +60,24 @@ std::string wrong_type(const std::string& expected, const nlohmann::json& value)
 template <class T>
 Result<T> read(const nlohmann::json& value, double low, double high, const char* choices, const std::string& name) {
   if constexpr (std::is_same_v<T, bool>) {
-    if (!value.is_boolean()) return Error{name, wrong_type("true or false", value)};
+    if (!value.is_boolean()) return Error{name, wrong_type("true or false", value), true};
     return value.get<bool>();
   } else if constexpr (std::is_same_v<T, std::string>) {
-    if (!value.is_string()) return Error{name, wrong_type("text", value)};
+    if (!value.is_string()) return Error{name, wrong_type("text", value), true};
     if (auto ok = check_choice(value.get<std::string>(), choices, name); !ok) return ok.error();
     return value.get<std::string>();
   } else if constexpr (std::is_same_v<T, std::vector<std::string>>) {
     if (!value.is_array() || !std::all_of(value.begin(), value.end(), [](const auto& v) { return v.is_string(); }))
-      return Error{name, wrong_type("a list of texts", value)};
+      return Error{name, wrong_type("a list of texts", value), true};
     return value.get<T>();
   } else {
-    if (!value.is_number()) return Error{name, wrong_type("a number", value)};
+    if (!value.is_number()) return Error{name, wrong_type("a number", value), true};
     const double number = value.get<double>();
     if (std::is_integral_v<T> && !(number == std::floor(number) && number >= 0 && number < 18446744073709551616.0))
-      return Error{name, wrong_type("a whole number", value)};
+      return Error{name, wrong_type("a whole number", value), true};
     if (auto ok = check_number(number, low, high, name); !ok) return ok.error();
     if (std::is_integral_v<T> && number > double(std::numeric_limits<T>::max()))
-      return Error{name, wrong_type("a smaller number", value)};
+      return Error{name, wrong_type("a smaller number", value), true};
     return std::is_integral_v<T> && value.is_number_unsigned() ? T(value.get<uint64_t>()) : T(number);
   }
 }
@@ -165,7 +165,7 @@ Result<void> read_request(std::span<const Option<R>> table, const nlohmann::json
     const nlohmann::json& value = item.value();
     const auto o =
         std::find_if(table.begin(), table.end(), [&](const Option<R>& x) { return json_name(x.name) == key; });
-    if (o == table.end()) return Error{key, "is no field of such a request"};
+    if (o == table.end()) return Error{key, "is no field of such a request", true};
     auto ok = std::visit(
         [&](auto member) -> Result<void> {
           using T = std::remove_cvref_t<decltype(request.*member)>;
@@ -189,9 +189,11 @@ Result<void> check_given(std::span<const Option<R>> table, const R& request, con
     if (!given.contains(json_name(o.name))) continue;
     const std::string name = std::string("--") + o.name;
     if (!(o.kinds >> kind & 1))
-      return Error{name, std::string("does not go with ") + kind_names[size_t(kind)] + ": it is for " +
-                             kind_list(o.kinds, kind_names)};
-    if (o.needs && !holds(table, request, o.needs)) return Error{name, "needs " + needs_text(o.needs)};
+      return Error{
+          name,
+          std::string("does not go with ") + kind_names[size_t(kind)] + ": it is for " + kind_list(o.kinds, kind_names),
+          true};
+    if (o.needs && !holds(table, request, o.needs)) return Error{name, "needs " + needs_text(o.needs), true};
   }
   return {};
 }

@@ -26,16 +26,17 @@ Result<std::vector<float>> parse_numbers(const std::string& text, size_t count, 
     ++p;
   }
   if (p != end || values.size() != count)
-    return Error{option, "expects " + std::to_string(count) + " numbers separated by commas, not \"" + text + "\""};
+    return Error{option, "expects " + std::to_string(count) + " numbers separated by commas, not \"" + text + "\"",
+                 true};
   return values;
 }
 
 Result<NamedColor> parse_named_color(const std::string& text, const std::string& option) {
   const size_t at = text.rfind('=');
-  if (at == std::string::npos || at == 0) return Error{option, "expects NAME=R,G,B, not \"" + text + "\""};
+  if (at == std::string::npos || at == 0) return Error{option, "expects NAME=R,G,B, not \"" + text + "\"", true};
   auto n = parse_numbers(text.substr(at + 1), 3, option);
   if (!n) return n.error();
-  if ((*n)[0] < 0 || (*n)[1] < 0 || (*n)[2] < 0) return Error{option, "a colour may not be negative"};
+  if ((*n)[0] < 0 || (*n)[1] < 0 || (*n)[2] < 0) return Error{option, "a colour may not be negative", true};
   return NamedColor{text.substr(0, at), {(*n)[0], (*n)[1], (*n)[2]}};
 }
 
@@ -47,7 +48,7 @@ Result<std::array<int, 2>> parse_size(const std::string& text, const std::string
     return status == std::errc() && end == digits.data() + digits.size() && value >= 1 && value <= 16384;
   };
   if (x == std::string::npos || !number(text.substr(0, x), size[0]) || !number(text.substr(x + 1), size[1]))
-    return Error{option, "expects WIDTHxHEIGHT, each from 1 to 16384, not \"" + text + "\""};
+    return Error{option, "expects WIDTHxHEIGHT, each from 1 to 16384, not \"" + text + "\"", true};
   return size;
 }
 
@@ -58,8 +59,8 @@ Result<std::optional<Camera>> parse_camera(const std::string& text) {
   Camera camera;
   camera.eye = {(*n)[0], (*n)[1], (*n)[2]}, camera.target = {(*n)[3], (*n)[4], (*n)[5]}, camera.fov = (*n)[6];
   if (!(camera.fov > 0 && camera.fov < 180))
-    return Error{"--camera", "field of view must lie between 0 and 180 degrees"};
-  if (camera.eye == camera.target) return Error{"--camera", "eye and target are the same point"};
+    return Error{"--camera", "field of view must lie between 0 and 180 degrees", true};
+  if (camera.eye == camera.target) return Error{"--camera", "eye and target are the same point", true};
   return std::optional<Camera>(camera);
 }
 
@@ -100,7 +101,7 @@ const std::map<std::string, ShWindow> window_names{
 Result<ShWindow> parse_window(const std::string& text) {
   const auto found = window_names.find(text);
   if (found == window_names.end())
-    return Error{"--window", "must be none, hann, lanczos or auto, not \"" + text + "\""};
+    return Error{"--window", "must be none, hann, lanczos or auto, not \"" + text + "\"", true};
   return found->second;
 }
 
@@ -111,9 +112,9 @@ Result<std::vector<SphereLamp>> parse_sphere_lamps(const std::vector<std::string
     if (!n) return n.error();
     const std::vector<float>& v = *n;
     const SphereLamp lamp{{v[0], v[1], v[2]}, v[3], {v[4], v[5], v[6]}};
-    if (!(lamp.radius > 0)) return Error{"--sphere-lamp", "the radius must be above 0"};
+    if (!(lamp.radius > 0)) return Error{"--sphere-lamp", "the radius must be above 0", true};
     for (float x : v)
-      if (std::abs(x) > 1e9f) return Error{"--sphere-lamp", "numbers must lie within 1e9"};
+      if (std::abs(x) > 1e9f) return Error{"--sphere-lamp", "numbers must lie within 1e9", true};
     lamps.push_back(lamp);
   }
   return lamps;
@@ -121,8 +122,10 @@ Result<std::vector<SphereLamp>> parse_sphere_lamps(const std::vector<std::string
 
 Result<std::vector<double>> parse_frames(const std::string& text) {
   constexpr size_t max_frames = 64;
-  const Error wrong{"--frames", "expects FROM:TO[:STEP] in seconds, at most " + std::to_string(max_frames) +
-                                    " of them, not \"" + text + "\""};
+  const Error wrong{
+      "--frames",
+      "expects FROM:TO[:STEP] in seconds, at most " + std::to_string(max_frames) + " of them, not \"" + text + "\"",
+      true};
   double n[3] = {0, 0, 0};
   size_t count = 0;
   const char* p = text.data();
@@ -145,14 +148,14 @@ Result<std::vector<double>> parse_frames(const std::string& text) {
 Result<Insertion> parse_insertion(const std::string& text) {
   const size_t at = text.rfind('@');
   if (at == std::string::npos || at == 0)
-    return Error{"--insert", "expects FILE@X,Y,Z or FILE@X,Y,Z,SCALE, not \"" + text + "\""};
+    return Error{"--insert", "expects FILE@X,Y,Z or FILE@X,Y,Z,SCALE, not \"" + text + "\"", true};
   const std::string place = text.substr(at + 1);
   const bool scaled = std::count(place.begin(), place.end(), ',') == 3;
   auto n = parse_numbers(place, scaled ? 4 : 3, "--insert");
   if (!n) return n.error();
   Insertion out{text.substr(0, at), {(*n)[0], (*n)[1], (*n)[2]}, scaled ? (*n)[3] : 1};
-  if (!(out.scale > 0)) return Error{"--insert", "the scale must be above 0"};
-  if (!all_at_most(abs(out.foot), Vec3(1e9f))) return Error{"--insert", "the place lies beyond 1e9"};
+  if (!(out.scale > 0)) return Error{"--insert", "the scale must be above 0", true};
+  if (!all_at_most(abs(out.foot), Vec3(1e9f))) return Error{"--insert", "the place lies beyond 1e9", true};
   return out;
 }
 
@@ -164,21 +167,23 @@ Result<Reflection> parse_reflection(const std::string& text) {
     return reflection;
   }
   auto brdf = parse_brdf(text);
-  if (!brdf) return text.starts_with("measured:") ? brdf.error() : Error{"--brdf", brdf.error().text()};
+  if (!brdf) return text.starts_with("measured:") ? brdf.error() : Error{"--brdf", brdf.error().text(), true};
   reflection.everywhere = std::move(*brdf);
   return reflection;
 }
 
 Result<void> parse_cpca(const std::string& text, CpcaOptions& options) {
   const std::string where = "--compress";
-  if (!text.starts_with("cpca:")) return Error{where, "must be cpca:CLUSTERS,RANK, not \"" + text + "\""};
+  if (!text.starts_with("cpca:")) return Error{where, "must be cpca:CLUSTERS,RANK, not \"" + text + "\"", true};
   auto n = parse_numbers(text.substr(5), 2, where);
   if (!n) return n.error();
   const float most[] = {float(max_cpca_clusters), float(max_cpca_rank)};
   for (size_t k = 0; k < 2; ++k)
     if ((*n)[k] != std::floor((*n)[k]) || (*n)[k] < float(1 - k) || (*n)[k] > most[k])
-      return Error{where, fmt::format("expects from 1 to {} clusters of rank 0 to {}, not \"{}\"", max_cpca_clusters,
-                                      max_cpca_rank, text)};
+      return Error{where,
+                   fmt::format("expects from 1 to {} clusters of rank 0 to {}, not \"{}\"", max_cpca_clusters,
+                               max_cpca_rank, text),
+                   true};
   options.clusters = int((*n)[0]), options.rank = int((*n)[1]);
   return {};
 }

@@ -21,7 +21,7 @@ Result<void> check_loop(const LoopRequest& request, const Baked& baked) {
   for (const Option<DrawRequest>& o : draw_options())
     if (std::find(std::begin(taken), std::end(taken), std::string(o.name)) == std::end(taken) &&
         is_given(request.draw, json_name(o.name)))
-      return Error{std::string("--") + o.name, "has no effect on the loop"};
+      return Error{std::string("--") + o.name, "has no effect on the loop", true};
   return check_draw(request.draw, baked);
 }
 
@@ -66,7 +66,7 @@ Result<Summary> relight_loop(const LoopRequest& request, const Job& job) {
   auto baked = load_baked(request.draw.baked);
   if (!baked) return baked.error();
   if (auto ok = check_loop(request, *baked); !ok) return ok.error();
-  if (request.frames < 1 || request.frames > 100000) return Error{"--frames", "must lie between 1 and 100000"};
+  if (request.frames < 1 || request.frames > 100000) return Error{"--frames", "must lie between 1 and 100000", true};
   auto view = parse_view(request.draw.camera, request.draw.size, baked->scene);
   if (!view) return view.error();
   auto around = surroundings_of(request.draw, job);

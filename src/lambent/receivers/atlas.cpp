@@ -75,7 +75,8 @@ Result<bool> reuse_texcoords(const Scene& scene, const AtlasOptions& o, Atlas& a
       return Error{"--texels-per-unit",
                    "the scene's TEXCOORD_1 would need an atlas of " +
                        size_text(int64_t(std::min(side, 1e15)), int64_t(std::min(side * layers, 1e15))) +
-                       " texels; the limit is " + std::to_string(max_atlas_side) + " a side"};
+                       " texels; the limit is " + std::to_string(max_atlas_side) + " a side",
+                   true};
     atlas.width = std::max(1, int(side)), atlas.height = atlas.width;
   } else {
     atlas.width = o.width, atlas.height = o.height / layers;
@@ -170,9 +171,11 @@ Result<Fit> fit_density(const Layout& layout, const AtlasOptions& o) {
   std::vector<std::array<int, 2>> rectangles;
   const double guess = std::sqrt(std::max(layout.area, 0.0)) * fit.density;
   auto too_large = [&] {
-    return Error{"--texels-per-unit", "would need an atlas of about " +
-                                          size_text(int64_t(std::min(guess, 1e15)), int64_t(std::min(guess, 1e15))) +
-                                          " texels; the limit is " + std::to_string(max_atlas_side) + " a side"};
+    return Error{"--texels-per-unit",
+                 "would need an atlas of about " +
+                     size_text(int64_t(std::min(guess, 1e15)), int64_t(std::min(guess, 1e15))) +
+                     " texels; the limit is " + std::to_string(max_atlas_side) + " a side",
+                 true};
   };
   if (!layout.rectangles(fit.density, o.padding, max_atlas_side, rectangles)) return too_large();
   double area = 0;
@@ -204,8 +207,10 @@ Result<Fit> fit_size(const Layout& layout, const AtlasOptions& o) {
     auto needed = fit_density(layout, any);
     const std::string size = needed ? size_text(needed->width, needed->packing.height)
                                     : "one beyond " + size_text(max_atlas_side, max_atlas_side);
-    return Error{"--atlas", size_text(o.width, o.height) + " is too small for " + std::to_string(layout.charts.count) +
-                                " charts: they need at least " + size + ", better several times that"};
+    return Error{"--atlas",
+                 size_text(o.width, o.height) + " is too small for " + std::to_string(layout.charts.count) +
+                     " charts: they need at least " + size + ", better several times that",
+                 true};
   }
   for (int step = 0; step < 16 && !fits(high); ++step) {
     const double middle = (low + high) / 2;
@@ -304,10 +309,10 @@ Result<void> check_options(const Scene& scene, const AtlasOptions& o) {
   if (by_size == (o.texels_per_unit != 0))
     return Error{"atlas", "needs either a density in texels or a size, and not both"};
   if (!by_size && !(o.texels_per_unit > 0 && std::isfinite(o.texels_per_unit)))
-    return Error{"--texels-per-unit", "must be positive"};
+    return Error{"--texels-per-unit", "must be positive", true};
   if (by_size && (o.width < 1 || o.height < 1 || o.width > max_atlas_side || o.height > max_atlas_side))
-    return Error{"--atlas", "each side must lie between 1 and " + std::to_string(max_atlas_side)};
-  if (o.padding < 1 || o.padding > 16) return Error{"--padding", "must lie between 1 and 16"};
+    return Error{"--atlas", "each side must lie between 1 and " + std::to_string(max_atlas_side), true};
+  if (o.padding < 1 || o.padding > 16) return Error{"--padding", "must lie between 1 and 16", true};
   if (!(surface_area(scene) > 0)) return Error{scene.path, "nothing to bake: no triangle has an area"};
   return {};
 }

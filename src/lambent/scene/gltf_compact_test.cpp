@@ -178,13 +178,15 @@ TEST(Compact, ReplacedGeometryGoes) {
 }
 
 TEST(Unbake, MayMeetAnything) {
-  for (
-      const char* text :
-      {R"({"extensions":{"LAMBENT_transfer":1}})", R"({"extensions":[],"meshes":[{"primitives":3}]})",
-       R"({"meshes":[{"primitives":[1,{"extensions":{"LAMBENT_transfer":[]}},{"extensions":7}]}]})",
-       R"({"meshes":[{"primitives":[{"attributes":4,"extensions":{"LAMBENT_transfer":{"ownMaterial":0,"texCoord":-1}}}]}]})",
-       R"({"meshes":[{"primitives":[{"material":0,"extensions":{"LAMBENT_transfer":{"ownMaterial":9,"ownIsDefault":true}}}]}],
-            "materials":[{"emissiveTexture":{"index":0}}],"textures":[{"source":7,"sampler":"x"}],"extensionsUsed":[1,"LAMBENT_transfer"]})"}) {
+  for (const char* text :
+       {R"({"extensions":{"LAMBENT_transfer":1}})", R"({"extensions":[],"meshes":[{"primitives":3}]})",
+        R"({"meshes":[{"primitives":[1,{"extensions":{"LAMBENT_transfer":[]}},{"extensions":7}]}]})",
+        R"({"meshes":[{"primitives":[{"attributes":4,
+            "extensions":{"LAMBENT_transfer":{"ownMaterial":0,"texCoord":-1}}}]}]})",
+        R"({"meshes":[{"primitives":[{"material":0,
+            "extensions":{"LAMBENT_transfer":{"ownMaterial":9,"ownIsDefault":true}}}]}],
+            "materials":[{"emissiveTexture":{"index":0}}],"textures":[{"source":7,"sampler":"x"}],
+            "extensionsUsed":[1,"LAMBENT_transfer"]})"}) {
     Json document = Json::parse(text);
     unbake(document);
     EXPECT_EQ(document.dump().find("LAMBENT"), std::string::npos) << document.dump();

@@ -199,8 +199,10 @@ Result<Pose> pose_scene(const Scene& scene, size_t animation, double time) {
 }
 
 Result<Deformation> parse_deformation(const std::string& text) {
-  const Error wrong{"--deform", "expects bend:ANGLE[,along[,towards]] or twist:ANGLE[,along], axes as x, y, z, not \"" +
-                                    text.substr(0, 80) + "\""};
+  const Error wrong{"--deform",
+                    "expects bend:ANGLE[,along[,towards]] or twist:ANGLE[,along], axes as x, y, z, not \"" +
+                        text.substr(0, 80) + "\"",
+                    true};
   Deformation d;
   size_t at = 0;
   if (text.starts_with("bend:")) at = 5;
@@ -219,8 +221,8 @@ Result<Deformation> parse_deformation(const std::string& text) {
   }
   if (at != text.size() || (d.along >= 0 && d.along == d.towards)) return wrong;
   if (d.kind == DeformKind::bend && !(std::abs(d.degrees) < 360))
-    return Error{"--deform", "bends by less than 360 degrees"};
-  if (!(std::abs(d.degrees) <= 36000)) return Error{"--deform", "twists by at most 36000 degrees"};
+    return Error{"--deform", "bends by less than 360 degrees", true};
+  if (!(std::abs(d.degrees) <= 36000)) return Error{"--deform", "twists by at most 36000 degrees", true};
   return d;
 }
 
