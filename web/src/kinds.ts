@@ -53,7 +53,10 @@ export interface BakedTransfer {
   dispose(): void;
 }
 
-/** What the page draws: store, meaning of the rows, placement. src/lambent/pipeline/browser.cpp holds the same, and a test compares the two. */
+/**
+ * What the page draws: store, meaning of the rows, placement. src/lambent/pipeline/browser.cpp holds the same, and a test
+ * compares the two.
+ */
 export const drawn = [
   ['dense', 'diffuse', 'vertices'],
   ['dense', 'diffuse', 'texels'],
