@@ -54,8 +54,8 @@ export interface BakedTransfer {
 }
 
 /**
- * What the page draws: store, meaning of the rows, placement. src/lambent/pipeline/browser.cpp holds the same, and a test
- * compares the two.
+ * What the page draws: store, meaning of the rows, placement. src/lambent/pipeline/browser.cpp holds the same, and a
+ * test compares the two.
  */
 export const drawn = [
   ['dense', 'diffuse', 'vertices'],
