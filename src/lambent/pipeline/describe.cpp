@@ -1,3 +1,4 @@
+#include <lambent/core/overloaded.h>
 #include <lambent/pipeline/describe.h>
 #include <lambent/pipeline/text.h>
 
@@ -12,11 +13,6 @@ namespace lambent {
 using nlohmann::json;
 
 namespace {
-
-template <class... F>
-struct Overloaded : F... {
-  using F::operator()...;
-};
 
 // A piece of a description: members of the JSON, and words.
 struct Said {
