@@ -45,6 +45,25 @@ class ProgressLine {
   bool shown_ = false;
 };
 
+// Where nobody watches a terminal: a line of its own every few seconds, for logs.
+class ProgressLog {
+ public:
+  void operator()(const std::string& stage, double fraction) {
+    const auto now = Clock::now();
+    if (fraction == 0) started_ = now;
+    if (fraction >= 1 || std::chrono::duration<double>(now - said_).count() < seconds_between) return;
+    said_ = now;
+    const double run = std::chrono::duration<double>(now - started_).count();
+    const std::string left = fraction > 0.01 ? ", " + human_seconds(run / fraction * (1 - fraction)) + " left" : "";
+    std::fprintf(stderr, "%s  %d%%%s\n", stage.c_str(), int(100 * fraction), left.c_str());
+    std::fflush(stderr);
+  }
+
+ private:
+  static constexpr double seconds_between = 5;
+  Clock::time_point started_ = Clock::now(), said_ = Clock::now();
+};
+
 Progress* interrupted_progress = nullptr;
 std::sig_atomic_t interruptions = 0;
 
@@ -58,7 +77,7 @@ extern "C" void on_interrupt(int) {
 
 }  // namespace
 
-Context::Context() : progress(::isatty(2) ? Progress::Report(ProgressLine()) : Progress::Report()) {
+Context::Context() : progress(::isatty(2) ? Progress::Report(ProgressLine()) : Progress::Report(ProgressLog())) {
   interrupted_progress = &progress;
   struct sigaction action = {};
   action.sa_handler = on_interrupt;

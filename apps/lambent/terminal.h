@@ -19,7 +19,7 @@ struct Context {
   bool json = false;
   int threads = 0;
   Progress progress;
-  Context();  // progress goes to stderr if that is a terminal; Ctrl-C and SIGTERM cancel it
+  Context();  // progress goes to stderr, drawn over itself on a terminal; Ctrl-C and SIGTERM cancel it
 };
 
 // "lambent: where: message" on stderr; returns `failure`, or `bad_usage` where the error is one of usage.

@@ -40,7 +40,7 @@ struct LatticePlacement {
   Lattice lattice;             // receivers are its points, in the order of Lattice::index
   std::vector<uint8_t> valid;  // by point; 0: it lies inside something and has its neighbours' values
 };
-// Receivers are the pixels of a picture, row by row from the top (relight/fix_view.h).
+// Receivers are the pixels of a picture, row by row from the top (fix_view() in render/render.h).
 struct FixedView {
   Camera camera;  // `up` is the default
   int width = 0, height = 0;
