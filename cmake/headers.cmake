@@ -42,6 +42,7 @@ set(lambent_headers
   lambent/bake/visibility.h
   lambent/baked/baked_file.h
   lambent/core/progress.h
+  lambent/pipeline/request.h
   lambent/receivers/receivers.h
   lambent/render/products.h
   lambent/render/render.h

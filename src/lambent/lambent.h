@@ -10,6 +10,7 @@
 #include <lambent/light/environment.h>
 #include <lambent/light/project.h>
 #include <lambent/light/sky.h>
+#include <lambent/pipeline/request.h>
 #include <lambent/receivers/receivers.h>
 #include <lambent/relight/lattice.h>
 #include <lambent/relight/light.h>

@@ -332,7 +332,7 @@ Result<BakeOutcome> bake_plain(const BakeRequest& request, const BakePlan& plan,
 
 }  // namespace
 
-Result<BakeOutcome> bake(const BakeRequest& asked, const Job& job) {
+Result<BakeOutcome> bake_with_summary(const BakeRequest& asked, const Job& job) {
   auto request = resolved(asked);
   if (!request) return request.error();
   auto plan = plan_of(*request, job);
@@ -341,9 +341,15 @@ Result<BakeOutcome> bake(const BakeRequest& asked, const Job& job) {
                                           : bake_plain(*request, *plan, job);
 }
 
+Result<Baked> bake(const BakeRequest& request, const Job& job) {
+  auto outcome = bake_with_summary(request, job);
+  if (!outcome) return outcome.error();
+  return std::move(outcome->baked);
+}
+
 Result<Summary> bake_to_file(const BakeRequest& request, const Job& job) {
   if (auto ok = check_output(request.output, {"glb"}); !ok) return ok.error();
-  auto outcome = bake(request, job);
+  auto outcome = bake_with_summary(request, job);
   if (!outcome) return outcome.error();
   const auto start = Clock::now();
   nlohmann::json pictures = nlohmann::json::array();

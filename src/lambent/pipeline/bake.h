@@ -1,6 +1,5 @@
 #pragma once
-// ONE bake: request -> scene with its fields, whatever the kind. The command line, JSON requests and whoever else only
-// fill the request in and say what came of it.
+// bake() of a request (request.h) with all that a command says of it and writes beside it.
 #include <lambent/baked/baked_file.h>
 #include <lambent/core/progress.h>
 #include <lambent/image/image.h>
@@ -13,12 +12,6 @@
 #include <vector>
 
 namespace lambent {
-
-// What runs beside a request and does not change its result.
-struct Job {
-  Progress* progress = nullptr;
-  std::function<void(const std::string&)> warn = [](const std::string&) {};  // one line each
-};
 
 // What a command says of its work: for people, a label and a text a line; for programs, JSON.
 struct Summary {
@@ -35,7 +28,7 @@ struct BakeOutcome {
 };
 
 // Errors: those of resolved(), of files, of the stages; cancelled.
-Result<BakeOutcome> bake(const BakeRequest& request, const Job& job = {});
+Result<BakeOutcome> bake_with_summary(const BakeRequest& request, const Job& job = {});
 
 // Bakes and writes the request's output and its pictures; their names are in the summary.
 Result<Summary> bake_to_file(const BakeRequest& request, const Job& job = {});

@@ -194,7 +194,21 @@ BakeKind kind_of(const BakeRequest& r) {
   return r.membrane.empty() ? BakeKind::diffuse : BakeKind::membrane;
 }
 
+std::string to_text(const BakeRequest& request) { return to_json(request).dump(); }
+Result<BakeRequest> bake_request(const std::string& json) {
+  const nlohmann::json object = nlohmann::json::parse(json, nullptr, false);
+  if (object.is_discarded()) return Error{"", "the request is not JSON", true};
+  return bake_request_from_json(object);
+}
+
 Result<BakeRequest> resolved(BakeRequest r) {
+  const BakeRequest untouched;
+  for (const Option<BakeRequest>& o : bake_options())
+    std::visit(
+        [&](auto member) {
+          if (r.*member != untouched.*member) r.given.insert(json_name(o.name));
+        },
+        o.member);
   if (auto ok = check_values(bake_options(), r, r.given); !ok) return ok.error();
   const BakeKind kind = kind_of(r);
   if (r.receivers.empty()) r.receivers = kind == BakeKind::lightmap ? "texels" : "vertices";

@@ -1,52 +1,9 @@
 #pragma once
-// What a bake is asked for: the options of `lambent bake`, a JSON object, and the provenance of a baked file are this.
+// The table of a bake request's fields, and its JSON.
 #include <lambent/pipeline/options.h>
+#include <lambent/pipeline/request.h>
 
 namespace lambent {
-
-struct BakeRequest {
-  std::string scene, output;
-  std::string transfer = "diffuse";
-  int order = 0;  // bands; 0: 6, or, of a lightmap, none
-  std::string light;
-  std::string precision = "half";
-  std::string receivers;  // "": texels for lightmaps, else vertices
-  float texels_per_unit = 0;
-  std::string atlas;
-  // Scene
-  bool ground = false;
-  float max_edge = 0, max_albedo = 1;
-  std::vector<std::string> emit;
-  // Rays
-  int samples = 1024;
-  std::string bounces = "3";
-  std::string shadows = "on";
-  bool terms = false;
-  size_t memory = size_t{4} << 30;
-  uint32_t seed = 1;
-  // Glossy
-  std::string brdf = "materials", outgoing = "map", simulate = "recursion";
-  int incident_order = 5, view_map = 64;
-  bool factors = false;
-  // Lobes, media, sheets
-  int lobes = 4;
-  std::string subsurface, membrane;
-  // Lightmaps
-  std::string direct = "included", directional = "none", solver = "gmres", gather = "rays", sky;
-  bool light_groups = false;
-  int lamp_samples = 32;
-  // Blocks
-  int cube = 64;
-  std::string visibility = "binary";
-  // Special cases and smaller files
-  std::string fix_light, fix_view, size = "512x512", compress;
-  int spp = 16;
-  // Free space
-  std::string lattice, lattice_box;
-  int lattice_order = 4;
-
-  GivenOptions given;  // by JSON name
-};
 
 enum class BakeKind { diffuse, matrix, factors, zonal, glossy_zonal, membrane, lightmap, blocks };
 inline constexpr const char* bake_kind_names[] = {"diffuse transfer",

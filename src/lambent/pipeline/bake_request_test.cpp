@@ -183,11 +183,11 @@ TEST_F(Requests, EveryOptionHasAnEffectOrIsRefusedByName) {
         }
         continue;
       }
-      auto with = bake(changed);
+      auto with = bake_with_summary(changed);
       EXPECT_TRUE(with) << with.error().text();
       if (!with) continue;
       if (!o.recorded || kind_of(changed) != BakeKind(k) || name == "factors") continue;  // which is the kind itself
-      auto without = bake(must_read(before));
+      auto without = bake_with_summary(must_read(before));
       EXPECT_TRUE(without) << without.error().text();
       if (!without) continue;
       EXPECT_NE(fingerprint(std::move(*with)), fingerprint(std::move(*without)));
@@ -209,6 +209,24 @@ TEST_F(Requests, BakeAgainToTheByte) {
     ASSERT_TRUE(second) << second.error().text();
     EXPECT_EQ(*read_file(at("out.glb")), *read_file(at("again.glb")));
   }
+}
+
+// As a program fills it in, without names of what it said; and as text.
+TEST_F(Requests, FieldsSetByHandCountAsSaid) {
+  BakeRequest request;
+  request.scene = at("s.obj"), request.samples = 32, request.order = 3;
+  auto baked = bake(request);
+  ASSERT_TRUE(baked) << baked.error().text();
+  auto read = bake_request(to_text(*resolved(request)));
+  ASSERT_TRUE(read) << read.error().text();
+  EXPECT_EQ(read->samples, 32);
+  read->scene = request.scene;
+  EXPECT_EQ(bake(*read)->provenance, baked->provenance);
+  request.lobes = 2;
+  auto refused = bake(request);
+  ASSERT_FALSE(refused);
+  EXPECT_EQ(refused.error().where, "--lobes");
+  EXPECT_FALSE(bake_request("{"));
 }
 
 TEST_F(Requests, AnotherSceneIsRefused) {
@@ -269,7 +287,7 @@ TEST_F(Requests, PlansSayReceiversAndBytesBeforeTheWork) {
   for (BakeKind kind : {BakeKind::diffuse, BakeKind::matrix, BakeKind::lightmap}) {
     const BakeRequest request = must_read(least(kind));
     auto plan = plan_bake(request);
-    auto baked = bake(request);
+    auto baked = bake_with_summary(request);
     ASSERT_TRUE(plan) << plan.error().text();
     ASSERT_TRUE(baked);
     EXPECT_EQ(plan->json["receivers"], baked->summary.json["receivers"]);

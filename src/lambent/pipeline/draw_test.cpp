@@ -91,7 +91,7 @@ TEST_F(Drawings, ReflectionsOneByOneAddUp) {
   lightmap.given = {"precision", "samples", "bounces", "terms", "transfer", "atlas", "light_groups"};
   for (const BakeRequest& asked : {diffuse, lightmap}) {
     SCOPED_TRACE(asked.transfer);
-    const auto whole = bake(asked);
+    const auto whole = bake_with_summary(asked);
     ASSERT_TRUE(whole) << whole.error().text();
     ASSERT_EQ(whole->baked.terms.size(), 3u);
     const bool lamps = asked.transfer == "lightmap";

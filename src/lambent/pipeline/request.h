@@ -1,0 +1,76 @@
+#pragma once
+// What a bake is asked for, and ONE bake of it, whatever the kind: the options of `lambent bake`, a JSON object, and
+// the provenance of a baked file are such a request.
+#include <lambent/baked/baked_file.h>
+#include <lambent/core/progress.h>
+
+#include <functional>
+#include <set>
+#include <string>
+#include <vector>
+
+namespace lambent {
+
+// The fields are the options of `lambent bake` and their syntaxes; docs/options.md says which go with which kind.
+struct BakeRequest {
+  std::string scene, output;
+  std::string transfer = "diffuse";
+  int order = 0;  // bands; 0: 6, or, of a lightmap, none
+  std::string light;
+  std::string precision = "half";
+  std::string receivers;  // "": texels for lightmaps, else vertices
+  float texels_per_unit = 0;
+  std::string atlas;
+  // Scene
+  bool ground = false;
+  float max_edge = 0, max_albedo = 1;
+  std::vector<std::string> emit;
+  // Rays
+  int samples = 1024;
+  std::string bounces = "3";
+  std::string shadows = "on";
+  bool terms = false;
+  size_t memory = size_t{4} << 30;
+  uint32_t seed = 1;
+  // Glossy
+  std::string brdf = "materials", outgoing = "map", simulate = "recursion";
+  int incident_order = 5, view_map = 64;
+  bool factors = false;
+  // Lobes, media, sheets
+  int lobes = 4;
+  std::string subsurface, membrane;
+  // Lightmaps
+  std::string direct = "included", directional = "none", solver = "gmres", gather = "rays", sky;
+  bool light_groups = false;
+  int lamp_samples = 32;
+  // Blocks
+  int cube = 64;
+  std::string visibility = "binary";
+  // Special cases and smaller files
+  std::string fix_light, fix_view, size = "512x512", compress;
+  int spp = 16;
+  // Free space
+  std::string lattice, lattice_box;
+  int lattice_order = 4;
+
+  // Names (as in JSON) of fields that were said. A field that differs from its default counts as said without being
+  // here.
+  std::set<std::string> given;
+};
+
+// What runs beside a request and does not change its result.
+struct Job {
+  Progress* progress = nullptr;
+  std::function<void(const std::string&)> warn = [](const std::string&) {};  // one line each
+};
+
+// Loads the scene, bakes it, and says in the result's provenance by which request. `output` is not read: save_baked()
+// writes the file. Errors begin with the option that contradicts another, is out of range or goes with no such kind;
+// those of files and of the stages; cancelled.
+Result<Baked> bake(const BakeRequest& request, const Job& job = {});
+
+// The request as a JSON object, and back. Errors name the field: unknown, of another type, out of range.
+std::string to_text(const BakeRequest& request);
+Result<BakeRequest> bake_request(const std::string& json);
+
+}  // namespace lambent
