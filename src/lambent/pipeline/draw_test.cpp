@@ -108,7 +108,7 @@ TEST_F(Drawings, ReflectionsOneByOneAddUp) {
       expect_equal(picture(whole->baked, request, "sum:" + std::to_string(k)), sum);
       BakeRequest fewer = asked;
       fewer.bounces = std::to_string(k), fewer.terms = false, fewer.given.erase("terms");
-      const auto part = bake(fewer);
+      const auto part = bake_with_summary(fewer);
       ASSERT_TRUE(part) << part.error().text();
       expect_equal(picture(part->baked, request, "product"), sum);
       request.show = "sum:0";
