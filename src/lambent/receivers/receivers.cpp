@@ -49,6 +49,71 @@ uint64_t morton(Vec3 p, const Bounds& box) {
   return spread_bits(uint64_t(q.x)) | spread_bits(uint64_t(q.y)) << 1 | spread_bits(uint64_t(q.z)) << 2;
 }
 
+std::vector<VertexGeometry> vertex_geometry(const Scene& scene) {
+  std::vector<VertexGeometry> geometry(scene.positions.size());
+  for (const Triangle& t : scene.triangles) {
+    const Vec3 normal = area_normal(scene, t);
+    if (!(dot(normal, normal) > 0)) continue;  // degenerate: no ray meets it, no light falls on it
+    for (int k = 0; k < 3; ++k) {
+      const Vec3 p = scene.positions[t.v[k]];
+      const Vec3 e1 = scene.positions[t.v[(k + 1) % 3]] - p, e2 = scene.positions[t.v[(k + 2) % 3]] - p;
+      const float l1 = length(e1), l2 = length(e2);
+      VertexGeometry& g = geometry[t.v[k]];
+      g.used = true, g.two_sided |= t.two_sided;
+      g.face_normal += normal;
+      if (!(l1 > 0 && l2 > 0)) continue;
+      g.edge = std::min({g.edge, l1, l2});
+      // The bisector of unit vectors a, b is (a + b) / 2 cos(half); times 2 sin(half) that is (a + b) tan(half).
+      const float cosine = std::clamp(dot(e1, e2) / (l1 * l2), -1.0f, 1.0f);
+      const float tan_half = std::sqrt((1 - cosine) / std::max(1 + cosine, 1e-6f));
+      g.inward += (e1 / l1 + e2 / l2) * tan_half;
+    }
+  }
+  return geometry;
+}
+
+// What sides become that share their place and nearly their normal.
+struct Welded {
+  Vec3 position, normal, inward;
+  float edge;
+};
+struct Welding {
+  std::vector<Welded> receivers;
+  std::vector<uint32_t> of_side;
+};
+Welding weld(const Scene& scene, const std::vector<VertexGeometry>& geometry, const std::vector<Side>& sides) {
+  auto place = [&](const Side& s) {
+    const Vec3 p = scene.positions[s.vertex] + 0.0f;  // -0 becomes 0
+    return std::tuple(p.x, p.y, p.z);
+  };
+  std::vector<uint32_t> by_place(sides.size());
+  std::iota(by_place.begin(), by_place.end(), 0u);
+  std::sort(by_place.begin(), by_place.end(), [&](uint32_t a, uint32_t b) {
+    auto pa = place(sides[a]), pb = place(sides[b]);
+    return pa != pb ? pa < pb : a < b;
+  });
+
+  Welding out;
+  std::vector<Welded>& welded = out.receivers;
+  out.of_side.resize(sides.size());
+  for (size_t begin = 0; begin < by_place.size();) {
+    size_t end = begin;
+    while (end < by_place.size() && place(sides[by_place[end]]) == place(sides[by_place[begin]])) ++end;
+    const size_t first = welded.size();
+    for (size_t i = begin; i < end; ++i) {
+      const Side& s = sides[by_place[i]];
+      const VertexGeometry& g = geometry[s.vertex];
+      size_t w = first;
+      while (w < welded.size() && dot(welded[w].normal, s.normal) < same_normal) ++w;
+      if (w == welded.size()) welded.push_back({scene.positions[s.vertex], s.normal, Vec3(0), INFINITY});
+      welded[w].inward += g.inward, welded[w].edge = std::min(welded[w].edge, g.edge);
+      out.of_side[by_place[i]] = uint32_t(w);
+    }
+    begin = end;
+  }
+  return out;
+}
+
 }  // namespace
 
 std::vector<uint32_t> curve_order(const std::vector<Vec3>& points, const Bounds& box) {
@@ -69,26 +134,7 @@ float receiver_lift(Vec3 p, float size, float diagonal) {
 
 Receivers make_vertex_receivers(const Scene& scene) {
   const size_t vertices = scene.positions.size();
-  std::vector<VertexGeometry> geometry(vertices);
-  for (const Triangle& t : scene.triangles) {
-    const Vec3 normal = area_normal(scene, t);
-    if (!(dot(normal, normal) > 0)) continue;  // degenerate: no ray meets it, no light falls on it
-    for (int k = 0; k < 3; ++k) {
-      const Vec3 p = scene.positions[t.v[k]];
-      const Vec3 e1 = scene.positions[t.v[(k + 1) % 3]] - p, e2 = scene.positions[t.v[(k + 2) % 3]] - p;
-      const float l1 = length(e1), l2 = length(e2);
-      VertexGeometry& g = geometry[t.v[k]];
-      g.used = true, g.two_sided |= t.two_sided;
-      g.face_normal += normal;
-      if (!(l1 > 0 && l2 > 0)) continue;
-      g.edge = std::min({g.edge, l1, l2});
-      // The bisector of unit vectors a, b is (a + b) / 2 cos(half); times 2 sin(half) that is (a + b) tan(half).
-      const float cosine = std::clamp(dot(e1, e2) / (l1 * l2), -1.0f, 1.0f);
-      const float tan_half = std::sqrt((1 - cosine) / std::max(1 + cosine, 1e-6f));
-      g.inward += (e1 / l1 + e2 / l2) * tan_half;
-    }
-  }
-
+  const std::vector<VertexGeometry> geometry = vertex_geometry(scene);
   std::vector<Side> sides;
   sides.reserve(vertices);
   bool any_back = false;
@@ -100,40 +146,8 @@ Receivers make_vertex_receivers(const Scene& scene) {
     sides.push_back({v, false, n});
     if (g.two_sided) sides.push_back({v, true, -n}), any_back = true;
   }
-  auto place = [&](const Side& s) {
-    const Vec3 p = scene.positions[s.vertex] + 0.0f;  // -0 becomes 0
-    return std::tuple(p.x, p.y, p.z);
-  };
-  std::vector<uint32_t> by_place(sides.size());
-  std::iota(by_place.begin(), by_place.end(), 0u);
-  std::sort(by_place.begin(), by_place.end(), [&](uint32_t a, uint32_t b) {
-    auto pa = place(sides[a]), pb = place(sides[b]);
-    return pa != pb ? pa < pb : a < b;
-  });
-
-  // Weld within each place.
-  struct Welded {
-    Vec3 position, normal, inward;
-    float edge;
-  };
-  std::vector<Welded> welded;
-  std::vector<uint32_t> receiver_of_side(sides.size());
-  for (size_t begin = 0; begin < by_place.size();) {
-    size_t end = begin;
-    while (end < by_place.size() && place(sides[by_place[end]]) == place(sides[by_place[begin]])) ++end;
-    const size_t first = welded.size();
-    for (size_t i = begin; i < end; ++i) {
-      const Side& s = sides[by_place[i]];
-      const VertexGeometry& g = geometry[s.vertex];
-      size_t w = first;
-      while (w < welded.size() && dot(welded[w].normal, s.normal) < same_normal) ++w;
-      if (w == welded.size()) welded.push_back({scene.positions[s.vertex], s.normal, Vec3(0), INFINITY});
-      welded[w].inward += g.inward, welded[w].edge = std::min(welded[w].edge, g.edge);
-      receiver_of_side[by_place[i]] = uint32_t(w);
-    }
-    begin = end;
-  }
-
+  const Welding welding = weld(scene, geometry, sides);
+  const std::vector<Welded>& welded = welding.receivers;
   const Bounds box = bounds(scene);
   std::vector<Vec3> places(welded.size());
   for (size_t i = 0; i < welded.size(); ++i) places[i] = welded[i].position;
@@ -156,7 +170,7 @@ Receivers make_vertex_receivers(const Scene& scene) {
   r.front.assign(vertices, none);
   if (any_back) r.back.assign(vertices, none);
   for (size_t i = 0; i < sides.size(); ++i)
-    (sides[i].back ? r.back : r.front)[sides[i].vertex] = rank[receiver_of_side[i]];
+    (sides[i].back ? r.back : r.front)[sides[i].vertex] = rank[welding.of_side[i]];
   r.basis = corner_receivers(scene, r.front, r.back);
   return r;
 }

@@ -29,11 +29,7 @@ struct EdgeSide {
   Vec2 at_a, at_b;
 };
 
-}  // namespace
-
-size_t smooth_seams(const Scene& scene, const TexelReceivers& texels, float* values, size_t stride, size_t width,
-                    float cosine, float keep, Progress* progress) {
-  ProgressStage stage(progress, "seams", most_steps);
+std::vector<EdgeSide> sorted_edges(const Scene& scene, const TexelReceivers& texels) {
   const std::vector<uint32_t> ids = number_positions(scene.positions).ids;
   std::vector<EdgeSide> edges;
   for (uint32_t i = 0; i < scene.triangles.size(); ++i)
@@ -49,9 +45,16 @@ size_t smooth_seams(const Scene& scene, const TexelReceivers& texels, float* val
   std::sort(edges.begin(), edges.end(), [](const EdgeSide& x, const EdgeSide& y) {
     return std::tie(x.a, x.b, x.front, x.triangle) < std::tie(y.a, y.b, y.front, y.triangle);
   });
+  return edges;
+}
 
-  std::vector<uint32_t> number;  // of receivers that take part
+// Differences across seams, which are to vanish, of the receivers that take part.
+struct Seams {
+  std::vector<uint32_t> receivers;
   std::vector<Row> rows;
+};
+Seams find_seams(const Scene& scene, const TexelReceivers& texels, const std::vector<EdgeSide>& edges, float cosine) {
+  Seams seams;
   std::vector<uint32_t> index;
   uint32_t receivers = 0;
   for (uint32_t r : texels.texels)
@@ -59,7 +62,7 @@ size_t smooth_seams(const Scene& scene, const TexelReceivers& texels, float* val
   index.assign(receivers, none);
   auto add = [&](Row& row, Vec2 at, float sign) {
     texels.spread_at(at, [&](uint32_t r, float w) {
-      if (index[r] == none) index[r] = uint32_t(number.size()), number.push_back(r);
+      if (index[r] == none) index[r] = uint32_t(seams.receivers.size()), seams.receivers.push_back(r);
       row.texel[size_t(row.count)] = index[r], row.weight[size_t(row.count)] = sign * w, ++row.count;
     });
   };
@@ -79,9 +82,19 @@ size_t smooth_seams(const Scene& scene, const TexelReceivers& texels, float* val
       const float s = float(p) / float(points);
       Row row;
       add(row, x.at_a + s * (x.at_b - x.at_a), 1.0f), add(row, y.at_a + s * (y.at_b - y.at_a), -1.0f);
-      rows.push_back(row);
+      seams.rows.push_back(row);
     }
   }
+  return seams;
+}
+
+}  // namespace
+
+size_t smooth_seams(const Scene& scene, const TexelReceivers& texels, float* values, size_t stride, size_t width,
+                    float cosine, float keep, Progress* progress) {
+  ProgressStage stage(progress, "seams", most_steps);
+  const Seams seams = find_seams(scene, texels, sorted_edges(scene, texels), cosine);
+  const std::vector<uint32_t>& number = seams.receivers;
   const size_t n = number.size();
   if (n == 0) return 0;
 
@@ -89,7 +102,7 @@ size_t smooth_seams(const Scene& scene, const TexelReceivers& texels, float* val
   auto normal_product = [&](const std::vector<double>& v, std::vector<double>& out) {
     std::fill(out.begin(), out.end(), 0.0);
     std::vector<double> sum(width);
-    for (const Row& row : rows) {
+    for (const Row& row : seams.rows) {
       std::fill(sum.begin(), sum.end(), 0.0);
       for (int k = 0; k < row.count; ++k)
         for (size_t c = 0; c < width; ++c)
