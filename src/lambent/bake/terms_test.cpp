@@ -69,8 +69,9 @@ TEST(Terms, AddUpToTheBakeAndToEveryBakeOfFewerBounces) {
       fewer.bounces = bounces, fewer.keep_terms = false;
       auto expected = bake(scene, *tracer, receivers, fewer);
       ASSERT_TRUE(expected);
-      if (expected->channels == 3)  // direct light alone is of one channel
+      if (expected->channels == 3) {  // direct light alone is of one channel
         EXPECT_LT(furthest(report.terms, size_t(bounces) + 1, *expected), 1e-6);
+      }
       for (size_t r = 0; bounces == 0 && r < receivers.count(); ++r) {
         const std::vector<float> one = load_receiver(*expected, r), three = load_receiver(report.terms[0], r);
         for (size_t i = 0; i < three.size(); ++i) EXPECT_NEAR(three[i], one[i % one.size()], 1e-6f);

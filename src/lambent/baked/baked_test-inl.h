@@ -30,7 +30,7 @@ struct Small {
   WritableTransfer transfer;
 };
 
-Small small_bake(int channels, Precision precision) {
+[[maybe_unused]] Small small_bake(int channels, Precision precision) {
   Small s;
   const uint32_t m = add_material(s.scene, "grey", Vec3(0.5f));
   add_box(s.scene, m, "box", Vec3(-1), Vec3(1), 2);
@@ -49,18 +49,21 @@ Small small_bake(int channels, Precision precision) {
   return s;
 }
 
-Baked baked_of(const Small& s) { return make_baked(s.scene, s.receivers, s.transfer.transfer, DiffuseRows{}); }
-Baked with_provenance(Baked baked, const std::string& text) {
+[[maybe_unused]] Baked baked_of(const Small& s) {
+  return make_baked(s.scene, s.receivers, s.transfer.transfer, DiffuseRows{});
+}
+[[maybe_unused]] Baked with_provenance(Baked baked, const std::string& text) {
   baked.provenance = text;
   return baked;
 }
-Baked with_errors(Baked baked, std::vector<float> errors) {
+[[maybe_unused]] Baked with_errors(Baked baked, std::vector<float> errors) {
   baked.surface.fit_errors = std::move(errors);
   return baked;
 }
 
 // Replaces text in the JSON chunk by text of the same length.
-std::vector<uint8_t> edited(std::vector<uint8_t> bytes, const std::string& from, const std::string& to) {
+[[maybe_unused]] std::vector<uint8_t> edited(std::vector<uint8_t> bytes, const std::string& from,
+                                             const std::string& to) {
   EXPECT_EQ(from.size(), to.size());
   const auto at = std::search(bytes.begin(), bytes.end(), from.begin(), from.end());
   EXPECT_NE(at, bytes.end()) << from;
@@ -70,8 +73,8 @@ std::vector<uint8_t> edited(std::vector<uint8_t> bytes, const std::string& from,
 
 // Each of `lies`, (from, to) of equal length, told once in place of the first `from` after `after`: refused in one line
 // that names the file.
-void expect_refused(const std::string& path, const std::string& after,
-                    std::initializer_list<std::pair<std::string, std::string>> lies) {
+[[maybe_unused]] void expect_refused(const std::string& path, const std::string& after,
+                                     std::initializer_list<std::pair<std::string, std::string>> lies) {
   const TemporaryFile lying("lie.glb");
   const std::vector<uint8_t> bytes = *read_file(path);
   const std::string text(bytes.begin(), bytes.end());

@@ -90,7 +90,9 @@ TEST(Sh, TablesAreRoundedAsSquareRootsAre) {
     for (int l = m + 1; l < max_sh_order; ++l) {
       const double l2 = double(l) * l, m2 = double(m) * m, k = double(l - 1) * (l - 1);
       EXPECT_EQ(t.a[l][m], std::sqrt((4 * l2 - 1) / (l2 - m2))) << l << " " << m;
-      if (l > m + 1) EXPECT_EQ(t.b[l][m], -std::sqrt((2.0 * l + 1) * (k - m2) / ((2.0 * l - 3) * (l2 - m2))));
+      if (l > m + 1) {
+        EXPECT_EQ(t.b[l][m], -std::sqrt((2.0 * l + 1) * (k - m2) / ((2.0 * l - 3) * (l2 - m2))));
+      }
     }
   }
 }
