@@ -28,6 +28,7 @@ struct DemoCommand {
   std::string folder = "out";
   int spp = 128, width = 320, height = 240;
   float detail = 1, exposure = -0.5f;
+  std::string at(const std::string& name) const { return folder + "/" + name; }
 };
 
 struct Hour {
@@ -59,86 +60,73 @@ Result<Image> trace_twice(const Scene& scene, const Environment& env, const Came
   return mean_of(a->image, b->image);
 }
 
-int run_demo(Context& context, const DemoCommand& o) {
-  std::error_code status;
-  std::filesystem::create_directories(o.folder, status);
-  if (!std::filesystem::is_directory(o.folder)) return fail({o.folder, "cannot be made: " + status.message()});
-  auto at = [&](const std::string& name) { return o.folder + "/" + name; };
-
-  const Scene scene = make_courtyard(o.detail);
-  auto tracer = Tracer::build(scene);
-  if (!tracer) return fail(tracer.error());
-  const Receivers receivers = make_vertex_receivers(scene);
-  const CornerReceivers corners = corner_receivers(scene, receivers.front, receivers.back);
-  const Camera camera = courtyard_camera();
+// What the hours share.
+struct Courtyard {
+  const Scene& scene;
+  const Tracer& tracer;
+  const CornerReceivers& corners;
+  const Transfer& transfer;
   BakeOptions options;
-  BakeReport report;
-  auto transfer = bake(scene, *tracer, receivers, options, &report, &context.progress);
-  if (!transfer) return fail(transfer.error());
-  Baked baked = make_baked(scene, receivers, *transfer, DiffuseRows{});
-  baked.provenance =
-      nlohmann::json{
-          {"generator", std::string("lambent ") + version},
-          {"input", "courtyard (built in)"},
-          {"options", {{"order", options.order}, {"samples", options.samples}, {"bounces", options.bounces}}}}
-          .dump();
-  if (auto ok = save_baked(at("courtyard.glb"), baked); !ok) return fail(ok.error());
+  Camera camera = courtyard_camera();
+};
 
-  std::vector<Row> rows;
-  std::vector<Image> relit_pictures;
-  Relit relit;
-  for (const Hour& hour : hours) {
-    SkyOptions sky;
-    sky.elevation = hour.elevation, sky.azimuth = hour.azimuth;
-    auto env = make_sky(sky);
-    if (!env) return fail(env.error());
-    const std::vector<Vec3> light = project_environment(*env, options.order);
-    relight(*transfer, light, relit);  // the first call sizes the output
-    const auto start = Clock::now();
-    relight(*transfer, light, relit);
-    Row row{hour.name, {}, {}, 0, 1e3 * seconds_since(start), 0};
+// One sky: relit, judged, and written; `shown_picture` is what to look at.
+Result<Row> draw_hour(const DemoCommand& o, const Courtyard& yard, const Hour& hour, Relit& relit, Image& shown_picture,
+                      Progress& progress) {
+  const auto& [scene, tracer, corners, transfer, options, camera] = yard;
+  SkyOptions sky;
+  sky.elevation = hour.elevation, sky.azimuth = hour.azimuth;
+  auto env = make_sky(sky);
+  if (!env) return env.error();
+  const std::vector<Vec3> light = project_environment(*env, options.order);
+  relight(transfer, light, relit);  // the first call sizes the output
+  const auto start = Clock::now();
+  relight(transfer, light, relit);
+  Row row{hour.name, {}, {}, 0, 1e3 * seconds_since(start), 0};
 
-    const Environment smooth = reconstruct_environment(light);
-    const RenderOptions view{o.width, o.height, 64};
-    auto picture = render(scene, *tracer, corners, relit, camera, view, &context.progress);
-    if (!picture) return fail(picture.error());
-    ReferenceOptions truth;
-    truth.width = o.width, truth.height = o.height, truth.spp = o.spp, truth.bounces = options.bounces,
-    truth.background = false;
-    const auto traced = Clock::now();
-    auto same_light = trace_twice(scene, smooth, camera, truth, context.progress, o.exposure, &row.noise_psnr);
-    if (!same_light) return fail(same_light.error());
-    row.reference_seconds = seconds_since(traced);
-    auto full_light = trace_twice(scene, *env, camera, truth, context.progress, o.exposure, nullptr);
-    if (!full_light) return fail(full_light.error());
-    auto d6 = compare_images(*picture, *same_light, o.exposure),
-         dsky = compare_images(*picture, *full_light, o.exposure);
-    if (!d6) return fail(d6.error());
-    if (!dsky) return fail(dsky.error());
-    row.order6 = *d6, row.sky = *dsky;
+  const Environment smooth = reconstruct_environment(light);
+  const RenderOptions view{o.width, o.height, 64};
+  auto picture = render(scene, tracer, corners, relit, camera, view, &progress);
+  if (!picture) return picture.error();
+  ReferenceOptions truth;
+  truth.width = o.width, truth.height = o.height, truth.spp = o.spp, truth.bounces = options.bounces,
+  truth.background = false;
+  const auto traced = Clock::now();
+  auto same_light = trace_twice(scene, smooth, camera, truth, progress, o.exposure, &row.noise_psnr);
+  if (!same_light) return same_light.error();
+  row.reference_seconds = seconds_since(traced);
+  auto full_light = trace_twice(scene, *env, camera, truth, progress, o.exposure, nullptr);
+  if (!full_light) return full_light.error();
+  auto d6 = compare_images(*picture, *same_light, o.exposure), dsky = compare_images(*picture, *full_light, o.exposure);
+  if (!d6) return d6.error();
+  if (!dsky) return dsky.error();
+  row.order6 = *d6, row.sky = *dsky;
 
-    // The pictures to look at have the sky behind them.
-    RenderOptions shown{o.width * 3 / 2, o.height * 3 / 2, 32, &*env};
-    auto pretty = render(scene, *tracer, corners, relit, camera, shown, &context.progress);
-    if (!pretty) return fail(pretty.error());
-    relit_pictures.push_back(*pretty);
-    const std::pair<std::string, Image> files[] = {
-        {"relit_" + row.name, std::move(*pretty)},
-        {"reference_" + row.name, *same_light},
-        {"reference_sky_" + row.name, *full_light},
-        {"error_" + row.name, difference_picture(*picture, *same_light, o.exposure)}};
-    for (const auto& [name, image] : files) {
-      // Error maps are already pictures of displayed values.
-      if (auto ok = save_image(at(name + ".png"), image, name.starts_with("error") ? 0 : o.exposure); !ok)
-        return fail(ok.error());
-      if (name.starts_with("relit"))
-        if (auto ok = save_image(at(name + ".exr"), image); !ok) return fail(ok.error());
-    }
-    rows.push_back(row);
+  // The pictures to look at have the sky behind them.
+  RenderOptions shown{o.width * 3 / 2, o.height * 3 / 2, 32, &*env};
+  auto pretty = render(scene, tracer, corners, relit, camera, shown, &progress);
+  if (!pretty) return pretty.error();
+  shown_picture = *pretty;
+  const std::pair<std::string, Image> files[] = {
+      {"relit_" + row.name, std::move(*pretty)},
+      {"reference_" + row.name, *same_light},
+      {"reference_sky_" + row.name, *full_light},
+      {"error_" + row.name, difference_picture(*picture, *same_light, o.exposure)}};
+  for (const auto& [name, image] : files) {
+    // Error maps are already pictures of displayed values.
+    if (auto ok = save_image(o.at(name + ".png"), image, name.starts_with("error") ? 0 : o.exposure); !ok)
+      return ok.error();
+    if (name.starts_with("relit"))
+      if (auto ok = save_image(o.at(name + ".exr"), image); !ok) return ok.error();
   }
+  return row;
+}
 
-  if (auto ok = save_image(at("courtyard.png"), beside(relit_pictures), o.exposure); !ok) return fail(ok.error());
-
+struct Said {
+  nlohmann::json json;
+  std::string table;
+};
+Said summarize(const Scene& scene, const BakeReport& report, const BakeOptions& options, const std::vector<Row>& rows) {
   nlohmann::json json{{"scene", {{"vertices", scene.positions.size()}, {"triangles", scene.triangles.size()}}},
                       {"bake",
                        {{"receivers", report.receivers},
@@ -170,9 +158,50 @@ int run_demo(Context& context, const DemoCommand& o) {
                             {"flip_full_sky", r.sky.flip},
                             {"reference_seconds", r.reference_seconds}});
   }
-  if (auto ok = write_file_atomically(at("summary.md"), table); !ok) return fail(ok.error());
-  if (context.json) print_json(json);
-  else fmt::print("{}\nPictures and table are in {}/\n", table, o.folder);
+  return {std::move(json), std::move(table)};
+}
+
+int run_demo(Context& context, const DemoCommand& o) {
+  std::error_code status;
+  std::filesystem::create_directories(o.folder, status);
+  if (!std::filesystem::is_directory(o.folder)) return fail({o.folder, "cannot be made: " + status.message()});
+  auto at = [&](const std::string& name) { return o.at(name); };
+
+  const Scene scene = make_courtyard(o.detail);
+  auto tracer = Tracer::build(scene);
+  if (!tracer) return fail(tracer.error());
+  const Receivers receivers = make_vertex_receivers(scene);
+  const CornerReceivers corners = corner_receivers(scene, receivers.front, receivers.back);
+  BakeOptions options;
+  BakeReport report;
+  auto transfer = bake(scene, *tracer, receivers, options, &report, &context.progress);
+  if (!transfer) return fail(transfer.error());
+  Baked baked = make_baked(scene, receivers, *transfer, DiffuseRows{});
+  baked.provenance =
+      nlohmann::json{
+          {"generator", std::string("lambent ") + version},
+          {"input", "courtyard (built in)"},
+          {"options", {{"order", options.order}, {"samples", options.samples}, {"bounces", options.bounces}}}}
+          .dump();
+  if (auto ok = save_baked(at("courtyard.glb"), baked); !ok) return fail(ok.error());
+
+  const Courtyard yard{scene, *tracer, corners, *transfer, options};
+  std::vector<Row> rows;
+  std::vector<Image> relit_pictures;
+  Relit relit;
+  for (const Hour& hour : hours) {
+    relit_pictures.emplace_back();
+    auto row = draw_hour(o, yard, hour, relit, relit_pictures.back(), context.progress);
+    if (!row) return fail(row.error());
+    rows.push_back(std::move(*row));
+  }
+
+  if (auto ok = save_image(at("courtyard.png"), beside(relit_pictures), o.exposure); !ok) return fail(ok.error());
+
+  const Said said = summarize(scene, report, options, rows);
+  if (auto ok = write_file_atomically(at("summary.md"), said.table); !ok) return fail(ok.error());
+  if (context.json) print_json(said.json);
+  else fmt::print("{}\nPictures and table are in {}/\n", said.table, o.folder);
   return success;
 }
 
