@@ -1,5 +1,7 @@
 #include "options.h"
 
+#include <lambent/pipeline/bake_parse.h>
+
 #include <lambent/brdf/parse_brdf.h>
 #include <lambent/core/file.h>
 #include <lambent/scene/load.h>
@@ -13,23 +15,6 @@
 
 namespace lambent::tool {
 
-namespace {
-
-Result<void> change_materials(Scene& scene, const SceneOptions& options) {
-  for (const std::string& text : options.emit) {
-    auto lamp = parse_named_color(text, "--emit");
-    if (!lamp) return lamp.error();
-    bool found = false;
-    for (Material& m : scene.materials)
-      if (m.name == lamp->name) m.emissive = lamp->color, m.emissive_texture = -1, found = true;
-    if (!found) return Error{"--emit", "the scene has no material \"" + lamp->name + "\"", true};
-  }
-  for (Material& m : scene.materials) m.base_color = min(m.base_color, Vec3(options.max_albedo));
-  return {};
-}
-
-}  // namespace
-
 void SceneOptions::add_to(CLI::App& command) {
   command.add_option("scene", path, "Scene: .gltf, .glb, .obj or .ply")->required();
   command.add_flag("--ground", ground, "Add a tessellated floor under the scene");
@@ -40,15 +25,11 @@ void SceneOptions::add_to(CLI::App& command) {
       ->check(CLI::PositiveNumber);
 }
 
-Result<Scene> load_prepared_scene(const SceneOptions& options) {
-  auto scene = load_scene(options.path);
-  if (!scene) return scene;
-  if (auto ok = change_materials(*scene, options); !ok) return ok.error();
-  if (options.ground) add_ground(*scene);
-  if (options.max_edge > 0)
-    if (auto ok = split_long_edges(*scene, options.max_edge); !ok) return ok.error();
-  warn(scene->warnings);
-  return scene;
+Result<Scene> load_prepared_scene(const SceneOptions& o) {
+  BakeRequest request;
+  request.scene = o.path, request.ground = o.ground, request.max_edge = o.max_edge, request.emit = o.emit;
+  request.max_albedo = o.max_albedo;
+  return load_scene_of(request, {nullptr, [](const std::string& message) { warn(message); }});
 }
 
 void ViewOptions::add_to(CLI::App& command) {
