@@ -11,17 +11,19 @@ namespace {
 struct CompareCommand {
   std::string a, b, output;
   float exposure = 0;
-  bool mean = false;
+  bool mean = false, all = false;
 };
 
 int run_compare(Context& context, const CompareCommand& o) {
   if (!o.output.empty())
     if (auto ok = check_output(o.output, {"png", "exr"}); !ok) return fail(ok.error());
-  auto a = load_image(o.a);
+  std::vector<std::string> warnings;
+  auto a = load_image(o.a, &warnings);
   if (!a) return fail(a.error());
-  auto b = load_image(o.b);
+  auto b = load_image(o.b, &warnings);
   if (!b) return fail(b.error());
-  auto d = compare_images(*a, *b, o.exposure);
+  warn(warnings);
+  auto d = compare_images(*a, *b, o.exposure, o.all);
   if (!d) return fail(d.error());
   if (o.mean && a->alpha.size() != b->alpha.size())
     return fail({o.b, "--mean needs both pictures with alpha, or both without"});
@@ -30,10 +32,12 @@ int run_compare(Context& context, const CompareCommand& o) {
                              o.mean ? o.exposure : 0);
         !ok)
       return fail(ok.error());
+  const size_t size = a->rgb.size();
   if (context.json) {
     print_json({{"a", o.a},
                 {"b", o.b},
                 {"pixels", d->pixels},
+                {"of_pixels", size},
                 {"rmse", d->rmse},
                 {"relative_mse", d->relative_mse},
                 {"psnr", std::isfinite(d->psnr) ? nlohmann::json(d->psnr) : nlohmann::json()},
@@ -42,9 +46,12 @@ int run_compare(Context& context, const CompareCommand& o) {
                 {"mean_b", d->mean_b}});
   } else {
     fmt::print(
-        "{} pixels\n  RMSE          {:.5f}\n  relative MSE  {:.3g}\n  PSNR          {:.2f} dB\n  FLIP          {:.4f}\n"
+        "{}\n  RMSE          {:.5f}\n  relative MSE  {:.3g}\n  PSNR          {:.2f} dB\n  FLIP          {:.4f}\n"
         "  mean          {:.5f} against {:.5f}\n",
-        human_count(d->pixels), d->rmse, d->relative_mse, d->psnr, d->flip, d->mean_a, d->mean_b);
+        d->pixels == size ? human_count(size) + " pixels"
+                          : fmt::format("{} covered pixels of {} (--all counts every one)", human_count(d->pixels),
+                                        human_count(size)),
+        d->rmse, d->relative_mse, d->psnr, d->flip, d->mean_a, d->mean_b);
     if (!o.output.empty()) fmt::print("{}\n", o.output);
   }
   return success;
@@ -58,6 +65,9 @@ void add_compare(CLI::App& app, Run& run) {
   c->add_option("a", o->a, "Picture")->required();
   c->add_option("b", o->b, "Reference picture")->required();
   c->add_option("-o,--output", o->output, "Picture to write: A, B and the false-colour difference");
+  c->add_flag("--all", o->all,
+              "Count every pixel; without it, where a picture has alpha, those that either covers, of which the other "
+              "may be empty");
   c->add_flag("--mean", o->mean,
               "Write the mean of A and B instead: two references with different seeds make one of twice the paths");
   c->add_option("--exposure", o->exposure, "Stops of exposure for PSNR, FLIP and the picture")

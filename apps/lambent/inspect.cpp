@@ -51,8 +51,10 @@ void print_scene(const nlohmann::json& d) {
 }
 
 int inspect_picture(Context& context, const std::string& path) {
-  auto image = load_image(path);
+  std::vector<std::string> warnings;
+  auto image = load_image(path, &warnings);
   if (!image) return fail(image.error());
+  warn(warnings);
   size_t negative = 0, broken = 0;
   double peak = 0, sum = 0;
   for (Vec3 p : image->rgb) {

@@ -113,8 +113,10 @@ Result<WebFiles> web_files(const WebOptions& options) {
   }
   if (auto ok = add_page(files); !ok) return ok.error();
   if (!options.reference.empty()) {
-    auto image = load_image(options.reference);
+    std::vector<std::string> warnings;
+    auto image = load_image(options.reference, &warnings);
     if (!image) return image.error();
+    warn(warnings);
     image->alpha.clear();
     if (auto ok = add_map(files, *image, options.reference, "data/reference.exr"); !ok) return ok.error();
     manifest["reference"] = "data/reference.exr";

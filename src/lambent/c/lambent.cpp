@@ -379,7 +379,9 @@ lambent_code lambent_set_environment(lambent_relighter* relighter, const float* 
           if (!is_finite(image.rgb[i]) || !all_at_most(Vec3(0), image.rgb[i]))
             return wrong("pixel " + std::to_string(i) + " is negative or not finite");
         }
-        return set_distant(*relighter, environment_from_image("picture", std::move(image)), rotation);
+        auto env = environment_from_image("picture", std::move(image));
+        if (!env) return wrong(env.error().message);
+        return set_distant(*relighter, *env, rotation);
       },
       relighter, rgb);
 }

@@ -25,12 +25,12 @@ void fill(Image& image, int x0, int y0, int width, int height, Vec3 color) {
 
 }  // namespace
 
-Result<ImageDifference> compare_images(const Image& a, const Image& b, float exposure) {
+Result<ImageDifference> compare_images(const Image& a, const Image& b, float exposure, bool all) {
   LAMBENT_CHECK(a.alpha.empty() || a.alpha.size() == a.rgb.size());
   LAMBENT_CHECK(b.alpha.empty() || b.alpha.size() == b.rgb.size());
   if (a.width != b.width || a.height != b.height)
     return Error{"", "pictures differ in size: " + size_text(a) + " and " + size_text(b)};
-  bool everywhere = a.alpha.empty() && b.alpha.empty();
+  const bool everywhere = all || (a.alpha.empty() && b.alpha.empty());
   std::vector<size_t> compared;
   for (size_t i = 0; i < a.rgb.size(); ++i) {
     if (!everywhere && !covered(a, i) && !covered(b, i)) continue;

@@ -5,7 +5,7 @@
 namespace lambent {
 
 struct ImageDifference {
-  size_t pixels = 0;        // compared: covered (alpha > 0) in either picture; all where neither has alpha
+  size_t pixels = 0;        // counted: covered (alpha > 0) in either picture; all where neither has alpha
   double rmse = 0;          // root mean square error of linear RGB
   double relative_mse = 0;  // mean of (a - b)^2 / (b^2 + 0.01), linear RGB: b is the reference
   double psnr =
@@ -14,9 +14,11 @@ struct ImageDifference {
   double mean_a = 0, mean_b = 0;  // mean luminance, linear: a ratio away from 1 is a factor, not noise
 };
 
-// Where only one picture has alpha, it decides what is compared.
-// Errors: sizes differ, or no pixel is covered, or a covered pixel is not finite.
-Result<ImageDifference> compare_images(const Image& a, const Image& b, float exposure = 0.0f);
+// Every number counts the pixels that either picture covers, or `all`: an object in the one picture alone is a
+// difference, the empty surroundings of both are not. Where only one picture has alpha, it decides. Pixels are compared
+// in front of black; FLIP sees the whole picture, and its map is averaged over what is counted.
+// Errors: sizes differ, or no pixel is covered, or a counted pixel is not finite.
+Result<ImageDifference> compare_images(const Image& a, const Image& b, float exposure = 0.0f, bool all = false);
 
 // FLIP error of every pixel, [0, 1], of two displayed pictures of one size (sRGB-encoded values in [0, 1]) at the
 // viewing resolution `pixels_per_degree`. Source: Andersson et al. 2020, "FLIP: a difference evaluator for alternating

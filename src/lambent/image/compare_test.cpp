@@ -270,6 +270,24 @@ TEST(Compare, OnlyCoveredPixelsCount) {
   EXPECT_EQ(d->pixels, 1u);
 }
 
+TEST(Compare, AllCountsTheSurroundingsToo) {
+  // An object of one pixel, half off, in four: 1/16 over it alone, 1/64 over all.
+  Image a = constant(2, 2, Vec3(0)), b = a;
+  a.at(0, 0) = Vec3(0.5f), b.at(0, 0) = Vec3(0.25f);
+  a.alpha = b.alpha = {1, 0, 0, 0};
+  auto covered = compare_images(a, b), all = compare_images(a, b, 0, true);
+  ASSERT_TRUE(covered && all);
+  EXPECT_EQ(covered->pixels, 1u);
+  EXPECT_EQ(all->pixels, 4u);
+  EXPECT_DOUBLE_EQ(covered->rmse * covered->rmse, 1 / 16.0);
+  EXPECT_DOUBLE_EQ(all->rmse * all->rmse, 1 / 64.0);
+  EXPECT_NEAR(all->psnr - covered->psnr, 10 * std::log10(4), 1e-9);
+  EXPECT_DOUBLE_EQ(covered->mean_a, 4 * all->mean_a);
+  EXPECT_GT(covered->flip, all->flip);
+  b.alpha = {0, 1, 0, 0};  // what either covers
+  EXPECT_EQ(compare_images(a, b)->pixels, 2u);
+}
+
 TEST(Compare, Errors) {
   Image a = constant(3, 2, Vec3(0.5f));
   EXPECT_EQ(compare_images(a, constant(2, 3, Vec3(0))).error().text(), "pictures differ in size: 3 x 2 and 2 x 3");

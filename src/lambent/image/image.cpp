@@ -1,4 +1,3 @@
-// Radiance .hdr: Ward 1991, "Real pixels" (Graphics Gems II), with the run-length codes of the Radiance distribution.
 // sRGB: IEC 61966-2-1. CIELAB: CIE 15.
 #include <lambent/core/check.h>
 #include <lambent/core/file.h>
@@ -7,8 +6,6 @@
 #include <stb_image.h>
 #include <stb_image_write.h>
 
-#include <array>
-#include <charconv>
 #include <climits>
 #include <cstring>
 #include <memory>
@@ -16,142 +13,6 @@
 
 namespace lambent {
 namespace {
-
-// --- Radiance .hdr
-
-struct HdrReader {
-  std::span<const uint8_t> bytes;
-  size_t at = 0;
-  bool truncated = false;  // set where bytes were missing
-
-  size_t left() const { return bytes.size() - at; }
-  bool has(size_t count) {
-    truncated |= left() < count;
-    return !truncated;
-  }
-
-  // The next line without its end; false at the end of the file.
-  bool line(std::string_view& text) {
-    const char* begin = reinterpret_cast<const char*>(bytes.data()) + at;
-    const void* end = left() ? std::memchr(begin, '\n', left()) : nullptr;
-    if (!end) return false;
-    text = {begin, size_t(static_cast<const char*>(end) - begin)};
-    at += text.size() + 1;
-    if (!text.empty() && text.back() == '\r') text.remove_suffix(1);
-    return true;
-  }
-};
-
-// m 2^(e - 136); mantissas are not rounded up by half a step, as in most readers.
-Vec3 decode_rgbe(const uint8_t* p) {
-  if (p[3] == 0) return Vec3(0);
-  float scale = std::ldexp(1.0f, int(p[3]) - 136);
-  return Vec3(p[0], p[1], p[2]) * scale;
-}
-
-// "-Y height +X width"
-Result<void> parse_resolution(std::string_view text, uint64_t& width, uint64_t& height, const std::string& path) {
-  std::array<std::string_view, 4> words;
-  size_t count = 0;
-  for (size_t i = 0; i < text.size();) {
-    size_t end = std::min(text.find(' ', i), text.size());
-    if (end > i) {
-      if (count == 4) return Error{path, "bad resolution line"};
-      words[count++] = text.substr(i, end - i);
-    }
-    i = end + 1;
-  }
-  auto number = [](std::string_view word, uint64_t& value) {
-    auto [end, code] = std::from_chars(word.data(), word.data() + word.size(), value);
-    return code == std::errc() && end == word.data() + word.size();
-  };
-  auto is_axis = [](std::string_view word) {
-    return word.size() == 2 && (word[0] == '+' || word[0] == '-') && (word[1] == 'X' || word[1] == 'Y');
-  };
-  if (count != 4 || !is_axis(words[0]) || !is_axis(words[2]) || words[0][1] == words[2][1] ||
-      !number(words[1], height) || !number(words[3], width))
-    return Error{path, "bad resolution line"};
-  if (words[0] != "-Y" || words[2] != "+X")
-    return Error{path, "rows run " + std::string(words[0]) + " " + std::string(words[2]) + ": only -Y +X is read"};
-  return {};
-}
-
-// One row of the newer code: four planes of runs. False when the bytes end or a run leaves the row.
-bool read_planes(HdrReader& in, size_t width, std::vector<uint8_t>& row) {
-  for (size_t channel = 0; channel < 4; ++channel) {
-    for (size_t x = 0; x < width;) {
-      if (!in.has(2)) return false;
-      size_t count = in.bytes[in.at++];
-      bool run = count > 128;
-      if (run) count -= 128;
-      if (count == 0 || count > width - x || !in.has(run ? 1 : count)) return false;
-      for (size_t i = 0; i < count; ++i) row[(x + i) * 4 + channel] = in.bytes[in.at + (run ? 0 : i)];
-      in.at += run ? 1 : count;
-      x += count;
-    }
-  }
-  return true;
-}
-
-// One row flat or of the older code, where (1, 1, 1, n) repeats the pixel before it and successive ones shift n by 8
-// bits.
-bool read_pixels(HdrReader& in, size_t width, std::vector<Vec3>& pixels) {
-  int shift = 0;
-  for (size_t x = 0; x < width;) {
-    if (!in.has(4)) return false;
-    const uint8_t* p = in.bytes.data() + in.at;
-    in.at += 4;
-    if (p[0] == 1 && p[1] == 1 && p[2] == 1) {
-      if (x == 0 || shift > 24) return false;
-      uint64_t count = uint64_t(p[3]) << shift;
-      if (count > width - x) return false;
-      pixels.insert(pixels.end(), size_t(count), Vec3(pixels.back()));
-      x += size_t(count), shift += 8;
-    } else {
-      pixels.push_back(decode_rgbe(p));
-      ++x, shift = 0;
-    }
-  }
-  return true;
-}
-
-Result<Image> load_hdr(std::span<const uint8_t> bytes, const std::string& path) {
-  HdrReader in{bytes};
-  std::string_view text;
-  if (!in.line(text)) return Error{path, "truncated header"};
-  for (;;) {
-    if (!in.line(text)) return Error{path, "truncated header"};
-    if (text.empty()) break;
-    if (text.starts_with("FORMAT=") && text != "FORMAT=32-bit_rle_rgbe")
-      return Error{path,
-                   text == "FORMAT=32-bit_rle_xyze" ? "XYZE pixels are not read, only RGBE" : "unknown pixel format"};
-  }
-  if (!in.line(text)) return Error{path, "truncated header"};
-  uint64_t width = 0, height = 0;
-  if (auto ok = parse_resolution(text, width, height, path); !ok) return ok.error();
-  if (auto ok = check_image_size(width, height, bytes.size(), path); !ok) return ok.error();
-  if (height > in.left() / 4) return Error{path, "truncated: fewer bytes than rows need"};
-
-  Image image;
-  image.width = int(width), image.height = int(height);
-  image.rgb.reserve(size_t(width * height));
-  bool planes_possible = width >= 8 && width < 32768;
-  std::vector<uint8_t> row(planes_possible ? size_t(width) * 4 : 0);
-  for (size_t y = 0; y < height; ++y) {
-    const uint8_t* p = bytes.data() + in.at;
-    bool ok;
-    if (planes_possible && in.left() >= 4 && p[0] == 2 && p[1] == 2 && (size_t(p[2]) << 8 | p[3]) == width) {
-      in.at += 4;
-      ok = read_planes(in, size_t(width), row);
-      if (ok)
-        for (size_t x = 0; x < width; ++x) image.rgb.push_back(decode_rgbe(&row[x * 4]));
-    } else {
-      ok = read_pixels(in, size_t(width), image.rgb);
-    }
-    if (!ok) return Error{path, (in.truncated ? "truncated in row " : "bad run in row ") + std::to_string(y)};
-  }
-  return image;
-}
 
 // --- PNG and JPEG
 
@@ -206,7 +67,8 @@ Result<Image> load_stb(std::span<const uint8_t> bytes, ImageFormat format, const
                  std::string(format == ImageFormat::png ? "bad PNG: " : "bad JPEG: ") + (why ? why : "unreadable")};
   };
   if (!stbi_info_from_memory(bytes.data(), size, &width, &height, &channels)) return failure();
-  if (auto ok = check_image_size(uint64_t(width), uint64_t(height), bytes.size(), path); !ok) return ok.error();
+  if (auto ok = check_image_size(uint64_t(width), uint64_t(height), bytes.size(), path, other_pixels_a_byte); !ok)
+    return ok.error();
   if (format == ImageFormat::jpeg && !jpeg_is_whole(bytes)) return Error{path, "truncated"};
   if (stbi_is_16_bit_from_memory(bytes.data(), size)) {
     std::unique_ptr<stbi_us, FreeStb> p(stbi_load_16_from_memory(bytes.data(), size, &width, &height, &channels, 0));
@@ -240,50 +102,93 @@ Result<std::vector<uint8_t>> encode_png(const Image& image, float exposure, cons
   return encoded;
 }
 
-Result<void> check_image_size(uint64_t width, uint64_t height, size_t bytes, const std::string& path) {
-  constexpr uint64_t free_pixels = uint64_t{1} << 22, pixels_a_byte = 8192;
+Result<void> check_image_size(uint64_t width, uint64_t height, size_t bytes, const std::string& path,
+                              uint64_t pixels_a_byte) {
+  constexpr uint64_t free_pixels = uint64_t{1} << 22;
   if (width == 0 || height == 0) return Error{path, "image has no pixels"};
+  const std::string image = "image of " + std::to_string(width) + " x " + std::to_string(height);
   if (width > max_image_pixels || height > max_image_pixels / width)
-    return Error{path,
-                 "image of " + std::to_string(width) + " x " + std::to_string(height) + " is larger than 2^28 pixels"};
+    return Error{path, image + " is larger than 2^28 pixels"};
   uint64_t beyond = width * height > free_pixels ? width * height - free_pixels : 0;
   if (beyond / pixels_a_byte > bytes)
-    return Error{path,
-                 "image of " + std::to_string(width) + " x " + std::to_string(height) + " does not fit its few bytes"};
+    return Error{path, image + " does not fit its few bytes: at most " + std::to_string(pixels_a_byte) +
+                           " pixels a byte beyond 2^22"};
   return {};
 }
 
+namespace {
+
+bool starts(std::span<const uint8_t> bytes, std::string_view magic) {
+  return bytes.size() >= magic.size() && std::memcmp(bytes.data(), magic.data(), magic.size()) == 0;
+}
+
+// What Debian has no small reader of, by its first bytes.
+constexpr std::pair<std::string_view, std::string_view> other_formats[] = {
+    {"\xabKTX 20\xbb", "KTX2"}, {"\xabKTX 11\xbb", "KTX"}, {"DDS ", "DDS"},
+    {{"II*\0", 4}, "TIFF"},     {{"MM\0*", 4}, "TIFF"},    {"PF\n", "PFM"}};
+
+}  // namespace
+
 ImageFormat image_format(std::span<const uint8_t> bytes) {
-  auto starts = [&](std::string_view magic) {
-    return bytes.size() >= magic.size() && std::memcmp(bytes.data(), magic.data(), magic.size()) == 0;
-  };
-  if (starts("\x76\x2f\x31\x01")) return ImageFormat::exr;
-  if (starts("#?")) return ImageFormat::hdr;
-  if (starts("\x89PNG\r\n\x1a\n")) return ImageFormat::png;
-  if (starts("\xff\xd8\xff")) return ImageFormat::jpeg;
+  if (starts(bytes, "\x76\x2f\x31\x01")) return ImageFormat::exr;
+  if (starts(bytes, "#?")) return ImageFormat::hdr;
+  if (starts(bytes, "\x89PNG\r\n\x1a\n")) return ImageFormat::png;
+  if (starts(bytes, "\xff\xd8\xff")) return ImageFormat::jpeg;
   return ImageFormat::unknown;
 }
 
-Result<Image> load_image(std::span<const uint8_t> bytes, const std::string& path) {
+Result<ImageFile> load_image_file(std::span<const uint8_t> bytes, const std::string& path) {
   if (bytes.empty()) return Error{path, "empty file"};
   ImageFormat format = image_format(bytes);
   switch (format) {
     case ImageFormat::exr: return load_exr(bytes, path);
     case ImageFormat::hdr: return load_hdr(bytes, path);
     case ImageFormat::png:
-    case ImageFormat::jpeg: return load_stb(bytes, format, path);
+    case ImageFormat::jpeg: {
+      auto image = load_stb(bytes, format, path);
+      if (!image) return image.error();
+      ImageFile file{.image = std::move(*image), .format = format};
+      file.width = file.image.width, file.height = file.image.height;
+      return file;
+    }
     case ImageFormat::unknown: break;
   }
+  for (const auto& [magic, name] : other_formats)
+    if (starts(bytes, magic)) return Error{path, std::string(name) + " is not read: convert it to .exr, .hdr or .png"};
   std::string extension = file_extension(path);
   for (const char* known : {"exr", "hdr", "png", "jpg", "jpeg"})
     if (extension == known) return Error{path, "does not begin as an ." + extension + " file does"};
   return Error{path, "not an image that can be read (.exr, .hdr, .png, .jpg)"};
 }
 
-Result<Image> load_image(const std::string& path) {
+Result<Image> in_display_window(ImageFile file, const std::string& path) {
+  Image& image = file.image;
+  if (file.left == 0 && file.top == 0 && file.width == image.width && file.height == image.height)
+    return std::move(image);
+  const int x0 = std::max(0, file.left), x1 = std::min(file.width, file.left + image.width);
+  const int y0 = std::max(0, file.top), y1 = std::min(file.height, file.top + image.height);
+  if (x0 >= x1 || y0 >= y1) return Error{path, "its pixels lie outside its display window"};
+  Image out(file.width, file.height);
+  if (!image.alpha.empty()) out.alpha.resize(out.rgb.size());
+  for (int y = y0; y < y1; ++y) {
+    const auto from = ptrdiff_t(y - file.top) * image.width + (x0 - file.left), to = ptrdiff_t(y) * out.width + x0;
+    std::copy_n(image.rgb.begin() + from, x1 - x0, out.rgb.begin() + to);
+    if (!image.alpha.empty()) std::copy_n(image.alpha.begin() + from, x1 - x0, out.alpha.begin() + to);
+  }
+  return out;
+}
+
+Result<Image> load_image(std::span<const uint8_t> bytes, const std::string& path, std::vector<std::string>* warnings) {
+  auto file = load_image_file(bytes, path);
+  if (!file) return file.error();
+  if (warnings) warnings->insert(warnings->end(), file->warnings.begin(), file->warnings.end());
+  return in_display_window(std::move(*file), path);
+}
+
+Result<Image> load_image(const std::string& path, std::vector<std::string>* warnings) {
   auto file = MappedFile::open(path);
   if (!file) return file.error();
-  return load_image(file->bytes(), path);
+  return load_image(file->bytes(), path, warnings);
 }
 
 Result<void> save_image(const std::string& path, const Image& image, float exposure) {

@@ -2,96 +2,22 @@
 #include <lambent/core/random.h>
 #include <lambent/image/image.h>
 
-#include <ImfArray.h>
-#include <ImfChannelList.h>
-#include <ImfChromaticitiesAttribute.h>
-#include <ImfFrameBuffer.h>
-#include <ImfHeader.h>
-#include <ImfIO.h>
-#include <ImfOutputFile.h>
+#include <ImfMultiPartOutputFile.h>
+#include <ImfOutputPart.h>
 #include <ImfPartType.h>
-#include <ImfStandardAttributes.h>
-#include <ImfTiledOutputFile.h>
+#include <ImfRgbaFile.h>
+#include <exr_maker.h>
 #include <gtest/gtest.h>
 #include <unistd.h>
 
+#include <array>
 #include <cstring>
 #include <filesystem>
-#include <functional>
 
 namespace lambent {
 namespace {
 
-using Bytes = std::vector<uint8_t>;
-
-struct Output : Imf::OStream {
-  Bytes bytes;
-  size_t at = 0;
-  Output() : OStream("test") {}
-  void write(const char data[], int count) override {
-    bytes.resize(std::max(bytes.size(), at + size_t(count)));
-    std::memcpy(bytes.data() + at, data, size_t(count));
-    at += size_t(count);
-  }
-  uint64_t tellp() override { return at; }
-  void seekp(uint64_t position) override { at = position; }
-};
-
-// An OpenEXR file with any header and channels; value(channel, x, y) counts from the data window's corner.
-struct Maker {
-  Imf::Header header;
-  std::vector<std::pair<std::string, Imf::Channel>> channels;
-  std::function<float(size_t channel, int x, int y)> value;
-  bool tiled = false;
-
-  Maker(int width, int height, std::initializer_list<const char*> names, Imf::PixelType type = Imf::FLOAT)
-      : header(width, height) {
-    for (const char* name : names) channels.emplace_back(name, Imf::Channel(type));
-    value = [](size_t c, int x, int y) { return 0.25f * float(c) + float(x) + 16 * float(y); };
-  }
-  Bytes bytes() {
-    Imath::Box2i window = header.dataWindow();
-    int width = window.max.x - window.min.x + 1, height = window.max.y - window.min.y + 1;
-    std::vector<std::vector<char>> planes;
-    Imf::FrameBuffer slices;
-    for (size_t c = 0; c < channels.size(); ++c) {
-      auto& [name, channel] = channels[c];
-      header.channels().insert(name, channel);
-      size_t size = channel.type == Imf::HALF ? 2 : 4, columns = size_t(width / channel.xSampling);
-      std::vector<char>& plane = planes.emplace_back(size * size_t(width) * size_t(height));
-      for (int y = 0; y < height / channel.ySampling; ++y)
-        for (int x = 0; x < width / channel.xSampling; ++x) {
-          char* p = plane.data() + (size_t(y) * columns + size_t(x)) * size;
-          float v = value(c, x, y);
-          half h(v);
-          uint32_t u = uint32_t(v);
-          std::memcpy(p,
-                      channel.type == Imf::HALF   ? static_cast<void*>(&h)
-                      : channel.type == Imf::UINT ? static_cast<void*>(&u)
-                                                  : &v,
-                      size);
-        }
-    }
-    for (size_t c = 0; c < channels.size(); ++c) {
-      const Imf::Channel& channel = channels[c].second;
-      size_t size = channel.type == Imf::HALF ? 2 : 4, columns = size_t(width / channel.xSampling);
-      slices.insert(channels[c].first, Imf::Slice::Make(channel.type, planes[c].data(), window, size, size * columns,
-                                                        channel.xSampling, channel.ySampling));
-    }
-    Output out;
-    if (tiled) {
-      header.setTileDescription(Imf::TileDescription(4, 3, Imf::ONE_LEVEL));
-      Imf::TiledOutputFile file(out, header, 0);
-      file.setFrameBuffer(slices);
-      file.writeTiles(0, file.numXTiles() - 1, 0, file.numYTiles() - 1);
-    } else {
-      Imf::OutputFile file(out, header, 0);
-      file.setFrameBuffer(slices);
-      file.writePixels(height);
-    }
-    return std::move(out.bytes);
-  }
-};
+using test::Bytes, test::Maker, test::Output;
 
 Bytes encoded(const Image& image) {
   auto bytes = encode_exr(image, "a.exr");
@@ -197,14 +123,34 @@ TEST(Exr, LossyCompressionsRead) {
   }
 }
 
-TEST(Exr, DataWindowIsThePicture) {
-  Maker maker(100, 100, {"R", "G", "B"});
-  maker.header.dataWindow() = Imath::Box2i({-7, 20}, {-2, 24});
+TEST(Exr, DisplayWindowIsThePicture) {
+  // 6 x 5 pixels at (2, 1) of a picture whose corner is (-3, 7).
+  Maker maker(6, 5, {"R", "G", "B", "A"});
+  maker.header.displayWindow() = Imath::Box2i({-3, 7}, {6, 15});
+  maker.header.dataWindow() = Imath::Box2i({-1, 8}, {4, 12});
+  maker.value = [](size_t c, int x, int y) { return c == 3 ? 1 : 1 + float(c) + float(x) + 16 * float(y); };
   auto image = load_image(maker.bytes(), "a.exr");
   ASSERT_TRUE(image) << image.error().text();
-  EXPECT_EQ(image->width, 6);
-  EXPECT_EQ(image->height, 5);
-  expect_window(*image, 3);
+  ASSERT_EQ(image->width, 10);
+  ASSERT_EQ(image->height, 9);
+  for (int y = 0; y < 9; ++y)
+    for (int x = 0; x < 10; ++x) {
+      const bool stored = x >= 2 && x < 8 && y >= 1 && y < 6;
+      const float v = stored ? 1 + float(x - 2) + 16 * float(y - 1) : 0;
+      EXPECT_EQ(image->at(x, y), stored ? Vec3(v, v + 1, v + 2) : Vec3(0)) << x << " " << y;
+      EXPECT_EQ(image->alpha[size_t(y * 10 + x)], stored ? 1 : 0);
+    }
+  // More is stored than shown: what lies outside is left aside.
+  maker.header.displayWindow() = Imath::Box2i({0, 9}, {1, 10});
+  image = load_image(maker.bytes(), "a.exr");
+  ASSERT_TRUE(image) << image.error().text();
+  ASSERT_EQ(image->rgb.size(), 4u);
+  EXPECT_EQ(image->at(1, 1).x, 1 + 2 + 16 * 2);
+  maker.header.displayWindow() = Imath::Box2i({5, 8}, {9, 12});
+  EXPECT_EQ(load_image(maker.bytes(), "a.exr").error().text(), "a.exr: its pixels lie outside its display window");
+  maker.header.displayWindow() = Imath::Box2i({0, 0}, {32767, 32767});
+  EXPECT_EQ(load_image(maker.bytes(), "a.exr").error().text(),
+            "a.exr: image of 32768 x 32768 is larger than 2^28 pixels");
 }
 
 TEST(Exr, SubsetsOfChannels) {
@@ -227,19 +173,22 @@ TEST(Exr, WhatIsNotReadIsNamed) {
     auto image = load_image(bytes, "a.exr");
     return image ? std::string("read") : image.error().text();
   };
-  EXPECT_EQ(message(Maker(2, 2, {"Z"}).bytes()), "a.exr: no channel named R, G, B or Y");
-  EXPECT_EQ(message(Maker(2, 2, {"layer.R", "layer.G"}).bytes()), "a.exr: no channel named R, G, B or Y");
-  Maker chroma(2, 2, {"Y", "RY", "BY"});
-  for (size_t c : {1, 2}) chroma.channels[c].second.xSampling = chroma.channels[c].second.ySampling = 2;
-  EXPECT_EQ(message(chroma.bytes()), "a.exr: luminance/chroma pixels are not read, only R, G, B or Y alone");
+  EXPECT_EQ(message(Maker(2, 2, {"Z", "depth.V"}).bytes()), "a.exr: no channel named R, G, B or Y; it has Z, depth.V");
+  EXPECT_EQ(message(Maker(2, 2, {"normal.X", "normal.Y", "normal.Z"}).bytes()),
+            "a.exr: no channel named R, G, B or Y; it has normal.X, normal.Y, normal.Z");
+  EXPECT_EQ(message(Maker(2, 2, {"Y", "RY"}).bytes()), "a.exr: has one channel of chroma, RY or BY, and not the other");
+  Maker chroma(4, 4, {"Y", "RY", "BY"});
+  for (size_t c : {1, 2}) chroma.channels[c].second.xSampling = chroma.channels[c].second.ySampling = 4;
+  EXPECT_EQ(message(chroma.bytes()),
+            "a.exr: chroma is neither as fine as luminance nor, in the first part, half as fine");
   Maker coarse(2, 2, {"R", "G"});
   coarse.channels[1].second.xSampling = 2;
   EXPECT_EQ(message(coarse.bytes()), "a.exr: channel G is subsampled");
   Bytes bytes = Maker(2, 2, {"R"}).bytes();
   bytes[5] |= 0x08;
   EXPECT_EQ(message(bytes), "a.exr: deep pixels are not read");
-  bytes[5] = 0x10;
-  EXPECT_EQ(message(bytes), "a.exr: files of several parts are not read");
+  bytes[5] = 0x10;  // says several parts, and has the header of one
+  EXPECT_EQ(message(bytes), "read");
   bytes[5] = 0, bytes[4] = 1;
   EXPECT_EQ(message(bytes), "a.exr: OpenEXR version is not 2");
   Maker deep(2, 2, {"R"});
@@ -266,7 +215,8 @@ std::string message_for_window(int x0, int y0, int x1, int y1) {
 TEST(Exr, SizesThatCannotBeAreRefusedBeforeAllocating) {
   EXPECT_EQ(message_for_window(0, 0, 1, 1), "read");
   EXPECT_EQ(message_for_window(0, 0, 65535, 65535), "a.exr: image of 65536 x 65536 is larger than 2^28 pixels");
-  EXPECT_EQ(message_for_window(0, 0, 16383, 16383), "a.exr: image of 16384 x 16384 does not fit its few bytes");
+  EXPECT_EQ(message_for_window(0, 0, 16383, 16383),
+            "a.exr: image of 16384 x 16384 does not fit its few bytes: at most 8192 pixels a byte beyond 2^22");
   EXPECT_EQ(message_for_window(0, 0, 0, (1 << 21) - 1), "a.exr: truncated: fewer bytes than the table of rows needs");
   const std::string bad = "a.exr: bad attribute \"dataWindow\" in the header";
   EXPECT_EQ(message_for_window(0, 0, -1, 5), bad);
@@ -304,6 +254,152 @@ TEST(Exr, EveryFlippedByteIsSafe) {
       }
     }
   }
+}
+
+// --- Layers, parts, chroma
+
+std::string taken(const Bytes& bytes, float* red = nullptr) {
+  auto file = load_image_file(bytes, "a.exr");
+  if (!file) return file.error().text();
+  if (red) *red = file->image.rgb[0].x;
+  return file->warnings.empty() ? "" : file->warnings[0];
+}
+
+// Channel c is c + 1 everywhere.
+Bytes layers(std::initializer_list<const char*> names) {
+  Maker maker(2, 2, names);
+  maker.value = [](size_t c, int, int) { return float(c) + 1; };
+  return maker.bytes();
+}
+
+TEST(ExrLayers, TheOneThatCanBeMeantIsTaken) {
+  float red = 0;
+  EXPECT_EQ(taken(layers({"depth.Z", "ViewLayer.Combined.R", "ViewLayer.Combined.G", "ViewLayer.Combined.B"}), &red),
+            "");
+  EXPECT_EQ(red, 2);
+  EXPECT_EQ(taken(layers({"left.R", "left.G", "left.B", "R", "G", "B"}), &red), "");  // the one without a name
+  EXPECT_EQ(red, 4);
+  EXPECT_EQ(taken(layers({"sky.red", "sky.green", "sky.blue", "sky.alpha"}), &red), "");
+  EXPECT_EQ(red, 1);
+  EXPECT_EQ(taken(layers({"light.Y", "normal.X", "normal.Y", "normal.Z"}), &red), "");
+  EXPECT_EQ(red, 1);
+  EXPECT_EQ(taken(layers({"Crypto00.r", "Crypto00.g", "Crypto00.b", "V.Beauty.R", "V.Beauty.G"}), &red), "");
+  EXPECT_EQ(red, 4);
+  EXPECT_EQ(taken(layers({"V.DiffCol.R", "V.Emit.R", "V.Combined.R"}), &red),
+            "a.exr: of its pictures V.Combined is taken, and left aside V.DiffCol, V.Emit");
+  EXPECT_EQ(red, 3);
+  EXPECT_EQ(taken(layers({"V.Combined.R", "Composite.Combined.R"}), &red),
+            "a.exr: of its pictures Composite.Combined is taken, and left aside V.Combined");
+  EXPECT_EQ(red, 2);
+  EXPECT_EQ(taken(layers({"V.DiffCol.R", "V.Emit.R"})),
+            "a.exr: has several pictures, and none that alone can be meant: V.DiffCol, V.Emit");
+}
+
+// Parts of one channel each, named by the part, of which every pixel is 1 for the first, 2 for the second.
+Bytes parts(const std::vector<std::pair<std::string, std::string>>& named,
+            const std::vector<Imath::Box2i>& windows = {}) {
+  std::vector<Imf::Header> headers;
+  for (size_t i = 0; i < named.size(); ++i) {
+    Imf::Header header(4, 3);
+    if (i < windows.size()) header.dataWindow() = windows[i];
+    header.setName(named[i].first), header.setType(Imf::SCANLINEIMAGE);
+    header.channels().insert(named[i].second, Imf::Channel(Imf::FLOAT));
+    headers.push_back(header);
+  }
+  Output out;
+  {
+    Imf::MultiPartOutputFile file(out, headers.data(), int(headers.size()), false, 0);
+    for (size_t i = 0; i < named.size(); ++i) {
+      const Imath::Box2i window = headers[i].dataWindow();
+      const size_t width = size_t(window.max.x - window.min.x + 1), height = size_t(window.max.y - window.min.y + 1);
+      std::vector<float> plane(width * height, float(i) + 1);
+      Imf::FrameBuffer slices;
+      slices.insert(named[i].second,
+                    Imf::Slice::Make(Imf::FLOAT, plane.data(), window, sizeof(float), sizeof(float) * width));
+      Imf::OutputPart part(file, int(i));
+      part.setFrameBuffer(slices);
+      part.writePixels(int(height));
+    }
+  }
+  return std::move(out.bytes);
+}
+
+TEST(ExrParts, TheOneThatCanBeMeantIsTaken) {
+  float red = 0;
+  EXPECT_EQ(taken(parts({{"depth", "Z"}, {"light", "R"}}), &red), "");
+  EXPECT_EQ(red, 2);
+  EXPECT_EQ(taken(parts({{"diffuse", "R"}, {"rgba", "R"}}), &red),
+            "a.exr: of its pictures rgba is taken, and left aside diffuse");
+  EXPECT_EQ(red, 2);
+  EXPECT_EQ(taken(parts({{"main", "R"}, {"diffuse", "diffuse.R"}}), &red), "");  // the one without a layer
+  EXPECT_EQ(red, 1);
+  EXPECT_EQ(taken(parts({{"left", "R"}, {"right", "R"}, {"depth", "Z"}})),
+            "a.exr: has several pictures, and none that alone can be meant: left, right");
+  EXPECT_EQ(taken(parts({{"a", "Z"}, {"b", "V"}})), "a.exr: no channel named R, G, B or Y; it has a/Z, b/V");
+  // Its own data window in the display window of all.
+  auto image = load_image(parts({{"depth", "Z"}, {"light", "R"}}, {{{0, 0}, {3, 2}}, {{1, 1}, {2, 1}}}), "a.exr");
+  ASSERT_TRUE(image) << image.error().text();
+  for (int y = 0; y < 3; ++y)
+    for (int x = 0; x < 4; ++x) EXPECT_EQ(image->at(x, y).x, y == 1 && (x == 1 || x == 2) ? 2 : 0) << x << " " << y;
+}
+
+TEST(ExrParts, EveryTruncationAndFlippedByteIsSafe) {
+  const Bytes bytes = parts({{"depth", "Z"}, {"light", "R"}});
+  for (size_t size = 0; size < bytes.size(); ++size)
+    ASSERT_FALSE(load_image(std::span(bytes).first(size), "a.exr")) << size << " of " << bytes.size();
+  for (size_t i = 0; i < bytes.size(); ++i) {
+    Bytes broken = bytes;
+    broken[i] ^= 0xff;
+    auto image = load_image(broken, "a.exr");
+    if (!image) {
+      EXPECT_EQ(image.error().text().find('\n'), std::string::npos);
+    }
+  }
+}
+
+TEST(ExrChroma, AsFineAsLuminanceByItsDefinition) {
+  // RGB (0.8, 0.4, 0.1): Y = 0.2126 R + 0.7152 G + 0.0722 B, RY = (R - Y) / Y, BY = (B - Y) / Y.
+  const float y = 0.2126f * 0.8f + 0.7152f * 0.4f + 0.0722f * 0.1f;
+  Maker maker(3, 2, {"Y", "RY", "BY", "A"});
+  maker.value = [&](size_t c, int, int) { return std::array{y, (0.8f - y) / y, (0.1f - y) / y, 0.5f}[c]; };
+  auto image = load_image(maker.bytes(), "a.exr");
+  ASSERT_TRUE(image) << image.error().text();
+  constexpr float four_digits = 1e-4f;
+  EXPECT_NEAR(image->at(2, 1).x, 0.8f, four_digits);
+  EXPECT_NEAR(image->at(2, 1).y, 0.4f, four_digits);
+  EXPECT_NEAR(image->at(2, 1).z, 0.1f, four_digits);
+  EXPECT_EQ(image->alpha[5], 0.5f);
+}
+
+TEST(ExrChroma, HalfAsFineIsWhatWasWritten) {
+  // By OpenEXR's own writer, from colours that its filters keep: smooth ones.
+  constexpr int width = 64, height = 32;
+  const auto color = [](int x, int y) {
+    const float s = 0.5f + 0.3f * std::sin(float(x) / 12), t = 0.5f + 0.3f * std::cos(float(y) / 9);
+    return Vec3(1 + s, 1 + t, 2 - s * t);
+  };
+  std::vector<Imf::Rgba> pixels(width * height);
+  for (int y = 0; y < height; ++y)
+    for (int x = 0; x < width; ++x) {
+      const Vec3 c = color(x, y);
+      pixels[size_t(y * width + x)] = Imf::Rgba(c.x, c.y, c.z, 0.25f);
+    }
+  Output out;
+  {
+    Imf::Header header(width, height);
+    header.dataWindow() = header.displayWindow() = Imath::Box2i({4, -6}, {4 + width - 1, -6 + height - 1});
+    Imf::RgbaOutputFile file(out, header, Imf::WRITE_YCA, 0);
+    file.setFrameBuffer(pixels.data() - 4 + 6 * width, 1, width);
+    file.writePixels(height);
+  }
+  auto image = load_image(out.bytes, "a.exr");
+  ASSERT_TRUE(image) << image.error().text();
+  ASSERT_EQ(image->width, width);
+  constexpr float loss = 0.02f;  // seven bits of luminance and five of chroma are kept
+  for (int y = 0; y < height; ++y)
+    for (int x = 0; x < width; ++x)
+      for (int k = 0; k < 3; ++k) EXPECT_NEAR(image->at(x, y)[k] / color(x, y)[k], 1, loss) << x << " " << y;
+  EXPECT_EQ(image->alpha[7], 0.25f);
 }
 
 // --- Chromaticities

@@ -2,6 +2,8 @@
 #include <lambent/core/parallel.h>
 #include <lambent/light/environment.h>
 
+#include <charconv>
+
 namespace lambent {
 namespace {
 
@@ -23,30 +25,106 @@ Vec2d row_moments(int y, int height) {
 
 }  // namespace
 
-Environment environment_from_image(std::string name, Image image) {
-  LAMBENT_CHECK(image.width > 0 && image.height > 0);
-  Environment env;
-  env.name = std::move(name), env.image = std::move(image), env.image.alpha.clear();
-  size_t negative = 0, infinite = 0;
-  for (Vec3& c : env.image.rgb) {
+namespace {
+
+std::string pixels_with(size_t count, const char* what) {
+  return std::to_string(count) + (count == 1 ? " pixel" : " pixels") + " with a channel that is " + what;
+}
+
+std::string number_text(float value) {
+  char text[32];
+  return {text, std::to_chars(text, text + sizeof text, value, std::chars_format::general, 6).ptr};
+}
+
+bool has_nan(const Vec3& c) { return std::isnan(c.x) || std::isnan(c.y) || std::isnan(c.z); }
+
+// Calls f(index) for the up to eight texels around texel i of a map that closes around.
+template <class F>
+void around(const Image& image, size_t i, F&& f) {
+  const int w = image.width, x = int(i % size_t(w)), y = int(i / size_t(w));
+  for (int v = std::max(0, y - 1); v <= std::min(image.height - 1, y + 1); ++v)
+    for (int u : {x == 0 ? w - 1 : x - 1, x, x + 1 == w ? 0 : x + 1}) {
+      const size_t j = size_t(v) * size_t(w) + size_t(u);
+      if (j != i) f(j);
+    }
+}
+
+}  // namespace
+
+void clamp_radiance(Image& image, float largest, std::vector<std::string>& warnings) {
+  size_t negative = 0, infinite = 0, missing = 0;
+  float most = 0;
+  for (const Vec3& c : image.rgb) {
     bool below = false, beyond = false;
     for (int k = 0; k < 3; ++k) {
-      beyond |= !std::isfinite(c[k]), below |= c[k] < 0 && std::isfinite(c[k]);
-      if (!std::isfinite(c[k]) || c[k] < 0) c[k] = 0;
+      below |= c[k] < 0, beyond |= std::isinf(c[k]) && c[k] > 0;
+      if (std::isfinite(c[k])) most = std::max(most, c[k]);
     }
-    infinite += beyond, negative += below && !beyond;
+    negative += below, infinite += beyond, missing += has_nan(c);
   }
-  if (negative + infinite > 0) {
-    size_t total = negative + infinite;
-    std::string text = std::to_string(total) + (total == 1 ? " pixel" : " pixels") + " clamped to 0: ";
-    if (negative > 0) text += std::to_string(negative) + " with a negative channel";
-    if (negative > 0 && infinite > 0) text += ", ";
-    if (infinite > 0) text += std::to_string(infinite) + " with a channel that is not finite";
-    env.warnings.push_back(std::move(text));
+  if (negative + infinite + missing == 0) return;
+  constexpr float half_max = 65504;
+  const float stand_in = largest > 0 ? largest : most > 0 ? most : half_max;
+  for (Vec3& c : image.rgb)
+    for (int k = 0; k < 3; ++k)
+      if (c[k] < 0) c[k] = 0;
+      else if (std::isinf(c[k])) c[k] = stand_in;
+  if (negative > 0) warnings.push_back(pixels_with(negative, "negative: taken as 0"));
+  if (infinite > 0)
+    warnings.push_back(pixels_with(infinite, "infinite: taken as ") + number_text(stand_in) +
+                       (largest > 0 ? ", the largest that its half floats hold" : ", the largest of the others"));
+  if (missing > 0) warnings.push_back(pixels_with(missing, "not a number: taken as the mean of their neighbours"));
+}
+
+void fill_missing(Image& image) {
+  // Layer by layer from what is known: a texel takes the mean of its neighbours of earlier layers.
+  enum State : uint8_t { known, missing, queued };
+  std::vector<uint8_t> state;
+  std::vector<size_t> layer, next;
+  for (size_t i = 0; i < image.rgb.size(); ++i)
+    if (has_nan(image.rgb[i])) {
+      if (state.empty()) state.resize(image.rgb.size(), known);
+      state[i] = missing;
+    }
+  if (state.empty()) return;
+  for (size_t i = 0; i < state.size(); ++i)
+    if (state[i] == missing) {
+      bool edge = false;
+      around(image, i, [&](size_t j) { edge |= state[j] == known; });
+      if (edge) layer.push_back(i);
+    }
+  for (size_t i : layer) state[i] = queued;
+  while (!layer.empty()) {
+    for (size_t i : layer) {
+      Vec3d sum(0);
+      int count = 0;
+      around(image, i, [&](size_t j) {
+        if (state[j] == known) sum += Vec3d(image.rgb[j]), ++count;
+      });
+      for (int k = 0; k < 3; ++k)
+        if (std::isnan(image.rgb[i][k])) image.rgb[i][k] = float(sum[k] / count);
+    }
+    for (size_t i : layer) state[i] = known;
+    next.clear();
+    for (size_t i : layer)
+      around(image, i, [&](size_t j) {
+        if (state[j] == missing) state[j] = queued, next.push_back(j);
+      });
+    std::swap(layer, next);
   }
-  if (env.image.width != 2 * int64_t(env.image.height))
-    env.warnings.push_back("map of " + std::to_string(env.image.width) + " x " + std::to_string(env.image.height) +
-                           " is not twice as wide as high: stretched over the whole sphere");
+  for (Vec3& c : image.rgb)
+    if (has_nan(c)) c = Vec3(0);  // all of it
+}
+
+Result<Environment> environment_from_image(std::string name, Image image) {
+  LAMBENT_CHECK(image.width > 0 && image.height > 0);
+  if (std::abs(image.width - 2 * int64_t(image.height)) > 1)
+    return Error{name, "a lat-long map is twice as wide as high, not " + std::to_string(image.width) + " x " +
+                           std::to_string(image.height)};
+  Environment env;
+  env.name = std::move(name), env.image = std::move(image), env.image.alpha.clear();
+  clamp_radiance(env.image, 0, env.warnings);
+  fill_missing(env.image);
   return env;
 }
 

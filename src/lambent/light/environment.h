@@ -7,6 +7,7 @@
 #include <lambent/image/image.h>
 
 #include <functional>
+#include <span>
 #include <string>
 #include <vector>
 
@@ -19,16 +20,25 @@ struct Environment {
   std::vector<std::string> warnings;  // e.g. how many pixels had to be clamped
 };
 
-// `spec` is a .hdr or .exr file, or
+// `spec` is a picture of the whole sphere (.exr, .hdr; .png and .jpg with a warning; lat-long or cube map, see
+// sphere_map.h), or
 //   uniform:R,G,B                                          the same radiance everywhere (one number: grey)
 //   sky:elevation=E,azimuth=A,turbidity=T,ground=G,sun=on  an analytic sky (sky.h), any subset of the keys
-// Negative and non-finite values are clamped to 0 with one warning that counts the pixels they are in. A map that is
-// not twice as wide as high is used, with a warning. Errors: bad spec or file, zero size, a picture format without high
-// dynamic range.
+// Of an EXR the display window is the sphere, black where nothing is stored; with the envmap attribute the data window,
+// where it has the attribute's shape. Values that are no radiance are mended, see clamp_radiance. Errors: bad spec or
+// file, zero size, a shape that no map of the sphere has.
 Result<Environment> load_environment(const std::string& spec);
+// A file's bytes, as load_environment reads them; `path` names it.
+Result<Environment> environment_from_file(std::span<const uint8_t> bytes, const std::string& path);
 
-// What load_environment does with a loaded file's picture.
-Environment environment_from_image(std::string name, Image image);
+// Of a lat-long map, up to a pixel twice as wide as high; mended likewise. Errors: another shape.
+Result<Environment> environment_from_image(std::string name, Image image);
+
+// Negative channels become 0, infinite ones `largest`, or where that is 0 the largest finite value of the picture; each
+// kind is counted in a warning, and so is what is not a number, which fill_missing replaces: by the mean of the up to
+// eight finite neighbours, of a map that closes around; where there are none, once those have theirs.
+void clamp_radiance(Image& image, float largest, std::vector<std::string>& warnings);
+void fill_missing(Image& image);
 
 // Direction of the centre of texel (x, y) of a width x height map, unit; and of any (u, v) in [0, 1]^2.
 Vec3 texel_direction(int x, int y, int width, int height);

@@ -140,22 +140,57 @@ TEST(LoadEnvironment, Uniform) {
     EXPECT_FALSE(load_environment(bad)) << bad;
 }
 
-TEST(LoadEnvironment, CountsWhatItClamps) {
+TEST(LoadEnvironment, MendsAndCountsWhatIsNoRadiance) {
   Image image(4, 2);
   for (Vec3& c : image.rgb) c = Vec3(1);
-  image.rgb[0] = {-1, 2, -3}, image.rgb[3] = {NAN, 5, -1}, image.rgb[5].z = INFINITY, image.rgb[6].y = -1e-8f;
+  image.rgb[0] = {-1, 2, -3}, image.rgb[3] = {-INFINITY, 5, -1}, image.rgb[5].z = INFINITY, image.rgb[6].y = -1e-8f;
   image.alpha.assign(8, 0.5f);
-  Environment env = environment_from_image("a", image);
-  ASSERT_EQ(env.warnings.size(), 1u);
-  EXPECT_EQ(env.warnings[0], "4 pixels clamped to 0: 2 with a negative channel, 2 with a channel that is not finite");
-  EXPECT_EQ(env.image.rgb[0], Vec3(0, 2, 0));
-  EXPECT_EQ(env.image.rgb[3], Vec3(0, 5, 0));
-  EXPECT_EQ(env.image.rgb[5], Vec3(1, 1, 0));
-  EXPECT_TRUE(env.image.alpha.empty());
-  Environment square = environment_from_image("b", Image(3, 3));
-  ASSERT_EQ(square.warnings.size(), 1u);
-  EXPECT_EQ(square.warnings[0], "map of 3 x 3 is not twice as wide as high: stretched over the whole sphere");
-  EXPECT_TRUE(environment_from_image("c", Image(4, 2)).warnings.empty());
+  auto env = environment_from_image("a", image);
+  ASSERT_TRUE(env);
+  EXPECT_EQ(env->warnings, (std::vector<std::string>{
+                               "3 pixels with a channel that is negative: taken as 0",
+                               "1 pixel with a channel that is infinite: taken as 5, the largest of the others"}));
+  EXPECT_EQ(env->image.rgb[0], Vec3(0, 2, 0));
+  EXPECT_EQ(env->image.rgb[3], Vec3(0, 5, 0));
+  EXPECT_EQ(env->image.rgb[5], Vec3(1, 1, 5));
+  EXPECT_TRUE(env->image.alpha.empty());
+  std::vector<std::string> warnings;
+  clamp_radiance(image, 65504, warnings);
+  EXPECT_EQ(image.rgb[5], Vec3(1, 1, 65504));
+  EXPECT_EQ(warnings[1],
+            "1 pixel with a channel that is infinite: taken as 65504, the largest that its half floats hold");
+  EXPECT_EQ(environment_from_image("b", Image(3, 3)).error().text(),
+            "b: a lat-long map is twice as wide as high, not 3 x 3");
+  EXPECT_TRUE(environment_from_image("c", Image(4, 2))->warnings.empty());
+  EXPECT_TRUE(environment_from_image("d", Image(5, 2)));
+}
+
+TEST(LoadEnvironment, WhatIsNotANumberIsTheMeanOfItsNeighbours) {
+  Environment env = skewed(8, 4);
+  const Image& given = env.image;
+  Image image = given;
+  image.at(0, 2) = Vec3(NAN);  // its neighbours are beyond the seam, too
+  image.at(4, 0).y = NAN;      // a pole: five neighbours
+  auto mended = environment_from_image("a", image);
+  ASSERT_TRUE(mended);
+  EXPECT_EQ(
+      mended->warnings,
+      std::vector<std::string>{"2 pixels with a channel that is not a number: taken as the mean of their neighbours"});
+  Vec3 seam(0), pole(0);
+  for (auto [x, y] : {std::pair{7, 1}, {0, 1}, {1, 1}, {7, 2}, {1, 2}, {7, 3}, {0, 3}, {1, 3}})
+    seam += given.at(x, y) / 8.0f;
+  for (auto [x, y] : {std::pair{3, 0}, {5, 0}, {3, 1}, {4, 1}, {5, 1}}) pole += given.at(x, y) / 5.0f;
+  constexpr float rounding = 1e-6f;
+  expect_near(mended->image.at(0, 2), seam, rounding * 4);
+  EXPECT_NEAR(mended->image.at(4, 0).y, pole.y, rounding * 4);
+  EXPECT_EQ(mended->image.at(4, 0).x, given.at(4, 0).x);  // the others stay
+  // A whole region of a constant map takes its constant, from the rim inwards; a map of nothing is black.
+  Image even(64, 32);
+  for (int y = 0; y < 32; ++y)
+    for (int x = 0; x < 64; ++x) even.at(x, y) = y < 20 ? Vec3(NAN) : Vec3(0.5f, 1, 2);
+  for (const Vec3& c : environment_from_image("b", even)->image.rgb) EXPECT_EQ(c, Vec3(0.5f, 1, 2));
+  std::fill(even.rgb.begin(), even.rgb.end(), Vec3(NAN));
+  for (const Vec3& c : environment_from_image("c", even)->image.rgb) EXPECT_EQ(c, Vec3(0));
 }
 
 TEST(LoadEnvironment, FilesAndErrors) {
@@ -168,7 +203,13 @@ TEST(LoadEnvironment, FilesAndErrors) {
   ASSERT_TRUE(env) << env.error().text();
   EXPECT_EQ(env->name, std::filesystem::path(base).filename().string());
   EXPECT_EQ(env->image.at(2, 0), Vec3(1, 2, 3));
-  EXPECT_EQ(load_environment(base + ".png").error().message, "an environment needs high dynamic range: .hdr or .exr");
+  auto low = load_environment(base + ".png");  // clamped to 1, and said
+  ASSERT_TRUE(low) << low.error().text();
+  EXPECT_EQ(low->image.at(2, 0), Vec3(1));
+  ASSERT_EQ(low->warnings.size(), 1u);
+  EXPECT_TRUE(
+      low->warnings[0].ends_with(".png: decoded from sRGB, where radiance ends at 1: lamps and the sun are cut off"))
+      << low->warnings[0];
   EXPECT_EQ(load_environment(base + ".hdr").error().message, "no such file");
   std::filesystem::remove(base + ".exr");
   std::filesystem::remove(base + ".png");
@@ -193,7 +234,8 @@ TEST(LoadEnvironment, RealFiles) {
     if (env->name == "city" || env->name == "courtyard_dwab") {
       ASSERT_EQ(env->warnings.size(), 1u) << env->name;
       std::string expected = env->name == "city" ? "299" : "1188";
-      EXPECT_EQ(env->warnings[0], expected + " pixels clamped to 0: " + expected + " with a negative channel");
+      EXPECT_EQ(env->warnings[0],
+                entry.path().string() + ": " + expected + " pixels with a channel that is negative: taken as 0");
     } else {
       EXPECT_TRUE(env->warnings.empty()) << env->name << ": " << env->warnings[0];
     }

@@ -1,6 +1,7 @@
 #include <lambent/core/file.h>
 #include <lambent/light/environment.h>
 #include <lambent/light/sky.h>
+#include <lambent/light/sphere_map.h>
 
 #include <charconv>
 #include <filesystem>
@@ -37,12 +38,39 @@ Result<Environment> load_environment(const std::string& spec) {
   }
   auto file = MappedFile::open(spec);
   if (!file) return file.error();
-  ImageFormat format = image_format(file->bytes());
-  if (format == ImageFormat::png || format == ImageFormat::jpeg)
-    return Error{spec, "an environment needs high dynamic range: .hdr or .exr"};
-  auto image = load_image(file->bytes(), spec);
-  if (!image) return image.error();
-  return environment_from_image(std::filesystem::path(spec).stem().string(), std::move(*image));
+  return environment_from_file(file->bytes(), spec);
+}
+
+Result<Environment> environment_from_file(std::span<const uint8_t> bytes, const std::string& path) {
+  auto file = load_image_file(bytes, path);
+  if (!file) return file.error();
+  std::vector<std::string> warnings = std::move(file->warnings);
+  if (file->format == ImageFormat::png || file->format == ImageFormat::jpeg)
+    warnings.push_back(path + ": decoded from sRGB, where radiance ends at 1: lamps and the sun are cut off");
+  const Envmap envmap = file->envmap;
+  const float largest = file->largest;
+  const int width = file->image.width, height = file->image.height;
+  Image image;
+  if (envmap != Envmap::unsaid && sphere_map_of(width, height, envmap, path)) {
+    if (width != file->width || height != file->height)
+      warnings.push_back(path + ": its envmap attribute lays its data window over the sphere, not its display window");
+    image = std::move(file->image);
+  } else {
+    auto shown = in_display_window(std::move(*file), path);
+    if (!shown) return shown.error();
+    image = std::move(*shown);
+  }
+  auto map = sphere_map_of(image.width, image.height, envmap, path);
+  if (!map) return map.error();
+  image.alpha.clear();
+  std::vector<std::string> mended;
+  clamp_radiance(image, largest, mended);
+  for (const std::string& text : mended) warnings.push_back(path + ": " + text);
+  image = latlong_of(std::move(image), *map);
+  fill_missing(image);
+  auto env = environment_from_image(std::filesystem::path(path).stem().string(), std::move(image));
+  if (env) env->warnings = std::move(warnings);
+  return env;
 }
 
 }  // namespace lambent
