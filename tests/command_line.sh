@@ -60,6 +60,10 @@ expect 0 'relit' render corner.glb --env uniform:1,0.5,0.25 --camera 3,2,4,1,0.5
 expect 0 'paths' reference corner.obj --max-edge 0.2 --env uniform:1,0.5,0.25 --light-order 6 \
   --camera 3,2,4,1,0.5,1,40 --size 48x32 --spp 64 -o b.exr --background none
 expect 0 'PSNR' compare a.exr b.exr -o difference.png
+# Nothing lies behind the scene: what is covered counts, unless all shall.
+expect 0 'covered pixels of .* \(--all counts every one\)' compare a.exr b.exr
+expect 0 '"pixels": ?1536[,}]?$' compare a.exr b.exr --all --json
+expect 1 'no map of the whole sphere: 2:1 is a lat-long map' env difference.png
 alike 35 "baked and path-traced corners" a.exr b.exr
 expect 0 'relit' render corner.glb --env sky:elevation=40,azimuth=20 --env-rotate 30,10,5 --window auto --size 40x40 \
   -o sky.png

@@ -275,8 +275,6 @@ std::string listed(const Range& range, Name name) {
   size_t count = 0;
   for (const auto& item : range)
     if (count++ < most) out += (out.empty() ? "" : ", ") + name(item);
-  for (char& c : out)
-    if (static_cast<unsigned char>(c) < ' ') c = '?';  // one line, whatever the file says
   return count > most ? out + " and " + std::to_string(count - most) + " more" : out;
 }
 

@@ -64,11 +64,16 @@ class MemoryOutput : public Imf::OStream {
   uint64_t at_ = 0;
 };
 
-// One line: the library's messages hold the file's name and may hold line ends.
-std::string one_line(std::string text, const std::string& path) {
-  if (size_t at = text.find("\"" + path + "\". "); at != std::string::npos) text.erase(0, at + path.size() + 4);
+// One line, whatever names the file has.
+void make_one_line(std::string& text) {
   for (char& c : text)
     if (static_cast<unsigned char>(c) < ' ') c = ' ';
+}
+
+// The library's messages hold the file's name and may hold line ends.
+std::string one_line(std::string text, const std::string& path) {
+  if (size_t at = text.find("\"" + path + "\". "); at != std::string::npos) text.erase(0, at + path.size() + 4);
+  make_one_line(text);
   while (!text.empty() && (text.back() == '.' || text.back() == ' ')) text.pop_back();
   return text.empty() ? "unreadable" : text;
 }
@@ -170,9 +175,7 @@ Result<bool> sampling_of(const ExrHeader& header, const ExrLayer& layer, const s
   return true;
 }
 
-}  // namespace
-
-Result<ImageFile> load_exr(std::span<const uint8_t> bytes, const std::string& path) {
+Result<ImageFile> load_any(std::span<const uint8_t> bytes, const std::string& path) {
   if (image_format(bytes) != ImageFormat::exr) return Error{path, "not an OpenEXR file"};
   auto header = read_exr_header(bytes, path);
   if (!header) return header.error();
@@ -187,6 +190,11 @@ Result<ImageFile> load_exr(std::span<const uint8_t> bytes, const std::string& pa
   if (header->flagged) file.warnings.push_back(path + ": says that it has several parts, and has one");
   file.left = int(part.x0 - part.shown_x0), file.top = int(part.y0 - part.shown_y0);
   file.width = int(part.shown_width), file.height = int(part.shown_height), file.envmap = part.envmap;
+  // Of a map by its envmap attribute the data window may be what counts.
+  const bool beyond = file.left < 0 || file.top < 0 || part.x0 + part.width > part.shown_x0 + part.shown_width ||
+                      part.y0 + part.height > part.shown_y0 + part.shown_height;
+  if (beyond && part.envmap == Envmap::unsaid)
+    file.warnings.push_back(path + ": pixels outside its display window are left aside");
   bool halves = true;
   for (const std::string& name : {layer->red, layer->green, layer->blue, layer->y})
     if (const ExrChannel* c = name.empty() ? nullptr : part.find(name)) halves &= c->type == Imf::HALF;
@@ -201,6 +209,19 @@ Result<ImageFile> load_exr(std::span<const uint8_t> bytes, const std::string& pa
   } catch (const std::exception& e) {
     return Error{path, "bad OpenEXR file: " + one_line(e.what(), path)};
   }
+}
+
+}  // namespace
+
+Result<ImageFile> load_exr(std::span<const uint8_t> bytes, const std::string& path) {
+  auto file = load_any(bytes, path);
+  if (!file) {
+    Error error = file.error();
+    make_one_line(error.message);
+    return error;
+  }
+  for (std::string& warning : file->warnings) make_one_line(warning);
+  return file;
 }
 
 namespace {

@@ -142,7 +142,9 @@ TEST(Exr, DisplayWindowIsThePicture) {
     }
   // More is stored than shown: what lies outside is left aside.
   maker.header.displayWindow() = Imath::Box2i({0, 9}, {1, 10});
-  image = load_image(maker.bytes(), "a.exr");
+  std::vector<std::string> warnings;
+  image = load_image(maker.bytes(), "a.exr", &warnings);
+  EXPECT_EQ(warnings, std::vector<std::string>{"a.exr: pixels outside its display window are left aside"});
   ASSERT_TRUE(image) << image.error().text();
   ASSERT_EQ(image->rgb.size(), 4u);
   EXPECT_EQ(image->at(1, 1).x, 1 + 2 + 16 * 2);

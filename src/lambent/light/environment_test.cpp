@@ -188,9 +188,11 @@ TEST(LoadEnvironment, WhatIsNotANumberIsTheMeanOfItsNeighbours) {
   Image even(64, 32);
   for (int y = 0; y < 32; ++y)
     for (int x = 0; x < 64; ++x) even.at(x, y) = y < 20 ? Vec3(NAN) : Vec3(0.5f, 1, 2);
-  for (const Vec3& c : environment_from_image("b", even)->image.rgb) EXPECT_EQ(c, Vec3(0.5f, 1, 2));
+  mended = environment_from_image("b", even);
+  for (const Vec3& c : mended->image.rgb) EXPECT_EQ(c, Vec3(0.5f, 1, 2));
   std::fill(even.rgb.begin(), even.rgb.end(), Vec3(NAN));
-  for (const Vec3& c : environment_from_image("c", even)->image.rgb) EXPECT_EQ(c, Vec3(0));
+  mended = environment_from_image("c", even);
+  for (const Vec3& c : mended->image.rgb) EXPECT_EQ(c, Vec3(0));
 }
 
 TEST(LoadEnvironment, FilesAndErrors) {
