@@ -144,8 +144,9 @@ lambent_code lambent_set_sh(lambent_relighter* relighter, const float* rgb, int 
 
 /** Distant light as a lat-long picture of radiance, height x width x (r, g, b) from the top: the top row is +Y, the
  * centre +X, three quarters to the right +Z. Projected onto the file's columns; `rotation` (3 x 3, null: none) turns
- * the light. Errors: LAMBENT_ARGUMENT: a size, whose width is twice its height but for a pixel, values that are negative
- * or not finite, a matrix that is no rotation; LAMBENT_UNSUPPORTED: the file has no columns for distant light. */
+ * the light. Errors: LAMBENT_ARGUMENT: a size, whose width is twice its height but for a pixel, values that are
+ * negative or not finite, a matrix that is no rotation; LAMBENT_UNSUPPORTED: the file has no columns for distant light.
+ */
 lambent_code lambent_set_environment(lambent_relighter* relighter, const float* rgb, int width, int height,
                                      const float* rotation);
 /** Distant light as a clear sky (light/sky.h): elevation [-2, 90] and azimuth (from +X towards +Z) of the sun in

@@ -2,7 +2,6 @@
 #include <lambent/light/environment.h>
 #include <lambent/light/project.h>
 
-#include <ImfEnvmapAttribute.h>
 #include <exr_maker.h>
 #include <gtest/gtest.h>
 

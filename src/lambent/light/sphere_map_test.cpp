@@ -7,7 +7,7 @@
 #include <lambent/light/project.h>
 #include <lambent/light/sphere_map.h>
 
-#include <ImfEnvmap.h>
+#include <exr_maker.h>
 #include <gtest/gtest.h>
 
 #include <numbers>
