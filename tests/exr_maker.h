@@ -14,6 +14,8 @@
 
 #include <cstring>
 #include <functional>
+#include <string>
+#include <vector>
 
 namespace lambent::test {
 
