@@ -94,6 +94,11 @@ struct Scene {
   std::string path;  // for messages and provenance; may be empty
   std::string hash;  // content_hash of the input file's bytes; may be empty
 
+  // Where positions count from in the file's space: 0 but for coordinates far from it (surveyed ones), of which floats
+  // would keep too little. All else in the scene's space counts from there too; files written hold it as their nodes'
+  // translation, and what users type is in the file's space.
+  Vec3d origin{0.0};
+
   std::vector<Vec3> positions;                 // world space, metres
   std::vector<Vec3> normals;                   // unit, as many as positions
   std::array<std::vector<Vec2>, 2> texcoords;  // each empty, or as many as positions

@@ -1,7 +1,8 @@
-// Formats: PNG (ISO/IEC 15948), JPEG (ITU-T T.81), by way of stb_image.
+// Formats: PNG (ISO/IEC 15948), JPEG (ITU-T T.81), and TGA, BMP, PSD and PNM as PNG, by way of stb_image.
 #include <lambent/scene/textures.h>
 
 #include <stb_image.h>
+#include <stb_image_write.h>
 
 #include <algorithm>
 #include <climits>
@@ -9,6 +10,12 @@
 
 namespace lambent {
 namespace {
+
+Error too_large(const std::string& where, int width, int height) {
+  return {where, "measures " + std::to_string(width) + " x " + std::to_string(height) + " pixels; the limit is " +
+                     std::to_string(max_texture_side) + " a side"};
+}
+Error too_short(const std::string& where) { return {where, "is broken: too few bytes for its size"}; }
 
 // The most pixels that this many encoded bytes can hold, so that a few bytes cannot ask for gigabytes. Deflate expands
 // at most 1032 times; a PNG pixel has at least `bits` bits. A JPEG block of 64 pixels takes at least one bit.
@@ -20,6 +27,51 @@ uint64_t most_pixels(std::span<const uint8_t> encoded, bool png) {
   int type = encoded[colour_type_at], channels = type == 2 ? 3 : type == 4 ? 2 : type == 6 ? 4 : 1;
   uint64_t bits = uint64_t(channels) * std::max<uint64_t>(encoded[depth_at], 1);
   return size * 1032 * 8 / bits;
+}
+
+bool begins(std::span<const uint8_t> bytes, std::string_view magic) {
+  return bytes.size() >= magic.size() && std::memcmp(bytes.data(), magic.data(), magic.size()) == 0;
+}
+
+// The same for the formats that are decoded to become PNG. Bytes that are missing would be read as noise, so whole
+// rows must be there: a TGA without runs has its pixels after 18 bytes of header, all others of the kind at least a
+// byte a pixel, runs of up to 128 pixels, or, of a BMP, a bit.
+uint64_t most_plain_pixels(std::span<const uint8_t> encoded) {
+  uint64_t size = encoded.size();
+  if (begins(encoded, "BM")) return size * 8;
+  if (begins(encoded, "8BPS")) return size * 128;
+  if (begins(encoded, "P5")) return size;
+  if (begins(encoded, "P6")) return size / 3;
+  constexpr size_t header = 18, kind_at = 2, bits_at = 16;
+  if (size <= header) return 0;
+  bool runs = encoded[kind_at] >= 8;
+  return runs ? size * 128 : (size - header) / std::max(1, (encoded[bits_at] + 7) / 8);
+}
+
+// A TGA, BMP, PSD (flattened, 8 or 16 bits) or binary PNM as the PNG that glTF takes in its place.
+Result<std::vector<uint8_t>> png_from(std::span<const uint8_t> encoded, const std::string& where) {
+  for (std::string_view other : {"GIF8", "DDS ", "RIFF", "II*", "MM", "#?", "v/1\x01", "<svg", "\xabKTX"}) {
+    if (begins(encoded, other)) return Error{where, "is no PNG, JPEG, TGA, BMP, PSD or PNM"};
+  }
+  int width = 0, height = 0, channels = 0;
+  if (encoded.size() > INT_MAX) return Error{where, "is larger than 2 GiB"};
+  const int size = int(encoded.size());
+  if (!stbi_info_from_memory(encoded.data(), size, &width, &height, &channels) || width <= 0 || height <= 0)
+    return Error{where, "is no PNG, JPEG, TGA, BMP, PSD or PNM"};
+  if (width > max_texture_side || height > max_texture_side) return too_large(where, width, height);
+  if (uint64_t(width) * uint64_t(height) > most_plain_pixels(encoded)) return too_short(where);
+  const int wanted = channels == 2 || channels == 4 ? 4 : 3;
+  stbi_uc* pixels = stbi_load_from_memory(encoded.data(), size, &width, &height, &channels, wanted);
+  if (!pixels) return Error{where, std::string("cannot be decoded: ") + stbi_failure_reason()};
+  std::vector<uint8_t> result;
+  auto append = [](void* out, void* data, int count) {
+    const uint8_t* bytes = static_cast<const uint8_t*>(data);
+    static_cast<std::vector<uint8_t>*>(out)->insert(static_cast<std::vector<uint8_t>*>(out)->end(), bytes, bytes + count);
+  };
+  bool written = stbi_write_png_to_func(append, &result, width, height, wanted, pixels, width * wanted);
+  stbi_image_free(pixels);
+  if (!written) return Error{where, "is too large to be written as PNG"};
+  return result;
 }
 
 }  // namespace
@@ -39,13 +91,8 @@ Result<void> decode_texture(std::span<const uint8_t> encoded, const std::string&
   int width = 0, height = 0, channels = 0;
   if (!stbi_info_from_memory(encoded.data(), size, &width, &height, &channels)) return Error{where, "is broken"};
   if (width <= 0 || height <= 0) return Error{where, "is empty"};
-  if (width > max_texture_side || height > max_texture_side) {
-    return Error{where, "measures " + std::to_string(width) + " x " + std::to_string(height) +
-                            " pixels; the limit is " + std::to_string(max_texture_side) + " a side"};
-  }
-  if (uint64_t(width) * uint64_t(height) > most_pixels(encoded, type == "image/png")) {
-    return Error{where, "is broken: too few bytes for its size"};
-  }
+  if (width > max_texture_side || height > max_texture_side) return too_large(where, width, height);
+  if (uint64_t(width) * uint64_t(height) > most_pixels(encoded, type == "image/png")) return too_short(where);
   constexpr int rgb = 3;
   stbi_uc* pixels = stbi_load_from_memory(encoded.data(), size, &width, &height, &channels, rgb);
   if (!pixels) return Error{where, std::string("cannot be decoded: ") + stbi_failure_reason()};
@@ -57,6 +104,11 @@ Result<void> decode_texture(std::span<const uint8_t> encoded, const std::string&
 
 Result<Texture> decode_texture(std::vector<uint8_t> encoded, const std::string& name) {
   Texture texture;
+  if (image_mime_type(encoded).empty()) {
+    auto png = png_from(encoded, name);
+    if (!png) return png.error();
+    encoded = std::move(*png);
+  }
   if (auto decoded = decode_texture(encoded, name, texture); !decoded) return decoded.error();
   texture.name = name;
   texture.encoded = std::move(encoded);
