@@ -48,6 +48,7 @@ std::vector<uint8_t> closed_components(const CornerFans& fans, const Components&
   std::vector<uint8_t> closed(components.count, 1);
   std::vector<uint64_t> ends;  // of edges to higher positions: that position, and which way the face runs
   for (uint32_t p = 0; p + 1 < fans.first.size(); ++p) {
+    if (fans.is_ring[p]) continue;
     ends.clear();
     for (uint32_t i = fans.first[p]; i < fans.first[p + 1]; ++i) {
       uint32_t c = fans.corners[i], next = fans.ids[next_corner(c)], previous = fans.ids[previous_corner(c)];
@@ -62,6 +63,29 @@ std::vector<uint8_t> closed_components(const CornerFans& fans, const Components&
     if (!paired) closed[components.of_position[p]] = 0;
   }
   return closed;
+}
+
+// Puts the corners at one position in the order of their ring; false, and untouched, where they make none.
+bool order_ring(const CornerFans& fans, std::span<uint32_t> corners) {
+  constexpr size_t most = 32;
+  const size_t count = corners.size();
+  if (count < 3 || count > most) return false;
+  uint32_t next[most], previous[most], ring[most];
+  for (size_t i = 0; i < count; ++i)
+    next[i] = fans.ids[next_corner(corners[i])], previous[i] = fans.ids[previous_corner(corners[i])];
+  // Each face is followed by the first that begins where it ends. A walk that went round without the first corner would
+  // never come to it in the end, so that one which does has seen all.
+  size_t at = 0;
+  ring[0] = corners[0];
+  for (size_t i = 1; i < count; ++i) {
+    size_t j = 0;
+    while (j < count && previous[j] != next[at]) ++j;
+    if (j == count || j == 0) return false;
+    ring[i] = corners[j], at = j;
+  }
+  if (next[at] != previous[0]) return false;
+  std::copy(ring, ring + count, corners.begin());
+  return true;
 }
 
 }  // namespace
@@ -118,6 +142,9 @@ CornerFans corner_fans(const Scene& scene) {
   fans.corners.resize(fans.ids.size());
   std::vector<uint32_t> end(fans.first.begin(), fans.first.end() - 1);
   for (uint32_t c = 0; c < fans.ids.size(); ++c) fans.corners[end[fans.ids[c]]++] = c;
+  fans.is_ring.resize(positions.count);
+  for (size_t p = 0; p < positions.count; ++p)
+    fans.is_ring[p] = order_ring(fans, {fans.corners.data() + fans.first[p], fans.corners.data() + fans.first[p + 1]});
   return fans;
 }
 
@@ -128,6 +155,7 @@ bool merge_duplicate_triangles(Scene& scene, const CornerFans& fans) {
   bool any = false;
   std::vector<FanTriangle> fan;
   for (uint32_t p = 0; p + 1 < fans.first.size(); ++p) {
+    if (fans.is_ring[p]) continue;  // of three faces at least, of which no two share two edges
     fan.clear();
     for (uint32_t i = fans.first[p]; i < fans.first[p + 1]; ++i) {
       uint32_t c = fans.corners[i], next = fans.ids[next_corner(c)], previous = fans.ids[previous_corner(c)];

@@ -21,6 +21,9 @@ PositionIds number_positions(std::span<const Vec3> positions);
 struct CornerFans {
   std::vector<uint32_t> ids;             // the position of each corner
   std::vector<uint32_t> first, corners;  // those at position p: corners[first[p]] to before corners[first[p + 1]]
+  // By position: whether its corners make one closed ring, in which each edge lies between two faces that run along it
+  // in opposite directions. Corners of a ring are in its order, from the smallest on, others ascending.
+  std::vector<uint8_t> is_ring;
 };
 CornerFans corner_fans(const Scene& scene);
 

@@ -131,7 +131,9 @@ bool Triangulator::is_ear(uint32_t i) {
 
 Result<void> finish_mesh(Scene& scene) {
   bool usable = false;
+  const bool has_normals = std::any_of(scene.normals.begin(), scene.normals.end(), is_direction);
   for (Triangle& t : scene.triangles) {
+    if (usable && !has_normals) break;
     Vec3d a = scene.positions[t.v[0]], b = scene.positions[t.v[1]], c = scene.positions[t.v[2]];
     Vec3d winding = cross(b - a, c - a);
     usable = usable || winding != Vec3d(0);

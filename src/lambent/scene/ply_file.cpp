@@ -425,14 +425,19 @@ class PlyBody {
       }
       return {};
     }
-    const size_t size = type_size[size_t(list.type)];
-    const char* values = reader_.take(count * size);
-    for (uint64_t k = 0; k < count; ++k) {
-      double value = reader_.number_at(list.type, values + k * size);
-      if (!(value >= 0 && value < double(vertex_count_))) return wrong(value);
-      mesh_.corners.push_back(uint32_t(value));
-    }
-    return {};
+    const char* values = reader_.take(count * type_size[size_t(list.type)]);
+    const size_t first = mesh_.corners.size();
+    mesh_.corners.resize(first + count);
+    uint64_t bad = count;
+    with_type(list.type, [&]<class T>(T) {
+      for (uint64_t k = count; k-- > 0;) {
+        T value = reader_.typed_at<T>(values + k * sizeof(T));
+        bool fits = value >= 0 && uint64_t(value) < vertex_count_;
+        mesh_.corners[first + k] = fits ? uint32_t(value) : 0;
+        if (!fits) bad = k;
+      }
+    });
+    return bad == count ? Result<void>() : wrong(reader_.number_at(list.type, values + bad * type_size[size_t(list.type)]));
   }
 
   bool read_list(const Property& list, std::vector<double>& values) {
