@@ -22,23 +22,21 @@ bool has_repeated_corner(const CornerFans& fans, uint32_t t) {
   return id[0] == id[1] || id[1] == id[2] || id[2] == id[0];
 }
 
-// Components connected over shared positions, numbered from 0 in order of triangles.
+// Components connected over shared positions, in order of their first ones.
 struct Components {
-  std::vector<uint32_t> of_position;  // none where no triangle is
+  std::vector<uint32_t> of_position;
   uint32_t count = 0;
 };
 
 Components connect(const CornerFans& fans) {
-  const size_t positions = fans.first.size() - 1;
-  UnionFind connected(positions);
+  UnionFind connected(fans.first.size() - 1);
   for (size_t c = 0; c < fans.ids.size(); c += 3)
     connected.join(fans.ids[c], fans.ids[c + 1]), connected.join(fans.ids[c], fans.ids[c + 2]);
   Components out;
-  out.of_position.assign(positions, none);
-  for (uint32_t id : fans.ids) {
-    uint32_t& number = out.of_position[connected.find(id)];
-    if (number == none) number = out.count++;
-    out.of_position[id] = number;
+  out.of_position.resize(connected.parent.size());
+  for (uint32_t p = 0; p < out.of_position.size(); ++p) {
+    const uint32_t first = connected.find(p);  // the smallest
+    out.of_position[p] = first == p ? out.count++ : out.of_position[first];
   }
   return out;
 }
@@ -199,22 +197,22 @@ void infer_sidedness(Scene& scene, const CornerFans& fans) {
   const Components components = connect(fans);
   std::vector<uint8_t> one_sided = closed_components(fans, components);
   auto component_of = [&](size_t t) { return components.of_position[fans.ids[3 * t]]; };
+  // The volume of what is closed is the same about any apex: one of its own corners, so that little cancels.
   struct Sums {
-    Vec3d centroid{0.0};
-    double corners = 0, volume = 0, area = 0;
+    uint32_t apex = none;
+    double volume = 0, area = 0;
   };
   std::vector<Sums> sums(components.count);
-  for (size_t t = 0; t < scene.triangles.size(); ++t) {
-    Sums& s = sums[component_of(t)];
-    for (uint32_t v : scene.triangles[t].v) s.centroid += Vec3d(scene.positions[v]);
-    s.corners += 3;
-  }
-  for (size_t t = 0; t < scene.triangles.size(); ++t) {
-    Sums& s = sums[component_of(t)];
-    const Triangle& triangle = scene.triangles[t];
-    Vec3d normal = wide_area_normal(scene, triangle), apex = s.centroid / s.corners;
-    s.volume += dot(Vec3d(scene.positions[triangle.v[0]]) - apex, normal) / 6;
-    s.area += length(normal) / 2;
+  if (std::find(one_sided.begin(), one_sided.end(), 1) != one_sided.end()) {
+    for (size_t t = 0; t < scene.triangles.size(); ++t) {
+      if (!one_sided[component_of(t)]) continue;
+      Sums& s = sums[component_of(t)];
+      const Triangle& triangle = scene.triangles[t];
+      if (s.apex == none) s.apex = triangle.v[0];
+      const Vec3d normal = wide_area_normal(scene, triangle);
+      s.volume += dot(Vec3d(scene.positions[triangle.v[0]]) - Vec3d(scene.positions[s.apex]), normal) / 6;
+      s.area += length(normal) / 2;
+    }
   }
   for (uint32_t c = 0; c < components.count; ++c)
     one_sided[c] = one_sided[c] && sums[c].volume > smallest_volume * std::pow(sums[c].area, 1.5);

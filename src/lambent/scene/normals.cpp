@@ -12,17 +12,16 @@ namespace {
 
 using DVec3 = Vec3d;
 
-// Unit normal, or zero for a triangle without an area; `area`: twice that.
-DVec3 face_normal(const Scene& s, const Triangle& t, double* area = nullptr) {
+// Unit normal, or zero for a triangle without an area.
+DVec3 face_normal(const Scene& s, const Triangle& t) {
   DVec3 n = wide_area_normal(s, t);
   double length = lambent::length(n);
-  if (area) *area = length;
   return length > 0 ? n / length : DVec3(0);
 }
 
 // Angle of the direction (cosine, sine), not of unit length, whose sine is not negative; to a few units in the last
 // place, and in a third of the time of std::atan2: atan(x) = atan(k / 16) + atan of what that leaves, below 1 / 32.
-double angle_of(double sine, double cosine) {
+inline double angle_of(double sine, double cosine) {
   static const std::array<double, 17> table = [] {
     std::array<double, 17> atans{};
     for (size_t k = 0; k < atans.size(); ++k) atans[k] = std::atan(double(k) / 16);
@@ -37,11 +36,20 @@ double angle_of(double sine, double cosine) {
   return cosine < 0 ? std::numbers::pi - angle : angle;
 }
 
-// Angle of the triangle of twice this area at corner k, radians.
-double corner_angle(const Scene& s, const Triangle& t, int k, double area) {
-  DVec3 p = s.positions[t.v[k]];
-  return angle_of(area, dot(DVec3(s.positions[t.v[(k + 1) % 3]]) - p, DVec3(s.positions[t.v[(k + 2) % 3]]) - p));
-}
+// A triangle with an area: its unit normal and the angles of its corners, radians.
+struct Face {
+  DVec3 normal{0.0};  // zero without an area
+  double angles[3] = {0, 0, 0};
+  Face(const Scene& s, const Triangle& t) {
+    const DVec3 a(s.positions[t.v[0]]), ab = DVec3(s.positions[t.v[1]]) - a, ac = DVec3(s.positions[t.v[2]]) - a,
+                bc = DVec3(s.positions[t.v[2]]) - DVec3(s.positions[t.v[1]]), across = cross(ab, ac);
+    const double area = length(across);
+    if (!(area > 0)) return;
+    normal = across / area;
+    angles[0] = angle_of(area, dot(ab, ac)), angles[1] = angle_of(area, -dot(ab, bc));
+    angles[2] = std::max(0.0, std::numbers::pi - angles[0] - angles[1]);
+  }
+};
 
 // Below this a sum of unit normals, weighted by angles of order one, has cancelled out.
 constexpr double cancelled = 1e-9;
@@ -85,10 +93,8 @@ class CornerGroups {
     }
     sums_.assign(corners.size(), DVec3(0));
     for (uint32_t i = 0; i < corners.size(); ++i) {
-      const Triangle& t = scene_.triangles[corners[i] / 3];
-      double area;
-      const DVec3 face = face_normal(scene_, t, &area);
-      sums_[sets_.find(i)] += corner_angle(scene_, t, int(corners[i] % 3), area) * face;
+      const Face face(scene_, scene_.triangles[corners[i] / 3]);
+      sums_[sets_.find(i)] += face.angles[corners[i] % 3] * face.normal;
     }
   }
   uint32_t group_of(uint32_t member) { return sets_.find(member); }
@@ -173,11 +179,9 @@ class NormalMaker {
     for (size_t t = 0; t < faces_.size(); ++t) {
       const Triangle& triangle = scene_.triangles[t];
       if (!wanted_[triangle.part]) continue;
-      double area;
-      const DVec3 face = face_normal(scene_, triangle, &area);
-      faces_[t] = Vec3(face);
-      if (area > 0)
-        for (int k = 0; k < 3; ++k) sums_[triangle.v[k]] += corner_angle(scene_, triangle, k, area) * face;
+      const Face face(scene_, triangle);
+      faces_[t] = Vec3(face.normal);
+      for (int k = 0; k < 3; ++k) sums_[triangle.v[k]] += face.angles[k] * face.normal;
     }
   }
 
@@ -333,12 +337,11 @@ void repair_normals(Scene& scene) {
   std::vector<DVec3> sums(scene.normals.size(), DVec3(0)), fallbacks = sums;
   for (const Triangle& t : scene.triangles) {
     if (!broken[t.v[0]] && !broken[t.v[1]] && !broken[t.v[2]]) continue;
-    double area;
-    DVec3 face = face_normal(scene, t, &area);
-    if (face == DVec3(0)) continue;
+    const Face face(scene, t);
+    if (face.normal == DVec3(0)) continue;
     for (int k = 0; k < 3; ++k) {
-      sums[t.v[k]] += corner_angle(scene, t, k, area) * face;
-      if (fallbacks[t.v[k]] == DVec3(0)) fallbacks[t.v[k]] = face;
+      sums[t.v[k]] += face.angles[k] * face.normal;
+      if (fallbacks[t.v[k]] == DVec3(0)) fallbacks[t.v[k]] = face.normal;
     }
   }
   for (Part& part : scene.parts) {

@@ -383,6 +383,7 @@ class PlyBody {
     mesh_.has_faces = true;
     mesh_.corner_counts.reserve(e.count);
     mesh_.corners.reserve(std::min<uint64_t>(3 * e.count, max_corners));
+    if (!reader_.is_text() && e.properties.size() == 1) return read_plain_faces(e);
     auto has = [&](FaceRole role) { return std::find(roles->begin(), roles->end(), role) != roles->end(); };
     const bool has_texcoords = has(FaceRole::texcoords), has_texture = has(FaceRole::texture);
     std::vector<double> uv;
@@ -413,31 +414,60 @@ class PlyBody {
     if (!read_count(list, count)) return ended(e, face);
     if (count > max_corners - mesh_.corners.size()) return Error{reader_.where(path_), "too many face corners"};
     mesh_.corner_counts.push_back(uint32_t(count));
-    auto wrong = [&](double value) {
-      return Error{reader_.where(path_), fmt::format("face {} names vertex {} of {}", face, value, vertex_count_)};
-    };
     if (reader_.is_text()) {
       double value;
       while (count-- > 0) {
         if (!reader_.read(list.type, value)) return ended(e, face);
-        if (!(value >= 0 && value < double(vertex_count_)) || value != std::floor(value)) return wrong(value);
+        if (!(value >= 0 && value < double(vertex_count_)) || value != std::floor(value)) return wrong_corner(face, value);
         mesh_.corners.push_back(uint32_t(value));
       }
       return {};
     }
     const char* values = reader_.take(count * type_size[size_t(list.type)]);
-    const size_t first = mesh_.corners.size();
-    mesh_.corners.resize(first + count);
-    uint64_t bad = count;
+    double value = 0;
+    bool ok = true;
+    with_type(list.type, [&]<class T>(T) { ok = add_corners<T>(values, count, value); });
+    return ok ? Result<void>() : wrong_corner(face, value);
+  }
+
+  Error wrong_corner(uint64_t face, double value) const {
+    return {reader_.where(path_), fmt::format("face {} names vertex {} of {}", face, value, vertex_count_)};
+  }
+
+  // Appends binary corners; false, and the first number that is no vertex, where there is one.
+  template <class T>
+  bool add_corners(const char* values, uint64_t count, double& bad) {
+    for (uint64_t k = 0; k < count; ++k) {
+      const T value = reader_.template typed_at<T>(values + k * sizeof(T));
+      if (!(value >= 0 && uint64_t(value) < vertex_count_)) return bad = double(value), false;
+      mesh_.corners.push_back(uint32_t(value));
+    }
+    return true;
+  }
+
+  // Binary faces that are lists of corners and nothing else, which most are.
+  Result<void> read_plain_faces(const Element& e) {
+    const Property& list = e.properties[0];
+    Result<void> done;
     with_type(list.type, [&]<class T>(T) {
-      for (uint64_t k = count; k-- > 0;) {
-        T value = reader_.typed_at<T>(values + k * sizeof(T));
-        bool fits = value >= 0 && uint64_t(value) < vertex_count_;
-        mesh_.corners[first + k] = fits ? uint32_t(value) : 0;
-        if (!fits) bad = k;
+      for (uint64_t face = 0; face < e.count; ++face) {
+        uint64_t count;
+        if (!read_count(list, count)) {
+          done = ended(e, face);
+          return;
+        }
+        if (count > max_corners - mesh_.corners.size()) {
+          done = Error{path_, "too many face corners"};
+          return;
+        }
+        mesh_.corner_counts.push_back(uint32_t(count));
+        double bad;
+        if (add_corners<T>(reader_.take(count * sizeof(T)), count, bad)) continue;
+        done = wrong_corner(face, bad);
+        return;
       }
     });
-    return bad == count ? Result<void>() : wrong(reader_.number_at(list.type, values + bad * type_size[size_t(list.type)]));
+    return done;
   }
 
   bool read_list(const Property& list, std::vector<double>& values) {
