@@ -1,16 +1,19 @@
-// Wavefront MTL: diffuse colour and emission with their maps, and the PBR extension's roughness and metalness (Blender,
-// Clara.io 2014); the rest of its Phong model has no use here.
+// Wavefront MTL: diffuse colour, emission and dissolve with their maps, and the PBR extension's roughness and metalness
+// (Clara.io 2014, Blender); the rest of its Phong model has no use here.
 #include <lambent/scene/load.h>
 #include <lambent/scene/load_mtl.h>
 #include <lambent/scene/mesh_file.h>
 #include <lambent/scene/mesh_text.h>
 #include <lambent/scene/named_file.h>
+#include <lambent/scene/textures.h>
 
 #include <fmt/format.h>
 
 #include <filesystem>
 #include <map>
+#include <optional>
 #include <set>
+#include <tuple>
 
 namespace lambent {
 namespace {
@@ -24,8 +27,9 @@ struct MtlMap {
 
 struct MtlMaterial {
   Vec3 diffuse{default_albedo}, emissive{0};
-  MtlMap color_map, glow_map;
+  MtlMap color_map, glow_map, alpha_map;
   double roughness = 1, metallic = 0;
+  std::optional<double> dissolve, transparency;  // d, Tr
 };
 using Library = std::map<std::string, MtlMaterial>;
 
@@ -86,8 +90,11 @@ MtlMap parse_map(std::string_view text, std::string where) {
   return map;
 }
 
-// `Pr x`: a number in [0, 1].
-bool parse_share(std::string_view text, double& share) {
+// `Pr x`, `d [-halo] x`: a number in [0, 1].
+template <class T>
+bool parse_share(std::string_view text, T& share) {
+  text = trimmed(text);
+  if (text.starts_with("-halo")) text.remove_prefix(5);
   skip_blanks(text);
   double x;
   if (!take_number(text, x) || std::isnan(x)) return false;
@@ -104,7 +111,7 @@ std::string lower_case(std::string_view text) {
 Result<void> parse_mtl(std::span<const uint8_t> bytes, const std::string& path, Library& library,
                        std::set<std::string>& unread) {
   constexpr double brightest = 1e9;  // keeps sums of light finite
-  static const std::set<std::string> known{"kd", "ke", "map_kd", "map_ke", "pr", "pm"},
+  static const std::set<std::string> known{"kd", "ke", "map_kd", "map_ke", "pr", "pm", "d", "tr", "map_d"},
       other{"map_bump", "bump", "norm", "disp", "map_pr", "map_pm", "decal"};
   LineReader lines(bytes);
   std::string_view text;
@@ -118,14 +125,17 @@ Result<void> parse_mtl(std::span<const uint8_t> bytes, const std::string& path, 
     if (!known.contains(keyword)) continue;
     std::string where = fmt::format("{}:{}", path, lines.number());
     if (!material) return Error{where, fmt::format("{} before the first newmtl", word)};
-    bool is_share = keyword[0] == 'p', ok = true;
+    bool is_color = keyword[0] == 'k', ok = true;
     if (keyword == "kd") ok = parse_color(text, material->diffuse, 1.0);
     if (keyword == "ke") ok = parse_color(text, material->emissive, brightest);
     if (keyword == "pr") ok = parse_share(text, material->roughness);
     if (keyword == "pm") ok = parse_share(text, material->metallic);
+    if (keyword == "d") ok = parse_share(text, material->dissolve);
+    if (keyword == "tr") ok = parse_share(text, material->transparency);
+    if (keyword == "map_d") material->alpha_map = parse_map(text, where);
     if (keyword == "map_kd") material->color_map = parse_map(text, where);
     if (keyword == "map_ke") material->glow_map = parse_map(text, where);
-    if (!ok) return Error{where, is_share ? "expected a number" : "expected a colour of one or three numbers"};
+    if (!ok) return Error{where, is_color ? "expected a colour of one or three numbers" : "expected a number"};
   }
   return {};
 }
@@ -166,46 +176,81 @@ class PictureLoader {
   // The texture's number; -1 where there is none to be had.
   int load(const MtlMap& map) {
     if (map.where.empty()) return -1;
-    std::string name = normal_name(map.name);
-    auto [place, is_new] = known_.try_emplace({name, map.clamp}, int(scene_.textures.size()));
-    if (!is_new) {
-      if (place->second < 0) ++lost_.count;
-      return place->second;
-    }
-    auto twin = known_.find({name, !map.clamp});
-    if (twin != known_.end() && twin->second >= 0) {
-      scene_.textures.push_back(scene_.textures[size_t(twin->second)]);
-    } else {
-      auto texture = read_named_picture(map.name, folder_, map.where);
-      if (!texture) return lost_.add(texture.error()), place->second = -1;
-      scene_.textures.push_back(std::move(*texture));
-    }
-    Texture& texture = scene_.textures.back();
-    texture.wrap_s = texture.wrap_t = map.clamp ? Wrap::clamp : Wrap::repeat;
+    const Texture* picture = read(map);
+    if (!picture) return -1;
+    auto [place, is_new] = known_.try_emplace({normal_name(map.name), "", map.clamp}, int(scene_.textures.size()));
+    if (is_new) add(*picture, map.clamp);
+    return place->second;
+  }
+
+  // The same of a colour map, or of white, with a mask as its alpha; -1 where the mask is not to be had.
+  int load_masked(const MtlMap& color, const MtlMap& mask) {
+    const Texture* alpha = read(mask);
+    const Texture* colors = color.where.empty() ? nullptr : read(color);
+    const bool is_same = normal_name(color.name) == normal_name(mask.name);
+    if (!alpha || (is_same && alpha->alpha.empty())) return -1;
+    const bool clamp = colors ? color.clamp : mask.clamp;
+    auto [place, is_new] = known_.try_emplace({colors ? normal_name(color.name) : "", normal_name(mask.name), clamp},
+                                              int(scene_.textures.size()));
+    if (!is_new) return place->second;
+    auto both = with_alpha(colors ? *colors : Texture{}, *alpha, colors ? colors->name : alpha->name);
+    if (!both) return lost_.add(both.error()), known_.erase(place), -1;
+    add(*both, clamp);
     return place->second;
   }
   void tell() const { lost_.tell(scene_); }
 
  private:
+  // Null where it cannot be had, which is counted each time.
+  const Texture* read(const MtlMap& map) {
+    auto [place, is_new] = pictures_.try_emplace(normal_name(map.name));
+    if (is_new) {
+      auto texture = read_named_picture(map.name, folder_, map.where);
+      if (!texture) return lost_.add(texture.error()), nullptr;
+      place->second = std::move(*texture);
+    }
+    if (place->second.rgb.empty()) return ++lost_.count, nullptr;
+    return &place->second;
+  }
+  void add(const Texture& texture, bool clamp) {
+    scene_.textures.push_back(texture);
+    scene_.textures.back().wrap_s = scene_.textures.back().wrap_t = clamp ? Wrap::clamp : Wrap::repeat;
+  }
+
   Scene& scene_;
   const std::string& folder_;
-  std::map<std::pair<std::string, bool>, int> known_;  // by name and clamp
+  std::map<std::string, Texture> pictures_;                               // by name; without pixels: lost
+  std::map<std::tuple<std::string, std::string, bool>, int> known_;  // by name, mask and clamp
   LostPictures lost_;
 };
+
+// What is there of a surface. `d` is read before `Tr`, of which files disagree whether 1 is clear or solid: alone it is
+// transparency, but never of all.
+float alpha_of(const MtlMaterial& source) {
+  if (source.dissolve) return float(*source.dissolve);
+  return source.transparency && *source.transparency < 1 ? float(1 - *source.transparency) : 1.0f;
+}
 
 Material material_from(const MtlMaterial& source, PictureLoader& pictures) {
   Material material;
   material.base_color = source.diffuse, material.emissive = source.emissive;
   material.metallic = float(source.metallic), material.roughness = float(source.roughness);
+  const bool has_color = !source.color_map.where.empty(), has_mask = !source.alpha_map.where.empty();
+  if (has_mask) material.base_color_texture = pictures.load_masked(source.color_map, source.alpha_map);
+  const bool is_masked = material.base_color_texture >= 0;
+  if (!is_masked) material.base_color_texture = pictures.load(source.color_map);
+  material.uv_transform = has_color ? source.color_map.transform : source.alpha_map.transform;
+  material.alpha = alpha_of(source);
+  if (is_masked || material.alpha < 1) material.alpha_mode = AlphaMode::blend;
   // Exporters write Kd 0, or Ke 0, beside the map that takes its place.
-  material.base_color_texture = pictures.load(source.color_map);
-  if (!source.color_map.where.empty() && source.diffuse == Vec3(0))
+  if (has_color && source.diffuse == Vec3(0))
     material.base_color = Vec3(material.base_color_texture < 0 ? default_albedo : 1.0f);
-  material.uv_transform = source.color_map.transform;
   material.emissive_texture = pictures.load(source.glow_map);
-  if (material.emissive_texture >= 0 && source.emissive == Vec3(0)) material.emissive = Vec3(1);
-  if (material.emissive_texture < 0 && !source.glow_map.where.empty()) material.emissive = Vec3(0);
   material.emissive_transform = source.glow_map.transform;
+  if (!source.glow_map.where.empty()) {
+    if (material.emissive_texture < 0) material.emissive = Vec3(0);
+    else if (source.emissive == Vec3(0)) material.emissive = Vec3(1);
+  }
   return material;
 }
 

@@ -29,6 +29,14 @@ uint64_t most_pixels(std::span<const uint8_t> encoded, bool png) {
   return size * 1032 * 8 / bits;
 }
 
+bool encode_png(const uint8_t* pixels, int width, int height, int channels, std::vector<uint8_t>& png) {
+  auto append = [](void* to, void* bytes, int n) {
+    auto& encoded = *static_cast<std::vector<uint8_t>*>(to);
+    encoded.insert(encoded.end(), static_cast<uint8_t*>(bytes), static_cast<uint8_t*>(bytes) + n);
+  };
+  return stbi_write_png_to_func(append, &png, width, height, channels, pixels, 0);
+}
+
 bool begins(std::span<const uint8_t> bytes, std::string_view magic) {
   return bytes.size() >= magic.size() && std::memcmp(bytes.data(), magic.data(), magic.size()) == 0;
 }
@@ -64,13 +72,9 @@ Result<std::vector<uint8_t>> png_from(std::span<const uint8_t> encoded, const st
   stbi_uc* pixels = stbi_load_from_memory(encoded.data(), size, &width, &height, &channels, wanted);
   if (!pixels) return Error{where, std::string("cannot be decoded: ") + stbi_failure_reason()};
   std::vector<uint8_t> result;
-  auto append = [](void* out, void* data, int count) {
-    const uint8_t* bytes = static_cast<const uint8_t*>(data);
-    static_cast<std::vector<uint8_t>*>(out)->insert(static_cast<std::vector<uint8_t>*>(out)->end(), bytes, bytes + count);
-  };
-  bool written = stbi_write_png_to_func(append, &result, width, height, wanted, pixels, width * wanted);
+  bool written = encode_png(pixels, width, height, wanted, result);
   stbi_image_free(pixels);
-  if (!written) return Error{where, "is too large to be written as PNG"};
+  if (!written) return Error{where, "cannot be encoded"};
   return result;
 }
 
@@ -93,11 +97,23 @@ Result<void> decode_texture(std::span<const uint8_t> encoded, const std::string&
   if (width <= 0 || height <= 0) return Error{where, "is empty"};
   if (width > max_texture_side || height > max_texture_side) return too_large(where, width, height);
   if (uint64_t(width) * uint64_t(height) > most_pixels(encoded, type == "image/png")) return too_short(where);
-  constexpr int rgb = 3;
-  stbi_uc* pixels = stbi_load_from_memory(encoded.data(), size, &width, &height, &channels, rgb);
+  const int kept = channels == 2 || channels == 4 ? 4 : 3;
+  stbi_uc* pixels = stbi_load_from_memory(encoded.data(), size, &width, &height, &channels, kept);
   if (!pixels) return Error{where, std::string("cannot be decoded: ") + stbi_failure_reason()};
   texture.width = width, texture.height = height, texture.mime_type = type;
-  texture.rgb.assign(pixels, pixels + size_t(width) * size_t(height) * rgb);
+  const size_t count = size_t(width) * size_t(height);
+  texture.alpha.clear();
+  if (kept == 3) {
+    texture.rgb.assign(pixels, pixels + count * 3);
+  } else {
+    texture.rgb.resize(count * 3), texture.alpha.resize(count);
+    bool solid = true;
+    for (size_t i = 0; i < count; ++i) {
+      std::copy_n(pixels + 4 * i, 3, texture.rgb.data() + 3 * i);
+      texture.alpha[i] = pixels[4 * i + 3], solid &= texture.alpha[i] == 255;
+    }
+    if (solid) texture.alpha = {};
+  }
   stbi_image_free(pixels);
   return {};
 }
@@ -113,6 +129,27 @@ Result<Texture> decode_texture(std::vector<uint8_t> encoded, const std::string& 
   texture.name = name;
   texture.encoded = std::move(encoded);
   return texture;
+}
+
+Result<Texture> with_alpha(const Texture& color, const Texture& mask, const std::string& name) {
+  const bool white = color.rgb.empty();
+  Texture out;
+  out.name = name, out.mime_type = "image/png", out.wrap_s = color.wrap_s, out.wrap_t = color.wrap_t;
+  out.width = white ? mask.width : color.width, out.height = white ? mask.height : color.height;
+  if (out.width <= 0 || out.height <= 0) return Error{name, "has no pixels"};
+  const size_t count = size_t(out.width) * size_t(out.height);
+  out.rgb = white ? std::vector<uint8_t>(count * 3, 255) : color.rgb;
+  out.alpha.resize(count);
+  std::vector<uint8_t> rgba(count * 4);
+  for (size_t i = 0; i < count; ++i) {
+    const Vec2 uv((float(i % size_t(out.width)) + 0.5f) / float(out.width),
+                  (float(i / size_t(out.width)) + 0.5f) / float(out.height));
+    const float a = mask.alpha.empty() ? sample_linear_texture(mask, uv).x : sample_alpha(mask, uv);
+    out.alpha[i] = rgba[4 * i + 3] = uint8_t(a * 255 + 0.5f);
+    std::copy_n(out.rgb.data() + 3 * i, 3, rgba.data() + 4 * i);
+  }
+  if (!encode_png(rgba.data(), out.width, out.height, 4, out.encoded)) return Error{name, "cannot be encoded"};
+  return out;
 }
 
 }  // namespace lambent
