@@ -1,5 +1,5 @@
-// Loading a scan: made sheets of half a million to eight million triangles as binary PLY without normals, in a temporary
-// folder. Processor time of the one thread that loads, the least of a few runs.
+// Loading a scan: made sheets of half a million to eight million triangles as binary PLY without normals, in a
+// temporary folder. Processor time of the one thread that loads, the least of a few runs.
 #include "bench.h"
 
 #include <lambent/core/file.h>
@@ -90,13 +90,14 @@ void bench_load() {
     const double plain = least_processor_seconds(runs, [&] { sum += read_plainly(path, n); });
     const double ours = least_processor_seconds(runs, [&] {
       auto scene = load_scene(path);
-      if (scene)
-        scene_bytes = scene->positions.size() * sizeof(Vec3) * 2 + scene->triangles.size() * sizeof(Triangle);
+      if (scene) scene_bytes = scene->positions.size() * sizeof(Vec3) * 2 + scene->triangles.size() * sizeof(Triangle);
     });
     std::filesystem::remove(path);
     report("load ply", ours, plain, "s", "the bytes read into arrays of positions and corners",
            {{"triangles", triangles}, {"check", sum % 7}});
-    if (before > 0) report("load ply, time per triangle", ours / 4, before, "s", "a quarter of the triangles", {{"triangles", triangles}});
+    if (before > 0)
+      report("load ply, time per triangle", ours / 4, before, "s", "a quarter of the triangles",
+             {{"triangles", triangles}});
     report("load ply, peak memory", double(usage().ru_maxrss) * 1024, double(scene_bytes), "bytes",
            "the scene that comes out", {{"triangles", triangles}});
     before = ours;

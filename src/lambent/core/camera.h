@@ -28,8 +28,8 @@ struct CameraRays {
   Vec3 direction(float x, float y) const { return normalize(corner + dx * x + dy * y); }
 };
 
-// Looks at all of the points from the front right and a little above, so that they just fit a picture of this width over
-// height, but for a margin of a fiftieth of it a side; what the picture is tighter for touches both margins.
+// Looks at all of the points from the front right and a little above, so that they just fit a picture of this width
+// over height, but for a margin of a fiftieth of it a side; what the picture is tighter for touches both margins.
 inline Camera camera_around(std::span<const Vec3> points, float aspect, float fov = 35.0f) {
   constexpr double margin = 0.02;
   const Vec3d forward = normalize(Vec3d(-0.55, -0.4, -1.0)), side = normalize(cross(forward, Vec3d(0, 1, 0))),

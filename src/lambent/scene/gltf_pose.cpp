@@ -176,12 +176,14 @@ Vec3d document_origin(const GltfDocument& document, const GltfPose& pose) {
     const Json* primitives = mesh ? check.array(gltf_item(json, "meshes", *mesh), "primitives", {}) : nullptr;
     for (size_t i = 0; primitives && i < primitives->size(); ++i) {
       const Json* attributes = check.object((*primitives)[i], "attributes", {});
-      auto positions = attributes ? check.index(*attributes, "POSITION", gltf_count(json, "accessors"), {}) : std::nullopt;
+      auto positions = attributes ? check.index(*attributes, "POSITION", gltf_count(json, "accessors"), {})
+                                  : std::nullopt;
       if (!check.ok()) return Vec3d(0);  // which reading says in words
       if (!positions) continue;
       double box[2][3] = {{0, 0, 0}, {0, 0, 0}};
       const Json& accessor = gltf_item(json, "accessors", *positions);
-      if (!check.numbers(accessor, "min", box[0], {}) || !check.numbers(accessor, "max", box[1], {})) check = GltfCheck("");
+      if (!check.numbers(accessor, "min", box[0], {}) || !check.numbers(accessor, "max", box[1], {}))
+        check = GltfCheck("");
       if (!(low.x <= high.x)) first = Vec3d(pose.world[n][3]);
       for (int k = 0; k < 8; ++k) {
         Vec3d p(pose.world[n] * Vec4d(box[k & 1][0], box[k >> 1 & 1][1], box[k >> 2][2], 1));

@@ -6,8 +6,8 @@
 namespace lambent {
 
 // Loads .gltf, .glb, .obj (with its .mtl) or .ply, chosen by extension, validates and cleans it:
-//   - every index, count, offset and number is checked; a file without a usable triangle is an error, and so are NaN and
-//   infinite positions in glTF; in OBJ and PLY, faces that use such vertices are left out and counted in a warning;
+//   - every index, count, offset and number is checked; a file without a usable triangle is an error, and so are NaN
+//   and infinite positions in glTF; in OBJ and PLY, faces that use such vertices are left out and counted in a warning;
 //   - missing or broken normals are computed (make_normals in clean.h);
 //   - exact duplicate triangles are dropped, and coincident opposite ones marked two-sided;
 //   - OBJ and PLY carry no sidedness: a connected component that is closed and faces outward is one-sided, others

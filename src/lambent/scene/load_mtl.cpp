@@ -201,7 +201,7 @@ class PictureLoader {
   void tell() const { lost_.tell(scene_); }
 
  private:
-  // Null where it cannot be had, which is counted each time.
+  // Null where it cannot be had.
   const Texture* read(const MtlMap& map) {
     auto [place, is_new] = pictures_.try_emplace(normal_name(map.name));
     if (is_new) {
@@ -209,8 +209,7 @@ class PictureLoader {
       if (!texture) return lost_.add(texture.error()), nullptr;
       place->second = std::move(*texture);
     }
-    if (place->second.rgb.empty()) return ++lost_.count, nullptr;
-    return &place->second;
+    return place->second.rgb.empty() ? nullptr : &place->second;
   }
   void add(const Texture& texture, bool clamp) {
     scene_.textures.push_back(texture);
@@ -219,7 +218,7 @@ class PictureLoader {
 
   Scene& scene_;
   const std::string& folder_;
-  std::map<std::string, Texture> pictures_;                               // by name; without pixels: lost
+  std::map<std::string, Texture> pictures_;                          // by name; without pixels: lost
   std::map<std::tuple<std::string, std::string, bool>, int> known_;  // by name, mask and clamp
   LostPictures lost_;
 };
@@ -281,7 +280,8 @@ Result<std::vector<uint32_t>> load_materials(Scene& scene, const std::vector<std
     auto [place, is_new] = numbers.try_emplace(key, uint32_t(scene.materials.size()));
     result.push_back(place->second);
     if (!is_new) continue;
-    Material material = material_from(found == library.end() ? MtlMaterial{.diffuse = fallback} : found->second, pictures);
+    Material material =
+        material_from(found == library.end() ? MtlMaterial{.diffuse = fallback} : found->second, pictures);
     material.name = found == library.end() ? "default" : name;
     scene.materials.push_back(std::move(material));
   }

@@ -151,7 +151,8 @@ Result<void> check_references(const ObjFile& obj) {
                      fmt::format("{} {} of {} does not exist", what, uint64_t(index) + 1, count)};
       };
       if (corner.v >= mesh.v.size()) return wrong("vertex", corner.v, mesh.v.size());
-      if (corner.vt != none && corner.vt >= mesh.vt.size()) return wrong("texture coordinate", corner.vt, mesh.vt.size());
+      if (corner.vt != none && corner.vt >= mesh.vt.size())
+        return wrong("texture coordinate", corner.vt, mesh.vt.size());
       if (corner.vn != none && corner.vn >= mesh.vn.size()) return wrong("normal", corner.vn, mesh.vn.size());
     }
   }

@@ -15,7 +15,8 @@ namespace {
 
 // Puts the mesh into the scene as one part; its vertices are the file's.
 LeftOut add_plain_part(PlyMesh& mesh, Scene& scene) {
-  scene.positions = place_positions(scene, mesh.positions, mesh.corners.size(), [&](size_t c) { return mesh.corners[c]; });
+  scene.positions =
+      place_positions(scene, mesh.positions, mesh.corners.size(), [&](size_t c) { return mesh.corners[c]; });
   mesh.positions = {};
   scene.triangles.reserve(mesh.corners.size() - std::min(mesh.corners.size(), 2 * mesh.corner_counts.size()));
   const bool any_broken = std::any_of(scene.positions.begin(), scene.positions.end(), is_broken);
@@ -26,7 +27,8 @@ LeftOut add_plain_part(PlyMesh& mesh, Scene& scene) {
   for (uint32_t count : mesh.corner_counts) {
     const std::span<const uint32_t> polygon(mesh.corners.data() + first, count);
     first += count;
-    if (any_broken && std::any_of(polygon.begin(), polygon.end(), [&](uint32_t v) { return is_broken(scene.positions[v]); })) {
+    if (any_broken &&
+        std::any_of(polygon.begin(), polygon.end(), [&](uint32_t v) { return is_broken(scene.positions[v]); })) {
       ++left_out.broken;
       continue;
     }

@@ -26,8 +26,8 @@ inline bool is_position(Vec3d p) {
 inline constexpr Vec3d broken_position{NAN};
 inline bool is_broken(Vec3 p) { return std::isnan(p.x); }
 
-// Zero; or, of a box so far from 0 that floats would lose its shape (surveyed coordinates), a point near its centre that
-// few digits write and floats hold. Exact zero too for boxes that are empty.
+// Zero; or, of a box so far from 0 that floats would lose its shape (surveyed coordinates), a point near its centre
+// that few digits write and floats hold. Exact zero too for boxes that are empty.
 Vec3d far_origin(Vec3d low, Vec3d high);
 
 // A file's positions as a scene has them, about its origin, which is chosen by those that the corners use. `vertex`
@@ -105,10 +105,10 @@ class Triangulator {
 // twice. Says so in a warning.
 void leave_colors_to_pictures(Scene& scene);
 
-// The way from a file's triangles to a usable scene; normals that the file lacks are zero. Vertices that no triangle uses
-// may be broken. Turns triangles whose three
-// normals all oppose them, merges duplicates, drops unused vertices and empty parts, makes and repairs normals, infers
-// sidedness, and calls a material single-sided where all its triangles are. Error: no triangle has an area.
+// The way from a file's triangles to a usable scene; normals that the file lacks are zero. Vertices that no triangle
+// uses may be broken. Turns triangles whose three normals all oppose them, merges duplicates, drops unused vertices and
+// empty parts, makes and repairs normals, infers sidedness, and calls a material single-sided where all its triangles
+// are. Error: no triangle has an area.
 Result<void> finish_mesh(Scene& scene);
 
 }  // namespace lambent

@@ -42,7 +42,8 @@ struct Face {
   double angles[3] = {0, 0, 0};
   Face(const Scene& s, const Triangle& t) {
     const DVec3 a(s.positions[t.v[0]]), ab = DVec3(s.positions[t.v[1]]) - a, ac = DVec3(s.positions[t.v[2]]) - a,
-                bc = DVec3(s.positions[t.v[2]]) - DVec3(s.positions[t.v[1]]), across = cross(ab, ac);
+                                        bc = DVec3(s.positions[t.v[2]]) - DVec3(s.positions[t.v[1]]),
+                                        across = cross(ab, ac);
     const double area = length(across);
     if (!(area > 0)) return;
     normal = across / area;
@@ -155,7 +156,8 @@ class NormalMaker {
   void make() {
     sum_faces();
     for (size_t p = 0; p + 1 < fans_.first.size(); ++p) {
-      const std::span<const uint32_t> all(fans_.corners.data() + fans_.first[p], fans_.corners.data() + fans_.first[p + 1]);
+      const std::span<const uint32_t> all(fans_.corners.data() + fans_.first[p],
+                                          fans_.corners.data() + fans_.first[p + 1]);
       if (fans_.is_ring[p] && is_smooth_vertex(all)) {
         const uint32_t v = vertex_of(all[0]);
         scene_.normals[v] = unit_or(sums_[v], faces_[all[0] / 3]);
@@ -164,8 +166,7 @@ class NormalMaker {
       }
     }
     auto before = [](const Copy& a, const Copy& b) { return a.vertex < b.vertex; };
-    if (!std::is_sorted(copies.begin(), copies.end(), before))
-      std::stable_sort(copies.begin(), copies.end(), before);
+    if (!std::is_sorted(copies.begin(), copies.end(), before)) std::stable_sort(copies.begin(), copies.end(), before);
   }
 
  private:

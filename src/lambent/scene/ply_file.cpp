@@ -2,131 +2,17 @@
 #include <lambent/scene/mesh_file.h>
 #include <lambent/scene/mesh_text.h>
 #include <lambent/scene/ply_file.h>
+#include <lambent/scene/ply_header.h>
 
 #include <fmt/format.h>
 
 #include <bit>
-#include <charconv>
 #include <cstring>
 
 namespace lambent {
 namespace {
 
-enum class Type : uint8_t { i8, u8, i16, u16, i32, u32, f32, f64 };
-constexpr size_t type_size[] = {1, 1, 2, 2, 4, 4, 4, 8};
-bool is_float(Type t) { return t == Type::f32 || t == Type::f64; }
-
-bool type_from_name(std::string_view name, Type& type) {
-  constexpr std::string_view names[][2] = {{"char", "int8"},     {"uchar", "uint8"},   {"short", "int16"},
-                                           {"ushort", "uint16"}, {"int", "int32"},     {"uint", "uint32"},
-                                           {"float", "float32"}, {"double", "float64"}};
-  for (size_t i = 0; i < std::size(names); ++i)
-    if (name == names[i][0] || name == names[i][1]) return type = Type(i), true;
-  return false;
-}
-
-template <class Act>
-void with_type(Type type, Act act) {
-  switch (type) {
-    case Type::i8: return act(int8_t{});
-    case Type::u8: return act(uint8_t{});
-    case Type::i16: return act(int16_t{});
-    case Type::u16: return act(uint16_t{});
-    case Type::i32: return act(int32_t{});
-    case Type::u32: return act(uint32_t{});
-    case Type::f32: return act(float{});
-    case Type::f64: return act(double{});
-  }
-}
-
-struct Property {
-  std::string name;
-  Type type{};
-  bool is_list = false;
-  Type count_type{};
-};
-
-struct Element {
-  std::string name;
-  uint64_t count = 0;
-  size_t line = 0;
-  std::vector<Property> properties;
-  size_t row_size = 0;  // bytes in binary; 0 where there are lists
-};
-
-enum class Format { ascii, little_endian, big_endian };
-
-struct Header {
-  Format format{};
-  std::vector<Element> elements;
-  std::vector<std::string> textures;  // what `comment TextureFile` lines say
-  size_t size = 0;                    // bytes
-  size_t lines = 0;
-};
-
-Result<Header> parse_header(std::string_view text, const std::string& path) {
-  Header header;
-  auto wrong = [&](std::string message) { return Error{fmt::format("{}:{}", path, header.lines), std::move(message)}; };
-  bool has_format = false;
-  // Lines end in LF, CR LF or, if the first one does, in CR.
-  char separator = '\n';
-  if (text.starts_with("ply\r") && !text.starts_with("ply\r\n")) separator = '\r';
-  while (true) {
-    ++header.lines;
-    size_t end = text.find(separator, header.size);
-    std::string_view line = text.substr(header.size, end == text.npos ? end : end - header.size), rest = line;
-    std::string_view keyword = take_word(rest);
-    if (header.lines == 1) {
-      if (trimmed(line) != "ply") return wrong("is not a PLY file");
-    } else if (keyword == "format") {
-      std::string_view name = take_word(rest), version = take_word(rest);
-      if (name != "ascii" && name != "binary_little_endian" && name != "binary_big_endian")
-        return wrong("unknown format");
-      if (version != "1.0") return wrong("version is not 1.0");
-      header.format = name == "ascii"                ? Format::ascii
-                    : name == "binary_little_endian" ? Format::little_endian
-                                                     : Format::big_endian;
-      has_format = true;
-    } else if (keyword == "element") {
-      Element element;
-      element.name = std::string(take_word(rest)), element.line = header.lines;
-      std::string_view count = take_word(rest);
-      auto [stop, code] = std::from_chars(count.data(), count.data() + count.size(), element.count);
-      if (code != std::errc() || stop != count.data() + count.size())
-        return wrong("element count is not a whole number");
-      for (const Element& e : header.elements)
-        if (e.name == element.name) return wrong(fmt::format("element {} comes twice", short_name(e.name)));
-      header.elements.push_back(std::move(element));
-    } else if (keyword == "property") {
-      if (header.elements.empty()) return wrong("property before the first element");
-      Property property;
-      std::string_view word = take_word(rest);
-      property.is_list = word == "list";
-      if (property.is_list) {
-        if (!type_from_name(take_word(rest), property.count_type)) return wrong("unknown type of a list's count");
-        if (is_float(property.count_type)) return wrong("a list's count must be of a whole-number type");
-        word = take_word(rest);
-      }
-      if (!type_from_name(word, property.type)) return wrong("unknown property type");
-      property.name = std::string(take_word(rest));
-      if (property.name.empty()) return wrong("property has no name");
-      header.elements.back().properties.push_back(std::move(property));
-    } else if (keyword == "comment" && take_word(rest) == "TextureFile") {
-      header.textures.emplace_back(trimmed(rest));
-    } else if (keyword != "comment" && keyword != "obj_info" && keyword != "end_header" && !trimmed(line).empty()) {
-      return wrong("unknown header line");
-    }
-    if (end == text.npos && keyword != "end_header") return wrong("the header does not end");
-    header.size = end == text.npos ? text.size() : end + 1;
-    if (keyword == "end_header") break;
-  }
-  if (!has_format) return wrong("the header names no format");
-  for (Element& e : header.elements) {
-    bool has_lists = std::any_of(e.properties.begin(), e.properties.end(), [](const Property& p) { return p.is_list; });
-    for (const Property& p : e.properties) e.row_size += has_lists ? 0 : type_size[size_t(p.type)];
-  }
-  return header;
-}
+using namespace ply;
 
 // The values after the header, in any of the three formats.
 class ValueReader {
@@ -418,7 +304,8 @@ class PlyBody {
       double value;
       while (count-- > 0) {
         if (!reader_.read(list.type, value)) return ended(e, face);
-        if (!(value >= 0 && value < double(vertex_count_)) || value != std::floor(value)) return wrong_corner(face, value);
+        if (!(value >= 0 && value < double(vertex_count_)) || value != std::floor(value))
+          return wrong_corner(face, value);
         mesh_.corners.push_back(uint32_t(value));
       }
       return {};
@@ -500,7 +387,7 @@ class PlyBody {
 
 Result<PlyMesh> read_ply(std::span<const uint8_t> bytes, const std::string& path) {
   std::string_view text(reinterpret_cast<const char*>(bytes.data()), bytes.size());
-  auto header = parse_header(text, path);
+  auto header = ply::parse_header(text, path);
   if (!header) return header.error();
   auto mesh = PlyBody(path, *header, text.substr(header->size)).read();
   if (mesh) mesh->textures = std::move(header->textures);
