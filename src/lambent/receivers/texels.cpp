@@ -20,7 +20,7 @@ TexelReceivers texel_receivers(const Scene& scene, int width, int height, const 
   for (size_t i = 0; i < scene.triangles.size(); ++i) {
     const Triangle& t = scene.triangles[i];
     const Vec3 n = area_normal(scene, t);
-    if (n == Vec3(0)) continue;
+    if (!(length(n) > 0)) continue;
     map.front[i] = {{front[t.v[0]], front[t.v[1]], front[t.v[2]]}, t.part};
     if (!back.empty() && t.two_sided) map.back[i] = {{back[t.v[0]], back[t.v[1]], back[t.v[2]]}, t.part};
   }

@@ -86,7 +86,7 @@ void LostPictures::add(const Error& error) {
 
 void LostPictures::tell(Scene& scene) const {
   if (count == 0) return;
-  std::string more = count > 1 ? fmt::format(" (and {} more pictures)", count - 1) : "";
+  std::string more = count > 1 ? fmt::format(" (and {} more)", count - 1) : "";
   scene.warnings.push_back(first + more + "; the surface does without");
 }
 

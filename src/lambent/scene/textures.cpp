@@ -41,9 +41,7 @@ bool begins(std::span<const uint8_t> bytes, std::string_view magic) {
   return bytes.size() >= magic.size() && std::memcmp(bytes.data(), magic.data(), magic.size()) == 0;
 }
 
-// The same for the formats that are decoded to become PNG. Bytes that are missing would be read as noise, so whole
-// rows must be there: a TGA without runs has its pixels after 18 bytes of header, all others of the kind at least a
-// byte a pixel, runs of up to 128 pixels, or, of a BMP, a bit.
+// The same for the formats that are decoded to become PNG: a byte a pixel or more; a BMP a bit, runs up to 128 pixels.
 uint64_t most_plain_pixels(std::span<const uint8_t> encoded) {
   uint64_t size = encoded.size();
   if (begins(encoded, "BM")) return size * 8;
@@ -68,8 +66,13 @@ Result<std::vector<uint8_t>> png_from(std::span<const uint8_t> encoded, const st
     return Error{where, "is no PNG, JPEG, TGA, BMP, PSD or PNM"};
   if (width > max_texture_side || height > max_texture_side) return too_large(where, width, height);
   if (uint64_t(width) * uint64_t(height) > most_plain_pixels(encoded)) return too_short(where);
+  // The decoder takes rows that are missing for whatever memory held: give it black.
+  std::vector<uint8_t> padded(encoded.begin(), encoded.end());
+  constexpr size_t widest = 8;  // four channels of 16 bits
+  padded.resize(std::min<size_t>(padded.size() + widest * size_t(width) * size_t(height), INT_MAX));
   const int wanted = channels == 2 || channels == 4 ? 4 : 3;
-  stbi_uc* pixels = stbi_load_from_memory(encoded.data(), size, &width, &height, &channels, wanted);
+  stbi_uc* pixels =
+      stbi_load_from_memory(padded.data(), int(padded.size()), &width, &height, &channels, wanted);
   if (!pixels) return Error{where, std::string("cannot be decoded: ") + stbi_failure_reason()};
   std::vector<uint8_t> result;
   bool written = encode_png(pixels, width, height, wanted, result);
