@@ -31,8 +31,9 @@ TEST(CameraAround, JustFitsAnyBoxInAnyPicture) {
     const Camera camera = camera_around(box, aspect);
     double widest = 0, highest = 0, left = 0, right = 0, low = 0, high = 0;
     for (int k = 0; k < 8; ++k) {
-      const Vec2d at = seen(camera, double(aspect), {k & 1 ? box.max.x : box.min.x, k & 2 ? box.max.y : box.min.y,
-                                                     k & 4 ? box.max.z : box.min.z});
+      const Vec2d at =
+          seen(camera, double(aspect),
+               {k & 1 ? box.max.x : box.min.x, k & 2 ? box.max.y : box.min.y, k & 4 ? box.max.z : box.min.z});
       left = std::min(left, at.x), right = std::max(right, at.x);
       low = std::min(low, at.y), high = std::max(high, at.y);
       widest = std::max(widest, std::abs(at.x)), highest = std::max(highest, std::abs(at.y));

@@ -181,15 +181,9 @@ template <class T>
 constexpr Vector<T, 3> cross(const Vector<T, 3>& a, const Vector<T, 3>& b) {
   return {a.y * b.z - b.y * a.z, a.z * b.x - b.z * a.x, a.x * b.y - b.x * a.y};
 }
-// To rounding at any size: squares that floats cannot hold, of very small or large scenes, are summed in double.
 template <class T, int N>
 T length(const Vector<T, N>& v) {
-  const T squared = dot(v, v);
-  if constexpr (sizeof(T) < sizeof(double)) {
-    if (!(squared > T(1e-30) && squared < T(1e36)))
-      return T(std::sqrt(dot(Vector<double, N>(v), Vector<double, N>(v))));
-  }
-  return std::sqrt(squared);
+  return std::sqrt(dot(v, v));
 }
 template <class T, int N>
 T distance(const Vector<T, N>& a, const Vector<T, N>& b) {
@@ -198,7 +192,7 @@ T distance(const Vector<T, N>& a, const Vector<T, N>& b) {
 // Not finite where v is zero; normalize_or() below has a way out.
 template <class T, int N>
 Vector<T, N> normalize(const Vector<T, N>& v) {
-  return v * (T(1) / length(v));
+  return v * (T(1) / std::sqrt(dot(v, v)));
 }
 template <class T, int N>
 Vector<T, N> reflect(const Vector<T, N>& v, const Vector<T, N>& n) {
@@ -412,11 +406,10 @@ inline float luminance(Vec3 c) { return 0.2126f * c.x + 0.7152f * c.y + 0.0722f 
 inline float largest(Vec3 v) { return std::max({v.x, v.y, v.z}); }
 inline bool is_finite(Vec3 v) { return std::isfinite(v.x) && std::isfinite(v.y) && std::isfinite(v.z); }
 
-// Unit vector along v, or `fallback` where v is zero, too short to have a direction in floats, or not finite.
+// Unit vector along v, or `fallback` where v is too short to have a direction.
 inline Vec3 normalize_or(Vec3 v, Vec3 fallback) {
-  constexpr float shortest = 1e-36f;
-  const float l = length(v);
-  return l > shortest && std::isfinite(l) ? v / l : fallback;
+  float len2 = dot(v, v);
+  return len2 > 1e-30f && std::isfinite(len2) ? v / std::sqrt(len2) : fallback;
 }
 
 // The rotation of a unit quaternion, (x, y, z, w).

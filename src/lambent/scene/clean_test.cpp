@@ -213,11 +213,12 @@ std::vector<Vec3d> plain_corner_normals(const Scene& s, double crease_degrees) {
   const size_t corners = 3 * s.triangles.size();
   auto place = [&](size_t c) { return s.positions[s.triangles[c / 3].v[c % 3]]; };
   auto normal = [&](size_t t) {
-    return normalize(cross(Vec3d(place(3 * t + 1)) - Vec3d(place(3 * t)), Vec3d(place(3 * t + 2)) - Vec3d(place(3 * t))));
+    return normalize(
+        cross(Vec3d(place(3 * t + 1)) - Vec3d(place(3 * t)), Vec3d(place(3 * t + 2)) - Vec3d(place(3 * t))));
   };
   auto angle = [&](size_t c) {
     const Vec3d p(place(c)), a = normalize(Vec3d(place(c / 3 * 3 + (c + 1) % 3)) - p),
-                b = normalize(Vec3d(place(c / 3 * 3 + (c + 2) % 3)) - p);
+                             b = normalize(Vec3d(place(c / 3 * 3 + (c + 2) % 3)) - p);
     return std::acos(std::clamp(dot(a, b), -1.0, 1.0));
   };
   auto share_an_edge_at = [&](size_t c, size_t d) {
@@ -253,7 +254,8 @@ TEST(MakeNormals, AgreesWithThePlainDefinition) {
       for (int j = 0; j < n; ++j) {
         const float tilt = pi * (float(i) + 0.01f) / (float(n) + 0.02f), turn = 2 * pi * float(j) / n;
         const float r = 1 + 0.15f * float(kind % 6) * random.next();
-        s.positions.push_back(r * Vec3(std::sin(tilt) * std::cos(turn), std::cos(tilt), std::sin(tilt) * std::sin(turn)));
+        s.positions.push_back(r *
+                              Vec3(std::sin(tilt) * std::cos(turn), std::cos(tilt), std::sin(tilt) * std::sin(turn)));
       }
     auto add = [&](int a, int b, int c) {
       if (kind >= 6 && random.next() < 0.2f) return;

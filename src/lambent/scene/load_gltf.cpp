@@ -370,7 +370,7 @@ bool read_scene(GltfCheck& check, GltfDocument& document, std::span<const uint8_
   if (scene.triangles.empty()) return check.fail({}, "no triangles");
   bool usable = false;
   for (size_t t = 0; t < scene.triangles.size() && !usable; ++t) {
-    usable = length(area_normal(scene, scene.triangles[t])) > 0;
+    usable = area_length(area_normal(scene, scene.triangles[t])) > 0;
   }
   if (!usable) return check.fail({}, "no triangles that have an area");
 

@@ -121,9 +121,9 @@ TEST(LoadMtl, PicturesAreFoundByTheirLastSteps) {
   folder.write("textures/tile.png", tiny_png());
   folder.write("scene/maps/tile.png", tiny_png());
   folder.write("secret.png", tiny_png());
-  for (const char* name : {"Brick.PNG", "C:\\projects\\yard\\brick.png", "/home/me/Brick.png", "..\\Brick.PNG",
-                           "textures/tile.png", "D:/yard/Textures/TILE.png", "\\\\server\\share\\textures\\tile.png",
-                           "../../textures/./tile.png"}) {
+  for (const char* name :
+       {"Brick.PNG", "C:\\projects\\yard\\brick.png", "/home/me/Brick.png", "..\\Brick.PNG", "textures/tile.png",
+        "D:/yard/Textures/TILE.png", "\\\\server\\share\\textures\\tile.png", "../../textures/./tile.png"}) {
     Scene s = with_material(folder, fmt::format("map_Kd {}\n", name));
     EXPECT_EQ(s.materials[0].base_color_texture, 0) << name;
     EXPECT_TRUE(s.warnings.empty()) << name;
@@ -199,7 +199,8 @@ TEST(LoadMtl, DissolvesByNumberAndMap) {
     EXPECT_TRUE(s.warnings.empty());
     ASSERT_EQ(s.materials[0].base_color_texture, 0) << mtl;
     EXPECT_TRUE(is_blended(s.materials[0]));
-    EXPECT_NEAR(sample_alpha(s.textures[0], {0.5f, s.textures[0].height == 2 ? 0.75f : 0.99f}), 128 / 255.0f, 0.01f) << mtl;
+    EXPECT_NEAR(sample_alpha(s.textures[0], {0.5f, s.textures[0].height == 2 ? 0.75f : 0.99f}), 128 / 255.0f, 0.01f)
+        << mtl;
   }
   // Colours' own alpha says nothing where no map_d asks for it.
   EXPECT_FALSE(is_blended(with_material(folder, "map_Kd both.tga\n").materials[0]));

@@ -103,8 +103,7 @@ TEST(LoadObj, BrokenVerticesCostTheFacesThatUseThem) {
     EXPECT_EQ(used.triangles.size(), 1u);
     EXPECT_EQ(used.positions, unused.positions);
     ASSERT_EQ(used.warnings.size(), 1u);
-    EXPECT_EQ(used.warnings[0],
-              "t.obj: 2 faces left out: they use vertices that are not finite or beyond 1e9");
+    EXPECT_EQ(used.warnings[0], "t.obj: 2 faces left out: they use vertices that are not finite or beyond 1e9");
     EXPECT_EQ(error_of(three + v + "\nf 1 2 4\n"),
               "t.obj: no triangles: 1 faces use vertices that are not finite or beyond 1e9");
   }

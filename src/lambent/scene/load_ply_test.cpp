@@ -236,12 +236,14 @@ TEST(LoadPly, MissingPointsDoNoHarm) {
 TEST(LoadPly, TextureCoordinatesAtFaces) {
   test::TemporaryFolder folder;
   folder.write("red blue.png", test::tiny_png());
-  const std::string xyz = "property float x\nproperty float y\nproperty float z\n", square = "0 0 0\n1 0 0\n1 1 0\n0 1 0\n",
+  const std::string xyz = "property float x\nproperty float y\nproperty float z\n",
+                    square = "0 0 0\n1 0 0\n1 1 0\n0 1 0\n",
                     head = "ply\nformat ascii 1.0\ncomment VCGLIB generated\ncomment TextureFile red blue.png\n";
   auto at_faces = [&](const std::string& lists) {
     return head + "element vertex 4\n" + xyz +
            "element face 2\nproperty list uchar int vertex_indices\nproperty list uchar float texcoord\n"
-           "property int texnumber\nend_header\n" + square + lists;
+           "property int texnumber\nend_header\n" +
+           square + lists;
   };
   const std::string by_faces = at_faces("3 0 1 2 6 0 0 0.25 0 0.25 1 0\n3 0 2 3 6 0.75 0 1 1 1 0.5 0\n");
   const std::string by_vertices =

@@ -138,6 +138,19 @@ inline Vec3 area_normal(const Scene& s, const Triangle& t) {
   return cross(s.positions[t.v[1]] - s.positions[t.v[0]], s.positions[t.v[2]] - s.positions[t.v[0]]);
 }
 
+// Its length: twice the area. Squares that floats cannot hold, of very small or large scenes, are summed in double.
+inline float area_length(Vec3 area_normal) {
+  const float squared = dot(area_normal, area_normal);
+  return squared > 1e-30f && squared < 1e36f ? std::sqrt(squared) : float(length(Vec3d(area_normal)));
+}
+
+// The unit normal along it, or `fallback` for a triangle without an area.
+inline Vec3 unit_normal(const Scene& s, const Triangle& t, Vec3 fallback = Vec3(0)) {
+  const Vec3 n = area_normal(s, t);
+  const float twice_area = area_length(n);
+  return twice_area > 0 && std::isfinite(twice_area) ? n / twice_area : fallback;
+}
+
 // Barycentric interpolation at weight (1-u-v, u, v) of the triangle's corners.
 template <class T>
 T interpolate(const std::vector<T>& values, const Triangle& t, float u, float v) {

@@ -71,8 +71,7 @@ Result<std::vector<uint8_t>> png_from(std::span<const uint8_t> encoded, const st
   constexpr size_t widest = 8;  // four channels of 16 bits
   padded.resize(std::min<size_t>(padded.size() + widest * size_t(width) * size_t(height), INT_MAX));
   const int wanted = channels == 2 || channels == 4 ? 4 : 3;
-  stbi_uc* pixels =
-      stbi_load_from_memory(padded.data(), int(padded.size()), &width, &height, &channels, wanted);
+  stbi_uc* pixels = stbi_load_from_memory(padded.data(), int(padded.size()), &width, &height, &channels, wanted);
   if (!pixels) return Error{where, std::string("cannot be decoded: ") + stbi_failure_reason()};
   std::vector<uint8_t> result;
   bool written = encode_png(pixels, width, height, wanted, result);
