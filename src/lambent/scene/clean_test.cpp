@@ -309,7 +309,8 @@ TEST(CornerFans, RingsAreWhatTheySay) {
     }
   }
   std::swap(cube.triangles[0].v[0], cube.triangles[0].v[1]);  // runs the wrong way: its corners are in no ring
-  EXPECT_EQ(std::count(corner_fans(cube).is_ring.begin(), corner_fans(cube).is_ring.end(), 1), 5);
+  const CornerFans turned = corner_fans(cube);
+  EXPECT_EQ(std::count(turned.is_ring.begin(), turned.is_ring.end(), 1), 5);
   cube = bare_cube();
   cube.triangles.pop_back(), --cube.parts[0].triangle_count;
   const CornerFans open = corner_fans(cube);

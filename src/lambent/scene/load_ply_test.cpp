@@ -245,13 +245,13 @@ TEST(LoadPly, TextureCoordinatesAtFaces) {
            "property int texnumber\nend_header\n" +
            square + lists;
   };
-  const std::string by_faces = at_faces("3 0 1 2 6 0 0 0.25 0 0.25 1 0\n3 0 2 3 6 0.75 0 1 1 1 0.5 0\n");
+  const std::string by_faces = at_faces("3 0 1 2 6 0.25 0 0 0 0.5 1 0\n3 0 2 3 6 0.75 0 1 1 1 0.5 0\n");
   const std::string by_vertices =
       head + "element vertex 6\n" + xyz + "property float s\nproperty float t\nelement face 2\n" +
-      "property list uchar int vertex_indices\nend_header\n0 0 0 0 0\n1 0 0 0.25 0\n1 1 0 0.25 1\n0 0 0 0.75 0\n"
+      "property list uchar int vertex_indices\nend_header\n0 0 0 0.25 0\n1 0 0 0 0\n1 1 0 0.5 1\n0 0 0 0.75 0\n"
       "1 1 0 1 1\n0 1 0 1 0.5\n3 0 1 2\n3 3 4 5\n";
   const std::string obj =
-      "v 0 0 0\nv 1 0 0\nv 1 1 0\nv 0 1 0\nvt 0 0\nvt 0.25 0\nvt 0.25 1\nvt 0.75 0\nvt 1 1\nvt 1 0.5\n"
+      "v 0 0 0\nv 1 0 0\nv 1 1 0\nv 0 1 0\nvt 0.25 0\nvt 0 0\nvt 0.5 1\nvt 0.75 0\nvt 1 1\nvt 1 0.5\n"
       "f 1/1 2/2 3/3\nf 1/4 3/5 4/6\n";
   auto corners = [](const Scene& s) {  // position and coordinates of each corner
     std::vector<std::pair<Vec3, Vec2>> out;
