@@ -194,13 +194,13 @@ TEST(LoadMtl, DissolvesByNumberAndMap) {
     EXPECT_EQ(m.alpha, alpha) << mtl;
     EXPECT_EQ(is_blended(m), alpha < 1) << mtl;
   }
-  for (const char* mtl : {"map_d mask.tga\n", "map_Kd both.tga\nmap_d mask.tga\n", "map_Kd both.tga\nmap_d both.tga\n"}) {
+  for (const char* mtl :
+       {"map_d mask.tga\n", "map_Kd both.tga\nmap_d mask.tga\n", "map_Kd both.tga\nmap_d both.tga\n"}) {
     Scene s = with_material(folder, mtl);
     EXPECT_TRUE(s.warnings.empty());
     ASSERT_EQ(s.materials[0].base_color_texture, 0) << mtl;
     EXPECT_TRUE(is_blended(s.materials[0]));
-    EXPECT_NEAR(sample_alpha(s.textures[0], {0.5f, 0.75f}), 128 / 255.0f, 0.01f)
-        << mtl;
+    EXPECT_NEAR(sample_alpha(s.textures[0], {0.5f, 0.75f}), 128 / 255.0f, 0.01f) << mtl;
   }
   // Colours' own alpha says nothing where no map_d asks for it.
   EXPECT_FALSE(is_blended(with_material(folder, "map_Kd both.tga\n").materials[0]));

@@ -2,7 +2,6 @@
 #include <lambent/scene/mesh_file.h>
 #include <lambent/scene/mesh_text.h>
 
-#include <fmt/format.h>
 #include <gtest/gtest.h>
 
 #include <numeric>
@@ -106,31 +105,6 @@ TEST(LoadObj, BrokenVerticesCostTheFacesThatUseThem) {
     EXPECT_EQ(used.warnings[0], "t.obj: 2 faces left out: they use vertices that are not finite or beyond 1e9");
     EXPECT_EQ(error_of(three + v + "\nf 1 2 4\n"),
               "t.obj: no triangles: 1 faces use vertices that are not finite or beyond 1e9");
-  }
-}
-
-TEST(LoadObj, SurveyedCoordinatesKeepTheirMillimetres) {
-  // A shed of 4 x 3 x 5 m in UTM coordinates whose corners have millimetres; the same about 0 is the truth.
-  const Vec3d size(4.123, 3.017, 5.031), far(431234.567, 251.25, 5412345.678);
-  for (double sign : {1.0, -1.0}) {
-    std::string near_text, far_text;
-    for (int i = 0; i < 8; ++i) {
-      Vec3d p(i & 1 ? size.x : 0, i & 2 ? size.y : 0, i & 4 ? size.z : 0), q = p + far * sign;
-      near_text += fmt::format("v {:.3f} {:.3f} {:.3f}\n", p.x, p.y, p.z);
-      far_text += fmt::format("v {:.3f} {:.3f} {:.3f}\n", q.x, q.y, q.z);
-    }
-    const std::string faces = "f 1 5 7 3\nf 2 4 8 6\nf 1 2 6 5\nf 3 7 8 4\nf 1 3 4 2\nf 5 6 8 7\n";
-    Scene near = must_load(near_text + faces), far_scene = must_load("v 0 0 0\n" + far_text + "f -8 -4 -2 -6\n" +
-                                                                     "f -7 -5 -1 -3\nf -8 -7 -3 -4\nf -6 -2 -1 -5\n"
-                                                                     "f -8 -6 -5 -7\nf -4 -3 -1 -2\n");
-    EXPECT_EQ(near.origin, Vec3d(0));
-    EXPECT_NE(far_scene.origin, Vec3d(0));
-    ASSERT_EQ(far_scene.positions.size(), near.positions.size());
-    for (size_t v = 0; v < near.positions.size(); ++v) {
-      Vec3d p = Vec3d(far_scene.positions[v]) + far_scene.origin - far * sign;
-      EXPECT_LT(length(p - Vec3d(near.positions[v])), 2e-6) << v;  // half a float's step at 16 m, thrice
-    }
-    for (int k = 0; k < 3; ++k) EXPECT_EQ(far_scene.origin[k], double(float(far_scene.origin[k])));
   }
 }
 

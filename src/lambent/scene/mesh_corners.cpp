@@ -95,7 +95,7 @@ class Assembler {
 LeftOut assemble_mesh(const CornerMesh& mesh, Scene& scene) { return Assembler(mesh, scene).assemble(); }
 
 Vec3d far_origin(Vec3d low, Vec3d high) {
-  constexpr double far = 16;  // sizes: floats then lose 4 of their 24 bits
+  constexpr double far = 100;  // sizes: floats then lose 7 of their 24 bits
   if (!(low.x <= high.x)) return Vec3d(0);
   Vec3d size = high - low, reach = max(-1.0 * low, high);
   double extent = std::max({size.x, size.y, size.z}), farthest = std::max({reach.x, reach.y, reach.z});
