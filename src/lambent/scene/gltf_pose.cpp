@@ -169,12 +169,14 @@ bool read_pose(GltfCheck& check, const GltfDocument& document, GltfPose& pose) {
 Vec3d document_origin(const GltfDocument& document, const GltfPose& pose) {
   const Json& json = document.json;
   GltfCheck check("");
+  constexpr size_t enough = 100'000;  // nodes and primitives that share each other could be without end
+  size_t visited = 0;
   Vec3d low(INFINITY), high(-INFINITY), first(0);
   for (size_t n : pose.shown) {
     const Json& node = gltf_item(json, "nodes", n);
     auto mesh = check.index(node, "mesh", gltf_count(json, "meshes"), {});
     const Json* primitives = mesh ? check.array(gltf_item(json, "meshes", *mesh), "primitives", {}) : nullptr;
-    for (size_t i = 0; primitives && i < primitives->size(); ++i) {
+    for (size_t i = 0; primitives && i < primitives->size() && visited < enough; ++i, ++visited) {
       const Json* attributes = check.object((*primitives)[i], "attributes", {});
       auto positions = attributes ? check.index(*attributes, "POSITION", gltf_count(json, "accessors"), {})
                                   : std::nullopt;
