@@ -33,6 +33,7 @@ std::optional<Scene> data_scene(const std::string& name, bool ground);
 void bench_bake();
 void bench_basis();
 void bench_lightmaps();
+void bench_load();
 void bench_products();
 void bench_radiosity();
 void bench_relight();

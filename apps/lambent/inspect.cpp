@@ -16,6 +16,7 @@ namespace lambent::tool {
 namespace {
 
 nlohmann::json vector_json(Vec3 v) { return {v.x, v.y, v.z}; }
+nlohmann::json place_json(Vec3 v, Vec3d origin) { return {v.x + origin.x, v.y + origin.y, v.z + origin.z}; }
 
 nlohmann::json describe_scene(const Scene& scene) {
   const Bounds box = bounds(scene);
@@ -33,7 +34,7 @@ nlohmann::json describe_scene(const Scene& scene) {
           {"parts", scene.parts.size()},
           {"textures", scene.textures.size()},
           {"materials", materials},
-          {"bounds", {{"min", vector_json(box.min)}, {"max", vector_json(box.max)}}},
+          {"bounds", {{"min", place_json(box.min, scene.origin)}, {"max", place_json(box.max, scene.origin)}}},
           {"receivers", make_vertex_receivers(scene).count()},
           {"warnings", scene.warnings}};
 }

@@ -150,22 +150,46 @@ export class Viewer {
   }
 
   /**
-   * From the front right and a little above, all of it in view: the camera of `lambent render --camera auto`, from
-   * farther off where the page is narrow.
+   * From the front right and a little above, all of it just in view: the camera of `lambent render --camera auto`
+   * (camera_around of core/camera.h) in the canvas as it is now.
    */
   frameAll(): void {
     const root = this.baked?.root;
     if (!root) return;
     root.updateMatrixWorld(true);
-    const box = new Box3();
-    root.traverse((o) => void ((o as Mesh).isMesh && !isGround(o) && box.expandByObject(o, true)));
-    if (box.isEmpty()) box.setFromObject(root, true);
+    const meshes: Mesh[] = [];
+    root.traverse((o) => void ((o as Mesh).isMesh && meshes.push(o as Mesh)));
+    const subject = meshes.filter((mesh) => !isGround(mesh));
     this.camera.fov = 35;
-    const centre = box.getCenter(new Vector3()),
-      radius = Math.max(box.getSize(new Vector3()).length() / 2, 1e-6);
-    const narrow = Math.max(1, this.canvas.clientHeight / Math.max(1, this.canvas.clientWidth));
-    const distance = (radius / Math.sin((35 * Math.PI) / 360)) * 0.95 * narrow;
-    this.orbit.look(new Vector3(0.55, 0.4, 1).normalize().multiplyScalar(distance).add(centre), centre);
+    const forward = new Vector3(-0.55, -0.4, -1).normalize(),
+      side = new Vector3().crossVectors(forward, new Vector3(0, 1, 0)).normalize(),
+      up = new Vector3().crossVectors(side, forward);
+    const margin = 0.02,
+      tanY = Math.tan((35 * Math.PI) / 360) * (1 - 2 * margin),
+      tanX = (tanY * Math.max(1, this.canvas.clientWidth)) / Math.max(1, this.canvas.clientHeight);
+    // What bounds the points from the right, the left, above, below, before and behind, in the axes of the view.
+    const most = new Array<number>(6).fill(-Infinity),
+      point = new Vector3();
+    for (const mesh of subject.length ? subject : meshes) {
+      const { count } = mesh.geometry.getAttribute('position');
+      for (let i = 0; i < count; ++i) {
+        mesh.getVertexPosition(i, point).applyMatrix4(mesh.matrixWorld);
+        const x = point.dot(side),
+          y = point.dot(up),
+          z = point.dot(forward);
+        [x - tanX * z, -x - tanX * z, y - tanY * z, -y - tanY * z, -z, z].forEach((bound, k) => {
+          if (bound > most[k]!) most[k] = bound;
+        });
+      }
+    }
+    const [right, left, top, bottom, near, far] = most as [number, number, number, number, number, number];
+    if (!(near + far >= 0)) return;
+    const z = Math.min(-(right + left) / (2 * tanX), -(top + bottom) / (2 * tanY));
+    const eye = new Vector3()
+      .addScaledVector(side, (right - left) / 2)
+      .addScaledVector(up, (top - bottom) / 2)
+      .addScaledVector(forward, z);
+    this.orbit.look(eye, eye.clone().addScaledVector(forward, (far - near) / 2 - z));
   }
 
   /** The light, its order or its window are others now. */

@@ -72,7 +72,7 @@ Lamps make_lamps(const Scene& scene, const Environment* sky, bool separate) {
     const Triangle& triangle = scene.triangles[t];
     const uint32_t m = scene.parts[triangle.part].material;
     const Material& material = scene.materials[m];
-    const float area = 0.5f * length(area_normal(scene, triangle));
+    const float area = 0.5f * area_length(area_normal(scene, triangle));
     if (!(largest(material.emissive) > 0) || !(area > 0)) continue;
     if (material_group[m] == none)
       material_group[m] = group_of(material.name.empty() ? "material " + std::to_string(m) : material.name);
@@ -141,7 +141,7 @@ void sample_lamps(const Scene& scene, const Tracer& tracer, const Lamps& lamps, 
       if (!(distance2 > 0)) continue;
       const float distance = std::sqrt(distance2);
       const Vec3 d = to / distance;
-      const float cosine = dot(normal, d), facing = -dot(normalize_or(area_normal(scene, t), Vec3(0)), d);
+      const float cosine = dot(normal, d), facing = -dot(unit_normal(scene, t), d);
       if (!(cosine > 0) || !emits(scene, t, facing > 0) || facing == 0) continue;
       const double density = lamp.density * double(distance2) / double(std::abs(facing));
       add(lamp.group, d, balanced(emission(scene, t, 1 - root, v), cosine, density, samples, rays), lamp.triangle,
@@ -175,7 +175,7 @@ LampLight met_lamp(const Scene& scene, const Lamps& lamps, uint32_t index, const
                    int samples, size_t rays) {
   const AreaLamp& lamp = lamps.area[index];
   const Triangle& t = scene.triangles[lamp.triangle];
-  const float facing = std::abs(dot(normalize_or(area_normal(scene, t), Vec3(0)), direction));
+  const float facing = std::abs(dot(unit_normal(scene, t), direction));
   const double density = lamp.density * double(hit.distance) * double(hit.distance) / double(std::max(facing, 1e-30f));
   return {lamp.group, direction, balanced(emission(scene, t, hit.u, hit.v), cosine, density, samples, rays)};
 }

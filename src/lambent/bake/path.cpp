@@ -11,7 +11,7 @@ PathEnd follow_path(const Scene& scene, const Tracer& tracer, const Reflection& 
   for (int bounce = 0; bounce < reflections; ++bounce) {
     const Triangle& triangle = scene.triangles[hit.triangle];
     if (!hit.front && !triangle.two_sided) break;
-    const Vec3 up = area_normal(scene, triangle) * (hit.front ? 1.0f : -1.0f), ng = normalize_or(up, Vec3(0));
+    const Vec3 ng = unit_normal(scene, triangle) * (hit.front ? 1.0f : -1.0f);
     Vec3 n = normalize_or(interpolate(scene.normals, triangle, hit.u, hit.v), ng);
     if (dot(n, ng) < 0) n = -n;
     const Mat3 frame = shading_frame(scene, triangle, n);

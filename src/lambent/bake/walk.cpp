@@ -29,9 +29,7 @@ Vec3 Walker::beside(const Hit& hit, Vec3 normal, float up) const {
   return p + normal * (up * 1e-5f * largest(size));
 }
 
-Vec3 Walker::normal(const Hit& hit) const {
-  return normalize_or(area_normal(scene, scene.triangles[hit.triangle]), Vec3(0));
-}
+Vec3 Walker::normal(const Hit& hit) const { return unit_normal(scene, scene.triangles[hit.triangle]); }
 
 bool Walker::keep(Vec3& p) const {
   if (options.period > 0) {

@@ -1,5 +1,5 @@
-// The one place where the stb single-header libraries are compiled. PNG and JPEG only: .hdr and .exr have readers of
-// their own.
+// The one place where the stb single-header libraries are compiled. GIF is left out, whose decoder is the one with a
+// history of memory errors, and HDR: .hdr and .exr have readers of their own.
 #if defined(__GNUC__)
 #pragma GCC diagnostic ignored "-Wunused-function"
 #pragma GCC diagnostic ignored "-Wunused-but-set-variable"
@@ -14,6 +14,10 @@
 
 #define STBI_ONLY_PNG
 #define STBI_ONLY_JPEG
+#define STBI_ONLY_TGA
+#define STBI_ONLY_BMP
+#define STBI_ONLY_PSD
+#define STBI_ONLY_PNM
 #define STBI_NO_STDIO
 #define STBI_NO_LINEAR
 #define STBI_FAILURE_USERMSG

@@ -279,9 +279,14 @@ Result<Bake> begin(const BakeRequest& request, const BakePlan& plan, const Job& 
   start = Clock::now();
   auto tracer = Tracer::build(*scene, job.progress);
   if (!tracer) return tracer.error();
-  Bake b{request, plan, job, std::move(*scene), std::move(*placed), std::move(*tracer)};
-  b.load_seconds = load_seconds, b.build_seconds = seconds_since(start);
-  return b;
+  return Bake{request,
+              plan,
+              job,
+              std::move(*scene),
+              std::move(*placed),
+              std::move(*tracer),
+              load_seconds,
+              seconds_since(start)};
 }
 
 // Stages after the surfaces' own, in their order; each takes a dense store.

@@ -38,7 +38,7 @@ const Option<R> table[] = {
      "vertices",
      0, 0, "vertices|texels|patches"},
     {"texels-per-unit", &R::texels_per_unit, "What is baked", D | L,
-     "Texels along one scene unit; the atlas is as large as that needs", 1e-9, 1e9, nullptr, "receivers=texels"},
+     "Texels along one scene unit; the atlas is as large as that needs", 1e-12, 1e12, nullptr, "receivers=texels"},
     {"atlas", &R::atlas, "What is baked", D | L,
      "WIDTHxHEIGHT of the atlas; texels are as small as that allows (1024x1024 if nothing is said)", 0, 0, nullptr,
      "receivers=texels"},
@@ -55,7 +55,7 @@ const Option<R> table[] = {
     {"seed", &R::seed, "How well", traced, "Of the ray directions"},
 
     {"ground", &R::ground, "Scene", every, "Add a tessellated floor under the scene"},
-    {"max-edge", &R::max_edge, "Scene", every, "Split edges longer than this many scene units", 1e-9, 1e9},
+    {"max-edge", &R::max_edge, "Scene", every, "Split edges longer than this many scene units", 1e-12, 1e12},
     {"emit", &R::emit, "Scene", every, "MATERIAL=R,G,B: make a material a lamp of this radiance"},
     {"max-albedo", &R::max_albedo, "Scene", every, "Darken base colours to at most this, channel by channel", 0, 1},
 

@@ -57,7 +57,7 @@ struct ColumnDrawing {
 
 Result<void> choose_light(ColumnDrawing& d) {
   const LightBasis basis = light_of(d.baked.surface.store);
-  auto light = column_light(d.request, d.around, basis);
+  auto light = column_light(d.request, d.around, basis, d.scene().origin);
   if (!light) return light.error();
   d.light = std::move(*light);
   if (d.show.part != Show::Part::bounce) d.emission = seen_emission(d.scene(), basis, d.light.lamps);
@@ -182,7 +182,7 @@ Result<Drawing> draw_columns(const Baked& baked, const DrawRequest& request, con
   if (!show) return show.error();
   ColumnDrawing d{baked, request, job, *show};
   for (const std::string& text : request.insert) {
-    auto insertion = parse_insertion(text);
+    auto insertion = parse_insertion(text, baked.scene.origin);
     if (!insertion) return insertion.error();
     d.insertions.push_back(std::move(*insertion));
   }

@@ -41,10 +41,11 @@ Result<std::vector<Vec3>> lamps_of(const DrawRequest& request, const LightBasis&
 
 }  // namespace
 
-Result<ColumnLight> column_light(const DrawRequest& request, const Surroundings& around, const LightBasis& basis) {
+Result<ColumnLight> column_light(const DrawRequest& request, const Surroundings& around, const LightBasis& basis,
+                                 Vec3d origin) {
   auto window = parse_window(request.window);
   if (!window) return window.error();
-  auto near = parse_sphere_lamps(request.sphere_lamp);
+  auto near = parse_sphere_lamps(request.sphere_lamp, origin);
   if (!near) return near.error();
   auto lamps = lamps_of(request, basis);
   if (!lamps) return lamps.error();

@@ -26,7 +26,8 @@ struct ColumnLight {
   // Of each place its own, distant light included.
   LocalLight local() const { return {projection.light, near, projection.window}; }
 };
-Result<ColumnLight> column_light(const DrawRequest& request, const Surroundings& around, const LightBasis& basis);
+Result<ColumnLight> column_light(const DrawRequest& request, const Surroundings& around, const LightBasis& basis,
+                                 Vec3d origin);
 
 // What each material's surfaces emit, as they are seen; empty without groups.
 std::vector<Vec3> seen_emission(const Scene& scene, const LightBasis& basis, const std::vector<Vec3>& lamps);

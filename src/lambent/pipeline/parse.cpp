@@ -13,14 +13,17 @@
 
 namespace lambent {
 
-Result<std::vector<float>> parse_numbers(const std::string& text, size_t count, const std::string& option) {
-  std::vector<float> values;
+namespace {
+
+template <class T>
+Result<std::vector<T>> parse_values(const std::string& text, size_t count, const std::string& option) {
+  std::vector<T> values;
   const char* p = text.data();
   const char* end = p + text.size();
   while (true) {
-    float value = 0;
+    T value = 0;
     auto [next, status] = std::from_chars(p, end, value);
-    if (status != std::errc() || !std::isfinite(value)) break;
+    if (status != std::errc() || !std::isfinite(float(value))) break;
     values.push_back(value), p = next;
     if (p == end || *p != ',') break;
     ++p;
@@ -29,6 +32,17 @@ Result<std::vector<float>> parse_numbers(const std::string& text, size_t count, 
     return Error{option, "expects " + std::to_string(count) + " numbers separated by commas, not \"" + text + "\"",
                  true};
   return values;
+}
+
+// A place of the file's space in the scene's.
+Vec3 place(const std::vector<double>& numbers, size_t first, Vec3d origin) {
+  return Vec3(Vec3d(numbers[first], numbers[first + 1], numbers[first + 2]) - origin);
+}
+
+}  // namespace
+
+Result<std::vector<float>> parse_numbers(const std::string& text, size_t count, const std::string& option) {
+  return parse_values<float>(text, count, option);
 }
 
 Result<NamedColor> parse_named_color(const std::string& text, const std::string& option) {
@@ -52,12 +66,12 @@ Result<std::array<int, 2>> parse_size(const std::string& text, const std::string
   return size;
 }
 
-Result<std::optional<Camera>> parse_camera(const std::string& text) {
+Result<std::optional<Camera>> parse_camera(const std::string& text, Vec3d origin) {
   if (text == "auto") return std::optional<Camera>();
-  auto n = parse_numbers(text, 7, "--camera");
+  auto n = parse_values<double>(text, 7, "--camera");
   if (!n) return n.error();
   Camera camera;
-  camera.eye = {(*n)[0], (*n)[1], (*n)[2]}, camera.target = {(*n)[3], (*n)[4], (*n)[5]}, camera.fov = (*n)[6];
+  camera.eye = place(*n, 0, origin), camera.target = place(*n, 3, origin), camera.fov = float((*n)[6]);
   if (!(camera.fov > 0 && camera.fov < 180))
     return Error{"--camera", "field of view must lie between 0 and 180 degrees", true};
   if (camera.eye == camera.target) return Error{"--camera", "eye and target are the same point", true};
@@ -67,12 +81,18 @@ Result<std::optional<Camera>> parse_camera(const std::string& text) {
 namespace {
 
 // What there is to look at: everything but an added floor, unless there is nothing else.
-Bounds subject_bounds(const Scene& scene) {
-  Bounds box;
-  for (const Triangle& t : scene.triangles)
-    if (scene.parts[t.part].name != ground_name)
-      for (uint32_t v : t.v) box.extend(scene.positions[v]);
-  return box.empty() ? bounds(scene) : box;
+std::vector<Vec3> subject(const Scene& scene) {
+  for (bool with_ground : {false, true}) {
+    std::vector<bool> seen(scene.positions.size());
+    for (const Triangle& t : scene.triangles)
+      if (with_ground || scene.parts[t.part].name != ground_name)
+        for (uint32_t v : t.v) seen[v] = true;
+    std::vector<Vec3> points;
+    for (size_t v = 0; v < seen.size(); ++v)
+      if (seen[v]) points.push_back(scene.positions[v]);
+    if (!points.empty()) return points;
+  }
+  return {};
 }
 
 }  // namespace
@@ -82,9 +102,9 @@ Result<View> parse_view(const std::string& camera_text, const std::string& size_
   auto size = parse_size(size_text, "--size");
   if (!size) return size.error();
   view.width = (*size)[0], view.height = (*size)[1];
-  auto camera = parse_camera(camera_text);
+  auto camera = parse_camera(camera_text, scene.origin);
   if (!camera) return camera.error();
-  view.camera = *camera ? **camera : camera_around(subject_bounds(scene));
+  view.camera = *camera ? **camera : camera_around(subject(scene), float(view.width) / float(view.height));
   return view;
 }
 
@@ -105,16 +125,16 @@ Result<ShWindow> parse_window(const std::string& text) {
   return found->second;
 }
 
-Result<std::vector<SphereLamp>> parse_sphere_lamps(const std::vector<std::string>& texts) {
+Result<std::vector<SphereLamp>> parse_sphere_lamps(const std::vector<std::string>& texts, Vec3d origin) {
   std::vector<SphereLamp> lamps;
   for (const std::string& text : texts) {
-    auto n = parse_numbers(text, 7, "--sphere-lamp");
+    auto n = parse_values<double>(text, 7, "--sphere-lamp");
     if (!n) return n.error();
-    const std::vector<float>& v = *n;
-    const SphereLamp lamp{{v[0], v[1], v[2]}, v[3], {v[4], v[5], v[6]}};
+    const std::vector<double>& v = *n;
+    const SphereLamp lamp{place(v, 0, origin), float(v[3]), {v[4], v[5], v[6]}};
     if (!(lamp.radius > 0)) return Error{"--sphere-lamp", "the radius must be above 0", true};
-    for (float x : v)
-      if (std::abs(x) > 1e9f) return Error{"--sphere-lamp", "numbers must lie within 1e9", true};
+    for (double x : v)
+      if (std::abs(x) > 1e9) return Error{"--sphere-lamp", "numbers must lie within 1e9", true};
     lamps.push_back(lamp);
   }
   return lamps;
@@ -145,15 +165,15 @@ Result<std::vector<double>> parse_frames(const std::string& text) {
   return times;
 }
 
-Result<Insertion> parse_insertion(const std::string& text) {
+Result<Insertion> parse_insertion(const std::string& text, Vec3d origin) {
   const size_t at = text.rfind('@');
   if (at == std::string::npos || at == 0)
     return Error{"--insert", "expects FILE@X,Y,Z or FILE@X,Y,Z,SCALE, not \"" + text + "\"", true};
-  const std::string place = text.substr(at + 1);
-  const bool scaled = std::count(place.begin(), place.end(), ',') == 3;
-  auto n = parse_numbers(place, scaled ? 4 : 3, "--insert");
+  const std::string numbers = text.substr(at + 1);
+  const bool scaled = std::count(numbers.begin(), numbers.end(), ',') == 3;
+  auto n = parse_values<double>(numbers, scaled ? 4 : 3, "--insert");
   if (!n) return n.error();
-  Insertion out{text.substr(0, at), {(*n)[0], (*n)[1], (*n)[2]}, scaled ? (*n)[3] : 1};
+  Insertion out{text.substr(0, at), place(*n, 0, origin), scaled ? float((*n)[3]) : 1};
   if (!(out.scale > 0)) return Error{"--insert", "the scale must be above 0", true};
   if (!all_at_most(abs(out.foot), Vec3(1e9f))) return Error{"--insert", "the place lies beyond 1e9", true};
   return out;

@@ -30,10 +30,11 @@ Result<NamedColor> parse_named_color(const std::string& text, const std::string&
 // "WIDTHxHEIGHT", each from 1 to 16384.
 Result<std::array<int, 2>> parse_size(const std::string& text, const std::string& option);
 
-// "EX,EY,EZ,TX,TY,TZ,FOV": eye, target, vertical degrees; nothing for "auto".
-Result<std::optional<Camera>> parse_camera(const std::string& text);
+// "EX,EY,EZ,TX,TY,TZ,FOV": eye, target, vertical degrees; nothing for "auto". Here and below places
+// are in the file's space, and `origin` is Scene::origin.
+Result<std::optional<Camera>> parse_camera(const std::string& text, Vec3d origin = Vec3d(0));
 
-// A camera and a picture's size; "auto" looks at the whole scene, an added floor left out.
+// A camera and a picture's size; "auto" just fits the whole scene in, an added floor left out.
 struct View {
   Camera camera;
   int width = 0, height = 0;
@@ -48,7 +49,7 @@ extern const std::map<std::string, ShWindow> window_names;
 Result<ShWindow> parse_window(const std::string& text);
 
 // "X,Y,Z,RADIUS,R,G,B" each.
-Result<std::vector<SphereLamp>> parse_sphere_lamps(const std::vector<std::string>& texts);
+Result<std::vector<SphereLamp>> parse_sphere_lamps(const std::vector<std::string>& texts, Vec3d origin = Vec3d(0));
 
 // "FROM:TO[:STEP]", seconds: at most 64 times.
 Result<std::vector<double>> parse_frames(const std::string& text);
@@ -59,7 +60,7 @@ struct Insertion {
   Vec3 foot;
   float scale = 1;
 };
-Result<Insertion> parse_insertion(const std::string& text);
+Result<Insertion> parse_insertion(const std::string& text, Vec3d origin = Vec3d(0));
 
 // "diffuse", "materials", or a BRDF (brdf/parse_brdf.h) for all surfaces; reads measured ones from their files.
 Result<Reflection> parse_reflection(const std::string& text);

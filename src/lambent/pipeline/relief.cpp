@@ -40,7 +40,7 @@ Result<void> displace_scene(Scene& scene, const Displacement& o) {
   for (const Triangle& t : scene.triangles) {
     const Vec2 a = (uv[t.v[1]] - uv[t.v[0]]) * repeat, b = (uv[t.v[2]] - uv[t.v[0]]) * repeat;
     const double c = std::abs(double(a.x) * b.y - double(a.y) * b.x);
-    if (c > 0) covered += c, area += length(area_normal(scene, t));
+    if (c > 0) covered += c, area += area_length(area_normal(scene, t));
   }
   if (!(covered > 0 && area > 0)) return Error{scene.path, "has texture coordinates that cover nothing"};
   if (auto ok = split_long_edges(scene, float(0.8 * std::sqrt(area / covered) / o.size), most_triangles); !ok)

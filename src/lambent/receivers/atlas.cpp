@@ -34,7 +34,7 @@ std::string size_text(int64_t w, int64_t h) { return std::to_string(w) + "x" + s
 
 double surface_area(const Scene& scene) {
   double sum = 0;
-  for (const Triangle& t : scene.triangles) sum += 0.5 * double(length(area_normal(scene, t)));
+  for (const Triangle& t : scene.triangles) sum += 0.5 * double(area_length(area_normal(scene, t)));
   return sum;
 }
 
@@ -59,7 +59,7 @@ Result<bool> reuse_texcoords(const Scene& scene, const AtlasOptions& o, Atlas& a
   };
   double covered = 0, surface = 0;
   for (const Triangle& t : scene.triangles) {
-    const double area = 0.5 * double(length(area_normal(scene, t)));
+    const double area = 0.5 * double(area_length(area_normal(scene, t)));
     if (!(area > 0)) continue;
     for (uint32_t v : t.v)
       if (!(uv[v].x >= 0 && uv[v].x <= 1 && uv[v].y >= 0 && uv[v].y <= 1)) return refuse("it leaves [0, 1]");

@@ -48,9 +48,8 @@ std::vector<Vec3> face_normals(const Scene& scene, std::vector<float>* areas) {
   std::vector<Vec3> normals(scene.triangles.size(), Vec3(0));
   if (areas) areas->assign(scene.triangles.size(), 0.0f);
   for (size_t i = 0; i < scene.triangles.size(); ++i) {
-    const Vec3 n = area_normal(scene, scene.triangles[i]);
-    if (dot(n, n) > 0) normals[i] = normalize_or(n, Vec3(0));
-    if (areas) (*areas)[i] = normals[i] == Vec3(0) ? 0.0f : length(n);
+    normals[i] = unit_normal(scene, scene.triangles[i]);
+    if (areas && normals[i] != Vec3(0)) (*areas)[i] = area_length(area_normal(scene, scene.triangles[i]));
   }
   return normals;
 }

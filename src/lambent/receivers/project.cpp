@@ -46,9 +46,9 @@ std::vector<Point> quadrature(const Scene& scene, const Basis& basis, const std:
       if (!at) continue;
       const Triangle& t = scene.triangles[i];
       const Vec3 n = area_normal(scene, t);
-      const double area = 0.5 * double(length(n));
+      const double area = 0.5 * double(area_length(n));
       if (!(area > 0)) continue;
-      const Vec3 side = normalize(n) * (front ? 1.0f : -1.0f);
+      const Vec3 side = n * (1 / area_length(n)) * (front ? 1.0f : -1.0f);
       const int cuts = cuts_of(*at, longest_edge(scene, t), cell);
       auto add = [&](float u, float v) {
         Point p;

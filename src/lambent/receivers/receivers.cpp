@@ -53,7 +53,7 @@ std::vector<VertexGeometry> vertex_geometry(const Scene& scene) {
   std::vector<VertexGeometry> geometry(scene.positions.size());
   for (const Triangle& t : scene.triangles) {
     const Vec3 normal = area_normal(scene, t);
-    if (!(dot(normal, normal) > 0)) continue;  // degenerate: no ray meets it, no light falls on it
+    if (!(area_length(normal) > 0)) continue;  // degenerate: no ray meets it, no light falls on it
     for (int k = 0; k < 3; ++k) {
       const Vec3 p = scene.positions[t.v[k]];
       const Vec3 e1 = scene.positions[t.v[(k + 1) % 3]] - p, e2 = scene.positions[t.v[(k + 2) % 3]] - p;
@@ -204,7 +204,7 @@ Receivers make_patch_receivers(const Scene& scene) {
   for (uint32_t i = 0; i < scene.triangles.size(); ++i) {
     const Triangle& t = scene.triangles[i];
     const Vec3 n = area_normal(scene, t);
-    if (!(dot(n, n) > 0)) continue;
+    if (!(area_length(n) > 0)) continue;
     const Vec3 centre = (scene.positions[t.v[0]] + scene.positions[t.v[1]] + scene.positions[t.v[2]]) / 3.0f;
     for (int back = 0; back <= int(t.two_sided); ++back) sides.push_back({i, back == 1}), centres.push_back(centre);
     any_back |= t.two_sided;
@@ -217,7 +217,8 @@ Receivers make_patch_receivers(const Scene& scene) {
   Receivers r;
   for (uint32_t i : curve_order(centres, box)) {
     const Triangle& t = scene.triangles[sides[i].triangle];
-    const Vec3 n = normalize(area_normal(scene, t)) * (sides[i].back ? -1.0f : 1.0f);
+    Vec3 n = area_normal(scene, t);
+    n = n * (1 / area_length(n)) * (sides[i].back ? -1.0f : 1.0f);
     float edge = INFINITY;
     for (int k = 0; k < 3; ++k)
       edge = std::min(edge, length(scene.positions[t.v[k]] - scene.positions[t.v[(k + 1) % 3]]));

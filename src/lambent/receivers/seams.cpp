@@ -66,9 +66,7 @@ Seams find_seams(const Scene& scene, const TexelReceivers& texels, const std::ve
       row.texel[size_t(row.count)] = index[r], row.weight[size_t(row.count)] = sign * w, ++row.count;
     });
   };
-  auto normal = [&](const EdgeSide& e) {
-    return normalize_or(area_normal(scene, scene.triangles[e.triangle]), Vec3(0));
-  };
+  auto normal = [&](const EdgeSide& e) { return unit_normal(scene, scene.triangles[e.triangle]); };
   for (size_t begin = 0, end; begin < edges.size(); begin = end) {
     for (end = begin; end < edges.size() && std::tie(edges[end].a, edges[end].b, edges[end].front) ==
                                                 std::tie(edges[begin].a, edges[begin].b, edges[begin].front);)

@@ -20,7 +20,7 @@ TexelReceivers texel_receivers(const Scene& scene, int width, int height, const 
   for (size_t i = 0; i < scene.triangles.size(); ++i) {
     const Triangle& t = scene.triangles[i];
     const Vec3 n = area_normal(scene, t);
-    if (!(dot(n, n) > 0)) continue;
+    if (!(area_length(n) > 0)) continue;
     map.front[i] = {{front[t.v[0]], front[t.v[1]], front[t.v[2]]}, t.part};
     if (!back.empty() && t.two_sided) map.back[i] = {{back[t.v[0]], back[t.v[1]], back[t.v[2]]}, t.part};
   }
@@ -30,7 +30,7 @@ TexelReceivers texel_receivers(const Scene& scene, int width, int height, const 
 void place_texel(const Scene& scene, Receivers& receivers, size_t r, const TexelPlace& at, bool back, float texel,
                  float diagonal) {
   const Triangle& t = scene.triangles[at.triangle];
-  const Vec3 face = normalize_or(area_normal(scene, t), Vec3(0, 1, 0)) * (back ? -1.0f : 1.0f);
+  const Vec3 face = unit_normal(scene, t, Vec3(0, 1, 0)) * (back ? -1.0f : 1.0f);
   Vec3 n = normalize_or(interpolate(scene.normals, t, at.u, at.v), face);
   if (dot(n, face) < 0) n = -n;
   Vec3 p = interpolate(scene.positions, t, at.u, at.v);

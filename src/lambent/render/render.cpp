@@ -135,7 +135,7 @@ Result<Image> render(const Scene& scene, const Tracer& tracer, const SpatialBasi
               },
               basis);
           const float side = hit.front ? 1.0f : -1.0f;
-          const Vec3 face = normalize_or(area_normal(scene, triangle), Vec3(0, 1, 0));
+          const Vec3 face = unit_normal(scene, triangle, Vec3(0, 1, 0));
           Vec3 n = normalize_or(interpolate(scene.normals, triangle, hit.u, hit.v), face);
           if (dot(n, face) < 0) n = -n;
           const Vec3 bent = mapped_normal(scene, triangle, hit.u, hit.v, n);

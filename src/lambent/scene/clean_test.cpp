@@ -1,3 +1,4 @@
+#include <lambent/core/random.h>
 #include <lambent/scene/clean.h>
 #include <lambent/scene/procedural.h>
 
@@ -204,6 +205,116 @@ TEST(NumberPositions, JoinsEqualOnesInOrder) {
   PositionIds ids = number_positions(p);
   EXPECT_EQ(ids.count, 3u);
   EXPECT_EQ(ids.ids, (std::vector<uint32_t>{0, 1, 0, 1, 2}));
+}
+
+// Normals by the definition, corner by corner: the faces that a walk over edges between smooth pairs of faces reaches,
+// weighted by angle. Quadratic.
+std::vector<Vec3d> plain_corner_normals(const Scene& s, double crease_degrees) {
+  const size_t corners = 3 * s.triangles.size();
+  auto place = [&](size_t c) { return s.positions[s.triangles[c / 3].v[c % 3]]; };
+  auto normal = [&](size_t t) {
+    return normalize(
+        cross(Vec3d(place(3 * t + 1)) - Vec3d(place(3 * t)), Vec3d(place(3 * t + 2)) - Vec3d(place(3 * t))));
+  };
+  auto angle = [&](size_t c) {
+    const Vec3d p(place(c)), a = normalize(Vec3d(place(c / 3 * 3 + (c + 1) % 3)) - p),
+                             b = normalize(Vec3d(place(c / 3 * 3 + (c + 2) % 3)) - p);
+    return std::acos(std::clamp(dot(a, b), -1.0, 1.0));
+  };
+  auto share_an_edge_at = [&](size_t c, size_t d) {
+    for (size_t i = 0; i < 3; ++i)
+      for (size_t j = 0; j < 3; ++j)
+        if (c / 3 * 3 + i != c && d / 3 * 3 + j != d && place(c / 3 * 3 + i) == place(d / 3 * 3 + j)) return true;
+    return false;
+  };
+  std::vector<Vec3d> out(corners);
+  for (size_t c = 0; c < corners; ++c) {
+    std::vector<size_t> reached{c};
+    Vec3d sum(0);
+    for (size_t i = 0; i < reached.size(); ++i) {
+      sum += angle(reached[i]) * normal(reached[i] / 3);
+      for (size_t d = 0; d < corners; ++d)
+        if (place(d) == place(c) && share_an_edge_at(reached[i], d) &&
+            dot(normal(reached[i] / 3), normal(d / 3)) > std::cos(radians(crease_degrees)) &&
+            std::find(reached.begin(), reached.end(), d) == reached.end())
+          reached.push_back(d);
+    }
+    out[c] = normalize(sum);
+  }
+  return out;
+}
+
+TEST(MakeNormals, AgreesWithThePlainDefinition) {
+  Random random(7);
+  for (int kind = 0; kind < 12; ++kind) {
+    // A bumpy sphere of shared vertices, more or less rough; some of its triangles missing, some vertices apart.
+    Scene s;
+    const int n = 7;
+    for (int i = 0; i <= n; ++i)
+      for (int j = 0; j < n; ++j) {
+        const float tilt = pi * (float(i) + 0.01f) / (float(n) + 0.02f), turn = 2 * pi * float(j) / n;
+        const float r = 1 + 0.15f * float(kind % 6) * random.next();
+        s.positions.push_back(r *
+                              Vec3(std::sin(tilt) * std::cos(turn), std::cos(tilt), std::sin(tilt) * std::sin(turn)));
+      }
+    auto add = [&](int a, int b, int c) {
+      if (kind >= 6 && random.next() < 0.2f) return;
+      s.triangles.push_back({{uint32_t(a), uint32_t(b), uint32_t(c)}, 0, false});
+      if (kind >= 9 && random.next() < 0.3f) {
+        s.positions.push_back(s.positions[size_t(a)]);
+        s.triangles.back().v[0] = uint32_t(s.positions.size() - 1);
+      }
+    };
+    for (int i = 0; i < n; ++i)
+      for (int j = 0; j < n; ++j) {
+        const int a = i * n + j, b = i * n + (j + 1) % n;
+        add(a, b, a + n), add(b, b + n, a + n);
+      }
+    s.normals.assign(s.positions.size(), Vec3(0)), s.materials.resize(1);
+    Part part;
+    part.vertex_count = uint32_t(s.positions.size()), part.triangle_count = uint32_t(s.triangles.size());
+    s.parts.push_back(part);
+    for (bool flat : {false, true}) {
+      Scene made = s;
+      const std::vector<Vec3d> truth = plain_corner_normals(s, flat ? 0.1 : double(crease_angle_degrees));
+      make_normals(made, 0, flat);
+      EXPECT_EQ(broken_invariant(made), "");
+      for (size_t c = 0; c < truth.size(); ++c) {
+        const uint32_t v = made.triangles[c / 3].v[c % 3];
+        EXPECT_LT(length(Vec3d(made.normals[v]) - truth[c]), 1e-6) << kind << " " << c;
+        EXPECT_EQ(made.positions[v], s.positions[s.triangles[c / 3].v[c % 3]]);
+      }
+    }
+  }
+}
+
+TEST(NumberPositions, ManyInBuckets) {
+  std::vector<Vec3> p;
+  for (uint32_t i = 0; i < 40'000; ++i) p.push_back({float(i * 7919 % 9973), i % 2 ? 0.0f : -0.0f, 1});
+  const PositionIds ids = number_positions(p);
+  EXPECT_EQ(ids.count, 9973u);
+  for (uint32_t i = 0; i < p.size(); ++i) EXPECT_EQ(ids.ids[i], i % 9973);
+}
+
+TEST(CornerFans, RingsAreWhatTheySay) {
+  Scene cube = bare_cube();
+  const CornerFans fans = corner_fans(cube);
+  for (size_t p = 0; p < 8; ++p) {
+    ASSERT_TRUE(fans.is_ring[p]);
+    const uint32_t *ring = &fans.corners[fans.first[p]], count = fans.first[p + 1] - fans.first[p];
+    for (uint32_t i = 0; i < count; ++i) {
+      const uint32_t c = ring[i], next = ring[(i + 1) % count];
+      EXPECT_EQ(fans.ids[c], p);
+      EXPECT_EQ(fans.ids[c / 3 * 3 + (c + 1) % 3], fans.ids[next / 3 * 3 + (next + 2) % 3]);
+    }
+  }
+  std::swap(cube.triangles[0].v[0], cube.triangles[0].v[1]);  // runs the wrong way: its corners are in no ring
+  const CornerFans turned = corner_fans(cube);
+  EXPECT_EQ(std::count(turned.is_ring.begin(), turned.is_ring.end(), 1), 5);
+  cube = bare_cube();
+  cube.triangles.pop_back(), --cube.parts[0].triangle_count;
+  const CornerFans open = corner_fans(cube);
+  EXPECT_EQ(std::count(open.is_ring.begin(), open.is_ring.end(), 1), 5);
 }
 
 }  // namespace

@@ -30,7 +30,8 @@ Result<void> displace(Scene& scene, const std::function<float(Vec2)>& height, Ve
   std::vector<Vec3> normals(n, Vec3(0.0f));  // by place
   for (const Triangle& t : scene.triangles) {
     const Vec2 d1 = (uv[t.v[1]] - uv[t.v[0]]) * tile, d2 = (uv[t.v[2]] - uv[t.v[0]]) * tile;
-    const double a = length(area_normal(scene, t)), c = std::abs(double(d1.x) * d2.y - double(d1.y) * d2.x);
+    const double a = double(area_length(area_normal(scene, t))),
+                 c = std::abs(double(d1.x) * d2.y - double(d1.y) * d2.x);
     for (uint32_t v : t.v) area[place[v]] += a, covered[place[v]] += c;
   }
   std::vector<float> moves(n);

@@ -2,6 +2,7 @@
 #include <lambent/scene/gltf_read.h>
 
 #include <lambent/core/check.h>
+#include <lambent/scene/mesh_file.h>
 
 #include <algorithm>
 
@@ -145,7 +146,12 @@ bool read_pose(GltfCheck& check, const GltfDocument& document, GltfPose& pose) {
   pose.world.assign(count, Mat4d(1.0));
   for (size_t n : order) {
     Mat4d local = local_matrix(check, gltf_item(json, "nodes", n), {"node", n});
-    pose.world[n] = parents[n] == no_parent ? local : pose.world[parents[n]] * local;
+    if (parents[n] == no_parent) {
+      for (size_t k = 0; k < 3; ++k) local[3][k] -= pose.origin[k];
+      pose.world[n] = local;
+    } else {
+      pose.world[n] = pose.world[parents[n]] * local;
+    }
   }
   if (!check.ok() || !read_shown(check, json, parents, pose.shown)) return false;
 
@@ -158,6 +164,38 @@ bool read_pose(GltfCheck& check, const GltfDocument& document, GltfPose& pose) {
     if (skin && pose.joints[*skin].empty() && !read_joints(check, document, *skin, pose)) return false;
   }
   return check.ok();
+}
+
+Vec3d document_origin(const GltfDocument& document, const GltfPose& pose) {
+  const Json& json = document.json;
+  GltfCheck check("");
+  constexpr size_t enough = 100'000;  // nodes and primitives that share each other could be without end
+  size_t visited = 0;
+  Vec3d low(INFINITY), high(-INFINITY), first(0);
+  for (size_t n : pose.shown) {
+    const Json& node = gltf_item(json, "nodes", n);
+    auto mesh = check.index(node, "mesh", gltf_count(json, "meshes"), {});
+    const Json* primitives = mesh ? check.array(gltf_item(json, "meshes", *mesh), "primitives", {}) : nullptr;
+    for (size_t i = 0; primitives && i < primitives->size() && visited < enough; ++i, ++visited) {
+      const Json* attributes = check.object((*primitives)[i], "attributes", {});
+      auto positions = attributes ? check.index(*attributes, "POSITION", gltf_count(json, "accessors"), {})
+                                  : std::nullopt;
+      if (!check.ok()) return Vec3d(0);  // which reading says in words
+      if (!positions) continue;
+      double box[2][3] = {{0, 0, 0}, {0, 0, 0}};
+      const Json& accessor = gltf_item(json, "accessors", *positions);
+      if (!check.numbers(accessor, "min", box[0], {}) || !check.numbers(accessor, "max", box[1], {}))
+        check = GltfCheck("");
+      if (!(low.x <= high.x)) first = Vec3d(pose.world[n][3]);
+      for (int k = 0; k < 8; ++k) {
+        Vec3d p(pose.world[n] * Vec4d(box[k & 1][0], box[k >> 1 & 1][1], box[k >> 2][2], 1));
+        low = min(low, p), high = max(high, p);
+      }
+    }
+  }
+  const Vec3d origin = far_origin(low, high);
+  if (origin == Vec3d(0)) return origin;
+  return far_origin(low - first, high - first) == Vec3d(0) ? first : origin;
 }
 
 bool read_placement(GltfCheck& check, const GltfDocument& document, const GltfPose& pose, size_t node,

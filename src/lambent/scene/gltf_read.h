@@ -84,11 +84,16 @@ std::optional<GltfAccessor> read_attribute(GltfCheck& check, const GltfDocument&
 
 // Where nodes stand in the rest pose, and what of them is shown.
 struct GltfPose {
+  Vec3d origin{0.0};                       // taken off every place below; set before reading (Scene::origin)
   std::vector<Mat4d> world;                // of each node
   std::vector<size_t> shown;               // nodes of the default scene (or all, where there is none), depth first
   std::vector<std::vector<Mat4d>> joints;  // of each skin that a shown mesh uses: joint to world times inverse bind
 };
 bool read_pose(GltfCheck& check, const GltfDocument& document, GltfPose& pose);
+
+// What Scene::origin is for a document, from a pose about 0 and the bounds that its accessors state: where its meshes
+// stand far from 0, the place of the first one if they are near it, else far_origin of all.
+Vec3d document_origin(const GltfDocument& document, const GltfPose& pose);
 
 // Lamps of shown nodes, KHR_lights_punctual, into scene.lights.
 bool read_lights(GltfCheck& check, const GltfDocument& document, const GltfPose& pose, Scene& scene);

@@ -7,6 +7,8 @@
 #include <filesystem>
 #include <unistd.h>
 
+#include "temporary_folder.h"
+
 namespace lambent::test {
 
 using Json = nlohmann::json;
@@ -144,20 +146,6 @@ inline Bytes make_png(int width, int height, int channels, int depth, const Byte
   chunk("IEND", {});
   return out;
 }
-
-// A folder of its own that goes away with the object.
-struct TemporaryFolder {
-  std::filesystem::path path;
-  TemporaryFolder() {
-    std::string name = (std::filesystem::temp_directory_path() / "lambent-test-XXXXXX").string();
-    path = ::mkdtemp(name.data());
-  }
-  ~TemporaryFolder() {
-    std::error_code ignored;
-    std::filesystem::remove_all(path, ignored);
-  }
-  std::string file(const std::string& name) const { return (path / name).string(); }
-};
 
 inline void write_bytes(const std::string& path, const Bytes& bytes) {
   std::span<const uint8_t> piece(bytes);

@@ -19,7 +19,7 @@ Result<Scene> load_scene(const std::string& path) {
   if (folder.empty()) folder = ".";
   auto scene = gltf               ? load_gltf(*file, path, folder)
              : extension == "obj" ? load_obj(file->bytes(), path, folder)
-                                  : load_ply(file->bytes(), path);
+                                  : load_ply(file->bytes(), path, folder);
   if (!scene) return scene.error();
   scene->path = path;
   scene->hash = content_hash(file->bytes());

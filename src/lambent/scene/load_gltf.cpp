@@ -359,14 +359,18 @@ bool read_scene(GltfCheck& check, GltfDocument& document, std::span<const uint8_
   std::vector<GltfMaterial> materials = read_materials(check, document);
   GltfPose pose;
   if (!check.ok() || !read_pose(check, document, pose)) return false;
+  scene.origin = document_origin(document, pose);
+  if (scene.origin != Vec3d(0)) {
+    pose = {.origin = scene.origin};
+    if (!read_pose(check, document, pose)) return false;
+  }
   for (const GltfMaterial& m : materials) scene.materials.push_back(m.material);
   PrimitiveReader primitives(check, document, pose, scene);
   if (!primitives.read_all() || !read_lights(check, document, pose, scene)) return false;
   if (scene.triangles.empty()) return check.fail({}, "no triangles");
   bool usable = false;
   for (size_t t = 0; t < scene.triangles.size() && !usable; ++t) {
-    Vec3 n = area_normal(scene, scene.triangles[t]);
-    usable = dot(n, n) > 0;
+    usable = area_length(area_normal(scene, scene.triangles[t])) > 0;
   }
   if (!usable) return check.fail({}, "no triangles that have an area");
 

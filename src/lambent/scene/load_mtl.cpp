@@ -1,25 +1,35 @@
-// Wavefront MTL: diffuse colour, diffuse map and emission; the rest of its Phong model has no use here.
+// Wavefront MTL: diffuse colour, emission and dissolve with their maps, and the PBR extension's roughness and metalness
+// (Clara.io 2014, Blender); the rest of its Phong model has no use here.
 #include <lambent/scene/load.h>
 #include <lambent/scene/load_mtl.h>
 #include <lambent/scene/mesh_file.h>
 #include <lambent/scene/mesh_text.h>
+#include <lambent/scene/named_file.h>
 #include <lambent/scene/textures.h>
 
 #include <fmt/format.h>
 
 #include <filesystem>
 #include <map>
+#include <optional>
 #include <set>
+#include <tuple>
 
 namespace lambent {
 namespace {
 
-struct MtlMaterial {
-  Vec3 diffuse{default_albedo}, emissive{0};
-  std::string map;  // file name with forward slashes; empty for none
+struct MtlMap {
+  std::string name;  // as written; empty for none
   bool clamp = false;
   std::array<float, 6> transform{1, 0, 0, 0, 1, 0};
-  std::string where;  // of the map, for messages
+  std::string where;  // for messages; empty where there is no line for it
+};
+
+struct MtlMaterial {
+  Vec3 diffuse{default_albedo}, emissive{0};
+  MtlMap color_map, glow_map, alpha_map;
+  double roughness = 1, metallic = 0;
+  std::optional<double> dissolve, transparency;  // d, Tr
 };
 using Library = std::map<std::string, MtlMaterial>;
 
@@ -52,9 +62,10 @@ void parse_option(std::string_view& text, double (&x)[3]) {
 }
 
 // `map_Kd [options] file name`.
-void parse_map(std::string_view text, MtlMaterial& material) {
+MtlMap parse_map(std::string_view text, std::string where) {
+  MtlMap map;
+  map.where = std::move(where);
   double scale[3] = {1, 1, 1}, offset[3] = {0, 0, 0}, unused[3];
-  material.clamp = false;
   for (text = trimmed(text); text.size() > 1 && text[0] == '-'; text = trimmed(text)) {
     std::string_view rest = text, option = take_word(rest);
     if (option == "-s") {
@@ -64,7 +75,7 @@ void parse_map(std::string_view text, MtlMaterial& material) {
     } else if (option == "-t" || option == "-mm") {
       parse_option(rest, unused);
     } else if (option == "-clamp") {
-      material.clamp = take_word(rest) == "on";
+      map.clamp = take_word(rest) == "on";
     } else if (option == "-blendu" || option == "-blendv" || option == "-cc" || option == "-bm" || option == "-boost" ||
                option == "-texres" || option == "-imfchan" || option == "-type") {
       take_word(rest);
@@ -73,87 +84,173 @@ void parse_map(std::string_view text, MtlMaterial& material) {
     }
     text = rest;
   }
-  material.map = std::string(text);
-  std::replace(material.map.begin(), material.map.end(), '\\', '/');
+  map.name = std::string(text);
   // In the file's space (v upwards) uv' = s uv + o; Scene's v runs down, so v' = s_v v + (1 - s_v - o_v).
-  material.transform = {float(scale[0]), 0, float(offset[0]), 0, float(scale[1]), float(1 - scale[1] - offset[1])};
+  map.transform = {float(scale[0]), 0, float(offset[0]), 0, float(scale[1]), float(1 - scale[1] - offset[1])};
+  return map;
 }
 
-Result<void> parse_mtl(std::span<const uint8_t> bytes, const std::string& path, Library& library) {
+// `Pr x`, `d [-halo] x`: a number in [0, 1].
+template <class T>
+bool parse_share(std::string_view text, T& share) {
+  text = trimmed(text);
+  if (text.starts_with("-halo")) text.remove_prefix(5);
+  skip_blanks(text);
+  double x;
+  if (!take_number(text, x) || std::isnan(x)) return false;
+  return share = std::clamp(x, 0.0, 1.0), true;
+}
+
+std::string lower_case(std::string_view text) {
+  std::string lower(text);
+  std::transform(lower.begin(), lower.end(), lower.begin(), [](unsigned char c) { return char(std::tolower(c)); });
+  return lower;
+}
+
+// Keywords in any case, as other readers take them. `unread`: what would change the picture and is not read.
+Result<void> parse_mtl(std::span<const uint8_t> bytes, const std::string& path, Library& library,
+                       std::set<std::string>& unread) {
+  constexpr double brightest = 1e9;  // keeps sums of light finite
+  static const std::set<std::string> known{"kd", "ke", "map_kd", "map_ke", "pr", "pm", "d", "tr", "map_d"},
+      other{"map_bump", "bump", "norm", "disp", "map_pr", "map_pm", "decal"};
   LineReader lines(bytes);
   std::string_view text;
   MtlMaterial* material = nullptr;
   while (lines.next(text)) {
-    std::string_view keyword = take_word(text);
-    if (keyword == "newmtl") {
-      material = &(library[short_name(text)] = MtlMaterial{});
-    } else if (keyword == "Kd" || keyword == "Ke" || keyword == "map_Kd") {
-      std::string where = fmt::format("{}:{}", path, lines.number());
-      if (!material) return Error{where, fmt::format("{} before the first newmtl", keyword)};
-      constexpr double brightest = 1e9;  // keeps sums of light finite
-      bool ok = true;
-      if (keyword == "Kd") ok = parse_color(text, material->diffuse, 1.0);
-      if (keyword == "Ke") ok = parse_color(text, material->emissive, brightest);
-      if (keyword == "map_Kd") parse_map(text, *material), material->where = where;
-      if (!ok) return Error{where, "expected a colour of one or three numbers"};
-    }
+    const std::string_view word = take_word(text);
+    if (word.size() > 8) continue;
+    const std::string keyword = lower_case(word);
+    if (keyword == "newmtl") material = &(library[short_name(text)] = MtlMaterial{});
+    if (other.contains(keyword)) unread.insert(std::string(word));
+    if (!known.contains(keyword)) continue;
+    std::string where = fmt::format("{}:{}", path, lines.number());
+    if (!material) return Error{where, fmt::format("{} before the first newmtl", word)};
+    bool is_color = keyword[0] == 'k', ok = true;
+    if (keyword == "kd") ok = parse_color(text, material->diffuse, 1.0);
+    if (keyword == "ke") ok = parse_color(text, material->emissive, brightest);
+    if (keyword == "pr") ok = parse_share(text, material->roughness);
+    if (keyword == "pm") ok = parse_share(text, material->metallic);
+    if (keyword == "d") ok = parse_share(text, material->dissolve);
+    if (keyword == "tr") ok = parse_share(text, material->transparency);
+    if (keyword == "map_d") material->alpha_map = parse_map(text, where);
+    if (keyword == "map_kd") material->color_map = parse_map(text, where);
+    if (keyword == "map_ke") material->glow_map = parse_map(text, where);
+    if (!ok) return Error{where, is_color ? "expected a colour of one or three numbers" : "expected a number"};
   }
   return {};
 }
 
-// Names in OBJ and MTL are plain; read_external_file takes URIs.
-std::string uri_from_name(std::string_view name) {
-  std::string uri;
-  for (char c : name) uri += c == '%' ? "%25" : c == '\\' ? "/" : std::string(1, c);
-  return uri;
-}
-
 // "a.png" and "./a.png" are one file, to be read once.
-std::string normal_name(const std::string& name) {
+std::string normal_name(std::string name) {
+  std::replace(name.begin(), name.end(), '\\', '/');
   return std::filesystem::path(name).lexically_normal().generic_string();
 }
 
 // The files of one mtllib line: usually one, whose name may hold blanks, or several.
 Result<void> load_library(std::string_view line, Scene& scene, const std::string& folder, Library& library,
-                          bool& complete) {
+                          bool& complete, std::set<std::string>& unread) {
   std::vector<std::string_view> names{line};
-  auto whole = read_external_file(uri_from_name(line), folder, scene.path);
+  auto whole = read_named_file(line, folder, scene.path);
   if (!whole && line.find_first_of(" \t") != line.npos) {
     names.clear();
     while (!trimmed(line).empty()) names.push_back(take_word(line));
   }
   for (std::string_view name : names) {
-    auto bytes = names.size() == 1 ? std::move(whole) : read_external_file(uri_from_name(name), folder, scene.path);
+    auto bytes = names.size() == 1 ? std::move(whole) : read_named_file(name, folder, scene.path);
     if (!bytes) {
       complete = false;
       scene.warnings.push_back(bytes.error().text());
       continue;
     }
     std::string path = (std::filesystem::path(folder) / name).string();
-    if (auto parsed = parse_mtl(*bytes, path, library); !parsed) return parsed.error();
+    if (auto parsed = parse_mtl(*bytes, path, library, unread); !parsed) return parsed.error();
   }
   return {};
 }
 
-using TextureNumbers = std::map<std::pair<std::string, bool>, int>;
+// Puts the pictures of materials into the scene, each once.
+class PictureLoader {
+ public:
+  PictureLoader(Scene& scene, const std::string& folder) : scene_(scene), folder_(folder) {}
 
-Result<int> load_texture(Scene& scene, const MtlMaterial& source, const std::string& folder, TextureNumbers& known) {
-  std::string name = normal_name(source.map);
-  auto [place, is_new] = known.try_emplace({name, source.clamp}, int(scene.textures.size()));
-  if (!is_new) return place->second;
-  if (auto twin = known.find({name, !source.clamp}); twin != known.end()) {
-    scene.textures.push_back(scene.textures[size_t(twin->second)]);
-  } else {
-    auto bytes = read_external_file(uri_from_name(source.map), folder, source.where);
-    if (!bytes) return bytes.error();
-    auto texture = decode_texture(std::move(*bytes), source.map);
-    if (!texture) return Error{source.where, texture.error().text()};
-    scene.textures.push_back(std::move(*texture));
+  // The texture's number; -1 where there is none to be had.
+  int load(const MtlMap& map) {
+    if (map.where.empty()) return -1;
+    const Texture* picture = read(map);
+    if (!picture) return -1;
+    auto [place, is_new] = known_.try_emplace({normal_name(map.name), "", map.clamp}, int(scene_.textures.size()));
+    if (is_new) add(*picture, map.clamp);
+    return place->second;
   }
-  Texture& texture = scene.textures.back();
-  texture.name = short_name(source.map);
-  texture.wrap_s = texture.wrap_t = source.clamp ? Wrap::clamp : Wrap::repeat;
-  return place->second;
+
+  // The same of a colour map, or of white, with a mask as its alpha; -1 where the mask is not to be had.
+  int load_masked(const MtlMap& color, const MtlMap& mask) {
+    const Texture* alpha = read(mask);
+    const Texture* colors = color.where.empty() ? nullptr : read(color);
+    const bool is_same = normal_name(color.name) == normal_name(mask.name);
+    if (!alpha || (is_same && alpha->alpha.empty())) return -1;
+    const bool clamp = colors ? color.clamp : mask.clamp;
+    auto [place, is_new] = known_.try_emplace({colors ? normal_name(color.name) : "", normal_name(mask.name), clamp},
+                                              int(scene_.textures.size()));
+    if (!is_new) return place->second;
+    auto both = with_alpha(colors ? *colors : Texture{}, *alpha, colors ? colors->name : alpha->name);
+    if (!both) return lost_.add(both.error()), known_.erase(place), -1;
+    add(*both, clamp);
+    return place->second;
+  }
+  void tell() const { lost_.tell(scene_); }
+
+ private:
+  // Null where it cannot be had.
+  const Texture* read(const MtlMap& map) {
+    auto [place, is_new] = pictures_.try_emplace(normal_name(map.name));
+    if (is_new) {
+      auto texture = read_named_picture(map.name, folder_, map.where);
+      if (!texture) return lost_.add(texture.error()), nullptr;
+      place->second = std::move(*texture);
+    }
+    return place->second.rgb.empty() ? nullptr : &place->second;
+  }
+  void add(const Texture& texture, bool clamp) {
+    scene_.textures.push_back(texture);
+    scene_.textures.back().wrap_s = scene_.textures.back().wrap_t = clamp ? Wrap::clamp : Wrap::repeat;
+  }
+
+  Scene& scene_;
+  const std::string& folder_;
+  std::map<std::string, Texture> pictures_;                          // by name; without pixels: lost
+  std::map<std::tuple<std::string, std::string, bool>, int> known_;  // by name, mask and clamp
+  LostPictures lost_;
+};
+
+// What is there of a surface. `d` is read before `Tr`, of which files disagree whether 1 is clear or solid: alone it is
+// transparency, but never of all.
+float alpha_of(const MtlMaterial& source) {
+  if (source.dissolve) return float(*source.dissolve);
+  return source.transparency && *source.transparency < 1 ? float(1 - *source.transparency) : 1.0f;
+}
+
+Material material_from(const MtlMaterial& source, PictureLoader& pictures) {
+  Material material;
+  material.base_color = source.diffuse, material.emissive = source.emissive;
+  material.metallic = float(source.metallic), material.roughness = float(source.roughness);
+  const bool has_color = !source.color_map.where.empty(), has_mask = !source.alpha_map.where.empty();
+  if (has_mask) material.base_color_texture = pictures.load_masked(source.color_map, source.alpha_map);
+  const bool is_masked = material.base_color_texture >= 0;
+  if (!is_masked) material.base_color_texture = pictures.load(source.color_map);
+  material.uv_transform = has_color ? source.color_map.transform : source.alpha_map.transform;
+  material.alpha = alpha_of(source);
+  if (is_masked || material.alpha < 1) material.alpha_mode = AlphaMode::blend;
+  // Exporters write Kd 0, or Ke 0, beside the map that takes its place.
+  if (has_color && source.diffuse == Vec3(0))
+    material.base_color = Vec3(material.base_color_texture < 0 ? default_albedo : 1.0f);
+  material.emissive_texture = pictures.load(source.glow_map);
+  material.emissive_transform = source.glow_map.transform;
+  if (!source.glow_map.where.empty()) {
+    if (material.emissive_texture < 0) material.emissive = Vec3(0);
+    else if (source.emissive == Vec3(0)) material.emissive = Vec3(1);
+  }
+  return material;
 }
 
 }  // namespace
@@ -163,14 +260,14 @@ Result<std::vector<uint32_t>> load_materials(Scene& scene, const std::vector<std
                                              const std::string& folder) {
   Library library;
   bool complete = true;
-  std::set<std::string> tried;
+  std::set<std::string> tried, unread;
   for (const std::string& line : libraries) {
     if (!tried.insert(normal_name(line)).second) continue;
-    if (auto loaded = load_library(line, scene, folder, library, complete); !loaded) return loaded.error();
+    if (auto loaded = load_library(line, scene, folder, library, complete, unread); !loaded) return loaded.error();
   }
 
   std::map<std::string, uint32_t> numbers;
-  TextureNumbers textures;
+  PictureLoader pictures(scene, folder);
   std::set<std::string> unknown;
   std::string first_unknown;
   std::vector<uint32_t> result;
@@ -183,20 +280,14 @@ Result<std::vector<uint32_t>> load_materials(Scene& scene, const std::vector<std
     auto [place, is_new] = numbers.try_emplace(key, uint32_t(scene.materials.size()));
     result.push_back(place->second);
     if (!is_new) continue;
-    Material material;
-    material.metallic = 0, material.roughness = 1;
-    material.name = "default", material.base_color = fallback;
-    if (found != library.end()) {
-      const MtlMaterial& source = found->second;
-      material.name = name, material.base_color = source.diffuse, material.emissive = source.emissive;
-      if (!source.map.empty()) {
-        auto texture = load_texture(scene, source, folder, textures);
-        if (!texture) return texture.error();
-        material.base_color_texture = *texture, material.uv_transform = source.transform;
-      }
-    }
+    Material material =
+        material_from(found == library.end() ? MtlMaterial{.diffuse = fallback} : found->second, pictures);
+    material.name = found == library.end() ? "default" : name;
     scene.materials.push_back(std::move(material));
   }
+  pictures.tell();
+  if (!unread.empty())
+    scene.warnings.push_back(fmt::format("{}: not read of its materials: {}", scene.path, fmt::join(unread, ", ")));
   if (!unknown.empty() && complete) {
     std::string more = unknown.size() > 1 ? fmt::format(" and {} more", unknown.size() - 1) : "";
     scene.warnings.push_back(

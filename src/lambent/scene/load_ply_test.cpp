@@ -1,10 +1,12 @@
 #include <lambent/scene/load.h>
 
+#include <fmt/format.h>
 #include <gtest/gtest.h>
 
 #include <bit>
 #include <cstring>
 
+#include "temporary_folder.h"
 #include "test_meshes.h"
 
 namespace lambent {
@@ -126,7 +128,7 @@ TEST(LoadPly, RefusesWithTheReason) {
   EXPECT_EQ(error_of(triangle(three, "3 0 1 1.5\n")), "t.ply:13: face 0 names vertex 1.5 of 3");
   EXPECT_EQ(error_of(triangle(three, "3 0 1 nan\n")), "t.ply:13: face 0 names vertex nan of 3");
   EXPECT_EQ(error_of(triangle("0 0 0\n1 nan 0\n0 1 0\n", "3 0 1 2\n")),
-            "t.ply:11: coordinate of vertex 1 is not finite or beyond 1e9");
+            "t.ply: no triangles: 1 faces use vertices that are not finite or beyond 1e9");
   EXPECT_EQ(error_of(triangle("0 0 0\n1 q 0\n0 1 0\n", "3 0 1 2\n")),
             "t.ply:11: the file ends or holds something that is not a number in vertex 1");
   EXPECT_EQ(error_of(triangle(three, "0\n")), "t.ply: no triangles");
@@ -182,6 +184,121 @@ TEST(LoadPly, NormalsColoursAndStrayVertices) {
   EXPECT_EQ(s.colors[0], Vec3(0.25f, 0.5f, 1));    // floats are linear
   ASSERT_EQ(s.warnings.size(), 1u);
   EXPECT_EQ(s.warnings[0], "t.ply: 1 faces with repeated corners dropped");
+}
+
+// A depth camera's frame: a grid of n x n points, of which those within a circle are missing.
+std::string frame(int n, const std::string& format, const char* missing, bool faces_use_them) {
+  auto is_missing = [&](int i) { return std::hypot(i % n - n / 2, i / n - n / 2) < n / 4; };
+  std::string points, faces;
+  int count = 0;
+  bool text = format == "ascii", big = format == "binary_big_endian";
+  for (int i = 0; i < n * n; ++i) {
+    for (int k = 0; k < 3; ++k) {
+      float x = k == 0 ? float(i % n) : k == 1 ? 0.25f : float(i / n);
+      if (is_missing(i)) x = std::strtof(missing, nullptr);
+      points += text ? fmt::format("{} ", x) : raw(x, big);
+    }
+    if (text) points += "\n";
+    int corners[4] = {i, i + n, i + n + 1, i + 1};
+    if (i % n == n - 1 || i / n == n - 1) continue;
+    bool broken = std::any_of(corners, corners + 4, is_missing);
+    if (broken && !faces_use_them) continue;
+    ++count;
+    faces += text ? "4" : raw(uint8_t(4), big);
+    for (int c : corners) faces += text ? fmt::format(" {}", c) : raw(c, big);
+    if (text) faces += "\n";
+  }
+  return fmt::format(
+             "ply\nformat {} 1.0\nelement vertex {}\nproperty float x\nproperty float y\nproperty float z\n"
+             "element face {}\nproperty list uchar int vertex_indices\nend_header\n",
+             format, n * n, count) +
+         points + faces;
+}
+
+TEST(LoadPly, MissingPointsDoNoHarm) {
+  for (const char* format : {"ascii", "binary_little_endian", "binary_big_endian"}) {
+    for (const char* missing : {"nan", "inf", "-1e30"}) {
+      Scene s = must_load(frame(16, format, missing, false));
+      EXPECT_TRUE(s.warnings.empty());
+      Scene used = must_load(frame(16, format, missing, true));
+      EXPECT_EQ(used.positions, s.positions);
+      EXPECT_EQ(used.triangles.size(), s.triangles.size());
+      ASSERT_EQ(used.warnings.size(), 1u);
+      size_t left_out = 15 * 15 - s.triangles.size() / 2;
+      EXPECT_EQ(used.warnings[0],
+                fmt::format("t.ply: {} faces left out: they use vertices that are not finite or beyond 1e9", left_out));
+    }
+  }
+}
+
+// A square of two triangles whose halves show the two ends of a picture: by MeshLab's lists at the faces, by vertices
+// that come twice, and as OBJ.
+TEST(LoadPly, TextureCoordinatesAtFaces) {
+  test::TemporaryFolder folder;
+  folder.write("red blue.png", test::tiny_png());
+  const std::string xyz = "property float x\nproperty float y\nproperty float z\n",
+                    square = "0 0 0\n1 0 0\n1 1 0\n0 1 0\n",
+                    head = "ply\nformat ascii 1.0\ncomment VCGLIB generated\ncomment TextureFile red blue.png\n";
+  auto at_faces = [&](const std::string& lists) {
+    return head + "element vertex 4\n" + xyz +
+           "element face 2\nproperty list uchar int vertex_indices\nproperty list uchar float texcoord\n"
+           "property int texnumber\nend_header\n" +
+           square + lists;
+  };
+  const std::string by_faces = at_faces("3 0 1 2 6 0.25 0 0 0 0.5 1 0\n3 0 2 3 6 0.75 0 1 1 1 0.5 0\n");
+  const std::string by_vertices =
+      head + "element vertex 6\n" + xyz + "property float s\nproperty float t\nelement face 2\n" +
+      "property list uchar int vertex_indices\nend_header\n0 0 0 0.25 0\n1 0 0 0 0\n1 1 0 0.5 1\n0 0 0 0.75 0\n"
+      "1 1 0 1 1\n0 1 0 1 0.5\n3 0 1 2\n3 3 4 5\n";
+  const std::string obj =
+      "v 0 0 0\nv 1 0 0\nv 1 1 0\nv 0 1 0\nvt 0.25 0\nvt 0 0\nvt 0.5 1\nvt 0.75 0\nvt 1 1\nvt 1 0.5\n"
+      "f 1/1 2/2 3/3\nf 1/4 3/5 4/6\n";
+  auto corners = [](const Scene& s) {  // position and coordinates of each corner
+    std::vector<std::pair<Vec3, Vec2>> out;
+    for (const Triangle& t : s.triangles)
+      for (uint32_t v : t.v) out.push_back({s.positions[v], s.texcoords[0][v]});
+    return out;
+  };
+  auto truth = load_obj(test::bytes_of(obj), "t.obj", "");
+  ASSERT_TRUE(truth);
+  for (const std::string& text : {by_faces, by_vertices}) {
+    auto s = load_ply(test::bytes_of(text), "t.ply", folder.path.string());
+    ASSERT_TRUE(s) << s.error().text();
+    EXPECT_EQ(test::broken_invariant(*s), "");
+    EXPECT_TRUE(s->warnings.empty()) << s->warnings[0];
+    EXPECT_EQ(corners(*s), corners(*truth));
+    ASSERT_EQ(s->textures.size(), 1u);
+    EXPECT_EQ(s->materials[0].base_color_texture, 0);
+    EXPECT_EQ(s->materials[0].base_color, Vec3(1));
+    EXPECT_EQ(albedo(*s, s->triangles[0], 0, 0), Vec3(1, 0, 0));
+    EXPECT_EQ(albedo(*s, s->triangles[1], 0, 0), Vec3(0, 0, 1));
+  }
+  // Without its picture, and lists that do not fit.
+  Scene lost = must_load(by_faces);
+  EXPECT_EQ(lost.materials[0].base_color, Vec3(0.8f));
+  EXPECT_EQ(lost.warnings.size(), 1u);
+  auto odd = load_ply(test::bytes_of(at_faces("3 0 1 2 0 0\n3 0 2 3 5 1 2 3 4 5 0\n")), "t.ply", folder.path.string());
+  ASSERT_TRUE(odd);
+  ASSERT_EQ(odd->warnings.size(), 1u);
+  EXPECT_EQ(odd->warnings[0], "t.ply: 2 faces do not have a texture coordinate a corner");
+}
+
+TEST(LoadPly, FacesOfSeveralTextures) {
+  test::TemporaryFolder folder;
+  folder.write("a.png", test::tiny_png()), folder.write("b.png", test::tiny_png());
+  std::string text =
+      "ply\nformat ascii 1.0\ncomment TextureFile a.png\ncomment TextureFile b.png\nelement vertex 4\n"
+      "property float x\nproperty float y\nproperty float z\nelement face 3\nproperty list uchar int vertex_indices\n"
+      "property list uchar float texcoord\nproperty int texnumber\nend_header\n0 0 0\n1 0 0\n1 1 0\n0 1 0\n"
+      "3 0 1 2 6 0 0 0 0 0 0 1\n3 0 2 3 6 0 0 0 0 0 0 0\n3 1 2 3 6 0 0 0 0 0 0 -1\n";
+  auto s = load_ply(test::bytes_of(text), "t.ply", folder.path.string());
+  ASSERT_TRUE(s) << s.error().text();
+  EXPECT_EQ(test::broken_invariant(*s), "");
+  ASSERT_EQ(s->parts.size(), 3u);
+  EXPECT_EQ(s->materials[s->parts[0].material].name, "a.png");
+  EXPECT_EQ(s->materials[s->parts[1].material].name, "b.png");
+  EXPECT_EQ(s->materials[s->parts[2].material].base_color_texture, -1);
+  EXPECT_EQ(s->materials[s->parts[2].material].base_color, Vec3(0.8f));
 }
 
 TEST(LoadPly, DataFile) {

@@ -15,6 +15,10 @@ void drop_unused(Scene& scene) {
   std::vector<uint32_t> place(scene.positions.size(), none);
   for (const Triangle& t : scene.triangles)
     for (uint32_t v : t.v) place[v] = 0;
+  auto is_bare = [](const Part& part) { return part.triangle_count == 0; };
+  if (std::find(place.begin(), place.end(), none) == place.end() &&
+      std::none_of(scene.parts.begin(), scene.parts.end(), is_bare))
+    return;
   uint32_t used = 0;
   std::vector<Part> parts;
   for (Part& part : scene.parts) {
@@ -45,6 +49,11 @@ bool is_direction(Vec3 n) { return is_finite(n) && n != Vec3(0); }
 
 bool Triangulator::cut(std::span<const uint32_t> vertices, std::span<const Vec3> positions,
                        std::vector<std::array<uint32_t, 3>>& triangles) {
+  if (vertices.size() == 3) {
+    bool differ = vertices[0] != vertices[1] && vertices[1] != vertices[2] && vertices[2] != vertices[0];
+    if (differ) triangles.push_back({0, 1, 2});
+    return differ;
+  }
   loop_.clear(), polygon_.clear(), cuts_.clear();
   for (uint32_t i = 0; i < vertices.size(); ++i)
     if (i == 0 || vertices[i] != vertices[i - 1]) loop_.push_back(i);
@@ -122,7 +131,9 @@ bool Triangulator::is_ear(uint32_t i) {
 
 Result<void> finish_mesh(Scene& scene) {
   bool usable = false;
+  const bool has_normals = std::any_of(scene.normals.begin(), scene.normals.end(), is_direction);
   for (Triangle& t : scene.triangles) {
+    if (usable && !has_normals) break;
     Vec3d a = scene.positions[t.v[0]], b = scene.positions[t.v[1]], c = scene.positions[t.v[2]];
     Vec3d winding = cross(b - a, c - a);
     usable = usable || winding != Vec3d(0);
@@ -135,16 +146,20 @@ Result<void> finish_mesh(Scene& scene) {
   }
   if (!usable) return Error{scene.path, scene.triangles.empty() ? "no triangles" : "no triangle has an area"};
 
-  merge_duplicate_triangles(scene);
   drop_unused(scene);
+  CornerFans fans = corner_fans(scene);
+  if (merge_duplicate_triangles(scene, fans)) {
+    drop_unused(scene);
+    fans = corner_fans(scene);
+  }
   std::vector<size_t> bare;
   for (size_t p = 0; p < scene.parts.size(); ++p) {
     auto begin = scene.normals.begin() + scene.parts[p].first_vertex;
     if (std::none_of(begin, begin + scene.parts[p].vertex_count, is_direction)) bare.push_back(p);
   }
-  make_normals(scene, bare, false);
+  make_normals(scene, bare, false, fans);
   repair_normals(scene);
-  infer_sidedness(scene);
+  infer_sidedness(scene, fans);
 
   for (Material& material : scene.materials) material.double_sided = false;
   for (const Triangle& t : scene.triangles)

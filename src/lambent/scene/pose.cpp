@@ -145,7 +145,7 @@ Result<Pose> pose_scene(const Scene& scene, size_t animation, double time) {
   if (!animate_nodes(check, rest, animation, time, nodes)) return check.error();
   moved.json = rest.json, moved.buffers = rest.buffers;
   moved.json["nodes"] = std::move(nodes);
-  GltfPose rest_pose, moved_pose;
+  GltfPose rest_pose{.origin = scene.origin}, moved_pose = rest_pose;
   if (!read_pose(check, rest, rest_pose) || !read_pose(check, moved, moved_pose)) return check.error();
 
   Pose pose;

@@ -87,6 +87,13 @@ void write_geometry(GlbWriter& out, const Scene& scene, const Part& part, const 
   primitive.erase("mode");
 }
 
+// A node that takes the scene's space to the file's.
+Json placed_node(const Scene& scene) {
+  Json node = Json::object();
+  if (Vec3d o = scene.origin; o != Vec3d(0)) node["translation"] = {o.x, o.y, o.z};
+  return node;
+}
+
 // Adds a node to the default scene, or, where there are no scenes, to the nodes, all of which then are shown.
 size_t add_root(GlbWriter& out, Json node) {
   size_t number = out.push("nodes", std::move(node));
@@ -102,7 +109,7 @@ size_t add_root(GlbWriter& out, Json node) {
 class DocumentWriter {
  public:
   DocumentWriter(GlbWriter& out, const Scene& scene, GltfPlaces& places)
-      : out_(out), scene_(scene), document_(*scene.document), places_(places) {}
+      : out_(out), scene_(scene), document_(*scene.document), places_(places), pose_{.origin = scene.origin} {}
 
   void embed_buffers() {
     std::vector<size_t> starts;
@@ -222,7 +229,8 @@ class DocumentWriter {
       json["mesh"] = mesh_index;
       return;
     }
-    Json fresh = {{"mesh", mesh_index}};
+    Json fresh = placed_node(scene_);
+    fresh["mesh"] = mesh_index;
     if (json.contains("name")) fresh["name"] = json["name"];
     json.erase("mesh"), json.erase("skin");
     int number = int(add_root(out_, std::move(fresh)));
@@ -352,7 +360,7 @@ Result<void> save_glb(const std::string& path, const Scene& scene, std::span<con
       if (!material) return material.error();
       primitive["material"] = *material;
     }
-    Json mesh = {{"primitives", Json::array({std::move(primitive)})}}, node = Json::object();
+    Json mesh = {{"primitives", Json::array({std::move(primitive)})}}, node = placed_node(scene);
     if (!part.name.empty()) mesh["name"] = part.name, node["name"] = part.name;
     node["mesh"] = out.push("meshes", std::move(mesh));
     places.part_nodes[p] = int(add_root(out, std::move(node)));

@@ -108,6 +108,11 @@ struct Scene {
   std::string path;  // for messages and provenance; may be empty
   std::string hash;  // content_hash of the input file's bytes; may be empty
 
+  // Where positions count from in the file's space: 0 but for coordinates far from it (surveyed ones), of which floats
+  // would keep too little. All else in the scene's space counts from there too; files written hold it as their nodes'
+  // translation, and what users type is in the file's space.
+  Vec3d origin{0.0};
+
   std::vector<Vec3> positions;                 // world space, metres
   std::vector<Vec3> normals;                   // unit, as many as positions
   std::array<std::vector<Vec2>, 2> texcoords;  // each empty, or as many as positions
@@ -131,6 +136,19 @@ Bounds bounds(const Scene& scene);  // of the vertices that triangles use
 // Cross product of two edges: twice the area along the geometric normal.
 inline Vec3 area_normal(const Scene& s, const Triangle& t) {
   return cross(s.positions[t.v[1]] - s.positions[t.v[0]], s.positions[t.v[2]] - s.positions[t.v[0]]);
+}
+
+// Its length: twice the area. Squares that floats cannot hold, of very small or large scenes, are summed in double.
+inline float area_length(Vec3 area_normal) {
+  const float squared = dot(area_normal, area_normal);
+  return squared > 1e-30f && squared < 1e36f ? std::sqrt(squared) : float(length(Vec3d(area_normal)));
+}
+
+// The unit normal along it, or `fallback` for a triangle without an area.
+inline Vec3 unit_normal(const Scene& s, const Triangle& t, Vec3 fallback = Vec3(0)) {
+  const Vec3 n = area_normal(s, t);
+  const float twice_area = area_length(n);
+  return twice_area > 0 && std::isfinite(twice_area) ? n / twice_area : fallback;
 }
 
 // Barycentric interpolation at weight (1-u-v, u, v) of the triangle's corners.

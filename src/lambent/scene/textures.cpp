@@ -1,4 +1,4 @@
-// Formats: PNG (ISO/IEC 15948), JPEG (ITU-T T.81), by way of stb_image.
+// Formats: PNG (ISO/IEC 15948), JPEG (ITU-T T.81), and TGA, BMP, PSD and PNM as PNG, by way of stb_image.
 #include <lambent/scene/textures.h>
 
 #include <stb_image.h>
@@ -11,6 +11,12 @@
 namespace lambent {
 namespace {
 
+Error too_large(const std::string& where, int width, int height) {
+  return {where, "measures " + std::to_string(width) + " x " + std::to_string(height) + " pixels; the limit is " +
+                     std::to_string(max_texture_side) + " a side"};
+}
+Error too_short(const std::string& where) { return {where, "is broken: too few bytes for its size"}; }
+
 // The most pixels that this many encoded bytes can hold, so that a few bytes cannot ask for gigabytes. Deflate expands
 // at most 1032 times; a PNG pixel has at least `bits` bits. A JPEG block of 64 pixels takes at least one bit.
 uint64_t most_pixels(std::span<const uint8_t> encoded, bool png) {
@@ -21,6 +27,57 @@ uint64_t most_pixels(std::span<const uint8_t> encoded, bool png) {
   int type = encoded[colour_type_at], channels = type == 2 ? 3 : type == 4 ? 2 : type == 6 ? 4 : 1;
   uint64_t bits = uint64_t(channels) * std::max<uint64_t>(encoded[depth_at], 1);
   return size * 1032 * 8 / bits;
+}
+
+bool encode_png(const uint8_t* pixels, int width, int height, int channels, std::vector<uint8_t>& png) {
+  auto append = [](void* to, void* bytes, int n) {
+    auto& encoded = *static_cast<std::vector<uint8_t>*>(to);
+    encoded.insert(encoded.end(), static_cast<uint8_t*>(bytes), static_cast<uint8_t*>(bytes) + n);
+  };
+  return stbi_write_png_to_func(append, &png, width, height, channels, pixels, 0);
+}
+
+bool begins(std::span<const uint8_t> bytes, std::string_view magic) {
+  return bytes.size() >= magic.size() && std::memcmp(bytes.data(), magic.data(), magic.size()) == 0;
+}
+
+// The same for the formats that are decoded to become PNG: a byte a pixel or more; a BMP a bit, runs up to 128 pixels.
+uint64_t most_plain_pixels(std::span<const uint8_t> encoded) {
+  uint64_t size = encoded.size();
+  if (begins(encoded, "BM")) return size * 8;
+  if (begins(encoded, "8BPS")) return size * 128;
+  if (begins(encoded, "P5")) return size;
+  if (begins(encoded, "P6")) return size / 3;
+  constexpr size_t header = 18, kind_at = 2, bits_at = 16;
+  if (size <= header) return 0;
+  bool runs = encoded[kind_at] >= 8;
+  return runs ? size * 128 : (size - header) / std::max(1, (encoded[bits_at] + 7) / 8);
+}
+
+// A TGA, BMP, PSD (flattened, 8 or 16 bits) or binary PNM as the PNG that glTF takes in its place.
+Result<std::vector<uint8_t>> png_from(std::span<const uint8_t> encoded, const std::string& where) {
+  for (std::string_view other : {"GIF8", "DDS ", "RIFF", "II*", "MM", "#?", "v/1\x01", "<svg", "\xabKTX"}) {
+    if (begins(encoded, other)) return Error{where, "is no PNG, JPEG, TGA, BMP, PSD or PNM"};
+  }
+  int width = 0, height = 0, channels = 0;
+  if (encoded.size() > INT_MAX) return Error{where, "is larger than 2 GiB"};
+  const int size = int(encoded.size());
+  if (!stbi_info_from_memory(encoded.data(), size, &width, &height, &channels) || width <= 0 || height <= 0)
+    return Error{where, "is no PNG, JPEG, TGA, BMP, PSD or PNM"};
+  if (width > max_texture_side || height > max_texture_side) return too_large(where, width, height);
+  if (uint64_t(width) * uint64_t(height) > most_plain_pixels(encoded)) return too_short(where);
+  // The decoder takes rows that are missing for whatever memory held: give it black.
+  std::vector<uint8_t> padded(encoded.begin(), encoded.end());
+  constexpr size_t widest = 8;  // four channels of 16 bits
+  padded.resize(std::min<size_t>(padded.size() + widest * size_t(width) * size_t(height), INT_MAX));
+  const int wanted = channels == 2 || channels == 4 ? 4 : 3;
+  stbi_uc* pixels = stbi_load_from_memory(padded.data(), int(padded.size()), &width, &height, &channels, wanted);
+  if (!pixels) return Error{where, std::string("cannot be decoded: ") + stbi_failure_reason()};
+  std::vector<uint8_t> result;
+  bool written = encode_png(pixels, width, height, wanted, result);
+  stbi_image_free(pixels);
+  if (!written) return Error{where, "cannot be encoded"};
+  return result;
 }
 
 }  // namespace
@@ -40,13 +97,8 @@ Result<void> decode_texture(std::span<const uint8_t> encoded, const std::string&
   int width = 0, height = 0, channels = 0;
   if (!stbi_info_from_memory(encoded.data(), size, &width, &height, &channels)) return Error{where, "is broken"};
   if (width <= 0 || height <= 0) return Error{where, "is empty"};
-  if (width > max_texture_side || height > max_texture_side) {
-    return Error{where, "measures " + std::to_string(width) + " x " + std::to_string(height) +
-                            " pixels; the limit is " + std::to_string(max_texture_side) + " a side"};
-  }
-  if (uint64_t(width) * uint64_t(height) > most_pixels(encoded, type == "image/png")) {
-    return Error{where, "is broken: too few bytes for its size"};
-  }
+  if (width > max_texture_side || height > max_texture_side) return too_large(where, width, height);
+  if (uint64_t(width) * uint64_t(height) > most_pixels(encoded, type == "image/png")) return too_short(where);
   const int kept = channels == 2 || channels == 4 ? 4 : 3;
   stbi_uc* pixels = stbi_load_from_memory(encoded.data(), size, &width, &height, &channels, kept);
   if (!pixels) return Error{where, std::string("cannot be decoded: ") + stbi_failure_reason()};
@@ -70,6 +122,11 @@ Result<void> decode_texture(std::span<const uint8_t> encoded, const std::string&
 
 Result<Texture> decode_texture(std::vector<uint8_t> encoded, const std::string& name) {
   Texture texture;
+  if (image_mime_type(encoded).empty()) {
+    auto png = png_from(encoded, name);
+    if (!png) return png.error();
+    encoded = std::move(*png);
+  }
   if (auto decoded = decode_texture(encoded, name, texture); !decoded) return decoded.error();
   texture.name = name;
   texture.encoded = std::move(encoded);
@@ -93,12 +150,7 @@ Result<Texture> with_alpha(const Texture& color, const Texture& mask, const std:
     out.alpha[i] = rgba[4 * i + 3] = uint8_t(a * 255 + 0.5f);
     std::copy_n(out.rgb.data() + 3 * i, 3, rgba.data() + 4 * i);
   }
-  auto append = [](void* to, void* bytes, int n) {
-    auto& encoded = *static_cast<std::vector<uint8_t>*>(to);
-    encoded.insert(encoded.end(), static_cast<uint8_t*>(bytes), static_cast<uint8_t*>(bytes) + n);
-  };
-  if (!stbi_write_png_to_func(append, &out.encoded, out.width, out.height, 4, rgba.data(), 0))
-    return Error{name, "cannot be encoded"};
+  if (!encode_png(rgba.data(), out.width, out.height, 4, out.encoded)) return Error{name, "cannot be encoded"};
   return out;
 }
 

@@ -19,7 +19,8 @@ std::string image_mime_type(std::span<const uint8_t> encoded);
 // hold.
 Result<void> decode_texture(std::span<const uint8_t> encoded, const std::string& where, Texture& texture);
 
-// The same for a texture that keeps its encoded bytes; `name` becomes its name and names it in errors.
+// The same for a texture that keeps its encoded bytes; `name` becomes its name and names it in errors. TGA, BMP, PSD
+// and binary PNM are read too, and kept as PNG.
 Result<Texture> decode_texture(std::vector<uint8_t> encoded, const std::string& name);
 
 // A PNG of `color` whose alpha is that of `mask`, or its red channel where it has none, looked up at the places of
