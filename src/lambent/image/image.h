@@ -38,8 +38,8 @@ ImageFormat image_format(std::span<const uint8_t> bytes);
 Result<Image> load_image(const std::string& path);
 Result<Image> load_image(std::span<const uint8_t> bytes, const std::string& path);
 
-// .exr: linear half floats, ZIP, with alpha where the image has it; finite values beyond +-65504 are clamped to that,
-// and `exposure` is not applied. .png: 8-bit sRGB of rgb * 2^exposure, clamped, opaque unless the image has alpha.
+// .exr: linear half floats, or single ones where light goes beyond +-65504, ZIP, with alpha where the image has it;
+// `exposure` is not applied. .png: 8-bit sRGB of rgb * 2^exposure, clamped, opaque unless the image has alpha.
 // Written whole or not at all. Errors: another extension; the disk's; too large for the format.
 Result<void> save_image(const std::string& path, const Image& image, float exposure = 0.0f);
 
@@ -48,6 +48,7 @@ Result<void> save_image(const std::string& path, const Image& image, float expos
 Result<void> check_image_size(uint64_t width, uint64_t height, size_t bytes, const std::string& path);
 
 // The OpenEXR half of the two above, on bytes. Single floats are for light: the sun is brighter than half floats go.
+// Half floats clamp what is finite to +-65504.
 enum class ExrPrecision { half, single };
 Result<Image> load_exr(std::span<const uint8_t> bytes, const std::string& path);
 Result<std::vector<uint8_t>> encode_exr(const Image& image, const std::string& path,
