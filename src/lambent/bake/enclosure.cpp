@@ -1,7 +1,6 @@
+#include <lambent/bake/directions.h>
 #include <lambent/bake/enclosure.h>
 #include <lambent/core/parallel.h>
-#include <lambent/core/random.h>
-#include <lambent/core/sampling.h>
 
 #include <algorithm>
 #include <atomic>
@@ -9,26 +8,15 @@
 namespace lambent {
 namespace {
 
-constexpr size_t ways = 64, few = 256;
+constexpr size_t few = 256;
 constexpr int most_walls = 256;  // along one way
 constexpr float beyond = 1e-4f;  // of the distance to a wall, and its other side begins
 
-struct Ways {
-  float x[ways], y[ways], z[ways];
-  explicit Ways(Vec3 normal) {
-    const Mat3 frame = frame_about(normal);
-    for (size_t k = 0; k < ways; ++k) {
-      const Vec3 d = frame * square_to_cosine_hemisphere(sobol_owen(uint32_t(k), 0));
-      x[k] = d.x, y[k] = d.y, z[k] = d.z;
-    }
-  }
-};
-
 bool sees_out(const Tracer& tracer, const Receivers& r, size_t i) {
-  const Ways out(r.normals[i]);
-  float visible[ways];
-  tracer.visible_fan(r.origins[i], {out.x, out.y, out.z, ways}, visible);
-  return std::any_of(visible, visible + ways, [](float v) { return v > 0; });
+  const FixedFan out(r.normals[i]);
+  float visible[FixedFan::count];
+  tracer.visible_fan(r.origins[i], {out.x, out.y, out.z, FixedFan::count}, visible);
+  return std::any_of(visible, visible + FixedFan::count, [](float v) { return v > 0; });
 }
 
 uint32_t last_part(const Scene& scene, const Tracer& tracer, Vec3 origin, Vec3 d) {
@@ -73,9 +61,9 @@ std::vector<uint32_t> outermost_parts(const Scene& scene, const Tracer& tracer, 
   const size_t n = receivers.count(), some = std::min(n, few);
   for (size_t k = 0; k < some; ++k) {
     const size_t i = k * n / some;
-    const Ways out(receivers.normals[i]);
-    for (size_t w = 0; w < ways; ++w)
-      if (const uint32_t p = last_part(scene, tracer, receivers.origins[i], {out.x[w], out.y[w], out.z[w]}); p != none)
+    const FixedFan out(receivers.normals[i]);
+    for (size_t w = 0; w < FixedFan::count; ++w)
+      if (const uint32_t p = last_part(scene, tracer, receivers.origins[i], out[w]); p != none)
         if (met[p]++ == 0) parts.push_back(p);
   }
   std::stable_sort(parts.begin(), parts.end(), [&](uint32_t a, uint32_t b) { return met[a] > met[b]; });
