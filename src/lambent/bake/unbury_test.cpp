@@ -133,7 +133,7 @@ TEST(MoveBuriedTexels, NoSeedDecidesAtTheRimOfALampOnAWall) {
   }
   ASSERT_GT(numbers.size(), moved / 2);
   const Environment black = make_environment("black", 4, 2, [](Vec3) { return Vec3(0); });
-  const auto truth = exit_radiances(scene, black, origins, normals, 1, 4096, 1, true);
+  const auto truth = exit_radiances(scene, black, origins, normals, 1, 4096, 1, {}, true);
   for (size_t i = 0; i < numbers.size(); ++i)
     EXPECT_NEAR(0.5f * (low[numbers[i]].x + high[numbers[i]].x), truth[i].mean.x, 0.05f)
         << origins[i].x << ", " << origins[i].z;
