@@ -15,7 +15,7 @@ struct Bright {
   LightmapReport report;
 };
 
-// A floor of two by two under a unit square that glows, one above it, and a dim one.
+// A square under one that glows, and another beside that.
 Bright bake_glowing(float radiance, float dim, Precision precision) {
   Scene scene;
   const uint32_t grey = add_material(scene, "grey", Vec3(0.5f)), lamp = add_material(scene, "lamp", Vec3(0)),
@@ -23,7 +23,7 @@ Bright bake_glowing(float radiance, float dim, Precision precision) {
   scene.materials[lamp].emissive = Vec3(radiance), scene.materials[other].emissive = Vec3(dim);
   add_quad(scene, grey, "floor", Vec3(0), Vec3(0, 0, 1), Vec3(1, 0, 0), 8, 8);
   add_quad(scene, lamp, "lamp", Vec3(0, 1, 0), Vec3(1, 0, 0), Vec3(0, 0, 1), 1, 1);
-  add_quad(scene, other, "other", Vec3(0, 2, 0), Vec3(1, 0, 0), Vec3(0, 0, 1), 1, 1);
+  add_quad(scene, other, "other", Vec3(1.5f, 1, 0), Vec3(1, 0, 0), Vec3(0, 0, 1), 1, 1);
   Bright out;
   auto tracer = Tracer::build(scene);
   auto map = bake_lightmap(scene, *tracer, make_patch_receivers(scene), make_lamps(scene, nullptr, true),

@@ -260,7 +260,7 @@ TEST(Domes, NoWordWhereAReceiverSeesOut) {
   request.exclude = {"floor", "unlit"};
   refused = bake(request);
   ASSERT_FALSE(refused);
-  EXPECT_EQ(refused.error().text(), "--exclude leaves no triangle");
+  EXPECT_EQ(refused.error().text(), "--exclude: leaves no triangle");
 }
 
 }  // namespace
