@@ -50,7 +50,7 @@ TEST(LightmapLight, BeyondHalfFloatsIsKeptInSinglePrecision) {
   EXPECT_EQ(plain.map.all.precision, Precision::half);
   EXPECT_EQ(plain.report.beyond_half, 0);
   const Bright exact = bake_glowing(1, 1, Precision::single);
-  for (const auto [radiance, dim] : {std::pair{1e9f, 1.0f}, {1.0f, 1e-7f}, {3e6f, 1e-9f}}) {
+  for (const auto& [radiance, dim] : {std::pair{1e9f, 1.0f}, {1.0f, 1e-7f}, {3e6f, 1e-9f}}) {
     const Bright b = bake_glowing(radiance, dim, Precision::half);
     EXPECT_EQ(b.map.all.precision, Precision::single);
     EXPECT_EQ(b.map.direct->precision, Precision::single);
