@@ -291,6 +291,17 @@ expect 2 'terms 0 to 2, not 3' render terms.glb $view --show sum:3 -o x.png
 expect 0 'holds lamps alone' render map.glb $view --env uniform:1 -o lone.png
 expect 2 'window: does not go with lamps alone' render map.glb $view --window hann -o x.png
 expect 2 'no group' render map.glb $view --lamp chandelier=1,1,1 -o x.png
+# A lamp dimmed in the bake is the lamp dimmed after it, and in the reference; a part left out is left out everywhere.
+expect 0 'lamps' bake box.obj --transfer lightmap --sky uniform:0.3,0.4,0.6 --light-groups --texels-per-unit 20 \
+  --samples 512 --bounces 2 --lamp lamp=0.1,0.2,0 --lamp sky=0,0,1 -o dim.glb
+expect 0 'relit' render dim.glb $view --show radiosity --spp 256 -o dim_lit.exr
+expect 0 'relit' render map.glb $view --show radiosity --spp 256 --lamp lamp=0.1,0.2,0 --lamp sky=0,0,1 -o dim_after.exr
+alike 50 "lamps dimmed in a bake and after it" dim_lit.exr dim_after.exr
+expect 0 'paths' reference box.obj --lamps --lamp lamp=0 --exclude wall --bounces 0 --spp 1 $view -o x.exr
+expect 2 'needs --lamps' reference box.obj --env uniform:1 --lamp lamp=2 -o x.exr
+expect 2 'no lamp "nobody"' bake box.obj --transfer lightmap --lamp nobody=2 -o x.glb
+expect 2 'no part or material "nobody"' bake box.obj --exclude nobody -o x.glb
+expect 2 'no lamps' bake box.obj --transfer lightmap --light-units watt -o x.glb
 expect 0 'applications' bake box.obj --transfer lightmap --atlas 64x48 --samples 64 --bounces converge:1e-3 \
   --solver southwell --direct separate --json -o map2.glb
 for picture in map2.direct.exr map2.indirect.exr; do [ -s $picture ] && ok || bad "$picture is missing"; done

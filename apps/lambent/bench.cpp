@@ -107,12 +107,12 @@ void add_bench(CLI::App& app, Run& run) {
   CLI::App* bench = app.add_subcommand("bench", "Measure choices on a scene of yours");
   bench->require_subcommand(1);
   CLI::App* c = bench->add_subcommand("solvers", "The scene's radiosity by every solver: residual against work");
-  o->request.receivers = "vertices", o->request.lamp_samples = 64;
+  o->request.transfer = "lightmap", o->request.receivers = "vertices", o->request.lamp_samples = 64;
   c->add_option("scene", o->request.scene,
                 "Scene: .gltf, .glb, .obj or .ply; a closed room of albedo 0.8 if there is none");
   add_table(*c, bake_options(), o->request, o->request.given, [](const std::string& name) {
     for (const char* taken : {"receivers", "texels-per-unit", "atlas", "sky", "samples", "lamp-samples", "memory",
-                              "seed", "ground", "max-edge", "emit", "max-albedo"})
+                              "seed", "ground", "max-edge", "emit", "light-units", "max-albedo", "exclude"})
       if (name == taken) return true;
     return false;
   });

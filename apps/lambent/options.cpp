@@ -1,6 +1,8 @@
 #include "options.h"
+#include "table.h"
 
 #include <lambent/pipeline/bake_parse.h>
+#include <lambent/pipeline/bake_request.h>
 
 #include <lambent/brdf/parse_brdf.h>
 #include <lambent/core/file.h>
@@ -16,19 +18,19 @@
 namespace lambent::tool {
 
 void SceneOptions::add_to(CLI::App& command) {
-  command.add_option("scene", path, "Scene: .gltf, .glb, .obj or .ply")->required();
-  command.add_flag("--ground", ground, "Add a tessellated floor under the scene");
-  command.add_option("--emit", emit, "MATERIAL=R,G,B: make a material a lamp of this radiance");
-  command.add_option("--max-albedo", max_albedo, "Darken base colours to at most this, channel by channel")
-      ->check(CLI::Range(0.0f, 1.0f));
-  command.add_option("--max-edge", max_edge, "Split edges longer than this many scene units")
-      ->check(CLI::PositiveNumber);
+  command.add_option("scene", request.scene, "Scene: .gltf, .glb, .obj or .ply")->required();
+  const std::set<std::string> taken{"ground", "max-edge", "emit", "max-albedo", "exclude", "light-units", "lamp"};
+  add_table(command, bake_options(), request, request.given,
+            [&](const std::string& name) { return taken.contains(name); });
 }
 
-Result<Scene> load_prepared_scene(const SceneOptions& o) {
-  BakeRequest request;
-  request.scene = o.path, request.ground = o.ground, request.max_edge = o.max_edge, request.emit = o.emit;
-  request.max_albedo = o.max_albedo;
+Result<Scene> load_prepared_scene(const SceneOptions& o, bool lamps) {
+  BakeRequest request = o.request;
+  for (const char* name : {"light_units", "lamp"})
+    if (!lamps && request.given.contains(name))
+      return Error{name == std::string("lamp") ? "--lamp" : "--light-units", "needs --lamps", true};
+  if (auto ok = check_values(bake_options(), request, request.given); !ok) return ok.error();
+  if (lamps) request.transfer = "lightmap";
   return load_scene_of(request, {nullptr, [](const std::string& message) { warn(message); }});
 }
 

@@ -5,6 +5,7 @@
 #include <lambent/bake/subsurface.h>
 #include <lambent/light/environment.h>
 #include <lambent/pipeline/parse.h>
+#include <lambent/pipeline/request.h>
 #include <lambent/scene/scene.h>
 #include <lambent/transfer/transfer.h>
 
@@ -12,16 +13,13 @@
 
 namespace lambent::tool {
 
+// A scene as a bake prepares it: rows of the bake's table.
 struct SceneOptions {
-  std::string path;
-  bool ground = false;
-  float max_edge = 0;             // 0: leave edges alone
-  std::vector<std::string> emit;  // NAME=R,G,B
-  float max_albedo = 1;
+  BakeRequest request;
   void add_to(CLI::App& command);
 };
-// Loads and prepares a scene; prints its warnings.
-Result<Scene> load_prepared_scene(const SceneOptions& options);
+// Loads and prepares a scene, its lamps with it where they give light; prints its warnings.
+Result<Scene> load_prepared_scene(const SceneOptions& options, bool lamps);
 
 struct ViewOptions {
   std::string camera = "auto", size = "512x512", background = "env", output;

@@ -46,8 +46,8 @@ int run_reference(Context& context, ReferenceCommand o) {
   }
   const bool displaced = !o.displace.heights.empty();
   SceneOptions prepared = o.scene;
-  if (displaced) prepared.ground = false;  // it stays flat
-  auto scene = load_prepared_scene(prepared);
+  if (displaced) prepared.request.ground = false;  // it stays flat
+  auto scene = load_prepared_scene(prepared, o.options.lamps);
   if (!scene) return fail(scene.error());
   auto poses = make_poses(o.motion, *scene);
   if (!poses) return fail(poses.error());
@@ -58,7 +58,7 @@ int run_reference(Context& context, ReferenceCommand o) {
   if (o.light.env.empty()) o.light.env = "uniform:0";
   if (displaced)
     if (auto ok = displace_scene(*scene, o.displace); !ok) return fail(ok.error());
-  if (displaced && o.scene.ground) add_ground(*scene);
+  if (displaced && o.scene.request.ground) add_ground(*scene);
   auto env = load_light(o.light);
   if (!env) return fail(env.error());
   if (basis.count() > 0) {

@@ -21,6 +21,13 @@ bool colour_allowed() {
   return ::isatty(2) && !(no && *no);
 }
 
+// "0.4%", "37%": what takes hours is seen to move within seconds.
+std::string percent(double fraction) { return fmt::format("{:.{}f}%", 100 * fraction, fraction < 0.1 ? 1 : 0); }
+// What is left after `run` seconds; "" where that would be a guess.
+std::string time_left(double fraction, double run) {
+  return fraction > 0.001 ? human_seconds(run / fraction * (1 - fraction)) + " left" : "";
+}
+
 // One line that is drawn over itself, once a stage has run for a second.
 class ProgressLine {
  public:
@@ -35,8 +42,7 @@ class ProgressLine {
     }
     if (run < 1 || std::chrono::duration<double>(now - drawn_).count() < 0.1) return;
     drawn_ = now, shown_ = true;
-    const std::string left = fraction > 0.01 ? human_seconds(run / fraction * (1 - fraction)) + " left" : "";
-    std::fprintf(stderr, "\r\033[K%s  %3d%%  %s", stage.c_str(), int(100 * fraction), left.c_str());
+    fmt::print(stderr, "\r\033[K{}  {:>4}  {}", stage, percent(fraction), time_left(fraction, run));
     std::fflush(stderr);
   }
 
@@ -54,8 +60,8 @@ class ProgressLog {
     if (fraction >= 1 || std::chrono::duration<double>(now - said_).count() < seconds_between) return;
     said_ = now;
     const double run = std::chrono::duration<double>(now - started_).count();
-    const std::string left = fraction > 0.01 ? ", " + human_seconds(run / fraction * (1 - fraction)) + " left" : "";
-    std::fprintf(stderr, "%s  %d%%%s\n", stage.c_str(), int(100 * fraction), left.c_str());
+    const std::string left = time_left(fraction, run);
+    fmt::print(stderr, "{}  {}{}{}\n", stage, percent(fraction), left.empty() ? "" : ", ", left);
     std::fflush(stderr);
   }
 

@@ -21,6 +21,14 @@ uint32_t morton2(Vec2 u) {
 
 }  // namespace
 
+FixedFan::FixedFan(Vec3 normal) {
+  const Mat3 frame = frame_about(normal);
+  for (size_t k = 0; k < count; ++k) {
+    const Vec3 d = frame * square_to_cosine_hemisphere(sobol_owen(uint32_t(k), 0));
+    x[k] = d.x, y[k] = d.y, z[k] = d.z;
+  }
+}
+
 std::vector<Vec2> sorted_points(size_t count, size_t half, uint32_t key) {
   std::vector<Vec2> points(count);
   for (size_t i = 0; i < count; ++i) points[i] = sobol_owen(uint32_t(i), key);

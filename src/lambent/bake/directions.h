@@ -39,6 +39,14 @@ DirectionSets make_direction_sets(int order, int samples, int sets, uint32_t see
 // environments", 1985.
 DirectionSets make_hemicube_set(int order, int samples);
 
+// 64 cosine-distributed directions about a normal, the same for every seed: for yes and no.
+struct FixedFan {
+  static constexpr size_t count = 64;
+  float x[count], y[count], z[count];
+  explicit FixedFan(Vec3 normal);
+  Vec3 operator[](size_t k) const { return {x[k], y[k], z[k]}; }
+};
+
 // A receiver's draw: which set, and the rotation Rz(a) Ry(b) Rz(c) that takes +z to its normal with a random spin c.
 struct DirectionChoice {
   int set;

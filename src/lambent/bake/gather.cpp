@@ -13,8 +13,6 @@ namespace {
 
 // A handful of sets keeps the tables in cache; the spin makes every receiver's directions its own.
 constexpr int set_count = 8;
-// Rays of the second look at dark receivers, when only occlusion was traced.
-constexpr size_t burial_rays = 64, burial_packet = 16;
 // Hits are looked up in tables larger than the caches: so many rays ahead.
 constexpr size_t lookahead = 16;
 
@@ -164,27 +162,31 @@ struct Fan {
 }  // namespace
 
 // A first packet settles it for all but those near something of the kind.
-bool is_buried(const Tracer& tracer, const SpatialBasis& basis, Vec3 origin, const Directions& fan) {
-  const size_t rays = fan.count;
-  float x[burial_rays], y[burial_rays], z[burial_rays];
-  Hit hits[burial_rays];
-  const size_t n = std::min(burial_rays, rays);
+bool is_buried(const Tracer& tracer, const Receivers& receivers, size_t receiver) {
+  constexpr size_t n = FixedFan::count, packet = 16;
+  const FixedFan fan(receivers.normals[receiver]);
+  float x[packet], y[packet], z[packet];
+  Hit hits[packet];
   size_t backs = 0;
-  for (size_t begin = 0; begin < n; begin += burial_packet) {
-    const size_t m = std::min(burial_packet, n - begin);
-    for (size_t k = 0; k < m; ++k) {  // every packet is spread over the whole fan
-      const size_t j = (begin + k) * 37 % n * rays / n;
+  for (size_t begin = 0; begin < n; begin += packet) {
+    for (size_t k = 0; k < packet; ++k) {  // every packet is spread over the whole fan
+      const size_t j = (begin + k) * 37 % n;
       x[k] = fan.x[j], y[k] = fan.y[j], z[k] = fan.z[j];
     }
-    tracer.closest_fan(origin, {x, y, z, m}, hits);
+    tracer.closest_fan(receivers.origins[receiver], {x, y, z, packet}, hits);
     std::visit(
         [&](const auto& b) {
-          for (size_t k = 0; k < m; ++k) backs += hits[k].triangle != none && !b.find(hits[k].triangle, hits[k].front);
+          for (const Hit& h : hits) backs += h.triangle != none && !b.find(h.triangle, h.front);
         },
-        basis);
+        receivers.basis);
     if (backs == 0) return false;
   }
   return 2 * backs > n;
+}
+
+bool is_buried(const Tracer& tracer, const Receivers& receivers, size_t receiver, size_t backs, size_t rays) {
+  if (4 * backs < rays || 4 * backs > 3 * rays) return 2 * backs > rays;
+  return is_buried(tracer, receivers, receiver);
 }
 
 float* checked_row(const GatherSky& sky, size_t first, size_t receiver) {
@@ -315,7 +317,7 @@ void trace_gather_on(const GatherSetup& setup, const Basis& basis, GatherScratch
     if (checked) scratch.half_rows.end_row();
     if (sky) {
       fan.project(*sky, first, r);
-      sky->buried[i] = 2 * backs > rays;
+      sky->buried[i] = is_buried(setup.tracer, setup.receivers, r, backs, rays);
     }
   }
   if (block) {
@@ -345,8 +347,7 @@ void trace_sky(const GatherSetup& setup, GatherScratch& scratch, size_t first, s
     fan.project(sky, first, r);
     size_t seen = 0;
     for (size_t j = 0; j < rays; ++j) seen += fan.visible[j] > 0;
-    sky.buried[i] = 4 * seen < rays && is_buried(setup.tracer, setup.receivers.basis, origin,
-                                                 {fan.x.data(), fan.y.data(), fan.z.data(), rays});
+    sky.buried[i] = 2 * seen < rays && is_buried(setup.tracer, setup.receivers, r);
   }
 }
 

@@ -100,9 +100,11 @@ void trace_gather(const GatherSetup& setup, GatherScratch& scratch, size_t first
 // Traces occlusion only: the sky rows, without hit rows.
 void trace_sky(const GatherSetup& setup, GatherScratch& scratch, size_t first, size_t count, const GatherSky& sky);
 
-// A second look at a receiver that sees little sky, when only occlusion was traced: do most of a sample of the fan's
-// rays meet backs of one-sided surfaces?
-bool is_buried(const Tracer& tracer, const SpatialBasis& basis, Vec3 origin, const Directions& fan);
+// Whether a receiver lies inside something: most rays of a fan that no seed changes meet backs of one-sided surfaces.
+bool is_buried(const Tracer& tracer, const Receivers& receivers, size_t receiver);
+// The same for one that `backs` of `rays` rays found so: asks only where these leave it open, as at the rim of a lamp
+// that hangs on a wall, so that no such receiver is one or the other by its seed.
+bool is_buried(const Tracer& tracer, const Receivers& receivers, size_t receiver, size_t backs, size_t rays);
 
 // Values of buried receivers are taken from their neighbours (neighbours_of).
 struct FillStep {

@@ -8,13 +8,15 @@
 #include <fmt/format.h>
 
 #include <chrono>
-#include <numeric>
+#include <algorithm>
 
 namespace lambent {
 namespace {
 
 // Beyond any lamp in any unit (the sun is 1.6e9 cd/m2), and far from where products of a few such numbers overflow.
 constexpr float brightest_lamp = 1e15f;
+// Half floats end there; below, they have fewer digits.
+constexpr float half_max = 65504, half_min = 0x1p-14f;
 std::string too_bright(const char* what, const std::string& name, float value) {
   return fmt::format("{} \"{}\" shines with {:.3g}; the most that is taken is {:g}", what, name, value, brightest_lamp);
 }
@@ -46,18 +48,28 @@ Result<void> check_options(const Scene& scene, const Lamps& lamps, const Lightma
   return {};
 }
 
-// x, [receiver][row][column][channel], as a Transfer. Errors: values that half floats do not hold.
-Result<Transfer> to_transfer(const LightBasis& light, const AlignedVector<float>& x, size_t rows, size_t receivers,
-                             size_t width, Precision precision) {
-  const float brightest = std::transform_reduce(
-      x.begin(), x.end(), 0.0f, [](float a, float b) { return std::max(a, b); }, [](float v) { return std::abs(v); });
-  if (precision == Precision::half && !(brightest <= 65504.0f))
-    return Error{
-        "lightmap",
-        fmt::format(
-            "its values go up to {:.3g}, and half floats to 65504: dim the lamps, or keep it in single precision",
-            brightest)};
-  return store_columns(light, x.data(), rows, 3, receivers, width, precision);
+// Of x, [receiver][row][column][channel]: a value that half floats hold only coarsely or not at all; 0: none. Brightest
+// first, then groups whose light lies below half floats' normal numbers.
+float beyond_half(const LightBasis& light, const AlignedVector<float>& x, size_t width) {
+  std::vector<float> most(width, 0);
+  for (size_t i = 0; i < x.size(); i += width)
+    for (size_t k = 0; k < width; ++k) most[k] = std::max(most[k], std::abs(x[i + k]));
+  const float brightest = *std::max_element(most.begin(), most.end());
+  if (brightest > half_max) return brightest;
+  const size_t columns = light.count(), first = columns - light.groups.size();
+  for (size_t k = first; k < columns; ++k)
+    if (const float value = std::max({most[3 * k], most[3 * k + 1], most[3 * k + 2]}); value > 0 && value < half_min)
+      return value;
+  return 0;
+}
+
+// Transfer of harmonics, the same in every channel, into the first columns of e.
+void add_sky(const std::vector<float>& sky, size_t harmonics, size_t width, AlignedVector<float>& e) {
+  parallel_for(sky.size() / harmonics, gather_block, [&](size_t begin, size_t end) {
+    for (size_t i = begin; i < end; ++i)
+      for (size_t k = 0; k < harmonics; ++k)
+        for (size_t c = 0; c < 3; ++c) e[i * width + 3 * k + c] = sky[i * harmonics + k];
+  });
 }
 
 Result<AlignedVector<float>> solution(const GatherOperator& op, const AlignedVector<float>& e, size_t width,
@@ -128,11 +140,7 @@ Result<Lightmap> bake_lightmap(const Scene& scene, const Tracer& tracer, const R
   auto op = GatherOperator::trace(setup, lamps.groups() ? &direct : nullptr, harmonics ? sky.data() : nullptr, bounces,
                                   o.memory - least, progress);
   if (!op) return op.error();
-  parallel_for(harmonics ? n : 0, gather_block, [&](size_t begin, size_t end) {
-    for (size_t i = begin; i < end; ++i)
-      for (size_t k = 0; k < harmonics; ++k)
-        for (size_t c = 0; c < 3; ++c) e[i * width + 3 * k + c] = sky[i * harmonics + k];
-  });
+  if (harmonics) add_sky(sky, harmonics, width, e);
   r.trace_seconds = op->report().seconds;
 
   const auto start = std::chrono::steady_clock::now();
@@ -149,20 +157,23 @@ Result<Lightmap> bake_lightmap(const Scene& scene, const Tracer& tracer, const R
   }
   r.bounce_seconds = seconds_since(start);
 
-  auto stored = [&](AlignedVector<float>& values, size_t rows_each) -> Result<Transfer> {
+  Precision precision = o.precision;  // all light decides, and its parts follow
+  auto stored = [&](AlignedVector<float>& values, size_t rows_each, bool is_all) -> Result<Transfer> {
     if (const auto* texels = std::get_if<TexelReceivers>(&receivers.basis))
       smooth_seams(scene, *texels, values.data(), rows_each * width,
                    rows_each == 1 ? 3 * light.count() : rows_each * width, 0.95f, 0.05f, progress);
     if (is_cancelled(progress)) return Error{"", "cancelled"};
-    return to_transfer(light, values, rows_each, n, width, o.precision);
+    const float value = precision == Precision::half ? beyond_half(light, values, width) : 0;
+    if (value > half_max || (is_all && value > 0)) precision = Precision::single, r.beyond_half = value;
+    return store_columns(light, values.data(), rows_each, 3, n, width, precision);
   };
-  auto all = stored(*x, rows);
+  auto all = stored(*x, rows, true);
   if (!all) return all.error();
   Lightmap map{std::move(*all), std::nullopt, {}};
   if (o.keep_terms) {
     *x = {};
     auto take = [&](int, AlignedVector<float> term) -> Result<void> {
-      auto transfer = stored(term, 1);
+      auto transfer = stored(term, 1, false);
       if (!transfer) return transfer.error();
       map.terms.push_back(std::move(*transfer));
       return {};
@@ -171,7 +182,7 @@ Result<Lightmap> bake_lightmap(const Scene& scene, const Tracer& tracer, const R
       return ok.error();
   }
   if (direct_apart) {
-    auto direct_light = stored(e, 1);
+    auto direct_light = stored(e, 1, false);
     if (!direct_light) return direct_light.error();
     map.direct = std::move(*direct_light);
   }

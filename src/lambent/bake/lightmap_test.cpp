@@ -421,9 +421,8 @@ TEST(Lightmap, RefusesWhatCannotBeBaked) {
   const uint32_t m = add_lamp(flat, "flat", Vec3(0.5f), Vec3(1));
   add_quad(flat, m, "flat", Vec3(0), Vec3(1, 0, 0), Vec3(2, 0, 0), 1, 1);
   EXPECT_EQ(make_lamps(flat, nullptr, true).groups(), 0u);
-  // One of no finite brightness is named, and so is light that halves cannot hold.
-  for (auto [radiance, words] :
-       {std::pair{3e38f, "\"sun\" shines with"}, {INFINITY, "\"sun\" shines with"}, {1e9f, "half floats"}}) {
+  // One of no finite brightness is named.
+  for (auto [radiance, words] : {std::pair{3e38f, "\"sun\" shines with"}, {INFINITY, "\"sun\" shines with"}}) {
     Scene glaring = dark;
     const uint32_t sun = add_lamp(glaring, "sun", Vec3(0.5f), Vec3(radiance));
     add_quad(glaring, sun, "sun", Vec3(0, 1, 0), Vec3(1, 0, 0), Vec3(0, 0, 1), 1, 1);

@@ -190,7 +190,7 @@ bool MatrixGather::trace(MatrixScratch& s, size_t r, MatrixHits* hits) const {
     setup.tracer.visible_fan(receivers.origins[r], d, s.visible.data());
     size_t seen = 0;
     for (size_t j = 0; j < rays(); ++j) seen += s.visible[j] > 0;
-    return 4 * seen < rays() && is_buried(setup.tracer, receivers.basis, receivers.origins[r], d);
+    return 2 * seen < rays() && is_buried(setup.tracer, receivers, r);
   }
   setup.tracer.closest_fan(receivers.origins[r], d, s.hits.data());
   size_t backs = 0;
@@ -211,7 +211,7 @@ bool MatrixGather::trace(MatrixScratch& s, size_t r, MatrixHits* hits) const {
                           uint16_t(h.v * 65535.0f + 0.5f),
                           {float_to_half(colour.x), float_to_half(colour.y), float_to_half(colour.z)}});
   }
-  return 2 * backs > rays();
+  return is_buried(setup.tracer, receivers, r, backs, rays());
 }
 
 }  // namespace lambent

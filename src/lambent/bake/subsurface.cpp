@@ -15,7 +15,6 @@ namespace lambent {
 namespace {
 
 constexpr size_t walk_grain = 4;  // receivers: walks are long
-constexpr size_t burial_rays = 64;
 
 using Clock = std::chrono::steady_clock;
 double seconds_since(Clock::time_point start) { return std::chrono::duration<double>(Clock::now() - start).count(); }
@@ -152,12 +151,7 @@ struct WalkRows final : LinearOperator {
     const Vec3 origin = receivers.origins[r], up = receivers.normals[r];
     const Mat3 frame = frame_about(up);
     const uint64_t key = hash64(options.seed, r);
-    float x[burial_rays], z[burial_rays], w[burial_rays];
-    for (uint32_t i = 0; i < burial_rays; ++i) {
-      const Vec3 d = frame * square_to_cosine_hemisphere(sobol_owen(i, uint32_t(key >> 32)));
-      x[i] = d.x, w[i] = d.y, z[i] = d.z;
-    }
-    buried[r] = is_buried(tracer, receivers.basis, origin, {x, w, z, burial_rays});
+    buried[r] = is_buried(tracer, receivers, r);
     // The surface that the receiver lies on; one that lies on a back has no medium behind it, and stays dark.
     // A ray straight down a vertex may slip between its triangles, hence others beside it.
     Hit below = tracer.closest(origin, -up);

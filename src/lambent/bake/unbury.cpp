@@ -3,35 +3,15 @@
 #include <lambent/bake/gather.h>
 #include <lambent/bake/unbury.h>
 #include <lambent/core/parallel.h>
-#include <lambent/core/random.h>
-#include <lambent/core/sampling.h>
 #include <lambent/receivers/raster.h>
 
 namespace lambent {
 namespace {
 
-constexpr size_t rays = 64;
 // Half sides of squares about the centre, in texels, on which points are tried, in `turns` directions; then the gap to
 // the last one is halved. Points beyond the surface's border stand for the nearest on it, as texel centres do.
 constexpr float radii[] = {0.3f, 0.6f, 0.99f};
 constexpr int turns = 8, halvings = 3;
-
-// Cosine-distributed directions about a normal.
-struct Cone {
-  float x[rays], y[rays], z[rays];
-  explicit Cone(Vec3 normal) {
-    const Mat3 frame = frame_about(normal);
-    for (size_t k = 0; k < rays; ++k) {
-      const Vec3 d = frame * square_to_cosine_hemisphere(sobol_owen(uint32_t(k), 0));
-      x[k] = d.x, y[k] = d.y, z[k] = d.z;
-    }
-  }
-};
-
-bool lies_inside(const Tracer& tracer, const Receivers& r, size_t i) {
-  const Cone cone(r.normals[i]);
-  return is_buried(tracer, r.basis, r.origins[i], {cone.x, cone.y, cone.z, rays});
-}
 
 struct Side {
   uint32_t triangle;
@@ -77,7 +57,7 @@ size_t move_buried_texels(const Scene& scene, const Tracer& tracer, const Atlas&
     ProgressStage stage(progress, "texels inside", receivers.count());
     parallel_for(receivers.count(), gather_block, [&](size_t begin, size_t end) {
       if (stage.cancelled()) return;
-      for (size_t r = begin; r < end; ++r) buried[r] = lies_inside(tracer, receivers, r);
+      for (size_t r = begin; r < end; ++r) buried[r] = is_buried(tracer, receivers, r);
       stage.advance(end - begin);
     });
     if (stage.cancelled()) return 0;
@@ -106,7 +86,7 @@ size_t move_buried_texels(const Scene& scene, const Tracer& tracer, const Atlas&
         }
         if (!(nearest.distance < INFINITY)) return false;
         place_texel(scene, receivers, r, {on.triangle, nearest.u, nearest.v}, on.back, texel_size, diagonal);
-        return !lies_inside(tracer, receivers, r);
+        return !is_buried(tracer, receivers, r);
       };
       auto search = [&] {
         float last = 0;

@@ -1,3 +1,4 @@
+#include <lambent/bake/gather.h>
 #include <lambent/bake/lightmap.h>
 #include <lambent/bake/unbury.h>
 #include <lambent/reference/path_tracer.h>
@@ -87,6 +88,67 @@ TEST(MoveBuriedTexels, NoRimWhereABoxStands) {
   EXPECT_LT(rms[1], 0.035) << "filled: " << rms[0];
   EXPECT_LT(worst[1], 0.12) << "filled: " << worst[0];
   EXPECT_LT(rms[1], 0.4 * rms[0]);
+}
+
+// A wall, y = 0, with a lamp on it, and a ceiling that sends its light back. The lamp hangs just off the wall and
+// shines away from it, or is a box that is sunk into it.
+Scene wall_with_lamp(bool sunk) {
+  Scene scene;
+  const uint32_t grey = add_material(scene, "grey", Vec3(0.5f)), lamp = add_material(scene, "lamp", Vec3(0));
+  scene.materials[lamp].emissive = Vec3(5);
+  add_quad(scene, grey, "wall", Vec3(-2, 0, -2), Vec3(0, 0, 4), Vec3(4, 0, 0), 1, 1);
+  const Vec3 corner(-0.63f, sunk ? -0.01f : 0.01f, -0.57f);
+  if (sunk) add_box(scene, lamp, "lamp", corner, Vec3(0.71f, 0.1f, 0.6f), 1);
+  else add_quad(scene, lamp, "lamp", corner, Vec3(0, 0, 1.17f), Vec3(1.34f, 0, 0), 1, 1);
+  add_quad(scene, grey, "ceiling", Vec3(-2, 2, -2), Vec3(4, 0, 0), Vec3(0, 0, 4), 1, 1);
+  return scene;
+}
+
+// Texels that the lamp covers move to its rim, where half of what they see is its back or its inside.
+TEST(MoveBuriedTexels, NoSeedDecidesAtTheRimOfALampOnAWall) {
+  for (bool sunk : {false, true}) {
+    SCOPED_TRACE(sunk ? "sunk" : "hung");
+    Scene scene = wall_with_lamp(sunk);
+    auto atlas = make_atlas(scene, {.texels_per_unit = 8});
+    ASSERT_TRUE(atlas);
+    Receivers receivers = make_texel_receivers(scene, *atlas);
+    auto tracer = Tracer::build(scene);
+    const size_t moved = move_buried_texels(scene, *tracer, *atlas, receivers);
+    EXPECT_GT(moved, 20u);
+    const Lamps lamps = make_lamps(scene, nullptr, false);
+    std::vector<float> low(receivers.count(), INFINITY), high(low.size(), 0);
+    size_t buried = 0;
+    for (uint32_t seed = 1; seed <= 6; ++seed) {
+      LightmapReport report;
+      auto map = bake_lightmap(scene, *tracer, receivers, lamps,
+                               {.samples = 1024, .bounces = 1, .seed = seed, .precision = Precision::single}, false,
+                               &report);
+      ASSERT_TRUE(map);
+      Relit relit;
+      relight(map->all, std::vector<Vec3>{Vec3(1)}, relit);
+      if (seed == 1) buried = report.buried;
+      EXPECT_EQ(report.buried, buried) << seed;
+      for (size_t r = 0; r < low.size(); ++r)
+        low[r] = std::min(low[r], relit.at(r).x), high[r] = std::max(high[r], relit.at(r).x);
+    }
+    // What is not filled from neighbours is what the path tracer has there, seed or no seed.
+    std::vector<Vec3> origins, normals;
+    std::vector<size_t> numbers;
+    for (size_t r = 0; r < low.size(); ++r) {
+      const Vec3 p = receivers.origins[r];
+      const bool at_rim = p.y < 0.01f && p.x > -0.8f && p.x < 0.9f && p.z > -0.75f && p.z < 0.8f;
+      if (!at_rim || is_buried(*tracer, receivers, r)) continue;
+      EXPECT_LT(high[r] - low[r], 0.1f + 0.05f * high[r]) << p.x << ", " << p.z;
+      origins.push_back(p), normals.push_back(receivers.normals[r]), numbers.push_back(r);
+    }
+    ASSERT_GT(numbers.size(), moved / 2);
+    const Environment black = make_environment("black", 4, 2, [](Vec3) { return Vec3(0); });
+    const auto truth = exit_radiances(scene, black, origins, normals, 1, 4096, 1, {}, true);
+    for (size_t i = 0; i < numbers.size(); ++i) {
+      const float value = 0.5f * (low[numbers[i]] + high[numbers[i]]);
+      EXPECT_NEAR(value, truth[i].mean.x, 0.05f + 0.03f * value) << origins[i].x << ", " << origins[i].z;
+    }
+  }
 }
 
 TEST(MoveBuriedTexels, NothingLeaksAcrossAWall) {

@@ -1,6 +1,7 @@
 #include <lambent/baked/baked_file.h>
 
 #include <lambent/baked/extension.h>
+#include <lambent/scene/exclude.h>
 #include <lambent/baked/viewer_look.h>
 #include <lambent/core/check.h>
 #include <lambent/scene/gltf.h>
@@ -123,6 +124,7 @@ Baked make_baked(Scene scene, const Receivers& receivers, Store store, Rows rows
   baked.surface = {placement_of(scene, receivers), std::move(store), std::move(rows)};
   baked.parts = scene_parts(scene, baked.surface.where);
   baked.basis = receivers.basis;
+  baked.excluded = scene.excluded;
   baked.scene = std::move(scene);
   LAMBENT_CHECK(is_consistent(baked.surface));
   return baked;
@@ -131,6 +133,7 @@ Baked make_baked(Scene scene, const Receivers& receivers, Store store, Rows rows
 Baked make_baked(Scene scene, FixedView view, Store store) {
   Baked baked;
   baked.surface = {std::move(view), std::move(store), PixelRows{}};
+  baked.excluded = scene.excluded;
   baked.scene = std::move(scene);
   LAMBENT_CHECK(is_consistent(baked.surface));
   return baked;
@@ -178,6 +181,7 @@ Result<Baked> load_baked(const MappedFile& file, const std::string& path) {
   const std::string folder = std::filesystem::path(path).parent_path().string();
   auto scene = load_gltf(file, path, folder.empty() ? "." : folder);
   if (!scene) return scene.error();
+  exclude_parts(*scene, fields->excluded);  // of inputs without a document they are not there
   if (auto ok = fit_to_scene(*scene, fields->surface.where, fields->parts, path); !ok) return ok.error();
   Baked baked{std::move(*fields), std::move(*scene), {}};
   baked.basis = spatial_basis(baked.scene, baked.surface.where);

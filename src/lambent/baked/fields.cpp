@@ -3,6 +3,8 @@
 #include <lambent/basis/sh.h>
 #include <lambent/core/check.h>
 
+#include <algorithm>
+
 namespace lambent {
 
 using nlohmann::json;
@@ -76,7 +78,7 @@ Result<BakedFields> read_fields(const MappedFile& file, const GltfChunks& chunks
   const BlobReader in{chunks, file};
   auto surface = decode_transfer(in, *t, where);
   if (!surface) return surface.error();
-  BakedFields fields{std::move(*surface), {}, {}, {}, "{}"};
+  BakedFields fields{std::move(*surface), {}, {}, {}, {}, "{}"};
   auto placement = decode_placement(in, extension, receivers_of(fields.surface.store), fields.parts, where);
   if (!placement) return placement.error();
   fields.surface.where = std::move(*placement);
@@ -91,6 +93,11 @@ Result<BakedFields> read_fields(const MappedFile& file, const GltfChunks& chunks
     auto terms = read_terms(in, *list, fields.surface, where);
     if (!terms) return terms.error();
     fields.terms = std::move(*terms);
+  }
+  if (const auto list = extension.find("excluded"); list != extension.end()) {
+    if (!list->is_array() || !std::all_of(list->begin(), list->end(), [](const json& v) { return v.is_string(); }))
+      return Error{where, "\"excluded\" is not a list of names"};
+    fields.excluded = list->get<std::vector<std::string>>();
   }
   if (const auto provenance = extension.find("provenance"); provenance != extension.end())
     fields.provenance = provenance->dump(-1, ' ', false, json::error_handler_t::replace);
@@ -109,6 +116,7 @@ json encode_fields(const BakedFields& fields, BlobWriter& out) {
     LAMBENT_CHECK(term.receivers == receivers_of(fields.surface.store) && term.rows == rows_of(fields.surface.store));
     extension["terms"].push_back(encode_dense(term, out));
   }
+  if (!fields.excluded.empty()) extension["excluded"] = fields.excluded;
   extension["provenance"] = json::parse(fields.provenance, nullptr, false);
   LAMBENT_CHECK(!extension["provenance"].is_discarded());
   return extension;

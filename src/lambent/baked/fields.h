@@ -23,6 +23,7 @@ struct BakedFields {
   // Terms of the surface's Neumann series, one by one, where they were kept: light that has met k surfaces between lamp
   // and receiver, k = 0, 1, ...; placed and meant as the surface's. Their sum is the surface's store.
   std::vector<Transfer> terms;
+  std::vector<std::string> excluded;  // parts that were left out of the bake, as it was asked for
   std::string provenance = "{}";  // JSON text: the request, inputs and their hashes, version, what the bake reported
 };
 

@@ -196,7 +196,11 @@ Result<void> save_image(const std::string& path, const Image& image, float expos
   LAMBENT_CHECK(image.alpha.empty() || image.alpha.size() == image.rgb.size());
   std::string extension = file_extension(path);
   if (extension != "exr" && extension != "png") return Error{path, "pictures are written as .exr or .png"};
-  auto encoded = extension == "exr" ? encode_exr(image, path) : encode_png(image, exposure, path);
+  const bool beyond_half = std::any_of(image.rgb.begin(), image.rgb.end(), [](Vec3 c) {
+    return std::max({std::abs(c.x), std::abs(c.y), std::abs(c.z)}) > 65504 && is_finite(c);
+  });
+  auto encoded = extension == "exr" ? encode_exr(image, path, beyond_half ? ExrPrecision::single : ExrPrecision::half)
+                                    : encode_png(image, exposure, path);
   if (!encoded) return encoded.error();
   std::span<const uint8_t> piece(*encoded);
   return write_file_atomically(path, {&piece, 1});

@@ -60,8 +60,8 @@ Result<Image> load_image(const std::string& path, std::vector<std::string>* warn
 Result<Image> load_image(std::span<const uint8_t> bytes, const std::string& path,
                          std::vector<std::string>* warnings = nullptr);
 
-// .exr: linear half floats, ZIP, with alpha where the image has it; finite values beyond +-65504 are clamped to that,
-// and `exposure` is not applied. .png: 8-bit sRGB of rgb * 2^exposure, clamped, opaque unless the image has alpha.
+// .exr: linear half floats, or single ones where light goes beyond +-65504, ZIP, with alpha where the image has it;
+// `exposure` is not applied. .png: 8-bit sRGB of rgb * 2^exposure, clamped, opaque unless the image has alpha.
 // Written whole or not at all. Errors: another extension; the disk's; too large for the format.
 Result<void> save_image(const std::string& path, const Image& image, float exposure = 0.0f);
 
@@ -76,7 +76,8 @@ Result<void> check_image_size(uint64_t width, uint64_t height, size_t bytes, con
 Result<ImageFile> load_hdr(std::span<const uint8_t> bytes, const std::string& path);
 Result<ImageFile> load_exr(std::span<const uint8_t> bytes, const std::string& path);
 
-// An .exr's bytes. Single floats are for light: the sun is brighter than half floats go.
+// An .exr's bytes. Single floats are for light: the sun is brighter than half floats go. Half floats clamp what is
+// finite to +-65504.
 enum class ExrPrecision { half, single };
 Result<std::vector<uint8_t>> encode_exr(const Image& image, const std::string& path,
                                         ExrPrecision precision = ExrPrecision::half);

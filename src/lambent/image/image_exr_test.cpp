@@ -69,6 +69,17 @@ TEST(Exr, BeyondHalfIsClampedAndNotANumberKept) {
   EXPECT_EQ(back->rgb[1].z, -INFINITY);
 }
 
+TEST(Exr, LightBeyondHalfIsSavedInSinglePrecision) {
+  Image image(2, 1);
+  image.rgb = {Vec3(1e6f, -1e9f, 65505), Vec3(0.1f, 2, 3)};
+  const std::string path = testing::TempDir() + "/lambent_exr_bright_" + std::to_string(::getpid()) + ".exr";
+  ASSERT_TRUE(save_image(path, image));
+  auto back = load_image(path);
+  std::filesystem::remove(path);
+  ASSERT_TRUE(back) << back.error().text();
+  EXPECT_EQ(back->rgb, image.rgb);
+}
+
 TEST(Exr, SaveWritesTheSameBytesTwice) {
   Image image(9, 4);
   for (size_t i = 0; i < image.rgb.size(); ++i) image.rgb[i] = Vec3(float(i), 1, 2);

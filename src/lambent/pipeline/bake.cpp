@@ -319,6 +319,8 @@ Result<BakeOutcome> bake_plain(const BakeRequest& request, const BakePlan& plan,
     if (auto ok = check_picture_bytes(b, *made); !ok) return ok.error();
     view = *made;
   }
+  if (plan.kind != BakeKind::membrane && request.shadows == "on")
+    warn_if_enclosed(b.scene, b.tracer, b.receivers(), job);
   if (b.placed.atlas) move_buried_texels(b.scene, b.tracer, *b.placed.atlas, b.placed.receivers, job.progress);
   if (auto ok = bake_surface(b); !ok) return ok.error();
   if (auto ok = bake_beside(b, lattice, view); !ok) return ok.error();

@@ -2,6 +2,7 @@
 
 #include <lambent/bake/unbury.h>
 #include <lambent/pipeline/lightmap_pictures.h>
+#include <lambent/pipeline/parse.h>
 #include <lambent/pipeline/place_receivers.h>
 #include <lambent/pipeline/text.h>
 
@@ -77,6 +78,9 @@ Result<BakeOutcome> bake_lightmap_request(const BakeRequest& request, const Bake
     auto env = load_environment(request.sky);
     if (!env) return env.error();
     for (const std::string& w : env->warnings) job.warn(w);
+    for (const std::string& text : request.lamp)
+      if (auto scale = parse_named_color(text, "--lamp"); scale && scale->name == sky_name)
+        for (Vec3& radiance : env->image.rgb) radiance *= scale->color;
     sky = std::move(*env);
   }
   const Lamps lamps = make_lamps(*scene, sky ? &*sky : nullptr, request.light_groups);
@@ -87,6 +91,7 @@ Result<BakeOutcome> bake_lightmap_request(const BakeRequest& request, const Bake
   auto tracer = Tracer::build(*scene, job.progress);
   if (!tracer) return tracer.error();
   seconds.build = seconds_since(start);
+  if (sky || request.order > 0) warn_if_enclosed(*scene, *tracer, placed->receivers, job);
   const size_t moved =
       placed->atlas ? move_buried_texels(*scene, *tracer, *placed->atlas, placed->receivers, job.progress) : 0;
 
@@ -95,6 +100,9 @@ Result<BakeOutcome> bake_lightmap_request(const BakeRequest& request, const Bake
   auto map = bake_lightmap(*scene, *tracer, placed->receivers, lamps, plan.lightmap, request.direct == "separate",
                            &report, job.progress);
   if (!map) return map.error();
+  if (report.beyond_half > 0)
+    job.warn(
+        fmt::format("the lightmap is kept in single precision: half floats do not hold {:.3g}", report.beyond_half));
   BakeOutcome out;
   out.summary = summarize(request, *map, report, seconds, moved, placed->atlas);
   out.pictures = lightmap_pictures(*map, placed->receivers, request.light_groups);

@@ -4,6 +4,9 @@
 #include <lambent/light/lamps.h>
 #include <lambent/pipeline/bake_lightmap.h>
 #include <lambent/pipeline/parse.h>
+#include <lambent/scene/exclude.h>
+#include <lambent/scene/gltf.h>
+#include <lambent/scene/lights.h>
 #include <lambent/scene/load.h>
 #include <lambent/scene/refine.h>
 
@@ -198,9 +201,61 @@ Result<BakePlan> plan_of(const BakeRequest& r, const Job& job) {
   return plan;
 }
 
+namespace {
+
+const std::map<std::string, LightUnits> unit_names{
+    {"lumen", LightUnits::lumen}, {"watt", LightUnits::watt}, {"raw", LightUnits::raw}};
+
+std::string generator_of(const Scene& scene) {
+  if (!scene.document) return {};
+  const auto& asset = scene.document->json["asset"];
+  const auto generator = asset.find("generator");
+  return generator != asset.end() && generator->is_string() ? generator->get<std::string>() : std::string();
+}
+
+// As --light-units says; a guess is told.
+Result<void> set_light_units(Scene& scene, const std::string& text, const Job& job) {
+  if (text != "auto" && scene.lights.empty())
+    return Error{"--light-units", "has nothing to convert: the scene has no lamps (KHR_lights_punctual)", true};
+  if (scene.lights.empty()) return {};
+  const std::string generator = generator_of(scene);
+  const LightUnits units = text == "auto" ? guess_light_units(generator) : unit_names.at(text);
+  convert_lights(scene.lights, units);
+  if (text == "auto" && units != LightUnits::lumen)
+    job.warn(fmt::format("{} lamp{} taken as \"{}\" writes them, {}; --light-units lumen takes them as they are",
+                         scene.lights.size(), scene.lights.size() == 1 ? " is" : "s are", generator,
+                         units == LightUnits::watt ? "at 683 lumens a watt, and divided by that to go with emission"
+                                                   : "in watts, and those of points and spots divided by 4 pi"));
+  return {};
+}
+
+// As --lamp says, but for the sky.
+Result<void> scale_lamps(Scene& scene, const BakeRequest& r) {
+  for (const std::string& text : r.lamp) {
+    auto scale = parse_named_color(text, "--lamp");
+    if (!scale) return scale.error();
+    bool found = !r.sky.empty() && scale->name == sky_name;
+    for (PunctualLight& light : scene.lights)
+      if (light.name == scale->name) light.intensity *= scale->color, found = true;
+    for (Material& m : scene.materials)
+      if (m.name == scale->name && m.emissive != Vec3(0)) m.emissive *= scale->color, found = true;
+    if (!found) return Error{"--lamp", "the scene has no lamp \"" + scale->name + "\"", true};
+  }
+  return {};
+}
+
+}  // namespace
+
 Result<Scene> load_scene_of(const BakeRequest& r, const Job& job) {
   auto scene = load_scene(r.scene);
   if (!scene) return scene;
+  const std::vector<std::string> unknown = exclude_parts(*scene, r.exclude);
+  if (!unknown.empty())
+    return Error{"--exclude",
+                 unknown[0] == unlit_word ? "the scene has no unlit material"
+                                          : "the scene has no part or material \"" + unknown[0] + "\"",
+                 true};
+  if (scene->triangles.empty()) return Error{"--exclude", "leaves no triangle", true};
   for (const std::string& text : r.emit) {
     auto lamp = parse_named_color(text, "--emit");
     if (!lamp) return lamp.error();
@@ -208,6 +263,10 @@ Result<Scene> load_scene_of(const BakeRequest& r, const Job& job) {
     for (Material& m : scene->materials)
       if (m.name == lamp->name) m.emissive = lamp->color, m.emissive_texture = -1, found = true;
     if (!found) return Error{"--emit", "the scene has no material \"" + lamp->name + "\"", true};
+  }
+  if (r.transfer == "lightmap") {  // no other kind knows lamps
+    if (auto ok = set_light_units(*scene, r.light_units, job); !ok) return ok.error();
+    if (auto ok = scale_lamps(*scene, r); !ok) return ok.error();
   }
   for (Material& m : scene->materials) m.base_color = min(m.base_color, Vec3(r.max_albedo));
   if (r.ground) add_ground(*scene);

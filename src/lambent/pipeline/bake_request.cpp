@@ -57,7 +57,16 @@ const Option<R> table[] = {
     {"ground", &R::ground, "Scene", every, "Add a tessellated floor under the scene"},
     {"max-edge", &R::max_edge, "Scene", every, "Split edges longer than this many scene units", 1e-12, 1e12},
     {"emit", &R::emit, "Scene", every, "MATERIAL=R,G,B: make a material a lamp of this radiance"},
+    {"light-units", &R::light_units, "Scene", L,
+     "What lamps are stated in, beside emission: lumen as glTF has it, candela and lux; watt divides them by 683, "
+     "Blender's lumens a watt; raw divides points and spots by 4 pi, watts all around; auto asks the file's generator",
+     0, 0, "auto|lumen|watt|raw"},
+    {"lamp", &R::lamp, "Scene", L,
+     "NAME=SCALE, or NAME=R,G,B: lamps of this name, or a material that glows, times so much; may be given again"},
     {"max-albedo", &R::max_albedo, "Scene", every, "Darken base colours to at most this, channel by channel", 0, 1},
+    {"exclude", &R::exclude, "Scene", every,
+     "Leave a part out, by its name or its material's, or with unlit all of unlit materials: sky domes, backdrops; may "
+     "be given again"},
 
     {"brdf", &R::brdf, "Glossy transfer (--transfer matrix, and zonal)", glossy,
      "How surfaces reflect: diffuse (by base colour), materials (glTF's metallic-roughness), or one model for all, as "

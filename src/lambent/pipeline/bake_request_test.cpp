@@ -1,6 +1,7 @@
 #include <lambent/baked/extension.h>
 #include <lambent/core/file.h>
 #include <lambent/pipeline/bake.h>
+#include <lambent/scene/gltf_test-inl.h>
 
 #include <gtest/gtest.h>
 #include <malloc.h>
@@ -54,6 +55,11 @@ class Requests : public testing::Test {
     std::filesystem::create_directories(folder);
     ASSERT_TRUE(write_file_atomically((folder / "m.mtl").string(), scene_mtl));
     ASSERT_TRUE(write_file_atomically((folder / "s.obj").string(), scene_obj));
+    test::Builder lit = test::triangle();
+    lit.json["extensions"]["KHR_lights_punctual"]["lights"] = {{{"type", "point"}, {"intensity", 10}}};
+    lit.json["nodes"].push_back(
+        {{"translation", {1, 0, 2}}, {"extensions", {{"KHR_lights_punctual", {{"light", 0}}}}}});
+    test::write_bytes(at("lit.glb"), lit.glb());
   }
   void TearDown() override { std::filesystem::remove_all(folder); }
   std::string at(const std::string& name) const { return (folder / name).string(); }
@@ -123,7 +129,10 @@ const std::map<std::string, Change> changes{
     {"ground", {true}},
     {"max_edge", {0.5}},
     {"emit", {nlohmann::json::array({"grey=1,2,3"})}},
+    {"light_units", {"raw"}},
+    {"lamp", {nlohmann::json::array({"lamp=2"})}},
     {"max_albedo", {0.3}},
+    {"exclude", {nlohmann::json::array({"red"})}},
     {"brdf", {"ggx:roughness=0.4"}},
     {"outgoing", {"svd:3"}},
     {"incident_order", {4}},
@@ -162,6 +171,7 @@ TEST_F(Requests, EveryOptionHasAnEffectOrIsRefusedByName) {
       const Change& change = changes.at(name);
       nlohmann::json before = least(BakeKind(k));
       if (name == "light") before.erase("order");
+      if (name == "light_units") before["scene"] = at("lit.glb");
       for (const auto& [key, value] : change.with.items()) before[key] = value;
       if (change.with.contains("receivers") && (o.kinds >> k & 1)) before.erase(name);
       if (name == "size") before["size"] = "16x12";
@@ -199,7 +209,9 @@ TEST_F(Requests, BakeAgainToTheByte) {
     SCOPED_TRACE(bake_kind_names[k]);
     nlohmann::json object = least(BakeKind(k));
     if (BakeKind(k) == BakeKind::diffuse) object.update({{"lattice", "2,2,1"}, {"max_edge", 0.7}, {"ground", true}});
-    if (BakeKind(k) == BakeKind::lightmap) object.update({{"light_groups", true}, {"sky", "sky:elevation=40"}});
+    if (BakeKind(k) == BakeKind::lightmap)
+      object.update(
+          {{"light_groups", true}, {"sky", "sky:elevation=40"}, {"lamp", {"lamp=0.5", "sky=2"}}, {"exclude", {"red"}}});
     auto first = bake_to_file(must_read(object));
     ASSERT_TRUE(first) << first.error().text();
     auto request = request_of_baked_file(at("out.glb"), "");

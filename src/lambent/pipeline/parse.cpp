@@ -48,7 +48,9 @@ Result<std::vector<float>> parse_numbers(const std::string& text, size_t count, 
 Result<NamedColor> parse_named_color(const std::string& text, const std::string& option) {
   const size_t at = text.rfind('=');
   if (at == std::string::npos || at == 0) return Error{option, "expects NAME=R,G,B, not \"" + text + "\"", true};
-  auto n = parse_numbers(text.substr(at + 1), 3, option);
+  const std::string numbers = text.substr(at + 1);
+  auto n = parse_numbers(numbers.find(',') == std::string::npos ? numbers + "," + numbers + "," + numbers : numbers, 3,
+                         option);
   if (!n) return n.error();
   if ((*n)[0] < 0 || (*n)[1] < 0 || (*n)[2] < 0) return Error{option, "a colour may not be negative", true};
   return NamedColor{text.substr(0, at), {(*n)[0], (*n)[1], (*n)[2]}};

@@ -20,7 +20,7 @@ namespace lambent {
 // Strictly `count` finite numbers, separated by commas.
 Result<std::vector<float>> parse_numbers(const std::string& text, size_t count, const std::string& option);
 
-// "NAME=R,G,B": a name (which may hold '=') and three numbers, none negative.
+// "NAME=R,G,B" or "NAME=S": a name (which may hold '=') and three numbers or one for all, none negative.
 struct NamedColor {
   std::string name;
   Vec3 color;

@@ -1,7 +1,10 @@
 #include <lambent/pipeline/place_receivers.h>
 
+#include <lambent/bake/enclosure.h>
 #include <lambent/pipeline/parse.h>
 #include <lambent/pipeline/version.h>
+
+#include <fmt/format.h>
 
 #include <filesystem>
 
@@ -21,6 +24,18 @@ Result<PlacedReceivers> place_receivers(Scene& scene, const BakeRequest& request
   if (!atlas->remark.empty()) job.warn(atlas->remark);
   Receivers receivers = make_texel_receivers(scene, *atlas);
   return PlacedReceivers{std::move(receivers), std::move(*atlas)};
+}
+
+void warn_if_enclosed(const Scene& scene, const Tracer& tracer, const Receivers& receivers, const Job& job) {
+  const Enclosure shell = find_enclosure(scene, tracer, receivers);
+  const std::vector<uint32_t>& parts = shell.parts;
+  if (parts.empty()) return;
+  constexpr size_t named = 3;
+  std::string names;
+  for (size_t k = 0; k < std::min(parts.size(), named); ++k) names += (k ? ", " : "") + scene.parts[parts[k]].name;
+  if (parts.size() > named) names += fmt::format(" and {} others", parts.size() - named);
+  job.warn(fmt::format("no receiver sees the environment{}: {} {} around all of it; --exclude leaves parts out",
+                       shell.has_outside ? " but its own" : "", names, parts.size() == 1 ? "is" : "are"));
 }
 
 std::string provenance_of(const BakeRequest& request, const Scene& scene, nlohmann::json report) {

@@ -1,6 +1,7 @@
 #pragma once
 #include <lambent/pipeline/bake.h>
 #include <lambent/receivers/atlas.h>
+#include <lambent/trace/tracer.h>
 
 namespace lambent {
 
@@ -10,6 +11,9 @@ struct PlacedReceivers {
 };
 // As a resolved request says. May split the scene's vertices, so before anything is built from it.
 Result<PlacedReceivers> place_receivers(Scene& scene, const BakeRequest& request, const Job& job);
+
+// One line where no receiver has a way out to the environment: what is around all of them.
+void warn_if_enclosed(const Scene& scene, const Tracer& tracer, const Receivers& receivers, const Job& job);
 
 // JSON text: what made the file, its inputs and their hashes, the request, and what the bake reported.
 std::string provenance_of(const BakeRequest& request, const Scene& scene, nlohmann::json report);

@@ -24,7 +24,7 @@ struct BakeRequest {
   // Scene
   bool ground = false;
   float max_edge = 0, max_albedo = 1;
-  std::vector<std::string> emit;
+  std::vector<std::string> emit, exclude;
   // Rays
   int samples = 1024;
   std::string bounces = "3";
@@ -40,7 +40,8 @@ struct BakeRequest {
   int lobes = 4;
   std::string subsurface, membrane;
   // Lightmaps
-  std::string direct = "included", directional = "none", solver = "gmres", gather = "rays", sky;
+  std::string direct = "included", directional = "none", solver = "gmres", gather = "rays", sky, light_units = "auto";
+  std::vector<std::string> lamp;
   bool light_groups = false;
   int lamp_samples = 32;
   // Blocks

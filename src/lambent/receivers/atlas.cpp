@@ -1,6 +1,7 @@
 // Follows: radiosity, "Discussion" (lightmaps). Charts by charts.h, shelves by pack.cpp.
 #include <lambent/receivers/atlas.h>
 #include <lambent/receivers/charts.h>
+#include <lambent/receivers/islands.h>
 #include <lambent/receivers/raster.h>
 
 #include <algorithm>
@@ -11,6 +12,9 @@ namespace {
 // A texel is covered twice only where its centre lies this far inside two triangles, in weights: seams of one chart do
 // not count.
 constexpr float well_inside = 1e-3f;
+// What other programs' rounding may leave of a layout that is right: coordinates so far outside of [0, 1], places that
+// differ or overlap by so much, and so small a share of a part without a place.
+constexpr float rounding = 1e-4f, unplaced = 1e-3f;
 // Triangles of one texel are neighbours if they lie within so many texels' widths in space.
 constexpr float neighbours_within = 4;
 // Rounds of cutting charts that overlap themselves.
@@ -28,6 +32,18 @@ double area2(const std::array<Vec2, 3>& t) {
 bool is_well_inside(const std::array<Vec2, 3>& t, int i, int j) {
   const ClosestPoint c = closest_point(t, Vec2(float(i) + 0.5f, float(j) + 0.5f));
   return c.distance == 0 && c.u > well_inside && c.v > well_inside && 1 - c.u - c.v > well_inside;
+}
+
+// The same for layouts that may overlap by rounding: the centre lies `depth` texels inside.
+bool is_deep_inside(const std::array<Vec2, 3>& t, int i, int j, float depth) {
+  const Vec2d p(double(i) + 0.5, double(j) + 0.5);
+  double nearest[2] = {INFINITY, INFINITY};  // whichever way the triangle winds
+  for (size_t k = 0; k < 3; ++k) {
+    const Vec2d a(t[k]), edge = Vec2d(t[(k + 1) % 3]) - a, to = p - a;
+    const double distance = (edge.x * to.y - edge.y * to.x) / std::max(length(edge), 1e-30);
+    nearest[0] = std::min(nearest[0], distance), nearest[1] = std::min(nearest[1], -distance);
+  }
+  return std::max(nearest[0], nearest[1]) > double(depth);
 }
 
 std::string size_text(int64_t w, int64_t h) { return std::to_string(w) + "x" + std::to_string(h); }
@@ -49,6 +65,22 @@ Result<void> check_texels(int64_t width, int64_t height, const AtlasOptions& o) 
       "makes an atlas of " + size_text(width, height) + ", more than " + std::to_string(max_atlas_texels) + " texels"};
 }
 
+// What speaks against a layout at any size, or ""; adds up the area that it covers and that of the surface.
+std::string flaw_of(const Scene& scene, const std::vector<Vec2>& uv, double& covered, double& surface) {
+  std::vector<double> whole(scene.parts.size(), 0), lost(scene.parts.size(), 0);
+  for (const Triangle& t : scene.triangles) {
+    const double area = 0.5 * double(area_length(area_normal(scene, t)));
+    if (!(area > 0)) continue;
+    for (uint32_t v : t.v)
+      if (!(std::max(std::abs(uv[v].x - 0.5f), std::abs(uv[v].y - 0.5f)) <= 0.5f + rounding)) return "it leaves [0, 1]";
+    const double place = area2(at_corners(uv, t));
+    covered += place, surface += area, whole[t.part] += area, lost[t.part] += place > 0 ? 0 : area;
+  }
+  for (size_t p = 0; p < scene.parts.size(); ++p)
+    if (lost[p] > double(unplaced) * whole[p]) return "some triangles have no area in it";
+  return covered > 1.001 ? "triangles overlap in it" : "";
+}
+
 // Uses the scene's own coordinates, or says in `remark` why not. Backs, where there are any, get the same layout below.
 Result<bool> reuse_texcoords(const Scene& scene, const AtlasOptions& o, Atlas& atlas) {
   const std::vector<Vec2>& uv = scene.texcoords[1];
@@ -58,16 +90,7 @@ Result<bool> reuse_texcoords(const Scene& scene, const AtlasOptions& o, Atlas& a
     return false;
   };
   double covered = 0, surface = 0;
-  for (const Triangle& t : scene.triangles) {
-    const double area = 0.5 * double(area_length(area_normal(scene, t)));
-    if (!(area > 0)) continue;
-    for (uint32_t v : t.v)
-      if (!(uv[v].x >= 0 && uv[v].x <= 1 && uv[v].y >= 0 && uv[v].y <= 1)) return refuse("it leaves [0, 1]");
-    const double place = area2(at_corners(uv, t));
-    if (!(place > 0)) return refuse("some triangles have no area in it");
-    covered += place, surface += area;
-  }
-  if (covered > 1.001) return refuse("triangles overlap in it");
+  if (std::string why = flaw_of(scene, uv, covered, surface); !why.empty()) return refuse(std::move(why));
   const int layers = any_two_sided(scene) ? 2 : 1;
   if (o.texels_per_unit > 0) {
     const double side = std::ceil(std::sqrt(surface / covered) * double(o.texels_per_unit));
@@ -85,7 +108,8 @@ Result<bool> reuse_texcoords(const Scene& scene, const AtlasOptions& o, Atlas& a
   if (auto ok = check_texels(atlas.width, int64_t(atlas.height) * layers, o); !ok) return ok.error();
   atlas.texels_per_unit = float(std::sqrt(covered * atlas.width * atlas.height / surface));
   std::vector<Vec2> at(uv.size());
-  for (size_t v = 0; v < uv.size(); ++v) at[v] = uv[v] * Vec2(float(atlas.width), float(atlas.height));
+  for (size_t v = 0; v < uv.size(); ++v)
+    at[v] = clamp(uv[v], Vec2(0), Vec2(1)) * Vec2(float(atlas.width), float(atlas.height));
   // Work is bounded by what slivers touch, which a sheet without overlap keeps near its area.
   double touched = 0;
   for (const Triangle& t : scene.triangles) {
@@ -95,13 +119,15 @@ Result<bool> reuse_texcoords(const Scene& scene, const AtlasOptions& o, Atlas& a
   if (touched > 64.0 * atlas.width * atlas.height + 64.0 * double(scene.triangles.size()))
     return refuse("its triangles are too thin for the atlas's texels");
   std::vector<uint8_t> taken(size_t(atlas.width) * size_t(atlas.height), 0);
+  const float rounded = rounding * float(std::max(atlas.width, atlas.height)),
+              depth = std::clamp(rounded, 1e-3f, 0.25f);
   size_t twice = 0;
   for (const Triangle& t : scene.triangles) {
     const auto corners = at_corners(at, t);
     if (!(area2(corners) > 0)) continue;
     each_texel(corners, 0, atlas.width, atlas.height, [&](int i, int j) {
       uint8_t& texel = taken[size_t(j) * size_t(atlas.width) + size_t(i)];
-      if (!is_well_inside(corners, i, j)) return;
+      if (!is_deep_inside(corners, i, j, depth)) return;
       twice += texel, texel = 1;
     });
   }
@@ -122,6 +148,13 @@ Result<bool> reuse_texcoords(const Scene& scene, const AtlasOptions& o, Atlas& a
     atlas.back = at;
     for (Vec2& p : atlas.back) p.y += float(atlas.height);
     atlas.height *= 2;
+  }
+  const size_t shared = count_shared_texels(scene, islands_of(scene, at, std::max(rounded, 1e-3f)), at, atlas.back,
+                                            atlas.width, atlas.height);
+  if (shared) {
+    atlas.back.clear();
+    return refuse("its islands touch at this size: " + std::to_string(shared) +
+                  " texels would light two of them; two texels apart they do not");
   }
   atlas.front = std::move(at);
   return true;

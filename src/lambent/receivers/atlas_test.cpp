@@ -214,6 +214,63 @@ TEST(Atlas, ReusesTheSecondCoordinatesUnlessTheyOverlap) {
   EXPECT_GT(make_atlas(collapsed, {.texels_per_unit = 10})->charts, 0u);
 }
 
+// A grid whose corners are vertices of their own, laid over all of the unit square, each rounded in its own way.
+Scene rounded_grid(float error) {
+  Scene scene;
+  const uint32_t m = add_material(scene, "grey", Vec3(0.5f));
+  constexpr int n = 12;
+  Random random(5);
+  std::vector<Vec3> positions, normals;
+  std::vector<Vec2> uv;
+  std::vector<uint32_t> indices;
+  auto corner = [&](int i, int j) {
+    const Vec2 at(float(i) / n, float(j) / n);
+    indices.push_back(uint32_t(positions.size())), normals.push_back({0, 1, 0});
+    positions.push_back({3 * at.x, 0.1f * float((i + j) % 2), 2 * at.y});
+    uv.push_back(at + error * (2 * Vec2(random.next(), random.next()) - Vec2(1)));
+  };
+  for (int k = 0; k < n * n; ++k) {
+    const int i = k % n, j = k / n;
+    corner(i, j), corner(i, j + 1), corner(i + 1, j);
+    corner(i + 1, j), corner(i, j + 1), corner(i + 1, j + 1);
+  }
+  for (int k = 0; k < 3; ++k) {  // a sliver that rounding left no place
+    indices.push_back(uint32_t(positions.size())), normals.push_back({0, 1, 0}), uv.push_back({0.3f, 0.3f});
+    positions.push_back({0.9f + (k == 1 ? 1e-3f : 0), 0, 0.6f + (k == 2 ? 1e-3f : 0)});
+  }
+  add_mesh(scene, m, "grid", positions, normals, indices);
+  scene.texcoords[1] = uv;
+  return scene;
+}
+
+TEST(Atlas, UsesALayoutThatIsRightButForRounding) {
+  for (int side : {32, 300, 2048})
+    for (float error : {0.0f, 1e-5f}) {
+      Scene scene = rounded_grid(error);
+      auto atlas = make_atlas(scene, {.width = side, .height = side});
+      ASSERT_TRUE(atlas) << atlas.error().text();
+      EXPECT_EQ(atlas->remark, "") << side;
+      EXPECT_EQ(atlas->charts, 0u);
+      for (Vec2 p : atlas->front) {
+        EXPECT_GE(std::min(p.x, p.y), 0.0f);
+        EXPECT_LE(std::max(p.x, p.y), float(side));
+      }
+    }
+  // Where more than rounding is wrong, it is not: outside, on one another, without a place.
+  auto remark = [](auto spoil) {
+    Scene scene = rounded_grid(0);
+    spoil(scene.texcoords[1]);
+    auto atlas = make_atlas(scene, {.width = 300, .height = 300});
+    EXPECT_TRUE(atlas);
+    EXPECT_GT(atlas->charts, 0u);
+    return atlas->remark;
+  };
+  EXPECT_NE(remark([](auto& uv) { uv[0].x = -1e-3f; }).find("leaves"), std::string::npos);
+  EXPECT_NE(remark([](auto& uv) { uv[0] = uv[6], uv[1] = uv[7], uv[2] = uv[8]; }).find("covered twice"),
+            std::string::npos);
+  EXPECT_NE(remark([](auto& uv) { uv[0] = uv[1] = uv[2]; }).find("no area"), std::string::npos);
+}
+
 TEST(Atlas, ASpiralDoesNotCoverItselfTwice) {
   // A ramp of two turns: flat enough to be one chart, and over itself in projection.
   Scene scene;

@@ -74,6 +74,7 @@ GltfMaterial read_material(GltfCheck& check, const Json& json, size_t texture_co
   GltfMaterial out;
   Material& m = out.material;
   m.name = check.text(json, "name", where);
+  m.unlit = read_extension(check, json, "KHR_materials_unlit", where) != nullptr;
   m.double_sided = check.boolean(json, "doubleSided", false, where);
   if (const Json* gloss = read_extension(check, json, "KHR_materials_pbrSpecularGlossiness", where)) {
     m.base_color = read_color(check, *gloss, "diffuseFactor", where, m.alpha);

@@ -1,7 +1,33 @@
-// KHR_lights_punctual (Khronos, ratified).
+// KHR_lights_punctual (Khronos, ratified). Units: glTF-Blender-IO, io_scene_gltf2/blender/exp/lights.py.
 #include <lambent/scene/lights.h>
 
+#include <charconv>
+
 namespace lambent {
+
+LightUnits guess_light_units(const std::string& generator) {
+  constexpr std::string_view blender = "Khronos glTF Blender I/O";
+  // The first that knew of lumens.
+  constexpr std::array<int, 3> first_standard{3, 4, 40};
+  if (!generator.starts_with(blender)) return LightUnits::lumen;
+  std::array<int, 3> version{};
+  const char *at = generator.data() + std::min(generator.find('v', blender.size()), generator.size()),
+             *end = generator.data() + generator.size();
+  if (at == end) return LightUnits::watt;
+  for (int& number : version) {
+    if (at == end) break;
+    at = std::from_chars(at + 1, end, number).ptr;
+  }
+  return version < first_standard ? LightUnits::raw : LightUnits::watt;
+}
+
+void convert_lights(std::vector<PunctualLight>& lights, LightUnits units) {
+  for (PunctualLight& light : lights) {
+    const bool directional = light.kind == PunctualLight::Kind::directional;
+    if (units == LightUnits::watt) light.intensity /= float(lumens_per_watt);
+    if (units == LightUnits::raw && !directional) light.intensity /= 4 * pi;
+  }
+}
 
 LampArrival arriving(const PunctualLight& light, Vec3 p) {
   if (light.kind == PunctualLight::Kind::directional) return {-light.direction, INFINITY, light.intensity};

@@ -17,6 +17,18 @@ struct LampArrival {
 // - cos outer))^2. `range` is not read: it is a hint for what a renderer may leave out.
 LampArrival arriving(const PunctualLight& light, Vec3 p);
 
+// What a file states its lamps in, beside the emission of its surfaces. glTF counts both in lumens: candela and lux
+// beside candela a square metre, or both in watts. Blender's exporter keeps emission in watts and writes lamps at 683
+// lumens a watt (Standard), or as they are, points and spots in watts all around (Raw, and all before v3.4.40); its
+// Unitless files need nothing. Source: io_scene_gltf2/blender/exp/lights.py of glTF-Blender-IO.
+enum class LightUnits { lumen, watt, raw };
+inline constexpr double lumens_per_watt = 683;
+
+// By asset.generator: what Blender's exporter of that version writes if it is not told otherwise; of others lumen.
+LightUnits guess_light_units(const std::string& generator);
+// Divides the lamps' intensities so that they go with the emission: by 1; 683; 4 pi, but directional lights by 1.
+void convert_lights(std::vector<PunctualLight>& lights, LightUnits units);
+
 // Whether light comes from the side of the triangle that a ray meets.
 inline bool emits(const Scene& scene, const Triangle& t, bool front_side) {
   const Vec3 e = scene.materials[scene.parts[t.part].material].emissive;

@@ -65,6 +65,7 @@ struct Material {
   int emissive_texture = -1;
   int emissive_set = 0;
   std::array<float, 6> emissive_transform{1, 0, 0, 0, 1, 0};
+  bool unlit = false;        // KHR_materials_unlit: shown as its base colour, whatever the light
   bool double_sided = true;  // false: seen from the front only; its back is black to light and absent to cameras
 };
 
@@ -129,6 +130,7 @@ struct Scene {
 
   std::shared_ptr<const GltfDocument> document;  // null unless the input was glTF
   std::vector<std::string> warnings;             // one line each, in the order found
+  std::vector<std::string> excluded;             // what exclude_parts() left out, as it was asked for
 };
 
 Bounds bounds(const Scene& scene);  // of the vertices that triangles use
