@@ -57,6 +57,8 @@ Result<std::optional<Camera>> parse_camera(const std::string& text) {
   auto n = parse_numbers(text, 7, "--camera");
   if (!n) return n.error();
   Camera camera;
+  for (float x : *n)
+    if (std::abs(x) > 1e9f) return Error{"--camera", "numbers must lie within 1e9", true};
   camera.eye = {(*n)[0], (*n)[1], (*n)[2]}, camera.target = {(*n)[3], (*n)[4], (*n)[5]}, camera.fov = (*n)[6];
   if (!(camera.fov > 0 && camera.fov < 180))
     return Error{"--camera", "field of view must lie between 0 and 180 degrees", true};

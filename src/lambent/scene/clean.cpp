@@ -246,7 +246,7 @@ void make_normals(Scene& scene, std::span<const size_t> parts, bool flat) {
     };
     insert_copies(scene.positions), insert_copies(scene.normals), insert_copies(scene.colors),
         insert_copies(scene.tangents);
-    insert_copies(scene.texcoords[0]), insert_copies(scene.texcoords[1]);
+    for (std::vector<Vec2>& uv : scene.texcoords) insert_copies(uv);
   }
   uint32_t shift = 0;
   size_t next = 0;

@@ -178,47 +178,50 @@ std::vector<GltfMaterial> read_materials(GltfCheck& check, const GltfDocument& d
   return materials;
 }
 
-bool read_textures(GltfCheck& check, GltfDocument& document, const std::vector<GltfMaterial>& materials,
+size_t texcoord_sets(const std::vector<GltfMaterial>& materials) {
+  size_t sets = 2;
+  for (const GltfMaterial& m : materials)
+    for (const GltfTextureUse* use : {&m.base_color, &m.metallic_roughness, &m.normal, &m.emissive})
+      if (use->texture && use->texcoord_set < max_texcoord_sets) sets = std::max(sets, size_t(use->texcoord_set) + 1);
+  return sets;
+}
+
+void read_textures(const GltfCheck& check, GltfDocument& document, const std::vector<GltfMaterial>& materials,
                    const std::vector<bool>& used, const std::vector<std::string>& image_problems, Scene& scene) {
   TextureReader reader(document, image_problems, scene);
   size_t translucent = 0;
+  GltfTold base_color, metallic_roughness, normal, emissive;
+  // The scene is still good without a texture.
+  auto read = [&](const GltfTextureUse& use, const char* what, GltfTold& told, int& texture, int& set,
+                  std::array<float, 6>& transform) {
+    if (!use.texture) return true;
+    GltfCheck trial = check;
+    if (use.texcoord_set >= max_texcoord_sets)
+      trial.fail({}, "it reads TEXCOORD_" + std::to_string(use.texcoord_set) + "; the last that is read is " +
+                         std::to_string(max_texcoord_sets - 1));
+    const int read_texture = trial.ok() ? reader.read(trial, *use.texture) : -1;
+    if (trial.ok()) texture = read_texture, set = int(use.texcoord_set), transform = use.transform;
+    else told.add(std::string(what) + " texture not read: " + trial.error().message);
+    return trial.ok();
+  };
   for (size_t i = 0; i < materials.size(); ++i) {
     if (!used[i]) continue;
-    translucent += !materials[i].opaque;
-    auto read = [&](GltfCheck& checked, const GltfTextureUse& use, const char* what) {
-      if (use.texcoord_set <= 1) return reader.read(checked, *use.texture);
-      checked.fail({"material", i}, std::string("its ") + what + " reads TEXCOORD_" + std::to_string(use.texcoord_set) +
-                                        "; only sets 0 and 1 are supported");
-      return -1;
-    };
-    Material& m = scene.materials[i];
-    if (const GltfTextureUse& use = materials[i].base_color; use.texture) {
-      m.base_color_texture = read(check, use, "base colour");
-      m.texcoord_set = int(use.texcoord_set), m.uv_transform = use.transform;
-      if (!check.ok()) return false;
-    }
-    // The scene is still good without these.
-    auto read_extra = [&](const GltfTextureUse& use, const char* what, int& texture, int& set,
-                          std::array<float, 6>& transform) {
-      if (!use.texture) return true;
-      GltfCheck trial = check;
-      const int read_texture = read(trial, use, what);
-      if (trial.ok()) texture = read_texture, set = int(use.texcoord_set), transform = use.transform;
-      else scene.warnings.push_back(std::string(what) + " texture not read: " + trial.error().message);
-      return trial.ok();
-    };
     const GltfMaterial& from = materials[i];
-    read_extra(from.metallic_roughness, "metallic-roughness", m.metallic_roughness_texture, m.metallic_roughness_set,
-               m.metallic_roughness_transform);
-    read_extra(from.normal, "normal", m.normal_texture, m.normal_set, m.normal_transform);
+    Material& m = scene.materials[i];
+    translucent += !from.opaque;
+    read(from.base_color, "base colour", base_color, m.base_color_texture, m.texcoord_set, m.uv_transform);
+    read(from.metallic_roughness, "metallic-roughness", metallic_roughness, m.metallic_roughness_texture,
+         m.metallic_roughness_set, m.metallic_roughness_transform);
+    read(from.normal, "normal", normal, m.normal_texture, m.normal_set, m.normal_transform);
     // A lamp of unknown pattern gives no light.
     const bool black = m.emissive == Vec3(0);
-    if (!black && !read_extra(from.emissive, "emissive", m.emissive_texture, m.emissive_set, m.emissive_transform))
+    if (!black && !read(from.emissive, "emissive", emissive, m.emissive_texture, m.emissive_set, m.emissive_transform))
       m.emissive = Vec3(0);
   }
+  for (const GltfTold* told : {&base_color, &metallic_roughness, &normal, &emissive})
+    told->tell(scene.warnings, "materials");
   warn_count(scene, translucent, " material with alpha is treated as opaque",
              " materials with alpha are treated as opaque");
-  return true;
 }
 
 }  // namespace lambent
