@@ -211,7 +211,7 @@ class DocumentWriter {
 
   void place_mesh(size_t node, size_t mesh_index, Json mesh, bool apart, bool still, const std::vector<size_t>& parts) {
     // Copies of one mesh that were changed alike stay copies of one.
-    const auto [known, is_new] = written_.try_emplace(mesh.dump(), mesh_index);
+    const auto [known, is_new] = written_.try_emplace({mesh_index, mesh.dump()}, mesh_index);
     if (!is_new) {
       mesh_index = known->second;
     } else if (users_[mesh_index]++ == 0) {
@@ -313,8 +313,8 @@ class DocumentWriter {
   const GltfDocument& document_;
   GltfPlaces& places_;
   GltfPose pose_;
-  std::vector<size_t> users_;              // nodes that still show each mesh of the document
-  std::map<std::string, size_t> written_;  // meshes that were written anew, by their JSON
+  std::vector<size_t> users_;                                 // nodes that still show each mesh of the document
+  std::map<std::pair<size_t, std::string>, size_t> written_;  // meshes written anew, by what they were and their JSON
 };
 
 }  // namespace
