@@ -278,7 +278,9 @@ TEST(BakedFile, OldFilesAreLeftNoLarger) {
     const auto look = load_look(*mapped, entry.path().string());
     const TemporaryFile again("again.glb"), third("third.glb");
     ASSERT_TRUE(save_baked(again.path, *baked, look ? &*look : nullptr));
-    EXPECT_LE(std::filesystem::file_size(again.path), std::filesystem::file_size(entry.path()));
+    // But for "written", which old ones have not, with the rounding of what follows the JSON.
+    constexpr size_t written = 128;
+    EXPECT_LE(std::filesystem::file_size(again.path), std::filesystem::file_size(entry.path()) + written);
     auto back = load_baked(again.path);
     ASSERT_TRUE(back) << back.error().text();
     EXPECT_EQ(back->scene.positions, baked->scene.positions);
