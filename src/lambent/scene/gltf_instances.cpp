@@ -115,6 +115,7 @@ bool expand_instances(GltfCheck& check, GltfDocument& document, std::vector<std:
   const size_t nodes = gltf_count(document.json, "nodes");
   std::map<size_t, std::pair<size_t, size_t>> children;  // of a node: the first of its instances, and how many
   size_t total = 0, skinned = 0, coloured = 0;
+  bool stays = false;  // the extension, somewhere
   for (size_t n = 0; n < nodes; ++n) {
     const GltfWhere where{"node", n};
     Json& node = document.json["nodes"][n];
@@ -122,6 +123,11 @@ bool expand_instances(GltfCheck& check, GltfDocument& document, std::vector<std:
     const Json* extension = extensions ? check.object(*extensions, extension_name, where) : nullptr;
     if (!check.ok()) return false;
     if (!extension) continue;
+    const bool skin = node.contains("skin");
+    if (skin || !node.contains("mesh")) {
+      skinned += skin, stays = true;
+      continue;
+    }
     const Json* attributes = check.object(*extension, "attributes", where);
     Instances instances;
     if (!check.ok() || !read_instances(check, document, attributes ? *attributes : Json::object(), where, instances))
@@ -132,11 +138,6 @@ bool expand_instances(GltfCheck& check, GltfDocument& document, std::vector<std:
     coloured += attributes && (attributes->contains("_COLOR_0") || attributes->contains("COLOR_0"));
     node["extensions"].erase(extension_name);
     if (node["extensions"].empty()) node.erase("extensions");
-    if (!node.contains("mesh")) continue;
-    if (node.contains("skin")) {
-      ++skinned;
-      continue;
-    }
     Json drawn = Json::object();  // what each instance has of the node
     for (const char* key : {"mesh", "weights", "name"})
       if (node.contains(key)) drawn[key] = node[key];
@@ -155,7 +156,7 @@ bool expand_instances(GltfCheck& check, GltfDocument& document, std::vector<std:
     for (Json& copy : copies) document.json["nodes"].push_back(std::move(copy));  // `node` is void from here on
   }
   if (!move_weight_channels(check, document.json, children)) return false;
-  forget_extension(document.json);
+  if (!stays) forget_extension(document.json);
   if (skinned)
     warnings.push_back("instances of " + std::to_string(skinned) +
                        (skinned == 1 ? " skinned node are" : " skinned nodes are") + " shown once");
