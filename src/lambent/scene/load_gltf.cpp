@@ -150,9 +150,13 @@ bool read_images(GltfCheck& check, GltfDocument& document, UriReader& files, std
 // Reads the primitives of all shown nodes into the scene.
 class PrimitiveReader {
  public:
-  // With `keep_all`, vertices that no triangle uses stay: what was baked counts them.
+  // With `keep_all`, parts have all vertices of their accessors: what was baked counts them.
   PrimitiveReader(GltfCheck& check, const GltfDocument& document, const GltfPose& pose, bool keep_all, Scene& scene)
-      : check_(check), document_(document), pose_(pose), scene_(scene), keep_all_(keep_all) {}
+      : check_(check),
+        document_(document),
+        pose_(pose),
+        scene_(scene),
+        users_(keep_all ? std::vector<uint32_t>() : count_users(document)) {}
 
   bool read_all() {
     for (size_t n : pose_.shown) {
@@ -223,8 +227,8 @@ class PrimitiveReader {
     if (!check_.ok()) return false;
     part.material = material ? uint32_t(*material) : default_material();
     if (!read_triangles(part, mode, indices, triangles, positions.count, where)) return false;
-    if (part.triangle_count == 0) return true;
-    const GltfVertices vertices = number_vertices(part, positions.count);
+    const bool shared = *position_index < users_.size() && users_[*position_index] > 1;
+    const GltfVertices vertices = number_vertices(part, positions.count, shared && part.triangle_count > 0);
     GltfPlacement placement;
     if (!check_vertices(vertices, targets.size(), where) ||
         !read_placement(check_, document_, pose_, node, primitive, vertices, where, placement) ||
@@ -349,11 +353,28 @@ class PrimitiveReader {
     return true;
   }
 
-  // Gives the part the vertices that its triangles use, in their order: primitives may share one large accessor.
-  GltfVertices number_vertices(Part& part, size_t count) {
+  // How many primitives have their places in each accessor.
+  static std::vector<uint32_t> count_users(const GltfDocument& document) {
+    std::vector<uint32_t> users(gltf_count(document.json, "accessors"));
+    for (size_t m = 0; m < gltf_count(document.json, "meshes"); ++m) {
+      GltfCheck check("");
+      const Json* primitives = check.array(gltf_item(document.json, "meshes", m), "primitives", {});
+      for (size_t p = 0; primitives && p < primitives->size(); ++p) {
+        GltfCheck trial("");
+        const Json* attributes = trial.object((*primitives)[p], "attributes", {});
+        const auto index = attributes ? trial.index(*attributes, "POSITION", users.size(), {}) : std::nullopt;
+        if (index) ++users[*index];
+      }
+    }
+    return users;
+  }
+
+  // Gives the part the vertices of an accessor: all, or, where primitives share a large one, those that its triangles
+  // use, in their order.
+  GltfVertices number_vertices(Part& part, size_t count, bool only_used) {
     const std::span<Triangle> triangles = std::span(scene_.triangles).subspan(part.first_triangle);
     std::vector<uint32_t>& used = part.source;
-    if (!keep_all_) {
+    if (only_used) {
       if (places_.size() < count) places_.resize(count, none);
       for (const Triangle& t : triangles)
         for (uint32_t v : t.v)
@@ -388,7 +409,7 @@ class PrimitiveReader {
   const GltfDocument& document_;
   const GltfPose& pose_;
   Scene& scene_;
-  const bool keep_all_;
+  const std::vector<uint32_t> users_;
   std::vector<size_t> bare_;
   std::vector<uint32_t> places_;  // of an accessor's elements among those in use; none between parts
   uint64_t visited_ = 0, skipped_ = 0, zeros_ = 0, work_ = 0, triangles_ = 0;
