@@ -500,6 +500,7 @@ expect 2 'show: must be' render corner.glb --env uniform:1 --show bounce:-1 -o x
 expect 1 'corner.glb: .*bake --terms' render corner.glb --env uniform:1 --show bounce:1 -o x.png
 expect 1 'no lamps of its own' render corner.glb --show emission -o x.png
 expect 2 'camera' render corner.glb --env uniform:1 --camera 1,2,3 -o x.png
+expect 2 'camera: numbers must lie within 1e9' render corner.glb --env uniform:1 --camera 1e19,2,4,1,0.5,1,40 -o x.png
 expect 2 'size' render corner.glb --env uniform:1 --size 0x10 -o x.png
 expect 2 'rotate' render corner.glb --env uniform:1 --env-rotate nan,0,0 -o x.png
 expect 2 'window' render corner.glb --env uniform:1 --window square -o x.png

@@ -124,6 +124,7 @@ Result<PatchScene> make_mesh_patch(const Scene& tile, int size, HeightField* hei
       }
       s.normals.insert(s.normals.end(), tile.normals.begin(), tile.normals.end());
       s.colors.insert(s.colors.end(), tile.colors.begin(), tile.colors.end());
+      s.texcoords.resize(tile.texcoords.size());
       for (size_t set = 0; set < tile.texcoords.size(); ++set)
         s.texcoords[set].insert(s.texcoords[set].end(), tile.texcoords[set].begin(), tile.texcoords[set].end());
       for (Triangle t : tile.triangles) {

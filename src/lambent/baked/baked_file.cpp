@@ -162,6 +162,7 @@ Result<void> save_baked(const std::string& path, const Baked& baked, const Viewe
     }
     extension["parts"] = std::move(parts);
     look_writer.write(document, places);
+    extension["written"] = written_state(document);
     document["extensions"][extension_name] = std::move(extension);
     json& used = document["extensionsUsed"];
     if (!used.is_array()) used = json::array();

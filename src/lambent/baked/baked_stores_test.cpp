@@ -159,7 +159,7 @@ TEST(BakedFile, RefusesHeadersThatLie) {
   ASSERT_TRUE(save_baked(whole.path, baked_of(s)));
   const std::string receivers = "\"receivers\":" + std::to_string(s.receivers.count());
   expect_refused(whole.path, "",
-                 {{"\"version\":1}", "\"version\":2}"},
+                 {{"\"version\":1,\"w", "\"version\":2,\"w"},
                   {"\"order\":3", "\"order\":4"},
                   {"\"order\":3", "\"order\":0"},
                   {"\"channels\":1", "\"channels\":2"},

@@ -7,6 +7,7 @@
 #include <bit>
 #include <cstring>
 #include <deque>
+#include <optional>
 #include <vector>
 
 namespace lambent {
@@ -105,5 +106,15 @@ Result<BakedFields> read_fields(const MappedFile& file, const GltfChunks& chunks
 
 // Whether JSON is of a glTF with our extension.
 bool has_extension(const nlohmann::json& document);
+
+// How the document was written, to be told from how it is found: the extension's "written" ({generator, bufferViews,
+// byteLength}: asset.generator, how many buffer views there are, and bytes in the first buffer), for a document that is
+// whole but for it.
+nlohmann::json written_state(const nlohmann::json& document);
+// Whether another program has written the file anew without knowing the extension, whose bulk data then are gone or
+// elsewhere: the document lists the extension as used and has it no more, or "written" says another number of buffer
+// views or of bytes. The error that says so, with asset.generator where it has changed; nullopt where all is as it was,
+// or the file is of a build that wrote no "written".
+std::optional<Error> find_rewritten(const nlohmann::json& document, const std::string& path);
 
 }  // namespace lambent

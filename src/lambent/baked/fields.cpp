@@ -50,6 +50,52 @@ bool has_extension(const json& document) {
   return extensions != document.end() && extensions->is_object() && extensions->contains(extension_name);
 }
 
+namespace {
+
+// Fit for one line.
+std::string short_name(std::string text) {
+  constexpr size_t longest = 60;
+  if (text.size() > longest) text.resize(longest);
+  std::replace_if(
+      text.begin(), text.end(), [](unsigned char c) { return c < 0x20 || c == 0x7f; }, '?');
+  return text;
+}
+
+}  // namespace
+
+json written_state(const json& document) {
+  const auto member = [](const json& parent, auto key) { return parent.contains(key) ? parent.at(key) : json(); };
+  json written{{"bufferViews", document.contains("bufferViews") ? document["bufferViews"].size() : 0}};
+  if (const auto generator = document.find("asset"); generator != document.end() && generator->is_object())
+    if (const json& name = member(*generator, "generator"); name.is_string()) written["generator"] = name;
+  const auto buffers = document.find("buffers");
+  if (buffers != document.end() && buffers->is_array() && !buffers->empty() && buffers->front().is_object())
+    written["byteLength"] = member(buffers->front(), "byteLength");
+  return written;
+}
+
+std::optional<Error> find_rewritten(const json& document, const std::string& path) {
+  const json now = written_state(document);
+  json then;
+  if (has_extension(document)) {
+    const json& extension = document["extensions"][extension_name];
+    if (!extension.is_object() || !extension.contains("written") || !extension["written"].is_object()) return {};
+    then = extension["written"];
+    if (then.value("bufferViews", json()) == now["bufferViews"] &&
+        then.value("byteLength", json()) == now.value("byteLength", json()))
+      return {};
+  } else {
+    const auto used = document.find("extensionsUsed");
+    if (used == document.end() || !used->is_array() ||
+        std::find(used->begin(), used->end(), json(extension_name)) == used->end())
+      return {};
+  }
+  const json name = now.value("generator", json());
+  const bool other = name.is_string() && (!then.is_object() || then.value("generator", json()) != name);
+  return Error{path, "was rewritten by " + (other ? short_name(name.get<std::string>()) + ", " : std::string()) +
+                         "a tool that does not know LAMBENT_transfer; bake again"};
+}
+
 Result<BakedFields> read_fields(const std::string& path) {
   auto file = MappedFile::open(path);
   if (!file) return file.error();
@@ -64,6 +110,7 @@ Result<BakedFields> read_fields(const MappedFile& file, const std::string& path)
 }
 
 Result<BakedFields> read_fields(const MappedFile& file, const GltfChunks& chunks, const std::string& path) {
+  if (auto rewritten = find_rewritten(chunks.json, path)) return *rewritten;
   if (!has_extension(chunks.json))
     return Error{path, "is not a baked file: it has no LAMBENT_transfer extension (make one with `lambent bake`)"};
   const json& extension = chunks.json["extensions"][extension_name];

@@ -73,6 +73,8 @@ Result<std::optional<Camera>> parse_camera(const std::string& text, Vec3d origin
   auto n = parse_values<double>(text, 7, "--camera");
   if (!n) return n.error();
   Camera camera;
+  for (double x : *n)
+    if (std::abs(x) > 1e9) return Error{"--camera", "numbers must lie within 1e9", true};
   camera.eye = place(*n, 0, origin), camera.target = place(*n, 3, origin), camera.fov = float((*n)[6]);
   if (!(camera.fov > 0 && camera.fov < 180))
     return Error{"--camera", "field of view must lie between 0 and 180 degrees", true};

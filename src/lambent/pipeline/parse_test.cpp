@@ -36,6 +36,11 @@ TEST(Parse, SizesAndCameras) {
   EXPECT_EQ((*camera)->eye, Vec3(1, 2, 3));
   EXPECT_EQ((*camera)->target, Vec3(4, 5, 6));
   EXPECT_EQ((*camera)->fov, 30);
+  for (const char* far : {"1e19,2,3,4,5,6,30", "1,2,3,4,5,-1.1e9,30"}) {
+    const auto beyond = parse_camera(far);
+    ASSERT_FALSE(beyond) << far;
+    EXPECT_EQ(beyond.error().message, "numbers must lie within 1e9");
+  }
   const auto automatic = parse_camera("auto");
   ASSERT_TRUE(automatic);
   EXPECT_FALSE(*automatic);

@@ -295,13 +295,13 @@ void split_vertices(Scene& scene, const Charts& charts, const std::vector<std::a
                     const std::vector<Vec2>& front_shift, const std::vector<Vec2>& back_shift, Atlas& atlas) {
   struct {
     std::vector<Vec3> positions, normals, colors;
-    std::vector<Vec2> texcoords;
+    std::vector<std::vector<Vec2>> texcoords;
     std::vector<Vec4> tangents;
     std::vector<Triangle> triangles;
-  } old{std::move(scene.positions),    std::move(scene.normals),  std::move(scene.colors),
-        std::move(scene.texcoords[0]), std::move(scene.tangents), scene.triangles};
-  scene.positions.clear(), scene.normals.clear(), scene.colors.clear();
-  scene.texcoords[0].clear(), scene.texcoords[1].clear(), scene.tangents.clear();
+  } old{std::move(scene.positions), std::move(scene.normals),  std::move(scene.colors),
+        std::move(scene.texcoords), std::move(scene.tangents), scene.triangles};
+  scene.positions.clear(), scene.normals.clear(), scene.colors.clear(), scene.tangents.clear();
+  scene.texcoords.assign(old.texcoords.size(), {});
   const bool backs = any_two_sided(scene);
   struct Key {
     uint32_t vertex, chart;
@@ -319,7 +319,8 @@ void split_vertices(Scene& scene, const Charts& charts, const std::vector<std::a
     part.changed = true, part.source.clear();
     for (const Key& key : keys) {
       scene.positions.push_back(old.positions[key.vertex]), scene.normals.push_back(old.normals[key.vertex]);
-      if (!old.texcoords.empty()) scene.texcoords[0].push_back(old.texcoords[key.vertex]);
+      for (size_t set = 0; set < old.texcoords.size(); ++set)
+        if (!old.texcoords[set].empty()) scene.texcoords[set].push_back(old.texcoords[set][key.vertex]);
       if (!old.colors.empty()) scene.colors.push_back(old.colors[key.vertex]);
       if (!old.tangents.empty()) scene.tangents.push_back(old.tangents[key.vertex]);
     }
@@ -360,13 +361,6 @@ Result<Atlas> make_atlas(Scene& scene, const AtlasOptions& o, Progress* progress
     if (!reused) return reused.error();
     if (*reused) return atlas;
   }
-  for (const Part& part : scene.parts) {
-    const Material& m = scene.materials[part.material];
-    if ((m.base_color_texture >= 0 && m.texcoord_set == 1) ||
-        (m.transmission_texture >= 0 && m.transmission_set == 1) || (m.normal_texture >= 0 && m.normal_set == 1) ||
-        (m.emissive_texture >= 0 && m.emissive_set == 1))
-      return Error{scene.path, "material \"" + m.name + "\" reads TEXCOORD_1, which the lightmap would replace"};
-  }
   Layout layout;
   std::vector<uint8_t> layers(scene.triangles.size(), 0);
   Fit fit;
@@ -398,9 +392,6 @@ Result<Atlas> make_atlas(Scene& scene, const AtlasOptions& o, Progress* progress
   for (auto& corners : layout.flat.corners)
     for (Vec2& p : corners) p *= atlas.texels_per_unit;
   split_vertices(scene, layout.charts, layout.flat.corners, front_shift, back_shift, atlas);
-  scene.texcoords[1].resize(scene.positions.size());
-  for (size_t v = 0; v < scene.positions.size(); ++v)
-    scene.texcoords[1][v] = atlas.front[v] / Vec2(float(atlas.width), float(atlas.height));
   return atlas;
 }
 

@@ -25,10 +25,9 @@ struct Atlas {
 };
 
 // Reuses TEXCOORD_1 if every triangle with an area has its own place there within [0, 1]^2; else cuts the surface into
-// charts (charts.h), packs them, splits vertices where charts part and writes TEXCOORD_1: front / (width, height).
-// Backs of two-sided triangles get places of their own. Splitting changes the scene's vertices. Errors: options out of
-// range; an atlas too small or too large (says the size needed); a material whose base colour, normals or emission read
-// TEXCOORD_1, which then cannot be replaced; cancelled.
+// charts (charts.h), packs them and splits vertices where charts part. Backs of two-sided triangles get places of their
+// own. Splitting changes the scene's vertices, which keep their texture coordinates. Errors: options out of range; an
+// atlas too small or too large (says the size needed); cancelled.
 Result<Atlas> make_atlas(Scene& scene, const AtlasOptions& options, Progress* progress = nullptr);
 
 // A receiver for every texel whose tent reaches the surface: at its centre, or, for texels partly covered, at the

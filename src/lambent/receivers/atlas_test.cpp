@@ -321,7 +321,7 @@ TEST(Atlas, AMillionLooseTrianglesNeitherHangNorExhaustMemory) {
   ASSERT_TRUE(atlas) << atlas.error().text();
   EXPECT_EQ(atlas->charts, count);
   EXPECT_LE(size_t(atlas->width) * size_t(atlas->height), size_t(20) * count);
-  Scene tight = scene;  // with a TEXCOORD_1 by now, whose texels would be too coarse
+  Scene tight = scene;
   auto small = make_atlas(tight, {.width = 1024, .height = 1024});
   ASSERT_FALSE(small);
   EXPECT_NE(small.error().text().find("too small"), std::string::npos);

@@ -27,8 +27,10 @@ void append_scene(Scene& a, const Scene& b) {
   LAMBENT_CHECK(vertices + added < none && a.triangles.size() + b.triangles.size() < none);
   append_attribute(a.colors, vertices, b.colors, added, Vec3(1)),
       append_attribute(a.tangents, vertices, b.tangents, added, Vec4(0));
+  a.texcoords.resize(std::max(a.texcoords.size(), b.texcoords.size()));
   for (size_t set = 0; set < a.texcoords.size(); ++set)
-    append_attribute(a.texcoords[set], vertices, b.texcoords[set], added, Vec2(0));
+    append_attribute(a.texcoords[set], vertices, set < b.texcoords.size() ? b.texcoords[set] : std::vector<Vec2>(),
+                     added, Vec2(0));
   a.positions.insert(a.positions.end(), b.positions.begin(), b.positions.end());
   a.normals.insert(a.normals.end(), b.normals.begin(), b.normals.end());
 

@@ -83,8 +83,8 @@ double key_time(const Channel& c, size_t key) {
 bool check_keys(GltfCheck& check, const Channel& c, const GltfWhere& where) {
   for (size_t k = 0; k < c.input.count; ++k) {
     const double t = key_time(c, k);
-    if (!std::isfinite(t) || t < 0 || (k > 0 && t <= key_time(c, k - 1)))
-      return check.fail(where, "a sampler's times do not grow");
+    if (!std::isfinite(t) || (k > 0 && t < key_time(c, k - 1)))
+      return check.fail(where, "a sampler's times fall or are not finite");
   }
   for (size_t k = 0; k < c.input.count * (c.interpolation == Interpolation::cubic ? 3 : 1); ++k)
     for (size_t i = 0; i < c.width; ++i)
@@ -103,7 +103,7 @@ void normalize_rotation(std::vector<double>& q) {
 
 std::vector<double> evaluate(const Channel& c, double time) {
   size_t low = 0, high = c.input.count - 1;
-  const bool before = time <= key_time(c, 0), after = time >= key_time(c, high);
+  const bool before = time < key_time(c, 0), after = time >= key_time(c, high);
   if (before) high = 0;
   if (after) low = high;
   while (high > low + 1) {
@@ -161,19 +161,18 @@ bool for_channels(GltfCheck& check, const GltfDocument& document, size_t animati
 
 }  // namespace
 
-bool read_animations(GltfCheck& check, const GltfDocument& document, std::vector<GltfAnimation>& animations) {
-  for (size_t i = 0; i < gltf_count(document.json, "animations"); ++i) {
-    GltfAnimation a;
-    a.name = check.text(gltf_item(document.json, "animations", i), "name", {"animation", i});
-    double from = INFINITY, to = 0;
-    if (!check.ok()) return false;
-    if (!for_channels(check, document, i, [&](const Channel& c) {
-          from = std::min(from, key_time(c, 0)), to = std::max(to, key_time(c, c.input.count - 1));
-        }))
-      return false;
-    a.from = std::isfinite(from) ? from : 0, a.to = to;
-    animations.push_back(std::move(a));
-  }
+std::string animation_name(const GltfDocument& document, size_t animation) {
+  GltfCheck check("");
+  return check.text(gltf_item(document.json, "animations", animation), "name", {});
+}
+
+bool read_times(GltfCheck& check, const GltfDocument& document, size_t animation, double& from, double& to) {
+  from = INFINITY, to = -INFINITY;
+  if (!for_channels(check, document, animation, [&](const Channel& c) {
+        from = std::min(from, key_time(c, 0)), to = std::max(to, key_time(c, c.input.count - 1));
+      }))
+    return false;
+  if (from > to) from = to = 0;
   return true;
 }
 

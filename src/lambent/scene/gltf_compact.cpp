@@ -66,26 +66,15 @@ bool uses_known_extensions(const Json& document) {
 enum class Target { accessor, view };
 using Visit = std::function<void(Target, Json&)>;
 
-// The member at the end of a path of keys; null where there is none.
-Json* member(Json& value, std::initializer_list<const char*> path) {
-  Json* at = &value;
-  for (const char* key : path) {
-    if (!at->is_object()) return nullptr;
-    const auto found = at->find(key);
-    if (found == at->end()) return nullptr;
-    at = &*found;
-  }
-  return at;
-}
 void visit_one(Json& parent, std::initializer_list<const char*> path, Target target, const Visit& visit) {
-  if (Json* value = member(parent, path)) visit(target, *value);
+  if (Json* value = gltf_member(parent, path)) visit(target, *value);
 }
 void visit_all(Json* object, const Visit& visit) {
   if (!object || !object->is_object()) return;
   for (Json& value : *object) visit(Target::accessor, value);
 }
 void each(Json& parent, const char* key, const std::function<void(Json&)>& work) {
-  Json* items = member(parent, {key});
+  Json* items = gltf_member(parent, {key});
   if (!items || !items->is_array()) return;
   for (Json& item : *items) work(item);
 }
@@ -94,14 +83,14 @@ void each(Json& parent, const char* key, const std::function<void(Json&)>& work)
 void visit_references(Json& document, const Visit& visit) {
   each(document, "meshes", [&](Json& mesh) {
     each(mesh, "primitives", [&](Json& primitive) {
-      visit_all(member(primitive, {"attributes"}), visit);
+      visit_all(gltf_member(primitive, {"attributes"}), visit);
       visit_one(primitive, {"indices"}, Target::accessor, visit);
       each(primitive, "targets", [&](Json& target) { visit_all(&target, visit); });
       visit_one(primitive, {"extensions", "KHR_draco_mesh_compression", "bufferView"}, Target::view, visit);
     });
   });
   each(document, "nodes", [&](Json& node) {
-    visit_all(member(node, {"extensions", "EXT_mesh_gpu_instancing", "attributes"}), visit);
+    visit_all(gltf_member(node, {"extensions", "EXT_mesh_gpu_instancing", "attributes"}), visit);
   });
   each(document, "skins", [&](Json& skin) { visit_one(skin, {"inverseBindMatrices"}, Target::accessor, visit); });
   each(document, "animations", [&](Json& animation) {
@@ -159,10 +148,10 @@ std::vector<size_t> shrink(Json& document, const char* key, const std::vector<bo
 void visit_ranges(Json& document, const std::function<void(Json&)>& visit) {
   each(document, "bufferViews", [&](Json& view) {
     visit(view);
-    Json* extensions = member(view, {"extensions"});
+    Json* extensions = gltf_member(view, {"extensions"});
     if (!extensions || !extensions->is_object()) return;
     for (Json& extension : *extensions)
-      if (member(extension, {"buffer"})) visit(extension);
+      if (gltf_member(extension, {"buffer"})) visit(extension);
   });
 }
 
@@ -174,7 +163,7 @@ void GlbWriter::compact() {
   if (!used) return;
   const size_t whole_size = size_;
   const auto range_of = [&](Json& holder) -> std::optional<Range> {
-    const Json *offset = member(holder, {"byteOffset"}), *length = member(holder, {"byteLength"});
+    const Json *offset = gltf_member(holder, {"byteOffset"}), *length = gltf_member(holder, {"byteLength"});
     const std::optional<size_t> at = offset ? whole(*offset, whole_size + 1) : 0,
                                 size = length ? whole(*length, whole_size + 1) : std::nullopt;
     if (!at || !size || *size > whole_size - *at) return std::nullopt;

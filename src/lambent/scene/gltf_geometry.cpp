@@ -1,6 +1,8 @@
 // glTF 2.0 specification (ISO/IEC 12113), sections 3.7.2 (meshes, morph targets) and 3.7.3 (skins).
 #include <lambent/scene/gltf_geometry.h>
 
+#include <lambent/scene/mesh_file.h>
+
 namespace lambent {
 
 using Json = nlohmann::json;
@@ -49,13 +51,15 @@ Vec3 unit_normal(Vec3d n) {
 }  // namespace
 
 bool read_vertices(GltfCheck& check, const GltfDocument& document, const Json& attributes,
-                   const GltfAccessor& positions, const std::vector<GltfMorph>& morphs, const GltfPlacement& placement,
-                   const GltfWhere& where, std::vector<Vec3>& out_positions, std::vector<Vec3>& out_normals) {
+                   const GltfAccessor& positions, const GltfVertices& vertices, const std::vector<GltfMorph>& morphs,
+                   const GltfPlacement& placement, const GltfWhere& where, std::vector<Vec3>& out_positions,
+                   std::vector<Vec3>& out_normals) {
   auto normals = read_attribute(check, document, attributes, "NORMAL", positions.count, where);
   if (!check.ok() || (normals && !check_gltf_vector(check, *normals, "NORMAL", where))) return false;
   Mat4d world = placement.world;
   Mat3d turn = normal_matrix(world);
-  for (size_t i = 0; i < positions.count; ++i) {
+  for (size_t k = 0; k < vertices.size(); ++k) {
+    const size_t i = vertices[k];
     if (placement.joints) world = placement.at(i), turn = normal_matrix(world);
     Vec3d p = positions.read3(i), n = normals ? normals->read3(i) : Vec3d(0);
     for (const GltfMorph& morph : morphs) {
@@ -63,7 +67,8 @@ bool read_vertices(GltfCheck& check, const GltfDocument& document, const Json& a
       if (normals && morph.normals) n += morph.weight * morph.normals->read3(i);
     }
     Vec3 position(Vec3d(world * Vec4d(p, 1)));
-    if (!is_finite(position)) return check.fail(where, "vertex " + std::to_string(i) + " is not at a finite position");
+    if (!is_position(position))
+      return check.fail(where, "vertex " + std::to_string(i) + " is not at a finite position or beyond 1e9");
     n = turn * n;
     out_positions.push_back(position);
     out_normals.push_back(unit_normal(n));

@@ -19,9 +19,11 @@ bool read_morphs(GltfCheck& check, const GltfDocument& document, size_t node, si
                  const nlohmann::json& primitive, size_t vertex_count, const GltfWhere& where,
                  std::vector<GltfMorph>& morphs);
 
-// Appends the vertices in world space. Normals are unit; zero where the file has none, or broken ones.
+// Appends the vertices in world space. Normals are unit; zero where the file has none, or broken ones. Fails at places
+// that are not finite or beyond max_coordinate.
 bool read_vertices(GltfCheck& check, const GltfDocument& document, const nlohmann::json& attributes,
-                   const GltfAccessor& positions, const std::vector<GltfMorph>& morphs, const GltfPlacement& placement,
-                   const GltfWhere& where, std::vector<Vec3>& out_positions, std::vector<Vec3>& out_normals);
+                   const GltfAccessor& positions, const GltfVertices& vertices, const std::vector<GltfMorph>& morphs,
+                   const GltfPlacement& placement, const GltfWhere& where, std::vector<Vec3>& out_positions,
+                   std::vector<Vec3>& out_normals);
 
 }  // namespace lambent

@@ -58,27 +58,63 @@ TEST(GltfLights, DefaultsAndNames) {
   EXPECT_EQ(arriving(sun, Vec3(7)).direction, Vec3(0, 1, 0));
 }
 
-TEST(GltfLights, RefusesWhatIsNoLamp) {
+// A lamp that is none is left out with a warning; what is not lit by lamps never fails by them.
+TEST(GltfLights, WhatIsNoLampIsLeftOut) {
+  const auto left_out = [](const Builder& b) {
+    auto scene = b.load();
+    if (!scene) return "refused: " + scene.error().text();
+    EXPECT_TRUE(scene->lights.empty());
+    EXPECT_EQ(scene->warnings.size(), 1u);
+    return scene->warnings.empty() ? std::string() : scene->warnings[0];
+  };
   const std::pair<Json, const char*> wrong[] = {
-      {{{"type", "tube"}}, "type"},
+      {{{"type", "tube"}}, "light 0: type \"tube\" is not point, spot or directional"},
       {{{"color", {1, 1, 1}}}, "type"},
       {{{"type", "point"}, {"intensity", -1}}, "negative or too large"},
       {{{"type", "point"}, {"intensity", 1e300}}, "negative or too large"},
-      {{{"type", "spot"}, {"spot", {{"innerConeAngle", 1}, {"outerConeAngle", 0.5}}}}, "cone"},
-      {{{"type", "spot"}, {"spot", {{"outerConeAngle", 3}}}}, "cone"},
+      {{{"type", "spot"}, {"spot", 5}}, "spot is not an object"},
       {5, "object"}};
   for (const auto& [light, message] : wrong) {
-    auto scene = lit_triangle(light, Json::object()).load();
-    ASSERT_FALSE(scene) << light.dump();
-    EXPECT_NE(scene.error().text().find(message), std::string::npos) << scene.error().text();
+    const std::string text = left_out(lit_triangle(light, Json::object()));
+    EXPECT_TRUE(text.starts_with("a lamp is left out: ")) << text;
+    EXPECT_NE(text.find(message), std::string::npos) << text;
   }
+  EXPECT_NE(left_out(lit_triangle({{"type", "point"}}, {{"translation", {0, 1e19, 0}}})).find("beyond 1e9"),
+            std::string::npos);
   Builder b = lit_triangle({{"type", "point"}}, Json::object());
   b.json["nodes"][1]["extensions"]["KHR_lights_punctual"]["light"] = 7;
-  EXPECT_FALSE(b.load());
+  EXPECT_NE(left_out(b).find("light is 7, out of range"), std::string::npos);
   b.json["nodes"][1]["extensions"]["KHR_lights_punctual"] = Json::object();
-  EXPECT_FALSE(b.load());
+  EXPECT_NE(left_out(b).find("names no light"), std::string::npos);
+  b.json["nodes"].push_back(b.json["nodes"][1]);
+  EXPECT_NE(left_out(b).find("(and 1 more lamps)"), std::string::npos);
   b.json["extensions"].erase("KHR_lights_punctual");
-  EXPECT_FALSE(b.load());
+  left_out(b);
+}
+
+TEST(GltfLights, ConesAreClamped) {
+  const auto spot = [](Json cones) {
+    auto scene = lit_triangle({{"type", "spot"}, {"spot", std::move(cones)}}, Json::object()).load();
+    EXPECT_TRUE(scene) << scene.error().text();
+    return *scene;
+  };
+  // A hard edge: all within the cone alike, nothing beyond.
+  const Scene hard = spot({{"innerConeAngle", 0.4}, {"outerConeAngle", 0.4}});
+  ASSERT_EQ(hard.warnings.size(), 1u);
+  EXPECT_NE(hard.warnings[0].find("clamped"), std::string::npos);
+  const auto at = [&](float angle) {
+    return arriving(hard.lights.at(0), 3.0f * Vec3(std::sin(angle), 0, -std::cos(angle))).irradiance.x;
+  };
+  EXPECT_FLOAT_EQ(at(0), 1 / 9.0f);
+  EXPECT_FLOAT_EQ(at(0.39f), 1 / 9.0f);
+  EXPECT_EQ(at(0.41f), 0);
+  const PunctualLight wide = spot({{"innerConeAngle", 0.1}, {"outerConeAngle", 1.6}}).lights.at(0);
+  EXPECT_FLOAT_EQ(wide.outer_cone, pi / 2);
+  EXPECT_FLOAT_EQ(wide.inner_cone, 0.1f);
+  const PunctualLight crossed = spot({{"innerConeAngle", 1.0}}).lights.at(0);
+  EXPECT_FLOAT_EQ(crossed.inner_cone, pi / 4);
+  EXPECT_FLOAT_EQ(crossed.outer_cone, pi / 4);
+  EXPECT_TRUE(spot({{"innerConeAngle", 0}, {"outerConeAngle", 1.5707963267948966}}).warnings.empty());
 }
 
 }  // namespace

@@ -198,53 +198,56 @@ std::vector<GltfMaterial> read_materials(GltfCheck& check, const GltfDocument& d
   return materials;
 }
 
-bool read_textures(GltfCheck& check, GltfDocument& document, const std::vector<GltfMaterial>& materials,
+size_t texcoord_sets(const std::vector<GltfMaterial>& materials) {
+  size_t sets = 2;
+  for (const GltfMaterial& m : materials)
+    for (const GltfTextureUse* use : {&m.base_color, &m.metallic_roughness, &m.normal, &m.transmission, &m.emissive})
+      if (use->texture && use->texcoord_set < max_texcoord_sets) sets = std::max(sets, size_t(use->texcoord_set) + 1);
+  return sets;
+}
+
+void read_textures(const GltfCheck& check, GltfDocument& document, const std::vector<GltfMaterial>& materials,
                    const std::vector<bool>& used, const std::vector<std::string>& image_problems, Scene& scene) {
   TextureReader reader(document, image_problems, scene);
   size_t unknown = 0, bending = 0;
+  GltfTold base_color, metallic_roughness, normal, transmission, emissive;
+  // The scene is still good without a texture.
+  auto read = [&](const GltfTextureUse& use, const char* what, GltfTold& told, int& texture, int& set,
+                  std::array<float, 6>& transform) {
+    if (!use.texture) return true;
+    GltfCheck trial = check;
+    if (use.texcoord_set >= max_texcoord_sets)
+      trial.fail({}, "it reads TEXCOORD_" + std::to_string(use.texcoord_set) + "; the last that is read is " +
+                         std::to_string(max_texcoord_sets - 1));
+    const int read_texture = trial.ok() ? reader.read(trial, *use.texture) : -1;
+    if (trial.ok()) texture = read_texture, set = int(use.texcoord_set), transform = use.transform;
+    else told.add(std::string(what) + " texture not read: " + trial.error().message);
+    return trial.ok();
+  };
   for (size_t i = 0; i < materials.size(); ++i) {
     if (!used[i]) continue;
-    unknown += !materials[i].known_alpha_mode, bending += materials[i].bends_light;
-    auto read = [&](GltfCheck& checked, const GltfTextureUse& use, const char* what) {
-      if (use.texcoord_set <= 1) return reader.read(checked, *use.texture);
-      checked.fail({"material", i}, std::string("its ") + what + " reads TEXCOORD_" + std::to_string(use.texcoord_set) +
-                                        "; only sets 0 and 1 are supported");
-      return -1;
-    };
-    Material& m = scene.materials[i];
-    if (const GltfTextureUse& use = materials[i].base_color; use.texture) {
-      m.base_color_texture = read(check, use, "base colour");
-      m.texcoord_set = int(use.texcoord_set), m.uv_transform = use.transform;
-      if (!check.ok()) return false;
-    }
-    // The scene is still good without these.
-    auto read_extra = [&](const GltfTextureUse& use, const char* what, int& texture, int& set,
-                          std::array<float, 6>& transform) {
-      if (!use.texture) return true;
-      GltfCheck trial = check;
-      const int read_texture = read(trial, use, what);
-      if (trial.ok()) texture = read_texture, set = int(use.texcoord_set), transform = use.transform;
-      else scene.warnings.push_back(std::string(what) + " texture not read: " + trial.error().message);
-      return trial.ok();
-    };
     const GltfMaterial& from = materials[i];
-    read_extra(from.metallic_roughness, "metallic-roughness", m.metallic_roughness_texture, m.metallic_roughness_set,
-               m.metallic_roughness_transform);
-    read_extra(from.normal, "normal", m.normal_texture, m.normal_set, m.normal_transform);
+    Material& m = scene.materials[i];
+    unknown += !from.known_alpha_mode, bending += from.bends_light;
+    read(from.base_color, "base colour", base_color, m.base_color_texture, m.texcoord_set, m.uv_transform);
+    read(from.metallic_roughness, "metallic-roughness", metallic_roughness, m.metallic_roughness_texture,
+         m.metallic_roughness_set, m.metallic_roughness_transform);
+    read(from.normal, "normal", normal, m.normal_texture, m.normal_set, m.normal_transform);
     // Glass of unknown pattern passes nothing.
-    if (m.transmission > 0 && !read_extra(from.transmission, "transmission", m.transmission_texture, m.transmission_set,
-                                          m.transmission_transform))
+    if (m.transmission > 0 && !read(from.transmission, "transmission", transmission, m.transmission_texture,
+                                    m.transmission_set, m.transmission_transform))
       m.transmission = 0;
     // A lamp of unknown pattern gives no light.
     const bool black = m.emissive == Vec3(0);
-    if (!black && !read_extra(from.emissive, "emissive", m.emissive_texture, m.emissive_set, m.emissive_transform))
+    if (!black && !read(from.emissive, "emissive", emissive, m.emissive_texture, m.emissive_set, m.emissive_transform))
       m.emissive = Vec3(0);
   }
+  for (const GltfTold* told : {&base_color, &metallic_roughness, &normal, &transmission, &emissive})
+    told->tell(scene.warnings, "materials");
   warn_count(scene, unknown, " material has an unknown alphaMode and is opaque",
              " materials have an unknown alphaMode and are opaque");
   warn_count(scene, bending, " material with rough or thick transmission passes light straight on",
              " materials with rough or thick transmission pass light straight on");
-  return true;
 }
 
 }  // namespace lambent

@@ -21,10 +21,13 @@ struct GltfMaterial {
 // All of the document's materials, in its order.
 std::vector<GltfMaterial> read_materials(GltfCheck& check, const GltfDocument& document);
 
+// How many sets of texture coordinates they read, at least two: a use of a set beyond max_texcoord_sets cannot be read.
+size_t texcoord_sets(const std::vector<GltfMaterial>& materials);
+
 // Decodes the images of the materials that `used` marks into scene.textures, each once, and sets the textures of
 // scene.materials, whose first ones are the document's. `image_problems` says for each image why its file could not be
-// read (empty: it could).
-bool read_textures(GltfCheck& check, GltfDocument& document, const std::vector<GltfMaterial>& materials,
+// read (empty: it could). A texture that cannot be read is left out with a warning, and emission with it.
+void read_textures(const GltfCheck& check, GltfDocument& document, const std::vector<GltfMaterial>& materials,
                    const std::vector<bool>& used, const std::vector<std::string>& image_problems, Scene& scene);
 
 }  // namespace lambent

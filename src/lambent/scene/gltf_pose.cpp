@@ -57,12 +57,14 @@ std::vector<size_t> read_parents(GltfCheck& check, const Json& document) {
   return parents;
 }
 
-// Appends the node and all below it, depth first, children in their order.
-void append_tree(const Json& document, size_t root, std::vector<size_t>& order) {
+// Appends the node and all below it, depth first, children in their order; nothing of what is `seen` already.
+void append_tree(const Json& document, size_t root, std::vector<bool>& seen, std::vector<size_t>& order) {
   std::vector<size_t> pending{root};
   while (!pending.empty()) {
     size_t n = pending.back();
     pending.pop_back();
+    if (seen[n]) continue;
+    seen[n] = true;
     order.push_back(n);
     const Json& node = gltf_item(document, "nodes", n);
     auto children = node.find("children");
@@ -71,12 +73,29 @@ void append_tree(const Json& document, size_t root, std::vector<size_t>& order) 
   }
 }
 
-bool read_shown(GltfCheck& check, const Json& document, const std::vector<size_t>& parents,
-                std::vector<size_t>& shown) {
+// KHR_node_visibility: whether each node is hidden, by itself or with what it hangs on. `order`: parents before
+// children.
+std::vector<bool> read_hidden(GltfCheck& check, const Json& document, const std::vector<size_t>& parents,
+                              const std::vector<size_t>& order) {
+  std::vector<bool> hidden(parents.size());
+  for (size_t n : order) {
+    const GltfWhere where{"node", n};
+    const Json* extensions = check.object(gltf_item(document, "nodes", n), "extensions", where);
+    const Json* own = extensions ? check.object(*extensions, "KHR_node_visibility", where) : nullptr;
+    hidden[n] = (parents[n] != no_parent && hidden[parents[n]]) ||
+                (own && !check.boolean(*own, "visible", true, where));
+  }
+  return hidden;
+}
+
+// Roots may be named twice, or be below other nodes, as some exporters write them: each is shown once, where its
+// parents put it.
+bool read_shown(GltfCheck& check, const Json& document, const std::vector<size_t>& parents, GltfPose& pose) {
   const size_t scenes = gltf_count(document, "scenes");
+  std::vector<bool> seen(parents.size()), named(parents.size());
   if (scenes == 0) {
     for (size_t n = 0; n < parents.size(); ++n) {
-      if (parents[n] == no_parent) append_tree(document, n, shown);
+      if (parents[n] == no_parent) append_tree(document, n, seen, pose.shown);
     }
     return true;
   }
@@ -84,14 +103,12 @@ bool read_shown(GltfCheck& check, const Json& document, const std::vector<size_t
   if (!check.ok()) return false;
   GltfWhere where{"scene", scene};
   const Json* roots = check.array(gltf_item(document, "scenes", scene), "nodes", where);
-  std::vector<bool> seen(parents.size());
   for (const Json& root : roots ? *roots : Json::array()) {
     auto n = check.integer(root, "a node", parents.size(), where);
     if (!n) return false;
-    if (seen[*n]) return check.fail(where, "names node " + std::to_string(*n) + " twice");
-    if (parents[*n] != no_parent) return check.fail(where, "names node " + std::to_string(*n) + ", which has a parent");
-    seen[*n] = true;
-    append_tree(document, *n, shown);
+    pose.inner_roots += named[*n] || parents[*n] != no_parent;
+    named[*n] = true;
+    append_tree(document, *n, seen, pose.shown);
   }
   return check.ok();
 }
@@ -139,8 +156,9 @@ bool read_pose(GltfCheck& check, const GltfDocument& document, GltfPose& pose) {
 
   std::vector<size_t> order;  // parents before children
   order.reserve(count);
+  std::vector<bool> seen(count);
   for (size_t n = 0; n < count; ++n) {
-    if (parents[n] == no_parent) append_tree(json, n, order);
+    if (parents[n] == no_parent) append_tree(json, n, seen, order);
   }
   if (order.size() != count) return check.fail({}, "the node hierarchy has a cycle");
   pose.world.assign(count, Mat4d(1.0));
@@ -153,7 +171,9 @@ bool read_pose(GltfCheck& check, const GltfDocument& document, GltfPose& pose) {
       pose.world[n] = pose.world[parents[n]] * local;
     }
   }
-  if (!check.ok() || !read_shown(check, json, parents, pose.shown)) return false;
+  if (!check.ok() || !read_shown(check, json, parents, pose)) return false;
+  const std::vector<bool> hidden = read_hidden(check, json, parents, order);
+  std::erase_if(pose.shown, [&](size_t n) { return hidden[n]; });
 
   const size_t skins = gltf_count(json, "skins");
   pose.joints.resize(skins);
@@ -199,7 +219,8 @@ Vec3d document_origin(const GltfDocument& document, const GltfPose& pose) {
 }
 
 bool read_placement(GltfCheck& check, const GltfDocument& document, const GltfPose& pose, size_t node,
-                    const Json& primitive, size_t vertex_count, const GltfWhere& where, GltfPlacement& placement) {
+                    const Json& primitive, const GltfVertices& vertices, const GltfWhere& where,
+                    GltfPlacement& placement) {
   placement.world = pose.world[node];
   placement.mirrored = determinant3(placement.world) < 0;
   auto skin = check.index(gltf_item(document.json, "nodes", node), "skin", pose.joints.size(), {"node", node});
@@ -207,8 +228,8 @@ bool read_placement(GltfCheck& check, const GltfDocument& document, const GltfPo
   if (!skin || !attributes) return check.ok();
   for (size_t set = 0;; ++set) {
     std::string joints = "JOINTS_" + std::to_string(set), weights = "WEIGHTS_" + std::to_string(set);
-    auto j = read_attribute(check, document, *attributes, joints.c_str(), vertex_count, where);
-    auto w = read_attribute(check, document, *attributes, weights.c_str(), vertex_count, where);
+    auto j = read_attribute(check, document, *attributes, joints.c_str(), vertices.count, where);
+    auto w = read_attribute(check, document, *attributes, weights.c_str(), vertices.count, where);
     if (!check.ok()) return false;
     if (!j || !w) break;
     if (j->components != 4 || j->is_matrix || (j->type != GltfType::u8 && j->type != GltfType::u16)) {
@@ -224,14 +245,15 @@ bool read_placement(GltfCheck& check, const GltfDocument& document, const GltfPo
   placement.joints = &pose.joints[*skin];
   const size_t joint_count = placement.joints->size();
   for (size_t set = 0; set < placement.joint_sets.size(); ++set) {
-    for (size_t i = 0; i < vertex_count; ++i) {
+    for (size_t k = 0; k < vertices.size(); ++k) {
+      const size_t i = vertices[k];
       double j[4] = {}, w[4] = {};
       placement.joint_sets[set].read(i, j), placement.weight_sets[set].read(i, w);
-      for (int k = 0; k < 4; ++k) {
-        if (!(w[k] >= 0) || !std::isfinite(w[k]))
+      for (int c = 0; c < 4; ++c) {
+        if (!(w[c] >= 0) || !std::isfinite(w[c]))
           return check.fail(where, "vertex " + std::to_string(i) + " has a bad weight");
-        if (w[k] > 0 && j[k] >= double(joint_count)) {
-          return check.fail(where, "vertex " + std::to_string(i) + " hangs on joint " + std::to_string(int(j[k])) +
+        if (w[c] > 0 && j[c] >= double(joint_count)) {
+          return check.fail(where, "vertex " + std::to_string(i) + " hangs on joint " + std::to_string(int(j[c])) +
                                        " of " + std::to_string(joint_count));
         }
       }

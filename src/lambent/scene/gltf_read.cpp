@@ -120,6 +120,17 @@ const Json& gltf_item(const Json& document, const char* key, size_t index) {
   return (*document.find(key))[index];
 }
 
+Json* gltf_member(Json& value, std::initializer_list<const char*> path) {
+  Json* at = &value;
+  for (const char* key : path) {
+    if (!at->is_object()) return nullptr;
+    const auto found = at->find(key);
+    if (found == at->end()) return nullptr;
+    at = &*found;
+  }
+  return at;
+}
+
 size_t component_size(GltfType type) {
   switch (type) {
     case GltfType::i8:

@@ -46,10 +46,29 @@ class GltfCheck {
   std::optional<Error> error_;
 };
 
+// Warnings of one kind, told in one line: the first, and how many more there were of what `many` names.
+class GltfTold {
+ public:
+  void add(std::string text) {
+    if (count_++ == 0) first_ = std::move(text);
+  }
+  void tell(std::vector<std::string>& warnings, const char* many) const {
+    if (count_ == 0) return;
+    warnings.push_back(first_ + (count_ > 1 ? " (and " + std::to_string(count_ - 1) + " more " + many + ")" : ""));
+  }
+
+ private:
+  std::string first_;
+  size_t count_ = 0;
+};
+
 // The elements of a top-level array: 0 where absent.
 size_t gltf_count(const nlohmann::json& document, const char* key);
 // One of them; the loader has made sure that it is an object.
 const nlohmann::json& gltf_item(const nlohmann::json& document, const char* key, size_t index);
+
+// The member at the end of a path of keys in JSON that nobody has checked; null where there is none.
+nlohmann::json* gltf_member(nlohmann::json& value, std::initializer_list<const char*> path);
 
 // Component types, by their OpenGL numbers.
 enum class GltfType { none = 0, i8 = 5120, u8 = 5121, i16 = 5122, u16 = 5123, u32 = 5125, f32 = 5126 };
@@ -84,9 +103,11 @@ std::optional<GltfAccessor> read_attribute(GltfCheck& check, const GltfDocument&
 
 // Where nodes stand in the rest pose, and what of them is shown.
 struct GltfPose {
-  Vec3d origin{0.0};                       // taken off every place below; set before reading (Scene::origin)
-  std::vector<Mat4d> world;                // of each node
-  std::vector<size_t> shown;               // nodes of the default scene (or all, where there is none), depth first
+  Vec3d origin{0.0};          // taken off every place below; set before reading (Scene::origin)
+  std::vector<Mat4d> world;   // of each node
+  std::vector<size_t> shown;  // nodes of the default scene (or all, where there is none), depth first,
+                              // less those that KHR_node_visibility hides with all below them
+  size_t inner_roots = 0;     // roots of the scene that have a parent, which moves them, or stand there twice
   std::vector<std::vector<Mat4d>> joints;  // of each skin that a shown mesh uses: joint to world times inverse bind
 };
 bool read_pose(GltfCheck& check, const GltfDocument& document, GltfPose& pose);
@@ -95,8 +116,9 @@ bool read_pose(GltfCheck& check, const GltfDocument& document, GltfPose& pose);
 // stand far from 0, the place of the first one if they are near it, else far_origin of all.
 Vec3d document_origin(const GltfDocument& document, const GltfPose& pose);
 
-// Lamps of shown nodes, KHR_lights_punctual, into scene.lights.
-bool read_lights(GltfCheck& check, const GltfDocument& document, const GltfPose& pose, Scene& scene);
+// Lamps of shown nodes, KHR_lights_punctual, into scene.lights. Cones that are not 0 <= inner < outer <= pi/2 are
+// clamped, lamps that cannot be read are left out; warnings say so.
+void read_lights(const GltfDocument& document, const GltfPose& pose, Scene& scene);
 
 // Takes vertices of one primitive of one node to the world: by the node's transform, or by the joints alone where it is
 // skinned.
@@ -107,8 +129,16 @@ struct GltfPlacement {
   std::vector<GltfAccessor> joint_sets, weight_sets;
   Mat4d at(size_t vertex) const;
 };
+// Which of an accessor's elements a primitive uses: the first `count`, or, where there is one, those of a list.
+struct GltfVertices {
+  size_t count = 0;
+  std::span<const uint32_t> list;
+  size_t size() const { return list.empty() ? count : list.size(); }
+  size_t operator[](size_t i) const { return list.empty() ? i : list[i]; }
+};
+// Of accessors of `vertices.count` elements; weights are checked of the vertices in use.
 bool read_placement(GltfCheck& check, const GltfDocument& document, const GltfPose& pose, size_t node,
-                    const nlohmann::json& primitive, size_t vertex_count, const GltfWhere& where,
+                    const nlohmann::json& primitive, const GltfVertices& vertices, const GltfWhere& where,
                     GltfPlacement& placement);
 
 // The inverse transpose of the upper 3 x 3 part up to a positive factor; finite for singular matrices too.

@@ -122,8 +122,8 @@ bool uses_extension(const Json& value, const std::string& extension) {
 
 }  // namespace
 
-void unbake(Json& document) {
-  take_extension(document);
+bool unbake(Json& document) {
+  const bool was_baked = !take_extension(document).is_null();
   Worn worn;
   for (size_t m = 0; m < gltf_count(document, "meshes"); ++m) {
     const auto primitives = document["meshes"][m].find("primitives");
@@ -142,7 +142,7 @@ void unbake(Json& document) {
   if (!worn.lit.empty()) drop_materials(document, worn);
 
   const auto used = document.find("extensionsUsed");
-  if (used == document.end() || !used->is_array()) return;
+  if (used == document.end() || !used->is_array()) return was_baked;
   Json kept = Json::array();
   for (Json& listed : *used) {
     const bool ours = listed == name,
@@ -152,6 +152,7 @@ void unbake(Json& document) {
   }
   if (kept.empty()) document.erase(used);
   else *used = std::move(kept);
+  return was_baked;
 }
 
 }  // namespace lambent

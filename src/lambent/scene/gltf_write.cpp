@@ -82,27 +82,31 @@ size_t GlbWriter::add_view(std::span<const uint8_t> bytes, size_t alignment) {
   return push("bufferViews", {{"buffer", 0}, {"byteOffset", offset}, {"byteLength", bytes.size()}});
 }
 
+size_t GlbWriter::add_accessor(Json accessor, std::vector<uint8_t> bytes, int target, size_t stride) {
+  const std::string key = content_hash(bytes) + accessor.dump() + std::to_string(target) + "," + std::to_string(stride);
+  const auto known = known_.find(key);
+  if (known != known_.end()) return known->second;
+  accessor["bufferView"] = add_view(keep(std::move(bytes)), 4);
+  Json& view = list("bufferViews").back();
+  view["target"] = target;
+  if (stride) view["byteStride"] = stride;
+  return known_[key] = push("accessors", std::move(accessor));
+}
+
 size_t GlbWriter::add_vectors(std::span<const float> values, int components, bool with_bounds) {
   const size_t count = values.size() / size_t(components);
-  size_t view = add_view(keep(bytes_of(values)), 4);
-  list("bufferViews")[view]["target"] = array_buffer;
-  Json accessor = {{"bufferView", view},
-                   {"componentType", int(GltfType::f32)},
-                   {"count", count},
-                   {"type", "VEC" + std::to_string(components)}};
+  Json accessor = {
+      {"componentType", int(GltfType::f32)}, {"count", count}, {"type", "VEC" + std::to_string(components)}};
   if (with_bounds) {
     add_bounds(accessor, count, components,
                [&](size_t i, int c) { return double(values[i * size_t(components) + size_t(c)]); });
   }
-  return push("accessors", std::move(accessor));
+  return add_accessor(std::move(accessor), bytes_of(values), array_buffer, 0);
 }
 
 size_t GlbWriter::add_indices(std::span<const uint32_t> indices) {
-  size_t view = add_view(keep(bytes_of(indices)), 4);
-  list("bufferViews")[view]["target"] = element_array_buffer;
-  return push(
-      "accessors",
-      {{"bufferView", view}, {"componentType", int(GltfType::u32)}, {"count", indices.size()}, {"type", "SCALAR"}});
+  return add_accessor({{"componentType", int(GltfType::u32)}, {"count", indices.size()}, {"type", "SCALAR"}},
+                      bytes_of(indices), element_array_buffer, 0);
 }
 
 size_t GlbWriter::add_copy(const GltfAccessor& from, std::span<const uint32_t> source, bool with_bounds) {
@@ -113,18 +117,13 @@ size_t GlbWriter::add_copy(const GltfAccessor& from, std::span<const uint32_t> s
     if (const uint8_t* element = from.element(source[i]))
       std::memcpy(bytes.data() + i * stride, element, from.element_size);
   }
-  size_t view = add_view(keep(std::move(bytes)), 4);
-  Json& view_json = list("bufferViews")[view];
-  view_json["target"] = array_buffer;
-  if (stride != from.element_size) view_json["byteStride"] = stride;
-  Json accessor = {
-      {"bufferView", view}, {"componentType", int(from.type)}, {"count", source.size()}, {"type", from.shape}};
+  Json accessor = {{"componentType", int(from.type)}, {"count", source.size()}, {"type", from.shape}};
   if (from.normalized) accessor["normalized"] = true;
   if (with_bounds) {
     add_bounds(accessor, source.size(), from.components,
                [&](size_t i, int c) { return from.component(from.element(source[i]), c); });
   }
-  return push("accessors", std::move(accessor));
+  return add_accessor(std::move(accessor), std::move(bytes), array_buffer, stride != from.element_size ? stride : 0);
 }
 
 Result<void> GlbWriter::write(const std::string& path) const {

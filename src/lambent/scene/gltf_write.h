@@ -2,6 +2,8 @@
 // Building and writing of a GLB: JSON, and binary data that is gathered by reference.
 #include <lambent/scene/gltf_read.h>
 
+#include <map>
+
 namespace lambent {
 
 class GlbWriter {
@@ -21,7 +23,7 @@ class GlbWriter {
   std::span<const uint8_t> keep(std::vector<uint8_t> bytes);
   size_t add_view(std::span<const uint8_t> bytes, size_t alignment);
 
-  // Accessors of fresh vertex data and indices.
+  // Accessors of fresh vertex data and indices; the same data in the same form are one accessor.
   size_t add_vectors(std::span<const float> values, int components, bool with_bounds);
   size_t add_indices(std::span<const uint32_t> indices);
   // Elements source[0], source[1], ... of an accessor, in its own type.
@@ -46,12 +48,14 @@ class GlbWriter {
   struct Move {
     size_t from, to;  // of bytes from here on, up to the next
   };
+  size_t add_accessor(Json accessor, std::vector<uint8_t> bytes, int target, size_t stride);
   static constexpr size_t run_alignment = 64;
   // Lays the ranges closer together; gives where they went, rising.
   std::vector<Move> keep_bytes(std::vector<Range> ranges);
 
   std::vector<Piece> pieces_;
   std::deque<std::vector<uint8_t>> kept_;
+  std::map<std::string, size_t> known_;  // accessors by what they say and hold
   size_t size_ = 0, alignment_ = 64;
 };
 

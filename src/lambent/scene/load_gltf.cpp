@@ -3,6 +3,7 @@
 #include <lambent/scene/clean.h>
 #include <lambent/scene/gltf_container.h>
 #include <lambent/scene/gltf_geometry.h>
+#include <lambent/scene/gltf_instances.h>
 #include <lambent/scene/gltf_materials.h>
 #include <lambent/scene/gltf_read.h>
 #include <lambent/scene/gltf_unbake.h>
@@ -23,7 +24,8 @@ constexpr uint64_t max_zeros = uint64_t{1} << 22, max_parts = uint64_t{1} << 20;
 
 bool is_supported_extension(const std::string& name) {
   return name == "KHR_mesh_quantization" || name == "KHR_texture_transform" || name == "KHR_lights_punctual" ||
-         name == "LAMBENT_transfer" || name.starts_with("KHR_materials_");
+         name == "KHR_node_visibility" || name == "EXT_mesh_gpu_instancing" || name == "LAMBENT_transfer" ||
+         name.starts_with("KHR_materials_");
 }
 
 // The document's own statements, and the shape of its top level, on which all later look-ups rely.
@@ -51,6 +53,7 @@ bool check_document(GltfCheck& check, const Json& json) {
   for (const char* key : {"scenes", "nodes", "meshes", "skins", "accessors", "bufferViews", "buffers", "materials",
                           "textures", "images", "samplers", "animations", "cameras"}) {
     const Json* list = check.array(json, key, {});
+    if (key == std::string_view("animations")) continue;  // each is checked when it is asked for
     for (size_t i = 0; list && i < list->size(); ++i) {
       if (!(*list)[i].is_object()) return check.fail({key, i}, "is not an object");
     }
@@ -147,8 +150,13 @@ bool read_images(GltfCheck& check, GltfDocument& document, UriReader& files, std
 // Reads the primitives of all shown nodes into the scene.
 class PrimitiveReader {
  public:
-  PrimitiveReader(GltfCheck& check, const GltfDocument& document, const GltfPose& pose, Scene& scene)
-      : check_(check), document_(document), pose_(pose), scene_(scene) {}
+  // With `keep_all`, parts have all vertices of their accessors: what was baked counts them.
+  PrimitiveReader(GltfCheck& check, const GltfDocument& document, const GltfPose& pose, bool keep_all, Scene& scene)
+      : check_(check),
+        document_(document),
+        pose_(pose),
+        scene_(scene),
+        users_(keep_all ? std::vector<uint32_t>() : count_users(document)) {}
 
   bool read_all() {
     for (size_t n : pose_.shown) {
@@ -202,57 +210,69 @@ class PrimitiveReader {
 
     std::vector<GltfMorph> targets;
     if (!read_morphs(check_, document_, node, mesh, primitive, positions.count, where, targets)) return false;
-    if (!check_size(positions, indices, triangles, targets.size(), where)) return false;
+    if (!check_size(positions, indices, triangles, where)) return false;
     // Every attribute must be readable, so that the writer can copy it.
     for (auto attribute = attributes->begin(); attribute != attributes->end(); ++attribute) {
       read_attribute(check_, document_, *attributes, attribute.key().c_str(), positions.count, where);
     }
-    GltfPlacement placement;
-    if (!check_.ok() || !read_placement(check_, document_, pose_, node, primitive, positions.count, where, placement)) {
-      return false;
-    }
+    if (!check_.ok()) return false;
 
     Part part;
     part.name = check_.text(gltf_item(document_.json, "nodes", node), "name", {"node", node});
     if (part.name.empty()) part.name = check_.text(gltf_item(document_.json, "meshes", mesh), "name", {"mesh", mesh});
     part.node = int(node), part.primitive = int(number);
-    part.first_vertex = uint32_t(scene_.positions.size()), part.vertex_count = uint32_t(positions.count);
+    part.first_vertex = uint32_t(scene_.positions.size());
     part.first_triangle = uint32_t(scene_.triangles.size());
     auto material = check_.index(primitive, "material", gltf_count(document_.json, "materials"), where);
     if (!check_.ok()) return false;
     part.material = material ? uint32_t(*material) : default_material();
-    if (!read_vertices(check_, document_, *attributes, positions, targets, placement, where, scene_.positions,
+    if (!read_triangles(part, mode, indices, triangles, positions.count, where)) return false;
+    const bool shared = *position_index < users_.size() && users_[*position_index] > 1;
+    const GltfVertices vertices = number_vertices(part, positions.count, shared && part.triangle_count > 0);
+    GltfPlacement placement;
+    if (!check_vertices(vertices, targets.size(), where) ||
+        !read_placement(check_, document_, pose_, node, primitive, vertices, where, placement) ||
+        !read_vertices(check_, document_, *attributes, positions, vertices, targets, placement, where, scene_.positions,
                        scene_.normals) ||
-        !read_colors(*attributes, positions.count, where) ||
-        !read_tangents(*attributes, positions.count, placement, where)) {
+        !read_texcoords(*attributes, vertices, where) || !read_colors(*attributes, vertices, where) ||
+        !read_tangents(*attributes, vertices, placement, where)) {
       return false;
     }
-    if (!read_triangles(part, mode, indices, triangles, placement.mirrored, where)) return false;
+    if (placement.mirrored)
+      for (size_t t = part.first_triangle; t < scene_.triangles.size(); ++t)
+        std::swap(scene_.triangles[t].v[1], scene_.triangles[t].v[2]);
     if (!attributes->contains("NORMAL")) bare_.push_back(scene_.parts.size());
     scene_.parts.push_back(std::move(part));
     return true;
   }
 
   bool check_size(const GltfAccessor& positions, const std::optional<GltfAccessor>& indices, size_t triangles,
-                  size_t targets, const GltfWhere& where) {
+                  const GltfWhere& where) {
     if (positions.data.empty()) zeros_ += positions.count;
     if (indices && indices->data.empty()) zeros_ += indices->count;
     if (zeros_ > max_zeros) return check_.fail(where, "too many vertices or indices have no bytes in a buffer");
-    // A vertex costs its place and the time of its morph targets.
-    work_ += uint64_t(positions.count) * (1 + targets), triangles_ += triangles;
-    if (work_ > max_vertices || triangles_ > max_triangles) {
-      return check_.fail(where, "the scene expands to more than " + std::to_string(max_vertices) + " vertices or " +
-                                    std::to_string(max_triangles) + " triangles");
-    }
-    return true;
+    triangles_ += triangles;
+    return triangles_ <= max_triangles || too_large(where);
   }
 
-  bool read_colors(const Json& attributes, size_t count, const GltfWhere& where) {
-    const size_t first = scene_.positions.size() - count;
-    for (size_t set = 0; set < 2; ++set) {
+  // A vertex costs its place and the time of its morph targets.
+  bool check_vertices(const GltfVertices& vertices, size_t targets, const GltfWhere& where) {
+    work_ += uint64_t(vertices.size()) * (1 + targets);
+    return work_ <= max_vertices || too_large(where);
+  }
+
+  bool too_large(const GltfWhere& where) {
+    return check_.fail(where, "the scene expands to more than " + std::to_string(max_vertices) + " vertices or " +
+                                  std::to_string(max_triangles) + " triangles");
+  }
+
+  // The sets that materials read, and the first two.
+  bool read_texcoords(const Json& attributes, const GltfVertices& vertices, const GltfWhere& where) {
+    const size_t count = vertices.size(), first = scene_.positions.size() - count;
+    for (size_t set = 0; set < scene_.texcoords.size(); ++set) {
       std::vector<Vec2>& texcoords = scene_.texcoords[set];
       std::string name = "TEXCOORD_" + std::to_string(set);
-      auto a = read_attribute(check_, document_, attributes, name.c_str(), count, where);
+      auto a = read_attribute(check_, document_, attributes, name.c_str(), vertices.count, where);
       if (!check_.ok()) return false;
       if (a && (a->components != 2 || a->type == GltfType::u32)) {
         return check_.fail(where, name + " is not two floats or small integers");
@@ -261,11 +281,16 @@ class PrimitiveReader {
       texcoords.resize(first + count);
       for (size_t i = 0; a && i < count; ++i) {
         double uv[2] = {};
-        a->read(i, uv);
+        a->read(vertices[i], uv);
         if (std::isfinite(uv[0]) && std::isfinite(uv[1])) texcoords[first + i] = Vec2(float(uv[0]), float(uv[1]));
       }
     }
-    auto a = read_attribute(check_, document_, attributes, "COLOR_0", count, where);
+    return true;
+  }
+
+  bool read_colors(const Json& attributes, const GltfVertices& vertices, const GltfWhere& where) {
+    const size_t count = vertices.size(), first = scene_.positions.size() - count;
+    auto a = read_attribute(check_, document_, attributes, "COLOR_0", vertices.count, where);
     if (!check_.ok()) return false;
     if (a) {
       a->normalized = true;  // the only kind of integers that colours may be
@@ -277,25 +302,26 @@ class PrimitiveReader {
     if (!a && scene_.colors.empty()) return true;
     scene_.colors.resize(first + count, Vec3(1.0f));
     for (size_t i = 0; a && i < count; ++i) {
-      Vec3 color(a->read3(i));
+      Vec3 color(a->read3(vertices[i]));
       if (is_finite(color)) scene_.colors[first + i] = max(color, Vec3(0.0f));
     }
     return true;
   }
 
-  bool read_tangents(const Json& attributes, size_t count, const GltfPlacement& placement, const GltfWhere& where) {
-    auto a = read_attribute(check_, document_, attributes, "TANGENT", count, where);
+  bool read_tangents(const Json& attributes, const GltfVertices& vertices, const GltfPlacement& placement,
+                     const GltfWhere& where) {
+    auto a = read_attribute(check_, document_, attributes, "TANGENT", vertices.count, where);
     if (!check_.ok()) return false;
     if (a && (a->components != 4 || a->is_matrix || a->type == GltfType::u32))
       return check_.fail(where, "TANGENT is not four floats or small integers");
     if (!attributes.contains("NORMAL")) a.reset();  // void without
     if (!a && scene_.tangents.empty()) return true;
-    const size_t first = scene_.positions.size() - count;
+    const size_t count = vertices.size(), first = scene_.positions.size() - count;
     scene_.tangents.resize(first + count, Vec4(0.0f));
     for (size_t i = 0; a && i < count; ++i) {
       double t[4] = {};
-      a->read(i, t);
-      const Mat3d world(placement.joints ? placement.at(i) : placement.world);
+      a->read(vertices[i], t);
+      const Mat3d world(placement.joints ? placement.at(vertices[i]) : placement.world);
       const Vec3 along = normalize_or(Vec3(world * Vec3d(t[0], t[1], t[2])), Vec3(0.0f));
       if (along == Vec3(0) || !(std::abs(t[3]) > 0)) continue;
       scene_.tangents[first + i] = Vec4(along, (t[3] > 0) == (determinant(world) > 0) ? 1.0f : -1.0f);
@@ -303,8 +329,9 @@ class PrimitiveReader {
     return true;
   }
 
+  // Their vertices are the accessor's for now.
   bool read_triangles(Part& part, uint64_t mode, const std::optional<GltfAccessor>& indices, size_t count,
-                      bool mirrored, const GltfWhere& where) {
+                      size_t vertex_count, const GltfWhere& where) {
     const bool two_sided = scene_.materials[part.material].double_sided;
     const uint32_t part_number = uint32_t(scene_.parts.size());
     for (size_t t = 0; t < count; ++t) {
@@ -314,18 +341,57 @@ class PrimitiveReader {
       uint32_t v[3];
       for (int k = 0; k < 3; ++k) {
         v[k] = indices ? indices->integer(corner[k]) : uint32_t(corner[k]);
-        if (v[k] >= part.vertex_count) {
+        if (v[k] >= vertex_count) {
           return check_.fail(where, "index " + std::to_string(corner[k]) + " is " + std::to_string(v[k]) +
-                                        ", but there are " + std::to_string(part.vertex_count) + " vertices");
+                                        ", but there are " + std::to_string(vertex_count) + " vertices");
         }
-        v[k] += part.first_vertex;
       }
       if (v[0] == v[1] || v[1] == v[2] || v[2] == v[0]) continue;  // that is how strips begin anew elsewhere
-      if (mirrored) std::swap(v[1], v[2]);
       scene_.triangles.push_back({{v[0], v[1], v[2]}, part_number, two_sided});
     }
     part.triangle_count = uint32_t(scene_.triangles.size()) - part.first_triangle;
     return true;
+  }
+
+  // How many primitives have their places in each accessor.
+  static std::vector<uint32_t> count_users(const GltfDocument& document) {
+    std::vector<uint32_t> users(gltf_count(document.json, "accessors"));
+    for (size_t m = 0; m < gltf_count(document.json, "meshes"); ++m) {
+      GltfCheck check("");
+      const Json* primitives = check.array(gltf_item(document.json, "meshes", m), "primitives", {});
+      for (size_t p = 0; primitives && p < primitives->size(); ++p) {
+        GltfCheck trial("");
+        const Json* attributes = trial.object((*primitives)[p], "attributes", {});
+        const auto index = attributes ? trial.index(*attributes, "POSITION", users.size(), {}) : std::nullopt;
+        if (index) ++users[*index];
+      }
+    }
+    return users;
+  }
+
+  // Gives the part the vertices of an accessor: all, or, where primitives share a large one, those that its triangles
+  // use, in their order.
+  GltfVertices number_vertices(Part& part, size_t count, bool only_used) {
+    const std::span<Triangle> triangles = std::span(scene_.triangles).subspan(part.first_triangle);
+    std::vector<uint32_t>& used = part.source;
+    if (only_used) {
+      if (places_.size() < count) places_.resize(count, none);
+      for (const Triangle& t : triangles)
+        for (uint32_t v : t.v)
+          if (places_[v] == none) places_[v] = 0, used.push_back(v);
+      std::sort(used.begin(), used.end());
+      for (size_t i = 0; i < used.size(); ++i) places_[used[i]] = uint32_t(i);
+      for (Triangle& t : triangles)
+        for (uint32_t& v : t.v) v = places_[v];
+      for (uint32_t v : used) places_[v] = none;
+      part.changed = used.size() < count;
+      if (!part.changed) used = {};
+    }
+    for (Triangle& t : triangles)
+      for (uint32_t& v : t.v) v += part.first_vertex;
+    const GltfVertices vertices{count, used};
+    part.vertex_count = uint32_t(vertices.size());
+    return vertices;
   }
 
   // What primitives without a material have, after all of the document's.
@@ -343,7 +409,9 @@ class PrimitiveReader {
   const GltfDocument& document_;
   const GltfPose& pose_;
   Scene& scene_;
+  const std::vector<uint32_t> users_;
   std::vector<size_t> bare_;
+  std::vector<uint32_t> places_;  // of an accessor's elements among those in use; none between parts
   uint64_t visited_ = 0, skipped_ = 0, zeros_ = 0, work_ = 0, triangles_ = 0;
 };
 
@@ -352,21 +420,28 @@ bool read_scene(GltfCheck& check, GltfDocument& document, std::span<const uint8_
   UriReader files(document, folder);
   std::vector<std::string> image_problems;
   if (!check_document(check, document.json)) return false;
-  unbake(document.json);
+  const bool was_baked = unbake(document.json);
   if (!read_buffers(check, document, binary, files) || !read_images(check, document, files, image_problems)) {
     return false;
   }
   std::vector<GltfMaterial> materials = read_materials(check, document);
   GltfPose pose;
-  if (!check.ok() || !read_pose(check, document, pose)) return false;
+  if (!check.ok() || !expand_instances(check, document, scene.warnings) || !read_pose(check, document, pose))
+    return false;
   scene.origin = document_origin(document, pose);
   if (scene.origin != Vec3d(0)) {
     pose = {.origin = scene.origin};
     if (!read_pose(check, document, pose)) return false;
   }
+  if (pose.inner_roots)
+    scene.warnings.push_back(std::to_string(pose.inner_roots) +
+                             (pose.inner_roots == 1 ? " root of the scene is" : " roots of the scene are") +
+                             " below other nodes, or named twice: shown once, where their parents put them");
   for (const GltfMaterial& m : materials) scene.materials.push_back(m.material);
-  PrimitiveReader primitives(check, document, pose, scene);
-  if (!primitives.read_all() || !read_lights(check, document, pose, scene)) return false;
+  scene.texcoords.resize(texcoord_sets(materials));
+  PrimitiveReader primitives(check, document, pose, was_baked, scene);
+  if (!primitives.read_all()) return false;
+  read_lights(document, pose, scene);
   if (scene.triangles.empty()) return check.fail({}, "no triangles");
   bool usable = false;
   for (size_t t = 0; t < scene.triangles.size() && !usable; ++t) {
@@ -376,12 +451,12 @@ bool read_scene(GltfCheck& check, GltfDocument& document, std::span<const uint8_
 
   std::vector<bool> used(scene.materials.size());
   for (const Part& part : scene.parts) used[part.material] = true;
-  if (!read_textures(check, document, materials, used, image_problems, scene)) return false;
-  for (size_t i = 0; i < image_problems.size(); ++i) {
-    if (!image_problems[i].empty()) {
-      scene.warnings.push_back("image " + std::to_string(i) + ": " + image_problems[i] + "; it stays a link");
-    }
-  }
+  read_textures(check, document, materials, used, image_problems, scene);
+  GltfTold links;
+  for (size_t i = 0; i < image_problems.size(); ++i)
+    if (!image_problems[i].empty())
+      links.add("image " + std::to_string(i) + ": " + image_problems[i] + "; it stays a link");
+  links.tell(scene.warnings, "images");
   make_normals(scene, primitives.parts_without_normals(), true);
   repair_normals(scene);
   merge_duplicate_triangles(scene);

@@ -128,11 +128,11 @@ TEST(HostileGltf, PositionsThatAreNotFinite) {
   for (float bad : {NAN, INFINITY, -INFINITY}) {
     Builder b = triangle();
     primitive(b)["attributes"]["POSITION"] = b.floats({0, 0, 0, 2, bad, 0, 0, 1, 0}, "VEC3");
-    EXPECT_EQ(message(b), "test.glb: mesh 0, primitive 0: vertex 1 is not at a finite position");
+    EXPECT_EQ(message(b), "test.glb: mesh 0, primitive 0: vertex 1 is not at a finite position or beyond 1e9");
   }
   Builder b = triangle();
   b.json["nodes"][0]["scale"] = {1e300, 1, 1};
-  EXPECT_EQ(message(b), "test.glb: mesh 0, primitive 0: vertex 1 is not at a finite position");
+  EXPECT_EQ(message(b), "test.glb: mesh 0, primitive 0: vertex 1 is not at a finite position or beyond 1e9");
 }
 
 TEST(HostileGltf, BrokenNormalsAreMade) {
@@ -192,7 +192,7 @@ TEST(HostileGltf, SmallFilesDoNotGrowLarge) {
   b = triangle();  // few vertices, each moved by many targets, counts as many vertices
   const size_t count = size_t{1} << 17, target_count = 2100;
   size_t positions = b.floats(std::vector<float>(3 * count, 1.0f), "VEC3");
-  primitive(b) = {{"attributes", {{"POSITION", positions}}}, {"indices", 2}, {"targets", Json::array()}};
+  primitive(b) = {{"attributes", {{"POSITION", positions}}}, {"targets", Json::array()}};
   for (size_t i = 0; i < target_count; ++i) primitive(b)["targets"].push_back({{"POSITION", positions}});
   b.json["meshes"][0]["weights"] = std::vector<double>(target_count, 1.0);
   EXPECT_NE(message(b).find("the scene expands to more than 268435456 vertices"), std::string::npos);
@@ -208,12 +208,7 @@ TEST(HostileGltf, NodeHierarchiesThatAreNoTrees) {
   EXPECT_EQ(message(b), "test.glb: node 0: is a child of two nodes, 1 and 2");
   b.json["nodes"] = {{{"mesh", 0}}, {{"children", {0, 0}}}};
   EXPECT_EQ(message(b), "test.glb: node 0: is a child of two nodes, 1 and 1");
-  b.json["nodes"] = {{{"mesh", 0}}, {{"children", {0}}}};
-  b.json["scenes"] = {{{"nodes", {0, 1}}}};
-  EXPECT_EQ(message(b), "test.glb: scene 0: names node 0, which has a parent");
-  b.json["scenes"] = {{{"nodes", {1, 1}}}};
-  EXPECT_EQ(message(b), "test.glb: scene 0: names node 1 twice");
-  b.json["nodes"][1]["children"] = {7};
+  b.json["nodes"] = {{{"mesh", 0}}, {{"children", {7}}}};
   EXPECT_EQ(message(b), "test.glb: node 1: a child is 7, out of range");
 }
 

@@ -1,5 +1,5 @@
 #pragma once
-// What the OBJ and PLY loaders share.
+// What the loaders share; all but the limits, OBJ's and PLY's.
 #include <lambent/scene/scene.h>
 
 #include <array>

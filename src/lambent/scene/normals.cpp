@@ -267,7 +267,7 @@ void insert_copies(Scene& scene, const std::vector<Copy>& copies, const std::vec
   };
   auto as_before = [](const auto& values, const Copy& copy) { return values[copy.vertex]; };
   insert(scene.positions, as_before), insert(scene.colors, as_before), insert(scene.tangents, as_before);
-  insert(scene.texcoords[0], as_before), insert(scene.texcoords[1], as_before);
+  for (std::vector<Vec2>& uv : scene.texcoords) insert(uv, as_before);
   insert(scene.normals, [](const auto&, const Copy& copy) { return copy.normal; });
 
   for (size_t p = 0, i = 0; p < scene.parts.size(); ++p) {

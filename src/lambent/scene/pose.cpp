@@ -92,14 +92,6 @@ void finish_pose(const Scene& scene, Pose& pose) {
   });
 }
 
-Result<std::vector<GltfAnimation>> animations_of(const Scene& scene) {
-  if (!scene.document) return Error{scene.path, "has no animations: it is not glTF"};
-  GltfCheck check(scene.path);
-  std::vector<GltfAnimation> animations;
-  if (!read_animations(check, *scene.document, animations)) return check.error();
-  return animations;
-}
-
 }  // namespace
 
 Mat3 pose_rotation(const Mat3d& F, Vec3 rest_normal, Vec3 normal) {
@@ -109,27 +101,30 @@ Mat3 pose_rotation(const Mat3d& F, Vec3 rest_normal, Vec3 normal) {
 }
 
 Result<std::vector<AnimationInfo>> list_animations(const Scene& scene) {
-  auto animations = animations_of(scene);
-  if (!animations) return animations.error();
-  std::vector<AnimationInfo> list;
-  for (const GltfAnimation& a : *animations) list.push_back({a.name, a.from, a.to});
+  if (!scene.document) return Error{scene.path, "has no animations: it is not glTF"};
+  std::vector<AnimationInfo> list(gltf_count(scene.document->json, "animations"));
+  for (size_t i = 0; i < list.size(); ++i) {
+    GltfCheck check("");
+    list[i].name = animation_name(*scene.document, i);
+    if (!read_times(check, *scene.document, i, list[i].from, list[i].to)) list[i].problem = check.error().text();
+  }
   return list;
 }
 
 Result<size_t> find_animation(const Scene& scene, const std::string& text) {
-  auto animations = animations_of(scene);
-  if (!animations) return animations.error();
-  if (animations->empty()) return Error{scene.path, "has no animations"};
-  for (size_t i = 0; i < animations->size(); ++i)
-    if ((*animations)[i].name == text) return i;
+  if (!scene.document) return Error{scene.path, "has no animations: it is not glTF"};
+  std::vector<std::string> all(gltf_count(scene.document->json, "animations"));
+  for (size_t i = 0; i < all.size(); ++i) all[i] = animation_name(*scene.document, i);
+  if (all.empty()) return Error{scene.path, "has no animations"};
+  for (size_t i = 0; i < all.size(); ++i)
+    if (all[i] == text) return i;
   size_t index = 0;
   const auto [end, status] = std::from_chars(text.data(), text.data() + text.size(), index);
-  if (status == std::errc() && end == text.data() + text.size() && index < animations->size()) return index;
+  if (status == std::errc() && end == text.data() + text.size() && index < all.size()) return index;
   std::string names;
-  for (const GltfAnimation& a : *animations)
-    names += (names.empty() ? "" : ", ") +
-             (a.name.empty() ? std::to_string(names.size()) : "\"" + a.name.substr(0, 40) + "\"");
-  return Error{scene.path, "has no animation \"" + text + "\"; there are " + std::to_string(animations->size()) + ": " +
+  for (size_t i = 0; i < all.size() && names.size() < 300; ++i)
+    names += (i ? ", " : "") + (all[i].empty() ? std::to_string(i) : "\"" + all[i].substr(0, 40) + "\"");
+  return Error{scene.path, "has no animation \"" + text + "\"; there are " + std::to_string(all.size()) + ": " +
                                names.substr(0, 300)};
 }
 
@@ -174,24 +169,20 @@ Result<Pose> pose_scene(const Scene& scene, size_t animation, double time) {
     if (!index) return Error{scene.path, place + " has no positions"};
     const GltfAccessor accessor = read_accessor(check, moved, *index);
     std::vector<GltfMorph> morphs;
-    GltfPlacement at_rest, placement;
-    std::vector<Vec3> positions, normals;
-    if (!check.ok() || !check_gltf_vector(check, accessor, "POSITION", where) ||
-        !read_morphs(check, moved, node, *mesh, primitive, accessor.count, where, morphs) ||
-        !read_placement(check, rest, rest_pose, node, primitive, accessor.count, where, at_rest) ||
-        !read_placement(check, moved, moved_pose, node, primitive, accessor.count, where, placement) ||
-        !read_vertices(check, moved, *attributes, accessor, morphs, placement, where, positions, normals))
-      return check.error();
-    if (part.source.empty() && positions.size() != part.vertex_count)
+    const GltfVertices vertices{accessor.count, part.source};
+    if (vertices.size() != part.vertex_count)
       return Error{scene.path,
                    place + " was refined (--max-edge), so that its vertices no longer hang on anything that moves"};
-    for (size_t v = 0; v < part.vertex_count; ++v) {
-      const size_t from = part.source.empty() ? v : part.source[v];
-      if (from >= positions.size()) return Error{scene.path, place + " does not fit its mesh"};
-      pose.positions.push_back(positions[from]);
-      // A vertex that was split for its normals has none in the file: it carries its own along.
-      pose.normals.push_back(part.source.empty() ? normals[from] : Vec3(0.0f));
-    }
+    for (uint32_t v : part.source)
+      if (v >= accessor.count) return Error{scene.path, place + " does not fit its mesh"};
+    GltfPlacement at_rest, placement;
+    if (!check.ok() || !check_gltf_vector(check, accessor, "POSITION", where) ||
+        !read_morphs(check, moved, node, *mesh, primitive, accessor.count, where, morphs) ||
+        !read_placement(check, rest, rest_pose, node, primitive, vertices, where, at_rest) ||
+        !read_placement(check, moved, moved_pose, node, primitive, vertices, where, placement) ||
+        !read_vertices(check, moved, *attributes, accessor, vertices, morphs, placement, where, pose.positions,
+                       pose.normals))
+      return check.error();
     pose.mirrored.push_back(placement.mirrored != at_rest.mirrored);
   }
   finish_pose(scene, pose);

@@ -19,8 +19,9 @@ struct Pose {
 struct AnimationInfo {
   std::string name;
   double from = 0, to = 0;  // seconds
+  std::string problem;      // why it cannot be played; "" where it can
 };
-// Errors: not a glTF; broken animations.
+// Errors: not a glTF.
 Result<std::vector<AnimationInfo>> list_animations(const Scene& scene);
 // By name, or by number where the text is one and no name. Errors: none there; a static scene.
 Result<size_t> find_animation(const Scene& scene, const std::string& name_or_index);

@@ -113,7 +113,6 @@ TEST(Pose, RefusesBrokenAnimations) {
   const Builder good = animated("translation", {0, 1}, {0, 0, 0, 1, 0, 0}, "VEC3", "LINEAR");
   EXPECT_EQ(message(good), "");
   EXPECT_NE(message(animated("translation", {1, 0}, {0, 0, 0, 1, 0, 0}, "VEC3", "LINEAR")), "");
-  EXPECT_NE(message(animated("translation", {0, 0}, {0, 0, 0, 1, 0, 0}, "VEC3", "LINEAR")), "");
   EXPECT_NE(message(animated("translation", {0, NAN}, {0, 0, 0, 1, 0, 0}, "VEC3", "LINEAR")), "");
   EXPECT_NE(message(animated("translation", {0, 1}, {0, 0, 0, INFINITY, 0, 0}, "VEC3", "LINEAR")), "");
   EXPECT_NE(message(animated("translation", {0, 1, 2}, {0, 0, 0, 1, 0, 0}, "VEC3", "LINEAR")), "");
@@ -146,6 +145,44 @@ TEST(Pose, RefusesBrokenAnimations) {
   EXPECT_FALSE(pose_scene(make_sphere(1, 1, Vec3(1)), 0, 0));
   EXPECT_FALSE(pose_scene(*good.load(), 1, 0));
   EXPECT_FALSE(pose_scene(*good.load(), 0, NAN));
+}
+
+TEST(Pose, KeysBeforeZeroAndTwoAtOneTime) {
+  const Scene early = loaded(animated("translation", {-2, 2}, {0, 0, 0, 4, 0, 0}, "VEC3", "LINEAR"));
+  EXPECT_EQ(at(early, -1).positions[0], Vec3(1, 0, 0));
+  EXPECT_EQ(at(early, 0).positions[0], Vec3(2, 0, 0));
+  EXPECT_EQ((*list_animations(early))[0].from, -2);
+  // A jump at 1, from 2 to 6: from there on the later key.
+  for (const char* how : {"LINEAR", "STEP"}) {
+    const Scene jump = loaded(animated("translation", {0, 1, 1, 2}, {0, 0, 0, 2, 0, 0, 6, 0, 0, 8, 0, 0}, "VEC3", how));
+    const bool linear = how == std::string("LINEAR");
+    EXPECT_EQ(at(jump, 0.5).positions[0], Vec3(linear ? 1 : 0, 0, 0));
+    EXPECT_EQ(at(jump, 1).positions[0], Vec3(6, 0, 0));
+    EXPECT_EQ(at(jump, 1.5).positions[0], Vec3(linear ? 7 : 6, 0, 0));
+    EXPECT_EQ(at(jump, 3).positions[0], Vec3(8, 0, 0));
+  }
+  // All keys at one time: before it the first, then the last.
+  const Scene at_once = loaded(animated("translation", {1, 1}, {2, 0, 0, 6, 0, 0}, "VEC3", "LINEAR"));
+  EXPECT_EQ(at(at_once, 0).positions[0], Vec3(2, 0, 0));
+  EXPECT_EQ(at(at_once, 1).positions[0], Vec3(6, 0, 0));
+}
+
+TEST(Pose, ABrokenAnimationHarmsNoOther) {
+  Builder b = animated("translation", {0, 1}, {0, 0, 0, 4, 0, 0}, "VEC3", "LINEAR");
+  b.json["animations"].push_back({{"name", "bad"}, {"channels", {1}}});
+  b.json["animations"].push_back(7);
+  std::swap(b.json["animations"][0], b.json["animations"][1]);
+  const Scene scene = loaded(b);
+  EXPECT_EQ(*find_animation(scene, "go"), 1u);
+  EXPECT_EQ(pose_scene(scene, 1, 0.5)->positions[0], Vec3(2, 0, 0));
+  EXPECT_FALSE(pose_scene(scene, 0, 0.5));
+  EXPECT_FALSE(pose_scene(scene, 2, 0.5));
+  const auto list = *list_animations(scene);
+  ASSERT_EQ(list.size(), 3u);
+  EXPECT_NE(list[0].problem, "");
+  EXPECT_EQ(list[1].problem, "");
+  EXPECT_EQ(list[1].to, 1);
+  EXPECT_NE(list[2].problem, "");
 }
 
 TEST(Pose, FindsAnimations) {

@@ -86,14 +86,16 @@ class EdgeSplitter {
     };
     copy(scene_.positions, out_.positions), copy(scene_.normals, out_.normals), copy(scene_.colors, out_.colors);
     copy(scene_.tangents, out_.tangents);
-    for (size_t set = 0; set < 2; ++set) copy(scene_.texcoords[set], out_.texcoords[set]);
+    out_.texcoords.resize(scene_.texcoords.size());
+    for (size_t set = 0; set < out_.texcoords.size(); ++set) copy(scene_.texcoords[set], out_.texcoords[set]);
   }
 
   void add_middle(uint32_t a, uint32_t b) {
     auto halve = [&](auto& values) {
       if (!values.empty()) values.push_back(0.5f * values[a] + 0.5f * values[b]);
     };
-    halve(out_.positions), halve(out_.colors), halve(out_.texcoords[0]), halve(out_.texcoords[1]);
+    halve(out_.positions), halve(out_.colors);
+    for (std::vector<Vec2>& uv : out_.texcoords) halve(uv);
     if (!out_.tangents.empty()) {
       const Vec4 t = out_.tangents[a], other = out_.tangents[b];
       out_.tangents.push_back(Vec4(normalize_or(Vec3(t) + Vec3(other), Vec3(t)), t.w));

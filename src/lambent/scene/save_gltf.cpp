@@ -58,7 +58,7 @@ void write_geometry(GlbWriter& out, const Scene& scene, const Part& part, const 
   }
   Json attributes = {{"POSITION", out.add_vectors(floats(positions), 3, true)},
                      {"NORMAL", out.add_vectors(floats(normals), 3, false)}};
-  for (size_t set = 0; set < 2; ++set) {
+  for (size_t set = 0; set < scene.texcoords.size(); ++set) {
     if (scene.texcoords[set].empty()) continue;
     const std::vector<Vec2> uv(scene.texcoords[set].begin() + first, scene.texcoords[set].begin() + first + count);
     const std::string name = "TEXCOORD_" + std::to_string(set);
@@ -165,11 +165,11 @@ class DocumentWriter {
     for (size_t n = 0; n < gltf_count(document_.json, "nodes"); ++n) {
       if (auto mesh = mesh_of(n)) ++users_[*mesh];
     }
-    for (const auto& [node, parts] : nodes) {
-      if (std::any_of(parts.begin(), parts.end(), [&](size_t p) { return scene_.parts[p].changed; })) {
-        rewrite_node(size_t(node), parts);
-      }
-    }
+    std::erase_if(nodes, [&](const auto& entry) {
+      return std::none_of(entry.second.begin(), entry.second.end(), [&](size_t p) { return scene_.parts[p].changed; });
+    });
+    for (const auto& [node, parts] : nodes) --users_[*mesh_of(size_t(node))];
+    for (const auto& [node, parts] : nodes) rewrite_node(size_t(node), parts);
   }
 
  private:
@@ -217,11 +217,14 @@ class DocumentWriter {
   }
 
   void place_mesh(size_t node, size_t mesh_index, Json mesh, bool apart, bool still, const std::vector<size_t>& parts) {
-    if (users_[mesh_index] == 1) {
+    // Copies of one mesh that were changed alike stay copies of one.
+    const auto [known, is_new] = written_.try_emplace({mesh_index, mesh.dump()}, mesh_index);
+    if (!is_new) {
+      mesh_index = known->second;
+    } else if (users_[mesh_index]++ == 0) {
       out_.list("meshes")[mesh_index] = std::move(mesh);
     } else {
-      --users_[mesh_index];
-      mesh_index = out_.push("meshes", std::move(mesh));
+      mesh_index = known->second = out_.push("meshes", std::move(mesh));
     }
     Json& json = out_.list("nodes")[node];
     if (still) json.erase("weights");
@@ -248,7 +251,8 @@ class DocumentWriter {
     const size_t old_count = accessor(before, "POSITION").count;
     for (uint32_t s : part.source) LAMBENT_CHECK(s < old_count);
     GltfPlacement placement;
-    LAMBENT_CHECK(read_placement(check, document_, pose_, node, primitive, old_count, {}, placement));
+    LAMBENT_CHECK(
+        read_placement(check, document_, pose_, node, primitive, GltfVertices{old_count, part.source}, {}, placement));
     const bool had_normals = before.contains("NORMAL");
     // Where the document has no normals, what it says about tangents is void too.
     auto is_void = [&](const std::string& name) { return !had_normals && (name == "NORMAL" || name == "TANGENT"); };
@@ -317,7 +321,8 @@ class DocumentWriter {
   const GltfDocument& document_;
   GltfPlaces& places_;
   GltfPose pose_;
-  std::vector<size_t> users_;  // nodes that show each mesh of the document
+  std::vector<size_t> users_;                                 // nodes that still show each mesh of the document
+  std::map<std::pair<size_t, std::string>, size_t> written_;  // meshes written anew, by what they were and their JSON
 };
 
 }  // namespace

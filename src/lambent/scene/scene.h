@@ -15,6 +15,9 @@ namespace lambent {
 // No such vertex, part, material, receiver, ...
 inline constexpr uint32_t none = 0xffffffffu;
 
+// Sets of texture coordinates that a scene may have.
+inline constexpr size_t max_texcoord_sets = 32;
+
 // What a texture is beyond [0, 1].
 enum class Wrap : uint8_t { repeat, clamp, mirror };
 
@@ -38,7 +41,7 @@ struct Material {
   std::string name;
   Vec3 base_color{1.0f};        // linear, [0, 1]
   int base_color_texture = -1;  // into Scene::textures
-  int texcoord_set = 0;         // 0 or 1
+  int texcoord_set = 0;         // into Scene::texcoords
   // KHR_texture_transform of the base colour: uv' = (uv_matrix rows) * (u, v, 1).
   std::array<float, 6> uv_transform{1, 0, 0, 0, 1, 0};
   // Read by see_through.h; times the alpha of the base colour texture (an alpha map of its own: with_alpha(),
@@ -114,10 +117,11 @@ struct Scene {
   // translation, and what users type is in the file's space.
   Vec3d origin{0.0};
 
-  std::vector<Vec3> positions;                 // world space, metres
-  std::vector<Vec3> normals;                   // unit, as many as positions
-  std::array<std::vector<Vec2>, 2> texcoords;  // each empty, or as many as positions
-  std::vector<Vec3> colors;                    // linear vertex colours: empty, or as many as positions
+  std::vector<Vec3> positions;  // world space, metres
+  std::vector<Vec3> normals;    // unit, as many as positions
+  // Sets of texture coordinates, at least two and all that materials read; each empty, or as many as positions.
+  std::vector<std::vector<Vec2>> texcoords = std::vector<std::vector<Vec2>>(2);
+  std::vector<Vec3> colors;  // linear vertex colours: empty, or as many as positions
   // Along +u of the normal texture; w: the sign of the bitangent cross(n, t) w. Empty, or as many as positions; zero:
   // not given.
   std::vector<Vec4> tangents;
