@@ -122,16 +122,18 @@ Result<Lightmap> bake_lightmap(const Scene& scene, const Tracer& tracer, const R
 
   // e: [harmonics | groups][channel]
   AlignedVector<float> e(n * width, 0.0f);
-  std::vector<float> sky(harmonics ? n * harmonics : 0);
+  std::vector<float> sky(harmonics ? n * setup.sky_width() : 0);
   const bool bounces = o.converge > 0 || o.bounces > 0;
   const GatherDirect direct{lamps, o.lamp_samples, e.data() + 3 * harmonics, width};
   auto op = GatherOperator::trace(setup, lamps.groups() ? &direct : nullptr, harmonics ? sky.data() : nullptr, bounces,
                                   o.memory - least, progress);
   if (!op) return op.error();
+  const size_t sky_channels = size_t(setup.sky_channels);
   parallel_for(harmonics ? n : 0, gather_block, [&](size_t begin, size_t end) {
     for (size_t i = begin; i < end; ++i)
       for (size_t k = 0; k < harmonics; ++k)
-        for (size_t c = 0; c < 3; ++c) e[i * width + 3 * k + c] = sky[i * harmonics + k];
+        for (size_t c = 0; c < 3; ++c)
+          e[i * width + 3 * k + c] = sky[i * setup.sky_width() + std::min(c, sky_channels - 1) * harmonics + k];
   });
   r.trace_seconds = op->report().seconds;
 
