@@ -169,6 +169,9 @@ class PrimitiveReader {
           std::to_string(skipped_) +
           (skipped_ == 1 ? " primitive of points or lines is" : " primitives of points or lines are") + " not lit");
     }
+    if (faded_)
+      scene_.warnings.push_back("the alpha of vertex colours is not read (" + std::to_string(faded_) +
+                                (faded_ == 1 ? " primitive)" : " primitives)"));
     return true;
   }
   const std::vector<size_t>& parts_without_normals() const { return bare_; }
@@ -223,7 +226,7 @@ class PrimitiveReader {
     part.material = material ? uint32_t(*material) : default_material();
     if (!read_vertices(check_, document_, *attributes, positions, targets, placement, where, scene_.positions,
                        scene_.normals) ||
-        !read_colors(*attributes, positions.count, where) ||
+        !read_colors(*attributes, positions.count, scene_.materials[part.material], where) ||
         !read_tangents(*attributes, positions.count, placement, where)) {
       return false;
     }
@@ -247,7 +250,7 @@ class PrimitiveReader {
     return true;
   }
 
-  bool read_colors(const Json& attributes, size_t count, const GltfWhere& where) {
+  bool read_colors(const Json& attributes, size_t count, const Material& material, const GltfWhere& where) {
     const size_t first = scene_.positions.size() - count;
     for (size_t set = 0; set < 2; ++set) {
       std::vector<Vec2>& texcoords = scene_.texcoords[set];
@@ -274,6 +277,14 @@ class PrimitiveReader {
         return check_.fail(where, "COLOR_0 is not three or four colour components");
       }
     }
+    if (a && a->components == 4 && material.alpha_mode != AlphaMode::opaque)
+      for (size_t i = 0; i < count; ++i) {
+        double rgba[4] = {};
+        a->read(i, rgba);
+        if (rgba[3] >= 1) continue;
+        ++faded_;
+        break;
+      }
     if (!a && scene_.colors.empty()) return true;
     scene_.colors.resize(first + count, Vec3(1.0f));
     for (size_t i = 0; a && i < count; ++i) {
@@ -344,7 +355,7 @@ class PrimitiveReader {
   const GltfPose& pose_;
   Scene& scene_;
   std::vector<size_t> bare_;
-  uint64_t visited_ = 0, skipped_ = 0, zeros_ = 0, work_ = 0, triangles_ = 0;
+  uint64_t visited_ = 0, skipped_ = 0, faded_ = 0, zeros_ = 0, work_ = 0, triangles_ = 0;
 };
 
 bool read_scene(GltfCheck& check, GltfDocument& document, std::span<const uint8_t> binary, const std::string& folder,
