@@ -1,6 +1,6 @@
-// Surfaces that let light pass (docs/theory.md, "Light that passes through"): of what is behind, (1 - a) + a t C shows,
-// a being alpha, t the transmission and C the base colour. Alpha is blended by three; coloured glass takes a draw of its
-// own, which multiplies what is there, before the one that adds what the glass reflects.
+// Surfaces that let light pass (docs/theory.md, "Light that passes through"): (1 - a) + a t C of what is behind shows,
+// a being alpha, t the transmission and C the base colour. Alpha is blended by three; coloured glass takes a draw of
+// its own, which multiplies what is there, before the one that adds what the glass reflects.
 import {
   Color,
   CustomBlending,

@@ -123,7 +123,7 @@ struct Baker {
 
   Result<Transfer> bounced() {
     const size_t C = coefficients(), channels = size_t(setup.channels), width = row_width(C, setup.channels);
-    const size_t W = sky_width(), sky_channels = size_t(setup.sky_channels);
+    const size_t W = sky_width();
     std::vector<float> T0(n() * W), T0_half(checked_count(n()) * W);
     const size_t fixed = solution_bytes(n(), C, setup.channels, setup.sky_channels) +
                          table_bytes(n(), scene.triangles.size(), C, size_t(options.samples)) +
@@ -144,7 +144,7 @@ struct Baker {
     const auto start = std::chrono::steady_clock::now();
     auto expand = [&](const float* t, float* x) {
       for (size_t k = 0; k < C; ++k)
-        for (size_t c = 0; c < channels; ++c) x[k * channels + c] = t[std::min(c, sky_channels - 1) * C + k];
+        for (size_t c = 0; c < channels; ++c) x[k * channels + c] = t[setup.sky_channel(c) * C + k];
       std::fill(x + C * channels, x + width, 0.0f);
     };
     Source source{[&](size_t r, float* x) { expand(T0.data() + r * W, x); }};

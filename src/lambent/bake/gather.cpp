@@ -298,13 +298,11 @@ void trace_gather_on(const GatherSetup& setup, const Basis& basis, GatherScratch
       if (block && j + lookahead / 2 < rays) prefetch_places(basis, hits[j + lookahead / 2], scratch.rows);
       const Hit& h = hits[j];
       const float share = sets.weights.empty() ? 1.0f : sets.weights[j];
-      const bool open = passes ? passages[j].sky != Vec3(0) : h.triangle == none;
-      if (passes)
-        for (size_t c = 0; c < fan.visible.size(); ++c) fan.visible[c][j] = share * passages[j].sky[int(c)];
-      else fan.visible[0][j] = open ? share : 0.0f;
-      if (open && sees_sky) {
+      const Vec3 open = passes ? passages[j].sky : Vec3(h.triangle == none ? 1.0f : 0.0f);
+      for (size_t c = 0; c < fan.visible.size(); ++c) fan.visible[c][j] = share * open[int(c)];
+      if (sees_sky && open != Vec3(0)) {
         LampLight light = met_sky(direct->lamps, direction(j), dot(normal, direction(j)), direct->samples, rays);
-        if (passes) light.value *= passages[j].sky;
+        light.value *= open;
         add_light(light, share);
       }
       if (h.triangle == none) continue;

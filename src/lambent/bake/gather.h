@@ -57,6 +57,7 @@ struct GatherSetup {
 
   size_t coefficients() const { return size_t(sh_count(sets.order)); }
   size_t sky_width() const { return coefficients() * size_t(sky_channels); }
+  size_t sky_channel(size_t channel) const { return std::min(channel, size_t(sky_channels) - 1); }
   // Linear base colour of a hit, less what passes.
   Vec3 albedo_at(uint32_t part, const Hit& hit) const {
     return part_varies[part] ? albedo(scene, scene.triangles[hit.triangle], hit.u, hit.v) : part_albedo[part];

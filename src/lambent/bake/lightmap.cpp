@@ -128,12 +128,10 @@ Result<Lightmap> bake_lightmap(const Scene& scene, const Tracer& tracer, const R
   auto op = GatherOperator::trace(setup, lamps.groups() ? &direct : nullptr, harmonics ? sky.data() : nullptr, bounces,
                                   o.memory - least, progress);
   if (!op) return op.error();
-  const size_t sky_channels = size_t(setup.sky_channels);
   parallel_for(harmonics ? n : 0, gather_block, [&](size_t begin, size_t end) {
     for (size_t i = begin; i < end; ++i)
-      for (size_t k = 0; k < harmonics; ++k)
-        for (size_t c = 0; c < 3; ++c)
-          e[i * width + 3 * k + c] = sky[i * setup.sky_width() + std::min(c, sky_channels - 1) * harmonics + k];
+      for (size_t j = 0; j < 3 * harmonics; ++j)
+        e[i * width + j] = sky[i * setup.sky_width() + setup.sky_channel(j % 3) * harmonics + j / 3];
   });
   r.trace_seconds = op->report().seconds;
 

@@ -120,8 +120,7 @@ void MatrixGather::direct_sharp_lobes(MatrixScratch& s, size_t r, float* out, fl
 void MatrixGather::expand(const float* t, float* x) const {
   for (size_t j = 0; j < J(); ++j)
     for (size_t c = 0; c < channels(); ++c)
-      std::copy_n(t + (std::min(c, sky_channels() - 1) * J() + j) * width(), width(),
-                  x + (j * channels() + c) * width());
+      std::copy_n(t + (setup.sky_channel(c) * J() + j) * width(), width(), x + (j * channels() + c) * width());
 }
 
 void MatrixGather::scattered(MatrixScratch& s, std::span<const MatrixHit> hits, const Vec3* through, size_t limit,

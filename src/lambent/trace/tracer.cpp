@@ -40,16 +40,16 @@ struct Tracer::Impl {
     if (scene) rtcReleaseScene(scene);
     if (device) rtcReleaseDevice(device);
   }
-  void read_materials(const Scene& scene_read) {
-    source = &scene_read;
-    const std::vector<uint8_t> materials = see_through_materials(scene_read);
+  void read_materials(const Scene& read) {
+    source = &read;
+    const std::vector<uint8_t> materials = see_through_materials(read);
     if (materials.empty()) return;
-    for (const Triangle& t : scene_read.triangles) {
-      passes.push_back(materials[scene_read.parts[t.part].material]);
+    for (const Triangle& t : read.triangles) {
+      const Material& m = read.materials[read.parts[t.part].material];
+      passes.push_back(materials[read.parts[t.part].material]);
       if (!passes.back()) continue;
-      const Material& m = scene_read.materials[scene_read.parts[t.part].material];
       const bool grey = m.base_color.x == m.base_color.y && m.base_color.y == m.base_color.z &&
-                        m.base_color_texture < 0 && scene_read.colors.empty();
+                        m.base_color_texture < 0 && read.colors.empty();
       colours |= m.transmission > 0 && !grey;
     }
     if (std::none_of(passes.begin(), passes.end(), [](uint8_t p) { return p; })) passes = {};
@@ -123,6 +123,12 @@ const Layers& find_layers(RTCScene scene, const std::vector<uint8_t>& passes, Ve
   layers.solid = intersect(scene, collecting.context, origin, direction, from, to);
   sort_layers(layers);
   return layers;
+}
+
+// Whether light from behind a hit comes through it.
+bool goes_on(const Scene& scene, const std::vector<uint8_t>& passes, const Hit& hit) {
+  return hit.triangle != none && !passes.empty() && passes[hit.triangle] &&
+         transmittance(scene, scene.triangles[hit.triangle], hit.u, hit.v) != Vec3(0);
 }
 
 // In [0, 1), of a ray and a surface on its way.
@@ -276,7 +282,7 @@ Hit Tracer::closest(Vec3 origin, Vec3 direction, float from, float to) const {
 Hit Tracer::closest(Vec3 origin, Vec3 direction, Passage& passage) const {
   const Hit first = closest(origin, direction);
   passage = {Vec3(first.triangle == none ? 1.0f : 0.0f), Vec3(1)};
-  if (first.triangle == none || !lets_pass(first.triangle)) return first;
+  if (!goes_on(*impl_->source, impl_->passes, first)) return first;
   return draw_hit(*impl_->source, find_layers(impl_->scene, impl_->passes, origin, direction), origin, direction,
                   passage);
 }
@@ -285,7 +291,7 @@ void Tracer::closest_fan(Vec3 origin, const Directions& d, Hit* hits, Passage* p
   closest_fan(origin, d, hits);
   for (size_t i = 0; i < d.count; ++i) {
     passages[i] = {Vec3(hits[i].triangle == none ? 1.0f : 0.0f), Vec3(1)};
-    if (hits[i].triangle == none || !lets_pass(hits[i].triangle)) continue;
+    if (!goes_on(*impl_->source, impl_->passes, hits[i])) continue;
     const Vec3 direction(d.x[i], d.y[i], d.z[i]);
     hits[i] = draw_hit(*impl_->source, find_layers(impl_->scene, impl_->passes, origin, direction), origin, direction,
                        passages[i]);
