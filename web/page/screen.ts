@@ -1,5 +1,5 @@
 // What fills the screen behind or instead of the scene: the environment, and a reference picture.
-import { Matrix3, Matrix4, ShaderMaterial, type DataTexture, type IUniform } from 'three';
+import { Matrix3, Matrix4, ShaderMaterial, type DataTexture, type IUniform, type Texture } from 'three';
 
 const uniform = <T>(value: T): IUniform<T> => ({ value });
 
@@ -46,6 +46,21 @@ export class SkyMaterial extends ShaderMaterial {
       ),
     );
     Object.assign(this.uniforms, { map: this.map, unproject: this.unproject, turnBack: this.turnBack });
+  }
+}
+
+/** A target of linear radiance, of the screen's size, as it is. */
+export class DevelopMaterial extends ShaderMaterial {
+  readonly map = uniform<Texture | null>(null);
+
+  constructor() {
+    super(
+      fillScreen(
+        'uniform sampler2D map;',
+        'gl_FragColor = vec4( texelFetch( map, ivec2( gl_FragCoord.xy ), 0 ).rgb, 1.0 );',
+      ),
+    );
+    Object.assign(this.uniforms, { map: this.map });
   }
 }
 

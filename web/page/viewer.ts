@@ -2,6 +2,7 @@
 import {
   AnimationMixer,
   Box3,
+  HalfFloatType,
   LinearToneMapping,
   Matrix4,
   PerspectiveCamera,
@@ -12,6 +13,7 @@ import {
   Vector2,
   Vector3,
   WebGLRenderer,
+  WebGLRenderTarget,
   type AnimationAction,
   type DataTexture,
   type Mesh,
@@ -19,12 +21,12 @@ import {
 } from 'three';
 import type { GLTF } from 'three/addons/loaders/GLTFLoader.js';
 import { FullScreenQuad } from 'three/addons/postprocessing/Pass.js';
-import { LambentError, type BakedScene, type ShWindow } from '../src/index.js';
+import { anySeeThrough, LambentError, type BakedScene, type ShWindow } from '../src/index.js';
 import type { EnvironmentFile } from './loading.js';
 import { LobeGlyphs, pickVertex } from './lobes.js';
 import { Model } from './model.js';
 import { Orbit } from './orbit.js';
-import { PictureMaterial, SkyMaterial } from './screen.js';
+import { DevelopMaterial, PictureMaterial, SkyMaterial } from './screen.js';
 import type { View } from './state.js';
 
 export interface ViewerCallbacks {
@@ -59,6 +61,8 @@ export class Viewer {
   private readonly scene = new Scene();
   private readonly sky = new SkyMaterial();
   private readonly picture = new PictureMaterial();
+  private readonly developed = new DevelopMaterial();
+  private readonly linear = new WebGLRenderTarget(1, 1, { type: HalfFloatType, samples: 4 });
   private readonly screen = new FullScreenQuad(this.sky);
   private readonly gain = { value: 1 }; // of false colour
   private readonly errorGain = { value: 1 };
@@ -319,21 +323,34 @@ export class Viewer {
       if (image) screen.render(renderer);
       return;
     }
-    if (this.showBackground && this.environment && view !== 'coefficient' && view !== 'error') {
-      screen.material = this.sky;
-      screen.render(renderer);
-    }
     const shown = view === 'compare' ? this.compare : this.baked;
-    if (!shown) return;
     for (const model of [this.baked, this.compare]) if (model) model.root.visible = model === shown;
-    shown.wear(
+    shown?.wear(
       view === 'compare' ? 'baked' : view,
       this.environment?.lighting,
       this.coefficient,
       this.gain,
       this.errorGain,
     );
+    // What shows through surfaces adds up as light does, before the sRGB curve.
+    const blends = shown !== undefined && anySeeThrough(shown.meshes);
+    if (blends) {
+      this.linear.setSize(this.canvas.width, this.canvas.height);
+      renderer.setRenderTarget(this.linear);
+      renderer.clear();
+    }
+    if (this.showBackground && this.environment && view !== 'coefficient' && view !== 'error') {
+      screen.material = this.sky;
+      screen.render(renderer);
+    }
+    if (!shown) return;
     renderer.render(this.scene, this.camera);
+    if (blends) {
+      renderer.setRenderTarget(null);
+      this.developed.map.value = this.linear.texture;
+      screen.material = this.developed;
+      screen.render(renderer);
+    }
     const glyphs = shown === this.baked ? this.glyphs.place(this.camera) : undefined;
     if (!glyphs) return;
     renderer.clearDepth(); // lobes may point into the surface

@@ -21,6 +21,7 @@ export { lobeValue, type Lobe } from './lobes.js';
 export { bakedScene, LambentTransferPlugin, type BakedScene } from './plugin.js';
 export { projectLatLong, texelSolidAngle, type LatLongMap } from './projection.js';
 export { diffuseParameters, PrtMaterial } from './prt_material.js';
+export { anySeeThrough } from './see_through.js';
 export { clampedCosine, evaluateSh, maxShOrder, shBand, shCount, shIndex } from './sh.js';
 export { makeShRotation, rotateSh, type ShRotation } from './sh_rotation.js';
 export { shWindow, shWindows, type ShWindow } from './sh_window.js';

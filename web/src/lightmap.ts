@@ -38,6 +38,7 @@ import type { BakedTransfer, TransferSource } from './kinds.js';
 import type { Lighting } from './lighting.js';
 import { afterAll, LightSum, maxColumns } from './light_sum.js';
 import { diffuseParameters, replaceOnce, useExitRadiance } from './prt_material.js';
+import { drawFilter, type Drawn } from './see_through.js';
 import { shCount } from './sh.js';
 
 const maxSide = 16384; // of an atlas; what a graphics card takes is less, mostly, and asked of it
@@ -264,8 +265,9 @@ class LightmapMaterial extends MeshBasicMaterial {
     if (gain) this.toneMapped = false;
   }
 
-  override onBeforeRender(renderer: WebGLRenderer): void {
-    this.atlas.update(renderer);
+  override onBeforeRender(...drawn: Drawn): void {
+    this.atlas.update(drawn[0]);
+    drawFilter(this, ...drawn);
   }
 
   override onBeforeCompile(shader: WebGLProgramParametersWithUniforms): void {

@@ -37,6 +37,7 @@ import {
   type LastReflection,
 } from './outgoing.js';
 import { diffuseParameters, replaceOnce, useExitRadiance } from './prt_material.js';
+import { drawFilter, type Drawn } from './see_through.js';
 import { shCount } from './sh.js';
 import { bindPart } from './vertex_transfer.js';
 
@@ -72,8 +73,9 @@ class MatrixMaterial extends MeshBasicMaterial {
     if (gain) this.toneMapped = false;
   }
 
-  override onBeforeRender(renderer: WebGLRenderer): void {
-    this.sum.update(renderer);
+  override onBeforeRender(...drawn: Drawn): void {
+    this.sum.update(drawn[0]);
+    drawFilter(this, ...drawn);
   }
 
   override onBeforeCompile(shader: WebGLProgramParametersWithUniforms): void {

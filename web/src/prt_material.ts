@@ -10,6 +10,7 @@ import {
   type WebGLProgramParametersWithUniforms,
 } from 'three';
 import type { BlockLayout } from './block_texture.js';
+import { drawFilter, glassParameters, type Drawn } from './see_through.js';
 import { glossFragmentDeclarations, glossVaryings, glossVertexBody } from './outgoing.js';
 
 /** Replaces one piece of a shader of three's; fails loudly where another version of three has no such piece. */
@@ -24,7 +25,7 @@ export const whiteLine = 'reflectedLight.indirectDiffuse += vec3( 1.0 );';
 /** Copies what a diffuse surface has from a material of three's own. */
 export function diffuseParameters(source: Material): MeshBasicMaterialParameters {
   const from = source as Partial<MeshBasicMaterial> & Material;
-  return {
+  const own: MeshBasicMaterialParameters = {
     name: source.name,
     side: source.side,
     transparent: source.transparent,
@@ -38,6 +39,7 @@ export function diffuseParameters(source: Material): MeshBasicMaterialParameters
     ...(from.map && { map: from.map }),
     ...(from.alphaMap && { alphaMap: from.alphaMap }),
   };
+  return glassParameters(source, own);
 }
 
 /** Uniforms that all materials of one file share. */
@@ -216,6 +218,10 @@ export class PrtMaterial extends MeshBasicMaterial {
       ...shader.defines,
     };
     if (falseColor) this.toneMapped = false;
+  }
+
+  override onBeforeRender(...drawn: Drawn): void {
+    drawFilter(this, ...drawn);
   }
 
   override onBeforeCompile(shader: WebGLProgramParametersWithUniforms): void {

@@ -5,6 +5,7 @@ import { MeshBasicMaterial, type WebGLProgramParametersWithUniforms, type MeshBa
 import { glslHarmonics } from './glsl_harmonics.js';
 import type { Lighting } from './lighting.js';
 import { replaceOnce, whiteLine } from './prt_material.js';
+import { drawFilter, type Drawn } from './see_through.js';
 import { clampedCosine, shBand, shCount } from './sh.js';
 
 /** Indices of the harmonics that irradiance has. */
@@ -37,6 +38,10 @@ export class UnshadowedMaterial extends MeshBasicMaterial {
       for (let c = 0; c < 3; ++c)
         this.light.value[3 * at + c] = (light[3 * index + c]! * clampedCosine(shBand(index))) / Math.PI;
     });
+  }
+
+  override onBeforeRender(...drawn: Drawn): void {
+    drawFilter(this, ...drawn);
   }
 
   override onBeforeCompile(shader: WebGLProgramParametersWithUniforms): void {

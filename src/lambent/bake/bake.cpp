@@ -20,9 +20,9 @@ double seconds_since(std::chrono::steady_clock::time_point start) {
 size_t row_width(size_t coefficients, int channels) { return pad_lanes(coefficients * size_t(channels)); }
 
 // Solution vectors: T0, X and the next X; T0 of half the rays at the checked receivers.
-size_t solution_bytes(size_t receivers, size_t coefficients, int channels) {
-  return 4 *
-         (receivers * (coefficients + 2 * row_width(coefficients, channels)) + checked_count(receivers) * coefficients);
+size_t solution_bytes(size_t receivers, size_t coefficients, int channels, int sky_channels = 1) {
+  const size_t sky = coefficients * size_t(sky_channels);
+  return 4 * (receivers * (sky + 2 * row_width(coefficients, channels)) + checked_count(receivers) * sky);
 }
 
 // Direction tables, corner maps and the scratch of every thread; an upper estimate.
@@ -40,12 +40,13 @@ struct Baker {
   Progress* progress;
   BakeReport& report;
   const LobeSets lobes = make_lobe_sets(options.lobe_kind, options.lobes, options.samples, options.seed);
-  Pool<LobeRays> lobe_rays{[this] { return std::make_unique<LobeRays>(make_lobe_rays(lobes)); }};
+  Pool<LobeRays> lobe_rays{[this] { return std::make_unique<LobeRays>(make_lobe_rays(lobes, setup.sky_channels)); }};
   Pool<GatherScratch, DeleteScratch> scratch{[this] { return make_gather_scratch(setup); }};
 
   size_t n() const { return receivers.count(); }
   size_t harmonics() const { return setup.coefficients(); }
   size_t coefficients() const { return harmonics() + lobes.count(); }
+  size_t sky_width() const { return coefficients() * size_t(setup.sky_channels); }
   size_t rays_each() const { return size_t(options.samples) + size_t(lobes.rays) * lobes.sharp.size(); }
   bool has_halves() const { return setup.sets.half < size_t(setup.sets.samples); }
 
@@ -56,7 +57,8 @@ struct Baker {
     for (size_t r = first; r < first + count && !is_cancelled(progress); ++r) {
       float* half = checked_row(sky, first, r);
       trace_lobes(lobes, setup.tracer, receivers.origins[r], receivers.normals[r], r, *rays,
-                  sky.rows + (r - first) * sky.stride + harmonics(), half ? half + harmonics() : nullptr);
+                  sky.rows + (r - first) * sky.stride + harmonics(), half ? half + harmonics() : nullptr,
+                  coefficients());
     }
   }
 
@@ -84,29 +86,29 @@ struct Baker {
 
   Result<Transfer> direct() {
     const auto start = std::chrono::steady_clock::now();
-    WritableTransfer out = make_transfer(options.light(), 1, 1, n(), options.precision);
+    WritableTransfer out = make_transfer(options.light(), 1, setup.sky_channels, n(), options.precision);
     std::vector<uint8_t> buried(n());
     ErrorSums errors(n());
     {
       ProgressStage stage(progress, "tracing", n());
       parallel_for(n(), gather_block, [&](size_t begin, size_t end) {
         if (stage.cancelled()) return;
-        std::vector<float> rows((end - begin) * coefficients()), half_rows(checked_count(end - begin) * coefficients());
-        const GatherSky sky{rows.data(), half_rows.data(), coefficients(), &lobes, buried.data() + begin};
+        std::vector<float> rows((end - begin) * sky_width()), half_rows(checked_count(end - begin) * sky_width());
+        const GatherSky sky{rows.data(), half_rows.data(), sky_width(), &lobes, buried.data() + begin};
         trace_sky(setup, *scratch.borrow(), begin, end - begin, sky);
         trace_sharp_lobes(begin, end - begin, sky);
         for (size_t r = begin; r < end; ++r) {
-          const float* row = rows.data() + (r - begin) * coefficients();
-          store_receiver(out, r, {row, coefficients()});
+          const float* row = rows.data() + (r - begin) * sky_width();
+          store_receiver(out, r, {row, sky_width()});
           if (r % check_every == 0 && !buried[r])
-            errors.add(r, half_rows.data() + (r - begin) / check_every * coefficients(), row, coefficients());
+            errors.add(r, half_rows.data() + (r - begin) / check_every * sky_width(), row, sky_width());
         }
         stage.advance(end - begin);
       });
       if (stage.cancelled()) return Error{"", "cancelled"};
     }
     for (const FillStep& step : make_fill_steps(scene, receivers.basis, buried)) {
-      std::vector<float> mean(coefficients());
+      std::vector<float> mean(sky_width());
       for (uint32_t s : step.sources) {
         const std::vector<float> value = load_receiver(out.transfer, s);
         for (size_t k = 0; k < mean.size(); ++k) mean[k] += value[k] / float(step.sources.size());
@@ -121,13 +123,14 @@ struct Baker {
 
   Result<Transfer> bounced() {
     const size_t C = coefficients(), channels = size_t(setup.channels), width = row_width(C, setup.channels);
-    std::vector<float> T0(n() * C), T0_half(checked_count(n()) * C);
-    const size_t fixed = solution_bytes(n(), C, setup.channels) +
+    const size_t W = sky_width();
+    std::vector<float> T0(n() * W), T0_half(checked_count(n()) * W);
+    const size_t fixed = solution_bytes(n(), C, setup.channels, setup.sky_channels) +
                          table_bytes(n(), scene.triangles.size(), C, size_t(options.samples)) +
                          lobe_set_bytes(options.samples, lobes.count());
     auto B = GatherOperator::trace(
         setup,
-        {.sky = {T0.data(), T0_half.data(), C, &lobes, nullptr},
+        {.sky = {T0.data(), T0_half.data(), W, &lobes, nullptr},
          .more = [&](size_t first, size_t count, const GatherSky& sky) { trace_sharp_lobes(first, count, sky); },
          .halves = true,
          .memory = options.memory > fixed ? options.memory - fixed : 0},
@@ -137,15 +140,15 @@ struct Baker {
     report.operator_bytes = B->report().bytes, report.operator_kept = B->report().kept;
     report.working_memory = fixed + report.operator_bytes;
 
-    // T0 is the same in every channel; x is [receiver][coefficient][channel].
+    // T0 is the same in every channel but for coloured glass; x is [receiver][coefficient][channel].
     const auto start = std::chrono::steady_clock::now();
     auto expand = [&](const float* t, float* x) {
       for (size_t k = 0; k < C; ++k)
-        for (size_t c = 0; c < channels; ++c) x[k * channels + c] = t[k];
+        for (size_t c = 0; c < channels; ++c) x[k * channels + c] = t[setup.sky_channel(c) * C + k];
       std::fill(x + C * channels, x + width, 0.0f);
     };
-    Source source{[&](size_t r, float* x) { expand(T0.data() + r * C, x); }};
-    if (has_halves()) source.set_half = [&](size_t r, float* x) { expand(T0_half.data() + r / check_every * C, x); };
+    Source source{[&](size_t r, float* x) { expand(T0.data() + r * W, x); }};
+    if (has_halves()) source.set_half = [&](size_t r, float* x) { expand(T0_half.data() + r / check_every * W, x); };
     auto solution = bounce(*B, source, width, options.bounces, progress);
     if (!solution) return solution.error();
     auto store = [&](const AlignedVector<float>& x) {

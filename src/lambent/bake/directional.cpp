@@ -40,6 +40,8 @@ void gather_on(const GatherSetup& setup, const Basis& basis, const Lamps& lamps,
   const size_t rays = size_t(sets.samples), rows = size_t(directional_rows(kind));
   AlignedVector<float> dx(sets.stride), dy(sets.stride), dz(sets.stride);
   std::vector<Hit> hits(rays);
+  std::vector<Passage> passages(rays);
+  const bool passes = setup.tracer.lets_pass();
   std::vector<LampLight> lights;
   std::vector<float> value(width);
   float weights[most_rows];
@@ -52,32 +54,35 @@ void gather_on(const GatherSetup& setup, const Basis& basis, const Lamps& lamps,
     const size_t base = size_t(choice.set) * sets.stride;
     rotate_directions(choice.rotation, sets.x.data() + base, sets.y.data() + base, sets.z.data() + base, sets.stride,
                       dx.data(), dy.data(), dz.data());
-    setup.tracer.closest_fan(origin, {dx.data(), dy.data(), dz.data(), rays}, hits.data());
+    const Directions directions{dx.data(), dy.data(), dz.data(), rays};
+    if (passes) setup.tracer.closest_fan(origin, directions, hits.data(), passages.data());
+    else setup.tracer.closest_fan(origin, directions, hits.data());
     lights.clear();
     sample_lamps(setup.scene, setup.tracer, lamps, origin, normal, lamp_samples, rays, setup.seed, r, lights);
     for (size_t j = 0; j < rays; ++j) {
       const Hit& h = hits[j];
       const Vec3 d(dx[j], dy[j], dz[j]);
       const float cosine = dot(normal, d), share = sets.weights.empty() ? 1.0f : sets.weights[j];
-      auto add_light = [&](LampLight light) {
+      auto add_light = [&](LampLight light, Vec3 weight) {
         light.value *= share;
+        if (passes) light.value *= weight;
         lights.push_back(light);
       };
-      if (h.triangle == none) {
-        if (lamps.sky) add_light(met_sky(lamps, d, cosine, lamp_samples, rays));
-        continue;
-      }
+      const bool open = passes ? passages[j].sky != Vec3(0) : h.triangle == none;
+      if (open && lamps.sky) add_light(met_sky(lamps, d, cosine, lamp_samples, rays), passages[j].sky);
+      if (h.triangle == none) continue;
       const Triangle& triangle = setup.scene.triangles[h.triangle];
       const uint32_t lamp = lamps.of_triangle.empty() ? none : lamps.of_triangle[h.triangle];
       if (lamp != none && emits(setup.scene, triangle, h.front))
-        add_light(met_lamp(setup.scene, lamps, lamp, h, d, cosine, lamp_samples, rays));
+        add_light(met_lamp(setup.scene, lamps, lamp, h, d, cosine, lamp_samples, rays), passages[j].hit);
       const auto* at = basis.find(h.triangle, h.front);
       if (!at || !x) continue;
       std::fill(value.begin(), value.end(), 0.0f);
       basis.spread(*at, h.u, h.v, [&](uint32_t receiver, float w) {
         for (size_t k = 0; k < width; ++k) value[k] += w * x[size_t(receiver) * width + k];
       });
-      const Vec3 rho = albedo(setup.scene, triangle, h.u, h.v) * (share / float(rays));
+      Vec3 rho = albedo(setup.scene, triangle, h.u, h.v) * (share / float(rays));
+      if (passes) rho *= passages[j].hit;
       row_weights(kind, d, frame, weights);
       for (size_t row = 0; row < rows; ++row)
         for (size_t k = 0; k < width; ++k) own[row * width + k] += weights[row] * rho[int(k % 3)] * value[k];

@@ -94,18 +94,19 @@ class BlockBuilder {
 struct Fan {
   const DirectionSets& sets;
   ShZyzRotator rotator;
-  AlignedVector<float> x, y, z, visible, lobe;
+  AlignedVector<float> x, y, z, lobe;
+  std::vector<AlignedVector<float>> visible;  // of each sky channel
   std::vector<float> half, rest;
   DirectionChoice choice{};
 
-  explicit Fan(const DirectionSets& s)
+  Fan(const DirectionSets& s, int sky_channels)
       : sets(s),
         rotator(s.order),
         x(s.stride),
         y(s.stride),
         z(s.stride),
-        visible(s.stride),
         lobe(s.stride),
+        visible(size_t(sky_channels), AlignedVector<float>(s.stride)),
         half(size_t(sh_count(s.order))),
         rest(half.size()) {}
 
@@ -118,15 +119,15 @@ struct Fan {
   }
 
   // T0: the mean of V y over cosine-distributed directions, which is the integral of V y cos / pi.
-  void project(float* row, float* half_row) {
+  void project(const float* seen, float* row, float* half_row) {
     const size_t coefficients = half.size();
     if (coefficients == 0) return;  // light of lobes alone
     const float* table = sets.table.data() + size_t(choice.set) * coefficients * sets.stride;
-    weighted_rows(table, coefficients, sets.stride, visible.data(),
-                  sets.half >= size_t(sets.samples) ? sets.stride : sets.half, half.data());
+    weighted_rows(table, coefficients, sets.stride, seen, sets.half >= size_t(sets.samples) ? sets.stride : sets.half,
+                  half.data());
     std::fill(rest.begin(), rest.end(), 0.0f);
     if (sets.half < size_t(sets.samples))
-      weighted_rows(table + sets.half, coefficients, sets.stride, visible.data() + sets.half, sets.stride - sets.half,
+      weighted_rows(table + sets.half, coefficients, sets.stride, seen + sets.half, sets.stride - sets.half,
                     rest.data());
     for (size_t k = 0; k < coefficients; ++k) row[k] = (half[k] + rest[k]) / float(sets.samples);
     rotator.rotate(choice.a, choice.b, choice.c, {row, coefficients});
@@ -137,15 +138,14 @@ struct Fan {
   }
 
   // The same for the broad lobes: the mean of V b.
-  void project_lobes(const LobeSets& lobes, float* row, float* half_row) {
+  void project_lobes(const LobeSets& lobes, const float* seen, float* row, float* half_row) {
     const size_t samples = size_t(sets.samples), half_rays = std::min(sets.half, samples);
     for (uint32_t k : lobes.broad) {
       evaluate_on_fan(lobes, k, x.data(), y.data(), z.data(), sets.stride, lobe.data());
       float first = 0, second = 0;
-      weighted_rows(lobe.data(), 1, sets.stride, visible.data(), sets.half < samples ? sets.half : sets.stride, &first);
+      weighted_rows(lobe.data(), 1, sets.stride, seen, sets.half < samples ? sets.half : sets.stride, &first);
       if (sets.half < samples)
-        weighted_rows(lobe.data() + sets.half, 1, sets.stride, visible.data() + sets.half, sets.stride - sets.half,
-                      &second);
+        weighted_rows(lobe.data() + sets.half, 1, sets.stride, seen + sets.half, sets.stride - sets.half, &second);
       row[k] = (first + second) / float(samples);
       if (half_row) half_row[k] = first / float(half_rays);
     }
@@ -154,8 +154,13 @@ struct Fan {
   void project(const GatherSky& sky, size_t first, size_t receiver) {
     float* row = sky.rows + (receiver - first) * sky.stride;
     float* half_row = checked_row(sky, first, receiver);
-    project(row, half_row);
-    if (sky.lobes) project_lobes(*sky.lobes, row + half.size(), half_row ? half_row + half.size() : nullptr);
+    for (const AlignedVector<float>& seen : visible) {
+      project(seen.data(), row, half_row);
+      if (sky.lobes)
+        project_lobes(*sky.lobes, seen.data(), row + half.size(), half_row ? half_row + half.size() : nullptr);
+      row += sky.stride / visible.size();
+      if (half_row) half_row += sky.stride / visible.size();
+    }
   }
 };
 
@@ -176,7 +181,8 @@ bool is_buried(const Tracer& tracer, const Receivers& receivers, size_t receiver
     tracer.closest_fan(receivers.origins[receiver], {x, y, z, packet}, hits);
     std::visit(
         [&](const auto& b) {
-          for (const Hit& h : hits) backs += h.triangle != none && !b.find(h.triangle, h.front);
+          for (const Hit& h : hits)
+            backs += h.triangle != none && !b.find(h.triangle, h.front) && !tracer.lets_pass(h.triangle);
         },
         receivers.basis);
     if (backs == 0) return false;
@@ -197,31 +203,35 @@ float* checked_row(const GatherSky& sky, size_t first, size_t receiver) {
 struct GatherScratch {
   Fan fan;
   std::vector<Hit> hits;
+  std::vector<Passage> passages;  // of the hits; empty where all surfaces are solid
   BlockBuilder rows, half_rows;
   std::vector<LampLight> lights;
-  GatherScratch(const DirectionSets& sets, size_t receivers)
-      : fan(sets), hits(size_t(sets.samples)), rows(receivers), half_rows(receivers) {}
+  explicit GatherScratch(const GatherSetup& setup)
+      : fan(setup.sets, setup.sky_channels),
+        hits(size_t(setup.sets.samples)),
+        passages(setup.tracer.lets_pass() ? hits.size() : 0),
+        rows(setup.receivers.count()),
+        half_rows(rows) {}
 };
 void DeleteScratch::operator()(GatherScratch* scratch) const { delete scratch; }
-ScratchPointer make_gather_scratch(const GatherSetup& setup) {
-  return ScratchPointer(new GatherScratch(setup.sets, setup.receivers.count()));
-}
+ScratchPointer make_gather_scratch(const GatherSetup& setup) { return ScratchPointer(new GatherScratch(setup)); }
 
 GatherSetup make_gather_setup(const Scene& scene, const Tracer& tracer, const Receivers& receivers, int order,
                               int samples, uint32_t seed, DirectionWarp warp, Progress* progress) {
-  GatherSetup setup{scene, tracer,  receivers, make_direction_sets(order, samples, set_count, seed, warp, progress),
-                    seed,  1,       1.0f,      {},
-                    {},    progress};
+  GatherSetup setup{scene, tracer, receivers, make_direction_sets(order, samples, set_count, seed, warp, progress),
+                    seed,  1,      1,         1.0f,
+                    {},    {},     progress};
   // Weights are sums over rays: halves hold 65504.
   setup.weight_unit = std::min(1.0f, 16384.0f / float(samples));
   bool coloured = false;
   for (const Part& part : scene.parts) {
     const Material& m = scene.materials[part.material];
     setup.part_albedo.push_back(m.base_color);
-    setup.part_varies.push_back(m.base_color_texture >= 0 || !scene.colors.empty());
-    coloured |= setup.part_varies.back() || !is_grey(m.base_color);
+    setup.part_varies.push_back(m.base_color_texture >= 0 || !scene.colors.empty() || m.transmission > 0);
+    coloured |= m.base_color_texture >= 0 || !scene.colors.empty() || !is_grey(m.base_color);
   }
   setup.channels = coloured ? 3 : 1;
+  setup.sky_channels = tracer.colours() ? 3 : 1;
   return setup;
 }
 
@@ -259,12 +269,15 @@ void trace_gather_on(const GatherSetup& setup, const Basis& basis, GatherScratch
   const size_t rays = size_t(sets.samples), half = std::min(sets.half, rays);
   Fan& fan = scratch.fan;
   const std::vector<Hit>& hits = scratch.hits;
+  std::vector<Passage>& passages = scratch.passages;
+  const bool passes = !passages.empty();
   scratch.rows.begin_block(), scratch.half_rows.begin_block();
   for (size_t i = 0; i < count && !is_cancelled(setup.progress); ++i) {
     const size_t r = first + i;
     const bool checked = block && r % check_every == 0;
-    setup.tracer.closest_fan(setup.receivers.origins[r], fan.aim(setup.receivers.normals[r], setup.seed, r),
-                             scratch.hits.data());
+    const Directions directions = fan.aim(setup.receivers.normals[r], setup.seed, r);
+    if (passes) setup.tracer.closest_fan(setup.receivers.origins[r], directions, scratch.hits.data(), passages.data());
+    else setup.tracer.closest_fan(setup.receivers.origins[r], directions, scratch.hits.data());
     scratch.rows.begin_row();
     if (checked) scratch.half_rows.begin_row();
     size_t backs = 0;
@@ -286,27 +299,31 @@ void trace_gather_on(const GatherSetup& setup, const Basis& basis, GatherScratch
       if (block && j + lookahead / 2 < rays) prefetch_places(basis, hits[j + lookahead / 2], scratch.rows);
       const Hit& h = hits[j];
       const float share = sets.weights.empty() ? 1.0f : sets.weights[j];
-      fan.visible[j] = h.triangle == none ? share : 0.0f;
-      if (h.triangle == none) {
-        if (sees_sky)
-          add_light(met_sky(direct->lamps, direction(j), dot(normal, direction(j)), direct->samples, rays), share);
-        continue;
+      const Vec3 open = passes ? passages[j].sky : Vec3(h.triangle == none ? 1.0f : 0.0f);
+      for (size_t c = 0; c < fan.visible.size(); ++c) fan.visible[c][j] = share * open[int(c)];
+      if (sees_sky && open != Vec3(0)) {
+        LampLight light = met_sky(direct->lamps, direction(j), dot(normal, direction(j)), direct->samples, rays);
+        light.value *= open;
+        add_light(light, share);
       }
+      if (h.triangle == none) continue;
       if (sees_lamps) {
         const uint32_t lamp = direct->lamps.of_triangle[h.triangle];
-        if (lamp != none && emits(setup.scene, setup.scene.triangles[h.triangle], h.front))
-          add_light(met_lamp(setup.scene, direct->lamps, lamp, h, direction(j), dot(normal, direction(j)),
-                             direct->samples, rays),
-                    share);
+        if (lamp != none && emits(setup.scene, setup.scene.triangles[h.triangle], h.front)) {
+          LampLight light = met_lamp(setup.scene, direct->lamps, lamp, h, direction(j), dot(normal, direction(j)),
+                                     direct->samples, rays);
+          if (passes) light.value *= passages[j].hit;
+          add_light(light, share);
+        }
       }
       const auto* at = basis.find(h.triangle, h.front);
       if (!at) {
-        ++backs;
+        backs += !setup.tracer.lets_pass(h.triangle);
         continue;
       }
       if (!block) continue;
-      const Vec3 rho = setup.part_varies[at->part] ? albedo(setup.scene, setup.scene.triangles[h.triangle], h.u, h.v)
-                                                   : setup.part_albedo[at->part];
+      Vec3 rho = setup.albedo_at(at->part, h);
+      if (passes) rho *= passages[j].hit;
       scatter(basis, *at, h, r * rays + j,
               [&](uint32_t receiver, float weight) { scratch.rows.add(receiver, rho * (weight * share)); });
       if (checked && j < half)
@@ -343,10 +360,13 @@ void trace_sky(const GatherSetup& setup, GatherScratch& scratch, size_t first, s
   for (size_t i = 0; i < count && !is_cancelled(setup.progress); ++i) {
     const size_t r = first + i;
     const Vec3 origin = setup.receivers.origins[r];
-    setup.tracer.visible_fan(origin, fan.aim(setup.receivers.normals[r], setup.seed, r), fan.visible.data());
+    const Directions directions = fan.aim(setup.receivers.normals[r], setup.seed, r);
+    std::vector<AlignedVector<float>>& v = fan.visible;
+    if (v.size() == 3) setup.tracer.visible_fan(origin, directions, {v[0].data(), v[1].data(), v[2].data()});
+    else setup.tracer.visible_fan(origin, directions, v[0].data());
     fan.project(sky, first, r);
     size_t seen = 0;
-    for (size_t j = 0; j < rays; ++j) seen += fan.visible[j] > 0;
+    for (size_t j = 0; j < rays; ++j) seen += v[0][j] > 0 || (v.size() == 3 && v[1][j] + v[2][j] > 0);
     sky.buried[i] = 2 * seen < rays && is_buried(setup.tracer, setup.receivers, r);
   }
 }

@@ -49,12 +49,19 @@ struct GatherSetup {
   DirectionSets sets;
   uint32_t seed;
   int channels;                   // of weights: 1 if all albedo is grey, else 3
+  int sky_channels;               // of sky rows: 3 where light comes through coloured surfaces, else 1
   float weight_unit;              // stored weight = sum of albedo x interpolation weight over rays, x weight_unit
   std::vector<Vec3> part_albedo;  // of parts with one albedo all over
   std::vector<uint8_t> part_varies;
   Progress* progress = nullptr;  // tracing looks at it receiver by receiver, and ends early when cancelled
 
   size_t coefficients() const { return size_t(sh_count(sets.order)); }
+  size_t sky_width() const { return coefficients() * size_t(sky_channels); }
+  size_t sky_channel(size_t channel) const { return std::min(channel, size_t(sky_channels) - 1); }
+  // Linear base colour of a hit, less what passes.
+  Vec3 albedo_at(uint32_t part, const Hit& hit) const {
+    return part_varies[part] ? albedo(scene, scene.triangles[hit.triangle], hit.u, hit.v) : part_albedo[part];
+  }
   // What a stored weight has to be multiplied by, given how many rays the row averages.
   float row_scale(size_t rays) const { return 1.0f / (weight_unit * float(rays)); }
 };
@@ -67,9 +74,9 @@ GatherSetup make_gather_setup(const Scene& scene, const Tracer& tracer, const Re
 
 // What tracing receivers [first, first + count) yields beside the hit rows. Spans are indexed from `first`.
 struct GatherSky {
-  float* rows;            // [receiver][stride], of which the coefficients come first: T0; then the lobes, if any
+  float* rows;            // [receiver][stride], [sky channel] within: the coefficients of T0; then the lobes, if any
   float* half_rows;       // [checked receiver][stride]: T0 by the first half of the rays
-  size_t stride;          // floats from one receiver to the next, no fewer than coefficients and lobes
+  size_t stride;          // floats from one receiver to the next, those of all sky channels
   const LobeSets* lobes;  // broad ones are summed, sharp ones left alone; may be null
   uint8_t* buried;        // 1: most rays met the back of a one-sided surface; the receiver lies inside something
 };

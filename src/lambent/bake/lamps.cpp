@@ -3,6 +3,7 @@
 #include <lambent/bake/lamps.h>
 #include <lambent/core/random.h>
 #include <lambent/core/sampling.h>
+#include <lambent/scene/see_through.h>
 
 #include <algorithm>
 
@@ -144,8 +145,9 @@ void sample_lamps(const Scene& scene, const Tracer& tracer, const Lamps& lamps, 
       const float cosine = dot(normal, d), facing = -dot(unit_normal(scene, t), d);
       if (!(cosine > 0) || !emits(scene, t, facing > 0) || facing == 0) continue;
       const double density = lamp.density * double(distance2) / double(std::abs(facing));
-      add(lamp.group, d, balanced(emission(scene, t, 1 - root, v), cosine, density, samples, rays), lamp.triangle,
-          distance);
+      Vec3 radiance = emission(scene, t, 1 - root, v);
+      if (tracer.lets_pass(lamp.triangle)) radiance *= coverage(scene, t, 1 - root, v);
+      add(lamp.group, d, balanced(radiance, cosine, density, samples, rays), lamp.triangle, distance);
     }
   }
   for (size_t l = 0; l < lamps.punctual_group.size(); ++l) {
@@ -167,6 +169,11 @@ void sample_lamps(const Scene& scene, const Tracer& tracer, const Lamps& lamps, 
     const Hit& h = shadow.hits[i];
     const bool arrives = h.triangle == none || h.triangle == pending[i].triangle ||
                          h.distance >= pending[i].distance * (1 - same_distance);
+    if (!arrives && h.triangle != none && tracer.lets_pass(h.triangle)) {
+      LampLight light = pending[i].light;
+      light.value *= tracer.transmittance(origin, light.direction, pending[i].distance * (1 - same_distance));
+      if (largest(light.value) > 0) out.push_back(light);
+    }
     if (arrives) out.push_back(pending[i].light);
   }
 }

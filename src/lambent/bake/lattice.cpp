@@ -17,8 +17,10 @@ namespace {
 
 // What a thread needs for one point at a time.
 struct LatticeScratch {
-  AlignedVector<float> x, y, z, visible, sum, v, yb;
+  AlignedVector<float> x, y, z, sum, v, yb;
+  std::vector<AlignedVector<float>> visible;  // of each sky channel
   std::vector<Hit> hits;
+  std::vector<Passage> passages;
   std::vector<float> V, scalars, out;
   std::vector<ViewWeights> weights;
 };
@@ -82,7 +84,9 @@ struct LatticeBaker {
   std::unique_ptr<LatticeScratch> make_scratch() const {
     auto s = std::make_unique<LatticeScratch>();
     const size_t stride = setup.sets.stride;
-    s->x.resize(stride), s->y.resize(stride), s->z.resize(stride), s->visible.resize(stride), s->hits.resize(rays());
+    s->x.resize(stride), s->y.resize(stride), s->z.resize(stride), s->hits.resize(rays());
+    s->visible.assign(size_t(setup.sky_channels), AlignedVector<float>(stride));
+    s->passages.resize(setup.tracer.lets_pass() ? rays() : 0);
     s->sum.resize(J() * wc()), s->v.resize(hit_batch * wc()), s->yb.resize(hit_batch * J());
     s->V.resize(V_count()), s->scalars.resize(rows() * channels()), s->out.resize(J() * channels() * C()),
         s->weights.resize(rows());
@@ -90,16 +94,15 @@ struct LatticeBaker {
   }
 
   // Transfer of what leaves a hit towards -w, added to v[channel][width].
-  void add_exit_radiance(LatticeScratch& s, const Corners& corners, const Hit& h, Vec3 w, float* v) const {
-    const Vec3 colour = setup.part_varies[corners.part] ? albedo(scene, scene.triangles[h.triangle], h.u, h.v)
-                                                        : setup.part_albedo[corners.part];
+  void add_exit_radiance(LatticeScratch& s, const Corners& corners, const Hit& h, Vec3 share, Vec3 w, float* v) const {
+    const Vec3 colour = setup.albedo_at(corners.part, h);
     const float b[3] = {1 - h.u - h.v, h.u, h.v};
     for (int k = 0; k < 3; ++k) {
       const uint32_t r = corners.receiver[size_t(k)];
       if (outgoing) evaluate_outgoing(*outgoing, r, -w, s.weights);
       else s.weights[0] = ViewWeights(0, 0, 0, 1);
       for (size_t row = 0; row < rows(); ++row) {
-        const Vec3 weight = b[k] * (Vec3(s.weights[row]) + colour * s.weights[row].w);
+        const Vec3 weight = share * b[k] * (Vec3(s.weights[row]) + colour * s.weights[row].w);
         for (size_t c = 0; c < channels(); ++c) s.scalars[row * channels() + c] = weight[int(c)];
       }
       add_weighted_rows(Y.data() + r * rows() * wc(), rows(), channels(), width(), s.scalars.data(), v);
@@ -116,24 +119,29 @@ struct LatticeBaker {
     const size_t base = size_t(choice.set) * sets.stride;
     rotate_directions(choice.rotation, sets.x.data() + base, sets.y.data() + base, sets.z.data() + base, sets.stride,
                       s.x.data(), s.y.data(), s.z.data());
-    setup.tracer.closest_fan(lattice.position(point), {s.x.data(), s.y.data(), s.z.data(), rays()}, s.hits.data());
+    const bool passes = !s.passages.empty();
+    const Directions directions{s.x.data(), s.y.data(), s.z.data(), rays()};
+    if (passes) setup.tracer.closest_fan(lattice.position(point), directions, s.hits.data(), s.passages.data());
+    else setup.tracer.closest_fan(lattice.position(point), directions, s.hits.data());
 
     std::fill(s.sum.begin(), s.sum.end(), 0.0f), std::fill(s.v.begin(), s.v.end(), 0.0f);
-    size_t backs = 0, seen = 0, in_batch = 0;
+    size_t backs = 0, in_batch = 0;
+    std::array<float, 3> seen{};  // of each sky channel, as if counted
     for (size_t i = 0; i < rays(); ++i) {
       const Hit& h = s.hits[i];
-      s.visible[i] = h.triangle == none ? 1.0f : 0.0f;
-      if (h.triangle == none) {
-        ++seen;
-        continue;
-      }
+      for (size_t c = 0; c < s.visible.size(); ++c)
+        s.visible[c][i] = passes             ? s.passages[i].sky[int(c)]
+                        : h.triangle == none ? 1.0f
+                                             : 0.0f,
+        seen[c] += s.visible[c][i];
+      if (h.triangle == none) continue;
       const Corners* corners = std::get<CornerReceivers>(setup.receivers.basis).find(h.triangle, h.front);
       if (!corners) {  // black
-        ++backs;
+        backs += !setup.tracer.lets_pass(h.triangle);
         continue;
       }
       const Vec3 w(s.x[i], s.y[i], s.z[i]);
-      add_exit_radiance(s, *corners, h, w, s.v.data() + in_batch * wc());
+      add_exit_radiance(s, *corners, h, passes ? s.passages[i].hit : Vec3(1), w, s.v.data() + in_batch * wc());
       evaluate_sh(options.order, w, {s.yb.data() + in_batch * J(), J()});
       if (++in_batch < hit_batch) continue;
       add_outer_products(s.yb.data(), J(), s.v.data(), wc(), s.sum.data());
@@ -143,20 +151,23 @@ struct LatticeBaker {
     if (in_batch) add_outer_products(s.yb.data(), J(), s.v.data(), wc(), s.sum.data());  // the rest of v is zero
 
     // V_k in the set's frame, turned into the world; then T_ji = sum_k C_ijk V_k.
-    weighted_rows(sets.table.data() + size_t(choice.set) * V_count() * sets.stride, V_count(), sets.stride,
-                  s.visible.data(), sets.stride, s.V.data());
-    const float open = float(seen) / float(rays());
-    for (size_t k = 0; k < V_count(); ++k)
-      s.V[k] = s.V[k] * ray_angle() + open * shortfall[size_t(choice.set) * V_count() + k];
-    rotator.rotate(choice.a, choice.b, choice.c, s.V);
     for (size_t j = 0; j < J(); ++j)
       for (size_t c = 0; c < channels(); ++c)
         for (size_t i = 0; i < C(); ++i)
           s.out[(j * channels() + c) * C() + i] = s.sum[j * wc() + c * width() + i] * ray_angle();
-    for (size_t k = 0; k < V_count(); ++k)
-      for (uint32_t e = tensor.begin[k]; e < tensor.begin[k + 1]; ++e)
-        for (size_t c = 0; c < channels(); ++c)
-          s.out[(tensor.j[e] * channels() + c) * C() + tensor.i[e]] += tensor.single[e] * s.V[k];
+    const size_t skies = s.visible.size();
+    for (size_t sky = 0; sky < skies; ++sky) {
+      weighted_rows(sets.table.data() + size_t(choice.set) * V_count() * sets.stride, V_count(), sets.stride,
+                    s.visible[sky].data(), sets.stride, s.V.data());
+      const float open = seen[sky] / float(rays());
+      for (size_t k = 0; k < V_count(); ++k)
+        s.V[k] = s.V[k] * ray_angle() + open * shortfall[size_t(choice.set) * V_count() + k];
+      rotator.rotate(choice.a, choice.b, choice.c, s.V);
+      for (size_t k = 0; k < V_count(); ++k)
+        for (uint32_t e = tensor.begin[k]; e < tensor.begin[k + 1]; ++e)
+          for (size_t c = sky; c < (skies == 1 ? channels() : sky + 1); ++c)
+            s.out[(tensor.j[e] * channels() + c) * C() + tensor.i[e]] += tensor.single[e] * s.V[k];
+    }
     store_receiver(out, point, s.out);
     return 2 * backs <= rays();
   }

@@ -63,12 +63,13 @@ float beyond_half(const LightBasis& light, const AlignedVector<float>& x, size_t
   return 0;
 }
 
-// Transfer of harmonics, the same in every channel, into the first columns of e.
-void add_sky(const std::vector<float>& sky, size_t harmonics, size_t width, AlignedVector<float>& e) {
-  parallel_for(sky.size() / harmonics, gather_block, [&](size_t begin, size_t end) {
+// Transfer of harmonics, one channel for all where nothing colours the light, into the first columns of e.
+void add_sky(const GatherSetup& setup, const std::vector<float>& sky, size_t width, AlignedVector<float>& e) {
+  const size_t harmonics = setup.coefficients();
+  parallel_for(sky.size() / setup.sky_width(), gather_block, [&](size_t begin, size_t end) {
     for (size_t i = begin; i < end; ++i)
-      for (size_t k = 0; k < harmonics; ++k)
-        for (size_t c = 0; c < 3; ++c) e[i * width + 3 * k + c] = sky[i * harmonics + k];
+      for (size_t j = 0; j < 3 * harmonics; ++j)
+        e[i * width + j] = sky[i * setup.sky_width() + setup.sky_channel(j % 3) * harmonics + j / 3];
   });
 }
 
@@ -134,13 +135,13 @@ Result<Lightmap> bake_lightmap(const Scene& scene, const Tracer& tracer, const R
 
   // e: [harmonics | groups][channel]
   AlignedVector<float> e(n * width, 0.0f);
-  std::vector<float> sky(harmonics ? n * harmonics : 0);
+  std::vector<float> sky(harmonics ? n * setup.sky_width() : 0);
   const bool bounces = o.converge > 0 || o.bounces > 0;
   const GatherDirect direct{lamps, o.lamp_samples, e.data() + 3 * harmonics, width};
   auto op = GatherOperator::trace(setup, lamps.groups() ? &direct : nullptr, harmonics ? sky.data() : nullptr, bounces,
                                   o.memory - least, progress);
   if (!op) return op.error();
-  if (harmonics) add_sky(sky, harmonics, width, e);
+  if (harmonics) add_sky(setup, sky, width, e);
   r.trace_seconds = op->report().seconds;
 
   const auto start = std::chrono::steady_clock::now();

@@ -46,9 +46,10 @@ LobeSets make_lobe_sets(LobeKind kind, const std::vector<Lobe>& lobes, int sampl
   return s;
 }
 
-LobeRays make_lobe_rays(const LobeSets& sets) {
+LobeRays make_lobe_rays(const LobeSets& sets, int sky_channels) {
   LobeRays rays;
-  for (auto* values : {&rays.x, &rays.y, &rays.z, &rays.cosine, &rays.visible}) values->resize(sets.stride);
+  for (auto* values : {&rays.x, &rays.y, &rays.z, &rays.cosine}) values->resize(sets.stride);
+  rays.visible.assign(size_t(sky_channels), AlignedVector<float>(sets.stride));
   return rays;
 }
 
@@ -76,20 +77,26 @@ void trace_lobe(const LobeSets& sets, const Tracer& tracer, Vec3 origin, Vec3 no
     rays.x[to] = d.x, rays.y[to] = d.y, rays.z[to] = d.z, rays.cosine[to] = cosine;
     if (i < sets.half) rays.half = rays.count;
   }
-  tracer.visible_fan(origin, {rays.x.data(), rays.y.data(), rays.z.data(), rays.count}, rays.visible.data());
+  const Directions directions{rays.x.data(), rays.y.data(), rays.z.data(), rays.count};
+  std::vector<AlignedVector<float>>& v = rays.visible;
+  if (v.size() == 3) tracer.visible_fan(origin, directions, {v[0].data(), v[1].data(), v[2].data()});
+  else tracer.visible_fan(origin, directions, v[0].data());
 }
 
 void trace_lobes(const LobeSets& sets, const Tracer& tracer, Vec3 origin, Vec3 normal, size_t receiver, LobeRays& rays,
-                 float* out, float* half_out) {
+                 float* out, float* half_out, size_t stride) {
   for (size_t lobe = 0; lobe < sets.sharp.size(); ++lobe) {
     const uint32_t k = sets.sharp[lobe];
     trace_lobe(sets, tracer, origin, normal, receiver, lobe, rays);
-    float half = 0, rest = 0;
-    for (size_t i = 0; i < rays.half; ++i) half += rays.visible[i] * rays.cosine[i];
-    for (size_t i = rays.half; i < rays.count; ++i) rest += rays.visible[i] * rays.cosine[i];
     const float scale = sets.integrals[k] / pi;
-    out[k] = scale * (half + rest) / float(sets.rays);
-    if (half_out) half_out[k] = scale * half / float(sets.half);
+    for (size_t c = 0; c < rays.visible.size(); ++c) {
+      const AlignedVector<float>& visible = rays.visible[c];
+      float half = 0, rest = 0;
+      for (size_t i = 0; i < rays.half; ++i) half += visible[i] * rays.cosine[i];
+      for (size_t i = rays.half; i < rays.count; ++i) rest += visible[i] * rays.cosine[i];
+      out[c * stride + k] = scale * (half + rest) / float(sets.rays);
+      if (half_out) half_out[c * stride + k] = scale * half / float(sets.half);
+    }
   }
 }
 

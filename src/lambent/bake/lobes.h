@@ -34,10 +34,11 @@ size_t lobe_set_bytes(int samples, size_t lobes);
 
 // What one thread needs: the rays of one receiver to one lobe that leave above its surface, and what became of them.
 struct LobeRays {
-  AlignedVector<float> x, y, z, cosine, visible;
-  size_t count = 0, half = 0;  // of all rays, and of the first half
+  AlignedVector<float> x, y, z, cosine;
+  std::vector<AlignedVector<float>> visible;  // of each sky channel (gather.h)
+  size_t count = 0, half = 0;                 // of all rays, and of the first half
 };
-LobeRays make_lobe_rays(const LobeSets& sets);
+LobeRays make_lobe_rays(const LobeSets& sets, int sky_channels);
 
 // The values of lobe k, scaled, at the directions of a fan; count a multiple of lane_multiple (kernels.h).
 void evaluate_on_fan(const LobeSets& sets, size_t k, const float* x, const float* y, const float* z, size_t count,
@@ -48,9 +49,9 @@ void evaluate_on_fan(const LobeSets& sets, size_t k, const float* x, const float
 void trace_lobe(const LobeSets& sets, const Tracer& tracer, Vec3 origin, Vec3 normal, size_t receiver, size_t i,
                 LobeRays& rays);
 
-// out[k] = 1/pi * integral of V b_k cos, for every sharp lobe k; half_out, if not null, by the first half of the rays
-// alone.
+// out[channel * stride + k] = 1/pi * integral of V b_k cos, for every sharp lobe k; half_out, if not null, by the first
+// half of the rays alone.
 void trace_lobes(const LobeSets& sets, const Tracer& tracer, Vec3 origin, Vec3 normal, size_t receiver, LobeRays& rays,
-                 float* out, float* half_out);
+                 float* out, float* half_out, size_t stride);
 
 }  // namespace lambent

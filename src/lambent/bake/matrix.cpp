@@ -193,7 +193,7 @@ Result<MatrixBake> bake_matrix(const Scene& scene, const Tracer& tracer, const R
                                         options.samples, options.seed, square_to_cosine_hemisphere, progress);
   for (const LinearMaterial& m : materials.materials)
     if (tints(m.black)) setup.channels = 3;
-  if (options.bounces == 0) setup.channels = 1;  // direct light meets no coloured surface on its way
+  if (options.bounces == 0) setup.channels = setup.sky_channels;  // direct light is coloured by glass alone
   const size_t needed = matrix_memory(receivers.count(), setup.channels, options, matrix);
   if (needed > options.memory)
     return Error{scene.path, "baking needs at least " + std::to_string(needed) +

@@ -32,13 +32,14 @@ void turn_rows_about_z(float* rows, int order, size_t width, float phi) {
 std::unique_ptr<MatrixScratch> MatrixGather::make_scratch() const {
   auto s = std::make_unique<MatrixScratch>();
   const size_t stride = setup.sets.stride, w = channels() * width();
-  s->x.resize(stride), s->y.resize(stride), s->z.resize(stride), s->visible.resize(stride), s->lobe.resize(stride),
-      s->hits.resize(rays());
+  s->x.resize(stride), s->y.resize(stride), s->z.resize(stride), s->lobe.resize(stride), s->hits.resize(rays()),
+      s->passages.resize(setup.tracer.lets_pass() ? rays() : 0);
+  s->visible.assign(sky_channels(), AlignedVector<float>(stride));
   s->V.resize(V_count()), s->column_row.resize(C());
   s->sh_rows.resize(J() * w), s->v.resize(hit_batch * w), s->zb.resize(hit_batch * J());
-  s->full.resize(J() * width()), s->half.resize(J() * width());
+  s->full.resize(t0_width()), s->half.resize(t0_width());
   s->weights.resize(J()), s->scalars.resize(J() * 3);
-  s->z_values.resize(J()), s->lobe_sums.resize(2 * J()), s->lobe_rays = make_lobe_rays(lobes);
+  s->z_values.resize(J()), s->lobe_sums.resize(2 * J()), s->lobe_rays = make_lobe_rays(lobes, setup.sky_channels);
   return s;
 }
 
@@ -66,8 +67,12 @@ void MatrixGather::to_incident(float* sh_rows, float phi, size_t w, float scale,
 }
 
 void MatrixGather::direct(MatrixScratch& s, size_t count, float* out) const {
+  for (const AlignedVector<float>& visible : s.visible) direct(s, visible, count, out), out += J() * width();
+}
+
+void MatrixGather::direct(MatrixScratch& s, const AlignedVector<float>& visible, size_t count, float* out) const {
   const size_t w = width(), base = size_t(s.choice.set) * V_count() * setup.sets.stride;
-  weighted_rows(setup.sets.table.data() + base, V_count(), setup.sets.stride, s.visible.data(),
+  weighted_rows(setup.sets.table.data() + base, V_count(), setup.sets.stride, visible.data(),
                 count == rays() ? setup.sets.stride : count, s.V.data());
   float* rows = s.sh_rows.data();
   std::fill(rows, rows + J() * w, 0.0f);
@@ -80,7 +85,7 @@ void MatrixGather::direct(MatrixScratch& s, size_t count, float* out) const {
   // Broad lobes: V b takes the place of V, and the harmonics below J that of the triple product.
   for (uint32_t k : lobes.broad) {
     evaluate_on_fan(lobes, k, s.x.data(), s.y.data(), s.z.data(), setup.sets.stride, s.lobe.data());
-    multiply_values(s.lobe.data(), s.visible.data(), setup.sets.stride, s.lobe.data());
+    multiply_values(s.lobe.data(), visible.data(), setup.sets.stride, s.lobe.data());
     weighted_rows(setup.sets.table.data() + base, J(), setup.sets.stride, s.lobe.data(),
                   count == rays() ? setup.sets.stride : count, s.V.data());
     for (size_t j = 0; j < J(); ++j) rows[j * w + harmonics() + k] = s.V[j];
@@ -92,30 +97,34 @@ void MatrixGather::direct_sharp_lobes(MatrixScratch& s, size_t r, float* out, fl
   for (size_t lobe = 0; lobe < lobes.sharp.size(); ++lobe) {
     const size_t k = lobes.sharp[lobe];
     trace_lobe(lobes, setup.tracer, receivers.origins[r], receivers.normals[r], r, lobe, s.lobe_rays);
-    std::fill(s.lobe_sums.begin(), s.lobe_sums.end(), 0.0);
-    for (size_t i = 0; i < s.lobe_rays.count; ++i) {
-      const float weight = s.lobe_rays.visible[i] * s.lobe_rays.cosine[i];
-      if (weight == 0) continue;
-      evaluate_cosine_basis(basis, Vec3(s.lobe_rays.x[i], s.lobe_rays.y[i], s.lobe_rays.z[i]) * materials.frames[r],
-                            s.z_values);
-      double* sums = s.lobe_sums.data() + (i < s.lobe_rays.half ? 0 : J());
-      for (size_t j = 0; j < J(); ++j) sums[j] += double(weight) * s.z_values[j];
-    }
     const double scale = double(lobes.integrals[k]) / std::numbers::pi;
-    for (size_t j = 0; j < J(); ++j) {
-      out[j * width() + harmonics() + k] = float(scale * (s.lobe_sums[j] + s.lobe_sums[J() + j]) / lobes.rays);
-      if (half_out) half_out[j * width() + harmonics() + k] = float(scale * s.lobe_sums[j] / double(lobes.half));
+    for (size_t c = 0; c < sky_channels(); ++c) {
+      std::fill(s.lobe_sums.begin(), s.lobe_sums.end(), 0.0);
+      for (size_t i = 0; i < s.lobe_rays.count; ++i) {
+        const float weight = s.lobe_rays.visible[c][i] * s.lobe_rays.cosine[i];
+        if (weight == 0) continue;
+        evaluate_cosine_basis(basis, Vec3(s.lobe_rays.x[i], s.lobe_rays.y[i], s.lobe_rays.z[i]) * materials.frames[r],
+                              s.z_values);
+        double* sums = s.lobe_sums.data() + (i < s.lobe_rays.half ? 0 : J());
+        for (size_t j = 0; j < J(); ++j) sums[j] += double(weight) * s.z_values[j];
+      }
+      for (size_t j = 0; j < J(); ++j) {
+        const size_t at = (c * J() + j) * width() + harmonics() + k;
+        out[at] = float(scale * (s.lobe_sums[j] + s.lobe_sums[J() + j]) / lobes.rays);
+        if (half_out) half_out[at] = float(scale * s.lobe_sums[j] / double(lobes.half));
+      }
     }
   }
 }
 
 void MatrixGather::expand(const float* t, float* x) const {
   for (size_t j = 0; j < J(); ++j)
-    for (size_t c = 0; c < channels(); ++c) std::copy_n(t + j * width(), width(), x + (j * channels() + c) * width());
+    for (size_t c = 0; c < channels(); ++c)
+      std::copy_n(t + (setup.sky_channel(c) * J() + j) * width(), width(), x + (j * channels() + c) * width());
 }
 
-void MatrixGather::scattered(MatrixScratch& s, std::span<const MatrixHit> hits, size_t limit, const float* Y,
-                             float* out) const {
+void MatrixGather::scattered(MatrixScratch& s, std::span<const MatrixHit> hits, const Vec3* through, size_t limit,
+                             const float* Y, float* out) const {
   const size_t w = width(), wc = channels() * w;
   float* rows = s.sh_rows.data();
   std::fill(rows, rows + J() * wc, 0.0f);
@@ -140,7 +149,8 @@ void MatrixGather::scattered(MatrixScratch& s, std::span<const MatrixHit> hits, 
         weights = s.weights.data();
       }
       for (size_t r = 0; r < size_t(f.rows); ++r) {
-        const Vec3 weight = b[k] * (Vec3(weights[r]) + colour * weights[r].w);
+        Vec3 weight = b[k] * (Vec3(weights[r]) + colour * weights[r].w);
+        if (through) weight *= through[i];
         for (size_t ch = 0; ch < channels(); ++ch) s.scalars[r * channels() + ch] = weight[int(ch)];
       }
       add_weighted_rows(Y + first_row[c] * wc, size_t(f.rows), channels(), w, s.scalars.data(), v);
@@ -163,10 +173,11 @@ void MatrixGather::simulated(MatrixScratch& s, size_t r, std::span<const MatrixH
     const PathEnd end = follow_path(scene, setup.tracer, materials.reflection, {s.x[ray], s.y[ray], s.z[ray]},
                                     s.hits[ray], options.bounces, key, ray);
     if (!end.leaves) continue;
+    const Vec3 throughput = s.passages.empty() ? end.throughput : end.throughput * s.passages[ray].hit;
     evaluate_sh(options.order, end.direction, s.column_row);
     float* v = s.v.data() + in_batch * wc;
     for (size_t c = 0; c < channels(); ++c)
-      for (size_t k = 0; k < C(); ++k) v[c * w + k] = end.throughput[int(c)] * s.column_row[k];
+      for (size_t k = 0; k < C(); ++k) v[c * w + k] = throughput[int(c)] * s.column_row[k];
     for (size_t j = 0; j < J(); ++j) s.zb[in_batch * J() + j] = table[j * setup.sets.stride + ray];
     if (++in_batch == hit_batch) add_outer_products(s.zb.data(), J(), s.v.data(), wc, s.sh_rows.data()), in_batch = 0;
   }
@@ -187,24 +198,29 @@ void MatrixGather::add_rest(MatrixScratch& s, size_t in_batch, size_t limit, flo
 bool MatrixGather::trace(MatrixScratch& s, size_t r, MatrixHits* hits) const {
   const Directions d = aim(s, r);
   if (!hits) {
-    setup.tracer.visible_fan(receivers.origins[r], d, s.visible.data());
+    std::vector<AlignedVector<float>>& v = s.visible;
+    if (v.size() == 3) setup.tracer.visible_fan(receivers.origins[r], d, {v[0].data(), v[1].data(), v[2].data()});
+    else setup.tracer.visible_fan(receivers.origins[r], d, v[0].data());
     size_t seen = 0;
-    for (size_t j = 0; j < rays(); ++j) seen += s.visible[j] > 0;
+    for (size_t j = 0; j < rays(); ++j) seen += v[0][j] > 0 || (v.size() == 3 && v[1][j] + v[2][j] > 0);
     return 2 * seen < rays() && is_buried(setup.tracer, receivers, r);
   }
-  setup.tracer.closest_fan(receivers.origins[r], d, s.hits.data());
+  const bool passes = !s.passages.empty();
+  if (passes) setup.tracer.closest_fan(receivers.origins[r], d, s.hits.data(), s.passages.data());
+  else setup.tracer.closest_fan(receivers.origins[r], d, s.hits.data());
   size_t backs = 0;
   for (size_t j = 0; j < rays(); ++j) {
     const Hit& h = s.hits[j];
-    s.visible[j] = h.triangle == none ? 1.0f : 0.0f;
+    for (size_t c = 0; c < s.visible.size(); ++c)
+      s.visible[c][j] = passes ? s.passages[j].sky[int(c)] : h.triangle == none ? 1.0f : 0.0f;
     if (h.triangle == none) continue;
     const Corners* corner = corners().find(h.triangle, h.front);
     if (!corner) {
-      ++backs;
+      backs += !setup.tracer.lets_pass(h.triangle);
       continue;
     }
-    const Vec3 colour = setup.part_varies[corner->part] ? albedo(scene, scene.triangles[h.triangle], h.u, h.v)
-                                                        : setup.part_albedo[corner->part];
+    const Vec3 colour = setup.albedo_at(corner->part, h);
+    if (passes) hits->weights.push_back(s.passages[j].hit);
     hits->hits.push_back({h.triangle << 1 | uint32_t(h.front),
                           uint32_t(j),
                           uint16_t(h.u * 65535.0f + 0.5f),

@@ -19,14 +19,19 @@ struct MatrixHit {
 
 struct MatrixHits {  // of a block of receivers
   std::vector<MatrixHit> hits;
+  std::vector<Vec3> weights;   // of each hit, what it counts for; empty where all surfaces are solid
   std::vector<uint32_t> ends;  // by receiver
-  size_t bytes() const { return hits.size() * sizeof(MatrixHit) + ends.size() * 4 + sizeof(MatrixHits); }
+  size_t bytes() const {
+    return hits.size() * sizeof(MatrixHit) + weights.size() * sizeof(Vec3) + ends.size() * 4 + sizeof(MatrixHits);
+  }
 };
 
 // What a thread needs for one receiver at a time.
 struct MatrixScratch {
-  AlignedVector<float> x, y, z, visible, lobe;
+  AlignedVector<float> x, y, z, lobe;
+  std::vector<AlignedVector<float>> visible;  // of each sky channel
   std::vector<Hit> hits;
+  std::vector<Passage> passages;
   std::vector<float> V, column_row;
   AlignedVector<float> sh_rows, v, zb, full, half;
   std::vector<ViewWeights> weights;
@@ -62,7 +67,8 @@ struct MatrixGather {
   size_t channels() const { return size_t(setup.channels); }
   size_t width() const { return pad_lanes(C()); }  // floats of a row of one channel
   size_t wc() const { return channels() * width(); }
-  size_t t0_width() const { return J() * width(); }
+  size_t sky_channels() const { return size_t(setup.sky_channels); }
+  size_t t0_width() const { return sky_channels() * J() * width(); }
   size_t V_count() const { return setup.coefficients(); }
   size_t rays() const { return size_t(setup.sets.samples); }
   bool has_halves() const { return setup.sets.half < rays(); }
@@ -72,22 +78,25 @@ struct MatrixGather {
   // Rows over the harmonics of the set's frame -> rows over the incident basis of the receiver's frame, into
   // out[j][width].
   void to_incident(float* sh_rows, float phi, size_t w, float scale, float* out) const;
-  // Direct light from the first `count` rays: X0_ji = mean of V y_i z_j = sum_k C_ijk V_k. out is [J][width].
+  // Direct light from the first `count` rays: X0_ji = mean of V y_i z_j = sum_k C_ijk V_k. out is [sky
+  // channel][J][width].
   void direct(MatrixScratch& s, size_t count, float* out) const;
+  void direct(MatrixScratch& s, const AlignedVector<float>& visible, size_t count, float* out) const;
   // Direct light of the sharp lobes, by rays of their own: X0_jk = 1/pi integral of V b_k z_j cos, into out and, if
   // given, half_out.
   void direct_sharp_lobes(MatrixScratch& s, size_t r, float* out, float* half_out) const;
-  // All direct light of a receiver that was traced, [J][width]; half may be null.
+  // All direct light of a receiver that was traced, [sky channel][J][width]; half may be null.
   void direct_light(MatrixScratch& s, size_t r, float* full, float* half) const {
     direct(s, rays(), full);
     if (half) direct(s, std::min(setup.sets.half, rays()), half);
     direct_sharp_lobes(s, r, full, half);
   }
-  // The same in every channel, [J][channel][width].
+  // To [J][channel][width]; the same in every channel where the sky has one.
   void expand(const float* t, float* x) const;
   // Light that the hits of rays below `limit` scatter to receiver r, added to out[J][channel][width]; Y holds scattered
-  // rows.
-  void scattered(MatrixScratch& s, std::span<const MatrixHit> hits, size_t limit, const float* Y, float* out) const;
+  // rows. `through`: the hits' weights, or null.
+  void scattered(MatrixScratch& s, std::span<const MatrixHit> hits, const Vec3* through, size_t limit, const float* Y,
+                 float* out) const;
   // The same light by following the rays below `limit` on from their hits, each to its end.
   void simulated(MatrixScratch& s, size_t r, std::span<const MatrixHit> hits, size_t limit, float* out) const;
   // Adds the last hits of a sum over rays, and the sum, as rows over the incident basis, to out.

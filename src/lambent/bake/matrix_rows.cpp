@@ -76,17 +76,20 @@ void MatrixRows::add_rows(size_t r, size_t, const float* Y, size_t, float* y, fl
   auto s = gather_.scratch.borrow();
   MatrixHits again;
   std::span<const MatrixHit> mine;
+  const Vec3* through = nullptr;
   if (is_kept_[b]) {
     const MatrixHits& hits = kept_[b];
     const size_t first = i == 0 ? 0 : hits.ends[i - 1];
     mine = {hits.hits.data() + first, hits.ends[i] - first};
+    if (!hits.weights.empty()) through = hits.weights.data() + first;
     (void)gather_.aim(*s, r);
   } else {
     (void)gather_.trace(*s, r, &again);
     mine = again.hits, again_ += gather_.rays();
+    if (!again.weights.empty()) through = again.weights.data();
   }
-  gather_.scattered(*s, mine, gather_.rays(), Y, y);
-  if (half) gather_.scattered(*s, mine, gather_.setup.sets.half, Y, half);
+  gather_.scattered(*s, mine, through, gather_.rays(), Y, y);
+  if (half) gather_.scattered(*s, mine, through, gather_.setup.sets.half, Y, half);
 }
 
 void MatrixRows::keep(size_t first, size_t count, const float* y, size_t width, float* x) const {

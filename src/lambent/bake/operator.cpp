@@ -11,10 +11,10 @@ namespace lambent {
 void GatherOperator::trace_block(const GatherWanted& wanted, size_t begin, size_t end) {
   auto block = traced_->blocks.borrow();
   auto scratch = traced_->scratch.borrow();
-  std::vector<float> unwanted(wanted.sky.rows ? 0 : (end - begin) * setup_->coefficients());
+  std::vector<float> unwanted(wanted.sky.rows ? 0 : (end - begin) * setup_->sky_width());
   GatherSky sky = wanted.sky;
   if (sky.rows) sky.rows += begin * sky.stride;
-  else sky = {unwanted.data(), nullptr, setup_->coefficients(), nullptr, nullptr};
+  else sky = {unwanted.data(), nullptr, setup_->sky_width(), nullptr, nullptr};
   if (sky.half_rows) sky.half_rows += checked_count(begin) * sky.stride;
   sky.buried = buried_.data() + begin;
   std::optional<GatherDirect> direct;
@@ -60,7 +60,7 @@ Result<GatherOperator> GatherOperator::trace(const GatherSetup& setup, const Gat
                                              bool hits, size_t memory, Progress* progress) {
   return trace(
       setup,
-      {.direct = direct, .sky = {sky, nullptr, setup.coefficients(), nullptr, nullptr}, .hits = hits, .memory = memory},
+      {.direct = direct, .sky = {sky, nullptr, setup.sky_width(), nullptr, nullptr}, .hits = hits, .memory = memory},
       progress);
 }
 

@@ -35,7 +35,7 @@ class GatherOperator final : public LinearOperator {
   // Traces all receivers. The setup must outlive the operator. Errors: cancelled.
   static Result<GatherOperator> trace(const GatherSetup& setup, const GatherWanted& wanted,
                                       Progress* progress = nullptr);
-  // `direct` and `sky` ([receiver][coefficient]) may be null.
+  // `direct` and `sky` ([receiver][sky channel][coefficient]) may be null.
   static Result<GatherOperator> trace(const GatherSetup& setup, const GatherDirect* direct, float* sky, bool hits,
                                       size_t memory, Progress* progress = nullptr);
 

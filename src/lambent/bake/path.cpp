@@ -28,7 +28,9 @@ PathEnd follow_path(const Scene& scene, const Tracer& tracer, const Reflection& 
     const Vec3 p = interpolate(scene.positions, triangle, hit.u, hit.v);
     // Clear of the surface by more than the rounding of p, which grows with coordinates and edges.
     const Vec3 size = abs(p) + abs(scene.positions[triangle.v[1]] - p) + abs(scene.positions[triangle.v[2]] - p);
-    hit = tracer.closest(p + ng * (1e-5f * std::max({size.x, size.y, size.z})), end.direction);
+    Passage passage;
+    hit = tracer.closest(p + ng * (1e-5f * std::max({size.x, size.y, size.z})), end.direction, passage);
+    end.throughput *= passage.hit;
     if (hit.triangle == none) {
       end.leaves = true;
       break;

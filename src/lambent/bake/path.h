@@ -9,7 +9,7 @@ namespace lambent {
 // A path that a ray along `direction`, which met the scene at `hit`, takes from there by sampling the BRDFs.
 struct PathEnd {
   bool leaves = false;    // it left the scene after at most so many reflections; else it brings no light
-  Vec3 throughput{0.0f};  // product of f cos / density
+  Vec3 throughput{0.0f};  // product of f cos / density, and of what passes on the way
   Vec3 direction{0.0f};   // in which it left
 };
 

@@ -101,16 +101,17 @@ struct WalkRows final : LinearOperator {
     const WalkEnd end = walkers[m].walk(start.position, start.into, random, sum.events);
     ++sum.walks, sum.lost += end.how == WalkEnd::lost;
     if (end.how != WalkEnd::left) return;
-    const Hit hit = walkers[m].tracer.closest(end.position, end.direction);
+    Passage passage;
+    const Hit hit = walkers[m].tracer.closest(end.position, end.direction, passage);
     const size_t from = walkers.size() == 3 ? m : 0, to = walkers.size() == 3 ? m + 1 : channels;
     if (hit.triangle == none) {
       evaluate_sh(options.order, end.direction, y);
       for (size_t c = from; c < to; ++c)
-        for (size_t k = 0; k < C; ++k) row[c * C + k] += start.through * y[k];
+        for (size_t k = 0; k < C; ++k) row[c * C + k] += start.through * passage.hit[int(c)] * y[k];
     } else if (options.bounces > 0) {
       Vec3 weight(0);
       for (size_t c = from; c < to; ++c) weight[int(c)] = start.through / float(samples());
-      weight *= albedo(scene, scene.triangles[hit.triangle], hit.u, hit.v);
+      weight *= albedo(scene, scene.triangles[hit.triangle], hit.u, hit.v) * passage.hit;
       std::visit(
           [&](const auto& basis) {
             if (const auto* at = basis.find(hit.triangle, hit.front))
@@ -222,7 +223,8 @@ Result<Transfer> bake_subsurface(const Scene& scene, const Tracer& tracer, const
   const GatherSetup setup =
       make_gather_setup(scene, tracer, receivers, 1, 16, options.seed);  // for what it knows of albedos
   std::vector<Walker> walkers = make_walkers(scene, tracer, subsurface);
-  const size_t channels = walkers.size() == 3 || (options.bounces > 0 && setup.channels == 3) ? 3 : 1;
+  const size_t channels =
+      walkers.size() == 3 || (options.bounces > 0 && setup.channels == 3) || setup.sky_channels == 3 ? 3 : 1;
   const size_t n = receivers.count(), C = size_t(sh_count(options.order)), width = C * channels;
   const size_t fixed = 3 * n * width * sizeof(float);
   if (fixed > options.memory) return WalkRows::too_small(fixed);

@@ -24,7 +24,9 @@ struct VisibilityTracer {
   const VisibilityOptions& options;
   Cube cube = make_cube(options.size);
 
-  // Binary levels at the centres; returns rays.
+  float top() const { return float((1 << options.bits) - 1); }
+
+  // Levels at the centres, rounded; returns rays.
   size_t trace_centres(Vec3 origin, Vec3 n, Scratch& s) const {
     s.levels.assign(cube.count(), 0), s.texels.clear(), s.x.clear(), s.y.clear(), s.z.clear();
     const DirectionArray& d = cube.texels;
@@ -33,17 +35,15 @@ struct VisibilityTracer {
         s.texels.push_back(t), s.x.push_back(d.x[t]), s.y.push_back(d.y[t]), s.z.push_back(d.z[t]);
     s.seen.resize(s.texels.size());
     tracer.visible_fan(origin, {s.x.data(), s.y.data(), s.z.data(), s.texels.size()}, s.seen.data());
-    for (size_t i = 0; i < s.texels.size(); ++i) s.levels[s.texels[i]] = s.seen[i] > 0;
+    for (size_t i = 0; i < s.texels.size(); ++i) s.levels[s.texels[i]] = uint8_t(s.seen[i] * top() + 0.5f);
     return s.texels.size();
   }
 
-  // Shares in place of binary levels.
+  // Shares in place of those at the centres.
   size_t refine(Vec3 origin, Vec3 n, Scratch& s) const {
     const int size = cube.size;
-    const uint8_t top = uint8_t((1 << options.bits) - 1);
     const std::vector<uint8_t> centres = s.levels;
     size_t rays = 0;
-    for (uint8_t& level : s.levels) level = level ? top : 0;
     for (int face = 0; face < 6; ++face)
       for (int row = 0; row < size; ++row)
         for (int column = 0; column < size; ++column) {
@@ -65,7 +65,7 @@ struct VisibilityTracer {
           tracer.visible_fan(origin, {s.x.data(), s.y.data(), s.z.data(), s.x.size()}, s.seen.data());
           float sum = 0;
           for (float seen : s.seen) sum += seen;
-          s.levels[texel] = uint8_t(sum / float(fine * fine) * float(top) + 0.5f);
+          s.levels[texel] = uint8_t(sum / float(fine * fine) * top() + 0.5f);
           rays += s.x.size();
         }
     return rays;

@@ -12,7 +12,8 @@ namespace lambent {
 struct VisibilityOptions {
   int size = 64;  // of the cube
   // 1: binary. More: the share of a texel that is seen, in 2^bits levels, from one ray at the centre and, where a
-  // texel's neighbours disagree with it, 8 x 8 in place of that one.
+  // texel's neighbours disagree with it, 8 x 8 in place of that one. Surfaces that let light pass count as seen by
+  // their share, grey, rounded to a level.
   int bits = 1;
   size_t memory = size_t{4} << 30;  // bytes that the result may take, by an estimate made before it starts
 };

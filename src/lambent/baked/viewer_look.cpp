@@ -67,6 +67,25 @@ void LookWriter::add_blobs(std::vector<GltfBlob>& blobs) {
     if (!side.indices.empty()) blobs.push_back({bytes_of(side.at), 4}), blobs.push_back({bytes_of(side.indices), 4});
 }
 
+// What lets light pass looks so in any viewer: alpha, of black, and transmission, which the base colour tints.
+void keep_see_through(json& document, const json& original, json& lit) {
+  const json nothing = json::object();
+  auto member = [&](const json& parent, const char* key) -> const json& {
+    return parent.is_object() && parent.contains(key) ? parent[key] : nothing;
+  };
+  const json &pbr = member(original, "pbrMetallicRoughness"), &factor = member(pbr, "baseColorFactor");
+  if (original.contains("alphaMode") && original["alphaMode"] != "OPAQUE") {
+    lit["alphaMode"] = original["alphaMode"];
+    if (original.contains("alphaCutoff")) lit["alphaCutoff"] = original["alphaCutoff"];
+    if (factor.is_array() && factor.size() == 4) lit["pbrMetallicRoughness"]["baseColorFactor"][3] = factor[3];
+    if (pbr.contains("baseColorTexture")) lit["pbrMetallicRoughness"]["baseColorTexture"] = pbr["baseColorTexture"];
+  }
+  const json& glass = member(member(original, "extensions"), "KHR_materials_transmission");
+  if (glass.empty()) return;
+  lit["pbrMetallicRoughness"] = pbr, lit["extensions"]["KHR_materials_transmission"] = glass;
+  use_extension(document, "KHR_materials_transmission");
+}
+
 // A copy of the material that glows with the texture; lamps with their own emission, which, of those with a texture, is
 // in ours.
 size_t LookWriter::lit_material(json& document, const json& original, size_t texture, size_t set) const {
@@ -78,6 +97,7 @@ size_t LookWriter::lit_material(json& document, const json& original, size_t tex
   use_extension(document, "KHR_materials_specular"), use_extension(document, "KHR_materials_emissive_strength");
   const auto name = original.find("name");
   lit["name"] = (name != original.end() && name->is_string() ? name->get<std::string>() : "surface") + " with lightmap";
+  keep_see_through(document, original, lit);
   double own[3] = {0, 0, 0};
   if (original.contains("emissiveFactor") && original["emissiveFactor"].is_array() &&
       original["emissiveFactor"].size() == 3)

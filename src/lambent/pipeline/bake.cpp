@@ -30,9 +30,9 @@ struct Bake {
   const BakeRequest& request;
   const BakePlan& plan;
   const Job& job;
-  Scene scene;
-  PlacedReceivers placed;
-  Tracer tracer;
+  Scene scene{};
+  PlacedReceivers placed{};
+  Tracer tracer{};  // of the scene above, which stays where it is
   double load_seconds = 0, build_seconds = 0;
   BakeReport report{};
   // What it has made so far; a dense store may still become a smaller one.
@@ -122,6 +122,9 @@ Result<void> bake_blocks(Bake& b) {
   VisibilityReport report;
   auto visibility = bake_visibility(b.tracer, b.receivers(), b.plan.visibility, &report, b.job.progress);
   if (!visibility) return visibility.error();
+  if (b.tracer.lets_pass() && visibility->bits == 1)
+    b.job.warn("binary visibility holds what lets light pass as seen or not (--visibility bits:N holds shares)");
+  if (b.tracer.colours()) b.job.warn("visibility has no colour: coloured glass is kept grey");
   b.report.receivers = b.receivers().count(), b.report.rays = report.rays, b.report.trace_seconds = report.seconds;
   const VisibilityStatistics s = visibility_statistics(*visibility);
   b.summary.json.update(
@@ -269,24 +272,19 @@ void summarize(Bake& b) {
   if (r.error >= 0) b.line("error", fmt::format("{:.2f}% RMS, estimated from half-sample gathers", 100 * r.error));
 }
 
-Result<Bake> begin(const BakeRequest& request, const BakePlan& plan, const Job& job) {
+Result<void> begin(Bake& b) {
   auto start = Clock::now();
-  auto scene = load_scene_of(request, job);
+  auto scene = load_scene_of(b.request, b.job);
   if (!scene) return scene.error();
-  auto placed = place_receivers(*scene, request, job);
+  b.scene = std::move(*scene);
+  auto placed = place_receivers(b.scene, b.request, b.job);
   if (!placed) return placed.error();
-  const double load_seconds = seconds_since(start);
-  start = Clock::now();
-  auto tracer = Tracer::build(*scene, job.progress);
+  b.placed = std::move(*placed);
+  b.load_seconds = seconds_since(start), start = Clock::now();
+  auto tracer = Tracer::build(b.scene, b.job.progress);
   if (!tracer) return tracer.error();
-  return Bake{request,
-              plan,
-              job,
-              std::move(*scene),
-              std::move(*placed),
-              std::move(*tracer),
-              load_seconds,
-              seconds_since(start)};
+  b.tracer = std::move(*tracer), b.build_seconds = seconds_since(start);
+  return {};
 }
 
 // Stages after the surfaces' own, in their order; each takes a dense store.
@@ -301,9 +299,9 @@ Result<void> bake_beside(Bake& b, const std::optional<Lattice>& lattice, const s
 }
 
 Result<BakeOutcome> bake_plain(const BakeRequest& request, const BakePlan& plan, const Job& job) {
-  auto begun = begin(request, plan, job);
-  if (!begun) return begun.error();
+  const std::unique_ptr<Bake> begun(new Bake{request, plan, job});
   Bake& b = *begun;
+  if (auto ok = begin(b); !ok) return ok.error();
   std::optional<Lattice> lattice;
   if (!request.lattice.empty()) {
     auto parsed = lattice_of_request(request, b.scene);

@@ -56,9 +56,9 @@ double expected_seconds(const Scene& scene, const Tracer& tracer, const Receiver
     for (size_t i = begin; i < end; ++i) {
       const size_t first = i * blocks / sampled * gather_block,
                    count = std::min(gather_block, receivers.count() - first);
-      std::vector<float> rows(count * setup.coefficients());
+      std::vector<float> rows(count * setup.sky_width());
       std::vector<uint8_t> buried(count);
-      const GatherSky sky{rows.data(), nullptr, setup.coefficients(), nullptr, buried.data()};
+      const GatherSky sky{rows.data(), nullptr, setup.sky_width(), nullptr, buried.data()};
       trace_gather(setup, *scratch, first, count, &block, &sky);
       done += count;
     }

@@ -49,28 +49,38 @@ Vec3 light_from_lamps(const Integrator& integrator, const PathVertex& vertex, co
   Vec3 sum(0);
   // Shadow rays end at the lamp: a nearer hit hides it. Lamps are met from afar, so a relative margin will do.
   constexpr float margin = 1e-4f;
-  auto reaches = [&](Vec3 d, float distance) {
+  auto reaching = [&](Vec3 d, float distance) {  // share
+    if (integrator.intersector.lets_pass())
+      return integrator.intersector.transmitted(vertex.position, d, distance * (1 - margin));
     Hit hit;
-    if (!integrator.intersector.nearest(vertex.position, d, hit)) return true;
-    return length(surface_point(*integrator.scene, hit).position - vertex.position) >= distance * (1 - margin);
+    if (!integrator.intersector.nearest(vertex.position, d, hit)) return Vec3(1);
+    const float to_hit = length(surface_point(*integrator.scene, hit).position - vertex.position);
+    return Vec3(to_hit >= distance * (1 - margin) ? 1.0f : 0.0f);
   };
   const EmitterSample e = sample_emitter(integrator.emitters, vertex.position, samples.pair(lamp_pairs + 2 * depth).x,
                                          samples.pair(lamp_pairs + 2 * depth + 1));
   if (e.pdf > 0 && dot(vertex.ng, e.direction) > 0) {
     const Vec3 wi = e.direction * vertex.frame, f = evaluate(vertex.brdf, wi, vertex.wo);
-    if (!black(f) && reaches(e.direction, e.distance)) {
+    const Vec3 share = black(f) ? Vec3(0) : reaching(e.direction, e.distance);
+    if (!black(share)) {
       const float weight =
           integrator.strategy == Strategy::combined ? mis_weight(e.pdf, pdf(vertex.brdf, wi, vertex.wo)) : 1.0f;
-      sum += f * e.radiance * (wi.z * weight / e.pdf);
+      sum += share * f * e.radiance * (wi.z * weight / e.pdf);
     }
   }
   for (const PunctualLight& light : integrator.scene->lights) {
     const LampArrival a = arriving(light, vertex.position);
     if (black(a.irradiance) || dot(vertex.ng, a.direction) <= 0) continue;
     const Vec3 wi = a.direction * vertex.frame, f = evaluate(vertex.brdf, wi, vertex.wo);
-    if (!black(f) && reaches(a.direction, a.distance)) sum += f * a.irradiance * wi.z;
+    if (!black(f)) sum += reaching(a.direction, a.distance) * f * a.irradiance * wi.z;
   }
   return sum;
+}
+
+// Of the sky's light along d, what arrives.
+Vec3 from_sky(const Integrator& integrator, Vec3 position, Vec3 d) {
+  if (integrator.intersector.lets_pass()) return integrator.intersector.transmitted(position, d, INFINITY);
+  return Vec3(integrator.intersector.occluded(position, d) ? 0.0f : 1.0f);
 }
 
 }  // namespace
@@ -121,6 +131,18 @@ bool make_vertex(const Integrator& integrator, const Hit& hit, Vec3 d, PathVerte
   return true;
 }
 
+bool meets(const Integrator& integrator, Vec3 origin, Vec3 d, bool camera, const PathSamples& samples, uint32_t depth,
+           Hit& hit, Vec3& weight) {
+  weight = Vec3(1);
+  if (!integrator.intersector.lets_pass())
+    return camera ? integrator.intersector.nearest_visible(origin, d, hit)
+                  : integrator.intersector.nearest(origin, d, hit);
+  // Diffuse glass that passes everything reflects nothing; other models have a glint of their own.
+  const bool plain = integrator.reflection.model == Reflection::Model::diffuse && !integrator.reflection.everywhere;
+  const uint64_t key = hash64(hash64(samples.key, samples.index), 0x91a55u + uint64_t(depth));
+  return integrator.intersector.met(origin, d, camera, plain ? 1.0f : 0.75f, key, hit, weight);
+}
+
 PathVertex white_vertex(Vec3 origin, Vec3 n) { return {origin, n, frame_about(n), Vec3(0, 0, 1), Lambert{Vec3(1)}}; }
 
 Vec3 exit_radiance_estimate(const Integrator& integrator, PathVertex vertex, const PathSamples& samples) {
@@ -133,9 +155,10 @@ Vec3 exit_radiance_estimate(const Integrator& integrator, PathVertex vertex, con
       if (light.pdf > 0 && dot(vertex.ng, light.direction) > 0) {
         Vec3 wi = light.direction * vertex.frame;
         const auto [f, density] = evaluate_with_pdf(vertex.brdf, wi, wo);
-        if (!black(f) && !integrator.intersector.occluded(vertex.position, light.direction)) {
+        const Vec3 share = black(f) ? Vec3(0) : from_sky(integrator, vertex.position, light.direction);
+        if (!black(share)) {
           float weight = strategy == Strategy::combined ? mis_weight(light.pdf, density) : 1.0f;
-          sum += throughput * f * light.radiance * (wi.z * weight / light.pdf);
+          sum += throughput * share * f * light.radiance * (wi.z * weight / light.pdf);
         }
       }
     }
@@ -150,8 +173,15 @@ Vec3 exit_radiance_estimate(const Integrator& integrator, PathVertex vertex, con
     throughput *= next.weight;
     if (black(throughput)) break;
     Hit hit;
-    bool leaves = last && !integrator.lamps ? !integrator.intersector.occluded(vertex.position, d)
-                                            : !integrator.intersector.nearest(vertex.position, d, hit);
+    Vec3 weight_met;
+    bool leaves;
+    if (integrator.intersector.lets_pass()) {
+      leaves = !meets(integrator, vertex.position, d, false, samples, uint32_t(depth + 1), hit, weight_met);
+      throughput *= weight_met;
+    } else {
+      leaves = last && !integrator.lamps ? !integrator.intersector.occluded(vertex.position, d)
+                                         : !integrator.intersector.nearest(vertex.position, d, hit);
+    }
     if (leaves && strategy != Strategy::light_only) {
       float weight = strategy == Strategy::combined ? mis_weight(next.pdf, environment_pdf(integrator.sampler, d))
                                                     : 1.0f;

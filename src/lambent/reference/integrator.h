@@ -51,6 +51,10 @@ Result<Integrator> make_integrator(const Scene& scene, const Environment& env, i
 // False where nothing reflects towards -d: the back of a one-sided triangle.
 bool make_vertex(const Integrator& integrator, const Hit& hit, Vec3 d, PathVertex& vertex);
 
+// The surface that a ray meets, past those that it is drawn to pass (Intersector::met), `camera` as there; false: none.
+bool meets(const Integrator& integrator, Vec3 origin, Vec3 d, bool camera, const PathSamples& samples, uint32_t depth,
+           Hit& hit, Vec3& weight);
+
 // A white Lambert receiver.
 PathVertex white_vertex(Vec3 origin, Vec3 n);
 

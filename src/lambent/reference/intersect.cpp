@@ -1,15 +1,19 @@
 // Ray tracing by Embree 3: one scene, watertight ("robust") traversal, single rays.
 #include <lambent/core/parallel.h>
+#include <lambent/core/random.h>
 #include <lambent/reference/intersect.h>
+#include <lambent/scene/see_through.h>
 
 #include <embree3/rtcore.h>
 
+#include <algorithm>
 #include <cstring>
 
 namespace lambent::reference {
 
 struct Intersector::Impl {
   const Scene* scene = nullptr;
+  std::vector<uint8_t> see_through;  // by material; empty where all are solid
   RTCDevice device = nullptr;
   RTCScene bvh = nullptr;
   ~Impl() {
@@ -27,13 +31,21 @@ constexpr float offset_ulps = 16;
 struct CameraContext {
   RTCIntersectContext context;  // first, so that Embree's pointer to it is a pointer to this
   const Scene* scene;
+  const std::vector<uint32_t>* passed = nullptr;  // triangles that are not there any more
+  bool backs = false;
 };
 
-// Refuses backs of one-sided triangles. Embree's Ng is cross(v1 - v0, v2 - v0): it points to the front.
+// Refuses backs of one-sided triangles, and what was passed. Embree's Ng is cross(v1 - v0, v2 - v0): it points to the
+// front.
 void skip_backs(const RTCFilterFunctionNArguments* args) {
-  const Scene& scene = *reinterpret_cast<const CameraContext*>(args->context)->scene;
+  const CameraContext& context = *reinterpret_cast<const CameraContext*>(args->context);
+  const Scene& scene = *context.scene;
   for (unsigned i = 0; i < args->N; ++i) {
     if (args->valid[i] == 0) continue;
+    if (context.passed && std::find(context.passed->begin(), context.passed->end(),
+                                    RTCHitN_primID(args->hit, args->N, i)) != context.passed->end())
+      args->valid[i] = 0;
+    if (args->valid[i] == 0 || context.backs) continue;
     if (scene.triangles[RTCHitN_primID(args->hit, args->N, i)].two_sided) continue;
     float facing = RTCRayN_dir_x(args->ray, args->N, i) * RTCHitN_Ng_x(args->hit, args->N, i) +
                    RTCRayN_dir_y(args->ray, args->N, i) * RTCHitN_Ng_y(args->hit, args->N, i) +
@@ -48,13 +60,15 @@ void set_ray(RTCRay& ray, Vec3 origin, Vec3 d) {
   ray.time = 0, ray.mask = ~0u, ray.id = 0, ray.flags = 0;
 }
 
-bool trace(RTCScene bvh, RTCIntersectContext& context, Vec3 origin, Vec3 d, Hit& hit) {
+bool trace(RTCScene bvh, RTCIntersectContext& context, Vec3 origin, Vec3 d, Hit& hit, float* distance = nullptr) {
   RTCRayHit r;
   set_ray(r.ray, origin, d);
+  if (distance) r.ray.tnear = *distance;
   r.hit.geomID = RTC_INVALID_GEOMETRY_ID, r.hit.instID[0] = RTC_INVALID_GEOMETRY_ID;
   rtcIntersect1(bvh, &context, &r);
   if (r.hit.geomID == RTC_INVALID_GEOMETRY_ID) return false;
   hit = {r.hit.primID, r.hit.u, r.hit.v};
+  if (distance) *distance = r.ray.tfar;
   return true;
 }
 
@@ -63,7 +77,7 @@ bool trace(RTCScene bvh, RTCIntersectContext& context, Vec3 origin, Vec3 d, Hit&
 Result<Intersector> Intersector::make(const Scene& scene) {
   if (scene.triangles.empty()) return Error{scene.path, "no triangles to trace"};
   auto impl = std::make_shared<Impl>();
-  impl->scene = &scene;
+  impl->scene = &scene, impl->see_through = see_through_materials(scene);
   impl->device = rtcNewDevice(nullptr);
   if (!impl->device) return Error{scene.path, "the ray tracer cannot start"};
   impl->bvh = rtcNewScene(impl->device);
@@ -110,6 +124,66 @@ bool Intersector::occluded(Vec3 origin, Vec3 d) const {
   set_ray(ray, origin, d);
   rtcOccluded1(impl_->bvh, &context, &ray);
   return ray.tfar < 0;
+}
+
+// Where a ray has come to, and what it has passed.
+struct Intersector::Way {
+  float distance = 0;
+  std::vector<uint32_t> passed{};
+  // Surfaces so near each other, for their distance, are one sheet, passed once: the two sides of a pane that is
+  // modelled as two triangles, two triangles that share an edge.
+  static constexpr float same_sheet = 1e-6f;
+};
+
+bool Intersector::lets_pass() const { return !impl_->see_through.empty(); }
+
+// The next surface along the way, and the way to it; one that is of the same sheet as the last is passed already.
+bool Intersector::next(Vec3 origin, Vec3 d, bool camera, Way& way, Hit& hit) const {
+  for (;;) {
+    CameraContext context;
+    rtcInitIntersectContext(&context.context);
+    context.context.filter = skip_backs, context.scene = impl_->scene, context.passed = &way.passed;
+    context.backs = !camera;
+    const float last = way.distance;
+    float distance = way.distance * (1 - Way::same_sheet);
+    if (!trace(impl_->bvh, context.context, origin, d, hit, &distance)) return false;
+    const bool solid = !impl_->see_through[impl_->scene->parts[impl_->scene->triangles[hit.triangle].part].material];
+    const bool same = !way.passed.empty() && distance <= last * (1 + Way::same_sheet);
+    if (solid || !same) return way.distance = distance, true;
+    way.passed.push_back(hit.triangle);
+  }
+}
+
+bool Intersector::met(Vec3 origin, Vec3 d, bool camera, float most, uint64_t key, Hit& hit, Vec3& weight) const {
+  weight = Vec3(1);
+  Way way;
+  while (next(origin, d, camera, way, hit)) {
+    const Triangle& t = impl_->scene->triangles[hit.triangle];
+    const Material& material = impl_->scene->materials[impl_->scene->parts[t.part].material];
+    const float covered = coverage(*impl_->scene, t, hit.u, hit.v);
+    const Vec3 pass = transmittance(*impl_->scene, t, hit.u, hit.v);
+    float on = largest(pass);
+    if (covered > 0) on = std::min(on, largest(material.emissive) > 0 ? 0.5f : most);
+    if (to_unit_float(uint32_t(hash64(key, uint64_t(hit.triangle)) >> 32)) >= on) {
+      weight *= covered / (1 - on);
+      return true;
+    }
+    weight *= pass / on;
+    way.passed.push_back(hit.triangle);
+  }
+  return false;
+}
+
+Vec3 Intersector::transmitted(Vec3 origin, Vec3 d, float distance) const {
+  Vec3 product(1);
+  Hit hit;
+  Way way;
+  while (next(origin, d, false, way, hit) && way.distance < distance) {
+    product *= transmittance(*impl_->scene, impl_->scene->triangles[hit.triangle], hit.u, hit.v);
+    if (product == Vec3(0)) break;
+    way.passed.push_back(hit.triangle);
+  }
+  return product;
 }
 
 SurfacePoint surface_point(const Scene& scene, const Hit& hit) {

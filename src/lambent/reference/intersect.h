@@ -25,7 +25,19 @@ class Intersector {
   // Whether any triangle, of either side, lies along origin + t d, t > 0.
   bool occluded(Vec3 origin, Vec3 d) const;
 
+  // Whether light passes through some surfaces (scene/see_through.h); the rest is for scenes where it does.
+  bool lets_pass() const;
+  // Nearest surface that the ray is drawn not to pass, by numbers keyed by `key`; false: it leaves the scene. `camera`:
+  // as nearest_visible(). The weight is what of light from there arrives, over the probability of having been drawn:
+  // coloured by what was passed, and times what is covered of where it stopped. At most `most` is the probability of
+  // passing a surface that reflects.
+  bool met(Vec3 origin, Vec3 d, bool camera, float most, uint64_t key, Hit& hit, Vec3& weight) const;
+  // Of light from `distance` away along d, what arrives: the product over the surfaces between.
+  Vec3 transmitted(Vec3 origin, Vec3 d, float distance) const;
+
  private:
+  struct Way;
+  bool next(Vec3 origin, Vec3 d, bool camera, Way& way, Hit& hit) const;
   struct Impl;
   std::shared_ptr<const Impl> impl_;
 };

@@ -1,6 +1,7 @@
 // Light sampling over areas: P. Shirley, C. Wang and K. Zimmerman, "Monte Carlo techniques for direct lighting
 // calculations", 1996.
 #include <lambent/reference/lamps.h>
+#include <lambent/scene/see_through.h>
 
 #include <algorithm>
 
@@ -46,7 +47,7 @@ EmitterSample sample_emitter(const EmitterSampler& s, Vec3 point, float pick, Ve
   sample.distance = length(to);
   if (!(sample.distance > 0)) return {};
   sample.direction = to / sample.distance;
-  sample.radiance = emitted(*s.scene, hit, sample.direction);
+  sample.radiance = emitted(*s.scene, hit, sample.direction) * coverage(*s.scene, t, hit.u, hit.v);
   const float facing = std::abs(dot(at.ng, sample.direction));
   if (sample.radiance == Vec3(0) || !(facing > 0)) return {};
   sample.pdf = float(area_density(s, material_emission(*s.scene, t)) * double(sample.distance) *

@@ -38,26 +38,29 @@ Result<ReferenceImage> render(const Integrator& integrator, const Camera& camera
   auto render_pixel = [&](size_t x, size_t y) {
     const size_t pixel = y * width + x;
     Moments moments;
-    int covered = 0;
+    float covered = 0;
     for (int i = 0; i < options.spp; ++i) {
       if (i % 256 == 0 && is_cancelled(progress)) return;
       PathSamples samples(hash64(seed, pixel), uint32_t(i), uint32_t(options.spp));
       Vec2 jitter = samples.pair(0);
-      Vec3 d = rays.direction(float(x) + jitter.x, float(y) + jitter.y), value(0);
+      Vec3 d = rays.direction(float(x) + jitter.x, float(y) + jitter.y), value(0), weight;
       Hit hit;
       PathVertex vertex;
-      if (integrator.intersector.nearest_visible(rays.eye, d, hit)) {
+      if (meets(integrator, rays.eye, d, true, samples, 0, hit, weight)) {
         ++covered;
         if (integrator.lamps) value += emitted(*integrator.scene, hit, d);
         if (make_vertex(integrator, hit, d, vertex)) value += exit_radiance_estimate(integrator, vertex, samples);
       } else if (options.background) {
         value = radiance_bilinear(*integrator.environment, d);
+      } else {
+        covered += 1 - (weight.x + weight.y + weight.z) / 3;
       }
+      value *= weight;
       moments.add(Vec3d(value));
     }
     result.image.rgb[pixel] = moments.mean(options.spp);
     result.variance[pixel] = moments.variance(options.spp);
-    if (!options.background) result.image.alpha[pixel] = float(covered) / float(options.spp);
+    if (!options.background) result.image.alpha[pixel] = std::clamp(covered / float(options.spp), 0.0f, 1.0f);
   };
 
   const size_t across = (width + tile - 1) / tile, down = (height + tile - 1) / tile;

@@ -8,6 +8,7 @@
 // integral of f L max(0, n . wi) over the directions wi above the true (geometric) surface; what lies along wi is
 // decided by true geometry. With k bounces, light reaches the first hit directly or after reflection at 1, 2, ... k
 // other points. No path is cut short or dropped at random.
+// Surfaces that let light pass (scene/see_through.h) are met or passed at random, and exactly on the way to lights.
 #include <lambent/core/camera.h>
 #include <lambent/core/progress.h>
 #include <lambent/light/environment.h>

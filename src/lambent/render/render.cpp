@@ -5,6 +5,7 @@
 #include <lambent/render/render.h>
 #include <lambent/scene/lights.h>
 #include <lambent/scene/reflection.h>
+#include <lambent/scene/see_through.h>
 
 namespace lambent {
 namespace {
@@ -23,9 +24,31 @@ Hit first_visible(const Scene& scene, const Tracer& tracer, Vec3 eye, Vec3 direc
 struct PixelRay {
   Hit hit;  // no triangle where it meets nothing
   Vec3 direction;
+  Vec3 weight{1};  // of what is met in the ray: less than all where light passes, here or before
 };
-// Calls a visitor with every pixel, row by row from the top, and its rays. `make_visit` is called once for each row of
-// the picture, on the thread that draws it.
+
+// What a ray shows, nearest first: surfaces that let light pass, and what is behind them.
+void see_through(const Scene& scene, const Tracer& tracer, Vec3 eye, Vec3 direction, std::vector<PixelRay>& out) {
+  thread_local std::vector<Hit> layers;
+  Vec3 through(1);
+  float from = 0;
+  for (int skipped = 0; skipped < 64; ++skipped) {
+    tracer.layers(eye, direction, from, layers);
+    for (const Hit& h : layers) {
+      const Triangle& t = scene.triangles[h.triangle];
+      if (!h.front && !t.two_sided) continue;
+      const float there = tracer.lets_pass(h.triangle) ? coverage(scene, t, h.u, h.v) : 1.0f;
+      if (there > 0) out.push_back({h, direction, there * through});
+      through *= tracer.lets_pass(h.triangle) ? transmittance(scene, t, h.u, h.v) : Vec3(0);
+      if (through == Vec3(0)) return;
+    }
+    if (layers.empty() || tracer.lets_pass(layers.back().triangle)) break;
+    from = std::nextafter(layers.back().distance * (1 + 1e-6f), INFINITY);
+  }
+  out.push_back({{}, direction, through});
+}
+// Calls a visitor with every pixel, row by row from the top, and what its rays show. `make_visit` is called once for
+// each row of the picture, on the thread that draws it.
 using VisitPixel = std::function<void(size_t pixel, std::span<const PixelRay> rays)>;
 Result<void> trace_pixels(const Scene& scene, const Tracer& tracer, const Camera& camera, const RenderOptions& options,
                           const std::function<VisitPixel()>& make_visit, Progress* progress) {
@@ -34,14 +57,16 @@ Result<void> trace_pixels(const Scene& scene, const Tracer& tracer, const Camera
   parallel_for(size_t(options.height), 1, [&](size_t begin, size_t end) {
     if (stage.cancelled()) return;
     const VisitPixel visit = make_visit();
-    std::vector<PixelRay> rays(size_t(options.samples));
+    std::vector<PixelRay> rays;
     for (int y = int(begin); y < int(end); ++y)
       for (int x = 0; x < options.width && !stage.cancelled(); ++x) {
         const uint32_t key = uint32_t(hash64(uint64_t(y) << 32 | uint64_t(x), 0xf11));
+        rays.clear();
         for (int s = 0; s < options.samples; ++s) {
           const Vec2 jitter = sobol_owen(uint32_t(s), key);
           const Vec3 direction = camera_rays.direction(float(x) + jitter.x, float(y) + jitter.y);
-          rays[size_t(s)] = {first_visible(scene, tracer, camera_rays.eye, direction), direction};
+          if (tracer.lets_pass()) see_through(scene, tracer, camera_rays.eye, direction, rays);
+          else rays.push_back({first_visible(scene, tracer, camera_rays.eye, direction), direction});
         }
         visit(size_t(y) * size_t(options.width) + size_t(x), rays);
       }
@@ -50,6 +75,8 @@ Result<void> trace_pixels(const Scene& scene, const Tracer& tracer, const Camera
   if (stage.cancelled()) return Error{"", "cancelled"};
   return {};
 }
+
+float mean(Vec3 v) { return v.x == v.y && v.y == v.z ? v.x : (v.x + v.y + v.z) / 3; }
 
 // What the light at a hit is multiplied by.
 Vec3 shown_colour(const Scene& scene, const RenderOptions& options, const Hit& hit) {
@@ -90,13 +117,18 @@ Result<Image> render_surfaces(const Scene& scene, const Tracer& tracer, const Ca
       [&]() -> VisitPixel {
         return [&, shade = make_shade()](size_t pixel, std::span<const PixelRay> rays) {
           Vec3 sum(0.0f);
-          size_t covered = 0;
+          const float samples = float(options.samples);
+          float open = 0;
           for (const PixelRay& ray : rays) {
-            if (ray.hit.triangle != none) sum += shade(ray.hit, ray.direction), ++covered;
-            else if (options.background) sum += radiance_bilinear(*options.background, ray.direction);
+            if (ray.hit.triangle != none) {
+              sum += ray.weight * shade(ray.hit, ray.direction);
+              continue;
+            }
+            open += mean(ray.weight);
+            if (options.background) sum += ray.weight * radiance_bilinear(*options.background, ray.direction);
           }
-          image.rgb[pixel] = sum / float(rays.size());
-          if (!options.background) image.alpha[pixel] = float(covered) / float(rays.size());
+          image.rgb[pixel] = sum / samples;
+          if (!options.background) image.alpha[pixel] = std::max(samples - open, 0.0f) / samples;
         };
       },
       progress);
@@ -163,17 +195,20 @@ Result<FixedViewTransfer> fix_view(const Scene& scene, const Tracer& tracer, con
         return [&, asked = std::vector<Asked>(), weights = std::vector<ViewWeights>(size_t(transfer.rows)),
                 row = std::vector<float>(3 * C)](size_t pixel, std::span<const PixelRay> rays) mutable {
           asked.clear();
-          size_t covered = 0;
+          const float samples = float(options.samples);
+          float open = 0;
           for (const PixelRay& ray : rays) {
-            if (ray.hit.triangle == none) continue;
-            ++covered;
+            if (ray.hit.triangle == none) {
+              open += mean(ray.weight);
+              continue;
+            }
             reflect_at(
                 scene, basis, options, ray.hit, ray.direction, weights, [&](uint32_t receiver, int r, Vec3 weight) {
                   auto place =
                       std::find_if(asked.begin(), asked.end(), [&](const Asked& a) { return a.first == receiver; });
                   if (place == asked.end())
                     place = asked.insert(asked.end(), {receiver, std::vector<Vec3>(size_t(transfer.rows), Vec3(0.0f))});
-                  place->second[size_t(r)] += weight / float(rays.size());
+                  place->second[size_t(r)] += ray.weight * weight / samples;
                 });
           }
           std::fill(row.begin(), row.end(), 0.0f);
@@ -186,7 +221,7 @@ Result<FixedViewTransfer> fix_view(const Scene& scene, const Tracer& tracer, con
               }
           }
           store_receiver(fixed, pixel, row);
-          out.coverage[pixel] = float(covered) / float(rays.size());
+          out.coverage[pixel] = std::max(samples - open, 0.0f) / samples;
         };
       },
       progress);

@@ -34,8 +34,8 @@ Result<Image> render(const Scene& scene, const Tracer& tracer, const SpatialBasi
 
 // O(view) . T with the view fixed: a transfer whose receivers are the pixels of a picture, row by row from the top,
 // with one row and three channels, so that relighting is T . light and the picture is there. Directional lightmaps and
-// lamps that are seen are left out. coverage: of each pixel, [0, 1]. Source: general-prt, "Special cases" (fixed view:
-// image relighting). Errors: cancelled.
+// lamps that are seen are left out. coverage: of each pixel, [0, 1], grey behind glass. Source: general-prt, "Special
+// cases" (fixed view: image relighting). Errors: cancelled.
 struct FixedViewTransfer {
   Transfer transfer;
   std::vector<float> coverage;

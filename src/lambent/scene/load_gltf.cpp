@@ -177,6 +177,9 @@ class PrimitiveReader {
           std::to_string(skipped_) +
           (skipped_ == 1 ? " primitive of points or lines is" : " primitives of points or lines are") + " not lit");
     }
+    if (faded_)
+      scene_.warnings.push_back("the alpha of vertex colours is not read (" + std::to_string(faded_) +
+                                (faded_ == 1 ? " primitive)" : " primitives)"));
     return true;
   }
   const std::vector<size_t>& parts_without_normals() const { return bare_; }
@@ -234,7 +237,8 @@ class PrimitiveReader {
         !read_placement(check_, document_, pose_, node, primitive, vertices, where, placement) ||
         !read_vertices(check_, document_, *attributes, positions, vertices, targets, placement, where, scene_.positions,
                        scene_.normals) ||
-        !read_texcoords(*attributes, vertices, where) || !read_colors(*attributes, vertices, where) ||
+        !read_texcoords(*attributes, vertices, where) ||
+        !read_colors(*attributes, vertices, scene_.materials[part.material], where) ||
         !read_tangents(*attributes, vertices, placement, where)) {
       return false;
     }
@@ -288,7 +292,8 @@ class PrimitiveReader {
     return true;
   }
 
-  bool read_colors(const Json& attributes, const GltfVertices& vertices, const GltfWhere& where) {
+  bool read_colors(const Json& attributes, const GltfVertices& vertices, const Material& material,
+                   const GltfWhere& where) {
     const size_t count = vertices.size(), first = scene_.positions.size() - count;
     auto a = read_attribute(check_, document_, attributes, "COLOR_0", vertices.count, where);
     if (!check_.ok()) return false;
@@ -299,6 +304,14 @@ class PrimitiveReader {
         return check_.fail(where, "COLOR_0 is not three or four colour components");
       }
     }
+    if (a && a->components == 4 && material.alpha_mode != AlphaMode::opaque)
+      for (size_t i = 0; i < count; ++i) {
+        double rgba[4] = {};
+        a->read(vertices[i], rgba);
+        if (rgba[3] >= 1) continue;
+        ++faded_;
+        break;
+      }
     if (!a && scene_.colors.empty()) return true;
     scene_.colors.resize(first + count, Vec3(1.0f));
     for (size_t i = 0; a && i < count; ++i) {
@@ -412,7 +425,7 @@ class PrimitiveReader {
   const std::vector<uint32_t> users_;
   std::vector<size_t> bare_;
   std::vector<uint32_t> places_;  // of an accessor's elements among those in use; none between parts
-  uint64_t visited_ = 0, skipped_ = 0, zeros_ = 0, work_ = 0, triangles_ = 0;
+  uint64_t visited_ = 0, skipped_ = 0, faded_ = 0, zeros_ = 0, work_ = 0, triangles_ = 0;
 };
 
 bool read_scene(GltfCheck& check, GltfDocument& document, std::span<const uint8_t> binary, const std::string& folder,

@@ -293,6 +293,47 @@ TEST(LoadGltf, Materials) {
   EXPECT_EQ(s.materials[2].roughness, 0.75f);
 }
 
+TEST(LoadGltf, WhatLetsLightPass) {
+  auto with = [](nlohmann::json material) {
+    Builder b = triangle();
+    primitive(b)["material"] = 0;
+    b.json["materials"] = {std::move(material)};
+    return b;
+  };
+  nlohmann::json glass = {{"alphaMode", "MASK"},
+                          {"alphaCutoff", 0.75},
+                          {"pbrMetallicRoughness", {{"baseColorFactor", {1, 1, 1, 0.5}}, {"roughnessFactor", 0}}},
+                          {"extensions", {{"KHR_materials_transmission", {{"transmissionFactor", 0.25}}}}}};
+  Scene s = loaded(with(glass));
+  EXPECT_EQ(s.materials[0].alpha_mode, AlphaMode::mask);
+  EXPECT_EQ(s.materials[0].alpha_cutoff, 0.75f);
+  EXPECT_EQ(s.materials[0].transmission, 0.25f);
+  EXPECT_TRUE(s.warnings.empty());
+  // Beyond what makes sense: nothing is left above 1; what is below 0, or no number, is refused or clamped.
+  glass["alphaCutoff"] = 1e30, glass["pbrMetallicRoughness"]["baseColorFactor"][3] = -4;
+  glass["extensions"]["KHR_materials_transmission"]["transmissionFactor"] = 9;
+  s = loaded(with(glass));
+  EXPECT_EQ(s.materials[0].alpha_cutoff, 2);
+  EXPECT_EQ(s.materials[0].alpha, 0);
+  EXPECT_EQ(s.materials[0].transmission, 1);
+  glass["alphaCutoff"] = "half";
+  EXPECT_FALSE(message(with(glass)).empty());
+  glass.erase("alphaCutoff");
+
+  glass["alphaMode"] = "HASHED", glass["pbrMetallicRoughness"]["roughnessFactor"] = 0.5;
+  s = loaded(with(glass));
+  EXPECT_EQ(s.materials[0].alpha_mode, AlphaMode::opaque);
+  EXPECT_EQ(s.warnings,
+            (std::vector<std::string>{"1 material has an unknown alphaMode and is opaque",
+                                      "1 material with rough or thick transmission passes light straight on"}));
+  glass["extensions"]["KHR_materials_transmission"]["transmissionTexture"] = {{"index", 3}};
+  EXPECT_FALSE(message(with(glass)).empty());  // there is no such texture
+
+  Builder faded = with({{"alphaMode", "BLEND"}});
+  primitive(faded)["attributes"]["COLOR_0"] = faded.floats({1, 1, 1, 1, 1, 1, 1, 0.5f, 1, 1, 1, 1}, "VEC4");
+  EXPECT_EQ(loaded(faded).warnings, std::vector<std::string>{"the alpha of vertex colours is not read (1 primitive)"});
+}
+
 // 2 x 2 pixels: red green / blue white.
 const Bytes four_colors = {255, 0, 0, 0, 255, 0, 0, 0, 255, 255, 255, 255};
 
