@@ -1,5 +1,5 @@
 // glTF 2.0 specification (ISO/IEC 12113), sections 3.8 and 3.9; KHR_texture_transform, KHR_materials_emissive_strength,
-// KHR_materials_pbrSpecularGlossiness.
+// KHR_materials_unlit, KHR_materials_pbrSpecularGlossiness, EXT_texture_webp.
 #include <lambent/scene/gltf_materials.h>
 
 #include <lambent/scene/gltf_container.h>
@@ -57,7 +57,9 @@ GltfMaterial read_material(GltfCheck& check, const Json& json, size_t texture_co
   m.double_sided = check.boolean(json, "doubleSided", false, where);
   std::string alpha = check.text(json, "alphaMode", where);
   out.opaque = alpha.empty() || alpha == "OPAQUE";
-  if (const Json* gloss = read_extension(check, json, "KHR_materials_pbrSpecularGlossiness", where)) {
+  out.unlit = read_extension(check, json, "KHR_materials_unlit", where) != nullptr;
+  const Json* gloss = read_extension(check, json, "KHR_materials_pbrSpecularGlossiness", where);
+  if (gloss && !out.unlit) {
     m.base_color = read_color(check, *gloss, "diffuseFactor", where);
     m.metallic = 0.0f;
     m.roughness = 1.0f - read_share(check, *gloss, "glossinessFactor", where);
@@ -68,6 +70,10 @@ GltfMaterial read_material(GltfCheck& check, const Json& json, size_t texture_co
     m.roughness = read_share(check, *pbr, "roughnessFactor", where);
     read_texture_reference(check, *pbr, "baseColorTexture", texture_count, where, out.base_color);
     read_texture_reference(check, *pbr, "metallicRoughnessTexture", texture_count, where, out.metallic_roughness);
+  }
+  if (out.unlit) {  // of all else, only the colour counts
+    m.metallic = 0, m.roughness = 1, out.metallic_roughness = {};
+    return out;
   }
   double factor[3] = {0, 0, 0}, strength = 1;
   check.numbers(json, "emissiveFactor", factor, where);
@@ -115,14 +121,27 @@ class TextureReader {
       wrap_s = read_wrap(check, json, "wrapS", {"sampler", *sampler});
       wrap_t = read_wrap(check, json, "wrapT", {"sampler", *sampler});
     }
-    auto image = check.index(texture, "source", gltf_count(document_.json, "images"), where);
-    if (check.ok() && !image) check.fail(where, "has no PNG or JPEG image");
+    std::vector<size_t> images;  // the first that can be read counts
+    const size_t count = gltf_count(document_.json, "images");
+    if (const Json* webp = read_extension(check, texture, "EXT_texture_webp", where))
+      if (auto image = check.index(*webp, "source", count, where)) images.push_back(*image);
+    if (auto image = check.index(texture, "source", count, where)) images.push_back(*image);
+    if (check.ok() && images.empty()) check.fail(where, "has no PNG, JPEG or WebP image");
     if (!check.ok()) return -1;
+    for (size_t i = 0; i + 1 < images.size(); ++i) {
+      GltfCheck trial = check;
+      const int read = read_image(trial, index, images[i], wrap_s, wrap_t);
+      if (trial.ok()) return read;
+    }
+    return read_image(check, index, images.back(), wrap_s, wrap_t);
+  }
 
-    GltfWhere image_where{"image", *image};
-    if (!problems_[*image].empty()) check.fail(image_where, problems_[*image]);
-    std::span<const uint8_t> bytes = image_bytes(check, document_, *image, image_where);
-    const Json& json = gltf_item(document_.json, "images", *image);
+ private:
+  int read_image(GltfCheck& check, size_t texture, size_t image, Wrap wrap_s, Wrap wrap_t) {
+    GltfWhere image_where{"image", image};
+    if (!problems_[image].empty()) check.fail(image_where, problems_[image]);
+    std::span<const uint8_t> bytes = image_bytes(check, document_, image, image_where);
+    const Json& json = gltf_item(document_.json, "images", image);
     std::string name = check.text(json, "name", image_where), uri = check.text(json, "uri", image_where);
     if (name.empty()) name = uri;
     if (!check.ok()) return -1;
@@ -138,29 +157,32 @@ class TextureReader {
       known_.erase(place);
       check.fail(image_where, (name.empty() ? "" : in_quotes(name) + " ") + result.error().message);
       return -1;
+    } else {
+      encoded_ += bytes.size();
     }
     pixels_ += uint64_t(decoded.width) * uint64_t(decoded.height);
-    if (pixels_ > max_pixels) {
+    const uint64_t most = std::min(max_pixels, free_pixels + texture_pixels_a_byte * encoded_);
+    if (pixels_ > most) {
       known_.erase(place);
-      check.fail(image_where, "the scene's material images have more than " + std::to_string(max_pixels) + " pixels");
+      check.fail(image_where, "the scene's material images have more than " + std::to_string(most) +
+                                  " pixels, which is what images of their bytes may have");
       return -1;
     }
     decoded_.try_emplace({bytes.data(), bytes.size()}, place->second);
     decoded.name = name, decoded.wrap_s = wrap_s, decoded.wrap_t = wrap_t;
     scene_.textures.push_back(std::move(decoded));
-    document_.textures.push_back(int(index));
+    document_.textures.push_back(int(texture));
     return place->second;
   }
 
- private:
-  static constexpr uint64_t max_pixels = uint64_t{1} << 30;
+  static constexpr uint64_t max_pixels = uint64_t{1} << 30, free_pixels = 4 * free_texture_pixels;
   using Bytes = std::pair<const uint8_t*, size_t>;
   GltfDocument& document_;
   const std::vector<std::string>& problems_;
   Scene& scene_;
   std::map<std::tuple<const uint8_t*, size_t, Wrap, Wrap>, int> known_;
   std::map<Bytes, int> decoded_;
-  uint64_t pixels_ = 0;
+  uint64_t pixels_ = 0, encoded_ = 0;
 };
 
 void warn_count(Scene& scene, size_t count, const char* one, const char* many) {
@@ -181,10 +203,10 @@ std::vector<GltfMaterial> read_materials(GltfCheck& check, const GltfDocument& d
 bool read_textures(GltfCheck& check, GltfDocument& document, const std::vector<GltfMaterial>& materials,
                    const std::vector<bool>& used, const std::vector<std::string>& image_problems, Scene& scene) {
   TextureReader reader(document, image_problems, scene);
-  size_t translucent = 0;
+  size_t translucent = 0, unlit = 0;
   for (size_t i = 0; i < materials.size(); ++i) {
     if (!used[i]) continue;
-    translucent += !materials[i].opaque;
+    translucent += !materials[i].opaque, unlit += materials[i].unlit;
     auto read = [&](GltfCheck& checked, const GltfTextureUse& use, const char* what) {
       if (use.texcoord_set <= 1) return reader.read(checked, *use.texture);
       checked.fail({"material", i}, std::string("its ") + what + " reads TEXCOORD_" + std::to_string(use.texcoord_set) +
@@ -218,6 +240,8 @@ bool read_textures(GltfCheck& check, GltfDocument& document, const std::vector<G
   }
   warn_count(scene, translucent, " material with alpha is treated as opaque",
              " materials with alpha are treated as opaque");
+  warn_count(scene, unlit, " unlit material is lit: a matte surface of its colour",
+             " unlit materials are lit: matte surfaces of their colour");
   return true;
 }
 
