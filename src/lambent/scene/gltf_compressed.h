@@ -16,12 +16,13 @@ class DecodeBudget {
   uint64_t left_;
 };
 
-// EXT_meshopt_compression and KHR_meshopt_compression (version 0 of the attribute codec): compressed buffer views
-// become plain ones. Views whose stream is of a kind that is not read stay the fallback that they say they are, if
-// there are bytes for it; else they are refused by name. Before anything reads a view.
+// EXT_meshopt_compression and KHR_meshopt_compression: compressed buffer views become plain ones. Views whose stream is
+// of a version or has a filter that is not known stay the fallback that they are, if there are bytes for it; else they
+// are refused by name. Before anything reads a view.
 bool decode_meshopt_views(GltfCheck& check, GltfDocument& document, DecodeBudget& budget);
-// Whether a buffer has bytes only for readers that know nothing of these extensions; it need not have any.
-bool is_fallback_buffer(const nlohmann::json& buffer);
+// The buffers that may have no bytes, or not all: those that say that they are fallbacks, or that compressed views
+// stand in.
+std::vector<bool> find_placeholders(const GltfDocument& document);
 
 // KHR_draco_mesh_compression: primitives get accessors of their decoded attributes and indices.
 bool decode_draco_primitives(GltfCheck& check, GltfDocument& document, DecodeBudget& budget);

@@ -34,8 +34,13 @@ void expect_same(const Scene& a, const Scene& b) {
   EXPECT_EQ(a.texcoords[0], b.texcoords[0]);
   EXPECT_EQ(a.colors, b.colors);
   ASSERT_EQ(a.triangles.size(), b.triangles.size());
-  for (size_t t = 0; t < a.triangles.size(); ++t)
-    for (int k = 0; k < 3; ++k) EXPECT_EQ(a.triangles[t].v[k], b.triangles[t].v[k]) << t;
+  for (size_t t = 0; t < a.triangles.size(); ++t) {
+    std::array<uint32_t, 3> p, q;  // from the same corner on: the codecs turn triangles
+    std::copy_n(a.triangles[t].v, 3, p.begin()), std::copy_n(b.triangles[t].v, 3, q.begin());
+    std::rotate(p.begin(), std::min_element(p.begin(), p.end()), p.end());
+    std::rotate(q.begin(), std::min_element(q.begin(), q.end()), q.end());
+    EXPECT_EQ(p, q) << t;
+  }
 }
 
 // A corner of a triangle with all that it carries.
@@ -186,9 +191,9 @@ TEST(GltfMeshopt, FiltersAreWithinTheirSteps) {
 }
 
 TEST(GltfMeshopt, QuaternionsOfAnAnimation) {
-  // A turn about +y of half a circle, and the same about a slanted axis on the way.
+  // Less than half a circle from one to the next.
   const Hills hills;
-  const std::vector<float> times = {0, 1, 2}, turns = {0, 0, 0, 1, 0.48f, 0.6f, -0.64f, 0, 0, 1, 0, 0};
+  const std::vector<float> times = {0, 1, 2}, turns = {0, 0, 0, 1, 0.24f, 0.3f, -0.32f, 0.8660254f, 0, 0.6f, 0, 0.8f};
   const auto animate = [&](Builder& b, const Json& output) {
     const size_t input = b.floats(times, "SCALAR");
     b.json["accessors"][input]["min"] = {0}, b.json["accessors"][input]["max"] = {2};
@@ -234,9 +239,9 @@ TEST(GltfMeshopt, WhatIsNotReadIsRefusedByNameOrTakenFromTheFallback) {
   };
   MeshoptBuilder m = meshopt_file(hills);
   const size_t at = extension_of(m.finished())["byteOffset"].get<size_t>();
-  m.file.binary[at] = 0xa1;
+  m.file.binary[at] = 0xa2;
   EXPECT_EQ(message(m.glb()),
-            "test.glb: buffer view 0: EXT_meshopt_compression: version 1 of the attribute codec is not supported");
+            "test.glb: buffer view 0: EXT_meshopt_compression: version 2 of the attribute codec is not supported");
   // The bytes of the fallback, where there are any: positions, in another buffer.
   Json json = m.finished();
   Bytes positions(hills.positions.size() * sizeof(float));
@@ -245,9 +250,20 @@ TEST(GltfMeshopt, WhatIsNotReadIsRefusedByNameOrTakenFromTheFallback) {
   expect_same(loaded(make_glb(json, m.file.binary)), loaded(hills.plain()));
 
   json = meshopt_file(hills).finished();
-  json["bufferViews"][0]["extensions"]["EXT_meshopt_compression"]["filter"] = "COLOR";
+  json["bufferViews"][0]["extensions"]["EXT_meshopt_compression"]["filter"] = "SPLINE";
   EXPECT_EQ(message(make_glb(json, meshopt_file(hills).file.binary)),
-            "test.glb: buffer view 0: EXT_meshopt_compression: the filter \"COLOR\" is not supported");
+            "test.glb: buffer view 0: EXT_meshopt_compression: the filter \"SPLINE\" is not supported");
+}
+
+// Buffers that say nothing of themselves may lack bytes as well, where only compressed views stand in them.
+TEST(GltfMeshopt, PlaceholdersNeedNoMark) {
+  const Hills hills;
+  const MeshoptBuilder m = meshopt_file(hills);
+  Json json = m.finished();
+  json["buffers"][1].erase("extensions");
+  expect_same(loaded(make_glb(json, m.file.binary)), loaded(hills.plain()));
+  json["bufferViews"][0].erase("extensions");
+  EXPECT_EQ(message(make_glb(json, m.file.binary)), "test.glb: buffer view 0: reaches past the end of buffer 1");
 }
 
 TEST(GltfMeshopt, WhatLiesIsRefused) {
@@ -261,7 +277,7 @@ TEST(GltfMeshopt, WhatLiesIsRefused) {
   const std::string view = "test.glb: buffer view 0: ", ours = view + "EXT_meshopt_compression: ";
   EXPECT_EQ(told({{"view", 0}, {"with", {{"count", 4'000'000'000u}}}}),
             ours + "is broken: too few bytes for its count");
-  EXPECT_EQ(told({{"view", 0}, {"with", {{"count", hills.count() + 16}}}}), ours + "is broken");
+  EXPECT_EQ(told({{"view", 0}, {"with", {{"count", hills.count() + 300}}}}), ours + "is broken");
   EXPECT_EQ(told({{"view", 0}, {"with", {{"byteStride", 6}}}}), ours + "its byteStride is not a multiple of 4");
   EXPECT_EQ(told({{"view", 0}, {"with", {{"byteStride", 0}}}}), ours + "its byteStride is not a multiple of 4");
   EXPECT_EQ(told({{"view", 0}, {"with", {{"filter", "OCTAHEDRAL"}}}}),

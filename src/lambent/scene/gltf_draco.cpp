@@ -162,7 +162,7 @@ class PrimitiveDecoder {
   }
 
  private:
-  static constexpr int array_buffer = 34962, element_array_buffer = 34963;
+  static constexpr unsigned array_buffer = 34962, element_array_buffer = 34963;
 
   bool fail(const std::string& why) { return check_.fail(where_, std::string(name) + " " + why); }
 
@@ -193,13 +193,13 @@ class PrimitiveDecoder {
         std::memcpy(bytes_.data() + at + (size_t(f) * 3 + k) * sizeof index, &index, sizeof index);
       }
     document_.json["accessors"].push_back({{"bufferView", add_view(at, element_array_buffer)},
-                                           {"componentType", int(GltfType::u32)},
+                                           {"componentType", unsigned(GltfType::u32)},
                                            {"count", count},
                                            {"type", "SCALAR"}});
     primitive["indices"] = document_.json["accessors"].size() - 1;
   }
 
-  size_t add_view(size_t at, int target) {
+  size_t add_view(size_t at, unsigned target) {
     document_.json["bufferViews"].push_back(
         {{"byteOffset", at}, {"byteLength", bytes_.size() - at}, {"target", target}});
     views_.push_back(document_.json["bufferViews"].size() - 1);

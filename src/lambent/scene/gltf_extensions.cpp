@@ -34,7 +34,7 @@ const std::map<std::string, const char*> unread_extensions{
     {"KHR_materials_diffuse_transmission", "no light passes through thin surfaces"},
     {"KHR_materials_dispersion", "nothing splits light into colours"},
     {"KHR_materials_iridescence", "thin films have no colours"},
-    {"KHR_materials_pbrSpecularGlossiness", "of it only diffuse colour and glossiness"},
+    {"KHR_materials_pbrSpecularGlossiness", "surfaces have its diffuse colour and glossiness alone"},
     {"KHR_materials_sheen", "cloth has no sheen"},
     {"KHR_materials_subsurface", "no light passes below the surface"},
     {"KHR_materials_transmission", "no light passes through surfaces"},
@@ -89,10 +89,9 @@ const Json* member(const Json& parent, const char* key) {
 
 // The extension that holds a texture's only image, where it is not read; null for textures that are.
 const char* unread_image(const Json& texture) {
-  const Json* extensions = member(texture, "extensions");
-  if (member(texture, "source") || !extensions || member(*extensions, "EXT_texture_webp")) return nullptr;
+  if (member(texture, "source") || find_extension(texture, "EXT_texture_webp")) return nullptr;
   for (const char* name : unread_images)
-    if (member(*extensions, name)) return name;
+    if (find_extension(texture, name)) return name;
   return nullptr;
 }
 
@@ -158,6 +157,11 @@ void drop_unread_textures(Json& document, std::vector<std::string>& warnings) {
   }
 }
 
+const Json* find_extension(const Json& holder, const char* name) {
+  const Json* extensions = member(holder, "extensions");
+  return extensions ? member(*extensions, name) : nullptr;
+}
+
 Json take_extension(Json& holder, const char* name) {
   if (!holder.is_object()) return {};
   const auto all = holder.find("extensions");
@@ -172,7 +176,7 @@ Json take_extension(Json& holder, const char* name) {
 
 bool uses_extension(const Json& value, const char* name) {
   if (!value.is_structured()) return false;
-  if (const Json* extensions = member(value, "extensions"); extensions && member(*extensions, name)) return true;
+  if (find_extension(value, name)) return true;
   return std::any_of(value.begin(), value.end(), [&](const Json& inner) { return uses_extension(inner, name); });
 }
 

@@ -21,6 +21,8 @@ void warn_of_unread_extensions(const nlohmann::json& document, std::vector<std::
 // pattern gives no light.
 void drop_unread_textures(nlohmann::json& document, std::vector<std::string>& warnings);
 
+// An extension of an object; null where it has none of the name.
+const nlohmann::json* find_extension(const nlohmann::json& holder, const char* name);
 // Takes an extension from an object, and with it an object of extensions that holds no other. Null where it is not
 // there.
 nlohmann::json take_extension(nlohmann::json& holder, const char* name);

@@ -3,6 +3,7 @@
 #include <lambent/scene/gltf_compressed.h>
 #include <lambent/scene/gltf_container.h>
 #include <lambent/scene/gltf_extensions.h>
+#include <lambent/scene/meshopt_v1.h>
 
 #include <meshoptimizer.h>
 
@@ -16,10 +17,13 @@ namespace {
 
 constexpr const char* names[] = {"KHR_meshopt_compression", "EXT_meshopt_compression"};
 
+constexpr uint8_t attribute_codec = 0xa0;
+
 struct Stream {
   std::span<const uint8_t> bytes;
   size_t count = 0, stride = 0;
   std::string mode, filter;
+  int version() const { return bytes.empty() ? 0 : bytes[0] - attribute_codec; }  // of the attribute codec
 };
 
 bool read_stream(GltfCheck& check, const GltfDocument& document, const Json& json, const GltfWhere& where, Stream& s) {
@@ -52,22 +56,24 @@ std::string broken_rule(const Stream& s) {
   const bool filtered = s.filter != "NONE";
   if (indices && filtered) return "indices have a filter";
   if (s.filter == "OCTAHEDRAL" && s.stride != 4 && s.stride != 8) return "OCTAHEDRAL goes with a stride of 4 or 8";
+  if (s.filter == "COLOR" && s.stride != 4 && s.stride != 8) return "COLOR goes with a stride of 4 or 8";
   if (s.filter == "QUATERNION" && s.stride != 8) return "QUATERNION goes with a stride of 8";
-  const uint64_t most = s.mode == "ATTRIBUTES" ? s.bytes.size() * uint64_t{64} / s.stride
+  const uint64_t expansion = s.version() == 1 ? 1024 : 64;
+  const uint64_t most = s.mode == "ATTRIBUTES" ? s.bytes.size() * expansion / s.stride
                       : s.mode == "TRIANGLES"  ? s.bytes.size() * uint64_t{3}
                                                : s.bytes.size();
   if (s.count > most) return "is broken: too few bytes for its count";
   return {};
 }
 
-// What of valid streams is not read. Empty where all is.
+// What of streams is not read. Empty where all is.
 std::string unread_kind(const Stream& s) {
-  constexpr uint8_t first_version = 0xa0, last_version = 0xaf;
-  if (s.mode == "ATTRIBUTES" && !s.bytes.empty() && s.bytes[0] > first_version && s.bytes[0] <= last_version)
-    return "version " + std::to_string(s.bytes[0] - first_version) + " of the attribute codec";
-  if (s.filter != "NONE" && s.filter != "OCTAHEDRAL" && s.filter != "QUATERNION" && s.filter != "EXPONENTIAL")
-    return "the filter " + in_quotes(s.filter);
-  return {};
+  constexpr int versions = 16;
+  if (s.mode == "ATTRIBUTES" && s.version() > 1 && s.version() < versions)
+    return "version " + std::to_string(s.version()) + " of the attribute codec";
+  for (const char* known : {"NONE", "OCTAHEDRAL", "QUATERNION", "EXPONENTIAL", "COLOR"})
+    if (s.filter == known) return {};
+  return "the filter " + in_quotes(s.filter);
 }
 
 bool decode(const Stream& s, std::vector<uint8_t>& out) {
@@ -76,9 +82,14 @@ bool decode(const Stream& s, std::vector<uint8_t>& out) {
     return meshopt_decodeIndexBuffer(out.data(), s.count, s.stride, s.bytes.data(), s.bytes.size()) == 0;
   if (s.mode == "INDICES")
     return meshopt_decodeIndexSequence(out.data(), s.count, s.stride, s.bytes.data(), s.bytes.size()) == 0;
-  if (meshopt_decodeVertexBuffer(out.data(), s.count, s.stride, s.bytes.data(), s.bytes.size()) != 0) return false;
+  if (s.version() == 1) {
+    if (!decode_attributes_v1(s.bytes, s.count, s.stride, out)) return false;
+  } else if (meshopt_decodeVertexBuffer(out.data(), s.count, s.stride, s.bytes.data(), s.bytes.size()) != 0) {
+    return false;
+  }
   if (s.filter == "OCTAHEDRAL") meshopt_decodeFilterOct(out.data(), s.count, s.stride);
   if (s.filter == "QUATERNION") meshopt_decodeFilterQuat(out.data(), s.count, s.stride);
+  if (s.filter == "COLOR") decode_color_filter(out, s.stride);
   if (s.filter == "EXPONENTIAL") meshopt_decodeFilterExp(out.data(), s.count, s.stride);
   return true;
 }
@@ -102,7 +113,7 @@ bool decode_view(GltfCheck& check, GltfDocument& document, size_t index, const c
   if (!budget.take(stream.count * stream.stride)) return refuse("the file expands to more than it may");
   std::vector<uint8_t> bytes;
   if (!decode(stream, bytes)) return refuse("is broken");
-  view["byteOffset"] = 0, view["byteLength"] = bytes.size();
+  view["byteOffset"] = 0u, view["byteLength"] = bytes.size();
   view["buffer"] = add_buffer(document, std::move(bytes));
   take_extension(view, name);
   return true;
@@ -110,13 +121,21 @@ bool decode_view(GltfCheck& check, GltfDocument& document, size_t index, const c
 
 }  // namespace
 
-bool is_fallback_buffer(const Json& buffer) {
-  const auto extensions = buffer.find("extensions");
-  if (extensions == buffer.end() || !extensions->is_object()) return false;
-  return std::any_of(std::begin(names), std::end(names), [&](const char* name) {
-    const auto found = extensions->find(name);
-    return found != extensions->end() && found->is_object() && found->value("fallback", Json()) == true;
-  });
+std::vector<bool> find_placeholders(const GltfDocument& document) {
+  std::vector<bool> placeholders(gltf_count(document.json, "buffers"));
+  for (const char* name : names) {
+    for (size_t i = 0; i < placeholders.size(); ++i) {
+      const Json* extension = find_extension(gltf_item(document.json, "buffers", i), name);
+      if (extension && extension->is_object() && extension->value("fallback", Json()) == true) placeholders[i] = true;
+    }
+    for (size_t i = 0; i < gltf_count(document.json, "bufferViews"); ++i) {
+      const Json& view = gltf_item(document.json, "bufferViews", i);
+      GltfCheck check("");
+      const auto buffer = check.index(view, "buffer", placeholders.size(), {});
+      if (buffer && find_extension(view, name)) placeholders[*buffer] = true;
+    }
+  }
+  return placeholders;
 }
 
 bool decode_meshopt_views(GltfCheck& check, GltfDocument& document, DecodeBudget& budget) {

@@ -92,6 +92,7 @@ class UriReader {
 
 bool read_buffers(GltfCheck& check, GltfDocument& document, std::span<const uint8_t> binary, UriReader& files) {
   const size_t count = gltf_count(document.json, "buffers");
+  const std::vector<bool> placeholders = find_placeholders(document);
   for (size_t i = 0; i < count; ++i) {
     GltfWhere where{"buffer", i};
     Json& buffer = document.json["buffers"][i];
@@ -99,17 +100,16 @@ bool read_buffers(GltfCheck& check, GltfDocument& document, std::span<const uint
     check.text(buffer, "uri", where);
     if (!check.ok()) return false;
     std::span<const uint8_t> bytes;
-    const bool fallback = is_fallback_buffer(buffer);
     if (buffer.contains("uri")) {
       auto read = files.read(buffer, "");
-      if (!read && !fallback) return check.fail(where, read.error().message);
+      if (!read && !placeholders[i]) return check.fail(where, read.error().message);
       if (read) bytes = *read;
     } else if (i == 0 && binary.data()) {
       bytes = binary;
-    } else if (!fallback) {
+    } else if (!placeholders[i]) {
       return check.fail(where, "has no bytes: neither a uri nor a GLB chunk");
     }
-    if (fallback) length = std::min<uint64_t>(length, bytes.size());
+    if (placeholders[i]) length = std::min<uint64_t>(length, bytes.size());
     if (length > bytes.size()) {
       return check.fail(
           where, "is truncated: has " + std::to_string(bytes.size()) + " of " + std::to_string(length) + " bytes");
