@@ -126,6 +126,47 @@ TEST(GltfExtensions, UnlitIsAMatteSurfaceOfItsColour) {
   EXPECT_EQ(a.warnings, Lines({"1 unlit material is lit: a matte surface of its colour"}));
 }
 
+TEST(GltfExtensions, IndexAndSpecularAreFresnelsReflectance) {
+  const auto dielectric = [](const Json& extensions) {
+    const Material m = loaded(dressed({{"extensions", extensions}})).materials[0];
+    return Vec4(m.dielectric_f0, m.dielectric_f90);
+  };
+  const auto ior = [](double n) { return Json{{"KHR_materials_ior", {{"ior", n}}}}; };
+  EXPECT_EQ(dielectric(Json::object()), Vec4(0.04f, 0.04f, 0.04f, 1)) << "1.5";
+  EXPECT_EQ(dielectric(ior(1.5)), Vec4(0.04f, 0.04f, 0.04f, 1));
+  EXPECT_EQ(dielectric(ior(3)), Vec4(0.25f, 0.25f, 0.25f, 1)) << "((3 - 1) / (3 + 1))^2";
+  EXPECT_EQ(dielectric(ior(1)), Vec4(0, 0, 0, 1));
+  EXPECT_EQ(dielectric(ior(0)), Vec4(1, 1, 1, 1)) << "a mirror";
+  Json both = ior(3);
+  both["KHR_materials_specular"] = {{"specularFactor", 0.5}, {"specularColorFactor", {0, 1, 8}}};
+  EXPECT_EQ(dielectric(both), Vec4(0, 0.125f, 0.5f, 0.5f)) << "weighted after it ends at 1";
+}
+
+TEST(GltfExtensions, WithoutSpecularASurfaceIsLambert) {
+  const Scene s = loaded(dressed({{"pbrMetallicRoughness", {{"metallicFactor", 0}, {"roughnessFactor", 0.3}}},
+                                  {"extensions", {{"KHR_materials_specular", {{"specularFactor", 0}}}}}}));
+  const Reflection materials{Reflection::Model::materials}, diffuse{Reflection::Model::diffuse};
+  const Vec3 wi = normalize(Vec3(0.3f, 0.2f, 1)), wo = normalize(Vec3(-0.4f, -0.2f, 1));
+  for (const Triangle& t : s.triangles) {
+    const Vec3 a = evaluate(surface_brdf(s, materials, t, 0.3f, 0.3f), wi, wo),
+               b = evaluate(surface_brdf(s, diffuse, t, 0.3f, 0.3f), wi, wo);
+    EXPECT_LT(length(a - b), 1e-6f);
+  }
+}
+
+TEST(GltfExtensions, SpecularOfMadeScenesIsWritten) {
+  TemporaryFolder folder;
+  Scene scene = loaded(dressed(Json::object()));
+  scene.document.reset();
+  for (Part& part : scene.parts) part.node = part.primitive = -1;
+  scene.materials[0].dielectric_f0 = Vec3(0.01f, 0.02f, 0.1f), scene.materials[0].dielectric_f90 = 0.5f;
+  ASSERT_TRUE(save_glb(folder.file("a.glb"), scene, {}, {}));
+  auto again = load_scene(folder.file("a.glb"));
+  ASSERT_TRUE(again) << again.error().text();
+  EXPECT_LT(length(again->materials[0].dielectric_f0 - scene.materials[0].dielectric_f0), 1e-7f);
+  EXPECT_EQ(again->materials[0].dielectric_f90, 0.5f);
+}
+
 TEST(GltfExtensions, TransformsOfEverySlotAreTheSameAsMovedCoordinates) {
   const double angle = 0.5, c = std::cos(angle), s = std::sin(angle);
   const Json transform = {{"offset", {0.25, -0.5}}, {"rotation", angle}, {"scale", {2, 3}}};

@@ -1,5 +1,6 @@
 // glTF 2.0 specification (ISO/IEC 12113), sections 3.8 and 3.9; KHR_texture_transform, KHR_materials_emissive_strength,
-// KHR_materials_unlit, KHR_materials_pbrSpecularGlossiness, EXT_texture_webp.
+// KHR_materials_unlit, KHR_materials_ior, KHR_materials_specular, KHR_materials_pbrSpecularGlossiness,
+// EXT_texture_webp.
 #include <lambent/scene/gltf_materials.h>
 
 #include <lambent/scene/gltf_container.h>
@@ -75,6 +76,7 @@ GltfMaterial read_material(GltfCheck& check, const Json& json, size_t texture_co
     m.metallic = 0, m.roughness = 1, out.metallic_roughness = {};
     return out;
   }
+  read_dielectric(check, json, where, out);
   double factor[3] = {0, 0, 0}, strength = 1;
   check.numbers(json, "emissiveFactor", factor, where);
   if (const Json* extension = read_extension(check, json, "KHR_materials_emissive_strength", where)) {
@@ -88,6 +90,22 @@ GltfMaterial read_material(GltfCheck& check, const Json& json, size_t texture_co
   if (const Json* info = check.object(json, "normalTexture", where))
     m.normal_scale = float(std::clamp(check.number(*info, "scale", 1, where), -steepest, steepest));
   return out;
+}
+
+// Fresnel's reflectance of the part that is no metal. An index of 0 stands for a mirror.
+void read_dielectric(GltfCheck& check, const Json& json, const GltfWhere& where, GltfMaterial& out) {
+  double index = 1.5, weight = 1, color[3] = {1, 1, 1};
+  if (const Json* ior = read_extension(check, json, "KHR_materials_ior", where))
+    index = std::max(0.0, check.number(*ior, "ior", index, where));
+  if (const Json* specular = read_extension(check, json, "KHR_materials_specular", where)) {
+    weight = std::clamp(check.number(*specular, "specularFactor", weight, where), 0.0, 1.0);
+    check.numbers(*specular, "specularColorFactor", color, where);
+    out.specular_textures = specular->contains("specularTexture") || specular->contains("specularColorTexture");
+  }
+  const double root = (index - 1) / (index + 1);
+  for (int c = 0; c < 3; ++c)
+    out.material.dielectric_f0[c] = float(weight * std::clamp(root * root * color[c], 0.0, 1.0));
+  out.material.dielectric_f90 = float(weight);
 }
 
 Wrap read_wrap(GltfCheck& check, const Json& sampler, const char* key, const GltfWhere& where) {
@@ -203,10 +221,10 @@ std::vector<GltfMaterial> read_materials(GltfCheck& check, const GltfDocument& d
 bool read_textures(GltfCheck& check, GltfDocument& document, const std::vector<GltfMaterial>& materials,
                    const std::vector<bool>& used, const std::vector<std::string>& image_problems, Scene& scene) {
   TextureReader reader(document, image_problems, scene);
-  size_t translucent = 0, unlit = 0;
+  size_t translucent = 0, unlit = 0, specular = 0;
   for (size_t i = 0; i < materials.size(); ++i) {
     if (!used[i]) continue;
-    translucent += !materials[i].opaque, unlit += materials[i].unlit;
+    translucent += !materials[i].opaque, unlit += materials[i].unlit, specular += materials[i].specular_textures;
     auto read = [&](GltfCheck& checked, const GltfTextureUse& use, const char* what) {
       if (use.texcoord_set <= 1) return reader.read(checked, *use.texture);
       checked.fail({"material", i}, std::string("its ") + what + " reads TEXCOORD_" + std::to_string(use.texcoord_set) +
@@ -242,6 +260,8 @@ bool read_textures(GltfCheck& check, GltfDocument& document, const std::vector<G
              " materials with alpha are treated as opaque");
   warn_count(scene, unlit, " unlit material is lit: a matte surface of its colour",
              " unlit materials are lit: matte surfaces of their colour");
+  warn_count(scene, specular, " material is without the textures of KHR_materials_specular, which are not read",
+             " materials are without the textures of KHR_materials_specular, which are not read");
   return true;
 }
 

@@ -15,6 +15,7 @@ struct GltfMaterial {
   Material material;  // its textures not set yet
   GltfTextureUse base_color, metallic_roughness, normal, emissive;
   bool opaque = true;
+  bool specular_textures = false;
   bool unlit = false;  // read as a matte surface of its colour
 };
 

@@ -46,6 +46,13 @@ class MaterialWriter {
       json["normalTexture"] = texture_reference(*texture, m.normal_set, m.normal_transform);
       if (m.normal_scale != 1) json["normalTexture"]["scale"] = finite_or(m.normal_scale, 1);
     }
+    if (m.dielectric_f0 != Material{}.dielectric_f0 || m.dielectric_f90 != Material{}.dielectric_f90) {
+      const float f90 = std::clamp(finite_or(m.dielectric_f90, 1), 1e-6f, 1.0f);  // the weight of both
+      const Vec3 color = m.dielectric_f0 / (f90 * Material{}.dielectric_f0);
+      json["extensions"]["KHR_materials_specular"] = {{"specularFactor", f90},
+                                                      {"specularColorFactor", {color.x, color.y, color.z}}};
+      out_.use_extension("KHR_materials_specular");
+    }
     add_emission(json, m.emissive);
     if (m.emissive_texture >= 0) {
       auto texture = add_texture(size_t(m.emissive_texture));

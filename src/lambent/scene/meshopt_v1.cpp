@@ -87,7 +87,7 @@ void add_deltas(uint8_t mode, const uint8_t* deltas, uint8_t* last) {
   else if (mode == 1)
     for (int k = 0; k < 4; k += 2)
       store(last + k, uint16_t(load<uint16_t>(last + k) + unzigzag(load<uint16_t>(deltas + k))));
-  else store(last, load<uint32_t>(last) ^ std::rotl(load<uint32_t>(deltas), mode >> 4));
+  else store(last, load<uint32_t>(last) ^ std::rotr(load<uint32_t>(deltas), mode >> 4));
 }
 
 }  // namespace

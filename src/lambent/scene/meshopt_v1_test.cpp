@@ -50,7 +50,7 @@ Bytes encode_v1(const Bytes& data, size_t stride, const Bytes& modes, const std:
         else if (mode == 1)
           for (int k = 0; k < 32; k += 16)
             d |= uint32_t(zigzag16(uint16_t((now >> k & 0xffff) - (before >> k & 0xffff)))) << k;
-        else d = std::rotr(now ^ before, mode >> 4);
+        else d = std::rotl(now ^ before, mode >> 4);
         for (size_t k = 0; k < 4; ++k) lanes[c + k][i] = uint8_t(d >> 8 * k);
       }
       last.assign(e, e + stride);
