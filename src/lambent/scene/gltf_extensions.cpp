@@ -13,10 +13,19 @@ using Json = nlohmann::json;
 
 namespace {
 
-const std::set<std::string> read_extensions{
-    "EXT_meshopt_compression",         "EXT_texture_webp",        "KHR_draco_mesh_compression", "KHR_lights_punctual",
-    "KHR_materials_emissive_strength", "KHR_materials_ior",       "KHR_materials_specular",     "KHR_materials_unlit",
-    "KHR_mesh_quantization",           "KHR_meshopt_compression", "KHR_texture_transform",      "LAMBENT_transfer"};
+const std::set<std::string> read_extensions{"EXT_meshopt_compression",
+                                            "EXT_texture_webp",
+                                            "KHR_draco_mesh_compression",
+                                            "KHR_lights_punctual",
+                                            "KHR_materials_emissive_strength",
+                                            "KHR_materials_ior",
+                                            "KHR_materials_specular",
+                                            "KHR_materials_transmission",
+                                            "KHR_materials_unlit",
+                                            "KHR_mesh_quantization",
+                                            "KHR_meshopt_compression",
+                                            "KHR_texture_transform",
+                                            "LAMBENT_transfer"};
 
 // Those that say where an image is, beside "source". Textures without another image are left out, and files may
 // require them.
@@ -37,7 +46,6 @@ const std::map<std::string, const char*> unread_extensions{
     {"KHR_materials_pbrSpecularGlossiness", "surfaces have its diffuse colour and glossiness alone"},
     {"KHR_materials_sheen", "cloth has no sheen"},
     {"KHR_materials_subsurface", "no light passes below the surface"},
-    {"KHR_materials_transmission", "no light passes through surfaces"},
     {"KHR_materials_volume", "nothing absorbs light inside"},
     {"KHR_materials_volume_scatter", "nothing scatters light inside"},
     {"KHR_node_visibility", "hidden nodes are shown"},

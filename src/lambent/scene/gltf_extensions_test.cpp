@@ -55,6 +55,17 @@ TEST(GltfWebp, IsTheSamePictureAsPng) {
   }
 }
 
+TEST(GltfWebp, HasAlpha) {
+  const Bytes rgba = {200, 10, 20, 255, 30, 150, 40, 7, 50, 60, 250, 128, 255, 255, 0, 64};
+  uint8_t* encoded = nullptr;
+  const size_t size = WebPEncodeLosslessRGBA(rgba.data(), 2, 2, 8, &encoded);
+  auto texture = decode_texture(Bytes(encoded, encoded + size), "a");
+  WebPFree(encoded);
+  ASSERT_TRUE(texture) << texture.error().text();
+  EXPECT_EQ(texture->rgb, colours);
+  EXPECT_EQ(texture->alpha, Bytes({255, 7, 128, 64}));
+}
+
 TEST(GltfWebp, AnImageThatIsBrokenLeavesTheOther) {
   Builder b = dressed({{"pbrMetallicRoughness", {{"baseColorTexture", {{"index", 0}}}}}});
   Bytes cut = make_webp(2, 2, colours);

@@ -286,10 +286,11 @@ TEST(LoadGltf, Materials) {
   EXPECT_EQ(m.emissive, Vec3(4, 0, 8));
   EXPECT_TRUE(m.double_sided);
   EXPECT_TRUE(s.triangles[0].two_sided);
+  EXPECT_EQ(m.alpha_mode, AlphaMode::blend);
+  EXPECT_EQ(m.alpha, 0.5f);
   EXPECT_EQ(s.warnings, (std::vector<std::string>{
                             "KHR_materials_pbrSpecularGlossiness is not read: surfaces have its diffuse colour and "
-                            "glossiness alone (1 place)",
-                            "1 material with alpha is treated as opaque"}));
+                            "glossiness alone (1 place)"}));
   EXPECT_EQ(s.materials[2].base_color, Vec3(0.1f, 0.2f, 0.3f));
   EXPECT_EQ(s.materials[2].roughness, 0.75f);
 }

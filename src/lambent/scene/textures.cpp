@@ -2,6 +2,7 @@
 #include <lambent/scene/textures.h>
 
 #include <stb_image.h>
+#include <stb_image_write.h>
 #include <webp/decode.h>
 
 #include <algorithm>
@@ -33,6 +34,23 @@ Result<void> check_size(int width, int height, size_t bytes, const std::string& 
   return {};
 }
 
+// Pixels of three or four bytes.
+void keep_pixels(const uint8_t* pixels, int channels, Texture& texture) {
+  const size_t count = size_t(texture.width) * size_t(texture.height);
+  texture.alpha.clear();
+  if (channels == 3) {
+    texture.rgb.assign(pixels, pixels + count * 3);
+    return;
+  }
+  texture.rgb.resize(count * 3), texture.alpha.resize(count);
+  bool solid = true;
+  for (size_t i = 0; i < count; ++i) {
+    std::copy_n(pixels + 4 * i, 3, texture.rgb.data() + 3 * i);
+    texture.alpha[i] = pixels[4 * i + 3], solid &= texture.alpha[i] == 255;
+  }
+  if (solid) texture.alpha = {};
+}
+
 Result<void> decode_stb(std::span<const uint8_t> encoded, bool png, const std::string& where, Texture& texture) {
   const int size = int(encoded.size());
   int width = 0, height = 0, channels = 0;
@@ -40,11 +58,11 @@ Result<void> decode_stb(std::span<const uint8_t> encoded, bool png, const std::s
   if (auto fits = check_size(width, height, encoded.size(), where); !fits) return fits;
   if (uint64_t(width) * uint64_t(height) > most_pixels(encoded, png))
     return Error{where, "is broken: too few bytes for its size"};
-  constexpr int rgb = 3;
-  stbi_uc* pixels = stbi_load_from_memory(encoded.data(), size, &width, &height, &channels, rgb);
+  const int kept = channels == 2 || channels == 4 ? 4 : 3;
+  stbi_uc* pixels = stbi_load_from_memory(encoded.data(), size, &width, &height, &channels, kept);
   if (!pixels) return Error{where, std::string("cannot be decoded: ") + stbi_failure_reason()};
   texture.width = width, texture.height = height;
-  texture.rgb.assign(pixels, pixels + size_t(width) * size_t(height) * rgb);
+  keep_pixels(pixels, kept, texture);
   stbi_image_free(pixels);
   return {};
 }
@@ -54,11 +72,13 @@ Result<void> decode_webp(std::span<const uint8_t> encoded, const std::string& wh
   if (WebPGetFeatures(encoded.data(), encoded.size(), &features) != VP8_STATUS_OK) return Error{where, "is broken"};
   if (features.has_animation) return Error{where, "is an animation"};
   if (auto fits = check_size(features.width, features.height, encoded.size(), where); !fits) return fits;
-  texture.width = features.width, texture.height = features.height;
-  const int row = 3 * features.width;
-  texture.rgb.resize(size_t(row) * size_t(features.height));
-  if (!WebPDecodeRGBInto(encoded.data(), encoded.size(), texture.rgb.data(), texture.rgb.size(), row))
-    return Error{where, "cannot be decoded"};
+  int width = 0, height = 0;
+  uint8_t* pixels =
+      (features.has_alpha ? WebPDecodeRGBA : WebPDecodeRGB)(encoded.data(), encoded.size(), &width, &height);
+  if (!pixels) return Error{where, "cannot be decoded"};
+  texture.width = width, texture.height = height;
+  keep_pixels(pixels, features.has_alpha ? 4 : 3, texture);
+  WebPFree(pixels);
   return {};
 }
 
@@ -90,6 +110,32 @@ Result<Texture> decode_texture(std::vector<uint8_t> encoded, const std::string& 
   texture.name = name;
   texture.encoded = std::move(encoded);
   return texture;
+}
+
+Result<Texture> with_alpha(const Texture& color, const Texture& mask, const std::string& name) {
+  const bool white = color.rgb.empty();
+  Texture out;
+  out.name = name, out.mime_type = "image/png", out.wrap_s = color.wrap_s, out.wrap_t = color.wrap_t;
+  out.width = white ? mask.width : color.width, out.height = white ? mask.height : color.height;
+  if (out.width <= 0 || out.height <= 0) return Error{name, "has no pixels"};
+  const size_t count = size_t(out.width) * size_t(out.height);
+  out.rgb = white ? std::vector<uint8_t>(count * 3, 255) : color.rgb;
+  out.alpha.resize(count);
+  std::vector<uint8_t> rgba(count * 4);
+  for (size_t i = 0; i < count; ++i) {
+    const Vec2 uv((float(i % size_t(out.width)) + 0.5f) / float(out.width),
+                  (float(i / size_t(out.width)) + 0.5f) / float(out.height));
+    const float a = mask.alpha.empty() ? sample_linear_texture(mask, uv).x : sample_alpha(mask, uv);
+    out.alpha[i] = rgba[4 * i + 3] = uint8_t(a * 255 + 0.5f);
+    std::copy_n(out.rgb.data() + 3 * i, 3, rgba.data() + 4 * i);
+  }
+  auto append = [](void* to, void* bytes, int n) {
+    auto& encoded = *static_cast<std::vector<uint8_t>*>(to);
+    encoded.insert(encoded.end(), static_cast<uint8_t*>(bytes), static_cast<uint8_t*>(bytes) + n);
+  };
+  if (!stbi_write_png_to_func(append, &out.encoded, out.width, out.height, 4, rgba.data(), 0))
+    return Error{name, "cannot be encoded"};
+  return out;
 }
 
 }  // namespace lambent
