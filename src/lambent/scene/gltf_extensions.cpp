@@ -117,6 +117,7 @@ void drop_references(Json& value, const std::vector<const char*>& names, std::se
   for (const std::string& key : gone) {
     value.erase(key);
     if (key == "emissiveTexture") value.erase("emissiveFactor");
+    if (key == "transmissionTexture") value.erase("transmissionFactor");
   }
 }
 

@@ -17,8 +17,8 @@ bool is_supported_extension(const std::string& name);
 void warn_of_unread_extensions(const nlohmann::json& document, std::vector<std::string>& warnings);
 
 // Takes textures whose only image is of a kind that is not read (KTX2, AVIF, DDS) out of the materials, for good: a
-// viewer of what is written would fail at them. Emission that such a texture shapes goes with it: a lamp of unknown
-// pattern gives no light.
+// viewer of what is written would fail at them. Emission and transmission that such a texture shapes go with it: a lamp
+// of unknown pattern gives no light.
 void drop_unread_textures(nlohmann::json& document, std::vector<std::string>& warnings);
 
 // An extension of an object; null where it has none of the name.
