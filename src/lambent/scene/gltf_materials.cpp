@@ -71,6 +71,22 @@ void read_see_through(GltfCheck& check, const Json& json, size_t texture_count, 
   out.bends_light = m.roughness > 0.1f || (volume && check.number(*volume, "thicknessFactor", 0, where) > 0);
 }
 
+// Fresnel's reflectance of the part that is no metal. An index of 0 stands for a mirror.
+void read_dielectric(GltfCheck& check, const Json& json, const GltfWhere& where, GltfMaterial& out) {
+  double index = 1.5, weight = 1, color[3] = {1, 1, 1};
+  if (const Json* ior = read_extension(check, json, "KHR_materials_ior", where))
+    index = std::max(0.0, check.number(*ior, "ior", index, where));
+  if (const Json* specular = read_extension(check, json, "KHR_materials_specular", where)) {
+    weight = std::clamp(check.number(*specular, "specularFactor", weight, where), 0.0, 1.0);
+    check.numbers(*specular, "specularColorFactor", color, where);
+    out.specular_textures = specular->contains("specularTexture") || specular->contains("specularColorTexture");
+  }
+  const double root = (index - 1) / (index + 1);
+  for (int c = 0; c < 3; ++c)
+    out.material.dielectric_f0[c] = float(weight * std::clamp(root * root * color[c], 0.0, 1.0));
+  out.material.dielectric_f90 = float(weight);
+}
+
 GltfMaterial read_material(GltfCheck& check, const Json& json, size_t texture_count, const GltfWhere& where) {
   GltfMaterial out;
   Material& m = out.material;
@@ -110,22 +126,6 @@ GltfMaterial read_material(GltfCheck& check, const Json& json, size_t texture_co
   if (const Json* info = check.object(json, "normalTexture", where))
     m.normal_scale = float(std::clamp(check.number(*info, "scale", 1, where), -steepest, steepest));
   return out;
-}
-
-// Fresnel's reflectance of the part that is no metal. An index of 0 stands for a mirror.
-void read_dielectric(GltfCheck& check, const Json& json, const GltfWhere& where, GltfMaterial& out) {
-  double index = 1.5, weight = 1, color[3] = {1, 1, 1};
-  if (const Json* ior = read_extension(check, json, "KHR_materials_ior", where))
-    index = std::max(0.0, check.number(*ior, "ior", index, where));
-  if (const Json* specular = read_extension(check, json, "KHR_materials_specular", where)) {
-    weight = std::clamp(check.number(*specular, "specularFactor", weight, where), 0.0, 1.0);
-    check.numbers(*specular, "specularColorFactor", color, where);
-    out.specular_textures = specular->contains("specularTexture") || specular->contains("specularColorTexture");
-  }
-  const double root = (index - 1) / (index + 1);
-  for (int c = 0; c < 3; ++c)
-    out.material.dielectric_f0[c] = float(weight * std::clamp(root * root * color[c], 0.0, 1.0));
-  out.material.dielectric_f90 = float(weight);
 }
 
 Wrap read_wrap(GltfCheck& check, const Json& sampler, const char* key, const GltfWhere& where) {
