@@ -2,6 +2,7 @@
 #include <lambent/scene/gltf_extensions.h>
 #include <lambent/scene/gltf_packed_test-inl.h>
 
+#include <lambent/bake/materials.h>
 #include <lambent/scene/reflection.h>
 #include <lambent/scene/textures.h>
 
@@ -162,6 +163,25 @@ TEST(GltfExtensions, WithoutSpecularASurfaceIsLambert) {
     const Vec3 a = evaluate(surface_brdf(s, materials, t, 0.3f, 0.3f), wi, wo),
                b = evaluate(surface_brdf(s, diffuse, t, 0.3f, 0.3f), wi, wo);
     EXPECT_LT(length(a - b), 1e-6f);
+  }
+}
+
+TEST(GltfExtensions, ABakeTellsMaterialsApartBySpecular) {
+  Builder b = dressed(Json::object());
+  b.json["materials"].push_back({{"extensions", {{"KHR_materials_specular", {{"specularFactor", 0.5}}}}}});
+  b.json["meshes"].push_back(b.json["meshes"][0]);
+  b.json["meshes"][1]["primitives"][0]["material"] = 1;
+  b.json["nodes"].push_back({{"mesh", 1}, {"translation", {0, 5, 0}}});
+  const Scene s = loaded(b);
+  const Receivers receivers = make_vertex_receivers(s);
+  const ReceiverMaterials made = make_receiver_materials(s, receivers, {Reflection::Model::materials});
+  ASSERT_EQ(made.materials.size(), 2u);
+  for (const Triangle& t : s.triangles) {
+    const uint16_t m = made.of_receiver[receivers.front[t.v[0]]];
+    const auto* white = std::get_if<MetallicRoughness>(&made.materials[m].white);
+    ASSERT_TRUE(white);
+    EXPECT_EQ(white->dielectric_f90, t.part == 0 ? 1.0f : 0.5f);
+    EXPECT_EQ(white->dielectric_f0, Vec3(t.part == 0 ? 0.04f : 0.02f));
   }
 }
 
