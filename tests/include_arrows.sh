@@ -58,4 +58,7 @@ only stb_image image scene
 only OpenEXR image
 only Imf image
 only Eigen basis
+only draco scene
+only meshoptimizer scene
+only webp scene
 exit $bad

@@ -1,7 +1,9 @@
 #include <lambent/bake/materials.h>
 #include <lambent/core/check.h>
 
+#include <array>
 #include <map>
+#include <tuple>
 
 namespace lambent {
 
@@ -13,7 +15,7 @@ ReceiverMaterials make_receiver_materials(const Scene& scene, const Receivers& r
   out.frames.resize(receivers.count());
   out.reflection = reflection;
   std::vector<uint8_t> done(receivers.count(), 0);
-  std::map<std::pair<int, int>, uint16_t> palette;
+  std::map<std::tuple<int, int, std::array<float, 4>>, uint16_t> palette;
   if (reflection.everywhere) out.materials.push_back({*reflection.everywhere, *reflection.everywhere});
   else if (reflection.model == Reflection::Model::diffuse)
     out.materials.push_back({Lambert{Vec3(0)}, Lambert{Vec3(1)}});
@@ -28,10 +30,14 @@ ReceiverMaterials make_receiver_materials(const Scene& scene, const Receivers& r
         out.frames[r] = shading_frame(scene, t, receivers.normals[r]);
         if (one) continue;
         const Vec2 m = metallic_roughness(scene, t, k == 1, k == 2);
-        const std::pair key(int(m.x * metallic_steps + 0.5f), int(m.y * roughness_steps + 0.5f));
+        const Material& material = scene.materials[scene.parts[t.part].material];
+        const Vec3 f0 = material.dielectric_f0;
+        const std::tuple key(int(m.x * metallic_steps + 0.5f), int(m.y * roughness_steps + 0.5f),
+                             std::array{f0.x, f0.y, f0.z, material.dielectric_f90});
         const auto [place, added] = palette.try_emplace(key, uint16_t(out.materials.size()));
         if (added) {
-          MetallicRoughness black{Vec3(0), float(key.first) / metallic_steps, float(key.second) / roughness_steps},
+          MetallicRoughness black{Vec3(0), float(std::get<0>(key)) / metallic_steps,
+                                  float(std::get<1>(key)) / roughness_steps, f0, material.dielectric_f90},
               white = black;
           white.base_color = Vec3(1);
           out.materials.push_back({black, white});

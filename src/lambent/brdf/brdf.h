@@ -58,6 +58,10 @@ struct Ward {
 struct MetallicRoughness {
   Vec3 base_color{1.0f};              // [0, 1]
   float metallic = 0, roughness = 1;  // [0, 1]; alpha = roughness^2
+  // Of the part that is no metal: reflectance at normal and at grazing incidence, [0, 1] (KHR_materials_ior,
+  // _specular).
+  Vec3 dielectric_f0{0.04f};
+  float dielectric_f90 = 1;
 };
 
 struct MeasuredTable;  // measured.h

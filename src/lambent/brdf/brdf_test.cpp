@@ -52,6 +52,7 @@ const std::vector<Named>& brdfs() {
       {"anisotropic Ward", Ward{Vec3(0.3f, 0.2f, 0.1f), Vec3(0.7f, 0.5f, 0.3f), Vec2(0.1f, 0.4f)}},
       {"bare Ward", Ward{Vec3(0), Vec3(1), Vec2(0.3f, 0.15f)}},
       {"plastic", MetallicRoughness{Vec3(0.8f, 0.3f, 0.1f), 0, 0.35f}},
+      {"dim plastic", MetallicRoughness{Vec3(0.8f, 0.3f, 0.1f), 0, 0.35f, Vec3(0.01f, 0.03f, 0.05f), 0.5f}},
       {"half metal", MetallicRoughness{Vec3(0.8f, 0.6f, 0.4f), 0.5f, 0.6f}},
       {"metal", MetallicRoughness{Vec3(1), 1, 0.5f}},
       {"measured", skew_measured()},
@@ -362,6 +363,17 @@ TEST(MetallicRoughness, IsGgxOnABase) {
     for (int k = 0; k < 3; ++k) {
       const double expected = (1 - f) * double(color[k]) / pi_d + f * ggx_formula(wi, wo, 0.36, 0.36);
       EXPECT_NEAR(plastic[k], expected, 2e-5 * expected);
+    }
+    // KHR_materials_specular: any reflectance at both ends; half a metal lies half way. Without any, the base is alone.
+    const Vec3 f0(0.02f, 0.05f, 0.2f);
+    const Vec3 dim = evaluate(MetallicRoughness{color, 0.5f, 0.6f, f0, 0.6f}, wi, wo);
+    const Vec3 bare = evaluate(MetallicRoughness{color, 0, 0.6f, Vec3(0), 0}, wi, wo);
+    for (int k = 0; k < 3; ++k) {
+      const double normal = 0.5 * (double(f0[k]) + double(color[k])),
+                   share = normal + (0.8 - normal) * std::pow(1 - c, 5);
+      const double expected = (1 - share) * 0.5 * double(color[k]) / pi_d + share * ggx_formula(wi, wo, 0.36, 0.36);
+      EXPECT_NEAR(dim[k], expected, 2e-5 * expected);
+      EXPECT_FLOAT_EQ(bare[k], color[k] / pi);
     }
   }
 }

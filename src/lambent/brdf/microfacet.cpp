@@ -2,7 +2,8 @@
 // refraction through rough surfaces", 2007 (GGX); E. Heitz, "Understanding the masking-shadowing function in
 // microfacet-based BRDFs", 2014 (anisotropic Smith, eq. 72 and 86; height correlation, eq. 99); C. Schlick, "An
 // inexpensive BRDF model for physically-based rendering", 1994; J. Dupuy and A. Benyoub, "Sampling visible GGX normals
-// with spherical caps", 2023; glTF 2.0, appendix B.
+// with spherical caps", 2023; glTF 2.0, appendix B;
+// KHR_materials_specular.
 #include <lambent/brdf/lobes.h>
 #include <lambent/core/sampling.h>
 
@@ -15,7 +16,9 @@ float fifth_power(float x) {
   const float x2 = x * x;
   return x2 * x2 * x;
 }
-Vec3 schlick(Vec3 f0, float cosine) { return f0 + (Vec3(1) - f0) * fifth_power(std::max(0.0f, 1 - cosine)); }
+Vec3 schlick(Vec3 f0, float cosine, float f90 = 1) {
+  return f0 + (Vec3(f90) - f0) * fifth_power(std::max(0.0f, 1 - cosine));
+}
 
 // Fresnel's equations for unpolarised light and an index n that reflects f0 at normal incidence (Cook and Torrance,
 // section 3.2).
@@ -62,14 +65,14 @@ Vec3 draw_visible_normal(Vec2 alpha, Vec3 wo, Vec2 u) {
 struct Layers {
   Vec2 alpha;
   Vec3 diffuse, f0;
+  float f90;
 };
 Layers layers(const MetallicRoughness& b) {
-  constexpr float dielectric = 0.04f;
   return {widths(Vec2(b.roughness * b.roughness)), b.base_color * (1 - b.metallic),
-          mix(Vec3(dielectric), b.base_color, b.metallic)};
+          mix(b.dielectric_f0, b.base_color, b.metallic), std::lerp(b.dielectric_f90, 1.0f, b.metallic)};
 }
 float diffuse_share(const Layers& l, Vec3 wo) {
-  const Vec3 f = schlick(l.f0, wo.z);
+  const Vec3 f = schlick(l.f0, wo.z, l.f90);
   return first_share(l.diffuse * (Vec3(1) - f), f);
 }
 
@@ -95,7 +98,7 @@ Vec3 draw(const Ggx& b, Vec3 wo, Vec2 u) { return reflect_about(draw_visible_nor
 BrdfValue value_above(const MetallicRoughness& b, Vec3 wi, Vec3 wo) {
   const Layers l = layers(b);
   const GgxLobe lobe = ggx_lobe(l.alpha, wi, wo);
-  const Vec3 f = schlick(l.f0, lobe.cosine);
+  const Vec3 f = schlick(l.f0, lobe.cosine, l.f90);
   const float diffuse = diffuse_share(l, wo);
   return {(Vec3(1) - f) * l.diffuse / pi + f * lobe.value, diffuse * wi.z / pi + (1 - diffuse) * lobe.pdf};
 }

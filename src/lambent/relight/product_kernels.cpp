@@ -194,8 +194,12 @@ Terms make_terms(const Brdf& brdf, const Mat3& frame, Vec3 wo_world) {
     t.colour[0] = b->f0, t.colour[1] = Vec3(1), t.alpha = widths(b->alpha);
     t.kind = Terms::Kind::ggx, t.count = 2;
   } else if (const auto* b = std::get_if<MetallicRoughness>(&brdf)) {
-    const Vec3 f0 = mix(Vec3(0.04f), b->base_color, b->metallic);
-    t.colour[0] = f0, t.colour[1] = Vec3(1), t.colour[2] = b->base_color * ((1 - b->metallic) / pi) * (Vec3(1) - f0);
+    // F = f0 (1 - q) + f90 q, and 1 - F = (1 - f90) + (f90 - f0) (1 - q).
+    const Vec3 f0 = mix(b->dielectric_f0, b->base_color, b->metallic),
+               diffuse = b->base_color * ((1 - b->metallic) / pi);
+    const float f90 = std::lerp(b->dielectric_f90, 1.0f, b->metallic);
+    t.lambert = diffuse * (1 - f90);
+    t.colour[0] = f0, t.colour[1] = Vec3(f90), t.colour[2] = diffuse * (Vec3(f90) - f0);
     t.alpha = widths(Vec2(b->roughness * b->roughness)), t.layered = true;
     t.kind = Terms::Kind::ggx, t.count = 3;
   } else {

@@ -78,7 +78,8 @@ const Brdf models[] = {Lambert{Vec3(0.8f, 0.5f, 0.2f)},
                        Ward{Vec3(0.2f), Vec3(0.7f, 0.6f, 0.5f), Vec2(0.1f, 0.3f)},
                        Ggx{Vec3(0.9f, 0.6f, 0.3f), Vec2(0.2f)},
                        CookTorrance{Vec3(0.2f), Vec3(0.7f), Vec3(0.3f, 0.5f, 0.7f), 0.25f},
-                       MetallicRoughness{Vec3(0.7f, 0.5f, 0.2f), 0.3f, 0.4f}};
+                       MetallicRoughness{Vec3(0.7f, 0.5f, 0.2f), 0.3f, 0.4f},
+                       MetallicRoughness{Vec3(0.7f, 0.5f, 0.2f), 0.1f, 0.4f, Vec3(0.02f, 0.1f, 0.3f), 0.6f}};
 
 double largest_error(Vec3 value, Vec3 truth) {
   return length(Vec3d(value) - Vec3d(truth)) / (1e-3 + length(Vec3d(truth)));

@@ -1,5 +1,5 @@
-// glTF 2.0 specification (ISO/IEC 12113): what refers to accessors and buffer views. Beside the core:
-// KHR_draco_mesh_compression, EXT_mesh_gpu_instancing, EXT_meshopt_compression.
+// glTF 2.0 specification (ISO/IEC 12113): what refers to accessors and buffer views; EXT_mesh_gpu_instancing beside the
+// core. Compressed views and primitives are plain since the document was read.
 #include <lambent/scene/gltf_write.h>
 
 #include <algorithm>
@@ -15,10 +15,8 @@ namespace {
 // Extensions that name no accessor and no buffer view, or only those that visit_references() knows. KHR_materials_*,
 // by their prefix, name textures alone.
 const std::set<std::string> known_extensions{"KHR_animation_pointer",
-                                             "KHR_draco_mesh_compression",
                                              "KHR_lights_punctual",
                                              "KHR_mesh_quantization",
-                                             "KHR_meshopt_compression",
                                              "KHR_node_hoverability",
                                              "KHR_node_selectability",
                                              "KHR_node_visibility",
@@ -27,7 +25,6 @@ const std::set<std::string> known_extensions{"KHR_animation_pointer",
                                              "KHR_xmp_json_ld",
                                              "EXT_lights_image_based",
                                              "EXT_mesh_gpu_instancing",
-                                             "EXT_meshopt_compression",
                                              "EXT_texture_avif",
                                              "EXT_texture_webp",
                                              "GODOT_single_root",
@@ -86,7 +83,6 @@ void visit_references(Json& document, const Visit& visit) {
       visit_all(gltf_member(primitive, {"attributes"}), visit);
       visit_one(primitive, {"indices"}, Target::accessor, visit);
       each(primitive, "targets", [&](Json& target) { visit_all(&target, visit); });
-      visit_one(primitive, {"extensions", "KHR_draco_mesh_compression", "bufferView"}, Target::view, visit);
     });
   });
   each(document, "nodes", [&](Json& node) {
@@ -144,17 +140,6 @@ std::vector<size_t> shrink(Json& document, const char* key, const std::vector<bo
   return numbers;
 }
 
-// What has bytes of the binary chunk: views, and what extensions of theirs keep in other places.
-void visit_ranges(Json& document, const std::function<void(Json&)>& visit) {
-  each(document, "bufferViews", [&](Json& view) {
-    visit(view);
-    Json* extensions = gltf_member(view, {"extensions"});
-    if (!extensions || !extensions->is_object()) return;
-    for (Json& extension : *extensions)
-      if (gltf_member(extension, {"buffer"})) visit(extension);
-  });
-}
-
 }  // namespace
 
 void GlbWriter::compact() {
@@ -170,7 +155,7 @@ void GlbWriter::compact() {
     return Range{*at, *at + *size};
   };
   bool sound = true;
-  visit_ranges(json, [&](Json& holder) { sound = sound && range_of(holder); });
+  each(json, "bufferViews", [&](Json& holder) { sound = sound && range_of(holder); });
   if (!sound) return;
 
   const std::vector<size_t> accessors = shrink(json, "accessors", used->accessors),
@@ -183,9 +168,9 @@ void GlbWriter::compact() {
   visit_references(json, renumber);
   each(json, "accessors", [&](Json& accessor) { visit_accessor(accessor, renumber); });
   std::vector<Range> ranges;
-  visit_ranges(json, [&](Json& holder) { ranges.push_back(*range_of(holder)); });
+  each(json, "bufferViews", [&](Json& holder) { ranges.push_back(*range_of(holder)); });
   const std::vector<Move> moves = keep_bytes(std::move(ranges));
-  visit_ranges(json, [&](Json& holder) {
+  each(json, "bufferViews", [&](Json& holder) {
     const size_t at = range_of(holder)->begin;
     const auto next = std::upper_bound(moves.begin(), moves.end(), at, [](size_t x, Move m) { return x < m.from; });
     const Move move = *std::prev(next);

@@ -68,20 +68,8 @@ Builder full_document() {
   const size_t places = b.floats({0, 0, 0, 5, 5, 5}, "VEC3");
   b.json["nodes"].push_back(
       {{"extensions", {{"EXT_mesh_gpu_instancing", {{"attributes", {{"TRANSLATION", places}}}}}}}});
-  const size_t draco = b.view(Bytes{1, 2, 3, 4, 5});
   b.json["meshes"].push_back(b.json["meshes"][0]);
-  b.json["meshes"][1]["primitives"][0]["extensions"]["KHR_draco_mesh_compression"] = {
-      {"bufferView", draco}, {"attributes", {{"POSITION", 0}}}};
   b.view(Bytes(500, 0xdd));
-  // A view whose compressed edition lies elsewhere in the buffer.
-  const size_t packed = b.floats({1, 2, 3}, "VEC3");
-  const size_t view = b.json["accessors"][packed]["bufferView"];
-  const size_t elsewhere = b.binary.size();
-  for (uint8_t i = 0; i < 20; ++i) b.binary.push_back(i);
-  b.json["bufferViews"][view]["extensions"]["EXT_meshopt_compression"] = {{"buffer", 0},      {"byteOffset", elsewhere},
-                                                                          {"byteLength", 20}, {"byteStride", 12},
-                                                                          {"count", 1},       {"mode", "ATTRIBUTES"}};
-  b.json["meshes"][1]["primitives"][0]["attributes"]["_PACKED"] = packed;
   // Two views of the same bytes, and one that reaches over both.
   const Json shared = b.json["bufferViews"][b.json["accessors"][moves]["bufferView"].get<size_t>()];
   b.json["bufferViews"].push_back(shared);
@@ -100,16 +88,11 @@ Json all_meant(const Saved& f) {
       add(p["indices"]);
       for (const Json& target : p["targets"])
         for (const Json& a : target) add(a);
-      if (p.contains("extensions"))
-        out.push_back(view_bytes(f, p["extensions"]["KHR_draco_mesh_compression"]["bufferView"].get<size_t>()));
     }
   for (const Json& skin : f.json["skins"]) add(skin["inverseBindMatrices"]);
   for (const Json& s : f.json["animations"][0]["samplers"]) add(s["input"]), add(s["output"]);
   for (const Json& image : f.json["images"]) out.push_back(view_bytes(f, image["bufferView"].get<size_t>()));
   add(f.json["nodes"][2]["extensions"]["EXT_mesh_gpu_instancing"]["attributes"]["TRANSLATION"]);
-  const size_t packed = f.json["meshes"][1]["primitives"][0]["attributes"]["_PACKED"];
-  const Json& view = f.json["bufferViews"][f.json["accessors"][packed]["bufferView"].get<size_t>()];
-  out.push_back(view_bytes(f, view["extensions"]["EXT_meshopt_compression"]));
   return out;
 }
 

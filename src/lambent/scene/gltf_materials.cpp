@@ -1,5 +1,6 @@
 // glTF 2.0 specification (ISO/IEC 12113), sections 3.8 and 3.9; KHR_texture_transform, KHR_materials_emissive_strength,
-// KHR_materials_pbrSpecularGlossiness.
+// KHR_materials_unlit, KHR_materials_ior, KHR_materials_specular, KHR_materials_pbrSpecularGlossiness,
+// EXT_texture_webp.
 #include <lambent/scene/gltf_materials.h>
 
 #include <lambent/scene/gltf_container.h>
@@ -70,13 +71,30 @@ void read_see_through(GltfCheck& check, const Json& json, size_t texture_count, 
   out.bends_light = m.roughness > 0.1f || (volume && check.number(*volume, "thicknessFactor", 0, where) > 0);
 }
 
+// Fresnel's reflectance of the part that is no metal. An index of 0 stands for a mirror.
+void read_dielectric(GltfCheck& check, const Json& json, const GltfWhere& where, GltfMaterial& out) {
+  double index = 1.5, weight = 1, color[3] = {1, 1, 1};
+  if (const Json* ior = read_extension(check, json, "KHR_materials_ior", where))
+    index = std::max(0.0, check.number(*ior, "ior", index, where));
+  if (const Json* specular = read_extension(check, json, "KHR_materials_specular", where)) {
+    weight = std::clamp(check.number(*specular, "specularFactor", weight, where), 0.0, 1.0);
+    check.numbers(*specular, "specularColorFactor", color, where);
+    out.specular_textures = specular->contains("specularTexture") || specular->contains("specularColorTexture");
+  }
+  const double root = (index - 1) / (index + 1);
+  for (int c = 0; c < 3; ++c)
+    out.material.dielectric_f0[c] = float(weight * std::clamp(root * root * color[c], 0.0, 1.0));
+  out.material.dielectric_f90 = float(weight);
+}
+
 GltfMaterial read_material(GltfCheck& check, const Json& json, size_t texture_count, const GltfWhere& where) {
   GltfMaterial out;
   Material& m = out.material;
   m.name = check.text(json, "name", where);
   m.unlit = read_extension(check, json, "KHR_materials_unlit", where) != nullptr;
   m.double_sided = check.boolean(json, "doubleSided", false, where);
-  if (const Json* gloss = read_extension(check, json, "KHR_materials_pbrSpecularGlossiness", where)) {
+  const Json* gloss = read_extension(check, json, "KHR_materials_pbrSpecularGlossiness", where);
+  if (gloss && !m.unlit) {
     m.base_color = read_color(check, *gloss, "diffuseFactor", where, m.alpha);
     m.metallic = 0.0f;
     m.roughness = 1.0f - read_share(check, *gloss, "glossinessFactor", where);
@@ -89,6 +107,12 @@ GltfMaterial read_material(GltfCheck& check, const Json& json, size_t texture_co
     read_texture_reference(check, *pbr, "metallicRoughnessTexture", texture_count, where, out.metallic_roughness);
   }
   read_see_through(check, json, texture_count, where, out);
+  if (m.unlit) {  // of all else, only the colour counts
+    m.metallic = 0, m.roughness = 1, out.metallic_roughness = {};
+    m.transmission = 0, out.transmission = {}, out.bends_light = false;
+    return out;
+  }
+  read_dielectric(check, json, where, out);
   double factor[3] = {0, 0, 0}, strength = 1;
   check.numbers(json, "emissiveFactor", factor, where);
   if (const Json* extension = read_extension(check, json, "KHR_materials_emissive_strength", where)) {
@@ -135,14 +159,27 @@ class TextureReader {
       wrap_s = read_wrap(check, json, "wrapS", {"sampler", *sampler});
       wrap_t = read_wrap(check, json, "wrapT", {"sampler", *sampler});
     }
-    auto image = check.index(texture, "source", gltf_count(document_.json, "images"), where);
-    if (check.ok() && !image) check.fail(where, "has no PNG or JPEG image");
+    std::vector<size_t> images;  // the first that can be read counts
+    const size_t count = gltf_count(document_.json, "images");
+    if (const Json* webp = read_extension(check, texture, "EXT_texture_webp", where))
+      if (auto image = check.index(*webp, "source", count, where)) images.push_back(*image);
+    if (auto image = check.index(texture, "source", count, where)) images.push_back(*image);
+    if (check.ok() && images.empty()) check.fail(where, "has no PNG, JPEG or WebP image");
     if (!check.ok()) return -1;
+    for (size_t i = 0; i + 1 < images.size(); ++i) {
+      GltfCheck trial = check;
+      const int read = read_image(trial, index, images[i], wrap_s, wrap_t);
+      if (trial.ok()) return read;
+    }
+    return read_image(check, index, images.back(), wrap_s, wrap_t);
+  }
 
-    GltfWhere image_where{"image", *image};
-    if (!problems_[*image].empty()) check.fail(image_where, problems_[*image]);
-    std::span<const uint8_t> bytes = image_bytes(check, document_, *image, image_where);
-    const Json& json = gltf_item(document_.json, "images", *image);
+ private:
+  int read_image(GltfCheck& check, size_t texture, size_t image, Wrap wrap_s, Wrap wrap_t) {
+    GltfWhere image_where{"image", image};
+    if (!problems_[image].empty()) check.fail(image_where, problems_[image]);
+    std::span<const uint8_t> bytes = image_bytes(check, document_, image, image_where);
+    const Json& json = gltf_item(document_.json, "images", image);
     std::string name = check.text(json, "name", image_where), uri = check.text(json, "uri", image_where);
     if (name.empty()) name = uri;
     if (!check.ok()) return -1;
@@ -158,29 +195,32 @@ class TextureReader {
       known_.erase(place);
       check.fail(image_where, (name.empty() ? "" : in_quotes(name) + " ") + result.error().message);
       return -1;
+    } else {
+      encoded_ += bytes.size();
     }
     pixels_ += uint64_t(decoded.width) * uint64_t(decoded.height);
-    if (pixels_ > max_pixels) {
+    const uint64_t most = std::min(max_pixels, free_pixels + texture_pixels_a_byte * encoded_);
+    if (pixels_ > most) {
       known_.erase(place);
-      check.fail(image_where, "the scene's material images have more than " + std::to_string(max_pixels) + " pixels");
+      check.fail(image_where, "the scene's material images have more than " + std::to_string(most) +
+                                  " pixels, which is what images of their bytes may have");
       return -1;
     }
     decoded_.try_emplace({bytes.data(), bytes.size()}, place->second);
     decoded.name = name, decoded.wrap_s = wrap_s, decoded.wrap_t = wrap_t;
     scene_.textures.push_back(std::move(decoded));
-    document_.textures.push_back(int(index));
+    document_.textures.push_back(int(texture));
     return place->second;
   }
 
- private:
-  static constexpr uint64_t max_pixels = uint64_t{1} << 30;
+  static constexpr uint64_t max_pixels = uint64_t{1} << 30, free_pixels = 4 * free_texture_pixels;
   using Bytes = std::pair<const uint8_t*, size_t>;
   GltfDocument& document_;
   const std::vector<std::string>& problems_;
   Scene& scene_;
   std::map<std::tuple<const uint8_t*, size_t, Wrap, Wrap>, int> known_;
   std::map<Bytes, int> decoded_;
-  uint64_t pixels_ = 0;
+  uint64_t pixels_ = 0, encoded_ = 0;
 };
 
 void warn_count(Scene& scene, size_t count, const char* one, const char* many) {
@@ -209,7 +249,7 @@ size_t texcoord_sets(const std::vector<GltfMaterial>& materials) {
 void read_textures(const GltfCheck& check, GltfDocument& document, const std::vector<GltfMaterial>& materials,
                    const std::vector<bool>& used, const std::vector<std::string>& image_problems, Scene& scene) {
   TextureReader reader(document, image_problems, scene);
-  size_t unknown = 0, bending = 0;
+  size_t unknown = 0, bending = 0, unlit = 0, specular = 0;
   GltfTold base_color, metallic_roughness, normal, transmission, emissive;
   // The scene is still good without a texture.
   auto read = [&](const GltfTextureUse& use, const char* what, GltfTold& told, int& texture, int& set,
@@ -229,6 +269,7 @@ void read_textures(const GltfCheck& check, GltfDocument& document, const std::ve
     const GltfMaterial& from = materials[i];
     Material& m = scene.materials[i];
     unknown += !from.known_alpha_mode, bending += from.bends_light;
+    unlit += m.unlit, specular += from.specular_textures;
     read(from.base_color, "base colour", base_color, m.base_color_texture, m.texcoord_set, m.uv_transform);
     read(from.metallic_roughness, "metallic-roughness", metallic_roughness, m.metallic_roughness_texture,
          m.metallic_roughness_set, m.metallic_roughness_transform);
@@ -248,6 +289,10 @@ void read_textures(const GltfCheck& check, GltfDocument& document, const std::ve
              " materials have an unknown alphaMode and are opaque");
   warn_count(scene, bending, " material with rough or thick transmission passes light straight on",
              " materials with rough or thick transmission pass light straight on");
+  warn_count(scene, unlit, " unlit material is lit: a matte surface of its colour",
+             " unlit materials are lit: matte surfaces of their colour");
+  warn_count(scene, specular, " material is without the textures of KHR_materials_specular, which are not read",
+             " materials are without the textures of KHR_materials_specular, which are not read");
 }
 
 }  // namespace lambent

@@ -16,6 +16,7 @@ struct GltfMaterial {
   GltfTextureUse base_color, metallic_roughness, normal, emissive, transmission;
   bool known_alpha_mode = true;
   bool bends_light = false;  // asks for what straight light through thin surfaces leaves out
+  bool specular_textures = false;
 };
 
 // All of the document's materials, in its order.

@@ -1,5 +1,6 @@
 #include <lambent/scene/gltf_unbake.h>
 
+#include <lambent/scene/gltf_extensions.h>
 #include <lambent/scene/gltf_read.h>
 
 #include <algorithm>
@@ -21,19 +22,6 @@ const Json* member(const Json& parent, const char* key) {
 std::optional<size_t> number(const Json& parent, const char* key) {
   GltfCheck check("");
   return parent.is_object() ? check.index(parent, key, INT32_MAX, {}) : std::nullopt;
-}
-
-// Takes our extension from an object, and with it an object of extensions that holds no other.
-Json take_extension(Json& holder) {
-  if (!holder.is_object()) return {};
-  const auto all = holder.find("extensions");
-  if (all == holder.end() || !all->is_object()) return {};
-  const auto ours = all->find(name);
-  if (ours == all->end()) return {};
-  Json taken = std::move(*ours);
-  all->erase(ours);
-  if (all->empty()) holder.erase(all);
-  return taken;
 }
 
 // Whether any object that is a member of that name, of extensions too, names the item.
@@ -72,7 +60,7 @@ struct Worn {
 };
 
 void restore_primitive(Json& primitive, Worn& worn) {
-  const Json ours = take_extension(primitive);
+  const Json ours = take_extension(primitive, name);
   if (!ours.is_object()) return;
   const auto own = number(ours, "ownMaterial");
   if (!own) return;
@@ -113,17 +101,10 @@ void drop_materials(Json& document, const Worn& worn) {
   }
 }
 
-bool uses_extension(const Json& value, const std::string& extension) {
-  if (!value.is_structured()) return false;
-  if (const Json* extensions = member(value, "extensions"); extensions && member(*extensions, extension.c_str()))
-    return true;
-  return std::any_of(value.begin(), value.end(), [&](const Json& inner) { return uses_extension(inner, extension); });
-}
-
 }  // namespace
 
 bool unbake(Json& document) {
-  const bool was_baked = !take_extension(document).is_null();
+  const bool was_baked = !take_extension(document, name).is_null();
   Worn worn;
   for (size_t m = 0; m < gltf_count(document, "meshes"); ++m) {
     const auto primitives = document["meshes"][m].find("primitives");
@@ -147,7 +128,7 @@ bool unbake(Json& document) {
   for (Json& listed : *used) {
     const bool ours = listed == name,
                looks = listed == "KHR_materials_specular" || listed == "KHR_materials_emissive_strength";
-    const bool gone = looks && !worn.lit.empty() && !uses_extension(document, listed.get<std::string>());
+    const bool gone = looks && !worn.lit.empty() && !uses_extension(document, listed.get<std::string>().c_str());
     if (!ours && !gone) kept.push_back(std::move(listed));
   }
   if (kept.empty()) document.erase(used);

@@ -58,9 +58,12 @@ size_t GlbWriter::push(const char* key, Json item) {
   return items.size() - 1;
 }
 
-void GlbWriter::use_extension(const char* name) {
-  Json& used = list("extensionsUsed");
-  if (std::find(used.begin(), used.end(), Json(name)) == used.end()) used.push_back(name);
+void GlbWriter::use_extension(const char* name, bool required) {
+  for (const char* key : {"extensionsUsed", "extensionsRequired"}) {
+    if (key == std::string_view("extensionsRequired") && !required) break;
+    Json& names = list(key);
+    if (std::find(names.begin(), names.end(), Json(name)) == names.end()) names.push_back(name);
+  }
 }
 
 size_t GlbWriter::append(std::span<const uint8_t> bytes, size_t alignment) {

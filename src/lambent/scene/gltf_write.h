@@ -14,7 +14,7 @@ class GlbWriter {
   // A top-level array, made where absent; and the number of an item appended to it.
   Json& list(const char* key);
   size_t push(const char* key, Json item);
-  void use_extension(const char* name);
+  void use_extension(const char* name, bool required = false);
 
   // Places bytes, which must outlive write(), in the binary chunk, at a multiple of `alignment` in the file; gives
   // their offset.

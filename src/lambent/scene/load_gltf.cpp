@@ -1,7 +1,9 @@
 // glTF 2.0 specification (ISO/IEC 12113): the loader. Sections 3.7.2 (meshes, morph targets) and 3.7.3 (skins) in the
 // rest pose.
 #include <lambent/scene/clean.h>
+#include <lambent/scene/gltf_compressed.h>
 #include <lambent/scene/gltf_container.h>
+#include <lambent/scene/gltf_extensions.h>
 #include <lambent/scene/gltf_geometry.h>
 #include <lambent/scene/gltf_instances.h>
 #include <lambent/scene/gltf_materials.h>
@@ -21,12 +23,6 @@ namespace {
 // zeros.
 constexpr uint64_t max_vertices = uint64_t{1} << 28, max_triangles = uint64_t{1} << 29;
 constexpr uint64_t max_zeros = uint64_t{1} << 22, max_parts = uint64_t{1} << 20;
-
-bool is_supported_extension(const std::string& name) {
-  return name == "KHR_mesh_quantization" || name == "KHR_texture_transform" || name == "KHR_lights_punctual" ||
-         name == "KHR_node_visibility" || name == "EXT_mesh_gpu_instancing" || name == "LAMBENT_transfer" ||
-         name.starts_with("KHR_materials_");
-}
 
 // The document's own statements, and the shape of its top level, on which all later look-ups rely.
 bool check_document(GltfCheck& check, const Json& json) {
@@ -98,6 +94,7 @@ class UriReader {
 
 bool read_buffers(GltfCheck& check, GltfDocument& document, std::span<const uint8_t> binary, UriReader& files) {
   const size_t count = gltf_count(document.json, "buffers");
+  const std::vector<bool> placeholders = find_placeholders(document);
   for (size_t i = 0; i < count; ++i) {
     GltfWhere where{"buffer", i};
     Json& buffer = document.json["buffers"][i];
@@ -107,24 +104,27 @@ bool read_buffers(GltfCheck& check, GltfDocument& document, std::span<const uint
     std::span<const uint8_t> bytes;
     if (buffer.contains("uri")) {
       auto read = files.read(buffer, "");
-      if (!read) return check.fail(where, read.error().message);
-      bytes = *read;
+      if (!read && !placeholders[i]) return check.fail(where, read.error().message);
+      if (read) bytes = *read;
     } else if (i == 0 && binary.data()) {
       bytes = binary;
-    } else {
+    } else if (!placeholders[i]) {
       return check.fail(where, "has no bytes: neither a uri nor a GLB chunk");
     }
+    if (placeholders[i]) length = std::min<uint64_t>(length, bytes.size());
     if (length > bytes.size()) {
       return check.fail(
           where, "is truncated: has " + std::to_string(bytes.size()) + " of " + std::to_string(length) + " bytes");
     }
     document.buffers.push_back(bytes.first(length));
   }
+  DecodeBudget budget(document);
+  if (!check.ok() || !decode_meshopt_views(check, document, budget)) return false;
   // All views, read here or not: the writer moves them.
   for (size_t i = 0; i < gltf_count(document.json, "bufferViews") && check.ok(); ++i) {
     read_buffer_view(check, document, i, nullptr);
   }
-  return check.ok();
+  return check.ok() && decode_draco_primitives(check, document, budget);
 }
 
 // Reads images that lie in files or URIs; what fails is only told, for it may not be needed.
@@ -434,6 +434,8 @@ bool read_scene(GltfCheck& check, GltfDocument& document, std::span<const uint8_
   std::vector<std::string> image_problems;
   if (!check_document(check, document.json)) return false;
   const bool was_baked = unbake(document.json);
+  warn_of_unread_extensions(document.json, scene.warnings);
+  drop_unread_textures(document.json, scene.warnings);
   if (!read_buffers(check, document, binary, files) || !read_images(check, document, files, image_problems)) {
     return false;
   }

@@ -1,6 +1,6 @@
 #pragma once
 // Writes materials and textures that a document does not have; of save_gltf.cpp. KHR_texture_transform,
-// KHR_materials_emissive_strength.
+// KHR_materials_emissive_strength, EXT_texture_webp.
 #include <lambent/scene/gltf.h>
 #include <lambent/scene/gltf_materials.h>
 #include <lambent/scene/gltf_write.h>
@@ -46,6 +46,13 @@ class MaterialWriter {
       if (!texture) return texture.error();
       json["normalTexture"] = texture_reference(*texture, m.normal_set, m.normal_transform);
       if (m.normal_scale != 1) json["normalTexture"]["scale"] = finite_or(m.normal_scale, 1);
+    }
+    if (m.dielectric_f0 != Material{}.dielectric_f0 || m.dielectric_f90 != Material{}.dielectric_f90) {
+      const float f90 = std::clamp(finite_or(m.dielectric_f90, 1), 1e-6f, 1.0f);  // the weight of both
+      const Vec3 color = m.dielectric_f0 / (f90 * Material{}.dielectric_f0);
+      json["extensions"]["KHR_materials_specular"] = {{"specularFactor", f90},
+                                                      {"specularColorFactor", {color.x, color.y, color.z}}};
+      out_.use_extension("KHR_materials_specular");
     }
     if (m.alpha_mode == AlphaMode::blend) json["alphaMode"] = "BLEND";
     if (m.alpha_mode == AlphaMode::mask)
@@ -140,7 +147,14 @@ class MaterialWriter {
     nlohmann::json& samplers = out_.list("samplers");
     size_t s = size_t(std::find(samplers.begin(), samplers.end(), sampler) - samplers.begin());
     if (s == samplers.size()) samplers.push_back(sampler);
-    return textures_[index] = out_.push("textures", {{"source", image->second}, {"sampler", s}});
+    nlohmann::json json = {{"sampler", s}};
+    if (texture.mime_type == "image/webp") {
+      json["extensions"]["EXT_texture_webp"]["source"] = image->second;
+      out_.use_extension("EXT_texture_webp", true);
+    } else {
+      json["source"] = image->second;
+    }
+    return textures_[index] = out_.push("textures", std::move(json));
   }
 
   static int wrap_number(Wrap wrap) { return wrap == Wrap::clamp ? 33071 : wrap == Wrap::mirror ? 33648 : 10497; }

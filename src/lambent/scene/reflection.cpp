@@ -36,7 +36,8 @@ Brdf surface_brdf(const Scene& scene, const Reflection& reflection, const Triang
   const Vec3 color = albedo(scene, triangle, u, v);
   if (reflection.model == Reflection::Model::diffuse) return Lambert{color};
   const Vec2 m = metallic_roughness(scene, triangle, u, v);
-  return MetallicRoughness{color, m.x, m.y};
+  const Material& material = scene.materials[scene.parts[triangle.part].material];
+  return MetallicRoughness{color, m.x, m.y, material.dielectric_f0, material.dielectric_f90};
 }
 
 Mat3 shading_frame(const Scene& scene, const Triangle& triangle, Vec3 n) {

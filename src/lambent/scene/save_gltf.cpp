@@ -114,19 +114,12 @@ class DocumentWriter {
   void embed_buffers() {
     std::vector<size_t> starts;
     for (std::span<const uint8_t> buffer : document_.buffers) starts.push_back(out_.append(buffer, buffer_alignment));
-    auto move = [&](Json& view) {
-      auto buffer = whole_number(view, "buffer", starts.size());
-      if (!buffer) return;
-      size_t offset = whole_number(view, "byteOffset", UINT32_MAX).value_or(0);
-      view["buffer"] = 0, view["byteOffset"] = starts[*buffer] + offset;
-    };
     if (!out_.json.contains("bufferViews")) return;
     for (Json& view : out_.list("bufferViews")) {
-      move(view);
-      auto extensions = view.find("extensions");  // compressed views have bytes of their own
-      if (extensions != view.end() && extensions->is_object()) {
-        for (Json& extension : *extensions) move(extension);
-      }
+      auto buffer = whole_number(view, "buffer", starts.size());
+      if (!buffer) continue;
+      size_t offset = whole_number(view, "byteOffset", UINT32_MAX).value_or(0);
+      view["buffer"] = 0, view["byteOffset"] = starts[*buffer] + offset;
     }
   }
 
@@ -200,8 +193,6 @@ class DocumentWriter {
       const Part& part = scene_.parts[p];
       if (!part.changed && !still) continue;
       Json& primitive = mesh["primitives"][size_t(part.primitive)];
-      auto extensions = primitive.find("extensions");
-      if (extensions != primitive.end() && extensions->is_object()) extensions->erase("KHR_draco_mesh_compression");
       if (still || part.source.empty()) {
         write_geometry(out_, scene_, part, apart ? Mat4d(1.0) : world, primitive);
       } else {

@@ -21,10 +21,10 @@ inline constexpr size_t max_texcoord_sets = 32;
 // What a texture is beyond [0, 1].
 enum class Wrap : uint8_t { repeat, clamp, mirror };
 
-// A texture: kept encoded (PNG or JPEG) to be written back as it came, and decoded to bytes for look-ups.
+// A texture: kept encoded (PNG, JPEG or WebP) to be written back as it came, and decoded to bytes for look-ups.
 struct Texture {
   std::string name;
-  std::string mime_type;         // "image/png" or "image/jpeg"
+  std::string mime_type;         // "image/png", "image/jpeg" or "image/webp"
   std::vector<uint8_t> encoded;  // may be empty for a scene whose document already holds the bytes
   int width = 0, height = 0;
   std::vector<uint8_t>
@@ -55,6 +55,9 @@ struct Material {
   int transmission_set = 0;
   std::array<float, 6> transmission_transform{1, 0, 0, 0, 1, 0};
   float metallic = 1.0f, roughness = 1.0f;  // factors of the texture below, [0, 1]
+  // Reflectance of the part that is no metal, at normal and at grazing incidence (KHR_materials_ior, _specular).
+  Vec3 dielectric_f0{0.04f};
+  float dielectric_f90 = 1.0f;
   // Roughness in its green, metallic in its blue channel, linear; with a texcoord set and transform of its own.
   int metallic_roughness_texture = -1;
   int metallic_roughness_set = 0;

@@ -1,8 +1,10 @@
-// Formats: PNG (ISO/IEC 15948), JPEG (ITU-T T.81), and TGA, BMP, PSD and PNM as PNG, by way of stb_image.
+// Formats: PNG (ISO/IEC 15948), JPEG (ITU-T T.81), and TGA, BMP, PSD and PNM as PNG, by way of stb_image; WebP (RFC
+// 9649), by way of libwebp.
 #include <lambent/scene/textures.h>
 
 #include <stb_image.h>
 #include <stb_image_write.h>
+#include <webp/decode.h>
 
 #include <algorithm>
 #include <climits>
@@ -57,13 +59,13 @@ uint64_t most_plain_pixels(std::span<const uint8_t> encoded) {
 // A TGA, BMP, PSD (flattened, 8 or 16 bits) or binary PNM as the PNG that glTF takes in its place.
 Result<std::vector<uint8_t>> png_from(std::span<const uint8_t> encoded, const std::string& where) {
   for (std::string_view other : {"GIF8", "DDS ", "RIFF", "II*", "MM", "#?", "v/1\x01", "<svg", "\xabKTX"}) {
-    if (begins(encoded, other)) return Error{where, "is no PNG, JPEG, TGA, BMP, PSD or PNM"};
+    if (begins(encoded, other)) return Error{where, "is no PNG, JPEG, WebP, TGA, BMP, PSD or PNM"};
   }
   int width = 0, height = 0, channels = 0;
   if (encoded.size() > INT_MAX) return Error{where, "is larger than 2 GiB"};
   const int size = int(encoded.size());
   if (!stbi_info_from_memory(encoded.data(), size, &width, &height, &channels) || width <= 0 || height <= 0)
-    return Error{where, "is no PNG, JPEG, TGA, BMP, PSD or PNM"};
+    return Error{where, "is no PNG, JPEG, WebP, TGA, BMP, PSD or PNM"};
   if (width > max_texture_side || height > max_texture_side) return too_large(where, width, height);
   if (uint64_t(width) * uint64_t(height) > most_plain_pixels(encoded)) return too_short(where);
   // The decoder takes rows that are missing for whatever memory held: give it black.
@@ -80,44 +82,84 @@ Result<std::vector<uint8_t>> png_from(std::span<const uint8_t> encoded, const st
   return result;
 }
 
+Result<void> check_size(int width, int height, size_t bytes, const std::string& where) {
+  if (width <= 0 || height <= 0) return Error{where, "is empty"};
+  const std::string measures = "measures " + std::to_string(width) + " x " + std::to_string(height) + " pixels; ";
+  if (width > max_texture_side || height > max_texture_side)
+    return Error{where, measures + "the limit is " + std::to_string(max_texture_side) + " a side"};
+  if (uint64_t(width) * uint64_t(height) > free_texture_pixels + texture_pixels_a_byte * bytes)
+    return Error{where, measures + "its few bytes may not expand so far"};
+  return {};
+}
+
+// Pixels of three or four bytes.
+void keep_pixels(const uint8_t* pixels, int channels, Texture& texture) {
+  const size_t count = size_t(texture.width) * size_t(texture.height);
+  texture.alpha.clear();
+  if (channels == 3) {
+    texture.rgb.assign(pixels, pixels + count * 3);
+    return;
+  }
+  texture.rgb.resize(count * 3), texture.alpha.resize(count);
+  bool solid = true;
+  for (size_t i = 0; i < count; ++i) {
+    std::copy_n(pixels + 4 * i, 3, texture.rgb.data() + 3 * i);
+    texture.alpha[i] = pixels[4 * i + 3], solid &= texture.alpha[i] == 255;
+  }
+  if (solid) texture.alpha = {};
+}
+
+Result<void> decode_stb(std::span<const uint8_t> encoded, bool png, const std::string& where, Texture& texture) {
+  const int size = int(encoded.size());
+  int width = 0, height = 0, channels = 0;
+  if (!stbi_info_from_memory(encoded.data(), size, &width, &height, &channels)) return Error{where, "is broken"};
+  if (auto fits = check_size(width, height, encoded.size(), where); !fits) return fits;
+  if (uint64_t(width) * uint64_t(height) > most_pixels(encoded, png))
+    return Error{where, "is broken: too few bytes for its size"};
+  const int kept = channels == 2 || channels == 4 ? 4 : 3;
+  stbi_uc* pixels = stbi_load_from_memory(encoded.data(), size, &width, &height, &channels, kept);
+  if (!pixels) return Error{where, std::string("cannot be decoded: ") + stbi_failure_reason()};
+  texture.width = width, texture.height = height;
+  keep_pixels(pixels, kept, texture);
+  stbi_image_free(pixels);
+  return {};
+}
+
+Result<void> decode_webp(std::span<const uint8_t> encoded, const std::string& where, Texture& texture) {
+  WebPBitstreamFeatures features;
+  if (WebPGetFeatures(encoded.data(), encoded.size(), &features) != VP8_STATUS_OK) return Error{where, "is broken"};
+  if (features.has_animation) return Error{where, "is an animation"};
+  if (auto fits = check_size(features.width, features.height, encoded.size(), where); !fits) return fits;
+  int width = 0, height = 0;
+  uint8_t* pixels =
+      (features.has_alpha ? WebPDecodeRGBA : WebPDecodeRGB)(encoded.data(), encoded.size(), &width, &height);
+  if (!pixels) return Error{where, "cannot be decoded"};
+  texture.width = width, texture.height = height;
+  keep_pixels(pixels, features.has_alpha ? 4 : 3, texture);
+  WebPFree(pixels);
+  return {};
+}
+
 }  // namespace
 
 std::string image_mime_type(std::span<const uint8_t> encoded) {
   static constexpr uint8_t png[8] = {0x89, 'P', 'N', 'G', '\r', '\n', 0x1a, '\n'}, jpeg[3] = {0xff, 0xd8, 0xff};
   if (encoded.size() >= sizeof png && std::memcmp(encoded.data(), png, sizeof png) == 0) return "image/png";
   if (encoded.size() >= sizeof jpeg && std::memcmp(encoded.data(), jpeg, sizeof jpeg) == 0) return "image/jpeg";
+  constexpr size_t kind_at = 8;  // after "RIFF" and a size
+  if (encoded.size() >= kind_at + 4 && std::memcmp(encoded.data(), "RIFF", 4) == 0 &&
+      std::memcmp(encoded.data() + kind_at, "WEBP", 4) == 0)
+    return "image/webp";
   return {};
 }
 
 Result<void> decode_texture(std::span<const uint8_t> encoded, const std::string& where, Texture& texture) {
   std::string type = image_mime_type(encoded);
-  if (type.empty()) return Error{where, "is neither PNG nor JPEG"};
+  if (type.empty()) return Error{where, "is neither PNG, JPEG nor WebP"};
   if (encoded.size() > INT_MAX) return Error{where, "is larger than 2 GiB"};
-  const int size = int(encoded.size());
-  int width = 0, height = 0, channels = 0;
-  if (!stbi_info_from_memory(encoded.data(), size, &width, &height, &channels)) return Error{where, "is broken"};
-  if (width <= 0 || height <= 0) return Error{where, "is empty"};
-  if (width > max_texture_side || height > max_texture_side) return too_large(where, width, height);
-  if (uint64_t(width) * uint64_t(height) > most_pixels(encoded, type == "image/png")) return too_short(where);
-  const int kept = channels == 2 || channels == 4 ? 4 : 3;
-  stbi_uc* pixels = stbi_load_from_memory(encoded.data(), size, &width, &height, &channels, kept);
-  if (!pixels) return Error{where, std::string("cannot be decoded: ") + stbi_failure_reason()};
-  texture.width = width, texture.height = height, texture.mime_type = type;
-  const size_t count = size_t(width) * size_t(height);
-  texture.alpha.clear();
-  if (kept == 3) {
-    texture.rgb.assign(pixels, pixels + count * 3);
-  } else {
-    texture.rgb.resize(count * 3), texture.alpha.resize(count);
-    bool solid = true;
-    for (size_t i = 0; i < count; ++i) {
-      std::copy_n(pixels + 4 * i, 3, texture.rgb.data() + 3 * i);
-      texture.alpha[i] = pixels[4 * i + 3], solid &= texture.alpha[i] == 255;
-    }
-    if (solid) texture.alpha = {};
-  }
-  stbi_image_free(pixels);
-  return {};
+  texture.mime_type = type;
+  return type == "image/webp" ? decode_webp(encoded, where, texture)
+                              : decode_stb(encoded, type == "image/png", where, texture);
 }
 
 Result<Texture> decode_texture(std::vector<uint8_t> encoded, const std::string& name) {

@@ -8,15 +8,17 @@
 
 namespace lambent {
 
-// Larger images are refused before they are decoded.
+// Larger images are refused before they are decoded: by their sides, and beyond 8192 x 8192 pixels those that have more
+// than 64 for each byte of their file.
 inline constexpr int max_texture_side = 16384;
+inline constexpr uint64_t free_texture_pixels = uint64_t{1} << 26, texture_pixels_a_byte = 64;
 
-// "image/png" or "image/jpeg" by the first bytes, else "".
+// "image/png", "image/jpeg" or "image/webp" by the first bytes, else "".
 std::string image_mime_type(std::span<const uint8_t> encoded);
 
-// Fills width, height, rgb, alpha (empty where all is covered) and mime_type from a PNG (8 or 16 bits) or JPEG. `where`
-// names the image in errors: another format, broken, larger than max_texture_side, or of a size that its bytes cannot
-// hold.
+// Fills width, height, rgb, alpha (empty where all is covered) and mime_type from a PNG (8 or 16 bits), JPEG or still
+// WebP. `where` names the image in errors: another format, broken, larger than the above, or of a size that its bytes
+// cannot hold.
 Result<void> decode_texture(std::span<const uint8_t> encoded, const std::string& where, Texture& texture);
 
 // The same for a texture that keeps its encoded bytes; `name` becomes its name and names it in errors. TGA, BMP, PSD

@@ -22,7 +22,7 @@ TEST(DecodeTexture, RefusesWhatIsNoImage) {
   for (std::vector<uint8_t> bytes : {std::vector<uint8_t>{}, {'G', 'I', 'F', '8', '9', 'a'}, {0xff, 0xd8}}) {
     auto texture = decode_texture(bytes, "a.png");
     ASSERT_FALSE(texture);
-    EXPECT_EQ(texture.error().text(), "a.png: is no PNG, JPEG, TGA, BMP, PSD or PNM");
+    EXPECT_EQ(texture.error().text(), "a.png: is no PNG, JPEG, WebP, TGA, BMP, PSD or PNM");
   }
   EXPECT_FALSE(decode_texture({0xff, 0xd8, 0xff, 0xe0}, "a"));
   for (auto [width, height] : {std::pair{0u, 1u},
