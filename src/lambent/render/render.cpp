@@ -111,7 +111,7 @@ Result<Image> render_surfaces(const Scene& scene, const Tracer& tracer, const Ca
                               const RenderOptions& options, const std::function<SurfaceShade()>& make_shade,
                               Progress* progress) {
   Image image(options.width, options.height);
-  if (!options.background) image.alpha.assign(image.rgb.size(), 0.0f);
+  image.coverage.assign(image.rgb.size(), 0.0f);
   auto traced = trace_pixels(
       scene, tracer, camera, options,
       [&]() -> VisitPixel {
@@ -128,11 +128,12 @@ Result<Image> render_surfaces(const Scene& scene, const Tracer& tracer, const Ca
             if (options.background) sum += ray.weight * radiance_bilinear(*options.background, ray.direction);
           }
           image.rgb[pixel] = sum / samples;
-          if (!options.background) image.alpha[pixel] = std::max(samples - open, 0.0f) / samples;
+          image.coverage[pixel] = std::max(samples - open, 0.0f) / samples;
         };
       },
       progress);
   if (!traced) return traced.error();
+  if (!options.background) image.alpha = image.coverage;
   return image;
 }
 
@@ -240,6 +241,7 @@ Image pixels_image(const Relit& relit, const std::vector<float>& coverage, const
     const Vec3 direction = rays.direction(float(i % size_t(width)) + 0.5f, float(i / size_t(width)) + 0.5f);
     image.rgb[i] += (1 - coverage[i]) * radiance_bilinear(*background, direction);
   }
+  image.coverage = coverage;
   if (!background) image.alpha = coverage;
   return image;
 }
