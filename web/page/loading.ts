@@ -31,7 +31,8 @@ export interface Manifest {
   environments: { name: string; file: string }[];
   camera?: number[];
   rotate?: number[];
-  exposure?: number;
+  exposure?: number | 'auto';
+  tone?: string;
 }
 
 export interface EnvironmentFile {
@@ -96,6 +97,9 @@ export async function readBaked(bytes: ArrayBuffer): Promise<GLTF> {
     throw new LambentError(`cannot be read: ${error instanceof Error ? error.message : String(error)}`);
   }
 }
+
+/** The scene of a file without what we know of it, as any viewer has it. */
+export const readPlain = (bytes: ArrayBuffer): Promise<GLTF> => new GLTFLoader().parseAsync(bytes, '');
 
 /** Linear radiance of an .hdr or .exr, told apart by content. */
 export function readMap(bytes: ArrayBuffer): LatLongMap {

@@ -2,7 +2,10 @@
 import {
   AnimationMixer,
   Box3,
-  LinearToneMapping,
+  DataUtils,
+  EquirectangularReflectionMapping,
+  FloatType,
+  HalfFloatType,
   Matrix4,
   PerspectiveCamera,
   Quaternion,
@@ -12,6 +15,7 @@ import {
   Vector2,
   Vector3,
   WebGLRenderer,
+  WebGLRenderTarget,
   type AnimationAction,
   type DataTexture,
   type Mesh,
@@ -26,6 +30,7 @@ import { Model } from './model.js';
 import { Orbit } from './orbit.js';
 import { PictureMaterial, SkyMaterial } from './screen.js';
 import type { View } from './state.js';
+import { autoExposure, clampBeforeTone, toneMappings, type Tone } from './tone.js';
 
 export interface ViewerCallbacks {
   /** A frame followed the one before it after so many milliseconds, without a pause between. */
@@ -34,6 +39,8 @@ export interface ViewerCallbacks {
   onUse(what: 'orbit' | 'light'): void;
   onProblem(message: string): void;
   onRecovered(): void;
+  /** The exposure was measured anew: so many stops. */
+  onMeter(stops: number): void;
 }
 
 const groundName = 'ground'; // of the floor that `lambent bake --ground` adds
@@ -42,6 +49,8 @@ export const falseColorEnd = 0.25;
 /** Of errors of a fit, relative. */
 export const fitErrorEnd = 0.1;
 const pause = 250; // milliseconds without a frame
+const meterPause = 300; // between two measures of the exposure while the light turns
+const meterWidth = 128; // pixels
 
 export class Viewer {
   readonly renderer: WebGLRenderer;
@@ -52,7 +61,8 @@ export class Viewer {
   wipe = 0.5;
   order = 0; // bands in use; 0: all
   window: ShWindow = 'none';
-  exposure = 0;
+  exposure: number | 'auto' = 'auto';
+  tone: Tone = 'neutral';
   showBackground = true;
   coefficient = 3;
 
@@ -66,9 +76,15 @@ export class Viewer {
   private readonly bounds = new Sphere(new Vector3(), 1);
   private baked: Model | undefined;
   private compare: Model | undefined;
+  private plain: Object3D | undefined; // a scene without transfer, in place of `baked`
   private environment: EnvironmentFile | undefined;
   private animation: { mixer: AnimationMixer; action: AnimationAction } | undefined;
   private lightChanged = true;
+  private measured = 0; // stops
+  private meterDue = true;
+  private lastMeter = -Infinity;
+  private meterSoon = 0;
+  private meterTarget: WebGLRenderTarget | undefined;
   private request = 0;
   private lastFrame = 0;
 
@@ -76,6 +92,7 @@ export class Viewer {
     private readonly canvas: HTMLCanvasElement,
     private readonly callbacks: ViewerCallbacks,
   ) {
+    clampBeforeTone();
     try {
       this.renderer = new WebGLRenderer({ canvas, antialias: true, powerPreference: 'high-performance' });
     } catch {
@@ -86,7 +103,6 @@ export class Viewer {
         `The graphics driver refuses a shader: ${context.getProgramInfoLog(program) ?? 'no reason given'}`,
       );
     this.renderer.autoClear = false;
-    this.renderer.toneMapping = LinearToneMapping; // exposure, then the sRGB curve: as `lambent render` writes a PNG
     this.renderer.setClearColor(0x000000, 1);
     canvas.addEventListener('webglcontextlost', () =>
       callbacks.onProblem('The graphics card was taken away from this page. The picture returns with it.'),
@@ -94,7 +110,8 @@ export class Viewer {
     // What was drawn into textures is gone.
     canvas.addEventListener('webglcontextrestored', () => (callbacks.onRecovered(), this.changeLight()));
     this.orbit = new Orbit(this.camera, canvas, {
-      onChange: () => (this.changeLight(), callbacks.onChange()),
+      onCamera: () => (this.invalidate(), callbacks.onChange()),
+      onLight: () => (this.changeLight(), callbacks.onChange()),
       onUse: (what) => callbacks.onUse(what),
     });
     new ResizeObserver(() => this.invalidate()).observe(canvas);
@@ -114,16 +131,34 @@ export class Viewer {
     }
     this[role] = model;
     this.scene.add(model.root);
-    if (role === 'baked') {
-      this.animation = undefined;
-      this.glyphs.clear();
-      if (gltf.animations[0]) {
-        const mixer = new AnimationMixer(gltf.scene);
-        this.animation = { mixer, action: mixer.clipAction(gltf.animations[0]) };
-      }
-      new Box3().setFromObject(model.root, true).getBoundingSphere(this.bounds);
-    }
+    if (role === 'baked') this.takeScene(gltf);
     this.changeLight();
+  }
+
+  /** A scene without transfer takes the place of the baked one: three.js's own materials under the environment. */
+  setPlain(gltf: GLTF): void {
+    if (this.baked) {
+      this.scene.remove(this.baked.root);
+      this.baked.dispose();
+      this.baked = undefined;
+    }
+    this.takeScene(gltf);
+    this.plain = gltf.scene;
+    this.scene.add(gltf.scene);
+    this.changeLight();
+  }
+
+  private takeScene(gltf: GLTF): void {
+    this.plain?.traverse((o) => (o as Partial<Mesh>).geometry?.dispose());
+    if (this.plain) this.scene.remove(this.plain);
+    this.plain = undefined;
+    this.animation = undefined;
+    this.glyphs.clear();
+    if (gltf.animations[0]) {
+      const mixer = new AnimationMixer(gltf.scene);
+      this.animation = { mixer, action: mixer.clipAction(gltf.animations[0]) };
+    }
+    new Box3().setFromObject(gltf.scene, true).getBoundingSphere(this.bounds);
   }
 
   get bakedScene(): BakedScene | undefined {
@@ -154,7 +189,7 @@ export class Viewer {
    * farther off where the page is narrow.
    */
   frameAll(): void {
-    const root = this.baked?.root;
+    const root = this.baked?.root ?? this.plain;
     if (!root) return;
     root.updateMatrixWorld(true);
     const box = new Box3();
@@ -170,8 +205,18 @@ export class Viewer {
 
   /** The light, its order or its window are others now. */
   changeLight(): void {
-    this.lightChanged = true;
+    this.lightChanged = this.meterDue = true;
     this.invalidate();
+  }
+  /** Measures the exposure where the camera stands, if it is automatic. */
+  measure(): void {
+    this.meterDue = true;
+    this.lastMeter = -Infinity;
+    this.invalidate();
+  }
+  /** Stops in use. */
+  get stops(): number {
+    return this.exposure === 'auto' ? this.measured : this.exposure;
   }
 
   play(on: boolean): void {
@@ -238,13 +283,15 @@ export class Viewer {
     const { renderer, camera, sky } = this;
     this.fitToCanvas();
     if (this.lightChanged) this.relight();
-    renderer.toneMappingExposure = 2 ** this.exposure;
-    this.gain.value = 2 ** this.exposure / falseColorEnd;
-    this.errorGain.value = 2 ** this.exposure / fitErrorEnd;
+    this.gain.value = falseColorGain(this.exposure) / falseColorEnd;
+    this.errorGain.value = falseColorGain(this.exposure) / fitErrorEnd;
     sky.turnBack.value.setFromMatrix4(
       new Matrix4().makeRotationFromQuaternion(new Quaternion().copy(this.orbit.light).invert()),
     );
     sky.unproject.value.copy(camera.matrixWorld).multiply(camera.projectionMatrixInverse);
+    if (this.exposure === 'auto' && this.meterDue) this.meter();
+    renderer.toneMapping = toneMappings[this.tone];
+    renderer.toneMappingExposure = 2 ** this.stops;
     const ratio = renderer.getPixelRatio(),
       width = this.canvas.width / ratio,
       height = this.canvas.height / ratio;
@@ -283,6 +330,56 @@ export class Viewer {
     lighting.window = this.window;
     this.baked?.relight(lighting);
     this.compare?.relight(lighting);
+    if (this.plain) this.lightPlain(this.environment!.background);
+  }
+
+  private lightPlain(background: DataTexture): void {
+    if (this.scene.environment?.source !== background.source) {
+      this.scene.environment?.dispose();
+      this.scene.environment = background.clone(); // with the first row at the top, as three.js has environments
+      this.scene.environment.mapping = EquirectangularReflectionMapping;
+      this.scene.environment.flipY = true;
+      this.scene.environment.needsUpdate = true;
+    }
+    this.scene.environmentRotation.setFromQuaternion(this.orbit.light);
+  }
+
+  /** A small picture of the surfaces says how bright they are; while the light turns, a few times a second. */
+  private meter(): void {
+    const { renderer, screen } = this,
+      wait = this.lastMeter + meterPause - performance.now();
+    clearTimeout(this.meterSoon);
+    if (wait > 0) return void (this.meterSoon = window.setTimeout(() => this.invalidate(), wait));
+    const type = renderer.extensions.has('EXT_color_buffer_float')
+      ? FloatType
+      : renderer.extensions.has('EXT_color_buffer_half_float')
+        ? HalfFloatType
+        : undefined;
+    if (type === undefined || !this.environment) return;
+    const height = Math.min(4 * meterWidth, Math.max(1, Math.round(meterWidth / this.camera.aspect))),
+      target = (this.meterTarget ??= new WebGLRenderTarget(meterWidth, height, { type }));
+    target.setSize(meterWidth, height);
+    const read = (): number[] => {
+      const pixels = new (type === FloatType ? Float32Array : Uint16Array)(4 * meterWidth * height);
+      renderer.readRenderTargetPixels(target, 0, 0, meterWidth, height, pixels);
+      return Array.from(pixels, (v) => (type === FloatType ? v : DataUtils.fromHalfFloat(v)));
+    };
+    renderer.setRenderTarget(target);
+    renderer.setClearColor(0x000000, 0);
+    renderer.clear();
+    this.drawScene('baked');
+    let pixels = read();
+    if (this.showBackground && !pixels.some((v, i) => i % 4 === 3 && v >= 0.5)) {
+      screen.material = this.sky;
+      screen.render(renderer);
+      pixels = read();
+    }
+    renderer.setClearColor(0x000000, 1);
+    renderer.setRenderTarget(null);
+    this.meterDue = false;
+    this.lastMeter = performance.now();
+    this.measured = autoExposure(pixels);
+    this.callbacks.onMeter(this.measured);
   }
 
   private drawView(view: View): void {
@@ -299,23 +396,31 @@ export class Viewer {
       screen.material = this.sky;
       screen.render(renderer);
     }
+    const shown = this.drawScene(view);
+    const glyphs = shown && shown === this.baked ? this.glyphs.place(this.camera) : undefined;
+    if (!glyphs) return;
+    renderer.clearDepth(); // lobes may point into the surface
+    renderer.render(glyphs, this.camera);
+  }
+
+  private drawScene(view: Exclude<View, 'reference'>): Model | undefined {
     const shown = view === 'compare' ? this.compare : this.baked;
-    if (!shown) return;
     for (const model of [this.baked, this.compare]) if (model) model.root.visible = model === shown;
-    shown.wear(
+    if (this.plain) this.plain.visible = !shown;
+    shown?.wear(
       view === 'compare' ? 'baked' : view,
       this.environment?.lighting,
       this.coefficient,
       this.gain,
       this.errorGain,
     );
-    renderer.render(this.scene, this.camera);
-    const glyphs = shown === this.baked ? this.glyphs.place(this.camera) : undefined;
-    if (!glyphs) return;
-    renderer.clearDepth(); // lobes may point into the surface
-    renderer.render(glyphs, this.camera);
+    if (shown ?? this.plain) this.renderer.render(this.scene, this.camera);
+    return shown;
   }
 }
+
+/** False colours show transfer, which no automatic exposure is measured from. */
+export const falseColorGain = (exposure: number | 'auto'): number => (exposure === 'auto' ? 1 : 2 ** exposure);
 
 function isGround(object: Object3D): boolean {
   for (let o: Object3D | null = object; o; o = o.parent) if (o.name === groundName) return true;
