@@ -480,7 +480,10 @@ expect 2 'order' bake corner.obj --order 0 -o x.glb
 expect 2 'order' bake corner.obj --order 1000 -o x.glb
 expect 2 'samples' bake corner.obj --samples -4 -o x.glb
 expect 2 'bounces' bake corner.obj --shadows off --bounces 3 -o x.glb
-expect 2 'exposure: brightens a PNG' render corner.glb --env uniform:1 --exposure 1 -o x.exr
+expect 2 'exposure: is for a PNG' render corner.glb --env uniform:1 --exposure 1 -o x.exr
+expect 2 'tone: is for a PNG' render corner.glb --env uniform:1 --tone agx -o x.exr
+expect 2 'exposure: must be auto or stops' render corner.glb --env uniform:1 --exposure bright -o x.png
+expect 2 'tone: must be .*neutral' render corner.glb --env uniform:1 --tone bright -o x.png
 expect 2 'show: must be' render corner.glb --env uniform:1 --show bounce:-1 -o x.png
 expect 1 'corner.glb: .*bake --terms' render corner.glb --env uniform:1 --show bounce:1 -o x.png
 expect 1 'no lamps of its own' render corner.glb --show emission -o x.png

@@ -10,7 +10,7 @@ namespace {
 
 struct CompareCommand {
   std::string a, b, output;
-  float exposure = 0;
+  DisplayOptions display{"0", "none"};
   bool mean = false;
 };
 
@@ -21,13 +21,15 @@ int run_compare(Context& context, const CompareCommand& o) {
   if (!a) return fail(a.error());
   auto b = load_image(o.b);
   if (!b) return fail(b.error());
-  auto d = compare_images(*a, *b, o.exposure);
+  auto display = parse_display(o.display.exposure, o.display.tone, {&*b, 1});
+  if (!display) return fail(display.error());
+  auto d = compare_images(*a, *b, *display);
   if (!d) return fail(d.error());
   if (o.mean && a->alpha.size() != b->alpha.size())
     return fail({o.b, "--mean needs both pictures with alpha, or both without"});
   if (!o.output.empty())
-    if (auto ok = save_image(o.output, o.mean ? mean_of(*a, *b) : difference_picture(*a, *b, o.exposure),
-                             o.mean ? o.exposure : 0);
+    if (auto ok = save_image(o.output, o.mean ? mean_of(*a, *b) : difference_picture(*a, *b, *display),
+                             o.mean ? *display : Display());
         !ok)
       return fail(ok.error());
   if (context.json) {
@@ -60,8 +62,7 @@ void add_compare(CLI::App& app, Run& run) {
   c->add_option("-o,--output", o->output, "Picture to write: A, B and the false-colour difference");
   c->add_flag("--mean", o->mean,
               "Write the mean of A and B instead: two references with different seeds make one of twice the paths");
-  c->add_option("--exposure", o->exposure, "Stops of exposure for PSNR, FLIP and the picture")
-      ->check(CLI::Range(-100.0f, 100.0f));
+  o->display.add_to(*c);  // for PSNR, FLIP and the picture
   c->callback([o, &run] { run = [o](Context& context) { return run_compare(context, *o); }; });
 }
 

@@ -27,7 +27,7 @@ double seconds_since(Clock::time_point start) { return std::chrono::duration<dou
 struct DemoCommand {
   std::string folder = "out";
   int spp = 128, width = 320, height = 240;
-  float detail = 1, exposure = -0.5f;
+  float detail = 1;
   std::string at(const std::string& name) const { return folder + "/" + name; }
 };
 
@@ -47,14 +47,14 @@ struct Row {
 // The mean of two independent pictures of half the paths each. Their distance from each other is twice the mean's
 // distance from the truth, 6 dB, so it tells the noise.
 Result<Image> trace_twice(const Scene& scene, const Environment& env, const Camera& camera, ReferenceOptions options,
-                          Progress& progress, float exposure, double* noise_psnr) {
+                          Progress& progress, const Display& display, double* noise_psnr) {
   options.spp = std::max(1, options.spp / 2);
   auto a = path_trace(scene, env, camera, options, &progress);
   if (!a) return a.error();
   options.seed += 1;
   auto b = path_trace(scene, env, camera, options, &progress);
   if (!b) return b.error();
-  auto apart = compare_images(a->image, b->image, exposure);
+  auto apart = compare_images(a->image, b->image, display);
   if (!apart) return apart.error();
   if (noise_psnr) *noise_psnr = apart->psnr + 20 * std::log10(2.0);
   return mean_of(a->image, b->image);
@@ -70,7 +70,7 @@ struct Courtyard {
   Camera camera = courtyard_camera();
 };
 
-// One sky: relit, judged, and written; `shown_picture` is what to look at.
+// One sky: relit, judged, and written; `shown_picture` is what to look at, as the screen shows it.
 Result<Row> draw_hour(const DemoCommand& o, const Courtyard& yard, const Hour& hour, Relit& relit, Image& shown_picture,
                       Progress& progress) {
   const auto& [scene, tracer, corners, transfer, options, camera] = yard;
@@ -88,16 +88,17 @@ Result<Row> draw_hour(const DemoCommand& o, const Courtyard& yard, const Hour& h
   const RenderOptions view{o.width, o.height, 64};
   auto picture = render(scene, tracer, corners, relit, camera, view, &progress);
   if (!picture) return picture.error();
+  const Display display{auto_exposure({&*picture, 1}), Tone::neutral};
   ReferenceOptions truth;
   truth.width = o.width, truth.height = o.height, truth.spp = o.spp, truth.bounces = options.bounces,
   truth.background = false;
   const auto traced = Clock::now();
-  auto same_light = trace_twice(scene, smooth, camera, truth, progress, o.exposure, &row.noise_psnr);
+  auto same_light = trace_twice(scene, smooth, camera, truth, progress, display, &row.noise_psnr);
   if (!same_light) return same_light.error();
   row.reference_seconds = seconds_since(traced);
-  auto full_light = trace_twice(scene, *env, camera, truth, progress, o.exposure, nullptr);
+  auto full_light = trace_twice(scene, *env, camera, truth, progress, display, nullptr);
   if (!full_light) return full_light.error();
-  auto d6 = compare_images(*picture, *same_light, o.exposure), dsky = compare_images(*picture, *full_light, o.exposure);
+  auto d6 = compare_images(*picture, *same_light, display), dsky = compare_images(*picture, *full_light, display);
   if (!d6) return d6.error();
   if (!dsky) return dsky.error();
   row.order6 = *d6, row.sky = *dsky;
@@ -107,14 +108,15 @@ Result<Row> draw_hour(const DemoCommand& o, const Courtyard& yard, const Hour& h
   auto pretty = render(scene, tracer, corners, relit, camera, shown, &progress);
   if (!pretty) return pretty.error();
   shown_picture = *pretty;
+  for (Vec3& c : shown_picture.rgb) c = shown(c, display);
   const std::pair<std::string, Image> files[] = {
       {"relit_" + row.name, std::move(*pretty)},
       {"reference_" + row.name, *same_light},
       {"reference_sky_" + row.name, *full_light},
-      {"error_" + row.name, difference_picture(*picture, *same_light, o.exposure)}};
+      {"error_" + row.name, difference_picture(*picture, *same_light, display)}};
   for (const auto& [name, image] : files) {
     // Error maps are already pictures of displayed values.
-    if (auto ok = save_image(o.at(name + ".png"), image, name.starts_with("error") ? 0 : o.exposure); !ok)
+    if (auto ok = save_image(o.at(name + ".png"), image, name.starts_with("error") ? Display() : display); !ok)
       return ok.error();
     if (name.starts_with("relit"))
       if (auto ok = save_image(o.at(name + ".exr"), image); !ok) return ok.error();
@@ -196,7 +198,7 @@ int run_demo(Context& context, const DemoCommand& o) {
     rows.push_back(std::move(*row));
   }
 
-  if (auto ok = save_image(at("courtyard.png"), beside(relit_pictures), o.exposure); !ok) return fail(ok.error());
+  if (auto ok = save_image(at("courtyard.png"), beside(relit_pictures)); !ok) return fail(ok.error());
 
   const Said said = summarize(scene, report, options, rows);
   if (auto ok = write_file_atomically(at("summary.md"), said.table); !ok) return fail(ok.error());

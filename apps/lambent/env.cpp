@@ -14,7 +14,7 @@ struct EnvCommand {
   int order = 6;
   ShWindow window = ShWindow::none;
   std::string convention = "lambent", output;
-  float exposure = 0;
+  DisplayOptions display;
 };
 
 // The environment beside its reconstruction, both 512 wide, labelled.
@@ -28,7 +28,8 @@ Image side_by_side(const Environment& env, std::span<const Vec3> light) {
   return both;
 }
 
-int run_env(Context& context, const EnvCommand& o) {
+int run_env(Context& context, const EnvCommand& o, const CLI::App& command) {
+  if (auto ok = check_display(o.display, command, o.output); !ok) return fail(ok.error());
   if (!o.output.empty())
     if (auto ok = check_output(o.output, {"png", "exr"}); !ok) return fail(ok.error());
   auto rotation = light_rotation(o.light);
@@ -71,7 +72,7 @@ int run_env(Context& context, const EnvCommand& o) {
   }
   if (!o.output.empty()) {
     if (!o.light.rotate.empty()) *env = rotated(*env, *rotation);
-    if (auto ok = save_image(o.output, side_by_side(*env, light), o.exposure); !ok) return fail(ok.error());
+    if (auto ok = save_shown(o.output, side_by_side(*env, light), o.display); !ok) return fail(ok.error());
     if (!context.json) fmt::print("# {}\n", o.output);
   }
   return success;
@@ -91,8 +92,8 @@ void add_env(CLI::App& app, Run& run) {
       ->check(CLI::IsMember({"lambent", "three", "unity", "godot", "gltf-ibl"}))
       ->capture_default_str();
   c->add_option("-o,--output", o->output, "Picture to write: the environment beside its reconstruction");
-  c->add_option("--exposure", o->exposure, "Stops that a PNG is brightened by")->check(CLI::Range(-100.0f, 100.0f));
-  c->callback([o, &run] { run = [o](Context& context) { return run_env(context, *o); }; });
+  o->display.add_to(*c);
+  c->callback([o, c, &run] { run = [o, c](Context& context) { return run_env(context, *o, *c); }; });
 }
 
 }  // namespace lambent::tool

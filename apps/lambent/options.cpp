@@ -32,13 +32,31 @@ Result<Scene> load_prepared_scene(const SceneOptions& o) {
   return load_scene_of(request, {nullptr, [](const std::string& message) { warn(message); }});
 }
 
+void DisplayOptions::add_to(CLI::App& command) {
+  command.add_option("--exposure", exposure, "Stops that a PNG is brightened by, or auto")->capture_default_str();
+  command.add_option("--tone", tone, "Curve from light to the screen, of a PNG")
+      ->check(CLI::IsMember({"neutral", "agx", "aces", "none"}))
+      ->capture_default_str();
+}
+
+Result<void> check_display(const DisplayOptions& options, const CLI::App& command, const std::string& output) {
+  for (const char* option : {"--exposure", "--tone"})
+    if (command.count(option) && file_extension(output) == "exr")
+      return Error{option, "is for a PNG; an EXR keeps radiance as it is", true};
+  return lambent::check_display(options.exposure, options.tone);
+}
+
+Result<void> save_shown(const std::string& output, const Image& image, const DisplayOptions& options) {
+  auto display = parse_display(options.exposure, options.tone, {&image, 1});
+  if (!display) return display.error();
+  return save_image(output, image, *display);
+}
+
 void ViewOptions::add_to(CLI::App& command) {
   command.add_option("--camera", camera, "EX,EY,EZ,TX,TY,TZ,FOV: eye, target, vertical degrees; or auto")
       ->capture_default_str();
   command.add_option("--size", size, "Picture size, WIDTHxHEIGHT pixels")->capture_default_str();
-  command.add_option("--exposure", exposure, "Stops that a PNG is brightened by")
-      ->check(CLI::Range(-100.0f, 100.0f))
-      ->capture_default_str();
+  display.add_to(command);
   command.add_option("--background", background, "What lies behind the scene: env, or none (transparent)")
       ->check(CLI::IsMember({"env", "none"}))
       ->capture_default_str();

@@ -3,6 +3,7 @@
 #include "terminal.h"
 
 #include <lambent/bake/subsurface.h>
+#include <lambent/image/image.h>
 #include <lambent/light/environment.h>
 #include <lambent/pipeline/parse.h>
 #include <lambent/scene/scene.h>
@@ -23,9 +24,18 @@ struct SceneOptions {
 // Loads and prepares a scene; prints its warnings.
 Result<Scene> load_prepared_scene(const SceneOptions& options);
 
+// How a PNG shows light; an EXR keeps it.
+struct DisplayOptions {
+  std::string exposure = "auto", tone = "neutral";
+  void add_to(CLI::App& command);
+};
+// Errors: as parse_display(), and options that were given for an EXR.
+Result<void> check_display(const DisplayOptions& options, const CLI::App& command, const std::string& output);
+Result<void> save_shown(const std::string& output, const Image& image, const DisplayOptions& options);
+
 struct ViewOptions {
   std::string camera = "auto", size = "512x512", background = "env", output;
-  float exposure = 0;
+  DisplayOptions display;
   void add_to(CLI::App& command);
 };
 Result<View> make_view(const ViewOptions& options, const Scene& scene);

@@ -30,7 +30,8 @@ struct ReferenceCommand {
   ReferenceOptions options;
 };
 
-int run_reference(Context& context, ReferenceCommand o) {
+int run_reference(Context& context, ReferenceCommand o, const CLI::App& command) {
+  if (auto ok = check_display(o.view.display, command, o.view.output); !ok) return fail(ok.error());
   if (auto ok = check_output(o.view.output, {"png", "exr"}); !ok) return fail(ok.error());
   auto rotation = light_rotation(o.light);
   if (!rotation) return fail(rotation.error());
@@ -72,7 +73,7 @@ int run_reference(Context& context, ReferenceCommand o) {
   auto result = path_trace(*scene, *env, view->camera, o.options, &context.progress);
   if (!result) return fail(result.error());
   const double seconds = std::chrono::duration<double>(std::chrono::steady_clock::now() - start).count();
-  if (auto ok = save_image(o.view.output, result->image, o.view.exposure); !ok) return fail(ok.error());
+  if (auto ok = save_shown(o.view.output, result->image, o.view.display); !ok) return fail(ok.error());
 
   double variance = 0;
   for (Vec3 v : result->variance) variance += (double(v.x) + v.y + v.z) / 3;
@@ -111,7 +112,7 @@ void add_reference(CLI::App& app, Run& run) {
       ->capture_default_str();
   c->add_option("--spp", o->options.spp, "Paths a pixel")->check(CLI::Range(1, 1 << 20))->capture_default_str();
   c->add_option("--seed", o->options.seed, "Of the paths")->capture_default_str();
-  c->callback([o, &run] { run = [o](Context& context) { return run_reference(context, *o); }; });
+  c->callback([o, c, &run] { run = [o, c](Context& context) { return run_reference(context, *o, *c); }; });
 }
 
 }  // namespace lambent::tool

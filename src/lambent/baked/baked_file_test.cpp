@@ -120,7 +120,7 @@ TEST(BakedFile, KeepsTexelsAndPatchesAndWhatViewersShow) {
     const TemporaryFile file("map.glb");
     const Mapped m = small_map(texels);
     const Image picture(4, 4);
-    const ViewerLook look{*encode_png(picture, 0, ""), 3.5f};
+    const ViewerLook look{*encode_png(picture, {}, ""), 3.5f};
     ASSERT_TRUE(save_baked(file.path, make_baked(m.scene, m.receivers, m.transfer.transfer, DiffuseRows{}), &look));
     auto back = load_baked(file.path);
     ASSERT_TRUE(back) << back.error().text();
@@ -190,7 +190,7 @@ TEST(BakedFile, AnEarlierBakeLeavesNothing) {
     ASSERT_TRUE(scene) << scene.error().text();
     const nlohmann::json original = scene->document->json;
     ASSERT_EQ(scene->positions.size(), m.scene.positions.size());
-    const ViewerLook look{*encode_png(Image(4, 4), 0, ""), 3.5f};
+    const ViewerLook look{*encode_png(Image(4, 4), {}, ""), 3.5f};
     for (const ViewerLook* shown : {&look, static_cast<const ViewerLook*>(nullptr)}) {
       const auto bake = [&](const Scene& from, const std::string& to) {
         auto saved = save_baked(to, make_baked(from, m.receivers, m.transfer.transfer, DiffuseRows{}), shown);

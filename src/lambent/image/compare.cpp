@@ -25,7 +25,7 @@ void fill(Image& image, int x0, int y0, int width, int height, Vec3 color) {
 
 }  // namespace
 
-Result<ImageDifference> compare_images(const Image& a, const Image& b, float exposure) {
+Result<ImageDifference> compare_images(const Image& a, const Image& b, const Display& display) {
   LAMBENT_CHECK(a.alpha.empty() || a.alpha.size() == a.rgb.size());
   LAMBENT_CHECK(b.alpha.empty() || b.alpha.size() == b.rgb.size());
   if (a.width != b.width || a.height != b.height)
@@ -41,7 +41,7 @@ Result<ImageDifference> compare_images(const Image& a, const Image& b, float exp
   }
   if (compared.empty()) return Error{"", "no pixel is covered"};
 
-  Image shown_a = displayed(a, exposure), shown_b = displayed(b, exposure);
+  Image shown_a = displayed(a, display), shown_b = displayed(b, display);
   std::vector<float> flip = flip_map(shown_b, shown_a);
   ImageDifference out;
   out.pixels = compared.size();
@@ -62,9 +62,9 @@ Result<ImageDifference> compare_images(const Image& a, const Image& b, float exp
   return out;
 }
 
-Image difference_picture(const Image& a, const Image& b, float exposure, float white) {
+Image difference_picture(const Image& a, const Image& b, const Display& display, float white) {
   LAMBENT_CHECK(a.width == b.width && a.height == b.height && a.rgb.size() == b.rgb.size() && white > 0);
-  Image shown_a = displayed(a, exposure), shown_b = displayed(b, exposure);
+  Image shown_a = displayed(a, display), shown_b = displayed(b, display);
   int scale = a.width >= 256 ? 2 : 1, strip = 11 * scale;
   std::array<Image, 3> panels;
   for (Image& panel : panels) panel = Image(a.width, a.height + 2 * strip);

@@ -9,14 +9,14 @@ struct ImageDifference {
   double rmse = 0;          // root mean square error of linear RGB
   double relative_mse = 0;  // mean of (a - b)^2 / (b^2 + 0.01), linear RGB: b is the reference
   double psnr =
-      0;  // decibels, of the displayed pictures (sRGB-encoded after exposure, clamped), peak 1; infinite if equal
+      0;  // decibels, of the displayed pictures (displayed() in image.h), peak 1; infinite if equal
   double flip = 0;                // mean LDR-FLIP of the displayed pictures, 67 pixels a degree
   double mean_a = 0, mean_b = 0;  // mean luminance, linear: a ratio away from 1 is a factor, not noise
 };
 
 // Where only one picture has alpha, it decides what is compared.
 // Errors: sizes differ, or no pixel is covered, or a covered pixel is not finite.
-Result<ImageDifference> compare_images(const Image& a, const Image& b, float exposure = 0.0f);
+Result<ImageDifference> compare_images(const Image& a, const Image& b, const Display& display = {});
 
 // FLIP error of every pixel, [0, 1], of two displayed pictures of one size (sRGB-encoded values in [0, 1]) at the
 // viewing resolution `pixels_per_degree`. Source: Andersson et al. 2020, "FLIP: a difference evaluator for alternating
@@ -30,8 +30,8 @@ Vec3 cielab(Vec3 linear);
 float hyab(Vec3 lab_a, Vec3 lab_b);
 
 // A, B and the false-coloured absolute difference of the displayed pictures (largest channel; white = `white` or more),
-// with labels above and a scale below. The exposure is applied: save or show the result with exposure 0. The sizes must
+// with labels above and a scale below. The display is applied: save or show the result without. The sizes must
 // be equal.
-Image difference_picture(const Image& a, const Image& b, float exposure = 0.0f, float white = 0.1f);
+Image difference_picture(const Image& a, const Image& b, const Display& display = {}, float white = 0.1f);
 
 }  // namespace lambent

@@ -218,15 +218,14 @@ Result<Image> load_stb(std::span<const uint8_t> bytes, ImageFormat format, const
 
 }  // namespace
 
-Result<std::vector<uint8_t>> encode_png(const Image& image, float exposure, const std::string& path) {
+Result<std::vector<uint8_t>> encode_png(const Image& image, const Display& display, const std::string& path) {
   size_t channels = image.alpha.empty() ? 3 : 4;
   // stb counts bytes in int, with a filter byte a row and room for incompressible data.
   if (image.rgb.size() > size_t(INT_MAX) / 8) return Error{path, "image is too large for a PNG"};
-  float gain = std::exp2(exposure);
   std::vector<uint8_t> pixels(image.rgb.size() * channels), encoded;
   for (size_t i = 0; i < image.rgb.size(); ++i) {
     float alpha = image.alpha.empty() ? 1.0f : std::fmin(std::fmax(image.alpha[i], 0.0f), 1.0f);
-    Vec3 straight = alpha > 0 ? image.rgb[i] * gain / alpha : Vec3(0);
+    const Vec3 straight = shown(alpha > 0 ? image.rgb[i] / alpha : Vec3(0), display);
     uint8_t* p = &pixels[i * channels];
     for (int c = 0; c < 3; ++c) p[c] = uint8_t(srgb_encode(straight[c]) * 255 + 0.5f);
     if (channels == 4) p[3] = uint8_t(alpha * 255 + 0.5f);
@@ -286,12 +285,12 @@ Result<Image> load_image(const std::string& path) {
   return load_image(file->bytes(), path);
 }
 
-Result<void> save_image(const std::string& path, const Image& image, float exposure) {
+Result<void> save_image(const std::string& path, const Image& image, const Display& display) {
   LAMBENT_CHECK(image.width > 0 && image.height > 0 && image.rgb.size() == size_t(image.width) * size_t(image.height));
   LAMBENT_CHECK(image.alpha.empty() || image.alpha.size() == image.rgb.size());
   std::string extension = file_extension(path);
   if (extension != "exr" && extension != "png") return Error{path, "pictures are written as .exr or .png"};
-  auto encoded = extension == "exr" ? encode_exr(image, path) : encode_png(image, exposure, path);
+  auto encoded = extension == "exr" ? encode_exr(image, path) : encode_png(image, display, path);
   if (!encoded) return encoded.error();
   std::span<const uint8_t> piece(*encoded);
   return write_file_atomically(path, {&piece, 1});
@@ -307,11 +306,10 @@ float srgb_decode(float encoded) {
   return encoded <= 0.04045f ? encoded / 12.92f : std::pow((encoded + 0.055f) / 1.055f, 2.4f);
 }
 
-Image displayed(const Image& image, float exposure) {
+Image displayed(const Image& image, const Display& display) {
   Image out(image.width, image.height);
-  float gain = std::exp2(exposure);
   for (size_t i = 0; i < out.rgb.size(); ++i) {
-    Vec3 c = image.rgb[i] * gain;
+    const Vec3 c = shown(image.rgb[i], display);
     out.rgb[i] = {srgb_encode(c.x), srgb_encode(c.y), srgb_encode(c.z)};
   }
   return out;
@@ -321,6 +319,8 @@ Image mean_of(Image a, const Image& b) {
   LAMBENT_CHECK(a.width == b.width && a.height == b.height && a.alpha.size() == b.alpha.size());
   for (size_t i = 0; i < a.rgb.size(); ++i) a.rgb[i] = 0.5f * (a.rgb[i] + b.rgb[i]);
   for (size_t i = 0; i < a.alpha.size(); ++i) a.alpha[i] = 0.5f * (a.alpha[i] + b.alpha[i]);
+  if (a.coverage.size() != b.coverage.size()) a.coverage.clear();
+  for (size_t i = 0; i < a.coverage.size(); ++i) a.coverage[i] = 0.5f * (a.coverage[i] + b.coverage[i]);
   return a;
 }
 

@@ -1,6 +1,7 @@
 #pragma once
 #include <lambent/core/result.h>
 #include <lambent/core/vec.h>
+#include <lambent/image/tone.h>
 
 #include <span>
 #include <string>
@@ -15,6 +16,7 @@ struct Image {
   int width = 0, height = 0;
   std::vector<Vec3> rgb;
   std::vector<float> alpha;
+  std::vector<float> coverage;  // share of each pixel that surfaces cover, known to whoever drew them; not in files
 
   Image() = default;
   Image(int w, int h) : width(w), height(h), rgb(size_t(w) * size_t(h)) {}
@@ -39,9 +41,9 @@ Result<Image> load_image(const std::string& path);
 Result<Image> load_image(std::span<const uint8_t> bytes, const std::string& path);
 
 // .exr: linear half floats, ZIP, with alpha where the image has it; finite values beyond +-65504 are clamped to that,
-// and `exposure` is not applied. .png: 8-bit sRGB of rgb * 2^exposure, clamped, opaque unless the image has alpha.
+// and `display` is not applied. .png: 8-bit sRGB of what is shown(), opaque unless the image has alpha.
 // Written whole or not at all. Errors: another extension; the disk's; too large for the format.
-Result<void> save_image(const std::string& path, const Image& image, float exposure = 0.0f);
+Result<void> save_image(const std::string& path, const Image& image, const Display& display = {});
 
 // Whether a file of so many bytes may claim a picture of this size: at most 2^28 pixels, and beyond the first 4 million
 // no more than 8192 a byte, which no honest compressor reaches. Asked before memory is taken.
@@ -54,7 +56,7 @@ Result<std::vector<uint8_t>> encode_exr(const Image& image, const std::string& p
                                         ExrPrecision precision = ExrPrecision::half);
 
 // The bytes of a .png as save_image writes it; `path` names it in errors.
-Result<std::vector<uint8_t>> encode_png(const Image& image, float exposure, const std::string& path);
+Result<std::vector<uint8_t>> encode_png(const Image& image, const Display& display, const std::string& path);
 
 // Matrix from linear RGB of other primaries and white (CIE x, y) to linear Rec. 709: through XYZ, with Bradford
 // adaptation of that white to D65. Errors: a y of 0, collinear primaries.
@@ -64,8 +66,8 @@ Result<Mat3> rec709_from_primaries(Vec2 red, Vec2 green, Vec2 blue, Vec2 white);
 float srgb_encode(float linear);
 float srgb_decode(float encoded);
 
-// Pixels as shown in front of black: sRGB-encoded rgb * 2^exposure, clamped to [0, 1]; without alpha.
-Image displayed(const Image& image, float exposure);
+// Pixels as shown() in front of black, sRGB-encoded; without alpha.
+Image displayed(const Image& image, const Display& display);
 
 // Pixel by pixel: two renderings with different seeds make one of twice the samples. Sizes must agree.
 Image mean_of(Image a, const Image& b);

@@ -242,14 +242,33 @@ Result<Drawing> draw(const DrawRequest& request, const Job& job) {
   return draw(*baked, request, job);
 }
 
+namespace {
+
+void describe_display(const Display& display, const std::string& tone, std::span<const Image> frames,
+                      Summary& summary) {
+  const Clipping clipped = clipping(frames, display);
+  summary.json["display"] = {
+      {"exposure", display.exposure}, {"tone", tone}, {"white", clipped.white}, {"negative", clipped.negative}};
+  summary.lines.emplace_back("shown", fmt::format("{:+.2f} stops, tone {}; {:.1f} % white, {:.1f} % darker than black",
+                                                  display.exposure, tone, 100 * clipped.white, 100 * clipped.negative));
+}
+
+}  // namespace
+
 Result<Summary> draw_to_file(const DrawRequest& request, const Job& job) {
   if (auto ok = check_output(request.output, {"png", "exr"}); !ok) return ok.error();
   auto drawing = draw(request, job);
   if (!drawing) return drawing.error();
   const std::vector<Image>& frames = drawing->frames;
-  if (auto ok = save_image(request.output, frames.size() > 1 ? beside(frames) : frames.front(), request.exposure); !ok)
+  const bool png = file_extension(request.output) == "png";
+  // Colours are no light: they are shown as they are, unless something else was said.
+  const bool is_light = request.show != "albedo" || is_given(request, "exposure") || is_given(request, "tone");
+  auto display = png && is_light ? parse_display(request.exposure, request.tone, frames) : Result<Display>(Display());
+  if (!display) return display.error();
+  if (auto ok = save_image(request.output, frames.size() > 1 ? beside(frames) : frames.front(), *display); !ok)
     return ok.error();
   drawing->summary.json["output"] = request.output;
+  if (png && is_light) describe_display(*display, request.tone, frames, drawing->summary);
   return std::move(drawing->summary);
 }
 

@@ -16,7 +16,7 @@ struct DrawRequest {
   // View
   std::string camera = "auto", size = "512x512", background = "env";
   int spp = 16;
-  float exposure = 0;
+  std::string exposure = "auto", tone = "neutral";
   // What is shown
   std::string show = "product";
   std::string brdf;  // "": as baked; of blocks, which know none, diffuse

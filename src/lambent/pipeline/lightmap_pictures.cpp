@@ -81,7 +81,7 @@ Result<std::optional<ViewerLook>> lightmap_look(const Lightmap& map, const Scene
   std::nth_element(brightness.begin(), brightness.begin() + ptrdiff_t(most), brightness.end());
   look.strength = std::max(brightness[most], 1e-6f);
   for (Vec3& c : radiance) c /= look.strength;
-  auto png = encode_png(lightmap_picture(*texels, radiance), 0, scene.path);
+  auto png = encode_png(lightmap_picture(*texels, radiance), {}, scene.path);
   if (!png) return png.error();
   look.png = std::move(*png);
   return std::optional<ViewerLook>(std::move(look));

@@ -33,7 +33,7 @@ Result<ReferenceImage> render(const Integrator& integrator, const Camera& camera
   const CameraRays rays(camera, options.width, options.height);
   const uint64_t seed = hash64(options.seed);
   ReferenceImage result{Image(options.width, options.height), std::vector<Vec3>(width * height)};
-  if (!options.background) result.image.alpha.resize(width * height);
+  result.image.coverage.resize(width * height);
 
   auto render_pixel = [&](size_t x, size_t y) {
     const size_t pixel = y * width + x;
@@ -57,7 +57,7 @@ Result<ReferenceImage> render(const Integrator& integrator, const Camera& camera
     }
     result.image.rgb[pixel] = moments.mean(options.spp);
     result.variance[pixel] = moments.variance(options.spp);
-    if (!options.background) result.image.alpha[pixel] = float(covered) / float(options.spp);
+    result.image.coverage[pixel] = float(covered) / float(options.spp);
   };
 
   const size_t across = (width + tile - 1) / tile, down = (height + tile - 1) / tile;
@@ -71,6 +71,7 @@ Result<ReferenceImage> render(const Integrator& integrator, const Camera& camera
     }
   });
   if (stage.cancelled()) return Error{"", "cancelled"};
+  if (!options.background) result.image.alpha = result.image.coverage;
   return result;
 }
 

@@ -84,7 +84,7 @@ Result<Image> render_surfaces(const Scene& scene, const Tracer& tracer, const Ca
                               const RenderOptions& options, const std::function<SurfaceShade()>& make_shade,
                               Progress* progress) {
   Image image(options.width, options.height);
-  if (!options.background) image.alpha.assign(image.rgb.size(), 0.0f);
+  image.coverage.assign(image.rgb.size(), 0.0f);
   auto traced = trace_pixels(
       scene, tracer, camera, options,
       [&]() -> VisitPixel {
@@ -96,11 +96,12 @@ Result<Image> render_surfaces(const Scene& scene, const Tracer& tracer, const Ca
             else if (options.background) sum += radiance_bilinear(*options.background, ray.direction);
           }
           image.rgb[pixel] = sum / float(rays.size());
-          if (!options.background) image.alpha[pixel] = float(covered) / float(rays.size());
+          image.coverage[pixel] = float(covered) / float(rays.size());
         };
       },
       progress);
   if (!traced) return traced.error();
+  if (!options.background) image.alpha = image.coverage;
   return image;
 }
 
@@ -205,6 +206,7 @@ Image pixels_image(const Relit& relit, const std::vector<float>& coverage, const
     const Vec3 direction = rays.direction(float(i % size_t(width)) + 0.5f, float(i / size_t(width)) + 0.5f);
     image.rgb[i] += (1 - coverage[i]) * radiance_bilinear(*background, direction);
   }
+  image.coverage = coverage;
   if (!background) image.alpha = coverage;
   return image;
 }
