@@ -7,6 +7,7 @@ import {
   LinearFilter,
   RepeatWrapping,
   RGBAFormat,
+  Vector3,
   type Texture,
 } from 'three';
 import { EXRLoader } from 'three/addons/loaders/EXRLoader.js';
@@ -39,6 +40,7 @@ export interface EnvironmentFile {
   name: string;
   lighting: Lighting;
   background: DataTexture; // first row at the zenith
+  sun: Vector3; // towards the brightest texel
 }
 
 /** The manifest, or undefined where the page stands alone. */
@@ -142,7 +144,21 @@ export const makeEnvironment = (name: string, map: LatLongMap): EnvironmentFile 
   name,
   lighting: new Lighting(projectLatLong(map, 16)),
   background: mapTexture(map),
+  sun: brightest(map),
 });
+
+/** Direction of the brightest texel. */
+export function brightest({ data, width, height, channels }: LatLongMap): Vector3 {
+  let best = 0,
+    peak = -1;
+  for (let i = 0; i < width * height; ++i) {
+    const y = 0.2126 * data[i * channels]! + 0.7152 * data[i * channels + 1]! + 0.0722 * data[i * channels + 2]!;
+    if (y > peak) [peak, best] = [y, i];
+  }
+  const phi = 2 * Math.PI * (((best % width) + 0.5) / width - 0.5),
+    theta = (Math.PI * (Math.floor(best / width) + 0.5)) / height;
+  return new Vector3(Math.sin(theta) * Math.cos(phi), Math.cos(theta), Math.sin(theta) * Math.sin(phi));
+}
 
 /** Light for a page that was given none: a plain sky over darker ground, with a broad sun in the east. */
 export function plainSky(): LatLongMap {

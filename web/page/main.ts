@@ -44,6 +44,7 @@ function showLoading(what: string, share?: number): void {
 }
 
 const megabytes = (bytes: number): string => `${(bytes / 1e6).toPrecision(3)} MB`;
+const degrees = (angle: number): string => `${Math.round(angle)}°`.replace('-', '−');
 const names: Record<View, string> = {
   baked: 'Baked',
   compare: 'Second file',
@@ -71,7 +72,7 @@ class Page {
     this.state = parseState(location.hash, base);
     this.viewer = new Viewer(get<HTMLCanvasElement>('picture'), {
       onFrame: (ms) => this.onFrame(ms),
-      onChange: () => this.saveSoon(),
+      onChange: () => (this.showHeight(), this.saveSoon()),
       onUse: (what) => what === 'light' && get('hint').classList.add('gone'),
       onProblem: showProblem,
       onRecovered: hideProblem,
@@ -177,6 +178,11 @@ class Page {
     this.saveSoon();
   }
 
+  private showHeight(): void {
+    input('height').value = String(this.viewer.lightHeight);
+    get('height-value').textContent = degrees(this.viewer.lightHeight);
+  }
+
   private showExposure(): void {
     const { stops } = this.viewer,
       isAuto = this.state.exposure === 'auto',
@@ -192,6 +198,11 @@ class Page {
       get(id).addEventListener(event, () => (change(), this.apply()));
     on('exposure', 'input', () => (state.exposure = Number(input('exposure').value)));
     on('auto', 'click', () => ((state.exposure = 'auto'), viewer.measure()));
+    get('height').addEventListener('input', () => {
+      viewer.lightHeight = Number(input('height').value);
+      get('height-value').textContent = degrees(viewer.lightHeight);
+      this.saveSoon();
+    });
     on('tone', 'change', () => (state.tone = select('tone').value as Tone));
     on(
       'order',
@@ -257,6 +268,12 @@ class Page {
     });
     this.connectWipe();
     this.connectLobes();
+    const showHelp = (): void => get<HTMLDialogElement>('help').showModal();
+    get('help-open').addEventListener('click', showHelp);
+    get('help-close').addEventListener('click', () => get<HTMLDialogElement>('help').close());
+    addEventListener('keydown', (e) => {
+      if (e.key === '?' && !get<HTMLDialogElement>('help').open) showHelp();
+    });
     get('controls').addEventListener('submit', (e) => e.preventDefault());
     addEventListener('hashchange', () => {
       if (location.hash !== this.address()) location.reload();
@@ -412,6 +429,7 @@ class Page {
     this.state.env = index;
     select('env').selectedIndex = index;
     this.viewer.setEnvironment(environment);
+    this.showHeight();
     this.saveSoon();
   }
 
@@ -425,6 +443,7 @@ class Page {
   private setRotation(degrees: number[]): void {
     const [yaw, pitch, roll] = degrees.map((d) => MathUtils.degToRad(d)) as [number, number, number];
     this.viewer.orbit.light.setFromEuler(new Euler(pitch, yaw, roll, 'YXZ'));
+    this.showHeight();
     this.viewer.changeLight();
     this.saveSoon();
   }

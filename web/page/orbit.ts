@@ -64,10 +64,10 @@ export class Orbit {
     this.look(offset.add(this.target), this.target.clone());
   }
 
+  /** Sideways about +Y, so that a sun keeps its height; up and down about the picture's own horizontal. */
   turnLight(x: number, y: number): void {
-    const right = new Vector3().setFromMatrixColumn(this.camera.matrixWorld, 0),
-      up = new Vector3().setFromMatrixColumn(this.camera.matrixWorld, 1);
-    const turn = new Quaternion().setFromAxisAngle(up, x * radiansAHeight);
+    const right = new Vector3().setFromMatrixColumn(this.camera.matrixWorld, 0);
+    const turn = new Quaternion().setFromAxisAngle(new Vector3(0, 1, 0), x * radiansAHeight);
     turn.multiply(new Quaternion().setFromAxisAngle(right, y * radiansAHeight));
     this.light.premultiply(turn).normalize();
     this.callbacks.onLight();

@@ -6,6 +6,7 @@ import {
   EquirectangularReflectionMapping,
   FloatType,
   HalfFloatType,
+  MathUtils,
   Matrix4,
   PerspectiveCamera,
   Quaternion,
@@ -213,6 +214,21 @@ export class Viewer {
     this.meterDue = true;
     this.lastMeter = -Infinity;
     this.invalidate();
+  }
+  /** How high above the horizon the brightest part of the environment stands, in degrees; keeps its azimuth when set. */
+  get lightHeight(): number {
+    return MathUtils.radToDeg(Math.asin(MathUtils.clamp(this.sun.y, -1, 1)));
+  }
+  set lightHeight(degrees: number) {
+    const { sun } = this,
+      axis = sun.clone().cross(new Vector3(0, 1, 0));
+    if (axis.length() < 1e-6) axis.setFromMatrixColumn(this.camera.matrixWorld, 0);
+    const turn = new Quaternion().setFromAxisAngle(axis.normalize(), MathUtils.degToRad(degrees - this.lightHeight));
+    this.orbit.light.premultiply(turn).normalize();
+    this.changeLight();
+  }
+  private get sun(): Vector3 {
+    return (this.environment?.sun ?? new Vector3(0, 1, 0)).clone().applyQuaternion(this.orbit.light);
   }
   /** Stops in use. */
   get stops(): number {

@@ -23,7 +23,7 @@ import { MeshoptDecoder, MeshoptEncoder, MeshoptSimplifier } from 'meshoptimizer
 import { beforeAll, describe, expect, it, vi } from 'vitest';
 import { LambentTransfer, sideSemantics } from '../src/gltf_transform/index.ts';
 import { plainKeys, replaceViews, viewKeys } from '../src/extension_views.ts';
-import { haveTool, lambent, lambentJson, makeFolder } from './tool.ts';
+import { haveTool, lambent, lambentJson, makeFolder, renderLinear } from './tool.ts';
 
 interface Extension {
   parts: { node: number; primitive: number; front: number; back?: number }[];
@@ -217,7 +217,7 @@ describe.skipIf(!haveTool)('a bake in glTF Transform', () => {
     const kind = /^[a-z]*/.exec(name)![0],
       light = kind === 'lightmap' ? [] : env,
       camera = kind === 'view' ? [] : ['--camera', '2.4,2.2,3.6,0,0.5,0,40', '--size', '160x120'];
-    lambent('render', at(`${name}.glb`), ...light, ...camera, '-o', at(`${name}.exr`));
+    renderLinear(at(`${name}.glb`), ...light, ...camera, '-o', at(`${name}.exr`));
     return at(`${name}.exr`);
   };
   /** rmse of linear radiance against the bake's own picture. */
@@ -287,7 +287,7 @@ describe.skipIf(!haveTool)('a bake in glTF Transform', () => {
     const after = vertices(await io.read(at('simple.glb')));
     expect(after.length).toBeLessThan(0.8 * before.size);
     for (const vertex of after) expect(before).toContain(vertex);
-    lambent('render', at('simple.glb'), ...env, '--camera', 'auto', '-o', at('simple.png'));
+    renderLinear(at('simple.glb'), ...env, '--camera', 'auto', '-o', at('simple.png'));
   });
 
   it('written twice, and after a write that failed', async () => {
