@@ -8,7 +8,7 @@ mkdir -p $out
 light="--env sky:elevation=30,azimuth=70,turbidity=3 --background none --spp 32"
 if [ -f "$data/meshes/CesiumMan.glb" ]; then
   $tool bake "$data/meshes/CesiumMan.glb" --transfer zonal --lobes 4 --samples 1024 -o $out/man.glb >&2
-  $tool render $out/man.glb --animation 0 --frames 0:1.6:0.4 $light --size 180x300 --exposure -1.6 -o $out/walk.png
+  $tool render $out/man.glb --animation 0 --frames 0:1.6:0.4 $light --size 180x300 --tone none --exposure -1.6 -o $out/walk.png
 else
   echo "skipped: no $data/meshes/CesiumMan.glb" >&2
 fi
@@ -36,7 +36,7 @@ for what in jade stone; do
     exposure=-1.2
     [ $what = stone ] && exposure=-2.2
     $tool render $out/vase.obj --transfer-texture $out/$what.lpt --tile 6,4 $deform $light --size 220x330 \
-      --exposure $exposure --camera 0,2.2,5.2,0,1.1,0,30 \
+      --tone none --exposure $exposure --camera 0,2.2,5.2,0,1.1,0,30 \
       -o $out/$what${deform:+-twisted}.png
   done
 done

@@ -235,7 +235,7 @@ TEST(Compare, NumbersByHand) {
   EXPECT_NEAR(d->psnr, -10 * std::log10((1 + 3 * std::pow(0.665185 - 0.484529, 2)) / 6), 1e-4);
   EXPECT_NEAR(d->mean_a, (0.2126 + 0.5 * 0.7152 + 0.2) / 2, rounding);
   EXPECT_NEAR(d->mean_b, (0.5 * 0.7152 + 0.4) / 2, rounding);
-  EXPECT_NEAR(d->flip, mean(flip_map(displayed(b, 0), displayed(a, 0))), rounding);
+  EXPECT_NEAR(d->flip, mean(flip_map(displayed(b, {}), displayed(a, {}))), rounding);
   auto same = compare_images(a, a);
   ASSERT_TRUE(same);
   EXPECT_EQ(same->rmse, 0);
@@ -245,7 +245,8 @@ TEST(Compare, NumbersByHand) {
 
 TEST(Compare, ExposureTouchesWhatIsShownAlone) {
   Image a = constant(4, 4, Vec3(0.1f)), b = constant(4, 4, Vec3(0.12f));
-  auto plain = compare_images(a, b), brighter = compare_images(a, b, 1), burnt = compare_images(a, b, 10);
+  auto plain = compare_images(a, b), brighter = compare_images(a, b, {1, Tone::none}),
+       burnt = compare_images(a, b, {10, Tone::none});
   ASSERT_TRUE(plain && brighter && burnt);
   EXPECT_EQ(plain->rmse, brighter->rmse);
   EXPECT_GT(plain->psnr, brighter->psnr);
@@ -286,7 +287,7 @@ TEST(Compare, Errors) {
 TEST(DifferencePicture, PanelsAndScale) {
   Image a = constant(60, 20, Vec3(0.25f)), b = a;
   b.at(30, 10) = Vec3(0.25f, 0.25f, 1);
-  Image picture = difference_picture(a, b, 1, 0.5f);
+  Image picture = difference_picture(a, b, {1, Tone::none}, 0.5f);
   EXPECT_EQ(picture.width, 180);
   EXPECT_EQ(picture.height, 20 + 2 * 11);
   constexpr float rounding = 1e-5f;

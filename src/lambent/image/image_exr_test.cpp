@@ -147,7 +147,7 @@ TEST(Exr, SaveWritesTheSameBytesTwice) {
   Image image(9, 4);
   for (size_t i = 0; i < image.rgb.size(); ++i) image.rgb[i] = Vec3(float(i), 1, 2);
   std::string path = testing::TempDir() + "/lambent_exr_" + std::to_string(::getpid()) + ".exr";
-  ASSERT_TRUE(save_image(path, image, 3));
+  ASSERT_TRUE(save_image(path, image, {3, Tone::none}));
   auto bytes = read_file(path);
   ASSERT_TRUE(bytes);
   EXPECT_EQ(*bytes, encoded(image));

@@ -148,7 +148,7 @@ Image random_image(int width, int height, bool alpha, uint64_t seed) {
 TEST(Png, RoundTripWithinHalfAStep) {
   Image image = random_image(7, 5, false, 1);
   std::string path = temporary("a.png");
-  ASSERT_TRUE(save_image(path, image, 0));
+  ASSERT_TRUE(save_image(path, image));
   auto back = load_image(path);
   ASSERT_TRUE(back) << back.error().text();
   EXPECT_TRUE(back->alpha.empty());
@@ -163,7 +163,7 @@ TEST(Png, StoresStraightAlpha) {
   image.rgb = {Vec3(0.25f, 0.125f, 0), Vec3(0.9f), Vec3(0)};
   image.alpha = {0.5f, 1.0f, 0.0f};
   std::string path = temporary("b.png");
-  ASSERT_TRUE(save_image(path, image, 0));
+  ASSERT_TRUE(save_image(path, image));
   auto back = load_image(path);
   ASSERT_TRUE(back) << back.error().text();
   ASSERT_EQ(back->alpha.size(), 3u);
@@ -180,7 +180,7 @@ TEST(Png, ExposureAndClamping) {
   Image image(4, 1);
   image.rgb = {Vec3(0.25f), Vec3(9), Vec3(-1), Vec3(NAN, INFINITY, -INFINITY)};
   std::string path = temporary("c.png");
-  ASSERT_TRUE(save_image(path, image, 1));
+  ASSERT_TRUE(save_image(path, image, {1, Tone::none}));
   auto back = load_image(path);
   ASSERT_TRUE(back) << back.error().text();
   EXPECT_EQ(back->rgb[0], Vec3(srgb_decode(188 / 255.0f)));  // linear 0.5 as above
@@ -244,7 +244,7 @@ TEST(Png, SixteenBits) {
 
 TEST(Png, EveryTruncationIsAnError) {
   std::string path = temporary("d.png");
-  ASSERT_TRUE(save_image(path, random_image(6, 6, true, 3), 0));
+  ASSERT_TRUE(save_image(path, random_image(6, 6, true, 3)));
   auto bytes = read_file(path);
   ASSERT_TRUE(bytes);
   size_t tail = 12;  // the closing chunk holds nothing; a file cut inside it may be taken
@@ -286,7 +286,7 @@ TEST(Srgb, KnownValuesAndInverse) {
   for (int i = 0; i <= 255; ++i) EXPECT_NEAR(srgb_encode(srgb_decode(float(i) / 255)), float(i) / 255, rounding) << i;
   Image image(2, 1);
   image.rgb = {Vec3(0.09f), Vec3(-1, 0.5f, 4)};
-  Image shown = displayed(image, 1);
+  Image shown = displayed(image, {1, Tone::none});
   EXPECT_NEAR(shown.rgb[0].x, 0.461356f, rounding);
   EXPECT_EQ(shown.rgb[1].x, 0);
   EXPECT_NEAR(shown.rgb[1].z, 1, rounding);

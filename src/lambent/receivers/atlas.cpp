@@ -329,7 +329,8 @@ Result<Atlas> make_atlas(Scene& scene, const AtlasOptions& o, Progress* progress
   }
   for (const Part& part : scene.parts) {
     const Material& m = scene.materials[part.material];
-    if ((m.base_color_texture >= 0 && m.texcoord_set == 1) || (m.normal_texture >= 0 && m.normal_set == 1) ||
+    if ((m.base_color_texture >= 0 && m.texcoord_set == 1) ||
+        (m.transmission_texture >= 0 && m.transmission_set == 1) || (m.normal_texture >= 0 && m.normal_set == 1) ||
         (m.emissive_texture >= 0 && m.emissive_set == 1))
       return Error{scene.path, "material \"" + m.name + "\" reads TEXCOORD_1, which the lightmap would replace"};
   }

@@ -45,8 +45,8 @@ void append_scene(Scene& a, const Scene& b) {
     a.parts.push_back(std::move(part));
   }
   for (Material material : b.materials) {
-    for (int* texture : {&material.base_color_texture, &material.metallic_roughness_texture, &material.normal_texture,
-                         &material.emissive_texture})
+    for (int* texture : {&material.base_color_texture, &material.transmission_texture,
+                         &material.metallic_roughness_texture, &material.normal_texture, &material.emissive_texture})
       if (*texture >= 0) *texture += int(a.textures.size());
     a.materials.push_back(std::move(material));
   }

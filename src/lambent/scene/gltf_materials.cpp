@@ -39,15 +39,35 @@ void read_texture_reference(GltfCheck& check, const Json& parent, const char* ke
                    float(-s * scale[0]), float(c * scale[1]), float(offset[1])};
 }
 
-Vec3 read_color(GltfCheck& check, const Json& parent, const char* key, const GltfWhere& where) {
+Vec3 read_color(GltfCheck& check, const Json& parent, const char* key, const GltfWhere& where, float& alpha) {
   double rgba[4] = {1, 1, 1, 1};
   check.numbers(parent, key, rgba, where);
+  alpha = float(std::clamp(rgba[3], 0.0, 1.0));
   return {float(std::clamp(rgba[0], 0.0, 1.0)), float(std::clamp(rgba[1], 0.0, 1.0)),
           float(std::clamp(rgba[2], 0.0, 1.0))};
 }
 
-float read_share(GltfCheck& check, const Json& parent, const char* key, const GltfWhere& where) {
-  return float(std::clamp(check.number(parent, key, 1, where), 0.0, 1.0));
+float read_share(GltfCheck& check, const Json& parent, const char* key, const GltfWhere& where, double fallback = 1) {
+  return float(std::clamp(check.number(parent, key, fallback, where), 0.0, 1.0));
+}
+
+// Alpha mode, cutoff and transmission.
+void read_see_through(GltfCheck& check, const Json& json, size_t texture_count, const GltfWhere& where,
+                      GltfMaterial& out) {
+  Material& m = out.material;
+  const std::string mode = check.text(json, "alphaMode", where);
+  if (mode == "MASK") m.alpha_mode = AlphaMode::mask;
+  else if (mode == "BLEND") m.alpha_mode = AlphaMode::blend;
+  else out.known_alpha_mode = mode.empty() || mode == "OPAQUE";
+  constexpr double beyond_all = 2;  // above 1 nothing is left
+  m.alpha_cutoff = float(std::clamp(check.number(json, "alphaCutoff", 0.5, where), 0.0, beyond_all));
+  if (const Json* extension = read_extension(check, json, "KHR_materials_transmission", where)) {
+    m.transmission = read_share(check, *extension, "transmissionFactor", where, 0);
+    read_texture_reference(check, *extension, "transmissionTexture", texture_count, where, out.transmission);
+  }
+  if (!(m.transmission > 0)) return;
+  const Json* volume = read_extension(check, json, "KHR_materials_volume", where);
+  out.bends_light = m.roughness > 0.1f || (volume && check.number(*volume, "thicknessFactor", 0, where) > 0);
 }
 
 GltfMaterial read_material(GltfCheck& check, const Json& json, size_t texture_count, const GltfWhere& where) {
@@ -55,20 +75,19 @@ GltfMaterial read_material(GltfCheck& check, const Json& json, size_t texture_co
   Material& m = out.material;
   m.name = check.text(json, "name", where);
   m.double_sided = check.boolean(json, "doubleSided", false, where);
-  std::string alpha = check.text(json, "alphaMode", where);
-  out.opaque = alpha.empty() || alpha == "OPAQUE";
   if (const Json* gloss = read_extension(check, json, "KHR_materials_pbrSpecularGlossiness", where)) {
-    m.base_color = read_color(check, *gloss, "diffuseFactor", where);
+    m.base_color = read_color(check, *gloss, "diffuseFactor", where, m.alpha);
     m.metallic = 0.0f;
     m.roughness = 1.0f - read_share(check, *gloss, "glossinessFactor", where);
     read_texture_reference(check, *gloss, "diffuseTexture", texture_count, where, out.base_color);
   } else if (const Json* pbr = check.object(json, "pbrMetallicRoughness", where)) {
-    m.base_color = read_color(check, *pbr, "baseColorFactor", where);
+    m.base_color = read_color(check, *pbr, "baseColorFactor", where, m.alpha);
     m.metallic = read_share(check, *pbr, "metallicFactor", where);
     m.roughness = read_share(check, *pbr, "roughnessFactor", where);
     read_texture_reference(check, *pbr, "baseColorTexture", texture_count, where, out.base_color);
     read_texture_reference(check, *pbr, "metallicRoughnessTexture", texture_count, where, out.metallic_roughness);
   }
+  read_see_through(check, json, texture_count, where, out);
   double factor[3] = {0, 0, 0}, strength = 1;
   check.numbers(json, "emissiveFactor", factor, where);
   if (const Json* extension = read_extension(check, json, "KHR_materials_emissive_strength", where)) {
@@ -181,10 +200,10 @@ std::vector<GltfMaterial> read_materials(GltfCheck& check, const GltfDocument& d
 bool read_textures(GltfCheck& check, GltfDocument& document, const std::vector<GltfMaterial>& materials,
                    const std::vector<bool>& used, const std::vector<std::string>& image_problems, Scene& scene) {
   TextureReader reader(document, image_problems, scene);
-  size_t translucent = 0;
+  size_t unknown = 0, bending = 0;
   for (size_t i = 0; i < materials.size(); ++i) {
     if (!used[i]) continue;
-    translucent += !materials[i].opaque;
+    unknown += !materials[i].known_alpha_mode, bending += materials[i].bends_light;
     auto read = [&](GltfCheck& checked, const GltfTextureUse& use, const char* what) {
       if (use.texcoord_set <= 1) return reader.read(checked, *use.texture);
       checked.fail({"material", i}, std::string("its ") + what + " reads TEXCOORD_" + std::to_string(use.texcoord_set) +
@@ -211,13 +230,19 @@ bool read_textures(GltfCheck& check, GltfDocument& document, const std::vector<G
     read_extra(from.metallic_roughness, "metallic-roughness", m.metallic_roughness_texture, m.metallic_roughness_set,
                m.metallic_roughness_transform);
     read_extra(from.normal, "normal", m.normal_texture, m.normal_set, m.normal_transform);
+    // Glass of unknown pattern passes nothing.
+    if (m.transmission > 0 && !read_extra(from.transmission, "transmission", m.transmission_texture, m.transmission_set,
+                                          m.transmission_transform))
+      m.transmission = 0;
     // A lamp of unknown pattern gives no light.
     const bool black = m.emissive == Vec3(0);
     if (!black && !read_extra(from.emissive, "emissive", m.emissive_texture, m.emissive_set, m.emissive_transform))
       m.emissive = Vec3(0);
   }
-  warn_count(scene, translucent, " material with alpha is treated as opaque",
-             " materials with alpha are treated as opaque");
+  warn_count(scene, unknown, " material has an unknown alphaMode and is opaque",
+             " materials have an unknown alphaMode and are opaque");
+  warn_count(scene, bending, " material with rough or thick transmission passes light straight on",
+             " materials with rough or thick transmission pass light straight on");
   return true;
 }
 

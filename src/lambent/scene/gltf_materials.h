@@ -13,8 +13,9 @@ struct GltfTextureUse {
 
 struct GltfMaterial {
   Material material;  // its textures not set yet
-  GltfTextureUse base_color, metallic_roughness, normal, emissive;
-  bool opaque = true;
+  GltfTextureUse base_color, metallic_roughness, normal, emissive, transmission;
+  bool known_alpha_mode = true;
+  bool bends_light = false;  // asks for what straight light through thin surfaces leaves out
 };
 
 // All of the document's materials, in its order.

@@ -286,7 +286,9 @@ TEST(LoadGltf, Materials) {
   EXPECT_EQ(m.emissive, Vec3(4, 0, 8));
   EXPECT_TRUE(m.double_sided);
   EXPECT_TRUE(s.triangles[0].two_sided);
-  EXPECT_EQ(s.warnings, std::vector<std::string>{"1 material with alpha is treated as opaque"});
+  EXPECT_EQ(m.alpha_mode, AlphaMode::blend);
+  EXPECT_EQ(m.alpha, 0.5f);
+  EXPECT_EQ(s.warnings, std::vector<std::string>{});
   EXPECT_EQ(s.materials[2].base_color, Vec3(0.1f, 0.2f, 0.3f));
   EXPECT_EQ(s.materials[2].roughness, 0.75f);
 }

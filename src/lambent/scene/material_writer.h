@@ -24,7 +24,8 @@ class MaterialWriter {
     const Material& m = scene_.materials[index];
     Vec3 base = clamp(Vec3(finite_or(m.base_color.x, 0), finite_or(m.base_color.y, 0), finite_or(m.base_color.z, 0)),
                       Vec3(0.0f), Vec3(1.0f));
-    nlohmann::json pbr = {{"baseColorFactor", nlohmann::json::array({base.x, base.y, base.z, 1.0f})},
+    const float alpha = std::clamp(finite_or(m.alpha, 1), 0.0f, 1.0f);
+    nlohmann::json pbr = {{"baseColorFactor", nlohmann::json::array({base.x, base.y, base.z, alpha})},
                           {"metallicFactor", std::clamp(finite_or(m.metallic, 1), 0.0f, 1.0f)},
                           {"roughnessFactor", std::clamp(finite_or(m.roughness, 1), 0.0f, 1.0f)}};
     if (m.base_color_texture >= 0) {
@@ -45,6 +46,19 @@ class MaterialWriter {
       if (!texture) return texture.error();
       json["normalTexture"] = texture_reference(*texture, m.normal_set, m.normal_transform);
       if (m.normal_scale != 1) json["normalTexture"]["scale"] = finite_or(m.normal_scale, 1);
+    }
+    if (m.alpha_mode == AlphaMode::blend) json["alphaMode"] = "BLEND";
+    if (m.alpha_mode == AlphaMode::mask)
+      json["alphaMode"] = "MASK", json["alphaCutoff"] = std::max(finite_or(m.alpha_cutoff, 0.5f), 0.0f);
+    if (m.transmission > 0) {
+      nlohmann::json& glass = json["extensions"]["KHR_materials_transmission"];
+      glass["transmissionFactor"] = std::clamp(finite_or(m.transmission, 0), 0.0f, 1.0f);
+      if (m.transmission_texture >= 0) {
+        auto texture = add_texture(size_t(m.transmission_texture));
+        if (!texture) return texture.error();
+        glass["transmissionTexture"] = texture_reference(*texture, m.transmission_set, m.transmission_transform);
+      }
+      out_.use_extension("KHR_materials_transmission");
     }
     add_emission(json, m.emissive);
     if (m.emissive_texture >= 0) {

@@ -1,5 +1,6 @@
 // sRGB transfer curve: IEC 61966-2-1.
 #include <lambent/scene/scene.h>
+#include <lambent/scene/see_through.h>
 
 namespace lambent {
 namespace {
@@ -88,7 +89,15 @@ Vec3 sample_texture(const Texture& texture, Vec2 uv) { return sample_bytes(textu
 
 Vec3 sample_linear_texture(const Texture& texture, Vec2 uv) { return sample_bytes(texture, uv, linear_table()); }
 
-Vec3 albedo(const Scene& scene, const Triangle& triangle, float u, float v) {
+float sample_alpha(const Texture& texture, Vec2 uv) {
+  if (texture.width <= 0 || texture.height <= 0 || texture.alpha.empty()) return 1.0f;
+  const Tap s = tap(uv.x, texture.width, texture.wrap_s), t = tap(uv.y, texture.height, texture.wrap_t);
+  auto texel = [&](size_t x, size_t y) { return float(texture.alpha[y * size_t(texture.width) + x]) / 255.0f; };
+  auto row = [&](size_t y) { return texel(s.first, y) + s.share * (texel(s.second, y) - texel(s.first, y)); };
+  return row(t.first) + t.share * (row(t.second) - row(t.first));
+}
+
+Vec3 base_color(const Scene& scene, const Triangle& triangle, float u, float v) {
   const Material& material = scene.materials[scene.parts[triangle.part].material];
   Vec3 color = material.base_color;
   if (material.base_color_texture >= 0) {
@@ -97,6 +106,12 @@ Vec3 albedo(const Scene& scene, const Triangle& triangle, float u, float v) {
   }
   if (!scene.colors.empty()) color *= interpolate(scene.colors, triangle, u, v);
   return clamp(color, Vec3(0.0f), Vec3(1.0f));
+}
+
+Vec3 albedo(const Scene& scene, const Triangle& triangle, float u, float v) {
+  const Vec3 color = base_color(scene, triangle, u, v);
+  const Material& material = scene.materials[scene.parts[triangle.part].material];
+  return material.transmission > 0 ? color * (1 - transmission(scene, triangle, u, v)) : color;
 }
 
 Vec3 emission_texel(const Scene& scene, const Triangle& triangle, float u, float v) {

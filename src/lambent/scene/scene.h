@@ -26,8 +26,12 @@ struct Texture {
   int width = 0, height = 0;
   std::vector<uint8_t>
       rgb;  // width * height * 3, first row is v = 0 (glTF: the image's top row); colours are sRGB-encoded
+  std::vector<uint8_t> alpha;  // width * height, linear; empty: 255 all over
   Wrap wrap_s = Wrap::repeat, wrap_t = Wrap::repeat;
 };
+
+// What alpha means (glTF 2.0, section 3.9.4): nothing; a hole below the cutoff; the share of a surface that is there.
+enum class AlphaMode : uint8_t { opaque, mask, blend };
 
 // glTF metallic-roughness. The diffuse pipeline reads base colour and emission; reflection.h says what else there is.
 struct Material {
@@ -37,6 +41,16 @@ struct Material {
   int texcoord_set = 0;         // 0 or 1
   // KHR_texture_transform of the base colour: uv' = (uv_matrix rows) * (u, v, 1).
   std::array<float, 6> uv_transform{1, 0, 0, 0, 1, 0};
+  // Read by see_through.h; times the alpha of the base colour texture (an alpha map of its own: with_alpha(),
+  // textures.h).
+  AlphaMode alpha_mode = AlphaMode::opaque;
+  float alpha = 1.0f, alpha_cutoff = 0.5f;
+  // Of the covered part, what passes straight through times the base colour (KHR_materials_transmission); times the
+  // red channel of the texture, linear.
+  float transmission = 0.0f;
+  int transmission_texture = -1;
+  int transmission_set = 0;
+  std::array<float, 6> transmission_transform{1, 0, 0, 0, 1, 0};
   float metallic = 1.0f, roughness = 1.0f;  // factors of the texture below, [0, 1]
   // Roughness in its green, metallic in its blue channel, linear; with a texcoord set and transform of its own.
   int metallic_roughness_texture = -1;
@@ -127,6 +141,8 @@ T interpolate(const std::vector<T>& values, const Triangle& t, float u, float v)
 
 // Linear base colour (factor x texture x vertex colour) at a point of a triangle, clamped to [0, 1]; bilinear texture
 // look-up.
+Vec3 base_color(const Scene& scene, const Triangle& triangle, float u, float v);
+// What of light a point reflects where it is covered: the base colour, less what passes through (see_through.h).
 Vec3 albedo(const Scene& scene, const Triangle& triangle, float u, float v);
 
 // (metallic, roughness): factors times the texture, at a point of a triangle, each in [0, 1].
@@ -145,6 +161,7 @@ Vec2 texture_place(const Scene& scene, const Triangle& triangle, float u, float 
 Vec3 sample_texture(const Texture& texture, Vec2 uv);
 // The same for a texture whose bytes are linear: byte / 255.
 Vec3 sample_linear_texture(const Texture& texture, Vec2 uv);
+float sample_alpha(const Texture& texture, Vec2 uv);  // 1 without alpha
 
 // The sRGB transfer curve and its inverse.
 float srgb_to_linear(float encoded);

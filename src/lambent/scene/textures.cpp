@@ -2,6 +2,7 @@
 #include <lambent/scene/textures.h>
 
 #include <stb_image.h>
+#include <stb_image_write.h>
 
 #include <algorithm>
 #include <climits>
@@ -46,11 +47,23 @@ Result<void> decode_texture(std::span<const uint8_t> encoded, const std::string&
   if (uint64_t(width) * uint64_t(height) > most_pixels(encoded, type == "image/png")) {
     return Error{where, "is broken: too few bytes for its size"};
   }
-  constexpr int rgb = 3;
-  stbi_uc* pixels = stbi_load_from_memory(encoded.data(), size, &width, &height, &channels, rgb);
+  const int kept = channels == 2 || channels == 4 ? 4 : 3;
+  stbi_uc* pixels = stbi_load_from_memory(encoded.data(), size, &width, &height, &channels, kept);
   if (!pixels) return Error{where, std::string("cannot be decoded: ") + stbi_failure_reason()};
   texture.width = width, texture.height = height, texture.mime_type = type;
-  texture.rgb.assign(pixels, pixels + size_t(width) * size_t(height) * rgb);
+  const size_t count = size_t(width) * size_t(height);
+  texture.alpha.clear();
+  if (kept == 3) {
+    texture.rgb.assign(pixels, pixels + count * 3);
+  } else {
+    texture.rgb.resize(count * 3), texture.alpha.resize(count);
+    bool solid = true;
+    for (size_t i = 0; i < count; ++i) {
+      std::copy_n(pixels + 4 * i, 3, texture.rgb.data() + 3 * i);
+      texture.alpha[i] = pixels[4 * i + 3], solid &= texture.alpha[i] == 255;
+    }
+    if (solid) texture.alpha = {};
+  }
   stbi_image_free(pixels);
   return {};
 }
@@ -61,6 +74,32 @@ Result<Texture> decode_texture(std::vector<uint8_t> encoded, const std::string& 
   texture.name = name;
   texture.encoded = std::move(encoded);
   return texture;
+}
+
+Result<Texture> with_alpha(const Texture& color, const Texture& mask, const std::string& name) {
+  const bool white = color.rgb.empty();
+  Texture out;
+  out.name = name, out.mime_type = "image/png", out.wrap_s = color.wrap_s, out.wrap_t = color.wrap_t;
+  out.width = white ? mask.width : color.width, out.height = white ? mask.height : color.height;
+  if (out.width <= 0 || out.height <= 0) return Error{name, "has no pixels"};
+  const size_t count = size_t(out.width) * size_t(out.height);
+  out.rgb = white ? std::vector<uint8_t>(count * 3, 255) : color.rgb;
+  out.alpha.resize(count);
+  std::vector<uint8_t> rgba(count * 4);
+  for (size_t i = 0; i < count; ++i) {
+    const Vec2 uv((float(i % size_t(out.width)) + 0.5f) / float(out.width),
+                  (float(i / size_t(out.width)) + 0.5f) / float(out.height));
+    const float a = mask.alpha.empty() ? sample_linear_texture(mask, uv).x : sample_alpha(mask, uv);
+    out.alpha[i] = rgba[4 * i + 3] = uint8_t(a * 255 + 0.5f);
+    std::copy_n(out.rgb.data() + 3 * i, 3, rgba.data() + 4 * i);
+  }
+  auto append = [](void* to, void* bytes, int n) {
+    auto& encoded = *static_cast<std::vector<uint8_t>*>(to);
+    encoded.insert(encoded.end(), static_cast<uint8_t*>(bytes), static_cast<uint8_t*>(bytes) + n);
+  };
+  if (!stbi_write_png_to_func(append, &out.encoded, out.width, out.height, 4, rgba.data(), 0))
+    return Error{name, "cannot be encoded"};
+  return out;
 }
 
 }  // namespace lambent
