@@ -127,7 +127,8 @@ describe.skipIf(!haveTool || !haveBrowser)('the page', () => {
     const page = await open(
       browser,
       server.address,
-      'camera=0,0.8,5,0,0,0,35&rotate=40,-25,70&exposure=-1.5&tone=agx&order=4&window=hann&against=unshadowed&wipe=0.25',
+      'camera=0,0.8,5,0,0,0,35&rotate=40,-25,70&exposure=-1.5&tone=agx' +
+        '&order=4&window=hann&against=unshadowed&wipe=0.25',
       400,
       400,
     );

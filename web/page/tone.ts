@@ -26,9 +26,9 @@ export function clampBeforeTone(): void {
 }
 
 /**
- * Stops at which nine tenths of what surfaces cover is no brighter than 0.7 (`auto_exposure` in src/lambent/image/tone.h):
- * `pixels` are linear RGBA, colours times alpha; those covered by less than half do not count, unless all are. 0 where
- * all is black.
+ * Stops at which nine tenths of what surfaces cover is no brighter than 0.7 (`auto_exposure` in
+ * src/lambent/image/tone.h): `pixels` are linear RGBA, colours times alpha; those covered by less than half do not
+ * count, unless all are. 0 where all is black.
  */
 export function autoExposure(pixels: ArrayLike<number>): number {
   const covered: number[] = [],

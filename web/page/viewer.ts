@@ -215,7 +215,7 @@ export class Viewer {
     this.lastMeter = -Infinity;
     this.invalidate();
   }
-  /** How high above the horizon the brightest part of the environment stands, in degrees; keeps its azimuth when set. */
+  /** How high above the horizon the environment's brightest texel stands, in degrees; keeps its azimuth when set. */
   get lightHeight(): number {
     return MathUtils.radToDeg(Math.asin(MathUtils.clamp(this.sun.y, -1, 1)));
   }

@@ -40,8 +40,8 @@ export function transferExtension(document: unknown): TransferExtension {
     throw new NoTransferError(
       isObject(document) && hasTraces(document)
         ? rewritten
-        : 'is not a baked file: it has no LAMBENT_transfer extension (make one with "lambent bake"; again, where another ' +
-            'tool has rewritten it)',
+        : 'is not a baked file: it has no LAMBENT_transfer extension (make one with "lambent bake"; again, where ' +
+            'another tool has rewritten it)',
     );
   if (extension['version'] !== 1)
     throw new LambentError(`was baked with file version ${String(extension['version'])}; this program reads version 1`);

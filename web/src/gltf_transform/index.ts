@@ -1,6 +1,6 @@
-// LAMBENT_transfer for glTF Transform (@gltf-transform/core): keeps a bake while other tools' functions change the file.
-// Values are carried as they are. Which receiver a vertex has is carried as a vertex attribute while the document is
-// open, so that it follows whatever reorders, drops, splits or joins vertices; what cannot follow is refused on writing.
+// LAMBENT_transfer for glTF Transform (@gltf-transform/core): keeps a bake while its functions change the file. Values
+// are carried as they are. Which receiver a vertex has is a vertex attribute while the document is open, so that it
+// follows whatever reorders, drops, splits or joins vertices; what cannot follow is refused on writing.
 import {
   type Accessor,
   Extension,
@@ -234,8 +234,8 @@ export class LambentTransfer extends Extension {
       this.document
         .getLogger()
         .warn(
-          `${extensionName}: ${data.used - used} of ${data.used} receivers have no vertex any more, and light between ` +
-            'those that are left is coarser (simplify() looks at the shape alone)',
+          `${extensionName}: ${data.used - used} of ${data.used} receivers have no vertex any more, and light is ` +
+            'coarser between those that are left (simplify() looks at the shape alone)',
         );
     const bare = data.isWhole ? this.bare() : [];
     if (bare.length > 0)
@@ -351,8 +351,10 @@ export class LambentTransfer extends Extension {
   }
 }
 
-const nameOf = (node: Node, primitive: number): string =>
-  `primitive ${primitive} of ${node.getName() || node.getMesh()?.getName() ? `"${node.getName() || node.getMesh()!.getName()}"` : 'a node without a name'}`;
+function nameOf(node: Node, primitive: number): string {
+  const name = node.getName() || node.getMesh()?.getName();
+  return `primitive ${primitive} of ${name ? `"${name}"` : 'a node without a name'}`;
+}
 
 function padded(view: Uint8Array): Uint8Array {
   const out = new Uint8Array(Math.ceil(view.byteLength / 4) * 4);
