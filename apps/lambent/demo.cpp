@@ -108,7 +108,7 @@ Result<Row> draw_hour(const DemoCommand& o, const Courtyard& yard, const Hour& h
   auto pretty = render(scene, tracer, corners, relit, camera, shown, &progress);
   if (!pretty) return pretty.error();
   shown_picture = *pretty;
-  for (Vec3& c : shown_picture.rgb) c = shown(c, display);
+  for (Vec3& c : shown_picture.rgb) c = lambent::shown(c, display);
   const std::pair<std::string, Image> files[] = {
       {"relit_" + row.name, std::move(*pretty)},
       {"reference_" + row.name, *same_light},
