@@ -324,6 +324,13 @@ expect 0 'relit' render prt.glb --env sky:elevation=30 $view -o prt.exr
 expect 0 'texels' bake box.obj --transfer lightmap --sky uniform:0.3,0.4,0.6 --texels-per-unit 20 --samples 512 \
   --bounces 2 -o whole_map.glb
 expect 0 'whole_three.exr' export whole_map.glb --three whole_three
+# MOZ_lightmap's numbers: under an even sky of radiance L an open floor receives pi L, which is white times intensity.
+printf 'v 0 0 0\nv 0 0 1\nv 1 0 1\nv 1 0 0\nf 1 2 3 4\n' >floor.obj
+expect 0 'texels' bake floor.obj --transfer lightmap --sky uniform:0.5,0.5,0.5 --texels-per-unit 8 --samples 256 \
+  -o floor.glb
+expect 0 'floor_three.three.glb' export floor.glb --three floor_three
+grep -aoE '"intensity":[0-9.]+' floor_three.three.glb | awk -F: '
+  { if ($2 < 1.55 || $2 > 1.60) bad = 1 } END { exit bad || NR != 1 }' && ok || bad "irradiance is not pi L"
 expect 0 'rank' compress map.glb --cpca 200,2 -o map_clusters.glb
 smaller map_clusters.glb map.glb
 expect 0 'clusters_three.sky.exr' export map_clusters.glb --three clusters_three

@@ -87,8 +87,10 @@ void add_export(CLI::App& app, Run& run) {
   CLI::Option_group* target = c->add_option_group("Target");
   target->add_option("--web", o->folder,
                      "Folder to write: the page that `view` serves, with its data, for any web server");
-  target->add_option("--three", o->three,
-                     "PREFIX of pictures for three.js: a lightmap's irradiance, or LightProbe coefficients a texel");
+  target->add_option(
+      "--three", o->three,
+      "PREFIX of pictures for three.js: a lightmap's irradiance, with a scene that wears it (MOZ_lightmap), or "
+      "LightProbe coefficients a texel");
   target->add_option("--godot", o->godot,
                      "PREFIX of pictures for Godot: the layers of a directional lightmap, from sh:2 or sh:3");
   target->require_option(1);

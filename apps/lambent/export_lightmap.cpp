@@ -1,6 +1,7 @@
 #include "export_lightmap.h"
 
 #include <lambent/baked/baked_file.h>
+#include <lambent/pipeline/lightmap_pictures.h>
 #include <lambent/relight/relight.h>
 #include <lambent/render/lightmap_picture.h>
 #include <lambent/transfer/directional_convert.h>
@@ -69,6 +70,7 @@ int export_lightmap(Context& context, const std::string& path, LightmapTarget ta
                            ", which the other system cannot hold: bake it with sh:2 or sh:3"});
   const size_t groups = light.groups.size();
   std::vector<std::string> written;
+  std::vector<Vec3> irradiance(receivers_of(field.store), Vec3(0));
   std::set<std::string> taken;
   for (size_t g = 0; g < groups; ++g) {
     if (context.progress.cancelled()) return fail({"", "cancelled"});
@@ -78,15 +80,29 @@ int export_lightmap(Context& context, const std::string& path, LightmapTarget ta
     if (!relight_columns(field.store, lit, relit))
       return fail({path, std::string("holds ") + name_of(field.store) + ", which no lightmap is made of"});
     const auto values = pictures_of(relit, receivers_of(field.store), kind, target);
+    for (size_t r = 0; r < irradiance.size(); ++r) irradiance[r] += values[0][r];
     const std::string name = prefix + (groups > 1 ? "." + file_name(light.groups[g], taken) : "");
     for (size_t k = 0; k < values.size(); ++k) {
       written.push_back(name + (values.size() > 1 ? "." + std::to_string(k) : "") + ".exr");
       if (auto ok = save_image(written.back(), lightmap_picture(*texels, values[k])); !ok) return fail(ok.error());
     }
   }
+  std::string scene;
+  if (target == LightmapTarget::three && kind == DirectionalKind::none) {
+    scene = prefix + ".three.glb";
+    auto look = irradiance_look(*texels, std::move(irradiance));
+    if (!look) return fail(look.error());
+    if (auto ok = save_look(scene, *baked, *look); !ok) return fail(ok.error());
+  }
   if (context.json)
-    print_json({{"pictures", written}, {"groups", light.groups}, {"width", texels->width}, {"height", texels->height}});
-  else fmt::print("{}\n  {} x {} texels\n", fmt::join(written, "\n"), texels->width, texels->height);
+    print_json({{"pictures", written},
+                {"groups", light.groups},
+                {"scene", scene},
+                {"width", texels->width},
+                {"height", texels->height}});
+  else
+    fmt::print("{}\n{}  {} x {} texels\n", fmt::join(written, "\n"), scene.empty() ? "" : scene + "\n", texels->width,
+               texels->height);
   return success;
 }
 

@@ -4,6 +4,7 @@
 
 #include <lambent/baked/baked_file.h>
 #include <lambent/image/image.h>
+#include <lambent/image/tone.h>
 #include <lambent/pipeline/browser.h>
 
 #include <algorithm>
@@ -82,18 +83,24 @@ void WebOptions::add_to(CLI::App& command) {
       ->take_all();
   command.add_option("--compare", compare, "A second baked file, to wipe against: with fewer bounces, say");
   command.add_option("--reference", reference,
-                     "A picture of the same camera, to wipe against: .exr, or .png at exposure 0");
+                     "A picture of the same camera, to wipe against: .exr, or .png of --exposure 0 --tone none");
   command.add_option("--camera", camera, "EX,EY,EZ,TX,TY,TZ,FOV to begin with; or auto")->capture_default_str();
   command.add_option("--env-rotate", rotate, "YAW,PITCH,ROLL to begin with, degrees about +Y, +X, +Z");
-  command.add_option("--exposure", exposure, "Stops to begin with")
-      ->check(CLI::Range(-6.0f, 6.0f))
+  command.add_option("--exposure", exposure, "Stops to begin with; auto: as the page measures them")
+      ->capture_default_str();
+  command.add_option("--tone", tone, "Curve from light to the screen to begin with")
+      ->check(CLI::IsMember({"neutral", "agx", "aces", "none"}))
       ->capture_default_str();
 }
 
 Result<WebFiles> web_files(const WebOptions& options) {
+  auto display = parse_display(options.exposure, options.tone, {});
+  if (!display) return display.error();
   nlohmann::json manifest{{"name", fs::path(options.baked).filename().string()},
                           {"baked", "data/scene.glb"},
-                          {"exposure", options.exposure}};
+                          {"exposure", display->exposure},
+                          {"tone", options.tone}};
+  if (options.exposure == "auto") manifest["exposure"] = "auto";
   auto camera = parse_camera(options.camera);
   if (!camera) return camera.error();
   if (*camera) {

@@ -16,8 +16,7 @@ namespace lambent::tool {
 struct WebOptions {
   std::string baked, compare, reference;
   std::vector<std::string> env;
-  std::string camera = "auto", rotate;
-  float exposure = 0;
+  std::string camera = "auto", rotate, exposure = "auto", tone = "neutral";
   void add_to(CLI::App& command);
 };
 

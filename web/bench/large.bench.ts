@@ -4,7 +4,7 @@ import { statSync } from 'node:fs';
 import { join } from 'node:path';
 import { expect, it } from 'vitest';
 import { drawn, haveBrowser, launch, open, psnr, serve, writeScene } from '../e2e/browser.ts';
-import { haveTool, lambent, lambentJson, makeFolder, writeLopsidedHdr } from '../test/tool.ts';
+import { haveTool, lambentJson, makeFolder, renderLinear, writeLopsidedHdr } from '../test/tool.ts';
 
 const camera = '3.1,2.6,4.3,-0.3,0.8,0,38',
   rotate = '40,-25,70';
@@ -44,8 +44,7 @@ it.skipIf(!haveTool || !haveBrowser)('large scenes', async () => {
     const frame = (performance.now() - frames) / 3;
     await page.close();
     expect(await server.stop()).toBe(0);
-    lambent(
-      'render',
+    renderLinear(
       at('large.glb'),
       '--camera',
       camera,

@@ -49,7 +49,7 @@ export function serve(...args: string[]): Promise<Server> {
   });
 }
 
-/** Opens the page at a state; resolves once all is loaded and drawn. */
+/** Opens the page at a state, showing light as it is unless that says otherwise; resolves once all is drawn. */
 export async function open(
   browser: Browser,
   address: string,
@@ -59,7 +59,7 @@ export async function open(
 ): Promise<Page> {
   const page = await browser.newPage({ viewport: { width, height }, deviceScaleFactor: 1 });
   page.on('pageerror', (error) => console.error('page:', error.message));
-  await page.goto(`${address}#${fragment}`);
+  await page.goto(`${address}#${fragment}&exposure=0&tone=none`); // the first of a name counts
   await ready(page);
   return page;
 }

@@ -3,7 +3,7 @@
 import { join } from 'node:path';
 import type { Browser } from 'playwright-core';
 import { afterAll, beforeAll, describe, expect, it } from 'vitest';
-import { haveTool, lambent, makeFolder, writeLopsidedHdr } from '../test/tool.ts';
+import { haveTool, lambent, makeFolder, renderLinear, writeLopsidedHdr } from '../test/tool.ts';
 import { complaint, haveBrowser, launch, open, psnr, serve, writeBumpy, writeScene } from './browser.ts';
 
 const rotate = '40,-25,70',
@@ -49,8 +49,7 @@ describe.skipIf(!haveTool || !haveBrowser)('a lightmap', () => {
     await page.close();
     expect(await server.stop()).toBe(0);
     const render = (name: string, turn: string): string =>
-      lambent(
-        'render',
+      renderLinear(
         at('lit.glb'),
         '--camera',
         camera,
@@ -105,7 +104,7 @@ describe.skipIf(!haveTool || !haveBrowser)('a lightmap', () => {
       await page.close();
       expect(await server.stop()).toBe(0);
       const shot = ['--camera', view, '--size', '640x480', '--spp', '16', '--background', 'none', '--exposure', '-2'];
-      lambent('render', at(`${name}.glb`), ...shot, '-o', at(`${name}.png`));
+      renderLinear(at(`${name}.glb`), ...shot, '-o', at(`${name}.png`));
       const db = psnr(at(`page_${name}.png`), at(`${name}.png`));
       console.log(`${kind}: ${db.toFixed(1)} dB (${folder})`);
       expect(db).toBeGreaterThan(40);

@@ -3,7 +3,7 @@
 import { join } from 'node:path';
 import type { Browser } from 'playwright-core';
 import { afterAll, beforeAll, describe, expect, it } from 'vitest';
-import { haveTool, lambent, makeFolder, writeLopsidedHdr } from '../test/tool.ts';
+import { haveTool, lambent, makeFolder, renderLinear, writeLopsidedHdr } from '../test/tool.ts';
 import { complaint, haveBrowser, launch, open, psnr, serve, writeScene } from './browser.ts';
 
 const rotate = '40,-25,70',
@@ -67,8 +67,7 @@ describe.skipIf(!haveTool || !haveBrowser)('glossy transfer', () => {
         );
         await page.screenshot({ path: at(`page_${name}_${k}.png`) });
         await page.close();
-        lambent(
-          'render',
+        renderLinear(
           at(`${name}.glb`),
           '--camera',
           camera,

@@ -127,7 +127,8 @@ describe.skipIf(!haveTool || !haveBrowser)('the page', () => {
     const page = await open(
       browser,
       server.address,
-      'camera=0,0.8,5,0,0,0,35&rotate=40,-25,70&exposure=-1.5&order=4&window=hann&against=unshadowed&wipe=0.25',
+      'camera=0,0.8,5,0,0,0,35&rotate=40,-25,70&exposure=-1.5&tone=agx' +
+        '&order=4&window=hann&against=unshadowed&wipe=0.25',
       400,
       400,
     );
@@ -142,6 +143,7 @@ describe.skipIf(!haveTool || !haveBrowser)('the page', () => {
     ).toEqual([40, -25, 70]);
     expect(Object.fromEntries(state)).toMatchObject({
       exposure: '-1.5',
+      tone: 'agx',
       order: '4',
       window: 'hann',
       against: 'unshadowed',
@@ -176,7 +178,7 @@ describe.skipIf(!haveTool || !haveBrowser)('the page', () => {
         };
       }
     });
-    await page.goto(`${other.address}#ui=off&camera=0,0.8,5,0,0,0,35`);
+    await page.goto(`${other.address}#ui=off&camera=0,0.8,5,0,0,0,35&exposure=0`);
     await page.waitForSelector('body[data-ready=yes]', { state: 'attached' });
     await drawn(page);
     const counts = (): Promise<{ uploads: number; uniformBytes: number }> =>

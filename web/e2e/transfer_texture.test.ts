@@ -5,7 +5,7 @@ import type { Browser, Page } from 'playwright-core';
 import type { ViteDevServer } from 'vite';
 import { afterAll, beforeAll, describe, expect, it } from 'vitest';
 import { readTransferTexture } from '../src/transfer_texture.ts';
-import { haveTool, lambent, lambentJson, makeFolder, writeLopsidedHdr } from '../test/tool.ts';
+import { haveTool, lambent, lambentJson, makeFolder, renderLinear, writeLopsidedHdr } from '../test/tool.ts';
 import { haveBrowser, launch, openFixture, png, psnr, writeBumpy } from './browser.ts';
 
 const camera = '1.6,1.5,2.2,-0.1,0.4,-0.2,40',
@@ -59,8 +59,7 @@ describe.skipIf(!haveTool || !haveBrowser)('a transfer texture', () => {
         '-o',
         at(`${name}.lpt`),
       );
-      lambent(
-        'render',
+      renderLinear(
         at('mesh.gltf'),
         '--transfer-texture',
         at(`${name}.lpt`),

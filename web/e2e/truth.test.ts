@@ -2,7 +2,7 @@
 import { join } from 'node:path';
 import type { Browser } from 'playwright-core';
 import { afterAll, beforeAll, describe, expect, it } from 'vitest';
-import { haveTool, lambent, makeFolder, writeLopsidedHdr } from '../test/tool.ts';
+import { haveTool, lambent, makeFolder, renderLinear, writeLopsidedHdr } from '../test/tool.ts';
 import { haveBrowser, launch, open, psnr, serve, writeScene, type Server } from './browser.ts';
 
 const camera = '3.1,2.6,4.3,-0.3,0.8,0,38',
@@ -39,8 +39,7 @@ describe.skipIf(!haveTool || !haveBrowser)('the picture', () => {
     const page = await open(browser, server.address, `ui=off&camera=${camera}&${fragment}`, 640, 480);
     await page.screenshot({ path: at(`${name}_page.png`) });
     await page.close();
-    lambent(
-      'render',
+    renderLinear(
       at(baked),
       '--camera',
       camera,

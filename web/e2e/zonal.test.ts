@@ -4,7 +4,7 @@ import { readFileSync } from 'node:fs';
 import { join } from 'node:path';
 import type { Browser } from 'playwright-core';
 import { afterAll, beforeAll, describe, expect, it } from 'vitest';
-import { haveTool, lambent, makeFolder, writeLopsidedHdr } from '../test/tool.ts';
+import { haveTool, lambent, makeFolder, renderLinear, writeLopsidedHdr } from '../test/tool.ts';
 import {
   drawn,
   haveBrowser,
@@ -51,8 +51,7 @@ describe.skipIf(!haveTool || !haveBrowser)('zonal lobes', () => {
     expect(await server.stop()).toBe(0);
   }
   const render = (baked: string, name: string, camera: string, args: string[]): string =>
-    lambent(
-      'render',
+    renderLinear(
       at(baked),
       '--camera',
       camera,

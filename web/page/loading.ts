@@ -7,6 +7,7 @@ import {
   LinearFilter,
   RepeatWrapping,
   RGBAFormat,
+  Vector3,
   type Texture,
 } from 'three';
 import { EXRLoader } from 'three/addons/loaders/EXRLoader.js';
@@ -31,13 +32,15 @@ export interface Manifest {
   environments: { name: string; file: string }[];
   camera?: number[];
   rotate?: number[];
-  exposure?: number;
+  exposure?: number | 'auto';
+  tone?: string;
 }
 
 export interface EnvironmentFile {
   name: string;
   lighting: Lighting;
   background: DataTexture; // first row at the zenith
+  sun: Vector3; // towards the brightest texel
 }
 
 /** The manifest, or undefined where the page stands alone. */
@@ -97,6 +100,9 @@ export async function readBaked(bytes: ArrayBuffer): Promise<GLTF> {
   }
 }
 
+/** The scene of a file without what we know of it, as any viewer has it. */
+export const readPlain = (bytes: ArrayBuffer): Promise<GLTF> => new GLTFLoader().parseAsync(bytes, '');
+
 /** Linear radiance of an .hdr or .exr, told apart by content. */
 export function readMap(bytes: ArrayBuffer): LatLongMap {
   const head = new Uint8Array(bytes, 0, Math.min(4, bytes.byteLength));
@@ -138,7 +144,21 @@ export const makeEnvironment = (name: string, map: LatLongMap): EnvironmentFile 
   name,
   lighting: new Lighting(projectLatLong(map, 16)),
   background: mapTexture(map),
+  sun: brightest(map),
 });
+
+/** Direction of the brightest texel. */
+export function brightest({ data, width, height, channels }: LatLongMap): Vector3 {
+  let best = 0,
+    peak = -1;
+  for (let i = 0; i < width * height; ++i) {
+    const y = 0.2126 * data[i * channels]! + 0.7152 * data[i * channels + 1]! + 0.0722 * data[i * channels + 2]!;
+    if (y > peak) [peak, best] = [y, i];
+  }
+  const phi = 2 * Math.PI * (((best % width) + 0.5) / width - 0.5),
+    theta = (Math.PI * (Math.floor(best / width) + 0.5)) / height;
+  return new Vector3(Math.sin(theta) * Math.cos(phi), Math.cos(theta), Math.sin(theta) * Math.sin(phi));
+}
 
 /** Light for a page that was given none: a plain sky over darker ground, with a broad sun in the east. */
 export function plainSky(): LatLongMap {

@@ -1,6 +1,6 @@
 // The page: controls, the wipe, files that are opened or dropped, and every message a user may see.
 import { Euler, MathUtils, Vector3 } from 'three';
-import { LambentError, shBand, shIndex, shWindows, type ShWindow } from '../src/index.js';
+import { LambentError, NoTransferError, shBand, shIndex, shWindows, type ShWindow } from '../src/index.js';
 import {
   fetchFile,
   loadManifest,
@@ -9,11 +9,13 @@ import {
   plainSky,
   readBaked,
   readMap,
+  readPlain,
   type EnvironmentFile,
   type Manifest,
 } from './loading.js';
 import { defaultState, formatState, parseState, type State, type View } from './state.js';
-import { falseColorEnd, fitErrorEnd, Viewer } from './viewer.js';
+import { tones, type Tone } from './tone.js';
+import { falseColorEnd, falseColorGain, fitErrorEnd, Viewer } from './viewer.js';
 
 const get = <T extends HTMLElement>(id: string): T => document.getElementById(id) as T;
 const input = (id: string): HTMLInputElement => get(id);
@@ -42,6 +44,7 @@ function showLoading(what: string, share?: number): void {
 }
 
 const megabytes = (bytes: number): string => `${(bytes / 1e6).toPrecision(3)} MB`;
+const degrees = (angle: number): string => `${Math.round(angle)}°`.replace('-', '−');
 const names: Record<View, string> = {
   baked: 'Baked',
   compare: 'Second file',
@@ -52,24 +55,28 @@ const names: Record<View, string> = {
 };
 
 class Page {
+  private readonly base = defaultState(); // what the address need not say
   private readonly state: State;
   private readonly viewer: Viewer;
   private readonly environments: { name: string; load: () => Promise<EnvironmentFile> }[] = [];
   private frameTime = 0;
   private savedSoon = 0;
+  private opened = false;
 
   constructor(private readonly manifest: Manifest | undefined) {
-    const base = defaultState();
+    const { base } = this;
     if (manifest?.camera) base.camera = manifest.camera;
     if (manifest?.rotate) base.rotate = manifest.rotate;
     if (manifest?.exposure !== undefined) base.exposure = manifest.exposure;
+    base.tone = tones.find((tone) => tone === manifest?.tone) ?? base.tone;
     this.state = parseState(location.hash, base);
     this.viewer = new Viewer(get<HTMLCanvasElement>('picture'), {
       onFrame: (ms) => this.onFrame(ms),
-      onChange: () => this.saveSoon(),
+      onChange: () => (this.showHeight(), this.saveSoon()),
       onUse: (what) => what === 'light' && get('hint').classList.add('gone'),
       onProblem: showProblem,
       onRecovered: hideProblem,
+      onMeter: () => this.showExposure(),
     });
     this.connect();
   }
@@ -123,7 +130,8 @@ class Page {
     input('order').value = String(state.order || all);
     input('coefficient').max = String(all * all - 1);
     input('coefficient').value = String(state.coefficient);
-    input('exposure').value = String(state.exposure);
+    select('tone').replaceChildren(...tones.map((tone) => option(tone, tone)));
+    select('tone').value = state.tone;
     input('background').checked = state.background;
     get('play').hidden = !viewer.hasAnimation;
     document.body.classList.toggle('bare', !state.ui);
@@ -136,15 +144,15 @@ class Page {
     viewer.against = state.against;
     viewer.wipe = state.wipe;
     viewer.exposure = state.exposure;
+    viewer.tone = state.tone;
+    const isOtherLight = viewer.order !== state.order || viewer.window !== state.window;
     viewer.order = state.order;
     viewer.window = state.window;
     viewer.coefficient = state.coefficient;
     viewer.showBackground = state.background;
-    viewer.changeLight();
-    get('exposure-value').textContent = `${state.exposure > 0 ? '+' : ''}${state.exposure.toFixed(1)}`.replace(
-      '-',
-      '−',
-    );
+    if (isOtherLight) viewer.changeLight();
+    else viewer.invalidate();
+    this.showExposure();
     get('order-value').textContent = `${viewer.bands} of ${viewer.bakedScene?.transfer.order ?? 1}`;
     const usesCoefficient = [state.view, state.against].includes('coefficient');
     const l = shBand(state.coefficient),
@@ -153,13 +161,13 @@ class Page {
     get('coefficient-row').hidden = !usesCoefficient;
     get('scale').hidden = !usesCoefficient && !usesError;
     get('coefficient-name').textContent = `l ${l}, m ${m}`;
-    const end = falseColorEnd / 2 ** state.exposure;
+    const end = falseColorEnd / falseColorGain(state.exposure);
     get('scale-low').textContent = `−${end.toPrecision(2)}`;
     get('scale-high').textContent = `+${end.toPrecision(2)}`;
     if (usesError && !usesCoefficient) // the scale's dark half is not used
     {
       get('scale-low').textContent = 'grey: 0 %';
-      get('scale-high').textContent = `${((100 * fitErrorEnd) / 2 ** state.exposure).toPrecision(2)} %`;
+      get('scale-high').textContent = `${((100 * fitErrorEnd) / falseColorGain(state.exposure)).toPrecision(2)} %`;
     }
     const wipe = get('wipe');
     wipe.hidden = !state.against;
@@ -170,11 +178,32 @@ class Page {
     this.saveSoon();
   }
 
+  private showHeight(): void {
+    input('height').value = String(this.viewer.lightHeight);
+    get('height-value').textContent = degrees(this.viewer.lightHeight);
+  }
+
+  private showExposure(): void {
+    const { stops } = this.viewer,
+      isAuto = this.state.exposure === 'auto',
+      text = `${stops > 0 ? '+' : ''}${stops.toFixed(1)}`.replace('-', '−');
+    input('exposure').value = String(stops);
+    get('exposure-value').textContent = text;
+    get('auto').setAttribute('aria-pressed', String(isAuto));
+  }
+
   private connect(): void {
     const { state, viewer } = this;
     const on = (id: string, event: string, change: () => void): void =>
       get(id).addEventListener(event, () => (change(), this.apply()));
     on('exposure', 'input', () => (state.exposure = Number(input('exposure').value)));
+    on('auto', 'click', () => ((state.exposure = 'auto'), viewer.measure()));
+    get('height').addEventListener('input', () => {
+      viewer.lightHeight = Number(input('height').value);
+      get('height-value').textContent = degrees(viewer.lightHeight);
+      this.saveSoon();
+    });
+    on('tone', 'change', () => (state.tone = select('tone').value as Tone));
     on(
       'order',
       'input',
@@ -239,9 +268,15 @@ class Page {
     });
     this.connectWipe();
     this.connectLobes();
+    const showHelp = (): void => get<HTMLDialogElement>('help').showModal();
+    get('help-open').addEventListener('click', showHelp);
+    get('help-close').addEventListener('click', () => get<HTMLDialogElement>('help').close());
+    addEventListener('keydown', (e) => {
+      if (e.key === '?' && !get<HTMLDialogElement>('help').open) showHelp();
+    });
     get('controls').addEventListener('submit', (e) => e.preventDefault());
     addEventListener('hashchange', () => {
-      if (location.hash !== formatState(this.current())) location.reload();
+      if (location.hash !== this.address()) location.reload();
     });
   }
 
@@ -304,8 +339,9 @@ class Page {
 
   private async openBaked(name: string, bytes: ArrayBuffer): Promise<void> {
     const { viewer } = this,
-      first = !viewer.bakedScene;
-    await this.useModel('baked', name, bytes);
+      first = !this.opened;
+    this.opened = true;
+    const problem = await this.useScene(name, bytes);
     get('name').textContent = document.title = name;
     get('hint').hidden = false;
     get('invitation').hidden = true;
@@ -314,6 +350,8 @@ class Page {
     this.setCamera(first ? this.state.camera : undefined);
     if (first && this.state.time !== undefined) viewer.pose(this.state.time);
     get('loading').hidden = true;
+    viewer.measure();
+    if (problem) return this.showPlain(problem);
     const t = viewer.bakedScene!.transfer;
     const rows: [string, string][] = [
       ['Transfer', `${t.kind}, order ${t.order}, ${t.channels === 3 ? 'colour' : 'grey'}`],
@@ -342,8 +380,28 @@ class Page {
     try {
       this.viewer.setModel(role, await readBaked(bytes));
     } catch (error) {
-      throw new LambentError(sentence(name, error));
+      throw new (error instanceof NoTransferError ? NoTransferError : LambentError)(sentence(name, error));
     }
+  }
+
+  /** The baked scene of a file; where it holds none, the scene as any viewer has it, and what is to be said of it. */
+  private async useScene(name: string, bytes: ArrayBuffer): Promise<NoTransferError | undefined> {
+    try {
+      await this.useModel('baked', name, bytes);
+      return undefined;
+    } catch (error) {
+      if (!(error instanceof NoTransferError)) throw error;
+      const plain = await readPlain(bytes).catch(() => {
+        throw error;
+      });
+      this.viewer.setPlain(plain);
+      return error;
+    }
+  }
+
+  private showPlain(problem: NoTransferError): void {
+    get('statistics').replaceChildren();
+    showProblem(problem.message);
   }
 
   private fetch(name: string, file: string): Promise<ArrayBuffer> {
@@ -371,6 +429,7 @@ class Page {
     this.state.env = index;
     select('env').selectedIndex = index;
     this.viewer.setEnvironment(environment);
+    this.showHeight();
     this.saveSoon();
   }
 
@@ -384,6 +443,7 @@ class Page {
   private setRotation(degrees: number[]): void {
     const [yaw, pitch, roll] = degrees.map((d) => MathUtils.degToRad(d)) as [number, number, number];
     this.viewer.orbit.light.setFromEuler(new Euler(pitch, yaw, roll, 'YXZ'));
+    this.showHeight();
     this.viewer.changeLight();
     this.saveSoon();
   }
@@ -398,10 +458,15 @@ class Page {
     };
   }
 
+  private address(): string {
+    const { exposure, tone } = this.base;
+    return formatState(this.current(), { ...defaultState(), exposure, tone });
+  }
+
   private saveSoon(): void {
     clearTimeout(this.savedSoon);
     this.savedSoon = window.setTimeout(() => {
-      if (this.viewer.bakedScene) history.replaceState(null, '', formatState(this.current()));
+      if (this.viewer.bakedScene) history.replaceState(null, '', this.address());
     }, 300);
   }
 

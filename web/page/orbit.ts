@@ -6,7 +6,8 @@ const radiansAHeight = 2.6; // for a drag over the whole height of the picture
 const keyStep = 0.06; // share of that height a key press counts as
 
 export interface OrbitCallbacks {
-  onChange(): void;
+  onCamera(): void;
+  onLight(): void;
   /** First move of each sort, so that hints can go. */
   onUse(what: 'orbit' | 'light'): void;
 }
@@ -44,7 +45,7 @@ export class Orbit {
     this.camera.up.set(0, 1, 0);
     this.camera.lookAt(target);
     this.camera.updateMatrixWorld();
-    this.callbacks.onChange();
+    this.callbacks.onCamera();
   }
 
   /** By shares of the picture's height, +x to the right, +y down. */
@@ -63,13 +64,13 @@ export class Orbit {
     this.look(offset.add(this.target), this.target.clone());
   }
 
+  /** Sideways about +Y, so that a sun keeps its height; up and down about the picture's own horizontal. */
   turnLight(x: number, y: number): void {
-    const right = new Vector3().setFromMatrixColumn(this.camera.matrixWorld, 0),
-      up = new Vector3().setFromMatrixColumn(this.camera.matrixWorld, 1);
-    const turn = new Quaternion().setFromAxisAngle(up, x * radiansAHeight);
+    const right = new Vector3().setFromMatrixColumn(this.camera.matrixWorld, 0);
+    const turn = new Quaternion().setFromAxisAngle(new Vector3(0, 1, 0), x * radiansAHeight);
     turn.multiply(new Quaternion().setFromAxisAngle(right, y * radiansAHeight));
     this.light.premultiply(turn).normalize();
-    this.callbacks.onChange();
+    this.callbacks.onLight();
   }
 
   zoom(factor: number): void {

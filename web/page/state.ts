@@ -1,6 +1,7 @@
 // What is on show, as the address's fragment: a link or a reload gives the same picture.
 // Numbers are separated by commas; `camera` and `rotate` are spelt as --camera and --env-rotate of the command line.
 import { shWindows, type ShWindow } from '../src/index.js';
+import { tones, type Tone } from './tone.js';
 
 export const views = ['baked', 'compare', 'unshadowed', 'coefficient', 'error', 'reference'] as const;
 export type View = (typeof views)[number];
@@ -9,7 +10,8 @@ export interface State {
   camera?: number[]; // eye, target, vertical field of view in degrees
   rotate: number[]; // yaw, pitch, roll in degrees
   env: number;
-  exposure: number; // stops
+  exposure: number | 'auto'; // stops
+  tone: Tone;
   order: number; // bands; 0: all that are baked
   window: ShWindow;
   view: View;
@@ -24,7 +26,8 @@ export interface State {
 export const defaultState = (): State => ({
   rotate: [0, 0, 0],
   env: 0,
-  exposure: 0,
+  exposure: 'auto',
+  tone: 'neutral',
   order: 0,
   window: 'none',
   view: 'baked',
@@ -52,7 +55,8 @@ export function parseState(fragment: string, base: State): State {
     state.camera = camera;
   state.rotate = numbers(from.get('rotate'), 3) ?? state.rotate;
   state.env = Math.floor(one('env', 0, 1e6) ?? state.env);
-  state.exposure = one('exposure', -20, 20) ?? state.exposure;
+  state.exposure = from.get('exposure') === 'auto' ? 'auto' : (one('exposure', -20, 20) ?? state.exposure);
+  state.tone = tones.find((t) => t === from.get('tone')) ?? state.tone;
   state.order = Math.floor(one('order', 0, 16) ?? state.order);
   state.window = shWindows.find((w) => w === from.get('window')) ?? state.window;
   state.view = views.find((v) => v === from.get('view')) ?? state.view;
@@ -69,14 +73,15 @@ export function parseState(fragment: string, base: State): State {
 
 const short = (x: number): string => String(Number(x.toPrecision(6)));
 
-export function formatState(state: State): string {
-  const base = defaultState(),
-    parts: string[] = [];
+/** What differs from `base`, and where the camera is. */
+export function formatState(state: State, base: State = defaultState()): string {
+  const parts: string[] = [];
   const put = (key: string, text: string): void => void parts.push(`${key}=${text}`);
   if (state.camera) put('camera', state.camera.map(short).join(','));
   if (state.rotate.some((r) => Math.abs(r) > 1e-4)) put('rotate', state.rotate.map(short).join(','));
   if (state.env !== base.env) put('env', String(state.env));
-  if (state.exposure !== base.exposure) put('exposure', short(state.exposure));
+  if (state.exposure !== base.exposure) put('exposure', state.exposure === 'auto' ? 'auto' : short(state.exposure));
+  if (state.tone !== base.tone) put('tone', state.tone);
   if (state.order !== base.order) put('order', String(state.order));
   if (state.window !== base.window) put('window', state.window);
   if (state.view !== base.view) put('view', state.view);

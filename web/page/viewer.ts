@@ -2,8 +2,11 @@
 import {
   AnimationMixer,
   Box3,
+  DataUtils,
+  EquirectangularReflectionMapping,
+  FloatType,
   HalfFloatType,
-  LinearToneMapping,
+  MathUtils,
   Matrix4,
   PerspectiveCamera,
   Quaternion,
@@ -28,6 +31,7 @@ import { Model } from './model.js';
 import { Orbit } from './orbit.js';
 import { DevelopMaterial, PictureMaterial, SkyMaterial } from './screen.js';
 import type { View } from './state.js';
+import { autoExposure, clampBeforeTone, toneMappings, type Tone } from './tone.js';
 
 export interface ViewerCallbacks {
   /** A frame followed the one before it after so many milliseconds, without a pause between. */
@@ -36,6 +40,8 @@ export interface ViewerCallbacks {
   onUse(what: 'orbit' | 'light'): void;
   onProblem(message: string): void;
   onRecovered(): void;
+  /** The exposure was measured anew: so many stops. */
+  onMeter(stops: number): void;
 }
 
 const groundName = 'ground'; // of the floor that `lambent bake --ground` adds
@@ -44,6 +50,8 @@ export const falseColorEnd = 0.25;
 /** Of errors of a fit, relative. */
 export const fitErrorEnd = 0.1;
 const pause = 250; // milliseconds without a frame
+const meterPause = 300; // between two measures of the exposure while the light turns
+const meterWidth = 128; // pixels
 
 export class Viewer {
   readonly renderer: WebGLRenderer;
@@ -54,7 +62,8 @@ export class Viewer {
   wipe = 0.5;
   order = 0; // bands in use; 0: all
   window: ShWindow = 'none';
-  exposure = 0;
+  exposure: number | 'auto' = 'auto';
+  tone: Tone = 'neutral';
   showBackground = true;
   coefficient = 3;
 
@@ -70,9 +79,15 @@ export class Viewer {
   private readonly bounds = new Sphere(new Vector3(), 1);
   private baked: Model | undefined;
   private compare: Model | undefined;
+  private plain: Object3D | undefined; // a scene without transfer, in place of `baked`
   private environment: EnvironmentFile | undefined;
   private animation: { mixer: AnimationMixer; action: AnimationAction } | undefined;
   private lightChanged = true;
+  private measured = 0; // stops
+  private meterDue = true;
+  private lastMeter = -Infinity;
+  private meterSoon = 0;
+  private meterTarget: WebGLRenderTarget | undefined;
   private request = 0;
   private lastFrame = 0;
 
@@ -80,6 +95,7 @@ export class Viewer {
     private readonly canvas: HTMLCanvasElement,
     private readonly callbacks: ViewerCallbacks,
   ) {
+    clampBeforeTone();
     try {
       this.renderer = new WebGLRenderer({ canvas, antialias: true, powerPreference: 'high-performance' });
     } catch {
@@ -90,7 +106,6 @@ export class Viewer {
         `The graphics driver refuses a shader: ${context.getProgramInfoLog(program) ?? 'no reason given'}`,
       );
     this.renderer.autoClear = false;
-    this.renderer.toneMapping = LinearToneMapping; // exposure, then the sRGB curve: as `lambent render` writes a PNG
     this.renderer.setClearColor(0x000000, 1);
     canvas.addEventListener('webglcontextlost', () =>
       callbacks.onProblem('The graphics card was taken away from this page. The picture returns with it.'),
@@ -98,7 +113,8 @@ export class Viewer {
     // What was drawn into textures is gone.
     canvas.addEventListener('webglcontextrestored', () => (callbacks.onRecovered(), this.changeLight()));
     this.orbit = new Orbit(this.camera, canvas, {
-      onChange: () => (this.changeLight(), callbacks.onChange()),
+      onCamera: () => (this.invalidate(), callbacks.onChange()),
+      onLight: () => (this.changeLight(), callbacks.onChange()),
       onUse: (what) => callbacks.onUse(what),
     });
     new ResizeObserver(() => this.invalidate()).observe(canvas);
@@ -118,16 +134,34 @@ export class Viewer {
     }
     this[role] = model;
     this.scene.add(model.root);
-    if (role === 'baked') {
-      this.animation = undefined;
-      this.glyphs.clear();
-      if (gltf.animations[0]) {
-        const mixer = new AnimationMixer(gltf.scene);
-        this.animation = { mixer, action: mixer.clipAction(gltf.animations[0]) };
-      }
-      new Box3().setFromObject(model.root, true).getBoundingSphere(this.bounds);
-    }
+    if (role === 'baked') this.takeScene(gltf);
     this.changeLight();
+  }
+
+  /** A scene without transfer takes the place of the baked one: three.js's own materials under the environment. */
+  setPlain(gltf: GLTF): void {
+    if (this.baked) {
+      this.scene.remove(this.baked.root);
+      this.baked.dispose();
+      this.baked = undefined;
+    }
+    this.takeScene(gltf);
+    this.plain = gltf.scene;
+    this.scene.add(gltf.scene);
+    this.changeLight();
+  }
+
+  private takeScene(gltf: GLTF): void {
+    this.plain?.traverse((o) => (o as Partial<Mesh>).geometry?.dispose());
+    if (this.plain) this.scene.remove(this.plain);
+    this.plain = undefined;
+    this.animation = undefined;
+    this.glyphs.clear();
+    if (gltf.animations[0]) {
+      const mixer = new AnimationMixer(gltf.scene);
+      this.animation = { mixer, action: mixer.clipAction(gltf.animations[0]) };
+    }
+    new Box3().setFromObject(gltf.scene, true).getBoundingSphere(this.bounds);
   }
 
   get bakedScene(): BakedScene | undefined {
@@ -158,7 +192,7 @@ export class Viewer {
    * (camera_around of core/camera.h) in the canvas as it is now.
    */
   frameAll(): void {
-    const root = this.baked?.root;
+    const root = this.baked?.root ?? this.plain;
     if (!root) return;
     root.updateMatrixWorld(true);
     const meshes: Mesh[] = [];
@@ -198,8 +232,33 @@ export class Viewer {
 
   /** The light, its order or its window are others now. */
   changeLight(): void {
-    this.lightChanged = true;
+    this.lightChanged = this.meterDue = true;
     this.invalidate();
+  }
+  /** Measures the exposure where the camera stands, if it is automatic. */
+  measure(): void {
+    this.meterDue = true;
+    this.lastMeter = -Infinity;
+    this.invalidate();
+  }
+  /** How high above the horizon the environment's brightest texel stands, in degrees; keeps its azimuth when set. */
+  get lightHeight(): number {
+    return MathUtils.radToDeg(Math.asin(MathUtils.clamp(this.sun.y, -1, 1)));
+  }
+  set lightHeight(degrees: number) {
+    const { sun } = this,
+      axis = sun.clone().cross(new Vector3(0, 1, 0));
+    if (axis.length() < 1e-6) axis.setFromMatrixColumn(this.camera.matrixWorld, 0);
+    const turn = new Quaternion().setFromAxisAngle(axis.normalize(), MathUtils.degToRad(degrees - this.lightHeight));
+    this.orbit.light.premultiply(turn).normalize();
+    this.changeLight();
+  }
+  private get sun(): Vector3 {
+    return (this.environment?.sun ?? new Vector3(0, 1, 0)).clone().applyQuaternion(this.orbit.light);
+  }
+  /** Stops in use. */
+  get stops(): number {
+    return this.exposure === 'auto' ? this.measured : this.exposure;
   }
 
   play(on: boolean): void {
@@ -266,13 +325,15 @@ export class Viewer {
     const { renderer, camera, sky } = this;
     this.fitToCanvas();
     if (this.lightChanged) this.relight();
-    renderer.toneMappingExposure = 2 ** this.exposure;
-    this.gain.value = 2 ** this.exposure / falseColorEnd;
-    this.errorGain.value = 2 ** this.exposure / fitErrorEnd;
+    this.gain.value = falseColorGain(this.exposure) / falseColorEnd;
+    this.errorGain.value = falseColorGain(this.exposure) / fitErrorEnd;
     sky.turnBack.value.setFromMatrix4(
       new Matrix4().makeRotationFromQuaternion(new Quaternion().copy(this.orbit.light).invert()),
     );
     sky.unproject.value.copy(camera.matrixWorld).multiply(camera.projectionMatrixInverse);
+    if (this.exposure === 'auto' && this.meterDue) this.meter();
+    renderer.toneMapping = toneMappings[this.tone];
+    renderer.toneMappingExposure = 2 ** this.stops;
     const ratio = renderer.getPixelRatio(),
       width = this.canvas.width / ratio,
       height = this.canvas.height / ratio;
@@ -311,6 +372,56 @@ export class Viewer {
     lighting.window = this.window;
     this.baked?.relight(lighting);
     this.compare?.relight(lighting);
+    if (this.plain) this.lightPlain(this.environment!.background);
+  }
+
+  private lightPlain(background: DataTexture): void {
+    if (this.scene.environment?.source !== background.source) {
+      this.scene.environment?.dispose();
+      this.scene.environment = background.clone(); // with the first row at the top, as three.js has environments
+      this.scene.environment.mapping = EquirectangularReflectionMapping;
+      this.scene.environment.flipY = true;
+      this.scene.environment.needsUpdate = true;
+    }
+    this.scene.environmentRotation.setFromQuaternion(this.orbit.light);
+  }
+
+  /** A small picture of the surfaces says how bright they are; while the light turns, a few times a second. */
+  private meter(): void {
+    const { renderer, screen } = this,
+      wait = this.lastMeter + meterPause - performance.now();
+    clearTimeout(this.meterSoon);
+    if (wait > 0) return void (this.meterSoon = window.setTimeout(() => this.invalidate(), wait));
+    const type = renderer.extensions.has('EXT_color_buffer_float')
+      ? FloatType
+      : renderer.extensions.has('EXT_color_buffer_half_float')
+        ? HalfFloatType
+        : undefined;
+    if (type === undefined || !this.environment) return;
+    const height = Math.min(4 * meterWidth, Math.max(1, Math.round(meterWidth / this.camera.aspect))),
+      target = (this.meterTarget ??= new WebGLRenderTarget(meterWidth, height, { type }));
+    target.setSize(meterWidth, height);
+    const read = (): number[] => {
+      const pixels = new (type === FloatType ? Float32Array : Uint16Array)(4 * meterWidth * height);
+      renderer.readRenderTargetPixels(target, 0, 0, meterWidth, height, pixels);
+      return Array.from(pixels, (v) => (type === FloatType ? v : DataUtils.fromHalfFloat(v)));
+    };
+    renderer.setRenderTarget(target);
+    renderer.setClearColor(0x000000, 0);
+    renderer.clear();
+    if (this.dress('baked') ?? this.plain) renderer.render(this.scene, this.camera);
+    let pixels = read();
+    if (this.showBackground && !pixels.some((v, i) => i % 4 === 3 && v >= 0.5)) {
+      screen.material = this.sky;
+      screen.render(renderer);
+      pixels = read();
+    }
+    renderer.setClearColor(0x000000, 1);
+    renderer.setRenderTarget(null);
+    this.meterDue = false;
+    this.lastMeter = performance.now();
+    this.measured = autoExposure(pixels);
+    this.callbacks.onMeter(this.measured);
   }
 
   private drawView(view: View): void {
@@ -323,16 +434,8 @@ export class Viewer {
       if (image) screen.render(renderer);
       return;
     }
-    const shown = view === 'compare' ? this.compare : this.baked;
-    for (const model of [this.baked, this.compare]) if (model) model.root.visible = model === shown;
-    shown?.wear(
-      view === 'compare' ? 'baked' : view,
-      this.environment?.lighting,
-      this.coefficient,
-      this.gain,
-      this.errorGain,
-    );
-    // What shows through surfaces adds up as light does, before the sRGB curve.
+    const shown = this.dress(view);
+    // What shows through surfaces adds up as light does, before the screen's curves.
     const blends = shown !== undefined && anySeeThrough(shown.meshes);
     if (blends) {
       this.linear.setSize(this.canvas.width, this.canvas.height);
@@ -343,20 +446,37 @@ export class Viewer {
       screen.material = this.sky;
       screen.render(renderer);
     }
-    if (!shown) return;
-    renderer.render(this.scene, this.camera);
+    if (shown ?? this.plain) renderer.render(this.scene, this.camera);
     if (blends) {
       renderer.setRenderTarget(null);
       this.developed.map.value = this.linear.texture;
       screen.material = this.developed;
       screen.render(renderer);
     }
-    const glyphs = shown === this.baked ? this.glyphs.place(this.camera) : undefined;
+    const glyphs = shown && shown === this.baked ? this.glyphs.place(this.camera) : undefined;
     if (!glyphs) return;
     renderer.clearDepth(); // lobes may point into the surface
     renderer.render(glyphs, this.camera);
   }
+
+  /** Makes the model that a view shows visible, in that view's materials. */
+  private dress(view: Exclude<View, 'reference'>): Model | undefined {
+    const shown = view === 'compare' ? this.compare : this.baked;
+    for (const model of [this.baked, this.compare]) if (model) model.root.visible = model === shown;
+    if (this.plain) this.plain.visible = !shown;
+    shown?.wear(
+      view === 'compare' ? 'baked' : view,
+      this.environment?.lighting,
+      this.coefficient,
+      this.gain,
+      this.errorGain,
+    );
+    return shown;
+  }
 }
+
+/** False colours show transfer, which no automatic exposure is measured from. */
+export const falseColorGain = (exposure: number | 'auto'): number => (exposure === 'auto' ? 1 : 2 ** exposure);
 
 function isGround(object: Object3D): boolean {
   for (let o: Object3D | null = object; o; o = o.parent) if (o.name === groundName) return true;

@@ -2,3 +2,6 @@
 export class LambentError extends Error {
   override name = 'LambentError';
 }
+
+/** The file may be shown as any other, but holds no transfer, or no longer. */
+export class NoTransferError extends LambentError {}

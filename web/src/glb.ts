@@ -1,9 +1,12 @@
 // The outside of a baked file: is it a whole GLB, and does it hold transfer that we know? Asked before three's loader
 // is, whose messages are for developers.
-import { LambentError } from './errors.js';
+import { LambentError, NoTransferError } from './errors.js';
+import { isOutOfPlace } from './extension_views.js';
 import { knownKinds, transferKind } from './kinds.js';
 
 export const extensionName = 'LAMBENT_transfer';
+/** Said of files whose transfer another tool has dropped or taken out of place. */
+export const rewritten = `was rewritten by a tool that does not know ${extensionName}; bake again`;
 
 /** The root extension (docs/file-format.md), as far as every kind has it. */
 export interface TransferExtension {
@@ -22,15 +25,24 @@ const isObject = (value: unknown): value is Record<string, unknown> =>
 export const isIndex = (value: unknown, limit = 0xffffffff): value is number =>
   typeof value === 'number' && Number.isInteger(value) && value >= 0 && value <= limit;
 
+/** Whether a document without our extension still names it: something has dropped the rest. */
+const hasTraces = (document: Record<string, unknown>): boolean =>
+  [document['extensionsUsed'], document['meshes']].some((part) => JSON.stringify(part ?? '').includes(extensionName));
+
 /**
- * The extension of a glTF document. Throws LambentError where it is missing, of another version, or of a kind we do not
- * know.
+ * The extension of a glTF document. Throws NoTransferError where it is missing or its data is, LambentError where it is
+ * of another version, or of a kind we do not know.
  */
 export function transferExtension(document: unknown): TransferExtension {
   const extensions = isObject(document) ? document['extensions'] : undefined;
   const extension = isObject(extensions) ? extensions[extensionName] : undefined;
-  if (!isObject(extension))
-    throw new LambentError('is not a baked file: it has no LAMBENT_transfer extension (make one with "lambent bake")');
+  if (!isObject(document) || !isObject(extension))
+    throw new NoTransferError(
+      isObject(document) && hasTraces(document)
+        ? rewritten
+        : 'is not a baked file: it has no LAMBENT_transfer extension (make one with "lambent bake"; again, where ' +
+            'another tool has rewritten it)',
+    );
   if (extension['version'] !== 1)
     throw new LambentError(`was baked with file version ${String(extension['version'])}; this program reads version 1`);
   const transfer = extension['transfer'],
@@ -46,6 +58,7 @@ export function transferExtension(document: unknown): TransferExtension {
     throw new LambentError('holds no list of "parts"');
   if (extension['surface'] !== undefined && !isObject(extension['surface']))
     throw new LambentError('holds a "surface" that is none');
+  if (isOutOfPlace(document, extension)) throw new NoTransferError(rewritten);
   return extension as unknown as TransferExtension;
 }
 

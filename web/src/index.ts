@@ -7,7 +7,7 @@ registerTransferKind(diffuseKind);
 registerTransferKind(zonalKind);
 registerTransferKind(matrixKind);
 
-export { LambentError } from './errors.js';
+export { LambentError, NoTransferError } from './errors.js';
 export { checkBakedFile, extensionName } from './glb.js';
 export {
   knownKinds,

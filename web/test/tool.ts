@@ -24,6 +24,19 @@ export function lambent(...args: string[]): string {
   return execFileSync(toolPath, args, { encoding: 'utf8', stdio: ['ignore', 'pipe', 'pipe'], maxBuffer: 1 << 28 });
 }
 
+/** A picture; a PNG shows light as it is, unless `args` say otherwise. */
+export function renderLinear(...args: string[]): string {
+  const more = (name: string, value: string): string[] =>
+    args.at(-1)!.endsWith('.exr') || args.some((a) => a.startsWith(name)) ? [] : [name, value];
+  return lambent(
+    'render',
+    ...args.slice(0, 1),
+    ...more('--exposure', '0'),
+    ...more('--tone', 'none'),
+    ...args.slice(1),
+  );
+}
+
 export const lambentJson = (...args: string[]): unknown => JSON.parse(lambent(...args, '--json'));
 
 /** Numbers in [0, 1) that are the same in every run. */

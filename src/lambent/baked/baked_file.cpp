@@ -170,6 +170,14 @@ Result<void> save_baked(const std::string& path, const Baked& baked, const Viewe
   });
 }
 
+Result<void> save_look(const std::string& path, const Baked& baked, const ViewerLook& look) {
+  std::vector<GltfBlob> blobs;
+  LookWriter look_writer(baked.scene, baked.basis, &look);
+  look_writer.add_blobs(blobs);
+  return save_glb(path, baked.scene, blobs,
+                  [&](json& document, const GltfPlaces& places) { look_writer.write(document, places); });
+}
+
 Result<Baked> load_baked(const std::string& path) {
   auto file = MappedFile::open(path);
   if (!file) return file.error();

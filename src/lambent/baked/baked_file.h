@@ -32,17 +32,23 @@ inline const VertexPlacement* vertices_of(const Baked& baked) {
 // Light in free space; null where there is none.
 const Field* lattice_of(const Baked& baked);
 
-// What viewers without our extension are to show of a bake over texels: every surface glows with one picture over the
-// atlas, the light that leaves it, as an emissive texture of a black material. Lamps keep their own emission.
+// What viewers without our extension are to show of a bake over texels. emission: every surface glows with one picture
+// over the atlas, the light that leaves it, as an emissive texture of a black material; lamps keep their own emission.
+// moz_lightmap: the scene's own materials with the light that arrives, in the vendor extension MOZ_lightmap.
+enum class LookKind : uint8_t { emission, moz_lightmap };
 struct ViewerLook {
-  std::vector<uint8_t> png;  // sRGB, of radiance / strength
+  std::vector<uint8_t> png;  // sRGB, of radiance / strength; MOZ_lightmap's is linear, of irradiance / strength
   float strength = 1;
+  LookKind kind = LookKind::emission;
 };
 
 // With a look, primitives get materials for it, two-sided ones a second primitive for their backs; the scene's own
 // materials stay in the file, and loading finds them again. Errors: the disk's; more than 4 GiB, which a GLB cannot
 // hold.
 Result<void> save_baked(const std::string& path, const Baked& baked, const ViewerLook* look = nullptr);
+
+// The scene with a look and without the transfer, for other programs. Errors: as above.
+Result<void> save_look(const std::string& path, const Baked& baked, const ViewerLook& look);
 
 // The scene comes without what an earlier bake had put into its file. Errors: as read_fields() and load_gltf().
 Result<Baked> load_baked(const std::string& path);

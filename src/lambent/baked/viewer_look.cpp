@@ -1,6 +1,8 @@
 // glTF 2.0 specification (ISO/IEC 12113); KHR_materials_emissive_strength, KHR_materials_specular. A lightmap is shown
 // as the emission of a black material without reflections: emission is core glTF, its strength goes beyond 1, and no
-// viewer multiplies it by lights of its own. (KHR_materials_unlit would end at 1 and escape tone mapping.)
+// viewer multiplies it by lights of its own. (KHR_materials_unlit would end at 1 and escape tone mapping.) For programs
+// that know it, MOZ_lightmap: "index" and "texCoord" of a texture and the "intensity" that makes its linear values
+// irradiance, as three.js's GLTFLightMapLoaderExtension and Hubs read it.
 #include <lambent/baked/viewer_look.h>
 
 #include <lambent/baked/extension.h>
@@ -28,6 +30,17 @@ void use_extension(json& document, const char* name) {
 }
 
 std::string texcoord(size_t set) { return "TEXCOORD_" + std::to_string(set); }
+
+// Takes our notes out of all primitives.
+void forget(json& document) {
+  for (json& mesh : list(document, "meshes"))
+    for (json& primitive : mesh["primitives"]) {
+      const auto extensions = primitive.find("extensions");
+      if (extensions == primitive.end()) continue;
+      extensions->erase(extension_name);
+      if (extensions->empty()) primitive.erase("extensions");
+    }
+}
 
 template <class T>
 std::span<const uint8_t> bytes_of(const std::vector<T>& v) {
@@ -88,7 +101,7 @@ void keep_see_through(json& document, const json& original, json& lit) {
 
 // A copy of the material that glows with the texture; lamps with their own emission, which, of those with a texture, is
 // in ours.
-size_t LookWriter::lit_material(json& document, const json& original, size_t texture, size_t set) const {
+size_t LookWriter::glowing_material(json& document, const json& original, size_t texture, size_t set) const {
   json lit = {
       {"pbrMetallicRoughness", {{"baseColorFactor", {0, 0, 0, 1}}, {"metallicFactor", 0}, {"roughnessFactor", 1}}},
       {"doubleSided", false}};
@@ -114,6 +127,16 @@ size_t LookWriter::lit_material(json& document, const json& original, size_t tex
     lit["emissiveTexture"] = {{"index", texture}, {"texCoord", set}};
     extensions["KHR_materials_emissive_strength"] = {{"emissiveStrength", look_->strength}};
   }
+  return push(document, "materials", std::move(lit));
+}
+
+// A copy of the material that wears the lightmap. Backs are primitives of their own, with texels of their own.
+size_t LookWriter::lit_material(json& document, const json& original, size_t texture, size_t set) const {
+  if (look_->kind == LookKind::emission) return glowing_material(document, original, texture, set);
+  json lit = original;
+  lit.erase("doubleSided");
+  lit["extensions"]["MOZ_lightmap"] = {{"index", texture}, {"texCoord", set}, {"intensity", look_->strength}};
+  use_extension(document, "MOZ_lightmap");
   return push(document, "materials", std::move(lit));
 }
 
@@ -167,10 +190,17 @@ void LookWriter::write(json& document, const GltfPlaces& places) const {
     json back = {{"attributes", {{"POSITION", attributes["POSITION"]}}},
                  {"indices", indices},
                  {"material", lit.at({ours["ownMaterial"].get<size_t>(), set})}};
-    for (size_t k = 0; k <= set; ++k) back["attributes"][texcoord(k)] = at;
+    if (look_->kind == LookKind::emission) {
+      for (size_t k = 0; k <= set; ++k) back["attributes"][texcoord(k)] = at;
+    } else {  // the material's own textures too; normals would be those of the front
+      back["attributes"] = attributes;
+      back["attributes"].erase("NORMAL"), back["attributes"].erase("TANGENT");
+      back["attributes"][texcoord(set)] = at;
+    }
     back["extensions"][extension_name] = {{"viewerOnly", true}};
     mesh["primitives"].push_back(std::move(back));
   }
+  if (look_->kind == LookKind::moz_lightmap) forget(document);
 }
 
 std::optional<ViewerLook> load_look(const MappedFile& file, const std::string& path) {

@@ -19,6 +19,7 @@ class LookWriter {
     std::vector<uint32_t> indices;  // of its triangles as seen from the back; empty on the front
   };
   size_t lit_material(nlohmann::json& document, const nlohmann::json& original, size_t texture, size_t set) const;
+  size_t glowing_material(nlohmann::json& document, const nlohmann::json& original, size_t texture, size_t set) const;
   const Scene& scene_;
   const ViewerLook* look_;
   std::vector<Side> fronts_, backs_;  // of each part; a back without indices is none

@@ -276,7 +276,7 @@ TEST(Compare, AllCountsTheSurroundingsToo) {
   Image a = constant(2, 2, Vec3(0)), b = a;
   a.at(0, 0) = Vec3(0.5f), b.at(0, 0) = Vec3(0.25f);
   a.alpha = b.alpha = {1, 0, 0, 0};
-  auto covered = compare_images(a, b), all = compare_images(a, b, 0, true);
+  auto covered = compare_images(a, b), all = compare_images(a, b, {}, true);
   ASSERT_TRUE(covered && all);
   EXPECT_EQ(covered->pixels, 1u);
   EXPECT_EQ(all->pixels, 4u);

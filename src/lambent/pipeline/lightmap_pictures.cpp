@@ -31,6 +31,17 @@ const TexelReceivers* lit_texels(const Lightmap& map, const Receivers& receivers
   return map.all.light.groups.empty() ? nullptr : std::get_if<TexelReceivers>(&receivers.basis);
 }
 
+// Divides by the brightest value but a thousandth of them, which it returns.
+float normalize_brightness(std::vector<Vec3>& values) {
+  std::vector<float> brightness;
+  for (const Vec3& c : values) brightness.push_back(largest(c));
+  const size_t most = brightness.size() - 1 - brightness.size() / 1000;
+  std::nth_element(brightness.begin(), brightness.begin() + ptrdiff_t(most), brightness.end());
+  const float strength = std::max(brightness[most], 1e-6f);
+  for (Vec3& c : values) c /= strength;
+  return strength;
+}
+
 }  // namespace
 
 std::vector<std::pair<std::string, Image>> lightmap_pictures(const Lightmap& map, const Receivers& receivers,
@@ -68,23 +79,33 @@ Result<std::optional<ViewerLook>> lightmap_look(const Lightmap& map, const Scene
   relight(map.all, only_group(map.all.light, all_groups), relit);
   std::vector<Vec3> radiance = texel_albedo(scene, receivers);
   const std::vector<Vec3> glow = texel_emission(scene, receivers);
-  std::vector<float> brightness(radiance.size());
   for (size_t r = 0; r < radiance.size(); ++r) {
     std::array<Vec3, 9> rows{};
     for (int row = 0; row < relit.rows; ++row) rows[size_t(row)] = relit.at(r, row);
     const Vec3 n = receivers.normals[r], white = evaluate_directional_light(kind, rows, receiver_frame(n), n);
     radiance[r] = max(radiance[r] * white, Vec3(0)) + glow[r];
-    brightness[r] = largest(radiance[r]);
   }
   ViewerLook look;
-  const size_t most = brightness.size() - 1 - brightness.size() / 1000;
-  std::nth_element(brightness.begin(), brightness.begin() + ptrdiff_t(most), brightness.end());
-  look.strength = std::max(brightness[most], 1e-6f);
-  for (Vec3& c : radiance) c /= look.strength;
+  look.strength = normalize_brightness(radiance);
   auto png = encode_png(lightmap_picture(*texels, radiance), {}, scene.path);
   if (!png) return png.error();
   look.png = std::move(*png);
   return std::optional<ViewerLook>(std::move(look));
+}
+
+Result<ViewerLook> irradiance_look(const TexelReceivers& texels, std::vector<Vec3> irradiance) {
+  ViewerLook look;
+  look.kind = LookKind::moz_lightmap;
+  for (Vec3& c : irradiance) c = max(c, Vec3(0));
+  look.strength = normalize_brightness(irradiance);
+  Image picture = lightmap_picture(texels, irradiance);
+  // Bytes are to be linear: what a PNG encodes as sRGB is decoded before.
+  for (Vec3& c : picture.rgb)
+    c = {srgb_decode(std::min(c.x, 1.0f)), srgb_decode(std::min(c.y, 1.0f)), srgb_decode(std::min(c.z, 1.0f))};
+  auto png = encode_png(picture, {}, "lightmap");
+  if (!png) return png.error();
+  look.png = std::move(*png);
+  return look;
 }
 
 }  // namespace lambent

@@ -19,4 +19,7 @@ std::vector<std::pair<std::string, Image>> lightmap_pictures(const Lightmap& map
 Result<std::optional<ViewerLook>> lightmap_look(const Lightmap& map, const Scene& scene, const Receivers& receivers,
                                                 DirectionalKind kind);
 
+// Irradiance of every receiver for MOZ_lightmap, in as many bits, clamped alike.
+Result<ViewerLook> irradiance_look(const TexelReceivers& texels, std::vector<Vec3> irradiance);
+
 }  // namespace lambent

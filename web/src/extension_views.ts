@@ -1,0 +1,85 @@
+// Where the extension's JSON names buffer views (docs/schema/LAMBENT_transfer.schema.json), so that they can be carried
+// into another file, and told from those that anything else of the file uses.
+import { LambentError } from './errors.js';
+
+export const viewKeys: readonly string[] = [
+  'bufferView',
+  'clusterOf',
+  'coverage',
+  'fitErrors',
+  'frames',
+  'lengths',
+  'mapOf',
+  'maps',
+  'texels',
+  'valid',
+  'weights',
+];
+/** Numbers that name nothing. */
+export const plainKeys: readonly string[] = [
+  'bits',
+  'channels',
+  'clusters',
+  'cube',
+  'fov',
+  'grid',
+  'height',
+  'lobeCount',
+  'mapCount',
+  'order',
+  'rank',
+  'receivers',
+  'rows',
+  'version',
+  'width',
+];
+
+/**
+ * The extension without its parts, with place(v) for each buffer view v. Throws LambentError at a number of a name that
+ * is in neither list, since it could be a view.
+ */
+export function replaceViews(
+  extension: Readonly<Record<string, unknown>>,
+  place: (view: number) => number,
+): Record<string, unknown> {
+  const entry = ([key, value]: [string, unknown]): [string, unknown] => {
+    if (key === 'provenance' || key === 'extras') return [key, value];
+    if (typeof value !== 'number' || plainKeys.includes(key)) return [key, walk(value)];
+    if (!viewKeys.includes(key))
+      throw new LambentError(`holds a number "${key}", which this version does not know: is there a newer one?`);
+    return [key, place(value)];
+  };
+  const walk = (value: unknown): unknown => {
+    if (Array.isArray(value)) return value.map(walk);
+    return typeof value === 'object' && value !== null ? Object.fromEntries(Object.entries(value).map(entry)) : value;
+  };
+  return walk({ ...extension, parts: undefined }) as Record<string, unknown>;
+}
+
+interface Document {
+  bufferViews?: unknown;
+  accessors?: unknown;
+  images?: unknown;
+}
+
+const objects = (list: unknown): Record<string, unknown>[] =>
+  Array.isArray(list) ? list.filter((o): o is Record<string, unknown> => typeof o === 'object' && o !== null) : [];
+
+/**
+ * Whether views that the extension names are missing, or are those of accessors or images: tools that do not know the
+ * extension drop its views and number the others anew.
+ */
+export function isOutOfPlace(document: Document, extension: Readonly<Record<string, unknown>>): boolean {
+  const count = Array.isArray(document.bufferViews) ? document.bufferViews.length : 0,
+    taken = new Set([...objects(document.accessors), ...objects(document.images)].map((o) => o['bufferView']));
+  const isWrong = (view: unknown): boolean => typeof view === 'number' && (view >= count || taken.has(view));
+  const walk = (value: unknown): boolean => {
+    if (typeof value !== 'object' || value === null) return false;
+    return Object.entries(value).some(([key, inner]) =>
+      viewKeys.includes(key) || key === 'front' || key === 'back'
+        ? isWrong(inner) || walk(inner)
+        : key !== 'provenance' && key !== 'extras' && walk(inner),
+    );
+  };
+  return walk(extension);
+}
