@@ -38,7 +38,7 @@ add_test(NAME c_api COMMAND c_api ${lambent_golden})
 if(NOT LAMBENT_SANITIZE)  # which has an allocator of its own
   add_test(NAME relight_memory COMMAND relight_memory ${lambent_golden})
   add_test(NAME wasm COMMAND ${CMAKE_CURRENT_SOURCE_DIR}/scripts/wasm --if-there)
-  set_tests_properties(wasm PROPERTIES ENVIRONMENT LAMBENT_RELIGHT=$<TARGET_FILE:relight>)
+  set_tests_properties(wasm PROPERTIES ENVIRONMENT LAMBENT_RELIGHT=$<TARGET_FILE:relight> COST 500)
 endif()
 
 add_test(NAME include_arrows COMMAND ${CMAKE_CURRENT_SOURCE_DIR}/tests/include_arrows.sh ${CMAKE_CURRENT_SOURCE_DIR})
