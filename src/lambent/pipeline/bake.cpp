@@ -279,14 +279,9 @@ Result<Bake> begin(const BakeRequest& request, const BakePlan& plan, const Job& 
   start = Clock::now();
   auto tracer = Tracer::build(*scene, job.progress);
   if (!tracer) return tracer.error();
-  return Bake{request,
-              plan,
-              job,
-              std::move(*scene),
-              std::move(*placed),
-              std::move(*tracer),
-              load_seconds,
-              seconds_since(start)};
+  Bake b{request, plan, job, std::move(*scene), std::move(*placed), std::move(*tracer)};
+  b.load_seconds = load_seconds, b.build_seconds = seconds_since(start);
+  return b;
 }
 
 // Stages after the surfaces' own, in their order; each takes a dense store.
