@@ -1,5 +1,5 @@
 // Loading a scan: made sheets of half a million to eight million triangles as binary PLY without normals, in a
-// temporary folder. Processor time of the one thread that loads, the least of a few runs.
+// temporary folder. Processor time, the system's part of it too, the least of a few runs.
 #include "bench.h"
 
 #include <lambent/core/file.h>
