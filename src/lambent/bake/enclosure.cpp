@@ -72,7 +72,7 @@ std::vector<uint32_t> outermost_parts(const Scene& scene, const Tracer& tracer, 
 
 }  // namespace
 
-Enclosure find_enclosure(const Scene& scene, const Tracer& tracer, const Receivers& receivers) {
+Enclosure find_enclosure(const Scene& scene, const Tracer& tracer, const Receivers& receivers, Progress* progress) {
   const std::vector<uint32_t> owner = parts_of_receivers(scene, receivers);
   std::vector<std::atomic<bool>> sees(scene.parts.size());
   std::atomic<size_t> seeing{0};
@@ -82,9 +82,12 @@ Enclosure find_enclosure(const Scene& scene, const Tracer& tracer, const Receive
   const size_t n = receivers.count(), some = std::min(n, few);
   for (size_t k = 0; k < some; ++k) look(k * n / some);
   if (seeing >= 2) return {};
+  ProgressStage stage(progress, "ways out", n);
   parallel_for(n, 64, [&](size_t begin, size_t end) {
-    for (size_t i = begin; i < end; ++i) look(i);
+    for (size_t i = begin; i < end && !stage.cancelled(); ++i) look(i);
+    stage.advance(end - begin);
   });
+  if (stage.cancelled()) return {};
   if (seeing == 0) return {outermost_parts(scene, tracer, receivers), false};
   const auto part = uint32_t(std::find(sees.begin(), sees.end(), true) - sees.begin());
   const bool has_others = std::any_of(owner.begin(), owner.end(), [&](uint32_t p) { return p != part; });

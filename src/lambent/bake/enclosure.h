@@ -13,6 +13,8 @@ struct Enclosure {
 // Looks for a way out of the scene from every receiver (64 directions, cosine-distributed). Where no receiver has one,
 // what the ways outwards meet last; where those of one part alone have, that part, if its box holds all others. A few
 // receivers tell as a rule that there is nothing of the kind.
-Enclosure find_enclosure(const Scene& scene, const Tracer& tracer, const Receivers& receivers);
+// Empty when cancelled.
+Enclosure find_enclosure(const Scene& scene, const Tracer& tracer, const Receivers& receivers,
+                         Progress* progress = nullptr);
 
 }  // namespace lambent

@@ -21,7 +21,8 @@ TEST(Parse, NamesMayHoldEqualSigns) {
   ASSERT_TRUE(lamp);
   EXPECT_EQ(lamp->name, "a=b");
   EXPECT_EQ(lamp->color, Vec3(1, 0.5f, 0));
-  for (const char* wrong : {"=1,1,1", "a", "a=1,1", "a=1,-1,1"})
+  EXPECT_EQ(parse_named_color("a=0.5", "--lamp")->color, Vec3(0.5f));
+  for (const char* wrong : {"=1,1,1", "a", "a=", "a=1,", "a=1,1", "a=-1", "a=1,-1,1"})
     EXPECT_FALSE(parse_named_color(wrong, "--lamp")) << wrong;
 }
 

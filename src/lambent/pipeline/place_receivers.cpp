@@ -27,7 +27,7 @@ Result<PlacedReceivers> place_receivers(Scene& scene, const BakeRequest& request
 }
 
 void warn_if_enclosed(const Scene& scene, const Tracer& tracer, const Receivers& receivers, const Job& job) {
-  const Enclosure shell = find_enclosure(scene, tracer, receivers);
+  const Enclosure shell = find_enclosure(scene, tracer, receivers, job.progress);
   const std::vector<uint32_t>& parts = shell.parts;
   if (parts.empty()) return;
   constexpr size_t named = 3;
