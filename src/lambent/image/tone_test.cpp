@@ -18,7 +18,8 @@ TEST(Tone, BlackIsBlackAndMoreLightIsNoDarker) {
     float before = -1;
     for (float stops = -12; stops <= 12; stops += 0.25f) {
       const Vec3 c = shown(Vec3(std::exp2(stops)), display);
-      EXPECT_NEAR(c.x, c.y, 2e-3f), EXPECT_NEAR(c.x, c.z, 2e-3f);  // grey stays grey, to the matrices' digits
+      EXPECT_NEAR(c.x, c.y, 2e-3f);
+      EXPECT_NEAR(c.x, c.z, 2e-3f);  // grey stays grey, to the matrices' digits
       EXPECT_GE(c.x, before - 1e-6f) << "tone " << int(tone) << " at " << stops << " stops";
       EXPECT_LE(c.x, 1);
       before = c.x;
@@ -35,7 +36,9 @@ TEST(Tone, MiddleGreyIsWhereItsAuthorsPutIt) {
   EXPECT_NEAR(shown(Vec3(0.18f * 0.6f), {0, Tone::aces}).x, 0.1, 0.01);
   // Neutral takes off the 4 % that a dielectric's Fresnel term adds, and nothing else below 0.76 of what is left.
   const Vec3 c = shown(Vec3(0.6f, 0.3f, 0.1f), {0, Tone::neutral});
-  EXPECT_NEAR(c.x, 0.56f, 1e-6f), EXPECT_NEAR(c.y, 0.26f, 1e-6f), EXPECT_NEAR(c.z, 0.06f, 1e-6f);
+  EXPECT_NEAR(c.x, 0.56f, 1e-6f);
+  EXPECT_NEAR(c.y, 0.26f, 1e-6f);
+  EXPECT_NEAR(c.z, 0.06f, 1e-6f);
   // ... and a peak p of what is left becomes 1 - 0.24^2 / (p - 0.52).
   EXPECT_NEAR(shown(Vec3(4.04f), {0, Tone::neutral}).x, 1 - 0.24f * 0.24f / (4 - 0.52f), 1e-5f);
   EXPECT_EQ(shown(Vec3(0.25f, 0.5f, 2), {1, Tone::none}), Vec3(0.5f, 1, 1));
@@ -48,7 +51,8 @@ TEST(Tone, BrokenLightIsShownAsSomething) {
       for (Vec3 c : {Vec3(nan), Vec3(inf), Vec3(-inf), Vec3(-1, 2, nan), Vec3(3e38f), Vec3(inf, 0, -3)}) {
         const Vec3 seen = shown(c, {stops, tone});
         for (int k = 0; k < 3; ++k) {
-          EXPECT_GE(seen[k], 0), EXPECT_LE(seen[k], 1);
+          EXPECT_GE(seen[k], 0);
+          EXPECT_LE(seen[k], 1);
         }
       }
   for (Tone tone : tones)
@@ -80,7 +84,8 @@ TEST(Tone, ClippingCountsWhatAPngLoses) {
   Image image(4, 1);
   image.rgb = {Vec3(0.5f), Vec3(1.5f), Vec3(-0.1f), Vec3(0, 0, 3)};
   const Clipping none = clipping({&image, 1}, {});
-  EXPECT_EQ(none.white, 0.5), EXPECT_EQ(none.negative, 0.25);
+  EXPECT_EQ(none.white, 0.5);
+  EXPECT_EQ(none.negative, 0.25);
   EXPECT_EQ(clipping({&image, 1}, {-2, Tone::none}).white, 0);
   EXPECT_EQ(clipping({&image, 1}, {0, Tone::neutral}).white, 0) << "the curve keeps room above white";
   auto png = encode_png(image, {}, "x.png");
@@ -97,7 +102,8 @@ TEST(Tone, ParsesWhatOptionsSay) {
   image.rgb[0] = Vec3(0.7f);
   auto display = parse_display("auto", "agx", {&image, 1});
   ASSERT_TRUE(display);
-  EXPECT_NEAR(display->exposure, 0, 1e-5f), EXPECT_EQ(display->tone, Tone::agx);
+  EXPECT_NEAR(display->exposure, 0, 1e-5f);
+  EXPECT_EQ(display->tone, Tone::agx);
   EXPECT_EQ(parse_display("-2.5", "none", {})->exposure, -2.5f);
   for (const char* wrong : {"", "x", "1x", "nan", "inf", "101", "1e999", " 1"})
     EXPECT_EQ(parse_display(wrong, "none", {}).error().where, "--exposure") << wrong;
