@@ -17,6 +17,7 @@ expect() {
   shift 2
   "$tool" "$@" >stdout 2>stderr
   local got=$?
+  sed -i -E '/^[a-z ]+  [0-9.]+%(, .* left)?$/d' stderr  # progress, told every few seconds: machines may be slow
   [ $got -eq "$code" ] || { bad "exit $got, not $code: lambent $*: $(head -c 300 stderr)"; return; }
   if [ "$code" -ne 0 ]; then
     [ "$(wc -l <stderr)" -eq 1 ] || { bad "not one line: lambent $*: $(cat stderr)"; return; }
@@ -541,7 +542,7 @@ expect 1 'corner.obj' render corner.obj --env uniform:1 -o x.png
 echo 'v 0 0 0' >points.obj
 expect 1 'points.obj.*no triangles' bake points.obj -o x.glb
 printf 'v 0 0 0\nv 1 0 0\nv nan 0 1\nf 1 2 3\n' >nan.obj
-expect 1 'nan.obj:3' bake nan.obj -o x.glb
+expect 1 'nan.obj: no triangles: 1 faces use vertices that are not finite' bake nan.obj -o x.glb
 printf 'v 0 0 0\nv 1 0 0\nv 0 0 1\nf 1 2 9\n' >range.obj
 expect 1 'range.obj:4' bake range.obj -o x.glb
 echo '{"asset":{"version":"2.0"},"buffers":[{"uri":"../secret.bin","byteLength":12}]}' >escape.gltf

@@ -8,9 +8,8 @@ struct ImageDifference {
   size_t pixels = 0;        // counted: covered (alpha > 0) in either picture; all where neither has alpha
   double rmse = 0;          // root mean square error of linear RGB
   double relative_mse = 0;  // mean of (a - b)^2 / (b^2 + 0.01), linear RGB: b is the reference
-  double psnr =
-      0;  // decibels, of the displayed pictures (displayed() in image.h), peak 1; infinite if equal
-  double flip = 0;                // mean LDR-FLIP of the displayed pictures, 67 pixels a degree
+  double psnr = 0;          // decibels, of the displayed pictures (displayed() in image.h), peak 1; infinite if equal
+  double flip = 0;          // mean LDR-FLIP of the displayed pictures, 67 pixels a degree
   double mean_a = 0, mean_b = 0;  // mean luminance, linear: a ratio away from 1 is a factor, not noise
 };
 

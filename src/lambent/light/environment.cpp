@@ -2,7 +2,7 @@
 #include <lambent/core/parallel.h>
 #include <lambent/light/environment.h>
 
-#include <charconv>
+#include <cstdio>
 
 namespace lambent {
 namespace {
@@ -32,8 +32,8 @@ std::string pixels_with(size_t count, const char* what) {
 }
 
 std::string number_text(float value) {
-  char text[32];
-  return {text, std::to_chars(text, text + sizeof text, value, std::chars_format::general, 6).ptr};
+  char text[32];  // not std::to_chars, which the C++ library of WebAssembly has for integers alone
+  return {text, size_t(std::snprintf(text, sizeof text, "%.6g", double(value)))};
 }
 
 bool has_nan(const Vec3& c) { return std::isnan(c.x) || std::isnan(c.y) || std::isnan(c.z); }

@@ -14,6 +14,7 @@
 
 #include <charconv>
 #include <map>
+#include <set>
 
 namespace lambent {
 namespace {
@@ -244,6 +245,17 @@ Result<void> scale_lamps(Scene& scene, const BakeRequest& r) {
   return {};
 }
 
+// Viewers show them as they are; transfer knows surfaces that are lit.
+void warn_of_unlit(const Scene& scene, const Job& job) {
+  std::set<uint32_t> unlit;
+  for (const Part& part : scene.parts)
+    if (scene.materials[part.material].unlit) unlit.insert(part.material);
+  if (!unlit.empty())
+    job.warn(std::to_string(unlit.size()) + (unlit.size() == 1
+                                                 ? " unlit material is lit: a matte surface of its colour"
+                                                 : " unlit materials are lit: matte surfaces of their colour"));
+}
+
 }  // namespace
 
 Result<Scene> load_scene_of(const BakeRequest& r, const Job& job) {
@@ -273,6 +285,7 @@ Result<Scene> load_scene_of(const BakeRequest& r, const Job& job) {
   if (r.max_edge > 0)
     if (auto ok = split_long_edges(*scene, r.max_edge); !ok) return ok.error();
   for (const std::string& w : scene->warnings) job.warn(w);
+  warn_of_unlit(*scene, job);
   return scene;
 }
 

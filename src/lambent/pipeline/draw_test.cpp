@@ -173,7 +173,7 @@ TEST_F(Drawings, NoOptionIsLeftAsideInSilence) {
     for (const auto& option : draw_options()) {
       const std::string option_name = option.name;
       // The picture is written by draw_to_file(); other files have other tests.
-      if (option_name == "baked" || option_name == "output" || option_name == "exposure" ||
+      if (option_name == "baked" || option_name == "output" || option_name == "exposure" || option_name == "tone" ||
           option_name == "transfer-texture")
         continue;
       SCOPED_TRACE(std::string(draw_kind_names[int(kind)]) + ", --" + option_name);

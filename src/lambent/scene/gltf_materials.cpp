@@ -249,7 +249,7 @@ size_t texcoord_sets(const std::vector<GltfMaterial>& materials) {
 void read_textures(const GltfCheck& check, GltfDocument& document, const std::vector<GltfMaterial>& materials,
                    const std::vector<bool>& used, const std::vector<std::string>& image_problems, Scene& scene) {
   TextureReader reader(document, image_problems, scene);
-  size_t unknown = 0, bending = 0, unlit = 0, specular = 0;
+  size_t unknown = 0, bending = 0, specular = 0;
   GltfTold base_color, metallic_roughness, normal, transmission, emissive;
   // The scene is still good without a texture.
   auto read = [&](const GltfTextureUse& use, const char* what, GltfTold& told, int& texture, int& set,
@@ -269,7 +269,7 @@ void read_textures(const GltfCheck& check, GltfDocument& document, const std::ve
     const GltfMaterial& from = materials[i];
     Material& m = scene.materials[i];
     unknown += !from.known_alpha_mode, bending += from.bends_light;
-    unlit += m.unlit, specular += from.specular_textures;
+    specular += from.specular_textures;
     read(from.base_color, "base colour", base_color, m.base_color_texture, m.texcoord_set, m.uv_transform);
     read(from.metallic_roughness, "metallic-roughness", metallic_roughness, m.metallic_roughness_texture,
          m.metallic_roughness_set, m.metallic_roughness_transform);
@@ -289,8 +289,6 @@ void read_textures(const GltfCheck& check, GltfDocument& document, const std::ve
              " materials have an unknown alphaMode and are opaque");
   warn_count(scene, bending, " material with rough or thick transmission passes light straight on",
              " materials with rough or thick transmission pass light straight on");
-  warn_count(scene, unlit, " unlit material is lit: a matte surface of its colour",
-             " unlit materials are lit: matte surfaces of their colour");
   warn_count(scene, specular, " material is without the textures of KHR_materials_specular, which are not read",
              " materials are without the textures of KHR_materials_specular, which are not read");
 }
