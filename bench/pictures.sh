@@ -8,7 +8,8 @@ mkdir -p $out
 light="--env sky:elevation=30,azimuth=70,turbidity=3 --background none --spp 32"
 if [ -f "$data/meshes/CesiumMan.glb" ]; then
   $tool bake "$data/meshes/CesiumMan.glb" --transfer zonal --lobes 4 --samples 1024 -o $out/man.glb >&2
-  $tool render $out/man.glb --animation 0 --frames 0:1.6:0.4 $light --size 180x300 --tone none --exposure -1.6 -o $out/walk.png
+  $tool render $out/man.glb --animation 0 --frames 0:1.6:0.4 $light --size 180x300 --tone none --exposure -1.6 \
+    -o $out/walk.png
 else
   echo "skipped: no $data/meshes/CesiumMan.glb" >&2
 fi

@@ -13,21 +13,12 @@ using Json = nlohmann::json;
 
 namespace {
 
-const std::set<std::string> read_extensions{"EXT_mesh_gpu_instancing",
-                                            "EXT_meshopt_compression",
-                                            "EXT_texture_webp",
-                                            "KHR_draco_mesh_compression",
-                                            "KHR_lights_punctual",
-                                            "KHR_materials_emissive_strength",
-                                            "KHR_materials_ior",
-                                            "KHR_materials_specular",
-                                            "KHR_materials_transmission",
-                                            "KHR_materials_unlit",
-                                            "KHR_mesh_quantization",
-                                            "KHR_meshopt_compression",
-                                            "KHR_node_visibility",
-                                            "KHR_texture_transform",
-                                            "LAMBENT_transfer"};
+const std::set<std::string> read_extensions{
+    "EXT_mesh_gpu_instancing",    "EXT_meshopt_compression", "EXT_texture_webp",
+    "KHR_draco_mesh_compression", "KHR_lights_punctual",     "KHR_materials_emissive_strength",
+    "KHR_materials_ior",          "KHR_materials_specular",  "KHR_materials_transmission",
+    "KHR_materials_unlit",        "KHR_mesh_quantization",   "KHR_meshopt_compression",
+    "KHR_node_visibility",        "KHR_texture_transform",   "LAMBENT_transfer"};
 
 // Those that say where an image is, beside "source". Textures without another image are left out, and files may
 // require them.

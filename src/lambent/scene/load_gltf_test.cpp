@@ -499,7 +499,8 @@ TEST(LoadGltf, BrokenImagesCostNoMoreThanThemselves) {
   twice.json["materials"].push_back(twice.json["materials"][0]);
   twice.json["meshes"][0]["primitives"].push_back(primitive(twice));
   twice.json["meshes"][0]["primitives"][1]["material"] = 1;
-  EXPECT_EQ(warning(twice), "base colour texture not read: \"colours\" is neither PNG, JPEG nor WebP (and 1 more materials)");
+  EXPECT_EQ(warning(twice),
+            "base colour texture not read: \"colours\" is neither PNG, JPEG nor WebP (and 1 more materials)");
   Bytes cut = make_png(2, 2, 3, 8, four_colors);
   cut.resize(30);
   EXPECT_NE(warning(textured(cut)).find("\"colours\""), std::string::npos);
