@@ -1,8 +1,9 @@
 #!/usr/bin/env bash
-# pfstools 2.2.0 (Debian 12: 2.2.0-5+b1), pfsinrgbe, Radiance pictures whose rows and columns do not begin at the top left.
+# pfstools 2.2.0 (Debian 12: 2.2.0-5+b1), pfsinrgbe, Radiance pictures whose rows and columns do not begin at the top
+# left.
 #
-# Expected: the resolution line of a Radiance picture has eight forms ("-Y 2 +X 3", "+Y 2 +X 3", "+X 3 -Y 2", ...), which say
-# from which corner pixels are counted and which way they run first; a reader puts each pixel in its place.
+# Expected: the resolution line of a Radiance picture has eight forms ("-Y 2 +X 3", "+Y 2 +X 3", "+X 3 -Y 2", ...),
+# which say from which corner pixels are counted and which way they run first; a reader puts each pixel in its place.
 #
 # Seen: the signs and the order of the axes are read past. "+Y", rows from below, comes out as it would for "-Y": upside
 # down. "+X 3 -Y 2", columns first, comes out as a picture of 2 x 3 instead of 3 x 2. No warning.

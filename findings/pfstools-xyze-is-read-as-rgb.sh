@@ -1,11 +1,11 @@
 #!/usr/bin/env bash
 # pfstools 2.2.0 (Debian 12: 2.2.0-5+b1), pfsinrgbe, a Radiance picture of FORMAT=32-bit_rle_xyze.
 #
-# Expected: pixels of such a picture are CIE X, Y and Z. pfs streams hold X, Y and Z too, so that they pass through: a pixel
-# of X = Y = Z = 1 stays that.
+# Expected: pixels of such a picture are CIE X, Y and Z. pfs streams hold X, Y and Z too, so that they pass through: a
+# pixel of X = Y = Z = 1 stays that.
 #
-# Seen: the FORMAT line is read past, and the three numbers are taken for red, green and blue and turned into X, Y, Z once
-# more: 0.9505, 1, 1.0888, the white of D65. No warning. Colours of maps made by Radiance's ra_xyze shift.
+# Seen: the FORMAT line is read past, and the three numbers are taken for red, green and blue and turned into X, Y, Z
+# once more: 0.9505, 1, 1.0890, the white of D65. No warning. Colours of maps made by Radiance's ra_xyze shift.
 set -euo pipefail
 folder=$(mktemp -d)
 trap 'rm -rf "$folder"' EXIT
