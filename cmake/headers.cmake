@@ -15,6 +15,7 @@ set(lambent_relight_headers
   lambent/core/result.h
   lambent/core/vec.h
   lambent/image/image.h
+  lambent/image/tone.h
   lambent/light/cube_light.h
   lambent/light/environment.h
   lambent/light/project.h

@@ -66,6 +66,21 @@ expect 0 'covered pixels of .* \(--all counts every one\)' compare a.exr b.exr
 expect 0 '"pixels": ?1536[,}]?$' compare a.exr b.exr --all --json
 expect 1 'no map of the whole sphere: 2:1 is a lat-long map' env difference.png
 alike 35 "baked and path-traced corners" a.exr b.exr
+# A bake judged in one page, which names nothing outside itself; under light that the bands hold all of it agrees.
+expect 0 '"psnr": (3[0-9]|[4-9][0-9])' check corner.obj --max-edge 0.2 --samples 256 --env uniform:1,0.5,0.25 \
+  --picture 48x32 --paths 256 -o check.html --json
+[ "$(grep -o 'src="data:image/png;base64,' check.html | wc -l)" -eq 5 ] && ! grep -qE '(src|href)="[^d]' check.html &&
+  ok || bad "the page of check is not whole"
+expect 0 'sharper than they are' check corner.obj --samples 64 --env sky:elevation=10 --picture 16x16 --paths 16 \
+  -o check.html
+expect 2 'transfer: lightmap' check corner.obj --transfer lightmap --env uniform:1 -o check.html
+expect 1 'must end in .html' check corner.obj --env uniform:1 -o check.png
+# Exposure and tone change a PNG alone.
+expect 0 'stops, tone neutral' render corner.glb --env uniform:1 --size 16x16 --spp 1 -o shown.png
+for other in '--exposure 1' '--exposure 0' '--tone agx' '--tone aces' '--tone none'; do
+  expect 0 'stops, tone' render corner.glb --env uniform:1 --size 16x16 --spp 1 $other -o other.png
+  cmp -s shown.png other.png && bad "$other has no effect" || ok
+done
 expect 0 'relit' render corner.glb --env sky:elevation=40,azimuth=20 --env-rotate 30,10,5 --window auto --size 40x40 \
   -o sky.png
 # Even light has 2 sqrt(pi) in its mean, and in the others what texels of 256 x 128 and float leave.

@@ -14,6 +14,7 @@ void add_render(CLI::App& app, Run& run);
 void add_relight(CLI::App& app, Run& run);
 void add_reference(CLI::App& app, Run& run);
 void add_compare(CLI::App& app, Run& run);
+void add_check(CLI::App& app, Run& run);
 void add_compress(CLI::App& app, Run& run);
 void add_patch(CLI::App& app, Run& run);
 void add_inspect(CLI::App& app, Run& run);

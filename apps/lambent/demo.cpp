@@ -1,14 +1,13 @@
 #include "commands.h"
 #include "options.h"
+#include "truth.h"
 
 #include <lambent/bake/bake.h>
 #include <lambent/baked/baked_file.h>
 #include <lambent/core/file.h>
-#include <lambent/image/compare.h>
 #include <lambent/light/project.h>
 #include <lambent/light/sky.h>
 #include <lambent/pipeline/version.h>
-#include <lambent/reference/path_tracer.h>
 #include <lambent/relight/relight.h>
 #include <lambent/render/render.h>
 #include <lambent/scene/procedural.h>
@@ -44,22 +43,6 @@ struct Row {
   double relight_ms, reference_seconds;
 };
 
-// The mean of two independent pictures of half the paths each. Their distance from each other is twice the mean's
-// distance from the truth, 6 dB, so it tells the noise.
-Result<Image> trace_twice(const Scene& scene, const Environment& env, const Camera& camera, ReferenceOptions options,
-                          Progress& progress, const Display& display, double* noise_psnr) {
-  options.spp = std::max(1, options.spp / 2);
-  auto a = path_trace(scene, env, camera, options, &progress);
-  if (!a) return a.error();
-  options.seed += 1;
-  auto b = path_trace(scene, env, camera, options, &progress);
-  if (!b) return b.error();
-  auto apart = compare_images(a->image, b->image, display);
-  if (!apart) return apart.error();
-  if (noise_psnr) *noise_psnr = apart->psnr + 20 * std::log10(2.0);
-  return mean_of(a->image, b->image);
-}
-
 // What the hours share.
 struct Courtyard {
   const Scene& scene;
@@ -93,15 +76,16 @@ Result<Row> draw_hour(const DemoCommand& o, const Courtyard& yard, const Hour& h
   truth.width = o.width, truth.height = o.height, truth.spp = o.spp, truth.bounces = options.bounces,
   truth.background = false;
   const auto traced = Clock::now();
-  auto same_light = trace_twice(scene, smooth, camera, truth, progress, display, &row.noise_psnr);
+  auto same_light = trace_truth(scene, smooth, camera, truth, display, progress);
   if (!same_light) return same_light.error();
   row.reference_seconds = seconds_since(traced);
-  auto full_light = trace_twice(scene, *env, camera, truth, progress, display, nullptr);
+  auto full_light = trace_truth(scene, *env, camera, truth, display, progress);
   if (!full_light) return full_light.error();
-  auto d6 = compare_images(*picture, *same_light, display), dsky = compare_images(*picture, *full_light, display);
+  auto d6 = compare_images(*picture, same_light->image, display),
+       dsky = compare_images(*picture, full_light->image, display);
   if (!d6) return d6.error();
   if (!dsky) return dsky.error();
-  row.order6 = *d6, row.sky = *dsky;
+  row.order6 = *d6, row.sky = *dsky, row.noise_psnr = same_light->noise_psnr;
 
   // The pictures to look at have the sky behind them.
   RenderOptions shown{o.width * 3 / 2, o.height * 3 / 2, 32, &*env};
@@ -111,9 +95,9 @@ Result<Row> draw_hour(const DemoCommand& o, const Courtyard& yard, const Hour& h
   for (Vec3& c : shown_picture.rgb) c = lambent::shown(c, display);
   const std::pair<std::string, Image> files[] = {
       {"relit_" + row.name, std::move(*pretty)},
-      {"reference_" + row.name, *same_light},
-      {"reference_sky_" + row.name, *full_light},
-      {"error_" + row.name, difference_picture(*picture, *same_light, display)}};
+      {"reference_" + row.name, same_light->image},
+      {"reference_sky_" + row.name, full_light->image},
+      {"error_" + row.name, difference_picture(*picture, same_light->image, display)}};
   for (const auto& [name, image] : files) {
     // Error maps are already pictures of displayed values.
     if (auto ok = save_image(o.at(name + ".png"), image, name.starts_with("error") ? Display() : display); !ok)

@@ -40,12 +40,8 @@ int run_env(Context& context, const EnvCommand& o, const CLI::App& command) {
   const auto window = apply_sh_window(o.window, light);
 
   // How much of the environment's power lies within the bands: |projection|^2 / |environment|^2.
-  double all = 0, kept = 0;
-  for (int y = 0; y < env->image.height; ++y)
-    for (int x = 0; x < env->image.width; ++x) {
-      const Vec3 c = env->image.at(x, y);
-      all += double(dot(c, c)) * texel_solid_angle(y, env->image.width, env->image.height);
-    }
+  const double all = squared_radiance(*env);
+  double kept = 0;
   for (Vec3 c : light) kept += double(dot(c, c));
   const auto converted = convert_sh(light, *parse_sh_convention(o.convention));
   if (context.json) {

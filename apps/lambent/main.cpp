@@ -24,6 +24,7 @@ int main(int argc, char** argv) {
   tool::add_relight(app, run);
   tool::add_reference(app, run);
   tool::add_compare(app, run);
+  tool::add_check(app, run);
   tool::add_compress(app, run);
   tool::add_patch(app, run);
   tool::add_inspect(app, run);

@@ -169,4 +169,14 @@ Environment reconstruct_environment(const DirectionalBasis& basis, std::span<con
   return env;
 }
 
+double squared_radiance(const Environment& env) {
+  double sum = 0;
+  for (int y = 0; y < env.image.height; ++y)
+    for (int x = 0; x < env.image.width; ++x) {
+      const Vec3 c = env.image.at(x, y);
+      sum += double(dot(c, c)) * texel_solid_angle(y, env.image.width, env.image.height);
+    }
+  return sum;
+}
+
 }  // namespace lambent

@@ -25,4 +25,8 @@ Environment reconstruct_environment(std::span<const Vec3> light, int width = 102
 // whose texels are no wider than half the standard deviation of the sharpest lobe, from 1024 to 4096.
 Environment reconstruct_environment(const DirectionalBasis& basis, std::span<const Vec3> light, int width = 0);
 
+// The integral of the squared radiance over the sphere, channels summed: of an environment within the bands, what they
+// keep of it.
+double squared_radiance(const Environment& env);
+
 }  // namespace lambent
