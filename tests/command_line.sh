@@ -623,5 +623,22 @@ wait $pid
 absent interrupted.glb
 [ -z "$(ls interrupted.glb.* 2>/dev/null)" ] && ok || bad "an interrupted bake left a temporary"
 
+# While it still reads: at once, in one line.
+{
+  printf 'ply\nformat ascii 1.0\nelement vertex 600000\nproperty float x\nproperty float y\nproperty float z\n'
+  printf 'element face 200000\nproperty list uchar int vertex_indices\nend_header\n'
+  awk 'BEGIN { for (i = 0; i < 600000; ++i) print i % 3, int(i / 3) % 500, i % 7
+               for (i = 0; i < 200000; ++i) print 3, 3 * i, 3 * i + 1, 3 * i + 2 }'
+} >slow.ply
+"$tool" inspect slow.ply >/dev/null 2>stderr &
+pid=$!
+sleep 0.1
+kill -INT $pid 2>/dev/null
+wait $pid
+got=$?
+# A machine may be quick enough to be done.
+[ $got -eq 0 ] ||
+  { [ $got -eq 1 ] && grep -qx 'lambent: cancelled' stderr && ok || bad "interrupted while reading: $got"; }
+
 echo "$passed passed, $failures failed"
 [ $failures -eq 0 ]

@@ -61,6 +61,7 @@ Result<void> write_folder(const fs::path& target, const WebFiles& files, const P
 }
 
 int run_export(Context& context, const ExportCommand& o) {
+  context.cleans_up = true;
   if (!o.three.empty()) return export_lightmap(context, o.web.baked, LightmapTarget::three, o.three);
   if (!o.godot.empty()) return export_lightmap(context, o.web.baked, LightmapTarget::godot, o.godot);
   fs::path target = fs::path(o.folder).lexically_normal();

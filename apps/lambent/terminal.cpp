@@ -5,6 +5,7 @@
 #include <fmt/format.h>
 #include <unistd.h>
 
+#include <atomic>
 #include <chrono>
 #include <csignal>
 #include <cstdio>
@@ -70,21 +71,33 @@ class ProgressLog {
   Clock::time_point started_ = Clock::now(), said_ = Clock::now();
 };
 
-Progress* interrupted_progress = nullptr;
+Context* interrupted = nullptr;
 std::sig_atomic_t interruptions = 0;
+std::atomic<bool> any_stage{false};  // has begun; before, files are read, which hears nothing
 
 extern "C" void on_interrupt(int) {
-  if (interrupted_progress) interrupted_progress->cancel();
-  if (++interruptions > 1) {  // asked twice: leave now, but leave nothing half-written
+  if (interrupted) interrupted->progress.cancel();
+  const bool reading = interrupted && !interrupted->cleans_up && !any_stage;
+  if (++interruptions > 1 || reading) {  // leave now, but leave nothing half-written
     remove_unfinished_files();
+    constexpr char said[] = "lambent: cancelled\n";
+    if (reading && ::write(2, said, sizeof said - 1) < 0) ::_exit(failure);
     ::_exit(failure);
   }
 }
 
+// Tells the handler above that there is something that hears.
+Progress::Report heard(Progress::Report report) {
+  return [report = std::move(report)](const std::string& stage, double fraction) {
+    any_stage = true;
+    report(stage, fraction);
+  };
+}
+
 }  // namespace
 
-Context::Context() : progress(::isatty(2) ? Progress::Report(ProgressLine()) : Progress::Report(ProgressLog())) {
-  interrupted_progress = &progress;
+Context::Context() : progress(heard(::isatty(2) ? Progress::Report(ProgressLine()) : Progress::Report(ProgressLog()))) {
+  interrupted = this;
   struct sigaction action = {};
   action.sa_handler = on_interrupt;
   ::sigaction(SIGINT, &action, nullptr);

@@ -18,6 +18,7 @@ inline constexpr int success = 0, failure = 1, bad_usage = 2;
 struct Context {
   bool json = false;
   int threads = 0;
+  bool cleans_up = false;  // the command removes what it made when it is cancelled; others end at once while they read
   Progress progress;
   Context();  // progress goes to stderr, drawn over itself on a terminal; Ctrl-C and SIGTERM cancel it
 };

@@ -31,6 +31,7 @@ void open_browser(const std::string& address) {
 }
 
 int run_view(Context& context, const ViewCommand& o) {
+  context.cleans_up = true;
   auto files = web_files(o.web);
   if (!files) return fail(files.error());
   httplib::Server server;
