@@ -17,7 +17,7 @@ struct Image;
 // Neutral, which leaves colours below 0.76 as they are but for a Fresnel's 4 %.
 enum class Tone : uint8_t { none, aces, agx, neutral };
 inline constexpr const char* tone_names = "neutral|agx|aces|none";
-
+// How radiance is shown.
 struct Display {
   float exposure = 0;  // stops
   Tone tone = Tone::none;
