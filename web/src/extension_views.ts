@@ -35,7 +35,8 @@ export const plainKeys: readonly string[] = [
 ];
 
 /**
- * The extension without its parts, with place(v) for each buffer view v. Throws LambentError at a number of a name that
+ * The extension without its parts and without what it says of the document that it was written into, with place(v) for
+ * each buffer view v. Throws LambentError at a number of a name that
  * is in neither list, since it could be a view.
  */
 export function replaceViews(
@@ -53,11 +54,12 @@ export function replaceViews(
     if (Array.isArray(value)) return value.map(walk);
     return typeof value === 'object' && value !== null ? Object.fromEntries(Object.entries(value).map(entry)) : value;
   };
-  return walk({ ...extension, parts: undefined }) as Record<string, unknown>;
+  return walk({ ...extension, parts: undefined, written: undefined }) as Record<string, unknown>;
 }
 
 interface Document {
   bufferViews?: unknown;
+  buffers?: unknown;
   accessors?: unknown;
   images?: unknown;
 }
@@ -66,8 +68,8 @@ const objects = (list: unknown): Record<string, unknown>[] =>
   Array.isArray(list) ? list.filter((o): o is Record<string, unknown> => typeof o === 'object' && o !== null) : [];
 
 /**
- * Whether views that the extension names are missing, or are those of accessors or images: tools that do not know the
- * extension drop its views and number the others anew.
+ * Whether the document has other views or bytes than it was written with, or views that the extension names are missing,
+ * or are those of accessors or images: tools that do not know the extension drop its views and number the others anew.
  */
 export function isOutOfPlace(document: Document, extension: Readonly<Record<string, unknown>>): boolean {
   const count = Array.isArray(document.bufferViews) ? document.bufferViews.length : 0,
@@ -81,5 +83,8 @@ export function isOutOfPlace(document: Document, extension: Readonly<Record<stri
         : key !== 'provenance' && key !== 'extras' && walk(inner),
     );
   };
-  return walk(extension);
+  const written = objects([extension['written']])[0] ?? {},
+    bytes = objects(document.buffers)[0]?.['byteLength'],
+    differs = (stated: unknown, found: unknown): boolean => typeof stated === 'number' && stated !== found;
+  return differs(written['bufferViews'], count) || differs(written['byteLength'], bytes) || walk(extension);
 }

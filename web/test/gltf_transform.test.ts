@@ -94,7 +94,8 @@ describe('the views of the extension', () => {
     };
     visit(schema);
     expect([...views].sort()).toEqual([...viewKeys, 'front'].sort());
-    for (const name of numbers) expect([...plainKeys, 'node', 'primitive', 'back' /* as front */]).toContain(name);
+    const others = ['node', 'primitive', 'back' /* as front */, 'bufferViews', 'byteLength' /* of the document */];
+    for (const name of numbers) expect([...plainKeys, ...others]).toContain(name);
   });
 
   it('are refused where they may have a new name', () => {
