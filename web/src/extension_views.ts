@@ -68,8 +68,9 @@ const objects = (list: unknown): Record<string, unknown>[] =>
   Array.isArray(list) ? list.filter((o): o is Record<string, unknown> => typeof o === 'object' && o !== null) : [];
 
 /**
- * Whether the document has other views or bytes than it was written with, or views that the extension names are missing,
- * or are those of accessors or images: tools that do not know the extension drop its views and number the others anew.
+ * Whether the document has other views or bytes than it was written with, or views that the extension names are
+ * missing, or are those of accessors or images: tools that do not know the extension drop its views and number the
+ * others anew.
  */
 export function isOutOfPlace(document: Document, extension: Readonly<Record<string, unknown>>): boolean {
   const count = Array.isArray(document.bufferViews) ? document.bufferViews.length : 0,
