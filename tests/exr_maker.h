@@ -62,7 +62,7 @@ struct Maker {
           char* p = plane.data() + (size_t(y) * columns + size_t(x)) * size;
           float v = value(c, x, y);
           half h(v);
-          uint32_t u = uint32_t(v);
+          uint32_t u = channel.type == Imf::UINT ? uint32_t(v) : 0;
           std::memcpy(p,
                       channel.type == Imf::HALF   ? static_cast<void*>(&h)
                       : channel.type == Imf::UINT ? static_cast<void*>(&u)

@@ -12,8 +12,8 @@ export const browserPath = process.env['CHROMIUM'] ?? '/usr/bin/chromium';
 export const haveBrowser = existsSync(browserPath);
 if (!haveBrowser) console.warn(`skipped: there is no ${browserPath}`);
 
-export const launch = (): Promise<Browser> =>
-  chromium.launch({
+export async function launch(): Promise<Browser> {
+  const browser = await chromium.launch({
     executablePath: browserPath,
     args: [
       '--no-sandbox',
@@ -25,6 +25,15 @@ export const launch = (): Promise<Browser> =>
       '--no-first-run',
     ],
   });
+  // Half a minute, which is what pages wait for by themselves, is too little beside a build on two cores.
+  const newPage = browser.newPage.bind(browser);
+  browser.newPage = async (options) => {
+    const page = await newPage(options);
+    page.setDefaultTimeout(150_000);
+    return page;
+  };
+  return browser;
+}
 
 export interface Server {
   address: string;

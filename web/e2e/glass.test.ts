@@ -3,7 +3,7 @@ import { writeFileSync } from 'node:fs';
 import { join } from 'node:path';
 import type { Browser } from 'playwright-core';
 import { afterAll, beforeAll, describe, expect, it } from 'vitest';
-import { haveTool, lambent, makeFolder, writeLopsidedHdr } from '../test/tool.ts';
+import { haveTool, lambent, makeFolder, renderLinear, writeLopsidedHdr } from '../test/tool.ts';
 import { haveBrowser, launch, open, psnr, serve, type Server } from './browser.ts';
 
 const camera = '0.5,1.6,6,0,1,0,40';
@@ -125,7 +125,7 @@ describe.skipIf(!haveTool || !haveBrowser)('glass', () => {
     await page.close();
     expect(await server.stop()).toBe(0);
     const view = ['--camera', camera, '--size', '480x360', '--spp', '256'];
-    lambent('render', at(`${name}.glb`), '--env', at('light.hdr'), ...view, '-o', at(`${name}_render.png`));
+    renderLinear(at(`${name}.glb`), '--env', at('light.hdr'), ...view, '-o', at(`${name}_render.png`));
     const db = psnr(at(`${name}_page.png`), at(`${name}_render.png`));
     console.log(`${name}: ${db.toFixed(1)} dB (${folder})`);
     return db;

@@ -30,7 +30,7 @@ const Bytes colours = {200, 10, 20, 30, 150, 40, 50, 60, 250, 255, 255, 0};
 // Hills with a material; images and textures are added.
 Builder dressed(const Json& material) {
   Builder b = Hills().plain();
-  b.json["materials"] = {material};
+  b.json["materials"] = Json::array({material});
   b.json["meshes"][0]["primitives"][0]["material"] = 0;
   return b;
 }
@@ -219,8 +219,9 @@ TEST(GltfExtensions, TransformsOfEverySlotAreTheSameAsMovedCoordinates) {
                 {"emissiveTexture", slot},
                 {"emissiveFactor", {1, 1, 1}}};
   };
-  moved.json["materials"] = {material({{"index", 0}, {"texCoord", 1}})};
-  turned.json["materials"] = {material({{"index", 0}, {"extensions", {{"KHR_texture_transform", transform}}}})};
+  moved.json["materials"] = Json::array({material({{"index", 0}, {"texCoord", 1}})});
+  turned.json["materials"] =
+      Json::array({material({{"index", 0}, {"extensions", {{"KHR_texture_transform", transform}}}})});
   const Scene a = loaded(moved), b = loaded(turned);
   EXPECT_EQ(b.warnings, Lines());
   constexpr float tolerance = 1e-4f;  // of coordinates rounded to floats, over texels half a unit wide

@@ -299,7 +299,7 @@ TEST(LoadGltf, WhatLetsLightPass) {
   auto with = [](nlohmann::json material) {
     Builder b = triangle();
     primitive(b)["material"] = 0;
-    b.json["materials"] = {std::move(material)};
+    b.json["materials"] = nlohmann::json::array({std::move(material)});
     return b;
   };
   nlohmann::json glass = {{"alphaMode", "MASK"},
