@@ -316,5 +316,18 @@ TEST(LoadPly, DataFile) {
   EXPECT_EQ(test::two_sided_count(*scene), 0u);
 }
 
+// As the nearest byte that there is: 0 and 255.
+TEST(LoadPly, BytesOfTextsAreKeptWithinBytes) {
+  const Scene s = must_load(
+      "ply\nformat ascii 1.0\nelement vertex 3\nproperty float x\nproperty float y\nproperty float z\n"
+      "property uchar red\nproperty uchar green\nproperty uchar blue\nelement face 1\n"
+      "property list uchar int vertex_indices\nend_header\n"
+      "0 0 0 1e300 -1e300 255\n1 0 0 256 -1 0\n0 1 0 255 0 0\n3 0 1 2\n");
+  ASSERT_EQ(s.colors.size(), 3u);
+  EXPECT_EQ(s.colors[0], Vec3(1, 0, 1));
+  EXPECT_EQ(s.colors[1], Vec3(1, 0, 0));
+  EXPECT_EQ(s.colors[2], Vec3(1, 0, 0));
+}
+
 }  // namespace
 }  // namespace lambent

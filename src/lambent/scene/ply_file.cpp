@@ -7,6 +7,7 @@
 #include <fmt/format.h>
 
 #include <bit>
+#include <cmath>
 #include <cstring>
 
 namespace lambent {
@@ -179,9 +180,11 @@ class PlyBody {
     bool encoded = false;
     std::vector<float> bytes;  // linear values of the 256 bytes
 
+    // Texts may say anything of a byte.
+    static uint8_t byte_of(double v) { return uint8_t(std::fmin(std::fmax(v, 0.0), 255.0)); }
     float linear(float share) const { return encoded ? srgb_to_linear(share) : share; }
     Vec3 operator()(double r, double g, double b) const {
-      if (!bytes.empty()) return {bytes[uint8_t(r)], bytes[uint8_t(g)], bytes[uint8_t(b)]};
+      if (!bytes.empty()) return {bytes[byte_of(r)], bytes[byte_of(g)], bytes[byte_of(b)]};
       Vec3 c = clamp_color(r * scale, g * scale, b * scale);
       return {linear(c.x), linear(c.y), linear(c.z)};
     }
@@ -326,7 +329,7 @@ class PlyBody {
   bool add_corners(const char* values, uint64_t count, double& bad) {
     for (uint64_t k = 0; k < count; ++k) {
       const T value = reader_.template typed_at<T>(values + k * sizeof(T));
-      if (!(value >= 0 && uint64_t(value) < vertex_count_)) return bad = double(value), false;
+      if (!(value >= 0 && double(value) < double(vertex_count_))) return bad = double(value), false;
       mesh_.corners.push_back(uint32_t(value));
     }
     return true;
