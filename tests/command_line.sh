@@ -68,12 +68,16 @@ expect 1 'no map of the whole sphere: 2:1 is a lat-long map' env difference.png
 alike 35 "baked and path-traced corners" a.exr b.exr
 # A bake judged in one page, which names nothing outside itself; under light that the bands hold all of it agrees.
 expect 0 '"psnr": (3[0-9]|[4-9][0-9])' check corner.obj --max-edge 0.2 --samples 256 --env uniform:1,0.5,0.25 \
-  --picture 48x32 --paths 256 -o check.html --json
+  --size 48x32 --paths 256 -o check.html --json
 [ "$(grep -o 'src="data:image/png;base64,' check.html | wc -l)" -eq 5 ] && ! grep -qE '(src|href)="[^d]' check.html &&
   ok || bad "the page of check is not whole"
-expect 0 'sharper than they are' check corner.obj --samples 64 --env sky:elevation=10 --picture 16x16 --paths 16 \
+expect 0 'sharper than they are' check corner.obj --samples 64 --env sky:elevation=10 --size 16x16 --paths 16 \
   -o check.html
 expect 2 'transfer: lightmap' check corner.obj --transfer lightmap --env uniform:1 -o check.html
+for option in '--fix-light uniform:1' '--fix-view auto' '--shadows off' '--membrane 0.5'; do
+  expect 2 'not expected' check corner.obj $option --env uniform:1 -o check.html
+done
+expect 2 '^lambent: --size' check corner.obj --samples 16 --env uniform:1 --size 0x9 -o check.html
 expect 1 'must end in .html' check corner.obj --env uniform:1 -o check.png
 # Exposure and tone change a PNG alone.
 expect 0 'stops, tone neutral' render corner.glb --env uniform:1 --size 16x16 --spp 1 -o shown.png

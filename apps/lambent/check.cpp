@@ -14,6 +14,7 @@
 
 #include <algorithm>
 #include <chrono>
+#include <set>
 
 namespace lambent::tool {
 namespace {
@@ -257,13 +258,17 @@ int run_check(Context& context, const CheckCommand& o) {
 }  // namespace
 
 void add_check(CLI::App& app, Run& run) {
+  // What the references could not answer to: light or view fixed in the bake, and light that takes other ways than
+  // theirs. `size` is of the pictures.
+  static const std::set<std::string> left_out{"scene", "output",  "fix-light",  "fix-view", "size",
+                                              "spp",   "shadows", "subsurface", "membrane", "sky"};
   auto o = std::make_shared<CheckCommand>();
   CLI::App* c = app.add_subcommand("check", "Bake a scene and judge it by path tracing, in one page");
   c->add_option("scene", o->request.scene, "Scene: .gltf, .glb, .obj or .ply")->required();
   o->light.add_to(*c);
   c->add_option("--camera", o->camera, "EX,EY,EZ,TX,TY,TZ,FOV: eye, target, vertical degrees; or auto")
       ->capture_default_str();
-  c->add_option("--picture", o->size, "Size of the pictures, WIDTHxHEIGHT pixels")->capture_default_str();
+  c->add_option("--size", o->size, "Size of the pictures, WIDTHxHEIGHT pixels")->capture_default_str();
   c->add_option("--paths", o->paths, "Paths a pixel of the references")
       ->check(CLI::Range(2, 1 << 20))
       ->capture_default_str();
@@ -272,7 +277,7 @@ void add_check(CLI::App& app, Run& run) {
       ->capture_default_str();
   c->add_option("-o,--output", o->output, "Page to write: .html, with all in it")->required();
   add_table(*c, bake_options(), o->request, o->request.given,
-            [](const std::string& name) { return name != "scene" && name != "output"; });
+            [](const std::string& name) { return !left_out.contains(name); });
   c->callback([o, &run] { run = [o](Context& context) { return run_check(context, *o); }; });
 }
 
