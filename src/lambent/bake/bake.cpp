@@ -2,13 +2,17 @@
 // so X_k is the transfer of up to k bounces. It is also the radiosity equation's Jacobi step.
 #include <lambent/bake/bake.h>
 #include <lambent/bake/columns.h>
+#include <lambent/bake/denoise.h>
 #include <lambent/bake/lobes.h>
 #include <lambent/bake/operator.h>
 #include <lambent/bake/solve.h>
 #include <lambent/core/parallel.h>
 #include <lambent/core/pool.h>
+#include <lambent/core/random.h>
 
 #include <chrono>
+#include <cmath>
+#include <optional>
 
 namespace lambent {
 namespace {
@@ -17,12 +21,16 @@ double seconds_since(std::chrono::steady_clock::time_point start) {
   return std::chrono::duration<double>(std::chrono::steady_clock::now() - start).count();
 }
 
+// Some 4 % of the error, where it is spread as in our scenes.
+constexpr size_t certified_places = 1024;
+
 size_t row_width(size_t coefficients, int channels) { return pad_lanes(coefficients * size_t(channels)); }
 
-// Solution vectors: T0, X and the next X; T0 of half the rays at the checked receivers.
-size_t solution_bytes(size_t receivers, size_t coefficients, int channels, int sky_channels = 1) {
-  const size_t sky = coefficients * size_t(sky_channels);
-  return 4 * (receivers * (sky + 2 * row_width(coefficients, channels)) + checked_count(receivers) * sky);
+// Solution vectors: T0, X, the next X and that denoised.
+size_t solution_bytes(size_t receivers, size_t coefficients, int channels, int sky_channels, const BakeOptions& o) {
+  const size_t width = row_width(coefficients, channels);
+  return 4 * receivers *
+         (coefficients * size_t(sky_channels) + (o.bounces > 0 ? 2 : 1) * width + (o.denoise ? width : 0));
 }
 
 // Direction tables, corner maps and the scratch of every thread; an upper estimate.
@@ -47,18 +55,16 @@ struct Baker {
   size_t harmonics() const { return setup.coefficients(); }
   size_t coefficients() const { return harmonics() + lobes.count(); }
   size_t sky_width() const { return coefficients() * size_t(setup.sky_channels); }
+  size_t width() const { return row_width(coefficients(), setup.channels); }
   size_t rays_each() const { return size_t(options.samples) + size_t(lobes.rays) * lobes.sharp.size(); }
-  bool has_halves() const { return setup.sets.half < size_t(setup.sets.samples); }
 
   // The columns of the sharp lobes, beside those that the fan has filled.
   void trace_sharp_lobes(size_t first, size_t count, const GatherSky& sky) {
     if (lobes.sharp.empty()) return;
     auto rays = lobe_rays.borrow();
     for (size_t r = first; r < first + count && !is_cancelled(progress); ++r) {
-      float* half = checked_row(sky, first, r);
       trace_lobes(lobes, setup.tracer, receivers.origins[r], receivers.normals[r], r, *rays,
-                  sky.rows + (r - first) * sky.stride + harmonics(), half ? half + harmonics() : nullptr,
-                  coefficients());
+                  sky.rows + (r - first) * sky.stride + harmonics(), nullptr, coefficients());
     }
   }
 
@@ -84,55 +90,51 @@ struct Baker {
     return std::move(out.transfer);
   }
 
+  // A row of T0, the same in every channel but for coloured glass, as one of X: [coefficient][channel].
+  void expand(const float* t, float* x) const {
+    const size_t C = coefficients(), channels = size_t(setup.channels);
+    for (size_t k = 0; k < C; ++k)
+      for (size_t c = 0; c < channels; ++c) x[k * channels + c] = t[setup.sky_channel(c) * C + k];
+    std::fill(x + C * channels, x + width(), 0.0f);
+  }
+  Transfer store(const float* x) const {
+    return store_columns(options.light(), x, 1, setup.channels, n(), width(), options.precision);
+  }
+
   Result<Transfer> direct() {
     const auto start = std::chrono::steady_clock::now();
-    WritableTransfer out = make_transfer(options.light(), 1, setup.sky_channels, n(), options.precision);
+    const size_t W = sky_width();
+    AlignedVector<float> x(n() * width());
     std::vector<uint8_t> buried(n());
-    ErrorSums errors(n());
     {
       ProgressStage stage(progress, "tracing", n());
       parallel_for(n(), gather_block, [&](size_t begin, size_t end) {
         if (stage.cancelled()) return;
-        std::vector<float> rows((end - begin) * sky_width()), half_rows(checked_count(end - begin) * sky_width());
-        const GatherSky sky{rows.data(), half_rows.data(), sky_width(), &lobes, buried.data() + begin};
+        std::vector<float> rows((end - begin) * W);
+        const GatherSky sky{rows.data(), nullptr, W, &lobes, buried.data() + begin};
         trace_sky(setup, *scratch.borrow(), begin, end - begin, sky);
         trace_sharp_lobes(begin, end - begin, sky);
-        for (size_t r = begin; r < end; ++r) {
-          const float* row = rows.data() + (r - begin) * sky_width();
-          store_receiver(out, r, {row, sky_width()});
-          if (r % check_every == 0 && !buried[r])
-            errors.add(r, half_rows.data() + (r - begin) / check_every * sky_width(), row, sky_width());
-        }
+        for (size_t r = begin; r < end; ++r) expand(rows.data() + (r - begin) * W, x.data() + r * width());
         stage.advance(end - begin);
       });
       if (stage.cancelled()) return Error{"", "cancelled"};
     }
-    for (const FillStep& step : make_fill_steps(scene, receivers.basis, buried)) {
-      std::vector<float> mean(sky_width());
-      for (uint32_t s : step.sources) {
-        const std::vector<float> value = load_receiver(out.transfer, s);
-        for (size_t k = 0; k < mean.size(); ++k) mean[k] += value[k] / float(step.sources.size());
-      }
-      store_receiver(out, step.receiver, mean);
-    }
+    fill_buried(make_fill_steps(scene, receivers.basis, buried), x.data(), width(), width());
     for (uint8_t b : buried) report.buried += b;
-    report.error = has_halves() ? errors.relative() : -1;
     report.trace_seconds = seconds_since(start), report.rays = n() * rays_each();
-    return std::move(out.transfer);
+    return finish({std::move(x), {}}, buried, {});
   }
 
   Result<Transfer> bounced() {
-    const size_t C = coefficients(), channels = size_t(setup.channels), width = row_width(C, setup.channels);
     const size_t W = sky_width();
-    std::vector<float> T0(n() * W), T0_half(checked_count(n()) * W);
-    const size_t fixed = solution_bytes(n(), C, setup.channels, setup.sky_channels) +
-                         table_bytes(n(), scene.triangles.size(), C, size_t(options.samples)) +
+    std::vector<float> T0(n() * W);
+    const size_t fixed = solution_bytes(n(), coefficients(), setup.channels, setup.sky_channels, options) +
+                         table_bytes(n(), scene.triangles.size(), coefficients(), size_t(options.samples)) +
                          lobe_set_bytes(options.samples, lobes.count());
     auto B = GatherOperator::trace(
         setup,
-        {.sky = {T0.data(), T0_half.data(), W, &lobes, nullptr},
+        {.sky = {T0.data(), nullptr, W, &lobes, nullptr},
          .more = [&](size_t first, size_t count, const GatherSky& sky) { trace_sharp_lobes(first, count, sky); },
-         .halves = true,
          .memory = options.memory > fixed ? options.memory - fixed : 0},
         progress);
     if (!B) return B.error();
@@ -140,33 +142,115 @@ struct Baker {
     report.operator_bytes = B->report().bytes, report.operator_kept = B->report().kept;
     report.working_memory = fixed + report.operator_bytes;
 
-    // T0 is the same in every channel but for coloured glass; x is [receiver][coefficient][channel].
     const auto start = std::chrono::steady_clock::now();
-    auto expand = [&](const float* t, float* x) {
-      for (size_t k = 0; k < C; ++k)
-        for (size_t c = 0; c < channels; ++c) x[k * channels + c] = t[setup.sky_channel(c) * C + k];
-      std::fill(x + C * channels, x + width, 0.0f);
-    };
-    Source source{[&](size_t r, float* x) { expand(T0.data() + r * W, x); }};
-    if (has_halves()) source.set_half = [&](size_t r, float* x) { expand(T0_half.data() + r / check_every * W, x); };
-    auto solution = bounce(*B, source, width, options.bounces, progress);
+    const Source source{[&](size_t r, float* x) { expand(T0.data() + r * W, x); }};
+    // The last step beside the one before it, which is what measuring gathers find on the surfaces that they meet.
+    AlignedVector<float> last(n() * width());
+    auto solution =
+        bounce(*B, source, width(), options.bounces, progress, [&](size_t first, size_t count, const float* y) {
+          std::copy_n(y, count * width(), last.data() + first * width());
+        });
     if (!solution) return solution.error();
-    auto store = [&](const AlignedVector<float>& x) {
-      return store_columns(options.light(), x.data(), 1, setup.channels, n(), width, options.precision);
-    };
-    Transfer result = store(solution->x);
-    report.error = solution->error;
+    B->fill(last.data(), width());
+    std::vector<AlignedVector<float>> terms;
     if (options.keep_terms) {
-      solution->x = {};
-      auto ok = bounce_terms(*B, source, width, options.bounces, progress, [&](int, const auto& x) -> Result<void> {
-        report.terms.push_back(store(x));
+      auto ok = bounce_terms(*B, source, width(), options.bounces, progress, [&](int, const auto& x) -> Result<void> {
+        terms.push_back(x);
         return {};
       });
       if (!ok) return ok.error();
     }
     report.rays = n() * (rays_each() - size_t(options.samples)) + B->report().rays;
     report.bounce_seconds = seconds_since(start);
+    const std::vector<uint8_t> buried = B->buried();
+    return finish({std::move(last), std::move(solution->x)}, buried, std::move(terms));
+  }
+
+  struct Solved {
+    AlignedVector<float> x, met;  // `met`: of one bounce less, on the surfaces that rays meet; empty: black
+  };
+
+  // Rows by rays of their own, at any place.
+  Result<Transfer> finish(Solved solved, const std::vector<uint8_t>& buried, std::vector<AlignedVector<float>> terms) {
+    const bool measures = options.denoise || options.certify;
+    const uint32_t seed = uint32_t(hash64(options.seed, 0x6e6f6973));
+    std::optional<GatherSetup> other;
+    if (measures)
+      other.emplace(make_gather_setup(scene, setup.tracer, receivers, options.order, options.samples, seed,
+                                      square_to_cosine_hemisphere, progress));
+    if (is_cancelled(progress)) return Error{"", "cancelled"};
+    Pool<GatherScratch, DeleteScratch> others([&] { return make_gather_scratch(*other); });
+    const GatherAt gather = [&](Vec3 origin, Vec3 normal, uint64_t key, float* row) {
+      std::vector<float> sky_row(sky_width()), met(width());
+      const GatherSky sky{sky_row.data(), nullptr, sky_width(), &lobes, nullptr};
+      const bool clear = gather_point(*other, *others.borrow(), origin, normal, key, sky,
+                                      solved.met.empty() ? nullptr : solved.met.data(), width(), met.data());
+      if (!lobes.sharp.empty())
+        trace_lobes(lobes, setup.tracer, origin, normal, size_t(key), *lobe_rays.borrow(), sky_row.data() + harmonics(),
+                    nullptr, coefficients());
+      expand(sky_row.data(), row);
+      for (size_t k = 0; k < width(); ++k) row[k] += met[k];
+      return clear;
+    };
+    if (options.denoise)
+      if (auto ok = take_noise_away(solved.x, buried, terms, gather); !ok) return ok.error();
+    if (options.certify) {
+      const auto start = std::chrono::steady_clock::now();
+      auto certificate = certify(scene, receivers, solved.x.data(), width(), gather, certified_places, seed, progress);
+      if (!certificate) return certificate.error();
+      report.certificate = std::move(*certificate), report.error = report.certificate.error;
+      report.certificate.noise = options.denoise ? report.denoised : report.noise;
+      report.certify_seconds = seconds_since(start);
+    }
+    Transfer result = store(solved.x.data());
+    for (AlignedVector<float>& term : terms) report.terms.push_back(store(term.data())), term = {};
     return result;
+  }
+
+  // Second gathers at one receiver in 16 tell the noise before and after.
+  Result<void> take_noise_away(AlignedVector<float>& x, const std::vector<uint8_t>& buried,
+                               std::vector<AlignedVector<float>>& terms, const GatherAt& gather) {
+    const auto start = std::chrono::steady_clock::now();
+    std::vector<uint32_t> measured;
+    for (size_t r = 0; r < n(); r += check_every)
+      if (!buried[r]) measured.push_back(uint32_t(r));
+    AlignedVector<float> again(measured.size() * width());
+    std::vector<float> variance(measured.size());
+    {
+      ProgressStage stage(progress, "measuring the noise", measured.size());
+      parallel_for(measured.size(), 4, [&](size_t begin, size_t end) {
+        for (size_t i = begin; i < end && !stage.cancelled(); ++i) {
+          const uint32_t r = measured[i];
+          float* row = again.data() + i * width();
+          gather(receivers.origins[r], receivers.normals[r], r, row);
+          variance[i] = float(0.5 * squared_difference(row, x.data() + size_t(r) * width()));
+        }
+        stage.advance(end - begin);
+      });
+      if (stage.cancelled()) return Error{"", "cancelled"};
+    }
+    std::vector<float*> more;
+    for (AlignedVector<float>& term : terms) more.push_back(term.data());
+    AlignedVector<float> out(x.size());
+    auto ok = denoise({receivers.origins, receivers.normals, buried, measured, variance}, x.data(), width(), out.data(),
+                      more, progress);
+    if (!ok) return ok;
+    double noise = 0, left = 0, total = 0;
+    for (size_t i = 0; i < measured.size(); ++i) {
+      const float *row = again.data() + i * width(), *first = x.data() + size_t(measured[i]) * width();
+      noise += double(variance[i]);
+      left += squared_difference(row, out.data() + size_t(measured[i]) * width()) - double(variance[i]);
+      for (size_t k = 0; k < width(); ++k) total += double(row[k]) * double(first[k]);
+    }
+    if (total > 0) report.noise = std::sqrt(noise / total), report.denoised = std::sqrt(std::max(0.0, left) / total);
+    x = std::move(out);
+    report.denoise_seconds = seconds_since(start);
+    return {};
+  }
+  double squared_difference(const float* a, const float* b) const {
+    double sum = 0;
+    for (size_t k = 0; k < width(); ++k) sum += double(a[k] - b[k]) * double(a[k] - b[k]);
+    return sum;
   }
 };
 
@@ -197,7 +281,7 @@ size_t least_memory(size_t receivers, bool coloured, const BakeOptions& options)
   const size_t tables = table_bytes(options.bounces > 0 ? receivers : 0, 0, coefficients, size_t(options.samples)) +
                         lobe_set_bytes(options.samples, options.lobes.size());
   if (!options.shadows) return 0;
-  return tables + (options.bounces > 0 ? solution_bytes(receivers, coefficients, coloured ? 3 : 1) : 0);
+  return tables + solution_bytes(receivers, coefficients, coloured ? 3 : 1, 1, options);
 }
 
 Result<Transfer> bake(const Scene& scene, const Tracer& tracer, const Receivers& receivers, const BakeOptions& options,

@@ -1,5 +1,6 @@
 #pragma once
 // Scene -> Transfer: diffuse light transport, direct and bounced.
+#include <lambent/bake/certify.h>
 #include <lambent/core/progress.h>
 #include <lambent/receivers/receivers.h>
 #include <lambent/scene/scene.h>
@@ -24,6 +25,8 @@ struct BakeOptions {
   uint32_t seed = 1;                // of the ray directions
   Precision precision = Precision::half;  // of the stored transfer
   bool keep_terms = false;                // BakeReport::terms, in as much time again as the bounces take
+  bool denoise = true;                    // takes away noise that neighbours do not share (denoise.h)
+  bool certify = true;                    // measures the result's error (certify.h)
 
   LightBasis light() const { return {order, lobe_kind, lobes, {}}; }
 };
@@ -39,11 +42,13 @@ struct BakeReport {
   size_t operator_bytes = 0;         // of the hit rows kept
   double operator_kept = 1;   // fraction of the hit rows kept in memory; the rest was traced again for each bounce
   size_t working_memory = 0;  // bytes, what the stages below allocated at their peak
-  double trace_seconds = 0, bounce_seconds = 0;
-  // Estimated relative RMS error of the transfer vectors, from half-sample gathers at one receiver in 16:
-  // sqrt(sum |half - full|^2 / sum |full|^2). Halves of one low-discrepancy set lean to either side of it, so this
-  // overestimates a little. Negative if too few samples to tell.
+  double trace_seconds = 0, bounce_seconds = 0, denoise_seconds = 0, certify_seconds = 0;
+  // Relative RMS error of the result. Of diffuse transfer the certificate's; of other kinds of the transfer vectors at
+  // the receivers, estimated from half-sample gathers at one in 16, which overestimates a little. Negative: not known.
   double error = -1;
+  Certificate certificate;  // of diffuse transfer, where the options want it
+  double noise = -1;        // relative RMS of the rows at the receivers as their rays gave them; negative: not measured
+  double denoised = -1;     // and after denoising
   // Where options.keep_terms says so, the result's terms: direct transfer, that of light reflected once, twice, ... E,
   // B E, B^2 E. They add up to the result, but for rounding. Source: radiosity, "Neumann series".
   std::vector<Transfer> terms;

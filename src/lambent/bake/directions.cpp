@@ -19,6 +19,28 @@ uint32_t morton2(Vec2 u) {
   return spread(u.x) | spread(u.y) << 1;
 }
 
+// Fills in `excess`; `table` and `weights` are there.
+void measure_excess(DirectionSets& s) {
+  const size_t coefficients = size_t(sh_count(s.order)), n = size_t(s.samples);
+  s.excess.assign(size_t(s.sets) * 2 * coefficients, 0);
+  for (size_t set = 0; set < size_t(s.sets); ++set)
+    for (size_t k = 0; k < coefficients; ++k) {
+      const int l = sh_band(int(k));
+      // About +z, the axis of the cosine, only the middle of a band is not zero.
+      const double open = int(k) == l * l + l
+                            ? clamped_cosine(l) / std::numbers::pi * std::sqrt((2 * l + 1) / (4 * std::numbers::pi))
+                            : 0;
+      const float* y = s.table.data() + (set * coefficients + k) * s.stride;
+      double sum = 0, first = 0;
+      for (size_t i = 0; i < n; ++i) {
+        sum += double(y[i]) * (s.weights.empty() ? 1.0 : double(s.weights[i]));
+        if (i + 1 == std::min(s.half, n)) first = sum;
+      }
+      s.excess[set * 2 * coefficients + k] = float(sum / double(n) - open);
+      s.excess[(set * 2 + 1) * coefficients + k] = float(first / double(std::min(s.half, n)) - open);
+    }
+}
+
 }  // namespace
 
 FixedFan::FixedFan(Vec3 normal) {
@@ -63,6 +85,7 @@ DirectionSets make_direction_sets(int order, int samples, int sets, uint32_t see
       for (size_t k = 0; k < coefficients; ++k) s.table[(set * coefficients + k) * s.stride + i] = y[k];
     }
   });
+  if (warp == square_to_cosine_hemisphere && !stage.cancelled()) measure_excess(s);
   return s;
 }
 
@@ -111,6 +134,7 @@ DirectionSets make_hemicube_set(int order, int samples) {
     evaluate_sh(order, d, y);
     for (size_t k = 0; k < coefficients; ++k) s.table[k * s.stride + i] = y[k];
   }
+  measure_excess(s);
   return s;
 }
 

@@ -129,12 +129,18 @@ struct Fan {
     if (sets.half < size_t(sets.samples))
       weighted_rows(table + sets.half, coefficients, sets.stride, seen + sets.half, sets.stride - sets.half,
                     rest.data());
-    for (size_t k = 0; k < coefficients; ++k) row[k] = (half[k] + rest[k]) / float(sets.samples);
-    rotator.rotate(choice.a, choice.b, choice.c, {row, coefficients});
-    if (!half_row) return;
+    const float* excess =
+        sets.excess.empty() ? nullptr : sets.excess.data() + size_t(choice.set) * 2 * coefficients;
+    float open = 0;
+    for (size_t j = 0; excess && j < size_t(sets.samples); ++j) open += seen[j];
+    open /= float(sets.samples);
     const float rays = float(std::min(sets.half, size_t(sets.samples)));
-    for (size_t k = 0; k < coefficients; ++k) half_row[k] = half[k] / rays;
-    rotator.rotate(choice.a, choice.b, choice.c, {half_row, coefficients});
+    for (size_t k = 0; k < coefficients; ++k) {
+      row[k] = (half[k] + rest[k]) / float(sets.samples) - (excess ? open * excess[k] : 0.0f);
+      if (half_row) half_row[k] = half[k] / rays - (excess ? open * excess[coefficients + k] : 0.0f);
+    }
+    rotator.rotate(choice.a, choice.b, choice.c, {row, coefficients});
+    if (half_row) rotator.rotate(choice.a, choice.b, choice.c, {half_row, coefficients});
   }
 
   // The same for the broad lobes: the mean of V b.
@@ -351,6 +357,43 @@ void trace_gather(const GatherSetup& setup, GatherScratch& scratch, size_t first
   LAMBENT_CHECK(count <= gather_block);
   std::visit([&](const auto& basis) { trace_gather_on(setup, basis, scratch, first, count, block, sky, direct); },
              setup.receivers.basis);
+}
+
+bool gather_point(const GatherSetup& setup, GatherScratch& scratch, Vec3 origin, Vec3 normal, uint64_t key,
+                  const GatherSky& sky, const float* x, size_t width, float* reflected) {
+  const size_t rays = size_t(setup.sets.samples), channels = size_t(setup.channels);
+  Fan& fan = scratch.fan;
+  const bool passes = !scratch.passages.empty();
+  const Directions directions = fan.aim(normal, setup.seed, key);
+  if (passes) setup.tracer.closest_fan(origin, directions, scratch.hits.data(), scratch.passages.data());
+  else setup.tracer.closest_fan(origin, directions, scratch.hits.data());
+  std::fill_n(reflected, width, 0.0f);
+  size_t backs = 0;
+  std::visit(
+      [&](const auto& basis) {
+        for (size_t j = 0; j < rays; ++j) {
+          const Hit& h = scratch.hits[j];
+          const Vec3 open = passes ? scratch.passages[j].sky : Vec3(h.triangle == none ? 1.0f : 0.0f);
+          for (size_t c = 0; c < fan.visible.size(); ++c) fan.visible[c][j] = open[int(c)];
+          if (h.triangle == none) continue;
+          const auto* at = basis.find(h.triangle, h.front);
+          if (!at) backs += !setup.tracer.lets_pass(h.triangle);
+          if (!at || !x) continue;
+          Vec3 rho = setup.albedo_at(at->part, h) / float(rays);
+          if (passes) rho *= scratch.passages[j].hit;
+          scatter(basis, *at, h, hash64(key, j), [&](uint32_t receiver, float weight) {
+            const float* from = x + size_t(receiver) * width;
+            if (channels == 1)
+              for (size_t k = 0; k < width; ++k) reflected[k] += rho.x * weight * from[k];
+            else
+              for (size_t k = 0; k + 2 < width; k += 3)
+                for (int c = 0; c < 3; ++c) reflected[k + size_t(c)] += rho[c] * weight * from[k + size_t(c)];
+          });
+        }
+      },
+      setup.receivers.basis);
+  fan.project(sky, 0, 0);
+  return 2 * backs <= rays;
 }
 
 void trace_sky(const GatherSetup& setup, GatherScratch& scratch, size_t first, size_t count, const GatherSky& sky) {

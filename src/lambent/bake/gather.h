@@ -107,6 +107,13 @@ void trace_gather(const GatherSetup& setup, GatherScratch& scratch, size_t first
 // Traces occlusion only: the sky rows, without hit rows.
 void trace_sky(const GatherSetup& setup, GatherScratch& scratch, size_t first, size_t count, const GatherSky& sky);
 
+// One gather from anywhere, as a receiver there would do it: `row` as GatherSky::rows (stride: that of all sky
+// channels), and in `reflected` ([column][channel], `width` floats) what the surfaces that it meets send back of the
+// solution x; both set. x null: no surface sends anything. `key` chooses the fan. False: the place lies inside
+// something.
+bool gather_point(const GatherSetup& setup, GatherScratch& scratch, Vec3 origin, Vec3 normal, uint64_t key,
+                  const GatherSky& sky, const float* x, size_t width, float* reflected);
+
 // Whether a receiver lies inside something: most rays of a fan that no seed changes meet backs of one-sided surfaces.
 bool is_buried(const Tracer& tracer, const Receivers& receivers, size_t receiver);
 // The same for one that `backs` of `rays` rays found so: asks only where these leave it open, as at the rim of a lamp
