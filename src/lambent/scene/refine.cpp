@@ -21,23 +21,25 @@ bool precedes(Vec3 a, Vec3 b) { return a.x != b.x ? a.x < b.x : a.y != b.y ? a.y
 // their order, so that all triangles on it agree bit for bit, whichever part they are of.
 class EdgeSplitter {
  public:
-  EdgeSplitter(Scene& scene, double max_edge) : scene_(scene), limit2_(max_edge * max_edge) {}
+  explicit EdgeSplitter(Scene& scene) : scene_(scene) {}
 
-  // Marks edges; the number of triangles, and a bound of the number of vertices, that splitting would give.
-  void mark() {
+  // Marks the edges that are wanted, by their ends in one order; the number of triangles, and a bound of the number of
+  // vertices, that splitting would give.
+  void mark(const std::function<bool(Vec3, Vec3)>& wants) {
     marks_.assign(scene_.triangles.size(), 0);
     triangles_ = scene_.triangles.size(), midpoints_ = 0;
     for (size_t t = 0; t < marks_.size(); ++t) {
       const uint32_t* v = scene_.triangles[t].v;
       for (int k = 0; k < 3; ++k) {
-        if (!(length2(scene_.positions[v[k]], scene_.positions[v[(k + 1) % 3]]) > limit2_)) continue;
+        const Vec3 a = scene_.positions[v[k]], b = scene_.positions[v[(k + 1) % 3]];
+        if (!(precedes(a, b) ? wants(a, b) : wants(b, a))) continue;
         marks_[t] |= uint8_t(1 << k), ++triangles_, ++midpoints_;
       }
     }
   }
   size_t triangles() const { return triangles_; }
   size_t vertices() const { return scene_.positions.size() + midpoints_; }
-  bool done() const { return midpoints_ == 0; }
+  size_t marked() const { return midpoints_; }
 
   void split() {
     out_.triangles.reserve(triangles_);
@@ -127,7 +129,6 @@ class EdgeSplitter {
   }
 
   Scene& scene_;
-  double limit2_;
   std::vector<uint8_t> marks_;  // bit k: edge k of the triangle is to be split
   size_t triangles_ = 0, midpoints_ = 0;
   std::vector<uint64_t> edges_;  // of the part, in order of their middles
@@ -207,13 +208,24 @@ Result<void> split_long_edges(Scene& scene, float max_edge, size_t max_triangles
     return Error{scene.path,
                  fmt::format("edges of at most {} are finer than coordinates of {} can express", max_edge, farthest)};
 
-  EdgeSplitter splitter(scene, double(max_edge));
-  for (splitter.mark(); !splitter.done(); splitter.mark()) {
+  EdgeSplitter splitter(scene);
+  const double limit2 = double(max_edge) * double(max_edge);
+  auto is_long = [&](Vec3 a, Vec3 b) { return length2(a, b) > limit2; };
+  for (splitter.mark(is_long); splitter.marked() > 0; splitter.mark(is_long)) {
     if (splitter.triangles() > max_triangles) return too_many(double(splitter.triangles()));
     if (splitter.triangles() >= none || splitter.vertices() >= none) return Error{scene.path, "too many vertices"};
     splitter.split();
   }
   return {};
+}
+
+size_t split_edges(Scene& scene, const std::function<bool(Vec3 a, Vec3 b)>& wants) {
+  EdgeSplitter splitter(scene);
+  splitter.mark(wants);
+  const size_t marked = splitter.marked();
+  LAMBENT_CHECK(splitter.triangles() < none && splitter.vertices() < none);
+  if (marked > 0) splitter.split();
+  return marked;
 }
 
 }  // namespace lambent

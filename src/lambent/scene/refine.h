@@ -2,6 +2,8 @@
 // Geometry that the user asked to be added or made finer.
 #include <lambent/scene/scene.h>
 
+#include <functional>
+
 namespace lambent {
 
 // Name of the part that add_ground adds.
@@ -17,5 +19,10 @@ void add_ground(Scene& scene);
 // positive, or too fine for the coordinates' precision; more than `max_triangles` triangles would result (mostly found
 // before anything is split; the scene may be left partly split).
 Result<void> split_long_edges(Scene& scene, float max_edge, size_t max_triangles = size_t{1} << 27);
+
+// Splits every edge whose ends `wants` at its middle, once, as above. `wants` is asked by the positions of the ends
+// alone, in one order for all triangles on an edge, from one thread. The number of edges split, one a triangle's side.
+// The mesh must stay below 2^32 vertices and triangles.
+size_t split_edges(Scene& scene, const std::function<bool(Vec3 a, Vec3 b)>& wants);
 
 }  // namespace lambent
