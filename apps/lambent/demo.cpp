@@ -159,6 +159,7 @@ int run_demo(Context& context, const DemoCommand& o) {
   const Receivers receivers = make_vertex_receivers(scene);
   const CornerReceivers corners = corner_receivers(scene, receivers.front, receivers.back);
   BakeOptions options;
+  options.error = 0.025;
   BakeReport report;
   auto transfer = bake(scene, *tracer, receivers, options, &report, &context.progress);
   if (!transfer) return fail(transfer.error());

@@ -86,7 +86,7 @@ struct Adapter {
                 {sky.data(), nullptr, setup.sky_width(), nullptr, buried.data()});
       for (size_t i = begin; i < end; ++i)  // of coloured glass, the first channel
         std::copy_n(sky.data() + (i - begin) * setup.sky_width(), width, out.data() + i * width);
-      stage.advance(end - begin);
+      if (!stage.cancelled()) stage.advance(end - begin);
     });
     if (stage.cancelled()) return Error{"", "cancelled"};
     report.rays += places.size() * size_t(options.samples);
@@ -272,9 +272,12 @@ struct Adapter {
     }
   }
 
+  size_t limit() const {
+    return report.before + std::max(options.triangles, size_t(options.more * double(report.before)));
+  }
+
   Result<void> run() {
-    if (auto ok = split_long_edges(scene, options.longest * diagonal, report.before + options.triangles); !ok)
-      return {};
+    if (auto ok = split_long_edges(scene, options.longest * diagonal, limit()); !ok) return {};
     auto built = Tracer::build(original, progress);
     if (!built) return built.error();
     tracer = std::move(*built), first = make_vertex_receivers(original);
@@ -284,7 +287,7 @@ struct Adapter {
       if (!wanted) return wanted.error();
       if (wanted->empty()) return {};
       close(*wanted);
-      if (scene.triangles.size() + 2 * wanted->size() > report.before + options.triangles) return {};
+      if (scene.triangles.size() + 2 * wanted->size() > limit()) return {};
       split_edges(scene, [&](Vec3 a, Vec3 b) { return wanted->contains(edge_key(a, b)); });
     }
     return {};

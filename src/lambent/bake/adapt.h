@@ -11,7 +11,8 @@ struct AdaptOptions {
   double error = 0.05;         // relative RMS of direct transfer, by area, that interpolation may lose; > 0
   float longest = 0.05f;       // edges longer than this part of the scene's diagonal are split first; of those above
   float shortest = 2e-3f;      // twice this part, some are
-  size_t triangles = 500'000;  // at most, beyond those that there are
+  double more = 1;             // triangles at most, beyond those that there are: so many times those,
+  size_t triangles = 150'000;  // or so many, if that is more
   int order = 4;               // of the harmonics that are looked at: bands above have more noise and less light
   int samples = 128;           // rays a place
   uint32_t seed = 1;

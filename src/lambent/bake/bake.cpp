@@ -10,6 +10,7 @@
 #include <lambent/core/pool.h>
 #include <lambent/core/random.h>
 
+#include <algorithm>
 #include <chrono>
 #include <cmath>
 #include <optional>
@@ -55,7 +56,9 @@ struct Baker {
   size_t harmonics() const { return setup.coefficients(); }
   size_t coefficients() const { return harmonics() + lobes.count(); }
   size_t sky_width() const { return coefficients() * size_t(setup.sky_channels); }
-  size_t width() const { return row_width(coefficients(), setup.channels); }
+  // Of the result: without bounces, surfaces' colours tell nothing.
+  int channels() const { return options.bounces > 0 ? setup.channels : setup.sky_channels; }
+  size_t width() const { return row_width(coefficients(), channels()); }
   size_t rays_each() const { return size_t(options.samples) + size_t(lobes.rays) * lobes.sharp.size(); }
 
   // The columns of the sharp lobes, beside those that the fan has filled.
@@ -92,13 +95,13 @@ struct Baker {
 
   // A row of T0, the same in every channel but for coloured glass, as one of X: [coefficient][channel].
   void expand(const float* t, float* x) const {
-    const size_t C = coefficients(), channels = size_t(setup.channels);
+    const size_t C = coefficients(), n = size_t(channels());
     for (size_t k = 0; k < C; ++k)
-      for (size_t c = 0; c < channels; ++c) x[k * channels + c] = t[setup.sky_channel(c) * C + k];
-    std::fill(x + C * channels, x + width(), 0.0f);
+      for (size_t c = 0; c < n; ++c) x[k * n + c] = t[setup.sky_channel(c) * C + k];
+    std::fill(x + C * n, x + width(), 0.0f);
   }
   Transfer store(const float* x) const {
-    return store_columns(options.light(), x, 1, setup.channels, n(), width(), options.precision);
+    return store_columns(options.light(), x, 1, channels(), n(), width(), options.precision);
   }
 
   Result<Transfer> direct() {
@@ -115,7 +118,7 @@ struct Baker {
         trace_sky(setup, *scratch.borrow(), begin, end - begin, sky);
         trace_sharp_lobes(begin, end - begin, sky);
         for (size_t r = begin; r < end; ++r) expand(rows.data() + (r - begin) * W, x.data() + r * width());
-        stage.advance(end - begin);
+        if (!stage.cancelled()) stage.advance(end - begin);
       });
       if (stage.cancelled()) return Error{"", "cancelled"};
     }
@@ -192,8 +195,8 @@ struct Baker {
       for (size_t k = 0; k < width(); ++k) row[k] += met[k];
       return clear;
     };
-    if (options.denoise)
-      if (auto ok = take_noise_away(solved.x, buried, terms, gather); !ok) return ok.error();
+    if (measures)
+      if (auto ok = measure_noise(solved.x, buried, terms, gather); !ok) return ok.error();
     if (options.certify) {
       const auto start = std::chrono::steady_clock::now();
       auto certificate = certify(scene, receivers, solved.x.data(), width(), gather, certified_places, seed, progress);
@@ -207,9 +210,9 @@ struct Baker {
     return result;
   }
 
-  // Second gathers at one receiver in 16 tell the noise before and after.
-  Result<void> take_noise_away(AlignedVector<float>& x, const std::vector<uint8_t>& buried,
-                               std::vector<AlignedVector<float>>& terms, const GatherAt& gather) {
+  // Second gathers at one receiver in 16 tell the noise; with it, it is taken away, and they tell what is left.
+  Result<void> measure_noise(AlignedVector<float>& x, const std::vector<uint8_t>& buried,
+                             std::vector<AlignedVector<float>>& terms, const GatherAt& gather) {
     const auto start = std::chrono::steady_clock::now();
     std::vector<uint32_t> measured;
     for (size_t r = 0; r < n(); r += check_every)
@@ -225,31 +228,56 @@ struct Baker {
           gather(receivers.origins[r], receivers.normals[r], r, row);
           variance[i] = float(0.5 * squared_difference(row, x.data() + size_t(r) * width()));
         }
-        stage.advance(end - begin);
+        if (!stage.cancelled()) stage.advance(end - begin);
       });
       if (stage.cancelled()) return Error{"", "cancelled"};
     }
-    std::vector<float*> more;
-    for (AlignedVector<float>& term : terms) more.push_back(term.data());
-    AlignedVector<float> out(x.size());
-    auto ok = denoise({receivers.origins, receivers.normals, buried, measured, variance}, x.data(), width(), out.data(),
-                      more, progress);
-    if (!ok) return ok;
+    AlignedVector<float> out;
+    if (options.denoise) {
+      out = x;
+      std::vector<AlignedVector<float>*> all{&out};
+      for (AlignedVector<float>& term : terms) all.push_back(&term);
+      auto ok = denoise_harmonics({receivers.origins, receivers.normals, buried, measured, variance}, all);
+      if (!ok) return ok;
+    }
     double noise = 0, left = 0, total = 0;
     for (size_t i = 0; i < measured.size(); ++i) {
       const float *row = again.data() + i * width(), *first = x.data() + size_t(measured[i]) * width();
       noise += double(variance[i]);
-      left += squared_difference(row, out.data() + size_t(measured[i]) * width()) - double(variance[i]);
-      for (size_t k = 0; k < width(); ++k) total += double(row[k]) * double(first[k]);
+      if (options.denoise)
+        left += squared_difference(row, out.data() + size_t(measured[i]) * width()) - double(variance[i]);
+      for (size_t k = 0; k < harmonics() * size_t(channels()); ++k) total += double(row[k]) * double(first[k]);
     }
-    if (total > 0) report.noise = std::sqrt(noise / total), report.denoised = std::sqrt(std::max(0.0, left) / total);
-    x = std::move(out);
+    if (total > 0) report.noise = std::sqrt(noise / total);
+    if (options.denoise) {
+      if (total > 0) report.denoised = std::sqrt(std::max(0.0, left) / total);
+      x = std::move(out);
+    }
     report.denoise_seconds = seconds_since(start);
     return {};
   }
+  // The first by its own noise, the others by the same weights. Lobes are left alone: sharp ones have rays of their
+  // own, and shadows that harmonics do not tell of.
+  Result<void> denoise_harmonics(const NoisyPlaces& noisy, const std::vector<AlignedVector<float>*>& all) {
+    const size_t values = harmonics() * size_t(channels()), w = pad_lanes(values);
+    std::vector<AlignedVector<float>> copies;
+    for (const AlignedVector<float>* rows : all) {
+      copies.emplace_back(n() * w, 0.0f);
+      for (size_t r = 0; r < n(); ++r) std::copy_n(rows->data() + r * width(), values, copies.back().data() + r * w);
+    }
+    std::vector<float*> more;
+    for (size_t k = 1; k < copies.size(); ++k) more.push_back(copies[k].data());
+    AlignedVector<float> out(n() * w);
+    if (auto ok = denoise(noisy, copies[0].data(), w, out.data(), more, progress); !ok) return ok;
+    copies[0] = std::move(out);
+    for (size_t k = 0; k < all.size(); ++k)
+      for (size_t r = 0; r < n(); ++r) std::copy_n(copies[k].data() + r * w, values, all[k]->data() + r * width());
+    return {};
+  }
+  // Of the harmonics.
   double squared_difference(const float* a, const float* b) const {
     double sum = 0;
-    for (size_t k = 0; k < width(); ++k) sum += double(a[k] - b[k]) * double(a[k] - b[k]);
+    for (size_t k = 0; k < harmonics() * size_t(channels()); ++k) sum += double(a[k] - b[k]) * double(a[k] - b[k]);
     return sum;
   }
 };
@@ -258,6 +286,8 @@ Result<void> check_options(const BakeOptions& o) {
   if (auto ok = check_light_basis(o, o.lobes.empty() ? 1 : 0); !ok) return ok;
   if (o.samples < 1 || o.samples > 1 << 20)
     return Error{"samples", "must lie between 1 and 1048576, not " + std::to_string(o.samples)};
+  if (!(o.error >= 0 && o.error <= 1))
+    return Error{"error", "must lie between 0 and 1, not " + std::to_string(o.error)};
   if (o.bounces < 0 || o.bounces > 64)
     return Error{"bounces", "must lie between 0 and 64, not " + std::to_string(o.bounces)};
   return {};
@@ -281,16 +311,13 @@ size_t least_memory(size_t receivers, bool coloured, const BakeOptions& options)
   const size_t tables = table_bytes(options.bounces > 0 ? receivers : 0, 0, coefficients, size_t(options.samples)) +
                         lobe_set_bytes(options.samples, options.lobes.size());
   if (!options.shadows) return 0;
-  return tables + solution_bytes(receivers, coefficients, coloured ? 3 : 1, 1, options);
+  return tables + solution_bytes(receivers, coefficients, coloured && options.bounces > 0 ? 3 : 1, 1, options);
 }
 
-Result<Transfer> bake(const Scene& scene, const Tracer& tracer, const Receivers& receivers, const BakeOptions& options,
-                      BakeReport* report, Progress* progress) {
-  if (auto ok = check_options(options); !ok) return ok.error();
-  if (receivers.count() == 0) return Error{scene.path, "nothing to bake: no triangle has an area"};
-  BakeReport unwanted;
-  BakeReport& r = report ? *report : unwanted;
-  r = {};
+namespace {
+
+Result<Transfer> bake_with_samples(const Scene& scene, const Tracer& tracer, const Receivers& receivers,
+                                   const BakeOptions& options, BakeReport& r, Progress* progress) {
   Baker baker{scene,
               receivers,
               options,
@@ -305,8 +332,47 @@ Result<Transfer> bake(const Scene& scene, const Tracer& tracer, const Receivers&
   auto result = !options.shadows ? baker.unshadowed() : options.bounces > 0 ? baker.bounced() : baker.direct();
   if (!result) return result;
   if (options.keep_terms && r.terms.empty()) r.terms = {*result};
-  r.receivers = receivers.count(), r.bytes = result->bytes();
+  r.receivers = receivers.count(), r.bytes = result->bytes(), r.samples = options.samples;
   return result;
+}
+
+// Rounds, each from the start: one with few rays tells how many it takes.
+Result<Transfer> bake_to_error(const Scene& scene, const Tracer& tracer, const Receivers& receivers,
+                               const BakeOptions& asked, BakeReport& r, Progress* progress) {
+  constexpr int first = 128, most = 1 << 16;
+  constexpr double slope = 0.75, safety = 1.1;  // denoised noise falls as rays to about this power
+  const auto start = std::chrono::steady_clock::now();
+  BakeOptions options = asked;
+  options.certify = true, options.samples = first;
+  size_t rays = 0;
+  double traced = 0, bounced = 0;
+  for (;;) {
+    const auto round = std::chrono::steady_clock::now();
+    r = {};
+    auto transfer = bake_with_samples(scene, tracer, receivers, options, r, progress);
+    if (!transfer) return transfer;
+    rays += r.rays, traced += r.trace_seconds, bounced += r.bounce_seconds;
+    r.rays = rays, r.trace_seconds = traced, r.bounce_seconds = bounced;
+    const double error = r.certificate.error, noise = r.certificate.noise,
+                 wanted = std::clamp(0.3 * error, 0.5 * options.error, options.error);
+    const double ratio = std::clamp(std::pow(safety * noise / wanted, 1 / slope), 1.5, 16.0);
+    const bool late = options.seconds >= 0 && seconds_since(start) + seconds_since(round) * ratio > options.seconds;
+    if (!(noise > wanted && error > options.error) || options.samples == most || late) return transfer;
+    options.samples = std::min(most, int(std::lround(double(options.samples) * ratio / 64)) * 64);
+  }
+}
+
+}  // namespace
+
+Result<Transfer> bake(const Scene& scene, const Tracer& tracer, const Receivers& receivers, const BakeOptions& options,
+                      BakeReport* report, Progress* progress) {
+  if (auto ok = check_options(options); !ok) return ok.error();
+  if (receivers.count() == 0) return Error{scene.path, "nothing to bake: no triangle has an area"};
+  BakeReport unwanted;
+  BakeReport& r = report ? *report : unwanted;
+  r = {};
+  return options.error > 0 && options.shadows ? bake_to_error(scene, tracer, receivers, options, r, progress)
+                                              : bake_with_samples(scene, tracer, receivers, options, r, progress);
 }
 
 }  // namespace lambent

@@ -25,8 +25,12 @@ struct BakeOptions {
   uint32_t seed = 1;                // of the ray directions
   Precision precision = Precision::half;  // of the stored transfer
   bool keep_terms = false;                // BakeReport::terms, in as much time again as the bounces take
-  bool denoise = true;                    // takes away noise that neighbours do not share (denoise.h)
-  bool certify = true;                    // measures the result's error (certify.h)
+  // Where > 0, bake to this relative RMS error (Certificate::error) with as many rays as that asks for, instead of
+  // `samples`: noise may be half of it, or more, up to all of it, where interpolation between receivers loses more. No
+  // more rays are asked for where they would end after so many seconds; negative: no limit.
+  double error = 0, seconds = -1;
+  bool denoise = true;  // takes away noise that neighbours do not share (denoise.h)
+  bool certify = true;  // measures the result's error (certify.h)
 
   LightBasis light() const { return {order, lobe_kind, lobes, {}}; }
 };
@@ -38,6 +42,7 @@ Result<void> check_light_basis(const BakeOptions& options, int least_order);
 struct BakeReport {
   size_t receivers = 0, buried = 0;  // buried: inside something, filled from their neighbours
   size_t rays = 0;                   // traced in all
+  int samples = 0;                   // rays a receiver of the result
   size_t bytes = 0;                  // of the transfer
   size_t operator_bytes = 0;         // of the hit rows kept
   double operator_kept = 1;   // fraction of the hit rows kept in memory; the rest was traced again for each bounce

@@ -95,7 +95,7 @@ Result<Certificate> certify(const Scene& scene, const Receivers& receivers, cons
         m.truth2 += double(a[k]) * double(b[k]);
       }
     }
-    stage.advance(end - begin);
+    if (!stage.cancelled()) stage.advance(end - begin);
   });
   if (stage.cancelled()) return Error{"", "cancelled"};
 

@@ -57,12 +57,14 @@ struct Neighbours {
 // The value at a place as a weighted mean of its neighbours'.
 struct Filter {
   std::array<float, most_neighbours> share{};
-  void apply(const Neighbours& at, const float* rows, size_t width, float* out) const {
-    std::fill_n(out, width, 0.0f);
+  // Summed in double precision: rows that sum to others still do.
+  void apply(const Neighbours& at, const float* rows, size_t width, double* sums, float* out) const {
+    std::fill_n(sums, width, 0.0);
     for (size_t q = 0; q < at.count; ++q) {
       const float* row = rows + size_t(at.index[q]) * width;
-      for (size_t k = 0; k < width; ++k) out[k] += share[q] * row[k];
+      for (size_t k = 0; k < width; ++k) sums[k] += double(share[q]) * double(row[k]);
     }
+    for (size_t k = 0; k < width; ++k) out[k] = float(sums[k]);
   }
 };
 constexpr size_t filters = std::size(strengths);
@@ -170,10 +172,10 @@ struct Denoiser {
   bool is_filtered(size_t i) const { return !is_left_out(i) && neighbours[i].count >= fewest_neighbours; }
 
   // |f - x|^2 - v + 2 share v, less that of the row as it is, v.
-  void judge(size_t i, float* filtered) {
+  void judge(size_t i, double* sums, float* filtered) {
     const std::array<Filter, filters> all = filters_of(i);
     for (size_t f = 0; f < filters; ++f) {
-      all[f].apply(neighbours[i], rows, width, filtered);
+      all[f].apply(neighbours[i], rows, width, sums, filtered);
       risks[i][f] = difference2(filtered, rows + i * width, width) - 2 * neighbours[i].variance * (1 - all[f].share[0]);
     }
   }
@@ -207,26 +209,27 @@ Result<void> denoise(const NoisyPlaces& noisy, const float* rows, size_t width, 
   Denoiser d{noisy, rows, width};
   auto each = [&](auto f) {
     parallel_for(n, piece, [&](size_t begin, size_t end) {
+      std::vector<double> sums(width);
       AlignedVector<float> scratch(width);
-      for (size_t i = begin; i < end && !stage.cancelled(); ++i) f(i, scratch.data());
-      stage.advance(end - begin);
+      for (size_t i = begin; i < end && !stage.cancelled(); ++i) f(i, sums.data(), scratch.data());
+      if (!stage.cancelled()) stage.advance(end - begin);
     });
     return !stage.cancelled();
   };
-  const bool found = each([&](size_t i, float*) { d.find(tree, measured_tree, i); });
-  const bool judged = found && each([&](size_t i, float* scratch) {
-                        if (d.is_filtered(i)) d.judge(i, scratch);
+  const bool found = each([&](size_t i, double*, float*) { d.find(tree, measured_tree, i); });
+  const bool judged = found && each([&](size_t i, double* sums, float* scratch) {
+                        if (d.is_filtered(i)) d.judge(i, sums, scratch);
                       });
   std::vector<AlignedVector<float>> before;
   for (const float* r : more) before.emplace_back(r, r + n * width);
-  const bool done = judged && each([&](size_t i, float*) {
+  const bool done = judged && each([&](size_t i, double* sums, float*) {
                       if (!d.is_filtered(i)) return;
                       const std::array<Filter, filters> filters_here = d.filters_of(i);
                       const Filter* best = d.choose(i, filters_here);
                       if (!best) return;
-                      best->apply(d.neighbours[i], rows, width, out + i * width);
+                      best->apply(d.neighbours[i], rows, width, sums, out + i * width);
                       for (size_t m = 0; m < more.size(); ++m)
-                        best->apply(d.neighbours[i], before[m].data(), width, more[m] + i * width);
+                        best->apply(d.neighbours[i], before[m].data(), width, sums, more[m] + i * width);
                     });
   if (!done) return Error{"", "cancelled"};
   return {};

@@ -228,8 +228,12 @@ TEST(BakeLobes, MatrixWithLambertIsTheDiffuseBake) {
   materials.of_receiver.assign(receivers.count(), 0);
   for (const Vec3& n : receivers.normals) materials.frames.push_back(frame_about(n));
   for (int bounces : {0, 2}) {
-    const BakeOptions options{
-        .order = 3, .lobes = skew_lobes, .samples = 128, .bounces = bounces, .precision = Precision::single};
+    const BakeOptions options{.order = 3,
+                              .lobes = skew_lobes,
+                              .samples = 128,
+                              .bounces = bounces,
+                              .precision = Precision::single,
+                              .denoise = false};
     auto vector = bake(scene, *tracer, receivers, options);
     auto matrix = bake_matrix(scene, *tracer, receivers, materials, options,
                               {.incident_order = 3, .outgoing = OutgoingKind::svd, .svd_rows = 2, .grid = 8});

@@ -74,6 +74,10 @@ void MatrixGather::direct(MatrixScratch& s, const AlignedVector<float>& visible,
   const size_t w = width(), base = size_t(s.choice.set) * V_count() * setup.sets.stride;
   weighted_rows(setup.sets.table.data() + base, V_count(), setup.sets.stride, visible.data(),
                 count == rays() ? setup.sets.stride : count, s.V.data());
+  float open = 0;  // the same control variate as of diffuse transfer
+  for (size_t j = 0; j < count; ++j) open += visible[j];
+  const float* excess = setup.sets.excess.data() + (size_t(s.choice.set) * 2 + (count == rays() ? 0 : 1)) * V_count();
+  for (size_t k = 0; k < V_count(); ++k) s.V[k] -= open * excess[k];
   float* rows = s.sh_rows.data();
   std::fill(rows, rows + J() * w, 0.0f);
   for (size_t k = 0; k < V_count(); ++k) {

@@ -147,8 +147,9 @@ TEST(Matrix, VisibilityAsAFactorGivesTheRowsOfADirectMatrix) {
   const MatrixOptions options{.incident_order = m, .outgoing = OutgoingKind::map, .grid = 8, .response_samples = 64};
   auto matrix = bake_matrix(scene, *tracer, receivers, materials,
                             {.order = n, .samples = 256, .bounces = 0, .precision = Precision::single}, options);
-  auto visibility = bake(scene, *tracer, receivers,
-                         {.order = n + m - 1, .samples = 256, .bounces = 0, .precision = Precision::single});
+  auto visibility =
+      bake(scene, *tracer, receivers,
+           {.order = n + m - 1, .samples = 256, .bounces = 0, .precision = Precision::single, .denoise = false});
   ASSERT_TRUE(matrix && visibility);
   const Outgoing outgoing = make_map_outgoing(materials, m, options);
   const std::vector<Vec3> light = uneven_light(n, 5);
@@ -175,7 +176,8 @@ TEST(Matrix, WithLambertIsTheDiffuseBake) {
   ASSERT_TRUE(tracer);
   const Receivers receivers = make_vertex_receivers(scene);
   for (int bounces : {0, 2}) {
-    const BakeOptions options{.order = 4, .samples = 512, .bounces = bounces, .precision = Precision::single};
+    const BakeOptions options{
+        .order = 4, .samples = 512, .bounces = bounces, .precision = Precision::single, .denoise = false};
     auto vector = bake(scene, *tracer, receivers, options);
     ASSERT_TRUE(vector);
     for (OutgoingKind kind : {OutgoingKind::map, OutgoingKind::svd}) {

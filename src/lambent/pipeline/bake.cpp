@@ -17,6 +17,7 @@
 #include <fmt/format.h>
 
 #include <chrono>
+#include <cmath>
 #include <filesystem>
 
 namespace lambent {
@@ -34,6 +35,7 @@ struct Bake {
   PlacedReceivers placed{};
   Tracer tracer{};  // of the scene above, which stays where it is
   double load_seconds = 0, build_seconds = 0;
+  std::optional<AdaptReport> adapted{};
   BakeReport report{};
   // What it has made so far; a dense store may still become a smaller one.
   Store store{};
@@ -218,6 +220,48 @@ Result<void> make_clusters(Bake& b) {
   return {};
 }
 
+// What is known of the result's error.
+void summarize_error(Bake& b) {
+  const BakeReport& r = b.report;
+  const Certificate& c = r.certificate;
+  if (b.adapted) {
+    const AdaptReport& a = *b.adapted;
+    b.summary.json["adapt"] = {{"triangles_before", a.before},
+                               {"triangles", a.after},
+                               {"levels", a.levels},
+                               {"rays", a.rays},
+                               {"first", a.first},
+                               {"last", a.last}};
+    b.summary.json["seconds"]["adapt"] = a.seconds;
+    if (a.after > a.before)
+      b.line("mesh", fmt::format("{} triangles from {}, split where light changes", human_count(a.after),
+                                 human_count(a.before)));
+  }
+  if (c.error < 0) {
+    if (r.error >= 0) b.line("error", fmt::format("{:.2f}% RMS, estimated from half-sample gathers", 100 * r.error));
+    return;
+  }
+  nlohmann::json parts = nlohmann::json::object();
+  for (size_t p = 0; p < c.parts.size(); ++p)
+    if (c.parts[p] >= 0) parts[b.scene.parts[p].name] = c.parts[p];
+  b.summary.json["certificate"] = {{"error", c.error},    {"uncertain", c.uncertain}, {"places", c.places},
+                                   {"noise", c.noise},    {"noise_of_rays", r.noise}, {"parts", std::move(parts)},
+                                   {"samples", r.samples}};
+  b.told["certificate"] = b.summary.json["certificate"];
+  b.summary.json["seconds"]["denoise"] = r.denoise_seconds, b.summary.json["seconds"]["certify"] = r.certify_seconds;
+  std::string text = fmt::format("{:.1f}% RMS (within {:.1f}), measured at {} places by rays of their own",
+                                 100 * c.error, 200 * c.uncertain, human_count(c.places));
+  if (c.noise >= 0)
+    text += fmt::format("; noise {:.1f}%{}, at {} rays a receiver", 100 * c.noise,
+                        r.denoised >= 0 ? fmt::format(" ({:.1f}% before denoising)", 100 * r.noise) : "", r.samples);
+  b.line("error", text);
+  if (b.plan.bake.error > 0 && c.error > b.plan.bake.error + 2 * c.uncertain)
+    b.line("", fmt::format("above the {:.3g}% asked for: {}", 100 * b.plan.bake.error,
+                           c.noise > 0.8 * c.error ? "more rays would help (--samples, or no --time)"
+                                                   : "what is lost lies between receivers (--quality final, or "
+                                                     "--max-edge, has more)"));
+}
+
 // What all kinds say, before what each has said of itself.
 void summarize(Bake& b) {
   const BakeReport& r = b.report;
@@ -269,7 +313,7 @@ void summarize(Bake& b) {
   if (r.operator_kept < 1)
     b.line("memory", fmt::format("{:.0f}% of the gather operator fitted; the rest was traced again for each bounce",
                                  100 * r.operator_kept));
-  if (r.error >= 0) b.line("error", fmt::format("{:.2f}% RMS, estimated from half-sample gathers", 100 * r.error));
+  summarize_error(b);
 }
 
 Result<void> begin(Bake& b) {
@@ -277,6 +321,9 @@ Result<void> begin(Bake& b) {
   auto scene = load_scene_of(b.request, b.job);
   if (!scene) return scene.error();
   b.scene = std::move(*scene);
+  auto adapted = adapt_scene(b.scene, b.request, b.plan, b.job);
+  if (!adapted) return adapted.error();
+  b.adapted = *adapted;
   auto placed = place_receivers(b.scene, b.request, b.job);
   if (!placed) return placed.error();
   b.placed = std::move(*placed);

@@ -8,6 +8,7 @@
 #include <lambent/scene/gltf.h>
 #include <lambent/scene/lights.h>
 #include <lambent/scene/load.h>
+#include <lambent/scene/pose.h>
 #include <lambent/scene/refine.h>
 
 #include <fmt/format.h>
@@ -18,6 +19,8 @@
 
 namespace lambent {
 namespace {
+
+constexpr double least_error = 1e-4;
 
 constexpr int max_lamps = 64, max_directional = 256;
 constexpr const char* light_syntax = "sh:BANDS, sh:BANDS+lamps:COUNT@ENV, or directional:COUNT";
@@ -104,6 +107,44 @@ Result<void> parse_bounces(const std::string& text, int& count, double& converge
   return {};
 }
 
+// "2%" or "0.02".
+Result<double> parse_error(const std::string& text) {
+  const bool percent = text.ends_with("%");
+  auto number = parse_numbers(percent ? text.substr(0, text.size() - 1) : text, 1, "--error");
+  if (!number) return number.error();
+  const double error = double((*number)[0]) / (percent ? 100 : 1);
+  if (error >= least_error && error <= 1) return error;
+  return Error{"--error", "must lie between 0.01% and 100%, not " + text, true};
+}
+
+struct Quality {
+  double error;
+  float shortest;         // edges, as parts of the diagonal
+  double triangles_more;  // at most, of those that there are,
+  size_t triangles;       // and so many
+};
+const std::map<std::string, Quality> qualities{{"preview", {0.1, 5e-3f, 0.5, 30'000}},
+                                               {"good", {0.025, 2e-3f, 1, 150'000}},
+                                               {"final", {0.01, 5e-4f, 3, 1'000'000}}};
+
+// How well: rays and mesh.
+Result<void> plan_error(const BakeRequest& r, BakePlan& plan) {
+  const Quality& q = qualities.at(r.quality);
+  double error = q.error;
+  if (!r.error.empty()) {
+    auto parsed = parse_error(r.error);
+    if (!parsed) return parsed.error();
+    error = *parsed;
+  }
+  if (r.samples == 0) plan.bake.error = error;
+  plan.bake.seconds = r.time;
+  plan.adapts = plan.kind == BakeKind::diffuse && r.receivers == "vertices" && r.shadows == "on" &&
+                r.subsurface.empty() && (r.adapt == "on" || (r.adapt == "auto" && r.samples == 0 && r.max_edge == 0));
+  plan.adapt.error = 0.8 * error, plan.adapt.shortest = q.shortest, plan.adapt.seed = r.seed;
+  plan.adapt.more = q.triangles_more, plan.adapt.triangles = q.triangles;
+  return {};
+}
+
 Result<int> parse_visibility(const std::string& text) {
   if (text == "binary") return 1;
   int bits = 0;
@@ -169,8 +210,9 @@ Result<BakePlan> plan_of(const BakeRequest& r, const Job& job) {
   BakePlan plan;
   plan.kind = kind_of(r);
   BakeOptions& b = plan.bake;
-  b.samples = r.samples, b.memory = r.memory, b.seed = r.seed, b.shadows = r.shadows == "on";
-  b.keep_terms = r.terms;
+  b.samples = std::max(r.samples, 1), b.memory = r.memory, b.seed = r.seed, b.shadows = r.shadows == "on";
+  b.keep_terms = r.terms, b.denoise = r.denoise == "on";
+  if (auto ok = plan_error(r, plan); !ok) return ok.error();
   const Precision precision = r.precision == "half" ? Precision::half : Precision::single;
   const bool lobes = plan.kind == BakeKind::zonal || plan.kind == BakeKind::glossy_zonal;
   b.precision = lobes ? Precision::single : precision;  // lobes are rounded once, when they are fitted
@@ -183,7 +225,7 @@ Result<BakePlan> plan_of(const BakeRequest& r, const Job& job) {
   plan.matrix.simulate_paths = r.simulate == "paths";
   if (auto ok = parse_outgoing(r.outgoing, plan.matrix); !ok) return ok.error();
   plan.zonal.lobes = r.lobes, plan.zonal.precision = precision;
-  plan.lattice = {r.lattice_order, r.samples, r.memory, r.seed, precision};
+  plan.lattice = {r.lattice_order, r.samples > 0 ? r.samples : 1024, r.memory, r.seed, precision};
   if (!r.compress.empty())
     if (auto ok = parse_cpca(r.compress, plan.cpca); !ok) return ok.error();
   if (!r.subsurface.empty()) {
@@ -287,6 +329,21 @@ Result<Scene> load_scene_of(const BakeRequest& r, const Job& job) {
   for (const std::string& w : scene->warnings) job.warn(w);
   warn_of_unlit(*scene, job);
   return scene;
+}
+
+Result<std::optional<AdaptReport>> adapt_scene(Scene& scene, const BakeRequest& request, const BakePlan& plan,
+                                               const Job& job) {
+  if (!plan.adapts) return std::optional<AdaptReport>();
+  const auto animations = list_animations(scene);
+  const bool moves = scene.document && (scene.document->json.contains("skins") || (animations && !animations->empty()));
+  if (moves) {
+    if (request.adapt == "on")
+      return Error{"--adapt", "splits no mesh that moves: the scene has bones or an animation", true};
+    return std::optional<AdaptReport>();
+  }
+  auto report = adapt(scene, plan.adapt, job.progress);
+  if (!report) return report.error();
+  return std::optional(*report);
 }
 
 Result<Lattice> lattice_of_request(const BakeRequest& r, const Scene& scene) {

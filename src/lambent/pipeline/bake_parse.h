@@ -1,5 +1,6 @@
 #pragma once
 // The small syntaxes of a bake request, read into the options of the stages.
+#include <lambent/bake/adapt.h>
 #include <lambent/bake/lattice.h>
 #include <lambent/bake/lightmap.h>
 #include <lambent/bake/matrix.h>
@@ -9,6 +10,8 @@
 #include <lambent/compress/zonal_fit.h>
 #include <lambent/pipeline/bake.h>
 #include <lambent/scene/reflection.h>
+
+#include <optional>
 
 namespace lambent {
 
@@ -23,6 +26,8 @@ struct BakePlan {
   LightmapOptions lightmap;
   VisibilityOptions visibility;
   Reflection reflection;
+  bool adapts = false;  // where the scene can be
+  AdaptOptions adapt;
 };
 
 // Errors name the option. Loads the environment that --light names.
@@ -30,6 +35,10 @@ Result<BakePlan> plan_of(const BakeRequest& request, const Job& job);
 
 // Scenes as the request prepares them; warnings go to the job.
 Result<Scene> load_scene_of(const BakeRequest& request, const Job& job);
+
+// Splits the scene's edges where the plan says so and the scene has no bones; nothing where not.
+Result<std::optional<AdaptReport>> adapt_scene(Scene& scene, const BakeRequest& request, const BakePlan& plan,
+                                               const Job& job);
 
 Result<Lattice> lattice_of_request(const BakeRequest& request, const Scene& scene);
 

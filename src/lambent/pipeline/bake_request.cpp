@@ -43,7 +43,20 @@ const Option<R> table[] = {
      "WIDTHxHEIGHT of the atlas; texels are as small as that allows (1024x1024 if nothing is said)", 0, 0, nullptr,
      "receivers=texels"},
 
-    {"samples", &R::samples, "How well", traced, "Rays a receiver", 1, 1 << 20},
+    {"quality", &R::quality, "How well", D,
+     "An error to bake to, and how fine a mesh may become: 10 %, 2.5 % or 1 % of the transfer's RMS", 0, 0,
+     "preview|good|final"},
+    {"error", &R::error, "How well", D,
+     "Bake to this relative RMS error, e.g. 2%, measured on rays and places of their own; says what it reached"},
+    {"time", &R::time, "How well", D, "Seconds after which no more rays are asked for, whatever the error", 0, 1e6},
+    {"adapt", &R::adapt, "How well", D,
+     "Split edges where light changes: auto does it for scenes without bones, where neither --samples nor --max-edge "
+     "is given",
+     0, 0, "auto|on|off", "receivers=vertices"},
+    {"denoise", &R::denoise, "How well", D | Z | F, "Take away noise that neighbours on a surface do not share", 0, 0,
+     "on|off"},
+    {"samples", &R::samples, "How well", traced,
+     "Rays a receiver; without, diffuse transfer is baked to an error, other kinds with 1024", 1, 1 << 20},
     {"bounces", &R::bounces, "How well", D | M | Z | G | L,
      "Reflections between surfaces, 0 to 64; lightmaps also converge:EPS, as many as leave that residual"},
     {"shadows", &R::shadows, "How well", D | Z, "off: open light everywhere, no shadows and no bounces", 0, 0,
@@ -161,6 +174,17 @@ constexpr Conflict conflicts[] = {
     {"terms", "direct=separate", "have direct light apart already"},
     {"terms", "directional=sh|hl2|vector", "are not kept of directional lightmaps"},
     {"atlas", "texels-per-unit", "excludes --texels-per-unit"},
+    {"error", "samples", "says how many rays: leave --samples out"},
+    {"time", "samples", "ends what --error asks for: leave --samples out"},
+    {"error", "subsurface", "is not measured of media: leave --subsurface out"},
+    {"error", "shadows=off", "is none without shadows"},
+    {"time", "subsurface", "is not heeded by media: leave --subsurface out"},
+    {"time", "shadows=off", "is next to none without shadows"},
+    {"denoise", "subsurface", "does not go with media"},
+    {"denoise", "shadows=off", "has no noise to take away without shadows"},
+    {"quality", "subsurface", "is not measured of media: leave --subsurface out"},
+    {"quality", "shadows=off", "is the same for all without shadows"},
+    {"adapt", "shadows=off", "looks for shadows"},
 };
 
 // Given options that conflict; a default conflicts with nothing.
@@ -226,6 +250,8 @@ Result<BakeRequest> resolved(BakeRequest r) {
   if (auto ok = check_kind(r, kind); !ok) return ok.error();
   if (kind == BakeKind::factors || r.shadows == "off") r.bounces = "0";
   if (r.order == 0 && r.light.empty() && kind != BakeKind::lightmap && kind != BakeKind::blocks) r.order = 6;
+  if (kind != BakeKind::diffuse || !r.subsurface.empty() || r.shadows == "off")
+    if (r.samples == 0) r.samples = 1024;
   if (r.receivers == "texels" && r.atlas.empty() && !(r.texels_per_unit > 0)) r.atlas = "1024x1024";
   if (r.shadows == "on") r.given.erase("shadows");
   return r;

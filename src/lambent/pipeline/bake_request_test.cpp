@@ -120,6 +120,11 @@ const std::map<std::string, Change> changes{
     {"precision", {"single"}},
     {"texels_per_unit", {5.0, {{"receivers", "texels"}}}},
     {"atlas", {"32x32", {{"receivers", "texels"}}}},
+    {"quality", {"preview", {{"adapt", "on"}}}},
+    {"error", {"60%", {{"samples", nullptr}}}},
+    {"time", {0.0, {{"samples", nullptr}, {"error", "0.1%"}, {"bounces", "0"}}}},
+    {"adapt", {"on", {{"quality", "final"}}}},
+    {"denoise", {"off"}},
     {"samples", {48}},
     {"bounces", {"1"}},
     {"shadows", {"off"}},
@@ -172,7 +177,9 @@ TEST_F(Requests, EveryOptionHasAnEffectOrIsRefusedByName) {
       nlohmann::json before = least(BakeKind(k));
       if (name == "light") before.erase("order");
       if (name == "light_units") before["scene"] = at("lit.glb");
-      for (const auto& [key, value] : change.with.items()) before[key] = value;
+      for (const auto& [key, value] : change.with.items())  // null: without it
+        if (!value.is_null()) before[key] = value;
+        else if (o.kinds >> k & 1) before.erase(key);
       if (change.with.contains("receivers") && (o.kinds >> k & 1)) before.erase(name);
       if (name == "size") before["size"] = "16x12";
       nlohmann::json after = before;

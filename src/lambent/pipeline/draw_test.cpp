@@ -82,12 +82,14 @@ TEST_F(Drawings, ReflectionsOneByOneAddUp) {
   const BakeRequest diffuse{.scene = at("room.obj"),
                             .precision = "single",
                             .max_edge = 0.4f,
+                            .denoise = "off",  // each bake would have weights of its own
                             .samples = 64,
                             .bounces = "2",
                             .terms = true,
-                            .given = {"precision", "max_edge", "samples", "bounces", "terms"}};
+                            .given = {"precision", "max_edge", "denoise", "samples", "bounces", "terms"}};
   BakeRequest lightmap = diffuse;
-  lightmap.transfer = "lightmap", lightmap.atlas = "64x64", lightmap.light_groups = true, lightmap.max_edge = 0;
+  lightmap.transfer = "lightmap", lightmap.atlas = "64x64", lightmap.light_groups = true, lightmap.max_edge = 0,
+  lightmap.denoise = "on";
   lightmap.given = {"precision", "samples", "bounces", "terms", "transfer", "atlas", "light_groups"};
   for (const BakeRequest& asked : {diffuse, lightmap}) {
     SCOPED_TRACE(asked.transfer);

@@ -185,7 +185,8 @@ TEST(Glass, HitsAreDrawnWithTheirShares) {
 TEST(Glass, DiffuseBakesAreTinted) {
   const World glazed(with(stained())), dark(with(smoked(0.75f))), open = opened(glazed);
   for (int bounces : {0, 2}) {
-    BakeOptions o{.order = 4, .samples = 512, .bounces = bounces, .precision = Precision::single};
+    // Denoised, each would have weights of its own.
+    BakeOptions o{.order = 4, .samples = 512, .bounces = bounces, .precision = Precision::single, .denoise = false};
     o.lobes = {{normalize(Vec3(1, 0.2f, 0.1f)), 4}, {normalize(Vec3(1, 0.1f, -0.2f)), 500}};  // broad and sharp
     auto a = bake(open.scene, open.tracer, open.receivers, o),
          b = bake(glazed.scene, glazed.tracer, glazed.receivers, o),
@@ -245,7 +246,8 @@ TEST(Glass, MatricesAreTinted) {
 
 TEST(Glass, LatticesAreTinted) {
   const World glazed(with(stained())), open = opened(glazed);
-  const BakeOptions o{.order = 3, .samples = 256, .bounces = 1, .precision = Precision::single};
+  // Denoised, each would have weights of its own.
+  const BakeOptions o{.order = 3, .samples = 256, .bounces = 1, .precision = Precision::single, .denoise = false};
   const Lattice lattice{Vec3(0.5f), Vec3(3.5f, 2.5f, 3.5f), 2, 2, 2};
   auto baked = [&](const World& w) {
     auto t = bake(w.scene, w.tracer, w.receivers, o);

@@ -13,6 +13,9 @@
 namespace lambent {
 namespace {
 
+// That most scenes need for the default error, all rounds together.
+constexpr int expected_samples = 512;
+
 using Clock = std::chrono::steady_clock;
 double seconds_since(Clock::time_point start) { return std::chrono::duration<double>(Clock::now() - start).count(); }
 
@@ -47,7 +50,8 @@ double expected_seconds(const Scene& scene, const Tracer& tracer, const Receiver
   constexpr size_t most_blocks = 24;
   const size_t blocks = (receivers.count() + gather_block - 1) / gather_block, sampled = std::min(blocks, most_blocks);
   const int order = std::max(1, plan.bake.order);
-  const GatherSetup setup = make_gather_setup(scene, tracer, receivers, order, r.samples, r.seed);
+  const GatherSetup setup =
+      make_gather_setup(scene, tracer, receivers, order, r.samples > 0 ? r.samples : expected_samples, r.seed);
   std::atomic<size_t> done{0};
   const auto start = Clock::now();
   parallel_for(sampled, 1, [&](size_t begin, size_t end) {
@@ -75,6 +79,7 @@ Result<Summary> plan_bake(const BakeRequest& asked, const Job& job) {
   if (!plan) return plan.error();
   auto scene = load_scene_of(*request, job);
   if (!scene) return scene.error();
+  if (auto ok = adapt_scene(*scene, *request, *plan, job); !ok) return ok.error();
   const size_t groups = plan->kind == BakeKind::lightmap ? make_lamps(*scene, nullptr, request->light_groups).groups()
                                                          : 0;
   auto placed = place_receivers(*scene, *request, job);

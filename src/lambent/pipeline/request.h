@@ -26,7 +26,9 @@ struct BakeRequest {
   float max_edge = 0, max_albedo = 1;
   std::vector<std::string> emit, exclude;
   // Rays
-  int samples = 1024;
+  std::string quality = "good", error, denoise = "on", adapt = "auto";
+  double time = -1;  // seconds; negative: no limit
+  int samples = 0;   // 0: as many as the error asks for, or, of kinds that are not baked to an error, 1024
   std::string bounces = "3";
   std::string shadows = "on";
   bool terms = false;

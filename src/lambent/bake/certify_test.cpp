@@ -1,0 +1,117 @@
+#include <lambent/bake/bake.h>
+#include <lambent/bake/certify.h>
+#include <lambent/core/random.h>
+#include <lambent/scene/procedural.h>
+#include <lambent/scene/refine.h>
+
+#include <gtest/gtest.h>
+
+#include <cmath>
+
+namespace lambent {
+namespace {
+
+TEST(Certificate, OfAParabolaBetweenReceiversIsTheClosedForm) {
+  // x^2 over the unit square in cells of h: piecewise linear interpolation loses x (h - x) within each, RMS h^2 /
+  // sqrt(30); the RMS of x^2 is 1 / sqrt(5).
+  constexpr int cells = 4;
+  const double h = 1.0 / cells;
+  const Scene scene = make_quad(Vec3(0), Vec3(0, 0, 1), Vec3(1, 0, 0), cells, cells, Vec3(0.5f));
+  const Receivers receivers = make_vertex_receivers(scene);
+  constexpr size_t width = 16;
+  auto truth = [](Vec3 p) { return p.x * p.x; };
+  std::vector<float> rows(receivers.count() * width, 0.0f);
+  for (size_t v = 0; v < scene.positions.size(); ++v)
+    rows[size_t(receivers.front[v]) * width] = truth(scene.positions[v]);
+  // Each gather is right in the mean alone, with noise a hundred times the error looked for.
+  const GatherAt noisy = [&](Vec3 origin, Vec3, uint64_t key, float* row) {
+    std::fill_n(row, width, 0.0f);
+    for (size_t k = 0; k < width; ++k) row[k] = 0.02f * (Random(key, k).next() - 0.5f);
+    row[0] += truth(origin);
+    return true;
+  };
+  auto certificate = certify(scene, receivers, rows.data(), width, noisy, 4000, 1);
+  ASSERT_TRUE(certificate);
+  const double expected = h * h / std::sqrt(30.0) * std::sqrt(5.0);
+  EXPECT_NEAR(certificate->error, expected, 0.05 * expected);
+  EXPECT_NEAR(certificate->error, expected, 4 * certificate->uncertain);
+  EXPECT_LT(certificate->uncertain, 0.03 * expected);
+  ASSERT_EQ(certificate->parts.size(), 1u);
+  EXPECT_EQ(certificate->parts[0], certificate->error);
+}
+
+TEST(Certificate, PlacesInsideSomethingDoNotCount) {
+  const Scene scene = make_quad(Vec3(0), Vec3(0, 0, 1), Vec3(1, 0, 0), 1, 1, Vec3(0.5f));
+  const Receivers receivers = make_vertex_receivers(scene);
+  const std::vector<float> rows(receivers.count() * 16, 1.0f);
+  const GatherAt half = [](Vec3 origin, Vec3, uint64_t, float* row) {
+    std::fill_n(row, 16, 1.0f);
+    return origin.x < 0.5f;
+  };
+  auto certificate = certify(scene, receivers, rows.data(), 16, half, 1000, 1);
+  ASSERT_TRUE(certificate);
+  EXPECT_NEAR(double(certificate->places), 500, 20);
+  EXPECT_NEAR(certificate->error, 0, 1e-6);
+  const GatherAt nowhere = [](Vec3, Vec3, uint64_t, float*) { return false; };
+  auto none_left = certify(scene, receivers, rows.data(), 16, nowhere, 100, 1);
+  ASSERT_TRUE(none_left);
+  EXPECT_LT(none_left->error, 0);
+}
+
+// The field against one of a mesh refined twice and many rays, at its vertices, weighed by area.
+double true_error(const Scene& coarse, const Receivers& receivers, const Transfer& stored, const BakeOptions& options) {
+  Scene fine = coarse;
+  for (int k = 0; k < 2; ++k) split_edges(fine, [](Vec3, Vec3) { return true; });
+  auto tracer = Tracer::build(fine);
+  const Receivers at = make_vertex_receivers(fine);
+  BakeOptions many = options;
+  many.samples = 2048, many.seed = 77, many.denoise = many.certify = false;
+  auto truth = bake(fine, *tracer, at, many);
+  // Where the fine vertices lie on the coarse mesh, by a ray from just above them.
+  auto coarse_tracer = Tracer::build(coarse);
+  std::vector<double> area(at.count(), 0);
+  const auto& corners = std::get<CornerReceivers>(at.basis);
+  for (uint32_t t = 0; t < fine.triangles.size(); ++t) {
+    const uint32_t* v = fine.triangles[t].v;
+    const double share =
+        length(cross(fine.positions[v[1]] - fine.positions[v[0]], fine.positions[v[2]] - fine.positions[v[0]])) / 6;
+    if (const Corners* c = corners.find(t, true))
+      for (uint32_t r : c->receiver) area[r] += share;
+  }
+  double error2 = 0, truth2 = 0;
+  for (size_t r = 0; r < at.count(); ++r) {
+    if (!(area[r] > 0)) continue;
+    const Hit hit = coarse_tracer->closest(at.origins[r] + 0.01f * at.normals[r], -at.normals[r]);
+    const auto& basis = std::get<CornerReceivers>(receivers.basis);
+    const Corners* c = hit.triangle == none ? nullptr : basis.find(hit.triangle, hit.front);
+    if (!c || hit.distance > 0.02f) continue;
+    const std::vector<float> exact = load_receiver(*truth, r);
+    std::vector<float> value(exact.size(), 0.0f);
+    basis.spread(*c, hit.u, hit.v, [&](uint32_t receiver, float w) {
+      const std::vector<float> row = load_receiver(stored, receiver);
+      for (size_t k = 0; k < row.size(); ++k) value[k] += w * row[k];
+    });
+    for (size_t k = 0; k < exact.size(); ++k)
+      error2 += area[r] * double(value[k] - exact[k]) * double(value[k] - exact[k]),
+          truth2 += area[r] * double(exact[k]) * double(exact[k]);
+  }
+  return std::sqrt(error2 / truth2);
+}
+
+TEST(Certificate, IsHonest) {
+  const Scene scenes[] = {make_courtyard(0.12f)};
+  for (const Scene& scene : scenes)
+    for (const int samples : {32, 256}) {
+      auto tracer = Tracer::build(scene);
+      const Receivers receivers = make_vertex_receivers(scene);
+      const BakeOptions options{.order = 4, .samples = samples, .bounces = 1, .seed = uint32_t(samples)};
+      BakeReport report;
+      auto stored = bake(scene, *tracer, receivers, options, &report);
+      ASSERT_TRUE(stored);
+      const double truth = true_error(scene, receivers, *stored, options);
+      EXPECT_NEAR(report.certificate.error / truth, 1, 0.2) << samples << " rays, truth " << truth;
+    }
+}
+
+}  // namespace
+}  // namespace lambent
