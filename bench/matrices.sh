@@ -46,7 +46,8 @@ measure() {
   truth=$out/${scene}_$(tr ':=,/' '____' <<<"${brdf}_$order")
   $tool bake "$file" --transfer matrix --brdf "$brdf" --order "$order" --bounces 0 --samples "$samples" "$@" \
     -o "$to.glb" --json >"$to.bake.json" 2>/dev/null
-  $tool render "$to.glb" --env "$env" --size "$size" --spp 64 --background none -o "$to.exr" --json >"$to.render.json"
+  $tool render "$to.glb" --env "$env" --size "$size" --spp 64 --window none --background none -o "$to.exr" \
+    --json >"$to.render.json"
   if [ ! -f "$truth.exr" ]; then
     for half in 1 2; do
       $tool reference "$file" --brdf "$brdf" --env "$env" --light-order "$order" --bounces 0 --spp $((spp / 2)) \

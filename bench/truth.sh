@@ -21,7 +21,7 @@ while IFS='|' read -r name file options camera; do
   for env in chinese_garden_1k circus_arena_1k; do
     pair=$out/${name}_$env
     $tool render $out/$name.glb --env "$data/environments/$env.hdr" --camera "$camera" --size "$size" --spp 256 \
-      --background none -o $pair.exr >/dev/null
+      --window none --background none -o $pair.exr >/dev/null
     # shellcheck disable=SC2086
     for half in 1 2; do
       $tool reference "$data/meshes/$file" $options --env "$data/environments/$env.hdr" --light-order $order \

@@ -90,8 +90,8 @@ void advise(Report& r, const Baked& baked, const BakeRequest& request) {
                     basis.order, 100 * r.energy, basis.order));
   if (r.clipped.negative > 0.01)
     r.advice.push_back(
-        fmt::format("{:.1f} % of the pixels are darker than black: harmonics of a sharp lamp ring. `render "
-                    "--window auto` smooths them",
+        fmt::format("{:.1f} % of the pixels are darker than black: harmonics of a sharp lamp ring. A bake with "
+                    "--light sh:N+lamps:4@ENV or --transfer blocks holds the lamps",
                     100 * r.clipped.negative));
   const double mean = r.same.difference.mean_b > 0 ? r.same.difference.mean_a / r.same.difference.mean_b : 1;
   if (r.same.difference.psnr < std::min(r.same.noise - 3, 40.0)) {
@@ -213,8 +213,12 @@ Result<Report> check(const CheckCommand& o, const Job& job) {
   if (basis.count() > 0) {
     const LightProjection projection = project_light(*env, basis, *rotation);
     const Environment known = reconstruct_environment(projection.basis, projection.light);
-    auto same = judge(r, ours, "Path-traced under the light that the bake knows", baked.scene, known, view->camera,
-                      options, *job.progress);
+    // That light rings in the reference too.
+    drawn.window = "none";
+    auto ringing = draw(baked, drawn, job);
+    if (!ringing) return ringing.error();
+    auto same = judge(r, ringing->frames.front(), "Path-traced under the light that the bake knows", baked.scene, known,
+                      view->camera, options, *job.progress);
     if (!same) return same.error();
     r.same = *same, r.energy = std::min(1.0, squared_radiance(known) / std::max(squared_radiance(turned), 1e-30));
   }

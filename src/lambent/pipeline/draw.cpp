@@ -8,6 +8,7 @@
 #include <lambent/pipeline/draw_texture.h>
 #include <lambent/pipeline/motion.h>
 #include <lambent/pipeline/text.h>
+#include <lambent/relight/dering.h>
 #include <lambent/relight/relighter.h>
 
 #include <fmt/format.h>
@@ -45,6 +46,7 @@ struct ColumnDrawing {
   Rows rows = {};                          // the surface's, or those of other materials
   std::deque<Field> terms = {};            // of the Neumann series, where they are drawn one by one
   std::vector<Relighter> relighters = {};  // what they give is summed
+  std::vector<Relighter> of_peaks = {};    // the same of the light's peaks; none where nothing rings
   std::vector<Vec3> emission = {};
   double relight_seconds = 1e9;
 
@@ -60,9 +62,10 @@ Result<void> choose_light(ColumnDrawing& d) {
   auto light = column_light(d.request, d.around, basis, d.scene().origin);
   if (!light) return light.error();
   d.light = std::move(*light);
+  if (std::holds_alternative<Outgoing>(d.rows)) soften_peaks(d.light);
   if (d.show.part != Show::Part::bounce) d.emission = seen_emission(d.scene(), basis, d.light.lamps);
   if (d.show.part == Show::Part::emission)
-    std::fill(d.light.projection.light.begin(), d.light.projection.light.end(), Vec3(0.0f));
+    std::fill(d.light.projection.light.begin(), d.light.projection.light.end(), Vec3(0.0f)), d.light.peaks.clear();
   if (!d.request.env.empty() && basis.order == 0 && basis.lobes.empty() && !d.around.seen)
     d.job.warn(d.request.baked + ": holds lamps alone, so that --env neither lights it nor, unseen, shows");
   return {};
@@ -80,12 +83,32 @@ Result<void> make_relighters(ColumnDrawing& d) {
     if (!relighter) return Error{d.request.baked, relighter.error().message};
     if (auto ok = relighter->set_light(d.light.projection.light); !ok) return ok;
     d.relighters.push_back(std::move(*relighter));
+    if (d.light.peaks.empty()) continue;
+    d.of_peaks.push_back(*Relighter::make(*field));
+    if (auto ok = d.of_peaks.back().set_light(d.light.peaks); !ok) return ok;
   }
   return {};
 }
 
-// T . light, in that pose.
-Result<void> relight(ColumnDrawing& d, const std::optional<Pose>& pose, Relit& out) {
+Result<void> sum_relit(std::vector<Relighter>& relighters, const RelightFrame& frame, Relit& out) {
+  Relit part;
+  for (size_t i = 0; i < relighters.size(); ++i) {
+    if (auto ok = relighters[i].relight(frame, i == 0 ? out : part); !ok) return ok;
+    if (i > 0)
+      std::transform(part.values.begin(), part.values.end(), out.values.begin(), out.values.begin(), std::plus());
+  }
+  return {};
+}
+
+// Whether every number of T . light is of what cannot be negative; else that is seen at the pixel.
+bool each_is_light(const Rows& rows) {
+  const auto* directional = std::get_if<DirectionalRows>(&rows);
+  return !std::holds_alternative<Outgoing>(rows) &&
+         (!directional || directional->kind == DirectionalKind::none || directional->kind == DirectionalKind::hl2);
+}
+
+// T . light, in that pose; `peaks` is of light's peaks, where rows have still to be held above 0, else without rows.
+Result<void> relight(ColumnDrawing& d, const std::optional<Pose>& pose, Relit& out, Relit& peaks) {
   RelightFrame frame;
   ReceiverFrames frames;
   LightField field;
@@ -99,12 +122,11 @@ Result<void> relight(ColumnDrawing& d, const std::optional<Pose>& pose, Relit& o
     frame.light = &field;
   }
   const auto start = std::chrono::steady_clock::now();
-  Relit part;
-  for (size_t i = 0; i < d.relighters.size(); ++i) {
-    if (auto ok = d.relighters[i].relight(frame, i == 0 ? out : part); !ok)
-      return Error{d.request.baked, ok.error().message};
-    if (i > 0)
-      std::transform(part.values.begin(), part.values.end(), out.values.begin(), out.values.begin(), std::plus());
+  if (auto ok = sum_relit(d.relighters, frame, out); !ok) return Error{d.request.baked, ok.error().message};
+  if (!d.of_peaks.empty()) {
+    frame.light = nullptr;  // near lamps are in none of the peaks
+    if (auto ok = sum_relit(d.of_peaks, frame, peaks); !ok) return Error{d.request.baked, ok.error().message};
+    if (each_is_light(d.rows)) dering(out, peaks), peaks = {};
   }
   d.relight_seconds =
       std::min(d.relight_seconds, std::chrono::duration<double>(std::chrono::steady_clock::now() - start).count());
@@ -132,9 +154,11 @@ Result<RelitScene> with_insertions(ColumnDrawing& d, Relit relit) {
 }
 
 // O(view): what the rows mean says how.
-Result<Image> shade(ColumnDrawing& d, const std::optional<Pose>& pose, Relit relit, const View& view) {
+Result<Image> shade(ColumnDrawing& d, const std::optional<Pose>& pose, Relit relit, const Relit& peaks,
+                    const View& view) {
   RenderOptions options{view.width, view.height, d.request.spp, d.around.background(), d.show.colour};
   options.emission = d.emission;
+  if (!peaks.values.empty() && d.insertions.empty()) options.peaks = &peaks;
   Rows rows = d.rows;
   if (auto* outgoing = std::get_if<Outgoing>(&rows); outgoing && pose && d.turns())
     *outgoing = turn_outgoing(*outgoing, receiver_rotations(*pose, d.where(), d.receivers()));
@@ -211,9 +235,9 @@ Result<Drawing> draw_columns(const Baked& baked, const DrawRequest& request, con
   if (auto ok = make_relighters(d); !ok) return ok.error();
   Drawing drawing;
   for (const std::optional<Pose>& pose : *poses) {
-    Relit relit;
-    if (auto ok = relight(d, pose, relit); !ok) return ok.error();
-    auto image = shade(d, pose, std::move(relit), *view);
+    Relit relit, peaks;
+    if (auto ok = relight(d, pose, relit, peaks); !ok) return ok.error();
+    auto image = shade(d, pose, std::move(relit), peaks, *view);
     if (!image) return image.error();
     drawing.frames.push_back(std::move(*image));
   }
@@ -223,6 +247,13 @@ Result<Drawing> draw_columns(const Baked& baked, const DrawRequest& request, con
                           {"window", light.window},       {"relight_seconds", d.relight_seconds}};
   drawing.summary.lines.emplace_back(
       "relit", fmt::format("{} receivers in {:.2f} ms", human_count(d.receivers()), 1e3 * d.relight_seconds));
+  drawing.summary.json["sharp_light"] = d.light.sharp;
+  if (!d.light.peaks.empty())
+    drawing.summary.lines.emplace_back(
+        "sharp",
+        fmt::format("{:.0f} % of the light is sharper than {} bands, and kept from ringing: its shadows are "
+                    "sharp with `lambent bake --light sh:{}+lamps:{}@ENV` or `--transfer blocks`",
+                    100 * d.light.sharp, light.window.size(), light.window.size(), std::max(1, d.light.lamps_found)));
   return drawing;
 }
 

@@ -1,5 +1,8 @@
 #include <lambent/pipeline/draw_light.h>
 
+#include <lambent/light/lamps.h>
+#include <lambent/light/peaks.h>
+
 #include <fmt/format.h>
 #include <fmt/ranges.h>
 
@@ -39,10 +42,35 @@ Result<std::vector<Vec3>> lamps_of(const DrawRequest& request, const LightBasis&
   return lamps;
 }
 
+// With less of all light in them, peaks ring too little to be seen.
+constexpr double least_sharp = 0.05;
+
+// --window auto. Lobes in the basis hold the lamps already.
+void find_peaks(const DrawRequest& request, const Surroundings& around, const LightBasis& basis, ColumnLight& out) {
+  if (!basis.lobes.empty() || basis.order == 0) return;
+  const int order = request.light_order ? std::min(request.light_order, basis.order) : basis.order;
+  const std::vector<Vec3>& all = out.projection.light;
+  const std::vector<Vec3> rest =
+      project_light(without_peaks(*around.env, order), basis, around.rotation, request.light_order).light;
+  const double light = luminance(all[0]), sharp = luminance(all[0] - rest[0]);
+  if (!(sharp > least_sharp * light)) return;
+  out.sharp = sharp / light, out.lamps_found = int(find_lamps(*around.env, 8).size());
+  for (size_t k = 0; k < all.size(); ++k) out.peaks.push_back(all[k] - rest[k]);
+}
+
 }  // namespace
 
+void soften_peaks(ColumnLight& light) {
+  const std::vector<float> w = sh_window(ShWindow::lanczos, int(light.projection.window.size()));
+  for (size_t k = 0; k < light.peaks.size(); ++k) {
+    const size_t l = size_t(sh_band(int(k)));
+    const Vec3 softened = light.peaks[k] * (l < w.size() ? w[l] : 0.0f);
+    light.projection.light[k] += softened - light.peaks[k], light.peaks[k] = softened;
+  }
+}
+
 Result<ColumnLight> column_light(const DrawRequest& request, const Surroundings& around, const LightBasis& basis,
-                                 Vec3d origin) {
+                                 Vec3d origin, bool knows_shadows) {
   auto window = parse_window(request.window);
   if (!window) return window.error();
   auto near = parse_sphere_lamps(request.sphere_lamp, origin);
@@ -51,7 +79,10 @@ Result<ColumnLight> column_light(const DrawRequest& request, const Surroundings&
   if (!lamps) return lamps.error();
   ColumnLight out{std::move(*lamps), {}, std::move(*near)};
   if (around.env) {
-    out.projection = project_light(*around.env, basis, around.rotation, request.light_order, *window);
+    knows_shadows = knows_shadows && *window == ShWindow::automatic;
+    out.projection = project_light(*around.env, basis, around.rotation, request.light_order,
+                                   knows_shadows ? ShWindow::none : *window);
+    if (knows_shadows) find_peaks(request, around, basis, out);
   } else {
     out.projection.light.assign(basis.count(), Vec3(0.0f));
     const int order = request.light_order ? std::min(request.light_order, basis.order) : basis.order;

@@ -18,16 +18,23 @@ struct Surroundings {
 };
 Result<Surroundings> surroundings_of(const DrawRequest& request, const Job& job);
 
-// A coefficient a column, by the environment and by what the scene's own lamps are scaled by.
+// A coefficient a column, by the environment and by what the scene's own lamps are scaled by. `--window auto` finds
+// peaks, for who sees shadows; else it windows the light as weakly as keeps open surfaces from going dark.
 struct ColumnLight {
   std::vector<Vec3> lamps;     // by group
   LightProjection projection;  // lamps are in its columns
   std::vector<SphereLamp> near;
+  // What of the light is too sharp for its bands and rings, by column; empty where --window leaves it or there is none.
+  std::vector<Vec3> peaks = {};
+  double sharp = 0;  // the peaks' share of all light, where they are not empty
+  int lamps_found = 0;
   // Of each place its own, distant light included.
   LocalLight local() const { return {projection.light, near, projection.window}; }
 };
 Result<ColumnLight> column_light(const DrawRequest& request, const Surroundings& around, const LightBasis& basis,
-                                 Vec3d origin);
+                                 Vec3d origin, bool knows_shadows = true);
+// Windows the peaks (Lanczos), the whole with them: for surfaces that reflect a part of the sky at a time.
+void soften_peaks(ColumnLight& light);
 
 // What each material's surfaces emit, as they are seen; empty without groups.
 std::vector<Vec3> seen_emission(const Scene& scene, const LightBasis& basis, const std::vector<Vec3>& lamps);

@@ -29,8 +29,9 @@ const Option<R> table[] = {
     {"env-rotate", &R::env_rotate, "Light", every, "YAW,PITCH,ROLL: turn the environment, degrees about +Y, +X, +Z", 0,
      0, nullptr, "env"},
     {"window", &R::window, "Light", every & ~(L | K),
-     "Against ringing of the harmonics: none, hann, lanczos, or auto (as weak as keeps open surfaces from going dark)",
-     0, 0, "none|hann|lanczos|auto"},
+     "Against ringing of the harmonics: auto (light in shadow does not go below what the rest of the sky gives), hann, "
+     "lanczos, or none",
+     0, 0, "auto|hann|lanczos|none"},
     {"light-order", &R::light_order, "Light", every & ~(L | K),
      "Use only this many bands of the baked ones; lobes are kept", 1, max_sh_order},
     {"lamp", &R::lamp, "Light", D | C | M | L | V,
@@ -210,7 +211,7 @@ Result<void> check_draw(const DrawRequest& request, const Baked& baked) {
   const bool lit = show->part != Show::Part::emission && show->colour != RenderOptions::Show::albedo;
   if (lit && (light.order > 0 || !light.lobes.empty()) && request.env.empty() && request.sphere_lamp.empty())
     return Error{"--env", "is needed: the file is baked for distant light", true};
-  if (light.order == 0 && request.window != "none")
+  if (light.order == 0 && is_given(request, "window"))
     return Error{"--window", "shapes harmonics, and the file is baked for none", true};
   if (light.order == 0 && request.light_order > 0)
     return Error{"--light-order", "counts bands of harmonics, and the file is baked for none", true};

@@ -10,7 +10,7 @@ namespace lambent {
 struct DrawRequest {
   std::string baked, output;
   // Light
-  std::string env, env_rotate, window = "none";
+  std::string env, env_rotate, window = "auto";
   int light_order = 0;  // bands; 0: all that there are
   std::vector<std::string> lamp, sphere_lamp;
   // View

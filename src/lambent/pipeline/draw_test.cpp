@@ -78,6 +78,28 @@ void expect_equal(const Image& a, const Image& b) {
 }
 
 // Emission and all reflections add up to the picture, and the first of them to what a bake of as many gives.
+TEST_F(Drawings, LightIsHeldAboveZeroWhereItHasPeaksAlone) {
+  const auto baked =
+      bake_with_summary({.scene = at("room.obj"), .samples = 64, .bounces = "0", .given = {"samples", "bounces"}});
+  ASSERT_TRUE(baked) << baked.error().text();
+  auto drawn = [&](const std::string& env, const std::string& window) {
+    auto drawing = draw(baked->baked, {.env = env,
+                                       .window = window,
+                                       .camera = "3,2,4,1,0.8,0.8,40",
+                                       .size = "24x18",
+                                       .background = "none",
+                                       .spp = 4});
+    EXPECT_TRUE(drawing);
+    return std::move(*drawing);
+  };
+  EXPECT_EQ(drawn("uniform:1", "auto").frames[0].rgb, drawn("uniform:1", "none").frames[0].rgb);
+  EXPECT_EQ(drawn("uniform:1", "auto").summary.json["sharp_light"], 0.0);
+  const Drawing held = drawn("sky:elevation=20,azimuth=100,width=256", "auto");
+  EXPECT_GT(held.summary.json["sharp_light"].get<double>(), 0.2);
+  EXPECT_EQ(drawn("sky:elevation=20,azimuth=100,width=256", "none").summary.json["sharp_light"], 0.0);
+  for (Vec3 c : held.frames[0].rgb) EXPECT_GE(std::min({c.x, c.y, c.z}), 0.0f);
+}
+
 TEST_F(Drawings, ReflectionsOneByOneAddUp) {
   const BakeRequest diffuse{.scene = at("room.obj"),
                             .precision = "single",
@@ -98,7 +120,7 @@ TEST_F(Drawings, ReflectionsOneByOneAddUp) {
     ASSERT_EQ(whole->baked.terms.size(), 3u);
     const bool lamps = asked.transfer == "lightmap";
     DrawRequest request{.camera = "3,2,4,1,0.8,0.8,40", .size = "24x18", .background = "none", .spp = 4};
-    if (!lamps) request.env = sky;
+    if (!lamps) request.env = sky, request.window = "none";  // what is held above 0 does not add up
     const Image product = picture(whole->baked, request, "product");
     Image sum = lamps ? picture(whole->baked, request, "emission") : Image(24, 18);
     for (int k = 0; k < 3; ++k) {

@@ -64,7 +64,7 @@ Result<Drawing> draw_texture(const DrawRequest& request, const Job& job) {
   if (!poses) return poses.error();
   auto around = surroundings_of(request, job);
   if (!around) return around.error();
-  auto light = column_light(request, *around, LightBasis{.order = texture->transfer.order}, scene->origin);
+  auto light = column_light(request, *around, LightBasis{.order = texture->transfer.order}, scene->origin, false);
   if (!light) return light.error();
   const LocalLight local = light->local();
   Drawing drawing;

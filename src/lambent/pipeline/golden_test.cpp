@@ -18,6 +18,10 @@ DrawRequest golden_request(const std::string& name) {
   if (name != "diffuse_fixed_view") request.camera = "3,2,4,1,0.5,1,40", request.size = "16x12", request.spp = 4;
   if (name == "lightmap") request.lamp = {"lamp=1,0.5,0.25", "sky=0.5,1,2"};
   else if (name != "lightmap_directional") request.env = "sky:elevation=40,azimuth=20,turbidity=4";
+  // What they drew was not kept from ringing.
+  if (!request.env.empty() && !name.starts_with("blocks") && name != "diffuse_directional" &&
+      name.find("fixed_light") == std::string::npos)
+    request.window = "none";
   return request;
 }
 

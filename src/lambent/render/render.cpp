@@ -2,6 +2,7 @@
 #include <lambent/core/parallel.h>
 #include <lambent/core/random.h>
 #include <lambent/core/sampling.h>
+#include <lambent/relight/dering.h>
 #include <lambent/render/render.h>
 #include <lambent/scene/lights.h>
 #include <lambent/scene/reflection.h>
@@ -152,18 +153,24 @@ Result<Image> render(const Scene& scene, const Tracer& tracer, const SpatialBasi
             sum += options.emission[scene.parts[triangle.part].material] *
                    emission_texel(scene, triangle, hit.u, hit.v);
           if (options.directional == DirectionalKind::none) {
-            reflect_at(scene, basis, options, hit, direction, weights,
-                       [&](uint32_t receiver, int row, Vec3 weight) { sum += weight * relit.at(receiver, row); });
-            return sum;
+            Vec3 whole(0.0f), peaks(0.0f);
+            reflect_at(scene, basis, options, hit, direction, weights, [&](uint32_t receiver, int row, Vec3 weight) {
+              whole += weight * relit.at(receiver, row);
+              if (options.peaks) peaks += weight * options.peaks->at(receiver, row);
+            });
+            return sum + (options.peaks ? dering(whole, peaks) : whole);
           }
           const Vec3 colour = shown_colour(scene, options, hit);
-          std::array<Vec3, 9> rows{};
+          std::array<Vec3, 9> rows{}, peak_rows{};
           std::visit(
               [&](const auto& b) {
                 const auto* at = b.find(hit.triangle, hit.front);
                 if (!at) return;
                 b.spread(*at, hit.u, hit.v, [&](uint32_t receiver, float weight) {
-                  for (int row = 0; row < relit.rows; ++row) rows[size_t(row)] += weight * relit.at(receiver, row);
+                  for (int row = 0; row < relit.rows; ++row) {
+                    rows[size_t(row)] += weight * relit.at(receiver, row);
+                    if (options.peaks) peak_rows[size_t(row)] += weight * options.peaks->at(receiver, row);
+                  }
                 });
               },
               basis);
@@ -172,8 +179,11 @@ Result<Image> render(const Scene& scene, const Tracer& tracer, const SpatialBasi
           Vec3 n = normalize_or(interpolate(scene.normals, triangle, hit.u, hit.v), face);
           if (dot(n, face) < 0) n = -n;
           const Vec3 bent = mapped_normal(scene, triangle, hit.u, hit.v, n);
-          return sum +
-                 colour * evaluate_directional_light(options.directional, rows, receiver_frame(side * n), side * bent);
+          auto light = [&](const std::array<Vec3, 9>& of) {
+            return evaluate_directional_light(options.directional, of, receiver_frame(side * n), side * bent);
+          };
+          const Vec3 whole = light(rows);
+          return sum + colour * (options.peaks ? dering(whole, light(peak_rows)) : whole);
         };
       },
       progress);

@@ -21,6 +21,9 @@ struct RenderOptions {
   const Environment* background = nullptr;  // null: black, and the image has alpha (coverage)
   // The light that surfaces receive, as if they were white (radiosity); their colour; or the product of both.
   enum class Show { product, radiosity, albedo } show = Show::product;
+  // What of relit comes from the light's peaks, row by row: light is kept from ringing at the pixel (relight/dering.h).
+  // Null: as it is.
+  const Relit* peaks = nullptr;
   const Outgoing* outgoing = nullptr;  // the last reflection of transfer matrices; null: diffuse
   DirectionalKind directional =
       DirectionalKind::none;   // what relit's rows are; shaded with the normal that the normal texture gives
