@@ -33,19 +33,18 @@ TEST(Adapt, AShadowOnOneLargeTriangle) {
   Scene after = before;
   auto report = adapt(after, {.error = 0.01, .longest = 0.1f, .shortest = 1e-3f});
   ASSERT_TRUE(report);
-         certified(before));
-         EXPECT_EQ(report->before, before.triangles.size());
-         EXPECT_EQ(report->after, after.triangles.size());
-         EXPECT_GT(certified(before), 0.04);
-         EXPECT_LT(certified(after), 0.025);
-         // As many triangles spread evenly are worse.
-         Scene even = before;
-         float edge = 8;
-         for (; even.triangles.size() < after.triangles.size(); edge *= 0.9f) {
-           even = before;
-           ASSERT_TRUE(split_long_edges(even, edge));
-         }
-         EXPECT_LT(certified(after), 0.75 * certified(even));
+  EXPECT_EQ(report->before, before.triangles.size());
+  EXPECT_EQ(report->after, after.triangles.size());
+  EXPECT_GT(certified(before), 0.04);
+  EXPECT_LT(certified(after), 0.025);
+  // As many triangles spread evenly are worse.
+  Scene even = before;
+  float edge = 8;
+  for (; even.triangles.size() < after.triangles.size(); edge *= 0.9f) {
+    even = before;
+    ASSERT_TRUE(split_long_edges(even, edge));
+  }
+  EXPECT_LT(certified(after), 0.75 * certified(even));
 }
 
 TEST(Adapt, WhereNothingChangesNothingIsSplit) {
