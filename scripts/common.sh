@@ -4,7 +4,7 @@ cd "$(dirname "${BASH_SOURCE[0]}")/.."
 
 build_packages="g++ cmake ninja-build ccache pkg-config libembree-dev libtbb-dev libhwy-dev libeigen3-dev libopenexr-dev
   libstb-dev libxxhash-dev nlohmann-json3-dev libfmt-dev libcli11-dev libcpp-httplib-dev libgtest-dev
-  libdraco-dev libmeshoptimizer-dev libwebp-dev"
+  libdraco-dev libmeshoptimizer-dev libwebp-dev libnanoflann-dev"
 sanitize_packages="clang-14 libclang-rt-14-dev"
 
 # Installs the Debian packages named, if any is missing. Needs root or sudo only then.
