@@ -1,7 +1,7 @@
 #!/usr/bin/env python3
 """Prints SOURCE;GROUP;... of sources to compile together: up to eight of a folder, of which no two give the same name
-to a helper of their own (in namespace {}), an alias or a macro. Those of Highway, which includes them once a target, are
-left out, and stay on their own. Usage: groups.py FILE..."""
+to a helper of their own (in namespace {}), an alias or a macro. Those of Highway, which includes them once a target,
+are left out, and stay on their own. Usage: groups.py FILE..."""
 import collections
 import pathlib
 import re
