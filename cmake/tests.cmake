@@ -9,6 +9,9 @@ target_compile_options(lambent-tests PRIVATE -Wall -Wextra -Wno-missing-field-in
 # Most of what a test compiles are these headers.
 target_precompile_headers(lambent-tests PRIVATE <gtest/gtest.h> <algorithm> <cmath> <filesystem> <functional> <map>
   <string> <variant> <vector>)
+if(LAMBENT_SANITIZE)
+  lambent_compile_together(lambent-tests ${lambent_tests})
+endif()
 # What is hot in tests is the library: less optimised they build in two thirds of the time, and under the sanitizers
 # those of the readers in a third.
 target_compile_options(lambent-tests PRIVATE $<IF:$<BOOL:${LAMBENT_SANITIZE}>,-O0,$<$<CONFIG:Release>:-O1>>)

@@ -9,12 +9,12 @@ namespace lambent {
 namespace {
 
 // Per millimetre. Scattering is the reduced one, (1 - g) sigma_s, which with g = 0 spreads light alike.
-struct Measured {
+struct MeasuredMedium {
   const char* name;
   Vec3 sigma_s, sigma_a;
   float eta;
 };
-const Measured measured[] = {
+const MeasuredMedium measured[] = {
     {"apple", {2.29f, 2.39f, 1.97f}, {0.0030f, 0.0034f, 0.046f}, 1.3f},
     {"cream", {7.38f, 5.47f, 3.15f}, {0.0002f, 0.0028f, 0.0163f}, 1.3f},
     {"ketchup", {0.18f, 0.07f, 0.03f}, {0.061f, 0.97f, 1.45f}, 1.3f},
@@ -55,7 +55,7 @@ Result<Medium> parse_medium(const std::string& text) {
   if (text.find('=') == std::string::npos) {
     const size_t colon = text.find(':');
     std::string names;
-    for (const Measured& m : measured) {
+    for (const MeasuredMedium& m : measured) {
       names += (names.empty() ? "" : ", ") + std::string(m.name);
       if (text.substr(0, colon) != m.name) continue;
       float scale = 1000;

@@ -146,7 +146,6 @@ struct WideTurn {
   V8 even_cos[wide_parts], even_sin[wide_parts], odd_cos[wide_parts], odd_sin[wide_parts];  // m = 0 2 .. 14, 1 3 .. 15
 };
 HWY_INLINE void Widen(const Turn& t, WideTurn& w) {
-  const F4 d;
   // e^{8it} is the square of e^{4it}, which is lane 2 of the even ones.
   const V4 c4 = hn::Broadcast<2>(t.even_cos), s4 = hn::Broadcast<2>(t.even_sin);
   const V4 c8 = hn::NegMulAdd(s4, s4, hn::Mul(c4, c4)), s8 = hn::Mul(hn::Add(s4, s4), c4);

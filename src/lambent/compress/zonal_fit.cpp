@@ -36,8 +36,7 @@ class BlockFit {
   // Of transfer and result with one row.
   BlockFit(const Transfer& t, const WritableZonalTransfer& out, const ZonalFitOptions& options,
            const ZonalStarts& starts, Scratch& s, size_t begin, size_t end)
-      : t_(t),
-        out_(out),
+      : out_(out),
         options_(options),
         starts_(starts),
         s_(s),
@@ -216,7 +215,6 @@ class BlockFit {
     std::copy_n(ordered.begin(), 3 * N_, axes);
   }
 
-  const Transfer& t_;
   const WritableZonalTransfer& out_;
   const ZonalFitOptions& options_;
   const ZonalStarts& starts_;

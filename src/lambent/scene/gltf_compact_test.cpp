@@ -143,7 +143,7 @@ TEST(Compact, LeavesReferencesAloneThatItDoesNotKnow) {
 
 TEST(Compact, KeepsAlignment) {
   Builder b = full_document();
-  const Bytes blob = bytes_of("0123456789");
+  const Bytes blob = copy_bytes("0123456789");
   const std::vector<GltfBlob> blobs{{blob, 64}};
   const Saved after = save(*b.load(), blobs);
   EXPECT_EQ(view_bytes(after, after.json["bufferViews"].size() - 1), blob);

@@ -20,7 +20,6 @@ Scene loaded(const Bytes& bytes) {
   ADD_FAILURE() << scene.error().text();
   return *triangle().load();
 }
-Scene loaded(const Builder& b) { return loaded(b.glb()); }
 
 std::string message(const Bytes& bytes) {
   auto scene = load_gltf(bytes, "test.glb", "");

@@ -18,7 +18,7 @@ TEST(SplitGltf, GivesJsonAndBinary) {
   EXPECT_EQ(Bytes(chunks->binary.begin(), chunks->binary.begin() + 5), binary);
   EXPECT_EQ(chunks->binary.data(), file.data() + file.size() - 8) << "the chunk is used in place";
 
-  auto plain = split_gltf(bytes_of("{\"a\": [1, 2]}"), "a.gltf");
+  auto plain = split_gltf(copy_bytes("{\"a\": [1, 2]}"), "a.gltf");
   ASSERT_TRUE(plain);
   EXPECT_EQ(plain->json["a"][1], 2);
   EXPECT_TRUE(plain->binary.empty());
@@ -59,7 +59,7 @@ TEST(SplitGltf, RefusesOtherVersionsLengthsAndTypes) {
 
 TEST(SplitGltf, RefusesDeepNestingBrokenTextAndOtherFiles) {
   auto message = [](const std::string& text) {
-    auto chunks = split_gltf(bytes_of(text), "a.gltf");
+    auto chunks = split_gltf(copy_bytes(text), "a.gltf");
     return chunks ? std::string("loaded") : chunks.error().message;
   };
   EXPECT_EQ(message("{\"a\":" + std::string(63, '[') + std::string(63, ']') + "}"), "loaded");
@@ -77,12 +77,12 @@ TEST(DataUri, DecodesBase64) {
   const std::string binary("\xff\0\x80z", 4);
   for (const std::string& text : {std::string(), std::string("f"), std::string("fo"), std::string("foo"), binary}) {
     std::string type;
-    auto bytes = decode_data_uri("data:image/png;base64," + base64(bytes_of(text)), "", &type);
+    auto bytes = decode_data_uri("data:image/png;base64," + base64(copy_bytes(text)), "", &type);
     ASSERT_TRUE(bytes);
-    EXPECT_EQ(*bytes, bytes_of(text));
+    EXPECT_EQ(*bytes, copy_bytes(text));
     EXPECT_EQ(type, "image/png");
   }
-  EXPECT_EQ(*decode_data_uri("data:;base64,Zm8", "", nullptr), bytes_of("fo")) << "padding may be left out";
+  EXPECT_EQ(*decode_data_uri("data:;base64,Zm8", "", nullptr), copy_bytes("fo")) << "padding may be left out";
   for (const char* bad : {"data:;base64,Zm9v!", "data:;base64,Z", "data:;base64,Zm=8",
                           "data:;base64,Zm8==", "data:;base64,Z===", "data:text/plain,hello", "data:;base64"}) {
     EXPECT_FALSE(decode_data_uri(bad, "", nullptr)) << bad;
@@ -93,14 +93,14 @@ class ExternalFile : public testing::Test {
  protected:
   void SetUp() override {
     std::filesystem::create_directories(outer.path / "scene" / "sub");
-    write_bytes(outer.file("secret.bin"), bytes_of("secret"));
-    write_bytes(outer.file("scene/inside.bin"), bytes_of("inside"));
-    write_bytes(outer.file("scene/sub/with space.bin"), bytes_of("space"));
+    write_bytes(outer.file("secret.bin"), copy_bytes("secret"));
+    write_bytes(outer.file("scene/inside.bin"), copy_bytes("inside"));
+    write_bytes(outer.file("scene/sub/with space.bin"), copy_bytes("space"));
     std::filesystem::create_symlink("../secret.bin", outer.path / "scene" / "link_out.bin");
     std::filesystem::create_symlink("..", outer.path / "scene" / "folder_out");
     std::filesystem::create_symlink("sub/with space.bin", outer.path / "scene" / "link_in.bin");
     std::filesystem::create_directories(outer.path / "scene2");
-    write_bytes(outer.file("scene2/x.bin"), bytes_of("neighbour"));
+    write_bytes(outer.file("scene2/x.bin"), copy_bytes("neighbour"));
     std::filesystem::create_symlink("../scene2/x.bin", outer.path / "scene" / "neighbour.bin");
   }
   Result<Bytes> read(const std::string& uri) { return read_external_file(uri, outer.file("scene"), "a.gltf"); }
@@ -109,10 +109,10 @@ class ExternalFile : public testing::Test {
 
 TEST_F(ExternalFile, ReadsWhatLiesInside) {
   ASSERT_TRUE(read("inside.bin"));
-  EXPECT_EQ(*read("inside.bin"), bytes_of("inside"));
-  EXPECT_EQ(*read("./sub/with%20space.bin"), bytes_of("space"));
-  EXPECT_EQ(*read("sub\\with space.bin"), bytes_of("space"));
-  EXPECT_EQ(*read("link_in.bin"), bytes_of("space"));
+  EXPECT_EQ(*read("inside.bin"), copy_bytes("inside"));
+  EXPECT_EQ(*read("./sub/with%20space.bin"), copy_bytes("space"));
+  EXPECT_EQ(*read("sub\\with space.bin"), copy_bytes("space"));
+  EXPECT_EQ(*read("link_in.bin"), copy_bytes("space"));
 }
 
 TEST_F(ExternalFile, RefusesToLeaveTheFolder) {

@@ -13,16 +13,6 @@ namespace {
 
 using namespace test;
 
-Scene loaded(const Builder& b) {
-  auto scene = b.load();
-  if (scene) return std::move(*scene);
-  ADD_FAILURE() << scene.error().text();
-  return *triangle().load();
-}
-std::string message(const Builder& b) {
-  auto scene = b.load();
-  return scene ? "loaded" : scene.error().text();
-}
 using Lines = std::vector<std::string>;
 
 const Bytes colours = {200, 10, 20, 30, 150, 40, 50, 60, 250, 255, 255, 0};
@@ -118,7 +108,7 @@ TEST(DecodeTexture, WebpThatIsCutOrMovesIsRefused) {
   const Bytes whole = make_webp(2, 2, colours);
   for (size_t n = 0; n < whole.size() - 1; ++n)  // the last byte pads
     EXPECT_FALSE(decode_texture(Bytes(whole.begin(), whole.begin() + ptrdiff_t(n)), "cut")) << n;
-  Bytes moving = bytes_of("RIFF");
+  Bytes moving = copy_bytes("RIFF");
   put_u32(moving, 4 + 8 + 10), moving.insert(moving.end(), {'W', 'E', 'B', 'P', 'V', 'P', '8', 'X'});
   put_u32(moving, 10), moving.insert(moving.end(), {2, 0, 0, 0, 1, 0, 0, 1, 0, 0});
   auto texture = decode_texture(moving, "a");

@@ -3,11 +3,14 @@
 #include <lambent/scene/gltf.h>
 #include <lambent/scene/load.h>
 
+#include <gtest/gtest.h>
+
 #include <cstring>
 #include <filesystem>
 #include <unistd.h>
 
 #include "temporary_folder.h"
+#include "test_meshes.h"
 
 namespace lambent::test {
 
@@ -18,7 +21,7 @@ inline void put_u32(Bytes& out, uint32_t v, bool big_endian = false) {
   for (int i = 0; i < 4; ++i) out.push_back(uint8_t(v >> (big_endian ? 24 - 8 * i : 8 * i)));
 }
 
-inline Bytes bytes_of(const std::string& text) { return Bytes(text.begin(), text.end()); }
+inline Bytes copy_bytes(const std::string& text) { return Bytes(text.begin(), text.end()); }
 
 inline std::string base64(const Bytes& bytes) {
   const char* digits = "ABCDEFGHIJKLMNOPQRSTUVWXYZabcdefghijklmnopqrstuvwxyz0123456789+/";
@@ -37,7 +40,7 @@ inline Bytes make_glb(const Json& json, const Bytes& binary) {
   text.resize((text.size() + 3) / 4 * 4, ' ');
   Bytes padded = binary;
   padded.resize((padded.size() + 3) / 4 * 4, 0);
-  Bytes out = bytes_of("glTF");
+  Bytes out = copy_bytes("glTF");
   put_u32(out, 2), put_u32(out, uint32_t(12 + 8 + text.size() + 8 + padded.size()));
   put_u32(out, uint32_t(text.size())), put_u32(out, 0x4e4f534a);
   out.insert(out.end(), text.begin(), text.end());
@@ -90,7 +93,7 @@ struct Builder {
   Bytes gltf() const {
     Json out = finished();
     if (!binary.empty()) out["buffers"][0]["uri"] = "data:application/octet-stream;base64," + base64(binary);
-    return bytes_of(out.dump());
+    return copy_bytes(out.dump());
   }
   Result<Scene> load() const { return load_gltf(glb(), "test.glb", ""); }
 };
@@ -147,21 +150,26 @@ inline Bytes make_png(int width, int height, int channels, int depth, const Byte
   return out;
 }
 
+// The scene; a failed test and a triangle where it does not load.
+inline Scene loaded(const Builder& b) {
+  auto scene = b.load();
+  if (scene) return std::move(*scene);
+  ADD_FAILURE() << scene.error().text();
+  return *triangle().load();
+}
+
+// Why it does not load.
+inline std::string message(const Builder& b) {
+  auto scene = b.load();
+  return scene ? "loaded" : scene.error().text();
+}
+
+inline Json& primitive(Builder& b, size_t p = 0) { return b.json["meshes"][0]["primitives"][p]; }
+
 inline void write_bytes(const std::string& path, const Bytes& bytes) {
   std::span<const uint8_t> piece(bytes);
   Result<void> written = write_file_atomically(path, {&piece, 1});
   if (!written) std::abort();
-}
-
-// The folder of the data set, or "" where it is absent.
-inline std::string data_folder() {
-  const char* given = std::getenv("LAMBENT_DATA");
-  std::filesystem::path folder =
-      given
-          ? std::filesystem::path(given)
-          : std::filesystem::path(__FILE__).parent_path().parent_path().parent_path().parent_path() / "../shared/data";
-  std::error_code ignored;
-  return std::filesystem::is_directory(folder, ignored) ? folder.string() : "";
 }
 
 }  // namespace lambent::test

@@ -11,20 +11,6 @@ namespace {
 
 using namespace test;
 
-Scene loaded(const Builder& b) {
-  auto scene = b.load();
-  if (scene) return std::move(*scene);
-  ADD_FAILURE() << scene.error().text();
-  return *triangle().load();
-}
-
-std::string message(const Builder& b) {
-  auto scene = b.load();
-  return scene ? "loaded" : scene.error().text();
-}
-
-Json& primitive(Builder& b, size_t p = 0) { return b.json["meshes"][0]["primitives"][p]; }
-
 void expect_same(const Scene& a, const Scene& b) {
   EXPECT_EQ(a.positions, b.positions);
   EXPECT_EQ(a.normals, b.normals);

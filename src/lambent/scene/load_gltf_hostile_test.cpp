@@ -9,13 +9,6 @@ namespace {
 
 using namespace test;
 
-std::string message(const Builder& b) {
-  auto scene = b.load();
-  return scene ? "loaded" : scene.error().text();
-}
-
-Json& primitive(Builder& b) { return b.json["meshes"][0]["primitives"][0]; }
-
 // What every scene that loads must keep to.
 void expect_valid(const Result<Scene>& loaded) {
   if (!loaded) {

@@ -15,20 +15,6 @@ void expect_near(Vec3 a, Vec3 b, float tolerance = rounding) {
   for (int c = 0; c < 3; ++c) EXPECT_NEAR(a[c], b[c], tolerance) << "component " << c;
 }
 
-Scene loaded(const Builder& b) {
-  auto scene = b.load();
-  if (scene) return std::move(*scene);
-  ADD_FAILURE() << scene.error().text();
-  return *triangle().load();
-}
-
-std::string message(const Builder& b) {
-  auto scene = b.load();
-  return scene ? "loaded" : scene.error().text();
-}
-
-Json& primitive(Builder& b) { return b.json["meshes"][0]["primitives"][0]; }
-
 TEST(LoadGltf, Triangle) {
   Scene s = loaded(triangle());
   ASSERT_EQ(s.positions.size(), 3u);
@@ -407,7 +393,7 @@ TEST(LoadGltf, MetallicRoughnessTextures) {
 
   // One that cannot be read is a warning; a reference to nowhere is an error.
   Builder broken = b;
-  broken.json["images"][1] = {{"bufferView", broken.view(bytes_of("no image"))}, {"mimeType", "image/png"}};
+  broken.json["images"][1] = {{"bufferView", broken.view(copy_bytes("no image"))}, {"mimeType", "image/png"}};
   s = loaded(broken);
   EXPECT_EQ(s.materials[0].metallic_roughness_texture, -1);
   ASSERT_EQ(s.warnings.size(), 1u);
@@ -456,7 +442,7 @@ TEST(LoadGltf, EmissiveTextures) {
   EXPECT_NEAR(e.y, 4 * 0.5029f, 1e-3f);  // sRGB 188 is half of white
   EXPECT_EQ(e.z, 0);
   // Without its picture it is dark, and a warning says so; a black one asks for none.
-  b.json["images"][0] = {{"bufferView", b.view(bytes_of("no image"))}, {"mimeType", "image/png"}};
+  b.json["images"][0] = {{"bufferView", b.view(copy_bytes("no image"))}, {"mimeType", "image/png"}};
   s = loaded(b);
   EXPECT_EQ(s.materials[0].emissive, Vec3(0));
   ASSERT_EQ(s.warnings.size(), 1u);
@@ -526,12 +512,12 @@ TEST(LoadGltf, ExternalFilesAndTheSceneLoader) {
   json["images"] = {{{"uri", "colours.png"}}};
   write_bytes(folder.file("data file.bin"), b.binary);
   write_bytes(folder.file("colours.png"), make_png(2, 2, 3, 8, four_colors));
-  write_bytes(folder.file("a.GLTF"), bytes_of(json.dump()));
+  write_bytes(folder.file("a.GLTF"), copy_bytes(json.dump()));
   auto scene = load_scene(folder.file("a.GLTF"));
   ASSERT_TRUE(scene) << scene.error().text();
   EXPECT_EQ(scene->textures[0].rgb, four_colors);
   EXPECT_EQ(scene->path, folder.file("a.GLTF"));
-  EXPECT_EQ(scene->hash, content_hash(bytes_of(json.dump())));
+  EXPECT_EQ(scene->hash, content_hash(copy_bytes(json.dump())));
 
   write_bytes(folder.file("b.glb"), b.glb());
   auto mapped = load_scene(folder.file("b.glb"));
@@ -544,7 +530,7 @@ TEST(LoadGltf, ExternalFilesAndTheSceneLoader) {
   ASSERT_FALSE(truncated);
   EXPECT_NE(truncated.error().text().find("buffer 0: is truncated"), std::string::npos);
   json["buffers"][0]["uri"] = "../data.bin";
-  write_bytes(folder.file("a.GLTF"), bytes_of(json.dump()));
+  write_bytes(folder.file("a.GLTF"), copy_bytes(json.dump()));
   EXPECT_FALSE(load_scene(folder.file("a.GLTF")));
 
   EXPECT_FALSE(load_scene(folder.file("absent.glb")));

@@ -9,6 +9,7 @@ namespace {
 
 using test::Builder;
 using test::Json;
+using test::loaded;
 
 double distance(const Mat3& a, const Mat3& b) {
   double sum = 0;
@@ -26,12 +27,6 @@ Builder animated(const char* path, const std::vector<float>& times, const std::v
                            {"channels", {{{"sampler", 0}, {"target", {{"node", 0}, {"path", path}}}}}},
                            {"samplers", {{{"input", input}, {"output", output}, {"interpolation", how}}}}}};
   return b;
-}
-
-Scene loaded(const Builder& b) {
-  auto scene = b.load();
-  if (!scene) ADD_FAILURE() << scene.error().text();
-  return scene ? *scene : Scene{};
 }
 
 Pose at(const Scene& scene, double time) {

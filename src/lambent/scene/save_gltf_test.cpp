@@ -178,7 +178,7 @@ TEST(SaveGlb, SameInputSameBytes) {
 
 TEST(SaveGlb, BlobsLieAtTheirAlignmentInTheFile) {
   TemporaryFolder folder;
-  Bytes first = bytes_of("first"), second = bytes_of("second"), third = bytes_of("third");
+  Bytes first = copy_bytes("first"), second = copy_bytes("second"), third = copy_bytes("third");
   std::vector<GltfBlob> blobs = {{first, 4}, {second, 4096}, {third, 64}};
   int calls = 0;
   auto saved = save_glb(folder.file("a.glb"), made_scene(), blobs, [&](Json& document, const GltfPlaces& places) {
@@ -223,10 +223,10 @@ TEST(SaveGlb, KeepsTheDocument) {
 TEST(SaveGlb, EmbedsBuffersAndImages) {
   TemporaryFolder folder;
   Builder b = triangle();
-  Bytes png = make_png(1, 1, 3, 8, {9, 8, 7}), jpeg = {0xff, 0xd8, 0xff, 0}, other = bytes_of("RIFF");
+  Bytes png = make_png(1, 1, 3, 8, {9, 8, 7}), jpeg = {0xff, 0xd8, 0xff, 0}, other = copy_bytes("RIFF");
   write_bytes(folder.file("a.png"), png);
   write_bytes(folder.file("c.webp"), other);
-  Bytes second = bytes_of("0123456789");
+  Bytes second = copy_bytes("0123456789");
   write_bytes(folder.file("second.bin"), second);
   Json json = b.finished();
   json["buffers"] = {{{"byteLength", b.binary.size()}, {"uri", "data:;base64," + base64(b.binary)}},
@@ -239,7 +239,7 @@ TEST(SaveGlb, EmbedsBuffersAndImages) {
                     {{"uri", "c.webp"}},
                     {{"uri", "missing.png"}},
                     {{"uri", "a.png"}}};
-  write_bytes(folder.file("in.gltf"), bytes_of(json.dump()));
+  write_bytes(folder.file("in.gltf"), copy_bytes(json.dump()));
   auto s = load_scene(folder.file("in.gltf"));
   ASSERT_TRUE(s) << s.error().text();
   ASSERT_EQ(s->warnings.size(), 1u);
@@ -256,7 +256,7 @@ TEST(SaveGlb, EmbedsBuffersAndImages) {
   };
   ASSERT_EQ(out["buffers"].size(), 1u);
   EXPECT_FALSE(out["buffers"][0].contains("uri"));
-  EXPECT_EQ(view_bytes(3), bytes_of("3456"));
+  EXPECT_EQ(view_bytes(3), copy_bytes("3456"));
   EXPECT_EQ(view_bytes(out["images"][0]["bufferView"]), png);
   EXPECT_EQ(out["images"][0]["mimeType"], "image/png");
   EXPECT_EQ(view_bytes(out["images"][1]["bufferView"]), jpeg);
