@@ -354,7 +354,7 @@ Result<Transfer> bake_to_error(const Scene& scene, const Tracer& tracer, const R
     rays += r.rays, traced += r.trace_seconds, bounced += r.bounce_seconds;
     r.rays = rays, r.trace_seconds = traced, r.bounce_seconds = bounced;
     const double error = r.certificate.error, noise = r.certificate.noise,
-                 wanted = std::clamp(0.3 * error, 0.5 * options.error, options.error);
+                 wanted = std::clamp(0.2 * error, 0.4 * options.error, 0.6 * options.error);
     const double ratio = std::clamp(std::pow(safety * noise / wanted, 1 / slope), 1.5, 16.0);
     const bool late = options.seconds >= 0 && seconds_since(start) + seconds_since(round) * ratio > options.seconds;
     if (!(noise > wanted && error > options.error) || options.samples == most || late) return transfer;

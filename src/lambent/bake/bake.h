@@ -26,8 +26,8 @@ struct BakeOptions {
   Precision precision = Precision::half;  // of the stored transfer
   bool keep_terms = false;                // BakeReport::terms, in as much time again as the bounces take
   // Where > 0, bake to this relative RMS error (Certificate::error) with as many rays as that asks for, instead of
-  // `samples`: noise may be half of it, or more, up to all of it, where interpolation between receivers loses more. No
-  // more rays are asked for where they would end after so many seconds; negative: no limit.
+  // `samples`: noise may be 0.4 of it, or, where interpolation between receivers loses more, up to 0.6. No more rays
+  // are asked for where they would end after so many seconds; negative: no limit.
   double error = 0, seconds = -1;
   bool denoise = true;  // takes away noise that neighbours do not share (denoise.h)
   bool certify = true;  // measures the result's error (certify.h)
