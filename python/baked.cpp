@@ -8,6 +8,7 @@
 #include <lambent/pipeline/parse.h>
 #include <lambent/relight/relighter.h>
 
+#include <chrono>
 #include <mutex>
 
 namespace lambent::python {
@@ -39,6 +40,7 @@ struct BakedObject {
   BakeOutcome outcome;
   std::mutex mutex;  // of the relighter, which works for one thread at a time
   std::optional<Relighter> relighter;
+  double seconds = 0;  // that the bake took without Python
 
   const Baked& baked() const { return outcome.baked; }
   const Field& surface() const { return outcome.baked.surface; }
@@ -49,7 +51,12 @@ Pointer bake_scene(const std::optional<SceneObject>& scene, const std::string& o
   BakeRequest request = take(bake_request(options));
   if (scene) request.loaded = scene->scene, request.scene = scene->scene->hash.empty() ? "" : scene->scene->path;
   auto out = std::make_shared<BakedObject>();
-  out->outcome = run<BakeOutcome>(report, [&](const Job& job) { return bake_with_summary(request, job); });
+  out->outcome = run<BakeOutcome>(report, [&](const Job& job) {
+    const auto start = std::chrono::steady_clock::now();
+    auto outcome = bake_with_summary(request, job);
+    out->seconds = std::chrono::duration<double>(std::chrono::steady_clock::now() - start).count();
+    return outcome;
+  });
   return out;
 }
 
@@ -197,6 +204,7 @@ void bind_baked(py::module_& m) {
       .def_property_readonly("back", [](const Pointer& o) { return vectors_view(vertices(*o).back, o); })
       .def_property_readonly("input", [](const Pointer& o) { return vectors_view(vertices(*o).input, o); })
       .def_property_readonly("input_count", [](const BakedObject& o) { return vertices(o).input_count; })
+      .def_readonly("_seconds", &BakedObject::seconds)
       .def("_pairs", &pairs_of)
       .def("_save", &save)
       .def("_columns", &columns)

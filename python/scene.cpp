@@ -2,6 +2,7 @@
 #include "bind.h"
 
 #include <lambent/bake/features.h>
+#include <lambent/core/parallel.h>
 #include <lambent/pipeline/bake_parse.h>
 #include <lambent/pipeline/parse.h>
 #include <lambent/light/project.h>
@@ -9,6 +10,11 @@
 #include <lambent/relight/light.h>
 #include <lambent/scene/arrays.h>
 #include <lambent/scene/load.h>
+#include <lambent/trace/tracer.h>
+
+#include <atomic>
+#include <cstring>
+#include <mutex>
 
 namespace lambent::python {
 namespace {
@@ -97,6 +103,39 @@ py::tuple features(const py::object& vertices, const py::object& faces, const py
   return py::make_tuple(out, vectors_view(n, std::make_shared<std::vector<Vec3>>()).attr("copy")());
 }
 
+// For scripts/bench python: whether single rays, one after another, meet anything.
+py::array_t<bool> single_rays(const SceneObject& o, const py::object& origins, const py::object& directions) {
+  const std::vector<Vec3> from = vectors(origins, "origins"), along = vectors(directions, "directions");
+  if (from.size() != along.size()) throw Failure{{"directions", "must be as many as origins", true}};
+  py::array_t<bool> out(ssize_t(from.size()));
+  bool* hits = out.mutable_data();
+  const Released released;
+  static std::mutex mutex;  // of the tracer that is kept from call to call
+  static std::pair<std::shared_ptr<const Scene>, Tracer> kept;
+  const std::lock_guard lock(mutex);
+  if (kept.first != o.scene) kept = {o.scene, take(Tracer::build(*o.scene))};
+  for (size_t i = 0; i < from.size(); ++i) hits[i] = kept.second.closest(from[i], along[i]).triangle != none;
+  return out;
+}
+
+// And how fast memory is read: a plain sum over it, on all cores.
+uint64_t sum_of_words(const py::array& a) {
+  const auto* data = static_cast<const uint8_t*>(a.data());
+  const size_t lines = size_t(a.nbytes()) / 128;
+  std::atomic<uint64_t> total{0};
+  const Released released;
+  parallel_for(lines, size_t{1} << 13, [&](size_t begin, size_t end) {
+    uint64_t sums[16] = {};
+    for (size_t i = begin; i < end; ++i) {
+      uint64_t words[16];
+      std::memcpy(words, data + i * 128, 128);
+      for (int k = 0; k < 16; ++k) sums[k] += words[k];
+    }
+    for (uint64_t s : sums) total += s;
+  });
+  return total;
+}
+
 }  // namespace
 
 void bind_scene(py::module_& m) {
@@ -150,6 +189,7 @@ void bind_scene(py::module_& m) {
       py::arg("scene"), py::arg("env"), py::kw_only(), py::arg("camera"), py::arg("size"), py::arg("brdf"),
       py::arg("window"), py::arg("light_order"), py::arg("background"), py::arg("spp"), py::arg("bounces"),
       py::arg("seed"), py::arg("lamps"), py::arg("report"));
+  m.def("single_rays", &single_rays), m.def("sum_of_words", &sum_of_words);
   m.def("features", &features, py::arg("vertices"), py::arg("faces"), py::arg("normals"), py::arg("order"),
         py::arg("samples"), py::arg("seed"), py::arg("offset"), py::arg("report"));
 }

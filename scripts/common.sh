@@ -41,7 +41,8 @@ build() {
   mkdir -p build
   local log="build/$preset.log"
   echo "Building ($preset)" >&2
-  if ! { cmake --preset "$preset" "${cmake_options[@]}" && nice cmake --build --preset "$preset" ${@:+--target "$@"}; } >"$log" 2>&1; then
+  if ! { cmake --preset "$preset" "${cmake_options[@]}" &&
+    nice cmake --build --preset "$preset" ${@:+--target "$@"}; } >"$log" 2>&1; then
     tail -n 40 "$log" >&2
     echo "The build failed; the whole log is $log" >&2
     exit 1

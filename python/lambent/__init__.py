@@ -251,7 +251,8 @@ def prt_features(vertices, faces, order=3, convention="pifu", normals=None, samp
 
     Direct light with shadows, the clamped cosine without 1/pi, at the mesh's own vertices in their order; rays start
     `offset` times the least extent along the normal (angle-weighted, as trimesh's, if none are given). `convention`: whose
-    light coefficients they are to be multiplied by, see sh.convert; "pifu" and "icon" are pi (-1)^m times diffuse transfer.
+    light coefficients they are to be multiplied by, see sh.convert; all are pi times diffuse transfer without bounces, "pifu" and
+    "icon" with the signs (-1)^m.
     """
     with _reporting(progress) as report:
         values = _lambent.features(vertices, faces, normals, order, samples, seed, offset, report)[0]
