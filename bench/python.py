@@ -50,7 +50,8 @@ def loop_over_single_rays(scene, v, normals, n=1600):
         directions = np.tile(d[k:k + side], (len(v), 1))
         cosine = (directions * np.repeat(normals, side, axis=0)).sum(1)
         seen = (cosine > 0) & ~_lambent.single_rays(scene, origins, directions)
-        total = total + ((seen * cosine)[:, None] * np.tile(basis[k:k + side], (len(v), 1))).reshape(len(v), side, 9).sum(1)
+        values = (seen * cosine)[:, None] * np.tile(basis[k:k + side], (len(v), 1))
+        total = total + values.reshape(len(v), side, 9).sum(1)
     return total * 4 * np.pi / n
 
 
@@ -65,7 +66,8 @@ def features():
     seconds = least(2, lambda: found.append(loop_over_single_rays(scene, v[some], normals[some])))
     theirs = seconds * len(v) / len(some)
     tell("prt_features", vertices=len(v), rays_each=1600, seconds=round(ours, 3),
-         loop_over_single_rays_seconds=round(theirs, 1), loop_timed_on_vertices=len(some), ratio=round(theirs / ours, 1),
+         loop_over_single_rays_seconds=round(theirs, 1), loop_timed_on_vertices=len(some),
+         ratio=round(theirs / ours, 1),
          seconds_of_800_rays=round(half, 3), ratio_of_rays_above_the_surface=round(theirs / half, 1),
          rms_between=float(np.sqrt(((found[0] - prt[some])**2).mean())))
 

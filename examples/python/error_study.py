@@ -23,14 +23,15 @@ def plot_svg(path, x, y, title):
         u = (np.log10(a) - np.log10(x[0])) / (np.log10(x[-1]) - np.log10(x[0]))
         low, high = np.floor(np.log10(min(y))), np.ceil(np.log10(max(y)))
         return 60 + 400 * u, 260 - 220 * (np.log10(b) - low) / (high - low)
-    parts = ['<svg xmlns="http://www.w3.org/2000/svg" width="500" height="310" font-family="sans-serif" font-size="12">',
-             '<rect width="500" height="310" fill="white"/>', f'<text x="60" y="24">{title}</text>']
+    parts = ['<svg xmlns="http://www.w3.org/2000/svg" width="500" height="310" font-family="sans-serif" '
+             'font-size="12">', '<rect width="500" height="310" fill="white"/>', f'<text x="60" y="24">{title}</text>']
     for n in x:
         u, _ = place(n, y[0])
         parts.append(f'<text x="{u:.1f}" y="280" text-anchor="middle">{n}</text>')
     for power in range(int(np.floor(np.log10(min(y)))), int(np.ceil(np.log10(max(y)))) + 1):
         _, v = place(x[0], 10.0**power)
-        parts.append(f'<path d="M60 {v:.1f}H460" stroke="#ccc"/><text x="52" y="{v + 4:.1f}" text-anchor="end">1e{power}</text>')
+        parts.append(f'<path d="M60 {v:.1f}H460" stroke="#ccc"/>')
+        parts.append(f'<text x="52" y="{v + 4:.1f}" text-anchor="end">1e{power}</text>')
     for values, style in ((y, 'stroke="#06c" stroke-width="2"'),
                           ([y[0] * (x[0] / n)**0.5 for n in x], 'stroke="#999" stroke-dasharray="4 4"')):
         points = " ".join(f"{u:.1f},{v:.1f}" for u, v in (place(n, e) for n, e in zip(x, values)))

@@ -68,7 +68,7 @@ def _image(value):
 
 
 def environment(light):
-    """An Environment: itself, what a text names (a file, "uniform:R,G,B", "sky:..."), or an array (height, width, 3)."""
+    """An Environment: itself, what a text names (a file, "uniform:..", "sky:.."), or an array (height, width, 3)."""
     if isinstance(light, Environment):
         return light
     if isinstance(light, (str, _os.PathLike)):
@@ -91,8 +91,8 @@ def bake(scene, progress=None, **options):
     """Bakes a Scene, or the file that a path names, into a Baked.
 
     `options` are those of `lambent bake` (docs/options.md) with _ for -: transfer, order, samples, bounces, ground, ...
-    The same options give the same bytes as there. `progress`: a callable (stage, fraction), or True for a bar. Ctrl-C and
-    what the callable raises end the work soon. Raises Error.
+    The same options give the same bytes as there. `progress`: a callable (stage, fraction), or True for a bar. Ctrl-C
+    and what the callable raises end the work soon. Raises Error.
     """
     scene, options = _scene_and_options(scene, options)
     with _reporting(progress) as report:
@@ -131,7 +131,8 @@ class Baked:
     transfer = property(
         lambda self: self._handle.transfer,
         doc="float16 or float32 (blocks, rows, channels, columns, 16), read-only and in place; see `values`.")
-    terms = property(lambda self: self._handle.terms, doc="As `transfer`, of direct light and each bounce (terms=True).")
+    terms = property(lambda self: self._handle.terms,
+                     doc="As `transfer`, of direct light and each bounce (terms=True).")
     front = property(lambda self: self._handle.front, doc="uint32: receiver of each scene vertex's front.")
     back = property(lambda self: self._handle.back, doc="The same for backs; empty where all is one-sided.")
 
@@ -160,8 +161,8 @@ class Baked:
         return self._handle._pairs()
 
     def by_input_vertex(self, values):
-        """Values of receivers, (receivers, ...), for each vertex of the input, in its order: the mean where a vertex has
-        several receivers, 0 where it has none."""
+        """Values of receivers, (receivers, ...), for each vertex of the input, in its order: the mean where a vertex
+        has several receivers, 0 where it has none."""
         values = _np.asarray(values)
         if values.ndim < 1 or values.shape[0] != self.receivers:
             raise _failure("values", f"must have {self.receivers} rows, a receiver each")
@@ -172,7 +173,7 @@ class Baked:
             out[pairs[:, 0]] = values[pairs[:, 1]]
             return out
         flat = values.reshape(len(values), -1)[pairs[:, 1]].astype(_np.float64)
-        sums = _np.stack([_np.bincount(pairs[:, 0], weights=flat[:, k], minlength=count) for k in range(flat.shape[1])], 1)
+        sums = _np.stack([_np.bincount(pairs[:, 0], weights=column, minlength=count) for column in flat.T], 1)
         means = sums / _np.maximum(how_many, 1)[:, None]
         return means.reshape(count, *values.shape[1:]).astype(values.dtype)
 
@@ -183,10 +184,10 @@ class Baked:
         return self._handle._columns(_options(_lambent.draw_fields, options), env)
 
     def relight(self, light=None, out=None, **options):
-        """T . light: float32 (receivers, 3), or (receivers, rows, 3); of diffuse bakes exit radiance of a white surface.
+        """T . light: float32 (receivers, 3), or (receivers, rows, 3); of diffuse bakes exit radiance of white surfaces.
 
-        `light`: what environment() takes, with the options of project(); or coefficients (columns, 3). `out`: an array to
-        write to, which saves its making.
+        `light`: what environment() takes, with the options of project(); or coefficients (columns, 3). `out`: an array
+        to write to, which saves its making.
         """
         if not (hasattr(light, "ndim") and light.ndim == 2):
             light = self.project(light, **options)
@@ -215,8 +216,8 @@ class Baked:
         return f"<lambent.Baked: {info['kind']}, {self.receivers} receivers, {info['where']}>"
 
 
-def reference(scene, env=None, *, camera="auto", size="512x512", spp=256, bounces=3, seed=1, brdf="diffuse", lamps=False,
-              background="env", light_order=0, window="none", env_rotate="", progress=None, **options):
+def reference(scene, env=None, *, camera="auto", size="512x512", spp=256, bounces=3, seed=1, brdf="diffuse",
+              lamps=False, background="env", light_order=0, window="none", env_rotate="", progress=None, **options):
     """Path-traces the scene, as `lambent reference` does; `options` prepare it (ground, max_edge, ...)."""
     scene = scene if isinstance(scene, Scene) else load(_os.fspath(scene))
     if options:
@@ -250,9 +251,9 @@ def prt_features(vertices, faces, order=3, convention="pifu", normals=None, samp
     """PRT features as human-reconstruction data sets have them: float32 (V, order^2), and the faces, int64 (F, 3).
 
     Direct light with shadows, the clamped cosine without 1/pi, at the mesh's own vertices in their order; rays start
-    `offset` times the least extent along the normal (angle-weighted, as trimesh's, if none are given). `convention`: whose
-    light coefficients they are to be multiplied by, see sh.convert; all are pi times diffuse transfer without bounces, "pifu" and
-    "icon" with the signs (-1)^m.
+    `offset` times the least extent along the normal (angle-weighted, as trimesh's, if none are given). `convention`:
+    whose light coefficients they are to be multiplied by, see sh.convert; all are pi times diffuse transfer without
+    bounces, "pifu" and "icon" with the signs (-1)^m.
     """
     with _reporting(progress) as report:
         values = _lambent.features(vertices, faces, normals, order, samples, seed, offset, report)[0]
@@ -296,7 +297,7 @@ def _evaluate(order, directions):
 
 
 def _project(order, function, exact_order=64):
-    """float64 (order^2,): coefficients of a function of directions (n, 3), by quadrature exact for exact_order bands."""
+    """float64 (order^2,): coefficients of a function of directions (n, 3), exact for exact_order bands."""
     return _lambent.sh_project(order, function, exact_order)
 
 

@@ -79,7 +79,8 @@ class Case(unittest.TestCase):
         return os.path.join(self.folder, name)
 
     def run_tool(self, *arguments):
-        done = subprocess.run([tool, *map(str, arguments)], capture_output=True, text=True, cwd=self.folder, check=False)
+        done = subprocess.run([tool, *map(str, arguments)], capture_output=True, text=True, cwd=self.folder,
+                              check=False)
         self.assertEqual(done.returncode, 0, done.stderr)
         return done.stdout
 

@@ -58,7 +58,8 @@ class Arrays(made.Case):
         self.assertEqual(a.__array_interface__["data"], b.__array_interface__["data"])
         address = a.__array_interface__["data"][0]
         with open("/proc/self/maps", encoding="utf-8") as maps:
-            inside = [line for line in maps if int(line.split("-")[0], 16) <= address < int(line.split("-")[1].split()[0], 16)]
+            ranges = [([int(x, 16) for x in line.split()[0].split("-")], line) for line in maps]
+        inside = [line for (low, high), line in ranges if low <= address < high]
         self.assertTrue(inside[0].rstrip().endswith("b.glb"))
         del baked, b
         self.assertTrue(np.isfinite(a.astype(np.float32)).all())
@@ -197,7 +198,8 @@ class InputVertices(made.Case):
             text += b" " * (-len(text) % 4)
             with open(self.path("c.glb"), "wb") as file:
                 rest = data[20 + count:]
-                file.write(struct.pack("<4sIIII", b"glTF", 2, 20 + len(text) + len(rest), len(text), 0x4E4F534A) + text + rest)
+                head = struct.pack("<4sIIII", b"glTF", 2, 20 + len(text) + len(rest), len(text), 0x4E4F534A)
+                file.write(head + text + rest)
             with self.assertRaises(lambent.Error) as raised:
                 lambent.open(self.path("c.glb"))
             self.assertIn(message, str(raised.exception))

@@ -72,9 +72,10 @@ class BadArrays(made.Case):
 
     def test_options(self):
         scene = lambent.Scene(*made.sphere(1))
-        for options, message in (({"order": "six"}, "order: expects a number"), ({"ground": 1}, "ground: expects true or false"),
-                                 ({"samples": 1.5}, "samples: expects a whole number"), ({"samples": float("nan")}, "options: "),
-                                 ({"seed": object()}, "options: "), ({"samples": -3}, "samples: expects a whole number")):
+        cases = [({"order": "six"}, "order: expects a number"), ({"ground": 1}, "ground: expects true or false"),
+                 ({"samples": 1.5}, "samples: expects a whole number"), ({"samples": float("nan")}, "options: "),
+                 ({"seed": object()}, "options: "), ({"samples": -3}, "samples: expects a whole number")]
+        for options, message in cases:
             with self.subTest(options=options), self.assertRaisesRegex(lambent.Error, "^" + message):
                 lambent.bake(scene, **options)
         with self.assertRaises(TypeError):
@@ -148,8 +149,9 @@ class Threads(made.Case):
         lambent.bake(scene, samples=8)  # and all goes on
 
     def test_interrupt(self):
-        code = SLOW + ("threading.Thread(target=lambda: (time.sleep(0.5), __import__('os').kill(__import__('os').getpid(), 2)))"
-                       ".start()\nstart = time.monotonic()\ntry:\n  lambent.bake(scene, samples=1 << 16)\n"
+        code = SLOW + ("import os\n"
+                       "threading.Thread(target=lambda: (time.sleep(0.5), os.kill(os.getpid(), 2))).start()\n"
+                       "start = time.monotonic()\ntry:\n  lambent.bake(scene, samples=1 << 16)\n"
                        "except KeyboardInterrupt:\n  print('stopped', time.monotonic() - start)\n"
                        "print(lambent.bake(scene, samples=1, bounces=0).receivers)\n")
         done = subprocess.run([sys.executable, "-c", code], capture_output=True, text=True, timeout=100, check=False)
@@ -173,7 +175,8 @@ class Threads(made.Case):
                        "def work():\n  while True: baked.relight(light)\n"
                        "for _ in range(3): threading.Thread(target=work, daemon=True).start()\ntime.sleep(0.3)\n")
         for _ in range(3):
-            done = subprocess.run([sys.executable, "-c", code], capture_output=True, text=True, timeout=100, check=False)
+            done = subprocess.run([sys.executable, "-c", code], capture_output=True, text=True, timeout=100,
+                                  check=False)
             self.assertEqual(done.returncode, 0, done.stderr)
 
     def test_terminated(self):

@@ -23,7 +23,7 @@ class Interface(made.Case):
 
         def check(stub, f):
             a = stub.args
-            names = [x.arg for x in a.args + ([a.vararg] if a.vararg else []) + a.kwonlyargs + ([a.kwarg] if a.kwarg else [])]
+            names = [x.arg for x in [*a.args, a.vararg, *a.kwonlyargs, a.kwarg] if x]
             try:
                 self.assertEqual([n for n in names if n != "self"], parameters(f), stub.name)
             except ValueError:  # of C++
@@ -61,9 +61,10 @@ class Interface(made.Case):
         two = lambent.sh.multiply(c[:4], c[5:], 3)
         values = (expected[:, :4] @ c[:4]) * (expected[:, :4] @ c[5:])
         np.testing.assert_allclose(lambent.sh.evaluate(3, d) @ two, values, atol=2e-4)
-        for bad in (lambda: lambent.sh.rotate(c[:5], R), lambda: lambent.sh.rotate(c, 2 * R), lambda: lambent.sh.evaluate(17, d),
-                    lambda: lambent.sh.convert(c, "x"), lambda: lambent.sh.multiply(c, c[:3]), lambda: lambent.sh.evaluate(3, d[0])):
-            self.assertRaises(lambent.Error, bad)
+        sh = lambent.sh
+        for function, *bad in ((sh.rotate, c[:5], R), (sh.rotate, c, 2 * R), (sh.evaluate, 17, d), (sh.convert, c, "x"),
+                               (sh.multiply, c, c[:3]), (sh.evaluate, 3, d[0])):
+            self.assertRaises(lambent.Error, function, *bad)
 
     def test_convert(self):
         c, t = np.random.default_rng(1).normal(size=(2, 9)).astype(np.float32)
@@ -87,8 +88,8 @@ class Interface(made.Case):
         np.testing.assert_array_equal(made_env.image.array, rng)
         y = np.arange(17) / 16 * np.pi
         weight = 2 * np.pi / 32 * (np.cos(y[:-1]) - np.cos(y[1:]))
-        np.testing.assert_allclose(made_env.project(1)[0], (rng * weight[:, None, None]).sum((0, 1)) / np.sqrt(4 * np.pi),
-                                   rtol=1e-4)
+        expected = (rng * weight[:, None, None]).sum((0, 1)) / np.sqrt(4 * np.pi)
+        np.testing.assert_allclose(made_env.project(1)[0], expected, rtol=1e-4)
         sky = lambent.sky(elevation=30, sun="off")
         self.assertEqual(sky.image.width, 1024)
         np.testing.assert_array_equal(sky.image.array, lambent.environment("sky:elevation=30,sun=off").image.array)

@@ -69,7 +69,7 @@ class SameBytes(made.Case):
     def test_same_line(self):
         import subprocess
         room = self.room()
-        for request in ({"order": 99}, {"samples": 0}, {"lobes": 3}, {"exclude": "sofa"}, {"transfer": "lightmap", "brdf": "x"}):
+        for request in ({"order": 99}, {"samples": 0}, {"lobes": 3}, {"exclude": "sofa"}, {**L, "brdf": "x"}):
             tool = subprocess.run([made.tool, "bake", room, "-o", self.path("x.glb"), *arguments(request)],
                                   capture_output=True, text=True, check=False)
             with self.assertRaises(lambent.Error) as raised:
@@ -88,8 +88,8 @@ class SameBytes(made.Case):
     def test_render_and_compare(self):
         room = self.room()
         self.run_tool("bake", room, "-o", self.path("b.glb"), "--samples", "64")
-        self.run_tool("render", self.path("b.glb"), "--env", SKY, "--size", "48x40", "--spp", "4", "-o", self.path("t.exr"))
-        self.run_tool("render", self.path("b.glb"), "--env", SKY, "--size", "48x40", "--spp", "4", "-o", self.path("t.png"))
+        for name in ("t.exr", "t.png"):
+            self.run_tool("render", self.path("b.glb"), "--env", SKY, "--size", "48x40", "--spp", "4", "-o", name)
         baked = lambent.open(self.path("b.glb"))
         for env in (SKY, lambent.environment(SKY)):
             picture = baked.render(env, size="48x40", spp=4)
