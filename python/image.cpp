@@ -32,7 +32,9 @@ Display display_of(const Image& image, const std::string& exposure, const std::s
   return take(parse_display(exposure, tone, {&image, 1}));
 }
 
-void save(const ImageObject& o, const std::string& path, const std::string& exposure, const std::string& tone) {
+void save(const ImageObject& o, const std::filesystem::path& file, const std::string& exposure,
+          const std::string& tone) {
+  const std::string path = file.string();
   const bool png = file_extension(path) == "png";
   const Display display = png ? display_of(*o.image, exposure, tone) : Display();
   const Released released;
@@ -92,9 +94,9 @@ void bind_image(py::module_& m) {
       .def("_repr_png_", [](const ImageObject& o) { return png_of(o, "auto", "neutral"); });
   m.def(
       "load_image",
-      [](const std::string& path) {
+      [](const std::filesystem::path& path) {
         const Released released;
-        return ImageObject{std::make_shared<Image>(take(load_image(path)))};
+        return ImageObject{std::make_shared<Image>(take(load_image(path.string())))};
       },
       py::arg("path"), "Reads .exr, .hdr, .png or .jpg; linear.");
   m.def("compare", &compare, py::arg("a"), py::arg("b"), py::arg("exposure") = "0", py::arg("tone") = "none",

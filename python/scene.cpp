@@ -37,9 +37,9 @@ SceneObject scene_of_arrays(const py::object& vertices, const py::object& faces,
   return {std::make_shared<Scene>(take(scene_from_arrays({places, corners, n, c, uv})))};
 }
 
-SceneObject load(const std::string& path) {
+SceneObject load(const std::filesystem::path& path) {
   const Released released;
-  return {std::make_shared<Scene>(take(load_scene(path)))};
+  return {std::make_shared<Scene>(take(load_scene(path.string())))};
 }
 
 // As a bake with these options would have it.

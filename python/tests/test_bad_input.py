@@ -95,7 +95,8 @@ class BadArrays(made.Case):
 
 SLOW = """
 import lambent, made, sys, threading, time
-scene = lambent.Scene(*made.bowl(5))
+scene = lambent.Scene(*made.bowl(6))
+slow = {"samples": 1 << 17, "order": 1, "bounces": 0}
 """
 
 
@@ -151,23 +152,23 @@ class Threads(made.Case):
     def test_interrupt(self):
         code = SLOW + ("import os\n"
                        "threading.Thread(target=lambda: (time.sleep(0.5), os.kill(os.getpid(), 2))).start()\n"
-                       "start = time.monotonic()\ntry:\n  lambent.bake(scene, samples=1 << 16)\n"
+                       "start = time.monotonic()\ntry:\n  lambent.bake(scene, **slow)\n"
                        "except KeyboardInterrupt:\n  print('stopped', time.monotonic() - start)\n"
                        "print(lambent.bake(scene, samples=1, bounces=0).receivers)\n")
         done = subprocess.run([sys.executable, "-c", code], capture_output=True, text=True, timeout=100, check=False)
         self.assertEqual(done.returncode, 0, done.stderr)
         word, seconds = done.stdout.split()[:2]
         self.assertEqual(word, "stopped")
-        self.assertLess(float(seconds), 5)
+        self.assertLess(float(seconds), 30)  # of minutes
 
     def test_interpreter_ends_during_a_bake(self):
         code = SLOW + ("for _ in range(2):\n"
-                       "  threading.Thread(target=lambda: lambent.bake(scene, samples=1 << 16), daemon=True).start()\n"
+                       "  threading.Thread(target=lambda: lambent.bake(scene, **slow), daemon=True).start()\n"
                        "time.sleep(0.7)\nprint('bye')\n")
         start = time.monotonic()
         done = subprocess.run([sys.executable, "-c", code], capture_output=True, text=True, timeout=100, check=False)
         self.assertEqual((done.returncode, done.stdout), (0, "bye\n"), done.stderr)
-        self.assertLess(time.monotonic() - start, 20)
+        self.assertLess(time.monotonic() - start, 60)
         self.assertNotIn("terminate", done.stderr)
 
     def test_interpreter_ends_while_relighting(self):
@@ -180,10 +181,10 @@ class Threads(made.Case):
             self.assertEqual(done.returncode, 0, done.stderr)
 
     def test_terminated(self):
-        child = subprocess.Popen([sys.executable, "-c", SLOW + "lambent.bake(scene, samples=1 << 16)"])
-        time.sleep(1)
+        child = subprocess.Popen([sys.executable, "-c", SLOW + "lambent.bake(scene, **slow)"])
+        time.sleep(2)
         child.send_signal(signal.SIGTERM)
-        self.assertEqual(child.wait(20), -signal.SIGTERM)
+        self.assertEqual(child.wait(60), -signal.SIGTERM)
 
 
 if __name__ == "__main__":

@@ -2,6 +2,7 @@
 import ast
 import inspect
 import os
+import pathlib
 
 import lambent
 import made
@@ -101,7 +102,7 @@ class Interface(made.Case):
         a = np.random.default_rng(3).random((12, 20, 3)).astype(np.float32)
         picture = lambent.Image(a)
         np.testing.assert_array_equal(picture.array, a)
-        picture.save(self.path("a.exr"))
+        picture.save(pathlib.Path(self.path("a.exr")))
         np.testing.assert_allclose(lambent.load_image(self.path("a.exr")).array, a, rtol=1e-3, atol=1e-4)
         b = a + np.float32(0.25)
         self.assertAlmostEqual(lambent.compare(picture, b)["rmse"], 0.25, places=6)
