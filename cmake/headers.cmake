@@ -39,6 +39,7 @@ set(lambent_relight_headers
 set(lambent_headers
   lambent/lambent.h
   lambent/bake/bake.h
+  lambent/bake/features.h
   lambent/bake/lattice.h
   lambent/bake/visibility.h
   lambent/baked/baked_file.h
@@ -47,6 +48,7 @@ set(lambent_headers
   lambent/receivers/receivers.h
   lambent/render/products.h
   lambent/render/render.h
+  lambent/scene/arrays.h
   lambent/scene/lights.h
   lambent/scene/load.h
   lambent/scene/reflection.h

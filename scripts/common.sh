@@ -5,6 +5,7 @@ cd "$(dirname "${BASH_SOURCE[0]}")/.."
 build_packages="g++ cmake ninja-build ccache pkg-config libembree-dev libtbb-dev libhwy-dev libeigen3-dev libopenexr-dev
   libstb-dev libxxhash-dev nlohmann-json3-dev libfmt-dev libcli11-dev libcpp-httplib-dev libgtest-dev
   libdraco-dev libmeshoptimizer-dev libwebp-dev libnanoflann-dev"
+python_packages="pybind11-dev python3-dev python3-numpy"
 sanitize_packages="clang-14 libclang-rt-14-dev"
 
 # Installs the Debian packages named, if any is missing. Needs root or sudo only then.
@@ -32,14 +33,16 @@ need() {
   rm -f "$log"
 }
 
-# build PRESET [TARGET...]
+# build PRESET [TARGET...], configured with $cmake_options
+cmake_options=()
 build() {
   local preset=$1
   shift
   mkdir -p build
   local log="build/$preset.log"
   echo "Building ($preset)" >&2
-  if ! { cmake --preset "$preset" && nice cmake --build --preset "$preset" ${@:+--target "$@"}; } >"$log" 2>&1; then
+  if ! { cmake --preset "$preset" "${cmake_options[@]}" &&
+    nice cmake --build --preset "$preset" ${@:+--target "$@"}; } >"$log" 2>&1; then
     tail -n 40 "$log" >&2
     echo "The build failed; the whole log is $log" >&2
     exit 1

@@ -1,5 +1,6 @@
 #include "commands.h"
 #include "export_lightmap.h"
+#include "export_npy.h"
 #include "web.h"
 
 #include <fmt/format.h>
@@ -14,7 +15,7 @@ namespace fs = std::filesystem;
 
 struct ExportCommand {
   WebOptions web;
-  std::string folder, three, godot;
+  std::string folder, three, godot, npy, convention = "pifu";
 };
 
 // The folder of an earlier export, or nothing: all else is somebody's work.
@@ -64,6 +65,7 @@ int run_export(Context& context, const ExportCommand& o) {
   context.cleans_up = true;
   if (!o.three.empty()) return export_lightmap(context, o.web.baked, LightmapTarget::three, o.three);
   if (!o.godot.empty()) return export_lightmap(context, o.web.baked, LightmapTarget::godot, o.godot);
+  if (!o.npy.empty()) return export_npy(context, o.web.baked, o.npy, o.convention);
   fs::path target = fs::path(o.folder).lexically_normal();
   if (!target.has_filename()) target = target.parent_path();  // "site/"
   if (auto ok = check_target(target); !ok) return fail(ok.error());
@@ -94,6 +96,13 @@ void add_export(CLI::App& app, Run& run) {
       "LightProbe coefficients a texel");
   target->add_option("--godot", o->godot,
                      "PREFIX of pictures for Godot: the layers of a directional lightmap, from sh:2 or sh:3");
+  auto* npy = target->add_option(
+      "--npy", o->npy, "Folder for NumPy: transfer by the input's vertices, for PRT data sets, and the faces");
+  c->add_option("--convention", o->convention,
+                "With --npy: whose light it goes with, and whose file names: pifu, icon, lambent, three, unity, godot, "
+                "gltf-ibl, filament, directx")
+      ->capture_default_str()
+      ->needs(npy);
   target->require_option(1);
   c->callback([o, &run] { run = [o](Context& context) { return run_export(context, *o); }; });
 }

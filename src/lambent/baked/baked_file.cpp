@@ -82,6 +82,9 @@ Result<void> fit_to_scene(const Scene& scene, Placement& where, std::vector<Bake
       Overloaded{[&](TexelPlacement& p) {
                    rearrange(p.front, found, wanted, Vec2(0)), rearrange(p.back, found, wanted, Vec2(0));
                  },
+                 [&](VertexPlacement& p) {
+                   for (auto* side : {&p.front, &p.back, &p.input}) rearrange(*side, found, wanted, none);
+                 },
                  [&](FixedView&) {}, [&](LatticePlacement&) {},
                  [&](auto& p) { rearrange(p.front, found, wanted, none), rearrange(p.back, found, wanted, none); }},
       where);
@@ -95,7 +98,7 @@ Placement placement_of(const Scene& scene, const Receivers& receivers) {
   return std::visit(
       Overloaded{
           [&](const CornerReceivers&) -> Placement {
-            return VertexPlacement{receivers.front, receivers.back};
+            return VertexPlacement{receivers.front, receivers.back, scene.input, scene.input_count};
           },
           [&](const TexelReceivers& t) -> Placement {
             return TexelPlacement{t.width, t.height, t.texels, places_of(scene, t.front), places_of(scene, t.back)};

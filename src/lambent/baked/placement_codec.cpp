@@ -3,6 +3,7 @@
 #include <lambent/core/overloaded.h>
 
 #include <algorithm>
+#include <numeric>
 
 namespace lambent {
 
@@ -25,6 +26,17 @@ void encode_sides(const std::vector<T>& front, const std::vector<T>& back, std::
     list.push_back(std::move(entry));
   }
   extension["parts"] = std::move(list);
+}
+
+// Where the vertices are the input's, as they come, their number says so.
+void encode_inputs(const VertexPlacement& p, std::span<const BakedPart> parts, json& extension, BlobWriter& out) {
+  if (p.input.empty()) return;
+  extension["inputVertices"] = p.input_count;
+  bool as_they_come = p.input.size() == p.input_count;
+  for (size_t v = 0; v < p.input.size() && as_they_come; ++v) as_they_come = p.input[v] == v;
+  for (size_t i = 0; i < parts.size() && !as_they_come; ++i)
+    extension["parts"][i]["input"] =
+        out.add({reinterpret_cast<const uint8_t*>(p.input.data() + parts[i].first), parts[i].count * 4});
 }
 
 json encode_view(const FixedView& v, BlobWriter& out) {
@@ -133,6 +145,42 @@ Result<Placement> decode_maps(const BlobReader& in, const json& extension, size_
   return Placement(std::move(placement));
 }
 
+Result<void> decode_inputs(const BlobReader& in, const json& extension, std::span<const BakedPart> parts,
+                           VertexPlacement& p, const std::string& where) {
+  if (!extension.contains("inputVertices")) return {};
+  auto count = read_count(extension, "inputVertices", 0xfffffffe, where);
+  if (!count) return count.error();
+  p.input_count = uint32_t(*count);
+  const json& list = extension["parts"];
+  const bool as_they_come = std::none_of(list.begin(), list.end(), [](const json& e) { return e.contains("input"); });
+  if (as_they_come) {
+    if (*count != p.front.size())
+      return Error{where, "\"inputVertices\" is " + std::to_string(*count) + " where there are " +
+                              std::to_string(p.front.size()) + " vertices as they came"};
+    p.input.resize(*count);
+    std::iota(p.input.begin(), p.input.end(), 0u);
+    return {};
+  }
+  for (size_t i = 0; i < parts.size(); ++i) {
+    auto numbers = read_values<uint32_t>(in, list[i], "input", parts[i].count, where);
+    if (!numbers) return numbers.error();
+    for (uint32_t n : *numbers)
+      if (n != no_receiver && n >= *count)
+        return Error{where, "vertex " + std::to_string(n) + " of the input is not there"};
+    p.input.insert(p.input.end(), numbers->begin(), numbers->end());
+  }
+  return {};
+}
+
+Result<Placement> decode_vertices(const BlobReader& in, const json& extension, size_t receivers,
+                                  std::vector<BakedPart>& parts, const std::string& where) {
+  auto placement = decode_maps<VertexPlacement>(in, extension, receivers, parts, where);
+  if (!placement) return placement;
+  if (auto ok = decode_inputs(in, extension, parts, std::get<VertexPlacement>(*placement), where); !ok)
+    return ok.error();
+  return placement;
+}
+
 Result<std::array<int, 3>> read_points(const json& object, const std::string& where) {
   const auto points = object.find("points");
   if (points == object.end() || !points->is_array() || points->size() != 3)
@@ -152,7 +200,9 @@ Result<std::array<int, 3>> read_points(const json& object, const std::string& wh
 void encode_placement(const Placement& where, std::span<const BakedPart> parts, json& extension, BlobWriter& out) {
   extension["parts"] = json::array();
   std::visit(
-      Overloaded{[&](const VertexPlacement& p) { encode_sides(p.front, p.back, parts, extension, out); },
+      Overloaded{[&](const VertexPlacement& p) {
+                   encode_sides(p.front, p.back, parts, extension, out), encode_inputs(p, parts, extension, out);
+                 },
                  [&](const TexelPlacement& p) {
                    encode_sides(p.front, p.back, parts, extension, out);
                    const std::span<const uint8_t> texels(reinterpret_cast<const uint8_t*>(p.texels.data()),
@@ -176,12 +226,12 @@ Result<Placement> decode_placement(const BlobReader& in, const json& extension, 
     return Placement(std::move(*decoded));
   }
   const auto surface = extension.find("surface");
-  if (surface == extension.end()) return decode_maps<VertexPlacement>(in, extension, receivers, parts, where);
+  if (surface == extension.end()) return decode_vertices(in, extension, receivers, parts, where);
   if (!surface->is_object() || !surface->contains("kind")) return Error{where, "\"surface\" has no kind"};
   const json& kind = (*surface)["kind"];
   if (kind == "texels") return decode_texels(in, extension, receivers, parts, where);
   if (kind == "patches") return decode_maps<PatchPlacement>(in, extension, receivers, parts, where);
-  if (kind == "vertices") return decode_maps<VertexPlacement>(in, extension, receivers, parts, where);
+  if (kind == "vertices") return decode_vertices(in, extension, receivers, parts, where);
   return Error{where, "receivers of this kind are not known to this program"};
 }
 

@@ -4,32 +4,34 @@
 namespace lambent {
 
 std::optional<ShConvention> parse_sh_convention(const std::string& name) {
-  if (name == "lambent") return ShConvention::lambent;
-  if (name == "three") return ShConvention::three;
+  if (name == "lambent" || name == "filament" || name == "directx") return ShConvention::lambent;
+  if (name == "three" || name == "pifu" || name == "icon") return ShConvention::three;
   if (name == "unity") return ShConvention::unity;
   if (name == "godot") return ShConvention::godot;
   if (name == "gltf-ibl") return ShConvention::gltf_ibl;
   return std::nullopt;
 }
 
-std::vector<Vec3> convert_sh(std::span<const Vec3> light, ShConvention to) {
+double sh_scale(ShConvention to, int i) {
   // Constants of the polynomials that the shaders of the Unity family evaluate, by coefficient.
-  const double basis[9] = {0.282095, 0.488603, 0.488603, 0.488603, 1.092548, 1.092548, 0.315392, 1.092548, 0.546274};
-  size_t count = light.size();
-  if (to == ShConvention::unity || to == ShConvention::gltf_ibl) count = std::min<size_t>(count, 9);
-  std::vector<Vec3> out(light.begin(), light.begin() + ptrdiff_t(count));
-  for (size_t i = 0; i < count; ++i) {
-    int l = sh_band(int(i)), m = int(i) - l * (l + 1);
-    double unsigned_ = m % 2 ? -1 : 1, scale = 1;
-    switch (to) {
-      case ShConvention::lambent: break;
-      case ShConvention::three: scale = unsigned_; break;
-      case ShConvention::godot: scale = unsigned_ / std::numbers::pi; break;
-      case ShConvention::gltf_ibl: scale = clamped_cosine(l); break;
-      case ShConvention::unity: scale = unsigned_ * clamped_cosine(l) / std::numbers::pi * basis[i]; break;
-    }
-    out[i] *= float(scale);
+  constexpr double basis[9] = {0.282095, 0.488603, 0.488603, 0.488603, 1.092548,
+                               1.092548, 0.315392, 1.092548, 0.546274};
+  const int l = sh_band(i), m = i - l * (l + 1);
+  const double unsigned_ = m % 2 ? -1 : 1;
+  switch (to) {
+    case ShConvention::lambent: break;
+    case ShConvention::three: return unsigned_;
+    case ShConvention::godot: return unsigned_ / std::numbers::pi;
+    case ShConvention::gltf_ibl: return i < 9 ? clamped_cosine(l) : 0;
+    case ShConvention::unity: return i < 9 ? unsigned_ * clamped_cosine(l) / std::numbers::pi * basis[i] : 0;
   }
+  return 1;
+}
+
+std::vector<Vec3> convert_sh(std::span<const Vec3> light, ShConvention to) {
+  std::vector<Vec3> out;
+  for (size_t i = 0; i < light.size() && sh_scale(to, int(i)) != 0; ++i)
+    out.push_back(light[i] * float(sh_scale(to, int(i))));
   return out;
 }
 

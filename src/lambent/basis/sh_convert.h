@@ -20,11 +20,16 @@ enum class ShConvention {
   gltf_ibl,  // EXT_lights_image_based: irradiance A.L, Condon-Shortley; order 3
 };
 
-// "lambent", "three", "unity", "godot" or "gltf-ibl"; nothing for others.
+// "lambent", "three", "unity", "godot" or "gltf-ibl"; also "filament" and "directx", which have ours, and "pifu" and
+// "icon", whose environments have three's signs. Nothing for others.
 std::optional<ShConvention> parse_sh_convention(const std::string& name);
 
 // Converts n^2 coefficients, n >= 1; conventions of order 3 keep the first 9 (fewer if there are fewer).
 std::vector<Vec3> convert_sh(std::span<const Vec3> light, ShConvention to);
+
+// The factor of coefficient i that convert_sh applies; 0 where the convention lacks it. Transfer that is divided by it
+// goes with light that is so converted: the sum of their products stays what it was.
+double sh_scale(ShConvention to, int i);
 
 // The function mirrored in x or in z (left-handed systems): negates coefficients of odd parity in that axis. Any order.
 std::vector<Vec3> mirror_sh_x(std::span<const Vec3> light);

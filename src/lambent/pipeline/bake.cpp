@@ -399,22 +399,27 @@ Result<Baked> bake(const BakeRequest& request, const Job& job) {
   return std::move(outcome->baked);
 }
 
+Result<nlohmann::json> save_outcome(const std::string& path, const BakeOutcome& outcome) {
+  nlohmann::json pictures = nlohmann::json::array();
+  const std::string stem = path.substr(0, path.find_last_of('.'));
+  for (const auto& [name, picture] : outcome.pictures) {
+    pictures.push_back(stem + name);
+    if (auto ok = save_image(stem + name, picture); !ok) return ok.error();
+  }
+  if (auto ok = save_baked(path, outcome.baked, outcome.look ? &*outcome.look : nullptr); !ok) return ok.error();
+  return pictures;
+}
+
 Result<Summary> bake_to_file(const BakeRequest& request, const Job& job) {
   if (auto ok = check_output(request.output, {"glb"}); !ok) return ok.error();
   auto outcome = bake_with_summary(request, job);
   if (!outcome) return outcome.error();
   const auto start = Clock::now();
-  nlohmann::json pictures = nlohmann::json::array();
-  const std::string stem = request.output.substr(0, request.output.find_last_of('.'));
-  for (const auto& [name, picture] : outcome->pictures) {
-    pictures.push_back(stem + name);
-    if (auto ok = save_image(stem + name, picture); !ok) return ok.error();
-  }
-  if (auto ok = save_baked(request.output, outcome->baked, outcome->look ? &*outcome->look : nullptr); !ok)
-    return ok.error();
+  auto pictures = save_outcome(request.output, *outcome);
+  if (!pictures) return pictures.error();
   Summary summary = std::move(outcome->summary);
   summary.json["output"] = request.output, summary.json["seconds"]["save"] = seconds_since(start);
-  if (!pictures.empty()) summary.json["pictures"] = std::move(pictures);
+  if (!pictures->empty()) summary.json["pictures"] = std::move(*pictures);
   return summary;
 }
 

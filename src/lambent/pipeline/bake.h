@@ -30,6 +30,9 @@ struct BakeOutcome {
 // Errors: those of resolved(), of files, of the stages; cancelled.
 Result<BakeOutcome> bake_with_summary(const BakeRequest& request, const Job& job = {});
 
+// Writes the baked file and, beside it, its pictures, whose names are given back as JSON. Errors: the disk's.
+Result<nlohmann::json> save_outcome(const std::string& path, const BakeOutcome& outcome);
+
 // Bakes and writes the request's output and its pictures; their names are in the summary.
 Result<Summary> bake_to_file(const BakeRequest& request, const Job& job = {});
 

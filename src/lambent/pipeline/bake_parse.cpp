@@ -301,7 +301,7 @@ void warn_of_unlit(const Scene& scene, const Job& job) {
 }  // namespace
 
 Result<Scene> load_scene_of(const BakeRequest& r, const Job& job) {
-  auto scene = load_scene(r.scene);
+  auto scene = r.loaded ? Result<Scene>(*r.loaded) : load_scene(r.scene);
   if (!scene) return scene;
   const std::vector<std::string> unknown = exclude_parts(*scene, r.exclude);
   if (!unknown.empty())

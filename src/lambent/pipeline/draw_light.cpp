@@ -15,7 +15,7 @@ Result<Surroundings> surroundings_of(const DrawRequest& request, const Job& job)
   if (!rotation) return rotation.error();
   Surroundings around{.env = {}, .rotation = *rotation, .seen = request.background == "env"};
   if (request.env.empty()) return around;
-  auto env = load_environment(request.env);
+  auto env = request.environment ? Result<Environment>(*request.environment) : load_environment(request.env);
   if (!env) return env.error();
   for (const std::string& warning : env->warnings) job.warn(warning);
   around.env = std::move(*env);

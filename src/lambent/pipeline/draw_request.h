@@ -1,6 +1,7 @@
 #pragma once
 // What a drawing is asked for: the options of `lambent render`.
 #include <lambent/baked/baked_file.h>
+#include <lambent/light/environment.h>
 #include <lambent/pipeline/options.h>
 #include <lambent/pipeline/parse.h>
 #include <lambent/render/render.h>
@@ -30,6 +31,9 @@ struct DrawRequest {
   // Transfer textures
   std::string transfer_texture, tile = "1,1", groove_map;
   float groove_depth = 0, groove_width = 1;  // depth 0: the table's deepest
+
+  // The environment itself, in place of what `env` names, which is said all the same.
+  std::shared_ptr<const Environment> environment;
 
   GivenOptions given;  // by JSON name; what differs from its default counts as given too
 };

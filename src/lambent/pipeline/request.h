@@ -5,6 +5,7 @@
 #include <lambent/core/progress.h>
 
 #include <functional>
+#include <memory>
 #include <set>
 #include <string>
 #include <vector>
@@ -55,6 +56,9 @@ struct BakeRequest {
   // Free space
   std::string lattice, lattice_box;
   int lattice_order = 4;
+
+  // The scene itself, in place of the file that `scene` names; no field of the JSON.
+  std::shared_ptr<const Scene> loaded;
 
   // Names (as in JSON) of fields that were said. A field that differs from its default counts as said without being
   // here.

@@ -297,10 +297,12 @@ void split_vertices(Scene& scene, const Charts& charts, const std::vector<std::a
     std::vector<Vec3> positions, normals, colors;
     std::vector<std::vector<Vec2>> texcoords;
     std::vector<Vec4> tangents;
+    std::vector<uint32_t> input;
     std::vector<Triangle> triangles;
-  } old{std::move(scene.positions), std::move(scene.normals),  std::move(scene.colors),
-        std::move(scene.texcoords), std::move(scene.tangents), scene.triangles};
+  } old{std::move(scene.positions), std::move(scene.normals), std::move(scene.colors), std::move(scene.texcoords),
+        std::move(scene.tangents),  std::move(scene.input),   scene.triangles};
   scene.positions.clear(), scene.normals.clear(), scene.colors.clear(), scene.tangents.clear();
+  scene.input.clear();
   scene.texcoords.assign(old.texcoords.size(), {});
   const bool backs = any_two_sided(scene);
   struct Key {
@@ -323,6 +325,7 @@ void split_vertices(Scene& scene, const Charts& charts, const std::vector<std::a
         if (!old.texcoords[set].empty()) scene.texcoords[set].push_back(old.texcoords[set][key.vertex]);
       if (!old.colors.empty()) scene.colors.push_back(old.colors[key.vertex]);
       if (!old.tangents.empty()) scene.tangents.push_back(old.tangents[key.vertex]);
+      if (!old.input.empty()) scene.input.push_back(old.input[key.vertex]);
     }
     atlas.front.resize(scene.positions.size(), Vec2(0));
     if (backs) atlas.back.resize(scene.positions.size(), Vec2(0));

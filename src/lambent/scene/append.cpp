@@ -27,6 +27,7 @@ void append_scene(Scene& a, const Scene& b) {
   LAMBENT_CHECK(vertices + added < none && a.triangles.size() + b.triangles.size() < none);
   append_attribute(a.colors, vertices, b.colors, added, Vec3(1)),
       append_attribute(a.tangents, vertices, b.tangents, added, Vec4(0));
+  if (!a.input.empty()) a.input.resize(vertices + added, none);
   a.texcoords.resize(std::max(a.texcoords.size(), b.texcoords.size()));
   for (size_t set = 0; set < a.texcoords.size(); ++set)
     append_attribute(a.texcoords[set], vertices, set < b.texcoords.size() ? b.texcoords[set] : std::vector<Vec2>(),

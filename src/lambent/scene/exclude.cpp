@@ -21,7 +21,7 @@ void shorten(std::vector<T>& values, size_t count) {
 void remove_parts(Scene& scene, const std::vector<uint8_t>& out) {
   size_t parts = 0, vertices = 0, triangles = 0;
   auto each_attribute = [&](auto f) {
-    f(scene.positions), f(scene.normals), f(scene.colors), f(scene.tangents);
+    f(scene.positions), f(scene.normals), f(scene.colors), f(scene.tangents), f(scene.input);
     for (auto& set : scene.texcoords) f(set);
   };
   for (size_t p = 0; p < scene.parts.size(); ++p) {

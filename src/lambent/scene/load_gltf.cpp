@@ -186,6 +186,7 @@ bool read_scene(GltfCheck& check, GltfDocument& document, std::span<const uint8_
     if (!image_problems[i].empty())
       links.add("image " + std::to_string(i) + ": " + image_problems[i] + "; it stays a link");
   links.tell(scene.warnings, "images");
+  number_inputs(scene);
   make_normals(scene, bare, true);
   repair_normals(scene);
   merge_duplicate_triangles(scene);

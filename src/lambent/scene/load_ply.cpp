@@ -40,6 +40,7 @@ LeftOut add_plain_part(PlyMesh& mesh, Scene& scene) {
   scene.normals.resize(scene.positions.size(), Vec3(0));
   scene.texcoords[0] = std::move(mesh.texcoords);
   scene.colors = std::move(mesh.colors);
+  number_inputs(scene);
   Part part;
   part.name = file_stem(scene.path);
   part.vertex_count = uint32_t(scene.positions.size()), part.triangle_count = uint32_t(scene.triangles.size());

@@ -21,6 +21,7 @@ class Assembler {
     std::vector<std::vector<uint32_t>> faces_of(mesh_.groups.size());
     for (uint32_t f = 0; f < mesh_.faces.size(); ++f) faces_of[mesh_.faces[f].group].push_back(f);
     for (uint32_t g = 0; g < mesh_.groups.size(); ++g) add_part(g, faces_of[g]);
+    scene_.input_count = uint32_t(mesh_.v.size());
     return left_out_;
   }
 
@@ -60,7 +61,7 @@ class Assembler {
   }
 
   void add_vertex(MeshCorner c) {
-    scene_.positions.push_back(positions_[c.v]);
+    scene_.positions.push_back(positions_[c.v]), scene_.input.push_back(c.v);
     scene_.normals.push_back(c.vn == none ? Vec3(0) : mesh_.vn[c.vn]);
     if (has_texcoords_) scene_.texcoords[0].push_back(c.vt == none ? Vec2(0) : mesh_.vt[c.vt]);
     if (!mesh_.colors.empty()) scene_.colors.push_back(mesh_.colors[c.v]);

@@ -37,7 +37,7 @@ void drop_unused(Scene& scene) {
       if (place[v] != none) values[place[v]] = values[v];
     values.resize(used);
   };
-  compact(scene.positions), compact(scene.normals), compact(scene.colors);
+  compact(scene.positions), compact(scene.normals), compact(scene.colors), compact(scene.input);
   for (auto& uv : scene.texcoords) compact(uv);
   for (Triangle& t : scene.triangles)
     for (uint32_t& v : t.v) v = place[v];

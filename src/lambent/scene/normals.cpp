@@ -267,6 +267,7 @@ void insert_copies(Scene& scene, const std::vector<Copy>& copies, const std::vec
   };
   auto as_before = [](const auto& values, const Copy& copy) { return values[copy.vertex]; };
   insert(scene.positions, as_before), insert(scene.colors, as_before), insert(scene.tangents, as_before);
+  insert(scene.input, as_before);
   for (std::vector<Vec2>& uv : scene.texcoords) insert(uv, as_before);
   insert(scene.normals, [](const auto&, const Copy& copy) { return copy.normal; });
 

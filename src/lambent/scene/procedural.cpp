@@ -91,6 +91,7 @@ void add_mesh(Scene& scene, uint32_t material, std::string name, std::span<const
   for (auto& uv : scene.texcoords)
     if (!uv.empty()) uv.resize(scene.positions.size(), Vec2(0));
   if (!scene.colors.empty()) scene.colors.resize(scene.positions.size(), Vec3(1));
+  if (!scene.input.empty()) scene.input.resize(scene.positions.size(), none);
   for (size_t i = 0; i < indices.size(); i += 3) {
     Triangle t{{}, uint32_t(scene.parts.size()), false};
     for (size_t k = 0; k < 3; ++k) {

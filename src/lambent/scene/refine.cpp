@@ -46,7 +46,7 @@ class EdgeSplitter {
     for (size_t p = 0; p < scene_.parts.size(); ++p) split_part(uint32_t(p));
     scene_.positions = std::move(out_.positions), scene_.normals = std::move(out_.normals);
     scene_.texcoords = std::move(out_.texcoords), scene_.colors = std::move(out_.colors);
-    scene_.tangents = std::move(out_.tangents);
+    scene_.tangents = std::move(out_.tangents), scene_.input = std::move(out_.input);
     scene_.triangles = std::move(out_.triangles);
     out_ = Scene();
   }
@@ -87,7 +87,7 @@ class EdgeSplitter {
       to.insert(to.end(), from.begin() + part.first_vertex, from.begin() + part.first_vertex + part.vertex_count);
     };
     copy(scene_.positions, out_.positions), copy(scene_.normals, out_.normals), copy(scene_.colors, out_.colors);
-    copy(scene_.tangents, out_.tangents);
+    copy(scene_.tangents, out_.tangents), copy(scene_.input, out_.input);
     out_.texcoords.resize(scene_.texcoords.size());
     for (size_t set = 0; set < out_.texcoords.size(); ++set) copy(scene_.texcoords[set], out_.texcoords[set]);
   }
@@ -97,6 +97,7 @@ class EdgeSplitter {
       if (!values.empty()) values.push_back(0.5f * values[a] + 0.5f * values[b]);
     };
     halve(out_.positions), halve(out_.colors);
+    if (!out_.input.empty()) out_.input.push_back(none);
     for (std::vector<Vec2>& uv : out_.texcoords) halve(uv);
     if (!out_.tangents.empty()) {
       const Vec4 t = out_.tangents[a], other = out_.tangents[b];

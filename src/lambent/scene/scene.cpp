@@ -2,6 +2,8 @@
 #include <lambent/scene/scene.h>
 #include <lambent/scene/see_through.h>
 
+#include <numeric>
+
 namespace lambent {
 namespace {
 
@@ -69,6 +71,12 @@ Vec3 sample_bytes(const Texture& texture, Vec2 uv, const std::array<float, 256>&
 float srgb_to_linear(float e) { return e <= 0.04045f ? e / 12.92f : std::pow((e + 0.055f) / 1.055f, 2.4f); }
 
 float linear_to_srgb(float l) { return l <= 0.0031308f ? 12.92f * l : 1.055f * std::pow(l, 1.0f / 2.4f) - 0.055f; }
+
+void number_inputs(Scene& scene) {
+  scene.input_count = uint32_t(scene.positions.size());
+  scene.input.resize(scene.positions.size());
+  std::iota(scene.input.begin(), scene.input.end(), 0u);
+}
 
 Bounds bounds(const Scene& scene) {
   Bounds box;

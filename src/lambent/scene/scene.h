@@ -129,6 +129,12 @@ struct Scene {
   // not given.
   std::vector<Vec4> tangents;
 
+  // Which vertex of the input each one is, counted from 0 as the input has them (an OBJ's `v` lines, a PLY's vertices,
+  // an array's rows, a glTF's as its nodes are read); `none` for those that were made. Vertices that were split have
+  // the same number. Empty for scenes that were made, or as many as positions.
+  std::vector<uint32_t> input;
+  uint32_t input_count = 0;  // vertices of the input, those that nothing uses with them
+
   std::vector<Triangle> triangles;
   std::vector<Part> parts;          // in order of their runs, covering all vertices and triangles
   std::vector<Material> materials;  // at least one
@@ -139,6 +145,9 @@ struct Scene {
   std::vector<std::string> warnings;             // one line each, in the order found
   std::vector<std::string> excluded;             // what exclude_parts() left out, as it was asked for
 };
+
+// Numbers the vertices as they are.
+void number_inputs(Scene& scene);
 
 Bounds bounds(const Scene& scene);  // of the vertices that triangles use
 

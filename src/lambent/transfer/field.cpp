@@ -64,6 +64,16 @@ DirectionalKind directional_of(const Field& field) {
   return rows ? rows->kind : DirectionalKind::none;
 }
 
+std::vector<std::array<uint32_t, 2>> input_receivers(const VertexPlacement& where) {
+  std::vector<std::array<uint32_t, 2>> pairs;
+  for (size_t v = 0; v < where.input.size(); ++v)
+    if (where.input[v] != no_receiver && where.front[v] != no_receiver)
+      pairs.push_back({where.input[v], where.front[v]});
+  std::sort(pairs.begin(), pairs.end());
+  pairs.erase(std::unique(pairs.begin(), pairs.end()), pairs.end());
+  return pairs;
+}
+
 Field lattice_field(LatticeTransfer l) {
   return {LatticePlacement{l.lattice, std::move(l.valid)}, std::move(l.transfer), IncidentRows{l.order}};
 }
@@ -71,7 +81,10 @@ Field lattice_field(LatticeTransfer l) {
 bool is_consistent(const Field& field) {
   const size_t n = receivers_of(field.store);
   const bool placed = std::visit(
-      Overloaded{[&](const VertexPlacement& p) { return most_receivers(p.front, p.back) <= n; },
+      Overloaded{[&](const VertexPlacement& p) {
+                   return most_receivers(p.front, p.back) <= n && most_receivers(p.input, {}) <= p.input_count &&
+                          (p.input.empty() || p.input.size() == p.front.size());
+                 },
                  [&](const TexelPlacement& p) {
                    return p.texels.size() == size_t(p.width) * size_t(p.height) && most_receivers(p.texels, {}) <= n;
                  },

@@ -14,6 +14,7 @@
 #include <lambent/transfer/visibility.h>
 #include <lambent/transfer/zonal_transfer.h>
 
+#include <array>
 #include <string>
 #include <variant>
 #include <vector>
@@ -27,6 +28,10 @@ inline constexpr uint32_t no_receiver = 0xffffffffu;
 // one-sided, and no_receiver stands where a side receives nothing.
 struct VertexPlacement {
   std::vector<uint32_t> front, back;  // receiver of each vertex, by side
+  // Which vertex of the scene's input each one is, counted from 0; no_receiver for those that the bake made. Empty
+  // where that is not known.
+  std::vector<uint32_t> input = {};
+  uint32_t input_count = 0;
 };
 struct TexelPlacement {
   int width = 0, height = 0;
@@ -89,6 +94,10 @@ struct Field {
 // Null where the rows are not those of a last reflection.
 inline const Outgoing* outgoing_of(const Field& field) { return std::get_if<Outgoing>(&field.rows); }
 DirectionalKind directional_of(const Field& field);
+
+// From the scene's input back to receivers: pairs of a vertex of the input and a receiver of its front, sorted, each
+// once. A vertex that was split, at a crease or a seam of its normals, has several. Empty where the input is not known.
+std::vector<std::array<uint32_t, 2>> input_receivers(const VertexPlacement& where);
 
 // Light in free space as a field.
 Field lattice_field(LatticeTransfer lattice);
