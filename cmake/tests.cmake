@@ -1,6 +1,6 @@
 add_executable(lambent-tests ${lambent_tests} ${tool_tests} apps/lambent/serve.cpp)
 target_link_libraries(lambent-tests PRIVATE lambent GTest::gtest GTest::gtest_main nlohmann_json::nlohmann_json
-  fmt::fmt OpenEXR::OpenEXR TBB::tbb CLI11::CLI11 PkgConfig::httplib
+  fmt::fmt OpenEXR::OpenEXR TBB::tbb CLI11::CLI11
   PkgConfig::webp draco::draco $<LINK_ONLY:meshoptimizer::meshoptimizer>)
 set(lambent_golden ${CMAKE_CURRENT_SOURCE_DIR}/tests/golden)
 target_compile_definitions(lambent-tests PRIVATE LAMBENT_GOLDEN="${lambent_golden}")
