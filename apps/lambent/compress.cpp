@@ -177,6 +177,7 @@ int run_compress(Context& context, CompressCommand o) {
   o.zonal.precision = o.precision == "half" ? Precision::half : Precision::single;
   auto baked = load_baked(o.baked);
   if (!baked) return fail(baked.error());
+  allow_replacing(o.baked);  // by less of the same
   std::error_code ignored;
   const uintmax_t before = std::filesystem::file_size(o.baked, ignored);  // the output may take its place
   if (std::holds_alternative<Visibility>(baked->surface.store))

@@ -5,6 +5,7 @@
 #include <lambent/bake/lobes.h>
 #include <lambent/bake/operator.h>
 #include <lambent/bake/solve.h>
+#include <lambent/core/checkpoint.h>
 #include <lambent/core/parallel.h>
 #include <lambent/core/pool.h>
 
@@ -91,12 +92,18 @@ struct Baker {
     ErrorSums errors(n());
     {
       ProgressStage stage(progress, "tracing", n());
+      const KeptPieces kept(progress, "tracing", n() / gather_block);
       parallel_for(n(), gather_block, [&](size_t begin, size_t end) {
         if (stage.cancelled()) return;
         std::vector<float> rows((end - begin) * sky_width()), half_rows(checked_count(end - begin) * sky_width());
         const GatherSky sky{rows.data(), half_rows.data(), sky_width(), &lobes, buried.data() + begin};
-        trace_sky(setup, *scratch.borrow(), begin, end - begin, sky);
-        trace_sharp_lobes(begin, end - begin, sky);
+        const std::span<float> full(rows), half(half_rows);
+        const std::span<uint8_t> inside(buried.data() + begin, end - begin);
+        if (!kept.load(begin / gather_block, full, half, inside)) {
+          trace_sky(setup, *scratch.borrow(), begin, end - begin, sky);
+          trace_sharp_lobes(begin, end - begin, sky);
+          kept.save(begin / gather_block, full, half, inside);
+        }
         for (size_t r = begin; r < end; ++r) {
           const float* row = rows.data() + (r - begin) * sky_width();
           store_receiver(out, r, {row, sky_width()});
