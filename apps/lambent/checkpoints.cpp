@@ -4,7 +4,6 @@
 #include <lambent/pipeline/durable.h>
 
 #include <fmt/format.h>
-#include <unistd.h>
 
 #include <filesystem>
 
@@ -58,7 +57,7 @@ int run_checkpoints(Context& context, const CheckpointsCommand& o) {
                                   human_bytes(double(c.bytes)), age(c.age), state));
     }
     for (const std::string& file : temporaries_below(folder)) {
-      if (o.clean) ::unlink(file.c_str());
+      if (o.clean) fs::remove_all(file, status);
       list.push_back({{"temporary", file}, {"state", o.clean ? "removed" : "left by a killed program"}});
       lines.push_back(file + "\n  " + (o.clean ? "removed" : "left by a killed program"));
     }

@@ -62,7 +62,7 @@ int open_locked(const std::string& path, int flags) {
 
 bool is_ours(const fs::path& file) {
   return file.filename() == checkpoint_identity_file || file.filename() == lock_file ||
-         file.extension() == pieces_ending || file.filename().string().starts_with("checkpoint.json.part");
+         file.extension() == pieces_ending || file.filename().string().starts_with("checkpoint.json.");
 }
 
 Error in_use(const std::string& folder) { return {folder, "is in use by another process"}; }

@@ -18,6 +18,9 @@ namespace {
 
 namespace fs = std::filesystem;
 
+// Then the writer's number. No other program's: what bears it may be removed.
+const std::string temporary_ending = ".lambent-part";
+
 std::string system_message() { return std::strerror(errno); }
 
 // Temporaries of writes in flight, kept where a signal handler can reach them without allocating. Never given back.
@@ -61,7 +64,9 @@ struct WrittenFile {
   int fd = -1;
   Unfinished* note = nullptr;
   WrittenFile(std::string asked)
-      : path(std::move(asked)), target(resolved(path)), temporary(target + ".part" + std::to_string(::getpid())) {}
+      : path(std::move(asked)),
+        target(resolved(path)),
+        temporary(target + temporary_ending + std::to_string(::getpid())) {}
   WrittenFile(const WrittenFile&) = delete;
   WrittenFile& operator=(const WrittenFile&) = delete;
   ~WrittenFile() {
@@ -112,6 +117,11 @@ thread_local FileSet* current_set = nullptr;
 int rename_all(std::vector<std::unique_ptr<WrittenFile>>& files) {
   const auto rename_one = [](const WrittenFile& file) { return ::rename(file.temporary.c_str(), file.target.c_str()); };
   if (files.size() == 1) return rename_one(*files[0]) == 0 ? 0 : errno;
+#ifdef __EMSCRIPTEN__  // where there is one process
+  for (const auto& file : files)
+    if (rename_one(*file) != 0) return errno;
+  return 0;
+#else
   volatile int failure = 0;
   const char* const head = files.back()->target.c_str();
   const pid_t child = ::vfork();
@@ -126,6 +136,7 @@ int rename_all(std::vector<std::unique_ptr<WrittenFile>>& files) {
   while (::waitpid(child, nullptr, 0) < 0 && errno == EINTR) {
   }
   return failure;
+#endif
 }
 
 }  // namespace
@@ -170,14 +181,15 @@ std::vector<std::string> stale_temporaries(const std::string& folder, const std:
   std::error_code status;
   for (const auto& entry : fs::directory_iterator(folder.empty() ? "." : folder, status)) {
     const std::string file = entry.path().filename().string();
-    const size_t dot = file.rfind(".part");
-    if (dot == std::string::npos || dot + 5 == file.size() || (!name.empty() && file.substr(0, dot) != name) ||
-        file.find_first_not_of("0123456789", dot + 5) != std::string::npos)
+    const size_t dot = file.rfind(temporary_ending), digits = dot + temporary_ending.size();
+    if (dot == std::string::npos || digits == file.size() || (!name.empty() && file.substr(0, dot) != name) ||
+        file.find_first_not_of("0123456789", digits) != std::string::npos)
       continue;
     const int fd = ::open(entry.path().c_str(), O_RDONLY | O_CLOEXEC | O_NOFOLLOW | O_NONBLOCK);
     if (fd < 0) continue;
     struct stat info;
-    if (::fstat(fd, &info) == 0 && S_ISREG(info.st_mode) && ::flock(fd, LOCK_EX | LOCK_NB) == 0)
+    if (::fstat(fd, &info) == 0 && (S_ISREG(info.st_mode) || S_ISDIR(info.st_mode)) &&
+        ::flock(fd, LOCK_EX | LOCK_NB) == 0)
       out.push_back(entry.path().string());
     ::close(fd);
   }
@@ -186,8 +198,10 @@ std::vector<std::string> stale_temporaries(const std::string& folder, const std:
 
 void remove_stale_temporaries(const std::string& path) {
   const fs::path target = resolved(path);
-  for (const std::string& file : stale_temporaries(target.parent_path().string(), target.filename().string()))
-    ::unlink(file.c_str());
+  for (const std::string& file : stale_temporaries(target.parent_path().string(), target.filename().string())) {
+    std::error_code ignored;
+    fs::remove_all(file, ignored);
+  }
 }
 
 }  // namespace lambent
