@@ -132,7 +132,10 @@ cmp -s whole.glb part.glb && ok || bad "what was gone on with has other bytes"
 grep -q 'resumed' stdout && ok || bad "nothing was gone on with"
 absent kept
 # By itself, where it is long; and with nothing left where it is short.
-timeout -s INT 4 "$tool" bake corner.obj --max-edge 0.01 --samples 16384 -o long.glb >/dev/null 2>stderr
+"$tool" bake corner.obj --max-edge 0.01 --samples 16384 -o long.glb >/dev/null 2>stderr &
+for i in $(seq 600); do [ -s long.glb.checkpoint/tracing.pieces ] || sleep 0.1; done
+kill -INT $!
+wait $!
 grep -q 'goes on from long.glb.checkpoint$' stderr && [ -e long.glb.checkpoint/checkpoint.json ] && ok ||
   bad "long work is not kept by itself: $(tail -1 stderr)"
 expect 0 'removed' checkpoints long.glb.checkpoint --clean

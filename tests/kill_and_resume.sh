@@ -1,5 +1,6 @@
 #!/usr/bin/env bash
-# Bakes of every kind, killed at random moments and gone on with: the finished file has the bytes of one that ran through.
+# Bakes of every kind, killed at random moments and gone on with: the finished file has the bytes of one that ran
+# through.
 # usage: kill_and_resume.sh LAMBENT [MOMENTS a kind] [KIND...]
 set -uo pipefail
 tool=$1
@@ -54,6 +55,7 @@ f 12 16 17 13
 f 13 17 18 14
 f 14 18 15 11
 O
+glossy="--order 4 --incident-order 3 --view-map 16"
 declare -A kinds=(
   [diffuse]="--max-edge 0.08 --samples 512 --bounces 4"
   [direct]="--max-edge 0.08 --samples 512 --bounces 0"
@@ -63,11 +65,11 @@ declare -A kinds=(
   [texels]="--receivers texels --atlas 96x96 --samples 512 --bounces 2"
   [patches]="--receivers patches --max-edge 0.12 --samples 256 --bounces 2"
   [lattice]="--max-edge 0.1 --samples 1024 --lattice 8,8,8"
-  [matrix]="--transfer matrix --max-edge 0.12 --samples 256 --order 4 --incident-order 3 --view-map 16 --bounces 2 --brdf ggx:roughness=0.4"
-  [paths]="--transfer matrix --max-edge 0.12 --samples 128 --order 4 --incident-order 3 --view-map 16 --bounces 2 --brdf ggx:roughness=0.4 --simulate paths"
-  [factors]="--transfer matrix --factors --max-edge 0.05 --samples 512 --order 4 --incident-order 3 --view-map 16 --brdf ggx:roughness=0.4"
+  [matrix]="--transfer matrix $glossy --max-edge 0.12 --samples 256 --bounces 2 --brdf ggx:roughness=0.4"
+  [paths]="--transfer matrix $glossy --max-edge 0.12 --samples 128 --bounces 2 --simulate paths"
+  [factors]="--transfer matrix $glossy --factors --max-edge 0.05 --samples 512 --brdf ggx:roughness=0.4"
   [zonal]="--transfer zonal --max-edge 0.2 --samples 256 --lobes 3"
-  [glossy_zonal]="--transfer zonal --outgoing svd:2 --max-edge 0.2 --samples 128 --order 4 --incident-order 3 --view-map 16 --lobes 2"
+  [glossy_zonal]="--transfer zonal $glossy --outgoing svd:2 --max-edge 0.2 --samples 128 --lobes 2"
   [subsurface]="--subsurface sigma_s=4,sigma_a=0.2 --max-edge 0.1 --samples 256 --bounces 2"
   [blocks]="--transfer blocks --max-edge 0.16 --cube 32"
   [lightmap]="--transfer lightmap --atlas 128x128 --samples 256 --light-groups --sky uniform:0.3 --bounces 3"
@@ -111,7 +113,7 @@ for kind in "$@"; do
     for picture in whole.*.exr; do
       [ ! -e "$picture" ] || cmp -s "$picture" "part.${picture#whole.}" || bad "$kind: $picture differs"
     done
-    [ -z "$(find . -name 'part.*.part*' -o -name '*.checkpoint')" ] || bad "$kind: left behind: $(ls -d part.*)"
+    [ -z "$(find . -name '*.lambent-part*' -o -name '*.checkpoint')" ] || bad "$kind: left behind: $(ls -d part.*)"
     total=$((total + 1))
   done
   rm -f whole.*

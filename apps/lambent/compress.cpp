@@ -69,6 +69,7 @@ Result<void> save_smaller(const CompressCommand& o, Baked& baked, Field smaller,
   if (!file) return file.error();
   const std::optional<ViewerLook> look = load_look(*file, o.baked);
   baked.surface = std::move(smaller), baked.provenance = provenance.dump(), baked.terms.clear();
+  allow_replacing(o.baked);  // by less of the same
   return save_baked(o.output, baked, look ? &*look : nullptr);
 }
 
@@ -177,7 +178,6 @@ int run_compress(Context& context, CompressCommand o) {
   o.zonal.precision = o.precision == "half" ? Precision::half : Precision::single;
   auto baked = load_baked(o.baked);
   if (!baked) return fail(baked.error());
-  allow_replacing(o.baked);  // by less of the same
   std::error_code ignored;
   const uintmax_t before = std::filesystem::file_size(o.baked, ignored);  // the output may take its place
   if (std::holds_alternative<Visibility>(baked->surface.store))
