@@ -12,6 +12,7 @@
 #include <cstring>
 #include <filesystem>
 #include <optional>
+#include <utility>
 
 namespace lambent {
 namespace {
@@ -23,21 +24,28 @@ const std::string temporary_ending = ".lambent-part";
 
 std::string system_message() { return std::strerror(errno); }
 
-// Temporaries of writes in flight, kept where a signal handler can reach them without allocating. Never given back.
+// Temporaries of writes in flight, kept where a signal handler can reach them without allocating; it looks at those
+// that are active. Never given back, but used again.
 struct Unfinished {
-  std::atomic<bool> active{false};
+  std::atomic<bool> active{false}, taken{true};
   std::string path;
   Unfinished* next = nullptr;
 };
 std::atomic<Unfinished*> all_unfinished{nullptr};
 
 Unfinished* note_unfinished(const std::string& path) {
+  for (Unfinished* note = all_unfinished; note; note = note->next)
+    if (!note->taken.exchange(true)) {
+      note->path = path, note->active = true;
+      return note;
+    }
   auto* note = new Unfinished;
   note->path = path, note->active = true, note->next = all_unfinished.load();
   while (!all_unfinished.compare_exchange_weak(note->next, note)) {
   }
   return note;
 }
+void release(Unfinished& note) { note.active = false, note.taken = false; }
 
 // Where a name leads: of a link, to what it names, there or not.
 std::string resolved(const std::string& path) {
@@ -71,7 +79,9 @@ struct WrittenFile {
   WrittenFile& operator=(const WrittenFile&) = delete;
   ~WrittenFile() {
     if (fd >= 0) ::close(fd);
-    if (note && note->active) ::unlink(temporary.c_str()), note->active = false;
+    if (!note) return;
+    ::unlink(temporary.c_str());
+    release(*note);
   }
   Error error(const std::string& why) const { return {path, "cannot be written: " + why}; }
 
@@ -148,7 +158,7 @@ Result<void> FileSet::commit() {
   if (files_.empty()) return {};
   const int failure = rename_all(files_);
   if (failure != 0) return files_.back()->error(std::strerror(failure));
-  for (auto& file : files_) file->note->active = false;
+  for (auto& file : files_) release(*std::exchange(file->note, nullptr));
   for (size_t i = 0; i < files_.size(); ++i)
     if (i == 0 || fs::path(files_[i]->target).parent_path() != fs::path(files_[i - 1]->target).parent_path())
       sync_folder(files_[i]->target);
