@@ -110,6 +110,7 @@ kill -INT $!
 wait $!
 [ $? -eq 1 ] && tail -1 stderr | grep -qx 'lambent: cancelled; the same command goes on from kept' && ok ||
   bad "an interrupted bake: $(cat stderr)"
+expect 0 'kept [0-9.]+ s ago' checkpoints
 expect 0 'can go on' checkpoints
 expect 0 'corner.obj' checkpoints kept --json
 expect 1 'kept: is of another request: samples was 1024, and is 32' bake corner.obj --max-edge 0.03 --samples 32 \

@@ -193,7 +193,7 @@ void look_at(const fs::path& folder, std::vector<CheckpointFound>& out) {
   const json identity = read_identity(*bytes);
   CheckpointFound found{.folder = folder.string()};
   std::error_code status;
-  fs::file_time_type last{};
+  fs::file_time_type last = fs::file_time_type::min();
   for (const auto& entry : fs::directory_iterator(folder, status))
     if (entry.is_regular_file(status))
       found.bytes += entry.file_size(status), last = std::max(last, entry.last_write_time(status));
