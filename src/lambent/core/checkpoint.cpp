@@ -283,9 +283,9 @@ void Checkpoint::flush() {
 }
 
 void Checkpoint::remove() {
-  flush();
   if (!impl_->on) return;
-  impl_->off = true;
+  impl_->off = true;  // what goes needs not reach the disk
+  flush();
   if (auto ok = remove_files(impl_->options.folder); !ok) impl_->options.warn(ok.error().text());
 }
 
