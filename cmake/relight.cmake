@@ -34,6 +34,7 @@ set(lambent_relight_sources
   src/lambent/core/glb.cpp
   src/lambent/core/parallel.cpp
   src/lambent/core/sampling.cpp
+  src/lambent/core/write_file.cpp
   src/lambent/light/cube_light.cpp
   src/lambent/light/environment.cpp
   src/lambent/light/project.cpp

@@ -1,6 +1,6 @@
 add_executable(lambent-tests ${lambent_tests} ${tool_tests} apps/lambent/serve.cpp)
 target_link_libraries(lambent-tests PRIVATE lambent GTest::gtest GTest::gtest_main nlohmann_json::nlohmann_json
-  fmt::fmt OpenEXR::OpenEXR TBB::tbb CLI11::CLI11 PkgConfig::httplib
+  fmt::fmt OpenEXR::OpenEXR TBB::tbb CLI11::CLI11
   PkgConfig::webp draco::draco $<LINK_ONLY:meshoptimizer::meshoptimizer>)
 set(lambent_golden ${CMAKE_CURRENT_SOURCE_DIR}/tests/golden)
 target_compile_definitions(lambent-tests PRIVATE LAMBENT_GOLDEN="${lambent_golden}")
@@ -46,4 +46,8 @@ endif()
 
 add_test(NAME include_arrows COMMAND ${CMAKE_CURRENT_SOURCE_DIR}/tests/include_arrows.sh ${CMAKE_CURRENT_SOURCE_DIR})
 add_test(NAME command_line COMMAND ${CMAKE_CURRENT_SOURCE_DIR}/tests/command_line.sh $<TARGET_FILE:lambent-tool>)
+add_test(NAME durable COMMAND ${CMAKE_CURRENT_SOURCE_DIR}/tests/durable.sh $<TARGET_FILE:lambent-tool>)
+# A hundred moments of each kind: kill_and_resume.sh LAMBENT 100.
+add_test(NAME kill_and_resume COMMAND ${CMAKE_CURRENT_SOURCE_DIR}/tests/kill_and_resume.sh
+  $<TARGET_FILE:lambent-tool> 2)
 set_tests_properties(command_line PROPERTIES COST 1000)  # the longest: first, beside the others

@@ -1,31 +1,7 @@
 #!/usr/bin/env bash
 # The command-line tool as a user meets it: exit codes, one line an error, nothing half-written, pictures that agree.
 set -uo pipefail
-tool=$1
-source_dir=$(cd "$(dirname "$0")/.." && pwd)
-dir=$(mktemp -d)
-trap 'rm -rf "$dir"' EXIT
-cd "$dir"
-failures=0
-passed=0
-ok() { passed=$((passed + 1)); }
-bad() { echo "FAILED: $*"; failures=$((failures + 1)); }
-
-# expect CODE PATTERN COMMAND...: exit code, and one line on stderr that matches.
-expect() {
-  local code=$1 pattern=$2
-  shift 2
-  "$tool" "$@" >stdout 2>stderr
-  local got=$?
-  sed -i -E '/^[a-z ]+  [0-9.]+%(, .* left)?$/d' stderr  # progress, told every few seconds: machines may be slow
-  [ $got -eq "$code" ] || { bad "exit $got, not $code: lambent $*: $(head -c 300 stderr)"; return; }
-  if [ "$code" -ne 0 ]; then
-    [ "$(wc -l <stderr)" -eq 1 ] || { bad "not one line: lambent $*: $(cat stderr)"; return; }
-    [ -s stdout ] && { bad "results on stdout despite failure: lambent $*"; return; }
-  fi
-  grep -qE "$pattern" stderr stdout || { bad "no \"$pattern\": lambent $*: $(cat stderr)"; return; }
-  ok
-}
+source "$(dirname "$0")/expect.sh"
 # alike DECIBELS WHAT COMPARED...: two pictures agree to that PSNR. That of identical ones is null, and their RMSE 0.
 alike() {
   local least=$1 what=$2 psnr
@@ -38,19 +14,6 @@ alike() {
     [ -n "$psnr" ] && [ "$psnr" -ge "$least" ] && ok || bad "$what differ: PSNR ${psnr:-unreadable}, not $least"
   fi
 }
-absent() { [ -e "$1" ] && bad "$1 was left behind" || ok; }
-
-# A corner of two quads and a floor, as OBJ.
-cat >corner.obj <<'O'
-v 0 0 0
-v 2 0 0
-v 2 0 2
-v 0 0 2
-v 0 2 0
-v 2 2 0
-f 4 3 2 1
-f 1 2 6 5
-O
 
 expect 0 'receivers' bake corner.obj --max-edge 0.2 --samples 256 -o corner.glb
 expect 0 '"error"' bake corner.obj --max-edge 0.2 --samples 256 --json -o corner.glb
@@ -633,7 +596,8 @@ kill -INT $pid 2>/dev/null
 wait $pid
 [ $? -eq 1 ] && ok || bad "an interrupted bake did not exit with 1"
 absent interrupted.glb
-[ -z "$(ls interrupted.glb.* 2>/dev/null)" ] && ok || bad "an interrupted bake left a temporary"
+[ -z "$(ls -d interrupted.glb.* 2>/dev/null | grep -vx interrupted.glb.checkpoint)" ] && ok ||
+  bad "an interrupted bake left a temporary"
 
 # While it still reads: at once, in one line.
 {
@@ -652,5 +616,4 @@ got=$?
 [ $got -eq 0 ] ||
   { [ $got -eq 1 ] && grep -qx 'lambent: cancelled' stderr && ok || bad "interrupted while reading: $got"; }
 
-echo "$passed passed, $failures failed"
-[ $failures -eq 0 ]
+finish

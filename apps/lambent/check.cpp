@@ -264,8 +264,8 @@ int run_check(Context& context, const CheckCommand& o) {
 void add_check(CLI::App& app, Run& run) {
   // What the references could not answer to: light or view fixed in the bake, and light that takes other ways than
   // theirs. `size` is of the pictures.
-  static const std::set<std::string> left_out{"scene", "output",  "fix-light",  "fix-view", "size",
-                                              "spp",   "shadows", "subsurface", "membrane", "sky"};
+  static const std::set<std::string> left_out{"scene", "output", "checkpoint", "depfile",    "fix-light", "fix-view",
+                                              "size",  "spp",    "shadows",    "subsurface", "membrane",  "sky"};
   auto o = std::make_shared<CheckCommand>();
   CLI::App* c = app.add_subcommand("check", "Bake a scene and judge it by path tracing, in one page");
   c->add_option("scene", o->request.scene, "Scene: .gltf, .glb, .obj or .ply")->required();

@@ -10,6 +10,8 @@ namespace lambent::tool {
 // Each adds its subcommand and says, by `run`, what to do if it is chosen; that returns the exit code.
 using Run = std::function<int(Context&)>;
 void add_bake(CLI::App& app, Run& run);
+void add_batch(CLI::App& app, Run& run);
+void add_checkpoints(CLI::App& app, Run& run);
 void add_render(CLI::App& app, Run& run);
 void add_relight(CLI::App& app, Run& run);
 void add_reference(CLI::App& app, Run& run);

@@ -69,6 +69,7 @@ Result<void> save_smaller(const CompressCommand& o, Baked& baked, Field smaller,
   if (!file) return file.error();
   const std::optional<ViewerLook> look = load_look(*file, o.baked);
   baked.surface = std::move(smaller), baked.provenance = provenance.dump(), baked.terms.clear();
+  allow_replacing(o.baked);  // by less of the same
   return save_baked(o.output, baked, look ? &*look : nullptr);
 }
 

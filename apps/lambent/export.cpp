@@ -3,10 +3,14 @@
 #include "export_npy.h"
 #include "web.h"
 
+#include <fcntl.h>
 #include <fmt/format.h>
+#include <sys/file.h>
 #include <unistd.h>
 
+#include <cstring>
 #include <filesystem>
+#include <memory>
 
 namespace lambent::tool {
 namespace {
@@ -35,9 +39,16 @@ Result<void> check_target(const fs::path& target) {
 
 // All files into a new folder beside the target, which then takes its place.
 Result<void> write_folder(const fs::path& target, const WebFiles& files, const Progress& progress) {
-  const fs::path fresh = target.string() + ".part" + std::to_string(::getpid()),
+  const fs::path fresh = target.string() + ".lambent-part" + std::to_string(::getpid()),
                  old = target.string() + ".old" + std::to_string(::getpid());
   std::error_code status;
+  remove_stale_temporaries(target.string());
+  fs::create_directory(fresh, status);
+  // As long as it is locked nobody takes it for one that was left behind.
+  const int lock = ::open(fresh.c_str(), O_RDONLY | O_DIRECTORY | O_CLOEXEC);
+  if (status || lock < 0 || ::flock(lock, LOCK_EX | LOCK_NB) != 0)
+    return Error{target.string(), std::string("cannot be written: ") + std::strerror(errno)};
+  const std::unique_ptr<const int, void (*)(const int*)> held(&lock, [](const int* fd) { ::close(*fd); });
   const auto give_up = [&](Error error) {
     std::error_code ignored;
     fs::remove_all(fresh, ignored);

@@ -72,6 +72,7 @@ int export_lightmap(Context& context, const std::string& path, LightmapTarget ta
   std::vector<std::string> written;
   std::vector<Vec3> irradiance(receivers_of(field.store), Vec3(0));
   std::set<std::string> taken;
+  FileSet set;
   for (size_t g = 0; g < groups; ++g) {
     if (context.progress.cancelled()) return fail({"", "cancelled"});
     std::vector<Vec3> lit(light.count(), Vec3(0));
@@ -94,6 +95,7 @@ int export_lightmap(Context& context, const std::string& path, LightmapTarget ta
     if (!look) return fail(look.error());
     if (auto ok = save_look(scene, *baked, *look); !ok) return fail(ok.error());
   }
+  if (auto ok = set.commit(); !ok) return fail(ok.error());
   if (context.json)
     print_json({{"pictures", written},
                 {"groups", light.groups},

@@ -1,15 +1,41 @@
 #include "commands.h"
 
+#include <lambent/core/file.h>
 #include <lambent/core/parallel.h>
 #include <lambent/pipeline/version.h>
 
+#include <fcntl.h>
 #include <fmt/format.h>
 
+#include <cerrno>
+#include <csignal>
+#include <cstring>
+#include <iostream>
 #include <new>
 
 using namespace lambent;
 
+namespace {
+
+// A standard stream that was closed: files that are opened must not get its number, and be written into.
+void open_standard_streams() {
+  for (int fd = 0; fd <= 2; ++fd)
+    if (::fcntl(fd, F_GETFD) < 0) (void)!::open("/dev/null", fd == 2 ? O_WRONLY : O_RDONLY);
+}
+
+// Results that went nowhere are a failure.
+int with_results_written(int code) {
+  std::cout.flush();
+  const bool well = std::fflush(stdout) == 0 && !std::ferror(stdout) && std::cout;
+  if (well || code != tool::success) return code;
+  return tool::fail({"stdout", std::string("cannot be written: ") + std::strerror(errno ? errno : EIO)});
+}
+
+}  // namespace
+
 int main(int argc, char** argv) {
+  open_standard_streams();
+  ::signal(SIGXFSZ, SIG_IGN);  // a limit on files is an error of the write
   CLI::App app{"lambent: bake how a scene shadows and scatters light, once; relight it for ever.", "lambent"};
   app.set_version_flag("--version", version);
   app.require_subcommand(1);
@@ -20,6 +46,8 @@ int main(int argc, char** argv) {
 
   tool::Run run;
   tool::add_bake(app, run);
+  tool::add_batch(app, run);
+  tool::add_checkpoints(app, run);
   tool::add_render(app, run);
   tool::add_relight(app, run);
   tool::add_reference(app, run);
@@ -38,14 +66,17 @@ int main(int argc, char** argv) {
   try {
     app.parse(argc, argv);
   } catch (const CLI::ParseError& e) {
-    if (e.get_exit_code() == 0) return app.exit(e);  // --help, --version
+    if (e.get_exit_code() == 0) return with_results_written(app.exit(e));  // --help, --version
     fmt::print(stderr, "lambent: {}\n", e.what());
     return tool::bad_usage;
   }
   ThreadLimit limit(context.threads);
+  const ReadLog inputs;  // none is written over
   try {
-    return run(context);
+    return with_results_written(run(context));
   } catch (const std::bad_alloc&) {
     return tool::fail({"", "out of memory"});
+  } catch (const std::exception& e) {  // the system's: no thread can be made, nothing can be printed
+    return tool::fail({"", e.what()});
   }
 }

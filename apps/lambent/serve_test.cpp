@@ -3,9 +3,13 @@
 #include <gtest/gtest.h>
 
 #include <arpa/inet.h>
+#include <fcntl.h>
 #include <sys/socket.h>
 #include <unistd.h>
 
+#include <atomic>
+#include <chrono>
+#include <fstream>
 #include <optional>
 #include <thread>
 
@@ -17,15 +21,21 @@ struct Answer {
   std::string head, body;
 };
 
-// What comes back over a socket, byte for byte; no client of the server's library takes part.
-Answer ask(int port, const std::string& request) {
+int connected(int port) {
   const int s = ::socket(AF_INET, SOCK_STREAM, 0);
   const timeval patience{5, 0};  // an answer that does not end is none
   ::setsockopt(s, SOL_SOCKET, SO_RCVTIMEO, &patience, sizeof patience);
   sockaddr_in to{};
   to.sin_family = AF_INET, to.sin_port = htons(uint16_t(port)), to.sin_addr.s_addr = htonl(INADDR_LOOPBACK);
   EXPECT_EQ(::connect(s, reinterpret_cast<sockaddr*>(&to), sizeof to), 0);
-  EXPECT_EQ(::send(s, request.data(), request.size(), MSG_NOSIGNAL), ssize_t(request.size()));
+  return s;
+}
+void say(int s, const std::string& text) {
+  EXPECT_EQ(::send(s, text.data(), text.size(), MSG_NOSIGNAL), ssize_t(text.size()));
+}
+
+// What comes back until the other side closes, byte for byte.
+Answer hear(int s) {
   std::string all;
   char buffer[4096];
   for (ssize_t n; (n = ::recv(s, buffer, sizeof buffer, 0)) > 0;) all.append(buffer, size_t(n));
@@ -35,6 +45,11 @@ Answer ask(int port, const std::string& request) {
   if (all.size() > 12) answer.status = std::stoi(all.substr(9, 3));
   if (end != std::string::npos) answer.head = all.substr(0, end + 2), answer.body = all.substr(end + 4);
   return answer;
+}
+Answer ask(int port, const std::string& request) {
+  const int s = connected(port);
+  say(s, request);
+  return hear(s);
 }
 std::string get(int port, const std::string& path, const std::string& range) {
   return "GET " + path + " HTTP/1.1\r\nHost: 127.0.0.1:" + std::to_string(port) + "\r\nConnection: close\r\n" +
@@ -50,19 +65,20 @@ class Serve : public testing::Test {
               {"one", {"text/plain", std::string("x")}},
               {"empty", {"text/plain", std::string()}},
               {"data/large", {"application/octet-stream", large}}};
-    answer_from(server_, files_, port_);
-    port_ = server_.bind_to_any_port("127.0.0.1");
-    ASSERT_GT(port_, 0);
-    serving_ = std::thread([this] { server_.listen_after_bind(); });
-    while (!server_.is_running()) std::this_thread::yield();
+    serving_ = std::thread([this] {
+      serve(
+          listener_, files_, [this] { return stop_.load(); }, limits_);
+    });
   }
   void TearDown() override {
-    server_.stop();
+    stop_ = true;
     serving_.join();
   }
   WebFiles files_;
-  httplib::Server server_;
-  int port_ = 0;
+  ServeLimits limits_{.seconds = 0.5, .stalled = 1};
+  Listener listener_ = std::move(*listen_on(0));
+  const int port_ = listener_.port;
+  std::atomic<bool> stop_{false};
   std::thread serving_;
 };
 
@@ -117,7 +133,9 @@ TEST_F(Serve, RangesThatAreNoneAreRefusedOrLeftAside) {
        {"bytes=5-2", "bytes=a-b", "lines=1-2", "bytes", "bytes=99999999999999999999-", "bytes=1-2-3", "=", "bytes=,"}) {
     const Answer answer = ask(port_, get(port_, "/data/large", range));
     EXPECT_TRUE(answer.status == 200 || answer.status == 416) << range << answer.status;
-    EXPECT_TRUE(answer.body == (answer.status == 200 ? files_.at("data/large").bytes() : "")) << range;
+    EXPECT_TRUE(answer.body ==
+                (answer.status == 200 ? files_.at("data/large").bytes() : "The file does not reach so far.\n"))
+        << range;
   }
 }
 
@@ -134,6 +152,110 @@ TEST_F(Serve, OtherPathsAndOtherNamesGetNothing) {
   const Answer answer =
       ask(port_, "GET /one HTTP/1.1\r\nHost: example.org\r\nConnection: close\r\nRange: bytes=0-\r\n\r\n");
   EXPECT_EQ(answer.status, 403);
+}
+
+TEST_F(Serve, RequestsThatAreNoneAreRefused) {
+  const std::string host = "Host: 127.0.0.1:" + std::to_string(port_) + "\r\nConnection: close\r\n";
+  const std::pair<std::string, int> requests[] = {
+      {"GET /one HTTP/1.1\r\n" + host + "\r\n", 200},
+      {"\r\nGET /one HTTP/1.0\r\n" + host + "\r\n", 200},
+      {"POST /one HTTP/1.1\r\n" + host + "\r\n", 405},
+      {"POST /one HTTP/1.1\r\n" + host + "Content-Length: 4\r\n\r\nbody", 413},
+      {"GET /one HTTP/1.1\r\n" + host + "Content-Length: -1\r\n\r\n", 413},
+      {"GET /one HTTP/1.1\r\n" + host + "Transfer-Encoding: chunked\r\n\r\n0\r\n\r\n", 413},
+      {"GET /one HTTP/1.1\r\nHost: evil\r\n" + host + "\r\n", 403},
+      {"GET /one HTTP/2.0\r\n" + host + "\r\n", 505},
+      {"GET /one\r\n\r\n", 400},
+      {"nonsense\r\n\r\n", 400},
+      {std::string("\0\0\0\0\r\n\r\n", 8), 400},
+      {"GET /one HTTP/1.1\r\nno colon\r\n" + host + "\r\n", 400},
+      {"GET /one HTTP/1.1\r\n folded: 1\r\n" + host + "\r\n", 400}};
+  for (const auto& [text, status] : requests) EXPECT_EQ(ask(port_, text).status, status) << text;
+}
+
+TEST_F(Serve, HeadSaysWhatGetSendsWithoutIt) {
+  std::string request = get(port_, "/data/large", "bytes=5-9");
+  const Answer answer = ask(port_, request.replace(0, 3, "HEAD"));
+  EXPECT_EQ(answer.status, 200);
+  EXPECT_NE(answer.head.find("Content-Length: 70000\r\n"), std::string::npos) << answer.head;
+  EXPECT_TRUE(answer.body.empty());
+}
+
+TEST_F(Serve, HeadersAreLimitedInSizeAndNumber) {
+  const std::string first = "GET /one HTTP/1.1\r\nConnection: close\r\nHost: 127.0.0.1:" + std::to_string(port_) +
+                            "\r\n";
+  auto with = [&](size_t count, size_t bytes) {
+    std::string text = first;
+    for (size_t i = 0; i < count; ++i) text += "H" + std::to_string(i) + ": " + std::string(bytes, 'x') + "\r\n";
+    return text + "\r\n";
+  };
+  EXPECT_EQ(ask(port_, with(limits_.headers - 2, 1)).status, 200);
+  EXPECT_EQ(ask(port_, with(limits_.headers - 1, 1)).status, 431);
+  EXPECT_EQ(ask(port_, with(1, limits_.head_bytes - first.size() - 8)).status, 200);
+  EXPECT_EQ(ask(port_, first + "H: " + std::string(limits_.head_bytes - first.size() - 3, 'x')).status, 431);
+}
+
+TEST_F(Serve, OneConnectionCarriesManyRequests) {
+  std::string request = get(port_, "/one", "");
+  const size_t close = request.find("Connection: close\r\n");
+  std::string kept = request;
+  kept.erase(close, 19);
+  const int s = connected(port_);
+  say(s, kept + kept + request);
+  const Answer answer = hear(s);
+  size_t answers = 0;
+  const std::string all = answer.head + answer.body;
+  for (size_t at = 0; (at = all.find("HTTP/1.1 200", at)) != std::string::npos; ++at) ++answers;
+  EXPECT_EQ(answers, 3u);
+}
+
+TEST_F(Serve, TwoHundredAtOnceAreAllAnswered) {
+  std::vector<std::thread> askers;
+  std::atomic<int> right{0};
+  const std::string whole(files_.at("data/large").bytes());
+  for (int i = 0; i < 200; ++i)
+    askers.emplace_back([&] {
+      const Answer answer = ask(port_, get(port_, "/data/large", ""));
+      right += answer.status == 200 && answer.body == whole;
+    });
+  for (std::thread& t : askers) t.join();
+  EXPECT_EQ(right, 200);
+}
+
+TEST_F(Serve, SlowSendersAreCutOffAndKeepNobodyWaiting) {
+  const auto start = std::chrono::steady_clock::now();
+  auto since = [&] { return std::chrono::duration<double>(std::chrono::steady_clock::now() - start).count(); };
+  std::vector<int> slow;
+  for (int i = 0; i < 100; ++i) say(slow.emplace_back(connected(port_)), "GET /one HT");
+  std::vector<int> silent;
+  for (int i = 0; i < 100; ++i) silent.push_back(connected(port_));
+  for (int i = 0; i < 20; ++i) EXPECT_EQ(ask(port_, get(port_, "/one", "")).status, 200);
+  EXPECT_LT(since(), limits_.seconds) << "others waited for the slow ones";
+  // A byte now and then does not help.
+  for (int i = 0; i < 4; ++i) {
+    std::this_thread::sleep_for(std::chrono::milliseconds(200));
+    for (int s : slow) (void)!::send(s, "T", 1, MSG_NOSIGNAL);
+  }
+  for (int s : slow) EXPECT_NE(hear(s).status, 200);
+  for (int s : silent) EXPECT_EQ(hear(s).status, 0);
+  EXPECT_LT(since(), 5) << "they were not cut off";
+}
+
+size_t resident_bytes() {
+  size_t pages = 0, resident = 0;
+  std::ifstream("/proc/self/statm") >> pages >> resident;
+  return resident * size_t(::sysconf(_SC_PAGESIZE));
+}
+
+TEST_F(Serve, MemoryStaysFlat) {
+  files_["huge"] = {"application/octet-stream", std::string(size_t{32} << 20, 'x')};
+  for (int i = 0; i < 20; ++i) ask(port_, get(port_, "/data/large", ""));
+  const size_t before = resident_bytes();
+  std::vector<int> idle;  // ask for much, and take nothing of it
+  for (int i = 0; i < 100; ++i) say(idle.emplace_back(connected(port_)), get(port_, "/huge", ""));
+  for (int i = 0; i < 500; ++i) ask(port_, get(port_, "/data/large", ""));
+  EXPECT_LT(resident_bytes(), before + (size_t{4} << 20));
+  for (int s : idle) ::close(s);
 }
 
 }  // namespace

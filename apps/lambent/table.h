@@ -23,7 +23,10 @@ void add_table(CLI::App& command, std::span<const Option<R>> table, R& request, 
           using T = std::remove_cvref_t<decltype(request.*member)>;
           if constexpr (std::is_same_v<T, bool>) return command.add_flag(name, request.*member, help);
           else if constexpr (std::is_same_v<T, size_t>)
-            return command.add_option(name, request.*member, help)->transform(CLI::AsSizeValue(false));
+            return command.add_option(name, request.*member, help)
+                ->transform(CLI::AsSizeValue(false))
+                ->transform(CLI::Validator(  // before the other, which takes -1 for the greatest of numbers
+                    [](std::string& said) { return said.starts_with('-') ? "must not be below 0" : ""; }, ""));
           else if constexpr (std::is_same_v<T, std::vector<std::string>>)  // one each time that it is said
             return command.add_option(name, request.*member, help)->allow_extra_args(false);
           else return command.add_option(name, request.*member, help);

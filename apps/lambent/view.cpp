@@ -4,9 +4,6 @@
 #include <fmt/format.h>
 #include <spawn.h>
 
-#include <chrono>
-#include <thread>
-
 namespace lambent::tool {
 namespace {
 
@@ -34,23 +31,14 @@ int run_view(Context& context, const ViewCommand& o) {
   context.cleans_up = true;
   auto files = web_files(o.web);
   if (!files) return fail(files.error());
-  httplib::Server server;
-  int port = o.port;
-  answer_from(server, *files, port);
-  if (port == 0) port = server.bind_to_any_port("127.0.0.1");
-  else if (!server.bind_to_port("127.0.0.1", port)) port = -1;
-  if (port < 0)
-    return fail(
-        {"--port", o.port ? "port " + std::to_string(o.port) + " is taken or not allowed" : "no port is free", true});
-  std::thread serving([&server] { server.listen_after_bind(); });
-  const std::string address = fmt::format("http://127.0.0.1:{}/", port);
+  auto listener = listen_on(o.port);
+  if (!listener) return fail(listener.error());
+  const std::string address = fmt::format("http://127.0.0.1:{}/", listener->port);
   if (context.json) print_json({{"address", address}});
   else fmt::print("{} is at {} (Ctrl-C ends it)\n", o.web.baked, address);
   std::fflush(stdout);
   if (!o.no_browser) open_browser(address);
-  while (!context.progress.cancelled()) std::this_thread::sleep_for(std::chrono::milliseconds(50));
-  server.stop();
-  serving.join();
+  serve(*listener, *files, [&] { return context.progress.cancelled(); });
   return success;
 }
 

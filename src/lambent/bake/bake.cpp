@@ -6,6 +6,7 @@
 #include <lambent/bake/lobes.h>
 #include <lambent/bake/operator.h>
 #include <lambent/bake/solve.h>
+#include <lambent/core/checkpoint.h>
 #include <lambent/core/parallel.h>
 #include <lambent/core/pool.h>
 #include <lambent/core/random.h>
@@ -111,12 +112,18 @@ struct Baker {
     std::vector<uint8_t> buried(n());
     {
       ProgressStage stage(progress, "tracing", n());
+      const KeptPieces kept(progress, "tracing", n() / gather_block);
       parallel_for(n(), gather_block, [&](size_t begin, size_t end) {
         if (stage.cancelled()) return;
         std::vector<float> rows((end - begin) * W);
         const GatherSky sky{rows.data(), nullptr, W, &lobes, buried.data() + begin};
-        trace_sky(setup, *scratch.borrow(), begin, end - begin, sky);
-        trace_sharp_lobes(begin, end - begin, sky);
+        const std::span<float> full(rows);
+        const std::span<uint8_t> inside(buried.data() + begin, end - begin);
+        if (!kept.load(begin / gather_block, full, inside)) {
+          trace_sky(setup, *scratch.borrow(), begin, end - begin, sky);
+          trace_sharp_lobes(begin, end - begin, sky);
+          kept.save(begin / gather_block, full, inside);
+        }
         for (size_t r = begin; r < end; ++r) expand(rows.data() + (r - begin) * W, x.data() + r * width());
         if (!stage.cancelled()) stage.advance(end - begin);
       });

@@ -222,6 +222,13 @@ struct GatherScratch {
 void DeleteScratch::operator()(GatherScratch* scratch) const { delete scratch; }
 ScratchPointer make_gather_scratch(const GatherSetup& setup) { return ScratchPointer(new GatherScratch(setup)); }
 
+bool has_coloured_albedo(const Scene& scene) {
+  return std::any_of(scene.parts.begin(), scene.parts.end(), [&](const Part& part) {
+    const Material& m = scene.materials[part.material];
+    return m.base_color_texture >= 0 || !scene.colors.empty() || !is_grey(m.base_color);
+  });
+}
+
 GatherSetup make_gather_setup(const Scene& scene, const Tracer& tracer, const Receivers& receivers, int order,
                               int samples, uint32_t seed, DirectionWarp warp, Progress* progress) {
   GatherSetup setup{scene, tracer, receivers, make_direction_sets(order, samples, set_count, seed, warp, progress),
@@ -229,14 +236,12 @@ GatherSetup make_gather_setup(const Scene& scene, const Tracer& tracer, const Re
                     {},    {},     progress};
   // Weights are sums over rays: halves hold 65504.
   setup.weight_unit = std::min(1.0f, 16384.0f / float(samples));
-  bool coloured = false;
   for (const Part& part : scene.parts) {
     const Material& m = scene.materials[part.material];
     setup.part_albedo.push_back(m.base_color);
     setup.part_varies.push_back(m.base_color_texture >= 0 || !scene.colors.empty() || m.transmission > 0);
-    coloured |= m.base_color_texture >= 0 || !scene.colors.empty() || !is_grey(m.base_color);
   }
-  setup.channels = coloured ? 3 : 1;
+  setup.channels = has_coloured_albedo(scene) ? 3 : 1;
   setup.sky_channels = tracer.colours() ? 3 : 1;
   return setup;
 }

@@ -66,6 +66,9 @@ struct GatherSetup {
   float row_scale(size_t rays) const { return 1.0f / (weight_unit * float(rays)); }
 };
 
+// Whether light that is reflected has to be kept for each colour.
+bool has_coloured_albedo(const Scene& scene);
+
 // `sets` of the setup may be replaced by make_hemicube_set(): its rows then are those of a hemicube ray cast at its
 // pixels' centres, which stand for the integral over the cosine that random rays estimate.
 GatherSetup make_gather_setup(const Scene& scene, const Tracer& tracer, const Receivers& receivers, int order,

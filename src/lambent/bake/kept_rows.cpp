@@ -39,6 +39,16 @@ size_t most_bytes(size_t rays, size_t receivers, int channels) {
   return 3 * entries / 2 * (9 + 2 * size_t(channels)) + 128;
 }
 
+bool is_sound(const SparseBlock& b, size_t receivers) {
+  const size_t entries = b.rows.size();
+  if (b.row_count > gather_block || b.ends.size() != b.columns.size() ||
+      (b.ends.empty() ? entries != 0 : b.ends.back() != entries) || !std::is_sorted(b.ends.begin(), b.ends.end()))
+    return false;
+  if (b.weights.size() != entries && b.weights.size() != 3 * entries) return false;
+  return std::all_of(b.columns.begin(), b.columns.end(), [&](uint32_t c) { return c < receivers; }) &&
+         std::all_of(b.rows.begin(), b.rows.end(), [&](uint8_t r) { return r < b.row_count; });
+}
+
 KeptRows::KeptRows(size_t blocks, size_t budget, size_t most_bytes_a_block) : blocks_(blocks), is_kept_(blocks, 0) {
   const size_t most = blocks > 0 && most_bytes_a_block > SIZE_MAX / 2 / blocks ? SIZE_MAX / 2
                                                                                : blocks * most_bytes_a_block;

@@ -10,6 +10,9 @@ namespace lambent {
 // What the rows of a block may take at most, of receivers that send so many rays into a scene of so many receivers.
 size_t most_bytes(size_t rays, size_t receivers, int channels);
 
+// Whether a block can be multiplied: its entries in order, and of receivers that there are.
+bool is_sound(const SparseBlock& block, size_t receivers);
+
 class KeptRows {
  public:
   struct Block {

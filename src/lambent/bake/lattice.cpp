@@ -5,6 +5,7 @@
 #include <lambent/bake/matrix_kernels.h>
 #include <lambent/basis/sh_product.h>
 #include <lambent/core/check.h>
+#include <lambent/core/checkpoint.h>
 #include <lambent/core/parallel.h>
 #include <lambent/core/pool.h>
 #include <lambent/core/random.h>
@@ -281,10 +282,16 @@ Result<LatticeTransfer> bake_lattice(const Scene& scene, const Tracer& tracer, c
   LatticeTransfer result{lattice, options.order, {}, std::vector<uint8_t>(lattice.count())};
   {
     ProgressStage stage(progress, "lattice", lattice.count());
+    const KeptPieces pieces(progress, "lattice", lattice.count() / transfer_block);
     parallel_for(lattice.count(), transfer_block, [&](size_t begin, size_t end) {
       if (stage.cancelled()) return;
-      auto s = baker.scratch.borrow();
-      for (size_t p = begin; p < end && !stage.cancelled(); ++p) result.valid[p] = baker.gather(*s, p, out);
+      const std::span<uint8_t> rows = stored_bytes(out, begin, end - begin),
+                               valid(result.valid.data() + begin, end - begin);
+      if (!pieces.load(begin / transfer_block, rows, valid)) {
+        auto s = baker.scratch.borrow();
+        for (size_t p = begin; p < end && !stage.cancelled(); ++p) result.valid[p] = baker.gather(*s, p, out);
+        pieces.save(begin / transfer_block, rows, valid);
+      }
       stage.advance(end - begin);
     });
     if (stage.cancelled()) return Error{"", "cancelled"};

@@ -88,10 +88,14 @@ Result<AlignedVector<float>> directional_rows_of(const GatherSetup& setup, const
   const size_t n = setup.receivers.count(), rows = size_t(directional_rows(o.directional));
   AlignedVector<float> wide(n * rows * width, 0.0f);
   ProgressStage stage(progress, "directions", n);
+  const KeptPieces pieces(progress, "directions", n / gather_block);
   parallel_for(n, gather_block, [&](size_t begin, size_t end) {
     if (stage.cancelled()) return;
-    for (size_t r = begin; r < end && !stage.cancelled(); ++r)
+    const std::span<float> own(wide.data() + begin * rows * width, (end - begin) * rows * width);
+    const bool loaded = pieces.load(begin / gather_block, own);
+    for (size_t r = begin; r < end && !loaded && !stage.cancelled(); ++r)
       gather_directional(setup, lamps, o.lamp_samples, o.directional, x, width, r, 1, wide.data() + r * rows * width);
+    if (!loaded) pieces.save(begin / gather_block, own);
     stage.advance(end - begin);
   });
   if (stage.cancelled()) return Error{"", "cancelled"};

@@ -74,10 +74,16 @@ struct MatrixBaker : MatrixGather {
     };
     {
       ProgressStage stage(progress, paths ? "paths" : "tracing", n());
+      const KeptPieces pieces(progress, "tracing", n() / gather_block);
       parallel_for(n(), gather_block, [&](size_t begin, size_t end) {
         if (stage.cancelled()) return;
-        auto s = scratch.borrow();
-        for (size_t r = begin; r < end && !stage.cancelled(); ++r) receive(*s, r);
+        const std::span<uint8_t> rows = stored_bytes(out, begin, end - begin),
+                                 inside(buried.data() + begin, end - begin);
+        if (!pieces.load(begin / gather_block, rows, inside, errors.of_block(begin))) {
+          auto s = scratch.borrow();
+          for (size_t r = begin; r < end && !stage.cancelled(); ++r) receive(*s, r);
+          pieces.save(begin / gather_block, rows, inside, errors.of_block(begin));
+        }
         stage.advance(end - begin);
       });
       if (stage.cancelled()) return Error{"", "cancelled"};

@@ -24,24 +24,43 @@ void MatrixRows::trace_receiver(MatrixScratch& s, size_t r, MatrixHits& hits) {
 }
 
 // Which blocks are kept depends on the scheduling, the result does not: the others are traced again, alike.
-void MatrixRows::trace_block(size_t block) {
-  auto s = gather_.scratch.borrow();
+void MatrixRows::trace_block(size_t block, const KeptPieces* pieces) {
+  const size_t first = block * gather_block, end = std::min(rows(), first + gather_block), width = gather_.t0_width();
+  const std::span<float> T0(T0_.data() + first * width, (end - first) * width),
+      half(T0_half_.data() + checked_count(first) * width, (checked_count(end) - checked_count(first)) * width);
+  const std::span<uint8_t> buried(buried_.data() + first, end - first);
   MatrixHits hits;
-  for (size_t r = block * gather_block; r < std::min(rows(), (block + 1) * gather_block); ++r) {
+  bool loaded = pieces && pieces->load(block, T0, half, buried, hits.hits, hits.weights, hits.ends);
+  if (loaded && !is_sound(hits, end - first)) pieces->refuse(), loaded = false, hits = {};
+  auto s = gather_.scratch.borrow();
+  for (size_t r = first; r < end && !loaded; ++r) {
     if (is_cancelled(gather_.setup.progress)) return;
     trace_receiver(*s, r, hits);
   }
+  if (pieces && !loaded) pieces->save(block, T0, half, buried, hits.hits, hits.weights, hits.ends);
   const size_t bytes = hits.bytes();
   if (is_kept_[block]) used_ += bytes, used_ -= kept_[block].bytes(), kept_[block] = std::move(hits);
   else if (used_.fetch_add(bytes) + bytes <= budget_) kept_[block] = std::move(hits), is_kept_[block] = 1;
   else used_ -= bytes;
 }
 
+// Of hits that were kept: whether they are such as this tracing makes.
+bool MatrixRows::is_sound(const MatrixHits& hits, size_t receivers) const {
+  if (hits.ends.size() != receivers || !std::is_sorted(hits.ends.begin(), hits.ends.end()) ||
+      hits.ends.back() != hits.hits.size() || (!hits.weights.empty() && hits.weights.size() != hits.hits.size()))
+    return false;
+  return std::all_of(hits.hits.begin(), hits.hits.end(), [&](const MatrixHit& h) {
+    return h.ray < gather_.rays() && h.corner / 2 < gather_.scene.triangles.size() &&
+           gather_.corners().find(h.corner / 2, h.corner % 2);
+  });
+}
+
 Result<void> MatrixRows::trace(Progress* progress) {
   ProgressStage stage(progress, "tracing", rows());
+  const KeptPieces pieces(progress, "tracing", kept_.size());
   parallel_for(rows(), gather_block, [&](size_t begin, size_t end) {
     if (stage.cancelled()) return;
-    trace_block(begin / gather_block);
+    trace_block(begin / gather_block, &pieces);
     stage.advance(end - begin);
   });
   if (stage.cancelled()) return Error{"", "cancelled"};
@@ -62,7 +81,7 @@ void MatrixRows::move_buried(Progress* progress) {
   ProgressStage stage(progress, "moving buried", blocks.size());
   parallel_for(blocks.size(), 1, [&](size_t begin, size_t) {
     if (stage.cancelled()) return;
-    trace_block(blocks[begin]);
+    trace_block(blocks[begin], nullptr);
     stage.advance();
   });
 }

@@ -3,6 +3,7 @@
 // to it, kept or traced again. Its x are scattered rows Y = H X, as few as a material's response takes.
 #include <lambent/bake/linear.h>
 #include <lambent/bake/matrix_gather.h>
+#include <lambent/core/checkpoint.h>
 
 #include <atomic>
 
@@ -31,7 +32,8 @@ class MatrixRows final : public LinearOperator {
 
  private:
   void trace_receiver(MatrixScratch& s, size_t r, MatrixHits& hits);
-  void trace_block(size_t block);
+  void trace_block(size_t block, const KeptPieces* pieces);
+  bool is_sound(const MatrixHits& hits, size_t receivers) const;
   void move_buried(Progress* progress);
 
   MatrixGather& gather_;

@@ -8,7 +8,56 @@
 
 namespace lambent {
 
-void GatherOperator::trace_block(const GatherWanted& wanted, size_t begin, size_t end) {
+namespace {
+
+// One piece of tracing as it is kept: what goes into the rows of all receivers, and the block's hit rows where there
+// was room for them.
+class TracedPiece {
+ public:
+  TracedPiece(const GatherWanted& wanted, const GatherSky& sky, const GatherDirect* direct, size_t begin, size_t end)
+      : sky_(sky.rows, wanted.sky.rows ? (end - begin) * sky.stride : 0),
+        half_(sky.half_rows, sky.half_rows ? (checked_count(end) - checked_count(begin)) * sky.stride : 0),
+        buried_(sky.buried, end - begin),
+        direct_(direct) {
+    if (direct) lights_.resize((end - begin) * 3 * direct->lamps.groups());
+  }
+
+  bool load(const KeptPieces& pieces, size_t number, GatherBlock& block, bool& has_rows, size_t receivers) {
+    SparseBlock &rows = block.rows, &half_rows = block.half_rows;
+    const std::span<float> lights(lights_);
+    if (!pieces.load(number, sky_, half_, buried_, lights, has_rows, rows.row_count, rows.columns, rows.ends, rows.rows,
+                     rows.weights, half_rows.row_count, half_rows.columns, half_rows.ends, half_rows.rows,
+                     half_rows.weights))
+      return false;
+    if (!is_sound(rows, receivers) || !is_sound(half_rows, receivers)) {
+      pieces.refuse();
+      return false;
+    }
+    for (size_t i = 0, each = direct_ ? 3 * direct_->lamps.groups() : 0; i * each < lights_.size(); ++i)
+      std::copy_n(lights_.data() + i * each, each, direct_->rows + i * direct_->width);
+    return true;
+  }
+  void save(const KeptPieces& pieces, size_t number, GatherBlock& block, bool has_rows) {
+    GatherBlock none;
+    SparseBlock &rows = has_rows ? block.rows : none.rows, &half_rows = has_rows ? block.half_rows : none.half_rows;
+    for (size_t i = 0, each = direct_ ? 3 * direct_->lamps.groups() : 0; i * each < lights_.size(); ++i)
+      std::copy_n(direct_->rows + i * direct_->width, each, lights_.data() + i * each);
+    const std::span<float> lights(lights_);
+    pieces.save(number, sky_, half_, buried_, lights, has_rows, rows.row_count, rows.columns, rows.ends, rows.rows,
+                rows.weights, half_rows.row_count, half_rows.columns, half_rows.ends, half_rows.rows,
+                half_rows.weights);
+  }
+
+ private:
+  std::span<float> sky_, half_;
+  std::span<uint8_t> buried_;
+  const GatherDirect* direct_;
+  std::vector<float> lights_;
+};
+
+}  // namespace
+
+void GatherOperator::trace_block(const GatherWanted& wanted, size_t begin, size_t end, const KeptPieces& pieces) {
   auto block = traced_->blocks.borrow();
   auto scratch = traced_->scratch.borrow();
   std::vector<float> unwanted(wanted.sky.rows ? 0 : (end - begin) * setup_->sky_width());
@@ -20,12 +69,19 @@ void GatherOperator::trace_block(const GatherWanted& wanted, size_t begin, size_
   std::optional<GatherDirect> direct;
   if (const GatherDirect* d = wanted.direct)
     direct.emplace(GatherDirect{d->lamps, d->samples, d->rows + begin * d->width, d->width});
+  const size_t number = begin / gather_block;
+  TracedPiece piece(wanted, sky, direct ? &*direct : nullptr, begin, end);
+  bool has_rows = false;
+  if (pieces && piece.load(pieces, number, *block, has_rows, rows())) {
+    if (wanted.hits && has_rows) traced_->kept.keep(number, *block);
+    return;
+  }
   trace_gather(*setup_, *scratch, begin, end - begin, wanted.hits ? block.get() : nullptr, &sky,
                direct ? &*direct : nullptr);
   if (wanted.more) wanted.more(begin, end - begin, sky);
-  if (!wanted.hits) return;
   if (!wanted.halves) block->half_rows = {};
-  traced_->kept.keep(begin / gather_block, *block);
+  has_rows = wanted.hits && traced_->kept.keep(number, *block);
+  if (pieces) piece.save(pieces, number, *block, has_rows);
 }
 
 Result<GatherOperator> GatherOperator::trace(const GatherSetup& setup, const GatherWanted& wanted, Progress* progress) {
@@ -40,9 +96,10 @@ Result<GatherOperator> GatherOperator::trace(const GatherSetup& setup, const Gat
       Pool<GatherScratch, DeleteScratch>([&setup] { return make_gather_scratch(setup); }),
       Pool<AlignedVector<float>>([] { return std::make_unique<AlignedVector<float>>(); })});
   ProgressStage stage(progress, "tracing", n);
+  const KeptPieces pieces(progress, "tracing", op.blocks());
   parallel_for(n, gather_block, [&](size_t begin, size_t end) {
     if (stage.cancelled()) return;
-    op.trace_block(wanted, begin, end);
+    op.trace_block(wanted, begin, end, pieces);
     stage.advance(end - begin);
   });
   if (stage.cancelled()) return Error{"", "cancelled"};

@@ -4,6 +4,7 @@
 // Columns are light groups times channels, or coefficients times channels; a row of x holds them all, `width` padded
 // floats.
 #include <lambent/bake/kept_rows.h>
+#include <lambent/core/checkpoint.h>
 #include <lambent/core/pool.h>
 #include <lambent/core/result.h>
 
@@ -59,7 +60,7 @@ class GatherOperator final : public LinearOperator {
   };
   // Calls f with the rows of a block, kept or traced again.
   void with_rows(size_t block, auto f) const;
-  void trace_block(const GatherWanted& wanted, size_t begin, size_t end);
+  void trace_block(const GatherWanted& wanted, size_t begin, size_t end, const KeptPieces& pieces);
 
   const GatherSetup* setup_ = nullptr;
   std::vector<uint8_t> buried_;

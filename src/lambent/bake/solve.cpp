@@ -1,5 +1,6 @@
 // Follows: radiosity ("Jacobi, Gauss-Seidel, Southwell", "Krylov subspace methods"); Saad and Schultz, "GMRES", 1986;
 // Cohen, Chen, Wallace and Greenberg, "A progressive refinement approach", 1988 (Southwell's relaxation as shooting).
+#include <lambent/bake/kept_operator.h>
 #include <lambent/bake/kernels.h>
 #include <lambent/bake/solve.h>
 #include <lambent/core/check.h>
@@ -392,14 +393,15 @@ Result<AlignedVector<float>> solve(const LinearOperator& op, const float* e, siz
   SolveReport& r = report ? *report : unwanted;
   r = {};
   ProgressStage stage(progress, "solving", solve_units);
-  Problem problem{op, e, width, options, r, progress, stage};
+  const KeptOperator kept(op, progress, "solving", 0);
+  Problem problem{kept, e, width, options, r, progress, stage};
   AlignedVector<float> x;
   switch (options.solver) {
     case Solver::jacobi: x = problem.jacobi(); break;
     case Solver::gauss_seidel: x = problem.gauss_seidel(); break;
     case Solver::gmres: x = problem.gmres(); break;
     case Solver::southwell:
-      auto transposed = op.transposed();
+      auto transposed = kept.transposed();
       if (!transposed) return Error{"solver", "southwell wants rows that are known by their entries"};
       x = problem.southwell(*transposed);
   }
@@ -410,11 +412,12 @@ Result<AlignedVector<float>> solve(const LinearOperator& op, const float* e, siz
 Result<Bounced> bounce(const LinearOperator& op, const Source& e, size_t width, int bounces, Progress* progress,
                        const TakeRows& last) {
   Bounced out{first_iterate(op, e, width)};
+  const KeptOperator kept(op, progress, "bounces", bounces);
   AlignedVector<float> next;
   ErrorSums errors(op.rows());
   for (int k = 1; k <= bounces; ++k) {
     ProgressStage stage(progress, "bounce " + std::to_string(k), op.rows());
-    Step step{op, &e, width, progress, &stage};
+    Step step{kept, &e, width, progress, &stage};
     if (k == bounces) step.errors = e.set_half ? &errors : nullptr, step.last = &last;
     const bool kept = k < bounces || !last;
     if (kept) next.resize(out.x.size());
@@ -429,10 +432,11 @@ Result<Bounced> bounce(const LinearOperator& op, const Source& e, size_t width, 
 Result<void> bounce_terms(const LinearOperator& op, const Source& e, size_t width, int bounces, Progress* progress,
                           const std::function<Result<void>(int k, const AlignedVector<float>& x)>& take) {
   AlignedVector<float> x = first_iterate(op, e, width), next(x.size());
+  const KeptOperator kept(op, progress, "terms", bounces);
   for (int k = 0;; ++k) {
     if (auto ok = take(k, x); !ok || k == bounces) return ok;
     ProgressStage stage(progress, "term " + std::to_string(k + 1), op.rows());
-    Step{op, nullptr, width, progress, &stage}.run(x.data(), next.data());
+    Step{kept, nullptr, width, progress, &stage}.run(x.data(), next.data());
     if (stage.cancelled()) return Error{"", "cancelled"};
     std::swap(x, next);
   }

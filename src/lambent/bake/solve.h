@@ -59,11 +59,12 @@ class ErrorSums {
   explicit ErrorSums(size_t rows) : sums_((rows + gather_block - 1) / gather_block) {}
   void add(size_t row, const float* half, const float* full, size_t count);
   double relative() const;
-
- private:
   struct Sum {
     double difference = 0, total = 0;
   };
+  Sum& of_block(size_t row) { return sums_[row / gather_block]; }
+
+ private:
   std::vector<Sum> sums_;
 };
 

@@ -5,6 +5,7 @@
 #include <lambent/bake/solve.h>
 #include <lambent/bake/walk.h>
 #include <lambent/core/check.h>
+#include <lambent/core/checkpoint.h>
 #include <lambent/core/parallel.h>
 #include <lambent/core/sampling.h>
 
@@ -166,14 +167,46 @@ struct WalkRows final : LinearOperator {
     entry_count += sum.entries.size() - before;
   }
 
+  // Of walks that were kept: whether they are such as these receivers have.
+  bool is_sound(const WalkSums& sum, size_t count) const {
+    return sum.ends.size() == count && std::is_sorted(sum.ends.begin(), sum.ends.end()) &&
+           sum.ends.back() == sum.entries.size() &&
+           std::all_of(sum.entries.begin(), sum.entries.end(), [&](const HitEntry& e) { return e.receiver < rows(); });
+  }
+
+  bool load(const KeptPieces& pieces, size_t begin, size_t end) {
+    WalkSums& sum = sums[begin / walk_grain];
+    const std::span<float> row(T0.data() + begin * width(), (end - begin) * width());
+    if (!pieces.load(begin / walk_grain, row, std::span(buried).subspan(begin, end - begin), sum.entries, sum.ends,
+                     sum.walks, sum.lost, sum.events, sum.difference, sum.total))
+      return false;
+    if (!is_sound(sum, end - begin)) {
+      pieces.refuse(), sum = {};
+      std::fill(row.begin(), row.end(), 0.0f);
+      return false;
+    }
+    entry_count += sum.entries.size();
+    return true;
+  }
+  void save(const KeptPieces& pieces, size_t begin, size_t end) {
+    WalkSums& sum = sums[begin / walk_grain];
+    pieces.save(begin / walk_grain, std::span(T0).subspan(begin * width(), (end - begin) * width()),
+                std::span(buried).subspan(begin, end - begin), sum.entries, sum.ends, sum.walks, sum.lost, sum.events,
+                sum.difference, sum.total);
+  }
+
   // Errors: cancelled; memory.
   Result<void> trace_all() {
     ProgressStage stage(progress, "walking", rows());
+    const KeptPieces pieces(progress, "walking", sums.size());
     parallel_for(rows(), walk_grain, [&](size_t begin, size_t end) {
       std::vector<float> y(C), half_row(width());
-      for (size_t r = begin; r < end; ++r) {
-        if (stage.cancelled() || bytes() > options.memory) return;
-        trace(r, half_row, y, sums[begin / walk_grain]);
+      if (!load(pieces, begin, end)) {
+        for (size_t r = begin; r < end; ++r) {
+          if (stage.cancelled() || bytes() > options.memory) return;
+          trace(r, half_row, y, sums[begin / walk_grain]);
+        }
+        save(pieces, begin, end);
       }
       stage.advance(end - begin);
     });

@@ -1,6 +1,7 @@
 // Follows: locally-adaptive-products, section 4.2.
 #include <lambent/bake/visibility.h>
 #include <lambent/core/check.h>
+#include <lambent/core/checkpoint.h>
 #include <lambent/core/parallel.h>
 #include <lambent/core/pool.h>
 
@@ -97,12 +98,15 @@ Result<Visibility> bake_visibility(const Tracer& tracer, const Receivers& receiv
   std::atomic<size_t> rays{0};
   {
     ProgressStage stage(progress, "tracing", receivers.count());
+    const KeptPieces kept(progress, "tracing", pieces.size());
     parallel_for(receivers.count(), piece_receivers, [&](size_t begin, size_t end) {
       if (stage.cancelled()) return;
       const auto s = pool.borrow();
       std::vector<uint8_t>& out = pieces[begin / piece_receivers];
+      const std::span<uint32_t> own_lengths(lengths.data() + begin, end - begin);
       size_t traced = 0;
-      for (size_t r = begin; r < end && !stage.cancelled(); ++r) {
+      const bool loaded = kept.load(begin / piece_receivers, out, own_lengths, traced);
+      for (size_t r = begin; r < end && !loaded && !stage.cancelled(); ++r) {
         traced += work.trace_centres(receivers.origins[r], receivers.normals[r], *s);
         if (options.bits > 1) traced += work.refine(receivers.origins[r], receivers.normals[r], *s);
         const size_t before = out.size();
@@ -110,6 +114,7 @@ Result<Visibility> bake_visibility(const Tracer& tracer, const Receivers& receiv
         lengths[r] = uint32_t(out.size() - before);
       }
       out.shrink_to_fit();
+      if (!loaded) kept.save(begin / piece_receivers, out, own_lengths, traced);
       rays += traced;
       stage.advance(end - begin);
     });

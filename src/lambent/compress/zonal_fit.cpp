@@ -4,6 +4,7 @@
 #include <lambent/compress/zonal_fit.h>
 #include <lambent/compress/zonal_kernel.h>
 #include <lambent/core/check.h>
+#include <lambent/core/checkpoint.h>
 #include <lambent/core/half.h>
 #include <lambent/core/parallel.h>
 #include <lambent/core/pool.h>
@@ -278,16 +279,26 @@ Result<ZonalTransfer> fit_zonal(const Transfer& t, const ZonalFitOptions& option
   std::atomic<size_t> retried{0};
   {
     ProgressStage stage(progress, "fitting lobes", t.receivers * size_t(t.rows));
+    const size_t blocks = (t.receivers + fit_block - 1) / fit_block;
+    const KeptPieces pieces(progress, "fitting", blocks * size_t(t.rows));
     for (int row = 0; row < t.rows; ++row) {
       const Transfer target = transfer_row(t, row);
       const WritableZonalTransfer fitted =
           t.rows == 1 ? out : make_zonal_transfer(order, options.lobes, t.channels, t.receivers, options.precision);
       parallel_for(t.receivers, fit_block, [&](size_t begin, size_t end) {
         if (stage.cancelled()) return;
-        auto scratch = pool.borrow();
-        BlockFit fit(target, fitted, options, starts, *scratch, begin, end);
-        if (order > exact) retried += fit.search();
-        fit.store(error, energy);
+        const size_t piece = size_t(row) * blocks + begin / fit_block, count = end - begin;
+        const std::span<uint8_t> bytes = stored_bytes(fitted, begin, count);
+        const std::span<double> errors_there(error.data() + begin, count), energies_there(energy.data() + begin, count);
+        size_t again = 0;
+        if (!pieces.load(piece, bytes, errors_there, energies_there, again)) {
+          auto scratch = pool.borrow();
+          BlockFit fit(target, fitted, options, starts, *scratch, begin, end);
+          if (order > exact) again = fit.search();
+          fit.store(error, energy);
+          pieces.save(piece, bytes, errors_there, energies_there, again);
+        }
+        retried += again;
         stage.advance(end - begin);
       });
       if (stage.cancelled()) return Error{"", "cancelled"};

@@ -7,19 +7,16 @@
 #include <unistd.h>
 
 #include <algorithm>
-#include <atomic>
 #include <cctype>
 #include <cerrno>
-#include <cstdio>
 #include <cstring>
+#include <mutex>
 
 namespace lambent {
 namespace {
 
-// The temporary of the write in flight, kept where a signal handler can reach it without allocating.
-constexpr size_t max_path = 4096;
-char unfinished_path[max_path];
-std::atomic<bool> unfinished{false};
+std::mutex logs_mutex;
+std::vector<ReadLog*> logs;
 
 std::string system_message() { return std::strerror(errno); }
 
@@ -34,10 +31,16 @@ Result<int> open_plain_file(const std::string& path, size_t& size) {
     return Error{path, why};
   }
   size = size_t(info.st_size);
+  ReadLog::note(path, info.st_dev, info.st_ino);
   return fd;
 }
 
 }  // namespace
+
+void ReadLog::note(const std::string& path, uint64_t device, uint64_t inode) {
+  std::lock_guard lock(logs_mutex);
+  for (ReadLog* log : logs) log->files_.push_back({path, device, inode});
+}
 
 Result<MappedFile> MappedFile::open(const std::string& path) {
   MappedFile file;
@@ -84,53 +87,42 @@ Result<std::vector<uint8_t>> read_file(const std::string& path) {
   return bytes;
 }
 
-Result<void> write_file_atomically(const std::string& path, std::span<const std::span<const uint8_t>> pieces) {
-  std::string temporary = path + ".part" + std::to_string(::getpid());
-  if (temporary.size() >= max_path) return Error{path, "path too long"};
+ReadLog::ReadLog() {
+  std::lock_guard lock(logs_mutex);
+  logs.push_back(this);
+}
+ReadLog::~ReadLog() {
+  std::lock_guard lock(logs_mutex);
+  std::erase(logs, this);
+}
+
+std::vector<ReadFile> ReadLog::files() const {
+  std::lock_guard lock(logs_mutex);
+  return files_;
+}
+
+bool is_being_read(const std::string& path) {
   struct stat info;
-  if (::stat(path.c_str(), &info) == 0 && S_ISDIR(info.st_mode)) return Error{path, "is a folder"};
-  std::strcpy(unfinished_path, temporary.c_str());
-  int fd = ::open(temporary.c_str(), O_WRONLY | O_CREAT | O_TRUNC | O_CLOEXEC, 0666);
-  if (fd < 0) return Error{path, "cannot be written: " + system_message()};
-  unfinished = true;
-  auto fail = [&](const std::string& why) {
-    ::close(fd);
-    ::unlink(temporary.c_str());
-    unfinished = false;
-    return Error{path, "cannot be written: " + why};
-  };
-  for (auto piece : pieces) {
-    size_t done = 0;
-    while (done < piece.size()) {
-      ssize_t put = ::write(fd, piece.data() + done, std::min<size_t>(piece.size() - done, size_t{1} << 26));
-      if (put < 0 && errno == EINTR) continue;
-      if (put <= 0) return fail(system_message());
-      done += size_t(put);
-    }
-  }
-  if (::fsync(fd) != 0 && errno != EINVAL) return fail(system_message());
-  if (::close(fd) != 0) {
-    ::unlink(temporary.c_str());
-    unfinished = false;
-    return Error{path, "cannot be written: " + system_message()};
-  }
-  if (::rename(temporary.c_str(), path.c_str()) != 0) {
-    std::string why = system_message();
-    ::unlink(temporary.c_str());
-    unfinished = false;
-    return Error{path, "cannot be written: " + why};
-  }
-  unfinished = false;
-  return {};
+  if (::stat(path.c_str(), &info) != 0) return false;
+  std::lock_guard lock(logs_mutex);
+  for (const ReadLog* log : logs)
+    for (const ReadFile& file : log->files_)
+      if (file.device == info.st_dev && file.inode == info.st_ino) return true;
+  return false;
 }
 
-Result<void> write_file_atomically(const std::string& path, std::string_view text) {
-  std::span<const uint8_t> piece(reinterpret_cast<const uint8_t*>(text.data()), text.size());
-  return write_file_atomically(path, {&piece, 1});
+Result<void> check_replaces_no_input(const std::string& path) {
+  if (!is_being_read(path)) return {};
+  return Error{path, "cannot be written: this command reads it, and no output takes the place of an input"};
 }
 
-void remove_unfinished_files() {
-  if (unfinished) ::unlink(unfinished_path);
+void allow_replacing(const std::string& path) {
+  struct stat info;
+  if (::stat(path.c_str(), &info) != 0) return;
+  std::lock_guard lock(logs_mutex);
+  for (ReadLog* log : logs)
+    std::erase_if(log->files_,
+                  [&](const ReadFile& file) { return file.device == info.st_dev && file.inode == info.st_ino; });
 }
 
 std::string file_extension(const std::string& path) {

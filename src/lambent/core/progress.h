@@ -1,5 +1,6 @@
 #pragma once
-// Progress of long work and the wish to stop it, passed down as a pointer; null means silent and not to be stopped.
+// Progress of long work, the wish to stop it and where it is kept, passed down as a pointer; null means silent and not
+// to be stopped.
 #include <atomic>
 #include <cstddef>
 #include <functional>
@@ -7,6 +8,8 @@
 #include <string>
 
 namespace lambent {
+
+class Checkpoint;
 
 // Made by whoever wants to see progress, or to stop the work.
 class Progress {
@@ -23,6 +26,8 @@ class Progress {
   // Safe in a signal handler.
   void cancel() { cancelled_.store(true, std::memory_order_relaxed); }
   bool cancelled() const { return cancelled_.load(std::memory_order_relaxed); }
+
+  Checkpoint* checkpoint = nullptr;  // where pieces of the work are kept (checkpoint.h); null: nowhere
 
  private:
   Report report_;

@@ -7,6 +7,7 @@
 #include <lambent/light/environment.h>
 #include <lambent/pipeline/bake_lightmap.h>
 #include <lambent/pipeline/bake_parse.h>
+#include <lambent/pipeline/durable.h>
 #include <lambent/pipeline/parse.h>
 #include <lambent/pipeline/place_receivers.h>
 #include <lambent/pipeline/text.h>
@@ -364,6 +365,8 @@ Result<BakeOutcome> bake_plain(const BakeRequest& request, const BakePlan& plan,
     if (auto ok = check_picture_bytes(b, *made); !ok) return ok.error();
     view = *made;
   }
+  if (auto ok = check_file_size(plan, request, b.scene, b.receivers().count(), 0); !ok) return ok.error();
+  if (auto ok = job.inputs_read({}); !ok) return ok.error();
   if (plan.kind != BakeKind::membrane && request.shadows == "on")
     warn_if_enclosed(b.scene, b.tracer, b.receivers(), job);
   if (b.placed.atlas) move_buried_texels(b.scene, b.tracer, *b.placed.atlas, b.placed.receivers, job.progress);
@@ -399,28 +402,55 @@ Result<Baked> bake(const BakeRequest& request, const Job& job) {
   return std::move(outcome->baked);
 }
 
-Result<nlohmann::json> save_outcome(const std::string& path, const BakeOutcome& outcome) {
-  nlohmann::json pictures = nlohmann::json::array();
+namespace {
+
+// The pictures, the rule of make and the baked file, whole or not at all; the names of the pictures.
+Result<std::vector<std::string>> write_outputs(const std::string& path, const BakeOutcome& outcome,
+                                               const BakeRequest* request, const DurableBake* durable) {
   const std::string stem = path.substr(0, path.find_last_of('.'));
+  std::vector<std::string> written;
+  FileSet set;
   for (const auto& [name, picture] : outcome.pictures) {
-    pictures.push_back(stem + name);
-    if (auto ok = save_image(stem + name, picture); !ok) return ok.error();
+    written.push_back(stem + name);
+    if (auto ok = save_image(written.back(), picture); !ok) return ok.error();
+  }
+  if (request && !request->depfile.empty()) {
+    std::vector<std::string> all = written;
+    all.insert(all.begin(), path);
+    if (auto ok = write_file_atomically(request->depfile, depfile_text(all, durable->inputs())); !ok) return ok.error();
   }
   if (auto ok = save_baked(path, outcome.baked, outcome.look ? &*outcome.look : nullptr); !ok) return ok.error();
-  return pictures;
+  if (auto ok = set.commit(); !ok) return ok.error();
+  return written;
 }
 
-Result<Summary> bake_to_file(const BakeRequest& request, const Job& job) {
-  if (auto ok = check_output(request.output, {"glb"}); !ok) return ok.error();
-  auto outcome = bake_with_summary(request, job);
-  if (!outcome) return outcome.error();
+}  // namespace
+
+Result<nlohmann::json> save_outcome(const std::string& path, const BakeOutcome& outcome) {
+  auto written = write_outputs(path, outcome, nullptr, nullptr);
+  if (!written) return written.error();
+  return nlohmann::json(*written);
+}
+
+Result<Summary> bake_to_file(const BakeRequest& asked, const Job& job) {
+  if (auto ok = check_output(asked.output, {"glb"}); !ok) return ok.error();
+  auto request = resolved(asked);
+  if (!request) return request.error();
+  DurableBake durable(*request, job);
+  auto outcome = bake_with_summary(asked, durable.job());
+  if (!outcome) return durable.explained(outcome.error());
   const auto start = Clock::now();
-  auto pictures = save_outcome(request.output, *outcome);
+  Summary& summary = outcome->summary;
+  auto pictures = write_outputs(request->output, *outcome, &*request, &durable);
   if (!pictures) return pictures.error();
-  Summary summary = std::move(outcome->summary);
-  summary.json["output"] = request.output, summary.json["seconds"]["save"] = seconds_since(start);
-  if (!pictures->empty()) summary.json["pictures"] = std::move(*pictures);
-  return summary;
+  if (!pictures->empty()) summary.json["pictures"] = *pictures;
+  durable.finish();
+  summary.json["output"] = request->output, summary.json["seconds"]["save"] = seconds_since(start);
+  if (const size_t taken = durable.taken()) {
+    summary.json["resumed"] = taken;
+    summary.lines.emplace_back("resumed", fmt::format("{} pieces of work were there already", human_count(taken)));
+  }
+  return std::move(summary);
 }
 
 }  // namespace lambent

@@ -87,6 +87,14 @@ Result<BakeOutcome> bake_lightmap_request(const BakeRequest& request, const Bake
   auto placed = place_receivers(*scene, request, job);
   if (!placed) return placed.error();
   Seconds seconds{seconds_since(start), 0};
+  if (auto ok = check_file_size(plan, request, *scene, placed->receivers.count(), lamps.groups()); !ok)
+    return ok.error();
+  const bool over_texels = placed->atlas && lamps.groups() > 0;
+  if (auto ok = job.inputs_read(over_texels ? lightmap_picture_names(lamps.names, plan.lightmap.directional,
+                                                                     request.light_groups, request.direct == "separate")
+                                            : std::vector<std::string>());
+      !ok)
+    return ok.error();
   start = Clock::now();
   auto tracer = Tracer::build(*scene, job.progress);
   if (!tracer) return tracer.error();

@@ -46,4 +46,8 @@ Result<Lattice> lattice_of_request(const BakeRequest& request, const Scene& scen
 // coordinates.
 Result<std::vector<float>> membrane_alphas(const std::string& text, const Scene& scene, const Receivers& receivers);
 
+// Whether a baked file can hold the result, as far as that is known before the first ray. Errors: it cannot.
+Result<void> check_file_size(const BakePlan& plan, const BakeRequest& request, const Scene& scene, size_t receivers,
+                             size_t groups);
+
 }  // namespace lambent

@@ -21,6 +21,12 @@ constexpr KindMask every = D | M | F | Z | G | S | L | K, traced = D | M | F | Z
 const Option<R> table[] = {
     {"scene", &R::scene, "Files", every, "Scene: .gltf, .glb, .obj or .ply", 0, 0, nullptr, nullptr, true, true},
     {"output", &R::output, "Files", every, "Baked file to write (.glb)", 0, 0, nullptr, nullptr, false},
+    {"checkpoint", &R::checkpoint, "Files", traced | K,
+     "Folder to keep the work in as it comes, from which the same command goes on after an interrupt or a crash; off: "
+     "nowhere (OUTPUT.checkpoint, of work of over a minute)",
+     0, 0, nullptr, nullptr, false},
+    {"depfile", &R::depfile, "Files", every, "Rule of make to write: the outputs, and all files that were read", 0, 0,
+     nullptr, nullptr, false},
     {"transfer", &R::transfer, "What is baked", every,
      "diffuse: a vector a receiver for distant light; matrix: incident light in every direction, for glossy materials; "
      "zonal: lobes, for what moves, glossy too with --brdf or --outgoing; lightmap: the light of the scene's own "
@@ -227,7 +233,9 @@ BakeKind kind_of(const BakeRequest& r) {
   return r.membrane.empty() ? BakeKind::diffuse : BakeKind::membrane;
 }
 
-std::string to_text(const BakeRequest& request) { return to_json(request).dump(); }
+std::string to_text(const BakeRequest& request) {
+  return to_json(request).dump(-1, ' ', false, nlohmann::json::error_handler_t::replace);
+}
 Result<BakeRequest> bake_request(const std::string& json) {
   const nlohmann::json object = nlohmann::json::parse(json, nullptr, false);
   if (object.is_discarded()) return Error{"", "the request is not JSON", true};

@@ -115,6 +115,8 @@ struct Change {
   nlohmann::json value, with = nlohmann::json::object();
 };
 const std::map<std::string, Change> changes{
+    {"checkpoint", {"off"}},
+    {"depfile", {"out.d"}},
     {"order", {2}},
     {"light", {"sh:2"}},
     {"precision", {"single"}},

@@ -44,6 +44,19 @@ float normalize_brightness(std::vector<Vec3>& values) {
 
 }  // namespace
 
+std::vector<std::string> lightmap_picture_names(const std::vector<std::string>& groups, DirectionalKind kind, bool each,
+                                                bool direct_apart) {
+  std::vector<std::string> out;
+  const int rows = directional_rows(kind);
+  for (const std::string& group : each ? groups : std::vector<std::string>{""}) {
+    const std::string prefix = group.empty() ? "" : group + ".";
+    if (direct_apart) out.push_back(picture_name(prefix + "direct", ""));
+    for (int row = 0; row < rows; ++row)
+      out.push_back(picture_name(direct_apart ? prefix + "indirect" : group, rows > 1 ? std::to_string(row) : ""));
+  }
+  return out;
+}
+
 std::vector<std::pair<std::string, Image>> lightmap_pictures(const Lightmap& map, const Receivers& receivers,
                                                              bool each) {
   std::vector<std::pair<std::string, Image>> out;

@@ -14,6 +14,10 @@ namespace lambent {
 std::vector<std::pair<std::string, Image>> lightmap_pictures(const Lightmap& map, const Receivers& receivers,
                                                              bool each);
 
+// The names alone, of lamps of these groups.
+std::vector<std::string> lightmap_picture_names(const std::vector<std::string>& groups, DirectionalKind kind, bool each,
+                                                bool direct_apart);
+
 // What leaves every texel with all lamps on, fit for eight bits: values beyond the brightest thousandth are clamped to
 // it. Nothing where there are no texels or no lamps.
 Result<std::optional<ViewerLook>> lightmap_look(const Lightmap& map, const Scene& scene, const Receivers& receivers,

@@ -19,12 +19,12 @@ constexpr int expected_samples = 512;
 using Clock = std::chrono::steady_clock;
 double seconds_since(Clock::time_point start) { return std::chrono::duration<double>(Clock::now() - start).count(); }
 
-// Rows and columns that will be stored.
-size_t stored_bytes(const BakePlan& plan, const BakeRequest& r, size_t receivers, size_t groups) {
+// Rows and columns that will be stored, of so many channels where the kind leaves it open.
+size_t stored_bytes(const BakePlan& plan, const BakeRequest& r, size_t receivers, size_t groups, size_t channels) {
   const size_t value = r.precision == "half" ? 2 : 4, columns = plan.bake.light().count();
   const size_t incident = size_t(sh_count(r.incident_order));
   switch (plan.kind) {
-    case BakeKind::diffuse: return receivers * columns * 3 * value;
+    case BakeKind::diffuse: return receivers * columns * channels * value;
     case BakeKind::lightmap:
       return receivers * (columns + groups) * size_t(directional_rows(plan.lightmap.directional)) * 3 * value;
     case BakeKind::factors: return receivers * size_t(sh_count(plan.bake.order + r.incident_order - 1)) * value;
@@ -33,10 +33,11 @@ size_t stored_bytes(const BakePlan& plan, const BakeRequest& r, size_t receivers
       const size_t rows = kind == OutgoingKind::map ? incident
                         : kind == OutgoingKind::svd ? size_t(plan.matrix.svd_rows)
                                                     : 2 * size_t(sh_count(plan.matrix.outgoing_order));
-      return receivers * rows * columns * 3 * value;
+      return receivers * rows * columns * channels * value;
     }
     case BakeKind::zonal:
-    case BakeKind::glossy_zonal: return receivers * (4 + size_t(r.lobes) * size_t(3 + 3 * plan.bake.order)) * value;
+    case BakeKind::glossy_zonal:
+      return receivers * (4 + size_t(r.lobes) * (3 + channels * size_t(plan.bake.order))) * value;
     case BakeKind::membrane: return receivers * size_t(4 + plan.bake.order) * value;
     case BakeKind::blocks: return expected_visibility_bytes(receivers, plan.visibility);
   }
@@ -72,6 +73,23 @@ double expected_seconds(const Scene& scene, const Tracer& tracer, const Receiver
 
 }  // namespace
 
+Result<void> check_file_size(const BakePlan& plan, const BakeRequest& r, const Scene& scene, size_t receivers,
+                             size_t groups) {
+  // What is stored in another form than it is baked in is not known before.
+  if (!r.compress.empty() || !r.fix_view.empty() || !r.fix_light.empty() || plan.kind == BakeKind::blocks ||
+      plan.kind == BakeKind::zonal || plan.kind == BakeKind::glossy_zonal)
+    return {};
+  const bool coloured = plan.bake.bounces > 0 && r.subsurface.empty() && has_coloured_albedo(scene);
+  const size_t each = stored_bytes(plan, r, receivers, groups, coloured ? 3 : 1);
+  const size_t bytes = each * (r.terms ? size_t(plan.bake.bounces) + 2 : 1);
+  if (bytes < size_t{1} << 32) return {};
+  return Error{r.output,
+               fmt::format("would take at least {} for {} receivers, and a baked file holds 4 GiB: take fewer bands, "
+                           "--precision half, fewer receivers or --compress",
+                           human_bytes(double(bytes)), human_count(receivers)),
+               true};
+}
+
 Result<Summary> plan_bake(const BakeRequest& asked, const Job& job) {
   auto request = resolved(asked);
   if (!request) return request.error();
@@ -86,12 +104,12 @@ Result<Summary> plan_bake(const BakeRequest& asked, const Job& job) {
   if (!placed) return placed.error();
   auto tracer = Tracer::build(*scene, job.progress);
   if (!tracer) return tracer.error();
-  const size_t receivers = placed->receivers.count(), bytes = stored_bytes(*plan, *request, receivers, groups);
+  const size_t receivers = placed->receivers.count(), bytes = stored_bytes(*plan, *request, receivers, groups, 3);
   const bool traced = request->shadows == "on" && plan->kind != BakeKind::membrane && receivers > 0;
   const double seconds = traced ? expected_seconds(*scene, *tracer, placed->receivers, *plan, *request) : 0;
   Summary s;
   s.json = {{"request", to_json(*request)}, {"receivers", receivers}, {"bytes", bytes}, {"seconds", seconds}};
-  s.lines = {{"request", s.json["request"].dump()},
+  s.lines = {{"request", to_text(*request)},
              {"receivers", human_count(receivers)},
              {"size", "at most about " + human_bytes(double(bytes))},
              {"time", fmt::format("about {} of tracing on {} threads", human_seconds(seconds), thread_count())}};

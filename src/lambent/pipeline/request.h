@@ -15,6 +15,8 @@ namespace lambent {
 // The fields are the options of `lambent bake` and their syntaxes; docs/options.md says which go with which kind.
 struct BakeRequest {
   std::string scene, output;
+  std::string checkpoint;  // a folder; "": beside the output, of long work; "off": none
+  std::string depfile;
   std::string transfer = "diffuse";
   int order = 0;  // bands; 0: 6, or, of a lightmap, none
   std::string light;
@@ -69,6 +71,9 @@ struct BakeRequest {
 struct Job {
   Progress* progress = nullptr;
   std::function<void(const std::string&)> warn = [](const std::string&) {};  // one line each
+  // Called once the inputs are read, before any ray, with what is to be added to the output's stem for each picture
+  // that will be written beside it. An error ends the bake.
+  std::function<Result<void>(const std::vector<std::string>&)> inputs_read = [](const auto&) { return Result<void>(); };
 };
 
 // Loads the scene, bakes it, and says in the result's provenance by which request. `output` is not read: save_baked()

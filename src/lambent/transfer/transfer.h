@@ -63,6 +63,13 @@ WritableTransfer make_transfer(LightBasis light, int rows, int channels, size_t 
 // Writes one receiver's values, [row][channel][column].
 void store_receiver(const WritableTransfer& t, size_t receiver, std::span<const float> values);
 
+// The bytes of receivers [first, first + count), padding included; `first` is a multiple of transfer_block, and so is
+// the count, but for the last ones.
+inline std::span<uint8_t> stored_bytes(const WritableTransfer& t, size_t first, size_t count) {
+  const size_t block = t.transfer.block_values() * t.transfer.value_bytes();
+  return {t.values + first / transfer_block * block, (count + transfer_block - 1) / transfer_block * block};
+}
+
 // One receiver's values, [row][channel][column].
 std::vector<float> load_receiver(const Transfer& t, size_t receiver);
 

@@ -49,6 +49,12 @@ struct WritableZonalTransfer {
 WritableZonalTransfer make_zonal_transfer(int order, int lobes, int channels, size_t receivers, Precision precision,
                                           int rows = 1);
 
+// The bytes of receivers [first, first + count), as those of a WritableTransfer.
+inline std::span<uint8_t> stored_bytes(const WritableZonalTransfer& t, size_t first, size_t count) {
+  const size_t block = t.transfer.receiver_values() * transfer_block * t.transfer.value_bytes();
+  return {t.values + first / transfer_block * block, (count + transfer_block - 1) / transfer_block * block};
+}
+
 // One receiver's values, row by row.
 void store_receiver(const WritableZonalTransfer& t, size_t receiver, std::span<const float> values);
 std::vector<float> load_receiver(const ZonalTransfer& t, size_t receiver);

@@ -1,0 +1,217 @@
+#include <lambent/core/file.h>
+
+#include <fcntl.h>
+#include <sys/file.h>
+#include <sys/stat.h>
+#include <sys/wait.h>
+#include <unistd.h>
+
+#include <algorithm>
+#include <atomic>
+#include <cerrno>
+#include <cstring>
+#include <filesystem>
+#include <optional>
+#include <utility>
+
+namespace lambent {
+namespace {
+
+namespace fs = std::filesystem;
+
+// Then the writer's number. No other program's: what bears it may be removed.
+const std::string temporary_ending = ".lambent-part";
+
+std::string system_message() { return std::strerror(errno); }
+
+// Temporaries of writes in flight, kept where a signal handler can reach them without allocating; it looks at those
+// that are active. Never given back, but used again.
+struct Unfinished {
+  std::atomic<bool> active{false}, taken{true};
+  std::string path;
+  Unfinished* next = nullptr;
+};
+std::atomic<Unfinished*> all_unfinished{nullptr};
+
+Unfinished* note_unfinished(const std::string& path) {
+  for (Unfinished* note = all_unfinished; note; note = note->next)
+    if (!note->taken.exchange(true)) {
+      note->path = path, note->active = true;
+      return note;
+    }
+  auto* note = new Unfinished;
+  note->path = path, note->active = true, note->next = all_unfinished.load();
+  while (!all_unfinished.compare_exchange_weak(note->next, note)) {
+  }
+  return note;
+}
+void release(Unfinished& note) { note.active = false, note.taken = false; }
+
+// Where a name leads: of a link, to what it names, there or not.
+std::string resolved(const std::string& path) {
+  std::error_code status;
+  fs::path at = path;
+  for (int links = 0; links < 40 && fs::is_symlink(fs::symlink_status(at, status)); ++links)
+    at = at.parent_path() / fs::read_symlink(at, status);
+  return at.string();
+}
+
+void sync_folder(const std::string& path) {
+  const std::string folder = fs::path(path).parent_path().string();
+  const int fd = ::open(folder.empty() ? "." : folder.c_str(), O_RDONLY | O_DIRECTORY | O_CLOEXEC);
+  if (fd < 0) return;
+  ::fsync(fd);
+  ::close(fd);
+}
+
+}  // namespace
+
+// A whole file under its temporary name. The lock says that somebody still writes it, until the descriptor is closed.
+struct WrittenFile {
+  std::string path, target, temporary;  // path: as asked for, in messages
+  int fd = -1;
+  Unfinished* note = nullptr;
+  WrittenFile(std::string asked)
+      : path(std::move(asked)),
+        target(resolved(path)),
+        temporary(target + temporary_ending + std::to_string(::getpid())) {}
+  WrittenFile(const WrittenFile&) = delete;
+  WrittenFile& operator=(const WrittenFile&) = delete;
+  ~WrittenFile() {
+    if (fd >= 0) ::close(fd);
+    if (!note) return;
+    ::unlink(temporary.c_str());
+    release(*note);
+  }
+  Error error(const std::string& why) const { return {path, "cannot be written: " + why}; }
+
+  // The mode and, as far as allowed, the owner of what it replaces.
+  Result<void> open() {
+    struct stat old;
+    const bool replaces = ::stat(target.c_str(), &old) == 0;
+    if (replaces && S_ISDIR(old.st_mode)) return Error{path, "is a folder"};
+    if (replaces && !S_ISREG(old.st_mode)) return error("it is not a plain file");
+    if (auto ok = check_replaces_no_input(path); !ok) return ok;
+    remove_stale_temporaries(target);
+    fd = ::open(temporary.c_str(), O_WRONLY | O_CREAT | O_EXCL | O_CLOEXEC, 0666);
+    if (fd < 0) return error(system_message());
+    ::flock(fd, LOCK_EX | LOCK_NB);
+    note = note_unfinished(temporary);
+    if (replaces) {
+      (void)!::fchown(fd, old.st_uid, old.st_gid);
+      ::fchmod(fd, old.st_mode & 0777);
+    }
+    return {};
+  }
+
+  Result<void> write(std::span<const std::span<const uint8_t>> pieces) {
+    for (auto piece : pieces)
+      for (size_t done = 0; done < piece.size();) {
+        const ssize_t put = ::write(fd, piece.data() + done, std::min<size_t>(piece.size() - done, size_t{1} << 26));
+        if (put < 0 && errno == EINTR) continue;
+        if (put <= 0) return error(system_message());
+        done += size_t(put);
+      }
+    if (::fsync(fd) != 0 && errno != EINVAL) return error(system_message());
+    return {};
+  }
+};
+
+namespace {
+
+thread_local FileSet* current_set = nullptr;
+
+// Renames all, the last one last. A program that is killed meanwhile leaves no set in part: another process does it,
+// which shares its memory and ends by itself. Power that fails meanwhile leaves no new file beside an old last one,
+// which is removed first.
+int rename_all(std::vector<std::unique_ptr<WrittenFile>>& files) {
+  const auto rename_one = [](const WrittenFile& file) { return ::rename(file.temporary.c_str(), file.target.c_str()); };
+  if (files.size() == 1) return rename_one(*files[0]) == 0 ? 0 : errno;
+#ifdef __EMSCRIPTEN__  // where there is one process
+  for (const auto& file : files)
+    if (rename_one(*file) != 0) return errno;
+  return 0;
+#else
+  volatile int failure = 0;
+  const char* const head = files.back()->target.c_str();
+  const pid_t child = ::vfork();
+  if (child == 0) {
+    ::setsid();  // what is sent to the group of the program does not reach it
+    if (::unlink(head) != 0 && errno != ENOENT) failure = errno;
+    for (size_t i = 0; i < files.size() && !failure; ++i)
+      if (rename_one(*files[i]) != 0) failure = errno;
+    ::_exit(0);
+  }
+  if (child < 0) return errno;
+  while (::waitpid(child, nullptr, 0) < 0 && errno == EINTR) {
+  }
+  return failure;
+#endif
+}
+
+}  // namespace
+
+FileSet::FileSet() : outer_(current_set) { current_set = this; }
+FileSet::~FileSet() { current_set = outer_; }
+
+Result<void> FileSet::commit() {
+  if (files_.empty()) return {};
+  const int failure = rename_all(files_);
+  if (failure != 0) return files_.back()->error(std::strerror(failure));
+  for (auto& file : files_) release(*std::exchange(file->note, nullptr));
+  for (size_t i = 0; i < files_.size(); ++i)
+    if (i == 0 || fs::path(files_[i]->target).parent_path() != fs::path(files_[i - 1]->target).parent_path())
+      sync_folder(files_[i]->target);
+  files_.clear();
+  return {};
+}
+
+Result<void> write_file_atomically(const std::string& path, std::span<const std::span<const uint8_t>> pieces) {
+  std::optional<FileSet> own;
+  if (!current_set) own.emplace();
+  auto file = std::make_unique<WrittenFile>(path);
+  if (auto ok = file->open(); !ok) return ok;
+  if (auto ok = file->write(pieces); !ok) return ok;
+  current_set->files_.push_back(std::move(file));
+  return own ? own->commit() : Result<void>();
+}
+
+Result<void> write_file_atomically(const std::string& path, std::string_view text) {
+  std::span<const uint8_t> piece(reinterpret_cast<const uint8_t*>(text.data()), text.size());
+  return write_file_atomically(path, {&piece, 1});
+}
+
+void remove_unfinished_files() {
+  for (const Unfinished* note = all_unfinished; note; note = note->next)
+    if (note->active) ::unlink(note->path.c_str());
+}
+
+std::vector<std::string> stale_temporaries(const std::string& folder, const std::string& name) {
+  std::vector<std::string> out;
+  std::error_code status;
+  for (const auto& entry : fs::directory_iterator(folder.empty() ? "." : folder, status)) {
+    const std::string file = entry.path().filename().string();
+    const size_t dot = file.rfind(temporary_ending), digits = dot + temporary_ending.size();
+    if (dot == std::string::npos || digits == file.size() || (!name.empty() && file.substr(0, dot) != name) ||
+        file.find_first_not_of("0123456789", digits) != std::string::npos)
+      continue;
+    const int fd = ::open(entry.path().c_str(), O_RDONLY | O_CLOEXEC | O_NOFOLLOW | O_NONBLOCK);
+    if (fd < 0) continue;
+    struct stat info;
+    if (::fstat(fd, &info) == 0 && (S_ISREG(info.st_mode) || S_ISDIR(info.st_mode)) &&
+        ::flock(fd, LOCK_EX | LOCK_NB) == 0)
+      out.push_back(entry.path().string());
+    ::close(fd);
+  }
+  return out;
+}
+
+void remove_stale_temporaries(const std::string& path) {
+  const fs::path target = resolved(path);
+  for (const std::string& file : stale_temporaries(target.parent_path().string(), target.filename().string())) {
+    std::error_code ignored;
+    fs::remove_all(file, ignored);
+  }
+}
+
+}  // namespace lambent
