@@ -84,7 +84,8 @@ class Features(made.Case):
     def test_export(self):
         v, f = made.cube(3)
         made.write_obj(self.path("c.obj"), v, f)
-        self.run_tool("bake", self.path("c.obj"), "-o", self.path("c.glb"), "--order", 3, "--bounces", 0, "--ground")
+        self.run_tool("bake", self.path("c.obj"), "-o", self.path("c.glb"), "--order", 3, "--bounces", 0, "--samples", 1024,
+                      "--ground")
         baked = lambent.open(self.path("c.glb"))
         mean = baked.by_input_vertex(baked.values[:, 0, 0].astype(np.float32))
         for convention, factor in (("pifu", SIGNS), ("icon", SIGNS), ("lambent", 1), ("three", SIGNS), ("filament", 1),
@@ -126,7 +127,7 @@ class Features(made.Case):
         prt, _ = lambent.prt_features(v, f)
         lights = lambent.environment_features(["uniform:0.5,1,2", "sky:elevation=50"])
         self.assertEqual((lights.dtype, lights.shape), (np.float32, (2, 9, 3)))
-        baked = lambent.bake(lambent.Scene(v, f), order=3, bounces=0)
+        baked = lambent.bake(lambent.Scene(v, f), order=3, bounces=0, samples=1024)
         ball = np.arange(18)  # of which no vertex is split
         exit_radiance = baked.by_input_vertex(baked.relight("sky:elevation=50"))[ball]
         np.testing.assert_allclose((prt @ lights[1])[ball] / np.pi, exit_radiance, rtol=0.05, atol=0.02)

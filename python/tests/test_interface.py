@@ -119,7 +119,7 @@ class Interface(made.Case):
         scene, said = lambent.Scene(*made.sphere(1)), io.StringIO()
         with contextlib.redirect_stderr(said):
             lambent.bake(scene, samples=8, progress=True)
-        self.assertRegex(said.getvalue(), "bounce 3: *100")
+        self.assertRegex(said.getvalue(), "measuring the error: *100")
 
 
 if __name__ == "__main__":

