@@ -224,6 +224,35 @@ export function writeScene(folder: string): string {
   return path;
 }
 
+/** A room that sees the sky through a door towards +X alone, and a block in it. */
+export function writeRoom(folder: string): string {
+  const lines: string[] = [];
+  let vertices = 0;
+  const quad = (corner: number[], a: number[], b: number[]): void => {
+    const [across, up] = [a, b].map((v) => Math.ceil(12 * Math.hypot(...v))) as [number, number];
+    for (let j = 0; j <= up; ++j)
+      for (let i = 0; i <= across; ++i)
+        lines.push('v ' + [0, 1, 2].map((k) => corner[k]! + (a[k]! * i) / across + (b[k]! * j) / up).join(' '));
+    const at = (i: number, j: number): number => vertices + j * (across + 1) + i + 1;
+    for (let j = 0; j < up; ++j)
+      for (let i = 0; i < across; ++i) lines.push(`f ${at(i, j)} ${at(i + 1, j)} ${at(i + 1, j + 1)} ${at(i, j + 1)}`);
+    vertices += (across + 1) * (up + 1);
+  };
+  quad([-2, 0, 2], [4, 0, 0], [0, 0, -4]); // floor
+  quad([-2, 2.4, -2], [4, 0, 0], [0, 0, 4]);
+  quad([-2, 0, -2], [4, 0, 0], [0, 2.4, 0]);
+  quad([2, 0, 2], [-4, 0, 0], [0, 2.4, 0]);
+  quad([-2, 0, 2], [0, 0, -4], [0, 2.4, 0]);
+  quad([2, 0, -2], [0, 0, 1.3], [0, 2.4, 0]); // left and right of the door
+  quad([2, 0, 0.7], [0, 0, 1.3], [0, 2.4, 0]);
+  quad([-0.4, 0, -0.2], [0.6, 0, 0], [0, 0.8, 0]);
+  quad([-0.4, 0, -0.8], [0, 0, 0.6], [0, 0.8, 0]);
+  quad([-0.4, 0.8, -0.2], [0.6, 0, 0], [0, 0, -0.6]);
+  const path = join(folder, 'room.obj');
+  writeFileSync(path, lines.join('\n') + '\n');
+  return path;
+}
+
 /** A unit ball alone. */
 export function writeBall(path: string): void {
   const rows = 40,

@@ -65,8 +65,8 @@ describe.skipIf(!haveTool || !haveBrowser || !haveData)(
         at('bunny.glb'),
       );
       const scene = [at('bunny.glb'), '--env', environment('chinese_garden')];
-      await shoot('web_bunny.jpg', scene, 'against=unshadowed&exposure=-1&window=auto', desk);
-      await shoot('web_phone.jpg', scene, 'exposure=-1&window=auto', {
+      await shoot('web_bunny.jpg', scene, 'against=unshadowed&exposure=-1', desk);
+      await shoot('web_phone.jpg', scene, 'exposure=-1', {
         viewport: { width: 390, height: 600 },
         deviceScaleFactor: 2,
         isMobile: true,
@@ -102,7 +102,7 @@ describe.skipIf(!haveTool || !haveBrowser || !haveData)(
       await shoot(
         'web_lobes.jpg',
         [at('man.glb'), '--env', environment('chinese_garden')],
-        'time=0.6&exposure=-1&window=auto',
+        'time=0.6&exposure=-1',
         desk,
         async (page) => {
           await page.focus('#picture');

@@ -3,7 +3,7 @@ import { join } from 'node:path';
 import type { Browser } from 'playwright-core';
 import { afterAll, beforeAll, describe, expect, it } from 'vitest';
 import { haveTool, lambent, makeFolder, renderLinear, writeLopsidedHdr } from '../test/tool.ts';
-import { haveBrowser, launch, open, psnr, serve, writeScene, type Server } from './browser.ts';
+import { haveBrowser, launch, open, psnr, serve, writeRoom, writeScene, type Server } from './browser.ts';
 
 const camera = '3.1,2.6,4.3,-0.3,0.8,0,38',
   rotate = '40,-25,70';
@@ -86,6 +86,28 @@ describe.skipIf(!haveTool || !haveBrowser)('the picture', () => {
         '-1.5',
       ]),
     ).toBeGreaterThan(40);
+  });
+  it('is that of render under a sun that rings in a room', async () => {
+    lambent('bake', writeRoom(folder), '--samples', '256', '--bounces', '2', '-o', at('room.glb'));
+    const inside = '-1.7,1.7,1.6,1,0.7,-0.6,75',
+      sun = 'sky:elevation=25,azimuth=10',
+      room = await serve(at('room.glb'), '--env', sun);
+    const shown = async (name: string, window: string): Promise<string> => {
+      const page = await open(browser, room.address, `ui=off&camera=${inside}&exposure=1${window}`, 640, 480);
+      await page.screenshot({ path: at(`${name}.png`) });
+      await page.close();
+      return at(`${name}.png`);
+    };
+    const page = await shown('room_page', ''),
+      ringing = await shown('room_ringing', '&window=none');
+    expect(await room.stop()).toBe(0);
+    const view = ['--env', sun, '--camera', inside, '--size', '640x480', '--spp', '64', '--exposure', '1'];
+    renderLinear(at('room.glb'), ...view, '-o', at('room_render.png'));
+    const db = psnr(page, at('room_render.png')),
+      without = psnr(ringing, at('room_render.png'));
+    console.log(`a room by default: ${db.toFixed(1)} dB; without a window ${without.toFixed(1)} dB (${folder})`);
+    expect(db).toBeGreaterThan(40);
+    expect(without).toBeLessThan(30);
   });
   it('is that of render under a sky, with a window', async () => {
     expect(

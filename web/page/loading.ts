@@ -19,7 +19,6 @@ import {
   LambentTransferPlugin,
   latLongMap,
   Lighting,
-  projectLatLong,
   type LatLongMap,
 } from '../src/index.js';
 
@@ -142,7 +141,7 @@ export function mapTexture(map: LatLongMap): DataTexture {
 
 export const makeEnvironment = (name: string, map: LatLongMap): EnvironmentFile => ({
   name,
-  lighting: new Lighting(projectLatLong(map, 16)),
+  lighting: Lighting.fromMap(map),
   background: mapTexture(map),
   sun: brightest(map),
 });

@@ -29,7 +29,7 @@ export const defaultState = (): State => ({
   exposure: 'auto',
   tone: 'neutral',
   order: 0,
-  window: 'none',
+  window: 'auto',
   view: 'baked',
   wipe: 0.5,
   coefficient: 3,

@@ -61,7 +61,7 @@ export class Viewer {
   against: View | undefined;
   wipe = 0.5;
   order = 0; // bands in use; 0: all
-  window: ShWindow = 'none';
+  window: ShWindow = 'auto';
   exposure: number | 'auto' = 'auto';
   tone: Tone = 'neutral';
   showBackground = true;

@@ -10,7 +10,7 @@ import { VertexTransfer } from './vertex_transfer.js';
 const radiance = /* glsl */ `
 vec3 prtRadiance( const in uint receiver ) {
   if ( receiver == 0xffffffffu ) return vec3( 0.0 );
-  vec3 sum = vec3( 0.0 );
+  vec3 sum = vec3( 0.0 ), peaks = vec3( 0.0 );
   for ( int k = 0; k < PRT_QUADS; ++ k ) {
     vec4 red = prtValues( receiver, k );
     #if PRT_CHANNELS == 3
@@ -20,8 +20,16 @@ vec3 prtRadiance( const in uint receiver ) {
     #endif
     sum += vec3( dot( red, prtLight[ k ] ), dot( green, prtLight[ PRT_QUADS + k ] ),
                  dot( blue, prtLight[ 2 * PRT_QUADS + k ] ) );
+    #ifdef PRT_PEAKS
+      peaks += vec3( dot( red, prtPeaks[ k ] ), dot( green, prtPeaks[ PRT_QUADS + k ] ),
+                     dot( blue, prtPeaks[ 2 * PRT_QUADS + k ] ) );
+    #endif
   }
-  return sum;
+  #ifdef PRT_PEAKS
+    return prtHeld( sum, peaks );
+  #else
+    return sum;
+  #endif
 }
 `;
 

@@ -16,9 +16,10 @@ export {
   type TransferKind,
   type TransferSource,
 } from './kinds.js';
-export { latLongMap, Lighting } from './lighting.js';
+export { latLongMap, Lighting, type LightParts } from './lighting.js';
 export { lobeValue, type Lobe } from './lobes.js';
 export { bakedScene, LambentTransferPlugin, type BakedScene } from './plugin.js';
+export { withoutPeaks } from './peaks.js';
 export { projectLatLong, texelSolidAngle, type LatLongMap } from './projection.js';
 export { diffuseParameters, PrtMaterial } from './prt_material.js';
 export { anySeeThrough } from './see_through.js';

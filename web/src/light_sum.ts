@@ -15,6 +15,7 @@ import {
   type LinearFilter,
   type Material,
   type NearestFilter,
+  type Texture,
   type WebGLRenderer,
 } from 'three';
 import type { BlockLayout } from './block_texture.js';
@@ -30,6 +31,7 @@ precision highp float;
 precision highp int;
 uniform highp sampler2DArray prtTransfer;
 uniform vec4 prtLight[ 3 * PRT_QUADS ];
+uniform bool prtHolds;
 out vec4 radiance;
 ${pick}
 void main() {
@@ -50,6 +52,7 @@ void main() {
     radiance.rgb += vec3( dot( red, prtLight[ k ] ), dot( green, prtLight[ PRT_QUADS + k ] ),
                           dot( blue, prtLight[ 2 * PRT_QUADS + k ] ) );
   }
+  if ( prtHolds ) radiance.rgb = max( radiance.rgb, vec3( 0.0 ) );
 }`;
 
 export interface SumOptions {
@@ -156,11 +159,14 @@ export function packLight(out: Float32Array, light: ArrayLike<number>): void {
   for (let k = 0; k < light.length / 3; ++k) for (let c = 0; c < 3; ++c) out[4 * quads * c + k] = light[3 * k + c]!;
 }
 
+/** T . light of one light, or of a part of it. */
 export class LightSum extends DrawnPicture {
   readonly light: Float32Array;
+  private readonly holds: { value: boolean };
 
   constructor({ layout, channels, transfer, width, height, filter, pick, uniforms, what }: SumOptions) {
-    const light = new Float32Array(12 * layout.quads);
+    const light = new Float32Array(12 * layout.quads),
+      holds = { value: false };
     super(width, height, filter, what, {
       fragmentShader: fragmentShader(pick),
       defines: {
@@ -170,14 +176,50 @@ export class LightSum extends DrawnPicture {
         PRT_ROWS: layout.rows,
         PRT_CHANNELS: channels,
       },
-      uniforms: { prtTransfer: { value: transfer }, prtLight: { value: light }, ...uniforms },
+      uniforms: { prtTransfer: { value: transfer }, prtLight: { value: light }, prtHolds: holds, ...uniforms },
     });
     this.light = light;
+    this.holds = holds;
   }
 
-  /** `light` is [column][3]. */
-  set(light: ArrayLike<number>): void {
+  /** `light` is [column][3]; `holds`: no number is less than 0. */
+  set(light: ArrayLike<number>, holds = false): void {
     packLight(this.light, light);
+    this.holds.value = holds;
     this.refresh();
+  }
+}
+
+/** The two of a light: its rest, and its peaks where it has any. What is drawn adds them up. */
+export class LightSums {
+  readonly rest: LightSum;
+  /** The picture of the peaks; that of the rest where there are none. */
+  readonly peakTexture: { value: Texture };
+  private peaks: LightSum | undefined;
+  private hasPeaks = false;
+
+  constructor(private readonly make: () => LightSum) {
+    this.rest = make();
+    this.peakTexture = { value: this.rest.target.texture };
+  }
+
+  /** `light` is [column][3]. `eachIsLight`: so is every row, and is held at 0 or above by itself. */
+  set(light: ArrayLike<number>, peaks: ArrayLike<number> | undefined, eachIsLight: boolean): void {
+    this.hasPeaks = peaks !== undefined;
+    this.rest.set(light, eachIsLight && this.hasPeaks);
+    if (!peaks) return;
+    this.peaks ??= this.make();
+    this.peaks.set(peaks, eachIsLight);
+    this.peakTexture.value = this.peaks.target.texture;
+  }
+
+  update(renderer: WebGLRenderer): void {
+    this.rest.update(renderer);
+    if (this.hasPeaks) this.peaks!.update(renderer);
+  }
+
+  dispose(): void {
+    this.rest.dispose();
+    this.peaks?.dispose();
   }
 }

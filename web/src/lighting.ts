@@ -1,8 +1,9 @@
 // Distant light as coefficients of radiance, that can be turned without another projection.
 import { DataUtils, FloatType, HalfFloatType, LightProbe, Matrix4, Quaternion, type Texture } from 'three';
 import { LambentError } from './errors.js';
+import { withoutPeaks } from './peaks.js';
 import { projectLatLong, type LatLongMap } from './projection.js';
-import { maxShOrder, shBand, shCount, shIndex, shOrder } from './sh.js';
+import { luminance, maxShOrder, shBand, shCount, shIndex, shOrder } from './sh.js';
 import { makeShRotation, rotateSh, type ShRotation } from './sh_rotation.js';
 import { shWindow, type ShWindow } from './sh_window.js';
 
@@ -37,11 +38,22 @@ export function latLongMap(texture: Texture): LatLongMap {
   return { data: flipped, width, height, channels };
 }
 
+/** With less of all light in them, peaks ring too little to be seen. */
+const leastSharp = 0.05;
+
+/** Light as transfer takes it: [coefficient][3]. Both parts are light, and neither may be negative where it arrives. */
+export interface LightParts {
+  /** All of the light; of one that has peaks, the rest of it. */
+  rest: Float64Array;
+  /** What is too sharp for the bands, and rings; undefined where that is left as it is, or is little. */
+  peaks: Float64Array | undefined;
+}
+
 export class Lighting {
   /** Turns the light: radiance from d becomes that from rotation * d. */
   readonly rotation = new Quaternion();
-  /** Against ringing. */
-  window: ShWindow = 'none';
+  /** Against ringing; `auto` keeps it from shadows as well, where the light comes from a map (docs/deringing.md). */
+  window: ShWindow = 'auto';
   /** Bands to use of those there are. */
   bands: number;
   /** Multiplies radiance. */
@@ -49,9 +61,16 @@ export class Lighting {
 
   readonly order: number;
   private windowFactors: { key: string; factors: number[] } | undefined;
+  private readonly restOf = new Map<number, Float64Array | undefined>();
 
-  /** `radiance`: order^2 RGB coefficients, [coefficient][3], in lambent's convention (docs/conventions.md). */
-  constructor(readonly radiance: ArrayLike<number>) {
+  /**
+   * `radiance`: order^2 RGB coefficients, [coefficient][3], in lambent's convention (docs/conventions.md). `map`: what
+   * they are of, which coefficients alone do not tell.
+   */
+  constructor(
+    readonly radiance: ArrayLike<number>,
+    private readonly map?: LatLongMap,
+  ) {
     this.order = this.bands = shOrder(radiance.length / 3);
     for (let i = 0; i < radiance.length; ++i)
       if (!Number.isFinite(radiance[i]!)) throw new LambentError('a light coefficient is not a finite number');
@@ -59,7 +78,11 @@ export class Lighting {
 
   /** From an equirectangular texture in memory, as three's HDRLoader and EXRLoader make it; `order` bands are kept. */
   static fromEquirectangular(texture: Texture, order = maxShOrder): Lighting {
-    return new Lighting(projectLatLong(latLongMap(texture), order));
+    return Lighting.fromMap(latLongMap(texture), order);
+  }
+
+  static fromMap(map: LatLongMap, order = maxShOrder): Lighting {
+    return new Lighting(projectLatLong(map, order), map);
   }
 
   /** From a three.js probe: three bands, its intensity included. */
@@ -75,13 +98,57 @@ export class Lighting {
     return probe;
   }
 
-  /** order^2 RGB coefficients, turned, windowed and scaled; zero beyond the bands in use. */
+  /**
+   * order^2 RGB coefficients, turned, windowed and scaled; zero beyond the bands in use. For open surfaces: `auto` is as
+   * weak a window as keeps those from going dark.
+   */
   coefficients(order: number): Float64Array {
-    const n = Math.max(1, Math.min(order, this.bands, this.order));
+    const n = this.bandsOf(order);
+    return this.turned(this.radiance, this.rotationOf(n), this.factors(n), order);
+  }
+
+  /**
+   * The same for what knows its shadows: `auto` takes peaks apart where there are any. `glossy`, of surfaces that
+   * reflect a part of the sky at a time: those peaks get a Lanczos window.
+   */
+  parts(order: number, glossy = false): LightParts {
+    const n = this.bandsOf(order);
+    if (this.window !== 'auto' || !this.map || n < 2) return { rest: this.coefficients(order), peaks: undefined };
+    const whole = new Array<number>(n).fill(1),
+      rotation = this.rotationOf(n),
+      rest = this.rest(n);
+    if (!rest) return { rest: this.turned(this.radiance, rotation, whole, order), peaks: undefined };
+    const peaks = rest.map((v, i) => this.radiance[i]! - v);
+    return {
+      rest: this.turned(rest, rotation, whole, order),
+      peaks: this.turned(peaks, rotation, glossy ? shWindow('lanczos', peaks) : whole, order),
+    };
+  }
+
+  /** Radiance without its peaks in n bands, not turned; undefined where too little of the light is in them. */
+  private rest(n: number): Float64Array | undefined {
+    if (!this.restOf.has(n)) {
+      const rest = projectLatLong(withoutPeaks(this.map!, n), n),
+        light = (of: ArrayLike<number>): number => luminance(of[0]!, of[1]!, of[2]!);
+      this.restOf.set(n, light(this.radiance) - light(rest) > leastSharp * light(this.radiance) ? rest : undefined);
+    }
+    return this.restOf.get(n);
+  }
+
+  private bandsOf(order: number): number {
+    return Math.max(1, Math.min(order, this.bands, this.order));
+  }
+
+  private turned(
+    radiance: ArrayLike<number>,
+    rotation: ShRotation,
+    factors: ArrayLike<number>,
+    order: number,
+  ): Float64Array {
     const light = new Float64Array(3 * shCount(order));
-    rotateSh(this.rotationOf(n), this.radiance, light);
-    const factors = this.factors(n);
-    for (let i = 0; i < 3 * shCount(n); ++i) light[i]! *= factors[shBand(Math.floor(i / 3))]! * this.intensity;
+    rotateSh(rotation, radiance, light);
+    for (let i = 0; i < 3 * shCount(factors.length); ++i)
+      light[i]! *= factors[shBand(Math.floor(i / 3))]! * this.intensity;
     return light;
   }
 

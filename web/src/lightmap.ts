@@ -36,8 +36,8 @@ import {
 } from './header.js';
 import type { BakedTransfer, TransferSource } from './kinds.js';
 import type { Lighting } from './lighting.js';
-import { afterAll, LightSum, maxColumns } from './light_sum.js';
-import { diffuseParameters, replaceOnce, useExitRadiance } from './prt_material.js';
+import { afterAll, LightSum, LightSums, maxColumns } from './light_sum.js';
+import { diffuseParameters, replaceOnce, setPeaks, useExitRadiance } from './prt_material.js';
 import { drawFilter, type Drawn } from './see_through.js';
 import { shCount } from './sh.js';
 
@@ -92,11 +92,12 @@ const vertexBody = /* glsl */ `
  * (transfer/directional.cpp).
  */
 const evaluations: Record<Directional, string> = {
-  none: 'return prtRowAt( place, 0 );',
+  none: '', // not asked for
   'sh:2': '',
   'sh:3': '', // below
-  vector:
-    'return max( n.x * prtRowAt( place, 0 ) + n.y * prtRowAt( place, 1 ) + n.z * prtRowAt( place, 2 ), vec3( 0.0 ) );',
+  vector: `
+  return max( n.x * prtRowAt( atlas, place, 0 ) + n.y * prtRowAt( atlas, place, 1 ) + n.z * prtRowAt( atlas, place, 2 ),
+              vec3( 0.0 ) );`,
   hl2: `
   // Half-Life 2's directions in the frame about the surface's normal (frame_about of core/vec.h).
   float side = N.z < 0.0 ? - 1.0 : 1.0, a = - 1.0 / ( side + N.z ), b = N.x * N.y * a;
@@ -108,17 +109,21 @@ const evaluations: Record<Directional, string> = {
   vec3 w = cosines * cosines;
   float total = w.x + w.y + w.z;
   if ( ! ( total > 0.0 ) ) return vec3( 0.0 );
-  return ( w.x * prtRowAt( place, 0 ) + w.y * prtRowAt( place, 1 ) + w.z * prtRowAt( place, 2 ) ) / total;`,
+  return ( w.x * prtRowAt( atlas, place, 0 ) + w.y * prtRowAt( atlas, place, 1 ) + w.z * prtRowAt( atlas, place, 2 ) ) /
+         total;`,
 };
 const evaluation = (kind: Directional): string =>
   kind !== 'sh:2' && kind !== 'sh:3'
     ? evaluations[kind]
     : `vec3 sum = vec3( 0.0 );
-  ${glslHarmonics(Number(kind[3]), (i, y) => `sum += ( ${y} ) * prtRowAt( place, ${i} );`)}
+  ${glslHarmonics(Number(kind[3]), (i, y) => `sum += ( ${y} ) * prtRowAt( atlas, place, ${i} );`)}
   return max( sum, vec3( 0.0 ) );`;
 
 const fragmentDeclarations = (kind: Directional): string => /* glsl */ `
 uniform highp sampler2D prtAtlas;
+#ifdef PRT_PEAKS
+  uniform highp sampler2D prtPeakAtlas;
+#endif
 uniform vec3 prtEmission;
 varying vec2 vPrtFront;
 #ifdef PRT_TWO_SIDED
@@ -140,12 +145,12 @@ varying vec2 vPrtFront;
   varying vec2 vPrtEmissivePlace;
 #endif
 // Rows lie below each other.
-vec3 prtRowAt( const in vec2 place, const in int row ) {
-  vec2 size = vec2( textureSize( prtAtlas, 0 ) );
-  return texture( prtAtlas, ( place + vec2( 0.0, size.y / float( PRT_ATLAS_ROWS ) * float( row ) ) ) / size ).rgb;
+vec3 prtRowAt( highp sampler2D atlas, const in vec2 place, const in int row ) {
+  vec2 size = vec2( textureSize( atlas, 0 ) );
+  return texture( atlas, ( place + vec2( 0.0, size.y / float( PRT_ATLAS_ROWS ) * float( row ) ) ) / size ).rgb;
 }
 #ifdef PRT_DIRECTIONAL
-  vec3 prtEvaluate( const in vec2 place, const in vec3 N, const in vec3 n ) {
+  vec3 prtEvaluate( highp sampler2D atlas, const in vec2 place, const in vec3 N, const in vec3 n ) {
     ${evaluation(kind)}
   }
   // The part of v that is square to n, as a unit vector; zero where v is nearly along n.
@@ -162,7 +167,11 @@ vec3 prtExitRadiance() {
     if ( ! gl_FrontFacing ) place = vPrtBack;
   #endif
   #ifndef PRT_DIRECTIONAL
-    return prtRowAt( place, 0 );
+    vec3 sum = prtRowAt( prtAtlas, place, 0 );
+    #ifdef PRT_PEAKS
+      sum += prtRowAt( prtPeakAtlas, place, 0 );
+    #endif
+    return sum;
   #else
     // Of the front: the normal, turned to its face's side, and what the normal map makes of it (scene/reflection.cpp).
     vec3 px = dFdx( vPrtPosition ), py = dFdy( vPrtPosition ), n = normalize( vPrtNormal );
@@ -187,7 +196,11 @@ vec3 prtExitRadiance() {
         bent = normalize( t * texel.x + cross( n, t ) * ( along.w > 0.0 ? texel.y : - texel.y ) + n * texel.z );
       }
     #endif
-    return prtEvaluate( place, side * n, side * bent );
+    vec3 sum = prtEvaluate( prtAtlas, place, side * n, side * bent );
+    #ifdef PRT_PEAKS
+      sum += prtEvaluate( prtPeakAtlas, place, side * n, side * bent );
+    #endif
+    return sum;
   #endif
 }
 vec3 prtEmitted() {
@@ -245,7 +258,7 @@ function readSurface(
 
 class LightmapMaterial extends MeshBasicMaterial {
   constructor(
-    readonly atlas: LightSum,
+    readonly atlas: LightSums,
     readonly directional: Directional,
     readonly surface: Surface,
     source: Material,
@@ -274,7 +287,11 @@ class LightmapMaterial extends MeshBasicMaterial {
     const { emission, normals, emissive } = this.surface;
     Object.assign(
       shader.uniforms,
-      { prtAtlas: { value: this.atlas.target.texture }, prtEmission: emission },
+      {
+        prtAtlas: { value: this.atlas.rest.target.texture },
+        prtPeakAtlas: this.atlas.peakTexture,
+        prtEmission: emission,
+      },
       this.gain && { prtGain: this.gain },
       normals && {
         prtNormalMap: { value: normals.texture },
@@ -318,9 +335,9 @@ class LightmapTransfer implements BakedTransfer {
   private readonly directional: Directional;
   private readonly layout: BlockLayout;
   private readonly transfer: DataArrayTexture;
-  private readonly atlas: LightSum;
+  private readonly atlas: LightSums;
   private readonly materials: LightmapMaterial[] = [];
-  private readonly ofCoefficients = new Set<LightSum>();
+  private readonly ofCoefficients = new Set<LightSums>();
   private readonly glow: { emission: { value: Color }; own: Color; lamp: string }[] = [];
 
   constructor(
@@ -342,9 +359,9 @@ class LightmapTransfer implements BakedTransfer {
     const { layout, data } = packBlocks({ ...header, count, channels: rows * header.channels }, values);
     this.layout = layout;
     this.transfer = blockTexture(layout, data);
-    this.atlas = this.makeAtlas();
+    this.atlas = new LightSums(() => this.makeAtlas());
     const { width, height } = receiversOf.image;
-    let gpuBytes = data.byteLength + this.atlas.bytes + 4 * width * height;
+    let gpuBytes = data.byteLength + this.atlas.rest.bytes + 4 * width * height;
     meshes.forEach((mesh, i) => {
       const own = owns[i]! as Material & Partial<MeshStandardMaterial>,
         surface = readSurface(mesh.geometry, own, header.directional);
@@ -386,13 +403,20 @@ uint prtPick( const in ivec2 texel, out int row ) {
   }
 
   check(renderer: WebGLRenderer): void {
-    this.atlas.check(renderer);
+    this.atlas.rest.check(renderer);
   }
 
   relight(lighting: Lighting): void {
     const lamps = [...this.lamps];
-    for (const atlas of this.ofCoefficients) atlas.refresh(); // a lost context has taken what was drawn
-    this.atlas.set([...lighting.coefficients(this.order), ...lamps.flatMap(([, color]) => color.toArray())]);
+    for (const { rest } of this.ofCoefficients) rest.refresh(); // a lost context has taken what was drawn
+    // The scene's own lamps are in none of the peaks.
+    const { rest, peaks } = lighting.parts(this.order);
+    this.atlas.set(
+      [...rest, ...lamps.flatMap(([, color]) => color.toArray())],
+      peaks ? [...peaks, ...new Array<number>(3 * lamps.length).fill(0)] : undefined,
+      this.directional === 'none' || this.directional === 'hl2',
+    );
+    for (const material of this.materials) setPeaks(material, peaks !== undefined);
     // One column is of all lamps together; else materials that glow have one of their name.
     for (const { emission, own, lamp } of this.glow) {
       const scale = lamps.length === 1 ? lamps[0]![1] : this.lamps.get(lamp);
@@ -402,8 +426,12 @@ uint prtPick( const in ivec2 texel, out int row ) {
   }
 
   coefficientMaterials(index: number, gain: { value: number }): Material[] {
-    const atlas = this.makeAtlas();
-    atlas.set(new Float64Array(3 * (shCount(this.order) + this.lamps.size)).fill(1, 3 * index, 3 * index + 3));
+    const atlas = new LightSums(() => this.makeAtlas());
+    atlas.set(
+      new Float64Array(3 * (shCount(this.order) + this.lamps.size)).fill(1, 3 * index, 3 * index + 3),
+      undefined,
+      false,
+    );
     this.ofCoefficients.add(atlas);
     const made = this.meshes.map(
       (_, i) =>

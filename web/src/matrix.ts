@@ -20,7 +20,7 @@ import { LambentError } from './errors.js';
 import { readHeader, type TransferHeader } from './header.js';
 import { limits, type BakedTransfer, type TransferKind, type TransferSource } from './kinds.js';
 import type { Lighting } from './lighting.js';
-import { afterAll, LightSum } from './light_sum.js';
+import { afterAll, LightSum, LightSums } from './light_sum.js';
 import {
   checkReflection,
   glossFragmentDeclarations,
@@ -36,7 +36,7 @@ import {
   rowWidth,
   type LastReflection,
 } from './outgoing.js';
-import { diffuseParameters, replaceOnce, useExitRadiance } from './prt_material.js';
+import { diffuseParameters, replaceOnce, setPeaks, useExitRadiance } from './prt_material.js';
 import { drawFilter, type Drawn } from './see_through.js';
 import { shCount } from './sh.js';
 import { bindPart } from './vertex_transfer.js';
@@ -54,11 +54,18 @@ vec3 prtRow( const in int r, const in int row ) {
   int i = r * PRT_SUM_ROWS + row;
   return texelFetch( prtRows, ivec2( i % ${rowWidth}, i / ${rowWidth} ), 0 ).rgb;
 }
+#ifdef PRT_PEAKS
+  uniform highp sampler2D prtPeakRows;
+  vec3 prtPeakRow( const in int r, const in int row ) {
+    int i = r * PRT_SUM_ROWS + row;
+    return texelFetch( prtPeakRows, ivec2( i % ${rowWidth}, i / ${rowWidth} ), 0 ).rgb;
+  }
+#endif
 ${glslReflect(shared.outgoing, false)}`;
 
 class MatrixMaterial extends MeshBasicMaterial {
   constructor(
-    readonly sum: LightSum,
+    readonly sums: LightSums,
     readonly shared: LastReflection,
     twoSided: boolean,
     source: Material,
@@ -74,14 +81,14 @@ class MatrixMaterial extends MeshBasicMaterial {
   }
 
   override onBeforeRender(...drawn: Drawn): void {
-    this.sum.update(drawn[0]);
+    this.sums.update(drawn[0]);
     drawFilter(this, ...drawn);
   }
 
   override onBeforeCompile(shader: WebGLProgramParametersWithUniforms): void {
     Object.assign(
       shader.uniforms,
-      { prtRows: { value: this.sum.target.texture } },
+      { prtRows: { value: this.sums.rest.target.texture }, prtPeakRows: this.sums.peakTexture },
       reflectionUniforms(this.shared),
       this.gain && { prtGain: this.gain },
     );
@@ -110,9 +117,9 @@ class MatrixTransfer implements BakedTransfer {
   readonly gpuBytes: number;
   private readonly layout: BlockLayout;
   private readonly transfer: DataArrayTexture;
-  private readonly sum: LightSum;
+  private readonly sums: LightSums;
   private readonly materials = new Map<string, MatrixMaterial>();
-  private readonly ofCoefficients = new Set<LightSum>();
+  private readonly ofCoefficients = new Set<LightSums>();
 
   constructor(
     header: TransferHeader,
@@ -130,14 +137,14 @@ class MatrixTransfer implements BakedTransfer {
     );
     this.layout = layout;
     this.transfer = blockTexture(layout, data);
-    this.sum = this.makeSum();
-    let gpuBytes = data.byteLength + this.sum.bytes + reflectionBytes(shared);
+    this.sums = new LightSums(() => this.makeSum());
+    let gpuBytes = data.byteLength + this.sums.rest.bytes + reflectionBytes(shared);
     for (const mesh of meshes) {
       const twoSided = mesh.geometry.hasAttribute('lambentReceiverBack'),
         source = mesh.material as Material,
         key = `${source.uuid} ${twoSided}`;
       gpuBytes += mesh.geometry.getAttribute('position').count * (twoSided ? 8 : 4);
-      const material = this.materials.get(key) ?? new MatrixMaterial(this.sum, shared, twoSided, source);
+      const material = this.materials.get(key) ?? new MatrixMaterial(this.sums, shared, twoSided, source);
       this.materials.set(key, material);
       mesh.material = material;
     }
@@ -168,12 +175,12 @@ uint prtPick( const in ivec2 texel, out int row ) {
   }
 
   check(renderer: WebGLRenderer): void {
-    this.sum.check(renderer);
+    this.sums.rest.check(renderer);
     checkReflection(this.shared, renderer);
     const { maxVertexTextures } = renderer.capabilities;
     const wanted = Math.max(
       ...this.meshes.map(
-        (mesh) => 3 + Number('isSkinnedMesh' in mesh) + Number(Object.keys(mesh.geometry.morphAttributes).length > 0),
+        (mesh) => 4 + Number('isSkinnedMesh' in mesh) + Number(Object.keys(mesh.geometry.morphAttributes).length > 0),
       ),
     );
     if (maxVertexTextures < wanted)
@@ -184,30 +191,32 @@ uint prtPick( const in ivec2 texel, out int row ) {
   }
 
   relight(lighting: Lighting): void {
-    for (const sum of this.ofCoefficients) sum.refresh();
-    this.sum.set(lighting.coefficients(this.order));
+    for (const { rest } of this.ofCoefficients) rest.refresh();
+    const { rest, peaks } = lighting.parts(this.order, true);
+    this.sums.set(rest, peaks, false);
+    for (const material of this.materials.values()) setPeaks(material, peaks !== undefined);
   }
 
   coefficientMaterials(index: number, gain: { value: number }): Material[] {
-    const sum = this.makeSum();
-    sum.set(new Float64Array(3 * shCount(this.order)).fill(1, 3 * index, 3 * index + 3));
-    this.ofCoefficients.add(sum);
+    const sums = new LightSums(() => this.makeSum());
+    sums.set(new Float64Array(3 * shCount(this.order)).fill(1, 3 * index, 3 * index + 3), undefined, false);
+    this.ofCoefficients.add(sums);
     const made = this.meshes.map(
       (mesh) =>
         new MatrixMaterial(
-          sum,
+          sums,
           this.shared,
           mesh.geometry.hasAttribute('lambentReceiverBack'),
           mesh.material as Material,
           gain,
         ),
     );
-    afterAll(made, () => (this.ofCoefficients.delete(sum), sum.dispose()));
+    afterAll(made, () => (this.ofCoefficients.delete(sums), sums.dispose()));
     return made;
   }
 
   dispose(): void {
-    for (const sum of [this.sum, ...this.ofCoefficients]) sum.dispose();
+    for (const sums of [this.sums, ...this.ofCoefficients]) sums.dispose();
     this.transfer.dispose();
     this.shared.frames.dispose();
     this.shared.maps.dispose();

@@ -60,8 +60,11 @@ export function packMaps(grid: number, maps: number, rows: number, values: Uint1
   return out;
 }
 
-/** GLSL that adds to gloss (a X) and coloured (b X), given r, `wo` in the receiver's frame and its `view_map`. */
-function weighRows({ kind, order, hasB }: Outgoing): string {
+/**
+ * GLSL that adds to gloss (a X) and coloured (b X), given r, `wo` in the receiver's frame and its `view_map`; `row`
+ * gives X.
+ */
+function weighRows({ kind, order, hasB }: Outgoing, row: string): string {
   const n = shCount(order);
   if (kind === 'map' || kind === 'svd')
     return `
@@ -71,27 +74,40 @@ function weighRows({ kind, order, hasB }: Outgoing): string {
     int tile = view_map * PRT_SUM_ROWS + row;
     vec2 corner = vec2( float( tile % PRT_ACROSS ), float( tile / PRT_ACROSS ) ) * float( PRT_GRID );
     vec4 w = textureLod( prtMaps, ( corner + place ) / size, 0.0 );
-    vec3 x = prtRow( r, row );
+    vec3 x = ${row}( r, row );
     gloss += w.rgb * x, coloured += w.a * x;
   }`;
   if (kind === 'phong')
     return `
   vec3 n = vec3( - wo.xy, wo.z );
-  ${glslHarmonics(order, (i, y) => `gloss += ( ${y} ) * prtRow( r, ${i} );`)}
-  gloss += prtRow( r, ${n} );
-  ${hasB ? `coloured += prtRow( r, ${n + 1} );` : ''}`;
+  ${glslHarmonics(order, (i, y) => `gloss += ( ${y} ) * ${row}( r, ${i} );`)}
+  gloss += ${row}( r, ${n} );
+  ${hasB ? `coloured += ${row}( r, ${n + 1} );` : ''}`;
   const scale = kind === 'hsh' ? `${Math.SQRT2} * ` : '';
   return `
   vec3 n = ${kind === 'hsh' ? 'vec3( 2.0 * sqrt( wo.z / ( 1.0 + wo.z ) ) * wo.xy, 2.0 * wo.z - 1.0 )' : 'wo'};
   ${glslHarmonics(order, (i, y) => {
-    const gloss = `gloss += ( ${scale}${y} ) * prtRow( r, ${i} );`;
-    return hasB ? `${gloss} coloured += ( ${scale}${y} ) * prtRow( r, ${n + i} );` : gloss;
+    const gloss = `gloss += ( ${scale}${y} ) * ${row}( r, ${i} );`;
+    return hasB ? `${gloss} coloured += ( ${scale}${y} ) * ${row}( r, ${n + i} );` : gloss;
   })}`;
 }
 
+const reflect = (outgoing: Outgoing, turns: boolean, name: string, row: string): string => /* glsl */ `
+void ${name}( const in uint receiver, const in vec3 view, out vec3 gloss, out vec3 coloured ) {
+  gloss = coloured = vec3( 0.0 );
+  if ( receiver == 0xffffffffu ) return;
+  int r = int( receiver ), i = 2 * r;
+  vec4 tangent = texelFetch( prtFrames, ivec2( i % ${rowWidth}, i / ${rowWidth} ), 0 );
+  vec3 normal = texelFetch( prtFrames, ivec2( ( i + 1 ) % ${rowWidth}, ( i + 1 ) / ${rowWidth} ), 0 ).xyz;
+  vec3 wo = view * ( ${turns ? 'prtFrame * ' : ''}mat3( tangent.xyz, cross( normal, tangent.xyz ), normal ) );
+  if ( wo.z < 0.0 ) wo = dot( wo.xy, wo.xy ) > 0.0 ? vec3( normalize( wo.xy ), 0.0 ) : vec3( 0.0, 0.0, 1.0 );
+  int view_map = int( tangent.w );
+  ${weighRows(outgoing, row)}
+}`;
+
 /**
  * GLSL: prtReflect( receiver, view, out gloss, out coloured ), from vec3 prtRow( receiver, row ); with `turns`, frames
- * turned by prtFrame.
+ * turned by prtFrame. Where there is PRT_PEAKS, prtPeakReflect from prtPeakRow as well.
  */
 export const glslReflect = (outgoing: Outgoing, turns: boolean): string => /* glsl */ `
 uniform highp sampler2D prtFrames;
@@ -106,23 +122,22 @@ vec2 prtSquare( const in vec3 wo ) {
   else ab.y = sign( d.y ) * radius, ab.x = ab.y * 1.2732395447 * atan( d.x / d.y );
   return clamp( 0.5 * ( ab + 1.0 ), 0.0, 1.0 );
 }
-void prtReflect( const in uint receiver, const in vec3 view, out vec3 gloss, out vec3 coloured ) {
-  gloss = coloured = vec3( 0.0 );
-  if ( receiver == 0xffffffffu ) return;
-  int r = int( receiver ), i = 2 * r;
-  vec4 tangent = texelFetch( prtFrames, ivec2( i % ${rowWidth}, i / ${rowWidth} ), 0 );
-  vec3 normal = texelFetch( prtFrames, ivec2( ( i + 1 ) % ${rowWidth}, ( i + 1 ) / ${rowWidth} ), 0 ).xyz;
-  vec3 wo = view * ( ${turns ? 'prtFrame * ' : ''}mat3( tangent.xyz, cross( normal, tangent.xyz ), normal ) );
-  if ( wo.z < 0.0 ) wo = dot( wo.xy, wo.xy ) > 0.0 ? vec3( normalize( wo.xy ), 0.0 ) : vec3( 0.0, 0.0, 1.0 );
-  int view_map = int( tangent.w );
-  ${weighRows(outgoing)}
-}
+${reflect(outgoing, turns, 'prtReflect', 'prtRow')}
+#ifdef PRT_PEAKS
+  ${reflect(outgoing, turns, 'prtPeakReflect', 'prtPeakRow')}
+#endif
 `;
 
 export const glossVaryings = /* glsl */ `
 varying vec3 vPrtGloss;
 #ifdef PRT_TWO_SIDED
   varying vec3 vPrtBackGloss;
+#endif
+#ifdef PRT_PEAKS
+  varying vec3 vPrtPeak, vPrtPeakGloss;
+  #ifdef PRT_TWO_SIDED
+    varying vec3 vPrtBackPeak, vPrtBackPeakGloss;
+  #endif
 #endif
 `;
 
@@ -132,6 +147,12 @@ export const glossVertexBody = /* glsl */ `
   prtReflect( lambentReceiver, prtView, vPrtGloss, vPrtFront );
   #ifdef PRT_TWO_SIDED
     prtReflect( lambentReceiverBack, prtView, vPrtBackGloss, vPrtBack );
+  #endif
+  #ifdef PRT_PEAKS
+    prtPeakReflect( lambentReceiver, prtView, vPrtPeakGloss, vPrtPeak );
+    #ifdef PRT_TWO_SIDED
+      prtPeakReflect( lambentReceiverBack, prtView, vPrtBackPeakGloss, vPrtBackPeak );
+    #endif
   #endif
 `;
 
@@ -144,6 +165,17 @@ varying vec3 vPrtFront, vPrtGloss;
 #else
   vec3 prtExitRadiance() { return vPrtFront; }
   vec3 prtGloss() { return vPrtGloss; }
+#endif
+#ifdef PRT_PEAKS
+  varying vec3 vPrtPeak, vPrtPeakGloss;
+  #ifdef PRT_TWO_SIDED
+    varying vec3 vPrtBackPeak, vPrtBackPeakGloss;
+    vec3 prtPeakExitRadiance() { return gl_FrontFacing ? vPrtPeak : vPrtBackPeak; }
+    vec3 prtPeakGloss() { return gl_FrontFacing ? vPrtPeakGloss : vPrtBackPeakGloss; }
+  #else
+    vec3 prtPeakExitRadiance() { return vPrtPeak; }
+    vec3 prtPeakGloss() { return vPrtPeakGloss; }
+  #endif
 #endif
 `;
 

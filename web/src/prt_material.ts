@@ -42,12 +42,23 @@ export function diffuseParameters(source: Material): MeshBasicMaterialParameters
   return glassParameters(source, own);
 }
 
+/** Compiles a material for light with peaks, or for light without. */
+export function setPeaks(material: Material, on: boolean): void {
+  const defines = (material.defines ??= {});
+  if ('PRT_PEAKS' in defines === on) return;
+  if (on) defines['PRT_PEAKS'] = '';
+  else delete defines['PRT_PEAKS'];
+  material.needsUpdate = true;
+}
+
 /** Uniforms that all materials of one file share. */
 export interface PrtUniforms {
   /** block_texture.ts */
   prtTransfer: { value: DataArrayTexture };
   /** 3 ceil(order^2 / 4) vec4: coefficients of red, then green, then blue, padded with zeros. */
   prtLight: { value: Float32Array };
+  /** The same of the light's peaks; prtLight is the rest then. */
+  prtPeaks: { value: Float32Array };
   [name: string]: { value: unknown };
 }
 
@@ -56,8 +67,8 @@ export interface PrtShader {
   /** Of programs: the same for the same GLSL. */
   key: string;
   /**
-   * Defines vec3 prtRadiance( uint receiver ), from prtValues( receiver, k ), prtLight and prtFrame; with `gloss`,
-   * prtReflect in its place (outgoing.ts).
+   * Defines vec3 prtRadiance( uint receiver ), from prtValues( receiver, k ), prtLight and prtFrame, and where there is
+   * PRT_PEAKS prtPeaks; with `gloss`, prtReflect in its place (outgoing.ts).
    */
   radiance: string;
   gloss?: boolean;
@@ -91,6 +102,13 @@ varying vec3 vPrtFront;
 #endif
 uniform highp sampler2DArray prtTransfer;
 uniform vec4 prtLight[ 3 * PRT_LIGHT_QUADS ];
+#ifdef PRT_PEAKS
+  uniform vec4 prtPeaks[ 3 * PRT_LIGHT_QUADS ];
+#endif
+// Light is not negative, nor is what a part of it gives (relight/dering.h).
+vec3 prtHeld( const in vec3 rest, const in vec3 peaks ) {
+  return max( rest, vec3( 0.0 ) ) + max( peaks, vec3( 0.0 ) );
+}
 
 // Values 4k .. 4k + 3 of a receiver.
 vec4 prtValues( const in uint receiver, const in int k ) {
@@ -176,7 +194,7 @@ vec3 prtExitRadiance() {
 
 /**
  * three's own fragment shader with prtExitRadiance() for white. `addsGloss`: and with prtGloss(), which base colour
- * does not tint; then both may be negative, and only their sum is clamped.
+ * does not tint; then both may be negative, and only their sum is clamped, that of the light's peaks by itself.
  */
 export function useExitRadiance(
   fragmentShader: string,
@@ -189,10 +207,16 @@ export function useExitRadiance(
     falseColorScale +
     declarations +
     replaceOnce(fragmentShader, whiteLine, `reflectedLight.indirectDiffuse += ${radiance};`);
+  const gloss = `#ifdef PRT_PEAKS
+    outgoingLight = max( outgoingLight + prtGloss(), vec3( 0.0 ) ) +
+                    max( diffuseColor.rgb * prtPeakExitRadiance() + prtPeakGloss(), vec3( 0.0 ) );
+  #else
+    outgoingLight = max( outgoingLight + prtGloss(), vec3( 0.0 ) );
+  #endif`;
   const last = falseColor
     ? `outgoingLight = prtScale( prtGain * luminance( prtExitRadiance()${addsGloss ? ' + prtGloss()' : ''} ) );`
     : addsGloss
-      ? 'outgoingLight = max( outgoingLight + prtGloss(), vec3( 0.0 ) );'
+      ? gloss
       : '';
   return last ? replaceOnce(lit, '#include <opaque_fragment>', `${last}\n#include <opaque_fragment>`) : lit;
 }

@@ -1,7 +1,7 @@
 // Windows against ringing, as factors a band (docs/theory.md).
 import { clampedCosine, evaluateSh, luminance, shBand, shCount, shOrder } from './sh.js';
 
-export const shWindows = ['none', 'hann', 'lanczos', 'auto'] as const;
+export const shWindows = ['auto', 'hann', 'lanczos', 'none'] as const;
 export type ShWindow = (typeof shWindows)[number];
 
 /**

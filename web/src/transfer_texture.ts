@@ -121,7 +121,7 @@ vec3 prtBand( const in vec3 n, const in int l ) {
   float y = ( at.y + float( ${tableHeight} * l ) + 0.5 ) / ${tableHeight * Math.max(1, bands)}.0;
   return textureLod( prtTable, vec2( at.x + ${0.5 / tableWidth}, y ), 0.0 ).rgb;
 }
-${zonalSum(order, lobes, channels, true)}
+${zonalSum(order, lobes, channels, { table: true })}
 vec4 prtTexel( const in ivec2 place, const in int k ) {
   ivec2 p = ivec2( ( place.x + ${width} ) % ${width}, ( place.y + ${height} ) % ${height} );
   int r = p.y * ${width} + p.x;

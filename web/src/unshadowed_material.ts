@@ -4,7 +4,7 @@
 import { MeshBasicMaterial, type WebGLProgramParametersWithUniforms, type MeshBasicMaterialParameters } from 'three';
 import { glslHarmonics } from './glsl_harmonics.js';
 import type { Lighting } from './lighting.js';
-import { replaceOnce, whiteLine } from './prt_material.js';
+import { replaceOnce, setPeaks, whiteLine } from './prt_material.js';
 import { drawFilter, type Drawn } from './see_through.js';
 import { clampedCosine, shBand, shCount } from './sh.js';
 
@@ -13,16 +13,17 @@ export const irradianceIndices = (order: number): number[] =>
   Array.from({ length: shCount(order) }, (_, i) => i).filter((i) => clampedCosine(shBand(i)) !== 0);
 
 /** GLSL that adds to `even` and `odd` the sums over harmonics of the normal `n`, by the recurrences of sh.ts. */
-export function glslIrradiance(order: number): string {
+export function glslIrradiance(order: number, light = 'irradianceLight'): string {
   const place = new Map(irradianceIndices(order).map((index, at) => [index, at]));
   return glslHarmonics(order, (index, value) => {
     const at = place.get(index);
-    return at === undefined ? '' : `${shBand(index) % 2 ? 'odd' : 'even'} += ${value} * irradianceLight[ ${at} ];`;
+    return at === undefined ? '' : `${shBand(index) % 2 ? 'odd' : 'even'} += ${value} * ${light}[ ${at} ];`;
   });
 }
 
 export class UnshadowedMaterial extends MeshBasicMaterial {
   private readonly light: { value: Float32Array };
+  private readonly peaks: { value: Float32Array };
 
   constructor(
     readonly order: number,
@@ -30,14 +31,18 @@ export class UnshadowedMaterial extends MeshBasicMaterial {
   ) {
     super(parameters);
     this.light = { value: new Float32Array(3 * irradianceIndices(order).length) };
+    this.peaks = { value: new Float32Array(this.light.value.length) };
   }
 
   relight(lighting: Lighting): void {
-    const light = lighting.coefficients(this.order);
-    irradianceIndices(this.order).forEach((index, at) => {
-      for (let c = 0; c < 3; ++c)
-        this.light.value[3 * at + c] = (light[3 * index + c]! * clampedCosine(shBand(index))) / Math.PI;
-    });
+    const { rest, peaks } = lighting.parts(this.order);
+    const pack = (out: Float32Array, light: ArrayLike<number>): void =>
+      irradianceIndices(this.order).forEach((index, at) => {
+        for (let c = 0; c < 3; ++c) out[3 * at + c] = (light[3 * index + c]! * clampedCosine(shBand(index))) / Math.PI;
+      });
+    pack(this.light.value, rest);
+    if (peaks) pack(this.peaks.value, peaks);
+    setPeaks(this, peaks !== undefined);
   }
 
   override onBeforeRender(...drawn: Drawn): void {
@@ -46,13 +51,30 @@ export class UnshadowedMaterial extends MeshBasicMaterial {
 
   override onBeforeCompile(shader: WebGLProgramParametersWithUniforms): void {
     shader.uniforms['irradianceLight'] = this.light;
+    shader.uniforms['irradiancePeaks'] = this.peaks;
     const count = irradianceIndices(this.order).length;
-    const declarations = `uniform vec3 irradianceLight[ ${count} ];\nvarying vec3 vEven;\nvarying vec3 vOdd;\n`;
+    const declarations = `
+uniform vec3 irradianceLight[ ${count} ];
+#ifdef PRT_PEAKS
+  uniform vec3 irradiancePeaks[ ${count} ];
+  void peakIrradiance( const in vec3 n, out vec3 even, out vec3 odd ) {
+    even = odd = vec3( 0.0 );
+    ${glslIrradiance(this.order, 'irradiancePeaks')}
+  }
+#endif
+varying vec3 vFront, vBack;
+`;
     const body = `
   vec3 n = normalize( ( vec4( transformedNormal, 0.0 ) * viewMatrix ).xyz );
   vec3 even = vec3( 0.0 ), odd = vec3( 0.0 );
   ${glslIrradiance(this.order)}
-  vEven = even; vOdd = odd;`;
+  vFront = even + odd; vBack = even - odd;
+  #ifdef PRT_PEAKS
+    vec3 evenPeaks, oddPeaks;
+    peakIrradiance( n, evenPeaks, oddPeaks );
+    vFront = max( vFront, vec3( 0.0 ) ) + max( evenPeaks + oddPeaks, vec3( 0.0 ) );
+    vBack = max( vBack, vec3( 0.0 ) ) + max( evenPeaks - oddPeaks, vec3( 0.0 ) );
+  #endif`;
     const withNormals = replaceOnce(
       shader.vertexShader,
       '#if defined ( USE_ENVMAP ) || defined ( USE_SKINNING )',
@@ -62,11 +84,11 @@ export class UnshadowedMaterial extends MeshBasicMaterial {
       declarations + replaceOnce(withNormals, '#include <fog_vertex>', '#include <fog_vertex>' + body);
     // On the back the normal is the other way, and odd harmonics change sign.
     shader.fragmentShader =
-      'varying vec3 vEven;\nvarying vec3 vOdd;\n' +
+      'varying vec3 vFront, vBack;\n' +
       replaceOnce(
         shader.fragmentShader,
         whiteLine,
-        'reflectedLight.indirectDiffuse += max( gl_FrontFacing ? vEven + vOdd : vEven - vOdd, vec3( 0.0 ) );',
+        'reflectedLight.indirectDiffuse += max( gl_FrontFacing ? vFront : vBack, vec3( 0.0 ) );',
       );
   }
 

@@ -24,7 +24,14 @@ import type { Lighting } from './lighting.js';
 import { packLight } from './light_sum.js';
 import { surfaceFrame, type Lobe } from './lobes.js';
 import { checkReflection, reflectionBytes, reflectionUniforms, type LastReflection } from './outgoing.js';
-import { diffuseParameters, PrtMaterial, type PrtOptions, type PrtShader, type PrtUniforms } from './prt_material.js';
+import {
+  diffuseParameters,
+  PrtMaterial,
+  setPeaks,
+  type PrtOptions,
+  type PrtShader,
+  type PrtUniforms,
+} from './prt_material.js';
 import { shCount } from './sh.js';
 
 /** The part's mesh, its vertices with their receivers. */
@@ -85,6 +92,9 @@ vec3 prtRadiance( const in uint receiver ) {
 `,
 });
 
+/** Matrices, fog, morph targets and what else a MeshBasicMaterial has in its vertex shader. */
+const ownUniforms = 32;
+
 /** How a kind lays out and reads the values of a receiver. */
 export interface VertexKind {
   kind: string;
@@ -139,6 +149,7 @@ export class VertexTransfer implements BakedTransfer {
     this.uniforms = {
       prtTransfer: { value: this.texture },
       prtLight: { value: new Float32Array(12 * this.quads) },
+      prtPeaks: { value: new Float32Array(12 * this.quads) },
       ...(last && reflectionUniforms(last)),
     };
     let gpuBytes = data.byteLength + (last ? reflectionBytes(last) : 0);
@@ -211,6 +222,13 @@ export class VertexTransfer implements BakedTransfer {
 
   check(renderer: WebGLRenderer): void {
     if (this.last) checkReflection(this.last, renderer);
+    // Light and its peaks, and what three has of its own.
+    const uniforms = 6 * this.quads + ownUniforms;
+    if (renderer.capabilities.maxVertexUniforms < uniforms)
+      throw new LambentError(
+        `is lit by ${this.order} bands, which take ${uniforms} uniforms in vertex shaders; ` +
+          `this graphics card has ${renderer.capabilities.maxVertexUniforms} there`,
+      );
     // Transfer, frames and view maps, bones as they are and as they were, and three's own of morph targets. All else is
     // within what WebGL 2 promises.
     const wanted = Math.max(
@@ -230,7 +248,10 @@ export class VertexTransfer implements BakedTransfer {
   }
 
   relight(lighting: Lighting): void {
-    packLight(this.uniforms.prtLight.value, lighting.coefficients(this.order));
+    const { rest, peaks } = lighting.parts(this.order, this.last !== undefined);
+    packLight(this.uniforms.prtLight.value, rest);
+    if (peaks) packLight(this.uniforms.prtPeaks.value, peaks);
+    for (const material of this.materials.values()) setPeaks(material, peaks !== undefined);
   }
 
   coefficientMaterials(index: number, gain: { value: number }): Material[] {

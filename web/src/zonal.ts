@@ -29,17 +29,20 @@ export function zonalValues(order: number, lobes: number, channels: number): num
 /**
  * GLSL: vec3 prtSum( vec4 v[ PRT_QUADS ] ), exit radiance of the values of one receiver under prtLight, turned by
  * prtFrame. `table`: lobes by the look-up vec3 prtBand( vec3 direction, int band ), counted from the first that is not
- * exact, in place of harmonics at their axes.
+ * exact, in place of harmonics at their axes. `peaks`: prtPeakSum under prtPeaks.
  */
-export function zonalSum(order: number, lobes: number, channels: 1 | 3, table = false): string {
+export function zonalSum(order: number, lobes: number, channels: 1 | 3, { table = false, peaks = false } = {}): string {
   const exact = exactZonalBands(order, lobes),
     upper = order - exact,
     lightQuads = Math.ceil(shCount(order) / 4);
+  const [array, sumName, lobeName] = peaks
+    ? ['prtPeaks', 'prtPeakSum', 'prtPeakLobe']
+    : ['prtLight', 'prtSum', 'prtLobe'];
   const swizzle = (k: number): string => 'xyzw'[k & 3]!;
   const value = (k: number): string => `v[ ${k >> 2} ].${swizzle(k)}`;
   /** Coefficient k of the light, three channels. */
   const light = (k: number): string =>
-    `vec3( ${[0, 1, 2].map((c) => `prtLight[ ${lightQuads * c + (k >> 2)} ].${swizzle(k)}`).join(', ')} )`;
+    `vec3( ${[0, 1, 2].map((c) => `${array}[ ${lightQuads * c + (k >> 2)} ].${swizzle(k)}`).join(', ')} )`;
   /** Value k, or those of three channels that lie `stride` apart. */
   const color = (k: number, stride: number): string =>
     `vec3( ${[0, 1, 2].map((c) => value(k + (channels === 3 ? c * stride : 0))).join(', ')} )`;
@@ -48,7 +51,7 @@ export function zonalSum(order: number, lobes: number, channels: 1 | 3, table = 
     // The linear band is a vector in x, y, z for each channel: (-t_11, -t_1-1, t_10).
     for (let c = 0; c < 3; ++c) {
       const at = channels === 3 ? 4 * c : 0,
-        of = (k: number): string => `prtLight[ ${lightQuads * c + (k >> 2)} ].${swizzle(k)}`;
+        of = (k: number): string => `${array}[ ${lightQuads * c + (k >> 2)} ].${swizzle(k)}`;
       lines.push(
         `sum[ ${c} ] += dot( prtFrame * vec3( - ${value(at + 3)}, - ${value(at + 1)}, ${value(at + 2)} ),
                      vec3( - ${of(3)}, - ${of(1)}, ${of(2)} ) );`,
@@ -62,14 +65,14 @@ export function zonalSum(order: number, lobes: number, channels: 1 | 3, table = 
     const coefficients = Array.from({ length: upper }, (_, l) => `g[ ${l} ] = ${color(at + 3 + l, upper)};`).join(' ');
     lines.push(
       `axis = vec3( ${value(at)}, ${value(at + 1)}, ${value(at + 2)} ); ${coefficients}`,
-      'sum += prtLobe( axis, g );',
+      `sum += ${lobeName}( axis, g );`,
     );
   }
   const lobe =
     upper === 0
       ? ''
       : `
-vec3 prtLobe( const in vec3 axis, const in vec3 g[ ${upper} ] ) {
+vec3 ${lobeName}( const in vec3 axis, const in vec3 g[ ${upper} ] ) {
   float size = length( axis );
   vec3 n = prtFrame * ( size > 0.0 ? axis / size : vec3( 0.0, 0.0, 1.0 ) ), sum = vec3( 0.0 );
   ${
@@ -82,7 +85,7 @@ vec3 prtLobe( const in vec3 axis, const in vec3 g[ ${upper} ] ) {
   return sum;
 }`;
   return `${lobe}
-vec3 prtSum( const in vec4 v[ PRT_QUADS ] ) {
+vec3 ${sumName}( const in vec4 v[ PRT_QUADS ] ) {
   vec3 sum = vec3( 0.0 )${upper > 0 ? `, axis, g[ ${upper} ]` : ''};
   ${lines.join('\n  ')}
   return sum;
@@ -90,15 +93,25 @@ vec3 prtSum( const in vec4 v[ PRT_QUADS ] ) {
 `;
 }
 
+const zonalSums = (order: number, lobes: number, channels: 1 | 3): string => `
+${zonalSum(order, lobes, channels)}
+#ifdef PRT_PEAKS
+  ${zonalSum(order, lobes, channels, { peaks: true })}
+#endif`;
+
 export const zonalShader = (order: number, lobes: number, channels: 1 | 3): PrtShader => ({
   key: `zonal ${order} ${lobes} ${channels}`,
   turns: true,
-  radiance: `${zonalSum(order, lobes, channels)}
+  radiance: `${zonalSums(order, lobes, channels)}
 vec3 prtRadiance( const in uint receiver ) {
   if ( receiver == 0xffffffffu ) return vec3( 0.0 );
   vec4 v[ PRT_QUADS ];
   for ( int k = 0; k < PRT_QUADS; ++ k ) v[ k ] = prtValues( receiver, k );
-  return prtSum( v );
+  #ifdef PRT_PEAKS
+    return prtHeld( prtSum( v ), prtPeakSum( v ) );
+  #else
+    return prtSum( v );
+  #endif
 }
 `,
 });
@@ -109,12 +122,19 @@ const glossyShader = (order: number, lobes: number, channels: 1 | 3, last: LastR
   turns: true,
   gloss: true,
   defines: reflectionDefines(last),
-  radiance: `${zonalSum(order, lobes, channels)}
+  radiance: `${zonalSums(order, lobes, channels)}
 vec3 prtRow( const in int r, const in int row ) {
   vec4 v[ PRT_QUADS ];
   for ( int k = 0; k < PRT_QUADS; ++ k ) v[ k ] = prtValues( uint( r ), row * PRT_QUADS + k );
   return prtSum( v );
 }
+#ifdef PRT_PEAKS
+  vec3 prtPeakRow( const in int r, const in int row ) {
+    vec4 v[ PRT_QUADS ];
+    for ( int k = 0; k < PRT_QUADS; ++ k ) v[ k ] = prtValues( uint( r ), row * PRT_QUADS + k );
+    return prtPeakSum( v );
+  }
+#endif
 ${glslReflect(last.outgoing, true)}`,
 });
 

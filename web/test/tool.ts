@@ -24,7 +24,7 @@ export function lambent(...args: string[]): string {
   return execFileSync(toolPath, args, { encoding: 'utf8', stdio: ['ignore', 'pipe', 'pipe'], maxBuffer: 1 << 28 });
 }
 
-/** A picture; a PNG shows light as it is, and light rings as on the page, unless `args` say otherwise. */
+/** A picture; a PNG shows light as it is, unless `args` say otherwise. */
 export function renderLinear(...args: string[]): string {
   const more = (name: string, value: string): string[] =>
     args.at(-1)!.endsWith('.exr') || args.some((a) => a.startsWith(name)) ? [] : [name, value];
@@ -33,7 +33,6 @@ export function renderLinear(...args: string[]): string {
     ...args.slice(0, 1),
     ...more('--exposure', '0'),
     ...more('--tone', 'none'),
-    ...(args.includes('--env') && !args.includes('--window') ? ['--window', 'none'] : []),
     ...args.slice(1),
   );
 }

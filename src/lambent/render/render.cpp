@@ -182,8 +182,9 @@ Result<Image> render(const Scene& scene, const Tracer& tracer, const SpatialBasi
           auto light = [&](const std::array<Vec3, 9>& of) {
             return evaluate_directional_light(options.directional, of, receiver_frame(side * n), side * bent);
           };
-          const Vec3 whole = light(rows);
-          return sum + colour * (options.peaks ? dering(whole, light(peak_rows)) : whole);
+          if (!options.peaks) return sum + colour * light(rows);
+          for (size_t k = 0; k < rows.size(); ++k) rows[k] -= peak_rows[k];
+          return sum + colour * (light(rows) + light(peak_rows));  // each is held at 0 by what evaluates it
         };
       },
       progress);
