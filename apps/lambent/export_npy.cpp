@@ -43,6 +43,10 @@ struct Features {
   std::vector<int64_t> faces;  // of the input's vertices
 };
 
+int known_corners(const VertexPlacement& at, const uint32_t* v) {
+  return int(at.input[v[0]] != no_receiver) + int(at.input[v[1]] != no_receiver) + int(at.input[v[2]] != no_receiver);
+}
+
 // What of a bake such pipelines can take.
 Result<const Transfer*> transfer_of(const Baked& baked, const std::string& path) {
   const auto* t = std::get_if<Transfer>(&baked.surface.store);
@@ -53,6 +57,11 @@ Result<const Transfer*> transfer_of(const Baked& baked, const std::string& path)
   if (t->channels != 1)
     return Error{path, "has coloured bounces, and --npy one channel: bake with --bounces 0, or grey surfaces"};
   if (at->input.empty()) return Error{path, "does not know the vertices of its input: bake again"};
+  for (const Triangle& triangle : baked.scene.triangles)
+    if (const int known = known_corners(*at, triangle.v); known != 0 && known != 3)
+      return Error{path,
+                   "its mesh was split where light changes, so its faces are not the input's: bake with --adapt "
+                   "off, and without --max-edge"};
   return t;
 }
 
@@ -74,7 +83,7 @@ Features features_of(const Baked& baked, const Transfer& t, ShConvention convent
     out.values.push_back(float(sums[i] / std::max(1u, count[i / std::max<size_t>(1, out.columns)])));
   for (const Triangle& triangle : baked.scene.triangles) {
     const uint32_t* v = triangle.v;
-    if (at.input[v[0]] == no_receiver || at.input[v[1]] == no_receiver || at.input[v[2]] == no_receiver) continue;
+    if (known_corners(at, v) < 3) continue;  // of the ground
     for (int k = 0; k < 3; ++k) out.faces.push_back(at.input[v[k]]);
   }
   return out;

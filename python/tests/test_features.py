@@ -84,8 +84,8 @@ class Features(made.Case):
     def test_export(self):
         v, f = made.cube(3)
         made.write_obj(self.path("c.obj"), v, f)
-        self.run_tool("bake", self.path("c.obj"), "-o", self.path("c.glb"), "--order", 3, "--bounces", 0, "--samples", 1024,
-                      "--ground")
+        self.run_tool("bake", self.path("c.obj"), "-o", self.path("c.glb"), "--order", 3, "--bounces", 0,
+                      "--samples", 1024, "--ground")
         baked = lambent.open(self.path("c.glb"))
         mean = baked.by_input_vertex(baked.values[:, 0, 0].astype(np.float32))
         for convention, factor in (("pifu", SIGNS), ("icon", SIGNS), ("lambent", 1), ("three", SIGNS), ("filament", 1),
@@ -101,6 +101,9 @@ class Features(made.Case):
                 self.assertEqual(values.dtype, np.float32)
             np.testing.assert_allclose(values, np.pi * mean * factor, rtol=1e-5, atol=1e-6)
             self.assertEqual({frozenset(t) for t in faces.tolist()}, {frozenset(t) for t in f.tolist()})
+        self.run_tool("bake", self.path("c.obj"), "-o", self.path("split.glb"), "--bounces", 0, "--max-edge", 0.1)
+        with self.assertRaises(Exception):
+            self.run_tool("export", self.path("split.glb"), "--npy", self.path("split"))
         features = lambent.prt_features(v, f)
         for convention in ("pifu", "icon", "three"):
             paths = lambent.save_prt_features(self.path("p" + convention), *features, convention)

@@ -99,8 +99,8 @@ export class Lighting {
   }
 
   /**
-   * order^2 RGB coefficients, turned, windowed and scaled; zero beyond the bands in use. For open surfaces: `auto` is as
-   * weak a window as keeps those from going dark.
+   * order^2 RGB coefficients, turned, windowed and scaled; zero beyond the bands in use. For open surfaces: `auto`
+   * is as weak a window as keeps those from going dark.
    */
   coefficients(order: number): Float64Array {
     const n = this.bandsOf(order);

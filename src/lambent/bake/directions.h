@@ -19,9 +19,9 @@ struct DirectionSets {
   std::vector<float> x, y, z;  // [set][stride]
   std::vector<float> weights;  // [sample], of mean 1, alike in all sets; empty: all are 1
   std::vector<float> table;    // [set][coefficient][stride]: harmonics at each direction, 0 in the padding
-  // [set][all, first half][coefficient]: what the mean of the harmonics over cosine-distributed directions has too much.
-  // A receiver that sees a share s of its sky has about s of it in its row: a control variate. Empty where directions
-  // follow another distribution.
+  // [set][all, first half][coefficient]: what the mean of the harmonics over cosine-distributed directions has too
+  // much. A receiver that sees a share s of its sky has about s of it in its row: a control variate. Empty where
+  // directions follow another distribution.
   std::vector<float> excess;
 };
 

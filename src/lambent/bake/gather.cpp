@@ -129,8 +129,7 @@ struct Fan {
     if (sets.half < size_t(sets.samples))
       weighted_rows(table + sets.half, coefficients, sets.stride, seen + sets.half, sets.stride - sets.half,
                     rest.data());
-    const float* excess =
-        sets.excess.empty() ? nullptr : sets.excess.data() + size_t(choice.set) * 2 * coefficients;
+    const float* excess = sets.excess.empty() ? nullptr : sets.excess.data() + size_t(choice.set) * 2 * coefficients;
     float open = 0;
     for (size_t j = 0; excess && j < size_t(sets.samples); ++j) open += seen[j];
     open /= float(sets.samples);
