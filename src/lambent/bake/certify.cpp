@@ -51,7 +51,7 @@ std::vector<SurfacePlace> draw_places(const Scene& scene, const Receivers& recei
   return places;
 }
 
-struct Measured {
+struct PlaceError {
   double error2 = 0, truth2 = 0;
   bool counts = false;
 };
@@ -62,7 +62,7 @@ Result<Certificate> certify(const Scene& scene, const Receivers& receivers, cons
                             const GatherAt& gather, size_t count, uint32_t seed, Progress* progress) {
   const std::vector<SurfacePlace> places = draw_places(scene, receivers, count, seed);
   const float diagonal = bounds(scene).diagonal();
-  std::vector<Measured> measured(places.size());
+  std::vector<PlaceError> measured(places.size());
   ProgressStage stage(progress, "measuring the error", places.size());
   parallel_for(places.size(), piece, [&](size_t begin, size_t end) {
     AlignedVector<float> a(width), b(width), s(width);
@@ -88,7 +88,7 @@ Result<Certificate> certify(const Scene& scene, const Receivers& receivers, cons
             });
           },
           receivers.basis);
-      Measured& m = measured[i];
+      PlaceError& m = measured[i];
       m.counts = true;
       for (size_t k = 0; k < width; ++k) {
         m.error2 += double(a[k] - s[k]) * double(b[k] - s[k]);
@@ -101,7 +101,7 @@ Result<Certificate> certify(const Scene& scene, const Receivers& receivers, cons
 
   Certificate c;
   double error2 = 0, truth2 = 0;
-  std::vector<Measured> parts(scene.parts.size());
+  std::vector<PlaceError> parts(scene.parts.size());
   std::vector<size_t> counts(scene.parts.size(), 0);
   for (size_t i = 0; i < places.size(); ++i) {
     if (!measured[i].counts) continue;
@@ -117,7 +117,7 @@ Result<Certificate> certify(const Scene& scene, const Receivers& receivers, cons
   if (c.places < fewest_of_part || !(truth2 > 0)) return c;
   c.error = std::sqrt(std::max(0.0, error2) / truth2);
   double spread = 0;
-  for (const Measured& m : measured)
+  for (const PlaceError& m : measured)
     if (m.counts) spread += (m.error2 - error2 / double(c.places)) * (m.error2 - error2 / double(c.places));
   c.uncertain = std::sqrt(spread) / truth2 / std::max(2 * c.error, 1e-12);
   return c;
