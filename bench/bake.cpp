@@ -39,13 +39,14 @@ void bake_scene(const std::string& name, const Scene& scene) {
     return j;
   };
   auto bake_seconds = [&](int bounces, BakeReport& report) {
-    BakeOptions options;
+    BakeOptions options;  // the gather alone
+    options.denoise = options.certify = false;
     options.bounces = bounces, options.order = order, options.samples = samples;
     return least_seconds(runs, [&] { (void)bake(scene, *tracer, receivers, options, &report); });
   };
   BakeReport r0, r1, r3;
   auto matrix_seconds = [&](int bounces) {
-    const BakeOptions options{.order = 5, .samples = samples, .bounces = bounces};
+    const BakeOptions options{.order = 5, .samples = samples, .bounces = bounces, .denoise = false, .certify = false};
     const ReceiverMaterials materials =
         make_receiver_materials(scene, receivers, {.everywhere = Ggx{.alpha = Vec2(0.16f)}});
     return least_seconds(

@@ -14,7 +14,8 @@ void bench_scaling() {
     auto tracer = Tracer::build(scene);
     if (!tracer) return;
     const Receivers receivers = make_vertex_receivers(scene);
-    BakeOptions options;
+    BakeOptions options;  // the gather alone
+    options.denoise = options.certify = false;
     options.samples = 256, options.bounces = 2;
     BakeReport r;
     const double seconds = least_seconds(2, [&] { (void)bake(scene, *tracer, receivers, options, &r); });
