@@ -20,6 +20,7 @@ set(lambent_relight_headers
   lambent/light/environment.h
   lambent/light/project.h
   lambent/light/sky.h
+  lambent/relight/dering.h
   lambent/relight/lattice.h
   lambent/relight/light.h
   lambent/relight/local_light.h
@@ -38,12 +39,15 @@ set(lambent_relight_headers
 )
 set(lambent_headers
   lambent/lambent.h
+  lambent/bake/adapt.h
   lambent/bake/bake.h
+  lambent/bake/certify.h
   lambent/bake/features.h
   lambent/bake/lattice.h
   lambent/bake/visibility.h
   lambent/baked/baked_file.h
   lambent/core/progress.h
+  lambent/light/peaks.h
   lambent/pipeline/request.h
   lambent/receivers/receivers.h
   lambent/render/products.h

@@ -1,6 +1,7 @@
 #pragma once
 // All that a program needs to bake, keep, relight and draw. From C, or to relight alone: lambent.h, one folder up, and
 // relight/relighter.h.
+#include <lambent/bake/adapt.h>
 #include <lambent/bake/bake.h>
 #include <lambent/bake/lattice.h>
 #include <lambent/bake/visibility.h>

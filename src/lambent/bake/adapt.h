@@ -7,6 +7,7 @@
 
 namespace lambent {
 
+// What splitting is asked for.
 struct AdaptOptions {
   double error = 0.05;         // relative RMS of direct transfer, by area, that interpolation may lose; > 0
   float longest = 0.05f;       // edges longer than this part of the scene's diagonal are split first; of those above
@@ -17,6 +18,7 @@ struct AdaptOptions {
   int samples = 128;           // rays a place
   uint32_t seed = 1;
 };
+// What it says of itself.
 struct AdaptReport {
   size_t before = 0, after = 0;  // triangles
   size_t rays = 0;

@@ -14,6 +14,7 @@ namespace lambent {
 // From any thread.
 using GatherAt = std::function<bool(Vec3 origin, Vec3 normal, uint64_t key, float* row)>;
 
+// What was measured.
 struct Certificate {
   // Relative RMS error of the field over all surfaces, by area: sqrt(mean |field - truth|^2 / mean |truth|^2). Noise
   // and what interpolation between receivers loses are both in it. Negative: not measured.

@@ -59,6 +59,7 @@ void remove_unfinished_files();
 std::vector<std::string> stale_temporaries(const std::string& folder, const std::string& name = {});
 void remove_stale_temporaries(const std::string& path);
 
+// A file that was read, as the system knows it.
 struct ReadFile {
   std::string path;
   uint64_t device, inode;
