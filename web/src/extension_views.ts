@@ -35,8 +35,8 @@ export const plainKeys: readonly string[] = [
 ];
 
 /**
- * The extension without its parts and without what it says of the document that it was written into, with place(v) for
- * each buffer view v. Throws LambentError at a number of a name that
+ * The extension without its parts, the map to its input's vertices, and what it says of the document that it was
+ * written into, with place(v) for each buffer view v. Throws LambentError at a number of a name that
  * is in neither list, since it could be a view.
  */
 export function replaceViews(
@@ -54,7 +54,10 @@ export function replaceViews(
     if (Array.isArray(value)) return value.map(walk);
     return typeof value === 'object' && value !== null ? Object.fromEntries(Object.entries(value).map(entry)) : value;
   };
-  return walk({ ...extension, parts: undefined, written: undefined }) as Record<string, unknown>;
+  return walk({ ...extension, parts: undefined, written: undefined, inputVertices: undefined }) as Record<
+    string,
+    unknown
+  >;
 }
 
 interface Document {
@@ -79,7 +82,7 @@ export function isOutOfPlace(document: Document, extension: Readonly<Record<stri
   const walk = (value: unknown): boolean => {
     if (typeof value !== 'object' || value === null) return false;
     return Object.entries(value).some(([key, inner]) =>
-      viewKeys.includes(key) || key === 'front' || key === 'back'
+      viewKeys.includes(key) || key === 'front' || key === 'back' || key === 'input'
         ? isWrong(inner) || walk(inner)
         : key !== 'provenance' && key !== 'extras' && walk(inner),
     );

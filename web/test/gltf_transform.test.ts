@@ -94,7 +94,15 @@ describe('the views of the extension', () => {
     };
     visit(schema);
     expect([...views].sort()).toEqual([...viewKeys, 'front'].sort());
-    const others = ['node', 'primitive', 'back' /* as front */, 'bufferViews', 'byteLength' /* of the document */];
+    const others = [
+      'node',
+      'primitive',
+      'back' /* as front */,
+      'input',
+      'inputVertices' /* not carried */,
+      'bufferViews',
+      'byteLength' /* of the document */,
+    ];
     for (const name of numbers) expect([...plainKeys, ...others]).toContain(name);
   });
 
