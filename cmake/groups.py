@@ -14,6 +14,7 @@ def helpers(source, text):
     """Pairs of a name and what it stands for: the same alias twice is no clash."""
     text = re.sub(r"//[^\n]*", "", text)
     yield from re.findall(r"^(?:using|namespace) (\w+) = (.*);", text, re.M)
+    yield from ((name, scope + name) for scope, name in re.findall(r"^using ([\w:]+::)(\w+);", text, re.M))
     yield from ((name, source) for name in re.findall(r"^#define (\w+)", text, re.M))
     for start in re.finditer(r"^namespace \{$", text, re.M):
         depth = 1
