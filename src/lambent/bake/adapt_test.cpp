@@ -3,6 +3,8 @@
 #include <lambent/scene/procedural.h>
 #include <lambent/scene/refine.h>
 
+#include "sanitizers.h"
+
 #include <gtest/gtest.h>
 
 #include <cmath>
@@ -29,6 +31,7 @@ double certified(const Scene& scene) {
 }
 
 TEST(Adapt, AShadowOnOneLargeTriangle) {
+  SKIP_UNDER_SANITIZERS();
   const Scene before = shadowed_floor();
   Scene after = before;
   auto report = adapt(after, {.error = 0.01, .longest = 0.1f, .shortest = 1e-3f});

@@ -4,6 +4,8 @@
 #include <lambent/scene/procedural.h>
 #include <lambent/scene/refine.h>
 
+#include "sanitizers.h"
+
 #include <gtest/gtest.h>
 
 #include <cmath>
@@ -99,6 +101,7 @@ double true_error(const Scene& coarse, const Receivers& receivers, const Transfe
 }
 
 TEST(Certificate, IsHonest) {
+  SKIP_UNDER_SANITIZERS();
   const Scene scenes[] = {make_courtyard(0.12f)};
   for (const Scene& scene : scenes)
     for (const int samples : {32, 256}) {

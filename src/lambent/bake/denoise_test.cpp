@@ -3,6 +3,8 @@
 #include <lambent/core/random.h>
 #include <lambent/scene/procedural.h>
 
+#include "sanitizers.h"
+
 #include <gtest/gtest.h>
 
 #include <cmath>
@@ -113,6 +115,7 @@ TEST(Denoise, OtherSurfacesNearbyTellNothing) {
 }
 
 TEST(Denoise, ABakeIsNearerToTheTruth) {
+  SKIP_UNDER_SANITIZERS();
   const Scene scene = make_courtyard(0.25f);
   auto tracer = Tracer::build(scene);
   const Receivers receivers = make_vertex_receivers(scene);
