@@ -95,12 +95,13 @@ void advise(Report& r, const Baked& baked, const BakeRequest& request) {
                     100 * r.clipped.negative));
   const double mean = r.same.difference.mean_b > 0 ? r.same.difference.mean_a / r.same.difference.mean_b : 1;
   if (r.same.difference.psnr < std::min(r.same.noise - 3, 40.0)) {
-    r.advice.push_back(fmt::format(
-        "The bake is {:.1f} dB from the reference, whose own noise allows {:.1f}{}. Where the "
-        "map shows whole faces, they are too large: --max-edge splits them; where it shows "
-        "grain, --samples {} has half the noise",
-        r.same.difference.psnr, r.same.noise,
-        std::abs(mean - 1) > 0.02 ? fmt::format(", its mean {:.2f} of the truth's", mean) : "", 3 * request.samples));
+    r.advice.push_back(
+        fmt::format("The bake is {:.1f} dB from the reference, whose own noise allows {:.1f}{}. Where the "
+                    "map shows whole faces, they are too large: --quality final or --max-edge splits them; "
+                    "where it shows grain, {} has half the noise",
+                    r.same.difference.psnr, r.same.noise,
+                    std::abs(mean - 1) > 0.02 ? fmt::format(", its mean {:.2f} of the truth's", mean) : "",
+                    request.samples > 0 ? fmt::format("--samples {}", 3 * request.samples) : "half the --error"));
   } else if (r.same.difference.psnr < 40 && r.same.noise < 43) {
     r.advice.push_back("The reference's noise is what limits these figures: --paths traces more");
   }

@@ -23,6 +23,7 @@ constexpr size_t pilot = 16;  // one edge in so many says whether the rest is wo
 constexpr size_t noise_places = 256;
 // Of a parabola that is zero at the ends, the mean square is 8/15 of that at the middle; triangles have three edges.
 constexpr double mean_square = 8.0 / 15;
+constexpr size_t split_cost = 4;       // triangles that splitting an edge may add, with what close() splits besides
 constexpr float inset = 0.01f;         // of an edge, towards the triangle: a wall's foot does not lie in the wall
 constexpr float longest_ratio = 1.6f;  // a triangle's longest edge is split too, where so much longer than one that is
 
@@ -245,8 +246,13 @@ struct Adapter {
       return a.first != b.first ? a.first > b.first : a.second < b.second;
     });
     // Half of it, since halves have errors of their own.
+    const size_t room = (limit() - std::min(limit(), scene.triangles.size())) / split_cost;
     for (const auto& [share, i] : order) {
       if (left <= 0.5 * budget || share <= 0) break;
+      if (wanted.size() >= room) {
+        report.limited = true;
+        break;
+      }
       left -= share;
       wanted.insert(edge_key(scene.positions[edges[i].a], scene.positions[edges[i].b]));
     }
@@ -277,7 +283,10 @@ struct Adapter {
   }
 
   Result<void> run() {
-    if (auto ok = split_long_edges(scene, options.longest * diagonal, limit()); !ok) return {};
+    if (auto ok = split_long_edges(scene, options.longest * diagonal, limit()); !ok) {
+      report.limited = true;
+      return {};
+    }
     auto built = Tracer::build(original, progress);
     if (!built) return built.error();
     tracer = std::move(*built), first = make_vertex_receivers(original);
@@ -287,7 +296,10 @@ struct Adapter {
       if (!wanted) return wanted.error();
       if (wanted->empty()) return {};
       close(*wanted);
-      if (scene.triangles.size() + 2 * wanted->size() > limit()) return {};
+      if (scene.triangles.size() + 2 * wanted->size() > limit()) {
+        report.limited = true;
+        return {};
+      }
       split_edges(scene, [&](Vec3 a, Vec3 b) { return wanted->contains(edge_key(a, b)); });
     }
     return {};

@@ -23,6 +23,7 @@ struct AdaptReport {
   size_t before = 0, after = 0;  // triangles
   size_t rays = 0;
   int levels = 0;
+  bool limited = false;          // more triangles were wanted than the options allow
   double first = -1, last = -1;  // relative RMS error of interpolation at the edges' middles, before and after
   double seconds = 0;
 };

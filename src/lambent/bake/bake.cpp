@@ -26,13 +26,18 @@ double seconds_since(std::chrono::steady_clock::time_point start) {
 // Some 4 % of the error, where it is spread as in our scenes.
 constexpr size_t certified_places = 1024;
 
+constexpr double least_noise_left = 0.2;  // 1 / sqrt of denoise()'s neighbours
+
 size_t row_width(size_t coefficients, int channels) { return pad_lanes(coefficients * size_t(channels)); }
 
-// Solution vectors: T0, X, the next X and that denoised.
+// Solution vectors: T0, X, the next X and that denoised, with its neighbours; copies of rows without their lobes; the
+// terms, and one of them before it was denoised.
 size_t solution_bytes(size_t receivers, size_t coefficients, int channels, int sky_channels, const BakeOptions& o) {
-  const size_t width = row_width(coefficients, channels);
-  return 4 * receivers *
-         (coefficients * size_t(sky_channels) + (o.bounces > 0 ? 2 : 1) * width + (o.denoise ? width : 0));
+  const size_t width = row_width(coefficients, channels), terms = o.keep_terms && o.denoise ? size_t(o.bounces) + 1 : 0;
+  const size_t denoised = o.denoise ? width + (o.lobes.empty() ? 0 : (2 + terms) * width) + (terms ? width : 0) : 0;
+  return receivers * (4 * (coefficients * size_t(sky_channels) + (o.bounces > 0 ? 2 : 1) * width + width / check_every +
+                           terms * width + denoised) +
+                      (o.denoise ? denoise_bytes : 0));
 }
 
 // Direction tables, corner maps and the scratch of every thread; an upper estimate.
@@ -165,7 +170,8 @@ struct Baker {
     std::vector<AlignedVector<float>> terms;
     if (options.keep_terms) {
       auto ok = bounce_terms(*B, source, width(), options.bounces, progress, [&](int, const auto& x) -> Result<void> {
-        terms.push_back(x);
+        if (options.denoise) terms.push_back(x);
+        else report.terms.push_back(store(x.data()));
         return {};
       });
       if (!ok) return ok.error();
@@ -209,7 +215,10 @@ struct Baker {
       auto certificate = certify(scene, receivers, solved.x.data(), width(), gather, certified_places, seed, progress);
       if (!certificate) return certificate.error();
       report.certificate = std::move(*certificate), report.error = report.certificate.error;
-      report.certificate.noise = options.denoise ? report.denoised : report.noise;
+      // As much less by denoising as at the receivers, but no less than a mean of neighbours can have.
+      report.noise = report.certificate.noise;
+      if (options.denoise && report.noise_of_rays > 0)
+        report.noise *= std::max(report.denoised / report.noise_of_rays, least_noise_left);
       report.certify_seconds = seconds_since(start);
     }
     Transfer result = store(solved.x.data());
@@ -242,9 +251,7 @@ struct Baker {
     AlignedVector<float> out;
     if (options.denoise) {
       out = x;
-      std::vector<AlignedVector<float>*> all{&out};
-      for (AlignedVector<float>& term : terms) all.push_back(&term);
-      auto ok = denoise_harmonics({receivers.origins, receivers.normals, buried, measured, variance}, all);
+      auto ok = denoise_harmonics({receivers.origins, receivers.normals, buried, measured, variance}, x, out, terms);
       if (!ok) return ok;
     }
     double noise = 0, left = 0, total = 0;
@@ -255,7 +262,7 @@ struct Baker {
         left += squared_difference(row, out.data() + size_t(measured[i]) * width()) - double(variance[i]);
       for (size_t k = 0; k < harmonics() * size_t(channels()); ++k) total += double(row[k]) * double(first[k]);
     }
-    if (total > 0) report.noise = std::sqrt(noise / total);
+    if (total > 0) report.noise_of_rays = std::sqrt(noise / total);
     if (options.denoise) {
       if (total > 0) report.denoised = std::sqrt(std::max(0.0, left) / total);
       x = std::move(out);
@@ -263,22 +270,28 @@ struct Baker {
     report.denoise_seconds = seconds_since(start);
     return {};
   }
-  // The first by its own noise, the others by the same weights. Lobes are left alone: sharp ones have rays of their
-  // own, and shadows that harmonics do not tell of.
-  Result<void> denoise_harmonics(const NoisyPlaces& noisy, const std::vector<AlignedVector<float>*>& all) {
-    const size_t values = harmonics() * size_t(channels()), w = pad_lanes(values);
-    std::vector<AlignedVector<float>> copies;
-    for (const AlignedVector<float>* rows : all) {
-      copies.emplace_back(n() * w, 0.0f);
-      for (size_t r = 0; r < n(); ++r) std::copy_n(rows->data() + r * width(), values, copies.back().data() + r * w);
+  // All by the weights of x's noise. Lobes are left alone: sharp ones have rays of their own, and shadows that
+  // harmonics do not tell of.
+  Result<void> denoise_harmonics(const NoisyPlaces& noisy, const AlignedVector<float>& x, AlignedVector<float>& out,
+                                 std::vector<AlignedVector<float>>& terms) {
+    const size_t values = harmonics() * size_t(channels()), w = lobes.count() ? pad_lanes(values) : width();
+    auto copy_values = [&](const AlignedVector<float>& from, size_t from_width, AlignedVector<float>& to,
+                           size_t to_width) {
+      for (size_t r = 0; r < n(); ++r) std::copy_n(from.data() + r * from_width, values, to.data() + r * to_width);
+    };
+    std::vector<AlignedVector<float>> apart;  // where rows hold lobes, too: the harmonics of x, of out, of each term
+    if (lobes.count()) {
+      apart.assign(2 + terms.size(), AlignedVector<float>(n() * w, 0.0f));
+      copy_values(x, width(), apart[0], w);
+      for (size_t t = 0; t < terms.size(); ++t) copy_values(terms[t], width(), apart[2 + t], w);
     }
     std::vector<float*> more;
-    for (size_t k = 1; k < copies.size(); ++k) more.push_back(copies[k].data());
-    AlignedVector<float> out(n() * w);
-    if (auto ok = denoise(noisy, copies[0].data(), w, out.data(), more, progress); !ok) return ok;
-    copies[0] = std::move(out);
-    for (size_t k = 0; k < all.size(); ++k)
-      for (size_t r = 0; r < n(); ++r) std::copy_n(copies[k].data() + r * w, values, all[k]->data() + r * width());
+    for (size_t t = 0; t < terms.size(); ++t) more.push_back(apart.empty() ? terms[t].data() : apart[2 + t].data());
+    auto ok = denoise(noisy, apart.empty() ? x.data() : apart[0].data(), w,
+                      apart.empty() ? out.data() : apart[1].data(), more, progress);
+    if (!ok || apart.empty()) return ok;
+    copy_values(apart[1], w, out, width());
+    for (size_t t = 0; t < terms.size(); ++t) copy_values(apart[2 + t], w, terms[t], width());
     return {};
   }
   // Of the harmonics.
@@ -347,7 +360,7 @@ Result<Transfer> bake_with_samples(const Scene& scene, const Tracer& tracer, con
 Result<Transfer> bake_to_error(const Scene& scene, const Tracer& tracer, const Receivers& receivers,
                                const BakeOptions& asked, BakeReport& r, Progress* progress) {
   constexpr int first = 128, most = 1 << 16;
-  constexpr double slope = 0.75, safety = 1.1;  // denoised noise falls as rays to about this power
+  constexpr double slope = 0.75;  // denoised noise falls as rays to about this power
   const auto start = std::chrono::steady_clock::now();
   BakeOptions options = asked;
   options.certify = true, options.samples = first;
@@ -360,11 +373,15 @@ Result<Transfer> bake_to_error(const Scene& scene, const Tracer& tracer, const R
     if (!transfer) return transfer;
     rays += r.rays, traced += r.trace_seconds, bounced += r.bounce_seconds;
     r.rays = rays, r.trace_seconds = traced, r.bounce_seconds = bounced;
-    const double error = r.certificate.error, noise = r.certificate.noise,
-                 wanted = std::clamp(0.2 * error, 0.4 * options.error, 0.6 * options.error);
-    const double ratio = std::clamp(std::pow(safety * noise / wanted, 1 / slope), 1.5, 16.0);
+    const double target = options.error, error = r.certificate.error, noise = r.noise,
+                 between = std::sqrt(std::max(0.0, error * error - noise * noise));
+    // Where little is lost between receivers, noise may take the rest. Else more rays would hardly be seen beside
+    // that; but noise is, in the shade of a sun.
+    const double wanted = between < 0.5 * target ? 0.9 * std::sqrt(target * target - between * between)
+                                                 : std::clamp(0.2 * error, 0.4 * target, 0.6 * target);
+    const double ratio = std::clamp(std::pow(noise / wanted, 1 / slope), 1.5, 16.0);
     const bool late = options.seconds >= 0 && seconds_since(start) + seconds_since(round) * ratio > options.seconds;
-    if (!(noise > wanted && error > options.error) || options.samples == most || late) return transfer;
+    if (!(noise > wanted && error > target) || options.samples == most || late) return transfer;
     options.samples = std::min(most, int(std::lround(double(options.samples) * ratio / 64)) * 64);
   }
 }

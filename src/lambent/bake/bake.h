@@ -26,8 +26,8 @@ struct BakeOptions {
   Precision precision = Precision::half;  // of the stored transfer
   bool keep_terms = false;                // BakeReport::terms, in as much time again as the bounces take
   // Where > 0, bake to this relative RMS error (Certificate::error) with as many rays as that asks for, instead of
-  // `samples`: noise may be 0.4 of it, or, where interpolation between receivers loses more, up to 0.6. No more rays
-  // are asked for where they would end after so many seconds; negative: no limit.
+  // `samples`; where interpolation between receivers is what loses, to noise of 0.4 to 0.6 of it. No more rays are
+  // asked for where they would end after so many seconds; negative: no limit.
   double error = 0, seconds = -1;
   bool denoise = true;  // takes away noise that neighbours do not share (denoise.h)
   bool certify = true;  // measures the result's error (certify.h)
@@ -52,8 +52,9 @@ struct BakeReport {
   // the receivers, estimated from half-sample gathers at one in 16, which overestimates a little. Negative: not known.
   double error = -1;
   Certificate certificate;  // of diffuse transfer, where the options want it
-  double noise = -1;        // relative RMS of the rows at the receivers as their rays gave them; negative: not measured
-  double denoised = -1;     // and after denoising
+  // Relative RMS of noise, negative: not measured. At the receivers, as their rays gave them and denoised; and of the
+  // result over all surfaces, by area, as the certificate's error is.
+  double noise_of_rays = -1, denoised = -1, noise = -1;
   // Where options.keep_terms says so, the result's terms: direct transfer, that of light reflected once, twice, ... E,
   // B E, B^2 E. They add up to the result, but for rounding. Source: radiosity, "Neumann series".
   std::vector<Transfer> terms;

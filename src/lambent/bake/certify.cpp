@@ -52,7 +52,7 @@ std::vector<SurfacePlace> draw_places(const Scene& scene, const Receivers& recei
 }
 
 struct PlaceError {
-  double error2 = 0, truth2 = 0;
+  double error2 = 0, truth2 = 0, noise2 = 0;
   bool counts = false;
 };
 
@@ -93,6 +93,7 @@ Result<Certificate> certify(const Scene& scene, const Receivers& receivers, cons
       for (size_t k = 0; k < width; ++k) {
         m.error2 += double(a[k] - s[k]) * double(b[k] - s[k]);
         m.truth2 += double(a[k]) * double(b[k]);
+        m.noise2 += 0.5 * double(a[k] - b[k]) * double(a[k] - b[k]);
       }
     }
     if (!stage.cancelled()) stage.advance(end - begin);
@@ -100,14 +101,14 @@ Result<Certificate> certify(const Scene& scene, const Receivers& receivers, cons
   if (stage.cancelled()) return Error{"", "cancelled"};
 
   Certificate c;
-  double error2 = 0, truth2 = 0;
+  double error2 = 0, truth2 = 0, noise2 = 0;
   std::vector<PlaceError> parts(scene.parts.size());
   std::vector<size_t> counts(scene.parts.size(), 0);
   for (size_t i = 0; i < places.size(); ++i) {
     if (!measured[i].counts) continue;
     const uint32_t part = scene.triangles[places[i].triangle].part;
     ++c.places, ++counts[part];
-    error2 += measured[i].error2, truth2 += measured[i].truth2;
+    error2 += measured[i].error2, truth2 += measured[i].truth2, noise2 += measured[i].noise2;
     parts[part].error2 += measured[i].error2, parts[part].truth2 += measured[i].truth2;
   }
   for (size_t p = 0; p < parts.size(); ++p)
@@ -115,7 +116,7 @@ Result<Certificate> certify(const Scene& scene, const Receivers& receivers, cons
                           ? -1
                           : std::sqrt(std::max(0.0, parts[p].error2) / parts[p].truth2));
   if (c.places < fewest_of_part || !(truth2 > 0)) return c;
-  c.error = std::sqrt(std::max(0.0, error2) / truth2);
+  c.error = std::sqrt(std::max(0.0, error2) / truth2), c.noise = std::sqrt(noise2 / truth2);
   double spread = 0;
   for (const PlaceError& m : measured)
     if (m.counts) spread += (m.error2 - error2 / double(c.places)) * (m.error2 - error2 / double(c.places));

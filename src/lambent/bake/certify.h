@@ -20,7 +20,7 @@ struct Certificate {
   // and what interpolation between receivers loses are both in it. Negative: not measured.
   double error = -1;
   double uncertain = 0;  // standard error of that
-  double noise = -1;     // of it, at the receivers themselves: what more rays would take away
+  double noise = -1;     // the same of one of its gathers: what as many rays leave before anything is denoised
   std::vector<double>
       parts;          // the same by part of the scene, relative to that part's own rows; negative: too few places
   size_t places = 0;  // that it was measured at

@@ -38,6 +38,9 @@ TEST(Certificate, OfAParabolaBetweenReceiversIsTheClosedForm) {
   EXPECT_NEAR(certificate->error, expected, 0.05 * expected);
   EXPECT_NEAR(certificate->error, expected, 4 * certificate->uncertain);
   EXPECT_LT(certificate->uncertain, 0.03 * expected);
+  // Uniform noise of width 0.02 in 16 columns, against the RMS of x^2.
+  const double noise = 0.02 / std::sqrt(12.0) * std::sqrt(16.0) * std::sqrt(5.0);
+  EXPECT_NEAR(certificate->noise, noise, 0.02 * noise);
   ASSERT_EQ(certificate->parts.size(), 1u);
   EXPECT_EQ(certificate->parts[0], certificate->error);
 }

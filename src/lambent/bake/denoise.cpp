@@ -69,6 +69,8 @@ struct Filter {
 };
 constexpr size_t filters = std::size(strengths);
 
+static_assert(sizeof(Neighbours) + filters * sizeof(float) <= denoise_bytes);
+
 struct Denoiser {
   const NoisyPlaces& noisy;
   const float* rows;
@@ -201,7 +203,7 @@ Result<void> denoise(const NoisyPlaces& noisy, const float* rows, size_t width, 
   LAMBENT_CHECK(noisy.measured.size() == noisy.variance.size() && width % lane_multiple == 0);
   std::copy_n(rows, n * width, out);
   if (noisy.measured.empty()) return {};
-  ProgressStage stage(progress, "denoising", 3 * n);
+  ProgressStage stage(progress, "denoising", (3 + more.size()) * n);
   std::vector<Vec3> measured_places;
   for (uint32_t r : noisy.measured) measured_places.push_back(noisy.places[r]);
   const Cloud all{noisy.places}, measured{measured_places};
@@ -220,17 +222,19 @@ Result<void> denoise(const NoisyPlaces& noisy, const float* rows, size_t width, 
   const bool judged = found && each([&](size_t i, double* sums, float* scratch) {
                         if (d.is_filtered(i)) d.judge(i, sums, scratch);
                       });
-  std::vector<AlignedVector<float>> before;
-  for (const float* r : more) before.emplace_back(r, r + n * width);
-  const bool done = judged && each([&](size_t i, double* sums, float*) {
-                      if (!d.is_filtered(i)) return;
-                      const std::array<Filter, filters> filters_here = d.filters_of(i);
-                      const Filter* best = d.choose(i, filters_here);
-                      if (!best) return;
-                      best->apply(d.neighbours[i], rows, width, sums, out + i * width);
-                      for (size_t m = 0; m < more.size(); ++m)
-                        best->apply(d.neighbours[i], before[m].data(), width, sums, more[m] + i * width);
-                    });
+  auto apply = [&](const float* from, float* to) {
+    return each([&](size_t i, double* sums, float*) {
+      if (!d.is_filtered(i)) return;
+      const std::array<Filter, filters> filters_here = d.filters_of(i);
+      if (const Filter* best = d.choose(i, filters_here))
+        best->apply(d.neighbours[i], from, width, sums, to + i * width);
+    });
+  };
+  bool done = judged && apply(rows, out);
+  for (size_t m = 0; m < more.size() && done; ++m) {
+    const AlignedVector<float> before(more[m], more[m] + n * width);
+    done = apply(before.data(), more[m]);
+  }
   if (!done) return Error{"", "cancelled"};
   return {};
 }

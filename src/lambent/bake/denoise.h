@@ -20,6 +20,9 @@ struct NoisyPlaces {
   std::span<const float> variance;        // and the squared error expected of their rows there
 };
 
+// Working memory a place, beside rows.
+inline constexpr size_t denoise_bytes = 128;
+
 // Local linear regression over neighbours on the same surface, weighed by distance and by what their rows differ beyond
 // the noise, at two strengths; which of them, or the row as it is, is chosen by its unbiased risk (Stein's) among
 // neighbours. rows is [place][width], width a multiple of lane_multiple (kernels.h); so is out, another array. `more`

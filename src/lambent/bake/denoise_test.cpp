@@ -139,7 +139,7 @@ TEST(Denoise, ABakeIsNearerToTheTruth) {
   const double before = error(*noisy), after = error(*denoised);
   EXPECT_LT(after, 0.75 * before);
   // What the bake says of itself, from one receiver in 16.
-  EXPECT_NEAR(report.noise / before, 1, 0.2);
+  EXPECT_NEAR(report.noise_of_rays / before, 1, 0.2);
   EXPECT_NEAR(report.denoised / after, 1, 0.25);
 }
 

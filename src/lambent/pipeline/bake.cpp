@@ -232,11 +232,12 @@ void summarize_error(Bake& b) {
                                {"levels", a.levels},
                                {"rays", a.rays},
                                {"first", a.first},
-                               {"last", a.last}};
+                               {"last", a.last},
+                               {"limited", a.limited}};
     b.summary.json["seconds"]["adapt"] = a.seconds;
     if (a.after > a.before)
-      b.line("mesh", fmt::format("{} triangles from {}, split where light changes", human_count(a.after),
-                                 human_count(a.before)));
+      b.line("mesh", fmt::format("{} triangles from {}, split where light changes{}", human_count(a.after),
+                                 human_count(a.before), a.limited ? ", as many as --quality allows" : ""));
   }
   if (c.error < 0) {
     if (r.error >= 0) b.line("error", fmt::format("{:.2f}% RMS, estimated from half-sample gathers", 100 * r.error));
@@ -246,19 +247,19 @@ void summarize_error(Bake& b) {
   for (size_t p = 0; p < c.parts.size(); ++p)
     if (c.parts[p] >= 0) parts[b.scene.parts[p].name] = c.parts[p];
   b.summary.json["certificate"] = {{"error", c.error},    {"uncertain", c.uncertain}, {"places", c.places},
-                                   {"noise", c.noise},    {"noise_of_rays", r.noise}, {"parts", std::move(parts)},
+                                   {"noise", r.noise},    {"noise_of_rays", c.noise}, {"parts", std::move(parts)},
                                    {"samples", r.samples}};
   b.told["certificate"] = b.summary.json["certificate"];
   b.summary.json["seconds"]["denoise"] = r.denoise_seconds, b.summary.json["seconds"]["certify"] = r.certify_seconds;
   std::string text = fmt::format("{:.1f}% RMS (within {:.1f}), measured at {} places by rays of their own",
                                  100 * c.error, 200 * c.uncertain, human_count(c.places));
-  if (c.noise >= 0)
-    text += fmt::format("; noise {:.1f}%{}, at {} rays a receiver", 100 * c.noise,
-                        r.denoised >= 0 ? fmt::format(" ({:.1f}% before denoising)", 100 * r.noise) : "", r.samples);
+  if (r.noise >= 0)
+    text += fmt::format("; noise {:.1f}%{}, at {} rays a receiver", 100 * r.noise,
+                        r.denoised >= 0 ? fmt::format(" ({:.1f}% before denoising)", 100 * c.noise) : "", r.samples);
   b.line("error", text);
   if (b.plan.bake.error > 0 && c.error > b.plan.bake.error + 2 * c.uncertain)
     b.line("", fmt::format("above the {:.3g}% asked for: {}", 100 * b.plan.bake.error,
-                           c.noise > 0.8 * c.error ? "more rays would help (--samples, or no --time)"
+                           r.noise > 0.8 * c.error ? "more rays would help (--samples, or no --time)"
                                                    : "what is lost lies between receivers (--quality final, or "
                                                      "--max-edge, has more)"));
 }

@@ -110,11 +110,10 @@ Result<void> parse_bounces(const std::string& text, int& count, double& converge
 // "2%" or "0.02".
 Result<double> parse_error(const std::string& text) {
   const bool percent = text.ends_with("%");
-  auto number = parse_numbers(percent ? text.substr(0, text.size() - 1) : text, 1, "--error");
-  if (!number) return number.error();
-  const double error = double((*number)[0]) / (percent ? 100 : 1);
+  const auto number = parse_numbers(percent ? text.substr(0, text.size() - 1) : text, 1, "--error");
+  const double error = number ? double((*number)[0]) / (percent ? 100 : 1) : 0;
   if (error >= least_error && error <= 1) return error;
-  return Error{"--error", "must lie between 0.01% and 100%, not " + text, true};
+  return Error{"--error", "must lie between 0.01% and 100%, not \"" + text + "\"", true};
 }
 
 struct Quality {

@@ -54,7 +54,9 @@ const Option<R> table[] = {
      "preview|good|final"},
     {"error", &R::error, "How well", D,
      "Bake to this relative RMS error, e.g. 2%, measured on rays and places of their own; says what it reached"},
-    {"time", &R::time, "How well", D, "Seconds after which no more rays are asked for, whatever the error", 0, 1e6},
+    {"time", &R::time, "How well", D,
+     "Seconds after which no more rays are asked for, whatever the error; the result then depends on the machine", 0,
+     1e6},
     {"adapt", &R::adapt, "How well", D,
      "Split edges where light changes: auto does it for scenes without bones, where neither --samples nor --max-edge "
      "is given",
@@ -206,6 +208,9 @@ Result<void> check_conflicts(const BakeRequest& r) {
   return {};
 }
 
+// So many rays on the mesh as it is.
+bool has_no_quality(const BakeRequest& r) { return r.samples > 0 && r.adapt != "on"; }
+
 Result<void> check_kind(const BakeRequest& r, BakeKind kind) {
   if (kind != BakeKind::diffuse && kind != BakeKind::lightmap && r.receivers != "vertices")
     return Error{"--receivers", std::string(bake_kind_names[int(kind)]) + " are received at vertices", true};
@@ -215,6 +220,9 @@ Result<void> check_kind(const BakeRequest& r, BakeKind kind) {
     return Error{"--shadows", "off has no bounces: leave --bounces out, or set it to 0", true};
   if (kind != BakeKind::lightmap && r.bounces.starts_with("converge:"))
     return Error{"--bounces", "converge:EPS is for lightmaps", true};
+  if (r.given.contains("quality") && has_no_quality(r))
+    return Error{"--quality", "with --samples says how fine --adapt on may make the mesh: add that, or leave one out",
+                 true};
   if (kind == BakeKind::blocks && (r.cube & (r.cube - 1)) != 0)
     return Error{"--cube", "must be 16, 32, 64, 128 or 256, not " + std::to_string(r.cube), true};
   return {};
@@ -269,6 +277,7 @@ nlohmann::json to_json(const BakeRequest& request) {
   const BakeKind kind = kind_of(request);
   nlohmann::json out = request_json(bake_options(), request, int(kind));
   if (request.shadows == "off") out.erase("bounces");
+  if (has_no_quality(request)) out.erase("quality");
   return out;
 }
 

@@ -125,7 +125,7 @@ const std::map<std::string, Change> changes{
     {"quality", {"preview", {{"adapt", "on"}}}},
     {"error", {"60%", {{"samples", nullptr}}}},
     {"time", {0.0, {{"samples", nullptr}, {"error", "0.1%"}, {"bounces", "0"}}}},
-    {"adapt", {"on", {{"quality", "final"}}}},
+    {"adapt", {"on"}},
     {"denoise", {"off"}},
     {"samples", {48}},
     {"bounces", {"1"}},
