@@ -219,6 +219,7 @@ struct Baker {
       report.noise = report.certificate.noise;
       if (options.denoise && report.noise_of_rays > 0)
         report.noise *= std::max(report.denoised / report.noise_of_rays, least_noise_left);
+      report.noise = std::min(report.noise, report.error);
       report.certify_seconds = seconds_since(start);
     }
     Transfer result = store(solved.x.data());
@@ -378,7 +379,7 @@ Result<Transfer> bake_to_error(const Scene& scene, const Tracer& tracer, const R
     // Where little is lost between receivers, noise may take the rest. Else more rays would hardly be seen beside
     // that; but noise is, in the shade of a sun.
     const double wanted = between < 0.5 * target ? 0.9 * std::sqrt(target * target - between * between)
-                                                 : std::clamp(0.2 * error, 0.4 * target, 0.6 * target);
+                                                 : std::clamp(0.2 * error, 0.3 * target, 0.6 * target);
     const double ratio = std::clamp(std::pow(noise / wanted, 1 / slope), 1.5, 16.0);
     const bool late = options.seconds >= 0 && seconds_since(start) + seconds_since(round) * ratio > options.seconds;
     if (!(noise > wanted && error > target) || options.samples == most || late) return transfer;

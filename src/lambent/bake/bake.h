@@ -26,7 +26,7 @@ struct BakeOptions {
   Precision precision = Precision::half;  // of the stored transfer
   bool keep_terms = false;                // BakeReport::terms, in as much time again as the bounces take
   // Where > 0, bake to this relative RMS error (Certificate::error) with as many rays as that asks for, instead of
-  // `samples`; where interpolation between receivers is what loses, to noise of 0.4 to 0.6 of it. No more rays are
+  // `samples`; where interpolation between receivers is what loses, to noise of 0.3 to 0.6 of it. No more rays are
   // asked for where they would end after so many seconds; negative: no limit.
   double error = 0, seconds = -1;
   bool denoise = true;  // takes away noise that neighbours do not share (denoise.h)
