@@ -47,6 +47,9 @@ endif()
 add_test(NAME include_arrows COMMAND ${CMAKE_CURRENT_SOURCE_DIR}/tests/include_arrows.sh ${CMAKE_CURRENT_SOURCE_DIR})
 add_test(NAME command_line COMMAND ${CMAKE_CURRENT_SOURCE_DIR}/tests/command_line.sh $<TARGET_FILE:lambent-tool>)
 add_test(NAME durable COMMAND ${CMAKE_CURRENT_SOURCE_DIR}/tests/durable.sh $<TARGET_FILE:lambent-tool>)
+if(LAMBENT_SANITIZE)
+  set_tests_properties(durable PROPERTIES ENVIRONMENT LAMBENT_DURABLE_RAYS=128)
+endif()
 # A hundred moments of each kind: kill_and_resume.sh LAMBENT 100.
 add_test(NAME kill_and_resume COMMAND ${CMAKE_CURRENT_SOURCE_DIR}/tests/kill_and_resume.sh
   $<TARGET_FILE:lambent-tool> 2)
