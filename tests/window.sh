@@ -23,7 +23,7 @@ env -u DISPLAY -u WAYLAND_DISPLAY "$tool" view --window "$golden/diffuse.glb" 2>
 grep -q "there is no display" error && [ "$(wc -l <error)" = 1 ] || failed "no display: $(cat error)"
 pass
 
-Xvfb -displayfd 3 -screen 0 900x700x24 -nolisten tcp 3>display >xvfb.log 2>&1 &
+Xvfb -displayfd 3 -screen 0 900x700x24 -nolisten tcp -noreset 3>display >xvfb.log 2>&1 &
 for _ in $(seq 100); do [ -s display ] && break; sleep 0.1; done
 [ -s display ] || failed "Xvfb did not start: $(cat xvfb.log)"
 export DISPLAY=:$(cat display) LIBGL_ALWAYS_SOFTWARE=1
@@ -32,16 +32,14 @@ show() { "$tool" view --window "$@"; }
 sky=sky:elevation=40,azimuth=20,turbidity=4 camera=3,2,4,1,0.5,1,40
 for file in "$golden"/*.glb; do
   name=$(basename "$file" .glb)
-  light=(--env $sky) view=(--camera $camera) size=(--size 96x72)
+  light=(--env $sky) view=(--camera $camera --spp 2) size=(--size 96x72)
   case $name in
     diffuse_fixed_view) view=() size=() ;;
     lightmap | lightmap_directional) light=() ;;
   esac
   printf '%s\n' 'panel off' 'size 96x72' 'frames 2' 'settle' "save $name.window.exr" >script
-  show "$file" "${light[@]}" "${view[@]}" --spp 2 --script script 2>log || failed "$name: $(cat log)"
-  spp=(--spp 2)
-  [ $name = diffuse_fixed_view ] && spp=()
-  "$tool" render "$file" "${light[@]}" "${view[@]}" "${size[@]}" "${spp[@]}" -o $name.render.exr >log 2>&1 ||
+  show "$file" "${light[@]}" "${view[@]}" --script script 2>log || failed "$name: $(cat log)"
+  "$tool" render "$file" "${light[@]}" "${view[@]}" "${size[@]}" -o $name.render.exr >log 2>&1 ||
     failed "$name: $(cat log)"
   cmp -s $name.window.exr $name.render.exr || failed "$name: the window's picture is not render's: $(
     "$tool" compare $name.window.exr $name.render.exr 2>&1)"
@@ -53,12 +51,12 @@ printf '%s\n' 'panel off' 'size 320x240' 'settle' 'save before.exr' 'wait 6' 'se
 show "$golden/diffuse.glb" --env $sky --camera $camera --spp 2 --script script 2>log &
 window=$!
 for _ in $(seq 100); do [ -s before.exr ] && break; sleep 0.1; done
-id=$(xdotool search --onlyvisible --pid $window | head -1)
+id=$(xdotool search --sync --onlyvisible --name '^lambent: ' | head -1) || failed "no window was found"
 xdotool mousemove --window $id 100 120 keydown shift mousedown 1 sleep 0.2 mousemove --window $id 130 120 sleep 0.2 \
   mousemove --window $id 160 120 sleep 0.2 mouseup 1 keyup shift
 wait $window || failed "a drag: $(cat log)"
 "$tool" render "$golden/diffuse.glb" --env $sky --camera $camera --spp 2 --size 320x240 --env-rotate -45,0,0 \
-  -o turned.exr >log
+  -o turned.exr >log 2>&1
 psnr=$("$tool" --json compare after.exr turned.exr | sed -n 's/.*"psnr": *\([0-9.a-z]*\).*/\1/p')
 [ -n "$psnr" ] && awk "BEGIN { exit !(\"$psnr\" == \"null\" || $psnr + 0 >= 45) }" || failed "the light turned by hand: $psnr dB"
 cmp -s before.exr after.exr && failed "the drag did nothing"

@@ -34,7 +34,7 @@ void light_controls(PanelState& panel, Session& s) {
     std::string chosen;
     if (!s.options.env.empty() && choose("environment", s.options.env, short_name(request.env), chosen))
       tell(panel, s.set("env", chosen));
-    if (ImGui::InputTextWithHint("##env", "file or sky:… and Enter", panel.env, sizeof panel.env,
+    if (ImGui::InputTextWithHint("##env", "file or sky:... and Enter", panel.env, sizeof panel.env,
                                  ImGuiInputTextFlags_EnterReturnsTrue))
       tell(panel, s.set("env", panel.env));
     bool sky = ImGui::SliderInt("sun's height", &panel.sky_elevation, 0, 90);
@@ -79,7 +79,7 @@ void material_controls(PanelState& panel, Session& s) {
   const Outgoing* outgoing = outgoing_of(baked.surface);
   const bool blocks = kind_of(baked.surface) == DrawKind::blocks;
   if (!blocks && !(outgoing && outgoing->kind == OutgoingKind::map)) return;
-  if (ImGui::InputTextWithHint("material", "diffuse, phong:…, ggx:… and Enter", panel.brdf, sizeof panel.brdf,
+  if (ImGui::InputTextWithHint("material", "diffuse, ggx:roughness=0.3 and Enter", panel.brdf, sizeof panel.brdf,
                                ImGuiInputTextFlags_EnterReturnsTrue))
     tell(panel, s.set("brdf", panel.brdf));
 }
@@ -93,7 +93,7 @@ void look_controls(PanelState& panel, Session& s) {
              s.live->request().show, chosen))
     tell(panel, s.set("show", chosen));
   static const std::vector<std::string> looks = choices_of(look_names);
-  if (choose("look", looks, "…", chosen)) {
+  if (choose("look", looks, looks[size_t(s.look)], chosen)) {
     const size_t index = size_t(std::find(looks.begin(), looks.end(), chosen) - looks.begin());
     tell(panel, s.look_as(Look(index), panel.coefficient));
   }
@@ -123,7 +123,8 @@ void comparison_controls(PanelState& panel, Session& s) {
 
 void statistics(Session& s) {
   const LiveTimes& t = s.times;
-  ImGui::Text("light %.1f  relight %.1f  rays %.1f  shade %.1f ms", t.project, t.relight, t.trace, t.shade);
+  ImGui::Text("ms: light %.1f, relight %.1f,", t.project, t.relight);
+  ImGui::Text("    rays %.1f, shade %.1f", t.trace, t.shade);
   ImGui::Text("%zu receivers, %d of %d samples", t.shaded, s.live->samples(), s.live->request().spp);
   if (s.dropped_pixels > 1) ImGui::Text("in a hurry: 1 pixel of %d", s.dropped_pixels * s.dropped_pixels);
   else if (!s.settled()) ImGui::TextUnformatted("refining");

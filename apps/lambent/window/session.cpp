@@ -79,8 +79,8 @@ Result<void> Session::show(size_t bake) {
   request.baked = names[bake];
   const LightBasis basis = light_of(bakes[bake]->surface.store);
   const bool distant = basis.order > 0 || !basis.lobes.empty() || kind_of(bakes[bake]->surface) == DrawKind::blocks;
-  if (!live && distant)
-    request.env = options.env.empty() ? "sky:elevation=35,azimuth=45,turbidity=3" : options.env.front();
+  if (!live && !options.env.empty()) request.env = options.env.front();
+  else if (!live && distant) request.env = "sky:elevation=35,azimuth=45,turbidity=3";
   auto made = LivePicture::make(*bakes[bake], request, job_);
   if (!made) return made.error();
   reference.stop();
@@ -182,9 +182,10 @@ Result<void> Session::resize(int width, int height) {
   return set("size", fmt::format("{}x{}", std::clamp(width, 1, 8192), std::clamp(height, 1, 8192)));
 }
 
-Result<void> Session::look_as(Look look, int coefficient) {
-  fresh_ = true, light_changed_ = true;
-  return live->look_as(look, coefficient);
+Result<void> Session::look_as(Look next, int coefficient) {
+  if (auto ok = live->look_as(next, coefficient); !ok) return ok;
+  look = next, fresh_ = true, light_changed_ = true;
+  return {};
 }
 
 Result<void> Session::drop(const std::string& path) {
@@ -237,7 +238,12 @@ Result<bool> Session::work(bool hurry) {
   auto worked = live->work(hurry);
   if (!worked) return worked;
   bool more = *worked;
-  if (more) times = live->times();
+  if (more) {
+    const LiveTimes& now = live->times();
+    for (double LiveTimes::*ms : {&LiveTimes::project, &LiveTimes::relight, &LiveTimes::trace, &LiveTimes::shade})
+      if (now.*ms > 0) times.*ms = now.*ms;
+    if (now.shaded > 0) times.shaded = now.shaded;
+  }
   if (other) {
     auto beside = other->work(hurry);
     if (!beside) return beside;
@@ -305,7 +311,8 @@ const Shown& Session::shown() {
   });
   dropped_pixels = std::max(1, view.width / std::max(1, image.width));
   if (right && settled() && right->width == image.width && right->height == image.height) {
-    if (auto apart = compare_images(image, *right, display, true)) distance = {apart->psnr, apart->flip, true};
+    if (auto apart = compare_images(image, *right, display, against != Against::reference))
+      distance = {apart->psnr, apart->flip, true};
   }
   return shown_;
 }

@@ -80,8 +80,9 @@ class Session {
   Against against = Against::nothing;
   float wipe = 0.5f;        // of the width
   bool difference = false;  // in place of the wipe
-  bool same_bands = true;   // the path tracer's light has no more bands than the bake's
-  bool level = true;        // light turns about +Y alone
+  Look look = Look::picture;
+  bool same_bands = true;  // the path tracer's light has no more bands than the bake's
+  bool level = true;       // light turns about +Y alone
   Distance distance;
   Display display;            // as measured, where the exposure is automatic
   LiveTimes times;            // of the latest piece of work

@@ -276,7 +276,8 @@ Result<void> LivePicture::State::add_sample() {
       if (fixed.coverage[i] < 1)
         image.rgb[i] += (1 - fixed.coverage[i]) * background(from.direction(float(i % size_t(view.width)) + 0.5f,
                                                                             float(i / size_t(view.width)) + 0.5f));
-    image.alpha.clear(), sums.samples = asked.spp;
+    if (background) image.alpha.clear();
+    sums.samples = asked.spp;
     return {};
   }
   const double pixels = double(width()) * double(height());
@@ -300,6 +301,7 @@ Result<void> LivePicture::State::add_sample() {
   RenderOptions options;
   shade_rays(*pass, shade_maker(options), background, sums);
   image = mean_of(sums, width(), height());
+  if (!background) image.alpha = image.coverage;
   times.shade = 1e3 * since(start), shade_cost = since(start) / pixels;
   return {};
 }

@@ -43,7 +43,8 @@ class LivePicture {
   bool done() const;  // all samples, of all of the light, at full size
   int samples() const;
 
-  // What there is; radiance, without alpha. In a hurry its sides may be a half, a third or a quarter of the view's.
+  // What there is; radiance, with alpha where nothing is behind the scene. In a hurry its sides may be a half, a third
+  // or a quarter of the view's.
   const Image& image() const;
   const View& view() const;
   const Scene& scene() const;              // in its pose

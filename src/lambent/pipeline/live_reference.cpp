@@ -16,6 +16,7 @@ struct LiveReference::State {
   std::unique_ptr<Progress> progress;
   std::mutex mutex;
   Image sum;
+  std::vector<Vec3> behind;  // each pixel's environment, as the live picture shows it; empty: black
   int paths = 0;
   std::string error;
   std::atomic<bool> running{false};
@@ -32,7 +33,8 @@ struct LiveReference::State {
       }
       if (paths == 0) sum = std::move(traced->image);
       else
-        for (size_t i = 0; i < sum.rgb.size(); ++i) sum.rgb[i] += traced->image.rgb[i];
+        for (size_t i = 0; i < sum.rgb.size(); ++i)
+          sum.rgb[i] += traced->image.rgb[i], sum.alpha[i] += traced->image.alpha[i];
       paths += options.spp;
     }
     running = false;
@@ -59,7 +61,15 @@ void LiveReference::start(const LivePicture& picture, const ReferenceOptions& op
   const Mat3 turn = *parse_rotation(picture.request().env_rotate, "--env-rotate");
   Environment env = picture.environment() ? *picture.environment() : Environment{"", Image(2, 1), {}};
   ReferenceOptions of = options;
-  of.background = picture.request().background == "env";
+  of.background = false;  // that of all of the light is put behind
+  s.behind.clear();
+  if (picture.request().background == "env" && picture.environment()) {
+    const View& view = picture.view();
+    const CameraRays rays(view.camera, view.width, view.height);
+    for (int y = 0; y < view.height; ++y)
+      for (int x = 0; x < view.width; ++x)
+        s.behind.push_back(radiance_bilinear(env, transpose(turn) * rays.direction(float(x) + 0.5f, float(y) + 0.5f)));
+  }
   s.thread = std::thread([&s, &scene = picture.scene(), view = picture.view(), of, order, turn,
                           turned = picture.request().env_rotate != "", env = std::move(env)]() mutable {
     if (order > 0) {
@@ -77,7 +87,11 @@ bool LiveReference::running() const { return state_->running; }
 LiveReference::Seen LiveReference::seen() const {
   std::lock_guard lock(state_->mutex);
   Seen out{state_->sum, state_->paths, state_->error};
-  for (Vec3& pixel : out.image.rgb) pixel *= 1.0f / float(std::max(out.paths, 1));
+  const float each = 1.0f / float(std::max(out.paths, 1));
+  for (size_t i = 0; i < out.image.rgb.size(); ++i) {
+    out.image.rgb[i] *= each, out.image.alpha[i] *= each;
+    if (!state_->behind.empty()) out.image.rgb[i] += (1 - out.image.alpha[i]) * state_->behind[i];
+  }
   return out;
 }
 

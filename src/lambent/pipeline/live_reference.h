@@ -23,7 +23,8 @@ class LiveReference {
   void stop();
   bool running() const;
 
-  // The mean of all paths so far; how many a pixel, 0: nothing yet.
+  // The mean of all paths so far, in front of what the live picture has behind; alpha: what surfaces cover. How many
+  // paths a pixel, 0: nothing yet.
   struct Seen {
     Image image;
     int paths = 0;

@@ -29,6 +29,7 @@ void expect_same(const Image& a, const Image& b) {
   ASSERT_EQ(a.width, b.width);
   ASSERT_EQ(a.height, b.height);
   for (size_t i = 0; i < a.rgb.size(); ++i) EXPECT_EQ(a.rgb[i], b.rgb[i]) << "pixel " << i;
+  EXPECT_EQ(a.alpha, b.alpha);
 }
 
 Image drawn(const Baked& baked, const DrawRequest& request) {
