@@ -145,7 +145,10 @@ TEST(LivePicture, OneCoefficientIsItsColumn) {
   const Image first = picture->image();
   // Of the constant harmonic, transfer is nowhere negative (red), and somewhere it is light (blue).
   float most = 0;
-  for (const Vec3& pixel : first.rgb) EXPECT_EQ(pixel.x, 0.0f), most = std::max(most, pixel.z);
+  for (const Vec3& pixel : first.rgb) {
+    EXPECT_EQ(pixel.x, 0.0f);
+    most = std::max(most, pixel.z);
+  }
   EXPECT_GT(most, 0.1f);
   for (const Look look : {Look::receivers, Look::density}) {
     ASSERT_EQ(error_of(picture->look_as(look)), "");
