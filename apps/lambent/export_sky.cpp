@@ -45,7 +45,7 @@ Result<Json> write_sky(LightmapWriter& w, const LightmapExport& o) {
   const char* snippet = godot                             ? "shaders/lambent_sky.gdshaderinc"
                       : o.target == LightmapTarget::unity ? "shaders/LambentSky.hlsl"
                                                           : "shaders/lambent_sky.glsl";
-  if (auto ok = w.save_carried(snippet); !ok) return ok.error();
+  if (auto ok = w.save_carried(snippet, "", int(count)); !ok) return ok.error();
   return sky;
 }
 

@@ -57,16 +57,23 @@ Result<void> LightmapWriter::save(const std::string& name, const std::vector<Vec
 Result<void> LightmapWriter::save_text(const std::string& path, const std::string& text) {
   files.push_back(path);
   const std::span<const uint8_t> bytes{reinterpret_cast<const uint8_t*>(text.data()), text.size()};
-  return write_file_atomically(path, bytes);
+  return write_file_atomically(path, std::span(&bytes, 1));
 }
 
-Result<void> LightmapWriter::save_carried(const std::string& name, const std::string& below) {
+Result<void> LightmapWriter::save_carried(const std::string& name, const std::string& below, int pictures) {
   const fs::path folder = fs::path(prefix).parent_path() / below;
   std::error_code status;
   if (!folder.empty()) fs::create_directories(folder, status);
   if (status) return Error{folder.string(), "cannot be written: " + status.message()};
-  const char* text = carried_file(name);
-  LAMBENT_CHECK(text);
+  const char* carried = carried_file(name);
+  LAMBENT_CHECK(carried);
+  std::string text = carried;
+  for (const std::string counted : {"[9]", "k < 9"}) {
+    std::string other = counted;
+    other.replace(other.find('9'), 1, std::to_string(pictures));
+    for (size_t at = text.find(counted); at != std::string::npos; at = text.find(counted, at + other.size()))
+      text.replace(at, counted.size(), other);
+  }
   return save_text((folder / fs::path(name).filename()).string(), text);
 }
 

@@ -32,8 +32,9 @@ struct LightmapWriter {
                     const std::vector<float>* alpha = nullptr);
   Result<void> save_picture(const std::string& path, const Image& image);
   Result<void> save_text(const std::string& path, const std::string& text);
-  // One of the files that the tool carries, into the folder of `prefix` or one below.
-  Result<void> save_carried(const std::string& name, const std::string& below = "");
+  // One of the files that the tool carries, into the folder of `prefix` or one below; those that sum 9 pictures sum
+  // `pictures`.
+  Result<void> save_carried(const std::string& name, const std::string& below = "", int pictures = 9);
   // PREFIX.KIND.glb: the scene with the atlas as TEXCOORD_1; node names of each part.
   Result<std::vector<std::vector<std::string>>> save_scene(const std::string& path);
   // Names without folders, as files beside one another name each other.

@@ -79,6 +79,7 @@ before = {o.name: [s.material for s in o.material_slots] for o in scene.objects}
 count = len(scene.objects)
 check(bake() == {"FINISHED"}, "a scene of all that is baked")
 names = {o.name for o in scene.objects if o.get("lambent_lit")}
+print(names)
 check({"wavy lit", "twin lit", "other twin lit", "wedge lit", "wedge_2 lit", "tool lit", "letter lit"} == names,
       "instances, twins, modifiers, texts and linked objects have lit copies")
 check("Lightmap" in floor.data.uv_layers and floor.material_slots[0].material.get("lambent_lit"),

@@ -61,7 +61,7 @@ def arguments_of(settings, given, sky, output):
             out += ["--lattice", f"{lattice[0]},{lattice[2]},{lattice[1]}"]
         return out + ["-o", output]
     out = ["bake", given, "--transfer", "lightmap", "--texels-per-unit", f"{settings.texels:.9g}",
-           "--samples", str(settings.samples), "--bounces", str(settings.bounces), "--light-units", "lumen"]
+           "--samples", str(settings.samples), "--bounces", str(settings.bounces)]
     if settings.light_groups:
         out.append("--light-groups")
     if sky:

@@ -81,6 +81,8 @@ def collect(context, selected_only, notes):
         if source.hide_render or (instancer and instancer.hide_render) or source.get("lambent_lit"):
             hidden += 1
             continue
+        if instancer == source and source.name in taken:  # a text or curve comes again as the mesh that it makes
+            continue
         name, number = source.name, 2
         while name in taken:
             name, number = f"{source.name}_{number}", number + 1
