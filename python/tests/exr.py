@@ -7,7 +7,8 @@ import numpy as np
 
 def read_exr(path):
     """Channel name -> float32 (height, width), the first row at the top."""
-    data = open(path, "rb").read()
+    with open(path, "rb") as file:
+        data = file.read()
     assert data[:4] == b"\x76\x2f\x31\x01" and data[4] == 2 and data[5] & 0x1a == 0, path
     at, attributes = 8, {}
     while data[at]:

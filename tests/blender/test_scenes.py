@@ -140,7 +140,7 @@ settings_for(kind="LIGHTMAP", texels=60, samples=20000)
 work = lambent_bake.Bake(bpy.context)
 for _ in range(600):
     time.sleep(0.05)
-    if work.run.poll() is not None or work.run.fraction > 0.01:
+    if work.run.poll() is not None or 0.005 < work.run.fraction < 0.9:
         break
 check(0 < work.run.fraction < 1 and work.run.process.poll() is None, f"progress: {work.run.stage} {work.run.fraction:.3f}")
 start = time.time()
