@@ -365,6 +365,22 @@ class Engines(unittest.TestCase):
             text = text_of(snippet)
             self.assertIn("9", text)
 
+    def test_attributes_of_other_programs_stay(self):
+        places = np.array([[0, 0, 0], [2, 0, 0], [2, 0, 2], [0, 0, 2], [0, 2, 0], [2, 2, 0]], np.float32)
+        made = glb_module.Glb()
+        made.json["scenes"][0]["nodes"] = [made.push("nodes", {"mesh": 0, "name": "corner"})]
+        made.push("meshes", {"primitives": [{"attributes": {
+            "POSITION": made.accessor(places, bounds=True), "_ID": made.accessor(np.arange(6, dtype=np.float32))},
+            "indices": made.accessor(np.array([3, 2, 1, 3, 1, 0, 0, 1, 5, 0, 5, 4], np.uint32))}]})
+        made.save("corner.glb")
+        run("bake", "corner.glb", "--transfer", "lightmap", "--sky", "uniform:1", "--atlas", "32x32", "--samples", "16", "-o",
+            "cornered.glb")
+        baked = glb_module.Glb.load("cornered.glb")
+        attributes = baked.json["meshes"][0]["primitives"][0]["attributes"]
+        number = baked.array(attributes["_ID"]).astype(int)
+        self.assertGreater(len(number), 6)  # charts part at the crease
+        np.testing.assert_array_equal(baked.array(attributes["POSITION"]), places[number])
+
 
 if __name__ == "__main__":
     unittest.main()

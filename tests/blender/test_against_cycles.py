@@ -27,7 +27,7 @@ sun = lamp("sun", "SUN", (0, 0, 5), 0.4, angle=0.0)
 sun.rotation_euler = (0.5, 0.3, 0)
 camera((0, -5.2, 1.7), (0, 0.6, 1.0))
 settings = scene.lambent
-settings.kind, settings.texels, settings.samples, settings.bounces = "LIGHTMAP", texels, 2048, 8
+settings.kind, settings.texels, settings.samples, settings.bounces = "LIGHTMAP", texels, 1024, 8
 settings.output = os.path.join(folder, "room.glb")
 check(bpy.ops.lambent.bake() == {"FINISHED"}, "a room with four kinds of lamps is baked")
 groups = sorted(n.label for g in bpy.data.node_groups for n in g.nodes if n.type == "RGB")
@@ -50,7 +50,7 @@ for obj in scene.objects:
             node = nodes.get("target") or nodes.new("ShaderNodeTexImage")
             node.name, node.image = "target", target
             nodes.active = node
-scene.cycles.samples, scene.cycles.max_bounces, scene.cycles.diffuse_bounces = 2048, 9, 9
+scene.cycles.samples, scene.cycles.max_bounces, scene.cycles.diffuse_bounces = 1024, 9, 9
 scene.cycles.sample_clamp_indirect, scene.cycles.blur_glossy = 0, 0
 scene.render.bake.margin = 4
 bpy.ops.object.bake(type="DIFFUSE", pass_filter={"DIRECT", "INDIRECT"}, margin=4, use_clear=True)
@@ -78,7 +78,7 @@ print(f"measured: PSNR of the two pictures {difference:.1f} dB")
 # And the original under Cycles, with nothing baked.
 bpy.ops.lambent.switch()
 scene.cycles.max_bounces = 9
-original = render("room_original", samples=256)
+original = render("room_original", samples=64)
 print(f"measured: PSNR of the lightmap's picture and Cycles' own of the scene {psnr(ours, original):.1f} dB")
 check(abs(np.median(ratio) - 1) < 0.02, "the median agrees within 2 %")
 check(difference >= 35, "the pictures agree to 35 dB")

@@ -206,7 +206,7 @@ def write_lamp(glb, name, light, matrix, notes):
     if light.type == "AREA":
         places, faces, area = flat_lamp(light, matrix)
         if area > 0:
-            glowing_shape(glb, name, places, faces, color / (math.pi * area))
+            glowing_shape(glb, name, places, faces, color / (4 * area))  # as Cycles has it, and EEVEE
         if getattr(light, "spread", math.pi) < math.pi - 1e-3:
             notes.append(f'lamp "{name}": its spread is left out: it shines to all sides of its front')
         return
