@@ -56,8 +56,8 @@ def loop_over_single_rays(scene, v, normals, n=1600):
 
 
 def features():
-    """Against the loop at as many directions (1,600, of which theirs count on one side of the surface alone), at as many
-    that count (800), and at as little noise."""
+    """Against the loop at as many directions (1,600, of which theirs count on one side of the surface alone), at as
+    many that count (800), and at no more noise."""
     v, f = scan()
     exact, _ = lambent.prt_features(v, f, convention="lambent", samples=16384, seed=7)
     scene, normals = lambent.Scene(v, f), lambent.vertex_normals(v, f).astype(float)

@@ -1,6 +1,6 @@
-"""What `pip install .` asks (PEP 517): CMake builds the extension, this puts a wheel together. It needs nothing that pip
-would have to fetch; the C++ libraries are the system's (scripts/common.sh names Debian's). $LAMBENT_BUILD names a build
-folder to use, configured or not; without, build/wheel."""
+"""What `pip install .` asks (PEP 517): CMake builds the extension, this puts a wheel together. It needs nothing that
+pip would have to fetch; the C++ libraries are the system's (scripts/common.sh names Debian's). $LAMBENT_BUILD names a
+build folder to use, configured or not; without, build/wheel."""
 import base64
 import hashlib
 import os

@@ -15,11 +15,14 @@ quietly() { "$@" >"$root.log" 2>&1 || { tail -n 30 "$root.log" >&2; exit 1; }; }
 cp /etc/apt/apt.conf.d/* "$root/etc/apt/apt.conf.d/" 2>/dev/null || true
 cp /etc/resolv.conf "$root/etc/resolv.conf"
 mountpoint -q "$root/proc" || mount -t proc proc "$root/proc"
-inside() { chroot "$root" env -i PATH=/usr/bin:/bin:/usr/sbin:/sbin HOME=/root LANG=C.UTF-8 DEBIAN_FRONTEND=noninteractive "$@"; }
+inside() {
+  chroot "$root" env -i PATH=/usr/bin:/bin:/usr/sbin:/sbin HOME=/root LANG=C.UTF-8 DEBIAN_FRONTEND=noninteractive "$@"
+}
 cp "$deb" "$root/tmp/lambent.deb"
 quietly inside apt-get update
 quietly inside apt-get install -y --no-install-recommends /tmp/lambent.deb
-echo "installed: $(inside dpkg-query -W -f '${Package} ${Version}' lambent), $(inside dpkg-query -f '.\n' -W | wc -l) packages in all"
+echo "installed: $(inside dpkg-query -W -f '${Package} ${Version}' lambent)," \
+  "$(inside dpkg-query -f '.\n' -W | wc -l) packages in all"
 mkdir -p "$root/tmp/use"
 cp "$here/examples/relight.c" "$here/examples/bake_and_relight.cpp" "$root/tmp/use/"
 cat >"$root/tmp/use/use.sh" <<'S'
@@ -31,7 +34,8 @@ lambent bake corner.obj --order 3 --samples 64 -o corner.glb >/dev/null 2>&1
 lambent render corner.glb --env sky:elevation=30 --size 64x64 -o corner.png >/dev/null 2>&1
 [ -s corner.png ] && echo "bake and render: ok"
 lambent bake corner.obj --transfer lightmap --sky uniform:1 --atlas 32x32 --samples 64 -o map.glb >/dev/null 2>&1
-lambent export map.glb --godot light/room >/dev/null 2>&1 || { mkdir light; lambent export map.glb --godot light/room >/dev/null; }
+mkdir light
+lambent export map.glb --godot light/room >/dev/null
 [ -s light/lambent_lightmap.gd ] && echo "export: ok"
 if [ -d /usr/share/lambent/web ]; then lambent export corner.glb --web site >/dev/null && echo "page: ok"; fi
 python3 - <<'P'

@@ -1,5 +1,6 @@
-"""What `lambent export` writes for Godot, Unity and three.js, read back as they read it, layer by layer: by the formulas
-of their shaders and the layouts of their loaders (docs/engines.md names their sources). They themselves are not run."""
+"""What `lambent export` writes for Godot, Unity and three.js, read back as they read it, layer by layer: by the
+formulas of their shaders and the layouts of their loaders (docs/engines.md names their sources). They themselves are
+not run."""
 import json
 import os
 import re
@@ -58,7 +59,8 @@ def text_of(path):
 
 def parse(text):
     """Godot's text resources: sections, and in each the properties as Python values; calls are (name, arguments)."""
-    tokens = re.findall(r'"(?:\\.|[^"\\])*"|[-+]?[0-9.]+(?:e[-+]?[0-9]+)?|[A-Za-z_][A-Za-z_0-9]*(?:\[[A-Za-z]+\])?|\S', text)
+    number, name = r"[-+]?[0-9.]+(?:e[-+]?[0-9]+)?", r"[A-Za-z_][A-Za-z_0-9]*(?:\[[A-Za-z]+\])?"
+    tokens = re.findall(r'"(?:\\.|[^"\\])*"|' + number + "|" + name + r"|\S", text)
     at = 0
 
     def value():
@@ -135,8 +137,8 @@ def godot_capture(c, n):
 def unity_light(c, n):
     """ShadeSH9() of Unity's shaders, from SphericalHarmonicsL2's numbers as SetSHCoefficients packs them."""
     x, y, z = n
-    return c[3] * x + c[1] * y + c[2] * z + c[0] - c[6] + c[4] * x * y + c[5] * y * z + 3 * c[6] * z * z + c[7] * z * x + \
-        c[8] * (x * x - y * y)
+    return c[3] * x + c[1] * y + c[2] * z + c[0] - c[6] + c[4] * x * y + c[5] * y * z + 3 * c[6] * z * z + \
+        c[7] * z * x + c[8] * (x * x - y * y)
 
 
 def look_up(picture, uv):
@@ -156,8 +158,8 @@ class Engines(unittest.TestCase):
         os.chdir(cls.held.name)
         write("box.obj", BOX)
         write("box.mtl", MATERIALS)
-        common = ["--transfer", "lightmap", "--sky", "uniform:0.3,0.4,0.6", "--texels-per-unit", "12", "--samples", "128",
-                  "--bounces", "2"]
+        common = ["--transfer", "lightmap", "--sky", "uniform:0.3,0.4,0.6", "--texels-per-unit", "12", "--samples",
+                  "128", "--bounces", "2"]
         run("bake", "box.obj", *common, "-o", "flat.glb")
         run("bake", "box.obj", *common, "--light-groups", "-o", "groups.glb")
         run("bake", "box.obj", *common, "--directional", "sh:2", "-o", "bent.glb")
@@ -198,7 +200,7 @@ class Engines(unittest.TestCase):
                     m = 2 * layers[1:] - 1
                     ours = layers[0] * (1 + 4 * (m[0] * y + m[1] * z + m[2] * x))
                 off = np.abs(ours[lit] - three_irradiance(probe, n)[lit] / np.pi).max(1)
-                # Beyond the surface texels are means of their neighbours', and a mean of packed layers is not that of light.
+                # Texels beyond the surface are means of neighbours', and a mean of packed layers is not that of light.
                 self.assertLessEqual(np.mean(off > 0.01), 0 if version == "4.3" else 0.01)
                 self.assertLess(np.median(off), 0.002)
         self.export("bent.glb", "--unity", "unity")
@@ -269,8 +271,8 @@ class Engines(unittest.TestCase):
         np.testing.assert_allclose(points, np.array(three["positions"]).reshape(-1, 3), rtol=1e-5)
         theirs = np.array(three["sh"]).reshape(-1, 9, 3)
         for n in normals:
-            np.testing.assert_allclose([godot_capture(c, n) for c in sh], [three_irradiance(c, n) / np.pi for c in theirs],
-                                       atol=1e-4)
+            np.testing.assert_allclose([godot_capture(c, n) for c in sh],
+                                       [three_irradiance(c, n) / np.pi for c in theirs], atol=1e-4)
 
     def probes_of_three(self):
         self.export("flat.glb", "--three", "t", "--probes", "free.glb", "--env", "sky:elevation=30")
@@ -303,7 +305,8 @@ class Engines(unittest.TestCase):
 
     def test_probes_under_an_even_sky(self):
         write("speck.obj", "v 0 0 0\nv 0.01 0 0\nv 0 0 0.01\nf 1 2 3\n")
-        run("bake", "speck.obj", "--lattice", "2,2,2", "--lattice-box", "-3,-3,-3,3,3,3", "--samples", "256", "-o", "speck.glb")
+        run("bake", "speck.obj", "--lattice", "2,2,2", "--lattice-box", "-3,-3,-3,3,3,3", "--samples", "256", "-o",
+            "speck.glb")
         self.export("flat.glb", "--unity", "even", "--probes", "speck.glb", "--env", "uniform:1,0.5,0.25")
         for c in np.array(json.loads(text_of("even.unity.json"))["probes"]["sh"]).reshape(-1, 9, 3):
             for n in normals:  # irradiance / pi of a sky of radiance L is L
@@ -350,7 +353,8 @@ class Engines(unittest.TestCase):
 
     def test_sky_columns(self):
         write("floor.obj", "v 0 0 0\nv 0 0 1\nv 1 0 1\nv 1 0 0\nf 1 2 3 4\n")
-        run("bake", "floor.obj", "--receivers", "texels", "--order", "3", "--atlas", "16x16", "--samples", "1024", "-o", "prt.glb")
+        run("bake", "floor.obj", "--receivers", "texels", "--order", "3", "--atlas", "16x16", "--samples", "1024",
+            "-o", "prt.glb")
         for target, snippet in (("--three", "lambent_sky.glsl"), ("--godot", "lambent_sky.gdshaderinc"),
                                 ("--unity", "LambentSky.hlsl")):
             self.export("prt.glb", target, "s", "--sky-columns", "--env", "uniform:1,0.5,0.25")
@@ -373,8 +377,8 @@ class Engines(unittest.TestCase):
             "POSITION": made.accessor(places, bounds=True), "_ID": made.accessor(np.arange(6, dtype=np.float32))},
             "indices": made.accessor(np.array([3, 2, 1, 3, 1, 0, 0, 1, 5, 0, 5, 4], np.uint32))}]})
         made.save("corner.glb")
-        run("bake", "corner.glb", "--transfer", "lightmap", "--sky", "uniform:1", "--atlas", "32x32", "--samples", "16", "-o",
-            "cornered.glb")
+        run("bake", "corner.glb", "--transfer", "lightmap", "--sky", "uniform:1", "--atlas", "32x32", "--samples", "16",
+            "-o", "cornered.glb")
         baked = glb_module.Glb.load("cornered.glb")
         attributes = baked.json["meshes"][0]["primitives"][0]["attributes"]
         number = baked.array(attributes["_ID"]).astype(int)

@@ -1,4 +1,5 @@
-"""What Blender scenes have in them: no UVs, modifiers, linked files, instanced and mirrored collections, hidden objects."""
+"""What Blender scenes have in them: no UVs, modifiers, linked files, instanced and mirrored collections, what is
+hidden."""
 import os
 import subprocess
 import sys
@@ -43,7 +44,8 @@ floor = plane("floor", [(-3, -3, 0), (3, -3, 0), (3, 3, 0), (-3, 3, 0)], None)
 settings_for()
 scene.world.use_nodes = True
 scene.world.node_tree.nodes["Background"].inputs["Color"].default_value = (0, 0, 0, 1)
-check("gives light" in bake() and not bpy.data.objects["floor"].data.uv_layers, "so is a scene without light; nothing changes")
+check("gives light" in bake() and not bpy.data.objects["floor"].data.uv_layers,
+      "so is a scene without light; nothing changes")
 lamp("sun", "SUN", (0, 0, 5), 3, angle=0.0)
 
 grey = material("grey", (0.5,) * 3)
@@ -79,7 +81,6 @@ before = {o.name: [s.material for s in o.material_slots] for o in scene.objects}
 count = len(scene.objects)
 check(bake() == {"FINISHED"}, "a scene of all that is baked")
 names = {o.name for o in scene.objects if o.get("lambent_lit")}
-print(names)
 check({"wavy lit", "twin lit", "other twin lit", "wedge lit", "wedge_2 lit", "tool lit", "letter lit"} == names,
       "instances, twins, modifiers, texts and linked objects have lit copies")
 check("Lightmap" in floor.data.uv_layers and floor.material_slots[0].material.get("lambent_lit"),
@@ -110,12 +111,15 @@ a, b = light_at(bpy.data.objects["wedge lit"], (-1.2, -1.3, 0.2)), light_at(mirr
 check(abs(a - b) < 0.05 * a and a > 0.2, f"both wedges are lit alike on their slopes: {a:.3f} and {b:.3f}")
 glb_size = os.path.getsize(bpy.path.abspath(scene.lambent.output))
 check(glb_size > 10000, "the GLB for the web is there")
-check(all(o.hide_render for o in scene.objects if o.name in ("instance 0", "twin", "wavy", "tool")), "originals are hidden")
+check(all(o.hide_render for o in scene.objects if o.name in ("instance 0", "twin", "wavy", "tool")),
+      "originals are hidden")
 bpy.ops.lambent.switch()
 check(all([s.material for s in o.material_slots] == before[o.name] for o in scene.objects
-          if o.name in before and o.name != "floor") and not scene.objects["wavy"].hide_render, "one click shows the originals")
+          if o.name in before and o.name != "floor") and not scene.objects["wavy"].hide_render,
+      "one click shows the originals")
 bpy.ops.lambent.switch()
-check(bake() == {"FINISHED"} and len([o for o in scene.objects if o.get("lambent_lit")]) == 7, "baked again, nothing piles up")
+check(bake() == {"FINISHED"} and len([o for o in scene.objects if o.get("lambent_lit")]) == 7,
+      "baked again, nothing piles up")
 bpy.ops.lambent.forget()
 check(len(scene.objects) == count and not floor.data.uv_layers, "and all of it can be taken out again")
 
@@ -142,9 +146,11 @@ for _ in range(600):
     time.sleep(0.05)
     if work.run.poll() is not None or 0.005 < work.run.fraction < 0.9:
         break
-check(0 < work.run.fraction < 1 and work.run.process.poll() is None, f"progress: {work.run.stage} {work.run.fraction:.3f}")
+check(0 < work.run.fraction < 1 and work.run.process.poll() is None,
+      f"progress: {work.run.stage} {work.run.fraction:.3f}")
 start = time.time()
 work.close()
-check(work.run.process.poll() == 1 and time.time() - start < 10 and not os.path.exists(work.folder), "cancelled, nothing left")
+check(work.run.process.poll() == 1 and time.time() - start < 10 and not os.path.exists(work.folder),
+      "cancelled, nothing left")
 os.environ["LAMBENT"] = "/nowhere/lambent"
 check("not found" in bake(), "a program that is not there is an error in one line")

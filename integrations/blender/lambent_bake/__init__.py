@@ -1,4 +1,4 @@
-"""Bake with lambent: light of lamps, sky and their reflections into a picture over the scene (with a layer for each lamp,
+"""Bake with lambent: light of lamps, sky and their reflections into a picture over the scene (with one for each lamp,
 to be dimmed afterwards), or light transport that a web page relights. Properties > Scene > Bake with lambent, or from
 Python: bpy.ops.lambent.bake(), in `blender -b FILE -P SCRIPT` too."""
 import os
@@ -30,8 +30,8 @@ class LambentSettings(bpy.types.PropertyGroup):
         ("LIGHTMAP", "Lightmap", "The light of lamps and world, with its reflections, in a picture over all objects"),
         ("PRT", "Light transport", "How the scene answers to any sky, for a page that relights it"),
         ("LATTICE", "Transport and free space", "The same, and light at points of a lattice, for what moves")])
-    selected: BoolProperty(name="Selected objects only", description="Others cast shadows and reflect, and stay as they are")
-    light_groups: BoolProperty(name="Light groups", default=True, description="A picture for each lamp, to be dimmed later")
+    selected: BoolProperty(name="Selected objects only", description="Others cast shadows and stay as they are")
+    light_groups: BoolProperty(name="Light groups", default=True, description="A picture for each lamp, to be dimmed")
     texels: FloatProperty(name="Texels a metre", default=32, min=0.01, soft_max=512)
     samples: IntProperty(name="Rays", default=512, min=1, max=65536, description="For each texel")
     bounces: IntProperty(name="Reflections", default=4, min=0, max=64)

@@ -88,8 +88,8 @@ def make_copy(item, collection):
 
 
 def make_group(name, pictures):
-    """A group of nodes whose output is light: each lamp's picture times a colour, to dim it. On backs, that of the back's
-    coordinates."""
+    """A group of nodes whose output is light: each lamp's picture times a colour, to dim it. On backs, that of the
+    back's coordinates."""
     group = bpy.data.node_groups.get(name)
     if group is None:
         group = bpy.data.node_groups.new(name, "ShaderNodeTree")
@@ -204,8 +204,8 @@ def load_picture(path, name):
 
 
 def apply(context, items, glb_path, pictures, name, notes):
-    """pictures: (label, path) of each light group. Objects that cannot take UVs of their own (instances, those of linked
-    files, those whose modifiers change them) get copies beside them."""
+    """pictures: (label, path) of each light group. Objects that cannot take UVs of their own (instances, those of
+    linked files, those whose modifiers change them) get copies beside them."""
     corners = items[-1].first + items[-1].corners()
     front, back = read_places(glb_path, corners)
     forget(context)
@@ -252,8 +252,8 @@ def apply(context, items, glb_path, pictures, name, notes):
     for material in lit.values():
         material.use_fake_user = True
     if copies:
-        notes.append(f"{copies} objects share their mesh, are linked or have modifiers: triangles of their own stand for "
-                     'them in the collection "lambent"')
+        notes.append(f"{copies} objects share their mesh, are linked or have modifiers: triangles of their own stand "
+                     'for them in the collection "lambent"')
     show(context, True)
 
 

@@ -83,6 +83,6 @@ class Run:
     def result(self):
         """What it printed; raises its own line where it failed."""
         if self.poll() != 0:
-            said = [m for m in self.messages if m.startswith("lambent:")] or self.messages or ["it ended without a word"]
+            said = [m for m in self.messages if m.startswith("lambent:")] or self.messages or ["it said nothing"]
             raise Failed(said[-1].removeprefix("lambent:").strip())
         return json.loads("".join(self.output) or "{}")

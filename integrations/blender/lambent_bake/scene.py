@@ -62,7 +62,7 @@ def read_mesh(item, mesh):
 
 
 def can_take_uv(source, corners):
-    """Whether lightmap coordinates fit the object's own mesh: one of its own, of this file, that no modifier changes."""
+    """Whether lightmap coordinates fit the object's own mesh: no other's, of this file, that no modifier changes."""
     if source.type != "MESH" or source.library or source.data.library or source.override_library:
         return False
     return source.data.users == 1 and not any(m.show_viewport or m.show_render for m in source.modifiers) and \
@@ -262,8 +262,8 @@ def write_scene(context, items, path, notes):
 
 
 def write_sky(context, folder):
-    """The world as `--sky` takes it; None of a black one. Whatever its nodes are, Cycles draws them, as a panorama whose
-    middle is +X: that of lambent's maps."""
+    """The world as `--sky` takes it; None of a black one. Whatever its nodes are, Cycles draws them, as a panorama
+    whose middle is +X: that of lambent's maps."""
     world = context.scene.world
     if world is None:
         return None

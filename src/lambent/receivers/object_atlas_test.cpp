@@ -34,7 +34,8 @@ TEST(ObjectAtlas, FindsTheWholeAtlasValues) {
   TexelReceivers split = whole;
   const std::vector<ObjectAtlas> objects = split_atlas(scene, split);
   ASSERT_EQ(objects.size(), scene.parts.size());
-  EXPECT_EQ(objects[0].name, "box"), EXPECT_EQ(objects[2].name, "box_2");
+  EXPECT_EQ(objects[0].name, "box");
+  EXPECT_EQ(objects[2].name, "box_2");
   size_t looked = 0;
   for (const ObjectAtlas& object : objects) {
     const std::vector<float> own = values_of(object, picture);
