@@ -59,7 +59,7 @@ def features():
     """Against the loop at as many directions (1,600, of which theirs count on one side of the surface alone), at as
     many that count (800), and at no more noise."""
     v, f = scan()
-    exact, _ = lambent.prt_features(v, f, convention="lambent", samples=16384, seed=7)
+    exact, _ = lambent.prt_features(v, f, convention="lambent", samples=4096, seed=7)
     scene, normals = lambent.Scene(v, f), lambent.vertex_normals(v, f).astype(float)
     some = np.random.default_rng(2).choice(len(v), 1000, replace=False)
     found = []

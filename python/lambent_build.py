@@ -1,6 +1,6 @@
 """What `pip install .` asks (PEP 517): CMake builds the extension, this puts a wheel together. It needs nothing that
 pip would have to fetch; the C++ libraries are the system's (scripts/common.sh names Debian's). $LAMBENT_BUILD names a
-build folder to use, configured or not; without, build/wheel."""
+build folder to use, as it is configured (with -DLAMBENT_PYTHON=ON) or new; without, build/wheel."""
 import base64
 import hashlib
 import os
@@ -50,11 +50,10 @@ get_requires_for_build_sdist = get_requires_for_build_wheel
 
 def build_extension(into):
     build = os.environ.get("LAMBENT_BUILD") or os.path.join(root, "build", "wheel")
-    subprocess.run(["cmake", "-S", root, "-B", build, "-DCMAKE_BUILD_TYPE=Release", "-DLAMBENT_PYTHON=ON",
-                    f"-DPython_EXECUTABLE={sys.executable}", "-DLAMBENT_PYTHON_DIR=.",
-                    *([] if os.path.exists(os.path.join(build, "CMakeCache.txt")) else
-                      ["-DLAMBENT_TESTS=OFF", "-DLAMBENT_BENCH=OFF"] +
-                      (["-G", "Ninja"] if shutil.which("ninja") else []))], check=True)
+    if not os.path.exists(os.path.join(build, "CMakeCache.txt")):
+        subprocess.run(["cmake", "-S", root, "-B", build, "-DCMAKE_BUILD_TYPE=Release", "-DLAMBENT_PYTHON=ON",
+                        f"-DPython_EXECUTABLE={sys.executable}", "-DLAMBENT_TESTS=OFF", "-DLAMBENT_BENCH=OFF",
+                        *(["-G", "Ninja"] if shutil.which("ninja") else [])], check=True)
     subprocess.run(["cmake", "--build", build, "--target", "lambent_python", "--parallel"], check=True)
     subprocess.run(["cmake", "--install", build, "--component", "python", "--prefix", into, "--strip"], check=True)
 
@@ -67,11 +66,13 @@ def build_wheel(wheel_directory, config_settings=None, metadata_directory=None):
     with tempfile.TemporaryDirectory() as stage:
         build_extension(stage)
         files = {}
-        for folder, _, found in os.walk(os.path.join(stage, "lambent")):
-            for f in found:
-                path = os.path.join(folder, f)
-                with open(path, "rb") as content:
-                    files[os.path.relpath(path, stage)] = content.read()
+        for folder, _, found in os.walk(stage):
+            for f in found if os.path.basename(folder) == "lambent" else []:
+                with open(os.path.join(folder, f), "rb") as content:
+                    files[f"lambent/{f}"] = content.read()
+    suffix = sysconfig.get_config_var("EXT_SUFFIX")
+    if f"lambent/_lambent{suffix}" not in files:
+        raise RuntimeError(f"the build folder's Python is another one: no _lambent{suffix} came of it")
     files[f"{info}/METADATA"] = metadata().encode()
     files[f"{info}/WHEEL"] = (f"Wheel-Version: 1.0\nGenerator: lambent\nRoot-Is-Purelib: false\n"
                               f"Tag: {tag}-{tag}-{platform}\n").encode()
