@@ -268,12 +268,12 @@ def show(context, lit):
         if names is not None:
             for slot, name in zip(obj.material_slots, names):
                 slot.material = bpy.data.materials.get(name) if name else None
-        if obj.get("lambent_hidden"):
-            obj.hide_render = lit
-            obj.hide_set(lit)
-        if obj.get("lambent_lit"):
-            obj.hide_render = not lit
-            obj.hide_set(not lit)
+        hidden = lit if obj.get("lambent_hidden") else not lit if obj.get("lambent_lit") else None
+        if hidden is None:
+            continue
+        obj.hide_render = hidden
+        if obj.name in context.view_layer.objects:  # not in a collection that the view leaves out
+            obj.hide_set(hidden)
     context.scene["lambent_shown"] = lit
 
 
