@@ -5,9 +5,8 @@
 
 #include <lambent/bake/gather.h>
 #include <lambent/bake/kernels.h>
+#include <lambent/core/embree.h>
 #include <lambent/core/parallel.h>
-
-#include <embree3/rtcore.h>
 
 #include <atomic>
 #include <cstring>
@@ -58,10 +57,9 @@ double raw_seconds(int runs, const Receivers& receivers, const DirectionSets& se
 
 inline size_t occluded_stream(RTCScene scene, Vec3 o, const float* x, const float* y, const float* z, size_t n) {
   alignas(64) RTCRay rays[256];
-  RTCIntersectContext context;
-  rtcInitIntersectContext(&context);
+  embree::Query query;
   for (size_t i = 0; i < n; ++i) rays[i] = {o.x, o.y, o.z, 0, x[i], y[i], z[i], 0, INFINITY, ~0u, 0, 0};
-  rtcOccluded1M(scene, &context, rays, unsigned(n), sizeof(RTCRay));
+  embree::occluded_many(scene, query, rays, n);
   size_t found = 0;
   for (size_t i = 0; i < n; ++i) found += rays[i].tfar < 0;
   return found;
@@ -72,8 +70,7 @@ size_t packets(RTCScene scene, Vec3 o, const float* x, const float* y, const flo
   alignas(64) int valid[16];
   std::fill(valid, valid + 16, -1);
   size_t found = 0;
-  RTCIntersectContext context;
-  rtcInitIntersectContext(&context);
+  embree::Query query;
   for (size_t begin = 0; begin < n; begin += 16) {
     RTCRayHit16 p;
     for (int i = 0; i < 16; ++i) {
@@ -84,8 +81,8 @@ size_t packets(RTCScene scene, Vec3 o, const float* x, const float* y, const flo
       p.ray.flags[i] = 0;
       p.hit.geomID[i] = RTC_INVALID_GEOMETRY_ID, p.hit.instID[0][i] = RTC_INVALID_GEOMETRY_ID;
     }
-    if (closest) rtcIntersect16(valid, scene, &context, &p);
-    else rtcOccluded16(valid, scene, &context, &p.ray);
+    if (closest) embree::intersect16(valid, scene, query, p);
+    else embree::occluded16(valid, scene, query, p.ray);
     for (int i = 0; i < 16; ++i) found += closest ? p.hit.geomID[i] != RTC_INVALID_GEOMETRY_ID : p.ray.tfar[i] < 0;
   }
   return found;
@@ -93,13 +90,12 @@ size_t packets(RTCScene scene, Vec3 o, const float* x, const float* y, const flo
 
 inline size_t closest_stream(RTCScene scene, Vec3 o, const float* x, const float* y, const float* z, size_t n) {
   alignas(64) RTCRayHit rays[256];
-  RTCIntersectContext context;
-  rtcInitIntersectContext(&context);
+  embree::Query query;
   for (size_t i = 0; i < n; ++i) {
     rays[i].ray = {o.x, o.y, o.z, 0, x[i], y[i], z[i], 0, INFINITY, ~0u, 0, 0};
     rays[i].hit.geomID = RTC_INVALID_GEOMETRY_ID, rays[i].hit.instID[0] = RTC_INVALID_GEOMETRY_ID;
   }
-  rtcIntersect1M(scene, &context, rays, unsigned(n), sizeof(RTCRayHit));
+  embree::intersect_many(scene, query, rays, n);
   size_t found = 0;
   for (size_t i = 0; i < n; ++i) found += rays[i].hit.geomID != RTC_INVALID_GEOMETRY_ID;
   return found;

@@ -1,6 +1,6 @@
 # The Python package (docs/python.md), in build/.../python as it is installed: `import lambent` with PYTHONPATH there.
 # Debian's python3-dev, python3-numpy and pybind11-dev; another Python by -DPython_EXECUTABLE.
-if(NOT DEFINED Python_EXECUTABLE AND NOT SKBUILD AND EXISTS /usr/bin/python3)
+if(NOT DEFINED Python_EXECUTABLE AND EXISTS /usr/bin/python3)
   set(Python_EXECUTABLE /usr/bin/python3)
 endif()
 find_package(Python 3.9 REQUIRED COMPONENTS Interpreter Development.Module)
@@ -19,13 +19,9 @@ foreach(file ${lambent_python_files})
   configure_file(python/lambent/${file} ${lambent_python_folder}/${file} COPYONLY)
 endforeach()
 
-if(SKBUILD)
-  set(lambent_python_destination lambent)
-else()
-  set(LAMBENT_PYTHON_DIR lib/python${Python_VERSION_MAJOR}.${Python_VERSION_MINOR}/dist-packages CACHE STRING
-    "Where Python finds packages, below the prefix")
-  set(lambent_python_destination ${LAMBENT_PYTHON_DIR}/lambent)
-endif()
+set(LAMBENT_PYTHON_DIR lib/python${Python_VERSION_MAJOR}.${Python_VERSION_MINOR}/dist-packages CACHE STRING
+  "Where Python finds packages, below the prefix")
+set(lambent_python_destination ${LAMBENT_PYTHON_DIR}/lambent)
 list(TRANSFORM lambent_python_files PREPEND python/lambent/ OUTPUT_VARIABLE lambent_python_sources)
 install(TARGETS lambent_python LIBRARY DESTINATION ${lambent_python_destination} COMPONENT python)
 install(FILES ${lambent_python_sources} DESTINATION ${lambent_python_destination} COMPONENT python)

@@ -258,6 +258,20 @@ expect 2 'product' render map.glb $view --show colour -o x.png
 expect 0 'lamps' bake box.obj --transfer lightmap --gather hemicube --atlas 64x64 --samples 300 -o cube.glb
 expect 0 'texels' export map.glb --three map_three
 expect 0 'texels' export map.glb --godot map_godot
+expect 0 'map_moz.glb' export map.glb --moz-lightmap map_moz.glb
+expect 0 'LambentImporter.cs' export map.glb --unity map_unity --per-object
+expect 0 'map_own.layers.exr' export map.glb --godot map_own --per-object --godot-version 4.3
+expect 2 'godot-version' export map.glb --godot x --godot-version 4.2
+expect 2 'godot' export map.glb --three x --godot-version 4.4
+expect 2 'need --env' export map.glb --three x --probes map.glb
+expect 1 'no light in free space' export map.glb --three x --probes map.glb --env uniform:1
+expect 2 'says nothing here' export map.glb --three x --env uniform:1
+expect 2 'one file holds it all' export map.glb --moz-lightmap x.glb --sky-columns
+expect 2 'goes with --web alone' export map.glb --three x --camera 1,2,3,4,5,6,40
+expect 2 'goes with --three' export map.glb --npy x --per-object
+expect 1 'no harmonics' export map.glb --three x --sky-columns
+expect 0 '"fraction":' bake box.obj --samples 16 --progress json -o x.glb
+for left in x.exr x.lamp.exr x.three.glb x.glb.lambent-part; do absent "$left"; done
 expect 0 'lamps' bake box.obj --transfer lightmap --directional sh:2 --atlas 64x64 --samples 64 -o sh2.glb
 expect 0 'sh2_godot.3.exr' export sh2.glb --godot sh2_godot
 expect 0 'sh2_three.3.exr' export sh2.glb --three sh2_three
@@ -302,6 +316,8 @@ expect 0 'relit' render hl2.glb $view -o hl2.exr
 expect 1 'sh:2 or sh:3' export hl2.glb --godot x
 expect 0 'receivers' bake box.obj --receivers texels --atlas 64x64 --order 3 --samples 64 -o prt.glb
 expect 1 'no lamps' export prt.glb --three x
+expect 0 'lambent_sky.glsl' export prt.glb --three prt_sky --sky-columns --env sky:elevation=30
+[ -s prt_sky.sky.8.exr ] && [ -s prt_sky.sky.json ] && ok || bad "sky columns are missing"
 expect 0 'relit' render prt.glb --env sky:elevation=30 $view -o prt.exr
 # Pictures of light groups add up to that of all; clusters are lamps too, and so are those beside harmonics.
 expect 0 'texels' bake box.obj --transfer lightmap --sky uniform:0.3,0.4,0.6 --texels-per-unit 20 --samples 512 \

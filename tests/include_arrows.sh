@@ -52,7 +52,7 @@ only() {  # only PATTERN PLACES...
     [[ " $* " == *" ${file%%/*} "* ]] || { echo "$file may not include $pattern"; bad=1; }
   done < <(grep -rlE "#include [<\"]$pattern" . --include='*.h' --include='*.cpp' | sed 's/^\.\///')
 }
-only embree trace reference
+only embree core trace reference
 only tbb/ core
 only stb_image image scene
 only OpenEXR image

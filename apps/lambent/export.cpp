@@ -19,7 +19,8 @@ namespace fs = std::filesystem;
 
 struct ExportCommand {
   WebOptions web;
-  std::string folder, three, godot, npy, convention = "pifu";
+  std::string folder, three, moz, godot, unity, npy, convention = "pifu";
+  LightmapExport lightmap;
 };
 
 // The folder of an earlier export, or nothing: all else is somebody's work.
@@ -72,10 +73,33 @@ Result<void> write_folder(const fs::path& target, const WebFiles& files, const P
   return {};
 }
 
-int run_export(Context& context, const ExportCommand& o) {
+// What the page alone shows says nothing of other files.
+Result<void> check_options(const ExportCommand& o, const CLI::App& command) {
+  const bool web = !o.folder.empty(), lightmap = !web && o.npy.empty();
+  for (const char* name : {"--compare", "--reference", "--camera", "--exposure", "--tone"})
+    if (!web && command.count(name) > 0) return Error{name, "goes with --web alone", true};
+  for (const char* name : {"--env", "--env-rotate"})
+    if (!o.npy.empty() && command.count(name) > 0) return Error{name, "does not go with --npy", true};
+  for (const char* name : {"--per-object", "--sky-columns", "--probes"})
+    if (!lightmap && command.count(name) > 0)
+      return Error{name, "goes with --three, --moz-lightmap, --godot or --unity", true};
+  if (lightmap && o.web.env.size() > 1) return Error{"--env", "takes one environment here", true};
+  return {};
+}
+
+int run_export(Context& context, const ExportCommand& o, const CLI::App& command) {
   context.cleans_up = true;
-  if (!o.three.empty()) return export_lightmap(context, o.web.baked, LightmapTarget::three, o.three);
-  if (!o.godot.empty()) return export_lightmap(context, o.web.baked, LightmapTarget::godot, o.godot);
+  if (auto ok = check_options(o, command); !ok) return fail(ok.error());
+  for (const auto& [prefix, target] :
+       {std::pair(&o.three, LightmapTarget::three), std::pair(&o.moz, LightmapTarget::moz),
+        std::pair(&o.godot, LightmapTarget::godot), std::pair(&o.unity, LightmapTarget::unity)}) {
+    if (prefix->empty()) continue;
+    LightmapExport lightmap = o.lightmap;
+    lightmap.baked = o.web.baked, lightmap.prefix = *prefix, lightmap.target = target;
+    if (!o.web.env.empty()) lightmap.light.env = o.web.env[0];
+    lightmap.light.rotate = o.web.rotate;
+    return export_lightmap(context, lightmap);
+  }
   if (!o.npy.empty()) return export_npy(context, o.web.baked, o.npy, o.convention);
   fs::path target = fs::path(o.folder).lexically_normal();
   if (!target.has_filename()) target = target.parent_path();  // "site/"
@@ -105,8 +129,14 @@ void add_export(CLI::App& app, Run& run) {
       "--three", o->three,
       "PREFIX of pictures for three.js: a lightmap's irradiance, with a scene that wears it (MOZ_lightmap), or "
       "LightProbe coefficients a texel");
-  target->add_option("--godot", o->godot,
-                     "PREFIX of pictures for Godot: the layers of a directional lightmap, from sh:2 or sh:3");
+  target->add_option("--moz-lightmap", o->moz,
+                     "A GLB to write: the scene with its own materials and the lightmap as MOZ_lightmap");
+  auto* godot = target->add_option(
+      "--godot", o->godot,
+      "PREFIX for Godot: pictures, of sh:2 or sh:3 the layers of a directional lightmap; a LightmapGIData, the scene "
+      "with UV2 and a script");
+  target->add_option("--unity", o->unity,
+                     "PREFIX for Unity: colours and, of sh:2 or sh:3, directions; the scene with UV2 and scripts");
   auto* npy = target->add_option(
       "--npy", o->npy, "Folder for NumPy: transfer by the input's vertices, for PRT data sets, and the faces");
   c->add_option("--convention", o->convention,
@@ -114,8 +144,18 @@ void add_export(CLI::App& app, Run& run) {
                 "gltf-ibl, filament, directx")
       ->capture_default_str()
       ->needs(npy);
+  c->add_option("--godot-version", o->lightmap.godot_version, "With --godot: whose layout LightmapGIData has")
+      ->check(CLI::IsMember({"4.3", "4.4", "4.5", "4.6"}))
+      ->capture_default_str()
+      ->needs(godot);
+  c->add_flag("--per-object", o->lightmap.per_object, "Of a lightmap: an atlas of its own for each object, by name");
+  c->add_flag("--sky-columns", o->lightmap.sky_columns,
+              "Of a lightmap with harmonics: a picture for each, which a shader sums by the sky's coefficients "
+              "(--env's are written beside them)");
+  c->add_option("--probes", o->lightmap.probes,
+                "Of a lightmap: probes too, from this file, baked with --lattice, in the light of --env");
   target->require_option(1);
-  c->callback([o, &run] { run = [o](Context& context) { return run_export(context, *o); }; });
+  c->callback([o, c, &run] { run = [o, c](Context& context) { return run_export(context, *o, *c); }; });
 }
 
 }  // namespace lambent::tool

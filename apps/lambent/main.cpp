@@ -42,6 +42,11 @@ int main(int argc, char** argv) {
   app.fallthrough();
   tool::Context context;
   app.add_flag("--json", context.json, "Results as JSON");
+  std::string progress = "text";
+  app.add_option("--progress", progress,
+                 "On stderr: text, or json, an object a line: {\"stage\": ..., \"fraction\": ...}")
+      ->check(CLI::IsMember({"text", "json"}))
+      ->capture_default_str();
   app.add_option("--threads", context.threads, "Threads to use; 0: all cores")->check(CLI::Range(0, 1024));
 
   tool::Run run;
@@ -70,6 +75,7 @@ int main(int argc, char** argv) {
     fmt::print(stderr, "lambent: {}\n", e.what());
     return tool::bad_usage;
   }
+  context.json_progress = progress == "json";
   ThreadLimit limit(context.threads);
   const ReadLog inputs;  // none is written over
   try {

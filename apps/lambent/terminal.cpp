@@ -71,6 +71,22 @@ class ProgressLog {
   Clock::time_point started_ = Clock::now(), said_ = Clock::now();
 };
 
+// For programs: whenever a stage begins or ends, and between five times a second.
+class ProgressJson {
+ public:
+  void operator()(const std::string& stage, double fraction) {
+    const auto now = Clock::now();
+    if (fraction > 0 && fraction < 1 && std::chrono::duration<double>(now - said_).count() < 0.2) return;
+    said_ = now;
+    const nlohmann::json line = {{"stage", stage}, {"fraction", fraction}};
+    fmt::print(stderr, "{}\n", line.dump());
+    std::fflush(stderr);
+  }
+
+ private:
+  Clock::time_point said_;
+};
+
 Context* interrupted = nullptr;
 std::sig_atomic_t interruptions = 0;
 std::atomic<bool> any_stage{false};  // has begun; before, files are read, which hears nothing
@@ -96,7 +112,12 @@ Progress::Report heard(Progress::Report report) {
 
 }  // namespace
 
-Context::Context() : progress(heard(::isatty(2) ? Progress::Report(ProgressLine()) : Progress::Report(ProgressLog()))) {
+Context::Context()
+    : progress(heard([this, text = ::isatty(2) ? Progress::Report(ProgressLine()) : Progress::Report(ProgressLog()),
+                      json_lines = ProgressJson()](const std::string& stage, double fraction) mutable {
+        if (json_progress) json_lines(stage, fraction);
+        else text(stage, fraction);
+      })) {
   interrupted = this;
   struct sigaction action = {};
   action.sa_handler = on_interrupt;

@@ -17,6 +17,7 @@ inline constexpr int success = 0, failure = 1, bad_usage = 2;
 
 struct Context {
   bool json = false;
+  bool json_progress = false;  // a JSON object a line, for programs: {"stage": ..., "fraction": ...}
   int threads = 0;
   bool cleans_up = false;  // the command removes what it made when it is cancelled; others end at once while they read
   Progress progress;

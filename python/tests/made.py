@@ -68,6 +68,14 @@ def write_obj(path, v, f, head=""):
         out.writelines(f"f {a} {b} {c}\n" for a, b, c in (f + 1).tolist())
 
 
+def run(*arguments):
+    """What the tool prints, run in the working folder; its own line where it fails."""
+    done = subprocess.run([tool, *map(str, arguments)], capture_output=True, text=True, check=False)
+    if done.returncode != 0:
+        raise AssertionError(done.stderr)
+    return done.stdout
+
+
 class Case(unittest.TestCase):
     """With a folder of its own."""
 

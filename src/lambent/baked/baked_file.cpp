@@ -9,6 +9,7 @@
 #include <lambent/core/overloaded.h>
 
 #include <algorithm>
+#include <set>
 #include <filesystem>
 #include <map>
 
@@ -173,12 +174,57 @@ Result<void> save_baked(const std::string& path, const Baked& baked, const Viewe
   });
 }
 
-Result<void> save_look(const std::string& path, const Baked& baked, const ViewerLook& look) {
+namespace {
+
+// Nodes with meshes get names that no other has; then the names of each part's node and of those above it.
+std::vector<std::vector<std::string>> name_nodes(json& document, const GltfPlaces& places) {
+  std::set<std::string> taken;
+  std::vector<size_t> parents(document["nodes"].size(), SIZE_MAX);
+  for (size_t n = 0; n < document["nodes"].size(); ++n) {
+    json& node = document["nodes"][n];
+    if (node.contains("children"))
+      for (const json& child : node["children"]) parents[child.get<size_t>()] = n;
+    const bool named = node.contains("name") && node["name"].is_string() && node["name"] != "";
+    const std::string given = named ? node["name"].get<std::string>() : "node";
+    std::string name = given;
+    for (int i = 2; !taken.insert(name).second; ++i) name = given + "_" + std::to_string(i);
+    node["name"] = name;
+  }
+  std::vector<std::vector<std::string>> out;
+  for (int node : places.part_nodes) {
+    std::vector<std::string> names;
+    for (size_t n = node < 0 ? SIZE_MAX : size_t(node); n != SIZE_MAX; n = parents[n])
+      names.insert(names.begin(), document["nodes"][n]["name"].get<std::string>());
+    out.push_back(std::move(names));
+  }
+  return out;
+}
+
+// Whether some texture is looked up in this set.
+bool uses_set(const Scene& scene, int set) {
+  return std::any_of(scene.materials.begin(), scene.materials.end(), [&](const Material& m) {
+    return (m.base_color_texture >= 0 && m.texcoord_set == set) ||
+           (m.transmission_texture >= 0 && m.transmission_set == set) ||
+           (m.metallic_roughness_texture >= 0 && m.metallic_roughness_set == set) ||
+           (m.normal_texture >= 0 && m.normal_set == set) || (m.emissive_texture >= 0 && m.emissive_set == set);
+  });
+}
+
+}  // namespace
+
+Result<void> save_look(const std::string& path, const Baked& baked, const ViewerLook& look,
+                       std::vector<std::vector<std::string>>* nodes) {
+  if (look.kind == LookKind::coordinates && uses_set(baked.scene, 1))
+    return Error{path, "would lose texture coordinates: materials use the second set, which is the lightmap's there"};
   std::vector<GltfBlob> blobs;
   LookWriter look_writer(baked.scene, baked.basis, &look);
   look_writer.add_blobs(blobs);
-  return save_glb(path, baked.scene, blobs,
-                  [&](json& document, const GltfPlaces& places) { look_writer.write(document, places); });
+  return save_glb(path, baked.scene, blobs, [&](json& document, const GltfPlaces& places) {
+    look_writer.write(document, places);
+    if (look.kind != LookKind::coordinates) return;
+    auto named = name_nodes(document, places);
+    if (nodes) *nodes = std::move(named);
+  });
 }
 
 Result<Baked> load_baked(const std::string& path) {

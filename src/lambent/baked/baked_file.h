@@ -35,11 +35,17 @@ const Field* lattice_of(const Baked& baked);
 // What viewers without our extension are to show of a bake over texels. emission: every surface glows with one picture
 // over the atlas, the light that leaves it, as an emissive texture of a black material; lamps keep their own emission.
 // moz_lightmap: the scene's own materials with the light that arrives, in the vendor extension MOZ_lightmap.
-enum class LookKind : uint8_t { emission, moz_lightmap };
-struct ViewerLook {
+// coordinates: no picture, the scene's own materials and TEXCOORD_1 for pictures that an engine is given apart; nodes
+// with meshes get names that no other has.
+enum class LookKind : uint8_t { emission, moz_lightmap, coordinates };
+struct ViewerPicture {
   std::vector<uint8_t> png;  // sRGB, of radiance / strength; MOZ_lightmap's is linear, of irradiance / strength
   float strength = 1;
+};
+struct ViewerLook : ViewerPicture {
   LookKind kind = LookKind::emission;
+  std::vector<ViewerPicture> objects = {};    // in place of the one picture: one an object (object_atlas.h)
+  std::vector<uint32_t> object_of_part = {};  // into objects, where there are any
 };
 
 // With a look, primitives get materials for it, two-sided ones a second primitive for their backs; the scene's own
@@ -47,8 +53,11 @@ struct ViewerLook {
 // hold.
 Result<void> save_baked(const std::string& path, const Baked& baked, const ViewerLook* look = nullptr);
 
-// The scene with a look and without the transfer, for other programs. Errors: as above.
-Result<void> save_look(const std::string& path, const Baked& baked, const ViewerLook& look);
+// The scene with a look and without the transfer, for other programs. `nodes` gets, where it is given, the names of
+// each part's node and of those above it, topmost first; none of parts without vertices. Errors: as above; coordinates
+// whose set the scene's materials use.
+Result<void> save_look(const std::string& path, const Baked& baked, const ViewerLook& look,
+                       std::vector<std::vector<std::string>>* nodes = nullptr);
 
 // The scene comes without what an earlier bake had put into its file. Errors: as read_fields() and load_gltf().
 Result<Baked> load_baked(const std::string& path);

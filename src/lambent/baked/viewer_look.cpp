@@ -10,6 +10,7 @@
 #include <algorithm>
 #include <map>
 #include <optional>
+#include <tuple>
 
 namespace lambent {
 namespace {
@@ -71,10 +72,15 @@ LookWriter::LookWriter(const Scene& scene, const SpatialBasis& basis, const View
   }
 }
 
+const ViewerPicture& LookWriter::picture(size_t object) const {
+  return look_->objects.empty() ? *look_ : look_->objects[object];
+}
+
 void LookWriter::add_blobs(std::vector<GltfBlob>& blobs) {
   first_blob_ = blobs.size();
   if (!look_) return;
-  blobs.push_back({look_->png, 4});
+  pictures_ = look_->kind == LookKind::coordinates ? 0 : std::max<size_t>(1, look_->objects.size());
+  for (size_t i = 0; i < pictures_; ++i) blobs.push_back({picture(i).png, 4});
   for (const Side& side : fronts_) blobs.push_back({bytes_of(side.at), 4});
   for (const Side& side : backs_)
     if (!side.indices.empty()) blobs.push_back({bytes_of(side.at), 4}), blobs.push_back({bytes_of(side.indices), 4});
@@ -131,11 +137,13 @@ size_t LookWriter::glowing_material(json& document, const json& original, size_t
 }
 
 // A copy of the material that wears the lightmap. Backs are primitives of their own, with texels of their own.
-size_t LookWriter::lit_material(json& document, const json& original, size_t texture, size_t set) const {
+size_t LookWriter::lit_material(json& document, const json& original, size_t texture, size_t set, size_t object) const {
   if (look_->kind == LookKind::emission) return glowing_material(document, original, texture, set);
   json lit = original;
   lit.erase("doubleSided");
-  lit["extensions"]["MOZ_lightmap"] = {{"index", texture}, {"texCoord", set}, {"intensity", look_->strength}};
+  if (look_->kind == LookKind::coordinates) return push(document, "materials", std::move(lit));
+  lit["extensions"]["MOZ_lightmap"] = {
+      {"index", texture + object}, {"texCoord", set}, {"intensity", picture(object).strength}};
   use_extension(document, "MOZ_lightmap");
   return push(document, "materials", std::move(lit));
 }
@@ -143,14 +151,18 @@ size_t LookWriter::lit_material(json& document, const json& original, size_t tex
 void LookWriter::write(json& document, const GltfPlaces& places) const {
   if (!look_) return;
   const int first_view = places.first_view + int(first_blob_);
-  const size_t image =
-      push(document, "images", {{"bufferView", first_view}, {"mimeType", "image/png"}, {"name", "lightmap"}});
-  const size_t sampler =
-      push(document, "samplers", {{"magFilter", 9729}, {"minFilter", 9729}, {"wrapS", 33071}, {"wrapT", 33071}});
-  const size_t texture = push(document, "textures", {{"source", image}, {"sampler", sampler}});
-  std::optional<size_t> plain;                      // what primitives without a material have, spelt out
-  std::map<std::pair<size_t, size_t>, size_t> lit;  // by own material and set of texture coordinates
-  int view = first_view + 1 + int(fronts_.size());  // of the backs
+  const size_t texture = document.contains("textures") ? document["textures"].size() : 0;  // the first of ours
+  for (size_t i = 0; i < pictures_; ++i) {
+    const size_t image = push(document, "images",
+                              {{"bufferView", first_view + int(i)}, {"mimeType", "image/png"}, {"name", "lightmap"}});
+    const size_t sampler =
+        push(document, "samplers", {{"magFilter", 9729}, {"minFilter", 9729}, {"wrapS", 33071}, {"wrapT", 33071}});
+    push(document, "textures", {{"source", image}, {"sampler", sampler}});
+  }
+  const int first_front = first_view + int(pictures_);
+  std::optional<size_t> plain;                               // what primitives without a material have, spelt out
+  std::map<std::tuple<size_t, size_t, size_t>, size_t> lit;  // by own material, set of texture coordinates, object
+  int view = first_front + int(fronts_.size());              // of the backs
   auto places_accessor = [&](int buffer_view, size_t count) {
     return push(document, "accessors",
                 {{"bufferView", buffer_view}, {"componentType", 5126}, {"count", count}, {"type", "VEC2"}});
@@ -165,7 +177,7 @@ void LookWriter::write(json& document, const GltfPlaces& places) const {
     if (ours.is_null()) {  // fresh, and not shared with an earlier part
       ours = json::object();
       size_t set = 1;
-      while (attributes.contains(texcoord(set))) ++set;
+      while (look_->kind != LookKind::coordinates && attributes.contains(texcoord(set))) ++set;
       if (set != 1) ours["texCoord"] = set;
       if (!primitive.contains("material")) {
         if (!plain) plain = push(document, "materials", {{"name", "default"}});
@@ -173,11 +185,12 @@ void LookWriter::write(json& document, const GltfPlaces& places) const {
       }
       const size_t own = primitive["material"].get<size_t>();
       ours["ownMaterial"] = own;
-      auto [material, is_new] = lit.try_emplace({own, set}, 0);
-      if (is_new) material->second = lit_material(document, json(document["materials"][own]), texture, set);
+      auto [material, is_new] = lit.try_emplace({own, set, object_of(p)}, 0);
+      if (is_new)
+        material->second = lit_material(document, json(document["materials"][own]), texture, set, object_of(p));
       primitive["material"] = material->second;
     }
-    const size_t front = places_accessor(first_view + 1 + int(p), part.vertex_count);
+    const size_t front = places_accessor(first_front + int(p), part.vertex_count);
     attributes[texcoord(ours.value("texCoord", size_t{1}))] = front;
     if (!attributes.contains("TEXCOORD_0")) attributes["TEXCOORD_0"] = front;
     if (backs_[p].indices.empty()) continue;
@@ -189,7 +202,7 @@ void LookWriter::write(json& document, const GltfPlaces& places) const {
     const size_t set = ours.value("texCoord", size_t{1});
     json back = {{"attributes", {{"POSITION", attributes["POSITION"]}}},
                  {"indices", indices},
-                 {"material", lit.at({ours["ownMaterial"].get<size_t>(), set})}};
+                 {"material", lit.at({ours["ownMaterial"].get<size_t>(), set, object_of(p)})}};
     if (look_->kind == LookKind::emission) {
       for (size_t k = 0; k <= set; ++k) back["attributes"][texcoord(k)] = at;
     } else {  // the material's own textures too; normals would be those of the front
@@ -200,7 +213,7 @@ void LookWriter::write(json& document, const GltfPlaces& places) const {
     back["extensions"][extension_name] = {{"viewerOnly", true}};
     mesh["primitives"].push_back(std::move(back));
   }
-  if (look_->kind == LookKind::moz_lightmap) forget(document);
+  if (look_->kind != LookKind::emission) forget(document);
 }
 
 std::optional<ViewerLook> load_look(const MappedFile& file, const std::string& path) {
@@ -225,7 +238,7 @@ std::optional<ViewerLook> load_look(const MappedFile& file, const std::string& p
       const json& view = member(item("images", member(texture, "source")), "bufferView");
       if (!strength.is_number() || !view.is_number_unsigned()) continue;  // a lamp's
       auto png = view_bytes({*chunks, file}, view.get<size_t>(), path);
-      if (png) return ViewerLook{{png->begin(), png->end()}, strength.get<float>()};
+      if (png) return ViewerLook{{{png->begin(), png->end()}, strength.get<float>()}};
     }
   return std::nullopt;
 }

@@ -106,19 +106,36 @@ Result<std::optional<ViewerLook>> lightmap_look(const Lightmap& map, const Scene
   return std::optional<ViewerLook>(std::move(look));
 }
 
+namespace {
+
+// Bytes are to be linear: what a PNG encodes as sRGB is decoded before.
+Result<std::vector<uint8_t>> linear_png(Image picture) {
+  for (Vec3& c : picture.rgb)
+    c = {srgb_decode(std::min(c.x, 1.0f)), srgb_decode(std::min(c.y, 1.0f)), srgb_decode(std::min(c.z, 1.0f))};
+  return encode_png(picture, {}, "lightmap");
+}
+
+}  // namespace
+
 Result<ViewerLook> irradiance_look(const TexelReceivers& texels, std::vector<Vec3> irradiance) {
   ViewerLook look;
   look.kind = LookKind::moz_lightmap;
   for (Vec3& c : irradiance) c = max(c, Vec3(0));
   look.strength = normalize_brightness(irradiance);
-  Image picture = lightmap_picture(texels, irradiance);
-  // Bytes are to be linear: what a PNG encodes as sRGB is decoded before.
-  for (Vec3& c : picture.rgb)
-    c = {srgb_decode(std::min(c.x, 1.0f)), srgb_decode(std::min(c.y, 1.0f)), srgb_decode(std::min(c.z, 1.0f))};
-  auto png = encode_png(picture, {}, "lightmap");
+  auto png = linear_png(lightmap_picture(texels, irradiance));
   if (!png) return png.error();
   look.png = std::move(*png);
   return look;
+}
+
+Result<ViewerPicture> irradiance_picture(Image irradiance) {
+  ViewerPicture picture;
+  for (Vec3& c : irradiance.rgb) c = max(c, Vec3(0));
+  picture.strength = normalize_brightness(irradiance.rgb);
+  auto png = linear_png(std::move(irradiance));
+  if (!png) return png.error();
+  picture.png = std::move(*png);
+  return picture;
 }
 
 }  // namespace lambent

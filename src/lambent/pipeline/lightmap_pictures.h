@@ -25,5 +25,7 @@ Result<std::optional<ViewerLook>> lightmap_look(const Lightmap& map, const Scene
 
 // Irradiance of every receiver for MOZ_lightmap, in as many bits, clamped alike.
 Result<ViewerLook> irradiance_look(const TexelReceivers& texels, std::vector<Vec3> irradiance);
+// Of a picture, texel by texel.
+Result<ViewerPicture> irradiance_picture(Image irradiance);
 
 }  // namespace lambent

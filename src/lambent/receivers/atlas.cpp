@@ -4,6 +4,8 @@
 #include <lambent/receivers/islands.h>
 #include <lambent/receivers/raster.h>
 
+#include <lambent/scene/gltf.h>
+
 #include <algorithm>
 
 namespace lambent {
@@ -290,6 +292,16 @@ size_t part_overlaps(const Layout& layout, double density, std::vector<uint8_t>&
   return moved;
 }
 
+// Whether the document has the part's vertices as they stand, and they stay where they are: then new ones may be copies
+// of those, with whatever attributes they have.
+bool stands(const Scene& scene, const Part& part) {
+  if (!scene.document || part.node < 0 || (part.changed && part.source.empty())) return false;
+  const nlohmann::json& node = scene.document->json["nodes"][size_t(part.node)];
+  if (node.contains("skin")) return false;
+  const nlohmann::json& mesh = scene.document->json["meshes"][node["mesh"].get<size_t>()];
+  return !mesh["primitives"][size_t(part.primitive)].contains("targets");
+}
+
 // Gives every (vertex, chart) a vertex of its own, and its place.
 void split_vertices(Scene& scene, const Charts& charts, const std::vector<std::array<Vec2, 3>>& corners,
                     const std::vector<Vec2>& front_shift, const std::vector<Vec2>& back_shift, Atlas& atlas) {
@@ -317,9 +329,13 @@ void split_vertices(Scene& scene, const Charts& charts, const std::vector<std::a
       for (uint32_t v : old.triangles[i].v) keys.push_back({v, charts.of_triangle[i]});
     std::sort(keys.begin(), keys.end());
     keys.erase(std::unique(keys.begin(), keys.end()), keys.end());
+    const bool copies = stands(scene, part);
+    const uint32_t old_first = part.first_vertex;
+    const std::vector<uint32_t> source = std::move(part.source);
     part.first_vertex = uint32_t(scene.positions.size()), part.vertex_count = uint32_t(keys.size());
     part.changed = true, part.source.clear();
     for (const Key& key : keys) {
+      if (copies) part.source.push_back(source.empty() ? key.vertex - old_first : source[key.vertex - old_first]);
       scene.positions.push_back(old.positions[key.vertex]), scene.normals.push_back(old.normals[key.vertex]);
       for (size_t set = 0; set < old.texcoords.size(); ++set)
         if (!old.texcoords[set].empty()) scene.texcoords[set].push_back(old.texcoords[set][key.vertex]);

@@ -1,10 +1,9 @@
-// Ray tracing by Embree 3: one scene, watertight ("robust") traversal, single rays.
+// Ray tracing by Embree: one scene, watertight ("robust") traversal, single rays.
+#include <lambent/core/embree.h>
 #include <lambent/core/parallel.h>
 #include <lambent/core/random.h>
 #include <lambent/reference/intersect.h>
 #include <lambent/scene/see_through.h>
-
-#include <embree3/rtcore.h>
 
 #include <algorithm>
 #include <cstring>
@@ -29,7 +28,7 @@ namespace {
 constexpr float offset_ulps = 16;
 
 struct CameraContext {
-  RTCIntersectContext context;  // first, so that Embree's pointer to it is a pointer to this
+  embree::Query query;  // first: embree.h
   const Scene* scene;
   const std::vector<uint32_t>* passed = nullptr;  // triangles that are not there any more
   bool backs = false;
@@ -60,12 +59,12 @@ void set_ray(RTCRay& ray, Vec3 origin, Vec3 d) {
   ray.time = 0, ray.mask = ~0u, ray.id = 0, ray.flags = 0;
 }
 
-bool trace(RTCScene bvh, RTCIntersectContext& context, Vec3 origin, Vec3 d, Hit& hit, float* distance = nullptr) {
+bool trace(RTCScene bvh, embree::Query& query, Vec3 origin, Vec3 d, Hit& hit, float* distance = nullptr) {
   RTCRayHit r;
   set_ray(r.ray, origin, d);
   if (distance) r.ray.tnear = *distance;
   r.hit.geomID = RTC_INVALID_GEOMETRY_ID, r.hit.instID[0] = RTC_INVALID_GEOMETRY_ID;
-  rtcIntersect1(bvh, &context, &r);
+  embree::intersect1(bvh, query, r);
   if (r.hit.geomID == RTC_INVALID_GEOMETRY_ID) return false;
   hit = {r.hit.primID, r.hit.u, r.hit.v};
   if (distance) *distance = r.ray.tfar;
@@ -81,7 +80,7 @@ Result<Intersector> Intersector::make(const Scene& scene) {
   impl->device = rtcNewDevice(nullptr);
   if (!impl->device) return Error{scene.path, "the ray tracer cannot start"};
   impl->bvh = rtcNewScene(impl->device);
-  rtcSetSceneFlags(impl->bvh, RTCSceneFlags(RTC_SCENE_FLAG_ROBUST | RTC_SCENE_FLAG_CONTEXT_FILTER_FUNCTION));
+  rtcSetSceneFlags(impl->bvh, RTCSceneFlags(RTC_SCENE_FLAG_ROBUST | embree::filtered));
   RTCGeometry mesh = rtcNewGeometry(impl->device, RTC_GEOMETRY_TYPE_TRIANGLE);
   // Embree's own buffers: it reads 16 bytes at the last vertex.
   void* positions =
@@ -105,24 +104,21 @@ Result<Intersector> Intersector::make(const Scene& scene) {
 }
 
 bool Intersector::nearest(Vec3 origin, Vec3 d, Hit& hit) const {
-  RTCIntersectContext context;
-  rtcInitIntersectContext(&context);
-  return trace(impl_->bvh, context, origin, d, hit);
+  embree::Query query;
+  return trace(impl_->bvh, query, origin, d, hit);
 }
 
 bool Intersector::nearest_visible(Vec3 origin, Vec3 d, Hit& hit) const {
   CameraContext camera;
-  rtcInitIntersectContext(&camera.context);
-  camera.context.filter = skip_backs, camera.scene = impl_->scene;
-  return trace(impl_->bvh, camera.context, origin, d, hit);
+  camera.query.filter = skip_backs, camera.scene = impl_->scene;
+  return trace(impl_->bvh, camera.query, origin, d, hit);
 }
 
 bool Intersector::occluded(Vec3 origin, Vec3 d) const {
-  RTCIntersectContext context;
-  rtcInitIntersectContext(&context);
+  embree::Query query;
   RTCRay ray;
   set_ray(ray, origin, d);
-  rtcOccluded1(impl_->bvh, &context, &ray);
+  embree::occluded1(impl_->bvh, query, ray);
   return ray.tfar < 0;
 }
 
@@ -141,12 +137,11 @@ bool Intersector::lets_pass() const { return !impl_->see_through.empty(); }
 bool Intersector::next(Vec3 origin, Vec3 d, bool camera, Way& way, Hit& hit) const {
   for (;;) {
     CameraContext context;
-    rtcInitIntersectContext(&context.context);
-    context.context.filter = skip_backs, context.scene = impl_->scene, context.passed = &way.passed;
+    context.query.filter = skip_backs, context.scene = impl_->scene, context.passed = &way.passed;
     context.backs = !camera;
     const float last = way.distance;
     float distance = way.distance * (1 - Way::same_sheet);
-    if (!trace(impl_->bvh, context.context, origin, d, hit, &distance)) return false;
+    if (!trace(impl_->bvh, context.query, origin, d, hit, &distance)) return false;
     const bool solid = !impl_->see_through[impl_->scene->parts[impl_->scene->triangles[hit.triangle].part].material];
     const bool same = !way.passed.empty() && distance <= last * (1 + Way::same_sheet);
     if (solid || !same) return way.distance = distance, true;

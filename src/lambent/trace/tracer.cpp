@@ -1,9 +1,8 @@
+#include <lambent/core/embree.h>
 #include <lambent/core/parallel.h>
 #include <lambent/core/random.h>
 #include <lambent/scene/see_through.h>
 #include <lambent/trace/tracer.h>
-
-#include <embree3/rtcore.h>
 
 #include <algorithm>
 #include <atomic>
@@ -65,7 +64,7 @@ struct Layers {
 };
 
 struct CollectContext {
-  RTCIntersectContext context;  // first, so that Embree's pointer to it is a pointer to this
+  embree::Query query;  // first: embree.h
   const std::vector<uint8_t>* passes;
   std::vector<Hit>* through;
 };
@@ -85,13 +84,13 @@ void collect(const RTCFilterFunctionNArguments* args) {
   }
 }
 
-Hit intersect(RTCScene scene, RTCIntersectContext& context, Vec3 origin, Vec3 direction, float from, float to) {
+Hit intersect(RTCScene scene, embree::Query& query, Vec3 origin, Vec3 direction, float from, float to) {
   RTCRayHit r;
   r.ray.org_x = origin.x, r.ray.org_y = origin.y, r.ray.org_z = origin.z, r.ray.tnear = from;
   r.ray.dir_x = direction.x, r.ray.dir_y = direction.y, r.ray.dir_z = direction.z, r.ray.time = 0;
   r.ray.tfar = to, r.ray.mask = ~0u, r.ray.id = 0, r.ray.flags = 0;
   r.hit.geomID = RTC_INVALID_GEOMETRY_ID, r.hit.instID[0] = RTC_INVALID_GEOMETRY_ID;
-  rtcIntersect1(scene, &context, &r);
+  embree::intersect1(scene, query, r);
   if (r.hit.geomID == RTC_INVALID_GEOMETRY_ID) return {};
   const float facing = r.hit.Ng_x * direction.x + r.hit.Ng_y * direction.y + r.hit.Ng_z * direction.z;
   return {r.hit.primID, r.hit.u, r.hit.v, facing < 0, r.ray.tfar};
@@ -118,9 +117,8 @@ const Layers& find_layers(RTCScene scene, const std::vector<uint8_t>& passes, Ve
   thread_local Layers layers;
   layers.through.clear();
   CollectContext collecting;
-  rtcInitIntersectContext(&collecting.context);
-  collecting.context.filter = collect, collecting.passes = &passes, collecting.through = &layers.through;
-  layers.solid = intersect(scene, collecting.context, origin, direction, from, to);
+  collecting.query.filter = collect, collecting.passes = &passes, collecting.through = &layers.through;
+  layers.solid = intersect(scene, collecting.query, origin, direction, from, to);
   sort_layers(layers);
   return layers;
 }
@@ -178,7 +176,7 @@ Result<Tracer> Tracer::build(const Scene& scene, Progress* progress) {
   impl->scene = rtcNewScene(impl->device);
   rtcSetSceneBuildQuality(impl->scene, RTC_BUILD_QUALITY_HIGH);
   impl->read_materials(scene);
-  if (!impl->passes.empty()) rtcSetSceneFlags(impl->scene, RTC_SCENE_FLAG_CONTEXT_FILTER_FUNCTION);
+  if (!impl->passes.empty()) rtcSetSceneFlags(impl->scene, embree::filtered);
 
   RTCGeometry mesh = rtcNewGeometry(impl->device, RTC_GEOMETRY_TYPE_TRIANGLE);
   auto* positions = static_cast<Vec3*>(rtcSetNewGeometryBuffer(mesh, RTC_BUFFER_TYPE_VERTEX, 0, RTC_FORMAT_FLOAT3,
@@ -227,8 +225,7 @@ void Tracer::visible_fan(Vec3 origin, const Directions& d, float* visible) const
     for (size_t i = 0; i < d.count; ++i) visible[i] = (colour[0][i] + colour[1][i] + colour[2][i]) / 3;
     return;
   }
-  RTCIntersectContext context;
-  rtcInitIntersectContext(&context);
+  embree::Query query;
   for (size_t begin = 0; begin < d.count; begin += batch) {
     const size_t n = std::min(batch, d.count - begin);
     for (size_t i = 0; i < n; ++i) {
@@ -237,7 +234,7 @@ void Tracer::visible_fan(Vec3 origin, const Directions& d, float* visible) const
       r.dir_x = d.x[begin + i], r.dir_y = d.y[begin + i], r.dir_z = d.z[begin + i], r.time = 0;
       r.tfar = INFINITY, r.mask = ~0u, r.id = 0, r.flags = 0;
     }
-    rtcOccluded1M(impl_->scene, &context, rays, unsigned(n), sizeof(RTCRay));
+    embree::occluded_many(impl_->scene, query, rays, n);
     for (size_t i = 0; i < n; ++i) visible[begin + i] = rays[i].tfar < 0 ? 0.0f : 1.0f;
   }
 }
@@ -246,8 +243,7 @@ void Tracer::closest_fan(Vec3 origin, const Directions& d, Hit* hits) const {
   constexpr size_t batch = 16;
   RTCRayHit16 packet;
   alignas(64) int valid[batch];
-  RTCIntersectContext context;
-  rtcInitIntersectContext(&context);
+  embree::Query query;
   for (size_t begin = 0; begin < d.count; begin += batch) {
     const size_t n = std::min(batch, d.count - begin);
     for (size_t i = 0; i < batch; ++i) {
@@ -259,7 +255,7 @@ void Tracer::closest_fan(Vec3 origin, const Directions& d, Hit* hits) const {
       packet.ray.mask[i] = ~0u, packet.ray.id[i] = 0, packet.ray.flags[i] = 0;
       packet.hit.geomID[i] = RTC_INVALID_GEOMETRY_ID, packet.hit.instID[0][i] = RTC_INVALID_GEOMETRY_ID;
     }
-    rtcIntersect16(valid, impl_->scene, &context, &packet);
+    embree::intersect16(valid, impl_->scene, query, packet);
     for (size_t i = 0; i < n; ++i) {
       Hit& h = hits[begin + i];
       if (packet.hit.geomID[i] == RTC_INVALID_GEOMETRY_ID) {
@@ -274,9 +270,8 @@ void Tracer::closest_fan(Vec3 origin, const Directions& d, Hit* hits) const {
 }
 
 Hit Tracer::closest(Vec3 origin, Vec3 direction, float from, float to) const {
-  RTCIntersectContext context;
-  rtcInitIntersectContext(&context);
-  return intersect(impl_->scene, context, origin, direction, from, to);
+  embree::Query query;
+  return intersect(impl_->scene, query, origin, direction, from, to);
 }
 
 Hit Tracer::closest(Vec3 origin, Vec3 direction, Passage& passage) const {

@@ -21,4 +21,20 @@ std::vector<Vec3> three_light_probe(DirectionalKind kind, std::span<const Vec3> 
 // last band. Source: Godot, servers/rendering/renderer_rd/shaders/forward_clustered/scene_forward_clustered.glsl.
 std::array<Vec3, 4> godot_lightmap_layers(DirectionalKind kind, std::span<const Vec3> rows);
 
+// Godot 4.3, whose layers are not packed and may be negative:
+//   E(n) / pi = 0.282095 l0 + 0.32573 (l1 y + l2 z + l3 x).
+// Source: the same shader, of 4.3.
+std::array<Vec3, 4> godot_unpacked_layers(DirectionalKind kind, std::span<const Vec3> rows);
+
+// Unity's directional lightmaps: a colour, irradiance / pi for the receiver's own normal N, and a texel (d / 2 + 1/2,
+// w), of which its shader makes
+//   E(n) / pi = colour (n . d / 2 + 1/2) / max(w, 1e-4).
+// d is what `sh:2` has of luminance, at most of length 1, and w = N . d / 2 + 1/2. Source: DecodeDirectionalLightmap in
+// Unity's shader include UnityCG.cginc. Axes are ours.
+struct UnityDirection {
+  Vec3 direction{0.5f};
+  float balance = 0.5f;
+};
+UnityDirection unity_direction(DirectionalKind kind, std::span<const Vec3> rows, Vec3 normal);
+
 }  // namespace lambent

@@ -57,5 +57,34 @@ TEST(DirectionalConvert, GodotMakesOurIrradianceOverPi) {
   EXPECT_EQ(godot_lightmap_layers(DirectionalKind::sh2, dark)[2], Vec3(0.5f));
 }
 
+TEST(DirectionalConvert, GodotsUnpackedLayersDo) {
+  const std::vector<Vec3> rows = rows_of(2, sun, {3, 2, 1}, {0.1f, 0.2f, 0.3f});
+  const std::array<Vec3, 4> l = godot_unpacked_layers(DirectionalKind::sh2, rows);
+  for (Vec3 n : directions) {
+    const Vec3 e = l[0] * 0.282095f + (l[1] * n.y + l[2] * n.z + l[3] * n.x) * 0.32573f;
+    const Vec3 ours = evaluate_directional_light(DirectionalKind::sh2, rows, Mat3(1.0f), n);
+    for (int k = 0; k < 3; ++k) EXPECT_NEAR(std::max(0.0f, e[k]), ours[k], 1e-4f * (1 + ours[k]));
+  }
+}
+
+TEST(DirectionalConvert, UnityBendsItsColourAsOurLuminanceBends) {
+  const Vec3 luminance(0.2126f, 0.7152f, 0.0722f), normal = normalize(Vec3(0.1f, 0.9f, -0.3f));
+  // Enough light from all around that the direction is not cut off at a length of 1; and a lamp alone, where it is.
+  for (float around : {3.0f, 0.0f}) {
+    const std::vector<Vec3> rows = rows_of(2, sun, {1, 1, 1}, Vec3(around));
+    const UnityDirection d = unity_direction(DirectionalKind::sh2, rows, normal);
+    const auto light = [&](Vec3 n) {
+      return dot(evaluate_directional_light(DirectionalKind::sh2, rows, Mat3(1.0f), n), luminance);
+    };
+    EXPECT_LE(length(d.direction - 0.5f), 0.5001f);
+    EXPECT_GT(dot(d.direction - 0.5f, sun), 0);
+    EXPECT_NEAR(d.balance, dot(normal, d.direction - 0.5f) + 0.5f, 1e-6f);
+    for (Vec3 n : directions)
+      if (around > 0)
+        EXPECT_NEAR(light(normal) * (dot(n, d.direction - 0.5f) + 0.5f) / d.balance, light(n), 1e-4f * light(n));
+  }
+  EXPECT_EQ(unity_direction(DirectionalKind::sh2, std::vector<Vec3>(4, Vec3(0)), normal).balance, 0.5f);
+}
+
 }  // namespace
 }  // namespace lambent
