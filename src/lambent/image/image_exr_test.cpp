@@ -271,8 +271,8 @@ TEST(Exr, EveryFlippedByteIsSafe) {
 
 // --- Layers, parts, chroma
 
-std::string taken(const Bytes& bytes, float* red = nullptr) {
-  auto file = load_image_file(bytes, "a.exr");
+std::string taken(const Bytes& bytes, float* red = nullptr, const std::string& path = "a.exr") {
+  auto file = load_image_file(bytes, path);
   if (!file) return file.error().text();
   if (red) *red = file->image.rgb[0].x;
   return file->warnings.empty() ? "" : file->warnings[0];
@@ -304,8 +304,9 @@ TEST(ExrLayers, TheOneThatCanBeMeantIsTaken) {
   EXPECT_EQ(taken(layers({"V.Combined.R", "Composite.Combined.R"}), &red),
             "a.exr: of its pictures Composite.Combined is taken, and left aside V.Combined");
   EXPECT_EQ(red, 2);
-  EXPECT_EQ(taken(layers({"V.DiffCol.R", "V.Emit.R"})),
-            "a.exr: has several pictures, and none that alone can be meant: V.DiffCol, V.Emit");
+  EXPECT_EQ(
+      taken(layers({"V.DiffCol.R", "V.Emit.R"})),
+      "a.exr: has several pictures, and none that alone can be meant: V.DiffCol, V.Emit; FILE.exr#NAME takes one");
 }
 
 // Parts of one channel each, named by the part, of which every pixel is 1 for the first, 2 for the second.
@@ -335,6 +336,43 @@ Bytes parts(const std::vector<std::pair<std::string, std::string>>& named,
     }
   }
   return std::move(out.bytes);
+}
+
+TEST(ExrLayers, OneMayBeNamed) {
+  float red = 0;
+  const Bytes two = layers({"V.DiffCol.R", "V.Emit.R", "R", "V.Emit.Z"});
+  EXPECT_EQ(taken(two, &red, "a.exr#V.Emit"), "");
+  EXPECT_EQ(red, 2);
+  EXPECT_EQ(taken(two, &red, "a.exr#V.DiffCol"), "");
+  EXPECT_EQ(red, 1);
+  EXPECT_EQ(taken(two, &red, "a.exr#R, G, B"), "");
+  EXPECT_EQ(red, 3);
+  EXPECT_EQ(taken(two, &red, "a.exr#Emit"), "a.exr#Emit: no picture is called that; it has V.DiffCol, V.Emit, R, G, B");
+  const Bytes in_parts = parts({{"diffuse", "R"}, {"specular", "key.R"}, {"coat", "key.R"}});
+  EXPECT_EQ(taken(in_parts, &red, "a.EXR#specular"), "");
+  EXPECT_EQ(red, 2);
+  EXPECT_EQ(taken(in_parts, &red, "a.exr#coat/key"), "");
+  EXPECT_EQ(red, 3);
+  EXPECT_EQ(taken(in_parts, &red, "a.exr#key"),
+            "a.exr#key: more than one picture is called that; it has diffuse, specular/key, coat/key");
+  const std::string png = "\x89PNG\r\n\x1a\n";
+  EXPECT_EQ(taken(Bytes(png.begin(), png.end()), &red, "a.exr#key"), "a.exr#key: only OpenEXR files have layers");
+}
+
+// From a file, whose own name may have a # in it.
+TEST(ExrLayers, AreNamedBehindTheFile) {
+  const test::TemporaryFolder folder;
+  const Bytes two = layers({"V.DiffCol.R", "V.Emit.R"});
+  for (const char* name : {"a.exr", "b#1.exr", "c.exr#2.exr"})
+    ASSERT_TRUE(write_file_atomically(folder.file(name), std::string(two.begin(), two.end())));
+  for (const char* name : {"a.exr", "b#1.exr", "c.exr#2.exr"}) {
+    const std::string file = folder.file(name);
+    auto emitted = load_image(file + "#V.Emit");
+    ASSERT_TRUE(emitted) << emitted.error().text();
+    EXPECT_EQ(emitted->rgb[0].x, 2);
+    EXPECT_FALSE(load_image(file));
+  }
+  EXPECT_FALSE(load_image(folder.file("d.exr#V.Emit")));
 }
 
 TEST(ExrParts, TheOneThatCanBeMeantIsTaken) {

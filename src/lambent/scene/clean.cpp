@@ -169,16 +169,21 @@ uint64_t triangle_key(const Scene& s, const Triangle& t) {
   return hash64(sum);
 }
 
-// Keys that more than one triangle has, sorted, and a few that only seem so: of a table of marks two may share one.
+// Keys that more than one triangle has, sorted, and a few that only seem so: each sets three of a table's marks, which
+// others may have set (Bloom 1970, "Space/time trade-offs in hash coding with allowable errors").
 std::vector<uint64_t> repeated_keys(const Scene& scene) {
-  const size_t size = std::bit_ceil(std::max<size_t>(16 * scene.triangles.size(), 64));
+  const size_t size = std::bit_ceil(std::max<size_t>(8 * scene.triangles.size(), 64));
   std::vector<bool> marks(size);
   std::vector<uint64_t> keys;
   for (const Triangle& t : scene.triangles) {
-    const uint64_t key = triangle_key(scene, t);
-    auto mark = marks[size_t(key) & (size - 1)];
-    if (mark) keys.push_back(key);
-    mark = true;
+    const uint64_t key = triangle_key(scene, t), more = hash64(key);
+    bool seen = true;
+    for (uint64_t place : {key, more, more >> 32}) {
+      auto mark = marks[size_t(place) & (size - 1)];
+      seen = seen && mark;
+      mark = true;
+    }
+    if (seen) keys.push_back(key);
   }
   std::sort(keys.begin(), keys.end());
   keys.erase(std::unique(keys.begin(), keys.end()), keys.end());
@@ -203,7 +208,7 @@ bool sorted_corners(const Scene& s, const Triangle& t, Corners& out, bool& turne
 }  // namespace
 
 bool merge_duplicate_triangles(Scene& scene) {
-  // Of most scenes next to nothing is left after the first look, which takes two bytes a triangle.
+  // Of most scenes next to nothing is left after the first look, which takes a byte or two a triangle.
   const std::vector<uint64_t> keys = repeated_keys(scene);
   if (keys.empty()) return false;
   std::vector<std::pair<uint64_t, uint32_t>> suspects;

@@ -1,6 +1,7 @@
 #include <lambent/trace/copies.h>
 
 #include <Eigen/Eigenvalues>
+#include <Eigen/LU>
 
 #include <array>
 #include <map>
@@ -119,9 +120,10 @@ std::optional<Affine> fit(const Model& model, const Moments& m, const Corners& f
     images.col(0) = across / std::sqrt(area);
   }
   const Matrix3d turn = images * axes.transpose();
-  const double volume = std::abs(turn.determinant()),
-               sides = images.col(0).norm() * images.col(1).norm() * images.col(2).norm();
-  if (!(volume > 1e-6 * sides) || !std::isfinite(volume)) return std::nullopt;
+  // Rays are turned back by the inverse, in floats: what is squeezed flat would lose their digits.
+  constexpr double most_squeezed = 30;
+  const double volume = std::abs(turn.determinant());
+  if (!(volume > 0) || !(turn.norm() * turn.inverse().norm() <= most_squeezed)) return std::nullopt;
   const Vector3d at = mean - turn * m.mean;
   Affine out{{}, Vec3(vec(at))};
   for (int c = 0; c < 3; ++c) out.turn[size_t(c)] = Vec3(vec(turn.col(c)));
