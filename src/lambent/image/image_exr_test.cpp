@@ -10,6 +10,8 @@
 #include <gtest/gtest.h>
 #include <unistd.h>
 
+#include "temporary_folder.h"
+
 #include <array>
 #include <cstring>
 #include <filesystem>
@@ -347,7 +349,7 @@ TEST(ExrLayers, OneMayBeNamed) {
   EXPECT_EQ(red, 1);
   EXPECT_EQ(taken(two, &red, "a.exr#R, G, B"), "");
   EXPECT_EQ(red, 3);
-  EXPECT_EQ(taken(two, &red, "a.exr#Emit"), "a.exr#Emit: no picture is called that; it has V.DiffCol, V.Emit, R, G, B");
+  EXPECT_EQ(taken(two, &red, "a.exr#Emit"), "a.exr#Emit: no picture is called that; it has R, G, B, V.DiffCol, V.Emit");
   const Bytes in_parts = parts({{"diffuse", "R"}, {"specular", "key.R"}, {"coat", "key.R"}});
   EXPECT_EQ(taken(in_parts, &red, "a.EXR#specular"), "");
   EXPECT_EQ(red, 2);
@@ -385,7 +387,7 @@ TEST(ExrParts, TheOneThatCanBeMeantIsTaken) {
   EXPECT_EQ(taken(parts({{"main", "R"}, {"diffuse", "diffuse.R"}}), &red), "");  // the one without a layer
   EXPECT_EQ(red, 1);
   EXPECT_EQ(taken(parts({{"left", "R"}, {"right", "R"}, {"depth", "Z"}})),
-            "a.exr: has several pictures, and none that alone can be meant: left, right");
+            "a.exr: has several pictures, and none that alone can be meant: left, right; FILE.exr#NAME takes one");
   EXPECT_EQ(taken(parts({{"a", "Z"}, {"b", "V"}})), "a.exr: no channel named R, G, B or Y; it has a/Z, b/V");
   // Its own data window in the display window of all.
   auto image = load_image(parts({{"depth", "Z"}, {"light", "R"}}, {{{0, 0}, {3, 2}}, {{1, 1}, {2, 1}}}), "a.exr");

@@ -8,13 +8,16 @@ namespace lambent {
 
 PictureName picture_name(const std::string& given) {
   std::error_code ignored;
-  // Layers' names may have a # themselves, so that the first one after .exr counts.
+  PictureName first{given,
+                    {}};  // what there is, else the first that it may be: names of layers may have a # themselves
   for (size_t at = given.find('#'); at != given.npos; at = given.find('#', at + 1)) {
-    if (file_extension(given.substr(0, at)) != "exr") continue;
+    PictureName name{given.substr(0, at), given.substr(at + 1)};
+    if (file_extension(name.file) != "exr" || name.layer.empty()) continue;
     if (std::filesystem::exists(given, ignored)) break;
-    return {given.substr(0, at), given.substr(at + 1)};
+    if (std::filesystem::exists(name.file, ignored)) return name;
+    if (first.layer.empty()) first = std::move(name);
   }
-  return {given, {}};
+  return std::filesystem::exists(given, ignored) ? PictureName{given, {}} : first;
 }
 
 }  // namespace lambent

@@ -163,6 +163,7 @@ Result<void> load_library(std::string_view line, Scene& scene, const std::string
       continue;
     }
     std::string path = (std::filesystem::path(folder) / name).string();
+    if (auto text = check_not_utf16(*bytes, path); !text) return text.error();
     if (auto parsed = parse_mtl(*bytes, path, library, unread); !parsed) return parsed.error();
   }
   return {};

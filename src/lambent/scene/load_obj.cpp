@@ -162,6 +162,7 @@ Result<void> check_references(const ObjFile& obj) {
 }  // namespace
 
 Result<Scene> load_obj(std::span<const uint8_t> bytes, const std::string& path, const std::string& folder) {
+  if (auto text = check_not_utf16(bytes, path); !text) return text.error();
   ObjFile obj;
   obj.path = path;
   ObjParser parser(obj);

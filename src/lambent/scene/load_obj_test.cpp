@@ -46,6 +46,18 @@ TEST(LoadObj, ReadsACube) {
   EXPECT_EQ(s.document, nullptr);
 }
 
+TEST(LoadObj, TextOfTwoBytesACharacterIsRefused) {
+  const std::string plain = "v 0 0 0\nv 1 0 0\nv 0 1 0\nf 1 2 3\n",
+                    refused = "t.obj: is text in UTF-16, which is not read: save it as UTF-8";
+  for (bool marked : {false, true}) {
+    std::string little = marked ? "\xff\xfe" : "", big = marked ? "\xfe\xff" : "";
+    for (char c : plain) little += c, little += '\0', big += '\0', big += c;
+    EXPECT_EQ(error_of(little), refused);
+    EXPECT_EQ(error_of(big), refused);
+  }
+  EXPECT_EQ(must_load("\xef\xbb\xbf" + plain).positions.size(), 3u);  // the mark of UTF-8 is no part of the first line
+}
+
 TEST(LoadObj, LineEndsCommentsAndContinuations) {
   const char* plain = "v 0 0 0\nv 1 0 0\nv 0 1 0\nf 1 2 3\n";
   Scene expected = must_load(plain);
