@@ -39,7 +39,8 @@ Vec3 balanced(Vec3 radiance, float cosine, double lamp_density, int samples, siz
   return sum > 0 ? radiance * float(p_c / sum) : Vec3(0);
 }
 
-// Of a lamp's picture: never so small that a bright spot between the points looked at would be drawn too seldom.
+// Of a lamp's picture, over the square of its cells a side: a bright spot between the points that were looked at, which
+// is smaller than a cell, is not drawn too seldom.
 constexpr float least_share = 0.02f;
 
 // Texels that a triangle's picture spans, about.
@@ -52,11 +53,11 @@ double texels_over(const Scene& scene, const Triangle& t) {
   return area * texture.width * texture.height;
 }
 
-// Cells a side: about one a texel, as far as there is room.
+// Cells a side: about two a texel, since light between texels is interpolated, as far as there is room.
 uint32_t cells_of(const Scene& scene, const Triangle& t, size_t room) {
-  constexpr uint32_t most = 32;
+  constexpr uint32_t most = 64;
   if (scene.materials[scene.parts[t.part].material].emissive_texture < 0) return 0;
-  const double side = std::sqrt(texels_over(scene, t));
+  const double side = 2 * std::sqrt(texels_over(scene, t));
   uint32_t n = 1;
   while (n < most && n < side) n *= 2;
   while (n > 1 && 2 * size_t(n) * n > room) n /= 2;
@@ -66,7 +67,7 @@ uint32_t cells_of(const Scene& scene, const Triangle& t, size_t room) {
 // The mean of the emission's texels over each cell, 0 for those that are not in the triangle, and over all of them.
 std::vector<double> cell_means(const Scene& scene, const Triangle& t, uint32_t n, Vec3& mean) {
   // As many points in all whatever the cells, a few in each at least.
-  const int points = std::max(256 / int(n * n), 4);
+  const int points = std::max(256 / int(n * n), 8);
   const Vec3 color = scene.materials[scene.parts[t.part].material].emissive;
   std::vector<double> out(2 * size_t(n) * n, 0.0);
   Vec3 sum(0);
@@ -85,7 +86,7 @@ std::vector<double> cell_means(const Scene& scene, const Triangle& t, uint32_t n
       }
     }
   }
-  mean = color * max(sum / float(n * n), Vec3(least_share));
+  mean = color * (max(sum, Vec3(least_share)) / float(n * n));
   // One sample in ten goes anywhere.
   const double all = std::accumulate(out.begin(), out.end(), 0.0), least = all > 0 ? 0.1 * all / (double(n) * n) : 1;
   for (uint32_t j = 0; j < n; ++j)
