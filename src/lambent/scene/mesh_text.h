@@ -35,7 +35,8 @@ Vec3 clamp_color(double r, double g, double b);
 // An error where the bytes are text of two bytes a character, as some editors save it.
 Result<void> check_not_utf16(std::span<const uint8_t> bytes, const std::string& path);
 
-// Lines, less the mark that UTF-8 may begin with; ended by LF, CR LF or (in a file without LF) CR; a backslash at the end joins the next line.
+// Lines, less the mark that UTF-8 may begin with; ended by LF, CR LF or (in a file without LF) CR; a backslash at the
+// end joins the next line.
 class LineReader {
  public:
   explicit LineReader(std::span<const uint8_t> bytes);
