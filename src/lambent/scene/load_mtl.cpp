@@ -77,7 +77,7 @@ MtlMap parse_map(std::string_view text, std::string where) {
     } else if (option == "-clamp") {
       map.clamp = take_word(rest) == "on";
     } else if (option == "-blendu" || option == "-blendv" || option == "-cc" || option == "-bm" || option == "-boost" ||
-               option == "-texres" || option == "-imfchan" || option == "-type") {
+               option == "-texres" || option == "-imfchan" || option == "-type" || option == "-colorspace") {
       take_word(rest);
     } else {
       break;  // a file name that starts with a dash

@@ -56,6 +56,11 @@ bool take_number(std::string_view& text, double& value) {
     return false;
   }
   text.remove_prefix(size_t(stop - text.data()));
+  // Microsoft's C library once wrote 1.#INF, -1.#IND, 1.#QNAN000000.
+  if (text.starts_with('#')) {
+    value = text.starts_with("#INF") ? std::copysign(double(INFINITY), value) : double(NAN);
+    while (!text.empty() && !is_blank(text[0]) && text[0] != '\n') text.remove_prefix(1);
+  }
   return true;
 }
 
