@@ -57,7 +57,7 @@ only tbb/ core
 only stb_image image scene
 only OpenEXR image
 only Imf image
-only Eigen basis
+only Eigen basis trace
 only draco scene
 only meshoptimizer scene
 only webp scene

@@ -6,9 +6,13 @@
 #include <lambent/scene/see_through.h>
 
 #include <algorithm>
+#include <numeric>
 
 namespace lambent {
 namespace {
+
+// Cells of all lamps together.
+constexpr size_t most_cells = size_t{1} << 22;
 
 // Distances that agree to this fraction are the same surface.
 constexpr float same_distance = 1e-3f;
@@ -35,20 +39,88 @@ Vec3 balanced(Vec3 radiance, float cosine, double lamp_density, int samples, siz
   return sum > 0 ? radiance * float(p_c / sum) : Vec3(0);
 }
 
-// Of the emission over a triangle, as far as a few hundred points tell. Never so small that a bright spot between them
-// would be drawn too seldom.
-Vec3 mean_emission(const Scene& scene, const Triangle& t) {
+// Of a lamp's picture, over the square of its cells a side: a bright spot between the points that were looked at, which
+// is smaller than a cell, is not drawn too seldom.
+constexpr float least_share = 0.02f;
+
+// Texels that a triangle's picture spans, about.
+double texels_over(const Scene& scene, const Triangle& t) {
   const Material& m = scene.materials[scene.parts[t.part].material];
-  if (m.emissive_texture < 0) return m.emissive;
-  constexpr int points = 256;
-  constexpr float least_share = 0.02f;
+  const Texture& texture = scene.textures[size_t(m.emissive_texture)];
+  auto at = [&](float u, float v) { return texture_place(scene, t, u, v, m.emissive_set, m.emissive_transform); };
+  const Vec2 a = at(0, 0), b = at(1, 0) - a, c = at(0, 1) - a;
+  const double area = 0.5 * std::abs(double(b.x) * double(c.y) - double(b.y) * double(c.x));
+  return area * texture.width * texture.height;
+}
+
+// Cells a side: about two a texel, since light between texels is interpolated, as far as there is room.
+uint32_t cells_of(const Scene& scene, const Triangle& t, size_t room) {
+  constexpr uint32_t most = 64;
+  if (scene.materials[scene.parts[t.part].material].emissive_texture < 0) return 0;
+  const double side = 2 * std::sqrt(texels_over(scene, t));
+  uint32_t n = 1;
+  while (n < most && n < side) n *= 2;
+  while (n > 1 && 2 * size_t(n) * n > room) n /= 2;
+  return n;
+}
+
+// The mean of the emission's texels over each cell, 0 for those that are not in the triangle, and over all of them.
+std::vector<double> cell_means(const Scene& scene, const Triangle& t, uint32_t n, Vec3& mean) {
+  // As many points in all whatever the cells, a few in each at least.
+  const int points = std::max(256 / int(n * n), 8);
+  const Vec3 color = scene.materials[scene.parts[t.part].material].emissive;
+  std::vector<double> out(2 * size_t(n) * n, 0.0);
   Vec3 sum(0);
-  for (int i = 0; i < points; ++i) {
-    const Vec2 u = sobol_owen(uint32_t(i), 0);
-    const float root = std::sqrt(u.x);
-    sum += emission_texel(scene, t, 1 - root, u.y * root);
+  for (uint32_t j = 0; j < n; ++j) {
+    for (uint32_t i = 0; i + j < n; ++i) {
+      for (uint32_t far = 0; far < (i + j + 1 < n ? 2u : 1u); ++far) {
+        Vec3 cell(0);
+        for (int k = 0; k < points; ++k) {
+          Vec2 x = sobol_owen(uint32_t(k), far + 2 * (i + n * j));
+          if ((x.x + x.y > 1) != (far == 1)) x = Vec2(1 - x.x, 1 - x.y);
+          cell += emission_texel(scene, t, (float(i) + x.x) / float(n), (float(j) + x.y) / float(n));
+        }
+        cell = cell / float(points);
+        sum += cell;
+        out[2 * (size_t(j) * n + i) + far] = double(largest(color * cell));
+      }
+    }
   }
-  return m.emissive * max(sum / float(points), Vec3(least_share));
+  mean = color * (max(sum, Vec3(least_share)) / float(n * n));
+  // One sample in ten goes anywhere.
+  const double all = std::accumulate(out.begin(), out.end(), 0.0), least = all > 0 ? 0.1 * all / (double(n) * n) : 1;
+  for (uint32_t j = 0; j < n; ++j)
+    for (uint32_t i = 0; i + j < n; ++i)
+      for (uint32_t far = 0; far < (i + j + 1 < n ? 2u : 1u); ++far) {
+        double& cell = out[2 * (size_t(j) * n + i) + far];
+        cell = std::max(cell, least);
+      }
+  return out;
+}
+
+// What of the lamp's samples falls into a cell, over the cell's share of its area.
+double cell_density(const Lamps& lamps, const AreaLamp& lamp, uint32_t cell) {
+  const double* to = lamps.cell_cumulative.data() + lamp.first_cell;
+  return (to[cell] - (cell > 0 ? to[cell - 1] : 0)) * lamp.cells * lamp.cells;
+}
+
+// A point of a lamp for a random one of the unit square: by its cells, uniform within each. `density`: over the mean.
+Vec2 draw_point(const Lamps& lamps, const AreaLamp& lamp, Vec2 u, double& density) {
+  density = 1;
+  uint32_t cell = 0;
+  if (lamp.cells > 0) {
+    const auto begin = lamps.cell_cumulative.begin() + lamp.first_cell, end = begin + 2 * lamp.cells * lamp.cells;
+    cell = uint32_t(std::min(std::upper_bound(begin, end, double(u.x)), end - 1) - begin);
+    const double low = cell > 0 ? begin[cell - 1] : 0.0, share = begin[cell] - low;
+    u.x = share > 0 ? std::clamp(float((double(u.x) - low) / share), 0.0f, 1.0f) : 0.5f;
+    density = cell_density(lamps, lamp, cell);
+  }
+  const float root = std::sqrt(u.x);
+  Vec2 at(1 - root, u.y * root);
+  if (lamp.cells == 0) return at;
+  const uint32_t square = cell / 2, n = lamp.cells;
+  if (cell % 2 == 1) at = Vec2(1 - at.x, 1 - at.y);
+  return Vec2((float(square % n) + at.x) / float(n), (float(square / n) + at.y) / float(n));
 }
 
 struct PendingSample {
@@ -58,6 +130,13 @@ struct PendingSample {
 };
 
 }  // namespace
+
+uint32_t lamp_cell(uint32_t n, float u, float v) {
+  const float x = std::clamp(u, 0.0f, 1.0f) * float(n), y = std::clamp(v, 0.0f, 1.0f) * float(n);
+  const uint32_t i = std::min(uint32_t(x), n - 1), j = std::min(uint32_t(y), n - 1 - i);  // rounding keeps it inside
+  const bool far = i + j + 1 < n && (x - float(i)) + (y - float(j)) > 1;
+  return 2 * (j * n + i) + (far ? 1 : 0);
+}
 
 Lamps make_lamps(const Scene& scene, const Environment* sky, bool separate) {
   Lamps lamps;
@@ -77,8 +156,16 @@ Lamps make_lamps(const Scene& scene, const Environment* sky, bool separate) {
     if (!(largest(material.emissive) > 0) || !(area > 0)) continue;
     if (material_group[m] == none)
       material_group[m] = group_of(material.name.empty() ? "material " + std::to_string(m) : material.name);
-    lamps.area.push_back(
-        {t, material_group[m], mean_emission(scene, triangle), double(area)});  // its area, until all are known
+    AreaLamp lamp{t, material_group[m], material.emissive, double(area)};  // its area, until all are known
+    lamp.cells = cells_of(scene, triangle, most_cells - std::min(most_cells, lamps.cell_cumulative.size()));
+    if (lamp.cells > 0) {
+      lamp.first_cell = uint32_t(lamps.cell_cumulative.size());
+      const std::vector<double> means = cell_means(scene, triangle, lamp.cells, lamp.radiance);
+      const double all = std::accumulate(means.begin(), means.end(), 0.0);
+      double sum = 0;
+      for (double mean : means) lamps.cell_cumulative.push_back((sum += mean) / all);
+    }
+    lamps.area.push_back(lamp);
   }
   for (const PunctualLight& light : scene.lights)
     lamps.punctual_group.push_back(largest(light.intensity) > 0 ? group_of(light.name) : none);
@@ -135,18 +222,18 @@ void sample_lamps(const Scene& scene, const Tracer& tracer, const Lamps& lamps, 
       const Triangle& t = scene.triangles[lamp.triangle];
       const double low = at == begin ? 0.0 : lamps.cumulative[at - 1];
       u.x = std::min(float((target - low) / (lamps.cumulative[at] - low)), 1.0f);
-      // Uniform over the triangle.
-      const float root = std::sqrt(u.x), v = u.y * root;
-      const Vec3 to = interpolate(scene.positions, t, 1 - root, v) - origin;
+      double share;
+      const Vec2 place = draw_point(lamps, lamp, u, share);
+      const Vec3 to = interpolate(scene.positions, t, place.x, place.y) - origin;
       const float distance2 = dot(to, to);
       if (!(distance2 > 0)) continue;
       const float distance = std::sqrt(distance2);
       const Vec3 d = to / distance;
       const float cosine = dot(normal, d), facing = -dot(unit_normal(scene, t), d);
       if (!(cosine > 0) || !emits(scene, t, facing > 0) || facing == 0) continue;
-      const double density = lamp.density * double(distance2) / double(std::abs(facing));
-      Vec3 radiance = emission(scene, t, 1 - root, v);
-      if (tracer.lets_pass(lamp.triangle)) radiance *= coverage(scene, t, 1 - root, v);
+      const double density = lamp.density * share * double(distance2) / double(std::abs(facing));
+      Vec3 radiance = emission(scene, t, place.x, place.y);
+      if (tracer.lets_pass(lamp.triangle)) radiance *= coverage(scene, t, place.x, place.y);
       add(lamp.group, d, balanced(radiance, cosine, density, samples, rays), lamp.triangle, distance);
     }
   }
@@ -183,7 +270,9 @@ LampLight met_lamp(const Scene& scene, const Lamps& lamps, uint32_t index, const
   const AreaLamp& lamp = lamps.area[index];
   const Triangle& t = scene.triangles[lamp.triangle];
   const float facing = std::abs(dot(unit_normal(scene, t), direction));
-  const double density = lamp.density * double(hit.distance) * double(hit.distance) / double(std::max(facing, 1e-30f));
+  const double share = lamp.cells > 0 ? cell_density(lamps, lamp, lamp_cell(lamp.cells, hit.u, hit.v)) : 1.0;
+  const double density = lamp.density * share * double(hit.distance) * double(hit.distance) /
+                         double(std::max(facing, 1e-30f));
   return {lamp.group, direction, balanced(emission(scene, t, hit.u, hit.v), cosine, density, samples, rays)};
 }
 

@@ -17,14 +17,22 @@ namespace lambent {
 struct AreaLamp {
   uint32_t triangle, group;
   Vec3 radiance;   // the mean over it, or a little more: what the density follows
-  double density;  // of the group's samples, per area
+  double density;  // of the group's samples, per area, where it has no cells
+  // Of a lamp with a picture: the first of its cells (LampCells), in rows of 2 * cells.
+  uint32_t first_cell = 0, cells = 0;
 };
+
+// A triangle cut into n x n alike ones by weights (u, v) of its corners, so that samples follow its picture: of square
+// (i, j) of n x n the near half is cell 2 (j n + i), the far one, which lies in the triangle too where i + j < n - 1,
+// the next.
+uint32_t lamp_cell(uint32_t n, float u, float v);
 
 struct Lamps {
   std::vector<std::string> names;        // of groups
   std::vector<AreaLamp> area;            // by group, then triangle
   std::vector<uint32_t> first;           // of each group's run in `area`; one more at the end
   std::vector<double> cumulative;        // within each group, as `area`
+  std::vector<double> cell_cumulative;   // within each lamp that has cells, ending in 1
   std::vector<uint32_t> of_triangle;     // lamp of each scene triangle, or none; empty without area lamps
   std::vector<uint32_t> punctual_group;  // of each of Scene::lights
   const Environment* sky = nullptr;

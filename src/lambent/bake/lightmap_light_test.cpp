@@ -66,6 +66,66 @@ TEST(LightmapLight, BeyondHalfFloatsIsKeptInSinglePrecision) {
   EXPECT_NEAR(factor, 0.19982, 0.005 * 0.19982);
 }
 
+// A floor under a lamp whose picture is dark but for one texel of 32 x 32: what a sum over its points gives, from as
+// few samples as a lamp of one colour takes.
+TEST(LightmapLight, ThePictureOfALampIsSampledWhereItIsBright) {
+  Scene scene;
+  const uint32_t grey = add_material(scene, "grey", Vec3(0.5f)), lamp = add_material(scene, "lamp", Vec3(0));
+  Texture picture;
+  picture.width = picture.height = 32;
+  picture.rgb.assign(3 * 32 * 32, 0);
+  for (size_t c = 0; c < 3; ++c) picture.rgb[3 * (32 * 21 + 6) + c] = 255;
+  scene.textures.push_back(picture);
+  scene.materials[lamp].emissive = Vec3(1000), scene.materials[lamp].emissive_texture = 0;
+  add_quad(scene, grey, "floor", Vec3(0), Vec3(0, 0, 1), Vec3(1, 0, 0), 6, 6);
+  add_quad(scene, lamp, "lamp", Vec3(0, 0.5f, 0), Vec3(1, 0, 0), Vec3(0, 0, 1), 2, 2);
+  for (Vec3 p : scene.positions) scene.texcoords[0].push_back(Vec2(p.x, p.z));
+  auto tracer = Tracer::build(scene);
+  const Receivers receivers = make_patch_receivers(scene);
+  auto map = bake_lightmap(scene, *tracer, receivers, make_lamps(scene, nullptr, false),
+                           {.samples = 64, .lamp_samples = 64, .bounces = 0, .precision = Precision::single}, false);
+  ASSERT_TRUE(map);
+  Relit relit;
+  relight(map->all, std::vector<Vec3>{Vec3(1)}, relit);
+  constexpr int steps = 512;
+  double squares = 0, all = 0;
+  for (size_t r = 0; r < receivers.count(); ++r) {
+    const Vec3d at = receivers.origins[r];
+    if (at.y > 0.25) continue;
+    double truth = 0;
+    for (int i = 0; i < steps; ++i)
+      for (int j = 0; j < steps; ++j) {
+        const Vec3d on((i + 0.5) / steps, 0.5, (j + 0.5) / steps), to = on - at;
+        const double d2 = dot(to, to);
+        truth += double(sample_texture(picture, Vec2(on.x, on.z)).x) * 1000 * to.y * to.y / (d2 * d2 * pi);
+      }
+    truth /= double(steps) * steps;
+    const double error = double(relit.at(r).x) - truth;
+    squares += error * error, all += truth * truth;
+  }
+  ASSERT_GT(all, 0);
+  EXPECT_LT(std::sqrt(squares / all), 0.08);  // 1.5 with one cell a triangle
+}
+
+// Every point of a triangle has one cell, and cells beside one another differ.
+TEST(LampCell, CutsATriangle) {
+  for (uint32_t n : {1u, 2u, 8u}) {
+    std::vector<size_t> counts(2 * n * n);
+    constexpr uint32_t steps = 64;
+    for (uint32_t i = 0; i < steps; ++i)
+      for (uint32_t j = 0; i + j < steps; ++j) {
+        const float u = (float(i) + 0.25f) / steps, v = (float(j) + 0.3f) / steps;
+        ++counts.at(lamp_cell(n, u, v));
+      }
+    size_t used = 0;
+    for (size_t count : counts) used += count > 0;
+    EXPECT_EQ(used, n * n);
+  }
+  EXPECT_EQ(lamp_cell(4, 1, 0), 2u * 3);
+  EXPECT_EQ(lamp_cell(4, 0, 1), 2u * 12);
+  EXPECT_LT(lamp_cell(4, 0.5f, 0.50001f), 32u);
+}
+
 // The cell of k in four by two, without a gap or with one.
 Vec2 cell(size_t k, size_t corner, float gap) {
   const Vec2 at(float(corner % 2), float(corner / 2));

@@ -278,9 +278,25 @@ std::string listed(const Range& range, Name name) {
   return count > most ? out + " and " + std::to_string(count - most) + " more" : out;
 }
 
+// By its label, else by its own name or its part's, as far as that says one.
+Result<ExrLayer> layer_called(const std::string& wanted, const std::vector<Candidate>& all, const ExrHeader& header,
+                              const std::string& path) {
+  const auto say = [&](const Candidate& c) { return label(header, c.layer); };
+  const ExrLayer* found = nullptr;
+  size_t count = 0;
+  for (const Candidate& c : all) {
+    if (say(c) == wanted) return c.layer;
+    if (c.layer.name != wanted && header.parts[c.layer.part].name != wanted) continue;
+    found = &c.layer, ++count;
+  }
+  if (count == 1) return *found;
+  return Error{path, std::string(count > 1 ? "more than one picture is called that" : "no picture is called that") +
+                         "; it has " + listed(all, say)};
+}
+
 }  // namespace
 
-Result<ExrLayer> choose_exr_layer(const ExrHeader& header, const std::string& path,
+Result<ExrLayer> choose_exr_layer(const ExrHeader& header, const std::string& wanted, const std::string& path,
                                   std::vector<std::string>& warnings) {
   std::vector<Candidate> all = candidates_of(header);
   if (all.empty()) {
@@ -290,6 +306,8 @@ Result<ExrLayer> choose_exr_layer(const ExrHeader& header, const std::string& pa
     return Error{
         path, "no channel named R, G, B or Y; it has " + listed(names, [](const std::string& name) { return name; })};
   }
+  const auto say = [&](const Candidate& c) { return label(header, c.layer); };
+  if (!wanted.empty()) return layer_called(wanted, all, header, path);
   std::vector<Candidate> pool = all;
   std::erase_if(pool, [](const Candidate& c) { return !c.layer.name.empty(); });
   if (all.size() == 1) return all[0].layer;
@@ -307,9 +325,9 @@ Result<ExrLayer> choose_exr_layer(const ExrHeader& header, const std::string& pa
   if (pool.size() > 1 &&
       std::any_of(pool.begin(), pool.end(), [&](const Candidate& c) { return name_of(c).starts_with("composite."); }))
     std::erase_if(pool, [&](const Candidate& c) { return !name_of(c).starts_with("composite."); });
-  const auto say = [&](const Candidate& c) { return label(header, c.layer); };
   if (pool.size() != 1)
-    return Error{path, "has several pictures, and none that alone can be meant: " + listed(all, say)};
+    return Error{path, "has several pictures, and none that alone can be meant: " + listed(all, say) +
+                           "; FILE.exr#NAME takes one"};
   std::erase_if(all, [&](const Candidate& c) { return say(c) == say(pool[0]); });
   warnings.push_back(path + ": of its pictures " + say(pool[0]) + " is taken, and left aside " + listed(all, say));
   return pool[0].layer;

@@ -44,9 +44,11 @@ struct ExrLayer {
   std::string red, green, blue, alpha, y, ry, by;  // ry and by only beside y
   bool has_color() const { return !red.empty() || !green.empty() || !blue.empty(); }
 };
-// The one layer that can be meant: the only one of colour or luminance, or the one without a name, or the one that is
-// called as pictures of everything are (Combined, beauty, RGBA); the last with a warning. Errors: none, or several,
-// named.
-Result<ExrLayer> choose_exr_layer(const ExrHeader& header, const std::string& path, std::vector<std::string>& warnings);
+// The layer called `wanted`: by its name, its part's, or PART/LAYER, as the errors list them. Where that is empty, the
+// one that can be meant: the only one of colour or luminance, or the one without a name, or the one that is
+// called as pictures of everything are (Combined, beauty, RGBA); the last with a warning. Errors: none,
+// or several, named.
+Result<ExrLayer> choose_exr_layer(const ExrHeader& header, const std::string& wanted, const std::string& path,
+                                  std::vector<std::string>& warnings);
 
 }  // namespace lambent

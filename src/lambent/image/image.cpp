@@ -2,6 +2,7 @@
 #include <lambent/core/check.h>
 #include <lambent/core/file.h>
 #include <lambent/image/image.h>
+#include <lambent/image/picture_name.h>
 
 #include <stb_image.h>
 #include <stb_image_write.h>
@@ -139,6 +140,8 @@ ImageFormat image_format(std::span<const uint8_t> bytes) {
 Result<ImageFile> load_image_file(std::span<const uint8_t> bytes, const std::string& path) {
   if (bytes.empty()) return Error{path, "empty file"};
   ImageFormat format = image_format(bytes);
+  if (format != ImageFormat::exr && !picture_name(path).layer.empty())
+    return Error{path, "only OpenEXR files have layers"};
   switch (format) {
     case ImageFormat::exr: return load_exr(bytes, path);
     case ImageFormat::hdr: return load_hdr(bytes, path);
@@ -185,7 +188,7 @@ Result<Image> load_image(std::span<const uint8_t> bytes, const std::string& path
 }
 
 Result<Image> load_image(const std::string& path, std::vector<std::string>* warnings) {
-  auto file = MappedFile::open(path);
+  auto file = MappedFile::open(picture_name(path).file);
   if (!file) return file.error();
   return load_image(file->bytes(), path, warnings);
 }

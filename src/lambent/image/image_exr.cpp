@@ -1,5 +1,6 @@
 // OpenEXR, through its C++ library. Luminance and chroma: "Technical Introduction to OpenEXR".
 #include <lambent/image/exr_header.h>
+#include <lambent/image/picture_name.h>
 
 #include <ImfArray.h>
 #include <ImfChannelList.h>
@@ -180,7 +181,7 @@ Result<ImageFile> load_any(std::span<const uint8_t> bytes, const std::string& pa
   auto header = read_exr_header(bytes, path);
   if (!header) return header.error();
   ImageFile file{.format = ImageFormat::exr};
-  auto layer = choose_exr_layer(*header, path, file.warnings);
+  auto layer = choose_exr_layer(*header, picture_name(path).layer, path, file.warnings);
   if (!layer) return layer.error();
   auto coarse = sampling_of(*header, *layer, path);
   if (!coarse) return coarse.error();

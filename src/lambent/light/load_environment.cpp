@@ -1,4 +1,5 @@
 #include <lambent/core/file.h>
+#include <lambent/image/picture_name.h>
 #include <lambent/light/environment.h>
 #include <lambent/light/sky.h>
 #include <lambent/light/sphere_map.h>
@@ -36,7 +37,7 @@ Result<Environment> load_environment(const std::string& spec) {
     if (!options) return options.error();
     return make_sky(*options);
   }
-  auto file = MappedFile::open(spec);
+  auto file = MappedFile::open(picture_name(spec).file);
   if (!file) return file.error();
   return environment_from_file(file->bytes(), spec);
 }
@@ -68,7 +69,7 @@ Result<Environment> environment_from_file(std::span<const uint8_t> bytes, const 
   for (const std::string& text : mended) warnings.push_back(path + ": " + text);
   image = latlong_of(std::move(image), *map);
   fill_missing(image);
-  auto env = environment_from_image(std::filesystem::path(path).stem().string(), std::move(image));
+  auto env = environment_from_image(std::filesystem::path(picture_name(path).file).stem().string(), std::move(image));
   if (env) env->warnings = std::move(warnings);
   return env;
 }

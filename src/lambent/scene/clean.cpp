@@ -17,6 +17,11 @@ struct FanTriangle {
   auto operator<=>(const FanTriangle&) const = default;
 };
 
+uint64_t hash_position(Vec3 p) {
+  return hash64(uint64_t(std::bit_cast<uint32_t>(p.x)) << 32 | std::bit_cast<uint32_t>(p.y),
+                std::bit_cast<uint32_t>(p.z));
+}
+
 bool has_repeated_corner(const CornerFans& fans, uint32_t t) {
   const uint32_t* id = &fans.ids[3 * size_t(t)];
   return id[0] == id[1] || id[1] == id[2] || id[2] == id[0];
@@ -98,19 +103,15 @@ PositionIds number_positions(std::span<const Vec3> positions) {
   };
   const size_t count = positions.size(), buckets = std::bit_ceil(count / bucket_size + 1);
   const int shift = 64 - std::bit_width(buckets - 1);
-  auto hash_of = [](Vec3 p) {
-    return hash64(uint64_t(std::bit_cast<uint32_t>(p.x)) << 32 | std::bit_cast<uint32_t>(p.y),
-                  std::bit_cast<uint32_t>(p.z));
-  };
   auto bucket_of = [&](uint64_t hash) { return buckets == 1 ? 0 : size_t(hash >> shift); };
   std::vector<uint32_t> first(buckets + 1, 0);
-  for (Vec3 p : positions) ++first[bucket_of(hash_of(p + 0.0f)) + 1];  // -0 becomes 0
+  for (Vec3 p : positions) ++first[bucket_of(hash_position(p + 0.0f)) + 1];  // -0 becomes 0
   std::partial_sum(first.begin(), first.end(), first.begin());
   std::vector<Entry> entries(count);
   std::vector<uint32_t> end(first.begin(), first.end() - 1);
   for (uint32_t i = 0; i < count; ++i) {
     Vec3 p = positions[i] + 0.0f;
-    entries[end[bucket_of(hash_of(p))]++] = {p, i};
+    entries[end[bucket_of(hash_position(p))]++] = {p, i};
   }
   PositionIds out;
   out.ids.resize(count);  // first where each position comes first
@@ -118,7 +119,7 @@ PositionIds number_positions(std::span<const Vec3> positions) {
   for (size_t b = 0; b < buckets; ++b) {
     slots.assign(std::bit_ceil(std::max<size_t>(2 * (first[b + 1] - first[b]), 16)), none);
     for (uint32_t e = first[b]; e < first[b + 1]; ++e) {
-      size_t slot = size_t(hash_of(entries[e].p)) & (slots.size() - 1);
+      size_t slot = size_t(hash_position(entries[e].p)) & (slots.size() - 1);
       while (slots[slot] != none && !(entries[slots[slot]].p == entries[e].p)) slot = (slot + 1) & (slots.size() - 1);
       if (slots[slot] == none) slots[slot] = e;
       out.ids[entries[e].index] = entries[slots[slot]].index;
@@ -146,7 +147,104 @@ CornerFans corner_fans(const Scene& scene) {
   return fans;
 }
 
-bool merge_duplicate_triangles(Scene& scene) { return merge_duplicate_triangles(scene, corner_fans(scene)); }
+namespace {
+
+// Removes triangles from their parts.
+void drop_triangles(Scene& scene, const std::vector<uint8_t>& dropped) {
+  uint32_t kept = 0;
+  for (Part& part : scene.parts) {
+    uint32_t first = kept;
+    for (uint32_t t = part.first_triangle; t < part.first_triangle + part.triangle_count; ++t)
+      if (!dropped[t]) scene.triangles[kept++] = scene.triangles[t];
+    if (kept - first != part.triangle_count) mark_changed(part);
+    part.first_triangle = first, part.triangle_count = kept - first;
+  }
+  scene.triangles.resize(kept);
+}
+
+// The same for all orders of its corners.
+uint64_t triangle_key(const Scene& s, const Triangle& t) {
+  uint64_t sum = 0;
+  for (uint32_t v : t.v) sum += hash_position(s.positions[v] + 0.0f);  // -0 becomes 0
+  return hash64(sum);
+}
+
+// Keys that more than one triangle has, sorted, and a few that only seem so: each sets three of a table's marks, which
+// others may have set (Bloom 1970, "Space/time trade-offs in hash coding with allowable errors").
+std::vector<uint64_t> repeated_keys(const Scene& scene) {
+  const size_t size = std::bit_ceil(std::max<size_t>(8 * scene.triangles.size(), 64));
+  std::vector<bool> marks(size);
+  std::vector<uint64_t> keys;
+  for (const Triangle& t : scene.triangles) {
+    const uint64_t key = triangle_key(scene, t), more = hash64(key);
+    bool seen = true;
+    for (uint64_t place : {key, more, more >> 32}) {
+      auto mark = marks[size_t(place) & (size - 1)];
+      seen = seen && mark;
+      mark = true;
+    }
+    if (seen) keys.push_back(key);
+  }
+  std::sort(keys.begin(), keys.end());
+  keys.erase(std::unique(keys.begin(), keys.end()), keys.end());
+  return keys;
+}
+
+using Corners = std::array<Vec3, 3>;
+
+// A triangle's corners from its lowest on, and whether they run by the higher of the others first; false where two are
+// one.
+bool sorted_corners(const Scene& s, const Triangle& t, Corners& out, bool& turned) {
+  auto before = [](Vec3 a, Vec3 b) { return a.x != b.x ? a.x < b.x : a.y != b.y ? a.y < b.y : a.z < b.z; };
+  int low = 0;
+  for (int k = 1; k < 3; ++k)
+    if (before(s.positions[t.v[k]], s.positions[t.v[low]])) low = k;
+  for (int k = 0; k < 3; ++k) out[size_t(k)] = s.positions[t.v[(low + k) % 3]];
+  turned = before(out[2], out[1]);
+  if (turned) std::swap(out[1], out[2]);
+  return !(out[0] == out[1]) && !(out[1] == out[2]);
+}
+
+}  // namespace
+
+bool merge_duplicate_triangles(Scene& scene) {
+  // Of most scenes next to nothing is left after the first look, which takes a byte or two a triangle.
+  const std::vector<uint64_t> keys = repeated_keys(scene);
+  if (keys.empty()) return false;
+  std::vector<std::pair<uint64_t, uint32_t>> suspects;
+  for (uint32_t t = 0; t < scene.triangles.size(); ++t) {
+    const uint64_t key = triangle_key(scene, scene.triangles[t]);
+    if (std::binary_search(keys.begin(), keys.end(), key)) suspects.push_back({key, t});
+  }
+  std::sort(suspects.begin(), suspects.end());
+  std::vector<uint8_t> dropped;
+  struct Seen {
+    Corners corners;
+    uint32_t kept[2];  // the first that turns either way
+  };
+  std::vector<Seen> seen;  // of one key; more than one where keys are equal by chance
+  for (size_t i = 0; i < suspects.size(); ++i) {
+    if (i == 0 || suspects[i].first != suspects[i - 1].first) seen.clear();
+    const uint32_t t = suspects[i].second;
+    Corners corners;
+    bool turned;
+    if (!sorted_corners(scene, scene.triangles[t], corners, turned)) continue;
+    auto at = std::find_if(seen.begin(), seen.end(), [&](const Seen& s) { return s.corners == corners; });
+    if (at == seen.end()) at = seen.insert(seen.end(), {corners, {none, none}});
+    uint32_t& first = at->kept[turned];
+    if (first != none) {
+      if (dropped.empty()) dropped.resize(scene.triangles.size());
+      dropped[t] = 1;
+      continue;
+    }
+    first = t;
+    if (at->kept[!turned] != none)
+      scene.triangles[at->kept[0]].two_sided = scene.triangles[at->kept[1]].two_sided = true;
+  }
+  if (dropped.empty()) return false;
+  drop_triangles(scene, dropped);
+  return true;
+}
 
 bool merge_duplicate_triangles(Scene& scene, const CornerFans& fans) {
   std::vector<uint8_t> dropped(scene.triangles.size(), 0);
@@ -177,15 +275,7 @@ bool merge_duplicate_triangles(Scene& scene, const CornerFans& fans) {
     }
   }
   if (!any) return false;
-  uint32_t kept = 0;
-  for (Part& part : scene.parts) {
-    uint32_t first = kept;
-    for (uint32_t t = part.first_triangle; t < part.first_triangle + part.triangle_count; ++t)
-      if (!dropped[t]) scene.triangles[kept++] = scene.triangles[t];
-    if (kept - first != part.triangle_count) mark_changed(part);
-    part.first_triangle = first, part.triangle_count = kept - first;
-  }
-  scene.triangles.resize(kept);
+  drop_triangles(scene, dropped);
   return true;
 }
 

@@ -288,6 +288,40 @@ TEST(MakeNormals, AgreesWithThePlainDefinition) {
   }
 }
 
+// By the fans and without them, of triangles among few places: repeated, turned, from several parts.
+TEST(MergeDuplicateTriangles, WithAndWithoutFansAgree) {
+  for (uint64_t seed = 0; seed < 20; ++seed) {
+    Random random(seed);
+    Scene s;
+    s.materials.resize(1);
+    const uint32_t places = seed < 10 ? 5 : 40;
+    for (uint32_t p = 0; p < 3; ++p) {
+      Part part;
+      part.first_vertex = uint32_t(s.positions.size()), part.first_triangle = uint32_t(s.triangles.size());
+      for (uint32_t v = 0; v < places; ++v) s.positions.push_back(Vec3(v % 3, v / 3, v == 0 ? -0.0f : 0.0f));
+      for (int t = 0; t < 60; ++t) {
+        Triangle triangle{{}, p, false};
+        for (uint32_t& v : triangle.v) v = part.first_vertex + uint32_t(random.next() * float(places));
+        s.triangles.push_back(triangle);
+      }
+      part.vertex_count = places, part.triangle_count = 60;
+      s.parts.push_back(part);
+    }
+    s.normals.assign(s.positions.size(), Vec3(0, 1, 0));
+    Scene a = s, b = s;
+    EXPECT_EQ(merge_duplicate_triangles(a), merge_duplicate_triangles(b, corner_fans(b)));
+    ASSERT_EQ(a.triangles.size(), b.triangles.size());
+    if (places == 5) {
+      EXPECT_LT(a.triangles.size(), s.triangles.size());
+    }
+    for (size_t t = 0; t < a.triangles.size(); ++t) {
+      EXPECT_TRUE(std::equal(a.triangles[t].v, a.triangles[t].v + 3, b.triangles[t].v));
+      EXPECT_EQ(a.triangles[t].two_sided, b.triangles[t].two_sided);
+    }
+    EXPECT_EQ(broken_invariant(a), "");
+  }
+}
+
 TEST(NumberPositions, ManyInBuckets) {
   std::vector<Vec3> p;
   for (uint32_t i = 0; i < 40'000; ++i) p.push_back({float(i * 7919 % 9973), i % 2 ? 0.0f : -0.0f, 1});

@@ -1,7 +1,10 @@
 // glTF 2.0 specification (ISO/IEC 12113), sections 3.7.2 (meshes, morph targets) and 3.7.3 (skins) in the rest pose.
 #include <lambent/scene/gltf_primitives.h>
 
+#include <lambent/scene/gltf_flat.h>
 #include <lambent/scene/gltf_geometry.h>
+
+#include <numeric>
 
 namespace lambent {
 
@@ -23,9 +26,11 @@ class PrimitiveReader {
         document_(document),
         pose_(pose),
         scene_(scene),
+        keep_all_(keep_all),
         users_(keep_all ? std::vector<uint32_t>() : count_users(document)) {}
 
   bool read_all() {
+    reserve();
     for (size_t n : pose_.shown) {
       const Json& node = gltf_item(document_.json, "nodes", n);
       auto mesh = check_.index(node, "mesh", gltf_count(document_.json, "meshes"), {"node", n});
@@ -49,7 +54,6 @@ class PrimitiveReader {
                                 (faded_ == 1 ? " primitive)" : " primitives)"));
     return true;
   }
-  std::vector<size_t>& parts_without_normals() { return bare_; }
 
  private:
   static constexpr uint64_t triangle_list = 4, triangle_strip = 5, triangle_fan = 6;
@@ -112,9 +116,86 @@ class PrimitiveReader {
     if (placement.mirrored)
       for (size_t t = part.first_triangle; t < scene_.triangles.size(); ++t)
         std::swap(scene_.triangles[t].v[1], scene_.triangles[t].v[2]);
-    if (!attributes->contains("NORMAL")) bare_.push_back(scene_.parts.size());
     scene_.parts.push_back(std::move(part));
+    return attributes->contains("NORMAL") ? number_inputs() : flatten(primitive, *attributes, positions.count, where);
+  }
+
+  // The last part's vertices, as they are.
+  bool number_inputs() {
+    const size_t first = scene_.input.size(), count = scene_.positions.size() - first;
+    scene_.input.resize(scene_.positions.size());
+    std::iota(scene_.input.begin() + ptrdiff_t(first), scene_.input.end(), scene_.input_count);
+    scene_.input_count += uint32_t(count);
     return true;
+  }
+
+  // Gives the last part normals, and vertices that are alike in all that the writer would copy become one.
+  bool flatten(const Json& primitive, const Json& attributes, size_t count, const GltfWhere& where) {
+    std::vector<GltfAccessor> all;
+    auto add = [&](const Json& named) {
+      for (const auto& [name, value] : named.items()) {
+        if (name == "NORMAL" || name == "TANGENT") continue;
+        if (auto a = read_attribute(check_, document_, named, name.c_str(), count, where)) all.push_back(std::move(*a));
+      }
+    };
+    if (!keep_all_) {
+      add(attributes);
+      if (const Json* targets = check_.array(primitive, "targets", where))
+        for (const Json& target : *targets) add(target);
+    }
+    const size_t first = scene_.input.size(), left = flatten_last_part(scene_, all);
+    for (size_t v = first; v < scene_.input.size(); ++v) scene_.input[v] += scene_.input_count;
+    scene_.input_count += uint32_t(left);
+    return check_.ok();
+  }
+
+  // Memory for what is to come, as far as the file's bytes stand for it, since arrays that double take thrice as much.
+  void reserve() {
+    struct Size {
+      uint64_t vertices = 0, triangles = 0;
+      std::vector<bool> sets;
+      bool colors = false, tangents = false, known = false;
+    };
+    std::vector<Size> meshes(gltf_count(document_.json, "meshes"));
+    Size all;
+    all.sets.resize(scene_.texcoords.size());
+    for (size_t n : pose_.shown) {
+      GltfCheck trial("");
+      const auto mesh = trial.index(gltf_item(document_.json, "nodes", n), "mesh", meshes.size(), {});
+      if (!mesh) continue;
+      Size& size = meshes[*mesh];
+      const Json* primitives = size.known ? nullptr
+                                          : trial.array(gltf_item(document_.json, "meshes", *mesh), "primitives", {});
+      size.known = true;
+      for (size_t p = 0; primitives && p < primitives->size(); ++p) {
+        const Json& primitive = (*primitives)[p];
+        GltfCheck one("");
+        const Json* attributes = one.object(primitive, "attributes", {});
+        const auto place = attributes ? one.index(*attributes, "POSITION", gltf_count(document_.json, "accessors"), {})
+                                      : std::nullopt;
+        if (!place) continue;
+        const GltfAccessor positions = read_accessor(one, document_, *place);
+        const auto index = one.index(primitive, "indices", gltf_count(document_.json, "accessors"), {});
+        const size_t corners = index ? read_accessor(one, document_, *index).count : positions.count;
+        if (!one.ok() || positions.data.empty()) continue;
+        size.triangles += one.integer(primitive, "mode", triangle_list, triangle_fan + 1, {}) == triangle_list
+                            ? corners / 3
+                            : corners;
+        size.vertices += std::min(positions.count, corners);
+        for (size_t set = 0; set < all.sets.size(); ++set)
+          if (attributes->contains("TEXCOORD_" + std::to_string(set))) all.sets[set] = true;
+        all.colors = all.colors || attributes->contains("COLOR_0");
+        all.tangents = all.tangents || attributes->contains("TANGENT");
+      }
+      all.vertices += size.vertices, all.triangles += size.triangles;
+    }
+    if (all.vertices > max_vertices || all.triangles > max_triangles) return;  // an error will say so
+    scene_.positions.reserve(all.vertices), scene_.normals.reserve(all.vertices), scene_.input.reserve(all.vertices);
+    scene_.triangles.reserve(all.triangles);
+    for (size_t set = 0; set < all.sets.size(); ++set)
+      if (all.sets[set]) scene_.texcoords[set].reserve(all.vertices);
+    if (all.colors) scene_.colors.reserve(all.vertices);
+    if (all.tangents) scene_.tangents.reserve(all.vertices);
   }
 
   bool check_size(const GltfAccessor& positions, const std::optional<GltfAccessor>& indices, size_t triangles,
@@ -289,20 +370,17 @@ class PrimitiveReader {
   const GltfDocument& document_;
   const GltfPose& pose_;
   Scene& scene_;
+  const bool keep_all_;
   const std::vector<uint32_t> users_;
-  std::vector<size_t> bare_;
   std::vector<uint32_t> places_;  // of an accessor's elements among those in use; none between parts
   uint64_t visited_ = 0, skipped_ = 0, faded_ = 0, zeros_ = 0, work_ = 0, triangles_ = 0;
 };
 
 }  // namespace
 
-bool read_primitives(GltfCheck& check, const GltfDocument& document, const GltfPose& pose, bool keep_all, Scene& scene,
-                     std::vector<size_t>& without_normals) {
-  PrimitiveReader reader(check, document, pose, keep_all, scene);
-  if (!reader.read_all()) return false;
-  without_normals = std::move(reader.parts_without_normals());
-  return true;
+bool read_primitives(GltfCheck& check, const GltfDocument& document, const GltfPose& pose, bool keep_all,
+                     Scene& scene) {
+  return PrimitiveReader(check, document, pose, keep_all, scene).read_all();
 }
 
 }  // namespace lambent

@@ -168,8 +168,7 @@ bool read_scene(GltfCheck& check, GltfDocument& document, std::span<const uint8_
                              " below other nodes, or named twice: shown once, where their parents put them");
   for (const GltfMaterial& m : materials) scene.materials.push_back(m.material);
   scene.texcoords.resize(texcoord_sets(materials));
-  std::vector<size_t> bare;
-  if (!read_primitives(check, document, pose, was_baked, scene, bare)) return false;
+  if (!read_primitives(check, document, pose, was_baked, scene)) return false;
   read_lights(document, pose, scene);
   if (scene.triangles.empty()) return check.fail({}, "no triangles");
   bool usable = false;
@@ -186,8 +185,6 @@ bool read_scene(GltfCheck& check, GltfDocument& document, std::span<const uint8_
     if (!image_problems[i].empty())
       links.add("image " + std::to_string(i) + ": " + image_problems[i] + "; it stays a link");
   links.tell(scene.warnings, "images");
-  number_inputs(scene);
-  make_normals(scene, bare, true);
   repair_normals(scene);
   merge_duplicate_triangles(scene);
   return true;

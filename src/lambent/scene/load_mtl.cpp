@@ -77,7 +77,7 @@ MtlMap parse_map(std::string_view text, std::string where) {
     } else if (option == "-clamp") {
       map.clamp = take_word(rest) == "on";
     } else if (option == "-blendu" || option == "-blendv" || option == "-cc" || option == "-bm" || option == "-boost" ||
-               option == "-texres" || option == "-imfchan" || option == "-type") {
+               option == "-texres" || option == "-imfchan" || option == "-type" || option == "-colorspace") {
       take_word(rest);
     } else {
       break;  // a file name that starts with a dash
@@ -163,6 +163,7 @@ Result<void> load_library(std::string_view line, Scene& scene, const std::string
       continue;
     }
     std::string path = (std::filesystem::path(folder) / name).string();
+    if (auto text = check_not_utf16(*bytes, path); !text) return text.error();
     if (auto parsed = parse_mtl(*bytes, path, library, unread); !parsed) return parsed.error();
   }
   return {};

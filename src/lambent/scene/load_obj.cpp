@@ -141,20 +141,21 @@ class ObjParser {
   std::map<std::pair<std::string, std::string>, uint32_t> numbers_;
 };
 
-Result<void> check_references(const ObjFile& obj) {
-  const CornerMesh& mesh = obj.mesh;
+// Faces whose vertices do not exist are an error; whose normals or texture coordinates do not, go without, as
+// everywhere.
+Result<void> check_references(ObjFile& obj, size_t& lost) {
+  CornerMesh& mesh = obj.mesh;
   for (const MeshFace& face : mesh.faces) {
+    bool whole = true;
     for (size_t c = face.first; c < face.first + face.count; ++c) {
-      MeshCorner corner = mesh.corners[c];
-      auto wrong = [&](const char* what, uint32_t index, size_t count) {
+      MeshCorner& corner = mesh.corners[c];
+      if (corner.v >= mesh.v.size())
         return Error{fmt::format("{}:{}", obj.path, face.line),
-                     fmt::format("{} {} of {} does not exist", what, uint64_t(index) + 1, count)};
-      };
-      if (corner.v >= mesh.v.size()) return wrong("vertex", corner.v, mesh.v.size());
-      if (corner.vt != none && corner.vt >= mesh.vt.size())
-        return wrong("texture coordinate", corner.vt, mesh.vt.size());
-      if (corner.vn != none && corner.vn >= mesh.vn.size()) return wrong("normal", corner.vn, mesh.vn.size());
+                     fmt::format("vertex {} of {} does not exist", uint64_t(corner.v) + 1, mesh.v.size())};
+      if (corner.vt != none && corner.vt >= mesh.vt.size()) corner.vt = none, whole = false;
+      if (corner.vn != none && corner.vn >= mesh.vn.size()) corner.vn = none, whole = false;
     }
+    lost += !whole;
   }
   return {};
 }
@@ -162,6 +163,7 @@ Result<void> check_references(const ObjFile& obj) {
 }  // namespace
 
 Result<Scene> load_obj(std::span<const uint8_t> bytes, const std::string& path, const std::string& folder) {
+  if (auto text = check_not_utf16(bytes, path); !text) return text.error();
   ObjFile obj;
   obj.path = path;
   ObjParser parser(obj);
@@ -171,13 +173,17 @@ Result<Scene> load_obj(std::span<const uint8_t> bytes, const std::string& path, 
     std::string reason = parser.parse_line(text, lines.number());
     if (!reason.empty()) return Error{fmt::format("{}:{}", path, lines.number()), reason};
   }
-  if (auto checked = check_references(obj); !checked) return checked.error();
+  size_t lost = 0;
+  if (auto checked = check_references(obj, lost); !checked) return checked.error();
   CornerMesh& mesh = obj.mesh;
   if (!mesh.colors.empty()) mesh.colors.resize(mesh.v.size(), Vec3(1));
 
   Scene scene;
   scene.path = path;
   if (auto told = tell_left_out(scene, assemble_mesh(mesh, scene)); !told) return told.error();
+  if (lost > 0)
+    scene.warnings.push_back(
+        fmt::format("{}: {} faces name normals or texture coordinates that do not exist, and go without", path, lost));
   std::vector<std::string> names;
   for (const auto& group : obj.groups) names.push_back(group.second);
   Vec3 fallback = mesh.colors.empty() ? Vec3(default_albedo) : Vec3(1);

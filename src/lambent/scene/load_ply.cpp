@@ -32,6 +32,10 @@ LeftOut add_plain_part(PlyMesh& mesh, Scene& scene) {
       ++left_out.broken;
       continue;
     }
+    if (count == 3 && polygon[0] != polygon[1] && polygon[1] != polygon[2] && polygon[2] != polygon[0]) {
+      scene.triangles.push_back({{polygon[0], polygon[1], polygon[2]}, 0, true});
+      continue;
+    }
     cuts.clear();
     left_out.repeated += !triangulator.cut(polygon, scene.positions, cuts);
     for (auto cut : cuts) scene.triangles.push_back({{polygon[cut[0]], polygon[cut[1]], polygon[cut[2]]}, 0, true});

@@ -34,11 +34,11 @@ Vec3d far_origin(Vec3d low, Vec3d high);
 // gives the position's number for each corner from 0.
 template <class Vertex>
 std::vector<Vec3> place_positions(Scene& scene, std::span<const Vec3d> file, size_t corners, Vertex vertex) {
+  std::vector<uint8_t> used(file.size(), 0);
+  for (size_t c = 0; c < corners; ++c) used[vertex(c)] = 1;
   Vec3d low(INFINITY), high(-INFINITY);
-  for (size_t c = 0; c < corners; ++c) {
-    Vec3d p = file[vertex(c)];
-    low = min(low, p), high = max(high, p);  // which pass over what is broken: NaN compares as not less
-  }
+  for (size_t v = 0; v < file.size(); ++v)
+    if (used[v]) low = min(low, file[v]), high = max(high, file[v]);  // NaN compares as not less
   scene.origin = far_origin(low, high);
   std::vector<Vec3> positions(file.size());
   for (size_t v = 0; v < file.size(); ++v) positions[v] = Vec3(file[v] - scene.origin);

@@ -56,6 +56,11 @@ bool take_number(std::string_view& text, double& value) {
     return false;
   }
   text.remove_prefix(size_t(stop - text.data()));
+  // Microsoft's C library once wrote 1.#INF, -1.#IND, 1.#QNAN000000.
+  if (text.starts_with('#')) {
+    value = text.starts_with("#INF") ? std::copysign(double(INFINITY), value) : double(NAN);
+    while (!text.empty() && !is_blank(text[0]) && text[0] != '\n') text.remove_prefix(1);
+  }
   return true;
 }
 
@@ -91,8 +96,16 @@ Vec3 clamp_color(double r, double g, double b) {
   return {channel(r), channel(g), channel(b)};
 }
 
+Result<void> check_not_utf16(std::span<const uint8_t> bytes, const std::string& path) {
+  if (bytes.size() < 2) return {};
+  const bool marked = (bytes[0] == 0xff && bytes[1] == 0xfe) || (bytes[0] == 0xfe && bytes[1] == 0xff);
+  if (!marked && (bytes[0] == 0) == (bytes[1] == 0)) return {};
+  return Error{path, "is text in UTF-16, which is not read: save it as UTF-8"};
+}
+
 LineReader::LineReader(std::span<const uint8_t> bytes)
     : rest_(reinterpret_cast<const char*>(bytes.data()), bytes.size()) {
+  if (rest_.starts_with("\xef\xbb\xbf")) rest_.remove_prefix(3);
   if (rest_.find('\n') == rest_.npos) separator_ = '\r';
 }
 

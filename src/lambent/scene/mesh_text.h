@@ -1,5 +1,6 @@
 #pragma once
 // Reading the words and numbers of OBJ, MTL and PLY. No locale is asked.
+#include <lambent/core/result.h>
 #include <lambent/core/vec.h>
 
 #include <span>
@@ -31,7 +32,11 @@ Vec2 texcoord_from_below(double u, double v);
 // To [0, 1]; NaN gives 1.
 Vec3 clamp_color(double r, double g, double b);
 
-// Lines, ended by LF, CR LF or (in a file without LF) CR; a backslash at the end joins the next line.
+// An error where the bytes are text of two bytes a character, as some editors save it.
+Result<void> check_not_utf16(std::span<const uint8_t> bytes, const std::string& path);
+
+// Lines, less the mark that UTF-8 may begin with; ended by LF, CR LF or (in a file without LF) CR; a backslash at the
+// end joins the next line.
 class LineReader {
  public:
   explicit LineReader(std::span<const uint8_t> bytes);

@@ -5,6 +5,7 @@
 
 #include <algorithm>
 #include <array>
+#include <cfloat>
 #include <numbers>
 
 namespace lambent {
@@ -19,36 +20,41 @@ DVec3 face_normal(const Scene& s, const Triangle& t) {
   return length > 0 ? n / length : DVec3(0);
 }
 
-// Angle of the direction (cosine, sine), not of unit length, whose sine is not negative; to a few units in the last
-// place, and in a third of the time of std::atan2: atan(x) = atan(k / 16) + atan of what that leaves, below 1 / 32.
-inline double angle_of(double sine, double cosine) {
-  static const std::array<double, 17> table = [] {
-    std::array<double, 17> atans{};
-    for (size_t k = 0; k < atans.size(); ++k) atans[k] = std::atan(double(k) / 16);
-    return atans;
-  }();
-  const double c = std::abs(cosine), low = std::min(sine, c), high = std::max(sine, c);
-  if (!(high > 0)) return 0;
-  const int k = int(16 * (low / high) + 0.5);
-  const double x = k / 16.0, t = (low - high * x) / (high + low * x), q = t * t;
-  double angle = table[size_t(k)] + t * (1 - q * (1. / 3 - q * (1. / 5 - q * (1. / 7 - q * (1. / 9 - q * (1. / 11))))));
-  if (sine > c) angle = std::numbers::pi / 2 - angle;
-  return cosine < 0 ? std::numbers::pi - angle : angle;
+// Angle of the direction (cosine, sine), not of unit length, whose sine is not negative; to 2e-7, without a branch, so
+// that compilers do four at once. Polynomial: Abramowitz and Stegun 1964, 4.4.49.
+inline float angle_of(float sine, float cosine) {
+  constexpr float half_pi = std::numbers::pi_v<float> / 2;
+  const float c = std::abs(cosine), low = sine < c ? sine : c, high = sine < c ? c : sine;
+  const float x = low / (high > FLT_MIN ? high : FLT_MIN), q = x * x;
+  float angle = x * (1 + q * (-0.3333314528f +
+                              q * (0.1999355085f +
+                                   q * (-0.1420889944f +
+                                        q * (0.1065626393f +
+                                             q * (-0.0752896400f +
+                                                  q * (0.0429096138f + q * (-0.0161657367f + q * 0.0028662257f))))))));
+  angle = sine > c ? half_pi - angle : angle;
+  return cosine < 0 ? 2 * half_pi - angle : angle;
 }
 
 // A triangle with an area: its unit normal and the angles of its corners, radians.
 struct Face {
-  DVec3 normal{0.0};  // zero without an area
-  double angles[3] = {0, 0, 0};
+  DVec3 normal{0.0};                    // zero without an area
+  float area = 0, cosines[2] = {0, 0};  // twice the area; times the tangents of the first two angles
+  Face() = default;
   Face(const Scene& s, const Triangle& t) {
     const DVec3 a(s.positions[t.v[0]]), ab = DVec3(s.positions[t.v[1]]) - a, ac = DVec3(s.positions[t.v[2]]) - a,
-                                        bc = DVec3(s.positions[t.v[2]]) - DVec3(s.positions[t.v[1]]),
                                         across = cross(ab, ac);
-    const double area = length(across);
-    if (!(area > 0)) return;
-    normal = across / area;
-    angles[0] = angle_of(area, dot(ab, ac)), angles[1] = angle_of(area, -dot(ab, bc));
-    angles[2] = std::max(0.0, std::numbers::pi - angles[0] - angles[1]);
+    const double twice = length(across);
+    if (!(twice > 0)) return;
+    // Floats hold the shape at any scale about the longer of the two edges.
+    const double scale = 1 / std::max(dot(ab, ab), dot(ac, ac));
+    normal = across * (1 / twice);
+    area = float(twice * scale), cosines[0] = float(dot(ab, ac) * scale), cosines[1] = float(dot(ab, ab - ac) * scale);
+  }
+  // Of its corners, radians; of none without an area.
+  std::array<float, 3> angles() const {
+    const float a = angle_of(area, cosines[0]), b = angle_of(area, cosines[1]);
+    return {a, b, std::max(0.0f, std::numbers::pi_v<float> - a - b)};
   }
 };
 
@@ -95,7 +101,7 @@ class CornerGroups {
     sums_.assign(corners.size(), DVec3(0));
     for (uint32_t i = 0; i < corners.size(); ++i) {
       const Face face(scene_, scene_.triangles[corners[i] / 3]);
-      sums_[sets_.find(i)] += face.angles[corners[i] % 3] * face.normal;
+      sums_[sets_.find(i)] += double(face.angles()[corners[i] % 3]) * face.normal;
     }
   }
   uint32_t group_of(uint32_t member) { return sets_.find(member); }
@@ -177,12 +183,27 @@ class NormalMaker {
   void sum_faces() {
     faces_.resize(scene_.triangles.size());
     sums_.assign(scene_.positions.size(), DVec3(0));
-    for (size_t t = 0; t < faces_.size(); ++t) {
-      const Triangle& triangle = scene_.triangles[t];
-      if (!wanted_[triangle.part]) continue;
-      const Face face(scene_, triangle);
-      faces_[t] = Vec3(face.normal);
-      for (int k = 0; k < 3; ++k) sums_[triangle.v[k]] += face.angles[k] * face.normal;
+    // In batches, so that their angles are found together.
+    constexpr size_t batch = 64;
+    Face faces[batch];
+    float a[batch], b[batch];
+    for (size_t begin = 0; begin < faces_.size(); begin += batch) {
+      const size_t count = std::min(batch, faces_.size() - begin);
+      for (size_t i = 0; i < count; ++i) {
+        const Triangle& triangle = scene_.triangles[begin + i];
+        faces[i] = wanted_[triangle.part] ? Face(scene_, triangle) : Face();
+      }
+      for (size_t i = 0; i < batch; ++i) a[i] = angle_of(faces[i].area, faces[i].cosines[0]);
+      for (size_t i = 0; i < batch; ++i) b[i] = angle_of(faces[i].area, faces[i].cosines[1]);
+      for (size_t i = 0; i < count; ++i) {
+        const Triangle& triangle = scene_.triangles[begin + i];
+        if (!wanted_[triangle.part]) continue;
+        faces_[begin + i] = Vec3(faces[i].normal);
+        const float c = std::max(0.0f, std::numbers::pi_v<float> - a[i] - b[i]);
+        sums_[triangle.v[0]] += double(a[i]) * faces[i].normal;
+        sums_[triangle.v[1]] += double(b[i]) * faces[i].normal;
+        sums_[triangle.v[2]] += double(c) * faces[i].normal;
+      }
     }
   }
 
@@ -341,8 +362,9 @@ void repair_normals(Scene& scene) {
     if (!broken[t.v[0]] && !broken[t.v[1]] && !broken[t.v[2]]) continue;
     const Face face(scene, t);
     if (face.normal == DVec3(0)) continue;
-    for (int k = 0; k < 3; ++k) {
-      sums[t.v[k]] += face.angles[k] * face.normal;
+    const std::array<float, 3> angles = face.angles();
+    for (size_t k = 0; k < 3; ++k) {
+      sums[t.v[k]] += double(angles[k]) * face.normal;
       if (fallbacks[t.v[k]] == DVec3(0)) fallbacks[t.v[k]] = face.normal;
     }
   }

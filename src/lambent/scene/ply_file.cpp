@@ -42,6 +42,7 @@ class ValueReader {
     return at;
   }
   bool is_text() const { return format_ == Format::ascii; }
+  size_t left() const { return rest_.size(); }
 
   // A binary value as a number, which is exact.
   double number_at(Type type, const char* at) const {
@@ -208,15 +209,8 @@ class PlyBody {
     return roles;
   }
 
-  // One vertex's values by their roles. Binary rows without lists are taken whole.
+  // One vertex's values by their roles.
   bool read_row(const Element& e, const std::vector<Role>& roles, double (&values)[role_count]) {
-    if (!reader_.is_text() && e.row_size > 0) {
-      const char* row = reader_.take(e.row_size);
-      if (!row) return false;
-      for (size_t p = 0; p < roles.size(); row += type_size[size_t(e.properties[p].type)], ++p)
-        if (roles[p] != other) values[roles[p]] = reader_.number_at(e.properties[p].type, row);
-      return true;
-    }
     for (size_t p = 0; p < roles.size(); ++p) {
       const Property& property = e.properties[p];
       if (!(property.is_list ? skip_list(property) : reader_.read(property.type, values[roles[p]]))) return false;
@@ -232,6 +226,8 @@ class PlyBody {
     if (!has(x, 3)) return Error{at(e), "vertices have no x, y and z"};
     const bool has_normals = has(nx, 3), has_texcoords = has(tex_u, 2), has_colors = has(red, 3);
     mesh_.has_vertices = true;
+    if (!reader_.is_text() && e.row_size > 0)
+      return read_columns(e, roles, color, has_normals, has_texcoords, has_colors);
     mesh_.positions.reserve(e.count);
     if (has_normals) mesh_.normals.reserve(e.count);
     if (has_texcoords) mesh_.texcoords.reserve(e.count);
@@ -245,6 +241,40 @@ class PlyBody {
       if (has_texcoords) mesh_.texcoords.push_back(texcoord_from_below(values[tex_u], values[tex_v]));
       if (has_colors) mesh_.colors.push_back(color(values[red], values[green], values[blue]));
     }
+    return {};
+  }
+
+  // The same of binary rows without lists, value by value of one property after the other, so that nothing is asked a
+  // value. That they are there is known.
+  Result<void> read_columns(const Element& e, const std::vector<Role>& roles, const ColorRule& color, bool has_normals,
+                            bool has_texcoords, bool has_colors) {
+    const char* first = reader_.take(e.count * e.row_size);
+    if (!first) return ended(e, 0);
+    std::vector<Vec2d> texcoords(has_texcoords ? e.count : 0);
+    mesh_.positions.resize(e.count);
+    if (has_normals) mesh_.normals.resize(e.count);
+    if (has_colors) mesh_.colors.resize(e.count);
+    for (size_t p = 0; p < roles.size(); first += type_size[size_t(e.properties[p].type)], ++p) {
+      const Role role = roles[p];
+      auto into = [&](auto& values, Role from) {
+        with_type(e.properties[p].type, [&]<class T>(T) {
+          const char* at = first;
+          for (auto& value : values) {
+            value[size_t(role - from)] = std::remove_reference_t<decltype(value[0])>(reader_.template typed_at<T>(at));
+            at += e.row_size;
+          }
+        });
+      };
+      if (role <= z) into(mesh_.positions, x);
+      else if (role <= nz) into(mesh_.normals, nx);
+      else if (role <= blue) into(mesh_.colors, red);
+      else if (role <= tex_v) into(texcoords, tex_u);
+    }
+    for (Vec3d& position : mesh_.positions)
+      if (!is_position(position)) position = broken_position;
+    for (Vec3& c : mesh_.colors) c = color(double(c.x), double(c.y), double(c.z));
+    mesh_.texcoords.reserve(texcoords.size());
+    for (Vec2d uv : texcoords) mesh_.texcoords.push_back(texcoord_from_below(uv.x, uv.y));
     return {};
   }
 
@@ -340,7 +370,7 @@ class PlyBody {
     const Property& list = e.properties[0];
     Result<void> done;
     with_type(list.type, [&]<class T>(T) {
-      for (uint64_t face = 0; face < e.count; ++face) {
+      for (uint64_t face = read_plain_triangles<T>(e, list); face < e.count; ++face) {
         uint64_t count;
         if (!read_count(list, count)) {
           done = ended(e, face);
@@ -358,6 +388,32 @@ class PlyBody {
       }
     });
     return done;
+  }
+
+  // The triangles that such faces begin with, where their counts are bytes; the first face that is none, or is broken,
+  // is left to be read. Returns how many there were.
+  template <class T>
+  uint64_t read_plain_triangles(const Element& e, const Property& list) {
+    constexpr size_t size = 1 + 3 * sizeof(T);
+    if (type_size[size_t(list.count_type)] != 1) return 0;
+    const uint64_t most = std::min<uint64_t>({e.count, reader_.left() / size, max_corners / 3});
+    const char* at = reader_.take(0);
+    mesh_.corners.resize(3 * most);
+    uint32_t* out = mesh_.corners.data();
+    uint64_t face = 0;
+    for (; face < most && *at == 3; ++face, at += size, out += 3) {
+      bool known = true;
+      for (size_t k = 0; k < 3; ++k) {
+        const T value = reader_.template typed_at<T>(at + 1 + k * sizeof(T));
+        known &= value >= 0 && uint64_t(value) < vertex_count_;
+        out[k] = uint32_t(value);
+      }
+      if (!known) break;
+    }
+    reader_.take(face * size);
+    mesh_.corners.resize(3 * face);
+    mesh_.corner_counts.assign(face, 3);
+    return face;
   }
 
   bool read_list(const Property& list, std::vector<double>& values) {

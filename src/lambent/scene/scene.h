@@ -130,8 +130,8 @@ struct Scene {
   std::vector<Vec4> tangents;
 
   // Which vertex of the input each one is, counted from 0 as the input has them (an OBJ's `v` lines, a PLY's vertices,
-  // an array's rows, a glTF's as its nodes are read); `none` for those that were made. Vertices that were split have
-  // the same number. Empty for scenes that were made, or as many as positions.
+  // an array's rows, a glTF's as its nodes are read, alike ones without normals once); `none` for those that were made.
+  // Vertices that were split have the same number. Empty for scenes that were made, or as many as positions.
   std::vector<uint32_t> input;
   uint32_t input_count = 0;  // vertices of the input, those that nothing uses with them
 

@@ -1,44 +1,18 @@
-#include <lambent/core/embree.h>
-#include <lambent/core/parallel.h>
 #include <lambent/core/random.h>
 #include <lambent/scene/see_through.h>
+#include <lambent/trace/embree_scene.h>
 #include <lambent/trace/tracer.h>
 
 #include <algorithm>
-#include <atomic>
 #include <bit>
-#include <cstring>
 
 namespace lambent {
-namespace {
-
-constexpr size_t build_units = 1000;  // of progress
-
-struct Build {
-  ProgressStage stage;
-  size_t done = 0;
-  // Called by the thread that builds. False: stop.
-  static bool advance(void* user, double share) {
-    Build& b = *static_cast<Build*>(user);
-    const size_t reached = size_t(std::clamp(share, 0.0, 1.0) * double(build_units));
-    if (reached > b.done) b.stage.advance(reached - b.done), b.done = reached;
-    return !b.stage.cancelled();
-  }
-};
-
-}  // namespace
 
 struct Tracer::Impl {
-  RTCDevice device = nullptr;
-  RTCScene scene = nullptr;
+  EmbreeScene embree;
   const Scene* source = nullptr;
   std::vector<uint8_t> passes;  // of each triangle; empty where all are solid
   bool colours = false;
-  std::atomic<ssize_t> bytes{0};
-  ~Impl() {
-    if (scene) rtcReleaseScene(scene);
-    if (device) rtcReleaseDevice(device);
-  }
   void read_materials(const Scene& read) {
     source = &read;
     const std::vector<uint8_t> materials = see_through_materials(read);
@@ -65,7 +39,9 @@ struct Layers {
 
 struct CollectContext {
   embree::Query query;  // first: embree.h
+  const EmbreeScene* scene;
   const std::vector<uint8_t>* passes;
+  Vec3 direction;  // in the world, as a ray's own may not be within a copy
   std::vector<Hit>* through;
 };
 
@@ -73,27 +49,28 @@ struct CollectContext {
 void collect(const RTCFilterFunctionNArguments* args) {
   const CollectContext& c = *reinterpret_cast<const CollectContext*>(args->context);
   for (unsigned i = 0; i < args->N; ++i) {
-    const uint32_t triangle = RTCHitN_primID(args->hit, args->N, i);
-    if (args->valid[i] == 0 || !(*c.passes)[triangle]) continue;
+    const unsigned instance = RTCHitN_instID(args->hit, args->N, i, 0),
+                   primitive = RTCHitN_primID(args->hit, args->N, i);
+    if (args->valid[i] == 0 || !(*c.passes)[c.scene->triangle(instance, primitive)]) continue;
     args->valid[i] = 0;
-    const float facing = RTCRayN_dir_x(args->ray, args->N, i) * RTCHitN_Ng_x(args->hit, args->N, i) +
-                         RTCRayN_dir_y(args->ray, args->N, i) * RTCHitN_Ng_y(args->hit, args->N, i) +
-                         RTCRayN_dir_z(args->ray, args->N, i) * RTCHitN_Ng_z(args->hit, args->N, i);
-    c.through->push_back({triangle, RTCHitN_u(args->hit, args->N, i), RTCHitN_v(args->hit, args->N, i), facing < 0,
-                          RTCRayN_tfar(args->ray, args->N, i)});
+    const Vec3 normal(RTCHitN_Ng_x(args->hit, args->N, i), RTCHitN_Ng_y(args->hit, args->N, i),
+                      RTCHitN_Ng_z(args->hit, args->N, i));
+    c.through->push_back(c.scene->hit(instance, primitive, RTCHitN_u(args->hit, args->N, i),
+                                      RTCHitN_v(args->hit, args->N, i), normal, c.direction,
+                                      RTCRayN_tfar(args->ray, args->N, i)));
   }
 }
 
-Hit intersect(RTCScene scene, embree::Query& query, Vec3 origin, Vec3 direction, float from, float to) {
+Hit intersect(const EmbreeScene& scene, embree::Query& query, Vec3 origin, Vec3 direction, float from, float to) {
   RTCRayHit r;
   r.ray.org_x = origin.x, r.ray.org_y = origin.y, r.ray.org_z = origin.z, r.ray.tnear = from;
   r.ray.dir_x = direction.x, r.ray.dir_y = direction.y, r.ray.dir_z = direction.z, r.ray.time = 0;
   r.ray.tfar = to, r.ray.mask = ~0u, r.ray.id = 0, r.ray.flags = 0;
   r.hit.geomID = RTC_INVALID_GEOMETRY_ID, r.hit.instID[0] = RTC_INVALID_GEOMETRY_ID;
-  embree::intersect1(scene, query, r);
+  embree::intersect1(scene.top(), query, r);
   if (r.hit.geomID == RTC_INVALID_GEOMETRY_ID) return {};
-  const float facing = r.hit.Ng_x * direction.x + r.hit.Ng_y * direction.y + r.hit.Ng_z * direction.z;
-  return {r.hit.primID, r.hit.u, r.hit.v, facing < 0, r.ray.tfar};
+  return scene.hit(r.hit.instID[0], r.hit.primID, r.hit.u, r.hit.v, {r.hit.Ng_x, r.hit.Ng_y, r.hit.Ng_z}, direction,
+                   r.ray.tfar);
 }
 
 // Surfaces that meet the ray within this share of its length are one sheet: the two sides of a pane modelled as two
@@ -112,12 +89,13 @@ void sort_layers(Layers& layers) {
 }
 
 // All that a ray goes through up to `to`, in one traversal.
-const Layers& find_layers(RTCScene scene, const std::vector<uint8_t>& passes, Vec3 origin, Vec3 direction,
+const Layers& find_layers(const EmbreeScene& scene, const std::vector<uint8_t>& passes, Vec3 origin, Vec3 direction,
                           float from = 0, float to = INFINITY) {
   thread_local Layers layers;
   layers.through.clear();
   CollectContext collecting;
-  collecting.query.filter = collect, collecting.passes = &passes, collecting.through = &layers.through;
+  collecting.query.filter = collect, collecting.scene = &scene, collecting.passes = &passes;
+  collecting.direction = direction, collecting.through = &layers.through;
   layers.solid = intersect(scene, collecting.query, origin, direction, from, to);
   sort_layers(layers);
   return layers;
@@ -162,52 +140,18 @@ Hit draw_hit(const Scene& scene, const Layers& layers, Vec3 origin, Vec3 directi
 
 }  // namespace
 
-Result<Tracer> Tracer::build(const Scene& scene, Progress* progress) {
+Result<Tracer> Tracer::build(const Scene& scene, Progress* progress, Sharing sharing) {
   auto impl = std::make_shared<Impl>();
-  impl->device = rtcNewDevice(nullptr);
-  if (!impl->device) return Error{scene.path, "the ray tracer could not start"};
-  rtcSetDeviceMemoryMonitorFunction(
-      impl->device,
-      [](void* user, ssize_t bytes, bool) {
-        static_cast<Impl*>(user)->bytes += bytes;
-        return true;
-      },
-      impl.get());
-  impl->scene = rtcNewScene(impl->device);
-  rtcSetSceneBuildQuality(impl->scene, RTC_BUILD_QUALITY_HIGH);
   impl->read_materials(scene);
-  if (!impl->passes.empty()) rtcSetSceneFlags(impl->scene, embree::filtered);
-
-  RTCGeometry mesh = rtcNewGeometry(impl->device, RTC_GEOMETRY_TYPE_TRIANGLE);
-  auto* positions = static_cast<Vec3*>(rtcSetNewGeometryBuffer(mesh, RTC_BUFFER_TYPE_VERTEX, 0, RTC_FORMAT_FLOAT3,
-                                                               sizeof(Vec3), scene.positions.size()));
-  auto* indices = static_cast<uint32_t*>(rtcSetNewGeometryBuffer(mesh, RTC_BUFFER_TYPE_INDEX, 0, RTC_FORMAT_UINT3,
-                                                                 3 * sizeof(uint32_t), scene.triangles.size()));
-  if (!positions || !indices) {
-    rtcReleaseGeometry(mesh);
-    return Error{scene.path, "out of memory for the ray tracer"};
-  }
-  std::copy(scene.positions.begin(), scene.positions.end(), positions);
-  for (size_t i = 0; i < scene.triangles.size(); ++i)
-    std::memcpy(indices + 3 * i, scene.triangles[i].v, 3 * sizeof(uint32_t));
-  Build building{{progress, "ray tree", build_units}};
-  rtcSetSceneProgressMonitorFunction(impl->scene, Build::advance, &building);
-  // A build on many threads may order the leaves differently from run to run, and with them the winner of exact ties.
-  run_serially([&] {
-    rtcCommitGeometry(mesh);
-    rtcAttachGeometry(impl->scene, mesh);
-    rtcReleaseGeometry(mesh);
-    rtcCommitScene(impl->scene);
-  });
-  rtcSetSceneProgressMonitorFunction(impl->scene, nullptr, nullptr);
-  if (is_cancelled(progress)) return Error{"", "cancelled"};
-  if (rtcGetDeviceError(impl->device) != RTC_ERROR_NONE) return Error{scene.path, "out of memory for the ray tracer"};
+  auto built = impl->embree.build(scene, !impl->passes.empty(), sharing, progress);
+  if (!built) return built.error();
   Tracer tracer;
   tracer.impl_ = std::move(impl);
   return tracer;
 }
 
-size_t Tracer::bytes() const { return size_t(std::max<ssize_t>(impl_->bytes, 0)); }
+size_t Tracer::bytes() const { return impl_->embree.bytes(); }
+size_t Tracer::copies() const { return impl_->embree.copies(); }
 
 bool Tracer::lets_pass() const { return !impl_->passes.empty(); }
 bool Tracer::lets_pass(uint32_t triangle) const { return lets_pass() && impl_->passes[triangle]; }
@@ -234,7 +178,7 @@ void Tracer::visible_fan(Vec3 origin, const Directions& d, float* visible) const
       r.dir_x = d.x[begin + i], r.dir_y = d.y[begin + i], r.dir_z = d.z[begin + i], r.time = 0;
       r.tfar = INFINITY, r.mask = ~0u, r.id = 0, r.flags = 0;
     }
-    embree::occluded_many(impl_->scene, query, rays, n);
+    embree::occluded_many(impl_->embree.top(), query, rays, n);
     for (size_t i = 0; i < n; ++i) visible[begin + i] = rays[i].tfar < 0 ? 0.0f : 1.0f;
   }
 }
@@ -255,30 +199,31 @@ void Tracer::closest_fan(Vec3 origin, const Directions& d, Hit* hits) const {
       packet.ray.mask[i] = ~0u, packet.ray.id[i] = 0, packet.ray.flags[i] = 0;
       packet.hit.geomID[i] = RTC_INVALID_GEOMETRY_ID, packet.hit.instID[0][i] = RTC_INVALID_GEOMETRY_ID;
     }
-    embree::intersect16(valid, impl_->scene, query, packet);
+    embree::intersect16(valid, impl_->embree.top(), query, packet);
     for (size_t i = 0; i < n; ++i) {
       Hit& h = hits[begin + i];
       if (packet.hit.geomID[i] == RTC_INVALID_GEOMETRY_ID) {
         h = Hit{};
         continue;
       }
-      const float facing = packet.hit.Ng_x[i] * packet.ray.dir_x[i] + packet.hit.Ng_y[i] * packet.ray.dir_y[i] +
-                           packet.hit.Ng_z[i] * packet.ray.dir_z[i];
-      h = {packet.hit.primID[i], packet.hit.u[i], packet.hit.v[i], facing < 0, packet.ray.tfar[i]};
+      const Vec3 normal(packet.hit.Ng_x[i], packet.hit.Ng_y[i], packet.hit.Ng_z[i]),
+          direction(packet.ray.dir_x[i], packet.ray.dir_y[i], packet.ray.dir_z[i]);
+      h = impl_->embree.hit(packet.hit.instID[0][i], packet.hit.primID[i], packet.hit.u[i], packet.hit.v[i], normal,
+                            direction, packet.ray.tfar[i]);
     }
   }
 }
 
 Hit Tracer::closest(Vec3 origin, Vec3 direction, float from, float to) const {
   embree::Query query;
-  return intersect(impl_->scene, query, origin, direction, from, to);
+  return intersect(impl_->embree, query, origin, direction, from, to);
 }
 
 Hit Tracer::closest(Vec3 origin, Vec3 direction, Passage& passage) const {
   const Hit first = closest(origin, direction);
   passage = {Vec3(first.triangle == none ? 1.0f : 0.0f), Vec3(1)};
   if (!goes_on(*impl_->source, impl_->passes, first)) return first;
-  return draw_hit(*impl_->source, find_layers(impl_->scene, impl_->passes, origin, direction), origin, direction,
+  return draw_hit(*impl_->source, find_layers(impl_->embree, impl_->passes, origin, direction), origin, direction,
                   passage);
 }
 
@@ -288,7 +233,7 @@ void Tracer::closest_fan(Vec3 origin, const Directions& d, Hit* hits, Passage* p
     passages[i] = {Vec3(hits[i].triangle == none ? 1.0f : 0.0f), Vec3(1)};
     if (!goes_on(*impl_->source, impl_->passes, hits[i])) continue;
     const Vec3 direction(d.x[i], d.y[i], d.z[i]);
-    hits[i] = draw_hit(*impl_->source, find_layers(impl_->scene, impl_->passes, origin, direction), origin, direction,
+    hits[i] = draw_hit(*impl_->source, find_layers(impl_->embree, impl_->passes, origin, direction), origin, direction,
                        passages[i]);
   }
 }
@@ -306,14 +251,14 @@ void Tracer::visible_fan(Vec3 origin, const Directions& d, const std::array<floa
 }
 
 void Tracer::layers(Vec3 origin, Vec3 direction, float from, std::vector<Hit>& out) const {
-  const Layers& met = find_layers(impl_->scene, impl_->passes, origin, direction, from);
+  const Layers& met = find_layers(impl_->embree, impl_->passes, origin, direction, from);
   out = met.through;
   if (met.solid.triangle != none) out.push_back(met.solid);
 }
 
 Vec3 Tracer::transmittance(Vec3 origin, Vec3 direction, float distance) const {
   if (!lets_pass()) return Vec3(closest(origin, direction, 0, distance).triangle == none ? 1.0f : 0.0f);
-  const Layers& met = find_layers(impl_->scene, impl_->passes, origin, direction, 0, distance);
+  const Layers& met = find_layers(impl_->embree, impl_->passes, origin, direction, 0, distance);
   if (met.solid.triangle != none) return Vec3(0);
   Vec3 product(1);
   for (const Hit& h : met.through)

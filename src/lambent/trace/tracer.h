@@ -32,12 +32,16 @@ struct Passage {
   Vec3 hit{1};  // what the ray's hit counts for
 };
 
+// Whether parts that are affine images of one another share their triangles. Memory then grows with shapes and not with
+// copies; hits agree to the rounding of coordinates, and rays take longer. Automatic: where it saves tens of megabytes.
+enum class Sharing : uint8_t { automatic, never, always };
+
 // Rays against a scene; it does not change once it is built, and any number of threads may trace.
 class Tracer {
  public:
   // Builds the acceleration structure; the result does not depend on the number of threads. The scene must outlive it
   // and keep its triangles; where lets_pass(), it is read for every ray. Errors: out of memory; cancelled.
-  static Result<Tracer> build(const Scene& scene, Progress* progress = nullptr);
+  static Result<Tracer> build(const Scene& scene, Progress* progress = nullptr, Sharing sharing = Sharing::automatic);
 
   // Whether light passes through some of the scene's surfaces; through this one; and through some of them coloured.
   bool lets_pass() const;
@@ -65,7 +69,8 @@ class Tracer {
   // One ray, from `from` units along it to `to`.
   Hit closest(Vec3 origin, Vec3 direction, float from = 0, float to = INFINITY) const;
 
-  size_t bytes() const;  // of the acceleration structure
+  size_t bytes() const;   // of the acceleration structure
+  size_t copies() const;  // parts that share their triangles with others
 
  private:
   struct Impl;
