@@ -8,6 +8,7 @@
 
 #include <climits>
 #include <cstring>
+#include <limits>
 #include <memory>
 #include <string_view>
 
