@@ -40,6 +40,10 @@ std::optional<Scene> data_scene(const std::string& name, bool ground) {
 
 int main(int argc, char** argv) {
   using namespace lambent::bench;
+#ifndef __OPTIMIZE__
+  return fmt::print(stderr, "lambent-bench: built without optimising (LAMBENT_TOGETHER), so that times mean nothing\n"),
+         2;
+#endif
   const std::pair<const char*, void (*)()> all[] = {
       {"bake", bench_bake},         {"basis", bench_basis},         {"error", bench_error},
       {"products", bench_products}, {"radiosity", bench_radiosity}, {"lightmaps", bench_lightmaps},

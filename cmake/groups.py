@@ -21,6 +21,8 @@ def helpers(source, text):
         for line in text[start.end() + 1 :].split("\n"):
             if depth == 1 and not line.startswith("TEST") and (found := DECLARED.match(line)):
                 yield found[1] or found[2], source
+                if line.startswith(("const", "static")):  # the others of one declaration
+                    yield from ((name, source) for name in re.findall(r", (\w+)(?= =|;|,)", line))
             depth += line.count("{") - line.count("}")
             if depth < 1:
                 break

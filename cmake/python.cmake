@@ -8,11 +8,12 @@ set(PYBIND11_FINDPYTHON ON)
 find_package(pybind11 2.10 REQUIRED CONFIG)
 
 set(lambent_python_folder ${CMAKE_CURRENT_BINARY_DIR}/python/lambent)
-pybind11_add_module(lambent_python MODULE NO_EXTRAS
-  python/baked.cpp python/image.cpp python/light.cpp python/module.cpp python/scene.cpp)
+set(lambent_python_module python/baked.cpp python/image.cpp python/light.cpp python/module.cpp python/scene.cpp)
+pybind11_add_module(lambent_python MODULE NO_EXTRAS ${lambent_python_module})
 set_target_properties(lambent_python PROPERTIES OUTPUT_NAME _lambent CXX_VISIBILITY_PRESET hidden
   LIBRARY_OUTPUT_DIRECTORY ${lambent_python_folder})
 target_compile_options(lambent_python PRIVATE ${lambent_warnings} $<$<CONFIG:Release>:-O1>)
+lambent_compile_together(lambent_python ${lambent_python_module})
 target_link_libraries(lambent_python PRIVATE lambent nlohmann_json::nlohmann_json fmt::fmt)
 set(lambent_python_files __init__.py __init__.pyi _progress.py py.typed)
 foreach(file ${lambent_python_files})

@@ -28,6 +28,7 @@ set(lambent_relight_sources
   src/lambent/brdf/microfacet.cpp
   src/lambent/brdf/phong.cpp
   src/lambent/brdf/ward.cpp
+  src/lambent/c/blocks.cpp
   src/lambent/c/lambent.cpp
   src/lambent/core/color.cpp
   src/lambent/core/file.cpp

@@ -12,9 +12,7 @@ target_compile_options(lambent-tests PRIVATE -Wall -Wextra -Wno-missing-field-in
 # Most of what a test compiles are these headers.
 target_precompile_headers(lambent-tests PRIVATE <gtest/gtest.h> <algorithm> <cmath> <filesystem> <functional> <map>
   <string> <variant> <vector>)
-if(LAMBENT_SANITIZE)
-  lambent_compile_together(lambent-tests ${lambent_tests})
-endif()
+lambent_compile_together(lambent-tests ${lambent_tests})
 # What is hot in tests is the library: less optimised they build in two thirds of the time, and under the sanitizers
 # those of the readers in a third.
 target_compile_options(lambent-tests PRIVATE $<IF:$<BOOL:${LAMBENT_SANITIZE}>,-O0,$<$<CONFIG:Release>:-O1>>)
@@ -48,13 +46,15 @@ if(NOT LAMBENT_SANITIZE)  # which has an allocator of its own
 endif()
 
 add_test(NAME include_arrows COMMAND ${CMAKE_CURRENT_SOURCE_DIR}/tests/include_arrows.sh ${CMAKE_CURRENT_SOURCE_DIR})
-add_test(NAME command_line COMMAND ${CMAKE_CURRENT_SOURCE_DIR}/tests/command_line.sh $<TARGET_FILE:lambent-tool>)
-add_test(NAME durable COMMAND ${CMAKE_CURRENT_SOURCE_DIR}/tests/durable.sh $<TARGET_FILE:lambent-tool>)
+foreach(name command_line command_line_stores command_line_lightmaps command_line_lobes durable)
+  add_test(NAME ${name} COMMAND ${CMAKE_CURRENT_SOURCE_DIR}/tests/${name}.sh $<TARGET_FILE:lambent-tool>)
+  set_tests_properties(${name} PROPERTIES COST 1000)  # the longest: first, beside the others
+endforeach()
 if(LAMBENT_SANITIZE)
-  set_tests_properties(durable PROPERTIES ENVIRONMENT LAMBENT_DURABLE_RAYS=128)
+  set_tests_properties(command_line command_line_stores command_line_lightmaps command_line_lobes durable PROPERTIES
+    ENVIRONMENT "LAMBENT_COARSE=1;LAMBENT_DURABLE_RAYS=128")
 endif()
 # A hundred moments of each kind: kill_and_resume.sh LAMBENT 100.
 add_test(NAME kill_and_resume COMMAND ${CMAKE_CURRENT_SOURCE_DIR}/tests/kill_and_resume.sh
   $<TARGET_FILE:lambent-tool> 2)
 add_test(NAME window COMMAND ${CMAKE_CURRENT_SOURCE_DIR}/tests/window.sh $<TARGET_FILE:lambent-tool>)
-set_tests_properties(command_line PROPERTIES COST 1000)  # the longest: first, beside the others

@@ -50,3 +50,29 @@ build() {
     exit 1
   fi
 }
+
+# timed NAME COMMAND...: runs it in a shell of its own and keeps what it took, for print_times.
+timed() {
+  local name=$1
+  shift
+  mkdir -p build
+  (
+    took=build/times.$BASHPID begun=$EPOCHREALTIME
+    trap '{ times; echo "$begun $EPOCHREALTIME"; } >"$took"; keep_times "$name" "$took"' EXIT
+    "$@"
+  )
+}
+# Processor seconds: the user's and the system's, of the shell and of all that it waited for.
+keep_times() {
+  tr ms '  ' <"$2" | awk -v name="$1" '
+    NF == 4 { processor += 60 * ($1 + $3) + $2 + $4 } NF == 2 { wall = $2 - $1 }
+    END { printf "%s\t%.1f\t%.1f\n", name, wall, processor }' >>build/times.txt
+  rm -f "$2"
+}
+# Steps that ran beside others take their wall seconds at the same time as those.
+print_times() {
+  [ ! -s build/times.txt ] || awk -F'\t' '
+    BEGIN { printf "%-34s %8s %12s\n", "seconds", "wall", "processor" }
+    { printf "%-34s %8.1f %12.1f\n", $1, $2, $3; processor += $3 }
+    END { printf "%-34s %8s %12.1f\n", "all", "", processor }' build/times.txt
+}

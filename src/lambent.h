@@ -121,12 +121,39 @@ lambent_code lambent_get_group(const lambent_file* file, size_t index, const cha
 lambent_code lambent_read(const lambent_file* file, size_t field, size_t receiver, float* values, size_t count);
 
 /** For a field of the file. Errors: LAMBENT_ARGUMENT: a field that is not there; LAMBENT_UNSUPPORTED: visibility in
- * blocks, which needs materials (C++: relight/relighter.h). */
+ * blocks, which needs materials: lambent_relighter_new_blocks(). */
 lambent_code lambent_relighter_new(const lambent_file* file, size_t field, lambent_relighter** relighter);
+
+/** How a surface reflects. */
+typedef enum lambent_model {
+  LAMBENT_LAMBERT = 0,           /**< evenly: base_color over pi; the rest is not looked at */
+  LAMBENT_METALLIC_ROUGHNESS = 1 /**< glTF's */
+} lambent_model;
+/** A material of a surface whose last reflection is free. */
+typedef struct lambent_material {
+  int model;           /**< of lambent_model */
+  float base_color[3]; /**< [0, 1], linear */
+  float metallic;      /**< [0, 1] */
+  float roughness;     /**< [0, 1] */
+} lambent_material;
+/** For visibility in blocks: light, view and materials meet when it is relit. `positions` and `normals` (unit) are x,
+ * y, z of each receiver as it was baked, `receivers` of them: those of its vertex (lambent_get_part()), the normal
+ * towards its side. Material of receiver r is materials[material_of[r]]; material_of null: the first for all. All is
+ * copied. Errors: LAMBENT_ARGUMENT: a number of receivers other than the field's, a material that is not there or out
+ * of range, numbers that are not finite, normals that are not unit; LAMBENT_UNSUPPORTED: another kind of transfer. */
+lambent_code lambent_relighter_new_blocks(const lambent_file* file, size_t field, const float* positions,
+                                          const float* normals, size_t receivers, const lambent_material* materials,
+                                          size_t material_count, const uint32_t* material_of,
+                                          lambent_relighter** relighter);
+/** Where blocks are seen from, x, y, z; the origin until told otherwise. Errors: LAMBENT_ARGUMENT: not finite;
+ * LAMBENT_UNSUPPORTED: other transfer than blocks looks alike from everywhere, or leaves the view to
+ * the last reflection. */
+lambent_code lambent_set_eye(lambent_relighter* relighter, const float* eye);
 /** Null is fine. */
 void lambent_relighter_free(lambent_relighter* relighter);
 
-/** Light as it multiplies the columns: `count` = columns times r, g, b. Errors: LAMBENT_ARGUMENT. */
+/** Light as it multiplies the columns: `count` = columns times r, g, b. Errors: LAMBENT_ARGUMENT; LAMBENT_UNSUPPORTED:
+ * blocks have no columns. */
 lambent_code lambent_set_columns(lambent_relighter* relighter, const float* rgb, size_t count);
 
 /** Whose spherical harmonics coefficients are (docs/conventions.md). All are indexed l(l+1)+m. */
@@ -143,9 +170,10 @@ typedef enum lambent_sh {
 lambent_code lambent_set_sh(lambent_relighter* relighter, const float* rgb, int order, int convention);
 
 /** Distant light as a lat-long picture of radiance, height x width x (r, g, b) from the top: the top row is +Y, the
- * centre +X, three quarters to the right +Z. Projected onto the file's columns; `rotation` (3 x 3, null: none) turns
- * the light. Errors: LAMBENT_ARGUMENT: a size, whose width is twice its height but for a pixel, values that are
- * negative or not finite, a matrix that is no rotation; LAMBENT_UNSUPPORTED: the file has no columns for distant light.
+ * centre +X, three quarters to the right +Z. Projected onto the file's columns, or onto the cube of its blocks;
+ * `rotation` (3 x 3, null: none) turns the light. Errors: LAMBENT_ARGUMENT: a size, whose width is twice its height but
+ * for a pixel, values that are negative or not finite, a matrix that is no rotation; LAMBENT_UNSUPPORTED: the file has
+ * no columns for distant light.
  */
 lambent_code lambent_set_environment(lambent_relighter* relighter, const float* rgb, int width, int height,
                                      const float* rotation);
@@ -162,8 +190,9 @@ lambent_code lambent_set_lamp(lambent_relighter* relighter, const char* group, c
 lambent_code lambent_set_rotations(lambent_relighter* relighter, const float* rotations, size_t receivers);
 
 /** T . light: row after row of r, g, b for each receiver, which begins at rgb[receiver * stride]; of diffuse transfer
- * the exit radiance of a white surface. `floats` is how many there is room for, stride 3 rows at least. Fastest with
- * one row, stride 3 and memory on a 64-byte boundary. Errors: LAMBENT_ARGUMENT; LAMBENT_NO_LIGHT. */
+ * the exit radiance of a white surface, of blocks that of its material towards the eye. `floats` is how many there is
+ * room for, stride 3 rows at least. Fastest with one row, stride 3 and memory on a 64-byte boundary. Errors:
+ * LAMBENT_ARGUMENT; LAMBENT_NO_LIGHT. */
 lambent_code lambent_relight(lambent_relighter* relighter, float* rgb, size_t floats, size_t stride);
 
 #ifdef __cplusplus

@@ -98,7 +98,8 @@ static void wrong_arguments(const char* path) {
   CHECK(lambent_set_environment(r, light, 1, 1, mirror) == LAMBENT_ARGUMENT);
   CHECK(lambent_set_sky(r, 200, 0, 3, 0.2f, 1, NULL) == LAMBENT_ARGUMENT);
   CHECK(lambent_set_lamp(r, "nobody", light) == LAMBENT_ARGUMENT);
-  CHECK(lambent_set_rotations(r, skew, 1) == LAMBENT_UNSUPPORTED);
+  CHECK(lambent_set_rotations(r, skew, 1) == LAMBENT_UNSUPPORTED && lambent_set_eye(r, skew) == LAMBENT_UNSUPPORTED);
+  CHECK(lambent_relighter_new_blocks(file, 0, skew, skew, 3, NULL, 0, NULL, &r) == LAMBENT_NULL);
   CHECK(lambent_set_columns(r, light, info.columns) == LAMBENT_OK);
   CHECK(lambent_relight(r, out, floats - 1, 3 * info.rows) == LAMBENT_ARGUMENT);
   CHECK(lambent_relight(r, out, floats, 3 * info.rows - 1) == LAMBENT_ARGUMENT);
@@ -110,6 +111,49 @@ static void wrong_arguments(const char* path) {
   free(out);
   lambent_relighter_free(r);
   lambent_close(file);
+}
+
+static void wrong_blocks(const lambent_file* file) {
+  lambent_relighter* r = NULL;
+  lambent_info info;
+  lambent_material material = {LAMBENT_LAMBERT, {1, 1, 1}, 0, 0};
+  float *up, *wrong, eye[3] = {0, 0, 0};
+  uint32_t* second;
+  size_t i;
+  info.size = sizeof info;
+  CHECK(lambent_describe(file, 0, &info) == LAMBENT_OK && info.values == 0 && info.columns == 0);
+  up = calloc(3 * info.receivers, sizeof *up), wrong = calloc(3 * info.receivers, sizeof *wrong);
+  second = calloc(info.receivers, sizeof *second);
+  for (i = 0; i < info.receivers; ++i) up[3 * i + 1] = 1, second[i] = 1;
+#define MAKE(field, positions, normals, count, materials, of) \
+  lambent_relighter_new_blocks(file, field, positions, normals, count, materials, 1, of, &r)
+  CHECK(lambent_relighter_new_blocks(NULL, 0, up, up, info.receivers, &material, 1, NULL, &r) == LAMBENT_NULL);
+  CHECK(lambent_relighter_new_blocks(file, 0, up, up, info.receivers, &material, 1, NULL, NULL) == LAMBENT_NULL);
+  CHECK(MAKE(0, NULL, up, info.receivers, &material, NULL) == LAMBENT_NULL);
+  CHECK(MAKE(0, up, NULL, info.receivers, &material, NULL) == LAMBENT_NULL);
+  CHECK(MAKE(0, up, up, info.receivers, NULL, NULL) == LAMBENT_NULL);
+  CHECK(MAKE(7, up, up, info.receivers, &material, NULL) == LAMBENT_ARGUMENT);
+  CHECK(MAKE(0, up, up, info.receivers - 1, &material, NULL) == LAMBENT_ARGUMENT);
+  CHECK(MAKE(0, up, wrong, info.receivers, &material, NULL) == LAMBENT_ARGUMENT);
+  CHECK(MAKE(0, up, up, info.receivers, &material, second) == LAMBENT_ARGUMENT);
+  wrong[2] = (float)NAN;
+  CHECK(MAKE(0, wrong, up, info.receivers, &material, NULL) == LAMBENT_ARGUMENT);
+  material.base_color[1] = 2;
+  CHECK(MAKE(0, up, up, info.receivers, &material, NULL) == LAMBENT_ARGUMENT);
+  material.base_color[1] = 1, material.model = 9;
+  CHECK(MAKE(0, up, up, info.receivers, &material, NULL) == LAMBENT_ARGUMENT && r == NULL);
+  material.model = LAMBENT_LAMBERT;
+  CHECK(MAKE(0, up, up, info.receivers, &material, NULL) == LAMBENT_OK && r != NULL);
+  CHECK(lambent_relight(r, wrong, 3 * info.receivers, 3) == LAMBENT_NO_LIGHT);
+  CHECK(lambent_set_eye(NULL, eye) == LAMBENT_NULL && lambent_set_eye(r, NULL) == LAMBENT_NULL);
+  CHECK(lambent_set_eye(r, eye) == LAMBENT_OK);
+  eye[1] = (float)INFINITY;
+  CHECK(lambent_set_eye(r, eye) == LAMBENT_ARGUMENT);
+  CHECK(lambent_set_sky(r, 40, 0, 3, 0.2f, 1, NULL) == LAMBENT_OK);
+  CHECK(lambent_relight(r, wrong, 3 * info.receivers - 1, 3) == LAMBENT_ARGUMENT);
+  CHECK(lambent_relight(r, wrong, 3 * info.receivers, 3) == LAMBENT_OK);
+  lambent_relighter_free(r);
+  free(up), free(wrong), free(second);
 }
 
 /* A file cut short anywhere, and one of the next version. */
@@ -155,6 +199,7 @@ int main(int argc, char** argv) {
   CHECK(lambent_open(blocks, &file) == LAMBENT_OK);
   CHECK(lambent_relighter_new(file, 0, &r) == LAMBENT_UNSUPPORTED && r == NULL);
   CHECK(lambent_read(file, 0, 0, values, 0) == LAMBENT_UNSUPPORTED);
+  wrong_blocks(file);
   lambent_close(file);
   if (!failures) printf("c_api passed\n");
   return failures != 0;

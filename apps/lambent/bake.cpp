@@ -21,10 +21,7 @@ Result<BakeRequest> asked(const BakeCommand& o) {
   if (o.from_json.empty() && o.again.empty()) return o.request;
   auto base = o.again.empty() ? load_bake_request(o.from_json) : request_of_baked_file(o.again, o.request.scene);
   if (!base) return base;
-  for (const Option<BakeRequest>& option : bake_options())
-    if (o.request.given.contains(json_name(option.name)))
-      std::visit([&](auto member) { (*base).*member = o.request.*member; }, option.member);
-  base->given.insert(o.request.given.begin(), o.request.given.end());
+  say_over(bake_options(), o.request, *base);
   return base;
 }
 

@@ -3,7 +3,8 @@
 import { statSync } from 'node:fs';
 import { join } from 'node:path';
 import { expect, it } from 'vitest';
-import { drawn, haveBrowser, launch, open, psnr, serve, writeScene } from '../e2e/browser.ts';
+import { drawn, haveBrowser, launch, open, psnr, serve } from '../e2e/browser.ts';
+import { writeScene } from '../e2e/scenes.ts';
 import { haveTool, lambentJson, makeFolder, renderLinear, writeLopsidedHdr } from '../test/tool.ts';
 
 const camera = '3.1,2.6,4.3,-0.3,0.8,0,38',

@@ -3,7 +3,8 @@
 // ratios are pessimistic for hardware that hides texel fetches.
 import { join } from 'node:path';
 import { expect, it } from 'vitest';
-import { haveBrowser, launch, openFixture, writeScene } from '../e2e/browser.ts';
+import { haveBrowser, launch, openFixture } from '../e2e/browser.ts';
+import { writeScene } from '../e2e/scenes.ts';
 import { haveTool, lambent, makeFolder } from '../test/tool.ts';
 
 it.skipIf(!haveTool || !haveBrowser)('shading', async () => {

@@ -5,7 +5,8 @@ import type { Browser, Page } from 'playwright-core';
 import { afterAll, beforeAll, describe, expect, it } from 'vitest';
 import { tones } from '../page/tone.ts';
 import { haveTool, lambent, lambentJson, makeFolder, writeLopsidedHdr } from '../test/tool.ts';
-import { drawn, haveBrowser, launch, open, psnr, ready, serve, writeScene, type Server } from './browser.ts';
+import { drawn, haveBrowser, launch, open, psnr, ready, serve, type Server } from './browser.ts';
+import { writeScene } from './scenes.ts';
 
 describe.skipIf(!haveTool || !haveBrowser)('what the page shows of light', () => {
   const folder = makeFolder(),

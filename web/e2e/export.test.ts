@@ -5,7 +5,8 @@ import type { Browser, Page } from 'playwright-core';
 import type { ViteDevServer } from 'vite';
 import { afterAll, beforeAll, describe, expect, it } from 'vitest';
 import { haveTool, lambent, makeFolder, renderLinear } from '../test/tool.ts';
-import { haveBrowser, launch, openFixture, psnr, writeScene } from './browser.ts';
+import { haveBrowser, launch, openFixture, psnr } from './browser.ts';
+import { writeScene } from './scenes.ts';
 
 const camera = '3.1,2.6,4.3,-0.3,0.8,0,38',
   size = [640, 480];

@@ -4,7 +4,8 @@ import type { Browser, CDPSession, Page } from 'playwright-core';
 import { afterAll, beforeAll, describe, expect, it } from 'vitest';
 import { writeBendingBar } from '../test/skinned.ts';
 import { haveTool, lambent, makeFolder, writeLopsidedHdr } from '../test/tool.ts';
-import { drawn, haveBrowser, launch, open, serve, writeBall, type Server } from './browser.ts';
+import { drawn, haveBrowser, launch, open, serve, type Server } from './browser.ts';
+import { writeBall } from './scenes.ts';
 
 const size = 400,
   camera = 'camera=0,0,5,0,0,0,35';

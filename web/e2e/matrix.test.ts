@@ -4,7 +4,8 @@ import { join } from 'node:path';
 import type { Browser } from 'playwright-core';
 import { afterAll, beforeAll, describe, expect, it } from 'vitest';
 import { haveTool, lambent, makeFolder, renderLinear, writeLopsidedHdr } from '../test/tool.ts';
-import { complaint, haveBrowser, launch, open, psnr, serve, writeScene } from './browser.ts';
+import { complaint, haveBrowser, launch, open, psnr, serve } from './browser.ts';
+import { writeScene } from './scenes.ts';
 
 const rotate = '40,-25,70',
   cameras = ['3.1,2.6,4.3,-0.3,0.8,0,38', '1.2,3.4,3.6,-0.3,0.6,0,36'] as const;

@@ -5,7 +5,8 @@ import type { Browser, Page } from 'playwright-core';
 import type { ViteDevServer } from 'vite';
 import { afterAll, beforeAll, describe, expect, it } from 'vitest';
 import { haveTool, lambent, makeFolder, writeLopsidedHdr } from '../test/tool.ts';
-import { haveBrowser, launch, openFixture, writeBall, writeScene } from './browser.ts';
+import { haveBrowser, launch, openFixture } from './browser.ts';
+import { writeBall, writeScene } from './scenes.ts';
 
 describe.skipIf(!haveTool || !haveBrowser)('the package', () => {
   const folder = makeFolder(),

@@ -6,18 +6,8 @@ import { join } from 'node:path';
 import type { Browser, Page } from 'playwright-core';
 import { afterAll, beforeAll, describe, expect, it } from 'vitest';
 import { haveTool, lambent, makeFolder, writeHdr } from '../test/tool.ts';
-import {
-  complaint,
-  drawn,
-  haveBrowser,
-  launch,
-  open,
-  serve,
-  writeBall,
-  writeScene,
-  writeSkin,
-  type Server,
-} from './browser.ts';
+import { complaint, drawn, haveBrowser, launch, open, serve, type Server } from './browser.ts';
+import { writeBall, writeScene, writeSkin } from './scenes.ts';
 
 describe.skipIf(!haveTool || !haveBrowser)('the page', () => {
   const folder = makeFolder(),

@@ -6,7 +6,8 @@ import type { ViteDevServer } from 'vite';
 import { afterAll, beforeAll, describe, expect, it } from 'vitest';
 import { readTransferTexture } from '../src/transfer_texture.ts';
 import { haveTool, lambent, lambentJson, makeFolder, renderLinear, writeLopsidedHdr } from '../test/tool.ts';
-import { haveBrowser, launch, openFixture, png, psnr, writeBumpy } from './browser.ts';
+import { haveBrowser, launch, openFixture, psnr } from './browser.ts';
+import { png, writeBumpy } from './scenes.ts';
 
 const camera = '1.6,1.5,2.2,-0.1,0.4,-0.2,40',
   size = [640, 480],

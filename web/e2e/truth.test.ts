@@ -3,7 +3,8 @@ import { join } from 'node:path';
 import type { Browser } from 'playwright-core';
 import { afterAll, beforeAll, describe, expect, it } from 'vitest';
 import { haveTool, lambent, makeFolder, renderLinear, writeLopsidedHdr } from '../test/tool.ts';
-import { haveBrowser, launch, open, psnr, serve, writeRoom, writeScene, type Server } from './browser.ts';
+import { haveBrowser, launch, open, psnr, serve, type Server } from './browser.ts';
+import { writeRoom, writeScene } from './scenes.ts';
 
 const camera = '3.1,2.6,4.3,-0.3,0.8,0,38',
   rotate = '40,-25,70';

@@ -5,18 +5,8 @@ import { join } from 'node:path';
 import type { Browser } from 'playwright-core';
 import { afterAll, beforeAll, describe, expect, it } from 'vitest';
 import { haveTool, lambent, makeFolder, renderLinear, writeLopsidedHdr } from '../test/tool.ts';
-import {
-  drawn,
-  haveBrowser,
-  launch,
-  open,
-  openFixture,
-  psnr,
-  serve,
-  writeBall,
-  writeScene,
-  writeSkin,
-} from './browser.ts';
+import { drawn, haveBrowser, launch, open, openFixture, psnr, serve } from './browser.ts';
+import { writeBall, writeScene, writeSkin } from './scenes.ts';
 
 const rotate = '40,-25,70';
 

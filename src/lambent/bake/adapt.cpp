@@ -75,7 +75,8 @@ struct Adapter {
     Receivers at;
     at.basis = first.basis;
     for (const Place& p : places) at.origins.push_back(p.origin), at.normals.push_back(p.normal);
-    const GatherSetup setup = make_gather_setup(original, tracer, at, options.order, options.samples, seed);
+    GatherSetup setup = make_gather_setup(original, tracer, at, options.order, options.samples, seed);
+    setup.progress = progress;
     Pool<GatherScratch, DeleteScratch> scratch([&] { return make_gather_scratch(setup); });
     std::vector<float> out(places.size() * width);
     ProgressStage stage(progress, name, places.size());

@@ -2,6 +2,7 @@
 // Mapping".
 #include <lambent/basis/sh.h>
 #include <lambent/bake/directional.h>
+#include <lambent/bake/fan.h>
 #include <lambent/bake/kernels.h>
 #include <lambent/core/random.h>
 
@@ -55,11 +56,14 @@ void gather_on(const GatherSetup& setup, const Basis& basis, const Lamps& lamps,
     rotate_directions(choice.rotation, sets.x.data() + base, sets.y.data() + base, sets.z.data() + base, sets.stride,
                       dx.data(), dy.data(), dz.data());
     const Directions directions{dx.data(), dy.data(), dz.data(), rays};
-    if (passes) setup.tracer.closest_fan(origin, directions, hits.data(), passages.data());
-    else setup.tracer.closest_fan(origin, directions, hits.data());
+    trace_hits(setup.tracer, origin, directions, hits.data(), passes ? std::span(passages) : std::span<Passage>(),
+               setup.progress);
+    if (is_cancelled(setup.progress)) return;
     lights.clear();
-    sample_lamps(setup.scene, setup.tracer, lamps, origin, normal, lamp_samples, rays, setup.seed, r, lights);
+    sample_lamps(setup.scene, setup.tracer, lamps, origin, normal, lamp_samples, rays, setup.seed, r, lights,
+                 setup.progress);
     for (size_t j = 0; j < rays; ++j) {
+      if (ends_fan(j, setup.progress)) return;
       const Hit& h = hits[j];
       const Vec3 d(dx[j], dy[j], dz[j]);
       const float cosine = dot(normal, d), share = sets.weights.empty() ? 1.0f : sets.weights[j];

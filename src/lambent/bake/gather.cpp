@@ -1,5 +1,6 @@
 // Follows: general-prt (transfer by the Neumann recursion, interpolated between receivers), radiosity (the same
 // operator).
+#include <lambent/bake/fan.h>
 #include <lambent/bake/gather.h>
 #include <lambent/bake/kernels.h>
 #include <lambent/core/check.h>
@@ -286,10 +287,9 @@ void trace_gather_on(const GatherSetup& setup, const Basis& basis, GatherScratch
     const size_t r = first + i;
     const bool checked = block && r % check_every == 0;
     const Directions directions = fan.aim(setup.receivers.normals[r], setup.seed, r);
-    if (passes) setup.tracer.closest_fan(setup.receivers.origins[r], directions, scratch.hits.data(), passages.data());
-    else setup.tracer.closest_fan(setup.receivers.origins[r], directions, scratch.hits.data());
-    scratch.rows.begin_row();
-    if (checked) scratch.half_rows.begin_row();
+    trace_hits(setup.tracer, setup.receivers.origins[r], directions, scratch.hits.data(), passages, setup.progress);
+    if (is_cancelled(setup.progress)) break;
+    scratch.rows.begin_row(), scratch.half_rows.begin_row();  // the second ends where it is checked
     size_t backs = 0;
     const Vec3 normal = setup.receivers.normals[r];
     auto direction = [&](size_t j) { return Vec3(fan.x[j], fan.y[j], fan.z[j]); };
@@ -300,11 +300,12 @@ void trace_gather_on(const GatherSetup& setup, const Basis& basis, GatherScratch
     if (direct) {
       scratch.lights.clear();
       sample_lamps(setup.scene, setup.tracer, direct->lamps, setup.receivers.origins[r], normal, direct->samples, rays,
-                   setup.seed, r, scratch.lights);
+                   setup.seed, r, scratch.lights, setup.progress);
       for (const LampLight& light : scratch.lights) add_light(light, 1);
     }
     const bool sees_sky = direct && direct->lamps.sky, sees_lamps = direct && !direct->lamps.of_triangle.empty();
     for (size_t j = 0; j < rays; ++j) {
+      if (ends_fan(j, setup.progress)) break;
       if (j + lookahead < rays) basis.prefetch(hits[j + lookahead].triangle, hits[j + lookahead].front);
       if (block && j + lookahead / 2 < rays) prefetch_places(basis, hits[j + lookahead / 2], scratch.rows);
       const Hit& h = hits[j];
@@ -369,8 +370,7 @@ bool gather_point(const GatherSetup& setup, GatherScratch& scratch, Vec3 origin,
   Fan& fan = scratch.fan;
   const bool passes = !scratch.passages.empty();
   const Directions directions = fan.aim(normal, setup.seed, key);
-  if (passes) setup.tracer.closest_fan(origin, directions, scratch.hits.data(), scratch.passages.data());
-  else setup.tracer.closest_fan(origin, directions, scratch.hits.data());
+  trace_hits(setup.tracer, origin, directions, scratch.hits.data(), scratch.passages, setup.progress);
   std::fill_n(reflected, width, 0.0f);
   size_t backs = 0;
   std::visit(
@@ -409,8 +409,8 @@ void trace_sky(const GatherSetup& setup, GatherScratch& scratch, size_t first, s
     const Vec3 origin = setup.receivers.origins[r];
     const Directions directions = fan.aim(setup.receivers.normals[r], setup.seed, r);
     std::vector<AlignedVector<float>>& v = fan.visible;
-    if (v.size() == 3) setup.tracer.visible_fan(origin, directions, {v[0].data(), v[1].data(), v[2].data()});
-    else setup.tracer.visible_fan(origin, directions, v[0].data());
+    trace_visible(setup.tracer, origin, directions, std::span(v), setup.progress);
+    if (is_cancelled(setup.progress)) return;
     fan.project(sky, first, r);
     size_t seen = 0;
     for (size_t j = 0; j < rays; ++j) seen += v[0][j] > 0 || (v.size() == 3 && v[1][j] + v[2][j] > 0);

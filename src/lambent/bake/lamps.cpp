@@ -1,5 +1,6 @@
 // Follows: radiosity, "Discussion 4" (direct light apart); E. Veach and L. Guibas, "Optimally combining sampling
 // techniques for Monte Carlo rendering", 1995.
+#include <lambent/bake/fan.h>
 #include <lambent/bake/lamps.h>
 #include <lambent/core/random.h>
 #include <lambent/core/sampling.h>
@@ -26,9 +27,9 @@ struct ShadowRays {
     x.push_back(d.x), y.push_back(d.y), z.push_back(d.z);
     return x.size() - 1;
   }
-  void trace(const Tracer& tracer, Vec3 origin) {
+  void trace(const Tracer& tracer, Vec3 origin, const Progress* progress) {
     hits.resize(x.size());
-    tracer.closest_fan(origin, {x.data(), y.data(), z.data(), x.size()}, hits.data());
+    trace_hits(tracer, origin, {x.data(), y.data(), z.data(), x.size()}, hits.data(), {}, progress);
   }
 };
 
@@ -194,7 +195,7 @@ Lamps make_lamps(const Scene& scene, const Environment* sky, bool separate) {
 }
 
 void sample_lamps(const Scene& scene, const Tracer& tracer, const Lamps& lamps, Vec3 origin, Vec3 normal, int samples,
-                  size_t rays, uint32_t seed, size_t receiver, std::vector<LampLight>& out) {
+                  size_t rays, uint32_t seed, size_t receiver, std::vector<LampLight>& out, const Progress* progress) {
   thread_local ShadowRays shadow;
   thread_local std::vector<PendingSample> pending;
   shadow.clear(), pending.clear();
@@ -209,6 +210,7 @@ void sample_lamps(const Scene& scene, const Tracer& tracer, const Lamps& lamps, 
     const double total = lamps.cumulative[end - 1];
     const uint32_t key = uint32_t(hash64(hash64(seed, 0x1a3 + g), receiver));
     for (int s = 0; s < samples; ++s) {
+      if (ends_fan(size_t(s), progress)) return;
       // One number picks the triangle and, by where within its share it fell, the place in it: the points stay spread
       // over both. (A second sequence of the same dimension would follow the first, digit by digit, however it is
       // scrambled.)
@@ -251,8 +253,9 @@ void sample_lamps(const Scene& scene, const Tracer& tracer, const Lamps& lamps, 
           none, INFINITY);
     }
   }
-  shadow.trace(tracer, origin);
+  shadow.trace(tracer, origin, progress);
   for (size_t i = 0; i < pending.size(); ++i) {
+    if (ends_fan(i, progress)) return;
     const Hit& h = shadow.hits[i];
     const bool arrives = h.triangle == none || h.triangle == pending[i].triangle ||
                          h.distance >= pending[i].distance * (1 - same_distance);

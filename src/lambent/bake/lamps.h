@@ -60,9 +60,10 @@ struct LampLight {
 
 // N samples towards each group's area lamps, as many towards the sky, one ray a punctual light; adds what arrives.
 // Random numbers are keyed by (seed, receiver). `rays`: M, of the gather's fan whose hits will be added by the two
-// below; 0: there are none, and lamp samples stand alone.
+// below; 0: there are none, and lamp samples stand alone. Ends early, with less than arrives, where cancelled.
 void sample_lamps(const Scene& scene, const Tracer& tracer, const Lamps& lamps, Vec3 origin, Vec3 normal, int samples,
-                  size_t rays, uint32_t seed, size_t receiver, std::vector<LampLight>& out);
+                  size_t rays, uint32_t seed, size_t receiver, std::vector<LampLight>& out,
+                  const Progress* progress = nullptr);
 
 // What a ray of the fan brings that met an area lamp, or left the scene.
 LampLight met_lamp(const Scene& scene, const Lamps& lamps, uint32_t lamp, const Hit& hit, Vec3 direction, float cosine,

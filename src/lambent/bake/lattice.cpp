@@ -1,5 +1,6 @@
 // Follows: general-prt (transferred incident radiance at points in free space), triple-product-integrals (light from
 // the sky as a triple product: with visibility known to order n + m - 1 it is exact, as in matrix.cpp).
+#include <lambent/bake/fan.h>
 #include <lambent/bake/gather.h>
 #include <lambent/bake/lattice.h>
 #include <lambent/bake/matrix_kernels.h>
@@ -122,13 +123,14 @@ struct LatticeBaker {
                       s.x.data(), s.y.data(), s.z.data());
     const bool passes = !s.passages.empty();
     const Directions directions{s.x.data(), s.y.data(), s.z.data(), rays()};
-    if (passes) setup.tracer.closest_fan(lattice.position(point), directions, s.hits.data(), s.passages.data());
-    else setup.tracer.closest_fan(lattice.position(point), directions, s.hits.data());
+    trace_hits(setup.tracer, lattice.position(point), directions, s.hits.data(), s.passages, setup.progress);
+    if (is_cancelled(setup.progress)) return false;
 
     std::fill(s.sum.begin(), s.sum.end(), 0.0f), std::fill(s.v.begin(), s.v.end(), 0.0f);
     size_t backs = 0, in_batch = 0;
     std::array<float, 3> seen{};  // of each sky channel, as if counted
     for (size_t i = 0; i < rays(); ++i) {
+      if (ends_fan(i, setup.progress)) return false;
       const Hit& h = s.hits[i];
       for (size_t c = 0; c < s.visible.size(); ++c)
         s.visible[c][i] = passes             ? s.passages[i].sky[int(c)]

@@ -21,33 +21,6 @@ std::string too_bright(const char* what, const std::string& name, float value) {
   return fmt::format("{} \"{}\" shines with {:.3g}; the most that is taken is {:g}", what, name, value, brightest_lamp);
 }
 
-Result<void> check_options(const Scene& scene, const Lamps& lamps, const LightmapOptions& o) {
-  if (o.order < 0 || o.order > max_sh_order)
-    return Error{"order", "must lie between 0 and " + std::to_string(max_sh_order)};
-  if (o.samples < 1 || o.samples > 1 << 20)
-    return Error{"samples", "must lie between 1 and 1048576, not " + std::to_string(o.samples)};
-  if (o.lamp_samples < 1 || o.lamp_samples > 1 << 16) return Error{"lamp samples", "must lie between 1 and 65536"};
-  if (o.bounces < 0 || o.bounces > 64)
-    return Error{"bounces", "must lie between 0 and 64, not " + std::to_string(o.bounces)};
-  if (!(o.converge >= 0 && o.converge < 1)) return Error{"converge", "must lie between 0 and 1"};
-  if (o.directional != DirectionalKind::none && o.order > 0)
-    return Error{"directional", "lightmaps hold lamps alone: leave the order out"};
-  if (o.keep_terms && (o.converge > 0 || o.directional != DirectionalKind::none))
-    return Error{"terms", "are kept of counted bounces, and not of directional lightmaps"};
-  for (const AreaLamp& lamp : lamps.area)
-    if (!(largest(lamp.radiance) <= brightest_lamp))
-      return Error{scene.path, too_bright("a lamp of the group", lamps.names[lamp.group], largest(lamp.radiance))};
-  for (const PunctualLight& light : scene.lights)
-    if (!(largest(light.intensity) <= brightest_lamp))
-      return Error{scene.path, too_bright("the light", light.name, largest(light.intensity))};
-  const size_t columns = size_t(sh_count(o.order)) + lamps.groups();
-  if (columns == 0)
-    return Error{scene.path, "nothing gives light: no emissive material, no lamp, no sky, no harmonics"};
-  if (columns > max_columns)
-    return Error{scene.path, std::to_string(columns) + " columns are more than " + std::to_string(max_columns)};
-  return {};
-}
-
 // Of x, [receiver][row][column][channel]: a value that half floats hold only coarsely or not at all; 0: none. Brightest
 // first, then groups whose light lies below half floats' normal numbers.
 float beyond_half(const LightBasis& light, const AlignedVector<float>& x, size_t width) {
@@ -108,6 +81,33 @@ double seconds_since(std::chrono::steady_clock::time_point start) {
 
 }  // namespace
 
+Result<void> check_lightmap(const Scene& scene, const Lamps& lamps, const LightmapOptions& o) {
+  if (o.order < 0 || o.order > max_sh_order)
+    return Error{"order", "must lie between 0 and " + std::to_string(max_sh_order)};
+  if (o.samples < 1 || o.samples > 1 << 20)
+    return Error{"samples", "must lie between 1 and 1048576, not " + std::to_string(o.samples)};
+  if (o.lamp_samples < 1 || o.lamp_samples > 1 << 16) return Error{"lamp samples", "must lie between 1 and 65536"};
+  if (o.bounces < 0 || o.bounces > 64)
+    return Error{"bounces", "must lie between 0 and 64, not " + std::to_string(o.bounces)};
+  if (!(o.converge >= 0 && o.converge < 1)) return Error{"converge", "must lie between 0 and 1"};
+  if (o.directional != DirectionalKind::none && o.order > 0)
+    return Error{"directional", "lightmaps hold lamps alone: leave the order out"};
+  if (o.keep_terms && (o.converge > 0 || o.directional != DirectionalKind::none))
+    return Error{"terms", "are kept of counted bounces, and not of directional lightmaps"};
+  for (const AreaLamp& lamp : lamps.area)
+    if (!(largest(lamp.radiance) <= brightest_lamp))
+      return Error{scene.path, too_bright("a lamp of the group", lamps.names[lamp.group], largest(lamp.radiance))};
+  for (const PunctualLight& light : scene.lights)
+    if (!(largest(light.intensity) <= brightest_lamp))
+      return Error{scene.path, too_bright("the light", light.name, largest(light.intensity))};
+  const size_t columns = size_t(sh_count(o.order)) + lamps.groups();
+  if (columns == 0)
+    return Error{scene.path, "nothing gives light: no emissive material, no lamp, no sky, no harmonics"};
+  if (columns > max_columns)
+    return Error{scene.path, std::to_string(columns) + " columns are more than " + std::to_string(max_columns)};
+  return {};
+}
+
 size_t least_lightmap_memory(size_t receivers, size_t groups, const LightmapOptions& o) {
   const size_t harmonics = size_t(sh_count(o.order)), width = pad_lanes(3 * (harmonics + groups));
   // e, x and the next x; GMRES keeps its Krylov vectors; directional rows.
@@ -119,7 +119,7 @@ size_t least_lightmap_memory(size_t receivers, size_t groups, const LightmapOpti
 Result<Lightmap> bake_lightmap(const Scene& scene, const Tracer& tracer, const Receivers& receivers, const Lamps& lamps,
                                const LightmapOptions& o, bool direct_apart, LightmapReport* report,
                                Progress* progress) {
-  if (auto ok = check_options(scene, lamps, o); !ok) return ok.error();
+  if (auto ok = check_lightmap(scene, lamps, o); !ok) return ok.error();
   if (receivers.count() == 0) return Error{scene.path, "nothing to bake: no triangle has an area"};
   const size_t least = least_lightmap_memory(receivers.count(), lamps.groups(), o);
   if (o.memory < least)

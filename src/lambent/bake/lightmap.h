@@ -48,8 +48,11 @@ struct LightmapReport {
 // Least working memory with which such a bake can run: the solution vectors. What is more holds the operator.
 size_t least_lightmap_memory(size_t receivers, size_t groups, const LightmapOptions& options);
 
-// Errors: options out of range, nothing that gives light (no groups and order 0), too many columns; memory too small
-// (says what is needed); cancelled.
+// What can be known before there are receivers. Errors: options out of range, nothing that gives light (no groups and
+// order 0), too many columns.
+Result<void> check_lightmap(const Scene& scene, const Lamps& lamps, const LightmapOptions& options);
+
+// Errors: those; memory too small (says what is needed); cancelled.
 Result<Lightmap> bake_lightmap(const Scene& scene, const Tracer& tracer, const Receivers& receivers, const Lamps& lamps,
                                const LightmapOptions& options, bool direct_apart, LightmapReport* report = nullptr,
                                Progress* progress = nullptr);

@@ -1,5 +1,6 @@
 // Follows: general-prt (custom light bases); importance sampling of the lobe by inversion.
 #include <lambent/bake/directions.h>
+#include <lambent/bake/fan.h>
 #include <lambent/bake/kernels.h>
 #include <lambent/bake/lobes.h>
 #include <lambent/core/random.h>
@@ -79,8 +80,7 @@ void trace_lobe(const LobeSets& sets, const Tracer& tracer, Vec3 origin, Vec3 no
   }
   const Directions directions{rays.x.data(), rays.y.data(), rays.z.data(), rays.count};
   std::vector<AlignedVector<float>>& v = rays.visible;
-  if (v.size() == 3) tracer.visible_fan(origin, directions, {v[0].data(), v[1].data(), v[2].data()});
-  else tracer.visible_fan(origin, directions, v[0].data());
+  trace_visible(tracer, origin, directions, std::span(v), nullptr);
 }
 
 void trace_lobes(const LobeSets& sets, const Tracer& tracer, Vec3 origin, Vec3 normal, size_t receiver, LobeRays& rays,

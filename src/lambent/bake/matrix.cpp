@@ -102,7 +102,26 @@ struct MatrixBaker : MatrixGather {
     report.rays = n() * (rays() + size_t(lobes.rays) * lobes.sharp.size());
     report.trace_seconds = seconds_since(start);
     report.working_memory = matrix_memory(n(), int(channels()), options, matrix);
-    return finish(buried, errors.relative(), std::move(out), last);
+    MatrixBake baked = finish(buried, errors.relative(), std::move(out), last);
+    if (options.keep_terms) report.terms = {baked.transfer};
+    return baked;
+  }
+
+  // One by one, as many columns and rows as the bake has.
+  Result<void> keep_terms(const MatrixRows& G, const Source& source, const LastReflection& last) {
+    std::vector<WritableTransfer> terms;
+    for (int k = 0; k <= options.bounces; ++k)
+      terms.push_back(make_transfer(options.light(), last.rows, last.channels, n(), options.precision));
+    auto ok = bounce_terms(
+        G, source, J() * wc(), options.bounces, progress, [](int, const auto&) { return Result<void>(); },
+        [&](int k) -> TakeRows {
+          return [&, k](size_t first, size_t count, const float* x) {
+            for (size_t i = 0; i < count; ++i)
+              store_rows(last, materials, terms[size_t(k)], first + i, x + i * J() * wc(), channels(), width());
+          };
+        });
+    for (WritableTransfer& term : terms) report.terms.push_back(std::move(term.transfer));
+    return ok;
   }
 
   Result<MatrixBake> run_bounced(const LastReflection& last) {
@@ -120,6 +139,9 @@ struct MatrixBaker : MatrixGather {
       store_rows(last, materials, out, r, x, channels(), width());
     });
     if (!solution) return solution.error();
+    solution->x = {};
+    if (options.keep_terms)
+      if (auto ok = keep_terms(G, source, last); !ok) return ok.error();
     report.rays = n() * (rays() + size_t(lobes.rays) * lobes.sharp.size()) + G.rays_again();
     report.bounce_seconds = seconds_since(start);
     report.working_memory = fixed + G.bytes();
@@ -160,7 +182,8 @@ Result<void> check_options(const BakeOptions& o, const MatrixOptions& m, const R
         within("order and incident-order together", o.order + m.incident_order, 2, max_sh_order + 1),
         within("svd rows", m.svd_rows, 1, sh_count(m.incident_order)), within("grid", m.grid, 8, 256)})
     if (!ok) return ok.error();
-  if (o.keep_terms) return Error{"terms", "are not kept of transfer matrices"};
+  if (o.keep_terms && m.simulate_paths && o.bounces > 0)
+    return Error{"terms", "are not known of simulated paths, which are followed whole"};
   // A path seldom meets a lamp by chance.
   if (m.simulate_paths && o.bounces > 0 && !o.lobes.empty())
     return Error{"lobes", "bounces by simulated paths are of harmonics alone"};

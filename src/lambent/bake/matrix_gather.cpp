@@ -2,6 +2,7 @@
 // order n + m - 1 the product of light and incident basis, of orders n and m, against it is exact). Instead of
 // scattering, paths (general-prt, "direct simulation").
 #include <lambent/bake/kernels.h>
+#include <lambent/bake/fan.h>
 #include <lambent/bake/matrix_gather.h>
 #include <lambent/bake/matrix_kernels.h>
 #include <lambent/bake/path.h>
@@ -135,6 +136,7 @@ void MatrixGather::scattered(MatrixScratch& s, std::span<const MatrixHit> hits, 
   const float* table = setup.sets.table.data() + size_t(s.choice.set) * V_count() * setup.sets.stride;
   size_t in_batch = 0;
   for (size_t i = 0; i < hits.size() && hits[i].ray < limit; ++i) {
+    if (ends_fan(i, setup.progress)) return;
     const MatrixHit& h = hits[i];
     float* v = s.v.data() + in_batch * wc;
     std::fill(v, v + wc, 0.0f);
@@ -173,6 +175,7 @@ void MatrixGather::simulated(MatrixScratch& s, size_t r, std::span<const MatrixH
   const uint64_t key = hash64(hash64(setup.seed, 0x9a7e5), r);
   size_t in_batch = 0;
   for (size_t i = 0; i < hits.size() && hits[i].ray < limit; ++i) {
+    if (ends_fan(i, setup.progress)) return;
     const uint32_t ray = hits[i].ray;
     const PathEnd end = follow_path(scene, setup.tracer, materials.reflection, {s.x[ray], s.y[ray], s.z[ray]},
                                     s.hits[ray], options.bounces, key, ray);
@@ -203,15 +206,14 @@ bool MatrixGather::trace(MatrixScratch& s, size_t r, MatrixHits* hits) const {
   const Directions d = aim(s, r);
   if (!hits) {
     std::vector<AlignedVector<float>>& v = s.visible;
-    if (v.size() == 3) setup.tracer.visible_fan(receivers.origins[r], d, {v[0].data(), v[1].data(), v[2].data()});
-    else setup.tracer.visible_fan(receivers.origins[r], d, v[0].data());
+    trace_visible(setup.tracer, receivers.origins[r], d, std::span(v), setup.progress);
     size_t seen = 0;
     for (size_t j = 0; j < rays(); ++j) seen += v[0][j] > 0 || (v.size() == 3 && v[1][j] + v[2][j] > 0);
     return 2 * seen < rays() && is_buried(setup.tracer, receivers, r);
   }
   const bool passes = !s.passages.empty();
-  if (passes) setup.tracer.closest_fan(receivers.origins[r], d, s.hits.data(), s.passages.data());
-  else setup.tracer.closest_fan(receivers.origins[r], d, s.hits.data());
+  trace_hits(setup.tracer, receivers.origins[r], d, s.hits.data(), s.passages, setup.progress);
+  if (is_cancelled(setup.progress)) return false;
   size_t backs = 0;
   for (size_t j = 0; j < rays(); ++j) {
     const Hit& h = s.hits[j];

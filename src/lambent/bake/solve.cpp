@@ -48,7 +48,7 @@ double greatest_ratio(const std::vector<double>& squares, const std::vector<doub
   return worst;
 }
 
-// One step, all rows of e + A x: `next` keeps them, or `last` takes them. Without e, A x alone.
+// One step, all rows of e + A x: `next` keeps them, `last` takes them, or both. Without e, A x alone.
 struct Step {
   const LinearOperator& op;
   const Source* e;
@@ -75,7 +75,7 @@ struct Step {
     for (size_t r = checked; halves && r < first + count; r += check_every)
       if (!op.is_filled(r)) errors->add(r, half + (r - checked) / check_every * width, y + (r - first) * width, width);
     if (last && *last) (*last)(first, count, y);
-    else op.keep(first, count, y, width, next);
+    if (next) op.keep(first, count, y, width, next);
   }
 
   void run(const float* x, float* next) const {
@@ -430,13 +430,22 @@ Result<Bounced> bounce(const LinearOperator& op, const Source& e, size_t width, 
 }
 
 Result<void> bounce_terms(const LinearOperator& op, const Source& e, size_t width, int bounces, Progress* progress,
-                          const std::function<Result<void>(int k, const AlignedVector<float>& x)>& take) {
+                          const std::function<Result<void>(int k, const AlignedVector<float>& x)>& take,
+                          const std::function<TakeRows(int k)>& taker_of) {
   AlignedVector<float> x = first_iterate(op, e, width), next(x.size());
+  if (taker_of)
+    parallel_for(op.rows(), gather_block, [&, take_row = taker_of(0)](size_t begin, size_t end) {
+      AlignedVector<float> y(width);
+      for (size_t r = begin; r < end; ++r) e.set(r, y.data()), take_row(r, 1, y.data());
+    });
   const KeptOperator kept(op, progress, "terms", bounces);
   for (int k = 0;; ++k) {
     if (auto ok = take(k, x); !ok || k == bounces) return ok;
     ProgressStage stage(progress, "term " + std::to_string(k + 1), op.rows());
-    Step{kept, nullptr, width, progress, &stage}.run(x.data(), next.data());
+    const TakeRows take_rows = taker_of ? taker_of(k + 1) : TakeRows();
+    Step step{kept, nullptr, width, progress, &stage};
+    step.last = &take_rows;
+    step.run(x.data(), next.data());
     if (stage.cancelled()) return Error{"", "cancelled"};
     std::swap(x, next);
   }

@@ -72,15 +72,17 @@ struct Bounced {
   AlignedVector<float> x;
   double error = -1;  // of the rows of the last step; negative: not estimated
 };
-// Takes rows [first, first + count) of the last step in place of x, from any thread.
+// Takes rows [first, first + count) of a step, from any thread; those of bounce() in place of x.
 using TakeRows = std::function<void(size_t first, size_t count, const float* y)>;
 
 // The sum of the first terms: x_0 = F e, x_{k+1} = F (e + A x_k), `bounces` times. Errors: cancelled.
 Result<Bounced> bounce(const LinearOperator& op, const Source& e, size_t width, int bounces,
                        Progress* progress = nullptr, const TakeRows& last = {});
 
-// The terms themselves: take(k, (F A)^k F e) for k = 0 ... bounces, in order. Errors: cancelled; those of take.
+// The terms themselves: take(k, (F A)^k F e) for k = 0 ... bounces, in order. Where x are other than the rows that it
+// is made of (LinearOperator::keep), taker_of(k) takes those of term k before. Errors: cancelled; those of take.
 Result<void> bounce_terms(const LinearOperator& op, const Source& e, size_t width, int bounces, Progress* progress,
-                          const std::function<Result<void>(int k, const AlignedVector<float>& x)>& take);
+                          const std::function<Result<void>(int k, const AlignedVector<float>& x)>& take,
+                          const std::function<TakeRows(int k)>& taker_of = {});
 
 }  // namespace lambent

@@ -242,7 +242,6 @@ Result<void> check_options(const BakeOptions& o, const Medium& medium) {
     return Error{"samples", "must lie between 1 and 1048576, not " + std::to_string(o.samples)};
   if (o.bounces < 0 || o.bounces > 64)
     return Error{"bounces", "must lie between 0 and 64, not " + std::to_string(o.bounces)};
-  if (o.keep_terms) return Error{"terms", "are not kept of light through a medium"};
   return {};
 }
 
@@ -272,14 +271,24 @@ Result<Transfer> bake_subsurface(const Scene& scene, const Tracer& tracer, const
 
   auto x = bounce(rows, source_of(rows.T0.data(), width), width, options.bounces, progress);
   if (!x) return x.error();
-  WritableTransfer out = make_transfer(options.light(), 1, int(channels), n, options.precision);
-  parallel_for(n, transfer_block, [&](size_t begin, size_t end) {
-    for (size_t r = begin; r < end; ++r) store_receiver(out, r, {x->x.data() + r * width, width});
-  });
-  report.bounce_seconds = seconds_since(start), report.bytes = out.transfer.bytes();
+  auto stored = [&](const AlignedVector<float>& values) {
+    WritableTransfer out = make_transfer(options.light(), 1, int(channels), n, options.precision);
+    parallel_for(n, transfer_block, [&](size_t begin, size_t end) {
+      for (size_t r = begin; r < end; ++r) store_receiver(out, r, {values.data() + r * width, width});
+    });
+    return std::move(out.transfer);
+  };
+  Transfer out = stored(x->x);
+  x->x = {};
+  if (options.keep_terms) {
+    auto ok = bounce_terms(rows, source_of(rows.T0.data(), width), width, options.bounces, progress,
+                           [&](int, const auto& term) { return report.terms.push_back(stored(term)), Result<void>(); });
+    if (!ok) return ok.error();
+  }
+  report.bounce_seconds = seconds_since(start), report.bytes = out.bytes();
   if (report_out) *report_out = report;
   if (walks_out) *walks_out = walks;
-  return std::move(out.transfer);
+  return out;
 }
 
 }  // namespace lambent

@@ -1,6 +1,8 @@
 // The terms of the Neumann series, one by one: radiosity, "Neumann series".
 #include <lambent/bake/bake.h>
 #include <lambent/bake/lightmap.h>
+#include <lambent/bake/materials.h>
+#include <lambent/bake/matrix.h>
 #include <lambent/bake/subsurface.h>
 #include <lambent/receivers/atlas.h>
 #include <lambent/scene/procedural.h>
@@ -122,6 +124,51 @@ TEST(Terms, OfAClosedBoxThatGlowsArePowersOfItsAlbedo) {
   }
 }
 
+TEST(Terms, OfMatricesAndMediaAddUp) {
+  const Scene scene = corner_scene();
+  auto tracer = Tracer::build(scene);
+  const Receivers receivers = make_vertex_receivers(scene);
+  Reflection reflection;
+  reflection.everywhere = Ggx{Vec3(0.9f, 0.8f, 0.7f), Vec2(0.3f)};
+  const ReceiverMaterials materials = make_receiver_materials(scene, receivers, reflection);
+  auto matrix_of = [&](OutgoingKind kind) {
+    return [&, kind](const BakeOptions& o, BakeReport* report) -> Result<Transfer> {
+      auto baked = bake_matrix(scene, *tracer, receivers, materials, o,
+                               {.incident_order = 3, .outgoing = kind, .grid = 16, .response_samples = 256}, report);
+      if (!baked) return baked.error();
+      return std::move(baked->transfer);
+    };
+  };
+  auto medium = [&](const BakeOptions& o, BakeReport* report) {
+    return bake_subsurface(scene, *tracer, receivers, o, {{Vec3(20, 15, 10), Vec3(1)}}, report);
+  };
+  using Baker = std::function<Result<Transfer>(const BakeOptions&, BakeReport*)>;
+  for (const Baker& baker : {Baker(matrix_of(OutgoingKind::map)), Baker(matrix_of(OutgoingKind::svd)),
+                             Baker(matrix_of(OutgoingKind::sh)), Baker(medium)}) {
+    BakeOptions options{.order = 3, .samples = 32, .bounces = 2, .precision = Precision::single};
+    auto plain = baker(options, nullptr);
+    options.keep_terms = true;
+    BakeReport report;
+    auto all = baker(options, &report);
+    ASSERT_TRUE(all && plain);
+    EXPECT_TRUE(same_bytes(*all, *plain));  // asking for terms changes nothing
+    ASSERT_EQ(report.terms.size(), 3u);
+    for (int bounces = 0; bounces <= 2; ++bounces) {
+      BakeOptions fewer = options;
+      fewer.bounces = bounces;
+      BakeReport of_fewer;
+      auto expected = baker(fewer, &of_fewer);
+      ASSERT_TRUE(expected);
+      EXPECT_EQ(of_fewer.terms.size(), size_t(bounces) + 1);
+      if (expected->channels == report.terms[0].channels) {
+        EXPECT_LT(furthest(report.terms, size_t(bounces) + 1, *expected), 1e-5);
+      } else {
+        EXPECT_EQ(bounces, 0);  // direct light alone is of one channel
+      }
+    }
+  }
+}
+
 TEST(Terms, AreRefusedWhereThereAreNone) {
   Scene scene = corner_scene();
   scene.materials[0].emissive = Vec3(1);
@@ -134,7 +181,9 @@ TEST(Terms, AreRefusedWhereThereAreNone) {
   EXPECT_FALSE(bake_lightmap(scene, *tracer, receivers, lamps, options, false));
   options.converge = 0, options.directional = DirectionalKind::sh2;
   EXPECT_FALSE(bake_lightmap(scene, *tracer, receivers, lamps, options, false));
-  EXPECT_FALSE(bake_subsurface(scene, *tracer, receivers, {.order = 2, .samples = 1, .keep_terms = true}, {}));
+  const ReceiverMaterials materials = make_receiver_materials(scene, receivers, {});
+  EXPECT_FALSE(bake_matrix(scene, *tracer, receivers, materials, {.order = 2, .samples = 1, .keep_terms = true},
+                           {.simulate_paths = true}));
 }
 
 }  // namespace

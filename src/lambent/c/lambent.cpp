@@ -1,14 +1,12 @@
 // lambent.h over read_fields(), project_light() and Relighter.
-#include <lambent.h>
-
 #include <lambent/baked/extension.h>
-#include <lambent/basis/sh.h>
+#include <lambent/c/handles.h>
 #include <lambent/basis/sh_convert.h>
+#include <lambent/core/overloaded.h>
 #include <lambent/core/parallel.h>
+#include <lambent/light/cube_light.h>
 #include <lambent/light/sky.h>
 #include <lambent/relight/light.h>
-#include <lambent/relight/relighter.h>
-#include <lambent/core/overloaded.h>
 
 #include <algorithm>
 #include <cstdio>
@@ -19,67 +17,18 @@ using namespace lambent;
 
 namespace {
 
-struct OpenFile {
-  BakedFields fields;
-  LightBasis light;                   // the surface's, whose group names are lent out
-  std::vector<std::string> rows_are;  // by field
-  size_t count() const { return 1 + fields.more.size(); }
-  const Field& field(size_t i) const { return i == 0 ? fields.surface : fields.more[i - 1]; }
-};
+thread_local char last_error[1024] = "";
 
 }  // namespace
 
-struct lambent_file {
-  std::shared_ptr<const OpenFile> open;
-};
-
-struct lambent_relighter {
-  std::shared_ptr<const OpenFile> open;
-  Relighter relighter;
-  LightBasis basis;
-  std::vector<Vec3> columns;  // harmonics, lobes, groups
-  bool lit = false;           // nothing of the columns but groups has a value unless it is set
-  bool changed = true;        // since the relighter had them
-  bool turned = false;
-  ReceiverFrames frames = {};
-  size_t distant() const { return basis.count() - basis.groups.size(); }
-};
-
-namespace {
-
-thread_local char last_error[1024] = "";
-
-lambent_code fail(lambent_code code, const std::string& text) {
-  std::snprintf(last_error, sizeof last_error, "%s", text.c_str());
+lambent_code lambent::c::fail(lambent_code code, std::string_view text) noexcept {
+  std::snprintf(last_error, sizeof last_error, "%.*s", int(std::min(text.size(), sizeof last_error)), text.data());
   return code;
 }
-lambent_code wrong(const std::string& text) { return fail(LAMBENT_ARGUMENT, text); }
 
-// Runs body, whose exceptions become codes.
-template <class Body>
-lambent_code guarded(const Body& body) noexcept {
-  try {
-    return body();
-  } catch (const std::bad_alloc&) {
-    std::snprintf(last_error, sizeof last_error, "out of memory");
-    return LAMBENT_MEMORY;
-  } catch (const std::exception& e) {
-    std::snprintf(last_error, sizeof last_error, "%s", e.what());
-    return LAMBENT_INTERNAL;
-  } catch (...) {
-    std::snprintf(last_error, sizeof last_error, "an unknown fault");
-    return LAMBENT_INTERNAL;
-  }
-}
-// And only where none of the pointers that it will follow is null.
-template <class Body, class... P>
-lambent_code guarded_with(const Body& body, const P*... pointers) noexcept {
-  if ((!pointers || ...)) {
-    std::snprintf(last_error, sizeof last_error, "a handle or a pointer is null");
-    return LAMBENT_NULL;
-  }
-  return guarded(body);
-}
+using namespace lambent::c;
+
+namespace {
 
 std::string name_of_rows(const Rows& rows) {
   return std::visit(Overloaded{[](const DirectionalRows& r) { return directional_name(r.kind); },
@@ -150,22 +99,15 @@ void take_sides(const std::vector<T>& front, const std::vector<T>& back, size_t 
   back_out = back.empty() ? nullptr : back.data() + first;
 }
 
-bool finite(const float* values, size_t count) {
-  return std::all_of(values, values + count, [](float v) { return std::isfinite(v); });
-}
-Vec3 color_at(const float* rgb, size_t i) { return {rgb[3 * i], rgb[3 * i + 1], rgb[3 * i + 2]}; }
-Mat3 matrix_at(const float* m) { return {color_at(m, 0), color_at(m, 1), color_at(m, 2)}; }
-
-bool is_rotation(const Mat3& m) {
-  for (size_t i = 0; i < 3; ++i)
-    for (size_t j = 0; j < 3; ++j)
-      if (!(std::abs(dot(m[i], m[j]) - float(i == j)) < 1e-3f)) return false;
-  return determinant(m) > 0;
-}
-
 // Distant light onto the columns for it; the lamps keep theirs.
 lambent_code set_distant(lambent_relighter& r, const Environment& env, const float* rotation) {
   if (rotation && !is_rotation(matrix_at(rotation))) return wrong("the matrix is no rotation");
+  if (const Visibility* blocks = r.blocks()) {
+    const CubeLight cube = cube_light(env, blocks->size, rotation ? matrix_at(rotation) : Mat3(1.0f));
+    if (auto ok = r.relighter.set_light(cube); !ok) return fail(LAMBENT_INTERNAL, ok.error().text());
+    r.lit = true;
+    return LAMBENT_OK;
+  }
   if (r.distant() == 0) return fail(LAMBENT_UNSUPPORTED, "the file has no columns for distant light");
   const LightProjection p = project_light(env, r.basis, rotation ? matrix_at(rotation) : Mat3(1.0f));
   std::copy_n(p.light.begin(), r.distant(), r.columns.begin());
@@ -316,15 +258,8 @@ lambent_code lambent_relighter_new(const lambent_file* file, size_t index, lambe
         if (index >= file->open->count()) return wrong("field " + std::to_string(index) + " is not there");
         const Field& field = file->open->field(index);
         if (std::holds_alternative<Visibility>(field.store))
-          return fail(LAMBENT_UNSUPPORTED, "visibility in blocks wants materials: relight it from C++");
-        auto made = Relighter::make(field);
-        if (!made) return fail(LAMBENT_INTERNAL, made.error().text());
-        LightBasis basis = light_of(field.store);
-        std::vector<Vec3> columns(basis.count(), Vec3(0));
-        std::fill(columns.end() - ptrdiff_t(basis.groups.size()), columns.end(), Vec3(1));
-        const bool lit = basis.groups.size() == basis.count();
-        *relighter = new lambent_relighter{file->open, std::move(*made), std::move(basis), std::move(columns), lit};
-        return LAMBENT_OK;
+          return fail(LAMBENT_UNSUPPORTED, "visibility in blocks wants materials: lambent_relighter_new_blocks()");
+        return new_relighter(*file, field, {}, relighter);
       },
       file, relighter);
 }
@@ -335,6 +270,7 @@ lambent_code lambent_set_columns(lambent_relighter* relighter, const float* rgb,
   return guarded_with(
       [&] {
         const size_t columns = relighter->basis.count();
+        if (columns == 0) return fail(LAMBENT_UNSUPPORTED, "the transfer has no columns");
         if (count != columns)
           return wrong("the transfer has " + std::to_string(columns) + " columns, not " + std::to_string(count));
         if (!finite(rgb, 3 * count)) return wrong("a coefficient is not finite");
@@ -433,11 +369,11 @@ lambent_code lambent_relight(lambent_relighter* relighter, float* rgb, size_t fl
   return guarded_with(
       [&] {
         if (!relighter->lit) return fail(LAMBENT_NO_LIGHT, "no light was set");
-        if (relighter->changed)
+        if (relighter->changed && !relighter->blocks())
           if (auto ok = relighter->relighter.set_light(relighter->columns); !ok)
             return fail(LAMBENT_INTERNAL, ok.error().text());
         relighter->changed = false;
-        const RelightFrame frame{.frames = relighter->turned ? &relighter->frames : nullptr};
+        const RelightFrame frame{.frames = relighter->turned ? &relighter->frames : nullptr, .eye = relighter->eye};
         if (auto ok = relighter->relighter.relight(frame, {rgb, floats}, stride); !ok) return wrong(ok.error().message);
         return LAMBENT_OK;
       },

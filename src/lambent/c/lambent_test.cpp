@@ -1,11 +1,14 @@
 #include <lambent.h>
 
+#include <lambent/baked/baked_file.h>
 #include <lambent/baked/fields.h>
 #include <lambent/basis/sh_convert.h>
 #include <lambent/core/random.h>
+#include <lambent/light/cube_light.h>
 #include <lambent/light/sky.h>
 #include <lambent/relight/light.h>
 #include <lambent/relight/relighter.h>
+#include <lambent/render/products.h>
 
 #include <gtest/gtest.h>
 
@@ -56,7 +59,7 @@ std::vector<Vec3> random_light(size_t columns, uint64_t seed = 1) {
   return light;
 }
 
-// One file for every store, placement and meaning but blocks.
+// One file for every store, placement and meaning but blocks, which want materials.
 const char* const names[] = {"diffuse",
                              "diffuse_grey_single",
                              "diffuse_lobes",
@@ -96,6 +99,64 @@ TEST(C, RelightsFreeSpace) {
   const std::vector<Vec3> light = random_light(o.info.columns);
   ASSERT_EQ(lambent_set_columns(o.relighter, &light[0].x, light.size()), LAMBENT_OK);
   EXPECT_EQ(o.relight(), relight(o.fields.more[0], light));
+}
+
+// What the scene of a bake of blocks says of its receivers, as an engine would.
+struct BlockReceivers {
+  Baked baked = *load_baked(golden("blocks"));
+  std::vector<float> positions, normals;
+  ProductReceivers products;
+  explicit BlockReceivers(const Brdf& brdf) {
+    const VertexPlacement& at = *vertices_of(baked);
+    const Visibility& visibility = std::get<Visibility>(baked.surface.store);
+    Reflection reflection;
+    reflection.everywhere = brdf;
+    products = make_product_receivers(baked.scene, at.front, at.back, visibility.receivers, reflection,
+                                      make_cube(visibility.size), {});
+    for (const Vec3 p : products.positions) positions.insert(positions.end(), {p.x, p.y, p.z});
+    for (const Mat3& f : products.frames) normals.insert(normals.end(), {f[2].x, f[2].y, f[2].z});
+  }
+};
+
+TEST(C, RelightsBlocksAsTheRelighterDoes) {
+  const lambent_material materials[] = {{LAMBENT_LAMBERT, {0.5f, 0.25f, 1}, 0, 0},
+                                        {LAMBENT_METALLIC_ROUGHNESS, {0.9f, 0.6f, 0.3f}, 1, 0.4f}};
+  const Brdf brdfs[] = {Lambert{Vec3(0.5f, 0.25f, 1)},
+                        MetallicRoughness{.base_color = Vec3(0.9f, 0.6f, 0.3f), .metallic = 1, .roughness = 0.4f}};
+  lambent_file* file = nullptr;
+  ASSERT_EQ(lambent_open(golden("blocks").c_str(), &file), LAMBENT_OK) << lambent_error();
+  const float eye[3] = {1, 2, 4};
+  for (uint32_t m = 0; m < 2; ++m) {
+    BlockReceivers of(brdfs[m]);
+    const size_t n = of.products.positions.size();
+    const std::vector<uint32_t> material_of(n, m);
+    lambent_relighter* relighter = nullptr;
+    ASSERT_EQ(lambent_relighter_new_blocks(file, 0, of.positions.data(), of.normals.data(), n, materials, 2,
+                                           material_of.data(), &relighter),
+              LAMBENT_OK)
+        << lambent_error();
+    std::vector<float> ours(3 * n), theirs(3 * n);
+    EXPECT_EQ(lambent_relight(relighter, ours.data(), ours.size(), 3), LAMBENT_NO_LIGHT);
+    ASSERT_EQ(lambent_set_sky(relighter, 40, 20, 3, 0.2f, 0, nullptr), LAMBENT_OK) << lambent_error();
+    ASSERT_EQ(lambent_set_eye(relighter, eye), LAMBENT_OK) << lambent_error();
+    ASSERT_EQ(lambent_relight(relighter, ours.data(), ours.size(), 3), LAMBENT_OK) << lambent_error();
+    EXPECT_EQ(lambent_set_columns(relighter, eye, 0), LAMBENT_UNSUPPORTED);
+    EXPECT_EQ(lambent_set_sh(relighter, eye, 1, LAMBENT_SH_LAMBENT), LAMBENT_UNSUPPORTED);
+    lambent_relighter_free(relighter);
+
+    auto same = Relighter::make(of.baked.surface, {.receivers = std::move(of.products)});
+    ASSERT_TRUE(same) << same.error().text();
+    const int size = std::get<Visibility>(of.baked.surface.store).size;
+    ASSERT_TRUE(same->set_light(cube_light(*make_sky({40, 20, 3, Vec3(0.2f), false}), size)));
+    ASSERT_TRUE(same->relight({.eye = Vec3(eye[0], eye[1], eye[2])}, theirs, 3));
+    float sum = 0;
+    for (size_t i = 0; i < ours.size(); ++i) {
+      EXPECT_NEAR(ours[i], theirs[i], 1e-5f * (1 + theirs[i])) << "float " << i << " of material " << m;  // frames spin
+      sum += ours[i];
+    }
+    EXPECT_GT(sum, 0);
+  }
+  lambent_close(file);
 }
 
 TEST(C, OpensMemoryAsItOpensAPath) {

@@ -9,6 +9,7 @@
 
 #include <climits>
 #include <cstring>
+#include <limits>
 #include <memory>
 #include <string_view>
 

@@ -70,7 +70,7 @@ Result<void> bake_diffuse(Bake& b) {
         fmt::format("{:.1f}% of the walks through the medium were lost, and their light with them: surfaces are "
                     "not closed, or the medium is too dense",
                     100 * walks.lost));
-  b.store = std::move(*transfer);
+  b.store = std::move(*transfer), b.terms = std::move(b.report.terms);
   b.summary.json["subsurface"] = {{"events", walks.events}, {"lost", walks.lost}};
   b.line("medium", fmt::format("{:.1f} events a walk", walks.events));
   return {};
@@ -81,7 +81,7 @@ Result<void> bake_glossy(Bake& b) {
                            make_receiver_materials(b.scene, b.receivers(), b.plan.reflection), b.plan.bake,
                            b.plan.matrix, &b.report, b.job.progress);
   if (!baked) return baked.error();
-  b.store = std::move(baked->transfer), b.rows = std::move(baked->outgoing);
+  b.store = std::move(baked->transfer), b.rows = std::move(baked->outgoing), b.terms = std::move(b.report.terms);
   return {};
 }
 

@@ -84,6 +84,7 @@ Result<BakeOutcome> bake_lightmap_request(const BakeRequest& request, const Bake
     sky = std::move(*env);
   }
   const Lamps lamps = make_lamps(*scene, sky ? &*sky : nullptr, request.light_groups);
+  if (auto ok = check_lightmap(*scene, lamps, plan.lightmap); !ok) return ok.error();  // before an atlas is made
   auto placed = place_receivers(*scene, request, job);
   if (!placed) return placed.error();
   Seconds seconds{seconds_since(start), 0};

@@ -69,7 +69,8 @@ const Option<R> table[] = {
      "Reflections between surfaces, 0 to 64; lightmaps also converge:EPS, as many as leave that residual"},
     {"shadows", &R::shadows, "How well", D | Z, "off: open light everywhere, no shadows and no bounces", 0, 0,
      "on|off"},
-    {"terms", &R::terms, "How well", D | L, "Keep direct light and each bounce one by one too, for `render --show`"},
+    {"terms", &R::terms, "How well", D | M | L,
+     "Keep direct light and each bounce one by one too, for `render --show`"},
     {"memory", &R::memory, "How well", traced | K,
      "Working memory beyond scene and result, bytes; e.g. 500MB, 2GiB (4GiB); less means rays traced again", 0, 0,
      nullptr, nullptr, false},
@@ -176,7 +177,7 @@ constexpr Conflict conflicts[] = {
     {"terms", "compress", "are kept of plain transfer: leave --compress out"},
     {"terms", "fix-view", "are kept on surfaces: leave --fix-view out"},
     {"terms", "fix-light", "are kept for any light: leave --fix-light out"},
-    {"terms", "subsurface", "are those of light between surfaces: leave --subsurface out"},
+    {"terms", "simulate=paths", "are not known of simulated paths, which are followed whole"},
     {"terms", "shadows=off", "are direct light alone without shadows"},
     {"terms", "bounces=converge:", "are counted: give --bounces a number"},
     {"terms", "direct=separate", "have direct light apart already"},
@@ -288,12 +289,8 @@ Result<BakeRequest> bake_request_from_json(const nlohmann::json& object) {
 }
 
 Result<BakeRequest> load_bake_request(const std::string& path) {
-  auto bytes = read_file(path);
-  if (!bytes) return bytes.error();
-  const nlohmann::json object = nlohmann::json::parse(bytes->begin(), bytes->end(), nullptr, false);
-  if (object.is_discarded()) return Error{path, "is not JSON"};
-  auto request = bake_request_from_json(object);
-  if (!request) return Error{path, "\"" + request.error().where + "\" " + request.error().message};
+  BakeRequest request;
+  if (auto ok = load_request(bake_options(), path, request, request.given); !ok) return ok.error();
   return request;
 }
 

@@ -1,3 +1,4 @@
+#include <lambent/core/file.h>
 #include <lambent/pipeline/options.h>
 
 #include <fmt/format.h>
@@ -8,6 +9,14 @@ std::string json_name(const std::string& option) {
   std::string name = option;
   std::replace(name.begin(), name.end(), '-', '_');
   return name;
+}
+
+Result<nlohmann::json> load_json(const std::string& path) {
+  auto bytes = read_file(path);
+  if (!bytes) return bytes.error();
+  nlohmann::json object = nlohmann::json::parse(bytes->begin(), bytes->end(), nullptr, false);
+  if (object.is_discarded()) return Error{path, "is not JSON"};
+  return object;
 }
 
 std::string kind_list(KindMask kinds, std::span<const char* const> kind_names) {

@@ -44,6 +44,9 @@ using GivenOptions = std::set<std::string>;
 
 std::string json_name(const std::string& option);  // "view-map" -> "view_map"
 
+// What a file says in JSON. Errors name the file.
+Result<nlohmann::json> load_json(const std::string& path);
+
 // "a", "b or c" ... of the kinds of a mask.
 std::string kind_list(KindMask kinds, std::span<const char* const> kind_names);
 // One line of docs for a value: "1 to 16", "half or single", "text".
@@ -179,6 +182,25 @@ Result<void> read_request(std::span<const Option<R>> table, const nlohmann::json
     given.insert(key);
   }
   return {};
+}
+
+// The same from a file. Errors name it and the field.
+template <class R>
+Result<void> load_request(std::span<const Option<R>> table, const std::string& path, R& request, GivenOptions& given) {
+  auto object = load_json(path);
+  if (!object) return object.error();
+  if (auto ok = read_request(table, *object, request, given); !ok)
+    return Error{path, (ok.error().where.empty() ? "" : "\"" + ok.error().where + "\" ") + ok.error().message};
+  return {};
+}
+
+// What was said of one request goes over what another says.
+template <class R>
+void say_over(std::span<const Option<R>> table, const R& said, R& request) {
+  for (const Option<R>& o : table)
+    if (said.given.contains(json_name(o.name)))
+      std::visit([&](auto member) { request.*member = said.*member; }, o.member);
+  request.given.insert(said.given.begin(), said.given.end());
 }
 
 // Every option that was said goes with the kind and has an effect, or is refused by name.

@@ -1,7 +1,6 @@
 #include <lambent/core/random.h>
 #include <lambent/receivers/atlas.h>
 #include <lambent/receivers/charts.h>
-#include <lambent/receivers/project.h>
 #include <lambent/receivers/raster.h>
 #include <lambent/receivers/seams.h>
 #include <lambent/scene/procedural.h>
@@ -328,63 +327,40 @@ TEST(Atlas, AMillionLooseTrianglesNeitherHangNorExhaustMemory) {
 }
 
 // A function that hats reproduce: linear in space.
-double linear(Vec3 p, Vec3) { return 0.3 + 1.5 * double(p.x) - 0.7 * double(p.y) + 0.4 * double(p.z); }
+double linear(Vec3 p) { return 0.3 + 1.5 * double(p.x) - 0.7 * double(p.y) + 0.4 * double(p.z); }
 
-TEST(Projection, HatsReproduceLinearFunctions) {
+// sum_i alpha_i B_i at a place of a triangle's front, alpha_i what receiver i finds where it is.
+template <class Basis>
+double between_receivers(const Receivers& r, uint32_t triangle, float u, float v) {
+  const Basis& basis = std::get<Basis>(r.basis);
+  double sum = 0;
+  basis.spread(*basis.find(triangle, true), u, v,
+               [&](uint32_t i, float weight) { sum += double(weight) * linear(r.origins[i]); });
+  return sum;
+}
+
+TEST(Bases, HatsReproduceLinearFunctions) {
   Scene scene = make_quad(Vec3(0.2f, 0.1f, 0), Vec3(1, 0.3f, 0), Vec3(0.1f, 0.2f, 1), 3, 4, Vec3(0.5f));
   const Receivers r = make_vertex_receivers(scene);
-  const auto alpha = project_on_surface(scene, r, Projection::least_squares, linear, 0.1f);
   Random random(2);
   for (uint32_t t = 0; t < scene.triangles.size(); ++t) {
     const float u = random.next() * 0.5f, v = random.next() * 0.5f;
     const Vec3 p = interpolate(scene.positions, scene.triangles[t], u, v);
-    EXPECT_NEAR(reconstruct_on_surface(r.basis, alpha, t, u, v, true), linear(p, Vec3(0)), 1e-5);
-  }
-  // Collocation reproduces it but for the hair that receivers are moved by: 1e-2 of an edge.
-  const auto there = project_on_surface(scene, r, Projection::collocation, linear, 0.1f);
-  for (size_t v = 0; v < scene.positions.size(); ++v)
-    EXPECT_NEAR(there[r.front[v]], linear(scene.positions[v], Vec3(0)), 0.01);
-}
-
-TEST(Projection, BoxesTakeAreaMeans) {
-  Scene scene = make_quad(Vec3(0), Vec3(2, 0, 0), Vec3(0, 0, 1), 2, 3, Vec3(0.5f));
-  const Receivers r = make_patch_receivers(scene);
-  ASSERT_EQ(r.count(), scene.triangles.size());
-  // The mean of a linear function over a triangle is its value at the centroid; of x^2, the mean over its edge
-  // midpoints.
-  auto f = [](Vec3 p, Vec3 n) { return linear(p, n) + 2 * double(p.x) * double(p.x); };
-  const auto alpha = project_on_surface(scene, r, Projection::least_squares, f, 0.01f);
-  for (uint32_t i = 0; i < scene.triangles.size(); ++i) {
-    const Triangle& t = scene.triangles[i];
-    double mean = 0;
-    for (int k = 0; k < 3; ++k)
-      mean += f(0.5f * (scene.positions[t.v[k]] + scene.positions[t.v[(k + 1) % 3]]), Vec3(0)) / 3;
-    EXPECT_NEAR(reconstruct_on_surface(r.basis, alpha, i, 0.2f, 0.3f, true), mean,
-                1e-4);  // midpoint rule, cells of 1/100
+    // But for the hair that receivers are moved by: 1e-2 of an edge.
+    EXPECT_NEAR(between_receivers<CornerReceivers>(r, t, u, v), linear(p), 0.01);
   }
 }
 
-TEST(Projection, BilinearTexelsReproduceWhatIsLinearInTheAtlas) {
+TEST(Bases, BilinearTexelsReproduceWhatIsLinearInTheAtlas) {
   Scene scene = make_quad(Vec3(0.2f, 0.1f, 0), Vec3(1, 0.3f, 0), Vec3(0.1f, 0.2f, 1), 2, 2, Vec3(0.5f));
   auto atlas = make_atlas(scene, {.texels_per_unit = 13.3f});
   ASSERT_TRUE(atlas);
   const Receivers r = make_texel_receivers(scene, *atlas);
-  // The chart is flat, so functions linear in space are linear in the atlas, and bilinear texels hold them exactly.
-  const auto alpha = project_on_surface(scene, r, Projection::least_squares, linear, 1.0f);
-  Random random(2);
-  for (uint32_t t = 0; t < scene.triangles.size(); ++t)
-    for (int k = 0; k < 10; ++k) {
-      const float u = random.next() * 0.5f, v = random.next() * 0.5f;
-      const Vec3 p = interpolate(scene.positions, scene.triangles[t], u, v);
-      EXPECT_NEAR(reconstruct_on_surface(r.basis, alpha, t, u, v, true), linear(p, Vec3(0)),
-                  2e-4);  // floats of atlas places
-    }
-  // Collocation: exact inside; texels on the border hold the border's value, so it errs within a texel of it by half a
-  // texel.
-  const auto there = project_on_surface(scene, r, Projection::collocation, linear, 1.0f);
+  // The chart is flat, so functions linear in space are linear in the atlas. Exact inside; texels on the border hold
+  // the border's value, so they err within a texel of it by half a texel.
   for (uint32_t t = 0; t < scene.triangles.size(); ++t) {
     const Vec3 p = interpolate(scene.positions, scene.triangles[t], 0.3f, 0.3f);
-    EXPECT_NEAR(reconstruct_on_surface(r.basis, there, t, 0.3f, 0.3f, true), linear(p, Vec3(0)), 1.7 * 0.6 / 13.3);
+    EXPECT_NEAR(between_receivers<TexelReceivers>(r, t, 0.3f, 0.3f), linear(p), 1.7 * 0.6 / 13.3);
   }
 }
 

@@ -150,6 +150,13 @@ inline Bytes make_png(int width, int height, int channels, int depth, const Byte
   return out;
 }
 
+// Rounding of a few float operations on values of order one.
+constexpr float rounding = 1e-6f;
+
+inline void expect_near(Vec3 a, Vec3 b, float tolerance = rounding) {
+  for (int c = 0; c < 3; ++c) EXPECT_NEAR(a[c], b[c], tolerance) << "component " << c;
+}
+
 // The scene; a failed test and a triangle where it does not load.
 inline Scene loaded(const Builder& b) {
   auto scene = b.load();
@@ -165,6 +172,20 @@ inline std::string message(const Builder& b) {
 }
 
 inline Json& primitive(Builder& b, size_t p = 0) { return b.json["meshes"][0]["primitives"][p]; }
+
+// 2 x 2 pixels: red green / blue white.
+inline const Bytes four_colors = {255, 0, 0, 0, 255, 0, 0, 0, 255, 255, 255, 255};
+
+inline Builder textured_triangle(const Bytes& image) {
+  Builder b = triangle();
+  primitive(b)["attributes"]["TEXCOORD_0"] = b.floats({0.25f, 0.25f, 0.75f, 0.25f, 0.25f, 0.75f}, "VEC2");
+  primitive(b)["material"] = 0;
+  b.json["images"] = {{{"bufferView", b.view(image)}, {"mimeType", "image/png"}, {"name", "colours"}}};
+  b.json["samplers"] = {{{"wrapS", 33071}, {"wrapT", 33648}}};
+  b.json["textures"] = {{{"source", 0}, {"sampler", 0}}};
+  b.json["materials"] = {{{"pbrMetallicRoughness", {{"baseColorTexture", {{"index", 0}}}}}}};
+  return b;
+}
 
 inline void write_bytes(const std::string& path, const Bytes& bytes) {
   std::span<const uint8_t> piece(bytes);

@@ -1,0 +1,121 @@
+#!/usr/bin/env bash
+# Other columns and stores on the command line: lobes and lamps, factors, fixed views, clusters, blocks.
+set -uo pipefail
+source "$(dirname "$0")/expect.sh"
+expect 0 'receivers' bake corner.obj --max-edge 0.2 --samples 64 -o corner.glb
+
+# Light of harmonics and lamps, and of lobes alone: the bake agrees with the reference under the same projection of the
+# light.
+sun=sky:elevation=55,azimuth=120,width=256
+shot="--camera 3,2,4,1,0.5,1,40 --size 48x32 --background none"
+for light in "sh:5+lamps:2@$sun" directional:16; do
+  expect 0 'lobe' bake corner.obj --max-edge 0.1 --samples 1024 --light "$light" -o lamps.glb
+  expect 0 'sharpness' inspect lamps.glb
+  # shellcheck disable=SC2086
+  expect 0 'relit' render lamps.glb --env $sun --env-rotate 20,0,0 $shot --spp 256 -o lamps_lit.exr
+  # shellcheck disable=SC2086
+  expect 0 'paths' reference corner.obj --max-edge 0.1 --env $sun --env-rotate 20,0,0 --light-basis lamps.glb $shot \
+    --spp 256 -o lamps_truth.exr
+  alike 40 "baked and path-traced corners under $light" lamps_lit.exr lamps_truth.exr --exposure -3
+done
+expect 2 'env: is needed' render lamps.glb -o x.png
+expect 0 'lamps? that stands? out, not 64' bake corner.obj --samples 64 --bounces 0 --light sh:5+lamps:64@$sun \
+  -o lamps.glb
+expect 0 'order 3,' bake corner.obj --samples 64 --light sh:3+lamps:4@uniform:1 -o lamps.glb
+# Factors: the pictures of a matrix bake of direct light, in fewer bytes; the material is still free. Phong's lobe by
+# convolution.
+"$tool" bake corner.obj --max-edge 0.5 --samples 64 --transfer matrix --brdf ggx:roughness=0.5 --order 3 \
+  --incident-order 3 --bounces 0 -o whole.glb >/dev/null 2>&1
+expect 0 'receivers' bake corner.obj --max-edge 0.5 --samples 64 --transfer matrix --brdf phong:exponent=9 --order 3 \
+  --incident-order 3 --factors --denoise off -o factors.glb
+expect 0 'factors, order 3' inspect factors.glb
+for f in whole factors; do expect 0 'relit' render $f.glb --env sky:elevation=30 --brdf ggx:roughness=0.5 --size 24x18 \
+  --background none -o $f.exr; done
+expect 0 'PSNR +([5-9][0-9]|inf)' compare factors.exr whole.exr
+[ "$(stat -c %s factors.glb)" -lt "$(stat -c %s whole.glb)" ] && ok || bad "factors take more bytes than the matrix"
+expect 0 'rows' bake corner.obj --samples 64 --transfer matrix --brdf phong:exponent=5 --outgoing phong --order 3 \
+  --incident-order 3 -o phong.glb
+expect 0 'outgoing phong' inspect phong.glb
+expect 0 'relit' render phong.glb --env sky:elevation=30 --size 16x16 -o phong.png
+expect 1 'phong' bake corner.obj --samples 64 --transfer matrix --brdf ggx:roughness=0.5 --outgoing phong --order 3 \
+  -o x.glb
+expect 1 'plain transfer' compress factors.glb --cpca 4,3 -o x.glb
+expect 2 'bounces: does not go with factors' bake corner.obj --transfer matrix --factors --bounces 2 -o x.glb
+expect 2 'factors' bake corner.obj --factors -o x.glb
+expect 2 'factors' bake corner.obj --transfer matrix --factors --order 12 --incident-order 6 -o x.glb
+# A fixed view is image relighting: the picture that the whole bake makes of that view.
+expect 0 'pixel' bake corner.obj --max-edge 0.5 --samples 64 --order 4 --fix-view 3,2,4,1,0.5,0,40 --size 24x18 \
+  --spp 4 -o view.glb
+expect 0 'fixed view of 24 x 18' inspect view.glb
+"$tool" bake corner.obj --max-edge 0.5 --samples 64 --order 4 -o whole.glb >/dev/null 2>&1
+expect 0 'relit +432' render view.glb --env sky:elevation=30 --env-rotate 20,30,40 --background none -o view.exr
+expect 0 'relit' render whole.glb --env sky:elevation=30 --env-rotate 20,30,40 --background none \
+  --camera 3,2,4,1,0.5,0,40 --size 24x18 --spp 4 -o whole.exr
+expect 0 'PSNR +(6[0-9]|[7-9][0-9]|inf)' compare view.exr whole.exr
+expect 2 'camera: does not go with fixed views' render view.glb --env sky:elevation=30 --camera auto -o x.png
+expect 0 'rows?' bake corner.obj --transfer matrix --brdf ggx:roughness=0.5 --order 3 --incident-order 3 \
+  --samples 64 --bounces 0 --fix-view auto --size 8x8 -o view.glb
+expect 0 'relit +64' render view.glb --env uniform:1,1,1 -o glossy_view.png
+expect 2 'fix-view' bake corner.obj --fix-view 1,2 -o x.glb
+expect 2 '4 GiB' bake corner.obj --fix-view auto --size 9000x9000 -o x.glb
+expect 2 'fix-view' bake corner.obj --fix-view auto --compress cpca:2,2 -o x.glb
+expect 2 'size: needs --fix-view' bake corner.obj --size 8x8 -o x.glb
+# Clusters, from the bake or from its file.
+expect 0 'clusters +4 of rank 3' bake corner.obj --max-edge 0.3 --samples 64 --compress cpca:4,3 -o clusters.glb
+expect 0 'in 4 clusters of rank 3' inspect clusters.glb
+"$tool" bake corner.obj --max-edge 0.3 --samples 64 -o whole.glb >/dev/null 2>&1
+expect 0 'clusters of rank' compress whole.glb --cpca 4,3 -o clusters2.glb
+for f in clusters clusters2 whole; do expect 0 'relit' render $f.glb --env sky:elevation=30 --size 24x18 \
+  --background none -o $f.exr; done
+expect 0 'PSNR +([3-9][0-9])' compare clusters.exr whole.exr
+expect 0 'PSNR +(inf|[6-9][0-9])' compare clusters.exr clusters2.exr
+expect 1 'plain transfer' compress clusters.glb --cpca 4,3 -o x.glb
+expect 1 'clusters.glb' compress clusters.glb --zonal 2 -o x.glb
+expect 2 'cpca' bake corner.obj --compress cpca:0,3 -o x.glb
+expect 2 'cpca' bake corner.obj --compress zip -o x.glb
+expect 2 'cpca' compress whole.glb -o x.glb
+# No file grows: what it was made of is gone, or nothing is written. Twice is the same, and in place of itself too.
+smaller clusters2.glb whole.glb
+expect 0 'before' compress whole.glb --zonal 2 -o lobes2.glb
+smaller lobes2.glb whole.glb
+grep -q "$(stat -c %s whole.glb | cut -c1-2)" stdout && ok || bad "not the file's size before: $(cat stdout)"
+expect 1 'would grow.*[0-9]+ bytes, and [0-9]+' compress whole.glb --cpca 64,16 -o x.glb
+expect 1 'would grow' compress whole.glb --zonal 8 --precision single -o x.glb
+absent x.glb
+cp whole.glb itself.glb
+expect 0 'clusters' compress itself.glb --cpca 4,3 -o itself.glb
+cmp -s itself.glb clusters2.glb && ok || bad "compressed in place of itself a file differs"
+expect 0 'lamp group' bake corner.obj --samples 64 --light sh:3+lamps:1@$sun --fix-light $sun -o fixed.glb
+expect 0 'relit' render fixed.glb --size 24x24 -o fixed.png
+for thread_count in 1 2; do "$tool" bake corner.obj --max-edge 0.3 --samples 64 --light sh:4+lamps:3@$sun \
+  --threads $thread_count -o threads_$thread_count.glb >/dev/null 2>&1; done
+cmp -s threads_1.glb threads_2.glb && ok || bad "1 and 2 threads give different files"
+expect 0 'paths' reference corner.obj --light-basis clusters.glb --env uniform:1 --size 8x8 --spp 1 -o basis.exr
+
+# All-frequency light: visibility in blocks, three roads to one picture.
+expect 0 'mixed' bake corner.obj --max-edge 0.1 --transfer blocks --cube 32 -o blocks.glb
+expect 0 '"cube": 32' inspect blocks.glb --json
+view=(--env sky:elevation=50,azimuth=20,sun=on --camera 3,2,4,1,0.5,1,40 --size 48x32 --background none \
+  --brdf phong:exponent=20,diffuse=0.3,specular=0.4)
+for method in blocks standard haar:1; do expect 0 'shaded' render blocks.glb "${view[@]}" --method $method \
+  -o ${method/:/_}.exr; done
+for method in blocks haar_1; do
+  alike 50 "$method and the standard basis" $method.exr standard.exr
+done
+expect 0 'shaded' render blocks.glb "${view[@]}" --indirect sh -o indirect.png
+expect 0 'frames_per_second' relight blocks.glb --env sky:elevation=50 --turntable --spin-light --frames 3 --json
+printf '{"baked": "blocks.glb", "env": "sky:elevation=50"}' >loop.json
+expect 0 'frames_per_second' relight --request loop.json --frames 2 --json
+expect 2 'baked: is needed' relight --env uniform:1
+expect 1 'lambent bake --transfer blocks' relight corner.glb --env uniform:1
+expect 2 'method: does not go with diffuse transfer: it is for blocks' render corner.glb --env uniform:1 \
+  --method haar -o x.png
+expect 2 'tolerance: needs --method blocks' render blocks.glb --env uniform:1 --method haar --tolerance 0.1 -o x.png
+expect 2 'window: does not go with blocks' render blocks.glb --env uniform:1 --window hann -o x.png
+expect 2 '\-\-method' render blocks.glb --env uniform:1 --method wavelets -o x.png
+expect 2 '\-\-visibility' bake corner.obj --transfer blocks --visibility bits:9 -o x.glb
+expect 2 'cube: does not go with diffuse transfer: it is for blocks' bake corner.obj --cube 64 -o x.glb
+expect 1 'more than --memory' bake corner.obj --max-edge 0.02 --transfer blocks --memory 1KB -o x.glb
+absent x.glb
+absent x.png
+finish
