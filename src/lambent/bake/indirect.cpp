@@ -99,11 +99,11 @@ void Gathering::compress(std::vector<Met>& met, Row& row) const {
   std::sort(entries.begin(), entries.end(), [](const auto& a, const auto& b) { return a.second < b.second; });
   size_t total = 0;
   for (const auto& [weight, node] : entries) {
-    const int byte = int(std::lround(weight / most * 255));
-    if (byte < 1) continue;
-    row.nodes.push_back(node), row.weights.push_back(uint8_t(byte)), total += size_t(byte);
+    const int root = int(std::lround(std::sqrt(weight / most) * 255));
+    if (root < 1) continue;
+    row.nodes.push_back(node), row.weights.push_back(uint8_t(root)), total += size_t(root * root);
   }
-  row.scale = float(std::min(sum, 1.0) * 255 / double(total));
+  row.scale = float(std::min(sum, 1.0) / double(total));
 }
 
 // Direct light at leaves of lamps that stand somewhere in the scene, each in units of its own mean.
@@ -168,8 +168,8 @@ double compression_error(const IndirectTransfer& t, const std::vector<Row>& rows
   for (size_t r = 0; r < rows.size(); ++r)
     for (size_t k = 0; k < test_lamps; ++k) {
       double sum = 0;
-      for (size_t e = t.first[r]; e < t.first[r + 1]; ++e) sum += t.weights[e] * double(node[t.nodes[e]][k]);
-      const double difference = sum * double(t.scales[r]) / 255 - rows[r].right[k];
+      for (size_t e = t.first[r]; e < t.first[r + 1]; ++e) sum += share(t.weights[e]) * double(node[t.nodes[e]][k]);
+      const double difference = sum * double(t.scales[r]) - rows[r].right[k];
       wrong += difference * difference, right += rows[r].right[k] * rows[r].right[k];
     }
   return right > 0 ? std::sqrt(wrong / right) : 0;

@@ -71,6 +71,10 @@ float headroom_above(const Tracer& tracer, Vec3 p, Vec3 n, float smallest, float
   return hit.triangle == none ? INFINITY : hit.distance;
 }
 
+// A surfel in a gap that is narrower than surfels are apart does not stand for a place outside, which is seen and lit
+// otherwise.
+bool is_outside(float place, float surfel, float gap) { return surfel < gap && place > 3 * surfel; }
+
 // Whether a straight way leads from one to the other just above the surface; both know their headroom.
 bool is_open(const Tracer& tracer, const SurfacePlace& a, const SurfacePlace& b, float smallest) {
   const float rise = length(b.position - a.position) * (0.02f + 0.15f * (1 - dot(a.normal, b.normal)));
@@ -162,7 +166,7 @@ struct Throwing {
   const Scene& scene;
   const Tracer& tracer;
   const std::vector<Candidate>& candidates;
-  float diagonal;
+  float diagonal, gap;  // gap: the leaves' spacing
   Surfels out{};
   std::vector<uint32_t> of_candidate{};  // surfel of each, or none yet
   std::vector<SurfacePlace> places{};    // of surfels
@@ -173,6 +177,7 @@ struct Throwing {
     found.clear();
     grid.near(at.position, reach, [&](uint32_t i) {
       if (same_material && out.materials[i] != at.material) return;
+      if (is_outside(at.headroom, places[i].headroom, gap)) return;
       const float d = distance_between(at.position, at.normal, out.positions[i], out.normals[i]);
       if (d < reach) found.push_back({d, i});
     });
@@ -253,11 +258,11 @@ Result<Surfels> make_surfels(const Scene& scene, const Tracer& tracer, const Sur
       make_candidates(scene, tracer, areas, candidates_a_leaf * count, options.seed, diagonal);
   if (candidates.empty()) return Error{scene.path, "has no surface that is not inside something"};
   stage.advance();
-  Throwing t{scene, tracer, candidates, diagonal};
-  t.of_candidate.assign(candidates.size(), none);
   // Darts that are thrown until none fits cover about 0.7 of the squares of their spacing.
   const double leaf_spacing = std::sqrt(0.7 * areas.sums.back() * double(candidates.size()) /
                                         double(candidates_a_leaf * count) / double(count));
+  Throwing t{scene, tracer, candidates, diagonal, float(leaf_spacing)};
+  t.of_candidate.assign(candidates.size(), none);
   int levels = 1;
   while (levels < int(max_surfel_levels) && count >> (2 * levels) >= coarsest) ++levels;
   for (int l = levels - 1; l >= 0; --l) {
@@ -282,9 +287,11 @@ struct SurfelSearch::Impl {
 
   bool stands_for(SurfacePlace& at, const Near& n) const {
     const Vec3 q = surfels.positions[n.index], m = surfels.normals[n.index];
-    if (n.distance < clear[n.index] && std::abs(dot(at.position - q, m)) <= height) return true;
+    const bool in_gap = headroom[n.index] < surfels.spacings.back();
+    if (!in_gap && n.distance < clear[n.index] && std::abs(dot(at.position - q, m)) <= height) return true;
     const float smallest = receiver_lift(at.position, 0, diagonal);
     if (at.headroom < 0) at.headroom = headroom_above(tracer, at.position, at.normal, smallest, diagonal);
+    if (in_gap && is_outside(at.headroom, headroom[n.index], surfels.spacings.back())) return false;
     return is_open(tracer, at, {q, m, none, headroom[n.index]}, smallest);
   }
   void find(const PointGrid& grid, const SurfacePlace& at, float reach, bool same_material,

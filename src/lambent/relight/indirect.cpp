@@ -51,8 +51,8 @@ void gather_indirect(const IndirectTransfer& t, IndirectSolve& s, std::span<cons
   parallel_for(t.gathering(), rows_a_piece, [&](size_t begin, size_t end) {
     for (size_t r = begin; r < end; ++r) {
       Vec3 sum(0.0f);
-      for (size_t e = t.first[r]; e < t.first[r + 1]; ++e) sum += float(t.weights[e]) * s.nodes[t.nodes[e]];
-      y[r] = (t.scales[r] / 255) * sum;
+      for (size_t e = t.first[r]; e < t.first[r + 1]; ++e) sum += share(t.weights[e]) * s.nodes[t.nodes[e]];
+      y[r] = t.scales[r] * sum;
     }
   });
 }

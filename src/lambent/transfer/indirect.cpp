@@ -65,10 +65,10 @@ Result<void> check_indirect(const IndirectTransfer& t, const std::string& where)
     for (size_t e = t.first[r]; e < t.first[r + 1]; ++e) {
       if (t.nodes[e] >= nodes || (e > t.first[r] && t.nodes[e] <= t.nodes[e - 1]))
         return Error{where, "node " + std::to_string(t.nodes[e]) + " does not exist, or stands out of order"};
-      sum += t.weights[e];
+      sum += double(share(t.weights[e]));
     }
     // More than all of a hemisphere would make bounces grow without end.
-    if (!(t.scales[r] >= 0) || !(sum * double(t.scales[r]) / 255 <= 1.001))
+    if (!(t.scales[r] >= 0) || !(sum * double(t.scales[r]) <= 1.001))
       return Error{where, "row " + std::to_string(r) + " sees more than a hemisphere"};
   }
   const size_t slots = t.receivers * kernel_slots;

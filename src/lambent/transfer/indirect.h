@@ -56,7 +56,7 @@ struct IndirectTransfer {
   Surfels surfels;
   uint32_t gather_level = 0;  // its surfels have rows
   // Rows of G, one a gathering surfel: entries first[r] ... first[r + 1], each a node, rising within a row, and its
-  // share of the hemisphere, weights * scales[r] / 255.
+  // share of the hemisphere, weights^2 * scales[r]: roots keep small ones.
   std::vector<uint32_t> first, nodes;
   std::vector<uint8_t> weights;
   std::vector<float> scales;
@@ -70,6 +70,9 @@ struct IndirectTransfer {
   size_t gathering() const { return surfels.counts.empty() ? 0 : surfels.counts[gather_level]; }
   size_t bytes() const;  // as stored in a file
 };
+
+// What a stored weight stands for, before its row's scale.
+inline float share(uint8_t weight) { return float(int(weight) * int(weight)); }
 
 // Whether all numbers are within their ranges: a tree without cycles, nodes and surfels that exist, finite positions,
 // unit normals. The error says what is not.
