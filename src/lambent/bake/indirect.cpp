@@ -225,6 +225,8 @@ Result<IndirectTransfer> bake_indirect(const Scene& scene, const Tracer& tracer,
   if (!surfels) return surfels.error();
   IndirectTransfer t;
   t.surfels = std::move(*surfels);
+  for (const Material& m : scene.materials) t.surfels.names.push_back(m.name);
+  for (Vec3& a : t.surfels.albedos) a = each(a, [](float x) { return half_to_float(float_to_half(x)); });  // as kept
   t.gather_level = uint32_t(t.surfels.levels() > 1 ? t.surfels.levels() - 2 : 0);
   const SurfelSearch search(t.surfels, tracer, t.gather_level);
   told.surfel_seconds = seconds_since(start), start = Clock::now();

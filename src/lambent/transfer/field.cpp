@@ -20,7 +20,8 @@ LightBasis light_of(const Store& store) {
   return std::visit(Overloaded{[](const Transfer& t) { return t.light; }, [](const CpcaTransfer& t) { return t.light; },
                                [](const ZonalTransfer& t) { return LightBasis{.order = t.order}; },
                                [](const FactoredTransfer& t) { return LightBasis{.order = t.light_order()}; },
-                               [](const Visibility&) { return LightBasis{}; }},
+                               [](const Visibility&) { return LightBasis{}; },
+                               [](const IndirectTransfer& t) { return LightBasis{.surfels = t.surfels.count()}; }},
                     store);
 }
 
@@ -55,7 +56,8 @@ int channels_of(const Store& store) {
 }
 
 const char* name_of(const Store& store) {
-  static constexpr const char* names[] = {"dense", "clusters", "lobes", "factors", "blocks"};
+  static constexpr const char* names[] = {"dense", "clusters", "lobes", "factors", "blocks", "surfels"};
+  static_assert(std::size(names) == std::variant_size_v<Store>);
   return names[store.index()];
 }
 

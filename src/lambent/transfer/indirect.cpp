@@ -14,8 +14,8 @@ size_t Surfels::first_node(size_t level) const {
 
 size_t IndirectTransfer::bytes() const {
   const size_t index = gathering() <= 65536 ? 2 : 4;
-  // Places and normals as floats, areas and albedos as halves; a parent a node.
-  return surfels.count() * (24 + 2 + 6 + 4) + surfels.parents.size() * 4 + pack_rows(*this).size() + weights.size() +
+  // Places, normals and areas are floats, albedos halves, materials two bytes.
+  return surfels.count() * (28 + 6 + 2) + surfels.parents.size() * 4 + pack_rows(*this).size() + weights.size() +
          scales.size() * 4 + receivers * kernel_slots * (index + 2);
 }
 
@@ -42,6 +42,7 @@ Result<void> check_surfels(const Surfels& s, const std::string& where) {
                                 std::to_string(l - 1)};
   for (size_t i = 0; i < n; ++i) {
     const Vec3 a = s.albedos[i];
+    if (s.materials[i] >= s.names.size()) return Error{where, "surfel " + std::to_string(i) + " has no material"};
     if (!is_finite(s.positions[i]) || largest(abs(s.positions[i])) > 1e9f ||
         !(std::abs(length(s.normals[i]) - 1) < 1e-2f) || !(s.areas[i] > 0) || !std::isfinite(s.areas[i]) ||
         !(std::min({a.x, a.y, a.z}) >= 0) || !(largest(a) <= 1))

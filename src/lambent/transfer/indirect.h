@@ -33,7 +33,8 @@ struct Surfels {
   std::vector<Vec3> normals;      // unit, towards the side that the surfel is on
   std::vector<float> areas;       // that a leaf stands for, > 0
   std::vector<Vec3> albedos;      // the mean over that area, as baked
-  std::vector<uint32_t> materials;  // of the scene
+  std::vector<uint32_t> materials;  // into the names below
+  std::vector<std::string> names;   // of materials: a wall is repainted by its name
   // Of levels 1 and up, one after another: the surfel of the level above that each one is a part of.
   std::vector<uint32_t> parents;
 
