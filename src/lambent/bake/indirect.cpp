@@ -198,7 +198,28 @@ Result<void> gather_rows(IndirectTransfer& t, const Gathering& g, IndirectReport
   return {};
 }
 
-void set_readers(IndirectTransfer& t, const SurfelSearch& search, const Receivers& receivers, IndirectReport& report) {
+// Receivers that see no surfel, inside something, read what a neighbour along the mesh reads, layer by layer.
+size_t fill_readers(IndirectTransfer& t, const Scene& scene, const SpatialBasis& basis) {
+  std::vector<uint8_t> unread(t.receivers);
+  for (size_t r = 0; r < t.receivers; ++r) unread[r] = t.reader_weights[r * kernel_slots] == 0;
+  const auto pairs = neighbours_of(scene, basis, unread);
+  size_t left = size_t(std::count(unread.begin(), unread.end(), uint8_t(1)));
+  for (std::vector<std::pair<uint32_t, uint32_t>> step{{}}; !step.empty();) {
+    step.clear();
+    for (const auto& [r, neighbour] : pairs)
+      if (unread[r] && !unread[neighbour] && (step.empty() || step.back().first != r)) step.emplace_back(r, neighbour);
+    for (const auto& [r, neighbour] : step) {
+      const size_t to = r * kernel_slots, from = neighbour * kernel_slots;
+      std::copy_n(t.reader_surfels.begin() + ptrdiff_t(from), kernel_slots, t.reader_surfels.begin() + ptrdiff_t(to));
+      std::copy_n(t.reader_weights.begin() + ptrdiff_t(from), kernel_slots, t.reader_weights.begin() + ptrdiff_t(to));
+      unread[r] = 0, --left;
+    }
+  }
+  return left;
+}
+
+void set_readers(IndirectTransfer& t, const Scene& scene, const SurfelSearch& search, const Receivers& receivers,
+                 IndirectReport& report) {
   t.receivers = receivers.count();
   t.reader_surfels.assign(t.receivers * kernel_slots, 0), t.reader_weights.assign(t.receivers * kernel_slots, 0);
   parallel_for(t.receivers, 64, [&](size_t begin, size_t end) {
@@ -210,7 +231,8 @@ void set_readers(IndirectTransfer& t, const SurfelSearch& search, const Receiver
       }
     }
   });
-  for (size_t r = 0; r < t.receivers; ++r) report.unread += t.reader_weights[r * kernel_slots] == 0;
+  for (size_t r = 0; r < t.receivers; ++r) report.buried += t.reader_weights[r * kernel_slots] == 0;
+  report.unread = fill_readers(t, scene, receivers.basis);
 }
 
 }  // namespace
@@ -238,7 +260,7 @@ Result<IndirectTransfer> bake_indirect(const Scene& scene, const Tracer& tracer,
   const Gathering g{scene, tracer, t.surfels, search, options, sets, test, diagonal, hits};
   if (auto ok = gather_rows(t, g, told, progress); !ok) return ok.error();
   told.trace_seconds = seconds_since(start), start = Clock::now();
-  set_readers(t, search, receivers, told);
+  set_readers(t, scene, search, receivers, told);
   told.reader_seconds = seconds_since(start);
   return t;
 }

@@ -148,7 +148,7 @@ Result<void> bake_to_indirect(Bake& b) {
   if (report.strays > report.rays / 50)
     b.job.warn(fmt::format("{:.1f} % of the rays met surfaces too small for a surfel of their own, and are lost: more "
                            "--surfels find them", 100 * double(report.strays) / double(report.rays)));
-  b.report.receivers = b.receivers().count(), b.report.rays = report.rays;
+  b.report.receivers = b.receivers().count(), b.report.rays = report.rays, b.report.buried = report.buried;
   b.report.trace_seconds = report.trace_seconds;
   const size_t entries = baked->nodes.size(), rows = baked->gathering();
   b.summary.json["indirect"] = {{"surfels", baked->surfels.count()},
@@ -164,7 +164,7 @@ Result<void> bake_to_indirect(Bake& b) {
                                 human_seconds(report.surfel_seconds), human_count(rows),
                                 double(entries) / double(std::max<size_t>(rows, 1)), 100 * baked->error));
   if (report.unread)
-    b.line("", human_count(report.unread) + " receivers see no surfel near them, and stay dark: inside something");
+    b.line("", human_count(report.unread) + " receivers and all their neighbours see no surfel, and stay dark");
   b.store = std::move(*baked);
   return {};
 }
