@@ -232,7 +232,7 @@ json encode(const IndirectTransfer& t, BlobWriter& out) {
   return {{"surfels", std::move(surfels)},
           {"gatherLevel", t.gather_level},
           {"entries", t.nodes.size()},
-          {"rows", out.add_copy(pack_rows(t))},
+          {"bufferView", out.add_copy(pack_rows(t))},
           {"weights", out.add(bytes_of(t.weights))},
           {"scales", out.add(bytes_of(t.scales))},
           {"kernels", {{"surfels", narrow(t.reader_surfels, t.gathering())}, {"weights", out.add(bytes_of(t.reader_weights))}}},
@@ -293,7 +293,7 @@ Result<Field> decode_indirect(const BlobReader& in, const json& object, size_t r
   if (!surfels) return surfels.error();
   t.surfels = std::move(*surfels), t.receivers = receivers;
   auto level = read_count(object, "gatherLevel", t.surfels.levels() - 1, where),
-       entries = read_count(object, "entries", 0x7fffffff, where), view = read_count(object, "rows", 0x7fffffff, where);
+       entries = read_count(object, "entries", 0x7fffffff, where), view = read_count(object, "bufferView", 0x7fffffff, where);
   for (const auto* count : {&level, &entries, &view})
     if (!*count) return count->error();
   t.gather_level = uint32_t(*level);
