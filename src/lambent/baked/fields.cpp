@@ -133,14 +133,14 @@ Result<BakedFields> read_fields(const MappedFile& file, const GltfChunks& chunks
   fields.surface.where = std::move(*placement);
   if (auto ok = check_placement(fields.surface, where); !ok) return ok.error();
   if (const auto object = extension.find("lattice");
-      object != extension.end() && light_of(fields.surface.store).surfels == 0 &&
+      object != extension.end() && !std::holds_alternative<IndirectTransfer>(fields.surface.store) &&
       !std::holds_alternative<Visibility>(fields.surface.store)) {
     auto lattice = decode_lattice(in, *object, light_of(fields.surface.store), where + ": lattice");
     if (!lattice) return lattice.error();
     fields.more.push_back(std::move(*lattice));
   }
   if (const auto list = extension.find("terms");
-      list != extension.end() && light_of(fields.surface.store).surfels == 0) {
+      list != extension.end() && !std::holds_alternative<IndirectTransfer>(fields.surface.store)) {
     auto terms = read_terms(in, *list, fields.surface, where);
     if (!terms) return terms.error();
     fields.terms = std::move(*terms);

@@ -335,7 +335,7 @@ void summarize(Bake& b) {
                                          human_seconds(b.build_seconds), human_seconds(r.trace_seconds),
                                          human_seconds(r.bounce_seconds)));
   const int rows = rows_of(b.store), channels = channels_of(b.store);
-  std::string shape = light.count() == light.surfels
+  std::string shape = light.count() == 0
                         ? std::string()
                         : fmt::format(" ({}, {} row{}, {} channel{}, {})", describe_light(light), rows,
                                       rows == 1 ? "" : "s", channels, channels == 1 ? "" : "s", b.request.precision);

@@ -29,7 +29,7 @@ std::string describe_light(const LightBasis& light) {
   auto add = [&](size_t count, const std::string& what) {
     if (count > 0) text += (text.empty() ? "" : " and ") + std::to_string(count) + " " + what + (count == 1 ? "" : "s");
   };
-  add(light.lobes.size(), "lobe"), add(light.groups.size(), "lamp group"), add(light.surfels, "surfel");
+  add(light.lobes.size(), "lobe"), add(light.groups.size(), "lamp group");
   return text;
 }
 

@@ -178,7 +178,8 @@ size_t Relighter::receivers() const { return receivers_of(state_->field.store); 
 int Relighter::rows() const { return rows_relit(state_->field.store); }
 
 Result<void> Relighter::set_light(std::span<const Vec3> columns) {
-  const size_t count = light().count();
+  const auto* surfels = std::get_if<IndirectTransfer>(&state_->field.store);
+  const size_t count = surfels ? surfels->surfels.count() : light().count();
   return std::visit(
       [&](auto& s) -> Result<void> {
         if constexpr (std::is_base_of_v<Columns, std::remove_reference_t<decltype(s)>>) {

@@ -48,12 +48,12 @@ class Relighter {
   ~Relighter();
 
   const Field& field() const;
-  LightBasis light() const;  // the columns that set_light() takes; none of visibility in blocks
+  LightBasis light() const;  // the columns that set_light() takes; none of visibility in blocks, nor of surfels
   size_t receivers() const;
   int rows() const;  // of what relight() gives: what the field's Rows mean; of visibility one, exit radiance
 
-  // One coefficient of radiance a column, light().count() of them; of direct to indirect light, exit radiance of a white
-  // surface at each surfel by direct light alone. Errors: another number; a store without columns.
+  // One coefficient of radiance a column, light().count() of them; of direct to indirect light instead one a surfel:
+  // exit radiance of a white surface there by direct light alone. Errors: another number; a store without columns.
   Result<void> set_light(std::span<const Vec3> columns);
   // For visibility in blocks. Errors: another store; a cube of another size than the visibility's.
   Result<void> set_light(const CubeLight& light);

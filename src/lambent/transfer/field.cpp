@@ -21,7 +21,7 @@ LightBasis light_of(const Store& store) {
                                [](const ZonalTransfer& t) { return LightBasis{.order = t.order}; },
                                [](const FactoredTransfer& t) { return LightBasis{.order = t.light_order()}; },
                                [](const Visibility&) { return LightBasis{}; },
-                               [](const IndirectTransfer& t) { return LightBasis{.surfels = t.surfels.count()}; }},
+                               [](const IndirectTransfer&) { return LightBasis{}; }},
                     store);
 }
 

@@ -64,7 +64,9 @@ struct FactoredTransfer {
 using Store = std::variant<Transfer, CpcaTransfer, ZonalTransfer, FactoredTransfer, Visibility, IndirectTransfer>;
 
 // Of any store.
-LightBasis light_of(const Store& store);  // the columns; none of visibility, which takes all of any environment
+// The columns; none of visibility, which takes all of any environment, and of direct to indirect light, which takes
+// direct light at its surfels.
+LightBasis light_of(const Store& store);
 size_t receivers_of(const Store& store);
 size_t bytes_of(const Store& store);
 int rows_of(const Store& store);     // that are stored; 0 of visibility

@@ -21,17 +21,16 @@ enum class Precision { half, single };
 inline constexpr size_t transfer_block = 16;
 
 // The COLUMNS of T: what light is a combination of. Harmonics come first, then lobes (lamps in the distance), then the
-// scene's own lamps by group; or, of direct-to-indirect transport, direct light itself.
+// scene's own lamps by group.
 struct LightBasis {
   int order = 0;  // bands of spherical harmonics (basis/sh.h): order^2 columns; 0: none
   LobeKind lobe_kind = LobeKind::von_mises_fisher;
   std::vector<Lobe> lobes;          // one column each, scaled to unit norm (basis/directional.h)
   std::vector<std::string> groups;  // one column each
-  size_t surfels = 0;               // direct light at so many, one column each (transfer/indirect.h); alone
-  size_t count() const { return size_t(sh_count(order)) + lobes.size() + groups.size() + surfels; }
+  size_t count() const { return size_t(sh_count(order)) + lobes.size() + groups.size(); }
 };
 
-// Columns that relighting takes at most, but for those of surfels.
+// Columns that relighting takes at most.
 inline constexpr size_t max_columns = 1024;
 
 // T, dense.
