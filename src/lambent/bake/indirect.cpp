@@ -253,8 +253,8 @@ Result<IndirectTransfer> bake_indirect(const Scene& scene, const Tracer& tracer,
   const SurfelSearch search(t.surfels, tracer, t.gather_level);
   told.surfel_seconds = seconds_since(start), start = Clock::now();
   const float diagonal = bounds(scene).diagonal();
-  const DirectionSets sets = make_direction_sets(1, options.samples, direction_sets, options.seed,
-                                                 square_to_cosine_hemisphere, progress);
+  const DirectionSets sets =
+      make_direction_sets(1, options.samples, direction_sets, options.seed, square_to_cosine_hemisphere, progress);
   const auto test = test_light(t.surfels, tracer, diagonal, options.seed);
   std::vector<std::atomic<uint32_t>> hits(t.surfels.count());
   const Gathering g{scene, tracer, t.surfels, search, options, sets, test, diagonal, hits};

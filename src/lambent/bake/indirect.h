@@ -16,9 +16,9 @@ struct IndirectOptions {
 
 struct IndirectReport {
   size_t rays = 0;
-  size_t strays = 0;          // hits for which no surfel stood; they count as black
-  size_t buried = 0;          // receivers that see no surfel near them, and read what neighbours read
-  size_t unread = 0;          // those without such a neighbour, black
+  size_t strays = 0;  // hits for which no surfel stood; they count as black
+  size_t buried = 0;  // receivers that see no surfel near them, and read what neighbours read
+  size_t unread = 0;  // those without such a neighbour, black
   double surfel_seconds = 0, trace_seconds = 0, reader_seconds = 0;
 };
 

@@ -125,8 +125,7 @@ TEST(Indirect, LampsAddUpAndAWallIsRepainted) {
     return s.x;
   };
   const auto xa = solved(a), xb = solved(b), xab = solved(both);
-  for (size_t r = 0; r < xa.size(); ++r)
-    EXPECT_NEAR(xab[r].x, xa[r].x + xb[r].x, 1e-5f * xab[r].x + 1e-7f);
+  for (size_t r = 0; r < xa.size(); ++r) EXPECT_NEAR(xab[r].x, xa[r].x + xb[r].x, 1e-5f * xab[r].x + 1e-7f);
   // A new bake has the same surfels, and differs by rounding alone.
   std::vector<Vec3> albedos = red->transfer.surfels.albedos;
   for (size_t i = 0; i < albedos.size(); ++i)
@@ -151,8 +150,7 @@ TEST(Indirect, ClosedNeighbouringRoomStaysDark) {
   IndirectSolve s = make_indirect_solve(m->transfer);
   solve_indirect(m->transfer, s, lit_by(*m, Vec3(-1, 1.2f, 0.2f), Vec3(5)));
   double lit = 0, dark = 0;
-  for (size_t r = 0; r < s.x.size(); ++r)
-    (m->transfer.surfels.positions[r].x < 0 ? lit : dark) += double(s.x[r].x);
+  for (size_t r = 0; r < s.x.size(); ++r) (m->transfer.surfels.positions[r].x < 0 ? lit : dark) += double(s.x[r].x);
   EXPECT_GT(lit, 1);
   EXPECT_LT(dark, 1e-3 * lit);
 }

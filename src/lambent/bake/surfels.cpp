@@ -134,8 +134,8 @@ std::vector<Candidate> make_candidates(const Scene& scene, const Tracer& tracer,
                                        uint32_t seed, float diagonal) {
   std::vector<Candidate> all(count);
   std::vector<uint8_t> wanted(count, 0);
-  const bool has_backs = std::any_of(scene.triangles.begin(), scene.triangles.end(),
-                                     [](const Triangle& t) { return !t.two_sided; });
+  const bool has_backs =
+      std::any_of(scene.triangles.begin(), scene.triangles.end(), [](const Triangle& t) { return !t.two_sided; });
   parallel_for(count, 256, [&](size_t begin, size_t end) {
     for (size_t i = begin; i < end; ++i) {
       Random random(seed, i);
@@ -212,9 +212,8 @@ void Throwing::throw_level(float spacing, bool leaves, Progress* progress) {
     parallel_for(out.count(), 256, [&](size_t begin, size_t end) {
       std::vector<Near> around;
       for (size_t i = begin; i < end; ++i)
-        out.parents[first + i] =
-            i < before ? uint32_t(i)
-                       : nearest(above, places[i], out.spacings.back(), false, around);
+        out.parents[first + i] = i < before ? uint32_t(i)
+                                            : nearest(above, places[i], out.spacings.back(), false, around);
     });
   }
   out.counts.push_back(uint32_t(out.count())), out.spacings.push_back(spacing);
@@ -228,8 +227,7 @@ void Throwing::tend_leaves(const PointGrid& grid) {
   parallel_for(candidates.size(), 256, [&](size_t begin, size_t end) {
     std::vector<Near> around;
     for (size_t c = begin; c < end; ++c)
-      leaf[c] = of_candidate[c] != none ? of_candidate[c]
-                                        : nearest(grid, candidates[c].at, spacing, true, around);
+      leaf[c] = of_candidate[c] != none ? of_candidate[c] : nearest(grid, candidates[c].at, spacing, true, around);
   });
   out.areas.assign(out.count(), 0.0f), out.albedos.assign(out.count(), Vec3(0.0f));
   for (size_t c = 0; c < candidates.size(); ++c)
@@ -281,8 +279,8 @@ struct SurfelSearch::Impl {
   uint32_t level;
   float diagonal;
   PointGrid leaves, gathering;
-  float height = 0;              // over its surface, in which
-  std::vector<float> clear{};    // so far around a surfel nothing stands in the way
+  float height = 0;            // over its surface, in which
+  std::vector<float> clear{};  // so far around a surfel nothing stands in the way
   std::vector<float> headroom{};
 
   bool stands_for(SurfacePlace& at, const Near& n) const {
@@ -308,8 +306,7 @@ struct SurfelSearch::Impl {
 SurfelSearch::SurfelSearch(const Surfels& s, const Tracer& tracer, uint32_t kernel_level) {
   Bounds box;
   for (Vec3 p : s.positions) box.extend(p);
-  impl_ = std::make_unique<Impl>(Impl{s, tracer, kernel_level, box.diagonal(),
-                                      PointGrid(s.spacings.back(), s.count()),
+  impl_ = std::make_unique<Impl>(Impl{s, tracer, kernel_level, box.diagonal(), PointGrid(s.spacings.back(), s.count()),
                                       PointGrid(1.2f * s.spacings[kernel_level], s.counts[kernel_level])});
   for (Vec3 p : s.positions) impl_->leaves.insert(p);
   for (size_t i = 0; i < s.counts[kernel_level]; ++i) impl_->gathering.insert(s.positions[i]);
@@ -323,8 +320,7 @@ SurfelSearch::SurfelSearch(const Surfels& s, const Tracer& tracer, uint32_t kern
       const Mat3 frame = frame_about(s.normals[i]);
       const float smallest = receiver_lift(s.positions[i], 0, impl_->diagonal);
       impl_->headroom[i] = headroom_above(tracer, s.positions[i], s.normals[i], smallest, impl_->diagonal);
-      const Vec3 from = s.positions[i] +
-                        s.normals[i] * (smallest + std::min(impl_->height, 0.4f * impl_->headroom[i]));
+      const Vec3 from = s.positions[i] + s.normals[i] * (smallest + std::min(impl_->height, 0.4f * impl_->headroom[i]));
       float nearest = reach;
       for (int k = 0; k < 16; ++k) {
         const float turn = 2 * pi * (float(k) + 0.5f) / 16;
@@ -341,7 +337,8 @@ uint32_t SurfelSearch::leaf(SurfacePlace at) const {
   thread_local std::vector<Near> found;
   const float spacing = impl_->surfels.spacings.back();
   // Of its own material; of any; farther away.
-  for (const auto& [reach, same] : {std::pair(1.0f, at.material != none), std::pair(1.5f, false), std::pair(4.0f, false)}) {
+  for (const auto& [reach, same] :
+       {std::pair(1.0f, at.material != none), std::pair(1.5f, false), std::pair(4.0f, false)}) {
     impl_->find(impl_->leaves, at, reach * spacing, same, found);
     while (!found.empty()) {
       const auto nearest = std::min_element(found.begin(), found.end());
@@ -374,8 +371,7 @@ void keep_linear(const SurfacePlace& at, const Surfels& s, std::span<const float
   std::array<float, kernel_slots> linear;
   for (size_t i = 0; i < k.count; ++i) {
     linear[i] = float(double(bells[i]) * (a + b * double(place[i].x) + c * double(place[i].y)) / determinant);
-    if (linear[i] < least_weight)
-      share = std::min(share, (k.weight[i] - least_weight) / (k.weight[i] - linear[i]));
+    if (linear[i] < least_weight) share = std::min(share, (k.weight[i] - least_weight) / (k.weight[i] - linear[i]));
   }
   for (size_t i = 0; i < k.count; ++i) k.weight[i] += share * (linear[i] - k.weight[i]);
 }

@@ -15,7 +15,7 @@ namespace lambent {
 
 // Where something is wanted to be known.
 struct SurfacePlace {
-  Vec3 position, normal;  // unit, towards the side that is meant
+  Vec3 position, normal;     // unit, towards the side that is meant
   uint32_t material = none;  // of the scene; none: of any
   float headroom = -1;       // how far above it something else is, along the normal; below 0: not known
 };

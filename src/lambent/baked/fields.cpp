@@ -132,9 +132,9 @@ Result<BakedFields> read_fields(const MappedFile& file, const GltfChunks& chunks
   if (!placement) return placement.error();
   fields.surface.where = std::move(*placement);
   if (auto ok = check_placement(fields.surface, where); !ok) return ok.error();
-  if (const auto object = extension.find("lattice");
-      object != extension.end() && !std::holds_alternative<IndirectTransfer>(fields.surface.store) &&
-      !std::holds_alternative<Visibility>(fields.surface.store)) {
+  if (const auto object = extension.find("lattice"); object != extension.end() &&
+                                                     !std::holds_alternative<IndirectTransfer>(fields.surface.store) &&
+                                                     !std::holds_alternative<Visibility>(fields.surface.store)) {
     auto lattice = decode_lattice(in, *object, light_of(fields.surface.store), where + ": lattice");
     if (!lattice) return lattice.error();
     fields.more.push_back(std::move(*lattice));

@@ -218,7 +218,8 @@ json encode(const IndirectTransfer& t, BlobWriter& out) {
     for (int c = 0; c < 3; ++c) albedos.push_back(float_to_half(a[c]));
   // Two bytes where those are enough.
   const auto narrow = [&](const std::vector<uint32_t>& values, size_t limit) {
-    return limit <= 65536 ? out.add_copy(std::vector<uint16_t>(values.begin(), values.end())) : out.add(bytes_of(values));
+    return limit <= 65536 ? out.add_copy(std::vector<uint16_t>(values.begin(), values.end()))
+                          : out.add(bytes_of(values));
   };
   json surfels{{"levels", s.counts},
                {"spacings", s.spacings},
@@ -235,7 +236,8 @@ json encode(const IndirectTransfer& t, BlobWriter& out) {
           {"bufferView", out.add_copy(pack_rows(t))},
           {"weights", out.add(bytes_of(t.weights))},
           {"scales", out.add(bytes_of(t.scales))},
-          {"kernels", {{"surfels", narrow(t.reader_surfels, t.gathering())}, {"weights", out.add(bytes_of(t.reader_weights))}}},
+          {"kernels",
+           {{"surfels", narrow(t.reader_surfels, t.gathering())}, {"weights", out.add(bytes_of(t.reader_weights))}}},
           {"error", t.error}};
 }
 
@@ -293,12 +295,12 @@ Result<Field> decode_indirect(const BlobReader& in, const json& object, size_t r
   if (!surfels) return surfels.error();
   t.surfels = std::move(*surfels), t.receivers = receivers;
   auto level = read_count(object, "gatherLevel", t.surfels.levels() - 1, where),
-       entries = read_count(object, "entries", 0x7fffffff, where), view = read_count(object, "bufferView", 0x7fffffff, where);
+       entries = read_count(object, "entries", 0x7fffffff, where),
+       view = read_count(object, "bufferView", 0x7fffffff, where);
   for (const auto* count : {&level, &entries, &view})
     if (!*count) return count->error();
   t.gather_level = uint32_t(*level);
-  if (receivers > in.chunks.binary.size() / kernel_slots)
-    return Error{where, "there is no room for so many receivers"};
+  if (receivers > in.chunks.binary.size() / kernel_slots) return Error{where, "there is no room for so many receivers"};
   auto packed = view_bytes(in, *view, where);
   if (!packed) return packed.error();
   if (auto ok = unpack_rows(*packed, t.gathering(), *entries, t, where); !ok) return ok.error();

@@ -146,8 +146,10 @@ Result<void> bake_to_indirect(Bake& b) {
   if (!baked) return baked.error();
   if (b.tracer.colours()) b.job.warn("bounces know no coloured glass: its light is kept grey");
   if (report.strays > report.rays / 50)
-    b.job.warn(fmt::format("{:.1f} % of the rays met surfaces too small for a surfel of their own, and are lost: more "
-                           "--surfels find them", 100 * double(report.strays) / double(report.rays)));
+    b.job.warn(
+        fmt::format("{:.1f} % of the rays met surfaces too small for a surfel of their own, and are lost: more "
+                    "--surfels find them",
+                    100 * double(report.strays) / double(report.rays)));
   b.report.receivers = b.receivers().count(), b.report.rays = report.rays, b.report.buried = report.buried;
   b.report.trace_seconds = report.trace_seconds;
   const size_t entries = baked->nodes.size(), rows = baked->gathering();
@@ -159,10 +161,10 @@ Result<void> bake_to_indirect(Bake& b) {
                                 {"unread", report.unread},
                                 {"surfel_seconds", report.surfel_seconds},
                                 {"kernel_seconds", report.reader_seconds}};
-  b.line("surfels", fmt::format("{} in {} levels, placed in {}; {} gather by {:.0f} entries each, to {:.2g} % RMS",
-                                human_count(baked->surfels.count()), baked->surfels.levels(),
-                                human_seconds(report.surfel_seconds), human_count(rows),
-                                double(entries) / double(std::max<size_t>(rows, 1)), 100 * baked->error));
+  b.line("surfels",
+         fmt::format("{} in {} levels, placed in {}; {} gather by {:.0f} entries each, to {:.2g} % RMS",
+                     human_count(baked->surfels.count()), baked->surfels.levels(), human_seconds(report.surfel_seconds),
+                     human_count(rows), double(entries) / double(std::max<size_t>(rows, 1)), 100 * baked->error));
   if (report.unread)
     b.line("", human_count(report.unread) + " receivers and all their neighbours see no surfel, and stay dark");
   b.store = std::move(*baked);

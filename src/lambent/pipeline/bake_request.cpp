@@ -31,7 +31,8 @@ const Option<R> table[] = {
      "diffuse: a vector a receiver for distant light; matrix: incident light in every direction, for glossy materials; "
      "zonal: lobes, for what moves, glossy too with --brdf or --outgoing; lightmap: the light of the scene's own "
      "lamps; "
-     "blocks: visibility for sharp shadows and highlights, with materials chosen when it is drawn; indirect: how direct "
+     "blocks: visibility for sharp shadows and highlights, with materials chosen when it is drawn; indirect: how "
+     "direct "
      "light becomes indirect light, for lamps that move and walls that are repainted",
      0, 0, "diffuse|matrix|zonal|lightmap|blocks|indirect"},
     {"order", &R::order, "What is baked", every & ~(K | I),

@@ -167,8 +167,7 @@ Said say(const Store& store) {
 const char* kind_of(const Field& field) {
   return std::visit(
       Overloaded{[](const ZonalTransfer&) { return "zonal"; }, [](const FactoredTransfer&) { return "factors"; },
-                 [](const Visibility&) { return "blocks"; },
-                 [](const IndirectTransfer&) { return "indirect"; },
+                 [](const Visibility&) { return "blocks"; }, [](const IndirectTransfer&) { return "indirect"; },
                  [&](const auto&) { return outgoing_of(field) ? "matrix" : "diffuse"; }},
       field.store);
 }
@@ -200,7 +199,8 @@ std::string describe_in_words(const Field& field) {
   // The kind goes first, unless the store says it; then what rows there are beyond one diffuse.
   const std::string kind = kind_of(field);
   const bool arrives = std::holds_alternative<IncidentRows>(field.rows);
-  if (kind != "zonal" && kind != "blocks" && kind != "indirect" && kind != rows.words && !arrives) words.push_back(kind);
+  if (kind != "zonal" && kind != "blocks" && kind != "indirect" && kind != rows.words && !arrives)
+    words.push_back(kind);
   if (kind == "diffuse" || (kind != "factors" && outgoing_of(field))) words.push_back(rows.words);
   words.push_back(store.words);
   words.push_back(some(receivers_of(field.store), "receiver"));

@@ -129,10 +129,9 @@ Result<Image> shade(const IndirectDrawing& d, const SurfelSearch& search, const 
           }
           if (shows_direct) {
             const Vec3 face = unit_normal(d.scene, triangle, at.normal);
-            const Vec3 origin = at.position +
-                                (hit.front ? face : -face) * receiver_lift(at.position, 0, d.diagonal);
-            const uint64_t key = hash64(uint64_t(std::bit_cast<uint32_t>(hit.u)) << 32 | std::bit_cast<uint32_t>(hit.v),
-                                        hit.triangle);
+            const Vec3 origin = at.position + (hit.front ? face : -face) * receiver_lift(at.position, 0, d.diagonal);
+            const uint64_t key =
+                hash64(uint64_t(std::bit_cast<uint32_t>(hit.u)) << 32 | std::bit_cast<uint32_t>(hit.v), hit.triangle);
             light += direct_light(d.tracer, d.lamps, origin, at.normal, pixel_samples, key);
           }
           return options.show == RenderOptions::Show::product ? albedo(d.scene, triangle, hit.u, hit.v) * light : light;
@@ -196,10 +195,11 @@ Result<Drawing> draw_indirect(const Baked& baked, const DrawRequest& request, co
                           {"read_seconds", d.read_seconds},
                           {"relight_seconds", d.ray_seconds + d.solve_seconds + d.read_seconds}};
   drawing.summary.lines.emplace_back(
-      "relit", fmt::format("shadow rays of {} surfels in {:.2f} ms, {} bounces in {:.2f} ms, {} receivers read in {:.2f} "
-                           "ms",
-                           human_count(d.transfer.surfels.count()), 1e3 * d.ray_seconds, d.solve.bounces,
-                           1e3 * d.solve_seconds, human_count(receivers), 1e3 * d.read_seconds));
+      "relit",
+      fmt::format("shadow rays of {} surfels in {:.2f} ms, {} bounces in {:.2f} ms, {} receivers read in {:.2f} "
+                  "ms",
+                  human_count(d.transfer.surfels.count()), 1e3 * d.ray_seconds, d.solve.bounces, 1e3 * d.solve_seconds,
+                  human_count(receivers), 1e3 * d.read_seconds));
   return drawing;
 }
 

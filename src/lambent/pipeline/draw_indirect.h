@@ -1,6 +1,6 @@
 #pragma once
-// Drawing direct-to-indirect transport: lamps of the request light the scene, sharply at the pixel; what they send on is
-// read there from surfels.
+// Drawing direct-to-indirect transport: lamps of the request light the scene, sharply at the pixel; what they send on
+// is read there from surfels.
 #include <lambent/pipeline/draw.h>
 
 namespace lambent {

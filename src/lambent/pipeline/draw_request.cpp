@@ -14,7 +14,8 @@ using R = DrawRequest;
 constexpr KindMask bit(DrawKind kind) { return KindMask(1) << int(kind); }
 constexpr KindMask D = bit(DrawKind::diffuse), C = bit(DrawKind::clusters), Z = bit(DrawKind::lobes),
                    M = bit(DrawKind::matrix), F = bit(DrawKind::factors), L = bit(DrawKind::lamps),
-                   K = bit(DrawKind::blocks), V = bit(DrawKind::fixed_view), I = bit(DrawKind::indirect), T = bit(DrawKind::texture);
+                   K = bit(DrawKind::blocks), V = bit(DrawKind::fixed_view), I = bit(DrawKind::indirect),
+                   T = bit(DrawKind::texture);
 constexpr KindMask every = D | C | Z | M | F | L | K | V | I | T, distant = every & ~I;
 
 const Option<R> table[] = {
@@ -26,8 +27,8 @@ const Option<R> table[] = {
     {"env", &R::env, "Light", distant,
      "Environment: a .hdr or .exr file, uniform:R,G,B, or sky:elevation=35,azimuth=45,turbidity=3", 0, 0, nullptr,
      nullptr, true, true},
-    {"env-rotate", &R::env_rotate, "Light", distant, "YAW,PITCH,ROLL: turn the environment, degrees about +Y, +X, +Z", 0,
-     0, nullptr, "env"},
+    {"env-rotate", &R::env_rotate, "Light", distant, "YAW,PITCH,ROLL: turn the environment, degrees about +Y, +X, +Z",
+     0, 0, nullptr, "env"},
     {"window", &R::window, "Light", distant & ~(L | K),
      "Against ringing of the harmonics: auto (light in shadow does not go below what the rest of the sky gives), hann, "
      "lanczos, or none",
@@ -166,10 +167,11 @@ Result<Show> parse_show(const std::string& text) {
           status == std::errc() && stop == end && show.term >= 0)
         return show;
     }
-  return Error{"--show",
-               "must be product, radiosity, albedo, emission, bounce:K or sum:K with K from 0, direct or indirect, not \"" +
-                   text + "\"",
-               true};
+  return Error{
+      "--show",
+      "must be product, radiosity, albedo, emission, bounce:K or sum:K with K from 0, direct or indirect, not \"" +
+          text + "\"",
+      true};
 }
 
 namespace {
@@ -210,7 +212,8 @@ Result<void> check_draw(const DrawRequest& request, DrawKind kind) {
     return Error{"--show", "of a transfer texture is product, radiosity or albedo", true};
   const bool two_sorts = show->part == Show::Part::direct || show->part == Show::Part::indirect;
   if (two_sorts && kind != DrawKind::indirect)
-    return Error{"--show", "direct and indirect are of files of direct to indirect light: bake --transfer indirect", true};
+    return Error{"--show", "direct and indirect are of files of direct to indirect light: bake --transfer indirect",
+                 true};
   if (kind == DrawKind::indirect && !two_sorts && show->part != Show::Part::all)
     return Error{"--show", "of direct to indirect light is product, radiosity, albedo, direct or indirect", true};
   if (said.contains("frames") && (kind == DrawKind::indirect ? request.move.empty() : request.animation.empty()))

@@ -211,7 +211,8 @@ TEST_F(Drawings, NoOptionIsLeftAsideInSilence) {
             if constexpr (std::is_same_v<T, std::string>)
               request.*member = option_name == "groove-map" ? at("half.png") : other_texts.at(option_name);
             else if constexpr (std::is_same_v<T, std::vector<std::string>>)
-              request.*member = {option_name == "lamp"     ? kind == DrawKind::indirect ? "spot@1,1,1,1,0,1,50=3,2,1" : "lamp=0.1,0.2,0.5"
+              request.*member = {option_name == "lamp"
+                                     ? kind == DrawKind::indirect ? "spot@1,1,1,1,0,1,50=3,2,1" : "lamp=0.1,0.2,0.5"
                                  : option_name == "move"   ? "1@0:1,1.2,1"
                                  : option_name == "albedo" ? "red=0.1,0.2,0.9"
                                  : option_name == "insert" ? at("pyramid.obj") + "@1,0.1,1,0.8"

@@ -37,8 +37,8 @@ Result<std::vector<double>> read_numbers(const std::string& text, size_t count, 
     ++at;
   }
   if (at != end || values.size() != count)
-    return wrong(option, "expects " + std::to_string(count) + " numbers within 1e9, separated by commas, not \"" +
-                             text + "\"");
+    return wrong(option,
+                 "expects " + std::to_string(count) + " numbers within 1e9, separated by commas, not \"" + text + "\"");
   return values;
 }
 

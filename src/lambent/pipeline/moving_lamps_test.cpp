@@ -13,11 +13,26 @@ MovingLamp must(const std::string& text) {
 }
 
 TEST(MovingLamps, WhatIsWrongIsNamed) {
-  for (const char* text :
-       {"", "lamp=1", "sphere@1,2,3=1", "sphere@1,2,3,0=1", "sphere@1,2,3,-1=1", "sphere@1,2,3,nan=1,1,1",
-        "sphere@1,2,inf,1=1", "sphere@1,2,3e9,1=1", "sphere@1,2,3,1=-1,0,0", "sphere@1,2,3,1=1,2", "sphere@1,2,3,1",
-        "cube@1,2,3=1", "point@1,2=1", "point@1,2,3=nan", "point@1,2,3=1e30", "spot@0,0,0,0,0,0,30=1",
-        "spot@0,0,0,0,-1,0,0=1", "spot@0,0,0,0,-1,0,91=1", "sun@10,91=1", "sun@10=1"}) {
+  for (const char* text : {"",
+                           "lamp=1",
+                           "sphere@1,2,3=1",
+                           "sphere@1,2,3,0=1",
+                           "sphere@1,2,3,-1=1",
+                           "sphere@1,2,3,nan=1,1,1",
+                           "sphere@1,2,inf,1=1",
+                           "sphere@1,2,3e9,1=1",
+                           "sphere@1,2,3,1=-1,0,0",
+                           "sphere@1,2,3,1=1,2",
+                           "sphere@1,2,3,1",
+                           "cube@1,2,3=1",
+                           "point@1,2=1",
+                           "point@1,2,3=nan",
+                           "point@1,2,3=1e30",
+                           "spot@0,0,0,0,0,0,30=1",
+                           "spot@0,0,0,0,-1,0,0=1",
+                           "spot@0,0,0,0,-1,0,91=1",
+                           "sun@10,91=1",
+                           "sun@10=1"}) {
     auto lamp = parse_moving_lamp(text);
     ASSERT_FALSE(lamp) << text;
     EXPECT_EQ(lamp.error().where, "--lamp") << text;
@@ -39,11 +54,11 @@ TEST(MovingLamps, LightAFloorAsTheyShould) {
   auto at = [&](const std::string& text, Vec3 p = Vec3(0, 1e-4f, 0)) {
     return direct_light(tracer, {must(text)}, p, Vec3(0, 1, 0), 64, 1).x;
   };
-  EXPECT_NEAR(at("sphere@0,2,0,0.5=3"), 3 * 0.0625f, 1e-3f);                 // L (r / d)^2
-  EXPECT_NEAR(at("sphere@0,20,0,0.0005=3"), 3 * 6.25e-10f, 1e-12f);          // as small as it is far
+  EXPECT_NEAR(at("sphere@0,2,0,0.5=3"), 3 * 0.0625f, 1e-3f);         // L (r / d)^2
+  EXPECT_NEAR(at("sphere@0,20,0,0.0005=3"), 3 * 6.25e-10f, 1e-12f);  // as small as it is far
   EXPECT_NEAR(at("sphere@2,2,0,0.5=3"), 3 * 0.25f / 8 * std::sqrt(0.5f), 2e-3f);
-  EXPECT_EQ(at("sphere@0,2,0,5=3"), 0);                                      // within it
-  EXPECT_EQ(at("sphere@0,-2,0,0.5=3"), 0);                                   // behind
+  EXPECT_EQ(at("sphere@0,2,0,5=3"), 0);     // within it
+  EXPECT_EQ(at("sphere@0,-2,0,0.5=3"), 0);  // behind
   EXPECT_NEAR(at("sphere@0,0,0,0.00001=3", Vec3(0, 2, 0)), 0, 1e-9f);
   EXPECT_NEAR(at("point@0,2,0=3"), 3 / (4 * pi), 1e-5f);
   EXPECT_NEAR(at("spot@0,2,0,0,0,0,40=3"), 3 / (4 * pi), 1e-5f);

@@ -13,10 +13,10 @@ struct IndirectSolve {
   std::vector<Vec3> albedos;       // of leaves
   std::vector<uint32_t> ancestor;  // gathering surfel of each leaf
   std::vector<float> node_areas;
-  std::vector<Vec3> nodes;         // what each node sends out
+  std::vector<Vec3> nodes;            // what each node sends out
   std::vector<Vec3> direct, x, next;  // of leaves; of gathering surfels
-  int bounces = 0;                 // of the last solve
-  double residual = 0;             // what further bounces would add, relative to the light there is
+  int bounces = 0;                    // of the last solve
+  double residual = 0;                // what further bounces would add, relative to the light there is
 };
 
 // `albedos` empty: as baked; else one a leaf.

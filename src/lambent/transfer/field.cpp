@@ -17,12 +17,12 @@ size_t most_receivers(const std::vector<uint32_t>& a, const std::vector<uint32_t
 }  // namespace
 
 LightBasis light_of(const Store& store) {
-  return std::visit(Overloaded{[](const Transfer& t) { return t.light; }, [](const CpcaTransfer& t) { return t.light; },
-                               [](const ZonalTransfer& t) { return LightBasis{.order = t.order}; },
-                               [](const FactoredTransfer& t) { return LightBasis{.order = t.light_order()}; },
-                               [](const Visibility&) { return LightBasis{}; },
-                               [](const IndirectTransfer&) { return LightBasis{}; }},
-                    store);
+  return std::visit(
+      Overloaded{[](const Transfer& t) { return t.light; }, [](const CpcaTransfer& t) { return t.light; },
+                 [](const ZonalTransfer& t) { return LightBasis{.order = t.order}; },
+                 [](const FactoredTransfer& t) { return LightBasis{.order = t.light_order()}; },
+                 [](const Visibility&) { return LightBasis{}; }, [](const IndirectTransfer&) { return LightBasis{}; }},
+      store);
 }
 
 size_t receivers_of(const Store& store) {

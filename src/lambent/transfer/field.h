@@ -2,7 +2,8 @@
 // The waist: everything that a bake makes and that relighting reads is a FIELD, along four axes, each a closed set:
 //   where    Placement   vertices, texels of an atlas, patches (triangles), a lattice in free space, pixels of a
 //   picture light    LightBasis  the columns of the store: harmonics, lobes, lamps by group (transfer.h) how      Store
-//   dense, clustered, zonal lobes, factored, visibility in blocks, direct to indirect light over surfels meaning  Rows        what the rows of T . light are
+//   dense, clustered, zonal lobes, factored, visibility in blocks, direct to indirect light over surfels meaning  Rows
+//   what the rows of T . light are
 // A stage that treats stores, placements or rows differently visits them, so that a new kind does not compile until
 // each stage has said what becomes of it.
 #include <lambent/core/camera.h>

@@ -38,8 +38,8 @@ Result<void> check_surfels(const Surfels& s, const std::string& where) {
   for (size_t l = 1, at = 0; l < s.levels(); ++l)
     for (size_t i = 0; i < s.counts[l]; ++i, ++at)
       if (s.parents[at] >= s.counts[l - 1])
-        return Error{where, "parent " + std::to_string(s.parents[at]) + " does not exist on level " +
-                                std::to_string(l - 1)};
+        return Error{where,
+                     "parent " + std::to_string(s.parents[at]) + " does not exist on level " + std::to_string(l - 1)};
   for (size_t i = 0; i < n; ++i) {
     const Vec3 a = s.albedos[i];
     if (s.materials[i] >= s.names.size()) return Error{where, "surfel " + std::to_string(i) + " has no material"};

@@ -27,12 +27,12 @@ inline constexpr size_t max_surfels = size_t{1} << 22, max_surfel_levels = 16;
 // Points on surfaces, level by level: level l is the first counts[l] of them, no two that could stand for one another
 // nearer than spacings[l]; the last level has them all, the leaves.
 struct Surfels {
-  std::vector<uint32_t> counts;   // by level, not falling, at least one
-  std::vector<float> spacings;    // by level
-  std::vector<Vec3> positions;    // on the surface
-  std::vector<Vec3> normals;      // unit, towards the side that the surfel is on
-  std::vector<float> areas;       // that a leaf stands for, > 0
-  std::vector<Vec3> albedos;      // the mean over that area, as baked
+  std::vector<uint32_t> counts;     // by level, not falling, at least one
+  std::vector<float> spacings;      // by level
+  std::vector<Vec3> positions;      // on the surface
+  std::vector<Vec3> normals;        // unit, towards the side that the surfel is on
+  std::vector<float> areas;         // that a leaf stands for, > 0
+  std::vector<Vec3> albedos;        // the mean over that area, as baked
   std::vector<uint32_t> materials;  // into the names below
   std::vector<std::string> names;   // of materials: a wall is repainted by its name
   // Of levels 1 and up, one after another: the surfel of the level above that each one is a part of.
