@@ -21,6 +21,7 @@ set(lambent_relight_headers
   lambent/light/project.h
   lambent/light/sky.h
   lambent/relight/dering.h
+  lambent/relight/indirect.h
   lambent/relight/lattice.h
   lambent/relight/light.h
   lambent/relight/local_light.h
@@ -31,6 +32,7 @@ set(lambent_relight_headers
   lambent/transfer/cpca_transfer.h
   lambent/transfer/directional.h
   lambent/transfer/field.h
+  lambent/transfer/indirect.h
   lambent/transfer/lattice.h
   lambent/transfer/outgoing.h
   lambent/transfer/transfer.h

@@ -42,6 +42,7 @@ set(lambent_relight_sources
   src/lambent/light/sky.cpp
   src/lambent/relight/factors.cpp
   src/lambent/relight/fix_light.cpp
+  src/lambent/relight/indirect.cpp
   src/lambent/relight/light.cpp
   src/lambent/relight/local_light.cpp
   src/lambent/relight/product_kernels.cpp
@@ -55,6 +56,7 @@ set(lambent_relight_sources
   src/lambent/transfer/directional.cpp
   src/lambent/transfer/directional_convert.cpp
   src/lambent/transfer/field.cpp
+  src/lambent/transfer/indirect.cpp
   src/lambent/transfer/outgoing.cpp
   src/lambent/transfer/transfer.cpp
   src/lambent/transfer/visibility.cpp

@@ -38,7 +38,9 @@ Relit relit(const Field& field) {
   }
   auto relighter = Relighter::make(field, std::move(options));
   if (!relighter) return {};
-  const bool lit = bool(visibility
+  const auto* indirect = std::get_if<IndirectTransfer>(&field.store);
+  const bool lit = bool(indirect ? relighter->set_light(std::vector<Vec3>(indirect->surfels.count(), Vec3(1)))
+                        : visibility
                             ? relighter->set_light(cube_light(
                                   make_environment("fuzz", 16, 8, [](Vec3) { return Vec3(1); }), visibility->size))
                             : relighter->set_light(light_for(relighter->light())));

@@ -5,6 +5,7 @@
 
 #include <lambent/baked/baked_file.h>
 #include <lambent/light/project.h>
+#include <lambent/pipeline/moving_lamps.h>
 #include <lambent/reference/path_tracer.h>
 #include <lambent/relight/light.h>
 #include <lambent/scene/refine.h>
@@ -30,6 +31,30 @@ struct ReferenceCommand {
   ReferenceOptions options;
 };
 
+// Lamps that stand anywhere, taken out of those of the scene's own that are scaled.
+std::vector<std::string> take_moving_lamps(BakeRequest& request) {
+  std::vector<std::string> moving;
+  for (const std::string& text : request.lamp)
+    if (names_moving_lamp(text)) moving.push_back(text);
+  std::erase_if(request.lamp, names_moving_lamp);
+  if (!moving.empty() && request.lamp.empty()) request.given.erase("lamp");
+  return moving;
+}
+
+// The scene's own lamps stay where they were asked for.
+Result<void> stand_lamps(Scene& scene, const std::vector<std::string>& texts, ReferenceOptions& options) {
+  if (texts.empty()) return {};
+  auto lamps = parse_moving_lamps(texts, scene.origin);
+  if (!lamps) return lamps.error();
+  if (!options.lamps) {
+    scene.lights.clear();
+    for (Material& m : scene.materials) m.emissive = Vec3(0.0f);
+  }
+  add_lamps(scene, *lamps);
+  options.lamps = true;
+  return {};
+}
+
 int run_reference(Context& context, ReferenceCommand o, const CLI::App& command) {
   if (auto ok = check_display(o.view.display, command, o.view.output); !ok) return fail(ok.error());
   if (auto ok = check_output(o.view.output, {"png", "exr"}); !ok) return fail(ok.error());
@@ -48,6 +73,7 @@ int run_reference(Context& context, ReferenceCommand o, const CLI::App& command)
   const bool displaced = !o.displace.heights.empty();
   SceneOptions prepared = o.scene;
   if (displaced) prepared.request.ground = false;  // it stays flat
+  const std::vector<std::string> moving = take_moving_lamps(prepared.request);
   auto scene = load_prepared_scene(prepared, o.options.lamps);
   if (!scene) return fail(scene.error());
   auto poses = make_poses(o.motion, *scene);
@@ -55,7 +81,8 @@ int run_reference(Context& context, ReferenceCommand o, const CLI::App& command)
   if (poses->front()) *scene = posed(*scene, *poses->front());
   auto view = make_view(o.view, *scene);  // of the scene before it is displaced, as render looks at it
   if (!view) return fail(view.error());
-  if (o.light.env.empty() && !o.options.lamps) return fail({"--env", "is needed, or --lamps", true});
+  if (auto ok = stand_lamps(*scene, moving, o.options); !ok) return fail(ok.error());
+  if (o.light.env.empty() && !o.options.lamps) return fail({"--env", "is needed, or --lamps or --lamp", true});
   if (o.light.env.empty()) o.light.env = "uniform:0";
   if (displaced)
     if (auto ok = displace_scene(*scene, o.displace); !ok) return fail(ok.error());
@@ -106,6 +133,8 @@ void add_reference(CLI::App& app, Run& run) {
       ->transform(CLI::CheckedTransformer(window_names).description("{none,hann,lanczos,auto}"));
   c->add_flag("--lamps", o->options.lamps,
               "The scene's own lamps give light too: emissive materials and punctual lights");
+  c->add_flag("!--no-direct", o->options.direct,
+              "Leave lamps and what they light straight out: light that has met two surfaces or more alone");
   c->add_flag("!--no-normal-maps", o->normal_maps, "Leave materials' normal textures out");
   c->add_option("--bounces", o->options.bounces, "Reflections between surfaces")
       ->check(CLI::Range(0, 64))

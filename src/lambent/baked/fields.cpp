@@ -22,6 +22,8 @@ Result<void> check_placement(Field& field, const std::string& where) {
     return Error{where, "zonal transfer is baked at vertices"};
   if (std::holds_alternative<Visibility>(field.store) && !at_vertices)
     return Error{where, "visibility in blocks is baked at vertices"};
+  if (std::holds_alternative<IndirectTransfer>(field.store) && !at_vertices)
+    return Error{where, "direct-to-indirect transport is baked at vertices"};
   if (!is_surface(field.where)) {
     if (!std::holds_alternative<DiffuseRows>(field.rows)) return Error{where, "a fixed view has one row a pixel"};
     field.rows = PixelRows{};
@@ -130,13 +132,15 @@ Result<BakedFields> read_fields(const MappedFile& file, const GltfChunks& chunks
   if (!placement) return placement.error();
   fields.surface.where = std::move(*placement);
   if (auto ok = check_placement(fields.surface, where); !ok) return ok.error();
-  if (const auto object = extension.find("lattice");
-      object != extension.end() && !std::holds_alternative<Visibility>(fields.surface.store)) {
+  if (const auto object = extension.find("lattice"); object != extension.end() &&
+                                                     !std::holds_alternative<IndirectTransfer>(fields.surface.store) &&
+                                                     !std::holds_alternative<Visibility>(fields.surface.store)) {
     auto lattice = decode_lattice(in, *object, light_of(fields.surface.store), where + ": lattice");
     if (!lattice) return lattice.error();
     fields.more.push_back(std::move(*lattice));
   }
-  if (const auto list = extension.find("terms"); list != extension.end()) {
+  if (const auto list = extension.find("terms");
+      list != extension.end() && !std::holds_alternative<IndirectTransfer>(fields.surface.store)) {
     auto terms = read_terms(in, *list, fields.surface, where);
     if (!terms) return terms.error();
     fields.terms = std::move(*terms);

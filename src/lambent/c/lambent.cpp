@@ -62,7 +62,8 @@ lambent_code open_bytes(const MappedFile& bytes, const std::string& path, lamben
 size_t values_of(const Store& store) {
   return std::visit(
       Overloaded{[](const FactoredTransfer& t) { return t.visibility.receiver_values(); },
-                 [](const Visibility&) { return size_t(0); }, [](const auto& t) { return t.receiver_values(); }},
+                 [](const Visibility&) { return size_t(0); }, [](const IndirectTransfer&) { return size_t(0); },
+                 [](const auto& t) { return t.receiver_values(); }},
       store);
 }
 
@@ -238,10 +239,13 @@ lambent_code lambent_read(const lambent_file* file, size_t index, size_t receive
         if (receiver >= receivers_of(store)) return wrong("receiver " + std::to_string(receiver) + " is not there");
         if (std::holds_alternative<Visibility>(store))
           return fail(LAMBENT_UNSUPPORTED, "visibility in blocks is no list of numbers");
+        if (std::holds_alternative<IndirectTransfer>(store))
+          return fail(LAMBENT_UNSUPPORTED, "direct-to-indirect transport is no list of numbers a receiver");
         if (count != values_of(store))
           return wrong("a receiver has " + std::to_string(values_of(store)) + " values, not " + std::to_string(count));
         const std::vector<float> all =
             std::visit(Overloaded{[](const Visibility&) { return std::vector<float>(); },
+                                  [](const IndirectTransfer&) { return std::vector<float>(); },
                                   [&](const FactoredTransfer& t) { return load_receiver(t.visibility, receiver); },
                                   [&](const auto& t) { return load_receiver(t, receiver); }},
                        store);
@@ -259,6 +263,9 @@ lambent_code lambent_relighter_new(const lambent_file* file, size_t index, lambe
         const Field& field = file->open->field(index);
         if (std::holds_alternative<Visibility>(field.store))
           return fail(LAMBENT_UNSUPPORTED, "visibility in blocks wants materials: lambent_relighter_new_blocks()");
+        if (std::holds_alternative<IndirectTransfer>(field.store))
+          return fail(LAMBENT_UNSUPPORTED,
+                      "direct-to-indirect transport wants direct light at its surfels: relight it from C++");
         return new_relighter(*file, field, {}, relighter);
       },
       file, relighter);

@@ -140,6 +140,37 @@ Result<void> bake_blocks(Bake& b) {
   return {};
 }
 
+Result<void> bake_to_indirect(Bake& b) {
+  IndirectReport report;
+  auto baked = bake_indirect(b.scene, b.tracer, b.receivers(), b.plan.indirect, &report, b.job.progress);
+  if (!baked) return baked.error();
+  if (b.tracer.colours()) b.job.warn("bounces know no coloured glass: its light is kept grey");
+  if (report.strays > report.rays / 50)
+    b.job.warn(
+        fmt::format("{:.1f} % of the rays met surfaces too small for a surfel of their own, and are lost: more "
+                    "--surfels find them",
+                    100 * double(report.strays) / double(report.rays)));
+  b.report.receivers = b.receivers().count(), b.report.rays = report.rays, b.report.buried = report.buried;
+  b.report.trace_seconds = report.trace_seconds;
+  const size_t entries = baked->nodes.size(), rows = baked->gathering();
+  b.summary.json["indirect"] = {{"surfels", baked->surfels.count()},
+                                {"gathering", rows},
+                                {"entries", entries},
+                                {"compression_error", baked->error},
+                                {"strays", report.strays},
+                                {"unread", report.unread},
+                                {"surfel_seconds", report.surfel_seconds},
+                                {"kernel_seconds", report.reader_seconds}};
+  b.line("surfels",
+         fmt::format("{} in {} levels, placed in {}; {} gather by {:.0f} entries each, to {:.2g} % RMS",
+                     human_count(baked->surfels.count()), baked->surfels.levels(), human_seconds(report.surfel_seconds),
+                     human_count(rows), double(entries) / double(std::max<size_t>(rows, 1)), 100 * baked->error));
+  if (report.unread)
+    b.line("", human_count(report.unread) + " receivers and all their neighbours see no surfel, and stay dark");
+  b.store = std::move(*baked);
+  return {};
+}
+
 Result<void> bake_surface(Bake& b) {
   switch (b.plan.kind) {
     case BakeKind::diffuse: return bake_diffuse(b);
@@ -147,6 +178,7 @@ Result<void> bake_surface(Bake& b) {
     case BakeKind::factors: return bake_factors(b);
     case BakeKind::membrane: return make_membrane(b);
     case BakeKind::blocks: return bake_blocks(b);
+    case BakeKind::indirect: return bake_to_indirect(b);
     case BakeKind::lightmap: return Error{"", "a lightmap is baked by bake_lightmap_request()"};
     case BakeKind::zonal:
     case BakeKind::glossy_zonal: break;
@@ -368,7 +400,7 @@ Result<BakeOutcome> bake_plain(const BakeRequest& request, const BakePlan& plan,
   }
   if (auto ok = check_file_size(plan, request, b.scene, b.receivers().count(), 0); !ok) return ok.error();
   if (auto ok = job.inputs_read({}); !ok) return ok.error();
-  if (plan.kind != BakeKind::membrane && request.shadows == "on")
+  if (plan.kind != BakeKind::membrane && plan.kind != BakeKind::indirect && request.shadows == "on")
     warn_if_enclosed(b.scene, b.tracer, b.receivers(), job);
   if (b.placed.atlas) move_buried_texels(b.scene, b.tracer, *b.placed.atlas, b.placed.receivers, job.progress);
   if (auto ok = bake_surface(b); !ok) return ok.error();

@@ -239,6 +239,7 @@ Result<BakePlan> plan_of(const BakeRequest& r, const Job& job) {
   auto bits = parse_visibility(r.visibility);
   if (!bits) return bits.error();
   plan.visibility = {r.cube, *bits, r.memory};
+  plan.indirect.surfels = size_t(r.surfels), plan.indirect.samples = b.samples, plan.indirect.seed = r.seed;
   if (auto ok = check_orders(plan, r); !ok) return ok.error();
   return plan;
 }

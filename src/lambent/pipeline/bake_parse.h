@@ -1,6 +1,7 @@
 #pragma once
 // The small syntaxes of a bake request, read into the options of the stages.
 #include <lambent/bake/adapt.h>
+#include <lambent/bake/indirect.h>
 #include <lambent/bake/lattice.h>
 #include <lambent/bake/lightmap.h>
 #include <lambent/bake/matrix.h>
@@ -25,6 +26,7 @@ struct BakePlan {
   SubsurfaceOptions subsurface;
   LightmapOptions lightmap;
   VisibilityOptions visibility;
+  IndirectOptions indirect;
   Reflection reflection;
   bool adapts = false;  // where the scene can be
   AdaptOptions adapt;

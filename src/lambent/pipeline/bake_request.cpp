@@ -15,8 +15,8 @@ using R = BakeRequest;
 constexpr KindMask bit(BakeKind kind) { return KindMask(1) << int(kind); }
 constexpr KindMask D = bit(BakeKind::diffuse), M = bit(BakeKind::matrix), F = bit(BakeKind::factors),
                    Z = bit(BakeKind::zonal), G = bit(BakeKind::glossy_zonal), S = bit(BakeKind::membrane),
-                   L = bit(BakeKind::lightmap), K = bit(BakeKind::blocks);
-constexpr KindMask every = D | M | F | Z | G | S | L | K, traced = D | M | F | Z | G | L, glossy = M | F | G;
+                   L = bit(BakeKind::lightmap), K = bit(BakeKind::blocks), I = bit(BakeKind::indirect);
+constexpr KindMask every = D | M | F | Z | G | S | L | K | I, traced = D | M | F | Z | G | L, glossy = M | F | G;
 
 const Option<R> table[] = {
     {"scene", &R::scene, "Files", every, "Scene: .gltf, .glb, .obj or .ply", 0, 0, nullptr, nullptr, true, true},
@@ -31,14 +31,16 @@ const Option<R> table[] = {
      "diffuse: a vector a receiver for distant light; matrix: incident light in every direction, for glossy materials; "
      "zonal: lobes, for what moves, glossy too with --brdf or --outgoing; lightmap: the light of the scene's own "
      "lamps; "
-     "blocks: visibility for sharp shadows and highlights, with materials chosen when it is drawn",
-     0, 0, "diffuse|matrix|zonal|lightmap|blocks"},
-    {"order", &R::order, "What is baked", every & ~K,
+     "blocks: visibility for sharp shadows and highlights, with materials chosen when it is drawn; indirect: how "
+     "direct "
+     "light becomes indirect light, for lamps that move and walls that are repainted",
+     0, 0, "diffuse|matrix|zonal|lightmap|blocks|indirect"},
+    {"order", &R::order, "What is baked", every & ~(K | I),
      "Bands of the light's spherical harmonics; 6 if nothing is said, of lightmaps none", 1, max_sh_order},
     {"light", &R::light, "What is baked", D | M | F,
      "What light is made of, in place of --order: sh:BANDS, sh:BANDS+lamps:COUNT@ENV, or directional:COUNT", 0, 0,
      nullptr, nullptr, true, true},
-    {"precision", &R::precision, "What is baked", every & ~K, "Of the stored transfer", 0, 0, "half|single"},
+    {"precision", &R::precision, "What is baked", every & ~(K | I), "Of the stored transfer", 0, 0, "half|single"},
     {"receivers", &R::receivers, "What is baked", every,
      "Where light is received: vertices, texels of an atlas, or patches (triangles); texels for lightmaps, else "
      "vertices",
@@ -63,7 +65,7 @@ const Option<R> table[] = {
      0, 0, "auto|on|off", "receivers=vertices"},
     {"denoise", &R::denoise, "How well", D | Z | F, "Take away noise that neighbours on a surface do not share", 0, 0,
      "on|off"},
-    {"samples", &R::samples, "How well", traced,
+    {"samples", &R::samples, "How well", traced | I,
      "Rays a receiver; without, diffuse transfer is baked to an error, other kinds with 1024", 1, 1 << 20},
     {"bounces", &R::bounces, "How well", D | M | Z | G | L,
      "Reflections between surfaces, 0 to 64; lightmaps also converge:EPS, as many as leave that residual"},
@@ -74,11 +76,11 @@ const Option<R> table[] = {
     {"memory", &R::memory, "How well", traced | K,
      "Working memory beyond scene and result, bytes; e.g. 500MB, 2GiB (4GiB); less means rays traced again", 0, 0,
      nullptr, nullptr, false},
-    {"seed", &R::seed, "How well", traced, "Of the ray directions"},
+    {"seed", &R::seed, "How well", traced | I, "Of the ray directions"},
 
     {"ground", &R::ground, "Scene", every, "Add a tessellated floor under the scene"},
     {"max-edge", &R::max_edge, "Scene", every, "Split edges longer than this many scene units", 1e-12, 1e12},
-    {"emit", &R::emit, "Scene", every, "MATERIAL=R,G,B: make a material a lamp of this radiance"},
+    {"emit", &R::emit, "Scene", every & ~I, "MATERIAL=R,G,B: make a material a lamp of this radiance"},
     {"light-units", &R::light_units, "Scene", L,
      "What lamps are stated in, beside emission: lumen as glTF has it, candela and lux; watt divides them by 683, "
      "Blender's lumens a watt; raw divides points and spots by 4 pi, watts all around; auto asks the file's generator",
@@ -137,6 +139,9 @@ const Option<R> table[] = {
      256},
     {"visibility", &R::visibility, "Blocks (--transfer blocks)", K,
      "binary, or bits:N, shares of texels in 2^N levels, for harsh light"},
+
+    {"surfels", &R::surfels, "Direct to indirect light (--transfer indirect)", I,
+     "Points on surfaces that direct light is taken at, about; a quarter of them gather", 64, 1 << 20},
 
     {"compress", &R::compress, "Smaller and special (diffuse, matrix)", D | M,
      "cpca:CLUSTERS,RANK: store clusters, and a few weights a receiver"},
@@ -239,6 +244,7 @@ BakeKind kind_of(const BakeRequest& r) {
     return r.given.contains("brdf") || r.given.contains("outgoing") ? BakeKind::glossy_zonal : BakeKind::zonal;
   if (r.transfer == "lightmap") return BakeKind::lightmap;
   if (r.transfer == "blocks") return BakeKind::blocks;
+  if (r.transfer == "indirect") return BakeKind::indirect;
   return r.membrane.empty() ? BakeKind::diffuse : BakeKind::membrane;
 }
 
@@ -266,7 +272,9 @@ Result<BakeRequest> resolved(BakeRequest r) {
   if (auto ok = check_conflicts(r); !ok) return ok.error();
   if (auto ok = check_kind(r, kind); !ok) return ok.error();
   if (kind == BakeKind::factors || r.shadows == "off") r.bounces = "0";
-  if (r.order == 0 && r.light.empty() && kind != BakeKind::lightmap && kind != BakeKind::blocks) r.order = 6;
+  if (r.order == 0 && r.light.empty() && kind != BakeKind::lightmap && kind != BakeKind::blocks &&
+      kind != BakeKind::indirect)
+    r.order = 6;
   if (kind != BakeKind::diffuse || !r.subsurface.empty() || r.shadows == "off")
     if (r.samples == 0) r.samples = 1024;
   if (r.receivers == "texels" && r.atlas.empty() && !(r.texels_per_unit > 0)) r.atlas = "1024x1024";

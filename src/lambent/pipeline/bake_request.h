@@ -5,7 +5,7 @@
 
 namespace lambent {
 
-enum class BakeKind { diffuse, matrix, factors, zonal, glossy_zonal, membrane, lightmap, blocks };
+enum class BakeKind { diffuse, matrix, factors, zonal, glossy_zonal, membrane, lightmap, blocks, indirect };
 inline constexpr const char* bake_kind_names[] = {"diffuse transfer",
                                                   "matrix transfer",
                                                   "factors",
@@ -13,7 +13,8 @@ inline constexpr const char* bake_kind_names[] = {"diffuse transfer",
                                                   "glossy lobes (zonal with --brdf or --outgoing)",
                                                   "membranes (--membrane)",
                                                   "lightmaps",
-                                                  "blocks"};
+                                                  "blocks",
+                                                  "direct to indirect light"};
 std::span<const Option<BakeRequest>> bake_options();
 BakeKind kind_of(const BakeRequest& request);
 

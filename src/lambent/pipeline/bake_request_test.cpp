@@ -80,9 +80,10 @@ class Requests : public testing::Test {
       case BakeKind::membrane: r["membrane"] = "0.4"; break;
       case BakeKind::lightmap: r.update({{"transfer", "lightmap"}, {"atlas", "24x24"}, {"lamp_samples", 4}}); break;
       case BakeKind::blocks: r.update({{"transfer", "blocks"}, {"cube", 16}}); break;
+      case BakeKind::indirect: r.update({{"transfer", "indirect"}, {"surfels", 256}}); break;
     }
     if (kind != BakeKind::membrane && kind != BakeKind::blocks) r["samples"] = 32;
-    if (kind != BakeKind::blocks && kind != BakeKind::lightmap) r["order"] = 3;
+    if (kind != BakeKind::blocks && kind != BakeKind::lightmap && kind != BakeKind::indirect) r["order"] = 3;
     return r;
   }
 };
@@ -163,6 +164,7 @@ const std::map<std::string, Change> changes{
     {"fix_view", {"auto"}},
     {"size", {"12x9", {{"fix_view", "auto"}}}},
     {"spp", {3, {{"fix_view", "auto"}, {"size", "16x12"}}}},
+    {"surfels", {512}},
     {"lattice", {"2,1,1"}},
     {"lattice_box", {"0,0,0,1,1,1", {{"lattice", "2,1,1"}}}},
     {"lattice_order", {2, {{"lattice", "2,1,1"}}}},

@@ -87,6 +87,20 @@ Said say(const Visibility& v) {
           fmt::format("\n  {:.1f} % of blocks mixed, with {:.1f} changes each", 100 * s.mixed, s.changes)};
 }
 
+Said say(const IndirectTransfer& t) {
+  const Surfels& s = t.surfels;
+  const double each = double(t.nodes.size()) / double(std::max<size_t>(t.gathering(), 1));
+  return {{{"surfels", s.count()},
+           {"levels", s.counts},
+           {"spacings", s.spacings},
+           {"gathering", t.gathering()},
+           {"entries", t.nodes.size()},
+           {"compression_error", t.error}},
+          fmt::format("direct to indirect light, {} in {} levels, {} with rows", some(s.count(), "surfel"), s.levels(),
+                      human_count(t.gathering())),
+          fmt::format("\n  rows of {:.0f} entries, to {:.2g} % RMS of what was gathered", each, 100 * t.error)};
+}
+
 Said say(const Rows& rows) {
   return std::visit(
       Overloaded{[](const DiffuseRows&) -> Said {
@@ -153,7 +167,7 @@ Said say(const Store& store) {
 const char* kind_of(const Field& field) {
   return std::visit(
       Overloaded{[](const ZonalTransfer&) { return "zonal"; }, [](const FactoredTransfer&) { return "factors"; },
-                 [](const Visibility&) { return "blocks"; },
+                 [](const Visibility&) { return "blocks"; }, [](const IndirectTransfer&) { return "indirect"; },
                  [&](const auto&) { return outgoing_of(field) ? "matrix" : "diffuse"; }},
       field.store);
 }
@@ -185,7 +199,8 @@ std::string describe_in_words(const Field& field) {
   // The kind goes first, unless the store says it; then what rows there are beyond one diffuse.
   const std::string kind = kind_of(field);
   const bool arrives = std::holds_alternative<IncidentRows>(field.rows);
-  if (kind != "zonal" && kind != "blocks" && kind != rows.words && !arrives) words.push_back(kind);
+  if (kind != "zonal" && kind != "blocks" && kind != "indirect" && kind != rows.words && !arrives)
+    words.push_back(kind);
   if (kind == "diffuse" || (kind != "factors" && outgoing_of(field))) words.push_back(rows.words);
   words.push_back(store.words);
   words.push_back(some(receivers_of(field.store), "receiver"));

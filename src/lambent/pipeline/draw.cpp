@@ -3,6 +3,7 @@
 #include <lambent/bake/materials.h>
 #include <lambent/pipeline/draw_blocks.h>
 #include <lambent/pipeline/draw_columns.h>
+#include <lambent/pipeline/draw_indirect.h>
 #include <lambent/pipeline/draw_texture.h>
 #include <lambent/pipeline/text.h>
 
@@ -80,6 +81,7 @@ Result<Drawing> draw_columns(const Baked& baked, const DrawRequest& request, con
 Result<Drawing> draw(const Baked& baked, const DrawRequest& request, const Job& job) {
   if (!request.transfer_texture.empty()) return draw_texture(request, job);
   if (auto ok = check_draw(request, baked); !ok) return ok.error();
+  if (std::holds_alternative<IndirectTransfer>(baked.surface.store)) return draw_indirect(baked, request, job);
   return std::holds_alternative<SightRows>(baked.surface.rows) ? draw_blocks(baked, request, job)
                                                                : draw_columns(baked, request, job);
 }

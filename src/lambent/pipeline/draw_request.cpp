@@ -14,8 +14,9 @@ using R = DrawRequest;
 constexpr KindMask bit(DrawKind kind) { return KindMask(1) << int(kind); }
 constexpr KindMask D = bit(DrawKind::diffuse), C = bit(DrawKind::clusters), Z = bit(DrawKind::lobes),
                    M = bit(DrawKind::matrix), F = bit(DrawKind::factors), L = bit(DrawKind::lamps),
-                   K = bit(DrawKind::blocks), V = bit(DrawKind::fixed_view), T = bit(DrawKind::texture);
-constexpr KindMask every = D | C | Z | M | F | L | K | V | T;
+                   K = bit(DrawKind::blocks), V = bit(DrawKind::fixed_view), I = bit(DrawKind::indirect),
+                   T = bit(DrawKind::texture);
+constexpr KindMask every = D | C | Z | M | F | L | K | V | I | T, distant = every & ~I;
 
 const Option<R> table[] = {
     {"baked", &R::baked, "Files", every, "Baked file, from `lambent bake`; with --transfer-texture, any scene", 0, 0,
@@ -23,26 +24,32 @@ const Option<R> table[] = {
     {"output", &R::output, "Files", every, "Picture to write: .png (8-bit sRGB) or .exr (linear)", 0, 0, nullptr,
      nullptr, false},
 
-    {"env", &R::env, "Light", every,
+    {"env", &R::env, "Light", distant,
      "Environment: a .hdr or .exr file, uniform:R,G,B, or sky:elevation=35,azimuth=45,turbidity=3", 0, 0, nullptr,
      nullptr, true, true},
-    {"env-rotate", &R::env_rotate, "Light", every, "YAW,PITCH,ROLL: turn the environment, degrees about +Y, +X, +Z", 0,
-     0, nullptr, "env"},
-    {"window", &R::window, "Light", every & ~(L | K),
+    {"env-rotate", &R::env_rotate, "Light", distant, "YAW,PITCH,ROLL: turn the environment, degrees about +Y, +X, +Z",
+     0, 0, nullptr, "env"},
+    {"window", &R::window, "Light", distant & ~(L | K),
      "Against ringing of the harmonics: auto (light in shadow does not go below what the rest of the sky gives), hann, "
      "lanczos, or none",
      0, 0, "auto|hann|lanczos|none"},
-    {"light-order", &R::light_order, "Light", every & ~(L | K),
+    {"light-order", &R::light_order, "Light", distant & ~(L | K),
      "Use only this many bands of the baked ones; lobes are kept", 1, max_sh_order},
-    {"lamp", &R::lamp, "Light", D | C | M | L | V,
-     "NAME=R,G,B: scale a group of lamps by this colour (files baked with --light-groups); may be given again"},
+    {"lamp", &R::lamp, "Light", D | C | M | L | V | I,
+     "NAME=R,G,B: scale a group of lamps by this colour (files baked with --light-groups); or a lamp that stands "
+     "anywhere (files of direct to indirect light): sphere@X,Y,Z,RADIUS=R,G,B (radiance), point@X,Y,Z=R,G,B (flux per "
+     "steradian), spot@X,Y,Z,TX,TY,TZ,ANGLE=R,G,B (towards T, within so many degrees) or sun@AZIMUTH,ELEVATION=R,G,B "
+     "(irradiance); may be given again"},
+    {"move", &R::move, "Light", I,
+     "N@T:X,Y,Z;T:X,Y,Z;...: where lamp N is at these times, straight from one to the next; may be given again", 0, 0,
+     nullptr, "frames"},
     {"sphere-lamp", &R::sphere_lamp, "Light", Z | T,
      "X,Y,Z,RADIUS,R,G,B: a near lamp, a sphere of that radiance; may be given again"},
 
     {"camera", &R::camera, "View", every & ~V, "EX,EY,EZ,TX,TY,TZ,FOV: eye, target, vertical degrees; or auto"},
     {"size", &R::size, "View", every & ~V, "Picture size, WIDTHxHEIGHT pixels"},
     {"spp", &R::spp, "View", every & ~V, "Rays a pixel", 1, 4096},
-    {"background", &R::background, "View", every, "What lies behind the scene: env, or none (transparent)", 0, 0,
+    {"background", &R::background, "View", distant, "What lies behind the scene: env, or none (transparent)", 0, 0,
      "env|none"},
     {"exposure", &R::exposure, "View", every,
      "Stops that a PNG is brightened by; auto: 90 % of what is covered is shown at 0.7 or less"},
@@ -51,7 +58,10 @@ const Option<R> table[] = {
     {"show", &R::show, "What is shown", every & ~(K | V),
      "product of light and colour; radiosity: the light alone, as if everything were white; albedo: the colour alone; "
      "emission: lamps that are seen, alone; bounce:K: light after K reflections between surfaces, alone; sum:K: lamps, "
-     "and light after 0 to K reflections (files baked with --terms)"},
+     "and light after 0 to K reflections (files baked with --terms); direct, indirect: light of either sort (files of "
+     "direct to indirect light)"},
+    {"albedo", &R::albedo, "What is shown", I,
+     "MATERIAL=R,G,B: repaint it, and what it reflects follows; may be given again"},
     {"brdf", &R::brdf, "What is shown", C | Z | M | F | K,
      "Other materials than were baked, or those of blocks: diffuse (by base colour), materials (glTF's "
      "metallic-roughness), or one model for all, as `bake --brdf` takes it; for bakes that kept incident light, and "
@@ -60,12 +70,12 @@ const Option<R> table[] = {
     {"insert", &R::insert, "What is shown", D | C | Z | M,
      "FILE@X,Y,Z[,SCALE]: put a small diffuse object there, lit by the scene's lattice; may be given again"},
 
-    {"animation", &R::animation, "Motion", every & ~(K | V),
+    {"animation", &R::animation, "Motion", distant & ~(K | V),
      "Pose the scene by this glTF animation, by name or number"},
-    {"time", &R::time, "Motion", every & ~(K | V), "At this time, seconds", 0, 0, nullptr, "animation"},
+    {"time", &R::time, "Motion", distant & ~(K | V), "At this time, seconds", 0, 0, nullptr, "animation"},
     {"frames", &R::frames, "Motion", every & ~(K | V),
-     "FROM:TO[:STEP]: at these times, seconds, as a strip of pictures", 0, 0, nullptr, "animation"},
-    {"deform", &R::deform, "Motion", every & ~(K | V),
+     "FROM:TO[:STEP]: at these times, seconds, as a strip of pictures; needs --animation, or --move"},
+    {"deform", &R::deform, "Motion", distant & ~(K | V),
      "bend:ANGLE[,along[,towards]] or twist:ANGLE[,along]: degrees from end to end, axes x, y or z"},
 
     {"method", &R::method, "Blocks", K,
@@ -108,6 +118,7 @@ constexpr Conflict conflicts[] = {
     {"window", "show=albedo|emission", "shapes light that --show leaves out"},
     {"light-order", "show=albedo|emission", "shapes light that --show leaves out"},
     {"brdf", "show=albedo|emission", "reflects light that --show leaves out"},
+    {"move", "show=albedo", "moves light that --show leaves out"},
 };
 
 GivenOptions said_in(const R& request) {
@@ -132,6 +143,7 @@ DrawKind kind_of(const Field& surface) {
   if (std::holds_alternative<SightRows>(surface.rows)) return DrawKind::blocks;
   if (std::holds_alternative<PixelRows>(surface.rows)) return DrawKind::fixed_view;
   if (std::holds_alternative<ZonalTransfer>(surface.store)) return DrawKind::lobes;
+  if (std::holds_alternative<IndirectTransfer>(surface.store)) return DrawKind::indirect;
   if (std::holds_alternative<FactoredTransfer>(surface.store)) return DrawKind::factors;
   if (std::holds_alternative<CpcaTransfer>(surface.store)) return DrawKind::clusters;
   if (outgoing_of(surface)) return DrawKind::matrix;
@@ -144,6 +156,8 @@ Result<Show> parse_show(const std::string& text) {
   if (text == "radiosity") return Show{RenderOptions::Show::radiosity};
   if (text == "albedo") return Show{RenderOptions::Show::albedo};
   if (text == "emission") return Show{.part = Show::Part::emission};
+  if (text == "direct") return Show{.part = Show::Part::direct};
+  if (text == "indirect") return Show{.part = Show::Part::indirect};
   for (const auto& [start, part] : {std::pair("bounce:", Show::Part::bounce), std::pair("sum:", Show::Part::sum)})
     if (text.starts_with(start)) {
       Show show{.part = part};
@@ -153,9 +167,11 @@ Result<Show> parse_show(const std::string& text) {
           status == std::errc() && stop == end && show.term >= 0)
         return show;
     }
-  return Error{"--show",
-               "must be product, radiosity, albedo, emission, bounce:K or sum:K with K from 0, not \"" + text + "\"",
-               true};
+  return Error{
+      "--show",
+      "must be product, radiosity, albedo, emission, bounce:K or sum:K with K from 0, direct or indirect, not \"" +
+          text + "\"",
+      true};
 }
 
 namespace {
@@ -194,8 +210,18 @@ Result<void> check_draw(const DrawRequest& request, DrawKind kind) {
   if (!show) return show.error();
   if (kind == DrawKind::texture && show->part != Show::Part::all)
     return Error{"--show", "of a transfer texture is product, radiosity or albedo", true};
-  const bool distant = kind == DrawKind::texture || kind == DrawKind::blocks;
-  if (distant && show->colour != RenderOptions::Show::albedo && request.env.empty() && request.sphere_lamp.empty())
+  const bool two_sorts = show->part == Show::Part::direct || show->part == Show::Part::indirect;
+  if (two_sorts && kind != DrawKind::indirect)
+    return Error{"--show", "direct and indirect are of files of direct to indirect light: bake --transfer indirect",
+                 true};
+  if (kind == DrawKind::indirect && !two_sorts && show->part != Show::Part::all)
+    return Error{"--show", "of direct to indirect light is product, radiosity, albedo, direct or indirect", true};
+  if (said.contains("frames") && (kind == DrawKind::indirect ? request.move.empty() : request.animation.empty()))
+    return Error{"--frames", kind == DrawKind::indirect ? "needs --move" : "needs --animation", true};
+  if (kind == DrawKind::indirect && request.lamp.empty() && show->colour != RenderOptions::Show::albedo)
+    return Error{"--lamp", "is needed: a lamp to light the scene by, e.g. point@0,2,0=10", true};
+  const bool from_afar = kind == DrawKind::texture || kind == DrawKind::blocks;
+  if (from_afar && show->colour != RenderOptions::Show::albedo && request.env.empty() && request.sphere_lamp.empty())
     return Error{"--env", "is needed: an environment to light the scene by", true};
   return {};
 }

@@ -13,7 +13,7 @@ struct DrawRequest {
   // Light
   std::string env, env_rotate, window = "auto";
   int light_order = 0;  // bands; 0: all that there are
-  std::vector<std::string> lamp, sphere_lamp;
+  std::vector<std::string> lamp, sphere_lamp, move;
   // View
   std::string camera = "auto", size = "512x512", background = "env";
   int spp = 16;
@@ -21,7 +21,7 @@ struct DrawRequest {
   // What is shown
   std::string show = "product";
   std::string brdf;  // "": as baked; of blocks, which know none, diffuse
-  std::vector<std::string> insert;
+  std::vector<std::string> insert, albedo;
   // Motion
   std::string animation, frames, deform;
   double time = 0;
@@ -39,23 +39,24 @@ struct DrawRequest {
 };
 
 // By what the rows mean and the store can do.
-enum class DrawKind { diffuse, clusters, lobes, matrix, factors, lamps, blocks, fixed_view, texture };
+enum class DrawKind { diffuse, clusters, lobes, matrix, factors, lamps, blocks, fixed_view, indirect, texture };
 inline constexpr const char* draw_kind_names[] = {
     "diffuse transfer", "clusters",    "lobes",
     "matrices",         "factors",     "lamps alone (lightmaps, fixed light)",
-    "blocks",           "fixed views", "transfer textures"};
+    "blocks",           "fixed views", "direct to indirect light",
+    "transfer textures"};
 std::span<const Option<DrawRequest>> draw_options();
 DrawKind kind_of(const Field& surface);
 
 // Whether an option, by its name in JSON, was said or differs from its default.
 bool is_given(const DrawRequest& request, const std::string& option);
 
-// What --show asks for: product, radiosity, albedo; emission, bounce:K, sum:K.
+// What --show asks for: product, radiosity, albedo; emission, bounce:K, sum:K; direct, indirect.
 struct Show {
   RenderOptions::Show colour = RenderOptions::Show::product;
   // All light; that of lamps that are seen and nothing else; that of one term of the Neumann series; that of lamps that
-  // are seen and of the terms up to one.
-  enum class Part { all, emission, bounce, sum } part = Part::all;
+  // are seen and of the terms up to one; of direct-to-indirect transport, lamps and what they light, or the rest.
+  enum class Part { all, emission, bounce, sum, direct, indirect } part = Part::all;
   int term = 0;
 };
 Result<Show> parse_show(const std::string& text);

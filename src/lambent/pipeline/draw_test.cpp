@@ -193,11 +193,13 @@ TEST_F(Drawings, NoOptionIsLeftAsideInSilence) {
                                                     {DrawKind::lamps, "lightmap"},
                                                     {DrawKind::blocks, "blocks"},
                                                     {DrawKind::fixed_view, "diffuse_fixed_view"},
+                                                    {DrawKind::indirect, "indirect"},
                                                     {DrawKind::texture, ""}};
   for (const auto& [kind, name] : files) {
     DrawRequest base{.baked = std::string(LAMBENT_GOLDEN) + "/" + name + ".glb", .env = sky, .background = "none"};
     if (kind == DrawKind::texture)
       base.baked = at("card.obj"), base.transfer_texture = at("grooves.lpt"), base.tile = "5,0";
+    if (kind == DrawKind::indirect) base.env = "", base.background = "env", base.lamp = {"point@1,1,1=3"};
     if (kind == DrawKind::blocks) base.brdf = "phong:exponent=20,diffuse=0.3,specular=0.4";
     if (kind != DrawKind::fixed_view) base.camera = "3,2,4,1,0.5,1,40", base.size = "16x12", base.spp = 4;
     const auto before = draw(base);
@@ -217,12 +219,16 @@ TEST_F(Drawings, NoOptionIsLeftAsideInSilence) {
             if constexpr (std::is_same_v<T, std::string>)
               request.*member = option_name == "groove-map" ? at("half.png") : other_texts.at(option_name);
             else if constexpr (std::is_same_v<T, std::vector<std::string>>)
-              request.*member = {option_name == "lamp"     ? "lamp=0.1,0.2,0.5"
+              request.*member = {option_name == "lamp"
+                                     ? kind == DrawKind::indirect ? "spot@1,1,1,1,0,1,50=3,2,1" : "lamp=0.1,0.2,0.5"
+                                 : option_name == "move"   ? "1@0:1,1.2,1"
+                                 : option_name == "albedo" ? "red=0.1,0.2,0.9"
                                  : option_name == "insert" ? at("pyramid.obj") + "@1,0.1,1,0.8"
                                                            : "1,2,2,0.5,9,8,7"};
             else if constexpr (!std::is_same_v<T, bool>) request.*member = T(other_numbers.at(option_name));
           },
           option.member);
+      if (option_name == "move") request.frames = "0:0";
       bool warned = false;
       const auto after = draw(request, {nullptr, [&](const std::string&) { warned = true; }});
       if (!(option.kinds >> int(kind) & 1)) {

@@ -336,6 +336,8 @@ Result<Parsed> parse_live(const Baked& baked, const DrawRequest& request) {
 }  // namespace
 
 Result<LivePicture> LivePicture::make(const Baked& baked, const DrawRequest& request, const Job& job) {
+  if (std::holds_alternative<IndirectTransfer>(baked.surface.store))
+    return Error{request.baked, "holds direct-to-indirect transport, which is not drawn live: see `lambent render`"};
   auto parsed = parse_live(baked, request);
   if (!parsed) return parsed.error();
   auto state = std::unique_ptr<State>(new State{baked, request, job, parsed->view});

@@ -84,7 +84,20 @@ TEST_P(Live, FollowsLightAndView) {
   expect_same(picture->image(), drawn(baked, request));
 }
 
-INSTANTIATE_TEST_SUITE_P(Files, Live, testing::ValuesIn(golden_names()), [](const auto& info) { return info.param; });
+// The kinds that are drawn live; the one that is not is refused by name.
+std::vector<std::string> live_names() {
+  std::vector<std::string> names = golden_names();
+  std::erase(names, "indirect");
+  return names;
+}
+INSTANTIATE_TEST_SUITE_P(Files, Live, testing::ValuesIn(live_names()), [](const auto& info) { return info.param; });
+
+TEST(LivePicture, RefusesDirectToIndirectLightByName) {
+  const auto [baked, request] = open("indirect");
+  auto picture = LivePicture::make(baked, request);
+  ASSERT_FALSE(picture);
+  EXPECT_NE(picture.error().message.find("direct-to-indirect"), std::string::npos) << picture.error().text();
+}
 
 TEST(LivePicture, DoesOnlyWhatHasChanged) {
   const auto [baked, request] = open(live_file);

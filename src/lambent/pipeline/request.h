@@ -55,6 +55,8 @@ struct BakeRequest {
   // Special cases and smaller files
   std::string fix_light, fix_view, size = "512x512", compress;
   int spp = 16;
+  // Direct to indirect light
+  int surfels = 16384;
   // Free space
   std::string lattice, lattice_box;
   int lattice_order = 4;

@@ -150,7 +150,8 @@ Vec3 exit_radiance_estimate(const Integrator& integrator, PathVertex vertex, con
   Vec3 sum(0), throughput(1);
   for (int depth = 0;; ++depth) {
     const Vec3 wo = vertex.wo;
-    if (strategy != Strategy::brdf_only) {
+    const bool counts = integrator.direct || depth > 0;
+    if (counts && strategy != Strategy::brdf_only) {
       EnvironmentSample light = sample_environment(integrator.sampler, samples.pair(uint32_t(2 * depth + 1)));
       if (light.pdf > 0 && dot(vertex.ng, light.direction) > 0) {
         Vec3 wi = light.direction * vertex.frame;
@@ -162,7 +163,7 @@ Vec3 exit_radiance_estimate(const Integrator& integrator, PathVertex vertex, con
         }
       }
     }
-    if (integrator.lamps && strategy != Strategy::brdf_only)
+    if (counts && integrator.lamps && strategy != Strategy::brdf_only)
       sum += throughput * light_from_lamps(integrator, vertex, samples, uint32_t(depth));
     const bool last = depth == integrator.bounces;
     if (last && strategy == Strategy::light_only) break;
@@ -182,12 +183,12 @@ Vec3 exit_radiance_estimate(const Integrator& integrator, PathVertex vertex, con
       leaves = last && !integrator.lamps ? !integrator.intersector.occluded(vertex.position, d)
                                          : !integrator.intersector.nearest(vertex.position, d, hit);
     }
-    if (leaves && strategy != Strategy::light_only) {
+    if (counts && leaves && strategy != Strategy::light_only) {
       float weight = strategy == Strategy::combined ? mis_weight(next.pdf, environment_pdf(integrator.sampler, d))
                                                     : 1.0f;
       sum += throughput * radiance(*integrator.environment, d) * weight;
     }
-    if (integrator.lamps && !leaves && strategy != Strategy::light_only) {
+    if (counts && integrator.lamps && !leaves && strategy != Strategy::light_only) {
       const Vec3 radiance = emitted(*integrator.scene, hit, d);
       if (!black(radiance)) {
         const float weight = strategy == Strategy::combined

@@ -43,6 +43,7 @@ struct Integrator {
   Reflection reflection;
   bool lamps;  // the scene's own; light_only and combined alone know punctual ones
   EmitterSampler emitters;
+  bool direct = true;  // false: what reaches the first vertex straight from a light is left out
 };
 Result<Integrator> make_integrator(const Scene& scene, const Environment& env, int bounces,
                                    Strategy strategy = Strategy::combined, const Reflection& reflection = {},

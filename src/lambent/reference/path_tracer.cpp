@@ -48,7 +48,7 @@ Result<ReferenceImage> render(const Integrator& integrator, const Camera& camera
       PathVertex vertex;
       if (meets(integrator, rays.eye, d, true, samples, 0, hit, weight)) {
         ++covered;
-        if (integrator.lamps) value += emitted(*integrator.scene, hit, d);
+        if (integrator.lamps && integrator.direct) value += emitted(*integrator.scene, hit, d);
         if (make_vertex(integrator, hit, d, vertex)) value += exit_radiance_estimate(integrator, vertex, samples);
       } else if (options.background) {
         value = radiance_bilinear(*integrator.environment, d);
@@ -89,6 +89,7 @@ Result<ReferenceImage> path_trace(const Scene& scene, const Environment& env, co
   Result<reference::Integrator> integrator = reference::make_integrator(
       scene, env, options.bounces, reference::Strategy::combined, options.reflection, options.lamps);
   if (!integrator) return integrator.error();
+  integrator->direct = options.direct;
   return reference::render(*integrator, camera, options, progress);
 }
 

@@ -27,6 +27,7 @@ struct ReferenceOptions {
   uint32_t seed = 1;
   Reflection reflection;  // of the surfaces
   bool lamps = false;     // the scene's own give light too, and are seen
+  bool direct = true;     // false: light that has met two surfaces or more alone; lamps and direct light are left out
 };
 
 struct ReferenceImage {

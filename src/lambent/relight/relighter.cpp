@@ -80,6 +80,19 @@ struct OfFactors : Columns {
   }
 };
 
+struct OfSurfels : Columns {
+  const IndirectTransfer& store;
+  IndirectSolve solve;
+  OfSurfels(const IndirectTransfer& s, std::span<const Vec3> albedos)
+      : store(s), solve(make_indirect_solve(s, albedos)) {}
+  void set(std::span<const Vec3> columns) { ready = true, solve_indirect(store, solve, columns); }
+  Result<void> relight(const RelightFrame& frame, Relit& out) {
+    if (auto ok = at_rest(frame); !ok) return ok;
+    read_indirect(store, solve, out);
+    return {};
+  }
+};
+
 struct OfBlocks {
   const Visibility& store;
   RelighterOptions options;
@@ -121,7 +134,7 @@ Result<void> check_products(const Visibility& v, const RelighterOptions& o) {
   return {};
 }
 
-using AnyStore = std::variant<OfColumns<Transfer>, OfColumns<CpcaTransfer>, OfLobes, OfFactors, OfBlocks>;
+using AnyStore = std::variant<OfColumns<Transfer>, OfColumns<CpcaTransfer>, OfLobes, OfFactors, OfBlocks, OfSurfels>;
 
 struct Make {
   const Field& field;
@@ -130,6 +143,7 @@ struct Make {
   AnyStore operator()(const CpcaTransfer& t) const { return OfColumns<CpcaTransfer>(t); }
   AnyStore operator()(const ZonalTransfer& t) const { return OfLobes(t, options.direct_lobes); }
   AnyStore operator()(const FactoredTransfer& t) const { return OfFactors(t, *outgoing_of(field)); }
+  AnyStore operator()(const IndirectTransfer& t) const { return OfSurfels(t, options.albedos); }
   AnyStore operator()(const Visibility& v) const { return OfBlocks{v, std::move(options)}; }
 };
 
@@ -150,6 +164,11 @@ Result<Relighter> Relighter::make(const Field& field, RelighterOptions options) 
   if (!is_consistent(field)) return wrong("placement, store and rows of the field do not fit one another");
   if (const auto* v = std::get_if<Visibility>(&field.store))
     if (auto ok = check_products(*v, options); !ok) return ok.error();
+  if (const auto* t = std::get_if<IndirectTransfer>(&field.store)) {
+    if (auto ok = check_indirect(*t, "relighter"); !ok) return ok.error();
+    if (!options.albedos.empty() && options.albedos.size() != t->surfels.count())
+      return wrong("there is not an albedo for each surfel");
+  }
   return Relighter(std::make_unique<State>(State{field, std::visit(Make{field, options}, field.store)}));
 }
 
@@ -159,7 +178,8 @@ size_t Relighter::receivers() const { return receivers_of(state_->field.store); 
 int Relighter::rows() const { return rows_relit(state_->field.store); }
 
 Result<void> Relighter::set_light(std::span<const Vec3> columns) {
-  const size_t count = light().count();
+  const auto* surfels = std::get_if<IndirectTransfer>(&state_->field.store);
+  const size_t count = surfels ? surfels->surfels.count() : light().count();
   return std::visit(
       [&](auto& s) -> Result<void> {
         if constexpr (std::is_base_of_v<Columns, std::remove_reference_t<decltype(s)>>) {

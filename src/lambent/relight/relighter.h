@@ -1,6 +1,7 @@
 #pragma once
 // Relights a field, whatever its store: what a program embeds. One relighter a store lies behind it; nothing else needs
 // to know which.
+#include <lambent/relight/indirect.h>
 #include <lambent/relight/products.h>
 #include <lambent/relight/zonal.h>
 #include <lambent/transfer/field.h>
@@ -18,6 +19,8 @@ struct RelighterOptions {
   ProductReceivers receivers = {};
   Product product = Product::blocks;
   double haar_fraction = 0.01;
+  // Direct to indirect light: other albedos of the surfels than were baked, one each; empty: those.
+  std::vector<Vec3> albedos = {};
 };
 
 // What changes from frame to frame.
@@ -47,11 +50,12 @@ class Relighter {
   ~Relighter();
 
   const Field& field() const;
-  LightBasis light() const;  // the columns that set_light() takes; none of visibility in blocks
+  LightBasis light() const;  // the columns that set_light() takes; none of visibility in blocks, nor of surfels
   size_t receivers() const;
   int rows() const;  // of what relight() gives: what the field's Rows mean; of visibility one, exit radiance
 
-  // One coefficient of radiance a column, light().count() of them. Errors: another number; a store without columns.
+  // One coefficient of radiance a column, light().count() of them; of direct to indirect light instead one a surfel:
+  // exit radiance of a white surface there by direct light alone. Errors: another number; a store without columns.
   Result<void> set_light(std::span<const Vec3> columns);
   // For visibility in blocks. Errors: another store; a cube of another size than the visibility's.
   Result<void> set_light(const CubeLight& light);

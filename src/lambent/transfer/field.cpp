@@ -17,11 +17,12 @@ size_t most_receivers(const std::vector<uint32_t>& a, const std::vector<uint32_t
 }  // namespace
 
 LightBasis light_of(const Store& store) {
-  return std::visit(Overloaded{[](const Transfer& t) { return t.light; }, [](const CpcaTransfer& t) { return t.light; },
-                               [](const ZonalTransfer& t) { return LightBasis{.order = t.order}; },
-                               [](const FactoredTransfer& t) { return LightBasis{.order = t.light_order()}; },
-                               [](const Visibility&) { return LightBasis{}; }},
-                    store);
+  return std::visit(
+      Overloaded{[](const Transfer& t) { return t.light; }, [](const CpcaTransfer& t) { return t.light; },
+                 [](const ZonalTransfer& t) { return LightBasis{.order = t.order}; },
+                 [](const FactoredTransfer& t) { return LightBasis{.order = t.light_order()}; },
+                 [](const Visibility&) { return LightBasis{}; }, [](const IndirectTransfer&) { return LightBasis{}; }},
+      store);
 }
 
 size_t receivers_of(const Store& store) {
@@ -55,7 +56,8 @@ int channels_of(const Store& store) {
 }
 
 const char* name_of(const Store& store) {
-  static constexpr const char* names[] = {"dense", "clusters", "lobes", "factors", "blocks"};
+  static constexpr const char* names[] = {"dense", "clusters", "lobes", "factors", "blocks", "surfels"};
+  static_assert(std::size(names) == std::variant_size_v<Store>);
   return names[store.index()];
 }
 

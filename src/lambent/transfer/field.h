@@ -2,12 +2,14 @@
 // The waist: everything that a bake makes and that relighting reads is a FIELD, along four axes, each a closed set:
 //   where    Placement   vertices, texels of an atlas, patches (triangles), a lattice in free space, pixels of a
 //   picture light    LightBasis  the columns of the store: harmonics, lobes, lamps by group (transfer.h) how      Store
-//   dense, clustered, zonal lobes, factored, visibility in blocks meaning  Rows        what the rows of T . light are
+//   dense, clustered, zonal lobes, factored, visibility in blocks, direct to indirect light over surfels meaning  Rows
+//   what the rows of T . light are
 // A stage that treats stores, placements or rows differently visits them, so that a new kind does not compile until
 // each stage has said what becomes of it.
 #include <lambent/core/camera.h>
 #include <lambent/transfer/cpca_transfer.h>
 #include <lambent/transfer/directional.h>
+#include <lambent/transfer/indirect.h>
 #include <lambent/transfer/lattice.h>
 #include <lambent/transfer/outgoing.h>
 #include <lambent/transfer/transfer.h>
@@ -60,16 +62,18 @@ struct FactoredTransfer {
   int incident_order = 0;
   int light_order() const { return visibility.light.order - incident_order + 1; }
 };
-using Store = std::variant<Transfer, CpcaTransfer, ZonalTransfer, FactoredTransfer, Visibility>;
+using Store = std::variant<Transfer, CpcaTransfer, ZonalTransfer, FactoredTransfer, Visibility, IndirectTransfer>;
 
 // Of any store.
-LightBasis light_of(const Store& store);  // the columns; none of visibility, which takes all of any environment
+// The columns; none of visibility, which takes all of any environment, and of direct to indirect light, which takes
+// direct light at its surfels.
+LightBasis light_of(const Store& store);
 size_t receivers_of(const Store& store);
 size_t bytes_of(const Store& store);
 int rows_of(const Store& store);     // that are stored; 0 of visibility
 int rows_relit(const Store& store);  // that relighting makes of those; of visibility 1
 int channels_of(const Store& store);
-const char* name_of(const Store& store);  // "dense", "clusters", "lobes", "factors", "blocks"
+const char* name_of(const Store& store);  // "dense", "clusters", "lobes", "factors", "blocks", "surfels"
 
 // MEANING of the rows of T . light.
 struct DiffuseRows {};  // one: exit radiance of a white surface

@@ -1,0 +1,268 @@
+#include <lambent/bake/indirect.h>
+
+#include <lambent/bake/directions.h>
+#include <lambent/core/half.h>
+#include <lambent/core/parallel.h>
+#include <lambent/core/random.h>
+
+#include <algorithm>
+#include <atomic>
+#include <chrono>
+#include <cmath>
+
+namespace lambent {
+namespace {
+
+using Clock = std::chrono::steady_clock;
+double seconds_since(Clock::time_point start) { return std::chrono::duration<double>(Clock::now() - start).count(); }
+
+constexpr size_t rows_a_piece = 16;
+constexpr int test_lamps = 4, direction_sets = 8;
+
+// A row as it is gathered: what leaves it met, and the nodes they are taken for.
+struct Met {
+  uint32_t node, leaf;
+  float weight;
+};
+struct Row {
+  std::vector<uint32_t> nodes;
+  std::vector<uint8_t> weights;
+  float scale = 0;
+  size_t strays = 0;
+  std::array<double, test_lamps> right{};  // light of test lamps, as gathered
+};
+
+struct Gathering {
+  const Scene& scene;
+  const Tracer& tracer;
+  const Surfels& surfels;
+  const SurfelSearch& search;
+  const IndirectOptions& options;
+  const DirectionSets& sets;
+  const std::vector<std::array<float, test_lamps>>& test;  // direct light of leaves
+  float diagonal;
+  std::vector<std::atomic<uint32_t>>& hits;  // of leaves, by all rows
+
+  // The node that a leaf is taken for at a distance.
+  uint32_t node_at(uint32_t leaf, float distance) const {
+    size_t level = surfels.levels() - 1;
+    for (; level > 0 && surfels.spacings[level - 1] <= options.angle * distance; --level)
+      leaf = surfels.parents[surfels.first_parent(level) + leaf];
+    return uint32_t(surfels.first_node(level)) + leaf;
+  }
+  void meet(uint32_t surfel, std::vector<Met>& met, Row& row) const;
+  void compress(std::vector<Met>& met, Row& row) const;
+};
+
+void Gathering::meet(uint32_t surfel, std::vector<Met>& met, Row& row) const {
+  const Vec3 n = surfels.normals[surfel];
+  const Vec3 origin = surfels.positions[surfel] +
+                      n * receiver_lift(surfels.positions[surfel], surfels.spacings.back(), diagonal);
+  const DirectionChoice choice = choose_directions(sets, n, options.seed, surfel);
+  const size_t at = size_t(choice.set) * sets.stride;
+  met.clear();
+  for (size_t i = 0; i < size_t(sets.samples); ++i) {
+    const Vec3 d = choice.rotation * Vec3(sets.x[at + i], sets.y[at + i], sets.z[at + i]);
+    Passage passage;
+    const Hit hit = tracer.lets_pass() ? tracer.closest(origin, d, passage) : tracer.closest(origin, d);
+    if (hit.triangle == none || (!hit.front && !scene.triangles[hit.triangle].two_sided)) continue;
+    const uint32_t leaf = search.leaf(surface_place(scene, hit));
+    if (leaf == none) {
+      ++row.strays;
+      continue;
+    }
+    hits[leaf].fetch_add(1, std::memory_order_relaxed);
+    const float weight = tracer.lets_pass() ? (passage.hit.x + passage.hit.y + passage.hit.z) / 3 : 1.0f;
+    met.push_back({node_at(leaf, hit.distance), leaf, weight / float(sets.samples)});
+  }
+}
+
+// Merges by node, leaves the smallest out, rounds to bytes.
+void Gathering::compress(std::vector<Met>& met, Row& row) const {
+  for (const Met& m : met)
+    for (size_t k = 0; k < test_lamps; ++k) row.right[k] += double(m.weight) * double(test[m.leaf][k]);
+  std::stable_sort(met.begin(), met.end(), [](const Met& a, const Met& b) { return a.node < b.node; });
+  std::vector<std::pair<float, uint32_t>> entries;
+  double sum = 0;
+  for (size_t i = 0; i < met.size(); ++i) {
+    if (entries.empty() || entries.back().second != met[i].node) entries.emplace_back(0.0f, met[i].node);
+    entries.back().first += met[i].weight, sum += double(met[i].weight);
+  }
+  std::sort(entries.begin(), entries.end());
+  double dropped = 0;
+  size_t first = 0;
+  while (first < entries.size() && dropped + double(entries[first].first) <= double(options.dropped) * sum)
+    dropped += double(entries[first++].first);
+  entries.erase(entries.begin(), entries.begin() + ptrdiff_t(first));
+  if (entries.empty()) return;
+  const float most = entries.back().first;
+  std::sort(entries.begin(), entries.end(), [](const auto& a, const auto& b) { return a.second < b.second; });
+  size_t total = 0;
+  for (const auto& [weight, node] : entries) {
+    const int root = int(std::lround(std::sqrt(weight / most) * 255));
+    if (root < 1) continue;
+    row.nodes.push_back(node), row.weights.push_back(uint8_t(root)), total += size_t(root * root);
+  }
+  row.scale = float(std::min(sum, 1.0) / double(total));
+}
+
+// Direct light at leaves of lamps that stand somewhere in the scene, each in units of its own mean.
+std::vector<std::array<float, test_lamps>> test_light(const Surfels& s, const Tracer& tracer, float diagonal,
+                                                      uint32_t seed) {
+  std::vector<std::array<float, test_lamps>> out(s.count());
+  for (size_t k = 0; k < test_lamps; ++k) {
+    Random random(seed, 0x7e57 + k);
+    const size_t under = random.next64() % s.count();
+    const Vec3 from = s.positions[under] + s.normals[under] * receiver_lift(s.positions[under], 0, diagonal);
+    const Hit ceiling = tracer.closest(from, s.normals[under]);
+    const float height = ceiling.triangle == none ? 0.1f * diagonal : 0.5f * ceiling.distance;
+    const Vec3 lamp = from + s.normals[under] * height;
+    parallel_for(s.count(), 256, [&](size_t begin, size_t end) {
+      for (size_t i = begin; i < end; ++i) {
+        const Vec3 p = s.positions[i] + s.normals[i] * receiver_lift(s.positions[i], 0, diagonal), way = lamp - p;
+        const float far = std::max(length(way), 1e-6f * diagonal), cosine = dot(way, s.normals[i]) / far;
+        const bool lit = cosine > 0 && tracer.closest(p, way / far, 0, far).triangle == none;
+        out[i][k] = lit ? cosine * height * height / (far * far + 0.01f * height * height) : 0.0f;
+      }
+    });
+  }
+  return out;
+}
+
+// Means over the tree, of what leaves have.
+std::vector<std::array<float, test_lamps>> at_nodes(const Surfels& s,
+                                                    const std::vector<std::array<float, test_lamps>>& leaves) {
+  std::vector<std::array<float, test_lamps>> nodes(s.nodes());
+  std::vector<float> areas(s.nodes(), 0.0f);
+  const size_t last = s.levels() - 1;
+  std::copy(leaves.begin(), leaves.end(), nodes.begin() + ptrdiff_t(s.first_node(last)));
+  std::copy(s.areas.begin(), s.areas.end(), areas.begin() + ptrdiff_t(s.first_node(last)));
+  for (size_t l = last; l > 0; --l) {
+    const size_t below = s.first_node(l), above = s.first_node(l - 1);
+    for (size_t i = 0; i < s.counts[l]; ++i) {
+      const size_t p = above + s.parents[s.first_parent(l) + i];
+      areas[p] += areas[below + i];
+      for (size_t k = 0; k < test_lamps; ++k) nodes[p][k] += areas[below + i] * nodes[below + i][k];
+    }
+    for (size_t i = above; i < above + s.counts[l - 1]; ++i)
+      for (float& v : nodes[i]) v /= areas[i];
+  }
+  return nodes;
+}
+
+// What a leaf weighs in the means of the tree: how often it was met, so that what is hidden from all rows, under a
+// plate or in a gap, does not darken what is seen beside it. All rows together then gather what was met, exactly.
+void weigh_leaves(Surfels& s, const std::vector<std::atomic<uint32_t>>& hits) {
+  double all = 0, area = 0;
+  for (const auto& h : hits) all += h;
+  for (float a : s.areas) area += double(a);
+  constexpr double unseen = 1e-3;  // of its area's share, where it is never met
+  for (size_t i = 0; i < s.count(); ++i)
+    s.areas[i] = float((double(hits[i]) + unseen * all * double(s.areas[i]) / area) / std::max(all, 1.0) + 1e-12);
+}
+
+// Of e = G d as stored, over test lamps.
+double compression_error(const IndirectTransfer& t, const std::vector<Row>& rows,
+                         const std::vector<std::array<float, test_lamps>>& node) {
+  double wrong = 0, right = 0;
+  for (size_t r = 0; r < rows.size(); ++r)
+    for (size_t k = 0; k < test_lamps; ++k) {
+      double sum = 0;
+      for (size_t e = t.first[r]; e < t.first[r + 1]; ++e) sum += share(t.weights[e]) * double(node[t.nodes[e]][k]);
+      const double difference = sum * double(t.scales[r]) - rows[r].right[k];
+      wrong += difference * difference, right += rows[r].right[k] * rows[r].right[k];
+    }
+  return right > 0 ? std::sqrt(wrong / right) : 0;
+}
+
+Result<void> gather_rows(IndirectTransfer& t, const Gathering& g, IndirectReport& report, Progress* progress) {
+  const size_t count = t.gathering();
+  std::vector<Row> rows(count);
+  ProgressStage stage(progress, "gathering", count);
+  parallel_for(count, rows_a_piece, [&](size_t begin, size_t end) {
+    std::vector<Met> met;
+    for (size_t r = begin; r < end && !stage.cancelled(); ++r)
+      g.meet(uint32_t(r), met, rows[r]), g.compress(met, rows[r]), stage.advance();
+  });
+  if (stage.cancelled()) return Error{"", "cancelled"};
+  t.first.assign(1, 0);
+  for (const Row& row : rows) {
+    t.nodes.insert(t.nodes.end(), row.nodes.begin(), row.nodes.end());
+    t.weights.insert(t.weights.end(), row.weights.begin(), row.weights.end());
+    t.scales.push_back(row.scale), t.first.push_back(uint32_t(t.nodes.size()));
+    report.strays += row.strays;
+  }
+  weigh_leaves(t.surfels, g.hits);
+  t.error = compression_error(t, rows, at_nodes(t.surfels, g.test));
+  report.rays = count * size_t(g.sets.samples);
+  return {};
+}
+
+// Receivers that see no surfel, inside something, read what a neighbour along the mesh reads, layer by layer.
+size_t fill_readers(IndirectTransfer& t, const Scene& scene, const SpatialBasis& basis) {
+  std::vector<uint8_t> unread(t.receivers);
+  for (size_t r = 0; r < t.receivers; ++r) unread[r] = t.reader_weights[r * kernel_slots] == 0;
+  const auto pairs = neighbours_of(scene, basis, unread);
+  size_t left = size_t(std::count(unread.begin(), unread.end(), uint8_t(1)));
+  for (std::vector<std::pair<uint32_t, uint32_t>> step{{}}; !step.empty();) {
+    step.clear();
+    for (const auto& [r, neighbour] : pairs)
+      if (unread[r] && !unread[neighbour] && (step.empty() || step.back().first != r)) step.emplace_back(r, neighbour);
+    for (const auto& [r, neighbour] : step) {
+      const size_t to = r * kernel_slots, from = neighbour * kernel_slots;
+      std::copy_n(t.reader_surfels.begin() + ptrdiff_t(from), kernel_slots, t.reader_surfels.begin() + ptrdiff_t(to));
+      std::copy_n(t.reader_weights.begin() + ptrdiff_t(from), kernel_slots, t.reader_weights.begin() + ptrdiff_t(to));
+      unread[r] = 0, --left;
+    }
+  }
+  return left;
+}
+
+void set_readers(IndirectTransfer& t, const Scene& scene, const SurfelSearch& search, const Receivers& receivers,
+                 IndirectReport& report) {
+  t.receivers = receivers.count();
+  t.reader_surfels.assign(t.receivers * kernel_slots, 0), t.reader_weights.assign(t.receivers * kernel_slots, 0);
+  parallel_for(t.receivers, 64, [&](size_t begin, size_t end) {
+    for (size_t r = begin; r < end; ++r) {
+      const Kernels k = search.kernels({receivers.origins[r], receivers.normals[r]});
+      for (size_t i = 0; i < k.count; ++i) {
+        t.reader_surfels[r * kernel_slots + i] = k.surfel[i];
+        t.reader_weights[r * kernel_slots + i] = float_to_half(k.weight[i]);
+      }
+    }
+  });
+  for (size_t r = 0; r < t.receivers; ++r) report.buried += t.reader_weights[r * kernel_slots] == 0;
+  report.unread = fill_readers(t, scene, receivers.basis);
+}
+
+}  // namespace
+
+Result<IndirectTransfer> bake_indirect(const Scene& scene, const Tracer& tracer, const Receivers& receivers,
+                                       const IndirectOptions& options, IndirectReport* report, Progress* progress) {
+  IndirectReport unasked;
+  IndirectReport& told = report ? *report : unasked;
+  told = {};
+  auto start = Clock::now();
+  auto surfels = make_surfels(scene, tracer, {options.surfels, options.seed}, progress);
+  if (!surfels) return surfels.error();
+  IndirectTransfer t;
+  t.surfels = std::move(*surfels);
+  for (const Material& m : scene.materials) t.surfels.names.push_back(m.name);
+  for (Vec3& a : t.surfels.albedos) a = each(a, [](float x) { return half_to_float(float_to_half(x)); });  // as kept
+  t.gather_level = uint32_t(t.surfels.levels() > 1 ? t.surfels.levels() - 2 : 0);
+  const SurfelSearch search(t.surfels, tracer, t.gather_level);
+  told.surfel_seconds = seconds_since(start), start = Clock::now();
+  const float diagonal = bounds(scene).diagonal();
+  const DirectionSets sets =
+      make_direction_sets(1, options.samples, direction_sets, options.seed, square_to_cosine_hemisphere, progress);
+  const auto test = test_light(t.surfels, tracer, diagonal, options.seed);
+  std::vector<std::atomic<uint32_t>> hits(t.surfels.count());
+  const Gathering g{scene, tracer, t.surfels, search, options, sets, test, diagonal, hits};
+  if (auto ok = gather_rows(t, g, told, progress); !ok) return ok.error();
+  told.trace_seconds = seconds_since(start), start = Clock::now();
+  set_readers(t, scene, search, receivers, told);
+  told.reader_seconds = seconds_since(start);
+  return t;
+}
+
+}  // namespace lambent

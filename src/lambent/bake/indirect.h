@@ -1,0 +1,31 @@
+#pragma once
+// Bakes direct-to-indirect transport (transfer/indirect.h): gathering surfels send their rays once, and what they meet
+// is looked up in the tree of surfels, near things finely and far ones coarsely.
+#include <lambent/bake/surfels.h>
+#include <lambent/receivers/receivers.h>
+
+namespace lambent {
+
+struct IndirectOptions {
+  size_t surfels = 16384;  // leaves, about
+  int samples = 1024;      // rays a gathering surfel
+  float angle = 0.2f;      // a node's spacing over its distance, at most
+  float dropped = 0.01f;   // of a row's sum: its smallest entries are left out, and the others make up for them
+  uint32_t seed = 1;
+};
+
+struct IndirectReport {
+  size_t rays = 0;
+  size_t strays = 0;  // hits for which no surfel stood; they count as black
+  size_t buried = 0;  // receivers that see no surfel near them, and read what neighbours read
+  size_t unread = 0;  // those without such a neighbour, black
+  double surfel_seconds = 0, trace_seconds = 0, reader_seconds = 0;
+};
+
+// Receivers read gathering surfels by kernels. Coloured glass is taken for grey. Errors: those of make_surfels();
+// cancelled.
+Result<IndirectTransfer> bake_indirect(const Scene& scene, const Tracer& tracer, const Receivers& receivers,
+                                       const IndirectOptions& options, IndirectReport* report = nullptr,
+                                       Progress* progress = nullptr);
+
+}  // namespace lambent

@@ -1,0 +1,214 @@
+#include <lambent/pipeline/moving_lamps.h>
+
+#include <lambent/core/random.h>
+#include <lambent/core/sampling.h>
+#include <lambent/pipeline/parse.h>
+#include <lambent/scene/append.h>
+#include <lambent/scene/procedural.h>
+
+#include <algorithm>
+#include <array>
+#include <charconv>
+#include <cmath>
+#include <numbers>
+
+namespace lambent {
+namespace {
+
+constexpr const char* lamp_kinds[] = {"sphere", "point", "spot", "sun"};
+constexpr size_t numbers_of[] = {4, 3, 7, 2};
+constexpr const char* lamp_syntax =
+    "expects sphere@X,Y,Z,RADIUS=R,G,B, point@X,Y,Z=R,G,B, spot@X,Y,Z,TX,TY,TZ,ANGLE=R,G,B or "
+    "sun@AZIMUTH,ELEVATION=R,G,B";
+constexpr float farthest = 1e9f;
+
+Error wrong(const char* option, const std::string& message) { return {option, message, true}; }
+
+// Doubles, so that a place far from the origin is moved before it is rounded.
+Result<std::vector<double>> read_numbers(const std::string& text, size_t count, const char* option) {
+  std::vector<double> values;
+  const char *at = text.data(), *end = at + text.size();
+  while (at < end) {
+    double value = 0;
+    const auto [next, status] = std::from_chars(at, end, value);
+    if (status != std::errc() || !(std::abs(value) <= double(farthest))) break;
+    values.push_back(value), at = next;
+    if (at == end || *at != ',') break;
+    ++at;
+  }
+  if (at != end || values.size() != count)
+    return wrong(option,
+                 "expects " + std::to_string(count) + " numbers within 1e9, separated by commas, not \"" + text + "\"");
+  return values;
+}
+
+Vec3 place_at(const std::vector<double>& n, size_t first, Vec3d origin) {
+  return Vec3(Vec3d(n[first], n[first + 1], n[first + 2]) - origin);
+}
+
+}  // namespace
+
+bool names_moving_lamp(const std::string& text) {
+  return std::any_of(std::begin(lamp_kinds), std::end(lamp_kinds),
+                     [&](const char* kind) { return text.starts_with(std::string(kind) + "@"); });
+}
+
+Result<MovingLamp> parse_moving_lamp(const std::string& text, Vec3d origin) {
+  const size_t at = text.find('@'), equals = text.rfind('=');
+  const auto kind = std::find(std::begin(lamp_kinds), std::end(lamp_kinds), text.substr(0, at));
+  if (at == std::string::npos || equals == std::string::npos || equals < at || kind == std::end(lamp_kinds))
+    return wrong("--lamp", std::string(lamp_syntax) + ", not \"" + text + "\"");
+  MovingLamp lamp;
+  lamp.kind = MovingLamp::Kind(kind - std::begin(lamp_kinds));
+  auto n = read_numbers(text.substr(at + 1, equals - at - 1), numbers_of[int(lamp.kind)], "--lamp");
+  if (!n) return n.error();
+  auto color = parse_named_color(text, "--lamp");
+  if (!color) return color.error();
+  if (!(largest(color->color) <= 1e12f)) return wrong("--lamp", "a colour may be 1e12 at most");
+  lamp.light.intensity = color->color;
+  if (lamp.kind == MovingLamp::Kind::sun) {
+    if (std::abs((*n)[1]) > 90) return wrong("--lamp", "a sun's elevation lies from -90 to 90 degrees");
+    const double azimuth = (*n)[0] * std::numbers::pi / 180, elevation = (*n)[1] * std::numbers::pi / 180;
+    lamp.light.kind = PunctualLight::Kind::directional;
+    lamp.light.direction = -Vec3(float(std::cos(elevation) * std::cos(azimuth)), float(std::sin(elevation)),
+                                 float(std::cos(elevation) * std::sin(azimuth)));
+    return lamp;
+  }
+  lamp.light.position = lamp.centre = place_at(*n, 0, origin);
+  if (lamp.kind == MovingLamp::Kind::sphere) {
+    lamp.radius = float((*n)[3]), lamp.radiance = color->color;
+    if (!(lamp.radius > 0)) return wrong("--lamp", "a sphere's radius must be above 0: point@ has none");
+  }
+  if (lamp.kind == MovingLamp::Kind::spot) {
+    const Vec3 way = place_at(*n, 3, origin) - lamp.light.position;
+    const float angle = radians(float((*n)[6]));
+    if (!(dot(way, way) > 0)) return wrong("--lamp", "a spot's target is where it stands");
+    if (!(angle > 0 && angle <= pi / 2)) return wrong("--lamp", "a spot's angle lies above 0 and up to 90 degrees");
+    lamp.light.kind = PunctualLight::Kind::spot, lamp.light.direction = normalize(way);
+    lamp.light.outer_cone = angle, lamp.light.inner_cone = angle / 2;
+  }
+  return lamp;
+}
+
+Result<std::vector<MovingLamp>> parse_moving_lamps(const std::vector<std::string>& texts, Vec3d origin) {
+  std::vector<MovingLamp> lamps;
+  for (const std::string& text : texts) {
+    auto lamp = parse_moving_lamp(text, origin);
+    if (!lamp) return lamp.error();
+    lamps.push_back(*lamp);
+  }
+  return lamps;
+}
+
+Result<LampPath> parse_lamp_path(const std::string& text, const std::vector<MovingLamp>& lamps, Vec3d origin) {
+  const std::string expected = "expects N@T:X,Y,Z;T:X,Y,Z;..., with N the number of a --lamp and times that rise";
+  const size_t at = text.find('@');
+  LampPath path;
+  const char* end = text.data() + std::min(at, text.size());
+  const auto [stop, status] = std::from_chars(text.data(), end, path.lamp);
+  if (at == std::string::npos || status != std::errc() || stop != end)
+    return wrong("--move", expected + ", not \"" + text + "\"");
+  if (path.lamp < 1 || path.lamp > lamps.size())
+    return wrong("--move", "there is no lamp " + std::to_string(path.lamp) + " but " + std::to_string(lamps.size()));
+  if (lamps[--path.lamp].kind == MovingLamp::Kind::sun) return wrong("--move", "a sun has no place to be moved");
+  for (size_t from = at + 1; from <= text.size();) {
+    const size_t until = std::min(text.find(';', from), text.size());
+    const std::string key = text.substr(from, until - from);
+    const size_t colon = key.find(':');
+    if (colon == std::string::npos) return wrong("--move", expected + ", not \"" + text + "\"");
+    auto time = read_numbers(key.substr(0, colon), 1, "--move");
+    if (!time) return time.error();
+    auto place = read_numbers(key.substr(colon + 1), 3, "--move");
+    if (!place) return place.error();
+    if (!path.places.empty() && !((*time)[0] > path.places.back().first)) return wrong("--move", expected);
+    path.places.emplace_back((*time)[0], place_at(*place, 0, origin));
+    from = until + 1;
+  }
+  return path;
+}
+
+void move_lamp(std::vector<MovingLamp>& lamps, const LampPath& path, double time) {
+  Vec3 at = path.places.front().second;
+  for (size_t k = 0; k < path.places.size(); ++k) {
+    const auto& [then, place] = path.places[k];
+    if (time < then) {
+      if (k > 0) {
+        const auto& [before, start] = path.places[k - 1];
+        at = start + float((time - before) / (then - before)) * (place - start);
+      }
+      break;
+    }
+    at = place;
+  }
+  lamps[path.lamp].centre = lamps[path.lamp].light.position = at;
+}
+
+namespace {
+
+float mean(Vec3 v) { return (v.x + v.y + v.z) / 3; }
+
+Vec3 reaching(const Tracer& tracer, Vec3 origin, Vec3 direction, float distance) {
+  if (tracer.lets_pass()) return tracer.transmittance(origin, direction, distance);
+  return Vec3(tracer.closest(origin, direction, 0, distance).triangle == none ? 1.0f : 0.0f);
+}
+
+// A sphere fills a cone of directions. Their solid angle is 2 pi (1 - cos), by the squared sine where that is small.
+Vec3 from_sphere(const Tracer& tracer, const MovingLamp& lamp, Vec3 origin, Vec3 normal, int samples, uint64_t key) {
+  const Vec3 way = lamp.centre - origin;
+  const float far = length(way);
+  if (!(far > lamp.radius)) return Vec3(0.0f);
+  const Vec3 axis = way / far;
+  const float sine = lamp.radius / far, sine2 = sine * sine, cosine = std::sqrt(std::max(1 - sine2, 0.0f));
+  const float depth = sine2 / (1 + cosine);  // 1 - cosine
+  if (dot(normal, axis) < -sine) return Vec3(0.0f);
+  const Mat3 frame = frame_about(axis);
+  Vec3 sum(0.0f);
+  for (int s = 0; s < samples; ++s) {
+    const Vec2 u = sobol_owen(uint32_t(s), uint32_t(key));
+    const float down = u.x * depth, turn = 2 * pi * u.y;
+    const float out = std::sqrt(std::max(down * (2 - down), 0.0f));
+    const Vec3 d = frame * Vec3(out * std::cos(turn), out * std::sin(turn), 1 - down);
+    const float facing = dot(normal, d);
+    if (facing <= 0) continue;
+    // Where the ray meets the sphere.
+    const float along = far * (1 - down), beside2 = far * far * out * out;
+    const float distance = along - std::sqrt(std::max(lamp.radius * lamp.radius - beside2, 0.0f));
+    sum += facing * reaching(tracer, origin, d, distance);
+  }
+  return lamp.radiance * sum * (2 * depth / float(samples));  // 2 pi depth, over pi
+}
+
+}  // namespace
+
+Vec3 direct_light(const Tracer& tracer, const std::vector<MovingLamp>& lamps, Vec3 origin, Vec3 normal, int samples,
+                  uint64_t key) {
+  Vec3 sum(0.0f);
+  for (size_t k = 0; k < lamps.size(); ++k) {
+    if (lamps[k].kind == MovingLamp::Kind::sphere) {
+      sum += from_sphere(tracer, lamps[k], origin, normal, samples, hash64(key, k));
+      continue;
+    }
+    const LampArrival a = arriving(lamps[k].light, origin);
+    const float facing = dot(normal, a.direction);
+    if (facing <= 0 || !(mean(a.irradiance) > 0) || !is_finite(a.irradiance)) continue;
+    sum += facing / pi * a.irradiance * reaching(tracer, origin, a.direction, a.distance);
+  }
+  return sum;
+}
+
+void add_lamps(Scene& scene, const std::vector<MovingLamp>& lamps) {
+  Scene spheres;
+  for (const MovingLamp& lamp : lamps) {
+    if (lamp.kind != MovingLamp::Kind::sphere) {
+      scene.lights.push_back(lamp.light);
+      continue;
+    }
+    const uint32_t material = add_material(spheres, "lamp", Vec3(0.0f));
+    spheres.materials[material].emissive = lamp.radiance;
+    // Corners lie on the sphere, faces within: at five levels their area is 0.1 % less.
+    add_sphere(spheres, material, "lamp", lamp.centre, lamp.radius, 5);
+  }
+  if (!spheres.triangles.empty()) append_scene(scene, spheres);
+}
+
+}  // namespace lambent

@@ -1,0 +1,49 @@
+#pragma once
+// Lamps that are not the scene's: named where a picture is made, moved from frame to frame, and direct light by them.
+#include <lambent/core/result.h>
+#include <lambent/scene/lights.h>
+#include <lambent/trace/tracer.h>
+
+#include <string>
+#include <utility>
+#include <vector>
+
+namespace lambent {
+
+struct MovingLamp {
+  enum class Kind { sphere, point, spot, sun } kind = Kind::point;
+  PunctualLight light;  // of all but spheres
+  Vec3 centre{0.0f};    // of spheres
+  float radius = 0;
+  Vec3 radiance{0.0f};
+};
+
+// Whether text begins as one of the four below, and is no group of the scene's own.
+bool names_moving_lamp(const std::string& text);
+
+// sphere@X,Y,Z,RADIUS=R,G,B (radiance), point@X,Y,Z=R,G,B (flux per steradian), spot@X,Y,Z,TX,TY,TZ,ANGLE=R,G,B (the
+// same, within ANGLE degrees of the way to the target T, full within half of that), sun@AZIMUTH,ELEVATION=R,G,B
+// (irradiance; degrees, azimuth from +X towards +Z as of skies). One number stands for three alike. Places are in the
+// file's space. Errors name --lamp.
+Result<MovingLamp> parse_moving_lamp(const std::string& text, Vec3d origin = Vec3d(0));
+Result<std::vector<MovingLamp>> parse_moving_lamps(const std::vector<std::string>& texts, Vec3d origin = Vec3d(0));
+
+// Where a lamp is when: N@T:X,Y,Z;T:X,Y,Z;..., lamp N (from 1) at rising times, straight from place to place, and
+// standing before the first and after the last. Spots keep their direction. Errors name --move.
+struct LampPath {
+  size_t lamp = 0;
+  std::vector<std::pair<double, Vec3>> places;
+};
+Result<LampPath> parse_lamp_path(const std::string& text, const std::vector<MovingLamp>& lamps,
+                                 Vec3d origin = Vec3d(0));
+void move_lamp(std::vector<MovingLamp>& lamps, const LampPath& path, double time);
+
+// Exit radiance of a white surface at `origin`, which is clear of it, by direct light of the lamps. Spheres are sampled
+// by solid angle, `samples` times each, by numbers keyed by `key`; a place within a sphere has no light of it.
+Vec3 direct_light(const Tracer& tracer, const std::vector<MovingLamp>& lamps, Vec3 origin, Vec3 normal, int samples,
+                  uint64_t key);
+
+// The same lamps as the scene's own: punctual lights, and spheres as surfaces that glow and reflect nothing.
+void add_lamps(Scene& scene, const std::vector<MovingLamp>& lamps);
+
+}  // namespace lambent

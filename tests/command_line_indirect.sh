@@ -1,0 +1,35 @@
+#!/usr/bin/env bash
+# Lamps that move on the command line.
+set -uo pipefail
+source "$(dirname "$0")/expect.sh"
+expect 0 'receivers' bake corner.obj --max-edge 0.2 --samples 64 -o corner.glb
+
+# Lamps that move, over direct-to-indirect transport.
+seen="--camera 3,2,4,1,0.5,1,40 --size 24x18 --spp 2"
+expect 0 'surfels' bake corner.obj --transfer indirect --surfels 512 --samples 64 -o indirect.glb
+expect 0 '"kind": "indirect"' inspect indirect.glb --json
+expect 0 'direct to indirect light' inspect indirect.glb
+expect 0 'shadow rays' render indirect.glb $seen --lamp point@0.4,0.6,0.5=3 --lamp sun@20,50=1,0.9,0.7 \
+  --lamp sphere@0.7,0.5,0.6,0.05=9 --lamp spot@0.5,0.9,0.5,0.5,0,0.5,40=2 -o indirect.png
+expect 0 '"frames": 3' render indirect.glb $seen --lamp point@0.4,0.6,0.5=3 \
+  --move '1@0:0.2,0.5,0.5;1:0.8,0.5,0.5' --frames 0:1:0.5 --json -o moved.png
+expect 0 'lights no surface' render indirect.glb $seen --lamp point@0.4,0.6,0.5=0 -o dark.png
+expect 2 'lamp: is needed' render indirect.glb $seen -o x.png
+expect 2 'env: does not go with direct to indirect light' render indirect.glb $seen --env uniform:1 -o x.png
+expect 2 'lamp: expects sphere@' render indirect.glb $seen --lamp lamp=1 -o x.png
+expect 2 "radius must be above 0" render indirect.glb $seen --lamp sphere@0,1,0,0=1 -o x.png
+expect 2 'within 1e9' render indirect.glb $seen --lamp point@nan,0,0=1 -o x.png
+expect 2 'move: needs --frames' render indirect.glb $seen --lamp point@0,1,0=1 --move 1@0:0,0,0 -o x.png
+expect 2 'frames: needs --move' render indirect.glb $seen --lamp point@0,1,0=1 --frames 0:1 -o x.png
+expect 2 'albedo: the file has no material' render indirect.glb $seen --lamp point@0,1,0=1 --albedo none=1 \
+  -o x.png
+expect 2 'show: direct and indirect are of' render corner.glb --env uniform:1 --show indirect -o x.png
+expect 1 'which the web page does not draw' export indirect.glb --web site_indirect
+expect 2 'surfels: does not go with diffuse transfer' bake corner.obj --surfels 512 -o x.glb
+expect 2 'order: does not go with direct to indirect light' bake corner.obj --transfer indirect --order 3 -o x.glb
+expect 0 'paths a pixel' reference corner.obj --lamp point@0.4,0.6,0.5=3 --no-direct --spp 4 --size 16x16 \
+  -o moved_truth.exr
+expect 2 'lamp: expects sphere@' reference corner.obj --lamp point@0.4,0.6=3 --spp 4 --size 16x16 -o x.exr
+absent x.glb
+absent x.png
+finish
