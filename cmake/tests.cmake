@@ -46,12 +46,14 @@ if(NOT LAMBENT_SANITIZE)  # which has an allocator of its own
 endif()
 
 add_test(NAME include_arrows COMMAND ${CMAKE_CURRENT_SOURCE_DIR}/tests/include_arrows.sh ${CMAKE_CURRENT_SOURCE_DIR})
-foreach(name command_line command_line_stores command_line_lightmaps command_line_lobes command_line_indirect durable)
+set(command_tests command_line command_line_stores command_line_lightmaps command_line_lobes command_line_indirect
+  durable)
+foreach(name ${command_tests})
   add_test(NAME ${name} COMMAND ${CMAKE_CURRENT_SOURCE_DIR}/tests/${name}.sh $<TARGET_FILE:lambent-tool>)
   set_tests_properties(${name} PROPERTIES COST 1000)  # the longest: first, beside the others
 endforeach()
 if(LAMBENT_SANITIZE)
-  set_tests_properties(command_line command_line_stores command_line_lightmaps command_line_lobes command_line_indirect durable PROPERTIES
+  set_tests_properties(${command_tests} PROPERTIES
     ENVIRONMENT "LAMBENT_COARSE=1;LAMBENT_DURABLE_RAYS=128")
 endif()
 # A hundred moments of each kind: kill_and_resume.sh LAMBENT 100.
