@@ -39,6 +39,23 @@ function findMeshes(gltf: GLTF, parser: GLTFParser): Map<string, Mesh> {
   return meshes;
 }
 
+/** One after another. */
+function joined(pieces: readonly ArrayBuffer[]): ArrayBuffer {
+  const length = pieces.reduce((sum, piece) => sum + piece.byteLength, 0);
+  let bytes: Uint8Array<ArrayBuffer>;
+  try {
+    bytes = new Uint8Array(length);
+  } catch {
+    throw new LambentError(`holds ${length.toLocaleString('en')} bytes in one piece, which is more than a browser has`);
+  }
+  let at = 0;
+  for (const piece of pieces) {
+    bytes.set(new Uint8Array(piece), at);
+    at += piece.byteLength;
+  }
+  return bytes.buffer;
+}
+
 interface Document {
   extensions?: Record<string, unknown>;
   bufferViews?: unknown[];
@@ -67,9 +84,14 @@ export class LambentTransferPlugin implements GLTFLoaderPlugin {
     const meshes = findMeshes(gltf, this.parser);
     const source: TransferSource = {
       extension,
-      bufferView: async (index) => {
-        if (index >= (document.bufferViews?.length ?? 0)) throw new LambentError(`buffer view ${index} does not exist`);
-        return (await this.parser.getDependency('bufferView', index)) as ArrayBuffer;
+      bufferView: async (views) => {
+        const pieces: ArrayBuffer[] = [];
+        for (const index of typeof views === 'number' ? [views] : views) {
+          if (index >= (document.bufferViews?.length ?? 0))
+            throw new LambentError(`buffer view ${index} does not exist`);
+          pieces.push((await this.parser.getDependency('bufferView', index)) as ArrayBuffer);
+        }
+        return pieces.length === 1 ? pieces[0]! : joined(pieces);
       },
       mesh: ({ node, primitive }: TransferExtension['parts'][number]) => {
         const mesh = meshes.get(`${node} ${primitive}`);

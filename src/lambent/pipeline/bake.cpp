@@ -175,15 +175,15 @@ Result<void> bake_free_space(Bake& b, const Lattice& lattice) {
   return {};
 }
 
-// A baked file is a GLB: told before the work where it can be.
+// What a GLB cannot hold is told before the work.
 Result<void> check_picture_bytes(const Bake& b, const View& view) {
   const size_t columns = b.plan.bake.light().count();
   const size_t bytes = 3 * size_t(view.width) * size_t(view.height) * columns *
                        (b.plan.bake.precision == Precision::half ? 2 : 4);
-  if (bytes < size_t{1} << 32) return {};
+  if (bytes < size_t{1} << 32 || file_extension(b.request.output) != "glb") return {};
   return Error{"--size",
-               fmt::format("{} pixels of {} columns take {} bytes, and a baked file holds 4 GiB", b.request.size,
-                           columns, bytes),
+               fmt::format("{} pixels of {} columns take {} bytes, and a .glb holds 4 GiB: write a .gltf",
+                           b.request.size, columns, bytes),
                true};
 }
 
@@ -407,7 +407,8 @@ namespace {
 
 // The pictures, the rule of make and the baked file, whole or not at all; the names of the pictures.
 Result<std::vector<std::string>> write_outputs(const std::string& path, const BakeOutcome& outcome,
-                                               const BakeRequest* request, const DurableBake* durable) {
+                                               size_t bin_limit, const BakeRequest* request,
+                                               const DurableBake* durable) {
   const std::string stem = path.substr(0, path.find_last_of('.'));
   std::vector<std::string> written;
   FileSet set;
@@ -420,21 +421,22 @@ Result<std::vector<std::string>> write_outputs(const std::string& path, const Ba
     all.insert(all.begin(), path);
     if (auto ok = write_file_atomically(request->depfile, depfile_text(all, durable->inputs())); !ok) return ok.error();
   }
-  if (auto ok = save_baked(path, outcome.baked, outcome.look ? &*outcome.look : nullptr); !ok) return ok.error();
+  if (auto ok = save_baked(path, outcome.baked, outcome.look ? &*outcome.look : nullptr, bin_limit); !ok)
+    return ok.error();
   if (auto ok = set.commit(); !ok) return ok.error();
   return written;
 }
 
 }  // namespace
 
-Result<nlohmann::json> save_outcome(const std::string& path, const BakeOutcome& outcome) {
-  auto written = write_outputs(path, outcome, nullptr, nullptr);
+Result<nlohmann::json> save_outcome(const std::string& path, const BakeOutcome& outcome, size_t bin_limit) {
+  auto written = write_outputs(path, outcome, bin_limit, nullptr, nullptr);
   if (!written) return written.error();
   return nlohmann::json(*written);
 }
 
 Result<Summary> bake_to_file(const BakeRequest& asked, const Job& job) {
-  if (auto ok = check_output(asked.output, {"glb"}); !ok) return ok.error();
+  if (auto ok = check_output(asked.output, {"glb", "gltf"}); !ok) return ok.error();
   auto request = resolved(asked);
   if (!request) return request.error();
   DurableBake durable(*request, job);
@@ -442,8 +444,8 @@ Result<Summary> bake_to_file(const BakeRequest& asked, const Job& job) {
   if (!outcome) return durable.explained(outcome.error());
   const auto start = Clock::now();
   Summary& summary = outcome->summary;
-  auto pictures = write_outputs(request->output, *outcome, &*request, &durable);
-  if (!pictures) return pictures.error();
+  auto pictures = write_outputs(request->output, *outcome, request->bin_limit, &*request, &durable);
+  if (!pictures) return durable.explained(pictures.error());
   if (!pictures->empty()) summary.json["pictures"] = *pictures;
   durable.finish();
   summary.json["output"] = request->output, summary.json["seconds"]["save"] = seconds_since(start);

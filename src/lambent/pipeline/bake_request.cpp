@@ -20,7 +20,9 @@ constexpr KindMask every = D | M | F | Z | G | S | L | K, traced = D | M | F | Z
 
 const Option<R> table[] = {
     {"scene", &R::scene, "Files", every, "Scene: .gltf, .glb, .obj or .ply", 0, 0, nullptr, nullptr, true, true},
-    {"output", &R::output, "Files", every, "Baked file to write (.glb)", 0, 0, nullptr, nullptr, false},
+    {"output", &R::output, "Files", every, "Baked file to write: .glb, of up to 4 GiB, or .gltf with its data beside it, of any size", 0, 0, nullptr, nullptr, false},
+    {"bin-limit", &R::bin_limit, "Files", every,
+     "Bytes of each .bin of a .gltf, at most; e.g. 256MB, 2GiB (1GiB)", 65536, 1e18, nullptr, nullptr, false},
     {"checkpoint", &R::checkpoint, "Files", traced | K,
      "Folder to keep the work in as it comes, from which the same command goes on after an interrupt or a crash; off: "
      "nowhere (OUTPUT.checkpoint, of work of over a minute)",
@@ -212,6 +214,8 @@ Result<void> check_conflicts(const BakeRequest& r) {
 bool has_no_quality(const BakeRequest& r) { return r.samples > 0 && r.adapt != "on"; }
 
 Result<void> check_kind(const BakeRequest& r, BakeKind kind) {
+  if (r.given.contains("bin_limit") && file_extension(r.output) != "gltf")
+    return Error{"--bin-limit", "is of the files beside a .gltf: leave it out, or write one", true};
   if (kind != BakeKind::diffuse && kind != BakeKind::lightmap && r.receivers != "vertices")
     return Error{"--receivers", std::string(bake_kind_names[int(kind)]) + " are received at vertices", true};
   if (!r.lattice.empty() && r.receivers != "vertices")

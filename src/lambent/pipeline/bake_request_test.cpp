@@ -115,6 +115,7 @@ struct Change {
   nlohmann::json value, with = nlohmann::json::object();
 };
 const std::map<std::string, Change> changes{
+    {"bin_limit", {size_t{1} << 20, {{"output", "out.gltf"}}}},
     {"checkpoint", {"off"}},
     {"depfile", {"out.d"}},
     {"order", {2}},

@@ -118,6 +118,12 @@ Result<void> DurableBake::begin(const std::vector<std::string>& pictures) {
   const std::string stem = request_.output.substr(0, request_.output.find_last_of('.'));
   std::vector<std::string> outputs{request_.output, request_.depfile};
   for (const std::string& picture : pictures) outputs.push_back(stem + picture);
+  std::error_code status;
+  for (size_t i = 0; file_extension(request_.output) == "gltf"; ++i) {
+    const std::string bin = stem + "." + std::to_string(i) + ".bin";
+    if (!fs::exists(bin, status)) break;
+    outputs.push_back(bin);
+  }
   for (const std::string& output : outputs)
     if (auto ok = check_replaces_no_input(output); !ok) return ok;
   const std::string folder = checkpoint_folder(request_);
@@ -136,7 +142,6 @@ Result<void> DurableBake::begin(const std::vector<std::string>& pictures) {
     if (why.empty()) return {};
     return Error{folder, why + "; `lambent checkpoints " + folder + " --clean` removes it"};
   };
-  std::error_code status;
   const bool at_once = !request_.checkpoint.empty() || fs::exists(folder, status);
   options.after = at_once ? 0 : long_work;
   checkpoint_ = std::make_unique<Checkpoint>(std::move(options));
@@ -147,6 +152,8 @@ Result<void> DurableBake::begin(const std::vector<std::string>& pictures) {
 Error DurableBake::explained(Error error) const {
   if (error.message == "cancelled" && checkpoint_ && checkpoint_->began())
     error.message += "; the same command goes on from " + checkpoint_folder(request_);
+  else if (checkpoint_ && checkpoint_->began())
+    error.message += "; what was baked is kept: --checkpoint " + checkpoint_folder(request_) + " goes on with it";
   return error;
 }
 

@@ -17,6 +17,7 @@ struct BakeRequest {
   std::string scene, output;
   std::string checkpoint;  // a folder; "": beside the output, of long work; "off": none
   std::string depfile;
+  size_t bin_limit = size_t{1} << 30;  // bytes of each .bin of a .gltf
   std::string transfer = "diffuse";
   int order = 0;  // bands; 0: 6, or, of a lightmap, none
   std::string light;
