@@ -44,8 +44,9 @@ struct BakeReport {
   size_t rays = 0;                   // traced in all
   int samples = 0;                   // rays a receiver of the result
   size_t bytes = 0;                  // of the transfer
-  size_t operator_bytes = 0;         // of the hit rows kept
-  double operator_kept = 1;   // fraction of the hit rows kept in memory; the rest was traced again for each bounce
+  size_t operator_bytes = 0;         // of the hit rows kept in memory
+  size_t operator_file_bytes = 0;    // and of those beyond, in a file (Progress::scratch)
+  double operator_kept = 1;   // fraction of the hit rows kept; the rest was traced again for each bounce
   size_t working_memory = 0;  // bytes, what the stages below allocated at their peak
   double trace_seconds = 0, bounce_seconds = 0, denoise_seconds = 0, certify_seconds = 0;
   // Relative RMS error of the result. Of diffuse transfer the certificate's; of other kinds of the transfer vectors at

@@ -37,7 +37,7 @@ struct Lightmap {
 };
 
 struct LightmapReport {
-  size_t receivers = 0, buried = 0, rays = 0, operator_bytes = 0;
+  size_t receivers = 0, buried = 0, rays = 0, operator_bytes = 0, operator_file_bytes = 0;
   double operator_kept = 1, trace_seconds = 0, bounce_seconds = 0;
   SolveReport solve;  // empty where bounces are counted
   // Where half floats were asked for and single ones taken: the brightest value of all, or of the darkest group, which

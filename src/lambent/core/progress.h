@@ -28,6 +28,7 @@ class Progress {
   bool cancelled() const { return cancelled_.load(std::memory_order_relaxed); }
 
   Checkpoint* checkpoint = nullptr;  // where pieces of the work are kept (checkpoint.h); null: nowhere
+  std::string scratch;               // a folder for what memory has no room for; "": that is made again
 
  private:
   Report report_;

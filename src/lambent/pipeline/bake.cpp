@@ -289,6 +289,7 @@ void summarize(Bake& b) {
                          {"bytes", bytes},
                          {"bytes_per_receiver", each},
                          {"operator_bytes", r.operator_bytes},
+                         {"operator_file_bytes", r.operator_file_bytes},
                          {"operator_kept", r.operator_kept},
                          {"working_memory", r.working_memory},
                          {"error", r.error >= 0 ? nlohmann::json(r.error) : nlohmann::json()}});
@@ -315,6 +316,9 @@ void summarize(Bake& b) {
   if (r.operator_kept < 1)
     b.line("memory", fmt::format("{:.0f}% of the gather operator fitted; the rest was traced again for each bounce",
                                  100 * r.operator_kept));
+  if (r.operator_file_bytes > 0)
+    b.line("memory", fmt::format("{} of the gather operator did not fit, and went through a file",
+                                 human_bytes(double(r.operator_file_bytes))));
   summarize_error(b);
 }
 

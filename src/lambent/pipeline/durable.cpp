@@ -91,6 +91,9 @@ std::string checkpoint_folder(const BakeRequest& request) {
 DurableBake::DurableBake(const BakeRequest& request, const Job& job) : request_(request), given_(job), own_(job) {
   build_name();  // before what is read counts as an input
   own_.progress = job.progress ? job.progress : &silent_;
+  own_.progress->scratch = request.scratch == none_wanted ? std::string()
+                         : request.scratch.empty()        ? folder_of(request.output)
+                                                          : request.scratch;
   own_.inputs_read = [this](const std::vector<std::string>& pictures) { return begin(pictures); };
   // Those that are read late are inputs from the start.
   for (const Option<BakeRequest>& o : bake_options()) {
@@ -104,7 +107,7 @@ DurableBake::DurableBake(const BakeRequest& request, const Job& job) : request_(
   }
 }
 
-DurableBake::~DurableBake() { own_.progress->checkpoint = nullptr; }
+DurableBake::~DurableBake() { own_.progress->checkpoint = nullptr, own_.progress->scratch.clear(); }
 
 std::vector<std::string> DurableBake::inputs() const {
   std::vector<std::string> out;
@@ -115,10 +118,12 @@ std::vector<std::string> DurableBake::inputs() const {
 }
 
 Result<void> DurableBake::begin(const std::vector<std::string>& pictures) {
+  std::error_code status;
+  if (!own_.progress->scratch.empty() && !fs::is_directory(own_.progress->scratch, status))
+    return Error{"--scratch", "is no folder: " + own_.progress->scratch, true};
   const std::string stem = request_.output.substr(0, request_.output.find_last_of('.'));
   std::vector<std::string> outputs{request_.output, request_.depfile};
   for (const std::string& picture : pictures) outputs.push_back(stem + picture);
-  std::error_code status;
   for (size_t i = 0; file_extension(request_.output) == "gltf"; ++i) {
     const std::string bin = stem + "." + std::to_string(i) + ".bin";
     if (!fs::exists(bin, status)) break;

@@ -17,6 +17,7 @@ struct BakeRequest {
   std::string scene, output;
   std::string checkpoint;  // a folder; "": beside the output, of long work; "off": none
   std::string depfile;
+  std::string scratch;                 // a folder; "": the output's; "off": none
   size_t bin_limit = size_t{1} << 30;  // bytes of each .bin of a .gltf
   std::string transfer = "diffuse";
   int order = 0;  // bands; 0: 6, or, of a lightmap, none
@@ -29,6 +30,8 @@ struct BakeRequest {
   bool ground = false;
   float max_edge = 0, max_albedo = 1;
   std::vector<std::string> emit, exclude;
+  std::string rooms;          // "": the scene as a whole
+  double rooms_error = 0.01;  // residual of the joined solution
   // Rays
   std::string quality = "good", error, denoise = "on", adapt = "auto";
   double time = -1;  // seconds; negative: no limit
