@@ -1,6 +1,6 @@
 // Time and memory a receiver from tens of thousands of receivers to millions, where the operator leaves the caches and
-// then the memory: the same courtyard at finer and finer tessellation, a process each. What raw closest hits of the same
-// rays grow by is divided out. LAMBENT_SCALE: details of the tessellation, LAMBENT_SCRATCH: a folder for rows that
+// then the memory: the same courtyard at finer and finer tessellation, a process each. What raw closest hits of the
+// same rays grow by is divided out. LAMBENT_SCALE: details of the tessellation, LAMBENT_SCRATCH: a folder for rows that
 // memory has no room for.
 #include "embree.h"
 
@@ -91,8 +91,8 @@ void bench_scale() {
   for (float detail; details >> detail;) {
     double receivers = 0;
     for (const bool small : {false, true}) {  // the operator in memory as far as 4 GiB go, and hardly any of it
-      const Measured m = measure_apart(detail, false, small ? size_t(receivers * 560) + (size_t{64} << 20)
-                                                            : size_t{4} << 30);
+      const Measured m =
+          measure_apart(detail, false, small ? size_t(receivers * 560) + (size_t{64} << 20) : size_t{4} << 30);
       if (m.receivers == 0) continue;
       receivers = m.receivers;
       if (first.receivers == 0) first = m;

@@ -46,6 +46,7 @@ endif()
 
 add_test(NAME include_arrows COMMAND ${CMAKE_CURRENT_SOURCE_DIR}/tests/include_arrows.sh ${CMAKE_CURRENT_SOURCE_DIR})
 add_test(NAME command_line COMMAND ${CMAKE_CURRENT_SOURCE_DIR}/tests/command_line.sh $<TARGET_FILE:lambent-tool>)
+add_test(NAME large COMMAND ${CMAKE_CURRENT_SOURCE_DIR}/tests/large.sh $<TARGET_FILE:lambent-tool>)
 add_test(NAME durable COMMAND ${CMAKE_CURRENT_SOURCE_DIR}/tests/durable.sh $<TARGET_FILE:lambent-tool>)
 if(LAMBENT_SANITIZE)
   set_tests_properties(durable PROPERTIES ENVIRONMENT LAMBENT_DURABLE_RAYS=128)

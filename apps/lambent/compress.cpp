@@ -76,9 +76,7 @@ Result<void> save_smaller(const CompressCommand& o, Baked& baked, Field smaller,
 struct Sizes {
   double before = 0, after = 0;
 };
-Sizes sizes_of(const CompressCommand& o, size_t before) {
-  return {double(before), double(bytes_on_disk(o.output))};
-}
+Sizes sizes_of(const CompressCommand& o, size_t before) { return {double(before), double(bytes_on_disk(o.output))}; }
 
 int compress_to_clusters(Context& context, const CompressCommand& o, Baked& baked, size_t size_before) {
   CpcaOptions options;

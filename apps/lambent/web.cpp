@@ -95,8 +95,7 @@ Result<std::string> add_baked(WebFiles& files, const std::string& path, const st
     return name;
   }
   if (auto ok = add_named_files(files, chunks->json, path, stem); !ok) return ok.error();
-  files[name] = {media_type("gltf"),
-                 chunks->json.dump(-1, ' ', false, nlohmann::json::error_handler_t::replace)};
+  files[name] = {media_type("gltf"), chunks->json.dump(-1, ' ', false, nlohmann::json::error_handler_t::replace)};
   return name;
 }
 
@@ -129,9 +128,8 @@ void WebOptions::add_to(CLI::App& command) {
 Result<WebFiles> web_files(const WebOptions& options) {
   auto display = parse_display(options.exposure, options.tone, {});
   if (!display) return display.error();
-  nlohmann::json manifest{{"name", fs::path(options.baked).filename().string()},
-                          {"exposure", display->exposure},
-                          {"tone", options.tone}};
+  nlohmann::json manifest{
+      {"name", fs::path(options.baked).filename().string()}, {"exposure", display->exposure}, {"tone", options.tone}};
   if (options.exposure == "auto") manifest["exposure"] = "auto";
   auto camera = parse_camera(options.camera);
   if (!camera) return camera.error();

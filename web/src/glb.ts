@@ -81,7 +81,7 @@ export function checkBakedFile(bytes: ArrayBuffer): unknown {
   const view = new DataView(bytes);
   if (bytes.byteLength < 4 || view.getUint32(0, true) !== 0x46546c67) {
     if (!/^\s*\{/.test(new TextDecoder().decode(new Uint8Array(bytes, 0, Math.min(64, bytes.byteLength)))))
-      throw new LambentError('is no glTF (.glb or .gltf)');
+      throw new LambentError('is not a glTF (.glb or .gltf)');
     const document = parse(new Uint8Array(bytes));
     transferExtension(document);
     return document;

@@ -2,6 +2,7 @@
 // Rows of a sparse matrix while rays meet their entries (gather.cpp, rooms.cpp).
 #include <lambent/bake/gather.h>
 #include <lambent/bake/kernels.h>
+#include <lambent/bake/shared_exponent.h>
 
 #include <algorithm>
 #include <bit>
@@ -9,9 +10,9 @@
 
 namespace lambent {
 
-// A block's entries as its rays meet them, merged by row and column. A table of the columns that the block has met finds
-// an entry without searching, and stays in cache however many receivers there are; what an earlier row or block left in
-// it is told by its number.
+// A block's entries as its rays meet them, merged by row and column. A table of the columns that the block has met
+// finds an entry without searching, and stays in cache however many receivers there are; what an earlier row or block
+// left in it is told by its number.
 class BlockBuilder {
  public:
   explicit BlockBuilder(size_t column_limit) : column_bits_(std::bit_width(column_limit)), places_(size_t{1} << 12) {}
@@ -61,7 +62,7 @@ class BlockBuilder {
         out.rows[at] = uint8_t(row);
         const Vec3 weight = entries_[i].weight * unit;
         if (channels == 1) floats_[at] = weight.x;
-        else floats_[3 * at] = weight.x, floats_[3 * at + 1] = weight.y, floats_[3 * at + 2] = weight.z;
+        else round_shared(&weight.x, &floats_[3 * at]);
       }
     out.weights.resize(floats_.size());
     floats_to_halves(floats_.data(), floats_.size(), out.weights.data());
@@ -108,7 +109,7 @@ class BlockBuilder {
     for (size_t shift = 32; shift < 32 + column_bits_; shift += digit) {
       uint32_t at[values] = {};
       for (uint64_t key : keys_) ++at[key >> shift & (values - 1)];
-      for (uint32_t sum = 0; uint32_t& a : at) {
+      for (uint32_t sum = 0; uint32_t & a : at) {
         const uint32_t count = a;
         a = sum, sum += count;
       }

@@ -1,5 +1,8 @@
 #include <lambent/bake/kept_rows.h>
 
+#include <lambent/bake/shared_exponent.h>
+#include <lambent/core/half.h>
+
 #include <fcntl.h>
 #include <sys/mman.h>
 #include <unistd.h>
@@ -18,6 +21,8 @@ constexpr uint8_t last_of_column = 0x80;
 struct PackedHeader {
   uint32_t rows = 0, columns = 0, entries = 0, steps = 0;  // steps: bytes of them
 };
+
+size_t weight_bytes(int channels) { return channels == 3 ? 4 : 2; }
 
 // A file without a name: it goes with the process, however that ends.
 int open_scratch(const std::string& folder) {
@@ -54,12 +59,14 @@ bool read_at(int fd, std::span<uint8_t> bytes, size_t at) {
 size_t most_bytes(size_t rays, size_t receivers, int channels) {
   const size_t entries = gather_block * std::min(3 * rays, receivers);
   // An entry, a column of its own at worst, and half as much again by the half-sample rows.
-  return 3 * entries / 2 * (6 + 2 * size_t(channels)) + 128;
+  return 3 * entries / 2 * (6 + weight_bytes(channels)) + 128;
 }
 
 void pack(const SparseBlock& block, std::vector<uint8_t>& out) {
   PackedHeader h{uint32_t(block.row_count), uint32_t(block.columns.size()), uint32_t(block.rows.size())};
-  out.resize(sizeof h + 5 * block.columns.size() + block.rows.size() + 2 * block.weights.size() + 1);
+  const int channels = block.weights.size() > block.rows.size() ? 3 : 1;
+  const size_t weights = block.rows.size() * weight_bytes(channels);
+  out.resize(sizeof h + 5 * block.columns.size() + block.rows.size() + weights + 1);
   uint8_t* at = out.data() + sizeof h;
   uint32_t last = 0;
   for (const uint32_t column : block.columns) {
@@ -72,8 +79,17 @@ void pack(const SparseBlock& block, std::vector<uint8_t>& out) {
   if (!block.rows.empty()) std::memcpy(at, block.rows.data(), block.rows.size());
   for (const uint32_t end : block.ends) at[end - 1] |= last_of_column;
   at += block.rows.size();
-  if (!block.weights.empty()) std::memcpy(at, block.weights.data(), 2 * block.weights.size());
-  at += 2 * block.weights.size();
+  if (channels == 1) {
+    if (weights) std::memcpy(at, block.weights.data(), weights);
+    at += weights;
+  } else {
+    for (size_t e = 0; e < block.rows.size(); ++e, at += 4) {
+      const uint16_t* w = block.weights.data() + 3 * e;
+      const float rgb[3] = {half_to_float(w[0]), half_to_float(w[1]), half_to_float(w[2])};
+      const uint32_t bits = pack_shared(rgb);
+      std::memcpy(at, &bits, sizeof bits);
+    }
+  }
   std::memcpy(out.data(), &h, sizeof h);
   out.resize(size_t(at - out.data()));
 }
@@ -84,7 +100,7 @@ bool unpack(std::span<const uint8_t> bytes, size_t receivers, int channels, Spar
   std::memcpy(&h, bytes.data(), sizeof h);
   const size_t weights = size_t(h.entries) * size_t(channels);
   if (h.rows > gather_block || h.columns > h.entries ||
-      bytes.size() != sizeof h + size_t(h.steps) + h.entries + 2 * weights)
+      bytes.size() != sizeof h + size_t(h.steps) + h.entries + h.entries * weight_bytes(channels))
     return false;
   out.row_count = h.rows;
   out.columns.resize(h.columns), out.ends.resize(h.columns), out.rows.resize(h.entries), out.weights.resize(weights);
@@ -114,7 +130,19 @@ bool unpack(std::span<const uint8_t> bytes, size_t receivers, int channels, Spar
     }
   }
   if (ends != h.columns || (h.columns ? out.ends.back() != h.entries : h.entries != 0)) return false;
-  if (weights) std::memcpy(out.weights.data(), at + h.entries, 2 * weights);
+  at += h.entries;
+  if (channels == 1) {
+    if (weights) std::memcpy(out.weights.data(), at, 2 * weights);
+    return true;
+  }
+  thread_local std::vector<float> floats;
+  floats.resize(weights);
+  for (size_t e = 0; e < h.entries; ++e) {
+    uint32_t bits;
+    std::memcpy(&bits, at + 4 * e, sizeof bits);
+    unpack_shared(bits, floats.data() + 3 * e);
+  }
+  floats_to_halves(floats.data(), weights, out.weights.data());
   return true;
 }
 

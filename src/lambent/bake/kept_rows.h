@@ -11,7 +11,7 @@ namespace lambent {
 // What the rows of a block may take at most, of receivers that send so many rays into a scene of so many receivers.
 size_t most_bytes(size_t rays, size_t receivers, int channels);
 
-// A block's rows as they are kept, in a little over half of a SparseBlock: steps from column to column (seven bits a
+// A block's rows as they are kept, in about half of what a SparseBlock takes: steps from column to column (seven bits a
 // byte, lowest first), a byte an entry with its row and whether it is its column's last, and the weights.
 void pack(const SparseBlock& block, std::vector<uint8_t>& out);
 // False where the bytes are no block of receivers that there are, with weights for so many channels.
@@ -38,7 +38,7 @@ class KeptRows {
     std::span<const uint8_t> rows, half_rows;
   };
   bool find(size_t block, std::vector<uint8_t>& buffer, Block& out) const;
-  size_t bytes() const { return used_; }       // in memory
+  size_t bytes() const { return used_; }        // in memory
   size_t file_bytes() const { return filed_; }  // beyond
   double fraction() const;                      // of the blocks kept
 

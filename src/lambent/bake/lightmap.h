@@ -37,12 +37,13 @@ struct Lightmap {
 };
 
 struct LightmapReport {
-  size_t receivers = 0, buried = 0, rays = 0, operator_bytes = 0, operator_file_bytes = 0;
+  size_t receivers = 0, buried = 0, rays = 0, operator_bytes = 0;
   double operator_kept = 1, trace_seconds = 0, bounce_seconds = 0;
   SolveReport solve;  // empty where bounces are counted
   // Where half floats were asked for and single ones taken: the brightest value of all, or of the darkest group, which
   // halves do not hold; else 0.
   float beyond_half = 0;
+  size_t operator_file_bytes = 0;  // as BakeReport's
 };
 
 // Least working memory with which such a bake can run: the solution vectors. What is more holds the operator.

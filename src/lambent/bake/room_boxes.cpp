@@ -8,8 +8,8 @@ namespace {
 
 constexpr int cells_along = 96;
 constexpr double most_open = 1.0 / 3;
-constexpr int least_cells = 4;             // of a room, along any axis that is cut
-constexpr double least_share = 1.0 / 40;   // of what is solid in a box, in each part
+constexpr int least_cells = 4;            // of a room, along any axis that is cut
+constexpr double least_share = 1.0 / 40;  // of what is solid in a box, in each part
 constexpr float most_overlap = 1.0f / 8;  // of boxes that are asked for
 
 // Which cells of a grid over the scene something is in.
@@ -98,8 +98,8 @@ std::vector<Room> find_rooms(const Scene& scene, size_t most) {
   std::vector<Part> parts{{{{0, 0, 0}, {grid.n[0], grid.n[1], grid.n[2]}}, grid.box, {}}};
   parts[0].cut = best_cut(grid, parts[0].cells);
   while (parts.size() < most) {
-    const auto next =
-        std::min_element(parts.begin(), parts.end(), [](const Part& a, const Part& b) { return a.cut.open < b.cut.open; });
+    const auto next = std::min_element(parts.begin(), parts.end(),
+                                       [](const Part& a, const Part& b) { return a.cut.open < b.cut.open; });
     if (next->cut.axis < 0 || next->cut.open > most_open) break;
     const Cut cut = next->cut;
     Part other = *next;

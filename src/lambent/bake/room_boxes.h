@@ -1,6 +1,6 @@
 #pragma once
-// A scene's space in boxes that tile it, cut where it is closed most: at walls and floors, so that what is open of a cut
-// is a door, a window, a stairwell.
+// A scene's space in boxes that tile it, cut where it is closed most: at walls and floors, so that what is open of a
+// cut is a door, a window, a stairwell.
 #include <lambent/core/result.h>
 #include <lambent/scene/scene.h>
 

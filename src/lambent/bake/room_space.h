@@ -17,8 +17,8 @@ struct Opening {
   int axis = 0;
   bool upper = false;  // on the room's face of greater coordinates
   Bounds face;
-  int across[2] = {1, 1};            // cells of place along the two other axes, in the order axis + 1, axis + 2
-  std::vector<uint32_t> node;        // of each cell [direction][place], `none` where nobody has met it
+  int across[2] = {1, 1};      // cells of place along the two other axes, in the order axis + 1, axis + 2
+  std::vector<uint32_t> node;  // of each cell [direction][place], `none` where nobody has met it
 };
 
 // Where a ray goes: into a surface, out of the scene, or through an opening.

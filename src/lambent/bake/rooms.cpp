@@ -53,9 +53,9 @@ struct RoomBaker {
   std::vector<size_t> node_row{};   // of each room: the first of the nodes
   std::vector<uint32_t> row_of{};   // of each receiver
   size_t rows = 0;
-  std::vector<float> e{};           // [row][coefficient]
-  AlignedVector<float> x{};         // [row][coefficient][channel]
-  std::vector<uint8_t> buried{};    // of receivers
+  std::vector<float> e{};         // [row][coefficient]
+  AlignedVector<float> x{};       // [row][coefficient][channel]
+  std::vector<uint8_t> buried{};  // of receivers
   std::vector<FillStep> fill{};
   std::unique_ptr<KeptRows> kept{};
   std::atomic<size_t> crossed{0}, lost{0};
@@ -92,7 +92,8 @@ struct RoomBaker {
           const size_t base = size_t(c.set) * few.stride;
           rotate_directions(c.rotation, few.x.data() + base, few.y.data() + base, few.z.data() + base, few.stride,
                             dx.data(), dy.data(), dz.data());
-          geometry->tracer.closest_fan(receivers.origins[r], {dx.data(), dy.data(), dz.data(), first_rays}, hits.data());
+          geometry->tracer.closest_fan(receivers.origins[r], {dx.data(), dy.data(), dz.data(), first_rays},
+                                       hits.data());
           for (size_t j = 0; j < first_rays; ++j) {
             const Exit exit = space.exit(room, receivers.origins[r], {dx[j], dy[j], dz[j]}, hits[j]);
             if (exit.opening != none) found[begin / gather_block].push_back({exit, uint32_t(hash64(r, j))});
@@ -114,8 +115,8 @@ struct RoomBaker {
         parallel_for(now[room].size(), gather_block, [&](size_t begin, size_t end) {
           for (size_t i = begin; i < end; ++i)
             for (const NodeRay& ray : space.rays_of(now[room][i])) {
-              const Exit exit = space.exit(room, ray.origin, ray.direction,
-                                           geometry->tracer.closest(ray.origin, ray.direction));
+              const Exit exit =
+                  space.exit(room, ray.origin, ray.direction, geometry->tracer.closest(ray.origin, ray.direction));
               if (exit.opening != none)
                 found[begin / gather_block].push_back({exit, uint32_t(hash64(now[room][i], ray.key))});
             }
@@ -266,8 +267,7 @@ struct RoomBaker {
       float* out = x.data() + size_t(row_of[step.receiver]) * width;
       std::fill(out, out + width, 0.0f);
       for (uint32_t s : step.sources)
-        for (size_t k = 0; k < width; ++k)
-          out[k] += x[size_t(row_of[s]) * width + k] / float(step.sources.size());
+        for (size_t k = 0; k < width; ++k) out[k] += x[size_t(row_of[s]) * width + k] / float(step.sources.size());
     }
   }
 
@@ -394,9 +394,8 @@ Result<Transfer> bake_rooms(const Scene& scene, const Receivers& receivers, cons
   BakeReport& r = report ? *report : unwanted;
   RoomsReport& t = rooms_report ? *rooms_report : untold;
   r = {}, t = {};
-  const std::unique_ptr<RoomBaker> baker(new RoomBaker{scene, receivers, options, how,
-                                                       RoomSpace(scene, rooms, how.places, how.directions), r, t,
-                                                       progress});
+  const std::unique_ptr<RoomBaker> baker(new RoomBaker{
+      scene, receivers, options, how, RoomSpace(scene, rooms, how.places, how.directions), r, t, progress});
   return baker->bake();
 }
 

@@ -1,10 +1,10 @@
 #pragma once
-// A scene's diffuse transfer room by room. A room's rows are gathered among its own triangles; a ray that leaves its box
-// into another ends at a NODE of that opening's light field: a cell of place and direction, whose value is the light
-// that arrives along rays of that cell, gathered in the room beyond. So the operator over all receivers and nodes is
-// blocks of rooms, joined through nodes alone, and is solved as such: inner iterations within a room, outer ones over
-// rooms with the newest light of their openings.
-// Source: radiosity, "Problem Size" (rooms coupled through 4D light fields, two-level block-structured iteration).
+// A scene's diffuse transfer room by room. A room's rows are gathered among its own triangles; a ray that leaves its
+// box into another ends at a NODE of that opening's light field: a cell of place and direction, whose value is the
+// light that arrives along rays of that cell, gathered in the room beyond. So the operator over all receivers and nodes
+// is blocks of rooms, joined through nodes alone, and is solved as such: inner iterations within a room, outer ones
+// over rooms with the newest light of their openings. Source: radiosity, "Problem Size" (rooms coupled through 4D light
+// fields, two-level block-structured iteration).
 #include <lambent/bake/bake.h>
 #include <lambent/bake/room_boxes.h>
 
@@ -28,8 +28,8 @@ struct RoomsReport {
   double lost = 0;  // share of the rays through openings that met no node, and count as dark
 };
 
-// All of the light, however often it is reflected. Of `options` order, samples, memory, seed and precision count. Errors:
-// what bake() refuses; lobes, see-through surfaces, receivers that are not at vertices; cancelled.
+// All of the light, however often it is reflected. Of `options` order, samples, memory, seed and precision count.
+// Errors: what bake() refuses; lobes, see-through surfaces, receivers that are not at vertices; cancelled.
 Result<Transfer> bake_rooms(const Scene& scene, const Receivers& receivers, const std::vector<Room>& rooms,
                             const BakeOptions& options, const RoomsOptions& how, BakeReport* report = nullptr,
                             RoomsReport* rooms_report = nullptr, Progress* progress = nullptr);

@@ -180,7 +180,7 @@ Result<void> save_look(const std::string& path, const Baked& baked, const Viewer
   LookWriter look_writer(baked.scene, baked.basis, &look);
   look_writer.add_blobs(blobs);
   return save_gltf(path, baked.scene, blobs,
-                  [&](json& document, const GltfPlaces& places) { look_writer.write(document, places); });
+                   [&](json& document, const GltfPlaces& places) { look_writer.write(document, places); });
 }
 
 Result<Baked> load_baked(const std::string& path) {

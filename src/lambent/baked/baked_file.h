@@ -43,8 +43,8 @@ struct ViewerLook {
   LookKind kind = LookKind::emission;
 };
 
-// A .glb, or a .gltf of any size with its data in NAME.0.bin, NAME.1.bin, ... of at most bin_limit bytes each (>= 65536;
-// what glTF's own accessors and images have in one piece may be longer); all of them appear together, or none.
+// A .glb, or a .gltf of any size with its data in NAME.0.bin, NAME.1.bin, ... of at most bin_limit bytes each (>=
+// 65536; what glTF's own accessors and images have in one piece may be longer); all of them appear together, or none.
 // With a look, primitives get materials for it, two-sided ones a second primitive for their backs; the scene's own
 // materials stay in the file, and loading finds them again. Errors: the disk's; more than 4 GiB, which a .glb cannot
 // hold.

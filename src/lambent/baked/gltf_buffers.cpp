@@ -67,8 +67,8 @@ Result<const GltfBuffers::Buffer*> GltfBuffers::buffer(size_t index, const std::
     found = {mapped->bytes(), *mapped, *path};
   }
   if (found.bytes.size() < *length)
-    return Error{place, "is truncated: has " + std::to_string(found.bytes.size()) + " of " + std::to_string(*length) +
-                            " bytes"};
+    return Error{
+        place, "is truncated: has " + std::to_string(found.bytes.size()) + " of " + std::to_string(*length) + " bytes"};
   if (uri != object.end()) found.bytes = found.bytes.first(*length);
   known = std::move(found);
   return &*known;

@@ -144,6 +144,13 @@ TEST(GltfSet, LongTransferIsReadInPlaceAcrossFiles) {
   EXPECT_FALSE(is_mapped(moved.data(), ".bin"));
 }
 
+TEST(GltfSet, PiecesInDataUrisAreOneTransfer) {
+  const fs::path seeds = fs::path(__FILE__).parent_path() / "../../../fuzz/corpus_baked";
+  auto whole = load_baked((seeds / "rgb_single.glb").string()), pieces = load_baked((seeds / "pieces.gltf").string());
+  ASSERT_TRUE(whole && pieces) << pieces.error().text();
+  EXPECT_EQ(fingerprint(*pieces), fingerprint(*whole));
+}
+
 TEST(GltfSet, AppearsWholeAndTakesItsOldFilesAlong) {
   const Folder folder;
   const std::string path = folder.at("x.gltf");
@@ -189,8 +196,8 @@ TEST(GltfSet, LiesAreRefusedInOneLine) {
     Json document = good;
     lie(document, document["extensions"]["LAMBENT_transfer"]["transfer"]["bufferView"]);
     ASSERT_TRUE(write_file_atomically(folder.at("lie.gltf"), document.dump()));
-    for (const std::string& text : {load_baked(folder.at("lie.gltf")).error().text(),
-                                    read_fields(folder.at("lie.gltf")).error().text()}) {
+    for (const std::string& text :
+         {load_baked(folder.at("lie.gltf")).error().text(), read_fields(folder.at("lie.gltf")).error().text()}) {
       EXPECT_NE(text.find(expected), std::string::npos) << text;
       EXPECT_NE(text.find("lie.gltf"), std::string::npos) << text;
       EXPECT_EQ(text.find('\n'), std::string::npos) << text;
@@ -200,9 +207,7 @@ TEST(GltfSet, LiesAreRefusedInOneLine) {
     EXPECT_NE(std::string(lambent_error()).find(expected), std::string::npos) << lambent_error();
   };
   const size_t last = good["buffers"].size() - 1;
-  const auto uri = [&](const char* name) {
-    return [=](Json& d, Json&) { d["buffers"][last]["uri"] = name; };
-  };
+  const auto uri = [&](const char* name) { return [=](Json& d, Json&) { d["buffers"][last]["uri"] = name; }; };
   refused("outside the scene's folder", uri("../x.0.bin"));
   refused("outside the scene's folder", uri("%2E%2E/x.0.bin"));
   refused("leads outside", uri("link.bin"));

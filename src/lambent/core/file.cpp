@@ -122,8 +122,8 @@ Result<MappedFile> MappedFile::open_parts(std::span<const Part> parts) {
     if (part.offset > there || part.bytes > there - part.offset) {
       why = "is truncated: has " + std::to_string(there) + " of " + std::to_string(part.offset + part.bytes) + " bytes";
     } else if (mapped) {
-      if (part.bytes > 0 && ::mmap(to, part.bytes, PROT_READ, MAP_PRIVATE | MAP_FIXED, *fd, off_t(part.offset)) ==
-                                MAP_FAILED)
+      if (part.bytes > 0 &&
+          ::mmap(to, part.bytes, PROT_READ, MAP_PRIVATE | MAP_FIXED, *fd, off_t(part.offset)) == MAP_FAILED)
         why = system_message();
     } else if (!read_whole(*fd, to, part.bytes, part.offset)) {
       why = "could not be read whole";

@@ -28,7 +28,6 @@ class Progress {
   bool cancelled() const { return cancelled_.load(std::memory_order_relaxed); }
 
   Checkpoint* checkpoint = nullptr;  // where pieces of the work are kept (checkpoint.h); null: nowhere
-  std::string scratch;               // a folder for what memory has no room for; "": that is made again
 
  private:
   Report report_;
@@ -36,6 +35,9 @@ class Progress {
   std::string stage_;
   size_t total_ = 0, done_ = 0;
   std::atomic<bool> cancelled_{false};
+
+ public:
+  std::string scratch;  // a folder for what memory has no room for; "": that is made again
 };
 
 // False where there is nobody to stop it.

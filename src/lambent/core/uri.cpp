@@ -103,8 +103,7 @@ std::string encode_uri(const std::string& name) {
   return out;
 }
 
-Result<std::string> find_external_file(const std::string& uri, const std::string& folder,
-                                       const std::string& referrer) {
+Result<std::string> find_external_file(const std::string& uri, const std::string& folder, const std::string& referrer) {
   namespace fs = std::filesystem;
   auto refuse = [&](const std::string& why) { return Error{referrer, in_quotes(uri) + " " + why}; };
   if (folder.empty()) return refuse("is an external file, which is not allowed here");

@@ -7,6 +7,7 @@
 #include <lambent/light/environment.h>
 #include <lambent/pipeline/bake_lightmap.h>
 #include <lambent/pipeline/bake_parse.h>
+#include <lambent/pipeline/bake_rooms.h>
 #include <lambent/pipeline/durable.h>
 #include <lambent/pipeline/parse.h>
 #include <lambent/pipeline/place_receivers.h>
@@ -54,7 +55,16 @@ struct Bake {
   void line(const std::string& label, std::string text) { summary.lines.emplace_back(label, std::move(text)); }
 };
 
+Result<void> bake_by_rooms(Bake& b) {
+  auto transfer =
+      bake_rooms_of_request(b.request, b.plan.bake, b.scene, b.receivers(), b.job, b.report, b.summary, b.told);
+  if (!transfer) return transfer.error();
+  b.store = std::move(*transfer);
+  return {};
+}
+
 Result<void> bake_diffuse(Bake& b) {
+  if (!b.request.rooms.empty()) return bake_by_rooms(b);
   if (b.request.subsurface.empty()) {
     auto transfer = bake(b.scene, b.tracer, b.receivers(), b.plan.bake, &b.report, b.job.progress);
     if (!transfer) return transfer.error();
@@ -334,6 +344,7 @@ Result<void> begin(Bake& b) {
   if (!placed) return placed.error();
   b.placed = std::move(*placed);
   b.load_seconds = seconds_since(start), start = Clock::now();
+  if (!b.request.rooms.empty()) return {};  // each has its own tree
   auto tracer = Tracer::build(b.scene, b.job.progress);
   if (!tracer) return tracer.error();
   b.tracer = std::move(*tracer), b.build_seconds = seconds_since(start);
@@ -372,7 +383,7 @@ Result<BakeOutcome> bake_plain(const BakeRequest& request, const BakePlan& plan,
   }
   if (auto ok = check_file_size(plan, request, b.scene, b.receivers().count(), 0); !ok) return ok.error();
   if (auto ok = job.inputs_read({}); !ok) return ok.error();
-  if (plan.kind != BakeKind::membrane && request.shadows == "on")
+  if (plan.kind != BakeKind::membrane && request.shadows == "on" && request.rooms.empty())
     warn_if_enclosed(b.scene, b.tracer, b.receivers(), job);
   if (b.placed.atlas) move_buried_texels(b.scene, b.tracer, *b.placed.atlas, b.placed.receivers, job.progress);
   if (auto ok = bake_surface(b); !ok) return ok.error();
@@ -410,9 +421,8 @@ Result<Baked> bake(const BakeRequest& request, const Job& job) {
 namespace {
 
 // The pictures, the rule of make and the baked file, whole or not at all; the names of the pictures.
-Result<std::vector<std::string>> write_outputs(const std::string& path, const BakeOutcome& outcome,
-                                               size_t bin_limit, const BakeRequest* request,
-                                               const DurableBake* durable) {
+Result<std::vector<std::string>> write_outputs(const std::string& path, const BakeOutcome& outcome, size_t bin_limit,
+                                               const BakeRequest* request, const DurableBake* durable) {
   const std::string stem = path.substr(0, path.find_last_of('.'));
   std::vector<std::string> written;
   FileSet set;

@@ -20,9 +20,11 @@ constexpr KindMask every = D | M | F | Z | G | S | L | K, traced = D | M | F | Z
 
 const Option<R> table[] = {
     {"scene", &R::scene, "Files", every, "Scene: .gltf, .glb, .obj or .ply", 0, 0, nullptr, nullptr, true, true},
-    {"output", &R::output, "Files", every, "Baked file to write: .glb, of up to 4 GiB, or .gltf with its data beside it, of any size", 0, 0, nullptr, nullptr, false},
-    {"bin-limit", &R::bin_limit, "Files", every,
-     "Bytes of each .bin of a .gltf, at most; e.g. 256MB, 2GiB (1GiB)", 65536, 1e18, nullptr, nullptr, false},
+    {"output", &R::output, "Files", every,
+     "Baked file to write: .glb, of up to 4 GiB, or .gltf with its data beside it, of any size", 0, 0, nullptr, nullptr,
+     false},
+    {"bin-limit", &R::bin_limit, "Files", every, "Bytes of each .bin of a .gltf, at most; e.g. 256MB, 2GiB (1GiB)",
+     65536, 1e18, nullptr, nullptr, false},
     {"checkpoint", &R::checkpoint, "Files", traced | K,
      "Folder to keep the work in as it comes, from which the same command goes on after an interrupt or a crash; off: "
      "nowhere (OUTPUT.checkpoint, of work of over a minute)",

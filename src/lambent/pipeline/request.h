@@ -17,8 +17,6 @@ struct BakeRequest {
   std::string scene, output;
   std::string checkpoint;  // a folder; "": beside the output, of long work; "off": none
   std::string depfile;
-  std::string scratch;                 // a folder; "": the output's; "off": none
-  size_t bin_limit = size_t{1} << 30;  // bytes of each .bin of a .gltf
   std::string transfer = "diffuse";
   int order = 0;  // bands; 0: 6, or, of a lightmap, none
   std::string light;
@@ -30,8 +28,6 @@ struct BakeRequest {
   bool ground = false;
   float max_edge = 0, max_albedo = 1;
   std::vector<std::string> emit, exclude;
-  std::string rooms;          // "": the scene as a whole
-  double rooms_error = 0.01;  // residual of the joined solution
   // Rays
   std::string quality = "good", error, denoise = "on", adapt = "auto";
   double time = -1;  // seconds; negative: no limit
@@ -69,6 +65,12 @@ struct BakeRequest {
   // Names (as in JSON) of fields that were said. A field that differs from its default counts as said without being
   // here.
   std::set<std::string> given;
+
+  // Large scenes
+  size_t bin_limit = size_t{1} << 30;  // bytes of each .bin of a .gltf
+  std::string scratch;                 // a folder; "": the output's; "off": none
+  std::string rooms;                   // "": the scene as a whole
+  double rooms_error = 0.01;           // residual of the joined solution
 };
 
 // What runs beside a request and does not change its result.

@@ -199,7 +199,8 @@ std::vector<GltfWriter::Move> GltfWriter::keep_bytes(std::vector<Range> ranges) 
       const size_t first = std::max(run.begin, pieces_[p].offset),
                    last = std::min(run.end, pieces_[p].offset + pieces_[p].bytes.size());
       if (first < last)
-        pieces.push_back({to + (first - run.begin), pieces_[p].bytes.subspan(first - pieces_[p].offset, last - first), 4});
+        pieces.push_back(
+            {to + (first - run.begin), pieces_[p].bytes.subspan(first - pieces_[p].offset, last - first), 4});
     }
     end = to + (run.end - run.begin);
   }

@@ -15,7 +15,8 @@ inline float finite_or(float x, float fallback) { return std::isfinite(x) ? x : 
 // Materials and textures that the document does not have.
 class MaterialWriter {
  public:
-  MaterialWriter(GltfWriter& out, const Scene& scene, const std::string& path) : out_(out), scene_(scene), path_(path) {}
+  MaterialWriter(GltfWriter& out, const Scene& scene, const std::string& path)
+      : out_(out), scene_(scene), path_(path) {}
 
   // The glTF number of a scene's material, in a one-sided and a two-sided edition.
   Result<size_t> add(uint32_t index, bool two_sided) {

@@ -319,7 +319,7 @@ class DocumentWriter {
 }  // namespace
 
 Result<void> save_gltf(const std::string& path, const Scene& scene, std::span<const GltfBlob> blobs,
-                      const std::function<void(Json& document, const GltfPlaces& places)>& extend, size_t bin_limit) {
+                       const std::function<void(Json& document, const GltfPlaces& places)>& extend, size_t bin_limit) {
   GltfWriter out;
   GltfPlaces places;
   for (const Part& part : scene.parts) {
