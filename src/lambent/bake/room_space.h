@@ -9,7 +9,7 @@
 namespace lambent {
 
 // Rays that stand for a node, of those that were met there.
-inline constexpr int most_node_rays = 8;
+inline constexpr int most_node_rays = 24;
 
 // Where two rooms touch, seen from one of them.
 struct Opening {

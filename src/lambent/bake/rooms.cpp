@@ -20,7 +20,7 @@ namespace {
 using Clock = std::chrono::steady_clock;
 double seconds_since(Clock::time_point start) { return std::chrono::duration<double>(Clock::now() - start).count(); }
 
-constexpr int first_rays = 64;       // a receiver, which find the nodes
+constexpr int first_rays = 256;      // a receiver, which find the nodes
 constexpr int most_generations = 6;  // of nodes that rays of nodes find
 constexpr int inner_most = 6;        // iterations within a room at a visit
 constexpr size_t padded(size_t n) { return (n + gather_block - 1) / gather_block * gather_block; }
@@ -184,17 +184,15 @@ struct RoomBaker {
     for (size_t i = begin; i < begin + gather_block; ++i) {
       s.rows.begin_row();
       std::fill(s.sky.begin(), s.sky.end(), 0.0f);
-      size_t backs = 0, cast = rays;
+      size_t backs = 0;
       if (i < all && of_nodes) {
         const std::span<const NodeRay> own = space.rays_of(space.nodes_of[room][i]);
-        cast = own.size();
         // As if all nodes had as many rays.
         for (size_t j = 0; j < rays && !own.empty(); ++j) {
           const NodeRay& ray = own[j % own.size()];
           add_ray(room, geometry, ray.origin, ray.direction, geometry.tracer.closest(ray.origin, ray.direction), s,
                   backs);
         }
-        cast = rays;
       } else if (i < all) {
         const uint32_t r = receivers_of[room][i];
         const DirectionChoice c = choose_directions(sets, receivers.normals[r], options.seed, r);
@@ -209,7 +207,7 @@ struct RoomBaker {
       s.rows.end_row();
       if (first) {
         float* row = e.data() + (first_row[room] + b * gather_block + i - begin) * coefficients;
-        for (size_t k = 0; k < coefficients; ++k) row[k] = s.sky[k] / float(cast);
+        for (size_t k = 0; k < coefficients; ++k) row[k] = s.sky[k] / float(rays);
       }
     }
     s.rows.finish(channels, of_nodes ? 1.0f : weight_unit, out);
@@ -271,6 +269,11 @@ struct RoomBaker {
     }
   }
 
+  // Whether row i of a room is of a receiver inside something, whose equation is another.
+  bool is_filled(size_t room, size_t i) const {
+    return i < receivers_of[room].size() && buried[receivers_of[room][i]];
+  }
+
   struct Change {
     double change = 0, all = 0;
   };
@@ -304,10 +307,10 @@ struct RoomBaker {
         float* y = fresh.data() + i * width;
         const float* old = x.data() + (first + i) * width;
         expand(e.data() + (first + i) * coefficients, y);
-        for (size_t k = 0; k < width; ++k) {
-          y[k] += scale * sums[(i - begin) * width + k];
+        for (size_t k = 0; k < width; ++k) y[k] += scale * sums[(i - begin) * width + k];
+        if (is_filled(room, i)) continue;
+        for (size_t k = 0; k < width; ++k)
           c.change += double(y[k] - old[k]) * double(y[k] - old[k]), c.all += double(y[k]) * double(y[k]);
-        }
       }
     });
     if (is_cancelled(progress)) return Error{"", "cancelled"};
@@ -321,7 +324,7 @@ struct RoomBaker {
     const size_t first = first_row[room], count = rooms_end(room) - first;
     parallel_for(count, gather_block, [&](size_t begin, size_t end) {
       for (size_t i = begin; i < end; ++i) {
-        if (i < receivers_of[room].size() && buried[receivers_of[room][i]]) continue;
+        if (is_filled(room, i)) continue;
         std::copy_n(fresh.data() + i * width, width, x.data() + (first + i) * width);
       }
     });

@@ -16,8 +16,8 @@ namespace lambent {
 struct RoomsOptions {
   double residual = 0.01;  // |e + A x - x| / |x| over all rooms, as they are met, at which it ends; > 0
   int most_sweeps = 100;   // over all rooms
-  int places = 48;         // cells of place along an opening's longer side
-  int directions = 10;     // and of direction along each side of the square that maps onto the half space
+  int places = 32;         // cells of place along an opening's longer side
+  int directions = 16;     // and of direction along each side of the square that maps onto the half space
   std::string scratch;     // a folder for rows that memory has no room for; "": they are traced again
 };
 

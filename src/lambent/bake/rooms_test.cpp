@@ -99,7 +99,7 @@ TEST(Rooms, JoinToTheSceneBakedWhole) {
   for (size_t k = 1; k < report.residuals.size(); ++k) EXPECT_LT(report.residuals[k], report.residuals[k - 1]);
   const double noise = difference(*again, *whole), found = difference(*joined, *whole);
   RecordProperty("noise", std::to_string(noise)), RecordProperty("difference", std::to_string(found));
-  EXPECT_LT(found, 1.2 * noise + 0.02) << "noise of the rays alone: " << noise;
+  EXPECT_LT(found, 0.025) << "noise of the rays alone: " << noise;  // what --quality good asks for
 }
 
 TEST(Rooms, TheSameBytesWhateverTheThreadsAndTheMemory) {
