@@ -31,7 +31,7 @@ struct RawScene {
 };
 
 // Least seconds of `runs` calls of trace(origin, x, y, z, count) for every receiver's directions, in parallel; samples
-// % 256 == 0.
+// % 256 == 0, or below 256 and a multiple of 16.
 template <class Trace>
 double raw_seconds(int runs, const Receivers& receivers, const DirectionSets& sets, Trace trace) {
   std::atomic<size_t> hits{0};
@@ -45,8 +45,8 @@ double raw_seconds(int runs, const Receivers& receivers, const DirectionSets& se
         const size_t base = size_t(c.set) * sets.stride;
         rotate_directions(c.rotation, sets.x.data() + base, sets.y.data() + base, sets.z.data() + base, sets.stride,
                           x.data(), y.data(), z.data());
-        for (size_t i = 0; i < samples; i += 256)
-          found += trace(receivers.origins[r], x.data() + i, y.data() + i, z.data() + i, 256);
+        for (size_t i = 0, each = std::min<size_t>(256, samples); i < samples; i += each)
+          found += trace(receivers.origins[r], x.data() + i, y.data() + i, z.data() + i, each);
       }
       hits += found;
     });

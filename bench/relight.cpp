@@ -88,7 +88,9 @@ void c_case() {
   BlobWriter bulk;
   nlohmann::json extension = encode_fields(fields, bulk), document{{"asset", {{"version", "2.0"}}}};
   extension["parts"][0]["node"] = extension["parts"][0]["primitive"] = 0;
-  resolve_views(extension, 0);
+  std::vector<std::vector<int>> numbers;
+  for (size_t i = 0; i < bulk.blobs.size(); ++i) numbers.push_back({int(i)});
+  resolve_views(extension, numbers);
   // JSON of a length that is known before its offsets are, so that bulk data begin on a cache line.
   std::vector<uint8_t> binary;
   for (const BlobWriter::Blob& blob : bulk.blobs) {

@@ -4,6 +4,7 @@
 set(lambent_relight_sources
   src/lambent/baked/blobs.cpp
   src/lambent/baked/fields.cpp
+  src/lambent/baked/gltf_buffers.cpp
   src/lambent/baked/outgoing_codec.cpp
   src/lambent/baked/placement_codec.cpp
   src/lambent/baked/store_codec.cpp
@@ -35,6 +36,7 @@ set(lambent_relight_sources
   src/lambent/core/glb.cpp
   src/lambent/core/parallel.cpp
   src/lambent/core/sampling.cpp
+  src/lambent/core/uri.cpp
   src/lambent/core/write_file.cpp
   src/lambent/light/cube_light.cpp
   src/lambent/light/environment.cpp

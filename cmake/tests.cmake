@@ -46,7 +46,7 @@ if(NOT LAMBENT_SANITIZE)  # which has an allocator of its own
 endif()
 
 add_test(NAME include_arrows COMMAND ${CMAKE_CURRENT_SOURCE_DIR}/tests/include_arrows.sh ${CMAKE_CURRENT_SOURCE_DIR})
-set(command_tests command_line command_line_stores command_line_lightmaps command_line_lobes command_line_indirect
+set(command_tests command_line command_line_stores command_line_lightmaps command_line_lobes command_line_indirect large
   durable)
 foreach(name ${command_tests})
   add_test(NAME ${name} COMMAND ${CMAKE_CURRENT_SOURCE_DIR}/tests/${name}.sh $<TARGET_FILE:lambent-tool>)

@@ -76,7 +76,7 @@ Pointer open(const std::string& path) {
 
 std::vector<std::string> save(const BakedObject& o, const std::string& path) {
   const Released released;
-  take(check_output(path, {"glb"}));
+  take(check_output(path, {"glb", "gltf"}));
   return take(save_outcome(path, o.outcome)).get<std::vector<std::string>>();
 }
 

@@ -62,7 +62,7 @@ Result<std::vector<BatchJob>> read_manifest(const std::string& path) {
     if (request) request = resolved(std::move(*request));
     if (!request) return Error{where, request.error().text()};
     if (request->scene.empty() || request->output.empty()) return Error{where, "needs \"scene\" and \"output\""};
-    if (auto ok = check_output(request->output, {"glb"}); !ok) return Error{where, ok.error().text()};
+    if (auto ok = check_output(request->output, {"glb", "gltf"}); !ok) return Error{where, ok.error().text()};
     const auto [first, is_new] = lines.emplace(fs::absolute(request->output).lexically_normal().string(), number);
     if (!is_new) return Error{where, fmt::format("writes {}, as line {} does", request->output, first->second)};
     jobs.push_back({number, std::move(*request), said});
@@ -158,11 +158,10 @@ void end(BatchJob& job, int status) {
     if (line.starts_with("warning: ")) warn(job.request.output + ": " + line.substr(9));
     else job.why = line.substr(9);
   ::close(job.said_on);
-  std::error_code ignored;
   const bool well = WIFEXITED(status) && WEXITSTATUS(status) == success;
   if (WIFSIGNALED(status)) job.why = fmt::format("ended by signal {}", WTERMSIG(status));
   job.state = well ? "baked" : "failed";
-  if (well) job.bytes = fs::file_size(job.request.output, ignored), job.why.clear();
+  if (well) job.bytes = bytes_on_disk(job.request.output), job.why.clear();
 }
 
 void tell(const BatchJob& job, size_t done, size_t all) {

@@ -9,7 +9,6 @@
 #include <fmt/format.h>
 
 #include <chrono>
-#include <filesystem>
 
 namespace lambent::tool {
 namespace {
@@ -69,7 +68,7 @@ Result<void> save_smaller(const CompressCommand& o, Baked& baked, Field smaller,
   if (!file) return file.error();
   const std::optional<ViewerLook> look = load_look(*file, o.baked);
   baked.surface = std::move(smaller), baked.provenance = provenance.dump(), baked.terms.clear();
-  allow_replacing(o.baked);  // by less of the same
+  for (const std::string& part : files_of(o.baked)) allow_replacing(part);  // by less of the same
   return save_baked(o.output, baked, look ? &*look : nullptr);
 }
 
@@ -77,12 +76,9 @@ Result<void> save_smaller(const CompressCommand& o, Baked& baked, Field smaller,
 struct Sizes {
   double before = 0, after = 0;
 };
-Sizes sizes_of(const CompressCommand& o, uintmax_t before) {
-  std::error_code ignored;
-  return {double(before), double(std::filesystem::file_size(o.output, ignored))};
-}
+Sizes sizes_of(const CompressCommand& o, size_t before) { return {double(before), double(bytes_on_disk(o.output))}; }
 
-int compress_to_clusters(Context& context, const CompressCommand& o, Baked& baked, uintmax_t size_before) {
+int compress_to_clusters(Context& context, const CompressCommand& o, Baked& baked, size_t size_before) {
   CpcaOptions options;
   if (auto ok = parse_cpca("cpca:" + o.cpca, options); !ok) return fail({"--cpca", ok.error().message, true});
   const auto* dense = std::get_if<Transfer>(&baked.surface.store);
@@ -120,7 +116,7 @@ int compress_to_clusters(Context& context, const CompressCommand& o, Baked& bake
   return success;
 }
 
-int compress_to_lobes(Context& context, CompressCommand& o, Baked& baked, uintmax_t size_before) {
+int compress_to_lobes(Context& context, CompressCommand& o, Baked& baked, size_t size_before) {
   const auto* dense = std::get_if<Transfer>(&baked.surface.store);
   if (!dense || !vertices_of(baked) || directional_of(baked.surface) != DirectionalKind::none)
     return fail({o.baked, "holds no transfer of spherical harmonics at vertices, which is what lobes are fitted to"});
@@ -172,14 +168,13 @@ int compress_to_lobes(Context& context, CompressCommand& o, Baked& baked, uintma
 }
 
 int run_compress(Context& context, CompressCommand o) {
-  if (auto ok = check_output(o.output, {"glb"}); !ok) return fail(ok.error());
+  if (auto ok = check_output(o.output, {"glb", "gltf"}); !ok) return fail(ok.error());
   if (!o.error_picture.empty())
     if (auto ok = check_output(o.error_picture, {"png", "exr"}); !ok) return fail(ok.error());
   o.zonal.precision = o.precision == "half" ? Precision::half : Precision::single;
   auto baked = load_baked(o.baked);
   if (!baked) return fail(baked.error());
-  std::error_code ignored;
-  const uintmax_t before = std::filesystem::file_size(o.baked, ignored);  // the output may take its place
+  const size_t before = bytes_on_disk(o.baked);  // the output may take its place
   if (std::holds_alternative<Visibility>(baked->surface.store))
     return fail({o.baked, "holds no transfer to compress, but visibility in blocks"});
   return o.cpca.empty() ? compress_to_lobes(context, o, *baked, before)
@@ -197,7 +192,7 @@ void add_compress(CLI::App& app, Run& run) {
       "--cpca", o->cpca, "CLUSTERS,RANK: clusters of receivers with like transfer, each a mean and so many components");
   auto* zonal = c->add_option("--zonal", o->zonal.lobes, "Lobes a receiver; of a matrix, a row")
                     ->check(CLI::Range(1, max_stored_lobes));
-  c->add_option("-o,--output", o->output, "Baked file to write (.glb)")->required();
+  c->add_option("-o,--output", o->output, "Baked file to write: .glb, or .gltf with its data beside it")->required();
   c->add_option("--starts", o->zonal.starts, "Searches from random axes where the error is high")
       ->check(CLI::Range(0, 1000))
       ->capture_default_str();

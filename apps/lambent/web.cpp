@@ -3,6 +3,8 @@
 #include "options.h"
 
 #include <lambent/baked/baked_file.h>
+#include <lambent/core/glb.h>
+#include <lambent/core/uri.h>
 #include <lambent/image/image.h>
 #include <lambent/image/tone.h>
 #include <lambent/pipeline/browser.h>
@@ -36,6 +38,7 @@ const char* media_type(const std::string& extension) {
                                                         {"svg", "image/svg+xml"},
                                                         {"png", "image/png"},
                                                         {"glb", "model/gltf-binary"},
+                                                        {"gltf", "model/gltf+json"},
                                                         {"wasm", "application/wasm"},
                                                         {"exr", "image/x-exr"}};
   const auto known = types.find(extension);
@@ -57,14 +60,43 @@ Result<void> add_page(WebFiles& files) {
   return {};
 }
 
-Result<void> add_baked(WebFiles& files, const std::string& path, const std::string& name) {
+// The files that a .gltf names, under names of ours, beside it; the document then names these.
+Result<void> add_named_files(WebFiles& files, nlohmann::json& document, const std::string& path,
+                             const std::string& stem) {
+  for (const char* list : {"buffers", "images"})
+    for (size_t i = 0; i < (document.contains(list) ? document[list].size() : 0); ++i) {
+      nlohmann::json& item = document[list][i];
+      if (!item.contains("uri") || !item["uri"].is_string() || is_data_uri(item["uri"].get<std::string>())) continue;
+      auto found = find_external_file(item["uri"].get<std::string>(), folder_of(path), path);
+      if (!found && list == std::string_view("images")) continue;  // the scene does without, too
+      if (!found) return found.error();
+      auto file = MappedFile::open(*found);
+      if (!file) return file.error();
+      const std::string ending = file_extension(*found), kind = media_type(ending);
+      const std::string name = stem + "." + list + "-" + std::to_string(i) + "." + (ending.empty() ? "bin" : ending);
+      files["data/" + name] = {kind, std::move(*file)};
+      item["uri"] = encode_uri(name);
+    }
+  return {};
+}
+
+// Under data/STEM.glb or data/STEM.gltf; the name.
+Result<std::string> add_baked(WebFiles& files, const std::string& path, const std::string& stem) {
   auto file = MappedFile::open(path);
   if (!file) return file.error();
   auto whole = load_baked(*file, path);
   if (!whole) return whole.error();
   if (auto ok = check_for_browser(whole->surface, path); !ok) return ok.error();
-  files[name] = {media_type("glb"), std::move(*file)};
-  return {};
+  auto chunks = split_gltf(file->bytes(), path);
+  if (!chunks) return chunks.error();
+  const std::string ending = chunks->binary.data() ? "glb" : "gltf", name = "data/" + stem + "." + ending;
+  if (ending == "glb") {
+    files[name] = {media_type("glb"), std::move(*file)};
+    return name;
+  }
+  if (auto ok = add_named_files(files, chunks->json, path, stem); !ok) return ok.error();
+  files[name] = {media_type("gltf"), chunks->json.dump(-1, ' ', false, nlohmann::json::error_handler_t::replace)};
+  return name;
 }
 
 Result<void> add_map(WebFiles& files, const Image& image, const std::string& path, const std::string& name) {
@@ -96,10 +128,8 @@ void WebOptions::add_to(CLI::App& command) {
 Result<WebFiles> web_files(const WebOptions& options) {
   auto display = parse_display(options.exposure, options.tone, {});
   if (!display) return display.error();
-  nlohmann::json manifest{{"name", fs::path(options.baked).filename().string()},
-                          {"baked", "data/scene.glb"},
-                          {"exposure", display->exposure},
-                          {"tone", options.tone}};
+  nlohmann::json manifest{
+      {"name", fs::path(options.baked).filename().string()}, {"exposure", display->exposure}, {"tone", options.tone}};
   if (options.exposure == "auto") manifest["exposure"] = "auto";
   auto camera = parse_camera(options.camera);
   if (!camera) return camera.error();
@@ -113,10 +143,13 @@ Result<WebFiles> web_files(const WebOptions& options) {
     manifest["rotate"] = *turn;
   }
   WebFiles files;
-  if (auto ok = add_baked(files, options.baked, "data/scene.glb"); !ok) return ok.error();
+  auto baked = add_baked(files, options.baked, "scene");
+  if (!baked) return baked.error();
+  manifest["baked"] = *baked;
   if (!options.compare.empty()) {
-    if (auto ok = add_baked(files, options.compare, "data/compare.glb"); !ok) return ok.error();
-    manifest["compare"] = "data/compare.glb";
+    auto compare = add_baked(files, options.compare, "compare");
+    if (!compare) return compare.error();
+    manifest["compare"] = *compare;
   }
   if (auto ok = add_page(files); !ok) return ok.error();
   if (!options.reference.empty()) {

@@ -5,6 +5,7 @@ import {
   FloatType,
   HalfFloatType,
   LinearFilter,
+  LoadingManager,
   RepeatWrapping,
   RGBAFormat,
   Vector3,
@@ -86,13 +87,39 @@ export async function fetchFile(
   return bytes.buffer;
 }
 
-/** A baked scene; its BakedScene is in gltf.userData.lambent. */
-export async function readBaked(bytes: ArrayBuffer): Promise<GLTF> {
-  checkBakedFile(bytes);
-  const loader = new GLTFLoader();
-  loader.register((parser) => new LambentTransferPlugin(parser));
+/** Where the files are that a .gltf names: below a folder of the server's, or those that were opened with it. */
+export type Beside = string | readonly File[];
+
+function gltfLoader(beside: Beside, opened: string[]): GLTFLoader {
+  const manager = new LoadingManager();
+  if (typeof beside !== 'string')
+    manager.setURLModifier((url) => {
+      if (/^(blob|data):/.test(url)) return url;
+      const name = decodeURIComponent(url.slice(url.lastIndexOf('/') + 1)),
+        file = beside.find((f) => f.name === name);
+      if (!file) throw new LambentError(`names ${name}, which was not opened with it: choose all its files at once`);
+      opened.push(URL.createObjectURL(file));
+      return opened.at(-1)!;
+    });
+  return new GLTFLoader(manager);
+}
+
+async function read(bytes: ArrayBuffer, beside: Beside, plugin: boolean): Promise<GLTF> {
+  const opened: string[] = [],
+    loader = gltfLoader(beside, opened);
+  if (plugin) loader.register((parser) => new LambentTransferPlugin(parser));
   try {
-    return await loader.parseAsync(bytes, '');
+    return await loader.parseAsync(bytes, typeof beside === 'string' ? beside : '');
+  } finally {
+    for (const url of opened) URL.revokeObjectURL(url);
+  }
+}
+
+/** A baked scene; its BakedScene is in gltf.userData.lambent. */
+export async function readBaked(bytes: ArrayBuffer, beside: Beside = ''): Promise<GLTF> {
+  checkBakedFile(bytes);
+  try {
+    return await read(bytes, beside, true);
   } catch (error) {
     if (error instanceof LambentError) throw error;
     throw new LambentError(`cannot be read: ${error instanceof Error ? error.message : String(error)}`);
@@ -100,7 +127,7 @@ export async function readBaked(bytes: ArrayBuffer): Promise<GLTF> {
 }
 
 /** The scene of a file without what we know of it, as any viewer has it. */
-export const readPlain = (bytes: ArrayBuffer): Promise<GLTF> => new GLTFLoader().parseAsync(bytes, '');
+export const readPlain = (bytes: ArrayBuffer, beside: Beside = ''): Promise<GLTF> => read(bytes, beside, false);
 
 /** Linear radiance of an .hdr or .exr, told apart by content. */
 export function readMap(bytes: ArrayBuffer): LatLongMap {

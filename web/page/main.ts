@@ -1,5 +1,5 @@
 // The page: controls, the wipe, files that are opened or dropped, and every message a user may see.
-import { Euler, MathUtils, Vector3 } from 'three';
+import { Euler, LoaderUtils, MathUtils, Vector3 } from 'three';
 import { LambentError, NoTransferError, shBand, shIndex, shWindows, type ShWindow } from '../src/index.js';
 import {
   fetchFile,
@@ -10,6 +10,7 @@ import {
   readBaked,
   readMap,
   readPlain,
+  type Beside,
   type EnvironmentFile,
   type Manifest,
 } from './loading.js';
@@ -99,9 +100,18 @@ class Page {
       this.show();
       return;
     }
-    await this.openBaked(manifest.name, await this.fetch(manifest.name, manifest.baked));
+    await this.openBaked(
+      manifest.name,
+      await this.fetch(manifest.name, manifest.baked),
+      LoaderUtils.extractUrlBase(manifest.baked),
+    );
     if (manifest.compare)
-      await this.useModel('compare', 'the second file', await this.fetch('the second file', manifest.compare));
+      await this.useModel(
+        'compare',
+        'the second file',
+        await this.fetch('the second file', manifest.compare),
+        LoaderUtils.extractUrlBase(manifest.compare),
+      );
     if (manifest.reference)
       viewer.setReference(mapTexture(readMap(await this.fetch('the reference', manifest.reference))));
     get('loading').hidden = true;
@@ -250,8 +260,7 @@ class Page {
     get('problem-close').addEventListener('click', hideProblem);
     get('open').addEventListener('click', () => get('file').click());
     get('file').addEventListener('change', () => {
-      const file = input('file').files?.[0];
-      if (file) this.openFile(file);
+      this.openFiles([...(input('file').files ?? [])]);
       input('file').value = '';
     });
     for (const event of ['dragenter', 'dragover', 'dragleave', 'drop'])
@@ -263,8 +272,7 @@ class Page {
         ),
       );
     addEventListener('drop', (e) => {
-      const file = e.dataTransfer?.files[0];
-      if (file) this.openFile(file);
+      this.openFiles([...(e.dataTransfer?.files ?? [])]);
     });
     this.connectWipe();
     this.connectLobes();
@@ -317,12 +325,15 @@ class Page {
     });
   }
 
-  private openFile(file: File): void {
+  /** One file, or a .gltf with those that it names. */
+  private openFiles(files: readonly File[]): void {
+    const file = files.find(({ name }) => /\.gl(b|tf)$/i.test(name)) ?? files[0];
+    if (!file) return;
     void this.attempt(file.name, async () => {
       showLoading(`Reading ${file.name}`);
       const bytes = await file.arrayBuffer();
-      if (file.name.toLowerCase().endsWith('.glb')) {
-        await this.openBaked(file.name, bytes);
+      if (/\.gl(b|tf)$/i.test(file.name)) {
+        await this.openBaked(file.name, bytes, files);
         this.show();
       } else {
         const environment = makeEnvironment(file.name, readMap(bytes));
@@ -337,11 +348,11 @@ class Page {
     });
   }
 
-  private async openBaked(name: string, bytes: ArrayBuffer): Promise<void> {
+  private async openBaked(name: string, bytes: ArrayBuffer, beside: Beside): Promise<void> {
     const { viewer } = this,
       first = !this.opened;
     this.opened = true;
-    const problem = await this.useScene(name, bytes);
+    const problem = await this.useScene(name, bytes, beside);
     get('name').textContent = document.title = name;
     get('hint').hidden = false;
     get('invitation').hidden = true;
@@ -376,22 +387,22 @@ class Page {
     );
   }
 
-  private async useModel(role: 'baked' | 'compare', name: string, bytes: ArrayBuffer): Promise<void> {
+  private async useModel(role: 'baked' | 'compare', name: string, bytes: ArrayBuffer, beside: Beside): Promise<void> {
     try {
-      this.viewer.setModel(role, await readBaked(bytes));
+      this.viewer.setModel(role, await readBaked(bytes, beside));
     } catch (error) {
       throw new (error instanceof NoTransferError ? NoTransferError : LambentError)(sentence(name, error));
     }
   }
 
   /** The baked scene of a file; where it holds none, the scene as any viewer has it, and what is to be said of it. */
-  private async useScene(name: string, bytes: ArrayBuffer): Promise<NoTransferError | undefined> {
+  private async useScene(name: string, bytes: ArrayBuffer, beside: Beside): Promise<NoTransferError | undefined> {
     try {
-      await this.useModel('baked', name, bytes);
+      await this.useModel('baked', name, bytes, beside);
       return undefined;
     } catch (error) {
       if (!(error instanceof NoTransferError)) throw error;
-      const plain = await readPlain(bytes).catch(() => {
+      const plain = await readPlain(bytes, beside).catch(() => {
         throw error;
       });
       this.viewer.setPlain(plain);

@@ -45,6 +45,7 @@ export function replaceViews(
 ): Record<string, unknown> {
   const entry = ([key, value]: [string, unknown]): [string, unknown] => {
     if (key === 'provenance' || key === 'extras') return [key, value];
+    if (viewKeys.includes(key) && Array.isArray(value)) return [key, value.map((view) => place(view as number))];
     if (typeof value !== 'number' || plainKeys.includes(key)) return [key, walk(value)];
     if (!viewKeys.includes(key))
       throw new LambentError(`holds a number "${key}", which this version does not know: is there a newer one?`);
@@ -78,7 +79,8 @@ const objects = (list: unknown): Record<string, unknown>[] =>
 export function isOutOfPlace(document: Document, extension: Readonly<Record<string, unknown>>): boolean {
   const count = Array.isArray(document.bufferViews) ? document.bufferViews.length : 0,
     taken = new Set([...objects(document.accessors), ...objects(document.images)].map((o) => o['bufferView']));
-  const isWrong = (view: unknown): boolean => typeof view === 'number' && (view >= count || taken.has(view));
+  const isWrong = (view: unknown): boolean =>
+    Array.isArray(view) ? view.some(isWrong) : typeof view === 'number' && (view >= count || taken.has(view));
   const walk = (value: unknown): boolean => {
     if (typeof value !== 'object' || value === null) return false;
     return Object.entries(value).some(([key, inner]) =>

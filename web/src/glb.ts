@@ -1,4 +1,4 @@
-// The outside of a baked file: is it a whole GLB, and does it hold transfer that we know? Asked before three's loader
+// The outside of a baked file: is it a whole glTF, and does it hold transfer that we know? Asked before three's loader
 // is, whose messages are for developers.
 import { LambentError, NoTransferError } from './errors.js';
 import { isOutOfPlace } from './extension_views.js';
@@ -16,7 +16,7 @@ export interface TransferExtension {
   surface?: { kind: unknown; [key: string]: unknown };
   /** A fixed view: receivers are the pixels of a picture. */
   view?: unknown;
-  parts: { node: number; primitive: number; front?: number; back?: number; [key: string]: unknown }[];
+  parts: { node: number; primitive: number; front?: Views; back?: Views; [key: string]: unknown }[];
   provenance?: unknown;
 }
 
@@ -24,6 +24,11 @@ const isObject = (value: unknown): value is Record<string, unknown> =>
   typeof value === 'object' && value !== null && !Array.isArray(value);
 export const isIndex = (value: unknown, limit = 0xffffffff): value is number =>
   typeof value === 'number' && Number.isInteger(value) && value >= 0 && value <= limit;
+
+/** A buffer view by its number, or several, one after another: data too long for one file. */
+export type Views = number | readonly number[];
+export const isViews = (value: unknown): value is Views =>
+  isIndex(value) || (Array.isArray(value) && value.length > 0 && value.every((view) => isIndex(view)));
 
 /** Whether a document without our extension still names it: something has dropped the rest. */
 const hasTraces = (document: Record<string, unknown>): boolean =>
@@ -62,12 +67,25 @@ export function transferExtension(document: unknown): TransferExtension {
   return extension as unknown as TransferExtension;
 }
 
-/** Checks the container and the extension; returns the glTF document. */
+function parse(text: Uint8Array): unknown {
+  try {
+    return JSON.parse(new TextDecoder('utf-8', { fatal: true }).decode(text));
+  } catch {
+    throw new LambentError('holds JSON that cannot be read');
+  }
+}
+
+/** Checks the container, .glb or .gltf, and the extension; returns the glTF document. */
 export function checkBakedFile(bytes: ArrayBuffer): unknown {
   if (bytes.byteLength === 0) throw new LambentError('is empty');
   const view = new DataView(bytes);
-  if (bytes.byteLength < 4 || view.getUint32(0, true) !== 0x46546c67)
-    throw new LambentError('is not a glTF binary (.glb)');
+  if (bytes.byteLength < 4 || view.getUint32(0, true) !== 0x46546c67) {
+    if (!/^\s*\{/.test(new TextDecoder().decode(new Uint8Array(bytes, 0, Math.min(64, bytes.byteLength)))))
+      throw new LambentError('is not a glTF (.glb or .gltf)');
+    const document = parse(new Uint8Array(bytes));
+    transferExtension(document);
+    return document;
+  }
   const length = bytes.byteLength >= 12 ? view.getUint32(8, true) : Infinity;
   if (bytes.byteLength < 20 || length > bytes.byteLength)
     throw new LambentError(
@@ -78,12 +96,7 @@ export function checkBakedFile(bytes: ArrayBuffer): unknown {
   const jsonLength = view.getUint32(12, true);
   if (view.getUint32(16, true) !== 0x4e4f534a || jsonLength > length - 20)
     throw new LambentError('does not begin with its JSON chunk');
-  let document: unknown;
-  try {
-    document = JSON.parse(new TextDecoder('utf-8', { fatal: true }).decode(new Uint8Array(bytes, 20, jsonLength)));
-  } catch {
-    throw new LambentError('holds JSON that cannot be read');
-  }
+  const document = parse(new Uint8Array(bytes, 20, jsonLength));
   transferExtension(document);
   return document;
 }

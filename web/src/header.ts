@@ -1,7 +1,7 @@
 // What every kind reads alike: the header, receivers, and geometries that carry them (docs/file-format.md).
 import { BufferGeometry } from 'three';
 import { LambentError } from './errors.js';
-import { isIndex, type TransferExtension } from './glb.js';
+import { isIndex, isViews, type TransferExtension, type Views } from './glb.js';
 import { axesOf, isDrawn, type TransferSource } from './kinds.js';
 import { maxShOrder } from './sh.js';
 
@@ -12,7 +12,7 @@ export interface TransferHeader {
   channels: 1 | 3;
   precision: 'half' | 'single';
   receivers: number;
-  bufferView: number;
+  bufferView: Views;
   directional: Directional;
 }
 
@@ -65,7 +65,7 @@ export function readHeader(
   if (!isIndex(order, maxShOrder) || (order < 1 && !isMore(groups))) throw new LambentError('"order" is out of range');
   if (channels !== 1 && channels !== 3) throw new LambentError('"channels" is out of range');
   if (!isIndex(receivers, noReceiver - 1) || receivers < 1) throw new LambentError('"receivers" is out of range');
-  if (!isIndex(bufferView)) throw new LambentError('"bufferView" is missing');
+  if (!isViews(bufferView)) throw new LambentError('"bufferView" is missing');
   return {
     order,
     channels,
@@ -84,7 +84,7 @@ export async function readReceivers(
   receivers: number,
   message: string,
 ): Promise<Uint32Array> {
-  if (!isIndex(view)) throw new LambentError('a part has no buffer view of receivers');
+  if (!isViews(view)) throw new LambentError('a part has no buffer view of receivers');
   const bytes = await source.bufferView(view);
   if (bytes.byteLength !== 4 * count) throw new LambentError(message);
   const map = new Uint32Array(bytes);

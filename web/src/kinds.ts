@@ -1,14 +1,14 @@
 // The kinds of transfer that a file may hold. A new one is one entry here and one module.
 import type { Color, Material, Mesh, WebGLRenderer } from 'three';
-import type { TransferExtension } from './glb.js';
+import type { TransferExtension, Views } from './glb.js';
 import type { Lighting } from './lighting.js';
 import type { Lobe } from './lobes.js';
 
 /** What a kind is given to read itself from. */
 export interface TransferSource {
   extension: TransferExtension;
-  /** Bytes of a buffer view; rejects where there is none. */
-  bufferView(index: number): Promise<ArrayBuffer>;
+  /** Bytes of a buffer view, or of several one after another; rejects where there is none. */
+  bufferView(views: Views): Promise<ArrayBuffer>;
   /** The mesh that draws a part. Throws LambentError where the file has none. */
   mesh(part: TransferExtension['parts'][number]): Mesh;
   /**

@@ -24,7 +24,7 @@ import {
 } from 'three';
 import { blockTexture, packBlocks, type BlockLayout } from './block_texture.js';
 import { LambentError } from './errors.js';
-import { isIndex } from './glb.js';
+import { isIndex, isViews } from './glb.js';
 import {
   directionalRows,
   readHeader,
@@ -289,7 +289,7 @@ uint prtPick( const in ivec2 texel, out int row ) {
 
 /** Two floats a vertex, in texels. */
 async function readPlaces(source: TransferSource, view: unknown, vertices: number): Promise<Float32BufferAttribute> {
-  if (!isIndex(view)) throw new LambentError('a part has no buffer view of places in the atlas');
+  if (!isViews(view)) throw new LambentError('a part has no buffer view of places in the atlas');
   const bytes = await source.bufferView(view);
   if (bytes.byteLength !== 8 * vertices) throw new LambentError('a part does not have one place in the atlas a vertex');
   const places = new Float32Array(bytes);

@@ -14,7 +14,7 @@ import {
   type WebGLRenderer,
 } from 'three';
 import { LambentError } from './errors.js';
-import { isIndex } from './glb.js';
+import { isIndex, isViews } from './glb.js';
 import { glslHarmonics } from './glsl_harmonics.js';
 import type { TransferSource } from './kinds.js';
 import { maxShOrder, shCount } from './sh.js';
@@ -268,7 +268,7 @@ export async function loadLastReflection(source: TransferSource, receivers: numb
   const { outgoing, rows, views } = readOutgoing(source.extension.transfer);
   const view = async (name: string, bytes: number): Promise<ArrayBuffer> => {
     const index = views[name];
-    if (!isIndex(index)) throw new LambentError(`the last reflection has no "${name}"`);
+    if (!isViews(index)) throw new LambentError(`the last reflection has no "${name}"`);
     const found = await source.bufferView(index);
     if (found.byteLength !== bytes)
       throw new LambentError(

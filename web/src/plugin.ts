@@ -3,7 +3,7 @@
 import type { Material, Mesh, Object3D } from 'three';
 import type { GLTF, GLTFLoaderPlugin, GLTFParser } from 'three/addons/loaders/GLTFLoader.js';
 import { LambentError } from './errors.js';
-import { extensionName, isIndex, transferExtension, type TransferExtension } from './glb.js';
+import { extensionName, isIndex, transferExtension, type TransferExtension, type Views } from './glb.js';
 import { transferKind, type BakedTransfer, type TransferSource } from './kinds.js';
 import type { Lighting } from './lighting.js';
 
@@ -39,6 +39,36 @@ function findMeshes(gltf: GLTF, parser: GLTFParser): Map<string, Mesh> {
   return meshes;
 }
 
+/** One after another. */
+function joined(pieces: readonly ArrayBuffer[]): ArrayBuffer {
+  const length = pieces.reduce((sum, piece) => sum + piece.byteLength, 0);
+  let bytes: Uint8Array<ArrayBuffer>;
+  try {
+    bytes = new Uint8Array(length);
+  } catch {
+    throw new LambentError(`holds ${length.toLocaleString('en')} bytes in one piece, which is more than a browser has`);
+  }
+  let at = 0;
+  for (const piece of pieces) {
+    bytes.set(new Uint8Array(piece), at);
+    at += piece.byteLength;
+  }
+  return bytes.buffer;
+}
+
+/** Bytes of a document's buffer views, whichever files they are in. */
+export const viewReader =
+  (parser: { json: object; getDependency(type: string, index: number): Promise<unknown> }) =>
+  async (views: Views): Promise<ArrayBuffer> => {
+    const count = (parser.json as Document).bufferViews?.length ?? 0,
+      pieces: ArrayBuffer[] = [];
+    for (const index of typeof views === 'number' ? [views] : views) {
+      if (index >= count) throw new LambentError(`buffer view ${index} does not exist`);
+      pieces.push((await parser.getDependency('bufferView', index)) as ArrayBuffer);
+    }
+    return pieces.length === 1 ? pieces[0]! : joined(pieces);
+  };
+
 interface Document {
   extensions?: Record<string, unknown>;
   bufferViews?: unknown[];
@@ -67,10 +97,7 @@ export class LambentTransferPlugin implements GLTFLoaderPlugin {
     const meshes = findMeshes(gltf, this.parser);
     const source: TransferSource = {
       extension,
-      bufferView: async (index) => {
-        if (index >= (document.bufferViews?.length ?? 0)) throw new LambentError(`buffer view ${index} does not exist`);
-        return (await this.parser.getDependency('bufferView', index)) as ArrayBuffer;
-      },
+      bufferView: viewReader(this.parser),
       mesh: ({ node, primitive }: TransferExtension['parts'][number]) => {
         const mesh = meshes.get(`${node} ${primitive}`);
         if (!mesh) throw new LambentError(`node ${node}, primitive ${primitive} has transfer but no mesh`);

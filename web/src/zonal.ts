@@ -3,7 +3,7 @@
 // Transfer" (2005), eq. 13. At vertices the inner sums are made at the axis, without loops; pixels of a transfer
 // texture look them up in a table of the light, eq. 25 (transfer_texture.ts).
 import { LambentError } from './errors.js';
-import { isIndex } from './glb.js';
+import { isIndex, isViews } from './glb.js';
 import { glslHarmonics } from './glsl_harmonics.js';
 import { readHeader } from './header.js';
 import { limits, type TransferKind } from './kinds.js';
@@ -148,7 +148,7 @@ export const zonalKind: TransferKind = {
       errors = source.extension.transfer['fitErrors'];
     let fitErrors: Float32Array | undefined;
     if (errors !== undefined) {
-      if (!isIndex(errors)) throw new LambentError('"fitErrors" is no buffer view');
+      if (!isViews(errors)) throw new LambentError('"fitErrors" is no buffer view');
       const bytes = await source.bufferView(errors);
       if (bytes.byteLength !== 4 * header.receivers)
         throw new LambentError('there is not one error of a fit for each receiver');

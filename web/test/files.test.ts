@@ -1,9 +1,11 @@
 import { describe, expect, it } from 'vitest';
 import { DataUtils } from 'three';
 import { blockLayout, packBlocks, type BlockHeader } from '../src/block_texture.ts';
+import { replaceViews } from '../src/extension_views.ts';
 import { readHeader } from '../src/header.ts';
 import { checkBakedFile } from '../src/index.ts';
 import { mapLayout, packMaps, readOutgoing } from '../src/outgoing.ts';
+import { viewReader } from '../src/plugin.ts';
 import { zonalValues } from '../src/zonal.ts';
 import { random } from './tool.ts';
 
@@ -129,12 +131,73 @@ function glb(json: unknown): ArrayBuffer {
   return bytes.buffer;
 }
 
+/** Plain .gltf. */
+const gltf = (json: unknown): ArrayBuffer => new TextEncoder().encode(JSON.stringify(json)).buffer as ArrayBuffer;
+
+describe('a .gltf with its data in several files', () => {
+  const document = (bufferView: unknown, ...more: object[]): object => ({
+    asset: { version: '2.0' },
+    buffers: [{ byteLength: 8 }, { byteLength: 4 }],
+    bufferViews: [
+      { buffer: 0, byteLength: 4 },
+      { buffer: 0, byteOffset: 4, byteLength: 4 },
+      { buffer: 1, byteLength: 4 },
+    ],
+    extensions: {
+      LAMBENT_transfer: {
+        version: 1,
+        transfer: { kind: 'diffuse', bufferView },
+        parts: [{ node: 0, primitive: 0, front: [1, 2] }],
+      },
+    },
+    ...Object.assign({}, ...more),
+  });
+
+  it('is checked as a .glb is', () => {
+    expect(checkBakedFile(gltf(document([0, 1, 2])))).toMatchObject({ asset: { version: '2.0' } });
+    expect(() => checkBakedFile(gltf(document([0, 3])))).toThrow(/rewritten/);
+    expect(() => checkBakedFile(gltf(document([0, 2], { images: [{ bufferView: 2 }] })))).toThrow(/rewritten/);
+    expect(() => checkBakedFile(gltf({ asset: {} }))).toThrow(/not a baked file/);
+    expect(() => checkBakedFile(new TextEncoder().encode('{"asset": ').buffer as ArrayBuffer)).toThrow(/JSON/);
+  });
+
+  it('has each of its views carried', () => {
+    const extension = (document([0, 1, 2]) as { extensions: { LAMBENT_transfer: Record<string, unknown> } }).extensions
+      .LAMBENT_transfer;
+    expect(replaceViews(extension, (view) => view + 10)['transfer']).toEqual({
+      kind: 'diffuse',
+      bufferView: [10, 11, 12],
+    });
+  });
+
+  const header = { kind: 'diffuse', basis: 'sh', order: 1, channels: 1, precision: 'half', receivers: 16 };
+  const read = (bufferView: unknown) => () =>
+    readHeader({ version: 1, transfer: { ...header, bufferView }, parts: [] }).bufferView;
+
+  it('has a list of views in its header', () => {
+    expect(read([4, 5])()).toEqual([4, 5]);
+    for (const wrong of [[], [4, -1], ['4'], null, 1.5]) expect(read(wrong)).toThrow(/bufferView/);
+  });
+
+  it('is read by the plugin, view after view', async () => {
+    const bytes = (values: number[]): ArrayBuffer => new Uint8Array(values).buffer;
+    const views = [bytes([1, 2]), bytes([3]), bytes([4, 5, 6])];
+    const read = viewReader({
+      json: document([0, 1, 2]),
+      getDependency: (_: string, index: number) => Promise.resolve(views[index]),
+    });
+    expect([...new Uint8Array(await read([2, 0, 1]))]).toEqual([4, 5, 6, 1, 2, 3]);
+    expect(await read(1)).toBe(views[1]);
+    await expect(read([0, 3])).rejects.toThrow(/buffer view 3 does not exist/);
+  });
+});
+
 describe('files that are not what they should be', () => {
   const transfer = { kind: 'diffuse' },
     extension = (e: object) => glb({ extensions: { LAMBENT_transfer: { version: 1, transfer, parts: [], ...e } } });
   const cases: [string, ArrayBuffer, RegExp][] = [
     ['empty', new ArrayBuffer(0), /is empty/],
-    ['text', new TextEncoder().encode('hello, world, this is text').buffer, /not a glTF binary/],
+    ['text', new TextEncoder().encode('hello, world, this is text').buffer, /is not a glTF/],
     ['no extension', glb({ asset: { version: '2.0' } }), /not a baked file/],
     ['another version', extension({ version: 2 }), /version 2/],
     ['another kind', extension({ transfer: { kind: 'quantum' } }), /kind "quantum".*diffuse/],

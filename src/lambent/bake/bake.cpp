@@ -42,9 +42,9 @@ size_t solution_bytes(size_t receivers, size_t coefficients, int channels, int s
 
 // Direction tables, corner maps and the scratch of every thread; an upper estimate.
 size_t table_bytes(size_t receivers, size_t triangles, size_t coefficients, size_t samples) {
-  const size_t entries = gather_block * std::min(3 * samples, receivers);
+  const size_t entries = gather_block * std::min(3 * samples, receivers), columns = std::min(entries, receivers);
   return 8 * pad_lanes(samples) * 4 * (coefficients + 3) + 32 * triangles +
-         size_t(thread_count()) * (48 * receivers + 48 * entries + 100 * samples);
+         size_t(thread_count()) * (140 * columns + 60 * entries + 100 * samples);
 }
 
 struct Baker {
@@ -155,6 +155,7 @@ struct Baker {
     if (!B) return B.error();
     report.trace_seconds = B->report().seconds, report.buried = B->report().buried;
     report.operator_bytes = B->report().bytes, report.operator_kept = B->report().kept;
+    report.operator_file_bytes = B->report().file_bytes;
     report.working_memory = fixed + report.operator_bytes;
 
     const auto start = std::chrono::steady_clock::now();
@@ -179,6 +180,7 @@ struct Baker {
     report.rays = n() * (rays_each() - size_t(options.samples)) + B->report().rays;
     report.bounce_seconds = seconds_since(start);
     const std::vector<uint8_t> buried = B->buried();
+    B = Error{}, T0 = {};  // what comes has need of their memory
     return finish({std::move(last), std::move(solution->x)}, buried, std::move(terms));
   }
 

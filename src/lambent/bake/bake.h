@@ -44,9 +44,9 @@ struct BakeReport {
   size_t rays = 0;                   // traced in all
   int samples = 0;                   // rays a receiver of the result
   size_t bytes = 0;                  // of the transfer
-  size_t operator_bytes = 0;         // of the hit rows kept
-  double operator_kept = 1;   // fraction of the hit rows kept in memory; the rest was traced again for each bounce
-  size_t working_memory = 0;  // bytes, what the stages below allocated at their peak
+  size_t operator_bytes = 0;         // of the hit rows kept in memory
+  double operator_kept = 1;          // fraction of the hit rows kept; the rest was traced again for each bounce
+  size_t working_memory = 0;         // bytes, what the stages below allocated at their peak
   double trace_seconds = 0, bounce_seconds = 0, denoise_seconds = 0, certify_seconds = 0;
   // Relative RMS error of the result. Of diffuse transfer the certificate's; of other kinds of the transfer vectors at
   // the receivers, estimated from half-sample gathers at one in 16, which overestimates a little. Negative: not known.
@@ -58,6 +58,7 @@ struct BakeReport {
   // Where options.keep_terms says so, the result's terms: direct transfer, that of light reflected once, twice, ... E,
   // B E, B^2 E. They add up to the result, but for rounding. Source: radiosity, "Neumann series".
   std::vector<Transfer> terms;
+  size_t operator_file_bytes = 0;  // of the hit rows kept beyond memory, in a file (Progress::scratch)
 };
 
 // Least working memory (BakeOptions::memory) with which such a bake can run.

@@ -1,5 +1,6 @@
 // Follows: general-prt (transfer by the Neumann recursion, interpolated between receivers), radiosity (the same
 // operator).
+#include <lambent/bake/block_builder.h>
 #include <lambent/bake/fan.h>
 #include <lambent/bake/gather.h>
 #include <lambent/bake/kernels.h>
@@ -18,78 +19,6 @@ constexpr int set_count = 8;
 constexpr size_t lookahead = 16;
 
 bool is_grey(Vec3 c) { return c.x == c.y && c.y == c.z; }
-
-// A block's entries as its rays meet them, merged by row and column. Tables as long as there are columns find an entry
-// without searching and need no clearing: what an earlier row or block left there is told by its number.
-class BlockBuilder {
- public:
-  explicit BlockBuilder(size_t column_limit) : places_(column_limit) {}
-
-  void begin_block() {
-    ++block_;
-    entries_.clear(), row_ends_.clear(), columns_.clear(), counts_.clear();
-  }
-  void begin_row() {
-    if (++row_ == 0)
-      std::fill(places_.begin(), places_.end(), Place{}),
-          ++row_;  // numbers begin anew after four thousand million rows
-  }
-  void prefetch(uint32_t column) const { __builtin_prefetch(&places_[column]); }
-  void end_row() { row_ends_.push_back(uint32_t(entries_.size())); }
-
-  void add(uint32_t column, Vec3 weight) {
-    Place& place = places_[column];
-    if (place.row == row_) {
-      entries_[place.entry].weight += weight;
-      return;
-    }
-    if (place.block != block_) {
-      place.block = block_, place.local = uint32_t(columns_.size());
-      columns_.push_back(column), counts_.push_back(0);
-    }
-    ++counts_[place.local];
-    place.row = row_, place.entry = uint32_t(entries_.size());
-    entries_.push_back({place.local, weight});
-  }
-
-  // Regroups the rows by columns: a counting sort, which keeps the rows of a column in order.
-  void finish(int channels, float unit, SparseBlock& out) {
-    out.row_count = row_ends_.size();
-    out.columns = columns_;
-    out.ends.resize(columns_.size());
-    uint32_t start = 0;
-    for (size_t k = 0; k < columns_.size(); ++k) out.ends[k] = start, start += counts_[k];
-    out.rows.resize(entries_.size());
-    floats_.resize(entries_.size() * size_t(channels));
-    for (size_t row = 0, i = 0; row < row_ends_.size(); ++row)
-      for (; i < row_ends_[row]; ++i) {
-        const size_t at = out.ends[entries_[i].local]++;  // the end once all are placed
-        out.rows[at] = uint8_t(row);
-        const Vec3 weight = entries_[i].weight * unit;
-        if (channels == 1) floats_[at] = weight.x;
-        else floats_[3 * at] = weight.x, floats_[3 * at + 1] = weight.y, floats_[3 * at + 2] = weight.z;
-      }
-    out.weights.resize(floats_.size());
-    floats_to_halves(floats_.data(), floats_.size(), out.weights.data());
-  }
-
- private:
-  // Sixteen bytes, so that looking one up touches one cache line.
-  struct alignas(16) Place {
-    uint32_t row = 0;               // the last that met this column, counted over all blocks
-    uint32_t block = 0, local = 0;  // and its number among that block's columns
-    uint32_t entry = 0;
-  };
-  struct Entry {
-    uint32_t local;
-    Vec3 weight;
-  };
-  uint32_t row_ = 0, block_ = 0;
-  std::vector<Place> places_;
-  std::vector<Entry> entries_;
-  std::vector<uint32_t> row_ends_, columns_, counts_;
-  std::vector<float> floats_;
-};
 
 // One receiver's directions in world space, and the sky row of a visibility.
 struct Fan {

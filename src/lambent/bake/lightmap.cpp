@@ -192,7 +192,8 @@ Result<Lightmap> bake_lightmap(const Scene& scene, const Tracer& tracer, const R
     map.direct = std::move(*direct_light);
   }
   r.receivers = n, r.buried = op->report().buried, r.rays = op->report().rays;
-  r.operator_bytes = op->report().bytes, r.operator_kept = bounces ? op->report().kept : 1;
+  r.operator_bytes = op->report().bytes, r.operator_file_bytes = op->report().file_bytes;
+  r.operator_kept = bounces ? op->report().kept : 1;
   return map;
 }
 

@@ -43,6 +43,7 @@ struct LightmapReport {
   // Where half floats were asked for and single ones taken: the brightest value of all, or of the darkest group, which
   // halves do not hold; else 0.
   float beyond_half = 0;
+  size_t operator_file_bytes = 0;  // as BakeReport's
 };
 
 // Least working memory with which such a bake can run: the solution vectors. What is more holds the operator.

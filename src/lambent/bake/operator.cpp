@@ -22,30 +22,20 @@ class TracedPiece {
     if (direct) lights_.resize((end - begin) * 3 * direct->lamps.groups());
   }
 
-  bool load(const KeptPieces& pieces, size_t number, GatherBlock& block, bool& has_rows, size_t receivers) {
-    SparseBlock &rows = block.rows, &half_rows = block.half_rows;
+  bool load(const KeptPieces& pieces, size_t number, PackedBlock& packed, bool& has_rows) {
     const std::span<float> lights(lights_);
-    if (!pieces.load(number, sky_, half_, buried_, lights, has_rows, rows.row_count, rows.columns, rows.ends, rows.rows,
-                     rows.weights, half_rows.row_count, half_rows.columns, half_rows.ends, half_rows.rows,
-                     half_rows.weights))
-      return false;
-    if (!is_sound(rows, receivers) || !is_sound(half_rows, receivers)) {
-      pieces.refuse();
-      return false;
-    }
+    if (!pieces.load(number, sky_, half_, buried_, lights, has_rows, packed.rows, packed.half_rows)) return false;
     for (size_t i = 0, each = direct_ ? 3 * direct_->lamps.groups() : 0; i * each < lights_.size(); ++i)
       std::copy_n(lights_.data() + i * each, each, direct_->rows + i * direct_->width);
     return true;
   }
-  void save(const KeptPieces& pieces, size_t number, GatherBlock& block, bool has_rows) {
-    GatherBlock none;
-    SparseBlock &rows = has_rows ? block.rows : none.rows, &half_rows = has_rows ? block.half_rows : none.half_rows;
+  void save(const KeptPieces& pieces, size_t number, PackedBlock& packed, bool has_rows) {
+    PackedBlock none;
+    PackedBlock& rows = has_rows ? packed : none;
     for (size_t i = 0, each = direct_ ? 3 * direct_->lamps.groups() : 0; i * each < lights_.size(); ++i)
       std::copy_n(direct_->rows + i * direct_->width, each, lights_.data() + i * each);
     const std::span<float> lights(lights_);
-    pieces.save(number, sky_, half_, buried_, lights, has_rows, rows.row_count, rows.columns, rows.ends, rows.rows,
-                rows.weights, half_rows.row_count, half_rows.columns, half_rows.ends, half_rows.rows,
-                half_rows.weights);
+    pieces.save(number, sky_, half_, buried_, lights, has_rows, rows.rows, rows.half_rows);
   }
 
  private:
@@ -71,17 +61,26 @@ void GatherOperator::trace_block(const GatherWanted& wanted, size_t begin, size_
     direct.emplace(GatherDirect{d->lamps, d->samples, d->rows + begin * d->width, d->width});
   const size_t number = begin / gather_block;
   TracedPiece piece(wanted, sky, direct ? &*direct : nullptr, begin, end);
+  const auto packed = traced_->packed.borrow();
   bool has_rows = false;
-  if (pieces && piece.load(pieces, number, *block, has_rows, rows())) {
-    if (wanted.hits && has_rows) traced_->kept.keep(number, *block);
-    return;
+  if (pieces && piece.load(pieces, number, *packed, has_rows)) {
+    if (!has_rows || (unpack(packed->rows, rows(), setup_->channels, block->rows) &&
+                      (!wanted.halves || unpack(packed->half_rows, rows(), setup_->channels, block->half_rows)))) {
+      if (wanted.hits && has_rows) traced_->kept.keep(number, *packed);
+      return;
+    }
+    pieces.refuse();
   }
   trace_gather(*setup_, *scratch, begin, end - begin, wanted.hits ? block.get() : nullptr, &sky,
                direct ? &*direct : nullptr);
   if (wanted.more) wanted.more(begin, end - begin, sky);
-  if (!wanted.halves) block->half_rows = {};
-  has_rows = wanted.hits && traced_->kept.keep(number, *block);
-  if (pieces) piece.save(pieces, number, *block, has_rows);
+  if (wanted.hits) {
+    pack(block->rows, packed->rows);
+    packed->half_rows.clear();
+    if (wanted.halves) pack(block->half_rows, packed->half_rows);
+    has_rows = traced_->kept.keep(number, *packed);
+  }
+  if (pieces) piece.save(pieces, number, *packed, has_rows);
 }
 
 Result<GatherOperator> GatherOperator::trace(const GatherSetup& setup, const GatherWanted& wanted, Progress* progress) {
@@ -91,8 +90,10 @@ Result<GatherOperator> GatherOperator::trace(const GatherSetup& setup, const Gat
   const size_t n = setup.receivers.count();
   op.buried_.assign(n, 0);
   op.traced_ = std::shared_ptr<Traced>(new Traced{
-      KeptRows(op.blocks(), wanted.hits ? wanted.memory : 0, most_bytes(size_t(setup.sets.samples), n, setup.channels)),
+      KeptRows(op.blocks(), wanted.hits ? wanted.memory : 0, most_bytes(size_t(setup.sets.samples), n, setup.channels),
+               wanted.hits && progress ? progress->scratch : std::string()),
       Pool<GatherBlock>([] { return std::make_unique<GatherBlock>(); }),
+      Pool<PackedBlock>([] { return std::make_unique<PackedBlock>(); }),
       Pool<GatherScratch, DeleteScratch>([&setup] { return make_gather_scratch(setup); }),
       Pool<AlignedVector<float>>([] { return std::make_unique<AlignedVector<float>>(); })});
   ProgressStage stage(progress, "tracing", n);
@@ -108,6 +109,7 @@ Result<GatherOperator> GatherOperator::trace(const GatherSetup& setup, const Gat
   if (wanted.sky.rows) fill_buried(op.fill_, wanted.sky.rows, wanted.sky.stride, wanted.sky.stride);
   for (uint8_t b : op.buried_) op.report_.buried += b;
   op.report_.rays = n * size_t(setup.sets.samples), op.report_.bytes = op.traced_->kept.bytes();
+  op.report_.file_bytes = op.traced_->kept.file_bytes();
   op.report_.kept = op.traced_->kept.fraction();
   op.report_.seconds = std::chrono::duration<double>(std::chrono::steady_clock::now() - start).count();
   return op;
@@ -127,25 +129,31 @@ GatherOperator::Report GatherOperator::report() const {
   return r;
 }
 
-void GatherOperator::with_rows(size_t b, auto f) const {
-  if (const KeptRows::Block* kept = traced_->kept.find(b)) return f(*kept);
+void GatherOperator::with_rows(size_t b, bool halves, auto f) const {
+  const auto block = traced_->blocks.borrow();
+  {
+    const auto buffer = traced_->packed.borrow();
+    KeptRows::Block kept;
+    if (traced_->kept.find(b, buffer->rows, kept) && unpack(kept.rows, rows(), setup_->channels, block->rows) &&
+        (!halves || unpack(kept.half_rows, rows(), setup_->channels, block->half_rows)))
+      return f(*block);
+  }
   const size_t begin = b * gather_block, count = std::min(gather_block, rows() - begin);
-  auto again = traced_->blocks.borrow();
-  trace_gather(*setup_, *traced_->scratch.borrow(), begin, count, again.get(), nullptr);
+  trace_gather(*setup_, *traced_->scratch.borrow(), begin, count, block.get(), nullptr);
   traced_->rays += count * size_t(setup_->sets.samples);
-  f(KeptRows::Block{again->rows.view(), again->half_rows.view()});
+  f(*block);
 }
 
 void GatherOperator::add_rows(size_t first, size_t count, const float* x, size_t width, float* y, float* half) const {
   LAMBENT_CHECK(first % gather_block == 0 && count <= gather_block);
   const auto sums = traced_->sums.borrow();
-  auto add = [&](const SparseRows& rows, size_t rays, float* out) {
+  auto add = [&](const SparseBlock& rows, size_t rays, float* out) {
     const float scale = setup_->row_scale(rays);
     sums->assign(rows.row_count * width, 0.0f);
-    multiply_entries(rows.entries, setup_->channels, x, width, sums->data());
+    multiply_entries(rows.view().entries, setup_->channels, x, width, sums->data());
     for (size_t i = 0; i < sums->size(); ++i) out[i] += scale * (*sums)[i];
   };
-  with_rows(first / gather_block, [&](const KeptRows::Block& block) {
+  with_rows(first / gather_block, half != nullptr, [&](const GatherBlock& block) {
     add(block.rows, size_t(setup_->sets.samples), y);
     if (half) add(block.half_rows, setup_->sets.half, half);
   });
@@ -158,8 +166,8 @@ std::optional<TransposedRows> GatherOperator::transposed() const {
   const size_t channels = size_t(push.channels);
   auto each_entry = [&](auto f) {
     for (size_t b = 0; b < blocks(); ++b)
-      with_rows(b, [&](const KeptRows::Block& block) {
-        const SparseEntries& s = block.rows.entries;
+      with_rows(b, false, [&](const GatherBlock& block) {
+        const SparseEntries s = block.rows.view().entries;
         for (size_t k = 0, e = 0; k < s.column_count; ++k)
           for (; e < s.ends[k]; ++e) {
             const size_t row = b * gather_block + s.rows[e];

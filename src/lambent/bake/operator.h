@@ -21,13 +21,13 @@ struct GatherWanted {
   std::function<void(size_t first, size_t count, const GatherSky& sky)> more{};
   bool hits = true;     // hit rows; with none the operator is not to be applied
   bool halves = false;  // and those of half of the rays
-  size_t memory = 0;    // bytes of hit rows kept, at most
+  size_t memory = 0;    // bytes of hit rows kept in memory, at most; more go where the progress says (`scratch`)
 };
 
 class GatherOperator final : public LinearOperator {
  public:
   struct Report {
-    size_t rays = 0, bytes = 0;  // traced so far; of the rows kept
+    size_t rays = 0, bytes = 0, file_bytes = 0;  // traced so far; of the rows kept, in memory and beyond it in a file
     size_t buried = 0;
     double kept = 1;     // fraction of the blocks kept; the rest is traced again at each application
     double seconds = 0;  // of the first tracing
@@ -54,12 +54,13 @@ class GatherOperator final : public LinearOperator {
   struct Traced {
     KeptRows kept;
     Pool<GatherBlock> blocks;
+    Pool<PackedBlock> packed;
     Pool<GatherScratch, DeleteScratch> scratch;
     Pool<AlignedVector<float>> sums;  // of a block's entries, not yet scaled
     std::atomic<size_t> rays{0};
   };
-  // Calls f with the rows of a block, kept or traced again.
-  void with_rows(size_t block, auto f) const;
+  // Calls f with the rows of a block, kept or traced again; those of half of the rays only where asked for.
+  void with_rows(size_t block, bool halves, auto f) const;
   void trace_block(const GatherWanted& wanted, size_t begin, size_t end, const KeptPieces& pieces);
 
   const GatherSetup* setup_ = nullptr;

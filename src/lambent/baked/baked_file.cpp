@@ -4,6 +4,7 @@
 #include <lambent/scene/exclude.h>
 #include <lambent/baked/viewer_look.h>
 #include <lambent/core/check.h>
+#include <lambent/core/uri.h>
 #include <lambent/scene/gltf.h>
 #include <lambent/scene/load.h>
 #include <lambent/core/overloaded.h>
@@ -149,15 +150,15 @@ const Field* lattice_of(const Baked& baked) {
   return nullptr;
 }
 
-Result<void> save_baked(const std::string& path, const Baked& baked, const ViewerLook* look) {
+Result<void> save_baked(const std::string& path, const Baked& baked, const ViewerLook* look, size_t bin_limit) {
   BlobWriter bulk;
   json extension = encode_fields(baked, bulk);
   std::vector<GltfBlob> blobs;
-  for (const BlobWriter::Blob& blob : bulk.blobs) blobs.push_back({blob.bytes, blob.alignment});
+  for (const BlobWriter::Blob& blob : bulk.blobs) blobs.push_back({blob.bytes, blob.alignment, true});
   LookWriter look_writer(baked.scene, baked.basis, look);
   look_writer.add_blobs(blobs);
-  return save_glb(path, baked.scene, blobs, [&](json& document, const GltfPlaces& places) {
-    resolve_views(extension, places.first_view);
+  const auto extend = [&](json& document, const GltfPlaces& places) {
+    resolve_views(extension, places.views);
     json parts = json::array();
     for (size_t i = 0; i < extension["parts"].size(); ++i) {
       if (places.part_nodes[i] < 0) continue;  // a part without vertices, which the file does not have
@@ -171,7 +172,8 @@ Result<void> save_baked(const std::string& path, const Baked& baked, const Viewe
     json& used = document["extensionsUsed"];
     if (!used.is_array()) used = json::array();
     if (std::find(used.begin(), used.end(), extension_name) == used.end()) used.push_back(extension_name);
-  });
+  };
+  return save_gltf(path, baked.scene, blobs, extend, bin_limit);
 }
 
 namespace {
@@ -219,7 +221,7 @@ Result<void> save_look(const std::string& path, const Baked& baked, const Viewer
   std::vector<GltfBlob> blobs;
   LookWriter look_writer(baked.scene, baked.basis, &look);
   look_writer.add_blobs(blobs);
-  return save_glb(path, baked.scene, blobs, [&](json& document, const GltfPlaces& places) {
+  return save_gltf(path, baked.scene, blobs, [&](json& document, const GltfPlaces& places) {
     look_writer.write(document, places);
     if (look.kind != LookKind::coordinates) return;
     auto named = name_nodes(document, places);
@@ -236,14 +238,37 @@ Result<Baked> load_baked(const std::string& path) {
 Result<Baked> load_baked(const MappedFile& file, const std::string& path) {
   auto fields = read_fields(file, path);
   if (!fields) return fields.error();
-  const std::string folder = std::filesystem::path(path).parent_path().string();
-  auto scene = load_gltf(file, path, folder.empty() ? "." : folder);
+  auto scene = load_gltf(file, path, folder_of(path));
   if (!scene) return scene.error();
   exclude_parts(*scene, fields->excluded);  // of inputs without a document they are not there
   if (auto ok = fit_to_scene(*scene, fields->surface.where, fields->parts, path); !ok) return ok.error();
   Baked baked{std::move(*fields), std::move(*scene), {}};
   baked.basis = spatial_basis(baked.scene, baked.surface.where);
   return baked;
+}
+
+std::vector<std::string> files_of(const std::string& path) {
+  std::vector<std::string> out{path};
+  auto file = MappedFile::open(path);
+  if (!file || file->bytes().empty()) return out;
+  auto chunks = split_gltf(file->bytes(), path);
+  if (!chunks || !chunks->json.contains("buffers")) return out;
+  for (const json& buffer : chunks->json["buffers"]) {
+    const json uri = buffer.is_object() ? buffer.value("uri", json()) : json();
+    if (!uri.is_string() || is_data_uri(uri.get<std::string>())) continue;
+    if (auto found = find_external_file(uri.get<std::string>(), folder_of(path), path); found) out.push_back(*found);
+  }
+  return out;
+}
+
+size_t bytes_on_disk(const std::string& path) {
+  size_t bytes = 0;
+  for (const std::string& file : files_of(path)) {
+    std::error_code status;
+    const uintmax_t size = std::filesystem::file_size(file, status);
+    bytes += status ? 0 : size_t(size);
+  }
+  return bytes;
 }
 
 bool is_baked(const std::string& path) {

@@ -1,6 +1,7 @@
 #pragma once
-// The baked file: a glTF 2.0 binary that any viewer opens, the input's scene kept, with the transfer in the extension
-// LAMBENT_transfer (docs/file-format.md; schema in docs/schema/).
+// The baked file: a glTF 2.0 that any viewer opens, in one binary (.glb) or with its data beside it (.gltf), the
+// input's scene kept, with the transfer in the extension LAMBENT_transfer (docs/file-format.md; schema in
+// docs/schema/).
 #include <lambent/baked/fields.h>
 #include <lambent/receivers/receivers.h>
 #include <lambent/scene/scene.h>
@@ -48,10 +49,14 @@ struct ViewerLook : ViewerPicture {
   std::vector<uint32_t> object_of_part = {};  // into objects, where there are any
 };
 
+// A .glb, or a .gltf of any size with its data in NAME.0.bin, NAME.1.bin, ... of at most bin_limit bytes each (>=
+// 65536; what glTF's own accessors and images have in one piece may be longer); all of them appear together, or none.
 // With a look, primitives get materials for it, two-sided ones a second primitive for their backs; the scene's own
-// materials stay in the file, and loading finds them again. Errors: the disk's; more than 4 GiB, which a GLB cannot
+// materials stay in the file, and loading finds them again. Errors: the disk's; more than 4 GiB, which a .glb cannot
 // hold.
-Result<void> save_baked(const std::string& path, const Baked& baked, const ViewerLook* look = nullptr);
+inline constexpr size_t default_bin_limit = size_t{1} << 30;  // what browsers take as one array
+Result<void> save_baked(const std::string& path, const Baked& baked, const ViewerLook* look = nullptr,
+                        size_t bin_limit = default_bin_limit);
 
 // The scene with a look and without the transfer, for other programs. `nodes` gets, where it is given, the names of
 // each part's node and of those above it, topmost first; none of parts without vertices. Errors: as above; coordinates
@@ -65,6 +70,10 @@ Result<Baked> load_baked(const MappedFile& file, const std::string& path);
 
 // What save_baked() was given to show; nullopt where the file has none.
 std::optional<ViewerLook> load_look(const MappedFile& file, const std::string& path);
+
+// A baked file and the files of its buffers, where it has any; and how many bytes they are, 0 where it is not there.
+std::vector<std::string> files_of(const std::string& path);
+size_t bytes_on_disk(const std::string& path);
 
 // Whether the file is a glTF with our extension; false for anything else, unreadable files too.
 bool is_baked(const std::string& path);

@@ -223,7 +223,7 @@ TEST(BakedFile, AnEarlierBakeLeavesNothing) {
     SCOPED_TRACE(texels);
     Mapped m = small_map(texels);
     // One part wears no material, and one has both sets of texture coordinates already.
-    ASSERT_TRUE(save_glb(plain.path, m.scene, {}, [](nlohmann::json& document, const GltfPlaces&) {
+    ASSERT_TRUE(save_gltf(plain.path, m.scene, {}, [](nlohmann::json& document, const GltfPlaces&) {
       document["meshes"][0]["primitives"][0].erase("material");
       auto& attributes = document["meshes"][1]["primitives"][0]["attributes"];
       document["accessors"].push_back({{"componentType", 5126},
@@ -231,7 +231,7 @@ TEST(BakedFile, AnEarlierBakeLeavesNothing) {
                                        {"type", "VEC2"}});
       attributes["TEXCOORD_0"] = attributes["TEXCOORD_1"] = document["accessors"].size() - 1;
     }));
-    ASSERT_TRUE(save_glb(plain.path, *load_scene(plain.path), {}, {}));  // without what we have replaced
+    ASSERT_TRUE(save_gltf(plain.path, *load_scene(plain.path), {}, {}));  // without what we have replaced
     auto scene = load_scene(plain.path);
     ASSERT_TRUE(scene) << scene.error().text();
     const nlohmann::json original = scene->document->json;

@@ -18,11 +18,12 @@ json BlobWriter::add(std::span<const uint8_t> bytes, size_t alignment) {
   return {{view_key, blobs.size() - 1}};
 }
 
-void resolve_views(json& value, int first_view) {
+void resolve_views(json& value, std::span<const std::vector<int>> views) {
   if (value.is_object() && value.size() == 1 && value.contains(view_key)) {
-    value = first_view + value[view_key].get<int>();
+    const std::vector<int>& numbers = views[value[view_key].get<size_t>()];
+    value = numbers.size() == 1 ? json(numbers[0]) : json(numbers);
   } else if (value.is_structured()) {
-    for (json& item : value) resolve_views(item, first_view);
+    for (json& item : value) resolve_views(item, views);
   }
 }
 
@@ -43,25 +44,11 @@ Result<std::vector<float>> read_numbers(const json& object, const char* key, siz
   return list->get<std::vector<float>>();
 }
 
-Result<std::span<const uint8_t>> view_bytes(const BlobReader& in, size_t index, const std::string& where) {
-  const json& document = in.chunks.json;
-  const size_t whole = in.chunks.binary.size();
-  const std::string place = where + ": buffer view " + std::to_string(index);
-  if (!document.contains("bufferViews") || !document["bufferViews"].is_array() ||
-      index >= document["bufferViews"].size())
-    return Error{place, "does not exist"};
-  const json& view = document["bufferViews"][index];
-  auto buffer = read_count(view, "buffer", 0, place);
-  if (!buffer) return buffer.error();
-  size_t offset = 0;
-  if (view.contains("byteOffset")) {
-    auto given = read_count(view, "byteOffset", whole, place);
-    if (!given) return given.error();
-    offset = *given;
-  }
-  auto length = read_count(view, "byteLength", whole - offset, place);
-  if (!length) return length.error();
-  return in.chunks.binary.subspan(offset, *length);
+Result<ViewBytes> read_view(const BlobReader& in, const json& object, const char* key, const std::string& where) {
+  const auto it = object.is_object() ? object.find(key) : object.end();
+  if (!object.is_object() || it == object.end() || !(it->is_number_unsigned() || it->is_array()))
+    return Error{where, std::string("\"") + key + "\" is missing or out of range"};
+  return in.buffers.view(*it, where);
 }
 
 }  // namespace lambent

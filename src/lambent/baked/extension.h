@@ -2,7 +2,7 @@
 // What the reader and the writer of LAMBENT_transfer share (docs/file-format.md): the JSON of the extension with its
 // bulk data, and a codec for each store, meaning and placement.
 #include <lambent/baked/fields.h>
-#include <lambent/core/glb.h>
+#include <lambent/baked/gltf_buffers.h>
 
 #include <bit>
 #include <cstring>
@@ -17,7 +17,7 @@ static_assert(std::endian::native == std::endian::little, "the file and its in-p
 inline constexpr const char* extension_name = "LAMBENT_transfer";
 
 // Bulk data on its way into a file. add() gives what stands for the data's buffer view in JSON until the views have
-// their numbers, which resolve_views() puts in.
+// their numbers, which resolve_views() puts in: of data that were written in pieces, a list of them.
 class BlobWriter {
  public:
   struct Blob {
@@ -36,12 +36,12 @@ class BlobWriter {
  private:
   std::deque<std::vector<uint8_t>> kept_;
 };
-void resolve_views(nlohmann::json& value, int first_view);
+// views[i]: those of blob i.
+void resolve_views(nlohmann::json& value, std::span<const std::vector<int>> views);
 
 // A stranger's JSON and bulk data. All errors name `where`.
 struct BlobReader {
-  const GltfChunks& chunks;
-  const MappedFile& file;
+  const GltfBuffers& buffers;
 };
 
 // A non-negative integer member, at most `limit`.
@@ -49,21 +49,21 @@ Result<size_t> read_count(const nlohmann::json& object, const char* key, size_t 
 // Exactly so many numbers, all within 1e9.
 Result<std::vector<float>> read_numbers(const nlohmann::json& object, const char* key, size_t count,
                                         const std::string& where);
-// The bytes of a buffer view of the (single) binary chunk.
-Result<std::span<const uint8_t>> view_bytes(const BlobReader& in, size_t index, const std::string& where);
-// Those of the view that member `key` names, as values of type T.
+// The bytes of the buffer view, or of the list of views, that member `key` names.
+Result<ViewBytes> read_view(const BlobReader& in, const nlohmann::json& object, const char* key,
+                            const std::string& where);
+// The same as values of type T.
 template <class T>
 Result<std::vector<T>> read_all_values(const BlobReader& in, const nlohmann::json& object, const char* key,
                                        const std::string& where) {
-  auto index = read_count(object, key, 0x7fffffff, where);
-  if (!index) return index.error();
-  auto bytes = view_bytes(in, *index, where);
-  if (!bytes) return bytes.error();
-  if (bytes->size() % sizeof(T))
-    return Error{where, std::string("\"") + key + "\" holds " + std::to_string(bytes->size()) +
+  auto view = read_view(in, object, key, where);
+  if (!view) return view.error();
+  const std::span<const uint8_t> bytes = view->bytes;
+  if (bytes.size() % sizeof(T))
+    return Error{where, std::string("\"") + key + "\" holds " + std::to_string(bytes.size()) +
                             " bytes, which is no whole number of values"};
-  std::vector<T> values(bytes->size() / sizeof(T));
-  if (!values.empty()) std::memcpy(static_cast<void*>(values.data()), bytes->data(), bytes->size());
+  std::vector<T> values(bytes.size() / sizeof(T));
+  if (!values.empty()) std::memcpy(static_cast<void*>(values.data()), bytes.data(), bytes.size());
   return values;
 }
 // Exactly `count` of them.
@@ -102,7 +102,7 @@ Result<Field> decode_lattice(const BlobReader& in, const nlohmann::json& object,
 
 // The extension's JSON, with references to `out`'s blobs for bulk data; parts are to get their nodes and primitives.
 nlohmann::json encode_fields(const BakedFields& fields, BlobWriter& out);
-Result<BakedFields> read_fields(const MappedFile& file, const GltfChunks& chunks, const std::string& path);
+Result<BakedFields> read_fields(const GltfBuffers& buffers, const std::string& path);
 
 // Whether JSON is of a glTF with our extension.
 bool has_extension(const nlohmann::json& document);

@@ -105,17 +105,17 @@ Result<BakedFields> read_fields(const std::string& path) {
 }
 
 Result<BakedFields> read_fields(const MappedFile& file, const std::string& path) {
-  if (file.bytes().empty()) return Error{path, "is empty"};
-  auto chunks = split_gltf(file.bytes(), path);
-  if (!chunks) return chunks.error();
-  return read_fields(file, *chunks, path);
+  auto buffers = GltfBuffers::open(file, path, folder_of(path));
+  if (!buffers) return buffers.error();
+  return read_fields(*buffers, path);
 }
 
-Result<BakedFields> read_fields(const MappedFile& file, const GltfChunks& chunks, const std::string& path) {
-  if (auto rewritten = find_rewritten(chunks.json, path)) return *rewritten;
-  if (!has_extension(chunks.json))
+Result<BakedFields> read_fields(const GltfBuffers& buffers, const std::string& path) {
+  const json& document = buffers.json();
+  if (auto rewritten = find_rewritten(document, path)) return *rewritten;
+  if (!has_extension(document))
     return Error{path, "is not a baked file: it has no LAMBENT_transfer extension (make one with `lambent bake`)"};
-  const json& extension = chunks.json["extensions"][extension_name];
+  const json& extension = document["extensions"][extension_name];
   const std::string where = path + ": " + extension_name;
   auto version = read_count(extension, "version", 0x7fffffff, where);
   if (!version) return version.error();
@@ -124,7 +124,7 @@ Result<BakedFields> read_fields(const MappedFile& file, const GltfChunks& chunks
                            std::to_string(baked_file_version)};
   const auto t = extension.find("transfer");
   if (t == extension.end() || !t->is_object()) return Error{where, "\"transfer\" is missing"};
-  const BlobReader in{chunks, file};
+  const BlobReader in{buffers};
   auto surface = decode_transfer(in, *t, where);
   if (!surface) return surface.error();
   BakedFields fields{std::move(*surface), {}, {}, {}, {}, "{}"};

@@ -27,8 +27,8 @@ struct BakedFields {
   std::string provenance = "{}";  // JSON text: the request, inputs and their hashes, version, what the bake reported
 };
 
-// Data are read in place and keep the mapping alive. Errors: not a baked file, another version, anything that does not
-// fit; all in one line that names the file.
+// Data are read in place and keep the mapping alive; the .bin files of a .gltf are looked up beside `path`. Errors: not
+// a baked file, another version, anything that does not fit or is not there; all in one line that names the file.
 Result<BakedFields> read_fields(const MappedFile& file, const std::string& path);
 Result<BakedFields> read_fields(const std::string& path);
 

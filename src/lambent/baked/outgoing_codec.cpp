@@ -36,7 +36,7 @@ Result<void> decode_maps(const BlobReader& in, const json& object, int rows, siz
     if (!*count) return count->error();
   if (*grid < 2 || *maps < 1) return Error{where, "view maps have no size"};
   const size_t each = *grid * *grid * size_t(rows);
-  if (*maps > in.chunks.binary.size() / (8 * each)) return Error{where, "there is no room for so many view maps"};
+  if (*maps > in.buffers.room() / (8 * each)) return Error{where, "there is no room for so many view maps"};
   auto halves = read_values<uint16_t>(in, object, "maps", *maps * each * 4, where);
   if (!halves) return halves.error();
   const uint16_t* p = halves->data();

@@ -85,19 +85,19 @@ Result<void> decode_values(const BlobReader& in, const json& object, T& t, const
   const bool half = precision != object.end() && *precision == "half";
   if (!half && (precision == object.end() || *precision != "single"))
     return Error{where, "\"precision\" must be half or single"};
-  auto channels = read_count(object, "channels", 3, where), view = read_count(object, "bufferView", 0x7fffffff, where);
-  for (const auto* count : {&channels, &view})
-    if (!*count) return count->error();
+  auto channels = read_count(object, "channels", 3, where);
+  if (!channels) return channels.error();
   if (*channels != 1 && *channels != 3) return Error{where, "\"channels\" is out of range"};
   t.channels = int(*channels), t.precision = half ? Precision::half : Precision::single;
-  auto data = view_bytes(in, *view, where);
-  if (!data) return data.error();
-  if (data->size() != t.bytes())
-    return Error{where, "the transfer holds " + std::to_string(data->size()) + " bytes where its header makes " +
+  auto view = read_view(in, object, "bufferView", where);
+  if (!view) return view.error();
+  const std::span<const uint8_t> data = view->bytes;
+  if (data.size() != t.bytes())
+    return Error{where, "the transfer holds " + std::to_string(data.size()) + " bytes where its header makes " +
                             std::to_string(t.bytes())};
-  if (reinterpret_cast<uintptr_t>(data->data()) % t.value_bytes()) return Error{where, "the transfer is not aligned"};
-  t.data = *data;
-  t.storage = std::make_shared<MappedFile>(in.file);
+  if (reinterpret_cast<uintptr_t>(data.data()) % t.value_bytes()) return Error{where, "the transfer is not aligned"};
+  t.data = data;
+  t.storage = std::make_shared<MappedFile>(std::move(view->file));
   return {};
 }
 
@@ -134,7 +134,7 @@ Result<CpcaTransfer> decode_cpca(const json& transfer, const std::string& where)
 // Light, rows and receivers are set.
 Result<void> decode_clusters(const BlobReader& in, const json& transfer, CpcaTransfer& c, const std::string& where) {
   const json& object = transfer["cpca"];
-  if (c.receivers > in.chunks.binary.size() / 2) return Error{where, "there is no room for so many receivers"};
+  if (c.receivers > in.buffers.room() / 2) return Error{where, "there is no room for so many receivers"};
   auto vectors = read_values<float>(in, transfer, "bufferView",
                                     size_t(c.clusters) * size_t(1 + c.rank) * c.receiver_values(), where);
   if (!vectors) return vectors.error();
@@ -184,30 +184,29 @@ Result<Visibility> decode_visibility_store(const BlobReader& in, const json& obj
                                            const std::string& where) {
   Visibility v;
   auto size = read_count(object, "cube", size_t(max_cube_size), where),
-       bits = read_count(object, "bits", size_t(max_visibility_bits), where),
-       data = read_count(object, "bufferView", 0x7fffffff, where),
-       lengths = read_count(object, "lengths", 0x7fffffff, where);
-  for (const auto* count : {&size, &bits, &data, &lengths})
+       bits = read_count(object, "bits", size_t(max_visibility_bits), where);
+  for (const auto* count : {&size, &bits})
     if (!*count) return count->error();
   if (!is_cube_size(int(*size)))
     return Error{where, "\"cube\" must be a multiple of 16 up to " + std::to_string(max_cube_size)};
   if (*bits < 1) return Error{where, "\"bits\" is 0"};
-  auto records = view_bytes(in, *data, where), numbers = view_bytes(in, *lengths, where);
-  if (!records) return records.error();
-  if (!numbers) return numbers.error();
-  if (receivers > numbers->size()) return Error{where, "there are fewer lengths than receivers"};
-  v.size = int(*size), v.bits = int(*bits), v.receivers = receivers, v.data = *records;
+  auto data = read_view(in, object, "bufferView", where), lengths = read_view(in, object, "lengths", where);
+  for (const auto* view : {&data, &lengths})
+    if (!*view) return view->error();
+  const std::span<const uint8_t> records = data->bytes, numbers = lengths->bytes;
+  if (receivers > numbers.size()) return Error{where, "there are fewer lengths than receivers"};
+  v.size = int(*size), v.bits = int(*bits), v.receivers = receivers, v.data = records;
   v.begin.reserve(receivers + 1), v.begin.push_back(0);
   size_t at = 0;
   for (size_t r = 0; r < receivers; ++r) {
     uint64_t length = 0;
-    if (!read_varint(*numbers, at, length) || length > records->size() - v.begin.back())
+    if (!read_varint(numbers, at, length) || length > records.size() - v.begin.back())
       return Error{where, "the length of receiver " + std::to_string(r) + " is broken"};
     v.begin.push_back(v.begin.back() + length);
   }
-  if (at != numbers->size()) return Error{where, "there are more lengths than receivers"};
+  if (at != numbers.size()) return Error{where, "there are more lengths than receivers"};
   if (auto ok = check_visibility(v, where); !ok) return ok.error();
-  v.storage = std::make_shared<MappedFile>(in.file);
+  v.storage = std::make_shared<MappedFile>(std::move(data->file));
   return v;
 }
 

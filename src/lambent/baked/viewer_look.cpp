@@ -150,7 +150,7 @@ size_t LookWriter::lit_material(json& document, const json& original, size_t tex
 
 void LookWriter::write(json& document, const GltfPlaces& places) const {
   if (!look_) return;
-  const int first_view = places.first_view + int(first_blob_);
+  const int first_view = places.views[first_blob_].front();
   const size_t texture = document.contains("textures") ? document["textures"].size() : 0;  // the first of ours
   for (size_t i = 0; i < pictures_; ++i) {
     const size_t image = push(document, "images",
@@ -217,28 +217,28 @@ void LookWriter::write(json& document, const GltfPlaces& places) const {
 }
 
 std::optional<ViewerLook> load_look(const MappedFile& file, const std::string& path) {
-  auto chunks = split_gltf(file.bytes(), path);
-  if (!chunks) return std::nullopt;
+  auto buffers = GltfBuffers::open(file, path, folder_of(path));
+  if (!buffers) return std::nullopt;
   const json nothing;
   const auto member = [&](const json& parent, const char* key) -> const json& {
     return parent.is_object() && parent.contains(key) ? parent[key] : nothing;
   };
   const auto item = [&](const char* key, const json& index) -> const json& {
-    const json& all = member(chunks->json, key);
+    const json& all = member(buffers->json(), key);
     return all.is_array() && index.is_number_unsigned() && index.get<size_t>() < all.size() ? all[index.get<size_t>()]
                                                                                             : nothing;
   };
-  for (const json& mesh : member(chunks->json, "meshes"))
+  for (const json& mesh : member(buffers->json(), "meshes"))
     for (const json& primitive : member(mesh, "primitives")) {
       if (!member(member(member(primitive, "extensions"), extension_name), "ownMaterial").is_number()) continue;
       const json& material = item("materials", member(primitive, "material"));
       const json& strength =
           member(member(member(material, "extensions"), "KHR_materials_emissive_strength"), "emissiveStrength");
       const json& texture = item("textures", member(member(material, "emissiveTexture"), "index"));
-      const json& view = member(item("images", member(texture, "source")), "bufferView");
-      if (!strength.is_number() || !view.is_number_unsigned()) continue;  // a lamp's
-      auto png = view_bytes({*chunks, file}, view.get<size_t>(), path);
-      if (png) return ViewerLook{{{png->begin(), png->end()}, strength.get<float>()}};
+      const json& image = item("images", member(texture, "source"));
+      if (!strength.is_number() || !member(image, "bufferView").is_number_unsigned()) continue;  // a lamp's
+      auto png = read_view({*buffers}, image, "bufferView", path);
+      if (png) return ViewerLook{{{png->bytes.begin(), png->bytes.end()}, strength.get<float>()}};
     }
   return std::nullopt;
 }

@@ -5,7 +5,7 @@
 
 namespace lambent {
 
-// For save_glb: appends its blobs after the caller's, then edits the document. Does nothing without a look or without
+// For save_gltf: appends its blobs after the caller's, then edits the document. Does nothing without a look or without
 // texels.
 class LookWriter {
  public:

@@ -38,15 +38,15 @@ std::string name_of_rows(const Rows& rows) {
 }
 
 // A newer version is told from a broken file before anything else of it is read.
-lambent_code open_bytes(const MappedFile& bytes, const std::string& path, lambent_file** out) {
-  if (bytes.bytes().empty()) return fail(LAMBENT_BROKEN, path + ": is empty");
-  auto chunks = split_gltf(bytes.bytes(), path);
-  if (!chunks) return fail(LAMBENT_BROKEN, chunks.error().text());
-  auto fields = read_fields(bytes, *chunks, path);
+lambent_code open_bytes(const MappedFile& bytes, const std::string& path, const std::string& folder,
+                        lambent_file** out) {
+  auto buffers = GltfBuffers::open(bytes, path, folder);
+  if (!buffers) return fail(LAMBENT_BROKEN, buffers.error().text());
+  auto fields = read_fields(*buffers, path);
   if (!fields) {
     bool newer = false;
-    if (has_extension(chunks->json)) {
-      const auto& extension = chunks->json["extensions"][extension_name];
+    if (has_extension(buffers->json())) {
+      const auto& extension = buffers->json()["extensions"][extension_name];
       const auto version = read_count(extension, "version", 0x7fffffff, path);
       newer = version && *version > size_t(baked_file_version);
     }
@@ -143,7 +143,7 @@ lambent_code lambent_open(const char* path, lambent_file** file) {
         *file = nullptr;
         auto mapped = MappedFile::open(path);
         if (!mapped) return fail(LAMBENT_UNREADABLE, mapped.error().text());
-        return open_bytes(*mapped, path, file);
+        return open_bytes(*mapped, path, folder_of(path), file);
       },
       path, file);
 }
@@ -152,7 +152,7 @@ lambent_code lambent_open_memory(const void* bytes, size_t size, lambent_file** 
   return guarded_with(
       [&] {
         *file = nullptr;
-        return open_bytes(MappedFile::copy_of({static_cast<const uint8_t*>(bytes), size}), "memory", file);
+        return open_bytes(MappedFile::copy_of({static_cast<const uint8_t*>(bytes), size}), "memory", "", file);
       },
       bytes, file);
 }

@@ -70,20 +70,79 @@ MappedFile MappedFile::copy_of(std::span<const uint8_t> bytes) {
   return file;
 }
 
+namespace {
+
+bool is_mappable(std::span<const MappedFile::Part> parts) {
+#ifdef __EMSCRIPTEN__  // where a mapping is a copy
+  return false;
+#else
+  const size_t page = size_t(::sysconf(_SC_PAGESIZE));
+  return std::all_of(parts.begin(), parts.end(), [&](const MappedFile::Part& part) {
+    return part.offset % page == 0 && (part.bytes % page == 0 || &part == &parts.back());
+  });
+#endif
+}
+
+bool read_whole(int fd, uint8_t* to, size_t bytes, size_t offset) {
+  for (size_t done = 0; done < bytes;) {
+    const ssize_t got = ::pread(fd, to + done, bytes - done, off_t(offset + done));
+    if (got < 0 && errno == EINTR) continue;
+    if (got <= 0) return false;
+    done += size_t(got);
+  }
+  return true;
+}
+
+}  // namespace
+
+Result<MappedFile> MappedFile::open_parts(std::span<const Part> parts) {
+  MappedFile file;
+  for (const Part& part : parts) {
+    if (part.bytes > SIZE_MAX / 2 - file.size_) return Error{part.path, "is too large"};
+    file.size_ += part.bytes;
+  }
+  if (file.size_ == 0) return file;
+  const bool mapped = is_mappable(parts);
+  const size_t size = file.size_;
+  if (mapped) {  // the addresses first, then a file over each part of them
+    void* p = ::mmap(nullptr, size, PROT_NONE, MAP_PRIVATE | MAP_ANONYMOUS | MAP_NORESERVE, -1, 0);
+    if (p == MAP_FAILED) return Error{parts[0].path, system_message()};
+    file.data_ = std::shared_ptr<const uint8_t>(static_cast<const uint8_t*>(p),
+                                                [size](const uint8_t* q) { ::munmap(const_cast<uint8_t*>(q), size); });
+  } else {
+    auto storage = std::make_shared<AlignedVector<uint8_t>>(size);
+    file.data_ = std::shared_ptr<const uint8_t>(storage, storage->data());
+  }
+  auto* to = const_cast<uint8_t*>(file.data_.get());
+  for (const Part& part : parts) {
+    size_t there = 0;
+    auto fd = open_plain_file(part.path, there);
+    if (!fd) return fd.error();
+    std::string why;
+    if (part.offset > there || part.bytes > there - part.offset) {
+      why = "is truncated: has " + std::to_string(there) + " of " + std::to_string(part.offset + part.bytes) + " bytes";
+    } else if (mapped) {
+      if (part.bytes > 0 &&
+          ::mmap(to, part.bytes, PROT_READ, MAP_PRIVATE | MAP_FIXED, *fd, off_t(part.offset)) == MAP_FAILED)
+        why = system_message();
+    } else if (!read_whole(*fd, to, part.bytes, part.offset)) {
+      why = "could not be read whole";
+    }
+    ::close(*fd);
+    if (!why.empty()) return Error{part.path, why};
+    to += part.bytes;
+  }
+  return file;
+}
+
 Result<std::vector<uint8_t>> read_file(const std::string& path) {
   size_t size = 0;
   auto fd = open_plain_file(path, size);
   if (!fd) return fd.error();
   std::vector<uint8_t> bytes(size);
-  size_t done = 0;
-  while (done < size) {
-    ssize_t got = ::read(*fd, bytes.data() + done, size - done);
-    if (got < 0 && errno == EINTR) continue;
-    if (got <= 0) break;
-    done += size_t(got);
-  }
+  const bool whole = read_whole(*fd, bytes.data(), size, 0);
   ::close(*fd);
-  if (done != size) return Error{path, "could not be read whole"};
+  if (!whole) return Error{path, "could not be read whole"};
   return bytes;
 }
 
@@ -123,6 +182,11 @@ void allow_replacing(const std::string& path) {
   for (ReadLog* log : logs)
     std::erase_if(log->files_,
                   [&](const ReadFile& file) { return file.device == info.st_dev && file.inode == info.st_ino; });
+}
+
+std::string folder_of(const std::string& path) {
+  const size_t slash = path.find_last_of('/');
+  return slash == std::string::npos ? "." : slash == 0 ? "/" : path.substr(0, slash);
 }
 
 std::string file_extension(const std::string& path) {

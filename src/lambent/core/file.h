@@ -18,6 +18,14 @@ class MappedFile {
   static Result<MappedFile> open(const std::string& path);
   // A copy of bytes that came from elsewhere, on a 64-byte boundary.
   static MappedFile copy_of(std::span<const uint8_t> bytes);
+  // Part of a file.
+  struct Part {
+    std::string path;
+    size_t offset = 0, bytes = 0;
+  };
+  // Parts one after another: mapped side by side where each begins at a page and each but the last ends at one, else
+  // copied. Errors: as open(); a file that is shorter than its part.
+  static Result<MappedFile> open_parts(std::span<const Part> parts);
   std::span<const uint8_t> bytes() const { return {data_.get(), size_}; }
 
  private:
@@ -37,7 +45,8 @@ Result<void> write_file_atomically(const std::string& path, std::string_view tex
 
 // While one lives, what this thread writes waits under temporary names; commit() makes all of it appear together, even
 // where the process is killed meanwhile. The last file written is the one that the others belong to: it is never there
-// beside others than its own. Without commit() nothing appears.
+// beside others than its own. Without commit() nothing appears. One that is made while another lives hands its files to
+// that.
 struct WrittenFile;
 class FileSet {
  public:
@@ -45,12 +54,15 @@ class FileSet {
   ~FileSet();
   FileSet(const FileSet&) = delete;
   FileSet& operator=(const FileSet&) = delete;
+  // A file that goes when the others appear.
+  void remove(const std::string& path) { removed_.push_back(path); }
   Result<void> commit();
 
  private:
   friend Result<void> write_file_atomically(const std::string&, std::span<const std::span<const uint8_t>>);
   FileSet* outer_;
   std::vector<std::unique_ptr<WrittenFile>> files_;
+  std::vector<std::string> removed_;
 };
 
 // Removes temporaries of writes in flight; safe to call from a signal handler.
@@ -85,6 +97,8 @@ Result<void> check_replaces_no_input(const std::string& path);
 // Of a file that is to take its own place.
 void allow_replacing(const std::string& path);
 
+// The folder that a file is in; "." where its path says none.
+std::string folder_of(const std::string& path);
 // Lower-case extension without the dot: "A/B.GLB" -> "glb".
 std::string file_extension(const std::string& path);
 

@@ -35,6 +35,9 @@ class Progress {
   std::string stage_;
   size_t total_ = 0, done_ = 0;
   std::atomic<bool> cancelled_{false};
+
+ public:
+  std::string scratch;  // a folder for what memory has no room for; "": that is made again
 };
 
 // False where there is nobody to stop it.

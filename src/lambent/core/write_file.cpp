@@ -11,6 +11,7 @@
 #include <cerrno>
 #include <cstring>
 #include <filesystem>
+#include <iterator>
 #include <optional>
 #include <utility>
 
@@ -124,9 +125,9 @@ thread_local FileSet* current_set = nullptr;
 // Renames all, the last one last. A program that is killed meanwhile leaves no set in part: another process does it,
 // which shares its memory and ends by itself. Power that fails meanwhile leaves no new file beside an old last one,
 // which is removed first.
-int rename_all(std::vector<std::unique_ptr<WrittenFile>>& files) {
+int rename_all(std::vector<std::unique_ptr<WrittenFile>>& files, const std::vector<std::string>& removed) {
   const auto rename_one = [](const WrittenFile& file) { return ::rename(file.temporary.c_str(), file.target.c_str()); };
-  if (files.size() == 1) return rename_one(*files[0]) == 0 ? 0 : errno;
+  if (files.size() == 1 && removed.empty()) return rename_one(*files[0]) == 0 ? 0 : errno;
 #ifdef __EMSCRIPTEN__  // where there is one process
   for (const auto& file : files)
     if (rename_one(*file) != 0) return errno;
@@ -138,6 +139,8 @@ int rename_all(std::vector<std::unique_ptr<WrittenFile>>& files) {
   if (child == 0) {
     ::setsid();  // what is sent to the group of the program does not reach it
     if (::unlink(head) != 0 && errno != ENOENT) failure = errno;
+    for (size_t i = 0; i < removed.size() && !failure; ++i)
+      if (::unlink(removed[i].c_str()) != 0 && errno != ENOENT) failure = errno;
     for (size_t i = 0; i < files.size() && !failure; ++i)
       if (rename_one(*files[i]) != 0) failure = errno;
     ::_exit(0);
@@ -155,14 +158,20 @@ FileSet::FileSet() : outer_(current_set) { current_set = this; }
 FileSet::~FileSet() { current_set = outer_; }
 
 Result<void> FileSet::commit() {
+  if (outer_) {
+    std::move(files_.begin(), files_.end(), std::back_inserter(outer_->files_));
+    outer_->removed_.insert(outer_->removed_.end(), removed_.begin(), removed_.end());
+    files_.clear(), removed_.clear();
+    return {};
+  }
   if (files_.empty()) return {};
-  const int failure = rename_all(files_);
+  const int failure = rename_all(files_, removed_);
   if (failure != 0) return files_.back()->error(std::strerror(failure));
   for (auto& file : files_) release(*std::exchange(file->note, nullptr));
   for (size_t i = 0; i < files_.size(); ++i)
     if (i == 0 || fs::path(files_[i]->target).parent_path() != fs::path(files_[i - 1]->target).parent_path())
       sync_folder(files_[i]->target);
-  files_.clear();
+  files_.clear(), removed_.clear();
   return {};
 }
 

@@ -7,6 +7,7 @@
 #include <lambent/light/environment.h>
 #include <lambent/pipeline/bake_lightmap.h>
 #include <lambent/pipeline/bake_parse.h>
+#include <lambent/pipeline/bake_rooms.h>
 #include <lambent/pipeline/durable.h>
 #include <lambent/pipeline/parse.h>
 #include <lambent/pipeline/place_receivers.h>
@@ -54,7 +55,16 @@ struct Bake {
   void line(const std::string& label, std::string text) { summary.lines.emplace_back(label, std::move(text)); }
 };
 
+Result<void> bake_by_rooms(Bake& b) {
+  auto transfer =
+      bake_rooms_of_request(b.request, b.plan.bake, b.scene, b.receivers(), b.job, b.report, b.summary, b.told);
+  if (!transfer) return transfer.error();
+  b.store = std::move(*transfer);
+  return {};
+}
+
 Result<void> bake_diffuse(Bake& b) {
+  if (!b.request.rooms.empty()) return bake_by_rooms(b);
   if (b.request.subsurface.empty()) {
     auto transfer = bake(b.scene, b.tracer, b.receivers(), b.plan.bake, &b.report, b.job.progress);
     if (!transfer) return transfer.error();
@@ -207,15 +217,15 @@ Result<void> bake_free_space(Bake& b, const Lattice& lattice) {
   return {};
 }
 
-// A baked file is a GLB: told before the work where it can be.
+// What a GLB cannot hold is told before the work.
 Result<void> check_picture_bytes(const Bake& b, const View& view) {
   const size_t columns = b.plan.bake.light().count();
   const size_t bytes = 3 * size_t(view.width) * size_t(view.height) * columns *
                        (b.plan.bake.precision == Precision::half ? 2 : 4);
-  if (bytes < size_t{1} << 32) return {};
+  if (bytes < size_t{1} << 32 || file_extension(b.request.output) != "glb") return {};
   return Error{"--size",
-               fmt::format("{} pixels of {} columns take {} bytes, and a baked file holds 4 GiB", b.request.size,
-                           columns, bytes),
+               fmt::format("{} pixels of {} columns take {} bytes, and a .glb holds 4 GiB: write a .gltf",
+                           b.request.size, columns, bytes),
                true};
 }
 
@@ -321,6 +331,7 @@ void summarize(Bake& b) {
                          {"bytes", bytes},
                          {"bytes_per_receiver", each},
                          {"operator_bytes", r.operator_bytes},
+                         {"operator_file_bytes", r.operator_file_bytes},
                          {"operator_kept", r.operator_kept},
                          {"working_memory", r.working_memory},
                          {"error", r.error >= 0 ? nlohmann::json(r.error) : nlohmann::json()}});
@@ -347,6 +358,9 @@ void summarize(Bake& b) {
   if (r.operator_kept < 1)
     b.line("memory", fmt::format("{:.0f}% of the gather operator fitted; the rest was traced again for each bounce",
                                  100 * r.operator_kept));
+  if (r.operator_file_bytes > 0)
+    b.line("memory", fmt::format("{} of the gather operator did not fit, and went through a file",
+                                 human_bytes(double(r.operator_file_bytes))));
   summarize_error(b);
 }
 
@@ -362,6 +376,7 @@ Result<void> begin(Bake& b) {
   if (!placed) return placed.error();
   b.placed = std::move(*placed);
   b.load_seconds = seconds_since(start), start = Clock::now();
+  if (!b.request.rooms.empty()) return {};  // each has its own tree
   auto tracer = Tracer::build(b.scene, b.job.progress);
   if (!tracer) return tracer.error();
   b.tracer = std::move(*tracer), b.build_seconds = seconds_since(start);
@@ -400,7 +415,8 @@ Result<BakeOutcome> bake_plain(const BakeRequest& request, const BakePlan& plan,
   }
   if (auto ok = check_file_size(plan, request, b.scene, b.receivers().count(), 0); !ok) return ok.error();
   if (auto ok = job.inputs_read({}); !ok) return ok.error();
-  if (plan.kind != BakeKind::membrane && plan.kind != BakeKind::indirect && request.shadows == "on")
+  if (plan.kind != BakeKind::membrane && plan.kind != BakeKind::indirect && request.shadows == "on" &&
+      request.rooms.empty())
     warn_if_enclosed(b.scene, b.tracer, b.receivers(), job);
   if (b.placed.atlas) move_buried_texels(b.scene, b.tracer, *b.placed.atlas, b.placed.receivers, job.progress);
   if (auto ok = bake_surface(b); !ok) return ok.error();
@@ -438,7 +454,7 @@ Result<Baked> bake(const BakeRequest& request, const Job& job) {
 namespace {
 
 // The pictures, the rule of make and the baked file, whole or not at all; the names of the pictures.
-Result<std::vector<std::string>> write_outputs(const std::string& path, const BakeOutcome& outcome,
+Result<std::vector<std::string>> write_outputs(const std::string& path, const BakeOutcome& outcome, size_t bin_limit,
                                                const BakeRequest* request, const DurableBake* durable) {
   const std::string stem = path.substr(0, path.find_last_of('.'));
   std::vector<std::string> written;
@@ -452,21 +468,22 @@ Result<std::vector<std::string>> write_outputs(const std::string& path, const Ba
     all.insert(all.begin(), path);
     if (auto ok = write_file_atomically(request->depfile, depfile_text(all, durable->inputs())); !ok) return ok.error();
   }
-  if (auto ok = save_baked(path, outcome.baked, outcome.look ? &*outcome.look : nullptr); !ok) return ok.error();
+  if (auto ok = save_baked(path, outcome.baked, outcome.look ? &*outcome.look : nullptr, bin_limit); !ok)
+    return ok.error();
   if (auto ok = set.commit(); !ok) return ok.error();
   return written;
 }
 
 }  // namespace
 
-Result<nlohmann::json> save_outcome(const std::string& path, const BakeOutcome& outcome) {
-  auto written = write_outputs(path, outcome, nullptr, nullptr);
+Result<nlohmann::json> save_outcome(const std::string& path, const BakeOutcome& outcome, size_t bin_limit) {
+  auto written = write_outputs(path, outcome, bin_limit, nullptr, nullptr);
   if (!written) return written.error();
   return nlohmann::json(*written);
 }
 
 Result<Summary> bake_to_file(const BakeRequest& asked, const Job& job) {
-  if (auto ok = check_output(asked.output, {"glb"}); !ok) return ok.error();
+  if (auto ok = check_output(asked.output, {"glb", "gltf"}); !ok) return ok.error();
   auto request = resolved(asked);
   if (!request) return request.error();
   DurableBake durable(*request, job);
@@ -474,8 +491,8 @@ Result<Summary> bake_to_file(const BakeRequest& asked, const Job& job) {
   if (!outcome) return durable.explained(outcome.error());
   const auto start = Clock::now();
   Summary& summary = outcome->summary;
-  auto pictures = write_outputs(request->output, *outcome, &*request, &durable);
-  if (!pictures) return pictures.error();
+  auto pictures = write_outputs(request->output, *outcome, request->bin_limit, &*request, &durable);
+  if (!pictures) return durable.explained(pictures.error());
   if (!pictures->empty()) summary.json["pictures"] = *pictures;
   durable.finish();
   summary.json["output"] = request->output, summary.json["seconds"]["save"] = seconds_since(start);

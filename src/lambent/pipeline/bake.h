@@ -31,7 +31,8 @@ struct BakeOutcome {
 Result<BakeOutcome> bake_with_summary(const BakeRequest& request, const Job& job = {});
 
 // Writes the baked file and, beside it, its pictures, whose names are given back as JSON. Errors: the disk's.
-Result<nlohmann::json> save_outcome(const std::string& path, const BakeOutcome& outcome);
+Result<nlohmann::json> save_outcome(const std::string& path, const BakeOutcome& outcome,
+                                    size_t bin_limit = default_bin_limit);
 
 // Bakes and writes the request's output and its pictures; their names are in the summary.
 Result<Summary> bake_to_file(const BakeRequest& request, const Job& job = {});

@@ -36,6 +36,7 @@ Summary summarize(const BakeRequest& request, const Lightmap& map, const Lightma
        {{"load", seconds.load}, {"build", seconds.build}, {"trace", r.trace_seconds}, {"bounce", r.bounce_seconds}}},
       {"bytes", map.all.bytes()},
       {"operator_bytes", r.operator_bytes},
+      {"operator_file_bytes", r.operator_file_bytes},
       {"operator_kept", r.operator_kept}};
   auto line = [&](const char* label, std::string text) { s.lines.emplace_back(label, std::move(text)); };
   if (atlas) {

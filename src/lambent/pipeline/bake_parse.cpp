@@ -138,7 +138,8 @@ Result<void> plan_error(const BakeRequest& r, BakePlan& plan) {
   if (r.samples == 0) plan.bake.error = error;
   plan.bake.seconds = r.time;
   plan.adapts = plan.kind == BakeKind::diffuse && r.receivers == "vertices" && r.shadows == "on" &&
-                r.subsurface.empty() && (r.adapt == "on" || (r.adapt == "auto" && r.samples == 0 && r.max_edge == 0));
+                r.subsurface.empty() && r.rooms.empty() &&
+                (r.adapt == "on" || (r.adapt == "auto" && r.samples == 0 && r.max_edge == 0));
   plan.adapt.error = 0.8 * error, plan.adapt.shortest = q.shortest, plan.adapt.seed = r.seed;
   plan.adapt.more = q.triangles_more, plan.adapt.triangles = q.triangles;
   return {};

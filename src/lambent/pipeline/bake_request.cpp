@@ -20,10 +20,18 @@ constexpr KindMask every = D | M | F | Z | G | S | L | K | I, traced = D | M | F
 
 const Option<R> table[] = {
     {"scene", &R::scene, "Files", every, "Scene: .gltf, .glb, .obj or .ply", 0, 0, nullptr, nullptr, true, true},
-    {"output", &R::output, "Files", every, "Baked file to write (.glb)", 0, 0, nullptr, nullptr, false},
+    {"output", &R::output, "Files", every,
+     "Baked file to write: .glb, of up to 4 GiB, or .gltf with its data beside it, of any size", 0, 0, nullptr, nullptr,
+     false},
+    {"bin-limit", &R::bin_limit, "Files", every, "Bytes of each .bin of a .gltf, at most; e.g. 256MB, 2GiB (1GiB)",
+     65536, 1e18, nullptr, nullptr, false},
     {"checkpoint", &R::checkpoint, "Files", traced | K,
      "Folder to keep the work in as it comes, from which the same command goes on after an interrupt or a crash; off: "
      "nowhere (OUTPUT.checkpoint, of work of over a minute)",
+     0, 0, nullptr, nullptr, false},
+    {"scratch", &R::scratch, "Files", D | L,
+     "Folder for rows of the operator that --memory has no room for (the output's); off: they are traced again at each "
+     "bounce",
      0, 0, nullptr, nullptr, false},
     {"depfile", &R::depfile, "Files", every, "Rule of make to write: the outputs, and all files that were read", 0, 0,
      nullptr, nullptr, false},
@@ -88,6 +96,12 @@ const Option<R> table[] = {
     {"lamp", &R::lamp, "Scene", L,
      "NAME=SCALE, or NAME=R,G,B: lamps of this name, or a material that glows, times so much; may be given again"},
     {"max-albedo", &R::max_albedo, "Scene", every, "Darken base colours to at most this, channel by channel", 0, 1},
+    {"rooms", &R::rooms, "Scene", D,
+     "Bake room by room, each with its own geometry, and join them through the light in their openings: auto finds "
+     "where to part the scene, a JSON file names the rooms' boxes or nodes",
+     0, 0, nullptr, nullptr, true, true},
+    {"rooms-error", &R::rooms_error, "Scene", D, "Relative residual of the joined rooms at which it ends", 1e-6, 0.5,
+     nullptr, "rooms"},
     {"exclude", &R::exclude, "Scene", every,
      "Leave a part out, by its name or its material's, or with unlit all of unlit materials: sky domes, backdrops; may "
      "be given again"},
@@ -199,6 +213,18 @@ constexpr Conflict conflicts[] = {
     {"quality", "subsurface", "is not measured of media: leave --subsurface out"},
     {"quality", "shadows=off", "is the same for all without shadows"},
     {"adapt", "shadows=off", "looks for shadows"},
+    {"rooms", "bounces", "ends by --rooms-error and not by a number of bounces: leave --bounces out"},
+    {"rooms", "light", "joins light of harmonics alone: leave --light out"},
+    {"rooms", "shadows=off", "has nothing to join without shadows"},
+    {"rooms", "subsurface", "does not know media: leave --subsurface out"},
+    {"rooms", "terms", "has no terms of its own: leave --terms out"},
+    {"rooms", "lattice", "does not light free space: leave --lattice out"},
+    {"rooms", "fix-view", "has no picture of the whole: leave --fix-view out"},
+    {"rooms", "error", "is not measured on places of its own: leave --error out, and say --samples"},
+    {"rooms", "quality", "keeps the mesh, and is baked with --samples: leave --quality out"},
+    {"rooms", "time", "is baked with --samples: leave --time out"},
+    {"rooms", "adapt=on|auto", "keeps the mesh as it is: leave --adapt out"},
+    {"rooms", "denoise=on", "is not denoised: leave --denoise out"},
 };
 
 // Given options that conflict; a default conflicts with nothing.
@@ -218,12 +244,16 @@ Result<void> check_conflicts(const BakeRequest& r) {
 bool has_no_quality(const BakeRequest& r) { return r.samples > 0 && r.adapt != "on"; }
 
 Result<void> check_kind(const BakeRequest& r, BakeKind kind) {
+  if (r.given.contains("bin_limit") && file_extension(r.output) != "gltf")
+    return Error{"--bin-limit", "is of the files beside a .gltf: leave it out, or write one", true};
   if (kind != BakeKind::diffuse && kind != BakeKind::lightmap && r.receivers != "vertices")
     return Error{"--receivers", std::string(bake_kind_names[int(kind)]) + " are received at vertices", true};
   if (!r.lattice.empty() && r.receivers != "vertices")
     return Error{"--receivers", "--lattice needs a bake at vertices", true};
   if (r.shadows == "off" && r.given.contains("bounces") && r.bounces != "0")
     return Error{"--shadows", "off has no bounces: leave --bounces out, or set it to 0", true};
+  if (!r.rooms.empty() && r.receivers != "vertices")
+    return Error{"--rooms", "joins receivers at vertices: leave --receivers out", true};
   if (kind != BakeKind::lightmap && r.bounces.starts_with("converge:"))
     return Error{"--bounces", "converge:EPS is for lightmaps", true};
   if (r.given.contains("quality") && has_no_quality(r))
@@ -275,7 +305,7 @@ Result<BakeRequest> resolved(BakeRequest r) {
   if (r.order == 0 && r.light.empty() && kind != BakeKind::lightmap && kind != BakeKind::blocks &&
       kind != BakeKind::indirect)
     r.order = 6;
-  if (kind != BakeKind::diffuse || !r.subsurface.empty() || r.shadows == "off")
+  if (kind != BakeKind::diffuse || !r.subsurface.empty() || r.shadows == "off" || !r.rooms.empty())
     if (r.samples == 0) r.samples = 1024;
   if (r.receivers == "texels" && r.atlas.empty() && !(r.texels_per_unit > 0)) r.atlas = "1024x1024";
   if (r.shadows == "on") r.given.erase("shadows");

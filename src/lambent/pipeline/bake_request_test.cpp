@@ -116,8 +116,10 @@ struct Change {
   nlohmann::json value, with = nlohmann::json::object();
 };
 const std::map<std::string, Change> changes{
+    {"bin_limit", {size_t{1} << 20, {{"output", "out.gltf"}}}},
     {"checkpoint", {"off"}},
     {"depfile", {"out.d"}},
+    {"scratch", {"off"}},
     {"order", {2}},
     {"light", {"sh:2"}},
     {"precision", {"single"}},
@@ -141,6 +143,8 @@ const std::map<std::string, Change> changes{
     {"lamp", {nlohmann::json::array({"lamp=2"})}},
     {"max_albedo", {0.3}},
     {"exclude", {nlohmann::json::array({"red"})}},
+    {"rooms", {"auto"}},
+    {"rooms_error", {0.3, {{"rooms", "auto"}}}},
     {"brdf", {"ggx:roughness=0.4"}},
     {"outgoing", {"svd:3"}},
     {"incident_order", {4}},

@@ -93,6 +93,9 @@ std::string checkpoint_folder(const BakeRequest& request) {
 DurableBake::DurableBake(const BakeRequest& request, const Job& job) : request_(request), given_(job), own_(job) {
   build_name();  // before what is read counts as an input
   own_.progress = job.progress ? job.progress : &silent_;
+  own_.progress->scratch = request.scratch == none_wanted ? std::string()
+                         : request.scratch.empty()        ? folder_of(request.output)
+                                                          : request.scratch;
   own_.inputs_read = [this](const std::vector<std::string>& pictures) { return begin(pictures); };
   // Those that are read late are inputs from the start.
   for (const Option<BakeRequest>& o : bake_options()) {
@@ -106,7 +109,7 @@ DurableBake::DurableBake(const BakeRequest& request, const Job& job) : request_(
   }
 }
 
-DurableBake::~DurableBake() { own_.progress->checkpoint = nullptr; }
+DurableBake::~DurableBake() { own_.progress->checkpoint = nullptr, own_.progress->scratch.clear(); }
 
 std::vector<std::string> DurableBake::inputs() const {
   std::vector<std::string> out;
@@ -117,9 +120,17 @@ std::vector<std::string> DurableBake::inputs() const {
 }
 
 Result<void> DurableBake::begin(const std::vector<std::string>& pictures) {
+  std::error_code status;
+  if (!own_.progress->scratch.empty() && !fs::is_directory(own_.progress->scratch, status))
+    return Error{"--scratch", "is no folder: " + own_.progress->scratch, true};
   const std::string stem = request_.output.substr(0, request_.output.find_last_of('.'));
   std::vector<std::string> outputs{request_.output, request_.depfile};
   for (const std::string& picture : pictures) outputs.push_back(stem + picture);
+  for (size_t i = 0; file_extension(request_.output) == "gltf"; ++i) {
+    const std::string bin = stem + "." + std::to_string(i) + ".bin";
+    if (!fs::exists(bin, status)) break;
+    outputs.push_back(bin);
+  }
   for (const std::string& output : outputs)
     if (auto ok = check_replaces_no_input(output); !ok) return ok;
   const std::string folder = checkpoint_folder(request_);
@@ -138,7 +149,6 @@ Result<void> DurableBake::begin(const std::vector<std::string>& pictures) {
     if (why.empty()) return {};
     return Error{folder, why + "; `lambent checkpoints " + folder + " --clean` removes it"};
   };
-  std::error_code status;
   const bool at_once = !request_.checkpoint.empty() || fs::exists(folder, status);
   options.after = at_once ? 0 : long_work;
   checkpoint_ = std::make_unique<Checkpoint>(std::move(options));
@@ -149,6 +159,8 @@ Result<void> DurableBake::begin(const std::vector<std::string>& pictures) {
 Error DurableBake::explained(Error error) const {
   if (error.message == "cancelled" && checkpoint_ && checkpoint_->began())
     error.message += "; the same command goes on from " + checkpoint_folder(request_);
+  else if (checkpoint_ && checkpoint_->began())
+    error.message += "; what was baked is kept: --checkpoint " + checkpoint_folder(request_) + " goes on with it";
   return error;
 }
 

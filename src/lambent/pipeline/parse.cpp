@@ -224,6 +224,8 @@ Result<void> check_output(const std::string& path, std::initializer_list<const c
   if (!std::filesystem::is_directory(folder, status)) return Error{path, "cannot be written: no folder " + folder};
   if (::access(folder.c_str(), W_OK) != 0) return Error{path, "cannot be written: folder " + folder + " is read-only"};
   if (std::filesystem::is_directory(path, status)) return Error{path, "is a folder"};
+  if (extension == "gltf" && std::filesystem::is_symlink(path, status))
+    return Error{path, "is a link, and a .gltf has its data beside it: name the file itself"};
   return {};
 }
 

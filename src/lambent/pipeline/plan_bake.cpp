@@ -73,23 +73,27 @@ double expected_seconds(const Scene& scene, const Tracer& tracer, const Receiver
   return seconds_since(start) * double(receivers.count()) / double(std::max<size_t>(done, 1));
 }
 
+// Of a scene and its receivers in a file, at least: a position and a receiver a vertex, three indices a triangle.
+size_t scene_bytes(const Scene& scene) { return 16 * scene.positions.size() + 6 * scene.triangles.size(); }
+
 }  // namespace
 
 Result<void> check_file_size(const BakePlan& plan, const BakeRequest& r, const Scene& scene, size_t receivers,
                              size_t groups) {
   // What is stored in another form than it is baked in is not known before.
-  if (!r.compress.empty() || !r.fix_view.empty() || !r.fix_light.empty() || plan.kind == BakeKind::blocks ||
-      plan.kind == BakeKind::indirect || plan.kind == BakeKind::zonal || plan.kind == BakeKind::glossy_zonal)
+  if (file_extension(r.output) != "glb" || !r.compress.empty() || !r.fix_view.empty() || !r.fix_light.empty() ||
+      plan.kind == BakeKind::blocks || plan.kind == BakeKind::indirect || plan.kind == BakeKind::zonal || plan.kind == BakeKind::glossy_zonal)
     return {};
   const bool coloured = plan.bake.bounces > 0 && r.subsurface.empty() && has_coloured_albedo(scene);
   const size_t each = stored_bytes(plan, r, receivers, groups, coloured ? 3 : 1);
-  const size_t bytes = each * (r.terms ? size_t(plan.bake.bounces) + 2 : 1);
+  const size_t bytes = each * (r.terms ? size_t(plan.bake.bounces) + 2 : 1) + scene_bytes(scene);
   if (bytes < size_t{1} << 32) return {};
-  return Error{r.output,
-               fmt::format("would take at least {} for {} receivers, and a baked file holds 4 GiB: take fewer bands, "
-                           "--precision half, fewer receivers or --compress",
-                           human_bytes(double(bytes)), human_count(receivers)),
-               true};
+  return Error{
+      r.output,
+      fmt::format("would take at least {} for {} receivers, and a .glb holds 4 GiB: write a .gltf (-o {}.gltf), "
+                  "whose data are beside it, or take fewer bands, --precision half or --compress",
+                  human_bytes(double(bytes)), human_count(receivers), r.output.substr(0, r.output.find_last_of('.'))),
+      true};
 }
 
 Result<Summary> plan_bake(const BakeRequest& asked, const Job& job) {

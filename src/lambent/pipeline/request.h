@@ -67,6 +67,12 @@ struct BakeRequest {
   // Names (as in JSON) of fields that were said. A field that differs from its default counts as said without being
   // here.
   std::set<std::string> given;
+
+  // Large scenes
+  size_t bin_limit = size_t{1} << 30;  // bytes of each .bin of a .gltf
+  std::string scratch;                 // a folder; "": the output's; "off": none
+  std::string rooms;                   // "": the scene as a whole
+  double rooms_error = 0.01;           // residual of the joined solution
 };
 
 // What runs beside a request and does not change its result.

@@ -142,7 +142,8 @@ std::vector<size_t> shrink(Json& document, const char* key, const std::vector<bo
 
 }  // namespace
 
-void GlbWriter::compact() {
+void GltfWriter::compact() {
+  compacted_ = false;
   if (!uses_known_extensions(json)) return;
   const std::optional<Used> used = find_used(json);
   if (!used) return;
@@ -170,6 +171,7 @@ void GlbWriter::compact() {
   std::vector<Range> ranges;
   each(json, "bufferViews", [&](Json& holder) { ranges.push_back(*range_of(holder)); });
   const std::vector<Move> moves = keep_bytes(std::move(ranges));
+  compacted_ = true;
   each(json, "bufferViews", [&](Json& holder) {
     const size_t at = range_of(holder)->begin;
     const auto next = std::upper_bound(moves.begin(), moves.end(), at, [](size_t x, Move m) { return x < m.from; });
@@ -178,7 +180,7 @@ void GlbWriter::compact() {
   });
 }
 
-std::vector<GlbWriter::Move> GlbWriter::keep_bytes(std::vector<Range> ranges) {
+std::vector<GltfWriter::Move> GltfWriter::keep_bytes(std::vector<Range> ranges) {
   std::sort(ranges.begin(), ranges.end(), [](Range a, Range b) { return a.begin < b.begin; });
   std::vector<Range> runs;
   for (const Range& range : ranges) {
@@ -197,7 +199,8 @@ std::vector<GlbWriter::Move> GlbWriter::keep_bytes(std::vector<Range> ranges) {
       const size_t first = std::max(run.begin, pieces_[p].offset),
                    last = std::min(run.end, pieces_[p].offset + pieces_[p].bytes.size());
       if (first < last)
-        pieces.push_back({to + (first - run.begin), pieces_[p].bytes.subspan(first - pieces_[p].offset, last - first)});
+        pieces.push_back(
+            {to + (first - run.begin), pieces_[p].bytes.subspan(first - pieces_[p].offset, last - first), 4});
     }
     end = to + (run.end - run.begin);
   }

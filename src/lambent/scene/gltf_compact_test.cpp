@@ -15,7 +15,7 @@ struct Saved {
 };
 Saved save(const Scene& scene, std::span<const GltfBlob> blobs = {}) {
   TemporaryFolder folder;
-  const auto saved = save_glb(folder.file("a.glb"), scene, blobs, {});
+  const auto saved = save_gltf(folder.file("a.glb"), scene, blobs, {});
   EXPECT_TRUE(saved) << saved.error().text();
   const Bytes file = *read_file(folder.file("a.glb"));
   auto chunks = split_gltf(file, "");

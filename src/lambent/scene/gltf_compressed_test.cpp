@@ -93,7 +93,7 @@ TEST(GltfDraco, WhatIsSavedIsPlain) {
   Scene scene = loaded(b);
   ASSERT_EQ(scene.parts.size(), 3u);
   EXPECT_EQ(scene.document->json["meshes"][0], scene.document->json["meshes"][1]) << "decoded once";
-  ASSERT_TRUE(save_glb(folder.file("a.glb"), scene, {}, {}));
+  ASSERT_TRUE(save_gltf(folder.file("a.glb"), scene, {}, {}));
   auto bytes = read_file(folder.file("a.glb"));
   ASSERT_TRUE(bytes);
   const Scene again = loaded(*bytes);
@@ -221,7 +221,7 @@ TEST(GltfMeshopt, WhatIsSavedIsPlain) {
   const Hills hills;
   TemporaryFolder folder;
   const Scene scene = loaded(meshopt_file(hills).glb());
-  ASSERT_TRUE(save_glb(folder.file("a.glb"), scene, {}, {}));
+  ASSERT_TRUE(save_gltf(folder.file("a.glb"), scene, {}, {}));
   auto bytes = read_file(folder.file("a.glb"));
   ASSERT_TRUE(bytes);
   const Scene again = loaded(*bytes);

@@ -1,4 +1,4 @@
-#include <lambent/scene/gltf_container.h>
+#include <lambent/core/uri.h>
 #include <lambent/scene/gltf_test-inl.h>
 
 #include <gtest/gtest.h>

@@ -1,6 +1,6 @@
 #include <lambent/scene/gltf_extensions.h>
 
-#include <lambent/scene/gltf_container.h>
+#include <lambent/core/uri.h>
 #include <lambent/scene/gltf_read.h>
 
 #include <algorithm>

@@ -79,7 +79,7 @@ TEST(GltfWebp, IsWrittenForWhoReadsIt) {
   auto texture = decode_texture(make_webp(2, 2, colours), "colours");
   ASSERT_TRUE(texture) << texture.error().text();
   scene.textures.push_back(*texture), scene.materials[0].base_color_texture = 0;
-  ASSERT_TRUE(save_glb(folder.file("a.glb"), scene, {}, {}));
+  ASSERT_TRUE(save_gltf(folder.file("a.glb"), scene, {}, {}));
   auto again = load_scene(folder.file("a.glb"));
   ASSERT_TRUE(again) << again.error().text();
   EXPECT_EQ(again->textures[0].rgb, colours);
@@ -184,7 +184,7 @@ TEST(GltfExtensions, SpecularOfMadeScenesIsWritten) {
   scene.document.reset();
   for (Part& part : scene.parts) part.node = part.primitive = -1;
   scene.materials[0].dielectric_f0 = Vec3(0.01f, 0.02f, 0.1f), scene.materials[0].dielectric_f90 = 0.5f;
-  ASSERT_TRUE(save_glb(folder.file("a.glb"), scene, {}, {}));
+  ASSERT_TRUE(save_gltf(folder.file("a.glb"), scene, {}, {}));
   auto again = load_scene(folder.file("a.glb"));
   ASSERT_TRUE(again) << again.error().text();
   EXPECT_LT(length(again->materials[0].dielectric_f0 - scene.materials[0].dielectric_f0), 1e-7f);

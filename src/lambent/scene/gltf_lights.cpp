@@ -1,5 +1,5 @@
 // KHR_lights_punctual (Khronos, ratified): lights shine along the -Z of their node; its scale does not matter.
-#include <lambent/scene/gltf_container.h>
+#include <lambent/core/uri.h>
 #include <lambent/scene/gltf_read.h>
 #include <lambent/scene/mesh_file.h>
 

@@ -3,7 +3,7 @@
 // EXT_texture_webp.
 #include <lambent/scene/gltf_materials.h>
 
-#include <lambent/scene/gltf_container.h>
+#include <lambent/core/uri.h>
 #include <lambent/scene/textures.h>
 
 #include <map>

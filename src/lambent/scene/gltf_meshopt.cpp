@@ -1,7 +1,7 @@
 // EXT_meshopt_compression, KHR_meshopt_compression. How far a stream can expand: in blocks of 256 elements a byte of
 // the attribute codec takes at least 4 bytes; a triangle takes at least one, and so does an index of a sequence.
 #include <lambent/scene/gltf_compressed.h>
-#include <lambent/scene/gltf_container.h>
+#include <lambent/core/uri.h>
 #include <lambent/scene/gltf_extensions.h>
 #include <lambent/scene/meshopt_v1.h>
 

@@ -2,7 +2,7 @@
 #include <lambent/scene/gltf_read.h>
 
 #include <lambent/core/check.h>
-#include <lambent/scene/gltf_container.h>
+#include <lambent/core/uri.h>
 
 #include <cstring>
 

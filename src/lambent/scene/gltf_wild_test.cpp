@@ -22,11 +22,11 @@ void expect_same(const Scene& a, const Scene& b) {
   for (size_t p = 0; p < a.parts.size(); ++p) EXPECT_EQ(a.parts[p].material, b.parts[p].material);
 }
 
-// The scene as save_glb() writes it, read again.
+// The scene as save_gltf() writes it, read again.
 Scene saved(const Scene& scene, Json* document = nullptr, size_t* bytes = nullptr) {
   TemporaryFolder folder;
   const std::string path = folder.file("saved.glb");
-  auto ok = save_glb(path, scene, {}, [&](Json& json, const GltfPlaces&) {
+  auto ok = save_gltf(path, scene, {}, [&](Json& json, const GltfPlaces&) {
     if (document) *document = json;
   });
   EXPECT_TRUE(ok) << (ok ? "" : ok.error().text());

@@ -1,4 +1,4 @@
-// glTF 2.0 specification (ISO/IEC 12113), section 4 (GLB).
+// glTF 2.0 specification (ISO/IEC 12113), sections 3.6.1 (buffers and views) and 4 (GLB).
 #include <lambent/scene/gltf_write.h>
 
 #include <lambent/core/check.h>
@@ -46,19 +46,19 @@ void add_bounds(Json& accessor, size_t count, int components, Component componen
 
 }  // namespace
 
-Json& GlbWriter::list(const char* key) {
+Json& GltfWriter::list(const char* key) {
   Json& value = json[key];
   if (!value.is_array()) value = Json::array();
   return value;
 }
 
-size_t GlbWriter::push(const char* key, Json item) {
+size_t GltfWriter::push(const char* key, Json item) {
   Json& items = list(key);
   items.push_back(std::move(item));
   return items.size() - 1;
 }
 
-void GlbWriter::use_extension(const char* name, bool required) {
+void GltfWriter::use_extension(const char* name, bool required) {
   for (const char* key : {"extensionsUsed", "extensionsRequired"}) {
     if (key == std::string_view("extensionsRequired") && !required) break;
     Json& names = list(key);
@@ -66,26 +66,34 @@ void GlbWriter::use_extension(const char* name, bool required) {
   }
 }
 
-size_t GlbWriter::append(std::span<const uint8_t> bytes, size_t alignment) {
+size_t GltfWriter::append(std::span<const uint8_t> bytes, size_t alignment) {
   LAMBENT_CHECK(std::has_single_bit(alignment));
   size_t offset = round_up(size_, alignment);
-  pieces_.push_back({offset, bytes});
+  pieces_.push_back({offset, bytes, alignment});
   size_ = offset + bytes.size();
   alignment_ = std::max(alignment_, alignment);
   return offset;
 }
 
-std::span<const uint8_t> GlbWriter::keep(std::vector<uint8_t> bytes) {
+std::span<const uint8_t> GltfWriter::keep(std::vector<uint8_t> bytes) {
   kept_.push_back(std::move(bytes));
   return kept_.back();
 }
 
-size_t GlbWriter::add_view(std::span<const uint8_t> bytes, size_t alignment) {
+size_t GltfWriter::add_view(std::span<const uint8_t> bytes, size_t alignment) {
   size_t offset = append(bytes, alignment);
   return push("bufferViews", {{"buffer", 0}, {"byteOffset", offset}, {"byteLength", bytes.size()}});
 }
 
-size_t GlbWriter::add_accessor(Json accessor, std::vector<uint8_t> bytes, int target, size_t stride) {
+std::vector<int> GltfWriter::add_views(std::span<const uint8_t> bytes, size_t alignment, size_t most) {
+  if (most == 0 || bytes.size() <= most) return {int(add_view(bytes, alignment))};
+  std::vector<int> views;
+  for (size_t at = 0; at < bytes.size(); at += most)
+    views.push_back(int(add_view(bytes.subspan(at, std::min(most, bytes.size() - at)), split_alignment)));
+  return views;
+}
+
+size_t GltfWriter::add_accessor(Json accessor, std::vector<uint8_t> bytes, int target, size_t stride) {
   const std::string key = content_hash(bytes) + accessor.dump() + std::to_string(target) + "," + std::to_string(stride);
   const auto known = known_.find(key);
   if (known != known_.end()) return known->second;
@@ -96,7 +104,7 @@ size_t GlbWriter::add_accessor(Json accessor, std::vector<uint8_t> bytes, int ta
   return known_[key] = push("accessors", std::move(accessor));
 }
 
-size_t GlbWriter::add_vectors(std::span<const float> values, int components, bool with_bounds) {
+size_t GltfWriter::add_vectors(std::span<const float> values, int components, bool with_bounds) {
   const size_t count = values.size() / size_t(components);
   Json accessor = {
       {"componentType", int(GltfType::f32)}, {"count", count}, {"type", "VEC" + std::to_string(components)}};
@@ -107,12 +115,12 @@ size_t GlbWriter::add_vectors(std::span<const float> values, int components, boo
   return add_accessor(std::move(accessor), bytes_of(values), array_buffer, 0);
 }
 
-size_t GlbWriter::add_indices(std::span<const uint32_t> indices) {
+size_t GltfWriter::add_indices(std::span<const uint32_t> indices) {
   return add_accessor({{"componentType", int(GltfType::u32)}, {"count", indices.size()}, {"type", "SCALAR"}},
                       bytes_of(indices), element_array_buffer, 0);
 }
 
-size_t GlbWriter::add_copy(const GltfAccessor& from, std::span<const uint32_t> source, bool with_bounds) {
+size_t GltfWriter::add_copy(const GltfAccessor& from, std::span<const uint32_t> source, bool with_bounds) {
   const size_t stride = round_up(from.element_size, 4);  // vertex attributes begin at multiples of four
   std::vector<uint8_t> bytes(source.size() * stride);
   for (size_t i = 0; i < source.size(); ++i) {
@@ -129,22 +137,32 @@ size_t GlbWriter::add_copy(const GltfAccessor& from, std::span<const uint32_t> s
   return add_accessor(std::move(accessor), std::move(bytes), array_buffer, stride != from.element_size ? stride : 0);
 }
 
-Result<void> GlbWriter::write(const std::string& path) const {
-  constexpr uint32_t magic = 0x46546c67, version = 2, json_type = 0x4e4f534a, bin_type = 0x004e4942;
-  constexpr size_t header_size = 12, chunk_header_size = 8;
-  std::string text;
+Result<std::string> GltfWriter::text(const std::string& path) const {
   try {
-    text = json.dump(-1, ' ', false, Json::error_handler_t::replace);
+    return json.dump(-1, ' ', false, Json::error_handler_t::replace);
   } catch (const std::exception& e) {
     return Error{path, std::string("its JSON cannot be written: ") + e.what()};
   }
+}
+
+Result<void> GltfWriter::write(const std::string& path) const {
+  return file_extension(path) == "gltf" ? write_bins(path) : write_glb(path);
+}
+
+Result<void> GltfWriter::write_glb(const std::string& path) const {
+  constexpr uint32_t magic = 0x46546c67, version = 2, json_type = 0x4e4f534a, bin_type = 0x004e4942;
+  constexpr size_t header_size = 12, chunk_header_size = 8;
+  auto dumped = text(path);
+  if (!dumped) return dumped.error();
+  std::string& text = *dumped;
   const bool has_binary = size_ > 0;
   // Spaces after the JSON bring the binary data to a multiple of the largest alignment in the file.
   const size_t json_at = header_size + chunk_header_size, bin_header = has_binary ? chunk_header_size : 0;
   const size_t json_end = round_up(json_at + text.size() + bin_header, has_binary ? alignment_ : 4) - bin_header;
   text.resize(json_end - json_at, ' ');
   const size_t binary_size = round_up(size_, 4), total = json_end + bin_header + binary_size;
-  if (total > UINT32_MAX) return Error{path, "would be larger than 4 GiB, which a GLB file cannot be"};
+  if (total > UINT32_MAX)
+    return Error{path, "would be larger than 4 GiB, which a .glb cannot be: write a .gltf, whose data are beside it"};
 
   std::vector<uint8_t> header, binary_header;
   for (uint32_t word : {magic, version, uint32_t(total), uint32_t(text.size()), json_type}) put_u32(header, word);

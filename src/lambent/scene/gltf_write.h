@@ -1,12 +1,12 @@
 #pragma once
-// Building and writing of a GLB: JSON, and binary data that is gathered by reference.
+// Building and writing of a glTF: JSON, and binary data that is gathered by reference.
 #include <lambent/scene/gltf_read.h>
 
 #include <map>
 
 namespace lambent {
 
-class GlbWriter {
+class GltfWriter {
  public:
   using Json = nlohmann::json;
   Json json = Json::object();
@@ -22,6 +22,8 @@ class GlbWriter {
   // The same for bytes that the writer keeps.
   std::span<const uint8_t> keep(std::vector<uint8_t> bytes);
   size_t add_view(std::span<const uint8_t> bytes, size_t alignment);
+  // Where `most` is not 0 and there are more bytes: views one after another, all but the last of `most`.
+  std::vector<int> add_views(std::span<const uint8_t> bytes, size_t alignment, size_t most);
 
   // Accessors of fresh vertex data and indices; the same data in the same form are one accessor.
   size_t add_vectors(std::span<const float> values, int components, bool with_bounds);
@@ -34,13 +36,22 @@ class GlbWriter {
   // reference is none.
   void compact();
 
-  size_t size() const { return size_; }  // of the binary chunk
+  // Once all data are in: the JSON's buffers, and where in them its views are. Of a .gltf (`path`) each is a file of at
+  // most bin_limit bytes, but for views that are longer.
+  void place_buffers(const std::string& path, size_t bin_limit);
+  // To the same path.
   Result<void> write(const std::string& path) const;
 
  private:
   struct Piece {
     size_t offset;
     std::span<const uint8_t> bytes;
+    size_t alignment = 4;
+  };
+  // A file of binary data.
+  struct Bin {
+    std::vector<Piece> pieces;
+    size_t size = 0;
   };
   struct Range {
     size_t begin = 0, end = 0;
@@ -53,7 +64,18 @@ class GlbWriter {
   // Lays the ranges closer together; gives where they went, rising.
   std::vector<Move> keep_bytes(std::vector<Range> ranges);
 
+  // Bytes that have to stay together: what views have in common with one another.
+  struct Unit {
+    size_t begin = 0, end = 0, alignment = 64;
+  };
+  std::vector<Unit> make_units();
+  Result<void> write_glb(const std::string& path) const;
+  Result<void> write_bins(const std::string& path) const;
+  Result<std::string> text(const std::string& path) const;
+
   std::vector<Piece> pieces_;
+  std::vector<Bin> bins_;
+  bool compacted_ = true;  // no bytes but those of views
   std::deque<std::vector<uint8_t>> kept_;
   std::map<std::string, size_t> known_;  // accessors by what they say and hold
   size_t size_ = 0, alignment_ = 64;

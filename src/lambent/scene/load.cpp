@@ -2,8 +2,6 @@
 
 #include <lambent/scene/gltf.h>
 
-#include <filesystem>
-
 namespace lambent {
 
 Result<Scene> load_scene(const std::string& path) {
@@ -15,8 +13,7 @@ Result<Scene> load_scene(const std::string& path) {
   }
   auto file = MappedFile::open(path);
   if (!file) return file.error();
-  std::string folder = std::filesystem::path(path).parent_path().string();
-  if (folder.empty()) folder = ".";
+  const std::string folder = folder_of(path);
   auto scene = gltf               ? load_gltf(*file, path, folder)
              : extension == "obj" ? load_obj(file->bytes(), path, folder)
                                   : load_ply(file->bytes(), path, folder);

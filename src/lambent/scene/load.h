@@ -22,9 +22,4 @@ Result<Scene> load_gltf(std::span<const uint8_t> bytes, const std::string& path,
 Result<Scene> load_obj(std::span<const uint8_t> bytes, const std::string& path, const std::string& folder);
 Result<Scene> load_ply(std::span<const uint8_t> bytes, const std::string& path, const std::string& folder = {});
 
-// An external file that a scene names, read from `folder`. Refused: absolute paths, "..", URLs, links that lead
-// outside. `uri` is percent-decoded first.
-Result<std::vector<uint8_t>> read_external_file(const std::string& uri, const std::string& folder,
-                                                const std::string& referrer);
-
 }  // namespace lambent

@@ -2,7 +2,7 @@
 // rest pose.
 #include <lambent/scene/clean.h>
 #include <lambent/scene/gltf_compressed.h>
-#include <lambent/scene/gltf_container.h>
+#include <lambent/core/uri.h>
 #include <lambent/scene/gltf_extensions.h>
 #include <lambent/scene/gltf_instances.h>
 #include <lambent/scene/gltf_materials.h>
@@ -70,9 +70,12 @@ class UriReader {
     type_.clear();
     auto known = files_.find(uri);
     if (known != files_.end()) return known->second;
-    auto bytes = read_external_file(uri, folder_, where);
-    if (!bytes) return bytes.error();
-    return files_[uri] = keep(std::move(*bytes));
+    auto path = find_external_file(uri, folder_, where);
+    if (!path) return path.error();
+    auto file = MappedFile::open(*path);
+    if (!file) return Error{where, in_quotes(uri) + " cannot be read: " + file.error().message};
+    document_.files.push_back(*file);
+    return files_[uri] = file->bytes();
   }
   const std::string& media_type() const { return type_; }  // of the last data URI
 

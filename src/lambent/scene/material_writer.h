@@ -15,7 +15,8 @@ inline float finite_or(float x, float fallback) { return std::isfinite(x) ? x : 
 // Materials and textures that the document does not have.
 class MaterialWriter {
  public:
-  MaterialWriter(GlbWriter& out, const Scene& scene, const std::string& path) : out_(out), scene_(scene), path_(path) {}
+  MaterialWriter(GltfWriter& out, const Scene& scene, const std::string& path)
+      : out_(out), scene_(scene), path_(path) {}
 
   // The glTF number of a scene's material, in a one-sided and a two-sided edition.
   Result<size_t> add(uint32_t index, bool two_sided) {
@@ -159,7 +160,7 @@ class MaterialWriter {
 
   static int wrap_number(Wrap wrap) { return wrap == Wrap::clamp ? 33071 : wrap == Wrap::mirror ? 33648 : 10497; }
 
-  GlbWriter& out_;
+  GltfWriter& out_;
   const Scene& scene_;
   const std::string& path_;
   std::map<std::pair<uint32_t, bool>, size_t> materials_;

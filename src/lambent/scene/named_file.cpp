@@ -1,7 +1,6 @@
 #include <lambent/scene/named_file.h>
 
-#include <lambent/scene/gltf_container.h>
-#include <lambent/scene/load.h>
+#include <lambent/core/uri.h>
 #include <lambent/scene/mesh_text.h>
 #include <lambent/scene/textures.h>
 

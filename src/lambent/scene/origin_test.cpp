@@ -68,7 +68,7 @@ TEST(Origin, FarSceneComesBackToTheBit) {
   ASSERT_NE(scene->origin, Vec3d(0));
   test::TemporaryFolder folder;
   auto round_trip = [&](const Scene& s) {
-    auto saved = save_glb(folder.file("a.glb"), s, {}, {});
+    auto saved = save_gltf(folder.file("a.glb"), s, {}, {});
     EXPECT_TRUE(saved);
     auto loaded = load_scene(folder.file("a.glb"));
     EXPECT_TRUE(loaded);

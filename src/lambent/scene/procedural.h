@@ -13,6 +13,10 @@ namespace lambent {
 Scene make_courtyard(float detail = 1.0f);
 Camera courtyard_camera();
 
+// A building of rooms on both sides of a hall, doors to it and a window each, for rooms that are joined; walls, floor
+// and ceiling in cells of at most `cell`.
+Scene make_building(int rooms_a_side, float cell);
+
 // Pieces that scenes are made of; each is appended to `scene` as one part of the given material, one-sided.
 uint32_t add_material(Scene& scene, std::string name, Vec3 albedo);
 // Triangles given by triples of indices into the positions, counter-clockwise seen from the front; one unit normal a

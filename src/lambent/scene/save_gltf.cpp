@@ -32,7 +32,7 @@ std::span<const float> floats(const std::vector<Vec3>& v) { return {v.empty() ? 
 std::span<const float> floats(const std::vector<Vec4>& v) { return {v.empty() ? nullptr : &v[0].x, v.size() * 4}; }
 std::span<const float> floats(const std::vector<Vec2>& v) { return {v.empty() ? nullptr : &v[0].x, v.size() * 2}; }
 
-size_t add_triangles(GlbWriter& out, const Scene& scene, const Part& part, bool mirrored) {
+size_t add_triangles(GltfWriter& out, const Scene& scene, const Part& part, bool mirrored) {
   std::vector<uint32_t> indices;
   indices.reserve(size_t(part.triangle_count) * 3);
   for (size_t t = 0; t < part.triangle_count; ++t) {
@@ -45,7 +45,7 @@ size_t add_triangles(GlbWriter& out, const Scene& scene, const Part& part, bool 
 
 // Replaces the geometry of `primitive` by the part's as it stands in the world, in the frame that `frame` leads out of.
 // Attributes are written where they say something, or where the primitive had them before.
-void write_geometry(GlbWriter& out, const Scene& scene, const Part& part, const Mat4d& frame, Json& primitive) {
+void write_geometry(GltfWriter& out, const Scene& scene, const Part& part, const Mat4d& frame, Json& primitive) {
   const Json before = primitive.contains("attributes") ? primitive["attributes"] : Json::object();
   const Mat4d inverse = inverse_affine(frame);
   const bool is_identity = frame == Mat4d(1.0);
@@ -95,7 +95,7 @@ Json placed_node(const Scene& scene) {
 }
 
 // Adds a node to the default scene, or, where there are no scenes, to the nodes, all of which then are shown.
-size_t add_root(GlbWriter& out, Json node) {
+size_t add_root(GltfWriter& out, Json node) {
   size_t number = out.push("nodes", std::move(node));
   if (!out.json.contains("scenes") || out.json["scenes"].empty()) return number;
   size_t scene = out.json.contains("scene") ? out.json["scene"].get<size_t>() : 0;
@@ -108,7 +108,7 @@ size_t add_root(GlbWriter& out, Json node) {
 // The document part of the output: rewrites what changed in a copy of the document.
 class DocumentWriter {
  public:
-  DocumentWriter(GlbWriter& out, const Scene& scene, GltfPlaces& places)
+  DocumentWriter(GltfWriter& out, const Scene& scene, GltfPlaces& places)
       : out_(out), scene_(scene), document_(*scene.document), places_(places), pose_{.origin = scene.origin} {}
 
   void embed_buffers() {
@@ -118,7 +118,7 @@ class DocumentWriter {
     for (Json& view : out_.list("bufferViews")) {
       auto buffer = whole_number(view, "buffer", starts.size());
       if (!buffer) continue;
-      size_t offset = whole_number(view, "byteOffset", UINT32_MAX).value_or(0);
+      size_t offset = whole_number(view, "byteOffset", SIZE_MAX / 2).value_or(0);
       view["buffer"] = 0, view["byteOffset"] = starts[*buffer] + offset;
     }
   }
@@ -307,7 +307,7 @@ class DocumentWriter {
     }
   }
 
-  GlbWriter& out_;
+  GltfWriter& out_;
   const Scene& scene_;
   const GltfDocument& document_;
   GltfPlaces& places_;
@@ -318,9 +318,9 @@ class DocumentWriter {
 
 }  // namespace
 
-Result<void> save_glb(const std::string& path, const Scene& scene, std::span<const GltfBlob> blobs,
-                      const std::function<void(Json& document, const GltfPlaces& places)>& extend) {
-  GlbWriter out;
+Result<void> save_gltf(const std::string& path, const Scene& scene, std::span<const GltfBlob> blobs,
+                       const std::function<void(Json& document, const GltfPlaces& places)>& extend, size_t bin_limit) {
+  GltfWriter out;
   GltfPlaces places;
   for (const Part& part : scene.parts) {
     LAMBENT_CHECK(part.node < 0 || scene.document);
@@ -364,17 +364,10 @@ Result<void> save_glb(const std::string& path, const Scene& scene, std::span<con
   }
 
   if (scene.document) out.compact();
-  places.first_view = int(gltf_count(out.json, "bufferViews"));
-  for (const GltfBlob& blob : blobs) out.add_view(blob.bytes, blob.alignment);
-  // All binary data is in place: one buffer, which keeps what a lone original had to say about itself.
-  if (out.size() > 0) {
-    Json buffer = gltf_count(out.json, "buffers") == 1 ? out.json["buffers"][0] : Json::object();
-    buffer.erase("uri");
-    buffer["byteLength"] = out.size();
-    out.json["buffers"] = Json::array({std::move(buffer)});
-  } else {
-    out.json.erase("buffers");
-  }
+  const size_t most = file_extension(path) == "gltf" ? bin_limit / split_alignment * split_alignment : 0;
+  for (const GltfBlob& blob : blobs)
+    places.views.push_back(out.add_views(blob.bytes, blob.alignment, blob.may_split ? most : 0));
+  out.place_buffers(path, bin_limit);
   if (extend) extend(out.json, places);
   return out.write(path);
 }

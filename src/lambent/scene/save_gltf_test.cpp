@@ -19,7 +19,7 @@ constexpr float normal_rounding = 1e-6f, frame_rounding = 2e-6f;
 class RoundTrip {
  public:
   Scene operator()(const Scene& scene) {
-    auto saved = save_glb(path(), scene, {}, {});
+    auto saved = save_gltf(path(), scene, {}, {});
     EXPECT_TRUE(saved) << saved.error().text();
     auto again = load_scene(path());
     if (again) return std::move(*again);
@@ -171,8 +171,8 @@ TEST(SaveGlb, ProceduralScene) {
 
 TEST(SaveGlb, SameInputSameBytes) {
   TemporaryFolder folder;
-  ASSERT_TRUE(save_glb(folder.file("a.glb"), made_scene(), {}, {}));
-  ASSERT_TRUE(save_glb(folder.file("b.glb"), made_scene(), {}, {}));
+  ASSERT_TRUE(save_gltf(folder.file("a.glb"), made_scene(), {}, {}));
+  ASSERT_TRUE(save_gltf(folder.file("b.glb"), made_scene(), {}, {}));
   EXPECT_EQ(*read_file(folder.file("a.glb")), *read_file(folder.file("b.glb")));
 }
 
@@ -181,9 +181,9 @@ TEST(SaveGlb, BlobsLieAtTheirAlignmentInTheFile) {
   Bytes first = copy_bytes("first"), second = copy_bytes("second"), third = copy_bytes("third");
   std::vector<GltfBlob> blobs = {{first, 4}, {second, 4096}, {third, 64}};
   int calls = 0;
-  auto saved = save_glb(folder.file("a.glb"), made_scene(), blobs, [&](Json& document, const GltfPlaces& places) {
+  auto saved = save_gltf(folder.file("a.glb"), made_scene(), blobs, [&](Json& document, const GltfPlaces& places) {
     ++calls;
-    document["extensions"]["LAMBENT_test"] = {{"first", places.first_view}};
+    document["extensions"]["LAMBENT_test"] = {{"first", places.views[0][0]}};
     document["extensionsUsed"].push_back("LAMBENT_test");
     EXPECT_EQ(places.part_nodes, (std::vector<int>{0, 1, 2, 3, 4}));
     EXPECT_EQ(places.part_primitives, (std::vector<int>{0, 0, 0, 0, 0}));
@@ -435,7 +435,7 @@ TEST(SaveGlb, NoMoreThanFourGigabytes) {
   if (reserved == MAP_FAILED) GTEST_SKIP() << "no room for 4 GiB of addresses";
   TemporaryFolder folder;
   GltfBlob blob{{static_cast<const uint8_t*>(reserved), size}};
-  auto saved = save_glb(folder.file("a.glb"), made_scene(), {&blob, 1}, {});
+  auto saved = save_gltf(folder.file("a.glb"), made_scene(), {&blob, 1}, {});
   munmap(reserved, size);
   ASSERT_FALSE(saved);
   EXPECT_NE(saved.error().message.find("4 GiB"), std::string::npos);
@@ -446,7 +446,7 @@ TEST(SaveGlb, TextureWithoutItsImageIsAnError) {
   TemporaryFolder folder;
   Scene s = made_scene();
   s.textures[0].encoded.clear();
-  EXPECT_FALSE(save_glb(folder.file("a.glb"), s, {}, {}));
+  EXPECT_FALSE(save_gltf(folder.file("a.glb"), s, {}, {}));
 }
 
 TEST(SaveGlb, RealScenes) {

@@ -4,7 +4,6 @@
 import {
   type Accessor,
   Extension,
-  Format,
   PropertyType,
   type Mesh,
   type Node,
@@ -15,7 +14,7 @@ import {
 } from '@gltf-transform/core';
 import { LambentError } from '../errors.js';
 import { isOutOfPlace, replaceViews } from '../extension_views.js';
-import { extensionName, rewritten } from '../glb.js';
+import { extensionName, rewritten, type Views } from '../glb.js';
 import { Part, Transfer, type TransferData } from './properties.js';
 
 /** The vertex attributes of an open document; files do not have them. */
@@ -27,7 +26,7 @@ const noReceiver = 0xffffffff;
 interface Extensions {
   extensions?: Record<string, unknown>;
 }
-type FilePart = Record<Side | 'node' | 'primitive', number | undefined>;
+type FilePart = Record<'node' | 'primitive', number | undefined> & Record<Side, Views | undefined>;
 interface Held {
   side: Side;
   name: string;
@@ -48,6 +47,15 @@ const isObject = (value: unknown): value is Record<string, unknown> =>
 const bytesOf = (a: Uint32Array): Uint8Array => new Uint8Array(a.buffer, a.byteOffset, a.byteLength);
 const wordsOf = (bytes: Uint8Array): Uint32Array =>
   bytes.byteLength % 4 === 0 ? new Uint32Array(bytes.slice().buffer) : fail(rewritten);
+function concatenated(pieces: readonly Uint8Array[]): Uint8Array {
+  const out = new Uint8Array(pieces.reduce((sum, piece) => sum + piece.byteLength, 0));
+  let at = 0;
+  for (const piece of pieces) {
+    out.set(piece, at);
+    at += piece.byteLength;
+  }
+  return out;
+}
 const hasTriangles = (primitive: Primitive): boolean => primitive.getMode() >= 4; // triangles, strips and fans
 const vertexCount = (primitive: Primitive): number => primitive.getAttribute('POSITION')?.getCount() ?? 0;
 const partOf = (primitive: Primitive): Part | null => primitive.getExtension<Part>(extensionName);
@@ -96,7 +104,10 @@ export class LambentTransfer extends Extension {
     if (isOutOfPlace(context.jsonDoc.json, extension)) return fail(rewritten);
     const { transfer, surface } = extension as { transfer: Record<string, unknown>; surface?: { kind?: unknown } },
       parts = (Array.isArray(extension['parts']) ? extension['parts'] : fail('holds no list of "parts"')) as FilePart[];
-    const bytes = (view: number | undefined): Uint8Array => context.bufferViews[view ?? -1] ?? fail(rewritten);
+    const bytes = (view: Views | undefined): Uint8Array =>
+      typeof view === 'object'
+        ? concatenated(view.map((piece) => bytes(piece)))
+        : (context.bufferViews[view ?? -1] ?? fail(rewritten));
     const views: Uint8Array[] = [];
     const header = replaceViews(extension, (view) => views.push(bytes(view)) - 1);
     const kind = extension['view'] !== undefined ? 'view' : (surface?.kind ?? 'vertices');
@@ -308,8 +319,6 @@ export class LambentTransfer extends Extension {
   override prewrite(context: WriterContext): this {
     const buffer = this.document.getRoot().listBuffers()[0];
     if (!buffer || this.views.size === 0) return this;
-    if (context.options.format !== Format.GLB)
-      this.document.getLogger().warn(`${extensionName}: lambent itself reads this in .glb files alone`);
     const others = context.otherBufferViews.get(buffer) ?? [];
     others.push(...this.views.values());
     context.otherBufferViews.set(buffer, others);

@@ -1,17 +1,13 @@
 // RFC 3986 (percent-encoding); RFC 2397 and 4648 (data URIs,
 // base64).
-#include <lambent/scene/gltf_container.h>
+#include <lambent/core/uri.h>
 
 #include <lambent/core/file.h>
-#include <lambent/scene/gltf.h>
-#include <lambent/scene/load.h>
 
 #include <algorithm>
 #include <filesystem>
 
 namespace lambent {
-
-using Json = nlohmann::json;
 
 namespace {
 
@@ -94,8 +90,20 @@ Result<std::vector<uint8_t>> decode_data_uri(const std::string& uri, const std::
   return bytes;
 }
 
-Result<std::vector<uint8_t>> read_external_file(const std::string& uri, const std::string& folder,
-                                                const std::string& referrer) {
+std::string encode_uri(const std::string& name) {
+  constexpr const char* digits = "0123456789ABCDEF";
+  std::string out;
+  for (const char c : name) {
+    const auto byte = static_cast<unsigned char>(c);
+    const bool plain = (c >= 'a' && c <= 'z') || (c >= 'A' && c <= 'Z') || (c >= '0' && c <= '9') || c == '-' ||
+                       c == '.' || c == '_' || c == '~';
+    if (plain) out += c;
+    else out += '%', out += digits[byte >> 4], out += digits[byte & 15];
+  }
+  return out;
+}
+
+Result<std::string> find_external_file(const std::string& uri, const std::string& folder, const std::string& referrer) {
   namespace fs = std::filesystem;
   auto refuse = [&](const std::string& why) { return Error{referrer, in_quotes(uri) + " " + why}; };
   if (folder.empty()) return refuse("is an external file, which is not allowed here");
@@ -117,8 +125,15 @@ Result<std::vector<uint8_t>> read_external_file(const std::string& uri, const st
   if (std::mismatch(inside.begin(), inside.end(), file.begin(), file.end()).first != inside.end()) {
     return refuse("leads outside the scene's folder");
   }
-  auto bytes = read_file(file.string());
-  if (!bytes) return refuse("cannot be read: " + bytes.error().message);
+  return file.string();
+}
+
+Result<std::vector<uint8_t>> read_external_file(const std::string& uri, const std::string& folder,
+                                                const std::string& referrer) {
+  auto file = find_external_file(uri, folder, referrer);
+  if (!file) return file.error();
+  auto bytes = read_file(*file);
+  if (!bytes) return Error{referrer, in_quotes(uri) + " cannot be read: " + bytes.error().message};
   return bytes;
 }
 

@@ -1,0 +1,139 @@
+// Rooms that are joined, against the same scene baked whole.
+#include <lambent/bake/rooms.h>
+#include <lambent/core/parallel.h>
+#include <lambent/scene/procedural.h>
+
+#include <gtest/gtest.h>
+
+namespace lambent {
+namespace {
+
+// Relative RMS difference over receivers, and each one's own at most.
+double difference(const Transfer& a, const Transfer& b) {
+  double squares = 0, all = 0;
+  for (size_t r = 0; r < a.receivers; ++r) {
+    const std::vector<float> x = load_receiver(a, r), y = load_receiver(b, r);
+    for (size_t k = 0; k < x.size(); ++k)
+      squares += std::pow(double(x[k]) - double(y[k]), 2), all += double(y[k]) * double(y[k]);
+  }
+  return std::sqrt(squares / all);
+}
+
+BakeOptions plain(int samples) {
+  BakeOptions o{.order = 3, .samples = samples, .bounces = 40, .precision = Precision::single};
+  o.denoise = o.certify = false;
+  return o;
+}
+
+TEST(Rooms, AreCutAtWallsAndTileTheScene) {
+  const Scene scene = make_building(3, 0.7f);
+  const std::vector<Room> rooms = find_rooms(scene, 16);
+  EXPECT_GE(rooms.size(), 7u);
+  const Bounds whole = room_bounds(scene);
+  double volume = 0;
+  for (const Room& room : rooms) {
+    const Vec3 d = room.box.max - room.box.min;
+    volume += double(d.x) * d.y * d.z;
+  }
+  const Vec3 d = whole.max - whole.min;
+  EXPECT_NEAR(volume, double(d.x) * d.y * d.z, 1e-4 * volume);
+  // The middles of the rooms and of the hall lie in boxes of their own.
+  std::vector<size_t> at;
+  const auto box_of = [&](Vec3 p) {
+    for (size_t i = 0; i < rooms.size(); ++i)
+      if (min(p, rooms[i].box.min) == rooms[i].box.min && max(p, rooms[i].box.max) == rooms[i].box.max) return i;
+    return rooms.size();
+  };
+  for (int i = 0; i < 3; ++i)
+    for (float z : {2.2f, 5.4f, 8.6f}) at.push_back(box_of(Vec3(2.2f + 4.2f * float(i), 1.5f, z)));
+  for (int i = 0; i < 3; ++i)
+    for (int j = 0; j < i; ++j)
+      for (size_t side : {0u, 2u}) EXPECT_NE(at[size_t(3 * i) + side], at[size_t(3 * j) + side]) << i << " " << j;
+  EXPECT_NE(at[0], at[1]);
+  EXPECT_NE(at[1], at[2]);
+}
+
+TEST(Rooms, ThatAreAskedForArePartedByPlanes) {
+  const Bounds whole{Vec3(0), Vec3(10, 3, 10)};
+  auto rooms = part_rooms(whole, {{"a", {Vec3(0.2f), Vec3(4, 3, 10)}},
+                                  {"b", {Vec3(4.5f, 0, 0), Vec3(10, 3, 4)}},
+                                  {"c", {Vec3(4.5f, 0, 4.2f), Vec3(10, 3, 10)}}});
+  ASSERT_TRUE(rooms) << rooms.error().text();
+  ASSERT_EQ(rooms->size(), 3u);
+  EXPECT_EQ((*rooms)[0].box.max.x, 4.25f);
+  EXPECT_EQ((*rooms)[1].box.min.x, 4.25f);
+  EXPECT_EQ((*rooms)[1].box.max.z, (*rooms)[2].box.min.z);
+  auto overlap = part_rooms(whole, {{"a", {Vec3(0), Vec3(6, 3, 10)}}, {"b", {Vec3(3, 0, 0), Vec3(10, 3, 10)}}});
+  ASSERT_FALSE(overlap);
+  EXPECT_NE(overlap.error().text().find("\"a\""), std::string::npos);
+}
+
+TEST(Rooms, OneRoomIsTheSceneItself) {
+  const Scene scene = make_building(1, 0.5f);
+  auto tracer = Tracer::build(scene);
+  const Receivers receivers = make_vertex_receivers(scene);
+  const BakeOptions options = plain(256);
+  auto whole = bake(scene, *tracer, receivers, options);
+  RoomsReport report;
+  auto one = bake_rooms(scene, receivers, {{"all", room_bounds(scene)}}, options, {.residual = 1e-4}, nullptr, &report);
+  ASSERT_TRUE(whole && one);
+  EXPECT_EQ(report.nodes, 0u);
+  EXPECT_TRUE(report.converged);
+  EXPECT_LT(difference(*one, *whole), 0.01);  // the same rays, but for a control variate of the sky's
+}
+
+TEST(Rooms, JoinToTheSceneBakedWhole) {
+  const Scene scene = make_building(6, 0.8f);  // twelve rooms and a hall
+  auto tracer = Tracer::build(scene);
+  const Receivers receivers = make_vertex_receivers(scene);
+  BakeOptions options = plain(256), other = options;
+  other.seed = 7;
+  auto whole = bake(scene, *tracer, receivers, options), again = bake(scene, *tracer, receivers, other);
+  RoomsReport report;
+  auto joined = bake_rooms(scene, receivers, find_rooms(scene, 32), options, {.residual = 1e-3}, nullptr, &report);
+  ASSERT_TRUE(whole && again && joined);
+  EXPECT_GE(report.rooms, 13u);
+  EXPECT_LT(report.largest, receivers.count() / 4);
+  EXPECT_TRUE(report.converged);
+  EXPECT_LT(report.lost, 0.01);
+  for (size_t k = 1; k < report.residuals.size(); ++k) EXPECT_LT(report.residuals[k], report.residuals[k - 1]);
+  const double noise = difference(*again, *whole), found = difference(*joined, *whole);
+  RecordProperty("noise", std::to_string(noise)), RecordProperty("difference", std::to_string(found));
+  EXPECT_LT(found, 0.025) << "noise of the rays alone: " << noise;  // what --quality good asks for
+}
+
+TEST(Rooms, TheSameBytesWhateverTheThreadsAndTheMemory) {
+  const Scene scene = make_building(2, 0.9f);
+  const Receivers receivers = make_vertex_receivers(scene);
+  const std::vector<Room> rooms = find_rooms(scene, 8);
+  const auto bytes_with = [&](int threads, size_t memory, const char* scratch, double* kept, size_t* filed) {
+    ThreadLimit limit(threads);
+    BakeOptions options = plain(64);
+    options.memory = memory;
+    BakeReport report;
+    auto t = bake_rooms(scene, receivers, rooms, options, {.residual = 0.01, .scratch = scratch}, &report);
+    EXPECT_TRUE(t) << t.error().text();
+    *kept = report.operator_kept, *filed = report.operator_file_bytes;
+    return t ? std::vector<uint8_t>(t->data.begin(), t->data.end()) : std::vector<uint8_t>();
+  };
+  double kept = 0;
+  size_t filed = 0;
+  const auto expected = bytes_with(1, size_t{4} << 30, "", &kept, &filed);
+  EXPECT_EQ(kept, 1.0);
+  EXPECT_EQ(filed, 0u);
+  EXPECT_EQ(bytes_with(2, size_t{4} << 30, "", &kept, &filed), expected);
+  BakeOptions least = plain(64);
+  least.memory = 0;
+  auto refused = bake_rooms(scene, receivers, rooms, least, {});
+  ASSERT_FALSE(refused);
+  const std::string text = refused.error().text();
+  const size_t needed = std::stoull(text.substr(text.find("least ") + 6));
+  EXPECT_EQ(bytes_with(2, needed, "/tmp", &kept, &filed), expected);
+  EXPECT_EQ(kept, 1.0);
+  EXPECT_GT(filed, 0u);
+  EXPECT_EQ(bytes_with(2, needed, "", &kept, &filed), expected);
+  EXPECT_LT(kept, 0.1);
+}
+
+}  // namespace
+}  // namespace lambent
