@@ -294,15 +294,14 @@ Result<Field> decode_indirect(const BlobReader& in, const json& object, size_t r
   if (!surfels) return surfels.error();
   t.surfels = std::move(*surfels), t.receivers = receivers;
   auto level = read_count(object, "gatherLevel", t.surfels.levels() - 1, where),
-       entries = read_count(object, "entries", 0x7fffffff, where),
-       view = read_count(object, "bufferView", 0x7fffffff, where);
-  for (const auto* count : {&level, &entries, &view})
+       entries = read_count(object, "entries", 0x7fffffff, where);
+  for (const auto* count : {&level, &entries})
     if (!*count) return count->error();
   t.gather_level = uint32_t(*level);
-  if (receivers > in.chunks.binary.size() / kernel_slots) return Error{where, "there is no room for so many receivers"};
-  auto packed = view_bytes(in, *view, where);
+  if (receivers > in.buffers.room() / kernel_slots) return Error{where, "there is no room for so many receivers"};
+  auto packed = read_view(in, object, "bufferView", where);
   if (!packed) return packed.error();
-  if (auto ok = unpack_rows(*packed, t.gathering(), *entries, t, where); !ok) return ok.error();
+  if (auto ok = unpack_rows(packed->bytes, t.gathering(), *entries, t, where); !ok) return ok.error();
   auto weights = read_values<uint8_t>(in, object, "weights", *entries, where);
   if (!weights) return weights.error();
   auto scales = read_values<float>(in, object, "scales", t.gathering(), where);
