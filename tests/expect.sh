@@ -16,7 +16,7 @@ expect() {
   shift 2
   "$tool" "$@" >stdout 2>stderr
   local got=$?
-  sed -i -E '/^[a-z ]+  [0-9.]+%(, .* left)?$/d' stderr  # progress, told every few seconds: machines may be slow
+  sed -i -E '/^[a-z0-9 ]+  [0-9.]+%(, .* left)?$/d' stderr  # progress, told every few seconds: machines may be slow
   [ $got -eq "$code" ] || { bad "exit $got, not $code: lambent $*: $(head -c 300 stderr)"; return; }
   if [ "$code" -ne 0 ]; then
     [ "$(wc -l <stderr)" -eq 1 ] || { bad "not one line: lambent $*: $(cat stderr)"; return; }
