@@ -43,26 +43,6 @@ std::string import_settings(int slices) {
       slices);
 }
 
-// Slices of one size, those of each object one after another, below one another in as few pictures as fit.
-Result<std::vector<std::string>> write_layers(LightmapWriter& w, const std::string& name,
-                                              const std::vector<Image>& slices) {
-  const int width = slices[0].width, height = slices[0].height;
-  const size_t a_file = std::max<size_t>(1, size_t(max_side / height));
-  std::vector<std::string> names;
-  for (size_t first = 0; first < slices.size(); first += a_file) {
-    const size_t count = std::min(a_file, slices.size() - first);
-    Image picture(width, height * int(count));
-    for (size_t k = 0; k < count; ++k)
-      std::copy(slices[first + k].rgb.begin(), slices[first + k].rgb.end(),
-                picture.rgb.begin() + ptrdiff_t(k * slices[first + k].rgb.size()));
-    const std::string path = name + (slices.size() > a_file ? "_" + std::to_string(names.size()) : "") + ".exr";
-    if (auto ok = w.save_picture(path, picture); !ok) return ok.error();
-    if (auto ok = w.save_text(path + ".import", import_settings(int(count))); !ok) return ok.error();
-    names.push_back(path);
-  }
-  return names;
-}
-
 template <class T, class Number>
 std::string packed(const char* type, const std::vector<T>& values, Number number) {
   std::string out = std::string(type) + "(";
@@ -122,6 +102,25 @@ std::vector<Image> slices_of(const LightmapWriter& w, const LightmapExport& o, c
 }
 
 }  // namespace
+
+Result<std::vector<std::string>> write_layers(LightmapWriter& w, const std::string& name,
+                                              const std::vector<Image>& slices) {
+  const int width = slices[0].width, height = slices[0].height;
+  const size_t a_file = std::max<size_t>(1, size_t(max_side / height));
+  std::vector<std::string> names;
+  for (size_t first = 0; first < slices.size(); first += a_file) {
+    const size_t count = std::min(a_file, slices.size() - first);
+    Image picture(width, height * int(count));
+    for (size_t k = 0; k < count; ++k)
+      std::copy(slices[first + k].rgb.begin(), slices[first + k].rgb.end(),
+                picture.rgb.begin() + ptrdiff_t(k * slices[first + k].rgb.size()));
+    const std::string path = name + (slices.size() > a_file ? "_" + std::to_string(names.size()) : "") + ".exr";
+    if (auto ok = w.save_picture(path, picture); !ok) return ok.error();
+    if (auto ok = w.save_text(path + ".import", import_settings(int(count))); !ok) return ok.error();
+    names.push_back(path);
+  }
+  return names;
+}
 
 Result<void> write_godot(LightmapWriter& w, const LightmapExport& o, const Relit& all) {
   int width = w.objects.empty() ? w.atlas.width : 1, height = w.objects.empty() ? w.atlas.height : 1;

@@ -28,6 +28,12 @@ Result<Json> write_sky(LightmapWriter& w, const LightmapExport& o) {
     if (auto ok = w.save(name, values[k]); !ok) return ok.error();
     names.push_back(LightmapWriter::base(name));
   }
+  for (size_t i = 0; godot && i < std::max<size_t>(1, w.objects.size()); ++i) {
+    std::vector<Image> slices;
+    for (const auto& column : values) slices.push_back(std::move(w.images(column)[i]));
+    const std::string name = o.prefix + ".sky.layers" + (w.objects.empty() ? "" : "." + w.object_files[i]);
+    if (auto ok = write_layers(w, name, slices); !ok) return ok.error();
+  }
   Json sky = {{"order", w.light.order}, {"pictures", names}, {"objects", w.object_files}};
   if (!o.light.env.empty()) {
     auto env = load_light(o.light);
@@ -46,6 +52,10 @@ Result<Json> write_sky(LightmapWriter& w, const LightmapExport& o) {
                       : o.target == LightmapTarget::unity ? "shaders/LambentSky.hlsl"
                                                           : "shaders/lambent_sky.glsl";
   if (auto ok = w.save_carried(snippet, "", int(count)); !ok) return ok.error();
+  if (o.target == LightmapTarget::unity && w.light.groups.empty())  // else with the lightmap
+    for (const auto& [name, below] :
+         {std::pair("unity/LambentImporter.cs", "Editor"), {"unity/LambentLightmap.cs", ""}})
+      if (auto ok = w.save_carried(name, below); !ok) return ok.error();
   return sky;
 }
 

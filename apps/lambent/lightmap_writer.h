@@ -69,6 +69,11 @@ struct GodotProbes {
 };
 GodotProbes godot_probes(const Lattice& lattice);
 
+// Slices of one size below one another, as Godot's 2d_array_texture takes them apart, in as few pictures as it can
+// have, with its import settings; their names.
+Result<std::vector<std::string>> write_layers(LightmapWriter& w, const std::string& name,
+                                              const std::vector<Image>& slices);
+
 Result<void> write_godot(LightmapWriter& w, const LightmapExport& o, const Relit& all);
 Result<void> write_unity(LightmapWriter& w, const LightmapExport& o, const Relit& all);
 // PREFIX.sky.K.exr, and for Godot all of them in one, with the shader's snippet and the sky's coefficients.

@@ -47,6 +47,43 @@ public static class LambentImporter
         public Grid probes = new Grid();
     }
 
+    [Serializable]
+    class Sky
+    {
+        public int order = 0;
+        public string[] pictures = new string[0];
+        public string[] objects = new string[0];
+    }
+
+    // PREFIX.sky.json: a Texture2DArray for LambentSky.hlsl, PREFIX.sky.asset, or one for each object.
+    [MenuItem("Tools/lambent/Make sky columns of...")]
+    static void ChooseSky()
+    {
+        string path = EditorUtility.OpenFilePanel("PREFIX.sky.json", Application.dataPath, "json");
+        if (!string.IsNullOrEmpty(path) && path.StartsWith(Application.dataPath, StringComparison.Ordinal))
+            MakeSky("Assets" + path.Substring(Application.dataPath.Length));
+    }
+
+    public static void MakeSky(string path)
+    {
+        Sky sky = JsonUtility.FromJson<Sky>(File.ReadAllText(path));
+        string folder = Path.GetDirectoryName(path).Replace('\\', '/') + "/";
+        string[] endings = sky.objects.Length == 0 ? new[] { "" } : Array.ConvertAll(sky.objects, o => "." + o);
+        foreach (string ending in endings)
+        {
+            Texture2DArray all = null;
+            for (int k = 0; k < sky.pictures.Length; ++k)
+            {
+                Texture2D one = Import(folder + sky.pictures[k] + ending + ".exr", TextureImporterType.Default);
+                if (all == null)
+                    all = new Texture2DArray(one.width, one.height, sky.pictures.Length, TextureFormat.RGBAHalf, false);
+                Graphics.CopyTexture(one, 0, 0, all, k, 0);
+            }
+            all.wrapMode = TextureWrapMode.Clamp;
+            AssetDatabase.CreateAsset(all, folder + Path.GetFileNameWithoutExtension(path) + ending + ".asset");
+        }
+    }
+
     [MenuItem("Tools/lambent/Use lightmaps of...")]
     static void Choose()
     {

@@ -362,6 +362,8 @@ class Engines(unittest.TestCase):
             self.assertEqual((told["order"], len(told["pictures"])), (3, 9))
             light = np.array(told["coefficients"]).reshape(9, 3)
             columns = np.stack([read_rgb(f"s.sky.{k}.exr") for k in range(9)])
+            if target == "--godot":
+                np.testing.assert_array_equal(self.layers("s.sky.layers.exr"), columns)
             total = np.einsum("kc,kyxc->yxc", light, columns)
             seen = total[(np.abs(columns[0]).max(2) > 0.2)]
             np.testing.assert_allclose(seen[np.abs(seen[:, 0] - 1) < 0.5], np.array([[1, 0.5, 0.25]]).repeat(
