@@ -80,9 +80,6 @@ bool KeptRows::keep(size_t block, const GatherBlock& rows) {
   return true;
 }
 
-double KeptRows::fraction() const {
-  return blocks_.empty() ? 1.0
-                         : double(std::count(is_kept_.begin(), is_kept_.end(), uint8_t(1))) / double(blocks_.size());
-}
+size_t KeptRows::count() const { return size_t(std::count(is_kept_.begin(), is_kept_.end(), uint8_t(1))); }
 
 }  // namespace lambent

@@ -32,7 +32,7 @@ class KeptRows {
   // Null where not kept.
   const Block* find(size_t block) const { return is_kept_[block] ? &blocks_[block] : nullptr; }
   size_t bytes() const { return used_; }
-  double fraction() const;  // of the blocks kept
+  size_t count() const;  // of blocks kept
 
  private:
   std::vector<Block> blocks_;

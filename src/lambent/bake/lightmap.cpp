@@ -87,9 +87,10 @@ Result<AlignedVector<float>> directional_rows_of(const GatherSetup& setup, const
                                                  const float* x, size_t width, Progress* progress) {
   const size_t n = setup.receivers.count(), rows = size_t(directional_rows(o.directional));
   AlignedVector<float> wide(n * rows * width, 0.0f);
-  ProgressStage stage(progress, "directions", n);
+  const Shares shares(n, gather_block);
+  ProgressStage stage(progress, "directions", shares.own());
   const KeptPieces pieces(progress, "directions", n / gather_block);
-  parallel_for(n, gather_block, [&](size_t begin, size_t end) {
+  shares.for_own([&](size_t begin, size_t end) {
     if (stage.cancelled()) return;
     const std::span<float> own(wide.data() + begin * rows * width, (end - begin) * rows * width);
     const bool loaded = pieces.load(begin / gather_block, own);
@@ -98,7 +99,8 @@ Result<AlignedVector<float>> directional_rows_of(const GatherSetup& setup, const
     if (!loaded) pieces.save(begin / gather_block, own);
     stage.advance(end - begin);
   });
-  if (stage.cancelled()) return Error{"", "cancelled"};
+  if (!none_cancelled(progress)) return Error{"", "cancelled"};
+  shares.gather(wide.data(), rows * width);
   return wide;
 }
 
@@ -153,6 +155,8 @@ Result<Lightmap> bake_lightmap(const Scene& scene, const Tracer& tracer, const R
   // A directional lightmap's last bounce is gathered with its directions.
   auto x = solution(*op, e, width, o, r.solve, progress);
   if (!x) return x.error();
+  const Shares shares = op->shares();
+  shares.gather(x->data(), width);
   const size_t rows = size_t(directional_rows(o.directional));
   if (directional) {
     auto wide = directional_rows_of(setup, lamps, o, bounces ? x->data() : nullptr, width, progress);
@@ -178,6 +182,7 @@ Result<Lightmap> bake_lightmap(const Scene& scene, const Tracer& tracer, const R
   if (o.keep_terms) {
     *x = {};
     auto take = [&](int, AlignedVector<float> term) -> Result<void> {
+      shares.gather(term.data(), width);
       auto transfer = stored(term, 1, false);
       if (!transfer) return transfer.error();
       map.terms.push_back(std::move(*transfer));
@@ -187,6 +192,7 @@ Result<Lightmap> bake_lightmap(const Scene& scene, const Tracer& tracer, const R
       return ok.error();
   }
   if (direct_apart) {
+    shares.gather(e.data(), width);
     auto direct_light = stored(e, 1, false);
     if (!direct_light) return direct_light.error();
     map.direct = std::move(*direct_light);
