@@ -9,18 +9,24 @@
 #define MPICH_SKIP_MPICXX 1
 #include <mpi.h>
 #include <sched.h>
+#include <sys/prctl.h>
+#include <sys/wait.h>
 #include <unistd.h>
 
+#include <cerrno>
 #include <chrono>
+#include <csignal>
 #include <cstdio>
+#include <cstring>
 #endif
 
 namespace lambent::tool {
 
 Launched launched() {
   // Open MPI; MPICH, Intel MPI and Slurm's PMI-2; Slurm with PMIx, which gives no size.
-  for (const auto& [count, rank] : {std::pair("OMPI_COMM_WORLD_SIZE", "OMPI_COMM_WORLD_RANK"),
-                                    std::pair("PMI_SIZE", "PMI_RANK"), std::pair("SLURM_STEP_NUM_TASKS", "PMIX_RANK")}) {
+  for (const auto& [count, rank] :
+       {std::pair("OMPI_COMM_WORLD_SIZE", "OMPI_COMM_WORLD_RANK"), std::pair("PMI_SIZE", "PMI_RANK"),
+        std::pair("SLURM_STEP_NUM_TASKS", "PMIX_RANK")}) {
     const char *n = std::getenv(count), *r = std::getenv(rank);
     if (n && r) return {std::max(1, std::atoi(n)), std::max(0, std::atoi(r))};
   }
@@ -37,6 +43,34 @@ using Clock = std::chrono::steady_clock;
 constexpr size_t most_at_once = size_t{1} << 28;  // MPI counts in int
 constexpr int patient = 2000;                     // looks before it sleeps between them
 constexpr double seconds_for_others = 5;
+
+volatile std::sig_atomic_t watched = 0;
+extern "C" void pass_on(int signal) {
+  if (watched > 0) ::kill(pid_t(watched), signal);
+}
+
+// The process goes on as a child of its own, and waits for it: where that dies of a signal (memory that the system has
+// not got, as a rule), a line says so, and the job ends with the exit code of a failure.
+void go_on_watched(int rank) {
+  const pid_t self = ::getpid(), child = ::fork();
+  if (child < 0) return;
+  if (child == 0) {
+    ::setpgid(0, 0);  // what is sent to the group comes once
+    ::prctl(PR_SET_PDEATHSIG, SIGKILL);
+    if (::getppid() != self) ::_exit(1);
+    return;
+  }
+  watched = child;
+  for (const int signal : {SIGINT, SIGTERM, SIGHUP, SIGUSR1, SIGUSR2}) ::signal(signal, pass_on);
+  int status = 0;
+  while (::waitpid(child, &status, 0) < 0 && errno == EINTR) {
+  }
+  if (!WIFSIGNALED(status)) ::_exit(WEXITSTATUS(status));
+  const std::string said = "lambent: rank " + std::to_string(rank) + " died: " + ::strsignal(WTERMSIG(status)) +
+                           "; the job ends\n";
+  (void)!::write(2, said.data(), said.size());
+  ::_exit(1);
+}
 
 class MpiRanks final : public Together {
  public:
@@ -128,7 +162,10 @@ class MpiRanks final : public Together {
 
 }  // namespace
 
-std::unique_ptr<Together> Together::begin() { return std::make_unique<MpiRanks>(); }
+std::unique_ptr<Together> Together::begin() {
+  go_on_watched(launched().rank);
+  return std::make_unique<MpiRanks>();
+}
 
 #else
 

@@ -388,8 +388,8 @@ Result<Transfer> bake_to_error(const Scene& scene, const Tracer& tracer, const R
     const double wanted = between < 0.5 * target ? 0.9 * std::sqrt(target * target - between * between)
                                                  : std::clamp(0.2 * error, 0.3 * target, 0.6 * target);
     const double ratio = std::clamp(std::pow(noise / wanted, 1 / slope), 1.5, 16.0);
-    const bool late = this_ranks().from_first(
-        options.seconds >= 0 && seconds_since(start) + seconds_since(round) * ratio > options.seconds);
+    const bool late = this_ranks().from_first(options.seconds >= 0 &&
+                                              seconds_since(start) + seconds_since(round) * ratio > options.seconds);
     if (!(noise > wanted && error > target) || options.samples == most || late) return transfer;
     options.samples = std::min(most, int(std::lround(double(options.samples) * ratio / 64)) * 64);
   }

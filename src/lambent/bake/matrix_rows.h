@@ -32,7 +32,7 @@ class MatrixRows final : public LinearOperator {
   const std::vector<uint8_t>& buried() const { return buried_; }
   // Of all ranks together.
   size_t bytes() const { return shares_.ranks().sum(used_); }
-  double kept() const;                                                // fraction of the blocks
+  double kept() const;                                               // fraction of the blocks
   size_t rays_again() const { return shares_.ranks().sum(again_); }  // traced after the first time
 
  private:

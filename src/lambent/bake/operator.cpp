@@ -101,7 +101,8 @@ void GatherOperator::trace_block(const GatherWanted& wanted, size_t begin, size_
   if (pieces && piece.load(pieces, number, *block, has_rows, rows())) {
     if (wanted.hits && has_rows) traced_->kept.keep(number, *block);
     if (has_rows) note_asked(*block, asked);
-    else if (!asked.empty()) for (uint8_t& a : asked) std::atomic_ref(a).store(1, std::memory_order_relaxed);
+    else if (!asked.empty())
+      for (uint8_t& a : asked) std::atomic_ref(a).store(1, std::memory_order_relaxed);
     return;
   }
   trace_gather(*setup_, *scratch, begin, end - begin, wanted.hits ? block.get() : nullptr, &sky,

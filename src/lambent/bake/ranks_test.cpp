@@ -55,14 +55,17 @@ void expect_alike(const char* what, const std::function<Bytes(Progress*)>& work)
 TEST(Ranks, ShareEveryItemOnce) {
   for (const int count : {1, 2, 3, 7})
     for (const size_t items : {0, 1, 63, 64, 65, 1000, 30000}) {
-      const auto own = by_ranks(count, [&](Progress* progress) {
+      const auto own = by_ranks(count, [&](Progress*) {
         const Shares shares(items, 64);
         std::mutex mutex;
         std::set<size_t> mine;
         shares.for_own([&](size_t begin, size_t end) {
           std::lock_guard lock(mutex);
           EXPECT_EQ(begin % 64, 0u);
-          for (size_t i = begin; i < end; ++i) EXPECT_TRUE(mine.insert(i).second), EXPECT_EQ(shares.owner(i), this_ranks().rank());
+          for (size_t i = begin; i < end; ++i) {
+            EXPECT_TRUE(mine.insert(i).second);
+            EXPECT_EQ(shares.owner(i), shares.ranks().rank());
+          }
         });
         EXPECT_EQ(mine.size(), shares.own());
         return mine;
@@ -70,13 +73,15 @@ TEST(Ranks, ShareEveryItemOnce) {
       size_t all = 0, most = 0;
       for (const auto& o : own) all += o->size(), most = std::max(most, o->size());
       EXPECT_EQ(all, items);
-      if (items == 30000) EXPECT_LE(most * size_t(count), items + items / 8);
+      if (items == 30000) {
+        EXPECT_LE(most * size_t(count), items + items / 8);
+      }
     }
 }
 
 TEST(Ranks, GatherWhatEachHasMade) {
   for (const int count : {1, 2, 5}) {
-    const auto rows = by_ranks(count, [&](Progress* progress) {
+    const auto rows = by_ranks(count, [&](Progress*) {
       const Shares shares(1000, 16);
       std::vector<int> values(3000, -1), pieces(63, -1);
       shares.for_own([&](size_t begin, size_t end) {
@@ -112,8 +117,9 @@ TEST(Ranks, DiffuseBakesAreAlike) {
   again.memory = least_memory(p.receivers.count(), true, few) + 4000;
   terms.keep_terms = true, direct.bounces = 0;
   direct.lobes = {{normalize(Vec3(1, 2, 3)), 40.0f}};
-  for (const auto& [name, options] : {std::pair("kept", few), std::pair("traced again", again),
-                                      std::pair("terms", terms), std::pair("direct", direct), std::pair("error", error)})
+  for (const auto& [name, options] :
+       {std::pair("kept", few), std::pair("traced again", again), std::pair("terms", terms),
+        std::pair("direct", direct), std::pair("error", error)})
     expect_alike(name, [&](Progress* progress) {
       BakeReport report;
       auto t = bake(p.scene, p.tracer, p.receivers, options, &report, progress);
@@ -146,7 +152,8 @@ TEST(Ranks, OtherBakesAreAlike) {
     });
   const Transfer surface = *bake(p.scene, p.tracer, p.receivers, few);
   expect_alike("lattice", [&](Progress* progress) {
-    auto l = bake_lattice(p.scene, p.tracer, p.receivers, surface, nullptr, {default_lattice_box(p.scene).min, default_lattice_box(p.scene).max, 5, 6, 7},
+    auto l = bake_lattice(p.scene, p.tracer, p.receivers, surface, nullptr,
+                          {default_lattice_box(p.scene).min, default_lattice_box(p.scene).max, 5, 6, 7},
                           {.order = 2, .samples = 64}, nullptr, progress);
     EXPECT_TRUE(l);
     return l ? bytes(l->transfer) : Bytes{};

@@ -38,10 +38,10 @@ struct SolveReport {
   bool converged = false;
 };
 
-// e and the result are [row][width], width a multiple of lane_multiple; e must be filled (F e = e). Of other ranks' rows
-// (LinearOperator::shares) the result has those that were fetched; so below. Not converging
-// within `most` is no error: the report says so, and the last iterate is returned. Errors: cancelled; southwell of an
-// operator that is not known by its entries.
+// e and the result are [row][width], width a multiple of lane_multiple; e must be filled (F e = e). Of other ranks'
+// rows (LinearOperator::shares) the result has those that were fetched; so below. Not converging within `most` is no
+// error: the report says so, and the last iterate is returned. Errors: cancelled; southwell of an operator that is not
+// known by its entries.
 Result<AlignedVector<float>> solve(const LinearOperator& op, const float* e, size_t width, const SolveOptions& options,
                                    SolveReport* report = nullptr, Progress* progress = nullptr);
 

@@ -91,7 +91,8 @@ void gather_pieces(const Shares& shares, std::vector<std::vector<uint8_t>>& piec
     auto from = all[size_t(k)].begin();
     each_piece(k, [&](auto& piece, size_t first) {
       const size_t end = std::min(first + piece_receivers, lengths.size());
-      const size_t bytes = std::accumulate(lengths.begin() + ptrdiff_t(first), lengths.begin() + ptrdiff_t(end), size_t{0});
+      const size_t bytes =
+          std::accumulate(lengths.begin() + ptrdiff_t(first), lengths.begin() + ptrdiff_t(end), size_t{0});
       piece.assign(from, from + ptrdiff_t(bytes)), from += ptrdiff_t(bytes);
     });
   }

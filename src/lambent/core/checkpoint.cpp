@@ -67,8 +67,7 @@ std::string name_of_rank(const std::string& stage, int rank) {
 bool is_of_stage(const std::string& file, const std::string& stage) {
   if (!file.starts_with(stage) || !file.ends_with(pieces_ending)) return false;
   const std::string middle = file.substr(stage.size(), file.size() - stage.size() - std::strlen(pieces_ending));
-  return middle.empty() ||
-         (middle.starts_with(".r") && middle.find_first_not_of("0123456789", 2) == std::string::npos);
+  return middle.empty() || (middle.starts_with(".r") && middle.find_first_not_of("0123456789", 2) == std::string::npos);
 }
 
 bool is_ours(const fs::path& file) {

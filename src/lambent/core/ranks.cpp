@@ -7,13 +7,14 @@ namespace {
 
 constexpr size_t stripes_a_rank = 16;
 
-Ranks alone;
+Ranks one_process;
 thread_local Ranks* current = nullptr;
 
 // What each rank has goes round in a ring: mine is handed on, then what came, until all have seen all.
 template <class Size, class Take>
 void hand_round(Ranks& ranks, std::vector<uint8_t> mine, Size size_of, Take take) {
-  const size_t n = size_t(ranks.count()), rank = size_t(ranks.rank()), next = (rank + 1) % n, before = (rank + n - 1) % n;
+  const size_t n = size_t(ranks.count()), rank = size_t(ranks.rank()), next = (rank + 1) % n,
+               before = (rank + n - 1) % n;
   std::vector<uint8_t> in;
   std::vector<std::span<const uint8_t>> give(n);
   std::vector<std::span<uint8_t>> get(n);
@@ -37,10 +38,12 @@ std::vector<std::vector<uint8_t>> Ranks::gather(std::vector<uint8_t> mine) {
   const uint64_t size = mine.size();
   std::memcpy(own.data(), &size, sizeof size);
   if (n > 1) {
-    hand_round(*this, own, [](size_t) { return sizeof(uint64_t); },
-               [&](size_t from, const std::vector<uint8_t>& in) { std::memcpy(&sizes[from], in.data(), sizeof size); });
-    hand_round(*this, mine, [&](size_t from) { return size_t(sizes[from]); },
-               [&](size_t from, const std::vector<uint8_t>& in) { out[from] = in; });
+    hand_round(
+        *this, own, [](size_t) { return sizeof(uint64_t); },
+        [&](size_t from, const std::vector<uint8_t>& in) { std::memcpy(&sizes[from], in.data(), sizeof size); });
+    hand_round(
+        *this, mine, [&](size_t from) { return size_t(sizes[from]); },
+        [&](size_t from, const std::vector<uint8_t>& in) { out[from] = in; });
   }
   out[size_t(rank())] = std::move(mine);
   return out;
@@ -55,7 +58,7 @@ uint64_t Ranks::sum(uint64_t mine) {
   return out;
 }
 
-Ranks& this_ranks() { return current ? *current : alone; }
+Ranks& this_ranks() { return current ? *current : one_process; }
 
 WithRanks::WithRanks(Ranks& ranks) : outer_(current) { current = &ranks; }
 WithRanks::~WithRanks() { current = outer_; }
@@ -69,7 +72,7 @@ bool none_cancelled(Progress* progress) {
 Shares::Shares(size_t count, size_t grain) : Shares(count, grain, &this_ranks()) {}
 
 Shares::Shares(size_t count, size_t grain, Ranks* ranks)
-    : ranks_(ranks ? ranks : &alone),
+    : ranks_(ranks ? ranks : &one_process),
       rank_(ranks_->rank()),
       size_(ranks_->count()),
       count_(count),
@@ -105,14 +108,16 @@ void Shares::gather_bytes(uint8_t* rows, size_t each) const {
   if (count_ == 0 || each == 0) return;
   std::vector<uint8_t> mine;
   mine.reserve(own() * each);
-  each_stripe(rank_, [&](size_t begin, size_t end) { mine.insert(mine.end(), rows + begin * each, rows + end * each); });
-  hand_round(*ranks_, std::move(mine), [&](size_t from) { return size_of(int(from)) * each; },
-             [&](size_t from, const std::vector<uint8_t>& in) {
-               const uint8_t* at = in.data();
-               each_stripe(int(from), [&](size_t begin, size_t end) {
-                 std::memcpy(rows + begin * each, at, (end - begin) * each), at += (end - begin) * each;
-               });
-             });
+  each_stripe(rank_,
+              [&](size_t begin, size_t end) { mine.insert(mine.end(), rows + begin * each, rows + end * each); });
+  hand_round(
+      *ranks_, std::move(mine), [&](size_t from) { return size_of(int(from)) * each; },
+      [&](size_t from, const std::vector<uint8_t>& in) {
+        const uint8_t* at = in.data();
+        each_stripe(int(from), [&](size_t begin, size_t end) {
+          std::memcpy(rows + begin * each, at, (end - begin) * each), at += (end - begin) * each;
+        });
+      });
 }
 
 }  // namespace lambent

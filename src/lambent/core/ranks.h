@@ -72,7 +72,7 @@ bool none_cancelled(Progress* progress);
 class Shares {
  public:
   Shares() : Shares(0, 1) {}
-  Shares(size_t count, size_t grain);                      // among this_ranks()
+  Shares(size_t count, size_t grain);                                                         // among this_ranks()
   static Shares of_one(size_t count, size_t grain) { return Shares(count, grain, nullptr); }  // all one's own
 
   Ranks& ranks() const { return *ranks_; }
@@ -118,8 +118,8 @@ class Shares {
   size_t count_, grain_, stripes_;
 };
 
-// While one lives, files that this thread writes whole (core/file.h) are written by all ranks, each its part of the same
-// bytes, where all see the first one's folder; else by that one alone. They are all there in the end, or none.
+// While one lives, files that this thread writes whole (core/file.h) are written by all ranks, each its part of the
+// same bytes, where all see the first one's folder; else by that one alone. They are all there in the end, or none.
 class WriteTogether {
  public:
   explicit WriteTogether(Ranks& ranks);

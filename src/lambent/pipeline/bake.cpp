@@ -341,8 +341,7 @@ Result<void> begin(Bake& b) {
 Result<void> bake_beside(Bake& b, const std::optional<Lattice>& lattice, const std::optional<View>& view) {
   if (lattice)
     if (auto ok = bake_free_space(b, *lattice); !ok) return ok;
-  if (view && this_ranks().count() > 1)
-    b.job.warn("--fix-view: its pixels are gathered by every rank for itself");
+  if (view && this_ranks().count() > 1) b.job.warn("--fix-view: its pixels are gathered by every rank for itself");
   if (view)
     if (auto ok = fix_the_view(b, *view); !ok) return ok;
   if (!b.request.fix_light.empty())
@@ -433,10 +432,8 @@ void summarize_ranks(Ranks& ranks, Summary& summary) {
   const double receivers = summary.json.value("receivers", 0.0), times = double(ranks.asks);
   const double asked = double(ranks.sum(ranks.asked_bytes)), all = double(ranks.sum(ranks.received));
   const double each = receivers > 0 && times > 0 ? asked / receivers / times : 0;
-  summary.json["ranks"] = {{"count", ranks.count()},
-                           {"exchanges", ranks.asks},
-                           {"bytes_per_receiver_per_bounce", each},
-                           {"bytes", all}};
+  summary.json["ranks"] = {
+      {"count", ranks.count()}, {"exchanges", ranks.asks}, {"bytes_per_receiver_per_bounce", each}, {"bytes", all}};
   summary.lines.emplace_back("ranks", fmt::format("{}; {} a receiver a bounce came from others, {} in all",
                                                   ranks.count(), human_bytes(each), human_bytes(all)));
 }

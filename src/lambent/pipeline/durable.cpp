@@ -154,9 +154,7 @@ Result<void> DurableBake::begin(const std::vector<std::string>& pictures) {
   return {};
 }
 
-size_t DurableBake::taken() const {
-  return size_t(this_ranks().sum(checkpoint_ ? checkpoint_->taken() : 0));
-}
+size_t DurableBake::taken() const { return size_t(this_ranks().sum(checkpoint_ ? checkpoint_->taken() : 0)); }
 
 Error DurableBake::explained(Error error) const {
   if (error.message == "cancelled" && checkpoint_ && checkpoint_->began())
