@@ -36,8 +36,15 @@ int with_results_written(int code) {
 }
 
 int run_command(tool::Context& context, const tool::Run& run) {
-  if (launched.count == 1) return run_command(context, run);
-  return run_as_rank(context, run, app.get_subcommands().front()->get_name(), launched.count);
+  ThreadLimit limit(context.threads);
+  const ReadLog inputs;  // none is written over
+  try {
+    return with_results_written(run(context));
+  } catch (const std::bad_alloc&) {
+    return tool::fail({"", "out of memory"});
+  } catch (const std::exception& e) {  // the system's: no thread can be made, nothing can be printed
+    return tool::fail({"", e.what()});
+  }
 }
 
 // As one of several processes that mpirun or the like has started.
@@ -98,13 +105,6 @@ int main(int argc, char** argv) {
     fmt::print(stderr, "lambent: {}\n", e.what());
     return tool::bad_usage;
   }
-  ThreadLimit limit(context.threads);
-  const ReadLog inputs;  // none is written over
-  try {
-    return with_results_written(run(context));
-  } catch (const std::bad_alloc&) {
-    return tool::fail({"", "out of memory"});
-  } catch (const std::exception& e) {  // the system's: no thread can be made, nothing can be printed
-    return tool::fail({"", e.what()});
-  }
+  if (launched.count == 1) return run_command(context, run);
+  return run_as_rank(context, run, app.get_subcommands().front()->get_name(), launched.count);
 }
