@@ -1,7 +1,8 @@
 #!/usr/bin/env bash
 # Processes that bake together, over MPI: JSON lines. Two ranks of one thread beside one process of two threads, in
 # turns, the least of ROUNDS (3); what goes between 2 to MOST (5) ranks; and from both a model of more of them on a
-# network. A scene whose operator two ranks can keep and one process of the same --memory cannot.
+# network. A scene whose operator two ranks can keep, and one process of the same --memory cannot. RAYS (512) a
+# receiver; KINDS: those whose rate is measured.
 source "$(dirname "$0")/common.sh"
 launcher=${MPIRUN:-$(command -v mpirun || command -v mpiexec.hydra || true)}
 [ -n "$launcher" ] || { echo "skipped: no mpirun" >&2; exit 0; }
@@ -13,6 +14,7 @@ TOOL=$tool ROUNDS=${ROUNDS:-3} MOST=${MOST:-5} python3 - "$launcher" "$data/mesh
 import json, math, os, resource, subprocess, sys, time
 
 launcher, scene, out = sys.argv[1:4]
+rays = os.environ.get("RAYS", "512")
 tool, rounds, most = os.environ["TOOL"], int(os.environ["ROUNDS"]), int(os.environ["MOST"])
 is_open_mpi = b"Open MPI" in subprocess.run([launcher, "--version"], capture_output=True).stdout
 flags = ["--oversubscribe", "--bind-to", "none"] if is_open_mpi else []
@@ -53,13 +55,14 @@ def room(path):
 
 made = out + "/room.obj"
 room(made)
-kinds = {"diffuse": (scene, ["--ground", "--samples", "512", "--bounces", "3", "--denoise", "off"]),
-         "room": (made, ["--max-edge", "0.12", "--samples", "512", "--bounces", "3", "--denoise", "off"]),
+kinds = {"diffuse": (scene, ["--ground", "--samples", rays, "--bounces", "3"]),
+         "room": (made, ["--max-edge", "0.12", "--samples", rays, "--bounces", "3"]),
          "matrix": (scene, ["--ground", "--transfer", "matrix", "--brdf", "ggx:roughness=0.4", "--samples", "64",
                             "--order", "4", "--incident-order", "3", "--bounces", "2"]),
          "lightmap": (scene, ["--ground", "--transfer", "lightmap", "--sky", "uniform:1", "--atlas", "256x256",
                               "--samples", "256"])}
-for kind, (path, options) in kinds.items():
+for kind in os.environ.get("KINDS", " ".join(kinds)).split():
+    path, options = kinds[kind]
     one, two = [], []
     for _ in range(rounds):
         one.append(bake(0, 2, options, path))
@@ -70,30 +73,27 @@ for kind, (path, options) in kinds.items():
          ratio_of_processor_time=min(s["busy"] for s in one) / min(s["busy"] for s in two),
          peer_is="one process of two threads", aim=">= 0.95 of its rate")
 
-# What is asked for, and a bounce's own work: seconds of one core a receiver.
+# What comes from others, of a receiver: a bounce's rows, and all there is (results, gathered for all). Where all ask for
+# all it is a row, or a few, from each of the others.
 for kind in ("diffuse", "room"):
     path, options = kinds[kind]
     alone = bake(0, 1, options, path)
     n, bounces = alone["receivers"], 3
     row = 4 * 16 * math.ceil(alone["order"] ** 2 * alone["channels"] / 16)
-    each = alone["seconds"]["bounce"] / n / bounces
-    trace = alone["seconds"]["trace"] / n
+    core = alone["busy"] / n  # seconds of one, a receiver
     for ranks in range(2, most + 1):
         said = bake(ranks, 1, options, path)["ranks"]
-        bytes_each = said["bytes_per_receiver_per_bounce"]
-        tell("ranks_traffic", kind=kind, ranks=ranks, bytes_a_receiver_a_bounce=bytes_each,
-             row_bytes=row, share_of_all=bytes_each / (row * (ranks - 1)), receivers=n)
-        share = bytes_each / (row * (ranks - 1))
-    # Each of N ranks of 16 cores does its share, and takes `share` of the rows that are not its own.
+        each, whole = said["bytes_per_receiver_per_bounce"], said["bytes"] / n
+        tell("ranks_traffic", kind=kind, ranks=ranks, bytes_a_receiver_a_bounce=each, row_bytes=row,
+             rows_from_each_other=each / row / (ranks - 1), bytes_a_receiver=whole,
+             bytes_a_receiver_from_each_other=whole / (ranks - 1), receivers=n)
+    # N ranks of 16 cores: each does its share of the work, and takes what is not its own.
     for gigabits in (10, 100):
         for ranks in (16, 64, 256):
-            for receivers in (1e6, 1e7):
-                work = receivers * each / ranks / 16
-                network = receivers * (ranks - 1) / ranks * share * row / (gigabits * 1.25e8) + 2e-4
-                tell("ranks_model", kind=kind, gigabits=gigabits, ranks=ranks, receivers=receivers, bounce_work=work,
-                     bounce_network=network, tracing=receivers * trace / ranks / 16,
-                     share_of_ideal=(receivers * trace / ranks / 16 + bounces * work) /
-                     (receivers * trace / ranks / 16 + bounces * (work + network)), unit="seconds")
+            work, network = core / ranks / 16, whole / (most - 1) / (gigabits * 1.25e8)
+            tell("ranks_model", kind=kind, rays=int(rays), gigabits=gigabits, ranks=ranks,
+                 work=1e6 * work, network=1e6 * network, unit="seconds a million receivers", share_of_ideal=work / (work + network),
+                 network_is_half_at_ranks=core / 16 / network)
 
 # More than one process may keep.
 path, options = kinds["room"]

@@ -77,10 +77,10 @@ glossy="--order 3 --incident-order 3 --view-map 16 --brdf ggx:roughness=0.4"
 declare -A kinds=(
   [default]="--order 4 --max-edge 0.3 --error 10%"
   [diffuse]="--max-edge 0.07 --samples 64 --bounces 2"
-  [again]="--max-edge 0.09 --samples 64 --bounces 2 --memory 9MB"
+  [again]="--max-edge 0.09 --samples 64 --bounces 2 --memory 10MB"
   [terms]="--max-edge 0.1 --samples 64 --terms --light sh:3+lamps:2@sky:elevation=40"
   [texels]="--receivers texels --atlas 64x64 --samples 64 --bounces 2"
-  [lattice]="--max-edge 0.15 --samples 64 --lattice 6,6,6 --compress cpca:8x2"
+  [lattice]="--max-edge 0.15 --samples 64 --lattice 6,6,6 --compress cpca:8,2"
   [matrix]="--transfer matrix $glossy --max-edge 0.12 --samples 32 --bounces 2"
   [paths]="--transfer matrix $glossy --max-edge 0.15 --samples 16 --bounces 1 --simulate paths"
   [zonal]="--transfer zonal --order 4 --max-edge 0.2 --samples 32 --lobes 2"
@@ -90,7 +90,7 @@ declare -A kinds=(
   [converge]="--transfer lightmap --atlas 64x64 --samples 32 --bounces converge:1e-3"
   [seidel]="--transfer lightmap --atlas 64x64 --samples 32 --bounces converge:1e-3 --solver gauss-seidel"
   [directional]="--transfer lightmap --atlas 64x64 --samples 32 --directional sh:2 --bounces 2"
-  [view]="--max-edge 0.2 --samples 32 --fix-view 1,0.5,1.9,1,0.4,0 --size 48x32 --spp 4"
+  [view]="--max-edge 0.2 --samples 32 --fix-view auto --size 48x32 --spp 4"
   [alone]="--transfer lightmap --atlas 32x32 --samples 32 --bounces converge:1e-2 --solver southwell"
 )
 [ $# -gt 0 ] || set -- $(printf '%s\n' "${!kinds[@]}" | sort)
@@ -125,8 +125,8 @@ by 2 inspect box.obj >stdout 2>stderr
 [ $? -ne 0 ] && [ "$(grep -c '^lambent:.*only bake' stderr)" -eq 1 ] && ok || bad "inspect by ranks: $(cat stderr)"
 
 # A rank is killed, or the whole job interrupted, at some moment; then fewer ranks, or none, go on.
-options=(--max-edge 0.06 --samples 256 --bounces 3)
-"$tool" bake box.obj "${options[@]}" -o whole.glb >/dev/null
+options=(--max-edge 0.06 --samples 512 --bounces 3)
+"$tool" bake box.obj "${options[@]}" -o whole.glb >/dev/null 2>stderr
 began=$(date +%s%N)
 by 3 bake box.obj "${options[@]}" --threads 1 -o part.glb >/dev/null 2>stderr || bad "by three: $(cat stderr)"
 took=$((($(date +%s%N) - began) / 1000000))

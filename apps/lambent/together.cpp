@@ -23,6 +23,7 @@
 namespace lambent::tool {
 
 Launched launched() {
+  if (std::getenv("LAMBENT_ALONE")) return {};
   // Open MPI; MPICH, Intel MPI and Slurm's PMI-2; Slurm with PMIx, which gives no size.
   for (const auto& [count, rank] :
        {std::pair("OMPI_COMM_WORLD_SIZE", "OMPI_COMM_WORLD_RANK"), std::pair("PMI_SIZE", "PMI_RANK"),
