@@ -73,8 +73,8 @@ for kind in os.environ.get("KINDS", " ".join(kinds)).split():
          ratio_of_processor_time=min(s["busy"] for s in one) / min(s["busy"] for s in two),
          peer_is="one process of two threads", aim=">= 0.95 of its rate")
 
-# What comes from others, of a receiver: a bounce's rows, and all there is (results, gathered for all). Where all ask for
-# all it is a row, or a few, from each of the others.
+# What comes from others, of a receiver: a bounce's rows, and all there is (results, gathered for all). Where all ask
+# for all it is a row, or a few, from each of the others.
 for kind in ("diffuse", "room"):
     path, options = kinds[kind]
     alone = bake(0, 1, options, path)
@@ -92,7 +92,8 @@ for kind in ("diffuse", "room"):
         for ranks in (16, 64, 256):
             work, network = core / ranks / 16, whole / (most - 1) / (gigabits * 1.25e8)
             tell("ranks_model", kind=kind, rays=int(rays), gigabits=gigabits, ranks=ranks,
-                 work=1e6 * work, network=1e6 * network, unit="seconds a million receivers", share_of_ideal=work / (work + network),
+                 work=1e6 * work, network=1e6 * network, unit="seconds a million receivers",
+                 share_of_ideal=work / (work + network),
                  network_is_half_at_ranks=core / 16 / network)
 
 # More than one process may keep.

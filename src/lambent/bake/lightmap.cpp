@@ -73,13 +73,22 @@ void add_sky(const GatherSetup& setup, const std::vector<float>& sky, size_t wid
   });
 }
 
+// All rows, on all ranks.
 Result<AlignedVector<float>> solution(const GatherOperator& op, const AlignedVector<float>& e, size_t width,
                                       const LightmapOptions& o, SolveReport& report, Progress* progress) {
-  if (o.converge > 0) return solve(op, e.data(), width, {o.solver, o.converge, 200}, &report, progress);
-  const int bounces = std::max(o.bounces - (o.directional != DirectionalKind::none), 0);
-  auto bounced = bounce(op, source_of(e.data(), width), width, bounces, progress);
-  if (!bounced) return bounced.error();
-  return std::move(bounced->x);
+  AlignedVector<float> x;
+  if (o.converge > 0) {
+    auto solved = solve(op, e.data(), width, {o.solver, o.converge, 200}, &report, progress);
+    if (!solved) return solved.error();
+    x = std::move(*solved);
+  } else {
+    const int bounces = std::max(o.bounces - (o.directional != DirectionalKind::none), 0);
+    auto bounced = bounce(op, source_of(e.data(), width), width, bounces, progress);
+    if (!bounced) return bounced.error();
+    x = std::move(bounced->x);
+  }
+  op.shares().gather(x.data(), width);
+  return x;
 }
 
 // [receiver][row][width]
@@ -155,8 +164,6 @@ Result<Lightmap> bake_lightmap(const Scene& scene, const Tracer& tracer, const R
   // A directional lightmap's last bounce is gathered with its directions.
   auto x = solution(*op, e, width, o, r.solve, progress);
   if (!x) return x.error();
-  const Shares shares = op->shares();
-  shares.gather(x->data(), width);
   const size_t rows = size_t(directional_rows(o.directional));
   if (directional) {
     auto wide = directional_rows_of(setup, lamps, o, bounces ? x->data() : nullptr, width, progress);
@@ -168,6 +175,7 @@ Result<Lightmap> bake_lightmap(const Scene& scene, const Tracer& tracer, const R
 
   Precision precision = o.precision;  // all light decides, and its parts follow
   auto stored = [&](AlignedVector<float>& values, size_t rows_each, bool is_all) -> Result<Transfer> {
+    if (!is_all) op->shares().gather(values.data(), width);
     if (const auto* texels = std::get_if<TexelReceivers>(&receivers.basis))
       smooth_seams(scene, *texels, values.data(), rows_each * width,
                    rows_each == 1 ? 3 * light.count() : rows_each * width, 0.95f, 0.05f, progress);
@@ -182,7 +190,6 @@ Result<Lightmap> bake_lightmap(const Scene& scene, const Tracer& tracer, const R
   if (o.keep_terms) {
     *x = {};
     auto take = [&](int, AlignedVector<float> term) -> Result<void> {
-      shares.gather(term.data(), width);
       auto transfer = stored(term, 1, false);
       if (!transfer) return transfer.error();
       map.terms.push_back(std::move(*transfer));
@@ -192,7 +199,6 @@ Result<Lightmap> bake_lightmap(const Scene& scene, const Tracer& tracer, const R
       return ok.error();
   }
   if (direct_apart) {
-    shares.gather(e.data(), width);
     auto direct_light = stored(e, 1, false);
     if (!direct_light) return direct_light.error();
     map.direct = std::move(*direct_light);
