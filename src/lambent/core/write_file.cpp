@@ -123,7 +123,7 @@ struct WrittenFile {
     return {};
   }
 
-  // As open() and write(), of all ranks; all fail where one does, and each says its own reason. Where a rank does not
+  // As open() and write(), of all ranks; all fail where one does. Where a rank does not
   // see the file, or has other bytes for it, the first one writes it alone.
   Result<void> write_by(Ranks& ranks, std::span<const std::span<const uint8_t>> pieces) {
     const bool leads = ranks.rank() == 0;
@@ -143,6 +143,7 @@ struct WrittenFile {
     const size_t rank = size_t(ranks.rank()), count = size_t(ranks.count());
     if (ranks.all(alike && seen)) ok = write(pieces, bytes * rank / count, bytes * (rank + 1) / count);
     else if (leads) ok = write(pieces, 0, bytes);
+    if (!ok && !leads) ranks.say(ok.error().text());
     if (!ranks.all(bool(ok))) return ok ? error("by another rank") : ok;
     return {};
   }
