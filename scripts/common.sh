@@ -7,6 +7,8 @@ build_packages="g++ cmake ninja-build ccache pkg-config libembree-dev libtbb-dev
   libdraco-dev libmeshoptimizer-dev libwebp-dev libnanoflann-dev"
 mpi_packages="libopenmpi-dev openmpi-bin"  # the tool builds and works without
 python_packages="pybind11-dev python3-dev python3-numpy"
+# Of `lambent view --window`, and of its tests.
+window_packages="libglfw3-dev libimgui-dev libgl-dev xvfb xdotool libgl1-mesa-dri"
 sanitize_packages="clang-14 libclang-rt-14-dev"
 
 # Installs the Debian packages named, if any is missing. Needs root or sudo only then.
