@@ -59,4 +59,8 @@ endif()
 # A hundred moments of each kind: kill_and_resume.sh LAMBENT 100.
 add_test(NAME kill_and_resume COMMAND ${CMAKE_CURRENT_SOURCE_DIR}/tests/kill_and_resume.sh
   $<TARGET_FILE:lambent-tool> 2)
+if(NOT LAMBENT_SANITIZE)
+  add_test(NAME ranks COMMAND ${CMAKE_CURRENT_SOURCE_DIR}/tests/ranks.sh $<TARGET_FILE:lambent-tool>)
+  set_tests_properties(ranks PROPERTIES SKIP_RETURN_CODE 77 COST 900)
+endif()
 add_test(NAME window COMMAND ${CMAKE_CURRENT_SOURCE_DIR}/tests/window.sh $<TARGET_FILE:lambent-tool>)

@@ -5,6 +5,7 @@ cd "$(dirname "${BASH_SOURCE[0]}")/.."
 build_packages="g++ cmake ninja-build ccache pkg-config libembree-dev libtbb-dev libhwy-dev libeigen3-dev libopenexr-dev
   libstb-dev libxxhash-dev nlohmann-json3-dev libfmt-dev libcli11-dev libgtest-dev
   libdraco-dev libmeshoptimizer-dev libwebp-dev libnanoflann-dev"
+mpi_packages="libopenmpi-dev openmpi-bin"  # the tool builds and works without
 python_packages="pybind11-dev python3-dev python3-numpy"
 # Of `lambent view --window`, and of its tests.
 window_packages="libglfw3-dev libimgui-dev libgl-dev xvfb xdotool libgl1-mesa-dri"

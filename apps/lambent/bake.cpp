@@ -2,6 +2,7 @@
 #include "commands.h"
 #include "table.h"
 
+#include <lambent/core/ranks.h>
 #include <lambent/pipeline/bake.h>
 #include <lambent/pipeline/draw_request.h>
 
@@ -31,8 +32,12 @@ int run_bake(Context& context, const BakeCommand& o) {
   if (request->scene.empty()) return fail({"scene", "is needed: a .gltf, .glb, .obj or .ply", true});
   if (request->output.empty() && !o.plan) return fail({"--output", "is needed: the baked file to write", true});
   const Job job{&context.progress, [](const std::string& message) { warn(message); }};
+  if (o.plan && is_quiet()) return success;
+  Ranks alone;
+  const WithRanks by(o.plan ? alone : this_ranks());
   auto summary = o.plan ? plan_bake(*request, job) : bake_to_file(*request, job);
   if (!summary) return fail(summary.error());
+  if (is_quiet()) return success;
   if (!context.json) {
     if (!o.plan) fmt::print("{}\n", request->output);
     if (const auto pictures = summary->json.find("pictures"); pictures != summary->json.end())

@@ -1,4 +1,5 @@
 #include "commands.h"
+#include "together.h"
 
 #include <lambent/core/file.h>
 #include <lambent/core/parallel.h>
@@ -7,11 +8,14 @@
 #include <fcntl.h>
 #include <fmt/format.h>
 
+#include <unistd.h>
+
 #include <cerrno>
 #include <csignal>
 #include <cstring>
 #include <iostream>
 #include <new>
+#include <thread>
 
 using namespace lambent;
 
@@ -31,10 +35,40 @@ int with_results_written(int code) {
   return tool::fail({"stdout", std::string("cannot be written: ") + std::strerror(errno ? errno : EIO)});
 }
 
+int run_command(tool::Context& context, const tool::Run& run) {
+  ThreadLimit limit(context.threads);
+  const ReadLog inputs;  // none is written over
+  try {
+    return with_results_written(run(context));
+  } catch (const std::bad_alloc&) {
+    return tool::fail({"", "out of memory"});
+  } catch (const std::exception& e) {  // the system's: no thread can be made, nothing can be printed
+    return tool::fail({"", e.what()});
+  }
+}
+
+// As one of several processes that mpirun or the like has started.
+int run_as_rank(tool::Context& context, const tool::Run& run, const std::string& command, int count) {
+  if (command != "bake")
+    return tool::fail({"", fmt::format("{} processes were started, and only bake works by ranks", count), true});
+  if (!tool::has_ranks())
+    return tool::fail({"", fmt::format("{} processes were started, and this lambent is built without MPI", count)});
+  const auto ranks = tool::Together::begin();
+  const WithRanks together(*ranks);
+  // Those of one machine share its cores, unless the launcher has done so.
+  const auto cores = unsigned(std::max(1L, ::sysconf(_SC_NPROCESSORS_ONLN)));
+  if (context.threads == 0 && std::thread::hardware_concurrency() >= cores)
+    context.threads = std::max(1, int(cores) / ranks->local_count());
+  const int code = run_command(context, run);
+  return ranks->end(code, [&] { tool::say_failure(fmt::format("rank {}", ranks->rank())); });
+}
+
 }  // namespace
 
 int main(int argc, char** argv) {
   open_standard_streams();
+  const tool::Launched launched = tool::launched();
+  if (launched.rank > 0) tool::be_quiet();
   ::signal(SIGXFSZ, SIG_IGN);  // a limit on files is an error of the write
   CLI::App app{"lambent: bake how a scene shadows and scatters light, once; relight it for ever.", "lambent"};
   app.set_version_flag("--version", version);
@@ -71,18 +105,12 @@ int main(int argc, char** argv) {
   try {
     app.parse(argc, argv);
   } catch (const CLI::ParseError& e) {
+    if (tool::is_quiet()) return e.get_exit_code() == 0 ? tool::success : tool::bad_usage;
     if (e.get_exit_code() == 0) return with_results_written(app.exit(e));  // --help, --version
     fmt::print(stderr, "lambent: {}\n", e.what());
     return tool::bad_usage;
   }
   context.json_progress = progress == "json";
-  ThreadLimit limit(context.threads);
-  const ReadLog inputs;  // none is written over
-  try {
-    return with_results_written(run(context));
-  } catch (const std::bad_alloc&) {
-    return tool::fail({"", "out of memory"});
-  } catch (const std::exception& e) {  // the system's: no thread can be made, nothing can be printed
-    return tool::fail({"", e.what()});
-  }
+  if (launched.count == 1) return run_command(context, run);
+  return run_as_rank(context, run, app.get_subcommands().front()->get_name(), launched.count);
 }

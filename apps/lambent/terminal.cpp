@@ -89,6 +89,8 @@ class ProgressJson {
 
 Context* interrupted = nullptr;
 std::sig_atomic_t interruptions = 0;
+bool quiet = false;
+std::string failed_with;
 std::atomic<bool> any_stage{false};  // has begun; before, files are read, which hears nothing
 
 extern "C" void on_interrupt(int) {
@@ -97,7 +99,7 @@ extern "C" void on_interrupt(int) {
   if (++interruptions > 1 || reading) {  // leave now, but leave nothing half-written
     remove_unfinished_files();
     constexpr char said[] = "lambent: cancelled\n";
-    if (reading && ::write(2, said, sizeof said - 1) < 0) ::_exit(failure);
+    if (reading && !quiet && ::write(2, said, sizeof said - 1) < 0) ::_exit(failure);
     ::_exit(failure);
   }
 }
@@ -106,7 +108,7 @@ extern "C" void on_interrupt(int) {
 Progress::Report heard(Progress::Report report) {
   return [report = std::move(report)](const std::string& stage, double fraction) {
     any_stage = true;
-    report(stage, fraction);
+    if (!quiet) report(stage, fraction);
   };
 }
 
@@ -127,15 +129,24 @@ Context::Context()
 }
 
 int fail(const Error& error) {
+  failed_with = error.text();
+  if (quiet) return error.usage ? bad_usage : failure;
   fmt::print(stderr, "{} {}\n", colour_allowed() ? "\033[31mlambent:\033[0m" : "lambent:", error.text());
   return error.usage ? bad_usage : failure;
 }
 
 void warn(const std::string& message) {
+  if (quiet) return;
   fmt::print(stderr, "{} {}\n", colour_allowed() ? "\033[33mwarning:\033[0m" : "warning:", message);
 }
 void warn(const std::vector<std::string>& messages) {
   for (const std::string& m : messages) warn(m);
+}
+
+void be_quiet() { quiet = true; }
+bool is_quiet() { return quiet; }
+void say_failure(const std::string& who) {
+  if (quiet) fmt::print(stderr, "lambent: {}: {}\n", who, failed_with);
 }
 
 void print_json(const nlohmann::json& value) {

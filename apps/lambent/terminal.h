@@ -29,6 +29,11 @@ int fail(const Error& error);
 void warn(const std::string& message);
 void warn(const std::vector<std::string>& messages);
 
+// From here on nothing is said: another rank says it. fail() keeps its message for say_failure().
+void be_quiet();
+bool is_quiet();
+void say_failure(const std::string& who);
+
 void print_json(const nlohmann::json& value);
 
 // The lines, indented under whatever was said before; or the JSON.

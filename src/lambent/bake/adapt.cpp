@@ -2,9 +2,9 @@
 // the difference, since rays are few.
 #include <lambent/bake/adapt.h>
 #include <lambent/bake/gather.h>
-#include <lambent/core/parallel.h>
 #include <lambent/core/pool.h>
 #include <lambent/core/random.h>
+#include <lambent/core/ranks.h>
 #include <lambent/receivers/receivers.h>
 #include <lambent/scene/refine.h>
 
@@ -79,8 +79,9 @@ struct Adapter {
     setup.progress = progress;
     Pool<GatherScratch, DeleteScratch> scratch([&] { return make_gather_scratch(setup); });
     std::vector<float> out(places.size() * width);
-    ProgressStage stage(progress, name, places.size());
-    parallel_for(places.size(), gather_block, [&](size_t begin, size_t end) {
+    const Shares shares(places.size(), gather_block);
+    ProgressStage stage(progress, name, shares.own());
+    shares.for_own([&](size_t begin, size_t end) {
       if (stage.cancelled()) return;
       std::vector<float> sky((end - begin) * setup.sky_width());
       std::vector<uint8_t> buried(end - begin);
@@ -90,7 +91,8 @@ struct Adapter {
         std::copy_n(sky.data() + (i - begin) * setup.sky_width(), width, out.data() + i * width);
       if (!stage.cancelled()) stage.advance(end - begin);
     });
-    if (stage.cancelled()) return Error{"", "cancelled"};
+    if (!none_cancelled(progress)) return Error{"", "cancelled"};
+    shares.gather(out.data(), width);
     report.rays += places.size() * size_t(options.samples);
     return out;
   }

@@ -115,10 +115,11 @@ struct Baker {
     const size_t W = sky_width();
     AlignedVector<float> x(n() * width());
     std::vector<uint8_t> buried(n());
+    const Shares shares(n(), gather_block);
     {
-      ProgressStage stage(progress, "tracing", n());
+      ProgressStage stage(progress, "tracing", shares.own());
       const KeptPieces kept(progress, "tracing", n() / gather_block);
-      parallel_for(n(), gather_block, [&](size_t begin, size_t end) {
+      shares.for_own([&](size_t begin, size_t end) {
         if (stage.cancelled()) return;
         std::vector<float> rows((end - begin) * W);
         const GatherSky sky{rows.data(), nullptr, W, &lobes, buried.data() + begin};
@@ -132,8 +133,9 @@ struct Baker {
         for (size_t r = begin; r < end; ++r) expand(rows.data() + (r - begin) * W, x.data() + r * width());
         if (!stage.cancelled()) stage.advance(end - begin);
       });
-      if (stage.cancelled()) return Error{"", "cancelled"};
+      if (!none_cancelled(progress)) return Error{"", "cancelled"};
     }
+    shares.gather(x.data(), width()), shares.gather(buried.data());
     fill_buried(make_fill_steps(scene, receivers.basis, buried), x.data(), width(), width());
     for (uint8_t b : buried) report.buried += b;
     report.trace_seconds = seconds_since(start), report.rays = n() * rays_each();
@@ -168,9 +170,12 @@ struct Baker {
         });
     if (!solution) return solution.error();
     B->fill(last.data(), width());
+    const Shares shares = B->shares();
+    shares.gather(last.data(), width()), shares.gather(solution->x.data(), width());
     std::vector<AlignedVector<float>> terms;
     if (options.keep_terms) {
-      auto ok = bounce_terms(*B, source, width(), options.bounces, progress, [&](int, const auto& x) -> Result<void> {
+      auto ok = bounce_terms(*B, source, width(), options.bounces, progress, [&](int, auto& x) -> Result<void> {
+        shares.gather(x.data(), width());
         if (options.denoise) terms.push_back(x);
         else report.terms.push_back(store(x.data()));
         return {};
@@ -239,8 +244,9 @@ struct Baker {
     AlignedVector<float> again(measured.size() * width());
     std::vector<float> variance(measured.size());
     {
-      ProgressStage stage(progress, "measuring the noise", measured.size());
-      parallel_for(measured.size(), 4, [&](size_t begin, size_t end) {
+      const Shares shares(measured.size(), 4);
+      ProgressStage stage(progress, "measuring the noise", shares.own());
+      shares.for_own([&](size_t begin, size_t end) {
         for (size_t i = begin; i < end && !stage.cancelled(); ++i) {
           const uint32_t r = measured[i];
           float* row = again.data() + i * width();
@@ -249,7 +255,8 @@ struct Baker {
         }
         if (!stage.cancelled()) stage.advance(end - begin);
       });
-      if (stage.cancelled()) return Error{"", "cancelled"};
+      if (!none_cancelled(progress)) return Error{"", "cancelled"};
+      shares.gather(again.data(), width()), shares.gather(variance.data());
     }
     AlignedVector<float> out;
     if (options.denoise) {
@@ -383,7 +390,8 @@ Result<Transfer> bake_to_error(const Scene& scene, const Tracer& tracer, const R
     const double wanted = between < 0.5 * target ? 0.9 * std::sqrt(target * target - between * between)
                                                  : std::clamp(0.2 * error, 0.3 * target, 0.6 * target);
     const double ratio = std::clamp(std::pow(noise / wanted, 1 / slope), 1.5, 16.0);
-    const bool late = options.seconds >= 0 && seconds_since(start) + seconds_since(round) * ratio > options.seconds;
+    const bool late = this_ranks().from_first(options.seconds >= 0 &&
+                                              seconds_since(start) + seconds_since(round) * ratio > options.seconds);
     if (!(noise > wanted && error > target) || options.samples == most || late) return transfer;
     options.samples = std::min(most, int(std::lround(double(options.samples) * ratio / 64)) * 64);
   }

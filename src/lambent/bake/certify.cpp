@@ -1,7 +1,7 @@
 #include <lambent/bake/certify.h>
 #include <lambent/core/aligned.h>
-#include <lambent/core/parallel.h>
 #include <lambent/core/random.h>
+#include <lambent/core/ranks.h>
 
 #include <algorithm>
 #include <cmath>
@@ -63,8 +63,9 @@ Result<Certificate> certify(const Scene& scene, const Receivers& receivers, cons
   const std::vector<SurfacePlace> places = draw_places(scene, receivers, count, seed);
   const float diagonal = bounds(scene).diagonal();
   std::vector<PlaceError> measured(places.size());
-  ProgressStage stage(progress, "measuring the error", places.size());
-  parallel_for(places.size(), piece, [&](size_t begin, size_t end) {
+  const Shares shares(places.size(), piece);
+  ProgressStage stage(progress, "measuring the error", shares.own());
+  shares.for_own([&](size_t begin, size_t end) {
     AlignedVector<float> a(width), b(width), s(width);
     for (size_t i = begin; i < end && !stage.cancelled(); ++i) {
       const SurfacePlace& at = places[i];
@@ -98,7 +99,8 @@ Result<Certificate> certify(const Scene& scene, const Receivers& receivers, cons
     }
     if (!stage.cancelled()) stage.advance(end - begin);
   });
-  if (stage.cancelled()) return Error{"", "cancelled"};
+  if (!none_cancelled(progress)) return Error{"", "cancelled"};
+  shares.gather(measured.data());
 
   Certificate c;
   double error2 = 0, truth2 = 0, noise2 = 0;

@@ -19,4 +19,9 @@ Transfer store_columns(const LightBasis& light, const float* x, size_t rows, int
   return std::move(out.transfer);
 }
 
+void gather_stored(const Shares& shares, const WritableTransfer& out) {
+  const size_t block = out.transfer.block_values() * out.transfer.value_bytes();
+  shares.gather_each(transfer_block, out.values, block);
+}
+
 }  // namespace lambent

@@ -5,7 +5,7 @@
 #include <lambent/bake/kernels.h>
 #include <lambent/core/aligned.h>
 #include <lambent/core/check.h>
-#include <lambent/core/parallel.h>
+#include <lambent/core/ranks.h>
 
 #include <nanoflann.hpp>
 
@@ -203,32 +203,37 @@ Result<void> denoise(const NoisyPlaces& noisy, const float* rows, size_t width, 
   LAMBENT_CHECK(noisy.measured.size() == noisy.variance.size() && width % lane_multiple == 0);
   std::copy_n(rows, n * width, out);
   if (noisy.measured.empty()) return {};
-  ProgressStage stage(progress, "denoising", (3 + more.size()) * n);
+  const Shares shares(n, piece);
+  ProgressStage stage(progress, "denoising", (3 + more.size()) * shares.own());
   std::vector<Vec3> measured_places;
   for (uint32_t r : noisy.measured) measured_places.push_back(noisy.places[r]);
   const Cloud all{noisy.places}, measured{measured_places};
   const Tree tree(3, all, {16}), measured_tree(3, measured, {16});
   Denoiser d{noisy, rows, width};
   auto each = [&](auto f) {
-    parallel_for(n, piece, [&](size_t begin, size_t end) {
+    shares.for_own([&](size_t begin, size_t end) {
       std::vector<double> sums(width);
       AlignedVector<float> scratch(width);
       for (size_t i = begin; i < end && !stage.cancelled(); ++i) f(i, sums.data(), scratch.data());
       if (!stage.cancelled()) stage.advance(end - begin);
     });
-    return !stage.cancelled();
+    return none_cancelled(progress);
   };
   const bool found = each([&](size_t i, double*, float*) { d.find(tree, measured_tree, i); });
+  shares.gather(d.neighbours.data());
   const bool judged = found && each([&](size_t i, double* sums, float* scratch) {
                         if (d.is_filtered(i)) d.judge(i, sums, scratch);
                       });
+  shares.gather(d.risks.data());
   auto apply = [&](const float* from, float* to) {
-    return each([&](size_t i, double* sums, float*) {
+    const bool all = each([&](size_t i, double* sums, float*) {
       if (!d.is_filtered(i)) return;
       const std::array<Filter, filters> filters_here = d.filters_of(i);
       if (const Filter* best = d.choose(i, filters_here))
         best->apply(d.neighbours[i], from, width, sums, to + i * width);
     });
+    shares.gather(to, width);
+    return all;
   };
   bool done = judged && apply(rows, out);
   for (size_t m = 0; m < more.size() && done; ++m) {

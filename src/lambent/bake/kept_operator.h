@@ -19,6 +19,8 @@ class KeptOperator final : public LinearOperator {
   void keep(size_t first, size_t count, const float* y, size_t width, float* x) const override {
     op_.keep(first, count, y, width, x);
   }
+  Shares shares() const override { return op_.shares(); }
+  void fetch(float* x, size_t width) const override { op_.fetch(x, width); }
   bool is_filled(size_t row) const override { return op_.is_filled(row); }
   void fill(float* x, size_t width) const override { op_.fill(x, width); }
   std::optional<TransposedRows> transposed() const override { return op_.transposed(); }

@@ -208,10 +208,13 @@ bool KeptRows::find(size_t block, std::vector<uint8_t>& buffer, Block& out) cons
   return true;
 }
 
+size_t KeptRows::count() const {
+  return size_t(std::count_if(places_.begin(), places_.end(),
+                              [](const Place& place) { return place.where != Place::Where::nowhere; }));
+}
+
 double KeptRows::fraction() const {
-  const auto kept = std::count_if(places_.begin(), places_.end(),
-                                  [](const Place& place) { return place.where != Place::Where::nowhere; });
-  return places_.empty() ? 1.0 : double(kept) / double(places_.size());
+  return places_.empty() ? 1.0 : double(count()) / double(places_.size());
 }
 
 }  // namespace lambent

@@ -40,7 +40,8 @@ class KeptRows {
   bool find(size_t block, std::vector<uint8_t>& buffer, Block& out) const;
   size_t bytes() const { return used_; }        // in memory
   size_t file_bytes() const { return filed_; }  // beyond
-  double fraction() const;                      // of the blocks kept
+  size_t count() const;                         // of blocks kept
+  double fraction() const;                      // of all
 
  private:
   struct Place {

@@ -1,5 +1,6 @@
 // Follows: general-prt (transferred incident radiance at points in free space), triple-product-integrals (light from
 // the sky as a triple product: with visibility known to order n + m - 1 it is exact, as in matrix.cpp).
+#include <lambent/bake/columns.h>
 #include <lambent/bake/fan.h>
 #include <lambent/bake/gather.h>
 #include <lambent/bake/lattice.h>
@@ -283,9 +284,10 @@ Result<LatticeTransfer> bake_lattice(const Scene& scene, const Tracer& tracer, c
       make_transfer({.order = surface.light.order}, int(J), channels, lattice.count(), options.precision);
   LatticeTransfer result{lattice, options.order, {}, std::vector<uint8_t>(lattice.count())};
   {
-    ProgressStage stage(progress, "lattice", lattice.count());
+    const Shares shares(lattice.count(), transfer_block);
+    ProgressStage stage(progress, "lattice", shares.own());
     const KeptPieces pieces(progress, "lattice", lattice.count() / transfer_block);
-    parallel_for(lattice.count(), transfer_block, [&](size_t begin, size_t end) {
+    shares.for_own([&](size_t begin, size_t end) {
       if (stage.cancelled()) return;
       const std::span<uint8_t> rows = stored_bytes(out, begin, end - begin),
                                valid(result.valid.data() + begin, end - begin);
@@ -296,7 +298,8 @@ Result<LatticeTransfer> bake_lattice(const Scene& scene, const Tracer& tracer, c
       }
       stage.advance(end - begin);
     });
-    if (stage.cancelled()) return Error{"", "cancelled"};
+    if (!none_cancelled(progress)) return Error{"", "cancelled"};
+    shares.gather(result.valid.data()), gather_stored(shares, out);
   }
   const size_t valid = size_t(std::count(result.valid.begin(), result.valid.end(), uint8_t(1)));
   if (valid == 0) return Error{"lattice", "every one of its points lies inside something"};

@@ -46,13 +46,22 @@ void add_sky(const GatherSetup& setup, const std::vector<float>& sky, size_t wid
   });
 }
 
+// All rows, on all ranks.
 Result<AlignedVector<float>> solution(const GatherOperator& op, const AlignedVector<float>& e, size_t width,
                                       const LightmapOptions& o, SolveReport& report, Progress* progress) {
-  if (o.converge > 0) return solve(op, e.data(), width, {o.solver, o.converge, 200}, &report, progress);
-  const int bounces = std::max(o.bounces - (o.directional != DirectionalKind::none), 0);
-  auto bounced = bounce(op, source_of(e.data(), width), width, bounces, progress);
-  if (!bounced) return bounced.error();
-  return std::move(bounced->x);
+  AlignedVector<float> x;
+  if (o.converge > 0) {
+    auto solved = solve(op, e.data(), width, {o.solver, o.converge, 200}, &report, progress);
+    if (!solved) return solved.error();
+    x = std::move(*solved);
+  } else {
+    const int bounces = std::max(o.bounces - (o.directional != DirectionalKind::none), 0);
+    auto bounced = bounce(op, source_of(e.data(), width), width, bounces, progress);
+    if (!bounced) return bounced.error();
+    x = std::move(bounced->x);
+  }
+  op.shares().gather(x.data(), width);
+  return x;
 }
 
 // [receiver][row][width]
@@ -60,9 +69,10 @@ Result<AlignedVector<float>> directional_rows_of(const GatherSetup& setup, const
                                                  const float* x, size_t width, Progress* progress) {
   const size_t n = setup.receivers.count(), rows = size_t(directional_rows(o.directional));
   AlignedVector<float> wide(n * rows * width, 0.0f);
-  ProgressStage stage(progress, "directions", n);
+  const Shares shares(n, gather_block);
+  ProgressStage stage(progress, "directions", shares.own());
   const KeptPieces pieces(progress, "directions", n / gather_block);
-  parallel_for(n, gather_block, [&](size_t begin, size_t end) {
+  shares.for_own([&](size_t begin, size_t end) {
     if (stage.cancelled()) return;
     const std::span<float> own(wide.data() + begin * rows * width, (end - begin) * rows * width);
     const bool loaded = pieces.load(begin / gather_block, own);
@@ -71,7 +81,8 @@ Result<AlignedVector<float>> directional_rows_of(const GatherSetup& setup, const
     if (!loaded) pieces.save(begin / gather_block, own);
     stage.advance(end - begin);
   });
-  if (stage.cancelled()) return Error{"", "cancelled"};
+  if (!none_cancelled(progress)) return Error{"", "cancelled"};
+  shares.gather(wide.data(), rows * width);
   return wide;
 }
 
@@ -164,6 +175,7 @@ Result<Lightmap> bake_lightmap(const Scene& scene, const Tracer& tracer, const R
 
   Precision precision = o.precision;  // all light decides, and its parts follow
   auto stored = [&](AlignedVector<float>& values, size_t rows_each, bool is_all) -> Result<Transfer> {
+    if (!is_all) op->shares().gather(values.data(), width);
     if (const auto* texels = std::get_if<TexelReceivers>(&receivers.basis))
       smooth_seams(scene, *texels, values.data(), rows_each * width,
                    rows_each == 1 ? 3 * light.count() : rows_each * width, 0.95f, 0.05f, progress);

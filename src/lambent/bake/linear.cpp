@@ -10,10 +10,13 @@ void LinearOperator::keep(size_t first, size_t count, const float* y, size_t wid
 }
 
 void LinearOperator::apply(const float* x, size_t width, float* y, const Progress* progress) const {
-  parallel_for(rows(), piece(), [&](size_t begin, size_t end) {
-    if (is_cancelled(progress)) return;
-    std::fill(y + begin * width, y + end * width, 0.0f);
-    add_rows(begin, end - begin, x, width, y + begin * width, nullptr);
+  shares().for_own([&](size_t begin, size_t end) {
+    for (size_t first = begin; first < end; first += piece()) {
+      if (is_cancelled(progress)) return;
+      const size_t count = std::min(piece(), end - first);
+      std::fill_n(y + first * width, count * width, 0.0f);
+      add_rows(first, count, x, width, y + first * width, nullptr);
+    }
   });
   fill(y, width);
 }

@@ -2,7 +2,7 @@
 // The linear operator A of x = e + A x, by its rows: hit rows that are kept or traced again (operator.h), glossy rows
 // (matrix_rows.h), rows of walks through a medium (subsurface_rows.h). The solvers (solve.h) know nothing else of it.
 #include <lambent/core/aligned.h>
-#include <lambent/core/progress.h>
+#include <lambent/core/ranks.h>
 
 #include <cstddef>
 #include <cstdint>
@@ -36,6 +36,11 @@ class LinearOperator {
   virtual void add_rows(size_t first, size_t count, const float* x, size_t width, float* y, float* half) const = 0;
   virtual size_t piece() const { return gather_block; }  // divides gather_block
 
+  // The rows of A that are known here; of others nothing is asked. With more ranks than one (core/ranks.h) x and y have
+  // all rows everywhere, and of them this rank's own are set, until fetch() has brought those that its rows of A meet.
+  virtual Shares shares() const { return Shares::of_one(rows(), gather_block); }
+  virtual void fetch(float*, size_t) const {}
+
   // Floats of x, and how rows y become part of it. By default x is those rows.
   virtual size_t size(size_t width) const { return rows() * width; }
   virtual void keep(size_t first, size_t count, const float* y, size_t width, float* x) const;
@@ -46,7 +51,7 @@ class LinearOperator {
   // None where rows are not known by their entries.
   virtual std::optional<TransposedRows> transposed() const { return std::nullopt; }
 
-  // y = F A x; not in place. All cores; sums in a fixed order. Left unfinished when cancelled.
+  // y = F A x; not in place, x fetched. All cores; sums in a fixed order. Left unfinished when cancelled.
   void apply(const float* x, size_t width, float* y, const Progress* progress = nullptr) const;
 };
 

@@ -1,4 +1,5 @@
 // Follows: general-prt (transfer matrices, the recursion over bounces, the last reflection).
+#include <lambent/bake/columns.h>
 #include <lambent/bake/kernels.h>
 #include <lambent/bake/last_reflection.h>
 #include <lambent/bake/matrix_rows.h>
@@ -72,10 +73,11 @@ struct MatrixBaker : MatrixGather {
       gather(s.half, setup.sets.half, half);
       errors.add(r, half.data(), x.data(), x.size());
     };
+    const Shares shares(n(), gather_block);
     {
-      ProgressStage stage(progress, paths ? "paths" : "tracing", n());
+      ProgressStage stage(progress, paths ? "paths" : "tracing", shares.own());
       const KeptPieces pieces(progress, "tracing", n() / gather_block);
-      parallel_for(n(), gather_block, [&](size_t begin, size_t end) {
+      shares.for_own([&](size_t begin, size_t end) {
         if (stage.cancelled()) return;
         const std::span<uint8_t> rows = stored_bytes(out, begin, end - begin),
                                  inside(buried.data() + begin, end - begin);
@@ -86,8 +88,9 @@ struct MatrixBaker : MatrixGather {
         }
         stage.advance(end - begin);
       });
-      if (stage.cancelled()) return Error{"", "cancelled"};
+      if (!none_cancelled(progress)) return Error{"", "cancelled"};
     }
+    shares.gather(buried.data()), errors.gather(shares), gather_stored(shares, out);
     const std::vector<FillStep> steps = make_fill_steps(scene, receivers.basis, buried);
     for (const FillStep& step : steps) receivers.origins[step.receiver] = receivers.origins[step.sources[0]];
     if (!steps.empty()) {
@@ -97,7 +100,7 @@ struct MatrixBaker : MatrixGather {
         receive(*scratch.borrow(), steps[i].receiver);
         stage.advance();
       });
-      if (stage.cancelled()) return Error{"", "cancelled"};
+      if (!none_cancelled(progress)) return Error{"", "cancelled"};
     }
     report.rays = n() * (rays() + size_t(lobes.rays) * lobes.sharp.size());
     report.trace_seconds = seconds_since(start);
@@ -120,8 +123,12 @@ struct MatrixBaker : MatrixGather {
               store_rows(last, materials, terms[size_t(k)], first + i, x + i * J() * wc(), channels(), width());
           };
         });
-    for (WritableTransfer& term : terms) report.terms.push_back(std::move(term.transfer));
-    return ok;
+    if (!ok) return ok;
+    for (WritableTransfer& term : terms) {
+      gather_stored(G.shares(), term);
+      report.terms.push_back(std::move(term.transfer));
+    }
+    return {};
   }
 
   Result<MatrixBake> run_bounced(const LastReflection& last) {
@@ -139,6 +146,7 @@ struct MatrixBaker : MatrixGather {
       store_rows(last, materials, out, r, x, channels(), width());
     });
     if (!solution) return solution.error();
+    gather_stored(G.shares(), out);
     solution->x = {};
     if (options.keep_terms)
       if (auto ok = keep_terms(G, source, last); !ok) return ok.error();

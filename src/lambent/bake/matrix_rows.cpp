@@ -37,6 +37,7 @@ void MatrixRows::trace_block(size_t block, const KeptPieces* pieces) {
     if (is_cancelled(gather_.setup.progress)) return;
     trace_receiver(*s, r, hits);
   }
+  note_asked(hits);
   if (pieces && !loaded) pieces->save(block, T0, half, buried, hits.hits, hits.weights, hits.ends);
   const size_t bytes = hits.bytes();
   if (is_kept_[block]) used_ += bytes, used_ -= kept_[block].bytes(), kept_[block] = std::move(hits);
@@ -55,17 +56,38 @@ bool MatrixRows::is_sound(const MatrixHits& hits, size_t receivers) const {
   });
 }
 
+// Whose scattered rows hits look up.
+void MatrixRows::note_asked(const MatrixHits& hits) {
+  if (asks_.empty()) return;
+  for (const MatrixHit& h : hits.hits)
+    for (uint32_t receiver : gather_.corners().find(h.corner / 2, h.corner % 2)->receiver)
+      std::atomic_ref(asks_[receiver]).store(1, std::memory_order_relaxed);
+}
+
+void MatrixRows::fetch(float* x, size_t) const {
+  ++shares_.ranks().asks;
+  asked_.fetch(x, [&](size_t row) {
+    const size_t first = gather_.first_row[row], wc = gather_.wc();
+    return std::pair(first * wc, (gather_.first_row[row + 1] - first) * wc);
+  });
+}
+
 Result<void> MatrixRows::trace(Progress* progress) {
-  ProgressStage stage(progress, "tracing", rows());
+  shares_ = Shares(rows(), gather_block);
+  asks_.assign(shares_.alone() ? 0 : rows(), 0);
+  ProgressStage stage(progress, "tracing", shares_.own());
   const KeptPieces pieces(progress, "tracing", kept_.size());
-  parallel_for(rows(), gather_block, [&](size_t begin, size_t end) {
+  shares_.for_own([&](size_t begin, size_t end) {
     if (stage.cancelled()) return;
     trace_block(begin / gather_block, &pieces);
     stage.advance(end - begin);
   });
-  if (stage.cancelled()) return Error{"", "cancelled"};
+  if (!none_cancelled(progress)) return Error{"", "cancelled"};
+  shares_.gather(buried_.data());
   move_buried(progress);
-  if (is_cancelled(progress)) return Error{"", "cancelled"};
+  if (!none_cancelled(progress)) return Error{"", "cancelled"};
+  shares_.gather(buried_.data());
+  if (!asks_.empty()) asked_ = AskedRows(shares_, asks_);
   return {};
 }
 
@@ -74,7 +96,7 @@ void MatrixRows::move_buried(Progress* progress) {
   std::set<size_t> touched;
   for (const FillStep& step : make_fill_steps(gather_.scene, gather_.receivers.basis, buried_)) {
     gather_.receivers.origins[step.receiver] = gather_.receivers.origins[step.sources[0]];
-    touched.insert(step.receiver / gather_block);
+    if (shares_.owner(step.receiver) == shares_.ranks().rank()) touched.insert(step.receiver / gather_block);
   }
   const std::vector<size_t> blocks(touched.begin(), touched.end());
   if (blocks.empty()) return;
@@ -87,7 +109,8 @@ void MatrixRows::move_buried(Progress* progress) {
 }
 
 double MatrixRows::kept() const {
-  return double(std::count(is_kept_.begin(), is_kept_.end(), uint8_t(1))) / double(is_kept_.size());
+  const auto own = std::count(is_kept_.begin(), is_kept_.end(), uint8_t(1));
+  return double(shares_.ranks().sum(uint64_t(own))) / double(is_kept_.size());
 }
 
 void MatrixRows::add_rows(size_t r, size_t, const float* Y, size_t, float* y, float* half) const {

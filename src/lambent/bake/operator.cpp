@@ -45,9 +45,35 @@ class TracedPiece {
   std::vector<float> lights_;
 };
 
+// Rows that a block's hits met.
+void note_asked(const GatherBlock& block, std::vector<uint8_t>& asked) {
+  if (asked.empty()) return;
+  for (const SparseBlock* rows : {&block.rows, &block.half_rows})
+    for (uint32_t column : rows->columns) std::atomic_ref(asked[column]).store(1, std::memory_order_relaxed);
+}
+
+// Rows that these are filled from, and which are not filled themselves.
+std::vector<uint8_t> sources_of(const Shares& shares, const std::vector<FillStep>& steps, size_t rows) {
+  std::vector<uint8_t> wanted(rows);
+  for (size_t i = steps.size(); i-- > 0;) {  // later ones are filled from earlier ones
+    const uint32_t r = steps[i].receiver;
+    if (wanted[r] || shares.owner(r) == shares.ranks().rank())
+      for (uint32_t source : steps[i].sources) wanted[source] = 1;
+    wanted[r] = 0;
+  }
+  return wanted;
+}
+
 }  // namespace
 
-void GatherOperator::trace_block(const GatherWanted& wanted, size_t begin, size_t end, const KeptPieces& pieces) {
+void GatherOperator::fill(float* x, size_t stride, size_t width) const {
+  if (fill_.empty()) return;
+  sources_.fetch(x, [&](size_t row) { return std::pair(row * stride, width); });
+  fill_buried(fill_, x, stride, width);
+}
+
+void GatherOperator::trace_block(const GatherWanted& wanted, size_t begin, size_t end, const KeptPieces& pieces,
+                                 std::vector<uint8_t>& asked) {
   auto block = traced_->blocks.borrow();
   auto scratch = traced_->scratch.borrow();
   std::vector<float> unwanted(wanted.sky.rows ? 0 : (end - begin) * setup_->sky_width());
@@ -67,6 +93,10 @@ void GatherOperator::trace_block(const GatherWanted& wanted, size_t begin, size_
     if (!has_rows || (unpack(packed->rows, rows(), setup_->channels, block->rows) &&
                       (!wanted.halves || unpack(packed->half_rows, rows(), setup_->channels, block->half_rows)))) {
       if (wanted.hits && has_rows) traced_->kept.keep(number, *packed);
+      if (!wanted.halves) block->half_rows = {};
+      if (has_rows) note_asked(*block, asked);
+      else if (!asked.empty())
+        for (uint8_t& a : asked) std::atomic_ref(a).store(1, std::memory_order_relaxed);
       return;
     }
     pieces.refuse();
@@ -74,6 +104,8 @@ void GatherOperator::trace_block(const GatherWanted& wanted, size_t begin, size_
   trace_gather(*setup_, *scratch, begin, end - begin, wanted.hits ? block.get() : nullptr, &sky,
                direct ? &*direct : nullptr);
   if (wanted.more) wanted.more(begin, end - begin, sky);
+  if (!wanted.halves) block->half_rows = {};
+  if (wanted.hits) note_asked(*block, asked);
   if (wanted.hits) {
     pack(block->rows, packed->rows);
     packed->half_rows.clear();
@@ -89,6 +121,8 @@ Result<GatherOperator> GatherOperator::trace(const GatherSetup& setup, const Gat
   op.setup_ = &setup;
   const size_t n = setup.receivers.count();
   op.buried_.assign(n, 0);
+  const Shares& shares = op.shares_ = Shares(n, gather_block);
+  std::vector<uint8_t> asked(wanted.hits && !shares.alone() ? n : 0);
   op.traced_ = std::shared_ptr<Traced>(new Traced{
       KeptRows(op.blocks(), wanted.hits ? wanted.memory : 0, most_bytes(size_t(setup.sets.samples), n, setup.channels),
                wanted.hits && progress ? progress->scratch : std::string()),
@@ -96,21 +130,24 @@ Result<GatherOperator> GatherOperator::trace(const GatherSetup& setup, const Gat
       Pool<PackedBlock>([] { return std::make_unique<PackedBlock>(); }),
       Pool<GatherScratch, DeleteScratch>([&setup] { return make_gather_scratch(setup); }),
       Pool<AlignedVector<float>>([] { return std::make_unique<AlignedVector<float>>(); })});
-  ProgressStage stage(progress, "tracing", n);
+  ProgressStage stage(progress, "tracing", shares.own());
   const KeptPieces pieces(progress, "tracing", op.blocks());
-  parallel_for(n, gather_block, [&](size_t begin, size_t end) {
+  shares.for_own([&](size_t begin, size_t end) {
     if (stage.cancelled()) return;
-    op.trace_block(wanted, begin, end, pieces);
+    op.trace_block(wanted, begin, end, pieces, asked);
     stage.advance(end - begin);
   });
-  if (stage.cancelled()) return Error{"", "cancelled"};
+  if (!none_cancelled(progress)) return Error{"", "cancelled"};
+  shares.gather(op.buried_.data());
   op.fill_ = make_fill_steps(setup.scene, setup.receivers.basis, op.buried_);
-  if (const GatherDirect* d = wanted.direct) fill_buried(op.fill_, d->rows, d->width, 3 * d->lamps.groups());
-  if (wanted.sky.rows) fill_buried(op.fill_, wanted.sky.rows, wanted.sky.stride, wanted.sky.stride);
+  if (!op.fill_.empty()) op.sources_ = AskedRows(shares, sources_of(shares, op.fill_, n));
+  if (const GatherDirect* d = wanted.direct) op.fill(d->rows, d->width, 3 * d->lamps.groups());
+  if (wanted.sky.rows) op.fill(wanted.sky.rows, wanted.sky.stride, wanted.sky.stride);
+  if (!asked.empty()) op.asked_ = AskedRows(shares, asked);
   for (uint8_t b : op.buried_) op.report_.buried += b;
-  op.report_.rays = n * size_t(setup.sets.samples), op.report_.bytes = op.traced_->kept.bytes();
-  op.report_.file_bytes = op.traced_->kept.file_bytes();
-  op.report_.kept = op.traced_->kept.fraction();
+  op.report_.rays = n * size_t(setup.sets.samples), op.report_.bytes = shares.ranks().sum(op.traced_->kept.bytes());
+  op.report_.file_bytes = shares.ranks().sum(op.traced_->kept.file_bytes());
+  op.report_.kept = double(shares.ranks().sum(op.traced_->kept.count())) / double(op.blocks());
   op.report_.seconds = std::chrono::duration<double>(std::chrono::steady_clock::now() - start).count();
   return op;
 }
@@ -125,7 +162,7 @@ Result<GatherOperator> GatherOperator::trace(const GatherSetup& setup, const Gat
 
 GatherOperator::Report GatherOperator::report() const {
   Report r = report_;
-  r.rays += traced_->rays;
+  r.rays += shares_.ranks().sum(traced_->rays);
   return r;
 }
 
@@ -160,6 +197,7 @@ void GatherOperator::add_rows(size_t first, size_t count, const float* x, size_t
 }
 
 std::optional<TransposedRows> GatherOperator::transposed() const {
+  if (!shares_.alone()) return std::nullopt;
   TransposedRows push;
   push.channels = setup_->channels;
   push.first.assign(rows() + 1, 0);

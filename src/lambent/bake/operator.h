@@ -3,6 +3,7 @@
 //   y = F B x,   F: values of buried receivers are those of their neighbours.
 // Columns are light groups times channels, or coefficients times channels; a row of x holds them all, `width` padded
 // floats.
+#include <lambent/bake/asked_rows.h>
 #include <lambent/bake/kept_rows.h>
 #include <lambent/core/checkpoint.h>
 #include <lambent/core/pool.h>
@@ -26,14 +27,15 @@ struct GatherWanted {
 
 class GatherOperator final : public LinearOperator {
  public:
-  struct Report {
+  struct Report {  // of all ranks together
     size_t rays = 0, bytes = 0, file_bytes = 0;  // traced so far; of the rows kept, in memory and beyond it in a file
     size_t buried = 0;
     double kept = 1;     // fraction of the blocks kept; the rest is traced again at each application
     double seconds = 0;  // of the first tracing
   };
 
-  // Traces all receivers. The setup must outlive the operator. Errors: cancelled.
+  // Traces all receivers; of those of other ranks it knows who is buried, and nothing else. The setup must outlive the
+  // operator. Errors: cancelled.
   static Result<GatherOperator> trace(const GatherSetup& setup, const GatherWanted& wanted,
                                       Progress* progress = nullptr);
   // `direct` and `sky` ([receiver][sky channel][coefficient]) may be null.
@@ -42,12 +44,16 @@ class GatherOperator final : public LinearOperator {
 
   size_t rows() const override { return setup_->receivers.count(); }
   size_t blocks() const { return (rows() + gather_block - 1) / gather_block; }
-  Report report() const;
+  Report report() const;  // all ranks together
   const std::vector<uint8_t>& buried() const { return buried_; }
 
   void add_rows(size_t first, size_t count, const float* x, size_t width, float* y, float* half) const override;
   bool is_filled(size_t row) const override { return buried_[row]; }
-  void fill(float* x, size_t width) const override { fill_buried(fill_, x, width, width); }
+  Shares shares() const override { return shares_; }
+  void fetch(float* x, size_t width) const override { ++shares_.ranks().asks, asked_.fetch(x, width); }
+  void fill(float* x, size_t width) const override { fill(x, width, width); }
+  // The same of rows that lie `stride` floats apart.
+  void fill(float* x, size_t stride, size_t width) const;
   std::optional<TransposedRows> transposed() const override;
 
  private:
@@ -61,9 +67,12 @@ class GatherOperator final : public LinearOperator {
   };
   // Calls f with the rows of a block, kept or traced again; those of half of the rays only where asked for.
   void with_rows(size_t block, bool halves, auto f) const;
-  void trace_block(const GatherWanted& wanted, size_t begin, size_t end, const KeptPieces& pieces);
+  void trace_block(const GatherWanted& wanted, size_t begin, size_t end, const KeptPieces& pieces,
+                   std::vector<uint8_t>& asked);
 
   const GatherSetup* setup_ = nullptr;
+  Shares shares_;
+  AskedRows asked_, sources_;  // by hits; of own rows that are filled
   std::vector<uint8_t> buried_;
   std::vector<FillStep> fill_;
   std::shared_ptr<Traced> traced_;

@@ -13,29 +13,31 @@
 namespace lambent {
 namespace {
 
-constexpr size_t rows_a_piece = 1024;
 constexpr size_t phases = 16;
 constexpr int restart = 8;
 constexpr uint32_t no_row = UINT32_MAX;
 constexpr size_t solve_units = 1000;  // of progress
 
 // Sums of a b over all rows, lane by lane, in a fixed order.
-std::vector<double> dots(const float* a, const float* b, size_t n, size_t width) {
-  const size_t pieces = (n + rows_a_piece - 1) / rows_a_piece;
+std::vector<double> dots(const LinearOperator& op, const float* a, const float* b, size_t width) {
+  const size_t pieces = (op.rows() + gather_block - 1) / gather_block;
+  const Shares shares = op.shares();
   std::vector<double> partial(pieces * width, 0.0), sum(width, 0.0);
-  parallel_for(n, rows_a_piece, [&](size_t begin, size_t end) {
-    double* s = partial.data() + begin / rows_a_piece * width;
+  shares.for_own([&](size_t begin, size_t end) {
+    double* s = partial.data() + begin / gather_block * width;
     for (size_t r = begin; r < end; ++r)
       for (size_t k = 0; k < width; ++k) s[k] += double(a[r * width + k]) * double(b[r * width + k]);
   });
+  shares.gather_pieces(partial.data(), width);
   for (size_t p = 0; p < pieces; ++p)
     for (size_t k = 0; k < width; ++k) sum[k] += partial[p * width + k];
   return sum;
 }
 
+// Of this rank's rows.
 template <class F>
-void each_row(size_t n, F f) {
-  parallel_for(n, rows_a_piece, [&](size_t begin, size_t end) {
+void each_row(const LinearOperator& op, F f) {
+  op.shares().for_own([&](size_t begin, size_t end) {
     for (size_t r = begin; r < end; ++r) f(r);
   });
 }
@@ -80,7 +82,7 @@ struct Step {
 
   void run(const float* x, float* next) const {
     Pool<AlignedVector<float>> buffers([] { return std::make_unique<AlignedVector<float>>(); });
-    parallel_for(op.rows(), gather_block, [&](size_t begin, size_t end) {
+    op.shares().for_own([&](size_t begin, size_t end) {
       const size_t most = std::min(op.piece(), end - begin);
       const auto y = buffers.borrow(), half = buffers.borrow();
       y->resize(most * width), half->resize(errors ? checked_count(most) * width : 0);
@@ -90,18 +92,18 @@ struct Step {
       }
       if (stage) stage->advance(end - begin);
     });
-    if (next) op.fill(next, width);
+    if (next) op.fill(next, width), op.fetch(next, width);
   }
 };
 
 // x = F e
 AlignedVector<float> first_iterate(const LinearOperator& op, const Source& e, size_t width) {
   AlignedVector<float> x(op.size(width), 0.0f);
-  parallel_for(op.rows(), gather_block, [&](size_t begin, size_t end) {
+  op.shares().for_own([&](size_t begin, size_t end) {
     AlignedVector<float> y(width);
     for (size_t r = begin; r < end; ++r) e.set(r, y.data()), op.keep(r, 1, y.data(), width, x.data());
   });
-  op.fill(x.data(), width);
+  op.fill(x.data(), width), op.fetch(x.data(), width);
   return x;
 }
 
@@ -115,10 +117,17 @@ struct Problem {
   ProgressStage& stage;
   Source source = source_of(e, width);
   size_t shown = 0;  // of the stage's solve_units
-  std::vector<double> norms = dots(e, e, op.rows(), width);
+  std::vector<double> norms = dots(op, e, e, width);
 
   size_t n() const { return op.rows(); }
   AlignedVector<float> copy_of_e() const { return AlignedVector<float>(e, e + n() * width); }
+  AlignedVector<float> fetched_e() const {
+    AlignedVector<float> x = copy_of_e();
+    op.fetch(x.data(), width);
+    return x;
+  }
+  static bool is_own(const Shares& shares, size_t row) { return shares.owner(row) == shares.ranks().rank(); }
+  bool goes_on() const { return none_cancelled(progress); }
   // Each step of most solvers takes about the same factor off the residual.
   bool done(double applications, double residual) {
     report.steps.push_back({applications, residual});
@@ -132,15 +141,15 @@ struct Problem {
   // |next - x| / |e|
   double change(const float* x, float* next) const {
     AlignedVector<float> d(n() * width);
-    each_row(n(), [&](size_t r) {
+    each_row(op, [&](size_t r) {
       for (size_t k = r * width; k < (r + 1) * width; ++k) d[k] = next[k] - x[k];
     });
-    return greatest_ratio(dots(d.data(), d.data(), n(), width), norms);
+    return greatest_ratio(dots(op, d.data(), d.data(), width), norms);
   }
 
   AlignedVector<float> jacobi() {
-    AlignedVector<float> x = copy_of_e(), next(x.size());
-    for (int k = 1; k <= options.most && !stage.cancelled(); ++k) {
+    AlignedVector<float> x = fetched_e(), next(x.size());
+    for (int k = 1; k <= options.most && goes_on(); ++k) {
       step(x.data(), next.data());
       const double residual = change(x.data(), next.data());  // of x; next is better still
       std::swap(x, next);
@@ -150,10 +159,11 @@ struct Problem {
   }
 
   AlignedVector<float> gauss_seidel() {
-    AlignedVector<float> x = copy_of_e();
+    AlignedVector<float> x = fetched_e();
+    const Shares shares = op.shares();
     const size_t blocks = (n() + gather_block - 1) / gather_block;
     std::vector<double> squares(blocks * width);
-    for (int k = 1; k <= options.most && !stage.cancelled(); ++k) {
+    for (int k = 1; k <= options.most && goes_on(); ++k) {
       for (size_t phase = 0; phase < phases; ++phase) {
         const size_t count = blocks > phase ? (blocks - phase - 1) / phases + 1 : 0;
         // All blocks of a phase read x before any of them writes it.
@@ -161,13 +171,14 @@ struct Problem {
         const Step next{op, &source, width, progress};
         parallel_for(count * gather_block, op.piece(), [&](size_t begin, size_t) {
           const size_t first = (phase + begin / gather_block * phases) * gather_block + begin % gather_block;
-          if (first >= n() || stage.cancelled()) return;
+          if (first >= n() || stage.cancelled() || !is_own(shares, first)) return;
           next.set_rows(first, std::min(op.piece(), n() - first), x.data(), fresh.data() + begin * width);
         });
-        if (stage.cancelled()) return x;
+        if (!goes_on()) return x;
         parallel_for(count, 1, [&](size_t begin, size_t end) {
           for (size_t i = begin; i < end; ++i) {
             const size_t b = phase + i * phases, first = b * gather_block;
+            if (!is_own(shares, first)) continue;
             double* s = squares.data() + b * width;
             std::fill(s, s + width, 0.0);
             for (size_t r = first; r < std::min(first + gather_block, n()); ++r) {
@@ -181,8 +192,10 @@ struct Problem {
             }
           }
         });
+        if (phase + 1 < phases) op.fetch(x.data(), width);
       }
-      op.fill(x.data(), width);
+      op.fill(x.data(), width), op.fetch(x.data(), width);
+      shares.gather_pieces(squares.data(), width);
       std::vector<double> sum(width, 0.0);
       for (size_t b = 0; b < blocks; ++b)
         for (size_t c = 0; c < width; ++c) sum[c] += squares[b * width + c];
@@ -256,12 +269,12 @@ AlignedVector<float> Problem::southwell(const TransposedRows& push) {
     if (touched >= next_look) {  // a quarter of an application between looks
       next_look = touched + entries / 4;
       if (stage.cancelled() ||
-          done(double(touched) / double(entries), greatest_ratio(dots(r.data(), r.data(), n(), width), norms)))
+          done(double(touched) / double(entries), greatest_ratio(dots(op, r.data(), r.data(), width), norms)))
         break;
     }
   }
   if (!report.converged)
-    done(double(touched) / double(entries), greatest_ratio(dots(r.data(), r.data(), n(), width), norms));
+    done(double(touched) / double(entries), greatest_ratio(dots(op, r.data(), r.data(), width), norms));
   op.fill(x.data(), width);
   return x;
 }
@@ -270,7 +283,8 @@ AlignedVector<float> Problem::southwell(const TransposedRows& push) {
 // Hessenberg matrices R and right-hand sides g, lane by lane.
 struct Krylov {
   using Lanes = std::vector<double>;
-  size_t n, width;
+  const LinearOperator& op;
+  size_t width;
   std::vector<AlignedVector<float>> V{};
   std::vector<std::array<Lanes, restart + 1>> R{};
   std::array<Lanes, restart + 1> g{};
@@ -278,12 +292,12 @@ struct Krylov {
 
   // V's next vector: v over its length.
   Lanes append(const AlignedVector<float>& v) {
-    Lanes length = dots(v.data(), v.data(), n, width);
+    Lanes length = dots(op, v.data(), v.data(), width);
     for (double& l : length) l = std::sqrt(l);
     std::vector<float> inverse(width);
     for (size_t k = 0; k < width; ++k) inverse[k] = length[k] > 0 ? float(1 / length[k]) : 0.0f;
     V.emplace_back(v.size());
-    each_row(n, [&](size_t i) {
+    each_row(op, [&](size_t i) {
       for (size_t k = 0; k < width; ++k) V.back()[i * width + k] = v[i * width + k] * inverse[k];
     });
     return length;
@@ -295,9 +309,9 @@ struct Krylov {
     const size_t m = R.size();
     auto& h = R.emplace_back();
     for (size_t j = 0; j <= m; ++j) {  // modified Gram-Schmidt
-      h[j] = dots(w.data(), V[j].data(), n, width);
+      h[j] = dots(op, w.data(), V[j].data(), width);
       const std::vector<float> share(h[j].begin(), h[j].end());
-      each_row(n, [&](size_t i) {
+      each_row(op, [&](size_t i) {
         for (size_t k = 0; k < width; ++k) w[i * width + k] -= share[k] * V[j][i * width + k];
       });
     }
@@ -331,7 +345,7 @@ struct Krylov {
         y[i][k] = d > 0 ? float(sum / d) : 0.0f;
       }
     for (size_t j = 0; j < m; ++j)
-      each_row(n, [&](size_t i) {
+      each_row(op, [&](size_t i) {
         for (size_t k = 0; k < width; ++k) x[i * width + k] += y[j][k] * V[j][i * width + k];
       });
   }
@@ -341,24 +355,26 @@ struct Krylov {
 AlignedVector<float> Problem::gmres() {
   AlignedVector<float> x(n() * width, 0.0f), r = copy_of_e(), w(x.size());
   int applications = 0;
-  while (applications < options.most && !stage.cancelled()) {
-    Krylov space{n(), width};
+  while (applications < options.most && goes_on()) {
+    Krylov space{op, width};
     space.begin(r);
     bool finished = false;
-    for (int m = 0; m < restart && applications < options.most && !finished && !stage.cancelled(); ++m) {
-      const AlignedVector<float>& v = space.V.back();
+    for (int m = 0; m < restart && applications < options.most && !finished && goes_on(); ++m) {
+      AlignedVector<float>& v = space.V.back();
+      op.fetch(v.data(), width);
       op.apply(v.data(), width, w.data(), progress);
       ++applications;
-      each_row(n(), [&](size_t i) {
+      each_row(op, [&](size_t i) {
         for (size_t k = i * width; k < (i + 1) * width; ++k) w[k] = v[k] - w[k];
       });
       finished = done(applications, greatest_ratio(space.extend(w), norms));
     }
     space.add_to(x);
     if (finished || applications >= options.most) break;
+    op.fetch(x.data(), width);
     step(x.data(), w.data());  // a fresh residual for the next cycle
     ++applications;
-    each_row(n(), [&](size_t i) {
+    each_row(op, [&](size_t i) {
       for (size_t k = i * width; k < (i + 1) * width; ++k) r[k] = w[k] - x[k];
     });
   }
@@ -405,7 +421,7 @@ Result<AlignedVector<float>> solve(const LinearOperator& op, const float* e, siz
       if (!transposed) return Error{"solver", "southwell wants rows that are known by their entries"};
       x = problem.southwell(*transposed);
   }
-  if (stage.cancelled()) return Error{"", "cancelled"};
+  if (!none_cancelled(progress)) return Error{"", "cancelled"};
   return x;
 }
 
@@ -416,37 +432,38 @@ Result<Bounced> bounce(const LinearOperator& op, const Source& e, size_t width, 
   AlignedVector<float> next;
   ErrorSums errors(op.rows());
   for (int k = 1; k <= bounces; ++k) {
-    ProgressStage stage(progress, "bounce " + std::to_string(k), op.rows());
+    ProgressStage stage(progress, "bounce " + std::to_string(k), op.shares().own());
     Step step{kept, &e, width, progress, &stage};
     if (k == bounces) step.errors = e.set_half ? &errors : nullptr, step.last = &last;
     const bool kept = k < bounces || !last;
     if (kept) next.resize(out.x.size());
     step.run(out.x.data(), kept ? next.data() : nullptr);
-    if (stage.cancelled()) return Error{"", "cancelled"};
+    if (!none_cancelled(progress)) return Error{"", "cancelled"};
     if (kept) std::swap(out.x, next);
   }
+  errors.gather(op.shares());
   if (e.set_half && bounces > 0) out.error = errors.relative();
   return out;
 }
 
 Result<void> bounce_terms(const LinearOperator& op, const Source& e, size_t width, int bounces, Progress* progress,
-                          const std::function<Result<void>(int k, const AlignedVector<float>& x)>& take,
+                          const std::function<Result<void>(int k, AlignedVector<float>& x)>& take,
                           const std::function<TakeRows(int k)>& taker_of) {
   AlignedVector<float> x = first_iterate(op, e, width), next(x.size());
   if (taker_of)
-    parallel_for(op.rows(), gather_block, [&, take_row = taker_of(0)](size_t begin, size_t end) {
+    op.shares().for_own([&, take_row = taker_of(0)](size_t begin, size_t end) {
       AlignedVector<float> y(width);
       for (size_t r = begin; r < end; ++r) e.set(r, y.data()), take_row(r, 1, y.data());
     });
   const KeptOperator kept(op, progress, "terms", bounces);
   for (int k = 0;; ++k) {
     if (auto ok = take(k, x); !ok || k == bounces) return ok;
-    ProgressStage stage(progress, "term " + std::to_string(k + 1), op.rows());
+    ProgressStage stage(progress, "term " + std::to_string(k + 1), op.shares().own());
     const TakeRows take_rows = taker_of ? taker_of(k + 1) : TakeRows();
     Step step{kept, nullptr, width, progress, &stage};
     step.last = &take_rows;
     step.run(x.data(), next.data());
-    if (stage.cancelled()) return Error{"", "cancelled"};
+    if (!none_cancelled(progress)) return Error{"", "cancelled"};
     std::swap(x, next);
   }
 }

@@ -38,9 +38,10 @@ struct SolveReport {
   bool converged = false;
 };
 
-// e and the result are [row][width], width a multiple of lane_multiple; e must be filled (F e = e). Not converging
-// within `most` is no error: the report says so, and the last iterate is returned. Errors: cancelled; southwell of an
-// operator that is not known by its entries.
+// e and the result are [row][width], width a multiple of lane_multiple; e must be filled (F e = e). Of other ranks'
+// rows (LinearOperator::shares) the result has those that were fetched; so below. Not converging within `most` is no
+// error: the report says so, and the last iterate is returned. Errors: cancelled; southwell of an operator that is not
+// known by its entries.
 Result<AlignedVector<float>> solve(const LinearOperator& op, const float* e, size_t width, const SolveOptions& options,
                                    SolveReport* report = nullptr, Progress* progress = nullptr);
 
@@ -59,6 +60,7 @@ class ErrorSums {
   explicit ErrorSums(size_t rows) : sums_((rows + gather_block - 1) / gather_block) {}
   void add(size_t row, const float* half, const float* full, size_t count);
   double relative() const;
+  void gather(const Shares& shares) { shares.gather_pieces(sums_.data()); }
   struct Sum {
     double difference = 0, total = 0;
   };
@@ -79,10 +81,11 @@ using TakeRows = std::function<void(size_t first, size_t count, const float* y)>
 Result<Bounced> bounce(const LinearOperator& op, const Source& e, size_t width, int bounces,
                        Progress* progress = nullptr, const TakeRows& last = {});
 
-// The terms themselves: take(k, (F A)^k F e) for k = 0 ... bounces, in order. Where x are other than the rows that it
-// is made of (LinearOperator::keep), taker_of(k) takes those of term k before. Errors: cancelled; those of take.
+// The terms themselves: take(k, (F A)^k F e) for k = 0 ... bounces, in order; it may complete other ranks' rows, and
+// change nothing else. Where x are other than the rows that it is made of (LinearOperator::keep), taker_of(k) takes
+// those of term k before, of own receivers. Errors: cancelled; those of take.
 Result<void> bounce_terms(const LinearOperator& op, const Source& e, size_t width, int bounces, Progress* progress,
-                          const std::function<Result<void>(int k, const AlignedVector<float>& x)>& take,
+                          const std::function<Result<void>(int k, AlignedVector<float>& x)>& take,
                           const std::function<TakeRows(int k)>& taker_of = {});
 
 }  // namespace lambent

@@ -3,6 +3,7 @@
 #include <lambent/bake/gather.h>
 #include <lambent/bake/unbury.h>
 #include <lambent/core/parallel.h>
+#include <lambent/core/ranks.h>
 #include <lambent/receivers/raster.h>
 
 namespace lambent {
@@ -54,13 +55,15 @@ size_t move_buried_texels(const Scene& scene, const Tracer& tracer, const Atlas&
   const TexelReceivers& map = std::get<TexelReceivers>(receivers.basis);
   std::vector<uint8_t> buried(receivers.count(), 0), moved(receivers.count(), 0);
   {
-    ProgressStage stage(progress, "texels inside", receivers.count());
-    parallel_for(receivers.count(), gather_block, [&](size_t begin, size_t end) {
+    const Shares shares(receivers.count(), gather_block);
+    ProgressStage stage(progress, "texels inside", shares.own());
+    shares.for_own([&](size_t begin, size_t end) {
       if (stage.cancelled()) return;
       for (size_t r = begin; r < end; ++r) buried[r] = is_buried(tracer, receivers, r);
       stage.advance(end - begin);
     });
-    if (stage.cancelled()) return 0;
+    if (!none_cancelled(progress)) return 0;
+    shares.gather(buried.data());
   }
 
   const std::vector<Texel> texels = buried_texels(scene, map, buried);

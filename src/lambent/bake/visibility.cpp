@@ -2,11 +2,12 @@
 #include <lambent/bake/visibility.h>
 #include <lambent/core/check.h>
 #include <lambent/core/checkpoint.h>
-#include <lambent/core/parallel.h>
 #include <lambent/core/pool.h>
+#include <lambent/core/ranks.h>
 
 #include <atomic>
 #include <chrono>
+#include <numeric>
 
 namespace lambent {
 namespace {
@@ -73,6 +74,30 @@ struct VisibilityTracer {
   }
 };
 
+// Each rank has made its own, of as many bytes as their receivers' lengths add up to.
+void gather_pieces(const Shares& shares, std::vector<std::vector<uint8_t>>& pieces,
+                   const std::vector<uint32_t>& lengths) {
+  if (shares.alone()) return;
+  auto each_piece = [&](int rank, auto f) {
+    shares.each_stripe(rank, [&](size_t begin, size_t end) {
+      for (size_t at = begin; at < end; at += piece_receivers) f(pieces[at / piece_receivers], at);
+    });
+  };
+  Ranks& ranks = shares.ranks();
+  std::vector<uint8_t> mine;
+  each_piece(ranks.rank(), [&](auto& piece, size_t) { mine.insert(mine.end(), piece.begin(), piece.end()); });
+  const auto all = ranks.gather(std::move(mine));
+  for (int k = 0; k < ranks.count(); ++k) {
+    auto from = all[size_t(k)].begin();
+    each_piece(k, [&](auto& piece, size_t first) {
+      const size_t end = std::min(first + piece_receivers, lengths.size());
+      const size_t bytes =
+          std::accumulate(lengths.begin() + ptrdiff_t(first), lengths.begin() + ptrdiff_t(end), size_t{0});
+      piece.assign(from, from + ptrdiff_t(bytes)), from += ptrdiff_t(bytes);
+    });
+  }
+}
+
 }  // namespace
 
 size_t expected_visibility_bytes(size_t receivers, const VisibilityOptions& options) {
@@ -97,9 +122,10 @@ Result<Visibility> bake_visibility(const Tracer& tracer, const Receivers& receiv
   std::vector<uint32_t> lengths(receivers.count());
   std::atomic<size_t> rays{0};
   {
-    ProgressStage stage(progress, "tracing", receivers.count());
+    const Shares shares(receivers.count(), piece_receivers);
+    ProgressStage stage(progress, "tracing", shares.own());
     const KeptPieces kept(progress, "tracing", pieces.size());
-    parallel_for(receivers.count(), piece_receivers, [&](size_t begin, size_t end) {
+    shares.for_own([&](size_t begin, size_t end) {
       if (stage.cancelled()) return;
       const auto s = pool.borrow();
       std::vector<uint8_t>& out = pieces[begin / piece_receivers];
@@ -118,7 +144,10 @@ Result<Visibility> bake_visibility(const Tracer& tracer, const Receivers& receiv
       rays += traced;
       stage.advance(end - begin);
     });
-    if (stage.cancelled()) return Error{"", "cancelled"};
+    if (!none_cancelled(progress)) return Error{"", "cancelled"};
+    rays = shares.ranks().sum(rays);
+    shares.gather(lengths.data());
+    gather_pieces(shares, pieces, lengths);
   }
   Visibility v = make_visibility(options.size, options.bits, std::move(pieces), lengths);
   if (report)

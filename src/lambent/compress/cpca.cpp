@@ -3,8 +3,8 @@
 // cluster's components are found anew by subspace iteration.
 #include <lambent/compress/cpca.h>
 #include <lambent/core/half.h>
-#include <lambent/core/parallel.h>
 #include <lambent/core/random.h>
+#include <lambent/core/ranks.h>
 
 #include <numeric>
 
@@ -66,6 +66,7 @@ struct Compressor {
   const Transfer& transfer;
   const CpcaOptions& options;
   ProgressStage& stage;  // advanced by receivers: those of a cluster when it is fitted, each when it is assigned
+  Progress* progress;
   size_t n = transfer.receivers, D = transfer.receiver_values(), stride = padded(D);
   std::vector<float> values = std::vector<float>(n * stride, 0.0f);  // [receiver][stride]
   std::vector<Cluster> clusters = std::vector<Cluster>(size_t(options.clusters));
@@ -132,15 +133,31 @@ struct Compressor {
   void fit_all() {
     std::vector<std::vector<uint32_t>> members(clusters.size());
     for (size_t r = 0; r < n; ++r) members[cluster_of[r]].push_back(uint32_t(r));
-    parallel_for(clusters.size(), 1, [&](size_t begin, size_t end) {
+    const Shares shares(clusters.size(), 1);
+    shares.for_own([&](size_t begin, size_t end) {
       if (stage.cancelled()) return;
       for (size_t c = begin; c < end; ++c) fit(c, members[c]), stage.advance(members[c].size());
     });
+    if (shares.alone() || !none_cancelled(progress)) return;
+    const size_t vectors = 1 + size_t(options.rank);
+    std::vector<float> all(clusters.size() * vectors * stride);
+    auto each_vector = [&](auto f) {
+      for (size_t c = 0; c < clusters.size(); ++c) {
+        clusters[c].mean.resize(stride), clusters[c].components.resize(vectors - 1, std::vector<float>(stride));
+        float* at = all.data() + c * vectors * stride;
+        f(clusters[c].mean.data(), at);
+        for (std::vector<float>& q : clusters[c].components) f(q.data(), at += stride);
+      }
+    };
+    each_vector([&](const float* own, float* to) { std::copy_n(own, stride, to); });
+    shares.gather(all.data(), vectors * stride);
+    each_vector([&](float* own, const float* from) { std::copy_n(from, stride, own); });
   }
 
   // Each receiver to whichever of the clusters with the nearest means leaves least error.
   void assign() {
-    parallel_for(n, 64, [&](size_t begin, size_t end) {
+    const Shares shares(n, 64);
+    shares.for_own([&](size_t begin, size_t end) {
       if (stage.cancelled()) return;
       std::vector<std::pair<float, uint16_t>> near(clusters.size());
       std::vector<float> centred(stride);
@@ -161,6 +178,7 @@ struct Compressor {
       }
       stage.advance(end - begin);
     });
+    if (none_cancelled(progress)) shares.gather(cluster_of.data());
   }
 };
 
@@ -175,12 +193,13 @@ Result<CpcaTransfer> compress_cpca(const Transfer& transfer, const CpcaOptions& 
     return Error{"rank", "must lie between 0 and 64, not " + std::to_string(options.rank)};
   if (options.iterations < 1 || options.iterations > 64)
     return Error{"iterations", "must lie between 1 and 64, not " + std::to_string(options.iterations)};
-  ProgressStage stage(progress, "clustering", transfer.receivers * size_t(2 * options.iterations + 1));
-  Compressor c{transfer, options, stage};
+  ProgressStage stage(progress, "clustering",
+                      transfer.receivers * size_t(2 * options.iterations + 1) / size_t(this_ranks().count()));
+  Compressor c{transfer, options, stage, progress};
   c.unpack();
   c.fit_all();
-  for (int i = 0; i < options.iterations && !stage.cancelled(); ++i) c.assign(), c.fit_all();
-  if (stage.cancelled()) return Error{"", "cancelled"};
+  for (int i = 0; i < options.iterations && none_cancelled(progress); ++i) c.assign(), c.fit_all();
+  if (!none_cancelled(progress)) return Error{"", "cancelled"};
 
   CpcaTransfer out;
   out.light = transfer.light, out.rows = transfer.rows, out.channels = transfer.channels,

@@ -6,9 +6,9 @@
 #include <lambent/core/check.h>
 #include <lambent/core/checkpoint.h>
 #include <lambent/core/half.h>
-#include <lambent/core/parallel.h>
 #include <lambent/core/pool.h>
 #include <lambent/core/random.h>
+#include <lambent/core/ranks.h>
 
 #include <array>
 #include <atomic>
@@ -250,6 +250,11 @@ Transfer transfer_row(const Transfer& t, int row) {
   return w.transfer;
 }
 
+void gather_stored(const Shares& shares, const WritableZonalTransfer& out) {
+  const size_t block = stored_bytes(out, 0, transfer_block).size();
+  shares.gather_each(transfer_block, out.values, block);
+}
+
 void put_row(const WritableZonalTransfer& out, int row, const ZonalTransfer& from) {
   const size_t piece = from.row_values() * transfer_block * from.value_bytes();
   for (size_t b = 0; b < from.blocks(); ++b)
@@ -278,14 +283,15 @@ Result<ZonalTransfer> fit_zonal(const Transfer& t, const ZonalFitOptions& option
   std::vector<double> errors(t.receivers), energies(t.receivers), error(t.receivers), energy(t.receivers);
   std::atomic<size_t> retried{0};
   {
-    ProgressStage stage(progress, "fitting lobes", t.receivers * size_t(t.rows));
+    const Shares shares(t.receivers, fit_block);
+    ProgressStage stage(progress, "fitting lobes", shares.own() * size_t(t.rows));
     const size_t blocks = (t.receivers + fit_block - 1) / fit_block;
     const KeptPieces pieces(progress, "fitting", blocks * size_t(t.rows));
     for (int row = 0; row < t.rows; ++row) {
       const Transfer target = transfer_row(t, row);
       const WritableZonalTransfer fitted =
           t.rows == 1 ? out : make_zonal_transfer(order, options.lobes, t.channels, t.receivers, options.precision);
-      parallel_for(t.receivers, fit_block, [&](size_t begin, size_t end) {
+      shares.for_own([&](size_t begin, size_t end) {
         if (stage.cancelled()) return;
         const size_t piece = size_t(row) * blocks + begin / fit_block, count = end - begin;
         const std::span<uint8_t> bytes = stored_bytes(fitted, begin, count);
@@ -301,7 +307,9 @@ Result<ZonalTransfer> fit_zonal(const Transfer& t, const ZonalFitOptions& option
         retried += again;
         stage.advance(end - begin);
       });
-      if (stage.cancelled()) return Error{"", "cancelled"};
+      if (!none_cancelled(progress)) return Error{"", "cancelled"};
+      shares.gather(error.data()), shares.gather(energy.data());
+      gather_stored(shares, fitted);
       if (t.rows > 1) put_row(out, row, fitted.transfer);
       const double weight = options.row_weights.empty() ? 1 : double(options.row_weights[size_t(row)]);
       for (size_t r = 0; r < t.receivers; ++r) errors[r] += weight * error[r], energies[r] += weight * energy[r];
@@ -315,7 +323,7 @@ Result<ZonalTransfer> fit_zonal(const Transfer& t, const ZonalFitOptions& option
       report->errors[r] = energies[r] > 0 ? float(std::sqrt(errors[r] / energies[r])) : 0.0f;
     }
     report->rms = total > 0 ? std::sqrt(sum / total) : 0;
-    report->retried = retried;
+    report->retried = this_ranks().sum(retried);
     report->seconds = std::chrono::duration<double>(std::chrono::steady_clock::now() - start).count();
   }
   return std::move(out.transfer);

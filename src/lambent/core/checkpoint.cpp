@@ -60,6 +60,16 @@ int open_locked(const std::string& path, int flags) {
   return -1;
 }
 
+// Files of a stage: STAGE.pieces of the first rank, STAGE.rK.pieces of others.
+std::string name_of_rank(const std::string& stage, int rank) {
+  return stage + (rank > 0 ? ".r" + std::to_string(rank) : "") + pieces_ending;
+}
+bool is_of_stage(const std::string& file, const std::string& stage) {
+  if (!file.starts_with(stage) || !file.ends_with(pieces_ending)) return false;
+  const std::string middle = file.substr(stage.size(), file.size() - stage.size() - std::strlen(pieces_ending));
+  return middle.empty() || (middle.starts_with(".r") && middle.find_first_not_of("0123456789", 2) == std::string::npos);
+}
+
 bool is_ours(const fs::path& file) {
   return file.filename() == checkpoint_identity_file || file.filename() == lock_file ||
          file.extension() == pieces_ending || file.filename().string().starts_with("checkpoint.json.");
@@ -89,8 +99,14 @@ struct Checkpoint::Stage {
   std::string name, path;
   size_t pieces = 0;
   Clock::time_point since = Clock::now();
-  int fd = -1;
-  std::unordered_map<uint64_t, std::pair<size_t, RecordHeader>> index;  // offset of the bytes
+  int fd = -1;  // this rank's
+  std::vector<int> others;
+  struct Place {
+    int fd;
+    size_t at;  // of the bytes
+    RecordHeader header;
+  };
+  std::unordered_map<uint64_t, Place> index;
   std::atomic<size_t> made{0}, damaged{0};
   std::mutex buffer_mutex, write_mutex;
   std::vector<uint8_t> buffer;
@@ -98,33 +114,36 @@ struct Checkpoint::Stage {
 
   ~Stage() {
     if (fd >= 0) ::close(fd);
+    for (int other : others) ::close(other);
   }
 
   // Finds the records; after one that is not whole the next is looked for.
-  void scan() {
+  void scan(int from) {
     struct stat info;
-    if (::fstat(fd, &info) != 0) return;
+    if (::fstat(from, &info) != 0) return;
     const size_t size = size_t(info.st_size);
     RecordHeader h;
     bool lost = false;
     size_t end = 0;  // of the last record
     for (size_t at = 0; at + sizeof h <= size;) {
-      const bool sound = read_at(fd, &h, sizeof h, at) && h.magic == record_magic && h.format == 1 &&
+      const bool sound = read_at(from, &h, sizeof h, at) && h.magic == record_magic && h.format == 1 &&
                          h.own == h.hash() && h.bytes <= size - at - sizeof h;
-      if (sound) index[h.piece] = {at + sizeof h, h};
+      if (sound) index[h.piece] = {from, at + sizeof h, h};
       else if (!lost) ++damaged;
       lost = !sound;
       at += sound ? sizeof h + padded(h.bytes) : 8;
       if (sound) end = at;
     }
     // What a killed writer left in part goes: its header would take the records to come for its own bytes.
-    if (end != size) (void)!::ftruncate(fd, off_t(end));
+    if (end == size) return;
+    if (from == fd) (void)!::ftruncate(fd, off_t(end));
+    else if (lost && damaged > 0) --damaged;  // another rank may be writing it
   }
 };
 
 struct Checkpoint::Impl {
   CheckpointOptions options;
-  Clock::time_point since = Clock::now();
+  Clock::time_point since = Clock::now(), looked{};
   std::mutex mutex;
   std::map<std::string, int> names;
   std::vector<std::unique_ptr<Stage>> stages;
@@ -132,16 +151,34 @@ struct Checkpoint::Impl {
   std::atomic<bool> on{false}, off{false};
   std::atomic<size_t> taken{0};
 
+  Result<void> take_folder();
+
   // Keeps nothing more; what is there stays good.
   void give_up(const std::string& why) {
     if (!off.exchange(true)) options.warn(options.folder + ": no more is kept: " + why);
   }
 
   void open_stage(Stage& s) {
-    s.path = options.folder + "/" + s.name + pieces_ending;
+    const std::string own = name_of_rank(s.name, options.rank);
+    s.path = options.folder + "/" + own;
     s.fd = ::open(s.path.c_str(), O_RDWR | O_CREAT | O_APPEND | O_CLOEXEC | O_NOFOLLOW, 0666);
-    if (s.fd < 0) give_up(system_message());
-    else s.scan();
+    if (s.fd < 0) return give_up(system_message());
+    std::error_code status;
+    for (const auto& entry : fs::directory_iterator(options.folder, status)) {
+      const std::string name = entry.path().filename().string();
+      if (name == own || !is_of_stage(name, s.name)) continue;
+      const int other = ::open(entry.path().c_str(), O_RDONLY | O_CLOEXEC | O_NOFOLLOW);
+      if (other >= 0) s.others.push_back(other), s.scan(other);
+    }
+    s.scan(s.fd);
+  }
+
+  // Of a rank that is not the first: whether that has begun. Looked for now and then.
+  bool is_there() {
+    if (seconds_since(looked) < seconds_buffered) return false;
+    looked = Clock::now();
+    auto there = read_file(options.folder + "/" + checkpoint_identity_file);
+    return there && std::string_view(reinterpret_cast<const char*>(there->data()), there->size()) == options.identity;
   }
 
   // Whether the work is long enough to be kept, as its stage goes.
@@ -188,6 +225,17 @@ size_t Checkpoint::taken() const { return impl_->taken; }
 
 Result<void> Checkpoint::begin() {
   Impl& i = *impl_;
+  if (i.options.rank == 0)
+    if (auto ok = i.take_folder(); !ok) return ok;
+  std::lock_guard lock(i.mutex);
+  for (auto& s : i.stages) i.open_stage(*s);
+  i.on = true;
+  return {};
+}
+
+// The folder as this work's own.
+Result<void> Checkpoint::Impl::take_folder() {
+  Impl& i = *this;
   const std::string& folder = i.options.folder;
   if (::mkdir(folder.c_str(), 0777) != 0 && errno != EEXIST)
     return Error{folder, "cannot be written: " + system_message()};
@@ -209,10 +257,8 @@ Result<void> Checkpoint::begin() {
     auto there = read_file(identity);
     if (!there) return there.error();
     if (auto ok = i.options.check(*there); !ok) return ok;
+    i.options.identity.assign(there->begin(), there->end());
   }
-  std::lock_guard lock(i.mutex);
-  for (auto& s : i.stages) i.open_stage(*s);
-  i.on = true;
   return {};
 }
 
@@ -229,9 +275,9 @@ Checkpoint::Stage& Checkpoint::stage(const std::string& name, size_t pieces) {
 bool Checkpoint::read(Stage& s, uint64_t piece, std::vector<uint8_t>& bytes) {
   const auto found = s.index.find(piece);
   if (found == s.index.end()) return false;
-  const auto& [at, header] = found->second;
+  const auto& [fd, at, header] = found->second;
   bytes.resize(header.bytes);
-  if (read_at(s.fd, bytes.data(), bytes.size(), at)) {
+  if (read_at(fd, bytes.data(), bytes.size(), at)) {
     const XXH128_hash_t hash = XXH3_128bits(bytes.data(), bytes.size());
     if (hash.low64 == header.low && hash.high64 == header.high) {
       ++impl_->taken, ++s.made;
@@ -250,8 +296,9 @@ void Checkpoint::append(Stage& s, uint64_t piece, const std::vector<uint8_t>& by
   if (i.off) return;
   if (!i.on) {
     static std::mutex beginning;
-    if (!i.is_due(s)) return;
+    if (i.options.rank == 0 && !i.is_due(s)) return;
     std::lock_guard lock(beginning);
+    if (i.options.rank > 0 && !i.on && !i.is_there()) return;
     if (!i.on && !i.off)
       if (auto ok = begin(); !ok) return i.give_up(ok.error().message);
   }
@@ -286,6 +333,7 @@ void Checkpoint::remove() {
   if (!impl_->on) return;
   impl_->off = true;  // what goes needs not reach the disk
   flush();
+  if (impl_->options.rank > 0) return;
   if (auto ok = remove_files(impl_->options.folder); !ok) impl_->options.warn(ok.error().text());
 }
 

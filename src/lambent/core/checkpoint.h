@@ -24,6 +24,9 @@ struct CheckpointOptions {
   // Seconds that the work has to take, as far as one can tell, before anything is kept; 0: kept from the start.
   double after = 0;
   std::function<void(const std::string&)> warn = [](const std::string&) {};  // one line each
+  // Of ranks (ranks.h) that keep one checkpoint, each its own pieces in files of its own; all read all. Rank 0 locks
+  // the folder; others take part where they see it with the identity that they know.
+  int rank = 0;
 };
 
 inline constexpr const char* checkpoint_identity_file = "checkpoint.json";

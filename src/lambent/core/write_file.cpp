@@ -1,4 +1,5 @@
 #include <lambent/core/file.h>
+#include <lambent/core/ranks.h>
 
 #include <fcntl.h>
 #include <sys/file.h>
@@ -105,15 +106,46 @@ struct WrittenFile {
     return {};
   }
 
-  Result<void> write(std::span<const std::span<const uint8_t>> pieces) {
-    for (auto piece : pieces)
-      for (size_t done = 0; done < piece.size();) {
-        const ssize_t put = ::write(fd, piece.data() + done, std::min<size_t>(piece.size() - done, size_t{1} << 26));
+  // Of the pieces, one after the other, bytes [first, end).
+  Result<void> write(std::span<const std::span<const uint8_t>> pieces, size_t first, size_t end) {
+    size_t at = 0;  // of the piece
+    for (auto piece : pieces) {
+      const size_t last = std::clamp(end, at, at + piece.size()) - at;
+      for (size_t done = std::clamp(first, at, at + piece.size()) - at; done < last;) {
+        const ssize_t put =
+            ::pwrite(fd, piece.data() + done, std::min<size_t>(last - done, size_t{1} << 26), off_t(at + done));
         if (put < 0 && errno == EINTR) continue;
         if (put <= 0) return error(system_message());
         done += size_t(put);
       }
+      at += piece.size();
+    }
     if (::fsync(fd) != 0 && errno != EINVAL) return error(system_message());
+    return {};
+  }
+
+  // As open() and write(), of all ranks; all fail where one does. Where a rank does not
+  // see the file, or has other bytes for it, the first one writes it alone.
+  Result<void> write_by(Ranks& ranks, std::span<const std::span<const uint8_t>> pieces) {
+    const bool leads = ranks.rank() == 0;
+    Result<void> ok = leads ? open() : Result<void>();
+    if (!ranks.all(bool(ok))) return ok ? error("by rank 0") : ok;
+    size_t bytes = 0;
+    for (auto piece : pieces) bytes += piece.size();
+    struct stat info = {};
+    if (leads) ::fstat(fd, &info);
+    std::string name(ranks.from_first(temporary.size()), '\0');
+    if (leads) name = temporary;
+    ranks.broadcast({reinterpret_cast<uint8_t*>(name.data()), name.size()});
+    const ino_t inode = ranks.from_first(info.st_ino);
+    const bool alike = ranks.from_first(bytes) == bytes;
+    if (!leads && alike) fd = ::open(name.c_str(), O_WRONLY | O_CLOEXEC | O_NOFOLLOW);
+    const bool seen = leads || (fd >= 0 && ::fstat(fd, &info) == 0 && info.st_ino == inode);
+    const size_t rank = size_t(ranks.rank()), count = size_t(ranks.count());
+    if (ranks.all(alike && seen)) ok = write(pieces, bytes * rank / count, bytes * (rank + 1) / count);
+    else if (leads) ok = write(pieces, 0, bytes);
+    if (!ok && !leads) ranks.say(ok.error().text());
+    if (!ranks.all(bool(ok))) return ok ? error("by another rank") : ok;
     return {};
   }
 };
@@ -121,6 +153,7 @@ struct WrittenFile {
 namespace {
 
 thread_local FileSet* current_set = nullptr;
+thread_local Ranks* together = nullptr;  // null: one process
 
 // Renames all, the last one last. A program that is killed meanwhile leaves no set in part: another process does it,
 // which shares its memory and ends by itself. Power that fails meanwhile leaves no new file beside an old last one,
@@ -157,6 +190,9 @@ int rename_all(std::vector<std::unique_ptr<WrittenFile>>& files, const std::vect
 FileSet::FileSet() : outer_(current_set) { current_set = this; }
 FileSet::~FileSet() { current_set = outer_; }
 
+WriteTogether::WriteTogether(Ranks& ranks) : outer_(together) { together = ranks.count() > 1 ? &ranks : nullptr; }
+WriteTogether::~WriteTogether() { together = outer_; }
+
 Result<void> FileSet::commit() {
   if (outer_) {
     std::move(files_.begin(), files_.end(), std::back_inserter(outer_->files_));
@@ -164,9 +200,11 @@ Result<void> FileSet::commit() {
     files_.clear(), removed_.clear();
     return {};
   }
-  if (files_.empty()) return {};
-  const int failure = rename_all(files_, removed_);
-  if (failure != 0) return files_.back()->error(std::strerror(failure));
+  const bool leads = !together || together->rank() == 0;
+  if (files_.empty() && !together) return {};
+  const int failure = leads && !files_.empty() ? rename_all(files_, removed_) : 0;
+  if (const int all = together ? together->from_first(failure) : failure; all != 0)
+    return leads ? files_.back()->error(std::strerror(all)) : Error{"", std::strerror(all)};
   for (auto& file : files_) release(*std::exchange(file->note, nullptr));
   for (size_t i = 0; i < files_.size(); ++i)
     if (i == 0 || fs::path(files_[i]->target).parent_path() != fs::path(files_[i - 1]->target).parent_path())
@@ -179,8 +217,13 @@ Result<void> write_file_atomically(const std::string& path, std::span<const std:
   std::optional<FileSet> own;
   if (!current_set) own.emplace();
   auto file = std::make_unique<WrittenFile>(path);
-  if (auto ok = file->open(); !ok) return ok;
-  if (auto ok = file->write(pieces); !ok) return ok;
+  if (together) {
+    if (auto ok = file->write_by(*together, pieces); !ok) return ok;
+    if (together->rank() > 0) return own ? own->commit() : Result<void>();
+  } else {
+    if (auto ok = file->open(); !ok) return ok;
+    if (auto ok = file->write(pieces, 0, SIZE_MAX); !ok) return ok;
+  }
   current_set->files_.push_back(std::move(file));
   return own ? own->commit() : Result<void>();
 }

@@ -4,6 +4,7 @@
 #include <lambent/bake/materials.h>
 #include <lambent/bake/unbury.h>
 #include <lambent/compress/parametric.h>
+#include <lambent/core/ranks.h>
 #include <lambent/light/environment.h>
 #include <lambent/pipeline/bake_lightmap.h>
 #include <lambent/pipeline/bake_parse.h>
@@ -387,6 +388,7 @@ Result<void> begin(Bake& b) {
 Result<void> bake_beside(Bake& b, const std::optional<Lattice>& lattice, const std::optional<View>& view) {
   if (lattice)
     if (auto ok = bake_free_space(b, *lattice); !ok) return ok;
+  if (view && this_ranks().count() > 1) b.job.warn("--fix-view: its pixels are gathered by every rank for itself");
   if (view)
     if (auto ok = fix_the_view(b, *view); !ok) return ok;
   if (!b.request.fix_light.empty())
@@ -474,6 +476,25 @@ Result<std::vector<std::string>> write_outputs(const std::string& path, const Ba
   return written;
 }
 
+// What ranks there were, and what went between them.
+void summarize_ranks(Ranks& ranks, Summary& summary) {
+  const double receivers = summary.json.value("receivers", 0.0), times = double(ranks.asks);
+  const double asked = double(ranks.sum(ranks.asked_bytes)), all = double(ranks.sum(ranks.received));
+  const double each = receivers > 0 && times > 0 ? asked / receivers / times : 0;
+  summary.json["ranks"] = {
+      {"count", ranks.count()}, {"exchanges", ranks.asks}, {"bytes_per_receiver_per_bounce", each}, {"bytes", all}};
+  summary.lines.emplace_back("ranks", fmt::format("{}; {} a receiver a bounce came from others, {} in all",
+                                                  ranks.count(), human_bytes(each), human_bytes(all)));
+}
+
+// Why a bake gains nothing by ranks; "": it does.
+std::string done_by_one_rank(const BakeRequest& request) {
+  if (kind_of(request) == BakeKind::membrane) return "--membrane";
+  if (kind_of(request) == BakeKind::lightmap && request.solver == "southwell")
+    return "--solver southwell, one receiver after the other";
+  return request.subsurface.empty() ? "" : "--subsurface";
+}
+
 }  // namespace
 
 Result<nlohmann::json> save_outcome(const std::string& path, const BakeOutcome& outcome, size_t bin_limit) {
@@ -486,10 +507,19 @@ Result<Summary> bake_to_file(const BakeRequest& asked, const Job& job) {
   if (auto ok = check_output(asked.output, {"glb", "gltf"}); !ok) return ok.error();
   auto request = resolved(asked);
   if (!request) return request.error();
+  Ranks alone;
+  std::optional<WithRanks> own;
+  if (const std::string why = done_by_one_rank(*request); !why.empty() && this_ranks().count() > 1) {
+    if (this_ranks().rank() > 0) return Summary{};
+    job.warn(why + ": done by rank 0 alone, the others wait");
+    own.emplace(alone);
+  }
+  Ranks& ranks = this_ranks();
   DurableBake durable(*request, job);
   auto outcome = bake_with_summary(asked, durable.job());
   if (!outcome) return durable.explained(outcome.error());
   const auto start = Clock::now();
+  const WriteTogether together(ranks);
   Summary& summary = outcome->summary;
   auto pictures = write_outputs(request->output, *outcome, request->bin_limit, &*request, &durable);
   if (!pictures) return durable.explained(pictures.error());
@@ -500,6 +530,7 @@ Result<Summary> bake_to_file(const BakeRequest& asked, const Job& job) {
     summary.json["resumed"] = taken;
     summary.lines.emplace_back("resumed", fmt::format("{} pieces of work were there already", human_count(taken)));
   }
+  if (ranks.count() > 1) summarize_ranks(ranks, summary);
   return std::move(summary);
 }
 

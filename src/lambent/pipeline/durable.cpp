@@ -1,5 +1,6 @@
 #include <lambent/pipeline/durable.h>
 
+#include <lambent/core/ranks.h>
 #include <lambent/pipeline/version.h>
 
 #include <fmt/format.h>
@@ -149,12 +150,23 @@ Result<void> DurableBake::begin(const std::vector<std::string>& pictures) {
     if (why.empty()) return {};
     return Error{folder, why + "; `lambent checkpoints " + folder + " --clean` removes it"};
   };
-  const bool at_once = !request_.checkpoint.empty() || fs::exists(folder, status);
+  Ranks& ranks = this_ranks();
+  const bool at_once = ranks.from_first(!request_.checkpoint.empty() || fs::exists(folder, status));
   options.after = at_once ? 0 : long_work;
+  options.rank = ranks.rank();
+  if (ranks.rank() > 0) options.warn = [&ranks](const std::string& line) { ranks.say(line); };
   checkpoint_ = std::make_unique<Checkpoint>(std::move(options));
   own_.progress->checkpoint = checkpoint_.get();
-  return at_once ? checkpoint_->begin() : Result<void>();
+  if (!at_once) return {};
+  // The first rank takes the folder; the others find it taken.
+  Result<void> ok = ranks.rank() == 0 ? checkpoint_->begin() : Result<void>();
+  if (!ranks.all(bool(ok))) return ok ? Error{folder, "is not to be had"} : ok;
+  if (ranks.rank() > 0) (void)checkpoint_->begin();
+  (void)ranks.all(true);  // all have looked at what is there before any adds to it
+  return {};
 }
+
+size_t DurableBake::taken() const { return size_t(this_ranks().sum(checkpoint_ ? checkpoint_->taken() : 0)); }
 
 Error DurableBake::explained(Error error) const {
   if (error.message == "cancelled" && checkpoint_ && checkpoint_->began())

@@ -20,8 +20,8 @@ class DurableBake {
   const Job& job() const { return own_; }
   // What a user is told of work that did not end.
   Error explained(Error error) const;
-  // Pieces that an earlier run had kept.
-  size_t taken() const { return checkpoint_ ? checkpoint_->taken() : 0; }
+  // Pieces that an earlier run had kept, of all ranks.
+  size_t taken() const;
   // All is written: the checkpoint goes.
   void finish();
   // The inputs read so far, each once.

@@ -1,0 +1,213 @@
+// Ranks that are threads here: whatever is baked has the bytes of one process, on each of them.
+#include "thread_ranks.h"
+
+#include <lambent/bake/bake.h>
+#include <lambent/bake/lattice.h>
+#include <lambent/bake/lightmap.h>
+#include <lambent/bake/materials.h>
+#include <lambent/bake/matrix.h>
+#include <lambent/bake/visibility.h>
+#include <lambent/compress/cpca.h>
+#include <lambent/compress/zonal_fit.h>
+#include <lambent/scene/procedural.h>
+
+#include <gtest/gtest.h>
+
+#include <mutex>
+#include <numeric>
+#include <set>
+
+namespace lambent {
+namespace {
+
+using Bytes = std::vector<uint8_t>;
+
+// With receivers inside a block, and enough of them for stripes of several blocks.
+Scene room(int n = 14) {
+  Scene scene;
+  const uint32_t m = add_material(scene, "wall", Vec3(0.7f, 0.5f, 0.4f)), lamp = add_material(scene, "lamp", Vec3(0));
+  scene.materials[lamp].emissive = Vec3(4);
+  add_box(scene, m, "room", Vec3(-1), Vec3(1, 1, 1.5f), n, true);
+  add_box(scene, m, "block", Vec3(-0.6f, -1.2f, -0.6f), Vec3(0.5f, 0.2f, 0.4f), n / 2);
+  add_quad(scene, lamp, "lamp", Vec3(-0.2f, 0.99f, -0.2f), Vec3(0.4f, 0, 0), Vec3(0, 0, 0.4f), 2, 2);
+  return scene;
+}
+
+struct Place {
+  Scene scene = room();
+  Tracer tracer = *Tracer::build(scene);
+  Receivers receivers = make_vertex_receivers(scene);
+};
+
+void append(Bytes& out, std::span<const uint8_t> more) { out.insert(out.end(), more.begin(), more.end()); }
+Bytes bytes(const Transfer& t) { return {t.data.data(), t.data.data() + t.bytes()}; }
+
+// The same from every rank of 1, 2, 3 and 5, and from none.
+void expect_alike(const char* what, const std::function<Bytes(Progress*)>& work) {
+  const Bytes alone = work(nullptr);
+  ASSERT_FALSE(alone.empty()) << what;
+  for (const int count : {1, 2, 3, 5}) {
+    const auto each = by_ranks(count, work);
+    for (int k = 0; k < count; ++k) EXPECT_TRUE(*each[size_t(k)] == alone) << what << ", rank " << k << " of " << count;
+  }
+}
+
+TEST(Ranks, ShareEveryItemOnce) {
+  for (const int count : {1, 2, 3, 7})
+    for (const size_t items : {0, 1, 63, 64, 65, 1000, 30000}) {
+      const auto own = by_ranks(count, [&](Progress*) {
+        const Shares shares(items, 64);
+        std::mutex mutex;
+        std::set<size_t> mine;
+        shares.for_own([&](size_t begin, size_t end) {
+          std::lock_guard lock(mutex);
+          EXPECT_EQ(begin % 64, 0u);
+          for (size_t i = begin; i < end; ++i) {
+            EXPECT_TRUE(mine.insert(i).second);
+            EXPECT_EQ(shares.owner(i), shares.ranks().rank());
+          }
+        });
+        EXPECT_EQ(mine.size(), shares.own());
+        return mine;
+      });
+      size_t all = 0, most = 0;
+      for (const auto& o : own) all += o->size(), most = std::max(most, o->size());
+      EXPECT_EQ(all, items);
+      if (items == 30000) {
+        EXPECT_LE(most * size_t(count), items + items / 8);
+      }
+    }
+}
+
+TEST(Ranks, GatherWhatEachHasMade) {
+  for (const int count : {1, 2, 5}) {
+    const auto rows = by_ranks(count, [&](Progress*) {
+      const Shares shares(1000, 16);
+      std::vector<int> values(3000, -1), pieces(63, -1);
+      shares.for_own([&](size_t begin, size_t end) {
+        for (size_t i = 3 * begin; i < 3 * end; ++i) values[i] = int(i);
+        pieces[begin / 16] = int(begin);
+      });
+      shares.gather(values.data(), 3), shares.gather_pieces(pieces.data());
+      values.insert(values.end(), pieces.begin(), pieces.end());
+      EXPECT_EQ(this_ranks().sum(uint64_t(this_ranks().rank()) + 1), uint64_t(count * (count + 1) / 2));
+      EXPECT_EQ(this_ranks().from_first(this_ranks().rank() + 7), 7);
+      return values;
+    });
+    std::vector<int> expected(3063);
+    std::iota(expected.begin(), expected.begin() + 3000, 0);
+    for (int p = 0; p < 63; ++p) expected[size_t(3000 + p)] = 16 * p;
+    for (const auto& r : rows) EXPECT_EQ(*r, expected);
+  }
+}
+
+TEST(Ranks, OneThatIsCancelledCancelsAll) {
+  const auto ends = by_ranks(3, [&](Progress* progress) {
+    if (this_ranks().rank() == 2) progress->cancel();
+    const bool well = none_cancelled(progress);
+    return well || !progress->cancelled();
+  });
+  for (const auto& e : ends) EXPECT_FALSE(*e);
+}
+
+TEST(Ranks, DiffuseBakesAreAlike) {
+  const Place p;
+  BakeOptions few{.order = 3, .samples = 128, .bounces = 2};
+  BakeOptions again = few, terms = few, direct = few, error{.order = 3, .bounces = 2, .error = 0.05};
+  again.memory = least_memory(p.receivers.count(), true, few) + 4000;
+  terms.keep_terms = true, direct.bounces = 0;
+  direct.lobes = {{normalize(Vec3(1, 2, 3)), 40.0f}};
+  for (const auto& [name, options] :
+       {std::pair("kept", few), std::pair("traced again", again), std::pair("terms", terms),
+        std::pair("direct", direct), std::pair("error", error)})
+    expect_alike(name, [&](Progress* progress) {
+      BakeReport report;
+      auto t = bake(p.scene, p.tracer, p.receivers, options, &report, progress);
+      EXPECT_TRUE(t) << t.error().text();
+      if (!t) return Bytes{};
+      Bytes out = bytes(*t);
+      for (const Transfer& term : report.terms) append(out, bytes(term));
+      for (const double value : {report.certificate.error, report.noise, report.denoised, double(report.samples)})
+        append(out, {reinterpret_cast<const uint8_t*>(&value), sizeof value});
+      EXPECT_GT(report.buried, 0u);
+      return out;
+    });
+}
+
+TEST(Ranks, OtherBakesAreAlike) {
+  const Place p;
+  const BakeOptions few{.order = 3, .samples = 64, .bounces = 2};
+  for (const bool paths : {false, true})
+    expect_alike(paths ? "paths" : "matrix", [&](Progress* progress) {
+      Receivers receivers = p.receivers;
+      MatrixOptions matrix{.incident_order = 3};
+      matrix.simulate_paths = paths;
+      BakeReport report;
+      auto t = bake_matrix(p.scene, p.tracer, receivers, make_receiver_materials(p.scene, receivers, {}), few, matrix,
+                           &report, progress);
+      EXPECT_TRUE(t);
+      Bytes out = t ? bytes(t->transfer) : Bytes{};
+      append(out, {reinterpret_cast<const uint8_t*>(&report.error), sizeof report.error});
+      return out;
+    });
+  const Transfer surface = *bake(p.scene, p.tracer, p.receivers, few);
+  expect_alike("lattice", [&](Progress* progress) {
+    auto l = bake_lattice(p.scene, p.tracer, p.receivers, surface, nullptr,
+                          {default_lattice_box(p.scene).min, default_lattice_box(p.scene).max, 5, 6, 7},
+                          {.order = 2, .samples = 64}, nullptr, progress);
+    EXPECT_TRUE(l);
+    return l ? bytes(l->transfer) : Bytes{};
+  });
+  expect_alike("blocks", [&](Progress* progress) {
+    auto v = bake_visibility(p.tracer, p.receivers, {.size = 16}, nullptr, progress);
+    EXPECT_TRUE(v);
+    return v ? Bytes(v->data.data(), v->data.data() + v->data.size()) : Bytes{};
+  });
+  expect_alike("zonal", [&](Progress* progress) {
+    auto z = fit_zonal(surface, {.lobes = 2}, nullptr, progress);
+    EXPECT_TRUE(z);
+    return z ? Bytes(z->data.data(), z->data.data() + z->data.size()) : Bytes{};
+  });
+  expect_alike("clusters", [&](Progress* progress) {
+    auto c = compress_cpca(surface, {.clusters = 12, .rank = 3}, nullptr, progress);
+    EXPECT_TRUE(c);
+    Bytes out;
+    if (!c) return out;
+    append(out, {reinterpret_cast<const uint8_t*>(c->weights.data()), c->weights.size() * sizeof(c->weights[0])});
+    append(out, {reinterpret_cast<const uint8_t*>(c->vectors.data()), c->vectors.size() * sizeof(c->vectors[0])});
+    return out;
+  });
+}
+
+TEST(Ranks, LightmapsAndSolversAreAlike) {
+  const Place p;
+  const Lamps lamps = make_lamps(p.scene, nullptr, false);
+  struct Case {
+    const char* name;
+    Solver solver;
+    double converge;
+    DirectionalKind directional;
+  };
+  for (const Case& c : {Case{"bounces", Solver::jacobi, 0, DirectionalKind::none},
+                        Case{"jacobi", Solver::jacobi, 1e-3, DirectionalKind::none},
+                        Case{"gauss-seidel", Solver::gauss_seidel, 1e-3, DirectionalKind::none},
+                        Case{"gmres", Solver::gmres, 1e-4, DirectionalKind::none},
+                        Case{"directional", Solver::gmres, 1e-2, DirectionalKind::sh2}})
+    expect_alike(c.name, [&](Progress* progress) {
+      LightmapOptions options;
+      options.samples = 64, options.lamp_samples = 4, options.bounces = 2, options.solver = c.solver,
+      options.converge = c.converge, options.directional = c.directional;
+      LightmapReport report;
+      auto map = bake_lightmap(p.scene, p.tracer, p.receivers, lamps, options, true, &report, progress);
+      EXPECT_TRUE(map) << map.error().text();
+      if (!map) return Bytes{};
+      Bytes out = bytes(map->all);
+      append(out, bytes(*map->direct));
+      for (const SolveStep& s : report.solve.steps)
+        append(out, {reinterpret_cast<const uint8_t*>(&s.residual), sizeof s.residual});
+      return out;
+    });
+}
+
+}  // namespace
+}  // namespace lambent
