@@ -9,8 +9,8 @@
 namespace lambent {
 namespace {
 
-// What Embree takes, as scripts/bench load prints it: a triangle in a tree of high quality with its corners, a copy
-// with its transformations and its place in the tree over all copies.
+// What Embree takes: a triangle in a tree of high quality with its corners (scripts/bench load prints the tracer's
+// bytes), and, at most, a copy with its transformations and its place in the tree over all copies.
 constexpr double triangle_bytes = 85, copy_bytes = 1000;
 constexpr uint32_t least_triangles = 64;
 // Little is not worth the last bits that hits differ by.
