@@ -23,6 +23,7 @@ quietly inside apt-get update
 quietly inside apt-get install -y --no-install-recommends /tmp/lambent.deb
 echo "installed: $(inside dpkg-query -W -f '${Package} ${Version}' lambent)," \
   "$(inside dpkg-query -f '.\n' -W | wc -l) packages in all"
+rm -rf "$root/tmp/use"
 mkdir -p "$root/tmp/use"
 cp "$here/examples/relight.c" "$here/examples/bake_and_relight.cpp" "$root/tmp/use/"
 cat >"$root/tmp/use/use.sh" <<'S'
