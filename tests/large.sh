@@ -62,6 +62,8 @@ expect 2 'scratch: is no folder' bake corner.obj --samples 16 --scratch nowhere 
 
 # Rooms.
 expect 0 'joined' bake corner.obj --max-edge 0.3 --samples 64 --rooms auto -o rooms.glb
+expect 0 'joined' bake --again rooms.glb corner.obj -o again.glb
+cmp -s rooms.glb again.glb && ok || bad "--again of rooms has other bytes"
 cat >rooms.json <<'J'
 {"rooms": [{"name": "left", "min": [0, 0, 0], "max": [1, 2, 2]}, {"name": "right", "min": [1, 0, 0], "max": [2, 2, 2]}]}
 J
