@@ -43,7 +43,8 @@ absent x.gltf
 
 # Too large for a .glb: said before a ray is traced, with what to say instead.
 began=$(date +%s)
-expect 2 'a .glb holds 4 GiB: write a .gltf \(-o huge.gltf\)' bake corner.obj --transfer matrix --brdf ggx:roughness=0.3 \
+expect 2 'a .glb holds 4 GiB: write a .gltf \(-o huge.gltf\)' bake corner.obj --transfer matrix \
+  --brdf ggx:roughness=0.3 \
   --max-edge 0.006 --order 10 --incident-order 7 --precision single --samples 1000000 -o huge.glb
 [ $(($(date +%s) - began)) -lt 120 ] && ok || bad "a result that is too large was not refused before it was traced"
 
@@ -61,6 +62,8 @@ expect 2 'scratch: is no folder' bake corner.obj --samples 16 --scratch nowhere 
 
 # Rooms.
 expect 0 'joined' bake corner.obj --max-edge 0.3 --samples 64 --rooms auto -o rooms.glb
+expect 0 'joined' bake --again rooms.glb corner.obj -o again.glb
+cmp -s rooms.glb again.glb && ok || bad "--again of rooms has other bytes"
 cat >rooms.json <<'J'
 {"rooms": [{"name": "left", "min": [0, 0, 0], "max": [1, 2, 2]}, {"name": "right", "min": [1, 0, 0], "max": [2, 2, 2]}]}
 J
@@ -69,7 +72,8 @@ echo '{"rooms": [{"name": "a", "nodes": ["nobody"]}]}' >rooms.json
 expect 1 'rooms.json: room 0: there is no node "nobody"' bake corner.obj --samples 64 --rooms rooms.json -o x.glb
 echo '{"rooms": 3}' >rooms.json
 expect 1 'rooms.json: is no JSON object' bake corner.obj --samples 64 --rooms rooms.json -o x.glb
-for more in "--bounces 2" "--transfer lightmap" "--light sh:3" "--lattice 2,2,2" "--receivers patches" "--denoise on"; do
+for more in "--bounces 2" "--transfer lightmap" "--light sh:3" "--lattice 2,2,2" "--receivers patches" \
+  "--denoise on"; do
   # shellcheck disable=SC2086
   expect 2 'rooms|denoise|--' bake corner.obj --samples 64 --rooms auto $more -o x.glb
 done

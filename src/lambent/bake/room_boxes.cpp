@@ -7,7 +7,8 @@ namespace lambent {
 namespace {
 
 constexpr int cells_along = 96;
-constexpr double most_open = 1.0 / 3;
+constexpr double most_open = 1.0 / 3, most_open_of_large = 0.9;
+constexpr double large_share = 1.0 / 8;   // of all that is solid: a box that is cut though nothing closes it
 constexpr int least_cells = 4;            // of a room, along any axis that is cut
 constexpr double least_share = 1.0 / 40;  // of what is solid in a box, in each part
 constexpr float most_overlap = 1.0f / 8;  // of boxes that are asked for
@@ -50,6 +51,7 @@ struct CellBox {
 struct Cut {
   int axis = -1, at = 0;
   double open = 1;
+  size_t solid = 0;  // cells of the whole box
 };
 
 // The plane through the middle of a layer of cells with the least that is open.
@@ -66,12 +68,13 @@ Cut best_cut(Grid& grid, const CellBox& b) {
     const size_t layer = size_t(b.high[u] - b.low[u]) * size_t(b.high[v] - b.low[v]);
     size_t all = 0, before = 0;
     for (size_t s : solid) all += s;
+    best.solid = all;
     for (int i = 0; i < layers; ++i) {
       const double open = 1 - double(solid[size_t(i)]) / double(layer);
       const size_t after = all - before - solid[size_t(i)];
       const bool parts = i >= least_cells && layers - 1 - i >= least_cells &&
                          double(std::min(before, after)) >= least_share * double(all);
-      if (parts && open < best.open - 1e-9) best = {axis, b.low[axis] + i, open};
+      if (parts && open < best.open - 1e-9) best = {axis, b.low[axis] + i, open, all};
       before += solid[size_t(i)];
     }
   }
@@ -97,10 +100,16 @@ std::vector<Room> find_rooms(const Scene& scene, size_t most) {
   };
   std::vector<Part> parts{{{{0, 0, 0}, {grid.n[0], grid.n[1], grid.n[2]}}, grid.box, {}}};
   parts[0].cut = best_cut(grid, parts[0].cells);
+  const size_t solid = parts[0].cut.solid;
   while (parts.size() < most) {
-    const auto next = std::min_element(parts.begin(), parts.end(),
-                                       [](const Part& a, const Part& b) { return a.cut.open < b.cut.open; });
-    if (next->cut.axis < 0 || next->cut.open > most_open) break;
+    // The most closed cut of all, but large boxes are cut in any case.
+    const auto rank = [&](const Part& part) {
+      const bool large = double(part.cut.solid) > large_share * double(solid);
+      return part.cut.axis < 0 || part.cut.open > (large ? most_open_of_large : most_open) ? 2.0 : part.cut.open;
+    };
+    const auto next =
+        std::min_element(parts.begin(), parts.end(), [&](const Part& a, const Part& b) { return rank(a) < rank(b); });
+    if (rank(*next) > 1) break;
     const Cut cut = next->cut;
     Part other = *next;
     const float plane = grid.box.min[cut.axis] + (float(cut.at) + 0.5f) * grid.cell;

@@ -18,8 +18,9 @@ struct Room {
 // All of the scene, with a little around it.
 Bounds room_bounds(const Scene& scene);
 
-// Cuts at axis-parallel planes, the most closed ones first, down to `most` rooms (>= 1): while less than a third of the
-// cut is open, by a grid of 96 cells along the scene's longest side, and both parts hold something.
+// Cuts at axis-parallel planes, the most closed ones first, up to `most` rooms (>= 1): while less than a third of the
+// cut is open, or, of a box with over an eighth of all that there is, nine tenths; by a grid of 96 cells along the
+// scene's longest side, where both parts hold something.
 std::vector<Room> find_rooms(const Scene& scene, size_t most);
 
 // A room a box that is asked for, parted by planes between the boxes: each is grown to all of the space on its side.

@@ -270,9 +270,7 @@ struct RoomBaker {
   }
 
   // Whether row i of a room is of a receiver inside something, whose equation is another.
-  bool is_filled(size_t room, size_t i) const {
-    return i < receivers_of[room].size() && buried[receivers_of[room][i]];
-  }
+  bool is_filled(size_t room, size_t i) const { return i < receivers_of[room].size() && buried[receivers_of[room][i]]; }
 
   struct Change {
     double change = 0, all = 0;

@@ -317,6 +317,8 @@ nlohmann::json to_json(const BakeRequest& request) {
   nlohmann::json out = request_json(bake_options(), request, int(kind));
   if (request.shadows == "off") out.erase("bounces");
   if (has_no_quality(request)) out.erase("quality");
+  if (!request.rooms.empty())
+    for (const char* without : {"bounces", "denoise", "adapt", "quality", "error", "time"}) out.erase(without);
   return out;
 }
 

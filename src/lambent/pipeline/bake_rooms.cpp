@@ -96,16 +96,15 @@ Result<Transfer> bake_rooms_of_request(const BakeRequest& request, const BakeOpt
   if (!found.converged)
     job.warn(fmt::format("the rooms are not joined to {:.3g}%: {:.3g}% after {} sweeps", 100 * how.residual,
                          100 * found.residuals.back(), found.residuals.size()));
-  summary.json["rooms"] = {{"rooms", found.rooms},         {"openings", found.openings},
-                           {"nodes", found.nodes},         {"largest", found.largest},
-                           {"residuals", found.residuals}, {"lost", found.lost}};
+  summary.json["rooms"] = {{"rooms", found.rooms},     {"openings", found.openings},   {"nodes", found.nodes},
+                           {"largest", found.largest}, {"residuals", found.residuals}, {"lost", found.lost}};
   told["rooms"] = {{"rooms", found.rooms}, {"residual", found.residuals.empty() ? 0.0 : found.residuals.back()}};
-  summary.lines.emplace_back(
-      "rooms", fmt::format("{}, the largest of {} receivers; {} nodes in {} openings", found.rooms,
-                           human_count(found.largest), human_count(found.nodes), found.openings));
+  summary.lines.emplace_back("rooms",
+                             fmt::format("{}, the largest of {} receivers; {} nodes in {} openings", found.rooms,
+                                         human_count(found.largest), human_count(found.nodes), found.openings));
   if (!found.residuals.empty())
-    summary.lines.emplace_back("joined", fmt::format("to {:.2g}% in {} sweeps", 100 * found.residuals.back(),
-                                                     found.residuals.size()));
+    summary.lines.emplace_back(
+        "joined", fmt::format("to {:.2g}% in {} sweeps", 100 * found.residuals.back(), found.residuals.size()));
   return transfer;
 }
 

@@ -23,7 +23,8 @@ struct Walls {
     quad("wall", low, x, z), quad("wall", low + y, z, x);
   }
   // Along x at z to z + thickness, with a hole from x0 to x1 and y0 to y1.
-  void with_hole(float low, float high, float z, float thickness, float height, float x0, float x1, float y0, float y1) {
+  void with_hole(float low, float high, float z, float thickness, float height, float x0, float x1, float y0,
+                 float y1) {
     block(Vec3(low, 0, z), Vec3(x0, height, z + thickness));
     block(Vec3(x1, 0, z), Vec3(high, height, z + thickness));
     if (y0 > 0) block(Vec3(x0, 0, z), Vec3(x1, y0, z + thickness));
