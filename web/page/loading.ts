@@ -5,6 +5,7 @@ import {
   FloatType,
   HalfFloatType,
   LinearFilter,
+  LoaderUtils,
   LoadingManager,
   RepeatWrapping,
   RGBAFormat,
@@ -87,7 +88,7 @@ export async function fetchFile(
   return bytes.buffer;
 }
 
-/** Where the files are that a .gltf names: below a folder of the server's, or those that were opened with it. */
+/** Where the files are that a .gltf names: beside a file of the server's, by its address, or those that were opened with it. */
 export type Beside = string | readonly File[];
 
 function gltfLoader(beside: Beside, opened: string[]): GLTFLoader {
@@ -109,7 +110,7 @@ async function read(bytes: ArrayBuffer, beside: Beside, plugin: boolean): Promis
     loader = gltfLoader(beside, opened);
   if (plugin) loader.register((parser) => new LambentTransferPlugin(parser));
   try {
-    return await loader.parseAsync(bytes, typeof beside === 'string' ? beside : '');
+    return await loader.parseAsync(bytes, typeof beside === 'string' ? LoaderUtils.extractUrlBase(beside) : '');
   } finally {
     for (const url of opened) URL.revokeObjectURL(url);
   }

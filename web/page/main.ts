@@ -1,5 +1,5 @@
 // The page: controls, the wipe, files that are opened or dropped, and every message a user may see.
-import { Euler, LoaderUtils, MathUtils, Vector3 } from 'three';
+import { Euler, MathUtils, Vector3 } from 'three';
 import { LambentError, NoTransferError, shBand, shIndex, shWindows, type ShWindow } from '../src/index.js';
 import {
   fetchFile,
@@ -100,18 +100,10 @@ class Page {
       this.show();
       return;
     }
-    await this.openBaked(
-      manifest.name,
-      await this.fetch(manifest.name, manifest.baked),
-      LoaderUtils.extractUrlBase(manifest.baked),
-    );
-    if (manifest.compare)
-      await this.useModel(
-        'compare',
-        'the second file',
-        await this.fetch('the second file', manifest.compare),
-        LoaderUtils.extractUrlBase(manifest.compare),
-      );
+    const { name, baked, compare } = manifest;
+    await this.openBaked(name, await this.fetch(name, baked), baked);
+    if (compare)
+      await this.useModel('compare', 'the second file', await this.fetch('the second file', compare), compare);
     if (manifest.reference)
       viewer.setReference(mapTexture(readMap(await this.fetch('the reference', manifest.reference))));
     get('loading').hidden = true;

@@ -12,7 +12,7 @@ namespace {
 constexpr size_t fewest_of_part = 16;
 constexpr size_t piece = 4;
 
-struct SurfacePlace {
+struct ErrorPlace {
   uint32_t triangle;
   float u, v;
   bool front;
@@ -28,7 +28,7 @@ double area_of(const Scene& scene, const Triangle& t) {
 }
 
 // One place in each of `count` equal shares of the area, in the order of triangles.
-std::vector<SurfacePlace> draw_places(const Scene& scene, const Receivers& receivers, size_t count, uint32_t seed) {
+std::vector<ErrorPlace> draw_places(const Scene& scene, const Receivers& receivers, size_t count, uint32_t seed) {
   double total = 0;
   auto each_side = [&](auto f) {
     for (uint32_t t = 0; t < scene.triangles.size(); ++t)
@@ -36,7 +36,7 @@ std::vector<SurfacePlace> draw_places(const Scene& scene, const Receivers& recei
         if (receives(receivers, t, front)) f(t, front, area_of(scene, scene.triangles[t]));
   };
   each_side([&](uint32_t, bool, double area) { total += area; });
-  std::vector<SurfacePlace> places;
+  std::vector<ErrorPlace> places;
   if (!(total > 0)) return places;
   Random random(seed, 0xce47);
   double passed = 0, next = total / double(count) * double(random.next());
@@ -60,7 +60,7 @@ struct PlaceError {
 
 Result<Certificate> certify(const Scene& scene, const Receivers& receivers, const float* rows, size_t width,
                             const GatherAt& gather, size_t count, uint32_t seed, Progress* progress) {
-  const std::vector<SurfacePlace> places = draw_places(scene, receivers, count, seed);
+  const std::vector<ErrorPlace> places = draw_places(scene, receivers, count, seed);
   const float diagonal = bounds(scene).diagonal();
   std::vector<PlaceError> measured(places.size());
   const Shares shares(places.size(), piece);
@@ -68,7 +68,7 @@ Result<Certificate> certify(const Scene& scene, const Receivers& receivers, cons
   shares.for_own([&](size_t begin, size_t end) {
     AlignedVector<float> a(width), b(width), s(width);
     for (size_t i = begin; i < end && !stage.cancelled(); ++i) {
-      const SurfacePlace& at = places[i];
+      const ErrorPlace& at = places[i];
       const Triangle& t = scene.triangles[at.triangle];
       const Vec3 weight(1 - at.u - at.v, at.u, at.v);
       Vec3 p(0), n(0);

@@ -213,8 +213,6 @@ size_t KeptRows::count() const {
                               [](const Place& place) { return place.where != Place::Where::nowhere; }));
 }
 
-double KeptRows::fraction() const {
-  return places_.empty() ? 1.0 : double(count()) / double(places_.size());
-}
+double KeptRows::fraction() const { return places_.empty() ? 1.0 : double(count()) / double(places_.size()); }
 
 }  // namespace lambent

@@ -27,7 +27,7 @@ struct GatherWanted {
 
 class GatherOperator final : public LinearOperator {
  public:
-  struct Report {  // of all ranks together
+  struct Report {                                // of all ranks together
     size_t rays = 0, bytes = 0, file_bytes = 0;  // traced so far; of the rows kept, in memory and beyond it in a file
     size_t buried = 0;
     double kept = 1;     // fraction of the blocks kept; the rest is traced again at each application

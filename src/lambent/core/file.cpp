@@ -95,9 +95,9 @@ bool read_whole(int fd, uint8_t* to, size_t bytes, size_t offset) {
 
 }  // namespace
 
-Result<MappedFile> MappedFile::open_parts(std::span<const Part> parts) {
+Result<MappedFile> MappedFile::open_parts(std::span<const MappedFile::Part> parts) {
   MappedFile file;
-  for (const Part& part : parts) {
+  for (const MappedFile::Part& part : parts) {
     if (part.bytes > SIZE_MAX / 2 - file.size_) return Error{part.path, "is too large"};
     file.size_ += part.bytes;
   }
@@ -114,7 +114,7 @@ Result<MappedFile> MappedFile::open_parts(std::span<const Part> parts) {
     file.data_ = std::shared_ptr<const uint8_t>(storage, storage->data());
   }
   auto* to = const_cast<uint8_t*>(file.data_.get());
-  for (const Part& part : parts) {
+  for (const MappedFile::Part& part : parts) {
     size_t there = 0;
     auto fd = open_plain_file(part.path, there);
     if (!fd) return fd.error();

@@ -9,6 +9,8 @@
 #include <exr_maker.h>
 #include <gtest/gtest.h>
 
+#include <array>
+
 #include "temporary_folder.h"
 
 namespace lambent {

@@ -82,7 +82,8 @@ Result<void> check_file_size(const BakePlan& plan, const BakeRequest& r, const S
                              size_t groups) {
   // What is stored in another form than it is baked in is not known before.
   if (file_extension(r.output) != "glb" || !r.compress.empty() || !r.fix_view.empty() || !r.fix_light.empty() ||
-      plan.kind == BakeKind::blocks || plan.kind == BakeKind::indirect || plan.kind == BakeKind::zonal || plan.kind == BakeKind::glossy_zonal)
+      plan.kind == BakeKind::blocks || plan.kind == BakeKind::indirect || plan.kind == BakeKind::zonal ||
+      plan.kind == BakeKind::glossy_zonal)
     return {};
   const bool coloured = plan.bake.bounces > 0 && r.subsurface.empty() && has_coloured_albedo(scene);
   const size_t each = stored_bytes(plan, r, receivers, groups, coloured ? 3 : 1);
