@@ -132,7 +132,7 @@ function glb(json: unknown): ArrayBuffer {
 }
 
 /** Plain .gltf. */
-const gltf = (json: unknown): ArrayBuffer => new TextEncoder().encode(JSON.stringify(json)).buffer as ArrayBuffer;
+const gltf = (json: unknown): ArrayBuffer => new TextEncoder().encode(JSON.stringify(json)).buffer;
 
 describe('a .gltf with its data in several files', () => {
   const document = (bufferView: unknown, ...more: object[]): object => ({
@@ -150,7 +150,7 @@ describe('a .gltf with its data in several files', () => {
         parts: [{ node: 0, primitive: 0, front: [1, 2] }],
       },
     },
-    ...Object.assign({}, ...more),
+    ...(Object.assign({}, ...more) as object),
   });
 
   it('is checked as a .glb is', () => {
@@ -158,7 +158,7 @@ describe('a .gltf with its data in several files', () => {
     expect(() => checkBakedFile(gltf(document([0, 3])))).toThrow(/rewritten/);
     expect(() => checkBakedFile(gltf(document([0, 2], { images: [{ bufferView: 2 }] })))).toThrow(/rewritten/);
     expect(() => checkBakedFile(gltf({ asset: {} }))).toThrow(/not a baked file/);
-    expect(() => checkBakedFile(new TextEncoder().encode('{"asset": ').buffer as ArrayBuffer)).toThrow(/JSON/);
+    expect(() => checkBakedFile(new TextEncoder().encode('{"asset": ').buffer)).toThrow(/JSON/);
   });
 
   it('has each of its views carried', () => {
