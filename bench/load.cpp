@@ -99,11 +99,11 @@ bool save_forest(const std::string& path, size_t copies) {
     return GltfBlob{{reinterpret_cast<const uint8_t*>(v.data()), v.size() * sizeof(Vec3)}};
   };
   const GltfBlob blobs[] = {bytes(places), bytes(scales)};
-  return bool(save_glb(path, tree, blobs, [&](nlohmann::json& document, const GltfPlaces& at) {
+  return bool(save_gltf(path, tree, blobs, [&](nlohmann::json& document, const GltfPlaces& at) {
     const size_t first = document["accessors"].size();
-    for (int i = 0; i < 2; ++i)
+    for (size_t i = 0; i < 2; ++i)
       document["accessors"].push_back(
-          {{"bufferView", at.first_view + i}, {"componentType", 5126}, {"count", copies}, {"type", "VEC3"}});
+          {{"bufferView", at.views[i].front()}, {"componentType", 5126}, {"count", copies}, {"type", "VEC3"}});
     document["nodes"][0]["extensions"]["EXT_mesh_gpu_instancing"]["attributes"] = {{"TRANSLATION", first},
                                                                                    {"SCALE", first + 1}};
     document["extensionsUsed"] = nlohmann::json::array({"EXT_mesh_gpu_instancing"});

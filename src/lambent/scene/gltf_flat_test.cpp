@@ -138,7 +138,7 @@ TEST(FlatGltf, StandsBesideOthers) {
   EXPECT_EQ(s.input_count, s.positions.size());
   EXPECT_EQ(s.texcoords[0].size(), s.positions.size());
   TemporaryFolder folder;
-  ASSERT_TRUE(save_glb(folder.file("a.glb"), s, {}, [](Json&, const GltfPlaces&) {}));
+  ASSERT_TRUE(save_gltf(folder.file("a.glb"), s, {}, {}));
   auto back = load_scene(folder.file("a.glb"));
   ASSERT_TRUE(back);
   EXPECT_EQ(back->positions, s.positions);
