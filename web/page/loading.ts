@@ -88,7 +88,7 @@ export async function fetchFile(
   return bytes.buffer;
 }
 
-/** Where the files are that a .gltf names: beside a file of the server's, by its address, or those that were opened with it. */
+/** Where the files are that a .gltf names: beside a file of the server's, by its address, or opened with it. */
 export type Beside = string | readonly File[];
 
 function gltfLoader(beside: Beside, opened: string[]): GLTFLoader {

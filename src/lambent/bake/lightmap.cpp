@@ -160,12 +160,11 @@ Result<Lightmap> bake_lightmap(const Scene& scene, const Tracer& tracer, const R
   r.trace_seconds = op->report().seconds;
 
   const auto start = std::chrono::steady_clock::now();
-  const bool directional = o.directional != DirectionalKind::none;
   // A directional lightmap's last bounce is gathered with its directions.
   auto x = solution(*op, e, width, o, r.solve, progress);
   if (!x) return x.error();
   const size_t rows = size_t(directional_rows(o.directional));
-  if (directional) {
+  if (o.directional != DirectionalKind::none) {
     auto wide = directional_rows_of(setup, lamps, o, bounces ? x->data() : nullptr, width, progress);
     if (!wide) return wide.error();
     *x = std::move(*wide);

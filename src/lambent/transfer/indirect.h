@@ -21,8 +21,10 @@ namespace lambent {
 
 // Surfels that a receiver reads, at most.
 inline constexpr size_t kernel_slots = 8;
-// Limits of a hierarchy.
-inline constexpr size_t max_surfels = size_t{1} << 22, max_surfel_levels = 16;
+// Limits of a hierarchy: surfels in all,
+inline constexpr size_t max_surfels = size_t{1} << 22;
+// and levels.
+inline constexpr size_t max_surfel_levels = 16;
 
 // Points on surfaces, level by level: level l is the first counts[l] of them, no two that could stand for one another
 // nearer than spacings[l]; the last level has them all, the leaves.
