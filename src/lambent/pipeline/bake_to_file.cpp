@@ -77,14 +77,15 @@ Result<Summary> bake_to_file(const BakeRequest& asked, const Job& job) {
   DurableBake durable(*request, job);
   auto outcome = bake_with_summary(asked, durable.job());
   if (!outcome) return durable.explained(outcome.error());
-  const auto start = Clock::now();
+  const auto start = std::chrono::steady_clock::now();
   const WriteTogether together(ranks);
   Summary& summary = outcome->summary;
   auto pictures = write_outputs(request->output, *outcome, request->bin_limit, &*request, &durable);
   if (!pictures) return durable.explained(pictures.error());
   if (!pictures->empty()) summary.json["pictures"] = *pictures;
   durable.finish();
-  summary.json["output"] = request->output, summary.json["seconds"]["save"] = seconds_since(start);
+  summary.json["output"] = request->output;
+  summary.json["seconds"]["save"] = std::chrono::duration<double>(std::chrono::steady_clock::now() - start).count();
   if (const size_t taken = durable.taken()) {
     summary.json["resumed"] = taken;
     summary.lines.emplace_back("resumed", fmt::format("{} pieces of work were there already", human_count(taken)));
