@@ -64,8 +64,10 @@ set(lambent_relight_sources
   src/lambent/transfer/visibility.cpp
   src/lambent/transfer/zonal_transfer.cpp
 )
-# One direction and many give the same bits, on every instruction set: no fused multiply-adds of the compiler's own.
-set_source_files_properties(src/lambent/basis/sh_evaluate.cpp PROPERTIES COMPILE_OPTIONS -ffp-contract=off)
+# One direction and many give the same bits, on every instruction set: no fused multiply-adds of the compiler's own. A
+# precompiled header would bring back those that it was compiled with, within "#pragma GCC target".
+set_source_files_properties(src/lambent/basis/sh_evaluate.cpp PROPERTIES COMPILE_OPTIONS -ffp-contract=off
+  SKIP_PRECOMPILE_HEADERS ON)
 add_library(lambent_relight STATIC ${lambent_relight_sources})
 add_library(lambent::relight ALIAS lambent_relight)
 set_target_properties(lambent_relight PROPERTIES EXPORT_NAME relight)

@@ -29,7 +29,7 @@ expect 2 'surfels: does not go with diffuse transfer' bake corner.obj --surfels 
 expect 2 'order: does not go with direct to indirect light' bake corner.obj --transfer indirect --order 3 -o x.glb
 expect 0 'paths a pixel' reference corner.obj --lamp point@0.4,0.6,0.5=3 --no-direct --spp 4 --size 16x16 \
   -o moved_truth.exr
-expect 2 'lamp: expects sphere@' reference corner.obj --lamp point@0.4,0.6=3 --spp 4 --size 16x16 -o x.exr
+expect 2 'lamp: expects 3 numbers' reference corner.obj --lamp point@0.4,0.6=3 --spp 4 --size 16x16 -o x.exr
 absent x.glb
 absent x.png
 finish

@@ -60,7 +60,7 @@ v 0 0 2
 f 4 3 2 1
 O
 printf 'newmtl red\nKd 0.8 0.1 0.1\n' >coloured.mtl
-expect 2 'at least .* for .* receivers, and a baked file holds 4 GiB' bake coloured.obj --max-edge 0.004 --order 16 \
+expect 2 'at least .* for .* receivers, and a .glb holds 4 GiB' bake coloured.obj --max-edge 0.004 --order 16 \
   --terms --precision single --memory 100GB -o x4.glb
 absent x4.glb
 

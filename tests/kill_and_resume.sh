@@ -59,7 +59,7 @@ glossy="--order 4 --incident-order 3 --view-map 16"
 declare -A kinds=(
   [diffuse]="--max-edge 0.08 --samples 512 --bounces 4"
   [direct]="--max-edge 0.08 --samples 512 --bounces 0"
-  [again]="--max-edge 0.1 --samples 512 --bounces 3 --memory 20MB"
+  [again]="--max-edge 0.1 --samples 512 --bounces 3 --memory 22MB --scratch off"
   [terms]="--max-edge 0.1 --samples 512 --terms"
   [lobes]="--max-edge 0.1 --samples 256 --light sh:4+lamps:2@sky:elevation=40"
   [texels]="--receivers texels --atlas 96x96 --samples 512 --bounces 2"

@@ -77,7 +77,7 @@ glossy="--order 3 --incident-order 3 --view-map 16 --brdf ggx:roughness=0.4"
 declare -A kinds=(
   [default]="--order 4 --max-edge 0.3 --error 10%"
   [diffuse]="--max-edge 0.07 --samples 64 --bounces 2"
-  [again]="--max-edge 0.09 --samples 64 --bounces 2 --memory 10MB"
+  [again]="--max-edge 0.09 --samples 64 --bounces 2 --memory 12MB --scratch off"
   [terms]="--max-edge 0.1 --samples 64 --terms --light sh:3+lamps:2@sky:elevation=40"
   [texels]="--receivers texels --atlas 64x64 --samples 64 --bounces 2"
   [lattice]="--max-edge 0.15 --samples 64 --lattice 6,6,6 --compress cpca:8,2"

@@ -3,8 +3,10 @@
 #include <lambent/bake/gather.h>
 #include <lambent/bake/kernels.h>
 #include <lambent/bake/shared_exponent.h>
+#include <lambent/core/random.h>
 
 #include <algorithm>
+#include <array>
 #include <bit>
 #include <vector>
 
@@ -62,7 +64,9 @@ class BlockBuilder {
         out.rows[at] = uint8_t(row);
         const Vec3 weight = entries_[i].weight * unit;
         if (channels == 1) floats_[at] = weight.x;
-        else round_shared(&weight.x, &floats_[3 * at]);
+        else
+          round_shared(&weight.x, dither(out.columns[counts_[entries_[i].local]], uint32_t(row)).data(),
+                       &floats_[3 * at]);
       }
     out.weights.resize(floats_.size());
     floats_to_halves(floats_.data(), floats_.size(), out.weights.data());
@@ -81,6 +85,12 @@ class BlockBuilder {
     Vec3 weight;
   };
   static constexpr uint32_t most_blocks = UINT32_MAX / uint32_t(gather_block);
+
+  // Even over rows and columns; by no more than these, so that the work's order makes no difference.
+  static std::array<float, 3> dither(uint32_t column, uint32_t row) {
+    const uint64_t h = hash64(column, row);
+    return {float(h & 0xffff) * 0x1p-16f, float(h >> 16 & 0xffff) * 0x1p-16f, float(h >> 32 & 0xffff) * 0x1p-16f};
+  }
 
   size_t start(uint32_t column) const {
     return size_t(column * 0x9e3779b1u) >> (32 - std::countr_zero(places_.size()));  // Knuth, TAOCP 3, section 6.4

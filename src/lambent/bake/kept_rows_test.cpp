@@ -21,8 +21,9 @@ SparseBlock random_block(uint64_t seed, int channels, uint32_t receivers) {
       if (random.next() < 0.7f) continue;
       b.rows.push_back(uint8_t(row));
       float w[3], rounded[3];
+      const float dither[3] = {0.5f, 0.1f, 0.9f};
       for (float& x : w) x = std::exp(18 * random.next() - 12);
-      round_shared(w, rounded);
+      round_shared(w, dither, rounded);
       for (int c = 0; c < channels; ++c) b.weights.push_back(float_to_half(channels == 3 ? rounded[c] : w[c]));
     }
     if (b.rows.size() > before) b.columns.push_back(column), b.ends.push_back(uint32_t(b.rows.size()));
@@ -30,21 +31,44 @@ SparseBlock random_block(uint64_t seed, int channels, uint32_t receivers) {
   return b;
 }
 
-TEST(SharedExponent, RoundsToTheNearestAndStaysAHalf) {
+TEST(SharedExponent, RoundsToANeighbourAndStaysAHalf) {
   Random random(3);
   for (int i = 0; i < 20000; ++i) {
-    float w[3], r[3], back[3];
+    float w[3], r[3], back[3], dither[3];
     for (float& x : w) x = random.next() < 0.1f ? 0.0f : std::exp(24 * random.next() - 13);
     for (float& x : w) x = std::min(x, 65000.0f);
-    round_shared(w, r);
+    for (float& d : dither) d = random.next();
+    round_shared(w, dither, r);
     const float most = std::max({w[0], w[1], w[2]});
     for (int c = 0; c < 3; ++c) {
-      EXPECT_LE(std::abs(r[c] - w[c]), std::max(most / 512, 0x1p-25f)) << w[c];
+      EXPECT_LE(std::abs(r[c] - w[c]), std::max(most / 255, 0x1p-24f)) << w[c];
       EXPECT_EQ(half_to_float(float_to_half(r[c])), r[c]);
     }
     unpack_shared(pack_shared(r), back);
     for (int c = 0; c < 3; ++c) EXPECT_EQ(back[c], r[c]) << w[0] << " " << w[1] << " " << w[2];
   }
+  // Weights of an interpolation that its rounding has taken below 0.
+  for (const float below : {-1e-9f, -0.01f}) {
+    const float w[3] = {below, below, 2 * below}, dither[3] = {0, 0.5f, 0.999f};
+    float r[3];
+    round_shared(w, dither, r);
+    for (float value : r) EXPECT_EQ(value, 0);
+  }
+}
+
+TEST(SharedExponent, IsRightInTheMean) {
+  Random random(4);
+  const float w[3] = {0.9f, 0.1234f, 0.0107f};
+  double sums[3] = {};
+  constexpr int count = 20000;
+  for (int i = 0; i < count; ++i) {
+    float r[3];
+    const float dither[3] = {random.next(), random.next(), random.next()};
+    round_shared(w, dither, r);
+    for (int c = 0; c < 3; ++c) sums[c] += double(r[c]) / count;
+  }
+  // A step is 1/512, so that the mean of so many is off by 1/512 / 2 / sqrt(20000) at most, here four times that.
+  for (int c = 0; c < 3; ++c) EXPECT_NEAR(sums[c], double(w[c]), 4 * 7e-6) << c;
 }
 
 TEST(KeptRows, PackedBlocksComeBackAndBrokenOnesAreTold) {

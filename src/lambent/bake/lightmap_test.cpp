@@ -402,7 +402,7 @@ TEST(Lightmap, TheSameBytesWhateverTheThreadsAndTheMemory) {
   EXPECT_EQ(bytes_with(2, size_t{4} << 30, &kept), expected);
   Scene scene = corner(true);
   const size_t least = least_lightmap_memory(place(scene, Where::texels, 10).count(), 3, {});
-  EXPECT_EQ(bytes_with(2, least + 200000, &kept), expected);
+  EXPECT_EQ(bytes_with(2, least + 30000, &kept), expected);
   EXPECT_LT(kept, 0.9);
   auto tracer = Tracer::build(scene);
   const Lamps lamps = make_lamps(scene, nullptr, false);

@@ -15,17 +15,18 @@ inline float power_of_two(int e) { return std::bit_cast<float>(uint32_t(e + 127)
 
 // Greatest e of the three: values below 2^e, no less than 2^least_exponent.
 inline int shared_exponent(const float* c) {
-  const float most = std::max({c[0], c[1], c[2]});
+  const float most = std::max({c[0], c[1], c[2], 0.0f});
   return std::max(int(std::bit_cast<uint32_t>(most) >> 23) - 126, least_exponent);
 }
 
-// The nearest three that can be packed; of numbers from 0 to 65,408.
-inline void round_shared(const float* from, float* to) {
+// Three that can be packed, next above or below; of numbers to 65,000. `dither`, each in [0, 1), decides which: where
+// it is even, the mean is the number itself, while rounding to the nearest would make all weights of a surface of one
+// colour wrong alike. Below 0 they are 0: an interpolation's weight may be, by its rounding.
+inline void round_shared(const float* from, const float* dither, float* to) {
   int e = shared_exponent(from);
-  const float most = std::max({from[0], from[1], from[2]});
-  if (std::nearbyint(most * power_of_two(shared_bits - e)) >= float(1 << shared_bits)) ++e;
+  if (std::max({from[0], from[1], from[2], 0.0f}) * power_of_two(shared_bits - e) >= float((1 << shared_bits) - 1)) ++e;
   const float up = power_of_two(shared_bits - e), down = power_of_two(e - shared_bits);
-  for (int c = 0; c < 3; ++c) to[c] = std::nearbyint(from[c] * up) * down;
+  for (int c = 0; c < 3; ++c) to[c] = std::floor(std::max(from[c], 0.0f) * up + dither[c]) * down;
 }
 
 inline uint32_t pack_shared(const float* c) {

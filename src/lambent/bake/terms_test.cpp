@@ -57,7 +57,7 @@ TEST(Terms, AddUpToTheBakeAndToEveryBakeOfFewerBounces) {
   for (size_t memory : {size_t{1} << 30, size_t{0}}) {
     // Denoised, each bake would have weights of its own.
     BakeOptions options{.order = 3, .samples = 128, .bounces = 3, .precision = Precision::single, .denoise = false};
-    options.memory = memory ? memory : least_memory(receivers.count(), true, options) + 200'000;
+    options.memory = memory ? memory : least_memory(receivers.count(), true, options) + 30'000;
     auto plain = bake(scene, *tracer, receivers, options);
     options.keep_terms = true;
     BakeReport report;
