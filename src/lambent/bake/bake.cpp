@@ -6,6 +6,7 @@
 #include <lambent/bake/lobes.h>
 #include <lambent/bake/operator.h>
 #include <lambent/bake/solve.h>
+#include <lambent/bake/thin.h>
 #include <lambent/core/checkpoint.h>
 #include <lambent/core/parallel.h>
 #include <lambent/core/pool.h>
@@ -25,6 +26,9 @@ double seconds_since(std::chrono::steady_clock::time_point start) {
 
 // Some 4 % of the error, where it is spread as in our scenes.
 constexpr size_t certified_places = 1024;
+constexpr int most_certified_samples = 512;
+
+constexpr double noise_slope = 0.75;  // denoised noise falls as rays to about this power
 
 constexpr double least_noise_left = 0.2;  // 1 / sqrt of denoise()'s neighbours
 
@@ -33,7 +37,7 @@ size_t row_width(size_t coefficients, int channels) { return pad_lanes(coefficie
 // Solution vectors: T0, X, the next X and that denoised, with its neighbours; copies of rows without their lobes; the
 // terms, and one of them before it was denoised.
 size_t solution_bytes(size_t receivers, size_t coefficients, int channels, int sky_channels, const BakeOptions& o) {
-  const size_t width = row_width(coefficients, channels), terms = o.keep_terms && o.denoise ? size_t(o.bounces) + 1 : 0;
+  const size_t width = row_width(coefficients, channels), terms = o.keep_terms ? size_t(o.bounces) + 1 : 0;
   const size_t denoised = o.denoise ? width + (o.lobes.empty() ? 0 : (2 + terms) * width) + (terms ? width : 0) : 0;
   return receivers * (4 * (coefficients * size_t(sky_channels) + (o.bounces > 0 ? 2 : 1) * width + width / check_every +
                            terms * width + denoised) +
@@ -47,13 +51,21 @@ size_t table_bytes(size_t receivers, size_t triangles, size_t coefficients, size
          size_t(thread_count()) * (48 * receivers + 48 * entries + 100 * samples);
 }
 
+// Where rows are received and where they are wanted.
+struct Placed {
+  const Receivers& all;
+  const Thinned& thinned;
+  const Receivers& traced;  // those that `thinned` has chosen
+};
+
 struct Baker {
   const Scene& scene;
-  const Receivers& receivers;
+  const Placed& placed;
   const BakeOptions& options;
   const GatherSetup setup;
   Progress* progress;
   BakeReport& report;
+  const Receivers& receivers = placed.traced;
   const LobeSets lobes = make_lobe_sets(options.lobe_kind, options.lobes, options.samples, options.seed);
   Pool<LobeRays> lobe_rays{[this] { return std::make_unique<LobeRays>(make_lobe_rays(lobes, setup.sky_channels)); }};
   Pool<GatherScratch, DeleteScratch> scratch{[this] { return make_gather_scratch(setup); }};
@@ -106,8 +118,9 @@ struct Baker {
       for (size_t c = 0; c < n; ++c) x[k * n + c] = t[setup.sky_channel(c) * C + k];
     std::fill(x + C * n, x + width(), 0.0f);
   }
-  Transfer store(const float* x) const {
-    return store_columns(options.light(), x, 1, channels(), n(), width(), options.precision);
+  Transfer store(const float* x, const Spread& spread) const {
+    if (placed.thinned.all()) return store_columns(options.light(), x, 1, channels(), n(), width(), options.precision);
+    return store_spread(options.light(), x, spread, channels(), placed.all.count(), width(), options.precision);
   }
 
   Result<Transfer> direct() {
@@ -170,8 +183,7 @@ struct Baker {
     std::vector<AlignedVector<float>> terms;
     if (options.keep_terms) {
       auto ok = bounce_terms(*B, source, width(), options.bounces, progress, [&](int, const auto& x) -> Result<void> {
-        if (options.denoise) terms.push_back(x);
-        else report.terms.push_back(store(x.data()));
+        terms.push_back(x);
         return {};
       });
       if (!ok) return ok.error();
@@ -210,20 +222,29 @@ struct Baker {
     };
     if (measures)
       if (auto ok = measure_noise(solved.x, buried, terms, gather); !ok) return ok.error();
+    const Spread spread(placed.all, placed.thinned, buried);
     if (options.certify) {
       const auto start = std::chrono::steady_clock::now();
-      auto certificate = certify(scene, receivers, solved.x.data(), width(), gather, certified_places, seed, progress);
+      if (options.samples > most_certified_samples)  // the scratch of more rays is not lent again
+        others.clear(), other.emplace(make_gather_setup(scene, setup.tracer, receivers, options.order,
+                                                        most_certified_samples, seed, square_to_cosine_hemisphere,
+                                                        progress));
+      const FieldRow field = [&](uint32_t r, float* row) { spread.row(r, solved.x.data(), width(), row); };
+      auto certificate = certify(scene, placed.all, field, width(), gather, certified_places, seed, progress);
       if (!certificate) return certificate.error();
-      report.certificate = std::move(*certificate), report.error = report.certificate.error;
+      Certificate& c = report.certificate = std::move(*certificate);
+      report.error = c.error;
+      if (c.noise >= 0)
+        c.noise *= std::pow(double(other->sets.samples) / double(options.samples), noise_slope);
       // As much less by denoising as at the receivers, but no less than a mean of neighbours can have.
-      report.noise = report.certificate.noise;
+      report.noise = c.noise;
       if (options.denoise && report.noise_of_rays > 0)
         report.noise *= std::max(report.denoised / report.noise_of_rays, least_noise_left);
       report.noise = std::min(report.noise, report.error);
       report.certify_seconds = seconds_since(start);
     }
-    Transfer result = store(solved.x.data());
-    for (AlignedVector<float>& term : terms) report.terms.push_back(store(term.data())), term = {};
+    Transfer result = store(solved.x.data(), spread);
+    for (AlignedVector<float>& term : terms) report.terms.push_back(store(term.data(), spread)), term = {};
     return result;
   }
 
@@ -337,50 +358,94 @@ size_t least_memory(size_t receivers, bool coloured, const BakeOptions& options)
 
 namespace {
 
-Result<Transfer> bake_with_samples(const Scene& scene, const Tracer& tracer, const Receivers& receivers,
+Result<Transfer> bake_with_samples(const Scene& scene, const Tracer& tracer, const Placed& placed,
                                    const BakeOptions& options, BakeReport& r, Progress* progress) {
   Baker baker{scene,
-              receivers,
+              placed,
               options,
-              make_gather_setup(scene, tracer, receivers, options.order, options.shadows ? options.samples : 1,
+              make_gather_setup(scene, tracer, placed.traced, options.order, options.shadows ? options.samples : 1,
                                 options.seed, square_to_cosine_hemisphere, progress),
               progress,
               r};
-  const size_t least = least_memory(receivers.count(), baker.setup.channels == 3, options);
+  const size_t least = least_memory(placed.traced.count(), baker.setup.channels == 3, options);
   if (options.memory < least)
     return Error{scene.path, "baking needs at least " + std::to_string(least) +
                                  " bytes of working memory, and was allowed " + std::to_string(options.memory)};
   auto result = !options.shadows ? baker.unshadowed() : options.bounces > 0 ? baker.bounced() : baker.direct();
   if (!result) return result;
   if (options.keep_terms && r.terms.empty()) r.terms = {*result};
-  r.receivers = receivers.count(), r.bytes = result->bytes(), r.samples = options.samples;
+  r.receivers = placed.all.count(), r.bytes = result->bytes(), r.samples = options.samples;
+  r.traced = options.shadows ? placed.traced.count() : 0;
   return result;
+}
+
+// The receivers that are worth tracing, by direct transfer in a few bands. Lobes have shadows that those do not tell
+// of.
+Result<Thinned> thin_receivers(const Scene& scene, const Tracer& tracer, const Receivers& receivers,
+                               const BakeOptions& options, BakeReport& r, Progress* progress) {
+  constexpr int most_order = 4, samples = 64;
+  constexpr double part = 0.35;  // of the error; squares add up
+  if (!options.thin || !options.lobes.empty() || options.order < 2) return keep_all(receivers.count());
+  const auto start = std::chrono::steady_clock::now();
+  const int order = std::min(options.order, most_order);
+  const size_t width = size_t(sh_count(order));
+  const PilotRows pilot = [&](std::span<const uint32_t> which, uint32_t pass, float* rows,
+                              uint8_t* inside) -> Result<void> {
+    Receivers at;
+    at.basis = receivers.basis;
+    for (uint32_t i : which) at.origins.push_back(receivers.origins[i]), at.normals.push_back(receivers.normals[i]);
+    const GatherSetup setup = make_gather_setup(scene, tracer, at, order, samples,
+                                                uint32_t(hash64(options.seed, 0x7468 + pass)));
+    Pool<GatherScratch, DeleteScratch> scratch([&] { return make_gather_scratch(setup); });
+    ProgressStage stage(progress, "looking where light changes", which.size());
+    parallel_for(which.size(), gather_block, [&](size_t begin, size_t end) {
+      if (stage.cancelled()) return;
+      std::vector<float> sky((end - begin) * setup.sky_width());
+      trace_sky(setup, *scratch.borrow(), begin, end - begin,
+                {sky.data(), nullptr, setup.sky_width(), nullptr, inside + begin});
+      for (size_t i = begin; i < end; ++i)  // of coloured glass, the first channel
+        std::copy_n(sky.data() + (i - begin) * setup.sky_width(), width, rows + i * width);
+      stage.advance(end - begin);
+    });
+    if (stage.cancelled()) return Error{"", "cancelled"};
+    return {};
+  };
+  auto thinned = thin(scene, receivers, width, pilot, {.error = part * options.error}, progress);
+  if (!thinned) return thinned;
+  r.rays = thinned->tried * size_t(samples), r.thin_seconds = seconds_since(start);
+  r.spread_error = thinned->all() ? -1 : thinned->error;
+  return thinned;
 }
 
 // Rounds, each from the start: one with few rays tells how many it takes.
 Result<Transfer> bake_to_error(const Scene& scene, const Tracer& tracer, const Receivers& receivers,
                                const BakeOptions& asked, BakeReport& r, Progress* progress) {
   constexpr int first = 128, most = 1 << 16;
-  constexpr double slope = 0.75;  // denoised noise falls as rays to about this power
   const auto start = std::chrono::steady_clock::now();
   BakeOptions options = asked;
   options.certify = true, options.samples = first;
-  size_t rays = 0;
+  auto thinned = thin_receivers(scene, tracer, receivers, asked, r, progress);
+  if (!thinned) return thinned.error();
+  const Receivers traced_ones = thinned->all() ? Receivers() : thinned_receivers(receivers, *thinned);
+  const Placed placed{receivers, *thinned, thinned->all() ? receivers : traced_ones};
+  const double thin_seconds = r.thin_seconds, spread_error = r.spread_error;
+  size_t rays = r.rays;
   double traced = 0, bounced = 0;
   for (;;) {
     const auto round = std::chrono::steady_clock::now();
     r = {};
-    auto transfer = bake_with_samples(scene, tracer, receivers, options, r, progress);
+    auto transfer = bake_with_samples(scene, tracer, placed, options, r, progress);
     if (!transfer) return transfer;
+    r.thin_seconds = thin_seconds, r.spread_error = spread_error;
     rays += r.rays, traced += r.trace_seconds, bounced += r.bounce_seconds;
     r.rays = rays, r.trace_seconds = traced, r.bounce_seconds = bounced;
     const double target = options.error, error = r.certificate.error, noise = r.noise,
                  between = std::sqrt(std::max(0.0, error * error - noise * noise));
     // Where little is lost between receivers, noise may take the rest. Else more rays would hardly be seen beside
     // that; but noise is, in the shade of a sun.
-    const double wanted = between < 0.5 * target ? 0.9 * std::sqrt(target * target - between * between)
-                                                 : std::clamp(0.2 * error, 0.3 * target, 0.6 * target);
-    const double ratio = std::clamp(std::pow(noise / wanted, 1 / slope), 1.5, 16.0);
+    const double wanted = between < target ? std::max(0.9 * std::sqrt(target * target - between * between), 0.3 * target)
+                                           : std::clamp(0.2 * error, 0.3 * target, 0.6 * target);
+    const double ratio = std::clamp(std::pow(noise / wanted, 1 / noise_slope), 1.5, 16.0);
     const bool late = options.seconds >= 0 && seconds_since(start) + seconds_since(round) * ratio > options.seconds;
     if (!(noise > wanted && error > target) || options.samples == most || late) return transfer;
     options.samples = std::min(most, int(std::lround(double(options.samples) * ratio / 64)) * 64);
@@ -396,8 +461,9 @@ Result<Transfer> bake(const Scene& scene, const Tracer& tracer, const Receivers&
   BakeReport unwanted;
   BakeReport& r = report ? *report : unwanted;
   r = {};
-  return options.error > 0 && options.shadows ? bake_to_error(scene, tracer, receivers, options, r, progress)
-                                              : bake_with_samples(scene, tracer, receivers, options, r, progress);
+  if (options.error > 0 && options.shadows) return bake_to_error(scene, tracer, receivers, options, r, progress);
+  const Thinned all = keep_all(receivers.count());
+  return bake_with_samples(scene, tracer, {receivers, all, receivers}, options, r, progress);
 }
 
 }  // namespace lambent

@@ -31,6 +31,7 @@ struct BakeOptions {
   double error = 0, seconds = -1;
   bool denoise = true;  // takes away noise that neighbours do not share (denoise.h)
   bool certify = true;  // measures the result's error (certify.h)
+  bool thin = true;     // with `error`: receivers denser than light varies stand for one another (thin.h)
 
   LightBasis light() const { return {order, lobe_kind, lobes, {}}; }
 };
@@ -42,12 +43,14 @@ Result<void> check_light_basis(const BakeOptions& options, int least_order);
 struct BakeReport {
   size_t receivers = 0, buried = 0;  // buried: inside something, filled from their neighbours
   size_t rays = 0;                   // traced in all
+  size_t traced = 0;                 // receivers that sent rays of the result; the others are fitted to them (thin.h)
   int samples = 0;                   // rays a receiver of the result
   size_t bytes = 0;                  // of the transfer
   size_t operator_bytes = 0;         // of the hit rows kept
   double operator_kept = 1;   // fraction of the hit rows kept in memory; the rest was traced again for each bounce
   size_t working_memory = 0;  // bytes, what the stages below allocated at their peak
   double trace_seconds = 0, bounce_seconds = 0, denoise_seconds = 0, certify_seconds = 0;
+  double thin_seconds = 0, spread_error = -1;  // of choosing them; relative RMS that the fit loses, where there is one
   // Relative RMS error of the result. Of diffuse transfer the certificate's; of other kinds of the transfer vectors at
   // the receivers, estimated from half-sample gathers at one in 16, which overestimates a little. Negative: not known.
   double error = -1;

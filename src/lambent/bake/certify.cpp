@@ -58,14 +58,14 @@ struct PlaceError {
 
 }  // namespace
 
-Result<Certificate> certify(const Scene& scene, const Receivers& receivers, const float* rows, size_t width,
+Result<Certificate> certify(const Scene& scene, const Receivers& receivers, const FieldRow& field, size_t width,
                             const GatherAt& gather, size_t count, uint32_t seed, Progress* progress) {
   const std::vector<SurfacePlace> places = draw_places(scene, receivers, count, seed);
   const float diagonal = bounds(scene).diagonal();
   std::vector<PlaceError> measured(places.size());
   ProgressStage stage(progress, "measuring the error", places.size());
   parallel_for(places.size(), piece, [&](size_t begin, size_t end) {
-    AlignedVector<float> a(width), b(width), s(width);
+    AlignedVector<float> a(width), b(width), s(width), row(width);
     for (size_t i = begin; i < end && !stage.cancelled(); ++i) {
       const SurfacePlace& at = places[i];
       const Triangle& t = scene.triangles[at.triangle];
@@ -84,7 +84,8 @@ Result<Certificate> certify(const Scene& scene, const Receivers& receivers, cons
       std::visit(
           [&](const auto& basis) {
             basis.spread(*basis.find(at.triangle, at.front), at.u, at.v, [&](uint32_t receiver, float w) {
-              for (size_t k = 0; k < width; ++k) s[k] += w * rows[size_t(receiver) * width + k];
+              field(receiver, row.data());
+              for (size_t k = 0; k < width; ++k) s[k] += w * row[k];
             });
           },
           receivers.basis);

@@ -14,6 +14,9 @@ namespace lambent {
 // From any thread.
 using GatherAt = std::function<bool(Vec3 origin, Vec3 normal, uint64_t key, float* row)>;
 
+// The field's row at one of its receivers. From any thread.
+using FieldRow = std::function<void(uint32_t receiver, float* row)>;
+
 // What was measured.
 struct Certificate {
   // Relative RMS error of the field over all surfaces, by area: sqrt(mean |field - truth|^2 / mean |truth|^2). Noise
@@ -26,10 +29,10 @@ struct Certificate {
   size_t places = 0;  // that it was measured at
 };
 
-// `rows`: [receiver][width], the field's. Places are drawn evenly by area over all sides that receive, two gathers at
+// `field`: its rows, `width` floats each. Places are drawn evenly by area over all sides that receive, two gathers at
 // each: with independent gathers a and b of a truth t, the mean of (a - s) . (b - s) is |s - t|^2, whatever their
 // noise. Errors: cancelled.
-Result<Certificate> certify(const Scene& scene, const Receivers& receivers, const float* rows, size_t width,
+Result<Certificate> certify(const Scene& scene, const Receivers& receivers, const FieldRow& field, size_t width,
                             const GatherAt& gather, size_t places, uint32_t seed, Progress* progress = nullptr);
 
 }  // namespace lambent

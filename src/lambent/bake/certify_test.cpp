@@ -13,6 +13,10 @@
 namespace lambent {
 namespace {
 
+FieldRow field_of(const std::vector<float>& rows, size_t width) {
+  return [&rows, width](uint32_t r, float* row) { std::copy_n(rows.data() + size_t(r) * width, width, row); };
+}
+
 TEST(Certificate, OfAParabolaBetweenReceiversIsTheClosedForm) {
   // x^2 over the unit square in cells of h: piecewise linear interpolation loses x (h - x) within each, RMS h^2 /
   // sqrt(30); the RMS of x^2 is 1 / sqrt(5).
@@ -32,7 +36,7 @@ TEST(Certificate, OfAParabolaBetweenReceiversIsTheClosedForm) {
     row[0] += truth(origin);
     return true;
   };
-  auto certificate = certify(scene, receivers, rows.data(), width, noisy, 4000, 1);
+  auto certificate = certify(scene, receivers, field_of(rows, width), width, noisy, 4000, 1);
   ASSERT_TRUE(certificate);
   const double expected = h * h / std::sqrt(30.0) * std::sqrt(5.0);
   EXPECT_NEAR(certificate->error, expected, 0.05 * expected);
@@ -53,12 +57,12 @@ TEST(Certificate, PlacesInsideSomethingDoNotCount) {
     std::fill_n(row, 16, 1.0f);
     return origin.x < 0.5f;
   };
-  auto certificate = certify(scene, receivers, rows.data(), 16, half, 1000, 1);
+  auto certificate = certify(scene, receivers, field_of(rows, 16), 16, half, 1000, 1);
   ASSERT_TRUE(certificate);
   EXPECT_NEAR(double(certificate->places), 500, 20);
   EXPECT_NEAR(certificate->error, 0, 1e-6);
   const GatherAt nowhere = [](Vec3, Vec3, uint64_t, float*) { return false; };
-  auto none_left = certify(scene, receivers, rows.data(), 16, nowhere, 100, 1);
+  auto none_left = certify(scene, receivers, field_of(rows, 16), 16, nowhere, 100, 1);
   ASSERT_TRUE(none_left);
   EXPECT_LT(none_left->error, 0);
 }

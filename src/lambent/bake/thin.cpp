@@ -1,0 +1,516 @@
+#include <lambent/bake/thin.h>
+#include <lambent/core/parallel.h>
+#include <lambent/core/random.h>
+
+#include <nanoflann.hpp>
+
+#include <algorithm>
+#include <cmath>
+#include <numeric>
+#include <unordered_map>
+
+namespace lambent {
+namespace {
+
+constexpr float least_cosine = 0.8f, most_slope = 0.35f;  // of places on the same surface
+constexpr size_t looked_at = 40, fewest_neighbours = 5;
+constexpr size_t smoothed = 6;        // neighbours whose differences are averaged with one's own
+constexpr size_t leaf = 6;            // a cell of so few that is to be split is traced whole
+constexpr double left_out_more = 0.5; // what leaving one out loses is more than what is lost between: squared
+constexpr size_t held_out = 768;
+constexpr int most_levels = 16, most_corrections = 3;
+constexpr size_t piece = 64;
+
+struct PointCloud {
+  std::span<const Vec3> points;
+  std::span<const uint32_t> which;
+  size_t kdtree_get_point_count() const { return which.size(); }
+  float kdtree_get_pt(size_t i, size_t axis) const { return points[which[i]][int(axis)]; }
+  template <class Box>
+  bool kdtree_get_bbox(Box&) const {
+    return false;
+  }
+};
+using PointTree = nanoflann::KDTreeSingleIndexAdaptor<nanoflann::L2_Simple_Adaptor<float, PointCloud>, PointCloud, 3,
+                                                      uint32_t>;
+
+bool on_one_surface(const Receivers& r, size_t i, size_t j) {
+  if (dot(r.normals[i], r.normals[j]) < least_cosine) return false;
+  const Vec3 d = r.origins[j] - r.origins[i];
+  return std::abs(dot(r.normals[i], d)) <= most_slope * length(d);
+}
+
+// Neighbours of receiver i among `which` on its surface, nearest first: indices into `which`. `skip`: not that one.
+size_t find_neighbours(const PointTree& tree, const Receivers& r, std::span<const uint32_t> which, size_t i,
+                       size_t skip, size_t most, uint32_t* out) {
+  uint32_t index[looked_at];
+  float distance2[looked_at];
+  const Vec3 p = r.origins[i];
+  const float query[3] = {p.x, p.y, p.z};
+  const size_t found = tree.knnSearch(query, looked_at, index, distance2);
+  size_t count = 0;
+  for (size_t q = 0; q < found && count < most; ++q)
+    if (which[index[q]] != skip && (which[index[q]] == i || on_one_surface(r, i, which[index[q]])))
+      out[count++] = index[q];
+  return count;
+}
+
+// Shares of neighbours in the value at a receiver: weighted least squares of 1, x, y over the tangent plane, the
+// normal's two tilts, and, where there are enough, x^2, xy, y^2; its value at the receiver. `of`: receivers.
+void regress(const Receivers& r, size_t i, const uint32_t* of, size_t count, float* share) {
+  constexpr size_t most_unknowns = 8;
+  const Vec3 centre = r.origins[i], n = r.normals[i];
+  const Mat3 frame = frame_about(n);
+  float reach = 0;
+  for (size_t q = 0; q < count; ++q) reach = std::max(reach, length(r.origins[of[q]] - centre));
+  reach = std::max(1.1f * reach, 1e-30f);
+  const size_t unknowns = count >= 12 ? 8 : count >= fewest_neighbours ? 3 : 1;
+  double feature[Spread::most][most_unknowns], weight[Spread::most], A[most_unknowns][most_unknowns + 1] = {};
+  for (size_t q = 0; q < count; ++q) {
+    const Vec3 d = (r.origins[of[q]] - centre) / reach, tilt = r.normals[of[q]];
+    const double x = double(dot(d, frame[0])), y = double(dot(d, frame[1])), far2 = double(dot(d, d));
+    weight[q] = (1 - far2) * (1 - far2) + 1e-6;
+    const double f[most_unknowns] = {1,     x,     y,     double(dot(tilt, frame[0])), double(dot(tilt, frame[1])),
+                                     x * x, x * y, y * y};
+    std::copy_n(f, most_unknowns, feature[q]);
+    for (size_t a = 0; a < unknowns; ++a)
+      for (size_t b = 0; b <= a; ++b) A[a][b] += weight[q] * f[a] * f[b];
+  }
+  for (size_t a = 0; a < unknowns; ++a)
+    for (size_t b = a + 1; b < unknowns; ++b) A[a][b] = A[b][a];
+  const double all = A[0][0];
+  // What neighbours do not tell is none: slopes, tilts, and most of all curvature.
+  const double ridge[most_unknowns] = {0, 1e-4, 1e-4, 1e-4, 1e-4, 1e-3, 1e-3, 1e-3};
+  for (size_t a = 1; a < unknowns; ++a) A[a][a] += ridge[a] * all;
+  A[0][most_unknowns] = 1;
+  for (size_t p = 0; p < unknowns; ++p)  // positive definite: no pivoting
+    for (size_t a = 0; a < unknowns; ++a) {
+      if (a == p) continue;
+      const double factor = A[a][p] / A[p][p];
+      for (size_t b = p; b < unknowns; ++b) A[a][b] -= factor * A[p][b];
+      A[a][most_unknowns] -= factor * A[p][most_unknowns];
+    }
+  double sum = 0, shares[Spread::most] = {};
+  for (size_t q = 0; q < count; ++q) {
+    for (size_t p = 0; p < unknowns; ++p) shares[q] += A[p][most_unknowns] / A[p][p] * feature[q][p];
+    shares[q] *= weight[q], sum += shares[q];
+  }
+  for (size_t q = 0; q < count; ++q) share[q] = float(shares[q] / sum);  // constants stay what they are
+}
+
+double area_of(const Scene& scene, const Triangle& t) {
+  const Vec3d a(scene.positions[t.v[0]]), b(scene.positions[t.v[1]]), c(scene.positions[t.v[2]]);
+  return 0.5 * length(cross(b - a, c - a));
+}
+
+struct Thinner {
+  const Receivers& r;
+  const ThinOptions& options;
+  const PilotRows& pilot;
+  Progress* progress;
+  size_t width;
+  std::vector<float> areas;
+  Vec3 corner{0};
+  size_t n = r.count();
+  std::vector<uint32_t> chosen{};   // in the order of choosing
+  std::vector<float> sizes{};       // of the cells of `chosen`; 0: a cell of one, and nothing is left to choose
+  std::vector<uint32_t> of = std::vector<uint32_t>(n, none);
+  // Of those that the pilot has looked at: receivers, [i][pass][width], inside.
+  std::vector<uint32_t> looked{};
+  std::vector<float> rows{};
+  std::vector<uint8_t> inside{};
+  std::vector<uint32_t> at = {};  // of chosen: index into looked, or none
+  std::vector<double> lost{};     // of looked: squared difference when left out
+  std::vector<uint8_t> alone{};   // of looked: too few neighbours to tell
+  size_t tried = 0;
+
+  struct Group {
+    uint32_t anchor, chosen;  // a member; the one chosen (index into `chosen`), or none
+    uint32_t count = 0;
+    Vec3d sum{0};
+    float nearest = INFINITY;
+    uint32_t best = none;
+  };
+
+  // Cells of those flagged, of half their size; with none chosen yet, of all, of this size.
+  void split(const std::vector<uint8_t>& flagged, float first_size) {
+    std::vector<uint32_t> members(chosen.size(), 0);
+    for (uint32_t c : of)
+      if (c != none) ++members[c];
+    std::unordered_map<uint64_t, std::vector<uint32_t>> cells;
+    std::vector<Group> groups;
+    std::vector<uint32_t> group_of(n, none);
+    const size_t before = chosen.size();
+    auto size_at = [&](uint32_t c) { return c == none ? first_size : 0.5f * sizes[c]; };
+    auto place = [&](uint32_t v, float size) -> uint32_t {
+      const Vec3 p = (r.origins[v] - corner) / size;
+      auto coordinate = [](float f) { return uint64_t(int64_t(std::floor(double(f)))) & 0x1fffff; };
+      const uint64_t key =
+          hash64(coordinate(p.x) << 42 | coordinate(p.y) << 21 | coordinate(p.z), uint64_t(size_level(size)));
+      auto& list = cells[key];
+      for (uint32_t g : list)
+        if (on_one_surface(r, groups[g].anchor, v)) return g;
+      list.push_back(uint32_t(groups.size()));
+      groups.push_back({v, none});
+      return uint32_t(groups.size() - 1);
+    };
+    auto wanted = [&](uint32_t v) { return of[v] == none || (flagged[of[v]] && sizes[of[v]] > 0); };
+    for (uint32_t c = 0; c < before; ++c) {
+      if (!flagged[c] || !(sizes[c] > 0)) continue;
+      if (members[c] <= leaf) continue;
+      const uint32_t v = chosen[c], g = place(v, size_at(c));
+      if (groups[g].chosen == none) groups[g].chosen = c;
+      group_of[v] = g;
+    }
+    for (uint32_t v = 0; v < n; ++v) {
+      if (!wanted(v)) continue;
+      const uint32_t c = of[v];
+      if (c != none && members[c] <= leaf) {  // all of it
+        if (chosen[c] == v) continue;
+        of[v] = uint32_t(chosen.size()), chosen.push_back(v), sizes.push_back(0), at.push_back(none);
+        continue;
+      }
+      if (c != none && chosen[c] == v) continue;
+      const uint32_t g = place(v, size_at(c));
+      group_of[v] = g, ++groups[g].count, groups[g].sum += Vec3d(r.origins[v]);
+    }
+    for (uint32_t v = 0; v < n; ++v) {
+      if (group_of[v] == none || groups[group_of[v]].count == 0) continue;
+      Group& g = groups[group_of[v]];
+      const Vec3d d = Vec3d(r.origins[v]) - g.sum / double(g.count);
+      if (const float distance = float(dot(d, d)); distance < g.nearest) g.nearest = distance, g.best = v;
+    }
+    for (uint32_t c = 0; c < before; ++c)
+      if (flagged[c]) sizes[c] = members[c] <= leaf ? 0 : size_at(c);
+    for (Group& g : groups) {
+      if (g.chosen != none) continue;
+      const float size = size_at(of[g.best]);
+      g.chosen = uint32_t(chosen.size());
+      chosen.push_back(g.best), sizes.push_back(size), at.push_back(none);
+    }
+    for (uint32_t v = 0; v < n; ++v)
+      if (group_of[v] != none) of[v] = groups[group_of[v]].chosen;
+    for (uint32_t c = 0; c < chosen.size(); ++c) of[chosen[c]] = c;
+  }
+  float level_size = 1;
+  int size_level(float size) const { return int(std::lround(std::log2(level_size / size))); }
+
+  Result<void> look(std::span<const uint32_t> which, uint32_t pass, std::vector<float>& two,
+                    std::vector<uint8_t>& inner) {
+    const size_t count = which.size();
+    std::vector<float> once(count * width);
+    two.assign(2 * count * width, 0.0f), inner.assign(count, 0);
+    for (uint32_t k = 0; k < 2; ++k) {
+      std::vector<uint8_t> here(count, 0);
+      if (auto ok = pilot(which, pass + k, once.data(), here.data()); !ok) return ok;
+      for (size_t i = 0; i < count; ++i) {
+        std::copy_n(once.data() + i * width, width, two.data() + (2 * i + k) * width);
+        inner[i] |= here[i];
+      }
+    }
+    tried += 2 * count;
+    return {};
+  }
+
+  // The pilot's rows of those that it has not looked at.
+  Result<void> look_at_new() {
+    std::vector<uint32_t> fresh;
+    for (size_t c = 0; c < chosen.size(); ++c)
+      if (sizes[c] > 0 && at[c] == none) at[c] = uint32_t(looked.size() + fresh.size()), fresh.push_back(chosen[c]);
+    std::vector<float> two;
+    std::vector<uint8_t> inner;
+    if (auto ok = look(fresh, 2 * uint32_t(looked.size() > 0), two, inner); !ok) return ok;
+    looked.insert(looked.end(), fresh.begin(), fresh.end());
+    rows.insert(rows.end(), two.begin(), two.end());
+    inside.insert(inside.end(), inner.begin(), inner.end());
+    return {};
+  }
+
+  // (a - sum of shares a_q) . (b - sum of shares b_q)
+  double difference(const float* two, const uint32_t* neighbour, const float* share, size_t count) const {
+    double sum = 0;
+    for (size_t k = 0; k < width; ++k) {
+      float a = two[k], b = two[width + k];
+      for (size_t q = 0; q < count; ++q) {
+        const float* row = rows.data() + 2 * size_t(neighbour[q]) * width;
+        a -= share[q] * row[k], b -= share[q] * row[width + k];
+      }
+      sum += double(a) * double(b);
+    }
+    return sum;
+  }
+
+  std::vector<uint32_t> clear() const {
+    std::vector<uint32_t> out;
+    for (uint32_t i = 0; i < looked.size(); ++i)
+      if (!inside[i]) out.push_back(i);
+    return out;
+  }
+
+  // Of receiver i from those looked at; its shares, indices into looked. At most Spread::most.
+  size_t neighbours(const PointTree& tree, std::span<const uint32_t> open, std::span<const uint32_t> receivers,
+                    size_t i, uint32_t* index, float* share) const {
+    uint32_t found[Spread::most], places[Spread::most];
+    const size_t count = find_neighbours(tree, r, receivers, i, i, Spread::most, found);
+    for (size_t q = 0; q < count; ++q) index[q] = open[found[q]], places[q] = receivers[found[q]];
+    if (count > 0) regress(r, i, places, count, share);
+    return count;
+  }
+
+  // What each loses when left out.
+  void compare() {
+    const std::vector<uint32_t> open = clear();
+    std::vector<uint32_t> receivers;
+    for (uint32_t i : open) receivers.push_back(looked[i]);
+    const PointCloud cloud{r.origins, receivers};
+    const PointTree tree(3, cloud, {16});
+    std::vector<double> own(looked.size(), 0.0);
+    std::vector<std::array<uint32_t, smoothed>> near(looked.size());
+    std::vector<uint8_t> nears(looked.size(), 0);
+    alone.assign(looked.size(), 0);
+    parallel_for(open.size(), piece, [&](size_t begin, size_t end) {
+      for (size_t k = begin; k < end; ++k) {
+        const uint32_t i = open[k];
+        uint32_t index[Spread::most];
+        float share[Spread::most];
+        const size_t count = neighbours(tree, open, receivers, looked[i], index, share);
+        alone[i] = count < fewest_neighbours;
+        own[i] = difference(rows.data() + 2 * size_t(i) * width, index, share, count);
+        nears[i] = uint8_t(std::min(count, smoothed));
+        std::copy_n(index, nears[i], near[i].begin());
+      }
+    });
+    lost.assign(looked.size(), 0.0);
+    for (uint32_t i : open) {
+      double sum = own[i];
+      for (size_t q = 0; q < nears[i]; ++q) sum += own[near[i][q]];
+      lost[i] = sum / double(1 + nears[i]);
+    }
+  }
+
+  // mean |row|^2 of those looked at, by the area they stand for.
+  double square() const {
+    double sum = 0, area = 0;
+    std::vector<double> cell(chosen.size(), 0.0);
+    for (uint32_t v = 0; v < n; ++v) cell[of[v]] += double(areas[v]);
+    for (size_t c = 0; c < chosen.size(); ++c) {
+      if (at[c] == none || inside[at[c]]) continue;
+      const float* two = rows.data() + 2 * size_t(at[c]) * width;
+      double product = 0;
+      for (size_t k = 0; k < width; ++k) product += double(two[k]) * double(two[width + k]);
+      sum += cell[c] * product, area += cell[c];
+    }
+    return area > 0 ? std::max(sum / area, 0.0) : 0.0;
+  }
+
+  // Those whose cells are to be split; empty: enough. `budget`: of the mean square lost.
+  std::vector<uint8_t> choose(double budget) {
+    std::vector<double> cell(chosen.size(), 0.0);
+    std::vector<uint32_t> members(chosen.size(), 0);
+    double all = 0;
+    for (uint32_t v = 0; v < n; ++v) cell[of[v]] += double(areas[v]), ++members[of[v]], all += double(areas[v]);
+    std::vector<std::pair<double, uint32_t>> order;
+    std::vector<uint8_t> flagged(chosen.size(), 0);
+    bool any = false;
+    double left = 0;
+    for (uint32_t c = 0; c < chosen.size(); ++c) {
+      if (members[c] < 2 || at[c] == none || inside[at[c]] || !(sizes[c] > 0)) continue;
+      if (alone[at[c]]) flagged[c] = 1, any = true;
+      else order.push_back({left_out_more * cell[c] * lost[at[c]], c}), left += order.back().first;
+    }
+    std::sort(order.begin(), order.end(), [](const auto& a, const auto& b) {
+      return a.first != b.first ? a.first > b.first : a.second < b.second;
+    });
+    if (left > budget * all)
+      for (const auto& [share, c] : order) {
+        if (left <= 0.5 * budget * all || share <= 0) break;
+        left -= share, flagged[c] = 1, any = true;
+      }
+    return any ? flagged : std::vector<uint8_t>();
+  }
+
+  // Mean square lost at receivers that are not chosen, times their part of the area.
+  Result<double> measure(uint32_t pass) {
+    double all = 0, open_area = 0;
+    std::vector<uint8_t> is_chosen(n, 0);
+    for (uint32_t c : chosen) is_chosen[c] = 1;
+    for (uint32_t v = 0; v < n; ++v) all += double(areas[v]), open_area += is_chosen[v] ? 0.0 : double(areas[v]);
+    std::vector<uint32_t> tests;
+    double passed = 0;
+    for (uint32_t v = 0; v < n; ++v) {
+      if (is_chosen[v]) continue;
+      passed += double(areas[v]);
+      if (passed >= open_area * (double(tests.size()) + 0.5) / double(held_out)) tests.push_back(v);
+    }
+    if (tests.empty()) return 0.0;
+    std::vector<float> two;
+    std::vector<uint8_t> inner;
+    if (auto ok = look(tests, pass, two, inner); !ok) return ok.error();
+    const std::vector<uint32_t> open = clear();
+    std::vector<uint32_t> receivers;
+    for (uint32_t i : open) receivers.push_back(looked[i]);
+    const PointCloud cloud{r.origins, receivers};
+    const PointTree tree(3, cloud, {16});
+    double sum = 0;
+    size_t count = 0;
+    for (size_t t = 0; t < tests.size(); ++t) {
+      if (inner[t]) continue;
+      uint32_t index[Spread::most];
+      float share[Spread::most];
+      const size_t found = neighbours(tree, open, receivers, tests[t], index, share);
+      sum += difference(two.data() + 2 * t * width, index, share, found), ++count;
+    }
+    return count ? std::max(0.0, sum / double(count)) * open_area / all : 0.0;
+  }
+
+  Thinned result() {
+    Thinned out;
+    std::vector<uint32_t> order(chosen.size()), rank(chosen.size());
+    std::iota(order.begin(), order.end(), 0u);
+    std::sort(order.begin(), order.end(), [&](uint32_t a, uint32_t b) { return chosen[a] < chosen[b]; });
+    for (uint32_t k = 0; k < order.size(); ++k) rank[order[k]] = k, out.chosen.push_back(chosen[order[k]]);
+    out.of.resize(n);
+    for (uint32_t v = 0; v < n; ++v) out.of[v] = rank[of[v]];
+    return out;
+  }
+};
+
+}  // namespace
+
+Thinned keep_all(size_t receivers) {
+  Thinned out;
+  out.chosen.resize(receivers), out.of.resize(receivers);
+  std::iota(out.chosen.begin(), out.chosen.end(), 0u), std::iota(out.of.begin(), out.of.end(), 0u);
+  return out;
+}
+
+std::vector<float> receiver_areas(const Scene& scene, const Receivers& receivers) {
+  std::vector<double> areas(receivers.count(), 0.0);
+  double texels = 0;
+  for (uint32_t t = 0; t < scene.triangles.size(); ++t)
+    for (const bool front : {true, false})
+      std::visit(
+          [&](const auto& basis) {
+            const auto* at = basis.find(t, front);
+            if (!at) return;
+            const double area = area_of(scene, scene.triangles[t]);
+            if constexpr (std::is_same_v<std::decay_t<decltype(basis)>, TexelReceivers>) texels += area;
+            else
+              for (const Vec2 corner : {Vec2(0, 0), Vec2(1, 0), Vec2(0, 1)})
+                basis.spread(*at, corner.x, corner.y,
+                             [&](uint32_t r, float weight) { areas[r] += double(weight) * area / 3; });
+          },
+          receivers.basis);
+  std::vector<float> out(areas.size());
+  for (size_t i = 0; i < areas.size(); ++i)
+    out[i] = float(texels > 0 ? texels / double(areas.size()) : areas[i]);
+  return out;
+}
+
+Result<Thinned> thin(const Scene& scene, const Receivers& receivers, size_t width, const PilotRows& pilot,
+                     const ThinOptions& options, Progress* progress) {
+  const size_t n = receivers.count();
+  if (n < 2 * options.fewest) return keep_all(n);
+  Thinner t{receivers, options, pilot, progress, width, receiver_areas(scene, receivers), bounds(scene).min};
+  double area = 0;
+  for (float a : t.areas) area += double(a);
+  if (!(area > 0)) return keep_all(n);
+  t.level_size = float(std::sqrt(area / double(options.fewest)));
+  t.split({}, t.level_size);
+  double scale = 1, lost = 0, square = options.square;
+  int corrections = 0;
+  for (int level = 0; level < most_levels; ++level) {
+    if (double(t.chosen.size()) > options.worth * double(n)) return keep_all(n);
+    if (auto ok = t.look_at_new(); !ok) return ok.error();
+    if (is_cancelled(progress)) return Error{"", "cancelled"};
+    t.compare();
+    if (!(options.square > 0)) square = t.square();
+    const double budget = options.error * options.error * square;
+    std::vector<uint8_t> flagged = t.choose(scale * budget);
+    if (flagged.empty()) {
+      auto measured = t.measure(100 + 2 * uint32_t(corrections));
+      if (!measured) return measured.error();
+      lost = *measured;
+      if (lost <= budget || corrections == most_corrections) break;
+      scale *= std::clamp(0.7 * budget / lost, 0.1, 0.7), ++corrections;
+      flagged = t.choose(scale * budget);
+      if (flagged.empty()) continue;
+    }
+    t.split(flagged, t.level_size);
+  }
+  Thinned out = double(t.chosen.size()) > options.worth * double(n) ? keep_all(n) : t.result();
+  out.tried = t.tried, out.error = out.all() || !(square > 0) ? 0 : std::sqrt(lost / square);
+  return out;
+}
+
+Receivers thinned_receivers(const Receivers& receivers, const Thinned& thinned) {
+  Receivers out;
+  for (uint32_t c : thinned.chosen) {
+    out.origins.push_back(receivers.origins[c]), out.normals.push_back(receivers.normals[c]);
+    if (!receivers.places.empty()) out.places.push_back(receivers.places[c]);
+  }
+  out.basis = receivers.basis;
+  auto moved = [&](uint32_t& r) {
+    if (r != none) r = thinned.of[r];
+  };
+  if (auto* corners = std::get_if<CornerReceivers>(&out.basis)) {
+    for (auto* side : {&corners->front, &corners->back})
+      for (Corners& c : *side)
+        for (uint32_t& r : c.receiver) moved(r);
+  } else if (auto* texels = std::get_if<TexelReceivers>(&out.basis)) {
+    for (uint32_t& r : texels->texels) moved(r);
+  } else {
+    auto& patches = std::get<PatchReceivers>(out.basis);
+    for (auto* side : {&patches.front, &patches.back})
+      for (Patch& p : *side) moved(p.receiver);
+  }
+  return out;
+}
+
+Spread::Spread(const Receivers& receivers, const Thinned& thinned, std::span<const uint8_t> left_out)
+    : receivers_(receivers), thinned_(thinned) {
+  if (thinned.all()) return;
+  near_.resize(thinned.chosen.size());
+  std::vector<uint32_t> open, members(thinned.chosen.size(), 0);
+  for (uint32_t c : thinned.of) ++members[c];
+  std::vector<uint32_t> index;
+  for (uint32_t c = 0; c < thinned.chosen.size(); ++c)
+    if (left_out.empty() || !left_out[c]) open.push_back(thinned.chosen[c]), index.push_back(c);
+  const PointCloud cloud{receivers.origins, open};
+  const PointTree tree(3, cloud, {16});
+  parallel_for(near_.size(), piece, [&](size_t begin, size_t end) {
+    for (size_t c = begin; c < end; ++c) {
+      if (members[c] < 2) continue;
+      Near& at = near_[c];
+      at.count =
+          uint32_t(find_neighbours(tree, receivers, open, thinned.chosen[c], SIZE_MAX, most, at.index.data()));
+      for (size_t q = 0; q < at.count; ++q) at.index[q] = index[at.index[q]];
+    }
+  });
+}
+
+Spread::Shares Spread::shares(size_t receiver) const {
+  Shares out;
+  const uint32_t c = thinned_.of[receiver];
+  if (thinned_.chosen[c] == receiver || near_[c].count == 0) {
+    out.count = 1, out.index[0] = c, out.share[0] = 1;
+    return out;
+  }
+  const Near& at = near_[c];
+  uint32_t places[most];
+  for (size_t q = 0; q < at.count; ++q) places[q] = thinned_.chosen[at.index[q]];
+  out.count = at.count, out.index = at.index;
+  regress(receivers_, receiver, places, at.count, out.share.data());
+  return out;
+}
+
+void Spread::row(size_t receiver, const float* rows, size_t width, float* out) const {
+  const Shares s = shares(receiver);
+  std::fill_n(out, width, 0.0f);
+  for (size_t q = 0; q < s.count; ++q) {
+    const float* from = rows + size_t(s.index[q]) * width;
+    for (size_t k = 0; k < width; ++k) out[k] += s.share[q] * from[k];
+  }
+}
+
+}  // namespace lambent
