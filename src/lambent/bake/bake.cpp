@@ -383,8 +383,11 @@ Result<Transfer> bake_with_samples(const Scene& scene, const Tracer& tracer, con
 // of.
 Result<Thinned> thin_receivers(const Scene& scene, const Tracer& tracer, const Receivers& receivers,
                                const BakeOptions& options, BakeReport& r, Progress* progress) {
-  constexpr int most_order = 4, samples = 64;
-  constexpr double part = 0.35;  // of the error; squares add up
+  constexpr int most_order = 4;
+  constexpr double part = 0.4;  // of the error; squares add up
+  // Their noise has to be averaged away over a few hundred cells.
+  const int samples =
+      std::clamp(16 * int(std::lround(4 * std::pow(0.02 / options.error, 1 / noise_slope))), 64, 144);
   if (!options.thin || !options.lobes.empty() || options.order < 2) return keep_all(receivers.count());
   const auto start = std::chrono::steady_clock::now();
   const int order = std::min(options.order, most_order);
@@ -443,8 +446,8 @@ Result<Transfer> bake_to_error(const Scene& scene, const Tracer& tracer, const R
                  between = std::sqrt(std::max(0.0, error * error - noise * noise));
     // Where little is lost between receivers, noise may take the rest. Else more rays would hardly be seen beside
     // that; but noise is, in the shade of a sun.
-    const double wanted = between < target ? std::max(0.9 * std::sqrt(target * target - between * between), 0.3 * target)
-                                           : std::clamp(0.2 * error, 0.3 * target, 0.6 * target);
+    const double wanted = between < target ? std::max(0.9 * std::sqrt(target * target - between * between), 0.5 * target)
+                                           : std::clamp(0.2 * error, 0.5 * target, 0.6 * target);
     const double ratio = std::clamp(std::pow(noise / wanted, 1 / noise_slope), 1.5, 16.0);
     const bool late = options.seconds >= 0 && seconds_since(start) + seconds_since(round) * ratio > options.seconds;
     if (!(noise > wanted && error > target) || options.samples == most || late) return transfer;

@@ -18,6 +18,8 @@ namespace {
 
 constexpr size_t most_neighbours = 24, looked_at = 48;    // itself among them; so many, and the fit ones of these
 constexpr size_t fewest_neighbours = 5;                   // a plane has three unknowns
+constexpr size_t tilt_neighbours = 10;                    // of so many on, rows may follow the normal as well
+constexpr double tilt_ridge = 1e-4;
 constexpr size_t judges = 8;                              // neighbours whose risks are added up
 constexpr size_t variances = 6;                           // measured places that tell a place's variance
 constexpr float least_cosine = 0.8f, most_slope = 0.35f;  // of a neighbour on the same surface
@@ -120,31 +122,36 @@ struct Denoiser {
     const Vec3 centre = noisy.places[i];
     const float reach = length(noisy.places[at.index[at.count - 1]] - centre);
     const bool surface = !noisy.normals.empty();
-    const size_t unknowns = surface ? 3 : 4;
+    // On a surface its tangent plane and the normal's two tilts, in free space the place.
+    const size_t unknowns = !surface ? 4 : at.count >= tilt_neighbours ? 5 : 3;
     const Mat3 frame = surface ? frame_about(noisy.normals[i]) : Mat3(1);
-    std::array<std::array<double, 4>, most_neighbours> feature{};
-    double A[4][5] = {};
+    constexpr size_t most = 5;
+    std::array<std::array<double, most>, most_neighbours> feature{};
+    double A[most][most + 1] = {};
     for (size_t q = 0; q < at.count; ++q) {
       const Vec3 d = (noisy.places[at.index[q]] - centre) / std::max(reach, 1e-30f);
-      feature[q] = {1, double(dot(d, frame[0])), double(dot(d, frame[1])), double(dot(d, frame[2]))};
+      feature[q] = {1, double(dot(d, frame[0])), double(dot(d, frame[1])), double(dot(d, frame[2])), 0};
+      if (surface)
+        feature[q][3] = double(dot(noisy.normals[at.index[q]], frame[0])),
+        feature[q][4] = double(dot(noisy.normals[at.index[q]], frame[1]));
       for (size_t r = 0; r < unknowns; ++r)
         for (size_t s = 0; s < unknowns; ++s) A[r][s] += double(weights[q]) * feature[q][r] * feature[q][s];
     }
-    A[0][4] = 1;
+    A[0][most] = 1;
     const double ridge = 1e-3 * A[0][0];  // slopes that neighbours do not tell are none
-    for (size_t r = 1; r < unknowns; ++r) A[r][r] += ridge;
+    for (size_t r = 1; r < unknowns; ++r) A[r][r] += surface && r > 2 ? tilt_ridge * A[0][0] : ridge;
     for (size_t p = 0; p < unknowns; ++p)  // positive definite: no pivoting
       for (size_t r = 0; r < unknowns; ++r) {
         if (r == p) continue;
         const double factor = A[r][p] / A[p][p];
         for (size_t s = p; s < unknowns; ++s) A[r][s] -= factor * A[p][s];
-        A[r][4] -= factor * A[p][4];
+        A[r][most] -= factor * A[p][most];
       }
     Filter f;
     double sum = 0;
     std::array<double, most_neighbours> share{};
     for (size_t q = 0; q < at.count; ++q) {
-      for (size_t p = 0; p < unknowns; ++p) share[q] += A[p][4] / A[p][p] * feature[q][p];
+      for (size_t p = 0; p < unknowns; ++p) share[q] += A[p][most] / A[p][p] * feature[q][p];
       share[q] *= double(weights[q]), sum += share[q];
     }
     for (size_t q = 0; q < at.count; ++q) f.share[q] = float(share[q] / sum);  // constants stay what they are

@@ -17,8 +17,8 @@ constexpr size_t looked_at = 40, fewest_neighbours = 5;
 constexpr size_t smoothed = 6;        // neighbours whose differences are averaged with one's own
 constexpr size_t leaf = 6;            // a cell of so few that is to be split is traced whole
 constexpr double left_out_more = 0.5; // what leaving one out loses is more than what is lost between: squared
-constexpr size_t held_out = 768;
-constexpr int most_levels = 16, most_corrections = 3;
+constexpr size_t held_out = 512;
+constexpr int most_levels = 16, most_corrections = 10;
 constexpr size_t piece = 64;
 
 struct PointCloud {
@@ -122,6 +122,7 @@ struct Thinner {
   std::vector<uint32_t> at = {};  // of chosen: index into looked, or none
   std::vector<double> lost{};     // of looked: squared difference when left out
   std::vector<uint8_t> alone{};   // of looked: too few neighbours to tell
+  std::vector<float> border{};    // of looked, inside something: the distance to what is not
   size_t tried = 0;
 
   struct Group {
@@ -180,14 +181,14 @@ struct Thinner {
       const Vec3d d = Vec3d(r.origins[v]) - g.sum / double(g.count);
       if (const float distance = float(dot(d, d)); distance < g.nearest) g.nearest = distance, g.best = v;
     }
-    for (uint32_t c = 0; c < before; ++c)
-      if (flagged[c]) sizes[c] = members[c] <= leaf ? 0 : size_at(c);
     for (Group& g : groups) {
       if (g.chosen != none) continue;
       const float size = size_at(of[g.best]);
       g.chosen = uint32_t(chosen.size());
       chosen.push_back(g.best), sizes.push_back(size), at.push_back(none);
     }
+    for (uint32_t c = 0; c < before; ++c)
+      if (flagged[c]) sizes[c] = members[c] <= leaf ? 0 : size_at(c);
     for (uint32_t v = 0; v < n; ++v)
       if (group_of[v] != none) of[v] = groups[group_of[v]].chosen;
     for (uint32_t c = 0; c < chosen.size(); ++c) of[chosen[c]] = c;
@@ -212,14 +213,36 @@ struct Thinner {
     return {};
   }
 
-  // The pilot's rows of those that it has not looked at.
+  // The pilot's rows of those that it has not looked at and that have more to choose.
   Result<void> look_at_new() {
     std::vector<uint32_t> fresh;
-    for (size_t c = 0; c < chosen.size(); ++c)
-      if (sizes[c] > 0 && at[c] == none) at[c] = uint32_t(looked.size() + fresh.size()), fresh.push_back(chosen[c]);
+    for (uint32_t c = 0; c < chosen.size(); ++c)
+      if (sizes[c] > 0 && at[c] == none) fresh.push_back(c);
+    return look_at(fresh);
+  }
+  // The same for all near these receivers.
+  Result<void> look_near(std::span<const uint32_t> receivers) {
+    const PointCloud cloud{r.origins, chosen};
+    const PointTree tree(3, cloud, {16});
+    std::vector<uint8_t> wanted(chosen.size(), 0);
+    for (uint32_t v : receivers) {
+      uint32_t found[Spread::most];
+      const size_t count = find_neighbours(tree, r, chosen, v, v, Spread::most, found);
+      for (size_t q = 0; q < count; ++q) wanted[found[q]] = at[found[q]] == none;
+    }
+    std::vector<uint32_t> fresh;
+    for (uint32_t c = 0; c < chosen.size(); ++c)
+      if (wanted[c]) fresh.push_back(c);
+    return look_at(fresh);
+  }
+  Result<void> look_at(std::vector<uint32_t> fresh) {
+    for (uint32_t& c : fresh) {
+      at[c] = uint32_t(looked.size() + size_t(&c - fresh.data()));
+      c = chosen[c];
+    }
     std::vector<float> two;
     std::vector<uint8_t> inner;
-    if (auto ok = look(fresh, 2 * uint32_t(looked.size() > 0), two, inner); !ok) return ok;
+    if (auto ok = look(fresh, 2 * uint32_t(looked.size() % 0x7fffff), two, inner); !ok) return ok;
     looked.insert(looked.end(), fresh.begin(), fresh.end());
     rows.insert(rows.end(), two.begin(), two.end());
     inside.insert(inside.end(), inner.begin(), inner.end());
@@ -267,7 +290,7 @@ struct Thinner {
     std::vector<double> own(looked.size(), 0.0);
     std::vector<std::array<uint32_t, smoothed>> near(looked.size());
     std::vector<uint8_t> nears(looked.size(), 0);
-    alone.assign(looked.size(), 0);
+    alone.assign(looked.size(), 0), border.assign(looked.size(), INFINITY);
     parallel_for(open.size(), piece, [&](size_t begin, size_t end) {
       for (size_t k = begin; k < end; ++k) {
         const uint32_t i = open[k];
@@ -280,6 +303,16 @@ struct Thinner {
         std::copy_n(index, nears[i], near[i].begin());
       }
     });
+    // Those inside something, but near what is not: where the border runs is not known.
+    for (uint32_t i = 0; i < looked.size() && !open.empty(); ++i) {
+      if (!inside[i]) continue;
+      uint32_t found;
+      const Vec3 p = r.origins[looked[i]];
+      const float query[3] = {p.x, p.y, p.z};
+      float distance2;
+      tree.knnSearch(query, 1, &found, &distance2);
+      border[i] = std::sqrt(distance2);
+    }
     lost.assign(looked.size(), 0.0);
     for (uint32_t i : open) {
       double sum = own[i];
@@ -314,8 +347,10 @@ struct Thinner {
     bool any = false;
     double left = 0;
     for (uint32_t c = 0; c < chosen.size(); ++c) {
-      if (members[c] < 2 || at[c] == none || inside[at[c]] || !(sizes[c] > 0)) continue;
-      if (alone[at[c]]) flagged[c] = 1, any = true;
+      if (members[c] < 2 || at[c] == none || !(sizes[c] > 0)) continue;
+      if (inside[at[c]]) {
+        if (border[at[c]] < 2 * sizes[c]) flagged[c] = 1, any = true;
+      } else if (alone[at[c]]) flagged[c] = 1, any = true;
       else order.push_back({left_out_more * cell[c] * lost[at[c]], c}), left += order.back().first;
     }
     std::sort(order.begin(), order.end(), [](const auto& a, const auto& b) {
@@ -346,6 +381,7 @@ struct Thinner {
     std::vector<float> two;
     std::vector<uint8_t> inner;
     if (auto ok = look(tests, pass, two, inner); !ok) return ok.error();
+    if (auto ok = look_near(tests); !ok) return ok.error();
     const std::vector<uint32_t> open = clear();
     std::vector<uint32_t> receivers;
     for (uint32_t i : open) receivers.push_back(looked[i]);
@@ -424,13 +460,15 @@ Result<Thinned> thin(const Scene& scene, const Receivers& receivers, size_t widt
     if (auto ok = t.look_at_new(); !ok) return ok.error();
     if (is_cancelled(progress)) return Error{"", "cancelled"};
     t.compare();
+    if (getenv("THIN")) fprintf(stderr, "level %d chosen %zu looked %zu scale %g\n", level, t.chosen.size(), t.looked.size(), scale);
     if (!(options.square > 0)) square = t.square();
     const double budget = options.error * options.error * square;
     std::vector<uint8_t> flagged = t.choose(scale * budget);
     if (flagged.empty()) {
-      auto measured = t.measure(100 + 2 * uint32_t(corrections));
+      auto measured = t.measure(0xffff0000u + 2 * uint32_t(corrections));
       if (!measured) return measured.error();
       lost = *measured;
+      if (getenv("THIN")) fprintf(stderr, "  measured %g budget %g\n", std::sqrt(lost/square), options.error);
       if (lost <= budget || corrections == most_corrections) break;
       scale *= std::clamp(0.7 * budget / lost, 0.1, 0.7), ++corrections;
       flagged = t.choose(scale * budget);
