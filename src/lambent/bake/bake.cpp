@@ -415,6 +415,13 @@ Result<Thinned> thin_receivers(const Scene& scene, const Tracer& tracer, const R
   };
   auto thinned = thin(scene, receivers, width, pilot, {.error = part * options.error}, progress);
   if (!thinned) return thinned;
+  // Where noise is what costs, sparse rows are of less use: denoising has fewer neighbours that are alike.
+  constexpr double least_samples = 64, denoised = 0.5, dearer = 5;
+  const double each = std::pow(denoised * thinned->noise / options.error, 1 / noise_slope) * samples;
+  if (dearer * each * double(thinned->chosen.size()) > std::max(each, least_samples) * double(receivers.count())) {
+    Thinned all = keep_all(receivers.count());
+    all.tried = thinned->tried, thinned = std::move(all);
+  }
   r.rays = thinned->tried * size_t(samples), r.thin_seconds = seconds_since(start);
   r.spread_error = thinned->all() ? -1 : thinned->error;
   return thinned;

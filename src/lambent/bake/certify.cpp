@@ -59,13 +59,14 @@ struct PlaceError {
 }  // namespace
 
 Result<Certificate> certify(const Scene& scene, const Receivers& receivers, const FieldRow& field, size_t width,
-                            const GatherAt& gather, size_t count, uint32_t seed, Progress* progress) {
+                            const GatherAt& gather, size_t count, uint32_t seed, Progress* progress,
+                            const FieldRow* again) {
   const std::vector<SurfacePlace> places = draw_places(scene, receivers, count, seed);
   const float diagonal = bounds(scene).diagonal();
   std::vector<PlaceError> measured(places.size());
   ProgressStage stage(progress, "measuring the error", places.size());
   parallel_for(places.size(), piece, [&](size_t begin, size_t end) {
-    AlignedVector<float> a(width), b(width), s(width), row(width);
+    AlignedVector<float> a(width), b(width), s(width), s2(width), row(width);
     for (size_t i = begin; i < end && !stage.cancelled(); ++i) {
       const SurfacePlace& at = places[i];
       const Triangle& t = scene.triangles[at.triangle];
@@ -80,19 +81,24 @@ Result<Certificate> certify(const Scene& scene, const Receivers& receivers, cons
       const Vec3 origin = p + face * receiver_lift(p, float(std::sqrt(area_of(scene, t))), diagonal);
       if (!gather(origin, n, hash64(seed, 2 * i), a.data()) || !gather(origin, n, hash64(seed, 2 * i + 1), b.data()))
         continue;
-      std::fill(s.begin(), s.end(), 0.0f);
-      std::visit(
-          [&](const auto& basis) {
-            basis.spread(*basis.find(at.triangle, at.front), at.u, at.v, [&](uint32_t receiver, float w) {
-              field(receiver, row.data());
-              for (size_t k = 0; k < width; ++k) s[k] += w * row[k];
-            });
-          },
-          receivers.basis);
+      auto look_up = [&](const FieldRow& of, AlignedVector<float>& sum) {
+        std::fill(sum.begin(), sum.end(), 0.0f);
+        std::visit(
+            [&](const auto& basis) {
+              basis.spread(*basis.find(at.triangle, at.front), at.u, at.v, [&](uint32_t receiver, float w) {
+                of(receiver, row.data());
+                for (size_t k = 0; k < width; ++k) sum[k] += w * row[k];
+              });
+            },
+            receivers.basis);
+      };
+      look_up(field, s);
+      if (again) look_up(*again, s2);
+      const AlignedVector<float>& other = again ? s2 : s;
       PlaceError& m = measured[i];
       m.counts = true;
       for (size_t k = 0; k < width; ++k) {
-        m.error2 += double(a[k] - s[k]) * double(b[k] - s[k]);
+        m.error2 += double(a[k] - s[k]) * double(b[k] - other[k]);
         m.truth2 += double(a[k]) * double(b[k]);
         m.noise2 += 0.5 * double(a[k] - b[k]) * double(a[k] - b[k]);
       }

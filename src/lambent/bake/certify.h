@@ -31,8 +31,9 @@ struct Certificate {
 
 // `field`: its rows, `width` floats each. Places are drawn evenly by area over all sides that receive, two gathers at
 // each: with independent gathers a and b of a truth t, the mean of (a - s) . (b - s) is |s - t|^2, whatever their
-// noise. Errors: cancelled.
+// noise. `again`: the same field with noise of its own; with it, the field's noise does not count. Errors: cancelled.
 Result<Certificate> certify(const Scene& scene, const Receivers& receivers, const FieldRow& field, size_t width,
-                            const GatherAt& gather, size_t places, uint32_t seed, Progress* progress = nullptr);
+                            const GatherAt& gather, size_t places, uint32_t seed, Progress* progress = nullptr,
+                            const FieldRow* again = nullptr);
 
 }  // namespace lambent

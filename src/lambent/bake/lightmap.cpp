@@ -2,6 +2,7 @@
 #include <lambent/bake/columns.h>
 #include <lambent/bake/kernels.h>
 #include <lambent/bake/lightmap.h>
+#include <lambent/bake/lightmap_error.h>
 #include <lambent/core/parallel.h>
 #include <lambent/receivers/seams.h>
 
@@ -32,6 +33,10 @@ Result<void> check_options(const Scene& scene, const Lamps& lamps, const Lightma
   if (!(o.converge >= 0 && o.converge < 1)) return Error{"converge", "must lie between 0 and 1"};
   if (o.directional != DirectionalKind::none && o.order > 0)
     return Error{"directional", "lightmaps hold lamps alone: leave the order out"};
+  if (!(o.error >= 0 && o.error <= 1))
+    return Error{"error", "must lie between 0 and 1, not " + std::to_string(o.error)};
+  if (o.error > 0 && (o.order > 0 || o.directional != DirectionalKind::none || o.gather != GatherKind::rays))
+    return Error{"error", "is of lamps alone, without directions and by rays"};
   if (o.keep_terms && (o.converge > 0 || o.directional != DirectionalKind::none))
     return Error{"terms", "are kept of counted bounces, and not of directional lightmaps"};
   for (const AreaLamp& lamp : lamps.area)
@@ -102,6 +107,39 @@ Result<AlignedVector<float>> directional_rows_of(const GatherSetup& setup, const
   return wide;
 }
 
+// Solutions as they are kept, seams closed.
+struct Storing {
+  const Scene& scene;
+  const Receivers& receivers;
+  const LightBasis& light;
+  size_t width;
+  Precision precision;  // all light decides, and its parts follow
+  LightmapReport& report;
+  Progress* progress;
+
+  Result<Transfer> stored(AlignedVector<float>& values, size_t rows, bool is_all) {
+    if (const auto* texels = std::get_if<TexelReceivers>(&receivers.basis))
+      smooth_seams(scene, *texels, values.data(), rows * width, rows == 1 ? 3 * light.count() : rows * width, 0.95f,
+                   0.05f, progress);
+    if (is_cancelled(progress)) return Error{"", "cancelled"};
+    const float value = precision == Precision::half ? beyond_half(light, values, width) : 0;
+    if (value > half_max || (is_all && value > 0)) precision = Precision::single, report.beyond_half = value;
+    return store_columns(light, values.data(), rows, 3, receivers.count(), width, precision);
+  }
+  Result<Lightmap> lightmap(AlignedVector<float>& all, size_t rows, AlignedVector<float>* direct) {
+    auto whole = stored(all, rows, true);
+    if (!whole) return whole.error();
+    Lightmap map{std::move(*whole), std::nullopt, {}};
+    if (direct) {
+      AlignedVector<float> copy = *direct;  // terms start from it
+      auto light_alone = stored(copy, 1, false);
+      if (!light_alone) return light_alone.error();
+      map.direct = std::move(*light_alone);
+    }
+    return map;
+  }
+};
+
 double seconds_since(std::chrono::steady_clock::time_point start) {
   return std::chrono::duration<double>(std::chrono::steady_clock::now() - start).count();
 }
@@ -137,6 +175,21 @@ Result<Lightmap> bake_lightmap(const Scene& scene, const Tracer& tracer, const R
   if (cube.samples) setup.sets = std::move(cube);
   const LightBasis light{.order = o.order, .groups = lamps.names};
 
+  if (o.error > 0) {
+    auto solved = solve_lightmap_to_error(scene, tracer, receivers, lamps, o, r, progress);
+    if (!solved) return solved.error();
+    Storing storing{scene, receivers, light, width, o.precision, r, progress};
+    auto map = storing.lightmap(solved->all, 1, direct_apart ? &solved->direct : nullptr);
+    if (!map) return map;
+    for (AlignedVector<float>& term : solved->terms) {
+      auto transfer = storing.stored(term, 1, false);
+      if (!transfer) return transfer.error();
+      map->terms.push_back(std::move(*transfer));
+    }
+    r.receivers = n;
+    return map;
+  }
+
   // e: [harmonics | groups][channel]
   AlignedVector<float> e(n * width, 0.0f);
   std::vector<float> sky(harmonics ? n * setup.sky_width() : 0);
@@ -162,34 +215,19 @@ Result<Lightmap> bake_lightmap(const Scene& scene, const Tracer& tracer, const R
   }
   r.bounce_seconds = seconds_since(start);
 
-  Precision precision = o.precision;  // all light decides, and its parts follow
-  auto stored = [&](AlignedVector<float>& values, size_t rows_each, bool is_all) -> Result<Transfer> {
-    if (const auto* texels = std::get_if<TexelReceivers>(&receivers.basis))
-      smooth_seams(scene, *texels, values.data(), rows_each * width,
-                   rows_each == 1 ? 3 * light.count() : rows_each * width, 0.95f, 0.05f, progress);
-    if (is_cancelled(progress)) return Error{"", "cancelled"};
-    const float value = precision == Precision::half ? beyond_half(light, values, width) : 0;
-    if (value > half_max || (is_all && value > 0)) precision = Precision::single, r.beyond_half = value;
-    return store_columns(light, values.data(), rows_each, 3, n, width, precision);
-  };
-  auto all = stored(*x, rows, true);
-  if (!all) return all.error();
-  Lightmap map{std::move(*all), std::nullopt, {}};
+  Storing storing{scene, receivers, light, width, o.precision, r, progress};
+  auto map = storing.lightmap(*x, rows, direct_apart ? &e : nullptr);
+  if (!map) return map;
   if (o.keep_terms) {
     *x = {};
     auto take = [&](int, AlignedVector<float> term) -> Result<void> {
-      auto transfer = stored(term, 1, false);
+      auto transfer = storing.stored(term, 1, false);
       if (!transfer) return transfer.error();
-      map.terms.push_back(std::move(*transfer));
+      map->terms.push_back(std::move(*transfer));
       return {};
     };
     if (auto ok = bounce_terms(*op, source_of(e.data(), width), width, o.bounces, progress, take); !ok)
       return ok.error();
-  }
-  if (direct_apart) {
-    auto direct_light = stored(e, 1, false);
-    if (!direct_light) return direct_light.error();
-    map.direct = std::move(*direct_light);
   }
   r.receivers = n, r.buried = op->report().buried, r.rays = op->report().rays;
   r.operator_bytes = op->report().bytes, r.operator_kept = bounces ? op->report().kept : 1;

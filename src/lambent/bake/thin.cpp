@@ -321,18 +321,22 @@ struct Thinner {
     }
   }
 
-  // mean |row|^2 of those looked at, by the area they stand for.
-  double square() const {
-    double sum = 0, area = 0;
+  // mean |row|^2 of those looked at, by the area they stand for; the same of their noise.
+  double square(double& noise) const {
+    double sum = 0, area = 0, noises = 0;
     std::vector<double> cell(chosen.size(), 0.0);
     for (uint32_t v = 0; v < n; ++v) cell[of[v]] += double(areas[v]);
     for (size_t c = 0; c < chosen.size(); ++c) {
       if (at[c] == none || inside[at[c]]) continue;
       const float* two = rows.data() + 2 * size_t(at[c]) * width;
       double product = 0;
-      for (size_t k = 0; k < width; ++k) product += double(two[k]) * double(two[width + k]);
+      for (size_t k = 0; k < width; ++k) {
+        product += double(two[k]) * double(two[width + k]);
+        noises += 0.5 * cell[c] * double(two[k] - two[width + k]) * double(two[k] - two[width + k]);
+      }
       sum += cell[c] * product, area += cell[c];
     }
+    noise = area > 0 ? noises / area : 0;
     return area > 0 ? std::max(sum / area, 0.0) : 0.0;
   }
 
@@ -453,7 +457,7 @@ Result<Thinned> thin(const Scene& scene, const Receivers& receivers, size_t widt
   if (!(area > 0)) return keep_all(n);
   t.level_size = float(std::sqrt(area / double(options.fewest)));
   t.split({}, t.level_size);
-  double scale = 1, lost = 0, square = options.square;
+  double scale = 1, lost = 0, square = 0, noise = 0;
   int corrections = 0;
   for (int level = 0; level < most_levels; ++level) {
     if (double(t.chosen.size()) > options.worth * double(n)) return keep_all(n);
@@ -461,7 +465,7 @@ Result<Thinned> thin(const Scene& scene, const Receivers& receivers, size_t widt
     if (is_cancelled(progress)) return Error{"", "cancelled"};
     t.compare();
     if (getenv("THIN")) fprintf(stderr, "level %d chosen %zu looked %zu scale %g\n", level, t.chosen.size(), t.looked.size(), scale);
-    if (!(options.square > 0)) square = t.square();
+    square = std::max(options.square, t.square(noise));
     const double budget = options.error * options.error * square;
     std::vector<uint8_t> flagged = t.choose(scale * budget);
     if (flagged.empty()) {
@@ -477,7 +481,8 @@ Result<Thinned> thin(const Scene& scene, const Receivers& receivers, size_t widt
     t.split(flagged, t.level_size);
   }
   Thinned out = double(t.chosen.size()) > options.worth * double(n) ? keep_all(n) : t.result();
-  out.tried = t.tried, out.error = out.all() || !(square > 0) ? 0 : std::sqrt(lost / square);
+  out.tried = t.tried, out.noise = square > 0 ? std::sqrt(noise / square) : 0;
+  out.error = out.all() || !(square > 0) ? 0 : std::sqrt(lost / square);
   return out;
 }
 

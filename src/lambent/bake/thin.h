@@ -21,7 +21,7 @@ using PilotRows =
 
 struct ThinOptions {
   double error = 0.005;   // relative RMS, by area, that the regression may lose; > 0
-  double square = 0;      // mean |row|^2 that this is relative to; 0: that of the rows
+  double square = 0;      // mean |row|^2 that this is relative to, at least
   size_t fewest = 6'000;  // receivers to begin with, where there are as many; fewer than twice that are all traced
   double worth = 0.7;     // if more than this part would be traced, all are
 };
@@ -31,6 +31,7 @@ struct Thinned {
   std::vector<uint32_t> of;      // [receiver]: the index into `chosen` of the one that stands for it
   size_t tried = 0;              // rows of the pilot
   double error = 0;              // relative RMS that the regression loses, measured at receivers that were left out
+  double noise = 0;              // relative RMS of the noise of the pilot's rows
   bool all() const { return chosen.size() == of.size(); }
 };
 
