@@ -54,6 +54,7 @@ std::vector<SurfacePlace> draw_places(const Scene& scene, const Receivers& recei
 struct PlaceError {
   double error2 = 0, truth2 = 0, noise2 = 0;
   bool counts = false;
+  Vec3 at{0}, normal{0};
 };
 
 }  // namespace
@@ -96,7 +97,7 @@ Result<Certificate> certify(const Scene& scene, const Receivers& receivers, cons
       if (again) look_up(*again, s2);
       const AlignedVector<float>& other = again ? s2 : s;
       PlaceError& m = measured[i];
-      m.counts = true;
+      m.counts = true, m.at = origin, m.normal = n;
       for (size_t k = 0; k < width; ++k) {
         m.error2 += double(a[k] - s[k]) * double(b[k] - other[k]);
         m.truth2 += double(a[k]) * double(b[k]);
@@ -115,6 +116,7 @@ Result<Certificate> certify(const Scene& scene, const Receivers& receivers, cons
     if (!measured[i].counts) continue;
     const uint32_t part = scene.triangles[places[i].triangle].part;
     ++c.places, ++counts[part];
+    c.measured.push_back({measured[i].at, measured[i].normal, measured[i].error2, measured[i].truth2});
     error2 += measured[i].error2, truth2 += measured[i].truth2, noise2 += measured[i].noise2;
     parts[part].error2 += measured[i].error2, parts[part].truth2 += measured[i].truth2;
   }

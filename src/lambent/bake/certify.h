@@ -27,6 +27,12 @@ struct Certificate {
   std::vector<double>
       parts;          // the same by part of the scene, relative to that part's own rows; negative: too few places
   size_t places = 0;  // that it was measured at
+  // At each of those, squares that are right in the mean alone: of the error, which may be negative, and of the truth.
+  struct Place {
+    Vec3 at, normal;
+    double error2, truth2;
+  };
+  std::vector<Place> measured;
 };
 
 // `field`: its rows, `width` floats each. Places are drawn evenly by area over all sides that receive, two gathers at
