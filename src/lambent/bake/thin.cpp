@@ -464,7 +464,6 @@ Result<Thinned> thin(const Scene& scene, const Receivers& receivers, size_t widt
     if (auto ok = t.look_at_new(); !ok) return ok.error();
     if (is_cancelled(progress)) return Error{"", "cancelled"};
     t.compare();
-    if (getenv("THIN")) fprintf(stderr, "level %d chosen %zu looked %zu scale %g\n", level, t.chosen.size(), t.looked.size(), scale);
     square = std::max(options.square, t.square(noise));
     const double budget = options.error * options.error * square;
     std::vector<uint8_t> flagged = t.choose(scale * budget);
@@ -472,8 +471,7 @@ Result<Thinned> thin(const Scene& scene, const Receivers& receivers, size_t widt
       auto measured = t.measure(0xffff0000u + 2 * uint32_t(corrections));
       if (!measured) return measured.error();
       lost = *measured;
-      if (getenv("THIN")) fprintf(stderr, "  measured %g budget %g\n", std::sqrt(lost/square), options.error);
-      if (lost <= budget || corrections == most_corrections) break;
+        if (lost <= budget || corrections == most_corrections) break;
       scale *= std::clamp(0.7 * budget / lost, 0.1, 0.7), ++corrections;
       flagged = t.choose(scale * budget);
       if (flagged.empty()) continue;
