@@ -6,6 +6,7 @@
 #include <lambent/bake/adapt.h>
 #include <lambent/bake/bake.h>
 #include <lambent/scene/procedural.h>
+#include <lambent/scene/refine.h>
 
 #include <fmt/format.h>
 
@@ -47,6 +48,7 @@ void compare(const std::string& name, const Scene& scene) {
           {"error_before", target},
           {"uncertain", now.report.certificate.uncertain},
           {"receivers", now.report.receivers},
+          {"traced", now.report.traced},
           {"receivers_before", old.report.receivers},
           {"samples", now.report.samples},
           {"rays", now.report.rays + (split ? split->rays : 0)},
@@ -79,6 +81,22 @@ void denoised(const std::string& name, const Scene& scene) {
            error(rows(samples, 5, false)), "relative RMS at receivers", "not denoised", {{"truth", "16,384 rays"}});
 }
 
+// The same surface, ever finer, to the same error.
+void growth(const std::string& name, Scene scene, int splits) {
+  double first = 0;
+  size_t vertices = 0;
+  for (int k = 0; k <= splits; ++k) {
+    if (k > 0) split_edges(scene, [](Vec3, Vec3) { return true; });
+    BakeOptions options;
+    options.error = 0.025;
+    const Timed t = timed(scene, options);
+    if (k == 0) first = t.seconds, vertices = scene.positions.size();
+    report(fmt::format("error growth {}, {} vertices", name, scene.positions.size()), t.seconds, first,
+           "processor seconds to 2.5 %", fmt::format("those of {} vertices", vertices),
+           {{"error", t.report.error}, {"traced", t.report.traced}, {"rays", t.report.rays}});
+  }
+}
+
 }  // namespace
 
 void bench_error() {
@@ -89,6 +107,7 @@ void bench_error() {
   compare("courtyard", make_courtyard(1));
   denoised("courtyard at half detail", make_courtyard(0.5f));
   compare("courtyard, finer", make_courtyard(2));
+  if (auto scene = data_scene("bunny.obj", true)) growth("bunny", *scene, 3);
 }
 
 }  // namespace lambent::bench

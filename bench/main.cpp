@@ -41,16 +41,18 @@ std::optional<Scene> data_scene(const std::string& name, bool ground) {
 int main(int argc, char** argv) {
   using namespace lambent::bench;
   const std::pair<const char*, void (*)()> all[] = {{"bake", bench_bake},           {"basis", bench_basis},
-                                                    {"error", bench_error},         {"products", bench_products},
-                                                    {"radiosity", bench_radiosity}, {"lightmaps", bench_lightmaps},
-                                                    {"load", bench_load},           {"relight", bench_relight},
-                                                    {"scaling", bench_scaling},     {"zonal", bench_zonal}};
+                                                    {"error", bench_error},         {"certificate", bench_certificate},
+                                                    {"products", bench_products},   {"radiosity", bench_radiosity},
+                                                    {"lightmaps", bench_lightmaps}, {"load", bench_load},
+                                                    {"relight", bench_relight},     {"scaling", bench_scaling},
+                                                    {"zonal", bench_zonal}};
   bool known = argc == 1;
   for (int i = 1; i < argc; ++i)
     for (auto [name, run] : all) known |= !std::strcmp(argv[i], name);
   if (!known)
     return fmt::print(stderr,
-                      "usage: lambent-bench [bake] [basis] [error] [products] [radiosity] [lightmaps] [load] [relight] "
+                      "usage: lambent-bench [bake] [basis] [certificate] [error] [products] [radiosity] [lightmaps] "
+                      "[load] [relight] "
                       "[scaling] [zonal]\n"),
            2;
   for (auto [name, run] : all) {

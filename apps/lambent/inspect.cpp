@@ -137,8 +137,7 @@ struct InspectCommand {
 };
 
 int paint_error(Context& context, const InspectCommand& o) {
-  if (auto ok = check_output(o.view_error, {"png"}); !ok)
-    return fail(Error{"--view-error", ok.error().message, true});
+  if (auto ok = check_output(o.view_error, {"png"}); !ok) return fail(Error{"--view-error", ok.error().message, true});
   if (!is_baked(o.path)) return fail(Error{"--view-error", "needs a baked file, and " + o.path + " is none", true});
   auto baked = load_baked(o.path);
   if (!baked) return fail(baked.error());
@@ -159,8 +158,8 @@ int paint_error(Context& context, const InspectCommand& o) {
                 {"parts", parts}});
     return success;
   }
-  fmt::print("{}\n  error {:.2f}% RMS (within {:.2f}), measured anew at {} places; of its own light, by part:\n", o.path,
-             100 * c.error, 200 * c.uncertain, human_count(c.places));
+  fmt::print("{}\n  error {:.2f}% RMS (within {:.2f}), measured anew at {} places; of its own light, by part:\n",
+             o.path, 100 * c.error, 200 * c.uncertain, human_count(c.places));
   for (const auto& [name, error] : parts.items()) fmt::print("    {:5.1f}%  {}\n", 100 * error.get<double>(), name);
   fmt::print("  {}: from 0 (dark) to {:.3g}% (yellow) of all light's RMS\n", o.view_error, 100 * view->scale);
   return success;

@@ -207,11 +207,13 @@ struct Baker {
       other.emplace(make_gather_setup(scene, setup.tracer, receivers, options.order, options.samples, seed,
                                       square_to_cosine_hemisphere, progress));
     if (is_cancelled(progress)) return Error{"", "cancelled"};
-    Pool<GatherScratch, DeleteScratch> others([&] { return make_gather_scratch(*other); });
+    std::optional<Pool<GatherScratch, DeleteScratch>> others;
+    auto lend_scratch = [&] { others.emplace([&] { return make_gather_scratch(*other); }); };
+    lend_scratch();
     const GatherAt gather = [&](Vec3 origin, Vec3 normal, uint64_t key, float* row) {
       std::vector<float> sky_row(sky_width()), met(width());
       const GatherSky sky{sky_row.data(), nullptr, sky_width(), &lobes, nullptr};
-      const bool clear = gather_point(*other, *others.borrow(), origin, normal, key, sky,
+      const bool clear = gather_point(*other, *others->borrow(), origin, normal, key, sky,
                                       solved.met.empty() ? nullptr : solved.met.data(), width(), met.data());
       if (!lobes.sharp.empty())
         trace_lobes(lobes, setup.tracer, origin, normal, size_t(key), *lobe_rays.borrow(), sky_row.data() + harmonics(),
@@ -225,17 +227,18 @@ struct Baker {
     const Spread spread(placed.all, placed.thinned, buried);
     if (options.certify) {
       const auto start = std::chrono::steady_clock::now();
-      if (options.samples > most_certified_samples)  // the scratch of more rays is not lent again
-        others.clear(), other.emplace(make_gather_setup(scene, setup.tracer, receivers, options.order,
-                                                        most_certified_samples, seed, square_to_cosine_hemisphere,
-                                                        progress));
+      if (options.samples > most_certified_samples) {
+        others.reset();
+        other.emplace(make_gather_setup(scene, setup.tracer, receivers, options.order, most_certified_samples, seed,
+                                        square_to_cosine_hemisphere, progress));
+        lend_scratch();
+      }
       const FieldRow field = [&](uint32_t r, float* row) { spread.row(r, solved.x.data(), width(), row); };
       auto certificate = certify(scene, placed.all, field, width(), gather, certified_places, seed, progress);
       if (!certificate) return certificate.error();
       Certificate& c = report.certificate = std::move(*certificate);
       report.error = c.error;
-      if (c.noise >= 0)
-        c.noise *= std::pow(double(other->sets.samples) / double(options.samples), noise_slope);
+      if (c.noise >= 0) c.noise *= std::pow(double(other->sets.samples) / double(options.samples), noise_slope);
       // As much less by denoising as at the receivers, but no less than a mean of neighbours can have.
       report.noise = c.noise;
       if (options.denoise && report.noise_of_rays > 0)
@@ -386,8 +389,7 @@ Result<Thinned> thin_receivers(const Scene& scene, const Tracer& tracer, const R
   constexpr int most_order = 4;
   constexpr double part = 0.4;  // of the error; squares add up
   // Their noise has to be averaged away over a few hundred cells.
-  const int samples =
-      std::clamp(16 * int(std::lround(4 * std::pow(0.02 / options.error, 1 / noise_slope))), 64, 144);
+  const int samples = std::clamp(16 * int(std::lround(4 * std::pow(0.02 / options.error, 1 / noise_slope))), 64, 144);
   if (!options.thin || !options.lobes.empty() || options.order < 2) return keep_all(receivers.count());
   const auto start = std::chrono::steady_clock::now();
   const int order = std::min(options.order, most_order);
@@ -397,8 +399,8 @@ Result<Thinned> thin_receivers(const Scene& scene, const Tracer& tracer, const R
     Receivers at;
     at.basis = receivers.basis;
     for (uint32_t i : which) at.origins.push_back(receivers.origins[i]), at.normals.push_back(receivers.normals[i]);
-    const GatherSetup setup = make_gather_setup(scene, tracer, at, order, samples,
-                                                uint32_t(hash64(options.seed, 0x7468 + pass)));
+    const GatherSetup setup =
+        make_gather_setup(scene, tracer, at, order, samples, uint32_t(hash64(options.seed, 0x7468 + pass)));
     Pool<GatherScratch, DeleteScratch> scratch([&] { return make_gather_scratch(setup); });
     ProgressStage stage(progress, "looking where light changes", which.size());
     parallel_for(which.size(), gather_block, [&](size_t begin, size_t end) {
@@ -453,8 +455,9 @@ Result<Transfer> bake_to_error(const Scene& scene, const Tracer& tracer, const R
                  between = std::sqrt(std::max(0.0, error * error - noise * noise));
     // Where little is lost between receivers, noise may take the rest. Else more rays would hardly be seen beside
     // that; but noise is, in the shade of a sun.
-    const double wanted = between < target ? std::max(0.9 * std::sqrt(target * target - between * between), 0.5 * target)
-                                           : std::clamp(0.2 * error, 0.5 * target, 0.6 * target);
+    const double wanted = between < target
+                            ? std::max(0.9 * std::sqrt(target * target - between * between), 0.5 * target)
+                            : std::clamp(0.2 * error, 0.5 * target, 0.6 * target);
     const double ratio = std::clamp(std::pow(noise / wanted, 1 / noise_slope), 1.5, 16.0);
     const bool late = options.seconds >= 0 && seconds_since(start) + seconds_since(round) * ratio > options.seconds;
     if (!(noise > wanted && error > target) || options.samples == most || late) return transfer;

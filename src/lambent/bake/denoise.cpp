@@ -16,9 +16,9 @@
 namespace lambent {
 namespace {
 
-constexpr size_t most_neighbours = 24, looked_at = 48;    // itself among them; so many, and the fit ones of these
-constexpr size_t fewest_neighbours = 5;                   // a plane has three unknowns
-constexpr size_t tilt_neighbours = 10;                    // of so many on, rows may follow the normal as well
+constexpr size_t most_neighbours = 24, looked_at = 48;  // itself among them; so many, and the fit ones of these
+constexpr size_t fewest_neighbours = 5;                 // a plane has three unknowns
+constexpr size_t tilt_neighbours = 10;                  // of so many on, rows may follow the normal as well
 constexpr double tilt_ridge = 1e-4;
 constexpr size_t judges = 8;                              // neighbours whose risks are added up
 constexpr size_t variances = 6;                           // measured places that tell a place's variance

@@ -300,8 +300,7 @@ struct LampSum {
     if (h.triangle == none || lamps.of_triangle.empty()) return;
     const uint32_t lamp = lamps.of_triangle[h.triangle];
     if (lamp == none || !emits(setup.scene, setup.scene.triangles[h.triangle], h.front)) return;
-    LampLight light =
-        met_lamp(setup.scene, lamps, lamp, h, direction, dot(normal, direction), direct->samples, rays);
+    LampLight light = met_lamp(setup.scene, lamps, lamp, h, direction, dot(normal, direction), direct->samples, rays);
     light.value *= passed;
     add(light, share);
   }

@@ -18,9 +18,9 @@ namespace lambent {
 namespace {
 
 constexpr size_t certified_places = 1024;
-constexpr double noise_slope = 0.75;    // denoised noise falls as rays to about this power
-constexpr double spread_part = 0.3;     // of the error that choosing receivers may lose, for direct light and bounces
-constexpr double noise_part = 0.5;      // and noise of each
+constexpr double noise_slope = 0.75;  // denoised noise falls as rays to about this power
+constexpr double spread_part = 0.3;   // of the error that choosing receivers may lose, for direct light and bounces
+constexpr double noise_part = 0.5;    // and noise of each
 constexpr int most_samples = 1 << 13, pilot_samples = 24, first_bounced = 96;
 constexpr size_t piece = 16;
 
@@ -61,8 +61,8 @@ struct Gatherer {
 // Rows of some receivers, their noise taken away, and of all.
 struct Stage {
   Thinned thinned;
-  AlignedVector<float> rows;     // [chosen][width]
-  std::vector<uint8_t> buried;   // of the chosen
+  AlignedVector<float> rows;      // [chosen][width]
+  std::vector<uint8_t> buried;    // of the chosen
   double noise2 = 0, total2 = 0;  // mean squares over all receivers: of noise that is left, of the rows
 };
 
@@ -78,10 +78,10 @@ struct LightmapSolver {
   bool coloured_sky = false;
   int direct_samples = o.lamp_samples, samples = first_bounced;
   Stage direct{}, bounced{};
-  AlignedVector<float> lit{};                    // direct light of all receivers
-  AlignedVector<float> met{};                    // of the chosen of `bounced`: what rays find on surfaces, less a bounce
-  std::optional<Receivers> cells{};              // those, and what stands for what
-  std::vector<AlignedVector<float>> terms{};     // of all receivers
+  AlignedVector<float> lit{};                 // direct light of all receivers
+  AlignedVector<float> met{};                 // of the chosen of `bounced`: what rays find on surfaces, less a bounce
+  std::optional<Receivers> cells{};           // those, and what stands for what
+  std::vector<AlignedVector<float>> terms{};  // of all receivers
 
   bool bounces() const { return o.converge > 0 || o.bounces > 0; }
   int fan_of(int towards) const { return lamps.sky || !lamps.area.empty() ? towards : 16; }
@@ -107,8 +107,7 @@ struct LightmapSolver {
       Gatherer gather(scene, tracer, receivers, lamps, towards, rays, uint32_t(hash64(o.seed, 0x6c + pass)), width);
       return gather_all(name, which, gather, x, rows, inside);
     };
-    auto thinned =
-        thin(scene, receivers, width, pilot, {.error = spread_part * o.error, .square = square}, progress);
+    auto thinned = thin(scene, receivers, width, pilot, {.error = spread_part * o.error, .square = square}, progress);
     if (thinned) report.rays += thinned->tried * size_t(rays + towards);
     return thinned;
   }
@@ -124,16 +123,15 @@ struct LightmapSolver {
     if (auto ok = gather_all("measuring the noise", which, other, x, again.data(), nullptr); !ok) return ok;
     std::vector<float> variance(measured.size());
     for (size_t i = 0; i < measured.size(); ++i)
-      variance[i] =
-          float(0.5 * squares(again.data() + i * width, s.rows.data() + size_t(measured[i]) * width, width));
+      variance[i] = float(0.5 * squares(again.data() + i * width, s.rows.data() + size_t(measured[i]) * width, width));
     AlignedVector<float> out(s.rows.size());
     std::vector<Vec3> places, normals;
     for (uint32_t r : chosen) places.push_back(receivers.origins[r]), normals.push_back(receivers.normals[r]);
     if (o.denoise) {
       std::vector<float*> others;
       for (AlignedVector<float>& term : more) others.push_back(term.data());
-      auto ok = denoise({places, normals, s.buried, measured, variance}, s.rows.data(), width, out.data(), others,
-                        progress);
+      auto ok =
+          denoise({places, normals, s.buried, measured, variance}, s.rows.data(), width, out.data(), others, progress);
       if (!ok) return ok;
     }
     std::vector<double> members(chosen.size(), 0.0);
@@ -143,8 +141,8 @@ struct LightmapSolver {
     for (size_t i = 0; i < measured.size(); ++i) {
       const size_t c = measured[i];
       const float *row = again.data() + i * width, *first = s.rows.data() + c * width;
-      s.noise2 += members[c] * (o.denoise ? squares(row, out.data() + c * width, width) - double(variance[i])
-                                          : double(variance[i]));
+      s.noise2 += members[c] *
+                  (o.denoise ? squares(row, out.data() + c * width, width) - double(variance[i]) : double(variance[i]));
       for (size_t k = 0; k < width; ++k) s.total2 += members[c] * double(row[k]) * double(first[k]);
       all += members[c];
     }
@@ -203,9 +201,11 @@ struct LightmapSolver {
   Result<void> solve_bounced() {
     const auto start = Clock::now();
     Stage& s = bounced;
-    const GatherSetup setup = make_gather_setup(scene, tracer, *cells, 1, samples, o.seed, square_to_cosine_hemisphere,
-                                                progress);
-    auto op = GatherOperator::trace(setup, nullptr, nullptr, true, o.memory, progress);
+    const GatherSetup setup =
+        make_gather_setup(scene, tracer, *cells, 1, samples, o.seed, square_to_cosine_hemisphere, progress);
+    auto op = GatherOperator::trace(
+        setup, nullptr, nullptr, true,
+        o.memory - std::min(o.memory, least_lightmap_memory(receivers.count(), lamps.groups(), o)), progress);
     if (!op) return op.error();
     report.trace_seconds += seconds_since(start);
     const auto solving = Clock::now();
@@ -219,10 +219,9 @@ struct LightmapSolver {
       if (!solved) return solved.error();
       x = std::move(*solved), met = x;
     } else {
-      auto solved = bounce(*op, source_of(e.data(), width), width, o.bounces, progress,
-                           [&](size_t first, size_t count, const float* y) {
-                             std::copy_n(y, count * width, x.data() + first * width);
-                           });
+      auto solved = bounce(
+          *op, source_of(e.data(), width), width, o.bounces, progress,
+          [&](size_t first, size_t count, const float* y) { std::copy_n(y, count * width, x.data() + first * width); });
       if (!solved) return solved.error();
       met = std::move(solved->x);
       op->fill(x.data(), width);
@@ -280,7 +279,8 @@ struct LightmapSolver {
       if (bounces() && !cells) {
         double square = 0;
         for (float v : lit) square += double(v) * double(v);
-        auto few = choose("looking where reflected light changes", 0, 64, lit.data(), square / double(receivers.count()));
+        auto few =
+            choose("looking where reflected light changes", 0, 64, lit.data(), square / double(receivers.count()));
         if (!few) return few.error();
         bounced.thinned = std::move(*few);
         cells = bounced.thinned.all() ? receivers : thinned_receivers(receivers, bounced.thinned);
@@ -316,8 +316,8 @@ struct LightmapSolver {
 }  // namespace
 
 Result<SolvedLightmap> solve_lightmap_to_error(const Scene& scene, const Tracer& tracer, const Receivers& receivers,
-                                               const Lamps& lamps, const LightmapOptions& options, LightmapReport& report,
-                                               Progress* progress) {
+                                               const Lamps& lamps, const LightmapOptions& options,
+                                               LightmapReport& report, Progress* progress) {
   return LightmapSolver{scene, tracer, receivers, lamps, options, report, progress}.run();
 }
 

@@ -12,8 +12,8 @@ struct SolvedLightmap {
 
 // Columns are the lamps' groups times channels, `width` floats. Errors: cancelled.
 Result<SolvedLightmap> solve_lightmap_to_error(const Scene& scene, const Tracer& tracer, const Receivers& receivers,
-                                               const Lamps& lamps, const LightmapOptions& options, LightmapReport& report,
-                                               Progress* progress = nullptr);
+                                               const Lamps& lamps, const LightmapOptions& options,
+                                               LightmapReport& report, Progress* progress = nullptr);
 
 // Texels along a unit of length with which direct light is told to an error by bilinear look-ups: measured with two
 // coarse atlases and extrapolated; at most so many that `most` texels result. `remark` says in one line what decided.

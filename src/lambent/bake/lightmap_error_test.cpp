@@ -73,7 +73,8 @@ TEST(LightmapError, IsWhatManyRaysFind) {
   const auto& basis = std::get<TexelReceivers>(yard.receivers.basis);
   for (uint32_t t = 0; t < yard.scene.triangles.size(); ++t) {
     if (yard.scene.parts[yard.scene.triangles[t].part].name != "inner") continue;
-    for (const Vec2 at : {Vec2(0.01f, 0.01f), Vec2(0.98f, 0.01f), Vec2(0.01f, 0.98f), Vec2(0.3f, 0.3f), Vec2(0.5f, 0.49f)})
+    for (const Vec2 at :
+         {Vec2(0.01f, 0.01f), Vec2(0.98f, 0.01f), Vec2(0.01f, 0.98f), Vec2(0.3f, 0.3f), Vec2(0.5f, 0.49f)})
       basis.spread(*basis.find(t, true), at.x, at.y,
                    [&](uint32_t r, float) { EXPECT_EQ(load_receiver(map.all, r)[0], 0) << t; });
   }

@@ -13,9 +13,7 @@
 namespace lambent {
 namespace {
 
-Scene grid(int cells) {
-  return make_quad(Vec3(0), Vec3(0, 0, 1), Vec3(1, 0, 0), cells, cells, Vec3(0.5f));
-}
+Scene grid(int cells) { return make_quad(Vec3(0), Vec3(0, 0, 1), Vec3(1, 0, 0), cells, cells, Vec3(0.5f)); }
 
 // Rows of a function of the place, with noise.
 PilotRows pilot_of(const Receivers& receivers, std::function<float(Vec3)> truth, float noise) {
@@ -66,7 +64,9 @@ TEST(Thin, FindsAShadowsEdgeUnderNoise) {
   EXPECT_LT(double(thinned->chosen.size()), 0.5 * double(receivers.count()));
   EXPECT_LT(lost(receivers, *thinned, truth), 2 * options.error);
   // As many, spread evenly, lose far more.
-  auto flat = thin(scene, receivers, 4, pilot_of(receivers, [](Vec3) { return 1.0f; }, 0),
+  auto flat = thin(scene, receivers, 4,
+                   pilot_of(
+                       receivers, [](Vec3) { return 1.0f; }, 0),
                    {.error = 0.02, .fewest = thinned->chosen.size()});
   ASSERT_TRUE(flat);
   EXPECT_GT(lost(receivers, *flat, truth), 2 * lost(receivers, *thinned, truth));

@@ -22,11 +22,6 @@ class Pool {
   };
   using Loan = std::unique_ptr<T, GiveBack>;
 
-  // Forgets what is not lent.
-  void clear() {
-    std::lock_guard lock(mutex_);
-    free_.clear();
-  }
   Loan borrow() {
     std::unique_lock lock(mutex_);
     if (free_.empty()) {

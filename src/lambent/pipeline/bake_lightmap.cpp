@@ -85,9 +85,9 @@ void summarize_error(const BakePlan& plan, const LightmapReport& r, const Scene&
   s.json["direct"] = {{"traced", r.direct_traced}, {"samples", r.direct_samples}};
   s.json["bounced"] = {{"traced", r.bounced_traced}, {"samples", r.samples}};
   s.json["seconds"]["certify"] = r.certify_seconds;
-  s.lines.emplace_back("traced", fmt::format("direct light at {} with {} samples, bounces at {} with {} rays",
-                                             human_count(r.direct_traced), r.direct_samples,
-                                             human_count(r.bounced_traced), r.samples));
+  s.lines.emplace_back(
+      "traced", fmt::format("direct light at {} with {} samples, bounces at {} with {} rays",
+                            human_count(r.direct_traced), r.direct_samples, human_count(r.bounced_traced), r.samples));
   if (c.error < 0) return;
   const double noise = std::hypot(r.direct_noise, r.bounced_noise);
   s.lines.emplace_back("error",
@@ -115,8 +115,8 @@ Result<std::optional<Environment>> sky_of_request(const BakeRequest& request, co
   return std::optional(std::move(*env));
 }
 
-Result<BakeRequest> with_density(const BakeRequest& request, const BakePlan& plan, const Scene& scene, const Lamps& lamps,
-                                 std::string& remark, const Job& job) {
+Result<BakeRequest> with_density(const BakeRequest& request, const BakePlan& plan, const Scene& scene,
+                                 const Lamps& lamps, std::string& remark, const Job& job) {
   BakeRequest out = request;
   if (request.receivers != "texels" || !request.atlas.empty() || request.texels_per_unit > 0) return out;
   if (lamps.groups() == 0) {  // the bake will say so

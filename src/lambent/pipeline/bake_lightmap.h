@@ -12,8 +12,8 @@ Result<BakeOutcome> bake_lightmap_request(const BakeRequest& request, const Bake
 Result<std::optional<Environment>> sky_of_request(const BakeRequest& request, const Job& job);
 
 // The request with the density of its texels, where neither it nor the atlas says one: as light asks for (`remark`).
-Result<BakeRequest> with_density(const BakeRequest& request, const BakePlan& plan, const Scene& scene, const Lamps& lamps,
-                                 std::string& remark, const Job& job);
+Result<BakeRequest> with_density(const BakeRequest& request, const BakePlan& plan, const Scene& scene,
+                                 const Lamps& lamps, std::string& remark, const Job& job);
 
 extern const std::map<std::string, Solver> solver_names;
 // {converged, steps: [{applications, residual}]}

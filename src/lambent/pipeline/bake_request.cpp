@@ -46,15 +46,15 @@ const Option<R> table[] = {
     {"texels-per-unit", &R::texels_per_unit, "What is baked", D | L,
      "Texels along one scene unit; the atlas is as large as that needs", 1e-12, 1e12, nullptr, "receivers=texels"},
     {"atlas", &R::atlas, "What is baked", D | L,
-     "WIDTHxHEIGHT of the atlas; texels are as small as that allows (if nothing is said, as light asks for in a lightmap "
-     "baked to an error, else 1024x1024)", 0, 0, nullptr,
-     "receivers=texels"},
+     "WIDTHxHEIGHT of the atlas; texels are as small as that allows (if nothing is said, as light asks for in a "
+     "lightmap "
+     "baked to an error, else 1024x1024)",
+     0, 0, nullptr, "receivers=texels"},
 
     {"quality", &R::quality, "How well", D | L,
      "An error to bake to, and how fine a mesh or a lightmap may become: 10 %, 2.5 % or 1 % of the transfer's RMS (of "
      "lightmaps 2 %)",
-     0, 0,
-     "preview|good|final"},
+     0, 0, "preview|good|final"},
     {"error", &R::error, "How well", D | L,
      "Bake to this relative RMS error, e.g. 2%, measured on rays and places of their own; says what it reached"},
     {"time", &R::time, "How well", D | L,
@@ -64,10 +64,11 @@ const Option<R> table[] = {
      "Split edges where light changes: auto does it for scenes without bones, where neither --samples nor --max-edge "
      "is given",
      0, 0, "auto|on|off", "receivers=vertices"},
-    {"denoise", &R::denoise, "How well", D | Z | F | L, "Take away noise that neighbours on a surface do not share", 0, 0,
-     "on|off"},
+    {"denoise", &R::denoise, "How well", D | Z | F | L, "Take away noise that neighbours on a surface do not share", 0,
+     0, "on|off"},
     {"samples", &R::samples, "How well", traced,
-     "Rays a receiver; without, diffuse transfer and lightmaps of lamps are baked to an error, other kinds with 1024", 1, 1 << 20},
+     "Rays a receiver; without, diffuse transfer and lightmaps of lamps are baked to an error, other kinds with 1024",
+     1, 1 << 20},
     {"bounces", &R::bounces, "How well", D | M | Z | G | L,
      "Reflections between surfaces, 0 to 64; lightmaps also converge:EPS, as many as leave that residual"},
     {"shadows", &R::shadows, "How well", D | Z, "off: open light everywhere, no shadows and no bounces", 0, 0,
@@ -233,10 +234,11 @@ Result<void> check_kind(const BakeRequest& r, BakeKind kind) {
   if (kind == BakeKind::lightmap && is_plain_lightmap(r))
     for (const char* name : {"quality", "error", "time", "denoise"})
       if (r.given.contains(name))
-        return Error{std::string("--") + name,
-                     "is for lightmaps of lamps that are baked to an error: leave --samples, --order, --directional and "
-                     "--gather out",
-                     true};
+        return Error{
+            std::string("--") + name,
+            "is for lightmaps of lamps that are baked to an error: leave --samples, --order, --directional and "
+            "--gather out",
+            true};
   if (r.given.contains("quality") && has_no_quality(r))
     return Error{"--quality", "with --samples says how fine --adapt on may make the mesh: add that, or leave one out",
                  true};

@@ -18,8 +18,8 @@ namespace lambent {
 namespace {
 
 constexpr size_t places = 8192;
-constexpr int samples = 256;      // of each gather
-constexpr size_t averaged = 24;   // places around a pixel, of those that face as it does
+constexpr int samples = 256;     // of each gather
+constexpr size_t averaged = 24;  // places around a pixel, of those that face as it does
 constexpr size_t looked_at = 64;
 constexpr float least_cosine = 0.5f;
 constexpr int legend_height = 26, margin = 6;
@@ -37,13 +37,15 @@ using Tree = nanoflann::KDTreeSingleIndexAdaptor<nanoflann::L2_Simple_Adaptor<fl
 
 // Dark blue, teal, green, yellow: even steps of lightness, for any eye and for grey print.
 Vec3 colour_of(double share) {
-  constexpr float anchors[5][3] = {
-      {0.16f, 0.05f, 0.33f}, {0.19f, 0.31f, 0.55f}, {0.13f, 0.57f, 0.55f}, {0.43f, 0.79f, 0.36f}, {0.99f, 0.91f, 0.14f}};
+  constexpr float anchors[5][3] = {{0.16f, 0.05f, 0.33f},
+                                   {0.19f, 0.31f, 0.55f},
+                                   {0.13f, 0.57f, 0.55f},
+                                   {0.43f, 0.79f, 0.36f},
+                                   {0.99f, 0.91f, 0.14f}};
   const float at = 4 * float(std::clamp(share, 0.0, 1.0));
   const int k = std::min(int(at), 3);
   Vec3 c;
-  for (int j = 0; j < 3; ++j)
-    c[j] = srgb_decode(anchors[k][j] + (at - float(k)) * (anchors[k + 1][j] - anchors[k][j]));
+  for (int j = 0; j < 3; ++j) c[j] = srgb_decode(anchors[k][j] + (at - float(k)) * (anchors[k + 1][j] - anchors[k][j]));
   return c;
 }
 
@@ -67,7 +69,8 @@ void draw_text(Image& image, int x, int y, const std::string& text, Vec3 colour)
 void draw_legend(Image& image, int top, double scale) {
   const int left = margin, right = image.width - margin;
   for (int x = left; x < right; ++x)
-    for (int y = top + 2; y < top + 11; ++y) image.at(x, y) = colour_of(double(x - left) / std::max(1, right - left - 1));
+    for (int y = top + 2; y < top + 11; ++y)
+      image.at(x, y) = colour_of(double(x - left) / std::max(1, right - left - 1));
   const int ticks = image.width >= 240 ? 4 : 2;
   for (int k = 0; k <= ticks; ++k) {
     const std::string text = fmt::format("{:.3g}%", 100 * scale * k / ticks);
@@ -182,7 +185,8 @@ void paint(const Scene& scene, const Tracer& tracer, const View& view, ErrorView
         size_t count = 0;
         for (size_t q = 0; q < found && count < averaged; ++q)
           if (dot(all[index[q]].normal, n) >= least_cosine) sum += all[index[q]].error2, ++count;
-        if (count > 0) local[y * size_t(view.width) + size_t(x)] = float(std::sqrt(std::max(0.0, sum / double(count)) / truth));
+        if (count > 0)
+          local[y * size_t(view.width) + size_t(x)] = float(std::sqrt(std::max(0.0, sum / double(count)) / truth));
       }
   });
   std::vector<float> shown;

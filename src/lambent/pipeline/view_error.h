@@ -16,8 +16,8 @@ struct ErrorView {
 };
 
 // Measured at 8,192 places by rays of their own, against surfaces whose light is gathered anew. `camera` and `size` as
-// `render` takes them. Errors: not a dense field of diffuse transfer of harmonics that was baked with shadows and without
-// a medium; those of parse_view(); cancelled.
+// `render` takes them. Errors: not a dense field of diffuse transfer of harmonics that was baked with shadows and
+// without a medium; those of parse_view(); cancelled.
 Result<ErrorView> view_error(const Baked& baked, const std::string& camera, const std::string& size, const Job& job);
 
 }  // namespace lambent
