@@ -161,7 +161,7 @@ int paint_error(Context& context, const InspectCommand& o) {
   fmt::print("{}\n  error {:.2f}% RMS (within {:.2f}), measured anew at {} places; of its own light, by part:\n",
              o.path, 100 * c.error, 200 * c.uncertain, human_count(c.places));
   for (const auto& [name, error] : parts.items()) fmt::print("    {:5.1f}%  {}\n", 100 * error.get<double>(), name);
-  fmt::print("  {}: from 0 (dark) to {:.3g}% (yellow) of all light's RMS\n", o.view_error, 100 * view->scale);
+  fmt::print("  {}: from 0 (black) to {:.3g}% (white) of all light's RMS\n", o.view_error, 100 * view->scale);
   return success;
 }
 

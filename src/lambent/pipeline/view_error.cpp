@@ -35,46 +35,15 @@ struct Cloud {
 };
 using Tree = nanoflann::KDTreeSingleIndexAdaptor<nanoflann::L2_Simple_Adaptor<float, Cloud>, Cloud, 3, uint32_t>;
 
-// Dark blue, teal, green, yellow: even steps of lightness, for any eye and for grey print.
-Vec3 colour_of(double share) {
-  constexpr float anchors[5][3] = {{0.16f, 0.05f, 0.33f},
-                                   {0.19f, 0.31f, 0.55f},
-                                   {0.13f, 0.57f, 0.55f},
-                                   {0.43f, 0.79f, 0.36f},
-                                   {0.99f, 0.91f, 0.14f}};
-  const float at = 4 * float(std::clamp(share, 0.0, 1.0));
-  const int k = std::min(int(at), 3);
-  Vec3 c;
-  for (int j = 0; j < 3; ++j) c[j] = srgb_decode(anchors[k][j] + (at - float(k)) * (anchors[k + 1][j] - anchors[k][j]));
-  return c;
-}
-
-// Digits, a point and a per cent sign, 3 x 5 pixels each, rows from the top.
-constexpr const char* glyph_names = "0123456789.%";
-constexpr uint16_t glyphs[] = {075557, 026227, 071747, 071717, 055711, 074717,
-                               074757, 071111, 075757, 075717, 000002, 051245};
-
-void draw_text(Image& image, int x, int y, const std::string& text, Vec3 colour) {
-  constexpr int size = 2;
-  for (char c : text) {
-    const char* name = std::char_traits<char>::find(glyph_names, std::size(glyphs), c);
-    for (int j = 0; name && j < 5 * size; ++j)
-      for (int i = 0; i < 3 * size; ++i)
-        if (glyphs[name - glyph_names] >> (3 * (4 - j / size) + 2 - i / size) & 1)
-          if (x + i >= 0 && x + i < image.width && y + j < image.height) image.at(x + i, y + j) = colour;
-    x += 4 * size;
-  }
-}
-
 void draw_legend(Image& image, int top, double scale) {
   const int left = margin, right = image.width - margin;
   for (int x = left; x < right; ++x)
     for (int y = top + 2; y < top + 11; ++y)
-      image.at(x, y) = colour_of(double(x - left) / std::max(1, right - left - 1));
+      image.at(x, y) = false_color(float(x - left) / float(std::max(1, right - left - 1)));
   const int ticks = image.width >= 240 ? 4 : 2;
   for (int k = 0; k <= ticks; ++k) {
     const std::string text = fmt::format("{:.3g}%", 100 * scale * k / ticks);
-    const int width = int(text.size()) * 8, x = left + (right - left) * k / ticks;
+    const int width = int(text.size()) * 6, x = left + (right - left) * k / ticks;
     draw_text(image, std::clamp(x - width / 2, 0, std::max(0, image.width - width)), top + 14, text, Vec3(1));
   }
 }
@@ -200,7 +169,7 @@ void paint(const Scene& scene, const Tracer& tracer, const View& view, ErrorView
   }
   out.scale = rounded_up(top);
   for (size_t i = 0; i < local.size(); ++i)
-    out.image.rgb[i] = local[i] < 0 ? Vec3(0.02f) : colour_of(double(local[i]) / out.scale);
+    out.image.rgb[i] = local[i] < 0 ? Vec3(0.1f, 0.2f, 0.3f) : false_color(local[i] / float(out.scale));
   draw_legend(out.image, height, out.scale);
 }
 
