@@ -28,7 +28,8 @@ double seconds_since(std::chrono::steady_clock::time_point start) {
 constexpr size_t certified_places = 1024;
 constexpr int most_certified_samples = 512;
 
-constexpr double noise_slope = 0.75;  // denoised noise falls as rays to about this power
+constexpr double noise_slope = 0.75;    // noise falls as rays to about this power,
+constexpr double denoised_slope = 0.6;  // and what denoising leaves of it to this
 
 constexpr double least_noise_left = 0.2;  // 1 / sqrt of denoise()'s neighbours
 
@@ -224,7 +225,7 @@ struct Baker {
     };
     if (measures)
       if (auto ok = measure_noise(solved.x, buried, terms, gather); !ok) return ok.error();
-    const Spread spread(placed.all, placed.thinned, buried);
+    const Spread spread(placed.all, placed.thinned, buried, solved.x.data(), width());
     if (options.certify) {
       const auto start = std::chrono::steady_clock::now();
       if (options.samples > most_certified_samples) {
@@ -458,7 +459,7 @@ Result<Transfer> bake_to_error(const Scene& scene, const Tracer& tracer, const R
     const double wanted = between < target
                             ? std::max(0.9 * std::sqrt(target * target - between * between), 0.5 * target)
                             : std::clamp(0.2 * error, 0.5 * target, 0.6 * target);
-    const double ratio = std::clamp(std::pow(noise / wanted, 1 / noise_slope), 1.5, 16.0);
+    const double ratio = std::clamp(std::pow(noise / wanted, 1 / denoised_slope), 1.5, 16.0);
     const bool late = options.seconds >= 0 && seconds_since(start) + seconds_since(round) * ratio > options.seconds;
     if (!(noise > wanted && error > target) || options.samples == most || late) return transfer;
     options.samples = std::min(most, int(std::lround(double(options.samples) * ratio / 64)) * 64);

@@ -153,7 +153,7 @@ struct LightmapSolver {
 
   // All receivers' rows from the chosen ones'.
   void spread(const Stage& s, const AlignedVector<float>& rows, AlignedVector<float>& out, bool add) {
-    const Spread of(receivers, s.thinned, s.buried);
+    const Spread of(receivers, s.thinned, s.buried, s.rows.data(), width);
     if (!add) out.assign(receivers.count() * width, 0.0f);
     parallel_for(receivers.count(), 64, [&](size_t begin, size_t end) {
       AlignedVector<float> row(width);

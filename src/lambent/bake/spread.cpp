@@ -18,6 +18,16 @@ double area_of(const Scene& scene, const Triangle& t) {
   return 0.5 * length(cross(b - a, c - a));
 }
 
+// Rows on the two sides of a wall's foot, or of a sharp shadow, are not.
+bool are_alike(const float* rows, size_t width, size_t i, size_t j) {
+  constexpr float most = 0.25f;  // of the greater one's square
+  const float *a = rows + i * width, *b = rows + j * width;
+  float difference = 0, first = 0, second = 0;
+  for (size_t k = 0; k < width; ++k)
+    difference += (a[k] - b[k]) * (a[k] - b[k]), first += a[k] * a[k], second += b[k] * b[k];
+  return difference <= most * std::max(first, second);
+}
+
 }  // namespace
 
 bool on_one_surface(const Receivers& r, size_t i, size_t j) {
@@ -134,7 +144,8 @@ Receivers thinned_receivers(const Receivers& receivers, const Thinned& thinned) 
   return out;
 }
 
-Spread::Spread(const Receivers& receivers, const Thinned& thinned, std::span<const uint8_t> left_out)
+Spread::Spread(const Receivers& receivers, const Thinned& thinned, std::span<const uint8_t> left_out,
+               const float* guide, size_t width)
     : receivers_(receivers), thinned_(thinned) {
   if (thinned.all()) return;
   near_.resize(thinned.chosen.size());
@@ -150,7 +161,11 @@ Spread::Spread(const Receivers& receivers, const Thinned& thinned, std::span<con
       if (members[c] < 2) continue;
       Near& at = near_[c];
       at.count = uint32_t(find_neighbours(tree, receivers, open, thinned.chosen[c], SIZE_MAX, most, at.index.data()));
-      for (size_t q = 0; q < at.count; ++q) at.index[q] = index[at.index[q]];
+      size_t alike = 0;
+      for (size_t q = 0; q < at.count; ++q)
+        if (const uint32_t other = index[at.index[q]]; !guide || are_alike(guide, width, c, other))
+          at.index[alike++] = other;
+      at.count = uint32_t(alike);
     }
   });
 }

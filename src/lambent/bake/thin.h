@@ -59,7 +59,10 @@ class Spread {
   };
   // Of the chosen, left_out[i] 1: tells nothing (inside something); empty: none. `receivers` and `thinned` must outlive
   // it.
-  Spread(const Receivers& receivers, const Thinned& thinned, std::span<const uint8_t> left_out);
+  // `guide`: rows of the chosen; neighbours whose row is very different, as beyond a wall, tell nothing. Null: all
+  // tell.
+  Spread(const Receivers& receivers, const Thinned& thinned, std::span<const uint8_t> left_out,
+         const float* guide = nullptr, size_t width = 0);
   Shares shares(size_t receiver) const;
   // rows: [chosen][width]
   void row(size_t receiver, const float* rows, size_t width, float* out) const;
