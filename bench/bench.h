@@ -40,6 +40,7 @@ void bench_products();
 void bench_radiosity();
 void bench_relight();
 void bench_scaling();
+void bench_window();
 void bench_zonal();
 
 }  // namespace lambent::bench

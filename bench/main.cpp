@@ -40,12 +40,11 @@ std::optional<Scene> data_scene(const std::string& name, bool ground) {
 
 int main(int argc, char** argv) {
   using namespace lambent::bench;
-  const std::pair<const char*, void (*)()> all[] = {{"bake", bench_bake},           {"basis", bench_basis},
-                                                    {"error", bench_error},         {"certificate", bench_certificate},
-                                                    {"products", bench_products},   {"radiosity", bench_radiosity},
-                                                    {"lightmaps", bench_lightmaps}, {"load", bench_load},
-                                                    {"relight", bench_relight},     {"scaling", bench_scaling},
-                                                    {"zonal", bench_zonal}};
+  const std::pair<const char*, void (*)()> all[] = {
+      {"bake", bench_bake},         {"basis", bench_basis},         {"error", bench_error},
+      {"products", bench_products}, {"radiosity", bench_radiosity}, {"lightmaps", bench_lightmaps},
+      {"load", bench_load},         {"relight", bench_relight},     {"scaling", bench_scaling},
+      {"zonal", bench_zonal},       {"window", bench_window},       {"certificate", bench_certificate}};
   bool known = argc == 1;
   for (int i = 1; i < argc; ++i)
     for (auto [name, run] : all) known |= !std::strcmp(argv[i], name);

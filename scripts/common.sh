@@ -6,6 +6,8 @@ build_packages="g++ cmake ninja-build ccache pkg-config libembree-dev libtbb-dev
   libstb-dev libxxhash-dev nlohmann-json3-dev libfmt-dev libcli11-dev libgtest-dev
   libdraco-dev libmeshoptimizer-dev libwebp-dev libnanoflann-dev"
 python_packages="pybind11-dev python3-dev python3-numpy"
+# Of `lambent view --window`, and of its tests.
+window_packages="libglfw3-dev libimgui-dev libgl-dev xvfb xdotool libgl1-mesa-dri"
 sanitize_packages="clang-14 libclang-rt-14-dev"
 
 # Installs the Debian packages named, if any is missing. Needs root or sudo only then.

@@ -1,5 +1,6 @@
 #include "commands.h"
 #include "serve.h"
+#include "window/window.h"
 
 #include <fmt/format.h>
 #include <spawn.h>
@@ -9,6 +10,7 @@ namespace {
 
 struct ViewCommand {
   WebOptions web;
+  WindowOptions window;
   int port = 0;
   bool no_browser = false;
 };
@@ -27,8 +29,35 @@ void open_browser(const std::string& address) {
     warn("no browser could be started: open the address by hand");
 }
 
-int run_view(Context& context, const ViewCommand& o) {
+// In a window of its own.
+int run_window(Context& context, const ViewCommand& o) {
+  SessionOptions session{.baked = {o.web.baked}, .env = o.web.env, .reference = o.web.reference};
+  if (!o.web.compare.empty()) session.baked.push_back(o.web.compare);
+  session.baked.insert(session.baked.end(), o.window.more.begin(), o.window.more.end());
+  DrawRequest& draw = session.draw;
+  draw.camera = o.web.camera, draw.exposure = o.web.exposure, draw.tone = o.web.tone, draw.brdf = o.window.brdf;
+  draw.spp = o.window.spp, draw.light_order = o.window.light_order;
+  if (!o.web.rotate.empty()) draw.env_rotate = o.web.rotate;
+  if (!o.window.method.empty()) draw.method = o.window.method;
+  const Job job{&context.progress, [](const std::string& message) { warn(message); }};
+  auto shown = run_window(session, o.window, job);
+  return shown ? success : fail(shown.error());
+}
+
+// Options of the one that the other has no use for, by name.
+Result<void> check_view(const CLI::App& command, bool window) {
+  for (const char* option : {"--port", "--no-browser"})
+    if (window && command.count(option))
+      return Error{option, "is of the page that a browser shows, not of --window", true};
+  for (const char* option : {"more", "--script", "--size", "--spp", "--brdf", "--method", "--light-order"})
+    if (!window && command.count(option)) return Error{option, "is for --window", true};
+  return {};
+}
+
+int run_view(Context& context, const ViewCommand& o, const CLI::App& command) {
+  if (auto ok = check_view(command, o.window.window); !ok) return fail(ok.error());
   context.cleans_up = true;
+  if (o.window.window) return run_window(context, o);
   auto files = web_files(o.web);
   if (!files) return fail(files.error());
   auto listener = listen_on(o.port);
@@ -46,13 +75,15 @@ int run_view(Context& context, const ViewCommand& o) {
 
 void add_view(CLI::App& app, Run& run) {
   auto o = std::make_shared<ViewCommand>();
-  CLI::App* c = app.add_subcommand("view", "Show a baked file in the browser; the light turns under the hand");
+  CLI::App* c =
+      app.add_subcommand("view", "Show a baked file in the browser, or in a window; the light turns under the hand");
   o->web.add_to(*c);
+  o->window.add_to(*c);
   c->add_option("--port", o->port, "Port on 127.0.0.1; 0: any that is free")
       ->check(CLI::Range(0, 65535))
       ->capture_default_str();
   c->add_flag("--no-browser", o->no_browser, "Only print the address");
-  c->callback([o, &run] { run = [o](Context& context) { return run_view(context, *o); }; });
+  c->callback([o, c, &run] { run = [o, c](Context& context) { return run_view(context, *o, *c); }; });
 }
 
 }  // namespace lambent::tool

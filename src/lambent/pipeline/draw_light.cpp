@@ -50,11 +50,13 @@ void find_peaks(const DrawRequest& request, const Surroundings& around, const Li
   if (!basis.lobes.empty() || basis.order == 0) return;
   const int order = request.light_order ? std::min(request.light_order, basis.order) : basis.order;
   const std::vector<Vec3>& all = out.projection.light;
-  const std::vector<Vec3> rest =
-      project_light(without_peaks(*around.env, order), basis, around.rotation, request.light_order).light;
+  const bool known = around.known && around.known->order == order;
+  const std::vector<Vec3> rest = project_light(known ? around.known->rest : without_peaks(*around.env, order), basis,
+                                               around.rotation, request.light_order)
+                                     .light;
   const double light = luminance(all[0]), sharp = luminance(all[0] - rest[0]);
   if (!(sharp > least_sharp * light)) return;
-  out.sharp = sharp / light, out.lamps_found = int(find_lamps(*around.env, 8).size());
+  out.sharp = sharp / light, out.lamps_found = known ? around.known->lamps : int(find_lamps(*around.env, 8).size());
   for (size_t k = 0; k < all.size(); ++k) out.peaks.push_back(all[k] - rest[k]);
 }
 

@@ -1,6 +1,6 @@
 // Files that versions before this one wrote, one of every kind, and what those versions drew of them (tests/golden/):
 // they are still read, and drawn to the same pixels.
-#include <lambent/pipeline/draw.h>
+#include <lambent/pipeline/golden_test-inl.h>
 
 #include <gtest/gtest.h>
 
@@ -11,26 +11,15 @@
 namespace lambent {
 namespace {
 
-// lambent render NAME.glb --camera 3,2,4,1,0.5,1,40 --size 16x12 --spp 4 --env sky:... --background none, but for what
-// some kinds do not take.
+using test::golden_names;
+
 DrawRequest golden_request(const std::string& name) {
-  DrawRequest request{.baked = std::string(LAMBENT_GOLDEN) + "/" + name + ".glb", .background = "none"};
-  if (name != "diffuse_fixed_view") request.camera = "3,2,4,1,0.5,1,40", request.size = "16x12", request.spp = 4;
-  if (name == "lightmap") request.lamp = {"lamp=1,0.5,0.25", "sky=0.5,1,2"};
-  else if (name != "lightmap_directional") request.env = "sky:elevation=40,azimuth=20,turbidity=4";
+  DrawRequest request = test::golden_request(name);
   // What they drew was not kept from ringing.
   if (!request.env.empty() && !name.starts_with("blocks") && name != "diffuse_directional" &&
       name.find("fixed_light") == std::string::npos)
     request.window = "none";
   return request;
-}
-
-std::vector<std::string> golden_names() {
-  std::vector<std::string> names;
-  for (const auto& entry : std::filesystem::directory_iterator(LAMBENT_GOLDEN))
-    if (entry.path().extension() == ".glb") names.push_back(entry.path().stem().string());
-  std::sort(names.begin(), names.end());
-  return names;
 }
 
 class Golden : public testing::TestWithParam<std::string> {};

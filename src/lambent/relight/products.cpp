@@ -421,11 +421,12 @@ ProductScratch::~ProductScratch() = default;
 
 void shade_receivers(Product product, const BlockLight& light, const HaarLight* haar, const Visibility& visibility,
                      const ProductReceivers& receivers, std::span<const uint32_t> seen, Vec3 eye, Relit& out,
-                     Breakdown* breakdown, ProductScratch* scratch) {
+                     Breakdown* breakdown, ProductScratch* scratch, bool keep) {
   LAMBENT_CHECK(light.cube && light.cube->size == visibility.size && (product != Product::haar || haar) &&
                 receivers.positions.size() == visibility.receivers);
   out.rows = 1;
-  out.values.assign((visibility.receivers + transfer_block - 1) / transfer_block * 3 * transfer_block, 0.0f);
+  const size_t values = (visibility.receivers + transfer_block - 1) / transfer_block * 3 * transfer_block;
+  if (!keep || out.values.size() != values) out.values.assign(values, 0.0f);
   std::mutex mutex;
   std::optional<ProductScratch> own;
   if (!scratch) scratch = &own.emplace();

@@ -115,10 +115,10 @@ class ProductScratch {
   std::unique_ptr<Pools> pools_;
 };
 
-// Exit radiance of the receivers in `seen` towards the eye, row 0 of `out`; others are left 0. All cores. Sizes `out`
-// and `scratch` on first use and allocates nothing after that.
+// Exit radiance of the receivers in `seen` towards the eye, row 0 of `out`; others are 0 or, where `keep`, what they
+// were (0 at first). All cores. Sizes `out` and `scratch` on first use and allocates nothing after that.
 void shade_receivers(Product product, const BlockLight& light, const HaarLight* haar, const Visibility& visibility,
                      const ProductReceivers& receivers, std::span<const uint32_t> seen, Vec3 eye, Relit& out,
-                     Breakdown* breakdown = nullptr, ProductScratch* scratch = nullptr);
+                     Breakdown* breakdown = nullptr, ProductScratch* scratch = nullptr, bool keep = false);
 
 }  // namespace lambent

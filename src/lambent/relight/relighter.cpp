@@ -104,7 +104,7 @@ struct OfBlocks {
     for (uint32_t r : seen)
       if (r >= store.receivers) return wrong("receiver " + std::to_string(r) + " is out of range");
     shade_receivers(options.product, light, haar ? &*haar : nullptr, store, options.receivers, seen, frame.eye, out,
-                    frame.breakdown, &scratch);
+                    frame.breakdown, &scratch, frame.keep);
     return {};
   }
 };

@@ -27,8 +27,10 @@ struct RelightFrame {
   const ReceiverFrames* frames = nullptr;
   const LightField* light = nullptr;
   // Visibility in blocks, where radiance depends on the view: the eye, and the receivers to shade (none given: all);
-  // others get 0. All other stores relight every receiver for every eye at once, so these make no difference to them.
+  // others get 0, or where `keep` stay as they are in `out`. All other stores relight every receiver for every eye at
+  // once, so these make no difference to them.
   Vec3 eye{0.0f};
+  bool keep = false;
   std::optional<std::span<const uint32_t>> seen = std::nullopt;
   Breakdown* breakdown = nullptr;  // of blocks; added to
 };

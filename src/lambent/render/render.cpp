@@ -22,14 +22,8 @@ Hit first_visible(const Scene& scene, const Tracer& tracer, Vec3 eye, Vec3 direc
   return {};
 }
 
-struct PixelRay {
-  Hit hit;  // no triangle where it meets nothing
-  Vec3 direction;
-  Vec3 weight{1};  // of what is met in the ray: less than all where light passes, here or before
-};
-
 // What a ray shows, nearest first: surfaces that let light pass, and what is behind them.
-void see_through(const Scene& scene, const Tracer& tracer, Vec3 eye, Vec3 direction, std::vector<PixelRay>& out) {
+void see_through(const Scene& scene, const Tracer& tracer, Vec3 eye, Vec3 direction, std::vector<ViewRay>& out) {
   thread_local std::vector<Hit> layers;
   Vec3 through(1);
   float from = 0;
@@ -48,9 +42,22 @@ void see_through(const Scene& scene, const Tracer& tracer, Vec3 eye, Vec3 direct
   }
   out.push_back({{}, direction, through});
 }
+
+// What samples [first, first + count) of a pixel show, added to `out`.
+void trace_pixel(const Scene& scene, const Tracer& tracer, const CameraRays& camera, int x, int y, int first, int count,
+                 std::vector<ViewRay>& out) {
+  const uint32_t key = uint32_t(hash64(uint64_t(y) << 32 | uint64_t(x), 0xf11));
+  for (int s = first; s < first + count; ++s) {
+    const Vec2 jitter = sobol_owen(uint32_t(s), key);
+    const Vec3 direction = camera.direction(float(x) + jitter.x, float(y) + jitter.y);
+    if (tracer.lets_pass()) see_through(scene, tracer, camera.eye, direction, out);
+    else out.push_back({first_visible(scene, tracer, camera.eye, direction), direction});
+  }
+}
+
 // Calls a visitor with every pixel, row by row from the top, and what its rays show. `make_visit` is called once for
 // each row of the picture, on the thread that draws it.
-using VisitPixel = std::function<void(size_t pixel, std::span<const PixelRay> rays)>;
+using VisitPixel = std::function<void(size_t pixel, std::span<const ViewRay> rays)>;
 Result<void> trace_pixels(const Scene& scene, const Tracer& tracer, const Camera& camera, const RenderOptions& options,
                           const std::function<VisitPixel()>& make_visit, Progress* progress) {
   const CameraRays camera_rays(camera, options.width, options.height);
@@ -58,17 +65,11 @@ Result<void> trace_pixels(const Scene& scene, const Tracer& tracer, const Camera
   parallel_for(size_t(options.height), 1, [&](size_t begin, size_t end) {
     if (stage.cancelled()) return;
     const VisitPixel visit = make_visit();
-    std::vector<PixelRay> rays;
+    std::vector<ViewRay> rays;
     for (int y = int(begin); y < int(end); ++y)
       for (int x = 0; x < options.width && !stage.cancelled(); ++x) {
-        const uint32_t key = uint32_t(hash64(uint64_t(y) << 32 | uint64_t(x), 0xf11));
         rays.clear();
-        for (int s = 0; s < options.samples; ++s) {
-          const Vec2 jitter = sobol_owen(uint32_t(s), key);
-          const Vec3 direction = camera_rays.direction(float(x) + jitter.x, float(y) + jitter.y);
-          if (tracer.lets_pass()) see_through(scene, tracer, camera_rays.eye, direction, rays);
-          else rays.push_back({first_visible(scene, tracer, camera_rays.eye, direction), direction});
-        }
+        trace_pixel(scene, tracer, camera_rays, x, y, 0, options.samples, rays);
         visit(size_t(y) * size_t(options.width) + size_t(x), rays);
       }
     stage.advance(end - begin);
@@ -116,11 +117,11 @@ Result<Image> render_surfaces(const Scene& scene, const Tracer& tracer, const Ca
   auto traced = trace_pixels(
       scene, tracer, camera, options,
       [&]() -> VisitPixel {
-        return [&, shade = make_shade()](size_t pixel, std::span<const PixelRay> rays) {
+        return [&, shade = make_shade()](size_t pixel, std::span<const ViewRay> rays) {
           Vec3 sum(0.0f);
           const float samples = float(options.samples);
           float open = 0;
-          for (const PixelRay& ray : rays) {
+          for (const ViewRay& ray : rays) {
             if (ray.hit.triangle != none) {
               sum += ray.weight * shade(ray.hit, ray.direction);
               continue;
@@ -138,56 +139,125 @@ Result<Image> render_surfaces(const Scene& scene, const Tracer& tracer, const Ca
   return image;
 }
 
-Result<Image> render(const Scene& scene, const Tracer& tracer, const SpatialBasis& basis, const Relit& relit,
-                     const Camera& camera, const RenderOptions& options, Progress* progress) {
+namespace {
+
+// Directional rows at a hit, under the normal there; peaks are held above 0 apart.
+Vec3 directional_light(const Scene& scene, const SpatialBasis& basis, const Relit& relit, const RenderOptions& options,
+                       const Hit& hit) {
+  std::array<Vec3, 9> rows{}, peak_rows{};
+  std::visit(
+      [&](const auto& b) {
+        const auto* at = b.find(hit.triangle, hit.front);
+        if (!at) return;
+        b.spread(*at, hit.u, hit.v, [&](uint32_t receiver, float weight) {
+          for (int row = 0; row < relit.rows; ++row) {
+            rows[size_t(row)] += weight * relit.at(receiver, row);
+            if (options.peaks) peak_rows[size_t(row)] += weight * options.peaks->at(receiver, row);
+          }
+        });
+      },
+      basis);
+  const Triangle& triangle = scene.triangles[hit.triangle];
+  const float side = hit.front ? 1.0f : -1.0f;
+  const Vec3 face = unit_normal(scene, triangle, Vec3(0, 1, 0));
+  Vec3 n = normalize_or(interpolate(scene.normals, triangle, hit.u, hit.v), face);
+  if (dot(n, face) < 0) n = -n;
+  const Vec3 bent = mapped_normal(scene, triangle, hit.u, hit.v, n);
+  auto light = [&](const std::array<Vec3, 9>& of) {
+    return evaluate_directional_light(options.directional, of, receiver_frame(side * n), side * bent);
+  };
+  if (!options.peaks) return light(rows);
+  for (size_t k = 0; k < rows.size(); ++k) rows[k] -= peak_rows[k];
+  return light(rows) + light(peak_rows);  // each is held at 0 by what evaluates it
+}
+
+}  // namespace
+
+std::function<SurfaceShade()> relit_shade(const Scene& scene, const SpatialBasis& basis, const Relit& relit,
+                                          const RenderOptions& options) {
   LAMBENT_CHECK(options.outgoing ? relit.rows == options.outgoing->rows()
                                  : relit.rows == directional_rows(options.directional));
-  return render_surfaces(
-      scene, tracer, camera, options,
-      [&]() -> SurfaceShade {
-        return [&, weights = std::vector<ViewWeights>(size_t(relit.rows))](const Hit& hit, Vec3 direction) mutable {
-          const Triangle& triangle = scene.triangles[hit.triangle];
-          if (options.show == RenderOptions::Show::albedo) return albedo(scene, triangle, hit.u, hit.v);
-          Vec3 sum(0.0f);
-          if (!options.emission.empty() && emits(scene, triangle, hit.front))
-            sum += options.emission[scene.parts[triangle.part].material] *
-                   emission_texel(scene, triangle, hit.u, hit.v);
-          if (options.directional == DirectionalKind::none) {
-            Vec3 whole(0.0f), peaks(0.0f);
-            reflect_at(scene, basis, options, hit, direction, weights, [&](uint32_t receiver, int row, Vec3 weight) {
-              whole += weight * relit.at(receiver, row);
-              if (options.peaks) peaks += weight * options.peaks->at(receiver, row);
-            });
-            return sum + (options.peaks ? dering(whole, peaks) : whole);
-          }
-          const Vec3 colour = shown_colour(scene, options, hit);
-          std::array<Vec3, 9> rows{}, peak_rows{};
-          std::visit(
-              [&](const auto& b) {
-                const auto* at = b.find(hit.triangle, hit.front);
-                if (!at) return;
-                b.spread(*at, hit.u, hit.v, [&](uint32_t receiver, float weight) {
-                  for (int row = 0; row < relit.rows; ++row) {
-                    rows[size_t(row)] += weight * relit.at(receiver, row);
-                    if (options.peaks) peak_rows[size_t(row)] += weight * options.peaks->at(receiver, row);
-                  }
-                });
-              },
-              basis);
-          const float side = hit.front ? 1.0f : -1.0f;
-          const Vec3 face = unit_normal(scene, triangle, Vec3(0, 1, 0));
-          Vec3 n = normalize_or(interpolate(scene.normals, triangle, hit.u, hit.v), face);
-          if (dot(n, face) < 0) n = -n;
-          const Vec3 bent = mapped_normal(scene, triangle, hit.u, hit.v, n);
-          auto light = [&](const std::array<Vec3, 9>& of) {
-            return evaluate_directional_light(options.directional, of, receiver_frame(side * n), side * bent);
-          };
-          if (!options.peaks) return sum + colour * light(rows);
-          for (size_t k = 0; k < rows.size(); ++k) rows[k] -= peak_rows[k];
-          return sum + colour * (light(rows) + light(peak_rows));  // each is held at 0 by what evaluates it
-        };
-      },
-      progress);
+  return [&]() -> SurfaceShade {
+    return [&, weights = std::vector<ViewWeights>(size_t(relit.rows))](const Hit& hit, Vec3 direction) mutable {
+      const Triangle& triangle = scene.triangles[hit.triangle];
+      if (options.show == RenderOptions::Show::albedo) return albedo(scene, triangle, hit.u, hit.v);
+      Vec3 sum(0.0f);
+      if (!options.emission.empty() && emits(scene, triangle, hit.front))
+        sum += options.emission[scene.parts[triangle.part].material] * emission_texel(scene, triangle, hit.u, hit.v);
+      if (options.directional != DirectionalKind::none)
+        return sum + shown_colour(scene, options, hit) * directional_light(scene, basis, relit, options, hit);
+      Vec3 whole(0.0f), peaks(0.0f);
+      reflect_at(scene, basis, options, hit, direction, weights, [&](uint32_t receiver, int row, Vec3 weight) {
+        whole += weight * relit.at(receiver, row);
+        if (options.peaks) peaks += weight * options.peaks->at(receiver, row);
+      });
+      return sum + (options.peaks ? dering(whole, peaks) : whole);
+    };
+  };
+}
+
+Result<Image> render(const Scene& scene, const Tracer& tracer, const SpatialBasis& basis, const Relit& relit,
+                     const Camera& camera, const RenderOptions& options, Progress* progress) {
+  return render_surfaces(scene, tracer, camera, options, relit_shade(scene, basis, relit, options), progress);
+}
+
+Result<ViewRays> trace_view(const Scene& scene, const Tracer& tracer, const Camera& camera, int width, int height,
+                            int first, int count, Progress* progress) {
+  const CameraRays camera_rays(camera, width, height);
+  ProgressStage stage(progress, "tracing the view", size_t(height));
+  std::vector<std::vector<ViewRay>> rows(static_cast<size_t>(height));
+  ViewRays out{width, height, count, {}, {0}};
+  out.begin.resize(size_t(width) * size_t(height) + 1);
+  parallel_for(size_t(height), 1, [&](size_t y, size_t) {
+    if (stage.cancelled()) return;
+    rows[y].reserve(size_t(width) * size_t(count));
+    for (int x = 0; x < width; ++x) {
+      trace_pixel(scene, tracer, camera_rays, x, int(y), first, count, rows[y]);
+      out.begin[y * size_t(width) + size_t(x) + 1] = uint32_t(rows[y].size());
+    }
+    stage.advance();
+  });
+  if (stage.cancelled()) return Error{"", "cancelled"};
+  uint32_t before = 0;
+  for (size_t y = 0; y < size_t(height); ++y) {
+    for (size_t x = 0; x < size_t(width); ++x) out.begin[y * size_t(width) + x + 1] += before;
+    before += uint32_t(rows[y].size());
+    out.rays.insert(out.rays.end(), rows[y].begin(), rows[y].end());
+    rows[y] = {};
+  }
+  return out;
+}
+
+void shade_rays(const ViewRays& view, const std::function<SurfaceShade()>& make_shade,
+                const std::function<Vec3(Vec3)>& background, ViewSums& sums) {
+  const size_t width = size_t(view.width), pixels = width * size_t(view.height);
+  if (sums.samples == 0) sums.rgb.assign(pixels, Vec3(0.0f)), sums.open.assign(pixels, 0.0f);
+  LAMBENT_CHECK(sums.rgb.size() == pixels);
+  parallel_for(size_t(view.height), 4, [&](size_t begin, size_t end) {
+    const SurfaceShade shade = make_shade();
+    for (size_t pixel = begin * width; pixel < end * width; ++pixel)
+      for (uint32_t i = view.begin[pixel]; i < view.begin[pixel + 1]; ++i) {
+        const ViewRay& ray = view.rays[i];
+        if (ray.hit.triangle != none) {
+          sums.rgb[pixel] += ray.weight * shade(ray.hit, ray.direction);
+          continue;
+        }
+        sums.open[pixel] += mean(ray.weight);
+        if (background) sums.rgb[pixel] += ray.weight * background(ray.direction);
+      }
+  });
+  sums.samples += view.samples;
+}
+
+Image mean_of(const ViewSums& sums, int width, int height) {
+  Image image(width, height);
+  image.coverage.resize(sums.rgb.size());
+  const float samples = float(sums.samples);
+  for (size_t i = 0; i < sums.rgb.size(); ++i) {
+    image.rgb[i] = sums.rgb[i] / samples;
+    image.coverage[i] = std::max(samples - sums.open[i], 0.0f) / samples;
+  }
+  return image;
 }
 
 Result<FixedViewTransfer> fix_view(const Scene& scene, const Tracer& tracer, const SpatialBasis& basis,
@@ -205,11 +275,11 @@ Result<FixedViewTransfer> fix_view(const Scene& scene, const Tracer& tracer, con
         // What a pixel's rays ask of the receivers, row by row, is gathered first: many meet the same ones.
         using Asked = std::pair<uint32_t, std::vector<Vec3>>;
         return [&, asked = std::vector<Asked>(), weights = std::vector<ViewWeights>(size_t(transfer.rows)),
-                row = std::vector<float>(3 * C)](size_t pixel, std::span<const PixelRay> rays) mutable {
+                row = std::vector<float>(3 * C)](size_t pixel, std::span<const ViewRay> rays) mutable {
           asked.clear();
           const float samples = float(options.samples);
           float open = 0;
-          for (const PixelRay& ray : rays) {
+          for (const ViewRay& ray : rays) {
             if (ray.hit.triangle == none) {
               open += mean(ray.weight);
               continue;

@@ -57,5 +57,38 @@ using SurfaceShade = std::function<Vec3(const Hit&, Vec3 direction)>;
 Result<Image> render_surfaces(const Scene& scene, const Tracer& tracer, const Camera& camera,
                               const RenderOptions& options, const std::function<SurfaceShade()>& make_shade,
                               Progress* progress = nullptr);
+// render()'s own; what it is made of must outlive it.
+std::function<SurfaceShade()> relit_shade(const Scene& scene, const SpatialBasis& basis, const Relit& relit,
+                                          const RenderOptions& options);
+
+// What a ray from the eye shows.
+struct ViewRay {
+  Hit hit;  // no triangle where it meets nothing
+  Vec3 direction;
+  Vec3 weight{1};  // of what is met in the ray: less than all where light passes, here or before
+};
+
+// Rays that are kept while the camera stands, so that light may change without tracing: `samples` a pixel, each one or,
+// where light passes through what it meets, several; those of pixel p are [begin[p], begin[p + 1]).
+struct ViewRays {
+  int width = 0, height = 0, samples = 0;
+  std::vector<ViewRay> rays;
+  std::vector<uint32_t> begin;
+};
+// Samples [first, first + count) of those that render() takes. Errors: cancelled.
+Result<ViewRays> trace_view(const Scene& scene, const Tracer& tracer, const Camera& camera, int width, int height,
+                            int first, int count, Progress* progress = nullptr);
+
+// Pixels' sums over the samples so far: radiance, and what of their rays met nothing. Samples added in order and
+// divided at the end make render()'s picture to the bit.
+struct ViewSums {
+  std::vector<Vec3> rgb;
+  std::vector<float> open;
+  int samples = 0;
+};
+// Adds to `sums`; `background`: radiance by direction, none: black.
+void shade_rays(const ViewRays& view, const std::function<SurfaceShade()>& make_shade,
+                const std::function<Vec3(Vec3)>& background, ViewSums& sums);
+Image mean_of(const ViewSums& sums, int width, int height);
 
 }  // namespace lambent

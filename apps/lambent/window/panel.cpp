@@ -1,0 +1,199 @@
+#include "panel.h"
+
+#include <fmt/format.h>
+#include <imgui.h>
+
+#include <algorithm>
+#include <filesystem>
+
+namespace lambent::tool {
+namespace {
+
+void tell(PanelState& panel, const Result<void>& result) {
+  // Of what is done right there is nothing to say.
+  panel.notice = result ? "" : result.error().text(), panel.notice_until = 1e300;
+}
+
+bool choose(const char* label, const std::vector<std::string>& names, const std::string& current, std::string& chosen) {
+  bool changed = false;
+  if (!ImGui::BeginCombo(label, current.c_str())) return false;
+  for (const std::string& name : names)
+    if (ImGui::Selectable(name.c_str(), name == current)) chosen = name, changed = true;
+  ImGui::EndCombo();
+  return changed;
+}
+
+std::string short_name(const std::string& path) {
+  return path.find(':') == std::string::npos ? std::filesystem::path(path).filename().string() : path;
+}
+
+void light_controls(PanelState& panel, Session& s) {
+  const DrawRequest& request = s.live->request();
+  const LightBasis basis = light_of(s.bakes[s.shown_bake]->surface.store);
+  if (!request.env.empty()) {
+    std::string chosen;
+    if (!s.options.env.empty() && choose("environment", s.options.env, short_name(request.env), chosen))
+      tell(panel, s.set("env", chosen));
+    if (ImGui::InputTextWithHint("##env", "file or sky:... and Enter", panel.env, sizeof panel.env,
+                                 ImGuiInputTextFlags_EnterReturnsTrue))
+      tell(panel, s.set("env", panel.env));
+    bool sky = ImGui::SliderInt("sun's height", &panel.sky_elevation, 0, 90);
+    sky |= ImGui::SliderInt("azimuth", &panel.sky_azimuth, -180, 180);
+    sky |= ImGui::SliderFloat("turbidity", &panel.turbidity, 2, 10, "%.1f");
+    if (sky)
+      tell(panel, s.set("env", fmt::format("sky:elevation={},azimuth={},turbidity={:.1f}", panel.sky_elevation,
+                                           panel.sky_azimuth, panel.turbidity)));
+    ImGui::Checkbox("level: light turns about +Y alone", &s.level);
+    if (ImGui::Button("light as it came")) tell(panel, s.set("env-rotate", ""));
+    if (basis.order > 1) {
+      int bands = request.light_order ? request.light_order : basis.order;
+      if (ImGui::SliderInt("bands", &bands, 1, basis.order))
+        tell(panel, s.set("light-order", std::to_string(bands == basis.order ? 0 : bands)));
+    }
+  }
+  for (const std::string& group : basis.groups) {
+    Vec3 color(1.0f);
+    for (const std::string& text : request.lamp)
+      if (auto lamp = parse_named_color(text, "--lamp"); lamp && lamp->name == group) color = lamp->color;
+    float rgb[3] = {color.x, color.y, color.z};
+    if (ImGui::ColorEdit3(group.c_str(), rgb, ImGuiColorEditFlags_Float | ImGuiColorEditFlags_HDR))
+      tell(panel, s.set("lamp", fmt::format("{}={},{},{}", group, std::max(0.0f, rgb[0]), std::max(0.0f, rgb[1]),
+                                            std::max(0.0f, rgb[2]))));
+  }
+}
+
+void display_controls(PanelState& panel, Session& s) {
+  const DrawRequest& request = s.live->request();
+  bool automatic = request.exposure == "auto";
+  if (ImGui::Checkbox("exposure by itself", &automatic))
+    tell(panel, s.set("exposure", automatic ? "auto" : fmt::format("{:.2f}", s.display.exposure)));
+  float stops = s.display.exposure;
+  if (ImGui::SliderFloat("stops", &stops, -10, 10, "%.2f"))
+    tell(panel, s.set("exposure", fmt::format("{:.2f}", stops)));
+  std::string chosen;
+  if (choose("tone", choices_of(tone_names), request.tone, chosen)) tell(panel, s.set("tone", chosen));
+}
+
+void material_controls(PanelState& panel, Session& s) {
+  const Baked& baked = *s.bakes[s.shown_bake];
+  const Outgoing* outgoing = outgoing_of(baked.surface);
+  const bool blocks = kind_of(baked.surface) == DrawKind::blocks;
+  if (!blocks && !(outgoing && outgoing->kind == OutgoingKind::map)) return;
+  if (ImGui::InputTextWithHint("material", "diffuse, ggx:roughness=0.3 and Enter", panel.brdf, sizeof panel.brdf,
+                               ImGuiInputTextFlags_EnterReturnsTrue))
+    tell(panel, s.set("brdf", panel.brdf));
+}
+
+void look_controls(PanelState& panel, Session& s) {
+  const DrawKind kind = kind_of(s.bakes[s.shown_bake]->surface);
+  std::string chosen;
+  if (kind != DrawKind::blocks && kind != DrawKind::fixed_view &&
+      choose("show",
+             {"product", "radiosity", "albedo", "emission", "bounce:0", "bounce:1", "bounce:2", "sum:0", "sum:1"},
+             s.live->request().show, chosen))
+    tell(panel, s.set("show", chosen));
+  static const std::vector<std::string> looks = choices_of(look_names);
+  if (choose("look", looks, looks[size_t(s.look)], chosen)) {
+    const size_t index = size_t(std::find(looks.begin(), looks.end(), chosen) - looks.begin());
+    tell(panel, s.look_as(Look(index), panel.coefficient));
+  }
+  if (ImGui::InputInt("coefficient", &panel.coefficient)) tell(panel, s.look_as(Look::coefficient, panel.coefficient));
+}
+
+void comparison_controls(PanelState& panel, Session& s) {
+  if (ImGui::RadioButton("picture alone", s.against == Against::nothing)) tell(panel, s.compare_with(Against::nothing));
+  if (ImGui::RadioButton("path tracer", s.against == Against::reference))
+    tell(panel, s.compare_with(Against::reference));
+  if (!s.options.reference.empty() &&
+      ImGui::RadioButton(short_name(s.options.reference).c_str(), s.against == Against::file))
+    tell(panel, s.compare_with(Against::file));
+  for (size_t i = 0; i < s.bakes.size(); ++i)
+    if (i != s.shown_bake &&
+        ImGui::RadioButton(short_name(s.names[i]).c_str(), s.against == Against::bake && s.other_bake == i))
+      tell(panel, s.compare_with(Against::bake, i));
+  if (s.against == Against::nothing) return;
+  bool difference = s.difference;
+  if (ImGui::Checkbox("difference, white at 0.1", &difference)) s.show_difference(difference);
+  if (s.against == Against::reference) {
+    if (ImGui::Checkbox("under the bake's bands", &s.same_bands)) tell(panel, s.compare_with(Against::reference));
+    ImGui::Text("%d paths a pixel", s.reference.paths());
+  }
+  if (s.distance.known) ImGui::Text("PSNR %.1f dB, FLIP %.3f", s.distance.psnr, s.distance.flip);
+}
+
+void statistics(Session& s) {
+  const LiveTimes& t = s.times;
+  ImGui::Text("ms: light %.1f, relight %.1f,", t.project, t.relight);
+  ImGui::Text("    rays %.1f, shade %.1f", t.trace, t.shade);
+  ImGui::Text("%zu receivers, %d of %d samples", t.shaded, s.live->samples(), s.live->request().spp);
+  if (s.dropped_pixels > 1) ImGui::Text("in a hurry: 1 pixel of %d", s.dropped_pixels * s.dropped_pixels);
+  else if (!s.settled()) ImGui::TextUnformatted("refining");
+  else ImGui::TextUnformatted("whole: as `lambent render`");
+  if (!s.frames.empty())
+    ImGui::PlotLines("##frames", s.frames.data(), int(s.frames.size()), 0, "ms a piece of work", 0,
+                     *std::max_element(s.frames.begin(), s.frames.end()), ImVec2(-1, 50));
+}
+
+}  // namespace
+
+Result<void> PanelState::save(Session& session) {
+  std::string path;
+  do path = fmt::format("lambent_{:03}.png", saved++);
+  while (std::filesystem::exists(path));
+  if (auto ok = session.save(path); !ok) return ok;
+  notice = path + " is written", notice_until = 1e300;
+  return {};
+}
+
+void draw_panel(PanelState& panel, Session& s, float x, float width, float height) {
+  ImGui::SetNextWindowPos(ImVec2(x, 0));
+  ImGui::SetNextWindowSize(ImVec2(width, height));
+  ImGui::Begin(
+      "lambent", nullptr,
+      ImGuiWindowFlags_NoMove | ImGuiWindowFlags_NoResize | ImGuiWindowFlags_NoTitleBar | ImGuiWindowFlags_NoCollapse);
+  ImGui::PushItemWidth(0.55f * width);
+  ImGui::TextWrapped("%s", short_name(s.names[s.shown_bake]).c_str());
+  ImGui::TextDisabled("%s", draw_kind_names[size_t(kind_of(s.bakes[s.shown_bake]->surface))]);
+  if (ImGui::CollapsingHeader("Light", ImGuiTreeNodeFlags_DefaultOpen)) light_controls(panel, s);
+  if (ImGui::CollapsingHeader("Display", ImGuiTreeNodeFlags_DefaultOpen)) display_controls(panel, s);
+  if (ImGui::CollapsingHeader("Materials and looks", ImGuiTreeNodeFlags_DefaultOpen))
+    material_controls(panel, s), look_controls(panel, s);
+  if (ImGui::CollapsingHeader("Beside it", ImGuiTreeNodeFlags_DefaultOpen)) comparison_controls(panel, s);
+  if (ImGui::CollapsingHeader("Frame", ImGuiTreeNodeFlags_DefaultOpen)) statistics(s);
+  if (ImGui::Button("save picture (S)"))
+    if (auto ok = panel.save(s); !ok) tell(panel, ok);
+  ImGui::SameLine();
+  if (ImGui::Button("copy command")) ImGui::SetClipboardText(s.command().c_str());
+  ImGui::SameLine();
+  if (ImGui::Button("?")) panel.help = !panel.help;
+  ImGui::PopItemWidth();
+  ImGui::End();
+}
+
+void draw_notices(PanelState& panel, double now) {
+  if (!panel.notice.empty() && now < panel.notice_until) {
+    ImGui::SetNextWindowPos(ImVec2(12, 12));
+    ImGui::Begin("notice", nullptr, ImGuiWindowFlags_NoDecoration | ImGuiWindowFlags_AlwaysAutoResize);
+    ImGui::TextUnformatted(panel.notice.c_str());
+    ImGui::End();
+  }
+  if (!panel.help) return;
+  ImGui::SetNextWindowPos(ImVec2(12, 50));
+  ImGui::Begin("Keys", &panel.help, ImGuiWindowFlags_AlwaysAutoResize | ImGuiWindowFlags_NoCollapse);
+  ImGui::TextUnformatted(
+      "drag              look around\n"
+      "Shift or right    turn the light\n"
+      "Alt or middle     shift the view\n"
+      "wheel, + and -    nearer, farther\n"
+      "arrows            look; with Shift, the light\n"
+      "R                 against the path tracer\n"
+      "D                 difference\n"
+      "S                 save the picture\n"
+      "Tab               panel on and off\n"
+      "Ctrl-Q            close\n"
+      "drop a file       a bake takes the scene's place,\n"
+      "                  an environment lights it");
+  ImGui::End();
+}
+
+}  // namespace lambent::tool

@@ -1,0 +1,404 @@
+// The window: GLFW for input, OpenGL for one textured rectangle, Dear ImGui for the panel. What is shown is computed by
+// the session; nothing of the picture depends on the graphics card.
+#include "window.h"
+
+#include "panel.h"
+
+#include <lambent/core/file.h>
+
+// clang-format off
+#include <GLFW/glfw3.h>
+// clang-format on
+#include <backends/imgui_impl_glfw.h>
+#include <backends/imgui_impl_opengl3.h>
+#include <fmt/format.h>
+#include <imgui.h>
+
+#include <chrono>
+#include <cmath>
+#include <cstdio>
+
+namespace lambent::tool {
+namespace {
+
+double window_clock() {
+  return std::chrono::duration<double>(std::chrono::steady_clock::now().time_since_epoch()).count();
+}
+
+constexpr float panel_width = 320;
+constexpr double rest = 0.15;  // seconds after which hands are thought to rest
+
+struct Window {
+  Session& session;
+  const WindowOptions& options;
+  const Job& job;
+  GLFWwindow* handle = nullptr;
+  GLuint texture = 0;
+  PanelState panel = {};
+  std::vector<std::string> dropped = {};
+  // Of a drag under way.
+  enum class Drag { none, look, light, pan, wipe } drag = Drag::none;
+  double x = 0, y = 0, last_input = 0;
+  int frames_due = 3;  // Dear ImGui settles in a few
+  // Of the script.
+  std::vector<Action> script = {};
+  size_t next = 0;
+  int frames_left = 0;
+  double wait_until = 0;
+  bool stays = false;
+
+  int picture_width() const {
+    int width = 0, height = 0;
+    glfwGetFramebufferSize(handle, &width, &height);
+    return std::max(1, width - (panel.open ? int(panel_width) : 0));
+  }
+  void say(const Result<void>& result) {
+    if (!result) panel.notice = result.error().text(), panel.notice_until = window_clock() + 6;
+    last_input = window_clock(), frames_due = 3;
+  }
+};
+
+std::string glfw_problem;
+void keep_problem(int, const char* text) { glfw_problem = text ? text : ""; }
+
+Window& of(GLFWwindow* handle) { return *static_cast<Window*>(glfwGetWindowUserPointer(handle)); }
+
+void on_button(GLFWwindow* handle, int button, int action, int mods) {
+  Window& w = of(handle);
+  w.frames_due = 3;
+  if (action == GLFW_RELEASE) {
+    w.drag = Window::Drag::none;
+    return;
+  }
+  if (ImGui::GetIO().WantCaptureMouse) return;
+  glfwGetCursorPos(handle, &w.x, &w.y);
+  const bool at_wipe = w.session.against != Against::nothing && !w.session.difference &&
+                       std::abs(w.x - double(w.session.wipe) * w.picture_width()) < 6;
+  w.drag = at_wipe                                                      ? Window::Drag::wipe
+         : button == GLFW_MOUSE_BUTTON_RIGHT || (mods & GLFW_MOD_SHIFT) ? Window::Drag::light
+         : button == GLFW_MOUSE_BUTTON_MIDDLE || (mods & GLFW_MOD_ALT)  ? Window::Drag::pan
+                                                                        : Window::Drag::look;
+}
+
+void on_move(GLFWwindow* handle, double x, double y) {
+  Window& w = of(handle);
+  w.frames_due = 3;
+  const float dx = float(x - w.x), dy = float(y - w.y);
+  w.x = x, w.y = y;
+  if (w.drag == Window::Drag::none || (dx == 0 && dy == 0)) return;
+  int height = 1, width = w.picture_width();
+  glfwGetWindowSize(handle, nullptr, &height);
+  const float degrees_a_pixel = 180.0f / float(std::max(1, height));
+  switch (w.drag) {
+    case Window::Drag::look: return w.say(w.session.orbit(-degrees_a_pixel * dx, degrees_a_pixel * dy));
+    case Window::Drag::light: return w.say(w.session.turn_light(-degrees_a_pixel * dx, degrees_a_pixel * dy));
+    case Window::Drag::pan: return w.say(w.session.pan(dx / float(height), dy / float(height)));
+    case Window::Drag::wipe: return w.session.move_wipe(float(x) / float(width)), w.say({});
+    case Window::Drag::none: return;
+  }
+}
+
+void on_scroll(GLFWwindow* handle, double, double dy) {
+  Window& w = of(handle);
+  if (!ImGui::GetIO().WantCaptureMouse) w.say(w.session.dolly(std::pow(0.9f, float(dy))));
+  w.frames_due = 3;
+}
+
+void on_key(GLFWwindow* handle, int key, int, int action, int mods) {
+  Window& w = of(handle);
+  w.frames_due = 3;
+  if (action == GLFW_RELEASE || ImGui::GetIO().WantTextInput) return;
+  const bool light = mods & GLFW_MOD_SHIFT;
+  auto turn = [&](float yaw, float pitch) {
+    w.say(light ? w.session.turn_light(yaw, -pitch) : w.session.orbit(yaw, pitch));
+  };
+  switch (key) {
+    case GLFW_KEY_LEFT: return turn(-5, 0);
+    case GLFW_KEY_RIGHT: return turn(5, 0);
+    case GLFW_KEY_UP: return turn(0, 5);
+    case GLFW_KEY_DOWN: return turn(0, -5);
+    case GLFW_KEY_EQUAL:
+    case GLFW_KEY_KP_ADD: return w.say(w.session.dolly(0.9f));
+    case GLFW_KEY_MINUS:
+    case GLFW_KEY_KP_SUBTRACT: return w.say(w.session.dolly(1 / 0.9f));
+    case GLFW_KEY_TAB: w.panel.open = !w.panel.open; return;
+    case GLFW_KEY_D: return w.session.show_difference(!w.session.difference), w.say({});
+    case GLFW_KEY_R:
+      return w.say(
+          w.session.compare_with(w.session.against == Against::reference ? Against::nothing : Against::reference));
+    case GLFW_KEY_S:
+      if (auto ok = w.panel.save(w.session); !ok) w.say(ok);
+      return;
+    case GLFW_KEY_F1: w.panel.help = !w.panel.help; return;
+    case GLFW_KEY_ESCAPE: w.panel.help = false; return;
+    case GLFW_KEY_Q:
+      if (mods & GLFW_MOD_CONTROL) glfwSetWindowShouldClose(handle, 1);
+      return;
+    default: return;
+  }
+}
+
+void on_drop(GLFWwindow* handle, int count, const char** paths) {
+  for (int i = 0; i < count; ++i) of(handle).dropped.emplace_back(paths[i]);
+}
+
+void on_refresh(GLFWwindow* handle) { of(handle).frames_due = 3; }
+void on_resize(GLFWwindow* handle, int, int) { of(handle).frames_due = 3, of(handle).last_input = window_clock(); }
+
+Result<void> make_window(Window& w) {
+  auto size = parse_size(w.options.size, "--size");
+  if (!size) return size.error();
+  glfwSetErrorCallback(keep_problem);
+  if (!glfwInit())
+    return Error{"--window", "there is no display to open a window on (" + glfw_problem +
+                                 "); without --window the "
+                                 "page is served to a browser"};
+  glfwWindowHint(GLFW_CONTEXT_VERSION_MAJOR, 3), glfwWindowHint(GLFW_CONTEXT_VERSION_MINOR, 3);
+  glfwWindowHint(GLFW_OPENGL_PROFILE, GLFW_OPENGL_CORE_PROFILE), glfwWindowHint(GLFW_OPENGL_FORWARD_COMPAT, 1);
+  w.handle =
+      glfwCreateWindow((*size)[0], (*size)[1], ("lambent: " + w.session.names.front()).c_str(), nullptr, nullptr);
+  if (!w.handle) return Error{"--window", "OpenGL 3.3 is not to be had here: " + glfw_problem};
+  glfwMakeContextCurrent(w.handle);
+  glfwSwapInterval(1);
+  glfwSetWindowUserPointer(w.handle, &w);
+  glfwSetMouseButtonCallback(w.handle, on_button), glfwSetCursorPosCallback(w.handle, on_move);
+  glfwSetScrollCallback(w.handle, on_scroll), glfwSetKeyCallback(w.handle, on_key);
+  glfwSetDropCallback(w.handle, on_drop), glfwSetWindowRefreshCallback(w.handle, on_refresh);
+  glfwSetFramebufferSizeCallback(w.handle, on_resize);
+  IMGUI_CHECKVERSION();
+  ImGui::CreateContext();
+  ImGui::GetIO().IniFilename = nullptr;  // nothing is left behind
+  if (!ImGui_ImplGlfw_InitForOpenGL(w.handle, true) || !ImGui_ImplOpenGL3_Init("#version 330 core"))
+    return Error{"--window", "OpenGL 3.3 is not to be had here"};
+  glGenTextures(1, &w.texture);
+  glBindTexture(GL_TEXTURE_2D, w.texture);
+  glTexParameteri(GL_TEXTURE_2D, GL_TEXTURE_MIN_FILTER, GL_LINEAR);
+  glTexParameteri(GL_TEXTURE_2D, GL_TEXTURE_MAG_FILTER, GL_NEAREST);
+  return {};
+}
+
+void close_window(Window& w) {
+  if (ImGui::GetCurrentContext()) {
+    if (ImGui::GetIO().BackendRendererUserData) ImGui_ImplOpenGL3_Shutdown();
+    if (ImGui::GetIO().BackendPlatformUserData) ImGui_ImplGlfw_Shutdown();
+    ImGui::DestroyContext();
+  }
+  if (w.handle) glfwDestroyWindow(w.handle);
+  glfwTerminate();
+}
+
+void present(Window& w) {
+  const Shown& shown = w.session.shown();
+  int width = 0, height = 0;
+  glfwGetFramebufferSize(w.handle, &width, &height);
+  if (shown.width > 0) {
+    glBindTexture(GL_TEXTURE_2D, w.texture);
+    glTexImage2D(GL_TEXTURE_2D, 0, GL_RGBA8, shown.width, shown.height, 0, GL_RGBA, GL_UNSIGNED_BYTE,
+                 shown.rgba.data());
+  }
+  ImGui_ImplOpenGL3_NewFrame();
+  ImGui_ImplGlfw_NewFrame();
+  ImGui::NewFrame();
+  if (shown.width > 0)
+    ImGui::GetBackgroundDrawList()->AddImage(reinterpret_cast<void*>(uintptr_t(w.texture)), ImVec2(0, 0),
+                                             ImVec2(float(w.picture_width()), float(height)));
+  if (w.panel.open) draw_panel(w.panel, w.session, float(w.picture_width()), panel_width, float(height));
+  draw_notices(w.panel, window_clock());
+  ImGui::Render();
+  glViewport(0, 0, width, height);
+  glClearColor(0.1f, 0.1f, 0.1f, 1);
+  glClear(GL_COLOR_BUFFER_BIT);
+  ImGui_ImplOpenGL3_RenderDrawData(ImGui::GetDrawData());
+}
+
+Result<void> screenshot(Window& w, const std::string& path) {
+  present(w);
+  int width = 0, height = 0;
+  glfwGetFramebufferSize(w.handle, &width, &height);
+  std::vector<uint8_t> pixels(size_t(width) * size_t(height) * 3);
+  glPixelStorei(GL_PACK_ALIGNMENT, 1);
+  glReadPixels(0, 0, width, height, GL_RGB, GL_UNSIGNED_BYTE, pixels.data());
+  Image image(width, height);
+  for (int y = 0; y < height; ++y)
+    for (int x = 0; x < width; ++x)
+      for (int c = 0; c < 3; ++c)
+        image.at(x, height - 1 - y)[c] =
+            srgb_decode(float(pixels[3 * (size_t(y) * size_t(width) + size_t(x)) + size_t(c)]) / 255);
+  if (auto ok = check_output(path, {"png"}); !ok) return ok;
+  return save_image(path, image);
+}
+
+Result<void> settle(Window& w) {
+  for (;;) {
+    if (is_cancelled(w.job.progress)) return Error{"", "cancelled"};
+    auto more = w.session.work(false);
+    if (!more) return more.error();
+    if (!*more) return {};
+  }
+}
+
+// COUNT pictures of the light's or the camera's way around, settled each: NAME%03d.png, or a film through ffmpeg.
+Result<void> film(Window& w, const std::string& what, int count, const std::string& path) {
+  const bool pictures = path.find('%') != std::string::npos;
+  FILE* pipe = nullptr;
+  const View view = w.session.live->view();
+  if (!pictures) {
+    if (path.find_first_of("'\\") != std::string::npos) return Error{path, "has a quote in its name"};
+    const std::string order = fmt::format(
+        "ffmpeg -loglevel error -y -f rawvideo -pixel_format rgba -video_size {}x{} -framerate 30 -i - -pix_fmt "
+        "yuv420p "
+        "-vf 'crop=trunc(iw/2)*2:trunc(ih/2)*2' 'file:{}'",
+        view.width, view.height, path);
+    pipe = popen(order.c_str(), "w");
+    if (!pipe) return Error{path, "ffmpeg could not be started"};
+  }
+  auto shoot = [&](int i) -> Result<void> {
+    if (auto ok = settle(w); !ok) return ok;
+    if (pictures) {
+      const size_t at = path.find('%'), end = path.find_first_of("d", at);
+      return w.session.save(path.substr(0, at) + fmt::format("{:03}", i) +
+                            (end == std::string::npos ? ".png" : path.substr(end + 1)));
+    }
+    const Shown& shown = w.session.shown();
+    if (fwrite(shown.rgba.data(), 1, shown.rgba.size(), pipe) != shown.rgba.size())
+      return Error{path, "ffmpeg ended early"};
+    return {};
+  };
+  Result<void> result;
+  for (int i = 0; i < count && result; ++i) {
+    result = shoot(i);
+    const float step = 360.0f / float(count);
+    if (result) result = what == "light" ? w.session.turn_light(step, 0) : w.session.orbit(step, 0);
+  }
+  if (pipe && pclose(pipe) != 0 && result) return Error{path, "ffmpeg failed, or is not installed"};
+  return result;
+}
+
+Result<float> number(const std::string& text, const char* verb) {
+  auto n = parse_numbers(text, 1, verb);
+  if (!n) return n.error();
+  return (*n)[0];
+}
+
+Result<void> two_numbers(const Action& a, const std::function<Result<void>(float, float)>& run) {
+  auto x = number(a.words[0], a.verb.c_str());
+  if (!x) return x.error();
+  auto y = a.words.size() > 1 ? number(a.words[1], a.verb.c_str()) : Result<float>(0.0f);
+  if (!y) return y.error();
+  return run(*x, *y);
+}
+
+Result<void> act(Window& w, const Action& a) {
+  Session& s = w.session;
+  w.last_input = window_clock();
+  const std::string& word = a.words.empty() ? a.verb : a.words[0];
+  if (a.verb == "set") return s.set(word, a.words[1]);
+  if (a.verb == "turn-light") return two_numbers(a, [&](float x, float y) { return s.turn_light(x, y); });
+  if (a.verb == "orbit") return two_numbers(a, [&](float x, float y) { return s.orbit(x, y); });
+  if (a.verb == "pan") return two_numbers(a, [&](float x, float y) { return s.pan(x, y); });
+  if (a.verb == "dolly") return two_numbers(a, [&](float x, float) { return s.dolly(x); });
+  if (a.verb == "look") {
+    for (const Look look : {Look::picture, Look::receivers, Look::density, Look::coefficient})
+      if (choices_of(look_names)[size_t(look)] == word)
+        return two_numbers({a.verb, {a.words.size() > 1 ? a.words[1] : "0"}, a.line},
+                           [&](float k, float) { return s.look_as(look, int(k)); });
+    return Error{"look", std::string("must be one of ") + look_names, true};
+  }
+  if (a.verb == "compare") {
+    if (word == "nothing") return s.compare_with(Against::nothing);
+    if (word == "reference") return s.compare_with(Against::reference);
+    if (word == "file") return s.compare_with(Against::file);
+    if (word == "bake")
+      return two_numbers({a.verb, {a.words.size() > 1 ? a.words[1] : "1"}, a.line},
+                         [&](float k, float) { return s.compare_with(Against::bake, size_t(std::max(0.0f, k))); });
+    return Error{"compare", "must be nothing, bake, reference or file", true};
+  }
+  if (a.verb == "wipe") return two_numbers(a, [&](float x, float) { return s.move_wipe(x), Result<void>(); });
+  if (a.verb == "difference") return s.show_difference(word == "on"), Result<void>();
+  if (a.verb == "drop") return s.drop(word);
+  if (a.verb == "settle") return settle(w);
+  if (a.verb == "wait")
+    return two_numbers(a, [&](float x, float) { return w.wait_until = window_clock() + double(x), Result<void>(); });
+  if (a.verb == "frames") return two_numbers(a, [&](float x, float) { return w.frames_left = int(x), Result<void>(); });
+  if (a.verb == "save") return s.save(word);
+  if (a.verb == "screenshot") return screenshot(w, word);
+  if (a.verb == "film") {
+    auto count = number(a.words[1], "film");
+    if (!count || !(*count >= 1 && *count <= 10000)) return Error{"film", "wants 1 to 10000 pictures", true};
+    if (word != "light" && word != "camera") return Error{"film", "turns the light or the camera", true};
+    return film(w, word, int(*count), a.words[2]);
+  }
+  if (a.verb == "size") {
+    auto size = parse_size(word, "size");
+    if (!size) return size.error();
+    glfwSetWindowSize(w.handle, (*size)[0] + (w.panel.open ? int(panel_width) : 0), (*size)[1]);
+    for (int i = 0; i < 100 && w.picture_width() != (*size)[0]; ++i) glfwWaitEventsTimeout(0.02);
+    return s.resize((*size)[0], (*size)[1]);
+  }
+  if (a.verb == "panel") return w.panel.open = word != "off", Result<void>();
+  return w.stays = true, Result<void>();
+}
+
+// What the script asks for next; false: it has ended.
+Result<bool> run_script(Window& w) {
+  if (w.frames_left > 0) return --w.frames_left, true;
+  if (window_clock() < w.wait_until) return true;
+  if (w.next >= w.script.size()) return w.script.empty() || w.stays;
+  const Action& a = w.script[w.next++];
+  w.frames_due = 3;
+  if (auto ok = act(w, a); !ok)
+    return Error{fmt::format("{}: line {}", w.options.script, a.line), ok.error().text(), ok.error().usage};
+  return true;
+}
+
+Result<void> loop(Window& w) {
+  bool busy = true;
+  while (!glfwWindowShouldClose(w.handle) && !is_cancelled(w.job.progress)) {
+    const bool traces = w.session.against == Against::reference;
+    const bool scripted = w.next < w.script.size() || w.frames_left > 0;
+    if (busy || scripted || w.frames_due > 0 || !w.dropped.empty()) glfwPollEvents();
+    else glfwWaitEventsTimeout(traces ? 0.2 : 1.0);
+    for (const std::string& path : std::exchange(w.dropped, {})) w.say(w.session.drop(path));
+    int width = 0, height = 0;
+    glfwGetFramebufferSize(w.handle, &width, &height);
+    if (width > 0 && height > 0) (void)w.session.resize(w.picture_width(), height);
+    auto goes_on = run_script(w);
+    if (!goes_on) return goes_on.error();
+    if (!*goes_on) return {};
+    const bool hurry = window_clock() - w.last_input < rest;
+    auto worked = w.session.work(hurry);
+    if (!worked) return worked.error();
+    busy = *worked || !w.session.settled();
+    const bool fresh = w.session.is_fresh();
+    if (!fresh && w.frames_due == 0) continue;
+    w.frames_due = std::max(0, w.frames_due - 1);
+    present(w);
+    glfwSwapBuffers(w.handle);
+  }
+  if (is_cancelled(w.job.progress)) return Error{"", "cancelled"};
+  return {};
+}
+
+}  // namespace
+
+Result<void> run_window(const SessionOptions& o, const WindowOptions& options, const Job& job) {
+  std::vector<Action> script;
+  if (!options.script.empty()) {
+    auto file = MappedFile::open(options.script);
+    if (!file) return file.error();
+    const auto bytes = file->bytes();
+    auto parsed = parse_script(std::string(bytes.begin(), bytes.end()), options.script);
+    if (!parsed) return parsed.error();
+    script = std::move(*parsed);
+  }
+  auto session = Session::open(o, job);
+  if (!session) return session.error();
+  Window w{**session, options, job};
+  w.script = std::move(script);
+  auto result = make_window(w);
+  if (result) result = loop(w);
+  close_window(w);
+  return result;
+}
+
+}  // namespace lambent::tool

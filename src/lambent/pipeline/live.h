@@ -1,0 +1,63 @@
+#pragma once
+// A picture under the hand: draw(), but piece by piece and only what has changed. Light that turns asks for T . light
+// and for the pixels' shades, and for no ray; a camera that moves for rays; materials for their reflection. When
+// nothing is left to do, the picture is draw()'s.
+#include <lambent/pipeline/draw.h>
+
+#include <memory>
+
+namespace lambent {
+
+// What pixels show in place of the picture.
+enum class Look { picture, receivers, density, coefficient };
+inline constexpr const char* look_names = "picture|receivers|density|coefficient";
+
+// Milliseconds of the latest piece of work, step by step; 0: not needed.
+struct LiveTimes {
+  double project = 0;  // environment -> coefficients, or the cube
+  double relight = 0;  // T . light; of blocks, the product at the receivers that are seen
+  double trace = 0;    // primary rays
+  double shade = 0;    // O(view) at the pixels
+  size_t shaded = 0;   // receivers
+};
+
+class LivePicture {
+ public:
+  // The request is draw()'s, and says what is seen at first. The baked file must outlive this. Errors: as draw(); what
+  // cannot be shown live, by name: --insert, --transfer-texture, --frames, --indirect.
+  static Result<LivePicture> make(const Baked& baked, const DrawRequest& request, const Job& job = {});
+  LivePicture(LivePicture&&) noexcept;
+  LivePicture& operator=(LivePicture&&) noexcept;
+  ~LivePicture();
+
+  // What is shown from now on; the next work() makes what it changes. On an error all stays as it was.
+  Result<void> ask(const DrawRequest& request);
+  // As asked: `lambent render` with these options draws the picture that this one becomes.
+  const DrawRequest& request() const;
+  Result<void> look_as(Look look, int coefficient = 0);
+
+  // One piece of work: the first sample of every pixel after a change, more of them after that. In a hurry (something
+  // moves) it may make fewer pixels, a coarser light, and of blocks shade a part of what is seen, so that it takes
+  // about `budget` seconds; the first call without makes up for it. False: there was nothing left to do.
+  Result<bool> work(bool hurry = false, double budget = 0.03);
+  bool done() const;  // all samples, of all of the light, at full size
+  int samples() const;
+
+  // What there is; radiance, with alpha where nothing is behind the scene. In a hurry its sides may be a half, a third
+  // or a quarter of the view's.
+  const Image& image() const;
+  const View& view() const;
+  const Scene& scene() const;              // in its pose
+  const Environment* environment() const;  // as loaded, not turned
+  const LiveTimes& times() const;
+
+  // What a ray through a place of the picture meets, [0, 1]^2 from the top left.
+  Hit pick(Vec2 at) const;
+
+ private:
+  struct State;
+  explicit LivePicture(std::unique_ptr<State> state);
+  std::unique_ptr<State> state_;
+};
+
+}  // namespace lambent
