@@ -38,7 +38,7 @@ size_t row_width(size_t coefficients, int channels) { return pad_lanes(coefficie
 // Solution vectors: T0, X, the next X and that denoised, with its neighbours; copies of rows without their lobes; the
 // terms, and one of them before it was denoised.
 size_t solution_bytes(size_t receivers, size_t coefficients, int channels, int sky_channels, const BakeOptions& o) {
-  const size_t width = row_width(coefficients, channels), terms = o.keep_terms ? size_t(o.bounces) + 1 : 0;
+  const size_t width = row_width(coefficients, channels), terms = o.keep_terms && o.denoise ? size_t(o.bounces) + 1 : 0;
   const size_t denoised = o.denoise ? width + (o.lobes.empty() ? 0 : (2 + terms) * width) + (terms ? width : 0) : 0;
   return receivers * (4 * (coefficients * size_t(sky_channels) + (o.bounces > 0 ? 2 : 1) * width + width / check_every +
                            terms * width + denoised) +
@@ -184,7 +184,8 @@ struct Baker {
     std::vector<AlignedVector<float>> terms;
     if (options.keep_terms) {
       auto ok = bounce_terms(*B, source, width(), options.bounces, progress, [&](int, const auto& x) -> Result<void> {
-        terms.push_back(x);
+        if (options.denoise || !placed.thinned.all()) terms.push_back(x);
+        else report.terms.push_back(store(x.data(), Spread(placed.all, placed.thinned, {})));
         return {};
       });
       if (!ok) return ok.error();
