@@ -3,6 +3,8 @@
 import { LambentError } from './errors.js';
 
 export const viewKeys: readonly string[] = [
+  'albedos',
+  'areas',
   'bufferView',
   'clusterOf',
   'coverage',
@@ -11,6 +13,12 @@ export const viewKeys: readonly string[] = [
   'lengths',
   'mapOf',
   'maps',
+  'materials',
+  'normals',
+  'parents',
+  'positions',
+  'scales',
+  'surfels',
   'texels',
   'valid',
   'weights',
@@ -21,7 +29,10 @@ export const plainKeys: readonly string[] = [
   'channels',
   'clusters',
   'cube',
+  'entries',
+  'error',
   'fov',
+  'gatherLevel',
   'grid',
   'height',
   'lobeCount',
