@@ -117,10 +117,10 @@ TEST(Ranks, DiffuseBakesAreAlike) {
   again.memory = least_memory(p.receivers.count(), true, few) + 4000;
   terms.keep_terms = true, direct.bounces = 0;
   direct.lobes = {{normalize(Vec3(1, 2, 3)), 40.0f}};
-  for (const auto& [name, options] :
+  for (const auto& [name, options_here] :
        {std::pair("kept", few), std::pair("traced again", again), std::pair("terms", terms),
         std::pair("direct", direct), std::pair("error", error)})
-    expect_alike(name, [&](Progress* progress) {
+    expect_alike(name, [&, &options = options_here](Progress* progress) {
       BakeReport report;
       auto t = bake(p.scene, p.tracer, p.receivers, options, &report, progress);
       EXPECT_TRUE(t) << t.error().text();
