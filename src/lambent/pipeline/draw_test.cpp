@@ -214,7 +214,7 @@ TEST_F(Drawings, NoOptionIsLeftAsideInSilence) {
       DrawRequest request = base;
       request.given.insert(json_name(option.name));
       std::visit(
-          [&](auto member) {
+          [&, kind = kind](auto member) {
             using T = std::remove_cvref_t<decltype(request.*member)>;
             if constexpr (std::is_same_v<T, std::string>)
               request.*member = option_name == "groove-map" ? at("half.png") : other_texts.at(option_name);
