@@ -3,7 +3,7 @@
 set -uo pipefail
 source "$(dirname "$0")/expect.sh"
 
-sky=sky:elevation=40
+sky=sky:elevation=40,width=128
 shot=(--env $sky --size 64x48 --exposure 0 --tone none)
 "$tool" bake corner.obj --max-edge 0.12 --samples 32 -o one.glb >/dev/null 2>&1
 expect 0 'receivers' bake corner.obj --max-edge 0.12 --samples 32 --bin-limit 64KiB -o "a set.gltf"
