@@ -193,7 +193,6 @@ Result<void> Session::drop(const std::string& path) {
     auto baked = load_baked(path);
     if (!baked) return baked.error();
     bakes.push_back(std::make_unique<Baked>(std::move(*baked))), names.push_back(path);
-    DrawRequest request = live->request();
     auto shown = show(bakes.size() - 1);
     if (!shown) bakes.pop_back(), names.pop_back();
     return shown;
