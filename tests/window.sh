@@ -7,7 +7,7 @@ tool=$(readlink -f "$1") golden=$(dirname "$(readlink -f "$0")")/golden
 for program in Xvfb xdotool; do
   command -v $program >/dev/null || { echo "window: left out: $program is not installed"; exit 0; }
 done
-if "$tool" view --window "$golden/diffuse.glb" 2>&1 </dev/null | grep -q "this build has no windows"; then
+if [[ $("$tool" view --window "$golden/diffuse.glb" 2>&1 </dev/null) == *"this build has no windows"* ]]; then
   echo "window: left out: this build has none"
   exit 0
 fi

@@ -9,6 +9,8 @@
 #include <filesystem>
 #include <map>
 
+#include "sanitizers.h"
+
 namespace lambent {
 namespace {
 
@@ -323,12 +325,7 @@ TEST_F(Requests, PlansSayReceiversAndBytesBeforeTheWork) {
   }
 }
 
-#if defined(__has_feature)
-#define LAMBENT_HAS_FEATURE(x) __has_feature(x)
-#else
-#define LAMBENT_HAS_FEATURE(x) 0
-#endif
-#if !defined(__SANITIZE_ADDRESS__) && !LAMBENT_HAS_FEATURE(address_sanitizer)  // whose allocator counts otherwise
+#ifndef LAMBENT_SANITIZED  // whose allocator counts otherwise
 TEST_F(Requests, TwoHundredLeaveMemoryWhereItWas) {
   const BakeRequest request = must_read(least(BakeKind::diffuse));
   size_t before = 0;
