@@ -7,6 +7,8 @@ set(lambent_relight_headers
   lambent/basis/haar.h
   lambent/basis/sh.h
   lambent/basis/sh_convert.h
+  lambent/basis/sh_fixed.h
+  lambent/basis/sh_tables.h
   lambent/brdf/brdf.h
   lambent/core/aligned.h
   lambent/core/camera.h

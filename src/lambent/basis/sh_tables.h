@@ -43,4 +43,17 @@ constexpr ShTables make_sh_tables() {
 inline constexpr ShTables sh_tables_exact = make_sh_tables();
 constexpr const ShTables& sh_tables() { return sh_tables_exact; }
 
+// The same in single or double precision.
+template <class T>
+constexpr ShTablesOf<T> round_sh_tables() {
+  ShTablesOf<T> t;
+  for (int l = 0; l < max_sh_order; ++l) {
+    t.diagonal[l] = T(sh_tables_exact.diagonal[l]);
+    for (int m = 0; m < l; ++m) t.a[l][m] = T(sh_tables_exact.a[l][m]), t.b[l][m] = T(sh_tables_exact.b[l][m]);
+  }
+  return t;
+}
+template <class T>
+inline constexpr ShTablesOf<T> sh_tables_rounded = round_sh_tables<T>();
+
 }  // namespace lambent

@@ -1,6 +1,6 @@
 #include <lambent/basis/sh.h>
 #include <lambent/basis/sh_convert.h>
-#include <lambent/basis/sh_tables.h>
+#include <lambent/basis/sh_fixed.h>
 #include <lambent/core/aligned.h>
 #include <lambent/core/random.h>
 #include <lambent/core/sampling.h>
@@ -135,6 +135,28 @@ TEST(Sh, EveryOrderGivesTheBitsOfTheLoop) {
       EXPECT_EQ(y[count], 7) << "nothing is written beyond the last";
       EXPECT_EQ(exact[count], 7);
     }
+}
+
+template <int order>
+void inlined_as_called() {
+  constexpr size_t count = size_t(sh_count(order));
+  for (Vec3 d : awkward_directions()) {
+    float y[count + 1], called[count];
+    double exact[count + 1], exact_called[count];
+    y[count] = 7, exact[count] = 7;
+    evaluate_sh<order>(d, std::span<float, count>(y, count)), evaluate_sh(order, d, called);
+    evaluate_sh<order>(Vec3d(d), std::span<double, count>(exact, count)), evaluate_sh(order, Vec3d(d), exact_called);
+    for (size_t i = 0; i < count; ++i) {
+      ASSERT_TRUE(same_bits(y[i], called[i])) << order << " " << i;
+      ASSERT_TRUE(same_bits(exact[i], exact_called[i])) << order << " " << i;
+    }
+    EXPECT_EQ(y[count], 7) << "nothing is written beyond the last";
+    EXPECT_EQ(exact[count], 7);
+  }
+}
+TEST(Sh, InlinedGivesTheBitsOfTheCall) {
+  inlined_as_called<1>(), inlined_as_called<2>(), inlined_as_called<3>();
+  inlined_as_called<4>(), inlined_as_called<5>(), inlined_as_called<6>();
 }
 
 TEST(Sh, ManyDirectionsGiveTheBitsOfOneOnEverySimdTarget) {
