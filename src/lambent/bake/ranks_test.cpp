@@ -6,6 +6,7 @@
 #include <lambent/bake/lightmap.h>
 #include <lambent/bake/materials.h>
 #include <lambent/bake/matrix.h>
+#include <lambent/bake/rooms.h>
 #include <lambent/bake/visibility.h>
 #include <lambent/compress/cpca.h>
 #include <lambent/compress/zonal_fit.h>
@@ -99,6 +100,30 @@ TEST(Ranks, GatherWhatEachHasMade) {
     for (int p = 0; p < 63; ++p) expected[size_t(3000 + p)] = 16 * p;
     for (const auto& r : rows) EXPECT_EQ(*r, expected);
   }
+}
+
+TEST(Ranks, RoomsAreAlike) {
+  const Place p;
+  auto rooms = part_rooms(room_bounds(p.scene), {{"left", {Vec3(-1), Vec3(-0.4f, 1, 1.5f)}},
+                                                 {"near", {Vec3(-0.4f, -1, -1), Vec3(0.2f, 1, 0)}},
+                                                 {"far", {Vec3(-0.4f, -1, 0), Vec3(0.2f, 1, 1.5f)}},
+                                                 {"right", {Vec3(0.2f, -1, -1), Vec3(1, 1, 1.5f)}}});
+  ASSERT_TRUE(rooms);
+  BakeOptions options{.order = 2, .samples = 64};
+  const auto work = [&](Progress* progress) {
+    auto t = bake_rooms(p.scene, p.receivers, *rooms, options, {.residual = 1e-3, .places = 6, .directions = 4},
+                        nullptr, nullptr, progress);
+    EXPECT_TRUE(t) << t.error().text();
+    return t ? bytes(*t) : Bytes();
+  };
+  const Bytes kept = work(nullptr);
+  options.memory = 0;
+  const auto refused = bake_rooms(p.scene, p.receivers, *rooms, options, {.places = 6, .directions = 4});
+  ASSERT_FALSE(refused);
+  const std::string text = refused.error().text();
+  options.memory = std::stoull(text.substr(text.find("least ") + 6)) + 20000;  // most of the rows are traced again
+  EXPECT_TRUE(work(nullptr) == kept);
+  expect_alike("rooms", work);
 }
 
 TEST(Ranks, OneThatIsCancelledCancelsAll) {

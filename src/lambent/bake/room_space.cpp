@@ -45,19 +45,22 @@ uint32_t RoomSpace::room_at(Vec3 p) const {
   return nearest;
 }
 
+bool RoomSpace::is_reached(size_t room, const Bounds& reach) const {
+  const Bounds& box = rooms[room].box;
+  for (int a = 0; a < 3; ++a)
+    if (!(reach.min[a] <= box.max[a] + tolerance_ && reach.max[a] >= box.min[a] - tolerance_)) return false;
+  return true;
+}
+
 Result<RoomGeometry> RoomSpace::geometry(size_t room, const Scene& scene) const {
   RoomGeometry out{std::make_unique<Scene>(), {}, {}};
   Scene& own = *out.scene;
-  const Bounds& box = rooms[room].box;
   std::vector<uint32_t> place(scene.positions.size(), none);
   for (uint32_t i = 0; i < scene.triangles.size(); ++i) {
     const Triangle& t = scene.triangles[i];
     Bounds reach;
     for (uint32_t v : t.v) reach.extend(scene.positions[v]);
-    bool inside = true;
-    for (int a = 0; a < 3; ++a)
-      inside = inside && reach.min[a] <= box.max[a] + tolerance_ && reach.max[a] >= box.min[a] - tolerance_;
-    if (!inside) continue;
+    if (!is_reached(room, reach)) continue;
     Triangle copy = t;
     for (uint32_t& v : copy.v) {
       if (place[v] == none) place[v] = uint32_t(own.positions.size()), own.positions.push_back(scene.positions[v]);

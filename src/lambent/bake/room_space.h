@@ -54,6 +54,8 @@ class RoomSpace {
   std::vector<std::vector<uint32_t>> nodes_of;  // of each room: nodes of openings that lead into it, numbered
 
   uint32_t room_at(Vec3 p) const;
+  // Whether a surface within these bounds is of the room's geometry.
+  bool is_reached(size_t room, const Bounds& reach) const;
   Result<RoomGeometry> geometry(size_t room, const Scene& scene) const;
   // Of a ray from within a room, given what it meets there.
   Exit exit(size_t room, Vec3 origin, Vec3 direction, const Hit& hit) const;

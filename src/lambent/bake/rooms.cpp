@@ -1,18 +1,23 @@
-// Follows: radiosity, "Problem Size". Jacobi within a room, Gauss-Seidel over rooms.
+// Follows: radiosity, "Problem Size". Jacobi within a room, Gauss-Seidel over rooms, of which those that do not touch
+// are visited side by side, each by the rank that it belongs to.
 #include <lambent/bake/rooms.h>
 
 #include <lambent/bake/block_builder.h>
 #include <lambent/bake/columns.h>
 #include <lambent/bake/kept_rows.h>
-#include <lambent/bake/room_space.h>
+#include <lambent/bake/room_nodes.h>
+#include <lambent/core/checkpoint.h>
 #include <lambent/core/parallel.h>
 #include <lambent/core/pool.h>
-#include <lambent/core/random.h>
+#include <lambent/core/ranks.h>
 #include <lambent/scene/see_through.h>
 
-#include <atomic>
+#include <algorithm>
+#include <array>
 #include <chrono>
 #include <cmath>
+#include <cstring>
+#include <numeric>
 
 namespace lambent {
 namespace {
@@ -20,9 +25,7 @@ namespace {
 using Clock = std::chrono::steady_clock;
 double seconds_since(Clock::time_point start) { return std::chrono::duration<double>(Clock::now() - start).count(); }
 
-constexpr int first_rays = 256;      // a receiver, which find the nodes
-constexpr int most_generations = 6;  // of nodes that rays of nodes find
-constexpr int inner_most = 6;        // iterations within a room at a visit
+constexpr int inner_most = 6;  // iterations within a room at a visit
 constexpr size_t padded(size_t n) { return (n + gather_block - 1) / gather_block * gather_block; }
 
 struct RowScratch {
@@ -30,6 +33,13 @@ struct RowScratch {
   AlignedVector<float> x, y, z;
   std::vector<Hit> hits;
   std::vector<float> harmonics, sky;
+};
+
+// What a block of rows is beside its rows: its sky, [row][coefficient], and counts of its rays.
+struct BlockFacts {
+  std::vector<float> e;
+  std::array<uint8_t, gather_block> buried{};
+  uint64_t crossed = 0, lost = 0;
 };
 
 struct RoomBaker {
@@ -51,82 +61,39 @@ struct RoomBaker {
   std::vector<std::vector<uint32_t>> receivers_of{};  // of each room
   std::vector<size_t> first_row{};  // of each room: its receivers, padded, then nodes of openings into it, padded
   std::vector<size_t> node_row{};   // of each room: the first of the nodes
-  std::vector<uint32_t> row_of{};   // of each receiver
-  size_t rows = 0;
-  std::vector<float> e{};         // [row][coefficient]
-  AlignedVector<float> x{};       // [row][coefficient][channel]
-  std::vector<uint8_t> buried{};  // of receivers
-  std::vector<FillStep> fill{};
+  std::vector<uint32_t> row_of{}, room_of{};  // of each receiver
+  size_t rows = 0, columns = 0;               // columns: with copies
+  Ranks& ranks = this_ranks();
+  RoomWork work{};
+  std::vector<std::vector<float>> e{};  // of each of this rank's rooms, [row of the room][coefficient]
+  AlignedVector<float> x{};             // [row][coefficient][channel]; of other ranks' rows those that are handed on
+  std::vector<uint8_t> buried{};        // of receivers
+  std::vector<std::vector<FillStep>> fill{};  // of each room
+  // Receivers that other rooms ask for, by their rooms. A copy of each, as it was at the end of the last step, is a row
+  // beyond those of rooms.
+  std::vector<std::vector<uint32_t>> lent{};
+  std::vector<uint32_t> copy_of{};  // of each receiver, its copy's row; none
   std::unique_ptr<KeptRows> kept{};
-  std::atomic<size_t> crossed{0}, lost{0};
-  std::atomic<bool> traced_anew{false};
+  uint64_t crossed = 0, lost = 0;
 
   size_t n() const { return receivers.count(); }
   size_t room_count() const { return space.rooms.size(); }
   size_t receiver_blocks(size_t room) const { return padded(receivers_of[room].size()) / gather_block; }
   size_t rooms_end(size_t room) const { return room + 1 < room_count() ? first_row[room + 1] : rows; }
+  size_t rows_in(size_t room) const { return rooms_end(room) - first_row[room]; }
+  // Where a room finds a receiver.
+  uint32_t column(size_t room, uint32_t r) const { return room_of[r] == room ? row_of[r] : copy_of[r]; }
+  bool is_own(size_t room) const { return work.owner[room] == ranks.rank(); }
 
   void assign_receivers() {
-    receivers_of.assign(room_count(), {});
-    for (uint32_t r = 0; r < n(); ++r) receivers_of[space.room_at(receivers.origins[r])].push_back(r);
-    for (const auto& own : receivers_of) told.largest = std::max(told.largest, own.size());
-  }
-
-  // Nodes that rays of receivers end at, by a few of them, and those that rays of nodes do, generation by generation.
-  Result<void> find_nodes() {
-    ProgressStage stage(progress, "finding openings", room_count());
-    const DirectionSets few = make_direction_sets(1, first_rays, 8, uint32_t(hash64(options.seed, 0x726f6f6d)));
-    std::vector<std::vector<uint32_t>> fresh(room_count());  // nodes whose rays have not been followed, by room
-    for (size_t room = 0; room < room_count(); ++room, stage.advance()) {
-      if (stage.cancelled()) return Error{"", "cancelled"};
-      auto geometry = space.geometry(room, scene);
-      if (!geometry) return geometry.error();
-      const auto& own = receivers_of[room];
-      std::vector<std::vector<Crossing>> found((own.size() + gather_block - 1) / gather_block);
-      parallel_for(own.size(), gather_block, [&](size_t begin, size_t end) {
-        AlignedVector<float> dx(few.stride), dy(few.stride), dz(few.stride);
-        std::vector<Hit> hits(first_rays);
-        for (size_t i = begin; i < end; ++i) {
-          const uint32_t r = own[i];
-          const DirectionChoice c = choose_directions(few, receivers.normals[r], options.seed, r);
-          const size_t base = size_t(c.set) * few.stride;
-          rotate_directions(c.rotation, few.x.data() + base, few.y.data() + base, few.z.data() + base, few.stride,
-                            dx.data(), dy.data(), dz.data());
-          geometry->tracer.closest_fan(receivers.origins[r], {dx.data(), dy.data(), dz.data(), first_rays},
-                                       hits.data());
-          for (size_t j = 0; j < first_rays; ++j) {
-            const Exit exit = space.exit(room, receivers.origins[r], {dx[j], dy[j], dz[j]}, hits[j]);
-            if (exit.opening != none) found[begin / gather_block].push_back({exit, uint32_t(hash64(r, j))});
-          }
-        }
-      });
-      for (const auto& block : found)
-        for (const Crossing& c : block) space.take(c, fresh);
+    receivers_of.assign(room_count(), {}), room_of.resize(n());
+    for (uint32_t r = 0; r < n(); ++r) {
+      room_of[r] = space.room_at(receivers.origins[r]);
+      receivers_of[room_of[r]].push_back(r);
     }
-    for (int generation = 0; generation < most_generations; ++generation) {
-      std::vector<std::vector<uint32_t>> now(room_count());
-      now.swap(fresh);
-      for (size_t room = 0; room < room_count(); ++room) {
-        if (now[room].empty()) continue;
-        if (stage.cancelled()) return Error{"", "cancelled"};
-        auto geometry = space.geometry(room, scene);
-        if (!geometry) return geometry.error();
-        std::vector<std::vector<Crossing>> found((now[room].size() + gather_block - 1) / gather_block);
-        parallel_for(now[room].size(), gather_block, [&](size_t begin, size_t end) {
-          for (size_t i = begin; i < end; ++i)
-            for (const NodeRay& ray : space.rays_of(now[room][i])) {
-              const Exit exit =
-                  space.exit(room, ray.origin, ray.direction, geometry->tracer.closest(ray.origin, ray.direction));
-              if (exit.opening != none)
-                found[begin / gather_block].push_back({exit, uint32_t(hash64(now[room][i], ray.key))});
-            }
-        });
-        for (const auto& block : found)
-          for (const Crossing& c : block) space.take(c, fresh);
-      }
-    }
-    space.number_nodes();
-    return {};
+    std::vector<size_t> cost;
+    for (const auto& own : receivers_of) cost.push_back(own.size()), told.largest = std::max(told.largest, own.size());
+    work = RoomWork(space, cost);
   }
 
   void number_rows() {
@@ -139,6 +106,11 @@ struct RoomBaker {
       node_row[room] = rows;
       rows += padded(space.nodes_of[room].size());
     }
+    lent = lent_receivers(space, scene, basis, room_of), copy_of.assign(n(), none);
+    columns = rows;
+    for (const auto& own : lent)
+      for (const uint32_t r : own) copy_of[r] = uint32_t(columns++);
+    columns = padded(columns);
     told.rooms = room_count(), told.openings = space.openings.size(), told.nodes = space.node_count();
   }
 
@@ -150,12 +122,12 @@ struct RoomBaker {
 
   // One ray into the row at hand.
   void add_ray(size_t room, const RoomGeometry& geometry, Vec3 origin, Vec3 direction, const Hit& hit, RowScratch& s,
-               size_t& backs) {
+               BlockFacts& facts, size_t& backs) {
     const Exit exit = space.exit(room, origin, direction, hit);
     if (exit.opening != none) {
-      ++crossed;
+      ++facts.crossed;
       const uint32_t node = space.find_node(exit);
-      if (node == none) ++lost;
+      if (node == none) ++facts.lost;
       else s.rows.add(uint32_t(node_row[space.openings[exit.opening].beyond] + node), Vec3(1));
       return;
     }
@@ -171,15 +143,17 @@ struct RoomBaker {
       return;
     }
     const Vec3 rho = albedo_of(triangle, *at, hit);
-    basis.spread(*at, hit.u, hit.v, [&](uint32_t r, float weight) { s.rows.add(row_of[r], weight * rho); });
+    basis.spread(*at, hit.u, hit.v, [&](uint32_t r, float weight) { s.rows.add(column(room, r), weight * rho); });
   }
 
-  // Block b of a room; where `first`, its e and who is buried, too. The number of rays that a row averages.
-  size_t trace_block(size_t room, const RoomGeometry& geometry, size_t b, bool first, RowScratch& s, SparseBlock& out) {
+  // Block b of a room. The number of rays that a row averages.
+  size_t trace_block(size_t room, const RoomGeometry& geometry, size_t b, RowScratch& s, SparseBlock& out,
+                     BlockFacts& facts) {
     const bool of_nodes = b >= receiver_blocks(room);
     const size_t begin = (of_nodes ? b - receiver_blocks(room) : b) * gather_block;
     const size_t all = of_nodes ? space.nodes_of[room].size() : receivers_of[room].size();
     const size_t rays = of_nodes ? size_t(most_node_rays) : size_t(options.samples);
+    facts.e.assign(gather_block * coefficients, 0.0f);
     s.rows.begin_block();
     for (size_t i = begin; i < begin + gather_block; ++i) {
       s.rows.begin_row();
@@ -191,7 +165,7 @@ struct RoomBaker {
         for (size_t j = 0; j < rays && !own.empty(); ++j) {
           const NodeRay& ray = own[j % own.size()];
           add_ray(room, geometry, ray.origin, ray.direction, geometry.tracer.closest(ray.origin, ray.direction), s,
-                  backs);
+                  facts, backs);
         }
       } else if (i < all) {
         const uint32_t r = receivers_of[room][i];
@@ -201,14 +175,12 @@ struct RoomBaker {
                           s.x.data(), s.y.data(), s.z.data());
         geometry.tracer.closest_fan(receivers.origins[r], {s.x.data(), s.y.data(), s.z.data(), rays}, s.hits.data());
         for (size_t j = 0; j < rays; ++j)
-          add_ray(room, geometry, receivers.origins[r], {s.x[j], s.y[j], s.z[j]}, s.hits[j], s, backs);
-        if (first) buried[r] = 2 * backs > rays;
+          add_ray(room, geometry, receivers.origins[r], {s.x[j], s.y[j], s.z[j]}, s.hits[j], s, facts, backs);
+        facts.buried[i - begin] = 2 * backs > rays;
       }
       s.rows.end_row();
-      if (first) {
-        float* row = e.data() + (first_row[room] + b * gather_block + i - begin) * coefficients;
-        for (size_t k = 0; k < coefficients; ++k) row[k] = s.sky[k] / float(rays);
-      }
+      float* row = facts.e.data() + (i - begin) * coefficients;
+      for (size_t k = 0; k < coefficients; ++k) row[k] = s.sky[k] / float(rays);
     }
     s.rows.finish(channels, of_nodes ? 1.0f : weight_unit, out);
     return rays;
@@ -216,41 +188,92 @@ struct RoomBaker {
 
   Pool<RowScratch> scratch{[this] {
     return std::unique_ptr<RowScratch>(
-        new RowScratch{BlockBuilder(rows), AlignedVector<float>(sets.stride), AlignedVector<float>(sets.stride),
+        new RowScratch{BlockBuilder(columns), AlignedVector<float>(sets.stride), AlignedVector<float>(sets.stride),
                        AlignedVector<float>(sets.stride), std::vector<Hit>(size_t(options.samples)),
                        std::vector<float>(coefficients), std::vector<float>(coefficients)});
   }};
 
+  // What the rank with the most rows needs beside rows of the operator: all ranks agree on it.
+  size_t fixed_bytes() const {
+    std::vector<size_t> of_rank(size_t(ranks.count()), 0);
+    for (size_t room = 0; room < room_count(); ++room)
+      of_rank[size_t(work.owner[room])] += 4 * coefficients * rows_in(room);
+    return *std::max_element(of_rank.begin(), of_rank.end()) + 4 * width * (columns + n()) + space.bytes();
+  }
+
+  // A room's blocks, but for those that have been kept before.
+  Result<void> trace_room(size_t room, const KeptPieces& pieces, ProgressStage& stage) {
+    const size_t first = first_row[room] / gather_block, blocks = rows_in(room) / gather_block;
+    e[room].assign(rows_in(room) * coefficients, 0.0f);
+    std::vector<uint8_t> missing(blocks, 0);
+    std::vector<BlockFacts> counts(blocks);
+    const auto finish = [&](size_t b, const PackedBlock& packed, BlockFacts& facts) {
+      kept->keep(first + b, packed);
+      std::copy(facts.e.begin(), facts.e.end(), e[room].data() + b * gather_block * coefficients);
+      for (size_t i = 0; b < receiver_blocks(room) && i < gather_block; ++i)
+        if (facts.buried[i]) buried[receivers_of[room][b * gather_block + i]] = 1;
+      facts.e = {}, counts[b] = std::move(facts);
+      stage.advance(gather_block);
+    };
+    parallel_for(blocks, 1, [&](size_t b, size_t) {
+      PackedBlock packed;
+      BlockFacts facts;
+      const bool is_there = pieces.load(first + b, packed.rows, facts.e, facts.buried, facts.crossed, facts.lost) &&
+                            facts.e.size() == gather_block * coefficients;
+      missing[b] = !is_there;
+      if (is_there) finish(b, packed, facts);
+    });
+    if (std::find(missing.begin(), missing.end(), 1) != missing.end()) {
+      auto geometry = space.geometry(room, scene);
+      if (!geometry) return geometry.error();
+      parallel_for(blocks, 1, [&](size_t b, size_t) {
+        if (!missing[b] || stage.cancelled()) return;
+        SparseBlock block;
+        PackedBlock packed;
+        BlockFacts facts;
+        trace_block(room, *geometry, b, *scratch.borrow(), block, facts);
+        pack(block, packed.rows);
+        pieces.save(first + b, packed.rows, facts.e, facts.buried, facts.crossed, facts.lost);
+        finish(b, packed, facts);
+      });
+    }
+    for (const BlockFacts& c : counts) crossed += c.crossed, lost += c.lost;
+    return {};
+  }
+
   Result<void> trace() {
     const auto start = Clock::now();
-    e.assign(rows * coefficients, 0.0f), buried.assign(n(), 0);
-    const size_t fixed = rows * (4 * coefficients + 4 * width) + n() * 4 * width + space.bytes();
+    e.assign(room_count(), {}), buried.assign(n(), 0);
+    const size_t fixed = fixed_bytes();
     if (options.memory < fixed)
       return Error{scene.path, "baking needs at least " + std::to_string(fixed) +
                                    " bytes of working memory, and was allowed " + std::to_string(options.memory)};
     kept = std::make_unique<KeptRows>(rows / gather_block, options.memory - fixed,
                                       most_bytes(size_t(options.samples), rows, channels), how.scratch);
-    ProgressStage stage(progress, "tracing rooms", rows);
-    for (size_t room = 0; room < room_count(); ++room) {
-      auto geometry = space.geometry(room, scene);
-      if (!geometry) return geometry.error();
-      parallel_for(rooms_end(room) - first_row[room], gather_block, [&](size_t begin, size_t end) {
-        if (stage.cancelled()) return;
-        SparseBlock block;
-        PackedBlock packed;
-        trace_block(room, *geometry, begin / gather_block, true, *scratch.borrow(), block);
-        pack(block, packed.rows);
-        kept->keep(first_row[room] / gather_block + begin / gather_block, packed);
-        stage.advance(end - begin);
-      });
-      if (stage.cancelled()) return Error{"", "cancelled"};
-    }
-    fill = make_fill_steps(scene, receivers.basis, buried);
+    size_t own = 0;
+    for (size_t room = 0; room < room_count(); ++room) own += is_own(room) ? rows_in(room) : 0;
+    ProgressStage stage(progress, "tracing rooms", own);
+    const KeptPieces pieces(progress, "rooms", rows / gather_block);
+    Result<void> ok;
+    for (size_t room = 0; room < room_count() && ok && !stage.cancelled(); ++room)
+      if (is_own(room)) ok = trace_room(room, pieces, stage);
+    if (auto well = agreed(std::move(ok)); !well) return well;
+    for (const auto& theirs : ranks.gather(buried))
+      for (size_t r = 0; r < n(); ++r) buried[r] |= theirs[r];
+    crossed = ranks.sum(crossed), lost = ranks.sum(lost);
+    arrange_filling();
     report.trace_seconds = seconds_since(start);
     report.working_memory = fixed + kept->bytes();
-    report.operator_bytes = kept->bytes(), report.operator_file_bytes = kept->file_bytes();
-    report.operator_kept = kept->fraction();
+    report.operator_bytes = ranks.sum(kept->bytes()), report.operator_file_bytes = ranks.sum(kept->file_bytes());
+    report.operator_kept = double(ranks.sum(kept->count())) / double(rows / gather_block);
     return {};
+  }
+
+  // Of all ranks: whether each has done its part.
+  Result<void> agreed(Result<void> mine) const {
+    if (!none_cancelled(progress)) return Error{"", "cancelled"};
+    if (ranks.all(bool(mine))) return {};
+    return mine ? Error{scene.path, "another rank has no tree of a room"} : std::move(mine);
   }
 
   void expand(const float* from, float* to) const {
@@ -259,14 +282,53 @@ struct RoomBaker {
     std::fill(to + coefficients * size_t(channels), to + width, 0.0f);
   }
 
-  // Receivers inside something have what their neighbours have.
-  void fill_rows() {
-    for (const FillStep& step : fill) {
+  // Receivers inside something have what their neighbours have, be they of other rooms.
+  void arrange_filling() {
+    fill.assign(room_count(), {});
+    for (FillStep& step : make_fill_steps(scene, receivers.basis, buried))
+      fill[room_of[step.receiver]].push_back(std::move(step));
+  }
+
+  void fill_rows(size_t room) {
+    for (const FillStep& step : fill[room]) {
       float* out = x.data() + size_t(row_of[step.receiver]) * width;
       std::fill(out, out + width, 0.0f);
-      for (uint32_t s : step.sources)
-        for (size_t k = 0; k < width; ++k) out[k] += x[size_t(row_of[s]) * width + k] / float(step.sources.size());
+      for (const uint32_t s : step.sources) {
+        const float* from = x.data() + size_t(column(room, s)) * width;
+        for (size_t k = 0; k < width; ++k) out[k] += from[k] / float(step.sources.size());
+      }
     }
+  }
+
+  // Rows of these rooms become known to all ranks: all of them, or those that other rooms ask for.
+  void hand_on(const std::vector<uint32_t>& these, bool all) {
+    const auto each_run = [&](size_t room, auto run) {
+      run(all ? first_row[room] : node_row[room], all ? node_row[room] : rooms_end(room));
+      for (size_t i = 0; i < lent[room].size() && !all; ++i) run(row_of[lent[room][i]], row_of[lent[room][i]] + 1);
+    };
+    if (ranks.count() > 1) {
+      std::vector<uint8_t> mine;
+      for (const uint32_t room : these)
+        if (is_own(room))
+          each_run(room, [&](size_t begin, size_t end) {
+            const auto* bytes = reinterpret_cast<const uint8_t*>(x.data() + begin * width);
+            mine.insert(mine.end(), bytes, bytes + (end - begin) * width * sizeof(float));
+          });
+      const auto each = ranks.gather(std::move(mine));
+      std::vector<size_t> at(each.size(), 0);
+      for (const uint32_t room : these) {
+        const size_t from = size_t(work.owner[room]);
+        if (is_own(room)) continue;
+        each_run(room, [&](size_t begin, size_t end) {
+          const size_t bytes = (end - begin) * width * sizeof(float);
+          if (bytes > 0) std::memcpy(x.data() + begin * width, each[from].data() + at[from], bytes);
+          at[from] += bytes, ranks.asked_bytes += all ? 0 : bytes;
+        });
+      }
+    }
+    for (const uint32_t room : these)
+      for (const uint32_t r : lent[room])
+        std::copy_n(x.data() + size_t(row_of[r]) * width, width, x.data() + size_t(copy_of[r]) * width);
   }
 
   // Whether row i of a room is of a receiver inside something, whose equation is another.
@@ -293,9 +355,9 @@ struct RoomBaker {
       std::vector<uint8_t> buffer;
       KeptRows::Block packed;
       const size_t rays = b < receiver_blocks(room) ? size_t(options.samples) : size_t(most_node_rays);
-      if (!kept->find(first / gather_block + b, buffer, packed) || !unpack(packed.rows, rows, channels, block)) {
-        trace_block(room, *geometry, b, false, *scratch.borrow(), block);
-        traced_anew = true;
+      if (!kept->find(first / gather_block + b, buffer, packed) || !unpack(packed.rows, columns, channels, block)) {
+        BlockFacts known;
+        trace_block(room, *geometry, b, *scratch.borrow(), block, known);
       }
       AlignedVector<float> sums(gather_block * width, 0.0f);
       multiply_entries(block.view().entries, channels, x.data(), width, sums.data());
@@ -304,7 +366,7 @@ struct RoomBaker {
       for (size_t i = begin; i < end; ++i) {
         float* y = fresh.data() + i * width;
         const float* old = x.data() + (first + i) * width;
-        expand(e.data() + (first + i) * coefficients, y);
+        expand(e[room].data() + i * coefficients, y);
         for (size_t k = 0; k < width; ++k) y[k] += scale * sums[(i - begin) * width + k];
         if (is_filled(room, i)) continue;
         for (size_t k = 0; k < width; ++k)
@@ -328,35 +390,74 @@ struct RoomBaker {
     });
   }
 
+  // Iterations within a room, with the newest light of its openings.
+  Result<void> visit(size_t room, size_t piece, const KeptPieces& pieces, Change& met) {
+    const std::span<float> own(x.data() + first_row[room] * width, rows_in(room) * width);
+    if (pieces.load(piece, own, met.change, met.all)) return {};
+    std::optional<RoomGeometry> geometry;
+    AlignedVector<float> fresh;
+    for (int inner = 0; inner < inner_most; ++inner) {
+      auto change = iterate(room, fresh, geometry);
+      if (!change) return change.error();
+      if (inner == 0) met = *change;  // as the room was met
+      store(room, fresh), fill_rows(room);
+      if (change->change <= 0.1 * how.residual * how.residual * change->all) break;
+    }
+    pieces.save(piece, own, met.change, met.all);
+    return {};
+  }
+
+  // Of all rooms, in one order, whoever visited them.
+  double residual_of(const std::vector<Change>& met) const {
+    std::vector<uint8_t> mine(met.size() * sizeof(Change));
+    std::memcpy(mine.data(), met.data(), mine.size());
+    const auto each = ranks.gather(std::move(mine));
+    Change sum;
+    for (size_t room = 0; room < room_count(); ++room) {
+      Change c;
+      std::memcpy(&c, each[size_t(work.owner[room])].data() + room * sizeof c, sizeof c);
+      sum.change += c.change, sum.all += c.all;
+    }
+    return sum.all > 0 ? std::sqrt(sum.change / sum.all) : 0.0;
+  }
+
   Result<void> solve() {
     const auto start = Clock::now();
-    x.assign(rows * width, 0.0f);
-    for (size_t r = 0; r < rows; ++r) expand(e.data() + r * coefficients, x.data() + r * width);
-    fill_rows();
-    AlignedVector<float> fresh;
+    x.assign(columns * width, 0.0f);
+    std::vector<uint32_t> every(room_count());
+    std::iota(every.begin(), every.end(), 0u);
+    for (const uint32_t room : every)
+      for (size_t i = 0; is_own(room) && i < rows_in(room); ++i)
+        expand(e[room].data() + i * coefficients, x.data() + (first_row[room] + i) * width);
+    hand_on(every, false);
+    for (const uint32_t room : every)
+      if (is_own(room)) fill_rows(room);
+    const KeptPieces pieces(progress, "joining", size_t(how.most_sweeps) * room_count());
     for (int sweep = 0; sweep < how.most_sweeps && !told.converged; ++sweep) {
       ProgressStage stage(progress, "joining rooms, sweep " + std::to_string(sweep + 1), room_count());
-      Change met;  // as each room was met, with the newest light of its openings
-      for (size_t room = 0; room < room_count(); ++room, stage.advance()) {
-        std::optional<RoomGeometry> geometry;
-        for (int inner = 0; inner < inner_most; ++inner) {
-          auto change = iterate(room, fresh, geometry);
-          if (!change) return change.error();
-          if (inner == 0) met.change += change->change, met.all += change->all;
-          store(room, fresh), fill_rows();
-          if (change->change <= 0.1 * how.residual * how.residual * change->all) break;
+      std::vector<Change> met(room_count());
+      for (const auto& step : work.steps) {
+        Result<void> ok;
+        for (const uint32_t room : step) {
+          if (is_own(room) && ok) ok = visit(room, size_t(sweep) * room_count() + room, pieces, met[room]);
+          stage.advance();
         }
+        if (auto well = agreed(std::move(ok)); !well) return well;
+        hand_on(step, false);
       }
-      told.residuals.push_back(met.all > 0 ? std::sqrt(met.change / met.all) : 0.0);
+      ++ranks.asks;
+      told.residuals.push_back(residual_of(met));
       told.converged = told.residuals.back() <= how.residual;
     }
+    hand_on(every, true);
     report.bounce_seconds = seconds_since(start);
     return {};
   }
 
   Result<Transfer> bake() {
     assign_receivers();
-    if (auto ok = find_nodes(); !ok) return ok.error();
+    if (auto ok = find_nodes(space, work, scene, receivers, receivers_of, options.seed, progress); !ok)
+      return ok.error();
     number_rows();
     if (auto ok = trace(); !ok) return ok.error();
     if (auto ok = solve(); !ok) return ok.error();

@@ -48,7 +48,6 @@ void summarize_ranks(Ranks& ranks, Summary& summary) {
 std::string done_by_one_rank(const BakeRequest& request) {
   if (kind_of(request) == BakeKind::membrane) return "--membrane";
   if (kind_of(request) == BakeKind::indirect) return "--transfer indirect";
-  if (!request.rooms.empty()) return "--rooms";
   if (kind_of(request) == BakeKind::lightmap && request.solver == "southwell")
     return "--solver southwell, one receiver after the other";
   return request.subsurface.empty() ? "" : "--subsurface";

@@ -1,0 +1,186 @@
+#include <lambent/bake/room_nodes.h>
+
+#include <lambent/bake/directions.h>
+#include <lambent/bake/kernels.h>
+#include <lambent/core/aligned.h>
+#include <lambent/core/parallel.h>
+#include <lambent/core/random.h>
+
+#include <algorithm>
+#include <atomic>
+#include <tuple>
+
+namespace lambent {
+namespace {
+
+constexpr int first_rays = 256;      // a receiver, which find the nodes
+constexpr int most_generations = 6;  // of nodes that rays of nodes find
+constexpr size_t grain = 64;
+
+using Found = std::vector<std::vector<Crossing>>;  // of each block of receivers or nodes
+using NodesOfRooms = std::vector<std::vector<uint32_t>>;
+
+Found cross_from_receivers(const RoomSpace& space, size_t room, const Tracer& tracer, const Receivers& receivers,
+                           const std::vector<uint32_t>& own, const DirectionSets& few, uint32_t seed) {
+  Found found((own.size() + grain - 1) / grain);
+  parallel_for(own.size(), grain, [&](size_t begin, size_t end) {
+    AlignedVector<float> dx(few.stride), dy(few.stride), dz(few.stride);
+    std::vector<Hit> hits(first_rays);
+    for (size_t i = begin; i < end; ++i) {
+      const uint32_t r = own[i];
+      const DirectionChoice c = choose_directions(few, receivers.normals[r], seed, r);
+      const size_t base = size_t(c.set) * few.stride;
+      rotate_directions(c.rotation, few.x.data() + base, few.y.data() + base, few.z.data() + base, few.stride,
+                        dx.data(), dy.data(), dz.data());
+      tracer.closest_fan(receivers.origins[r], {dx.data(), dy.data(), dz.data(), first_rays}, hits.data());
+      for (size_t j = 0; j < first_rays; ++j) {
+        const Exit exit = space.exit(room, receivers.origins[r], {dx[j], dy[j], dz[j]}, hits[j]);
+        if (exit.opening != none) found[begin / grain].push_back({exit, uint32_t(hash64(r, j))});
+      }
+    }
+  });
+  return found;
+}
+
+Found cross_from_nodes(const RoomSpace& space, size_t room, const Tracer& tracer, const std::vector<uint32_t>& nodes) {
+  Found found((nodes.size() + grain - 1) / grain);
+  parallel_for(nodes.size(), grain, [&](size_t begin, size_t end) {
+    for (size_t i = begin; i < end; ++i)
+      for (const NodeRay& ray : space.rays_of(nodes[i])) {
+        const Exit exit = space.exit(room, ray.origin, ray.direction, tracer.closest(ray.origin, ray.direction));
+        if (exit.opening != none) found[begin / grain].push_back({exit, uint32_t(hash64(nodes[i], ray.key))});
+      }
+  });
+  return found;
+}
+
+// Of those at each cell the ones that its node would keep.
+std::vector<Crossing> least_crossings(const Found& found) {
+  std::vector<Crossing> all;
+  for (const auto& block : found) all.insert(all.end(), block.begin(), block.end());
+  std::sort(all.begin(), all.end(), [](const Crossing& a, const Crossing& b) {
+    return std::tie(a.exit.opening, a.exit.cell, a.key) < std::tie(b.exit.opening, b.exit.cell, b.key);
+  });
+  size_t count = 0, of_cell = 0;
+  for (size_t i = 0; i < all.size(); ++i) {
+    const bool same = i > 0 && all[i].exit.opening == all[i - 1].exit.opening &&
+                      all[i].exit.cell == all[i - 1].exit.cell;
+    of_cell = same ? of_cell + 1 : 0;
+    if (of_cell < size_t(most_node_rays)) all[count++] = all[i];
+  }
+  all.resize(count);
+  return all;
+}
+
+// Each rank has found those of its rooms, and gets the others'.
+void share(Found& found, const RoomWork& work) {
+  Ranks& ranks = this_ranks();
+  if (ranks.count() == 1) return;
+  std::vector<uint8_t> mine;
+  for (size_t room = 0; room < found.size(); ++room)
+    if (work.owner[room] == ranks.rank()) checkpoint_detail::put(mine, checkpoint_detail::bytes_of(found[room]));
+  const auto all = ranks.gather(std::move(mine));
+  std::vector<size_t> at(all.size(), 0);
+  for (size_t room = 0; room < found.size(); ++room) {
+    const size_t from = size_t(work.owner[room]);
+    if (int(from) == ranks.rank()) continue;
+    std::span<const uint8_t> part;
+    checkpoint_detail::get(all[from], at[from], part);
+    found[room].resize(part.size() / sizeof(Crossing));
+    std::copy(part.begin(), part.end(), checkpoint_detail::bytes_of(found[room]).begin());
+  }
+}
+
+}  // namespace
+
+std::vector<std::vector<uint32_t>> lent_receivers(const RoomSpace& space, const Scene& scene,
+                                                  const CornerReceivers& basis, const std::vector<uint32_t>& room_of) {
+  std::vector<uint8_t> is_lent(room_of.size(), 0);
+  parallel_for(scene.triangles.size(), 1024, [&](size_t begin, size_t end) {
+    for (size_t i = begin; i < end; ++i) {
+      Bounds reach;
+      for (const uint32_t v : scene.triangles[i].v) reach.extend(scene.positions[v]);
+      std::vector<uint32_t> rooms, own;
+      for (uint32_t room = 0; room < space.rooms.size(); ++room)
+        if (space.is_reached(room, reach)) rooms.push_back(room);
+      for (const bool front : {true, false})
+        if (const Corners* at = basis.find(uint32_t(i), front))
+          own.insert(own.end(), at->receiver.begin(), at->receiver.end());
+      for (const uint32_t r : own) rooms.push_back(room_of[r]);
+      for (const uint32_t r : own)
+        if (std::any_of(rooms.begin(), rooms.end(), [&](uint32_t room) { return room != room_of[r]; }))
+          std::atomic_ref(is_lent[r]).store(1, std::memory_order_relaxed);
+    }
+  });
+  std::vector<std::vector<uint32_t>> lent(space.rooms.size());
+  for (uint32_t r = 0; r < room_of.size(); ++r)
+    if (is_lent[r]) lent[room_of[r]].push_back(r);
+  return lent;
+}
+
+RoomWork::RoomWork(const RoomSpace& space, const std::vector<size_t>& cost) : owner(space.rooms.size(), 0) {
+  const size_t count = space.rooms.size();
+  std::vector<std::vector<uint32_t>> beside(count);
+  for (const Opening& o : space.openings) beside[o.room].push_back(o.beyond), beside[o.beyond].push_back(o.room);
+  std::vector<size_t> step(count, count);
+  for (uint32_t room = 0; room < count; ++room) {
+    std::vector<bool> taken(count + 1);
+    for (const uint32_t other : beside[room]) taken[step[other]] = true;
+    step[room] = size_t(std::find(taken.begin(), taken.end(), false) - taken.begin());
+    if (step[room] >= steps.size()) steps.resize(step[room] + 1);
+    steps[step[room]].push_back(room);
+  }
+  // In each step the dearest first, to whom has least to do in it, and in all.
+  const size_t ranks = size_t(this_ranks().count());
+  std::vector<size_t> in_all(ranks, 0);
+  for (auto rooms : steps) {
+    std::stable_sort(rooms.begin(), rooms.end(), [&](uint32_t a, uint32_t b) { return cost[a] > cost[b]; });
+    std::vector<size_t> in_step(ranks, 0);
+    for (const uint32_t room : rooms) {
+      size_t least = 0;
+      for (size_t k = 1; k < ranks; ++k)
+        if (std::tie(in_step[k], in_all[k]) < std::tie(in_step[least], in_all[least])) least = k;
+      owner[room] = int(least);
+      in_step[least] += cost[room], in_all[least] += cost[room];
+    }
+  }
+}
+
+Result<void> find_nodes(RoomSpace& space, const RoomWork& work, const Scene& scene, const Receivers& receivers,
+                        const std::vector<std::vector<uint32_t>>& receivers_of, uint32_t seed, Progress* progress) {
+  const size_t rooms = space.rooms.size();
+  Ranks& ranks = this_ranks();
+  const DirectionSets few = make_direction_sets(1, first_rays, 8, uint32_t(hash64(seed, 0x726f6f6d)));
+  const KeptPieces pieces(progress, "openings", (most_generations + 1) * rooms);
+  ProgressStage stage(progress, "finding openings", (most_generations + 1) * rooms);
+  NodesOfRooms fresh(rooms);  // nodes whose rays have not been followed
+  for (size_t generation = 0; generation <= most_generations; ++generation) {
+    NodesOfRooms now(rooms);
+    now.swap(fresh);
+    Found found(rooms);
+    Result<void> ok;
+    for (size_t room = 0; room < rooms && ok && !stage.cancelled(); ++room, stage.advance()) {
+      if (work.owner[room] != ranks.rank() || (generation > 0 && now[room].empty())) continue;
+      const size_t piece = generation * rooms + room;
+      if (pieces.load(piece, found[room])) continue;
+      auto geometry = space.geometry(room, scene);
+      if (!geometry) {
+        ok = geometry.error();
+        break;
+      }
+      found[room] = least_crossings(generation == 0 ? cross_from_receivers(space, room, geometry->tracer, receivers,
+                                                                           receivers_of[room], few, seed)
+                                                    : cross_from_nodes(space, room, geometry->tracer, now[room]));
+      pieces.save(piece, found[room]);
+    }
+    if (!none_cancelled(progress)) return Error{"", "cancelled"};
+    if (!ranks.all(bool(ok))) return ok ? Error{scene.path, "another rank has no tree of a room"} : ok;
+    share(found, work);
+    for (const auto& of_room : found)
+      for (const Crossing& c : of_room) space.take(c, fresh);
+  }
+  space.number_nodes();
+  return {};
+}
+
+}  // namespace lambent
