@@ -9,6 +9,8 @@
 
 #include <gtest/gtest.h>
 
+#include "sanitizers.h"
+
 namespace lambent {
 namespace {
 
@@ -157,6 +159,7 @@ TEST(Indirect, ClosedNeighbouringRoomStaysDark) {
 
 // Lamps at several places, against paths that know no surfels.
 TEST(Indirect, IsWhatPathsGather) {
+  SKIP_UNDER_SANITIZERS();
   const auto m = make(room(Vec3(0.9f, 0.1f, 0.1f)), 8192, 512);
   const SurfelSearch search(m->transfer.surfels, m->tracer, m->transfer.gather_level);
   IndirectSolve s = make_indirect_solve(m->transfer);

@@ -7,6 +7,8 @@
 
 #include <gtest/gtest.h>
 
+#include "sanitizers.h"
+
 namespace lambent {
 namespace {
 
@@ -69,6 +71,7 @@ TEST(LightmapLight, BeyondHalfFloatsIsKeptInSinglePrecision) {
 // A floor under a lamp whose picture is dark but for one texel of 32 x 32: what a sum over its points gives, from as
 // few samples as a lamp of one colour takes.
 TEST(LightmapLight, ThePictureOfALampIsSampledWhereItIsBright) {
+  SKIP_UNDER_SANITIZERS();
   Scene scene;
   const uint32_t grey = add_material(scene, "grey", Vec3(0.5f)), lamp = add_material(scene, "lamp", Vec3(0));
   Texture picture;

@@ -10,6 +10,8 @@
 
 #include <gtest/gtest.h>
 
+#include "sanitizers.h"
+
 namespace lambent {
 namespace {
 
@@ -198,6 +200,7 @@ TEST(Lightmap, ClosedBoxOfUniformEmission) {
 }
 
 TEST(Lightmap, IntegratingSphereWithAnEmissivePatch) {
+  SKIP_UNDER_SANITIZERS();
   // Every point of a sphere sees every other with the same form factor: a patch that is the fraction f of it adds L f
   // to all, and each bounce multiplies by rho. The ball's 5,120 faces fall 0.3% short of it, bounce by bounce.
   constexpr float rho = 0.7f, L = 4, faceted = 0.01f;
@@ -299,6 +302,7 @@ Environment skew_sky() {
 }
 
 TEST(Lightmap, AgreesWithThePathTracer) {
+  SKIP_UNDER_SANITIZERS();
   // 12 receivers of each kind; paths and rays leave noise below 1%, interpolation between receivers a little more.
   // Seams of the ball's charts move single texels by a few percent, since it is look-ups that they make agree.
   constexpr float noise = 0.02f, seams = 0.03f;
@@ -341,6 +345,7 @@ TEST(Lightmap, DirectApartIsTheBakeWithoutBounces) {
 }
 
 TEST(Lightmap, HarmonicsOverTexelsAreTheVertexBakeBetweenVertices) {
+  SKIP_UNDER_SANITIZERS();
   // A PRT lightmap against the vertex bake, both relit by one skew light, at random points of the floor away from its
   // shadows' sharpest parts: interpolation over cells of 1/12, and rays of their own, leave 2% of the brightest.
   Scene scene = corner(false);

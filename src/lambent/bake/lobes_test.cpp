@@ -12,6 +12,8 @@
 
 #include <gtest/gtest.h>
 
+#include "sanitizers.h"
+
 namespace lambent {
 namespace {
 
@@ -38,6 +40,7 @@ const std::vector<Lobe> skew_lobes{{normalize(Vec3(0.3f, 0.8f, -0.5f)), 5000},
                                    {Vec3(0, -1, 0), 100000}};
 
 TEST(BakeLobes, OpenPlaneIsTheIntegral) {
+  SKIP_UNDER_SANITIZERS();
   const Vec3 a(0.1f, 0.2f, 1), b(1, -0.2f, 0), n = normalize(cross(a, b));
   const Mat3 frame = frame_about(n);
   for (LobeKind kind : {LobeKind::von_mises_fisher, LobeKind::cosine_power})
@@ -119,6 +122,7 @@ Scene court() {
 }
 
 TEST(BakeLobes, AgreesWithThePathTracerUnderSunAndSky) {
+  SKIP_UNDER_SANITIZERS();
   auto sky = make_sky({.elevation = 50, .azimuth = 70, .width = 512});
   ASSERT_TRUE(sky);
   const Mat3 R = rotation_from_yaw_pitch_roll({15, 10, -5});

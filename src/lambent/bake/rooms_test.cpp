@@ -5,6 +5,8 @@
 
 #include <gtest/gtest.h>
 
+#include "sanitizers.h"
+
 namespace lambent {
 namespace {
 
@@ -83,6 +85,7 @@ TEST(Rooms, OneRoomIsTheSceneItself) {
 }
 
 TEST(Rooms, JoinToTheSceneBakedWhole) {
+  SKIP_UNDER_SANITIZERS();
   const Scene scene = make_building(6, 0.8f);  // twelve rooms and a hall
   auto tracer = Tracer::build(scene);
   const Receivers receivers = make_vertex_receivers(scene);
