@@ -33,7 +33,8 @@ for decade in range(0, y_low - 1, -1):
     out.append(f'<text x="{left - 8}" y="{at + 4:.1f}" text-anchor="end">1e{decade}</text>')
 for sweep in range(1, sweeps + 1):
     out.append(f'<text x="{x(sweep):.1f}" y="{height - bottom + 18}" text-anchor="middle">{sweep}</text>')
-out.append(f'<text x="{(left + width - right) / 2}" y="{height - 10}" text-anchor="middle">sweeps over all rooms</text>')
+out.append(f'<text x="{(left + width - right) / 2}" y="{height - 10}" text-anchor="middle">'
+           'sweeps over all rooms</text>')
 curves = [("residual over all rooms", "#1f618d", record["residuals"], ""),
           ("difference from the scene baked whole", "#c0392b", record["differences"], ""),
           ("two seeds of the whole", "#888", [record["limit"]] * sweeps, ' stroke-dasharray="5 4"')]
