@@ -41,6 +41,6 @@ curves = [("residual over all rooms", "#1f618d", record["residuals"], ""),
 for i, (name, color, values, dash) in enumerate(curves):
     points = " ".join(f"{x(k + 1):.1f},{y(v):.1f}" for k, v in enumerate(values))
     out.append(f'<polyline points="{points}" fill="none" stroke="{color}" stroke-width="2"{dash}/>')
-    out.append(f'<text x="{width - right - 250}" y="{top + 18 + 18 * i}" fill="{color}">{name}</text>')
+    out.append(f'<text x="{width - right - 265}" y="{top + 18 + 18 * i}" fill="{color}">{name}</text>')
 out.append("</svg>")
 open(sys.argv[2], "w").write("\n".join(out) + "\n")
