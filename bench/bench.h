@@ -38,6 +38,7 @@ void bench_load();
 void bench_products();
 void bench_radiosity();
 void bench_relight();
+void bench_rooms();
 void bench_scale();
 void bench_scaling();
 void bench_window();

@@ -1,6 +1,6 @@
 #!/usr/bin/env bash
 # What keeping work costs, and what it takes to go on: JSON lines. Bakes with and without a checkpoint take turns, and
-# the least of ROUNDS (5) counts.
+# the least of ROUNDS (5) counts. KINDS: some alone.
 source "$(dirname "$0")/common.sh"
 [ -d "$data/meshes" ] || { echo "skipped: no folder $data" >&2; exit 0; }
 scene=$data/meshes/armadillo.obj
@@ -22,7 +22,8 @@ def command(options, checkpoint):
 def bake(options, checkpoint):
     return json.loads(subprocess.run(command(options, checkpoint), check=True, capture_output=True).stdout)
 
-for kind, options in kinds.items():
+for kind in os.environ.get("KINDS", " ".join(kinds)).split():
+    options = kinds[kind]
     seconds = {"off": [], out + "/kept": []}
     for _ in range(rounds):
         for checkpoint in seconds:

@@ -8,6 +8,7 @@
 
 #include <algorithm>
 #include <atomic>
+#include <cstring>
 #include <tuple>
 
 namespace lambent {
@@ -144,6 +145,32 @@ RoomWork::RoomWork(const RoomSpace& space, const std::vector<size_t>& cost) : ow
       in_step[least] += cost[room], in_all[least] += cost[room];
     }
   }
+}
+
+uint64_t hand_rows(const RoomWork& work, const std::vector<uint32_t>& rooms,
+                   const std::function<RowRuns(uint32_t)>& runs_of, float* x, size_t width) {
+  Ranks& ranks = this_ranks();
+  if (ranks.count() == 1) return 0;
+  std::vector<uint8_t> mine;
+  for (const uint32_t room : rooms)
+    if (work.owner[room] == ranks.rank())
+      for (const auto& run : runs_of(room)) {
+        const auto* bytes = reinterpret_cast<const uint8_t*>(x + run.first * width);
+        mine.insert(mine.end(), bytes, bytes + (run.second - run.first) * width * sizeof(float));
+      }
+  const auto each = ranks.gather(std::move(mine));
+  std::vector<size_t> at(each.size(), 0);
+  uint64_t taken = 0;
+  for (const uint32_t room : rooms) {
+    const size_t from = size_t(work.owner[room]);
+    if (int(from) == ranks.rank()) continue;
+    for (const auto& run : runs_of(room)) {
+      const size_t bytes = (run.second - run.first) * width * sizeof(float);
+      if (bytes > 0) std::memcpy(x + run.first * width, each[from].data() + at[from], bytes);
+      at[from] += bytes, taken += bytes;
+    }
+  }
+  return taken;
 }
 
 Result<void> find_nodes(RoomSpace& space, const RoomWork& work, const Scene& scene, const Receivers& receivers,

@@ -6,6 +6,9 @@
 #include <lambent/core/ranks.h>
 #include <lambent/receivers/receivers.h>
 
+#include <functional>
+#include <utility>
+
 namespace lambent {
 
 struct RoomWork {
@@ -22,6 +25,12 @@ struct RoomWork {
 // there.
 std::vector<std::vector<uint32_t>> lent_receivers(const RoomSpace& space, const Scene& scene,
                                                   const CornerReceivers& basis, const std::vector<uint32_t>& room_of);
+
+// Rows [first, second).
+using RowRuns = std::vector<std::pair<size_t, size_t>>;
+// Each rank has made the rows of these rooms that are its own, x[row][width], and gets the others'; the bytes it took.
+uint64_t hand_rows(const RoomWork& work, const std::vector<uint32_t>& rooms,
+                   const std::function<RowRuns(uint32_t)>& runs_of, float* x, size_t width);
 
 // Nodes that rays of receivers end at, by a few of them, and those that rays of nodes do, generation by generation.
 // Each rank follows those of its rooms; all come to know all nodes. Errors: cancelled; a room without a tree.

@@ -74,6 +74,7 @@ struct RoomBaker {
   std::vector<std::vector<uint32_t>> lent{};
   std::vector<uint32_t> copy_of{};  // of each receiver, its copy's row; none
   std::unique_ptr<KeptRows> kept{};
+  std::vector<uint8_t> is_kept{};  // of each of this rank's rooms: all its rows are
   uint64_t crossed = 0, lost = 0;
 
   size_t n() const { return receivers.count(); }
@@ -83,6 +84,11 @@ struct RoomBaker {
   size_t rows_in(size_t room) const { return rooms_end(room) - first_row[room]; }
   // Where a room finds a receiver.
   uint32_t column(size_t room, uint32_t r) const { return room_of[r] == room ? row_of[r] : copy_of[r]; }
+  size_t rows_of(int rank) const {
+    size_t sum = 0;
+    for (size_t room = 0; room < room_count(); ++room) sum += work.owner[room] == rank ? rows_in(room) : 0;
+    return sum;
+  }
   bool is_own(size_t room) const { return work.owner[room] == ranks.rank(); }
 
   void assign_receivers() {
@@ -195,20 +201,19 @@ struct RoomBaker {
 
   // What the rank with the most rows needs beside rows of the operator: all ranks agree on it.
   size_t fixed_bytes() const {
-    std::vector<size_t> of_rank(size_t(ranks.count()), 0);
-    for (size_t room = 0; room < room_count(); ++room)
-      of_rank[size_t(work.owner[room])] += 4 * coefficients * rows_in(room);
-    return *std::max_element(of_rank.begin(), of_rank.end()) + 4 * width * (columns + n()) + space.bytes();
+    size_t most = 0;
+    for (int k = 0; k < ranks.count(); ++k) most = std::max(most, rows_of(k));
+    return 4 * coefficients * most + 4 * width * (columns + n()) + space.bytes();
   }
 
   // A room's blocks, but for those that have been kept before.
   Result<void> trace_room(size_t room, const KeptPieces& pieces, ProgressStage& stage) {
     const size_t first = first_row[room] / gather_block, blocks = rows_in(room) / gather_block;
     e[room].assign(rows_in(room) * coefficients, 0.0f);
-    std::vector<uint8_t> missing(blocks, 0);
+    std::vector<uint8_t> waiting(blocks, 0), missing(blocks, 0);
     std::vector<BlockFacts> counts(blocks);
     const auto finish = [&](size_t b, const PackedBlock& packed, BlockFacts& facts) {
-      kept->keep(first + b, packed);
+      missing[b] = !kept->keep(first + b, packed);
       std::copy(facts.e.begin(), facts.e.end(), e[room].data() + b * gather_block * coefficients);
       for (size_t i = 0; b < receiver_blocks(room) && i < gather_block; ++i)
         if (facts.buried[i]) buried[receivers_of[room][b * gather_block + i]] = 1;
@@ -220,14 +225,14 @@ struct RoomBaker {
       BlockFacts facts;
       const bool is_there = pieces.load(first + b, packed.rows, facts.e, facts.buried, facts.crossed, facts.lost) &&
                             facts.e.size() == gather_block * coefficients;
-      missing[b] = !is_there;
-      if (is_there) finish(b, packed, facts);
+      if (is_there) return finish(b, packed, facts);
+      waiting[b] = 1;
     });
-    if (std::find(missing.begin(), missing.end(), 1) != missing.end()) {
+    if (std::find(waiting.begin(), waiting.end(), 1) != waiting.end()) {
       auto geometry = space.geometry(room, scene);
       if (!geometry) return geometry.error();
       parallel_for(blocks, 1, [&](size_t b, size_t) {
-        if (!missing[b] || stage.cancelled()) return;
+        if (!waiting[b] || stage.cancelled()) return;
         SparseBlock block;
         PackedBlock packed;
         BlockFacts facts;
@@ -237,22 +242,21 @@ struct RoomBaker {
         finish(b, packed, facts);
       });
     }
+    is_kept[room] = std::find(missing.begin(), missing.end(), 1) == missing.end();
     for (const BlockFacts& c : counts) crossed += c.crossed, lost += c.lost;
     return {};
   }
 
   Result<void> trace() {
     const auto start = Clock::now();
-    e.assign(room_count(), {}), buried.assign(n(), 0);
+    e.assign(room_count(), {}), buried.assign(n(), 0), is_kept.assign(room_count(), 0);
     const size_t fixed = fixed_bytes();
     if (options.memory < fixed)
       return Error{scene.path, "baking needs at least " + std::to_string(fixed) +
                                    " bytes of working memory, and was allowed " + std::to_string(options.memory)};
     kept = std::make_unique<KeptRows>(rows / gather_block, options.memory - fixed,
                                       most_bytes(size_t(options.samples), rows, channels), how.scratch);
-    size_t own = 0;
-    for (size_t room = 0; room < room_count(); ++room) own += is_own(room) ? rows_in(room) : 0;
-    ProgressStage stage(progress, "tracing rooms", own);
+    ProgressStage stage(progress, "tracing rooms", rows_of(ranks.rank()));
     const KeptPieces pieces(progress, "rooms", rows / gather_block);
     Result<void> ok;
     for (size_t room = 0; room < room_count() && ok && !stage.cancelled(); ++room)
@@ -302,30 +306,14 @@ struct RoomBaker {
 
   // Rows of these rooms become known to all ranks: all of them, or those that other rooms ask for.
   void hand_on(const std::vector<uint32_t>& these, bool all) {
-    const auto each_run = [&](size_t room, auto run) {
-      run(all ? first_row[room] : node_row[room], all ? node_row[room] : rooms_end(room));
-      for (size_t i = 0; i < lent[room].size() && !all; ++i) run(row_of[lent[room][i]], row_of[lent[room][i]] + 1);
+    const auto runs_of = [&](uint32_t room) {
+      RowRuns runs{{all ? first_row[room] : node_row[room], all ? node_row[room] : rooms_end(room)}};
+      for (size_t i = 0; i < lent[room].size() && !all; ++i)
+        runs.emplace_back(row_of[lent[room][i]], row_of[lent[room][i]] + 1);
+      return runs;
     };
-    if (ranks.count() > 1) {
-      std::vector<uint8_t> mine;
-      for (const uint32_t room : these)
-        if (is_own(room))
-          each_run(room, [&](size_t begin, size_t end) {
-            const auto* bytes = reinterpret_cast<const uint8_t*>(x.data() + begin * width);
-            mine.insert(mine.end(), bytes, bytes + (end - begin) * width * sizeof(float));
-          });
-      const auto each = ranks.gather(std::move(mine));
-      std::vector<size_t> at(each.size(), 0);
-      for (const uint32_t room : these) {
-        const size_t from = size_t(work.owner[room]);
-        if (is_own(room)) continue;
-        each_run(room, [&](size_t begin, size_t end) {
-          const size_t bytes = (end - begin) * width * sizeof(float);
-          if (bytes > 0) std::memcpy(x.data() + begin * width, each[from].data() + at[from], bytes);
-          at[from] += bytes, ranks.asked_bytes += all ? 0 : bytes;
-        });
-      }
-    }
+    const uint64_t bytes = hand_rows(work, these, runs_of, x.data(), width);
+    ranks.asked_bytes += all ? 0 : bytes;
     for (const uint32_t room : these)
       for (const uint32_t r : lent[room])
         std::copy_n(x.data() + size_t(row_of[r]) * width, width, x.data() + size_t(copy_of[r]) * width);
@@ -343,7 +331,7 @@ struct RoomBaker {
     const size_t first = first_row[room], count = rooms_end(room) - first;
     fresh.resize(count * width);
     std::vector<Change> changes(count / gather_block);
-    if (kept->fraction() < 1 && !geometry) {
+    if (!is_kept[room] && !geometry) {
       auto made = space.geometry(room, scene);
       if (!made) return made.error();
       geometry = std::move(*made);
@@ -409,9 +397,8 @@ struct RoomBaker {
 
   // Of all rooms, in one order, whoever visited them.
   double residual_of(const std::vector<Change>& met) const {
-    std::vector<uint8_t> mine(met.size() * sizeof(Change));
-    std::memcpy(mine.data(), met.data(), mine.size());
-    const auto each = ranks.gather(std::move(mine));
+    const auto* bytes = reinterpret_cast<const uint8_t*>(met.data());
+    const auto each = ranks.gather({bytes, bytes + met.size() * sizeof(Change)});
     Change sum;
     for (size_t room = 0; room < room_count(); ++room) {
       Change c;
@@ -426,7 +413,7 @@ struct RoomBaker {
     x.assign(columns * width, 0.0f);
     std::vector<uint32_t> every(room_count());
     std::iota(every.begin(), every.end(), 0u);
-    for (const uint32_t room : every)
+    for (uint32_t room : every)
       for (size_t i = 0; is_own(room) && i < rows_in(room); ++i)
         expand(e[room].data() + i * coefficients, x.data() + (first_row[room] + i) * width);
     hand_on(every, false);

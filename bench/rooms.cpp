@@ -1,0 +1,67 @@
+// Rooms that are joined, sweep by sweep, against the same scene baked whole with the same rays: residuals, and what is
+// left of the difference after so many sweeps. The whole, by two seeds, says what the rays alone are off. A made
+// building of twelve rooms and a hall; LAMBENT_ROOMS_SCENE: a file instead. LAMBENT_ROOMS_RAYS (256) a receiver.
+#include "bench.h"
+
+#include <lambent/bake/rooms.h>
+#include <lambent/scene/load.h>
+#include <lambent/scene/procedural.h>
+
+#include <fmt/format.h>
+
+#include <cmath>
+#include <cstdlib>
+
+namespace lambent::bench {
+namespace {
+
+double difference_of(const Transfer& a, const Transfer& b) {
+  double squares = 0, all = 0;
+  for (size_t r = 0; r < a.receivers; ++r) {
+    const std::vector<float> x = load_receiver(a, r), y = load_receiver(b, r);
+    for (size_t k = 0; k < x.size(); ++k)
+      squares += std::pow(double(x[k]) - double(y[k]), 2), all += double(y[k]) * double(y[k]);
+  }
+  return std::sqrt(squares / all);
+}
+
+}  // namespace
+
+void bench_rooms() {
+  const char *file = std::getenv("LAMBENT_ROOMS_SCENE"), *rays = std::getenv("LAMBENT_ROOMS_RAYS");
+  auto loaded = file ? load_scene(file) : Result<Scene>(make_building(6, 0.8f));
+  if (!loaded) return fmt::print(stderr, "skipped: {}\n", loaded.error().text());
+  Scene& scene = *loaded;
+  for (Material& m : scene.materials) m.base_color = min(m.base_color, Vec3(0.8f));
+  auto tracer = Tracer::build(scene);
+  if (!tracer) return fmt::print(stderr, "skipped: {}\n", tracer.error().text());
+  const Receivers receivers = make_vertex_receivers(scene);
+  BakeOptions options{
+      .order = 3, .samples = rays ? std::atoi(rays) : 256, .bounces = 40, .precision = Precision::single};
+  options.denoise = options.certify = false;
+  BakeOptions other = options;
+  other.seed = 7;
+  auto whole = bake(scene, *tracer, receivers, options), again = bake(scene, *tracer, receivers, other);
+  if (!whole || !again) return fmt::print(stderr, "skipped: {}\n", (whole ? again : whole).error().text());
+  const std::vector<Room> rooms = find_rooms(scene, 64);
+  RoomsOptions how{.residual = 1e-3};
+  RoomsReport told;
+  std::vector<double> differences;
+  for (how.most_sweeps = 1; how.most_sweeps <= 20 && !told.converged; ++how.most_sweeps) {
+    auto joined = bake_rooms(scene, receivers, rooms, options, how, nullptr, &told);
+    if (!joined) return fmt::print(stderr, "skipped: {}\n", joined.error().text());
+    differences.push_back(difference_of(*joined, *whole));
+  }
+  report("rooms_joined", differences.back(), difference_of(*again, *whole), "relative RMS over receivers",
+         "two seeds of the whole",
+         {{"receivers", receivers.count()},
+          {"largest", told.largest},
+          {"rooms", told.rooms},
+          {"openings", told.openings},
+          {"nodes", told.nodes},
+          {"lost", told.lost},
+          {"residuals", told.residuals},
+          {"differences", differences}});
+}
+
+}  // namespace lambent::bench
