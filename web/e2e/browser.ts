@@ -18,6 +18,8 @@ export async function launch(): Promise<Browser> {
       '--no-sandbox',
       '--use-angle=swiftshader',
       '--enable-unsafe-swiftshader',
+      '--enable-unsafe-webgpu',
+      '--use-webgpu-adapter=swiftshader',
       '--disable-background-networking',
       '--disable-component-update',
       '--disable-sync',
@@ -80,8 +82,12 @@ export async function ready(page: Page): Promise<void> {
   await drawn(page);
 }
 
-/** The scenes of fixture/scenes.ts, with files of `folder` under /files/, a tilde for each slash. */
-export async function openFixture(browser: Browser, folder: string): Promise<{ page: Page; server: ViteDevServer }> {
+/** A program of fixture/, by its page, with files of `folder` under /files/, a tilde for each slash. */
+export async function openFixture(
+  browser: Browser,
+  folder: string,
+  name = '',
+): Promise<{ page: Page; server: ViteDevServer }> {
   const web = fileURLToPath(new URL('..', import.meta.url));
   const server = await createServer({
     root: join(web, 'e2e/fixture'),
@@ -93,6 +99,9 @@ export async function openFixture(browser: Browser, folder: string): Promise<{ p
   await server.listen();
   const page = await browser.newPage();
   page.on('pageerror', (error) => console.error('page:', error.message));
+  page.on('console', (message) => {
+    if (message.type() === 'error') console.error('page:', message.text());
+  });
   await page.route('**/files/*', (route) =>
     route.fulfill({
       body: readFileSync(
@@ -107,8 +116,8 @@ export async function openFixture(browser: Browser, folder: string): Promise<{ p
       ),
     }),
   );
-  await page.goto(server.resolvedUrls!.local[0]!);
-  await page.waitForFunction(() => 'scenes' in window);
+  await page.goto(server.resolvedUrls!.local[0]! + name);
+  await page.waitForFunction(() => 'scenes' in window || 'gpu' in window);
   return { page, server };
 }
 

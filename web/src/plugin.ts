@@ -6,6 +6,7 @@ import { LambentError } from './errors.js';
 import { extensionName, isIndex, transferExtension, type TransferExtension, type Views } from './glb.js';
 import { transferKind, type BakedTransfer, type TransferSource } from './kinds.js';
 import type { Lighting } from './lighting.js';
+import type { NodeEdition } from './node_edition.js';
 
 export interface BakedScene {
   transfer: BakedTransfer;
@@ -88,7 +89,11 @@ function primitiveOf(document: Document, key: string): Record<string, unknown> {
 export class LambentTransferPlugin implements GLTFLoaderPlugin {
   readonly name = extensionName;
 
-  constructor(private readonly parser: GLTFParser) {}
+  /** `nodes`, of lambent-three/webgpu: WebGPURenderer draws the scene, too. */
+  constructor(
+    private readonly parser: GLTFParser,
+    private readonly nodes?: NodeEdition,
+  ) {}
 
   async afterRoot(gltf: GLTF): Promise<void> {
     const document = this.parser.json as Document;
@@ -97,6 +102,7 @@ export class LambentTransferPlugin implements GLTFLoaderPlugin {
     const meshes = findMeshes(gltf, this.parser);
     const source: TransferSource = {
       extension,
+      nodes: this.nodes,
       bufferView: viewReader(this.parser),
       mesh: ({ node, primitive }: TransferExtension['parts'][number]) => {
         const mesh = meshes.get(`${node} ${primitive}`);

@@ -74,6 +74,8 @@ export interface PrtShader {
   gloss?: boolean;
   /** Whether prtFrame is asked for. */
   turns: boolean;
+  /** Whether nodes draw the same: values are those of transfer . light and nothing else. */
+  nodes?: boolean;
   defines?: Record<string, number>;
 }
 
