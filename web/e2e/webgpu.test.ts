@@ -51,7 +51,7 @@ describe.skipIf(!haveTool || !haveBrowser)('on WebGPURenderer', () => {
       renderLinear(
         at(`${name}.glb`),
         ...view,
-        ...['--size', size.join('x'), '--spp', '64', '--background', 'none', '-o', at(`${name}_render.png`)],
+        ...['--size', size.join('x'), '--spp', '16', '--background', 'none', '-o', at(`${name}_render.png`)],
       );
       const url = (path: string): string => `data:image/png;base64,${readFileSync(path).toString('base64')}`,
         truth = at(`${name}_render.png`),

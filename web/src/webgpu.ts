@@ -155,7 +155,7 @@ export const nodes: NodeEdition = {
       return varying(select(none, vec3(0), value.rgb));
     };
     const front = of('lambentReceiver');
-    const node = lit(twoSided ? (select(frontFacing, front, of('lambentReceiverBack')) as Node<'vec3'>) : front);
+    const node = lit(twoSided ? select(frontFacing, front, of('lambentReceiverBack')) : front);
     made.set(twoSided, node);
     return node;
   },
@@ -164,14 +164,16 @@ export const nodes: NodeEdition = {
     const { picture } = sum as Sum;
     const { width, height } = picture.renderTarget!;
     const of = (name: string): Node<'vec3'> => {
-      const place = varying(attribute(name, 'vec2')) as unknown as Node<'vec2'>;
+      const own = attribute<'vec2'>(name, 'vec2'),
+        place = varying(own);
       return (picture.sample(place.div(vec2(width, height))) as unknown as Node<'vec4'>).rgb;
     };
     const front = of('lambentPlace'),
-      radiance = twoSided ? (select(frontFacing, front, of('lambentPlaceBack')) as Node<'vec3'>) : front;
+      radiance = twoSided ? select(frontFacing, front, of('lambentPlaceBack')) : front;
     let emitted = uniform(emission.value) as unknown as Node<'vec3'>;
     if (emissive) {
-      const place = vec3(attribute('lambentEmissivePlace', 'vec2') as unknown as Node<'vec2'>, 1);
+      const own = attribute<'vec2'>('lambentEmissivePlace', 'vec2'),
+        place = vec3(own, 1);
       const at = (uniform(emissive.texture.matrix) as unknown as Node<'mat3'>).mul(place);
       emitted = emitted.mul((texture(emissive.texture, at.xy) as unknown as Node<'vec4'>).rgb);
     }
