@@ -17,6 +17,9 @@ describe.skipIf(!haveTool || !haveBrowser)('the package', () => {
     writeLopsidedHdr(at('light.hdr'));
     writeBall(at('ball.obj'));
     lambent('bake', at('ball.obj'), '--shadows', 'off', '-o', at('ball.glb'));
+    // So far away that it is alone under the sky.
+    const free = ['--lattice', '2,2,2', '--lattice-box=40,40,40,44,44,44', '--lattice-order', '3', '--samples', '64'];
+    lambent('bake', at('ball.obj'), ...free, '-o', at('free.glb'));
     lambent('bake', writeScene(folder), '--samples', '64', '-o', at('scene.glb'));
     lambent('export', at('ball.glb'), '--env', at('light.hdr'), '--web', at('site'));
     browser = await launch();
@@ -47,6 +50,15 @@ describe.skipIf(!haveTool || !haveBrowser)('the package', () => {
     // Roughness 1 takes what its specular part reflects out of the diffuse part, and adds none of it back from a probe.
     expect(means[2]! / means[0]!).toBeGreaterThan(0.9);
     expect(means[2]! / means[0]!).toBeLessThan(1.01);
+  });
+
+  it("lights materials of three's own by a grid of probes out of its lattice", async () => {
+    const { apart, mean } = await page.evaluate(() =>
+      window.scenes.probes('/files/free.glb', '/files/site~data~environment-0.exr'),
+    );
+    console.log(`a grid of probes: ${((100 * apart) / mean).toFixed(2)} % of the mean apart at most`);
+    expect(mean).toBeGreaterThan(0.01);
+    expect(apart / mean).toBeLessThan(0.005);
   });
 
   it('leaves files open to a plain GLTFLoader', async () => {

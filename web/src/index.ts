@@ -16,6 +16,7 @@ export {
   type TransferKind,
   type TransferSource,
 } from './kinds.js';
+export { Lattice, type LatticeHeader, type ProbeGrid, type ProbeGridClass } from './lattice.js';
 export { latLongMap, Lighting, type LightParts } from './lighting.js';
 export { lobeValue, type Lobe } from './lobes.js';
 export type { NodeEdition, NodeRenderer, Renderer } from './node_edition.js';
