@@ -20,7 +20,10 @@ describe.skipIf(!haveTool || !haveBrowser)('the package', () => {
     // So far away that it is alone under the sky.
     const free = ['--lattice', '2,2,2', '--lattice-box=40,40,40,44,44,44', '--lattice-order', '3', '--samples', '64'];
     lambent('bake', at('ball.obj'), ...free, '-o', at('free.glb'));
-    lambent('bake', writeScene(folder), '--samples', '64', '-o', at('scene.glb'));
+    const scene = writeScene(folder),
+      atlas = ['--receivers', 'texels', '--texels-per-unit', '4', '--samples', '16', '--order', '4'];
+    lambent('bake', scene, '--samples', '64', '-o', at('scene.glb'));
+    lambent('bake', scene, ...atlas, '-o', at('atlas.glb'));
     lambent('export', at('ball.glb'), '--env', at('light.hdr'), '--web', at('site'));
     browser = await launch();
     ({ page, server } = await openFixture(browser, folder));
@@ -59,6 +62,16 @@ describe.skipIf(!haveTool || !haveBrowser)('the package', () => {
     console.log(`a grid of probes: ${((100 * apart) / mean).toFixed(2)} % of the mean apart at most`);
     expect(mean).toBeGreaterThan(0.01);
     expect(apart / mean).toBeLessThan(0.005);
+  });
+
+  it('has materials that are cloned, and that take hooks of a program beside their own', async () => {
+    for (const path of ['/files/scene.glb', '/files/atlas.glb']) {
+      const { own, clone, hook } = await page.evaluate((path) => window.scenes.dressed(path), path);
+      expect(Math.min(...own)).toBeGreaterThan(100);
+      expect(clone).toEqual(own);
+      expect(hook[0]! / own[0]!).toBeCloseTo(0.5, 5);
+      expect(hook.slice(1)).toEqual(own.slice(1));
+    }
   });
 
   it('leaves files open to a plain GLTFLoader', async () => {

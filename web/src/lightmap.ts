@@ -47,7 +47,7 @@ import {
   type NodeSum,
   type Renderer,
 } from './node_edition.js';
-import { diffuseParameters, replaceOnce, setPeaks, useExitRadiance } from './prt_material.js';
+import { chainHooks, copyNodes, diffuseParameters, replaceOnce, setPeaks, useExitRadiance } from './prt_material.js';
 import { drawFilter, type Drawn } from './see_through.js';
 import { shCount } from './sh.js';
 
@@ -117,14 +117,26 @@ class LightmapMaterial extends MeshBasicMaterial {
       ...(emissive && { PRT_EMISSIVE_MAP: '' }),
     };
     if (gain) this.toneMapped = false;
+    chainHooks(
+      this,
+      (shader) => this.patch(shader),
+      () => `lambent lightmap ${directional}`, // the rest is in the defines
+    );
+  }
+
+  override clone(): this {
+    const made = new LightmapMaterial(this.atlas, this.directional, this.surface, this, this.gain).copy(this);
+    copyNodes(this, made);
+    return made as this;
   }
 
   override onBeforeRender(...drawn: Drawn): void {
+    setPeaks(this, this.atlas.hasPeaks);
     this.atlas.update(drawn[0]);
     drawFilter(this, ...drawn);
   }
 
-  override onBeforeCompile(shader: WebGLProgramParametersWithUniforms): void {
+  private patch(shader: WebGLProgramParametersWithUniforms): void {
     const { emission, normals, emissive } = this.surface;
     Object.assign(
       shader.uniforms,
@@ -158,10 +170,6 @@ class LightmapMaterial extends MeshBasicMaterial {
         '#include <opaque_fragment>',
         'outgoingLight += prtEmitted();\n#include <opaque_fragment>',
       );
-  }
-
-  override customProgramCacheKey(): string {
-    return `lambent lightmap ${this.directional}`; // the rest is in the defines
   }
 }
 
@@ -283,7 +291,6 @@ uint prtPick( const in ivec2 texel, out int row ) {
       sharp = peaks && [...peaks, ...new Array<number>(3 * lamps.length).fill(0)];
     this.atlas.set(light, sharp, this.directional === 'none' || this.directional === 'hl2');
     this.sum?.set(light, sharp, true);
-    for (const material of this.materials) setPeaks(material, peaks !== undefined);
     // One column is of all lamps together; else materials that glow have one of their name.
     for (const { emission, own, lamp } of this.glow) {
       const scale = lamps.length === 1 ? lamps[0]![1] : this.lamps.get(lamp);

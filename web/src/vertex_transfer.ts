@@ -34,14 +34,7 @@ import {
 import { packLight } from './light_sum.js';
 import { surfaceFrame, type Lobe } from './lobes.js';
 import { checkReflection, reflectionBytes, reflectionUniforms, type LastReflection } from './outgoing.js';
-import {
-  diffuseParameters,
-  PrtMaterial,
-  setPeaks,
-  type PrtOptions,
-  type PrtShader,
-  type PrtUniforms,
-} from './prt_material.js';
+import { diffuseParameters, PrtMaterial, type PrtOptions, type PrtShader, type PrtUniforms } from './prt_material.js';
 import { shCount } from './sh.js';
 
 /** The part's mesh, its vertices with their receivers. */
@@ -164,6 +157,7 @@ export class VertexTransfer implements BakedTransfer {
       prtTransfer: { value: this.texture },
       prtLight: { value: new Float32Array(12 * this.quads) },
       prtPeaks: { value: new Float32Array(12 * this.quads) },
+      prtHasPeaks: { value: false },
       ...(last && reflectionUniforms(last)),
     };
     this.refusal = !nodes
@@ -204,7 +198,11 @@ export class VertexTransfer implements BakedTransfer {
     this.gpuBytes = gpuBytes;
     if (fitErrors)
       this.fitErrorMaterials = (gain) => {
-        const uniforms = { ...this.uniforms, prtErrors: { value: (this.errors ??= errorTexture(fitErrors)) } };
+        const uniforms = {
+          ...this.uniforms,
+          prtHasPeaks: { value: false },
+          prtErrors: { value: (this.errors ??= errorTexture(fitErrors)) },
+        };
         return meshes.map(
           (mesh, i) =>
             new PrtMaterial(
@@ -279,13 +277,17 @@ export class VertexTransfer implements BakedTransfer {
     const { rest, peaks } = lighting.parts(this.order, this.last !== undefined);
     packLight(this.uniforms.prtLight.value, rest);
     if (peaks) packLight(this.uniforms.prtPeaks.value, peaks);
-    for (const material of this.materials.values()) setPeaks(material, peaks !== undefined);
+    this.uniforms.prtHasPeaks.value = peaks !== undefined; // materials take it when they are drawn
     this.sum?.set(rest, peaks, true);
   }
 
   coefficientMaterials(index: number, gain: { value: number }): Material[] {
     const light = new Float64Array(3 * shCount(this.order)).fill(1, 3 * index, 3 * index + 3);
-    const uniforms = { ...this.uniforms, prtLight: { value: new Float32Array(12 * this.quads) } };
+    const uniforms = {
+      ...this.uniforms,
+      prtHasPeaks: { value: false },
+      prtLight: { value: new Float32Array(12 * this.quads) },
+    };
     packLight(uniforms.prtLight.value, light);
     return this.meshes.map(
       (mesh, i) =>
