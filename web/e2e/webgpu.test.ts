@@ -28,6 +28,8 @@ describe.skipIf(!haveTool || !haveBrowser)('on WebGPURenderer', () => {
       ...['--emit', 'white=0.5,0.4,0.2', '--light-groups', '-o', at('atlas.glb')],
     );
     lambent('compress', at('vertices.glb'), '--zonal', '2', '-o', at('lobes.glb'));
+    const glossy = ['--transfer', 'matrix', '--order', '3', '--outgoing', 'svd:2', '--samples', '16'];
+    lambent('bake', scene, ...glossy, '-o', at('glossy.glb'));
     browser = await launch();
     ({ page, server } = await openFixture(browser, folder, 'webgpu.html'));
   });
@@ -89,6 +91,8 @@ describe.skipIf(!haveTool || !haveBrowser)('on WebGPURenderer', () => {
       page.evaluate(([path, nodes]) => window.gpu.refusal(path, nodes), [`/files/${name}`, withNodes] as const);
     for (const sentence of await say('vertices.glb', false)) expect(sentence).toMatch(/lambent-three\/webgpu/);
     for (const sentence of await say('lobes.glb', true)) expect(sentence).toMatch(/zonal lobes, which WebGPURenderer/);
+    for (const sentence of await say('glossy.glb', true))
+      expect(sentence).toMatch(/transfer matrix, which WebGPURenderer/);
     expect(await say('vertices.glb', true)).toEqual(['', '']);
   });
 });
