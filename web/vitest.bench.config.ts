@@ -1,5 +1,11 @@
 import { defineConfig } from 'vitest/config';
 
 export default defineConfig({
-  test: { include: ['bench/**/*.bench.ts'], fileParallelism: false, testTimeout: 600_000, hookTimeout: 240_000 },
+  test: {
+    include: ['bench/**/*.bench.ts'],
+    globalSetup: ['e2e/setup.ts'],
+    fileParallelism: false,
+    testTimeout: 600_000,
+    hookTimeout: 240_000,
+  },
 });

@@ -1,5 +1,10 @@
 import { defineConfig } from 'vitest/config';
 
 export default defineConfig({
-  test: { include: ['e2e/screenshots.ts'], fileParallelism: false, hookTimeout: 240_000 },
+  test: {
+    include: ['e2e/screenshots.ts'],
+    globalSetup: ['e2e/setup.ts'],
+    fileParallelism: false,
+    hookTimeout: 240_000,
+  },
 });

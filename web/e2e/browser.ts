@@ -1,29 +1,18 @@
 // `lambent view`, headless Chromium and what the tests ask of them.
 import { spawn, type ChildProcess } from 'node:child_process';
-import { existsSync, readFileSync } from 'node:fs';
+import { readFileSync } from 'node:fs';
 import { join } from 'node:path';
 import { fileURLToPath } from 'node:url';
 import { chromium, type Browser, type Page } from 'playwright-core';
 import { createServer, type ViteDevServer } from 'vite';
+import { inject } from 'vitest';
 import { lambentJson, toolPath } from '../test/tool.ts';
 
-export const browserPath = process.env['CHROMIUM'] ?? '/usr/bin/chromium';
-export const haveBrowser = existsSync(browserPath);
-if (!haveBrowser) console.warn(`skipped: there is no ${browserPath}`);
+export const haveBrowser = inject('browser') !== '';
 
+/** A connection to the one browser of all tests (setup.ts); closing it closes the pages that were opened by it. */
 export async function launch(): Promise<Browser> {
-  const browser = await chromium.launch({
-    executablePath: browserPath,
-    args: [
-      '--no-sandbox',
-      '--use-angle=swiftshader',
-      '--enable-unsafe-swiftshader',
-      '--disable-background-networking',
-      '--disable-component-update',
-      '--disable-sync',
-      '--no-first-run',
-    ],
-  });
+  const browser = await chromium.connect(inject('browser'));
   // Half a minute, which is what pages wait for by themselves, is too little beside a build on two cores.
   const newPage = browser.newPage.bind(browser);
   browser.newPage = async (options) => {
@@ -80,19 +69,26 @@ export async function ready(page: Page): Promise<void> {
   await drawn(page);
 }
 
-/** The scenes of fixture/scenes.ts, with files of `folder` under /files/, a tilde for each slash. */
-export async function openFixture(browser: Browser, folder: string): Promise<{ page: Page; server: ViteDevServer }> {
+/** A program of fixture/, by its page, with files of `folder` under /files/, a tilde for each slash. */
+export async function openFixture(
+  browser: Browser,
+  folder: string,
+  name = '',
+): Promise<{ page: Page; server: ViteDevServer }> {
   const web = fileURLToPath(new URL('..', import.meta.url));
   const server = await createServer({
     root: join(web, 'e2e/fixture'),
     configFile: false,
     logLevel: 'error',
-    cacheDir: join(folder, 'cache'),
+    cacheDir: fileURLToPath(new URL('../../build/web-tests/fixture-cache', import.meta.url)), // of all folders
     server: { host: '127.0.0.1', port: 0, fs: { allow: [web] } },
   });
   await server.listen();
   const page = await browser.newPage();
   page.on('pageerror', (error) => console.error('page:', error.message));
+  page.on('console', (message) => {
+    if (message.type() === 'error') console.error('page:', message.text());
+  });
   await page.route('**/files/*', (route) =>
     route.fulfill({
       body: readFileSync(
@@ -107,8 +103,8 @@ export async function openFixture(browser: Browser, folder: string): Promise<{ p
       ),
     }),
   );
-  await page.goto(server.resolvedUrls!.local[0]!);
-  await page.waitForFunction(() => 'scenes' in window);
+  await page.goto(server.resolvedUrls!.local[0]! + name);
+  await page.waitForFunction(() => 'scenes' in window || 'gpu' in window);
   return { page, server };
 }
 

@@ -36,7 +36,7 @@ describe.skipIf(!haveTool || !haveBrowser)('what the page shows of light', () =>
       const fragment = `ui=off&background=none&camera=${camera}&exposure=auto&tone=${tone}`,
         page = await open(browser, server.address, fragment, 640, 480);
       await page.screenshot({ path: at(`${tone}_page.png`) });
-      const view = ['--camera', camera, '--size', '640x480', '--spp', '64', '--background', 'none'],
+      const view = ['--camera', camera, '--size', '640x480', '--spp', '16', '--background', 'none'],
         { display } = lambentJson(
           ...['render', at('scene.glb'), '--env', at('light.hdr'), ...view, '--tone', tone],
           ...['-o', at(`${tone}_render.png`)],

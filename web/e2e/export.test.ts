@@ -10,7 +10,7 @@ import { writeScene } from './scenes.ts';
 
 const camera = '3.1,2.6,4.3,-0.3,0.8,0,38',
   size = [640, 480];
-const shot = ['--camera', camera, '--size', '640x480', '--spp', '64', '--background', 'none', '--exposure', '-2'];
+const shot = ['--camera', camera, '--size', '640x480', '--spp', '16', '--background', 'none', '--exposure', '-2'];
 
 describe.skipIf(!haveTool || !haveBrowser)('an exported lightmap', () => {
   const folder = makeFolder(),

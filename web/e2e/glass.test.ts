@@ -124,7 +124,7 @@ describe.skipIf(!haveTool || !haveBrowser)('glass', () => {
     await page.screenshot({ path: at(`${name}_page.png`) });
     await page.close();
     expect(await server.stop()).toBe(0);
-    const view = ['--camera', camera, '--size', '480x360', '--spp', '256'];
+    const view = ['--camera', camera, '--size', '480x360', '--spp', '16'];
     renderLinear(at(`${name}.glb`), '--env', at('light.hdr'), ...view, '-o', at(`${name}_render.png`));
     const db = psnr(at(`${name}_page.png`), at(`${name}_render.png`));
     console.log(`${name}: ${db.toFixed(1)} dB (${folder})`);

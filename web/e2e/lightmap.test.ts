@@ -57,7 +57,7 @@ describe.skipIf(!haveTool || !haveBrowser)('a lightmap', () => {
         '--size',
         '640x480',
         '--spp',
-        '64',
+        '16',
         '--env',
         at('light.hdr'),
         '--env-rotate',

@@ -17,7 +17,13 @@ describe.skipIf(!haveTool || !haveBrowser)('the package', () => {
     writeLopsidedHdr(at('light.hdr'));
     writeBall(at('ball.obj'));
     lambent('bake', at('ball.obj'), '--shadows', 'off', '-o', at('ball.glb'));
-    lambent('bake', writeScene(folder), '--samples', '64', '-o', at('scene.glb'));
+    // So far away that it is alone under the sky.
+    const free = ['--lattice', '2,2,2', '--lattice-box=40,40,40,44,44,44', '--lattice-order', '3', '--samples', '64'];
+    lambent('bake', at('ball.obj'), ...free, '-o', at('free.glb'));
+    const scene = writeScene(folder),
+      atlas = ['--receivers', 'texels', '--texels-per-unit', '4', '--samples', '16', '--order', '4'];
+    lambent('bake', scene, '--samples', '64', '-o', at('scene.glb'));
+    lambent('bake', scene, ...atlas, '-o', at('atlas.glb'));
     lambent('export', at('ball.glb'), '--env', at('light.hdr'), '--web', at('site'));
     browser = await launch();
     ({ page, server } = await openFixture(browser, folder));
@@ -47,6 +53,25 @@ describe.skipIf(!haveTool || !haveBrowser)('the package', () => {
     // Roughness 1 takes what its specular part reflects out of the diffuse part, and adds none of it back from a probe.
     expect(means[2]! / means[0]!).toBeGreaterThan(0.9);
     expect(means[2]! / means[0]!).toBeLessThan(1.01);
+  });
+
+  it("lights materials of three's own by a grid of probes out of its lattice", async () => {
+    const { apart, mean } = await page.evaluate(() =>
+      window.scenes.probes('/files/free.glb', '/files/site~data~environment-0.exr'),
+    );
+    console.log(`a grid of probes: ${((100 * apart) / mean).toFixed(2)} % of the mean apart at most`);
+    expect(mean).toBeGreaterThan(0.01);
+    expect(apart / mean).toBeLessThan(0.005);
+  });
+
+  it('has materials that are cloned, and that take hooks of a program beside their own', async () => {
+    for (const path of ['/files/scene.glb', '/files/atlas.glb']) {
+      const { own, clone, hook } = await page.evaluate((path) => window.scenes.dressed(path), path);
+      expect(Math.min(...own)).toBeGreaterThan(100);
+      expect(clone).toEqual(own);
+      expect(hook[0]! / own[0]!).toBeCloseTo(0.5, 5);
+      expect(hook.slice(1)).toEqual(own.slice(1));
+    }
   });
 
   it('leaves files open to a plain GLTFLoader', async () => {

@@ -75,7 +75,7 @@ describe.skipIf(!haveTool || !haveBrowser)('a transfer texture', () => {
         '--size',
         size.join('x'),
         '--spp',
-        '64',
+        '16',
         '--background',
         'none',
         `--exposure=${exposure}`,

@@ -47,7 +47,7 @@ describe.skipIf(!haveTool || !haveBrowser)('the picture', () => {
       '--size',
       '640x480',
       '--spp',
-      '256',
+      '16',
       ...args,
       '-o',
       at(`${name}_render.png`),
@@ -102,7 +102,7 @@ describe.skipIf(!haveTool || !haveBrowser)('the picture', () => {
     const page = await shown('room_page', ''),
       ringing = await shown('room_ringing', '&window=none');
     expect(await room.stop()).toBe(0);
-    const view = ['--env', sun, '--camera', inside, '--size', '640x480', '--spp', '64', '--exposure', '1'];
+    const view = ['--env', sun, '--camera', inside, '--size', '640x480', '--spp', '16', '--exposure', '1'];
     renderLinear(at('room.glb'), ...view, '-o', at('room_render.png'));
     const db = psnr(page, at('room_render.png')),
       without = psnr(ringing, at('room_render.png'));

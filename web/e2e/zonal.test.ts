@@ -48,7 +48,7 @@ describe.skipIf(!haveTool || !haveBrowser)('zonal lobes', () => {
       '--size',
       '640x480',
       '--spp',
-      '64',
+      '16',
       '--env',
       at('light.hdr'),
       '--env-rotate',

@@ -33,7 +33,7 @@ vec3 prtRadiance( const in uint receiver ) {
 }
 `;
 
-const shader: PrtShader = { key: 'diffuse', radiance, turns: false };
+const shader: PrtShader = { key: 'diffuse', radiance, turns: false, nodes: true };
 
 export const diffuseKind: TransferKind = {
   name: 'diffuse',

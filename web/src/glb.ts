@@ -16,6 +16,8 @@ export interface TransferExtension {
   surface?: { kind: unknown; [key: string]: unknown };
   /** A fixed view: receivers are the pixels of a picture. */
   view?: unknown;
+  /** Light in free space. */
+  lattice?: unknown;
   parts: { node: number; primitive: number; front?: Views; back?: Views; [key: string]: unknown }[];
   provenance?: unknown;
 }

@@ -16,8 +16,10 @@ export {
   type TransferKind,
   type TransferSource,
 } from './kinds.js';
+export { Lattice, type LatticeHeader, type ProbeGrid, type ProbeGridClass } from './lattice.js';
 export { latLongMap, Lighting, type LightParts } from './lighting.js';
 export { lobeValue, type Lobe } from './lobes.js';
+export type { NodeEdition, NodeRenderer, Renderer } from './node_edition.js';
 export { bakedScene, LambentTransferPlugin, type BakedScene } from './plugin.js';
 export { withoutPeaks } from './peaks.js';
 export { projectLatLong, texelSolidAngle, type LatLongMap } from './projection.js';

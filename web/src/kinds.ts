@@ -1,8 +1,9 @@
 // The kinds of transfer that a file may hold. A new one is one entry here and one module.
-import type { Color, Material, Mesh, WebGLRenderer } from 'three';
+import type { Color, Material, Mesh } from 'three';
 import type { TransferExtension, Views } from './glb.js';
 import type { Lighting } from './lighting.js';
 import type { Lobe } from './lobes.js';
+import type { NodeEdition, Renderer } from './node_edition.js';
 
 /** What a kind is given to read itself from. */
 export interface TransferSource {
@@ -15,6 +16,8 @@ export interface TransferSource {
    * The scene's own material of a part whose mesh wears one for other viewers; its mesh's material where it does not.
    */
   ownMaterial(part: TransferExtension['parts'][number]): Promise<Material>;
+  /** For WebGPURenderer. */
+  nodes?: NodeEdition | undefined;
 }
 
 /** The transfer of one file, bound to its meshes. */
@@ -29,7 +32,7 @@ export interface BakedTransfer {
   /** Meshes whose material is ours now. */
   readonly meshes: Mesh[];
   /** Throws LambentError where the graphics card lacks what this is drawn with. */
-  check(renderer: WebGLRenderer): void;
+  check(renderer: Renderer): void;
   /** Shows the meshes under this light. Writes a few hundred bytes of uniforms and nothing else. */
   relight(lighting: Lighting): void;
   /**

@@ -196,7 +196,7 @@ export class LightSums {
   /** The picture of the peaks; that of the rest where there are none. */
   readonly peakTexture: { value: Texture };
   private peaks: LightSum | undefined;
-  private hasPeaks = false;
+  hasPeaks = false;
 
   constructor(private readonly make: () => LightSum) {
     this.rest = make();

@@ -20,7 +20,6 @@ import {
   type MeshStandardMaterial,
   type Texture,
   type WebGLProgramParametersWithUniforms,
-  type WebGLRenderer,
 } from 'three';
 import { blockTexture, packBlocks, type BlockLayout } from './block_texture.js';
 import { LambentError } from './errors.js';
@@ -37,7 +36,18 @@ import type { BakedTransfer, TransferSource } from './kinds.js';
 import type { Lighting } from './lighting.js';
 import { fragmentDeclarations, vertexBody, vertexDeclarations } from './lightmap_glsl.js';
 import { afterAll, LightSum, LightSums, maxColumns } from './light_sum.js';
-import { diffuseParameters, replaceOnce, setPeaks, useExitRadiance } from './prt_material.js';
+import {
+  checkNodes,
+  glassRefusal,
+  isNodeRenderer,
+  onlyGlsl,
+  setNodes,
+  withoutNodes,
+  type NodeEdition,
+  type NodeSum,
+  type Renderer,
+} from './node_edition.js';
+import { chainHooks, copyNodes, diffuseParameters, replaceOnce, setPeaks, useExitRadiance } from './prt_material.js';
 import { drawFilter, type Drawn } from './see_through.js';
 import { shCount } from './sh.js';
 
@@ -107,14 +117,26 @@ class LightmapMaterial extends MeshBasicMaterial {
       ...(emissive && { PRT_EMISSIVE_MAP: '' }),
     };
     if (gain) this.toneMapped = false;
+    chainHooks(
+      this,
+      (shader) => this.patch(shader),
+      () => `lambent lightmap ${directional}`, // the rest is in the defines
+    );
+  }
+
+  override clone(): this {
+    const made = new LightmapMaterial(this.atlas, this.directional, this.surface, this, this.gain).copy(this);
+    copyNodes(this, made);
+    return made as this;
   }
 
   override onBeforeRender(...drawn: Drawn): void {
+    setPeaks(this, this.atlas.hasPeaks);
     this.atlas.update(drawn[0]);
     drawFilter(this, ...drawn);
   }
 
-  override onBeforeCompile(shader: WebGLProgramParametersWithUniforms): void {
+  private patch(shader: WebGLProgramParametersWithUniforms): void {
     const { emission, normals, emissive } = this.surface;
     Object.assign(
       shader.uniforms,
@@ -149,10 +171,6 @@ class LightmapMaterial extends MeshBasicMaterial {
         'outgoingLight += prtEmitted();\n#include <opaque_fragment>',
       );
   }
-
-  override customProgramCacheKey(): string {
-    return `lambent lightmap ${this.directional}`; // the rest is in the defines
-  }
 }
 
 class LightmapTransfer implements BakedTransfer {
@@ -169,6 +187,8 @@ class LightmapTransfer implements BakedTransfer {
   private readonly atlas: LightSums;
   private readonly materials: LightmapMaterial[] = [];
   private readonly ofCoefficients = new Set<LightSums>();
+  private readonly sum: NodeSum | undefined; // for WebGPURenderer
+  private refusal: string | undefined; // why that does not draw this
   private readonly glow: { emission: { value: Color }; own: Color; lamp: string }[] = [];
 
   constructor(
@@ -178,6 +198,7 @@ class LightmapTransfer implements BakedTransfer {
     private readonly receiversOf: DataTexture,
     readonly meshes: Mesh[],
     owns: Material[],
+    nodes?: NodeEdition,
   ) {
     this.order = header.order;
     this.channels = header.channels;
@@ -192,7 +213,20 @@ class LightmapTransfer implements BakedTransfer {
     this.transfer = blockTexture(layout, data);
     this.atlas = new LightSums(() => this.makeAtlas());
     const { width, height } = receiversOf.image;
-    let gpuBytes = data.byteLength + this.atlas.rest.bytes + 4 * width * height;
+    this.refusal = !nodes
+      ? withoutNodes
+      : header.directional !== 'none'
+        ? onlyGlsl('a directional lightmap')
+        : undefined;
+    if (!this.refusal)
+      this.sum = nodes!.sum({
+        layout,
+        transfer: this.transfer,
+        channels: header.channels,
+        receivers: header.receivers,
+        receiversOf,
+      });
+    let gpuBytes = data.byteLength + this.atlas.rest.bytes + 4 * width * height + (this.sum?.bytes ?? 0);
     meshes.forEach((mesh, i) => {
       const own = owns[i]! as Material & Partial<MeshStandardMaterial>,
         surface = readSurface(mesh.geometry, own, header.directional);
@@ -205,6 +239,16 @@ class LightmapTransfer implements BakedTransfer {
       const material = new LightmapMaterial(this.atlas, header.directional, surface, own);
       material.vertexColors = mesh.geometry.hasAttribute('color');
       this.materials.push(material);
+      this.refusal ??=
+        glassRefusal(material) ??
+        (material.vertexColors && own.emissive?.getHex()
+          ? onlyGlsl('glowing beside colours of its vertices')
+          : undefined);
+      setNodes(
+        material,
+        this.refusal === undefined ? nodes!.overAtlas(this.sum!, surface) : undefined,
+        `The baked scene ${this.refusal}.`,
+      );
       mesh.material = material;
       gpuBytes += mesh.geometry.getAttribute('position').count * (surface.twoSided ? 16 : 8);
     });
@@ -233,7 +277,8 @@ uint prtPick( const in ivec2 texel, out int row ) {
     });
   }
 
-  check(renderer: WebGLRenderer): void {
+  check(renderer: Renderer): void {
+    if (isNodeRenderer(renderer)) return checkNodes(renderer, this.refusal);
     this.atlas.rest.check(renderer);
   }
 
@@ -242,12 +287,10 @@ uint prtPick( const in ivec2 texel, out int row ) {
     for (const { rest } of this.ofCoefficients) rest.refresh(); // a lost context has taken what was drawn
     // The scene's own lamps are in none of the peaks.
     const { rest, peaks } = lighting.parts(this.order);
-    this.atlas.set(
-      [...rest, ...lamps.flatMap(([, color]) => color.toArray())],
-      peaks ? [...peaks, ...new Array<number>(3 * lamps.length).fill(0)] : undefined,
-      this.directional === 'none' || this.directional === 'hl2',
-    );
-    for (const material of this.materials) setPeaks(material, peaks !== undefined);
+    const light = [...rest, ...lamps.flatMap(([, color]) => color.toArray())],
+      sharp = peaks && [...peaks, ...new Array<number>(3 * lamps.length).fill(0)];
+    this.atlas.set(light, sharp, this.directional === 'none' || this.directional === 'hl2');
+    this.sum?.set(light, sharp, true);
     // One column is of all lamps together; else materials that glow have one of their name.
     for (const { emission, own, lamp } of this.glow) {
       const scale = lamps.length === 1 ? lamps[0]![1] : this.lamps.get(lamp);
@@ -281,6 +324,7 @@ uint prtPick( const in ivec2 texel, out int row ) {
   dispose(): void {
     for (const atlas of [this.atlas, ...this.ofCoefficients]) atlas.dispose();
     this.transfer.dispose();
+    this.sum?.dispose();
     this.receiversOf.dispose();
     for (const material of this.materials) material.dispose();
     for (const mesh of this.meshes) mesh.geometry.dispose();
@@ -335,5 +379,5 @@ export async function loadLightmap(source: TransferSource): Promise<BakedTransfe
     meshes.push(mesh);
     owns.push(await source.ownMaterial(part));
   }
-  return new LightmapTransfer(header, groups, values, receivers, meshes, owns);
+  return new LightmapTransfer(header, groups, values, receivers, meshes, owns, source.nodes);
 }

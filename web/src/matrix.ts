@@ -13,7 +13,6 @@ import {
   type Material,
   type Mesh,
   type WebGLProgramParametersWithUniforms,
-  type WebGLRenderer,
 } from 'three';
 import { blockTexture, packBlocks, type BlockLayout } from './block_texture.js';
 import { LambentError } from './errors.js';
@@ -36,6 +35,7 @@ import {
   rowWidth,
   type LastReflection,
 } from './outgoing.js';
+import { checkNodes, isNodeRenderer, onlyGlsl, setNodes, type Renderer } from './node_edition.js';
 import { diffuseParameters, replaceOnce, setPeaks, useExitRadiance } from './prt_material.js';
 import { drawFilter, type Drawn } from './see_through.js';
 import { shCount } from './sh.js';
@@ -63,6 +63,8 @@ vec3 prtRow( const in int r, const in int row ) {
 #endif
 ${glslReflect(shared.outgoing, false)}`;
 
+const matrixRefusal = onlyGlsl('a transfer matrix');
+
 class MatrixMaterial extends MeshBasicMaterial {
   constructor(
     readonly sums: LightSums,
@@ -78,6 +80,7 @@ class MatrixMaterial extends MeshBasicMaterial {
       ...(gain && { PRT_FALSE_COLOR: '' }),
     };
     if (gain) this.toneMapped = false;
+    setNodes(this, undefined, `The baked scene ${matrixRefusal}.`);
   }
 
   override onBeforeRender(...drawn: Drawn): void {
@@ -174,7 +177,8 @@ uint prtPick( const in ivec2 texel, out int row ) {
     });
   }
 
-  check(renderer: WebGLRenderer): void {
+  check(renderer: Renderer): void {
+    if (isNodeRenderer(renderer)) return checkNodes(renderer, matrixRefusal);
     this.sums.rest.check(renderer);
     checkReflection(this.shared, renderer);
     const { maxVertexTextures } = renderer.capabilities;

@@ -5,12 +5,16 @@ import type { GLTF, GLTFLoaderPlugin, GLTFParser } from 'three/addons/loaders/GL
 import { LambentError } from './errors.js';
 import { extensionName, isIndex, transferExtension, type TransferExtension, type Views } from './glb.js';
 import { transferKind, type BakedTransfer, type TransferSource } from './kinds.js';
+import { loadLattice, type Lattice } from './lattice.js';
 import type { Lighting } from './lighting.js';
+import type { NodeEdition } from './node_edition.js';
 
 export interface BakedScene {
   transfer: BakedTransfer;
   /** What the bake was told and what it reported. */
   provenance: unknown;
+  /** Light in free space, where the file was baked with a lattice; relight() sees to it, too. */
+  lattice: Lattice | undefined;
   relight(lighting: Lighting): void;
   dispose(): void;
 }
@@ -88,7 +92,11 @@ function primitiveOf(document: Document, key: string): Record<string, unknown> {
 export class LambentTransferPlugin implements GLTFLoaderPlugin {
   readonly name = extensionName;
 
-  constructor(private readonly parser: GLTFParser) {}
+  /** `nodes`, of lambent-three/webgpu: WebGPURenderer draws the scene, too. */
+  constructor(
+    private readonly parser: GLTFParser,
+    private readonly nodes?: NodeEdition,
+  ) {}
 
   async afterRoot(gltf: GLTF): Promise<void> {
     const document = this.parser.json as Document;
@@ -97,6 +105,7 @@ export class LambentTransferPlugin implements GLTFLoaderPlugin {
     const meshes = findMeshes(gltf, this.parser);
     const source: TransferSource = {
       extension,
+      nodes: this.nodes,
       bufferView: viewReader(this.parser),
       mesh: ({ node, primitive }: TransferExtension['parts'][number]) => {
         const mesh = meshes.get(`${node} ${primitive}`);
@@ -114,11 +123,19 @@ export class LambentTransferPlugin implements GLTFLoaderPlugin {
     // What other viewers are shown of backs is drawn by the parts themselves.
     for (const [key, mesh] of meshes) if (primitiveOf(document, key)['viewerOnly'] === true) mesh.visible = false;
     const transfer = await transferKind(extension.transfer.kind)!.load(source);
+    const lattice = await loadLattice(source);
     const baked: BakedScene = {
       transfer,
+      lattice,
       provenance: extension.provenance,
-      relight: (lighting) => transfer.relight(lighting),
-      dispose: () => transfer.dispose(),
+      relight: (lighting) => {
+        transfer.relight(lighting);
+        lattice?.relight(lighting, transfer.lamps?.values());
+      },
+      dispose: () => {
+        transfer.dispose();
+        lattice?.dispose();
+      },
     };
     gltf.userData['lambent'] = baked;
   }

@@ -59,6 +59,8 @@ export interface PrtUniforms {
   prtLight: { value: Float32Array };
   /** The same of the light's peaks; prtLight is the rest then. */
   prtPeaks: { value: Float32Array };
+  /** Whether there are any; no shader's. */
+  prtHasPeaks: { value: boolean };
   [name: string]: { value: unknown };
 }
 
@@ -74,6 +76,8 @@ export interface PrtShader {
   gloss?: boolean;
   /** Whether prtFrame is asked for. */
   turns: boolean;
+  /** Whether nodes draw the same: values are those of transfer . light and nothing else. */
+  nodes?: boolean;
   defines?: Record<string, number>;
 }
 
@@ -221,6 +225,51 @@ export function useExitRadiance(
   return last ? replaceOnce(lit, '#include <opaque_fragment>', `${last}\n#include <opaque_fragment>`) : lit;
 }
 
+type Compile = Material['onBeforeCompile'];
+
+/**
+ * Puts `patch` before whatever a program sets as onBeforeCompile, and `key` before its customProgramCacheKey. A hook
+ * that calls the one that it replaces, as is usual, does not patch again.
+ */
+export function chainHooks(
+  material: Material,
+  patch: (shader: WebGLProgramParametersWithUniforms) => void,
+  key: () => string,
+): void {
+  const patched = new WeakSet<object>();
+  let compile: Compile | undefined, cacheKey: (() => string) | undefined;
+  Object.defineProperties(material, {
+    onBeforeCompile: {
+      configurable: true,
+      get: (): Compile => {
+        const own = compile;
+        return (shader, renderer) => {
+          if (!patched.has(shader)) patch(shader);
+          patched.add(shader);
+          own?.call(material, shader, renderer);
+        };
+      },
+      set: (hook: Compile) => (compile = hook),
+    },
+    customProgramCacheKey: {
+      configurable: true,
+      get: () => {
+        const own = cacheKey ?? (() => compile?.toString() ?? '');
+        return () => `${key()} ${own.call(material)}`;
+      },
+      set: (hook: () => string) => (cacheKey = hook),
+    },
+  });
+}
+
+/** The nodes of a material for its clone (node_edition.ts). */
+export function copyNodes(from: Material, to: Material): void {
+  for (const name of ['colorNode', 'colorNodeKey']) {
+    const property = Object.getOwnPropertyDescriptor(from, name);
+    if (property) Object.defineProperty(to, name, property);
+  }
+}
+
 export class PrtMaterial extends MeshBasicMaterial {
   constructor(
     readonly prtUniforms: PrtUniforms,
@@ -242,13 +291,26 @@ export class PrtMaterial extends MeshBasicMaterial {
       ...shader.defines,
     };
     if (falseColor) this.toneMapped = false;
+    chainHooks(
+      this,
+      (shader) => this.patch(shader),
+      () => `lambent ${shader.key}`, // the rest is in the defines
+    );
+  }
+
+  /** Under the same light, which relight() turns for both. */
+  override clone(): this {
+    const made = new PrtMaterial(this.prtUniforms, this.options).copy(this);
+    copyNodes(this, made);
+    return made as this;
   }
 
   override onBeforeRender(...drawn: Drawn): void {
+    setPeaks(this, this.prtUniforms.prtHasPeaks.value);
     drawFilter(this, ...drawn);
   }
 
-  override onBeforeCompile(shader: WebGLProgramParametersWithUniforms): void {
+  private patch(shader: WebGLProgramParametersWithUniforms): void {
     const { falseColor, rest, shader: kind } = this.options;
     Object.assign(
       shader.uniforms,
@@ -266,9 +328,5 @@ export class PrtMaterial extends MeshBasicMaterial {
       falseColor !== undefined,
       kind.gloss,
     );
-  }
-
-  override customProgramCacheKey(): string {
-    return `lambent ${this.options.shader.key}`; // the rest is in the defines
   }
 }

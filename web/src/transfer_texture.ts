@@ -15,6 +15,7 @@ import {
   type WebGLProgramParametersWithUniforms,
   type WebGLRenderer,
 } from 'three';
+import { checkNodes, isNodeRenderer, onlyGlsl, setNodes, type Renderer } from './node_edition.js';
 import { blockTexture, packBlocks, type BlockLayout } from './block_texture.js';
 import { LambentError } from './errors.js';
 import { glslHarmonics } from './glsl_harmonics.js';
@@ -168,6 +169,8 @@ vec3 prtExitRadiance() {
 `;
 };
 
+const textureRefusal = onlyGlsl('shaded by a transfer texture');
+
 /**
  * What shows a transfer texture: white is its exit radiance, and all else a MeshBasicMaterial's own. Meshes need
  * texture coordinates and normals.
@@ -183,6 +186,7 @@ export class TransferTextureMaterial extends MeshBasicMaterial {
     parameters: MeshBasicMaterialParameters = {},
   ) {
     super(parameters);
+    setNodes(this, undefined, `This surface ${textureRefusal}.`);
     const { order, lobes } = transfer,
       exact = exactZonalBands(order, lobes),
       quads = Math.ceil(shCount(order) / 4);
@@ -209,7 +213,8 @@ export class TransferTextureMaterial extends MeshBasicMaterial {
   }
 
   /** Throws LambentError where the graphics card lacks what this is drawn with. */
-  check(renderer: WebGLRenderer): void {
+  check(renderer: Renderer): void {
+    if (isNodeRenderer(renderer)) return checkNodes(renderer, textureRefusal);
     this.table.check(renderer);
   }
 

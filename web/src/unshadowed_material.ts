@@ -4,6 +4,7 @@
 import { MeshBasicMaterial, type WebGLProgramParametersWithUniforms, type MeshBasicMaterialParameters } from 'three';
 import { glslHarmonics } from './glsl_harmonics.js';
 import type { Lighting } from './lighting.js';
+import { onlyGlsl, setNodes } from './node_edition.js';
 import { replaceOnce, setPeaks, whiteLine } from './prt_material.js';
 import { drawFilter, type Drawn } from './see_through.js';
 import { clampedCosine, shBand, shCount } from './sh.js';
@@ -30,6 +31,7 @@ export class UnshadowedMaterial extends MeshBasicMaterial {
     parameters: MeshBasicMaterialParameters = {},
   ) {
     super(parameters);
+    setNodes(this, undefined, `This surface ${onlyGlsl('drawn without shadows')}.`);
     this.light = { value: new Float32Array(3 * irradianceIndices(order).length) };
     this.peaks = { value: new Float32Array(this.light.value.length) };
   }

@@ -13,7 +13,6 @@ import {
   type Mesh,
   type Object3D,
   type SkinnedMesh,
-  type WebGLRenderer,
 } from 'three';
 import { blockTexture, packBlocks } from './block_texture.js';
 import { LambentError } from './errors.js';
@@ -21,17 +20,21 @@ import type { TransferExtension } from './glb.js';
 import { noReceiver, readReceivers, shareGeometry, type TransferHeader } from './header.js';
 import type { BakedTransfer, TransferSource } from './kinds.js';
 import type { Lighting } from './lighting.js';
+import {
+  checkNodes,
+  glassRefusal,
+  isNodeRenderer,
+  onlyGlsl,
+  setNodes,
+  withoutNodes,
+  type NodeEdition,
+  type NodeSum,
+  type Renderer,
+} from './node_edition.js';
 import { packLight } from './light_sum.js';
 import { surfaceFrame, type Lobe } from './lobes.js';
 import { checkReflection, reflectionBytes, reflectionUniforms, type LastReflection } from './outgoing.js';
-import {
-  diffuseParameters,
-  PrtMaterial,
-  setPeaks,
-  type PrtOptions,
-  type PrtShader,
-  type PrtUniforms,
-} from './prt_material.js';
+import { diffuseParameters, PrtMaterial, type PrtOptions, type PrtShader, type PrtUniforms } from './prt_material.js';
 import { shCount } from './sh.js';
 
 /** The part's mesh, its vertices with their receivers. */
@@ -127,12 +130,16 @@ export class VertexTransfer implements BakedTransfer {
   private readonly optionsOf: PrtOptions[] = [];
   private readonly materials = new Map<string, PrtMaterial>();
   private readonly quads: number; // of the light, a channel
+  private readonly sum: NodeSum | undefined; // for WebGPURenderer
+  /** Why WebGPURenderer does not draw this. */
+  private refusal: string | undefined;
 
   private constructor(
     header: TransferHeader,
     { kind, count, valueChannels, shader, readLobes, fitErrors, last }: VertexKind,
     values: ArrayBuffer,
     readonly meshes: Mesh[],
+    nodes?: NodeEdition,
   ) {
     this.kind = kind;
     this.order = header.order;
@@ -150,9 +157,17 @@ export class VertexTransfer implements BakedTransfer {
       prtTransfer: { value: this.texture },
       prtLight: { value: new Float32Array(12 * this.quads) },
       prtPeaks: { value: new Float32Array(12 * this.quads) },
+      prtHasPeaks: { value: false },
       ...(last && reflectionUniforms(last)),
     };
-    let gpuBytes = data.byteLength + (last ? reflectionBytes(last) : 0);
+    this.refusal = !nodes
+      ? withoutNodes
+      : shader.nodes
+        ? undefined
+        : onlyGlsl(kind === 'zonal' ? 'made of zonal lobes' : 'a transfer matrix');
+    if (!this.refusal)
+      this.sum = nodes!.sum({ layout, transfer: this.texture, channels: header.channels, receivers: header.receivers });
+    let gpuBytes = data.byteLength + (last ? reflectionBytes(last) : 0) + (this.sum?.bytes ?? 0);
     for (const mesh of meshes) {
       const twoSided = mesh.geometry.hasAttribute('lambentReceiverBack');
       const rest = shader.turns ? this.restOf(mesh) : undefined;
@@ -172,12 +187,22 @@ export class VertexTransfer implements BakedTransfer {
         key = `${source.uuid} ${twoSided} ${rest ? mesh.uuid : ''}`;
       const material = this.materials.get(key) ?? new PrtMaterial(this.uniforms, options, diffuseParameters(source));
       this.materials.set(key, material);
+      this.refusal ??= glassRefusal(material);
+      setNodes(
+        material,
+        this.refusal === undefined ? nodes!.atVertices(this.sum!, twoSided) : undefined,
+        `The baked scene ${this.refusal}.`,
+      );
       mesh.material = material;
     }
     this.gpuBytes = gpuBytes;
     if (fitErrors)
       this.fitErrorMaterials = (gain) => {
-        const uniforms = { ...this.uniforms, prtErrors: { value: (this.errors ??= errorTexture(fitErrors)) } };
+        const uniforms = {
+          ...this.uniforms,
+          prtHasPeaks: { value: false },
+          prtErrors: { value: (this.errors ??= errorTexture(fitErrors)) },
+        };
         return meshes.map(
           (mesh, i) =>
             new PrtMaterial(
@@ -217,10 +242,11 @@ export class VertexTransfer implements BakedTransfer {
   static async load(source: TransferSource, header: TransferHeader, kind: VertexKind): Promise<VertexTransfer> {
     const values = await source.bufferView(header.bufferView);
     const meshes = await Promise.all(source.extension.parts.map((part) => bindPart(source, part, header.receivers)));
-    return new VertexTransfer(header, kind, values, meshes);
+    return new VertexTransfer(header, kind, values, meshes, source.nodes);
   }
 
-  check(renderer: WebGLRenderer): void {
+  check(renderer: Renderer): void {
+    if (isNodeRenderer(renderer)) return checkNodes(renderer, this.refusal);
     if (this.last) checkReflection(this.last, renderer);
     // Light and its peaks, and what three has of its own.
     const uniforms = 6 * this.quads + ownUniforms;
@@ -251,12 +277,17 @@ export class VertexTransfer implements BakedTransfer {
     const { rest, peaks } = lighting.parts(this.order, this.last !== undefined);
     packLight(this.uniforms.prtLight.value, rest);
     if (peaks) packLight(this.uniforms.prtPeaks.value, peaks);
-    for (const material of this.materials.values()) setPeaks(material, peaks !== undefined);
+    this.uniforms.prtHasPeaks.value = peaks !== undefined; // materials take it when they are drawn
+    this.sum?.set(rest, peaks, true);
   }
 
   coefficientMaterials(index: number, gain: { value: number }): Material[] {
     const light = new Float64Array(3 * shCount(this.order)).fill(1, 3 * index, 3 * index + 3);
-    const uniforms = { ...this.uniforms, prtLight: { value: new Float32Array(12 * this.quads) } };
+    const uniforms = {
+      ...this.uniforms,
+      prtHasPeaks: { value: false },
+      prtLight: { value: new Float32Array(12 * this.quads) },
+    };
     packLight(uniforms.prtLight.value, light);
     return this.meshes.map(
       (mesh, i) =>
@@ -270,6 +301,7 @@ export class VertexTransfer implements BakedTransfer {
 
   dispose(): void {
     this.texture.dispose();
+    this.sum?.dispose();
     this.errors?.dispose();
     this.last?.frames.dispose();
     this.last?.maps.dispose();
