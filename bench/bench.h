@@ -35,6 +35,7 @@ void bench_basis();
 void bench_error();
 void bench_lightmaps();
 void bench_load();
+void bench_moving();
 void bench_products();
 void bench_radiosity();
 void bench_relight();

@@ -47,16 +47,16 @@ int main(int argc, char** argv) {
   const std::pair<const char*, void (*)()> all[] = {
       {"bake", bench_bake},         {"basis", bench_basis},         {"error", bench_error},
       {"products", bench_products}, {"radiosity", bench_radiosity}, {"lightmaps", bench_lightmaps},
-      {"load", bench_load},         {"rooms", bench_rooms},         {"relight", bench_relight},
-      {"scale", bench_scale},       {"scaling", bench_scaling},     {"zonal", bench_zonal},
-      {"window", bench_window}};
+      {"load", bench_load},         {"moving", bench_moving},       {"rooms", bench_rooms},
+      {"relight", bench_relight},   {"scale", bench_scale},         {"scaling", bench_scaling},
+      {"zonal", bench_zonal},       {"window", bench_window}};
   bool known = argc == 1;  // then all but rooms and scale, which take minutes
   for (int i = 1; i < argc; ++i)
     for (auto [name, run] : all) known |= !std::strcmp(argv[i], name);
   if (!known)
     return fmt::print(stderr,
-                      "usage: lambent-bench [bake] [basis] [error] [products] [radiosity] [lightmaps] [load] [relight] "
-                      "[rooms] [scale] [scaling] [zonal]\n"),
+                      "usage: lambent-bench [bake] [basis] [error] [products] [radiosity] [lightmaps] [load] [moving] "
+                      "[relight] [rooms] [scale] [scaling] [zonal] [window]\n"),
            2;
   for (auto [name, run] : all) {
     bool wanted = argc == 1 && run != bench_scale && run != bench_rooms;

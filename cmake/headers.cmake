@@ -8,6 +8,8 @@ set(lambent_relight_headers
   lambent/basis/sh.h
   lambent/basis/sh_convert.h
   lambent/basis/sh_fixed.h
+  lambent/basis/sh_product.h
+  lambent/basis/sh_product_tile.h
   lambent/basis/sh_tables.h
   lambent/brdf/brdf.h
   lambent/core/aligned.h
@@ -27,6 +29,7 @@ set(lambent_relight_headers
   lambent/relight/lattice.h
   lambent/relight/light.h
   lambent/relight/local_light.h
+  lambent/relight/moving.h
   lambent/relight/products.h
   lambent/relight/relight.h
   lambent/relight/relighter.h
@@ -37,6 +40,7 @@ set(lambent_relight_headers
   lambent/transfer/indirect.h
   lambent/transfer/lattice.h
   lambent/transfer/outgoing.h
+  lambent/transfer/shells.h
   lambent/transfer/transfer.h
   lambent/transfer/visibility.h
   lambent/transfer/zonal_transfer.h

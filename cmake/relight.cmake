@@ -7,6 +7,7 @@ set(lambent_relight_sources
   src/lambent/baked/gltf_buffers.cpp
   src/lambent/baked/outgoing_codec.cpp
   src/lambent/baked/placement_codec.cpp
+  src/lambent/baked/shells_codec.cpp
   src/lambent/baked/store_codec.cpp
   src/lambent/basis/cosine_basis.cpp
   src/lambent/basis/cubemap.cpp
@@ -20,6 +21,7 @@ set(lambent_relight_sources
   src/lambent/basis/sh_evaluate.cpp
   src/lambent/basis/sh_product.cpp
   src/lambent/basis/sh_product_grid.cpp
+  src/lambent/basis/sh_product_tile.cpp
   src/lambent/basis/sh_rotation.cpp
   src/lambent/basis/sh_rotation_zyz.cpp
   src/lambent/basis/wigner.cpp
@@ -47,6 +49,8 @@ set(lambent_relight_sources
   src/lambent/relight/indirect.cpp
   src/lambent/relight/light.cpp
   src/lambent/relight/local_light.cpp
+  src/lambent/relight/moving.cpp
+  src/lambent/relight/moving_kernels.cpp
   src/lambent/relight/product_kernels.cpp
   src/lambent/relight/products.cpp
   src/lambent/relight/relight.cpp
@@ -60,6 +64,7 @@ set(lambent_relight_sources
   src/lambent/transfer/field.cpp
   src/lambent/transfer/indirect.cpp
   src/lambent/transfer/outgoing.cpp
+  src/lambent/transfer/shells.cpp
   src/lambent/transfer/transfer.cpp
   src/lambent/transfer/visibility.cpp
   src/lambent/transfer/zonal_transfer.cpp

@@ -69,7 +69,7 @@ void lambent_close(lambent_file* file);
 typedef struct lambent_info {
   size_t size;           /**< set by the caller, to sizeof(lambent_info) */
   const char* store;     /**< how: "dense", "clusters", "lobes", "factors" or "blocks" */
-  const char* placement; /**< where: "vertices", "texels", "patches", "lattice" or "pixels" */
+  const char* placement; /**< where: "vertices", "texels", "patches", "lattice", "pixels" or "shells" */
   const char* meaning;   /**< of the rows: "diffuse", "directional", "outgoing", "incident", "pixels" or "sight" */
   const char* rows_are;  /**< of directional and outgoing rows, which: "sh:2", "hl2", "map", ...; else "" */
   size_t receivers;      /**< places that receive light */
@@ -85,7 +85,7 @@ typedef struct lambent_info {
   int height;            /**< the same */
   float box_min[3];      /**< of a lattice: its least corner, metres; else 0 */
   float box_max[3];      /**< and its greatest */
-  int points[3];         /**< of a lattice: points along x, y, z, x fastest; else 0 */
+  int points[3];         /**< of a lattice: points along x, y, z, x fastest; of shells: twice side, how many; else 0 */
 } lambent_info;
 
 /** How many fields a file has: 0 is the surface's, then light in free space (a lattice) where it was baked. */

@@ -20,6 +20,7 @@ void add_check(CLI::App& app, Run& run);
 void add_compress(CLI::App& app, Run& run);
 void add_patch(CLI::App& app, Run& run);
 void add_inspect(CLI::App& app, Run& run);
+void add_field(CLI::App& app, Run& run);
 void add_env(CLI::App& app, Run& run);
 void add_demo(CLI::App& app, Run& run);
 void add_view(CLI::App& app, Run& run);

@@ -94,6 +94,7 @@ int main(int argc, char** argv) {
   tool::add_check(app, run);
   tool::add_compress(app, run);
   tool::add_patch(app, run);
+  tool::add_field(app, run);
   tool::add_inspect(app, run);
   tool::add_env(app, run);
   tool::add_demo(app, run);

@@ -38,9 +38,11 @@ export const plainKeys: readonly string[] = [
   'lobeCount',
   'mapCount',
   'order',
+  'radius',
   'rank',
   'receivers',
   'rows',
+  'side',
   'version',
   'width',
 ];

@@ -87,7 +87,7 @@ Result<void> fit_to_scene(const Scene& scene, Placement& where, std::vector<Bake
                  [&](VertexPlacement& p) {
                    for (auto* side : {&p.front, &p.back, &p.input}) rearrange(*side, found, wanted, none);
                  },
-                 [&](FixedView&) {}, [&](LatticePlacement&) {},
+                 [&](FixedView&) {}, [&](LatticePlacement&) {}, [&](ShellPlacement&) {},
                  [&](auto& p) { rearrange(p.front, found, wanted, none), rearrange(p.back, found, wanted, none); }},
       where);
   parts = wanted;
@@ -147,6 +147,19 @@ Baked make_baked(Scene scene, FixedView view, Store store) {
 const Field* lattice_of(const Baked& baked) {
   for (const Field& field : baked.more)
     if (std::holds_alternative<LatticePlacement>(field.where)) return &field;
+  return nullptr;
+}
+
+const Field* hiding_of(const Baked& baked) {
+  for (const Field& field : baked.more)
+    if (std::holds_alternative<HiddenRows>(field.rows)) return &field;
+  return nullptr;
+}
+
+const Field* shining_of(const Baked& baked) {
+  for (const Field& field : baked.more)
+    if (std::holds_alternative<ShellPlacement>(field.where) && std::holds_alternative<IncidentRows>(field.rows))
+      return &field;
   return nullptr;
 }
 

@@ -139,6 +139,11 @@ Result<BakedFields> read_fields(const GltfBuffers& buffers, const std::string& p
     if (!lattice) return lattice.error();
     fields.more.push_back(std::move(*lattice));
   }
+  if (const auto object = extension.find("shells"); object != extension.end()) {
+    auto shells = decode_shells(in, *object, where + ": shells");
+    if (!shells) return shells.error();
+    for (Field& field : *shells) fields.more.push_back(std::move(field));
+  }
   if (const auto list = extension.find("terms");
       list != extension.end() && !std::holds_alternative<IndirectTransfer>(fields.surface.store)) {
     auto terms = read_terms(in, *list, fields.surface, where);
@@ -159,10 +164,18 @@ json encode_fields(const BakedFields& fields, BlobWriter& out) {
   LAMBENT_CHECK(is_consistent(fields.surface));
   json extension{{"version", baked_file_version}, {"transfer", encode_transfer(fields.surface, out)}};
   encode_placement(fields.surface.where, fields.parts, extension, out);
+  const Field *hidden = nullptr, *shining = nullptr;
   for (const Field& field : fields.more) {
-    LAMBENT_CHECK(is_consistent(field) && light_of(field.store).count() == light_of(fields.surface.store).count());
+    LAMBENT_CHECK(is_consistent(field));
+    if (std::holds_alternative<ShellPlacement>(field.where)) {
+      (std::holds_alternative<HiddenRows>(field.rows) ? hidden : shining) = &field;
+      continue;
+    }
+    LAMBENT_CHECK(light_of(field.store).count() == light_of(fields.surface.store).count());
     extension["lattice"] = encode_lattice(field, out);
   }
+  LAMBENT_CHECK(hidden || !shining);
+  if (hidden) extension["shells"] = encode_shells(*hidden, shining, out);
   for (const Transfer& term : fields.terms) {
     LAMBENT_CHECK(term.receivers == receivers_of(fields.surface.store) && term.rows == rows_of(fields.surface.store));
     extension["terms"].push_back(encode_dense(term, out));

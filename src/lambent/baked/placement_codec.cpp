@@ -214,7 +214,8 @@ void encode_placement(const Placement& where, std::span<const BakedPart> parts, 
                    encode_sides(p.front, p.back, parts, extension, out);
                    extension["surface"] = {{"kind", "patches"}};
                  },
-                 [&](const LatticePlacement&) {}, [&](const FixedView& v) { extension["view"] = encode_view(v, out); }},
+                 [&](const LatticePlacement&) {}, [&](const ShellPlacement&) {},
+                 [&](const FixedView& v) { extension["view"] = encode_view(v, out); }},
       where);
 }
 

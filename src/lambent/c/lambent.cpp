@@ -80,7 +80,15 @@ void describe_placement(const Placement& where, lambent_info& info) {
             }
             info.points[0] = p.lattice.nx, info.points[1] = p.lattice.ny, info.points[2] = p.lattice.nz;
           },
-          [&](const FixedView& p) { info.placement = "pixels", info.width = p.width, info.height = p.height; }},
+          [&](const FixedView& p) { info.placement = "pixels", info.width = p.width, info.height = p.height; },
+          [&](const ShellPlacement& p) {
+            info.placement = "shells";
+            for (size_t k = 0; k < 3; ++k) {
+              info.box_min[k] = p.shells.center[k] - p.shells.radius;
+              info.box_max[k] = p.shells.center[k] + p.shells.radius;
+            }
+            info.points[0] = info.points[1] = p.shells.side, info.points[2] = int(p.shells.radii.size());
+          }},
       where);
 }
 
@@ -88,7 +96,8 @@ const char* meaning_of(const Rows& rows) {
   return std::visit(
       Overloaded{[](const DiffuseRows&) { return "diffuse"; }, [](const DirectionalRows&) { return "directional"; },
                  [](const Outgoing&) { return "outgoing"; }, [](const IncidentRows&) { return "incident"; },
-                 [](const PixelRows&) { return "pixels"; }, [](const SightRows&) { return "sight"; }},
+                 [](const PixelRows&) { return "pixels"; }, [](const SightRows&) { return "sight"; },
+                 [](const HiddenRows&) { return "hidden"; }},
       rows);
 }
 

@@ -122,42 +122,55 @@ Said say(const Rows& rows) {
                  },
                  [](const SightRows&) -> Said {
                    return {json::object(), "sight"};
+                 },
+                 [](const HiddenRows&) -> Said {
+                   return {json::object(), "what the object hides"};
                  }},
       rows);
 }
 
 Said say(const Placement& where) {
-  return std::visit(Overloaded{[](const VertexPlacement&) -> Said {
-                                 return {json::object(), "", ""};
-                               },
-                               [](const TexelPlacement& p) -> Said {
-                                 return {{{"atlas", {p.width, p.height}}},
-                                         "",
-                                         fmt::format("\n  over an atlas of {} x {} texels", p.width, p.height)};
-                               },
-                               [](const PatchPlacement&) -> Said {
-                                 return {json::object(), "", "\n  over patches"};
-                               },
-                               [](const LatticePlacement& p) -> Said {
-                                 const Lattice& l = p.lattice;
-                                 return {{{"points", {l.nx, l.ny, l.nz}},
-                                          {"min", vector_json(l.min)},
-                                          {"max", vector_json(l.max)},
-                                          {"invalid", std::count(p.valid.begin(), p.valid.end(), uint8_t(0))}},
-                                         "",
-                                         fmt::format("\n  in free space at {} x {} x {} points", l.nx, l.ny, l.nz)};
-                               },
-                               [](const FixedView& v) -> Said {
-                                 return {{{"view",
-                                           {{"width", v.width},
-                                            {"height", v.height},
-                                            {"eye", vector_json(v.camera.eye)},
-                                            {"target", vector_json(v.camera.target)},
-                                            {"fov", v.camera.fov}}}},
-                                         "",
-                                         fmt::format("\n  a fixed view of {} x {} pixels", v.width, v.height)};
-                               }},
-                    where);
+  return std::visit(
+      Overloaded{
+          [](const VertexPlacement&) -> Said {
+            return {json::object(), "", ""};
+          },
+          [](const TexelPlacement& p) -> Said {
+            return {{{"atlas", {p.width, p.height}}},
+                    "",
+                    fmt::format("\n  over an atlas of {} x {} texels", p.width, p.height)};
+          },
+          [](const PatchPlacement&) -> Said {
+            return {json::object(), "", "\n  over patches"};
+          },
+          [](const LatticePlacement& p) -> Said {
+            const Lattice& l = p.lattice;
+            return {{{"points", {l.nx, l.ny, l.nz}},
+                     {"min", vector_json(l.min)},
+                     {"max", vector_json(l.max)},
+                     {"invalid", std::count(p.valid.begin(), p.valid.end(), uint8_t(0))}},
+                    "",
+                    fmt::format("\n  in free space at {} x {} x {} points", l.nx, l.ny, l.nz)};
+          },
+          [](const FixedView& v) -> Said {
+            return {{{"view",
+                      {{"width", v.width},
+                       {"height", v.height},
+                       {"eye", vector_json(v.camera.eye)},
+                       {"target", vector_json(v.camera.target)},
+                       {"fov", v.camera.fov}}}},
+                    "",
+                    fmt::format("\n  a fixed view of {} x {} pixels", v.width, v.height)};
+          },
+          [](const ShellPlacement& p) -> Said {
+            const Shells& s = p.shells;
+            return {{{"center", vector_json(s.center)}, {"radius", s.radius}, {"radii", s.radii}, {"side", s.side}},
+                    "",
+                    fmt::format("\n  on {} shells of {} x {} points, {:.3g} to {:.3g} radii of the "
+                                "object",
+                                s.radii.size(), s.side, s.side, s.radii.front() / s.radius, s.radii.back() / s.radius)};
+          }},
+      where);
 }
 
 Said say(const Store& store) {
@@ -175,13 +188,14 @@ const char* kind_of(const Field& field) {
 }  // namespace
 
 const char* name_of(const Placement& where) {
-  static constexpr const char* names[] = {"vertices", "texels", "patches", "lattice", "view"};
+  static constexpr const char* names[] = {"vertices", "texels", "patches", "lattice", "view", "shells"};
   static_assert(std::size(names) == std::variant_size_v<Placement>);
   return names[where.index()];
 }
 
 const char* name_of(const Rows& rows) {
-  static constexpr const char* names[] = {"diffuse", "directional", "outgoing", "incident", "pixels", "sight"};
+  static constexpr const char* names[] = {"diffuse", "directional", "outgoing", "incident",
+                                          "pixels",  "sight",       "hidden"};
   static_assert(std::size(names) == std::variant_size_v<Rows>);
   return names[rows.index()];
 }

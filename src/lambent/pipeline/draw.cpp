@@ -4,6 +4,7 @@
 #include <lambent/pipeline/draw_blocks.h>
 #include <lambent/pipeline/draw_columns.h>
 #include <lambent/pipeline/draw_indirect.h>
+#include <lambent/pipeline/draw_moving.h>
 #include <lambent/pipeline/draw_texture.h>
 #include <lambent/pipeline/text.h>
 
@@ -82,6 +83,7 @@ Result<Drawing> draw(const Baked& baked, const DrawRequest& request, const Job& 
   if (!request.transfer_texture.empty()) return draw_texture(request, job);
   if (auto ok = check_draw(request, baked); !ok) return ok.error();
   if (std::holds_alternative<IndirectTransfer>(baked.surface.store)) return draw_indirect(baked, request, job);
+  if (!request.place.empty()) return draw_moving(baked, request, job);
   return std::holds_alternative<SightRows>(baked.surface.rows) ? draw_blocks(baked, request, job)
                                                                : draw_columns(baked, request, job);
 }

@@ -179,6 +179,9 @@ Result<Image> shade(ColumnDrawing& d, const std::optional<Pose>& pose, Relit rel
                  },
                  [&](const SightRows&) -> Result<Image> {
                    return Error{d.request.baked, "is of visibility in blocks"};
+                 },
+                 [&](const HiddenRows&) -> Result<Image> {
+                   return Error{d.request.baked, "holds what an object hides, which no picture shows"};
                  }},
       rows);
 }

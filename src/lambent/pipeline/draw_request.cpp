@@ -40,9 +40,11 @@ const Option<R> table[] = {
      "anywhere (files of direct to indirect light): sphere@X,Y,Z,RADIUS=R,G,B (radiance), point@X,Y,Z=R,G,B (flux per "
      "steradian), spot@X,Y,Z,TX,TY,TZ,ANGLE=R,G,B (towards T, within so many degrees) or sun@AZIMUTH,ELEVATION=R,G,B "
      "(irradiance); may be given again"},
-    {"move", &R::move, "Light", I,
-     "N@T:X,Y,Z;T:X,Y,Z;...: where lamp N is at these times, straight from one to the next; may be given again", 0, 0,
-     nullptr, "frames"},
+    {"move", &R::move, "Light", D | I,
+     "N@T:X,Y,Z;T:X,Y,Z;...: where lamp N is at these times, straight from one to the next (files of direct to "
+     "indirect "
+     "light); or NAME=PATH.json: the path of an object of --place; may be given again",
+     0, 0, nullptr, "frames"},
     {"sphere-lamp", &R::sphere_lamp, "Light", Z | T,
      "X,Y,Z,RADIUS,R,G,B: a near lamp, a sphere of that radiance; may be given again"},
 
@@ -69,6 +71,9 @@ const Option<R> table[] = {
      0, 0, nullptr, nullptr, true, true},
     {"insert", &R::insert, "What is shown", D | C | Z | M,
      "FILE@X,Y,Z[,SCALE]: put a small diffuse object there, lit by the scene's lattice; may be given again"},
+    {"place", &R::place, "What is shown", D,
+     "NAME=FIELD@X,Y,Z[,YAW,PITCH,ROLL[,SCALE]]: put the object of a file of `lambent field` there, the middle of its "
+     "box, turned; it casts shadows on the scene and on others, and is lit by the scene's lattice; may be given again"},
 
     {"animation", &R::animation, "Motion", distant & ~(K | V),
      "Pose the scene by this glTF animation, by name or number"},
@@ -111,6 +116,11 @@ constexpr Conflict conflicts[] = {
     {"deform", "animation", "and --animation both move the scene: give one"},
     {"insert", "animation", "draws the scene at rest: leave the animation out"},
     {"insert", "deform", "draws the scene at rest: leave --deform out"},
+    {"place", "animation", "moves objects over a scene at rest: leave the animation out"},
+    {"place", "deform", "moves objects over a scene at rest: leave --deform out"},
+    {"place", "show=emission|bounce:|sum:", "is lit by all light at once: no --show of a part of it"},
+    {"place", "insert", "and --insert both put objects in: give --place for all"},
+    {"move", "animation", "moves objects over a scene at rest: leave the animation out"},
     {"insert", "show=emission|bounce:|sum:", "is lit by all light at once: no --show of a part of it"},
     {"tolerance", "method=standard|haar", "needs --method blocks"},
     {"lamp", "show=albedo", "lights what --show albedo shows no light of"},
@@ -216,8 +226,10 @@ Result<void> check_draw(const DrawRequest& request, DrawKind kind) {
                  true};
   if (kind == DrawKind::indirect && !two_sorts && show->part != Show::Part::all)
     return Error{"--show", "of direct to indirect light is product, radiosity, albedo, direct or indirect", true};
-  if (said.contains("frames") && (kind == DrawKind::indirect ? request.move.empty() : request.animation.empty()))
-    return Error{"--frames", kind == DrawKind::indirect ? "needs --move" : "needs --animation", true};
+  const bool by_paths = kind == DrawKind::indirect || !request.place.empty();
+  if (said.contains("frames") && (by_paths ? request.move.empty() : request.animation.empty()))
+    return Error{"--frames", by_paths ? "needs --move" : "needs --animation", true};
+  if (said.contains("move") && !by_paths) return Error{"--move", "needs --place", true};
   if (kind == DrawKind::indirect && request.lamp.empty() && show->colour != RenderOptions::Show::albedo)
     return Error{"--lamp", "is needed: a lamp to light the scene by, e.g. point@0,2,0=10", true};
   const bool from_afar = kind == DrawKind::texture || kind == DrawKind::blocks;
@@ -245,11 +257,15 @@ Result<void> check_draw(const DrawRequest& request, const Baked& baked) {
   if (!request.brdf.empty() && (!outgoing || outgoing->kind != OutgoingKind::map))
     return Error{request.baked,
                  "--brdf needs a bake that kept incident light: lambent bake --transfer matrix --outgoing map"};
-  if (request.insert.empty()) return {};
+  if (request.insert.empty() && request.place.empty()) return {};
   if (!lattice_of(baked))
-    return Error{request.baked, "has no light in free space for --insert: bake it with --lattice"};
+    return Error{request.baked, std::string("has no light in free space for ") +
+                                    (request.insert.empty() ? "--place" : "--insert") + ": bake it with --lattice"};
   if (!vertices_of(baked) || std::holds_alternative<DirectionalRows>(baked.surface.rows))
-    return Error{request.baked, "objects can only be inserted into bakes at vertices"};
+    return Error{request.baked, "objects can only be " + std::string(request.insert.empty() ? "placed" : "inserted") +
+                                    " into bakes at vertices"};
+  if (!request.place.empty() && light.count() != size_t(sh_count(light.order)))
+    return Error{request.baked, "has lobes or lamps beside harmonics, which objects of --place cannot shadow"};
   return {};
 }
 

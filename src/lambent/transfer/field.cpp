@@ -92,7 +92,8 @@ bool is_consistent(const Field& field) {
                  },
                  [&](const PatchPlacement& p) { return most_receivers(p.front, p.back) <= n; },
                  [&](const LatticePlacement& p) { return p.lattice.count() == n && p.valid.size() == n; },
-                 [&](const FixedView& p) { return size_t(p.width) * size_t(p.height) == n && p.coverage.size() == n; }},
+                 [&](const FixedView& p) { return size_t(p.width) * size_t(p.height) == n && p.coverage.size() == n; },
+                 [&](const ShellPlacement& p) { return is_consistent(p.shells) && p.shells.count() == n; }},
       field.where);
   const int rows = rows_of(field.store);
   const auto* factored = std::get_if<FactoredTransfer>(&field.store);
@@ -105,7 +106,8 @@ bool is_consistent(const Field& field) {
                                    : rows == o.rows();
                  },
                  [&](const IncidentRows& r) { return rows == r.order * r.order && !factored; },
-                 [&](const PixelRows&) { return rows == 1 && !factored; }, [&](const SightRows&) { return rows == 0; }},
+                 [&](const PixelRows&) { return rows == 1 && !factored; }, [&](const SightRows&) { return rows == 0; },
+                 [&](const HiddenRows&) { return rows == 1 && !factored; }},
       field.rows);
   return placed && meant && (field.fit_errors.empty() || field.fit_errors.size() == n);
 }

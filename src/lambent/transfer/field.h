@@ -1,9 +1,9 @@
 #pragma once
 // The waist: everything that a bake makes and that relighting reads is a FIELD, along four axes, each a closed set:
 //   where    Placement   vertices, texels of an atlas, patches (triangles), a lattice in free space, pixels of a
-//   picture light    LightBasis  the columns of the store: harmonics, lobes, lamps by group (transfer.h) how      Store
-//   dense, clustered, zonal lobes, factored, visibility in blocks, direct to indirect light over surfels meaning  Rows
-//   what the rows of T . light are
+//   picture, shells about an object light    LightBasis  the columns of the store: harmonics, lobes, lamps by group
+//   (transfer.h) how      Store dense, clustered, zonal lobes, factored, visibility in blocks, direct to indirect light
+//   over surfels meaning  Rows what the rows of T . light are
 // A stage that treats stores, placements or rows differently visits them, so that a new kind does not compile until
 // each stage has said what becomes of it.
 #include <lambent/core/camera.h>
@@ -12,6 +12,7 @@
 #include <lambent/transfer/indirect.h>
 #include <lambent/transfer/lattice.h>
 #include <lambent/transfer/outgoing.h>
+#include <lambent/transfer/shells.h>
 #include <lambent/transfer/transfer.h>
 #include <lambent/transfer/visibility.h>
 #include <lambent/transfer/zonal_transfer.h>
@@ -53,7 +54,12 @@ struct FixedView {
   int width = 0, height = 0;
   std::vector<float> coverage;  // [0, 1] a pixel: how much of it the scene covers
 };
-using Placement = std::variant<VertexPlacement, TexelPlacement, PatchPlacement, LatticePlacement, FixedView>;
+// Receivers are the points around an object, in the order of shell_point().
+struct ShellPlacement {
+  Shells shells;
+};
+using Placement =
+    std::variant<VertexPlacement, TexelPlacement, PatchPlacement, LatticePlacement, FixedView, ShellPlacement>;
 
 // HOW. Visibility times cosine over pi in light order + incident order - 1 bands, one row and channel; the rows are
 // made of the product with the light, once a frame (relight/factors.h).
@@ -83,9 +89,10 @@ struct DirectionalRows {
 struct IncidentRows {
   int order = 0;  // harmonics, world axes, of the radiance that arrives: order^2 rows
 };
-struct PixelRows {};  // one: what the pixel shows
-struct SightRows {};  // of visibility: nothing is summed before light, view and material are known
-using Rows = std::variant<DiffuseRows, DirectionalRows, Outgoing, IncidentRows, PixelRows, SightRows>;
+struct PixelRows {};   // one: what the pixel shows
+struct SightRows {};   // of visibility: nothing is summed before light, view and material are known
+struct HiddenRows {};  // one: of the light over the whole sphere, what an object is in the way of
+using Rows = std::variant<DiffuseRows, DirectionalRows, Outgoing, IncidentRows, PixelRows, SightRows, HiddenRows>;
 
 // What is baked: where, how and what it means.
 struct Field {

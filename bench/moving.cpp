@@ -1,0 +1,54 @@
+// Objects that move over a baked scene: nanoseconds a receiver and object beyond the relight, all receivers near them.
+#include "bench.h"
+
+#include <lambent/bake/shells.h>
+#include <lambent/core/parallel.h>
+#include <lambent/relight/moving.h>
+#include <lambent/scene/procedural.h>
+
+namespace lambent::bench {
+
+void bench_moving() {
+  const ThreadLimit one(1);
+  constexpr int order = 4, side = 316;
+  constexpr double aim = 12;  // ns
+  std::vector<Vec3> places, normals;
+  for (int i = 0; i < side * side; ++i) {
+    places.emplace_back(float(i % side) / side * 6 - 3, -1.0f, float(i / side) / side * 6 - 3);
+    normals.emplace_back(0.0f, 1.0f, 0.0f);
+  }
+  const WritableTransfer t = make_transfer({.order = order}, 1, 1, places.size(), Precision::half);
+  std::vector<float> row(size_t(sh_count(order)), 0.1f);
+  for (size_t r = 0; r < places.size(); ++r) store_receiver(t, r, row);
+  const MovingReceivers receivers = moving_receivers(t.transfer, places, normals);
+  const Scene ball = make_sphere(1, 2, Vec3(0.5f));
+  auto tracer = Tracer::build(ball);
+  const ShellOptions options{.order = order, .samples = 32};
+  auto shells = make_shells(ball, options);
+  if (!tracer || !shells) return;
+  auto field = bake_hidden(*tracer, *shells, options);
+  if (!field) return;
+  const HiddenLight hidden = hidden_light(*field, order);
+  const std::vector<Vec3> light(size_t(sh_count(order)), Vec3(0.1f));
+  Relit relit;
+  relight(t.transfer, light, relit);
+  const double alone = least_seconds(9, [&] { relight(t.transfer, light, relit); });
+  for (int count : {1, 2, 10}) {
+    std::vector<PlacedObject> placed;
+    std::vector<const PlacedObject*> objects;
+    for (int i = 0; i < count; ++i)
+      placed.push_back(place_object(hidden, {Vec3(0.2f * float(i), 0.1f, 0.1f * float(i)),
+                                             rotation_from_yaw_pitch_roll({10.0f * float(i), 0, 0}), 1}));
+    for (const PlacedObject& p : placed) objects.push_back(&p);
+    MovingShader shader;
+    MovingCount done;
+    const MovingLight lights[] = {{light, false, &relit}};
+    const double seconds =
+        least_seconds(9, [&] { done = shader.shade(receivers, objects, {.light_order = order}, lights); });
+    report("moving, " + std::to_string(count) + " objects", 1e9 * seconds / double(done.pairs), aim, "ns",
+           "the aim, a receiver and object beyond the relight",
+           {{"pairs", done.pairs}, {"relight_ns", 1e9 * alone / double(places.size())}});
+  }
+}
+
+}  // namespace lambent::bench

@@ -1,0 +1,155 @@
+#include <lambent/bake/shells.h>
+
+#include <lambent/basis/sh.h>
+#include <lambent/core/parallel.h>
+#include <lambent/core/random.h>
+#include <lambent/core/sampling.h>
+#include <lambent/scene/lights.h>
+
+#include <algorithm>
+#include <atomic>
+#include <chrono>
+#include <cmath>
+
+namespace lambent {
+namespace {
+
+constexpr size_t rays_at_once = 64;
+
+// Directions in which the object may be seen from a point, and the solid angle of all of them.
+struct Cone {
+  Mat3 frame{1.0f};
+  float solid_angle = 4 * pi;
+  bool whole = true;
+  Vec3 direction(Vec2 u) const {
+    if (whole) return square_to_sphere(u);
+    const float z = 1 - u.x * solid_angle / (2 * pi), r = std::sqrt(std::max(0.0f, 1 - z * z));
+    return frame * Vec3(r * std::cos(2 * pi * u.y), r * std::sin(2 * pi * u.y), z);
+  }
+};
+
+Cone cone_towards(const Shells& shells, Vec3 point) {
+  const Vec3 to = shells.center - point;
+  const float distance = length(to), sine = shells.radius / std::max(distance, 1e-30f);
+  if (!(sine < 0.999f)) return {};
+  return {frame_about(to / distance), 2 * pi * (1 - std::sqrt(1 - sine * sine)), false};
+}
+
+// Integrals over the sphere of value(directions, values) times each harmonic, a channel after the other: at every
+// point. `value` is given up to 64 directions, and fills as many numbers a channel, 64 apart.
+template <class Value>
+Result<Transfer> integrate(const Shells& shells, const ShellOptions& o, LightBasis light, int rows, int channels,
+                           const char* stage_name, Progress* progress, Value value) {
+  const size_t n = size_t(sh_count(o.order)), count = shells.count();
+  WritableTransfer out = make_transfer(std::move(light), rows, channels, count, Precision::half);
+  ProgressStage stage(progress, stage_name, count);
+  parallel_for(count, transfer_block, [&](size_t begin, size_t end) {
+    alignas(64) float x[rays_at_once], y[rays_at_once], z[rays_at_once], values[3 * rays_at_once];
+    AlignedVector<float> table(n * rays_at_once);
+    std::vector<double> sums(size_t(channels) * n), ones(n);
+    std::vector<float> row(sums.size());
+    for (size_t p = begin; p < end && !stage.cancelled(); ++p) {
+      const Vec3 point = shell_point(shells, p);
+      const Cone cone = cone_towards(shells, point);
+      const auto key = uint32_t(hash64(p, o.seed));
+      std::fill(sums.begin(), sums.end(), 0.0), std::fill(ones.begin(), ones.end(), 0.0);
+      for (size_t first = 0; first < size_t(o.samples); first += rays_at_once) {
+        const size_t rays = std::min(rays_at_once, size_t(o.samples) - first);
+        for (size_t i = 0; i < rays; ++i) {
+          const Vec3 d = cone.direction(sobol_owen(uint32_t(first + i), key));
+          x[i] = d.x, y[i] = d.y, z[i] = d.z;
+        }
+        value(point, Directions{x, y, z, rays}, values);
+        evaluate_sh(o.order, std::span(x, rays), std::span(y, rays), std::span(z, rays), rays_at_once, table);
+        for (size_t c = 0; c < size_t(channels); ++c)
+          for (size_t k = 0; k < n; ++k)
+            for (size_t i = 0; i < rays; ++i)
+              sums[c * n + k] += double(values[c * rays_at_once + i] * table[k * rays_at_once + i]);
+        for (size_t k = 0; k < n; ++k)
+          for (size_t i = 0; i < rays; ++i) ones[k] += double(table[k * rays_at_once + i]);
+      }
+      // Over the whole sphere the mean is integrated exactly: it has no harmonics but the first. So what is surrounded
+      // is hidden without noise.
+      for (size_t c = 0; cone.whole && c < size_t(channels); ++c)
+        for (size_t k = 1; k < n; ++k) sums[c * n + k] -= sums[c * n] / ones[0] * ones[k];
+      // Diffuse rows are [channel][column]; rows of incident light [row][channel] of one column.
+      for (size_t c = 0; c < size_t(channels); ++c)
+        for (size_t k = 0; k < n; ++k)
+          row[rows == 1 ? c * n + k : k * size_t(channels) + c] =
+              float(sums[c * n + k] * double(cone.solid_angle) / o.samples);
+      store_receiver(out, p, row);
+    }
+    stage.advance(end - begin);
+  });
+  if (stage.cancelled()) return Error{"", "cancelled"};
+  return out.transfer;
+}
+
+void add_radii(std::vector<float>& radii, double from, double to, int count) {
+  for (int i = 0; i < count; ++i)
+    radii.push_back(float(from * std::pow(to / from, count > 1 ? double(i) / (count - 1) : 0.0)));
+}
+
+}  // namespace
+
+Result<Shells> make_shells(const Scene& scene, const ShellOptions& o) {
+  if (o.order < 1 || o.order > max_sh_order) return Error{"", "the order must be 1 to 16"};
+  if (o.shells < 2 || o.shells > max_shells || o.side < 2 || o.side > max_shell_side)
+    return Error{"", "from 2 to 64 shells of 2 to 64 points a side are possible"};
+  if (!(o.inner > 0 && o.inner < 1 && o.outer > 1) || !std::isfinite(o.outer))
+    return Error{"", "the first shell must lie within the object's sphere, and the last one beyond it"};
+  const Bounds box = bounds(scene);
+  Shells s{0.5f * (box.min + box.max), 0, {}, o.side};
+  for (const Vec3& p : scene.positions) s.radius = std::max(s.radius, length(p - s.center));
+  if (scene.triangles.empty() || !is_finite(s.center) || !(s.radius > 0) || !std::isfinite(s.radius * o.outer))
+    return Error{scene.path, "has no size to put shells about"};
+  const int within = o.shells / 3;
+  if (within > 0) add_radii(s.radii, o.inner * double(s.radius), 0.98 * double(s.radius), within);
+  // What is hidden changes fast just outside: even steps of the logarithm of the distance from the sphere.
+  std::vector<float> beyond;
+  add_radii(beyond, 0.01, o.outer - 1.0, o.shells - within);
+  for (float b : beyond) s.radii.push_back(float((1 + double(b)) * double(s.radius)));
+  if (!is_consistent(s)) return Error{"", "the shells do not rise: the first or the last lies too near the sphere"};
+  return s;
+}
+
+Result<Field> bake_hidden(const Tracer& tracer, const Shells& shells, const ShellOptions& o, ShellReport* report,
+                          Progress* progress) {
+  const auto start = std::chrono::steady_clock::now();
+  auto t = integrate(shells, o, {.order = o.order}, 1, 1, "shells", progress,
+                     [&](Vec3 point, const Directions& d, float* values) {
+                       tracer.visible_fan(point, d, values);
+                       for (size_t i = 0; i < d.count; ++i) values[i] = 1 - values[i];
+                     });
+  if (!t) return t.error();
+  if (report)
+    *report = {shells.count(), shells.count() * size_t(o.samples), t->bytes(),
+               std::chrono::duration<double>(std::chrono::steady_clock::now() - start).count()};
+  return Field{ShellPlacement{shells}, std::move(*t), HiddenRows{}};
+}
+
+Result<Field> bake_shining(const Scene& scene, const Tracer& tracer, const Shells& shells, const ShellOptions& o,
+                           Progress* progress) {
+  if (std::none_of(scene.materials.begin(), scene.materials.end(),
+                   [](const Material& m) { return m.emissive != Vec3(0.0f); }))
+    return Error{scene.path, "has no emissive material that it could shine with"};
+  auto t =
+      integrate(shells, o, {.groups = {"all"}}, sh_count(o.order), 3, "shining", progress,
+                [&](Vec3 point, const Directions& d, float* values) {
+                  Hit hits[rays_at_once];
+                  tracer.closest_fan(point, d, hits);
+                  for (size_t i = 0; i < d.count; ++i) {
+                    Vec3 e(0.0f);
+                    if (hits[i].triangle != none && emits(scene, scene.triangles[hits[i].triangle], hits[i].front)) {
+                      const Triangle& triangle = scene.triangles[hits[i].triangle];
+                      e = scene.materials[scene.parts[triangle.part].material].emissive *
+                          emission_texel(scene, triangle, hits[i].u, hits[i].v);
+                    }
+                    for (size_t c = 0; c < 3; ++c) values[c * rays_at_once + i] = e[int(c)];
+                  }
+                });
+  if (!t) return t.error();
+  return Field{ShellPlacement{shells}, std::move(*t), IncidentRows{o.order}};
+}
+
+}  // namespace lambent

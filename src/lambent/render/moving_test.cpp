@@ -1,0 +1,175 @@
+// Objects over a baked scene against the path tracer, which knows the joint scene.
+#include <lambent/bake/bake.h>
+#include <lambent/bake/shells.h>
+#include <lambent/core/random.h>
+#include <lambent/light/project.h>
+#include <lambent/reference/path_tracer.h>
+#include <lambent/relight/moving.h>
+#include <lambent/scene/append.h>
+#include <lambent/scene/procedural.h>
+
+#include "sanitizers.h"
+
+#include <gtest/gtest.h>
+
+#include <cmath>
+
+namespace lambent {
+namespace {
+
+std::vector<Vec3> uneven_light(int order) {
+  Random random(11);
+  std::vector<Vec3> light(size_t(sh_count(order)));
+  for (size_t k = 0; k < light.size(); ++k)
+    light[k] = (Vec3(random.next(), random.next(), random.next()) - 0.5f) * 2.0f / float(1 + sh_band(int(k)));
+  light[0] = Vec3(3, 2.5f, 2);
+  return light;
+}
+
+Scene yard() {
+  Scene scene;
+  add_quad(scene, add_material(scene, "floor", Vec3(0.7f)), "floor", Vec3(-3, 0, -3), Vec3(0, 0, 6), Vec3(6, 0, 0), 40,
+           40);
+  add_quad(scene, add_material(scene, "wall", Vec3(0.6f)), "wall", Vec3(-3, 0, -3), Vec3(6, 0, 0), Vec3(0, 2, 0), 40,
+           14);
+  return scene;
+}
+
+// An object with its field.
+struct Thing {
+  Scene scene;
+  Receivers receivers;
+  Transfer transfer;
+  Field field;
+  HiddenLight light;
+  Thing(Scene s, int order, int own_order, int samples = 64) : scene(std::move(s)) {
+    const ShellOptions options{.order = order, .samples = samples};
+    auto tracer = Tracer::build(scene);
+    receivers = make_vertex_receivers(scene);
+    transfer = *bake(scene, *tracer, receivers, {.order = own_order, .samples = 512, .bounces = 0});
+    field = *bake_hidden(*tracer, *make_shells(scene, options), options);
+    light = hidden_light(field, order);
+  }
+};
+
+Scene moved(const Scene& scene, const Shells& shells, const RigidPlace& place) {
+  Scene out = scene;
+  for (Vec3& p : out.positions) p = place.position + place.scale * (place.rotation * (p - shells.center));
+  for (Vec3& n : out.normals) n = place.rotation * n;
+  return out;
+}
+
+// dB of our light against the truth, its greatest as the peak.
+double decibels(const std::vector<Vec3>& ours, const std::vector<Vec3>& truth) {
+  double squares = 0, peak = 0;
+  for (size_t i = 0; i < ours.size(); ++i)
+    for (int c = 0; c < 3; ++c) {
+      squares += std::pow(double(ours[i][c] - truth[i][c]), 2);
+      peak = std::max(peak, double(truth[i][c]));
+    }
+  return 10 * std::log10(peak * peak / (squares / double(3 * ours.size())));
+}
+
+TEST(Moving, TwoObjectsShadowASceneAsThePathTracerSays) {
+  SKIP_UNDER_SANITIZERS();
+  constexpr int light_order = 4, order = 8;
+  const Scene scene = yard();
+  auto tracer = Tracer::build(scene);
+  const Receivers receivers = make_vertex_receivers(scene);
+  auto transfer = bake(scene, *tracer, receivers, {.order = order, .samples = 1024, .bounces = 0});
+  ASSERT_TRUE(transfer);
+  Scene box;
+  add_box(box, add_material(box, "box", Vec3(0.5f)), "box", Vec3(-0.4f, -0.3f, -0.5f), Vec3(0.4f, 0.3f, 0.5f), 4);
+  const Thing ball(make_sphere(0.5f, 3, Vec3(0.5f)), order, light_order, 256), block(box, order, light_order, 256);
+  const PlacedObject placed[] = {
+      place_object(ball.light, {Vec3(-0.7f, 0.8f, 0.3f), Mat3(1.0f), 1}),
+      place_object(block.light, {Vec3(0.8f, 0.7f, -0.6f), rotation_from_yaw_pitch_roll({30, 20, 0}), 1})};
+  const std::vector<const PlacedObject*> objects{&placed[0], &placed[1]};
+  const std::vector<Vec3> light = uneven_light(light_order);
+  std::vector<Vec3> padded(light);
+  padded.resize(size_t(sh_count(order)), Vec3(0.0f));
+  const MovingReceivers moving = moving_receivers(*transfer, receivers.origins, receivers.normals);
+  Relit relit, alone;
+  relight(*transfer, padded, relit);
+  alone = relit;
+  MovingShader shader;
+  const MovingLight lights[] = {{light, false, &relit}};
+  const MovingCount done = shader.shade(moving, objects, {.light_order = light_order}, lights);
+  EXPECT_GT(done.pairs, 0u);
+  Scene joint = scene;
+  append_scene(joint, moved(ball.scene, ball.light.shells, placed[0].place));
+  append_scene(joint, moved(block.scene, block.light.shells, placed[1].place));
+  std::vector<Vec3> at, normals, ours, without;
+  for (size_t r = 0; r < receivers.count(); r += 7) {
+    at.push_back(receivers.origins[r]), normals.push_back(receivers.normals[r]);
+    ours.push_back(relit.at(r)), without.push_back(alone.at(r));
+  }
+  const Environment env = reconstruct_environment(light, 128);
+  std::vector<Vec3> truth;
+  for (const ExitRadiance& e : exit_radiances(joint, env, at, normals, 0, 1024, 7)) truth.push_back(e.mean);
+  const double with = decibels(ours, truth), before = decibels(without, truth);
+  RecordProperty("decibels", std::to_string(with));
+  RecordProperty("decibels_without_shadows", std::to_string(before));
+  EXPECT_GT(with, 35);
+  EXPECT_GT(with, before + 8);
+}
+
+TEST(Moving, FarObjectsChangeNothingAndCostNothing) {
+  const Scene scene = make_quad(Vec3(-1, 0, -1), Vec3(0, 0, 2), Vec3(2, 0, 0), 12, 12, Vec3(0.5f));
+  auto tracer = Tracer::build(scene);
+  const Receivers receivers = make_vertex_receivers(scene);
+  auto transfer = bake(scene, *tracer, receivers, {.order = 3, .samples = 64, .bounces = 0});
+  const Thing ball(make_sphere(0.1f, 1, Vec3(0.5f)), 3, 3);
+  const PlacedObject far = place_object(ball.light, {Vec3(0, 40, 0), Mat3(1.0f), 1}),
+                     below = place_object(ball.light, {Vec3(0, -1, 0), Mat3(1.0f), 1});
+  const std::vector<const PlacedObject*> objects{&far, &below};
+  const std::vector<Vec3> light = uneven_light(3);
+  Relit relit;
+  relight(*transfer, light, relit);
+  const Relit before = relit;
+  const MovingLight lights[] = {{light, false, &relit}};
+  const MovingReceivers moving = moving_receivers(*transfer, receivers.origins, receivers.normals);
+  const MovingCount done = MovingShader().shade(moving, objects, {.light_order = 3}, lights);
+  EXPECT_EQ(done.pairs, 0u);
+  EXPECT_EQ(relit.values, before.values);
+}
+
+TEST(Moving, UnderABlockNoLightIsLeft) {
+  // A ball as large as the receiver's whole sky: the receiver lies within it.
+  const Scene scene = make_quad(Vec3(-0.1f, 0, -0.1f), Vec3(0, 0, 0.2f), Vec3(0.2f, 0, 0), 4, 4, Vec3(0.5f));
+  auto tracer = Tracer::build(scene);
+  const Receivers receivers = make_vertex_receivers(scene);
+  auto transfer = bake(scene, *tracer, receivers, {.order = 4, .samples = 256, .bounces = 0});
+  const Thing ball(make_sphere(2, 3, Vec3(0.5f)), 4, 3);
+  const PlacedObject around = place_object(ball.light, {Vec3(0, 0.1f, 0), Mat3(1.0f), 1});
+  const std::vector<const PlacedObject*> objects{&around};
+  const std::vector<Vec3> light = uneven_light(4);
+  Relit relit;
+  relight(*transfer, light, relit);
+  const float before = relit.at(0).x;
+  const MovingLight lights[] = {{light, false, &relit}};
+  const MovingReceivers moving = moving_receivers(*transfer, receivers.origins, receivers.normals);
+  MovingShader().shade(moving, objects, {.light_order = 4}, lights);
+  for (size_t r = 0; r < receivers.count(); ++r) EXPECT_NEAR(relit.at(r).x / before, 0, 0.01f);
+}
+
+TEST(Moving, TurnedReceiversAreThoseBakedTurned) {
+  // A bent sheet's own transfer, turned with it: light turned the other way gives the same.
+  Scene box;
+  add_box(box, add_material(box, "box", Vec3(0.5f)), "box", Vec3(-1, -1, -1), Vec3(1, 1, 1), 2, true);
+  box.triangles.resize(box.triangles.size() * 5 / 6);
+  auto tracer = Tracer::build(box);
+  const Receivers receivers = make_vertex_receivers(box);
+  auto transfer = bake(box, *tracer, receivers, {.order = 4, .samples = 256, .precision = Precision::single});
+  ASSERT_TRUE(transfer);
+  const RigidPlace place{Vec3(5, 1, 2), rotation_from_yaw_pitch_roll({25, -40, 70}), 1.5f};
+  const MovingReceivers turned = moving_receivers(*transfer, receivers.origins, receivers.normals, Vec3(0.0f), place);
+  const std::vector<Vec3> light = uneven_light(4);
+  Relit ours, truth;
+  light_receivers(turned, 4, {light, false, &ours});
+  relight(*transfer, rotate_sh(make_sh_rotation(4, transpose(place.rotation)), light), truth);
+  for (size_t r = 0; r < receivers.count(); ++r) EXPECT_LT(length(ours.at(r) - truth.at(r)), 1e-4f);
+}
+
+}  // namespace
+}  // namespace lambent
