@@ -96,7 +96,7 @@ Result<Certificate> measure(const Baked& baked, const Tracer& tracer, const Aske
   // What surfaces send, of a bounce less, from rays of its own.
   AlignedVector<float> met;
   if (asked.bounces > 0) {
-    BakeOptions options{.order = t.light.order, .samples = 128, .bounces = asked.bounces - 1, .seed = 0x7e58};
+    BakeOptions options{.order = t.light.order, .samples = 512, .bounces = asked.bounces - 1, .seed = 0x7e58};
     options.precision = Precision::single, options.certify = false;
     auto sent = bake(scene, tracer, own, options, nullptr, progress);
     if (!sent) return sent.error();
