@@ -32,6 +32,7 @@ std::optional<Scene> data_scene(const std::string& name, bool ground);
 
 void bench_bake();
 void bench_basis();
+void bench_certificate();
 void bench_error();
 void bench_lightmaps();
 void bench_load();

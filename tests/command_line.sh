@@ -7,6 +7,8 @@ expect 0 'receivers' bake corner.obj --max-edge 0.2 --samples 256 -o corner.glb
 expect 0 '"error"' bake corner.obj --max-edge 0.2 --samples 256 --json -o corner.glb
 expect 0 '"order": 6' inspect corner.glb --json
 expect 0 'vertices' inspect corner.obj
+expect 0 '"scale"' inspect corner.glb --view-error view_error.png --camera 3,2,4,1,0.5,1,40 --size 64x48 --json
+expect 2 'needs a baked file' inspect corner.obj --view-error view_error.png
 expect 0 'relit' render corner.glb --env uniform:1,0.5,0.25 --camera 3,2,4,1,0.5,1,40 --size 48x32 --spp 256 -o a.exr \
   --background none
 expect 0 'paths' reference corner.obj --max-edge 0.2 --env uniform:1,0.5,0.25 --light-order 6 \

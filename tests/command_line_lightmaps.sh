@@ -38,6 +38,14 @@ expect 0 'paths' reference box.obj --lamps --env uniform:0.3,0.4,0.6 --bounces 2
 alike 35 "lightmapped and path-traced boxes" map_lit.exr map_truth.exr
 expect 0 'relit' render map.glb $view --lamp lamp=0.1,0.2,0 --lamp sky=0,0,1 -o dimmed.exr
 for part in radiosity albedo product; do expect 0 'relit' render map.glb $view --show $part -o map_$part.png; done
+# Without --samples, to an error: as fine and with as many rays as light asks for.
+expect 0 'error +[0-9.]+% RMS' bake box.obj --transfer lightmap --sky uniform:0.3,0.4,0.6 --bounces 2 \
+  --quality preview -o by_error.glb
+expect 0 'relit' render by_error.glb $view --spp 256 -o by_error.exr
+alike 35 "a box baked to an error and path-traced" by_error.exr map_truth.exr
+expect 2 'says how many rays' bake box.obj --transfer lightmap --samples 64 --error 2% -o x.glb
+expect 2 'leave --samples, --order' bake box.obj --transfer lightmap --order 3 --error 2% -o x.glb
+expect 2 'not measured of hemicubes' bake box.obj --transfer lightmap --gather hemicube --error 2% -o x.glb
 cmp -s map_radiosity.png map_product.png && bad "radiosity and product are the same picture" || ok
 expect 2 'product' render map.glb $view --show colour -o x.png
 expect 0 'lamps' bake box.obj --transfer lightmap --gather hemicube --atlas 64x64 --samples 300 -o cube.glb

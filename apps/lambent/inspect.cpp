@@ -4,6 +4,8 @@
 #include <lambent/baked/baked_file.h>
 #include <lambent/core/file.h>
 #include <lambent/pipeline/describe.h>
+#include <lambent/pipeline/parse.h>
+#include <lambent/pipeline/view_error.h>
 #include <lambent/receivers/receivers.h>
 #include <lambent/scene/load.h>
 #include <lambent/transfer/zonal_texture.h>
@@ -130,7 +132,42 @@ int inspect_baked(Context& context, const std::string& path) {
   return success;
 }
 
-int run_inspect(Context& context, const std::string& path) {
+struct InspectCommand {
+  std::string path, view_error, camera = "auto", size = "512x512";
+};
+
+int paint_error(Context& context, const InspectCommand& o) {
+  if (auto ok = check_output(o.view_error, {"png"}); !ok) return fail(Error{"--view-error", ok.error().message, true});
+  if (!is_baked(o.path)) return fail(Error{"--view-error", "needs a baked file, and " + o.path + " is none", true});
+  auto baked = load_baked(o.path);
+  if (!baked) return fail(baked.error());
+  auto view = view_error(*baked, o.camera, o.size, {&context.progress, [](const std::string& text) { warn(text); }});
+  if (!view) return fail(view.error());
+  if (auto ok = save_image(o.view_error, view->image); !ok) return fail(ok.error());
+  const Certificate& c = view->certificate;
+  nlohmann::json parts = nlohmann::json::object();
+  for (size_t p = 0; p < c.parts.size(); ++p)
+    if (c.parts[p] >= 0) parts[baked->scene.parts[p].name] = c.parts[p];
+  if (context.json) {
+    print_json({{"file", o.path},
+                {"picture", o.view_error},
+                {"error", c.error},
+                {"uncertain", c.uncertain},
+                {"places", c.places},
+                {"scale", view->scale},
+                {"parts", parts}});
+    return success;
+  }
+  fmt::print("{}\n  error {:.2f}% RMS (within {:.2f}), measured anew at {} places; of its own light, by part:\n",
+             o.path, 100 * c.error, 200 * c.uncertain, human_count(c.places));
+  for (const auto& [name, error] : parts.items()) fmt::print("    {:5.1f}%  {}\n", 100 * error.get<double>(), name);
+  fmt::print("  {}: from 0 (black) to {:.3g}% (white) of all light's RMS\n", o.view_error, 100 * view->scale);
+  return success;
+}
+
+int run_inspect(Context& context, const InspectCommand& o) {
+  const std::string& path = o.path;
+  if (!o.view_error.empty()) return paint_error(context, o);
   const std::string extension = file_extension(path);
   if (extension == "lpt") return inspect_texture(context, path);
   if (std::set<std::string>{"hdr", "exr", "png", "jpg", "jpeg"}.contains(extension))
@@ -153,11 +190,15 @@ int run_inspect(Context& context, const std::string& path) {
 }  // namespace
 
 void add_inspect(CLI::App& app, Run& run) {
-  auto path = std::make_shared<std::string>();
+  auto o = std::make_shared<InspectCommand>();
   CLI::App* c = app.add_subcommand(
       "inspect", "Say what is in a scene, a baked file, a transfer texture, an environment or a picture");
-  c->add_option("file", *path, "File")->required();
-  c->callback([path, &run] { run = [path](Context& context) { return run_inspect(context, *path); }; });
+  c->add_option("file", o->path, "File")->required();
+  auto* paint = c->add_option("--view-error", o->view_error,
+                              "Picture (.png) to paint of a diffuse bake's error, measured anew, with its scale");
+  c->add_option("--camera", o->camera, "Of --view-error: EYE,TARGET,FOV or auto")->needs(paint);
+  c->add_option("--size", o->size, "Of --view-error: WIDTHxHEIGHT in pixels")->needs(paint);
+  c->callback([o, &run] { run = [o](Context& context) { return run_inspect(context, *o); }; });
 }
 
 }  // namespace lambent::tool

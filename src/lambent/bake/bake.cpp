@@ -1,6 +1,7 @@
 // Follows: general-prt. T0 holds direct light with shadows; X_{k+1} = T0 + B X_k sums the Neumann series term by term,
 // so X_k is the transfer of up to k bounces. It is also the radiosity equation's Jacobi step.
 #include <lambent/bake/bake.h>
+#include <lambent/bake/certify_field.h>
 #include <lambent/bake/columns.h>
 #include <lambent/bake/denoise.h>
 #include <lambent/bake/lobes.h>
@@ -219,7 +220,12 @@ struct Baker {
       if (auto ok = measure_noise(solved.x, buried, terms, gather); !ok) return ok.error();
     if (options.certify) {
       const auto start = std::chrono::steady_clock::now();
-      auto certificate = certify(scene, receivers, solved.x.data(), width(), gather, certified_places, seed, progress);
+      const FieldRow field = [&](uint32_t r, float* row) {
+        std::copy_n(solved.x.data() + size_t(r) * width(), width(), row);
+      };
+      const ReflectedErrors reflected{*other, solved.met.empty() ? 0 : options.bounces};
+      auto certificate =
+          certify_field(scene, receivers, field, width(), gather, certified_places, seed, progress, &reflected);
       if (!certificate) return certificate.error();
       report.certificate = std::move(*certificate), report.error = report.certificate.error;
       // As much less by denoising as at the receivers, but no less than a mean of neighbours can have.

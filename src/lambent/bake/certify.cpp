@@ -1,4 +1,4 @@
-#include <lambent/bake/certify.h>
+#include <lambent/bake/certify_field.h>
 #include <lambent/core/aligned.h>
 #include <lambent/core/random.h>
 #include <lambent/core/ranks.h>
@@ -16,6 +16,7 @@ struct ErrorPlace {
   uint32_t triangle;
   float u, v;
   bool front;
+  double weight;  // its share of the area over its share of the places
 };
 
 bool receives(const Receivers& receivers, uint32_t triangle, bool front) {
@@ -27,46 +28,114 @@ double area_of(const Scene& scene, const Triangle& t) {
   return 0.5 * length(cross(b - a, c - a));
 }
 
-// One place in each of `count` equal shares of the area, in the order of triangles.
-std::vector<ErrorPlace> draw_places(const Scene& scene, const Receivers& receivers, size_t count, uint32_t seed) {
-  double total = 0;
-  auto each_side = [&](auto f) {
-    for (uint32_t t = 0; t < scene.triangles.size(); ++t)
-      for (const bool front : {true, false})
-        if (receives(receivers, t, front)) f(t, front, area_of(scene, scene.triangles[t]));
-  };
-  each_side([&](uint32_t, bool, double area) { total += area; });
-  std::vector<ErrorPlace> places;
-  if (!(total > 0)) return places;
-  Random random(seed, 0xce47);
-  double passed = 0, next = total / double(count) * double(random.next());
-  each_side([&](uint32_t t, bool front, double area) {
-    for (passed += area; next < passed && places.size() < count;) {
-      const Vec2 r = random.next2();
-      const float root = std::sqrt(r.x);
-      places.push_back({t, root * (1 - r.y), root * r.y, front});
-      next = total / double(count) * (double(places.size()) + double(random.next()));
+void look_up(const Receivers& receivers, const FieldRow& field, uint32_t triangle, bool front, float u, float v,
+             AlignedVector<float>& row, AlignedVector<float>& sum) {
+  std::fill(sum.begin(), sum.end(), 0.0f);
+  std::visit(
+      [&](const auto& basis) {
+        basis.spread(*basis.find(triangle, front), u, v, [&](uint32_t receiver, float w) {
+          field(receiver, row.data());
+          for (size_t k = 0; k < sum.size(); ++k) sum[k] += w * row[k];
+        });
+      },
+      receivers.basis);
+}
+
+// A side that receives.
+struct Side {
+  uint32_t triangle;
+  bool front;
+  double area, varies;  // how much the field differs over it, squared
+};
+std::vector<Side> find_sides(const Scene& scene, const Receivers& receivers, const FieldRow& field, size_t width) {
+  std::vector<Side> sides;
+  for (uint32_t t = 0; t < scene.triangles.size(); ++t)
+    for (const bool front : {true, false})
+      if (receives(receivers, t, front)) sides.push_back({t, front, area_of(scene, scene.triangles[t]), 0});
+  const Shares shares(sides.size(), 64);
+  shares.for_own([&](size_t begin, size_t end) {
+    AlignedVector<float> corner[3], row(width);
+    for (auto& c : corner) c.resize(width);
+    for (size_t i = begin; i < end; ++i) {
+      Side& side = sides[i];
+      for (int c = 0; c < 3; ++c) look_up(receivers, field, side.triangle, side.front, c == 1, c == 2, row, corner[c]);
+      for (size_t k = 0; k < width; ++k)
+        for (int c = 0; c < 3; ++c) {
+          const double d = double(corner[c][k]) - double(corner[(c + 1) % 3][k]);
+          side.varies += d * d;
+        }
     }
   });
+  shares.gather(sides.data());
+  return sides;
+}
+
+// One place in each of `count` equal shares, in the order of triangles: half of them by area alone, half by how much
+// the field differs over a triangle as well. Errors gather where it does, in few places, which area alone seldom meets.
+std::vector<ErrorPlace> draw_places(const Scene& scene, const Receivers& receivers, const FieldRow& field, size_t width,
+                                    size_t count, uint32_t seed) {
+  std::vector<Side> sides = find_sides(scene, receivers, field, width);
+  double area = 0, varies = 0;
+  for (const Side& s : sides) area += s.area, varies += s.area * s.varies;
+  std::vector<ErrorPlace> places;
+  if (!(area > 0)) return places;
+  auto density = [&](const Side& s) { return varies > 0 ? 0.5 + 0.5 * s.varies * area / varies : 1.0; };
+  Random random(seed, 0xce47);
+  double passed = 0, next = area / double(count) * double(random.next());
+  for (const Side& s : sides)
+    for (passed += s.area * density(s); next < passed && places.size() < count;) {
+      const Vec2 r = random.next2();
+      const float root = std::sqrt(r.x);
+      places.push_back({s.triangle, root * (1 - r.y), root * r.y, s.front, 1 / density(s)});
+      next = area / double(count) * (double(places.size()) + double(random.next()));
+    }
   return places;
 }
 
 struct PlaceError {
   double error2 = 0, truth2 = 0, noise2 = 0;
   bool counts = false;
+  Vec3 at{0}, normal{0};
 };
+
+// The squared errors at all places, from two residuals at each.
+Result<void> measure_errors(const std::vector<ErrorPlace>& places, const ReflectedErrors* reflected, size_t width,
+                            uint32_t seed, std::vector<float> (&residuals)[2], std::vector<PlaceError>& measured,
+                            Progress* progress) {
+  std::vector<size_t> counting;
+  ResidualPlaces at;
+  for (size_t i = 0; i < places.size(); ++i) {
+    if (!measured[i].counts) continue;
+    for (auto& rows : residuals) std::copy_n(rows.data() + i * width, width, rows.data() + counting.size() * width);
+    counting.push_back(i);
+    at.at.push_back(measured[i].at), at.normal.push_back(measured[i].normal), at.weight.push_back(places[i].weight);
+  }
+  for (uint32_t k = 0; k < 2 && reflected; ++k) {
+    auto ok =
+        add_reflected_errors(*reflected, at, uint32_t(hash64(seed, 0x2ef1 + k)), width, residuals[k].data(), progress);
+    if (!ok) return ok;
+  }
+  for (size_t j = 0; j < counting.size(); ++j)
+    for (size_t k = 0; k < width; ++k)
+      measured[counting[j]].error2 += double(residuals[0][j * width + k]) * double(residuals[1][j * width + k]);
+  return {};
+}
 
 }  // namespace
 
-Result<Certificate> certify(const Scene& scene, const Receivers& receivers, const float* rows, size_t width,
-                            const GatherAt& gather, size_t count, uint32_t seed, Progress* progress) {
-  const std::vector<ErrorPlace> places = draw_places(scene, receivers, count, seed);
+Result<Certificate> certify_field(const Scene& scene, const Receivers& receivers, const FieldRow& field, size_t width,
+                                  const GatherAt& gather, size_t count, uint32_t seed, Progress* progress,
+                                  const ReflectedErrors* reflected, const FieldRow* again,
+                                  std::vector<MeasuredPlace>* kept) {
+  const std::vector<ErrorPlace> places = draw_places(scene, receivers, field, width, count, seed);
   const float diagonal = bounds(scene).diagonal();
   std::vector<PlaceError> measured(places.size());
+  std::vector<float> residuals[2];  // [place][width]
+  for (auto& rows : residuals) rows.resize(places.size() * width);
   const Shares shares(places.size(), piece);
   ProgressStage stage(progress, "measuring the error", shares.own());
   shares.for_own([&](size_t begin, size_t end) {
-    AlignedVector<float> a(width), b(width), s(width);
+    AlignedVector<float> a(width), b(width), s(width), s2(width), row(width);
     for (size_t i = begin; i < end && !stage.cancelled(); ++i) {
       const ErrorPlace& at = places[i];
       const Triangle& t = scene.triangles[at.triangle];
@@ -81,18 +150,13 @@ Result<Certificate> certify(const Scene& scene, const Receivers& receivers, cons
       const Vec3 origin = p + face * receiver_lift(p, float(std::sqrt(area_of(scene, t))), diagonal);
       if (!gather(origin, n, hash64(seed, 2 * i), a.data()) || !gather(origin, n, hash64(seed, 2 * i + 1), b.data()))
         continue;
-      std::fill(s.begin(), s.end(), 0.0f);
-      std::visit(
-          [&](const auto& basis) {
-            basis.spread(*basis.find(at.triangle, at.front), at.u, at.v, [&](uint32_t receiver, float w) {
-              for (size_t k = 0; k < width; ++k) s[k] += w * rows[size_t(receiver) * width + k];
-            });
-          },
-          receivers.basis);
+      look_up(receivers, field, at.triangle, at.front, at.u, at.v, row, s);
+      if (again) look_up(receivers, *again, at.triangle, at.front, at.u, at.v, row, s2);
+      const AlignedVector<float>& other = again ? s2 : s;
       PlaceError& m = measured[i];
-      m.counts = true;
+      m.counts = true, m.at = origin, m.normal = n;
       for (size_t k = 0; k < width; ++k) {
-        m.error2 += double(a[k] - s[k]) * double(b[k] - s[k]);
+        residuals[0][i * width + k] = a[k] - s[k], residuals[1][i * width + k] = b[k] - other[k];
         m.truth2 += double(a[k]) * double(b[k]);
         m.noise2 += 0.5 * double(a[k] - b[k]) * double(a[k] - b[k]);
       }
@@ -101,8 +165,11 @@ Result<Certificate> certify(const Scene& scene, const Receivers& receivers, cons
   });
   if (!none_cancelled(progress)) return Error{"", "cancelled"};
   shares.gather(measured.data());
+  for (auto& rows : residuals) shares.gather(rows.data(), width);
+  if (auto ok = measure_errors(places, reflected, width, seed, residuals, measured, progress); !ok) return ok.error();
 
   Certificate c;
+  if (kept) kept->clear();
   double error2 = 0, truth2 = 0, noise2 = 0;
   std::vector<PlaceError> parts(scene.parts.size());
   std::vector<size_t> counts(scene.parts.size(), 0);
@@ -110,8 +177,11 @@ Result<Certificate> certify(const Scene& scene, const Receivers& receivers, cons
     if (!measured[i].counts) continue;
     const uint32_t part = scene.triangles[places[i].triangle].part;
     ++c.places, ++counts[part];
-    error2 += measured[i].error2, truth2 += measured[i].truth2, noise2 += measured[i].noise2;
-    parts[part].error2 += measured[i].error2, parts[part].truth2 += measured[i].truth2;
+    const PlaceError& m = measured[i];
+    const double w = places[i].weight;
+    if (kept) kept->push_back({m.at, m.normal, m.error2, m.truth2, w});
+    error2 += w * m.error2, truth2 += w * m.truth2, noise2 += w * m.noise2;
+    parts[part].error2 += w * m.error2, parts[part].truth2 += w * m.truth2;
   }
   for (size_t p = 0; p < parts.size(); ++p)
     c.parts.push_back(counts[p] < fewest_of_part || !(parts[p].truth2 > 0)
@@ -120,10 +190,19 @@ Result<Certificate> certify(const Scene& scene, const Receivers& receivers, cons
   if (c.places < fewest_of_part || !(truth2 > 0)) return c;
   c.error = std::sqrt(std::max(0.0, error2) / truth2), c.noise = std::sqrt(noise2 / truth2);
   double spread = 0;
-  for (const PlaceError& m : measured)
-    if (m.counts) spread += (m.error2 - error2 / double(c.places)) * (m.error2 - error2 / double(c.places));
+  for (size_t i = 0; i < places.size(); ++i) {
+    if (!measured[i].counts) continue;
+    const double off = places[i].weight * (measured[i].error2 - error2 / truth2 * measured[i].truth2);
+    spread += off * off;
+  }
   c.uncertain = std::sqrt(spread) / truth2 / std::max(2 * c.error, 1e-12);
   return c;
+}
+
+Result<Certificate> certify(const Scene& scene, const Receivers& receivers, const float* rows, size_t width,
+                            const GatherAt& gather, size_t places, uint32_t seed, Progress* progress) {
+  const FieldRow field = [&](uint32_t r, float* row) { std::copy_n(rows + size_t(r) * width, width, row); };
+  return certify_field(scene, receivers, field, width, gather, places, seed, progress);
 }
 
 }  // namespace lambent

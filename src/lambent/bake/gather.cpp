@@ -202,6 +202,40 @@ void prefetch_places(const CornerReceivers& basis, const Hit& h, const BlockBuil
   for (uint32_t receiver : at->receiver) rows.prefetch(receiver);
 }
 
+// What lamps send to one receiver, by samples towards them and by what the fan's rays meet.
+struct LampSum {
+  const GatherSetup& setup;
+  const GatherDirect* direct;  // null: nothing
+  float* row;
+  Vec3 normal;
+  size_t rays = size_t(setup.sets.samples);
+
+  void add(const LampLight& light, float share) {
+    for (int c = 0; c < 3; ++c) row[size_t(light.group) * 3 + size_t(c)] += share * light.value[c];
+  }
+  void sample(std::vector<LampLight>& lights, Vec3 origin, size_t key) {
+    if (!direct) return;
+    lights.clear();
+    sample_lamps(setup.scene, setup.tracer, direct->lamps, origin, normal, direct->samples, rays, setup.seed, key,
+                 lights, setup.progress);
+    for (const LampLight& light : lights) add(light, 1);
+  }
+  void meet(const Hit& h, Vec3 direction, Vec3 open, Vec3 passed, float share) {
+    const Lamps& lamps = direct->lamps;
+    if (lamps.sky && open != Vec3(0)) {
+      LampLight light = met_sky(lamps, direction, dot(normal, direction), direct->samples, rays);
+      light.value *= open;
+      add(light, share);
+    }
+    if (h.triangle == none || lamps.of_triangle.empty()) return;
+    const uint32_t lamp = lamps.of_triangle[h.triangle];
+    if (lamp == none || !emits(setup.scene, setup.scene.triangles[h.triangle], h.front)) return;
+    LampLight light = met_lamp(setup.scene, lamps, lamp, h, direction, dot(normal, direction), direct->samples, rays);
+    light.value *= passed;
+    add(light, share);
+  }
+};
+
 template <class Basis>
 void trace_gather_on(const GatherSetup& setup, const Basis& basis, GatherScratch& scratch, size_t first, size_t count,
                      GatherBlock* block, const GatherSky* sky, const GatherDirect* direct) {
@@ -222,17 +256,8 @@ void trace_gather_on(const GatherSetup& setup, const Basis& basis, GatherScratch
     size_t backs = 0;
     const Vec3 normal = setup.receivers.normals[r];
     auto direction = [&](size_t j) { return Vec3(fan.x[j], fan.y[j], fan.z[j]); };
-    auto add_light = [&](const LampLight& light, float share) {
-      float* row = direct->rows + i * direct->width + size_t(light.group) * 3;
-      for (int c = 0; c < 3; ++c) row[c] += share * light.value[c];
-    };
-    if (direct) {
-      scratch.lights.clear();
-      sample_lamps(setup.scene, setup.tracer, direct->lamps, setup.receivers.origins[r], normal, direct->samples, rays,
-                   setup.seed, r, scratch.lights, setup.progress);
-      for (const LampLight& light : scratch.lights) add_light(light, 1);
-    }
-    const bool sees_sky = direct && direct->lamps.sky, sees_lamps = direct && !direct->lamps.of_triangle.empty();
+    LampSum lamps{setup, direct, direct ? direct->rows + i * direct->width : nullptr, normal};
+    lamps.sample(scratch.lights, setup.receivers.origins[r], r);
     for (size_t j = 0; j < rays; ++j) {
       if (ends_fan(j, setup.progress)) break;
       if (j + lookahead < rays) basis.prefetch(hits[j + lookahead].triangle, hits[j + lookahead].front);
@@ -241,21 +266,8 @@ void trace_gather_on(const GatherSetup& setup, const Basis& basis, GatherScratch
       const float share = sets.weights.empty() ? 1.0f : sets.weights[j];
       const Vec3 open = passes ? passages[j].sky : Vec3(h.triangle == none ? 1.0f : 0.0f);
       for (size_t c = 0; c < fan.visible.size(); ++c) fan.visible[c][j] = share * open[int(c)];
-      if (sees_sky && open != Vec3(0)) {
-        LampLight light = met_sky(direct->lamps, direction(j), dot(normal, direction(j)), direct->samples, rays);
-        light.value *= open;
-        add_light(light, share);
-      }
+      if (direct) lamps.meet(h, direction(j), open, passes ? passages[j].hit : Vec3(1), share);
       if (h.triangle == none) continue;
-      if (sees_lamps) {
-        const uint32_t lamp = direct->lamps.of_triangle[h.triangle];
-        if (lamp != none && emits(setup.scene, setup.scene.triangles[h.triangle], h.front)) {
-          LampLight light = met_lamp(setup.scene, direct->lamps, lamp, h, direction(j), dot(normal, direction(j)),
-                                     direct->samples, rays);
-          if (passes) light.value *= passages[j].hit;
-          add_light(light, share);
-        }
-      }
       const auto* at = basis.find(h.triangle, h.front);
       if (!at) {
         backs += !setup.tracer.lets_pass(h.triangle);
@@ -294,7 +306,7 @@ void trace_gather(const GatherSetup& setup, GatherScratch& scratch, size_t first
 }
 
 bool gather_point(const GatherSetup& setup, GatherScratch& scratch, Vec3 origin, Vec3 normal, uint64_t key,
-                  const GatherSky& sky, const float* x, size_t width, float* reflected) {
+                  const GatherSky& sky, const float* x, size_t width, float* reflected, const GatherDirect* direct) {
   const size_t rays = size_t(setup.sets.samples), channels = size_t(setup.channels);
   Fan& fan = scratch.fan;
   const bool passes = !scratch.passages.empty();
@@ -302,12 +314,16 @@ bool gather_point(const GatherSetup& setup, GatherScratch& scratch, Vec3 origin,
   trace_hits(setup.tracer, origin, directions, scratch.hits.data(), scratch.passages, setup.progress);
   std::fill_n(reflected, width, 0.0f);
   size_t backs = 0;
+  LampSum lamps{setup, direct, direct ? direct->rows : nullptr, normal};
+  lamps.sample(scratch.lights, origin, size_t(key));
   std::visit(
       [&](const auto& basis) {
         for (size_t j = 0; j < rays; ++j) {
           const Hit& h = scratch.hits[j];
           const Vec3 open = passes ? scratch.passages[j].sky : Vec3(h.triangle == none ? 1.0f : 0.0f);
           for (size_t c = 0; c < fan.visible.size(); ++c) fan.visible[c][j] = open[int(c)];
+          if (direct)
+            lamps.meet(h, Vec3(fan.x[j], fan.y[j], fan.z[j]), open, passes ? scratch.passages[j].hit : Vec3(1), 1);
           if (h.triangle == none) continue;
           const auto* at = basis.find(h.triangle, h.front);
           if (!at) backs += !setup.tracer.lets_pass(h.triangle);

@@ -112,10 +112,11 @@ void trace_sky(const GatherSetup& setup, GatherScratch& scratch, size_t first, s
 
 // One gather from anywhere, as a receiver there would do it: `row` as GatherSky::rows (stride: that of all sky
 // channels), and in `reflected` ([column][channel], `width` floats) what the surfaces that it meets send back of the
-// solution x; both set. x null: no surface sends anything. `key` chooses the fan. False: the place lies inside
-// something.
+// solution x; both set. x null: no surface sends anything. `key` chooses the fan. `direct`, where not null, has one
+// row, to which the lamps' light is added. False: the place lies inside something.
 bool gather_point(const GatherSetup& setup, GatherScratch& scratch, Vec3 origin, Vec3 normal, uint64_t key,
-                  const GatherSky& sky, const float* x, size_t width, float* reflected);
+                  const GatherSky& sky, const float* x, size_t width, float* reflected,
+                  const GatherDirect* direct = nullptr);
 
 // Whether a receiver lies inside something: most rays of a fan that no seed changes meet backs of one-sided surfaces.
 bool is_buried(const Tracer& tracer, const Receivers& receivers, size_t receiver);

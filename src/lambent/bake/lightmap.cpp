@@ -2,6 +2,7 @@
 #include <lambent/bake/columns.h>
 #include <lambent/bake/kernels.h>
 #include <lambent/bake/lightmap.h>
+#include <lambent/bake/lightmap_error.h>
 #include <lambent/core/parallel.h>
 #include <lambent/receivers/seams.h>
 
@@ -86,8 +87,59 @@ Result<AlignedVector<float>> directional_rows_of(const GatherSetup& setup, const
   return wide;
 }
 
+// Solutions as they are kept, seams closed.
+struct Storing {
+  const Scene& scene;
+  const Receivers& receivers;
+  LightBasis light;
+  size_t width;
+  Precision precision;  // all light decides, and its parts follow
+  LightmapReport& report;
+  Progress* progress;
+
+  Result<Transfer> stored(AlignedVector<float>& values, size_t rows, bool is_all) {
+    if (const auto* texels = std::get_if<TexelReceivers>(&receivers.basis))
+      smooth_seams(scene, *texels, values.data(), rows * width, rows == 1 ? 3 * light.count() : rows * width, 0.95f,
+                   0.05f, progress);
+    if (is_cancelled(progress)) return Error{"", "cancelled"};
+    const float value = precision == Precision::half ? beyond_half(light, values, width) : 0;
+    if (value > half_max || (is_all && value > 0)) precision = Precision::single, report.beyond_half = value;
+    return store_columns(light, values.data(), rows, 3, receivers.count(), width, precision);
+  }
+  Result<void> add_term(AlignedVector<float>& values, Lightmap& map) {
+    auto transfer = stored(values, 1, false);
+    if (!transfer) return transfer.error();
+    map.terms.push_back(std::move(*transfer));
+    return {};
+  }
+  // Seams are closed in place: nothing is to start from these values afterwards.
+  Result<void> add_direct(AlignedVector<float>& values, Lightmap& map) {
+    auto transfer = stored(values, 1, false);
+    if (!transfer) return transfer.error();
+    map.direct = std::move(*transfer);
+    return {};
+  }
+};
+
 double seconds_since(std::chrono::steady_clock::time_point start) {
   return std::chrono::duration<double>(std::chrono::steady_clock::now() - start).count();
+}
+
+Result<Lightmap> bake_to_error(const Scene& scene, const Tracer& tracer, const Receivers& receivers, const Lamps& lamps,
+                               const LightmapOptions& o, bool direct_apart, LightmapReport& r, Progress* progress) {
+  auto solved = solve_lightmap_to_error(scene, tracer, receivers, lamps, o, r, progress);
+  if (!solved) return solved.error();
+  Storing storing{scene, receivers, {.order = 0, .groups = lamps.names}, pad_lanes(3 * lamps.groups()), o.precision,
+                  r,     progress};
+  auto all = storing.stored(solved->all, 1, true);
+  if (!all) return all.error();
+  Lightmap map{std::move(*all), std::nullopt, {}};
+  for (AlignedVector<float>& term : solved->terms)
+    if (auto ok = storing.add_term(term, map); !ok) return ok.error();
+  if (direct_apart)
+    if (auto ok = storing.add_direct(solved->direct, map); !ok) return ok.error();
+  r.receivers = receivers.count();
+  return map;
 }
 
 }  // namespace
@@ -103,6 +155,10 @@ Result<void> check_lightmap(const Scene& scene, const Lamps& lamps, const Lightm
   if (!(o.converge >= 0 && o.converge < 1)) return Error{"converge", "must lie between 0 and 1"};
   if (o.directional != DirectionalKind::none && o.order > 0)
     return Error{"directional", "lightmaps hold lamps alone: leave the order out"};
+  if (!(o.error >= 0 && o.error <= 1))
+    return Error{"error", "must lie between 0 and 1, not " + std::to_string(o.error)};
+  if (o.error > 0 && (o.order > 0 || o.directional != DirectionalKind::none || o.gather != GatherKind::rays))
+    return Error{"error", "is of lamps alone, without directions and by rays"};
   if (o.keep_terms && (o.converge > 0 || o.directional != DirectionalKind::none))
     return Error{"terms", "are kept of counted bounces, and not of directional lightmaps"};
   for (const AreaLamp& lamp : lamps.area)
@@ -139,6 +195,7 @@ Result<Lightmap> bake_lightmap(const Scene& scene, const Tracer& tracer, const R
   LightmapReport unwanted;
   LightmapReport& r = report ? *report : unwanted;
   r = {};
+  if (o.error > 0) return bake_to_error(scene, tracer, receivers, lamps, o, direct_apart, r, progress);
   const size_t n = receivers.count(), harmonics = size_t(sh_count(o.order)),
                width = pad_lanes(3 * (harmonics + lamps.groups()));
   const int order = std::max(o.order, 1);
@@ -172,35 +229,22 @@ Result<Lightmap> bake_lightmap(const Scene& scene, const Tracer& tracer, const R
   }
   r.bounce_seconds = seconds_since(start);
 
-  Precision precision = o.precision;  // all light decides, and its parts follow
-  auto stored = [&](AlignedVector<float>& values, size_t rows_each, bool is_all) -> Result<Transfer> {
-    if (!is_all) op->shares().gather(values.data(), width);
-    if (const auto* texels = std::get_if<TexelReceivers>(&receivers.basis))
-      smooth_seams(scene, *texels, values.data(), rows_each * width,
-                   rows_each == 1 ? 3 * light.count() : rows_each * width, 0.95f, 0.05f, progress);
-    if (is_cancelled(progress)) return Error{"", "cancelled"};
-    const float value = precision == Precision::half ? beyond_half(light, values, width) : 0;
-    if (value > half_max || (is_all && value > 0)) precision = Precision::single, r.beyond_half = value;
-    return store_columns(light, values.data(), rows_each, 3, n, width, precision);
-  };
-  auto all = stored(*x, rows, true);
+  Storing storing{scene, receivers, light, width, o.precision, r, progress};
+  auto all = storing.stored(*x, rows, true);
   if (!all) return all.error();
   Lightmap map{std::move(*all), std::nullopt, {}};
   if (o.keep_terms) {
     *x = {};
     auto take = [&](int, AlignedVector<float> term) -> Result<void> {
-      auto transfer = stored(term, 1, false);
-      if (!transfer) return transfer.error();
-      map.terms.push_back(std::move(*transfer));
-      return {};
+      op->shares().gather(term.data(), width);
+      return storing.add_term(term, map);
     };
     if (auto ok = bounce_terms(*op, source_of(e.data(), width), width, o.bounces, progress, take); !ok)
       return ok.error();
   }
   if (direct_apart) {
-    auto direct_light = stored(e, 1, false);
-    if (!direct_light) return direct_light.error();
-    map.direct = std::move(*direct_light);
+    op->shares().gather(e.data(), width);
+    if (auto ok = storing.add_direct(e, map); !ok) return ok.error();
   }
   r.receivers = n, r.buried = op->report().buried, r.rays = op->report().rays;
   r.operator_bytes = op->report().bytes, r.operator_file_bytes = op->report().file_bytes;

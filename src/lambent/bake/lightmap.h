@@ -2,6 +2,7 @@
 // Scene and lamps -> Transfer: radiosity. The columns are groups of the scene's own lamps, and, where wanted, harmonics
 // of a distant light (a PRT lightmap); the operator and the rays are those of bake.h. Relit with coefficient 1 a group,
 // it is exit radiance of white receivers, irradiance / pi; other coefficients dim and tint the groups.
+#include <lambent/bake/certify.h>
 #include <lambent/bake/directional.h>
 #include <lambent/bake/operator.h>
 #include <lambent/bake/solve.h>
@@ -27,6 +28,12 @@ struct LightmapOptions {
   uint32_t seed = 1;
   Precision precision = Precision::half;
   bool keep_terms = false;  // Lightmap::terms; of counted bounces of lightmaps that are not directional
+  // Where > 0, bake to this relative RMS error (Certificate::error): direct light and bounces have receivers and rays
+  // of their own, as many as that asks for (thin.h), `lamp_samples` to begin with and none of `samples`. Of lamps
+  // alone, without `directional`, by rays. No more are asked for where they would end after so many seconds; negative:
+  // no limit.
+  double error = 0, seconds = -1;
+  bool denoise = true;  // then: takes away noise that neighbours do not share (denoise.h)
 };
 
 struct Lightmap {
@@ -44,6 +51,13 @@ struct LightmapReport {
   // halves do not hold; else 0.
   float beyond_half = 0;
   size_t operator_file_bytes = 0;  // as BakeReport's
+  // Of a bake to an error: what was reached; of its noise, direct light's and that of bounces, relative to all light;
+  // receivers that were traced for each, and rays of each.
+  Certificate certificate;
+  double direct_noise = -1, bounced_noise = -1;
+  size_t direct_traced = 0, bounced_traced = 0;
+  int direct_samples = 0, samples = 0;
+  double certify_seconds = 0;
 };
 
 // Least working memory with which such a bake can run: the solution vectors. What is more holds the operator.

@@ -7,6 +7,7 @@
 #include <lambent/bake/materials.h>
 #include <lambent/bake/matrix.h>
 #include <lambent/bake/rooms.h>
+#include <lambent/bake/thin.h>
 #include <lambent/bake/visibility.h>
 #include <lambent/compress/cpca.h>
 #include <lambent/compress/zonal_fit.h>
@@ -232,6 +233,47 @@ TEST(Ranks, LightmapsAndSolversAreAlike) {
         append(out, {reinterpret_cast<const uint8_t*>(&s.residual), sizeof s.residual});
       return out;
     });
+}
+
+TEST(Ranks, LightmapsToAnErrorAreAlike) {
+  const Place p;
+  const Environment sky = make_environment("sky", 8, 4, [](Vec3) { return Vec3(0.5f); });
+  const Lamps lamps = make_lamps(p.scene, &sky, true);
+  LightmapOptions options{.lamp_samples = 4, .bounces = 2, .keep_terms = true};
+  options.error = 0.3;
+  expect_alike("to an error", [&](Progress* progress) {
+    LightmapReport report;
+    auto map = bake_lightmap(p.scene, p.tracer, p.receivers, lamps, options, true, &report, progress);
+    EXPECT_TRUE(map) << map.error().text();
+    if (!map) return Bytes{};
+    Bytes out = bytes(map->all);
+    append(out, bytes(*map->direct));
+    for (const Transfer& term : map->terms) append(out, bytes(term));
+    append(out, {reinterpret_cast<const uint8_t*>(&report.certificate.error), sizeof(double)});
+    return out;
+  });
+}
+
+TEST(Ranks, ChosenReceiversAreAlike) {
+  const Scene scene = make_quad(Vec3(0), Vec3(0, 0, 1), Vec3(1, 0, 0), 60, 60, Vec3(0.5f));
+  const Receivers receivers = make_vertex_receivers(scene);
+  auto truth = [&](uint32_t r) { return receivers.origins[r].x < 0.3f ? 0.2f : 1.0f; };
+  const PilotRows pilot = [&](std::span<const uint32_t> which, uint32_t, float* rows, uint8_t* inside) {
+    for (size_t i = 0; i < which.size(); ++i) rows[i] = truth(which[i]), inside[i] = 0;
+    return Result<void>();
+  };
+  expect_alike("chosen", [&](Progress*) {
+    auto thinned = thin(scene, receivers, 1, pilot, {.error = 0.05, .fewest = 300});
+    EXPECT_TRUE(thinned);
+    EXPECT_FALSE(thinned->all());
+    std::vector<float> rows;
+    for (uint32_t c : thinned->chosen) rows.push_back(truth(c));
+    const Spread spread(receivers, *thinned, {}, rows.data(), 1);
+    std::vector<float> all(receivers.count());
+    for (size_t r = 0; r < all.size(); ++r) spread.row(r, rows.data(), 1, &all[r]);
+    return Bytes(reinterpret_cast<const uint8_t*>(all.data()),
+                 reinterpret_cast<const uint8_t*>(all.data() + all.size()));
+  });
 }
 
 }  // namespace

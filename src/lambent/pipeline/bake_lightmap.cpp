@@ -1,5 +1,6 @@
 #include <lambent/pipeline/bake_lightmap.h>
 
+#include <lambent/bake/lightmap_error.h>
 #include <lambent/bake/unbury.h>
 #include <lambent/pipeline/lightmap_pictures.h>
 #include <lambent/pipeline/parse.h>
@@ -21,7 +22,7 @@ struct Seconds {
 };
 
 Summary summarize(const BakeRequest& request, const Lightmap& map, const LightmapReport& r, const Seconds& seconds,
-                  size_t moved, const std::optional<Atlas>& atlas) {
+                  size_t moved, const std::optional<Atlas>& atlas, const std::string& density) {
   const LightBasis& light = map.all.light;
   const double rate = double(r.rays) / std::max(r.trace_seconds, 1e-9);
   Summary s;
@@ -46,6 +47,7 @@ Summary summarize(const BakeRequest& request, const Lightmap& map, const Lightma
                        {"texels_per_unit", atlas->texels_per_unit}};
     line("atlas", fmt::format("{}x{}, {} charts, {:.3g} texels a unit", atlas->width, atlas->height,
                               human_count(atlas->charts), atlas->texels_per_unit));
+    if (!density.empty()) line("density", density);
   }
   line("receivers", fmt::format("{}{}{}", human_count(r.receivers),
                                 moved ? "; " + human_count(moved) + " moved out of geometry" : "",
@@ -68,25 +70,79 @@ Summary summarize(const BakeRequest& request, const Lightmap& map, const Lightma
   return s;
 }
 
+// What a bake to an error says of it.
+void summarize_error(const BakePlan& plan, const LightmapReport& r, const Scene& scene, Summary& s) {
+  const Certificate& c = r.certificate;
+  if (!(plan.lightmap.error > 0)) return;
+  nlohmann::json parts = nlohmann::json::object();
+  for (size_t p = 0; p < c.parts.size(); ++p)
+    if (c.parts[p] >= 0) parts[scene.parts[p].name] = c.parts[p];
+  s.json["certificate"] = {{"error", c.error},
+                           {"uncertain", c.uncertain},
+                           {"places", c.places},
+                           {"direct_noise", r.direct_noise},
+                           {"bounced_noise", r.bounced_noise},
+                           {"parts", std::move(parts)}};
+  s.json["direct"] = {{"traced", r.direct_traced}, {"samples", r.direct_samples}};
+  s.json["bounced"] = {{"traced", r.bounced_traced}, {"samples", r.samples}};
+  s.json["seconds"]["certify"] = r.certify_seconds;
+  s.lines.emplace_back(
+      "traced", fmt::format("direct light at {} with {} samples, bounces at {} with {} rays",
+                            human_count(r.direct_traced), r.direct_samples, human_count(r.bounced_traced), r.samples));
+  if (c.error < 0) return;
+  const double noise = std::hypot(r.direct_noise, r.bounced_noise);
+  s.lines.emplace_back("error",
+                       fmt::format("{:.1f}% RMS (within {:.1f}), measured at {} places by rays of their own; noise "
+                                   "{:.1f}% of direct light, {:.1f}% of bounces",
+                                   100 * c.error, 200 * c.uncertain, human_count(c.places), 100 * r.direct_noise,
+                                   100 * r.bounced_noise));
+  if (c.error > plan.lightmap.error + 2 * c.uncertain)
+    s.lines.emplace_back("", fmt::format("above the {:.3g}% asked for: {}", 100 * plan.lightmap.error,
+                                         noise > 0.8 * c.error ? "more rays would help (no --time)"
+                                                               : "what is lost lies between texels (--quality final, "
+                                                                 "or --texels-per-unit, has more)"));
+}
+
 }  // namespace
+
+Result<std::optional<Environment>> sky_of_request(const BakeRequest& request, const Job& job) {
+  if (request.sky.empty()) return std::optional<Environment>();
+  auto env = load_environment(request.sky);
+  if (!env) return env.error();
+  for (const std::string& w : env->warnings) job.warn(w);
+  for (const std::string& text : request.lamp)
+    if (auto scale = parse_named_color(text, "--lamp"); scale && scale->name == sky_name)
+      for (Vec3& radiance : env->image.rgb) radiance *= scale->color;
+  return std::optional(std::move(*env));
+}
+
+Result<BakeRequest> with_density(const BakeRequest& request, const BakePlan& plan, const Scene& scene,
+                                 const Lamps& lamps, std::string& remark, const Job& job) {
+  BakeRequest out = request;
+  if (request.receivers != "texels" || !request.atlas.empty() || request.texels_per_unit > 0) return out;
+  if (lamps.groups() == 0) {  // the bake will say so
+    out.atlas = "1024x1024";
+    return out;
+  }
+  auto density =
+      lightmap_density(scene, lamps, plan.lightmap.error, plan.most_texels, request.seed, &remark, job.progress);
+  if (!density) return density.error();
+  out.texels_per_unit = *density;
+  return out;
+}
 
 Result<BakeOutcome> bake_lightmap_request(const BakeRequest& request, const BakePlan& plan, const Job& job) {
   auto start = Clock::now();
   auto scene = load_scene_of(request, job);
   if (!scene) return scene.error();
-  std::optional<Environment> sky;
-  if (!request.sky.empty()) {
-    auto env = load_environment(request.sky);
-    if (!env) return env.error();
-    for (const std::string& w : env->warnings) job.warn(w);
-    for (const std::string& text : request.lamp)
-      if (auto scale = parse_named_color(text, "--lamp"); scale && scale->name == sky_name)
-        for (Vec3& radiance : env->image.rgb) radiance *= scale->color;
-    sky = std::move(*env);
-  }
-  const Lamps lamps = make_lamps(*scene, sky ? &*sky : nullptr, request.light_groups);
+  auto sky = sky_of_request(request, job);
+  if (!sky) return sky.error();
+  const Lamps lamps = make_lamps(*scene, *sky ? &**sky : nullptr, request.light_groups);
   if (auto ok = check_lightmap(*scene, lamps, plan.lightmap); !ok) return ok.error();  // before an atlas is made
-  auto placed = place_receivers(*scene, request, job);
+  std::string density;
+  auto dense = with_density(request, plan, *scene, lamps, density, job);
+  if (!dense) return dense.error();
+  auto placed = place_receivers(*scene, *dense, job);
   if (!placed) return placed.error();
   Seconds seconds{seconds_since(start), 0};
   if (auto ok = check_file_size(plan, request, *scene, placed->receivers.count(), lamps.groups()); !ok)
@@ -101,7 +157,7 @@ Result<BakeOutcome> bake_lightmap_request(const BakeRequest& request, const Bake
   auto tracer = Tracer::build(*scene, job.progress);
   if (!tracer) return tracer.error();
   seconds.build = seconds_since(start);
-  if (sky || request.order > 0) warn_if_enclosed(*scene, *tracer, placed->receivers, job);
+  if (*sky || request.order > 0) warn_if_enclosed(*scene, *tracer, placed->receivers, job);
   const size_t moved =
       placed->atlas ? move_buried_texels(*scene, *tracer, *placed->atlas, placed->receivers, job.progress) : 0;
 
@@ -114,7 +170,8 @@ Result<BakeOutcome> bake_lightmap_request(const BakeRequest& request, const Bake
     job.warn(
         fmt::format("the lightmap is kept in single precision: half floats do not hold {:.3g}", report.beyond_half));
   BakeOutcome out;
-  out.summary = summarize(request, *map, report, seconds, moved, placed->atlas);
+  out.summary = summarize(request, *map, report, seconds, moved, placed->atlas, density);
+  summarize_error(plan, report, *scene, out.summary);
   out.pictures = lightmap_pictures(*map, placed->receivers, request.light_groups);
   auto look = lightmap_look(*map, *scene, placed->receivers, plan.lightmap.directional);
   if (!look) return look.error();
@@ -125,7 +182,10 @@ Result<BakeOutcome> bake_lightmap_request(const BakeRequest& request, const Bake
                          kind == DirectionalKind::none ? Rows(DiffuseRows{}) : Rows(DirectionalRows{kind}));
   out.baked.terms = std::move(terms);
   out.baked.provenance = provenance_of(request, out.baked.scene,
-                                       {{"receivers", report.receivers}, {"moved", moved}, {"buried", report.buried}});
+                                       {{"receivers", report.receivers},
+                                        {"moved", moved},
+                                        {"buried", report.buried},
+                                        {"certificate", out.summary.json.value("certificate", nlohmann::json())}});
   return out;
 }
 

@@ -121,15 +121,17 @@ struct Quality {
   float shortest;         // edges, as parts of the diagonal
   double triangles_more;  // at most, of those that there are,
   size_t triangles;       // and so many
+  double lightmap_error;
+  size_t texels;  // of a lightmap, at most
 };
-const std::map<std::string, Quality> qualities{{"preview", {0.1, 5e-3f, 0.5, 30'000}},
-                                               {"good", {0.025, 2e-3f, 1, 150'000}},
-                                               {"final", {0.01, 5e-4f, 3, 1'000'000}}};
+const std::map<std::string, Quality> qualities{{"preview", {0.1, 5e-3f, 0.5, 30'000, 0.1, 60'000}},
+                                               {"good", {0.025, 2e-3f, 1, 150'000, 0.02, 400'000}},
+                                               {"final", {0.01, 5e-4f, 3, 1'000'000, 0.01, 2'000'000}}};
 
 // How well: rays and mesh.
 Result<void> plan_error(const BakeRequest& r, BakePlan& plan) {
   const Quality& q = qualities.at(r.quality);
-  double error = q.error;
+  double error = plan.kind == BakeKind::lightmap ? q.lightmap_error : q.error;
   if (!r.error.empty()) {
     auto parsed = parse_error(r.error);
     if (!parsed) return parsed.error();
@@ -141,6 +143,7 @@ Result<void> plan_error(const BakeRequest& r, BakePlan& plan) {
                 r.subsurface.empty() && r.rooms.empty() &&
                 (r.adapt == "on" || (r.adapt == "auto" && r.samples == 0 && r.max_edge == 0));
   plan.adapt.error = 0.8 * error, plan.adapt.shortest = q.shortest, plan.adapt.seed = r.seed;
+  plan.most_texels = q.texels;
   plan.adapt.more = q.triangles_more, plan.adapt.triangles = q.triangles;
   return {};
 }
@@ -160,10 +163,11 @@ Result<int> parse_visibility(const std::string& text) {
 
 LightmapOptions lightmap_options(const BakeRequest& r, const BakeOptions& bake, double converge) {
   LightmapOptions o;
-  o.order = r.order, o.samples = r.samples, o.lamp_samples = r.lamp_samples, o.bounces = bake.bounces;
+  o.order = r.order, o.samples = std::max(r.samples, 1), o.lamp_samples = r.lamp_samples, o.bounces = bake.bounces;
   o.converge = converge, o.solver = solver_names.at(r.solver), o.directional = *directional_kind(r.directional);
   o.memory = r.memory, o.gather = r.gather == "hemicube" ? GatherKind::hemicube : GatherKind::rays;
   o.seed = r.seed, o.precision = bake.precision, o.keep_terms = r.terms;
+  o.error = r.samples == 0 ? bake.error : 0, o.seconds = r.time, o.denoise = r.denoise == "on";
   return o;
 }
 

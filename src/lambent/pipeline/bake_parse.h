@@ -30,6 +30,7 @@ struct BakePlan {
   Reflection reflection;
   bool adapts = false;  // where the scene can be
   AdaptOptions adapt;
+  size_t most_texels = 0;  // of a lightmap whose density is chosen
 };
 
 // Errors name the option. Loads the environment that --light names.

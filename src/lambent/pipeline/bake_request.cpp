@@ -56,25 +56,29 @@ const Option<R> table[] = {
     {"texels-per-unit", &R::texels_per_unit, "What is baked", D | L,
      "Texels along one scene unit; the atlas is as large as that needs", 1e-12, 1e12, nullptr, "receivers=texels"},
     {"atlas", &R::atlas, "What is baked", D | L,
-     "WIDTHxHEIGHT of the atlas; texels are as small as that allows (1024x1024 if nothing is said)", 0, 0, nullptr,
-     "receivers=texels"},
+     "WIDTHxHEIGHT of the atlas; texels are as small as that allows (if nothing is said, as light asks for in a "
+     "lightmap "
+     "baked to an error, else 1024x1024)",
+     0, 0, nullptr, "receivers=texels"},
 
-    {"quality", &R::quality, "How well", D,
-     "An error to bake to, and how fine a mesh may become: 10 %, 2.5 % or 1 % of the transfer's RMS", 0, 0,
-     "preview|good|final"},
-    {"error", &R::error, "How well", D,
+    {"quality", &R::quality, "How well", D | L,
+     "An error to bake to, and how fine a mesh or a lightmap may become: 10 %, 2.5 % or 1 % of the transfer's RMS (of "
+     "lightmaps 2 %)",
+     0, 0, "preview|good|final"},
+    {"error", &R::error, "How well", D | L,
      "Bake to this relative RMS error, e.g. 2%, measured on rays and places of their own; says what it reached"},
-    {"time", &R::time, "How well", D,
+    {"time", &R::time, "How well", D | L,
      "Seconds after which no more rays are asked for, whatever the error; the result then depends on the machine", 0,
      1e6},
     {"adapt", &R::adapt, "How well", D,
      "Split edges where light changes: auto does it for scenes without bones, where neither --samples nor --max-edge "
      "is given",
      0, 0, "auto|on|off", "receivers=vertices"},
-    {"denoise", &R::denoise, "How well", D | Z | F, "Take away noise that neighbours on a surface do not share", 0, 0,
-     "on|off"},
+    {"denoise", &R::denoise, "How well", D | Z | F | L, "Take away noise that neighbours on a surface do not share", 0,
+     0, "on|off"},
     {"samples", &R::samples, "How well", traced | I,
-     "Rays a receiver; without, diffuse transfer is baked to an error, other kinds with 1024", 1, 1 << 20},
+     "Rays a receiver; without, diffuse transfer and lightmaps of lamps are baked to an error, other kinds with 1024",
+     1, 1 << 20},
     {"bounces", &R::bounces, "How well", D | M | Z | G | L,
      "Reflections between surfaces, 0 to 64; lightmaps also converge:EPS, as many as leave that residual"},
     {"shadows", &R::shadows, "How well", D | Z, "off: open light everywhere, no shadows and no bounces", 0, 0,
@@ -204,6 +208,8 @@ constexpr Conflict conflicts[] = {
     {"atlas", "texels-per-unit", "excludes --texels-per-unit"},
     {"error", "samples", "says how many rays: leave --samples out"},
     {"time", "samples", "ends what --error asks for: leave --samples out"},
+    {"error", "gather=hemicube", "is not measured of hemicubes: leave --gather out"},
+    {"error", "directional=sh|hl2|vector", "is not measured of directional lightmaps: leave --directional out"},
     {"error", "subsurface", "is not measured of media: leave --subsurface out"},
     {"error", "shadows=off", "is none without shadows"},
     {"time", "subsurface", "is not heeded by media: leave --subsurface out"},
@@ -240,8 +246,13 @@ Result<void> check_conflicts(const BakeRequest& r) {
   return {};
 }
 
-// So many rays on the mesh as it is.
-bool has_no_quality(const BakeRequest& r) { return r.samples > 0 && r.adapt != "on"; }
+// So many rays on the mesh as it is; of lightmaps, what is not baked to an error.
+bool is_plain_lightmap(const BakeRequest& r) {
+  return r.samples > 0 || r.order > 0 || r.directional != "none" || r.gather != "rays";
+}
+bool has_no_quality(const BakeRequest& r) {
+  return r.transfer == "lightmap" ? is_plain_lightmap(r) : r.samples > 0 && r.adapt != "on";
+}
 
 Result<void> check_kind(const BakeRequest& r, BakeKind kind) {
   if (r.given.contains("bin_limit") && file_extension(r.output) != "gltf")
@@ -256,6 +267,14 @@ Result<void> check_kind(const BakeRequest& r, BakeKind kind) {
     return Error{"--rooms", "joins receivers at vertices: leave --receivers out", true};
   if (kind != BakeKind::lightmap && r.bounces.starts_with("converge:"))
     return Error{"--bounces", "converge:EPS is for lightmaps", true};
+  if (kind == BakeKind::lightmap && is_plain_lightmap(r))
+    for (const char* name : {"quality", "error", "time", "denoise"})
+      if (r.given.contains(name))
+        return Error{
+            std::string("--") + name,
+            "is for lightmaps of lamps that are baked to an error: leave --samples, --order, --directional and "
+            "--gather out",
+            true};
   if (r.given.contains("quality") && has_no_quality(r))
     return Error{"--quality", "with --samples says how fine --adapt on may make the mesh: add that, or leave one out",
                  true};
@@ -305,9 +324,13 @@ Result<BakeRequest> resolved(BakeRequest r) {
   if (r.order == 0 && r.light.empty() && kind != BakeKind::lightmap && kind != BakeKind::blocks &&
       kind != BakeKind::indirect)
     r.order = 6;
-  if (kind != BakeKind::diffuse || !r.subsurface.empty() || r.shadows == "off" || !r.rooms.empty())
-    if (r.samples == 0) r.samples = 1024;
-  if (r.receivers == "texels" && r.atlas.empty() && !(r.texels_per_unit > 0)) r.atlas = "1024x1024";
+  const bool to_error = kind == BakeKind::lightmap
+                          ? !is_plain_lightmap(r)
+                          : kind == BakeKind::diffuse && r.subsurface.empty() && r.shadows == "on" && r.rooms.empty();
+  if (!to_error && r.samples == 0) r.samples = 1024;
+  if (r.receivers == "texels" && r.atlas.empty() && !(r.texels_per_unit > 0) &&
+      !(kind == BakeKind::lightmap && r.samples == 0))
+    r.atlas = "1024x1024";
   if (r.shadows == "on") r.given.erase("shadows");
   return r;
 }
@@ -319,6 +342,8 @@ nlohmann::json to_json(const BakeRequest& request) {
   if (has_no_quality(request)) out.erase("quality");
   if (!request.rooms.empty())
     for (const char* without : {"bounces", "denoise", "adapt", "quality", "error", "time"}) out.erase(without);
+  if (kind == BakeKind::lightmap && is_plain_lightmap(request))
+    for (const char* name : {"error", "time", "denoise"}) out.erase(name);
   return out;
 }
 

@@ -1,6 +1,7 @@
 // What a bake would take, from a little of it.
 #include <lambent/bake/gather.h>
 #include <lambent/core/parallel.h>
+#include <lambent/pipeline/bake_lightmap.h>
 #include <lambent/pipeline/bake_parse.h>
 #include <lambent/pipeline/place_receivers.h>
 #include <lambent/pipeline/text.h>
@@ -105,8 +106,17 @@ Result<Summary> plan_bake(const BakeRequest& asked, const Job& job) {
   auto scene = load_scene_of(*request, job);
   if (!scene) return scene.error();
   if (auto ok = adapt_scene(*scene, *request, *plan, job); !ok) return ok.error();
-  const size_t groups = plan->kind == BakeKind::lightmap ? make_lamps(*scene, nullptr, request->light_groups).groups()
-                                                         : 0;
+  size_t groups = 0;
+  std::string density;
+  if (plan->kind == BakeKind::lightmap) {
+    auto sky = sky_of_request(*request, job);
+    if (!sky) return sky.error();
+    const Lamps lamps = make_lamps(*scene, *sky ? &**sky : nullptr, request->light_groups);
+    groups = lamps.groups();
+    auto dense = with_density(*request, *plan, *scene, lamps, density, job);
+    if (!dense) return dense.error();
+    *request = std::move(*dense);
+  }
   auto placed = place_receivers(*scene, *request, job);
   if (!placed) return placed.error();
   auto tracer = Tracer::build(*scene, job.progress);
