@@ -156,7 +156,7 @@ export class Lattice {
     return out;
   }
 
-  /** Irradiance of a surface there that looks towards `normal`; exit radiance of a diffuse one is albedo / pi times it. */
+  /** Irradiance of a surface there towards `normal`; exit radiance of a diffuse one is albedo / pi times it. */
   irradianceAt(position: Vector3, normal: Vector3, target = new Color()): Color {
     const radiance = this.radianceAt(position),
       rows = shCount(this.order),
