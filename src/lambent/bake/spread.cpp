@@ -9,7 +9,7 @@
 namespace lambent {
 namespace {
 
-constexpr float least_cosine = 0.8f, most_slope = 0.35f;  // of places on the same surface
+constexpr float alike_cosine = 0.8f, most_slope = 0.35f;  // of places on the same surface
 constexpr size_t looked_at = 40;
 constexpr size_t piece = 64;
 
@@ -31,7 +31,7 @@ bool are_alike(const float* rows, size_t width, size_t i, size_t j) {
 }  // namespace
 
 bool on_one_surface(const Receivers& r, size_t i, size_t j) {
-  if (dot(r.normals[i], r.normals[j]) < least_cosine) return false;
+  if (dot(r.normals[i], r.normals[j]) < alike_cosine) return false;
   const Vec3 d = r.origins[j] - r.origins[i];
   return std::abs(dot(r.normals[i], d)) <= most_slope * length(d);
 }

@@ -253,6 +253,8 @@ Result<Drawing> draw_moving(const Baked& baked, const DrawRequest& request, cons
   std::map<std::string, std::unique_ptr<Model>> models;
   auto movers = load_movers(request, models);
   if (!movers) return movers.error();
+  for (const auto& [path, model] : models)
+    if (shining_of(model->baked)) job.warn(path + ": shines, and its light on what is around it is not drawn yet");
   auto begun = begin_columns(baked, request, job);
   if (!begun) return begun.error();
   ColumnDrawing& d = *begun;
