@@ -14,7 +14,7 @@ namespace {
 
 constexpr size_t rays = 32;                      // of a place, to the surfaces that it sees
 constexpr size_t averaged = 12, looked_at = 32;  // places around one; of these those that face as it does
-constexpr float least_cosine = 0.7f;
+constexpr float facing_cosine = 0.7f;
 constexpr int most_bounces = 8;
 constexpr size_t piece = 16;
 
@@ -56,7 +56,7 @@ struct Reflector {
     const size_t found = tree.knnSearch(query, looked_at, index, distance2);
     uint32_t count = 0;
     for (size_t q = 0; q < found && count < most; ++q)
-      if (dot(places.normal[index[q]], normal) >= least_cosine) out[count++] = index[q];
+      if (dot(places.normal[index[q]], normal) >= facing_cosine) out[count++] = index[q];
     return count;
   }
 

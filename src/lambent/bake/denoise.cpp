@@ -20,7 +20,7 @@ constexpr size_t most_neighbours = 24, looked_at = 48;    // itself among them; 
 constexpr size_t fewest_neighbours = 5;                   // a plane has three unknowns
 constexpr size_t judges = 8;                              // neighbours whose risks are added up
 constexpr size_t variances = 6;                           // measured places that tell a place's variance
-constexpr float least_cosine = 0.8f, most_slope = 0.35f;  // of a neighbour on the same surface
+constexpr float alike_cosine = 0.8f, most_slope = 0.35f;  // of a neighbour on the same surface
 constexpr float strengths[] = {4, 16};                    // differences beyond the noise count less, the larger
 constexpr size_t piece = 256;
 
@@ -83,7 +83,7 @@ struct Denoiser {
     if (is_left_out(j)) return false;
     if (noisy.normals.empty() || i == j) return true;
     const Vec3 d = noisy.places[j] - noisy.places[i];
-    return dot(noisy.normals[i], noisy.normals[j]) >= least_cosine &&
+    return dot(noisy.normals[i], noisy.normals[j]) >= alike_cosine &&
            std::abs(dot(noisy.normals[i], d)) <= most_slope * length(d);
   }
 

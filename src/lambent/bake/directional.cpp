@@ -10,12 +10,12 @@ namespace lambent {
 namespace {
 
 // A cosine-distributed ray stands for light spread by 1 / cos; grazing ones would weigh without bound.
-constexpr float least_cosine = 0.02f;
+constexpr float grazing_cosine = 0.02f;
 constexpr int most_rows = 9;
 
 // What one unit of E from direction d adds to each row: the row's kernel over that of E, cos / pi.
 void row_weights(DirectionalKind kind, Vec3 d, const Mat3& frame, float* out) {
-  const float scale = 1 / std::max(dot(d, frame[2]), least_cosine);
+  const float scale = 1 / std::max(dot(d, frame[2]), grazing_cosine);
   switch (kind) {
     case DirectionalKind::none: out[0] = 1; break;
     case DirectionalKind::sh2:
