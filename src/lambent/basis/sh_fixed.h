@@ -66,6 +66,7 @@ template <int order, int l>
   }
 }
 
+// All harmonics of one direction.
 template <int order, class T>
 [[gnu::always_inline]] inline void evaluate(T x, T y, T z, T* __restrict out) {
   if constexpr (order < 4 || sizeof(T) > sizeof(float)) {

@@ -11,6 +11,7 @@ inline constexpr size_t sh_tile = 64;
 // The tensor, put so that it is read once from end to end.
 struct ShTileProduct {
   int order_a = 0, order_b = 0, order_c = 0;
+  // Entries of one coefficient of a.
   struct Row {
     uint16_t i;      // of a
     uint16_t count;  // of entries

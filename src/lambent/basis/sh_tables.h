@@ -9,11 +9,13 @@
 
 namespace lambent {
 
+// By degree l and frequency m.
 template <class T>
 struct ShTablesOf {
   T diagonal[max_sh_order]{};
   T a[max_sh_order][max_sh_order]{}, b[max_sh_order][max_sh_order]{};
 };
+// As they are worked out.
 using ShTables = ShTablesOf<double>;
 
 // Rounded like std::sqrt (the test compares every entry's bits): Newton's method in more digits, from above.
@@ -40,7 +42,9 @@ constexpr ShTables make_sh_tables() {
   }
   return t;
 }
+// The constants.
 inline constexpr ShTables sh_tables_exact = make_sh_tables();
+// The same.
 constexpr const ShTables& sh_tables() { return sh_tables_exact; }
 
 // The same in single or double precision.

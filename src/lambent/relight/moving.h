@@ -30,6 +30,7 @@ struct HiddenLight {
 // The field is of HiddenRows; `order` bands of it at most.
 HiddenLight hidden_light(const Field& field, int order);
 
+// An object where it stands, its field turned to the world.
 struct PlacedObject {
   const HiddenLight* light = nullptr;
   RigidPlace place;
@@ -49,6 +50,7 @@ struct MovingReceivers {
   std::vector<Vec3> positions, normals;  // normals are unit
   AlignedVector<float> transfer;         // [tile][channel][coefficient][receiver in tile]
   AlignedVector<float> lobes;            // [tile][9][receiver in tile]: the cosine about the normal, over pi
+  // Receivers that are multiplied together: a sphere about them.
   struct Tile {
     Vec3 center{0.0f};
     float radius = 0;
@@ -66,6 +68,7 @@ struct MovingLight {
   Relit* values = nullptr;
 };
 
+// How objects are summed over receivers.
 struct MovingOptions {
   int light_order = 0;          // bands of the light
   float least_share = 2.5e-4f;  // of the sphere: what hides less is passed over

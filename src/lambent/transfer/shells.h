@@ -10,6 +10,7 @@
 
 namespace lambent {
 
+// At most.
 inline constexpr int max_shells = 64, max_shell_side = 64;
 
 // A shell has side x side points: the corners of a grid over the square [-1, 1]^2, which is folded to the sphere along
