@@ -42,8 +42,7 @@ const Option<R> table[] = {
      "(irradiance); may be given again"},
     {"move", &R::move, "Light", D | I,
      "N@T:X,Y,Z;T:X,Y,Z;...: where lamp N is at these times, straight from one to the next (files of direct to "
-     "indirect "
-     "light); or NAME=PATH.json: the path of an object of --place; may be given again",
+     "indirect light); or NAME=PATH.json: the path of an object of --place; may be given again",
      0, 0, nullptr, "frames"},
     {"sphere-lamp", &R::sphere_lamp, "Light", Z | T,
      "X,Y,Z,RADIUS,R,G,B: a near lamp, a sphere of that radiance; may be given again"},
@@ -227,9 +226,9 @@ Result<void> check_draw(const DrawRequest& request, DrawKind kind) {
   if (kind == DrawKind::indirect && !two_sorts && show->part != Show::Part::all)
     return Error{"--show", "of direct to indirect light is product, radiosity, albedo, direct or indirect", true};
   const bool by_paths = kind == DrawKind::indirect || !request.place.empty();
+  if (said.contains("move") && !by_paths) return Error{"--move", "needs --place", true};
   if (said.contains("frames") && (by_paths ? request.move.empty() : request.animation.empty()))
     return Error{"--frames", by_paths ? "needs --move" : "needs --animation", true};
-  if (said.contains("move") && !by_paths) return Error{"--move", "needs --place", true};
   if (kind == DrawKind::indirect && request.lamp.empty() && show->colour != RenderOptions::Show::albedo)
     return Error{"--lamp", "is needed: a lamp to light the scene by, e.g. point@0,2,0=10", true};
   const bool from_afar = kind == DrawKind::texture || kind == DrawKind::blocks;

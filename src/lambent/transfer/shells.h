@@ -11,7 +11,9 @@
 namespace lambent {
 
 // At most.
-inline constexpr int max_shells = 64, max_shell_side = 64;
+inline constexpr int max_shells = 64;
+// At most.
+inline constexpr int max_shell_side = 64;
 
 // A shell has side x side points: the corners of a grid over the square [-1, 1]^2, which is folded to the sphere along
 // the diagonals of its quarters (octahedral map). Points on its border appear twice, so that no cell wraps around.
