@@ -178,6 +178,7 @@ const std::map<std::string, Change> changes{
 
 // Every option with every kind: refused by name, or baked, and then it has an effect.
 TEST_F(Requests, EveryOptionHasAnEffectOrIsRefusedByName) {
+  std::map<std::string, std::string> known;  // fingerprints by request: many options change the same one
   for (int k = 0; k < int(std::size(bake_kind_names)); ++k)
     for (const Option<BakeRequest>& o : bake_options()) {
       const std::string name = json_name(o.name);
@@ -216,10 +217,14 @@ TEST_F(Requests, EveryOptionHasAnEffectOrIsRefusedByName) {
       EXPECT_TRUE(with) << with.error().text();
       if (!with) continue;
       if (!o.recorded || kind_of(changed) != BakeKind(k) || name == "factors") continue;  // which is the kind itself
-      auto without = bake_with_summary(must_read(before));
-      EXPECT_TRUE(without) << without.error().text();
-      if (!without) continue;
-      EXPECT_NE(fingerprint(std::move(*with)), fingerprint(std::move(*without)));
+      std::string& other = known[before.dump()];
+      if (other.empty()) {
+        auto without = bake_with_summary(must_read(before));
+        EXPECT_TRUE(without) << without.error().text();
+        if (!without) continue;
+        other = fingerprint(std::move(*without));
+      }
+      EXPECT_NE(fingerprint(std::move(*with)), other);
     }
 }
 
