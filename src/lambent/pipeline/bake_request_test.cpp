@@ -179,10 +179,17 @@ const std::map<std::string, Change> changes{
 // Every option with every kind: refused by name, or baked, and then it has an effect.
 TEST_F(Requests, EveryOptionHasAnEffectOrIsRefusedByName) {
   std::map<std::string, std::string> known;  // fingerprints by request: many options change the same one
-  for (int k = 0; k < int(std::size(bake_kind_names)); ++k)
+#ifdef LAMBENT_SANITIZED
+  constexpr size_t of_each = 3;  // every option with some kinds, every kind with some options
+#else
+  constexpr size_t of_each = 1;
+#endif
+  for (int k = 0; k < int(std::size(bake_kind_names)); ++k) {
+    size_t index = size_t(k);
     for (const Option<BakeRequest>& o : bake_options()) {
       const std::string name = json_name(o.name);
       if (name == "scene" || name == "output" || name == "transfer" || name == "receivers") continue;
+      if (index++ % of_each != 0) continue;
       ASSERT_TRUE(changes.contains(name)) << name << " has no value to be tried with";
       const Change& change = changes.at(name);
       nlohmann::json before = least(BakeKind(k));
@@ -226,6 +233,7 @@ TEST_F(Requests, EveryOptionHasAnEffectOrIsRefusedByName) {
       }
       EXPECT_NE(fingerprint(std::move(*with)), other);
     }
+  }
 }
 
 TEST_F(Requests, BakeAgainToTheByte) {
