@@ -109,6 +109,7 @@ TEST_F(DrawMoving, BadPlacesAndPathsAreRefusedInOneLine) {
   path_says(R"({"times": [0], "places": [[0,1]]})", "place 0 is not X, Y, Z");
   path_says(R"({"times": [0], "places": [[0,1e99,0]]})", "place 0 is not X, Y, Z");
   path_says(R"({"times": [0, 1], "places": [[0,1,0]]})", "as long as each other");
+  path_says(R"({"times": [0], "places": [[0,1,0]], "speed": 3})", "speed");
   path_says(R"({"times": [NaN], "places": [[0,1,0]]})", "path.json");
   DrawRequest r = request({ball_at("0,1,0")});
   r.move = {"b=" + path("path.json")}, r.frames = "0:1:1";

@@ -65,6 +65,8 @@ Result<std::vector<PlaceKey>> load_path(const std::string& path) {
   const json *times = list("times"), *places = list("places");
   if (!times || !places || times->empty() || times->size() != places->size())
     return Error{path, "expects \"times\" and \"places\", lists as long as each other and not empty"};
+  for (const auto& [key, value] : object->items())
+    if (key != "times" && key != "places") return Error{path, "\"" + key + "\" is neither \"times\" nor \"places\""};
   std::vector<PlaceKey> keys;
   for (size_t i = 0; i < times->size(); ++i) {
     const json &time = (*times)[i], &place = (*places)[i];
