@@ -4,6 +4,7 @@
 #include <fcntl.h>
 #include <sys/file.h>
 #include <sys/stat.h>
+#include <sys/uio.h>
 #include <unistd.h>
 #include <xxhash.h>
 
@@ -23,6 +24,7 @@ using Clock = std::chrono::steady_clock;
 
 constexpr uint32_t record_magic = 0x4b50434c;  // "LCPK"
 constexpr size_t buffered = size_t{1} << 20;
+constexpr size_t small_piece = size_t{1} << 16;  // larger ones are written from where they are
 constexpr double seconds_buffered = 0.25, seconds_unsynced = 30;
 constexpr const char *lock_file = "lock", *pieces_ending = ".pieces";
 
@@ -39,6 +41,52 @@ struct RecordHeader {
 };
 
 size_t padded(size_t bytes) { return (bytes + 7) / 8 * 8; }
+
+// What a piece of some parts is in a file: its header, then each part's length, bytes and padding.
+struct Record {
+  RecordHeader header;
+  std::vector<uint64_t> lengths;
+  std::vector<iovec> runs;
+  size_t bytes = 0;  // of all runs
+
+  Record(uint64_t piece, std::span<const std::span<const uint8_t>> parts) {
+    static const uint8_t zeros[8] = {};
+    lengths.reserve(parts.size());
+    add(&header, sizeof header);
+    for (std::span<const uint8_t> part : parts) {
+      add(&lengths.emplace_back(part.size()), sizeof(uint64_t));
+      add(part.data(), part.size());
+      add(zeros, padded(part.size()) - part.size());
+    }
+    const std::unique_ptr<XXH3_state_t, decltype(&XXH3_freeState)> state(XXH3_createState(), XXH3_freeState);
+    XXH3_128bits_reset(state.get());
+    for (size_t i = 1; i < runs.size(); ++i) XXH3_128bits_update(state.get(), runs[i].iov_base, runs[i].iov_len);
+    const XXH128_hash_t hash = XXH3_128bits_digest(state.get());
+    header.piece = piece, header.bytes = bytes - sizeof header, header.low = hash.low64, header.high = hash.high64;
+    header.own = header.hash();
+  }
+  Record(const Record&) = delete;
+
+ private:
+  void add(const void* from, size_t size) {
+    if (size == 0) return;
+    runs.push_back({const_cast<void*>(from), size});
+    bytes += size;
+  }
+};
+
+// False: not all could be written, and the system says why. Changes the runs.
+bool write_runs(int fd, std::span<iovec> runs) {
+  constexpr size_t most = 64;  // of a call; the least that a system may set is 16, Linux's is 1024
+  while (!runs.empty()) {
+    ssize_t put = ::writev(fd, runs.data(), int(std::min(runs.size(), most)));
+    if (put < 0 && errno == EINTR) continue;
+    if (put <= 0) return false;
+    for (; !runs.empty() && size_t(put) >= runs[0].iov_len; runs = runs.subspan(1)) put -= ssize_t(runs[0].iov_len);
+    if (put > 0) runs[0].iov_base = static_cast<char*>(runs[0].iov_base) + put, runs[0].iov_len -= size_t(put);
+  }
+  return true;
+}
 
 bool read_at(int fd, void* to, size_t bytes, size_t at) {
   for (size_t done = 0; done < bytes;) {
@@ -109,7 +157,7 @@ struct Checkpoint::Stage {
   std::unordered_map<uint64_t, Place> index;
   std::atomic<size_t> made{0}, damaged{0};
   std::mutex buffer_mutex, write_mutex;
-  std::vector<uint8_t> buffer;
+  std::vector<uint8_t> buffer, writing;
   Clock::time_point written = Clock::now(), synced = Clock::now();
 
   ~Stage() {
@@ -189,21 +237,19 @@ struct Checkpoint::Impl {
     return ran + rest > options.after;
   }
 
-  void write(Stage& s, bool sync) {
-    std::vector<uint8_t> bytes;
+  // What is buffered, or one record.
+  void write(Stage& s, bool sync, Record* record = nullptr) {
     std::unique_lock writing(s.write_mutex);
-    {
+    if (!record) {
       std::lock_guard lock_buffer(s.buffer_mutex);
-      bytes.swap(s.buffer);
+      s.writing.swap(s.buffer);
+      s.buffer.clear();
       s.written = Clock::now();
     }
     if (off || s.fd < 0) return;
-    for (size_t done = 0; done < bytes.size();) {
-      const ssize_t put = ::write(s.fd, bytes.data() + done, bytes.size() - done);
-      if (put < 0 && errno == EINTR) continue;
-      if (put <= 0) return give_up(system_message());
-      done += size_t(put);
-    }
+    iovec all{s.writing.data(), s.writing.size()};
+    if (!(record ? write_runs(s.fd, record->runs) : write_runs(s.fd, {&all, all.iov_len > 0 ? size_t{1} : 0})))
+      return give_up(system_message());
     if (!sync && seconds_since(s.synced) < seconds_unsynced) return;
     s.synced = Clock::now();
     writing.unlock();
@@ -290,7 +336,7 @@ bool Checkpoint::read(Stage& s, uint64_t piece, std::vector<uint8_t>& bytes) {
 
 void Checkpoint::note_damage(Stage& s) { ++s.damaged, --s.made, --impl_->taken; }
 
-void Checkpoint::append(Stage& s, uint64_t piece, const std::vector<uint8_t>& bytes) {
+void Checkpoint::append(Stage& s, uint64_t piece, std::span<const std::span<const uint8_t>> parts) {
   Impl& i = *impl_;
   ++s.made;
   if (i.off) return;
@@ -303,16 +349,15 @@ void Checkpoint::append(Stage& s, uint64_t piece, const std::vector<uint8_t>& by
       if (auto ok = begin(); !ok) return i.give_up(ok.error().message);
   }
   if (i.off || s.fd < 0) return;
-  RecordHeader h;
-  const XXH128_hash_t hash = XXH3_128bits(bytes.data(), bytes.size());
-  h.piece = piece, h.bytes = bytes.size(), h.low = hash.low64, h.high = hash.high64, h.own = h.hash();
+  Record record(piece, parts);
+  if (record.bytes > small_piece) return i.write(s, false, &record);
   bool full;
   {
     std::lock_guard lock(s.buffer_mutex);
-    const auto* head = reinterpret_cast<const uint8_t*>(&h);
-    s.buffer.insert(s.buffer.end(), head, head + sizeof h);
-    s.buffer.insert(s.buffer.end(), bytes.begin(), bytes.end());
-    s.buffer.resize(padded(s.buffer.size()));
+    for (const iovec& run : record.runs) {
+      const auto* from = static_cast<const uint8_t*>(run.iov_base);
+      s.buffer.insert(s.buffer.end(), from, from + run.iov_len);
+    }
     full = s.buffer.size() >= buffered || seconds_since(s.written) > seconds_buffered;
   }
   if (full) i.write(s, false);

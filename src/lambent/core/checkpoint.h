@@ -45,7 +45,8 @@ class Checkpoint {
   // Stages are told apart by their names, and alike names by their order. `pieces`: how many there will be, or 0.
   Stage& stage(const std::string& name, size_t pieces);
   bool read(Stage& stage, uint64_t piece, std::vector<uint8_t>& bytes);
-  void append(Stage& stage, uint64_t piece, const std::vector<uint8_t>& bytes);
+  // The parts one after the other, as KeptPieces reads them.
+  void append(Stage& stage, uint64_t piece, std::span<const std::span<const uint8_t>> parts);
   void note_damage(Stage& stage);
 
   void flush();          // to the disk
@@ -114,7 +115,7 @@ class KeptPieces {
   template <class... Parts>
   bool load(uint64_t piece, Parts&&... parts) const {
     using namespace checkpoint_detail;
-    std::vector<uint8_t> bytes;
+    thread_local std::vector<uint8_t> bytes;  // taken once: fresh pages cost more than reading
     if (!checkpoint_ || !checkpoint_->read(*stage_, piece, bytes)) return false;
     std::span<const uint8_t> part;
     size_t at = 0;
@@ -130,10 +131,8 @@ class KeptPieces {
   template <class... Parts>
   void save(uint64_t piece, Parts&&... parts) const {
     if (!checkpoint_ || progress_->cancelled()) return;
-    std::vector<uint8_t> bytes;
-    bytes.reserve((size_t{16} + ... + checkpoint_detail::bytes_of(parts).size()) + 16 * sizeof...(parts));
-    (checkpoint_detail::put(bytes, checkpoint_detail::bytes_of(parts)), ...);
-    checkpoint_->append(*stage_, piece, bytes);
+    const std::span<const uint8_t> all[] = {checkpoint_detail::bytes_of(parts)...};
+    checkpoint_->append(*stage_, piece, all);
   }
   // What was loaded is nothing that the stage can have made.
   void refuse() const { checkpoint_->note_damage(*stage_); }

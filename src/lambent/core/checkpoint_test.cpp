@@ -84,6 +84,36 @@ TEST_F(Checkpoints, WorkIsMadeOnce) {
   EXPECT_FALSE(std::filesystem::exists(folder.file("c")));
 }
 
+// Small pieces are buffered, large ones written from where they are; from several threads, in any order.
+TEST_F(Checkpoints, PiecesOfAnySizeComeBack) {
+  constexpr size_t sizes[] = {0, 1, 7, 8, 4099, 65'400, 65'536, 65'541, 300'001};
+  auto bytes_of = [&](size_t piece) {
+    std::vector<uint8_t> bytes(sizes[piece % std::size(sizes)]);
+    for (size_t i = 0; i < bytes.size(); ++i) bytes[i] = uint8_t(i * 31 + piece);
+    return bytes;
+  };
+  constexpr size_t count = 6 * std::size(sizes);
+  for (const bool again : {false, true}) {
+    Checkpoint checkpoint(options());
+    ASSERT_TRUE(checkpoint.begin());
+    Progress progress;
+    progress.checkpoint = &checkpoint;
+    const KeptPieces pieces(&progress, "sizes", count);
+    std::vector<std::thread> threads;
+    for (size_t t = 0; t < 3; ++t)
+      threads.emplace_back([&, t] {
+        for (size_t i = t; i < count; i += 3) {
+          std::vector<uint8_t> first, last;
+          EXPECT_EQ(pieces.load(i, first, last), again);
+          if (!again) pieces.save(i, first = bytes_of(i), last = bytes_of(i + 1));
+          EXPECT_TRUE(first == bytes_of(i) && last == bytes_of(i + 1)) << i;
+        }
+      });
+    for (std::thread& thread : threads) thread.join();
+  }
+  EXPECT_TRUE(warnings.empty());
+}
+
 // Every byte of the file flipped in its turn: pieces that are damaged are made again, and all others are there.
 TEST_F(Checkpoints, FlippedBitsCostTheirPiecesAlone) {
   run();
