@@ -38,14 +38,37 @@ Mat3 groove_frame(const Scene& scene, const Triangle& t, Vec2 tile, Vec3 normal)
   return {x, cross(normal, x), normal};
 }
 
+namespace {
+
+// At a place on a triangle, as many coefficients as `out` has; what lamps there add too. False: nothing arrives.
+bool arriving_here(const ArrivingAt& at, const Hit& hit, const LocalLight& lamps, Vec3 place, std::vector<Vec3>& near,
+                   std::span<Vec3> out) {
+  const Corners* corners = at.corners.find(hit.triangle, hit.front);
+  if (!corners) return false;
+  const size_t n = size_t(sh_count(at.light.order)), count = std::min(n, out.size());
+  const float weights[3] = {1 - hit.u - hit.v, hit.u, hit.v};
+  const Vec3* from[3];
+  for (size_t i = 0; i < 3; ++i) from[i] = at.light.light.data() + size_t(corners->receiver[i]) * n;
+  for (size_t k = 0; k < count; ++k)
+    out[k] = weights[0] * from[0][k] + weights[1] * from[1][k] + weights[2] * from[2][k];
+  std::fill(out.begin() + ptrdiff_t(count), out.end(), Vec3(0.0f));
+  if (lamps.lamps.empty()) return true;
+  near.resize(out.size());
+  light_at(lamps, place, near);
+  for (size_t k = 0; k < out.size(); ++k) out[k] += near[k] - lamps.distant[k];
+  return true;
+}
+
+}  // namespace
+
 Result<Image> render_transfer_texture(const Scene& scene, const Tracer& tracer, const ZonalTexture& texture,
                                       const TextureUse& use, const LocalLight& light, const Camera& camera,
-                                      const RenderOptions& options, Progress* progress) {
+                                      const RenderOptions& options, Progress* progress, const ArrivingAt* arriving) {
   return render_surfaces(
       scene, tracer, camera, options,
       [&]() -> SurfaceShade {
-        return [&, values = std::vector<float>(texture.transfer.receiver_values()), here = light.distant](
-                   const Hit& hit, Vec3) mutable {
+        return [&, values = std::vector<float>(texture.transfer.receiver_values()), here = light.distant,
+                near = std::vector<Vec3>()](const Hit& hit, Vec3) mutable {
           const Triangle& t = scene.triangles[hit.triangle];
           Vec3 normal = normalize_or(interpolate(scene.normals, t, hit.u, hit.v), {0, 0, 1});
           if (!hit.front) normal = -normal;
@@ -61,7 +84,13 @@ Result<Image> render_transfer_texture(const Scene& scene, const Tracer& tracer, 
             sample_zonal_texture(texture, uv * use.tile, values);
             frame = texture_frame(scene, t, normal);
           }
-          if (!light.lamps.empty()) light_at(light, interpolate(scene.positions, t, hit.u, hit.v), here);
+          const Vec3 place = interpolate(scene.positions, t, hit.u, hit.v);
+          if (arriving) {
+            if (!arriving_here(*arriving, hit, light, place, near, here) && options.show != RenderOptions::Show::albedo)
+              return Vec3(0.0f);
+          } else if (!light.lamps.empty()) {
+            light_at(light, place, here);
+          }
           const Vec3 white = shade_zonal(texture.transfer, values, frame, here);
           if (options.show == RenderOptions::Show::radiosity) return white;
           const Vec3 colour = albedo(scene, t, hit.u, hit.v);
