@@ -93,7 +93,9 @@ const Option<R> table[] = {
      "none|sh"},
 
     {"transfer-texture", &R::transfer_texture, "Transfer textures", T,
-     "Shade the scene by this texture of zonal lobes, from `lambent patch`", 0, 0, nullptr, nullptr, true, true},
+     "Shade the scene by this texture of zonal lobes, from `lambent patch`; over a bake that kept incident light, in "
+     "the light that arrives there",
+     0, 0, nullptr, nullptr, true, true},
     {"tile", &R::tile, "Transfer textures", T,
      "U,V: its repetitions over the unit of texture coordinates; of grooves, across which they lie: 12,0 makes 12 "
      "along "

@@ -41,7 +41,7 @@ Result<TextureUse> texture_use(const DrawRequest& request, const ZonalTexture& t
 // The mesh, and the light that arrives at it where its bake knows that.
 struct TexturedScene {
   Scene scene;
-  std::optional<ArrivingLight> arriving;
+  std::optional<ArrivingLight> arriving, peaks;
   CornerReceivers corners;
 };
 
@@ -54,15 +54,23 @@ std::string cannot_light(const Baked& baked, const DrawRequest& request) {
   return "";
 }
 
-Result<ArrivingLight> arriving_at_mesh(const Baked& baked, const DrawRequest& request, const Surroundings& around) {
-  auto light = column_light(request, around, light_of(baked.surface.store), baked.scene.origin, false);
+Result<void> add_arriving(const Baked& baked, const DrawRequest& request, const Surroundings& around,
+                          TexturedScene& out) {
+  auto light = column_light(request, around, light_of(baked.surface.store), baked.scene.origin);
   if (!light) return light.error();
+  soften_peaks(*light);
   auto relighter = Relighter::make(baked.surface);
   if (!relighter) return Error{request.baked, relighter.error().message};
-  if (auto ok = relighter->set_light(light->projection.light); !ok) return Error{request.baked, ok.error().message};
-  Relit rows;
-  if (auto ok = relighter->relight({}, rows); !ok) return Error{request.baked, ok.error().message};
-  return arriving_light(rows, *outgoing_of(baked.surface));
+  for (const auto& [part, arriving] :
+       {std::pair(&light->projection.light, &out.arriving), std::pair(&light->peaks, &out.peaks)}) {
+    if (part->empty()) continue;
+    Relit rows;
+    if (auto ok = relighter->set_light(*part); !ok) return Error{request.baked, ok.error().message};
+    if (auto ok = relighter->relight({}, rows); !ok) return Error{request.baked, ok.error().message};
+    *arriving = arriving_light(rows, *outgoing_of(baked.surface));
+  }
+  out.corners = std::get<CornerReceivers>(baked.basis);
+  return {};
 }
 
 Result<TexturedScene> load_textured_scene(const DrawRequest& request, const Surroundings& around, const Job& job) {
@@ -71,13 +79,8 @@ Result<TexturedScene> load_textured_scene(const DrawRequest& request, const Surr
     auto baked = load_baked(request.baked);
     if (!baked) return baked.error();
     const std::string why = cannot_light(*baked, request);
-    if (!why.empty()) {
-      job.warn(request.baked + ": what was baked is left out, its shadows too, since " + why);
-    } else {
-      auto arriving = arriving_at_mesh(*baked, request, around);
-      if (!arriving) return arriving.error();
-      out.arriving = std::move(*arriving), out.corners = std::get<CornerReceivers>(baked->basis);
-    }
+    if (!why.empty()) job.warn(request.baked + ": what was baked is left out, its shadows too, since " + why);
+    else if (auto ok = add_arriving(*baked, request, around, out); !ok) return ok.error();
     out.scene = std::move(baked->scene);
   } else {
     auto scene = load_scene(request.baked);
@@ -111,7 +114,8 @@ Result<Drawing> draw_texture(const DrawRequest& request, const Job& job) {
   if (!light) return light.error();
   const LocalLight local = light->local();
   std::optional<ArrivingAt> arriving;
-  if (loaded->arriving) arriving.emplace(ArrivingAt{*loaded->arriving, loaded->corners});
+  if (loaded->arriving)
+    arriving.emplace(ArrivingAt{*loaded->arriving, loaded->corners, loaded->peaks ? &*loaded->peaks : nullptr});
   Drawing drawing;
   Result<View> view = Error{};
   for (const std::optional<Pose>& pose : *poses) {

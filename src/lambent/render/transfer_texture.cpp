@@ -1,4 +1,5 @@
 // Follows: local-deformable-prt, section 5, pixel by pixel.
+#include <lambent/relight/dering.h>
 #include <lambent/relight/zonal.h>
 #include <lambent/render/transfer_texture.h>
 
@@ -40,23 +41,37 @@ Mat3 groove_frame(const Scene& scene, const Triangle& t, Vec2 tile, Vec3 normal)
 
 namespace {
 
-// At a place on a triangle, as many coefficients as `out` has; what lamps there add too. False: nothing arrives.
-bool arriving_here(const ArrivingAt& at, const Hit& hit, const LocalLight& lamps, Vec3 place, std::vector<Vec3>& near,
-                   std::span<Vec3> out) {
-  const Corners* corners = at.corners.find(hit.triangle, hit.front);
-  if (!corners) return false;
-  const size_t n = size_t(sh_count(at.light.order)), count = std::min(n, out.size());
+// At a place on a triangle, as many coefficients as `out` has.
+void arriving_here(const ArrivingLight& light, const Corners& corners, const Hit& hit, std::span<Vec3> out) {
+  const size_t n = size_t(sh_count(light.order)), count = std::min(n, out.size());
   const float weights[3] = {1 - hit.u - hit.v, hit.u, hit.v};
   const Vec3* from[3];
-  for (size_t i = 0; i < 3; ++i) from[i] = at.light.light.data() + size_t(corners->receiver[i]) * n;
+  for (size_t i = 0; i < 3; ++i) from[i] = light.light.data() + size_t(corners.receiver[i]) * n;
   for (size_t k = 0; k < count; ++k)
     out[k] = weights[0] * from[0][k] + weights[1] * from[1][k] + weights[2] * from[2][k];
   std::fill(out.begin() + ptrdiff_t(count), out.end(), Vec3(0.0f));
-  if (lamps.lamps.empty()) return true;
-  near.resize(out.size());
-  light_at(lamps, place, near);
-  for (size_t k = 0; k < out.size(); ++k) out[k] += near[k] - lamps.distant[k];
-  return true;
+}
+
+// What leaves the relief, white, at a hit, given its values there; `here` and `near` are scratch.
+Vec3 shade_relief(const ZonalTransfer& transfer, std::span<const float> values, const Mat3& frame, const Hit& hit,
+                  Vec3 place, const LocalLight& light, const ArrivingAt* arriving, std::vector<Vec3>& here,
+                  std::vector<Vec3>& near) {
+  if (!arriving) {
+    if (!light.lamps.empty()) light_at(light, place, here);
+    return shade_zonal(transfer, values, frame, here);
+  }
+  const Corners* corners = arriving->corners.find(hit.triangle, hit.front);
+  if (!corners) return Vec3(0.0f);
+  arriving_here(arriving->light, *corners, hit, here);
+  if (!light.lamps.empty()) {
+    near.resize(here.size());
+    light_at(light, place, near);
+    for (size_t k = 0; k < here.size(); ++k) here[k] += near[k] - light.distant[k];
+  }
+  const Vec3 white = shade_zonal(transfer, values, frame, here);
+  if (!arriving->peaks) return white;
+  arriving_here(*arriving->peaks, *corners, hit, here);
+  return dering(white, shade_zonal(transfer, values, frame, here));
 }
 
 }  // namespace
@@ -84,14 +99,8 @@ Result<Image> render_transfer_texture(const Scene& scene, const Tracer& tracer, 
             sample_zonal_texture(texture, uv * use.tile, values);
             frame = texture_frame(scene, t, normal);
           }
-          const Vec3 place = interpolate(scene.positions, t, hit.u, hit.v);
-          if (arriving) {
-            if (!arriving_here(*arriving, hit, light, place, near, here) && options.show != RenderOptions::Show::albedo)
-              return Vec3(0.0f);
-          } else if (!light.lamps.empty()) {
-            light_at(light, place, here);
-          }
-          const Vec3 white = shade_zonal(texture.transfer, values, frame, here);
+          const Vec3 white = shade_relief(texture.transfer, values, frame, hit,
+                                          interpolate(scene.positions, t, hit.u, hit.v), light, arriving, here, near);
           if (options.show == RenderOptions::Show::radiosity) return white;
           const Vec3 colour = albedo(scene, t, hit.u, hit.v);
           return options.show == RenderOptions::Show::albedo ? colour : colour * white;

@@ -27,10 +27,12 @@ struct TextureUse {
   std::function<float(Vec2)> groove_map;  // optional: what the depth is multiplied by, at uv
 };
 
-// The light that arrives at a mesh, by receiver, and where those are.
+// The light that arrives at a mesh, by receiver, and where those are. `peaks`: what of it comes from the light's peaks,
+// by which pixels are kept from ringing (relight/dering.h); null: they are as they are.
 struct ArrivingAt {
   const ArrivingLight& light;
   const CornerReceivers& corners;
+  const ArrivingLight* peaks = nullptr;
 };
 
 // `light` has as many coefficients as the texture's order asks for. As render() otherwise; parts of the scene without
