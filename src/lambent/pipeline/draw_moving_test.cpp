@@ -91,7 +91,7 @@ TEST_F(DrawMoving, ALampIsSeenAndLightsTheFloorAndTheBall) {
   auto at = [&](int x, int y) { return drawing->frames[0].rgb[size_t(y) * 32 + size_t(x)]; };
   EXPECT_NEAR(at(7, 15).x, 8, 0.5f);  // the lamp itself
   // The floor at its foot: a ball's light, 8 (0.3 / d)^2 cos, of albedo 0.7; red leads.
-  const Vec3 foot = at(4, 16), side = at(21, 16);
+  const Vec3 foot = at(4, 16), side = at(18, 16);
   EXPECT_GT(foot.x, 0.1f);
   EXPECT_NEAR(foot.y / foot.x, 0.5f, 0.02f);
   EXPECT_GT(side.x, 0.05f);  // the ball's side towards it
