@@ -56,6 +56,7 @@ set(lambent_relight_sources
   src/lambent/relight/products.cpp
   src/lambent/relight/relight.cpp
   src/lambent/relight/relight_cpca.cpp
+  src/lambent/relight/relight_haar.cpp
   src/lambent/relight/relight_lattice.cpp
   src/lambent/relight/relighter.cpp
   src/lambent/relight/shining.cpp
@@ -64,6 +65,7 @@ set(lambent_relight_sources
   src/lambent/transfer/directional.cpp
   src/lambent/transfer/directional_convert.cpp
   src/lambent/transfer/field.cpp
+  src/lambent/transfer/haar_transfer.cpp
   src/lambent/transfer/indirect.cpp
   src/lambent/transfer/outgoing.cpp
   src/lambent/transfer/shells.cpp
