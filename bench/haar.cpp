@@ -111,7 +111,8 @@ void report_rate(const std::vector<std::vector<HaarEntry>>& rows, const CubeLigh
   const double seconds = least_processor_seconds(9, [&] { relight(t, terms, relit); });
   std::vector<uint64_t> stream(size_t{32} << 20, 1);
   uint64_t sum = 0;
-  const double read = least_processor_seconds(5, [&] { sum += std::accumulate(stream.begin(), stream.end(), uint64_t{0}); });
+  const double read =
+      least_processor_seconds(5, [&] { sum += std::accumulate(stream.begin(), stream.end(), uint64_t{0}); });
   report("haar, read", double(bytes) / seconds / 1e9, 0.5 * double(stream.size() * 8) / read / 1e9, "GB/s",
          "half of the rate at which memory is read",
          {{"bytes", bytes}, {"all_bytes", t.bytes()}, {"seconds", seconds}, {"kept", sum != 0}});
