@@ -170,8 +170,8 @@ std::vector<Vec3> arriving_at(const MovingReceivers& r, const Lattice& lattice, 
 
 // What the lamps among the objects add to receivers: the scene's (`self` null), or an object's, which does not light
 // itself.
-MovingCount add_lamps(const MovingScene& s, const MovingReceivers& receivers, const Mover* self,
-                      const std::vector<Mover>& movers, LampShader& shader, Relit& values) {
+MovingCount add_lamp_light(const MovingScene& s, const MovingReceivers& receivers, const Mover* self,
+                           const std::vector<Mover>& movers, LampShader& shader, Relit& values) {
   std::vector<std::vector<float>> open;
   std::vector<LampLight> lamps;
   std::vector<const PlacedObject*> objects;
@@ -260,14 +260,14 @@ Result<Image> draw_frame(const MovingScene& s, std::vector<Mover>& movers, doubl
   const MovingCount done = shaders.sky.shade(s.receivers, objects,
                                              {.light_order = s.light_order, .bounced = !d.baked.terms.empty()}, lights);
   if (s.has_peaks()) dering(drawn.relit, peaks);
-  add_lamps(s, s.receivers, nullptr, movers, shaders.lamps, drawn.relit);
+  add_lamp_light(s, s.receivers, nullptr, movers, shaders.lamps, drawn.relit);
   tally.pairs += done.pairs, tally.tiles += done.tiles;
   std::vector<Vec3> emission = d.emission;
   for (size_t i = 0; i < movers.size(); ++i) {
     std::vector<const PlacedObject*> others = objects;
     others.erase(others.begin() + ptrdiff_t(i));
     Relit relit = relight_object(s, movers[i], others, shaders.sky);
-    add_lamps(s, movers[i].receivers, &movers[i], movers, shaders.lamps, relit);
+    add_lamp_light(s, movers[i].receivers, &movers[i], movers, shaders.lamps, relit);
     append_object(drawn, movers[i], relit, emission);
   }
   tally.seconds += std::chrono::duration<double>(std::chrono::steady_clock::now() - start).count();
