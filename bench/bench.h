@@ -1,6 +1,7 @@
 #pragma once
 // Benchmarks print one JSON object a line: name, ours, limit (or peer), ratio, and what they ran on. Limits are
 // measured in the same run, on the same data. Nothing here is a test: machines are shared and noisy.
+#include <lambent/light/environment.h>
 #include <lambent/scene/scene.h>
 
 #include <nlohmann/json.hpp>
@@ -29,11 +30,14 @@ double least_seconds(int runs, F&& f) {
 
 // A shared mesh on a floor, if the data folder (LAMBENT_DATA, or ../shared/data beside the repository) is there.
 std::optional<Scene> data_scene(const std::string& name, bool ground);
+// The same of an environment, by its name without .hdr.
+std::optional<Environment> data_environment(const std::string& name);
 
 void bench_bake();
 void bench_basis();
 void bench_certificate();
 void bench_error();
+void bench_haar();
 void bench_lightmaps();
 void bench_load();
 void bench_moving();

@@ -1,6 +1,7 @@
 #include "bench.h"
 
 #include <lambent/core/parallel.h>
+#include <lambent/light/environment.h>
 #include <lambent/scene/load.h>
 #include <lambent/scene/refine.h>
 
@@ -36,6 +37,19 @@ std::optional<Scene> data_scene(const std::string& name, bool ground) {
   return std::move(*scene);
 }
 
+std::optional<Environment> data_environment(const std::string& name) {
+  const char* given = std::getenv("LAMBENT_DATA");
+  const std::filesystem::path repository = std::filesystem::path(__FILE__).parent_path().parent_path();
+  const std::filesystem::path folder = given ? std::filesystem::path(given)
+                                             : repository.parent_path() / "shared" / "data";
+  auto env = load_environment((folder / "environments" / (name + ".hdr")).string());
+  if (!env) {
+    fmt::print(stderr, "skipped: {}\n", env.error().text());
+    return std::nullopt;
+  }
+  return std::move(*env);
+}
+
 }  // namespace lambent::bench
 
 int main(int argc, char** argv) {
@@ -50,18 +64,19 @@ int main(int argc, char** argv) {
     bool asked = false;  // run where it is named alone: it takes minutes
   };
   const Bench all[] = {
-      {"bake", bench_bake},           {"basis", bench_basis},       {"certificate", bench_certificate, true},
-      {"error", bench_error},         {"products", bench_products}, {"radiosity", bench_radiosity},
-      {"lightmaps", bench_lightmaps}, {"load", bench_load},         {"moving", bench_moving},
-      {"relight", bench_relight},     {"rooms", bench_rooms, true}, {"scale", bench_scale, true},
-      {"scaling", bench_scaling},     {"zonal", bench_zonal},       {"window", bench_window}};
+      {"bake", bench_bake},           {"basis", bench_basis},         {"certificate", bench_certificate, true},
+      {"error", bench_error},         {"haar", bench_haar},           {"products", bench_products},
+      {"radiosity", bench_radiosity}, {"lightmaps", bench_lightmaps}, {"load", bench_load},
+      {"moving", bench_moving},       {"relight", bench_relight},     {"rooms", bench_rooms, true},
+      {"scale", bench_scale, true},   {"scaling", bench_scaling},     {"zonal", bench_zonal},
+      {"window", bench_window}};
   bool known = argc == 1;
   for (int i = 1; i < argc; ++i)
     for (const Bench& bench : all) known |= !std::strcmp(argv[i], bench.name);
   if (!known)
     return fmt::print(stderr,
                       "usage: lambent-bench [bake] [basis] [certificate] [error] [products] [radiosity] [lightmaps] "
-                      "[load] [moving] [relight] [rooms] [scale] [scaling] [zonal] [window]\n"),
+                      "[haar] [load] [moving] [relight] [rooms] [scale] [scaling] [zonal] [window]\n"),
            2;
   for (auto [name, run, asked] : all) {
     bool wanted = argc == 1 && !asked;

@@ -24,6 +24,7 @@ set(lambent_relight_headers
   lambent/light/environment.h
   lambent/light/project.h
   lambent/light/sky.h
+  lambent/relight/arriving.h
   lambent/relight/dering.h
   lambent/relight/indirect.h
   lambent/relight/lattice.h
@@ -32,11 +33,14 @@ set(lambent_relight_headers
   lambent/relight/moving.h
   lambent/relight/products.h
   lambent/relight/relight.h
+  lambent/relight/relight_haar.h
   lambent/relight/relighter.h
+  lambent/relight/shining.h
   lambent/relight/zonal.h
   lambent/transfer/cpca_transfer.h
   lambent/transfer/directional.h
   lambent/transfer/field.h
+  lambent/transfer/haar_transfer.h
   lambent/transfer/indirect.h
   lambent/transfer/lattice.h
   lambent/transfer/outgoing.h

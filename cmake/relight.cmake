@@ -44,6 +44,7 @@ set(lambent_relight_sources
   src/lambent/light/environment.cpp
   src/lambent/light/project.cpp
   src/lambent/light/sky.cpp
+  src/lambent/relight/arriving.cpp
   src/lambent/relight/factors.cpp
   src/lambent/relight/fix_light.cpp
   src/lambent/relight/indirect.cpp
@@ -55,13 +56,16 @@ set(lambent_relight_sources
   src/lambent/relight/products.cpp
   src/lambent/relight/relight.cpp
   src/lambent/relight/relight_cpca.cpp
+  src/lambent/relight/relight_haar.cpp
   src/lambent/relight/relight_lattice.cpp
   src/lambent/relight/relighter.cpp
+  src/lambent/relight/shining.cpp
   src/lambent/relight/zonal.cpp
   src/lambent/transfer/cpca_transfer.cpp
   src/lambent/transfer/directional.cpp
   src/lambent/transfer/directional_convert.cpp
   src/lambent/transfer/field.cpp
+  src/lambent/transfer/haar_transfer.cpp
   src/lambent/transfer/indirect.cpp
   src/lambent/transfer/outgoing.cpp
   src/lambent/transfer/shells.cpp

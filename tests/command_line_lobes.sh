@@ -126,6 +126,13 @@ expect 2 'below 1' patch --groove 1 --albedo 1 -o x.lpt
 expect 2 'shadows' bake corner.obj --transfer zonal --outgoing svd:2 --shadows off -o x.glb
 expect 0 'what was baked is left out' render corner.glb --transfer-texture relief.lpt --env uniform:1 --size 8x8 \
   -o card.png
+# Over a bake that kept incident light, by what arrives.
+expect 0 'rows' bake corner.obj --max-edge 0.5 --samples 64 --order 4 --incident-order 4 --bounces 1 --transfer matrix \
+  -o arriving.glb
+expect 0 '"arriving_order": 4' render arriving.glb --transfer-texture relief.lpt --env sky:elevation=40 --size 8x8 \
+  -o card.png --json
+expect 0 'since it is of the scene at rest' render arriving.glb --transfer-texture relief.lpt --env uniform:1 \
+  --deform twist:20,y --size 8x8 -o card.png
 expect 2 'lamp: does not go with transfer textures' render card.obj --transfer-texture relief.lpt --env uniform:1 \
   --lamp x=1,1,1 -o x.png
 expect 0 'paths' reference card.obj --ground --displace sky.png --heights 8 --env uniform:1 --size 8x8 --spp 1 \

@@ -110,6 +110,10 @@ expect 2 'baked: is needed' relight --env uniform:1
 expect 1 'lambent bake --transfer blocks' relight corner.glb --env uniform:1
 expect 2 'method: does not go with diffuse transfer: it is for blocks' render corner.glb --env uniform:1 \
   --method haar -o x.png
+expect 0 'by 50 terms' render blocks.glb --env sky:elevation=50 --size 24x16 --method columns:0.05 --terms 50 \
+  -o columns.exr
+expect 2 'terms: needs --method columns' render blocks.glb --env uniform:1 --terms 50 -o x.png
+expect 2 'columns:ERROR takes an error' render blocks.glb --env uniform:1 --method columns:2 -o x.png
 expect 2 'tolerance: needs --method blocks' render blocks.glb --env uniform:1 --method haar --tolerance 0.1 -o x.png
 expect 2 'window: does not go with blocks' render blocks.glb --env uniform:1 --window hann -o x.png
 expect 2 '\-\-method' render blocks.glb --env uniform:1 --method wavelets -o x.png

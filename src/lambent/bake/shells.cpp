@@ -39,9 +39,9 @@ Cone cone_towards(const Shells& shells, Vec3 point) {
 // point. `value` is given up to 64 directions, and fills as many numbers a channel, 64 apart.
 template <class Value>
 Result<Transfer> integrate(const Shells& shells, const ShellOptions& o, LightBasis light, int rows, int channels,
-                           const char* stage_name, Progress* progress, Value value) {
+                           Precision precision, const char* stage_name, Progress* progress, Value value) {
   const size_t n = size_t(sh_count(o.order)), count = shells.count();
-  WritableTransfer out = make_transfer(std::move(light), rows, channels, count, Precision::half);
+  WritableTransfer out = make_transfer(std::move(light), rows, channels, count, precision);
   ProgressStage stage(progress, stage_name, count);
   parallel_for(count, transfer_block, [&](size_t begin, size_t end) {
     alignas(64) float x[rays_at_once], y[rays_at_once], z[rays_at_once], values[3 * rays_at_once];
@@ -116,7 +116,7 @@ Result<Shells> make_shells(const Scene& scene, const ShellOptions& o) {
 Result<Field> bake_hidden(const Tracer& tracer, const Shells& shells, const ShellOptions& o, ShellReport* report,
                           Progress* progress) {
   const auto start = std::chrono::steady_clock::now();
-  auto t = integrate(shells, o, {.order = o.order}, 1, 1, "shells", progress,
+  auto t = integrate(shells, o, {.order = o.order}, 1, 1, Precision::half, "shells", progress,
                      [&](Vec3 point, const Directions& d, float* values) {
                        tracer.visible_fan(point, d, values);
                        for (size_t i = 0; i < d.count; ++i) values[i] = 1 - values[i];
@@ -133,8 +133,12 @@ Result<Field> bake_shining(const Scene& scene, const Tracer& tracer, const Shell
   if (std::none_of(scene.materials.begin(), scene.materials.end(),
                    [](const Material& m) { return m.emissive != Vec3(0.0f); }))
     return Error{scene.path, "has no emissive material that it could shine with"};
+  float brightest = 0;
+  for (const Material& m : scene.materials) brightest = std::max({brightest, m.emissive.x, m.emissive.y, m.emissive.z});
+  // 4 pi of the brightest times a harmonic is beyond what half a float holds.
+  const Precision precision = brightest > 500 ? Precision::single : Precision::half;
   auto t =
-      integrate(shells, o, {.groups = {"all"}}, sh_count(o.order), 3, "shining", progress,
+      integrate(shells, o, {.groups = {"all"}}, sh_count(o.order), 3, precision, "shining", progress,
                 [&](Vec3 point, const Directions& d, float* values) {
                   Hit hits[rays_at_once];
                   tracer.closest_fan(point, d, hits);

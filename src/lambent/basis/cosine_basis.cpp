@@ -2,6 +2,8 @@
 #include <lambent/basis/quadrature.h>
 #include <lambent/core/check.h>
 
+#include <algorithm>
+
 namespace lambent {
 
 CosineBasis make_cosine_basis(int order) {
@@ -54,6 +56,34 @@ void evaluate_cosine_basis(const CosineBasis& basis, Vec3 d, std::span<float> ou
     for (size_t k = 0; k <= j; ++k) sum += basis.from_sh[j * n + k] * y[k];
     out[j] = float(sum);
   }
+}
+
+std::vector<double> extend_below(const CosineBasis& basis, double below) {
+  const size_t n = size_t(basis.count());
+  const std::vector<double>& C = basis.to_sh;  // y = C z, so 1/pi * integral of y L cos is C X, and the Gram is C C^T
+  std::vector<double> A(n * n, 0.0), out(C), y(n);
+  for (const DirectionNode& node : direction_quadrature(2 * basis.order + 2, -1, 0)) {
+    evaluate_sh(basis.order, node.direction, y);
+    for (size_t i = 0; i < n; ++i)
+      for (size_t j = 0; j < n; ++j) A[i * n + j] += below * node.weight * y[i] * y[j];
+  }
+  for (size_t i = 0; i < n; ++i)
+    for (size_t j = 0; j < n; ++j)
+      for (size_t k = 0; k <= std::min(i, j); ++k) A[i * n + j] += C[i * n + k] * C[j * n + k];
+  // Gauss: A is symmetric and positive, so no pivots are sought.
+  for (size_t p = 0; p < n; ++p)
+    for (size_t i = p + 1; i < n; ++i) {
+      const double f = A[i * n + p] / A[p * n + p];
+      for (size_t j = p; j < n; ++j) A[i * n + j] -= f * A[p * n + j];
+      for (size_t j = 0; j < n; ++j) out[i * n + j] -= f * out[p * n + j];
+    }
+  for (size_t p = n; p-- > 0;)
+    for (size_t j = 0; j < n; ++j) {
+      double sum = out[p * n + j];
+      for (size_t k = p + 1; k < n; ++k) sum -= A[p * n + k] * out[k * n + j];
+      out[p * n + j] = sum / A[p * n + p];
+    }
+  return out;
 }
 
 }  // namespace lambent

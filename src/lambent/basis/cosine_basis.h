@@ -22,4 +22,9 @@ CosineBasis make_cosine_basis(int order);
 // Values of z_j at a unit direction of the upper hemisphere.
 void evaluate_cosine_basis(const CosineBasis& basis, Vec3 d, std::span<float> out);
 
+// order^2 x order^2, row-major, from X_j = 1/pi * integral of z_j L cos to harmonics over the whole sphere: those l
+// that minimise 1/pi * the integral of (sum l_k y_k - L)^2 cos above the horizon, plus `below` times that of (sum l_k
+// y_k)^2 under it. With `below` = 0 they agree with L's projection above, and are far too large under it.
+std::vector<double> extend_below(const CosineBasis& basis, double below);
+
 }  // namespace lambent

@@ -82,6 +82,12 @@ ShTileProduct make_sh_tile_product(int order_a, int order_b, int order_c) {
   return p;
 }
 
+const ShTileProduct& ShTileProducts::make(int a, int b, int c) {
+  auto& slot = made_[{a, b, c}];
+  if (!slot) slot = std::make_unique<const ShTileProduct>(make_sh_tile_product(a, b, c));
+  return *slot;
+}
+
 void multiply_sh_tile(const ShTileProduct& product, const float* a, const float* b, float* out) {
   HWY_DYNAMIC_DISPATCH(MultiplyTile)(product, a, b, out);
 }

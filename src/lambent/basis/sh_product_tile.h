@@ -3,6 +3,10 @@
 // which is sparse, with no search and no branch within a tile.
 #include <lambent/basis/sh_product.h>
 
+#include <map>
+#include <memory>
+#include <tuple>
+
 namespace lambent {
 
 // Functions in a tile; coefficient k of function i is at [k * sh_tile + i].
@@ -24,6 +28,19 @@ struct ShTileProduct {
 // Orders 1 .. max_sh_order. Entries grow as the fifth power of the orders: from about order 9 on multiply_sh() is
 // faster.
 ShTileProduct make_sh_tile_product(int order_a, int order_b, int order_c);
+
+// Tensors by their three orders, each made once.
+class ShTileProducts {
+ public:
+  const ShTileProduct& make(int order_a, int order_b, int order_c);
+  // Made before; any number of threads may ask.
+  const ShTileProduct& at(int order_a, int order_b, int order_c) const {
+    return *made_.at({order_a, order_b, order_c});
+  }
+
+ private:
+  std::map<std::tuple<int, int, int>, std::unique_ptr<const ShTileProduct>> made_;
+};
 
 // The products' first order_c bands. All begin on a cache line; out may not overlap the others.
 void multiply_sh_tile(const ShTileProduct& product, const float* a, const float* b, float* out);

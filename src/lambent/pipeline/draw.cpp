@@ -6,6 +6,7 @@
 #include <lambent/pipeline/draw_indirect.h>
 #include <lambent/pipeline/draw_moving.h>
 #include <lambent/pipeline/draw_texture.h>
+#include <lambent/pipeline/draw_wavelets.h>
 #include <lambent/pipeline/text.h>
 
 #include <fmt/format.h>
@@ -84,8 +85,8 @@ Result<Drawing> draw(const Baked& baked, const DrawRequest& request, const Job& 
   if (auto ok = check_draw(request, baked); !ok) return ok.error();
   if (std::holds_alternative<IndirectTransfer>(baked.surface.store)) return draw_indirect(baked, request, job);
   if (!request.place.empty()) return draw_moving(baked, request, job);
-  return std::holds_alternative<SightRows>(baked.surface.rows) ? draw_blocks(baked, request, job)
-                                                               : draw_columns(baked, request, job);
+  if (!std::holds_alternative<SightRows>(baked.surface.rows)) return draw_columns(baked, request, job);
+  return is_columns_method(request.method) ? draw_wavelets(baked, request, job) : draw_blocks(baked, request, job);
 }
 
 Result<Drawing> draw(const DrawRequest& request, const Job& job) {

@@ -1,6 +1,7 @@
 #include <lambent/pipeline/draw_moving.h>
 
 #include <lambent/pipeline/draw_columns.h>
+#include <lambent/pipeline/lamp_sight.h>
 #include <lambent/pipeline/place.h>
 #include <lambent/pipeline/text.h>
 #include <lambent/relight/dering.h>
@@ -23,6 +24,8 @@ namespace {
 struct Model {
   Baked baked;
   HiddenLight hidden;
+  std::optional<ShiningLight> shining;
+  std::vector<ShiningPoint> points;      // of what shines
   std::vector<Vec3> positions, normals;  // of receivers
   const Transfer& transfer() const { return std::get<Transfer>(baked.surface.store); }
 };
@@ -32,7 +35,11 @@ struct Mover {
   const Model* model = nullptr;
   PlacedObject placed = {};
   MovingReceivers receivers = {};
+  PlacedLamp lamp = {};  // of a model that shines
 };
+
+// Points of a lamp towards which a receiver looks past the scene.
+constexpr int lamp_sight_points = 32;
 
 // Normals of receivers at vertices, towards their side.
 std::vector<Vec3> receiver_normals(const Scene& scene, const VertexPlacement& at, size_t receivers) {
@@ -55,7 +62,12 @@ Result<std::unique_ptr<Model>> load_model(const std::string& path) {
       t->columns() != size_t(sh_count(t->light.order)))
     return Error{path, "is no diffuse bake at vertices by harmonics alone, as an object that moves is"};
   HiddenLight light = hidden_light(*hidden, max_sh_order);
-  auto model = std::make_unique<Model>(Model{std::move(*object), std::move(light), {}, {}});
+  auto model = std::make_unique<Model>(Model{std::move(*object), std::move(light), {}, {}, {}, {}});
+  if (const Field* shining = shining_of(model->baked)) {
+    model->shining = shining_light(*shining, max_sh_order);
+    model->points = shining_points(model->baked.scene, lamp_sight_points);
+    if (model->points.empty()) return Error{path, "shines, and has no material that does"};
+  }
   const auto& where = std::get<VertexPlacement>(model->baked.surface.where);
   const size_t count = receivers_of(model->baked.surface.store);
   model->positions = receiver_positions(model->baked.scene.positions, where, count);
@@ -78,6 +90,8 @@ struct MovingScene {
   Relit all, peaks;
   FreeSpace space;
   int light_order = 0;
+  std::optional<Tracer> tracer;  // of the scene alone, where lamps move
+  float diagonal = 0;
   bool has_peaks() const { return !d.light.peaks.empty(); }
 };
 
@@ -112,7 +126,9 @@ Result<MovingScene> make_moving_scene(ColumnDrawing& d) {
                 {},
                 {},
                 {},
-                direct.light.order};
+                direct.light.order,
+                {},
+                0};
   if (d.request.light_order) s.light_order = std::min(s.light_order, d.request.light_order);
   if (auto ok = d.relighters.front().relight({}, s.all); !ok) return Error{d.request.baked, ok.error().message};
   if (s.has_peaks())
@@ -152,6 +168,26 @@ std::vector<Vec3> arriving_at(const MovingReceivers& r, const Lattice& lattice, 
   return out;
 }
 
+// What the lamps among the objects add to receivers: the scene's (`self` null), or an object's, which does not light
+// itself.
+MovingCount add_lamp_light(const MovingScene& s, const MovingReceivers& receivers, const Mover* self,
+                           const std::vector<Mover>& movers, LampShader& shader, Relit& values) {
+  std::vector<std::vector<float>> open;
+  std::vector<LampLight> lamps;
+  std::vector<const PlacedObject*> objects;
+  for (const Mover& m : movers)
+    if (&m != self) objects.push_back(&m.placed);
+  for (const Mover& m : movers) {
+    if (!m.model->shining || &m == self) continue;
+    open.push_back(lamp_in_sight(*s.tracer, s.diagonal, receivers, m.model->points, m.model->hidden.shells.center,
+                                 m.placed.place));
+    lamps.push_back({&m.lamp, &m.placed});
+  }
+  for (size_t i = 0; i < lamps.size(); ++i) lamps[i].open = open[i];
+  if (lamps.empty()) return {};
+  return shader.add(receivers, lamps, objects, self ? LampResponse::transfer : LampResponse::cosine, values);
+}
+
 // One object's receivers under the others.
 Relit relight_object(const MovingScene& s, const Mover& m, std::span<const PlacedObject* const> others,
                      MovingShader& shader) {
@@ -168,7 +204,7 @@ Relit relight_object(const MovingScene& s, const Mover& m, std::span<const Place
   return all;
 }
 
-void append_object(RelitScene& into, const Mover& m, const Relit& relit) {
+void append_object(RelitScene& into, const Mover& m, const Relit& relit, std::vector<Vec3>& emission) {
   const auto& at = std::get<VertexPlacement>(m.model->baked.surface.where);
   const size_t first = into.receivers, vertices = into.scene.positions.size(), added = at.front.size();
   Scene moved = m.model->baked.scene;
@@ -176,7 +212,10 @@ void append_object(RelitScene& into, const Mover& m, const Relit& relit) {
   const Vec3 center = m.model->hidden.shells.center;
   for (Vec3& p : moved.positions) p = place.position + place.scale * (place.rotation * (p - center));
   for (Vec3& n : moved.normals) n = place.rotation * n;
+  if (m.model->shining || !emission.empty()) emission.resize(into.scene.materials.size(), Vec3(0.0f));
   append_scene(into.scene, moved);
+  if (m.model->shining)
+    for (const Material& material : moved.materials) emission.push_back(material.emissive);
   for (const auto& [side, more] : {std::pair(&into.front, &at.front), std::pair(&into.back, &at.back)}) {
     if (side->empty() && more->empty()) continue;
     side->resize(vertices, none);
@@ -188,6 +227,12 @@ void append_object(RelitScene& into, const Mover& m, const Relit& relit) {
   for (size_t r = 0; r < m.receivers.count; ++r) into.relit.set(first + r, 0, relit.at(r));
 }
 
+// Kept from frame to frame.
+struct MovingShaders {
+  MovingShader sky;
+  LampShader lamps;
+};
+
 // What was drawn, counted.
 struct MovingTally {
   size_t pairs = 0, tiles = 0;
@@ -195,7 +240,7 @@ struct MovingTally {
 };
 
 Result<Image> draw_frame(const MovingScene& s, std::vector<Mover>& movers, double time, const View& view,
-                         MovingShader& shader, std::set<std::string>& warned, MovingTally& tally) {
+                         MovingShaders& shaders, std::set<std::string>& warned, MovingTally& tally) {
   ColumnDrawing& d = s.d;
   const auto start = std::chrono::steady_clock::now();
   for (Mover& m : movers) {
@@ -203,6 +248,7 @@ Result<Image> draw_frame(const MovingScene& s, std::vector<Mover>& movers, doubl
     m.placed = place_object(model.hidden, place_at(m.file, time, d.scene().origin));
     m.receivers =
         moving_receivers(model.transfer(), model.positions, model.normals, model.hidden.shells.center, m.placed.place);
+    if (model.shining) m.lamp = place_lamp(*model.shining, m.placed.place);
     check_place(s, m, warned);
   }
   std::vector<const PlacedObject*> objects;
@@ -211,20 +257,24 @@ Result<Image> draw_frame(const MovingScene& s, std::vector<Mover>& movers, doubl
   Relit peaks = s.peaks;
   std::vector<MovingLight> lights{{d.light.projection.light, false, &drawn.relit}};
   if (s.has_peaks()) lights.push_back({d.light.peaks, false, &peaks});
-  const MovingCount done =
-      shader.shade(s.receivers, objects, {.light_order = s.light_order, .bounced = !d.baked.terms.empty()}, lights);
+  const MovingCount done = shaders.sky.shade(s.receivers, objects,
+                                             {.light_order = s.light_order, .bounced = !d.baked.terms.empty()}, lights);
   if (s.has_peaks()) dering(drawn.relit, peaks);
+  add_lamp_light(s, s.receivers, nullptr, movers, shaders.lamps, drawn.relit);
   tally.pairs += done.pairs, tally.tiles += done.tiles;
+  std::vector<Vec3> emission = d.emission;
   for (size_t i = 0; i < movers.size(); ++i) {
     std::vector<const PlacedObject*> others = objects;
     others.erase(others.begin() + ptrdiff_t(i));
-    append_object(drawn, movers[i], relight_object(s, movers[i], others, shader));
+    Relit relit = relight_object(s, movers[i], others, shaders.sky);
+    add_lamp_light(s, movers[i].receivers, &movers[i], movers, shaders.lamps, relit);
+    append_object(drawn, movers[i], relit, emission);
   }
   tally.seconds += std::chrono::duration<double>(std::chrono::steady_clock::now() - start).count();
   auto tracer = Tracer::build(drawn.scene);
   if (!tracer) return tracer.error();
   RenderOptions options{view.width, view.height, d.request.spp, d.around.background(), d.show.colour};
-  options.emission = d.emission;
+  options.emission = std::move(emission);
   if (!options.emission.empty()) options.emission.resize(drawn.scene.materials.size(), Vec3(0.0f));
   return render(drawn.scene, *tracer, corner_receivers(drawn.scene, drawn.front, drawn.back), drawn.relit, view.camera,
                 options, d.job.progress);
@@ -253,8 +303,6 @@ Result<Drawing> draw_moving(const Baked& baked, const DrawRequest& request, cons
   std::map<std::string, std::unique_ptr<Model>> models;
   auto movers = load_movers(request, models);
   if (!movers) return movers.error();
-  for (const auto& [path, model] : models)
-    if (shining_of(model->baked)) job.warn(path + ": shines, and its light on what is around it is not drawn yet");
   auto begun = begin_columns(baked, request, job);
   if (!begun) return begun.error();
   ColumnDrawing& d = *begun;
@@ -273,12 +321,18 @@ Result<Drawing> draw_moving(const Baked& baked, const DrawRequest& request, cons
   if (auto ok = make_relighters(d); !ok) return ok.error();
   auto scene = make_moving_scene(d);
   if (!scene) return scene.error();
+  if (std::any_of(movers->begin(), movers->end(), [](const Mover& m) { return m.model->shining.has_value(); })) {
+    auto tracer = Tracer::build(d.scene(), job.progress);
+    if (!tracer) return tracer.error();
+    const Bounds box = bounds(d.scene());
+    scene->tracer = std::move(*tracer), scene->diagonal = length(box.max - box.min);
+  }
   Drawing drawing;
-  MovingShader shader;
+  MovingShaders shaders;
   MovingTally tally;
   std::set<std::string> warned;
   for (double time : times) {
-    auto image = draw_frame(*scene, *movers, time, *view, shader, warned, tally);
+    auto image = draw_frame(*scene, *movers, time, *view, shaders, warned, tally);
     if (!image) return image.error();
     drawing.frames.push_back(std::move(*image));
   }

@@ -68,6 +68,35 @@ TEST_F(DrawMoving, ABallOverAFloorDarkensItAndIsLit) {
   EXPECT_NEAR(at(after, 25, 16), 0.5f, 0.1f);  // its top is under the open sky
 }
 
+TEST_F(DrawMoving, ALampIsSeenAndLightsTheFloorAndTheBall) {
+  make_files();
+  Scene lamp = make_sphere(0.3f, 2, Vec3(0.2f));
+  lamp.materials[0].emissive = Vec3(8, 4, 2);
+  BakeRequest bake_lamp;
+  bake_lamp.loaded = std::make_shared<const Scene>(lamp), bake_lamp.scene = "lamp", bake_lamp.order = 4;
+  bake_lamp.samples = 16, bake_lamp.bounces = "0", bake_lamp.output = path("lamp.glb");
+  auto own = bake(bake_lamp);
+  ASSERT_TRUE(own) << own.error().text();
+  ASSERT_TRUE(save_baked(path("lamp.glb"), *own));
+  FieldRequest field{path("lamp.glb"), path("lamp.field.glb")};
+  field.shells = 8, field.side = 8, field.samples = 64, field.radiance = true;
+  field.given = {"shells", "side", "samples", "radiance"};
+  auto made = field_to_file(field);
+  ASSERT_TRUE(made) << made.error().text();
+  const std::string place = "l=" + path("lamp.field.glb") + "@-1,0.8,0";
+  DrawRequest r = request({place, ball_at("0.6,0.6,0")});
+  r.env = "uniform:0.001";
+  auto drawing = draw(r);
+  ASSERT_TRUE(drawing) << drawing.error().text();
+  auto at = [&](int x, int y) { return drawing->frames[0].rgb[size_t(y) * 32 + size_t(x)]; };
+  EXPECT_NEAR(at(7, 15).x, 8, 0.5f);  // the lamp itself
+  // The floor at its foot: a ball's light, 8 (0.3 / d)^2 cos, of albedo 0.7; red leads.
+  const Vec3 foot = at(4, 16), side = at(18, 16);
+  EXPECT_GT(foot.x, 0.1f);
+  EXPECT_NEAR(foot.y / foot.x, 0.5f, 0.02f);
+  EXPECT_GT(side.x, 0.05f);  // the ball's side towards it
+}
+
 TEST_F(DrawMoving, PathsMoveAndTurnWithTime) {
   make_files();
   write("path.json", R"({"times": [0, 2], "places": [[-1, 0.6, 0], [1, 0.6, 0, 0, 0, 720]]})");

@@ -83,7 +83,10 @@ const Option<R> table[] = {
      "bend:ANGLE[,along[,towards]] or twist:ANGLE[,along]: degrees from end to end, axes x, y or z"},
 
     {"method", &R::method, "Blocks", K,
-     "By blocks, standard (every texel), haar or haar:FRACTION (wavelets, kept coefficients)"},
+     "By blocks, standard (every texel), haar or haar:FRACTION (wavelets, kept coefficients), or columns or "
+     "columns:ERROR (wavelets of the transfer, diffuse, to that error of each receiver)"},
+    {"terms", &R::terms, "Blocks", K, "How many wavelets of the light are used, those that change most; 0: all", 0,
+     1 << 20, nullptr, "method=columns"},
     {"brdf-samples", &R::brdf_samples, "Blocks", K,
      "How many BRDF samples a block gets: bounded, by the error; paper, by its appendix A; full, 256", 0, 0,
      "bounded|paper|full", "method=blocks"},
@@ -93,7 +96,9 @@ const Option<R> table[] = {
      "none|sh"},
 
     {"transfer-texture", &R::transfer_texture, "Transfer textures", T,
-     "Shade the scene by this texture of zonal lobes, from `lambent patch`", 0, 0, nullptr, nullptr, true, true},
+     "Shade the scene by this texture of zonal lobes, from `lambent patch`; over a bake that kept incident light, in "
+     "the light that arrives there",
+     0, 0, nullptr, nullptr, true, true},
     {"tile", &R::tile, "Transfer textures", T,
      "U,V: its repetitions over the unit of texture coordinates; of grooves, across which they lie: 12,0 makes 12 "
      "along "
@@ -122,6 +127,9 @@ constexpr Conflict conflicts[] = {
     {"move", "animation", "moves objects over a scene at rest: leave the animation out"},
     {"insert", "show=emission|bounce:|sum:", "is lit by all light at once: no --show of a part of it"},
     {"tolerance", "method=standard|haar", "needs --method blocks"},
+    {"tolerance", "method=columns", "needs --method blocks"},
+    {"brdf", "method=columns", "has no effect by --method columns, which is diffuse by base colour"},
+    {"indirect", "method=columns", "is not added by --method columns"},
     {"lamp", "show=albedo", "lights what --show albedo shows no light of"},
     {"sphere-lamp", "show=albedo|emission", "lights what --show leaves out"},
     {"window", "show=albedo|emission", "shapes light that --show leaves out"},

@@ -28,6 +28,7 @@ struct DrawRequest {
   // Blocks
   std::string method = "blocks", brdf_samples = "bounded", indirect = "none";
   float tolerance = 0.2f;
+  int terms = 0;  // of the light's wavelets; 0: all
   // Transfer textures
   std::string transfer_texture, tile = "1,1", groove_map;
   float groove_depth = 0, groove_width = 1;  // depth 0: the table's deepest

@@ -3,6 +3,7 @@
 #include <lambent/pipeline/draw_light.h>
 #include <lambent/pipeline/motion.h>
 #include <lambent/pipeline/relief.h>
+#include <lambent/relight/relighter.h>
 #include <lambent/render/transfer_texture.h>
 #include <lambent/scene/displace.h>
 #include <lambent/scene/load.h>
@@ -37,15 +38,59 @@ Result<TextureUse> texture_use(const DrawRequest& request, const ZonalTexture& t
   return use;
 }
 
-Result<Scene> load_textured_scene(const DrawRequest& request, const Job& job) {
-  auto scene = load_scene(request.baked);
-  if (!scene) return scene;
-  for (const std::string& warning : scene->warnings) job.warn(warning);
-  if (is_baked(request.baked))
-    job.warn(request.baked + ": what was baked is left out, its shadows too: a transfer texture shades itself alone");
-  if (scene->texcoords[0].empty())
+// The mesh, and the light that arrives at it where its bake knows that.
+struct TexturedScene {
+  Scene scene;
+  std::optional<ArrivingLight> arriving, peaks;
+  CornerReceivers corners;
+};
+
+// Why what was baked cannot light the relief; empty where it can.
+std::string cannot_light(const Baked& baked, const DrawRequest& request) {
+  const Outgoing* outgoing = outgoing_of(baked.surface);
+  if (!outgoing || outgoing->kind != OutgoingKind::map || !vertices_of(baked))
+    return "it did not keep the light that arrives (`lambent bake --transfer matrix` does)";
+  if (!request.animation.empty() || !request.deform.empty()) return "it is of the scene at rest, which moves here";
+  return "";
+}
+
+Result<void> add_arriving(const Baked& baked, const DrawRequest& request, const Surroundings& around,
+                          TexturedScene& out) {
+  auto light = column_light(request, around, light_of(baked.surface.store), baked.scene.origin);
+  if (!light) return light.error();
+  soften_peaks(*light);
+  auto relighter = Relighter::make(baked.surface);
+  if (!relighter) return Error{request.baked, relighter.error().message};
+  for (const auto& [part, arriving] :
+       {std::pair(&light->projection.light, &out.arriving), std::pair(&light->peaks, &out.peaks)}) {
+    if (part->empty()) continue;
+    Relit rows;
+    if (auto ok = relighter->set_light(*part); !ok) return Error{request.baked, ok.error().message};
+    if (auto ok = relighter->relight({}, rows); !ok) return Error{request.baked, ok.error().message};
+    *arriving = arriving_light(rows, *outgoing_of(baked.surface));
+  }
+  out.corners = std::get<CornerReceivers>(baked.basis);
+  return {};
+}
+
+Result<TexturedScene> load_textured_scene(const DrawRequest& request, const Surroundings& around, const Job& job) {
+  TexturedScene out;
+  if (is_baked(request.baked)) {
+    auto baked = load_baked(request.baked);
+    if (!baked) return baked.error();
+    const std::string why = cannot_light(*baked, request);
+    if (!why.empty()) job.warn(request.baked + ": what was baked is left out, its shadows too, since " + why);
+    else if (auto ok = add_arriving(*baked, request, around, out); !ok) return ok.error();
+    out.scene = std::move(baked->scene);
+  } else {
+    auto scene = load_scene(request.baked);
+    if (!scene) return scene.error();
+    out.scene = std::move(*scene);
+  }
+  for (const std::string& warning : out.scene.warnings) job.warn(warning);
+  if (out.scene.texcoords[0].empty())
     job.warn(request.baked + ": has no texture coordinates, so that the transfer texture shows as one colour");
-  return scene;
+  return out;
 }
 
 }  // namespace
@@ -58,29 +103,36 @@ Result<Drawing> draw_texture(const DrawRequest& request, const Job& job) {
   if (!texture) return texture.error();
   auto use = texture_use(request, *texture, job);
   if (!use) return use.error();
-  auto scene = load_textured_scene(request, job);
-  if (!scene) return scene.error();
-  auto poses = make_poses({request.animation, request.frames, request.deform, request.time}, *scene);
-  if (!poses) return poses.error();
   auto around = surroundings_of(request, job);
   if (!around) return around.error();
-  auto light = column_light(request, *around, LightBasis{.order = texture->transfer.order}, scene->origin, false);
+  auto loaded = load_textured_scene(request, *around, job);
+  if (!loaded) return loaded.error();
+  const Scene& scene = loaded->scene;
+  auto poses = make_poses({request.animation, request.frames, request.deform, request.time}, scene);
+  if (!poses) return poses.error();
+  auto light = column_light(request, *around, LightBasis{.order = texture->transfer.order}, scene.origin, false);
   if (!light) return light.error();
   const LocalLight local = light->local();
+  std::optional<ArrivingAt> arriving;
+  if (loaded->arriving)
+    arriving.emplace(ArrivingAt{*loaded->arriving, loaded->corners, loaded->peaks ? &*loaded->peaks : nullptr});
   Drawing drawing;
   Result<View> view = Error{};
   for (const std::optional<Pose>& pose : *poses) {
-    const Scene moved = pose ? posed(*scene, *pose) : *scene;
+    const Scene moved = pose ? posed(scene, *pose) : scene;
     if (drawing.frames.empty()) view = parse_view(request.camera, request.size, moved);
     if (!view) return view.error();
     auto tracer = Tracer::build(moved);
     if (!tracer) return tracer.error();
     const RenderOptions options{view->width, view->height, request.spp, around->background(), show->colour};
-    auto image = render_transfer_texture(moved, *tracer, *texture, *use, local, view->camera, options, job.progress);
+    auto image = render_transfer_texture(moved, *tracer, *texture, *use, local, view->camera, options, job.progress,
+                                         arriving ? &*arriving : nullptr);
     if (!image) return image.error();
     drawing.frames.push_back(std::move(*image));
   }
-  drawing.summary.json = {{"texels", texture->transfer.receivers}, {"frames", drawing.frames.size()}};
+  drawing.summary.json = {{"texels", texture->transfer.receivers},
+                          {"frames", drawing.frames.size()},
+                          {"arriving_order", loaded->arriving ? loaded->arriving->order : 0}};
   drawing.summary.lines.emplace_back(
       "texture", fmt::format("{} x {} {} of {} lobes", texture->width, texture->height,
                              texture->groove_depth > 0 ? "grooves" : "texels", texture->transfer.lobes));

@@ -30,8 +30,7 @@ const Option<R> table[] = {
     {"seed", &R::seed, "Rays", raw | baked, "Of the ray directions"},
     {"bounces", &R::bounces, "Rays", raw, "Reflections within the object, as `lambent bake` takes them"},
     {"radiance", &R::radiance, "Field", raw | baked,
-     "Also how its emissive materials shine, for programs that read the field: `lambent render` does not light by it "
-     "yet"},
+     "Also how its emissive materials shine: a lamp that moves, and lights the scene and other objects"},
 };
 
 Result<Baked> bake_object(const R& request, const Job& job) {
@@ -76,7 +75,6 @@ Result<Summary> field_to_file(const FieldRequest& request, const Job& job) {
   if (!hidden) return hidden.error();
   object->more.push_back(std::move(*hidden));
   if (request.radiance) {
-    job.warn(request.output + ": keeps how the object shines; `lambent render --place` does not light by it yet");
     auto shining = bake_shining(object->scene, *tracer, *shells, options, job.progress);
     if (!shining) return shining.error();
     object->more.push_back(std::move(*shining));

@@ -47,23 +47,19 @@ bool factor_of(const PlacedObject& object, const MovingReceivers& r, size_t firs
                AlignedVector<float>& factor, TileWork& work, size_t& pairs) {
   const size_t n = size_t(sh_count(object.light->order)), stride = object.stride();
   const float radius = object.radius(), reach = 0.25f * radius * radius / least;
-  const Mat3 back = transpose(object.place.rotation) * (1 / object.place.scale);
-  alignas(64) float x[sh_tile], y[sh_tile], z[sh_tile];
   uint8_t wanted[sh_tile];
   size_t met = 0;
   for (size_t i = 0; i < sh_tile; ++i) {
     const size_t at = first + std::min(i, count - 1);
-    const Vec3 from = r.positions[at] - object.place.position, own = back * from;
-    x[i] = own.x, y[i] = own.y, z[i] = own.z;
+    const Vec3 from = r.positions[at] - object.place.position;
     wanted[i] = i < count && dot(r.normals[at], from) < radius && dot(from, from) < reach;
     met += wanted[i];
   }
   if (met == 0) return false;
   pairs += met;
-  mix_tile(object.light->shells, object.light->log_radii.data(), x, y, z, work.mix);
-  work.rows.resize(sh_tile * stride), factor.resize(n * sh_tile);
-  if (met < sh_tile) std::fill(work.rows.begin(), work.rows.end(), 0.0f);
-  hidden_of_tile(work.mix, wanted, size_t(object.light->shells.side), object.values.data(), stride, work.rows.data());
+  factor.resize(n * sh_tile);
+  rows_of_tile(object.light->shells, object.light->log_radii, object.place, object.values, stride,
+               std::span(r.positions).subspan(first, count), wanted, work.mix, work.rows);
   factor_of_tile(work.rows.data(), stride, n, whole_sphere, factor.data());
   return true;
 }
@@ -98,6 +94,20 @@ void light_of_tile(const float* rows, const MovingLight& light, size_t coefficie
 }
 
 }  // namespace
+
+void rows_of_tile(const Shells& shells, const std::vector<float>& log_radii, const RigidPlace& place,
+                  std::span<const float> values, size_t stride, std::span<const Vec3> positions, const uint8_t* wanted,
+                  TileMix& mix, AlignedVector<float>& rows) {
+  const Mat3 back = transpose(place.rotation) * (1 / place.scale);
+  alignas(64) float x[sh_tile], y[sh_tile], z[sh_tile];
+  for (size_t i = 0; i < sh_tile; ++i) {
+    const Vec3 own = back * (positions[std::min(i, positions.size() - 1)] - place.position);
+    x[i] = own.x, y[i] = own.y, z[i] = own.z;
+  }
+  mix_tile(shells, log_radii.data(), x, y, z, mix);
+  rows.assign(sh_tile * stride, 0.0f);
+  hidden_of_tile(mix, wanted, size_t(shells.side), values.data(), stride, rows.data());
+}
 
 HiddenLight hidden_light(const Field& field, int order) {
   const Transfer& t = std::get<Transfer>(field.store);
@@ -194,18 +204,13 @@ void light_receivers(const MovingReceivers& r, int light_order, const MovingLigh
   });
 }
 
-const ShTileProduct& MovingShader::product(int a, int b, int c) {
-  auto& slot = products_[{a, b, c}];
-  if (!slot) slot = std::make_unique<const ShTileProduct>(make_sh_tile_product(a, b, c));
-  return *slot;
-}
-
 MovingCount MovingShader::shade(const MovingReceivers& r, std::span<const PlacedObject* const> objects,
                                 const MovingOptions& options, std::span<const MovingLight> lights) {
   const size_t n = size_t(sh_count(r.order)), lit = size_t(sh_count(options.light_order));
   LAMBENT_CHECK(options.light_order >= 1 && options.light_order <= r.order);
   for (const PlacedObject* object : objects)  // before any thread asks
-    product(r.order, object->light->order, r.order), product(r.order, object->light->order, options.light_order);
+    products_.make(r.order, object->light->order, r.order),
+        products_.make(r.order, object->light->order, options.light_order);
   std::atomic<size_t> pairs{0}, worked{0};
   parallel_for(r.tiles.size(), 1, [&](size_t begin, size_t end) {
     thread_local TileWork work;
@@ -225,8 +230,7 @@ MovingCount MovingShader::shade(const MovingReceivers& r, std::span<const Placed
         const float* a = rows;
         for (size_t f = 0; f < factors; ++f) {
           const int bands = f + 1 == factors ? options.light_order : r.order;
-          multiply_sh_tile(*products_.at({r.order, work.orders[f], bands}), a, work.factors[f].data(),
-                           work.next.data());
+          multiply_sh_tile(products_.at(r.order, work.orders[f], bands), a, work.factors[f].data(), work.next.data());
           std::swap(work.product, work.next), a = work.product.data();
         }
         for (const MovingLight& light : lights) {

@@ -7,10 +7,6 @@
 #include <lambent/relight/relight.h>
 #include <lambent/transfer/field.h>
 
-#include <map>
-#include <memory>
-#include <tuple>
-
 namespace lambent {
 
 // x -> position + scale * rotation * (x - the centre of the object's shells).
@@ -92,8 +88,7 @@ class MovingShader {
                     const MovingOptions& options, std::span<const MovingLight> lights);
 
  private:
-  const ShTileProduct& product(int a, int b, int c);
-  std::map<std::tuple<int, int, int>, std::unique_ptr<const ShTileProduct>> products_;
+  ShTileProducts products_;
 };
 
 }  // namespace lambent

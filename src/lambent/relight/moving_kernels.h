@@ -19,6 +19,11 @@ void mix_tile(const Shells& shells, const float* log_radii, const float* x, cons
 void hidden_of_tile(const TileMix& mix, const uint8_t* wanted, size_t side, const float* values, size_t stride,
                     float* rows);
 
+// Both for an object where it stands: values mixed at as many places as `positions`, 0 where they are not wanted.
+void rows_of_tile(const Shells& shells, const std::vector<float>& log_radii, const RigidPlace& place,
+                  std::span<const float> values, size_t stride, std::span<const Vec3> positions, const uint8_t* wanted,
+                  TileMix& mix, AlignedVector<float>& rows);
+
 // factor[k * sh_tile + i] = (k = 0 ? all : 0) - rows[i * stride + k].
 void factor_of_tile(const float* rows, size_t stride, size_t coefficients, float all, float* factor);
 

@@ -1,4 +1,5 @@
 // Follows: local-deformable-prt, section 5, pixel by pixel.
+#include <lambent/relight/dering.h>
 #include <lambent/relight/zonal.h>
 #include <lambent/render/transfer_texture.h>
 
@@ -38,14 +39,51 @@ Mat3 groove_frame(const Scene& scene, const Triangle& t, Vec2 tile, Vec3 normal)
   return {x, cross(normal, x), normal};
 }
 
+namespace {
+
+// At a place on a triangle, as many coefficients as `out` has.
+void arriving_here(const ArrivingLight& light, const Corners& corners, const Hit& hit, std::span<Vec3> out) {
+  const size_t n = size_t(sh_count(light.order)), count = std::min(n, out.size());
+  const float weights[3] = {1 - hit.u - hit.v, hit.u, hit.v};
+  const Vec3* from[3];
+  for (size_t i = 0; i < 3; ++i) from[i] = light.light.data() + size_t(corners.receiver[i]) * n;
+  for (size_t k = 0; k < count; ++k)
+    out[k] = weights[0] * from[0][k] + weights[1] * from[1][k] + weights[2] * from[2][k];
+  std::fill(out.begin() + ptrdiff_t(count), out.end(), Vec3(0.0f));
+}
+
+// What leaves the relief, white, at a hit, given its values there; `here` and `near` are scratch.
+Vec3 shade_relief(const ZonalTransfer& transfer, std::span<const float> values, const Mat3& frame, const Hit& hit,
+                  Vec3 place, const LocalLight& light, const ArrivingAt* arriving, std::vector<Vec3>& here,
+                  std::vector<Vec3>& near) {
+  if (!arriving) {
+    if (!light.lamps.empty()) light_at(light, place, here);
+    return shade_zonal(transfer, values, frame, here);
+  }
+  const Corners* corners = arriving->corners.find(hit.triangle, hit.front);
+  if (!corners) return Vec3(0.0f);
+  arriving_here(arriving->light, *corners, hit, here);
+  if (!light.lamps.empty()) {
+    near.resize(here.size());
+    light_at(light, place, near);
+    for (size_t k = 0; k < here.size(); ++k) here[k] += near[k] - light.distant[k];
+  }
+  const Vec3 white = shade_zonal(transfer, values, frame, here);
+  if (!arriving->peaks) return white;
+  arriving_here(*arriving->peaks, *corners, hit, here);
+  return dering(white, shade_zonal(transfer, values, frame, here));
+}
+
+}  // namespace
+
 Result<Image> render_transfer_texture(const Scene& scene, const Tracer& tracer, const ZonalTexture& texture,
                                       const TextureUse& use, const LocalLight& light, const Camera& camera,
-                                      const RenderOptions& options, Progress* progress) {
+                                      const RenderOptions& options, Progress* progress, const ArrivingAt* arriving) {
   return render_surfaces(
       scene, tracer, camera, options,
       [&]() -> SurfaceShade {
-        return [&, values = std::vector<float>(texture.transfer.receiver_values()), here = light.distant](
-                   const Hit& hit, Vec3) mutable {
+        return [&, values = std::vector<float>(texture.transfer.receiver_values()), here = light.distant,
+                near = std::vector<Vec3>()](const Hit& hit, Vec3) mutable {
           const Triangle& t = scene.triangles[hit.triangle];
           Vec3 normal = normalize_or(interpolate(scene.normals, t, hit.u, hit.v), {0, 0, 1});
           if (!hit.front) normal = -normal;
@@ -61,8 +99,8 @@ Result<Image> render_transfer_texture(const Scene& scene, const Tracer& tracer, 
             sample_zonal_texture(texture, uv * use.tile, values);
             frame = texture_frame(scene, t, normal);
           }
-          if (!light.lamps.empty()) light_at(light, interpolate(scene.positions, t, hit.u, hit.v), here);
-          const Vec3 white = shade_zonal(texture.transfer, values, frame, here);
+          const Vec3 white = shade_relief(texture.transfer, values, frame, hit,
+                                          interpolate(scene.positions, t, hit.u, hit.v), light, arriving, here, near);
           if (options.show == RenderOptions::Show::radiosity) return white;
           const Vec3 colour = albedo(scene, t, hit.u, hit.v);
           return options.show == RenderOptions::Show::albedo ? colour : colour * white;

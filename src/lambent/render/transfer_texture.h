@@ -1,6 +1,8 @@
 #pragma once
 // Pictures of surfaces that carry a transfer texture: relief that shades itself, on any mesh, deforming or not. The
-// mesh itself casts no shadow. Source: local-deformable-prt, section 5.
+// mesh itself casts no shadow, unless it is known what light arrives at it. Source: local-deformable-prt, section 5.
+#include <lambent/receivers/receivers.h>
+#include <lambent/relight/arriving.h>
 #include <lambent/relight/local_light.h>
 #include <lambent/render/render.h>
 #include <lambent/transfer/zonal_texture.h>
@@ -25,10 +27,20 @@ struct TextureUse {
   std::function<float(Vec2)> groove_map;  // optional: what the depth is multiplied by, at uv
 };
 
+// The light that arrives at a mesh, by receiver, and where those are. `peaks`: what of it comes from the light's peaks,
+// by which pixels are kept from ringing (relight/dering.h); null: they are as they are.
+struct ArrivingAt {
+  const ArrivingLight& light;
+  const CornerReceivers& corners;
+  const ArrivingLight* peaks = nullptr;
+};
+
 // `light` has as many coefficients as the texture's order asks for. As render() otherwise; parts of the scene without
-// texture coordinates show the texture's first texel, or its plane.
+// texture coordinates show the texture's first texel, or its plane. `arriving`, where it is not null, takes the place
+// of distant light; sides that receive nothing are black, and near lamps still cast no shadow of the mesh.
 Result<Image> render_transfer_texture(const Scene& scene, const Tracer& tracer, const ZonalTexture& texture,
                                       const TextureUse& use, const LocalLight& light, const Camera& camera,
-                                      const RenderOptions& options, Progress* progress = nullptr);
+                                      const RenderOptions& options, Progress* progress = nullptr,
+                                      const ArrivingAt* arriving = nullptr);
 
 }  // namespace lambent
