@@ -173,7 +173,7 @@ std::vector<Vec3> arriving_at(const MovingReceivers& r, const Lattice& lattice, 
 MovingCount add_lamp_light(const MovingScene& s, const MovingReceivers& receivers, const Mover* self,
                            const std::vector<Mover>& movers, LampShader& shader, Relit& values) {
   std::vector<std::vector<float>> open;
-  std::vector<LampLight> lamps;
+  std::vector<SeenLamp> lamps;
   std::vector<const PlacedObject*> objects;
   for (const Mover& m : movers)
     if (&m != self) objects.push_back(&m.placed);

@@ -58,7 +58,7 @@ double joint_decibels(int order, bool with_ball) {
   const std::vector<ShiningPoint> points = shining_points(lamp.scene, 32);
   const std::vector<float> open =
       lamp_in_sight(*tracer, length(box.max - box.min), moving, points, lamp.hides.shells.center, lamp.lamp.place);
-  const LampLight lamps[] = {{&lamp.lamp, &lamp.object, open}};
+  const SeenLamp lamps[] = {{&lamp.lamp, &lamp.object, open}};
   const std::vector<const PlacedObject*> objects{&lamp.object, with_ball ? &ball.object : &lamp.object};
   Relit relit;
   relit.values.assign((moving.count + transfer_block - 1) / transfer_block * 3 * transfer_block, 0.0f);

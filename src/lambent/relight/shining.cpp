@@ -27,7 +27,7 @@ struct LampWork {
 };
 
 // The receivers of a tile that a lamp can reach; how many.
-size_t reached(const MovingReceivers& r, const LampLight& lamp, size_t first, size_t count, uint8_t* wanted) {
+size_t reached(const MovingReceivers& r, const SeenLamp& lamp, size_t first, size_t count, uint8_t* wanted) {
   size_t met = 0;
   for (size_t i = 0; i < sh_tile; ++i) {
     const size_t at = first + std::min(i, count - 1);
@@ -39,8 +39,8 @@ size_t reached(const MovingReceivers& r, const LampLight& lamp, size_t first, si
 }
 
 // Objects that may be nearer to some receiver of the tile than the lamp is and hide some of it, nearest first.
-void find_between(const MovingReceivers::Tile& tile, const LampLight& lamp,
-                  std::span<const PlacedObject* const> objects, LampWork& work) {
+void find_between(const MovingReceivers::Tile& tile, const SeenLamp& lamp, std::span<const PlacedObject* const> objects,
+                  LampWork& work) {
   work.between.clear();
   const float far = length(lamp.lamp->place.position - tile.center) + tile.radius;
   for (const PlacedObject* object : objects) {
@@ -52,7 +52,7 @@ void find_between(const MovingReceivers::Tile& tile, const LampLight& lamp,
 }
 
 // What an object lets pass of a lamp's light, by receiver; false where it is in nobody's way.
-bool lets_by(const PlacedObject& object, const MovingReceivers& r, const LampLight& lamp, size_t first, size_t count,
+bool lets_by(const PlacedObject& object, const MovingReceivers& r, const SeenLamp& lamp, size_t first, size_t count,
              const uint8_t* wanted, LampWork& work) {
   uint8_t nearer[sh_tile];
   size_t met = 0;
@@ -73,7 +73,7 @@ bool lets_by(const PlacedObject& object, const MovingReceivers& r, const LampLig
 }
 
 // What arrives of a lamp at a tile without anything in the way.
-void light_tile(const MovingReceivers& r, const LampLight& lamp, size_t first, size_t count, const uint8_t* wanted,
+void light_tile(const MovingReceivers& r, const SeenLamp& lamp, size_t first, size_t count, const uint8_t* wanted,
                 LampWork& work) {
   const ShiningLight& light = *lamp.lamp->light;
   const size_t stride = lamp.lamp->stride(), values = 3 * size_t(sh_count(light.order));
@@ -99,7 +99,7 @@ void cosines_of_tile(const MovingReceivers& r, int order, size_t first, size_t c
 }
 
 // Adds what of the tile's light leaves its receivers, which is never negative.
-void reflect_tile(const LampLight& lamp, int order, const float* const* response, size_t coefficients, size_t first,
+void reflect_tile(const SeenLamp& lamp, int order, const float* const* response, size_t coefficients, size_t first,
                   size_t count, const LampWork& work, Relit& values) {
   const size_t n = size_t(sh_count(order));
   for (size_t c = 0; c < 3; ++c) {
@@ -161,9 +161,9 @@ void arriving_from(const PlacedLamp& lamp, Vec3 point, std::span<Vec3> out) {
   }
 }
 
-MovingCount LampShader::add(const MovingReceivers& r, std::span<const LampLight> lamps,
+MovingCount LampShader::add(const MovingReceivers& r, std::span<const SeenLamp> lamps,
                             std::span<const PlacedObject* const> objects, LampResponse response, Relit& values) {
-  for (const LampLight& lamp : lamps)  // before any thread asks
+  for (const SeenLamp& lamp : lamps)  // before any thread asks
     for (const PlacedObject* object : objects)
       products_.make(lamp.lamp->light->order, object->light->order, lamp.lamp->light->order);
   std::atomic<size_t> pairs{0}, worked{0};
@@ -172,7 +172,7 @@ MovingCount LampShader::add(const MovingReceivers& r, std::span<const LampLight>
     uint8_t wanted[sh_tile];
     for (size_t tile = begin; tile < end; ++tile) {
       const size_t first = tile * sh_tile, count = std::min(sh_tile, r.count - first);
-      for (const LampLight& lamp : lamps) {
+      for (const SeenLamp& lamp : lamps) {
         const size_t met = reached(r, lamp, first, count, wanted);
         if (met == 0) continue;
         pairs += met, ++worked;

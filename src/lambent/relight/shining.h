@@ -30,7 +30,7 @@ PlacedLamp place_lamp(const ShiningLight& light, const RigidPlace& place);
 void arriving_from(const PlacedLamp& lamp, Vec3 point, std::span<Vec3> out);
 
 // A lamp over receivers.
-struct LampLight {
+struct SeenLamp {
   const PlacedLamp* lamp = nullptr;
   const PlacedObject* itself = nullptr;  // the same object as what hides: not in the way of its own light
   // By receiver: how much of what the lamp sends there is not held back by what is no object, [0, 1]. Empty: all.
@@ -46,7 +46,7 @@ class LampShader {
  public:
   // Adds the exit radiance of white receivers to `values`. An object is in the way of a receiver where its middle is
   // nearer than the lamp's. Every lamp counts, however far.
-  MovingCount add(const MovingReceivers& receivers, std::span<const LampLight> lamps,
+  MovingCount add(const MovingReceivers& receivers, std::span<const SeenLamp> lamps,
                   std::span<const PlacedObject* const> objects, LampResponse response, Relit& values);
 
  private:

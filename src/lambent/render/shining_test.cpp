@@ -51,7 +51,7 @@ Relit black(size_t count) {
 Relit lit(const MovingReceivers& r, const PlacedLamp& lamp, std::span<const PlacedObject* const> objects = {},
           const PlacedObject* itself = nullptr) {
   Relit out = black(r.count);
-  const LampLight lamps[] = {{&lamp, itself}};
+  const SeenLamp lamps[] = {{&lamp, itself}};
   LampShader().add(r, lamps, objects, LampResponse::cosine, out);
   return out;
 }
@@ -154,7 +154,7 @@ TEST(Shining, WhatIsBelowTheHorizonOrOutOfSightIsNotLit) {
   EXPECT_EQ(lit(r, placed).at(0), Vec3(0.0f));
   const float open[] = {1, 0.25f};
   Relit relit = black(2);
-  const LampLight lamps[] = {{&placed, nullptr, open}};
+  const SeenLamp lamps[] = {{&placed, nullptr, open}};
   LampShader().add(r, lamps, {}, LampResponse::cosine, relit);
   EXPECT_NEAR(relit.at(1).x, 0.25f * lit(r, placed).at(1).x, 1e-6f);
 }
