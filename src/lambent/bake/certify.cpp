@@ -1,5 +1,6 @@
 #include <lambent/bake/certify_field.h>
 #include <lambent/core/aligned.h>
+#include <lambent/core/check.h>
 #include <lambent/core/random.h>
 #include <lambent/core/ranks.h>
 
@@ -98,10 +99,11 @@ struct PlaceError {
   Vec3 at{0}, normal{0};
 };
 
-// The squared errors at all places, from two residuals at each.
+// The squared errors at all places, from two residuals at each. `beside`: what the field that these are of has more
+// than the one that is measured; empty where it is that.
 Result<void> measure_errors(const std::vector<ErrorPlace>& places, const ReflectedErrors* reflected, size_t width,
-                            uint32_t seed, std::vector<float> (&residuals)[2], std::vector<PlaceError>& measured,
-                            Progress* progress) {
+                            uint32_t seed, std::vector<float> (&residuals)[2], const std::vector<float>& beside,
+                            std::vector<PlaceError>& measured, Progress* progress) {
   std::vector<size_t> counting;
   ResidualPlaces at;
   for (size_t i = 0; i < places.size(); ++i) {
@@ -115,59 +117,17 @@ Result<void> measure_errors(const std::vector<ErrorPlace>& places, const Reflect
         add_reflected_errors(*reflected, at, uint32_t(hash64(seed, 0x2ef1 + k)), width, residuals[k].data(), progress);
     if (!ok) return ok;
   }
+  for (size_t j = 0; j < counting.size() && !beside.empty(); ++j)
+    for (auto& rows : residuals)
+      for (size_t k = 0; k < width; ++k) rows[j * width + k] += beside[counting[j] * width + k];
   for (size_t j = 0; j < counting.size(); ++j)
     for (size_t k = 0; k < width; ++k)
       measured[counting[j]].error2 += double(residuals[0][j * width + k]) * double(residuals[1][j * width + k]);
   return {};
 }
 
-}  // namespace
-
-Result<Certificate> certify_field(const Scene& scene, const Receivers& receivers, const FieldRow& field, size_t width,
-                                  const GatherAt& gather, size_t count, uint32_t seed, Progress* progress,
-                                  const ReflectedErrors* reflected, const FieldRow* again,
-                                  std::vector<MeasuredPlace>* kept) {
-  const std::vector<ErrorPlace> places = draw_places(scene, receivers, field, width, count, seed);
-  const float diagonal = bounds(scene).diagonal();
-  std::vector<PlaceError> measured(places.size());
-  std::vector<float> residuals[2];  // [place][width]
-  for (auto& rows : residuals) rows.resize(places.size() * width);
-  const Shares shares(places.size(), piece);
-  ProgressStage stage(progress, "measuring the error", shares.own());
-  shares.for_own([&](size_t begin, size_t end) {
-    AlignedVector<float> a(width), b(width), s(width), s2(width), row(width);
-    for (size_t i = begin; i < end && !stage.cancelled(); ++i) {
-      const ErrorPlace& at = places[i];
-      const Triangle& t = scene.triangles[at.triangle];
-      const Vec3 weight(1 - at.u - at.v, at.u, at.v);
-      Vec3 p(0), n(0);
-      for (int k = 0; k < 3; ++k) p += weight[k] * scene.positions[t.v[k]], n += weight[k] * scene.normals[t.v[k]];
-      Vec3 face = normalize(
-          cross(scene.positions[t.v[1]] - scene.positions[t.v[0]], scene.positions[t.v[2]] - scene.positions[t.v[0]]));
-      n = normalize_or(n, face);
-      if (dot(n, face) < 0) n = -n;
-      if (!at.front) n = -n, face = -face;
-      const Vec3 origin = p + face * receiver_lift(p, float(std::sqrt(area_of(scene, t))), diagonal);
-      if (!gather(origin, n, hash64(seed, 2 * i), a.data()) || !gather(origin, n, hash64(seed, 2 * i + 1), b.data()))
-        continue;
-      look_up(receivers, field, at.triangle, at.front, at.u, at.v, row, s);
-      if (again) look_up(receivers, *again, at.triangle, at.front, at.u, at.v, row, s2);
-      const AlignedVector<float>& other = again ? s2 : s;
-      PlaceError& m = measured[i];
-      m.counts = true, m.at = origin, m.normal = n;
-      for (size_t k = 0; k < width; ++k) {
-        residuals[0][i * width + k] = a[k] - s[k], residuals[1][i * width + k] = b[k] - other[k];
-        m.truth2 += double(a[k]) * double(b[k]);
-        m.noise2 += 0.5 * double(a[k] - b[k]) * double(a[k] - b[k]);
-      }
-    }
-    if (!stage.cancelled()) stage.advance(end - begin);
-  });
-  if (!none_cancelled(progress)) return Error{"", "cancelled"};
-  shares.gather(measured.data());
-  for (auto& rows : residuals) shares.gather(rows.data(), width);
-  if (auto ok = measure_errors(places, reflected, width, seed, residuals, measured, progress); !ok) return ok.error();
-
+Certificate sum_up(const Scene& scene, const std::vector<ErrorPlace>& places, const std::vector<PlaceError>& measured,
+                   std::vector<MeasuredPlace>* kept) {
   Certificate c;
   if (kept) kept->clear();
   double error2 = 0, truth2 = 0, noise2 = 0;
@@ -197,6 +157,67 @@ Result<Certificate> certify_field(const Scene& scene, const Receivers& receivers
   }
   c.uncertain = std::sqrt(spread) / truth2 / std::max(2 * c.error, 1e-12);
   return c;
+}
+
+}  // namespace
+
+Result<Certificate> certify_field(const Scene& scene, const Receivers& receivers, const FieldRow& field, size_t width,
+                                  const GatherAt& gather, size_t count, uint32_t seed, Progress* progress,
+                                  const ReflectedErrors* reflected, const FieldRow* again,
+                                  std::vector<MeasuredPlace>* kept) {
+  const std::vector<ErrorPlace> places = draw_places(scene, receivers, field, width, count, seed);
+  const float diagonal = bounds(scene).diagonal();
+  std::vector<PlaceError> measured(places.size());
+  std::vector<float> residuals[2];  // [place][width]
+  for (auto& rows : residuals) rows.resize(places.size() * width);
+  // e = (truth - read) + (read - field), of which the gathers' residuals and what comes back make the first.
+  const FieldRow* read = reflected ? reflected->read : nullptr;
+  LAMBENT_CHECK(!read || !again);
+  std::vector<float> beside(read ? places.size() * width : 0);
+  const Shares shares(places.size(), piece);
+  ProgressStage stage(progress, "measuring the error", shares.own());
+  shares.for_own([&](size_t begin, size_t end) {
+    AlignedVector<float> a(width), b(width), s(width), s2(width), row(width);
+    for (size_t i = begin; i < end && !stage.cancelled(); ++i) {
+      const ErrorPlace& at = places[i];
+      const Triangle& t = scene.triangles[at.triangle];
+      const Vec3 weight(1 - at.u - at.v, at.u, at.v);
+      Vec3 p(0), n(0);
+      for (int k = 0; k < 3; ++k) p += weight[k] * scene.positions[t.v[k]], n += weight[k] * scene.normals[t.v[k]];
+      Vec3 face = normalize(
+          cross(scene.positions[t.v[1]] - scene.positions[t.v[0]], scene.positions[t.v[2]] - scene.positions[t.v[0]]));
+      n = normalize_or(n, face);
+      if (dot(n, face) < 0) n = -n;
+      if (!at.front) n = -n, face = -face;
+      const Vec3 origin = p + face * receiver_lift(p, float(std::sqrt(area_of(scene, t))), diagonal);
+      if (!gather(origin, n, hash64(seed, 2 * i), a.data()) || !gather(origin, n, hash64(seed, 2 * i + 1), b.data()))
+        continue;
+      look_up(receivers, field, at.triangle, at.front, at.u, at.v, row, s);
+      if (again) look_up(receivers, *again, at.triangle, at.front, at.u, at.v, row, s2);
+      if (read) {
+        look_up(receivers, *read, at.triangle, at.front, at.u, at.v, row, s2);
+        for (size_t k = 0; k < width; ++k) beside[i * width + k] = s2[k] - s[k];
+        s = s2;
+      }
+      const AlignedVector<float>& other = again ? s2 : s;
+      PlaceError& m = measured[i];
+      m.counts = true, m.at = origin, m.normal = n;
+      for (size_t k = 0; k < width; ++k) {
+        residuals[0][i * width + k] = a[k] - s[k], residuals[1][i * width + k] = b[k] - other[k];
+        m.truth2 += double(a[k]) * double(b[k]);
+        m.noise2 += 0.5 * double(a[k] - b[k]) * double(a[k] - b[k]);
+      }
+    }
+    if (!stage.cancelled()) stage.advance(end - begin);
+  });
+  if (!none_cancelled(progress)) return Error{"", "cancelled"};
+  shares.gather(measured.data());
+  for (auto& rows : residuals) shares.gather(rows.data(), width);
+  if (read) shares.gather(beside.data(), width);
+  if (auto ok = measure_errors(places, reflected, width, seed, residuals, beside, measured, progress); !ok)
+    return ok.error();
+
+  return sum_up(scene, places, measured, kept);
 }
 
 Result<Certificate> certify(const Scene& scene, const Receivers& receivers, const float* rows, size_t width,

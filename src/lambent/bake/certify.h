@@ -14,6 +14,9 @@ namespace lambent {
 // From any thread.
 using GatherAt = std::function<bool(Vec3 origin, Vec3 normal, uint64_t key, float* row)>;
 
+// The field's row at one of its receivers. From any thread.
+using FieldRow = std::function<void(uint32_t receiver, float* row)>;
+
 // What was measured.
 struct Certificate {
   // Relative RMS error of the field over all surfaces, by area: sqrt(mean |field - truth|^2 / mean |truth|^2). Noise

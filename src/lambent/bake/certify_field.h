@@ -5,9 +5,6 @@
 
 namespace lambent {
 
-// The field's row at one of its receivers. From any thread.
-using FieldRow = std::function<void(uint32_t receiver, float* row)>;
-
 // A place, and squares there that are right in the mean alone: of the error, which may be negative, and of the truth.
 struct MeasuredPlace {
   Vec3 at, normal;
@@ -16,8 +13,8 @@ struct MeasuredPlace {
 };
 
 // `reflected`, where not null: the gathers read a solution that has the field's errors, too. `again`: the same field
-// with noise of its own; with it, the field's noise does not count. `measured`, where not null, becomes the places that
-// counted. Errors: cancelled.
+// with noise of its own, and not together with `reflected->read`; with it, the field's noise does not count.
+// `measured`, where not null, becomes the places that counted. Errors: cancelled.
 Result<Certificate> certify_field(const Scene& scene, const Receivers& receivers, const FieldRow& field, size_t width,
                                   const GatherAt& gather, size_t places, uint32_t seed, Progress* progress = nullptr,
                                   const ReflectedErrors* reflected = nullptr, const FieldRow* again = nullptr,

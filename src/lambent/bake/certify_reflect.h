@@ -1,6 +1,7 @@
 #pragma once
 // What surfaces send back of their own errors. A gather whose bounce reads the stored solution does not see the part of
 // an error that this solution has, too: with the residual r = gather - stored, the error is e = r + B e.
+#include <lambent/bake/certify.h>
 #include <lambent/bake/gather.h>
 
 #include <functional>
@@ -12,6 +13,9 @@ namespace lambent {
 struct ReflectedErrors {
   const GatherSetup& setup;  // its geometry and albedo
   int bounces;
+  // The field that gathers read, where it is not the one that is measured: over the same receivers, of as many bounces,
+  // with errors of its own, which are those that come back.
+  const FieldRow* read = nullptr;
 };
 
 // Places where residuals were measured.

@@ -390,8 +390,9 @@ Result<float> lightmap_density(const Scene& scene, const Lamps& lamps, double er
   const double taken = std::clamp(wanted, density / 2, limit);
   if (remark)
     *remark = fmt::format("{:.3g} texels a unit, {} (at {:.3g} look-ups lose {:.1f}%)", taken,
-                          wanted > limit ? fmt::format("as many as --quality allows; light asks for {:.3g}", wanted)
-                                         : "as light asks for",
+                          wanted > limit
+                              ? fmt::format("all that --quality and --memory allow; light asks for {:.3g}", wanted)
+                              : "as light asks for",
                           density, 100 * lost[1]);
   return float(taken);
 }

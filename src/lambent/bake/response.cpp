@@ -5,6 +5,7 @@
 #include <lambent/core/parallel.h>
 #include <lambent/core/sampling.h>
 
+#include <algorithm>
 #include <array>
 
 namespace lambent {
@@ -138,6 +139,35 @@ Result<std::vector<ViewMap>> make_responses(std::span<const LinearMaterial> mate
     }
   });
   return maps;
+}
+
+double energy_beyond(const Brdf& brdf, const CosineBasis& basis, int samples) {
+  constexpr int views = 8;
+  if (std::holds_alternative<Lambert>(brdf)) return 0;
+  // f is a colour: its luminance alone counts, in both sums. With c_j = 1/pi integral of f z_j cos, the span holds
+  // pi sum c_j^2.
+  const size_t n = size_t(basis.count());
+  double all = 0, held = 0;
+  std::vector<double> O(n);
+  std::vector<float> z(n);
+  for (int v = 0; v < views; ++v) {
+    const float cosine = std::sqrt((float(v) + 0.5f) / views), sine = std::sqrt(1 - cosine * cosine);
+    const float turn = 0.25f * pi * (float(v) + 0.5f) / views;  // between the axes of what is anisotropic
+    const Vec3 wo(sine * std::cos(turn), sine * std::sin(turn), cosine);
+    std::fill(O.begin(), O.end(), 0.0);
+    double squares = 0;
+    for (int s = 0; s < samples; ++s) {
+      const BrdfSample drawn = sample(brdf, wo, sobol_owen(uint32_t(s), 0x0b5e));
+      if (!(drawn.pdf > 0)) continue;
+      const double weight = double(luminance(drawn.weight));
+      evaluate_cosine_basis(basis, drawn.wi, z);
+      for (size_t j = 0; j < n; ++j) O[j] += weight * double(z[j]) / samples;
+      squares += weight * double(luminance(evaluate(brdf, drawn.wi, wo))) / samples;
+    }
+    all += squares;
+    for (double o : O) held += o * o / double(pi);
+  }
+  return all > 0 ? std::clamp(1 - held / all, 0.0, 1.0) : 0.0;
 }
 
 std::vector<double> phong_convolution(float exponent, int order) {

@@ -22,6 +22,11 @@ struct LinearMaterial {
 Result<std::vector<ViewMap>> make_responses(std::span<const LinearMaterial> materials, const CosineBasis& basis,
                                             int grid, int samples, Progress* progress = nullptr);
 
+// What the incident basis does not hold of a reflectance: of the integral of f^2 cos over the hemisphere, mean over
+// views by their cosine, the part outside the basis' span, [0, 1]. 0 for Lambert, near 1 for a mirror. `samples`
+// directions a view, drawn from the BRDF.
+double energy_beyond(const Brdf& brdf, const CosineBasis& basis, int samples = 4096);
+
 // O = sum_r g_r(wo) h_rj: the rows h and the weights g, by singular values of O weighed by the cosine of the view. At
 // most max_rows, and as few as leave a relative error (root of the weighed sum of squares) of `tolerance`.
 struct FactoredResponse {

@@ -65,5 +65,38 @@ TEST(Response, IsTheIntegralInEveryView) {
   }
 }
 
+// 1 - sum c_j^2 / (1/pi integral of f^2 cos), by cosine-distributed points and not by the BRDF's own.
+double plain_beyond(const Brdf& brdf, const CosineBasis& basis) {
+  constexpr uint32_t points = 1 << 14, views = 32;
+  double all = 0, held = 0;
+  std::vector<float> z(size_t(basis.count()));
+  for (uint32_t v = 0; v < views; ++v) {
+    const Vec3 wo = square_to_cosine_hemisphere(sobol_owen(v, 5));
+    std::vector<double> c(z.size(), 0.0);
+    for (uint32_t i = 0; i < points; ++i) {
+      const Vec3 wi = square_to_cosine_hemisphere(sobol_owen(i, 78));
+      const double f = double(luminance(evaluate(brdf, wi, wo)));
+      evaluate_cosine_basis(basis, wi, z);
+      for (size_t j = 0; j < z.size(); ++j) c[j] += f * double(z[j]) / points;
+      all += f * f / points;
+    }
+    for (double x : c) held += x * x;
+  }
+  return 1 - held / all;
+}
+
+TEST(Response, WhatTheBandsDoNotHoldIsTheIntegral) {
+  const CosineBasis four = make_cosine_basis(4), six = make_cosine_basis(6);
+  EXPECT_EQ(energy_beyond(Lambert{Vec3(0.5f)}, four), 0);
+  for (const float alpha : {0.36f, 0.6f}) {
+    const Ggx ggx{Vec3(0.9f, 0.6f, 0.3f), Vec2(alpha)};
+    EXPECT_NEAR(energy_beyond(ggx, four), plain_beyond(ggx, four), 0.04) << alpha;
+    EXPECT_NEAR(energy_beyond(ggx, six), plain_beyond(ggx, six), 0.04) << alpha;
+  }
+  // A lobe of few bands is held, one that is nearly a mirror is not.
+  EXPECT_LT(energy_beyond(Phong{Vec3(0.2f), Vec3(0.5f), 1}, six), 0.02);
+  EXPECT_GT(energy_beyond(Ggx{Vec3(1), Vec2(0.01f)}, six), 0.99);
+}
+
 }  // namespace
 }  // namespace lambent

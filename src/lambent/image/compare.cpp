@@ -23,9 +23,8 @@ void fill(Image& image, int x0, int y0, int width, int height, Vec3 color) {
     for (int x = std::max(x0, 0); x < std::min(x0 + width, image.width); ++x) image.at(x, y) = color;
 }
 
-}  // namespace
-
-Result<ImageDifference> compare_images(const Image& a, const Image& b, const Display& display, bool all) {
+// The pixels that are compared.
+Result<std::vector<size_t>> counted_pixels(const Image& a, const Image& b, bool all) {
   LAMBENT_CHECK(a.alpha.empty() || a.alpha.size() == a.rgb.size());
   LAMBENT_CHECK(b.alpha.empty() || b.alpha.size() == b.rgb.size());
   if (a.width != b.width || a.height != b.height)
@@ -40,7 +39,19 @@ Result<ImageDifference> compare_images(const Image& a, const Image& b, const Dis
     compared.push_back(i);
   }
   if (compared.empty()) return Error{"", "no pixel is covered"};
+  return compared;
+}
 
+double decibels(double square) {
+  return square > 0 ? -10 * std::log10(square) : std::numeric_limits<double>::infinity();
+}
+
+}  // namespace
+
+Result<ImageDifference> compare_images(const Image& a, const Image& b, const Display& display, bool all) {
+  auto counted = counted_pixels(a, b, all);
+  if (!counted) return counted.error();
+  const std::vector<size_t>& compared = *counted;
   Image shown_a = displayed(a, display), shown_b = displayed(b, display);
   std::vector<float> flip = flip_map(shown_b, shown_a);
   ImageDifference out;
@@ -57,9 +68,29 @@ Result<ImageDifference> compare_images(const Image& a, const Image& b, const Dis
   }
   double pixels = double(compared.size()), values = 3 * pixels;
   out.rmse = std::sqrt(squares / values), out.relative_mse = relative / values;
-  out.psnr = shown_squares > 0 ? -10 * std::log10(shown_squares / values) : std::numeric_limits<double>::infinity();
+  out.psnr = decibels(shown_squares / values);
   out.flip /= pixels, out.mean_a /= pixels, out.mean_b /= pixels;
   return out;
+}
+
+Result<UnnoisyDifference> compare_to_two(const Image& a, const Image& b, const Image& c, const Display& display,
+                                         bool all) {
+  auto counted = counted_pixels(a, b, all);
+  if (!counted) return counted.error();
+  if (auto ok = counted_pixels(a, c, all); !ok) return ok.error();
+  const Image shown_a = displayed(a, display), shown_b = displayed(b, display), shown_c = displayed(c, display);
+  const double pixels = double(counted->size());
+  double sum = 0, squares = 0, noise = 0;
+  for (size_t i : *counted) {
+    double product = 0;
+    for (int k = 0; k < 3; ++k) {
+      const double va = shown_a.rgb[i][k], vb = shown_b.rgb[i][k], vc = shown_c.rgb[i][k];
+      product += (va - vb) * (va - vc) / 3, noise += (vb - vc) * (vb - vc) / 12;
+    }
+    sum += product, squares += product * product;
+  }
+  const double mean = sum / pixels, within = 2 * std::sqrt(std::max(0.0, squares / pixels - mean * mean) / pixels);
+  return UnnoisyDifference{decibels(mean), decibels(mean + within), decibels(mean - within), decibels(noise / pixels)};
 }
 
 Image difference_picture(const Image& a, const Image& b, const Display& display, float white) {

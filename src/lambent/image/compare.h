@@ -19,6 +19,18 @@ struct ImageDifference {
 // Errors: sizes differ, or no pixel is covered, or a counted pixel is not finite.
 Result<ImageDifference> compare_images(const Image& a, const Image& b, const Display& display = {}, bool all = false);
 
+// What two references say of a picture, that are each as noisy as they like but independent (of different seeds).
+struct UnnoisyDifference {
+  // Of the displayed pictures, decibels, peak 1: -10 log10 of the mean of (a - b)(a - c), in which the noise of b and c
+  // is not. Infinite where that is not above 0. Noise that a display clips or bends does stay, as a bias.
+  double psnr = 0;
+  double least = 0, most = 0;  // with twice the standard error of that mean added and taken off
+  double noise = 0;            // what a PSNR against the mean of b and c can reach for a perfect `a`
+};
+// Pixels as in compare_images(), of `b` and `c` alike. Errors: as there.
+Result<UnnoisyDifference> compare_to_two(const Image& a, const Image& b, const Image& c, const Display& display = {},
+                                         bool all = false);
+
 // FLIP error of every pixel, [0, 1], of two displayed pictures of one size (sRGB-encoded values in [0, 1]) at the
 // viewing resolution `pixels_per_degree`. Source: Andersson et al. 2020, "FLIP: a difference evaluator for alternating
 // images".

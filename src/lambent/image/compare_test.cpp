@@ -289,6 +289,28 @@ TEST(Compare, AllCountsTheSurroundingsToo) {
   EXPECT_EQ(compare_images(a, b)->pixels, 2u);
 }
 
+TEST(Compare, TwoNoisyReferencesSayWhatOneOfThemCannot) {
+  // Off by 0.01 as displayed, each reference by noise of 0.05 / sqrt(3) at every pixel.
+  constexpr int size = 128;
+  auto shown = [](float v) { return srgb_decode(v); };
+  Image a = constant(size, size, Vec3(shown(0.51f))), b = a, c = a;
+  Random random(7);
+  for (Image* image : {&b, &c})
+    for (Vec3& v : image->rgb)
+      for (int k = 0; k < 3; ++k) v[k] = shown(0.5f + 0.1f * (random.next() - 0.5f));
+  auto d = compare_to_two(a, b, c);
+  ASSERT_TRUE(d);
+  EXPECT_NEAR(d->psnr, 40, 0.4);
+  EXPECT_LT(d->least, 40);
+  EXPECT_GT(d->most, 40);
+  EXPECT_LT(d->most - d->least, 1);
+  EXPECT_NEAR(d->noise, -10 * std::log10(0.01 / 12 / 2), 0.1);  // of the mean of both
+  EXPECT_LT(compare_images(a, mean_of(b, c))->psnr, 34);
+  EXPECT_EQ(compare_to_two(a, b, constant(3, 2, Vec3(0))).error().text(),
+            "pictures differ in size: 128 x 128 and 3 x 2");
+  EXPECT_EQ(compare_to_two(a, a, a)->psnr, INFINITY);
+}
+
 TEST(Compare, Errors) {
   Image a = constant(3, 2, Vec3(0.5f));
   EXPECT_EQ(compare_images(a, constant(2, 3, Vec3(0))).error().text(), "pictures differ in size: 3 x 2 and 2 x 3");

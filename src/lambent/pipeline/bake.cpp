@@ -87,10 +87,47 @@ Result<void> bake_diffuse(Bake& b) {
   return {};
 }
 
+// Lobes that the incident bands do not hold show blurred, and nothing after the bake brings them back.
+void warn_of_smooth_materials(Bake& b, const ReceiverMaterials& materials) {
+  constexpr double told = 0.1;
+  const CosineBasis basis = make_cosine_basis(b.plan.matrix.incident_order);
+  std::vector<size_t> receivers(materials.materials.size(), 0);
+  for (uint16_t m : materials.of_receiver) ++receivers[m];
+  double most = 0, mean = 0;
+  const Brdf* smoothest = nullptr;
+  size_t smooth = 0;
+  for (size_t m = 0; m < receivers.size(); ++m) {
+    if (receivers[m] == 0) continue;
+    const double beyond = energy_beyond(materials.materials[m].white, basis, 1024);
+    mean += beyond * double(receivers[m]) / double(materials.of_receiver.size());
+    if (beyond > told) smooth += receivers[m];
+    if (beyond > most) most = beyond, smoothest = &materials.materials[m].white;
+  }
+  b.summary.json["beyond_incident_bands"] = {{"most", most}, {"mean", mean}};
+  if (most <= told) return;
+  const auto* mixed = std::get_if<MetallicRoughness>(smoothest);
+  b.job.warn(fmt::format(
+      "{}: {:.0f} % of the energy of {} lies beyond {} incident bands, and is lost: it will look rougher than it is "
+      "({}`--transfer blocks` holds it)",
+      smooth == materials.of_receiver.size()
+          ? "all surfaces are too smooth"
+          : fmt::format("{} of {} receivers are on surfaces too smooth", human_count(smooth),
+                        human_count(materials.of_receiver.size())),
+      100 * most,
+      mixed ? fmt::format("the smoothest's reflection (metallic {:.2g}, roughness {:.2g})", mixed->metallic,
+                          mixed->roughness)
+            : std::string("their reflection"),
+      b.plan.matrix.incident_order,
+      b.plan.matrix.incident_order < max_incident_order
+          ? fmt::format("--incident-order {} holds more, ", max_incident_order)
+          : ""));
+}
+
 Result<void> bake_glossy(Bake& b) {
-  auto baked = bake_matrix(b.scene, b.tracer, b.receivers(),
-                           make_receiver_materials(b.scene, b.receivers(), b.plan.reflection), b.plan.bake,
-                           b.plan.matrix, &b.report, b.job.progress);
+  const ReceiverMaterials materials = make_receiver_materials(b.scene, b.receivers(), b.plan.reflection);
+  warn_of_smooth_materials(b, materials);
+  auto baked =
+      bake_matrix(b.scene, b.tracer, b.receivers(), materials, b.plan.bake, b.plan.matrix, &b.report, b.job.progress);
   if (!baked) return baked.error();
   b.store = std::move(baked->transfer), b.rows = std::move(baked->outgoing), b.terms = std::move(b.report.terms);
   return {};
@@ -102,8 +139,9 @@ Result<void> bake_factors(Bake& b) {
   visibility.order += b.plan.matrix.incident_order - 1, visibility.bounces = 0;
   auto transfer = bake(b.scene, b.tracer, b.receivers(), visibility, &b.report, b.job.progress);
   if (!transfer) return transfer.error();
-  b.rows = make_map_outgoing(make_receiver_materials(b.scene, b.receivers(), b.plan.reflection),
-                             b.plan.matrix.incident_order, b.plan.matrix, b.job.progress);
+  const ReceiverMaterials materials = make_receiver_materials(b.scene, b.receivers(), b.plan.reflection);
+  warn_of_smooth_materials(b, materials);
+  b.rows = make_map_outgoing(materials, b.plan.matrix.incident_order, b.plan.matrix, b.job.progress);
   if (is_cancelled(b.job.progress)) return Error{"", "cancelled"};
   b.store = FactoredTransfer{std::move(*transfer), b.plan.matrix.incident_order};
   return {};

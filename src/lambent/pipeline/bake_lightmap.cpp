@@ -9,6 +9,7 @@
 
 #include <fmt/format.h>
 
+#include <algorithm>
 #include <chrono>
 
 namespace lambent {
@@ -124,8 +125,12 @@ Result<BakeRequest> with_density(const BakeRequest& request, const BakePlan& pla
     out.atlas = "1024x1024";
     return out;
   }
-  auto density =
-      lightmap_density(scene, lamps, plan.lightmap.error, plan.most_texels, request.seed, &remark, job.progress);
+  // As many as working memory has room for, twice.
+  constexpr size_t many = 1 << 20;
+  const double each = double(least_lightmap_memory(many, lamps.groups(), plan.lightmap)) / many;
+  const size_t fit = size_t(double(plan.lightmap.memory) / (2 * std::max(each, 1.0)));
+  auto density = lightmap_density(scene, lamps, plan.lightmap.error, std::clamp<size_t>(fit, 1, plan.most_texels),
+                                  request.seed, &remark, job.progress);
   if (!density) return density.error();
   out.texels_per_unit = *density;
   return out;
@@ -172,6 +177,10 @@ Result<BakeOutcome> bake_lightmap_request(const BakeRequest& request, const Bake
   BakeOutcome out;
   out.summary = summarize(request, *map, report, seconds, moved, placed->atlas, density);
   summarize_error(plan, report, *scene, out.summary);
+  if (const Certificate& c = report.certificate;
+      plan.lightmap.error > 0 && c.error > plan.lightmap.error + 2 * c.uncertain)
+    job.warn(fmt::format("the lightmap's error is {:.1f}%, above the {:.3g}% asked for", 100 * c.error,
+                         100 * plan.lightmap.error));
   out.pictures = lightmap_pictures(*map, placed->receivers, request.light_groups);
   auto look = lightmap_look(*map, *scene, placed->receivers, plan.lightmap.directional);
   if (!look) return look.error();

@@ -124,9 +124,9 @@ struct Quality {
   double lightmap_error;
   size_t texels;  // of a lightmap, at most
 };
-const std::map<std::string, Quality> qualities{{"preview", {0.1, 5e-3f, 0.5, 30'000, 0.1, 60'000}},
-                                               {"good", {0.025, 2e-3f, 1, 150'000, 0.02, 400'000}},
-                                               {"final", {0.01, 5e-4f, 3, 1'000'000, 0.01, 2'000'000}}};
+const std::map<std::string, Quality> qualities{{"preview", {0.1, 2e-3f, 0.5, 30'000, 0.1, 60'000}},
+                                               {"good", {0.025, 5e-4f, 1, 150'000, 0.02, 2'500'000}},
+                                               {"final", {0.01, 1.25e-4f, 3, 1'000'000, 0.01, 8'000'000}}};
 
 // How well: rays and mesh.
 Result<void> plan_error(const BakeRequest& r, BakePlan& plan) {

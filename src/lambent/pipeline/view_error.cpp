@@ -18,7 +18,8 @@ namespace lambent {
 namespace {
 
 constexpr size_t places = 8192;
-constexpr int samples = 256;     // of each gather
+constexpr int samples = 256;  // of each gather
+constexpr int fresh_samples = 512;
 constexpr size_t averaged = 24;  // places around a pixel, of those that face as it does
 constexpr size_t looked_at = 64;
 constexpr float least_cosine = 0.5f;
@@ -83,6 +84,17 @@ Result<Asked> check(const Baked& baked) {
   return Asked{transfer, std::atoi(asked->bounces.c_str())};
 }
 
+// Adds a transfer to rows, [receiver][column][channel].
+void add_rows(const Transfer& t, size_t channels, size_t width, AlignedVector<float>& rows) {
+  const size_t columns = t.light.count();
+  for (size_t r = 0; r * width < rows.size(); ++r) {
+    const std::vector<float> row = load_receiver(t, r);
+    for (size_t k = 0; k < columns; ++k)
+      for (size_t c = 0; c < channels; ++c)
+        rows[r * width + k * channels + c] += row[std::min(c, size_t(t.channels) - 1) * columns + k];
+  }
+}
+
 Result<Certificate> measure(const Baked& baked, const Tracer& tracer, const Asked& asked,
                             std::vector<MeasuredPlace>& measured, Progress* progress) {
   const Scene& scene = baked.scene;
@@ -93,19 +105,18 @@ Result<Certificate> measure(const Baked& baked, const Tracer& tracer, const Aske
   const size_t channels = asked.bounces > 0 ? size_t(std::max(setup.channels, setup.sky_channels))
                                             : size_t(setup.sky_channels);
   const size_t width = pad_lanes(columns * channels);
-  // What surfaces send, of a bounce less, from rays of its own.
-  AlignedVector<float> met;
+  // A solution from rays of its own, and what surfaces send of it, of a bounce less.
+  AlignedVector<float> fresh, met;
   if (asked.bounces > 0) {
-    BakeOptions options{.order = t.light.order, .samples = 512, .bounces = asked.bounces - 1, .seed = 0x7e58};
-    options.precision = Precision::single, options.certify = false;
-    auto sent = bake(scene, tracer, own, options, nullptr, progress);
-    if (!sent) return sent.error();
+    BakeOptions options{.order = t.light.order, .samples = fresh_samples, .bounces = asked.bounces, .seed = 0x7e58};
+    options.precision = Precision::single, options.certify = false, options.keep_terms = true;
+    BakeReport report;
+    if (auto sent = bake(scene, tracer, own, options, &report, progress); !sent) return sent.error();
     met.assign(own.count() * width, 0.0f);
-    for (size_t r = 0; r < own.count(); ++r) {
-      const std::vector<float> row = load_receiver(*sent, r);
-      for (size_t k = 0; k < columns; ++k)
-        for (size_t c = 0; c < channels; ++c)
-          met[r * width + k * channels + c] = row[std::min(c, size_t(sent->channels) - 1) * columns + k];
+    for (size_t term = 0; term < report.terms.size(); ++term) {
+      if (term + 1 == report.terms.size()) fresh = met;
+      add_rows(report.terms[term], channels, width, term + 1 == report.terms.size() ? fresh : met);
+      report.terms[term] = {};
     }
   }
   Pool<GatherScratch, DeleteScratch> scratch([&] { return make_gather_scratch(setup); });
@@ -127,7 +138,8 @@ Result<Certificate> measure(const Baked& baked, const Tracer& tracer, const Aske
   };
   Receivers stored;
   stored.basis = baked.basis;
-  const ReflectedErrors reflected{setup, asked.bounces};
+  const FieldRow read = [&](uint32_t r, float* row) { std::copy_n(fresh.data() + size_t(r) * width, width, row); };
+  const ReflectedErrors reflected{setup, asked.bounces, asked.bounces > 0 ? &read : nullptr};
   return certify_field(scene, stored, field, width, gather, places, 0x7e59, progress, &reflected, nullptr, &measured);
 }
 

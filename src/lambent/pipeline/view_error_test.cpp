@@ -2,6 +2,9 @@
 #include <lambent/pipeline/view_error.h>
 #include <lambent/scene/procedural.h>
 
+#include "../bake/true_error_test-inl.h"
+#include "sanitizers.h"
+
 #include <gtest/gtest.h>
 
 namespace lambent {
@@ -48,6 +51,28 @@ TEST(ViewError, OfWhatIsRightIsNone) {
   auto view = view_error(make_wrong(1, plain), above, "64x90", {});
   ASSERT_TRUE(view) << view.error().text();
   EXPECT_LT(view->certificate.error, 0.003);
+}
+
+// Surfaces that send each other much of what is wrong with them: what comes back counts, and counts once.
+TEST(ViewError, InACornerIsTheTrueOne) {
+  SKIP_UNDER_SANITIZERS();
+  Scene scene;
+  const uint32_t white = add_material(scene, "white", Vec3(0.8f));
+  constexpr int cells = 5;
+  add_quad(scene, white, "floor", Vec3(-1, 0, -1), Vec3(0, 0, 2), Vec3(2, 0, 0), cells, cells);
+  add_quad(scene, white, "left", Vec3(-1, 0, -1), Vec3(0, 2, 0), Vec3(0, 0, 2), cells, cells);
+  add_quad(scene, white, "back", Vec3(-1, 0, -1), Vec3(2, 0, 0), Vec3(0, 2, 0), cells, cells);
+  add_quad(scene, white, "shelf", Vec3(-0.9f, 0.6f, -0.9f), Vec3(0, 0, 0.8f), Vec3(0.9f, 0, 0), cells, cells);
+  const Receivers receivers = make_vertex_receivers(scene);
+  const Tracer tracer = *Tracer::build(scene);
+  const BakeOptions options{.order = 3, .samples = 256, .bounces = 3, .precision = Precision::single};
+  Transfer stored = *bake(scene, tracer, receivers, options);
+  const double truth = test::true_error(scene, receivers, stored, options, 1024);
+  Baked baked = make_baked(std::move(scene), receivers, std::move(stored), DiffuseRows{});
+  baked.provenance = R"({"request": {"scene": "s.obj", "output": "s.glb", "bounces": "3"}})";
+  auto view = view_error(baked, "3,3,3,0,0.5,0,40", "64x90", {});
+  ASSERT_TRUE(view) << view.error().text();
+  EXPECT_NEAR(view->certificate.error / truth, 1, 0.15) << "truth " << truth;
 }
 
 TEST(ViewError, SaysWhatItDoesNotMeasure) {
