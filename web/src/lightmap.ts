@@ -35,7 +35,7 @@ import {
 import type { BakedTransfer, TransferSource } from './kinds.js';
 import type { Lighting } from './lighting.js';
 import { fragmentDeclarations, vertexBody, vertexDeclarations } from './lightmap_glsl.js';
-import { afterAll, LightSum, LightSums, maxColumns } from './light_sum.js';
+import { afterAll, LightSum, LightSums, maxColumns, setPeaks } from './light_sum.js';
 import {
   checkNodes,
   glassRefusal,
@@ -47,7 +47,7 @@ import {
   type NodeSum,
   type Renderer,
 } from './node_edition.js';
-import { chainHooks, copyNodes, diffuseParameters, replaceOnce, setPeaks, useExitRadiance } from './prt_material.js';
+import { chainHooks, copyNodes, diffuseParameters, replaceOnce, useExitRadiance } from './prt_material.js';
 import { drawFilter, type Drawn } from './see_through.js';
 import { shCount } from './sh.js';
 

@@ -19,7 +19,7 @@ import { LambentError } from './errors.js';
 import { readHeader, type TransferHeader } from './header.js';
 import { limits, type BakedTransfer, type TransferKind, type TransferSource } from './kinds.js';
 import type { Lighting } from './lighting.js';
-import { afterAll, LightSum, LightSums } from './light_sum.js';
+import { afterAll, LightSum, LightSums, setPeaks } from './light_sum.js';
 import {
   checkReflection,
   glossFragmentDeclarations,
@@ -36,7 +36,7 @@ import {
   type LastReflection,
 } from './outgoing.js';
 import { checkNodes, isNodeRenderer, onlyGlsl, setNodes, type Renderer } from './node_edition.js';
-import { diffuseParameters, replaceOnce, setPeaks, useExitRadiance } from './prt_material.js';
+import { diffuseParameters, replaceOnce, useExitRadiance } from './prt_material.js';
 import { drawFilter, type Drawn } from './see_through.js';
 import { shCount } from './sh.js';
 import { bindPart } from './vertex_transfer.js';
