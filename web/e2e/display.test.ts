@@ -146,7 +146,8 @@ describe.skipIf(!haveTool || !haveBrowser)('what the page shows of light', () =>
     expect(await page.evaluate(() => navigator.clipboard.readText())).toBe(page.url());
     const [download] = await Promise.all([page.waitForEvent('download'), page.click('#save')]);
     expect(download.suggestedFilename()).toBe('scene.png');
-    const png = readFileSync(await download.path());
+    await download.saveAs(at('saved.png'));
+    const png = readFileSync(at('saved.png'));
     expect([png.readUInt32BE(16), png.readUInt32BE(20)]).toEqual([640, 480]);
     await page.click('#spin');
     await page.waitForTimeout(300);

@@ -21,6 +21,7 @@ document.body.append(renderer.domElement);
 const gltf = await new GLTFLoader().register((parser) => new LambentTransferPlugin(parser)).loadAsync('scene.glb'),
   baked = bakedScene(gltf)!;
 const light = Lighting.fromEquirectangular(await new HDRLoader().setDataType(FloatType).loadAsync('sky.hdr'));
+light.intensity = 3;
 
 const scene = new Scene().add(gltf.scene, baked.lattice!.probeGrid(LightProbeGridWebGL)),
   camera = new PerspectiveCamera(40, innerWidth / innerHeight, 0.1, 50);
@@ -32,9 +33,12 @@ const balls = [0, 1, 2].map((i) => {
   return ball;
 });
 scene.add(...balls);
-renderer.setAnimationLoop((time) => {
-  light.rotation.setFromAxisAngle(new Vector3(0, 1, 0), time / 5000);
+
+const slider = document.querySelector('input')!;
+function turn(): void {
+  light.rotation.setFromAxisAngle(new Vector3(0, 1, 0), (slider.valueAsNumber * Math.PI) / 180);
   baked.relight(light);
-  balls.forEach((ball, i) => (ball.position.z = 0.3 + 0.5 * Math.sin(time / 2000 + i)));
   renderer.render(scene, camera);
-});
+}
+slider.addEventListener('input', turn);
+turn();

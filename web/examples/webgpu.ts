@@ -16,15 +16,22 @@ const gltf = await loader.loadAsync('scene.glb'),
   baked = bakedScene(gltf)!;
 baked.transfer.check(renderer);
 const light = Lighting.fromEquirectangular(await new HDRLoader().setDataType(FloatType).loadAsync('sky.hdr'));
+light.intensity = 3;
 
 const scene = new Scene().add(gltf.scene),
   camera = new PerspectiveCamera(40, innerWidth / innerHeight, 0.1, 50);
 camera.position.set(3, 2.5, 4.5);
 const controls = new OrbitControls(camera, renderer.domElement);
 controls.target.set(0, 0.6, 0);
-await renderer.setAnimationLoop((time: number) => {
-  controls.update();
-  light.rotation.setFromAxisAngle(new Vector3(0, 1, 0), time / 5000);
+controls.update();
+
+const slider = document.querySelector('input')!,
+  draw = (): void => renderer.render(scene, camera);
+function turn(): void {
+  light.rotation.setFromAxisAngle(new Vector3(0, 1, 0), (slider.valueAsNumber * Math.PI) / 180);
   baked.relight(light);
-  renderer.render(scene, camera);
-});
+  draw();
+}
+controls.addEventListener('change', draw);
+slider.addEventListener('input', turn);
+turn();

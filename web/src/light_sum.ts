@@ -22,6 +22,7 @@ import {
 import type { BlockLayout } from './block_texture.js';
 import { LambentError } from './errors.js';
 import { limits } from './kinds.js';
+import type { Sums } from './turned.js';
 
 /** Compiles a material for light with peaks, or for light without. */
 export function setPeaks(material: Material, on: boolean): void {
@@ -252,27 +253,32 @@ export class LightSum extends DrawnPicture {
  * The two of a light: its rest, and its peaks where it has any, which what is drawn adds up; or one picture of both,
  * where they can be added before.
  */
-export class LightSums {
+export class LightSums implements Sums {
   readonly rest: LightSum;
-  /** The picture of the peaks; that of the rest where there are none. */
-  readonly peakTexture: { value: Texture };
+  /** That of the peaks is that of the rest where there are none. */
+  readonly pictures: { rest: Texture; peaks: Texture };
   private peaks: LightSum | undefined;
   hasPeaks = false;
 
-  constructor(private readonly make: () => LightSum) {
+  /** `eachIsLight`: so is every row, and is held at 0 or above by itself. */
+  constructor(
+    private readonly make: () => LightSum,
+    private readonly eachIsLight: boolean,
+  ) {
     this.rest = make();
-    this.peakTexture = { value: this.rest.target.texture };
+    this.pictures = { rest: this.rest.target.texture, peaks: this.rest.target.texture };
   }
 
-  /** `light` is [column][3]. `eachIsLight`: so is every row, and is held at 0 or above by itself. */
-  set(light: ArrayLike<number>, peaks: ArrayLike<number> | undefined, eachIsLight: boolean): void {
-    const inOne = eachIsLight && this.rest.takesPeaks;
+  /** `light` is [column][3]. */
+  set(light: ArrayLike<number>, peaks: ArrayLike<number> | undefined): void {
+    const { eachIsLight } = this,
+      inOne = eachIsLight && this.rest.takesPeaks;
     this.hasPeaks = peaks !== undefined && !inOne;
     this.rest.set(light, eachIsLight && peaks !== undefined, inOne ? peaks : undefined);
     if (!this.hasPeaks || !peaks) return;
     this.peaks ??= this.make();
     this.peaks.set(peaks, eachIsLight);
-    this.peakTexture.value = this.peaks.target.texture;
+    this.pictures.peaks = this.peaks.target.texture;
   }
 
   update(renderer: WebGLRenderer): void {

@@ -13,6 +13,7 @@ import type { BlockLayout } from './block_texture.js';
 import { setPeaks } from './light_sum.js';
 import { drawFilter, glassParameters, type Drawn } from './see_through.js';
 import { glossFragmentDeclarations, glossVaryings, glossVertexBody } from './outgoing.js';
+import type { TurnedSums } from './turned.js';
 import type { VertexSums } from './vertex_sum.js';
 
 /** Replaces one piece of a shader of three's; fails loudly where another version of three has no such piece. */
@@ -92,7 +93,7 @@ export interface PrtOptions {
   /** Instead of light: transfer . light, signed, in false colour; +-1 / gain are the ends of the scale. */
   falseColor?: { gain: { value: number } };
   /** With a shader that is summed. */
-  sums?: VertexSums;
+  sums?: TurnedSums<VertexSums>;
 }
 
 const vertexDeclarations = /* glsl */ `
@@ -308,7 +309,7 @@ export class PrtMaterial extends MeshBasicMaterial {
 
   override onBeforeRender(...drawn: Drawn): void {
     const { sums } = this.options;
-    sums?.update(drawn[0]);
+    sums?.update(drawn[0], drawn[4]);
     setPeaks(this, sums ? sums.hasPeaks : this.prtUniforms.prtHasPeaks.value);
     drawFilter(this, ...drawn);
   }
@@ -317,7 +318,7 @@ export class PrtMaterial extends MeshBasicMaterial {
     const { falseColor, rest, sums, shader: kind } = this.options;
     Object.assign(
       shader.uniforms,
-      sums ? sums.uniforms : this.prtUniforms,
+      sums ? { prtSums: sums.rest, prtPeakSums: sums.peaks } : this.prtUniforms,
       falseColor && { prtGain: falseColor.gain },
       rest && ('bones' in rest ? { prtRestBones: { value: rest.bones } } : { prtRestInverse: { value: rest.inverse } }),
     );

@@ -12,6 +12,7 @@ import {
 } from 'three';
 import type { BlockLayout } from './block_texture.js';
 import { LightSum, LightSums } from './light_sum.js';
+import type { Sums } from './turned.js';
 
 const columns = 2048; // receivers a row of the picture
 
@@ -44,9 +45,7 @@ interface Light {
   peaks: ArrayLike<number> | undefined;
 }
 
-export class VertexSums {
-  /** For shaders. */
-  readonly uniforms: { prtSums: { value: Texture }; prtPeakSums: { value: Texture } };
+export class VertexSums implements Sums {
   private readonly sums: LightSums;
   private light: Light | undefined;
   /** Of the processor. */
@@ -73,21 +72,25 @@ uint prtPick( const in ivec2 texel, out int row ) {
   return r < ${receivers} ? uint( r ) : 0xffffffffu;
 }`,
         }),
+      true,
     );
-    this.uniforms = { prtSums: { value: this.sums.rest.target.texture }, prtPeakSums: this.sums.peakTexture };
+  }
+
+  get pictures(): { rest: Texture; peaks: Texture } {
+    return this.table ? { rest: this.table, peaks: this.table } : this.sums.pictures;
   }
 
   get bytes(): number {
     return this.sums.rest.bytes;
   }
   get hasPeaks(): boolean {
-    return this.sums.hasPeaks;
+    return this.sums.hasPeaks && !this.table; // the table has both
   }
 
   /** `light` is [column][3]. */
   set(rest: ArrayLike<number>, peaks: ArrayLike<number> | undefined): void {
     this.light = { rest, peaks };
-    this.sums.set(rest, peaks, true);
+    this.sums.set(rest, peaks);
   }
 
   /** Throws LambentError where the graphics card has no texture of that size. */
@@ -123,8 +126,6 @@ uint prtPick( const in ivec2 texel, out int row ) {
         sums[4 * r + c] = peaks ? Math.max(sum, 0) + Math.max(peak, 0) : sum;
       }
     this.table.needsUpdate = true;
-    this.uniforms.prtSums.value = this.table;
-    this.sums.hasPeaks = false; // the table has both
   }
 
   dispose(): void {

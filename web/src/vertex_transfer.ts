@@ -36,6 +36,7 @@ import { surfaceFrame, type Lobe } from './lobes.js';
 import { checkReflection, reflectionBytes, reflectionUniforms, type LastReflection } from './outgoing.js';
 import { diffuseParameters, PrtMaterial, type PrtOptions, type PrtShader, type PrtUniforms } from './prt_material.js';
 import { shCount } from './sh.js';
+import { RestPose, TurnedSums } from './turned.js';
 import { VertexSums, type VertexSumOptions } from './vertex_sum.js';
 
 /** The part's mesh, its vertices with their receivers. */
@@ -132,8 +133,8 @@ export class VertexTransfer implements BakedTransfer {
   private readonly materials = new Map<string, PrtMaterial>();
   private readonly quads: number; // of the light, a channel
   private readonly summing: VertexSumOptions | undefined; // of a shader that is summed
-  private readonly sums: VertexSums | undefined; // for WebGLRenderer
-  private readonly ofCoefficients = new Set<VertexSums>();
+  private readonly sums: TurnedSums<VertexSums> | undefined; // for WebGLRenderer
+  private readonly ofCoefficients = new Set<TurnedSums<VertexSums>>();
   private readonly sum: NodeSum | undefined; // for WebGPURenderer
   /** Why WebGPURenderer does not draw this. */
   private refusal: string | undefined;
@@ -172,11 +173,11 @@ export class VertexTransfer implements BakedTransfer {
     const summing = { layout, transfer: this.texture, channels: header.channels, receivers: header.receivers };
     if (shader.summed) {
       this.summing = summing;
-      this.sums = new VertexSums(summing);
+      this.sums = new TurnedSums(() => new VertexSums(summing), header.order, new RestPose(meshes));
     }
     if (!this.refusal) this.sum = nodes!.sum(summing);
     let gpuBytes =
-      data.byteLength + (last ? reflectionBytes(last) : 0) + (this.sums?.bytes ?? 0) + (this.sum?.bytes ?? 0);
+      data.byteLength + (last ? reflectionBytes(last) : 0) + (this.sums?.main.bytes ?? 0) + (this.sum?.bytes ?? 0);
     for (const mesh of meshes) {
       const twoSided = mesh.geometry.hasAttribute('lambentReceiverBack');
       const rest = shader.turns ? this.restOf(mesh) : undefined;
@@ -258,7 +259,7 @@ export class VertexTransfer implements BakedTransfer {
   check(renderer: Renderer): void {
     if (isNodeRenderer(renderer)) return checkNodes(renderer, this.refusal);
     if (this.last) checkReflection(this.last, renderer);
-    this.sums?.check(renderer);
+    this.sums?.main.check(renderer);
     // Light and its peaks, and what three has of its own.
     const uniforms = 6 * this.quads + ownUniforms;
     if (!this.sums && renderer.capabilities.maxVertexUniforms < uniforms)
@@ -295,7 +296,8 @@ export class VertexTransfer implements BakedTransfer {
 
   coefficientMaterials(index: number, gain: { value: number }): Material[] {
     const light = new Float64Array(3 * shCount(this.order)).fill(1, 3 * index, 3 * index + 3);
-    const sums = this.summing && new VertexSums(this.summing);
+    const { summing } = this,
+      sums = summing && new TurnedSums(() => new VertexSums(summing), this.order);
     sums?.set(light, undefined);
     if (sums) this.ofCoefficients.add(sums);
     const uniforms = {
