@@ -1,6 +1,6 @@
 # Files of integrations/ that the tool carries and `lambent export` writes beside what they read.
 set(carried_files godot/lambent_lightmap.gd unity/LambentLightmap.cs unity/LambentProbes.hlsl unity/LambentImporter.cs
-  shaders/lambent_sky.gdshaderinc shaders/LambentSky.hlsl shaders/lambent_sky.glsl)
+  shaders/lambent_sky.gdshaderinc shaders/LambentSky.hlsl shaders/lambent_sky.glsl three/lambent_probes.js)
 set(carried_source ${CMAKE_CURRENT_BINARY_DIR}/carried_files.cpp)
 set(carried_text "#include \"lightmap_writer.h\"\n\nnamespace lambent::tool {\n\n")
 string(APPEND carried_text "const char* carried_file(const std::string& name) {\n")

@@ -58,6 +58,8 @@ expect 2 'godot-version' export map.glb --godot x --godot-version 4.2
 expect 2 'godot' export map.glb --three x --godot-version 4.4
 expect 2 'need --env' export map.glb --three x --probes map.glb
 expect 1 'no light in free space' export map.glb --three x --probes map.glb --env uniform:1
+expect 2 'needs --env' export map.glb --three-probes x
+expect 1 'no light in free space' export map.glb --three-probes x --env uniform:1
 expect 2 'says nothing here' export map.glb --three x --env uniform:1
 expect 2 'one file holds it all' export map.glb --moz-lightmap x.glb --sky-columns
 expect 2 'goes with --web alone' export map.glb --three x --camera 1,2,3,4,5,6,40

@@ -1,6 +1,7 @@
 #include "commands.h"
 #include "export_lightmap.h"
 #include "export_npy.h"
+#include "export_three_probes.h"
 #include "web.h"
 
 #include <fcntl.h>
@@ -19,7 +20,7 @@ namespace fs = std::filesystem;
 
 struct ExportCommand {
   WebOptions web;
-  std::string folder, three, moz, godot, unity, npy, convention = "pifu";
+  std::string folder, three, moz, godot, unity, npy, three_probes, convention = "pifu";
   LightmapExport lightmap;
 };
 
@@ -75,7 +76,7 @@ Result<void> write_folder(const fs::path& target, const WebFiles& files, const P
 
 // What the page alone shows says nothing of other files.
 Result<void> check_options(const ExportCommand& o, const CLI::App& command) {
-  const bool web = !o.folder.empty(), lightmap = !web && o.npy.empty();
+  const bool web = !o.folder.empty(), lightmap = !web && o.npy.empty() && o.three_probes.empty();
   for (const char* name : {"--compare", "--reference", "--camera", "--exposure", "--tone"})
     if (!web && command.count(name) > 0) return Error{name, "goes with --web alone", true};
   for (const char* name : {"--env", "--env-rotate"})
@@ -83,7 +84,7 @@ Result<void> check_options(const ExportCommand& o, const CLI::App& command) {
   for (const char* name : {"--per-object", "--sky-columns", "--probes"})
     if (!lightmap && command.count(name) > 0)
       return Error{name, "goes with --three, --moz-lightmap, --godot or --unity", true};
-  if (lightmap && o.web.env.size() > 1) return Error{"--env", "takes one environment here", true};
+  if (!web && o.web.env.size() > 1) return Error{"--env", "takes one environment here", true};
   return {};
 }
 
@@ -100,6 +101,9 @@ int run_export(Context& context, const ExportCommand& o, const CLI::App& command
     lightmap.light.rotate = o.web.rotate;
     return export_lightmap(context, lightmap);
   }
+  if (!o.three_probes.empty())
+    return export_three_probes(context, o.web.baked, o.three_probes,
+                               {o.web.env.empty() ? std::string() : o.web.env[0], o.web.rotate});
   if (!o.npy.empty()) return export_npy(context, o.web.baked, o.npy, o.convention);
   fs::path target = fs::path(o.folder).lexically_normal();
   if (!target.has_filename()) target = target.parent_path();  // "site/"
@@ -154,6 +158,10 @@ void add_export(CLI::App& app, Run& run) {
               "(--env's are written beside them)");
   c->add_option("--probes", o->lightmap.probes,
                 "Of a lightmap: probes too, from this file, baked with --lattice, in the light of --env");
+  target->add_option(
+      "--three-probes", o->three_probes,
+      "PREFIX for three.js: the light of a file baked with --lattice under --env, as LightProbeGrid keeps "
+      "it, and the script that loads it");
   target->require_option(1);
   c->callback([o, c, &run] { run = [o, c](Context& context) { return run_export(context, *o, *c); }; });
 }

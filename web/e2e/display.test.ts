@@ -123,40 +123,78 @@ describe.skipIf(!haveTool || !haveBrowser)('what the page shows of light', () =>
     await sky.stop();
   });
 
-  it('sums the light when that changes, not when the camera moves', async () => {
-    const other = await serve(at('lightmap.glb'), '--env', at('light.hdr')),
-      page = await browser.newPage({ viewport: { width: 320, height: 240 } });
-    await page.addInitScript(() => {
-      const gl = WebGL2RenderingContext.prototype as unknown as Record<string, (...a: unknown[]) => unknown>;
-      (window as unknown as { draws: number }).draws = 0;
-      for (const name of ['drawArrays', 'drawElements']) {
-        const real = gl[name]!;
-        gl[name] = function (this: unknown, ...args: unknown[]) {
-          ++(window as unknown as { draws: number }).draws;
-          return real.apply(this, args);
-        };
-      }
-    });
-    await page.goto(`${other.address}#exposure=0&camera=${camera}`);
-    await ready(page);
+  it('raises a sky of its own, turns by itself, and shares what it shows', async () => {
+    const sky = await serve(at('scene.glb'), '--env', 'sky:elevation=25,azimuth=70'),
+      page = await open(browser, sky.address, `camera=${camera}&rotate=30,0,0`, 640, 480),
+      state = (): URLSearchParams => new URLSearchParams(new URL(page.url()).hash.slice(1)),
+      stops0 = await page.screenshot();
     await page.focus('#picture');
-    const drawsOf = async (key: string): Promise<number> => {
-      const count = (): Promise<number> => page.evaluate(() => (window as unknown as { draws: number }).draws),
-        before = await count();
-      await page.keyboard.press(key);
-      await drawn(page);
-      return (await count()) - before;
-    };
-    const [camera1, light, camera2] = [
-      await drawsOf('ArrowLeft'),
-      await drawsOf('Shift+ArrowLeft'),
-      await drawsOf('ArrowLeft'),
-    ];
-    expect(camera1).toBe(camera2);
-    expect(light).toBeGreaterThan(camera1);
+    await page.keyboard.press('Shift+ArrowUp');
+    await page.waitForFunction(() => /elevation=/.test(location.hash));
+    // 0.06 of the height, 2.6 radians for all of it; the sun is in front of the camera or behind it.
+    expect(Math.abs(Number(state().get('elevation')) - 25)).toBeCloseTo((0.06 * 2.6 * 180) / Math.PI, 1);
+    expect(state().get('rotate')!.split(',').map(Number)).toEqual([30, 0, 0]); // and the horizon stays
+    const raised = await page.screenshot();
+    expect(raised.equals(stops0)).toBe(false);
+    await page.click('#more > summary');
+    expect(await page.isVisible('#statistics')).toBe(false);
+    await page.click('#statistics-box > summary');
+    expect(await page.textContent('#statistics')).toContain('order 5');
+    await page.context().grantPermissions(['clipboard-read', 'clipboard-write']);
+    await page.click('#link');
+    await page.waitForFunction(() => document.getElementById('said')!.textContent !== '');
+    expect(await page.evaluate(() => navigator.clipboard.readText())).toBe(page.url());
+    const [download] = await Promise.all([page.waitForEvent('download'), page.click('#save')]);
+    expect(download.suggestedFilename()).toBe('scene.png');
+    await download.saveAs(at('saved.png'));
+    const png = readFileSync(at('saved.png'));
+    expect([png.readUInt32BE(16), png.readUInt32BE(20)]).toEqual([640, 480]);
+    await page.click('#spin');
+    await page.waitForTimeout(300);
+    await page.click('#spin');
+    await page.waitForFunction(() => !/rotate=30,/.test(location.hash));
+    expect(state().get('rotate')).toMatch(/^[\d.]+,[-\d.e]+,[-\d.e]+$/);
     await page.close();
-    await other.stop();
+    await sky.stop();
   });
+
+  it.each(['lightmap.glb', 'scene.glb'])(
+    'sums the light when that changes, not as the camera moves: %s',
+    async (name) => {
+      const other = await serve(at(name), '--env', at('light.hdr')),
+        page = await browser.newPage({ viewport: { width: 320, height: 240 } });
+      await page.addInitScript(() => {
+        const gl = WebGL2RenderingContext.prototype as unknown as Record<string, (...a: unknown[]) => unknown>;
+        (window as unknown as { draws: number }).draws = 0;
+        for (const name of ['drawArrays', 'drawElements']) {
+          const real = gl[name]!;
+          gl[name] = function (this: unknown, ...args: unknown[]) {
+            ++(window as unknown as { draws: number }).draws;
+            return real.apply(this, args);
+          };
+        }
+      });
+      await page.goto(`${other.address}#exposure=0&camera=${camera}`);
+      await ready(page);
+      await page.focus('#picture');
+      const drawsOf = async (key: string): Promise<number> => {
+        const count = (): Promise<number> => page.evaluate(() => (window as unknown as { draws: number }).draws),
+          before = await count();
+        await page.keyboard.press(key);
+        await drawn(page);
+        return (await count()) - before;
+      };
+      const [camera1, light, camera2] = [
+        await drawsOf('ArrowLeft'),
+        await drawsOf('Shift+ArrowLeft'),
+        await drawsOf('ArrowLeft'),
+      ];
+      expect(camera1).toBe(camera2);
+      expect(light).toBeGreaterThan(camera1);
+      await page.close();
+      await other.stop();
+    },
+  );
 
   interface Json {
     bufferViews: unknown[];

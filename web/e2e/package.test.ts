@@ -3,6 +3,7 @@ import { readFileSync, writeFileSync } from 'node:fs';
 import { join } from 'node:path';
 import type { Browser, Page } from 'playwright-core';
 import type { ViteDevServer } from 'vite';
+import { Vector3 } from 'three';
 import { afterAll, beforeAll, describe, expect, it } from 'vitest';
 import { haveTool, lambent, makeFolder, writeLopsidedHdr } from '../test/tool.ts';
 import { haveBrowser, launch, openFixture } from './browser.ts';
@@ -72,6 +73,57 @@ describe.skipIf(!haveTool || !haveBrowser)('the package', () => {
       expect(hook[0]! / own[0]!).toBeCloseTo(0.5, 5);
       expect(hook.slice(1)).toEqual(own.slice(1));
     }
+  });
+
+  it.each([
+    ['diffuse', ['--order', '4']],
+    ['atlas', ['--receivers', 'texels', '--texels-per-unit', '8', '--order', '4']],
+    [
+      'matrix',
+      [
+        '--transfer',
+        'matrix',
+        '--brdf',
+        'ggx:roughness=0.6,f0=0.6',
+        '--outgoing',
+        'map',
+        '--order',
+        '4',
+        '--incident-order',
+        '3',
+      ],
+    ],
+  ])('lights a scene that was turned since as if it had been baked so: %s', async (name, kind) => {
+    // The ball over a floor, and the same turned about the fixture's axis.
+    const axis = new Vector3(0.48, -0.6, 0.64),
+      text = readFileSync(at('scene.obj'), 'utf8'),
+      v = new Vector3();
+    writeFileSync(
+      at('other.obj'),
+      text.replace(/^(vn?) (\S+) (\S+) (\S+)/gm, (_, key: string, ...xyz: string[]) => {
+        v.fromArray(xyz.slice(0, 3).map(Number)).applyAxisAngle(axis, 1.1);
+        return `${key} ${v.toArray().join(' ')}`;
+      }),
+    );
+    for (const file of ['scene', 'other'])
+      lambent(
+        'bake',
+        at(`${file}.obj`),
+        ...kind,
+        '--samples',
+        '512',
+        '--bounces',
+        '1',
+        '-o',
+        at(`${file}_${name}.glb`),
+      );
+    const { turned, not } = await page.evaluate(
+      (files) => window.scenes.turned(files[0]!, files[1]!),
+      ['scene', 'other'].map((file) => `/files/${file}_${name}.glb`),
+    );
+    console.log(`turned, ${name}: ${turned.toFixed(1)} dB; taken as it was baked ${not.toFixed(1)} dB`);
+    expect(turned).toBeGreaterThan(45);
+    expect(not).toBeLessThan(turned - 10);
   });
 
   it('leaves files open to a plain GLTFLoader', async () => {

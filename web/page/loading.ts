@@ -24,6 +24,8 @@ import {
   type LatLongMap,
 } from '../src/index.js';
 
+import { skyMap, sunDirection, type Sky } from './sky.js';
+
 /** lambent.json beside the page, as `lambent view` and `lambent export` write it; paths are relative to it. */
 export interface Manifest {
   name: string;
@@ -187,22 +189,8 @@ export function brightest({ data, width, height, channels }: LatLongMap): Vector
   return new Vector3(Math.sin(theta) * Math.cos(phi), Math.cos(theta), Math.sin(theta) * Math.sin(phi));
 }
 
-/** Light for a page that was given none: a plain sky over darker ground, with a broad sun in the east. */
-export function plainSky(): LatLongMap {
-  const width = 256,
-    height = 128,
-    data = new Float32Array(3 * width * height),
-    sun = [0.62, 0.55, 0.56];
-  for (let y = 0; y < height; ++y)
-    for (let x = 0; x < width; ++x) {
-      const phi = 2 * Math.PI * ((x + 0.5) / width - 0.5),
-        theta = (Math.PI * (y + 0.5)) / height;
-      const d = [Math.sin(theta) * Math.cos(phi), Math.cos(theta), Math.sin(theta) * Math.sin(phi)];
-      const towards = d[0]! * sun[0]! + d[1]! * sun[1]! + d[2]! * sun[2]!,
-        up = d[1]!;
-      const glow = 9 * Math.exp(40 * (towards - 1));
-      const sky = up > 0 ? [0.35 + 0.25 * (1 - up), 0.45 + 0.2 * (1 - up), 0.7] : [0.16, 0.14, 0.12];
-      for (let c = 0; c < 3; ++c) data[3 * (y * width + x) + c] = sky[c]! + (up > 0 ? glow * [1, 0.85, 0.6][c]! : 0);
-    }
-  return { data, width, height, channels: 3 };
-}
+/** A sky of the page's own. */
+export const makeSky = (name: string, sky: Sky): EnvironmentFile => ({
+  ...makeEnvironment(name, skyMap(sky)),
+  sun: new Vector3().fromArray(sunDirection(sky)),
+});

@@ -6,7 +6,7 @@ import {
   loadManifest,
   makeEnvironment,
   mapTexture,
-  plainSky,
+  makeSky,
   readBaked,
   readMap,
   readPlain,
@@ -14,38 +14,15 @@ import {
   type EnvironmentFile,
   type Manifest,
 } from './loading.js';
+import { get, degrees, hideProblem, input, megabytes, select, sentence, showLoading, showProblem } from './dom.js';
+import { connectLobes, connectWipe } from './hands.js';
+import { connectSharing } from './sharing.js';
+import { highestSun, lowestSun, parseSky, type Sky } from './sky.js';
 import { defaultState, formatState, parseState, type State, type View } from './state.js';
+import { showFrameTime, showStatistics } from './statistics.js';
 import { tones, type Tone } from './tone.js';
 import { falseColorEnd, falseColorGain, fitErrorEnd, Viewer } from './viewer.js';
 
-const get = <T extends HTMLElement>(id: string): T => document.getElementById(id) as T;
-const input = (id: string): HTMLInputElement => get(id);
-const select = (id: string): HTMLSelectElement => get(id);
-
-function showProblem(text: string): void {
-  document.body.classList.remove('bare');
-  get('loading').hidden = true;
-  get('problem-text').textContent = text;
-  get('problem').hidden = false;
-}
-const hideProblem = (): void => void (get('problem').hidden = true);
-const sentence = (name: string, error: unknown): string =>
-  error instanceof LambentError
-    ? name
-      ? `${name} ${error.message}`
-      : error.message
-    : `${name ? name + ': ' : ''}${error instanceof Error ? error.message : String(error)}`;
-
-function showLoading(what: string, share?: number): void {
-  get('loading-what').textContent = what;
-  const bar = get<HTMLProgressElement>('loading-share');
-  if (share === undefined || share === 0) bar.removeAttribute('value');
-  else bar.value = share;
-  get('loading').hidden = false;
-}
-
-const megabytes = (bytes: number): string => `${(bytes / 1e6).toPrecision(3)} MB`;
-const degrees = (angle: number): string => `${Math.round(angle)}°`.replace('-', '−');
 const names: Record<View, string> = {
   baked: 'Baked',
   compare: 'Second file',
@@ -55,12 +32,16 @@ const names: Record<View, string> = {
   reference: 'Reference',
 };
 
+const usualSpin = 12; // degrees a second
+
 class Page {
   private readonly base = defaultState(); // what the address need not say
   private readonly state: State;
   private readonly viewer: Viewer;
-  private readonly environments: { name: string; load: () => Promise<EnvironmentFile> }[] = [];
-  private frameTime = 0;
+  private readonly environments: { name: string; load: () => Promise<EnvironmentFile>; opened?: true }[] = [];
+  /** Of the environment in use, where it is a sky: as it stands now. */
+  private sky: Sky | undefined;
+  private isServed = false; // the scene, and not opened from a file
   private savedSoon = 0;
   private opened = false;
 
@@ -72,8 +53,9 @@ class Page {
     base.tone = tones.find((tone) => tone === manifest?.tone) ?? base.tone;
     this.state = parseState(location.hash, base);
     this.viewer = new Viewer(get<HTMLCanvasElement>('picture'), {
-      onFrame: (ms) => this.onFrame(ms),
+      onFrame: showFrameTime,
       onChange: () => (this.showHeight(), this.saveSoon()),
+      onLift: (by) => this.lift(by),
       onUse: (what) => what === 'light' && get('hint').classList.add('gone'),
       onProblem: showProblem,
       onRecovered: hideProblem,
@@ -86,14 +68,11 @@ class Page {
     const { manifest, state, viewer } = this;
     for (const { name, file } of manifest?.environments ?? [])
       this.environments.push({ name, load: async () => makeEnvironment(name, readMap(await this.fetch(name, file))) });
-    if (this.environments.length === 0)
-      this.environments.push({
-        name: 'plain sky',
-        load: () => Promise.resolve(makeEnvironment('plain sky', plainSky())),
-      });
+    if (!this.environments.some(({ name }) => parseSky(name)))
+      this.environments.push({ name: 'sky', load: () => Promise.resolve(makeSky('sky', parseSky('sky')!)) });
     this.listEnvironments();
     this.setRotation(state.rotate);
-    await this.chooseEnvironment(Math.min(state.env, this.environments.length - 1));
+    await this.chooseEnvironment(Math.min(state.env, this.environments.length - 1), state.elevation);
     if (!manifest) {
       get('loading').hidden = true;
       get('invitation').hidden = false;
@@ -101,6 +80,7 @@ class Page {
       return;
     }
     const { name, baked, compare } = manifest;
+    this.isServed = true;
     await this.openBaked(name, await this.fetch(name, baked), baked);
     if (compare)
       await this.useModel('compare', 'the second file', await this.fetch('the second file', compare), compare);
@@ -135,6 +115,7 @@ class Page {
     select('tone').replaceChildren(...tones.map((tone) => option(tone, tone)));
     select('tone').value = state.tone;
     input('background').checked = state.background;
+    input('free').checked = state.free;
     get('play').hidden = !viewer.hasAnimation;
     document.body.classList.toggle('bare', !state.ui);
     this.apply();
@@ -152,6 +133,9 @@ class Page {
     viewer.window = state.window;
     viewer.coefficient = state.coefficient;
     viewer.showBackground = state.background;
+    viewer.spin = state.spin;
+    viewer.orbit.free = state.free;
+    get('spin').setAttribute('aria-pressed', String(state.spin !== 0));
     if (isOtherLight) viewer.changeLight();
     else viewer.invalidate();
     this.showExposure();
@@ -181,8 +165,25 @@ class Page {
   }
 
   private showHeight(): void {
-    input('height').value = String(this.viewer.lightHeight);
-    get('height-value').textContent = degrees(this.viewer.lightHeight);
+    const height = this.sky?.elevation ?? this.viewer.lightHeight,
+      [low, high] = this.sky ? [lowestSun, highestSun] : [-90, 90];
+    Object.assign(input('height'), { min: String(low), max: String(high), value: String(height) });
+    get('height-value').textContent = degrees(height);
+  }
+
+  /** Puts a sky's sun elsewhere: the sky is another one then. */
+  private raiseSun(elevation: number): void {
+    if (!this.sky) return;
+    this.sky.elevation = this.state.elevation = MathUtils.clamp(elevation, lowestSun, highestSun);
+    this.viewer.setEnvironment(makeSky('', this.sky));
+    this.showHeight();
+    this.saveSoon();
+  }
+  /** A hand that goes up by so many degrees; the sun goes with its light on what faces the camera. */
+  private lift(by: number): boolean {
+    if (!this.sky || this.state.free) return false;
+    this.raiseSun(this.sky.elevation + (this.viewer.isSunBehindCamera ? by : -by));
+    return true;
   }
 
   private showExposure(): void {
@@ -201,10 +202,14 @@ class Page {
     on('exposure', 'input', () => (state.exposure = Number(input('exposure').value)));
     on('auto', 'click', () => ((state.exposure = 'auto'), viewer.measure()));
     get('height').addEventListener('input', () => {
-      viewer.lightHeight = Number(input('height').value);
+      const height = Number(input('height').value);
+      if (this.sky) return this.raiseSun(height);
+      viewer.lightHeight = height;
       get('height-value').textContent = degrees(viewer.lightHeight);
       this.saveSoon();
     });
+    on('spin', 'click', () => (state.spin = state.spin ? 0 : usualSpin));
+    on('free', 'change', () => (state.free = input('free').checked));
     on('tone', 'change', () => (state.tone = select('tone').value as Tone));
     on(
       'order',
@@ -248,7 +253,12 @@ class Page {
       this.saveSoon();
     });
     get('reset-view').addEventListener('click', () => this.setCamera(this.manifest?.camera));
-    get('reset-light').addEventListener('click', () => this.setRotation(this.manifest?.rotate ?? [0, 0, 0]));
+    get('reset-light').addEventListener('click', () => {
+      this.setRotation(this.manifest?.rotate ?? [0, 0, 0]);
+      const { name } = this.environments[state.env]!;
+      if (this.sky) this.raiseSun(parseSky(name)!.elevation);
+      delete state.elevation;
+    });
     get('problem-close').addEventListener('click', hideProblem);
     get('open').addEventListener('click', () => get('file').click());
     get('file').addEventListener('change', () => {
@@ -266,54 +276,31 @@ class Page {
     addEventListener('drop', (e) => {
       this.openFiles([...(e.dataTransfer?.files ?? [])]);
     });
-    this.connectWipe();
-    this.connectLobes();
+    connectWipe(
+      () => state.wipe,
+      (share) => ((state.wipe = share), this.apply()),
+    );
+    connectLobes(viewer);
+    connectSharing(viewer, () => ({
+      name: document.title,
+      address: this.saveNow(),
+      whole: this.isServed && this.environments.findIndex((e) => e.opened) < 0,
+    }));
     const showHelp = (): void => get<HTMLDialogElement>('help').showModal();
     get('help-open').addEventListener('click', showHelp);
     get('help-close').addEventListener('click', () => get<HTMLDialogElement>('help').close());
     addEventListener('keydown', (e) => {
       if (e.key === '?' && !get<HTMLDialogElement>('help').open) showHelp();
     });
+    // How much of the page's foot the controls cover; later, since what depends on it is observed as well.
+    const cover = (): void => {
+      const { top } = get('controls').getBoundingClientRect();
+      document.documentElement.style.setProperty('--covered', `${Math.round(innerHeight - top) + 8}px`);
+    };
+    new ResizeObserver(() => requestAnimationFrame(cover)).observe(get('controls'));
     get('controls').addEventListener('submit', (e) => e.preventDefault());
     addEventListener('hashchange', () => {
       if (location.hash !== this.address()) location.reload();
-    });
-  }
-
-  private connectWipe(): void {
-    const wipe = get('wipe'),
-      move = (share: number): void => ((this.state.wipe = MathUtils.clamp(share, 0, 1)), this.apply());
-    wipe.addEventListener('pointerdown', (e) => wipe.setPointerCapture(e.pointerId));
-    wipe.addEventListener('pointermove', (e) => wipe.hasPointerCapture(e.pointerId) && move(e.clientX / innerWidth));
-    wipe.addEventListener('keydown', (e) => {
-      const step = { ArrowLeft: -0.02, ArrowRight: 0.02, Home: -1, End: 1 }[e.key];
-      if (step !== undefined) {
-        move(this.state.wipe + step);
-        e.preventDefault();
-      }
-    });
-  }
-
-  /** A double click, or the key L under the pointer, in the picture's middle where there is none. */
-  private connectLobes(): void {
-    const { viewer } = this,
-      picture = get('picture');
-    let at: { x: number; y: number } | undefined;
-    const pick = (x: number, y: number): void => {
-      if (!viewer.hasLobes) return;
-      get('lobes').textContent = viewer.pickLobes(x, y) ?? '';
-      get('hint').hidden = true; // the words stand in its place
-    };
-    picture.addEventListener('pointermove', (e) => (at = { x: e.offsetX, y: e.offsetY }));
-    picture.addEventListener('pointerleave', () => (at = undefined));
-    picture.addEventListener('dblclick', (e) => pick(e.offsetX, e.offsetY));
-    picture.addEventListener('keydown', (e) => {
-      if (e.key.toLowerCase() === 'l' && !e.ctrlKey && !e.metaKey && !e.altKey)
-        pick(at?.x ?? picture.clientWidth / 2, at?.y ?? picture.clientHeight / 2);
-      else if (e.key === 'Escape') {
-        viewer.clearLobes();
-        get('lobes').textContent = '';
-      }
     });
   }
 
@@ -325,6 +312,7 @@ class Page {
       showLoading(`Reading ${file.name}`);
       const bytes = await file.arrayBuffer();
       if (/\.gl(b|tf)$/i.test(file.name)) {
+        this.isServed = false;
         await this.openBaked(file.name, bytes, files);
         this.show();
       } else {
@@ -332,6 +320,7 @@ class Page {
         this.environments.push({
           name: file.name,
           load: () => Promise.resolve(makeEnvironment(file.name, readMap(bytes))),
+          opened: true,
         });
         this.listEnvironments();
         this.useEnvironment(this.environments.length - 1, environment);
@@ -355,28 +344,7 @@ class Page {
     get('loading').hidden = true;
     viewer.measure();
     if (problem) return this.showPlain(problem);
-    const t = viewer.bakedScene!.transfer;
-    const rows: [string, string][] = [
-      ['Transfer', `${t.kind}, order ${t.order}, ${t.channels === 3 ? 'colour' : 'grey'}`],
-      ['Receivers', t.receivers.toLocaleString('en')],
-      ['Vertices', t.meshes.reduce((n, m) => n + m.geometry.getAttribute('position').count, 0).toLocaleString('en')],
-      ['In the file', megabytes(t.fileBytes)],
-      ['On the graphics card', megabytes(t.gpuBytes)],
-      ...(t.lamps?.size ? [['Lamps', [...t.lamps.keys()].join(', ')] as [string, string]] : []),
-      ['A receiver', `${Math.round(t.fileBytes / t.receivers)} bytes`],
-    ];
-    const zonal = (viewer.bakedScene!.provenance as { zonal?: { lobes?: unknown; rms?: unknown } } | undefined)?.zonal;
-    if (typeof zonal?.lobes === 'number' && typeof zonal.rms === 'number')
-      rows.push(['Lobes', `${zonal.lobes} a receiver`], ['Fit error', `${(100 * zonal.rms).toPrecision(3)} % RMS`]);
-    get('statistics').replaceChildren(
-      ...rows.flatMap(([term, text]) => {
-        const dt = document.createElement('dt'),
-          dd = document.createElement('dd');
-        dt.textContent = term;
-        dd.textContent = text;
-        return [dt, dd];
-      }),
-    );
+    showStatistics(viewer.bakedScene);
   }
 
   private async useModel(role: 'baked' | 'compare', name: string, bytes: ArrayBuffer, beside: Beside): Promise<void> {
@@ -403,7 +371,7 @@ class Page {
   }
 
   private showPlain(problem: NoTransferError): void {
-    get('statistics').replaceChildren();
+    showStatistics();
     showProblem(problem.message);
   }
 
@@ -420,15 +388,25 @@ class Page {
     select('env').replaceChildren(...this.environments.map(({ name }, i) => new Option(name, String(i))));
   }
 
-  private async chooseEnvironment(index: number): Promise<void> {
+  /** `elevation`: of a sky's sun, where it is another than its name says. */
+  private async chooseEnvironment(index: number, elevation?: number): Promise<void> {
+    const sky = parseSky(this.environments[index]!.name);
+    if (sky && elevation !== undefined) {
+      get('loading').hidden = true;
+      return this.useEnvironment(index, makeSky('', { ...sky, elevation }), { ...sky, elevation });
+    }
     const environment = await this.environments[index]!.load().catch((error: unknown) => {
       throw new LambentError(sentence(this.environments[index]!.name, error));
     });
     get('loading').hidden = true;
-    this.useEnvironment(index, environment);
+    this.useEnvironment(index, environment, sky);
   }
 
-  private useEnvironment(index: number, environment: EnvironmentFile): void {
+  private useEnvironment(index: number, environment: EnvironmentFile, sky?: Sky): void {
+    this.sky = sky;
+    if (sky && sky.elevation !== parseSky(this.environments[index]!.name)!.elevation)
+      this.state.elevation = sky.elevation;
+    else delete this.state.elevation;
     this.state.env = index;
     select('env').selectedIndex = index;
     this.viewer.setEnvironment(environment);
@@ -468,14 +446,12 @@ class Page {
 
   private saveSoon(): void {
     clearTimeout(this.savedSoon);
-    this.savedSoon = window.setTimeout(() => {
-      if (this.viewer.bakedScene) history.replaceState(null, '', this.address());
-    }, 300);
+    this.savedSoon = window.setTimeout(() => this.saveNow(), 300);
   }
-
-  private onFrame(milliseconds: number): void {
-    this.frameTime = this.frameTime ? 0.9 * this.frameTime + 0.1 * milliseconds : milliseconds;
-    get('figures').textContent = `${this.frameTime.toFixed(this.frameTime < 10 ? 1 : 0)} ms a frame`;
+  /** The address with all that is shown. */
+  private saveNow(): string {
+    if (this.viewer.bakedScene) history.replaceState(null, '', this.address());
+    return location.href;
   }
 
   private async attempt(name: string, work: () => Promise<void>): Promise<void> {

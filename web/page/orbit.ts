@@ -8,6 +8,8 @@ const keyStep = 0.06; // share of that height a key press counts as
 export interface OrbitCallbacks {
   onCamera(): void;
   onLight(): void;
+  /** The light's height is to follow the hand, up by so many degrees; false where it is turned instead. */
+  onLift(degrees: number): boolean;
   /** First move of each sort, so that hints can go. */
   onUse(what: 'orbit' | 'light'): void;
 }
@@ -18,6 +20,10 @@ export class Orbit {
   readonly light = new Quaternion();
   /** One finger, or the plain mouse, turns the light. */
   lightFirst = false;
+  /** Sideways the light turns about the picture's own upright, and not about +Y. */
+  free = false;
+  /** Otherwise with Ctrl alone, as where two fingers part on a touch pad. */
+  wheelZooms = true;
   private readonly pointers = new Map<number, { x: number; y: number }>();
 
   constructor(
@@ -31,7 +37,11 @@ export class Orbit {
       canvas.addEventListener(end, (e) => this.pointers.delete(e.pointerId));
     canvas.addEventListener(
       'wheel',
-      (e) => (e.preventDefault(), this.zoom(Math.exp(MathUtils.clamp(e.deltaY, -120, 120) * 0.0015))),
+      (e) => {
+        if (!this.wheelZooms && !e.ctrlKey) return;
+        e.preventDefault();
+        this.zoom(Math.exp(MathUtils.clamp(e.deltaY, -120, 120) * 0.0015));
+      },
       { passive: false },
     );
     canvas.addEventListener('contextmenu', (e) => e.preventDefault());
@@ -66,8 +76,11 @@ export class Orbit {
 
   /** Sideways about +Y, so that a sun keeps its height; up and down about the picture's own horizontal. */
   turnLight(x: number, y: number): void {
-    const right = new Vector3().setFromMatrixColumn(this.camera.matrixWorld, 0);
-    const turn = new Quaternion().setFromAxisAngle(new Vector3(0, 1, 0), x * radiansAHeight);
+    const right = new Vector3().setFromMatrixColumn(this.camera.matrixWorld, 0),
+      upright = new Vector3(0, 1, 0);
+    if (this.free) upright.setFromMatrixColumn(this.camera.matrixWorld, 1);
+    if (y !== 0 && this.callbacks.onLift(-MathUtils.radToDeg(y * radiansAHeight))) y = 0;
+    const turn = new Quaternion().setFromAxisAngle(upright, x * radiansAHeight);
     turn.multiply(new Quaternion().setFromAxisAngle(right, y * radiansAHeight));
     this.light.premultiply(turn).normalize();
     this.callbacks.onLight();

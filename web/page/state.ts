@@ -1,6 +1,7 @@
 // What is on show, as the address's fragment: a link or a reload gives the same picture.
 // Numbers are separated by commas; `camera` and `rotate` are spelt as --camera and --env-rotate of the command line.
 import { shWindows, type ShWindow } from '../src/index.js';
+import { highestSun, lowestSun } from './sky.js';
 import { tones, type Tone } from './tone.js';
 
 export const views = ['baked', 'compare', 'unshadowed', 'coefficient', 'error', 'reference'] as const;
@@ -10,6 +11,9 @@ export interface State {
   camera?: number[]; // eye, target, vertical field of view in degrees
   rotate: number[]; // yaw, pitch, roll in degrees
   env: number;
+  elevation?: number; // of a sky's sun, where it is another than the sky's name says
+  spin: number; // degrees a second that the light turns about +Y
+  free: boolean; // a hand that goes sideways turns the light about the picture's upright, not about +Y
   exposure: number | 'auto'; // stops
   tone: Tone;
   order: number; // bands; 0: all that are baked
@@ -26,6 +30,8 @@ export interface State {
 export const defaultState = (): State => ({
   rotate: [0, 0, 0],
   env: 0,
+  spin: 0,
+  free: false,
   exposure: 'auto',
   tone: 'neutral',
   order: 0,
@@ -55,6 +61,10 @@ export function parseState(fragment: string, base: State): State {
     state.camera = camera;
   state.rotate = numbers(from.get('rotate'), 3) ?? state.rotate;
   state.env = Math.floor(one('env', 0, 1e6) ?? state.env);
+  const elevation = one('elevation', lowestSun, highestSun);
+  if (elevation !== undefined) state.elevation = elevation;
+  state.spin = one('spin', -360, 360) ?? state.spin;
+  if (from.has('free')) state.free = from.get('free') === 'on';
   state.exposure = from.get('exposure') === 'auto' ? 'auto' : (one('exposure', -20, 20) ?? state.exposure);
   state.tone = tones.find((t) => t === from.get('tone')) ?? state.tone;
   state.order = Math.floor(one('order', 0, 16) ?? state.order);
@@ -80,6 +90,9 @@ export function formatState(state: State, base: State = defaultState()): string 
   if (state.camera) put('camera', state.camera.map(short).join(','));
   if (state.rotate.some((r) => Math.abs(r) > 1e-4)) put('rotate', state.rotate.map(short).join(','));
   if (state.env !== base.env) put('env', String(state.env));
+  if (state.elevation !== undefined) put('elevation', short(state.elevation));
+  if (state.spin) put('spin', short(state.spin));
+  if (state.free) put('free', 'on');
   if (state.exposure !== base.exposure) put('exposure', state.exposure === 'auto' ? 'auto' : short(state.exposure));
   if (state.tone !== base.tone) put('tone', state.tone);
   if (state.order !== base.order) put('order', String(state.order));

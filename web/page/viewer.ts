@@ -26,6 +26,7 @@ import type { GLTF } from 'three/addons/loaders/GLTFLoader.js';
 import { FullScreenQuad } from 'three/addons/postprocessing/Pass.js';
 import { anySeeThrough, LambentError, type BakedScene, type ShWindow } from '../src/index.js';
 import type { EnvironmentFile } from './loading.js';
+import { framed, framedFov } from './framing.js';
 import { LobeGlyphs, pickVertex } from './lobes.js';
 import { Model } from './model.js';
 import { Orbit } from './orbit.js';
@@ -37,6 +38,8 @@ export interface ViewerCallbacks {
   /** A frame followed the one before it after so many milliseconds, without a pause between. */
   onFrame(milliseconds: number): void;
   onChange(): void;
+  /** As of an orbit (orbit.ts). */
+  onLift(degrees: number): boolean;
   onUse(what: 'orbit' | 'light'): void;
   onProblem(message: string): void;
   onRecovered(): void;
@@ -44,7 +47,6 @@ export interface ViewerCallbacks {
   onMeter(stops: number): void;
 }
 
-const groundName = 'ground'; // of the floor that `lambent bake --ground` adds
 /** Transfer at the ends of the false-colour scale, at exposure 0: those of open surfaces stay below 0.33. */
 export const falseColorEnd = 0.25;
 /** Of errors of a fit, relative. */
@@ -66,10 +68,11 @@ export class Viewer {
   tone: Tone = 'neutral';
   showBackground = true;
   coefficient = 3;
+  spin = 0; // degrees a second that the light turns about +Y
 
   private readonly scene = new Scene();
   private readonly sky = new SkyMaterial();
-  private readonly picture = new PictureMaterial();
+  private readonly reference = new PictureMaterial();
   private readonly developed = new DevelopMaterial();
   private readonly linear = new WebGLRenderTarget(1, 1, { type: HalfFloatType, samples: 4 });
   private readonly screen = new FullScreenQuad(this.sky);
@@ -115,6 +118,7 @@ export class Viewer {
     this.orbit = new Orbit(this.camera, canvas, {
       onCamera: () => (this.invalidate(), callbacks.onChange()),
       onLight: () => (this.changeLight(), callbacks.onChange()),
+      onLift: (degrees) => callbacks.onLift(degrees),
       onUse: (what) => callbacks.onUse(what),
     });
     new ResizeObserver(() => this.invalidate()).observe(canvas);
@@ -183,51 +187,17 @@ export class Viewer {
   }
 
   setReference(map: DataTexture): void {
-    this.picture.map.value = map;
+    this.reference.map.value = map;
     this.invalidate();
   }
 
-  /**
-   * From the front right and a little above, all of it just in view: the camera of `lambent render --camera auto`
-   * (camera_around of core/camera.h) in the canvas as it is now.
-   */
+  /** The camera of `lambent render --camera auto`, in the canvas as it is now. */
   frameAll(): void {
-    const root = this.baked?.root ?? this.plain;
-    if (!root) return;
-    root.updateMatrixWorld(true);
-    const meshes: Mesh[] = [];
-    root.traverse((o) => void ((o as Mesh).isMesh && meshes.push(o as Mesh)));
-    const subject = meshes.filter((mesh) => !isGround(mesh));
-    this.camera.fov = 35;
-    const forward = new Vector3(-0.55, -0.4, -1).normalize(),
-      side = new Vector3().crossVectors(forward, new Vector3(0, 1, 0)).normalize(),
-      up = new Vector3().crossVectors(side, forward);
-    const margin = 0.02,
-      tanY = Math.tan((35 * Math.PI) / 360) * (1 - 2 * margin),
-      tanX = (tanY * Math.max(1, this.canvas.clientWidth)) / Math.max(1, this.canvas.clientHeight);
-    // What bounds the points from the right, the left, above, below, before and behind, in the axes of the view.
-    const most = new Array<number>(6).fill(-Infinity),
-      point = new Vector3();
-    for (const mesh of subject.length ? subject : meshes) {
-      const { count } = mesh.geometry.getAttribute('position');
-      for (let i = 0; i < count; ++i) {
-        mesh.getVertexPosition(i, point).applyMatrix4(mesh.matrixWorld);
-        const x = point.dot(side),
-          y = point.dot(up),
-          z = point.dot(forward);
-        [x - tanX * z, -x - tanX * z, y - tanY * z, -y - tanY * z, -z, z].forEach((bound, k) => {
-          if (bound > most[k]!) most[k] = bound;
-        });
-      }
-    }
-    const [right, left, top, bottom, near, far] = most as [number, number, number, number, number, number];
-    if (!(near + far >= 0)) return;
-    const z = Math.min(-(right + left) / (2 * tanX), -(top + bottom) / (2 * tanY));
-    const eye = new Vector3()
-      .addScaledVector(side, (right - left) / 2)
-      .addScaledVector(up, (top - bottom) / 2)
-      .addScaledVector(forward, z);
-    this.orbit.look(eye, eye.clone().addScaledVector(forward, (far - near) / 2 - z));
+    const root = this.baked?.root ?? this.plain,
+      { clientWidth, clientHeight } = this.canvas;
+    this.camera.fov = framedFov;
+    const view = root && framed(root, Math.max(1, clientWidth) / Math.max(1, clientHeight));
+    if (view) this.orbit.look(view.eye, view.target);
   }
 
   /** The light, its order or its window are others now. */
@@ -255,6 +225,10 @@ export class Viewer {
   }
   private get sun(): Vector3 {
     return (this.environment?.sun ?? new Vector3(0, 1, 0)).clone().applyQuaternion(this.orbit.light);
+  }
+  /** What shines on what faces the camera. */
+  get isSunBehindCamera(): boolean {
+    return this.sun.dot(this.camera.position.clone().sub(this.orbit.target).setY(0)) >= 0;
   }
   /** Stops in use. */
   get stops(): number {
@@ -309,6 +283,23 @@ export class Viewer {
     if (!this.request) this.request = requestAnimationFrame((now) => this.onFrame(now));
   }
 
+  dispose(): void {
+    cancelAnimationFrame(this.request);
+    clearTimeout(this.meterSoon);
+    this.request = -1; // no more are asked for
+    for (const model of [this.baked, this.compare]) model?.dispose();
+    this.environment?.background.dispose();
+    this.linear.dispose();
+    this.meterTarget?.dispose();
+    this.renderer.dispose();
+  }
+
+  /** What is shown, as a PNG. */
+  picture(): Promise<Blob | null> {
+    this.draw();
+    return new Promise((resolve) => this.canvas.toBlob(resolve));
+  }
+
   private onFrame(now: number): void {
     this.request = 0;
     const apart = now - this.lastFrame;
@@ -316,6 +307,11 @@ export class Viewer {
     if (this.animation?.action.isRunning()) {
       this.animation.mixer.update(Math.min(apart, pause) / 1000);
       this.invalidate();
+    }
+    if (this.spin !== 0) {
+      const angle = MathUtils.degToRad((this.spin * Math.min(apart, pause)) / 1000);
+      this.orbit.light.premultiply(new Quaternion().setFromAxisAngle(new Vector3(0, 1, 0), angle)).normalize();
+      this.changeLight();
     }
     this.draw();
     if (apart < pause) this.callbacks.onFrame(apart);
@@ -428,9 +424,9 @@ export class Viewer {
     const { renderer, screen } = this;
     renderer.clear();
     if (view === 'reference') {
-      const image = this.picture.map.value?.image;
-      this.picture.stretch.value = image ? this.camera.aspect / (image.width / image.height) : 1;
-      screen.material = this.picture;
+      const image = this.reference.map.value?.image;
+      this.reference.stretch.value = image ? this.camera.aspect / (image.width / image.height) : 1;
+      screen.material = this.reference;
       if (image) screen.render(renderer);
       return;
     }
@@ -477,8 +473,3 @@ export class Viewer {
 
 /** False colours show transfer, which no automatic exposure is measured from. */
 export const falseColorGain = (exposure: number | 'auto'): number => (exposure === 'auto' ? 1 : 2 ** exposure);
-
-function isGround(object: Object3D): boolean {
-  for (let o: Object3D | null = object; o; o = o.parent) if (o.name === groundName) return true;
-  return false;
-}

@@ -1,7 +1,8 @@
-// T . light on the graphics card: a half-float picture with a texel for each row of each receiver, drawn when the light
-// changes and only looked up until then. Who makes one says which texel is whose.
+// T . light on the graphics card: a picture with a texel for each row of each receiver, drawn when the light changes and
+// only looked up until then. Who makes one says which texel is whose.
 import {
   Camera,
+  FloatType,
   GLSL3,
   HalfFloatType,
   Mesh,
@@ -21,8 +22,20 @@ import {
 import type { BlockLayout } from './block_texture.js';
 import { LambentError } from './errors.js';
 import { limits } from './kinds.js';
+import type { Sums } from './turned.js';
 
-/** Columns of light at most: uniforms of 192 vec4 of the 224 that WebGL 2 promises. */
+/** Compiles a material for light with peaks, or for light without. */
+export function setPeaks(material: Material, on: boolean): void {
+  const defines = (material.defines ??= {});
+  if ('PRT_PEAKS' in defines === on) return;
+  if (on) defines['PRT_PEAKS'] = '';
+  else delete defines['PRT_PEAKS'];
+  material.needsUpdate = true;
+}
+
+/** vec4 of uniforms in fragment shaders that WebGL 2 promises. */
+const promised = 224;
+/** Columns of light at most: uniforms of 192 vec4. */
 export const maxColumns = limits.columns;
 
 const vertexShader = 'in vec3 position;\nvoid main() { gl_Position = vec4( position, 1.0 ); }';
@@ -31,6 +44,9 @@ precision highp float;
 precision highp int;
 uniform highp sampler2DArray prtTransfer;
 uniform vec4 prtLight[ 3 * PRT_QUADS ];
+#ifdef PRT_PEAKS
+  uniform vec4 prtPeaks[ 3 * PRT_QUADS ];
+#endif
 uniform bool prtHolds;
 out vec4 radiance;
 ${pick}
@@ -43,6 +59,7 @@ void main() {
   ivec3 at = ivec3( ( r & ( PRT_COLUMNS - 1 ) ) * PRT_TEXELS, ( r / PRT_COLUMNS ) & ( PRT_ROWS - 1 ),
                     r / ( PRT_COLUMNS * PRT_ROWS ) );
   at.x += row * PRT_CHANNELS * PRT_QUADS;
+  vec3 peaks = vec3( 0.0 );
   for ( int k = 0; k < PRT_QUADS; ++ k ) {
     vec4 red = texelFetch( prtTransfer, at + ivec3( k, 0, 0 ), 0 ), green = red, blue = red;
     #if PRT_CHANNELS == 3
@@ -51,8 +68,13 @@ void main() {
     #endif
     radiance.rgb += vec3( dot( red, prtLight[ k ] ), dot( green, prtLight[ PRT_QUADS + k ] ),
                           dot( blue, prtLight[ 2 * PRT_QUADS + k ] ) );
+    #ifdef PRT_PEAKS
+      peaks += vec3( dot( red, prtPeaks[ k ] ), dot( green, prtPeaks[ PRT_QUADS + k ] ),
+                     dot( blue, prtPeaks[ 2 * PRT_QUADS + k ] ) );
+    #endif
   }
-  if ( prtHolds ) radiance.rgb = max( radiance.rgb, vec3( 0.0 ) );
+  // Light is not negative, nor is what a part of it gives (relight/dering.h).
+  if ( prtHolds ) radiance.rgb = max( radiance.rgb, vec3( 0.0 ) ) + max( peaks, vec3( 0.0 ) );
 }`;
 
 export interface SumOptions {
@@ -63,6 +85,8 @@ export interface SumOptions {
   width: number;
   height: number;
   filter: typeof NearestFilter | typeof LinearFilter;
+  /** In single floats, where the graphics card draws into those. */
+  single?: boolean;
   /** GLSL: uint prtPick( ivec2 texel, out int row ), the receiver or 0xffffffffu, and what it reads. */
   pick: string;
   uniforms?: Record<string, IUniform>;
@@ -70,13 +94,15 @@ export interface SumOptions {
   what: { size: string; use: string };
 }
 
-/** A half-float picture that is drawn anew when what it shows has changed. */
+/** A picture in half floats, or in `single` ones, that is drawn anew when what it shows has changed. */
 export class DrawnPicture {
   readonly target: WebGLRenderTarget;
   private readonly quad: Mesh<PlaneGeometry, RawShaderMaterial>;
   private readonly scene = new Scene();
   private readonly camera = new Camera();
-  private changed = true;
+  private version = 0;
+  /** By renderer, which makes properties of its own again when a context has been lost: the version that it drew. */
+  private readonly versions = new WeakMap<object, number>();
 
   constructor(
     width: number,
@@ -84,6 +110,7 @@ export class DrawnPicture {
     filter: SumOptions['filter'],
     private readonly what: SumOptions['what'],
     drawing: { fragmentShader: string; defines: Record<string, number>; uniforms: Record<string, IUniform> },
+    private readonly single = false,
   ) {
     this.target = new WebGLRenderTarget(width, height, {
       type: HalfFloatType,
@@ -102,23 +129,36 @@ export class DrawnPicture {
   }
 
   get bytes(): number {
-    return 8 * this.target.width * this.target.height;
+    return (this.single ? 16 : 8) * this.target.width * this.target.height;
+  }
+  protected get material(): RawShaderMaterial {
+    return this.quad.material;
   }
 
-  /** Draws again: the light has changed, or a lost context has taken what was drawn. */
+  /** Draws again: the light has changed. */
   refresh(): void {
-    this.changed = true;
+    ++this.version;
   }
 
-  /** Throws LambentError where the graphics card cannot draw this. */
-  check(renderer: WebGLRenderer): void {
+  /** Whether the graphics card draws into floats. */
+  isDrawnBy({ extensions }: WebGLRenderer): boolean {
+    return extensions.has('EXT_color_buffer_float') || extensions.has('EXT_color_buffer_half_float');
+  }
+
+  /** Throws LambentError where the graphics card has no texture of this size. */
+  checkSize(renderer: WebGLRenderer): void {
     const { width, height } = this.target;
     if (Math.max(width, height) > renderer.capabilities.maxTextureSize)
       throw new LambentError(
         `${this.what.size} of ${width} x ${height} texels, ` +
           `where this graphics card takes ${renderer.capabilities.maxTextureSize}`,
       );
-    if (!renderer.extensions.has('EXT_color_buffer_float') && !renderer.extensions.has('EXT_color_buffer_half_float'))
+  }
+
+  /** Throws LambentError where the graphics card cannot draw this. */
+  check(renderer: WebGLRenderer): void {
+    this.checkSize(renderer);
+    if (!this.isDrawnBy(renderer))
       throw new LambentError(
         `${this.what.use}, which needs a graphics card that draws into half-float textures (EXT_color_buffer_float)`,
       );
@@ -126,9 +166,11 @@ export class DrawnPicture {
 
   /** Before what shows it is drawn; the renderer is left as it was. */
   update(renderer: WebGLRenderer): void {
-    if (!this.changed) return;
+    const card = renderer.properties;
+    if (this.versions.get(card) === this.version) return;
     this.check(renderer);
-    this.changed = false;
+    if (this.single && renderer.extensions.has('EXT_color_buffer_float')) this.target.texture.type = FloatType;
+    this.versions.set(card, this.version);
     const before = renderer.getRenderTarget(),
       face = renderer.getActiveCubeFace(),
       level = renderer.getActiveMipmapLevel();
@@ -162,12 +204,14 @@ export function packLight(out: Float32Array, light: ArrayLike<number>): void {
 /** T . light of one light, or of a part of it. */
 export class LightSum extends DrawnPicture {
   readonly light: Float32Array;
+  readonly peaks: Float32Array;
   private readonly holds: { value: boolean };
 
-  constructor({ layout, channels, transfer, width, height, filter, pick, uniforms, what }: SumOptions) {
+  constructor({ layout, channels, transfer, width, height, filter, single, pick, uniforms, what }: SumOptions) {
     const light = new Float32Array(12 * layout.quads),
+      peaks = new Float32Array(12 * layout.quads),
       holds = { value: false };
-    super(width, height, filter, what, {
+    const drawing = {
       fragmentShader: fragmentShader(pick),
       defines: {
         PRT_QUADS: layout.quads,
@@ -176,41 +220,65 @@ export class LightSum extends DrawnPicture {
         PRT_ROWS: layout.rows,
         PRT_CHANNELS: channels,
       },
-      uniforms: { prtTransfer: { value: transfer }, prtLight: { value: light }, prtHolds: holds, ...uniforms },
-    });
+      uniforms: {
+        prtTransfer: { value: transfer },
+        prtLight: { value: light },
+        prtPeaks: { value: peaks },
+        prtHolds: holds,
+        ...uniforms,
+      },
+    };
+    super(width, height, filter, what, drawing, single);
     this.light = light;
+    this.peaks = peaks;
     this.holds = holds;
   }
 
-  /** `light` is [column][3]; `holds`: no number is less than 0. */
-  set(light: ArrayLike<number>, holds = false): void {
+  /** Whether a light and its peaks are summed at once. */
+  get takesPeaks(): boolean {
+    return this.light.length / 2 + 1 <= promised;
+  }
+
+  /** `light` is [column][3]; `holds`: no number is less than 0, of the rest and of the `peaks`, which are added. */
+  set(light: ArrayLike<number>, holds = false, peaks?: ArrayLike<number>): void {
     packLight(this.light, light);
+    if (peaks) packLight(this.peaks, peaks);
     this.holds.value = holds;
+    setPeaks(this.material, peaks !== undefined);
     this.refresh();
   }
 }
 
-/** The two of a light: its rest, and its peaks where it has any. What is drawn adds them up. */
-export class LightSums {
+/**
+ * The two of a light: its rest, and its peaks where it has any, which what is drawn adds up; or one picture of both,
+ * where they can be added before.
+ */
+export class LightSums implements Sums {
   readonly rest: LightSum;
-  /** The picture of the peaks; that of the rest where there are none. */
-  readonly peakTexture: { value: Texture };
+  /** That of the peaks is that of the rest where there are none. */
+  readonly pictures: { rest: Texture; peaks: Texture };
   private peaks: LightSum | undefined;
   hasPeaks = false;
 
-  constructor(private readonly make: () => LightSum) {
+  /** `eachIsLight`: so is every row, and is held at 0 or above by itself. */
+  constructor(
+    private readonly make: () => LightSum,
+    private readonly eachIsLight: boolean,
+  ) {
     this.rest = make();
-    this.peakTexture = { value: this.rest.target.texture };
+    this.pictures = { rest: this.rest.target.texture, peaks: this.rest.target.texture };
   }
 
-  /** `light` is [column][3]. `eachIsLight`: so is every row, and is held at 0 or above by itself. */
-  set(light: ArrayLike<number>, peaks: ArrayLike<number> | undefined, eachIsLight: boolean): void {
-    this.hasPeaks = peaks !== undefined;
-    this.rest.set(light, eachIsLight && this.hasPeaks);
-    if (!peaks) return;
+  /** `light` is [column][3]. */
+  set(light: ArrayLike<number>, peaks: ArrayLike<number> | undefined): void {
+    const { eachIsLight } = this,
+      inOne = eachIsLight && this.rest.takesPeaks;
+    this.hasPeaks = peaks !== undefined && !inOne;
+    this.rest.set(light, eachIsLight && peaks !== undefined, inOne ? peaks : undefined);
+    if (!this.hasPeaks || !peaks) return;
     this.peaks ??= this.make();
     this.peaks.set(peaks, eachIsLight);
-    this.peakTexture.value = this.peaks.target.texture;
+    this.pictures.peaks = this.peaks.target.texture;
   }
 
   update(renderer: WebGLRenderer): void {

@@ -35,7 +35,7 @@ import {
 import type { BakedTransfer, TransferSource } from './kinds.js';
 import type { Lighting } from './lighting.js';
 import { fragmentDeclarations, vertexBody, vertexDeclarations } from './lightmap_glsl.js';
-import { afterAll, LightSum, LightSums, maxColumns } from './light_sum.js';
+import { afterAll, LightSum, LightSums, maxColumns, setPeaks } from './light_sum.js';
 import {
   checkNodes,
   glassRefusal,
@@ -47,9 +47,10 @@ import {
   type NodeSum,
   type Renderer,
 } from './node_edition.js';
-import { chainHooks, copyNodes, diffuseParameters, replaceOnce, setPeaks, useExitRadiance } from './prt_material.js';
+import { chainHooks, copyNodes, diffuseParameters, replaceOnce, useExitRadiance } from './prt_material.js';
 import { drawFilter, type Drawn } from './see_through.js';
 import { shCount } from './sh.js';
+import { RestPose, TurnedSums } from './turned.js';
 
 const maxSide = 16384; // of an atlas; what a graphics card takes is less, mostly, and asked of it
 
@@ -99,7 +100,7 @@ function readSurface(
 
 class LightmapMaterial extends MeshBasicMaterial {
   constructor(
-    readonly atlas: LightSums,
+    readonly atlas: TurnedSums<LightSums>,
     readonly directional: Directional,
     readonly surface: Surface,
     source: Material,
@@ -132,7 +133,7 @@ class LightmapMaterial extends MeshBasicMaterial {
 
   override onBeforeRender(...drawn: Drawn): void {
     setPeaks(this, this.atlas.hasPeaks);
-    this.atlas.update(drawn[0]);
+    this.atlas.update(drawn[0], drawn[4]);
     drawFilter(this, ...drawn);
   }
 
@@ -140,11 +141,7 @@ class LightmapMaterial extends MeshBasicMaterial {
     const { emission, normals, emissive } = this.surface;
     Object.assign(
       shader.uniforms,
-      {
-        prtAtlas: { value: this.atlas.rest.target.texture },
-        prtPeakAtlas: this.atlas.peakTexture,
-        prtEmission: emission,
-      },
+      { prtAtlas: this.atlas.rest, prtPeakAtlas: this.atlas.peaks, prtEmission: emission },
       this.gain && { prtGain: this.gain },
       normals && {
         prtNormalMap: { value: normals.texture },
@@ -184,9 +181,9 @@ class LightmapTransfer implements BakedTransfer {
   private readonly directional: Directional;
   private readonly layout: BlockLayout;
   private readonly transfer: DataArrayTexture;
-  private readonly atlas: LightSums;
+  private readonly atlas: TurnedSums<LightSums>;
   private readonly materials: LightmapMaterial[] = [];
-  private readonly ofCoefficients = new Set<LightSums>();
+  private readonly ofCoefficients = new Set<TurnedSums<LightSums>>();
   private readonly sum: NodeSum | undefined; // for WebGPURenderer
   private refusal: string | undefined; // why that does not draw this
   private readonly glow: { emission: { value: Color }; own: Color; lamp: string }[] = [];
@@ -211,7 +208,8 @@ class LightmapTransfer implements BakedTransfer {
     const { layout, data } = packBlocks({ ...header, count, channels: rows * header.channels }, values);
     this.layout = layout;
     this.transfer = blockTexture(layout, data);
-    this.atlas = new LightSums(() => this.makeAtlas());
+    // Rows of normals are in the axes of the bake: they are as they were.
+    this.atlas = this.makeAtlases(header.directional === 'none' ? new RestPose(meshes) : undefined);
     const { width, height } = receiversOf.image;
     this.refusal = !nodes
       ? withoutNodes
@@ -226,7 +224,7 @@ class LightmapTransfer implements BakedTransfer {
         receivers: header.receivers,
         receiversOf,
       });
-    let gpuBytes = data.byteLength + this.atlas.rest.bytes + 4 * width * height + (this.sum?.bytes ?? 0);
+    let gpuBytes = data.byteLength + this.atlas.main.rest.bytes + 4 * width * height + (this.sum?.bytes ?? 0);
     meshes.forEach((mesh, i) => {
       const own = owns[i]! as Material & Partial<MeshStandardMaterial>,
         surface = readSurface(mesh.geometry, own, header.directional);
@@ -255,6 +253,11 @@ class LightmapTransfer implements BakedTransfer {
     this.gpuBytes = gpuBytes;
   }
 
+  private makeAtlases(pose?: RestPose): TurnedSums<LightSums> {
+    const eachIsLight = this.directional === 'none' || this.directional === 'hl2';
+    return new TurnedSums(() => new LightSums(() => this.makeAtlas(), eachIsLight), this.order, pose);
+  }
+
   /** Exit radiance of white at every texel, under one light. */
   private makeAtlas(): LightSum {
     const { width, height } = this.receiversOf.image,
@@ -279,17 +282,16 @@ uint prtPick( const in ivec2 texel, out int row ) {
 
   check(renderer: Renderer): void {
     if (isNodeRenderer(renderer)) return checkNodes(renderer, this.refusal);
-    this.atlas.rest.check(renderer);
+    this.atlas.main.rest.check(renderer);
   }
 
   relight(lighting: Lighting): void {
     const lamps = [...this.lamps];
-    for (const { rest } of this.ofCoefficients) rest.refresh(); // a lost context has taken what was drawn
     // The scene's own lamps are in none of the peaks.
     const { rest, peaks } = lighting.parts(this.order);
     const light = [...rest, ...lamps.flatMap(([, color]) => color.toArray())],
       sharp = peaks && [...peaks, ...new Array<number>(3 * lamps.length).fill(0)];
-    this.atlas.set(light, sharp, this.directional === 'none' || this.directional === 'hl2');
+    this.atlas.set(light, sharp);
     this.sum?.set(light, sharp, true);
     // One column is of all lamps together; else materials that glow have one of their name.
     for (const { emission, own, lamp } of this.glow) {
@@ -300,11 +302,10 @@ uint prtPick( const in ivec2 texel, out int row ) {
   }
 
   coefficientMaterials(index: number, gain: { value: number }): Material[] {
-    const atlas = new LightSums(() => this.makeAtlas());
+    const atlas = this.makeAtlases();
     atlas.set(
       new Float64Array(3 * (shCount(this.order) + this.lamps.size)).fill(1, 3 * index, 3 * index + 3),
       undefined,
-      false,
     );
     this.ofCoefficients.add(atlas);
     const made = this.meshes.map(

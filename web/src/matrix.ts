@@ -19,7 +19,7 @@ import { LambentError } from './errors.js';
 import { readHeader, type TransferHeader } from './header.js';
 import { limits, type BakedTransfer, type TransferKind, type TransferSource } from './kinds.js';
 import type { Lighting } from './lighting.js';
-import { afterAll, LightSum, LightSums } from './light_sum.js';
+import { afterAll, LightSum, LightSums, setPeaks } from './light_sum.js';
 import {
   checkReflection,
   glossFragmentDeclarations,
@@ -36,9 +36,10 @@ import {
   type LastReflection,
 } from './outgoing.js';
 import { checkNodes, isNodeRenderer, onlyGlsl, setNodes, type Renderer } from './node_edition.js';
-import { diffuseParameters, replaceOnce, setPeaks, useExitRadiance } from './prt_material.js';
+import { diffuseParameters, replaceOnce, useExitRadiance } from './prt_material.js';
 import { drawFilter, type Drawn } from './see_through.js';
 import { shCount } from './sh.js';
+import { RestPose, TurnedSums } from './turned.js';
 import { bindPart } from './vertex_transfer.js';
 
 const vertexDeclarations = (shared: LastReflection): string => /* glsl */ `
@@ -50,6 +51,8 @@ varying vec3 vPrtFront;
 #endif
 ${glossVaryings}
 uniform highp sampler2D prtRows;
+uniform mat3 prtTurnBack;
+#define PRT_TURN_BACK
 vec3 prtRow( const in int r, const in int row ) {
   int i = r * PRT_SUM_ROWS + row;
   return texelFetch( prtRows, ivec2( i % ${rowWidth}, i / ${rowWidth} ), 0 ).rgb;
@@ -67,7 +70,7 @@ const matrixRefusal = onlyGlsl('a transfer matrix');
 
 class MatrixMaterial extends MeshBasicMaterial {
   constructor(
-    readonly sums: LightSums,
+    readonly sums: TurnedSums<LightSums>,
     readonly shared: LastReflection,
     twoSided: boolean,
     source: Material,
@@ -84,14 +87,14 @@ class MatrixMaterial extends MeshBasicMaterial {
   }
 
   override onBeforeRender(...drawn: Drawn): void {
-    this.sums.update(drawn[0]);
+    this.sums.update(drawn[0], drawn[4]);
     drawFilter(this, ...drawn);
   }
 
   override onBeforeCompile(shader: WebGLProgramParametersWithUniforms): void {
     Object.assign(
       shader.uniforms,
-      { prtRows: { value: this.sums.rest.target.texture }, prtPeakRows: this.sums.peakTexture },
+      { prtRows: this.sums.rest, prtPeakRows: this.sums.peaks, prtTurnBack: this.sums.turnBack },
       reflectionUniforms(this.shared),
       this.gain && { prtGain: this.gain },
     );
@@ -120,9 +123,9 @@ class MatrixTransfer implements BakedTransfer {
   readonly gpuBytes: number;
   private readonly layout: BlockLayout;
   private readonly transfer: DataArrayTexture;
-  private readonly sums: LightSums;
+  private readonly sums: TurnedSums<LightSums>;
   private readonly materials = new Map<string, MatrixMaterial>();
-  private readonly ofCoefficients = new Set<LightSums>();
+  private readonly ofCoefficients = new Set<TurnedSums<LightSums>>();
 
   constructor(
     header: TransferHeader,
@@ -140,8 +143,8 @@ class MatrixTransfer implements BakedTransfer {
     );
     this.layout = layout;
     this.transfer = blockTexture(layout, data);
-    this.sums = new LightSums(() => this.makeSum());
-    let gpuBytes = data.byteLength + this.sums.rest.bytes + reflectionBytes(shared);
+    this.sums = this.makeSums(new RestPose(meshes));
+    let gpuBytes = data.byteLength + this.sums.main.rest.bytes + reflectionBytes(shared);
     for (const mesh of meshes) {
       const twoSided = mesh.geometry.hasAttribute('lambentReceiverBack'),
         source = mesh.material as Material,
@@ -152,6 +155,10 @@ class MatrixTransfer implements BakedTransfer {
       mesh.material = material;
     }
     this.gpuBytes = gpuBytes;
+  }
+
+  private makeSums(pose?: RestPose): TurnedSums<LightSums> {
+    return new TurnedSums(() => new LightSums(() => this.makeSum(), false), this.order, pose);
   }
 
   private makeSum(): LightSum {
@@ -179,7 +186,7 @@ uint prtPick( const in ivec2 texel, out int row ) {
 
   check(renderer: Renderer): void {
     if (isNodeRenderer(renderer)) return checkNodes(renderer, matrixRefusal);
-    this.sums.rest.check(renderer);
+    this.sums.main.rest.check(renderer);
     checkReflection(this.shared, renderer);
     const { maxVertexTextures } = renderer.capabilities;
     const wanted = Math.max(
@@ -195,15 +202,14 @@ uint prtPick( const in ivec2 texel, out int row ) {
   }
 
   relight(lighting: Lighting): void {
-    for (const { rest } of this.ofCoefficients) rest.refresh();
     const { rest, peaks } = lighting.parts(this.order, true);
-    this.sums.set(rest, peaks, false);
+    this.sums.set(rest, peaks);
     for (const material of this.materials.values()) setPeaks(material, peaks !== undefined);
   }
 
   coefficientMaterials(index: number, gain: { value: number }): Material[] {
-    const sums = new LightSums(() => this.makeSum());
-    sums.set(new Float64Array(3 * shCount(this.order)).fill(1, 3 * index, 3 * index + 3), undefined, false);
+    const sums = this.makeSums();
+    sums.set(new Float64Array(3 * shCount(this.order)).fill(1, 3 * index, 3 * index + 3), undefined);
     this.ofCoefficients.add(sums);
     const made = this.meshes.map(
       (mesh) =>

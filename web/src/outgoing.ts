@@ -144,6 +144,9 @@ varying vec3 vPrtGloss;
 export const glossVertexBody = /* glsl */ `
   vec3 prtView = isOrthographic ? vec3( viewMatrix[ 0 ][ 2 ], viewMatrix[ 1 ][ 2 ], viewMatrix[ 2 ][ 2 ] )
                                 : normalize( cameraPosition - ( modelMatrix * vec4( transformed, 1.0 ) ).xyz );
+  #ifdef PRT_TURN_BACK
+    prtView = prtTurnBack * prtView;
+  #endif
   prtReflect( lambentReceiver, prtView, vPrtGloss, vPrtFront );
   #ifdef PRT_TWO_SIDED
     prtReflect( lambentReceiverBack, prtView, vPrtBackGloss, vPrtBack );

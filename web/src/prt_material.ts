@@ -10,8 +10,11 @@ import {
   type WebGLProgramParametersWithUniforms,
 } from 'three';
 import type { BlockLayout } from './block_texture.js';
+import { setPeaks } from './light_sum.js';
 import { drawFilter, glassParameters, type Drawn } from './see_through.js';
 import { glossFragmentDeclarations, glossVaryings, glossVertexBody } from './outgoing.js';
+import type { TurnedSums } from './turned.js';
+import type { VertexSums } from './vertex_sum.js';
 
 /** Replaces one piece of a shader of three's; fails loudly where another version of three has no such piece. */
 export function replaceOnce(shader: string, piece: string, by: string): string {
@@ -42,15 +45,6 @@ export function diffuseParameters(source: Material): MeshBasicMaterialParameters
   return glassParameters(source, own);
 }
 
-/** Compiles a material for light with peaks, or for light without. */
-export function setPeaks(material: Material, on: boolean): void {
-  const defines = (material.defines ??= {});
-  if ('PRT_PEAKS' in defines === on) return;
-  if (on) defines['PRT_PEAKS'] = '';
-  else delete defines['PRT_PEAKS'];
-  material.needsUpdate = true;
-}
-
 /** Uniforms that all materials of one file share. */
 export interface PrtUniforms {
   /** block_texture.ts */
@@ -76,8 +70,11 @@ export interface PrtShader {
   gloss?: boolean;
   /** Whether prtFrame is asked for. */
   turns: boolean;
-  /** Whether nodes draw the same: values are those of transfer . light and nothing else. */
-  nodes?: boolean;
+  /**
+   * Whether values are those of transfer . light and nothing else: they are summed when the light changes, `radiance`
+   * looks the sums up (vertex_sum.ts), and nodes draw the same.
+   */
+  summed?: boolean;
   defines?: Record<string, number>;
 }
 
@@ -95,6 +92,8 @@ export interface PrtOptions {
   twoSided: boolean;
   /** Instead of light: transfer . light, signed, in false colour; +-1 / gain are the ends of the scale. */
   falseColor?: { gain: { value: number } };
+  /** With a shader that is summed. */
+  sums?: TurnedSums<VertexSums>;
 }
 
 const vertexDeclarations = /* glsl */ `
@@ -104,6 +103,7 @@ varying vec3 vPrtFront;
   attribute uint lambentReceiverBack;
   varying vec3 vPrtBack;
 #endif
+#ifndef PRT_SUMMED
 uniform highp sampler2DArray prtTransfer;
 uniform vec4 prtLight[ 3 * PRT_LIGHT_QUADS ];
 #ifdef PRT_PEAKS
@@ -121,6 +121,7 @@ vec4 prtValues( const in uint receiver, const in int k ) {
                     r / ( PRT_COLUMNS * PRT_ROWS ) );
   return texelFetch( prtTransfer, at + ivec3( k, 0, 0 ), 0 );
 }
+#endif
 
 #ifdef PRT_TURNS
   // How the surface stands now against the pose that was baked: a rotation of the world.
@@ -288,6 +289,7 @@ export class PrtMaterial extends MeshBasicMaterial {
       ...(twoSided && { PRT_TWO_SIDED: '' }),
       ...(falseColor && { PRT_FALSE_COLOR: '' }),
       ...(shader.turns && { PRT_TURNS: '' }),
+      ...(shader.summed && { PRT_SUMMED: '' }),
       ...shader.defines,
     };
     if (falseColor) this.toneMapped = false;
@@ -306,15 +308,17 @@ export class PrtMaterial extends MeshBasicMaterial {
   }
 
   override onBeforeRender(...drawn: Drawn): void {
-    setPeaks(this, this.prtUniforms.prtHasPeaks.value);
+    const { sums } = this.options;
+    sums?.update(drawn[0], drawn[4]);
+    setPeaks(this, sums ? sums.hasPeaks : this.prtUniforms.prtHasPeaks.value);
     drawFilter(this, ...drawn);
   }
 
   private patch(shader: WebGLProgramParametersWithUniforms): void {
-    const { falseColor, rest, shader: kind } = this.options;
+    const { falseColor, rest, sums, shader: kind } = this.options;
     Object.assign(
       shader.uniforms,
-      this.prtUniforms,
+      sums ? { prtSums: sums.rest, prtPeakSums: sums.peaks } : this.prtUniforms,
       falseColor && { prtGain: falseColor.gain },
       rest && ('bones' in rest ? { prtRestBones: { value: rest.bones } } : { prtRestInverse: { value: rest.inverse } }),
     );

@@ -5,7 +5,8 @@ import { MeshBasicMaterial, type WebGLProgramParametersWithUniforms, type MeshBa
 import { glslHarmonics } from './glsl_harmonics.js';
 import type { Lighting } from './lighting.js';
 import { onlyGlsl, setNodes } from './node_edition.js';
-import { replaceOnce, setPeaks, whiteLine } from './prt_material.js';
+import { setPeaks } from './light_sum.js';
+import { replaceOnce, whiteLine } from './prt_material.js';
 import { drawFilter, type Drawn } from './see_through.js';
 import { clampedCosine, shBand, shCount } from './sh.js';
 

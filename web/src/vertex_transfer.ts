@@ -1,5 +1,5 @@
 // Transfer at vertices, whatever its kind: a texture of every receiver's values, receivers as attributes, and light as
-// uniforms.
+// uniforms, of vertex shaders or of what sums it up once a light (vertex_sum.ts).
 import {
   DataTexture,
   DataUtils,
@@ -31,11 +31,13 @@ import {
   type NodeSum,
   type Renderer,
 } from './node_edition.js';
-import { packLight } from './light_sum.js';
+import { afterAll, packLight } from './light_sum.js';
 import { surfaceFrame, type Lobe } from './lobes.js';
 import { checkReflection, reflectionBytes, reflectionUniforms, type LastReflection } from './outgoing.js';
 import { diffuseParameters, PrtMaterial, type PrtOptions, type PrtShader, type PrtUniforms } from './prt_material.js';
 import { shCount } from './sh.js';
+import { RestPose, TurnedSums } from './turned.js';
+import { VertexSums, type VertexSumOptions } from './vertex_sum.js';
 
 /** The part's mesh, its vertices with their receivers. */
 export async function bindPart(
@@ -130,6 +132,9 @@ export class VertexTransfer implements BakedTransfer {
   private readonly optionsOf: PrtOptions[] = [];
   private readonly materials = new Map<string, PrtMaterial>();
   private readonly quads: number; // of the light, a channel
+  private readonly summing: VertexSumOptions | undefined; // of a shader that is summed
+  private readonly sums: TurnedSums<VertexSums> | undefined; // for WebGLRenderer
+  private readonly ofCoefficients = new Set<TurnedSums<VertexSums>>();
   private readonly sum: NodeSum | undefined; // for WebGPURenderer
   /** Why WebGPURenderer does not draw this. */
   private refusal: string | undefined;
@@ -162,12 +167,17 @@ export class VertexTransfer implements BakedTransfer {
     };
     this.refusal = !nodes
       ? withoutNodes
-      : shader.nodes
+      : shader.summed
         ? undefined
         : onlyGlsl(kind === 'zonal' ? 'made of zonal lobes' : 'a transfer matrix');
-    if (!this.refusal)
-      this.sum = nodes!.sum({ layout, transfer: this.texture, channels: header.channels, receivers: header.receivers });
-    let gpuBytes = data.byteLength + (last ? reflectionBytes(last) : 0) + (this.sum?.bytes ?? 0);
+    const summing = { layout, transfer: this.texture, channels: header.channels, receivers: header.receivers };
+    if (shader.summed) {
+      this.summing = summing;
+      this.sums = new TurnedSums(() => new VertexSums(summing), header.order, new RestPose(meshes));
+    }
+    if (!this.refusal) this.sum = nodes!.sum(summing);
+    let gpuBytes =
+      data.byteLength + (last ? reflectionBytes(last) : 0) + (this.sums?.main.bytes ?? 0) + (this.sum?.bytes ?? 0);
     for (const mesh of meshes) {
       const twoSided = mesh.geometry.hasAttribute('lambentReceiverBack');
       const rest = shader.turns ? this.restOf(mesh) : undefined;
@@ -179,6 +189,7 @@ export class VertexTransfer implements BakedTransfer {
         shader,
         twoSided,
         ...(rest && { rest }),
+        ...(this.sums && { sums: this.sums }),
       };
       gpuBytes += vertices * (twoSided ? 8 : 4);
       this.optionsOf.push(options);
@@ -248,19 +259,20 @@ export class VertexTransfer implements BakedTransfer {
   check(renderer: Renderer): void {
     if (isNodeRenderer(renderer)) return checkNodes(renderer, this.refusal);
     if (this.last) checkReflection(this.last, renderer);
+    this.sums?.main.check(renderer);
     // Light and its peaks, and what three has of its own.
     const uniforms = 6 * this.quads + ownUniforms;
-    if (renderer.capabilities.maxVertexUniforms < uniforms)
+    if (!this.sums && renderer.capabilities.maxVertexUniforms < uniforms)
       throw new LambentError(
         `is lit by ${this.order} bands, which take ${uniforms} uniforms in vertex shaders; ` +
           `this graphics card has ${renderer.capabilities.maxVertexUniforms} there`,
       );
-    // Transfer, frames and view maps, bones as they are and as they were, and three's own of morph targets. All else is
+    // Transfer or its sums, those of the light's peaks, frames and view maps, bones as they are and as they were, and three's own of morph targets. All else is
     // within what WebGL 2 promises.
     const wanted = Math.max(
       ...this.meshes.map(
         (mesh) =>
-          1 +
+          (this.sums?.hasPeaks ? 2 : 1) +
           (this.last ? 2 : 0) +
           ('isSkinnedMesh' in mesh ? 1 + Number(this.bones.size > 0) : 0) +
           Number(Object.keys(mesh.geometry.morphAttributes).length > 0),
@@ -278,30 +290,39 @@ export class VertexTransfer implements BakedTransfer {
     packLight(this.uniforms.prtLight.value, rest);
     if (peaks) packLight(this.uniforms.prtPeaks.value, peaks);
     this.uniforms.prtHasPeaks.value = peaks !== undefined; // materials take it when they are drawn
+    this.sums?.set(rest, peaks);
     this.sum?.set(rest, peaks, true);
   }
 
   coefficientMaterials(index: number, gain: { value: number }): Material[] {
     const light = new Float64Array(3 * shCount(this.order)).fill(1, 3 * index, 3 * index + 3);
+    const { summing } = this,
+      sums = summing && new TurnedSums(() => new VertexSums(summing), this.order);
+    sums?.set(light, undefined);
+    if (sums) this.ofCoefficients.add(sums);
     const uniforms = {
       ...this.uniforms,
       prtHasPeaks: { value: false },
       prtLight: { value: new Float32Array(12 * this.quads) },
     };
     packLight(uniforms.prtLight.value, light);
-    return this.meshes.map(
+    const made = this.meshes.map(
       (mesh, i) =>
         new PrtMaterial(
           uniforms,
-          { ...this.optionsOf[i]!, falseColor: { gain } },
+          { ...this.optionsOf[i]!, falseColor: { gain }, ...(sums && { sums }) },
           { side: (mesh.material as Material).side },
         ),
     );
+    if (sums) afterAll(made, () => (this.ofCoefficients.delete(sums), sums.dispose()));
+    return made;
   }
 
   dispose(): void {
     this.texture.dispose();
     this.sum?.dispose();
+    this.sums?.dispose();
+    for (const sums of this.ofCoefficients) sums.dispose();
     this.errors?.dispose();
     this.last?.frames.dispose();
     this.last?.maps.dispose();

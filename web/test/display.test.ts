@@ -17,6 +17,12 @@ describe('the state of the page', () => {
           expect(parseState(formatState(state, base), base)).toEqual(state);
       });
 
+  it('keeps a sun that was raised, and a light that turns, or turns freely', () => {
+    const state = { ...defaultState(), elevation: -1.5, spin: -8, free: true };
+    expect(parseState(formatState(state), defaultState())).toEqual(state);
+    expect(parseState('#elevation=200&spin=x', defaultState())).toMatchObject({ elevation: 90, spin: 0 });
+  });
+
   it('leaves what cannot be read as it was', () => {
     const base = { ...defaultState(), exposure: 1, tone: 'agx' as const };
     expect(parseState('#exposure=bright&tone=vivid', base)).toMatchObject({ exposure: 1, tone: 'agx' });

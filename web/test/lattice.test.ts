@@ -192,5 +192,19 @@ describe.skipIf(!haveTool)("a file's lattice", () => {
       `probes of ${count} points, against the tool's: ${(100 * worst).toFixed(3)} % of the largest number apart`,
     );
     expect(worst).toBeLessThan(0.001);
+    // And what three's grid keeps, as a file: numbers that the two sums differ in are at most a step of half floats apart.
+    lambent('export', at('free.glb'), '--three-probes', at('grid'), '--env', at('light.hdr'));
+    const bytes = new Uint8Array(readFileSync(at('grid.probes.bin'))).buffer,
+      about = JSON.parse(readFileSync(at('grid.probes.json'), 'utf8')) as Record<string, number[]>,
+      values = (bits: Uint16Array): number[] => Array.from(bits, (v) => DataUtils.fromHalfFloat(v)),
+      theirs = values(new Uint16Array(bytes)),
+      ours = values(grid.texture!.image.data as Uint16Array);
+    expect(theirs.length).toBe(ours.length);
+    theirs.forEach((v, i) => expect(Math.abs(v - ours[i]!)).toBeLessThan(size * 0.001));
+    expect(about['resolution']).toEqual([4, 3, 5]);
+    expect(
+      new Vector3(grid.width, grid.height, grid.depth).distanceTo(new Vector3().fromArray(about['size']!)),
+    ).toBeLessThan(1e-5);
+    expect(grid.position.distanceTo(new Vector3().fromArray(about['position']!))).toBeLessThan(1e-5);
   });
 });

@@ -13,6 +13,7 @@
 #include <lambent/core/random.h>
 #include <lambent/core/sampling.h>
 
+#include <atomic>
 #include <chrono>
 
 namespace lambent {
@@ -206,6 +207,29 @@ void fill_invalid(const Lattice& lattice, const std::vector<uint8_t>& valid, con
   }
 }
 
+// Pairs of valid neighbours, and those with a solid surface between them.
+std::pair<size_t, size_t> count_walled(const Tracer& tracer, const Lattice& lattice,
+                                       const std::vector<uint8_t>& valid) {
+  std::atomic<size_t> pairs = 0, walled = 0;
+  parallel_for(lattice.count(), 256, [&](size_t begin, size_t end) {
+    for (size_t p = begin; p < end; ++p) {
+      const std::array<int, 3> at = lattice.place(p), n{lattice.nx, lattice.ny, lattice.nz};
+      for (size_t axis = 0; axis < 3; ++axis) {
+        std::array<int, 3> next = at;
+        if (++next[axis] == n[axis]) continue;
+        const size_t q = lattice.index(next[0], next[1], next[2]);
+        if (!valid[p] || !valid[q]) continue;
+        const Vec3 from = lattice.position(p), way = lattice.position(q) - from;
+        const float distance = length(way);
+        if (!(distance > 0)) continue;
+        const Hit hit = tracer.closest(from, way / distance, 0, distance);
+        ++pairs, walled += hit.triangle != none && !tracer.lets_pass(hit.triangle);
+      }
+    }
+  });
+  return {pairs, walled};
+}
+
 bool is_coloured(const Outgoing& o) {
   for (const ViewMap& map : o.maps)
     for (const ViewWeights& w : map.values)
@@ -225,9 +249,9 @@ Error too_little_memory(size_t needed, size_t allowed) {
 
 }  // namespace
 
-Bounds default_lattice_box(const Scene& scene) {
+Bounds default_lattice_box(const Scene& scene, int nx, int ny, int nz) {
   const Bounds box = bounds(scene);
-  const Vec3 inset = min(Vec3(1e-3f * box.diagonal()), 0.5f * (box.max - box.min));
+  const Vec3 inset = 0.5f * (box.max - box.min) / Vec3(float(nx), float(ny), float(nz));
   return {box.min + inset, box.max - inset};
 }
 
@@ -305,9 +329,16 @@ Result<LatticeTransfer> bake_lattice(const Scene& scene, const Tracer& tracer, c
   if (valid == 0) return Error{"lattice", "every one of its points lies inside something"};
   fill_invalid(lattice, result.valid, out);
   result.transfer = std::move(out.transfer);
-  if (report)
-    *report = {lattice.count(), lattice.count() - valid, lattice.count() * size_t(options.samples), bytes,
-               std::chrono::duration<double>(std::chrono::steady_clock::now() - start).count()};
+  if (report) {
+    const auto [pairs, walled] = count_walled(tracer, lattice, result.valid);
+    *report = {lattice.count(),
+               lattice.count() - valid,
+               lattice.count() * size_t(options.samples),
+               bytes,
+               std::chrono::duration<double>(std::chrono::steady_clock::now() - start).count(),
+               pairs,
+               walled};
+  }
   return result;
 }
 

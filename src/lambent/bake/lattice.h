@@ -28,11 +28,13 @@ struct LatticeReport {
   size_t rays = 0;
   size_t bytes = 0;  // of the transfer
   double seconds = 0;
+  size_t neighbours = 0, walled = 0;  // pairs of valid neighbours along the axes; those with a solid surface between
+                                      // them, through which interpolated light leaks
 };
 
-// The scene's bounds less a thousandth of their diagonal on each side, so that outer points do not lie in a room's
-// walls and floor.
-Bounds default_lattice_box(const Scene& scene);
+// From the first point to the last of so many an axis, each in the middle of a cell of the scene's bounds: half a cell
+// inside them, so that outer points do not lie in a room's walls and floor.
+Bounds default_lattice_box(const Scene& scene, int nx, int ny, int nz);
 
 // Bytes that the lattice itself takes.
 size_t lattice_bytes(const Lattice& lattice, int light_order, int order, int channels, Precision precision);

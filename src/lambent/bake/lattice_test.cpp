@@ -188,6 +188,24 @@ TEST(Lattice, FillsPointsInsideSolids) {
   EXPECT_NE(none_left.error().message.find("inside something"), std::string::npos);
 }
 
+TEST(Lattice, StandsHalfACellInsideAndCountsWhatStandsBetweenPoints) {
+  Scene scene = coloured_corner();
+  const Bounds box = bounds(scene), points = default_lattice_box(scene, 4, 1, 2);
+  const Vec3 size = box.max - box.min, first = box.min + size / Vec3(8, 2, 4), last = box.max - size / Vec3(8, 2, 4);
+  EXPECT_LT(length(points.min - first) + length(points.max - last), 1e-5f);
+  // Two rows of points along x: through the box's side at x = -0.5 and 0.5 where they are low, over it where high.
+  const Surfaces s = bake_surfaces(std::move(scene), {.order = 2, .samples = 16, .bounces = 0});
+  LatticeReport report;
+  must_bake(s, {Vec3(-1, 0.5f, 1), Vec3(1, 0.5f, 1), 2, 1, 1}, {.order = 2, .samples = 64}, &report);
+  EXPECT_EQ(report.neighbours, 1u);
+  EXPECT_EQ(report.walled, 0u);
+  must_bake(s, {Vec3(-1, 0.5f, 0), Vec3(1, 1.5f, 0), 2, 2, 1}, {.order = 2, .samples = 64}, &report);
+  EXPECT_EQ(report.neighbours, 4u);
+  EXPECT_EQ(report.walled, 1u);  // the low pair
+  must_bake(s, {Vec3(-1.5f, 0.5f, 0), Vec3(1.5f, 0.5f, 0), 3, 1, 1}, {.order = 2, .samples = 64}, &report);
+  EXPECT_EQ(report.neighbours, 0u);  // the middle point is none
+}
+
 TEST(Lattice, IsTheSameOnOneThreadAndSaysWhatMemoryItNeeds) {
   const Surfaces s = bake_surfaces(coloured_corner(), {.order = 3, .samples = 64, .bounces = 1});
   const Lattice lattice{Vec3(-1.5f, 0.1f, -1.5f), Vec3(1.5f, 2, 1.5f), 5, 4, 3};

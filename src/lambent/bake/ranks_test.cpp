@@ -185,9 +185,10 @@ TEST(Ranks, OtherBakesAreAlike) {
     });
   const Transfer surface = *bake(p.scene, p.tracer, p.receivers, few);
   expect_alike("lattice", [&](Progress* progress) {
-    auto l = bake_lattice(p.scene, p.tracer, p.receivers, surface, nullptr,
-                          {default_lattice_box(p.scene).min, default_lattice_box(p.scene).max, 5, 6, 7},
-                          {.order = 2, .samples = 64}, nullptr, progress);
+    auto l =
+        bake_lattice(p.scene, p.tracer, p.receivers, surface, nullptr,
+                     {default_lattice_box(p.scene, 5, 6, 7).min, default_lattice_box(p.scene, 5, 6, 7).max, 5, 6, 7},
+                     {.order = 2, .samples = 64}, nullptr, progress);
     EXPECT_TRUE(l);
     return l ? bytes(l->transfer) : Bytes{};
   });

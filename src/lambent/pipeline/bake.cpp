@@ -243,16 +243,19 @@ Result<void> bake_free_space(Bake& b, const Lattice& lattice) {
   if (!baked) return baked.error();
   b.more.push_back(lattice_field(std::move(*baked)));
   b.told["lattice_invalid"] = report.invalid;
-  b.summary.json["lattice"] = {{"points", report.points},
-                               {"invalid", report.invalid},
-                               {"rays", report.rays},
-                               {"seconds", report.seconds},
-                               {"bytes", report.bytes}};
-  b.line("lattice",
-         fmt::format(
-             "{} points, order {}, {} in {}{}", human_count(report.points), b.plan.lattice.order,
-             human_bytes(double(report.bytes)), human_seconds(report.seconds),
-             report.invalid ? "; " + human_count(report.invalid) + " inside something, filled from neighbours" : ""));
+  b.summary.json["lattice"] = {{"points", report.points}, {"invalid", report.invalid},
+                               {"rays", report.rays},     {"seconds", report.seconds},
+                               {"bytes", report.bytes},   {"neighbours", report.neighbours},
+                               {"walled", report.walled}};
+  const std::string invalid =
+      report.invalid ? "; " + human_count(report.invalid) + " inside something, filled from neighbours" : "";
+  b.line("lattice", fmt::format("{} points, order {}, {} in {}{}", human_count(report.points), b.plan.lattice.order,
+                                human_bytes(double(report.bytes)), human_seconds(report.seconds), invalid));
+  if (report.walled)
+    b.job.warn(
+        fmt::format("--lattice: a surface stands between {} of {} pairs of neighbouring points, thinner than a "
+                    "cell: light leaks through it; finer cells keep it in",
+                    human_count(report.walled), human_count(report.neighbours)));
   return {};
 }
 

@@ -359,7 +359,8 @@ Result<Lattice> lattice_of_request(const BakeRequest& r, const Scene& scene) {
       return Error{"--lattice",
                    fmt::format("expects three whole numbers from 1 to {}, not \"{}\"", max_lattice_points, r.lattice),
                    true};
-  Bounds box = default_lattice_box(scene);
+  const int nx = int((*counts)[0]), ny = int((*counts)[1]), nz = int((*counts)[2]);
+  Bounds box = default_lattice_box(scene, nx, ny, nz);
   if (!r.lattice_box.empty()) {
     auto b = parse_numbers(r.lattice_box, 6, "--lattice-box");
     if (!b) return b.error();
@@ -369,7 +370,7 @@ Result<Lattice> lattice_of_request(const BakeRequest& r, const Scene& scene) {
     if (!all_at_most(max(abs(box.min), abs(box.max)), Vec3(1e9f)))
       return Error{"--lattice-box", "lies beyond 1e9", true};
   }
-  return Lattice{box.min, box.max, int((*counts)[0]), int((*counts)[1]), int((*counts)[2])};
+  return Lattice{box.min, box.max, nx, ny, nz};
 }
 
 Result<std::vector<float>> membrane_alphas(const std::string& text, const Scene& scene, const Receivers& receivers) {

@@ -1,0 +1,166 @@
+// <lambent-viewer src="scene.glb" env="sky:elevation=20">: a baked scene in anybody's page, of one file that asks for
+// no other (docs/web.md). Attributes are spelt as the options of `lambent view`.
+import { Euler, MathUtils, Vector3 } from 'three';
+import { LambentError } from '../src/index.js';
+import { fetchFile, makeEnvironment, makeSky, readBaked, readMap, type EnvironmentFile } from './loading.js';
+import { defaultState, parseState, type State } from './state.js';
+import { parseSky } from './sky.js';
+import { Viewer } from './viewer.js';
+
+const sheet = `
+:host { display: block; position: relative; aspect-ratio: 4 / 3; overflow: hidden; background: #0c0d10; }
+:host([hidden]) { display: none; }
+canvas { position: absolute; inset: 0; width: 100%; height: 100%; touch-action: pan-y; cursor: grab; outline: none; }
+canvas:focus-visible { outline: 2px solid #8ab8ff; outline-offset: -3px; }
+p { position: absolute; inset: auto 0 0 0; margin: 0; padding: 0.4em 0.8em; font: 15px/1.4 system-ui, sans-serif;
+  color: #eceff3; background: #16181c; }
+p:empty { display: none; }`;
+
+/** What the address of the page may hold, an element has as attributes. */
+const ofState = ['camera', 'rotate', 'exposure', 'tone', 'spin', 'background', 'order', 'window'] as const;
+
+export class LambentViewer extends HTMLElement {
+  static readonly observedAttributes = ['src', 'env', 'alt', ...ofState];
+  private readonly canvas = document.createElement('canvas');
+  private readonly words = document.createElement('p');
+  private viewer: Viewer | undefined;
+  private shown: { src?: string | null; env?: string | null } = {};
+  private due = false;
+
+  constructor() {
+    super();
+    const root = this.attachShadow({ mode: 'open' }),
+      style = new CSSStyleSheet(); // which no content security policy has a say in
+    style.replaceSync(sheet);
+    root.adoptedStyleSheets = [style];
+    this.canvas.tabIndex = 0;
+    this.canvas.setAttribute('role', 'img');
+    this.words.setAttribute('role', 'status');
+    root.append(this.canvas, this.words);
+  }
+
+  connectedCallback(): void {
+    this.update();
+  }
+  disconnectedCallback(): void {
+    this.viewer?.dispose();
+    this.viewer = undefined;
+    this.shown = {};
+    // A canvas gives its context once.
+    const fresh = this.canvas.cloneNode() as HTMLCanvasElement;
+    this.canvas.replaceWith(fresh);
+    Object.assign(this, { canvas: fresh });
+  }
+  attributeChangedCallback(): void {
+    this.update();
+  }
+
+  /** Once for all attributes that change together. */
+  private update(): void {
+    if (this.due) return;
+    this.due = true;
+    queueMicrotask(() => {
+      this.due = false;
+      if (this.isConnected) void this.show();
+    });
+  }
+
+  private say(text: string): void {
+    this.words.textContent = text;
+  }
+
+  private async show(): Promise<void> {
+    this.canvas.setAttribute(
+      'aria-label',
+      `${this.getAttribute('alt') ?? 'A scene in light that turns'}. Drag or use the arrow keys to look around; with Shift, to turn the light.`,
+    );
+    try {
+      this.viewer ??= this.makeViewer();
+      const { viewer } = this,
+        src = this.getAttribute('src'),
+        env = this.getAttribute('env') ?? 'sky',
+        state = this.stateOf();
+      if (src === null) throw new LambentError('lambent-viewer has no src, the address of a baked file');
+      const isNewScene = this.shown.src !== src,
+        isNewLight = this.shown.env !== env;
+      this.shown = { src, env };
+      const [scene, light] = await Promise.all([
+        isNewScene
+          ? this.fetch(src)
+              .then((bytes) => readBaked(bytes, src))
+              .catch(named(src))
+          : undefined,
+        isNewLight ? this.environment(env).catch(named(env)) : undefined,
+      ]);
+      if (viewer !== this.viewer || this.shown.src !== src || this.shown.env !== env) return; // others came meanwhile
+      Object.assign(viewer, {
+        exposure: state.exposure,
+        tone: state.tone,
+        order: state.order,
+        window: state.window,
+        spin: state.spin,
+        showBackground: state.background,
+      });
+      if (light) viewer.setEnvironment(light);
+      if (scene) viewer.setModel('baked', scene);
+      const [yaw, pitch, roll] = state.rotate.map((d) => MathUtils.degToRad(d)) as [number, number, number];
+      viewer.orbit.light.setFromEuler(new Euler(pitch, yaw, roll, 'YXZ'));
+      if (state.camera) {
+        viewer.camera.fov = state.camera[6]!;
+        viewer.orbit.look(new Vector3().fromArray(state.camera), new Vector3().fromArray(state.camera, 3));
+      } else if (scene) viewer.frameAll();
+      viewer.changeLight();
+      viewer.measure();
+      this.say('');
+      this.dispatchEvent(new Event('load'));
+    } catch (error) {
+      this.say(error instanceof Error ? error.message : String(error));
+      this.dispatchEvent(new Event('error'));
+    }
+  }
+
+  /** As the page reads them from its address; what cannot be read is as if it were not there. */
+  private stateOf(): State {
+    const from = new URLSearchParams();
+    for (const name of ofState) {
+      const value = this.getAttribute(name);
+      if (value !== null) from.set(name, value);
+    }
+    return parseState(from.toString(), defaultState());
+  }
+
+  private makeViewer(): Viewer {
+    const viewer = new Viewer(this.canvas, {
+      onFrame: () => undefined,
+      onChange: () => undefined,
+      onLift: () => false,
+      onUse: () => undefined,
+      onProblem: (message) => this.say(message),
+      onRecovered: () => this.say(''),
+      onMeter: () => undefined,
+    });
+    viewer.orbit.wheelZooms = false; // the wheel scrolls the page that this is a part of
+    return viewer;
+  }
+
+  private fetch(path: string): Promise<ArrayBuffer> {
+    return fetchFile(path, (share) => this.say(share > 0 ? `Loading: ${Math.round(100 * share)} %` : 'Loading'));
+  }
+
+  private async environment(env: string): Promise<EnvironmentFile> {
+    const sky = parseSky(env);
+    if (sky) return makeSky(env, sky);
+    if (env === 'sky' || env.startsWith('sky:'))
+      throw new LambentError('is no sky: elevation, azimuth, turbidity, ground and sun are its keys');
+    return makeEnvironment(env, readMap(await this.fetch(env)));
+  }
+}
+
+/** An error that says whose it is. */
+const named =
+  (name: string) =>
+  (error: unknown): never => {
+    throw new LambentError(`${name} ${error instanceof Error ? error.message : String(error)}`);
+  };
+
+if (!customElements.get('lambent-viewer')) customElements.define('lambent-viewer', LambentViewer);

@@ -1,0 +1,119 @@
+// Nodes that were turned since the bake: transfer is in the axes of the scene as it was baked, so that such a mesh takes
+// the light as it stands in its own. It has a sum of its own, of all receivers of the file.
+import { Matrix3, type BufferGeometry, type Mesh, type Object3D, type Texture, type WebGLRenderer } from 'three';
+import { orthogonalPart } from './lobes.js';
+import { makeShRotation, rotateSh } from './sh_rotation.js';
+import { shCount } from './sh.js';
+
+/** How meshes stood when they were baked: as they do on loading. Skins are not known. */
+export class RestPose {
+  private readonly inverse = new WeakMap<BufferGeometry, Matrix3>();
+  private readonly linear = new Matrix3();
+
+  constructor(meshes: readonly Mesh[]) {
+    for (const mesh of meshes) {
+      if ('isSkinnedMesh' in mesh) continue;
+      mesh.updateWorldMatrix(true, false);
+      const rest = new Matrix3().setFromMatrix4(mesh.matrixWorld);
+      if (rest.determinant() !== 0) this.inverse.set(mesh.geometry, rest.invert());
+    }
+  }
+
+  /** The turn of a mesh, or of a clone of it, since then; undefined where there is none. */
+  turnOf(object: Object3D): Matrix3 | undefined {
+    const rest = this.inverse.get((object as Mesh).geometry);
+    if (!rest) return undefined;
+    const turn = orthogonalPart(this.linear.setFromMatrix4(object.matrixWorld).multiply(rest));
+    const isTurned = turn.elements.some((v, i) => Math.abs(v - (i % 4 === 0 ? 1 : 0)) > 1e-5);
+    return isTurned ? turn : undefined;
+  }
+}
+
+/** [column][3]: harmonics of the world, as many as there are, in the axes of what was turned; lamps stay. */
+export function lightFor(turn: Matrix3, light: ArrayLike<number>, order: number): Float64Array {
+  const out = Float64Array.from(light);
+  // Column-major, so that these are the rows of its inverse.
+  if (order > 0)
+    rotateSh(makeShRotation(order, turn.elements), Float64Array.from(light).subarray(0, 3 * shCount(order)), out);
+  return out;
+}
+
+export interface Sums {
+  /** [column][3] of light, and of its peaks where those count apart. */
+  set(light: ArrayLike<number>, peaks: ArrayLike<number> | undefined): void;
+  update(renderer: WebGLRenderer): void;
+  readonly pictures: { rest: Texture; peaks: Texture };
+  readonly hasPeaks: boolean;
+  dispose(): void;
+}
+
+const upright = new Matrix3();
+
+interface Light {
+  rest: ArrayLike<number>;
+  peaks: ArrayLike<number> | undefined;
+}
+
+/** Sums of a light, and of the same light for each mesh that was turned. */
+export class TurnedSums<S extends Sums> {
+  readonly main: S;
+  /** For shaders: what is drawn next. */
+  readonly rest: { value: Texture };
+  readonly peaks: { value: Texture };
+  /** From the world into the axes that were baked. */
+  readonly turnBack = { value: new Matrix3() };
+  private light: Light | undefined;
+  private readonly turned = new Map<Object3D, { sums: S; turn: Matrix3; of: Light | undefined }>();
+
+  /** `order` of the light's harmonics. */
+  constructor(
+    private readonly make: () => S,
+    private readonly order: number,
+    private readonly pose?: RestPose,
+  ) {
+    this.main = make();
+    this.rest = { value: this.main.pictures.rest };
+    this.peaks = { value: this.main.pictures.peaks };
+  }
+
+  get hasPeaks(): boolean {
+    return this.main.hasPeaks;
+  }
+
+  set(rest: ArrayLike<number>, peaks: ArrayLike<number> | undefined): void {
+    this.light = { rest, peaks };
+    this.main.set(rest, peaks);
+  }
+
+  /** Before `object` is drawn. */
+  update(renderer: WebGLRenderer, object: Object3D): void {
+    const turn = this.pose?.turnOf(object),
+      sums = turn ? this.sumsFor(object, turn) : this.main;
+    sums.update(renderer);
+    const { rest, peaks } = sums.pictures,
+      back = turn ? turn.transpose() : upright;
+    if (this.rest.value === rest && this.peaks.value === peaks && this.turnBack.value.equals(back)) return;
+    this.rest.value = rest;
+    this.peaks.value = peaks;
+    this.turnBack.value = back;
+    renderer.state.useProgram(null!); // else meshes of one material, one after another, keep the first one's values
+  }
+
+  private sumsFor(object: Object3D, turn: Matrix3): S {
+    const { light, order } = this;
+    let entry = this.turned.get(object);
+    if (!entry) this.turned.set(object, (entry = { sums: this.make(), turn: upright, of: undefined }));
+    if (light && (entry.of !== light || !entry.turn.equals(turn))) {
+      entry.sums.set(lightFor(turn, light.rest, order), light.peaks && lightFor(turn, light.peaks, order));
+      entry.turn = turn.clone();
+      entry.of = light;
+    }
+    return entry.sums;
+  }
+
+  dispose(): void {
+    this.main.dispose();
+    for (const { sums } of this.turned.values()) sums.dispose();
+    this.turned.clear();
+  }
+}
