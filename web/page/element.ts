@@ -70,10 +70,9 @@ export class LambentViewer extends HTMLElement {
   }
 
   private async show(): Promise<void> {
-    this.canvas.setAttribute(
-      'aria-label',
-      `${this.getAttribute('alt') ?? 'A scene in light that turns'}. Drag or use the arrow keys to look around; with Shift, to turn the light.`,
-    );
+    const seen = this.getAttribute('alt') ?? 'A scene in light that turns',
+      how = 'Drag or use the arrow keys to look around; with Shift, to turn the light.';
+    this.canvas.setAttribute('aria-label', `${seen}. ${how}`);
     try {
       this.viewer ??= this.makeViewer();
       const { viewer } = this,

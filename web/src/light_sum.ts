@@ -1,5 +1,5 @@
-// T . light on the graphics card: a picture with a texel for each row of each receiver, drawn when the light changes and
-// only looked up until then. Who makes one says which texel is whose.
+// T . light on the graphics card: a picture with a texel for each row of each receiver, drawn when the light changes
+// and only looked up until then. Who makes one says which texel is whose.
 import {
   Camera,
   FloatType,

@@ -1,5 +1,5 @@
-// Nodes that were turned since the bake: transfer is in the axes of the scene as it was baked, so that such a mesh takes
-// the light as it stands in its own. It has a sum of its own, of all receivers of the file.
+// Nodes that were turned since the bake: transfer is in the axes of the scene as it was baked, so that such a mesh
+// takes the light as it stands in its own. It has a sum of its own, of all receivers of the file.
 import { Matrix3, type BufferGeometry, type Mesh, type Object3D, type Texture, type WebGLRenderer } from 'three';
 import { orthogonalPart } from './lobes.js';
 import { makeShRotation, rotateSh } from './sh_rotation.js';

@@ -267,8 +267,8 @@ export class VertexTransfer implements BakedTransfer {
         `is lit by ${this.order} bands, which take ${uniforms} uniforms in vertex shaders; ` +
           `this graphics card has ${renderer.capabilities.maxVertexUniforms} there`,
       );
-    // Transfer or its sums, those of the light's peaks, frames and view maps, bones as they are and as they were, and three's own of morph targets. All else is
-    // within what WebGL 2 promises.
+    // Transfer or its sums, those of the light's peaks, frames and view maps, bones as they are and as they were, and
+    // three's own of morph targets. All else is within what WebGL 2 promises.
     const wanted = Math.max(
       ...this.meshes.map(
         (mesh) =>

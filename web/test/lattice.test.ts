@@ -192,7 +192,7 @@ describe.skipIf(!haveTool)("a file's lattice", () => {
       `probes of ${count} points, against the tool's: ${(100 * worst).toFixed(3)} % of the largest number apart`,
     );
     expect(worst).toBeLessThan(0.001);
-    // And what three's grid keeps, as a file: numbers that the two sums differ in are at most a step of half floats apart.
+    // And what three's grid keeps, as a file.
     lambent('export', at('free.glb'), '--three-probes', at('grid'), '--env', at('light.hdr'));
     const bytes = new Uint8Array(readFileSync(at('grid.probes.bin'))).buffer,
       about = JSON.parse(readFileSync(at('grid.probes.json'), 'utf8')) as Record<string, number[]>,
