@@ -125,10 +125,10 @@ void warn_of_smooth_materials(Bake& b, const ReceiverMaterials& materials) {
 
 Result<void> bake_glossy(Bake& b) {
   const ReceiverMaterials materials = make_receiver_materials(b.scene, b.receivers(), b.plan.reflection);
-  warn_of_smooth_materials(b, materials);
   auto baked =
       bake_matrix(b.scene, b.tracer, b.receivers(), materials, b.plan.bake, b.plan.matrix, &b.report, b.job.progress);
   if (!baked) return baked.error();
+  warn_of_smooth_materials(b, materials);
   b.store = std::move(baked->transfer), b.rows = std::move(baked->outgoing), b.terms = std::move(b.report.terms);
   return {};
 }
@@ -140,9 +140,9 @@ Result<void> bake_factors(Bake& b) {
   auto transfer = bake(b.scene, b.tracer, b.receivers(), visibility, &b.report, b.job.progress);
   if (!transfer) return transfer.error();
   const ReceiverMaterials materials = make_receiver_materials(b.scene, b.receivers(), b.plan.reflection);
-  warn_of_smooth_materials(b, materials);
   b.rows = make_map_outgoing(materials, b.plan.matrix.incident_order, b.plan.matrix, b.job.progress);
   if (is_cancelled(b.job.progress)) return Error{"", "cancelled"};
+  warn_of_smooth_materials(b, materials);
   b.store = FactoredTransfer{std::move(*transfer), b.plan.matrix.incident_order};
   return {};
 }

@@ -4,6 +4,8 @@
 #include <lambent/scene/append.h>
 #include <lambent/scene/load.h>
 
+#include <cmath>
+
 namespace lambent {
 
 Result<void> add_insertion(const Insertion& insertion, const Lattice& lattice, int order, const Relit& free_space,
@@ -15,7 +17,11 @@ Result<void> add_insertion(const Insertion& insertion, const Lattice& lattice, i
   for (const Vec3& p : object->positions)
     if (!is_finite(p)) return Error{insertion.path, "is too large to be scaled so"};
   const Bounds box = bounds(*object);
-  const Vec3 slack(0.01f * length(lattice.max - lattice.min));
+  // The outer points stand for half a cell more; of an axis with one point, for all of it.
+  Vec3 slack;
+  const int points[] = {lattice.nx, lattice.ny, lattice.nz};
+  for (int k = 0; k < 3; ++k)
+    slack[k] = points[k] > 1 ? 0.51f * (lattice.max[k] - lattice.min[k]) / float(points[k] - 1) : INFINITY;
   if (!all_at_most(lattice.min - slack, box.min) || !all_at_most(box.max, lattice.max + slack))
     job.warn(insertion.path + ": reaches out of the lattice's box; light there is that of the box's border");
   auto tracer = Tracer::build(*object);
