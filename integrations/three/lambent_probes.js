@@ -1,8 +1,10 @@
 // Light in free space from `lambent export BAKED --three-probes PREFIX --env SKY`, as a grid of probes of three.js
 // (r187 and newer). Needs nothing but three.js:
 //
-//   import { LightProbeGridWebGL } from 'three/addons/lighting/LightProbeGridWebGL.js'; // LightProbeGrid: WebGPURenderer
+//   import { LightProbeGridWebGL } from 'three/addons/lighting/LightProbeGridWebGL.js';
 //   scene.add(await loadProbes(LightProbeGridWebGL, 'light/room.probes.json'));
+//
+// and LightProbeGrid for WebGPURenderer.
 import { Data3DTexture, HalfFloatType, LinearFilter, RGBAFormat } from 'three';
 
 export async function loadProbes(GridClass, url) {
