@@ -46,8 +46,11 @@ if(NOT LAMBENT_SANITIZE)  # which has an allocator of its own
 endif()
 
 add_test(NAME include_arrows COMMAND ${CMAKE_CURRENT_SOURCE_DIR}/tests/include_arrows.sh ${CMAKE_CURRENT_SOURCE_DIR})
-set(command_tests command_line command_line_stores command_line_lightmaps command_line_lobes command_line_indirect large
-  durable)
+set(command_tests command_line command_line_stores command_line_lightmaps command_line_lobes command_line_indirect
+  large)
+if(NOT LAMBENT_SANITIZE)  # full disks, limits and torn files are core/checkpoint_test.cpp's, too
+  list(APPEND command_tests durable)
+endif()
 foreach(name ${command_tests})
   add_test(NAME ${name} COMMAND ${CMAKE_CURRENT_SOURCE_DIR}/tests/${name}.sh $<TARGET_FILE:lambent-tool>)
   set_tests_properties(${name} PROPERTIES COST 1000)  # the longest: first, beside the others
@@ -55,7 +58,6 @@ endforeach()
 if(LAMBENT_SANITIZE)
   list(FILTER command_tests INCLUDE REGEX command_line)
   set_tests_properties(${command_tests} PROPERTIES ENVIRONMENT LAMBENT_COARSE=1)
-  set_tests_properties(durable PROPERTIES ENVIRONMENT LAMBENT_DURABLE_RAYS=128)
 endif()
 set(kill_and_resume 2)  # moments of each kind; more of them: scripts/bench kills
 if(LAMBENT_SANITIZE)  # where a bake takes seconds

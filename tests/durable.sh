@@ -105,7 +105,7 @@ done
 [ -z "$(ls set.*.lambent-part* 2>/dev/null)" ] && ok || bad "temporaries of killed runs stay: $(ls set.*.lambent-part*)"
 
 # Checkpoints: interrupted, gone on with; refused by name; listed and cleaned.
-rays=${LAMBENT_DURABLE_RAYS:-1024}  # fewer where the tool is slow
+rays=1024
 work=(bake corner.obj --max-edge 0.03 --samples "$rays")
 "$tool" "${work[@]}" --checkpoint off -o whole.glb >/dev/null 2>stderr || bad "$(cat stderr)"
 "$tool" "${work[@]}" --checkpoint kept -o part.glb >/dev/null 2>stderr &

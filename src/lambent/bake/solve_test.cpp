@@ -5,6 +5,8 @@
 #include <lambent/core/random.h>
 #include <lambent/scene/procedural.h>
 
+#include "sanitizers.h"
+
 #include <gtest/gtest.h>
 
 namespace lambent {
@@ -128,6 +130,7 @@ TEST(Solve, ColouredColumnsAgreeAndTheResidualIsWhatTheySay) {
 }
 
 TEST(Solve, BetterSolversTakeFewerApplications) {
+  SKIP_UNDER_SANITIZERS();
   const System s(room(Vec3(0.8f), 16), 3, 256);  // blocks enough for all phases of Gauss-Seidel
   auto applications = [&](Solver solver) {
     SolveReport report;

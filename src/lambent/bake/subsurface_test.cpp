@@ -7,6 +7,8 @@
 #include <lambent/core/random.h>
 #include <lambent/scene/procedural.h>
 
+#include "sanitizers.h"
+
 #include <gtest/gtest.h>
 
 #include <array>
@@ -61,6 +63,7 @@ std::vector<double> half_space_reflectance(double albedo, const std::vector<Quad
 }
 
 TEST(Subsurface, HalfSpaceReflectsWhatChandrasekharFound) {
+  SKIP_UNDER_SANITIZERS();
   const auto nodes = gauss_legendre(64, 0, 1);
   const PatchScene patch = make_patch({8, std::vector<float>(64, 0.3f)}, Vec3(1));
   const Vec3 albedo(0.5f, 0.9f, 0.99f);

@@ -90,6 +90,7 @@ TEST(Sky, DiscStandsWhereAskedAndItsEnergyIsExactAtAnySize) {
 }
 
 TEST(Sky, DiscHasItsSizeAndRadianceOnAFineMap) {
+  SKIP_UNDER_SANITIZERS();
   SkyOptions options;
   options.width = 4096, options.elevation = 20;
   Environment env = sky(options);

@@ -14,6 +14,7 @@
 #include <lambent/scene/procedural.h>
 
 #include "reference_checks.h"
+#include "sanitizers.h"
 
 #include <gtest/gtest.h>
 
@@ -374,6 +375,7 @@ TEST(Glass, MasksAreHoles) {
 }
 
 TEST(Glass, TheReferenceAgrees) {
+  SKIP_UNDER_SANITIZERS();
   // Coloured, half-covered panes that reflect as well, lamps on either side of them: bake and path tracer share no ray.
   Scene s = room(8);
   Material glass = stained();
@@ -418,6 +420,7 @@ TEST(Glass, TheReferenceAgrees) {
 }
 
 TEST(Glass, PicturesShowWhatIsBehind) {
+  SKIP_UNDER_SANITIZERS();
   // Black panes in front of a uniform sky: 0.5^k of it, by render and by reference; tinted, in front of a lit wall.
   for (int panes = 1; panes <= 4; ++panes) {
     Scene s;

@@ -5,6 +5,8 @@
 #include <lambent/receivers/seams.h>
 #include <lambent/scene/procedural.h>
 
+#include "sanitizers.h"
+
 #include <gtest/gtest.h>
 
 #include <map>
@@ -302,6 +304,7 @@ TEST(Atlas, ASpiralDoesNotCoverItselfTwice) {
 }
 
 TEST(Atlas, AMillionLooseTrianglesNeitherHangNorExhaustMemory) {
+  SKIP_UNDER_SANITIZERS();
   Scene scene;
   const uint32_t m = add_material(scene, "grey", Vec3(0.5f));
   Random random(1);

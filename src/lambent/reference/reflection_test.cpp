@@ -3,6 +3,8 @@
 #include <lambent/reference/integrator.h>
 #include <lambent/scene/procedural.h>
 
+#include "sanitizers.h"
+
 #include <gtest/gtest.h>
 #include <reference_checks.h>
 
@@ -160,6 +162,7 @@ TEST(ReferenceReflection, MaterialsOfTheScene) {
 }
 
 TEST(ReferenceReflection, BallInUniformLight) {
+  SKIP_UNDER_SANITIZERS();
   // It shows the albedo towards the eye of what it is made of: what light-only sampling, which never draws from the
   // BRDF, says of each pixel, BRDF-only sampling must say too; and nothing shines brighter than the light, but for
   // glTF's grazing gain of 2 %.

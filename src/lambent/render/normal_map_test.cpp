@@ -151,6 +151,7 @@ TEST(NormalMap, NormalsAreThoseOfTheBumps) {
 }
 
 TEST(NormalMap, ALampOnBumpsIsItsFormula) {
+  SKIP_UNDER_SANITIZERS();
   const Bumps bumps;
   Scene scene = bumpy(bumps);
   const Vec3 I(3, 2, 1), to_sun = normalize(bumps.n() + 0.5f * normalize(bumps.a) - 0.3f * normalize(bumps.b));

@@ -223,6 +223,7 @@ TEST(TransferTexture, GroovesAreThoseOfDisplacedGeometry) {
 
 // A glowing ball near the relief, against the path tracer's: a mesh of triangles that it samples.
 TEST(TransferTexture, NearLampsLightItAsTheyDoTheDisplacedGeometry) {
+  SKIP_UNDER_SANITIZERS();
   const WavyRelief wavy = wavy_relief(24);
   const Scene sheet = tiled_sheet(24 * 5);
   auto tracer = Tracer::build(sheet);

@@ -7,6 +7,8 @@
 #include <lambent/trace/copies.h>
 #include <lambent/trace/tracer.h>
 
+#include "sanitizers.h"
+
 #include <gtest/gtest.h>
 
 namespace lambent {
@@ -219,6 +221,7 @@ double difference(const Transfer& a, const Transfer& b, double most) {
 // Direct light is the same to the bit, but at one receiver in five hundred, in a fold so tight that its hair above the
 // surface is within the rounding of another. Of rays that bounce one in two thousand meets a neighbour of its triangle.
 TEST(SharedCopies, BakeToTheSame) {
+  SKIP_UNDER_SANITIZERS();
   for (bool glass : {false, true}) {
     const Pair p(grove(glass));
     const Receivers receivers = make_vertex_receivers(p.scene);
