@@ -115,8 +115,8 @@ def features():
         values = {"seconds": round(ours, 3), "core_seconds": round(core, 2)}
         for name, theirs in (("public_script", public), ("loop_over_single_rays", (loop, loop_core))):
             if theirs is not None:
-                values |= {name + "_seconds": round(theirs[0], 1), name + "_core_seconds": round(theirs[1], 1),
-                           name + "_ratio": round(theirs[0] / ours, 1),
+                values |= {name + "_seconds": round(theirs[0], 1), name + "_ratio": round(theirs[0] / ours, 1),
+                           name + "_core_seconds": round(theirs[1], 1),
                            name + "_core_ratio": round(theirs[1] / core, 1)}
         tell("prt_features", vertices=len(v), rays_each=samples, aim=20, **values,
              rms_error=round(float(np.sqrt(((prt - exact)**2).mean())), 5), their_rms_error=round(noise, 5))
