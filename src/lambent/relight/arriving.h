@@ -7,6 +7,7 @@
 
 namespace lambent {
 
+// Incident radiance at each receiver, in harmonics.
 struct ArrivingLight {
   int order = 0;
   std::vector<Vec3> light;  // [receiver][order^2], world axes

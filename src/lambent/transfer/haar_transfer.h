@@ -20,6 +20,7 @@ namespace lambent {
 // Receivers whose sums stay in a core's cache while column after column is added.
 inline constexpr size_t haar_chunk = 4096;
 
+// Diffuse transfer in Haar wavelets of the light on a cube's faces, sparse, by column (Ng et al. 2003).
 struct HaarTransfer {
   int size = 0;  // of the cube, texels a side of a face: 2^k
   size_t receivers = 0;
