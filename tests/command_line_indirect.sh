@@ -14,9 +14,9 @@ expect 0 'shadow rays' render indirect.glb $seen --lamp point@0.4,0.6,0.5=3 --la
 expect 0 '"frames": 3' render indirect.glb $seen --lamp point@0.4,0.6,0.5=3 \
   --move '1@0:0.2,0.5,0.5;1:0.8,0.5,0.5' --frames 0:1:0.5 --json -o moved.png
 expect 0 'lights no surface' render indirect.glb $seen --lamp point@0.4,0.6,0.5=0 -o dark.png
-expect 2 'lamp: is needed' render indirect.glb $seen -o x.png
-expect 2 'env: does not go with direct to indirect light' render indirect.glb $seen --env uniform:1 -o x.png
-expect 2 'lamp: expects sphere@' render indirect.glb $seen --lamp lamp=1 -o x.png
+expect 2 'lamp: or --env is needed' render indirect.glb $seen -o x.png
+expect 0 'shadow rays' render indirect.glb $seen --env uniform:1 --env-rotate 20,0,0 -o sky.png
+expect 2 'has no lamp "lamp"; it has none; or it is sphere@' render indirect.glb $seen --lamp lamp=1 -o x.png
 expect 2 "radius must be above 0" render indirect.glb $seen --lamp sphere@0,1,0,0=1 -o x.png
 expect 2 'within 1e9' render indirect.glb $seen --lamp point@nan,0,0=1 -o x.png
 expect 2 'move: needs --frames' render indirect.glb $seen --lamp point@0,1,0=1 --move 1@0:0,0,0 -o x.png

@@ -3,6 +3,7 @@
 #include <lambent/bake/directions.h>
 #include <lambent/core/parallel.h>
 #include <lambent/core/random.h>
+#include <lambent/core/sampling.h>
 #include <lambent/receivers/receivers.h>
 
 #include <algorithm>
@@ -332,6 +333,7 @@ SurfelSearch::SurfelSearch(const Surfels& s, const Tracer& tracer, uint32_t kern
   });
 }
 SurfelSearch::~SurfelSearch() = default;
+float SurfelSearch::diagonal() const { return impl_->diagonal; }
 
 uint32_t SurfelSearch::leaf(SurfacePlace at) const {
   thread_local std::vector<Near> found;
@@ -414,6 +416,32 @@ Kernels SurfelSearch::kernels(SurfacePlace at) const {
     return k;
   }
   return k;
+}
+
+std::vector<SurfacePlace> places_of_leaf(const Scene& scene, const Tracer& tracer, const Surfels& surfels,
+                                         const SurfelSearch& search, uint32_t leaf, size_t most) {
+  // Tries on a disk that is wider than most cells; their surfaces are looked for from a little above.
+  constexpr size_t tries_a_place = 3;
+  const float reach = 0.8f * surfels.spacings.back();
+  const Vec3 p = surfels.positions[leaf], n = surfels.normals[leaf];
+  const Mat3 frame = frame_about(n);
+  const float smallest = receiver_lift(p, 0, search.diagonal());
+  const Hit above = tracer.closest(p + n * smallest, n, 0, reach);
+  const Vec3 from = p + n * (0.5f * std::min(reach, above.triangle == none ? reach : above.distance));
+  const float height = length(from - p);
+  std::vector<SurfacePlace> found;
+  for (uint32_t k = 0; k < tries_a_place * most && found.size() < most; ++k) {
+    const Vec2 on_disk = square_to_disk(sobol_owen(k, uint32_t(hash64(0x1eaf, leaf))));
+    const Vec3 aside = frame[0] * (on_disk.x * reach) + frame[1] * (on_disk.y * reach);
+    const float distance = length(aside);
+    if (distance > 0 && tracer.closest(from, aside / distance, 0, distance).triangle != none) continue;
+    const Hit hit = tracer.closest(from + aside, -n, 0, 2 * height + reach);
+    if (hit.triangle == none) continue;
+    const SurfacePlace at = surface_place(scene, hit);
+    if (search.leaf(at) == leaf) found.push_back(at);
+  }
+  if (found.empty()) found.push_back({p, n});
+  return found;
 }
 
 }  // namespace lambent

@@ -44,10 +44,17 @@ class SurfelSearch {
   // Kernels over the surfels of the kernel level: they sum to 1, and where the surfels around lie in a plane they keep
   // linear functions over it, but for where that would take weights below -1/4. No surfel near: none.
   Kernels kernels(SurfacePlace at) const;
+  float diagonal() const;  // of the surfels' box
 
  private:
   struct Impl;
   std::unique_ptr<Impl> impl_;
 };
+
+// Where direct light of a leaf is looked at: up to `most` places that it is the leaf of, so that their mean is what
+// lies on its area, however near a lamp or a shadow's edge; the surfel itself where none else is found. The scene is
+// the tracer's; `search` is over the same surfels.
+std::vector<SurfacePlace> places_of_leaf(const Scene& scene, const Tracer& tracer, const Surfels& surfels,
+                                         const SurfelSearch& search, uint32_t leaf, size_t most);
 
 }  // namespace lambent

@@ -1,14 +1,18 @@
 #include <lambent/pipeline/draw_indirect.h>
 
+#include <lambent/bake/lamps.h>
 #include <lambent/bake/surfels.h>
 #include <lambent/core/parallel.h>
 #include <lambent/core/random.h>
+#include <lambent/core/sampling.h>
+#include <lambent/pipeline/draw_light.h>
 #include <lambent/pipeline/moving_lamps.h>
 #include <lambent/pipeline/text.h>
 #include <lambent/receivers/receivers.h>
 #include <lambent/relight/indirect.h>
 
 #include <fmt/format.h>
+#include <fmt/ranges.h>
 
 #include <algorithm>
 #include <atomic>
@@ -21,7 +25,15 @@ namespace {
 using Clock = std::chrono::steady_clock;
 double seconds_since(Clock::time_point start) { return std::chrono::duration<double>(Clock::now() - start).count(); }
 
-constexpr int lamp_samples = 8, pixel_samples = 2;  // of a sphere: at a surfel; at a ray of a pixel
+// Of a sphere: at a surfel, over its places; at a ray of a pixel.
+constexpr int lamp_samples = 8, pixel_samples = 2;
+// Places that a surfel is lit at; where a lamp is within a few spacings of it.
+constexpr size_t places_a_leaf = 4, places_near_a_lamp = 64;
+constexpr float near_a_lamp = 3;
+// Of what stands still, the scene's own lamps by group and the sky: rays towards them, and as many all around, at each
+// place of a surfel, once; at a ray of a pixel.
+constexpr int still_samples = 16, still_pixel_samples = 4;
+constexpr uint32_t still_seed = 0x57111;
 
 // Repaints walls: the scene that is seen, and the albedos of surfels.
 Result<void> repaint(const DrawRequest& request, Scene& scene, const Surfels& surfels, std::vector<Vec3>& albedos) {
@@ -45,6 +57,18 @@ Result<void> repaint(const DrawRequest& request, Scene& scene, const Surfels& su
   return {};
 }
 
+// Light that does not move: of the scene's own lamps, and of the environment as it is turned.
+struct StillLight {
+  Surroundings around{};
+  std::optional<Environment> sky{};
+  Lamps lamps{};
+  std::vector<Vec3> scales{};     // by group
+  std::vector<Vec3> at_leaves{};  // direct
+  bool shines() const {
+    return std::any_of(scales.begin(), scales.end(), [](Vec3 s) { return largest(s) > 0; });
+  }
+};
+
 struct IndirectDrawing {
   const DrawRequest& request;
   const Job& job;
@@ -53,23 +77,94 @@ struct IndirectDrawing {
   Scene scene{};  // repainted
   Tracer tracer{};
   float diagonal = 0;
+  StillLight still{};
   std::vector<MovingLamp> lamps{};
   std::vector<LampPath> paths{};
+  const SurfelSearch* search = nullptr;
+  std::vector<std::vector<SurfacePlace>> places{};  // of leaves
   IndirectSolve solve{};
   std::vector<Vec3> direct{};  // at surfels
   double ray_seconds = 1e9, solve_seconds = 1e9, read_seconds = 1e9;
 };
 
+// Exit radiance of a white surface, by what stands still.
+Vec3 still_light(const IndirectDrawing& d, Vec3 origin, Vec3 normal, int samples, uint64_t key) {
+  const StillLight& still = d.still;
+  if (!still.shines()) return Vec3(0.0f);
+  thread_local std::vector<LampLight> arrived;
+  arrived.clear();
+  const bool spreads = still.lamps.sky || !still.lamps.area.empty();
+  const size_t rays = spreads ? size_t(samples) : 0;
+  sample_lamps(d.scene, d.tracer, still.lamps, origin, normal, samples, rays, still_seed, key, arrived);
+  const Mat3 frame = frame_about(normal);
+  for (size_t i = 0; i < rays; ++i) {
+    const Vec3 local = square_to_cosine_hemisphere(sobol_owen(uint32_t(i), uint32_t(hash64(key, still_seed))));
+    const Vec3 direction = frame * local;
+    const Hit hit = d.tracer.closest(origin, direction);
+    if (hit.triangle == none && still.lamps.sky)
+      arrived.push_back(met_sky(still.lamps, direction, local.z, samples, rays));
+    if (hit.triangle == none || still.lamps.of_triangle.empty()) continue;
+    const uint32_t lamp = still.lamps.of_triangle[hit.triangle];
+    if (lamp != none && emits(d.scene, d.scene.triangles[hit.triangle], hit.front))
+      arrived.push_back(met_lamp(d.scene, still.lamps, lamp, hit, direction, local.z, samples, rays));
+  }
+  Vec3 sum(0.0f);
+  for (const LampLight& l : arrived) sum += still.scales[l.group] * l.value;
+  return sum;
+}
+
+bool is_near(const IndirectDrawing& d, size_t leaf, Vec3 lamp) {
+  return length(d.transfer.surfels.positions[leaf] - lamp) < near_a_lamp * d.transfer.surfels.spacings.back();
+}
+
+// The mean over a leaf of what light(place's lifted origin, its normal, samples' share, key) gives.
+Vec3 mean_over_leaf(const IndirectDrawing& d, size_t leaf, bool near, auto light) {
+  std::vector<SurfacePlace> many;
+  if (near) many = places_of_leaf(d.scene, d.tracer, d.transfer.surfels, *d.search, uint32_t(leaf), places_near_a_lamp);
+  const std::vector<SurfacePlace>& places = near ? many : d.places[leaf];
+  Vec3 sum(0.0f);
+  for (size_t k = 0; k < places.size(); ++k) {
+    const Vec3 p = places[k].position, n = places[k].normal;
+    sum += light(p + n * receiver_lift(p, 0, d.diagonal), n, places.size(), hash64(leaf, k));
+  }
+  return sum / float(places.size());
+}
+
+void light_leaves_once(IndirectDrawing& d) {
+  const size_t leaves = d.transfer.surfels.count();
+  d.places.resize(leaves), d.still.at_leaves.assign(leaves, Vec3(0.0f));
+  ProgressStage stage(d.job.progress, "lighting", leaves);
+  parallel_for(leaves, 64, [&](size_t begin, size_t end) {
+    for (size_t i = begin; i < end && !stage.cancelled(); ++i, stage.advance()) {
+      d.places[i] = places_of_leaf(d.scene, d.tracer, d.transfer.surfels, *d.search, uint32_t(i), places_a_leaf);
+      if (!d.still.shines()) continue;
+      const bool near = std::any_of(d.scene.lights.begin(), d.scene.lights.end(), [&](const PunctualLight& l) {
+        return l.kind != PunctualLight::Kind::directional && is_near(d, i, l.position);
+      });
+      d.still.at_leaves[i] = mean_over_leaf(d, i, near, [&](Vec3 origin, Vec3 normal, size_t, uint64_t key) {
+        return still_light(d, origin, normal, still_samples, key);
+      });
+    }
+  });
+}
+
+// Direct light of a leaf by lamps that move.
+Vec3 direct_at_leaf(const IndirectDrawing& d, const std::vector<MovingLamp>& lamps, size_t leaf) {
+  if (lamps.empty()) return Vec3(0.0f);
+  const bool near = std::any_of(lamps.begin(), lamps.end(), [&](const MovingLamp& l) {
+    return l.kind != MovingLamp::Kind::sun && is_near(d, leaf, l.light.position);
+  });
+  return mean_over_leaf(d, leaf, near, [&](Vec3 origin, Vec3 normal, size_t places, uint64_t key) {
+    return direct_light(d.tracer, lamps, origin, normal, std::max(lamp_samples / int(places), 1), key);
+  });
+}
+
 // Direct light at surfels, and the bounces that follow; fastest times are kept.
 void light_surfels(IndirectDrawing& d) {
-  const Surfels& s = d.transfer.surfels;
   auto start = Clock::now();
-  d.direct.resize(s.count());
-  parallel_for(s.count(), 128, [&](size_t begin, size_t end) {
-    for (size_t i = begin; i < end; ++i) {
-      const Vec3 origin = s.positions[i] + s.normals[i] * receiver_lift(s.positions[i], 0, d.diagonal);
-      d.direct[i] = direct_light(d.tracer, d.lamps, origin, s.normals[i], lamp_samples, i);
-    }
+  d.direct.resize(d.transfer.surfels.count());
+  parallel_for(d.direct.size(), 128, [&](size_t begin, size_t end) {
+    for (size_t i = begin; i < end; ++i) d.direct[i] = d.still.at_leaves[i] + direct_at_leaf(d, d.lamps, i);
   });
   d.ray_seconds = std::min(d.ray_seconds, seconds_since(start)), start = Clock::now();
   solve_indirect(d.transfer, d.solve, d.direct);
@@ -80,14 +175,11 @@ void light_surfels(IndirectDrawing& d) {
 }
 
 void warn_of_dark_lamps(const IndirectDrawing& d) {
-  const Surfels& s = d.transfer.surfels;
   for (size_t k = 0; k < d.lamps.size(); ++k) {
     std::atomic<bool> lights = false;
-    parallel_for(s.count(), 128, [&](size_t begin, size_t end) {
-      for (size_t i = begin; i < end && !lights; ++i) {
-        const Vec3 origin = s.positions[i] + s.normals[i] * receiver_lift(s.positions[i], 0, d.diagonal);
-        if (largest(direct_light(d.tracer, {d.lamps[k]}, origin, s.normals[i], lamp_samples, i)) > 0) lights = true;
-      }
+    parallel_for(d.direct.size(), 128, [&](size_t begin, size_t end) {
+      for (size_t i = begin; i < end && !lights; ++i)
+        if (largest(direct_at_leaf(d, {d.lamps[k]}, i)) > 0) lights = true;
     });
     if (!lights)
       d.job.warn(fmt::format("lamp {} lights no surface: it is black, inside something, or turned away", k + 1));
@@ -109,8 +201,17 @@ std::optional<Vec3> seen_lamp(const IndirectDrawing& d, Vec3 eye, Vec3 direction
   return seen;
 }
 
-Result<Image> shade(const IndirectDrawing& d, const SurfelSearch& search, const View& view) {
-  RenderOptions options{view.width, view.height, d.request.spp, nullptr, d.show.colour};
+// What the surface sends out by itself.
+Vec3 glow(const IndirectDrawing& d, const Hit& hit) {
+  if (d.still.lamps.of_triangle.empty()) return Vec3(0.0f);
+  const uint32_t lamp = d.still.lamps.of_triangle[hit.triangle];
+  const Triangle& triangle = d.scene.triangles[hit.triangle];
+  if (lamp == none || !emits(d.scene, triangle, hit.front)) return Vec3(0.0f);
+  return d.still.scales[d.still.lamps.area[lamp].group] * emission(d.scene, triangle, hit.u, hit.v);
+}
+
+Result<Image> shade(const IndirectDrawing& d, const View& view) {
+  RenderOptions options{view.width, view.height, d.request.spp, d.still.around.background(), d.show.colour};
   const bool shows_direct = d.show.part != Show::Part::indirect, shows_indirect = d.show.part != Show::Part::direct;
   return render_surfaces(
       d.scene, d.tracer, view.camera, options,
@@ -123,7 +224,7 @@ Result<Image> shade(const IndirectDrawing& d, const SurfelSearch& search, const 
           const SurfacePlace at = surface_place(d.scene, hit);
           Vec3 light(0.0f);
           if (shows_indirect) {
-            const Kernels k = search.kernels(at);
+            const Kernels k = d.search->kernels(at);
             for (size_t i = 0; i < k.count; ++i) light += k.weight[i] * d.solve.x[k.surfel[i]];
             light = max(light, Vec3(0.0f));
           }
@@ -132,18 +233,50 @@ Result<Image> shade(const IndirectDrawing& d, const SurfelSearch& search, const 
             const Vec3 origin = at.position + (hit.front ? face : -face) * receiver_lift(at.position, 0, d.diagonal);
             const uint64_t key =
                 hash64(uint64_t(std::bit_cast<uint32_t>(hit.u)) << 32 | std::bit_cast<uint32_t>(hit.v), hit.triangle);
-            light += direct_light(d.tracer, d.lamps, origin, at.normal, pixel_samples, key);
+            light += direct_light(d.tracer, d.lamps, origin, at.normal, pixel_samples, key) +
+                     still_light(d, origin, at.normal, still_pixel_samples, key);
           }
-          return options.show == RenderOptions::Show::product ? albedo(d.scene, triangle, hit.u, hit.v) * light : light;
+          if (options.show != RenderOptions::Show::product) return light;
+          const Vec3 sent = shows_direct ? glow(d, hit) : Vec3(0.0f);
+          return albedo(d.scene, triangle, hit.u, hit.v) * light + sent;
         };
       },
       d.job.progress);
 }
 
+// Lamps that stand anywhere, and what the scene's own are scaled by.
 Result<void> read_lamps(IndirectDrawing& d) {
-  auto lamps = parse_moving_lamps(d.request.lamp, d.scene.origin);
+  auto around = surroundings_of(d.request, d.job);
+  if (!around) return around.error();
+  StillLight& still = d.still;
+  still.around = std::move(*around);
+  if (still.around.env)
+    still.sky = d.request.env_rotate.empty() ? *still.around.env : rotated(*still.around.env, still.around.rotation);
+  still.lamps = make_lamps(d.scene, still.sky ? &*still.sky : nullptr, true);
+  still.scales.assign(still.lamps.groups(), Vec3(1.0f));
+  std::vector<std::string> moving;
+  for (const std::string& text : d.request.lamp) {
+    if (names_moving_lamp(text)) {
+      moving.push_back(text);
+      continue;
+    }
+    auto named = parse_named_color(text, "--lamp");
+    if (!named) return named.error();
+    const auto group = std::find(still.lamps.names.begin(), still.lamps.names.end(), named->name);
+    if (group == still.lamps.names.end())
+      return Error{"--lamp",
+                   "the scene has no lamp \"" + named->name + "\"; it has " +
+                       (still.lamps.names.empty() ? "none" : fmt::format("{}", fmt::join(still.lamps.names, ", "))) +
+                       "; or it is " + moving_lamp_syntax,
+                   true};
+    still.scales[size_t(group - still.lamps.names.begin())] = named->color;
+  }
+  auto lamps = parse_moving_lamps(moving, d.scene.origin);
   if (!lamps) return lamps.error();
   d.lamps = std::move(*lamps);
+  if (d.lamps.empty() && still.lamps.groups() == 0 && d.show.colour != RenderOptions::Show::albedo)
+    return Error{"--lamp", "or --env is needed to light the scene, which has no lamp of its own: e.g. point@0,2,0=10",
+                 true};
   for (const std::string& text : d.request.move) {
     auto path = parse_lamp_path(text, d.lamps, d.scene.origin);
     if (!path) return path.error();
@@ -174,13 +307,16 @@ Result<Drawing> draw_indirect(const Baked& baked, const DrawRequest& request, co
   if (!tracer) return tracer.error();
   d.tracer = std::move(*tracer);
   const SurfelSearch search(d.transfer.surfels, d.tracer, d.transfer.gather_level);
+  d.search = &search;
+  light_leaves_once(d);
+  if (is_cancelled(job.progress)) return Error{"", "cancelled"};
   d.solve = make_indirect_solve(d.transfer, albedos);
   Drawing drawing;
   for (double time : times) {
     for (const LampPath& path : d.paths) move_lamp(d.lamps, path, time);
     light_surfels(d);
     if (drawing.frames.empty()) warn_of_dark_lamps(d);
-    auto image = shade(d, search, *view);
+    auto image = shade(d, *view);
     if (!image) return image.error();
     drawing.frames.push_back(std::move(*image));
   }

@@ -24,10 +24,10 @@ const Option<R> table[] = {
     {"output", &R::output, "Files", every, "Picture to write: .png (8-bit sRGB) or .exr (linear)", 0, 0, nullptr,
      nullptr, false},
 
-    {"env", &R::env, "Light", distant,
+    {"env", &R::env, "Light", every,
      "Environment: a .hdr or .exr file, uniform:R,G,B, or sky:elevation=35,azimuth=45,turbidity=3", 0, 0, nullptr,
      nullptr, true, true},
-    {"env-rotate", &R::env_rotate, "Light", distant, "YAW,PITCH,ROLL: turn the environment, degrees about +Y, +X, +Z",
+    {"env-rotate", &R::env_rotate, "Light", every, "YAW,PITCH,ROLL: turn the environment, degrees about +Y, +X, +Z",
      0, 0, nullptr, "env"},
     {"window", &R::window, "Light", distant & ~(L | K),
      "Against ringing of the harmonics: auto (light in shadow does not go below what the rest of the sky gives), hann, "
@@ -36,8 +36,8 @@ const Option<R> table[] = {
     {"light-order", &R::light_order, "Light", distant & ~(L | K),
      "Use only this many bands of the baked ones; lobes are kept", 1, max_sh_order},
     {"lamp", &R::lamp, "Light", D | C | M | L | V | I,
-     "NAME=R,G,B: scale a group of lamps by this colour (files baked with --light-groups); or a lamp that stands "
-     "anywhere (files of direct to indirect light): sphere@X,Y,Z,RADIUS=R,G,B (radiance), point@X,Y,Z=R,G,B (flux per "
+     "NAME=R,G,B: scale a group of lamps by this colour (files baked with --light-groups, and of direct to indirect "
+     "light); or a lamp that stands anywhere (the latter): sphere@X,Y,Z,RADIUS=R,G,B (radiance), point@X,Y,Z=R,G,B (flux per "
      "steradian), spot@X,Y,Z,TX,TY,TZ,ANGLE=R,G,B (towards T, within so many degrees) or sun@AZIMUTH,ELEVATION=R,G,B "
      "(irradiance); may be given again"},
     {"move", &R::move, "Light", D | I,
@@ -50,7 +50,7 @@ const Option<R> table[] = {
     {"camera", &R::camera, "View", every & ~V, "EX,EY,EZ,TX,TY,TZ,FOV: eye, target, vertical degrees; or auto"},
     {"size", &R::size, "View", every & ~V, "Picture size, WIDTHxHEIGHT pixels"},
     {"spp", &R::spp, "View", every & ~V, "Rays a pixel", 1, 4096},
-    {"background", &R::background, "View", distant, "What lies behind the scene: env, or none (transparent)", 0, 0,
+    {"background", &R::background, "View", every, "What lies behind the scene: env, or none (transparent)", 0, 0,
      "env|none"},
     {"exposure", &R::exposure, "View", every,
      "Stops that a PNG is brightened by; auto: 90 % of what is covered is shown at 0.7 or less"},
@@ -237,8 +237,6 @@ Result<void> check_draw(const DrawRequest& request, DrawKind kind) {
   if (said.contains("move") && !by_paths) return Error{"--move", "needs --place", true};
   if (said.contains("frames") && (by_paths ? request.move.empty() : request.animation.empty()))
     return Error{"--frames", by_paths ? "needs --move" : "needs --animation", true};
-  if (kind == DrawKind::indirect && request.lamp.empty() && show->colour != RenderOptions::Show::albedo)
-    return Error{"--lamp", "is needed: a lamp to light the scene by, e.g. point@0,2,0=10", true};
   const bool from_afar = kind == DrawKind::texture || kind == DrawKind::blocks;
   if (from_afar && show->colour != RenderOptions::Show::albedo && request.env.empty() && request.sphere_lamp.empty())
     return Error{"--env", "is needed: an environment to light the scene by", true};

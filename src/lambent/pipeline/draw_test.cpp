@@ -200,7 +200,7 @@ TEST_F(Drawings, NoOptionIsLeftAsideInSilence) {
     DrawRequest base{.baked = std::string(LAMBENT_GOLDEN) + "/" + name + ".glb", .env = sky, .background = "none"};
     if (kind == DrawKind::texture)
       base.baked = at("card.obj"), base.transfer_texture = at("grooves.lpt"), base.tile = "5,0";
-    if (kind == DrawKind::indirect) base.env = "", base.background = "env", base.lamp = {"point@1,1,1=3"};
+    if (kind == DrawKind::indirect) base.lamp = {"point@1,1,1=3"};
     if (kind == DrawKind::blocks) base.brdf = "phong:exponent=20,diffuse=0.3,specular=0.4";
     if (kind != DrawKind::fixed_view) base.camera = "3,2,4,1,0.5,1,40", base.size = "16x12", base.spp = 4;
     const auto before = draw(base);

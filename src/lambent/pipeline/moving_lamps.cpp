@@ -17,9 +17,6 @@ namespace {
 
 constexpr const char* lamp_kinds[] = {"sphere", "point", "spot", "sun"};
 constexpr size_t numbers_of[] = {4, 3, 7, 2};
-constexpr const char* lamp_syntax =
-    "expects sphere@X,Y,Z,RADIUS=R,G,B, point@X,Y,Z=R,G,B, spot@X,Y,Z,TX,TY,TZ,ANGLE=R,G,B or "
-    "sun@AZIMUTH,ELEVATION=R,G,B";
 constexpr float farthest = 1e9f;
 
 Error wrong(const char* option, const std::string& message) { return {option, message, true}; }
@@ -57,7 +54,7 @@ Result<MovingLamp> parse_moving_lamp(const std::string& text, Vec3d origin) {
   const size_t at = text.find('@'), equals = text.rfind('=');
   const auto kind = std::find(std::begin(lamp_kinds), std::end(lamp_kinds), text.substr(0, at));
   if (at == std::string::npos || equals == std::string::npos || equals < at || kind == std::end(lamp_kinds))
-    return wrong("--lamp", std::string(lamp_syntax) + ", not \"" + text + "\"");
+    return wrong("--lamp", std::string("expects ") + moving_lamp_syntax + ", not \"" + text + "\"");
   MovingLamp lamp;
   lamp.kind = MovingLamp::Kind(kind - std::begin(lamp_kinds));
   auto n = read_numbers(text.substr(at + 1, equals - at - 1), numbers_of[int(lamp.kind)], "--lamp");

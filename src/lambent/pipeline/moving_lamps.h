@@ -18,6 +18,11 @@ struct MovingLamp {
   Vec3 radiance{0.0f};
 };
 
+// What --lamp may say of one.
+inline constexpr const char* moving_lamp_syntax =
+    "sphere@X,Y,Z,RADIUS=R,G,B, point@X,Y,Z=R,G,B, spot@X,Y,Z,TX,TY,TZ,ANGLE=R,G,B or "
+    "sun@AZIMUTH,ELEVATION=R,G,B";
+
 // Whether text begins as one of the four below, and is no group of the scene's own.
 bool names_moving_lamp(const std::string& text);
 

@@ -15,12 +15,12 @@ struct IndirectSolve {
   // Of nodes: albedo, the mean of their leaves; share in the mean of the node above.
   std::vector<Vec3> albedos;
   std::vector<float> shares;
-  AlignedVector<float> sent;     // what each node sends out, [node][4], the fourth 0
-  std::vector<Vec3> first;       // light of the first bounce, G P R d
-  std::vector<Vec3> x, before;   // of gathering surfels: the newest iterates
-  Vec3 radius;                   // spectral radius of G P R U, by channel, about
-  int bounces = 0;               // applications of G in the last solve
-  double residual = 0;           // |G P R (d + U x) - x| / |G P R d| of the iterate before the last, sums of magnitudes
+  AlignedVector<float> sent;    // what each node sends out, [node][4], the fourth 0
+  std::vector<Vec3> first;      // light of the first bounce, G P R d
+  std::vector<Vec3> x, before;  // of gathering surfels: the newest iterates
+  Vec3 radius;                  // spectral radius of G P R U, by channel, about
+  int bounces = 0;              // applications of G in the last solve
+  double residual = 0;          // |G P R (d + U x) - x| / |G P R d| of the iterate before the last, sums of magnitudes
 };
 
 // `albedos` empty: as baked; else one a leaf.
