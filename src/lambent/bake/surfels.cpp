@@ -162,6 +162,31 @@ std::vector<Candidate> make_candidates(const Scene& scene, const Tracer& tracer,
   return out;
 }
 
+// Irradiance changes over the harmonic mean distance of what is seen. Source: G. Ward, F. Rubinstein and R. Clear, "A
+// ray tracing solution for diffuse interreflection", 1988.
+size_t count_by_distance(const Tracer& tracer, const SideAreas& areas, const std::vector<Candidate>& some,
+                         float diagonal) {
+  constexpr size_t rays = 16, least = 16384, most = 65536;
+  constexpr double part = 1.0 / 12;
+  std::vector<double> inverse(some.size());
+  parallel_for(some.size(), 64, [&](size_t begin, size_t end) {
+    for (size_t i = begin; i < end; ++i) {
+      const SurfacePlace& at = some[i].at;
+      const FixedFan fan(at.normal);
+      const float smallest = receiver_lift(at.position, 0, diagonal);
+      for (size_t k = 0; k < rays; ++k) {
+        const Hit hit = tracer.closest(at.position + at.normal * smallest, fan[k * FixedFan::count / rays]);
+        if (hit.triangle != none) inverse[i] += 1 / double(std::max(hit.distance, smallest)) / double(rays);
+      }
+    }
+  });
+  if (inverse.empty()) return least;
+  const auto median = inverse.begin() + ptrdiff_t(inverse.size() / 2);
+  std::nth_element(inverse.begin(), median, inverse.end());
+  const double wanted = 0.7 * areas.sums.back() * (*median / part) * (*median / part);
+  return size_t(std::clamp(wanted, double(least), double(most)));
+}
+
 // Dart throwing, level by level.
 struct Throwing {
   const Scene& scene;
@@ -251,7 +276,12 @@ Result<Surfels> make_surfels(const Scene& scene, const Tracer& tracer, const Sur
   const SideAreas areas = side_areas(scene);
   if (areas.sums.empty()) return Error{scene.path, "has no surface that light could bounce off"};
   const float diagonal = bounds(scene).diagonal();
-  const size_t count = std::clamp<size_t>(options.count, 16, max_surfels / 4);
+  const size_t wanted = options.count > 0
+                          ? options.count
+                          : count_by_distance(tracer, areas,
+                                              make_candidates(scene, tracer, areas, 2048, options.seed, diagonal),
+                                              diagonal);
+  const size_t count = std::clamp<size_t>(wanted, 16, max_surfels / 4);
   ProgressStage stage(progress, "placing surfels", 8);
   const std::vector<Candidate> candidates =
       make_candidates(scene, tracer, areas, candidates_a_leaf * count, options.seed, diagonal);

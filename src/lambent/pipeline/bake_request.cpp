@@ -159,7 +159,10 @@ const Option<R> table[] = {
      "binary, or bits:N, shares of texels in 2^N levels, for harsh light"},
 
     {"surfels", &R::surfels, "Direct to indirect light (--transfer indirect)", I,
-     "Points on surfaces that direct light is taken at, about; a quarter of them gather", 64, 1 << 20},
+     "Points on surfaces that direct light is taken at, about; a quarter of them gather; 0: 16,384 to 65,536, by how "
+     "far "
+     "surfaces see",
+     0, 1 << 20},
 
     {"compress", &R::compress, "Smaller and special (diffuse, matrix)", D | M,
      "cpca:CLUSTERS,RANK: store clusters, and a few weights a receiver"},

@@ -27,8 +27,8 @@ const Option<R> table[] = {
     {"env", &R::env, "Light", every,
      "Environment: a .hdr or .exr file, uniform:R,G,B, or sky:elevation=35,azimuth=45,turbidity=3", 0, 0, nullptr,
      nullptr, true, true},
-    {"env-rotate", &R::env_rotate, "Light", every, "YAW,PITCH,ROLL: turn the environment, degrees about +Y, +X, +Z",
-     0, 0, nullptr, "env"},
+    {"env-rotate", &R::env_rotate, "Light", every, "YAW,PITCH,ROLL: turn the environment, degrees about +Y, +X, +Z", 0,
+     0, nullptr, "env"},
     {"window", &R::window, "Light", distant & ~(L | K),
      "Against ringing of the harmonics: auto (light in shadow does not go below what the rest of the sky gives), hann, "
      "lanczos, or none",
@@ -37,9 +37,9 @@ const Option<R> table[] = {
      "Use only this many bands of the baked ones; lobes are kept", 1, max_sh_order},
     {"lamp", &R::lamp, "Light", D | C | M | L | V | I,
      "NAME=R,G,B: scale a group of lamps by this colour (files baked with --light-groups, and of direct to indirect "
-     "light); or a lamp that stands anywhere (the latter): sphere@X,Y,Z,RADIUS=R,G,B (radiance), point@X,Y,Z=R,G,B (flux per "
-     "steradian), spot@X,Y,Z,TX,TY,TZ,ANGLE=R,G,B (towards T, within so many degrees) or sun@AZIMUTH,ELEVATION=R,G,B "
-     "(irradiance); may be given again"},
+     "light); or a lamp that stands anywhere (the latter): sphere@X,Y,Z,RADIUS=R,G,B (radiance), point@X,Y,Z=R,G,B "
+     "(flux per steradian), spot@X,Y,Z,TX,TY,TZ,ANGLE=R,G,B (towards T, within so many degrees) or "
+     "sun@AZIMUTH,ELEVATION=R,G,B (irradiance); may be given again"},
     {"move", &R::move, "Light", D | I,
      "N@T:X,Y,Z;T:X,Y,Z;...: where lamp N is at these times, straight from one to the next (files of direct to "
      "indirect light); or NAME=PATH.json: the path of an object of --place; may be given again",

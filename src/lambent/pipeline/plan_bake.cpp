@@ -41,7 +41,8 @@ size_t stored_bytes(const BakePlan& plan, const BakeRequest& r, size_t receivers
       return receivers * (4 + size_t(r.lobes) * (3 + channels * size_t(plan.bake.order))) * value;
     case BakeKind::membrane: return receivers * size_t(4 + plan.bake.order) * value;
     // A quarter of the surfels gather some 200 entries of two bytes each.
-    case BakeKind::indirect: return plan.indirect.surfels * (44 + 100) + receivers * kernel_slots * 4;
+    case BakeKind::indirect:
+      return std::max<size_t>(plan.indirect.surfels, 16384) * (44 + 100) + receivers * kernel_slots * 4;
     case BakeKind::blocks: return expected_visibility_bytes(receivers, plan.visibility);
   }
   return 0;

@@ -56,7 +56,7 @@ struct BakeRequest {
   std::string fix_light, fix_view, size = "512x512", compress;
   int spp = 16;
   // Direct to indirect light
-  int surfels = 16384;
+  int surfels = 0;
   // Free space
   std::string lattice, lattice_box;
   int lattice_order = 4;
