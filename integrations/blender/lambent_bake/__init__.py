@@ -35,8 +35,8 @@ class LambentSettings(bpy.types.PropertyGroup):
     texels: FloatProperty(name="Texels a metre", default=0, min=0, soft_max=512, description="0: as fine as the light "
                           "asks for; with a number of rays, as 1024 x 1024 texels come to")
     quality: EnumProperty(name="Quality", default="good", items=[
-        ("preview", "Preview", "A tenth off, in the mean of squares"), ("good", "Good", "2 to 3 % off"),
-        ("final", "Final", "1 to 2 % off, with finer texels or meshes"),
+        ("preview", "Preview", "10 % off, in the mean of squares"), ("good", "Good", "2.5 % off, lightmaps 2 %"),
+        ("final", "Final", "1 % off, with finer texels or meshes"),
         ("error", "To an error", "As many rays as the error takes"),
         ("rays", "By rays", "So many rays for each receiver: its noise is not looked at, nor is what is between")])
     error: FloatProperty(name="Error", default=2, min=0.1, max=100, subtype="PERCENTAGE",
