@@ -53,6 +53,7 @@ def build_extension(into):
     if not os.path.exists(os.path.join(build, "CMakeCache.txt")):
         subprocess.run(["cmake", "-S", root, "-B", build, "-DCMAKE_BUILD_TYPE=Release", "-DLAMBENT_PYTHON=ON",
                         f"-DPython_EXECUTABLE={sys.executable}", "-DLAMBENT_TESTS=OFF", "-DLAMBENT_BENCH=OFF",
+                        "-DLAMBENT_TOGETHER=ON",
                         *(["-G", "Ninja"] if shutil.which("ninja") else [])], check=True)
     subprocess.run(["cmake", "--build", build, "--target", "lambent_python", "--parallel"], check=True)
     subprocess.run(["cmake", "--install", build, "--component", "python", "--prefix", into, "--strip"], check=True)

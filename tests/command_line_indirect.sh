@@ -19,7 +19,11 @@ expect 0 'shadow rays' render indirect.glb $seen --env uniform:1 --env-rotate 20
 expect 2 'has no lamp "lamp"; it has none; or it is sphere@' render indirect.glb $seen --lamp lamp=1 -o x.png
 expect 2 "radius must be above 0" render indirect.glb $seen --lamp sphere@0,1,0,0=1 -o x.png
 expect 2 'within 1e9' render indirect.glb $seen --lamp point@nan,0,0=1 -o x.png
-expect 2 'move: needs --frames' render indirect.glb $seen --lamp point@0,1,0=1 --move 1@0:0,0,0 -o x.png
+expect 0 'shadow rays' render indirect.glb $seen --lamp point@0.4,0.6,0.5=3 --move '1@0:0.2,0.5,0.5;1:0.8,0.5,0.5' \
+  --time 1 -o there.exr
+expect 0 'shadow rays' render indirect.glb $seen --lamp point@0.8,0.5,0.5=3 -o same.exr
+alike 100 "a lamp that has moved there, and one that stands there" there.exr same.exr
+expect 2 'time: needs --animation, or --move' render indirect.glb $seen --lamp point@0,1,0=1 --time 1 -o x.png
 expect 2 'frames: needs --move' render indirect.glb $seen --lamp point@0,1,0=1 --frames 0:1 -o x.png
 expect 2 'albedo: the file has no material' render indirect.glb $seen --lamp point@0,1,0=1 --albedo none=1 \
   -o x.png

@@ -33,12 +33,16 @@ printf 'v 0 0 0\nv 2 0 0\nv 2 0 2\nv 0 0 2\nv 0 2 0\nv 2 2 0\nf 4 3 2 1\nf 1 2 6
 lambent --version
 lambent bake corner.obj --order 3 --samples 64 -o corner.glb >/dev/null 2>&1
 lambent render corner.glb --env sky:elevation=30 --size 64x64 -o corner.png >/dev/null 2>&1
-[ -s corner.png ] && echo "bake and render: ok"
+[ -s corner.png ]
+echo "bake and render: ok"
 lambent bake corner.obj --transfer lightmap --sky uniform:1 --atlas 32x32 --samples 64 -o map.glb >/dev/null 2>&1
 mkdir light
 lambent export map.glb --godot light/room >/dev/null
-[ -s light/lambent_lightmap.gd ] && echo "export: ok"
-if [ -d /usr/share/lambent/web ]; then lambent export corner.glb --web site >/dev/null && echo "page: ok"; fi
+[ -s light/lambent_lightmap.gd ]
+echo "export: ok"
+lambent export corner.glb --web site >/dev/null
+[ -s site/index.html ]
+echo "page: ok"
 python3 - <<'P'
 import lambent, numpy
 baked = lambent.bake(lambent.load("corner.obj"), order=3, samples=64)
@@ -46,8 +50,10 @@ light = baked.relight("uniform:1")
 assert light.shape == (baked.receivers, 3) and numpy.isfinite(light).all()
 print("python: ok,", baked.receivers, "receivers")
 P
-[ -s /usr/share/lambent/blender/lambent_bake/__init__.py ] && echo "add-on: there"
-! ldd /usr/bin/lambent /usr/lib/python3/dist-packages/lambent/*.so | grep 'not found' && echo "libraries: all found"
+[ -s /usr/share/lambent/blender/lambent_bake/__init__.py ]
+echo "add-on: there"
+if ldd /usr/bin/lambent /usr/lib/python3/dist-packages/lambent/*.so | grep 'not found'; then exit 1; fi
+echo "libraries: all found"
 S
 inside bash /tmp/use/use.sh
 # The library: what Suggests names, a C and a C++ program.

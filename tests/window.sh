@@ -68,6 +68,35 @@ psnr=$("$tool" --json compare after.exr turned.exr | sed -n 's/.*"psnr": *\([0-9
 cmp -s before.exr after.exr && failed "the drag did nothing"
 pass
 
+# Objects: one inserted, one of a field, as `render` draws them; a hand with Ctrl carries it away; one is taken out.
+printf 'v 0 0 0\nv 1 0 0\nv 0 0 1\nv 0.3 0.8 0.3\nf 1 2 3\nf 1 4 2\nf 2 4 3\nf 3 4 1\n' >pyramid.obj
+lattice=$golden/diffuse_lattice.glb
+for object in "--insert pyramid.obj@0.8,0.2,0.8,1.2" "--place a=$golden/diffuse_field.glb@0.6,0.9,0.4,20,0,0,0.6"; do
+  printf '%s\n' 'panel off' 'size 320x240' 'settle' 'save before.exr' 'wait 6' 'settle' 'save after.exr' \
+    "set ${object#--}" 'settle' 'save back.exr' >script
+  rm -f before.exr
+  show "$lattice" $object --env $sky --camera $camera --spp 1 --script script 2>log &
+  window=$!
+  for _ in $(seq 200); do [ -s before.exr ] && break; sleep 0.1; done
+  id=$(xdotool search --sync --onlyvisible --name '^lambent: ' | head -1) || failed "no window was found"
+  read -r x y <<<"$(case $object in --insert*) echo 130 115 ;; *) echo 125 122 ;; esac)"
+  xdotool mousemove --window $id $x $y keydown ctrl mousedown 1 sleep 0.2 mousemove --window $id $((x - 30)) $y \
+    sleep 0.3 mouseup 1 keyup ctrl
+  wait $window || failed "$object: $(cat log)"
+  "$tool" render "$lattice" $object --env $sky --camera $camera --spp 1 --size 320x240 -o object.exr >log 2>&1 ||
+    failed "$object: $(cat log)"
+  cmp -s before.exr object.exr || failed "$object: the window's picture is not render's"
+  cmp -s before.exr after.exr && failed "$object: a hand with Ctrl did nothing"
+  cmp -s before.exr back.exr || failed "$object: put back it is not where it was"
+  pass
+done
+printf '%s\n' 'panel off' 'size 320x240' 'set insert pyramid.obj@' 'settle' 'save without.exr' >script
+show "$lattice" --insert pyramid.obj@0.8,0.2,0.8,1.2 --env $sky --camera $camera --spp 1 --script script 2>log ||
+  failed "an object taken out: $(cat log)"
+"$tool" render "$lattice" --env $sky --camera $camera --spp 1 --size 320x240 -o plain.exr >log 2>&1
+cmp -s without.exr plain.exr || failed "an object that was taken out is still there"
+pass
+
 # Beside the path tracer, another bake, a difference; a window of one pixel; what cannot be dropped.
 printf '%s\n' 'compare reference' 'settle' 'wait 2' 'screenshot wipe.png' 'compare bake' 'difference on' 'settle' \
   'screenshot difference.png' 'difference off' 'compare nothing' 'look receivers' 'settle' 'look density' 'settle' \

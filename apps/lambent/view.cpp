@@ -37,6 +37,7 @@ int run_window(Context& context, const ViewCommand& o) {
   DrawRequest& draw = session.draw;
   draw.camera = o.web.camera, draw.exposure = o.web.exposure, draw.tone = o.web.tone, draw.brdf = o.window.brdf;
   draw.spp = o.window.spp, draw.light_order = o.window.light_order;
+  draw.insert = o.window.insert, draw.place = o.window.place, draw.move = o.window.move;
   if (!o.web.rotate.empty()) draw.env_rotate = o.web.rotate;
   if (!o.window.method.empty()) draw.method = o.window.method;
   const Job job{&context.progress, [](const std::string& message) { warn(message); }};
@@ -49,7 +50,8 @@ Result<void> check_view(const CLI::App& command, bool window) {
   for (const char* option : {"--port", "--no-browser"})
     if (window && command.count(option))
       return Error{option, "is of the page that a browser shows, not of --window", true};
-  for (const char* option : {"more", "--script", "--size", "--spp", "--brdf", "--method", "--light-order"})
+  for (const char* option :
+       {"more", "--script", "--size", "--spp", "--brdf", "--insert", "--place", "--move", "--method", "--light-order"})
     if (!window && command.count(option)) return Error{option, "is for --window", true};
   return {};
 }

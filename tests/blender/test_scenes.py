@@ -15,7 +15,7 @@ from lambent_bake import glb, result, run, scene as scene_module  # noqa: E402
 
 def settings_for(texels=8, samples=64, **values):
     s = bpy.context.scene.lambent
-    s.kind, s.texels, s.samples, s.bounces = "LIGHTMAP", texels, samples, 2
+    s.kind, s.quality, s.texels, s.samples, s.bounces = "LIGHTMAP", "rays", texels, samples, 2
     for key, value in values.items():
         setattr(s, key, value)
     return s
@@ -26,6 +26,10 @@ def bake():
         return bpy.ops.lambent.bake()
     except RuntimeError as error:  # Blender raises an operator's errors
         return str(error)
+
+
+def scene_glb():
+    return glb.Glb.load(bpy.context.scene.lambent.output)
 
 
 def notes():
@@ -132,12 +136,25 @@ check(not any(s.material and s.material.get("lambent_lit") for s in twins[0].mat
 for o in scene.objects:
     o.select_set(False)
 check("selected" in bake(), "nothing selected is an error")
-settings_for(selected=False, kind="PRT", quality="preview", order=3)
-check(bake() == {"FINISHED"}, "light transport")
-settings_for(kind="LATTICE", lattice=(3, 2, 4))
-check(bake() == {"FINISHED"}, "with a lattice")
-held = glb.Glb.load(scene.lambent.output).json["extensions"]["LAMBENT_transfer"]
-check("lattice" in held, "which the file has")
+
+# To an error: as the program asks for it, and as it says that it has reached it.
+settings_for(selected=False, quality="preview", texels=0)
+check(bake() == {"FINISHED"}, "a lightmap to a quality, its texels as the light asks for")
+held = scene_glb().json["extensions"]["LAMBENT_transfer"]
+asked = held["provenance"]["request"]
+check(asked["quality"] == "preview" and "samples" not in asked and "texels_per_unit" not in asked,
+      "which is what the program was asked")
+check("% off (within" in scene["lambent_reached"], scene["lambent_reached"])
+settings_for(quality="error", error=12, texels=4)
+check(bake() == {"FINISHED"}, "to an error of one's own")
+asked = scene_glb().json["extensions"]["LAMBENT_transfer"]["provenance"]["request"]
+check(asked["error"] == "12%" and asked["texels_per_unit"] == 4, "which is what the program was asked")
+bpy.ops.lambent.forget()
+for kind in ("PRT", "LATTICE"):
+    for quality in ("preview", "error", "rays"):
+        settings_for(kind=kind, quality=quality, error=20, samples=32, order=3, lattice=(3, 2, 4))
+        check(bake() == {"FINISHED"}, f"{kind}: {scene['lambent_reached']}")
+check("lattice" in scene_glb().json["extensions"]["LAMBENT_transfer"], "which has the lattice")
 
 # Progress and cancelling.
 settings_for(kind="LIGHTMAP", texels=60, samples=20000)

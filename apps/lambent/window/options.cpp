@@ -14,6 +14,9 @@ void WindowOptions::add_to(CLI::App& command) {
       ->group(group)
       ->capture_default_str();
   command.add_option("--brdf", brdf, "With --window: other materials, as for render")->group(group);
+  command.add_option("--insert", insert, "With --window: an object put into the scene, as for render")->group(group);
+  command.add_option("--place", place, "With --window: an object over the scene, as for render")->group(group);
+  command.add_option("--move", move, "With --window: the path of one, as for render")->group(group);
   command.add_option("--method", method, "With --window: how blocks are multiplied, as for render")->group(group);
   command.add_option("--light-order", light_order, "With --window: bands to begin with, as for render")
       ->check(CLI::Range(1, max_sh_order))

@@ -1,5 +1,7 @@
 #include "panel.h"
 
+#include <lambent/pipeline/place.h>
+
 #include <fmt/format.h>
 #include <imgui.h>
 
@@ -84,6 +86,23 @@ void material_controls(PanelState& panel, Session& s) {
     tell(panel, s.set("brdf", panel.brdf));
 }
 
+// Where objects are, and when: of --place, and of what moves by paths or animations.
+void object_controls(PanelState& panel, Session& s) {
+  const DrawRequest& request = s.live->request();
+  for (const std::string& text : request.place) {
+    auto object = parse_place(text);
+    if (!object) continue;
+    float at[3] = {float(object->at.position.x), float(object->at.position.y), float(object->at.position.z)};
+    if (!ImGui::DragFloat3(object->name.c_str(), at, 0.01f, 0, 0, "%.2f")) continue;
+    object->at.position = Vec3d(at[0], at[1], at[2]);
+    tell(panel, s.set("place", place_text(*object)));
+    return;  // the list is another one
+  }
+  if (request.move.empty() && request.animation.empty()) return;
+  float time = float(request.time);
+  if (ImGui::DragFloat("time, s", &time, 0.02f, 0, 0, "%.2f")) tell(panel, s.set("time", fmt::format("{:.3f}", time)));
+}
+
 void look_controls(PanelState& panel, Session& s) {
   const DrawKind kind = kind_of(s.bakes[s.shown_bake]->surface);
   std::string chosen;
@@ -157,7 +176,7 @@ void draw_panel(PanelState& panel, Session& s, float x, float width, float heigh
   if (ImGui::CollapsingHeader("Light", ImGuiTreeNodeFlags_DefaultOpen)) light_controls(panel, s);
   if (ImGui::CollapsingHeader("Display", ImGuiTreeNodeFlags_DefaultOpen)) display_controls(panel, s);
   if (ImGui::CollapsingHeader("Materials and looks", ImGuiTreeNodeFlags_DefaultOpen))
-    material_controls(panel, s), look_controls(panel, s);
+    material_controls(panel, s), object_controls(panel, s), look_controls(panel, s);
   if (ImGui::CollapsingHeader("Beside it", ImGuiTreeNodeFlags_DefaultOpen)) comparison_controls(panel, s);
   if (ImGui::CollapsingHeader("Frame", ImGuiTreeNodeFlags_DefaultOpen)) statistics(s);
   if (ImGui::Button("save picture (S)"))
@@ -184,6 +203,7 @@ void draw_notices(PanelState& panel, double now) {
       "drag              look around\n"
       "Shift or right    turn the light\n"
       "Alt or middle     shift the view\n"
+      "Ctrl              carry an object; with Shift, up and down\n"
       "wheel, + and -    nearer, farther\n"
       "arrows            look; with Shift, the light\n"
       "R                 against the path tracer\n"

@@ -3,6 +3,7 @@
 #include <lambent/core/file.h>
 #include <lambent/core/parallel.h>
 #include <lambent/pipeline/parse.h>
+#include <lambent/pipeline/place.h>
 
 #include <fmt/format.h>
 
@@ -10,6 +11,7 @@
 #include <chrono>
 #include <cmath>
 #include <sstream>
+#include <tuple>
 
 namespace lambent::tool {
 namespace {
@@ -38,6 +40,13 @@ float wrapped(float degrees) {
 
 double seconds_now() {
   return std::chrono::duration<double>(std::chrono::steady_clock::now().time_since_epoch()).count();
+}
+
+// Where the name ends in a value of an option that is given again.
+size_t name_end(const std::string& option, const std::string& value) {
+  return option == "insert"                    ? value.rfind('@')
+       : option == "place" || option == "move" ? value.find('=')
+                                               : value.rfind('=');
 }
 
 // The pixel of a picture of another size at the same place.
@@ -94,9 +103,10 @@ Result<void> Session::ask(const DrawRequest& request) {
   if (auto ok = check_display(request.exposure, request.tone); !ok) return ok;
   const DrawRequest before = live->request();
   const bool traced = against == Against::reference;
-  if (traced &&
-      (request.animation != before.animation || request.time != before.time || request.deform != before.deform))
-    reference.stop();  // its scene moves
+  const auto moves = [](const DrawRequest& r) {
+    return std::tie(r.animation, r.time, r.deform, r.insert, r.place, r.move);
+  };
+  if (traced && moves(request) != moves(before)) reference.stop();  // its scene changes
   if (auto ok = live->ask(request); !ok) return ok;
   if (other) {
     DrawRequest same = request;
@@ -123,9 +133,13 @@ Result<void> Session::set(const std::string& option, const std::string& value) {
           if constexpr (std::is_same_v<T, std::string>) request.*member = value;
           else if constexpr (std::is_same_v<T, std::vector<std::string>>) {
             auto& list = request.*member;
-            const std::string name = value.substr(0, value.rfind('='));
-            std::erase_if(list, [&](const std::string& v) { return v.substr(0, v.rfind('=')) == name; });
-            list.push_back(value);
+            const auto name = [&](const std::string& v) { return v.substr(0, name_end(option, v)); };
+            const auto same =
+                std::find_if(list.begin(), list.end(), [&](const auto& v) { return name(v) == name(value); });
+            const bool out = name_end(option, value) + 1 == value.size();
+            if (same == list.end() && !out) list.push_back(value);
+            else if (same != list.end() && out) list.erase(same);
+            else if (same != list.end()) *same = value;
           } else {
             const auto n = parse_numbers(value, 1, "--" + option);
             number_ok = bool(n);
@@ -173,6 +187,45 @@ Result<void> Session::dolly(float factor) {
   Camera c = live->view().camera;
   c.eye = c.target + factor * (c.eye - c.target);
   return set("camera", camera_text(c, live->scene().origin));
+}
+
+bool Session::grab(Vec2 at) {
+  const Hit hit = live->pick(at);
+  const auto object = live->object_of(hit);
+  if (!object) return false;
+  const bool inserted = !live->request().insert.empty();
+  held_ = {inserted, *object,
+           interpolate(live->scene().positions, live->scene().triangles[hit.triangle], hit.u, hit.v)};
+  return true;
+}
+
+Result<void> Session::carry(Vec2 at, bool lift) {
+  const View& view = live->view();
+  const CameraRays rays(view.camera, view.width, view.height);
+  const Vec3 along = rays.direction(at.x * float(view.width), at.y * float(view.height)), eye = view.camera.eye;
+  const Vec3 upright(eye.x - held_.at.x, 0, eye.z - held_.at.z), normal = lift ? upright : Vec3(0, 1, 0);
+  const float t = dot(held_.at - eye, normal) / dot(along, normal);
+  if (!(t > 0 && t < 100 * bounds(live->scene()).diagonal())) return {};  // beyond the horizon
+  Vec3 by = eye + t * along - held_.at;
+  if (lift) by.x = by.z = 0;
+  DrawRequest request = live->request();
+  const Vec3d origin = live->scene().origin;
+  if (held_.inserted) {
+    std::string& text = request.insert.at(held_.index);
+    auto object = parse_insertion(text, origin);
+    if (!object) return object.error();
+    const Vec3d p = Vec3d(object->foot + by) + origin;
+    text = fmt::format("{}@{:.9g},{:.9g},{:.9g},{:.9g}", object->path, p.x, p.y, p.z, object->scale);
+  } else {
+    auto objects = parse_places(request.place, request.move);
+    if (!objects) return objects.error();
+    PlacedFile& object = objects->at(held_.index);
+    if (!object.keys.empty()) return Error{object.name, "is where its path has it: --move"};
+    object.at.position += Vec3d(by);
+    request.place[held_.index] = place_text(object);
+  }
+  held_.at += by;
+  return ask(request);
 }
 
 Result<void> Session::resize(int width, int height) {

@@ -40,7 +40,9 @@ class Session {
   static Result<std::unique_ptr<Session>> open(const SessionOptions& options, const Job& job);
   ~Session();
 
-  // Of draw()'s table, by name: "exposure", "env-rotate", ... Errors: no such option, a wrong value; all stays.
+  // Of draw()'s table, by name: "exposure", "env-rotate", ... Of an option that is given again a value takes the place
+  // of the one of the same name ("desk=...", "a=..." of --place, "cup.obj@..." of --insert), and with nothing after the
+  // name takes it out. Errors: no such option, a wrong value; all stays.
   Result<void> set(const std::string& option, const std::string& value);
   // What hands do. Degrees; a share of the picture's height; a factor of the distance.
   Result<void> turn_light(float yaw, float pitch);
@@ -49,6 +51,12 @@ class Session {
   Result<void> dolly(float factor);
   Result<void> resize(int width, int height);
   Result<void> look_as(Look look, int coefficient = 0);
+  // Takes hold of the object of --insert or --place that is seen at a place of the picture, [0, 1]^2 from the top left;
+  // false: none is.
+  bool grab(Vec2 at);
+  // Carries it there: level, at the height at which it was taken, or `lift`ed straight up and down. Errors: one that
+  // --move moves.
+  Result<void> carry(Vec2 at, bool lift);
   // A file of any kind that we know: another bake takes the scene's place, an environment lights it.
   Result<void> drop(const std::string& path);
   // What is right of the wipe; of several bakes or environments the one by number.
@@ -93,6 +101,11 @@ class Session {
   explicit Session(Job job) : job_(std::move(job)) {}
   Result<void> show(size_t bake);
   Result<void> ask(const DrawRequest& request);
+  struct {
+    bool inserted = false;
+    size_t index = 0;
+    Vec3 at{0.0f};
+  } held_ = {};
   void restart_reference();
   void measure(bool settled);
   Job job_;

@@ -37,7 +37,7 @@ struct Window {
   PanelState panel = {};
   std::vector<std::string> dropped = {};
   // Of a drag under way.
-  enum class Drag { none, look, light, pan, wipe } drag = Drag::none;
+  enum class Drag { none, look, light, pan, wipe, object } drag = Drag::none;
   double x = 0, y = 0, last_input = 0;
   int frames_due = 3;  // Dear ImGui settles in a few
   // Of the script.
@@ -47,6 +47,11 @@ struct Window {
   double wait_until = 0;
   bool stays = false;
 
+  Vec2 place_of(double at_x, double at_y) const {  // in the picture
+    int height = 1;
+    glfwGetWindowSize(handle, nullptr, &height);
+    return Vec2(float(at_x) / float(picture_width()), float(at_y) / float(std::max(1, height)));
+  }
   int picture_width() const {
     int width = 0, height = 0;
     glfwGetFramebufferSize(handle, &width, &height);
@@ -74,6 +79,11 @@ void on_button(GLFWwindow* handle, int button, int action, int mods) {
   glfwGetCursorPos(handle, &w.x, &w.y);
   const bool at_wipe = w.session.against != Against::nothing && !w.session.difference &&
                        std::abs(w.x - double(w.session.wipe) * w.picture_width()) < 6;
+  if (mods & GLFW_MOD_CONTROL && button == GLFW_MOUSE_BUTTON_LEFT) {
+    if (w.session.grab(w.place_of(w.x, w.y))) w.drag = Window::Drag::object;
+    else w.say(Error{"nothing to carry", "no object of --insert or --place is there"});
+    return;
+  }
   w.drag = at_wipe                                                      ? Window::Drag::wipe
          : button == GLFW_MOUSE_BUTTON_RIGHT || (mods & GLFW_MOD_SHIFT) ? Window::Drag::light
          : button == GLFW_MOUSE_BUTTON_MIDDLE || (mods & GLFW_MOD_ALT)  ? Window::Drag::pan
@@ -94,6 +104,8 @@ void on_move(GLFWwindow* handle, double x, double y) {
     case Window::Drag::light: return w.say(w.session.turn_light(-degrees_a_pixel * dx, degrees_a_pixel * dy));
     case Window::Drag::pan: return w.say(w.session.pan(dx / float(height), dy / float(height)));
     case Window::Drag::wipe: return w.session.move_wipe(float(x) / float(width)), w.say({});
+    case Window::Drag::object:
+      return w.say(w.session.carry(w.place_of(x, y), glfwGetKey(handle, GLFW_KEY_LEFT_SHIFT) == GLFW_PRESS));
     case Window::Drag::none: return;
   }
 }

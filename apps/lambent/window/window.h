@@ -10,6 +10,7 @@ struct WindowOptions {
   bool window = false;
   std::vector<std::string> more;  // bakes to compare with
   std::string script, size = "1280x800", brdf, method;
+  std::vector<std::string> insert, place, move;  // as for render
   int spp = 16, light_order = 0;
   void add_to(CLI::App& command);
 };

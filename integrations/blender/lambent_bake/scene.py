@@ -197,7 +197,11 @@ def flat_lamp(light, matrix):
 
 
 def write_lamp(glb, name, light, matrix, notes):
-    color = np.array(light.color) * light.energy
+    color = np.array(light.color) * light.energy * 2**getattr(light, "exposure", 0.0)  # 4.5 and later
+    if getattr(light, "use_temperature", False):
+        color = color * np.array(light.temperature_color)
+    if not getattr(light, "normalize", True):
+        notes.append(f'lamp "{name}": is taken as one whose power does not grow with its size')
     place, back = matrix.translation, matrix.to_3x3().normalized() @ mathutils.Vector((0, 0, 1))
     if light.use_nodes:
         notes.append(f'lamp "{name}": its nodes are not read')
@@ -206,7 +210,8 @@ def write_lamp(glb, name, light, matrix, notes):
     if light.type == "AREA":
         places, faces, area = flat_lamp(light, matrix)
         if area > 0:
-            glowing_shape(glb, name, places, faces, color / (4 * area))  # as Cycles has it, and EEVEE
+            # As Cycles has it: until 4.0 a quarter of the power over the area, from then on power over pi.
+            glowing_shape(glb, name, places, faces, color / ((math.pi if bpy.app.version >= (4, 0) else 4) * area))
         if getattr(light, "spread", math.pi) < math.pi - 1e-3:
             notes.append(f'lamp "{name}": its spread is left out: it shines to all sides of its front')
         return

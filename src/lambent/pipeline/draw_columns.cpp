@@ -1,7 +1,6 @@
 #include <lambent/pipeline/draw_columns.h>
 
 #include <lambent/core/overloaded.h>
-#include <lambent/pipeline/draw_insert.h>
 #include <lambent/relight/dering.h>
 
 #include <algorithm>
@@ -25,26 +24,6 @@ bool each_is_light(const Rows& rows) {
   const auto* directional = std::get_if<DirectionalRows>(&rows);
   return !std::holds_alternative<Outgoing>(rows) &&
          (!directional || directional->kind == DirectionalKind::none || directional->kind == DirectionalKind::hl2);
-}
-
-// The scene with what is inserted, all of it relit.
-Result<RelitScene> with_insertions(ColumnDrawing& d, Relit relit) {
-  const VertexPlacement& at = *vertices_of(d.baked);
-  const Outgoing* outgoing = std::get_if<Outgoing>(&d.rows);
-  RelitScene drawn{d.scene(),     at.front,         at.back,
-                   d.receivers(), std::move(relit), outgoing ? std::optional(*outgoing) : std::nullopt};
-  const Field& lattice = *lattice_of(d.baked);
-  auto relighter = Relighter::make(lattice);
-  if (!relighter) return Error{d.request.baked, relighter.error().message};
-  if (auto ok = relighter->set_light(d.light.projection.light); !ok) return Error{d.request.baked, ok.error().message};
-  Relit free_space;
-  if (auto ok = relighter->relight({}, free_space); !ok) return ok.error();
-  for (const Insertion& insertion : d.insertions)
-    if (auto ok = add_insertion(insertion, std::get<LatticePlacement>(lattice.where).lattice,
-                                std::get<IncidentRows>(lattice.rows).order, free_space, drawn, d.job);
-        !ok)
-      return ok.error();
-  return drawn;
 }
 
 }  // namespace
@@ -142,6 +121,42 @@ Rows posed_rows(const ColumnDrawing& d, const std::optional<Pose>& pose) {
   return rows;
 }
 
+Result<void> make_insertions(ColumnDrawing& d, std::span<const std::shared_ptr<const InsertedObject>> known) {
+  d.inserted.clear();
+  if (d.insertions.empty()) return {};
+  const Field& field = *lattice_of(d.baked);
+  for (const Insertion& insertion : d.insertions) {
+    const auto same = std::find_if(known.begin(), known.end(), [&](const auto& o) { return o->of == insertion; });
+    if (same != known.end()) {
+      d.inserted.push_back(*same);
+      continue;
+    }
+    auto made = make_inserted(insertion, std::get<LatticePlacement>(field.where).lattice,
+                              std::get<IncidentRows>(field.rows).order, d.job);
+    if (!made) return made.error();
+    d.inserted.push_back(std::move(*made));
+  }
+  return {};
+}
+
+Result<RelitScene> with_insertions(const ColumnDrawing& d, Relit relit) {
+  const VertexPlacement& at = *vertices_of(d.baked);
+  const Outgoing* outgoing = std::get_if<Outgoing>(&d.rows);
+  RelitScene drawn{d.scene(),     at.front,         at.back,
+                   d.receivers(), std::move(relit), outgoing ? std::optional(*outgoing) : std::nullopt};
+  const Field& field = *lattice_of(d.baked);
+  auto relighter = Relighter::make(field);
+  if (!relighter) return Error{d.request.baked, relighter.error().message};
+  if (auto ok = relighter->set_light(d.light.projection.light); !ok) return Error{d.request.baked, ok.error().message};
+  Relit free_space;
+  if (auto ok = relighter->relight({}, free_space); !ok) return ok.error();
+  const Lattice& lattice = std::get<LatticePlacement>(field.where).lattice;
+  for (const auto& object : d.inserted)
+    if (auto ok = insert_object(drawn, object->scene, object->receivers, object->transfer, lattice, free_space); !ok)
+      return ok.error();
+  return drawn;
+}
+
 // O(view): what the rows mean says how.
 Result<Image> shade(ColumnDrawing& d, const std::optional<Pose>& pose, Relit relit, const Relit& peaks,
                     const View& view) {
@@ -157,6 +172,7 @@ Result<Image> shade(ColumnDrawing& d, const std::optional<Pose>& pose, Relit rel
       if (!tracer) return tracer.error();
       return render(scene, *tracer, d.baked.basis, relit, view.camera, options, d.job.progress);
     }
+    if (auto ok = make_insertions(d); !ok) return ok.error();
     auto drawn = with_insertions(d, std::move(relit));
     if (!drawn) return drawn.error();
     options.outgoing = drawn->outgoing ? &*drawn->outgoing : nullptr;

@@ -2,6 +2,7 @@
 // Drawing by columns of light, step by step: light -> rows -> pixels. draw() goes through all of it; who draws frame
 // after frame (live.h) goes on from the first step whose input changed.
 #include <lambent/pipeline/draw.h>
+#include <lambent/pipeline/draw_insert.h>
 #include <lambent/pipeline/draw_light.h>
 #include <lambent/pipeline/motion.h>
 #include <lambent/relight/relighter.h>
@@ -17,6 +18,7 @@ struct ColumnDrawing {
   const Job& job;
   Show show;
   std::vector<Insertion> insertions;
+  std::vector<std::shared_ptr<const InsertedObject>> inserted = {};  // one for each, once they are made
   Surroundings around;
   ColumnLight light;
   Rows rows = {};                          // the surface's, or those of other materials
@@ -45,6 +47,10 @@ Result<void> set_lights(ColumnDrawing& d);
 Result<void> relight(ColumnDrawing& d, const std::optional<Pose>& pose, Relit& out, Relit& peaks);
 // The rows' meaning, turned with the surface where it can be.
 Rows posed_rows(const ColumnDrawing& d, const std::optional<Pose>& pose);
+// Objects of `insertions` that are not made yet; those of `known` need not be made again. Errors: make_inserted()'s.
+Result<void> make_insertions(ColumnDrawing& d, std::span<const std::shared_ptr<const InsertedObject>> known = {});
+// The scene with what is inserted, all of it relit; needs the light, and the objects made.
+Result<RelitScene> with_insertions(const ColumnDrawing& d, Relit relit);
 // O(view), a whole picture.
 Result<Image> shade(ColumnDrawing& d, const std::optional<Pose>& pose, Relit relit, const Relit& peaks,
                     const View& view);

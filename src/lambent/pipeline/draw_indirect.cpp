@@ -293,7 +293,7 @@ Result<Drawing> draw_indirect(const Baked& baked, const DrawRequest& request, co
   IndirectDrawing d{request, job, std::get<IndirectTransfer>(baked.surface.store), *show};
   d.scene = baked.scene, d.diagonal = bounds(d.scene).diagonal();
   if (auto ok = read_lamps(d); !ok) return ok.error();
-  std::vector<double> times{0};
+  std::vector<double> times{request.time};
   if (!request.frames.empty()) {
     auto given = parse_frames(request.frames);
     if (!given) return given.error();

@@ -8,8 +8,8 @@
 
 namespace lambent {
 
-Result<void> add_insertion(const Insertion& insertion, const Lattice& lattice, int order, const Relit& free_space,
-                           RelitScene& into, const Job& job) {
+Result<std::shared_ptr<const InsertedObject>> make_inserted(const Insertion& insertion, const Lattice& lattice,
+                                                            int order, const Job& job) {
   auto object = load_scene(insertion.path);
   if (!object) return object.error();
   for (const std::string& warning : object->warnings) job.warn(warning);
@@ -26,13 +26,13 @@ Result<void> add_insertion(const Insertion& insertion, const Lattice& lattice, i
     job.warn(insertion.path + ": reaches out of the lattice's box; light there is that of the box's border");
   auto tracer = Tracer::build(*object);
   if (!tracer) return tracer.error();
-  const Receivers receivers = make_vertex_receivers(*object);
-  // What the object does to light that comes to it: own shadows, and one bounce.
+  Receivers receivers = make_vertex_receivers(*object);
   auto transfer = bake(*object, *tracer, receivers,
                        {.order = order, .samples = 512, .bounces = 1, .precision = Precision::single}, nullptr,
                        job.progress);
   if (!transfer) return transfer.error();
-  return insert_object(into, *object, receivers, *transfer, lattice, free_space);
+  return std::make_shared<const InsertedObject>(
+      InsertedObject{insertion, std::move(*object), std::move(receivers), std::move(*transfer)});
 }
 
 }  // namespace lambent

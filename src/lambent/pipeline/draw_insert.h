@@ -4,10 +4,21 @@
 #include <lambent/pipeline/parse.h>
 #include <lambent/render/insert.h>
 
+#include <memory>
+
 namespace lambent {
 
-// Loads the object, bakes it alone where it stands and lights it by the lattice, relit; `into` then draws it too.
-Result<void> add_insertion(const Insertion& insertion, const Lattice& lattice, int order, const Relit& free_space,
-                           RelitScene& into, const Job& job);
+// An object where it stands, and what it does to light that comes to it: own shadows, and one bounce.
+struct InsertedObject {
+  Insertion of;
+  Scene scene;
+  Receivers receivers;
+  Transfer transfer;
+};
+
+// Loads the object and bakes it alone where it stands, for light of a lattice of that order. Errors: of files;
+// cancelled.
+Result<std::shared_ptr<const InsertedObject>> make_inserted(const Insertion& insertion, const Lattice& lattice,
+                                                            int order, const Job& job);
 
 }  // namespace lambent

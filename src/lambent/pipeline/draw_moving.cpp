@@ -1,13 +1,11 @@
 #include <lambent/pipeline/draw_moving.h>
 
-#include <lambent/pipeline/draw_columns.h>
 #include <lambent/pipeline/lamp_sight.h>
 #include <lambent/pipeline/place.h>
 #include <lambent/pipeline/text.h>
 #include <lambent/relight/dering.h>
 #include <lambent/relight/lattice.h>
 #include <lambent/relight/moving.h>
-#include <lambent/render/insert.h>
 #include <lambent/scene/append.h>
 
 #include <fmt/format.h>
@@ -83,17 +81,18 @@ struct FreeSpace {
   Relit all, peaks;
 };
 
-// All that does not move, and the lights: of the whole, and of its peaks where it has any.
+// All that does not move, and its light: of the whole, and of the light's peaks where it has any.
 struct MovingScene {
-  ColumnDrawing& d;
   MovingReceivers receivers;
-  Relit all, peaks;
-  FreeSpace space;
+  int order = 0;  // bands of the light straight from the sky
+  Relit all = {}, peaks = {};
+  FreeSpace space = {};
   int light_order = 0;
-  std::optional<Tracer> tracer;  // of the scene alone, where lamps move
+  std::optional<Tracer> tracer = std::nullopt;  // of the scene alone, where lamps move
   float diagonal = 0;
-  bool has_peaks() const { return !d.light.peaks.empty(); }
 };
+
+bool has_peaks(const ColumnDrawing& d) { return !d.light.peaks.empty(); }
 
 Result<FreeSpace> relight_lattice(const ColumnDrawing& d) {
   const Field& field = *lattice_of(d.baked);
@@ -110,37 +109,35 @@ Result<FreeSpace> relight_lattice(const ColumnDrawing& d) {
   return space;
 }
 
-Result<MovingScene> make_moving_scene(ColumnDrawing& d) {
-  const auto* whole = std::get_if<Transfer>(&d.baked.surface.store);
-  if (!whole) return Error{d.request.baked, "is no dense transfer, over which objects could move"};
+Result<MovingScene> make_moving_scene(const Baked& baked, const DrawRequest& request, const Job& job) {
+  const auto* whole = std::get_if<Transfer>(&baked.surface.store);
+  if (!whole) return Error{request.baked, "is no dense transfer, over which objects could move"};
   // Light straight from the sky alone, where it was kept apart.
-  const Transfer& direct = d.baked.terms.empty() ? *whole : d.baked.terms.front();
-  if (d.baked.terms.empty() && whole->channels == 3)
-    d.job.warn(d.request.baked +
-               ": holds light that has bounced together with the sky's, so that objects shadow both "
-               "alike; `lambent bake --terms` keeps them apart");
-  const VertexPlacement& at = *vertices_of(d.baked);
-  MovingScene s{d,
-                moving_receivers(direct, receiver_positions(d.scene().positions, d.where(), d.receivers()),
-                                 receiver_normals(d.scene(), at, d.receivers())),
-                {},
-                {},
-                {},
-                direct.light.order,
-                {},
-                0};
-  if (d.request.light_order) s.light_order = std::min(s.light_order, d.request.light_order);
-  if (auto ok = d.relighters.front().relight({}, s.all); !ok) return Error{d.request.baked, ok.error().message};
-  if (s.has_peaks())
-    if (auto ok = d.of_peaks.front().relight({}, s.peaks); !ok) return Error{d.request.baked, ok.error().message};
+  const Transfer& direct = baked.terms.empty() ? *whole : baked.terms.front();
+  if (baked.terms.empty() && whole->channels == 3)
+    job.warn(request.baked +
+             ": holds light that has bounced together with the sky's, so that objects shadow both "
+             "alike; `lambent bake --terms` keeps them apart");
+  const size_t receivers = receivers_of(baked.surface.store);
+  return MovingScene{moving_receivers(direct, receiver_positions(baked.scene.positions, baked.surface.where, receivers),
+                                      receiver_normals(baked.scene, *vertices_of(baked), receivers)),
+                     direct.light.order};
+}
+
+Result<void> light_scene(MovingScene& s, ColumnDrawing& d) {
+  const std::string& path = d.request.baked;
+  s.light_order = d.request.light_order ? std::min(s.order, d.request.light_order) : s.order;
+  if (auto ok = d.relighters.front().relight({}, s.all); !ok) return Error{path, ok.error().message};
+  if (has_peaks(d))
+    if (auto ok = d.of_peaks.front().relight({}, s.peaks); !ok) return Error{path, ok.error().message};
   auto space = relight_lattice(d);
-  if (!space) return Error{d.request.baked, space.error().message};
+  if (!space) return Error{path, space.error().message};
   s.space = std::move(*space);
-  return s;
+  return {};
 }
 
 // Warns where an object stands where the lattice knows nothing.
-void check_place(const MovingScene& s, const Mover& m, std::set<std::string>& warned) {
+void check_place(const MovingScene& s, const Mover& m, const Job& job, std::set<std::string>& warned) {
   const Lattice& l = s.space.lattice;
   const Vec3 p = m.placed.place.position, slack(0.01f * length(l.max - l.min) + m.placed.radius());
   const bool outside = !all_at_most(l.min - slack, p) || !all_at_most(p, l.max + slack);
@@ -152,8 +149,7 @@ void check_place(const MovingScene& s, const Mover& m, std::set<std::string>& wa
   }
   const bool buried = !outside && !s.space.valid[l.index(at[0], at[1], at[2])];
   if ((outside || buried) && warned.insert(m.file.name).second)
-    s.d.job.warn(m.file.name + (outside
-                                    ? ": stands outside of the lattice's box; light there is that of the box's border"
+    job.warn(m.file.name + (outside ? ": stands outside of the lattice's box; light there is that of the box's border"
                                     : ": stands inside something; light there is that of its surroundings"));
 }
 
@@ -189,18 +185,18 @@ MovingCount add_lamp_light(const MovingScene& s, const MovingReceivers& receiver
 }
 
 // One object's receivers under the others.
-Relit relight_object(const MovingScene& s, const Mover& m, std::span<const PlacedObject* const> others,
+Relit relight_object(const MovingScene& s, bool with_peaks, const Mover& m, std::span<const PlacedObject* const> others,
                      MovingShader& shader) {
   const int order = std::min(s.space.order, m.receivers.order);
   Relit all, peaks;
   std::vector<std::vector<Vec3>> arriving;
   arriving.push_back(arriving_at(m.receivers, s.space.lattice, s.space.all, order));
-  if (s.has_peaks()) arriving.push_back(arriving_at(m.receivers, s.space.lattice, s.space.peaks, order));
+  if (with_peaks) arriving.push_back(arriving_at(m.receivers, s.space.lattice, s.space.peaks, order));
   std::vector<MovingLight> lights{{arriving[0], true, &all}};
-  if (s.has_peaks()) lights.push_back({arriving[1], true, &peaks});
+  if (with_peaks) lights.push_back({arriving[1], true, &peaks});
   for (const MovingLight& light : lights) light_receivers(m.receivers, order, light);
   shader.shade(m.receivers, others, {.light_order = order}, lights);
-  if (s.has_peaks()) dering(all, peaks);
+  if (with_peaks) dering(all, peaks);
   return all;
 }
 
@@ -227,59 +223,6 @@ void append_object(RelitScene& into, const Mover& m, const Relit& relit, std::ve
   for (size_t r = 0; r < m.receivers.count; ++r) into.relit.set(first + r, 0, relit.at(r));
 }
 
-// Kept from frame to frame.
-struct MovingShaders {
-  MovingShader sky;
-  LampShader lamps;
-};
-
-// What was drawn, counted.
-struct MovingTally {
-  size_t pairs = 0, tiles = 0;
-  double seconds = 0;
-};
-
-Result<Image> draw_frame(const MovingScene& s, std::vector<Mover>& movers, double time, const View& view,
-                         MovingShaders& shaders, std::set<std::string>& warned, MovingTally& tally) {
-  ColumnDrawing& d = s.d;
-  const auto start = std::chrono::steady_clock::now();
-  for (Mover& m : movers) {
-    const Model& model = *m.model;
-    m.placed = place_object(model.hidden, place_at(m.file, time, d.scene().origin));
-    m.receivers =
-        moving_receivers(model.transfer(), model.positions, model.normals, model.hidden.shells.center, m.placed.place);
-    if (model.shining) m.lamp = place_lamp(*model.shining, m.placed.place);
-    check_place(s, m, warned);
-  }
-  std::vector<const PlacedObject*> objects;
-  for (const Mover& m : movers) objects.push_back(&m.placed);
-  RelitScene drawn{d.scene(), vertices_of(d.baked)->front, vertices_of(d.baked)->back, d.receivers(), s.all, {}};
-  Relit peaks = s.peaks;
-  std::vector<MovingLight> lights{{d.light.projection.light, false, &drawn.relit}};
-  if (s.has_peaks()) lights.push_back({d.light.peaks, false, &peaks});
-  const MovingCount done = shaders.sky.shade(s.receivers, objects,
-                                             {.light_order = s.light_order, .bounced = !d.baked.terms.empty()}, lights);
-  if (s.has_peaks()) dering(drawn.relit, peaks);
-  add_lamp_light(s, s.receivers, nullptr, movers, shaders.lamps, drawn.relit);
-  tally.pairs += done.pairs, tally.tiles += done.tiles;
-  std::vector<Vec3> emission = d.emission;
-  for (size_t i = 0; i < movers.size(); ++i) {
-    std::vector<const PlacedObject*> others = objects;
-    others.erase(others.begin() + ptrdiff_t(i));
-    Relit relit = relight_object(s, movers[i], others, shaders.sky);
-    add_lamp_light(s, movers[i].receivers, &movers[i], movers, shaders.lamps, relit);
-    append_object(drawn, movers[i], relit, emission);
-  }
-  tally.seconds += std::chrono::duration<double>(std::chrono::steady_clock::now() - start).count();
-  auto tracer = Tracer::build(drawn.scene);
-  if (!tracer) return tracer.error();
-  RenderOptions options{view.width, view.height, d.request.spp, d.around.background(), d.show.colour};
-  options.emission = std::move(emission);
-  if (!options.emission.empty()) options.emission.resize(drawn.scene.materials.size(), Vec3(0.0f));
-  return render(drawn.scene, *tracer, corner_receivers(drawn.scene, drawn.front, drawn.back), drawn.relit, view.camera,
-                options, d.job.progress);
-}
-
 Result<std::vector<Mover>> load_movers(const DrawRequest& request,
                                        std::map<std::string, std::unique_ptr<Model>>& models) {
   auto files = parse_places(request.place, request.move);
@@ -299,10 +242,106 @@ Result<std::vector<Mover>> load_movers(const DrawRequest& request,
 
 }  // namespace
 
-Result<Drawing> draw_moving(const Baked& baked, const DrawRequest& request, const Job& job) {
+struct MovingDrawing::State {
+  const Baked& baked;
+  const Job& job;
+  MovingScene scene;
+  std::map<std::string, std::unique_ptr<Model>> models = {};
+  std::vector<Mover> movers = {};
+  // Kept from frame to frame.
+  MovingShader sky = {};
+  LampShader lamps = {};
+  std::set<std::string> warned = {};
+  std::vector<std::pair<std::string, size_t>> parts = {};
+  MovingCount done = {};
+  double seconds = 0;
+};
+
+MovingDrawing::MovingDrawing(std::unique_ptr<State> state) : state_(std::move(state)) {}
+MovingDrawing::MovingDrawing(MovingDrawing&&) noexcept = default;
+MovingDrawing& MovingDrawing::operator=(MovingDrawing&&) noexcept = default;
+MovingDrawing::~MovingDrawing() = default;
+size_t MovingDrawing::objects() const { return state_->movers.size(); }
+const std::vector<std::pair<std::string, size_t>>& MovingDrawing::parts() const { return state_->parts; }
+size_t MovingDrawing::pairs() const { return state_->done.pairs; }
+size_t MovingDrawing::tiles() const { return state_->done.tiles; }
+double MovingDrawing::seconds() const { return state_->seconds; }
+int MovingDrawing::light_order() const { return state_->scene.light_order; }
+
+Result<MovingDrawing> MovingDrawing::make(const Baked& baked, const DrawRequest& request, const Job& job) {
   std::map<std::string, std::unique_ptr<Model>> models;
   auto movers = load_movers(request, models);
   if (!movers) return movers.error();
+  auto scene = make_moving_scene(baked, request, job);
+  if (!scene) return scene.error();
+  MovingDrawing out(std::unique_ptr<State>(new State{baked, job, std::move(*scene)}));
+  out.state_->models = std::move(models);
+  if (auto ok = out.change(request); !ok) return ok.error();
+  return out;
+}
+
+Result<void> MovingDrawing::change(const DrawRequest& request) {
+  State& s = *state_;
+  auto movers = load_movers(request, s.models);
+  if (!movers) return movers.error();
+  const bool shines = std::any_of(movers->begin(), movers->end(), [](const Mover& m) { return m.model->shining; });
+  if (shines && !s.scene.tracer) {
+    auto tracer = Tracer::build(s.baked.scene, s.job.progress);
+    if (!tracer) return tracer.error();
+    const Bounds box = bounds(s.baked.scene);
+    s.scene.tracer = std::move(*tracer), s.scene.diagonal = length(box.max - box.min);
+  }
+  s.movers = std::move(*movers);
+  return {};
+}
+
+Result<void> MovingDrawing::set_light(ColumnDrawing& d) { return light_scene(state_->scene, d); }
+
+void MovingDrawing::move_to(double time) {
+  State& s = *state_;
+  const auto start = std::chrono::steady_clock::now();
+  for (Mover& m : s.movers) {
+    const Model& model = *m.model;
+    m.placed = place_object(model.hidden, place_at(m.file, time, s.baked.scene.origin));
+    m.receivers =
+        moving_receivers(model.transfer(), model.positions, model.normals, model.hidden.shells.center, m.placed.place);
+    if (model.shining) m.lamp = place_lamp(*model.shining, m.placed.place);
+    check_place(s.scene, m, s.job, s.warned);
+  }
+  s.seconds += std::chrono::duration<double>(std::chrono::steady_clock::now() - start).count();
+}
+
+RelitScene MovingDrawing::lit(const ColumnDrawing& d, std::vector<Vec3>& emission) {
+  State& s = *state_;
+  const auto start = std::chrono::steady_clock::now();
+  std::vector<const PlacedObject*> objects;
+  for (const Mover& m : s.movers) objects.push_back(&m.placed);
+  const VertexPlacement& at = *vertices_of(s.baked);
+  RelitScene drawn{s.baked.scene, at.front, at.back, d.receivers(), s.scene.all, {}};
+  Relit peaks = s.scene.peaks;
+  std::vector<MovingLight> lights{{d.light.projection.light, false, &drawn.relit}};
+  if (has_peaks(d)) lights.push_back({d.light.peaks, false, &peaks});
+  const MovingCount done = s.sky.shade(s.scene.receivers, objects,
+                                       {.light_order = s.scene.light_order, .bounced = !s.baked.terms.empty()}, lights);
+  if (has_peaks(d)) dering(drawn.relit, peaks);
+  add_lamp_light(s.scene, s.scene.receivers, nullptr, s.movers, s.lamps, drawn.relit);
+  s.done.pairs += done.pairs, s.done.tiles += done.tiles;
+  emission = d.emission;
+  s.parts.clear();
+  for (size_t i = 0; i < s.movers.size(); ++i) {
+    std::vector<const PlacedObject*> others = objects;
+    others.erase(others.begin() + ptrdiff_t(i));
+    Relit relit = relight_object(s.scene, has_peaks(d), s.movers[i], others, s.sky);
+    add_lamp_light(s.scene, s.movers[i].receivers, &s.movers[i], s.movers, s.lamps, relit);
+    s.parts.emplace_back(s.movers[i].file.name, drawn.scene.triangles.size());
+    append_object(drawn, s.movers[i], relit, emission);
+  }
+  if (!emission.empty()) emission.resize(drawn.scene.materials.size(), Vec3(0.0f));
+  s.seconds += std::chrono::duration<double>(std::chrono::steady_clock::now() - start).count();
+  return drawn;
+}
+
+Result<Drawing> draw_moving(const Baked& baked, const DrawRequest& request, const Job& job) {
   auto begun = begin_columns(baked, request, job);
   if (!begun) return begun.error();
   ColumnDrawing& d = *begun;
@@ -312,6 +351,8 @@ Result<Drawing> draw_moving(const Baked& baked, const DrawRequest& request, cons
     if (!given) return given.error();
     times = *given;
   }
+  auto moving = MovingDrawing::make(baked, request, job);
+  if (!moving) return moving.error();
   auto view = parse_view(request.camera, request.size, baked.scene);
   if (!view) return view.error();
   auto around = surroundings_of(request, job);
@@ -319,35 +360,31 @@ Result<Drawing> draw_moving(const Baked& baked, const DrawRequest& request, cons
   d.around = std::move(*around);
   if (auto ok = choose_light(d); !ok) return ok.error();
   if (auto ok = make_relighters(d); !ok) return ok.error();
-  auto scene = make_moving_scene(d);
-  if (!scene) return scene.error();
-  if (std::any_of(movers->begin(), movers->end(), [](const Mover& m) { return m.model->shining.has_value(); })) {
-    auto tracer = Tracer::build(d.scene(), job.progress);
-    if (!tracer) return tracer.error();
-    const Bounds box = bounds(d.scene());
-    scene->tracer = std::move(*tracer), scene->diagonal = length(box.max - box.min);
-  }
+  if (auto ok = moving->set_light(d); !ok) return ok.error();
   Drawing drawing;
-  MovingShaders shaders;
-  MovingTally tally;
-  std::set<std::string> warned;
   for (double time : times) {
-    auto image = draw_frame(*scene, *movers, time, *view, shaders, warned, tally);
+    moving->move_to(time);
+    RenderOptions options{view->width, view->height, request.spp, d.around.background(), d.show.colour};
+    const RelitScene drawn = moving->lit(d, options.emission);
+    auto tracer = Tracer::build(drawn.scene);
+    if (!tracer) return tracer.error();
+    auto image = render(drawn.scene, *tracer, corner_receivers(drawn.scene, drawn.front, drawn.back), drawn.relit,
+                        view->camera, options, job.progress);
     if (!image) return image.error();
     drawing.frames.push_back(std::move(*image));
   }
-  const double frames = double(times.size());
+  const double frames = double(times.size()), ms = 1e3 * moving->seconds() / frames;
   drawing.summary.json = {{"receivers", d.receivers()},
                           {"frames", times.size()},
-                          {"objects", movers->size()},
-                          {"order", scene->light_order},
-                          {"pairs", double(tally.pairs) / frames},
-                          {"tiles", double(tally.tiles) / frames},
-                          {"relight_seconds", tally.seconds / frames}};
+                          {"objects", moving->objects()},
+                          {"order", moving->light_order()},
+                          {"pairs", double(moving->pairs()) / frames},
+                          {"tiles", double(moving->tiles()) / frames},
+                          {"relight_seconds", moving->seconds() / frames}};
   drawing.summary.lines.emplace_back(
       "relit", fmt::format("{} receivers and {} objects in {:.2f} ms a frame; {} pairs of both are near each other",
-                           human_count(d.receivers()), movers->size(), 1e3 * tally.seconds / frames,
-                           human_count(size_t(double(tally.pairs) / frames))));
+                           human_count(d.receivers()), moving->objects(), ms,
+                           human_count(size_t(double(moving->pairs()) / frames))));
   return drawing;
 }
 

@@ -42,8 +42,7 @@ const Option<R> table[] = {
      "sun@AZIMUTH,ELEVATION=R,G,B (irradiance); may be given again"},
     {"move", &R::move, "Light", D | I,
      "N@T:X,Y,Z;T:X,Y,Z;...: where lamp N is at these times, straight from one to the next (files of direct to "
-     "indirect light); or NAME=PATH.json: the path of an object of --place; may be given again",
-     0, 0, nullptr, "frames"},
+     "indirect light); or NAME=PATH.json: the path of an object of --place; may be given again"},
     {"sphere-lamp", &R::sphere_lamp, "Light", Z | T,
      "X,Y,Z,RADIUS,R,G,B: a near lamp, a sphere of that radiance; may be given again"},
 
@@ -76,7 +75,7 @@ const Option<R> table[] = {
 
     {"animation", &R::animation, "Motion", distant & ~(K | V),
      "Pose the scene by this glTF animation, by name or number"},
-    {"time", &R::time, "Motion", distant & ~(K | V), "At this time, seconds", 0, 0, nullptr, "animation"},
+    {"time", &R::time, "Motion", every & ~(K | V), "At this time, seconds, of --animation or --move"},
     {"frames", &R::frames, "Motion", every & ~(K | V),
      "FROM:TO[:STEP]: at these times, seconds, as a strip of pictures; needs --animation, or --move"},
     {"deform", &R::deform, "Motion", distant & ~(K | V),
@@ -235,6 +234,8 @@ Result<void> check_draw(const DrawRequest& request, DrawKind kind) {
     return Error{"--show", "of direct to indirect light is product, radiosity, albedo, direct or indirect", true};
   const bool by_paths = kind == DrawKind::indirect || !request.place.empty();
   if (said.contains("move") && !by_paths) return Error{"--move", "needs --place", true};
+  if (said.contains("time") && request.animation.empty() && request.move.empty())
+    return Error{"--time", "needs --animation, or --move", true};
   if (said.contains("frames") && (by_paths ? request.move.empty() : request.animation.empty()))
     return Error{"--frames", by_paths ? "needs --move" : "needs --animation", true};
   const bool from_afar = kind == DrawKind::texture || kind == DrawKind::blocks;

@@ -1,12 +1,13 @@
 #include <lambent/pipeline/live.h>
 
 #include <lambent/core/overloaded.h>
-#include <lambent/core/random.h>
 #include <lambent/light/cube_light.h>
 #include <lambent/light/lamps.h>
 #include <lambent/light/peaks.h>
 #include <lambent/pipeline/draw_blocks.h>
 #include <lambent/pipeline/draw_columns.h>
+#include <lambent/pipeline/draw_moving.h>
+#include <lambent/pipeline/live_look.h>
 
 #include <algorithm>
 #include <array>
@@ -46,6 +47,15 @@ LiveLight live_light(const Environment& env, const DrawRequest& request, const L
   return out;
 }
 
+// The scene with objects in it that were not baked with it.
+struct Company {
+  Scene scene;
+  SpatialBasis basis;
+  std::optional<Outgoing> outgoing;
+  std::vector<Vec3> emission;
+  std::vector<size_t> first;  // triangle of each object
+};
+
 }  // namespace
 
 struct LivePicture::State {
@@ -59,7 +69,8 @@ struct LivePicture::State {
 
   // What has to be made anew, first to last; `draft`: made in a hurry, and to be made again.
   struct {
-    bool environment = true, materials = true, pose = true, light = true, values = true, rays = true, shades = true;
+    bool environment = true, materials = true, pose = true, light = true, values = true, rays = true, shades = true,
+         objects = true;
   } due = {};
   bool draft_light = false, draft_values = false;
 
@@ -68,6 +79,8 @@ struct LivePicture::State {
   std::optional<BlockShading> blocks = std::nullopt;
   std::optional<Pose> pose = std::nullopt;
   Scene moved = {};
+  std::optional<MovingDrawing> moving = std::nullopt;  // of --place
+  std::optional<Company> company = std::nullopt;
   std::optional<Tracer> tracer = std::nullopt;
   Relit relit = {}, peaks = {};
   Rows rows = {};
@@ -81,8 +94,10 @@ struct LivePicture::State {
   double trace_cost = 2e-7, shade_cost = 1e-7, receiver_cost = 1e-6;  // seconds each, as measured
   LiveTimes times = {};
 
-  const Scene& scene() const { return pose ? moved : baked.scene; }
-  LightBasis basis() const { return light_of(baked.surface.store); }
+  const Scene& scene() const { return company ? company->scene : pose ? moved : baked.scene; }
+  const SpatialBasis& basis() const { return company ? company->basis : baked.basis; }
+  bool has_objects() const { return moving || (columns && !columns->insertions.empty()); }
+  LightBasis light_basis() const { return light_of(baked.surface.store); }
   bool is_fixed() const { return std::holds_alternative<FixedView>(baked.surface.where); }
   int width() const { return std::max(1, view.width / scale); }
   int height() const { return std::max(1, view.height / scale); }
@@ -90,13 +105,14 @@ struct LivePicture::State {
   Result<void> make_environment_due();
   Result<void> make_materials();
   Result<void> make_pose();
+  Result<void> make_objects();
+  Result<void> join_objects();
   Result<void> project(bool hurry);
   Result<void> make_values(bool hurry, double budget);
   Result<void> shade_blocks_seen(bool hurry, double budget);
   void choose_scale(bool hurry, double budget);
   Result<void> add_sample();
   std::function<SurfaceShade()> shade_maker(RenderOptions& options);
-  std::function<SurfaceShade()> look_shade();
   const std::vector<uint32_t>& receivers_in_view();
 };
 
@@ -106,8 +122,8 @@ Result<void> LivePicture::State::make_environment_due() {
   auto env = asked.environment ? Result<Environment>(*asked.environment) : load_environment(asked.env);
   if (!env) return env.error();
   for (const std::string& warning : env->warnings) job.warn(warning);
-  light[1] = live_light(reduced(*env, coarse_sky), asked, basis());
-  light[0] = live_light(*env, asked, basis());
+  light[1] = live_light(reduced(*env, coarse_sky), asked, light_basis());
+  light[0] = live_light(*env, asked, light_basis());
   return {};
 }
 
@@ -120,8 +136,20 @@ Result<void> LivePicture::State::make_materials() {
   }
   auto begun = begin_columns(baked, asked, job);
   if (!begun) return begun.error();
+  if (auto ok = make_insertions(*begun, columns ? columns->inserted : decltype(columns->inserted)()); !ok) return ok;
   columns.emplace(std::move(*begun));
   rows = columns->rows;
+  return {};
+}
+
+// Objects of --place; those of --insert are among the materials.
+Result<void> LivePicture::State::make_objects() {
+  if (asked.place.empty()) return moving.reset(), Result<void>();
+  if (moving) return moving->change(asked);
+  auto made = MovingDrawing::make(baked, asked, job);
+  if (!made) return made.error();
+  moving.emplace(std::move(*made));
+  due.light = true;  // that comes to them
   return {};
 }
 
@@ -153,7 +181,32 @@ Result<void> LivePicture::State::project(bool hurry) {
     std::fill(of.begin(), of.end(), Vec3(0.0f)), d.light.peaks.clear(), d.emission.clear();
     of[size_t(coefficient)] = Vec3(1.0f);
   }
-  return d.relighters.empty() ? make_relighters(d) : set_lights(d);
+  if (auto ok = d.relighters.empty() ? make_relighters(d) : set_lights(d); !ok) return ok;
+  return moving ? moving->set_light(d) : Result<void>();
+}
+
+// The scene with its objects, and all of its light in `relit`. Where they stand is looked at only if it has changed:
+// who holds the scene meanwhile has let go of it then.
+Result<void> LivePicture::State::join_objects() {
+  if (moving && due.objects) moving->move_to(asked.time);
+  std::vector<Vec3> emission = columns->emission;
+  auto drawn = moving ? moving->lit(*columns, emission) : with_insertions(*columns, std::move(relit));
+  if (!drawn) return drawn.error();
+  relit = std::move(drawn->relit), peaks = {};
+  if (!emission.empty()) emission.resize(drawn->scene.materials.size(), Vec3(0.0f));
+  if (!due.objects) return company->outgoing = std::move(drawn->outgoing), company->emission = emission, Result<void>();
+  SpatialBasis corners = corner_receivers(drawn->scene, drawn->front, drawn->back);
+  company = Company{std::move(drawn->scene), std::move(corners), std::move(drawn->outgoing), std::move(emission), {}};
+  if (moving)
+    for (const auto& part : moving->parts()) company->first.push_back(part.second);
+  size_t first = baked.scene.triangles.size();
+  for (const auto& object : columns->inserted)
+    company->first.push_back(std::exchange(first, first + object->scene.triangles.size()));
+  auto built = Tracer::build(company->scene, job.progress);
+  if (!built) return built.error();
+  tracer.emplace(std::move(*built));
+  for (auto& kept : rays) kept.clear();
+  return due.objects = false, Result<void>();
 }
 
 // Those of the triangles that rays have met: of a picture that moves, no others are wanted.
@@ -195,9 +248,10 @@ Result<void> LivePicture::State::shade_blocks_seen(bool hurry, double budget) {
 Result<void> LivePicture::State::make_values(bool hurry, double budget) {
   if (blocks) return shade_blocks_seen(hurry, budget);
   times.shaded = columns->receivers();
-  if (auto ok = relight(*columns, pose, relit, peaks); !ok) return ok;
+  if (!moving)
+    if (auto ok = relight(*columns, pose, relit, peaks); !ok) return ok;
   rows = posed_rows(*columns, pose);
-  return {};
+  return has_objects() ? join_objects() : Result<void>();
 }
 
 void LivePicture::State::choose_scale(bool hurry, double budget) {
@@ -209,58 +263,17 @@ void LivePicture::State::choose_scale(bool hurry, double budget) {
   if (next != scale) scale = next, due.shades = true;
 }
 
-namespace {
-
-Vec3 signed_color(float x) { return x < 0 ? Vec3(-x, -0.25f * x, 0) : Vec3(0, 0.5f * x, x); }
-
-// A colour of the receiver's own, darker towards the borders between receivers.
-Vec3 receiver_color(uint32_t receiver, float weight) {
-  const uint64_t h = hash64(receiver, 0x5eed);
-  const Vec3 hue(float(h & 255), float(h >> 8 & 255), float(h >> 16 & 255));
-  return (0.15f + 0.85f * weight) * (0.3f + 0.7f / 255 * hue);
-}
-
-}  // namespace
-
-std::function<SurfaceShade()> LivePicture::State::look_shade() {
-  return [this]() -> SurfaceShade {
-    return [this](const Hit& hit, Vec3) {
-      Vec3 out(0.0f);
-      std::visit(
-          [&](const auto& b) {
-            const auto* at = b.find(hit.triangle, hit.front);
-            if (!at) return;
-            uint32_t nearest = none;
-            float most = -1, value = 0;
-            b.spread(*at, hit.u, hit.v, [&](uint32_t receiver, float weight) {
-              if (weight > most) nearest = receiver, most = weight;
-              if (look == Look::coefficient) value += weight * relit.at(receiver).x;
-            });
-            if (look == Look::coefficient) out = signed_color(value);
-            else if (look == Look::receivers) out = receiver_color(nearest, most);
-          },
-          baked.basis);
-      if (look != Look::density) return out;
-      // Triangles for each thousandth of the scene's size squared, from 1/16 to 65,536.
-      const Triangle& t = scene().triangles[hit.triangle];
-      const Bounds box = bounds(scene());
-      const float unit = length(box.max - box.min) / 1000, area = length(area_normal(scene(), t)) / 2;
-      return false_color((std::log2(unit * unit / std::max(area, 1e-30f)) + 4) / 20);
-    };
-  };
-}
-
 std::function<SurfaceShade()> LivePicture::State::shade_maker(RenderOptions& options) {
-  if (look != Look::picture) return look_shade();
+  if (look != Look::picture) return look_shade(look, scene(), basis(), relit);
   if (blocks) {
     options.show = RenderOptions::Show::radiosity;  // colour is in what was shaded
     return relit_shade(scene(), baked.basis, blocks->relit, options);
   }
-  options.show = columns->show.colour, options.emission = columns->emission;
+  options.show = columns->show.colour, options.emission = company ? company->emission : columns->emission;
   if (!peaks.values.empty()) options.peaks = &peaks;
   if (const auto* directional = std::get_if<DirectionalRows>(&rows)) options.directional = directional->kind;
-  options.outgoing = std::get_if<Outgoing>(&rows);
-  return relit_shade(scene(), baked.basis, relit, options);
+  options.outgoing = !company ? std::get_if<Outgoing>(&rows) : company->outgoing ? &*company->outgoing : nullptr;
+  return relit_shade(scene(), basis(), relit, options);
 }
 
 Result<void> LivePicture::State::add_sample() {
@@ -320,7 +333,7 @@ struct Parsed {
 
 // All of a request that can be wrong but for its files.
 Result<Parsed> parse_live(const Baked& baked, const DrawRequest& request) {
-  for (const char* option : {"insert", "transfer-texture", "frames", "indirect"})
+  for (const char* option : {"transfer-texture", "frames", "indirect"})
     if (is_given(request, json_name(option)))
       return Error{std::string("--") + option, "is not shown live: `lambent render` draws it", true};
   if (auto ok = check_draw(request, baked); !ok) return ok.error();
@@ -345,6 +358,7 @@ Result<LivePicture> LivePicture::make(const Baked& baked, const DrawRequest& req
   if (auto ok = state->make_environment_due(); !ok) return ok.error();
   if (auto ok = state->make_materials(); !ok) return ok.error();
   if (auto ok = state->make_pose(); !ok) return ok.error();
+  if (auto ok = state->make_objects(); !ok) return ok.error();
   state->due.environment = state->due.materials = state->due.pose = false;
   return LivePicture(std::move(state));
 }
@@ -356,21 +370,31 @@ Result<void> LivePicture::ask(const DrawRequest& request) {
   const DrawRequest before = s.asked;
   const bool sky = !is_same(before, request, {"env", "light-order", "window"}) ||
                    before.environment != request.environment;
-  const bool materials = !is_same(before, request, {"brdf", "show", "method", "brdf-samples", "tolerance"});
-  const bool pose = !is_same(before, request, {"animation", "time", "deform"});
+  const bool materials = !is_same(before, request, {"brdf", "show", "method", "brdf-samples", "tolerance", "insert"});
+  const bool places = !is_same(before, request, {"place", "move"});
+  const bool time = before.time != request.time;
+  const bool objects = places || !is_same(before, request, {"insert"}) || (time && !request.move.empty());
+  const bool left_alone = s.has_objects() && request.place.empty() && request.insert.empty();
+  const bool pose = left_alone || !is_same(before, request, {"animation", "deform"}) ||
+                    (time && !request.animation.empty());
   s.asked = request;
   auto made = [&]() -> Result<void> {
     if (sky)
       if (auto ok = s.make_environment_due(); !ok) return ok;
     if (materials)
       if (auto ok = s.make_materials(); !ok) return ok;
+    if (places)
+      if (auto ok = s.make_objects(); !ok) return ok;
+    if (left_alone) s.company.reset();  // the pose is of the scene alone
     return pose ? s.make_pose() : Result<void>();
   }();
   if (!made) {  // back to what was, which did not fail
     s.asked = before;
     if (sky) (void)s.make_environment_due();
     if (materials) (void)s.make_materials();
+    if (places) (void)s.make_objects();
     if (pose) (void)s.make_pose();
+    if (s.has_objects()) s.due.objects = s.due.values = true;
     if (materials || sky) s.due.light = true;
     return made;
   }
@@ -379,7 +403,8 @@ Result<void> LivePicture::ask(const DrawRequest& request) {
                        old.camera.fov == parsed->view.camera.fov && old.width == parsed->view.width &&
                        old.height == parsed->view.height);
   s.due.light |= sky || materials || !is_same(before, request, {"env-rotate", "lamp", "sphere-lamp"});
-  s.due.values |= pose, s.due.rays |= pose || moved;
+  s.due.values |= pose || objects, s.due.rays |= pose || moved;
+  s.due.objects |= objects;
   s.due.shades |= !is_same(before, request, {"background"}) || before.spp > request.spp;
   s.view = parsed->view, s.turn = parsed->turn;
   return {};
@@ -389,7 +414,7 @@ const DrawRequest& LivePicture::request() const { return state_->asked; }
 
 Result<void> LivePicture::look_as(Look look, int coefficient) {
   State& s = *state_;
-  const size_t columns = s.basis().count();
+  const size_t columns = s.light_basis().count();
   if (look == Look::coefficient && (s.blocks || size_t(std::max(0, coefficient)) >= columns || coefficient < 0))
     return Error{"look",
                  s.blocks ? "visibility in blocks has no coefficients"
@@ -455,6 +480,14 @@ Hit LivePicture::pick(Vec2 at) const {
   if (!s.tracer) return {};
   const CameraRays rays(s.view.camera, s.view.width, s.view.height);
   return s.tracer->closest(rays.eye, rays.direction(at.x * float(s.view.width), at.y * float(s.view.height)));
+}
+
+std::optional<size_t> LivePicture::object_of(const Hit& hit) const {
+  const std::optional<Company>& with = state_->company;
+  if (!with || hit.triangle == none) return std::nullopt;
+  const auto after = std::upper_bound(with->first.begin(), with->first.end(), size_t(hit.triangle));
+  if (after == with->first.begin()) return std::nullopt;
+  return size_t(after - with->first.begin()) - 1;
 }
 
 }  // namespace lambent

@@ -24,7 +24,7 @@ struct LiveTimes {
 class LivePicture {
  public:
   // The request is draw()'s, and says what is seen at first. The baked file must outlive this. Errors: as draw(); what
-  // cannot be shown live, by name: --insert, --transfer-texture, --frames, --indirect.
+  // cannot be shown live, by name: --transfer-texture, --frames, --indirect.
   static Result<LivePicture> make(const Baked& baked, const DrawRequest& request, const Job& job = {});
   LivePicture(LivePicture&&) noexcept;
   LivePicture& operator=(LivePicture&&) noexcept;
@@ -47,12 +47,16 @@ class LivePicture {
   // or a quarter of the view's.
   const Image& image() const;
   const View& view() const;
-  const Scene& scene() const;              // in its pose
+  // In its pose, with what is put into it (--insert, --place) where it has been drawn so; stays as it is until the
+  // work() after a request of another pose or other objects.
+  const Scene& scene() const;
   const Environment* environment() const;  // as loaded, not turned
   const LiveTimes& times() const;
 
   // What a ray through a place of the picture meets, [0, 1]^2 from the top left.
   Hit pick(Vec2 at) const;
+  // The object of --insert or --place that a triangle is of, by its number there.
+  std::optional<size_t> object_of(const Hit& hit) const;
 
  private:
   struct State;

@@ -1,6 +1,8 @@
 #include <lambent/pipeline/golden_test-inl.h>
 #include <lambent/pipeline/live.h>
 
+#include "temporary_folder.h"
+
 #include <gtest/gtest.h>
 
 #include <algorithm>
@@ -136,6 +138,8 @@ TEST(LivePicture, KeepsWhatItShowsOnErrors) {
            {[](DrawRequest& r) { r.brdf = "phong:0.5,20"; }, "--brdf"},
            {[](DrawRequest& r) { r.show = "bounce:1"; }, "--terms"},
            {[](DrawRequest& r) { r.insert = {"a.obj@0,0,0"}; }, "--insert"},
+           {[](DrawRequest& r) { r.place = {"a=a.field.glb@0,0,0"}; }, "--place"},
+           {[](DrawRequest& r) { r.transfer_texture = "a.lpt"; }, "--transfer-texture"},
            {[](DrawRequest& r) { r.animation = "0"; }, ""}}) {
     DrawRequest asked = request;
     change(asked);
@@ -145,6 +149,60 @@ TEST(LivePicture, KeepsWhatItShowsOnErrors) {
     finish(*picture);
     expect_same(picture->image(), before);
   }
+}
+
+// A request after the other on one picture: each becomes what render draws, hurried through before or not.
+void expect_each_drawn(const Baked& baked, const std::vector<DrawRequest>& requests) {
+  auto picture = LivePicture::make(baked, requests.front());
+  ASSERT_TRUE(picture) << picture.error().text();
+  Image before;
+  for (const DrawRequest& request : requests) {
+    SCOPED_TRACE(testing::Message() << "request " << &request - requests.data());
+    ASSERT_EQ(error_of(picture->ask(request)), "");
+    ASSERT_TRUE(picture->work(true, 1e-5));
+    finish(*picture);
+    expect_same(picture->image(), drawn(baked, request));
+    if (&request != requests.data()) EXPECT_NE(picture->image().rgb, before.rgb);
+    before = picture->image();
+  }
+}
+
+TEST(LivePicture, ObjectsThatMoveAreDrawnAsRenderDoes) {
+  const auto [baked, request] = open("diffuse_lattice");
+  const std::string file = golden_request("diffuse_field").baked;
+  test::TemporaryFolder folder;
+  folder.write("path.json", R"({"times": [0, 2], "places": [[0, 0.8, 0], [1, 0.8, 0.5, 0, 0, 90]]})");
+  DrawRequest one = request, two = request, turned = request, later = request;
+  one.place = {"a=" + file + "@0,0.8,0,0,0,0,0.5"};
+  two.place = {"a=" + file + "@0.5,0.9,0.2,30,0,0,0.5", "b=" + file + "@-0.5,0.6,0,0,0,0,0.4"};
+  turned = two, turned.env_rotate = "70,0,0";
+  later.place = one.place, later.move = {"a=" + folder.file("path.json")}, later.time = 1.5;
+  expect_each_drawn(baked, {one, two, turned, later, request, one});
+}
+
+TEST(LivePicture, AnInsertedObjectIsDrawnAsRenderDoesAndTakenHoldOf) {
+  const auto [baked, request] = open("diffuse_lattice");
+  test::TemporaryFolder folder;
+  folder.write("pyramid.obj", "v 0 0 0\nv 1 0 0\nv 0 0 1\nv 0.3 0.8 0.3\nf 1 2 3\nf 1 4 2\nf 2 4 3\nf 3 4 1\n");
+  DrawRequest one = request, beside = request, turned = request;
+  one.insert = {folder.file("pyramid.obj") + "@1,0.5,1,0.8"};
+  beside.insert = {folder.file("pyramid.obj") + "@0.4,0.1,0.4,0.8", one.insert.front()};
+  turned = beside, turned.env_rotate = "70,0,0";
+  expect_each_drawn(baked, {one, turned, request});
+
+  auto picture = LivePicture::make(baked, one);
+  ASSERT_TRUE(picture) << picture.error().text();
+  finish(*picture);
+  size_t on_it = 0, beside_it = 0;
+  for (int y = 0; y < 24; ++y)
+    for (int x = 0; x < 32; ++x) {
+      const Hit hit = picture->pick(Vec2((float(x) + 0.5f) / 32, (float(y) + 0.5f) / 24));
+      const std::optional<size_t> object = picture->object_of(hit);
+      EXPECT_EQ(object.has_value(), hit.triangle != none && hit.triangle >= baked.scene.triangles.size());
+      ++(object ? on_it : beside_it);
+    }
+  EXPECT_GT(on_it, 0u);
+  EXPECT_GT(beside_it, on_it);
 }
 
 TEST(LivePicture, OneCoefficientIsItsColumn) {

@@ -59,6 +59,7 @@ struct Insertion {
   std::string path;
   Vec3 foot;
   float scale = 1;
+  bool operator==(const Insertion&) const = default;
 };
 Result<Insertion> parse_insertion(const std::string& text, Vec3d origin = Vec3d(0));
 

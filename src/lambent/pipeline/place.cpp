@@ -55,6 +55,12 @@ Result<PlacedFile> parse_place(const std::string& text) {
   return out;
 }
 
+std::string place_text(const PlacedFile& o) {
+  const Vec3d &p = o.at.position, &d = o.at.degrees;
+  return fmt::format("{}={}@{:.9g},{:.9g},{:.9g},{:.9g},{:.9g},{:.9g},{:.9g}", o.name, o.path, p.x, p.y, p.z, d.x, d.y,
+                     d.z, o.scale);
+}
+
 Result<std::vector<PlaceKey>> load_path(const std::string& path) {
   auto object = load_json(path);
   if (!object) return object.error();

@@ -25,6 +25,7 @@ struct PlacedFile {
   std::vector<PlaceKey> keys = {};  // of its path; none: it stays
 };
 Result<PlacedFile> parse_place(const std::string& text);
+std::string place_text(const PlacedFile& object);  // the same text again, without its path
 
 // {"times": [...], "places": [[X, Y, Z] or [X, Y, Z, YAW, PITCH, ROLL], ...]}: seconds that rise, and as many places.
 // Errors name the file.
