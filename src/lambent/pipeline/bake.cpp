@@ -356,6 +356,7 @@ void summarize(Bake& b) {
   const double each = double(bytes) / double(std::max<size_t>(receivers, 1));
   const double rate = r.trace_seconds > 0 ? double(r.rays) / r.trace_seconds : 0.0;
   b.summary.json.update({{"receivers", r.receivers},
+                         {"traced", r.traced},
                          {"buried", r.buried},
                          {"vertices", b.scene.positions.size()},
                          {"triangles", b.scene.triangles.size()},
@@ -384,6 +385,8 @@ void summarize(Bake& b) {
                      fmt::format("{} ({} vertices, {} triangles{})", human_count(r.receivers),
                                  human_count(b.scene.positions.size()), human_count(b.scene.triangles.size()),
                                  r.buried ? "; " + human_count(r.buried) + " buried, filled from neighbours" : ""));
+  if (r.traced > 0 && r.traced < r.receivers)
+    lines.emplace_back("", human_count(r.traced) + " of them traced, which stand for the others");
   if (r.rays > 0)
     lines.emplace_back("rays", fmt::format("{} ({:.1f} million a second)", human_count(r.rays), rate / 1e6));
   lines.emplace_back("time", fmt::format("load {}, build {}, trace {}, bounce {}", human_seconds(b.load_seconds),
