@@ -5,13 +5,17 @@
 #include <lambent/core/pool.h>
 #include <lambent/core/random.h>
 
+#include <algorithm>
+#include <cmath>
+
 namespace lambent {
 namespace {
 
-constexpr int pilot_order = 4, pilot_samples = 64;
-constexpr double lost_part = 0.3;  // of the error, between those that are traced
-constexpr double worth = 0.5;      // what is looked at is traced again
-constexpr size_t piece = 16;
+constexpr int pilot_order = 4, fewest_samples = 64;
+constexpr double least_error = 0.01;  // below it, looking costs what it saves
+constexpr double lost_part = 0.3;     // of the error, between those that are traced
+constexpr double pilot_worth = 0.5;   // what is looked at is traced again
+constexpr size_t pilot_piece = 16;
 
 }  // namespace
 
@@ -19,11 +23,13 @@ Result<StandIns> choose_stand_ins(const Scene& scene, const Tracer& tracer, cons
                                   const BakeOptions& options, Progress* progress) {
   StandIns out;
   const size_t n = receivers.count();
-  if (options.thin == 0 || n < 2 * options.thin || !options.lobes.empty() || !(options.error > 0)) {
+  if (options.thin == 0 || n < 2 * options.thin || !options.lobes.empty() || !(options.error >= least_error)) {
     out.thinned = keep_all(n);
     return out;
   }
   const int order = std::min(options.order, pilot_order);
+  // The pilot's noise, which falls as rays^-0.75, has to be told from what is lost.
+  const int pilot_samples = int(fewest_samples * std::clamp(std::pow(0.025 / options.error, 1.33), 1.0, 4.0));
   const size_t coefficients = size_t(sh_count(order)), width = pad_lanes(coefficients);
   const PilotRows pilot = [&](std::span<const uint32_t> which, uint32_t pass, float* rows,
                               uint8_t* inside) -> Result<void> {
@@ -31,7 +37,7 @@ Result<StandIns> choose_stand_ins(const Scene& scene, const Tracer& tracer, cons
                                                 uint32_t(hash64(options.seed, 0x57a + pass)),
                                                 square_to_cosine_hemisphere, progress);
     Pool<GatherScratch, DeleteScratch> scratch([&] { return make_gather_scratch(setup); });
-    const Shares shares(which.size(), piece);
+    const Shares shares(which.size(), pilot_piece);
     ProgressStage stage(progress, "looking where light changes", shares.own());
     shares.for_own([&](size_t begin, size_t end) {
       std::vector<float> sky(setup.sky_width());
@@ -49,7 +55,7 @@ Result<StandIns> choose_stand_ins(const Scene& scene, const Tracer& tracer, cons
     return {};
   };
   auto thinned = thin(scene, receivers, width, pilot,
-                      {.error = lost_part * options.error, .fewest = options.thin, .worth = worth});
+                      {.error = lost_part * options.error, .fewest = options.thin, .worth = pilot_worth});
   if (!thinned) return thinned.error();
   out.rays = thinned->tried * size_t(pilot_samples);
   out.thinned = std::move(*thinned);

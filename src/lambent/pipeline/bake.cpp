@@ -356,7 +356,6 @@ void summarize(Bake& b) {
   const double each = double(bytes) / double(std::max<size_t>(receivers, 1));
   const double rate = r.trace_seconds > 0 ? double(r.rays) / r.trace_seconds : 0.0;
   b.summary.json.update({{"receivers", r.receivers},
-                         {"traced", r.traced},
                          {"buried", r.buried},
                          {"vertices", b.scene.positions.size()},
                          {"triangles", b.scene.triangles.size()},
@@ -378,6 +377,7 @@ void summarize(Bake& b) {
                          {"operator_kept", r.operator_kept},
                          {"working_memory", r.working_memory},
                          {"error", r.error >= 0 ? nlohmann::json(r.error) : nlohmann::json()}});
+  if (r.traced > 0) b.summary.json["traced"] = r.traced;
   if (b.view) b.summary.json["pixels"] = receivers;
   if (!b.terms.empty()) b.summary.json["terms"] = b.terms.size();
   std::vector<std::pair<std::string, std::string>> lines;
