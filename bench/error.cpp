@@ -16,6 +16,8 @@
 namespace lambent::bench {
 namespace {
 
+constexpr size_t fewest_traced = 6'000;  // as the pipeline has it
+
 double processor_seconds() { return double(std::clock()) / CLOCKS_PER_SEC; }
 
 struct Timed {
@@ -40,13 +42,14 @@ void compare(const std::string& name, const Scene& scene) {
   auto split = adapt(adapted, {.error = 0.8 * target});
   const double splitting = processor_seconds() - start;
   BakeOptions options;
-  options.error = target;
+  options.error = target, options.thin = fewest_traced;
   const Timed now = timed(adapted, options);
   report("error " + name, now.seconds + splitting, old.seconds, "processor seconds", "1,024 rays a receiver, as before",
          {{"error", now.report.error},
           {"error_before", target},
           {"uncertain", now.report.certificate.uncertain},
           {"receivers", now.report.receivers},
+          {"traced", now.report.traced},
           {"receivers_before", old.report.receivers},
           {"samples", now.report.samples},
           {"rays", now.report.rays + (split ? split->rays : 0)},
@@ -79,9 +82,31 @@ void denoised(const std::string& name, const Scene& scene) {
            error(rows(samples, 5, false)), "relative RMS at receivers", "not denoised", {{"truth", "16,384 rays"}});
 }
 
+// The same surface with ever more vertices, to one error: what they cost beyond what light asks for.
+void growth() {
+  double first = 0;
+  for (const int levels : {6, 8, 9}) {
+    Scene scene;
+    const uint32_t grey = add_material(scene, "grey", Vec3(0.6f));
+    add_quad(scene, grey, "floor", Vec3(-2, 0, -2), Vec3(0, 0, 4), Vec3(4, 0, 0), 128, 128);
+    add_sphere(scene, grey, "ball", Vec3(0, 0.8f, 0), 0.7f, levels);
+    BakeOptions options;
+    options.error = 0.01, options.thin = fewest_traced;
+    const Timed now = timed(scene, options);
+    if (first == 0) first = now.seconds;
+    report(fmt::format("growth, {} vertices", scene.positions.size()), now.seconds, first, "processor seconds",
+           "of the first",
+           {{"error", now.report.error},
+            {"uncertain", now.report.certificate.uncertain},
+            {"traced", now.report.traced},
+            {"rays", now.report.rays}});
+  }
+}
+
 }  // namespace
 
 void bench_error() {
+  growth();
   for (const char* name : {"room.glb", "cornell_box_rounded.glb", "zdm2_level.glb"})
     if (auto scene = data_scene(name, false)) compare(name, *scene);
   for (const char* name : {"bunny.obj", "armadillo.obj"})

@@ -7,6 +7,7 @@
 #include <lambent/bake/lobes.h>
 #include <lambent/bake/operator.h>
 #include <lambent/bake/solve.h>
+#include <lambent/bake/stand_in.h>
 #include <lambent/core/checkpoint.h>
 #include <lambent/core/parallel.h>
 #include <lambent/core/pool.h>
@@ -50,7 +51,9 @@ size_t table_bytes(size_t receivers, size_t triangles, size_t coefficients, size
 
 struct Baker {
   const Scene& scene;
-  const Receivers& receivers;
+  const Receivers& all;
+  const StandIns& stand_ins;
+  const Receivers& receivers;  // that are traced
   const BakeOptions& options;
   const GatherSetup setup;
   Progress* progress;
@@ -109,6 +112,19 @@ struct Baker {
   }
   Transfer store(const float* x) const {
     return store_columns(options.light(), x, 1, channels(), n(), width(), options.precision);
+  }
+  // A stored row as one of X.
+  void load_row(const Transfer& stored, size_t r, float* x) const {
+    const std::vector<float> values = load_receiver(stored, r);
+    const size_t C = coefficients(), n = size_t(channels());
+    for (size_t k = 0; k < C; ++k)
+      for (size_t c = 0; c < n; ++c) x[k * n + c] = values[c * C + k];
+    std::fill(x + C * n, x + width(), 0.0f);
+  }
+  // Of all receivers. `guide`: the solution.
+  Transfer store_all(const float* x, const float* guide, const std::vector<uint8_t>& buried) const {
+    return stand_ins.thinned.all() ? store(x)
+                                   : spread_transfer(all, stand_ins, buried, guide, x, width(), channels(), options);
   }
 
   Result<Transfer> direct() {
@@ -178,7 +194,7 @@ struct Baker {
       auto ok = bounce_terms(*B, source, width(), options.bounces, progress, [&](int, auto& x) -> Result<void> {
         shares.gather(x.data(), width());
         if (options.denoise) terms.push_back(x);
-        else report.terms.push_back(store(x.data()));
+        else report.terms.push_back(store_all(x.data(), solution->x.data(), B->buried()));
         return {};
       });
       if (!ok) return ok.error();
@@ -218,14 +234,18 @@ struct Baker {
     };
     if (measures)
       if (auto ok = measure_noise(solved.x, buried, terms, gather); !ok) return ok.error();
+    Transfer result = store_all(solved.x.data(), solved.x.data(), buried);
+    for (AlignedVector<float>& term : terms)
+      report.terms.push_back(store_all(term.data(), solved.x.data(), buried)), term = {};
     if (options.certify) {
       const auto start = std::chrono::steady_clock::now();
       const FieldRow field = [&](uint32_t r, float* row) {
-        std::copy_n(solved.x.data() + size_t(r) * width(), width(), row);
+        if (stand_ins.thinned.all()) std::copy_n(solved.x.data() + size_t(r) * width(), width(), row);
+        else load_row(result, r, row);
       };
       const ReflectedErrors reflected{*other, solved.met.empty() ? 0 : options.bounces};
       auto certificate =
-          certify_field(scene, receivers, field, width(), gather, certified_places, seed, progress, &reflected);
+          certify_field(scene, all, field, width(), gather, certified_places, seed, progress, &reflected);
       if (!certificate) return certificate.error();
       report.certificate = std::move(*certificate), report.error = report.certificate.error;
       // As much less by denoising as at the receivers, but no less than a mean of neighbours can have.
@@ -235,8 +255,6 @@ struct Baker {
       report.noise = std::min(report.noise, report.error);
       report.certify_seconds = seconds_since(start);
     }
-    Transfer result = store(solved.x.data());
-    for (AlignedVector<float>& term : terms) report.terms.push_back(store(term.data())), term = {};
     return result;
   }
 
@@ -352,9 +370,13 @@ size_t least_memory(size_t receivers, bool coloured, const BakeOptions& options)
 
 namespace {
 
-Result<Transfer> bake_with_samples(const Scene& scene, const Tracer& tracer, const Receivers& receivers,
-                                   const BakeOptions& options, BakeReport& r, Progress* progress) {
+Result<Transfer> bake_with_samples(const Scene& scene, const Tracer& tracer, const Receivers& all,
+                                   const StandIns& stand_ins, const BakeOptions& options, BakeReport& r,
+                                   Progress* progress) {
+  const Receivers& receivers = stand_ins.thinned.all() ? all : stand_ins.own;
   Baker baker{scene,
+              all,
+              stand_ins,
               receivers,
               options,
               make_gather_setup(scene, tracer, receivers, options.order, options.shadows ? options.samples : 1,
@@ -368,7 +390,7 @@ Result<Transfer> bake_with_samples(const Scene& scene, const Tracer& tracer, con
   auto result = !options.shadows ? baker.unshadowed() : options.bounces > 0 ? baker.bounced() : baker.direct();
   if (!result) return result;
   if (options.keep_terms && r.terms.empty()) r.terms = {*result};
-  r.receivers = receivers.count(), r.bytes = result->bytes(), r.samples = options.samples;
+  r.receivers = all.count(), r.traced = receivers.count(), r.bytes = result->bytes(), r.samples = options.samples;
   return result;
 }
 
@@ -380,12 +402,14 @@ Result<Transfer> bake_to_error(const Scene& scene, const Tracer& tracer, const R
   const auto start = std::chrono::steady_clock::now();
   BakeOptions options = asked;
   options.certify = true, options.samples = first;
-  size_t rays = 0;
-  double traced = 0, bounced = 0;
+  auto stand_ins = choose_stand_ins(scene, tracer, receivers, options, progress);
+  if (!stand_ins) return stand_ins.error();
+  size_t rays = stand_ins->rays;
+  double traced = seconds_since(start), bounced = 0;
   for (;;) {
     const auto round = std::chrono::steady_clock::now();
     r = {};
-    auto transfer = bake_with_samples(scene, tracer, receivers, options, r, progress);
+    auto transfer = bake_with_samples(scene, tracer, receivers, *stand_ins, options, r, progress);
     if (!transfer) return transfer;
     rays += r.rays, traced += r.trace_seconds, bounced += r.bounce_seconds;
     r.rays = rays, r.trace_seconds = traced, r.bounce_seconds = bounced;
@@ -412,8 +436,9 @@ Result<Transfer> bake(const Scene& scene, const Tracer& tracer, const Receivers&
   BakeReport unwanted;
   BakeReport& r = report ? *report : unwanted;
   r = {};
-  return options.error > 0 && options.shadows ? bake_to_error(scene, tracer, receivers, options, r, progress)
-                                              : bake_with_samples(scene, tracer, receivers, options, r, progress);
+  return options.error > 0 && options.shadows
+           ? bake_to_error(scene, tracer, receivers, options, r, progress)
+           : bake_with_samples(scene, tracer, receivers, {keep_all(receivers.count()), {}}, options, r, progress);
 }
 
 }  // namespace lambent

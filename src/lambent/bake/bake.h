@@ -31,6 +31,9 @@ struct BakeOptions {
   double error = 0, seconds = -1;
   bool denoise = true;  // takes away noise that neighbours do not share (denoise.h)
   bool certify = true;  // measures the result's error (certify.h)
+  // Where > 0, of at least twice so many receivers, baked to an error, those that light does not tell apart are not
+  // traced: others stand for them (stand_in.h).
+  size_t thin = 0;
 
   LightBasis light() const { return {order, lobe_kind, lobes, {}}; }
 };
@@ -41,6 +44,7 @@ Result<void> check_light_basis(const BakeOptions& options, int least_order);
 // What it says of itself.
 struct BakeReport {
   size_t receivers = 0, buried = 0;  // buried: inside something, filled from their neighbours
+  size_t traced = 0;                 // of the receivers; others stand for the rest (BakeOptions::thin)
   size_t rays = 0;                   // traced in all
   int samples = 0;                   // rays a receiver of the result
   size_t bytes = 0;                  // of the transfer

@@ -50,14 +50,18 @@ size_t find_neighbours(const PointTree& tree, const Receivers& r, std::span<cons
   return count;
 }
 
-void regress(const Receivers& r, size_t i, const uint32_t* of, size_t count, float* share) {
-  constexpr size_t most_unknowns = 8;
+namespace {
+
+constexpr size_t most_unknowns = 8;
+
+// By so many of the unknowns. False: the place lies so far out of its neighbours that they would be told to shout.
+bool regress_by(size_t unknowns, const Receivers& r, size_t i, const uint32_t* of, size_t count, float* share) {
+  constexpr double most_said = 2;  // sum of what they say, either way
   const Vec3 centre = r.origins[i], n = r.normals[i];
   const Mat3 frame = frame_about(n);
   float reach = 0;
   for (size_t q = 0; q < count; ++q) reach = std::max(reach, length(r.origins[of[q]] - centre));
   reach = std::max(1.1f * reach, 1e-30f);
-  const size_t unknowns = count >= 12 ? 8 : count >= fewest_neighbours ? 3 : 1;
   double feature[Spread::most][most_unknowns], weight[Spread::most], A[most_unknowns][most_unknowns + 1] = {};
   for (size_t q = 0; q < count; ++q) {
     const Vec3 d = (r.origins[of[q]] - centre) / reach, tilt = r.normals[of[q]];
@@ -88,7 +92,20 @@ void regress(const Receivers& r, size_t i, const uint32_t* of, size_t count, flo
     for (size_t p = 0; p < unknowns; ++p) shares[q] += A[p][most_unknowns] / A[p][p] * feature[q][p];
     shares[q] *= weight[q], sum += shares[q];
   }
-  for (size_t q = 0; q < count; ++q) share[q] = float(shares[q] / sum);  // constants stay what they are
+  double said = 0;
+  for (size_t q = 0; q < count; ++q) {
+    share[q] = float(shares[q] / sum);  // constants stay what they are
+    said += std::abs(shares[q] / sum);
+  }
+  return said <= most_said;
+}
+
+}  // namespace
+
+void regress(const Receivers& r, size_t i, const uint32_t* of, size_t count, float* share) {
+  if (count >= 12 && regress_by(8, r, i, of, count, share)) return;
+  if (count >= fewest_neighbours && regress_by(3, r, i, of, count, share)) return;
+  regress_by(1, r, i, of, count, share);
 }
 
 Thinned keep_all(size_t receivers) {

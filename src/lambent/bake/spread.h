@@ -29,7 +29,8 @@ size_t find_neighbours(const PointTree& tree, const Receivers& r, std::span<cons
                        size_t skip, size_t most, uint32_t* out);
 
 // Shares of neighbours in the value at a receiver: weighted least squares of 1, x, y over the tangent plane, the
-// normal's two tilts, and, where there are enough, x^2, xy, y^2; its value at the receiver. `of`: receivers.
+// normal's two tilts, and, where there are enough, x^2, xy, y^2; its value at the receiver. Fewer of these where the
+// receiver lies so far out that the shares would be large. `of`: receivers.
 void regress(const Receivers& r, size_t i, const uint32_t* of, size_t count, float* share);
 
 }  // namespace lambent

@@ -352,7 +352,7 @@ Result<Thinned> thin(const Scene& scene, const Receivers& receivers, size_t widt
   double scale = 1, lost = 0, square = 0, noise = 0;
   int corrections = 0;
   for (int level = 0; level < most_levels; ++level) {
-    if (double(t.chosen.size()) > options.worth * double(n)) return keep_all(n);
+    if (double(t.chosen.size()) > options.worth * double(n)) break;
     if (auto ok = t.look_at_new(); !ok) return ok.error();
     t.compare();
     square = std::max(options.square, t.square(noise));

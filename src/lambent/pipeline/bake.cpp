@@ -377,6 +377,7 @@ void summarize(Bake& b) {
                          {"operator_kept", r.operator_kept},
                          {"working_memory", r.working_memory},
                          {"error", r.error >= 0 ? nlohmann::json(r.error) : nlohmann::json()}});
+  if (r.traced > 0) b.summary.json["traced"] = r.traced;
   if (b.view) b.summary.json["pixels"] = receivers;
   if (!b.terms.empty()) b.summary.json["terms"] = b.terms.size();
   std::vector<std::pair<std::string, std::string>> lines;
@@ -384,6 +385,8 @@ void summarize(Bake& b) {
                      fmt::format("{} ({} vertices, {} triangles{})", human_count(r.receivers),
                                  human_count(b.scene.positions.size()), human_count(b.scene.triangles.size()),
                                  r.buried ? "; " + human_count(r.buried) + " buried, filled from neighbours" : ""));
+  if (r.traced > 0 && r.traced < r.receivers)
+    lines.emplace_back("", human_count(r.traced) + " of them traced, which stand for the others");
   if (r.rays > 0)
     lines.emplace_back("rays", fmt::format("{} ({:.1f} million a second)", human_count(r.rays), rate / 1e6));
   lines.emplace_back("time", fmt::format("load {}, build {}, trace {}, bounce {}", human_seconds(b.load_seconds),

@@ -116,6 +116,8 @@ Result<double> parse_error(const std::string& text) {
   return Error{"--error", "must lie between 0.01% and 100%, not \"" + text + "\"", true};
 }
 
+constexpr size_t fewest_traced = 6'000;
+
 struct Quality {
   double error;
   float shortest;         // edges, as parts of the diagonal
@@ -142,6 +144,10 @@ Result<void> plan_error(const BakeRequest& r, BakePlan& plan) {
   plan.adapts = plan.kind == BakeKind::diffuse && r.receivers == "vertices" && r.shadows == "on" &&
                 r.subsurface.empty() && r.rooms.empty() &&
                 (r.adapt == "on" || (r.adapt == "auto" && r.samples == 0 && r.max_edge == 0));
+  // A mesh that the request makes as fine as it wants may be finer than light is.
+  if (plan.kind == BakeKind::diffuse && r.receivers == "vertices" && r.subsurface.empty() && r.rooms.empty() &&
+      r.adapt != "off")
+    plan.bake.thin = fewest_traced;
   plan.adapt.error = 0.8 * error, plan.adapt.shortest = q.shortest, plan.adapt.seed = r.seed;
   plan.most_texels = q.texels;
   plan.adapt.more = q.triangles_more, plan.adapt.triangles = q.triangles;

@@ -71,8 +71,8 @@ const Option<R> table[] = {
      "Seconds after which no more rays are asked for, whatever the error; the result then depends on the machine", 0,
      1e6},
     {"adapt", &R::adapt, "How well", D,
-     "Split edges where light changes: auto does it for scenes without bones, where neither --samples nor --max-edge "
-     "is given",
+     "Receivers where light changes: split edges, and, in a bake to an error, trace no receivers that others can stand "
+     "for; auto splits scenes without bones, where neither --samples nor --max-edge is given",
      0, 0, "auto|on|off", "receivers=vertices"},
     {"denoise", &R::denoise, "How well", D | Z | F | L, "Take away noise that neighbours on a surface do not share", 0,
      0, "on|off"},
