@@ -116,7 +116,7 @@ describe.skipIf(!haveTool || !haveBrowser)('visibility in blocks', () => {
     const page = await open(browser, server.address, `camera=${camera}`, 640, 480);
     await page.setInputFiles('#file', at('broken.glb'));
     await page.waitForSelector('#problem:not([hidden])');
-    expect(await page.textContent('#problem-text')).toMatch(/^broken\.glb: the visibility of receiver 0 is broken/);
+    expect(await page.textContent('#problem-text')).toMatch(/^broken\.glb holds broken visibility, at receiver 0/);
     await page.close();
   });
 });

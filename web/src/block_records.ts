@@ -27,7 +27,7 @@ export function checkRecords(records: Uint8Array, begins: Float64Array, blocks: 
     top = 2 ** bits - 1,
     flags = Math.ceil(blocks / 4);
   for (let r = 0; r + 1 < begins.length; ++r)
-    if (!isRecord(begins[r]!, begins[r + 1]!)) throw new LambentError(`the visibility of receiver ${r} is broken`);
+    if (!isRecord(begins[r]!, begins[r + 1]!)) throw new LambentError(`holds broken visibility, at receiver ${r}`);
 
   function isRecord(begin: number, end: number): boolean {
     let at = begin + flags;

@@ -3,7 +3,7 @@
 import { cardinalFunctions } from './block_light.js';
 
 export const receiverColumns = 1024; // of the texture of receivers, two texels each
-export const byteColumns = 2048;
+export const wordColumns = 2048; // of the texture of records, four bytes a word
 export const pictureColumns = 2048;
 
 /** What both pictures read. */
@@ -16,8 +16,8 @@ uniform highp sampler2D prtBlockSums;
 out vec4 radiance;
 
 uint prtByte( const in uint at ) {
-  return texelFetch( prtSight, ivec3( int( at & ${byteColumns - 1}u ), int( ( at >> 11 ) & 2047u ), int( at >> 22 ) ),
-                     0 ).r;
+  ivec3 word = ivec3( int( ( at >> 2 ) & ${wordColumns - 1}u ), int( ( at >> 13 ) & 2047u ), int( at >> 24 ) );
+  return ( texelFetch( prtSight, word, 0 ).r >> ( 8u * ( at & 3u ) ) ) & 255u;
 }
 // Irradiance of what three texels of sums hold.
 vec3 prtMeet( highp sampler2D from, const in int x, const in int block, const in vec3 n ) {

@@ -1,5 +1,5 @@
 // Visibility in blocks (docs/blocks.md; docs/file-format.md, kind "blocks"): sharp shadows of light that turns, of
-// materials that change. Records lie as they are in a texture of bytes. What a surface scatters evenly is drawn into a
+// materials that change. Records lie as they are in a texture. What a surface scatters evenly is drawn into a
 // picture, a texel a receiver, when the light changes; what its lobe reflects into another one, when the light, the eye
 // or the material does. Meshes look both up.
 //
@@ -14,7 +14,7 @@ import {
   NearestFilter,
   RedIntegerFormat,
   RGBAFormat,
-  UnsignedByteType,
+  UnsignedIntType,
   Vector3,
   type IUniform,
   type Material,
@@ -24,7 +24,7 @@ import {
 } from 'three';
 import { BlockLight, widestBlock } from './block_light.js';
 import { blockTolerance, diffuseOf, lobeOf, samplesOf, type Reflection } from './block_reflection.js';
-import { byteColumns, diffuseShader, glossShader, pictureColumns, receiverColumns } from './block_shader.js';
+import { wordColumns, diffuseShader, glossShader, pictureColumns, receiverColumns } from './block_shader.js';
 import { checkRecords, recordBegins } from './block_records.js';
 import { blockSide, cubeBlocks, maxCube } from './cube.js';
 import { LambentError } from './errors.js';
@@ -33,13 +33,20 @@ import { noReceiver } from './header.js';
 import type { BakedTransfer, TransferKind, TransferSource } from './kinds.js';
 import type { Lighting } from './lighting.js';
 import { DrawnPicture } from './light_sum.js';
-import { checkNodes, isNodeRenderer, onlyGlsl, setNodes, type Renderer } from './node_edition.js';
+import {
+  checkNodes,
+  glassRefusal,
+  isNodeRenderer,
+  setNodes,
+  withoutNodes,
+  type NodeBlocks,
+  type NodeEdition,
+  type Renderer,
+} from './node_edition.js';
 import { glossFragmentDeclarations, glossVaryings } from './outgoing.js';
-import { chainHooks, diffuseParameters, replaceOnce, useExitRadiance } from './prt_material.js';
+import { chainHooks, copyNodes, diffuseParameters, replaceOnce, useExitRadiance } from './prt_material.js';
 import { drawFilter, type Drawn } from './see_through.js';
 import { bindPart } from './vertex_transfer.js';
-
-const refusal = onlyGlsl('visibility in blocks');
 
 /** What all meshes of one file share. */
 interface Shared {
@@ -87,7 +94,6 @@ class BlocksMaterial extends MeshBasicMaterial {
   ) {
     super(parameters);
     this.defines = twoSided ? { PRT_TWO_SIDED: '' } : {};
-    setNodes(this, undefined, `The baked scene ${refusal}.`);
     chainHooks(
       this,
       (shader) => this.patch(shader),
@@ -96,7 +102,9 @@ class BlocksMaterial extends MeshBasicMaterial {
   }
 
   override clone(): this {
-    return new BlocksMaterial(this.shared, this.twoSided).copy(this) as this;
+    const made = new BlocksMaterial(this.shared, this.twoSided).copy(this);
+    copyNodes(this, made);
+    return made as this;
   }
 
   override onBeforeRender(...drawn: Drawn): void {
@@ -181,15 +189,20 @@ class BlocksTransfer implements BakedTransfer {
   private readonly materials = new Map<string, BlocksMaterial>();
   private readonly vertexBytes: number;
 
+  private readonly nodes: NodeBlocks | undefined; // for WebGPURenderer
+  /** Why WebGPURenderer does not draw this. */
+  private refusal: string | undefined;
+
   constructor(
     { cube, bits, receivers }: Header,
     records: Uint8Array,
     begins: Float64Array,
     readonly meshes: Mesh[],
+    nodes?: NodeEdition,
   ) {
     this.receivers = receivers;
     this.fileBytes = records.byteLength;
-    this.sight = byteTexture(records);
+    this.sight = recordTexture(records);
     this.places = placeReceivers(meshes, receivers, begins);
     this.light = new BlockLight(cube);
     this.widest = widestBlock(cube);
@@ -222,6 +235,9 @@ class BlocksTransfer implements BakedTransfer {
     );
     const reflection: Shared['reflection'] = { value: { model: 'diffuse' } };
     this.shared = { diffuse, gloss: this.gloss, light: this.light, reflection, eye, share: { value: 1 } };
+    const { sight, places, light } = this;
+    this.nodes = nodes?.blocks({ sight, places, light, cube, bits, receivers });
+    this.refusal = nodes ? undefined : withoutNodes;
     let vertexBytes = 0;
     for (const mesh of meshes) {
       const twoSided = mesh.geometry.hasAttribute('lambentReceiverBack'),
@@ -230,6 +246,12 @@ class BlocksTransfer implements BakedTransfer {
       vertexBytes += mesh.geometry.getAttribute('position').count * (twoSided ? 8 : 4);
       const material = this.materials.get(key) ?? new BlocksMaterial(this.shared, twoSided, diffuseParameters(source));
       this.materials.set(key, material);
+      this.refusal ??= glassRefusal(material);
+      setNodes(
+        material,
+        this.refusal === undefined ? this.nodes!.atVertices(twoSided) : undefined,
+        `The baked scene ${this.refusal}.`,
+      );
       mesh.material = material;
     }
     this.vertexBytes = vertexBytes;
@@ -244,6 +266,7 @@ class BlocksTransfer implements BakedTransfer {
       light.bytes +
       shared.diffuse.bytes +
       (this.reflection.model === 'diffuse' ? 0 : gloss.bytes) +
+      (this.nodes?.bytes ?? 0) +
       this.vertexBytes
     );
   }
@@ -255,23 +278,28 @@ class BlocksTransfer implements BakedTransfer {
     const { shared, lobe, gloss } = this;
     shared.reflection.value = value;
     shared.share.value = diffuseOf(value);
-    if (value.model === 'diffuse') return;
+    if (value.model === 'diffuse') {
+      this.nodes?.setLobe(0, 1, lobe);
+      return;
+    }
     this.light.gloss();
     const { colour, width } = lobeOf(value),
       { one, nodes, all } = samplesOf(value, this.widest);
     lobe.colour.value = colour;
     lobe.width.value = width;
     lobe.samples.value.set(one, nodes, all);
-    gloss.define({ PRT_MODEL: value.model === 'phong' ? 1 : 2 });
+    const model = value.model === 'phong' ? 1 : 2;
+    gloss.define({ PRT_MODEL: model });
     gloss.refresh();
+    this.nodes?.setLobe(model, shared.share.value, lobe);
   }
 
   check(renderer: Renderer): void {
-    if (isNodeRenderer(renderer)) return checkNodes(renderer, refusal);
+    if (isNodeRenderer(renderer)) return checkNodes(renderer, this.refusal);
     this.shared.diffuse.check(renderer);
     const { maxTextureSize, maxVertexTextures } = renderer.capabilities,
       { width, height } = this.light.sums.value.image,
-      most = Math.max(width, height, byteColumns, this.places.image.height);
+      most = Math.max(width, height, wordColumns, this.places.image.height);
     if (maxTextureSize < most)
       throw new LambentError(`takes textures of ${most} texels a side; this graphics card has ${maxTextureSize}`);
     const wanted = Math.max(
@@ -290,9 +318,11 @@ class BlocksTransfer implements BakedTransfer {
     this.light.set(lighting.onCube(this.light.size));
     this.shared.diffuse.refresh();
     this.gloss.refresh();
+    this.nodes?.refresh();
   }
 
   dispose(): void {
+    this.nodes?.dispose();
     this.sight.dispose();
     this.places.dispose();
     this.light.dispose();
@@ -305,19 +335,19 @@ class BlocksTransfer implements BakedTransfer {
 
 const flagBytes = (cube: number): number => Math.ceil(cubeBlocks(cube) / 4);
 
-/** Records as they are in the file. */
-function byteTexture(records: Uint8Array): DataArrayTexture {
-  const rows = Math.ceil(records.length / byteColumns),
+/** Records as they are in the file, four bytes a word. */
+function recordTexture(records: Uint8Array): DataArrayTexture {
+  const rows = Math.ceil(records.length / (4 * wordColumns)),
     height = Math.min(rows, 2048),
     layers = Math.ceil(rows / height);
   if (layers > 256)
     throw new LambentError(`holds ${records.length.toLocaleString('en')} bytes of visibility, more than textures hold`);
-  const data = new Uint8Array(byteColumns * height * layers);
-  data.set(records);
-  const made = new DataArrayTexture(data, byteColumns, height, layers);
+  const words = new Uint32Array(wordColumns * height * layers);
+  new Uint8Array(words.buffer).set(records);
+  const made = new DataArrayTexture(words, wordColumns, height, layers);
   made.name = 'lambent visibility';
   made.format = RedIntegerFormat;
-  made.type = UnsignedByteType;
+  made.type = UnsignedIntType;
   made.minFilter = made.magFilter = NearestFilter;
   made.generateMipmaps = false;
   made.needsUpdate = true;
@@ -417,7 +447,7 @@ async function load(source: TransferSource): Promise<BakedTransfer> {
     begins = recordBegins(new Uint8Array(await source.bufferView(lengths)), receivers, records.length);
   checkRecords(records, begins, cubeBlocks(cube), bits);
   const meshes = await Promise.all(source.extension.parts.map((part) => bindPart(source, part, receivers)));
-  return new BlocksTransfer({ cube, bits, receivers }, records, begins, meshes);
+  return new BlocksTransfer({ cube, bits, receivers }, records, begins, meshes, source.nodes);
 }
 
 export const blocksKind: TransferKind = { name: 'blocks', load };

@@ -166,14 +166,14 @@ describe('records of visibility', () => {
         try {
           checkRecords(broken, begins, blocks, bits);
         } catch (error) {
-          expect(String(error)).toMatch(/the visibility of receiver \d+ is broken/);
+          expect(String(error)).toMatch(/holds broken visibility, at receiver \d+/);
           ++refused;
         }
       }
       expect(refused).toBeGreaterThan(20);
       const flags = records.slice();
       flags[0] = 255;
-      expect(() => checkRecords(flags, begins, blocks, bits)).toThrow(/receiver 0 is broken/);
+      expect(() => checkRecords(flags, begins, blocks, bits)).toThrow(/broken visibility, at receiver 0/);
     });
   }
 });
