@@ -319,10 +319,12 @@ class Page {
   private openFiles(files: readonly File[]): void {
     const file = files.find(({ name }) => /\.gl(b|tf)$/i.test(name)) ?? files[0];
     if (!file) return;
-    void this.attempt(file.name, async () => {
+    const isScene = /\.gl(b|tf)$/i.test(file.name);
+    // What is wrong with a scene names it already.
+    void this.attempt(isScene ? '' : file.name, async () => {
       showLoading(`Reading ${file.name}`);
       const bytes = await file.arrayBuffer();
-      if (/\.gl(b|tf)$/i.test(file.name)) {
+      if (isScene) {
         this.isServed = false;
         await this.openBaked(file.name, bytes, files);
         this.show();
