@@ -258,7 +258,7 @@ describe.skipIf(!haveTool || !haveBrowser)('the page', () => {
     [
       'a file cut off',
       (f) => (writeFileSync(join(f, 'cut.glb'), readFileSync(join(f, 'ball.glb')).subarray(0, 5000)), 'cut.glb'),
-      /cut\.glb is cut off/,
+      /^cut\.glb is cut off/,
     ],
     [
       'a scene that is not baked',
@@ -267,14 +267,14 @@ describe.skipIf(!haveTool || !haveBrowser)('the page', () => {
         plain(f),
         'plain.glb'
       ),
-      /plain\.glb is not a baked file/,
+      /^plain\.glb is not a baked file/,
     ],
     [
       'a picture for an environment',
       (f) => (writeFileSync(join(f, 'picture.hdr'), 'GIF89a nothing'), 'picture.hdr'),
-      /picture\.hdr is no environment/,
+      /^picture\.hdr is no environment/,
     ],
-    ['an empty file', (f) => (writeFileSync(join(f, 'empty.glb'), ''), 'empty.glb'), /empty\.glb is empty/],
+    ['an empty file', (f) => (writeFileSync(join(f, 'empty.glb'), ''), 'empty.glb'), /^empty\.glb is empty/],
   ];
   /** ball.glb with its extension under a name that nobody knows. */
   function plain(f: string): void {

@@ -30,6 +30,7 @@ describe.skipIf(!haveTool || !haveBrowser)('on WebGPURenderer', () => {
     lambent('compress', at('vertices.glb'), '--zonal', '2', '-o', at('lobes.glb'));
     const glossy = ['--transfer', 'matrix', '--order', '3', '--outgoing', 'svd:2', '--samples', '16'];
     lambent('bake', scene, ...glossy, '-o', at('glossy.glb'));
+    lambent('bake', scene, '--transfer', 'blocks', '--cube', '32', '--visibility', 'bits:3', '-o', at('blocks.glb'));
     browser = await launch();
     ({ page, server } = await openFixture(browser, folder, 'webgpu.html'));
   });
@@ -83,6 +84,26 @@ describe.skipIf(!haveTool || !haveBrowser)('on WebGPURenderer', () => {
         const between = await inside(webgl, await picture(backend));
         console.log(`${name}: ${between.toFixed(1)} dB against WebGLRenderer inside outlines`);
         expect(between).toBeGreaterThan(50);
+      }
+    });
+
+  for (const brdf of ['diffuse', 'phong:diffuse=0.4,specular=0.5,exponent=50', 'ggx:roughness=0.4,f0=0.6'])
+    it(`draws visibility in blocks as WebGLRenderer does: ${brdf}`, async () => {
+      const path = '/files/blocks.glb',
+        shot = { path, light: 'sky:elevation=35,azimuth=60,sun=on', brdf, camera: camera.split(',').map(Number), size };
+      const take = (backend: Backend): Promise<{ png: string; milliseconds: number[] }> =>
+        page.evaluate(([b, s]) => window.gpu.shoot(b, s), [backend, shot] as const);
+      const truth = await take('webgl');
+      for (const backend of ['webgpu', 'fallback'] as const) {
+        const { png, milliseconds } = await take(backend),
+          db = await page.evaluate(([a, b]) => window.gpu.inside(a, b), [truth.png, png] as const);
+        writeFileSync(at(`blocks_${brdf.split(':')[0]}_${backend}.png`), Buffer.from(png.replace(/.*,/, ''), 'base64'));
+        const frames = [truth.milliseconds, milliseconds].map((all) => all.map((t) => t.toFixed(0)).join(', '));
+        console.log(
+          `blocks, ${brdf}, ${backend}: ${db.toFixed(1)} dB against WebGLRenderer inside outlines; frames of ` +
+            `${frames[1]} ms, there ${frames[0]} ms (${folder})`,
+        );
+        expect(db).toBeGreaterThan(50);
       }
     });
 

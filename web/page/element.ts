@@ -17,7 +17,7 @@ p { position: absolute; inset: auto 0 0 0; margin: 0; padding: 0.4em 0.8em; font
 p:empty { display: none; }`;
 
 /** What the address of the page may hold, an element has as attributes. */
-const ofState = ['camera', 'rotate', 'exposure', 'tone', 'spin', 'background', 'order', 'window'] as const;
+const ofState = ['camera', 'rotate', 'exposure', 'tone', 'spin', 'background', 'order', 'window', 'brdf'] as const;
 
 export class LambentViewer extends HTMLElement {
   static readonly observedAttributes = ['src', 'env', 'alt', ...ofState];
@@ -102,6 +102,8 @@ export class LambentViewer extends HTMLElement {
       });
       if (light) viewer.setEnvironment(light);
       if (scene) viewer.setModel('baked', scene);
+      const transfer = viewer.bakedScene?.transfer;
+      if (transfer?.reflection) transfer.reflection = state.brdf ?? { model: 'diffuse' };
       const [yaw, pitch, roll] = state.rotate.map((d) => MathUtils.degToRad(d)) as [number, number, number];
       viewer.orbit.light.setFromEuler(new Euler(pitch, yaw, roll, 'YXZ'));
       if (state.camera) {

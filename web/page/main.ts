@@ -19,6 +19,7 @@ import { connectLobes, connectWipe } from './hands.js';
 import { connectSharing } from './sharing.js';
 import { highestSun, lowestSun, parseSky, type Sky } from './sky.js';
 import { defaultState, formatState, parseState, type State, type View } from './state.js';
+import { showSurface } from './surface.js';
 import { showFrameTime, showStatistics } from './statistics.js';
 import { tones, type Tone } from './tone.js';
 import { falseColorEnd, falseColorGain, fitErrorEnd, Viewer } from './viewer.js';
@@ -93,8 +94,10 @@ class Page {
   /** All of the state to controls and viewer. */
   private show(): void {
     const { state, viewer } = this;
-    const possible: View[] = ['baked', 'unshadowed', 'coefficient'];
-    if (viewer.bakedScene?.transfer.fitErrorMaterials) possible.push('error');
+    const possible: View[] = ['baked', 'unshadowed'],
+      transfer = viewer.bakedScene?.transfer;
+    if (!transfer || transfer.coefficientMaterials) possible.push('coefficient');
+    if (transfer?.fitErrorMaterials) possible.push('error');
     if (this.manifest?.compare) possible.splice(1, 0, 'compare');
     if (this.manifest?.reference) possible.push('reference');
     if (!possible.includes(state.view)) state.view = 'baked';
@@ -106,8 +109,8 @@ class Page {
     select('view').value = state.view;
     select('against').value = state.against ?? '';
     select('window').value = state.window;
-    const all = Math.max(1, viewer.bakedScene?.transfer.order ?? 1); // none where there are lamps alone
-    state.coefficient = Math.min(state.coefficient, all * all - 1);
+    const all = Math.max(1, transfer?.order ?? 1); // none where there are lamps alone
+    if (transfer?.coefficientMaterials) state.coefficient = Math.min(state.coefficient, all * all - 1);
     input('order').max = String(all);
     input('order').value = String(state.order || all);
     input('coefficient').max = String(all * all - 1);
@@ -116,6 +119,14 @@ class Page {
     select('tone').value = state.tone;
     input('background').checked = state.background;
     input('free').checked = state.free;
+    // Sight has no bands to leave out, and surfaces that are free.
+    get('order-row').hidden = get('window-row').hidden = transfer?.reflection !== undefined;
+    if (transfer?.reflection && state.brdf) transfer.reflection = state.brdf;
+    showSurface(transfer?.reflection, (to) => {
+      state.brdf = to;
+      if (viewer.bakedScene) viewer.bakedScene.transfer.reflection = to;
+      this.apply();
+    });
     get('play').hidden = !viewer.hasAnimation;
     document.body.classList.toggle('bare', !state.ui);
     this.apply();
@@ -308,10 +319,12 @@ class Page {
   private openFiles(files: readonly File[]): void {
     const file = files.find(({ name }) => /\.gl(b|tf)$/i.test(name)) ?? files[0];
     if (!file) return;
-    void this.attempt(file.name, async () => {
+    const isScene = /\.gl(b|tf)$/i.test(file.name);
+    // What is wrong with a scene names it already.
+    void this.attempt(isScene ? '' : file.name, async () => {
       showLoading(`Reading ${file.name}`);
       const bytes = await file.arrayBuffer();
-      if (/\.gl(b|tf)$/i.test(file.name)) {
+      if (isScene) {
         this.isServed = false;
         await this.openBaked(file.name, bytes, files);
         this.show();

@@ -28,6 +28,12 @@ export class Model {
     this.own = this.meshes.map((mesh) => mesh.material as Material);
   }
 
+  /** Of what is drawn without shadows: as many as are baked. Sight has none, and diffuse surfaces ask for few. */
+  private get bands(): number {
+    const { order, reflection } = this.baked.transfer;
+    return reflection ? 6 : Math.max(1, order);
+  }
+
   get meshes(): Mesh[] {
     return this.baked.transfer.meshes;
   }
@@ -45,22 +51,25 @@ export class Model {
       if (!this.unshadowed) {
         const made = new Map<Material, UnshadowedMaterial>();
         for (const m of this.own)
-          if (!made.has(m))
-            made.set(m, new UnshadowedMaterial(Math.max(1, this.baked.transfer.order), diffuseParameters(m)));
+          if (!made.has(m)) made.set(m, new UnshadowedMaterial(this.bands, diffuseParameters(m)));
         this.unshadowed = this.own.map((m) => made.get(m)!);
         if (lighting) this.relight(lighting);
       }
       materials = this.unshadowed;
     } else if (look === 'coefficient') {
       if (this.coefficient?.index !== index) {
-        this.coefficient?.materials.forEach((m) => m.dispose());
-        this.coefficient = { index, materials: this.baked.transfer.coefficientMaterials(index, gain) };
+        this.disposeCoefficient();
+        this.coefficient = { index, materials: this.baked.transfer.coefficientMaterials?.(index, gain) ?? this.own };
       }
       materials = this.coefficient.materials;
     } else if (look === 'error') {
       materials = this.errors ??= this.baked.transfer.fitErrorMaterials?.(errorGain) ?? this.own;
     }
     this.meshes.forEach((mesh, i) => (mesh.material = materials[i]!));
+  }
+
+  private disposeCoefficient(): void {
+    if (this.coefficient?.materials !== this.own) this.coefficient?.materials.forEach((m) => m.dispose());
   }
 
   relight(lighting: Lighting): void {
@@ -70,7 +79,7 @@ export class Model {
 
   dispose(): void {
     this.unshadowed?.forEach((m) => m.dispose());
-    this.coefficient?.materials.forEach((m) => m.dispose());
+    this.disposeCoefficient();
     if (this.errors !== this.own) this.errors?.forEach((m) => m.dispose());
     this.baked.dispose();
   }

@@ -1,7 +1,8 @@
 // What is on show, as the address's fragment: a link or a reload gives the same picture.
 // Numbers are separated by commas; `camera` and `rotate` are spelt as --camera and --env-rotate of the command line.
-import { shWindows, type ShWindow } from '../src/index.js';
+import { shWindows, type Reflection, type ShWindow } from '../src/index.js';
 import { highestSun, lowestSun } from './sky.js';
+import { formatReflection, parseReflection } from './surface.js';
 import { tones, type Tone } from './tone.js';
 
 export const views = ['baked', 'compare', 'unshadowed', 'coefficient', 'error', 'reference'] as const;
@@ -23,6 +24,7 @@ export interface State {
   wipe: number; // share of the width left of the wipe
   coefficient: number;
   time?: number; // seconds into the animation, standing still
+  brdf?: Reflection; // where surfaces are free, other than diffuse
   background: boolean;
   ui: boolean;
 }
@@ -76,6 +78,8 @@ export function parseState(fragment: string, base: State): State {
   state.coefficient = Math.floor(one('coefficient', 0, 255) ?? state.coefficient);
   const time = one('time', 0, 1e6);
   if (time !== undefined) state.time = time;
+  const brdf = parseReflection(from.get('brdf') ?? '');
+  if (brdf) state.brdf = brdf;
   if (from.has('background')) state.background = from.get('background') !== 'none';
   if (from.has('ui')) state.ui = from.get('ui') !== 'off';
   return state;
@@ -104,6 +108,7 @@ export function formatState(state: State, base: State = defaultState()): string 
   }
   if (state.coefficient !== base.coefficient) put('coefficient', String(state.coefficient));
   if (state.time !== undefined) put('time', short(state.time));
+  if (state.brdf && state.brdf.model !== 'diffuse') put('brdf', formatReflection(state.brdf));
   if (!state.background) put('background', 'none');
   if (!state.ui) put('ui', 'off');
   return '#' + parts.join('&');

@@ -19,7 +19,10 @@ export function showStatistics(baked?: BakedScene): void {
 
 function rowsOf({ transfer: t, provenance }: BakedScene): [string, string][] {
   const rows: [string, string][] = [
-    ['Transfer', `${t.kind}, order ${t.order}, ${t.channels === 3 ? 'colour' : 'grey'}`],
+    [
+      'Transfer',
+      t.reflection ? 'visibility in blocks' : `${t.kind}, order ${t.order}, ${t.channels === 3 ? 'colour' : 'grey'}`,
+    ],
     ['Receivers', t.receivers.toLocaleString('en')],
     ['Vertices', t.meshes.reduce((n, m) => n + m.geometry.getAttribute('position').count, 0).toLocaleString('en')],
     ['In the file', megabytes(t.fileBytes)],

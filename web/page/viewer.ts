@@ -52,6 +52,7 @@ export const falseColorEnd = 0.25;
 /** Of errors of a fit, relative. */
 export const fitErrorEnd = 0.1;
 const pause = 250; // milliseconds without a frame
+const finePause = 250; // after the light has stood still, what is sharp is drawn from all of its texels
 const meterPause = 300; // between two measures of the exposure while the light turns
 const meterWidth = 128; // pixels
 
@@ -90,6 +91,8 @@ export class Viewer {
   private meterDue = true;
   private lastMeter = -Infinity;
   private meterSoon = 0;
+  private lastLight = -Infinity;
+  private fineSoon = 0;
   private meterTarget: WebGLRenderTarget | undefined;
   private request = 0;
   private lastFrame = 0;
@@ -286,6 +289,7 @@ export class Viewer {
   dispose(): void {
     cancelAnimationFrame(this.request);
     clearTimeout(this.meterSoon);
+    clearTimeout(this.fineSoon);
     this.request = -1; // no more are asked for
     for (const model of [this.baked, this.compare]) model?.dispose();
     this.environment?.background.dispose();
@@ -366,6 +370,13 @@ export class Viewer {
     lighting.rotation.copy(this.orbit.light);
     lighting.bands = this.bands;
     lighting.window = this.window;
+    if (this.baked?.baked.transfer.reflection) {
+      const now = performance.now();
+      lighting.quick = now - this.lastLight < finePause;
+      this.lastLight = now;
+      clearTimeout(this.fineSoon);
+      if (lighting.quick) this.fineSoon = window.setTimeout(() => this.changeLight(), finePause + 50);
+    }
     this.baked?.relight(lighting);
     this.compare?.relight(lighting);
     if (this.plain) this.lightPlain(this.environment!.background);

@@ -1,3 +1,4 @@
+import { blocksKind } from './blocks.js';
 import { diffuseKind } from './diffuse.js';
 import { registerTransferKind } from './kinds.js';
 import { matrixKind } from './matrix.js';
@@ -6,7 +7,10 @@ import { zonalKind } from './zonal.js';
 registerTransferKind(diffuseKind);
 registerTransferKind(zonalKind);
 registerTransferKind(matrixKind);
+registerTransferKind(blocksKind);
 
+export type { Reflection } from './block_reflection.js';
+export { cubeLight, type CubeLight } from './cube.js';
 export { LambentError, NoTransferError } from './errors.js';
 export { checkBakedFile, extensionName } from './glb.js';
 export {

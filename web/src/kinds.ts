@@ -1,5 +1,6 @@
 // The kinds of transfer that a file may hold. A new one is one entry here and one module.
 import type { Color, Material, Mesh } from 'three';
+import type { Reflection } from './block_reflection.js';
 import type { TransferExtension, Views } from './glb.js';
 import type { Lighting } from './lighting.js';
 import type { Lobe } from './lobes.js';
@@ -41,9 +42,11 @@ export interface BakedTransfer {
   readonly lamps?: Map<string, Color>;
   /**
    * Materials that show one coefficient of transfer in false colour, one a mesh in the order of `meshes`; `gain` is a
-   * shared uniform. Made on demand; the caller disposes of them.
+   * shared uniform. Made on demand; the caller disposes of them. Not where transfer has no coefficients.
    */
-  coefficientMaterials(index: number, gain: { value: number }): Material[];
+  readonly coefficientMaterials?: (index: number, gain: { value: number }) => Material[];
+  /** Visibility in blocks: what all surfaces are made of. Counts at the next frame. */
+  reflection?: Reflection;
   /**
    * Where the file has the errors of a fit: materials that show them in false colour, as coefficientMaterials() does.
    */
@@ -67,6 +70,7 @@ export const drawn = [
   ['dense', 'outgoing', 'vertices'],
   ['lobes', 'diffuse', 'vertices'],
   ['lobes', 'outgoing', 'vertices'],
+  ['blocks', 'sight', 'vertices'],
 ] as const;
 
 /** Of what is drawn: columns of an atlas's light; lobes of all rows of a receiver; of a matrix, texels a receiver. */

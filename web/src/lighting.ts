@@ -1,9 +1,10 @@
 // Distant light as coefficients of radiance, that can be turned without another projection.
 import { DataUtils, FloatType, HalfFloatType, LightProbe, Matrix4, Quaternion, type Texture } from 'three';
+import { cubeLight, reducedMap, type CubeLight } from './cube.js';
 import { LambentError } from './errors.js';
 import { withoutPeaks } from './peaks.js';
 import { projectLatLong, type LatLongMap } from './projection.js';
-import { luminance, maxShOrder, shBand, shCount, shIndex, shOrder } from './sh.js';
+import { evaluateSh, luminance, maxShOrder, shBand, shCount, shIndex, shOrder } from './sh.js';
 import { makeShRotation, rotateSh, type ShRotation } from './sh_rotation.js';
 import { shWindow, type ShWindow } from './sh_window.js';
 
@@ -41,6 +42,26 @@ export function latLongMap(texture: Texture): LatLongMap {
 /** With less of all light in them, peaks ring too little to be seen. */
 const leastSharp = 0.05;
 
+/** Texels around the equator of a map that is put on a cube, at most. */
+const widestOnCube = 2048;
+
+/** What coefficients are of, where there is no map: the radiance that they add up to. */
+function mapOf(radiance: ArrayLike<number>, order: number): LatLongMap {
+  const [width, height] = [128, 64],
+    data = new Float32Array(3 * width * height),
+    harmonics = new Float64Array(shCount(order));
+  for (let y = 0; y < height; ++y)
+    for (let x = 0; x < width; ++x) {
+      const theta = (Math.PI * (y + 0.5)) / height,
+        phi = 2 * Math.PI * ((x + 0.5) / width - 0.5),
+        sine = Math.sin(theta);
+      evaluateSh(order, sine * Math.cos(phi), Math.cos(theta), sine * Math.sin(phi), harmonics);
+      for (let i = 0; i < harmonics.length; ++i)
+        for (let c = 0; c < 3; ++c) data[3 * (y * width + x) + c]! += harmonics[i]! * radiance[3 * i + c]!;
+    }
+  return { data, width, height, channels: 3 };
+}
+
 /** Light as transfer takes it: [coefficient][3]. Both parts are light, and neither may be negative where it arrives. */
 export interface LightParts {
   /** All of the light; of one that has peaks, the rest of it. */
@@ -58,9 +79,13 @@ export class Lighting {
   bands: number;
   /** Multiplies radiance. */
   intensity = 1;
+  /** For light that a hand is turning: onCube() takes a map no finer than the cube, a quarter of the work and less. */
+  quick = false;
 
   readonly order: number;
   private windowFactors: { key: string; factors: number[] } | undefined;
+  private narrow: { most: number; map: LatLongMap } | undefined;
+  private cube: { key: string; light: CubeLight } | undefined;
   private readonly restOf = new Map<number, Float64Array | undefined>();
 
   /**
@@ -135,6 +160,22 @@ export class Lighting {
     return this.restOf.get(n);
   }
 
+  /**
+   * On a cube of so many texels a side, turned and scaled: for what sees light as it is, without bands or a window.
+   * Maps wider than 2048 texels are reduced to that.
+   */
+  onCube(size: number): CubeLight {
+    const most = this.quick ? 4 * size : widestOnCube,
+      key = `${size} ${most} ${this.rotation.toArray().join(' ')} ${this.intensity}`;
+    if (this.cube?.key === key) return this.cube.light;
+    if (this.narrow?.most !== most)
+      this.narrow = { most, map: reducedMap(this.map ?? mapOf(this.radiance, this.order), most) };
+    const light = cubeLight(this.narrow.map, size, this.matrix());
+    for (let i = 0; i < light.energy.length; ++i) light.energy[i]! *= this.intensity;
+    this.cube = { key, light };
+    return light;
+  }
+
   private bandsOf(order: number): number {
     return Math.max(1, Math.min(order, this.bands, this.order));
   }
@@ -161,7 +202,11 @@ export class Lighting {
   }
 
   private rotationOf(n: number): ShRotation {
+    return makeShRotation(n, this.matrix());
+  }
+  /** Row-major. */
+  private matrix(): number[] {
     const e = new Matrix4().makeRotationFromQuaternion(this.rotation).elements; // column-major
-    return makeShRotation(n, [e[0], e[4], e[8], e[1], e[5], e[9], e[2], e[6], e[10]]);
+    return [e[0], e[4], e[8], e[1], e[5], e[9], e[2], e[6], e[10]];
   }
 }

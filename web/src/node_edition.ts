@@ -1,6 +1,6 @@
 // What WebGPURenderer draws: nodes in the place of GLSL. The package's root knows only what they are asked for, so that
 // programs on WebGLRenderer do without three's node system; lambent-three/webgpu makes them.
-import type { Color, DataArrayTexture, DataTexture, Material, Texture, WebGLRenderer } from 'three';
+import type { Color, DataArrayTexture, DataTexture, Material, Texture, Vector3, WebGLRenderer } from 'three';
 import type { BlockLayout } from './block_texture.js';
 import { LambentError } from './errors.js';
 
@@ -35,10 +35,36 @@ export interface NodeSurface {
   emissive?: { texture: Texture };
 }
 
+/** Visibility in blocks: records, receivers, and the light (blocks.ts). */
+export interface NodeBlockOptions {
+  sight: DataArrayTexture;
+  places: DataTexture;
+  light: Record<'sums' | 'coarse' | 'texels', { value: DataTexture }>;
+  cube: number;
+  bits: number;
+  receivers: number;
+}
+/** Its pictures, drawn when the light, the eye or the lobe has changed. */
+export interface NodeBlocks {
+  /** The light is another. */
+  refresh(): void;
+  /** `model`: 0 none, 1 Phong, 2 GGX; `share`: of what is scattered evenly. */
+  setLobe(
+    model: number,
+    share: number,
+    lobe: { colour: { value: number }; width: { value: number }; samples: { value: Vector3 } },
+  ): void;
+  /** For `colorNode`. */
+  atVertices(twoSided: boolean): { uuid: string };
+  readonly bytes: number;
+  dispose(): void;
+}
+
 export interface NodeEdition {
   sum(options: NodeSumOptions): NodeSum;
   /** For `colorNode` of a MeshBasicMaterial: its colour times the exit radiance of its vertices' receivers. */
   atVertices(sum: NodeSum, twoSided: boolean): { uuid: string };
+  blocks(options: NodeBlockOptions): NodeBlocks;
   /** The same of places in an atlas, and what glows. */
   overAtlas(sum: NodeSum, surface: NodeSurface): { uuid: string };
 }

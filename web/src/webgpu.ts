@@ -35,6 +35,7 @@ import {
   vec3,
   vec4,
 } from 'three/tsl';
+import { BlockNodes } from './block_nodes.js';
 import type { NodeEdition, NodeSum, NodeSumOptions, NodeSurface } from './node_edition.js';
 
 const columns = 2048; // receivers a row of the picture
@@ -141,6 +142,7 @@ function lit(radiance: Node<'vec3'>, emitted?: Node<'vec3'>): Node<'vec4'> {
 
 export const nodes: NodeEdition = {
   sum: (options) => new Sum(options),
+  blocks: (options) => new BlockNodes(options),
 
   atVertices(sum: NodeSum, twoSided: boolean): Node<'vec4'> {
     const { picture, made } = sum as Sum,

@@ -13,13 +13,13 @@ namespace {
 constexpr DrawnKind kinds[] = {
     {"dense", "diffuse", "vertices"},  {"dense", "diffuse", "texels"},   {"dense", "directional", "texels"},
     {"dense", "outgoing", "vertices"}, {"lobes", "diffuse", "vertices"}, {"lobes", "outgoing", "vertices"},
+    {"blocks", "sight", "vertices"},
 };
 
 // What a kind that is not drawn is, for those who made it.
 std::string why_not(const Field& field) {
   using std::string;
   if (std::holds_alternative<FixedView>(field.where)) return "is of a fixed view, a picture without surfaces";
-  if (std::holds_alternative<Visibility>(field.store)) return "is of visibility in blocks";
   if (std::holds_alternative<IndirectTransfer>(field.store)) return "holds direct-to-indirect transport";
   if (std::holds_alternative<CpcaTransfer>(field.store)) return "holds clusters";
   if (std::holds_alternative<FactoredTransfer>(field.store)) return "holds factors";

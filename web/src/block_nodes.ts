@@ -1,0 +1,439 @@
+// What block_shader.ts has in GLSL, in nodes for WebGPURenderer: visibility in blocks times light (times a lobe), a
+// texel a receiver.
+import {
+  FloatType,
+  NearestFilter,
+  Vector3,
+  type Node,
+  type NodeFrame,
+  type Texture,
+  type TextureNode,
+} from 'three/webgpu';
+import {
+  attribute,
+  bool,
+  cross,
+  dot,
+  float,
+  Fn,
+  frontFacing,
+  If,
+  int,
+  ivec2,
+  Loop,
+  materialColor,
+  mix,
+  rtt,
+  screenCoordinate,
+  select,
+  texture,
+  textureLoad,
+  uint,
+  uniform,
+  varying,
+  vec2,
+  vec3,
+  vec4,
+} from 'three/tsl';
+import { cardinalFunctions } from './block_light.js';
+import { blockTolerance } from './block_reflection.js';
+import { pictureColumns, receiverColumns, wordColumns } from './block_shader.js';
+import { cubeBlocks } from './cube.js';
+import type { NodeBlocks, NodeBlockOptions } from './node_edition.js';
+
+type Int = Node<'int'>;
+type Uint = Node<'uint'>;
+type Vec3 = Node<'vec3'>;
+type Texels = TextureNode<'vec4'>;
+
+interface Changes {
+  count: Uint;
+  where: Uint;
+}
+
+// Loops within loops take names, which the types do not know.
+const namedLoop = Loop as unknown as (range: object, body: (index: Record<string, Int>) => void) => void;
+const loop = (count: Int, name: string, body: (i: Int) => void): void =>
+  namedLoop({ start: int(0), end: count, type: 'int', condition: '<', name }, (index) => body(index[name]!));
+
+/** Records, receivers and the light, as nodes. */
+class Reader {
+  private readonly sight: Texels;
+  private readonly places: Texels;
+  readonly sums: Texels;
+  readonly coarse: Texels;
+  readonly texels: Texels;
+
+  constructor(readonly options: NodeBlockOptions) {
+    const { sight, places, light } = options,
+      node = (of: Texture): Texels => texture(of);
+    this.sight = node(sight);
+    this.places = node(places);
+    this.sums = node(light.sums.value);
+    this.coarse = node(light.coarse.value);
+    this.texels = node(light.texels.value);
+  }
+
+  /** The light's textures are others where surfaces have begun to shine. */
+  follow(): void {
+    const { coarse, texels } = this.options.light;
+    this.coarse.value = coarse.value;
+    this.texels.value = texels.value;
+  }
+
+  byte(at: Uint): Uint {
+    const place = ivec2(
+      int(at.shiftRight(uint(2)).bitAnd(uint(wordColumns - 1))),
+      int(at.shiftRight(uint(13)).bitAnd(uint(2047))),
+    );
+    const word = uint(textureLoad(this.sight, place).depth(int(at.shiftRight(uint(24)))).r);
+    return word.shiftRight(at.bitAnd(uint(3)).mul(uint(8))).bitAnd(uint(255));
+  }
+  texel(of: Texels, x: Int, y: Int): Vec3 {
+    return (textureLoad(of, ivec2(x, y)) as unknown as Node<'vec4'>).xyz;
+  }
+  /** Irradiance of what three texels hold. */
+  meet(of: Texels, x: Int, b: Int, n: Vec3): Vec3 {
+    const channel = (c: number): Node<'float'> => dot(this.texel(of, x.add(int(c)), b), n);
+    return vec3(channel(0), channel(1), channel(2));
+  }
+  receiver(): { p: Vec3; n: Vec3; begin: Uint } {
+    const at = ivec2(screenCoordinate).toVar(),
+      number = at.y.mul(int(pictureColumns)).add(at.x).toVar(),
+      last = int(this.options.receivers - 1),
+      r = select(number.lessThan(last), number, last).toVar(),
+      place = ivec2(r.mod(int(receiverColumns)).mul(int(2)), r.div(int(receiverColumns))).toVar();
+    const load = (x: number): Node<'vec4'> =>
+      textureLoad(this.places, place.add(ivec2(x, 0))).toVar();
+    const p = load(0),
+      n = load(1);
+    return {
+      p: p.xyz,
+      n: n.xyz,
+      begin: uint(p.w)
+        .bitOr(uint(n.w).shiftLeft(uint(24)))
+        .toVar(),
+    };
+  }
+  level(c: Changes, i: Int): Node<'float'> {
+    return this.options.bits === 1
+      ? float(int(1).sub(i.bitAnd(int(1))))
+      : float(this.byte(c.where.add(c.count).add(uint(i))));
+  }
+  get scale(): number {
+    return 1 / (2 ** this.options.bits - 1);
+  }
+  /** For each block that is seen. */
+  blocks(begin: Uint, body: (b: Int, clear: Node<'bool'>, c: Changes) => void): void {
+    const { cube, bits } = this.options,
+      blocks = cubeBlocks(cube),
+      at = begin.add(uint(Math.ceil(blocks / 4))).toVar(),
+      flags = uint(0).toVar();
+    loop(int(blocks), 'b', (b) => {
+      If(b.bitAnd(int(3)).equal(int(0)), () => {
+        flags.assign(this.byte(begin.add(uint(b.shiftRight(int(2))))));
+      }).Else(() => {
+        flags.assign(flags.shiftRight(uint(2)));
+      });
+      const sight = flags.bitAnd(uint(3)).toVar();
+      If(sight.notEqual(uint(0)), () => {
+        const count = uint(0).toVar(),
+          where = uint(0).toVar();
+        If(sight.equal(uint(2)), () => {
+          count.assign(this.byte(at));
+          at.addAssign(uint(1));
+          If(count.greaterThan(uint(127)), () => {
+            count.assign(count.bitAnd(uint(127)).bitOr(this.byte(at).shiftLeft(uint(7))));
+            at.addAssign(uint(1));
+          });
+          where.assign(at);
+          at.addAssign(count.mul(uint(bits === 1 ? 1 : 2)));
+        });
+        body(b, sight.equal(uint(1)), { count, where });
+      });
+    });
+  }
+  /** Line 9: light summed over what is seen of a block. */
+  addSeen(
+    sum: ReturnType<Vec3['toVar']>,
+    factor: Node<'float'>,
+    b: Int,
+    clear: Node<'bool'>,
+    c: Changes,
+    n: Vec3,
+  ): void {
+    If(clear, () => {
+      sum.addAssign(this.meet(this.sums, int(0), b, n).mul(factor));
+    }).Else(() => {
+      const before = float(0).toVar();
+      loop(int(c.count), 'i', (i) => {
+        const after = this.level(c, i).toVar(),
+          t = int(this.byte(c.where.add(uint(i))));
+        sum.addAssign(
+          this.meet(this.sums, t.mul(int(3)), b, n).mul(after.sub(before).mul(float(this.scale)).mul(factor)),
+        );
+        before.assign(after);
+      });
+    });
+  }
+}
+
+/** Exit radiance of white by Lambert's law. */
+const evenNode = (from: Reader): (() => Node<'vec4'>) =>
+  Fn(() => {
+    const { n, begin } = from.receiver(),
+      sum = vec3(0).toVar();
+    from.blocks(begin, (b, clear, c) => from.addSeen(sum, float(1), b, clear, c, n));
+    return vec4(sum.mul(1 / Math.PI), 1);
+  });
+
+/** The unit direction of a place in a block, in its texels. */
+function directionOf(cube: number, b: Int, place: Node<'vec2'>): Vec3 {
+  const side = cube / 16,
+    face = b.div(int(side * side)),
+    row = b.div(int(side)).mod(int(side)),
+    column = b.mod(int(side)),
+    corner = vec2(float(column.mul(int(16))), float(row.mul(int(16)))),
+    uv = corner
+      .add(place)
+      .mul(2 / cube)
+      .sub(1),
+    u = uv.x,
+    v = uv.y,
+    one = float(1);
+  const on = [
+    vec3(one, v.negate(), u.negate()),
+    vec3(one.negate(), v.negate(), u),
+    vec3(u, one, v),
+    vec3(u, one.negate(), v.negate()),
+    vec3(u, v.negate(), one),
+    vec3(u.negate(), v.negate(), one.negate()),
+  ] as Vec3[];
+  return on.reduceRight((rest, d, i) => select(face.equal(int(i)), d, rest)).normalize();
+}
+
+/** What the lobe is; of `model` 1 Phong's, of 2 GGX. */
+interface Lobe {
+  colour: { value: number };
+  width: { value: number };
+  samples: { value: Vector3 };
+}
+
+/** Exit radiance towards the eye by the lobe alone. */
+function shineNode(from: Reader, eye: Node<'vec3'>, model: Int, lobe: Record<keyof Lobe, Node>): () => Node<'vec4'> {
+  const colour = lobe.colour as unknown as Node<'float'>,
+    width = lobe.width as unknown as Node<'float'>,
+    samplesAt = lobe.samples as unknown as Vec3,
+    { cube } = from.options,
+    cardinal = cardinalFunctions(4),
+    atMiddle = [0, 1, 2, 3].map((i) => (cardinal[16 * i + 7]! + cardinal[16 * i + 8]!) / 2);
+  return Fn(() => {
+    const { p, n, begin } = from.receiver(),
+      wo = eye.sub(p).normalize().toVar(),
+      cosO = dot(n, wo).toVar(),
+      mirror = n.mul(cosO.mul(2)).sub(wo).toVar(),
+      sum = vec3(0).toVar();
+    const valueOf = (wi: Vec3): Node<'float'> => {
+      const value = float(0).toVar();
+      If(model.equal(int(1)), () => {
+        const c = dot(mirror, wi).clamp(0, 1).toVar();
+        If(c.greaterThan(1e-30), () => {
+          value.assign(
+            colour
+              .mul(width.add(2))
+              .mul(1 / (2 * Math.PI))
+              .mul(c.pow(width)),
+          );
+        });
+      }).Else(() => {
+        const cosI = dot(n, wi).toVar();
+        If(cosI.greaterThan(1e-6), () => {
+          const sumOf = wi.add(wo).toVar(),
+            across = dot(sumOf, sumOf).max(1e-12).sqrt().toVar(),
+            h = sumOf.div(across).toVar(),
+            a2 = width.mul(width).toVar(),
+            hz = dot(n, h).max(1e-6).toVar(),
+            slope = cross(n, h).toVar(),
+            s = dot(slope, slope).div(a2).add(hz.mul(hz)).toVar();
+          const root = (c: Node<'float'>): Node<'float'> =>
+            a2
+              .mul(float(1).sub(c.mul(c)))
+              .add(c.mul(c))
+              .sqrt()
+              .mul(0.5);
+          const masking = cosO.mul(root(cosI)).add(cosI.mul(root(cosO))),
+            shape = float(1 / (4 * Math.PI)).div(a2.mul(s).mul(s).mul(masking)),
+            q = float(1).sub(across.mul(0.5)).max(0).toVar();
+          value.assign(shape.mul(mix(colour, float(1), q.mul(q).mul(q).mul(q).mul(q))));
+        });
+      });
+      return value;
+    };
+    const node = (b: Int, i: Int): Vec3 =>
+      directionOf(
+        cube,
+        b,
+        vec2(float(i.bitAnd(int(3)).mul(int(4)).add(int(2))), float(i.shiftRight(int(2)).mul(int(4)).add(int(2)))),
+      );
+    // Light times lobe over texels first .. first + count - 1 of a block.
+    const addRun = (b: Int, first: Int, count: Int, share: Node<'float'>): void =>
+      loop(count, 't', (t) => {
+        const x = first.add(t).mul(int(2)).toVar(),
+          e = from.texel(from.texels, x.add(int(1)), b).toVar();
+        If(e.x.add(e.y).add(e.z).greaterThan(0), () => {
+          const d = from.texel(from.texels, x, b).toVar();
+          sum.addAssign(e.mul(valueOf(d).mul(dot(n, d)).mul(share)));
+        });
+      });
+    If(cosO.greaterThan(1e-6), () => {
+      from.blocks(begin, (b, clear, c) => {
+        const towards = directionOf(cube, b, vec2(8, 8)).toVar(),
+          along = dot(mirror, towards).toVar(),
+          samples = int(0).toVar(),
+          middle = float(0).toVar();
+        If(along.greaterThan(samplesAt.z), () => void samples.assign(int(3)))
+          .ElseIf(along.greaterThan(samplesAt.y), () => void samples.assign(int(2)))
+          .ElseIf(along.greaterThan(samplesAt.x), () => void samples.assign(int(1)));
+        If(samples.equal(int(1)), () => void middle.assign(valueOf(towards)));
+        If(bool(model.equal(int(2)).and(samples.equal(int(1)))), () => {
+          const least = middle.toVar(),
+            most = middle.toVar(),
+            back = float(0).toVar();
+          // Of each node, how much of a block's middle it makes.
+          const [outer, inner] = [float(atMiddle[0]), float(atMiddle[1])];
+          const weight = (k: Int): Node<'float'> => select(k.equal(int(1)).or(k.equal(int(2))), inner, outer);
+          loop(int(16), 'j', (j) => {
+            const value = valueOf(node(b, j)).toVar();
+            least.assign(least.min(value));
+            most.assign(most.max(value));
+            back.addAssign(value.mul(weight(j.bitAnd(int(3)))).mul(weight(j.shiftRight(int(2)))));
+          });
+          If(most.sub(least).mul(Math.PI).greaterThanEqual(blockTolerance), () => {
+            const near = back
+              .sub(middle)
+              .abs()
+              .mul(Math.PI)
+              .lessThan(0.25 * blockTolerance);
+            samples.assign(select(near.and(most.lessThan(least.mul(2))), int(2), int(3)));
+          }).ElseIf(clear.not().and(dot(n, towards).lessThanEqual(0)), () => void samples.assign(int(3)));
+        });
+        If(samples.equal(int(1)), () => from.addSeen(sum, middle, b, clear, c, n))
+          .ElseIf(samples.greaterThan(int(1)).and(clear.not()), () =>
+            loop(int(c.count), 'i', (i) => {
+              const level = from.level(c, i).toVar();
+              If(level.greaterThan(0), () => {
+                const first = int(from.byte(c.where.add(uint(i)))).toVar(),
+                  end = int(256).toVar();
+                If(i.add(int(1)).lessThan(int(c.count)), () => {
+                  end.assign(int(from.byte(c.where.add(uint(i)).add(uint(1)))));
+                });
+                addRun(b, first, end.sub(first), level.mul(from.scale));
+              });
+            }),
+          )
+          .ElseIf(samples.equal(int(3)), () => addRun(b, int(0), int(256), float(1)))
+          .ElseIf(samples.equal(int(2)), () =>
+            loop(int(16), 'j', (j) => {
+              sum.addAssign(from.meet(from.coarse, j.mul(int(3)), b, n).mul(valueOf(node(b, j))));
+            }),
+          );
+      });
+    });
+    return vec4(sum, 1);
+  });
+}
+
+type Picture = ReturnType<typeof rtt>;
+function picture(of: Node<'vec4'>, receivers: number, name: string): Picture {
+  const made = rtt(of, Math.min(pictureColumns, receivers), Math.ceil(receivers / pictureColumns), {
+    type: FloatType,
+    minFilter: NearestFilter,
+    magFilter: NearestFilter,
+    depthBuffer: false,
+    generateMipmaps: false,
+    autoUpdate: false,
+  });
+  made.updateBeforeType = 'render';
+  made.name = name;
+  return made;
+}
+
+/** Pictures of receivers, and what meshes look up in them. */
+export class BlockNodes implements NodeBlocks {
+  private readonly reader: Reader;
+  private readonly even: Picture;
+  private readonly shine: Picture;
+  private readonly made = new Map<boolean, Node<'vec4'>>();
+  private readonly eye = new Vector3(Infinity, 0, 0);
+  private readonly share = uniform(1);
+  private readonly model = uniform(0, 'int');
+  private readonly shines = uniform(0);
+  private readonly lobe = { colour: uniform(0), width: uniform(1), samples: uniform(new Vector3()) };
+
+  constructor(options: NodeBlockOptions) {
+    const reader = (this.reader = new Reader(options)),
+      { receivers } = options;
+    this.even = picture(evenNode(reader)(), receivers, 'lambent even');
+    const eye = uniform(this.eye) as unknown as Vec3;
+    this.shine = picture(shineNode(reader, eye, this.model, this.lobe)(), receivers, 'lambent shine');
+    // Before a frame that looks it up, from where that frame is seen; of surfaces that do not shine never.
+    const { shine } = this,
+      draw = shine.updateBefore.bind(shine);
+    shine.updateBefore = (frame: NodeFrame) => {
+      if (this.shines.value === 0) return undefined;
+      const now = new Vector3().setFromMatrixPosition(frame.camera!.matrixWorld);
+      if (!now.equals(this.eye)) {
+        this.eye.copy(now);
+        shine.textureNeedsUpdate = true;
+      }
+      return draw(frame);
+    };
+  }
+
+  get bytes(): number {
+    const { width, height } = this.even.renderTarget!;
+    return 32 * width * height;
+  }
+
+  refresh(): void {
+    this.reader.follow();
+    this.even.textureNeedsUpdate = this.shine.textureNeedsUpdate = true;
+  }
+
+  setLobe(model: number, share: number, lobe: Lobe): void {
+    this.reader.follow();
+    this.model.value = model;
+    this.share.value = share;
+    this.shines.value = model === 0 ? 0 : 1;
+    this.lobe.colour.value = lobe.colour.value;
+    this.lobe.width.value = lobe.width.value;
+    this.lobe.samples.value.copy(lobe.samples.value);
+    this.shine.textureNeedsUpdate = true;
+  }
+
+  atVertices(twoSided: boolean): Node<'vec4'> {
+    const known = this.made.get(twoSided);
+    if (known) return known;
+    const of = (from: Picture, name: string): Vec3 => {
+      const receiver = attribute<'uint'>(name, 'uint'),
+        none = receiver.equal(uint(0xffffffff)),
+        r = int(select(none, uint(0), receiver)),
+        value = textureLoad(from, ivec2(r.mod(pictureColumns), r.div(pictureColumns))) as unknown as Node<'vec4'>;
+      return varying(select(none, vec3(0), value.rgb));
+    };
+    const side = (from: Picture): Vec3 => {
+      const front = of(from, 'lambentReceiver');
+      return twoSided ? select(frontFacing, front, of(from, 'lambentReceiverBack')) : front;
+    };
+    const color = vec4(materialColor as unknown as Node<'vec4'>),
+      light = color.rgb.mul(side(this.even)).mul(this.share).add(side(this.shine).mul(this.shines));
+    const node = vec4(light.max(0), color.a);
+    this.made.set(twoSided, node);
+    return node;
+  }
+
+  dispose(): void {
+    this.even.dispose();
+    this.shine.dispose();
+  }
+}
