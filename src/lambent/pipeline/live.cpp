@@ -356,7 +356,7 @@ Result<void> LivePicture::ask(const DrawRequest& request) {
   const DrawRequest before = s.asked;
   const bool sky = !is_same(before, request, {"env", "light-order", "window"}) ||
                    before.environment != request.environment;
-  const bool materials = !is_same(before, request, {"brdf", "show", "method", "brdf-samples", "tolerance"});
+  const bool materials = !is_same(before, request, {"brdf", "show", "method", "brdf-samples", "tolerance", "terms"});
   const bool pose = !is_same(before, request, {"animation", "time", "deform"});
   s.asked = request;
   auto made = [&]() -> Result<void> {
@@ -390,10 +390,10 @@ const DrawRequest& LivePicture::request() const { return state_->asked; }
 Result<void> LivePicture::look_as(Look look, int coefficient) {
   State& s = *state_;
   const size_t columns = s.basis().count();
-  if (look == Look::coefficient && (s.blocks || size_t(std::max(0, coefficient)) >= columns || coefficient < 0))
+  if (look == Look::coefficient && (size_t(std::max(0, coefficient)) >= columns || coefficient < 0))
     return Error{"look",
-                 s.blocks ? "visibility in blocks has no coefficients"
-                          : "the file has coefficients 0 to " + std::to_string(columns - 1),
+                 columns == 0 ? "blocks and wavelets have no coefficients to show"
+                              : "the file has coefficients 0 to " + std::to_string(columns - 1),
                  true};
   if (look == Look::coefficient && !std::holds_alternative<DiffuseRows>(s.rows))
     return Error{"look", "one coefficient is of diffuse transfer", true};
