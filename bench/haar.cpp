@@ -105,17 +105,17 @@ void report_rate(const std::vector<std::vector<HaarEntry>>& rows, const CubeLigh
   const HaarTransfer t = make_haar_transfer(haar_size, many);
   const HaarTerms terms = haar_terms(t, haar_column_norms(t), light, 200);
   Relit relit;
-  size_t bytes = 0;
-  relight(t, terms, relit, &bytes);
+  HaarReading reading;
+  relight(t, terms, relit, &reading);
   const ThreadLimit one(1);
   const double seconds = least_processor_seconds(9, [&] { relight(t, terms, relit); });
   std::vector<uint64_t> stream(size_t{32} << 20, 1);
   uint64_t sum = 0;
   const double read =
       least_processor_seconds(5, [&] { sum += std::accumulate(stream.begin(), stream.end(), uint64_t{0}); });
-  report("haar, read", double(bytes) / seconds / 1e9, 0.5 * double(stream.size() * 8) / read / 1e9, "GB/s",
+  report("haar, read", double(reading.bytes) / seconds / 1e9, 0.5 * double(stream.size() * 8) / read / 1e9, "GB/s",
          "half of the rate at which memory is read",
-         {{"bytes", bytes}, {"all_bytes", t.bytes()}, {"seconds", seconds}, {"kept", sum != 0}});
+         {{"bytes", reading.bytes}, {"all_bytes", t.bytes()}, {"seconds", seconds}, {"kept", sum != 0}});
 }
 
 }  // namespace
@@ -145,15 +145,11 @@ void bench_haar() {
   for (const char* name : {"chinese_garden_512", "studio_small_03_512", "dikhololo_night_512"})
     if (auto env = data_environment(name)) report_errors(name, seen, *t, norms, cube_light(*env, haar_size));
   std::vector<std::vector<HaarEntry>> rows(visibility->receivers);
-  for (size_t chunk = 0; chunk < t->chunks(); ++chunk)
-    for (uint32_t c = 0; c < t->columns(); ++c) {
-      size_t at = chunk * haar_chunk;
-      const std::span<const uint8_t> bytes = t->column(chunk, c);
-      for (size_t i = 0; i < bytes.size(); i += 2) {
-        at += bytes[i];
-        if (bytes[i + 1]) rows[at - 1].push_back({c, float(int8_t(bytes[i + 1])) * t->steps[c]});
-      }
-    }
+  for (size_t r = 0; r < rows.size(); ++r) {
+    const std::vector<float> row = load_receiver(*t, r);
+    for (uint32_t c = 0; c < row.size(); ++c)
+      if (row[c] != 0) rows[r].push_back({c, row[c]});
+  }
   report_rate(rows, cube_light(*sun, haar_size));
 }
 

@@ -9,6 +9,7 @@ set(lambent_relight_sources
   src/lambent/baked/placement_codec.cpp
   src/lambent/baked/shells_codec.cpp
   src/lambent/baked/store_codec.cpp
+  src/lambent/baked/wavelet_codec.cpp
   src/lambent/basis/cosine_basis.cpp
   src/lambent/basis/cubemap.cpp
   src/lambent/basis/directional.cpp

@@ -39,11 +39,12 @@ Relit relit(const Field& field) {
   auto relighter = Relighter::make(field, std::move(options));
   if (!relighter) return {};
   const auto* indirect = std::get_if<IndirectTransfer>(&field.store);
+  const int cube = cube_of(field.store);
+  if (cube > 64) return {};
   const bool lit = bool(indirect ? relighter->set_light(std::vector<Vec3>(indirect->surfels.count(), Vec3(1)))
-                        : visibility
-                            ? relighter->set_light(cube_light(
-                                  make_environment("fuzz", 16, 8, [](Vec3) { return Vec3(1); }), visibility->size))
-                            : relighter->set_light(light_for(relighter->light())));
+                        : cube   ? relighter->set_light(cube_light(
+                                       make_environment("fuzz", 16, 8, [](Vec3 d) { return Vec3(1 + d.y); }), cube))
+                                 : relighter->set_light(light_for(relighter->light())));
   Relit out;
   if (!lit || !relighter->relight({.eye = Vec3(0, 1, 0)}, out)) return {};
   return out;

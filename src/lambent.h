@@ -68,13 +68,13 @@ void lambent_close(lambent_file* file);
 /** What a field of a file is. Texts live as long as the file. */
 typedef struct lambent_info {
   size_t size;           /**< set by the caller, to sizeof(lambent_info) */
-  const char* store;     /**< how: "dense", "clusters", "lobes", "factors" or "blocks" */
+  const char* store;     /**< how: "dense", "clusters", "lobes", "factors", "blocks", "surfels", "wavelets" */
   const char* placement; /**< where: "vertices", "texels", "patches", "lattice", "pixels" or "shells" */
   const char* meaning;   /**< of the rows: "diffuse", "directional", "outgoing", "incident", "pixels" or "sight" */
   const char* rows_are;  /**< of directional and outgoing rows, which: "sh:2", "hl2", "map", ...; else "" */
   size_t receivers;      /**< places that receive light */
   size_t rows;           /**< colours that relighting gives for each */
-  size_t columns;        /**< coefficients of light: harmonics, then lobes, then groups of lamps */
+  size_t columns;        /**< coefficients of light: harmonics, then lobes, groups of lamps; 0 of blocks, wavelets */
   size_t values;         /**< floats that lambent_read() gives of a receiver; 0 of blocks */
   size_t parts;          /**< triangle primitives that have receivers */
   int channels;          /**< 1: the same transfer for red, green and blue; 3: one for each */
@@ -116,8 +116,8 @@ lambent_code lambent_get_texels(const lambent_file* file, const uint32_t** recei
 /** Name of a group of lamps, 0 to groups - 1. Errors: LAMBENT_ARGUMENT. */
 lambent_code lambent_get_group(const lambent_file* file, size_t index, const char** name);
 /** The transfer itself: the info's `values` floats of one receiver, [row][channel][column] of dense and clustered
- * transfer; of lobes as transfer/zonal_transfer.h has them. Errors: LAMBENT_ARGUMENT: index or size;
- * LAMBENT_UNSUPPORTED: blocks. */
+ * transfer; of lobes as transfer/zonal_transfer.h has them; of wavelets a coefficient a column. Errors:
+ * LAMBENT_ARGUMENT: index or size; LAMBENT_UNSUPPORTED: blocks. */
 lambent_code lambent_read(const lambent_file* file, size_t field, size_t receiver, float* values, size_t count);
 
 /** For a field of the file. Errors: LAMBENT_ARGUMENT: a field that is not there; LAMBENT_UNSUPPORTED: visibility in
@@ -153,7 +153,7 @@ lambent_code lambent_set_eye(lambent_relighter* relighter, const float* eye);
 void lambent_relighter_free(lambent_relighter* relighter);
 
 /** Light as it multiplies the columns: `count` = columns times r, g, b. Errors: LAMBENT_ARGUMENT; LAMBENT_UNSUPPORTED:
- * blocks have no columns. */
+ * blocks and wavelets take an environment. */
 lambent_code lambent_set_columns(lambent_relighter* relighter, const float* rgb, size_t count);
 
 /** Whose spherical harmonics coefficients are (docs/conventions.md). All are indexed l(l+1)+m. */
@@ -170,7 +170,8 @@ typedef enum lambent_sh {
 lambent_code lambent_set_sh(lambent_relighter* relighter, const float* rgb, int order, int convention);
 
 /** Distant light as a lat-long picture of radiance, height x width x (r, g, b) from the top: the top row is +Y, the
- * centre +X, three quarters to the right +Z. Projected onto the file's columns, or onto the cube of its blocks;
+ * centre +X, three quarters to the right +Z. Projected onto the file's columns, or onto the cube of its blocks
+ * or wavelets;
  * `rotation` (3 x 3, null: none) turns the light. Errors: LAMBENT_ARGUMENT: a size, whose width is twice its height but
  * for a pixel, values that are negative or not finite, a matrix that is no rotation; LAMBENT_UNSUPPORTED: the file has
  * no columns for distant light.

@@ -110,16 +110,33 @@ expect 2 'baked: is needed' relight --env uniform:1
 expect 1 'lambent bake --transfer blocks' relight corner.glb --env uniform:1
 expect 2 'method: does not go with diffuse transfer: it is for blocks' render corner.glb --env uniform:1 \
   --method haar -o x.png
-expect 0 'by 50 terms' render blocks.glb --env sky:elevation=50 --size 24x16 --method columns:0.05 --terms 50 \
-  -o columns.exr
-expect 2 'terms: needs --method columns' render blocks.glb --env uniform:1 --terms 50 -o x.png
-expect 2 'columns:ERROR takes an error' render blocks.glb --env uniform:1 --method columns:2 -o x.png
+expect 2 'terms: does not go with blocks: it is for wavelets' render blocks.glb --env uniform:1 --terms 50 -o x.png
 expect 2 'tolerance: needs --method blocks' render blocks.glb --env uniform:1 --method haar --tolerance 0.1 -o x.png
 expect 2 'window: does not go with blocks' render blocks.glb --env uniform:1 --window hann -o x.png
 expect 2 '\-\-method' render blocks.glb --env uniform:1 --method wavelets -o x.png
 expect 2 '\-\-visibility' bake corner.obj --transfer blocks --visibility bits:9 -o x.glb
 expect 2 'cube: does not go with diffuse transfer: it is for blocks' bake corner.obj --cube 64 -o x.glb
 expect 1 'more than --memory' bake corner.obj --max-edge 0.02 --transfer blocks --memory 1KB -o x.glb
+
+# Transfer in Haar wavelets by column: few terms of the light, all of them, and texels.
+expect 0 'wavelets' bake corner.obj --max-edge 0.1 --light haar:32,error=0.01 --visibility binary \
+  -o haar.glb
+expect 0 'Haar wavelets of a cube of 32' inspect haar.glb
+view=(--env sky:elevation=50,azimuth=20,sun=on --camera 3,2,4,1,0.5,1,40 --size 48x32 --background none)
+expect 0 '50 wavelets of the light' render haar.glb "${view[@]}" --terms 50 -o few.exr
+expect 0 'bytes_read' render haar.glb "${view[@]}" -o all.exr --json
+expect 0 'shaded' render blocks.glb "${view[@]}" --brdf diffuse --method standard -o by_texels.exr
+alike 35 "all wavelets and the standard basis" all.exr by_texels.exr
+alike 25 "few wavelets and all" few.exr all.exr
+expect 0 'texels' bake corner.obj --light haar:16,keep=0.1 --receivers texels --atlas 64x64 -o haar_texels.glb
+expect 0 'wavelets of the light' render haar_texels.glb "${view[@]}" -o haar_texels.png
+expect 2 'a cube of 16, 32' bake corner.obj --light haar:48 -o x.glb
+expect 2 'keep=FRACTION below 1' bake corner.obj --light haar:32,keep=2 -o x.glb
+expect 2 'haar is of diffuse transfer' bake corner.obj --light haar:32 --transfer matrix -o x.glb
+expect 2 'bounces: does not go with wavelets' bake corner.obj --light haar:32 --bounces 1 -o x.glb
+expect 2 'window: does not go with wavelets' render haar.glb --env uniform:1 --window hann -o x.png
+expect 2 'env: is needed' render haar.glb -o x.png
+expect 1 'holds transfer in wavelets' compress haar.glb --zonal 2 -o x.glb
 absent x.glb
 absent x.png
 finish

@@ -177,6 +177,10 @@ int run_compress(Context& context, CompressCommand o) {
   const size_t before = bytes_on_disk(o.baked);  // the output may take its place
   if (std::holds_alternative<Visibility>(baked->surface.store))
     return fail({o.baked, "holds no transfer to compress, but visibility in blocks"});
+  if (std::holds_alternative<HaarTransfer>(baked->surface.store))
+    return fail({o.baked,
+                 "holds transfer in wavelets, which is compressed as it is baked: bake --light haar:...,error="
+                 "or keep="});
   return o.cpca.empty() ? compress_to_lobes(context, o, *baked, before)
                         : compress_to_clusters(context, o, *baked, before);
 }

@@ -87,7 +87,7 @@ Result<void> Session::show(size_t bake) {
   DrawRequest request = live ? live->request() : options.draw;
   request.baked = names[bake];
   const LightBasis basis = light_of(bakes[bake]->surface.store);
-  const bool distant = basis.order > 0 || !basis.lobes.empty() || kind_of(bakes[bake]->surface) == DrawKind::blocks;
+  const bool distant = basis.order > 0 || !basis.lobes.empty() || cube_of(bakes[bake]->surface.store) > 0;
   if (!live && !options.env.empty()) request.env = options.env.front();
   else if (!live && distant) request.env = "sky:elevation=35,azimuth=45,turbidity=3";
   auto made = LivePicture::make(*bakes[bake], request, job_);

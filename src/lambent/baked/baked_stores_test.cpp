@@ -1,4 +1,5 @@
 #include <lambent/baked/baked_test-inl.h>
+#include <lambent/relight/relight_haar.h>
 
 #include <fstream>
 
@@ -391,6 +392,73 @@ TEST(BakedFile, BrokenVisibilityIsRefusedOrHarmless) {
     for (size_t r = 0; r < read->receivers; ++r) decode_visibility(*read, r, levels);
   }
   EXPECT_GT(refused, 500u);
+}
+
+// Two columns of each face, one of them of every receiver.
+HaarTransfer small_wavelets(size_t receivers) {
+  Random random(9);
+  std::vector<std::vector<HaarEntry>> rows(receivers);
+  for (auto& row : rows)
+    for (uint32_t face = 0; face < 6; ++face) {
+      row.push_back({256 * face, random.next() - 0.5f});
+      if (random.next() < 0.2f) row.push_back({256 * face + 40, random.next()});
+    }
+  HaarTransfer t = make_haar_transfer(16, rows);
+  t.error = 0.25;
+  return t;
+}
+
+TEST(BakedFile, WaveletsComeBackAsTheyWere) {
+  const TemporaryFile file("wavelets.glb");
+  const Small s = small_bake(1, Precision::half);
+  const HaarTransfer t = small_wavelets(s.receivers.count());
+  ASSERT_TRUE(save_baked(file.path, make_baked(s.scene, s.receivers, t, DiffuseRows{})));
+  auto back = load_baked(file.path);
+  ASSERT_TRUE(back) << back.error().text();
+  ASSERT_TRUE(std::holds_alternative<HaarTransfer>(back->surface.store));
+  const auto& kept = std::get<HaarTransfer>(back->surface.store);
+  EXPECT_EQ(kept.size, 16);
+  EXPECT_EQ(kept.error, 0.25);
+  EXPECT_EQ(kept.steps, t.steps);
+  EXPECT_EQ(kept.starts, t.starts);
+  EXPECT_EQ(kept.begin, t.begin);
+  EXPECT_TRUE(std::equal(t.data.begin(), t.data.end(), kept.data.begin(), kept.data.end()));
+}
+
+// Another cube, any cut and any changed byte: refused in one line, or relit without harm.
+TEST(BakedFile, WaveletsThatLieAreRefusedOrHarmless) {
+  const TemporaryFile file("wavelets_broken.glb");
+  const Small s = small_bake(1, Precision::half);
+  ASSERT_TRUE(
+      save_baked(file.path, make_baked(s.scene, s.receivers, small_wavelets(s.receivers.count()), DiffuseRows{})));
+  const std::vector<uint8_t> whole = *read_file(file.path);
+  const std::string text(whole.begin(), whole.end());
+  const auto read = [&](const std::string& changed) {
+    std::ofstream(file.path, std::ios::binary) << changed;  // no waiting for the disk
+    return load_baked(file.path);
+  };
+  for (const char* to : {"\"cube\":32", "\"cube\":48", "\"cube\":-1"}) {
+    std::string changed = text;
+    changed.replace(changed.find("\"cube\":16"), 9, to);
+    auto baked = read(changed);
+    ASSERT_FALSE(baked) << to;
+    EXPECT_EQ(baked.error().text().find('\n'), std::string::npos);
+  }
+  CubeLight light{16, std::vector<Vec3>(cube_texels(16), Vec3(1.0f)), {}};
+  Random random(8);
+  size_t refused = 0;
+  for (int i = 0; i < 1000; ++i) {
+    std::string changed = text;
+    if (i % 8 == 0) changed.resize(size_t(random.next() * float(text.size())));
+    else changed[size_t(random.next() * float(text.size()))] = char(random.next64());
+    auto baked = read(changed);
+    const auto* t = baked ? std::get_if<HaarTransfer>(&baked->surface.store) : nullptr;
+    refused += !baked;
+    if (!t) continue;
+    Relit relit;
+    relight(*t, haar_terms(*t, haar_column_norms(*t), light, 0), relit);
+  }
+  EXPECT_GT(refused, 200u);
 }
 
 }  // namespace

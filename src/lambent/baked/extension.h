@@ -77,13 +77,19 @@ Result<std::vector<T>> read_values(const BlobReader& in, const nlohmann::json& o
   return values;
 }
 
-// Store and meaning, the extension's "transfer". The kind is named by both: diffuse, matrix, zonal, factors, blocks.
+// Store and meaning, the extension's "transfer". The kind is named by both: diffuse, matrix, zonal, factors, blocks,
+// indirect, wavelets.
 nlohmann::json encode_transfer(const Field& field, BlobWriter& out);
 Result<Field> decode_transfer(const BlobReader& in, const nlohmann::json& transfer, const std::string& where);
 
 // A dense store's data and header, whose light, rows and receivers are known from elsewhere.
 nlohmann::json encode_dense(const Transfer& t, BlobWriter& out);
 Result<void> decode_dense(const BlobReader& in, const nlohmann::json& object, Transfer& t, const std::string& where);
+
+// Haar wavelets by column, but for the kind and the number of receivers.
+nlohmann::json encode_wavelets(const HaarTransfer& t, BlobWriter& out);
+Result<HaarTransfer> decode_wavelets(const BlobReader& in, const nlohmann::json& object, size_t receivers,
+                                     const std::string& where);
 
 nlohmann::json encode_outgoing(const Outgoing& o, BlobWriter& out);
 Result<Outgoing> decode_outgoing(const BlobReader& in, const nlohmann::json& object, int rows, size_t receivers,

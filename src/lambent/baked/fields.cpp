@@ -24,6 +24,8 @@ Result<void> check_placement(Field& field, const std::string& where) {
     return Error{where, "visibility in blocks is baked at vertices"};
   if (std::holds_alternative<IndirectTransfer>(field.store) && !at_vertices)
     return Error{where, "direct-to-indirect transport is baked at vertices"};
+  if (std::holds_alternative<HaarTransfer>(field.store) && !is_surface(field.where))
+    return Error{where, "transfer in wavelets is baked on surfaces"};
   if (!is_surface(field.where)) {
     if (!std::holds_alternative<DiffuseRows>(field.rows)) return Error{where, "a fixed view has one row a pixel"};
     field.rows = PixelRows{};
@@ -132,9 +134,9 @@ Result<BakedFields> read_fields(const GltfBuffers& buffers, const std::string& p
   if (!placement) return placement.error();
   fields.surface.where = std::move(*placement);
   if (auto ok = check_placement(fields.surface, where); !ok) return ok.error();
-  if (const auto object = extension.find("lattice"); object != extension.end() &&
-                                                     !std::holds_alternative<IndirectTransfer>(fields.surface.store) &&
-                                                     !std::holds_alternative<Visibility>(fields.surface.store)) {
+  // Stores of columns alone have light in free space, and terms, by the same ones.
+  const bool by_columns = light_of(fields.surface.store).count() > 0;
+  if (const auto object = extension.find("lattice"); object != extension.end() && by_columns) {
     auto lattice = decode_lattice(in, *object, light_of(fields.surface.store), where + ": lattice");
     if (!lattice) return lattice.error();
     fields.more.push_back(std::move(*lattice));
@@ -144,8 +146,7 @@ Result<BakedFields> read_fields(const GltfBuffers& buffers, const std::string& p
     if (!shells) return shells.error();
     for (Field& field : *shells) fields.more.push_back(std::move(field));
   }
-  if (const auto list = extension.find("terms");
-      list != extension.end() && !std::holds_alternative<IndirectTransfer>(fields.surface.store)) {
+  if (const auto list = extension.find("terms"); list != extension.end() && by_columns) {
     auto terms = read_terms(in, *list, fields.surface, where);
     if (!terms) return terms.error();
     fields.terms = std::move(*terms);

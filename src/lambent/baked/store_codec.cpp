@@ -170,6 +170,7 @@ Result<ZonalTransfer> decode_zonal(const json& object, const std::string& where)
   return zonal;
 }
 
+json encode(const HaarTransfer& t, BlobWriter& out) { return encode_wavelets(t, out); }
 json encode(const FactoredTransfer& t, BlobWriter& out) { return encode(t.visibility, out); }
 
 json encode(const Visibility& v, BlobWriter& out) {
@@ -420,6 +421,7 @@ Result<Field> decode_rows_of_columns(const BlobReader& in, const json& t, bool m
 
 const char* kind_of(const Field& field) {
   if (std::holds_alternative<Visibility>(field.store)) return "blocks";
+  if (std::holds_alternative<HaarTransfer>(field.store)) return "wavelets";
   if (std::holds_alternative<IndirectTransfer>(field.store)) return "indirect";
   if (std::holds_alternative<FactoredTransfer>(field.store)) return "factors";
   if (std::holds_alternative<ZonalTransfer>(field.store)) return "zonal";
@@ -454,6 +456,11 @@ Result<Field> decode_transfer(const BlobReader& in, const json& t, const std::st
     return Error{where, "directional light is of diffuse transfer alone"};
   if (kind == "indirect") return decode_indirect(in, t, *receivers, where);
   if (kind == "blocks") return decode_blocks(in, t, *receivers, where);
+  if (kind == "wavelets") {
+    auto wavelets = decode_wavelets(in, t, *receivers, where);
+    if (!wavelets) return wavelets.error();
+    return Field{{}, std::move(*wavelets), DiffuseRows{}};
+  }
   if (kind == "zonal") return decode_lobes_of_rows(in, t, *receivers, where);
   if (kind == "factors") return decode_factors(in, t, *receivers, where);
   if (kind == "matrix" || kind == "diffuse") return decode_rows_of_columns(in, t, kind == "matrix", *receivers, where);

@@ -76,6 +76,7 @@ struct lambent_relighter {
   lambent::ReceiverFrames frames = {};
   lambent::Vec3 eye{0};  // of blocks
   size_t distant() const { return basis.count() - basis.groups.size(); }
+  int cube() const { return lambent::cube_of(relighter.field().store); }  // 0: light comes by columns
   const lambent::Visibility* blocks() const { return std::get_if<lambent::Visibility>(&relighter.field().store); }
 };
 

@@ -112,8 +112,8 @@ void take_sides(const std::vector<T>& front, const std::vector<T>& back, size_t 
 // Distant light onto the columns for it; the lamps keep theirs.
 lambent_code set_distant(lambent_relighter& r, const Environment& env, const float* rotation) {
   if (rotation && !is_rotation(matrix_at(rotation))) return wrong("the matrix is no rotation");
-  if (const Visibility* blocks = r.blocks()) {
-    const CubeLight cube = cube_light(env, blocks->size, rotation ? matrix_at(rotation) : Mat3(1.0f));
+  if (const int size = r.cube()) {
+    const CubeLight cube = cube_light(env, size, rotation ? matrix_at(rotation) : Mat3(1.0f));
     if (auto ok = r.relighter.set_light(cube); !ok) return fail(LAMBENT_INTERNAL, ok.error().text());
     r.lit = true;
     return LAMBENT_OK;
@@ -385,7 +385,7 @@ lambent_code lambent_relight(lambent_relighter* relighter, float* rgb, size_t fl
   return guarded_with(
       [&] {
         if (!relighter->lit) return fail(LAMBENT_NO_LIGHT, "no light was set");
-        if (relighter->changed && !relighter->blocks())
+        if (relighter->changed && relighter->cube() == 0)
           if (auto ok = relighter->relighter.set_light(relighter->columns); !ok)
             return fail(LAMBENT_INTERNAL, ok.error().text());
         relighter->changed = false;

@@ -85,36 +85,43 @@ Result<HaarTransfer> fit_haar(const Visibility& v, std::span<const Vec3> normals
   if (!(o.keep >= 0 && o.keep <= 1) || !(o.error >= 0 && o.error < 1))
     return Error{"", "the share or the error of Haar coefficients is out of range"};
   const Cube cube = make_cube(v.size);
-  std::vector<std::vector<HaarEntry>> rows(v.receivers);
-  std::vector<double> squares(v.receivers), left(v.receivers);
-  ProgressStage stage(progress, "wavelets", v.receivers);
-  parallel_for(v.receivers, 16, [&](size_t begin, size_t end) {
-    thread_local HaarScratchRow scratch;
-    for (size_t r = begin; r < end && !stage.cancelled(); ++r) {
-      transform_row(v, cube, r, normals[r], scratch);
-      rows[r] = largest_of(scratch.row, o);
-      for (float c : scratch.row) squares[r] += double(c) * double(c);
-      double kept = 0;
-      for (const HaarEntry& e : rows[r]) kept += double(e.value) * double(e.value);
-      left[r] = squares[r] - kept;
-    }
-    stage.advance(end - begin);
-  });
-  if (stage.cancelled()) return Error{"", "cancelled"};
-  HaarTransfer out = make_haar_transfer(v.size, rows);
-  if (!report) return out;
-  double all = 0, lost = 0;
+  ProgressStage stage(progress, "wavelets", 2 * v.receivers);
+  // Twice over all: the columns' steps first, then the chunks, of which one is in memory at a time.
+  std::vector<float> largest(cube.count());
+  double all = 0, left = 0;
+  std::vector<std::vector<HaarEntry>> rows;
+  std::vector<double> squares, dropped;
+  const auto make_rows = [&](size_t first, size_t count) {
+    rows.assign(count, {}), squares.assign(count, 0), dropped.assign(count, 0);
+    parallel_for(count, 16, [&](size_t begin, size_t end) {
+      thread_local HaarScratchRow scratch;
+      for (size_t r = begin; r < end && !stage.cancelled(); ++r) {
+        transform_row(v, cube, first + r, normals[first + r], scratch);
+        rows[r] = largest_of(scratch.row, o);
+        for (float c : scratch.row) squares[r] += double(c) * double(c);
+        dropped[r] = squares[r];
+        for (const HaarEntry& e : rows[r]) dropped[r] -= double(e.value) * double(e.value);
+      }
+      stage.advance(end - begin);
+    });
+  };
   size_t entries = 0;
-  for (size_t r = 0; r < v.receivers; ++r) {
-    all += squares[r], lost += left[r], entries += rows[r].size();
-    for (const HaarEntry& e : rows[r]) {
-      const float step = out.steps[e.column], rounded = step > 0 ? std::round(e.value / step) * step : 0.0f;
-      lost += double(rounded - e.value) * double(rounded - e.value);
+  for (size_t first = 0; first < v.receivers && !stage.cancelled(); first += haar_chunk) {
+    make_rows(first, std::min(haar_chunk, v.receivers - first));
+    for (size_t r = 0; r < rows.size(); ++r) {
+      all += squares[r], left += std::max(dropped[r], 0.0), entries += rows[r].size();
+      for (const HaarEntry& e : rows[r]) largest[e.column] = std::max(largest[e.column], std::abs(e.value));
     }
   }
-  *report = {all > 0 ? std::sqrt(std::max(lost, 0.0) / all) : 0.0,
-             double(entries) / double(std::max<size_t>(v.receivers, 1))};
-  return out;
+  HaarWriter writer(v.size, largest);
+  for (size_t first = 0; first < v.receivers && !stage.cancelled(); first += haar_chunk) {
+    if (v.receivers > haar_chunk) make_rows(first, std::min(haar_chunk, v.receivers - first));
+    writer.add(rows);
+  }
+  if (stage.cancelled()) return Error{"", "cancelled"};
+  const double error = all > 0 ? std::sqrt((left + writer.lost()) / all) : 0.0;
+  if (report) *report = {error, double(entries) / double(std::max<size_t>(v.receivers, 1))};
+  return writer.finish(error);
 }
 
 }  // namespace lambent

@@ -8,6 +8,7 @@
 
 #include <gtest/gtest.h>
 
+#include <algorithm>
 #include <cmath>
 
 namespace lambent {
@@ -112,52 +113,83 @@ TEST(HaarTransfer, ReadsTheColumnsThatTheLightWakesAlone) {
   ASSERT_TRUE(t);
   const HaarTerms terms = haar_terms(*t, haar_column_norms(*t), s.light, 20);
   ASSERT_EQ(terms.columns.size(), 20u);
-  size_t read = 0, due = 0, all = 0;
-  Relit relit;
-  relight(*t, terms, relit, &read);
-  for (size_t chunk = 0; chunk < t->chunks(); ++chunk) {
-    for (uint32_t c : terms.columns) due += t->column(chunk, c).size();
-    all += t->data[chunk].size();
+  HaarReading reading;
+  Relit relit, spoilt;
+  relight(*t, terms, relit, &reading);
+  EXPECT_EQ(reading.terms, 20u);
+  EXPECT_LT(reading.bytes, t->data.size() / 4);
+  // Whatever stands in the others makes no difference.
+  std::vector<uint8_t> bytes(t->data.begin(), t->data.end());
+  size_t kept = 0;
+  for (size_t c = 0; c < t->columns(); ++c) {
+    const bool woken = std::binary_search(terms.columns.begin(), terms.columns.end(), uint32_t(c));
+    const size_t at = size_t(t->column(0, c).data() - t->data.data()), count = t->column(0, c).size();
+    if (woken) kept += count;
+    else std::fill_n(bytes.begin() + ptrdiff_t(at), count, uint8_t(0xa5));
   }
-  EXPECT_EQ(read, due);
-  EXPECT_LT(read, all / 4);
+  HaarTransfer other = *t;
+  other.data = bytes;
+  relight(other, terms, spoilt);
+  EXPECT_EQ(reading.bytes, kept);
+  EXPECT_TRUE(std::equal(relit.values.begin(), relit.values.end(), spoilt.values.begin()));
 }
 
-TEST(HaarTransfer, SparseColumnsOfManyChunksKeepTheirPlaces) {
-  // One entry every 700 receivers, in a column of each chunk, and one at the very last.
+TEST(HaarTransfer, SparseAndWholeTilesOfManyChunksKeepTheirPlaces) {
+  // One entry every 700 receivers, in a column of each chunk; one at the very last; and a column of two of three.
   std::vector<std::vector<HaarEntry>> rows(2 * haar_chunk + 5);
-  for (size_t r = 0; r < rows.size(); r += 700) rows[r].push_back({7, 0.5f + float(r % 3)});
-  rows.back().push_back({9, -1.0f});
+  const auto dense = [](size_t r) { return r % 3 ? 0.25f + float(r % 7) : 0.0f; };
+  for (size_t r = 0; r < rows.size(); ++r) {
+    if (r % 700 == 0) rows[r].push_back({7, 0.5f + float(r % 3)});
+    if (r + 1 == rows.size()) rows[r].push_back({9, -1.0f});
+    if (dense(r) != 0) rows[r].push_back({11, dense(r)});
+  }
   const HaarTransfer t = make_haar_transfer(4, rows);
   ASSERT_TRUE(check_haar(t, "it"));
+  size_t entries = 0;
+  for (const auto& row : rows) entries += row.size();
+  EXPECT_EQ(t.entries(), entries);
   Relit relit;
-  relight(t, {{7, 9}, {Vec3(t.steps[7], 0, 0), Vec3(0, t.steps[9], 0)}}, relit);
+  relight(t, {{7, 9, 11}, {Vec3(t.steps[7], 0, 0), Vec3(0, t.steps[9], 0), Vec3(0, 0, t.steps[11])}}, relit);
   for (size_t r = 0; r < rows.size(); ++r) {
     EXPECT_NEAR(relit.at(r).x, r % 700 == 0 ? 0.5f + float(r % 3) : 0.0f, 0.02f) << r;
     EXPECT_NEAR(relit.at(r).y, r + 1 == rows.size() ? -1.0f : 0.0f, 1e-5f) << r;
+    EXPECT_NEAR(relit.at(r).z, dense(r), 0.03f) << r;
   }
+  for (size_t r : {size_t(700), 2 * haar_chunk + 4})
+    for (const HaarEntry& e : rows[r]) EXPECT_NEAR(load_receiver(t, r)[e.column], e.value, 0.03f);
 }
 
 TEST(HaarTransfer, ColumnsThatLieAreRefused) {
   std::vector<std::vector<HaarEntry>> rows(300);
-  rows[290].push_back({3, 1.0f});
+  rows[290].push_back({3, 1.0f}), rows[295].push_back({3, 0.5f});
+  for (size_t r = 64; r < 128; ++r) rows[r].push_back({5, 1.0f});
   const HaarTransfer good = make_haar_transfer(4, rows);
   ASSERT_TRUE(check_haar(good, "it"));
+  const size_t third = 0, fifth = good.column(0, 3).size();  // where these begin
   const auto refused = [&](auto change, const std::string& part) {
     HaarTransfer bad = good;
-    change(bad);
+    std::vector<uint8_t> bytes(good.data.begin(), good.data.end());
+    change(bad, bytes);
+    bad.data = bytes;
     const auto ok = check_haar(bad, "it");
     ASSERT_FALSE(ok) << part;
     EXPECT_NE(ok.error().text().find(part), std::string::npos) << ok.error().text();
   };
-  refused([](HaarTransfer& t) { t.size = 5; }, "power of two");
-  refused([](HaarTransfer& t) { t.steps.pop_back(); }, "numbers of columns");
-  refused([](HaarTransfer& t) { t.steps[3] = NAN; }, "step");
-  refused([](HaarTransfer& t) { t.begin[3] = 99; }, "follow");
-  refused([](HaarTransfer& t) { t.data[0].push_back(1), t.begin.back() += 1; }, "within a pair");
-  refused([](HaarTransfer& t) { t.data[0][0] = 0; }, "stays");
-  refused([](HaarTransfer& t) { t.data[0].back() = 128; }, "beyond");
-  refused([](HaarTransfer& t) { t.receivers = 290; }, "beyond");
+  using Bytes = std::vector<uint8_t>;
+  refused([](HaarTransfer& t, Bytes&) { t.size = 5; }, "power of two");
+  refused([](HaarTransfer& t, Bytes&) { t.steps.pop_back(); }, "numbers of columns");
+  refused([](HaarTransfer& t, Bytes&) { t.steps[3] = NAN; }, "step");
+  refused([](HaarTransfer& t, Bytes&) { t.begin[3] = 999; }, "follow");
+  refused([](HaarTransfer& t, Bytes&) { t.begin[4] += 1, t.begin[5] += 1; }, "tiles");
+  refused([](HaarTransfer& t, Bytes&) { t.starts[1] += 1; }, "fill");
+  refused([](HaarTransfer&, Bytes& b) { b.push_back(1); }, "fill");
+  refused([&](HaarTransfer&, Bytes& b) { b[third + 8] = 1; }, "tiles");       // fewer entries than there are
+  refused([&](HaarTransfer&, Bytes& b) { b[third + 8] = 0; }, "tiles");       // all 64
+  refused([&](HaarTransfer&, Bytes& b) { b[third] |= 1; }, "tiles");          // a tile more
+  refused([&](HaarTransfer&, Bytes& b) { b[third + 9] = 44; }, "receivers");  // 300 of them end at 43 of the fifth
+  refused([&](HaarTransfer&, Bytes& b) { b[third + 11] = b[third + 9]; }, "receivers");
+  refused([&](HaarTransfer&, Bytes& b) { std::fill_n(&b[fifth], 8, uint8_t(0)); }, "tiles");
+  refused([](HaarTransfer& t, Bytes&) { t.receivers = 290; }, "receivers");
 }
 
 }  // namespace

@@ -6,6 +6,7 @@
 #include <lambent/compress/parametric.h>
 #include <lambent/core/ranks.h>
 #include <lambent/light/environment.h>
+#include <lambent/pipeline/bake_cube.h>
 #include <lambent/pipeline/bake_lightmap.h>
 #include <lambent/pipeline/bake_parse.h>
 #include <lambent/pipeline/bake_rooms.h>
@@ -170,22 +171,14 @@ Result<void> make_membrane(Bake& b) {
   return {};
 }
 
-Result<void> bake_blocks(Bake& b) {
-  VisibilityReport report;
-  auto visibility = bake_visibility(b.tracer, b.receivers(), b.plan.visibility, &report, b.job.progress);
-  if (!visibility) return visibility.error();
-  if (b.tracer.lets_pass() && visibility->bits == 1)
-    b.job.warn("binary visibility holds what lets light pass as seen or not (--visibility bits:N holds shares)");
-  if (b.tracer.colours()) b.job.warn("visibility has no colour: coloured glass is kept grey");
-  b.report.receivers = b.receivers().count(), b.report.rays = report.rays, b.report.trace_seconds = report.seconds;
-  const VisibilityStatistics s = visibility_statistics(*visibility);
-  b.summary.json.update(
-      {{"blocked", s.blocked}, {"clear", s.clear}, {"mixed", s.mixed}, {"changes_per_mixed_block", s.changes}});
-  b.line("blocks", fmt::format("{:.1f} % blocked, {:.1f} % clear, {:.1f} % mixed with {:.1f} changes each; cube {}, {} "
-                               "bit{}",
-                               100 * s.blocked, 100 * s.clear, 100 * s.mixed, s.changes, visibility->size,
-                               visibility->bits, visibility->bits == 1 ? "" : "s"));
-  b.store = std::move(*visibility), b.rows = SightRows{};
+Result<void> bake_over_cube(Bake& b) {
+  const bool wavelets = b.plan.kind == BakeKind::wavelets;
+  auto seen = bake_visibility_of_plan(b.plan, b.tracer, b.receivers(), b.job, b.report, b.summary);
+  if (!seen) return seen.error();
+  if (!wavelets) return b.store = std::move(*seen), b.rows = SightRows{}, Result<void>();
+  auto transfer = fit_haar_of_plan(b.plan, *seen, b.receivers(), b.job, b.summary, b.told);
+  if (!transfer) return transfer.error();
+  b.store = std::move(*transfer);
   return {};
 }
 
@@ -226,7 +219,8 @@ Result<void> bake_surface(Bake& b) {
     case BakeKind::matrix: return bake_glossy(b);
     case BakeKind::factors: return bake_factors(b);
     case BakeKind::membrane: return make_membrane(b);
-    case BakeKind::blocks: return bake_blocks(b);
+    case BakeKind::blocks:
+    case BakeKind::wavelets: return bake_over_cube(b);
     case BakeKind::indirect: return bake_to_indirect(b);
     case BakeKind::lightmap: return Error{"", "a lightmap is baked by bake_lightmap_request()"};
     case BakeKind::zonal:

@@ -23,7 +23,8 @@ namespace {
 constexpr double least_error = 1e-4;
 
 constexpr int max_lamps = 64, max_directional = 256;
-constexpr const char* light_syntax = "sh:BANDS, sh:BANDS+lamps:COUNT@ENV, or directional:COUNT";
+constexpr const char* light_syntax =
+    "sh:BANDS, sh:BANDS+lamps:COUNT@ENV, directional:COUNT, or haar:SIZE[,error=ERROR|,keep=FRACTION]";
 
 // KIND or KIND:N, where N is the number of rows (svd) or bands (sh, hemisphere, hsh).
 Result<void> parse_outgoing(const std::string& text, MatrixOptions& matrix) {
@@ -65,6 +66,7 @@ Result<void> parse_light(const std::string& text, BakeOptions& bake, const Job& 
     bake.order = 0, bake.lobes = even_lobes(*count);
     return {};
   }
+  if (text.starts_with("haar:")) return Error{"--light", "haar is of diffuse transfer: leave --transfer out", true};
   if (!text.starts_with("sh:"))
     return Error{"--light", "must be " + std::string(light_syntax) + ", not \"" + text + "\"", true};
   const size_t plus = text.find('+');
@@ -88,6 +90,25 @@ Result<void> parse_light(const std::string& text, BakeOptions& bake, const Job& 
     job.warn(fmt::format("{}: has {}{} out, not {}", name, found,
                          found == 1 ? " lamp that stands" : " lamps that stand", *count));
   return {};
+}
+
+// "haar:SIZE", with what is kept after a comma.
+Result<void> parse_haar(const std::string& text, BakePlan& plan) {
+  const size_t comma = text.find(',');
+  auto size = parse_whole(text.substr(5, comma == std::string::npos ? comma : comma - 5), 16, max_cube_size,
+                          "the size after haar:");
+  if (!size) return size.error();
+  if ((*size & (*size - 1)) != 0) return Error{"--light", "haar takes a cube of 16, 32, 64, 128 or 256 texels", true};
+  plan.visibility.size = *size, plan.haar = {.error = 0.02};
+  if (comma == std::string::npos) return {};
+  const std::string kept = text.substr(comma + 1);
+  const bool share = kept.starts_with("keep=");
+  if (share || kept.starts_with("error="))
+    if (auto n = parse_numbers(kept.substr(kept.find('=') + 1), 1, "--light"); n && (*n)[0] >= 0 && (*n)[0] < 1) {
+      (share ? plan.haar.keep : plan.haar.error) = double((*n)[0]);
+      if (!share || plan.haar.keep > 0) return {};
+    }
+  return Error{"--light", "expects error=ERROR or keep=FRACTION below 1 after the comma, not \"" + kept + "\"", true};
 }
 
 // "k" or "converge:EPS".
@@ -229,7 +250,7 @@ Result<BakePlan> plan_of(const BakeRequest& r, const Job& job) {
   double converge = 0;
   if (auto ok = parse_bounces(r.bounces, b.bounces, converge); !ok) return ok.error();
   b.order = r.order;
-  if (!r.light.empty())
+  if (!r.light.empty() && plan.kind != BakeKind::wavelets)
     if (auto ok = parse_light(r.light, b, job); !ok) return ok.error();
   plan.matrix.incident_order = r.incident_order, plan.matrix.grid = r.view_map;
   plan.matrix.simulate_paths = r.simulate == "paths";
@@ -250,6 +271,8 @@ Result<BakePlan> plan_of(const BakeRequest& r, const Job& job) {
   auto bits = parse_visibility(r.visibility);
   if (!bits) return bits.error();
   plan.visibility = {r.cube, *bits, r.memory};
+  if (plan.kind == BakeKind::wavelets)
+    if (auto ok = parse_haar(r.light, plan); !ok) return ok.error();
   plan.indirect.surfels = size_t(r.surfels), plan.indirect.samples = b.samples, plan.indirect.seed = r.seed;
   if (auto ok = check_orders(plan, r); !ok) return ok.error();
   return plan;

@@ -8,6 +8,7 @@
 #include <lambent/bake/subsurface.h>
 #include <lambent/bake/visibility.h>
 #include <lambent/compress/cpca.h>
+#include <lambent/compress/haar_fit.h>
 #include <lambent/compress/zonal_fit.h>
 #include <lambent/pipeline/bake.h>
 #include <lambent/scene/reflection.h>
@@ -26,6 +27,7 @@ struct BakePlan {
   SubsurfaceOptions subsurface;
   LightmapOptions lightmap;
   VisibilityOptions visibility;
+  HaarFitOptions haar;
   IndirectOptions indirect;
   Reflection reflection;
   bool adapts = false;  // where the scene can be

@@ -15,8 +15,9 @@ using R = BakeRequest;
 constexpr KindMask bit(BakeKind kind) { return KindMask(1) << int(kind); }
 constexpr KindMask D = bit(BakeKind::diffuse), M = bit(BakeKind::matrix), F = bit(BakeKind::factors),
                    Z = bit(BakeKind::zonal), G = bit(BakeKind::glossy_zonal), S = bit(BakeKind::membrane),
-                   L = bit(BakeKind::lightmap), K = bit(BakeKind::blocks), I = bit(BakeKind::indirect);
-constexpr KindMask every = D | M | F | Z | G | S | L | K | I, traced = D | M | F | Z | G | L, glossy = M | F | G;
+                   L = bit(BakeKind::lightmap), K = bit(BakeKind::blocks), I = bit(BakeKind::indirect),
+                   W = bit(BakeKind::wavelets);
+constexpr KindMask every = D | M | F | Z | G | S | L | K | I | W, traced = D | M | F | Z | G | L, glossy = M | F | G;
 
 const Option<R> table[] = {
     {"scene", &R::scene, "Files", every, "Scene: .gltf, .glb, .obj or .ply", 0, 0, nullptr, nullptr, true, true},
@@ -25,7 +26,7 @@ const Option<R> table[] = {
      false},
     {"bin-limit", &R::bin_limit, "Files", every, "Bytes of each .bin of a .gltf, at most; e.g. 256MB, 2GiB (1GiB)",
      65536, 1e18, nullptr, nullptr, false},
-    {"checkpoint", &R::checkpoint, "Files", traced | K,
+    {"checkpoint", &R::checkpoint, "Files", traced | K | W,
      "Folder to keep the work in as it comes, from which the same command goes on after an interrupt or a crash; off: "
      "nowhere (OUTPUT.checkpoint, of work of over a minute)",
      0, 0, nullptr, nullptr, false},
@@ -43,19 +44,21 @@ const Option<R> table[] = {
      "direct "
      "light becomes indirect light, for lamps that move and walls that are repainted",
      0, 0, "diffuse|matrix|zonal|lightmap|blocks|indirect"},
-    {"order", &R::order, "What is baked", every & ~(K | I),
+    {"order", &R::order, "What is baked", every & ~(K | I | W),
      "Bands of the light's spherical harmonics; 6 if nothing is said, of lightmaps none", 1, max_sh_order},
-    {"light", &R::light, "What is baked", D | M | F,
-     "What light is made of, in place of --order: sh:BANDS, sh:BANDS+lamps:COUNT@ENV, or directional:COUNT", 0, 0,
-     nullptr, nullptr, true, true},
-    {"precision", &R::precision, "What is baked", every & ~(K | I), "Of the stored transfer", 0, 0, "half|single"},
+    {"light", &R::light, "What is baked", D | M | F | W,
+     "What light is made of, in place of --order: sh:BANDS, sh:BANDS+lamps:COUNT@ENV, directional:COUNT, or "
+     "haar:SIZE[,error=ERROR|,keep=FRACTION] (wavelets on a cube of so many texels a side, as few as leave that error "
+     "of a receiver's transfer, 0.02, or that share of all)",
+     0, 0, nullptr, nullptr, true, true},
+    {"precision", &R::precision, "What is baked", every & ~(K | I | W), "Of the stored transfer", 0, 0, "half|single"},
     {"receivers", &R::receivers, "What is baked", every,
      "Where light is received: vertices, texels of an atlas, or patches (triangles); texels for lightmaps, else "
      "vertices",
      0, 0, "vertices|texels|patches"},
-    {"texels-per-unit", &R::texels_per_unit, "What is baked", D | L,
+    {"texels-per-unit", &R::texels_per_unit, "What is baked", D | L | W,
      "Texels along one scene unit; the atlas is as large as that needs", 1e-12, 1e12, nullptr, "receivers=texels"},
-    {"atlas", &R::atlas, "What is baked", D | L,
+    {"atlas", &R::atlas, "What is baked", D | L | W,
      "WIDTHxHEIGHT of the atlas; texels are as small as that allows (if nothing is said, as light asks for in a "
      "lightmap "
      "baked to an error, else 1024x1024)",
@@ -85,7 +88,7 @@ const Option<R> table[] = {
      "on|off"},
     {"terms", &R::terms, "How well", D | M | L,
      "Keep direct light and each bounce one by one too, for `render --show`"},
-    {"memory", &R::memory, "How well", traced | K,
+    {"memory", &R::memory, "How well", traced | K | W,
      "Working memory beyond scene and result, bytes; e.g. 500MB, 2GiB (4GiB); less means rays traced again", 0, 0,
      nullptr, nullptr, false},
     {"seed", &R::seed, "How well", traced | I, "Of the ray directions"},
@@ -155,8 +158,8 @@ const Option<R> table[] = {
 
     {"cube", &R::cube, "Blocks (--transfer blocks)", K, "Texels a side of a cubemap's face: 16, 32, 64, 128 or 256", 16,
      256},
-    {"visibility", &R::visibility, "Blocks (--transfer blocks)", K,
-     "binary, or bits:N, shares of texels in 2^N levels, for harsh light"},
+    {"visibility", &R::visibility, "Blocks (--transfer blocks)", K | W,
+     "binary, or bits:N, shares of texels in 2^N levels, for harsh light; of wavelets bits:4, of blocks binary"},
 
     {"surfels", &R::surfels, "Direct to indirect light (--transfer indirect)", I,
      "Points on surfaces that direct light is taken at, about; a quarter of them gather; 0: 16,384 to 65,536, by how "
@@ -260,7 +263,8 @@ bool has_no_quality(const BakeRequest& r) {
 Result<void> check_kind(const BakeRequest& r, BakeKind kind) {
   if (r.given.contains("bin_limit") && file_extension(r.output) != "gltf")
     return Error{"--bin-limit", "is of the files beside a .gltf: leave it out, or write one", true};
-  if (kind != BakeKind::diffuse && kind != BakeKind::lightmap && r.receivers != "vertices")
+  if (kind != BakeKind::diffuse && kind != BakeKind::lightmap && kind != BakeKind::wavelets &&
+      r.receivers != "vertices")
     return Error{"--receivers", std::string(bake_kind_names[int(kind)]) + " are received at vertices", true};
   if (!r.lattice.empty() && r.receivers != "vertices")
     return Error{"--receivers", "--lattice needs a bake at vertices", true};
@@ -297,6 +301,7 @@ BakeKind kind_of(const BakeRequest& r) {
   if (r.transfer == "lightmap") return BakeKind::lightmap;
   if (r.transfer == "blocks") return BakeKind::blocks;
   if (r.transfer == "indirect") return BakeKind::indirect;
+  if (r.light.starts_with("haar:")) return BakeKind::wavelets;
   return r.membrane.empty() ? BakeKind::diffuse : BakeKind::membrane;
 }
 
@@ -323,6 +328,7 @@ Result<BakeRequest> resolved(BakeRequest r) {
   if (auto ok = check_given(bake_options(), r, r.given, int(kind), bake_kind_names); !ok) return ok.error();
   if (auto ok = check_conflicts(r); !ok) return ok.error();
   if (auto ok = check_kind(r, kind); !ok) return ok.error();
+  if (kind == BakeKind::wavelets && !r.given.contains("visibility")) r.visibility = "bits:4";
   if (kind == BakeKind::factors || r.shadows == "off") r.bounces = "0";
   if (r.order == 0 && r.light.empty() && kind != BakeKind::lightmap && kind != BakeKind::blocks &&
       kind != BakeKind::indirect)

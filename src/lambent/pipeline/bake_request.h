@@ -5,7 +5,7 @@
 
 namespace lambent {
 
-enum class BakeKind { diffuse, matrix, factors, zonal, glossy_zonal, membrane, lightmap, blocks, indirect };
+enum class BakeKind { diffuse, matrix, factors, zonal, glossy_zonal, membrane, lightmap, blocks, indirect, wavelets };
 inline constexpr const char* bake_kind_names[] = {"diffuse transfer",
                                                   "matrix transfer",
                                                   "factors",
@@ -14,7 +14,8 @@ inline constexpr const char* bake_kind_names[] = {"diffuse transfer",
                                                   "membranes (--membrane)",
                                                   "lightmaps",
                                                   "blocks",
-                                                  "direct to indirect light"};
+                                                  "direct to indirect light",
+                                                  "wavelets (--light haar)"};
 std::span<const Option<BakeRequest>> bake_options();
 BakeKind kind_of(const BakeRequest& request);
 

@@ -20,6 +20,7 @@ constexpr DrawnKind kinds[] = {
 std::string why_not(const Field& field) {
   using std::string;
   if (std::holds_alternative<FixedView>(field.where)) return "is of a fixed view, a picture without surfaces";
+  if (std::holds_alternative<HaarTransfer>(field.store)) return "holds transfer in wavelets";
   if (std::holds_alternative<IndirectTransfer>(field.store)) return "holds direct-to-indirect transport";
   if (std::holds_alternative<CpcaTransfer>(field.store)) return "holds clusters";
   if (std::holds_alternative<FactoredTransfer>(field.store)) return "holds factors";

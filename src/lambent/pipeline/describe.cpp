@@ -101,6 +101,17 @@ Said say(const IndirectTransfer& t) {
           fmt::format("\n  rows of {:.0f} entries, to {:.2g} % RMS of what was gathered", each, 100 * t.error)};
 }
 
+Said say(const HaarTransfer& t) {
+  const double each = double(t.entries()) / double(std::max<size_t>(t.receivers, 1));
+  return {{{"cube", t.size},
+           {"rows", t.rows},
+           {"channels", t.channels},
+           {"wavelets_per_receiver", each},
+           {"compression_error", t.error}},
+          fmt::format("Haar wavelets of a cube of {} by column, {:.0f} of {} a receiver, to {:.2g} % RMS", t.size, each,
+                      human_count(t.columns()), 100 * t.error)};
+}
+
 Said say(const Rows& rows) {
   return std::visit(
       Overloaded{[](const DiffuseRows&) -> Said {
@@ -181,6 +192,7 @@ const char* kind_of(const Field& field) {
   return std::visit(
       Overloaded{[](const ZonalTransfer&) { return "zonal"; }, [](const FactoredTransfer&) { return "factors"; },
                  [](const Visibility&) { return "blocks"; }, [](const IndirectTransfer&) { return "indirect"; },
+                 [](const HaarTransfer&) { return "wavelets"; },
                  [&](const auto&) { return outgoing_of(field) ? "matrix" : "diffuse"; }},
       field.store);
 }
@@ -213,7 +225,7 @@ std::string describe_in_words(const Field& field) {
   // The kind goes first, unless the store says it; then what rows there are beyond one diffuse.
   const std::string kind = kind_of(field);
   const bool arrives = std::holds_alternative<IncidentRows>(field.rows);
-  if (kind != "zonal" && kind != "blocks" && kind != "indirect" && kind != rows.words && !arrives)
+  if (kind != "zonal" && kind != "blocks" && kind != "indirect" && kind != "wavelets" && kind != rows.words && !arrives)
     words.push_back(kind);
   if (kind == "diffuse" || (kind != "factors" && outgoing_of(field))) words.push_back(rows.words);
   words.push_back(store.words);

@@ -6,7 +6,6 @@
 #include <lambent/pipeline/draw_indirect.h>
 #include <lambent/pipeline/draw_moving.h>
 #include <lambent/pipeline/draw_texture.h>
-#include <lambent/pipeline/draw_wavelets.h>
 #include <lambent/pipeline/text.h>
 
 #include <fmt/format.h>
@@ -68,6 +67,12 @@ Result<Drawing> draw_columns(const Baked& baked, const DrawRequest& request, con
                           {"window", light.window},       {"relight_seconds", d.relight_seconds}};
   drawing.summary.lines.emplace_back(
       "relit", fmt::format("{} receivers in {:.2f} ms", human_count(d.receivers()), 1e3 * d.relight_seconds));
+  if (d.light.cube.size) {
+    drawing.summary.json.update({{"terms", d.reading.terms}, {"bytes_read", d.reading.bytes}});
+    drawing.summary.lines.emplace_back(
+        "read", fmt::format("{} wavelets of the light, {} of {}", human_count(d.reading.terms),
+                            human_bytes(double(d.reading.bytes)), human_bytes(double(bytes_of(baked.surface.store)))));
+  }
   drawing.summary.json["sharp_light"] = d.light.sharp;
   if (!d.light.peaks.empty())
     drawing.summary.lines.emplace_back(
@@ -86,7 +91,7 @@ Result<Drawing> draw(const Baked& baked, const DrawRequest& request, const Job& 
   if (std::holds_alternative<IndirectTransfer>(baked.surface.store)) return draw_indirect(baked, request, job);
   if (!request.place.empty()) return draw_moving(baked, request, job);
   if (!std::holds_alternative<SightRows>(baked.surface.rows)) return draw_columns(baked, request, job);
-  return is_columns_method(request.method) ? draw_wavelets(baked, request, job) : draw_blocks(baked, request, job);
+  return draw_blocks(baked, request, job);
 }
 
 Result<Drawing> draw(const DrawRequest& request, const Job& job) {

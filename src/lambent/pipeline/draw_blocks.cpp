@@ -30,8 +30,6 @@ Result<ProductMethod> parse_method(const std::string& text) {
   if (text.starts_with("haar:"))
     if (auto n = parse_numbers(text.substr(5), 1, "--method"); n && (*n)[0] > 0 && (*n)[0] <= 1)
       return ProductMethod{Product::haar, double((*n)[0])};
-  if (text.starts_with("columns"))
-    return Error{"--method", "columns is of `lambent render`: a window and a loop multiply at each receiver", true};
   return Error{
       "--method",
       "must be blocks, standard, haar, or haar:FRACTION with a fraction above 0 and up to 1, not \"" + text + "\"",

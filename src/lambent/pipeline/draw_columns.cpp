@@ -53,18 +53,25 @@ Result<void> choose_light(ColumnDrawing& d) {
   auto light = column_light(d.request, d.around, basis, d.scene().origin);
   if (!light) return light.error();
   d.light = std::move(*light);
+  if (const int size = cube_of(d.baked.surface.store)) {
+    const bool dark = !d.around.env || d.show.part == Show::Part::emission;
+    const Environment none{"", Image(2, 1), {}};
+    d.light.cube = cube_light(dark ? none : *d.around.env, size, d.around.rotation);
+  }
   if (std::holds_alternative<Outgoing>(d.rows)) soften_peaks(d.light);
   if (d.show.part != Show::Part::bounce) d.emission = seen_emission(d.scene(), basis, d.light.lamps);
   if (d.show.part == Show::Part::emission)
     std::fill(d.light.projection.light.begin(), d.light.projection.light.end(), Vec3(0.0f)), d.light.peaks.clear();
-  if (!d.request.env.empty() && basis.order == 0 && basis.lobes.empty() && !d.around.seen)
+  if (!d.request.env.empty() && basis.order == 0 && basis.lobes.empty() && d.light.cube.size == 0 && !d.around.seen)
     d.job.warn(d.request.baked + ": holds lamps alone, so that --env neither lights it nor, unseen, shows");
   return {};
 }
 
 Result<void> set_lights(ColumnDrawing& d) {
   for (Relighter& relighter : d.relighters)
-    if (auto ok = relighter.set_light(d.light.projection.light); !ok) return Error{d.request.baked, ok.error().message};
+    if (auto ok = d.light.cube.size ? relighter.set_light(d.light.cube) : relighter.set_light(d.light.projection.light);
+        !ok)
+      return Error{d.request.baked, ok.error().message};
   if (d.light.peaks.empty()) return {};
   for (Relighter& relighter : d.of_peaks)
     if (auto ok = relighter.set_light(d.light.peaks); !ok) return Error{d.request.baked, ok.error().message};
@@ -80,7 +87,7 @@ Result<void> make_relighters(ColumnDrawing& d) {
   else summed.push_back(&d.baked.surface);
   for (const Field* field : summed) {
     for (std::vector<Relighter>* relighters : {&d.relighters, &d.of_peaks}) {
-      auto relighter = Relighter::make(*field);
+      auto relighter = Relighter::make(*field, {.terms = size_t(d.request.terms)});
       if (!relighter) return Error{d.request.baked, relighter.error().message};
       relighters->push_back(std::move(*relighter));
     }
@@ -101,8 +108,11 @@ Result<void> relight(ColumnDrawing& d, const std::optional<Pose>& pose, Relit& o
     field = make_light_field(d.light.local(), receiver_positions(vertices, d.where(), d.receivers()));
     frame.light = &field;
   }
+  frame.reading = &d.reading;
   const auto start = std::chrono::steady_clock::now();
   if (auto ok = sum_relit(d.relighters, frame, out); !ok) return Error{d.request.baked, ok.error().message};
+  if (d.light.cube.size)  // few terms ring
+    for (float& v : out.values) v = std::max(v, 0.0f);
   if (d.light.peaks.empty()) peaks = {};
   else {
     frame.light = nullptr;  // near lamps are in none of the peaks

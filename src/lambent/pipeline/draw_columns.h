@@ -26,6 +26,7 @@ struct ColumnDrawing {
   std::vector<Relighter> relighters = {};  // what they give is summed
   std::vector<Relighter> of_peaks = {};    // the same of the light's peaks; none where nothing rings
   std::vector<Vec3> emission = {};
+  HaarReading reading = {};  // of wavelets
   double relight_seconds = 1e9;
 
   const Placement& where() const { return baked.surface.where; }

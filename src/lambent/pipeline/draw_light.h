@@ -1,5 +1,6 @@
 #pragma once
 // The light of a drawing.
+#include <lambent/light/cube_light.h>
 #include <lambent/light/environment.h>
 #include <lambent/pipeline/bake.h>
 #include <lambent/pipeline/draw_request.h>
@@ -32,6 +33,7 @@ struct ColumnLight {
   std::vector<Vec3> lamps;     // by group
   LightProjection projection;  // lamps are in its columns
   std::vector<SphereLamp> near;
+  CubeLight cube = {};  // the environment, for a store that takes light on one
   // What of the light is too sharp for its bands and rings, by column; empty where --window leaves it or there is none.
   std::vector<Vec3> peaks = {};
   double sharp = 0;  // the peaks' share of all light, where they are not empty

@@ -15,8 +15,8 @@ constexpr KindMask bit(DrawKind kind) { return KindMask(1) << int(kind); }
 constexpr KindMask D = bit(DrawKind::diffuse), C = bit(DrawKind::clusters), Z = bit(DrawKind::lobes),
                    M = bit(DrawKind::matrix), F = bit(DrawKind::factors), L = bit(DrawKind::lamps),
                    K = bit(DrawKind::blocks), V = bit(DrawKind::fixed_view), I = bit(DrawKind::indirect),
-                   T = bit(DrawKind::texture);
-constexpr KindMask every = D | C | Z | M | F | L | K | V | I | T, distant = every & ~I;
+                   W = bit(DrawKind::wavelets), T = bit(DrawKind::texture);
+constexpr KindMask every = D | C | Z | M | F | L | K | V | I | W | T, distant = every & ~I;
 
 const Option<R> table[] = {
     {"baked", &R::baked, "Files", every, "Baked file, from `lambent bake`; with --transfer-texture, any scene", 0, 0,
@@ -29,11 +29,11 @@ const Option<R> table[] = {
      nullptr, true, true},
     {"env-rotate", &R::env_rotate, "Light", every, "YAW,PITCH,ROLL: turn the environment, degrees about +Y, +X, +Z", 0,
      0, nullptr, "env"},
-    {"window", &R::window, "Light", distant & ~(L | K),
+    {"window", &R::window, "Light", distant & ~(L | K | W),
      "Against ringing of the harmonics: auto (light in shadow does not go below what the rest of the sky gives), hann, "
      "lanczos, or none",
      0, 0, "auto|hann|lanczos|none"},
-    {"light-order", &R::light_order, "Light", distant & ~(L | K),
+    {"light-order", &R::light_order, "Light", distant & ~(L | K | W),
      "Use only this many bands of the baked ones; lobes are kept", 1, max_sh_order},
     {"lamp", &R::lamp, "Light", D | C | M | L | V | I,
      "NAME=R,G,B: scale a group of lamps by this colour (files baked with --light-groups, and of direct to indirect "
@@ -82,10 +82,7 @@ const Option<R> table[] = {
      "bend:ANGLE[,along[,towards]] or twist:ANGLE[,along]: degrees from end to end, axes x, y or z"},
 
     {"method", &R::method, "Blocks", K,
-     "By blocks, standard (every texel), haar or haar:FRACTION (wavelets, kept coefficients), or columns or "
-     "columns:ERROR (wavelets of the transfer, diffuse, to that error of each receiver)"},
-    {"terms", &R::terms, "Blocks", K, "How many wavelets of the light are used, those that change most; 0: all", 0,
-     1 << 20, nullptr, "method=columns"},
+     "By blocks, standard (every texel), or haar or haar:FRACTION (wavelets, kept coefficients)"},
     {"brdf-samples", &R::brdf_samples, "Blocks", K,
      "How many BRDF samples a block gets: bounded, by the error; paper, by its appendix A; full, 256", 0, 0,
      "bounded|paper|full", "method=blocks"},
@@ -93,6 +90,9 @@ const Option<R> table[] = {
      "brdf-samples=bounded"},
     {"indirect", &R::indirect, "Blocks", K, "sh adds light that has bounced, by a diffuse bake in harmonics", 0, 0,
      "none|sh"},
+
+    {"terms", &R::terms, "Wavelets", W, "How many wavelets of the light are used, those that change most; 0: all", 0,
+     1 << 20},
 
     {"transfer-texture", &R::transfer_texture, "Transfer textures", T,
      "Shade the scene by this texture of zonal lobes, from `lambent patch`; over a bake that kept incident light, in "
@@ -126,9 +126,6 @@ constexpr Conflict conflicts[] = {
     {"move", "animation", "moves objects over a scene at rest: leave the animation out"},
     {"insert", "show=emission|bounce:|sum:", "is lit by all light at once: no --show of a part of it"},
     {"tolerance", "method=standard|haar", "needs --method blocks"},
-    {"tolerance", "method=columns", "needs --method blocks"},
-    {"brdf", "method=columns", "has no effect by --method columns, which is diffuse by base colour"},
-    {"indirect", "method=columns", "is not added by --method columns"},
     {"lamp", "show=albedo", "lights what --show albedo shows no light of"},
     {"sphere-lamp", "show=albedo|emission", "lights what --show leaves out"},
     {"window", "show=albedo|emission", "shapes light that --show leaves out"},
@@ -159,6 +156,7 @@ DrawKind kind_of(const Field& surface) {
   if (std::holds_alternative<SightRows>(surface.rows)) return DrawKind::blocks;
   if (std::holds_alternative<PixelRows>(surface.rows)) return DrawKind::fixed_view;
   if (std::holds_alternative<ZonalTransfer>(surface.store)) return DrawKind::lobes;
+  if (std::holds_alternative<HaarTransfer>(surface.store)) return DrawKind::wavelets;
   if (std::holds_alternative<IndirectTransfer>(surface.store)) return DrawKind::indirect;
   if (std::holds_alternative<FactoredTransfer>(surface.store)) return DrawKind::factors;
   if (std::holds_alternative<CpcaTransfer>(surface.store)) return DrawKind::clusters;
@@ -253,7 +251,8 @@ Result<void> check_draw(const DrawRequest& request, const Baked& baked) {
   if (auto ok = check_show(request, *show, baked); !ok) return ok;
   const LightBasis light = light_of(baked.surface.store);
   const bool lit = show->part != Show::Part::emission && show->colour != RenderOptions::Show::albedo;
-  if (lit && (light.order > 0 || !light.lobes.empty()) && request.env.empty() && request.sphere_lamp.empty())
+  if (lit && (light.order > 0 || !light.lobes.empty() || kind == DrawKind::wavelets) && request.env.empty() &&
+      request.sphere_lamp.empty())
     return Error{"--env", "is needed: the file is baked for distant light", true};
   if (light.order == 0 && is_given(request, "window"))
     return Error{"--window", "shapes harmonics, and the file is baked for none", true};

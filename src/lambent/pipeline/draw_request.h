@@ -28,7 +28,8 @@ struct DrawRequest {
   // Blocks
   std::string method = "blocks", brdf_samples = "bounded", indirect = "none";
   float tolerance = 0.2f;
-  int terms = 0;  // of the light's wavelets; 0: all
+  // Wavelets
+  int terms = 0;  // of the light's; 0: all
   // Transfer textures
   std::string transfer_texture, tile = "1,1", groove_map;
   float groove_depth = 0, groove_width = 1;  // depth 0: the table's deepest
@@ -40,12 +41,24 @@ struct DrawRequest {
 };
 
 // By what the rows mean and the store can do.
-enum class DrawKind { diffuse, clusters, lobes, matrix, factors, lamps, blocks, fixed_view, indirect, texture };
+enum class DrawKind {
+  diffuse,
+  clusters,
+  lobes,
+  matrix,
+  factors,
+  lamps,
+  blocks,
+  fixed_view,
+  indirect,
+  wavelets,
+  texture
+};
 inline constexpr const char* draw_kind_names[] = {
-    "diffuse transfer", "clusters",    "lobes",
-    "matrices",         "factors",     "lamps alone (lightmaps, fixed light)",
-    "blocks",           "fixed views", "direct to indirect light",
-    "transfer textures"};
+    "diffuse transfer", "clusters",         "lobes",
+    "matrices",         "factors",          "lamps alone (lightmaps, fixed light)",
+    "blocks",           "fixed views",      "direct to indirect light",
+    "wavelets",         "transfer textures"};
 std::span<const Option<DrawRequest>> draw_options();
 DrawKind kind_of(const Field& surface);
 

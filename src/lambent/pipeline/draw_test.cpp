@@ -195,6 +195,7 @@ TEST_F(Drawings, NoOptionIsLeftAsideInSilence) {
                                                     {DrawKind::blocks, "blocks"},
                                                     {DrawKind::fixed_view, "diffuse_fixed_view"},
                                                     {DrawKind::indirect, "indirect"},
+                                                    {DrawKind::wavelets, "wavelets"},
                                                     {DrawKind::texture, ""}};
   for (const auto& [kind, name] : files) {
     DrawRequest base{.baked = std::string(LAMBENT_GOLDEN) + "/" + name + ".glb", .env = sky, .background = "none"};

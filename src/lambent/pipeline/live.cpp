@@ -370,7 +370,7 @@ Result<void> LivePicture::ask(const DrawRequest& request) {
   const DrawRequest before = s.asked;
   const bool sky = !is_same(before, request, {"env", "light-order", "window"}) ||
                    before.environment != request.environment;
-  const bool materials = !is_same(before, request, {"brdf", "show", "method", "brdf-samples", "tolerance", "insert"});
+  const bool materials = !is_same(before, request, {"brdf", "show", "method", "brdf-samples", "tolerance", "terms", "insert"});
   const bool places = !is_same(before, request, {"place", "move"});
   const bool time = before.time != request.time;
   const bool objects = places || !is_same(before, request, {"insert"}) || (time && !request.move.empty());
@@ -417,8 +417,8 @@ Result<void> LivePicture::look_as(Look look, int coefficient) {
   const size_t columns = s.light_basis().count();
   if (look == Look::coefficient && (s.blocks || size_t(std::max(0, coefficient)) >= columns || coefficient < 0))
     return Error{"look",
-                 s.blocks ? "visibility in blocks has no coefficients"
-                          : "the file has coefficients 0 to " + std::to_string(columns - 1),
+                 columns == 0 ? "blocks and wavelets have no coefficients to show"
+                              : "the file has coefficients 0 to " + std::to_string(columns - 1),
                  true};
   if (look == Look::coefficient && !std::holds_alternative<DiffuseRows>(s.rows))
     return Error{"look", "one coefficient is of diffuse transfer", true};

@@ -43,6 +43,8 @@ size_t stored_bytes(const BakePlan& plan, const BakeRequest& r, size_t receivers
     // A quarter of the surfels gather some 200 entries of two bytes each.
     case BakeKind::indirect:
       return std::max<size_t>(plan.indirect.surfels, 16384) * (44 + 100) + receivers * kernel_slots * 4;
+    // Where hardly any coefficient is 0.
+    case BakeKind::wavelets: return receivers * cube_texels(plan.visibility.size);
     case BakeKind::blocks: return expected_visibility_bytes(receivers, plan.visibility);
   }
   return 0;
@@ -84,8 +86,8 @@ Result<void> check_file_size(const BakePlan& plan, const BakeRequest& r, const S
                              size_t groups) {
   // What is stored in another form than it is baked in is not known before.
   if (file_extension(r.output) != "glb" || !r.compress.empty() || !r.fix_view.empty() || !r.fix_light.empty() ||
-      plan.kind == BakeKind::blocks || plan.kind == BakeKind::indirect || plan.kind == BakeKind::zonal ||
-      plan.kind == BakeKind::glossy_zonal)
+      plan.kind == BakeKind::blocks || plan.kind == BakeKind::wavelets || plan.kind == BakeKind::indirect ||
+      plan.kind == BakeKind::zonal || plan.kind == BakeKind::glossy_zonal)
     return {};
   const bool coloured = plan.bake.bounces > 0 && r.subsurface.empty() && has_coloured_albedo(scene);
   const size_t each = stored_bytes(plan, r, receivers, groups, coloured ? 3 : 1);

@@ -5,29 +5,86 @@
 #include <lambent/core/parallel.h>
 
 #include <algorithm>
-#include <atomic>
 #include <bit>
-#include <numeric>
+#include <cstring>
+#include <utility>
 
+#undef HWY_TARGET_INCLUDE
+#define HWY_TARGET_INCLUDE "lambent/relight/relight_haar.cpp"
+#include <hwy/foreach_target.h>
+#include <hwy/highway.h>
+
+#ifndef LAMBENT_RELIGHT_HAAR_COLUMNS
+#define LAMBENT_RELIGHT_HAAR_COLUMNS
 namespace lambent {
 namespace {
 
-struct alignas(16) HaarSum {
-  float value[4];
+// A column on its way through a chunk.
+struct ColumnCursor {
+  const uint8_t* at;
+  uint64_t tiles;
+  Vec3 color;
 };
+// So many go through a chunk together: each tile's sums are in the first cache for all of them, and that many streams
+// are still fetched ahead.
+constexpr size_t columns_together = 16;
 
-// Adds a column, scaled, to the sums of a chunk.
-void add_column(std::span<const uint8_t> bytes, Vec3 scale, HaarSum* sums) {
-  const float by[4] = {scale.x, scale.y, scale.z, 0};
-  HaarSum* at = sums - 1;
-  const uint8_t* const end = bytes.data() + bytes.size();
-  for (const uint8_t* p = bytes.data(); p != end; p += 2) {
-    at += p[0];
+}  // namespace
+}  // namespace lambent
+#endif
+
+HWY_BEFORE_NAMESPACE();
+namespace lambent {
+namespace {
+namespace HWY_NAMESPACE {
+namespace hn = hwy::HWY_NAMESPACE;
+
+// A column's next tile, where it has one there, times its colour, onto [r, g, b][receiver in tile].
+HWY_INLINE void AddTile(ColumnCursor& column, float* HWY_RESTRICT sums) {
+  const hn::CappedTag<float, 16> d;
+  const float r = column.color.x, g = column.color.y, b = column.color.z;
+  const uint8_t* p = column.at;
+  const size_t count = *p++;
+  if (count == 0) {
+    const auto vr = hn::Set(d, r), vg = hn::Set(d, g), vb = hn::Set(d, b);
+    for (size_t i = 0; i < haar_tile; i += hn::Lanes(d), sums += hn::Lanes(d)) {
+      const auto levels = hn::LoadU(hn::Rebind<int8_t, decltype(d)>(), reinterpret_cast<const int8_t*>(p) + i);
+      const auto q = hn::ConvertTo(d, hn::PromoteTo(hn::Rebind<int32_t, decltype(d)>(), levels));
+      hn::StoreU(hn::MulAdd(q, vr, hn::LoadU(d, sums)), d, sums);
+      hn::StoreU(hn::MulAdd(q, vg, hn::LoadU(d, sums + haar_tile)), d, sums + haar_tile);
+      hn::StoreU(hn::MulAdd(q, vb, hn::LoadU(d, sums + 2 * haar_tile)), d, sums + 2 * haar_tile);
+    }
+    column.at = p + haar_tile;
+    return;
+  }
+  for (size_t i = 0; i < count; ++i, p += 2) {
+    float* at = sums + p[0];
     const float q = float(int8_t(p[1]));
-    for (int k = 0; k < 4; ++k) at->value[k] += q * by[k];
+    at[0] += q * r, at[haar_tile] += q * g, at[2 * haar_tile] += q * b;
+  }
+  column.at = p;
+}
+
+// Adds columns, in their order, to the sums of a chunk: [tile][r, g, b][receiver].
+void AddColumns(ColumnCursor* columns, size_t count, float* sums) {
+  uint64_t tiles = 0;
+  for (size_t i = 0; i < count; ++i) tiles |= columns[i].tiles;
+  for (; tiles; tiles &= tiles - 1) {
+    const int tile = std::countr_zero(tiles);
+    for (size_t i = 0; i < count; ++i)
+      if (columns[i].tiles >> tile & 1) AddTile(columns[i], sums + 3 * haar_tile * size_t(tile));
   }
 }
 
+}  // namespace HWY_NAMESPACE
+}  // namespace
+}  // namespace lambent
+HWY_AFTER_NAMESPACE();
+
+#if HWY_ONCE
+namespace lambent {
+namespace {
+HWY_EXPORT(AddColumns);
 }  // namespace
 
 HaarTerms haar_terms(const HaarTransfer& t, std::span<const float> norms, const CubeLight& light, size_t count) {
@@ -62,26 +119,37 @@ HaarTerms haar_terms(const HaarTransfer& t, std::span<const float> norms, const 
   return out;
 }
 
-void relight(const HaarTransfer& t, const HaarTerms& light, Relit& out, size_t* read) {
+void relight(const HaarTransfer& t, const HaarTerms& light, Relit& out, HaarReading* reading) {
   out.rows = 1;
   out.values.resize((t.receivers + transfer_block - 1) / transfer_block * 3 * transfer_block);
-  std::atomic<size_t> bytes{0};
   parallel_for(t.chunks(), 1, [&](size_t begin, size_t end) {
-    thread_local std::vector<HaarSum> sums(haar_chunk);
+    thread_local std::vector<float> sums(3 * haar_chunk);
+    const auto add_columns = HWY_DYNAMIC_DISPATCH(AddColumns);
     for (size_t chunk = begin; chunk < end; ++chunk) {
       const size_t first = chunk * haar_chunk, count = std::min(haar_chunk, t.receivers - first);
-      std::fill_n(sums.begin(), count, HaarSum{});
-      size_t here = 0;
+      std::fill(sums.begin(), sums.end(), 0.0f);
+      ColumnCursor together[columns_together];
+      size_t waiting = 0;
       for (size_t i = 0; i < light.columns.size(); ++i) {
-        const std::span<const uint8_t> column = t.column(chunk, light.columns[i]);
-        add_column(column, light.values[i], sums.data()), here += column.size();
+        const auto column = t.column(chunk, light.columns[i]);
+        if (column.empty()) continue;
+        ColumnCursor& c = together[waiting++];
+        c = {column.data() + sizeof c.tiles, 0, light.values[i]};
+        std::memcpy(&c.tiles, column.data(), sizeof c.tiles);
+        if (waiting == columns_together) add_columns(together, std::exchange(waiting, 0), sums.data());
       }
-      bytes += here;
-      for (size_t r = 0; r < (count + transfer_block - 1) / transfer_block * transfer_block; ++r)
-        out.set(first + r, 0, r < count ? Vec3(sums[r].value[0], sums[r].value[1], sums[r].value[2]) : Vec3(0.0f));
+      add_columns(together, waiting, sums.data());
+      for (size_t r = 0; r < (count + transfer_block - 1) / transfer_block * transfer_block; ++r) {
+        const float* at = sums.data() + r / haar_tile * 3 * haar_tile + r % haar_tile;
+        out.set(first + r, 0, r < count ? Vec3(at[0], at[haar_tile], at[2 * haar_tile]) : Vec3(0.0f));
+      }
     }
   });
-  if (read) *read += bytes;
+  if (!reading) return;
+  *reading = {light.columns.size(), 0};
+  for (size_t chunk = 0; chunk < t.chunks(); ++chunk)
+    for (uint32_t c : light.columns) reading->bytes += t.column(chunk, c).size();
 }
 
 }  // namespace lambent
+#endif  // HWY_ONCE

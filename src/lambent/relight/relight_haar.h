@@ -16,8 +16,13 @@ struct HaarTerms {
 // column's norm (haar_column_norms()). The cube has the transfer's size.
 HaarTerms haar_terms(const HaarTransfer& transfer, std::span<const float> norms, const CubeLight& light, size_t count);
 
-// T . light of white receivers, by those terms; the sum of each receiver has a fixed order. `read`, where it is given:
-// bytes of columns that were read.
-void relight(const HaarTransfer& transfer, const HaarTerms& light, Relit& out, size_t* read = nullptr);
+// What a relighting by wavelets has read.
+struct HaarReading {
+  size_t terms = 0, bytes = 0;  // of the light; of the transfer's columns
+};
+
+// T . light of white receivers, by those terms; the sum of each receiver has a fixed order. `reading`, where it is
+// given, is set.
+void relight(const HaarTransfer& transfer, const HaarTerms& light, Relit& out, HaarReading* reading = nullptr);
 
 }  // namespace lambent

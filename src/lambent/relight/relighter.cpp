@@ -93,6 +93,31 @@ struct OfSurfels : Columns {
   }
 };
 
+Result<void> check_cube(const CubeLight& cube, int size) {
+  if (cube.size == size) return {};
+  return wrong("the light is on a cube of " + std::to_string(cube.size) + " texels a side, the transfer on one of " +
+               std::to_string(size));
+}
+
+struct OfWavelets {
+  const HaarTransfer& store;
+  size_t count;
+  std::vector<float> norms;
+  bool ready = false;
+  HaarTerms terms = {};
+  OfWavelets(const HaarTransfer& s, size_t n) : store(s), count(n), norms(haar_column_norms(s)) {}
+  Result<void> set(const CubeLight& cube) {
+    if (auto ok = check_cube(cube, store.size); !ok) return ok;
+    ready = true, terms = haar_terms(store, norms, cube, count);
+    return {};
+  }
+  Result<void> relight(const RelightFrame& frame, Relit& out) {
+    if (auto ok = at_rest(frame); !ok) return ok;
+    lambent::relight(store, terms, out, frame.reading);
+    return {};
+  }
+};
+
 struct OfBlocks {
   const Visibility& store;
   RelighterOptions options;
@@ -102,9 +127,7 @@ struct OfBlocks {
   ProductScratch scratch = {};
   std::vector<uint32_t> all = {};
   Result<void> set(const CubeLight& cube) {
-    if (cube.size != store.size)
-      return wrong("the light is on a cube of " + std::to_string(cube.size) +
-                   " texels a side, the visibility on one of " + std::to_string(store.size));
+    if (auto ok = check_cube(cube, store.size); !ok) return ok;
     ready = true;
     lambent::set_light(light, cube);
     if (options.product == Product::haar) haar = make_haar_light(cube, options.haar_fraction);
@@ -134,7 +157,8 @@ Result<void> check_products(const Visibility& v, const RelighterOptions& o) {
   return {};
 }
 
-using AnyStore = std::variant<OfColumns<Transfer>, OfColumns<CpcaTransfer>, OfLobes, OfFactors, OfBlocks, OfSurfels>;
+using AnyStore =
+    std::variant<OfColumns<Transfer>, OfColumns<CpcaTransfer>, OfLobes, OfFactors, OfBlocks, OfSurfels, OfWavelets>;
 
 struct Make {
   const Field& field;
@@ -144,6 +168,7 @@ struct Make {
   AnyStore operator()(const ZonalTransfer& t) const { return OfLobes(t, options.direct_lobes); }
   AnyStore operator()(const FactoredTransfer& t) const { return OfFactors(t, *outgoing_of(field)); }
   AnyStore operator()(const IndirectTransfer& t) const { return OfSurfels(t, options.albedos); }
+  AnyStore operator()(const HaarTransfer& t) const { return OfWavelets(t, options.terms); }
   AnyStore operator()(const Visibility& v) const { return OfBlocks{v, std::move(options)}; }
 };
 
@@ -164,6 +189,9 @@ Result<Relighter> Relighter::make(const Field& field, RelighterOptions options) 
   if (!is_consistent(field)) return wrong("placement, store and rows of the field do not fit one another");
   if (const auto* v = std::get_if<Visibility>(&field.store))
     if (auto ok = check_products(*v, options); !ok) return ok.error();
+  if (const auto* t = std::get_if<HaarTransfer>(&field.store);
+      t && !(is_cube_size(t->size) && std::has_single_bit(unsigned(t->size))))
+    return wrong("wavelets want a cube of 16, 32, 64, 128 or 256 texels a side");
   if (const auto* t = std::get_if<IndirectTransfer>(&field.store)) {
     if (auto ok = check_indirect(*t, "relighter"); !ok) return ok.error();
     if (!options.albedos.empty() && options.albedos.size() != t->surfels.count())
@@ -189,7 +217,7 @@ Result<void> Relighter::set_light(std::span<const Vec3> columns) {
           s.set(columns);
           return {};
         } else {
-          return wrong("visibility in blocks takes light on a cube");
+          return wrong("this transfer takes light on a cube");
         }
       },
       state_->store);
@@ -197,7 +225,8 @@ Result<void> Relighter::set_light(std::span<const Vec3> columns) {
 
 Result<void> Relighter::set_light(const CubeLight& light) {
   if (auto* blocks = std::get_if<OfBlocks>(&state_->store)) return blocks->set(light);
-  return wrong("this transfer takes a coefficient a column; visibility in blocks takes light on a cube");
+  if (auto* wavelets = std::get_if<OfWavelets>(&state_->store)) return wavelets->set(light);
+  return wrong("this transfer takes a coefficient a column; blocks and wavelets take light on a cube");
 }
 
 Result<void> Relighter::relight(const RelightFrame& frame, Relit& out) {

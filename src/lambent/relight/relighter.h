@@ -3,6 +3,7 @@
 // to know which.
 #include <lambent/relight/indirect.h>
 #include <lambent/relight/products.h>
+#include <lambent/relight/relight_haar.h>
 #include <lambent/relight/zonal.h>
 #include <lambent/transfer/field.h>
 
@@ -21,6 +22,8 @@ struct RelighterOptions {
   double haar_fraction = 0.01;
   // Direct to indirect light: other albedos of the surfels than were baked, one each; empty: those.
   std::vector<Vec3> albedos = {};
+  // Haar wavelets: how many of the light's are used, those that change most; 0: all.
+  size_t terms = 0;
 };
 
 // What changes from frame to frame.
@@ -36,6 +39,7 @@ struct RelightFrame {
   bool keep = false;
   std::optional<std::span<const uint32_t>> seen = std::nullopt;
   Breakdown* breakdown = nullptr;  // of blocks; added to
+  HaarReading* reading = nullptr;  // of wavelets; set
 };
 
 // See above; errors name what does not fit, in a line.
@@ -50,14 +54,14 @@ class Relighter {
   ~Relighter();
 
   const Field& field() const;
-  LightBasis light() const;  // the columns that set_light() takes; none of visibility in blocks, nor of surfels
+  LightBasis light() const;  // the columns that set_light() takes; none of blocks, surfels, wavelets
   size_t receivers() const;
   int rows() const;  // of what relight() gives: what the field's Rows mean; of visibility one, exit radiance
 
   // One coefficient of radiance a column, light().count() of them; of direct to indirect light instead one a surfel:
   // exit radiance of a white surface there by direct light alone. Errors: another number; a store without columns.
   Result<void> set_light(std::span<const Vec3> columns);
-  // For visibility in blocks. Errors: another store; a cube of another size than the visibility's.
+  // For visibility in blocks, and for wavelets. Errors: another store; a cube of another size than the store's.
   Result<void> set_light(const CubeLight& light);
 
   // T . light at every receiver; may be called from one thread at a time, and works on all cores. The first call sizes

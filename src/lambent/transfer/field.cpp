@@ -17,12 +17,17 @@ size_t most_receivers(const std::vector<uint32_t>& a, const std::vector<uint32_t
 }  // namespace
 
 LightBasis light_of(const Store& store) {
-  return std::visit(
-      Overloaded{[](const Transfer& t) { return t.light; }, [](const CpcaTransfer& t) { return t.light; },
-                 [](const ZonalTransfer& t) { return LightBasis{.order = t.order}; },
-                 [](const FactoredTransfer& t) { return LightBasis{.order = t.light_order()}; },
-                 [](const Visibility&) { return LightBasis{}; }, [](const IndirectTransfer&) { return LightBasis{}; }},
-      store);
+  return std::visit(Overloaded{[](const Transfer& t) { return t.light; }, [](const CpcaTransfer& t) { return t.light; },
+                               [](const ZonalTransfer& t) { return LightBasis{.order = t.order}; },
+                               [](const FactoredTransfer& t) { return LightBasis{.order = t.light_order()}; },
+                               [](const auto&) { return LightBasis{}; }},
+                    store);
+}
+
+int cube_of(const Store& store) {
+  return std::visit(Overloaded{[](const Visibility& v) { return v.size; }, [](const HaarTransfer& t) { return t.size; },
+                               [](const auto&) { return 0; }},
+                    store);
 }
 
 size_t receivers_of(const Store& store) {
@@ -56,7 +61,7 @@ int channels_of(const Store& store) {
 }
 
 const char* name_of(const Store& store) {
-  static constexpr const char* names[] = {"dense", "clusters", "lobes", "factors", "blocks", "surfels"};
+  static constexpr const char* names[] = {"dense", "clusters", "lobes", "factors", "blocks", "surfels", "wavelets"};
   static_assert(std::size(names) == std::variant_size_v<Store>);
   return names[store.index()];
 }

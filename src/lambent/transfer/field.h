@@ -3,12 +3,13 @@
 //   where    Placement   vertices, texels of an atlas, patches (triangles), a lattice in free space, pixels of a
 //   picture, shells about an object light    LightBasis  the columns of the store: harmonics, lobes, lamps by group
 //   (transfer.h) how      Store dense, clustered, zonal lobes, factored, visibility in blocks, direct to indirect light
-//   over surfels meaning  Rows what the rows of T . light are
+//   over surfels, Haar wavelets meaning  Rows what the rows of T . light are
 // A stage that treats stores, placements or rows differently visits them, so that a new kind does not compile until
 // each stage has said what becomes of it.
 #include <lambent/core/camera.h>
 #include <lambent/transfer/cpca_transfer.h>
 #include <lambent/transfer/directional.h>
+#include <lambent/transfer/haar_transfer.h>
 #include <lambent/transfer/indirect.h>
 #include <lambent/transfer/lattice.h>
 #include <lambent/transfer/outgoing.h>
@@ -68,18 +69,20 @@ struct FactoredTransfer {
   int incident_order = 0;
   int light_order() const { return visibility.light.order - incident_order + 1; }
 };
-using Store = std::variant<Transfer, CpcaTransfer, ZonalTransfer, FactoredTransfer, Visibility, IndirectTransfer>;
+using Store =
+    std::variant<Transfer, CpcaTransfer, ZonalTransfer, FactoredTransfer, Visibility, IndirectTransfer, HaarTransfer>;
 
 // Of any store.
-// The columns; none of visibility, which takes all of any environment, and of direct to indirect light, which takes
-// direct light at its surfels.
+// The columns; none of visibility and of wavelets, which take light on a cube, and of direct to indirect light, which
+// takes direct light at its surfels.
 LightBasis light_of(const Store& store);
+int cube_of(const Store& store);  // texels a side of the cube that light is taken on; 0 where it is not
 size_t receivers_of(const Store& store);
 size_t bytes_of(const Store& store);
 int rows_of(const Store& store);     // that are stored; 0 of visibility
 int rows_relit(const Store& store);  // that relighting makes of those; of visibility 1
 int channels_of(const Store& store);
-const char* name_of(const Store& store);  // "dense", "clusters", "lobes", "factors", "blocks", "surfels"
+const char* name_of(const Store& store);  // "dense", "clusters", "lobes", "factors", "blocks", "surfels", "wavelets"
 
 // MEANING of the rows of T . light.
 struct DiffuseRows {};  // one: exit radiance of a white surface

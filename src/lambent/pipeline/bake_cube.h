@@ -1,0 +1,17 @@
+#pragma once
+// Bakes over a cube of directions: visibility in blocks, and diffuse transfer in wavelets, which is made of it.
+#include <lambent/bake/bake.h>
+#include <lambent/pipeline/bake_parse.h>
+
+namespace lambent {
+
+// What the receivers see; what it says of itself goes to the report and the summary. Warns of glass that it cannot
+// hold. Errors: those of bake_visibility().
+Result<Visibility> bake_visibility_of_plan(const BakePlan& plan, const Tracer& tracer, const Receivers& receivers,
+                                           const Job& job, BakeReport& report, Summary& summary);
+
+// That times the cosine, in wavelets. Errors: cancelled.
+Result<HaarTransfer> fit_haar_of_plan(const BakePlan& plan, const Visibility& seen, const Receivers& receivers,
+                                      const Job& job, Summary& summary, nlohmann::json& told);
+
+}  // namespace lambent
