@@ -134,6 +134,8 @@ Rows posed_rows(const ColumnDrawing& d, const std::optional<Pose>& pose) {
 Result<void> make_insertions(ColumnDrawing& d, std::span<const std::shared_ptr<const InsertedObject>> known) {
   d.inserted.clear();
   if (d.insertions.empty()) return {};
+  if (const auto* outgoing = std::get_if<Outgoing>(&d.rows))
+    if (auto ok = check_insertion(*outgoing, d.scene().path); !ok) return ok;
   const Field& field = *lattice_of(d.baked);
   for (const Insertion& insertion : d.insertions) {
     const auto same = std::find_if(known.begin(), known.end(), [&](const auto& o) { return o->of == insertion; });

@@ -17,6 +17,14 @@ void append_side(std::vector<uint32_t>& a, size_t count, const std::vector<uint3
 
 }  // namespace
 
+Result<void> check_insertion(const Outgoing& o, const std::string& path) {
+  if (o.kind != OutgoingKind::map && o.kind != OutgoingKind::svd)
+    return Error{path, std::string("objects cannot be inserted into a scene baked with outgoing rows of kind ") +
+                           outgoing_names[int(o.kind)] + ", only with map or svd"};
+  if (o.maps.size() > 65535) return Error{path, "has too many view maps to insert an object"};
+  return {};
+}
+
 Result<void> insert_object(RelitScene& into, const Scene& object, const Receivers& receivers, const Transfer& transfer,
                            const Lattice& lattice, const Relit& light) {
   LAMBENT_CHECK(transfer.rows == 1 && transfer.receivers == receivers.count() &&
@@ -25,11 +33,7 @@ Result<void> insert_object(RelitScene& into, const Scene& object, const Receiver
   LAMBENT_CHECK(first + added < none);
   if (into.outgoing) {
     Outgoing& o = *into.outgoing;
-    if (o.kind != OutgoingKind::map && o.kind != OutgoingKind::svd)
-      return Error{into.scene.path,
-                   std::string("objects cannot be inserted into a scene baked with outgoing rows of kind ") +
-                       outgoing_names[int(o.kind)] + ", only with map or svd"};
-    if (o.maps.size() > 65535) return Error{into.scene.path, "has too many view maps to insert an object"};
+    if (auto ok = check_insertion(o, into.scene.path); !ok) return ok;
     // Lambert's law: the first row, times the colour, in every view.
     ViewMap lambert{2, into.relit.rows, std::vector<ViewWeights>(4 * size_t(into.relit.rows), ViewWeights(0.0f))};
     for (size_t node = 0; node < 4; ++node) lambert.values[node * size_t(into.relit.rows)] = ViewWeights(0, 0, 0, 1);

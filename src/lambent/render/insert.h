@@ -18,10 +18,13 @@ struct RelitScene {
   std::optional<Outgoing> outgoing;  // none: diffuse
 };
 
+// Whether a diffuse object can be put among surfaces of that last reflection. Errors name `path`: it has no rows to
+// spare for a diffuse surface (neither map nor svd), or has too many maps.
+Result<void> check_insertion(const Outgoing& outgoing, const std::string& path);
+
 // Appends a diffuse object. `transfer` is its own diffuse transfer, baked alone where it stands, of harmonics up to the
 // lattice's order: each of its receivers is lit by lattice light at its place, as if it were the same all over the
-// object. Errors: the last reflection is of a kind with no rows to spare for a diffuse surface (neither map nor svd),
-// or has too many maps.
+// object. Errors: check_insertion()'s.
 Result<void> insert_object(RelitScene& into, const Scene& object, const Receivers& receivers, const Transfer& transfer,
                            const Lattice& lattice, const Relit& light);
 
