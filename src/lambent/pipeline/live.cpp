@@ -370,7 +370,8 @@ Result<void> LivePicture::ask(const DrawRequest& request) {
   const DrawRequest before = s.asked;
   const bool sky = !is_same(before, request, {"env", "light-order", "window"}) ||
                    before.environment != request.environment;
-  const bool materials = !is_same(before, request, {"brdf", "show", "method", "brdf-samples", "tolerance", "terms", "insert"});
+  const bool materials =
+      !is_same(before, request, {"brdf", "show", "method", "brdf-samples", "tolerance", "terms", "insert"});
   const bool places = !is_same(before, request, {"place", "move"});
   const bool time = before.time != request.time;
   const bool objects = places || !is_same(before, request, {"insert"}) || (time && !request.move.empty());
