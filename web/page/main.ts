@@ -1,6 +1,14 @@
 // The page: controls, the wipe, files that are opened or dropped, and every message a user may see.
 import { Euler, MathUtils, Vector3 } from 'three';
-import { LambentError, NoTransferError, shBand, shIndex, shWindows, type ShWindow } from '../src/index.js';
+import {
+  LambentError,
+  NoTransferError,
+  shBand,
+  shIndex,
+  shWindows,
+  type Reflection,
+  type ShWindow,
+} from '../src/index.js';
 import {
   fetchFile,
   loadManifest,
@@ -19,7 +27,7 @@ import { connectLobes, connectWipe } from './hands.js';
 import { connectSharing } from './sharing.js';
 import { highestSun, lowestSun, parseSky, type Sky } from './sky.js';
 import { defaultState, formatState, parseState, type State, type View } from './state.js';
-import { showSurface } from './surface.js';
+import { showSurface, takeReflection } from './surface.js';
 import { showFrameTime, showStatistics } from './statistics.js';
 import { tones, type Tone } from './tone.js';
 import { falseColorEnd, falseColorGain, fitErrorEnd, Viewer } from './viewer.js';
@@ -121,12 +129,13 @@ class Page {
     input('free').checked = state.free;
     // Sight has no bands to leave out, and surfaces that are free.
     get('order-row').hidden = get('window-row').hidden = transfer?.reflection !== undefined;
-    if (transfer?.reflection && state.brdf) transfer.reflection = state.brdf;
-    showSurface(transfer?.reflection, (to) => {
-      state.brdf = to;
-      if (viewer.bakedScene) viewer.bakedScene.transfer.reflection = to;
-      this.apply();
-    });
+    const makeSurfaces = (brdf: Reflection): void => {
+      state.brdf = takeReflection(transfer!, brdf, viewer.renderer, (error) =>
+        showProblem(sentence(document.title, error)),
+      );
+    };
+    if (transfer?.reflection && state.brdf) makeSurfaces(state.brdf);
+    showSurface(transfer?.reflection, (to) => (makeSurfaces(to), this.apply()));
     get('play').hidden = !viewer.hasAnimation;
     document.body.classList.toggle('bare', !state.ui);
     this.apply();

@@ -1,5 +1,5 @@
 // What surfaces are made of, where that is free (visibility in blocks): the controls, and the text of the address.
-import type { Reflection } from '../src/index.js';
+import type { BakedTransfer, Reflection, Renderer } from '../src/index.js';
 import { get, input, select } from './dom.js';
 
 export type Model = Reflection['model'];
@@ -93,4 +93,21 @@ export function showSurface(of: Reflection | undefined, change: (to: Reflection)
       change(made);
     };
   }
+}
+
+/** Makes a scene of it, and says of what it is now: diffuse, where the graphics card does not draw that. */
+export function takeReflection(
+  transfer: BakedTransfer,
+  of: Reflection,
+  renderer: Renderer,
+  onProblem: (error: unknown) => void,
+): Reflection {
+  transfer.reflection = of;
+  try {
+    transfer.check(renderer);
+  } catch (error) {
+    transfer.reflection = { model: 'diffuse' };
+    onProblem(error);
+  }
+  return transfer.reflection;
 }

@@ -103,8 +103,7 @@ class Reader {
       last = int(this.options.receivers - 1),
       r = select(number.lessThan(last), number, last).toVar(),
       place = ivec2(r.mod(int(receiverColumns)).mul(int(2)), r.div(int(receiverColumns))).toVar();
-    const load = (x: number): Node<'vec4'> =>
-      textureLoad(this.places, place.add(ivec2(x, 0))).toVar();
+    const load = (x: number): Node<'vec4'> => textureLoad(this.places, place.add(ivec2(x, 0))).toVar();
     const p = load(0),
       n = load(1);
     return {

@@ -159,8 +159,8 @@ vec3 prtRuns( const in Changes c, const in int b ) {
   return sum;
 }
 
-// 1, 16 or 256 samples (1, 2, 3) for models of which nothing is known but values: 1 where they are alike, 16 where those
-// give the middle's value back.
+// 1, 16 or 256 samples (1, 2, 3) for models of which nothing is known but values: 1 where they are alike, 16 where
+// those give the middle's value back.
 int prtByValues( const in int b, const in float middle ) {
   const float w[ 4 ] = float[ 4 ]( ${atMiddle.join(', ')} );
   float least = middle, most = middle, back = 0.0;

@@ -1,15 +1,14 @@
 // Visibility in blocks (docs/blocks.md; docs/file-format.md, kind "blocks"): sharp shadows of light that turns, of
-// materials that change. Records lie as they are in a texture. What a surface scatters evenly is drawn into a
-// picture, a texel a receiver, when the light changes; what its lobe reflects into another one, when the light, the eye
-// or the material does. Meshes look both up.
+// materials that change. Records lie as they are in a texture. What a surface scatters evenly is drawn into a picture,
+// a texel a receiver, when the light changes (block_sum.ts: where the card is a program, summed by this one); what its
+// lobe reflects into another one, when the light, the eye or the material does. Meshes look both up.
 //
 // Budget: the file's bytes, 32 a receiver for its place and normal, 16 for each picture; of the light 48 bytes a texel
-// of the cube, 80 more and 960 a block where materials shine.
+// of the cube, 32 more and 768 a block where materials shine.
 import {
   DataArrayTexture,
   DataTexture,
   FloatType,
-  Matrix3,
   MeshBasicMaterial,
   NearestFilter,
   RedIntegerFormat,
@@ -19,12 +18,15 @@ import {
   type IUniform,
   type Material,
   type Mesh,
-  type SkinnedMesh,
+  type Texture,
+  type WebGLRenderer,
   type WebGLProgramParametersWithUniforms,
 } from 'three';
+import { isSoftware, sumBlocks, type BlockSumOptions } from './block_sum.js';
 import { BlockLight, widestBlock } from './block_light.js';
+import { placeReceivers } from './block_places.js';
 import { blockTolerance, diffuseOf, lobeOf, samplesOf, type Reflection } from './block_reflection.js';
-import { wordColumns, diffuseShader, glossShader, pictureColumns, receiverColumns } from './block_shader.js';
+import { wordColumns, diffuseShader, glossShader, pictureColumns } from './block_shader.js';
 import { checkRecords, recordBegins } from './block_records.js';
 import { blockSide, cubeBlocks, maxCube } from './cube.js';
 import { LambentError } from './errors.js';
@@ -50,7 +52,7 @@ import { bindPart } from './vertex_transfer.js';
 
 /** What all meshes of one file share. */
 interface Shared {
-  diffuse: DrawnPicture;
+  even: EvenPicture;
   gloss: DrawnPicture;
   light: BlockLight;
   reflection: { value: Reflection };
@@ -109,9 +111,9 @@ class BlocksMaterial extends MeshBasicMaterial {
 
   override onBeforeRender(...drawn: Drawn): void {
     const [renderer, , camera] = drawn,
-      { diffuse, gloss, reflection, eye } = this.shared,
+      { even, gloss, reflection, eye } = this.shared,
       shines = reflection.value.model !== 'diffuse';
-    diffuse.update(renderer);
+    even.update(renderer);
     if (shines) {
       const now = new Vector3().setFromMatrixPosition(camera.matrixWorld);
       if (!now.equals(eye)) {
@@ -130,12 +132,8 @@ class BlocksMaterial extends MeshBasicMaterial {
   }
 
   private patch(shader: WebGLProgramParametersWithUniforms): void {
-    const { diffuse, gloss, share } = this.shared;
-    Object.assign(shader.uniforms, {
-      prtEven: { value: diffuse.target.texture },
-      prtShine: { value: gloss.target.texture },
-      prtShare: share,
-    });
+    const { even, gloss, share } = this.shared;
+    Object.assign(shader.uniforms, { prtEven: even.shown, prtShine: { value: gloss.target.texture }, prtShare: share });
     shader.vertexShader =
       vertexDeclarations +
       replaceOnce(shader.vertexShader, '#include <fog_vertex>', '#include <fog_vertex>' + vertexBody);
@@ -164,6 +162,45 @@ class ReceiverPicture extends DrawnPicture {
   define(defines: Record<string, number>): void {
     Object.assign((this.material.defines ??= {}), defines);
     this.material.needsUpdate = true;
+  }
+}
+
+/** Exit radiance of white: drawn by the graphics card, or summed by the processor. */
+class EvenPicture {
+  /** What there is now. */
+  readonly shown: { value: Texture };
+  private table: DataTexture | undefined;
+  private isStale = true;
+
+  constructor(
+    readonly drawn: ReceiverPicture,
+    private readonly options: BlockSumOptions,
+  ) {
+    this.shown = { value: drawn.target.texture };
+  }
+
+  get bytes(): number {
+    return this.drawn.bytes;
+  }
+  refresh(): void {
+    this.isStale = true;
+    this.drawn.refresh();
+  }
+  update(renderer: WebGLRenderer): void {
+    if (!isSoftware(renderer) && this.drawn.isDrawnBy(renderer)) return this.drawn.update(renderer);
+    const { width, height } = this.drawn.target;
+    if (!this.table) {
+      this.table = new DataTexture(new Float32Array(4 * width * height), width, height, RGBAFormat, FloatType);
+      this.shown.value = this.table;
+    }
+    if (!this.isStale) return;
+    this.isStale = false;
+    sumBlocks(this.options, this.table.image.data as Float32Array);
+    this.table.needsUpdate = true;
+  }
+  dispose(): void {
+    this.drawn.dispose();
+    this.table?.dispose();
   }
 }
 
@@ -234,7 +271,15 @@ class BlocksTransfer implements BakedTransfer {
       },
     );
     const reflection: Shared['reflection'] = { value: { model: 'diffuse' } };
-    this.shared = { diffuse, gloss: this.gloss, light: this.light, reflection, eye, share: { value: 1 } };
+    const even = new EvenPicture(diffuse, {
+      records,
+      places: this.places.image.data as Float32Array,
+      begins,
+      sums: sums.value.image.data as Float32Array,
+      cube,
+      bits,
+    });
+    this.shared = { even, gloss: this.gloss, light: this.light, reflection, eye, share: { value: 1 } };
     const { sight, places, light } = this;
     this.nodes = nodes?.blocks({ sight, places, light, cube, bits, receivers });
     this.refusal = nodes ? undefined : withoutNodes;
@@ -264,7 +309,7 @@ class BlocksTransfer implements BakedTransfer {
       bytes(sight) +
       bytes(places) +
       light.bytes +
-      shared.diffuse.bytes +
+      shared.even.bytes +
       (this.reflection.model === 'diffuse' ? 0 : gloss.bytes) +
       (this.nodes?.bytes ?? 0) +
       this.vertexBytes
@@ -296,7 +341,8 @@ class BlocksTransfer implements BakedTransfer {
 
   check(renderer: Renderer): void {
     if (isNodeRenderer(renderer)) return checkNodes(renderer, this.refusal);
-    this.shared.diffuse.check(renderer);
+    this.shared.even.drawn.checkSize(renderer);
+    if (this.reflection.model !== 'diffuse') this.gloss.check(renderer);
     const { maxTextureSize, maxVertexTextures } = renderer.capabilities,
       { width, height } = this.light.sums.value.image,
       most = Math.max(width, height, wordColumns, this.places.image.height);
@@ -316,7 +362,7 @@ class BlocksTransfer implements BakedTransfer {
 
   relight(lighting: Lighting): void {
     this.light.set(lighting.onCube(this.light.size));
-    this.shared.diffuse.refresh();
+    this.shared.even.refresh();
     this.gloss.refresh();
     this.nodes?.refresh();
   }
@@ -326,7 +372,7 @@ class BlocksTransfer implements BakedTransfer {
     this.sight.dispose();
     this.places.dispose();
     this.light.dispose();
-    this.shared.diffuse.dispose();
+    this.shared.even.dispose();
     this.gloss.dispose();
     for (const material of this.materials.values()) material.dispose();
     for (const mesh of this.meshes) mesh.geometry.dispose();
@@ -348,88 +394,6 @@ function recordTexture(records: Uint8Array): DataArrayTexture {
   made.name = 'lambent visibility';
   made.format = RedIntegerFormat;
   made.type = UnsignedIntType;
-  made.minFilter = made.magFilter = NearestFilter;
-  made.generateMipmaps = false;
-  made.needsUpdate = true;
-  return made;
-}
-
-/** Places and unit normals of vertices in the world; normals on the side that the triangles' fronts are on. */
-function surfaceOf(mesh: Mesh): { positions: Float32Array; normals: Float32Array } {
-  mesh.updateWorldMatrix(true, false);
-  const { geometry, matrixWorld } = mesh,
-    count = geometry.getAttribute('position').count,
-    [positions, normals, fronts] = [
-      new Float32Array(3 * count),
-      new Float32Array(3 * count),
-      new Float32Array(3 * count),
-    ],
-    turn = new Matrix3().getNormalMatrix(matrixWorld),
-    own = geometry.getAttribute('normal'),
-    skin = 'isSkinnedMesh' in mesh ? (mesh as SkinnedMesh) : undefined,
-    [p, n, a, b, c] = Array.from({ length: 5 }, () => new Vector3()) as [Vector3, Vector3, Vector3, Vector3, Vector3];
-  if (!own) throw new LambentError('has a mesh without normals, which visibility in blocks was baked for');
-  for (let v = 0; v < count; ++v) {
-    mesh.getVertexPosition(v, p);
-    n.fromBufferAttribute(own, v);
-    if (skin) {
-      a.fromBufferAttribute(geometry.getAttribute('position'), v);
-      n.add(a);
-      n.copy(skin.applyBoneTransform(v, n)).sub(skin.applyBoneTransform(v, a));
-    }
-    p.applyMatrix4(matrixWorld).toArray(positions, 3 * v);
-    n.applyMatrix3(turn)
-      .normalize()
-      .toArray(normals, 3 * v);
-  }
-  const corners = geometry.index?.count ?? count,
-    isMirrored = matrixWorld.determinant() < 0;
-  for (let i = 0; i + 2 < corners; i += 3) {
-    const at = [0, 1, 2].map((k) => geometry.index?.getX(i + k) ?? i + k);
-    [a, b, c].forEach((corner, k) => corner.fromArray(positions, 3 * at[k]!));
-    b.sub(a)
-      .cross(c.sub(a))
-      .multiplyScalar(isMirrored ? -1 : 1);
-    for (const v of at) for (let k = 0; k < 3; ++k) fronts[3 * v + k]! += b.getComponent(k);
-  }
-  for (let v = 0; v < 3 * count; v += 3) {
-    const along = normals[v]! * fronts[v]! + normals[v + 1]! * fronts[v + 1]! + normals[v + 2]! * fronts[v + 2]!;
-    if (along < 0) for (let k = 0; k < 3; ++k) normals[v + k] = -normals[v + k]!;
-  }
-  return { positions, normals };
-}
-
-/**
- * Two texels a receiver: its place and the lower 24 bits of where its record begins, its normal and the upper ones.
- * As the scene stands now, which is as it was baked.
- */
-function placeReceivers(meshes: readonly Mesh[], receivers: number, begins: Float64Array): DataTexture {
-  const height = Math.ceil(receivers / receiverColumns),
-    data = new Float32Array(8 * receiverColumns * height),
-    done = new Uint8Array(receivers);
-  for (let r = 0; r < receivers; ++r) {
-    data[8 * r + 3] = begins[r]! % 2 ** 24;
-    data[8 * r + 7] = Math.floor(begins[r]! / 2 ** 24);
-  }
-  for (const mesh of meshes) {
-    const { positions, normals } = surfaceOf(mesh);
-    for (const [name, sign] of [
-      ['lambentReceiver', 1],
-      ['lambentReceiverBack', -1],
-    ] as const) {
-      if (!mesh.geometry.hasAttribute(name)) continue;
-      const map = mesh.geometry.getAttribute(name);
-      for (let v = 0; v < map.count; ++v) {
-        const r = map.getX(v);
-        if (r === noReceiver || done[r]) continue;
-        done[r] = 1;
-        data.set(positions.subarray(3 * v, 3 * v + 3), 8 * r);
-        for (let k = 0; k < 3; ++k) data[8 * r + 4 + k] = sign * normals[3 * v + k]!;
-      }
-    }
-  }
-  const made = new DataTexture(data, 2 * receiverColumns, height, RGBAFormat, FloatType);
-  made.name = 'lambent receivers';
   made.minFilter = made.magFilter = NearestFilter;
   made.generateMipmaps = false;
   made.needsUpdate = true;

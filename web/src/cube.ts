@@ -321,7 +321,7 @@ function directions(size: number, moment: Float64Array): Float32Array {
   return out;
 }
 
-/** A map with factor x factor texels made one, energy kept, no wider than that; as it is where its sides do not divide. */
+/** A map with n x n texels made one, energy kept, no wider than that; as it is where its sides do not divide. */
 export function reducedMap(map: LatLongMap, most: number): LatLongMap {
   const { data, width, height, channels } = map;
   let factor = Math.max(1, Math.ceil(width / most));
