@@ -99,6 +99,7 @@ TEST(Browser, RefusesAllElseByName) {
   EXPECT_TRUE(has(why(VertexPlacement{}, CpcaTransfer{}, DiffuseRows{}), "clusters"));
   EXPECT_TRUE(has(why(FixedView{}, Transfer{}, PixelRows{}), "fixed view"));
   EXPECT_TRUE(has(why(VertexPlacement{}, HaarTransfer{}, DiffuseRows{}), "wavelets"));
+  EXPECT_EQ(why(VertexPlacement{}, Visibility{}, SightRows{}), "");
   EXPECT_TRUE(has(why(VertexPlacement{}, FactoredTransfer{}, Outgoing{}), "factors"));
   EXPECT_TRUE(has(why(VertexPlacement{}, Transfer{{.lobes = {{}}}}, DiffuseRows{}), "lobes of light"));
   EXPECT_TRUE(has(why(VertexPlacement{}, Transfer{{.groups = {"a"}}}, DiffuseRows{}), "lamps"));
