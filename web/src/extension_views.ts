@@ -18,6 +18,7 @@ export const viewKeys: readonly string[] = [
   'parents',
   'positions',
   'scales',
+  'steps',
   'surfels',
   'texels',
   'valid',

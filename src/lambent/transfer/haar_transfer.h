@@ -18,8 +18,10 @@
 
 namespace lambent {
 
-// Receivers whose sums stay in a core's cache while column after column is added, in tiles of 64.
-inline constexpr size_t haar_tile = 64, haar_chunk = 64 * haar_tile;
+// Receivers side by side that have their entries together.
+inline constexpr size_t haar_tile = 64;
+// Receivers whose sums stay in a core's cache while column after column is added.
+inline constexpr size_t haar_chunk = 64 * haar_tile;
 // With so many entries a tile has the values of all its receivers: that is read several times as fast.
 inline constexpr size_t haar_whole = haar_tile / 2;
 
