@@ -1,12 +1,14 @@
 #!/usr/bin/env python3
-"""Prints SOURCE;GROUP;... of sources to compile together: up to eight of a folder, of which no two give the same name
-to a helper of their own (in namespace {}), an alias or a macro. Those of Highway, which includes them once a target,
-are left out, and stay on their own. Usage: groups.py FILE..."""
-import collections
+"""Prints SOURCE;GROUP;... of sources to compile together, some BYTES of them: the longest first, each where least is.
+No two of a group give the same name to a helper of their own (in namespace {}), an alias or a macro, nor one to such a
+helper and another, in a header that it includes, to what it declares. Sources of Highway, which includes them once a
+target, are left out, and stay on their own. Usage: groups.py FILE..."""
+import functools
 import pathlib
 import re
 import sys
 
+BYTES = 120_000  # beyond, headers are a small part of what is compiled, and the last groups wait for one core
 DECLARED = re.compile(r"(?:struct|class|enum class|enum) (\w+)|(?:[\w:<>,&*\[\] ]+[ &*>])?(\w+)\s*(?:\(|=|\{|\[|;)")
 
 
@@ -28,18 +30,34 @@ def helpers(source, text):
                 break
 
 
-groups = collections.defaultdict(list)  # folder -> [(sources, their helpers)]
-for source in sys.argv[1:]:
-    text = pathlib.Path(source).read_text()
-    if "#include <hwy/" in text:
-        continue
-    folder, names = pathlib.Path(source).parent, dict(helpers(source, text))
-    for sources, taken in groups[folder]:
-        if len(sources) < 8 and all(taken.get(name, meaning) == meaning for name, meaning in names.items()):
-            break
-    else:
-        groups[folder].append((sources := [], taken := {}))
-    sources.append(source)
-    taken.update(names)
-print(end=";".join(f"{source};{'_'.join(folder.parts)}_{number}" for folder, of_folder in groups.items()
-                   for number, (sources, _) in enumerate(of_folder) for source in sources))
+@functools.cache
+def includes(file):
+    """Headers of the project that a file includes, and what those include."""
+    named = re.findall(r'^#include [<"]([^>"]+)[>"]', file.read_text(errors="surrogateescape"), re.M)
+    found = [path for name in named for folder in (file.parent, pathlib.Path("src"), pathlib.Path("tests"))
+             if (path := folder / name).exists()]
+    return set(found).union(*map(includes, found))
+
+
+@functools.cache
+def declared(header):
+    """What a header declares in namespaces: names at the beginning of a line."""
+    lines = header.read_text(errors="surrogateescape").split("\n")
+    return {found[1] or found[2] for line in lines if line[:1] > " " and (found := DECLARED.match(line))}
+
+
+texts = {source: text for source in sys.argv[1:]
+         if "#include <hwy/" not in (text := pathlib.Path(source).read_text(errors="surrogateescape"))}
+groups = []  # [sources, their helpers, their bytes]
+for source, text in sorted(texts.items(), key=lambda item: (-len(item[1]), item[0])):
+    names = {name: "" for header in includes(pathlib.Path(source)) for name in declared(header)}
+    names.update(helpers(source, text))
+    fits = [group for group in groups if group[2] + len(text) <= BYTES
+            and all(group[1].get(name, meaning) == meaning for name, meaning in names.items())]
+    if not fits:
+        groups.append([[], {}, 0])
+    group = min(fits, key=lambda group: group[2], default=groups[-1])
+    group[0].append(source)
+    group[1].update(names)
+    group[2] += len(text)
+print(end=";".join(f"{source};{number}" for number, (sources, _, _) in enumerate(groups) for source in sorted(sources)))

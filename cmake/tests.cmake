@@ -3,16 +3,21 @@ target_link_libraries(lambent-tests PRIVATE lambent GTest::gtest GTest::gtest_ma
   fmt::fmt OpenEXR::OpenEXR TBB::tbb CLI11::CLI11
   PkgConfig::webp draco::draco $<LINK_ONLY:meshoptimizer::meshoptimizer>)
 set(lambent_golden ${CMAKE_CURRENT_SOURCE_DIR}/tests/golden)
-# Not of every test: a path on the command line is one that the compiler's cache cannot share with other checkouts.
-set_property(SOURCE src/lambent/c/lambent_test.cpp src/lambent/pipeline/draw_test.cpp
-  src/lambent/pipeline/golden_test.cpp src/lambent/pipeline/live_test.cpp src/lambent/pipeline/draw_indirect_test.cpp
-  APPEND PROPERTY COMPILE_DEFINITIONS LAMBENT_GOLDEN="${lambent_golden}")
+# Not of every test: a path on the command line is one that the compiler's cache cannot share with other checkouts, as
+# it cannot where sources are compiled together, which are named by whole paths.
+if(LAMBENT_TOGETHER)
+  target_compile_definitions(lambent-tests PRIVATE LAMBENT_GOLDEN="${lambent_golden}")
+else()
+  set_property(SOURCE src/lambent/c/lambent_test.cpp src/lambent/pipeline/draw_test.cpp
+    src/lambent/pipeline/golden_test.cpp src/lambent/pipeline/live_test.cpp src/lambent/pipeline/draw_indirect_test.cpp
+    APPEND PROPERTY COMPILE_DEFINITIONS LAMBENT_GOLDEN="${lambent_golden}")
+endif()
 target_include_directories(lambent-tests PRIVATE ${CMAKE_CURRENT_SOURCE_DIR}/tests)
 target_compile_options(lambent-tests PRIVATE -Wall -Wextra -Wno-missing-field-initializers)
 # Most of what a test compiles are these headers.
 target_precompile_headers(lambent-tests PRIVATE <gtest/gtest.h> <algorithm> <cmath> <filesystem> <functional> <map>
   <string> <variant> <vector>)
-lambent_compile_together(lambent-tests ${lambent_tests})
+lambent_compile_together(lambent-tests ${lambent_tests} ${tool_tests})
 # What is hot in tests is the library: less optimised they build in two thirds of the time, and under the sanitizers
 # those of the readers in a third.
 target_compile_options(lambent-tests PRIVATE $<IF:$<BOOL:${LAMBENT_SANITIZE}>,-O0,$<$<CONFIG:Release>:-O1>>)

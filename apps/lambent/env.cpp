@@ -29,7 +29,7 @@ Image side_by_side(const Environment& env, std::span<const Vec3> light) {
 }
 
 int run_env(Context& context, const EnvCommand& o, const CLI::App& command) {
-  if (auto ok = check_display(o.display, command, o.output); !ok) return fail(ok.error());
+  if (auto ok = check_display_options(o.display, command, o.output); !ok) return fail(ok.error());
   if (!o.output.empty())
     if (auto ok = check_output(o.output, {"png", "exr"}); !ok) return fail(ok.error());
   auto rotation = light_rotation(o.light);

@@ -41,11 +41,11 @@ void DisplayOptions::add_to(CLI::App& command) {
       ->capture_default_str();
 }
 
-Result<void> check_display(const DisplayOptions& options, const CLI::App& command, const std::string& output) {
+Result<void> check_display_options(const DisplayOptions& options, const CLI::App& command, const std::string& output) {
   for (const char* option : {"--exposure", "--tone"})
     if (command.count(option) && file_extension(output) == "exr")
       return Error{option, "is for a PNG; an EXR keeps radiance as it is", true};
-  return lambent::check_display(options.exposure, options.tone);
+  return check_display(options.exposure, options.tone);
 }
 
 Result<void> save_shown(const std::string& output, const Image& image, const DisplayOptions& options) {

@@ -28,7 +28,7 @@ struct DisplayOptions {
   void add_to(CLI::App& command);
 };
 // Errors: as parse_display(), and options that were given for an EXR.
-Result<void> check_display(const DisplayOptions& options, const CLI::App& command, const std::string& output);
+Result<void> check_display_options(const DisplayOptions& options, const CLI::App& command, const std::string& output);
 Result<void> save_shown(const std::string& output, const Image& image, const DisplayOptions& options);
 
 struct ViewOptions {

@@ -56,7 +56,7 @@ Result<void> stand_lamps(Scene& scene, const std::vector<std::string>& texts, Re
 }
 
 int run_reference(Context& context, ReferenceCommand o, const CLI::App& command) {
-  if (auto ok = check_display(o.view.display, command, o.view.output); !ok) return fail(ok.error());
+  if (auto ok = check_display_options(o.view.display, command, o.view.output); !ok) return fail(ok.error());
   if (auto ok = check_output(o.view.output, {"png", "exr"}); !ok) return fail(ok.error());
   auto rotation = light_rotation(o.light);
   if (!rotation) return fail(rotation.error());
