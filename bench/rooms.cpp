@@ -1,6 +1,8 @@
 // Rooms that are joined, sweep by sweep, against the same scene baked whole with the same rays: residuals, and what is
 // left of the difference after so many sweeps. The whole, by two seeds, says what the rays alone are off. A made
 // building of twelve rooms and a hall; LAMBENT_ROOMS_SCENE: a file instead. LAMBENT_ROOMS_RAYS (256) a receiver.
+// LAMBENT_ROOMS_LOSS (0.01): what light fields may lose, "inf": they are everywhere, 0: nowhere. LAMBENT_ROOMS_CELLS
+// (32 16): of a field's place and direction.
 #include "bench.h"
 
 #include <lambent/bake/rooms.h>
@@ -11,6 +13,7 @@
 
 #include <cmath>
 #include <cstdlib>
+#include <sstream>
 
 namespace lambent::bench {
 namespace {
@@ -45,13 +48,14 @@ void bench_rooms() {
   if (!whole || !again) return fmt::print(stderr, "skipped: {}\n", (whole ? again : whole).error().text());
   const std::vector<Room> rooms = find_rooms(scene, 64);
   RoomsOptions how{.residual = 1e-3};
+  if (const char* loss = std::getenv("LAMBENT_ROOMS_LOSS")) how.loss = std::strtod(loss, nullptr);
+  if (const char* cells = std::getenv("LAMBENT_ROOMS_CELLS")) std::istringstream(cells) >> how.places >> how.directions;
   RoomsReport told;
+  how.keep_sweeps = true;
+  auto joined = bake_rooms(scene, receivers, rooms, options, how, nullptr, &told);
+  if (!joined) return fmt::print(stderr, "skipped: {}\n", joined.error().text());
   std::vector<double> differences;
-  for (how.most_sweeps = 1; how.most_sweeps <= 20 && !told.converged; ++how.most_sweeps) {
-    auto joined = bake_rooms(scene, receivers, rooms, options, how, nullptr, &told);
-    if (!joined) return fmt::print(stderr, "skipped: {}\n", joined.error().text());
-    differences.push_back(difference_of(*joined, *whole));
-  }
+  for (const Transfer& t : told.sweeps) differences.push_back(difference_of(t, *whole));
   report("rooms_joined", differences.back(), difference_of(*again, *whole), "relative RMS over receivers",
          "two seeds of the whole",
          {{"receivers", receivers.count()},
@@ -60,6 +64,10 @@ void bench_rooms() {
           {"openings", told.openings},
           {"nodes", told.nodes},
           {"lost", told.lost},
+          {"handed", told.handed},
+          {"handed_rays", told.handed_rays},
+          {"loss", told.loss},
+          {"loss_of_all", told.loss_of_all},
           {"residuals", told.residuals},
           {"differences", differences}});
 }

@@ -120,6 +120,12 @@ Exit RoomSpace::exit(size_t room, Vec3 origin, Vec3 direction, const Hit& hit) c
   return out;
 }
 
+void RoomSpace::clear_nodes() {
+  for (Opening& o : openings) o.node.assign(o.handed ? 0 : o.node.size(), none), o.node.shrink_to_fit();
+  nodes_of.assign(rooms.size(), {});
+  rays_ = {}, counts_ = {}, number_ = {};
+}
+
 void RoomSpace::take(const Crossing& crossing, std::vector<std::vector<uint32_t>>& fresh) {
   Opening& o = openings[crossing.exit.opening];
   uint32_t& node = o.node[crossing.exit.cell];

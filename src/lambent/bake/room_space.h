@@ -19,6 +19,7 @@ struct Opening {
   Bounds face;
   int across[2] = {1, 1};      // cells of place along the two other axes, in the order axis + 1, axis + 2
   std::vector<uint32_t> node;  // of each cell [direction][place], `none` where nobody has met it
+  bool handed = false;         // it has no light field: rays go on beyond it
 };
 
 // Where a ray goes: into a surface, out of the scene, or through an opening.
@@ -59,6 +60,8 @@ class RoomSpace {
   Result<RoomGeometry> geometry(size_t room, const Scene& scene) const;
   // Of a ray from within a room, given what it meets there.
   Exit exit(size_t room, Vec3 origin, Vec3 direction, const Hit& hit) const;
+  // No nodes, as before any was found.
+  void clear_nodes();
   // Notes a ray at its node, of which the keys that are least are kept. New nodes go to the room beyond.
   void take(const Crossing& crossing, std::vector<std::vector<uint32_t>>& fresh);
   std::span<const NodeRay> rays_of(uint32_t node) const {

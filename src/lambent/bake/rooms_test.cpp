@@ -108,6 +108,46 @@ TEST(Rooms, JoinToTheSceneBakedWhole) {
   EXPECT_LT(found, 0.025) << "noise of the rays alone: " << noise;  // what --quality good asks for
 }
 
+// In the open, where nothing closes what is cut, light fields blur what is seen of the sky; measured as such, they give
+// way to rays that are handed on, and what is left is the rounding of places on the cuts.
+TEST(Rooms, InTheOpenRaysAreHandedOn) {
+  SKIP_UNDER_SANITIZERS();
+  const Scene scene = make_courtyard(0.25f);
+  auto tracer = Tracer::build(scene);
+  const Receivers receivers = make_vertex_receivers(scene);
+  const BakeOptions options = plain(64);
+  auto whole = bake(scene, *tracer, receivers, options);
+  ASSERT_TRUE(whole);
+  const Bounds all = room_bounds(scene);
+  const Vec3 middle = 0.5f * (all.min + all.max);
+  std::vector<Room> rooms;
+  for (int i = 0; i < 4; ++i) {
+    Bounds box = all;
+    (i % 2 ? box.min.x : box.max.x) = middle.x, (i / 2 ? box.min.z : box.max.z) = middle.z;
+    rooms.push_back({std::to_string(i), box});
+  }
+  const auto joined = [&](double loss, RoomsReport& told) {
+    auto t = bake_rooms(scene, receivers, rooms, options,
+                        {.residual = 1e-3, .places = 8, .directions = 6, .loss = loss}, nullptr, &told);
+    EXPECT_TRUE(t) << t.error().text();
+    return t ? difference(*t, *whole) : 1.0;
+  };
+  RoomsReport blurred, measured, exact;
+  const double by_fields = joined(INFINITY, blurred), by_both = joined(0.01, measured), by_rays = joined(0, exact);
+  RecordProperty("by_fields", std::to_string(by_fields)), RecordProperty("by_both", std::to_string(by_both));
+  RecordProperty("by_rays", std::to_string(by_rays)), RecordProperty("loss", std::to_string(measured.loss_of_all));
+  printf("fields %g both %g rays %g loss %g left %g handed %zu of %zu rays %zu\n", by_fields, by_both, by_rays,
+         measured.loss_of_all, measured.loss, measured.handed, measured.openings, measured.handed_rays);
+  EXPECT_EQ(blurred.handed, 0u);
+  EXPECT_EQ(exact.handed, exact.openings);
+  EXPECT_EQ(exact.nodes, 0u);
+  EXPECT_GT(measured.handed, 0u);
+  EXPECT_LE(measured.loss, 0.01);
+  EXPECT_LT(by_rays, 0.01);
+  EXPECT_LT(by_both, 0.02);
+  EXPECT_GT(by_fields, 2 * by_both);
+}
+
 TEST(Rooms, TheSameBytesWhateverTheThreadsAndTheMemory) {
   const Scene scene = make_building(2, 0.9f);
   const Receivers receivers = make_vertex_receivers(scene);
