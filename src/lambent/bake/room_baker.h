@@ -1,5 +1,6 @@
 #pragma once
 // A bake by rooms under way (rooms.h): its rows are traced in room_rows.cpp and solved for in rooms.cpp.
+#include <lambent/basis/sh_rotation_zyz.h>
 #include <lambent/bake/block_builder.h>
 #include <lambent/bake/columns.h>
 #include <lambent/bake/kept_rows.h>
@@ -22,13 +23,15 @@ struct RowScratch {
   BlockBuilder rows;
   AlignedVector<float> x, y, z;
   std::vector<Hit> hits;
-  std::vector<float> harmonics, sky;
+  std::vector<float> harmonics, sky, excess;
+  ShZyzRotator rotator;
+  size_t open = 0;  // rays of the row at hand that leave the scene
 };
 
 // What a block of rows is beside its rows: its sky, [row][coefficient], and counts of its rays.
 struct BlockFacts {
   std::vector<float> e;
-  std::array<uint32_t, gather_block> backs{};  // rays that met the back of something
+  std::array<uint32_t, gather_block> backs{}, fields{};  // rays of rows that met the back of something, or a field
   uint64_t crossed = 0, lost = 0;
 };
 
@@ -70,7 +73,7 @@ struct RoomBaker {
   // The same rows' entries by rays that were handed on, which are all kept; of each block, whether it has any.
   std::unique_ptr<KeptRows> handed{};
   std::vector<uint8_t> has_handed{};
-  std::vector<uint32_t> backs{};  // of rows: rays that were handed on and met the back of something
+  std::vector<uint32_t> backs{}, fields{};  // of rows, as in BlockFacts
   uint64_t crossed = 0, lost = 0, handed_rays = 0;
   size_t handed_bytes = 0;  // of rows
 
@@ -94,6 +97,7 @@ struct RoomBaker {
     double change = 0, all = 0;
   };
   void assign_receivers();
+  void share_rooms();
   Result<void> find_all_nodes();
   void number_rows();
   void arrange_filling();
@@ -115,11 +119,14 @@ struct RoomBaker {
   void each_ray(size_t room, const RoomGeometry& geometry, size_t block, size_t i, RowScratch& s, F f) const;
   void add_surface(size_t room, const std::array<uint32_t, 3>& receiver, float u, float v, Vec3 reflected,
                    RowScratch& s) const;
+  void begin_row(RowScratch& s) const;
   void add_sky(Vec3 direction, RowScratch& s) const;
+  void end_row(size_t room, size_t block, size_t i, RowScratch& s, BlockFacts& facts) const;
   void trace_block(size_t room, const RoomGeometry& geometry, size_t block, RowScratch& s, SparseBlock& out,
                    BlockFacts& facts);
   Result<void> trace_room(size_t room, const KeptPieces& pieces, ProgressStage& stage);
   Result<void> trace();
+  Result<void> decide_buried();
   size_t fixed_bytes() const;
   std::unique_ptr<RowScratch> make_scratch() const;
   Pool<RowScratch> scratch{[this] { return make_scratch(); }};

@@ -49,13 +49,12 @@ Result<std::vector<Traveller>> RoomBaker::leave(std::span<const HandedBlock> blo
 void RoomBaker::pack_handed(const HandedBlock& at, std::span<const Traveller> ends, PackedBlock& out,
                             BlockFacts& facts) {
   const auto s = scratch.borrow();
-  const size_t stride = std::max(size_t(options.samples), size_t(most_node_rays)), rays = rays_in(at.room, at.block);
+  const size_t stride = std::max(size_t(options.samples), size_t(most_node_rays));
   facts.e.assign(gather_block * coefficients, 0.0f);
   s->rows.begin_block();
   size_t next = 0;
   for (size_t i = 0; i < gather_block; ++i) {
-    s->rows.begin_row();
-    std::fill(s->sky.begin(), s->sky.end(), 0.0f);
+    begin_row(*s);
     for (; next < ends.size() && ends[next].tag / stride % gather_block == i; ++next) {
       const Traveller& t = ends[next];
       if (t.end == Traveller::End::outside) add_sky(t.direction, *s);
@@ -64,12 +63,12 @@ void RoomBaker::pack_handed(const HandedBlock& at, std::span<const Traveller> en
       else {
         const Exit exit{t.receiver[0], false, t.receiver[1], t.at, t.direction};
         const uint32_t node = t.end == Traveller::End::field ? space.find_node(exit) : none;
+        ++facts.fields[i];
         if (node == none) ++facts.lost;
         else s->rows.add(uint32_t(node_row[space.openings[exit.opening].beyond] + node), Vec3(1));
       }
     }
-    s->rows.end_row();
-    for (size_t k = 0; k < coefficients; ++k) facts.e[i * coefficients + k] = s->sky[k] / float(rays);
+    end_row(at.room, at.block, i, *s, facts);
   }
   SparseBlock block;
   s->rows.finish(channels, at.block < receiver_blocks(at.room) ? weight_unit : 1.0f, block);
@@ -81,6 +80,7 @@ bool RoomBaker::take_handed(const HandedBlock& at, const PackedBlock& packed, co
   const size_t block = first_row[at.room] / gather_block + at.block;
   std::copy(facts.e.begin(), facts.e.end(), e[at.room].data() + at.block * gather_block * coefficients);
   std::copy(facts.backs.begin(), facts.backs.end(), backs.data() + block * gather_block);
+  std::copy(facts.fields.begin(), facts.fields.end(), fields.data() + block * gather_block);
   has_handed[block] = 1;
   return handed->keep(block, packed);
 }
@@ -106,7 +106,7 @@ Result<void> RoomBaker::hand_rays() {
   handed = std::make_unique<KeptRows>(told.handed > 0 ? rows / gather_block : 0,
                                       how.scratch.empty() ? SIZE_MAX / 4 : left,
                                       most_bytes(size_t(options.samples), columns, channels), how.scratch);
-  has_handed.assign(rows / gather_block, 0), backs.assign(rows, 0);
+  has_handed.assign(rows / gather_block, 0), backs.assign(rows, 0), fields.assign(rows, 0);
   if (told.handed == 0) return {};
   const KeptPieces pieces(progress, "handed", rows / gather_block);
   std::vector<HandedBlock> missing;
@@ -118,7 +118,8 @@ Result<void> RoomBaker::hand_rays() {
     for (size_t b = 0; b < rows_in(room) / gather_block; ++b) {
       PackedBlock packed;
       BlockFacts facts;
-      if (!pieces.load(first_row[room] / gather_block + b, packed.rows, facts.e, facts.backs, facts.lost) ||
+      if (!pieces.load(first_row[room] / gather_block + b, packed.rows, facts.e, facts.backs, facts.fields,
+                       facts.lost) ||
           facts.e.size() != gather_block * coefficients)
         missing.push_back({room, b});
       else if (lost += facts.lost; !take_handed({room, b}, packed, facts)) ok = no_room;
@@ -141,7 +142,8 @@ Result<void> RoomBaker::hand_rays() {
       PackedBlock packed;
       BlockFacts facts;
       pack_handed(now[k], {first, end}, packed, facts);
-      pieces.save(first_row[now[k].room] / gather_block + now[k].block, packed.rows, facts.e, facts.backs, facts.lost);
+      pieces.save(first_row[now[k].room] / gather_block + now[k].block, packed.rows, facts.e, facts.backs, facts.fields,
+                  facts.lost);
       of_block[k] = facts.lost, has_room[k] = take_handed(now[k], packed, facts);
     });
     for (size_t k = 0; k < now.size(); ++k) {

@@ -121,10 +121,34 @@ std::vector<std::vector<uint32_t>> lent_receivers(const RoomSpace& space, const 
   return lent;
 }
 
+namespace {
+
+// Of each room, those whose openings' nodes its rays may end at, or the other way round: beyond its openings, and
+// beyond those of rooms that rays are handed on through.
+std::vector<std::vector<uint32_t>> rooms_beside(const RoomSpace& space) {
+  const size_t count = space.rooms.size();
+  std::vector<std::vector<uint32_t>> beside(count), on(count);
+  for (const Opening& o : space.openings)
+    if (o.handed) on[o.room].push_back(o.beyond);
+  for (uint32_t room = 0; room < count; ++room) {
+    std::vector<uint32_t> reached{room};
+    std::vector<bool> is_reached(count);
+    is_reached[room] = true;
+    for (size_t k = 0; k < reached.size(); ++k)
+      for (const uint32_t next : on[reached[k]])
+        if (!is_reached[next]) is_reached[next] = true, reached.push_back(next);
+    for (const Opening& o : space.openings)
+      if (is_reached[o.room] && o.beyond != room && (o.room == room || !o.handed))
+        beside[room].push_back(o.beyond), beside[o.beyond].push_back(room);
+  }
+  return beside;
+}
+
+}  // namespace
+
 RoomWork::RoomWork(const RoomSpace& space, const std::vector<size_t>& cost) : owner(space.rooms.size(), 0) {
   const size_t count = space.rooms.size();
-  std::vector<std::vector<uint32_t>> beside(count);
-  for (const Opening& o : space.openings) beside[o.room].push_back(o.beyond), beside[o.beyond].push_back(o.room);
+  const std::vector<std::vector<uint32_t>> beside = rooms_beside(space);
   std::vector<size_t> step(count, count);
   for (uint32_t room = 0; room < count; ++room) {
     std::vector<bool> taken(count + 1);

@@ -12,7 +12,8 @@
 namespace lambent {
 
 struct RoomWork {
-  // Rooms of a step have no opening in common, so that none of them asks for what another makes.
+  // Rooms of a step have no opening in common, and none that rays are handed on to, so that none of them asks for nodes
+  // that another makes.
   std::vector<std::vector<uint32_t>> steps;
   std::vector<int> owner;  // of each room, the rank
 

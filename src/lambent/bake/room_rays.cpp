@@ -2,6 +2,7 @@
 
 #include <lambent/bake/directions.h>
 #include <lambent/bake/kernels.h>
+#include <lambent/basis/sh.h>
 #include <lambent/core/aligned.h>
 #include <lambent/core/parallel.h>
 #include <lambent/core/random.h>
@@ -101,18 +102,28 @@ struct Journey {
   }
 };
 
-// The stand-in's four numbers: bands 0 and 1 of the sky.
-using Stand = std::array<double, 4>;
+// The stand-in's numbers: of a sky that is each of the harmonics of three bands.
+constexpr int stand_order = 3;
+using Stand = std::array<double, stand_order * stand_order>;
 
 Stand add(Stand a, const Stand& b, double times) {
-  for (size_t k = 0; k < 4; ++k) a[k] += times * b[k];
+  for (size_t k = 0; k < a.size(); ++k) a[k] += times * b[k];
   return a;
 }
 double product(const Stand& a, const Stand& b) { return std::inner_product(a.begin(), a.end(), b.begin(), 0.0); }
-Stand of_sky(Vec3 d) { return {1, d.x, d.y, d.z}; }
+Stand of_sky(Vec3 d) {
+  std::array<float, stand_order * stand_order> y;
+  evaluate_sh(stand_order, d, y);
+  Stand out;
+  std::copy(y.begin(), y.end(), out.begin());
+  return out;
+}
+// Half of what an open surface has: the cosine's bands are 1, 2/3 and 1/4 of pi.
 Stand of_surface(Vec3 reflected, Vec3 normal) {
-  const double half = 0.5 * (reflected.x + reflected.y + reflected.z) / 3, first = 2.0 / 3 * half;
-  return {half, first * normal.x, first * normal.y, first * normal.z};
+  const double half = 0.5 * (reflected.x + reflected.y + reflected.z) / 3;
+  Stand out = of_sky(normal);
+  for (size_t k = 0; k < out.size(); ++k) out[k] *= half * (k == 0 ? 1.0 : k < 4 ? 2.0 / 3 : 0.25);
+  return out;
 }
 
 constexpr size_t held_out = 512;  // receivers

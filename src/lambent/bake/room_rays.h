@@ -40,10 +40,10 @@ struct FieldLoss {
 };
 
 // What light fields lose, measured once their nodes are found: at receivers held out, each opening's rays end at nodes,
-// whose means are of the rays that stand for them, or go on to their ends, under a stand-in for the light: the sky's
-// first two bands, of which a surface sends back half of what its normal faces. Noise is left out: halves of a
-// receiver's rays are multiplied. Of openings that lose most, as many are handed on (Opening::handed) as leave the
-// others' loss at `most`. All ranks. Errors: cancelled; a room without a tree.
+// whose means are of the rays that stand for them, or go on to their ends, under a stand-in for the light: each of the
+// harmonics of three bands as a sky, of which a surface sends back half of what it would have with nothing about it.
+// Noise is left out: halves of a receiver's rays are multiplied. Of openings that lose most, as many are handed on
+// (Opening::handed) as leave the others' loss at `most`. All ranks. Errors: cancelled; a room without a tree.
 Result<FieldLoss> hand_on_what_fields_lose(RoomSpace& space, const RoomWork& work, const RoomSurfaces& surfaces,
                                            const Receivers& receivers,
                                            const std::vector<std::vector<uint32_t>>& receivers_of, uint32_t seed,

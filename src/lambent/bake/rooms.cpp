@@ -38,8 +38,13 @@ void RoomBaker::assign_receivers() {
     room_of[r] = space.room_at(receivers.origins[r]);
     receivers_of[room_of[r]].push_back(r);
   }
+  for (const auto& own : receivers_of) told.largest = std::max(told.largest, own.size());
+  share_rooms();
+}
+
+void RoomBaker::share_rooms() {
   std::vector<size_t> cost;
-  for (const auto& own : receivers_of) cost.push_back(own.size()), told.largest = std::max(told.largest, own.size());
+  for (const auto& own : receivers_of) cost.push_back(own.size());
   work = RoomWork(space, cost);
 }
 
@@ -59,7 +64,7 @@ Result<void> RoomBaker::find_all_nodes() {
     told.handed = space.openings.size();
   }
   if (told.handed == 0) return {};
-  space.clear_nodes();
+  space.clear_nodes(), share_rooms();
   return told.handed == space.openings.size() ? Result<void>() : find();
 }
 
