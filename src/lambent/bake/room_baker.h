@@ -12,12 +12,34 @@
 #include <lambent/core/ranks.h>
 
 #include <array>
+#include <cstdlib>
 #include <memory>
+#include <new>
 #include <optional>
 
 namespace lambent {
 
 constexpr size_t padded_rows(size_t n) { return (n + gather_block - 1) / gather_block * gather_block; }
+
+// Floats that are 0 until they are written to, and take memory from then on: rows of other ranks' rooms take none.
+class ZeroPages {
+ public:
+  ZeroPages() = default;
+  explicit ZeroPages(size_t count) : data_(static_cast<float*>(std::calloc(count + 64, sizeof(float)))) {
+    if (!data_) throw std::bad_alloc();
+  }
+  float* data() { return aligned(); }
+  const float* data() const { return aligned(); }
+
+ private:
+  struct Free {
+    void operator()(float* p) const { std::free(p); }
+  };
+  float* aligned() const {
+    return data_ ? reinterpret_cast<float*>((reinterpret_cast<uintptr_t>(data_.get()) + 63) / 64 * 64) : nullptr;
+  }
+  std::unique_ptr<float, Free> data_;
+};
 
 struct RowScratch {
   BlockBuilder rows;
@@ -60,7 +82,7 @@ struct RoomBaker {
   Ranks& ranks = this_ranks();
   RoomWork work{};
   std::vector<std::vector<float>> e{};  // of each of this rank's rooms, [row of the room][coefficient]
-  AlignedVector<float> x{};             // [row][coefficient][channel]; of other ranks' rows those that are handed on
+  ZeroPages x{};                        // [row][coefficient][channel]; of other ranks' rows those that are handed on
   std::vector<uint8_t> buried{};        // of receivers
   std::vector<std::vector<FillStep>> fill{};  // of each room
   // Receivers that other rooms ask for, by their rooms. A copy of each, as it was at the end of the last step, is a row
@@ -127,6 +149,7 @@ struct RoomBaker {
   Result<void> trace_room(size_t room, const KeptPieces& pieces, ProgressStage& stage);
   Result<void> trace();
   Result<void> decide_buried();
+  size_t most_of_ranks(size_t mine) const;
   size_t fixed_bytes() const;
   std::unique_ptr<RowScratch> make_scratch() const;
   Pool<RowScratch> scratch{[this] { return make_scratch(); }};

@@ -198,6 +198,10 @@ struct LossMeter {
 
   // Of nodes that rays ended at, (room, node), which rise.
   using Nodes = std::vector<std::pair<uint32_t, uint32_t>>;
+  struct Mean {
+    std::pair<uint32_t, uint32_t> node;
+    Stand value;
+  };
   Nodes nodes() const {
     Nodes out;
     for (const HeldRay& ray : rays)
@@ -206,23 +210,45 @@ struct LossMeter {
     out.erase(std::unique(out.begin(), out.end()), out.end());
     return out;
   }
-  Result<std::vector<Stand>> means_of(const Nodes& nodes) const {
-    std::vector<Traveller> sent;
-    for (size_t i = 0; i < nodes.size(); ++i) {
-      const auto own = space.rays_of(space.nodes_of[nodes[i].first][nodes[i].second]);
-      for (size_t k = 0; k < own.size(); ++k)
-        sent.push_back(
-            {i * most_node_rays + k, own[k].origin, own[k].direction, nodes[i].first, 1, this_ranks().rank()});
+  // Each rank follows the rays of its rooms' nodes, whoever asks for them.
+  Result<std::vector<Stand>> means_of(const Nodes& asked) const {
+    Ranks& ranks = this_ranks();
+    const auto* bytes = reinterpret_cast<const uint8_t*>(asked.data());
+    Nodes own;
+    for (const auto& theirs : ranks.gather({bytes, bytes + asked.size() * sizeof(asked[0])})) {
+      Nodes nodes(theirs.size() / sizeof(asked[0]));
+      if (!theirs.empty()) std::memcpy(static_cast<void*>(nodes.data()), theirs.data(), theirs.size());
+      for (const auto& node : nodes)
+        if (work.owner[node.first] == ranks.rank()) own.push_back(node);
     }
+    std::sort(own.begin(), own.end());
+    own.erase(std::unique(own.begin(), own.end()), own.end());
+    const auto rays_of = [&](size_t i) { return space.rays_of(space.nodes_of[own[i].first][own[i].second]); };
+    std::vector<Traveller> sent;
+    for (size_t i = 0; i < own.size(); ++i)
+      for (size_t k = 0; k < rays_of(i).size(); ++k) {
+        const NodeRay& ray = rays_of(i)[k];
+        sent.push_back({i * most_node_rays + k, ray.origin, ray.direction, own[i].first, 1, ranks.rank()});
+      }
     auto ends = follow(space, work, surfaces, std::move(sent), true, progress);
     if (!ends) return ends.error();
-    std::vector<Stand> means(nodes.size(), Stand{});
+    std::vector<Mean> made(own.size());
+    for (size_t i = 0; i < own.size(); ++i) made[i] = {own[i], {}};
     for (const Traveller& t : *ends) {
-      const size_t i = t.tag / most_node_rays,
-                   count = space.rays_of(space.nodes_of[nodes[i].first][nodes[i].second]).size();
-      means[i] = add(means[i], end_of(t), 1.0 / double(count));
+      const size_t i = t.tag / most_node_rays;
+      made[i].value = add(made[i].value, end_of(t), 1.0 / double(rays_of(i).size()));
     }
-    return means;
+    std::vector<Stand> out(asked.size(), Stand{});
+    bytes = reinterpret_cast<const uint8_t*>(made.data());
+    for (const auto& theirs : ranks.gather({bytes, bytes + made.size() * sizeof(Mean)})) {
+      std::vector<Mean> means(theirs.size() / sizeof(Mean));
+      if (!theirs.empty()) std::memcpy(static_cast<void*>(means.data()), theirs.data(), theirs.size());
+      for (const Mean& mean : means) {
+        const auto at = std::lower_bound(asked.begin(), asked.end(), mean.node);
+        if (at != asked.end() && *at == mean.node) out[size_t(at - asked.begin())] = mean.value;
+      }
+    }
+    return out;
   }
 
   // Of each room's samples: squares of what each opening's field loses, and at the end of the whole.

@@ -76,11 +76,26 @@ void RoomBaker::trace_block(size_t room, const RoomGeometry& geometry, size_t bl
   s.rows.finish(channels, block < receiver_blocks(room) ? weight_unit : 1.0f, out);
 }
 
-// What the rank with the most rows needs beside rows of the operator: all ranks agree on it.
+// The most of all ranks'.
+size_t RoomBaker::most_of_ranks(size_t mine) const {
+  const auto* bytes = reinterpret_cast<const uint8_t*>(&mine);
+  size_t most = mine;
+  for (const auto& theirs : ranks.gather({bytes, bytes + sizeof mine})) {
+    size_t other;
+    std::memcpy(&other, theirs.data(), sizeof other);
+    most = std::max(most, other);
+  }
+  return most;
+}
+
+// What a rank needs beside rows of the operator, of its own rooms' rows, all nodes and copies, and the result: all
+// ranks agree on it.
 size_t RoomBaker::fixed_bytes() const {
-  size_t most = 0;
+  size_t most = 0, nodes = 0;
   for (int k = 0; k < ranks.count(); ++k) most = std::max(most, rows_of(k));
-  return 4 * coefficients * most + 4 * width * (columns + n()) + space.bytes();
+  for (const auto& own : space.nodes_of) nodes += padded_rows(own.size());
+  const size_t of_x = std::min(columns, most + nodes + columns - rows);
+  return 4 * coefficients * most + 4 * width * (of_x + n()) + most_of_ranks(space.bytes());
 }
 
 // A room's blocks, but for those that have been kept before.
@@ -160,13 +175,7 @@ Result<void> RoomBaker::trace() {
   if (auto ok = hand_rays(); !ok) return ok;
   const size_t fixed = fixed_bytes();
   // All of what was handed on where there is no file for it.
-  size_t most = 0;
-  for (const auto& theirs : ranks.gather({reinterpret_cast<const uint8_t*>(&handed_bytes),
-                                          reinterpret_cast<const uint8_t*>(&handed_bytes) + sizeof handed_bytes})) {
-    size_t bytes;
-    std::memcpy(&bytes, theirs.data(), sizeof bytes);
-    most = std::max(most, bytes);
-  }
+  const size_t most = most_of_ranks(handed_bytes);
   const size_t needed = fixed + (how.scratch.empty() ? most : 0);
   if (options.memory < needed)
     return Error{scene.path, "baking needs at least " + std::to_string(needed) +

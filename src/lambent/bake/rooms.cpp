@@ -46,6 +46,9 @@ void RoomBaker::share_rooms() {
   std::vector<size_t> cost;
   for (const auto& own : receivers_of) cost.push_back(own.size());
   work = RoomWork(space, cost);
+  std::vector<uint8_t> own(room_count());
+  for (size_t room = 0; room < room_count(); ++room) own[room] = is_own(room);
+  space.clear_nodes(std::move(own));
 }
 
 // Fields at all openings at first; then, where some lose more than they may, those alone that stay.
@@ -64,7 +67,7 @@ Result<void> RoomBaker::find_all_nodes() {
     told.handed = space.openings.size();
   }
   if (told.handed == 0) return {};
-  space.clear_nodes(), share_rooms();
+  share_rooms();
   return told.handed == space.openings.size() ? Result<void>() : find();
 }
 
@@ -227,7 +230,7 @@ double RoomBaker::residual_of(const std::vector<Change>& met) const {
 
 Result<void> RoomBaker::solve() {
   const auto start = std::chrono::steady_clock::now();
-  x.assign(columns * width, 0.0f);
+  x = ZeroPages(columns * width);
   std::vector<uint32_t> every(room_count());
   std::iota(every.begin(), every.end(), 0u);
   for (uint32_t room : every)
@@ -254,7 +257,6 @@ Result<void> RoomBaker::solve() {
     told.converged = told.residuals.back() <= how.residual;
     if (how.keep_sweeps) hand_on(every, true), told.sweeps.push_back(transfer());
   }
-  hand_on(every, true);
   report.bounce_seconds = std::chrono::duration<double>(std::chrono::steady_clock::now() - start).count();
   return {};
 }
@@ -273,6 +275,9 @@ Result<Transfer> RoomBaker::bake() {
   if (auto ok = trace(); !ok) return ok.error();
   if (auto ok = solve(); !ok) return ok.error();
   kept.reset(), handed.reset(), e = {};
+  std::vector<uint32_t> every(room_count());
+  std::iota(every.begin(), every.end(), 0u);
+  hand_on(every, true);
   Transfer out = transfer();
   x = {};
   for (uint8_t b : buried) report.buried += b;

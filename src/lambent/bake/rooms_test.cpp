@@ -141,6 +141,7 @@ TEST(Rooms, InTheOpenRaysAreHandedOn) {
   exactly.seed = 5;
   auto truth = bake(scene, *tracer, receivers, exactly);
   ASSERT_TRUE(truth);
+  const double noise = difference(*whole, *truth);
   RoomsReport blurred, measured, exact;
   const auto joined = [&](double loss, RoomsReport& told, const Transfer& other) {
     auto t = bake_rooms(scene, receivers, rooms, options,
