@@ -27,3 +27,25 @@ print(json.dumps({"name": "bake_memory", "ours": used, "limit": base + memory, "
                   "aim": "<= 1"}))
 P
 done
+
+# A building room by room, by one process and by RANKS (4): the most that any process of each bake has, beside a bake of
+# the whole. SAMPLES (64) rays a receiver.
+level=$data/meshes/zdm2_level.glb
+bake=("$tool" bake "$level" --order 3 --samples "${SAMPLES:-64}" -o "$out/l.glb" --json)
+by_rooms=("${bake[@]}" --rooms auto)
+launcher=${MPIRUN:-$(command -v mpirun || command -v mpiexec.hydra || true)}
+export OMPI_ALLOW_RUN_AS_ROOT=1 OMPI_ALLOW_RUN_AS_ROOT_CONFIRM=1
+flags=()
+[ -n "$launcher" ] && "$launcher" --version 2>&1 | grep -q 'Open MPI' && flags=(--oversubscribe --bind-to none)
+whole=$(peak "$out/result.json" "${bake[@]}" --denoise off --bounces 8)
+rooms=$(peak "$out/result.json" "${by_rooms[@]}")
+ranks=0
+[ -z "$launcher" ] || ranks=$(peak "$out/result.json" "$launcher" "${flags[@]}" -np "${RANKS:-4}" "${by_rooms[@]}")
+python3 - "$whole" "$rooms" "$ranks" "$out/result.json" <<'P'
+import json, sys
+whole, rooms, ranks = map(int, sys.argv[1:4])
+r = json.load(open(sys.argv[4]))
+print(json.dumps({"name": "rooms_memory", "ours": rooms, "limit": whole, "ratio": rooms / whole, "of_a_rank": ranks,
+                  "unit": "bytes", "limit_is": "a bake of the whole", "receivers": r["receivers"],
+                  "rooms": r["rooms"]}))
+P

@@ -1,6 +1,7 @@
 #include <lambent/bake/indirect.h>
 
 #include <lambent/bake/directions.h>
+#include <lambent/core/checkpoint.h>
 #include <lambent/core/half.h>
 #include <lambent/core/parallel.h>
 #include <lambent/core/random.h>
@@ -175,14 +176,65 @@ double compression_error(const IndirectTransfer& t, const std::vector<Row>& rows
   return right > 0 ? std::sqrt(wrong / right) : 0;
 }
 
+// A piece of rows as it is kept.
+struct RowPiece {
+  std::vector<uint32_t> sizes, nodes, leaves;  // leaves: of all hits
+  std::vector<uint8_t> weights;
+  std::vector<float> scales;
+  std::vector<uint64_t> strays;
+  std::vector<std::array<double, test_lamps>> right;
+
+  void add(const Row& row) {
+    sizes.push_back(uint32_t(row.nodes.size())), scales.push_back(row.scale), strays.push_back(row.strays);
+    nodes.insert(nodes.end(), row.nodes.begin(), row.nodes.end()), right.push_back(row.right);
+    weights.insert(weights.end(), row.weights.begin(), row.weights.end());
+  }
+  bool fits(size_t rows, const Surfels& s) const {
+    size_t all = 0;
+    for (const uint32_t size : sizes) all += size;
+    const auto below = [](const std::vector<uint32_t>& v, size_t end) {
+      return std::all_of(v.begin(), v.end(), [end](uint32_t k) { return k < end; });
+    };
+    return sizes.size() == rows && scales.size() == rows && strays.size() == rows && right.size() == rows &&
+           nodes.size() == all && weights.size() == all && below(nodes, s.nodes()) && below(leaves, s.count());
+  }
+  void take(Row* rows) const {
+    for (size_t i = 0, at = 0; i < sizes.size(); at += sizes[i++]) {
+      const auto from = ptrdiff_t(at), to = ptrdiff_t(at + sizes[i]);
+      rows[i] = {{nodes.begin() + from, nodes.begin() + to},
+                 {weights.begin() + from, weights.begin() + to},
+                 scales[i],
+                 size_t(strays[i]),
+                 right[i]};
+    }
+  }
+};
+
 Result<void> gather_rows(IndirectTransfer& t, const Gathering& g, IndirectReport& report, Progress* progress) {
   const size_t count = t.gathering();
   std::vector<Row> rows(count);
+  const KeptPieces pieces(progress, "gathering", (count + rows_a_piece - 1) / rows_a_piece);
   ProgressStage stage(progress, "gathering", count);
   parallel_for(count, rows_a_piece, [&](size_t begin, size_t end) {
+    const size_t number = begin / rows_a_piece;
+    RowPiece piece;
+    if (pieces.load(number, piece.sizes, piece.nodes, piece.leaves, piece.weights, piece.scales, piece.strays,
+                    piece.right)) {
+      if (piece.fits(end - begin, t.surfels)) {
+        piece.take(rows.data() + begin);
+        for (const uint32_t leaf : piece.leaves) g.hits[leaf].fetch_add(1, std::memory_order_relaxed);
+        stage.advance(end - begin);
+        return;
+      }
+      pieces.refuse(), piece = {};
+    }
     std::vector<Met> met;
-    for (size_t r = begin; r < end && !stage.cancelled(); ++r)
-      g.meet(uint32_t(r), met, rows[r]), g.compress(met, rows[r]), stage.advance();
+    for (size_t r = begin; r < end && !stage.cancelled(); ++r) {
+      g.meet(uint32_t(r), met, rows[r]);
+      for (size_t k = 0; pieces && k < met.size(); ++k) piece.leaves.push_back(met[k].leaf);
+      g.compress(met, rows[r]), piece.add(rows[r]), stage.advance();
+    }
+    pieces.save(number, piece.sizes, piece.nodes, piece.leaves, piece.weights, piece.scales, piece.strays, piece.right);
   });
   if (stage.cancelled()) return Error{"", "cancelled"};
   t.first.assign(1, 0);

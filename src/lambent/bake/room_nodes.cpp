@@ -2,6 +2,7 @@
 
 #include <lambent/bake/directions.h>
 #include <lambent/bake/kernels.h>
+#include <lambent/bake/room_rays.h>
 #include <lambent/core/aligned.h>
 #include <lambent/core/parallel.h>
 #include <lambent/core/random.h>
@@ -60,7 +61,8 @@ std::vector<Crossing> least_crossings(const Found& found) {
   std::vector<Crossing> all;
   for (const auto& block : found) all.insert(all.end(), block.begin(), block.end());
   std::sort(all.begin(), all.end(), [](const Crossing& a, const Crossing& b) {
-    return std::tie(a.exit.opening, a.exit.cell, a.key) < std::tie(b.exit.opening, b.exit.cell, b.key);
+    return std::tie(a.exit.opening, a.exit.cell, a.key, a.exit.at.x, a.exit.at.y, a.exit.at.z) <
+           std::tie(b.exit.opening, b.exit.cell, b.key, b.exit.at.x, b.exit.at.y, b.exit.at.z);
   });
   size_t count = 0, of_cell = 0;
   for (size_t i = 0; i < all.size(); ++i) {
@@ -119,10 +121,34 @@ std::vector<std::vector<uint32_t>> lent_receivers(const RoomSpace& space, const 
   return lent;
 }
 
+namespace {
+
+// Of each room, those whose openings' nodes its rays may end at, or the other way round: beyond its openings, and
+// beyond those of rooms that rays are handed on through.
+std::vector<std::vector<uint32_t>> rooms_beside(const RoomSpace& space) {
+  const size_t count = space.rooms.size();
+  std::vector<std::vector<uint32_t>> beside(count), on(count);
+  for (const Opening& o : space.openings)
+    if (o.handed) on[o.room].push_back(o.beyond);
+  for (uint32_t room = 0; room < count; ++room) {
+    std::vector<uint32_t> reached{room};
+    std::vector<bool> is_reached(count);
+    is_reached[room] = true;
+    for (size_t k = 0; k < reached.size(); ++k)
+      for (const uint32_t next : on[reached[k]])
+        if (!is_reached[next]) is_reached[next] = true, reached.push_back(next);
+    for (const Opening& o : space.openings)
+      if (is_reached[o.room] && o.beyond != room && (o.room == room || !o.handed))
+        beside[room].push_back(o.beyond), beside[o.beyond].push_back(room);
+  }
+  return beside;
+}
+
+}  // namespace
+
 RoomWork::RoomWork(const RoomSpace& space, const std::vector<size_t>& cost) : owner(space.rooms.size(), 0) {
   const size_t count = space.rooms.size();
-  std::vector<std::vector<uint32_t>> beside(count);
-  for (const Opening& o : space.openings) beside[o.room].push_back(o.beyond), beside[o.beyond].push_back(o.room);
+  const std::vector<std::vector<uint32_t>> beside = rooms_beside(space);
   std::vector<size_t> step(count, count);
   for (uint32_t room = 0; room < count; ++room) {
     std::vector<bool> taken(count + 1);
@@ -173,35 +199,87 @@ uint64_t hand_rows(const RoomWork& work, const std::vector<uint32_t>& rooms,
   return taken;
 }
 
-Result<void> find_nodes(RoomSpace& space, const RoomWork& work, const Scene& scene, const Receivers& receivers,
-                        const std::vector<std::vector<uint32_t>>& receivers_of, uint32_t seed, Progress* progress) {
-  const size_t rooms = space.rooms.size();
-  Ranks& ranks = this_ranks();
+namespace {
+
+struct NodeSearch {
+  RoomSpace& space;
+  const RoomWork& work;
+  const RoomSurfaces& surfaces;
+  const Receivers& receivers;
+  const std::vector<std::vector<uint32_t>>& receivers_of;
+  uint32_t seed;
+  Progress* progress;
+  const KeptPieces& pieces;
   const DirectionSets few = make_direction_sets(1, first_rays, 8, uint32_t(hash64(seed, 0x726f6f6d)));
+  Ranks& ranks = this_ranks();
+
+  // Where rays of a room cross; those that go on beyond it are added to `on`.
+  Result<std::vector<Crossing>> cross(size_t generation, uint32_t room, const std::vector<uint32_t>& nodes,
+                                      std::vector<Traveller>& on) const {
+    auto geometry = space.geometry(room, surfaces.scene);
+    if (!geometry) return geometry.error();
+    Found found = generation == 0
+                    ? cross_from_receivers(space, room, geometry->tracer, receivers, receivers_of[room], few, seed)
+                    : cross_from_nodes(space, room, geometry->tracer, nodes);
+    for (auto& block : found)
+      std::erase_if(block, [&](const Crossing& c) {
+        if (!space.openings[c.exit.opening].handed) return false;
+        const uint32_t beyond = space.openings[c.exit.opening].beyond;
+        on.push_back({uint64_t(c.key) << 32 | on.size(), c.exit.at, c.exit.direction, beyond, 1, ranks.rank()});
+        return true;
+      });
+    return least_crossings(found);
+  }
+
+  // Of one of each rank's rooms, `none` if it has no more; ranks do theirs side by side, since rays go on from one's
+  // rooms to another's.
+  Result<void> search(size_t generation, uint32_t room, const NodesOfRooms& nodes, Found& found) const {
+    std::vector<Traveller> on;
+    const size_t piece = generation * space.rooms.size() + room;
+    const bool there = room == none || (generation > 0 && nodes[room].empty()) || pieces.load(piece, found[room]);
+    Result<void> ok;
+    if (!there && !is_cancelled(progress)) {
+      auto crossed = cross(generation, room, nodes[room], on);
+      if (crossed) found[room] = std::move(*crossed);
+      else ok = crossed.error();
+    }
+    if (!none_cancelled(progress)) return Error{"", "cancelled"};
+    if (!ranks.all(bool(ok))) return ok ? Error{surfaces.scene.path, "another rank has no tree of a room"} : ok;
+    auto ends = follow(space, work, surfaces, std::move(on), false, progress);
+    if (!ends) return ends.error();
+    if (there) return {};
+    Found further(1);
+    for (const Traveller& t : *ends)
+      if (t.end == Traveller::End::field)
+        further[0].push_back({{t.receiver[0], false, t.receiver[1], t.at, t.direction}, uint32_t(t.tag >> 32)});
+    further.push_back(std::move(found[room]));
+    found[room] = least_crossings(further);
+    pieces.save(piece, found[room]);
+    return {};
+  }
+};
+
+}  // namespace
+
+Result<void> find_nodes(RoomSpace& space, const RoomWork& work, const RoomSurfaces& surfaces,
+                        const Receivers& receivers, const std::vector<std::vector<uint32_t>>& receivers_of,
+                        uint32_t seed, Progress* progress) {
+  const size_t rooms = space.rooms.size();
   const KeptPieces pieces(progress, "openings", (most_generations + 1) * rooms);
-  ProgressStage stage(progress, "finding openings", (most_generations + 1) * rooms);
+  const NodeSearch search{space, work, surfaces, receivers, receivers_of, seed, progress, pieces};
+  std::vector<std::vector<uint32_t>> rooms_of(size_t(search.ranks.count()));
+  for (uint32_t room = 0; room < rooms; ++room) rooms_of[size_t(work.owner[room])].push_back(room);
+  size_t most = 0;
+  for (const auto& own : rooms_of) most = std::max(most, own.size());
+  ProgressStage stage(progress, "finding openings", (most_generations + 1) * most);
   NodesOfRooms fresh(rooms);  // nodes whose rays have not been followed
   for (size_t generation = 0; generation <= most_generations; ++generation) {
     NodesOfRooms now(rooms);
     now.swap(fresh);
     Found found(rooms);
-    Result<void> ok;
-    for (size_t room = 0; room < rooms && ok && !stage.cancelled(); ++room, stage.advance()) {
-      if (work.owner[room] != ranks.rank() || (generation > 0 && now[room].empty())) continue;
-      const size_t piece = generation * rooms + room;
-      if (pieces.load(piece, found[room])) continue;
-      auto geometry = space.geometry(room, scene);
-      if (!geometry) {
-        ok = geometry.error();
-        break;
-      }
-      found[room] = least_crossings(generation == 0 ? cross_from_receivers(space, room, geometry->tracer, receivers,
-                                                                           receivers_of[room], few, seed)
-                                                    : cross_from_nodes(space, room, geometry->tracer, now[room]));
-      pieces.save(piece, found[room]);
-    }
-    if (!none_cancelled(progress)) return Error{"", "cancelled"};
-    if (!ranks.all(bool(ok))) return ok ? Error{scene.path, "another rank has no tree of a room"} : ok;
+    const auto& own = rooms_of[size_t(search.ranks.rank())];
+    for (size_t k = 0; k < most; ++k, stage.advance())
+      if (auto ok = search.search(generation, k < own.size() ? own[k] : none, now, found); !ok) return ok;
     share(found, work);
     for (const auto& of_room : found)
       for (const Crossing& c : of_room) space.take(c, fresh);

@@ -12,7 +12,8 @@
 namespace lambent {
 
 struct RoomWork {
-  // Rooms of a step have no opening in common, so that none of them asks for what another makes.
+  // Rooms of a step have no opening in common, and none that rays are handed on to, so that none of them asks for nodes
+  // that another makes.
   std::vector<std::vector<uint32_t>> steps;
   std::vector<int> owner;  // of each room, the rank
 
@@ -32,9 +33,13 @@ using RowRuns = std::vector<std::pair<size_t, size_t>>;
 uint64_t hand_rows(const RoomWork& work, const std::vector<uint32_t>& rooms,
                    const std::function<RowRuns(uint32_t)>& runs_of, float* x, size_t width);
 
-// Nodes that rays of receivers end at, by a few of them, and those that rays of nodes do, generation by generation.
-// Each rank follows those of its rooms; all come to know all nodes. Errors: cancelled; a room without a tree.
-Result<void> find_nodes(RoomSpace& space, const RoomWork& work, const Scene& scene, const Receivers& receivers,
-                        const std::vector<std::vector<uint32_t>>& receivers_of, uint32_t seed, Progress* progress);
+struct RoomSurfaces;
+
+// Nodes that rays of receivers end at, by a few of them, and those that rays of nodes do, generation by generation;
+// beyond openings that are handed on, too. Each rank follows those of its rooms; all come to know all nodes. Errors:
+// cancelled; a room without a tree.
+Result<void> find_nodes(RoomSpace& space, const RoomWork& work, const RoomSurfaces& surfaces,
+                        const Receivers& receivers, const std::vector<std::vector<uint32_t>>& receivers_of,
+                        uint32_t seed, Progress* progress);
 
 }  // namespace lambent

@@ -13,7 +13,8 @@ RoomSpace::RoomSpace(const Scene& scene, const std::vector<Room>& given, int pla
       bounds_(room_bounds(scene)),
       tolerance_(1e-5f * bounds_.diagonal()),
       directions_(directions),
-      openings_of_(given.size()) {
+      openings_of_(given.size()),
+      kept_(given.size(), 1) {
   for (uint32_t i = 0; i < rooms.size(); ++i)
     for (uint32_t j = 0; j < rooms.size(); ++j)
       for (int axis = 0; axis < 3 && i != j; ++axis)
@@ -120,18 +121,28 @@ Exit RoomSpace::exit(size_t room, Vec3 origin, Vec3 direction, const Hit& hit) c
   return out;
 }
 
+void RoomSpace::clear_nodes(std::vector<uint8_t> kept) {
+  kept_ = std::move(kept);
+  for (Opening& o : openings) o.node.assign(o.handed ? 0 : o.node.size(), none), o.node.shrink_to_fit();
+  nodes_of.assign(rooms.size(), {});
+  slot_ = {}, rays_ = {}, counts_ = {}, number_ = {};
+}
+
 void RoomSpace::take(const Crossing& crossing, std::vector<std::vector<uint32_t>>& fresh) {
   Opening& o = openings[crossing.exit.opening];
   uint32_t& node = o.node[crossing.exit.cell];
   if (node == none) {
-    node = uint32_t(counts_.size());
-    counts_.push_back(0), rays_.resize(counts_.size() * size_t(most_node_rays));
+    node = uint32_t(slot_.size());
+    slot_.push_back(kept_[o.beyond] ? uint32_t(counts_.size()) : none);
+    if (kept_[o.beyond]) counts_.push_back(0), rays_.resize(counts_.size() * size_t(most_node_rays));
     fresh[o.beyond].push_back(node);
   }
+  const uint32_t slot = slot_[node];
+  if (slot == none) return;
   const NodeRay ray{crossing.exit.at, crossing.exit.direction, crossing.key};
-  NodeRay* const own = rays_.data() + size_t(node) * most_node_rays;
-  if (counts_[node] < most_node_rays) {
-    own[counts_[node]++] = ray;
+  NodeRay* const own = rays_.data() + size_t(slot) * most_node_rays;
+  if (counts_[slot] < most_node_rays) {
+    own[counts_[slot]++] = ray;
     return;
   }
   NodeRay* const greatest =
@@ -140,7 +151,7 @@ void RoomSpace::take(const Crossing& crossing, std::vector<std::vector<uint32_t>
 }
 
 void RoomSpace::number_nodes() {
-  number_.assign(counts_.size(), none);
+  number_.assign(slot_.size(), none);
   for (const Opening& o : openings)
     for (const uint32_t node : o.node)
       if (node != none) number_[node] = uint32_t(nodes_of[o.beyond].size()), nodes_of[o.beyond].push_back(node);
@@ -172,7 +183,7 @@ uint32_t RoomSpace::find_node(const Exit& exit) const {
 }
 
 size_t RoomSpace::bytes() const {
-  size_t sum = rays_.size() * sizeof(NodeRay) + counts_.size() * 5;
+  size_t sum = rays_.size() * sizeof(NodeRay) + counts_.size() + 12 * slot_.size();
   for (const Opening& o : openings) sum += 4 * o.node.size();
   return sum;
 }

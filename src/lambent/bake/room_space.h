@@ -19,6 +19,7 @@ struct Opening {
   Bounds face;
   int across[2] = {1, 1};      // cells of place along the two other axes, in the order axis + 1, axis + 2
   std::vector<uint32_t> node;  // of each cell [direction][place], `none` where nobody has met it
+  bool handed = false;         // it has no light field: rays go on beyond it
 };
 
 // Where a ray goes: into a surface, out of the scene, or through an opening.
@@ -59,16 +60,18 @@ class RoomSpace {
   Result<RoomGeometry> geometry(size_t room, const Scene& scene) const;
   // Of a ray from within a room, given what it meets there.
   Exit exit(size_t room, Vec3 origin, Vec3 direction, const Hit& hit) const;
+  // No nodes, as before any was found. Rays are kept of nodes of these rooms alone, [room].
+  void clear_nodes(std::vector<uint8_t> kept);
   // Notes a ray at its node, of which the keys that are least are kept. New nodes go to the room beyond.
   void take(const Crossing& crossing, std::vector<std::vector<uint32_t>>& fresh);
   std::span<const NodeRay> rays_of(uint32_t node) const {
-    return {rays_.data() + size_t(node) * most_node_rays, counts_[node]};
+    return {rays_.data() + size_t(slot_[node]) * most_node_rays, counts_[slot_[node]]};
   }
   // Once all are found: gives each node its number among those of its room, in the order of openings and cells.
   void number_nodes();
   // The number of the ray's node in the room beyond: its own, or the nearest that there is; `none`: there is none near.
   uint32_t find_node(const Exit& exit) const;
-  size_t node_count() const { return counts_.size(); }
+  size_t node_count() const { return slot_.size(); }
   size_t bytes() const;
 
  private:
@@ -77,6 +80,8 @@ class RoomSpace {
   float tolerance_;
   int directions_;
   std::vector<std::vector<uint32_t>> openings_of_;  // of each room
+  std::vector<uint8_t> kept_;                       // of each room: rays of its nodes
+  std::vector<uint32_t> slot_;                      // of each node, its place in these; none
   std::vector<NodeRay> rays_;
   std::vector<uint8_t> counts_;
   std::vector<uint32_t> number_;  // of each node, once numbered

@@ -4,7 +4,8 @@
 // light that arrives along rays of that cell, gathered in the room beyond. So the operator over all receivers and nodes
 // is blocks of rooms, joined through nodes alone, and is solved as such: inner iterations within a room, outer ones
 // over rooms with the newest light of their openings. Source: radiosity, "Problem Size" (rooms coupled through 4D light
-// fields, two-level block-structured iteration).
+// fields, two-level block-structured iteration). Where a light field blurs more than it may, at cuts that nothing
+// closes, there is none: rays are handed on into the room beyond, whose receivers they meet (room_rays.h).
 #include <lambent/bake/bake.h>
 #include <lambent/bake/room_boxes.h>
 
@@ -18,14 +19,20 @@ struct RoomsOptions {
   int most_sweeps = 100;   // over all rooms
   int places = 32;         // cells of place along an opening's longer side
   int directions = 16;     // and of direction along each side of the square that maps onto the half space
-  std::string scratch;     // a folder for rows that memory has no room for; "": they are traced again
+  // Of what receivers have, the most that light fields may lose (FieldLoss); 0: there are none, infinite: as they are.
+  double loss = 0.01;
+  bool keep_sweeps = false;  // what all receivers have after each sweep, in the report
+  std::string scratch;       // a folder for rows that memory has no room for; "": they are traced again
 };
 
 struct RoomsReport {
   size_t rooms = 0, openings = 0, nodes = 0, largest = 0;  // largest: receivers of a room
   std::vector<double> residuals;                           // of each sweep
+  std::vector<Transfer> sweeps;                            // after each, where they are kept
   bool converged = false;
-  double lost = 0;  // share of the rays through openings that met no node, and count as dark
+  size_t handed = 0, handed_rays = 0;  // openings whose rays are handed on, and rays that were
+  double loss = 0, loss_of_all = 0;    // what light fields lose, as measured; what they would at all openings
+  double lost = 0;                     // share of the rays through openings that met no node, and count as dark
 };
 
 // All of the light, however often it is reflected. Of `options` order, samples, memory, seed and precision count.

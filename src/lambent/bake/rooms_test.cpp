@@ -108,6 +108,62 @@ TEST(Rooms, JoinToTheSceneBakedWhole) {
   EXPECT_LT(found, 0.025) << "noise of the rays alone: " << noise;  // what --quality good asks for
 }
 
+// A field in the open, with things above it.
+Scene open_place() {
+  Scene scene;
+  const uint32_t grey = add_material(scene, "grey", Vec3(0.6f)),
+                 red = add_material(scene, "red", Vec3(0.7f, 0.3f, 0.2f));
+  add_quad(scene, grey, "ground", Vec3(-3, 0, -3), Vec3(0, 0, 6), Vec3(6, 0, 0), 20, 20);
+  add_sphere(scene, red, "ball", Vec3(-0.4f, 0.7f, 0.3f), 0.6f, 2);
+  add_sphere(scene, red, "ball", Vec3(1.2f, 0.6f, -0.7f), 0.5f, 2);
+  add_box(scene, grey, "box", Vec3(-0.9f, 0.2f, -1.6f), Vec3(0.6f, 1.5f, -0.9f), 5);
+  return scene;
+}
+
+// Where nothing closes what is cut, light fields blur what is seen through it: measured as such, they give way to rays
+// that are handed on, by which the rooms are the whole but for rounding.
+TEST(Rooms, InTheOpenRaysAreHandedOn) {
+  SKIP_UNDER_SANITIZERS();
+  const Scene scene = open_place();
+  auto tracer = Tracer::build(scene);
+  const Receivers receivers = make_vertex_receivers(scene);
+  const BakeOptions options = plain(64);
+  auto whole = bake(scene, *tracer, receivers, options);
+  ASSERT_TRUE(whole);
+  const Bounds all = room_bounds(scene);
+  std::vector<Room> rooms;
+  for (int i = 0; i < 4; ++i) {
+    Bounds box = all;
+    (i % 2 ? box.min.x : box.max.x) = -0.25f, (i / 2 ? box.min.z : box.max.z) = 0.1f;
+    rooms.push_back({std::to_string(i), box});
+  }
+  BakeOptions exactly = plain(4096);
+  exactly.seed = 5;
+  auto truth = bake(scene, *tracer, receivers, exactly);
+  ASSERT_TRUE(truth);
+  const double noise = difference(*whole, *truth);
+  RoomsReport blurred, measured, exact;
+  const auto joined = [&](double loss, RoomsReport& told, const Transfer& other) {
+    auto t = bake_rooms(scene, receivers, rooms, options,
+                        {.residual = 1e-4, .places = 8, .directions = 6, .loss = loss}, nullptr, &told);
+    EXPECT_TRUE(t) << t.error().text();
+    EXPECT_TRUE(told.converged);
+    return t ? difference(*t, other) : 1.0;
+  };
+  const double by_fields = joined(INFINITY, blurred, *truth), by_both = joined(0.01, measured, *truth);
+  RecordProperty("noise", std::to_string(noise)), RecordProperty("by_fields", std::to_string(by_fields));
+  RecordProperty("by_both", std::to_string(by_both)), RecordProperty("loss", std::to_string(measured.loss_of_all));
+  EXPECT_LT(joined(0, exact, *whole), 2e-3);
+  EXPECT_EQ(blurred.handed, 0u);
+  EXPECT_EQ(exact.handed, exact.openings);
+  EXPECT_EQ(exact.nodes, 0u);
+  EXPECT_GT(measured.handed, 0u);
+  EXPECT_LE(measured.loss, 0.01);
+  EXPECT_GT(measured.loss_of_all, 0.01);
+  EXPECT_LT(by_both, std::hypot(noise, 0.015));
+  EXPECT_GT(by_fields, std::hypot(noise, 0.02));
+}
+
 TEST(Rooms, TheSameBytesWhateverTheThreadsAndTheMemory) {
   const Scene scene = make_building(2, 0.9f);
   const Receivers receivers = make_vertex_receivers(scene);

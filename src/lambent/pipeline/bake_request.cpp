@@ -26,7 +26,7 @@ const Option<R> table[] = {
      false},
     {"bin-limit", &R::bin_limit, "Files", every, "Bytes of each .bin of a .gltf, at most; e.g. 256MB, 2GiB (1GiB)",
      65536, 1e18, nullptr, nullptr, false},
-    {"checkpoint", &R::checkpoint, "Files", traced | K | W,
+    {"checkpoint", &R::checkpoint, "Files", traced | K | I | W,
      "Folder to keep the work in as it comes, from which the same command goes on after an interrupt or a crash; off: "
      "nowhere (OUTPUT.checkpoint, of work of over a minute)",
      0, 0, nullptr, nullptr, false},

@@ -85,9 +85,7 @@ json read_identity(std::span<const uint8_t> bytes) { return json::parse(bytes.be
 }  // namespace
 
 std::string checkpoint_folder(const BakeRequest& request) {
-  if (request.checkpoint == none_wanted || kind_of(request) == BakeKind::membrane ||
-      kind_of(request) == BakeKind::indirect)
-    return {};
+  if (request.checkpoint == none_wanted || kind_of(request) == BakeKind::membrane) return {};
   return request.checkpoint.empty() ? request.output + ending : request.checkpoint;
 }
 
