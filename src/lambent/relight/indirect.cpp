@@ -219,7 +219,7 @@ struct NodePlaces {
 
 // A node that is met stands for what lies about its middle, which may lie in the plane that it is seen from or below
 // it.
-constexpr float least_rise = 0.05f;
+constexpr float least_rise = 0.15f;
 Vec3 risen(Vec3 way, Vec3 normal) {
   const Vec3 d = normalize_or(way, normal);
   const float rise = dot(d, normal);
