@@ -8,8 +8,8 @@
 source "$(dirname "$0")/common.sh"
 out=out/indirect_lamps
 mkdir -p $out
-need python3 python3-numpy
-TOOL=$tool DATA=$data OUT=$out python3 - <<'P'
+need python3-numpy
+TOOL=$tool DATA=$data OUT=$out /usr/bin/python3 - <<'P'
 import json, math, os, struct, subprocess, sys
 import numpy as np
 

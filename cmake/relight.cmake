@@ -38,6 +38,7 @@ set(lambent_relight_sources
   src/lambent/core/color.cpp
   src/lambent/core/file.cpp
   src/lambent/core/glb.cpp
+  src/lambent/core/huffman.cpp
   src/lambent/core/parallel.cpp
   src/lambent/core/sampling.cpp
   src/lambent/core/uri.cpp

@@ -1,6 +1,7 @@
 #include <lambent/bake/indirect.h>
 
 #include <lambent/bake/directions.h>
+#include <lambent/core/check.h>
 #include <lambent/core/half.h>
 #include <lambent/core/parallel.h>
 #include <lambent/core/random.h>
@@ -282,7 +283,9 @@ void set_readers(IndirectTransfer& t, const Scene& scene, const SurfelSearch& se
   });
   for (size_t r = 0; r < t.receivers; ++r) report.buried += t.reader_weights[r * kernel_slots] == 0;
   report.unread = fill_readers(t, scene, receivers.basis);
-  unpack_kernels(pack_kernels(t), t, "");  // in the order in which a file has them
+  // In the order in which a file has them.
+  const auto ok = unpack_kernels(pack_kernels(t), t, "");
+  LAMBENT_CHECK(ok);
 }
 
 }  // namespace

@@ -1,6 +1,7 @@
 // Direct-to-indirect transport in a baked file.
 #include <lambent/baked/extension.h>
 #include <lambent/core/half.h>
+#include <lambent/core/huffman.h>
 
 #include <algorithm>
 #include <cmath>
@@ -37,10 +38,28 @@ Result<std::vector<uint32_t>> read_indices(const BlobReader& in, const json& obj
 // Levels whose surfels have parents of the level above, those that are not their own.
 size_t level_above_limit(const Surfels& s) { return s.levels() > 1 ? s.counts[s.levels() - 2] : 1; }
 
+// Bytes by how often each is there: {"bytes": how many, "coded": a view}.
+json encode_bytes(const std::vector<uint8_t>& bytes, BlobWriter& out) {
+  return {{"bytes", bytes.size()}, {"coded", out.add_copy(huffman_encode(bytes))}};
+}
+// Those, or a view of them as they are.
+Result<std::vector<uint8_t>> decode_bytes(const BlobReader& in, const json& object, const char* key,
+                                          const std::string& where) {
+  const auto member = object.find(key);
+  if (member == object.end() || !member->is_object()) return read_all_values<uint8_t>(in, object, key, where);
+  auto count = read_count(*member, "bytes", SIZE_MAX / 2, where);
+  if (!count) return count.error();
+  auto coded = read_view(in, *member, "coded", where);
+  if (!coded) return coded.error();
+  auto bytes = huffman_decode(coded->bytes, *count);
+  if (!bytes) return Error{where, std::string("\"") + key + "\" is broken"};
+  return std::move(*bytes);
+}
+
 json encode_rows(const NodeRows& rows, BlobWriter& out) {
   return {{"entries", rows.nodes.size()},
-          {"bufferView", out.add_copy(pack_rows(rows))},
-          {"weights", out.add(bytes_of(rows.weights))},
+          {"bufferView", encode_bytes(pack_rows(rows), out)},
+          {"weights", encode_bytes(rows.weights, out)},
           {"scales", out.add(bytes_of(rows.scales))}};
 }
 
@@ -48,11 +67,11 @@ Result<void> decode_rows(const BlobReader& in, const json& object, size_t count,
                          const std::string& where) {
   auto entries = read_count(object, "entries", 0x7fffffff, where);
   if (!entries) return entries.error();
-  auto packed = read_view(in, object, "bufferView", where);
-  if (!packed) return packed.error();
-  if (auto ok = unpack_rows(packed->bytes, count, *entries, rows, where); !ok) return ok;
-  auto weights = read_values<uint8_t>(in, object, "weights", *entries, where);
-  if (!weights) return weights.error();
+  auto packed = decode_bytes(in, object, "bufferView", where), weights = decode_bytes(in, object, "weights", where);
+  for (const auto* bytes : {&packed, &weights})
+    if (!*bytes) return bytes->error();
+  if (weights->size() != *entries) return Error{where, "there are not as many weights as entries"};
+  if (auto ok = unpack_rows(*packed, count, *entries, rows, where); !ok) return ok;
   auto scales = read_values<float>(in, object, "scales", count, where);
   if (!scales) return scales.error();
   rows.weights = std::move(*weights), rows.scales = std::move(*scales);
@@ -170,9 +189,9 @@ Result<Surfels> decode_surfels(const BlobReader& in, const json& object, const s
 
 Result<void> decode_kernels(const BlobReader& in, const json& object, IndirectTransfer& t, const std::string& where) {
   if (object.contains("bufferView")) {
-    auto packed = read_view(in, object, "bufferView", where);
+    auto packed = decode_bytes(in, object, "bufferView", where);
     if (!packed) return packed.error();
-    return unpack_kernels(packed->bytes, t, where);
+    return unpack_kernels(*packed, t, where);
   }
   // Eight surfels a receiver and as many halves: as files had them first.
   if (t.receivers > in.buffers.room() / kernel_slots) return Error{where, "there is no room for so many receivers"};
@@ -209,7 +228,7 @@ json encode_indirect(const IndirectTransfer& t, BlobWriter& out) {
   json object = encode_rows(t.gather, out);
   object.update({{"surfels", encode_surfels(t.surfels, out)},
                  {"gatherLevel", t.gather_level},
-                 {"kernels", {{"bufferView", out.add_copy(pack_kernels(t))}}},
+                 {"kernels", {{"bufferView", encode_bytes(pack_kernels(t), out)}}},
                  {"error", t.error}});
   if (t.lattice) object["lattice"] = encode_free_space(*t.lattice, out);
   return object;

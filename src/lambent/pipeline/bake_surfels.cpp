@@ -9,11 +9,8 @@ namespace {
 
 // What the store's parts take in a file.
 nlohmann::json bytes_of_parts(const IndirectTransfer& t) {
-  const size_t kernels = pack_kernels(t).size();
-  const auto of = [](const NodeRows& r) { return pack_rows(r).size() + r.weights.size() + 4 * r.scales.size(); };
-  const size_t rows = of(t.gather), lattice = t.lattice ? of(t.lattice->rows) + t.lattice->valid.size() : 0;
-  return {
-      {"kernels", kernels}, {"rows", rows}, {"lattice", lattice}, {"surfels", t.bytes() - kernels - rows - lattice}};
+  const IndirectTransfer::Bytes b = t.bytes_of_parts();
+  return {{"surfels", b.surfels}, {"rows", b.gather}, {"kernels", b.kernels}, {"lattice", b.lattice}};
 }
 
 void tell_lattice(const IndirectTransfer& t, const IndirectReport& report, Summary& summary) {

@@ -1,4 +1,5 @@
 #include <lambent/basis/sh.h>
+#include <lambent/core/huffman.h>
 #include <lambent/transfer/indirect.h>
 
 #include <algorithm>
@@ -12,12 +13,13 @@ size_t Surfels::first_node(size_t level) const {
   return first;
 }
 
-size_t IndirectTransfer::bytes() const {
+IndirectTransfer::Bytes IndirectTransfer::bytes_of_parts() const {
   const size_t n = surfels.count(), coarsest = surfels.counts.empty() ? 0 : surfels.counts[0];
-  const auto of = [](const NodeRows& r) { return pack_rows(r).size() + r.weights.size() + r.scales.size() * 4; };
+  const auto coded = [](const std::vector<uint8_t>& bytes) { return huffman_encode(bytes).size(); };
+  const auto of = [&](const NodeRows& r) { return coded(pack_rows(r)) + coded(r.weights) + r.scales.size() * 4; };
   // Places 8, normals 4, areas 2, albedos 6, materials 1; parents of those that are not their own, two bytes mostly.
-  return n * (8 + 4 + 2 + 6 + 1) + (n - coarsest) * 2 + of(gather) + pack_kernels(*this).size() +
-         (lattice ? of(lattice->rows) + lattice->valid.size() : 0);
+  return {n * (8 + 4 + 2 + 6 + 1) + (n - coarsest) * 2, of(gather), coded(pack_kernels(*this)),
+          lattice ? of(lattice->rows) + lattice->valid.size() : 0};
 }
 
 namespace {

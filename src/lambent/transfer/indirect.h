@@ -89,7 +89,15 @@ struct IndirectTransfer {
 
   int rows = 1, channels = 1;  // rows: of a receiver, more than one of directional light
   size_t gathering() const { return surfels.counts.empty() ? 0 : surfels.counts[gather_level]; }
-  size_t bytes() const;  // as stored in a file
+  // As stored in a file, about.
+  struct Bytes {
+    size_t surfels = 0, gather = 0, kernels = 0, lattice = 0;
+  };
+  Bytes bytes_of_parts() const;
+  size_t bytes() const {
+    const Bytes b = bytes_of_parts();
+    return b.surfels + b.gather + b.kernels + b.lattice;
+  }
 };
 
 // Weights of kernels are multiples of this.

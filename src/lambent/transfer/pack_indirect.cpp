@@ -20,21 +20,19 @@ struct PackedKernel {
 };
 
 PackedKernel packed(const IndirectTransfer& t, size_t receiver) {
-  std::array<std::pair<uint32_t, int>, kernel_slots> entries;
-  size_t count = 0;
+  PackedKernel out;
   for (size_t k = receiver * kernel_slots; k < (receiver + 1) * kernel_slots; ++k) {
     const float steps = std::round(half_to_float(t.reader_weights[k]) / kernel_step);
     if (steps == 0) continue;
     const uint32_t surfel = t.reader_surfels[k];
-    const auto same =
-        std::find_if(entries.begin(), entries.begin() + count, [&](const auto& e) { return e.first == surfel; });
-    if (same == entries.begin() + count) entries[count++] = {surfel, 0};
-    same->second = std::clamp(same->second + int(steps), -127, 127);
+    size_t at = out.count;
+    while (at > 0 && out.surfel[at - 1] >= surfel) --at;
+    if (at == out.count || out.surfel[at] != surfel) {
+      for (size_t i = out.count++; i > at; --i) out.surfel[i] = out.surfel[i - 1], out.steps[i] = out.steps[i - 1];
+      out.surfel[at] = surfel, out.steps[at] = 0;
+    }
+    out.steps[at] = std::clamp(out.steps[at] + int(steps), -127, 127);
   }
-  std::sort(entries.begin(), entries.begin() + count);
-  PackedKernel out;
-  for (size_t i = 0; i < count; ++i) out.surfel[i] = entries[i].first, out.steps[i] = entries[i].second;
-  out.count = count;
   return out;
 }
 
@@ -170,18 +168,21 @@ Result<void> unpack_kernels(std::span<const uint8_t> bytes, IndirectTransfer& t,
     if (bytes.size() - at < 2) return broken;
     const uint8_t again = bytes[at], others = bytes[at + 1];
     at += 2;
-    std::array<uint32_t, kernel_slots> surfel{};
-    size_t count = 0;
+    std::array<uint32_t, kernel_slots> kept{}, added{}, surfel{};
+    size_t had = 0, count = 0;
     if (again >> known || others > kernel_slots) return broken;
     for (size_t i = 0; i < known; ++i)
-      if (again >> i & 1) surfel[count++] = before[i];
+      if (again >> i & 1) kept[had++] = before[i];
+    if (had + others > kernel_slots) return broken;
     uint64_t s = 0;
     for (size_t i = 0; i < others; ++i) {
       uint64_t step = 0;
-      if (count == kernel_slots || !read_varint(bytes, at, step) || step > 0xffffffffu - s) return broken;
-      surfel[count++] = uint32_t(s += step);
+      if (!read_varint(bytes, at, step) || step > 0xffffffffu - s) return broken;
+      added[i] = uint32_t(s += step);
     }
-    std::sort(surfel.begin(), surfel.begin() + ptrdiff_t(count));
+    // Both rise.
+    for (size_t i = 0, j = 0; i + j < had + others;)
+      surfel[count++] = j == others || (i < had && kept[i] < added[j]) ? kept[i++] : added[j++];
     if (bytes.size() - at < count) return broken;
     for (size_t i = 0; i < count; ++i) {
       t.reader_surfels[r * kernel_slots + i] = surfel[i];
