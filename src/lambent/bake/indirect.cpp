@@ -302,7 +302,8 @@ Result<IndirectTransfer> bake_indirect(const Scene& scene, const Tracer& tracer,
   t.surfels = std::move(*surfels);
   for (const Material& m : scene.materials) t.surfels.names.push_back(m.name);
   round_surfels(t.surfels);
-  t.gather_level = uint32_t(t.surfels.levels() > 1 ? t.surfels.levels() - 2 : 0);
+  const size_t leaves = t.surfels.levels() - 1;
+  t.gather_level = uint32_t(options.all_gather || leaves == 0 ? leaves : leaves - 1);
   const SurfelSearch search(t.surfels, tracer, t.gather_level);
   told.surfel_seconds = seconds_since(start), start = Clock::now();
   const float diagonal = bounds(scene).diagonal();

@@ -168,6 +168,11 @@ const Option<R> table[] = {
      "surfaces see",
      0, 1 << 20},
 
+    {"gatherers", &R::gatherers, "Direct to indirect light (--transfer indirect)", I,
+     "Which of them gather: a quarter, evenly apart, or all, for light that changes over a few of their distances, "
+     "with several times the bytes and the time",
+     0, 0, "quarter|all"},
+
     {"compress", &R::compress, "Smaller and special (diffuse, matrix)", D | M,
      "cpca:CLUSTERS,RANK: store clusters, and a few weights a receiver"},
     {"fix-light", &R::fix_light, "Smaller and special (diffuse, matrix)", D | M,
