@@ -34,6 +34,10 @@ def run(*words):
     return json.loads(done.stdout), done.stderr
 
 
+def say(name, **line):
+    print(json.dumps(dict(name=name, **line)), flush=True)
+
+
 def courtyard(path):
     """Walls around a floor, a porch on pillars along one side; a quad a side, split by the bake."""
     quads = []
@@ -98,9 +102,12 @@ def errors(name):
     if name == "cornell":  # whose walls reflect all light
         for kind in ("obj", "mtl"):
             text = open(f"{meshes}/cornell_box.{kind}").read().replace("cornell_box.mtl", "cornell.mtl")
-            open(f"{out}/cornell.{kind}", "w").write(text.replace("Kd 1 1 1", "Kd 0.75 0.75 0.75") if kind == "mtl" else text)
+            if kind == "mtl":
+                text = text.replace("Kd 1 1 1", "Kd 0.75 0.75 0.75")
+            open(f"{out}/cornell.{kind}", "w").write(text)
     baked = f"{out}/{name}.glb"
-    made, _ = run("bake", path, "--transfer", "indirect", "--surfels", surfels, "-o", baked, *env.get("BAKE", "").split())
+    of_bake, of_render = env.get("BAKE", "").split(), env.get("RENDER", "").split()
+    made, _ = run("bake", path, "--transfer", "indirect", "--surfels", surfels, "-o", baked, *of_bake)
     places, normals = surfels_of(baked)
     tall = places[:, 1].max() - places[:, 1].min()
     floor = np.flatnonzero(normals[:, 1] > 0.9)
@@ -118,20 +125,23 @@ def errors(name):
         text = lambda *v: ",".join("%.6g" % x for x in v)
         shot = ["--camera", text(*eye, *lamp, 80), "--size", size, "--background", "none"]
         light = ["--lamp", f"point@{text(*lamp)}={tall * tall:.6g}"]
-        drawn, said = run("render", baked, *light, "--show", "indirect", "--spp", 16, *shot, "-o", f"{out}/ours.exr", *env.get("RENDER", "").split())
+        look = ["--show", "indirect", "--spp", 16, *shot, "-o", f"{out}/ours.exr"]
+        _, said = run("render", baked, *light, *look, *of_render)
         if "lights no surface" in said:
             continue
         for half in (1, 2):
-            run("reference", path, *light, "--no-direct", "--bounces", 16, "--spp", spp, "--seed", half, *shot, "-o", f"{out}/truth_{half}.exr")
+            paths = ["--no-direct", "--bounces", 16, "--spp", spp, "--seed", half]
+            run("reference", path, *light, *paths, *shot, "-o", f"{out}/truth_{half}.exr")
         mine, noise = (run("compare", a, f"{out}/truth_1.exr")[0] for a in (f"{out}/ours.exr", f"{out}/truth_2.exr"))
         mean = noise["mean_b"]
-        if not mean > 1e-5:
+        noise_of_one = 20 * math.log10(4 * mean / max(noise["rmse"] / math.sqrt(2), 1e-9)) if mean > 1e-5 else 0
+        if noise_of_one < 20:  # next to nothing is lit, or by a few bright paths
             continue
         squared = max(mine["rmse"] ** 2 - noise["rmse"] ** 2 / 2, 1e-12)
         psnr = 20 * math.log10(4 * mean / math.sqrt(squared))
         found.append(psnr)
-        print(json.dumps(dict(name=f"indirect light, {name}", lamp=text(*lamp), eye=text(*eye), psnr=round(psnr, 2), mean=round(mine["mean_a"] / mean, 3),
-                              noise=round(20 * math.log10(4 * mean / max(noise["rmse"] / math.sqrt(2), 1e-9)), 1))), flush=True)
+        say(f"indirect light, {name}", lamp=text(*lamp), eye=text(*eye), psnr=round(psnr, 2),
+            mean=round(mine["mean_a"] / mean, 3), noise=round(noise_of_one, 1))
         if env.get("KEEP"):
             for picture in ("ours", "truth_1"):
                 os.replace(f"{out}/{picture}.exr", f"{out}/{name}_{len(found)}_{picture}.exr")
@@ -140,6 +150,7 @@ def errors(name):
 
 for name in env.get("SCENES", " ".join(scenes)).split():
     found, made = errors(name)
-    print(json.dumps(dict(name=f"indirect light, {name}, {len(found)} lamps", worst=round(min(found), 2), median=round(float(np.median(found)), 2), aim=35,
-                          surfels=made["indirect"]["surfels"], entries=made["indirect"]["entries"], bake_seconds=round(sum(made["seconds"].values()), 1))), flush=True)
+    say(f"indirect light, {name}, {len(found)} lamps", worst=round(min(found), 2), median=round(float(np.median(found)), 2),
+        aim=35, surfels=made["indirect"]["surfels"], entries=made["indirect"]["entries"],
+        bake_seconds=round(sum(made["seconds"].values()), 1))
 P

@@ -8,11 +8,11 @@
 namespace lambent {
 
 struct IndirectOptions {
-  size_t surfels = 0;     // leaves, about (SurfelOptions)
-  int samples = 1024;     // rays a gathering surfel
+  size_t surfels = 0;       // leaves, about (SurfelOptions)
+  int samples = 1024;       // rays a gathering surfel
   bool all_gather = false;  // rows are of all leaves, and not of the level above, a quarter of them
-  float angle = 0.2f;     // a node's spacing over its distance, at most
-  float dropped = 0.01f;  // of a row's sum: its smallest entries are left out, and the others make up for them
+  float angle = 0.2f;       // a node's spacing over its distance, at most
+  float dropped = 0.01f;    // of a row's sum: its smallest entries are left out, and the others make up for them
   uint32_t seed = 1;
   // Light in free space, at a lattice's points, of so many bands (transfer/lattice.h).
   std::optional<Lattice> lattice = std::nullopt;
