@@ -8,6 +8,7 @@ source "$(dirname "$0")/common.sh"
 out=out/indirect scene=${SCENE:-$LAMBENT_DATA/meshes/room.glb} edge=${EDGE:-0.2} surfels=${SURFELS:-16384}
 samples=${SAMPLES:-1024} spp=${SPP:-512} size=${SIZE:-160x120}
 lamp=${LAMP:-0.5,3.5,0.7} eye=${EYE:-4.5,3,4.5,0,1.5,0,70}
+near=$(python3 -c "x, y, z = map(float, '$lamp'.split(',')); print(x + 0.2, y, z, sep=',')")  # where it is moved to
 mkdir -p $out
 shot=(--camera "$eye" --size "$size")
 clock() { date +%s.%N; }
@@ -19,7 +20,7 @@ $tool --json bake "$scene" --transfer indirect --surfels "$surfels" --samples "$
 indirect_seconds=$(took "$start")
 $tool --json bake "$scene" --samples 64 --max-edge "$edge" -o $out/diffuse.glb >$out/diffuse.json
 $tool --json render $out/indirect.glb --lamp "point@$lamp=100" --show indirect "${shot[@]}" --spp 16 \
-  --move "1@0:$lamp;1:$lamp" --frames 0:1:0.2 -o $out/frames.exr >$out/frames.json
+  --move "1@0:$lamp;1:$near" --frames 0:1:0.2 -o $out/frames.exr >$out/frames.json
 $tool --json render $out/indirect.glb --lamp "point@$lamp=100" --show indirect "${shot[@]}" --spp 16 \
   -o $out/ours.exr >$out/ours.json
 # The scene with a lamp of its own, for lightmaps.

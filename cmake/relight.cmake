@@ -5,6 +5,7 @@ set(lambent_relight_sources
   src/lambent/baked/blobs.cpp
   src/lambent/baked/fields.cpp
   src/lambent/baked/gltf_buffers.cpp
+  src/lambent/baked/indirect_codec.cpp
   src/lambent/baked/outgoing_codec.cpp
   src/lambent/baked/placement_codec.cpp
   src/lambent/baked/shells_codec.cpp
@@ -37,6 +38,7 @@ set(lambent_relight_sources
   src/lambent/core/color.cpp
   src/lambent/core/file.cpp
   src/lambent/core/glb.cpp
+  src/lambent/core/huffman.cpp
   src/lambent/core/parallel.cpp
   src/lambent/core/sampling.cpp
   src/lambent/core/uri.cpp
@@ -68,6 +70,7 @@ set(lambent_relight_sources
   src/lambent/transfer/field.cpp
   src/lambent/transfer/haar_transfer.cpp
   src/lambent/transfer/indirect.cpp
+  src/lambent/transfer/pack_indirect.cpp
   src/lambent/transfer/outgoing.cpp
   src/lambent/transfer/shells.cpp
   src/lambent/transfer/transfer.cpp

@@ -28,6 +28,22 @@ expect 2 'frames: needs --move' render indirect.glb $seen --lamp point@0,1,0=1 -
 expect 2 'albedo: the file has no material' render indirect.glb $seen --lamp point@0,1,0=1 --albedo none=1 \
   -o x.png
 expect 2 'show: direct and indirect are of' render corner.glb --env uniform:1 --show indirect -o x.png
+# Texels with directions and light in free space, by the same surfels.
+expect 0 'in free space at 8 points' bake corner.obj --transfer indirect --surfels 256 --samples 32 --receivers texels \
+  --atlas 32x32 --directional sh:3 --lattice 2,2,2 --lattice-order 3 -o texels.glb
+expect 0 '"directional": "sh:3"' inspect texels.glb --json
+expect 0 'shadow rays' render texels.glb $seen --lamp point@0.4,0.6,0.5=3 --at receivers --show indirect -o texels.exr
+expect 0 'shadow rays' render texels.glb $seen --lamp point@0.4,0.6,0.5=3 --show indirect -o pixels.exr
+alike 30 "light that texels have, and that pixels read" texels.exr pixels.exr
+expect 0 'shadow rays' render texels.glb $seen --lamp point@0.4,0.6,0.5=3 --insert corner.obj@0.5,0.1,0.5,0.2 \
+  -o object.png
+expect 0 '"lamps_evaluated": 1' render texels.glb $seen --lamp point@0.4,0.6,0.5=3 --lamp point@0.6,0.6,0.5=2 \
+  --move '2@0:0.6,0.6,0.5;1:0.7,0.6,0.5' --frames 0:1 --frame-bounces 1 --json -o one_moved.png
+expect 1 'has no light in free space' render indirect.glb $seen --lamp point@0.4,0.6,0.5=3 \
+  --insert corner.obj@0.5,0.1,0.5,0.2 -o x.png
+expect 2 'directional: of direct to indirect light is sh:2' bake corner.obj --transfer indirect --directional hl2 \
+  -o x.glb
+expect 2 'frame-bounces: needs --frames' render indirect.glb $seen --lamp point@0,1,0=1 --frame-bounces 1 -o x.png
 expect 1 'which the web page does not draw' export indirect.glb --web site_indirect
 expect 2 'surfels: does not go with diffuse transfer' bake corner.obj --surfels 512 -o x.glb
 expect 2 'order: does not go with direct to indirect light' bake corner.obj --transfer indirect --order 3 -o x.glb

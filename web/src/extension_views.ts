@@ -7,7 +7,9 @@ export const viewKeys: readonly string[] = [
   'areas',
   'bufferView',
   'clusterOf',
+  'coded',
   'coverage',
+  'directions',
   'fitErrors',
   'frames',
   'lengths',
@@ -16,6 +18,7 @@ export const viewKeys: readonly string[] = [
   'materials',
   'normals',
   'parents',
+  'places',
   'positions',
   'scales',
   'steps',
@@ -27,6 +30,7 @@ export const viewKeys: readonly string[] = [
 /** Numbers that name nothing. */
 export const plainKeys: readonly string[] = [
   'bits',
+  'bytes',
   'channels',
   'clusters',
   'cube',

@@ -1,6 +1,5 @@
 // Follows: radiosity, "Discussion 3" ("Spherical Harmonics" and "vector irradiance" are keywords), "Radiosity Normal
 // Mapping".
-#include <lambent/basis/sh.h>
 #include <lambent/bake/directional.h>
 #include <lambent/bake/fan.h>
 #include <lambent/bake/kernels.h>
@@ -12,27 +11,6 @@ namespace {
 // A cosine-distributed ray stands for light spread by 1 / cos; grazing ones would weigh without bound.
 constexpr float grazing_cosine = 0.02f;
 constexpr int most_rows = 9;
-
-// What one unit of E from direction d adds to each row: the row's kernel over that of E, cos / pi.
-void row_weights(DirectionalKind kind, Vec3 d, const Mat3& frame, float* out) {
-  const float scale = 1 / std::max(dot(d, frame[2]), grazing_cosine);
-  switch (kind) {
-    case DirectionalKind::none: out[0] = 1; break;
-    case DirectionalKind::sh2:
-    case DirectionalKind::sh3: {
-      const int order = kind == DirectionalKind::sh2 ? 2 : 3;
-      evaluate_sh(order, d, {out, size_t(sh_count(order))});
-      for (int k = 0; k < sh_count(order); ++k) out[k] *= float(clamped_cosine(sh_band(k))) * scale;
-      break;
-    }
-    case DirectionalKind::hl2:
-      for (int k = 0; k < 3; ++k) out[k] = std::max(0.0f, dot(d, frame * hl2_basis[k])) * scale;
-      break;
-    case DirectionalKind::vector:
-      for (int k = 0; k < 3; ++k) out[k] = d[k] * scale;
-      break;
-  }
-}
 
 template <class Basis>
 void gather_on(const GatherSetup& setup, const Basis& basis, const Lamps& lamps, int lamp_samples, DirectionalKind kind,
@@ -87,12 +65,12 @@ void gather_on(const GatherSetup& setup, const Basis& basis, const Lamps& lamps,
       });
       Vec3 rho = albedo(setup.scene, triangle, h.u, h.v) * (share / float(rays));
       if (passes) rho *= passages[j].hit;
-      row_weights(kind, d, frame, weights);
+      directional_weights(kind, d, frame, grazing_cosine, weights);
       for (size_t row = 0; row < rows; ++row)
         for (size_t k = 0; k < width; ++k) own[row * width + k] += weights[row] * rho[int(k % 3)] * value[k];
     }
     for (const LampLight& light : lights) {
-      row_weights(kind, light.direction, frame, weights);
+      directional_weights(kind, light.direction, frame, grazing_cosine, weights);
       for (size_t row = 0; row < rows; ++row)
         for (int c = 0; c < 3; ++c)
           own[row * width + size_t(light.group) * 3 + size_t(c)] += weights[row] * light.value[c];

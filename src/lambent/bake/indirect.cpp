@@ -1,10 +1,12 @@
 #include <lambent/bake/indirect.h>
 
 #include <lambent/bake/directions.h>
+#include <lambent/core/check.h>
 #include <lambent/core/checkpoint.h>
 #include <lambent/core/half.h>
 #include <lambent/core/parallel.h>
 #include <lambent/core/random.h>
+#include <lambent/core/sampling.h>
 
 #include <algorithm>
 #include <atomic>
@@ -51,31 +53,45 @@ struct Gathering {
       leaf = surfels.parents[surfels.first_parent(level) + leaf];
     return uint32_t(surfels.first_node(level)) + leaf;
   }
+  // Sends a fan of `set`, turned as for `key` about the pole. The share of rays that met backs of one-sided surfaces.
+  double send(const DirectionSets& fans, Vec3 origin, Vec3 pole, uint64_t key, bool counts, std::vector<Met>& met,
+              Row& row) const;
   void meet(uint32_t surfel, std::vector<Met>& met, Row& row) const;
   void compress(std::vector<Met>& met, Row& row) const;
 };
 
-void Gathering::meet(uint32_t surfel, std::vector<Met>& met, Row& row) const {
-  const Vec3 n = surfels.normals[surfel];
-  const Vec3 origin = surfels.positions[surfel] +
-                      n * receiver_lift(surfels.positions[surfel], surfels.spacings.back(), diagonal);
-  const DirectionChoice choice = choose_directions(sets, n, options.seed, surfel);
-  const size_t at = size_t(choice.set) * sets.stride;
+double Gathering::send(const DirectionSets& fans, Vec3 origin, Vec3 pole, uint64_t key, bool counts,
+                       std::vector<Met>& met, Row& row) const {
+  const DirectionChoice choice = choose_directions(fans, pole, options.seed, key);
+  const size_t at = size_t(choice.set) * fans.stride;
+  size_t backs = 0;
   met.clear();
-  for (size_t i = 0; i < size_t(sets.samples); ++i) {
-    const Vec3 d = choice.rotation * Vec3(sets.x[at + i], sets.y[at + i], sets.z[at + i]);
+  for (size_t i = 0; i < size_t(fans.samples); ++i) {
+    const Vec3 d = choice.rotation * Vec3(fans.x[at + i], fans.y[at + i], fans.z[at + i]);
     Passage passage;
     const Hit hit = tracer.lets_pass() ? tracer.closest(origin, d, passage) : tracer.closest(origin, d);
-    if (hit.triangle == none || (!hit.front && !scene.triangles[hit.triangle].two_sided)) continue;
+    if (hit.triangle == none) continue;
+    if (!hit.front && !scene.triangles[hit.triangle].two_sided) {
+      ++backs;
+      continue;
+    }
     const uint32_t leaf = search.leaf(surface_place(scene, hit));
     if (leaf == none) {
       ++row.strays;
       continue;
     }
-    hits[leaf].fetch_add(1, std::memory_order_relaxed);
+    if (counts) hits[leaf].fetch_add(1, std::memory_order_relaxed);
     const float weight = tracer.lets_pass() ? (passage.hit.x + passage.hit.y + passage.hit.z) / 3 : 1.0f;
-    met.push_back({node_at(leaf, hit.distance), leaf, weight / float(sets.samples)});
+    met.push_back({node_at(leaf, hit.distance), leaf, weight / float(fans.samples)});
   }
+  return double(backs) / double(fans.samples);
+}
+
+void Gathering::meet(uint32_t surfel, std::vector<Met>& met, Row& row) const {
+  const Vec3 n = surfels.normals[surfel];
+  const Vec3 origin = surfels.positions[surfel] +
+                      n * receiver_lift(surfels.positions[surfel], surfels.spacings.back(), diagonal);
+  send(sets, origin, n, surfel, true, met, row);
 }
 
 // Merges by node, leaves the smallest out, rounds to bytes.
@@ -163,7 +179,7 @@ void weigh_leaves(Surfels& s, const std::vector<std::atomic<uint32_t>>& hits) {
 }
 
 // Of e = G d as stored, over test lamps.
-double compression_error(const IndirectTransfer& t, const std::vector<Row>& rows,
+double compression_error(const NodeRows& t, const std::vector<Row>& rows,
                          const std::vector<std::array<float, test_lamps>>& node) {
   double wrong = 0, right = 0;
   for (size_t r = 0; r < rows.size(); ++r)
@@ -210,6 +226,16 @@ struct RowPiece {
   }
 };
 
+NodeRows rows_of(const std::vector<Row>& rows) {
+  NodeRows out;
+  for (const Row& row : rows) {
+    out.nodes.insert(out.nodes.end(), row.nodes.begin(), row.nodes.end());
+    out.weights.insert(out.weights.end(), row.weights.begin(), row.weights.end());
+    out.scales.push_back(row.scale), out.first.push_back(uint32_t(out.nodes.size()));
+  }
+  return out;
+}
+
 Result<void> gather_rows(IndirectTransfer& t, const Gathering& g, IndirectReport& report, Progress* progress) {
   const size_t count = t.gathering();
   std::vector<Row> rows(count);
@@ -237,16 +263,39 @@ Result<void> gather_rows(IndirectTransfer& t, const Gathering& g, IndirectReport
     pieces.save(number, piece.sizes, piece.nodes, piece.leaves, piece.weights, piece.scales, piece.strays, piece.right);
   });
   if (stage.cancelled()) return Error{"", "cancelled"};
-  t.first.assign(1, 0);
-  for (const Row& row : rows) {
-    t.nodes.insert(t.nodes.end(), row.nodes.begin(), row.nodes.end());
-    t.weights.insert(t.weights.end(), row.weights.begin(), row.weights.end());
-    t.scales.push_back(row.scale), t.first.push_back(uint32_t(t.nodes.size()));
-    report.strays += row.strays;
-  }
+  t.gather = rows_of(rows);
+  for (const Row& row : rows) report.strays += row.strays;
   weigh_leaves(t.surfels, g.hits);
-  t.error = compression_error(t, rows, at_nodes(t.surfels, g.test));
+  round_surfels(t.surfels);
+  t.error = compression_error(t.gather, rows, at_nodes(t.surfels, g.test));
   report.rays = count * size_t(g.sets.samples);
+  return {};
+}
+
+// Light in free space, by the same leaves.
+Result<void> gather_lattice(IndirectTransfer& t, const Gathering& g, IndirectReport& report, Progress* progress) {
+  IndirectLattice f{*g.options.lattice, g.options.lattice_order, {}, {}};
+  const size_t points = f.lattice.count();
+  const DirectionSets sets =
+      make_direction_sets(1, g.options.samples, direction_sets, g.options.seed, square_to_sphere, progress);
+  std::vector<Row> rows(points);
+  f.valid.assign(points, 1);
+  ProgressStage stage(progress, "gathering in free space", points);
+  parallel_for(points, rows_a_piece, [&](size_t begin, size_t end) {
+    std::vector<Met> met;
+    for (size_t p = begin; p < end && !stage.cancelled(); ++p, stage.advance()) {
+      // A pole of its own and a spin about it: every point's directions are turned at random.
+      const uint64_t bits = hash64(hash64(g.options.seed, 0x1a771ce), p);
+      const Vec3 pole = square_to_sphere({to_unit_float(uint32_t(bits >> 32)), to_unit_float(uint32_t(bits))});
+      f.valid[p] = g.send(sets, f.lattice.position(p), pole, p, false, met, rows[p]) <= 0.5;
+      if (f.valid[p]) g.compress(met, rows[p]);
+    }
+  });
+  if (stage.cancelled()) return Error{"", "cancelled"};
+  report.invalid = size_t(std::count(f.valid.begin(), f.valid.end(), uint8_t(0)));
+  if (report.invalid == points) return Error{"lattice", "every point lies inside something"};
+  f.rows = rows_of(rows), report.rays += points * size_t(sets.samples);
+  t.lattice = std::move(f);
   return {};
 }
 
@@ -276,7 +325,8 @@ void set_readers(IndirectTransfer& t, const Scene& scene, const SurfelSearch& se
   t.reader_surfels.assign(t.receivers * kernel_slots, 0), t.reader_weights.assign(t.receivers * kernel_slots, 0);
   parallel_for(t.receivers, 64, [&](size_t begin, size_t end) {
     for (size_t r = begin; r < end; ++r) {
-      const Kernels k = search.kernels({receivers.origins[r], receivers.normals[r]});
+      Kernels k = search.kernels({receivers.origins[r], receivers.normals[r]});
+      round_kernels(k);
       for (size_t i = 0; i < k.count; ++i) {
         t.reader_surfels[r * kernel_slots + i] = k.surfel[i];
         t.reader_weights[r * kernel_slots + i] = float_to_half(k.weight[i]);
@@ -285,6 +335,9 @@ void set_readers(IndirectTransfer& t, const Scene& scene, const SurfelSearch& se
   });
   for (size_t r = 0; r < t.receivers; ++r) report.buried += t.reader_weights[r * kernel_slots] == 0;
   report.unread = fill_readers(t, scene, receivers.basis);
+  // In the order in which a file has them.
+  const auto ok = unpack_kernels(pack_kernels(t), t, "");
+  LAMBENT_CHECK(ok);
 }
 
 }  // namespace
@@ -300,8 +353,9 @@ Result<IndirectTransfer> bake_indirect(const Scene& scene, const Tracer& tracer,
   IndirectTransfer t;
   t.surfels = std::move(*surfels);
   for (const Material& m : scene.materials) t.surfels.names.push_back(m.name);
-  for (Vec3& a : t.surfels.albedos) a = each(a, [](float x) { return half_to_float(float_to_half(x)); });  // as kept
-  t.gather_level = uint32_t(t.surfels.levels() > 1 ? t.surfels.levels() - 2 : 0);
+  round_surfels(t.surfels);
+  const size_t leaves = t.surfels.levels() - 1;
+  t.gather_level = uint32_t(options.all_gather || leaves == 0 ? leaves : leaves - 1);
   const SurfelSearch search(t.surfels, tracer, t.gather_level);
   told.surfel_seconds = seconds_since(start), start = Clock::now();
   const float diagonal = bounds(scene).diagonal();
@@ -311,6 +365,9 @@ Result<IndirectTransfer> bake_indirect(const Scene& scene, const Tracer& tracer,
   std::vector<std::atomic<uint32_t>> hits(t.surfels.count());
   const Gathering g{scene, tracer, t.surfels, search, options, sets, test, diagonal, hits};
   if (auto ok = gather_rows(t, g, told, progress); !ok) return ok.error();
+  if (options.lattice)
+    if (auto ok = gather_lattice(t, g, told, progress); !ok) return ok.error();
+  t.rows = directional_rows(options.directional);
   told.trace_seconds = seconds_since(start), start = Clock::now();
   set_readers(t, scene, search, receivers, told);
   told.reader_seconds = seconds_since(start);

@@ -1,5 +1,6 @@
 #include <lambent/bake/indirect.h>
 #include <lambent/bake/solve.h>
+#include <lambent/basis/sh.h>
 #include <lambent/core/random.h>
 #include <lambent/core/sampling.h>
 #include <lambent/reference/path_tracer.h>
@@ -21,12 +22,11 @@ struct Made {
   IndirectTransfer transfer;
 };
 
-std::unique_ptr<Made> make(Scene scene, size_t surfels, int samples, float angle = 0.2f) {
+std::unique_ptr<Made> make(Scene scene, size_t surfels, int samples, IndirectOptions options = {}) {
   auto m = std::make_unique<Made>();
   m->scene = std::move(scene);
   m->tracer = *Tracer::build(m->scene), m->receivers = make_vertex_receivers(m->scene);
-  IndirectOptions options;
-  options.surfels = surfels, options.samples = samples, options.angle = angle;
+  options.surfels = surfels, options.samples = samples;
   auto t = bake_indirect(m->scene, m->tracer, m->receivers, options);
   EXPECT_TRUE(t);
   m->transfer = std::move(*t);
@@ -157,6 +157,165 @@ TEST(Indirect, ClosedNeighbouringRoomStaysDark) {
   EXPECT_LT(dark, 1e-3 * lit);
 }
 
+// Of a lamp that is carried along: the light that surfels gather has no more kinks than what rays of their own find,
+// each lit sharply where it ends. Direct light is taken at points of leaves, as `render` does.
+TEST(Indirect, LightDoesNotPopAsALampMoves) {
+  const auto m = make(room(Vec3(0.9f, 0.1f, 0.1f)), 2048, 256);
+  const Surfels& f = m->transfer.surfels;
+  const SurfelSearch search(f, m->tracer, m->transfer.gather_level);
+  std::vector<std::vector<SurfacePlace>> places;
+  for (uint32_t i = 0; i < f.count(); ++i) places.push_back(places_of_leaf(m->scene, m->tracer, f, search, i, 4));
+  constexpr size_t frames = 12, apart = 7;
+  const float lift = receiver_lift(Vec3(2), 0, bounds(m->scene).diagonal());
+  const auto lit = [&](Vec3 lamp, const SurfacePlace& at) {
+    const Vec3 p = at.position + at.normal * lift;
+    const LampArrival a = arriving({.position = lamp, .intensity = Vec3(10)}, p);
+    const float facing = dot(at.normal, a.direction);
+    return facing > 0 && m->tracer.closest(p, a.direction, 0, a.distance).triangle == none ? facing / pi * a.irradiance
+                                                                                           : Vec3(0.0f);
+  };
+  IndirectSolve s = make_indirect_solve(m->transfer);
+  std::vector<Vec3> direct(f.count()), gathered(m->transfer.gathering());
+  std::vector<std::vector<double>> ours, truth;
+  for (size_t k = 0; k < frames; ++k) {
+    const Vec3 lamp(-0.8f + 1.6f * float(k) / float(frames - 1), 2.2f, 1.2f);
+    for (size_t i = 0; i < f.count(); ++i) {
+      direct[i] = Vec3(0.0f);
+      for (const SurfacePlace& at : places[i]) direct[i] += lit(lamp, at) / float(places[i].size());
+    }
+    gather_indirect(m->transfer, s, direct, gathered);
+    ours.emplace_back(), truth.emplace_back();
+    for (size_t r = 0; r < gathered.size(); r += apart) {
+      ours.back().push_back(double(gathered[r].y));
+      constexpr uint32_t rays = 512;
+      double sum = 0;
+      for (uint32_t j = 0; j < rays; ++j) {
+        const Vec3 d = frame_about(f.normals[r]) * square_to_cosine_hemisphere(sobol_owen(j, uint32_t(r)));
+        const Hit hit = m->tracer.closest(f.positions[r] + f.normals[r] * lift, d);
+        if (hit.triangle != none && hit.front)
+          sum += double(albedo(m->scene, m->scene.triangles[hit.triangle], hit.u, hit.v).y *
+                        lit(lamp, surface_place(m->scene, hit)).y) /
+                 rays;
+      }
+      truth.back().push_back(sum);
+    }
+  }
+  double mean = 0, kinks = 0, kinks_of_truth = 0;
+  for (size_t k = 1; k + 1 < frames; ++k)
+    for (size_t r = 0; r < ours[k].size(); ++r) {
+      mean += truth[k][r] / double(ours[k].size() * (frames - 2));
+      for (auto [x, sum] : {std::pair(&ours, &kinks), std::pair(&truth, &kinks_of_truth)})
+        *sum += std::pow((*x)[k + 1][r] - 2 * (*x)[k][r] + (*x)[k - 1][r], 2) / double(ours[k].size() * (frames - 2));
+    }
+  EXPECT_GT(mean, 0.05);
+  EXPECT_LT(std::sqrt(kinks), 1.2 * std::sqrt(kinks_of_truth) + 0.001 * mean);
+  EXPECT_LT(std::sqrt(kinks), 0.02 * mean);
+}
+
+TEST(Indirect, GoesOnFromTheLightBefore) {
+  const auto m = make(room(Vec3(0.9f, 0.1f, 0.1f)), 512, 64);
+  const auto a = lit_by(*m, Vec3(1, 2, 1), Vec3(10)), b = lit_by(*m, Vec3(1.05f, 2, 1), Vec3(10));
+  IndirectSolve s = make_indirect_solve(m->transfer), other = make_indirect_solve(m->transfer);
+  solve_indirect(m->transfer, other, b, 1e-5);
+  const int anew = other.bounces;
+  solve_indirect(m->transfer, s, a, 1e-5);
+  solve_indirect(m->transfer, s, b, 1e-5, 64, true);
+  EXPECT_LT(s.bounces, anew);
+  double mean = 0;
+  for (Vec3 x : other.x) mean += double(x.x) / double(other.x.size());
+  for (size_t r = 0; r < s.x.size(); ++r) EXPECT_NEAR(s.x[r].x, other.x[r].x, 2e-4 * mean);
+  // A bounce a frame comes to the same.
+  for (Vec3& x : s.x) x = Vec3(0);
+  double left = 1;
+  for (int k = 0; k < 40; ++k) {
+    step_indirect(m->transfer, s, b);
+    EXPECT_LE(s.residual, left * 1.001 + 1e-6);
+    left = s.residual;
+  }
+  for (size_t r = 0; r < s.x.size(); ++r) EXPECT_NEAR(s.x[r].x, other.x[r].x, 1e-3 * mean);
+}
+
+// Of all that leaves surfaces, by rays of its own: E / pi of a normal at a place.
+Vec3 gathered(const Made& m, const SurfelSearch& search, const std::vector<Vec3>& direct, const IndirectSolve& s,
+              Vec3 origin, Vec3 normal, std::optional<Vec3> above) {
+  const Surfels& f = m.transfer.surfels;
+  Vec3 sum(0.0f);
+  constexpr uint32_t rays = 2048;
+  for (uint32_t k = 0; k < rays; ++k) {
+    const Vec3 d = frame_about(normal) * square_to_cosine_hemisphere(sobol_owen(k, 77));
+    if (above && dot(d, *above) <= 0) continue;
+    const Hit hit = m.tracer.closest(origin, d);
+    if (hit.triangle == none) continue;
+    const uint32_t leaf = search.leaf(surface_place(m.scene, hit));
+    if (leaf != none) sum += f.albedos[leaf] * (direct[leaf] + s.x[s.ancestor[leaf]]);
+  }
+  return sum / float(rays);
+}
+
+TEST(Indirect, DirectionsAtReceiversAreThoseOfWhatIsSeen) {
+  const auto m = make(room(Vec3(0.9f, 0.1f, 0.1f)), 2048, 256);
+  const auto direct = lit_by(*m, Vec3(1, 2, 1), Vec3(9, 7, 5));
+  IndirectSolve s = make_indirect_solve(m->transfer);
+  solve_indirect(m->transfer, s, direct);
+  send_indirect(m->transfer, s, direct);
+  Relit plain, vector, harmonics;
+  read_indirect(m->transfer, s, plain);
+  read_directional_indirect(m->transfer, s, DirectionalKind::vector, vector);
+  read_directional_indirect(m->transfer, s, DirectionalKind::sh3, harmonics);
+  EXPECT_EQ(vector.rows, 3);
+  EXPECT_EQ(harmonics.rows, 9);
+  const SurfelSearch search(m->transfer.surfels, m->tracer, m->transfer.gather_level);
+  double wrong = 0, right = 0;
+  for (size_t r = 0; r < m->receivers.count(); ++r) {
+    const Vec3 n = m->receivers.normals[r], origin = m->receivers.origins[r];
+    const Mat3 frame = receiver_frame(n);
+    const Vec3 own = plain.at(r), v[3] = {vector.at(r, 0), vector.at(r, 1), vector.at(r, 2)};
+    std::array<Vec3, 9> rows;
+    for (int k = 0; k < 9; ++k) rows[size_t(k)] = harmonics.at(r, k);
+    // Kernels over one plane have one normal, and solved light is a bounce behind what is sent.
+    EXPECT_NEAR(evaluate_directional_light(DirectionalKind::vector, v, frame, n).y, own.y, 0.02f * own.y + 0.005f);
+    // Not in corners, where a receiver sees what surfels around it do not.
+    if (r % 5 || std::abs(gathered(*m, search, direct, s, origin, n, n).y - own.y) > 0.05f * own.y) continue;
+    const Vec3 bent = normalize_or(n + 0.5f * frame[0], n);
+    const Vec3 ours = evaluate_directional_light(DirectionalKind::sh3, rows, frame, bent),
+               truth = gathered(*m, search, direct, s, origin, bent, n), e = ours - truth;
+    wrong += double(dot(e, e)), right += double(dot(truth, truth));
+  }
+  EXPECT_GT(right, 0);
+  EXPECT_LT(std::sqrt(wrong / right), 0.08);
+}
+
+TEST(Indirect, LatticeHasWhatArrivesInFreeSpace) {
+  IndirectOptions options;
+  options.lattice = Lattice{Vec3(-1.5f, 0.5f, -1.5f), Vec3(1.5f, 2.5f, 1.5f), 3, 2, 3};
+  const auto m = make(room(Vec3(0.9f, 0.1f, 0.1f)), 2048, 256, options);
+  ASSERT_TRUE(m->transfer.lattice);
+  const IndirectLattice& f = *m->transfer.lattice;
+  EXPECT_EQ(std::count(f.valid.begin(), f.valid.end(), 0), 1);  // in the block
+  const auto direct = lit_by(*m, Vec3(1, 2, 1), Vec3(9, 7, 5));
+  IndirectSolve s = make_indirect_solve(m->transfer);
+  solve_indirect(m->transfer, s, direct);
+  send_indirect(m->transfer, s, direct);
+  Relit arriving;
+  read_lattice_indirect(m->transfer, s, arriving);
+  ASSERT_EQ(arriving.rows, 16);
+  const SurfelSearch search(m->transfer.surfels, m->tracer, m->transfer.gather_level);
+  std::vector<Vec3> rows(16);
+  for (size_t p = 0; p < f.lattice.count(); ++p) {
+    for (int k = 0; k < 16; ++k) rows[size_t(k)] = arriving.at(p, k);
+    EXPECT_GT(rows[0].y, 0);  // that in the block has its neighbours'
+    if (!f.valid[p]) continue;
+    for (int k = 0; k < 16; ++k) rows[size_t(k)] *= float(clamped_cosine(sh_band(k)) / double(pi));
+    double scale = 0;
+    std::vector<std::pair<Vec3, Vec3>> pairs;
+    for (Vec3 n : {Vec3(1, 0, 0), Vec3(-1, 0, 0), Vec3(0, 1, 0), Vec3(0, -1, 0), Vec3(0, 0, 1)})
+      pairs.emplace_back(reconstruct_sh(rows, n), gathered(*m, search, direct, s, f.lattice.position(p), n, {})),
+          scale = std::max(scale, double(pairs.back().second.y));
+    for (const auto& [ours, truth] : pairs)
+      for (int c = 0; c < 3; ++c) EXPECT_NEAR(ours[c], truth[c], 0.08 * scale) << "point " << p;
+  }
+}
+
 // Lamps at several places, against paths that know no surfels.
 TEST(Indirect, IsWhatPathsGather) {
   SKIP_UNDER_SANITIZERS();
@@ -194,14 +353,35 @@ TEST(Indirect, IsWhatPathsGather) {
 TEST(Indirect, RowsArePackedAndBrokenOnesRefused) {
   const auto m = make(room(Vec3(0.5f)), 256, 64);
   const IndirectTransfer& good = m->transfer;
-  const std::vector<uint8_t> bytes = pack_rows(good);
-  IndirectTransfer read;
-  ASSERT_TRUE(unpack_rows(bytes, good.gathering(), good.nodes.size(), read, "x"));
-  EXPECT_EQ(read.first, good.first);
-  EXPECT_EQ(read.nodes, good.nodes);
+  const std::vector<uint8_t> bytes = pack_rows(good.gather);
+  NodeRows read;
+  ASSERT_TRUE(unpack_rows(bytes, good.gathering(), good.gather.nodes.size(), read, "x"));
+  EXPECT_EQ(read.first, good.gather.first);
+  EXPECT_EQ(read.nodes, good.gather.nodes);
   for (size_t length : {size_t(0), bytes.size() / 2, bytes.size() - 1})
-    EXPECT_FALSE(unpack_rows({bytes.data(), length}, good.gathering(), good.nodes.size(), read, "x"));
-  EXPECT_FALSE(unpack_rows(bytes, good.gathering(), good.nodes.size() - 1, read, "x"));
+    EXPECT_FALSE(unpack_rows({bytes.data(), length}, good.gathering(), good.gather.nodes.size(), read, "x"));
+  EXPECT_FALSE(unpack_rows(bytes, good.gathering(), good.gather.nodes.size() - 1, read, "x"));
+  // Kernels have come back once, at the end of the bake.
+  const std::vector<uint8_t> kernels = pack_kernels(good);
+  IndirectTransfer same = good;
+  same.reader_surfels.clear(), same.reader_weights.clear();
+  ASSERT_TRUE(unpack_kernels(kernels, same, "x"));
+  EXPECT_EQ(same.reader_surfels, good.reader_surfels);
+  EXPECT_EQ(same.reader_weights, good.reader_weights);
+  for (size_t length : {size_t(0), size_t(1), kernels.size() / 2, kernels.size() - 1})
+    EXPECT_FALSE(unpack_kernels({kernels.data(), length}, same, "x"));
+  for (const auto& [at, value] : {std::pair(size_t(0), 1), std::pair(size_t(1), 9), std::pair(size_t(1), 255)}) {
+    std::vector<uint8_t> wrong = kernels;
+    wrong[at] = uint8_t(value);
+    EXPECT_FALSE(unpack_kernels(wrong, same, "x"));
+  }
+  // Surfels are as they are kept.
+  Surfels rounded = good.surfels;
+  round_surfels(rounded);
+  EXPECT_EQ(rounded.positions, good.surfels.positions);
+  EXPECT_EQ(rounded.normals, good.surfels.normals);
+  EXPECT_EQ(rounded.areas, good.surfels.areas);
+  EXPECT_EQ(rounded.albedos, good.surfels.albedos);
   auto broken = [&](auto change) {
     IndirectTransfer t = good;
     change(t);
@@ -210,6 +390,7 @@ TEST(Indirect, RowsArePackedAndBrokenOnesRefused) {
   EXPECT_FALSE(broken([](IndirectTransfer&) {}));
   EXPECT_TRUE(broken([](IndirectTransfer& t) { t.surfels.parents[3] = t.surfels.counts[0]; }));
   EXPECT_TRUE(broken([](IndirectTransfer& t) { t.surfels.parents.pop_back(); }));
+  EXPECT_TRUE(broken([](IndirectTransfer& t) { t.surfels.parents[3] = 2; }));
   EXPECT_TRUE(broken([](IndirectTransfer& t) { t.surfels.counts[0] = t.surfels.counts[1] + 1; }));
   EXPECT_TRUE(broken([](IndirectTransfer& t) { t.surfels.positions[0].x = NAN; }));
   EXPECT_TRUE(broken([](IndirectTransfer& t) { t.surfels.normals[0] = Vec3(0); }));
@@ -218,10 +399,10 @@ TEST(Indirect, RowsArePackedAndBrokenOnesRefused) {
   EXPECT_TRUE(broken([](IndirectTransfer& t) { t.surfels.materials[0] = 99; }));
   EXPECT_TRUE(broken([](IndirectTransfer& t) { t.surfels.spacings[1] = INFINITY; }));
   EXPECT_TRUE(broken([](IndirectTransfer& t) { t.gather_level = 99; }));
-  EXPECT_TRUE(broken([](IndirectTransfer& t) { t.nodes.back() = uint32_t(t.surfels.nodes()); }));
-  EXPECT_TRUE(broken([](IndirectTransfer& t) { std::swap(t.nodes[0], t.nodes[1]); }));
-  EXPECT_TRUE(broken([](IndirectTransfer& t) { t.scales[0] *= 2; }));
-  EXPECT_TRUE(broken([](IndirectTransfer& t) { t.scales[0] = NAN; }));
+  EXPECT_TRUE(broken([](IndirectTransfer& t) { t.gather.nodes.back() = uint32_t(t.surfels.nodes()); }));
+  EXPECT_TRUE(broken([](IndirectTransfer& t) { std::swap(t.gather.nodes[0], t.gather.nodes[1]); }));
+  EXPECT_TRUE(broken([](IndirectTransfer& t) { t.gather.scales[0] *= 2; }));
+  EXPECT_TRUE(broken([](IndirectTransfer& t) { t.gather.scales[0] = NAN; }));
   EXPECT_TRUE(broken([](IndirectTransfer& t) { t.reader_surfels[0] = uint32_t(t.gathering()); }));
   EXPECT_TRUE(broken([](IndirectTransfer& t) { t.reader_weights[0] = 0x7c00; }));
 }

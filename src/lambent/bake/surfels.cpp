@@ -261,6 +261,28 @@ void Throwing::tend_leaves(const PointGrid& grid) {
   for (size_t i = 0; i < out.count(); ++i) out.albedos[i] /= out.areas[i];
 }
 
+// Those that a level adds, along a curve: neighbours in space are neighbours in memory, and in files.
+void order_along_curve(Surfels& s) {
+  const Bounds box = surfel_box(s);
+  std::vector<uint32_t> old;  // of each surfel's new place
+  for (size_t l = 0; l < s.levels(); ++l) {
+    const uint32_t first = l > 0 ? s.counts[l - 1] : 0;
+    const std::vector<Vec3> added(s.positions.begin() + first, s.positions.begin() + s.counts[l]);
+    for (uint32_t i : curve_order(added, box)) old.push_back(first + i);
+  }
+  std::vector<uint32_t> place(old.size());
+  for (uint32_t i = 0; i < old.size(); ++i) place[old[i]] = i;
+  const auto reorder = [&](auto& values) {
+    auto was = values;
+    for (size_t i = 0; i < old.size(); ++i) values[i] = was[old[i]];
+  };
+  reorder(s.positions), reorder(s.normals), reorder(s.areas), reorder(s.albedos), reorder(s.materials);
+  const std::vector<uint32_t> parents = s.parents;
+  for (size_t l = 1; l < s.levels(); ++l)
+    for (size_t i = 0; i < s.counts[l]; ++i)
+      s.parents[s.first_parent(l) + i] = place[parents[s.first_parent(l) + old[i]]];
+}
+
 }  // namespace
 
 SurfacePlace surface_place(const Scene& scene, const Hit& hit) {
@@ -301,6 +323,7 @@ Result<Surfels> make_surfels(const Scene& scene, const Tracer& tracer, const Sur
   }
   if (t.out.count() > max_surfels) return Error{scene.path, "takes too many surfels"};
   for (float& a : t.out.areas) a *= float(areas.sums.back() / double(candidates_a_leaf * count));
+  order_along_curve(t.out);
   return std::move(t.out);
 }
 

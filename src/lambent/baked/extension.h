@@ -91,6 +91,14 @@ nlohmann::json encode_wavelets(const HaarTransfer& t, BlobWriter& out);
 Result<HaarTransfer> decode_wavelets(const BlobReader& in, const nlohmann::json& object, size_t receivers,
                                      const std::string& where);
 
+// Direct-to-indirect transport, but for the kind and the number of receivers.
+nlohmann::json encode_indirect(const IndirectTransfer& t, BlobWriter& out);
+Result<Field> decode_indirect(const BlobReader& in, const nlohmann::json& object, size_t receivers,
+                              const std::string& where);
+
+// The transfer's "directional"; none where there is no such member.
+Result<DirectionalKind> decode_directional(const nlohmann::json& transfer, const std::string& where);
+
 nlohmann::json encode_outgoing(const Outgoing& o, BlobWriter& out);
 Result<Outgoing> decode_outgoing(const BlobReader& in, const nlohmann::json& object, int rows, size_t receivers,
                                  const std::string& where);
@@ -101,7 +109,9 @@ void encode_placement(const Placement& where, std::span<const BakedPart> parts, 
 Result<Placement> decode_placement(const BlobReader& in, const nlohmann::json& extension, size_t receivers,
                                    std::vector<BakedPart>& parts, const std::string& where);
 
-// Light in free space, the extension's "lattice".
+// Light in free space, the extension's "lattice"; the place of its points alone, with an order.
+nlohmann::json encode_points(const Lattice& lattice, int order, const std::vector<uint8_t>& valid, BlobWriter& out);
+Result<Lattice> decode_points(const nlohmann::json& object, int& order, const std::string& where);
 nlohmann::json encode_lattice(const Field& field, BlobWriter& out);
 Result<Field> decode_lattice(const BlobReader& in, const nlohmann::json& object, const LightBasis& light,
                              const std::string& where);

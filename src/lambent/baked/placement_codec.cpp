@@ -236,18 +236,22 @@ Result<Placement> decode_placement(const BlobReader& in, const json& extension, 
   return Error{where, "receivers of this kind are not known to this program"};
 }
 
+json encode_points(const Lattice& l, int order, const std::vector<uint8_t>& valid, BlobWriter& out) {
+  return {{"min", {l.min.x, l.min.y, l.min.z}},
+          {"max", {l.max.x, l.max.y, l.max.z}},
+          {"points", {l.nx, l.ny, l.nz}},
+          {"order", order},
+          {"valid", out.add(valid)}};
+}
+
 json encode_lattice(const Field& field, BlobWriter& out) {
   const auto& place = std::get<LatticePlacement>(field.where);
-  const Lattice& l = place.lattice;
   json object = encode_dense(std::get<Transfer>(field.store), out);
-  object["min"] = {l.min.x, l.min.y, l.min.z}, object["max"] = {l.max.x, l.max.y, l.max.z};
-  object["points"] = {l.nx, l.ny, l.nz}, object["order"] = std::get<IncidentRows>(field.rows).order;
-  object["valid"] = out.add(place.valid);
+  object.update(encode_points(place.lattice, std::get<IncidentRows>(field.rows).order, place.valid, out));
   return object;
 }
 
-Result<Field> decode_lattice(const BlobReader& in, const json& object, const LightBasis& light,
-                             const std::string& where) {
+Result<Lattice> decode_points(const json& object, int& order, const std::string& where) {
   if (!object.is_object()) return Error{where, "is not an object"};
   auto min = read_numbers(object, "min", 3, where), max = read_numbers(object, "max", 3, where);
   for (const auto* list : {&min, &max})
@@ -258,15 +262,23 @@ Result<Field> decode_lattice(const BlobReader& in, const json& object, const Lig
   auto points = read_points(object, where);
   if (!points) return points.error();
   l.nx = (*points)[0], l.ny = (*points)[1], l.nz = (*points)[2];
-  auto order = read_count(object, "order", size_t(max_sh_order), where);
-  if (!order) return order.error();
-  if (*order < 1) return Error{where, "its order is 0"};
-  Transfer transfer{light, sh_count(int(*order)), 1, l.count()};
+  auto bands = read_count(object, "order", size_t(max_sh_order), where);
+  if (!bands) return bands.error();
+  if (*bands < 1) return Error{where, "its order is 0"};
+  order = int(*bands);
+  return l;
+}
+
+Result<Field> decode_lattice(const BlobReader& in, const json& object, const LightBasis& light,
+                             const std::string& where) {
+  int order = 0;
+  auto l = decode_points(object, order, where);
+  if (!l) return l.error();
+  Transfer transfer{light, sh_count(order), 1, l->count()};
   if (auto ok = decode_dense(in, object, transfer, where); !ok) return ok.error();
-  auto valid = read_values<uint8_t>(in, object, "valid", l.count(), where);
+  auto valid = read_values<uint8_t>(in, object, "valid", l->count(), where);
   if (!valid) return valid.error();
-  Field field{LatticePlacement{l, std::move(*valid)}, std::move(transfer), IncidentRows{int(*order)}};
-  return field;
+  return Field{LatticePlacement{*l, std::move(*valid)}, std::move(transfer), IncidentRows{order}};
 }
 
 }  // namespace lambent

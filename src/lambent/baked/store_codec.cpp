@@ -211,114 +211,7 @@ Result<Visibility> decode_visibility_store(const BlobReader& in, const json& obj
   return v;
 }
 
-json encode(const IndirectTransfer& t, BlobWriter& out) {
-  const Surfels& s = t.surfels;
-  std::vector<uint16_t> albedos;
-  for (Vec3 a : s.albedos)
-    for (int c = 0; c < 3; ++c) albedos.push_back(float_to_half(a[c]));
-  // Two bytes where those are enough.
-  const auto narrow = [&](const std::vector<uint32_t>& values, size_t limit) {
-    return limit <= 65536 ? out.add_copy(std::vector<uint16_t>(values.begin(), values.end()))
-                          : out.add(bytes_of(values));
-  };
-  json surfels{{"levels", s.counts},
-               {"spacings", s.spacings},
-               {"positions", out.add(bytes_of(s.positions))},
-               {"normals", out.add(bytes_of(s.normals))},
-               {"areas", out.add(bytes_of(s.areas))},
-               {"albedos", out.add_copy(albedos)},
-               {"materials", narrow(s.materials, s.names.size())},
-               {"names", s.names},
-               {"parents", out.add(bytes_of(s.parents))}};
-  return {{"surfels", std::move(surfels)},
-          {"gatherLevel", t.gather_level},
-          {"entries", t.nodes.size()},
-          {"bufferView", out.add_copy(pack_rows(t))},
-          {"weights", out.add(bytes_of(t.weights))},
-          {"scales", out.add(bytes_of(t.scales))},
-          {"kernels",
-           {{"surfels", narrow(t.reader_surfels, t.gathering())}, {"weights", out.add(bytes_of(t.reader_weights))}}},
-          {"error", t.error}};
-}
-
-// Indices of two bytes where those are enough, else of four.
-Result<std::vector<uint32_t>> read_narrow(const BlobReader& in, const json& object, const char* key, size_t count,
-                                          size_t limit, const std::string& where) {
-  if (limit > 65536) return read_values<uint32_t>(in, object, key, count, where);
-  auto values = read_values<uint16_t>(in, object, key, count, where);
-  if (!values) return values.error();
-  return std::vector<uint32_t>(values->begin(), values->end());
-}
-
-Result<Surfels> decode_surfels(const BlobReader& in, const json& object, const std::string& where) {
-  Surfels s;
-  const auto levels = object.find("levels"), names = object.find("names");
-  if (levels == object.end() || !levels->is_array() || levels->empty() || levels->size() > max_surfel_levels ||
-      !std::all_of(levels->begin(), levels->end(),
-                   [](const json& n) { return n.is_number_unsigned() && n.get<uint64_t>() <= max_surfels; }))
-    return Error{where, "\"levels\" is not a list of numbers of surfels"};
-  s.counts = levels->get<std::vector<uint32_t>>();
-  if (names == object.end() || !names->is_array() || names->size() > max_surfels ||
-      !std::all_of(names->begin(), names->end(), [](const json& n) { return n.is_string(); }))
-    return Error{where, "\"names\" is not a list of materials"};
-  s.names = names->get<std::vector<std::string>>();
-  auto spacings = read_numbers(object, "spacings", s.levels(), where);
-  if (!spacings) return spacings.error();
-  s.spacings = std::move(*spacings);
-  const size_t n = s.counts.back();
-  auto positions = read_values<Vec3>(in, object, "positions", n, where),
-       normals = read_values<Vec3>(in, object, "normals", n, where);
-  for (const auto* values : {&positions, &normals})
-    if (!*values) return values->error();
-  auto areas = read_values<float>(in, object, "areas", n, where);
-  if (!areas) return areas.error();
-  auto albedos = read_values<uint16_t>(in, object, "albedos", 3 * n, where);
-  if (!albedos) return albedos.error();
-  auto materials = read_narrow(in, object, "materials", n, s.names.size(), where);
-  if (!materials) return materials.error();
-  auto parents = read_values<uint32_t>(in, object, "parents", s.nodes() - s.counts[0], where);
-  if (!parents) return parents.error();
-  for (size_t i = 0; i < n; ++i)
-    s.albedos.emplace_back(half_to_float((*albedos)[3 * i]), half_to_float((*albedos)[3 * i + 1]),
-                           half_to_float((*albedos)[3 * i + 2]));
-  s.positions = std::move(*positions), s.normals = std::move(*normals), s.areas = std::move(*areas);
-  s.materials = std::move(*materials), s.parents = std::move(*parents);
-  return s;
-}
-
-Result<Field> decode_indirect(const BlobReader& in, const json& object, size_t receivers, const std::string& where) {
-  IndirectTransfer t;
-  for (const char* member : {"surfels", "kernels"})
-    if (!object.contains(member) || !object[member].is_object())
-      return Error{where, std::string("\"") + member + "\" is missing"};
-  auto surfels = decode_surfels(in, object["surfels"], where + ": surfels");
-  if (!surfels) return surfels.error();
-  t.surfels = std::move(*surfels), t.receivers = receivers;
-  auto level = read_count(object, "gatherLevel", t.surfels.levels() - 1, where),
-       entries = read_count(object, "entries", 0x7fffffff, where);
-  for (const auto* count : {&level, &entries})
-    if (!*count) return count->error();
-  t.gather_level = uint32_t(*level);
-  if (receivers > in.buffers.room() / kernel_slots) return Error{where, "there is no room for so many receivers"};
-  auto packed = read_view(in, object, "bufferView", where);
-  if (!packed) return packed.error();
-  if (auto ok = unpack_rows(packed->bytes, t.gathering(), *entries, t, where); !ok) return ok.error();
-  auto weights = read_values<uint8_t>(in, object, "weights", *entries, where);
-  if (!weights) return weights.error();
-  auto scales = read_values<float>(in, object, "scales", t.gathering(), where);
-  if (!scales) return scales.error();
-  const json& kernels = object["kernels"];
-  auto readers = read_narrow(in, kernels, "surfels", receivers * kernel_slots, t.gathering(), where + ": kernels");
-  if (!readers) return readers.error();
-  auto shares = read_values<uint16_t>(in, kernels, "weights", receivers * kernel_slots, where + ": kernels");
-  if (!shares) return shares.error();
-  t.weights = std::move(*weights), t.scales = std::move(*scales);
-  t.reader_surfels = std::move(*readers), t.reader_weights = std::move(*shares);
-  if (const auto error = object.find("error"); error != object.end() && error->is_number())
-    t.error = error->get<double>();
-  if (auto ok = check_indirect(t, where); !ok) return ok.error();
-  return Field{{}, std::move(t), DiffuseRows{}};
-}
+json encode(const IndirectTransfer& t, BlobWriter& out) { return encode_indirect(t, out); }
 
 // Rows of a transfer matrix, as its header says.
 Result<int> read_rows(const json& transfer, const std::string& where) {
@@ -397,9 +290,9 @@ Result<Field> decode_rows_of_columns(const BlobReader& in, const json& t, bool m
     if (!outgoing) return outgoing.error();
     field.rows = std::move(*outgoing);
   }
-  if (const auto name = t.find("directional"); name != t.end()) {
-    const auto kind = directional_kind(name->is_string() ? name->get<std::string>() : "");
-    if (!kind) return Error{where, "directional light \"" + name->dump() + "\" is not known to this program"};
+  if (t.contains("directional")) {
+    const auto kind = decode_directional(t, where);
+    if (!kind) return kind.error();
     if (matrix && *kind != DirectionalKind::none) return Error{where, "directional light is of diffuse transfer alone"};
     if (*kind != DirectionalKind::none) field.rows = DirectionalRows{*kind}, rows = directional_rows(*kind);
   }
@@ -430,6 +323,14 @@ const char* kind_of(const Field& field) {
 
 }  // namespace
 
+Result<DirectionalKind> decode_directional(const json& t, const std::string& where) {
+  const auto name = t.find("directional");
+  if (name == t.end()) return DirectionalKind::none;
+  const auto kind = directional_kind(name->is_string() ? name->get<std::string>() : "");
+  if (!kind) return Error{where, "directional light \"" + name->dump() + "\" is not known to this program"};
+  return *kind;
+}
+
 json encode_dense(const Transfer& t, BlobWriter& out) { return encode_values(t, out); }
 Result<void> decode_dense(const BlobReader& in, const json& object, Transfer& t, const std::string& where) {
   return decode_values(in, object, t, where);
@@ -452,7 +353,7 @@ Result<Field> decode_transfer(const BlobReader& in, const json& t, const std::st
   const std::string kind = t.contains("kind") && t["kind"].is_string() ? t["kind"].get<std::string>() : "";
   auto receivers = read_count(t, "receivers", 0xfffffffe, where);
   if (!receivers) return receivers.error();
-  if (kind != "diffuse" && t.contains("directional") && t["directional"] != "none")
+  if (kind != "diffuse" && kind != "indirect" && t.contains("directional") && t["directional"] != "none")
     return Error{where, "directional light is of diffuse transfer alone"};
   if (kind == "indirect") return decode_indirect(in, t, *receivers, where);
   if (kind == "blocks") return decode_blocks(in, t, *receivers, where);

@@ -10,6 +10,7 @@
 #include <lambent/pipeline/bake_lightmap.h>
 #include <lambent/pipeline/bake_parse.h>
 #include <lambent/pipeline/bake_rooms.h>
+#include <lambent/pipeline/bake_surfels.h>
 #include <lambent/pipeline/durable.h>
 #include <lambent/pipeline/parse.h>
 #include <lambent/pipeline/place_receivers.h>
@@ -183,32 +184,11 @@ Result<void> bake_over_cube(Bake& b) {
 }
 
 Result<void> bake_to_indirect(Bake& b) {
-  IndirectReport report;
-  auto baked = bake_indirect(b.scene, b.tracer, b.receivers(), b.plan.indirect, &report, b.job.progress);
+  auto baked =
+      bake_indirect_of_request(b.request, b.plan, b.scene, b.tracer, b.receivers(), b.job, b.report, b.summary);
   if (!baked) return baked.error();
-  if (b.tracer.colours()) b.job.warn("bounces know no coloured glass: its light is kept grey");
-  if (report.strays > report.rays / 50)
-    b.job.warn(
-        fmt::format("{:.1f} % of the rays met surfaces too small for a surfel of their own, and are lost: more "
-                    "--surfels find them",
-                    100 * double(report.strays) / double(report.rays)));
-  b.report.receivers = b.receivers().count(), b.report.rays = report.rays, b.report.buried = report.buried;
-  b.report.trace_seconds = report.trace_seconds;
-  const size_t entries = baked->nodes.size(), rows = baked->gathering();
-  b.summary.json["indirect"] = {{"surfels", baked->surfels.count()},
-                                {"gathering", rows},
-                                {"entries", entries},
-                                {"compression_error", baked->error},
-                                {"strays", report.strays},
-                                {"unread", report.unread},
-                                {"surfel_seconds", report.surfel_seconds},
-                                {"kernel_seconds", report.reader_seconds}};
-  b.line("surfels",
-         fmt::format("{} in {} levels, placed in {}; {} gather by {:.0f} entries each, to {:.2g} % RMS",
-                     human_count(baked->surfels.count()), baked->surfels.levels(), human_seconds(report.surfel_seconds),
-                     human_count(rows), double(entries) / double(std::max<size_t>(rows, 1)), 100 * baked->error));
-  if (report.unread)
-    b.line("", human_count(report.unread) + " receivers and all their neighbours see no surfel, and stay dark");
+  if (const DirectionalKind kind = b.plan.indirect.directional; kind != DirectionalKind::none)
+    b.rows = DirectionalRows{kind};
   b.store = std::move(*baked);
   return {};
 }
@@ -439,7 +419,7 @@ Result<BakeOutcome> bake_plain(const BakeRequest& request, const BakePlan& plan,
   Bake& b = *begun;
   if (auto ok = begin(b); !ok) return ok.error();
   std::optional<Lattice> lattice;
-  if (!request.lattice.empty()) {
+  if (!request.lattice.empty() && plan.kind != BakeKind::indirect) {
     auto parsed = lattice_of_request(request, b.scene);
     if (!parsed) return parsed.error();
     if (auto ok = check_lattice(*parsed, plan.bake.order, plan.lattice); !ok) return ok.error();

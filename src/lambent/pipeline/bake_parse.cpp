@@ -274,6 +274,7 @@ Result<BakePlan> plan_of(const BakeRequest& r, const Job& job) {
   if (plan.kind == BakeKind::wavelets)
     if (auto ok = parse_haar(r.light, plan); !ok) return ok.error();
   plan.indirect.surfels = size_t(r.surfels), plan.indirect.samples = b.samples, plan.indirect.seed = r.seed;
+  plan.indirect.directional = *directional_kind(r.directional), plan.indirect.all_gather = r.gatherers == "all";
   if (auto ok = check_orders(plan, r); !ok) return ok.error();
   return plan;
 }

@@ -56,9 +56,9 @@ const Option<R> table[] = {
      "Where light is received: vertices, texels of an atlas, or patches (triangles); texels for lightmaps, else "
      "vertices",
      0, 0, "vertices|texels|patches"},
-    {"texels-per-unit", &R::texels_per_unit, "What is baked", D | L | W,
+    {"texels-per-unit", &R::texels_per_unit, "What is baked", D | L | W | I,
      "Texels along one scene unit; the atlas is as large as that needs", 1e-12, 1e12, nullptr, "receivers=texels"},
-    {"atlas", &R::atlas, "What is baked", D | L | W,
+    {"atlas", &R::atlas, "What is baked", D | L | W | I,
      "WIDTHxHEIGHT of the atlas; texels are as small as that allows (if nothing is said, as light asks for in a "
      "lightmap "
      "baked to an error, else 1024x1024)",
@@ -141,9 +141,10 @@ const Option<R> table[] = {
     {"direct", &R::direct, "Lightmaps (--transfer lightmap)", L,
      "separate writes direct light to a picture of its own as well, and leaves it out of the others", 0, 0,
      "included|separate"},
-    {"directional", &R::directional, "Lightmaps (--transfer lightmap)", L,
-     "For normal maps: sh:2 or sh:3 (harmonics of irradiance), hl2 (Half-Life 2's three directions), vector", 0, 0,
-     "none|sh:2|sh:3|hl2|vector"},
+    {"directional", &R::directional, "Lightmaps (--transfer lightmap)", L | I,
+     "For normal maps: sh:2 or sh:3 (harmonics of irradiance), hl2 (Half-Life 2's three directions; of lightmaps), "
+     "vector",
+     0, 0, "none|sh:2|sh:3|hl2|vector"},
     {"solver", &R::solver, "Lightmaps (--transfer lightmap)", L, "With --bounces converge:EPS", 0, 0,
      "jacobi|gauss-seidel|southwell|gmres", "bounces=converge:"},
     {"gather", &R::gather, "Lightmaps (--transfer lightmap)", L,
@@ -167,6 +168,11 @@ const Option<R> table[] = {
      "surfaces see",
      0, 1 << 20},
 
+    {"gatherers", &R::gatherers, "Direct to indirect light (--transfer indirect)", I,
+     "Which of them gather: a quarter, evenly apart, or all, for light that changes over a few of their distances, "
+     "with several times the bytes and the time",
+     0, 0, "quarter|all"},
+
     {"compress", &R::compress, "Smaller and special (diffuse, matrix)", D | M,
      "cpca:CLUSTERS,RANK: store clusters, and a few weights a receiver"},
     {"fix-light", &R::fix_light, "Smaller and special (diffuse, matrix)", D | M,
@@ -179,11 +185,11 @@ const Option<R> table[] = {
     {"spp", &R::spp, "Smaller and special (diffuse, matrix)", D | M, "Of --fix-view: rays a pixel", 1, 4096, nullptr,
      "fix-view"},
 
-    {"lattice", &R::lattice, "Light in free space (diffuse, matrix)", D | M,
+    {"lattice", &R::lattice, "Light in free space (diffuse, matrix, indirect)", D | M | I,
      "NX,NY,NZ: also bake light in free space at so many points, for `render --insert`"},
-    {"lattice-box", &R::lattice_box, "Light in free space (diffuse, matrix)", D | M,
+    {"lattice-box", &R::lattice_box, "Light in free space (diffuse, matrix, indirect)", D | M | I,
      "X0,Y0,Z0,X1,Y1,Z1: where, if not throughout the scene's box", 0, 0, nullptr, "lattice"},
-    {"lattice-order", &R::lattice_order, "Light in free space (diffuse, matrix)", D | M,
+    {"lattice-order", &R::lattice_order, "Light in free space (diffuse, matrix, indirect)", D | M | I,
      "Bands of the light that arrives there", 1, max_sh_order, nullptr, "lattice"},
 };
 
@@ -264,9 +270,11 @@ Result<void> check_kind(const BakeRequest& r, BakeKind kind) {
   if (r.given.contains("bin_limit") && file_extension(r.output) != "gltf")
     return Error{"--bin-limit", "is of the files beside a .gltf: leave it out, or write one", true};
   if (kind != BakeKind::diffuse && kind != BakeKind::lightmap && kind != BakeKind::wavelets &&
-      r.receivers != "vertices")
+      kind != BakeKind::indirect && r.receivers != "vertices")
     return Error{"--receivers", std::string(bake_kind_names[int(kind)]) + " are received at vertices", true};
-  if (!r.lattice.empty() && r.receivers != "vertices")
+  if (kind == BakeKind::indirect && r.directional == "hl2")
+    return Error{"--directional", "of direct to indirect light is sh:2, sh:3 or vector", true};
+  if (!r.lattice.empty() && r.receivers != "vertices" && kind != BakeKind::indirect)
     return Error{"--receivers", "--lattice needs a bake at vertices", true};
   if (r.shadows == "off" && r.given.contains("bounces") && r.bounces != "0")
     return Error{"--shadows", "off has no bounces: leave --bounces out, or set it to 0", true};

@@ -173,6 +173,7 @@ const std::map<std::string, Change> changes{
     {"size", {"12x9", {{"fix_view", "auto"}}}},
     {"spp", {3, {{"fix_view", "auto"}, {"size", "16x12"}}}},
     {"surfels", {512}},
+    {"gatherers", {"all"}},
     {"lattice", {"2,1,1"}},
     {"lattice_box", {"0,0,0,1,1,1", {{"lattice", "2,1,1"}}}},
     {"lattice_order", {2, {{"lattice", "2,1,1"}}}},

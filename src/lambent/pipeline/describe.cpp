@@ -89,16 +89,20 @@ Said say(const Visibility& v) {
 
 Said say(const IndirectTransfer& t) {
   const Surfels& s = t.surfels;
-  const double each = double(t.nodes.size()) / double(std::max<size_t>(t.gathering(), 1));
+  const double each = double(t.gather.nodes.size()) / double(std::max<size_t>(t.gathering(), 1));
   return {{{"surfels", s.count()},
            {"levels", s.counts},
            {"spacings", s.spacings},
            {"gathering", t.gathering()},
-           {"entries", t.nodes.size()},
+           {"entries", t.gather.nodes.size()},
+           {"lattice_points", t.lattice ? t.lattice->lattice.count() : 0},
            {"compression_error", t.error}},
           fmt::format("direct to indirect light, {} in {} levels, {} with rows", some(s.count(), "surfel"), s.levels(),
                       human_count(t.gathering())),
-          fmt::format("\n  rows of {:.0f} entries, to {:.2g} % RMS of what was gathered", each, 100 * t.error)};
+          fmt::format("\n  rows of {:.0f} entries, to {:.2g} % RMS of what was gathered{}", each, 100 * t.error,
+                      t.lattice ? fmt::format("\n  in free space at {} points, order {}",
+                                              human_count(t.lattice->lattice.count()), t.lattice->order)
+                                : "")};
 }
 
 Said say(const HaarTransfer& t) {
@@ -188,7 +192,7 @@ Said say(const Store& store) {
   return std::visit([](const auto& s) { return say(s); }, store);
 }
 
-const char* kind_of(const Field& field) {
+const char* kind_name(const Field& field) {
   return std::visit(
       Overloaded{[](const ZonalTransfer&) { return "zonal"; }, [](const FactoredTransfer&) { return "factors"; },
                  [](const Visibility&) { return "blocks"; }, [](const IndirectTransfer&) { return "indirect"; },
@@ -213,7 +217,7 @@ const char* name_of(const Rows& rows) {
 }
 
 json describe(const Field& field) {
-  json d{{"kind", kind_of(field)},         {"store", name_of(field.store)},          {"where", name_of(field.where)},
+  json d{{"kind", kind_name(field)},       {"store", name_of(field.store)},          {"where", name_of(field.where)},
          {"meaning", name_of(field.rows)}, {"receivers", receivers_of(field.store)}, {"bytes", bytes_of(field.store)}};
   for (const Said& said : {say(field.store), say(field.rows), say(field.where)}) d.update(said.members);
   return d;
@@ -223,7 +227,7 @@ std::string describe_in_words(const Field& field) {
   const Said store = say(field.store), rows = say(field.rows), where = say(field.where);
   std::vector<std::string> words;
   // The kind goes first, unless the store says it; then what rows there are beyond one diffuse.
-  const std::string kind = kind_of(field);
+  const std::string kind = kind_name(field);
   const bool arrives = std::holds_alternative<IncidentRows>(field.rows);
   if (kind != "zonal" && kind != "blocks" && kind != "indirect" && kind != "wavelets" && kind != rows.words && !arrives)
     words.push_back(kind);

@@ -5,11 +5,13 @@
 #include <lambent/core/parallel.h>
 #include <lambent/core/random.h>
 #include <lambent/core/sampling.h>
+#include <lambent/pipeline/draw_insert.h>
 #include <lambent/pipeline/draw_light.h>
 #include <lambent/pipeline/moving_lamps.h>
 #include <lambent/pipeline/text.h>
 #include <lambent/receivers/receivers.h>
 #include <lambent/relight/indirect.h>
+#include <lambent/scene/append.h>
 
 #include <fmt/format.h>
 #include <fmt/ranges.h>
@@ -69,7 +71,24 @@ struct StillLight {
   }
 };
 
+// A lamp that moves, and what it gave leaves where it stood last.
+struct LitLamp {
+  MovingLamp lamp;
+  std::vector<Vec3> at_leaves{};
+};
+
+// Objects put into the scene, over light in free space.
+struct Objects {
+  std::vector<std::shared_ptr<const InsertedObject>> made{};
+  Scene scene{};                   // with the one that was baked, which comes first
+  std::optional<Tracer> tracer{};  // of it
+  RelitScene lit{};                // alone
+  SpatialBasis basis{};            // of those
+  size_t first = 0;                // triangle in `scene`
+};
+
 struct IndirectDrawing {
+  const Baked& baked;
   const DrawRequest& request;
   const Job& job;
   const IndirectTransfer& transfer;
@@ -83,30 +102,41 @@ struct IndirectDrawing {
   const SurfelSearch* search = nullptr;
   std::vector<std::vector<SurfacePlace>> places{};  // of leaves
   IndirectSolve solve{};
+  std::vector<LitLamp> lit{};  // the lamps
   std::vector<Vec3> direct{};  // at surfels
+  Relit relit{};               // at receivers, where they are read
+  Objects objects{};
+  size_t evaluated = 0;  // lamps, in the last frame
   double ray_seconds = 1e9, solve_seconds = 1e9, read_seconds = 1e9;
+
+  DirectionalKind directional() const { return directional_of(baked.surface); }
+  bool reads_receivers() const { return request.at == "receivers"; }
+  // What is seen.
+  const Scene& drawn() const { return objects.tracer ? objects.scene : scene; }
+  const Tracer& sight() const { return objects.tracer ? *objects.tracer : tracer; }
 };
 
 // Exit radiance of a white surface, by what stands still.
-Vec3 still_light(const IndirectDrawing& d, Vec3 origin, Vec3 normal, int samples, uint64_t key) {
+Vec3 still_light(const IndirectDrawing& d, const Scene& scene, const Tracer& tracer, Vec3 origin, Vec3 normal,
+                 int samples, uint64_t key) {
   const StillLight& still = d.still;
   if (!still.shines()) return Vec3(0.0f);
   thread_local std::vector<LampLight> arrived;
   arrived.clear();
   const bool spreads = still.lamps.sky || !still.lamps.area.empty();
   const size_t rays = spreads ? size_t(samples) : 0;
-  sample_lamps(d.scene, d.tracer, still.lamps, origin, normal, samples, rays, still_seed, key, arrived);
+  sample_lamps(scene, tracer, still.lamps, origin, normal, samples, rays, still_seed, key, arrived);
   const Mat3 frame = frame_about(normal);
   for (size_t i = 0; i < rays; ++i) {
     const Vec3 local = square_to_cosine_hemisphere(sobol_owen(uint32_t(i), uint32_t(hash64(key, still_seed))));
     const Vec3 direction = frame * local;
-    const Hit hit = d.tracer.closest(origin, direction);
+    const Hit hit = tracer.closest(origin, direction);
     if (hit.triangle == none && still.lamps.sky)
       arrived.push_back(met_sky(still.lamps, direction, local.z, samples, rays));
     if (hit.triangle == none || still.lamps.of_triangle.empty()) continue;
     const uint32_t lamp = still.lamps.of_triangle[hit.triangle];
-    if (lamp != none && emits(d.scene, d.scene.triangles[hit.triangle], hit.front))
-      arrived.push_back(met_lamp(d.scene, still.lamps, lamp, hit, direction, local.z, samples, rays));
+    if (lamp != none && emits(scene, scene.triangles[hit.triangle], hit.front))
+      arrived.push_back(met_lamp(scene, still.lamps, lamp, hit, direction, local.z, samples, rays));
   }
   Vec3 sum(0.0f);
   for (const LampLight& l : arrived) sum += still.scales[l.group] * l.value;
@@ -142,48 +172,97 @@ void light_leaves_once(IndirectDrawing& d) {
         return l.kind != PunctualLight::Kind::directional && is_near(d, i, l.position);
       });
       d.still.at_leaves[i] = mean_over_leaf(d, i, near, [&](Vec3 origin, Vec3 normal, size_t, uint64_t key) {
-        return still_light(d, origin, normal, still_samples, key);
+        return still_light(d, d.scene, d.tracer, origin, normal, still_samples, key);
       });
     }
   });
 }
 
-// Direct light of a leaf by lamps that move.
-Vec3 direct_at_leaf(const IndirectDrawing& d, const std::vector<MovingLamp>& lamps, size_t leaf) {
-  if (lamps.empty()) return Vec3(0.0f);
-  const bool near = std::any_of(lamps.begin(), lamps.end(), [&](const MovingLamp& l) {
-    return l.kind != MovingLamp::Kind::sun && is_near(d, leaf, l.light.position);
-  });
+// Direct light of a leaf by a lamp that moves.
+Vec3 direct_at_leaf(const IndirectDrawing& d, const MovingLamp& lamp, size_t leaf) {
+  const bool near = lamp.kind != MovingLamp::Kind::sun && is_near(d, leaf, lamp.light.position);
   return mean_over_leaf(d, leaf, near, [&](Vec3 origin, Vec3 normal, size_t places, uint64_t key) {
-    return direct_light(d.tracer, lamps, origin, normal, std::max(lamp_samples / int(places), 1), key);
+    return direct_light(d.tracer, {&lamp, 1}, origin, normal, std::max(lamp_samples / int(places), 1), key);
   });
 }
 
-// Direct light at surfels, and the bounces that follow; fastest times are kept.
-void light_surfels(IndirectDrawing& d) {
+// Direct light at surfels: of lamps that stand where they stood it is known, and their lights add up.
+void light_leaves(IndirectDrawing& d) {
+  d.direct = d.still.at_leaves;
+  d.lit.resize(d.lamps.size()), d.evaluated = 0;
+  for (size_t k = 0; k < d.lamps.size(); ++k) {
+    LitLamp& lit = d.lit[k];
+    const MovingLamp& lamp = d.lamps[k];
+    const bool stood = !lit.at_leaves.empty() && lit.lamp.light.position == lamp.light.position &&
+                       lit.lamp.centre == lamp.centre;
+    lit.lamp = lamp, lit.at_leaves.resize(d.direct.size());
+    d.evaluated += !stood;
+    parallel_for(d.direct.size(), 128, [&](size_t begin, size_t end) {
+      for (size_t i = begin; i < end; ++i) {
+        if (!stood) lit.at_leaves[i] = direct_at_leaf(d, lamp, i);
+        d.direct[i] += lit.at_leaves[i];
+      }
+    });
+  }
+}
+
+// Direct light at surfels, and the bounces that follow, from where the frame before had come; fastest times are kept.
+void light_surfels(IndirectDrawing& d, bool first) {
   auto start = Clock::now();
-  d.direct.resize(d.transfer.surfels.count());
-  parallel_for(d.direct.size(), 128, [&](size_t begin, size_t end) {
-    for (size_t i = begin; i < end; ++i) d.direct[i] = d.still.at_leaves[i] + direct_at_leaf(d, d.lamps, i);
-  });
-  d.ray_seconds = std::min(d.ray_seconds, seconds_since(start)), start = Clock::now();
-  solve_indirect(d.transfer, d.solve, d.direct);
+  light_leaves(d);
+  d.ray_seconds = std::min(d.ray_seconds, seconds_since(start));
+  start = Clock::now();
+  if (d.request.frame_bounces == 0) solve_indirect(d.transfer, d.solve, d.direct, 1e-3, 64, !first);
+  else if (first) std::fill(d.solve.x.begin(), d.solve.x.end(), Vec3(0.0f));
+  for (int k = 0; k < d.request.frame_bounces; ++k) step_indirect(d.transfer, d.solve, d.direct);
   d.solve_seconds = std::min(d.solve_seconds, seconds_since(start)), start = Clock::now();
-  Relit relit;
-  read_indirect(d.transfer, d.solve, relit);
+  const bool directional = d.directional() != DirectionalKind::none;
+  if (directional || !d.objects.made.empty()) send_indirect(d.transfer, d.solve, d.direct);
+  if (directional) read_directional_indirect(d.transfer, d.solve, d.directional(), d.relit);
+  else read_indirect(d.transfer, d.solve, d.relit);
   d.read_seconds = std::min(d.read_seconds, seconds_since(start));
 }
 
 void warn_of_dark_lamps(const IndirectDrawing& d) {
-  for (size_t k = 0; k < d.lamps.size(); ++k) {
-    std::atomic<bool> lights = false;
-    parallel_for(d.direct.size(), 128, [&](size_t begin, size_t end) {
-      for (size_t i = begin; i < end && !lights; ++i)
-        if (largest(direct_at_leaf(d, {d.lamps[k]}, i)) > 0) lights = true;
-    });
-    if (!lights)
+  for (size_t k = 0; k < d.lit.size(); ++k)
+    if (std::all_of(d.lit[k].at_leaves.begin(), d.lit[k].at_leaves.end(), [](Vec3 l) { return !(largest(l) > 0); }))
       d.job.warn(fmt::format("lamp {} lights no surface: it is black, inside something, or turned away", k + 1));
+}
+
+// Objects of --insert, each baked alone; the scene knows nothing of them but what the eye and shadow rays see.
+Result<void> make_objects(IndirectDrawing& d) {
+  for (const std::string& text : d.request.insert) {
+    auto insertion = parse_insertion(text, d.baked.scene.origin);
+    if (!insertion) return insertion.error();
+    const IndirectLattice& f = *d.transfer.lattice;
+    auto made = make_inserted(*insertion, f.lattice, f.order, d.job);
+    if (!made) return made.error();
+    d.objects.made.push_back(std::move(*made));
   }
+  Objects& o = d.objects;
+  if (o.made.empty()) return {};
+  o.scene = d.scene, o.first = d.scene.triangles.size();
+  for (const auto& object : o.made) append_scene(o.scene, object->scene);
+  auto tracer = Tracer::build(o.scene, d.job.progress);
+  if (!tracer) return tracer.error();
+  o.tracer = std::move(*tracer);
+  if (!d.still.lamps.of_triangle.empty()) d.still.lamps.of_triangle.resize(o.scene.triangles.size(), none);
+  return {};
+}
+
+Result<void> light_objects(IndirectDrawing& d) {
+  Objects& o = d.objects;
+  if (o.made.empty()) return {};
+  Relit free_space;
+  read_lattice_indirect(d.transfer, d.solve, free_space);
+  o.lit = RelitScene{};
+  for (const auto& object : o.made)
+    if (auto ok = insert_object(o.lit, object->scene, object->receivers, object->transfer, d.transfer.lattice->lattice,
+                                free_space);
+        !ok)
+      return ok;
+  o.basis = corner_receivers(o.lit.scene, o.lit.front, o.lit.back);
+  return {};
 }
 
 // A lamp that the eye sees before anything else: its radiance.
@@ -205,40 +284,65 @@ std::optional<Vec3> seen_lamp(const IndirectDrawing& d, Vec3 eye, Vec3 direction
 Vec3 glow(const IndirectDrawing& d, const Hit& hit) {
   if (d.still.lamps.of_triangle.empty()) return Vec3(0.0f);
   const uint32_t lamp = d.still.lamps.of_triangle[hit.triangle];
-  const Triangle& triangle = d.scene.triangles[hit.triangle];
-  if (lamp == none || !emits(d.scene, triangle, hit.front)) return Vec3(0.0f);
-  return d.still.scales[d.still.lamps.area[lamp].group] * emission(d.scene, triangle, hit.u, hit.v);
+  const Triangle& triangle = d.drawn().triangles[hit.triangle];
+  if (lamp == none || !emits(d.drawn(), triangle, hit.front)) return Vec3(0.0f);
+  return d.still.scales[d.still.lamps.area[lamp].group] * emission(d.drawn(), triangle, hit.u, hit.v);
+}
+
+// Light that has bounced, as if what was hit were white.
+using IndirectShade = std::function<Vec3(const Hit&, Vec3 direction, const SurfacePlace&)>;
+std::function<IndirectShade()> indirect_shade(const IndirectDrawing& d, const RenderOptions& white,
+                                              const RenderOptions& diffuse) {
+  return [&]() -> IndirectShade {
+    const SurfaceShade at_receivers = d.reads_receivers() ? relit_shade(d.scene, d.baked.basis, d.relit, white)()
+                                                          : SurfaceShade();
+    const SurfaceShade at_objects =
+        d.objects.tracer ? relit_shade(d.objects.lit.scene, d.objects.basis, d.objects.lit.relit, diffuse)()
+                         : SurfaceShade();
+    return [&d, at_receivers, at_objects](const Hit& hit, Vec3 direction, const SurfacePlace& at) {
+      if (at_objects && hit.triangle >= d.objects.first) {
+        Hit own = hit;
+        own.triangle -= uint32_t(d.objects.first);
+        return at_objects(own, direction);
+      }
+      if (at_receivers) return at_receivers(hit, direction);
+      const Kernels k = d.search->kernels(at);
+      Vec3 light(0.0f);
+      for (size_t i = 0; i < k.count; ++i) light += k.weight[i] * d.solve.x[k.surfel[i]];
+      return max(light, Vec3(0.0f));
+    };
+  };
 }
 
 Result<Image> shade(const IndirectDrawing& d, const View& view) {
-  RenderOptions options{view.width, view.height, d.request.spp, d.still.around.background(), d.show.colour};
+  const RenderOptions options{view.width, view.height, d.request.spp, d.still.around.background(), d.show.colour};
+  RenderOptions white = options, diffuse = options;
+  white.show = diffuse.show = RenderOptions::Show::radiosity, white.directional = d.directional();
   const bool shows_direct = d.show.part != Show::Part::indirect, shows_indirect = d.show.part != Show::Part::direct;
+  const auto make_indirect = indirect_shade(d, white, diffuse);
+  const Scene& scene = d.drawn();
   return render_surfaces(
-      d.scene, d.tracer, view.camera, options,
+      scene, d.sight(), view.camera, options,
       [&]() -> SurfaceShade {
-        return [&](const Hit& hit, Vec3 direction) {
-          const Triangle& triangle = d.scene.triangles[hit.triangle];
-          if (options.show == RenderOptions::Show::albedo) return albedo(d.scene, triangle, hit.u, hit.v);
+        return [&, indirect = make_indirect()](const Hit& hit, Vec3 direction) {
+          const Triangle& triangle = scene.triangles[hit.triangle];
+          if (options.show == RenderOptions::Show::albedo) return albedo(scene, triangle, hit.u, hit.v);
           if (shows_direct)
             if (const auto lamp = seen_lamp(d, view.camera.eye, direction, hit.distance)) return *lamp;
-          const SurfacePlace at = surface_place(d.scene, hit);
+          const SurfacePlace at = surface_place(scene, hit);
           Vec3 light(0.0f);
-          if (shows_indirect) {
-            const Kernels k = d.search->kernels(at);
-            for (size_t i = 0; i < k.count; ++i) light += k.weight[i] * d.solve.x[k.surfel[i]];
-            light = max(light, Vec3(0.0f));
-          }
+          if (shows_indirect) light += indirect(hit, direction, at);
           if (shows_direct) {
-            const Vec3 face = unit_normal(d.scene, triangle, at.normal);
+            const Vec3 face = unit_normal(scene, triangle, at.normal);
             const Vec3 origin = at.position + (hit.front ? face : -face) * receiver_lift(at.position, 0, d.diagonal);
             const uint64_t key =
                 hash64(uint64_t(std::bit_cast<uint32_t>(hit.u)) << 32 | std::bit_cast<uint32_t>(hit.v), hit.triangle);
-            light += direct_light(d.tracer, d.lamps, origin, at.normal, pixel_samples, key) +
-                     still_light(d, origin, at.normal, still_pixel_samples, key);
+            light += direct_light(d.sight(), d.lamps, origin, at.normal, pixel_samples, key) +
+                     still_light(d, scene, d.sight(), origin, at.normal, still_pixel_samples, key);
           }
           if (options.show != RenderOptions::Show::product) return light;
           const Vec3 sent = shows_direct ? glow(d, hit) : Vec3(0.0f);
-          return albedo(d.scene, triangle, hit.u, hit.v) * light + sent;
+          return albedo(scene, triangle, hit.u, hit.v) * light + sent;
         };
       },
       d.job.progress);
@@ -290,7 +394,7 @@ Result<void> read_lamps(IndirectDrawing& d) {
 Result<Drawing> draw_indirect(const Baked& baked, const DrawRequest& request, const Job& job) {
   auto show = parse_show(request.show);
   if (!show) return show.error();
-  IndirectDrawing d{request, job, std::get<IndirectTransfer>(baked.surface.store), *show};
+  IndirectDrawing d{baked, request, job, std::get<IndirectTransfer>(baked.surface.store), *show};
   d.scene = baked.scene, d.diagonal = bounds(d.scene).diagonal();
   if (auto ok = read_lamps(d); !ok) return ok.error();
   std::vector<double> times{request.time};
@@ -311,10 +415,12 @@ Result<Drawing> draw_indirect(const Baked& baked, const DrawRequest& request, co
   light_leaves_once(d);
   if (is_cancelled(job.progress)) return Error{"", "cancelled"};
   d.solve = make_indirect_solve(d.transfer, albedos);
+  if (auto ok = make_objects(d); !ok) return ok.error();
   Drawing drawing;
   for (double time : times) {
     for (const LampPath& path : d.paths) move_lamp(d.lamps, path, time);
-    light_surfels(d);
+    light_surfels(d, drawing.frames.empty());
+    if (auto ok = light_objects(d); !ok) return ok.error();
     if (drawing.frames.empty()) warn_of_dark_lamps(d);
     auto image = shade(d, *view);
     if (!image) return image.error();
@@ -325,6 +431,7 @@ Result<Drawing> draw_indirect(const Baked& baked, const DrawRequest& request, co
                           {"surfels", d.transfer.surfels.count()},
                           {"frames", drawing.frames.size()},
                           {"bounces", d.solve.bounces},
+                          {"lamps_evaluated", d.evaluated},
                           {"residual", d.solve.residual},
                           {"shadow_ray_seconds", d.ray_seconds},
                           {"solve_seconds", d.solve_seconds},

@@ -1,10 +1,17 @@
 #include <lambent/baked/baked_file.h>
+#include <lambent/pipeline/bake.h>
 #include <lambent/pipeline/draw.h>
 #include <lambent/pipeline/golden_test-inl.h>
 #include <lambent/pipeline/parse.h>
 #include <lambent/reference/path_tracer.h>
+#include <lambent/scene/append.h>
+#include <lambent/scene/load.h>
+#include <lambent/scene/procedural.h>
 
 #include <gtest/gtest.h>
+
+#include <filesystem>
+#include <fstream>
 
 namespace lambent {
 namespace {
@@ -105,6 +112,97 @@ TEST(IndirectDrawing, SkyIsAsBrightAsByPaths) {
   EXPECT_NEAR(mean(drawn(baked, r)) / truth(baked.scene, r), 1, 0.04);
   r.show = "indirect";
   EXPECT_NEAR(mean(drawn(baked, r)) / truth(baked.scene, r), 1, 0.1);
+}
+
+// Texels with directions, and light in free space.
+const Baked& with_all_outputs() {
+  static const Baked baked = [] {
+    BakeRequest r;
+    Scene scene;
+    add_box(scene, add_material(scene, "grey", Vec3(0.6f, 0.5f, 0.4f)), "shell", Vec3(-2, 0, -2), Vec3(2, 3, 2), 4,
+            true);
+    r.loaded = std::make_shared<const Scene>(std::move(scene));
+    r.scene = "room.glb", r.transfer = "indirect", r.surfels = 512, r.samples = 128, r.receivers = "texels";
+    r.atlas = "48x48", r.directional = "sh:3", r.lattice = "3,3,3";
+    auto made = bake(r);
+    EXPECT_TRUE(made) << made.error().text();
+    return std::move(*made);
+  }();
+  return baked;
+}
+
+const char* inside = "1.7,1.6,1.7,0,1,0,70";
+
+double difference(const Image& a, const Image& b) {
+  double wrong = 0, right = 0;
+  for (size_t i = 0; i < a.rgb.size(); ++i) {
+    const Vec3 e = a.rgb[i] - b.rgb[i];
+    wrong += double(dot(e, e)), right += double(dot(b.rgb[i], b.rgb[i]));
+  }
+  return std::sqrt(wrong / right);
+}
+
+TEST(IndirectDrawing, TexelsHaveWhatPixelsRead) {
+  DrawRequest r = request();
+  r.lamp = {"point@1,2,1=9,7,5"}, r.show = "indirect", r.camera = inside;
+  const Image pixels = drawn(with_all_outputs(), r);
+  r.at = "receivers";
+  EXPECT_LT(difference(drawn(with_all_outputs(), r), pixels), 0.08);  // sh:3 of their own normals, and texels
+  Baked plain = with_all_outputs();
+  plain.surface.rows = DiffuseRows{}, std::get<IndirectTransfer>(plain.surface.store).rows = 1;
+  EXPECT_LT(difference(drawn(plain, r), pixels), 0.04);
+}
+
+TEST(IndirectDrawing, ObjectsAreLitByTheLattice) {
+  const std::string path = (std::filesystem::temp_directory_path() / "lambent_lit_object.obj").string();
+  {
+    std::ofstream file(path);
+    for (int i = 0; i < 8; ++i) file << "v " << (i & 1) << " " << (i >> 1 & 1) << " " << (i >> 2) << "\n";
+    for (const char* face : {"1 3 4 2", "5 6 8 7", "1 2 6 5", "3 7 8 4", "1 5 7 3", "2 4 8 6"})
+      file << "f " << face << "\n";
+  }
+  DrawRequest r = request();
+  r.lamp = {"point@1,2,1=9,7,5"}, r.show = "indirect", r.size = "24x18", r.camera = inside;
+  const Image without = drawn(with_all_outputs(), r);
+  r.insert = {path + "@-0.3,0.8,-0.2,0.6"};
+  const Image with = drawn(with_all_outputs(), r);
+  Scene scene = with_all_outputs().scene, object = *load_scene(path);
+  scene.lights = {{.position = Vec3(1, 2, 1), .intensity = Vec3(9, 7, 5)}};
+  place_scene(object, Vec3(-0.3f, 0.8f, -0.2f), 0.6f), append_scene(scene, object);
+  const auto view = parse_view(r.camera, r.size, with_all_outputs().scene);
+  const auto truth = path_trace(scene, *load_environment("uniform:0"), view->camera,
+                                {.width = view->width,
+                                 .height = view->height,
+                                 .spp = 512,
+                                 .bounces = 12,
+                                 .background = false,
+                                 .lamps = true,
+                                 .direct = false});
+  ASSERT_TRUE(truth);
+  double ours = 0, right = 0;
+  size_t pixels = 0;
+  for (size_t i = 0; i < with.rgb.size(); ++i)
+    if (with.rgb[i] != without.rgb[i]) ++pixels, ours += double(with.rgb[i].y), right += double(truth->image.rgb[i].y);
+  EXPECT_GT(pixels, 6u);
+  EXPECT_NEAR(ours / right, 1, 0.1);  // three points an axis
+  std::filesystem::remove(path);
+}
+
+TEST(IndirectDrawing, LampsThatMovedAloneAreLitAnew) {
+  DrawRequest r = request();
+  r.lamp = {"point@1,1,1.2=3,2,1", "point@0.6,0.8,1.2=1"}, r.move = {"2@0:0.6,0.8,1.2;1:0.8,0.8,1.2"}, r.frames = "0:1";
+  const auto frames = draw(room(), r);
+  ASSERT_TRUE(frames) << frames.error().text();
+  EXPECT_EQ(frames->summary.json["lamps_evaluated"], 1);
+  r.frames.clear(), r.time = 1;
+  EXPECT_LT(difference(frames->frames.back(), drawn(room(), r)), 2e-3);
+  // A bounce a frame comes to the same, over some of them.
+  r.time = 0, r.frames = "0:0.001:0.0001", r.frame_bounces = 2;
+  r.move = {"2@0:0.6,0.8,1.2;1:0.60001,0.8,1.2"};
+  const auto settled = draw(room(), r);
+  ASSERT_TRUE(settled) << settled.error().text();
+  EXPECT_LT(difference(settled->frames.back(), frames->frames.at(0)), 5e-3);
+  EXPECT_GT(difference(settled->frames.front(), frames->frames.at(0)), 5e-3);
 }
 
 TEST(IndirectDrawing, NothingThatShinesIsRefused) {

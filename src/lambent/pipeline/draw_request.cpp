@@ -62,12 +62,16 @@ const Option<R> table[] = {
      "direct to indirect light)"},
     {"albedo", &R::albedo, "What is shown", I,
      "MATERIAL=R,G,B: repaint it, and what it reflects follows; may be given again"},
+    {"at", &R::at, "What is shown", I,
+     "Where indirect light is read: pixels, whatever the mesh; or the file's receivers, as an engine reads them, and "
+     "where those have directions, for the normal that a normal map gives",
+     0, 0, "pixels|receivers"},
     {"brdf", &R::brdf, "What is shown", C | Z | M | F | K,
      "Other materials than were baked, or those of blocks: diffuse (by base colour), materials (glTF's "
      "metallic-roughness), or one model for all, as `bake --brdf` takes it; for bakes that kept incident light, and "
      "blocks",
      0, 0, nullptr, nullptr, true, true},
-    {"insert", &R::insert, "What is shown", D | C | Z | M,
+    {"insert", &R::insert, "What is shown", D | C | Z | M | I,
      "FILE@X,Y,Z[,SCALE]: put a small diffuse object there, lit by the scene's lattice; may be given again"},
     {"place", &R::place, "What is shown", D,
      "NAME=FIELD@X,Y,Z[,YAW,PITCH,ROLL[,SCALE]]: put the object of a file of `lambent field` there, the middle of its "
@@ -78,6 +82,10 @@ const Option<R> table[] = {
     {"time", &R::time, "Motion", every & ~(K | V), "At this time, seconds, of --animation or --move"},
     {"frames", &R::frames, "Motion", every & ~(K | V),
      "FROM:TO[:STEP]: at these times, seconds, as a strip of pictures; needs --animation, or --move"},
+    {"frame-bounces", &R::frame_bounces, "Motion", I,
+     "Bounces a frame, from the light of the frame before, so that what changes settles over the frames; 0: as many as "
+     "it takes",
+     0, 64, nullptr, "frames"},
     {"deform", &R::deform, "Motion", distant & ~(K | V),
      "bend:ANGLE[,along[,towards]] or twist:ANGLE[,along]: degrees from end to end, axes x, y or z"},
 
@@ -126,6 +134,8 @@ constexpr Conflict conflicts[] = {
     {"move", "animation", "moves objects over a scene at rest: leave the animation out"},
     {"insert", "show=emission|bounce:|sum:", "is lit by all light at once: no --show of a part of it"},
     {"tolerance", "method=standard|haar", "needs --method blocks"},
+    {"at", "show=direct|albedo", "reads light that --show leaves out"},
+    {"frame-bounces", "show=direct|albedo", "are of light that --show leaves out"},
     {"lamp", "show=albedo", "lights what --show albedo shows no light of"},
     {"sphere-lamp", "show=albedo|emission", "lights what --show leaves out"},
     {"window", "show=albedo|emission", "shapes light that --show leaves out"},
@@ -263,6 +273,8 @@ Result<void> check_draw(const DrawRequest& request, const Baked& baked) {
     return Error{request.baked,
                  "--brdf needs a bake that kept incident light: lambent bake --transfer matrix --outgoing map"};
   if (request.insert.empty() && request.place.empty()) return {};
+  const auto* indirect = std::get_if<IndirectTransfer>(&baked.surface.store);
+  if (indirect && indirect->lattice) return {};
   if (!lattice_of(baked))
     return Error{request.baked, std::string("has no light in free space for ") +
                                     (request.insert.empty() ? "--place" : "--insert") + ": bake it with --lattice"};

@@ -22,9 +22,11 @@ struct DrawRequest {
   std::string show = "product";
   std::string brdf;  // "": as baked; of blocks, which know none, diffuse
   std::vector<std::string> insert, albedo, place;
+  std::string at = "pixels";
   // Motion
   std::string animation, frames, deform;
   double time = 0;
+  int frame_bounces = 0;  // 0: as many as it takes
   // Blocks
   std::string method = "blocks", brdf_samples = "bounded", indirect = "none";
   float tolerance = 0.2f;

@@ -177,7 +177,7 @@ Vec3 from_sphere(const Tracer& tracer, const MovingLamp& lamp, Vec3 origin, Vec3
 
 }  // namespace
 
-Vec3 direct_light(const Tracer& tracer, const std::vector<MovingLamp>& lamps, Vec3 origin, Vec3 normal, int samples,
+Vec3 direct_light(const Tracer& tracer, std::span<const MovingLamp> lamps, Vec3 origin, Vec3 normal, int samples,
                   uint64_t key) {
   Vec3 sum(0.0f);
   for (size_t k = 0; k < lamps.size(); ++k) {

@@ -4,6 +4,7 @@
 #include <lambent/scene/lights.h>
 #include <lambent/trace/tracer.h>
 
+#include <span>
 #include <string>
 #include <utility>
 #include <vector>
@@ -45,7 +46,7 @@ void move_lamp(std::vector<MovingLamp>& lamps, const LampPath& path, double time
 
 // Exit radiance of a white surface at `origin`, which is clear of it, by direct light of the lamps. Spheres are sampled
 // by solid angle, `samples` times each, by numbers keyed by `key`; a place within a sphere has no light of it.
-Vec3 direct_light(const Tracer& tracer, const std::vector<MovingLamp>& lamps, Vec3 origin, Vec3 normal, int samples,
+Vec3 direct_light(const Tracer& tracer, std::span<const MovingLamp> lamps, Vec3 origin, Vec3 normal, int samples,
                   uint64_t key);
 
 // The same lamps as the scene's own: punctual lights, and spheres as surfaces that glow and reflect nothing.

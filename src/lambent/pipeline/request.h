@@ -57,6 +57,7 @@ struct BakeRequest {
   int spp = 16;
   // Direct to indirect light
   int surfels = 0;
+  std::string gatherers = "quarter";
   // Free space
   std::string lattice, lattice_box;
   int lattice_order = 4;

@@ -82,13 +82,18 @@ struct OfFactors : Columns {
 
 struct OfSurfels : Columns {
   const IndirectTransfer& store;
+  DirectionalKind kind;
   IndirectSolve solve;
-  OfSurfels(const IndirectTransfer& s, std::span<const Vec3> albedos)
-      : store(s), solve(make_indirect_solve(s, albedos)) {}
-  void set(std::span<const Vec3> columns) { ready = true, solve_indirect(store, solve, columns); }
+  OfSurfels(const IndirectTransfer& s, DirectionalKind directional, std::span<const Vec3> albedos)
+      : store(s), kind(directional), solve(make_indirect_solve(s, albedos)) {}
+  void set(std::span<const Vec3> columns) {
+    ready = true, solve_indirect(store, solve, columns);
+    if (kind != DirectionalKind::none) send_indirect(store, solve, columns);
+  }
   Result<void> relight(const RelightFrame& frame, Relit& out) {
     if (auto ok = at_rest(frame); !ok) return ok;
-    read_indirect(store, solve, out);
+    if (kind == DirectionalKind::none) read_indirect(store, solve, out);
+    else read_directional_indirect(store, solve, kind, out);
     return {};
   }
 };
@@ -167,7 +172,7 @@ struct Make {
   AnyStore operator()(const CpcaTransfer& t) const { return OfColumns<CpcaTransfer>(t); }
   AnyStore operator()(const ZonalTransfer& t) const { return OfLobes(t, options.direct_lobes); }
   AnyStore operator()(const FactoredTransfer& t) const { return OfFactors(t, *outgoing_of(field)); }
-  AnyStore operator()(const IndirectTransfer& t) const { return OfSurfels(t, options.albedos); }
+  AnyStore operator()(const IndirectTransfer& t) const { return OfSurfels(t, directional_of(field), options.albedos); }
   AnyStore operator()(const HaarTransfer& t) const { return OfWavelets(t, options.terms); }
   AnyStore operator()(const Visibility& v) const { return OfBlocks{v, std::move(options)}; }
 };
@@ -196,6 +201,8 @@ Result<Relighter> Relighter::make(const Field& field, RelighterOptions options) 
     if (auto ok = check_indirect(*t, "relighter"); !ok) return ok.error();
     if (!options.albedos.empty() && options.albedos.size() != t->surfels.count())
       return wrong("there is not an albedo for each surfel");
+    if (directional_of(field) == DirectionalKind::hl2)
+      return wrong("directional light of direct-to-indirect transport is sh:2, sh:3 or vector");
   }
   return Relighter(std::make_unique<State>(State{field, std::visit(Make{field, options}, field.store)}));
 }

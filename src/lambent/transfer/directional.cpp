@@ -59,4 +59,24 @@ Vec3 evaluate_directional_light(DirectionalKind kind, std::span<const Vec3> rows
   return sum;
 }
 
+void directional_weights(DirectionalKind kind, Vec3 d, const Mat3& frame, float grazing, std::span<float> out) {
+  const float scale = 1 / std::max(dot(d, frame[2]), grazing);
+  switch (kind) {
+    case DirectionalKind::none: out[0] = 1; break;
+    case DirectionalKind::sh2:
+    case DirectionalKind::sh3: {
+      const int order = kind == DirectionalKind::sh2 ? 2 : 3;
+      evaluate_sh(order, d, out.first(size_t(sh_count(order))));
+      for (int k = 0; k < sh_count(order); ++k) out[size_t(k)] *= float(clamped_cosine(sh_band(k))) * scale;
+      break;
+    }
+    case DirectionalKind::hl2:
+      for (int k = 0; k < 3; ++k) out[size_t(k)] = std::max(0.0f, dot(d, frame * hl2_basis[k])) * scale;
+      break;
+    case DirectionalKind::vector:
+      for (int k = 0; k < 3; ++k) out[size_t(k)] = d[k] * scale;
+      break;
+  }
+}
+
 }  // namespace lambent

@@ -35,6 +35,11 @@ inline const Vec3 hl2_basis[3] = {
 // with. Half-Life 2 weighs by squares of the cosines, made to sum to 1.
 Vec3 evaluate_directional_light(DirectionalKind kind, std::span<const Vec3> rows, const Mat3& frame, Vec3 n);
 
+// What one unit of E, exit radiance of a white receiver, from the unit direction d adds to each row: the row's kernel
+// over that of E, cos / pi. Grazing light, which counts for little in E, would weigh without bound: the cosine is taken
+// for `grazing` at least.
+void directional_weights(DirectionalKind kind, Vec3 d, const Mat3& frame, float grazing, std::span<float> out);
+
 // The receiver's frame: frame_about its normal, so that no tangents need to be stored.
 inline Mat3 receiver_frame(Vec3 normal) { return frame_about(normal); }
 

@@ -1,5 +1,6 @@
+#include <lambent/basis/sh.h>
+#include <lambent/core/huffman.h>
 #include <lambent/transfer/indirect.h>
-#include <lambent/transfer/visibility.h>
 
 #include <algorithm>
 #include <cmath>
@@ -12,11 +13,13 @@ size_t Surfels::first_node(size_t level) const {
   return first;
 }
 
-size_t IndirectTransfer::bytes() const {
-  const size_t index = gathering() <= 65536 ? 2 : 4;
-  // Places, normals and areas are floats, albedos halves, materials two bytes.
-  return surfels.count() * (28 + 6 + 2) + surfels.parents.size() * 4 + pack_rows(*this).size() + weights.size() +
-         scales.size() * 4 + receivers * kernel_slots * (index + 2);
+IndirectTransfer::Bytes IndirectTransfer::bytes_of_parts() const {
+  const size_t n = surfels.count(), coarsest = surfels.counts.empty() ? 0 : surfels.counts[0];
+  const auto coded = [](const std::vector<uint8_t>& bytes) { return huffman_encode(bytes).size(); };
+  const auto of = [&](const NodeRows& r) { return coded(pack_rows(r)) + coded(r.weights) + r.scales.size() * 4; };
+  // Places 8, normals 4, areas 2, albedos 6, materials 1; parents of those that are not their own, two bytes mostly.
+  return {n * (8 + 4 + 2 + 6 + 1) + (n - coarsest) * 2, of(gather), coded(pack_kernels(*this)),
+          lattice ? of(lattice->rows) + lattice->valid.size() : 0};
 }
 
 namespace {
@@ -40,6 +43,8 @@ Result<void> check_surfels(const Surfels& s, const std::string& where) {
       if (s.parents[at] >= s.counts[l - 1])
         return Error{where,
                      "parent " + std::to_string(s.parents[at]) + " does not exist on level " + std::to_string(l - 1)};
+      else if (i < s.counts[l - 1] && s.parents[at] != i)
+        return Error{where, "surfel " + std::to_string(i) + " is not its own parent on level " + std::to_string(l - 1)};
   for (size_t i = 0; i < n; ++i) {
     const Vec3 a = s.albedos[i];
     if (s.materials[i] >= s.names.size()) return Error{where, "surfel " + std::to_string(i) + " has no material"};
@@ -51,12 +56,7 @@ Result<void> check_surfels(const Surfels& s, const std::string& where) {
   return {};
 }
 
-}  // namespace
-
-Result<void> check_indirect(const IndirectTransfer& t, const std::string& where) {
-  if (auto ok = check_surfels(t.surfels, where); !ok) return ok;
-  if (t.gather_level >= t.surfels.levels()) return Error{where, "the gathering level does not exist"};
-  const size_t rows = t.gathering(), nodes = t.surfels.nodes();
+Result<void> check_rows(const NodeRows& t, size_t rows, size_t nodes, const std::string& where) {
   if (t.first.size() != rows + 1 || t.first.front() != 0 || t.first.back() != t.nodes.size() ||
       t.weights.size() != t.nodes.size() || t.scales.size() != rows)
     return Error{where, "rows and entries do not fit one another"};
@@ -72,6 +72,28 @@ Result<void> check_indirect(const IndirectTransfer& t, const std::string& where)
     if (!(t.scales[r] >= 0) || !(sum * double(t.scales[r]) <= 1.001))
       return Error{where, "row " + std::to_string(r) + " sees more than a hemisphere"};
   }
+  return {};
+}
+
+Result<void> check_free_space(const IndirectLattice& f, size_t nodes, const std::string& where) {
+  const Lattice& l = f.lattice;
+  for (int n : {l.nx, l.ny, l.nz})
+    if (n < 1 || n > max_lattice_points) return Error{where, "the lattice has too few or too many points"};
+  if (!is_finite(l.min) || !is_finite(l.max) || !all_at_most(l.min, l.max) || f.order < 1 || f.order > max_sh_order)
+    return Error{where, "the lattice has no box, or an order out of range"};
+  if (f.valid.size() != l.count()) return Error{where, "the lattice does not say which points are valid"};
+  return check_rows(f.rows, l.count(), nodes, where + ": lattice");
+}
+
+}  // namespace
+
+Result<void> check_indirect(const IndirectTransfer& t, const std::string& where) {
+  if (auto ok = check_surfels(t.surfels, where); !ok) return ok;
+  if (t.gather_level >= t.surfels.levels()) return Error{where, "the gathering level does not exist"};
+  const size_t rows = t.gathering(), nodes = t.surfels.nodes();
+  if (auto ok = check_rows(t.gather, rows, nodes, where); !ok) return ok;
+  if (t.lattice)
+    if (auto ok = check_free_space(*t.lattice, nodes, where); !ok) return ok;
   const size_t slots = t.receivers * kernel_slots;
   if (t.reader_surfels.size() != slots || t.reader_weights.size() != slots)
     return Error{where, "there are not kernels for each receiver"};
@@ -79,35 +101,6 @@ Result<void> check_indirect(const IndirectTransfer& t, const std::string& where)
     if (s >= rows) return Error{where, "a receiver reads surfel " + std::to_string(s) + ", which has no row"};
   for (uint16_t w : t.reader_weights)
     if ((w & 0x7fffu) > 0x4800u) return Error{where, "the weight of a kernel is out of range"};  // 8 in halves
-  return {};
-}
-
-std::vector<uint8_t> pack_rows(const IndirectTransfer& t) {
-  std::vector<uint8_t> out;
-  for (size_t r = 0; r + 1 < t.first.size(); ++r) {
-    append_varint(out, t.first[r + 1] - t.first[r]);
-    uint32_t last = 0;
-    for (size_t e = t.first[r]; e < t.first[r + 1]; ++e) append_varint(out, t.nodes[e] - last), last = t.nodes[e];
-  }
-  return out;
-}
-
-Result<void> unpack_rows(std::span<const uint8_t> bytes, size_t rows, size_t most, IndirectTransfer& t,
-                         const std::string& where) {
-  const Error broken{where, "the rows of the operator are broken"};
-  size_t at = 0;
-  t.first.assign(1, 0), t.nodes.clear();
-  for (size_t r = 0; r < rows; ++r) {
-    uint64_t count = 0, node = 0;
-    if (!read_varint(bytes, at, count) || count > most - t.nodes.size()) return broken;
-    for (uint64_t e = 0; e < count; ++e) {
-      uint64_t step = 0;
-      if (!read_varint(bytes, at, step) || step > 0xffffffffu - node) return broken;
-      t.nodes.push_back(uint32_t(node += step));
-    }
-    t.first.push_back(uint32_t(t.nodes.size()));
-  }
-  if (at != bytes.size() || t.nodes.size() != most) return broken;
   return {};
 }
 

@@ -10,9 +10,11 @@
 // for light transport".
 #include <lambent/core/result.h>
 #include <lambent/core/vec.h>
+#include <lambent/transfer/lattice.h>
 
 #include <array>
 #include <cstdint>
+#include <optional>
 #include <span>
 #include <string>
 #include <vector>
@@ -37,7 +39,8 @@ struct Surfels {
   std::vector<Vec3> albedos;        // the mean over that area, as baked
   std::vector<uint32_t> materials;  // into the names below
   std::vector<std::string> names;   // of materials: a wall is repainted by its name
-  // Of levels 1 and up, one after another: the surfel of the level above that each one is a part of.
+  // Of levels 1 and up, one after another: the surfel of the level above that each one is a part of; of those that the
+  // level above has too, itself.
   std::vector<uint32_t> parents;
 
   size_t count() const { return positions.size(); }
@@ -54,25 +57,55 @@ struct Kernels {
   size_t count = 0;
 };
 
+// Rows over nodes: entries first[r] ... first[r + 1] of row r, each a node, rising within a row, and its share,
+// weights^2 * scales[r]: roots keep small ones.
+struct NodeRows {
+  std::vector<uint32_t> first{0}, nodes;
+  std::vector<uint8_t> weights;
+  std::vector<float> scales;
+  size_t count() const { return scales.size(); }
+};
+
+// Light in free space, at the points of a lattice: what of all directions each node takes. Harmonics come of it in the
+// directions of nodes from the point, which are not kept.
+struct IndirectLattice {
+  Lattice lattice;
+  int order = 0;               // bands of the radiance that arrives, order^2 rows, as of LatticeTransfer
+  std::vector<uint8_t> valid;  // by point; 0: it lies inside something, has no entries, and its neighbours' values
+  NodeRows rows;               // shares of the sphere
+};
+
 // The whole operator. Values of one channel serve all three: colour is in the albedos alone.
 struct IndirectTransfer {
   Surfels surfels;
   uint32_t gather_level = 0;  // its surfels have rows
-  // Rows of G, one a gathering surfel: entries first[r] ... first[r + 1], each a node, rising within a row, and its
-  // share of the hemisphere, weights^2 * scales[r]: roots keep small ones.
-  std::vector<uint32_t> first, nodes;
-  std::vector<uint8_t> weights;
-  std::vector<float> scales;
+  NodeRows gather;            // G: shares of the hemisphere
   // Receivers' kernels, [receiver][kernel_slots]: gathering surfels, and halves.
   size_t receivers = 0;
   std::vector<uint32_t> reader_surfels;
   std::vector<uint16_t> reader_weights;
+  std::optional<IndirectLattice> lattice = std::nullopt;
   double error = 0;  // relative RMS that compression and rounding of G made, over test lamps
 
-  int rows = 1, channels = 1;
+  int rows = 1, channels = 1;  // rows: of a receiver, more than one of directional light
   size_t gathering() const { return surfels.counts.empty() ? 0 : surfels.counts[gather_level]; }
-  size_t bytes() const;  // as stored in a file
+  // As stored in a file, about.
+  struct Bytes {
+    size_t surfels = 0, gather = 0, kernels = 0, lattice = 0;
+  };
+  Bytes bytes_of_parts() const;
+  size_t bytes() const {
+    const Bytes b = bytes_of_parts();
+    return b.surfels + b.gather + b.kernels + b.lattice;
+  }
 };
+
+// Weights of kernels are multiples of this.
+inline constexpr float kernel_step = 1.0f / 64;
+// The kernel as it is kept: the largest weight makes up for the others' rounding, so that they sum to what they did.
+void round_kernels(Kernels& kernels);
+// Surfels as they are kept: places within their box to 21 bits an axis, normals, halves of albedos, areas to 8 bits.
+void round_surfels(Surfels& surfels);
 
 // What a stored weight stands for, before its row's scale.
 inline float share(uint8_t weight) { return float(int(weight) * int(weight)); }
@@ -82,9 +115,26 @@ inline float share(uint8_t weight) { return float(int(weight) * int(weight)); }
 Result<void> check_indirect(const IndirectTransfer& t, const std::string& where);
 
 // Entries of rows as stored: of each row its count, then the differences of its nodes, base-128.
-std::vector<uint8_t> pack_rows(const IndirectTransfer& t);
-// Errors: bytes that end too soon or go on, entries beyond `most`.
-Result<void> unpack_rows(std::span<const uint8_t> bytes, size_t rows, size_t most, IndirectTransfer& t,
+std::vector<uint8_t> pack_rows(const NodeRows& rows);
+// Of so many rows. Errors: bytes that end too soon or go on, entries beyond `most`.
+Result<void> unpack_rows(std::span<const uint8_t> bytes, size_t rows, size_t most, NodeRows& out,
                          const std::string& where);
+
+// Kernels of receivers as stored: those of neighbours along a curve have most of their surfels in common. Of each
+// receiver a byte of those of the last one's surfels that it has too; how many others there are, and they, base-128,
+// each as the difference from the one before; then all of its weights, a byte each, by surfel.
+std::vector<uint8_t> pack_kernels(const IndirectTransfer& t);
+// Sets kernels of t.receivers. Errors: bytes that end too soon or go on, more surfels than a kernel has.
+Result<void> unpack_kernels(std::span<const uint8_t> bytes, IndirectTransfer& t, const std::string& where);
+
+// A surfel's place in eight bytes, 21 bits an axis of a box, and its normal in four, a place in the octahedral map.
+uint64_t pack_place(Vec3 p, const Bounds& box);
+Vec3 unpack_place(uint64_t packed, const Bounds& box);
+uint32_t pack_normal(Vec3 n);
+Vec3 unpack_normal(uint32_t packed);
+// The upper half of a float, rounded; above 0 stays above 0.
+uint16_t pack_area(float area);
+inline float unpack_area(uint16_t packed) { return __builtin_bit_cast(float, uint32_t(packed) << 16); }
+Bounds surfel_box(const Surfels& surfels);
 
 }  // namespace lambent

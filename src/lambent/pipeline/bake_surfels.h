@@ -1,0 +1,14 @@
+#pragma once
+// Direct-to-indirect transport of a request, with its lattice, and what it says of itself.
+#include <lambent/bake/bake.h>
+#include <lambent/pipeline/bake.h>
+#include <lambent/pipeline/bake_parse.h>
+
+namespace lambent {
+
+// Errors: those of bake_indirect(), of --lattice and --lattice-box.
+Result<IndirectTransfer> bake_indirect_of_request(const BakeRequest& request, const BakePlan& plan, const Scene& scene,
+                                                  const Tracer& tracer, const Receivers& receivers, const Job& job,
+                                                  BakeReport& report, Summary& summary);
+
+}  // namespace lambent
