@@ -5,8 +5,8 @@
 # 38), which ring in both, and lies between `least` and `most`; `held` is the picture that is shown, kept from ringing,
 # against those; `whole` that against all of the light, which no 6 bands hold, and `whole_plain` without deringing.
 # `reference_noise_psnr` is what the references' own noise would allow a plain PSNR. Where it is low, displays, which
-# clip it at black, make `ours` less than it is (a picture of 3,000 paths had 26 dB against two of 64), so references get
-# twice the paths, from SPP on, until they have NOISE dB, or MOST paths; `sloped` is without that bias, to first order.
+# clip it at black, make `ours` less than it is (a picture of 3,000 paths had 26 dB against two of 64), so references
+# get twice the paths, from SPP on, until they have NOISE dB, or MOST paths; `sloped` has no such bias, to first order.
 # `black`: the part of what the references show lit (above a twentieth of white) that the picture shows with less than a
 # tenth of that. Of the PNG: parts of the pixels that are burnt out (aim 2 %) or negative, shown black. Textures bend no
 # normals in the reference, as bakes at vertices have none. Pictures and error maps go to out/first/; bakes and
@@ -23,8 +23,8 @@ mkdir -p "$out"
 # trace SEED PATHS OUTPUT: a reference.
 trace() {
   # shellcheck disable=SC2086
-  $tool reference "$file" $options "${view[@]}" "${bands[@]}" --bounces 3 --no-normal-maps --spp "$2" --background none \
-    --seed "$1" -o "$3" >/dev/null
+  $tool reference "$file" $options "${view[@]}" "${bands[@]}" --bounces 3 --no-normal-maps --spp "$2" \
+    --background none --seed "$1" -o "$3" >/dev/null
 }
 # The two halves of the reference: each becomes the mean of itself and as many paths of another seed, until they do.
 references() {

@@ -305,7 +305,7 @@ TEST(Compare, TwoNoisyReferencesSayWhatOneOfThemCannot) {
   EXPECT_GT(d->most, 40);
   EXPECT_LT(d->most - d->least, 1);
   EXPECT_NEAR(d->noise, -10 * std::log10(0.01 / 12 / 2), 0.1);  // of the mean of both
-  EXPECT_NEAR(d->sloped, 40, 1);  // linear noise has another mean
+  EXPECT_NEAR(d->sloped, 40, 1);                                // linear noise has another mean
   EXPECT_LT(compare_images(a, mean_of(b, c))->psnr, 34);
   EXPECT_EQ(compare_to_two(a, b, constant(3, 2, Vec3(0))).error().text(),
             "pictures differ in size: 128 x 128 and 3 x 2");
