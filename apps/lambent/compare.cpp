@@ -61,25 +61,29 @@ int run_compare(Context& context, const CompareCommand& o) {
                           {"relative_mse", d->relative_mse},
                           {"psnr", number(d->psnr)},
                           {"flip", d->flip},
+                          {"black", d->black},
                           {"mean_a", d->mean_a},
                           {"mean_b", d->mean_b}};
     if (unnoisy)
       out["without_noise"] = {{"psnr", number(unnoisy->psnr)},
                               {"least", number(unnoisy->least)},
                               {"most", number(unnoisy->most)},
+                              {"sloped", number(unnoisy->sloped)},
                               {"noise", number(unnoisy->noise)}};
     print_json(out);
   } else {
     fmt::print(
         "{}\n  RMSE          {:.5f}\n  relative MSE  {:.3g}\n  PSNR          {:.2f} dB\n  FLIP          {:.4f}\n"
-        "  mean          {:.5f} against {:.5f}\n",
+        "  mean          {:.5f} against {:.5f}\n  black         {:.2f} % of what B shows lit\n",
         d->pixels == size ? human_count(size) + " pixels"
                           : fmt::format("{} covered pixels of {} (--all counts every one)", human_count(d->pixels),
                                         human_count(size)),
-        d->rmse, d->relative_mse, d->psnr, d->flip, d->mean_a, d->mean_b);
+        d->rmse, d->relative_mse, d->psnr, d->flip, d->mean_a, d->mean_b, 100 * d->black);
     if (unnoisy)
-      fmt::print("  without noise {:.2f} dB ({:.2f} to {:.2f}); the references' own allows {:.2f} dB\n", unnoisy->psnr,
-                 unnoisy->least, unnoisy->most, unnoisy->noise);
+      fmt::print(
+          "  without noise {:.2f} dB ({:.2f} to {:.2f}; {:.2f} by the display's slope); the references' own "
+          "allows {:.2f} dB\n",
+          unnoisy->psnr, unnoisy->least, unnoisy->most, unnoisy->sloped, unnoisy->noise);
     if (!o.output.empty()) fmt::print("{}\n", o.output);
   }
   return success;

@@ -9,7 +9,7 @@ export type Reflection =
   | { model: 'phong'; diffuse: number; specular: number; exponent: number }
   | { model: 'ggx'; roughness: number; f0: number };
 
-const tolerance = 0.2; // the default of `render --tolerance`
+const tolerance = 0.2; // the default of `render` for Phong's lobes
 const leastAlpha = 1e-3;
 const never = 2;
 

@@ -12,6 +12,7 @@ namespace {
 
 constexpr size_t fewest_of_part = 16;
 constexpr size_t piece = 4;
+constexpr size_t looked_at = 16;  // places on texels, for one of the certificate
 
 struct ErrorPlace {
   uint32_t triangle;
@@ -69,6 +70,51 @@ std::vector<Side> find_sides(const Scene& scene, const Receivers& receivers, con
   });
   shares.gather(sides.data());
   return sides;
+}
+
+// How much the receivers differ, squared, of which a place has its value.
+double varies_at(const Receivers& receivers, const FieldRow& field, const ErrorPlace& p, AlignedVector<float>& row,
+                 AlignedVector<float>& mean) {
+  double squares = 0;
+  std::fill(mean.begin(), mean.end(), 0.0f);
+  std::visit(
+      [&](const auto& basis) {
+        basis.spread(*basis.find(p.triangle, p.front), p.u, p.v, [&](uint32_t receiver, float w) {
+          field(receiver, row.data());
+          for (size_t k = 0; k < mean.size(); ++k) mean[k] += w * row[k], squares += double(w * row[k] * row[k]);
+        });
+      },
+      receivers.basis);
+  for (float m : mean) squares -= double(m) * double(m);
+  return std::max(squares, 0.0);
+}
+
+// Of texels, which are many on a triangle: `count` of these, half of them evenly, half by how much texels differ there.
+std::vector<ErrorPlace> choose_places(const Receivers& receivers, const FieldRow& field, size_t width, size_t count,
+                                      uint32_t seed, const std::vector<ErrorPlace>& from) {
+  std::vector<double> varies(from.size());
+  const Shares shares(from.size(), 64);
+  shares.for_own([&](size_t begin, size_t end) {
+    AlignedVector<float> row(width), mean(width);
+    for (size_t i = begin; i < end; ++i) varies[i] = varies_at(receivers, field, from[i], row, mean);
+  });
+  shares.gather(varies.data());
+  double all = 0, weights = 0;
+  for (size_t i = 0; i < from.size(); ++i) all += from[i].weight * varies[i], weights += from[i].weight;
+  if (!(all > 0)) return from;
+  std::vector<ErrorPlace> places;
+  Random random(seed, 0xce48);
+  const double apart = weights / double(count);
+  double passed = apart * double(random.next());
+  for (size_t i = 0; i < from.size(); ++i) {
+    const double density = 0.5 + 0.5 * varies[i] * weights / all, share = from[i].weight * density / apart;
+    const double before = std::floor(passed / apart);
+    passed += from[i].weight * density;
+    if (std::floor(passed / apart) == before) continue;
+    places.push_back(from[i]);
+    places.back().weight = from[i].weight / std::min(share, 1.0);
+  }
+  return places;
 }
 
 // One place in each of `count` equal shares, in the order of triangles: half of them by area alone, half by how much
@@ -165,7 +211,10 @@ Result<Certificate> certify_field(const Scene& scene, const Receivers& receivers
                                   const GatherAt& gather, size_t count, uint32_t seed, Progress* progress,
                                   const ReflectedErrors* reflected, const FieldRow* again,
                                   std::vector<MeasuredPlace>* kept) {
-  const std::vector<ErrorPlace> places = draw_places(scene, receivers, field, width, count, seed);
+  const bool texels = std::holds_alternative<TexelReceivers>(receivers.basis);
+  std::vector<ErrorPlace> places =
+      draw_places(scene, receivers, field, width, texels ? looked_at * count : count, seed);
+  if (texels) places = choose_places(receivers, field, width, count, seed, places);
   const float diagonal = bounds(scene).diagonal();
   std::vector<PlaceError> measured(places.size());
   std::vector<float> residuals[2];  // [place][width]

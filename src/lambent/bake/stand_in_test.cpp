@@ -74,6 +74,27 @@ TEST(StandIns, TheSameBytesWhateverTheThreads) {
   }
 }
 
+TEST(StandIns, EndWhereNothingVariesAndWhereAllDoes) {
+  // An open floor; slivers a thousand times as long as wide; black surfaces; a triangle a kilometre wide over a mote.
+  Scene open = make_quad(Vec3(-1, 0, -1), Vec3(0, 0, 2), Vec3(2, 0, 0), 40, 40, Vec3(0.5f));
+  Scene slivers = make_quad(Vec3(0), Vec3(0, 0, 1e-3f), Vec3(1000, 0, 0), 1, 2000, Vec3(0.5f));
+  Scene black = make_quad(Vec3(-1, 0, -1), Vec3(0, 0, 2), Vec3(2, 0, 0), 30, 30, Vec3(0));
+  add_box(black, 0, "box", Vec3(-0.3f, 0.1f, -0.3f), Vec3(0.3f, 0.5f, 0.3f), 4);
+  Scene wide = make_quad(Vec3(-500, 0, -500), Vec3(0, 0, 1000), Vec3(1000, 0, 0), 1, 1, Vec3(0.5f));
+  add_quad(wide, 0, "mote", Vec3(0, 0.01f, 0), Vec3(0, 0, 0.01f), Vec3(0.01f, 0, 0), 40, 40);
+  for (const Scene* scene : {&open, &slivers, &black, &wide}) {
+    const Receivers receivers = make_vertex_receivers(*scene);
+    auto tracer = Tracer::build(*scene);
+    BakeReport report;
+    auto baked =
+        bake(*scene, *tracer, receivers, {.order = 2, .bounces = 1, .error = 0.05, .seconds = 0, .thin = 200}, &report);
+    ASSERT_TRUE(baked) << baked.error().text();
+    EXPECT_EQ(baked->receivers, receivers.count());
+    EXPECT_GE(report.certificate.error, 0);
+    EXPECT_LT(report.certificate.error, 0.2);
+  }
+}
+
 TEST(StandIns, FewReceiversAndLobesAreAllTraced) {
   const Scene scene = floor_and_box();
   const Receivers receivers = make_vertex_receivers(scene);

@@ -15,6 +15,8 @@ constexpr size_t smoothed = 6;         // neighbours whose differences are avera
 constexpr size_t leaf = 6;             // a cell of so few that is to be split is traced whole
 constexpr double left_out_more = 0.5;  // what leaving one out loses is more than what is lost between: squared
 constexpr size_t held_out = 512;
+constexpr uint32_t test_passes = 4;
+constexpr double surely = 1.05;  // more expected than is worth it by so much: no more is looked at
 constexpr int most_levels = 16, most_corrections = 10;
 constexpr size_t piece = 64;
 
@@ -134,14 +136,14 @@ struct Thinner {
       if (sizes[c] > 0 && at[c] == none) fresh.push_back(c);
     return look_at(fresh);
   }
-  // The same for all near these receivers.
+  // The same for all that Spread would ask for these receivers.
   Result<void> look_near(std::span<const uint32_t> receivers) {
     const PointCloud cloud{r.origins, chosen};
     const PointTree tree(3, cloud, {16});
     std::vector<uint8_t> wanted(chosen.size(), 0);
     for (uint32_t v : receivers) {
       uint32_t found[Spread::most];
-      const size_t count = find_neighbours(tree, r, chosen, v, v, Spread::most, found);
+      const size_t count = find_neighbours(tree, r, chosen, chosen[of[v]], SIZE_MAX, Spread::most, found);
       for (size_t q = 0; q < count; ++q) wanted[found[q]] = at[found[q]] == none;
     }
     std::vector<uint32_t> fresh;
@@ -184,11 +186,12 @@ struct Thinner {
     return out;
   }
 
-  // Of receiver i from those looked at; its shares, indices into looked. At most Spread::most.
+  // Of receiver i from those looked at around `about`, without `skip`; its shares, indices into looked. At most
+  // Spread::most.
   size_t neighbours(const PointTree& tree, std::span<const uint32_t> open, std::span<const uint32_t> receivers,
-                    size_t i, uint32_t* index, float* share) const {
+                    size_t i, size_t about, size_t skip, uint32_t* index, float* share) const {
     uint32_t found[Spread::most], places[Spread::most];
-    const size_t count = find_neighbours(tree, r, receivers, i, i, Spread::most, found);
+    const size_t count = find_neighbours(tree, r, receivers, about, skip, Spread::most, found);
     for (size_t q = 0; q < count; ++q) index[q] = open[found[q]], places[q] = receivers[found[q]];
     if (count > 0) regress(r, i, places, count, share);
     return count;
@@ -214,7 +217,7 @@ struct Thinner {
         uint32_t index[Spread::most];
         float share[Spread::most];
         Own& mine = compared[k];
-        mine.count = uint32_t(neighbours(tree, open, receivers, looked[i], index, share));
+        mine.count = uint32_t(neighbours(tree, open, receivers, looked[i], looked[i], looked[i], index, share));
         mine.difference = difference(rows.data() + 2 * size_t(i) * width, index, share, mine.count);
         mine.nears = std::min(mine.count, uint32_t(smoothed));
         std::copy_n(index, mine.nears, mine.near.begin());
@@ -290,23 +293,63 @@ struct Thinner {
     return any ? flagged : std::vector<uint8_t>();
   }
 
-  // Mean square lost at receivers that are not chosen, times their part of the area.
-  Result<double> measure(uint32_t pass) {
-    double all = 0, open_area = 0;
-    std::vector<uint8_t> is_chosen(n, 0);
-    for (uint32_t c : chosen) is_chosen[c] = 1;
-    for (uint32_t v = 0; v < n; ++v) all += double(areas[v]), open_area += is_chosen[v] ? 0.0 : double(areas[v]);
-    std::vector<uint32_t> tests;
-    double passed = 0;
+  // How many would be traced in the end, for this budget of the mean square lost, if squares of what a cell loses fell
+  // as the area of its pieces: as at edges and where all is detail, and more slowly than where light is smooth. Pieces
+  // as they are fewest.
+  double expected(double budget) const {
+    std::vector<double> cell(chosen.size(), 0.0);
+    std::vector<uint32_t> members(chosen.size(), 0);
+    double all = 0, roots = 0, sum = 0;
+    for (uint32_t v = 0; v < n; ++v) cell[of[v]] += double(areas[v]), ++members[of[v]], all += double(areas[v]);
+    auto root = [&](uint32_t c) {
+      if (members[c] < 2 || at[c] == none || inside[at[c]] || !(sizes[c] > 0)) return 0.0;
+      return std::sqrt(left_out_more * cell[c] * std::max(0.0, lost[at[c]]));
+    };
+    for (uint32_t c = 0; c < chosen.size(); ++c) roots += root(c);
+    for (uint32_t c = 0; c < chosen.size(); ++c)
+      sum += root(c) > 0 ? std::clamp(root(c) * roots / (budget * all), 1.0, double(members[c])) : 1.0;
+    return sum;
+  }
+
+  // How often receivers that are not chosen are looked at: half by area, half by what their cells seem to lose as well,
+  // since most is lost in few places. [receiver], 0: chosen.
+  std::vector<double> test_densities() const {
+    std::vector<double> out(n, 0.0), loses(n, 0.0);
+    double area = 0, all = 0;
     for (uint32_t v = 0; v < n; ++v) {
-      if (is_chosen[v]) continue;
-      passed += double(areas[v]);
-      if (passed >= open_area * (double(tests.size()) + 0.5) / double(held_out)) tests.push_back(v);
+      const uint32_t c = of[v];
+      if (chosen[c] == v) continue;
+      // A cell of one that is looked at no more has what was lost there when it was split.
+      if (at[c] != none && !inside[at[c]]) loses[v] = double(areas[v]) * std::max(0.0, lost[at[c]]);
+      out[v] = double(areas[v]), area += out[v], all += loses[v];
+    }
+    for (uint32_t v = 0; v < n && all > 0; ++v) out[v] = 0.5 * out[v] + 0.5 * loses[v] * area / all;
+    return out;
+  }
+
+  // Mean square lost at receivers that are not chosen, times their part of the area, as Spread will have them: from the
+  // neighbours of the one that stands for them.
+  Result<double> measure(uint32_t pass) {
+    double all = 0, density = 0, passed = 0;
+    for (float a : areas) all += double(a);
+    const std::vector<double> densities = test_densities();
+    for (double d : densities) density += d;
+    const double apart = density / double(held_out);
+    std::vector<uint32_t> tests;
+    for (uint32_t v = 0; v < n; ++v) {
+      const double before = std::floor(passed / apart + 0.5);
+      passed += densities[v];
+      if (densities[v] > 0 && std::floor(passed / apart + 0.5) > before) tests.push_back(v);
     }
     if (tests.empty()) return 0.0;
-    std::vector<float> two;
-    std::vector<uint8_t> inner;
-    if (auto ok = look(tests, pass, two, inner); !ok) return ok.error();
+    // Means of several passes, since their noise has to lie below what is lost.
+    std::vector<float> two(2 * tests.size() * width, 0.0f), once;
+    std::vector<uint8_t> inner(tests.size(), 0), there;
+    for (uint32_t k = 0; k < test_passes; ++k) {
+      if (auto ok = look(tests, pass + 2 * k, once, there); !ok) return ok.error();
+      for (size_t i = 0; i < two.size(); ++i) two[i] += once[i] / float(test_passes);
+      for (size_t i = 0; i < inner.size(); ++i) inner[i] |= there[i];
+    }
     if (auto ok = look_near(tests); !ok) return ok.error();
     const std::vector<uint32_t> open = clear();
     std::vector<uint32_t> receivers;
@@ -314,15 +357,16 @@ struct Thinner {
     const PointCloud cloud{r.origins, receivers};
     const PointTree tree(3, cloud, {16});
     double sum = 0;
-    size_t count = 0;
     for (size_t t = 0; t < tests.size(); ++t) {
       if (inner[t]) continue;
       uint32_t index[Spread::most];
       float share[Spread::most];
-      const size_t found = neighbours(tree, open, receivers, tests[t], index, share);
-      sum += difference(two.data() + 2 * t * width, index, share, found), ++count;
+      const uint32_t v = tests[t];
+      const size_t found = neighbours(tree, open, receivers, v, chosen[of[v]], SIZE_MAX, index, share);
+      sum += double(areas[v]) / std::min(1.0, densities[v] / apart) *
+             difference(two.data() + 2 * t * width, index, share, found);
     }
-    return count ? std::max(0.0, sum / double(count)) * open_area / all : 0.0;
+    return std::max(0.0, sum) / all;
   }
 
   Thinned result() {
@@ -351,15 +395,21 @@ Result<Thinned> thin(const Scene& scene, const Receivers& receivers, size_t widt
   t.split({}, t.level_size);
   double scale = 1, lost = 0, square = 0, noise = 0;
   int corrections = 0;
+  bool pays = true;
   for (int level = 0; level < most_levels; ++level) {
-    if (double(t.chosen.size()) > options.worth * double(n)) break;
+    pays = double(t.chosen.size()) <= options.worth * double(n);
+    if (!pays) break;
     if (auto ok = t.look_at_new(); !ok) return ok.error();
     t.compare();
     square = std::max(options.square, t.square(noise));
     const double budget = options.error * options.error * square;
+    if (level == 0 && t.expected(budget) > surely * options.worth * double(n)) {
+      pays = false;
+      break;
+    }
     std::vector<uint8_t> flagged = t.choose(scale * budget);
     if (flagged.empty()) {
-      auto measured = t.measure(0xffff0000u + 2 * uint32_t(corrections));
+      auto measured = t.measure(0xffff0000u + 2 * test_passes * uint32_t(corrections));
       if (!measured) return measured.error();
       lost = *measured;
       if (lost <= budget || corrections == most_corrections) break;
@@ -369,7 +419,8 @@ Result<Thinned> thin(const Scene& scene, const Receivers& receivers, size_t widt
     }
     t.split(flagged, t.level_size);
   }
-  Thinned out = double(t.chosen.size()) > options.worth * double(n) ? keep_all(n) : t.result();
+  pays = pays && double(t.chosen.size()) <= options.worth * double(n);
+  Thinned out = pays ? t.result() : keep_all(n);
   out.tried = t.tried, out.noise = square > 0 ? std::sqrt(noise / square) : 0;
   out.error = out.all() || !(square > 0) ? 0 : std::sqrt(lost / square);
   return out;

@@ -8,6 +8,9 @@
 namespace lambent {
 namespace {
 
+constexpr float lit_luminance = 0.05f, black_part = 0.1f;
+constexpr double slope_step = 0.01;
+
 bool covered(const Image& image, size_t i) { return !image.alpha.empty() && image.alpha[i] > 0; }
 
 std::string size_text(const Image& image) { return std::to_string(image.width) + " x " + std::to_string(image.height); }
@@ -42,6 +45,12 @@ Result<std::vector<size_t>> counted_pixels(const Image& a, const Image& b, bool 
   return compared;
 }
 
+Image mixed(const Image& a, const Image& b, double share) {
+  Image out = a;
+  for (size_t i = 0; i < out.rgb.size(); ++i) out.rgb[i] += float(share) * (b.rgb[i] - a.rgb[i]);
+  return out;
+}
+
 double decibels(double square) {
   return square > 0 ? -10 * std::log10(square) : std::numeric_limits<double>::infinity();
 }
@@ -57,15 +66,20 @@ Result<ImageDifference> compare_images(const Image& a, const Image& b, const Dis
   ImageDifference out;
   out.pixels = compared.size();
   double squares = 0, relative = 0, shown_squares = 0;
+  size_t lit = 0, black = 0;
   for (size_t i : compared) {
     for (int c = 0; c < 3; ++c) {
       double va = a.rgb[i][c], vb = b.rgb[i][c], d = va - vb,
              shown = double(shown_a.rgb[i][c]) - double(shown_b.rgb[i][c]);
       squares += d * d, relative += d * d / (vb * vb + 0.01), shown_squares += shown * shown;
     }
+    const Vec3 shown = shown_b.rgb[i];
+    if (luminance(Vec3(srgb_decode(shown.x), srgb_decode(shown.y), srgb_decode(shown.z))) > lit_luminance)
+      ++lit, black += luminance(a.rgb[i]) < black_part * luminance(b.rgb[i]);
     out.flip += double(flip[i]);
     out.mean_a += double(luminance(a.rgb[i])), out.mean_b += double(luminance(b.rgb[i]));
   }
+  out.black = lit ? double(black) / double(lit) : 0;
   double pixels = double(compared.size()), values = 3 * pixels;
   out.rmse = std::sqrt(squares / values), out.relative_mse = relative / values;
   out.psnr = decibels(shown_squares / values);
@@ -79,18 +93,24 @@ Result<UnnoisyDifference> compare_to_two(const Image& a, const Image& b, const I
   if (!counted) return counted.error();
   if (auto ok = counted_pixels(a, c, all); !ok) return ok.error();
   const Image shown_a = displayed(a, display), shown_b = displayed(b, display), shown_c = displayed(c, display);
+  // A hundredth of the way to each.
+  const Image near_b = displayed(mixed(a, b, slope_step), display),
+              near_c = displayed(mixed(a, c, slope_step), display);
   const double pixels = double(counted->size());
-  double sum = 0, squares = 0, noise = 0;
+  double sum = 0, squares = 0, noise = 0, sloped = 0;
   for (size_t i : *counted) {
     double product = 0;
     for (int k = 0; k < 3; ++k) {
       const double va = shown_a.rgb[i][k], vb = shown_b.rgb[i][k], vc = shown_c.rgb[i][k];
       product += (va - vb) * (va - vc) / 3, noise += (vb - vc) * (vb - vc) / 12;
+      if (va > 0 && va < 1)
+        sloped += (double(near_b.rgb[i][k]) - va) * (double(near_c.rgb[i][k]) - va) / (3 * slope_step * slope_step);
     }
     sum += product, squares += product * product;
   }
   const double mean = sum / pixels, within = 2 * std::sqrt(std::max(0.0, squares / pixels - mean * mean) / pixels);
-  return UnnoisyDifference{decibels(mean), decibels(mean + within), decibels(mean - within), decibels(noise / pixels)};
+  return UnnoisyDifference{decibels(mean), decibels(mean + within), decibels(mean - within), decibels(sloped / pixels),
+                           decibels(noise / pixels)};
 }
 
 Image difference_picture(const Image& a, const Image& b, const Display& display, float white) {

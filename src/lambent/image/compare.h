@@ -11,6 +11,9 @@ struct ImageDifference {
   double psnr = 0;          // decibels, of the displayed pictures (displayed() in image.h), peak 1; infinite if equal
   double flip = 0;          // mean LDR-FLIP of the displayed pictures, 67 pixels a degree
   double mean_a = 0, mean_b = 0;  // mean luminance, linear: a ratio away from 1 is a factor, not noise
+  // Of the pixels that b displays lit (luminance above a twentieth of white), the part that has less than a tenth of
+  // b's luminance in a: places lost in black.
+  double black = 0;
 };
 
 // Every number counts the pixels that either picture covers, or `all`: an object in the one picture alone is a
@@ -25,7 +28,10 @@ struct UnnoisyDifference {
   // is not. Infinite where that is not above 0. Noise that a display clips or bends does stay, as a bias.
   double psnr = 0;
   double least = 0, most = 0;  // with twice the standard error of that mean added and taken off
-  double noise = 0;            // what a PSNR against the mean of b and c can reach for a perfect `a`
+  // The same by the display's slope at a's values instead of displayed values: of differences to their first order, and
+  // whatever the noise. Where `a` shows pure black or white it has no slope, and no difference counts.
+  double sloped = 0;
+  double noise = 0;  // what a PSNR against the mean of b and c can reach for a perfect `a`
 };
 // Pixels as in compare_images(), of `b` and `c` alike. Errors: as there.
 Result<UnnoisyDifference> compare_to_two(const Image& a, const Image& b, const Image& c, const Display& display = {},

@@ -305,10 +305,37 @@ TEST(Compare, TwoNoisyReferencesSayWhatOneOfThemCannot) {
   EXPECT_GT(d->most, 40);
   EXPECT_LT(d->most - d->least, 1);
   EXPECT_NEAR(d->noise, -10 * std::log10(0.01 / 12 / 2), 0.1);  // of the mean of both
+  EXPECT_NEAR(d->sloped, 40, 1);                                // linear noise has another mean
   EXPECT_LT(compare_images(a, mean_of(b, c))->psnr, 34);
   EXPECT_EQ(compare_to_two(a, b, constant(3, 2, Vec3(0))).error().text(),
             "pictures differ in size: 128 x 128 and 3 x 2");
   EXPECT_EQ(compare_to_two(a, a, a)->psnr, INFINITY);
+}
+
+TEST(Compare, NoiseThatADisplayClipsCountsNotBySlope) {
+  // Dark, and off by as much; references whose noise is ten times that light.
+  constexpr int size = 128;
+  const float dark = 0.001f;
+  Image a = constant(size, size, Vec3(2 * dark)), b = a, c = a;
+  Random random(8);
+  for (Image* image : {&b, &c})
+    for (Vec3& v : image->rgb)
+      for (int k = 0; k < 3; ++k) v[k] = dark * (1 + 20 * (random.next() - 0.5f));
+  const double off = 12.92 * double(dark), expected = -10 * std::log10(off * off);
+  const auto d = compare_to_two(a, b, c);
+  EXPECT_NEAR(d->sloped, expected, 3);
+  EXPECT_GT(std::abs(d->psnr - expected), 3);
+}
+
+TEST(Compare, LitPlacesThatAreLostInBlack) {
+  // Of eight pixels, b shows six lit; a has two of those, and a dark one, at 9 % of b, and one at 11 %.
+  Image b = constant(4, 2, Vec3(0.5f)), a = b;
+  a.at(0, 0) = b.at(0, 0) = b.at(1, 0) = Vec3(0.04f);
+  a.at(1, 0) = 0.09f * b.at(1, 0);
+  a.at(2, 0) = a.at(3, 1) = Vec3(0.045f), a.at(0, 1) = Vec3(0.055f);
+  EXPECT_DOUBLE_EQ(compare_images(a, b)->black, 2.0 / 6);
+  EXPECT_EQ(compare_images(b, a)->black, 0);
+  EXPECT_EQ(compare_images(a, constant(4, 2, Vec3(0)))->black, 0);
 }
 
 TEST(Compare, Errors) {

@@ -322,6 +322,25 @@ TEST_F(Requests, BadFieldsAreNamed) {
   EXPECT_FALSE(load_bake_request(at("none.json")));
 }
 
+TEST_F(Requests, ErrorsAndTimesOutOfRangeAreNamedAndTheLeastTimeEnds) {
+  nlohmann::json plain = least(BakeKind::diffuse);
+  plain.erase("samples");
+  auto outcome = [&](const char* key, const nlohmann::json& value) -> Result<BakeOutcome> {
+    nlohmann::json object = plain;
+    object[key] = value;
+    auto request = bake_request_from_json(object);
+    if (!request) return request.error();
+    return bake_with_summary(*request);
+  };
+  for (const char* error : {"0", "0%", "200%", "1.5", "nan", "NaN%", "inf", "-1%", "0.001%", "%", "1 %%", "one"})
+    EXPECT_EQ(outcome("error", error).error().where, "--error") << error;
+  for (const double time : {-1.0, -1e-3, 1e30}) EXPECT_EQ(outcome("time", time).error().where, "time") << time;
+  EXPECT_EQ(outcome("time", "nan").error().where, "time");
+  auto hurried = outcome("time", 0);
+  ASSERT_TRUE(hurried) << hurried.error().text();
+  EXPECT_GT(hurried->summary.json["certificate"]["error"].get<double>(), 0);
+}
+
 TEST_F(Requests, FewRowsOfIncidentLightNeedNoWordAboutOthers) {
   for (int order : {1, 2}) {
     nlohmann::json object = least(BakeKind::matrix);

@@ -17,6 +17,9 @@ double seconds_since(Clock::time_point start) { return std::chrono::duration<dou
 
 const Visibility& visibility_of(const Baked& baked) { return std::get<Visibility>(baked.surface.store); }
 
+// What values at a block's nodes tell of a lobe is little: under a sun, 0.2 shows as edges between blocks.
+constexpr float lobe_tolerance = 0.2f, values_tolerance = 0.02f;
+
 SamplingRule sampling_rule(const std::string& name) {
   return name == "bounded" ? SamplingRule::bounded : name == "paper" ? SamplingRule::appendix_a : SamplingRule::full;
 }
@@ -45,9 +48,11 @@ Result<BlockShading> make_block_shading(const Baked& baked, const DrawRequest& r
   if (!at) return Error{request.baked, "has visibility elsewhere than at vertices"};
   const Visibility& visibility = visibility_of(baked);
   RelighterOptions options{.product = method->product, .haar_fraction = method->haar_fraction};
-  options.receivers = make_product_receivers(baked.scene, at->front, at->back, visibility.receivers, *reflection,
-                                             make_cube(visibility.size),
-                                             {sampling_rule(request.brdf_samples), request.tolerance});
+  options.receivers = make_product_receivers(
+      baked.scene, at->front, at->back, visibility.receivers, *reflection, make_cube(visibility.size),
+      {sampling_rule(request.brdf_samples), request.tolerance > 0 ? request.tolerance : lobe_tolerance});
+  if (!(request.tolerance > 0))
+    for (ProductMaterial& m : options.receivers.materials) m.tolerance = m.by_values ? values_tolerance : m.tolerance;
   std::vector<Vec3> albedo;
   for (uint32_t material : options.receivers.material_of)
     albedo.push_back(diffuse_albedo(options.receivers.materials[material].brdf));

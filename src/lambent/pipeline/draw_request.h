@@ -16,7 +16,7 @@ struct DrawRequest {
   std::vector<std::string> lamp, sphere_lamp, move;
   // View
   std::string camera = "auto", size = "512x512", background = "env";
-  int spp = 16;
+  int spp = 64;
   std::string exposure = "auto", tone = "neutral";
   // What is shown
   std::string show = "product";
@@ -29,7 +29,7 @@ struct DrawRequest {
   int frame_bounces = 0;  // 0: as many as it takes
   // Blocks
   std::string method = "blocks", brdf_samples = "bounded", indirect = "none";
-  float tolerance = 0.2f;
+  float tolerance = 0;  // 0: 0.2 of Phong's lobes, 0.02 of other models
   // Wavelets
   int terms = 0;  // of the light's; 0: all
   // Transfer textures
