@@ -6,6 +6,7 @@ set(lambent_golden ${CMAKE_CURRENT_SOURCE_DIR}/tests/golden)
 # Not of every test: a path on the command line is one that the compiler's cache cannot share with other checkouts.
 set_property(SOURCE src/lambent/c/lambent_test.cpp src/lambent/pipeline/draw_test.cpp
   src/lambent/pipeline/golden_test.cpp src/lambent/pipeline/live_test.cpp src/lambent/pipeline/draw_indirect_test.cpp
+  src/lambent/pipeline/live_kinds_test.cpp src/lambent/pipeline/live_look_test.cpp
   APPEND PROPERTY COMPILE_DEFINITIONS LAMBENT_GOLDEN="${lambent_golden}")
 target_include_directories(lambent-tests PRIVATE ${CMAKE_CURRENT_SOURCE_DIR}/tests)
 target_compile_options(lambent-tests PRIVATE -Wall -Wextra -Wno-missing-field-initializers)
