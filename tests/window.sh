@@ -138,7 +138,8 @@ wait $window && failed "a file of no bytes was read again"
 cmp -s before.exr after.exr || failed "a window whose file was cut short shows something else"
 grep -q "line 11" log && [ "$(wc -l <log)" = 1 ] || failed "a file of no bytes: $(cat log)"
 pass
-MESA_GL_VERSION_OVERRIDE=2.1 show "$golden/diffuse.glb" --env $sky --script script 2>log && failed "OpenGL 2.1 went through"
+MESA_GL_VERSION_OVERRIDE=2.1 show "$golden/diffuse.glb" --env $sky --script script 2>log &&
+  failed "OpenGL 2.1 went through"
 grep -q "OpenGL 3.3 is not to be had" log && [ "$(wc -l <log)" = 1 ] || failed "no OpenGL 3.3: $(cat log)"
 pass
 
@@ -179,7 +180,7 @@ wipe x|wipe
 look lobes|no zonal lobes
 lamp 0 point@0,0,0=1|counts from 1
 lamp 3 point@0,0,0=1|there are lamps 1 to 0
-set material red=lambert|--material
+set material red=lambert|does not go with
 ACTIONS
 show "$golden/diffuse.glb" --port 80 2>error && failed "--port went through"
 grep -q -e "--port" error || failed "$(cat error)"

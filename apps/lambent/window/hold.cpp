@@ -3,6 +3,7 @@
 #include "session.h"
 
 #include <lambent/pipeline/place.h>
+#include <lambent/scene/pose.h>
 
 #include <fmt/format.h>
 
@@ -85,6 +86,38 @@ std::optional<Vec2> Session::lamp_in_picture(const std::string& text) const {
   const Vec2 share = at / Vec2(float(view.width), float(view.height));
   if (!(share.x >= 0 && share.x <= 1 && share.y >= 0 && share.y <= 1)) return std::nullopt;
   return share;
+}
+
+namespace {
+
+// When what moves has come to its end.
+double end_of_motion(const DrawRequest& request, const Scene& scene) {
+  double end = 0;
+  if (!request.animation.empty()) {
+    const auto animation = find_animation(scene, request.animation);
+    const auto all = list_animations(scene);
+    if (animation && all) end = all->at(*animation).to;
+  }
+  if (auto objects = parse_places(request.place, request.move); objects && !request.place.empty())
+    for (const PlacedFile& object : *objects)
+      if (!object.keys.empty()) end = std::max(end, object.keys.back().time);
+  auto lamps = parse_moving_lamps({}, scene.origin);
+  for (const std::string& text : request.lamp)
+    if (auto lamp = parse_moving_lamp(text, scene.origin); lamp && names_moving_lamp(text)) lamps->push_back(*lamp);
+  for (const std::string& text : request.move)
+    if (auto path = parse_lamp_path(text, *lamps, scene.origin)) end = std::max(end, path->places.back().first);
+  return end;
+}
+
+}  // namespace
+
+Result<void> Session::advance(double seconds) {
+  if (!moves_by_itself()) return {};
+  DrawRequest request = live->request();
+  const double end = end_of_motion(request, bakes[shown_bake]->scene);
+  request.time += seconds;
+  if (request.time > end) request.time = 0;
+  return ask(request);
 }
 
 std::string Session::material_at(Vec2 at) const {

@@ -46,7 +46,7 @@ void sky_controls(PanelState& panel, Session& s) {
 void light_controls(PanelState& panel, Session& s) {
   const DrawRequest& request = s.live->request();
   const LightBasis basis = light_of(s.bakes[s.shown_bake]->surface.store);
-  if (!request.env.empty()) {
+  if (!request.env.empty() || kind_of(s.bakes[s.shown_bake]->surface) == DrawKind::indirect) {
     std::string chosen;
     if (!s.options.env.empty() && choose("environment", s.options.env, short_name(request.env), chosen))
       tell(panel, s.set("env", chosen));
@@ -242,6 +242,7 @@ void draw_notices(PanelState& panel, double now) {
       "D                 difference\n"
       "S                 save the picture\n"
       "F5                read the file again\n"
+      "Space             play what moves, and stop it\n"
       "Tab               panel on and off\n"
       "Ctrl-Q            close\n"
       "drop a file       a bake takes the scene's place,\n"

@@ -120,6 +120,11 @@ Result<void> Session::show(size_t bake) {
   const bool dark = !live && kind_of(bakes[bake]->surface) == DrawKind::indirect && request.lamp.empty();
   if (dark) request.lamp = lamps_to_begin_with(*bakes[bake], !request.env.empty());
   auto made = LivePicture::make(*bakes[bake], request, job_);
+  if (!made && live) {  // of another kind: with what goes with all
+    DrawRequest plain{.baked = request.baked, .env = request.env, .env_rotate = request.env_rotate};
+    plain.exposure = request.exposure, plain.tone = request.tone, plain.spp = request.spp, plain.size = request.size;
+    if (auto again = LivePicture::make(*bakes[bake], plain, job_)) made = std::move(again);
+  }
   if (!made) return made.error();
   reference.stop();
   other.reset(), against = Against::nothing, distance = {}, look = Look::picture;

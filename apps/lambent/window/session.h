@@ -74,6 +74,9 @@ class Session {
   // Carries it there: level, at the height at which it was taken, or `lift`ed straight up and down. Errors: one that
   // --move moves.
   Result<void> carry(Vec2 at, bool lift);
+  // Animations and --move: whether there are any; goes on by so many seconds, from their end to their beginning.
+  bool moves_by_itself() const { return !live->request().animation.empty() || !live->request().move.empty(); }
+  Result<void> advance(double seconds);
   // A file of any kind that we know: another bake takes the scene's place, an environment lights it.
   Result<void> drop(const std::string& path);
   // The file that is shown has been replaced since it was read; reads it again.

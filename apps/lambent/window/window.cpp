@@ -41,6 +41,7 @@ struct Window {
   enum class Drag { none, look, light, pan, wipe, object } drag = Drag::none;
   double x = 0, y = 0, last_input = 0;
   double last_click = 0, click_x = 0, click_y = 0;
+  double played = -1;  // what moves by itself goes on since then; below 0: it stands
   int frames_due = 3;  // Dear ImGui settles in a few
   // Of the script.
   std::vector<Action> script = {};
@@ -149,6 +150,7 @@ void on_key(GLFWwindow* handle, int key, int, int action, int mods) {
       if (auto ok = w.panel.save(w.session); !ok) w.say(ok);
       return;
     case GLFW_KEY_F5: return w.say(w.session.reload());
+    case GLFW_KEY_SPACE: w.played = w.session.moves_by_itself() && w.played < 0 ? window_clock() : -1; return;
     case GLFW_KEY_F1: w.panel.help = !w.panel.help; return;
     case GLFW_KEY_ESCAPE: w.panel.help = false; return;
     case GLFW_KEY_Q:
@@ -234,7 +236,10 @@ void draw_lamps(const Window& w, float height) {
       const ImVec2 place(at->x * float(w.picture_width()), at->y * height);
       list.AddCircle(place, 10, IM_COL32(0, 0, 0, 200), 0, 3.5f),
           list.AddCircle(place, 10, IM_COL32(255, 210, 90, 255), 0, 1.5f);
-      list.AddText(ImVec2(place.x + 12, place.y - 6), IM_COL32(255, 210, 90, 255), fmt::format("{}", i + 1).c_str());
+      const std::string number = fmt::format("{}", i + 1);
+      for (const float beside : {-1.0f, 1.0f})
+        list.AddText(ImVec2(place.x + 14 + beside, place.y - 6 + beside), IM_COL32(0, 0, 0, 255), number.c_str());
+      list.AddText(ImVec2(place.x + 14, place.y - 6), IM_COL32(255, 210, 90, 255), number.c_str());
     }
 }
 
@@ -415,7 +420,7 @@ Result<void> loop(Window& w) {
   while (!glfwWindowShouldClose(w.handle) && !is_cancelled(w.job.progress)) {
     const bool traces = w.session.against == Against::reference;
     const bool scripted = w.next < w.script.size() || w.frames_left > 0;
-    if (busy || scripted || w.frames_due > 0 || !w.dropped.empty()) glfwPollEvents();
+    if (busy || scripted || w.played >= 0 || w.frames_due > 0 || !w.dropped.empty()) glfwPollEvents();
     else glfwWaitEventsTimeout(traces ? 0.2 : 1.0);
     for (const std::string& path : std::exchange(w.dropped, {})) w.say(w.session.drop(path));
     int width = 0, height = 0;
@@ -430,6 +435,10 @@ Result<void> loop(Window& w) {
     auto goes_on = run_script(w);
     if (!goes_on) return goes_on.error();
     if (!*goes_on) return {};
+    if (w.played >= 0) {
+      const double now = window_clock();
+      w.say(w.session.advance(now - w.played)), w.played = now;
+    }
     const bool hurry = window_clock() - w.last_input < rest;
     auto worked = w.session.work(hurry);
     if (!worked) return worked.error();

@@ -28,7 +28,7 @@ TEST(LiveIndirect, LampsAndPaintAreDrawnAsRenderDoes) {
   more.lamp = {moved.lamp.front(), "spot@1,1.5,1,1,0,1,50=5", "sun@40,60=0.5"};
   painted.albedo = {"red=0.1,0.8,0.2", "grey=0.9"};
   sky.env = "sky:elevation=60,azimuth=20,turbidity=4,width=64", sky.albedo = painted.albedo;
-  turned = sky, turned.env_rotate = "70,0,0", turned.lamp = {"sky=2,1,1"};
+  turned = sky, turned.background = "none", turned.env_rotate = "70,0,0", turned.lamp = {"sky=2,1,1"};
   later.lamp = {"point@1,1,1=3"}, later.move = {"1@0:1,1,1;2:0.5,0.7,1.3"}, later.time = 1.5;
   DrawRequest part = request;
   part.show = "indirect";
