@@ -10,6 +10,7 @@ if(LAMBENT_TOGETHER)
 else()
   set_property(SOURCE src/lambent/c/lambent_test.cpp src/lambent/pipeline/draw_test.cpp
     src/lambent/pipeline/golden_test.cpp src/lambent/pipeline/live_test.cpp src/lambent/pipeline/draw_indirect_test.cpp
+    src/lambent/pipeline/live_kinds_test.cpp src/lambent/pipeline/live_look_test.cpp
     APPEND PROPERTY COMPILE_DEFINITIONS LAMBENT_GOLDEN="${lambent_golden}")
 endif()
 target_include_directories(lambent-tests PRIVATE ${CMAKE_CURRENT_SOURCE_DIR}/tests)

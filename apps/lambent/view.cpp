@@ -35,11 +35,9 @@ int run_window(Context& context, const ViewCommand& o) {
   if (!o.web.compare.empty()) session.baked.push_back(o.web.compare);
   session.baked.insert(session.baked.end(), o.window.more.begin(), o.window.more.end());
   DrawRequest& draw = session.draw;
-  draw.camera = o.web.camera, draw.exposure = o.web.exposure, draw.tone = o.web.tone, draw.brdf = o.window.brdf;
-  draw.spp = o.window.spp, draw.light_order = o.window.light_order;
-  draw.insert = o.window.insert, draw.place = o.window.place, draw.move = o.window.move;
+  draw = o.window.draw, draw.given.clear();  // what is as it would be counts as not said
+  draw.camera = o.web.camera, draw.exposure = o.web.exposure, draw.tone = o.web.tone;
   if (!o.web.rotate.empty()) draw.env_rotate = o.web.rotate;
-  if (!o.window.method.empty()) draw.method = o.window.method;
   const Job job{&context.progress, [](const std::string& message) { warn(message); }};
   auto shown = run_window(session, o.window, job);
   return shown ? success : fail(shown.error());
@@ -50,8 +48,10 @@ Result<void> check_view(const CLI::App& command, bool window) {
   for (const char* option : {"--port", "--no-browser"})
     if (window && command.count(option))
       return Error{option, "is of the page that a browser shows, not of --window", true};
-  for (const char* option :
-       {"more", "--script", "--size", "--spp", "--brdf", "--insert", "--place", "--move", "--method", "--light-order"})
+  std::vector<std::string> of_window{"more", "--script", "--size"};
+  for (const Option<DrawRequest>& o : draw_options())
+    if (WindowOptions::takes(o.name)) of_window.push_back(std::string("--") + o.name);
+  for (const std::string& option : of_window)
     if (!window && command.count(option)) return Error{option, "is for --window", true};
   return {};
 }

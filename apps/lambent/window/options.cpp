@@ -1,4 +1,7 @@
+#include "../table.h"
 #include "window.h"
+
+#include <algorithm>
 
 namespace lambent::tool {
 
@@ -9,18 +12,13 @@ void WindowOptions::add_to(CLI::App& command) {
   command.add_option("--script", script, "With --window: do what this file says, an action a line, and end")
       ->group(group);
   command.add_option("--size", size, "With --window: its size, WIDTHxHEIGHT")->group(group)->capture_default_str();
-  command.add_option("--spp", spp, "With --window: rays a pixel, once nothing moves")
-      ->check(CLI::Range(1, 4096))
-      ->group(group)
-      ->capture_default_str();
-  command.add_option("--brdf", brdf, "With --window: other materials, as for render")->group(group);
-  command.add_option("--insert", insert, "With --window: an object put into the scene, as for render")->group(group);
-  command.add_option("--place", place, "With --window: an object over the scene, as for render")->group(group);
-  command.add_option("--move", move, "With --window: the path of one, as for render")->group(group);
-  command.add_option("--method", method, "With --window: how blocks are multiplied, as for render")->group(group);
-  command.add_option("--light-order", light_order, "With --window: bands to begin with, as for render")
-      ->check(CLI::Range(1, max_sh_order))
-      ->group(group);
+  add_table(command, draw_options(), draw, draw.given, takes);
+}
+
+bool WindowOptions::takes(const std::string& option) {
+  static const std::vector<std::string> others{"baked", "output",     "env",  "env-rotate", "window", "camera",
+                                               "size",  "background", "tone", "exposure",   "frames", "indirect"};
+  return std::find(others.begin(), others.end(), option) == others.end();
 }
 
 }  // namespace lambent::tool

@@ -1,5 +1,6 @@
 #include "panel.h"
 
+#include <lambent/light/sky.h>
 #include <lambent/pipeline/place.h>
 
 #include <fmt/format.h>
@@ -9,12 +10,12 @@
 #include <filesystem>
 
 namespace lambent::tool {
-namespace {
 
 void tell(PanelState& panel, const Result<void>& result) {
-  // Of what is done right there is nothing to say.
   panel.notice = result ? "" : result.error().text(), panel.notice_until = 1e300;
 }
+
+namespace {
 
 bool choose(const char* label, const std::vector<std::string>& names, const std::string& current, std::string& chosen) {
   bool changed = false;
@@ -29,22 +30,30 @@ std::string short_name(const std::string& path) {
   return path.find(':') == std::string::npos ? std::filesystem::path(path).filename().string() : path;
 }
 
+// An analytic sky: that of --env, as it is, or one to begin with.
+void sky_controls(PanelState& panel, Session& s) {
+  const std::string& env = s.live->request().env;
+  SkyOptions sky;
+  if (env.starts_with("sky:"))
+    if (auto said = parse_sky(env.substr(4))) sky = *said;
+  bool changed = ImGui::SliderFloat("sun's height", &sky.elevation, -2, 90, "%.1f");
+  changed |= ImGui::SliderFloat("azimuth", &sky.azimuth, -180, 180, "%.1f");
+  changed |= ImGui::SliderFloat("turbidity", &sky.turbidity, 1.7f, 10, "%.1f");
+  if (env.starts_with("sky:")) changed |= ImGui::Checkbox("sun", &sky.sun);
+  if (changed) tell(panel, s.set("env", sky_text(sky)));
+}
+
 void light_controls(PanelState& panel, Session& s) {
   const DrawRequest& request = s.live->request();
   const LightBasis basis = light_of(s.bakes[s.shown_bake]->surface.store);
-  if (!request.env.empty()) {
+  if (!request.env.empty() || kind_of(s.bakes[s.shown_bake]->surface) == DrawKind::indirect) {
     std::string chosen;
     if (!s.options.env.empty() && choose("environment", s.options.env, short_name(request.env), chosen))
       tell(panel, s.set("env", chosen));
     if (ImGui::InputTextWithHint("##env", "file or sky:... and Enter", panel.env, sizeof panel.env,
                                  ImGuiInputTextFlags_EnterReturnsTrue))
       tell(panel, s.set("env", panel.env));
-    bool sky = ImGui::SliderInt("sun's height", &panel.sky_elevation, 0, 90);
-    sky |= ImGui::SliderInt("azimuth", &panel.sky_azimuth, -180, 180);
-    sky |= ImGui::SliderFloat("turbidity", &panel.turbidity, 2, 10, "%.1f");
-    if (sky)
-      tell(panel, s.set("env", fmt::format("sky:elevation={},azimuth={},turbidity={:.1f}", panel.sky_elevation,
-                                           panel.sky_azimuth, panel.turbidity)));
+    sky_controls(panel, s);
     ImGui::Checkbox("level: light turns about +Y alone", &s.level);
     if (ImGui::Button("light as it came")) tell(panel, s.set("env-rotate", ""));
     if (basis.order > 1) {
@@ -53,15 +62,7 @@ void light_controls(PanelState& panel, Session& s) {
         tell(panel, s.set("light-order", std::to_string(bands == basis.order ? 0 : bands)));
     }
   }
-  for (const std::string& group : basis.groups) {
-    Vec3 color(1.0f);
-    for (const std::string& text : request.lamp)
-      if (auto lamp = parse_named_color(text, "--lamp"); lamp && lamp->name == group) color = lamp->color;
-    float rgb[3] = {color.x, color.y, color.z};
-    if (ImGui::ColorEdit3(group.c_str(), rgb, ImGuiColorEditFlags_Float | ImGuiColorEditFlags_HDR))
-      tell(panel, s.set("lamp", fmt::format("{}={},{},{}", group, std::max(0.0f, rgb[0]), std::max(0.0f, rgb[1]),
-                                            std::max(0.0f, rgb[2]))));
-  }
+  lamp_controls(panel, s);
 }
 
 void display_controls(PanelState& panel, Session& s) {
@@ -80,10 +81,28 @@ void material_controls(PanelState& panel, Session& s) {
   const Baked& baked = *s.bakes[s.shown_bake];
   const Outgoing* outgoing = outgoing_of(baked.surface);
   const bool blocks = kind_of(baked.surface) == DrawKind::blocks;
+  paint_controls(panel, s);
   if (!blocks && !(outgoing && outgoing->kind == OutgoingKind::map)) return;
   if (ImGui::InputTextWithHint("material", "diffuse, ggx:roughness=0.3 and Enter", panel.brdf, sizeof panel.brdf,
                                ImGuiInputTextFlags_EnterReturnsTrue))
     tell(panel, s.set("brdf", panel.brdf));
+  model_controls(panel, s);
+}
+
+// Where a transfer texture lies, and how deep its grooves are.
+void texture_controls(PanelState& panel, Session& s) {
+  const DrawRequest& request = s.live->request();
+  if (request.transfer_texture.empty()) return;
+  ImGui::TextWrapped("%s", short_name(request.transfer_texture).c_str());
+  float tile[2] = {1, 1};
+  if (auto said = parse_numbers(request.tile, 2, "--tile")) tile[0] = (*said)[0], tile[1] = (*said)[1];
+  if (ImGui::DragFloat2("repetitions", tile, 0.05f, 0, 0, "%.3g"))
+    tell(panel, s.set("tile", fmt::format("{:.5g},{:.5g}", tile[0], tile[1])));
+  float depth = request.groove_depth, width = request.groove_width;
+  if (ImGui::SliderFloat("grooves' depth", &depth, 0.01f, 2, "%.3f"))
+    tell(panel, s.set("groove-depth", fmt::format("{:.4g}", depth)));
+  if (ImGui::SliderFloat("grooves' width", &width, 0.01f, 1, "%.3f"))
+    tell(panel, s.set("groove-width", fmt::format("{:.4g}", width)));
 }
 
 // Where objects are, and when: of --place, and of what moves by paths or animations.
@@ -105,18 +124,23 @@ void object_controls(PanelState& panel, Session& s) {
 
 void look_controls(PanelState& panel, Session& s) {
   const DrawKind kind = kind_of(s.bakes[s.shown_bake]->surface);
+  std::vector<std::string> shown{"product", "radiosity", "albedo"};
+  const char* of_terms[] = {"emission", "bounce:0", "bounce:1", "bounce:2", "sum:0", "sum:1"};
+  if (kind == DrawKind::indirect) shown.insert(shown.end(), {"direct", "indirect"});
+  else if (s.live->request().transfer_texture.empty())
+    shown.insert(shown.end(), std::begin(of_terms), std::end(of_terms));
   std::string chosen;
-  if (kind != DrawKind::blocks && kind != DrawKind::fixed_view &&
-      choose("show",
-             {"product", "radiosity", "albedo", "emission", "bounce:0", "bounce:1", "bounce:2", "sum:0", "sum:1"},
-             s.live->request().show, chosen))
+  if (kind != DrawKind::blocks && kind != DrawKind::fixed_view && choose("show", shown, s.live->request().show, chosen))
     tell(panel, s.set("show", chosen));
   static const std::vector<std::string> looks = choices_of(look_names);
   if (choose("look", looks, looks[size_t(s.look)], chosen)) {
     const size_t index = size_t(std::find(looks.begin(), looks.end(), chosen) - looks.begin());
-    tell(panel, s.look_as(Look(index), panel.coefficient));
+    panel.number = 0, tell(panel, s.look_as(Look(index), panel.number));
   }
-  if (ImGui::InputInt("coefficient", &panel.coefficient)) tell(panel, s.look_as(Look::coefficient, panel.coefficient));
+  const bool numbered = s.look == Look::coefficient || s.look == Look::rows || s.look == Look::balls ||
+                        s.look == Look::lobes;
+  if (numbered && ImGui::InputInt(s.look == Look::coefficient ? "coefficient" : "row", &panel.number))
+    tell(panel, s.look_as(s.look, panel.number));
 }
 
 void comparison_controls(PanelState& panel, Session& s) {
@@ -142,11 +166,18 @@ void comparison_controls(PanelState& panel, Session& s) {
 
 void statistics(Session& s) {
   const LiveTimes& t = s.times;
-  ImGui::Text("ms: light %.1f, relight %.1f,", t.project, t.relight);
-  ImGui::Text("    rays %.1f, shade %.1f", t.trace, t.shade);
+  ImGui::Text("ms: light %.1f, product %.1f,", t.project, t.relight);
+  ImGui::Text("    rays %.1f, draw %.1f", t.trace, t.shade);
+  if (const Breakdown* b = s.live->breakdown()) {
+    const double all = double(std::max<size_t>(1, b->blocked + b->light_visibility + b->light_brdf + b->triple));
+    ImGui::Text("blocks: %.0f %% dark, light x visibility %.0f,", 100 * double(b->blocked) / all,
+                100 * double(b->light_visibility) / all);
+    ImGui::Text("    light x BRDF %.0f, all three %.0f", 100 * double(b->light_brdf) / all,
+                100 * double(b->triple) / all);
+  }
   ImGui::Text("%zu receivers, %d of %d samples", t.shaded, s.live->samples(), s.live->request().spp);
   if (s.dropped_pixels > 1) ImGui::Text("in a hurry: 1 pixel of %d", s.dropped_pixels * s.dropped_pixels);
-  else if (!s.settled()) ImGui::TextUnformatted("refining");
+  else if (!s.settled()) ImGui::TextUnformatted(s.is_measuring() ? "measuring" : "refining");
   else ImGui::TextUnformatted("whole: as `lambent render`");
   if (!s.frames.empty())
     ImGui::PlotLines("##frames", s.frames.data(), int(s.frames.size()), 0, "ms a piece of work", 0,
@@ -176,7 +207,7 @@ void draw_panel(PanelState& panel, Session& s, float x, float width, float heigh
   if (ImGui::CollapsingHeader("Light", ImGuiTreeNodeFlags_DefaultOpen)) light_controls(panel, s);
   if (ImGui::CollapsingHeader("Display", ImGuiTreeNodeFlags_DefaultOpen)) display_controls(panel, s);
   if (ImGui::CollapsingHeader("Materials and looks", ImGuiTreeNodeFlags_DefaultOpen))
-    material_controls(panel, s), object_controls(panel, s), look_controls(panel, s);
+    material_controls(panel, s), texture_controls(panel, s), object_controls(panel, s), look_controls(panel, s);
   if (ImGui::CollapsingHeader("Beside it", ImGuiTreeNodeFlags_DefaultOpen)) comparison_controls(panel, s);
   if (ImGui::CollapsingHeader("Frame", ImGuiTreeNodeFlags_DefaultOpen)) statistics(s);
   if (ImGui::Button("save picture (S)"))
@@ -203,12 +234,15 @@ void draw_notices(PanelState& panel, double now) {
       "drag              look around\n"
       "Shift or right    turn the light\n"
       "Alt or middle     shift the view\n"
-      "Ctrl              carry an object; with Shift, up and down\n"
+      "Ctrl              carry a lamp or an object; with Shift, up and down\n"
+      "double click      edit the material that is there (blocks)\n"
       "wheel, + and -    nearer, farther\n"
       "arrows            look; with Shift, the light\n"
       "R                 against the path tracer\n"
       "D                 difference\n"
       "S                 save the picture\n"
+      "F5                read the file again\n"
+      "Space             play what moves, and stop it\n"
       "Tab               panel on and off\n"
       "Ctrl-Q            close\n"
       "drop a file       a bake takes the scene's place,\n"

@@ -10,11 +10,17 @@ struct PanelState {
   double notice_until = 0;
   // Texts being edited.
   char env[512] = "", brdf[256] = "";
-  int sky_elevation = 35, sky_azimuth = 45, coefficient = 0;
-  float turbidity = 3;
+  std::string material;  // that is edited
+  int number = 0;        // of a coefficient or a row
   int saved = 0;
   Result<void> save(Session& session);  // under the first free name
 };
+
+// Says what went wrong; of what is done right there is nothing to say.
+void tell(PanelState& panel, const Result<void>& result);
+void lamp_controls(PanelState& panel, Session& session);
+void paint_controls(PanelState& panel, Session& session);
+void model_controls(PanelState& panel, Session& session);
 
 void draw_panel(PanelState& panel, Session& session, float x, float width, float height);
 void draw_notices(PanelState& panel, double now);

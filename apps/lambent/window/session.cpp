@@ -1,9 +1,12 @@
 #include "session.h"
 
+#include "hold.h"
+
 #include <lambent/core/file.h>
 #include <lambent/core/parallel.h>
 #include <lambent/pipeline/parse.h>
 #include <lambent/pipeline/place.h>
+#include <lambent/scene/load.h>
 
 #include <fmt/format.h>
 
@@ -44,9 +47,18 @@ double seconds_now() {
 
 // Where the name ends in a value of an option that is given again.
 size_t name_end(const std::string& option, const std::string& value) {
-  return option == "insert"                    ? value.rfind('@')
-       : option == "place" || option == "move" ? value.find('=')
-                                               : value.rfind('=');
+  return option == "insert"                                            ? value.rfind('@')
+       : option == "place" || option == "move" || option == "material" ? value.find('=')
+                                                                       : value.rfind('=');
+}
+
+// Of direct to indirect light that has no light yet: a lamp over the middle of the scene.
+std::vector<std::string> lamps_to_begin_with(const Baked& baked, bool has_sky) {
+  const Scene& scene = baked.scene;
+  const bool glows = std::any_of(scene.materials.begin(), scene.materials.end(),
+                                 [](const Material& m) { return largest(m.emissive) > 0; });
+  if (has_sky || glows || !scene.lights.empty()) return {};
+  return {lamp_over(scene, "sphere")};
 }
 
 // The pixel of a picture of another size at the same place.
@@ -69,10 +81,9 @@ Result<std::unique_ptr<Session>> Session::open(const SessionOptions& options, co
   s->options = options;
   if (auto ok = check_display(options.draw.exposure, options.draw.tone); !ok) return ok.error();
   for (const std::string& path : options.baked) {
-    auto baked = load_baked(path);
+    auto baked = s->load(path);
     if (!baked) return baked.error();
-    s->bakes.push_back(std::make_unique<Baked>(std::move(*baked)));
-    s->names.push_back(path);
+    s->bakes.push_back(std::move(*baked)), s->names.push_back(path);
   }
   if (!options.reference.empty()) {
     auto image = load_image(options.reference);
@@ -83,18 +94,43 @@ Result<std::unique_ptr<Session>> Session::open(const SessionOptions& options, co
   return s;
 }
 
+// With a transfer texture any scene will do.
+Result<std::unique_ptr<Baked>> Session::load(const std::string& path) const {
+  const bool textured = !(live ? live->request() : options.draw).transfer_texture.empty();
+  if (textured && !is_baked(path)) {
+    auto scene = load_scene(path);
+    if (!scene) return scene.error();
+    auto out = std::make_unique<Baked>();
+    out->scene = std::move(*scene);
+    return out;
+  }
+  auto baked = load_baked(path);
+  if (!baked) return baked.error();
+  return std::make_unique<Baked>(std::move(*baked));
+}
+
 Result<void> Session::show(size_t bake) {
   DrawRequest request = live ? live->request() : options.draw;
   request.baked = names[bake];
   const LightBasis basis = light_of(bakes[bake]->surface.store);
-  const bool distant = basis.order > 0 || !basis.lobes.empty() || cube_of(bakes[bake]->surface.store) > 0;
+  const bool distant = basis.order > 0 || !basis.lobes.empty() || cube_of(bakes[bake]->surface.store) > 0 ||
+                       !request.transfer_texture.empty();
   if (!live && !options.env.empty()) request.env = options.env.front();
   else if (!live && distant) request.env = "sky:elevation=35,azimuth=45,turbidity=3";
+  const bool dark = !live && kind_of(bakes[bake]->surface) == DrawKind::indirect && request.lamp.empty();
+  if (dark) request.lamp = lamps_to_begin_with(*bakes[bake], !request.env.empty());
   auto made = LivePicture::make(*bakes[bake], request, job_);
+  if (!made && live) {  // of another kind: with what goes with all
+    DrawRequest plain{.baked = request.baked, .env = request.env, .env_rotate = request.env_rotate};
+    plain.exposure = request.exposure, plain.tone = request.tone, plain.spp = request.spp, plain.size = request.size;
+    if (auto again = LivePicture::make(*bakes[bake], plain, job_)) made = std::move(again);
+  }
   if (!made) return made.error();
   reference.stop();
-  other.reset(), against = Against::nothing, distance = {};
+  other.reset(), against = Against::nothing, distance = {}, look = Look::picture;
   live = std::make_unique<LivePicture>(std::move(*made)), shown_bake = bake;
+  std::error_code status;
+  written_ = std::filesystem::last_write_time(names[bake], status);
   fresh_ = light_changed_ = true, measured_ = false;
   return {};
 }
@@ -103,18 +139,20 @@ Result<void> Session::ask(const DrawRequest& request) {
   if (auto ok = check_display(request.exposure, request.tone); !ok) return ok;
   const DrawRequest before = live->request();
   const bool traced = against == Against::reference;
-  const auto moves = [](const DrawRequest& r) {
-    return std::tie(r.animation, r.time, r.deform, r.insert, r.place, r.move);
-  };
-  if (traced && moves(request) != moves(before)) reference.stop();  // its scene changes
+  if (traced) reference.stop();  // its scene may change
   if (auto ok = live->ask(request); !ok) return ok;
+  if (before.transfer_texture.empty() != request.transfer_texture.empty()) {  // another kind
+    look = Look::picture;
+    if (traced) against = Against::nothing;
+  }
   if (other) {
     DrawRequest same = request;
     same.baked = names[other_bake];
     if (auto ok = other->ask(same); !ok) job_.warn(ok.error().text());
   }
   light_changed_ |= before.env != request.env || before.env_rotate != request.env_rotate ||
-                    before.lamp != request.lamp || before.brdf != request.brdf || before.show != request.show;
+                    before.lamp != request.lamp || before.brdf != request.brdf || before.show != request.show ||
+                    before.material != request.material || before.albedo != request.albedo;
   const bool shown_alike = before.exposure == request.exposure && before.tone == request.tone;
   if (!shown_alike) measured_ = false;
   fresh_ = true, distance = {};
@@ -153,6 +191,13 @@ Result<void> Session::set(const std::string& option, const std::string& value) {
   return Error{option, "is no option of a drawing", true};
 }
 
+Result<void> Session::clear(const std::string& option) {
+  DrawRequest request = live->request();
+  for (const Option<DrawRequest>& o : draw_options())
+    if (option == o.name) std::visit([&](auto member) { request.*member = DrawRequest().*member; }, o.member);
+  return ask(request);
+}
+
 Result<void> Session::turn_light(float yaw, float pitch) {
   DrawRequest request = live->request();
   if (request.env.empty()) return Error{"light", "nothing shines from afar: there is no environment to turn"};
@@ -189,45 +234,6 @@ Result<void> Session::dolly(float factor) {
   return set("camera", camera_text(c, live->scene().origin));
 }
 
-bool Session::grab(Vec2 at) {
-  const Hit hit = live->pick(at);
-  const auto object = live->object_of(hit);
-  if (!object) return false;
-  const bool inserted = !live->request().insert.empty();
-  held_ = {inserted, *object,
-           interpolate(live->scene().positions, live->scene().triangles[hit.triangle], hit.u, hit.v)};
-  return true;
-}
-
-Result<void> Session::carry(Vec2 at, bool lift) {
-  const View& view = live->view();
-  const CameraRays rays(view.camera, view.width, view.height);
-  const Vec3 along = rays.direction(at.x * float(view.width), at.y * float(view.height)), eye = view.camera.eye;
-  const Vec3 upright(eye.x - held_.at.x, 0, eye.z - held_.at.z), normal = lift ? upright : Vec3(0, 1, 0);
-  const float t = dot(held_.at - eye, normal) / dot(along, normal);
-  if (!(t > 0 && t < 100 * bounds(live->scene()).diagonal())) return {};  // beyond the horizon
-  Vec3 by = eye + t * along - held_.at;
-  if (lift) by.x = by.z = 0;
-  DrawRequest request = live->request();
-  const Vec3d origin = live->scene().origin;
-  if (held_.inserted) {
-    std::string& text = request.insert.at(held_.index);
-    auto object = parse_insertion(text, origin);
-    if (!object) return object.error();
-    const Vec3d p = Vec3d(object->foot + by) + origin;
-    text = fmt::format("{}@{:.9g},{:.9g},{:.9g},{:.9g}", object->path, p.x, p.y, p.z, object->scale);
-  } else {
-    auto objects = parse_places(request.place, request.move);
-    if (!objects) return objects.error();
-    PlacedFile& object = objects->at(held_.index);
-    if (!object.keys.empty()) return Error{object.name, "is where its path has it: --move"};
-    object.at.position += Vec3d(by);
-    request.place[held_.index] = place_text(object);
-  }
-  held_.at += by;
-  return ask(request);
-}
-
 Result<void> Session::resize(int width, int height) {
   const View& v = live->view();
   if (width == v.width && height == v.height) return {};
@@ -235,30 +241,52 @@ Result<void> Session::resize(int width, int height) {
   return set("size", fmt::format("{}x{}", std::clamp(width, 1, 8192), std::clamp(height, 1, 8192)));
 }
 
-Result<void> Session::look_as(Look next, int coefficient) {
-  if (auto ok = live->look_as(next, coefficient); !ok) return ok;
-  look = next, fresh_ = true, light_changed_ = true;
+Result<void> Session::look_as(Look next, int number) {
+  if (auto ok = live->look_as(next, number); !ok) return ok;
+  look = next, fresh_ = true, light_changed_ = true, measured_ = false;
   return {};
 }
 
 Result<void> Session::drop(const std::string& path) {
-  if (is_baked(path)) {
-    auto baked = load_baked(path);
+  const std::string ending = file_extension(path);
+  const bool is_scene = ending == "glb" || ending == "gltf" || ending == "obj" || ending == "ply";
+  const bool textured = !live->request().transfer_texture.empty();
+  if (is_baked(path) || (is_scene && textured)) {
+    auto baked = load(path);
     if (!baked) return baked.error();
-    bakes.push_back(std::make_unique<Baked>(std::move(*baked))), names.push_back(path);
+    bakes.push_back(std::move(*baked)), names.push_back(path);
     auto shown = show(bakes.size() - 1);
     if (!shown) bakes.pop_back(), names.pop_back();
     return shown;
   }
-  const std::string ending = file_extension(path);
-  if (ending == "glb" || ending == "gltf" || ending == "obj" || ending == "ply")
-    return Error{path, "is a scene and no bake: `lambent bake` makes one of it"};
-  return set("env", path);
+  if (is_scene) return Error{path, "is a scene and no bake: `lambent bake` makes one of it"};
+  return set(ending == "lpt" ? "transfer-texture" : "env", path);
+}
+
+bool Session::is_replaced() {
+  if (const double now = seconds_now(); now - looked_ < 1) return false;
+  else looked_ = now;
+  std::error_code status;
+  const auto written = std::filesystem::last_write_time(names[shown_bake], status);
+  if (status || written == written_) return false;
+  written_ = written;  // said once
+  return true;
+}
+
+Result<void> Session::reload() {
+  auto baked = load(names[shown_bake]);
+  if (!baked) return baked.error();
+  std::swap(bakes[shown_bake], *baked);
+  auto shown = show(shown_bake);
+  if (!shown) std::swap(bakes[shown_bake], *baked);
+  return shown;
 }
 
 Result<void> Session::compare_with(Against next, size_t bake) {
   if (next == Against::file && options.reference.empty())
     return Error{"compare", "no picture was given: --reference", true};
+  if (next == Against::reference && !live->request().transfer_texture.empty())
+    return Error{"compare", "the path tracer sees the mesh alone, without the relief of a transfer texture", true};
   if (next == Against::bake) {
     if (bake >= bakes.size()) return Error{"compare", "no such bake was given", true};
     DrawRequest same = live->request();
@@ -301,7 +329,7 @@ Result<bool> Session::work(bool hurry) {
     if (!beside) return beside;
     more |= *beside;
   }
-  if (more) {
+  if (more && !live->is_measuring()) {
     fresh_ = true;
     frames.push_back(float(1e3 * (seconds_now() - start)));
     if (frames.size() > 240) frames.erase(frames.begin());
@@ -325,7 +353,9 @@ void Session::measure(bool done) {
   const bool due = !measured_ || (automatic && light_changed_ && (done || now - last_exposure_ > 0.33));
   if (!due || live->samples() == 0) return;
   const Image& image = live->image();
-  if (auto parsed = parse_display(request.exposure, request.tone, std::span(&image, 1))) display = *parsed;
+  const bool is_light = look == Look::picture || look == Look::rows || look == Look::coefficient;
+  if (!is_light) display = Display();  // colours are shown as they are
+  else if (auto parsed = parse_display(request.exposure, request.tone, std::span(&image, 1))) display = *parsed;
   measured_ = true, last_exposure_ = now;
   if (done) light_changed_ = false;
 }
@@ -398,13 +428,24 @@ std::string Session::command() const {
   return out + " -o picture.png";
 }
 
+std::string sky_text(const SkyOptions& sky) {
+  const SkyOptions plain;
+  std::string out =
+      fmt::format("sky:elevation={:.4g},azimuth={:.5g},turbidity={:.3g}", sky.elevation, sky.azimuth, sky.turbidity);
+  if (sky.ground != plain.ground) out += fmt::format(",ground={:.4g}", sky.ground.x);
+  if (sky.sun != plain.sun) out += ",sun=off";
+  if (sky.width != plain.width) out += fmt::format(",width={}", sky.width);
+  return out;
+}
+
 Result<std::vector<Action>> parse_script(const std::string& text, const std::string& name) {
   // Verbs, and how many words follow: at least, at most.
   static const std::map<std::string, std::pair<size_t, size_t>> verbs{
       {"set", {2, 2}},    {"turn-light", {1, 2}}, {"orbit", {2, 2}},  {"pan", {2, 2}},        {"dolly", {1, 1}},
       {"look", {1, 2}},   {"compare", {1, 2}},    {"wipe", {1, 1}},   {"difference", {1, 1}}, {"drop", {1, 1}},
       {"settle", {0, 0}}, {"wait", {1, 1}},       {"frames", {1, 1}}, {"save", {1, 1}},       {"screenshot", {1, 1}},
-      {"film", {3, 3}},   {"size", {1, 1}},       {"panel", {1, 1}},  {"stay", {0, 0}}};
+      {"film", {3, 3}},   {"lamp", {1, 2}},       {"reload", {0, 0}}, {"reopen", {0, 0}},     {"size", {1, 1}},
+      {"panel", {1, 1}},  {"stay", {0, 0}}};
   std::vector<Action> out;
   std::istringstream lines(text);
   std::string line;

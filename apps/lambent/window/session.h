@@ -1,10 +1,13 @@
 #pragma once
 // What a window shows and what hands do to it, without a window: pictures, what they are compared with, actions.
+#include <lambent/core/file.h>
 #include <lambent/image/compare.h>
+#include <lambent/light/sky.h>
 #include <lambent/pipeline/live.h>
 #include <lambent/pipeline/live_reference.h>
 
 #include <deque>
+#include <filesystem>
 #include <map>
 #include <memory>
 #include <string>
@@ -44,21 +47,41 @@ class Session {
   // of the one of the same name ("desk=...", "a=..." of --place, "cup.obj@..." of --insert), and with nothing after the
   // name takes it out. Errors: no such option, a wrong value; all stays.
   Result<void> set(const std::string& option, const std::string& value);
+  // An option that may be given again: as if it never was.
+  Result<void> clear(const std::string& option);
   // What hands do. Degrees; a share of the picture's height; a factor of the distance.
   Result<void> turn_light(float yaw, float pitch);
   Result<void> orbit(float yaw, float pitch);
   Result<void> pan(float right, float up);
   Result<void> dolly(float factor);
   Result<void> resize(int width, int height);
-  Result<void> look_as(Look look, int coefficient = 0);
-  // Takes hold of the object of --insert or --place that is seen at a place of the picture, [0, 1]^2 from the top left;
-  // false: none is.
+  Result<void> look_as(Look look, int number = 0);
+
+  // Lamps that stand anywhere, in the order of --lamp, as text: puts `text` in the place of the one, or after the last;
+  // "" takes it out. Errors: --lamp's; there is no such one; one that --move moves.
+  std::vector<std::string> standing_lamps() const;
+  Result<void> set_lamp(size_t index, const std::string& text);
+  // A new one of a kind, "sphere", "point", "spot" or "sun", above the middle of the scene.
+  std::string new_lamp(const std::string& kind) const;
+  // Where in the picture it is, [0, 1]^2 from the top left; none: a sun, behind the eye, beyond the picture.
+  std::optional<Vec2> lamp_in_picture(const std::string& text) const;
+
+  // Takes hold of the lamp, or else of the object of --insert or --place, that is seen at a place of the picture,
+  // [0, 1]^2 from the top left; false: none is.
   bool grab(Vec2 at);
+  // The scene's material that is seen there; "": none.
+  std::string material_at(Vec2 at) const;
   // Carries it there: level, at the height at which it was taken, or `lift`ed straight up and down. Errors: one that
   // --move moves.
   Result<void> carry(Vec2 at, bool lift);
+  // Animations and --move: whether there are any; goes on by so many seconds, from their end to their beginning.
+  bool moves_by_itself() const { return !live->request().animation.empty() || !live->request().move.empty(); }
+  Result<void> advance(double seconds);
   // A file of any kind that we know: another bake takes the scene's place, an environment lights it.
   Result<void> drop(const std::string& path);
+  // The file that is shown has been replaced since it was read; reads it again.
+  bool is_replaced();
+  Result<void> reload();
   // What is right of the wipe; of several bakes or environments the one by number.
   Result<void> compare_with(Against against, size_t bake = 1);
 
@@ -68,7 +91,8 @@ class Session {
 
   // A piece of work; false: there is nothing to do but what the path tracer does. `hurry`: hands are at it.
   Result<bool> work(bool hurry);
-  bool settled() const;  // nothing but the path tracer goes on
+  bool is_measuring() const { return live->is_measuring(); }  // what a look is made of
+  bool settled() const;                                       // nothing but the path tracer goes on
 
   // The picture as shown, left of the wipe; what it is compared with right of it, or how far both are apart.
   const Shown& shown();
@@ -102,18 +126,26 @@ class Session {
   Result<void> show(size_t bake);
   Result<void> ask(const DrawRequest& request);
   struct {
-    bool inserted = false;
+    enum class Of { inserted, placed, lamp } of = Of::placed;
     size_t index = 0;
     Vec3 at{0.0f};
   } held_ = {};
+  Result<void> move_held(Vec3 by);
   void restart_reference();
   void measure(bool settled);
+  Result<std::unique_ptr<Baked>> load(const std::string& path) const;
+  FilesInMemory in_memory_;
   Job job_;
+  std::filesystem::file_time_type written_ = {};
+  double looked_ = 0;  // at the disk
   Shown shown_;
   bool fresh_ = true, measured_ = false, light_changed_ = true;
   int seen_paths_ = 0;
   double last_exposure_ = 0;
 };
+
+// "sky:..." that gives this sky, as short as it can be.
+std::string sky_text(const SkyOptions& sky);
 
 // One action a line, as hands would: see docs/window.md. Errors: the line's number and what is wrong with it.
 struct Action {

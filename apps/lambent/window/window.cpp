@@ -14,6 +14,7 @@
 #include <fmt/format.h>
 #include <imgui.h>
 
+#include <algorithm>
 #include <chrono>
 #include <cmath>
 #include <cstdio>
@@ -39,6 +40,8 @@ struct Window {
   // Of a drag under way.
   enum class Drag { none, look, light, pan, wipe, object } drag = Drag::none;
   double x = 0, y = 0, last_input = 0;
+  double last_click = 0, click_x = 0, click_y = 0;
+  double played = -1;  // what moves by itself goes on since then; below 0: it stands
   int frames_due = 3;  // Dear ImGui settles in a few
   // Of the script.
   std::vector<Action> script = {};
@@ -81,8 +84,13 @@ void on_button(GLFWwindow* handle, int button, int action, int mods) {
                        std::abs(w.x - double(w.session.wipe) * w.picture_width()) < 6;
   if (mods & GLFW_MOD_CONTROL && button == GLFW_MOUSE_BUTTON_LEFT) {
     if (w.session.grab(w.place_of(w.x, w.y))) w.drag = Window::Drag::object;
-    else w.say(Error{"nothing to carry", "no object of --insert or --place is there"});
+    else w.say(Error{"nothing to carry", "no lamp that stands anywhere and no object of --insert or --place is there"});
     return;
+  }
+  if (const double now = window_clock(); button == GLFW_MOUSE_BUTTON_LEFT) {
+    const bool twice = now - w.last_click < 0.35 && std::hypot(w.x - w.click_x, w.y - w.click_y) < 4;
+    w.last_click = now, w.click_x = w.x, w.click_y = w.y;
+    if (twice) w.panel.material = w.session.material_at(w.place_of(w.x, w.y));
   }
   w.drag = at_wipe                                                      ? Window::Drag::wipe
          : button == GLFW_MOUSE_BUTTON_RIGHT || (mods & GLFW_MOD_SHIFT) ? Window::Drag::light
@@ -141,6 +149,8 @@ void on_key(GLFWwindow* handle, int key, int, int action, int mods) {
     case GLFW_KEY_S:
       if (auto ok = w.panel.save(w.session); !ok) w.say(ok);
       return;
+    case GLFW_KEY_F5: return w.say(w.session.reload());
+    case GLFW_KEY_SPACE: w.played = w.session.moves_by_itself() && w.played < 0 ? window_clock() : -1; return;
     case GLFW_KEY_F1: w.panel.help = !w.panel.help; return;
     case GLFW_KEY_ESCAPE: w.panel.help = false; return;
     case GLFW_KEY_Q:
@@ -166,6 +176,7 @@ Result<void> make_window(Window& w) {
                                  "); without --window the "
                                  "page is served to a browser"};
   glfwWindowHint(GLFW_CONTEXT_VERSION_MAJOR, 3), glfwWindowHint(GLFW_CONTEXT_VERSION_MINOR, 3);
+  glfwWindowHint(GLFW_CONTEXT_ROBUSTNESS, GLFW_LOSE_CONTEXT_ON_RESET);
   glfwWindowHint(GLFW_OPENGL_PROFILE, GLFW_OPENGL_CORE_PROFILE), glfwWindowHint(GLFW_OPENGL_FORWARD_COMPAT, 1);
   w.handle =
       glfwCreateWindow((*size)[0], (*size)[1], ("lambent: " + w.session.names.front()).c_str(), nullptr, nullptr);
@@ -196,7 +207,40 @@ void close_window(Window& w) {
     ImGui::DestroyContext();
   }
   if (w.handle) glfwDestroyWindow(w.handle);
+  w.handle = nullptr, w.texture = 0;
   glfwTerminate();
+}
+
+// After a context that was lost: another window at the same place.
+Result<void> reopen(Window& w) {
+  int width = 0, height = 0, x = 0, y = 0;
+  glfwGetWindowSize(w.handle, &width, &height), glfwGetWindowPos(w.handle, &x, &y);
+  close_window(w);
+  if (auto ok = make_window(w); !ok) return ok;
+  glfwSetWindowSize(w.handle, width, height), glfwSetWindowPos(w.handle, x, y);
+  w.frames_due = 3, w.drag = Window::Drag::none;
+  return {};
+}
+
+bool is_lost() {
+  constexpr GLenum context_lost = 0x0507;
+  return glGetError() == context_lost;
+}
+
+// Rings where lamps stand that have a place.
+void draw_lamps(const Window& w, float height) {
+  const std::vector<std::string> lamps = w.session.standing_lamps();
+  ImDrawList& list = *ImGui::GetBackgroundDrawList();
+  for (size_t i = 0; i < lamps.size(); ++i)
+    if (const auto at = w.session.lamp_in_picture(lamps[i])) {
+      const ImVec2 place(at->x * float(w.picture_width()), at->y * height);
+      list.AddCircle(place, 10, IM_COL32(0, 0, 0, 200), 0, 3.5f),
+          list.AddCircle(place, 10, IM_COL32(255, 210, 90, 255), 0, 1.5f);
+      const std::string number = fmt::format("{}", i + 1);
+      for (const float beside : {-1.0f, 1.0f})
+        list.AddText(ImVec2(place.x + 14 + beside, place.y - 6 + beside), IM_COL32(0, 0, 0, 255), number.c_str());
+      list.AddText(ImVec2(place.x + 14, place.y - 6), IM_COL32(255, 210, 90, 255), number.c_str());
+    }
 }
 
 void present(Window& w) {
@@ -214,6 +258,7 @@ void present(Window& w) {
   if (shown.width > 0)
     ImGui::GetBackgroundDrawList()->AddImage(reinterpret_cast<void*>(uintptr_t(w.texture)), ImVec2(0, 0),
                                              ImVec2(float(w.picture_width()), float(height)));
+  if (w.panel.open) draw_lamps(w, float(height));
   if (w.panel.open) draw_panel(w.panel, w.session, float(w.picture_width()), panel_width, float(height));
   draw_notices(w.panel, window_clock());
   ImGui::Render();
@@ -310,10 +355,10 @@ Result<void> act(Window& w, const Action& a) {
   if (a.verb == "pan") return two_numbers(a, [&](float x, float y) { return s.pan(x, y); });
   if (a.verb == "dolly") return two_numbers(a, [&](float x, float) { return s.dolly(x); });
   if (a.verb == "look") {
-    for (const Look look : {Look::picture, Look::receivers, Look::density, Look::coefficient})
-      if (choices_of(look_names)[size_t(look)] == word)
-        return two_numbers({a.verb, {a.words.size() > 1 ? a.words[1] : "0"}, a.line},
-                           [&](float k, float) { return s.look_as(look, int(k)); });
+    const std::vector<std::string> looks = choices_of(look_names);
+    if (const auto look = std::find(looks.begin(), looks.end(), word); look != looks.end())
+      return two_numbers({a.verb, {a.words.size() > 1 ? a.words[1] : "0"}, a.line},
+                         [&](float k, float) { return s.look_as(Look(look - looks.begin()), int(k)); });
     return Error{"look", std::string("must be one of ") + look_names, true};
   }
   if (a.verb == "compare") {
@@ -328,6 +373,13 @@ Result<void> act(Window& w, const Action& a) {
   if (a.verb == "wipe") return two_numbers(a, [&](float x, float) { return s.move_wipe(x), Result<void>(); });
   if (a.verb == "difference") return s.show_difference(word == "on"), Result<void>();
   if (a.verb == "drop") return s.drop(word);
+  if (a.verb == "reload") return s.reload();
+  if (a.verb == "reopen") return reopen(w);
+  if (a.verb == "lamp")
+    return two_numbers({a.verb, {word}, a.line}, [&](float k, float) {
+      if (!(k >= 1)) return Result<void>(Error{"lamp", "counts from 1", true});
+      return s.set_lamp(size_t(k) - 1, a.words.size() > 1 ? a.words[1] : "");
+    });
   if (a.verb == "settle") return settle(w);
   if (a.verb == "wait")
     return two_numbers(a, [&](float x, float) { return w.wait_until = window_clock() + double(x), Result<void>(); });
@@ -368,15 +420,25 @@ Result<void> loop(Window& w) {
   while (!glfwWindowShouldClose(w.handle) && !is_cancelled(w.job.progress)) {
     const bool traces = w.session.against == Against::reference;
     const bool scripted = w.next < w.script.size() || w.frames_left > 0;
-    if (busy || scripted || w.frames_due > 0 || !w.dropped.empty()) glfwPollEvents();
+    if (busy || scripted || w.played >= 0 || w.frames_due > 0 || !w.dropped.empty()) glfwPollEvents();
     else glfwWaitEventsTimeout(traces ? 0.2 : 1.0);
     for (const std::string& path : std::exchange(w.dropped, {})) w.say(w.session.drop(path));
     int width = 0, height = 0;
     glfwGetFramebufferSize(w.handle, &width, &height);
     if (width > 0 && height > 0) (void)w.session.resize(w.picture_width(), height);
+    if (w.session.is_replaced())
+      w.say(Error{w.session.names[w.session.shown_bake], "has been replaced on the disk: F5 shows it anew"});
+    if (is_lost()) {
+      if (auto ok = reopen(w); !ok) return ok;
+      w.say(Error{"OpenGL", "its context was lost, and made anew"});
+    }
     auto goes_on = run_script(w);
     if (!goes_on) return goes_on.error();
     if (!*goes_on) return {};
+    if (w.played >= 0) {
+      const double now = window_clock();
+      w.say(w.session.advance(now - w.played)), w.played = now;
+    }
     const bool hurry = window_clock() - w.last_input < rest;
     auto worked = w.session.work(hurry);
     if (!worked) return worked.error();

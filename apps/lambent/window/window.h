@@ -9,10 +9,10 @@ namespace lambent::tool {
 struct WindowOptions {
   bool window = false;
   std::vector<std::string> more;  // bakes to compare with
-  std::string script, size = "1280x800", brdf, method;
-  std::vector<std::string> insert, place, move;  // as for render
-  int spp = 16, light_order = 0;
+  std::string script, size = "1280x800";
+  DrawRequest draw;  // options of render that the page has not
   void add_to(CLI::App& command);
+  static bool takes(const std::string& option);  // of draw_options()
 };
 
 // Shows the session in a window of its own until it is closed or its script ends. Errors: no display, no OpenGL 3.3, a

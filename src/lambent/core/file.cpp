@@ -7,6 +7,7 @@
 #include <unistd.h>
 
 #include <algorithm>
+#include <atomic>
 #include <cctype>
 #include <cerrno>
 #include <cstring>
@@ -14,6 +15,8 @@
 
 namespace lambent {
 namespace {
+
+std::atomic<int> in_memory = 0;
 
 std::mutex logs_mutex;
 std::vector<ReadLog*> logs;
@@ -42,8 +45,15 @@ void ReadLog::note(const std::string& path, uint64_t device, uint64_t inode) {
   for (ReadLog* log : logs) log->files_.push_back({path, device, inode});
 }
 
+FilesInMemory::FilesInMemory() { ++in_memory; }
+FilesInMemory::~FilesInMemory() { --in_memory; }
+
 Result<MappedFile> MappedFile::open(const std::string& path) {
   MappedFile file;
+  if (in_memory > 0) {
+    auto bytes = read_file(path);
+    return bytes ? Result<MappedFile>(copy_of(*bytes)) : bytes.error();
+  }
   auto fd = open_plain_file(path, file.size_);
   if (!fd) return fd.error();
   if (file.size_ > 0) {
@@ -76,6 +86,7 @@ bool is_mappable(std::span<const MappedFile::Part> parts) {
 #ifdef __EMSCRIPTEN__  // where a mapping is a copy
   return false;
 #else
+  if (in_memory > 0) return false;
   const size_t page = size_t(::sysconf(_SC_PAGESIZE));
   return std::all_of(parts.begin(), parts.end(), [&](const MappedFile::Part& part) {
     return part.offset % page == 0 && (part.bytes % page == 0 || &part == &parts.back());

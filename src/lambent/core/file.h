@@ -33,6 +33,16 @@ class MappedFile {
   size_t size_ = 0;
 };
 
+// While one lives, files are read into memory where they would be mapped: who shows one for hours is not ended by
+// another program that cuts it short.
+class FilesInMemory {
+ public:
+  FilesInMemory();
+  ~FilesInMemory();
+  FilesInMemory(const FilesInMemory&) = delete;
+  FilesInMemory& operator=(const FilesInMemory&) = delete;
+};
+
 // Whole file as bytes. Errors: missing, a folder, unreadable.
 Result<std::vector<uint8_t>> read_file(const std::string& path);
 

@@ -39,10 +39,17 @@ Result<ProductMethod> parse_method(const std::string& text) {
       true};
 }
 
+Result<Reflection> block_reflection(const Scene& scene, const DrawRequest& request) {
+  auto reflection = parse_reflection(request.brdf.empty() ? "diffuse" : request.brdf);
+  if (!reflection) return reflection.error();
+  if (auto ok = parse_materials(request.material, scene, *reflection); !ok) return ok.error();
+  return reflection;
+}
+
 Result<BlockShading> make_block_shading(const Baked& baked, const DrawRequest& request) {
   auto method = parse_method(request.method);
   if (!method) return method.error();
-  auto reflection = parse_reflection(request.brdf.empty() ? "diffuse" : request.brdf);
+  auto reflection = block_reflection(baked.scene, request);
   if (!reflection) return reflection.error();
   const VertexPlacement* at = vertices_of(baked);
   if (!at) return Error{request.baked, "has visibility elsewhere than at vertices"};

@@ -23,6 +23,8 @@ struct BlockShading {
   size_t seen = 0;
   double project_seconds = 0, forms_seconds = 0, cull_seconds = 0, shade_seconds = 0;
 };
+// By --brdf and --material.
+Result<Reflection> block_reflection(const Scene& scene, const DrawRequest& request);
 Result<BlockShading> make_block_shading(const Baked& baked, const DrawRequest& request);
 
 // Warns of light that binary visibility shows steps under where `job` is given.

@@ -1,16 +1,10 @@
 #include <lambent/pipeline/draw_indirect.h>
 
-#include <lambent/bake/lamps.h>
-#include <lambent/bake/surfels.h>
 #include <lambent/core/parallel.h>
 #include <lambent/core/random.h>
 #include <lambent/core/sampling.h>
-#include <lambent/pipeline/draw_insert.h>
-#include <lambent/pipeline/draw_light.h>
-#include <lambent/pipeline/moving_lamps.h>
 #include <lambent/pipeline/text.h>
 #include <lambent/receivers/receivers.h>
-#include <lambent/relight/indirect.h>
 #include <lambent/scene/append.h>
 
 #include <fmt/format.h>
@@ -27,17 +21,15 @@ namespace {
 using Clock = std::chrono::steady_clock;
 double seconds_since(Clock::time_point start) { return std::chrono::duration<double>(Clock::now() - start).count(); }
 
-// Of a sphere: at a surfel, over its places; at a ray of a pixel.
-constexpr int lamp_samples = 8, pixel_samples = 2;
-// Places that a surfel is lit at; where a lamp is within a few spacings of it.
-constexpr size_t places_a_leaf = 4, places_near_a_lamp = 64;
-constexpr float near_a_lamp = 3;
-// Of what stands still, the scene's own lamps by group and the sky: rays towards them, and as many all around, at each
-// place of a surfel, once; at a ray of a pixel.
-constexpr int still_samples = 16, still_pixel_samples = 4;
+constexpr float near_a_lamp = 3;  // spacings
 constexpr uint32_t still_seed = 0x57111;
 
-// Repaints walls: the scene that is seen, and the albedos of surfels.
+}  // namespace
+
+bool StillLight::shines() const {
+  return std::any_of(scales.begin(), scales.end(), [](Vec3 s) { return largest(s) > 0; });
+}
+
 Result<void> repaint(const DrawRequest& request, Scene& scene, const Surfels& surfels, std::vector<Vec3>& albedos) {
   for (const std::string& text : request.albedo) {
     auto named = parse_named_color(text, "--albedo");
@@ -59,70 +51,15 @@ Result<void> repaint(const DrawRequest& request, Scene& scene, const Surfels& su
   return {};
 }
 
-// Light that does not move: of the scene's own lamps, and of the environment as it is turned.
-struct StillLight {
-  Surroundings around{};
-  std::optional<Environment> sky{};
-  Lamps lamps{};
-  std::vector<Vec3> scales{};     // by group
-  std::vector<Vec3> at_leaves{};  // direct
-  bool shines() const {
-    return std::any_of(scales.begin(), scales.end(), [](Vec3 s) { return largest(s) > 0; });
-  }
-};
+namespace {
 
-// A lamp that moves, and what it gave leaves where it stood last.
-struct LitLamp {
-  MovingLamp lamp;
-  std::vector<Vec3> at_leaves{};
-};
-
-// Objects put into the scene, over light in free space.
-struct Objects {
-  std::vector<std::shared_ptr<const InsertedObject>> made{};
-  Scene scene{};                   // with the one that was baked, which comes first
-  std::optional<Tracer> tracer{};  // of it
-  RelitScene lit{};                // alone
-  SpatialBasis basis{};            // of those
-  size_t first = 0;                // triangle in `scene`
-};
-
-struct IndirectDrawing {
-  const Baked& baked;
-  const DrawRequest& request;
-  const Job& job;
-  const IndirectTransfer& transfer;
-  Show show;
-  Scene scene{};  // repainted
-  Tracer tracer{};
-  float diagonal = 0;
-  StillLight still{};
-  std::vector<MovingLamp> lamps{};
-  std::vector<LampPath> paths{};
-  const SurfelSearch* search = nullptr;
-  std::vector<std::vector<SurfacePlace>> places{};  // of leaves
-  IndirectSolve solve{};
-  std::vector<LitLamp> lit{};  // the lamps
-  std::vector<Vec3> direct{};  // at surfels
-  Relit relit{};               // at receivers, where they are read
-  Objects objects{};
-  size_t evaluated = 0;  // lamps, in the last frame
-  double ray_seconds = 1e9, solve_seconds = 1e9, read_seconds = 1e9;
-
-  DirectionalKind directional() const { return directional_of(baked.surface); }
-  bool reads_receivers() const { return request.at == "receivers"; }
-  // What is seen.
-  const Scene& drawn() const { return objects.tracer ? objects.scene : scene; }
-  const Tracer& sight() const { return objects.tracer ? *objects.tracer : tracer; }
-};
-
-// Exit radiance of a white surface, by what stands still.
-Vec3 still_light(const IndirectDrawing& d, const Scene& scene, const Tracer& tracer, Vec3 origin, Vec3 normal,
-                 int samples, uint64_t key) {
+// Exit radiance of a white surface, by what stands still: what arrives, sample by sample.
+std::vector<LampLight>& still_light(const IndirectDrawing& d, const Scene& scene, const Tracer& tracer, Vec3 origin,
+                                    Vec3 normal, int samples, uint64_t key) {
   const StillLight& still = d.still;
-  if (!still.shines()) return Vec3(0.0f);
   thread_local std::vector<LampLight> arrived;
   arrived.clear();
+  if (!still.shines()) return arrived;
   const bool spreads = still.lamps.sky || !still.lamps.area.empty();
   const size_t rays = spreads ? size_t(samples) : 0;
   sample_lamps(scene, tracer, still.lamps, origin, normal, samples, rays, still_seed, key, arrived);
@@ -138,6 +75,10 @@ Vec3 still_light(const IndirectDrawing& d, const Scene& scene, const Tracer& tra
     if (lamp != none && emits(scene, scene.triangles[hit.triangle], hit.front))
       arrived.push_back(met_lamp(scene, still.lamps, lamp, hit, direction, local.z, samples, rays));
   }
+  return arrived;
+}
+
+Vec3 scaled_sum(const StillLight& still, const std::vector<LampLight>& arrived) {
   Vec3 sum(0.0f);
   for (const LampLight& l : arrived) sum += still.scales[l.group] * l.value;
   return sum;
@@ -147,48 +88,97 @@ bool is_near(const IndirectDrawing& d, size_t leaf, Vec3 lamp) {
   return length(d.transfer.surfels.positions[leaf] - lamp) < near_a_lamp * d.transfer.surfels.spacings.back();
 }
 
-// The mean over a leaf of what light(place's lifted origin, its normal, samples' share, key) gives.
-Vec3 mean_over_leaf(const IndirectDrawing& d, size_t leaf, bool near, auto light) {
+// Calls light(place's lifted origin, its normal, number of places, key) for the places of a leaf.
+size_t over_leaf(const IndirectDrawing& d, size_t leaf, bool near, const IndirectQuality& quality, auto light) {
   std::vector<SurfacePlace> many;
-  if (near) many = places_of_leaf(d.scene, d.tracer, d.transfer.surfels, *d.search, uint32_t(leaf), places_near_a_lamp);
+  near = near && quality.places_near > quality.places;
+  if (near)
+    many = places_of_leaf(d.scene, d.tracer, d.transfer.surfels, *d.search, uint32_t(leaf), quality.places_near);
   const std::vector<SurfacePlace>& places = near ? many : d.places[leaf];
-  Vec3 sum(0.0f);
-  for (size_t k = 0; k < places.size(); ++k) {
+  const size_t count = near ? places.size() : std::min(places.size(), quality.places);
+  for (size_t k = 0; k < count; ++k) {
     const Vec3 p = places[k].position, n = places[k].normal;
-    sum += light(p + n * receiver_lift(p, 0, d.diagonal), n, places.size(), hash64(leaf, k));
+    light(p + n * receiver_lift(p, 0, d.diagonal), n, count, hash64(leaf, k));
   }
-  return sum / float(places.size());
+  return count;
 }
 
-void light_leaves_once(IndirectDrawing& d) {
+}  // namespace
+
+Result<void> make_places(IndirectDrawing& d) {
+  auto tracer = Tracer::build(d.scene, d.job.progress);
+  if (!tracer) return tracer.error();
+  d.tracer = std::move(*tracer), d.diagonal = bounds(d.scene).diagonal();
+  d.search = std::make_unique<const SurfelSearch>(d.transfer.surfels, d.tracer, d.transfer.gather_level);
   const size_t leaves = d.transfer.surfels.count();
-  d.places.resize(leaves), d.still.at_leaves.assign(leaves, Vec3(0.0f));
-  ProgressStage stage(d.job.progress, "lighting", leaves);
+  d.places.resize(leaves), d.direct.assign(leaves, Vec3(0.0f));
+  ProgressStage stage(d.job.progress, "places", leaves);
   parallel_for(leaves, 64, [&](size_t begin, size_t end) {
-    for (size_t i = begin; i < end && !stage.cancelled(); ++i, stage.advance()) {
-      d.places[i] = places_of_leaf(d.scene, d.tracer, d.transfer.surfels, *d.search, uint32_t(i), places_a_leaf);
-      if (!d.still.shines()) continue;
+    for (size_t i = begin; i < end && !stage.cancelled(); ++i, stage.advance())
+      d.places[i] =
+          places_of_leaf(d.scene, d.tracer, d.transfer.surfels, *d.search, uint32_t(i), IndirectQuality().places);
+  });
+  if (stage.cancelled()) return Error{"", "cancelled"};
+  return {};
+}
+
+void light_leaves(IndirectDrawing& d, size_t first, size_t count, const IndirectQuality& quality,
+                  ProgressStage* stage) {
+  d.still.at_leaves.resize(d.transfer.surfels.count());
+  if (!d.still.shines()) return;
+  parallel_for(count, 64, [&](size_t begin, size_t end) {
+    for (size_t i = first + begin; i < first + end; ++i) {
+      if (stage && stage->cancelled()) return;
       const bool near = std::any_of(d.scene.lights.begin(), d.scene.lights.end(), [&](const PunctualLight& l) {
         return l.kind != PunctualLight::Kind::directional && is_near(d, i, l.position);
       });
-      d.still.at_leaves[i] = mean_over_leaf(d, i, near, [&](Vec3 origin, Vec3 normal, size_t, uint64_t key) {
-        return still_light(d, d.scene, d.tracer, origin, normal, still_samples, key);
+      std::vector<LampLight>& sums = d.still.at_leaves[i];
+      sums.clear();
+      const size_t places = over_leaf(d, i, near, quality, [&](Vec3 origin, Vec3 normal, size_t, uint64_t key) {
+        for (const LampLight& l : still_light(d, d.scene, d.tracer, origin, normal, quality.still_samples, key)) {
+          auto sum = std::find_if(sums.begin(), sums.end(), [&](const LampLight& s) { return s.group == l.group; });
+          if (sum == sums.end()) sums.push_back({l.group, normal, l.value});
+          else sum->value += l.value;
+        }
       });
+      for (LampLight& sum : sums) sum.value /= float(places);
+      if (stage) stage->advance();
     }
   });
 }
 
+namespace {
+
 // Direct light of a leaf by a lamp that moves.
-Vec3 direct_at_leaf(const IndirectDrawing& d, const MovingLamp& lamp, size_t leaf) {
+Vec3 direct_at_leaf(const IndirectDrawing& d, const MovingLamp& lamp, size_t leaf, const IndirectQuality& quality) {
   const bool near = lamp.kind != MovingLamp::Kind::sun && is_near(d, leaf, lamp.light.position);
-  return mean_over_leaf(d, leaf, near, [&](Vec3 origin, Vec3 normal, size_t places, uint64_t key) {
-    return direct_light(d.tracer, {&lamp, 1}, origin, normal, std::max(lamp_samples / int(places), 1), key);
+  Vec3 sum(0.0f);
+  const size_t count = over_leaf(d, leaf, near, quality, [&](Vec3 origin, Vec3 normal, size_t places, uint64_t key) {
+    sum += direct_light(d.tracer, {&lamp, 1}, origin, normal, std::max(quality.lamp_samples / int(places), 1), key);
+  });
+  return sum / float(count);
+}
+
+Vec3 still_at_leaf(const IndirectDrawing& d, size_t leaf) {
+  return d.still.at_leaves.empty() ? Vec3(0.0f) : scaled_sum(d.still, d.still.at_leaves[leaf]);
+}
+
+}  // namespace
+
+void sum_direct(IndirectDrawing& d, size_t first, size_t count, const IndirectQuality& quality) {
+  parallel_for(count, 128, [&](size_t begin, size_t end) {
+    for (size_t i = first + begin; i < first + end; ++i) {
+      d.direct[i] = still_at_leaf(d, i);
+      for (const MovingLamp& lamp : d.lamps) d.direct[i] += direct_at_leaf(d, lamp, i, quality);
+    }
   });
 }
 
-// Direct light at surfels: of lamps that stand where they stood it is known, and their lights add up.
-void light_leaves(IndirectDrawing& d) {
-  d.direct = d.still.at_leaves;
+namespace {
+
+// All direct light at leaves: of lamps that stand where they stood it is known, and their lights add up.
+void light_lamps(IndirectDrawing& d) {
+  for (size_t i = 0; i < d.direct.size(); ++i) d.direct[i] = still_at_leaf(d, i);
   d.lit.resize(d.lamps.size()), d.evaluated = 0;
   for (size_t k = 0; k < d.lamps.size(); ++k) {
     LitLamp& lit = d.lit[k];
@@ -199,7 +189,7 @@ void light_leaves(IndirectDrawing& d) {
     d.evaluated += !stood;
     parallel_for(d.direct.size(), 128, [&](size_t begin, size_t end) {
       for (size_t i = begin; i < end; ++i) {
-        if (!stood) lit.at_leaves[i] = direct_at_leaf(d, lamp, i);
+        if (!stood) lit.at_leaves[i] = direct_at_leaf(d, lamp, i, {});
         d.direct[i] += lit.at_leaves[i];
       }
     });
@@ -207,18 +197,17 @@ void light_leaves(IndirectDrawing& d) {
 }
 
 // Direct light at surfels, and the bounces that follow, from where the frame before had come; fastest times are kept.
-void light_surfels(IndirectDrawing& d, bool first) {
+void light_surfels(IndirectDrawing& d, DirectionalKind directional, bool first) {
   auto start = Clock::now();
-  light_leaves(d);
-  d.ray_seconds = std::min(d.ray_seconds, seconds_since(start));
-  start = Clock::now();
+  light_lamps(d);
+  d.ray_seconds = std::min(d.ray_seconds, seconds_since(start)), start = Clock::now();
   if (d.request.frame_bounces == 0) solve_indirect(d.transfer, d.solve, d.direct, 1e-3, 64, !first);
   else if (first) std::fill(d.solve.x.begin(), d.solve.x.end(), Vec3(0.0f));
   for (int k = 0; k < d.request.frame_bounces; ++k) step_indirect(d.transfer, d.solve, d.direct);
   d.solve_seconds = std::min(d.solve_seconds, seconds_since(start)), start = Clock::now();
-  const bool directional = d.directional() != DirectionalKind::none;
-  if (directional || !d.objects.made.empty()) send_indirect(d.transfer, d.solve, d.direct);
-  if (directional) read_directional_indirect(d.transfer, d.solve, d.directional(), d.relit);
+  const bool directed = directional != DirectionalKind::none;
+  if (directed || !d.objects.made.empty()) send_indirect(d.transfer, d.solve, d.direct);
+  if (directed) read_directional_indirect(d.transfer, d.solve, directional, d.relit);
   else read_indirect(d.transfer, d.solve, d.relit);
   d.read_seconds = std::min(d.read_seconds, seconds_since(start));
 }
@@ -232,14 +221,14 @@ void warn_of_dark_lamps(const IndirectDrawing& d) {
 // Objects of --insert, each baked alone; the scene knows nothing of them but what the eye and shadow rays see.
 Result<void> make_objects(IndirectDrawing& d) {
   for (const std::string& text : d.request.insert) {
-    auto insertion = parse_insertion(text, d.baked.scene.origin);
+    auto insertion = parse_insertion(text, d.scene.origin);
     if (!insertion) return insertion.error();
     const IndirectLattice& f = *d.transfer.lattice;
     auto made = make_inserted(*insertion, f.lattice, f.order, d.job);
     if (!made) return made.error();
     d.objects.made.push_back(std::move(*made));
   }
-  Objects& o = d.objects;
+  ObjectsInScene& o = d.objects;
   if (o.made.empty()) return {};
   o.scene = d.scene, o.first = d.scene.triangles.size();
   for (const auto& object : o.made) append_scene(o.scene, object->scene);
@@ -251,7 +240,7 @@ Result<void> make_objects(IndirectDrawing& d) {
 }
 
 Result<void> light_objects(IndirectDrawing& d) {
-  Objects& o = d.objects;
+  ObjectsInScene& o = d.objects;
   if (o.made.empty()) return {};
   Relit free_space;
   read_lattice_indirect(d.transfer, d.solve, free_space);
@@ -263,6 +252,12 @@ Result<void> light_objects(IndirectDrawing& d) {
       return ok;
   o.basis = corner_receivers(o.lit.scene, o.lit.front, o.lit.back);
   return {};
+}
+
+Vec3 read_surfels(const IndirectDrawing& d, const Kernels& k) {
+  Vec3 light(0.0f);
+  for (size_t i = 0; i < k.count; ++i) light += k.weight[i] * d.solve.x[k.surfel[i]];
+  return max(light, Vec3(0.0f));
 }
 
 // A lamp that the eye sees before anything else: its radiance.
@@ -289,75 +284,47 @@ Vec3 glow(const IndirectDrawing& d, const Hit& hit) {
   return d.still.scales[d.still.lamps.area[lamp].group] * emission(d.drawn(), triangle, hit.u, hit.v);
 }
 
-// Light that has bounced, as if what was hit were white.
-using IndirectShade = std::function<Vec3(const Hit&, Vec3 direction, const SurfacePlace&)>;
-std::function<IndirectShade()> indirect_shade(const IndirectDrawing& d, const RenderOptions& white,
-                                              const RenderOptions& diffuse) {
-  return [&]() -> IndirectShade {
-    const SurfaceShade at_receivers = d.reads_receivers() ? relit_shade(d.scene, d.baked.basis, d.relit, white)()
-                                                          : SurfaceShade();
-    const SurfaceShade at_objects =
-        d.objects.tracer ? relit_shade(d.objects.lit.scene, d.objects.basis, d.objects.lit.relit, diffuse)()
-                         : SurfaceShade();
-    return [&d, at_receivers, at_objects](const Hit& hit, Vec3 direction, const SurfacePlace& at) {
-      if (at_objects && hit.triangle >= d.objects.first) {
-        Hit own = hit;
-        own.triangle -= uint32_t(d.objects.first);
-        return at_objects(own, direction);
-      }
-      if (at_receivers) return at_receivers(hit, direction);
-      const Kernels k = d.search->kernels(at);
-      Vec3 light(0.0f);
-      for (size_t i = 0; i < k.count; ++i) light += k.weight[i] * d.solve.x[k.surfel[i]];
-      return max(light, Vec3(0.0f));
-    };
-  };
-}
+}  // namespace
 
-Result<Image> shade(const IndirectDrawing& d, const View& view) {
-  const RenderOptions options{view.width, view.height, d.request.spp, d.still.around.background(), d.show.colour};
-  RenderOptions white = options, diffuse = options;
-  white.show = diffuse.show = RenderOptions::Show::radiosity, white.directional = d.directional();
+Kernels kernels_at(const IndirectDrawing& d, const Hit& hit) { return d.search->kernels(surface_place(d.scene, hit)); }
+
+Vec3 shade_indirect(const IndirectDrawing& d, Vec3 eye, const IndirectQuality& quality, const Hit& hit, Vec3 direction,
+                    const Kernels* kernels, const Bounced& bounced) {
+  using Colour = RenderOptions::Show;
   const bool shows_direct = d.show.part != Show::Part::indirect, shows_indirect = d.show.part != Show::Part::direct;
-  const auto make_indirect = indirect_shade(d, white, diffuse);
   const Scene& scene = d.drawn();
-  return render_surfaces(
-      scene, d.sight(), view.camera, options,
-      [&]() -> SurfaceShade {
-        return [&, indirect = make_indirect()](const Hit& hit, Vec3 direction) {
-          const Triangle& triangle = scene.triangles[hit.triangle];
-          if (options.show == RenderOptions::Show::albedo) return albedo(scene, triangle, hit.u, hit.v);
-          if (shows_direct)
-            if (const auto lamp = seen_lamp(d, view.camera.eye, direction, hit.distance)) return *lamp;
-          const SurfacePlace at = surface_place(scene, hit);
-          Vec3 light(0.0f);
-          if (shows_indirect) light += indirect(hit, direction, at);
-          if (shows_direct) {
-            const Vec3 face = unit_normal(scene, triangle, at.normal);
-            const Vec3 origin = at.position + (hit.front ? face : -face) * receiver_lift(at.position, 0, d.diagonal);
-            const uint64_t key =
-                hash64(uint64_t(std::bit_cast<uint32_t>(hit.u)) << 32 | std::bit_cast<uint32_t>(hit.v), hit.triangle);
-            light += direct_light(d.sight(), d.lamps, origin, at.normal, pixel_samples, key) +
-                     still_light(d, scene, d.sight(), origin, at.normal, still_pixel_samples, key);
-          }
-          if (options.show != RenderOptions::Show::product) return light;
-          const Vec3 sent = shows_direct ? glow(d, hit) : Vec3(0.0f);
-          return albedo(scene, triangle, hit.u, hit.v) * light + sent;
-        };
-      },
-      d.job.progress);
+  const Triangle& triangle = scene.triangles[hit.triangle];
+  if (d.show.colour == Colour::albedo) return albedo(scene, triangle, hit.u, hit.v);
+  if (shows_direct)
+    if (const auto lamp = seen_lamp(d, eye, direction, hit.distance)) return *lamp;
+  const SurfacePlace at = surface_place(scene, hit);
+  Vec3 light(0.0f);
+  if (shows_indirect && bounced) {
+    light += bounced(hit, direction, at);
+  } else if (shows_indirect) {
+    light = read_surfels(d, kernels ? *kernels : d.search->kernels(at));
+  }
+  if (shows_direct) {
+    const Vec3 face = unit_normal(scene, triangle, at.normal);
+    const Vec3 origin = at.position + (hit.front ? face : -face) * receiver_lift(at.position, 0, d.diagonal);
+    const uint64_t key =
+        hash64(uint64_t(std::bit_cast<uint32_t>(hit.u)) << 32 | std::bit_cast<uint32_t>(hit.v), hit.triangle);
+    light += direct_light(d.sight(), d.lamps, origin, at.normal, quality.pixel_samples, key) +
+             scaled_sum(d.still, still_light(d, scene, d.sight(), origin, at.normal, quality.still_pixel_samples, key));
+  }
+  if (d.show.colour != Colour::product) return light;
+  const Vec3 sent = shows_direct ? glow(d, hit) : Vec3(0.0f);
+  return albedo(scene, triangle, hit.u, hit.v) * light + sent;
 }
 
-// Lamps that stand anywhere, and what the scene's own are scaled by.
+void set_sky(IndirectDrawing& d, std::optional<Environment> turned) {
+  d.still.sky = std::move(turned), d.still.at_leaves.clear();
+  d.still.lamps = make_lamps(d.scene, d.still.sky ? &*d.still.sky : nullptr, true);
+}
+
 Result<void> read_lamps(IndirectDrawing& d) {
-  auto around = surroundings_of(d.request, d.job);
-  if (!around) return around.error();
   StillLight& still = d.still;
-  still.around = std::move(*around);
-  if (still.around.env)
-    still.sky = d.request.env_rotate.empty() ? *still.around.env : rotated(*still.around.env, still.around.rotation);
-  still.lamps = make_lamps(d.scene, still.sky ? &*still.sky : nullptr, true);
-  still.scales.assign(still.lamps.groups(), Vec3(1.0f));
+  std::vector<Vec3> scales(still.lamps.groups(), Vec3(1.0f));
   std::vector<std::string> moving;
   for (const std::string& text : d.request.lamp) {
     if (names_moving_lamp(text)) {
@@ -373,20 +340,57 @@ Result<void> read_lamps(IndirectDrawing& d) {
                        (still.lamps.names.empty() ? "none" : fmt::format("{}", fmt::join(still.lamps.names, ", "))) +
                        "; or it is " + moving_lamp_syntax,
                    true};
-    still.scales[size_t(group - still.lamps.names.begin())] = named->color;
+    scales[size_t(group - still.lamps.names.begin())] = named->color;
   }
   auto lamps = parse_moving_lamps(moving, d.scene.origin);
   if (!lamps) return lamps.error();
-  d.lamps = std::move(*lamps);
-  if (d.lamps.empty() && still.lamps.groups() == 0 && d.show.colour != RenderOptions::Show::albedo)
+  if (lamps->empty() && still.lamps.groups() == 0 && d.show.colour != RenderOptions::Show::albedo)
     return Error{"--lamp", "or --env is needed to light the scene, which has no lamp of its own: e.g. point@0,2,0=10",
                  true};
+  std::vector<LampPath> paths;
   for (const std::string& text : d.request.move) {
-    auto path = parse_lamp_path(text, d.lamps, d.scene.origin);
+    auto path = parse_lamp_path(text, *lamps, d.scene.origin);
     if (!path) return path.error();
-    d.paths.push_back(std::move(*path));
+    paths.push_back(std::move(*path));
   }
+  still.scales = std::move(scales), d.lamps = std::move(*lamps), d.paths = std::move(paths);
   return {};
+}
+
+Scene scene_with_lamps(const IndirectDrawing& d) {
+  Scene scene = d.scene;
+  const std::vector<std::string>& names = d.still.lamps.names;
+  const auto scale = [&](const std::string& name) {
+    const auto group = std::find(names.begin(), names.end(), name);
+    return group == names.end() ? Vec3(1.0f) : d.still.scales[size_t(group - names.begin())];
+  };
+  for (Material& m : scene.materials) m.emissive = scale(m.name) * m.emissive;
+  for (PunctualLight& l : scene.lights) l.intensity = scale(l.name) * l.intensity;
+  add_lamps(scene, d.lamps);
+  return scene;
+}
+
+namespace {
+
+// Where light that has bounced is not read off surfels at the pixel: at receivers, as the file has them, and on
+// objects.
+Bounced bounced_light(const IndirectDrawing& d, const Baked& baked, RenderOptions options) {
+  options.show = RenderOptions::Show::radiosity;
+  const SurfaceShade at_objects = d.objects.tracer
+                                    ? relit_shade(d.objects.lit.scene, d.objects.basis, d.objects.lit.relit, options)()
+                                    : SurfaceShade();
+  options.directional = directional_of(baked.surface);
+  const SurfaceShade at_receivers = d.request.at == "receivers" ? relit_shade(d.scene, baked.basis, d.relit, options)()
+                                                                : SurfaceShade();
+  if (!at_objects && !at_receivers) return {};
+  return [&d, at_receivers, at_objects](const Hit& hit, Vec3 direction, const SurfacePlace& at) {
+    if (at_objects && hit.triangle >= d.objects.first) {
+      Hit own = hit;
+      own.triangle -= uint32_t(d.objects.first);
+      return at_objects(own, direction);
+    }
+    return at_receivers ? at_receivers(hit, direction) : read_surfels(d, d.search->kernels(at));
+  };
 }
 
 }  // namespace
@@ -394,8 +398,14 @@ Result<void> read_lamps(IndirectDrawing& d) {
 Result<Drawing> draw_indirect(const Baked& baked, const DrawRequest& request, const Job& job) {
   auto show = parse_show(request.show);
   if (!show) return show.error();
-  IndirectDrawing d{baked, request, job, std::get<IndirectTransfer>(baked.surface.store), *show};
-  d.scene = baked.scene, d.diagonal = bounds(d.scene).diagonal();
+  const DirectionalKind directional = directional_of(baked.surface);
+  IndirectDrawing d{request, job, std::get<IndirectTransfer>(baked.surface.store), *show};
+  d.scene = baked.scene;
+  auto around = surroundings_of(request, job);
+  if (!around) return around.error();
+  std::optional<Environment> sky = around->env;
+  if (sky && !request.env_rotate.empty()) sky = rotated(*sky, around->rotation);
+  set_sky(d, std::move(sky));
   if (auto ok = read_lamps(d); !ok) return ok.error();
   std::vector<double> times{request.time};
   if (!request.frames.empty()) {
@@ -407,22 +417,30 @@ Result<Drawing> draw_indirect(const Baked& baked, const DrawRequest& request, co
   if (!view) return view.error();
   std::vector<Vec3> albedos = d.transfer.surfels.albedos;
   if (auto ok = repaint(request, d.scene, d.transfer.surfels, albedos); !ok) return ok.error();
-  auto tracer = Tracer::build(d.scene, job.progress);
-  if (!tracer) return tracer.error();
-  d.tracer = std::move(*tracer);
-  const SurfelSearch search(d.transfer.surfels, d.tracer, d.transfer.gather_level);
-  d.search = &search;
-  light_leaves_once(d);
+  if (auto ok = make_places(d); !ok) return ok.error();
+  const size_t leaves = d.transfer.surfels.count();
+  {
+    ProgressStage stage(job.progress, "lighting", leaves);
+    light_leaves(d, 0, leaves, {}, &stage);
+  }
   if (is_cancelled(job.progress)) return Error{"", "cancelled"};
   d.solve = make_indirect_solve(d.transfer, albedos);
   if (auto ok = make_objects(d); !ok) return ok.error();
+  const RenderOptions options{view->width, view->height, request.spp, around->background(), show->colour};
   Drawing drawing;
   for (double time : times) {
     for (const LampPath& path : d.paths) move_lamp(d.lamps, path, time);
-    light_surfels(d, drawing.frames.empty());
+    light_surfels(d, directional, drawing.frames.empty());
     if (auto ok = light_objects(d); !ok) return ok.error();
     if (drawing.frames.empty()) warn_of_dark_lamps(d);
-    auto image = shade(d, *view);
+    auto image = render_surfaces(
+        d.drawn(), d.sight(), view->camera, options,
+        [&]() -> SurfaceShade {
+          return [&, bounced = bounced_light(d, baked, options)](const Hit& hit, Vec3 direction) {
+            return shade_indirect(d, view->camera.eye, {}, hit, direction, nullptr, bounced);
+          };
+        },
+        job.progress);
     if (!image) return image.error();
     drawing.frames.push_back(std::move(*image));
   }

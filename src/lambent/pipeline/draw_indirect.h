@@ -1,11 +1,110 @@
 #pragma once
 // Drawing direct-to-indirect transport: lamps of the request light the scene, sharply at the pixel; what they send on
-// is read there from surfels.
+// is read there from surfels. Step by step, for who draws frame after frame (live_indirect.h).
+#include <lambent/bake/lamps.h>
+#include <lambent/bake/surfels.h>
 #include <lambent/pipeline/draw.h>
+#include <lambent/pipeline/draw_insert.h>
+#include <lambent/pipeline/draw_light.h>
+#include <lambent/pipeline/moving_lamps.h>
+#include <lambent/relight/indirect.h>
 
 namespace lambent {
 
 // draw() of such a file.
 Result<Drawing> draw_indirect(const Baked& baked, const DrawRequest& request, const Job& job);
+
+// How closely light is looked at.
+struct IndirectQuality {
+  // Places that a leaf is lit at; where a lamp is within a few spacings of it.
+  size_t places = 4, places_near = 64;
+  // Rays towards a sphere: over a leaf's places; at a ray of a pixel.
+  int lamp_samples = 8, pixel_samples = 2;
+  // Rays towards what stands still, the scene's own lamps by group and the sky, and as many all around: at each place
+  // of a leaf; at a ray of a pixel.
+  int still_samples = 16, still_pixel_samples = 4;
+};
+// Of a picture that moves.
+inline constexpr IndirectQuality hurried_indirect{1, 1, 1, 1, 2, 1};
+
+// Light that does not move: of the scene's own lamps, and of the environment as it is turned.
+struct StillLight {
+  std::optional<Environment> sky{};  // turned
+  Lamps lamps{};
+  std::vector<Vec3> scales{};                       // by group
+  std::vector<std::vector<LampLight>> at_leaves{};  // direct, a sum for each group that arrives
+  bool shines() const;
+};
+
+// A lamp that moves, and what it gave leaves where it stood last.
+struct LitLamp {
+  MovingLamp lamp;
+  std::vector<Vec3> at_leaves{};
+};
+
+// Objects put into the scene, over light in free space.
+struct ObjectsInScene {
+  std::vector<std::shared_ptr<const InsertedObject>> made{};
+  Scene scene{};                   // with the one that was baked, which comes first
+  std::optional<Tracer> tracer{};  // of it
+  RelitScene lit{};                // alone
+  SpatialBasis basis{};            // of those
+  size_t first = 0;                // triangle in `scene`
+};
+
+// A drawing under way. What it is made of must outlive it.
+struct IndirectDrawing {
+  const DrawRequest& request;
+  const Job& job;
+  const IndirectTransfer& transfer;
+  Show show;
+  Scene scene{};  // repainted
+  Tracer tracer{};
+  float diagonal = 0;
+  StillLight still{};
+  std::vector<MovingLamp> lamps{};
+  std::vector<LampPath> paths{};
+  std::unique_ptr<const SurfelSearch> search{};
+  std::vector<std::vector<SurfacePlace>> places{};  // of leaves
+  IndirectSolve solve{};
+  std::vector<LitLamp> lit{};  // the lamps
+  std::vector<Vec3> direct{};  // at surfels
+  Relit relit{};               // at receivers, where they are read
+  ObjectsInScene objects{};
+  size_t evaluated = 0;  // lamps, in the last frame
+  double ray_seconds = 1e9, solve_seconds = 1e9, read_seconds = 1e9;
+
+  // What is seen.
+  const Scene& drawn() const { return objects.tracer ? objects.scene : scene; }
+  const Tracer& sight() const { return objects.tracer ? *objects.tracer : tracer; }
+};
+
+// The environment that shines from afar, or none: turned already. Then nothing is known of what arrives at leaves.
+void set_sky(IndirectDrawing& d, std::optional<Environment> turned);
+// Lamps of the request: where they stand anywhere, and what the scene's own are scaled by, whose names set_sky() has
+// found. Errors name the option; no light at all.
+Result<void> read_lamps(IndirectDrawing& d);
+// Repaints walls: the scene that is seen, and the albedos of surfels. Errors name --albedo.
+Result<void> repaint(const DrawRequest& request, Scene& scene, const Surfels& surfels, std::vector<Vec3>& albedos);
+// Tracer, search, and the places of leaves, for d.scene. Errors: those of Tracer::build(); cancelled.
+Result<void> make_places(IndirectDrawing& d);
+
+// What stands still, at leaves [first, first + count): kept by group, so that lamps are scaled without a ray.
+void light_leaves(IndirectDrawing& d, size_t first, size_t count, const IndirectQuality& quality,
+                  ProgressStage* stage = nullptr);
+// All direct light at leaves [first, first + count), into d.direct.
+void sum_direct(IndirectDrawing& d, size_t first, size_t count, const IndirectQuality& quality);
+
+// Light that has bounced, as if what was hit were white.
+using Bounced = std::function<Vec3(const Hit&, Vec3 direction, const SurfacePlace&)>;
+// What a ray of a pixel meets sends towards the eye. `kernels`: what its place reads, where that is known; `bounced`:
+// where light is not read off surfels.
+Vec3 shade_indirect(const IndirectDrawing& d, Vec3 eye, const IndirectQuality& quality, const Hit& hit, Vec3 direction,
+                    const Kernels* kernels = nullptr, const Bounced& bounced = {});
+// The place at a hit, and what it reads there.
+Kernels kernels_at(const IndirectDrawing& d, const Hit& hit);
+
+// The scene as the path tracer is to see it: lamps that stand anywhere in it, its own scaled.
+Scene scene_with_lamps(const IndirectDrawing& d);
 
 }  // namespace lambent

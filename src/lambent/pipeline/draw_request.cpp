@@ -71,6 +71,9 @@ const Option<R> table[] = {
      "metallic-roughness), or one model for all, as `bake --brdf` takes it; for bakes that kept incident light, and "
      "blocks",
      0, 0, nullptr, nullptr, true, true},
+    {"material", &R::material, "What is shown", K,
+     "NAME=BRDF: another model for that material of the scene, as --brdf takes one for all; NAME=textured:BRDF: its "
+     "diffuse colour times the base colour, with textures; may be given again"},
     {"insert", &R::insert, "What is shown", D | C | Z | M | I,
      "FILE@X,Y,Z[,SCALE]: put a small diffuse object there, lit by the scene's lattice; may be given again"},
     {"place", &R::place, "What is shown", D,

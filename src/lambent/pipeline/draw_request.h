@@ -21,7 +21,7 @@ struct DrawRequest {
   // What is shown
   std::string show = "product";
   std::string brdf;  // "": as baked; of blocks, which know none, diffuse
-  std::vector<std::string> insert, albedo, place;
+  std::vector<std::string> insert, albedo, place, material;
   std::string at = "pixels";
   // Motion
   std::string animation, frames, deform;

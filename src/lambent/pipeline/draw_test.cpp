@@ -224,10 +224,11 @@ TEST_F(Drawings, NoOptionIsLeftAsideInSilence) {
             else if constexpr (std::is_same_v<T, std::vector<std::string>>)
               request.*member = {option_name == "lamp"
                                      ? kind == DrawKind::indirect ? "spot@1,1,1,1,0,1,50=3,2,1" : "lamp=0.1,0.2,0.5"
-                                 : option_name == "move"   ? "1@0:1,1.2,1"
-                                 : option_name == "albedo" ? "red=0.1,0.2,0.9"
-                                 : option_name == "insert" ? at("pyramid.obj") + "@1,0.1,1,0.8"
-                                                           : "1,2,2,0.5,9,8,7"};
+                                 : option_name == "move"     ? "1@0:1,1.2,1"
+                                 : option_name == "albedo"   ? "red=0.1,0.2,0.9"
+                                 : option_name == "material" ? "red=phong:exponent=40,diffuse=0.1,specular=0.8"
+                                 : option_name == "insert"   ? at("pyramid.obj") + "@1,0.1,1,0.8"
+                                                             : "1,2,2,0.5,9,8,7"};
             else if constexpr (!std::is_same_v<T, bool>) request.*member = T(other_numbers.at(option_name));
           },
           option.member);

@@ -1,10 +1,7 @@
 #include <lambent/pipeline/draw_texture.h>
 
-#include <lambent/pipeline/draw_light.h>
 #include <lambent/pipeline/motion.h>
 #include <lambent/pipeline/relief.h>
-#include <lambent/relight/relighter.h>
-#include <lambent/render/transfer_texture.h>
 #include <lambent/scene/displace.h>
 #include <lambent/scene/load.h>
 
@@ -13,7 +10,6 @@
 #include <memory>
 
 namespace lambent {
-namespace {
 
 Result<TextureUse> texture_use(const DrawRequest& request, const ZonalTexture& texture, const Job& job) {
   auto tile = parse_numbers(request.tile, 2, "--tile");
@@ -38,14 +34,6 @@ Result<TextureUse> texture_use(const DrawRequest& request, const ZonalTexture& t
   return use;
 }
 
-// The mesh, and the light that arrives at it where its bake knows that.
-struct TexturedScene {
-  Scene scene;
-  std::optional<ArrivingLight> arriving, peaks;
-  CornerReceivers corners;
-};
-
-// Why what was baked cannot light the relief; empty where it can.
 std::string cannot_light(const Baked& baked, const DrawRequest& request) {
   const Outgoing* outgoing = outgoing_of(baked.surface);
   if (!outgoing || outgoing->kind != OutgoingKind::map || !vertices_of(baked))
@@ -54,22 +42,39 @@ std::string cannot_light(const Baked& baked, const DrawRequest& request) {
   return "";
 }
 
-Result<void> add_arriving(const Baked& baked, const DrawRequest& request, const Surroundings& around,
-                          TexturedScene& out) {
+Result<ArrivingParts> relight_arriving(Relighter& relighter, const Baked& baked, const DrawRequest& request,
+                                       const Surroundings& around) {
   auto light = column_light(request, around, light_of(baked.surface.store), baked.scene.origin);
   if (!light) return light.error();
   soften_peaks(*light);
-  auto relighter = Relighter::make(baked.surface);
-  if (!relighter) return Error{request.baked, relighter.error().message};
+  ArrivingParts out;
   for (const auto& [part, arriving] :
-       {std::pair(&light->projection.light, &out.arriving), std::pair(&light->peaks, &out.peaks)}) {
+       {std::pair(&light->projection.light, &out.all), std::pair(&light->peaks, &out.peaks)}) {
     if (part->empty()) continue;
     Relit rows;
-    if (auto ok = relighter->set_light(*part); !ok) return Error{request.baked, ok.error().message};
-    if (auto ok = relighter->relight({}, rows); !ok) return Error{request.baked, ok.error().message};
+    if (auto ok = relighter.set_light(*part); !ok) return Error{request.baked, ok.error().message};
+    if (auto ok = relighter.relight({}, rows); !ok) return Error{request.baked, ok.error().message};
     *arriving = arriving_light(rows, *outgoing_of(baked.surface));
   }
-  out.corners = std::get<CornerReceivers>(baked.basis);
+  return out;
+}
+
+namespace {
+
+// The mesh, and the light that arrives at it where its bake knows that.
+struct TexturedScene {
+  Scene scene;
+  ArrivingParts arriving;
+  CornerReceivers corners;
+};
+
+Result<void> add_arriving(const Baked& baked, const DrawRequest& request, const Surroundings& around,
+                          TexturedScene& out) {
+  auto relighter = Relighter::make(baked.surface);
+  if (!relighter) return Error{request.baked, relighter.error().message};
+  auto arriving = relight_arriving(*relighter, baked, request, around);
+  if (!arriving) return arriving.error();
+  out.arriving = std::move(*arriving), out.corners = std::get<CornerReceivers>(baked.basis);
   return {};
 }
 
@@ -114,8 +119,8 @@ Result<Drawing> draw_texture(const DrawRequest& request, const Job& job) {
   if (!light) return light.error();
   const LocalLight local = light->local();
   std::optional<ArrivingAt> arriving;
-  if (loaded->arriving)
-    arriving.emplace(ArrivingAt{*loaded->arriving, loaded->corners, loaded->peaks ? &*loaded->peaks : nullptr});
+  if (const ArrivingParts& parts = loaded->arriving; parts.all)
+    arriving.emplace(ArrivingAt{*parts.all, loaded->corners, parts.peaks ? &*parts.peaks : nullptr});
   Drawing drawing;
   Result<View> view = Error{};
   for (const std::optional<Pose>& pose : *poses) {
@@ -132,7 +137,7 @@ Result<Drawing> draw_texture(const DrawRequest& request, const Job& job) {
   }
   drawing.summary.json = {{"texels", texture->transfer.receivers},
                           {"frames", drawing.frames.size()},
-                          {"arriving_order", loaded->arriving ? loaded->arriving->order : 0}};
+                          {"arriving_order", loaded->arriving.all ? loaded->arriving.all->order : 0}};
   drawing.summary.lines.emplace_back(
       "texture", fmt::format("{} x {} {} of {} lobes", texture->width, texture->height,
                              texture->groove_depth > 0 ? "grooves" : "texels", texture->transfer.lobes));

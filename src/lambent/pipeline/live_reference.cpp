@@ -2,6 +2,7 @@
 
 #include <lambent/light/project.h>
 #include <lambent/pipeline/bake_request.h>
+#include <lambent/pipeline/draw_blocks.h>
 #include <lambent/relight/light.h>
 
 #include <atomic>
@@ -70,7 +71,7 @@ void LiveReference::start(const LivePicture& picture, const ReferenceOptions& op
       for (int x = 0; x < view.width; ++x)
         s.behind.push_back(radiance_bilinear(env, transpose(turn) * rays.direction(float(x) + 0.5f, float(y) + 0.5f)));
   }
-  s.thread = std::thread([&s, &scene = picture.scene(), view = picture.view(), of, order, turn,
+  s.thread = std::thread([&s, scene = picture.lit_scene(), view = picture.view(), of, order, turn,
                           turned = picture.request().env_rotate != "", env = std::move(env)]() mutable {
     if (order > 0) {
       const LightProjection bands = project_light(env, LightBasis{.order = order}, turn);
@@ -78,7 +79,7 @@ void LiveReference::start(const LivePicture& picture, const ReferenceOptions& op
     } else if (turned) {
       env = rotated(env, turn, 2);
     }
-    s.trace(scene, env, view, of);
+    s.trace(*scene, env, view, of);
   });
 }
 
@@ -111,9 +112,13 @@ ReferenceOptions reference_options(const Baked& baked, const DrawRequest& reques
     if (brdf.empty() && outgoing_of(baked.surface)) brdf = baked_by->brdf;
     if (kind_of(baked.surface) == DrawKind::blocks) out.bounces = 0;
   }
-  if (!brdf.empty())
+  if (!request.material.empty()) {
+    if (auto reflection = block_reflection(baked.scene, request)) out.reflection = std::move(*reflection);
+  } else if (!brdf.empty())
     if (auto reflection = parse_reflection(brdf)) out.reflection = std::move(*reflection);
-  out.lamps = !light_of(baked.surface.store).groups.empty();
+  const bool by_lamps = kind_of(baked.surface) == DrawKind::indirect;
+  if (by_lamps) out.bounces = 16;
+  out.lamps = by_lamps || !light_of(baked.surface.store).groups.empty();
   return out;
 }
 

@@ -1,5 +1,4 @@
-#include <lambent/pipeline/golden_test-inl.h>
-#include <lambent/pipeline/live.h>
+#include <lambent/pipeline/live_test-inl.h>
 
 #include "temporary_folder.h"
 
@@ -10,53 +9,22 @@
 namespace lambent {
 namespace {
 
+using test::drawn;
+using test::error_of;
+using test::expect_each_drawn;
+using test::expect_same;
+using test::finish;
 using test::golden_names;
 using test::golden_request;
+using test::open_golden;
 
 constexpr const char* live_file = "diffuse";
-
-std::string error_of(const Result<void>& result) { return result ? "" : result.error().text(); }
-
-// All work that there is, and how many pieces it was.
-int finish(LivePicture& picture) {
-  int pieces = 0;
-  for (;; ++pieces) {
-    const auto more = picture.work();
-    EXPECT_TRUE(more) << more.error().text();
-    if (!more || !*more || pieces > 1000) return pieces;
-  }
-}
-
-void expect_same(const Image& a, const Image& b) {
-  ASSERT_EQ(a.width, b.width);
-  ASSERT_EQ(a.height, b.height);
-  for (size_t i = 0; i < a.rgb.size(); ++i) EXPECT_EQ(a.rgb[i], b.rgb[i]) << "pixel " << i;
-  EXPECT_EQ(a.alpha, b.alpha);
-}
-
-Image drawn(const Baked& baked, const DrawRequest& request) {
-  auto drawing = draw(baked, request);
-  EXPECT_TRUE(drawing) << drawing.error().text();
-  return drawing ? drawing->frames.at(0) : Image();
-}
-
-struct Opened {
-  Baked baked;
-  DrawRequest request;
-};
-Opened open(const std::string& name) {
-  Opened out{{}, golden_request(name)};
-  auto baked = load_baked(out.request.baked);
-  EXPECT_TRUE(baked) << baked.error().text();
-  if (baked) out.baked = std::move(*baked);
-  return out;
-}
 
 class Live : public testing::TestWithParam<std::string> {};
 
 // Of every kind, whatever was seen before: once nothing is left to do it is the picture that render draws.
 TEST_P(Live, BecomesThePicture) {
-  const auto [baked, request] = open(GetParam());
+  const auto [baked, request] = open_golden(GetParam());
   auto picture = LivePicture::make(baked, request);
   ASSERT_TRUE(picture) << picture.error().text();
   EXPECT_GE(finish(*picture), 1);
@@ -65,7 +33,7 @@ TEST_P(Live, BecomesThePicture) {
 }
 
 TEST_P(Live, FollowsLightAndView) {
-  const auto [baked, request] = open(GetParam());
+  const auto [baked, request] = open_golden(GetParam());
   auto picture = LivePicture::make(baked, request);
   ASSERT_TRUE(picture) << picture.error().text();
   DrawRequest moved = request;
@@ -86,23 +54,10 @@ TEST_P(Live, FollowsLightAndView) {
   expect_same(picture->image(), drawn(baked, request));
 }
 
-// The kinds that are drawn live; the one that is not is refused by name.
-std::vector<std::string> live_names() {
-  std::vector<std::string> names = golden_names();
-  std::erase(names, "indirect");
-  return names;
-}
-INSTANTIATE_TEST_SUITE_P(Files, Live, testing::ValuesIn(live_names()), [](const auto& info) { return info.param; });
-
-TEST(LivePicture, RefusesDirectToIndirectLightByName) {
-  const auto [baked, request] = open("indirect");
-  auto picture = LivePicture::make(baked, request);
-  ASSERT_FALSE(picture);
-  EXPECT_NE(picture.error().message.find("direct-to-indirect"), std::string::npos) << picture.error().text();
-}
+INSTANTIATE_TEST_SUITE_P(Files, Live, testing::ValuesIn(golden_names()), [](const auto& info) { return info.param; });
 
 TEST(LivePicture, DoesOnlyWhatHasChanged) {
-  const auto [baked, request] = open(live_file);
+  const auto [baked, request] = open_golden(live_file);
   auto picture = LivePicture::make(baked, request);
   ASSERT_TRUE(picture);
   EXPECT_EQ(finish(*picture), request.spp);
@@ -125,7 +80,7 @@ TEST(LivePicture, DoesOnlyWhatHasChanged) {
 }
 
 TEST(LivePicture, KeepsWhatItShowsOnErrors) {
-  const auto [baked, request] = open(live_file);
+  const auto [baked, request] = open_golden(live_file);
   auto picture = LivePicture::make(baked, request);
   ASSERT_TRUE(picture);
   finish(*picture);
@@ -139,7 +94,9 @@ TEST(LivePicture, KeepsWhatItShowsOnErrors) {
            {[](DrawRequest& r) { r.show = "bounce:1"; }, "--terms"},
            {[](DrawRequest& r) { r.insert = {"a.obj@0,0,0"}; }, "--insert"},
            {[](DrawRequest& r) { r.place = {"a=a.field.glb@0,0,0"}; }, "--place"},
-           {[](DrawRequest& r) { r.transfer_texture = "a.lpt"; }, "--transfer-texture"},
+           {[](DrawRequest& r) { r.transfer_texture = "a.lpt"; }, "a.lpt"},
+           {[](DrawRequest& r) { r.tile = "2,2"; }, "--tile"},
+           {[](DrawRequest& r) { r.albedo = {"red=1"}; }, "--albedo"},
            {[](DrawRequest& r) { r.animation = "0"; }, ""}}) {
     DrawRequest asked = request;
     change(asked);
@@ -151,24 +108,8 @@ TEST(LivePicture, KeepsWhatItShowsOnErrors) {
   }
 }
 
-// A request after the other on one picture: each becomes what render draws, hurried through before or not.
-void expect_each_drawn(const Baked& baked, const std::vector<DrawRequest>& requests) {
-  auto picture = LivePicture::make(baked, requests.front());
-  ASSERT_TRUE(picture) << picture.error().text();
-  Image before;
-  for (const DrawRequest& request : requests) {
-    SCOPED_TRACE(testing::Message() << "request " << &request - requests.data());
-    ASSERT_EQ(error_of(picture->ask(request)), "");
-    ASSERT_TRUE(picture->work(true, 1e-5));
-    finish(*picture);
-    expect_same(picture->image(), drawn(baked, request));
-    if (&request != requests.data()) EXPECT_NE(picture->image().rgb, before.rgb);
-    before = picture->image();
-  }
-}
-
 TEST(LivePicture, ObjectsThatMoveAreDrawnAsRenderDoes) {
-  const auto [baked, request] = open("diffuse_lattice");
+  const auto [baked, request] = open_golden("diffuse_lattice");
   const std::string file = golden_request("diffuse_field").baked;
   test::TemporaryFolder folder;
   folder.write("path.json", R"({"times": [0, 2], "places": [[0, 0.8, 0], [1, 0.8, 0.5, 0, 0, 90]]})");
@@ -181,7 +122,7 @@ TEST(LivePicture, ObjectsThatMoveAreDrawnAsRenderDoes) {
 }
 
 TEST(LivePicture, AnInsertedObjectIsDrawnAsRenderDoesAndTakenHoldOf) {
-  const auto [baked, request] = open("diffuse_lattice");
+  const auto [baked, request] = open_golden("diffuse_lattice");
   test::TemporaryFolder folder;
   folder.write("pyramid.obj", "v 0 0 0\nv 1 0 0\nv 0 0 1\nv 0.3 0.8 0.3\nf 1 2 3\nf 1 4 2\nf 2 4 3\nf 3 4 1\n");
   DrawRequest one = request, beside = request, turned = request;
@@ -203,32 +144,6 @@ TEST(LivePicture, AnInsertedObjectIsDrawnAsRenderDoesAndTakenHoldOf) {
     }
   EXPECT_GT(on_it, 0u);
   EXPECT_GT(beside_it, on_it);
-}
-
-TEST(LivePicture, OneCoefficientIsItsColumn) {
-  const auto [baked, request] = open("diffuse_grey_single");
-  auto picture = LivePicture::make(baked, request);
-  ASSERT_TRUE(picture);
-  EXPECT_NE(error_of(picture->look_as(Look::coefficient, 1 << 20)), "");
-  EXPECT_NE(error_of(picture->look_as(Look::coefficient, -1)), "");
-  ASSERT_EQ(error_of(picture->look_as(Look::coefficient, 0)), "");
-  finish(*picture);
-  const Image first = picture->image();
-  // Of the constant harmonic, transfer is nowhere negative (red), and somewhere it is light (blue).
-  float most = 0;
-  for (const Vec3& pixel : first.rgb) {
-    EXPECT_EQ(pixel.x, 0.0f);
-    most = std::max(most, pixel.z);
-  }
-  EXPECT_GT(most, 0.1f);
-  for (const Look look : {Look::receivers, Look::density}) {
-    ASSERT_EQ(error_of(picture->look_as(look)), "");
-    finish(*picture);
-    EXPECT_FALSE(std::equal(first.rgb.begin(), first.rgb.end(), picture->image().rgb.begin()));
-  }
-  ASSERT_EQ(error_of(picture->look_as(Look::picture)), "");
-  finish(*picture);
-  expect_same(picture->image(), drawn(baked, request));
 }
 
 }  // namespace

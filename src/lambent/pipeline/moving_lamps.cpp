@@ -6,6 +6,9 @@
 #include <lambent/scene/append.h>
 #include <lambent/scene/procedural.h>
 
+#include <fmt/format.h>
+#include <fmt/ranges.h>
+
 #include <algorithm>
 #include <array>
 #include <charconv>
@@ -50,19 +53,40 @@ bool names_moving_lamp(const std::string& text) {
                      [&](const char* kind) { return text.starts_with(std::string(kind) + "@"); });
 }
 
-Result<MovingLamp> parse_moving_lamp(const std::string& text, Vec3d origin) {
+Result<LampNumbers> read_lamp_numbers(const std::string& text) {
   const size_t at = text.find('@'), equals = text.rfind('=');
   const auto kind = std::find(std::begin(lamp_kinds), std::end(lamp_kinds), text.substr(0, at));
   if (at == std::string::npos || equals == std::string::npos || equals < at || kind == std::end(lamp_kinds))
     return wrong("--lamp", std::string("expects ") + moving_lamp_syntax + ", not \"" + text + "\"");
-  MovingLamp lamp;
-  lamp.kind = MovingLamp::Kind(kind - std::begin(lamp_kinds));
+  LampNumbers lamp{MovingLamp::Kind(kind - std::begin(lamp_kinds)), {}, {}};
   auto n = read_numbers(text.substr(at + 1, equals - at - 1), numbers_of[int(lamp.kind)], "--lamp");
   if (!n) return n.error();
   auto color = parse_named_color(text, "--lamp");
   if (!color) return color.error();
   if (!(largest(color->color) <= 1e12f)) return wrong("--lamp", "a colour may be 1e12 at most");
-  lamp.light.intensity = color->color;
+  lamp.numbers = std::move(*n), lamp.color = color->color;
+  return lamp;
+}
+
+std::string lamp_text(const LampNumbers& lamp) {
+  const Vec3 c = lamp.color;
+  return fmt::format("{}@{:.9g}={:.6g},{:.6g},{:.6g}", lamp_kinds[int(lamp.kind)], fmt::join(lamp.numbers, ","), c.x,
+                     c.y, c.z);
+}
+
+void carry_lamp(LampNumbers& lamp, Vec3d by) {
+  if (lamp.kind == MovingLamp::Kind::sun) return;
+  for (size_t first : {size_t(0), size_t(3)})
+    if (first == 0 || lamp.kind == MovingLamp::Kind::spot)
+      for (size_t k = 0; k < 3; ++k) lamp.numbers.at(first + k) += by[int(k)];
+}
+
+Result<MovingLamp> parse_moving_lamp(const std::string& text, Vec3d origin) {
+  auto read = read_lamp_numbers(text);
+  if (!read) return read.error();
+  const std::vector<double>* n = &read->numbers;
+  MovingLamp lamp;
+  lamp.kind = read->kind, lamp.light.intensity = read->color;
   if (lamp.kind == MovingLamp::Kind::sun) {
     if (std::abs((*n)[1]) > 90) return wrong("--lamp", "a sun's elevation lies from -90 to 90 degrees");
     const double azimuth = (*n)[0] * std::numbers::pi / 180, elevation = (*n)[1] * std::numbers::pi / 180;
@@ -73,7 +97,7 @@ Result<MovingLamp> parse_moving_lamp(const std::string& text, Vec3d origin) {
   }
   lamp.light.position = lamp.centre = place_at(*n, 0, origin);
   if (lamp.kind == MovingLamp::Kind::sphere) {
-    lamp.radius = float((*n)[3]), lamp.radiance = color->color;
+    lamp.radius = float((*n)[3]), lamp.radiance = read->color;
     if (!(lamp.radius > 0)) return wrong("--lamp", "a sphere's radius must be above 0: point@ has none");
   }
   if (lamp.kind == MovingLamp::Kind::spot) {

@@ -32,6 +32,18 @@ bool names_moving_lamp(const std::string& text);
 // (irradiance; degrees, azimuth from +X towards +Z as of skies). One number stands for three alike. Places are in the
 // file's space. Errors name --lamp.
 Result<MovingLamp> parse_moving_lamp(const std::string& text, Vec3d origin = Vec3d(0));
+// The same as its numbers, in the file's space and in the order of the text: for who changes some of them. Whether they
+// are within their ranges parse_moving_lamp() says.
+struct LampNumbers {
+  MovingLamp::Kind kind = MovingLamp::Kind::point;
+  std::vector<double> numbers;
+  Vec3 color{1.0f};
+};
+Result<LampNumbers> read_lamp_numbers(const std::string& text);
+std::string lamp_text(const LampNumbers& lamp);
+// By an offset, a spot's target with it; suns have no place.
+void carry_lamp(LampNumbers& lamp, Vec3d by);
+
 Result<std::vector<MovingLamp>> parse_moving_lamps(const std::vector<std::string>& texts, Vec3d origin = Vec3d(0));
 
 // Where a lamp is when: N@T:X,Y,Z;T:X,Y,Z;..., lamp N (from 1) at rising times, straight from place to place, and

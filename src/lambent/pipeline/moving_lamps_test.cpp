@@ -47,6 +47,19 @@ TEST(MovingLamps, WhatIsWrongIsNamed) {
   }
 }
 
+TEST(MovingLamps, AreTheirNumbersAgain) {
+  for (const char* text :
+       {"sphere@1,2,3,0.25=3,2,1", "point@-1.5,2,1e+06=5,5,5", "spot@0,1,0,0,0,0.5,30=1,1,1", "sun@40,60=2,1,1"}) {
+    auto numbers = read_lamp_numbers(text);
+    ASSERT_TRUE(numbers) << numbers.error().text();
+    EXPECT_EQ(lamp_text(*numbers), text);
+  }
+  LampNumbers spot = *read_lamp_numbers("spot@0,1,0,0,0,0.5,30=1"), sun = *read_lamp_numbers("sun@40,60=2");
+  carry_lamp(spot, Vec3d(1, 2, 3)), carry_lamp(sun, Vec3d(1, 2, 3));
+  EXPECT_EQ(lamp_text(spot), "spot@1,3,3,1,2,3.5,30=1,1,1");
+  EXPECT_EQ(lamp_text(sun), "sun@40,60=2,2,2");
+}
+
 // Over an open floor, in closed form.
 TEST(MovingLamps, LightAFloorAsTheyShould) {
   const Scene floor = make_quad(Vec3(-9, 0, 9), Vec3(18, 0, 0), Vec3(0, 0, -18), 1, 1, Vec3(0.5f));

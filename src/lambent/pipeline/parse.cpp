@@ -196,6 +196,25 @@ Result<Reflection> parse_reflection(const std::string& text) {
   return reflection;
 }
 
+Result<void> parse_materials(const std::vector<std::string>& texts, const Scene& scene, Reflection& reflection) {
+  for (const std::string& text : texts) {
+    // A name may hold '=': the first '=' after which there is a model.
+    const auto known = std::find_if(scene.materials.begin(), scene.materials.end(), [&](const Material& m) {
+      return !m.name.empty() && text.starts_with(m.name + "=");
+    });
+    if (known == scene.materials.end())
+      return Error{"--material", "expects NAME=BRDF with a material of the scene, not \"" + text + "\"", true};
+    std::string model = text.substr(known->name.size() + 1);
+    const std::string prefix = "textured:";
+    const bool textured = model.starts_with(prefix);
+    if (textured) model = model.substr(prefix.size());
+    auto brdf = parse_brdf(model);
+    if (!brdf) return Error{"--material", known->name + ": " + brdf.error().text(), true};
+    reflection.named.push_back({known->name, std::move(*brdf), textured});
+  }
+  return {};
+}
+
 Result<void> parse_cpca(const std::string& text, CpcaOptions& options) {
   const std::string where = "--compress";
   if (!text.starts_with("cpca:")) return Error{where, "must be cpca:CLUSTERS,RANK, not \"" + text + "\"", true};

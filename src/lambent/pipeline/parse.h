@@ -66,6 +66,9 @@ Result<Insertion> parse_insertion(const std::string& text, Vec3d origin = Vec3d(
 // "diffuse", "materials", or a BRDF (brdf/parse_brdf.h) for all surfaces; reads measured ones from their files.
 Result<Reflection> parse_reflection(const std::string& text);
 
+// "NAME=BRDF" or "NAME=textured:BRDF" each: added to reflection.named. Errors: a material that the scene has not.
+Result<void> parse_materials(const std::vector<std::string>& texts, const Scene& scene, Reflection& reflection);
+
 // "cpca:CLUSTERS,RANK".
 Result<void> parse_cpca(const std::string& text, CpcaOptions& options);
 

@@ -22,7 +22,7 @@ constexpr int samples = 256;  // of each gather
 constexpr int fresh_samples = 512;
 constexpr size_t averaged = 24;  // places around a pixel, of those that face as it does
 constexpr size_t looked_at = 64;
-constexpr float least_cosine = 0.5f;
+constexpr float least_facing = 0.5f;
 constexpr int legend_height = 26, margin = 6;
 
 struct Cloud {
@@ -143,7 +143,11 @@ Result<Certificate> measure(const Baked& baked, const Tracer& tracer, const Aske
   return certify_field(scene, stored, field, width, gather, places, 0x7e59, progress, &reflected, nullptr, &measured);
 }
 
-void paint(const Scene& scene, const Tracer& tracer, const View& view, ErrorView& out) {
+}  // namespace
+
+void paint_error(const Scene& scene, const Tracer& tracer, const View& view, ErrorView& out) {
+  out.image = Image(view.width, view.height);
+  if (view.height <= legend_height) return;
   const std::vector<MeasuredPlace>& all = out.measured;
   const Cloud cloud{all};
   const Tree tree(3, cloud, {16});
@@ -169,7 +173,7 @@ void paint(const Scene& scene, const Tracer& tracer, const View& view, ErrorView
         double sum = 0, weight = 0;
         size_t count = 0;
         for (size_t q = 0; q < found && count < averaged; ++q)
-          if (dot(all[index[q]].normal, n) >= least_cosine)
+          if (dot(all[index[q]].normal, n) >= least_facing)
             sum += all[index[q]].weight * all[index[q]].error2, weight += all[index[q]].weight, ++count;
         if (count > 0)
           local[y * size_t(view.width) + size_t(x)] = float(std::sqrt(std::max(0.0, sum / weight) / truth));
@@ -190,22 +194,32 @@ void paint(const Scene& scene, const Tracer& tracer, const View& view, ErrorView
   draw_legend(out.image, height, out.scale);
 }
 
-}  // namespace
+Result<void> can_measure_error(const Baked& baked) {
+  auto asked = check(baked);
+  return asked ? Result<void>() : asked.error();
+}
 
-Result<ErrorView> view_error(const Baked& baked, const std::string& camera, const std::string& size, const Job& job) {
+Result<ErrorView> measure_error(const Baked& baked, const Tracer& tracer, const Job& job) {
   auto asked = check(baked);
   if (!asked) return asked.error();
+  ErrorView out{{}, {}, {}};
+  auto certificate = measure(baked, tracer, *asked, out.measured, job.progress);
+  if (!certificate) return certificate.error();
+  if (certificate->error < 0) return Error{"--view-error", "found too few places that receive light", false};
+  out.certificate = std::move(*certificate);
+  return out;
+}
+
+Result<ErrorView> view_error(const Baked& baked, const std::string& camera, const std::string& size, const Job& job) {
+  if (auto ok = can_measure_error(baked); !ok) return ok.error();
   auto view = parse_view(camera, size, baked.scene);
   if (!view) return view.error();
   if (view->height <= legend_height) return Error{"--size", "leaves no room for the legend", true};
   auto tracer = Tracer::build(baked.scene, job.progress);
   if (!tracer) return tracer.error();
-  ErrorView out{Image(view->width, view->height), {}, {}};
-  auto certificate = measure(baked, *tracer, *asked, out.measured, job.progress);
-  if (!certificate) return certificate.error();
-  if (certificate->error < 0) return Error{"--view-error", "found too few places that receive light", false};
-  out.certificate = std::move(*certificate);
-  paint(baked.scene, *tracer, *view, out);
+  auto out = measure_error(baked, *tracer, job);
+  if (!out) return out.error();
+  paint_error(baked.scene, *tracer, *view, *out);
   return out;
 }
 

@@ -138,7 +138,8 @@ bool meets(const Integrator& integrator, Vec3 origin, Vec3 d, bool camera, const
     return camera ? integrator.intersector.nearest_visible(origin, d, hit)
                   : integrator.intersector.nearest(origin, d, hit);
   // Diffuse glass that passes everything reflects nothing; other models have a glint of their own.
-  const bool plain = integrator.reflection.model == Reflection::Model::diffuse && !integrator.reflection.everywhere;
+  const Reflection& r = integrator.reflection;
+  const bool plain = r.model == Reflection::Model::diffuse && !r.everywhere && r.named.empty();
   const uint64_t key = hash64(hash64(samples.key, samples.index), 0x91a55u + uint64_t(depth));
   return integrator.intersector.met(origin, d, camera, plain ? 1.0f : 0.75f, key, hit, weight);
 }

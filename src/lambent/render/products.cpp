@@ -1,6 +1,8 @@
 // Follows: locally-adaptive-products, section 5 (vertices are culled before they are shaded).
 #include <lambent/render/products.h>
 
+#include <map>
+
 namespace lambent {
 
 ProductReceivers make_product_receivers(const Scene& scene, const std::vector<uint32_t>& front,
@@ -11,7 +13,9 @@ ProductReceivers make_product_receivers(const Scene& scene, const std::vector<ui
   std::vector<Vec3> face_normal(scene.positions.size(), Vec3(0));
   for (const Triangle& t : scene.triangles)
     for (uint32_t v : t.v) face_normal[v] += area_normal(scene, t);
-  const bool varied = !reflection.everywhere;
+  const bool varied = !reflection.everywhere || !reflection.named.empty();
+  // One for all that it is named for, or that nothing is: those do not vary.
+  std::map<const Reflection::Named*, ProductMaterial> same;
   out.materials.resize(varied ? count : 1);
   if (!varied) out.materials[0] = make_product_material(*reflection.everywhere, cube, sampling);
   std::vector<uint8_t> done(count, 0);
@@ -27,7 +31,17 @@ ProductReceivers make_product_receivers(const Scene& scene, const std::vector<ui
         out.positions[r] = scene.positions[v], out.frames[r] = shading_frame(scene, t, n);
         if (!varied) continue;
         out.material_of[r] = r;
-        out.materials[r] = make_product_material(surface_brdf(scene, reflection, t, k == 1, k == 2), cube, sampling);
+        const Reflection::Named* named = named_for(reflection, scene, t);
+        auto make = [&] {
+          return make_product_material(surface_brdf(scene, reflection, t, k == 1, k == 2), cube, sampling);
+        };
+        if (named ? named->textured : !reflection.everywhere) {
+          out.materials[r] = make();
+          continue;
+        }
+        auto known = same.find(named);
+        if (known == same.end()) known = same.emplace(named, make()).first;
+        out.materials[r] = known->second;
       }
   return out;
 }

@@ -228,25 +228,36 @@ Result<ViewRays> trace_view(const Scene& scene, const Tracer& tracer, const Came
   return out;
 }
 
-void shade_rays(const ViewRays& view, const std::function<SurfaceShade()>& make_shade,
-                const std::function<Vec3(Vec3)>& background, ViewSums& sums) {
+void shade_rays(const ViewRays& view, const std::function<RayShade()>& make_shade,
+                const std::function<Vec3(Vec3)>& background, ViewSums& sums, int first, int last) {
   const size_t width = size_t(view.width), pixels = width * size_t(view.height);
-  if (sums.samples == 0) sums.rgb.assign(pixels, Vec3(0.0f)), sums.open.assign(pixels, 0.0f);
-  LAMBENT_CHECK(sums.rgb.size() == pixels);
-  parallel_for(size_t(view.height), 4, [&](size_t begin, size_t end) {
-    const SurfaceShade shade = make_shade();
-    for (size_t pixel = begin * width; pixel < end * width; ++pixel)
+  if (sums.samples == 0 && first == 0) sums.rgb.assign(pixels, Vec3(0.0f)), sums.open.assign(pixels, 0.0f);
+  LAMBENT_CHECK(sums.rgb.size() == pixels && first <= last && last <= view.height);
+  parallel_for(size_t(last - first), 4, [&](size_t begin, size_t end) {
+    const RayShade shade = make_shade();
+    for (size_t pixel = (size_t(first) + begin) * width; pixel < (size_t(first) + end) * width; ++pixel)
       for (uint32_t i = view.begin[pixel]; i < view.begin[pixel + 1]; ++i) {
         const ViewRay& ray = view.rays[i];
         if (ray.hit.triangle != none) {
-          sums.rgb[pixel] += ray.weight * shade(ray.hit, ray.direction);
+          sums.rgb[pixel] += ray.weight * shade(i);
           continue;
         }
         sums.open[pixel] += mean(ray.weight);
         if (background) sums.rgb[pixel] += ray.weight * background(ray.direction);
       }
   });
-  sums.samples += view.samples;
+  if (last == view.height) sums.samples += view.samples;
+}
+
+std::function<RayShade()> by_number(const ViewRays& view, std::function<SurfaceShade()> make_shade) {
+  return [&view, make_shade = std::move(make_shade)]() -> RayShade {
+    return [&view, shade = make_shade()](size_t ray) { return shade(view.rays[ray].hit, view.rays[ray].direction); };
+  };
+}
+
+void shade_rays(const ViewRays& view, const std::function<SurfaceShade()>& make_shade,
+                const std::function<Vec3(Vec3)>& background, ViewSums& sums) {
+  shade_rays(view, by_number(view, make_shade), background, sums, 0, view.height);
 }
 
 Image mean_of(const ViewSums& sums, int width, int height) {

@@ -86,9 +86,17 @@ struct ViewSums {
   std::vector<float> open;
   int samples = 0;
 };
-// Adds to `sums`; `background`: radiance by direction, none: black.
+// Of view.rays, by number, where it met something: radiance.
+using RayShade = std::function<Vec3(size_t ray)>;
+// Adds rows [first, last) of the picture to `sums`, which count the samples with the last row of all; `background`:
+// radiance by direction, none: black.
+void shade_rays(const ViewRays& view, const std::function<RayShade()>& make_shade,
+                const std::function<Vec3(Vec3)>& background, ViewSums& sums, int first, int last);
+// All rows, by what was met.
 void shade_rays(const ViewRays& view, const std::function<SurfaceShade()>& make_shade,
                 const std::function<Vec3(Vec3)>& background, ViewSums& sums);
+// The one as the other; `view` must outlive it.
+std::function<RayShade()> by_number(const ViewRays& view, std::function<SurfaceShade()> make_shade);
 Image mean_of(const ViewSums& sums, int width, int height);
 
 }  // namespace lambent

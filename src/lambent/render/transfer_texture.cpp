@@ -76,37 +76,40 @@ Vec3 shade_relief(const ZonalTransfer& transfer, std::span<const float> values, 
 
 }  // namespace
 
+std::function<SurfaceShade()> transfer_texture_shade(const Scene& scene, const ZonalTexture& texture,
+                                                     const TextureUse& use, const LocalLight& light,
+                                                     RenderOptions::Show show, const ArrivingAt* arriving) {
+  return [&, show, arriving]() -> SurfaceShade {
+    return [&, show, arriving, values = std::vector<float>(texture.transfer.receiver_values()), here = light.distant,
+            near = std::vector<Vec3>()](const Hit& hit, Vec3) mutable {
+      const Triangle& t = scene.triangles[hit.triangle];
+      Vec3 normal = normalize_or(interpolate(scene.normals, t, hit.u, hit.v), {0, 0, 1});
+      if (!hit.front) normal = -normal;
+      const bool placed = !scene.texcoords[0].empty();
+      const Vec2 uv = placed ? interpolate(scene.texcoords[0], t, hit.u, hit.v) : Vec2(0.0f);
+      Mat3 frame;
+      if (texture.groove_depth > 0) {
+        const float phase = dot(uv, use.tile), x = (phase - std::floor(phase) - 0.5f) / use.groove_width;
+        sample_groove(texture, placed ? x : 1, use.groove_depth * (use.groove_map ? use.groove_map(uv) : 1), values);
+        frame = groove_frame(scene, t, use.tile, normal);
+      } else {
+        sample_zonal_texture(texture, uv * use.tile, values);
+        frame = texture_frame(scene, t, normal);
+      }
+      const Vec3 white = shade_relief(texture.transfer, values, frame, hit,
+                                      interpolate(scene.positions, t, hit.u, hit.v), light, arriving, here, near);
+      if (show == RenderOptions::Show::radiosity) return white;
+      const Vec3 colour = albedo(scene, t, hit.u, hit.v);
+      return show == RenderOptions::Show::albedo ? colour : colour * white;
+    };
+  };
+}
+
 Result<Image> render_transfer_texture(const Scene& scene, const Tracer& tracer, const ZonalTexture& texture,
                                       const TextureUse& use, const LocalLight& light, const Camera& camera,
                                       const RenderOptions& options, Progress* progress, const ArrivingAt* arriving) {
-  return render_surfaces(
-      scene, tracer, camera, options,
-      [&]() -> SurfaceShade {
-        return [&, values = std::vector<float>(texture.transfer.receiver_values()), here = light.distant,
-                near = std::vector<Vec3>()](const Hit& hit, Vec3) mutable {
-          const Triangle& t = scene.triangles[hit.triangle];
-          Vec3 normal = normalize_or(interpolate(scene.normals, t, hit.u, hit.v), {0, 0, 1});
-          if (!hit.front) normal = -normal;
-          const bool placed = !scene.texcoords[0].empty();
-          const Vec2 uv = placed ? interpolate(scene.texcoords[0], t, hit.u, hit.v) : Vec2(0.0f);
-          Mat3 frame;
-          if (texture.groove_depth > 0) {
-            const float phase = dot(uv, use.tile), x = (phase - std::floor(phase) - 0.5f) / use.groove_width;
-            sample_groove(texture, placed ? x : 1, use.groove_depth * (use.groove_map ? use.groove_map(uv) : 1),
-                          values);
-            frame = groove_frame(scene, t, use.tile, normal);
-          } else {
-            sample_zonal_texture(texture, uv * use.tile, values);
-            frame = texture_frame(scene, t, normal);
-          }
-          const Vec3 white = shade_relief(texture.transfer, values, frame, hit,
-                                          interpolate(scene.positions, t, hit.u, hit.v), light, arriving, here, near);
-          if (options.show == RenderOptions::Show::radiosity) return white;
-          const Vec3 colour = albedo(scene, t, hit.u, hit.v);
-          return options.show == RenderOptions::Show::albedo ? colour : colour * white;
-        };
-      },
-      progress);
+  return render_surfaces(scene, tracer, camera, options,
+                         transfer_texture_shade(scene, texture, use, light, options.show, arriving), progress);
 }
 
 }  // namespace lambent

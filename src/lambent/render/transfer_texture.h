@@ -35,6 +35,11 @@ struct ArrivingAt {
   const ArrivingLight* peaks = nullptr;
 };
 
+// What leaves the relief at a hit; what it is made of must outlive it. Null `arriving`: distant light.
+std::function<SurfaceShade()> transfer_texture_shade(const Scene& scene, const ZonalTexture& texture,
+                                                     const TextureUse& use, const LocalLight& light,
+                                                     RenderOptions::Show show, const ArrivingAt* arriving = nullptr);
+
 // `light` has as many coefficients as the texture's order asks for. As render() otherwise; parts of the scene without
 // texture coordinates show the texture's first texel, or its plane. `arriving`, where it is not null, takes the place
 // of distant light; sides that receive nothing are black, and near lamps still cast no shadow of the mesh.

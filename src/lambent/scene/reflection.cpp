@@ -29,9 +29,32 @@ Vec3 square_to(Vec3 v, Vec3 n) {
   return sine > least_sine ? t / sine : Vec3(0);
 }
 
+Brdf tinted(Brdf brdf, Vec3 color) {
+  std::visit(
+      [&](auto& b) {
+        using T = std::remove_cvref_t<decltype(b)>;
+        if constexpr (std::is_same_v<T, Lambert>) b.albedo *= color;
+        else if constexpr (std::is_same_v<T, Ggx>) b.f0 *= color;
+        else if constexpr (std::is_same_v<T, MetallicRoughness>) b.base_color *= color;
+        else if constexpr (!std::is_same_v<T, Measured>) b.diffuse *= color;
+      },
+      brdf);
+  return brdf;
+}
+
 }  // namespace
 
+const Reflection::Named* named_for(const Reflection& reflection, const Scene& scene, const Triangle& triangle) {
+  if (reflection.named.empty()) return nullptr;
+  const std::string& name = scene.materials[scene.parts[triangle.part].material].name;
+  for (const Reflection::Named& n : reflection.named)
+    if (n.material == name) return &n;
+  return nullptr;
+}
+
 Brdf surface_brdf(const Scene& scene, const Reflection& reflection, const Triangle& triangle, float u, float v) {
+  if (const Reflection::Named* n = named_for(reflection, scene, triangle))
+    return n->textured ? tinted(n->brdf, albedo(scene, triangle, u, v)) : n->brdf;
   if (reflection.everywhere) return *reflection.everywhere;
   const Vec3 color = albedo(scene, triangle, u, v);
   if (reflection.model == Reflection::Model::diffuse) return Lambert{color};

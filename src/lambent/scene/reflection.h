@@ -4,6 +4,8 @@
 #include <lambent/scene/scene.h>
 
 #include <optional>
+#include <string>
+#include <vector>
 
 namespace lambent {
 
@@ -15,8 +17,18 @@ struct Reflection {
   };
   Model model = Model::diffuse;
   std::optional<Brdf> everywhere;  // stands in for both, on every surface
-  bool normal_maps = true;         // materials' normal textures bend the shading normal, where single points are shaded
+  // Of the materials of that name, before all else.
+  struct Named {
+    std::string material;
+    Brdf brdf;
+    bool textured = false;  // its diffuse colour (of GGX its f0) times the base colour, with textures
+  };
+  std::vector<Named> named = {};
+  bool normal_maps = true;  // materials' normal textures bend the shading normal, where single points are shaded
 };
+
+// The model that was named for a material; null: none was.
+const Reflection::Named* named_for(const Reflection& reflection, const Scene& scene, const Triangle& triangle);
 
 // At barycentric (u, v) of the triangle, textures included.
 Brdf surface_brdf(const Scene& scene, const Reflection& reflection, const Triangle& triangle, float u, float v);

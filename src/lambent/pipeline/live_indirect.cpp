@@ -1,0 +1,194 @@
+// Lamps under the hand: leaves are lit part by part, the bounces follow, and pixels send shadow rays of their own.
+#include <lambent/pipeline/draw_indirect.h>
+#include <lambent/pipeline/live_kind.h>
+
+#include <algorithm>
+#include <chrono>
+
+namespace lambent {
+namespace {
+
+using LiveClock = std::chrono::steady_clock;
+double since(LiveClock::time_point start) { return std::chrono::duration<double>(LiveClock::now() - start).count(); }
+
+constexpr size_t leaves_a_piece = 2048;
+constexpr size_t kept_kernels = size_t(2) << 20;
+// The bounces of a picture that moves.
+constexpr double coarse_tolerance = 1e-2;
+constexpr int coarse_bounces = 8;
+
+// All leaves, in pieces.
+struct Sweep {
+  size_t next = 0, left = 0;
+  bool coarse = false;
+  void begin(size_t count, bool coarsely) { left = count, coarse = coarsely; }
+  // Calls run(first, count) until all was done or `seconds` have gone.
+  void go_on(size_t leaves, double seconds, auto run) {
+    const auto start = LiveClock::now();
+    while (left > 0) {
+      if (next >= leaves) next = 0;
+      const size_t count = std::min({leaves_a_piece, left, leaves - next});
+      run(next, count), next += count, left -= count;
+      if (since(start) > seconds) return;
+    }
+  }
+};
+
+class LiveIndirect : public LiveKind {
+ public:
+  LiveIndirect(const Baked& baked, const DrawRequest& request, const Job& job)
+      : baked_(baked),
+        request_(request),
+        job_(job),
+        d_{request_, job_, std::get<IndirectTransfer>(baked.surface.store), {}} {}
+
+  Result<void> begin(const LiveSkies& skies) {
+    if (auto ok = check(); !ok) return ok;
+    auto show = parse_show(request_.show);
+    if (!show) return show.error();
+    d_.show = *show, d_.scene = baked_.scene, skies_ = skies;
+    set_sky(d_, turned(0));
+    if (auto ok = read_lamps(d_); !ok) return ok;
+    move_lamps();
+    if (auto ok = paint(); !ok) return ok;
+    return make_places(d_);
+  }
+
+  Result<Due> ask(const DrawRequest& request, const LiveSkies& skies) override {
+    const DrawRequest before = std::exchange(request_, request);
+    const LiveSkies old = std::exchange(skies_, skies);
+    Due due;
+    auto made = change(before, due);
+    if (made) return due;
+    request_ = before, skies_ = old;
+    Due again;
+    if (skies_.env[0]) sky_due_ = true;
+    (void)change(request, again);
+    return made.error();
+  }
+
+  const Scene& scene() const override { return d_.scene; }
+  const Tracer& tracer() const override { return d_.tracer; }
+  std::shared_ptr<const Scene> lit_scene() const override {
+    return std::make_shared<const Scene>(scene_with_lamps(d_));
+  }
+  std::vector<std::string> lamp_names() const override { return d_.still.lamps.names; }
+
+  Result<Light> light(bool hurry, double budget, LiveTimes& times) override {
+    const size_t leaves = d_.transfer.surfels.count();
+    auto start = LiveClock::now();
+    if (sky_due_ || (sky_coarse_ && !hurry)) {
+      turn_sky(hurry), sky_due_ = false, still_due_ = true;
+      sky_coarse_ = hurry && skies_.env[0] && skies_.env[0]->image.width > skies_.env[1]->image.width;
+    }
+    times.project = 1e3 * since(start), start = LiveClock::now();
+    const IndirectQuality quality = hurry ? hurried_indirect : IndirectQuality();
+    if (d_.still.shines() && (still_due_ || (still_.coarse && !hurry))) still_.begin(leaves, hurry), still_due_ = false;
+    if (still_.left > 0) direct_due_ = true;
+    if (direct_due_ || (direct_.coarse && !hurry)) direct_.begin(leaves, hurry), direct_due_ = false;
+    still_.go_on(leaves, budget / 2, [&](size_t first, size_t count) { light_leaves(d_, first, count, quality); });
+    if (hurry || still_.left == 0)
+      direct_.go_on(leaves, budget, [&](size_t first, size_t count) { sum_direct(d_, first, count, quality); });
+    times.shaded = leaves;
+    const bool more = still_.left > 0 || direct_.left > 0;
+    if (!hurry && more) return times.relight = 1e3 * since(start), Light::unfinished;
+    if (solve_due_) d_.solve = make_indirect_solve(d_.transfer, albedos_), solve_due_ = false;
+    if (hurry) solve_indirect(d_.transfer, d_.solve, d_.direct, coarse_tolerance, coarse_bounces);
+    else solve_indirect(d_.transfer, d_.solve, d_.direct);
+    times.relight = 1e3 * since(start);
+    if (more) direct_due_ = still_.left > 0;
+    return more ? Light::partial : hurry ? Light::draft : Light::whole;
+  }
+
+  std::function<RayShade()> shade(const Pass& pass) override {
+    std::vector<Kernels>& kept = kernels_[size_t(pass.scale)];
+    if (pass.fresh)
+      for (auto& kernels : kernels_) kernels.clear();
+    const bool keeps = pass.sample == 0 && d_.show.part != Show::Part::direct && pass.rays.rays.size() <= kept_kernels;
+    if (keeps && kept.size() != pass.rays.rays.size()) kept.assign(pass.rays.rays.size(), Kernels{.count = SIZE_MAX});
+    const IndirectQuality quality = pass.hurry ? hurried_indirect : IndirectQuality();
+    return [this, &kept, keeps, quality, &rays = pass.rays.rays, eye = pass.eye]() -> RayShade {
+      return [this, &kept, keeps, quality, &rays, eye](size_t ray) {
+        const Hit& hit = rays[ray].hit;
+        if (keeps && kept[ray].count == SIZE_MAX) kept[ray] = kernels_at(d_, hit);
+        return shade_indirect(d_, eye, quality, hit, rays[ray].direction, keeps ? &kept[ray] : nullptr);
+      };
+    };
+  }
+  bool shades_coarsely() const override { return true; }
+
+ private:
+  std::optional<Environment> turned(bool coarse) const {
+    const Environment* env = skies_.env[coarse ? 1 : 0];
+    if (!env) return std::nullopt;
+    return request_.env_rotate.empty() ? *env : rotated(*env, skies_.turn);
+  }
+  // What was known of leaves shows until they are lit anew.
+  void turn_sky(bool coarse) {
+    auto kept = std::move(d_.still.at_leaves);
+    const size_t groups = d_.still.lamps.groups();
+    set_sky(d_, turned(coarse));
+    if (groups == d_.still.lamps.groups()) d_.still.at_leaves = std::move(kept);
+  }
+  void move_lamps() {
+    for (const LampPath& path : d_.paths) move_lamp(d_.lamps, path, request_.time);
+  }
+  Result<void> paint() {
+    d_.scene.materials = baked_.scene.materials, d_.scene.colors = baked_.scene.colors;
+    albedos_ = d_.transfer.surfels.albedos, solve_due_ = true;
+    return repaint(request_, d_.scene, d_.transfer.surfels, albedos_);
+  }
+  // What pictures one by one have alone.
+  Result<void> check() const {
+    const char* const option = !request_.insert.empty()   ? "--insert"
+                             : request_.at != "pixels"    ? "--at"
+                             : request_.frame_bounces > 0 ? "--frame-bounces"
+                                                          : nullptr;
+    if (option) return Error{option, "is of `render` where light is direct to indirect: no window draws it", true};
+    return {};
+  }
+  Result<void> change(const DrawRequest& before, Due& due) {
+    if (auto ok = check(); !ok) return ok;
+    auto show = parse_show(request_.show);
+    if (!show) return show.error();
+    due.shades = before.show != request_.show;
+    d_.show = *show;
+    if (before.env != request_.env || before.env_rotate != request_.env_rotate ||
+        before.environment != request_.environment)
+      sky_due_ = due.light = true;
+    if (bool(skies_.env[0]) != bool(d_.still.sky)) set_sky(d_, turned(0)), still_due_ = true;  // groups are others
+    const bool shone = d_.still.shines();
+    if (auto ok = read_lamps(d_); !ok) return ok;
+    move_lamps();
+    if (before.lamp != request_.lamp || before.move != request_.move || before.time != request_.time)
+      direct_due_ = due.light = true;
+    if (!shone && d_.still.shines()) still_due_ = true;
+    if (before.albedo == request_.albedo) return {};
+    due.light = direct_due_ = true;
+    if (auto ok = paint(); !ok) return ok;
+    if (!d_.tracer.lets_pass()) return {};
+    due.rays = still_due_ = true;  // paint is solid
+    return make_places(d_);
+  }
+
+  const Baked& baked_;
+  DrawRequest request_;
+  Job job_;
+  LiveSkies skies_ = {};
+  IndirectDrawing d_;
+  std::vector<Vec3> albedos_ = {};
+  bool sky_due_ = false, sky_coarse_ = false, still_due_ = true, direct_due_ = true, solve_due_ = true;
+  Sweep still_ = {}, direct_ = {};
+  std::array<std::vector<Kernels>, 5> kernels_ = {};  // by scale, of the first sample's rays
+};
+
+}  // namespace
+
+Result<std::unique_ptr<LiveKind>> make_live_indirect(const Baked& baked, const DrawRequest& request,
+                                                     const LiveSkies& skies, const Job& job) {
+  auto made = std::make_unique<LiveIndirect>(baked, request, job);
+  if (auto ok = made->begin(skies); !ok) return ok.error();
+  return std::unique_ptr<LiveKind>(std::move(made));
+}
+
+}  // namespace lambent

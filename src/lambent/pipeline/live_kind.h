@@ -1,0 +1,58 @@
+#pragma once
+// A kind of live picture whose light and shades are steps of its own: direct to indirect light, transfer textures.
+#include <lambent/pipeline/draw_light.h>
+#include <lambent/pipeline/live.h>
+#include <lambent/render/render.h>
+
+#include <array>
+
+namespace lambent {
+
+// The environment as it is and coarse, of light that turns; null: none.
+struct LiveSkies {
+  std::array<const Environment*, 2> env{nullptr, nullptr};
+  std::array<std::shared_ptr<const Peakless>, 2> known = {};
+  Mat3 turn{1.0f};
+};
+
+class LiveKind {
+ public:
+  virtual ~LiveKind() = default;
+
+  // What a request makes anew.
+  struct Due {
+    bool light = false, rays = false, shades = false;
+  };
+  // What is shown from now on, under these skies. On an error all stays as it was.
+  virtual Result<Due> ask(const DrawRequest& request, const LiveSkies& skies) = 0;
+
+  virtual const Scene& scene() const = 0;
+  virtual const Tracer& tracer() const = 0;
+  // With lamps that are not the scene's; null: the scene.
+  virtual std::shared_ptr<const Scene> lit_scene() const { return nullptr; }
+  virtual std::vector<std::string> lamp_names() const { return {}; }
+
+  // unfinished: nothing to show yet; partial: to go on with at once; draft: to be made again when nothing moves.
+  enum class Light { unfinished, partial, draft, whole };
+  // A piece of work of about `budget` seconds.
+  virtual Result<Light> light(bool hurry, double budget, LiveTimes& times) = 0;
+
+  // Radiance of what the rays of a pass met, by number; what they are is the same as before unless rays were due.
+  struct Pass {
+    const ViewRays& rays;
+    int sample = 0, scale = 1;
+    bool fresh = false;  // other rays than last time
+    bool hurry = false;
+    Vec3 eye{0.0f};
+  };
+  virtual std::function<RayShade()> shade(const Pass& pass) = 0;
+  virtual bool shades_coarsely() const { return false; }  // in a hurry
+};
+
+// `baked` must outlive it. Errors: as draw().
+Result<std::unique_ptr<LiveKind>> make_live_indirect(const Baked& baked, const DrawRequest& request,
+                                                     const LiveSkies& skies, const Job& job);
+Result<std::unique_ptr<LiveKind>> make_live_texture(const Baked& baked, const DrawRequest& request,
+                                                    const LiveSkies& skies, const Job& job);
+
+}  // namespace lambent
