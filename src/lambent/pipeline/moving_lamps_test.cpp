@@ -49,7 +49,7 @@ TEST(MovingLamps, WhatIsWrongIsNamed) {
 
 TEST(MovingLamps, AreTheirNumbersAgain) {
   for (const char* text :
-       {"sphere@1,2,3,0.25=3,2,1", "point@-1.5,2,1e+06=5,5,5", "spot@0,1,0,0,0,0.5,30=1,1,1", "sun@40,60=2,1,1"}) {
+       {"sphere@1,2,3,0.25=3,2,1", "point@-1.5,2,1000000=5,5,5", "spot@0,1,0,0,0,0.5,30=1,1,1", "sun@40,60=2,1,1"}) {
     auto numbers = read_lamp_numbers(text);
     ASSERT_TRUE(numbers) << numbers.error().text();
     EXPECT_EQ(lamp_text(*numbers), text);
