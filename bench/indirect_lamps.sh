@@ -151,6 +151,7 @@ def errors(name):
 for name in env.get("SCENES", " ".join(scenes)).split():
     found, made = errors(name)
     say(f"indirect light, {name}, {len(found)} lamps", worst=round(min(found), 2),
-        median=round(float(np.median(found)), 2), aim=35, surfels=made["indirect"]["surfels"], entries=made["indirect"]["entries"],
+        median=round(float(np.median(found)), 2), aim=35, surfels=made["indirect"]["surfels"],
+        entries=made["indirect"]["entries"],
         bake_seconds=round(sum(made["seconds"].values()), 1))
 P
