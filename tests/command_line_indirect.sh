@@ -29,7 +29,7 @@ expect 2 'albedo: the file has no material' render indirect.glb $seen --lamp poi
   -o x.png
 expect 2 'show: direct and indirect are of' render corner.glb --env uniform:1 --show indirect -o x.png
 # Texels with directions and light in free space, by the same surfels.
-expect 0 'in free space at 8 points' bake corner.obj --transfer indirect --surfels 256 --samples 32 --receivers texels \
+expect 0 '8 points, order 3' bake corner.obj --transfer indirect --surfels 256 --samples 32 --receivers texels \
   --atlas 32x32 --directional sh:3 --lattice 2,2,2 --lattice-order 3 -o texels.glb
 expect 0 '"directional": "sh:3"' inspect texels.glb --json
 expect 0 'shadow rays' render texels.glb $seen --lamp point@0.4,0.6,0.5=3 --at receivers --show indirect -o texels.exr
