@@ -289,7 +289,7 @@ Vec3 glow(const IndirectDrawing& d, const Hit& hit) {
 Kernels kernels_at(const IndirectDrawing& d, const Hit& hit) { return d.search->kernels(surface_place(d.scene, hit)); }
 
 Vec3 shade_indirect(const IndirectDrawing& d, Vec3 eye, const IndirectQuality& quality, const Hit& hit, Vec3 direction,
-                    const Kernels* kernels, const Bounced& bounced) {
+                    const Kernels* kernels, const IndirectShade& bounced) {
   using Colour = RenderOptions::Show;
   const bool shows_direct = d.show.part != Show::Part::indirect, shows_indirect = d.show.part != Show::Part::direct;
   const Scene& scene = d.drawn();
@@ -374,7 +374,7 @@ namespace {
 
 // Where light that has bounced is not read off surfels at the pixel: at receivers, as the file has them, and on
 // objects.
-Bounced bounced_light(const IndirectDrawing& d, const Baked& baked, RenderOptions options) {
+IndirectShade bounced_light(const IndirectDrawing& d, const Baked& baked, RenderOptions options) {
   options.show = RenderOptions::Show::radiosity;
   const SurfaceShade at_objects = d.objects.tracer
                                     ? relit_shade(d.objects.lit.scene, d.objects.basis, d.objects.lit.relit, options)()

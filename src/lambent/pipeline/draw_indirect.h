@@ -96,11 +96,11 @@ void light_leaves(IndirectDrawing& d, size_t first, size_t count, const Indirect
 void sum_direct(IndirectDrawing& d, size_t first, size_t count, const IndirectQuality& quality);
 
 // Light that has bounced, as if what was hit were white.
-using Bounced = std::function<Vec3(const Hit&, Vec3 direction, const SurfacePlace&)>;
+using IndirectShade = std::function<Vec3(const Hit&, Vec3 direction, const SurfacePlace&)>;
 // What a ray of a pixel meets sends towards the eye. `kernels`: what its place reads, where that is known; `bounced`:
 // where light is not read off surfels.
 Vec3 shade_indirect(const IndirectDrawing& d, Vec3 eye, const IndirectQuality& quality, const Hit& hit, Vec3 direction,
-                    const Kernels* kernels = nullptr, const Bounced& bounced = {});
+                    const Kernels* kernels = nullptr, const IndirectShade& bounced = {});
 // The place at a hit, and what it reads there.
 Kernels kernels_at(const IndirectDrawing& d, const Hit& hit);
 
