@@ -415,10 +415,10 @@ Result<Transfer> bake_to_error(const Scene& scene, const Tracer& tracer, const R
     r.rays = rays, r.trace_seconds = traced, r.bounce_seconds = bounced;
     const double target = options.error, error = r.certificate.error, noise = r.noise,
                  between = std::sqrt(std::max(0.0, error * error - noise * noise));
-    // Where little is lost between receivers, noise may take the rest. Else more rays would hardly be seen beside
-    // that; but noise is, in the shade of a sun.
+    // Where little is lost between receivers, noise may take the rest. Else half of what is lost there: less would
+    // hardly be seen beside it, an eighth of the whole. But in the shade of a sun noise is what is seen.
     const double wanted = between < 0.5 * target ? 0.9 * std::sqrt(target * target - between * between)
-                                                 : std::clamp(0.2 * error, 0.3 * target, 0.6 * target);
+                                                 : std::clamp(0.5 * between, 0.3 * target, 1.5 * target);
     const double ratio = std::clamp(std::pow(noise / wanted, 1 / slope), 1.5, 16.0);
     const bool late = this_ranks().from_first(options.seconds >= 0 &&
                                               seconds_since(start) + seconds_since(round) * ratio > options.seconds);

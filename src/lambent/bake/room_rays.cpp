@@ -347,6 +347,8 @@ Result<FieldLoss> hand_on_what_fields_lose(RoomSpace& space, const RoomWork& wor
   double left = 0;
   for (double& l : lost) l = all > 0 ? std::max(l, 0.0) / all : 0.0, left += l;
   FieldLoss out{std::sqrt(left)};
+  const uint64_t sent = this_ranks().sum(meter.samples.size() * rays_of_each);
+  out.crossing = double(this_ranks().sum(meter.rays.size())) / double(std::max<uint64_t>(sent, 1));
   std::vector<uint32_t> order(lost.size());
   std::iota(order.begin(), order.end(), 0u);
   std::stable_sort(order.begin(), order.end(), [&](uint32_t a, uint32_t b) { return lost[a] > lost[b]; });

@@ -37,6 +37,7 @@ Result<std::vector<Traveller>> follow(const RoomSpace& space, const RoomWork& wo
 struct FieldLoss {
   double all = 0, left = 0;  // relative RMS over receivers: of all openings' light fields; of those that stay
   size_t handed = 0;         // openings whose rays are handed on
+  double crossing = 0;       // of receivers' rays, those that leave their room
 };
 
 // What light fields lose, measured once their nodes are found: at receivers held out, each opening's rays end at nodes,

@@ -54,6 +54,7 @@ void RoomBaker::share_rooms() {
 // Fields at all openings at first; then, where some lose more than they may, those alone that stay.
 Result<void> RoomBaker::find_all_nodes() {
   const auto find = [&] { return find_nodes(space, work, surfaces, receivers, receivers_of, options.seed, progress); };
+  bool all = how.loss <= 0;  // are handed on
   if (how.loss > 0)
     if (auto ok = find(); !ok) return ok;
   if (how.loss > 0 && std::isfinite(how.loss)) {
@@ -61,8 +62,11 @@ Result<void> RoomBaker::find_all_nodes() {
         hand_on_what_fields_lose(space, work, surfaces, receivers, receivers_of, options.seed, how.loss, progress);
     if (!loss) return loss.error();
     told.loss = loss->left, told.loss_of_all = loss->all, told.handed = loss->handed;
+    const double on = loss->crossing * double(n()) * double(options.samples);
+    all = how.cheapest && on <= double(space.node_count()) * double(most_node_rays);
   }
-  if (how.loss <= 0) {
+  if (all) {
+    told.loss = 0;
     for (Opening& o : space.openings) o.handed = true;
     told.handed = space.openings.size();
   }

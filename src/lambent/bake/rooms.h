@@ -21,6 +21,7 @@ struct RoomsOptions {
   int directions = 16;     // and of direction along each side of the square that maps onto the half space
   // Of what receivers have, the most that light fields may lose (FieldLoss); 0: there are none, infinite: as they are.
   double loss = 0.01;
+  bool cheapest = false;     // no light fields at all where their nodes would send more rays than are handed on
   bool keep_sweeps = false;  // what all receivers have after each sweep, in the report
   std::string scratch;       // a folder for rows that memory has no room for; "": they are traced again
 };

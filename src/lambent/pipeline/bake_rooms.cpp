@@ -88,7 +88,7 @@ Result<Transfer> bake_rooms_of_request(const BakeRequest& request, const BakeOpt
   auto rooms = rooms_of_request(request, scene);
   if (!rooms) return rooms.error();
   RoomsOptions how;
-  how.residual = how.loss = request.rooms_error;
+  how.residual = how.loss = request.rooms_error, how.cheapest = true;
   if (job.progress) how.scratch = job.progress->scratch;
   RoomsReport found;
   auto transfer = bake_rooms(scene, receivers, *rooms, options, how, &report, &found, job.progress);

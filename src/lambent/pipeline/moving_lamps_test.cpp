@@ -65,7 +65,8 @@ TEST(MovingLamps, LightAFloorAsTheyShould) {
   const Scene floor = make_quad(Vec3(-9, 0, 9), Vec3(18, 0, 0), Vec3(0, 0, -18), 1, 1, Vec3(0.5f));
   const Tracer tracer = *Tracer::build(floor);
   auto at = [&](const std::string& text, Vec3 p = Vec3(0, 1e-4f, 0)) {
-    return direct_light(tracer, {must(text)}, p, Vec3(0, 1, 0), 64, 1).x;
+    const MovingLamp lamp = must(text);
+    return direct_light(tracer, {&lamp, 1}, p, Vec3(0, 1, 0), 64, 1).x;
   };
   EXPECT_NEAR(at("sphere@0,2,0,0.5=3"), 3 * 0.0625f, 1e-3f);         // L (r / d)^2
   EXPECT_NEAR(at("sphere@0,20,0,0.0005=3"), 3 * 6.25e-10f, 1e-12f);  // as small as it is far
