@@ -260,6 +260,10 @@ Result<Field> decode_indirect(const BlobReader& in, const json& object, size_t r
     return Error{where, "directional light of direct-to-indirect transport is sh:2, sh:3 or vector"};
   t.rows = directional_rows(*kind);
   if (auto ok = check_indirect(t, where); !ok) return ok.error();
+  // Files of older builds as they would be written now, so that writing them does not change them.
+  if (!object["surfels"].contains("places")) round_surfels(t.surfels);
+  if (!object["kernels"].contains("bufferView"))
+    if (auto ok = unpack_kernels(pack_kernels(t), t, where); !ok) return ok.error();
   if (*kind == DirectionalKind::none) return Field{{}, std::move(t), DiffuseRows{}};
   return Field{{}, std::move(t), DirectionalRows{*kind}};
 }

@@ -174,6 +174,13 @@ void sum_direct(IndirectDrawing& d, size_t first, size_t count, const IndirectQu
   });
 }
 
+void read_receivers(IndirectDrawing& d, DirectionalKind directional) {
+  const bool directed = directional != DirectionalKind::none;
+  if (directed || !d.objects.made.empty()) send_indirect(d.transfer, d.solve, d.direct);
+  if (directed) read_directional_indirect(d.transfer, d.solve, directional, d.relit);
+  else read_indirect(d.transfer, d.solve, d.relit);
+}
+
 namespace {
 
 // All direct light at leaves: of lamps that stand where they stood it is known, and their lights add up.
@@ -205,10 +212,7 @@ void light_surfels(IndirectDrawing& d, DirectionalKind directional, bool first) 
   else if (first) std::fill(d.solve.x.begin(), d.solve.x.end(), Vec3(0.0f));
   for (int k = 0; k < d.request.frame_bounces; ++k) step_indirect(d.transfer, d.solve, d.direct);
   d.solve_seconds = std::min(d.solve_seconds, seconds_since(start)), start = Clock::now();
-  const bool directed = directional != DirectionalKind::none;
-  if (directed || !d.objects.made.empty()) send_indirect(d.transfer, d.solve, d.direct);
-  if (directed) read_directional_indirect(d.transfer, d.solve, directional, d.relit);
-  else read_indirect(d.transfer, d.solve, d.relit);
+  read_receivers(d, directional);
   d.read_seconds = std::min(d.read_seconds, seconds_since(start));
 }
 
@@ -317,6 +321,24 @@ Vec3 shade_indirect(const IndirectDrawing& d, Vec3 eye, const IndirectQuality& q
   return albedo(scene, triangle, hit.u, hit.v) * light + sent;
 }
 
+IndirectShade bounced_light(const IndirectDrawing& d, const Baked& baked, const RenderOptions& on_objects,
+                            const RenderOptions& in_file) {
+  const SurfaceShade at_objects =
+      d.objects.tracer ? relit_shade(d.objects.lit.scene, d.objects.basis, d.objects.lit.relit, on_objects)()
+                       : SurfaceShade();
+  const SurfaceShade at_receivers = d.request.at == "receivers" ? relit_shade(d.scene, baked.basis, d.relit, in_file)()
+                                                                : SurfaceShade();
+  if (!at_objects && !at_receivers) return {};
+  return [&d, at_receivers, at_objects](const Hit& hit, Vec3 direction, const SurfacePlace& at) {
+    if (at_objects && hit.triangle >= d.objects.first) {
+      Hit own = hit;
+      own.triangle -= uint32_t(d.objects.first);
+      return at_objects(own, direction);
+    }
+    return at_receivers ? at_receivers(hit, direction) : read_surfels(d, d.search->kernels(at));
+  };
+}
+
 void set_sky(IndirectDrawing& d, std::optional<Environment> turned) {
   d.still.sky = std::move(turned), d.still.at_leaves.clear();
   d.still.lamps = make_lamps(d.scene, d.still.sky ? &*d.still.sky : nullptr, true);
@@ -370,31 +392,6 @@ Scene scene_with_lamps(const IndirectDrawing& d) {
   return scene;
 }
 
-namespace {
-
-// Where light that has bounced is not read off surfels at the pixel: at receivers, as the file has them, and on
-// objects.
-IndirectShade bounced_light(const IndirectDrawing& d, const Baked& baked, RenderOptions options) {
-  options.show = RenderOptions::Show::radiosity;
-  const SurfaceShade at_objects = d.objects.tracer
-                                    ? relit_shade(d.objects.lit.scene, d.objects.basis, d.objects.lit.relit, options)()
-                                    : SurfaceShade();
-  options.directional = directional_of(baked.surface);
-  const SurfaceShade at_receivers = d.request.at == "receivers" ? relit_shade(d.scene, baked.basis, d.relit, options)()
-                                                                : SurfaceShade();
-  if (!at_objects && !at_receivers) return {};
-  return [&d, at_receivers, at_objects](const Hit& hit, Vec3 direction, const SurfacePlace& at) {
-    if (at_objects && hit.triangle >= d.objects.first) {
-      Hit own = hit;
-      own.triangle -= uint32_t(d.objects.first);
-      return at_objects(own, direction);
-    }
-    return at_receivers ? at_receivers(hit, direction) : read_surfels(d, d.search->kernels(at));
-  };
-}
-
-}  // namespace
-
 Result<Drawing> draw_indirect(const Baked& baked, const DrawRequest& request, const Job& job) {
   auto show = parse_show(request.show);
   if (!show) return show.error();
@@ -427,6 +424,10 @@ Result<Drawing> draw_indirect(const Baked& baked, const DrawRequest& request, co
   d.solve = make_indirect_solve(d.transfer, albedos);
   if (auto ok = make_objects(d); !ok) return ok.error();
   const RenderOptions options{view->width, view->height, request.spp, around->background(), show->colour};
+  RenderOptions on_objects = options;  // light alone, which what is met multiplies by its colour
+  on_objects.show = RenderOptions::Show::radiosity;
+  RenderOptions in_file = on_objects;
+  in_file.directional = directional;
   Drawing drawing;
   for (double time : times) {
     for (const LampPath& path : d.paths) move_lamp(d.lamps, path, time);
@@ -436,7 +437,7 @@ Result<Drawing> draw_indirect(const Baked& baked, const DrawRequest& request, co
     auto image = render_surfaces(
         d.drawn(), d.sight(), view->camera, options,
         [&]() -> SurfaceShade {
-          return [&, bounced = bounced_light(d, baked, options)](const Hit& hit, Vec3 direction) {
+          return [&, bounced = bounced_light(d, baked, on_objects, in_file)](const Hit& hit, Vec3 direction) {
             return shade_indirect(d, view->camera.eye, {}, hit, direction, nullptr, bounced);
           };
         },

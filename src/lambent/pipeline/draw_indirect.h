@@ -97,6 +97,12 @@ void sum_direct(IndirectDrawing& d, size_t first, size_t count, const IndirectQu
 
 // Light that has bounced, as if what was hit were white.
 using IndirectShade = std::function<Vec3(const Hit&, Vec3 direction, const SurfacePlace&)>;
+// What receivers read, with directions where rows have them, into d.relit.
+void read_receivers(IndirectDrawing& d, DirectionalKind directional);
+// Where light that has bounced is not read off surfels at the pixel: at receivers, as the file has them, and on
+// objects; by options that outlive it, light alone. Else nothing.
+IndirectShade bounced_light(const IndirectDrawing& d, const Baked& baked, const RenderOptions& on_objects,
+                            const RenderOptions& in_file);
 // What a ray of a pixel meets sends towards the eye. `kernels`: what its place reads, where that is known; `bounced`:
 // where light is not read off surfels.
 Vec3 shade_indirect(const IndirectDrawing& d, Vec3 eye, const IndirectQuality& quality, const Hit& hit, Vec3 direction,

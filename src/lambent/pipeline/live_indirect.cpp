@@ -95,6 +95,7 @@ class LiveIndirect : public LiveKind {
     if (solve_due_) d_.solve = make_indirect_solve(d_.transfer, albedos_), solve_due_ = false;
     if (hurry) solve_indirect(d_.transfer, d_.solve, d_.direct, coarse_tolerance, coarse_bounces);
     else solve_indirect(d_.transfer, d_.solve, d_.direct);
+    if (request_.at == "receivers") read_receivers(d_, directional_of(baked_.surface));
     times.relight = 1e3 * since(start);
     if (more) direct_due_ = still_.left > 0;
     return more ? Light::partial : hurry ? Light::draft : Light::whole;
@@ -107,9 +108,12 @@ class LiveIndirect : public LiveKind {
     const bool keeps = pass.sample == 0 && d_.show.part != Show::Part::direct && pass.rays.rays.size() <= kept_kernels;
     if (keeps && kept.size() != pass.rays.rays.size()) kept.assign(pass.rays.rays.size(), Kernels{.count = SIZE_MAX});
     const IndirectQuality quality = pass.hurry ? hurried_indirect : IndirectQuality();
+    at_receivers_.show = RenderOptions::Show::radiosity, at_receivers_.directional = directional_of(baked_.surface);
     return [this, &kept, keeps, quality, &rays = pass.rays.rays, eye = pass.eye]() -> RayShade {
-      return [this, &kept, keeps, quality, &rays, eye](size_t ray) {
+      const IndirectShade bounced = bounced_light(d_, baked_, at_receivers_, at_receivers_);
+      return [this, &kept, keeps, quality, &rays, eye, bounced](size_t ray) {
         const Hit& hit = rays[ray].hit;
+        if (bounced) return shade_indirect(d_, eye, quality, hit, rays[ray].direction, nullptr, bounced);
         if (keeps && kept[ray].count == SIZE_MAX) kept[ray] = kernels_at(d_, hit);
         return shade_indirect(d_, eye, quality, hit, rays[ray].direction, keeps ? &kept[ray] : nullptr);
       };
@@ -141,7 +145,6 @@ class LiveIndirect : public LiveKind {
   // What pictures one by one have alone.
   Result<void> check() const {
     const char* const option = !request_.insert.empty()   ? "--insert"
-                             : request_.at != "pixels"    ? "--at"
                              : request_.frame_bounces > 0 ? "--frame-bounces"
                                                           : nullptr;
     if (option) return Error{option, "is of `render` where light is direct to indirect: no window draws it", true};
@@ -162,6 +165,7 @@ class LiveIndirect : public LiveKind {
     move_lamps();
     if (before.lamp != request_.lamp || before.move != request_.move || before.time != request_.time)
       direct_due_ = due.light = true;
+    if (before.at != request_.at) due.light = direct_due_ = true;
     if (!shone && d_.still.shines()) still_due_ = true;
     if (before.albedo == request_.albedo) return {};
     due.light = direct_due_ = true;
@@ -177,6 +181,7 @@ class LiveIndirect : public LiveKind {
   LiveSkies skies_ = {};
   IndirectDrawing d_;
   std::vector<Vec3> albedos_ = {};
+  RenderOptions at_receivers_ = {};  // light alone, where it is read there
   bool sky_due_ = false, sky_coarse_ = false, still_due_ = true, direct_due_ = true, solve_due_ = true;
   Sweep still_ = {}, direct_ = {};
   std::array<std::vector<Kernels>, 5> kernels_ = {};  // by scale, of the first sample's rays
