@@ -37,34 +37,19 @@ struct Sweep {
 class LiveIndirect : public LiveKind {
  public:
   LiveIndirect(const Baked& baked, const DrawRequest& request, const Job& job)
-      : baked_(baked),
-        request_(request),
-        job_(job),
-        d_{request_, job_, std::get<IndirectTransfer>(baked.surface.store), {}} {}
+      : LiveKind(baked, request, job), d_{request_, job_, std::get<IndirectTransfer>(baked.surface.store), {}} {}
 
   Result<void> begin(const LiveSkies& skies) {
     if (auto ok = check(); !ok) return ok;
     auto show = parse_show(request_.show);
     if (!show) return show.error();
+    at_receivers_.show = RenderOptions::Show::radiosity, at_receivers_.directional = directional_of(baked_.surface);
     d_.show = *show, d_.scene = baked_.scene, skies_ = skies;
     set_sky(d_, turned(0));
     if (auto ok = read_lamps(d_); !ok) return ok;
     move_lamps();
     if (auto ok = paint(); !ok) return ok;
     return make_places(d_);
-  }
-
-  Result<Due> ask(const DrawRequest& request, const LiveSkies& skies) override {
-    const DrawRequest before = std::exchange(request_, request);
-    const LiveSkies old = std::exchange(skies_, skies);
-    Due due;
-    auto made = change(before, due);
-    if (made) return due;
-    request_ = before, skies_ = old;
-    Due again;
-    if (skies_.env[0]) sky_due_ = true;
-    (void)change(request, again);
-    return made.error();
   }
 
   const Scene& scene() const override { return d_.scene; }
@@ -108,7 +93,6 @@ class LiveIndirect : public LiveKind {
     const bool keeps = pass.sample == 0 && d_.show.part != Show::Part::direct && pass.rays.rays.size() <= kept_kernels;
     if (keeps && kept.size() != pass.rays.rays.size()) kept.assign(pass.rays.rays.size(), Kernels{.count = SIZE_MAX});
     const IndirectQuality quality = pass.hurry ? hurried_indirect : IndirectQuality();
-    at_receivers_.show = RenderOptions::Show::radiosity, at_receivers_.directional = directional_of(baked_.surface);
     return [this, &kept, keeps, quality, &rays = pass.rays.rays, eye = pass.eye]() -> RayShade {
       const IndirectShade bounced = bounced_light(d_, baked_, at_receivers_, at_receivers_);
       return [this, &kept, keeps, quality, &rays, eye, bounced](size_t ray) {
@@ -150,7 +134,8 @@ class LiveIndirect : public LiveKind {
     if (option) return Error{option, "is of `render` where light is direct to indirect: no window draws it", true};
     return {};
   }
-  Result<void> change(const DrawRequest& before, Due& due) {
+  void restore_sky() override { sky_due_ = sky_due_ || skies_.env[0]; }
+  Result<void> change(const DrawRequest& before, Due& due) override {
     if (auto ok = check(); !ok) return ok;
     auto show = parse_show(request_.show);
     if (!show) return show.error();
@@ -175,10 +160,6 @@ class LiveIndirect : public LiveKind {
     return make_places(d_);
   }
 
-  const Baked& baked_;
-  DrawRequest request_;
-  Job job_;
-  LiveSkies skies_ = {};
   IndirectDrawing d_;
   std::vector<Vec3> albedos_ = {};
   RenderOptions at_receivers_ = {};  // light alone, where it is read there
@@ -191,9 +172,7 @@ class LiveIndirect : public LiveKind {
 
 Result<std::unique_ptr<LiveKind>> make_live_indirect(const Baked& baked, const DrawRequest& request,
                                                      const LiveSkies& skies, const Job& job) {
-  auto made = std::make_unique<LiveIndirect>(baked, request, job);
-  if (auto ok = made->begin(skies); !ok) return ok.error();
-  return std::unique_ptr<LiveKind>(std::move(made));
+  return make_live<LiveIndirect>(baked, request, skies, job);
 }
 
 }  // namespace lambent

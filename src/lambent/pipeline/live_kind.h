@@ -5,6 +5,7 @@
 #include <lambent/render/render.h>
 
 #include <array>
+#include <utility>
 
 namespace lambent {
 
@@ -17,6 +18,9 @@ struct LiveSkies {
 
 class LiveKind {
  public:
+  // `baked` must outlive it.
+  LiveKind(const Baked& baked, const DrawRequest& request, const Job& job)
+      : baked_(baked), request_(request), job_(job) {}
   virtual ~LiveKind() = default;
 
   // What a request makes anew.
@@ -24,7 +28,18 @@ class LiveKind {
     bool light = false, rays = false, shades = false;
   };
   // What is shown from now on, under these skies. On an error all stays as it was.
-  virtual Result<Due> ask(const DrawRequest& request, const LiveSkies& skies) = 0;
+  Result<Due> ask(const DrawRequest& request, const LiveSkies& skies) {
+    const DrawRequest before = std::exchange(request_, request);
+    const LiveSkies old = std::exchange(skies_, skies);
+    Due due;
+    auto made = change(before, due);
+    if (made) return due;
+    request_ = before, skies_ = old;
+    Due again;
+    restore_sky();
+    (void)change(request, again);
+    return made.error();
+  }
 
   virtual const Scene& scene() const = 0;
   virtual const Tracer& tracer() const = 0;
@@ -47,7 +62,26 @@ class LiveKind {
   };
   virtual std::function<RayShade()> shade(const Pass& pass) = 0;
   virtual bool shades_coarsely() const { return false; }  // in a hurry
+
+ protected:
+  // To request_ and skies_, from what was asked for before.
+  virtual Result<void> change(const DrawRequest& before, Due& due) = 0;
+  virtual void restore_sky() {}  // of which more may be kept than skies_
+
+  const Baked& baked_;
+  DrawRequest request_;
+  Job job_;
+  LiveSkies skies_ = {};
 };
+
+// A kind by its begin(skies).
+template <class Kind>
+Result<std::unique_ptr<LiveKind>> make_live(const Baked& baked, const DrawRequest& request, const LiveSkies& skies,
+                                            const Job& job) {
+  auto made = std::make_unique<Kind>(baked, request, job);
+  if (auto ok = made->begin(skies); !ok) return ok.error();
+  return std::unique_ptr<LiveKind>(std::move(made));
+}
 
 // `baked` must outlive it. Errors: as draw().
 Result<std::unique_ptr<LiveKind>> make_live_indirect(const Baked& baked, const DrawRequest& request,

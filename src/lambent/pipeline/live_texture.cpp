@@ -14,8 +14,7 @@ using LiveClock = std::chrono::steady_clock;
 
 class LiveTexture : public LiveKind {
  public:
-  LiveTexture(const Baked& baked, const DrawRequest& request, const Job& job)
-      : baked_(baked), request_(request), job_(job) {}
+  using LiveKind::LiveKind;
 
   Result<void> begin(const LiveSkies& skies) {
     skies_ = skies;
@@ -28,18 +27,6 @@ class LiveTexture : public LiveKind {
     if (baked_.scene.texcoords[0].empty())
       job_.warn(request_.baked + ": has no texture coordinates, so that the transfer texture shows as one colour");
     return make_pose();
-  }
-
-  Result<Due> ask(const DrawRequest& request, const LiveSkies& skies) override {
-    const DrawRequest before = std::exchange(request_, request);
-    const LiveSkies old = std::exchange(skies_, skies);
-    Due due;
-    auto made = change(before, due);
-    if (made) return due;
-    request_ = before, skies_ = old;
-    Due again;
-    (void)change(request, again);
-    return made.error();
   }
 
   const Scene& scene() const override { return pose_ ? moved_ : baked_.scene; }
@@ -113,7 +100,7 @@ class LiveTexture : public LiveKind {
     tracer_.emplace(std::move(*built));
     return {};
   }
-  Result<void> change(const DrawRequest& was, Due& due) {
+  Result<void> change(const DrawRequest& was, Due& due) override {
     const DrawRequest& is = request_;
     const auto use = [](const DrawRequest& r) {
       return std::tie(r.tile, r.groove_map, r.groove_depth, r.groove_width);
@@ -134,10 +121,6 @@ class LiveTexture : public LiveKind {
     return due.rays ? make_pose() : Result<void>();
   }
 
-  const Baked& baked_;
-  DrawRequest request_;
-  Job job_;
-  LiveSkies skies_ = {};
   Show show_ = {};
   ZonalTexture texture_ = {};
   TextureUse use_ = {};
@@ -154,9 +137,7 @@ class LiveTexture : public LiveKind {
 
 Result<std::unique_ptr<LiveKind>> make_live_texture(const Baked& baked, const DrawRequest& request,
                                                     const LiveSkies& skies, const Job& job) {
-  auto made = std::make_unique<LiveTexture>(baked, request, job);
-  if (auto ok = made->begin(skies); !ok) return ok.error();
-  return std::unique_ptr<LiveKind>(std::move(made));
+  return make_live<LiveTexture>(baked, request, skies, job);
 }
 
 }  // namespace lambent
