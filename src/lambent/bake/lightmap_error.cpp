@@ -333,6 +333,19 @@ struct LightmapSolver {
   }
 };
 
+// By how much denser than at the second look texels must be to lose no more than `error`, where the first, half as
+// dense, lost `first`: the square is a part 1/x, of shadows' edges, and a part 1/x^4, of light that look-ups take as
+// linear.
+double denser(double first, double second, double error) {
+  const double all = second * second, edges = std::clamp((16 * all - first * first) / 14, 0.0, all);
+  double low = 0.5, high = 1e6;
+  while (high > 1.001 * low) {
+    const double x = std::sqrt(low * high);
+    (edges / x + (all - edges) / (x * x * x * x) > error * error ? low : high) = x;
+  }
+  return high;
+}
+
 }  // namespace
 
 Result<SolvedLightmap> solve_lightmap_to_error(const Scene& scene, const Tracer& tracer, const Receivers& receivers,
@@ -384,10 +397,8 @@ Result<float> lightmap_density(const Scene& scene, const Lamps& lamps, double er
     if (!certificate) return certificate.error();
     lost[k] = std::max(certificate->error, 0.0);
   }
-  // Between the slopes of shadows' edges and of smooth light.
-  const double slope = lost[1] > 0 ? std::clamp(std::log2(lost[0] / lost[1]), 0.5, 1.5) : 1.5;
-  const double wanted = density * std::pow(std::max(lost[1], 1e-6) / (part * error), 1 / slope);
-  const double taken = std::clamp(wanted, density / 2, limit);
+  const double wanted = density * denser(lost[0], lost[1], part * error);
+  const double taken = std::min(wanted, limit);
   if (remark)
     *remark = fmt::format("{:.3g} texels a unit, {} (at {:.3g} look-ups lose {:.1f}%)", taken,
                           wanted > limit

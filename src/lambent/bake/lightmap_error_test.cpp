@@ -148,5 +148,23 @@ TEST(LightmapError, DensityFollowsTheError) {
   EXPECT_NEAR(double(*limited) * double(*limited) * area, 60'000, 600);
 }
 
+TEST(LightmapError, DensityIsEnoughForTheError) {
+  SKIP_UNDER_SANITIZERS();
+  const Scene scene = make_yard();
+  const Environment sky = make_environment(
+      "sky", 64, 32, [](Vec3 d) { return Vec3(dot(d, normalize(Vec3(1, 1, 0.4f))) > 0.99f ? 40.0f : 0.2f); });
+  const Lamps lamps = make_lamps(scene, &sky, false);
+  LightmapOptions options{.bounces = 1};
+  options.error = 0.04;
+  auto density = lightmap_density(scene, lamps, options.error, 4'000'000, 1, nullptr);
+  ASSERT_TRUE(density);
+  Yard yard(*density);
+  yard.lamps = lamps;
+  LightmapReport report;
+  yard.bake(options, &report);
+  EXPECT_LT(report.certificate.error - report.certificate.uncertain, options.error);
+  EXPECT_GT(report.certificate.error, 0.4 * options.error);  // nor much finer than it asks for
+}
+
 }  // namespace
 }  // namespace lambent
