@@ -16,7 +16,7 @@ set(lambent_relight_sources
   src/lambent/basis/directional.cpp
   src/lambent/basis/haar.cpp
   src/lambent/basis/hemispherical.cpp
-  src/lambent/basis/pseudo_inverse.cpp
+  src/lambent/basis/symmetric.cpp
   src/lambent/basis/quadrature.cpp
   src/lambent/basis/sh.cpp
   src/lambent/basis/sh_convert.cpp

@@ -1,27 +1,46 @@
-add_executable(lambent-tests ${lambent_tests} ${tool_tests} apps/lambent/serve.cpp)
-target_link_libraries(lambent-tests PRIVATE lambent GTest::gtest GTest::gtest_main nlohmann_json::nlohmann_json
-  fmt::fmt OpenEXR::OpenEXR TBB::tbb CLI11::CLI11
-  PkgConfig::webp draco::draco $<LINK_ONLY:meshoptimizer::meshoptimizer>)
+# Under the sanitizers the library is what is checked: tests that another build has compiled may be linked to it, whose
+# list of objects LAMBENT_TEST_OBJECTS names. Of functions that both have, in headers, the linker takes the first: the
+# library's, whole.
+set(LAMBENT_TEST_OBJECTS "" CACHE FILEPATH "Link the objects that this file lists, and compile no tests")
 set(lambent_golden ${CMAKE_CURRENT_SOURCE_DIR}/tests/golden)
-# Not of every test: a path on the command line is one that the compiler's cache cannot share with other checkouts, as
-# it cannot where sources are compiled together, which are named by whole paths.
-if(LAMBENT_TOGETHER)
-  target_compile_definitions(lambent-tests PRIVATE LAMBENT_GOLDEN="${lambent_golden}")
+set(test_libraries lambent GTest::gtest nlohmann_json::nlohmann_json fmt::fmt OpenEXR::OpenEXR TBB::tbb CLI11::CLI11
+  PkgConfig::webp draco::draco)
+if(LAMBENT_TEST_OBJECTS)
+  file(STRINGS ${LAMBENT_TEST_OBJECTS} test_objects)
+  set_property(DIRECTORY APPEND PROPERTY CMAKE_CONFIGURE_DEPENDS ${LAMBENT_TEST_OBJECTS})
 else()
-  set_property(SOURCE src/lambent/c/lambent_test.cpp src/lambent/pipeline/draw_test.cpp
-    src/lambent/pipeline/golden_test.cpp src/lambent/pipeline/live_test.cpp src/lambent/pipeline/draw_indirect_test.cpp
-    src/lambent/pipeline/live_kinds_test.cpp src/lambent/pipeline/live_look_test.cpp
-    APPEND PROPERTY COMPILE_DEFINITIONS LAMBENT_GOLDEN="${lambent_golden}")
+  add_library(lambent-test-objects OBJECT ${lambent_tests} ${tool_tests})
+  target_link_libraries(lambent-test-objects PRIVATE ${test_libraries})
+  # Not of every test: a path on the command line is one that the compiler's cache cannot share with other checkouts,
+  # as it cannot where sources are compiled together, which are named by whole paths.
+  if(LAMBENT_TOGETHER)
+    target_compile_definitions(lambent-test-objects PRIVATE LAMBENT_GOLDEN="${lambent_golden}")
+  else()
+    set_property(SOURCE src/lambent/c/lambent_test.cpp src/lambent/pipeline/draw_test.cpp
+      src/lambent/pipeline/golden_test.cpp src/lambent/pipeline/live_test.cpp
+      src/lambent/pipeline/draw_indirect_test.cpp src/lambent/pipeline/live_kinds_test.cpp
+      src/lambent/pipeline/live_look_test.cpp APPEND PROPERTY COMPILE_DEFINITIONS LAMBENT_GOLDEN="${lambent_golden}")
+  endif()
+  target_include_directories(lambent-test-objects PRIVATE ${CMAKE_CURRENT_SOURCE_DIR}/tests)
+  target_compile_options(lambent-test-objects PRIVATE -Wall -Wextra -Wno-missing-field-initializers)
+  # Most of what a test compiles are these headers.
+  target_precompile_headers(lambent-test-objects PRIVATE <gtest/gtest.h> <algorithm> <cmath> <filesystem> <functional>
+    <map> <string> <variant> <vector>)
+  lambent_compile_together(lambent-test-objects ${lambent_tests} ${tool_tests})
+  # What is hot in tests is the library: less optimised they build in two thirds of the time, and under the sanitizers
+  # those of the readers in a third.
+  target_compile_options(lambent-test-objects PRIVATE
+    $<IF:$<BOOL:${LAMBENT_SANITIZE}>,-O0,$<$<CONFIG:Release>:-O1>>)
+  set(test_objects $<FILTER:$<TARGET_OBJECTS:lambent-test-objects>,EXCLUDE,[.]gch$>)
+  file(GENERATE OUTPUT test_objects.txt CONTENT "$<JOIN:${test_objects},\n>\n")
 endif()
-target_include_directories(lambent-tests PRIVATE ${CMAKE_CURRENT_SOURCE_DIR}/tests)
-target_compile_options(lambent-tests PRIVATE -Wall -Wextra -Wno-missing-field-initializers)
-# Most of what a test compiles are these headers.
-target_precompile_headers(lambent-tests PRIVATE <gtest/gtest.h> <algorithm> <cmath> <filesystem> <functional> <map>
-  <string> <variant> <vector>)
-lambent_compile_together(lambent-tests ${lambent_tests} ${tool_tests})
-# What is hot in tests is the library: less optimised they build in two thirds of the time, and under the sanitizers
-# those of the readers in a third.
-target_compile_options(lambent-tests PRIVATE $<IF:$<BOOL:${LAMBENT_SANITIZE}>,-O0,$<$<CONFIG:Release>:-O1>>)
+add_executable(lambent-tests ${test_objects} apps/lambent/serve.cpp)
+target_link_libraries(lambent-tests PRIVATE ${test_libraries} GTest::gtest_main
+  $<LINK_ONLY:meshoptimizer::meshoptimizer>)
+if(LAMBENT_TEST_OBJECTS)
+  target_link_options(lambent-tests BEFORE PRIVATE LINKER:--whole-archive $<TARGET_FILE:lambent>
+    $<TARGET_FILE:lambent_relight> LINKER:--no-whole-archive)
+endif()
 
 # A few processes of many tests and not one a test, which under the sanitizers would take longer to start than to run.
 # One test is `lambent-tests --gtest_filter=NAME`.

@@ -3,16 +3,14 @@
 // release build.
 #include <gtest/gtest.h>
 
-#if defined(__SANITIZE_ADDRESS__)
-#define LAMBENT_SANITIZED 1
-#elif defined(__has_feature)
-#if __has_feature(address_sanitizer)
-#define LAMBENT_SANITIZED 1
-#endif
-#endif
+extern "C" void __asan_init() __attribute__((weak));
 
-#ifdef LAMBENT_SANITIZED
-#define SKIP_UNDER_SANITIZERS() GTEST_SKIP() << "long, and only accuracy: run without sanitizers"
-#else
-#define SKIP_UNDER_SANITIZERS() static_cast<void>(0)
-#endif
+namespace lambent {
+
+// Whether the program is linked with the address sanitizer: asked as it runs, since tests are compiled once for both.
+inline bool under_sanitizers() { return __asan_init != nullptr; }
+
+}  // namespace lambent
+
+#define SKIP_UNDER_SANITIZERS() \
+  if (lambent::under_sanitizers()) GTEST_SKIP() << "long, and only accuracy: run without sanitizers"

@@ -256,11 +256,8 @@ TEST_F(Serve, MemoryStaysFlat) {
   std::vector<int> idle;  // ask for much, and take nothing of it
   for (int i = 0; i < 100; ++i) say(idle.emplace_back(connected(port_)), get(port_, "/huge", ""));
   for (int i = 0; i < 500; ++i) ask(port_, get(port_, "/data/large", ""));
-#ifdef LAMBENT_SANITIZED  // whose allocator keeps so much of what was given back
-  const size_t kept = size_t{256} << 20;
-#else
-  const size_t kept = 0;
-#endif
+  // The sanitizers' allocator keeps so much of what was given back.
+  const size_t kept = under_sanitizers() ? size_t{256} << 20 : 0;
   EXPECT_LT(resident_bytes(), before + kept + (size_t{4} << 20));
   for (int s : idle) ::close(s);
 }

@@ -1,6 +1,6 @@
 #include <lambent/bake/response.h>
 #include <lambent/basis/hemispherical.h>
-#include <lambent/basis/svd.h>
+#include <lambent/basis/symmetric.h>
 #include <lambent/core/check.h>
 #include <lambent/core/parallel.h>
 #include <lambent/core/sampling.h>
@@ -208,24 +208,34 @@ FactoredResponse factor_response(const ViewMap& response, int max_rows, double t
       for (int j = 0; j < n; ++j)
         A[(size_t(i) * 4 + size_t(c)) * size_t(n) + size_t(j)] = seen.back() * response.values[size_t(i * n + j)][c];
   }
-  const Svd d = thin_svd(A, nodes * 4, n);
+  // A = U S V^T by the eigenvectors V of A^T A, n x n: singular values below 1e-8 of the greatest are rounding.
+  std::vector<double> gram(size_t(n) * size_t(n));
+  for (size_t at = 0; at < A.size(); at += size_t(n))
+    for (size_t j = 0; j < size_t(n); ++j)
+      for (size_t k = 0; k < size_t(n); ++k) gram[j * size_t(n) + k] += A[at + j] * A[at + k];
+  const SymmetricEigen d = symmetric_eigen(gram, n);
   FactoredResponse f;
-  f.singular_values = d.s;
   double total = 0;
-  for (double s : d.s) total += s * s;
+  for (double square : d.values) {
+    total += std::max(square, 0.0);
+    f.singular_values.push_back(std::sqrt(std::max(square, 0.0)));
+  }
   double left = total;
-  while (f.rows < std::min(max_rows, d.k) && (f.rows == 0 || left > tolerance * tolerance * total))
-    left -= d.s[size_t(f.rows)] * d.s[size_t(f.rows)], ++f.rows;
+  while (f.rows < std::min(max_rows, n) && (f.rows == 0 || left > tolerance * tolerance * total))
+    left -= std::max(d.values[size_t(f.rows)], 0.0), ++f.rows;
   f.error = total > 0 ? std::sqrt(std::max(left, 0.0) / total) : 0;
   f.h.resize(size_t(f.rows) * size_t(n));
   for (int r = 0; r < f.rows; ++r)
-    for (int j = 0; j < n; ++j) f.h[size_t(r * n + j)] = float(d.V[size_t(j * d.k + r)]);
+    for (int j = 0; j < n; ++j) f.h[size_t(r * n + j)] = float(d.vectors[size_t(j * n + r)]);
   f.g = {response.grid, f.rows, std::vector<ViewWeights>(size_t(nodes) * size_t(f.rows))};
   for (int i = 0; i < nodes; ++i)
     for (int r = 0; r < f.rows; ++r)
-      for (int c = 0; c < 4; ++c)
-        f.g.values[size_t(i * f.rows + r)][c] =
-            float(d.U[(size_t(i) * 4 + size_t(c)) * size_t(d.k) + size_t(r)] * d.s[size_t(r)] / seen[size_t(i)]);
+      for (int c = 0; c < 4; ++c) {
+        double sum = 0;
+        for (int j = 0; j < n; ++j)
+          sum += A[(size_t(i) * 4 + size_t(c)) * size_t(n) + size_t(j)] * d.vectors[size_t(j * n + r)];
+        f.g.values[size_t(i * f.rows + r)][c] = float(sum / seen[size_t(i)]);
+      }
   f.constant = f.rows == 1;
   for (const ViewWeights& w : f.g.values) {
     const ViewWeights apart = abs(w - f.g.values[0]);

@@ -1,7 +1,7 @@
 // Follows: P. Gautron, J. Krivanek, S. Pattanaik, K. Bouatouch, "A novel hemispherical basis for accurate and efficient
 // rendering" (2004); general-prt (least-squares optimal hemispherical SH).
 #include <lambent/basis/hemispherical.h>
-#include <lambent/basis/pseudo_inverse.h>
+#include <lambent/basis/symmetric.h>
 #include <lambent/basis/quadrature.h>
 #include <lambent/core/check.h>
 

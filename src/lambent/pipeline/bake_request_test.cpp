@@ -181,12 +181,8 @@ const std::map<std::string, Change> changes{
 
 // Every option with every kind: refused by name, or baked, and then it has an effect.
 TEST_F(Requests, EveryOptionHasAnEffectOrIsRefusedByName) {
-  std::map<std::string, std::string> known;  // fingerprints by request: many options change the same one
-#ifdef LAMBENT_SANITIZED
-  constexpr size_t of_each = 3;  // every option with some kinds, every kind with some options
-#else
-  constexpr size_t of_each = 1;
-#endif
+  std::map<std::string, std::string> known;           // fingerprints by request: many options change the same one
+  const size_t of_each = under_sanitizers() ? 3 : 1;  // every option with some kinds, every kind with some options
   for (int k = 0; k < int(std::size(bake_kind_names)); ++k) {
     size_t index = size_t(k);
     for (const Option<BakeRequest>& o : bake_options()) {
@@ -363,8 +359,8 @@ TEST_F(Requests, PlansSayReceiversAndBytesBeforeTheWork) {
   }
 }
 
-#ifndef LAMBENT_SANITIZED  // whose allocator counts otherwise
 TEST_F(Requests, TwoHundredLeaveMemoryWhereItWas) {
+  if (under_sanitizers()) GTEST_SKIP() << "their allocator counts otherwise";
   const BakeRequest request = must_read(least(BakeKind::diffuse));
   size_t before = 0;
   for (int i = 0; i < 220; ++i) {
@@ -374,7 +370,6 @@ TEST_F(Requests, TwoHundredLeaveMemoryWhereItWas) {
   // A leak of a hundred bytes a request would show; what threads keep for themselves does not grow with requests.
   EXPECT_LT(double(::mallinfo2().uordblks), double(before) + 200 * 100);
 }
-#endif
 
 }  // namespace
 }  // namespace lambent
