@@ -48,6 +48,7 @@ set(lambent_relight_sources
   src/lambent/light/project.cpp
   src/lambent/light/sky.cpp
   src/lambent/relight/arriving.cpp
+  src/lambent/relight/block_kernels.cpp
   src/lambent/relight/factors.cpp
   src/lambent/relight/fix_light.cpp
   src/lambent/relight/indirect.cpp
