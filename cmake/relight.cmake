@@ -43,6 +43,7 @@ set(lambent_relight_sources
   src/lambent/core/sampling.cpp
   src/lambent/core/uri.cpp
   src/lambent/core/write_file.cpp
+  src/lambent/light/cube_cut.cpp
   src/lambent/light/cube_light.cpp
   src/lambent/light/environment.cpp
   src/lambent/light/project.cpp

@@ -17,9 +17,9 @@ namespace {
 namespace HWY_NAMESPACE {
 
 constexpr size_t lanes = hn::MaxLanes(F());
-// A row of sums: one vector where there are 16 lanes, of which the last four are another row's and mean nothing.
+// A row of sums: one vector where there are 16 lanes, of which the last four are 0.
 using R = hn::CappedTag<float, lanes == 16 ? 16 : 4>;
-constexpr size_t row_lanes = hn::MaxLanes(R()), row_parts = (sum_width + row_lanes - 1) / row_lanes;
+constexpr size_t row_lanes = hn::MaxLanes(R()), row_parts = (12 + row_lanes - 1) / row_lanes;
 
 struct Row {
   hn::Vec<R> v[row_parts];
@@ -88,14 +88,17 @@ void ReadSight(BlockScratch& s, const Visibility& visibility, size_t receiver, b
       if (!want_rows) continue;
       const auto base = (uint32_t(w) * 32 + bit) * uint32_t(block_texels);
       uint32_t* to = s.rows.data() + s.row_count;
-      // Sixteen at a time, past the end of the block's, but not past the end of all.
+      // By whole lanes, 32 at least, past the end of the block's, but not past the end of all.
       int i = 0;
-      if (last - c.where >= count + int(hn::Lanes(du)))
-        for (; i < count; i += int(hn::Lanes(du)))
-          hn::StoreU(hn::Add(hn::PromoteTo(du, hn::LoadU(B(), c.where + i)), hn::Set(du, base)), du, to + i);
+      if (last - c.where >= block_texels + 32) {
+        do
+          for (const int end = i + 32; i < end; i += int(hn::Lanes(du)))
+            hn::StoreU(hn::Add(hn::PromoteTo(du, hn::LoadU(B(), c.where + i)), hn::Set(du, base)), du, to + i);
+        while (i < count);
+      }
       for (; i < count; ++i) to[i] = base + c.where[i];
       if constexpr (binary) {
-        if (count % 2) to[count++] = uint32_t(blocks) * uint32_t(block_texels);  // a row of nothing
+        to[count] = uint32_t(blocks) * uint32_t(block_texels), count += count & 1;  // a row of nothing
       } else {
         for (int k = 0, before = 0; k < count; ++k) {
           s.steps[s.row_count + size_t(k)] = float(int(c.level[k]) - before) * scale, before = c.level[k];
@@ -109,19 +112,23 @@ void ReadSight(BlockScratch& s, const Visibility& visibility, size_t receiver, b
 // Light of the runs that ReadSight() found, and of clear blocks.
 template <bool binary>
 Row SumSeen(const BlockScratch& s, const BlockLight& light, size_t words) {
-  Row even = ZeroRow(), odd = ZeroRow();
+  Row even = ZeroRow(), odd = even, third = even, fourth = even;
   const float* sums = light.sums.data();
   const uint32_t* at = s.rows.data();
+  auto row = [&](size_t i) { return sums + sum_width * at[i]; };
+  size_t i = 0;
   if constexpr (binary) {
-    size_t i = 0;
-    for (; i + 4 <= s.row_count; i += 4) {
-      AddDifference(even, sums + sum_width * at[i], sums + sum_width * at[i + 1]);
-      AddDifference(odd, sums + sum_width * at[i + 2], sums + sum_width * at[i + 3]);
+    for (; i + 8 <= s.row_count; i += 8) {
+      AddDifference(even, row(i), row(i + 1)), AddDifference(odd, row(i + 2), row(i + 3));
+      AddDifference(third, row(i + 4), row(i + 5)), AddDifference(fourth, row(i + 6), row(i + 7));
     }
-    if (i < s.row_count) AddDifference(even, sums + sum_width * at[i], sums + sum_width * at[i + 1]);
+    for (; i < s.row_count; i += 2) AddDifference(even, row(i), row(i + 1));
   } else {
-    for (size_t i = 0; i < s.row_count; ++i) AddTimes(i % 2 ? odd : even, s.steps[i], LoadRow(sums + sum_width * at[i]));
+    for (; i + 2 <= s.row_count; i += 2)
+      AddTimes(even, s.steps[i], LoadRow(row(i))), AddTimes(odd, s.steps[i + 1], LoadRow(row(i + 1)));
+    if (i < s.row_count) AddTimes(even, s.steps[i], LoadRow(row(i)));
   }
+  AddRow(even, third), AddRow(odd, fourth);
   for (size_t w = 0; w < words; ++w) {
     const float* whole = light.whole.data() + w * 32 * sum_width;
     uint32_t bits = s.clear[w];

@@ -18,8 +18,8 @@ struct Terms {
   const MeasuredTable* table = nullptr;
 };
 
-// A row of the light's sums; rows begin at multiples of it, and there is room for four numbers more behind the last.
-inline constexpr size_t sum_width = 12;
+// A row of the light's sums has twelve numbers, and begins on a cache line.
+inline constexpr size_t sum_width = 16;
 inline constexpr size_t nodes_each[3] = {1, 4, 16}, coarse_each = 20;
 
 // Roughness as it is evaluated.

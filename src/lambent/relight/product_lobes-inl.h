@@ -27,11 +27,32 @@ HWY_INLINE V Along(Vec3 a, V x, V y, V z) {
   return hn::MulAdd(Fill(a.x), x, hn::MulAdd(Fill(a.y), y, hn::Mul(Fill(a.z), z)));
 }
 
-// x^n for x in [0, 1].
+// 2^x for x in [-126, 0].
+HWY_INLINE V Exp2(V x) {
+  const hn::RebindToSigned<F> di;
+  const V whole = hn::Round(x), r = hn::Sub(x, whole);
+  V p = Fill(1.54035304e-4f);  // Taylor's: below half a unit in the last place for |r| <= 1/2
+  for (float c : {1.33335581e-3f, 9.61812911e-3f, 5.55041087e-2f, 2.40226507e-1f, 6.93147181e-1f, 1.0f})
+    p = hn::MulAdd(p, r, Fill(c));
+  return hn::BitCast(F(), hn::Add(hn::BitCast(di, p), hn::ShiftLeft<23>(hn::ConvertTo(di, whole))));
+}
+HWY_INLINE V ExpOfNegative(V x) {
+  return Exp2(hn::Max(hn::Mul(x, Fill(std::numbers::log2e_v<float>)), Fill(-126.0f)));
+}
+
+// x^n for x in [0, 1]: whole n by squares.
 HWY_INLINE V Power(V x, float n) {
   const F d;
-  const V least = Fill(1e-30f);
-  return hn::IfThenZeroElse(hn::Le(x, least), hn::Exp(d, hn::Mul(Fill(n), hn::Log(d, hn::Max(x, least)))));
+  if (n == float(int(n))) {
+    V result = Fill(1.0f), square = x;
+    for (int bits = int(n); bits; bits >>= 1) {
+      if (bits & 1) result = hn::Mul(result, square);
+      square = hn::Mul(square, square);
+    }
+    return result;
+  }
+  const V least = Fill(1e-30f), log = hn::Log(d, hn::Max(x, least));
+  return hn::IfThenZeroElse(hn::Le(x, least), ExpOfNegative(hn::Mul(Fill(n), log)));
 }
 
 // Each lobe gives s_k(wi), `count` of them, for unit wi of the world. Above the horizon alone, but for Phong's, which
@@ -68,7 +89,7 @@ struct WardLobe {
     const V ax = hn::Mul(h.hx, Fill(1 / t.alpha.x)), ay = hn::Mul(h.hy, Fill(1 / t.alpha.y));
     const V inverse = hn::Div(Fill(1.0f), hn::Mul(h.hz, h.hz));
     const V slopes = hn::Mul(hn::MulAdd(ax, ax, hn::Mul(ay, ay)), inverse);
-    const V bell = hn::Exp(F(), hn::Max(hn::Neg(slopes), Fill(-80.0f)));
+    const V bell = ExpOfNegative(hn::Neg(slopes));
     const V scale = hn::Mul(hn::Mul(h.square, Fill(1 / (pi * t.alpha.x * t.alpha.y))), hn::Mul(inverse, inverse));
     s[0] = hn::IfThenElseZero(h.above, hn::Mul(bell, scale));
   }
@@ -117,7 +138,7 @@ struct CookTorranceLobe {
     const V one = Fill(1.0f), length = hn::Sqrt(h.square), cosine = hn::Mul(Fill(0.5f), length);
     const V hz = hn::Div(h.hz, length), inverse = hn::Div(one, hn::Mul(h.hz, h.hz));
     const V slopes = hn::Mul(hn::MulAdd(h.hx, h.hx, hn::Mul(h.hy, h.hy)), hn::Mul(inverse, Fill(1 / (t.alpha.x * t.alpha.x))));
-    const V bell = hn::Exp(F(), hn::Max(hn::Neg(slopes), Fill(-80.0f)));
+    const V bell = ExpOfNegative(hn::Neg(slopes));
     const V wz = hn::Max(h.wz, Fill(least_cosine));
     const V masking = hn::Min(one, hn::Div(hn::Mul(hn::Add(hz, hz), hn::Min(wz, Fill(t.wo.z))), cosine));
     const V hz2 = hn::Mul(hz, hz);
