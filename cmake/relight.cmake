@@ -43,11 +43,13 @@ set(lambent_relight_sources
   src/lambent/core/sampling.cpp
   src/lambent/core/uri.cpp
   src/lambent/core/write_file.cpp
+  src/lambent/light/cube_cut.cpp
   src/lambent/light/cube_light.cpp
   src/lambent/light/environment.cpp
   src/lambent/light/project.cpp
   src/lambent/light/sky.cpp
   src/lambent/relight/arriving.cpp
+  src/lambent/relight/block_kernels.cpp
   src/lambent/relight/factors.cpp
   src/lambent/relight/fix_light.cpp
   src/lambent/relight/indirect.cpp

@@ -7,18 +7,20 @@ namespace lambent {
 
 // A BRDF for one view: lambert + sum of colour[k] s_k(wi), s_k numbers, `count` of them.
 struct Terms {
-  enum class Kind { none, phong, ward, ggx, other } kind = Kind::none;
-  int count = 0;
+  enum class Kind { none, phong, ward, ggx, cook_torrance, measured } kind = Kind::none;
+  int count = 0;  // ggx: 3 with a base below it; cook_torrance: 1 where all channels reflect alike
   Vec3 lambert{0}, colour[3];
   Mat3 frame;
   Vec3 wo, mirror;  // in the frame; in the world
   float exponent = 0;
   Vec2 alpha{1};
-  bool layered = false;  // ggx: with a base below it, the third term
-  const Brdf* brdf = nullptr;
+  Vec3 index{0};  // of refraction, of f0; 0: of an f0 of 1
+  const MeasuredTable* table = nullptr;
 };
 
-inline constexpr size_t sum_width = 12, nodes_each[3] = {1, 4, 16}, coarse_each = 21;
+// A row of the light's sums has twelve numbers, and begins on a cache line.
+inline constexpr size_t sum_width = 16;
+inline constexpr size_t nodes_each[3] = {1, 4, 16}, coarse_each = 20;
 
 // Roughness as it is evaluated.
 inline Vec2 widths(Vec2 alpha) { return max(alpha, Vec2(min_alpha)); }
@@ -33,11 +35,5 @@ void evaluate_terms(const Terms& t, const float* x, const float* y, const float*
 // with n; or, `plain`, as they are.
 void integrate_texels(const float* light, const float* weight, Vec3 n, const float* terms, int count, bool plain,
                       uint32_t rows, Vec3* sums);
-
-// s_k at the texels of `rows` from its values at side x side nodes, [k][16]; out is [k][256].
-void interpolate_terms(const float* nodes, const float* cardinal, int side, int count, uint32_t rows, float* out);
-
-// eq. 6 and line 9: light summed over what is seen of a block, 12 numbers.
-void sum_seen(const float* sums, const BlockChanges& changes, float scale, float* out);
 
 }  // namespace lambent

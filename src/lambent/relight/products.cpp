@@ -2,7 +2,7 @@
 #include <lambent/core/check.h>
 #include <lambent/core/parallel.h>
 #include <lambent/core/pool.h>
-#include <lambent/relight/product_kernels.h>
+#include <lambent/relight/block_kernels.h>
 
 #include <bit>
 #include <mutex>
@@ -10,10 +10,6 @@
 
 namespace lambent {
 namespace {
-
-Vec3 contract(const float* m, Vec3 n) {
-  return n.x * Vec3(m[0], m[1], m[2]) + n.y * Vec3(m[4], m[5], m[6]) + n.z * Vec3(m[8], m[9], m[10]);
-}
 
 // Exponent of a Phong lobe as wide as the model's: half-vector slopes of width alpha turn the mirror image by twice the
 // angle.
@@ -64,33 +60,11 @@ std::array<float, 4> phong_errors(float exponent, float angle, float half_width,
 }
 
 struct Scratch {
-  alignas(64) float terms[3 * block_texels], weights[block_texels], nodes[3 * 16], sum[sum_width];
-  AlignedVector<float> middles;
+  BlockScratch blocks;
+  alignas(64) float terms[3 * block_texels], weights[block_texels];
 };
 
 constexpr uint32_t all_rows = (1u << block_side) - 1;
-
-// Rows of a block, a bit each, of which anything is seen.
-uint32_t rows_seen(const BlockChanges& c) {
-  uint32_t rows = 0;
-  for (int i = 0; i < c.count; ++i) {
-    if (c.level_after(i) == 0) continue;
-    const int first = c.where[i] / block_side,
-              last = ((i + 1 < c.count ? c.where[i + 1] : block_texels) - 1) / block_side;
-    rows |= (2u << last) - (1u << first);
-  }
-  return rows;
-}
-
-// s_k at a block's own directions of light, in `rows`.
-void evaluate_block(const Terms& t, const float* light, uint32_t rows, float* out) {
-  while (rows) {
-    const int first = std::countr_zero(rows), count = std::countr_one(rows >> first);
-    const float* l = light + first * block_side;
-    evaluate_terms(t, l, l + 256, l + 512, size_t(count) * block_side, out + first * block_side, block_texels);
-    rows &= ~(((1u << count) - 1) << first);
-  }
-}
 
 void expand(const BlockChanges& c, float scale, float* weights) {
   int t = 0;
@@ -108,117 +82,6 @@ Vec3 total(const Terms& t, const Vec3* sums) {
   return out;
 }
 
-// 0 for none, 1 to 4 for 1, 4, 16, 256 samples, for a block whose middle is at this cosine from the mirror image of the
-// view.
-int sample_class(const ProductMaterial& m, float cosine) {
-  int k = 0;
-  while (k < 4 && cosine > m.cosines[size_t(k)]) ++k;
-  return k;
-}
-
-// The same from values at 16 nodes and the middle: 1 sample where they are alike, 16 where those give the middle's
-// value back, else 256.
-int class_by_values(const Terms& t, const ProductMaterial& m, const Cube& cube, const float* nodes, const float* middle,
-                    size_t stride) {
-  float least = INFINITY, most = 0, centre = 0, back = 0;
-  const std::vector<float>& c = cube.cardinal[2];
-  for (int i = 0; i < 16; ++i) {
-    float value = 0;
-    for (int k = 0; k < t.count; ++k) value += largest(t.colour[k]) * nodes[16 * k + i];
-    least = std::min(least, value), most = std::max(most, value);
-    // Halfway between texels 7 and 8, along both sides.
-    back += value * 0.5f * (c[size_t(i % 4 * 16 + 7)] + c[size_t(i % 4 * 16 + 8)]) * 0.5f *
-            (c[size_t(i / 4 * 16 + 7)] + c[size_t(i / 4 * 16 + 8)]);
-  }
-  for (int k = 0; k < t.count; ++k) centre += largest(t.colour[k]) * middle[size_t(k) * stride];
-  least = std::min(least, centre), most = std::max(most, centre);
-  if (pi * (most - least) < m.tolerance) return 1;
-  return pi * std::abs(back - centre) < 0.25f * m.tolerance && most < 2 * least ? 3 : 4;
-}
-
-Vec3 shade_blocks_with(Scratch& s, const BlockLight& light, const Visibility& visibility, size_t receiver,
-                       const ProductMaterial& material, const Mat3& frame, Vec3 wo, Breakdown& tally) {
-  const Terms t = make_terms(material.brdf, frame, wo);
-  if (!(t.wo.z > least_cosine)) return Vec3(0);
-  const Cube& cube = *light.cube;
-  const size_t blocks = size_t(cube.blocks()), stride = cube.nodes[0].x.size();
-  const Vec3 n = frame[2];
-  const float scale = 1 / float(visibility.top());
-  if (t.count > 0) {
-    s.middles.resize(3 * stride);
-    evaluate_terms(t, cube.nodes[0].x.data(), cube.nodes[0].y.data(), cube.nodes[0].z.data(), stride, s.middles.data(),
-                   stride);
-  }
-  Vec3 sums[4] = {};
-  VisibilityReader reader(visibility, receiver);
-  for (size_t b = 0; b < blocks; ++b) {
-    const BlockSight sight = reader.sight(int(b));
-    if (sight == BlockSight::blocked) {
-      ++tally.blocked;
-      continue;
-    }
-    const bool clear = sight == BlockSight::clear;
-    const BlockChanges changes = clear ? BlockChanges{} : reader.next();
-    const float* coarse = light.coarse.data() + b * coarse_each * sum_width;
-    if (!clear) sum_seen(light.sums.data() + b * block_texels * sum_width, changes, scale, s.sum);
-    const Vec3 seen = contract(clear ? coarse : s.sum, n);
-    sums[0] += seen;
-    const float* texels = light.texels.data() + b * 6 * block_texels;
-    auto integrate = [&](uint32_t rows) {
-      if (!clear) expand(changes, scale, s.weights);
-      integrate_texels(texels, clear ? nullptr : s.weights, n, s.terms, t.count, false, rows, sums);
-    };
-    int samples = 0;
-    if (t.count > 0) {
-      samples = sample_class(material, dot(t.mirror, cube.nodes[0].at(b)));
-      if (material.by_values && samples < 4) {
-        evaluate_terms(t, &cube.nodes[2].x[16 * b], &cube.nodes[2].y[16 * b], &cube.nodes[2].z[16 * b], 16, s.nodes,
-                       16);
-        samples = class_by_values(t, material, cube, s.nodes, &s.middles[b], stride);
-      }
-      // Samples below the horizon say nothing about the block's part above it.
-      if (!clear && t.kind != Terms::Kind::phong && samples == 1 && dot(n, cube.nodes[0].at(b)) <= 0) samples = 4;
-      // Nor do nodes below it, where the model's values break off.
-      if (!clear && t.kind != Terms::Kind::phong && samples > 1 &&
-          dot(n, cube.nodes[0].at(b)) < std::sin(cube.reach[b]))
-        samples = 4;
-    }
-    if (samples == 1) {
-      for (int k = 0; k < t.count; ++k) sums[k + 1] += s.middles[size_t(k) * stride + b] * seen;
-    } else if (samples == 2 || samples == 3) {
-      const DirectionArray& nodes = cube.nodes[size_t(samples - 1)];
-      const size_t each = nodes_each[samples - 1];
-      const float* cardinal = coarse + (samples == 2 ? 1 : 5) * sum_width;
-      alignas(64) float x[16], y[16], z[16];
-      for (size_t i = 0; i < 16; ++i) {
-        const size_t j = each * b + std::min(i, each - 1);
-        x[i] = nodes.x[j], y[i] = nodes.y[j], z[i] = nodes.z[j];
-      }
-      evaluate_terms(t, x, y, z, 16, s.nodes, 16);
-      if (clear) {
-        for (int k = 0; k < t.count; ++k) {
-          float m[sum_width] = {};
-          for (size_t i = 0; i < each; ++i)
-            for (size_t l = 0; l < sum_width; ++l) m[l] += s.nodes[16 * size_t(k) + i] * cardinal[i * sum_width + l];
-          sums[k + 1] += contract(m, n);
-        }
-      } else {
-        const uint32_t rows = rows_seen(changes);
-        const size_t grid = size_t(samples - 1);
-        interpolate_terms(s.nodes, cube.cardinal[grid].data(), node_sides[grid], t.count, rows, s.terms);
-        integrate(rows);
-      }
-    } else if (samples == 4) {
-      const uint32_t rows = clear ? all_rows : rows_seen(changes);
-      evaluate_block(t, texels, rows, s.terms);
-      integrate(rows);
-    }
-    ++tally.samples[size_t(std::max(samples, 1) - 1)];
-    ++(clear ? tally.light_brdf : samples <= 1 ? tally.light_visibility : tally.triple);
-  }
-  return total(t, sums);
-}
-
 Vec3 shade_standard_with(Scratch& s, const BlockLight& light, const Visibility& visibility, size_t receiver,
                          const ProductMaterial& material, const Mat3& frame, Vec3 wo) {
   const Terms t = make_terms(material.brdf, frame, wo);
@@ -231,7 +94,7 @@ Vec3 shade_standard_with(Scratch& s, const BlockLight& light, const Visibility& 
     if (sight == BlockSight::blocked) continue;
     if (sight == BlockSight::mixed) expand(reader.next(), scale, s.weights);
     const float* texels = light.texels.data() + size_t(b) * 6 * block_texels;
-    evaluate_block(t, texels, all_rows, s.terms);
+    evaluate_terms(t, texels, texels + 256, texels + 512, block_texels, s.terms, block_texels);
     const float* weights = sight == BlockSight::clear ? nullptr : s.weights;
     integrate_texels(texels, weights, frame[2], s.terms, t.count, true, all_rows, sums);
   }
@@ -240,12 +103,27 @@ Vec3 shade_standard_with(Scratch& s, const BlockLight& light, const Visibility& 
 
 }  // namespace
 
+namespace {
+
+void set_cube(BlockLight& out, int size) {
+  if (out.cube && out.cube->size == size) return;
+  out.cube = std::make_shared<const Cube>(make_cube(size)), out.rise.clear();
+  for (float reach : out.cube->reach) out.rise.push_back(std::sin(reach));
+  // Halfway between texels 7 and 8, along both sides.
+  const std::vector<float>& c = out.cube->cardinal[2];
+  auto half_way = [&](size_t i) { return 0.5f * (c[i * 16 + 7] + c[i * 16 + 8]); };
+  for (size_t i = 0; i < 16; ++i) out.middle_weights[i] = half_way(i % 4) * half_way(i / 4);
+}
+
+}  // namespace
+
 void set_light(BlockLight& out, const CubeLight& light) {
-  if (!out.cube || out.cube->size != light.size) out.cube = std::make_shared<const Cube>(make_cube(light.size));
+  set_cube(out, light.size);
   const Cube& cube = *out.cube;
   const size_t blocks = size_t(cube.blocks());
-  out.texels.resize(blocks * 6 * block_texels), out.sums.resize(blocks * block_texels * sum_width),
-      out.coarse.resize(blocks * coarse_each * sum_width);
+  // Rows are read by sixteen numbers.
+  out.texels.resize(blocks * 6 * block_texels), out.sums.resize((blocks * block_texels + 2) * sum_width),
+      out.whole.resize((blocks + 1) * sum_width), out.coarse.resize((blocks * coarse_each + 1) * sum_width);
   parallel_for(blocks, 8, [&](size_t begin, size_t end) {
     for (size_t b = begin; b < end; ++b) {
       float* texels = out.texels.data() + b * 6 * block_texels;
@@ -260,9 +138,9 @@ void set_light(BlockLight& out, const CubeLight& light) {
           for (size_t c = 0; c < 3; ++c) m[4 * k + c] = d[int(k)] * e[int(c)];
         }
         float* sums = out.sums.data() + (b * block_texels + t) * sum_width;
-        for (size_t i = 0; i < sum_width; ++i) sum[i] += double(m[i]), sums[i] = float(sum[i]), coarse[i] = sums[i];
+        for (size_t i = 0; i < sum_width; ++i) sum[i] += double(m[i]), sums[i] = float(sum[i]);
         const size_t x = t % block_side, y = t / block_side;
-        float* at = coarse + sum_width;
+        float* at = coarse;
         for (size_t k = 1; k < 3; ++k) {
           const size_t side = size_t(node_sides[k]);
           for (size_t j = 0; j < side; ++j)
@@ -272,6 +150,7 @@ void set_light(BlockLight& out, const CubeLight& light) {
             }
         }
       }
+      std::copy_n(out.sums.data() + b * block_texels * sum_width, sum_width, out.whole.data() + b * sum_width);
     }
   });
 }
@@ -323,13 +202,16 @@ Vec3 diffuse_albedo(const Brdf& brdf) {
 void Breakdown::add(const Breakdown& b) {
   blocked += b.blocked, light_brdf += b.light_brdf, light_visibility += b.light_visibility, triple += b.triple;
   for (size_t k = 0; k < 4; ++k) samples[k] += b.samples[k];
+  times.visibility += b.times.visibility, times.brdf += b.times.brdf, times.integral += b.times.integral,
+      times.receivers += b.times.receivers;
 }
 
 Vec3 shade_blocks(const BlockLight& light, const Visibility& visibility, size_t receiver,
                   const ProductMaterial& material, const Mat3& frame, Vec3 wo, Breakdown* breakdown) {
   Scratch s;
   Breakdown tally;
-  const Vec3 out = shade_blocks_with(s, light, visibility, receiver, material, frame, wo, tally);
+  const Vec3 out = shade_blocks_in_simd(s.blocks, light, visibility, receiver, material,
+                                        make_terms(material.brdf, frame, wo), tally);
   if (breakdown) breakdown->add(tally);
   return out;
 }
@@ -441,7 +323,8 @@ void shade_receivers(Product product, const BlockLight& light, const HaarLight* 
       const Vec3 wo = normalize_or(eye - receivers.positions[r], frame[2]);
       Vec3 value(0);
       if (product == Product::blocks) {
-        value = shade_blocks_with(*s, light, visibility, r, material, frame, wo, tally);
+        value = shade_blocks_in_simd(s->blocks, light, visibility, r, material, make_terms(material.brdf, frame, wo),
+                                     tally, breakdown && i % 64 == 0 ? &tally.times : nullptr);
       } else if (product == Product::standard) {
         value = shade_standard_with(*s, light, visibility, r, material, frame, wo);
       } else {

@@ -23,8 +23,11 @@ namespace lambent {
 struct BlockLight {
   std::shared_ptr<const Cube> cube;
   AlignedVector<float> texels;  // standard: [block][direction x, y, z, energy r, g, b][256]
-  AlignedVector<float> sums;    // eq. 6: [block][texel][12], M summed from the texel to the block's end
-  AlignedVector<float> coarse;  // [block][1 + 4 + 16][12], M times the cardinal functions of 1, 4 and 16 samples
+  AlignedVector<float> sums;    // eq. 6: [block][texel][12], M summed from the texel to the block's end; and a 0
+  AlignedVector<float> whole;   // [block][12], M summed over the block
+  AlignedVector<float> coarse;  // [block][4 + 16][12], M times the cardinal functions of 4 and 16 samples
+  std::vector<float> rise;      // by block, sine of its reach: its part of the horizon
+  std::array<float, 16> middle_weights{};  // of the values at 16 nodes, in what they interpolate at a block's middle
 };
 // Rebuilds all three. Allocates the first time only.
 void set_light(BlockLight& out, const CubeLight& light);
@@ -53,10 +56,17 @@ ProductMaterial make_product_material(const Brdf& brdf, const Cube& cube, const 
 // Colour of the Lambert part; 0 where the model has none of its own (Ggx, Measured).
 Vec3 diffuse_albedo(const Brdf& brdf);
 
-// Blocks by what was done with them (Table 1) and by BRDF samples (Table 2).
+// Nanoseconds of a thread that some receivers took, stage by stage: which blocks are seen and where; BRDFs; sums.
+struct StageTimes {
+  double visibility = 0, brdf = 0, integral = 0;
+  size_t receivers = 0;
+};
+
+// Blocks by what was done with them (Table 1) and by BRDF samples (Table 2); of one receiver in 64 what its stages took.
 struct Breakdown {
   size_t blocked = 0, light_brdf = 0, light_visibility = 0, triple = 0;
   std::array<size_t, 4> samples{0, 0, 0, 0};  // 1, 4, 16, 256
+  StageTimes times = {};
   void add(const Breakdown& b);
 };
 

@@ -1,0 +1,524 @@
+// Follows: locally-adaptive-products, section 4 (Algorithm 1).
+#include <lambent/relight/block_kernels.h>
+
+#include <bit>
+#include <chrono>
+#include <cstring>
+
+#undef HWY_TARGET_INCLUDE
+#define HWY_TARGET_INCLUDE "lambent/relight/block_kernels.cpp"
+#include <hwy/foreach_target.h>
+#include <hwy/highway.h>
+#include <lambent/relight/product_lobes-inl.h>
+
+HWY_BEFORE_NAMESPACE();
+namespace lambent {
+namespace {
+namespace HWY_NAMESPACE {
+
+constexpr size_t lanes = hn::MaxLanes(F());
+// A row of sums: one vector where there are 16 lanes, of which the last four are 0.
+using R = hn::CappedTag<float, lanes == 16 ? 16 : 4>;
+constexpr size_t row_lanes = hn::MaxLanes(R()), row_parts = (12 + row_lanes - 1) / row_lanes;
+
+struct Row {
+  hn::Vec<R> v[row_parts];
+};
+HWY_INLINE Row ZeroRow() {
+  Row r;
+  for (auto& v : r.v) v = hn::Zero(R());
+  return r;
+}
+HWY_INLINE Row LoadRow(const float* p) {
+  Row r;
+  for (size_t i = 0; i < row_parts; ++i) r.v[i] = hn::LoadU(R(), p + i * row_lanes);
+  return r;
+}
+HWY_INLINE void AddRow(Row& to, const Row& a) {
+  for (size_t i = 0; i < row_parts; ++i) to.v[i] = hn::Add(to.v[i], a.v[i]);
+}
+HWY_INLINE void AddDifference(Row& to, const float* a, const float* b) {
+  for (size_t i = 0; i < row_parts; ++i)
+    to.v[i] = hn::Add(to.v[i], hn::Sub(hn::LoadU(R(), a + i * row_lanes), hn::LoadU(R(), b + i * row_lanes)));
+}
+HWY_INLINE void AddTimes(Row& to, float scale, const Row& a) {
+  for (size_t i = 0; i < row_parts; ++i) to.v[i] = hn::MulAdd(hn::Set(R(), scale), a.v[i], to.v[i]);
+}
+HWY_INLINE Vec3 Contract(const Row& row, Vec3 n) {
+  alignas(64) float m[row_parts * row_lanes];
+  for (size_t i = 0; i < row_parts; ++i) hn::Store(row.v[i], R(), m + i * row_lanes);
+  return n.x * Vec3(m[0], m[1], m[2]) + n.y * Vec3(m[4], m[5], m[6]) + n.z * Vec3(m[8], m[9], m[10]);
+}
+
+// The low bit of each pair, of 32 pairs.
+HWY_INLINE uint32_t EvenBits(uint64_t x) {
+  x &= 0x5555555555555555;
+  x = (x | x >> 1) & 0x3333333333333333, x = (x | x >> 2) & 0x0f0f0f0f0f0f0f0f;
+  x = (x | x >> 4) & 0x00ff00ff00ff00ff, x = (x | x >> 8) & 0x0000ffff0000ffff;
+  return uint32_t(x | x >> 16);
+}
+
+// Which blocks are seen, and of mixed ones that no lobe reaches the rows of the sums that are begins and ends of what is
+// seen, so that summing them is one loop.
+template <bool binary>
+void ReadSight(BlockScratch& s, const Visibility& visibility, size_t receiver, bool want_rows) {
+  using U = hn::CappedTag<uint32_t, 16>;
+  using B = hn::Rebind<uint8_t, U>;
+  const U du;
+  const size_t blocks = size_t(visibility.blocks()), words = (blocks + 31) / 32;
+  const uint8_t* flags = visibility.data.data() + visibility.begin[receiver];
+  const uint8_t* last = visibility.data.data() + visibility.data.size();
+  const uint8_t* at = flags + visibility.flag_bytes();
+  const float scale = 1 / float(visibility.top());
+  s.row_count = 0, s.changes.clear();
+  for (size_t w = 0; w < words; ++w) {
+    uint64_t pairs = 0;
+    std::memcpy(&pairs, flags + 8 * w, std::min<size_t>(8, visibility.flag_bytes() - 8 * w));
+    s.clear[w] = EvenBits(pairs), s.mixed[w] = EvenBits(pairs >> 1);
+    for (uint32_t bits = s.mixed[w]; bits; bits &= bits - 1) {
+      const auto bit = uint32_t(std::countr_zero(bits));
+      int count = *at & 127;
+      if (*at++ & 128) count |= int(*at++) << 7;
+      const BlockChanges c{at, binary ? nullptr : at + count, count};
+      at += binary ? count : 2 * count;
+      if (s.lit[w] >> bit & 1) {
+        s.changes.push_back(c);
+        continue;
+      }
+      if (!want_rows) continue;
+      const auto base = (uint32_t(w) * 32 + bit) * uint32_t(block_texels);
+      uint32_t* to = s.rows.data() + s.row_count;
+      // By whole lanes, 32 at least, past the end of the block's, but not past the end of all.
+      int i = 0;
+      if (last - c.where >= block_texels + 32) {
+        do
+          for (const int end = i + 32; i < end; i += int(hn::Lanes(du)))
+            hn::StoreU(hn::Add(hn::PromoteTo(du, hn::LoadU(B(), c.where + i)), hn::Set(du, base)), du, to + i);
+        while (i < count);
+      }
+      for (; i < count; ++i) to[i] = base + c.where[i];
+      if constexpr (binary) {
+        to[count] = uint32_t(blocks) * uint32_t(block_texels), count += count & 1;  // a row of nothing
+      } else {
+        for (int k = 0, before = 0; k < count; ++k) {
+          s.steps[s.row_count + size_t(k)] = float(int(c.level[k]) - before) * scale, before = c.level[k];
+        }
+      }
+      s.row_count += size_t(count);
+    }
+  }
+}
+
+// Light of the runs that ReadSight() found, and of clear blocks.
+template <bool binary>
+Row SumSeen(const BlockScratch& s, const BlockLight& light, size_t words) {
+  Row even = ZeroRow(), odd = even, third = even, fourth = even;
+  const float* sums = light.sums.data();
+  const uint32_t* at = s.rows.data();
+  auto row = [&](size_t i) { return sums + sum_width * at[i]; };
+  size_t i = 0;
+  if constexpr (binary) {
+    for (; i + 8 <= s.row_count; i += 8) {
+      AddDifference(even, row(i), row(i + 1)), AddDifference(odd, row(i + 2), row(i + 3));
+      AddDifference(third, row(i + 4), row(i + 5)), AddDifference(fourth, row(i + 6), row(i + 7));
+    }
+    for (; i < s.row_count; i += 2) AddDifference(even, row(i), row(i + 1));
+  } else {
+    for (; i + 2 <= s.row_count; i += 2)
+      AddTimes(even, s.steps[i], LoadRow(row(i))), AddTimes(odd, s.steps[i + 1], LoadRow(row(i + 1)));
+    if (i < s.row_count) AddTimes(even, s.steps[i], LoadRow(row(i)));
+  }
+  AddRow(even, third), AddRow(odd, fourth);
+  for (size_t w = 0; w < words; ++w) {
+    const float* whole = light.whole.data() + w * 32 * sum_width;
+    uint32_t bits = s.clear[w];
+    while (bits) {
+      AddRow(even, LoadRow(whole + size_t(std::countr_zero(bits)) * sum_width));
+      bits &= bits - 1;
+      if (!bits) break;
+      AddRow(odd, LoadRow(whole + size_t(std::countr_zero(bits)) * sum_width));
+      bits &= bits - 1;
+    }
+  }
+  AddRow(even, odd);
+  return even;
+}
+
+// Light of what is seen of one mixed block.
+HWY_INLINE Row SumChanges(const float* sums, const BlockChanges& c, float scale) {
+  Row out = ZeroRow();
+  int before = 0;
+  for (int i = 0; i < c.count; ++i) {
+    const int after = c.level_after(i);
+    AddTimes(out, float(after - before) * scale, LoadRow(sums + sum_width * c.where[i]));
+    before = after;
+  }
+  return out;
+}
+
+// Texels of a block that are seen: a bit each, and how much of each where that is not all.
+struct Seen {
+  uint16_t rows[block_side];
+  const float* weights = nullptr;
+};
+void ReadTexels(const BlockChanges& c, float scale, float* weights, Seen& out) {
+  uint64_t bits[4] = {};
+  if (!c.level) {
+    // Runs end where the count of changes up to there is even.
+    for (int i = 0; i < c.count; ++i) bits[c.where[i] >> 6] |= uint64_t{1} << (c.where[i] & 63);
+    uint64_t carry = 0;
+    for (uint64_t& word : bits) {
+      for (int shift = 1; shift < 64; shift *= 2) word ^= word << shift;
+      word ^= carry, carry = 0 - (word >> 63);
+    }
+    out.weights = nullptr;
+  } else {
+    int t = 0;
+    float now = 0;
+    for (int i = 0; i < c.count; ++i) {
+      for (; t < c.where[i]; ++t) weights[t] = now, bits[t >> 6] |= uint64_t(now > 0) << (t & 63);
+      now = float(c.level[i]) * scale;
+    }
+    for (; t < block_texels; ++t) weights[t] = now, bits[t >> 6] |= uint64_t(now > 0) << (t & 63);
+    out.weights = weights;
+  }
+  for (size_t r = 0; r < size_t(block_side); ++r) out.rows[r] = uint16_t(bits[r / 4] >> (r % 4 * 16));
+}
+
+// Sums over texels, of a term: by channel.
+template <int count>
+struct TexelSums {
+  V acc[count][3];
+  TexelSums() {
+    for (auto& a : acc)
+      for (V& v : a) v = hn::Zero(F());
+  }
+};
+
+// Adds light x what is seen x s_k x cosine over a block, where term(row, column) gives s_k; `seen` null: all of it.
+template <int count, class Term>
+HWY_INLINE void AddTexels(TexelSums<count>& sums, const float* light, const Seen* seen, Vec3 n, Term term) {
+  const F d;
+  const V nx = Fill(n.x), ny = Fill(n.y), nz = Fill(n.z);
+  for (size_t row = 0; row < size_t(block_side); ++row) {
+    const uint32_t bits = seen ? seen->rows[row] : 0xffffu;
+    if (!bits) continue;
+    for (size_t column = 0; column < size_t(block_side); column += lanes) {
+      const float* l = light + row * block_side + column;
+      const V x = hn::Load(d, l), y = hn::Load(d, l + 256), z = hn::Load(d, l + 512);
+      V cosine = hn::MulAdd(nx, x, hn::MulAdd(ny, y, hn::Mul(nz, z)));
+      if (seen && seen->weights) {
+        cosine = hn::Mul(cosine, hn::Load(d, seen->weights + row * block_side + column));
+      } else if (bits != 0xffffu) {
+        const auto part = uint16_t(bits >> column);
+        uint8_t bytes[8] = {};
+        std::memcpy(bytes, &part, 2);
+        cosine = hn::IfThenElseZero(hn::LoadMaskBits(d, bytes), cosine);
+      }
+      V s[count];
+      term(row, column, x, y, z, s);
+      const V r = hn::Load(d, l + 768), g = hn::Load(d, l + 1024), b = hn::Load(d, l + 1280);
+      for (int k = 0; k < count; ++k) {
+        const V f = hn::Mul(cosine, s[k]);
+        sums.acc[k][0] = hn::MulAdd(f, r, sums.acc[k][0]), sums.acc[k][1] = hn::MulAdd(f, g, sums.acc[k][1]),
+        sums.acc[k][2] = hn::MulAdd(f, b, sums.acc[k][2]);
+      }
+    }
+  }
+}
+
+// s_k at 16 nodes of a block, [k][16].
+template <class Lobe>
+HWY_INLINE void AtNodes(const Lobe& lobe, const float* x, const float* y, const float* z, float* out) {
+  const F d;
+  for (size_t i = 0; i < 16; i += lanes) {
+    V s[Lobe::count];
+    lobe(hn::LoadU(d, x + i), hn::LoadU(d, y + i), hn::LoadU(d, z + i), s);
+    for (int k = 0; k < Lobe::count; ++k) hn::Store(s[k], d, out + 16 * k + i);
+  }
+}
+
+// The same of the 4 or 16 nodes of a block's class, those of 4 and others.
+template <class Lobe>
+HWY_INLINE void AtBlockNodes(const Lobe& lobe, const Cube& cube, int samples, size_t b, float* out) {
+  const DirectionArray& nodes = cube.nodes[size_t(samples - 1)];
+  if (samples == 3) return AtNodes(lobe, &nodes.x[16 * b], &nodes.y[16 * b], &nodes.z[16 * b], out);
+  alignas(64) float at[3][16];
+  for (size_t i = 0; i < 16; ++i) {
+    const size_t j = 4 * b + std::min<size_t>(i, 3);
+    at[0][i] = nodes.x[j], at[1][i] = nodes.y[j], at[2][i] = nodes.z[j];
+  }
+  AtNodes(lobe, at[0], at[1], at[2], out);
+}
+
+// How many samples a lobe of which values alone are known wants of a block (1: one, 3: 16, 4: 256), from those at 16
+// nodes and at its middle: one where they are alike, 16 where those give the middle's value back.
+template <int count>
+int ClassByValues(const Terms& t, const ProductMaterial& m, const BlockLight& light, const float* nodes, const float* middle,
+                  size_t stride) {
+  const F d;
+  V least = Fill(INFINITY), most = hn::Zero(d), back = hn::Zero(d);
+  for (size_t i = 0; i < 16; i += lanes) {
+    V value = hn::Zero(d);
+    for (int k = 0; k < count; ++k)
+      value = hn::MulAdd(Fill(largest(t.colour[k])), hn::Load(d, nodes + 16 * k + i), value);
+    least = hn::Min(least, value), most = hn::Max(most, value);
+    back = hn::MulAdd(value, hn::LoadU(d, light.middle_weights.data() + i), back);
+  }
+  float centre = 0;
+  for (int k = 0; k < count; ++k) centre += largest(t.colour[k]) * middle[size_t(k) * stride];
+  const float low = std::min(hn::GetLane(hn::MinOfLanes(d, least)), centre),
+              high = std::max(hn::GetLane(hn::MaxOfLanes(d, most)), centre);
+  if (pi * (high - low) < m.tolerance) return 1;
+  const float off = std::abs(hn::GetLane(hn::SumOfLanes(d, back)) - centre);
+  return pi * off < 0.25f * m.tolerance && high < 2 * low ? 3 : 4;
+}
+
+// s_k of a block by interpolation between its nodes.
+template <int count>
+struct Interpolated {
+  const float *along, *cardinal;  // [k][node column][row], [node column][column]
+  int side;
+  HWY_INLINE void operator()(size_t row, size_t column, V, V, V, V* s) const {
+    const F d;
+    for (int k = 0; k < count; ++k) {
+      const float* a = along + 64 * k + row;
+      s[k] = hn::Mul(Fill(a[0]), hn::LoadU(d, cardinal + column));
+      for (int i = 1; i < side; ++i) s[k] = hn::MulAdd(Fill(a[16 * i]), hn::LoadU(d, cardinal + 16 * i + column), s[k]);
+    }
+  }
+};
+template <int count>
+Interpolated<count> Interpolate(const float* nodes, const float* cardinal, int side, float* along) {
+  const F d;
+  for (int k = 0; k < count; ++k)
+    for (int i = 0; i < side; ++i)
+      for (size_t row = 0; row < size_t(block_side); row += lanes) {
+        V sum = hn::Zero(d);
+        for (int j = 0; j < side; ++j)
+          sum = hn::MulAdd(Fill(nodes[16 * k + j * side + i]), hn::LoadU(d, cardinal + 16 * size_t(j) + row), sum);
+        hn::Store(sum, d, along + 64 * k + 16 * i + row);
+      }
+  return {along, cardinal, side};
+}
+
+// Blocks that the lobe reaches, of those that are seen; and the lobe at their middles.
+template <class Lobe>
+void FindLit(const Lobe& lobe, BlockScratch& s, const Cube& cube, const ProductMaterial& m) {
+  const F d;
+  const DirectionArray& middles = cube.nodes[0];
+  const size_t stride = middles.x.size();
+  const Vec3 mirror = lobe.t.mirror;
+  for (size_t w = 0; w < s.lit.size(); ++w) s.lit[w] = 0;
+  for (size_t i = 0; i < stride; i += lanes) {
+    const V x = hn::Load(d, &middles.x[i]), y = hn::Load(d, &middles.y[i]), z = hn::Load(d, &middles.z[i]);
+    const V cosine = Along(mirror, x, y, z);
+    hn::Store(cosine, d, &s.cosines[i]);
+    uint8_t bits[8] = {};
+    hn::StoreMaskBits(d, hn::Gt(cosine, Fill(m.cosines[0])), bits);
+    uint32_t reached = 0;
+    std::memcpy(&reached, bits, 2);
+    reached &= (1u << lanes) - 1;
+    if (!reached) continue;
+    s.lit[i / 32] |= reached << (i % 32);
+    V values[Lobe::count];
+    lobe(x, y, z, values);
+    for (int k = 0; k < Lobe::count; ++k) hn::Store(values[k], d, &s.middles[size_t(k) * stride + i]);
+  }
+}
+
+// Samples by class of a block that is lit, 1 to 4, with the lobe at its nodes where values were asked.
+template <class Lobe>
+HWY_INLINE int ClassOf(const Lobe& lobe, BlockScratch& s, const BlockLight& light, const ProductMaterial& m, Vec3 n,
+                       size_t b, bool clear, bool& known) {
+  const Cube& cube = *light.cube;
+  const size_t stride = cube.nodes[0].x.size();
+  int samples = 1;
+  while (samples < 4 && s.cosines[b] > m.cosines[size_t(samples)]) ++samples;
+  if (!std::is_same_v<Lobe, PhongLobe> && !clear && samples < 4) {
+    // Nodes below the horizon say nothing about the block's part above it.
+    const float height = dot(n, cube.nodes[0].at(b));
+    if (height <= 0 || (height < light.rise[b] && samples > 1)) return 4;
+  }
+  if (m.by_values && samples < 4) {
+    const DirectionArray& nodes = cube.nodes[2];
+    AtNodes(lobe, &nodes.x[16 * b], &nodes.y[16 * b], &nodes.z[16 * b], s.nodes);
+    samples = ClassByValues<Lobe::count>(lobe.t, m, light, s.nodes, &s.middles[b], stride), known = true;
+    if (!std::is_same_v<Lobe, PhongLobe> && !clear && samples > 1 && dot(n, cube.nodes[0].at(b)) < light.rise[b])
+      samples = 4;
+  }
+  return samples;
+}
+
+// What a receiver's lobe makes of it.
+template <class Lobe>
+struct LobeSums {
+  Row rows[Lobe::count + 1];  // times 1 (Lambert's law), times each term
+  TexelSums<Lobe::count> texels;
+  LobeSums() {
+    for (Row& r : rows) r = ZeroRow();
+  }
+};
+
+// One block that is lit and seen; `changes` null: clear.
+template <class Lobe>
+void AddLitBlock(const Lobe& lobe, BlockScratch& s, const BlockLight& light, const ProductMaterial& m, Vec3 n, size_t b,
+                 const BlockChanges* changes, float scale, LobeSums<Lobe>& sums, Breakdown& tally) {
+  constexpr int count = Lobe::count;
+  const Cube& cube = *light.cube;
+  const size_t stride = cube.nodes[0].x.size();
+  bool known = false;
+  const int samples = ClassOf(lobe, s, light, m, n, b, !changes, known);
+  ++tally.samples[size_t(samples - 1)];
+  ++(!changes ? tally.light_brdf : samples == 1 ? tally.light_visibility : tally.triple);
+  if (samples == 1 || (changes && lobe.t.lambert != Vec3(0))) {
+    const Row seen = changes ? SumChanges(light.sums.data() + b * block_texels * sum_width, *changes, scale)
+                             : LoadRow(light.whole.data() + b * sum_width);
+    if (changes) AddRow(sums.rows[0], seen);
+    if (samples == 1)
+      for (int k = 0; k < count; ++k) AddTimes(sums.rows[k + 1], s.middles[size_t(k) * stride + b], seen);
+  }
+  if (samples == 1) return;
+  const size_t grid = size_t(samples - 1), each = samples < 4 ? nodes_each[grid] : 0;
+  if (samples < 4 && !known) AtBlockNodes(lobe, cube, samples, b, s.nodes);
+  if (samples < 4 && !changes) {
+    const float* row = light.coarse.data() + (b * coarse_each + (samples == 2 ? 0 : 4)) * sum_width;
+    for (size_t i = 0; i < each; ++i, row += sum_width) {
+      const Row cardinal = LoadRow(row);
+      for (size_t k = 0; k < size_t(count); ++k) AddTimes(sums.rows[k + 1], s.nodes[16 * k + i], cardinal);
+    }
+    return;
+  }
+  Seen seen;
+  if (changes) ReadTexels(*changes, scale, s.weights, seen);
+  const float* texels = light.texels.data() + b * 6 * block_texels;
+  if (samples < 4) {
+    AddTexels(sums.texels, texels, &seen, n,
+              Interpolate<count>(s.nodes, cube.cardinal[grid].data(), node_sides[grid], s.along));
+  } else {
+    AddTexels(sums.texels, texels, changes ? &seen : nullptr, n,
+              [&](size_t, size_t, V x, V y, V z, V* out) HWY_ATTR { lobe(x, y, z, out); });
+  }
+}
+
+// What BRDFs took of that, done once more.
+template <class Lobe>
+void EvaluateLit(const Lobe& lobe, BlockScratch& s, const BlockLight& light, const ProductMaterial& m, Vec3 n) {
+  const F d;
+  const Cube& cube = *light.cube;
+  V sink = hn::Zero(d);
+  for (size_t w = 0; w < s.lit.size(); ++w)
+    for (uint32_t bits = (s.clear[w] | s.mixed[w]) & s.lit[w]; bits; bits &= bits - 1) {
+      const auto bit = uint32_t(std::countr_zero(bits));
+      const size_t b = w * 32 + bit;
+      bool known = false;
+      const int samples = ClassOf(lobe, s, light, m, n, b, s.clear[w] >> bit & 1, known);
+      if (samples > 1 && samples < 4 && !known) AtBlockNodes(lobe, cube, samples, b, s.nodes);
+      const float* l = light.texels.data() + b * 6 * block_texels;
+      for (size_t i = 0; i < size_t(block_texels) && samples == 4; i += lanes) {
+        V values[Lobe::count];
+        lobe(hn::Load(d, l + i), hn::Load(d, l + 256 + i), hn::Load(d, l + 512 + i), values);
+        for (V v : values) sink = hn::Add(sink, v);
+      }
+    }
+  hn::Store(sink, d, s.along);
+}
+
+// What a stage took, where it is asked for.
+struct Clock {
+  StageTimes* times;
+  std::chrono::steady_clock::time_point at = {};
+  explicit Clock(StageTimes* t) : times(t) {
+    if (times) at = std::chrono::steady_clock::now(), ++times->receivers;
+  }
+  void Stage(double StageTimes::*of) {
+    if (!times) return;
+    const auto now = std::chrono::steady_clock::now();
+    times->*of += std::chrono::duration<double, std::nano>(now - at).count(), at = now;
+  }
+};
+
+void TallyDiffuse(const BlockScratch& s, size_t blocks, size_t words, Breakdown& tally) {
+  size_t clear = 0, mixed = 0, clear_unlit = 0, mixed_unlit = 0;
+  for (size_t w = 0; w < words; ++w) {
+    clear += size_t(std::popcount(s.clear[w])), mixed += size_t(std::popcount(s.mixed[w]));
+    clear_unlit += size_t(std::popcount(s.clear[w] & ~s.lit[w]));
+    mixed_unlit += size_t(std::popcount(s.mixed[w] & ~s.lit[w]));
+  }
+  tally.blocked += blocks - clear - mixed, tally.light_brdf += clear_unlit, tally.light_visibility += mixed_unlit;
+  tally.samples[0] += clear_unlit + mixed_unlit;
+}
+
+Vec3 ShadeBlocks(BlockScratch& s, const BlockLight& light, const Visibility& visibility, size_t receiver,
+                 const ProductMaterial& material, const Terms& t, Breakdown& tally, StageTimes* times) {
+  const Cube& cube = *light.cube;
+  const size_t blocks = size_t(cube.blocks()), words = (blocks + 31) / 32;
+  const bool binary = visibility.bits == 1;
+  const Vec3 n = t.frame[2];
+  const bool diffuse = t.lambert != Vec3(0);
+  Clock clock(times);
+  std::fill(s.lit.begin(), s.lit.end(), 0u);
+  WithLobe(t, [&](auto lobe) HWY_ATTR { FindLit(lobe, s, cube, material); });
+  clock.Stage(&StageTimes::brdf);
+  if (binary) ReadSight<true>(s, visibility, receiver, diffuse);
+  else ReadSight<false>(s, visibility, receiver, diffuse);
+  TallyDiffuse(s, blocks, words, tally);
+  clock.Stage(&StageTimes::visibility);
+  Vec3 out(0);
+  if (diffuse) out = t.lambert * Contract(binary ? SumSeen<true>(s, light, words) : SumSeen<false>(s, light, words), n);
+  const float scale = 1 / float(visibility.top());
+  WithLobe(t, [&](auto lobe) HWY_ATTR {
+    using Lobe = decltype(lobe);
+    LobeSums<Lobe> sums;
+    const BlockChanges* changes = s.changes.data();
+    for (size_t w = 0; w < words; ++w)
+      for (uint32_t bits = (s.clear[w] | s.mixed[w]) & s.lit[w]; bits; bits &= bits - 1) {
+        const auto bit = uint32_t(std::countr_zero(bits));
+        const bool clear = s.clear[w] >> bit & 1;
+        AddLitBlock(lobe, s, light, material, n, w * 32 + bit, clear ? nullptr : changes++, scale, sums, tally);
+      }
+    out += t.lambert * Contract(sums.rows[0], n);
+    for (int k = 0; k < Lobe::count; ++k) {
+      Vec3 of = Contract(sums.rows[k + 1], n);
+      for (int c = 0; c < 3; ++c) of[size_t(c)] += hn::GetLane(hn::SumOfLanes(F(), sums.texels.acc[k][c]));
+      out += t.colour[k] * of;
+    }
+  });
+  clock.Stage(&StageTimes::integral);
+  if (times && t.count > 0) {
+    const double before = times->brdf;
+    WithLobe(t, [&](auto lobe) HWY_ATTR { EvaluateLit(lobe, s, light, material, n); });
+    clock.Stage(&StageTimes::brdf);
+    times->integral = std::max(0.0, times->integral - (times->brdf - before));
+  }
+  return out;
+}
+
+}  // namespace HWY_NAMESPACE
+}  // namespace
+}  // namespace lambent
+HWY_AFTER_NAMESPACE();
+
+#if HWY_ONCE
+namespace lambent {
+namespace {
+
+HWY_EXPORT(ShadeBlocks);
+
+}  // namespace
+
+Vec3 shade_blocks_in_simd(BlockScratch& s, const BlockLight& light, const Visibility& visibility, size_t receiver,
+                          const ProductMaterial& material, const Terms& terms, Breakdown& tally, StageTimes* times) {
+  if (!(terms.wo.z > least_cosine)) return Vec3(0);
+  const size_t blocks = size_t(light.cube->blocks()), words = (blocks + 31) / 32,
+               stride = light.cube->nodes[0].x.size(), most = blocks * block_texels + 64;
+  if (s.cosines.size() != stride) {
+    s.clear.assign(words, 0), s.mixed.assign(words, 0), s.lit.assign(words, 0);
+    s.cosines.resize(stride), s.middles.resize(3 * stride), s.rows.resize(most), s.changes.reserve(blocks);
+  }
+  if (visibility.bits > 1 && s.steps.size() != most) s.steps.resize(most);
+  return HWY_DYNAMIC_DISPATCH(ShadeBlocks)(s, light, visibility, receiver, material, terms, tally, times);
+}
+
+}  // namespace lambent
+#endif
