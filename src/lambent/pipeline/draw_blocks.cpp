@@ -86,10 +86,11 @@ Result<void> set_environment(BlockShading& s, const Environment& env, const Mat3
 Result<void> shade_view(BlockShading& s, const View& view) {
   const VertexPlacement& at = *vertices_of(*s.baked);
   auto start = Clock::now();
-  const std::vector<uint32_t> seen = seen_receivers(
-      s.baked->scene, at.front, at.back, visibility_of(*s.baked).receivers, view.camera, view.width, view.height);
+  s.in_view = seen_receivers(s.baked->scene, at.front, at.back, visibility_of(*s.baked).receivers, view.camera,
+                             view.width, view.height);
   s.cull_seconds += seconds_since(start), start = Clock::now();
-  auto ok = s.relighter.relight({.eye = view.camera.eye, .seen = std::span(seen), .breakdown = &s.breakdown}, s.relit);
+  const std::span<const uint32_t> seen(s.in_view);
+  auto ok = s.relighter.relight({.eye = view.camera.eye, .seen = seen, .breakdown = &s.breakdown}, s.relit);
   s.shade_seconds += seconds_since(start), s.seen += seen.size();
   return ok;
 }

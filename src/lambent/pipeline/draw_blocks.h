@@ -17,8 +17,9 @@ Result<ProductMethod> parse_method(const std::string& text);
 struct BlockShading {
   const Baked* baked = nullptr;
   Relighter relighter;
-  std::vector<Vec3> albedo;  // diffuse, of each receiver
-  Relit relit = {};          // exit radiance towards the eye, of the receivers that were seen
+  std::vector<Vec3> albedo;            // diffuse, of each receiver
+  Relit relit = {};                    // exit radiance towards the eye, of the receivers that were seen
+  std::vector<uint32_t> in_view = {};  // those, of the latest view
   Breakdown breakdown = {};
   size_t seen = 0;
   double project_seconds = 0, forms_seconds = 0, cull_seconds = 0, shade_seconds = 0;

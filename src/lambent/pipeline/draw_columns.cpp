@@ -1,6 +1,7 @@
 #include <lambent/pipeline/draw_columns.h>
 
 #include <lambent/core/overloaded.h>
+#include <lambent/relight/block_runs.h>
 #include <lambent/relight/dering.h>
 
 #include <algorithm>
@@ -24,6 +25,14 @@ bool each_is_light(const Rows& rows) {
   const auto* directional = std::get_if<DirectionalRows>(&rows);
   return !std::holds_alternative<Outgoing>(rows) &&
          (!directional || directional->kind == DirectionalKind::none || directional->kind == DirectionalKind::hl2);
+}
+
+// dering() of every number, on all cores.
+void hold_above_zero(Relit& whole, const Relit& peaks, const BlockRuns* only) {
+  const size_t each = size_t(whole.rows) * 3 * transfer_block;
+  parallel_blocks(whole.values.size() / each, 1024, only, [&](size_t begin, size_t end) {
+    for (size_t i = begin * each; i < end * each; ++i) whole.values[i] = dering(whole.values[i], peaks.values[i]);
+  });
 }
 
 }  // namespace
@@ -95,8 +104,17 @@ Result<void> make_relighters(ColumnDrawing& d) {
   return set_lights(d);
 }
 
-Result<void> relight(ColumnDrawing& d, const std::optional<Pose>& pose, Relit& out, Relit& peaks) {
+bool relights_in_part(const ColumnDrawing& d) {
+  const Store& store = d.baked.surface.store;
+  const bool can = std::holds_alternative<Transfer>(store) || std::holds_alternative<CpcaTransfer>(store) ||
+                   std::holds_alternative<ZonalTransfer>(store);
+  return can && d.relighters.size() == 1 && d.light.near.empty();
+}
+
+Result<void> relight(ColumnDrawing& d, const std::optional<Pose>& pose, Relit& out, Relit& peaks,
+                     const std::vector<uint32_t>* seen) {
   RelightFrame frame;
+  if (seen) frame.keep = true, frame.seen = *seen;
   ReceiverFrames frames;
   LightField field;
   if (d.turns() && pose) {
@@ -116,8 +134,13 @@ Result<void> relight(ColumnDrawing& d, const std::optional<Pose>& pose, Relit& o
   if (d.light.peaks.empty()) peaks = {};
   else {
     frame.light = nullptr;  // near lamps are in none of the peaks
-    if (auto ok = sum_relit(d.of_peaks, frame, peaks); !ok) return Error{d.request.baked, ok.error().message};
-    if (each_is_light(d.rows)) dering(out, peaks), peaks = {};
+    const bool held_here = each_is_light(d.rows);
+    Relit& relit = held_here ? d.peaks : peaks;
+    if (auto ok = sum_relit(d.of_peaks, frame, relit); !ok) return Error{d.request.baked, ok.error().message};
+    if (held_here) {
+      const BlockRuns runs = seen ? block_runs(*seen, d.receivers()) : BlockRuns();
+      hold_above_zero(out, relit, seen ? &runs : nullptr), peaks = {};
+    }
   }
   d.relight_seconds =
       std::min(d.relight_seconds, std::chrono::duration<double>(std::chrono::steady_clock::now() - start).count());

@@ -26,6 +26,7 @@ struct ColumnDrawing {
   std::vector<Relighter> relighters = {};  // what they give is summed
   std::vector<Relighter> of_peaks = {};    // the same of the light's peaks; none where nothing rings
   std::vector<Vec3> emission = {};
+  Relit peaks = {};          // T . their light, where rows are held above 0 at once
   HaarReading reading = {};  // of wavelets
   double relight_seconds = 1e9;
 
@@ -44,8 +45,12 @@ Result<void> choose_light(ColumnDrawing& d);
 Result<void> make_relighters(ColumnDrawing& d);
 // Again, after the light has changed.
 Result<void> set_lights(ColumnDrawing& d);
-// T . light, in that pose; `peaks` is of light's peaks, where rows have still to be held above 0, else empty.
-Result<void> relight(ColumnDrawing& d, const std::optional<Pose>& pose, Relit& out, Relit& peaks);
+// T . light, in that pose; `peaks` is of light's peaks, where rows have still to be held above 0, else empty. `seen`:
+// of no other receivers than these, where the store can.
+Result<void> relight(ColumnDrawing& d, const std::optional<Pose>& pose, Relit& out, Relit& peaks,
+                     const std::vector<uint32_t>* seen = nullptr);
+// Whether it can.
+bool relights_in_part(const ColumnDrawing& d);
 // The rows' meaning, turned with the surface where it can be.
 Rows posed_rows(const ColumnDrawing& d, const std::optional<Pose>& pose);
 // Objects of `insertions` that are not made yet; those of `known` need not be made again. Errors: make_inserted()'s.

@@ -14,6 +14,7 @@
 #include <atomic>
 #include <bit>
 #include <chrono>
+#include <cmath>
 
 namespace lambent {
 namespace {
@@ -165,11 +166,18 @@ Vec3 still_at_leaf(const IndirectDrawing& d, size_t leaf) {
 
 }  // namespace
 
-void sum_direct(IndirectDrawing& d, size_t first, size_t count, const IndirectQuality& quality) {
+void light_lamp(IndirectDrawing& d, size_t k, size_t first, size_t count, const IndirectQuality& quality) {
   parallel_for(count, 128, [&](size_t begin, size_t end) {
-    for (size_t i = first + begin; i < first + end; ++i) {
+    for (size_t i = first + begin; i < first + end; ++i)
+      d.lit[k].at_leaves[i] = direct_at_leaf(d, d.lit[k].lamp, i, quality);
+  });
+}
+
+void sum_direct(IndirectDrawing& d) {
+  parallel_for(d.direct.size(), 4096, [&](size_t begin, size_t end) {
+    for (size_t i = begin; i < end; ++i) {
       d.direct[i] = still_at_leaf(d, i);
-      for (const MovingLamp& lamp : d.lamps) d.direct[i] += direct_at_leaf(d, lamp, i, quality);
+      for (const LitLamp& lit : d.lit) d.direct[i] += lit.at_leaves[i];
     }
   });
 }
@@ -185,22 +193,14 @@ namespace {
 
 // All direct light at leaves: of lamps that stand where they stood it is known, and their lights add up.
 void light_lamps(IndirectDrawing& d) {
-  for (size_t i = 0; i < d.direct.size(); ++i) d.direct[i] = still_at_leaf(d, i);
   d.lit.resize(d.lamps.size()), d.evaluated = 0;
   for (size_t k = 0; k < d.lamps.size(); ++k) {
     LitLamp& lit = d.lit[k];
-    const MovingLamp& lamp = d.lamps[k];
-    const bool stood = !lit.at_leaves.empty() && lit.lamp.light.position == lamp.light.position &&
-                       lit.lamp.centre == lamp.centre;
-    lit.lamp = lamp, lit.at_leaves.resize(d.direct.size());
-    d.evaluated += !stood;
-    parallel_for(d.direct.size(), 128, [&](size_t begin, size_t end) {
-      for (size_t i = begin; i < end; ++i) {
-        if (!stood) lit.at_leaves[i] = direct_at_leaf(d, lamp, i, {});
-        d.direct[i] += lit.at_leaves[i];
-      }
-    });
+    if (!lit.at_leaves.empty() && is_same(lit.lamp, d.lamps[k])) continue;
+    lit.lamp = d.lamps[k], lit.at_leaves.resize(d.direct.size()), ++d.evaluated;
+    light_lamp(d, k, 0, d.direct.size(), {});
   }
+  sum_direct(d);
 }
 
 // Direct light at surfels, and the bounces that follow, from where the frame before had come; fastest times are kept.
@@ -292,8 +292,30 @@ Vec3 glow(const IndirectDrawing& d, const Hit& hit) {
 
 Kernels kernels_at(const IndirectDrawing& d, const Hit& hit) { return d.search->kernels(surface_place(d.scene, hit)); }
 
+namespace {
+
+// Direct light of the lamps in their order, and of what stands still.
+Vec3 direct_at_pixel(const IndirectDrawing& d, const IndirectQuality& quality, Vec3 origin, Vec3 normal, uint64_t key,
+                     std::span<Vec3> known) {
+  const auto once = [&](size_t k, auto light) {
+    if (known.empty()) return light();
+    if (std::isnan(known[k].x)) known[k] = light();
+    return known[k];
+  };
+  Vec3 sum(0.0f);
+  for (size_t k = 0; k < d.lamps.size(); ++k)
+    sum += once(
+        k, [&] { return direct_light(d.sight(), d.lamps[k], origin, normal, quality.pixel_samples, hash64(key, k)); });
+  return sum + once(d.lamps.size(), [&] {
+           return scaled_sum(d.still,
+                             still_light(d, d.drawn(), d.sight(), origin, normal, quality.still_pixel_samples, key));
+         });
+}
+
+}  // namespace
+
 Vec3 shade_indirect(const IndirectDrawing& d, Vec3 eye, const IndirectQuality& quality, const Hit& hit, Vec3 direction,
-                    const Kernels* kernels, const IndirectShade& bounced) {
+                    const KnownPlace& known, const IndirectShade& bounced) {
   using Colour = RenderOptions::Show;
   const bool shows_direct = d.show.part != Show::Part::indirect, shows_indirect = d.show.part != Show::Part::direct;
   const Scene& scene = d.drawn();
@@ -306,15 +328,14 @@ Vec3 shade_indirect(const IndirectDrawing& d, Vec3 eye, const IndirectQuality& q
   if (shows_indirect && bounced) {
     light += bounced(hit, direction, at);
   } else if (shows_indirect) {
-    light = read_surfels(d, kernels ? *kernels : d.search->kernels(at));
+    light = read_surfels(d, known.kernels ? *known.kernels : d.search->kernels(at));
   }
   if (shows_direct) {
     const Vec3 face = unit_normal(scene, triangle, at.normal);
     const Vec3 origin = at.position + (hit.front ? face : -face) * receiver_lift(at.position, 0, d.diagonal);
     const uint64_t key =
         hash64(uint64_t(std::bit_cast<uint32_t>(hit.u)) << 32 | std::bit_cast<uint32_t>(hit.v), hit.triangle);
-    light += direct_light(d.sight(), d.lamps, origin, at.normal, quality.pixel_samples, key) +
-             scaled_sum(d.still, still_light(d, scene, d.sight(), origin, at.normal, quality.still_pixel_samples, key));
+    light += direct_at_pixel(d, quality, origin, at.normal, key, known.lights);
   }
   if (d.show.colour != Colour::product) return light;
   const Vec3 sent = shows_direct ? glow(d, hit) : Vec3(0.0f);
@@ -438,7 +459,7 @@ Result<Drawing> draw_indirect(const Baked& baked, const DrawRequest& request, co
         d.drawn(), d.sight(), view->camera, options,
         [&]() -> SurfaceShade {
           return [&, bounced = bounced_light(d, baked, on_objects, in_file)](const Hit& hit, Vec3 direction) {
-            return shade_indirect(d, view->camera.eye, {}, hit, direction, nullptr, bounced);
+            return shade_indirect(d, view->camera.eye, {}, hit, direction, {}, bounced);
           };
         },
         job.progress);

@@ -92,8 +92,10 @@ Result<void> make_places(IndirectDrawing& d);
 // What stands still, at leaves [first, first + count): kept by group, so that lamps are scaled without a ray.
 void light_leaves(IndirectDrawing& d, size_t first, size_t count, const IndirectQuality& quality,
                   ProgressStage* stage = nullptr);
-// All direct light at leaves [first, first + count), into d.direct.
-void sum_direct(IndirectDrawing& d, size_t first, size_t count, const IndirectQuality& quality);
+// Light of lamp k alone at leaves [first, first + count), into d.lit[k], which has room for all.
+void light_lamp(IndirectDrawing& d, size_t k, size_t first, size_t count, const IndirectQuality& quality);
+// All direct light at leaves, of what stands still and of d.lit one after the other, into d.direct.
+void sum_direct(IndirectDrawing& d);
 
 // Light that has bounced, as if what was hit were white.
 using IndirectShade = std::function<Vec3(const Hit&, Vec3 direction, const SurfacePlace&)>;
@@ -103,10 +105,15 @@ void read_receivers(IndirectDrawing& d, DirectionalKind directional);
 // objects; by options that outlive it, light alone. Else nothing.
 IndirectShade bounced_light(const IndirectDrawing& d, const Baked& baked, const RenderOptions& on_objects,
                             const RenderOptions& in_file);
-// What a ray of a pixel meets sends towards the eye. `kernels`: what its place reads, where that is known; `bounced`:
-// where light is not read off surfels.
+// What is known of a ray of a pixel: what its place reads, if it is known; light of each lamp there, and, last, of what
+// stands still. Of those that are NaN it is found, and kept; without room it is found each time.
+struct KnownPlace {
+  const Kernels* kernels = nullptr;
+  std::span<Vec3> lights{};
+};
+// What a ray of a pixel meets sends towards the eye. `bounced`: where light is not read off surfels.
 Vec3 shade_indirect(const IndirectDrawing& d, Vec3 eye, const IndirectQuality& quality, const Hit& hit, Vec3 direction,
-                    const Kernels* kernels = nullptr, const IndirectShade& bounced = {});
+                    const KnownPlace& known = {}, const IndirectShade& bounced = {});
 // The place at a hit, and what it reads there.
 Kernels kernels_at(const IndirectDrawing& d, const Hit& hit);
 

@@ -173,11 +173,11 @@ Result<bool> LivePicture::State::work_on_light(bool hurry, double budget) {
   }
   if (due.rays) {
     forget_rays();
-    if (blocks) due.values = true;  // their radiance depends on the eye
+    if (blocks || draft_values) due.values = true;  // radiance of blocks depends on the eye; others are seen
   }
   choose_scale(hurry, budget);
-  if (blocks && hurry && receivers_in_view().empty() && due.values) {  // rays first: they tell what is seen
-    draft_values = true, restart();
+  if (due.values && hurry && can_shade_what_is_seen() && receivers_in_view().empty()) {  // rays tell what is seen
+    restart();
     if (auto ok = add_sample(hurry); !ok) return ok.error();
   }
   if (due.values || (draft_values && !hurry)) {

@@ -4,6 +4,7 @@
 
 #include <algorithm>
 #include <chrono>
+#include <cmath>
 
 namespace lambent {
 namespace {
@@ -13,6 +14,7 @@ double since(LiveClock::time_point start) { return std::chrono::duration<double>
 
 constexpr size_t leaves_a_piece = 2048;
 constexpr size_t kept_kernels = size_t(2) << 20;
+constexpr size_t kept_lights = size_t(16) << 20;
 // The bounces of a picture that moves.
 constexpr double coarse_tolerance = 1e-2;
 constexpr int coarse_bounces = 8;
@@ -20,18 +22,38 @@ constexpr int coarse_bounces = 8;
 // All leaves, in pieces.
 struct Sweep {
   size_t next = 0, left = 0;
-  bool coarse = false;
-  void begin(size_t count, bool coarsely) { left = count, coarse = coarsely; }
-  // Calls run(first, count) until all was done or `seconds` have gone.
-  void go_on(size_t leaves, double seconds, auto run) {
+  bool coarse = false;  // some of what was done
+  void begin(size_t count) { left = count, coarse = false; }
+  // Calls run(first, count) until all was done or `seconds` have gone. How many leaves that were.
+  size_t go_on(size_t leaves, bool coarsely, double seconds, auto run) {
     const auto start = LiveClock::now();
+    const size_t before = left;
+    coarse |= coarsely && left > 0;
     while (left > 0) {
       if (next >= leaves) next = 0;
       const size_t count = std::min({leaves_a_piece, left, leaves - next});
       run(next, count), next += count, left -= count;
-      if (since(start) > seconds) return;
+      if (since(start) > seconds) break;
     }
+    return before - left;
   }
+};
+
+// What rays of the first sample have of each lamp and, last, of what stands still: [ray][light], NaN where it is not
+// known.
+struct RayLights {
+  size_t each = 0;
+  std::vector<Vec3> values = {};
+
+  void begin(size_t rays, size_t count) {
+    if (each == count && values.size() == rays * count) return;
+    each = count, values.assign(rays * count, Vec3(NAN));
+  }
+  void forget(size_t light) {
+    for (size_t i = light; light < each && i < values.size(); i += each) values[i] = Vec3(NAN);
+  }
+  void forget_all() { values.clear(); }
+  std::span<Vec3> of(size_t ray) { return std::span(values).subspan(ray * each, each); }
 };
 
 class LiveIndirect : public LiveKind {
@@ -68,38 +90,50 @@ class LiveIndirect : public LiveKind {
     }
     times.project = 1e3 * since(start), start = LiveClock::now();
     const IndirectQuality quality = hurry ? hurried_indirect : IndirectQuality();
-    if (d_.still.shines() && (still_due_ || (still_.coarse && !hurry))) still_.begin(leaves, hurry), still_due_ = false;
-    if (still_.left > 0) direct_due_ = true;
-    if (direct_due_ || (direct_.coarse && !hurry)) direct_.begin(leaves, hurry), direct_due_ = false;
-    still_.go_on(leaves, budget / 2, [&](size_t first, size_t count) { light_leaves(d_, first, count, quality); });
-    if (hurry || still_.left == 0)
-      direct_.go_on(leaves, budget, [&](size_t first, size_t count) { sum_direct(d_, first, count, quality); });
-    times.shaded = leaves;
-    const bool more = still_.left > 0 || direct_.left > 0;
+    if (d_.still.shines() && (still_due_ || (still_.coarse && !hurry))) still_.begin(leaves), still_due_ = false;
+    still_.go_on(leaves, hurry, budget / 2,
+                 [&](size_t first, size_t count) { light_leaves(d_, first, count, quality); });
+    bool more = still_.left > 0;
+    times.shaded = 0;
+    for (size_t k = 0; k < d_.lit.size(); ++k) {
+      if (!hurry && sweeps_[k].coarse) sweeps_[k].begin(leaves);
+      times.shaded += sweeps_[k].go_on(leaves, hurry, budget - since(start),
+                                       [&](size_t first, size_t count) { light_lamp(d_, k, first, count, quality); });
+      more |= sweeps_[k].left > 0;
+    }
     if (!hurry && more) return times.relight = 1e3 * since(start), Light::unfinished;
+    sum_direct(d_);
     if (solve_due_) d_.solve = make_indirect_solve(d_.transfer, albedos_), solve_due_ = false;
     if (hurry) solve_indirect(d_.transfer, d_.solve, d_.direct, coarse_tolerance, coarse_bounces);
     else solve_indirect(d_.transfer, d_.solve, d_.direct);
     if (request_.at == "receivers") read_receivers(d_, directional_of(baked_.surface));
     times.relight = 1e3 * since(start);
-    if (more) direct_due_ = still_.left > 0;
     return more ? Light::partial : hurry ? Light::draft : Light::whole;
   }
 
   std::function<RayShade()> shade(const Pass& pass) override {
     std::vector<Kernels>& kept = kernels_[size_t(pass.scale)];
-    if (pass.fresh)
+    RayLights& lights = lights_[size_t(pass.hurry ? pass.scale : 0)];
+    if (pass.fresh) {
       for (auto& kernels : kernels_) kernels.clear();
-    const bool keeps = pass.sample == 0 && d_.show.part != Show::Part::direct && pass.rays.rays.size() <= kept_kernels;
-    if (keeps && kept.size() != pass.rays.rays.size()) kept.assign(pass.rays.rays.size(), Kernels{.count = SIZE_MAX});
+      for (RayLights& l : lights_) l.forget_all();
+    }
+    const size_t count = pass.rays.rays.size(), each = d_.lamps.size() + 1;
+    const bool keeps = pass.sample == 0 && d_.show.part != Show::Part::direct && count <= kept_kernels;
+    if (keeps && kept.size() != count) kept.assign(count, Kernels{.count = SIZE_MAX});
+    const bool lit = pass.sample == 0 && d_.show.part != Show::Part::indirect && count * each <= kept_lights;
+    if (lit) lights.begin(count, each);
     const IndirectQuality quality = pass.hurry ? hurried_indirect : IndirectQuality();
-    return [this, &kept, keeps, quality, &rays = pass.rays.rays, eye = pass.eye]() -> RayShade {
+    return [this, &kept, keeps, &lights, lit, quality, &rays = pass.rays.rays, eye = pass.eye]() -> RayShade {
       const IndirectShade bounced = bounced_light(d_, baked_, at_receivers_, at_receivers_);
-      return [this, &kept, keeps, quality, &rays, eye, bounced](size_t ray) {
+      return [this, &kept, keeps, &lights, lit, quality, &rays, eye, bounced](size_t ray) {
         const Hit& hit = rays[ray].hit;
-        if (bounced) return shade_indirect(d_, eye, quality, hit, rays[ray].direction, nullptr, bounced);
-        if (keeps && kept[ray].count == SIZE_MAX) kept[ray] = kernels_at(d_, hit);
-        return shade_indirect(d_, eye, quality, hit, rays[ray].direction, keeps ? &kept[ray] : nullptr);
+        KnownPlace known{nullptr, lit ? lights.of(ray) : std::span<Vec3>()};
+        if (keeps && !bounced) {
+          if (kept[ray].count == SIZE_MAX) kept[ray] = kernels_at(d_, hit);
+          known.kernels = &kept[ray];
+        }
+        return shade_indirect(d_, eye, quality, hit, rays[ray].direction, known, bounced);
       };
     };
   }
@@ -117,9 +151,35 @@ class LiveIndirect : public LiveKind {
     const size_t groups = d_.still.lamps.groups();
     set_sky(d_, turned(coarse));
     if (groups == d_.still.lamps.groups()) d_.still.at_leaves = std::move(kept);
+    forget_still();
   }
+  void forget_still() {
+    for (RayLights& l : lights_) l.forget(l.each - 1);
+  }
+  void forget_light(size_t light) {
+    for (RayLights& l : lights_) l.forget(light);
+  }
+  // Lamps that stand as one did keep its light; others have that of the one in their place until they are lit.
   void move_lamps() {
     for (const LampPath& path : d_.paths) move_lamp(d_.lamps, path, request_.time);
+    std::vector<LitLamp> lit = std::exchange(d_.lit, {});
+    std::vector<Sweep> sweeps = std::exchange(sweeps_, {});
+    const size_t leaves = d_.transfer.surfels.count(), count = d_.lamps.size();
+    d_.lit.resize(count), sweeps_.resize(count);
+    std::vector<bool> moved(count, true);
+    for (size_t k = 0; k < count; ++k)
+      for (size_t i = 0; i < lit.size() && moved[k]; ++i) {
+        if (lit[i].at_leaves.empty() || !is_same(lit[i].lamp, d_.lamps[k])) continue;
+        d_.lit[k] = std::move(lit[i]), sweeps_[k] = sweeps[i], moved[k] = false;
+        lit[i].at_leaves.clear();
+        if (i != k) forget_light(k);  // whose rays are keyed by its place in the list
+      }
+    for (size_t k = 0; k < count; ++k) {
+      if (!moved[k]) continue;
+      if (k < lit.size()) d_.lit[k].at_leaves = std::move(lit[k].at_leaves);
+      d_.lit[k].lamp = d_.lamps[k], d_.lit[k].at_leaves.resize(leaves, Vec3(0.0f));
+      sweeps_[k].begin(leaves), forget_light(k);
+    }
   }
   Result<void> paint() {
     d_.scene.materials = baked_.scene.materials, d_.scene.colors = baked_.scene.colors;
@@ -144,28 +204,35 @@ class LiveIndirect : public LiveKind {
     if (before.env != request_.env || before.env_rotate != request_.env_rotate ||
         before.environment != request_.environment)
       sky_due_ = due.light = true;
-    if (bool(skies_.env[0]) != bool(d_.still.sky)) set_sky(d_, turned(0)), still_due_ = true;  // groups are others
+    if (bool(skies_.env[0]) != bool(d_.still.sky)) {  // groups are others
+      set_sky(d_, turned(0)), still_due_ = true;
+      for (RayLights& l : lights_) l.forget_all();
+    }
     const bool shone = d_.still.shines();
+    const std::vector<Vec3> scales = d_.still.scales;
     if (auto ok = read_lamps(d_); !ok) return ok;
+    if (scales != d_.still.scales) forget_still();
     move_lamps();
-    if (before.lamp != request_.lamp || before.move != request_.move || before.time != request_.time)
-      direct_due_ = due.light = true;
-    if (before.at != request_.at) due.light = direct_due_ = true;
+    due.light |= before.lamp != request_.lamp || before.move != request_.move || before.time != request_.time ||
+                 before.at != request_.at || before.albedo != request_.albedo;
     if (!shone && d_.still.shines()) still_due_ = true;
     if (before.albedo == request_.albedo) return {};
-    due.light = direct_due_ = true;
     if (auto ok = paint(); !ok) return ok;
     if (!d_.tracer.lets_pass()) return {};
     due.rays = still_due_ = true;  // paint is solid
+    for (Sweep& sweep : sweeps_) sweep.begin(d_.transfer.surfels.count());
     return make_places(d_);
   }
 
   IndirectDrawing d_;
   std::vector<Vec3> albedos_ = {};
   RenderOptions at_receivers_ = {};  // light alone, where it is read there
-  bool sky_due_ = false, sky_coarse_ = false, still_due_ = true, direct_due_ = true, solve_due_ = true;
-  Sweep still_ = {}, direct_ = {};
-  std::array<std::vector<Kernels>, 5> kernels_ = {};  // by scale, of the first sample's rays
+  bool sky_due_ = false, sky_coarse_ = false, still_due_ = true, solve_due_ = true;
+  Sweep still_ = {};
+  std::vector<Sweep> sweeps_ = {};  // of each lamp
+  // Of the first sample's rays, by scale.
+  std::array<std::vector<Kernels>, 5> kernels_ = {};
+  std::array<RayLights, 5> lights_ = {};  // in a hurry; 0: at rest
 };
 
 }  // namespace

@@ -35,6 +35,52 @@ TEST(LiveIndirect, LampsAndPaintAreDrawnAsRenderDoes) {
   expect_each_drawn(baked, {request, moved, more, painted, sky, turned, later, part, request});
 }
 
+// Lamps that stand keep their light: leaves are lit by the one that moves alone, hurried through or not.
+TEST(LiveIndirect, OnlyTheLampThatMovesIsLitAnew) {
+  const auto [baked, request] = open_golden("indirect");
+  const size_t leaves = std::get<IndirectTransfer>(baked.surface.store).surfels.count();
+  DrawRequest three = request;
+  three.lamp = {"sphere@0.6,1.1,1.2,0.2=30,20,10", "point@1,1,1=3", "spot@1,1.5,1,1,0,1,50=5"};
+  auto picture = LivePicture::make(baked, three);
+  ASSERT_TRUE(picture) << picture.error().text();
+  ASSERT_TRUE(*picture->work(false, 1e3));
+  EXPECT_EQ(picture->times().shaded, 3 * leaves);
+  finish(*picture);
+  const auto lit = [&](const DrawRequest& next) {
+    EXPECT_EQ(error_of(picture->ask(next)), "");
+    EXPECT_TRUE(*picture->work(false, 1e3));
+    const size_t count = picture->times().shaded;
+    finish(*picture);
+    expect_same(picture->image(), drawn(baked, next));
+    return count;
+  };
+  DrawRequest moved = three, dimmed = three, fewer = three, swapped = three;
+  moved.lamp[1] = "point@0.5,1.2,0.8=3";
+  EXPECT_EQ(lit(moved), leaves);
+  dimmed.lamp[1] = moved.lamp[1], dimmed.lamp[2] = "spot@1,1.5,1,1,0,1,50=1,2,5";
+  EXPECT_EQ(lit(dimmed), leaves);
+  EXPECT_EQ(lit(three), 2 * leaves);
+  fewer.lamp.erase(fewer.lamp.begin());
+  EXPECT_EQ(lit(fewer), 0u);
+  std::swap(fewer.lamp[0], fewer.lamp[1]);
+  EXPECT_EQ(lit(fewer), 0u);
+  EXPECT_EQ(lit(three), leaves);  // one that was not there
+  // In a hurry the one that moves is coarse, and the others stay as they were.
+  ASSERT_EQ(error_of(picture->ask(moved)), "");
+  ASSERT_TRUE(*picture->work(true, 1e3));
+  EXPECT_EQ(picture->times().shaded, leaves);
+  ASSERT_TRUE(*picture->work(false, 1e3));
+  EXPECT_EQ(picture->times().shaded, leaves);
+  finish(*picture);
+  expect_same(picture->image(), drawn(baked, moved));
+  // Begun at rest and gone on with in a hurry, it is still whole in the end.
+  ASSERT_EQ(error_of(picture->ask(three)), "");
+  ASSERT_TRUE(*picture->work(false, 0));
+  ASSERT_TRUE(*picture->work(true, 1e3));
+  finish(*picture);
+  expect_same(picture->image(), drawn(baked, three));
+}
+
 TEST(LiveIndirect, OwnLampsAreScaledAndStandBeside) {
   auto [baked, request] = open_golden("indirect");
   baked.scene.lights = {{.name = "bulb", .position = Vec3(1, 1, 1.2f), .intensity = Vec3(3, 2, 1)}};

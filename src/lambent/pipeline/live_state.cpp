@@ -9,9 +9,11 @@ namespace lambent {
 namespace {
 
 constexpr size_t kept_rays = size_t(4) << 20;
-constexpr int coarse_sky = 256;  // texels around, of light that turns
-constexpr double a_piece = 0.1;  // seconds of shading at a time, of a picture that is at rest
-constexpr int rows_a_piece = 8;  // at least
+constexpr size_t many_receivers = 20000;
+constexpr double worth_a_part = 0.8;  // of all receivers
+constexpr int coarse_sky = 256;       // texels around, of light that turns
+constexpr double a_piece = 0.1;       // seconds of shading at a time, of a picture that is at rest
+constexpr int rows_a_piece = 8;       // at least
 
 LiveLight live_light(const Environment& env, const DrawRequest& request, const LightBasis& basis) {
   LiveLight out{env, nullptr};
@@ -65,6 +67,7 @@ Result<void> LivePicture::State::make_materials() {
   if (kind_of(baked.surface) == DrawKind::blocks) {
     auto made = make_block_shading(baked, asked);
     if (!made) return made.error();
+    if (blocks) made->relit = std::move(blocks->relit);  // shows until it is shaded anew
     blocks.emplace(std::move(*made));
     return {};
   }
@@ -144,17 +147,31 @@ Result<void> LivePicture::State::join_objects() {
   return due.objects = false, Result<void>();
 }
 
+// Whether receivers that are not seen may be left as they are: of blocks, and where there are enough of others.
+bool LivePicture::State::can_shade_what_is_seen() const {
+  if (blocks) return true;
+  return columns && !has_objects() && look == Look::picture && columns->receivers() >= many_receivers &&
+         std::holds_alternative<CornerReceivers>(baked.basis) && relights_in_part(*columns);
+}
+
 // Those of the triangles that rays have met: of a picture that moves, no others are wanted.
 const std::vector<uint32_t>& LivePicture::State::receivers_in_view() {
+  if (seen_scale != scale) seen.clear();
   if (!seen.empty() || rays[size_t(scale)].empty()) return seen;
+  seen_scale = scale;
   const auto& corners = std::get<CornerReceivers>(baked.basis);
   std::vector<uint8_t> wanted(receivers_of(baked.surface.store), 0);
   for (const ViewRay& ray : rays[size_t(scale)].front().rays)
     if (ray.hit.triangle != none)
       if (const Corners* at = corners.find(ray.hit.triangle, ray.hit.front))
         for (uint32_t r : at->receiver) wanted[r] = 1;
-  for (size_t r = 0; r < wanted.size(); ++r)
-    if (wanted[r]) seen.push_back(uint32_t(r));
+  size_t blocks_seen = 0, last = SIZE_MAX;
+  for (size_t r = 0; r < wanted.size(); ++r) {
+    if (!wanted[r]) continue;
+    seen.push_back(uint32_t(r));
+    if (r / transfer_block != last) ++blocks_seen, last = r / transfer_block;
+  }
+  seen_share = double(blocks_seen * transfer_block) / double(std::max<size_t>(wanted.size(), 1));
   return seen;
 }
 
@@ -166,13 +183,18 @@ Result<void> LivePicture::State::shade_blocks_seen(bool hurry, double budget) {
     s.seen = 0;
     auto ok = shade_view(s, view);
     times.shaded = s.seen, draft_values = false;
+    has_value.assign(receivers_of(baked.surface.store), 0);
+    for (uint32_t r : s.in_view) has_value[r] = 1;
     if (s.seen > 0) receiver_cost = seconds_from(start) / double(s.seen);
     return ok;
   }
   const std::vector<uint32_t>& all = receivers_in_view();
   const size_t parts = std::clamp<size_t>(size_t(std::ceil(double(all.size()) * receiver_cost / budget)), 1, 16);
-  std::vector<uint32_t> part;
-  for (size_t i = turn_of++ % parts; i < all.size(); i += parts) part.push_back(all[i]);
+  std::vector<uint32_t> part;  // with what has come into view
+  const size_t turn = turn_of++ % parts;
+  has_value.resize(receivers_of(baked.surface.store), 0);
+  for (size_t i = 0; i < all.size(); ++i)
+    if (i % parts == turn || !has_value[all[i]]) part.push_back(all[i]), has_value[all[i]] = 1;
   draft_values = true, times.shaded = part.size();
   auto ok = s.relighter.relight(
       {.eye = view.camera.eye, .keep = true, .seen = std::span<const uint32_t>(part), .breakdown = &s.breakdown},
@@ -183,9 +205,11 @@ Result<void> LivePicture::State::shade_blocks_seen(bool hurry, double budget) {
 
 Result<void> LivePicture::State::make_values(bool hurry, double budget) {
   if (blocks) return shade_blocks_seen(hurry, budget);
-  times.shaded = columns->receivers();
+  const bool part = hurry && can_shade_what_is_seen() && !receivers_in_view().empty() && seen_share < worth_a_part;
+  times.shaded = part ? seen.size() : columns->receivers();
   if (!moving)
-    if (auto ok = relight(*columns, pose, relit, peaks); !ok) return ok;
+    if (auto ok = relight(*columns, pose, relit, peaks, part ? &seen : nullptr); !ok) return ok;
+  draft_values = part;
   rows = posed_rows(*columns, pose);
   return has_objects() ? join_objects() : Result<void>();
 }
@@ -196,7 +220,7 @@ void LivePicture::State::choose_scale(bool hurry, double budget) {
   const double pixels = double(view.width) * double(view.height);
   for (; hurry && next < coarsest_live; ++next)
     if (pixels / (next * next) * ((rays[size_t(next)].empty() ? trace_cost : 0.0) + shade_cost) <= budget) break;
-  if (next != scale) scale = next, due.shades = true;
+  if (next != scale) scale = next, due.shades = true, due.values |= draft_values;
 }
 
 std::function<RayShade()> LivePicture::State::shade_maker(RenderOptions& options, const ViewRays& pass, bool hurry) {
@@ -252,7 +276,7 @@ Result<void> LivePicture::State::add_sample(bool hurry) {
   if (is_fixed()) return draw_fixed(), Result<void>();
   auto pass = trace_pass();
   if (!pass) return pass.error();
-  if (blocks && draft_values && seen.empty()) return {};  // shaded first, now that rays tell what is seen
+  if (due.values && seen.empty() && hurry && can_shade_what_is_seen()) return {};  // shaded first, now that rays tell
   const auto start = LiveClock::now();
   if (is_overlay(look)) {
     image = paint_look({look, number, scene(), basis(), relit, measured}, baked, *rays_of(), **pass, view);

@@ -63,8 +63,11 @@ struct LivePicture::State {
   std::optional<Tracer> tracer = std::nullopt;
   Relit relit = {}, peaks = {};
   Rows rows = {};
-  std::vector<uint32_t> seen = {};  // of blocks, in the picture; empty: not known yet
-  size_t turn_of = 0;               // of their parts, in a hurry
+  std::vector<uint32_t> seen = {};      // receivers in the picture, in a hurry; empty: not known yet
+  int seen_scale = 0;                   // of the rays that met them
+  double seen_share = 1;                // of all blocks of receivers, those that they are in
+  size_t turn_of = 0;                   // of blocks, of their parts
+  std::vector<uint8_t> has_value = {};  // of blocks, receivers that were shaded, if long ago
 
   std::array<std::vector<ViewRays>, coarsest_live + 1> rays = {};  // by scale
   int scale = 1;
@@ -110,6 +113,7 @@ struct LivePicture::State {
   Result<void> light_kind(bool hurry, double budget);
   void restart() { sums = {}, row = 0, extra.reset(); }
   const std::vector<uint32_t>& receivers_in_view();
+  bool can_shade_what_is_seen() const;
 };
 
 }  // namespace lambent

@@ -1,5 +1,9 @@
 #include <lambent/pipeline/live_test-inl.h>
 
+#include <lambent/pipeline/bake.h>
+#include <lambent/scene/procedural.h>
+#include <lambent/scene/refine.h>
+
 #include "temporary_folder.h"
 
 #include <gtest/gtest.h>
@@ -77,6 +81,62 @@ TEST(LivePicture, DoesOnlyWhatHasChanged) {
   finish(*picture);
   ASSERT_EQ(error_of(picture->ask(asked)), "");
   EXPECT_TRUE(picture->done());
+}
+
+// In a hurry receivers that no ray has met are left out, and what is seen is none the less right; at rest all follow.
+TEST(LivePicture, OnlyWhatIsSeenIsRelitInAHurry) {
+  Scene scene = make_courtyard();
+  for (float edge = 0.4f; scene.positions.size() < 20000; edge *= 0.8f) ASSERT_TRUE(split_long_edges(scene, edge));
+  const size_t receivers = scene.positions.size();
+  BakeRequest bake_it{.order = 3, .bounces = "0"};
+  bake_it.samples = 16, bake_it.denoise = "off";
+  bake_it.loaded = std::make_shared<const Scene>(std::move(scene));
+  const auto baked = bake(bake_it);
+  ASSERT_TRUE(baked) << baked.error().text();
+  DrawRequest request{.baked = "courtyard", .camera = "2,1.6,2,0,1,0,30", .size = "24x18", .background = "none"};
+  request.env = "sky:elevation=30,azimuth=20,turbidity=3,width=64", request.spp = 1;
+  auto picture = LivePicture::make(*baked, request);
+  ASSERT_TRUE(picture) << picture.error().text();
+  const auto hurried = [&](const DrawRequest& next) {
+    ASSERT_EQ(error_of(picture->ask(next)), "");
+    ASSERT_TRUE(*picture->work(true, 1e3));  // enough for every pixel
+    expect_same(picture->image(), drawn(*baked, next));
+    EXPECT_FALSE(picture->done());
+  };
+  hurried(request);
+  EXPECT_LT(picture->times().shaded, receivers / 2);
+  EXPECT_GT(picture->times().shaded, 0u);
+  DrawRequest turned = request, away = request;
+  turned.env_rotate = "70,0,0";
+  hurried(turned);
+  away.env_rotate = "70,0,0", away.camera = "-2,1.2,1,0,1.5,3,40";  // others are seen now
+  hurried(away);
+  finish(*picture);
+  expect_same(picture->image(), drawn(*baked, away));
+  // All is known by now.
+  ASSERT_EQ(error_of(picture->ask(turned)), "");
+  ASSERT_TRUE(*picture->work(true, 1e3));
+  EXPECT_EQ(picture->times().relight, 0);
+  expect_same(picture->image(), drawn(*baked, turned));
+}
+
+// Of blocks a part is shaded in turn while hands move; what comes into view is no dark place until its turn.
+TEST(LivePicture, BlocksThatComeIntoViewHaveAValueAtOnce) {
+  auto [baked, request] = open_golden("blocks");
+  request.env = "sky:elevation=40,azimuth=20,turbidity=4,width=64", request.size = "64x48", request.spp = 1;
+  for (const bool rested : {false, true}) {
+    auto picture = LivePicture::make(baked, request);
+    ASSERT_TRUE(picture) << picture.error().text();
+    if (rested) finish(*picture);
+    for (const char* camera : {"3,2,4,1,0.5,1,40", "2,0.4,4,1,0.3,1,70", "0.3,3,3,1,0.5,1,50"}) {
+      if (rested && camera == request.camera) continue;  // there is nothing to do
+      DrawRequest moved = request, coarse = request;
+      moved.camera = camera, coarse.camera = camera, coarse.size = "16x12";
+      ASSERT_EQ(error_of(picture->ask(moved)), "");
+      ASSERT_TRUE(*picture->work(true, 1e-6));
+      expect_same(picture->image(), drawn(baked, coarse));
+    }
+  }
 }
 
 TEST(LivePicture, KeepsWhatItShowsOnErrors) {

@@ -14,6 +14,7 @@
 #include <charconv>
 #include <cmath>
 #include <numbers>
+#include <tuple>
 
 namespace lambent {
 namespace {
@@ -201,20 +202,28 @@ Vec3 from_sphere(const Tracer& tracer, const MovingLamp& lamp, Vec3 origin, Vec3
 
 }  // namespace
 
+Vec3 direct_light(const Tracer& tracer, const MovingLamp& lamp, Vec3 origin, Vec3 normal, int samples, uint64_t key) {
+  if (lamp.kind == MovingLamp::Kind::sphere) return from_sphere(tracer, lamp, origin, normal, samples, key);
+  const LampArrival a = arriving(lamp.light, origin);
+  const float facing = dot(normal, a.direction);
+  if (facing <= 0 || !(mean(a.irradiance) > 0) || !is_finite(a.irradiance)) return Vec3(0.0f);
+  return facing / pi * a.irradiance * reaching(tracer, origin, a.direction, a.distance);
+}
+
 Vec3 direct_light(const Tracer& tracer, std::span<const MovingLamp> lamps, Vec3 origin, Vec3 normal, int samples,
                   uint64_t key) {
   Vec3 sum(0.0f);
-  for (size_t k = 0; k < lamps.size(); ++k) {
-    if (lamps[k].kind == MovingLamp::Kind::sphere) {
-      sum += from_sphere(tracer, lamps[k], origin, normal, samples, hash64(key, k));
-      continue;
-    }
-    const LampArrival a = arriving(lamps[k].light, origin);
-    const float facing = dot(normal, a.direction);
-    if (facing <= 0 || !(mean(a.irradiance) > 0) || !is_finite(a.irradiance)) continue;
-    sum += facing / pi * a.irradiance * reaching(tracer, origin, a.direction, a.distance);
-  }
+  for (size_t k = 0; k < lamps.size(); ++k)
+    sum += direct_light(tracer, lamps[k], origin, normal, samples, hash64(key, k));
   return sum;
+}
+
+bool is_same(const MovingLamp& a, const MovingLamp& b) {
+  const auto of = [](const PunctualLight& l) {
+    return std::tie(l.kind, l.position, l.direction, l.intensity, l.inner_cone, l.outer_cone);
+  };
+  return a.kind == b.kind && of(a.light) == of(b.light) && a.centre == b.centre && a.radius == b.radius &&
+         a.radiance == b.radiance;
 }
 
 void add_lamps(Scene& scene, const std::vector<MovingLamp>& lamps) {

@@ -44,6 +44,9 @@ std::string lamp_text(const LampNumbers& lamp);
 // By an offset, a spot's target with it; suns have no place.
 void carry_lamp(LampNumbers& lamp, Vec3d by);
 
+// Whether both give the same light.
+bool is_same(const MovingLamp& a, const MovingLamp& b);
+
 Result<std::vector<MovingLamp>> parse_moving_lamps(const std::vector<std::string>& texts, Vec3d origin = Vec3d(0));
 
 // Where a lamp is when: N@T:X,Y,Z;T:X,Y,Z;..., lamp N (from 1) at rising times, straight from place to place, and
@@ -60,6 +63,8 @@ void move_lamp(std::vector<MovingLamp>& lamps, const LampPath& path, double time
 // by solid angle, `samples` times each, by numbers keyed by `key`; a place within a sphere has no light of it.
 Vec3 direct_light(const Tracer& tracer, std::span<const MovingLamp> lamps, Vec3 origin, Vec3 normal, int samples,
                   uint64_t key);
+// That of lamp k of them is of hash64(key, k) alone.
+Vec3 direct_light(const Tracer& tracer, const MovingLamp& lamp, Vec3 origin, Vec3 normal, int samples, uint64_t key);
 
 // The same lamps as the scene's own: punctual lights, and spheres as surfaces that glow and reflect nothing.
 void add_lamps(Scene& scene, const std::vector<MovingLamp>& lamps);

@@ -1,6 +1,6 @@
 #include <lambent/core/check.h>
 #include <lambent/core/parallel.h>
-#include <lambent/relight/relight.h>
+#include <lambent/relight/block_runs.h>
 
 #undef HWY_TARGET_INCLUDE
 #define HWY_TARGET_INCLUDE "lambent/relight/relight.cpp"
@@ -154,22 +154,24 @@ namespace {
 
 // body(begin, end, light [channel][column]) for runs of blocks.
 template <class Body>
-void for_blocks(const Transfer& t, std::span<const Vec3> light, const Body& body) {
+void for_blocks(const Transfer& t, std::span<const Vec3> light, const BlockRuns* only, const Body& body) {
   const size_t C = t.columns();
   LAMBENT_CHECK(light.size() >= C && C <= max_columns && t.data.size() == t.bytes());
   float planar[3 * max_columns];
   for (size_t k = 0; k < C; ++k)
     for (size_t c = 0; c < 3; ++c) planar[c * C + k] = light[k][c];
   const size_t grain = std::max<size_t>(1, (size_t{1} << 20) / (t.block_values() * t.value_bytes()));
-  parallel_for(t.blocks(), grain, [&](size_t begin, size_t end) { body(begin, end, planar); });
+  parallel_blocks(t.blocks(), grain, only, [&](size_t begin, size_t end) { body(begin, end, planar); });
 }
 
 }  // namespace
 
-void relight(const Transfer& t, std::span<const Vec3> light, Relit& out) {
+void relight(const Transfer& t, std::span<const Vec3> light, Relit& out) { relight(t, light, out, nullptr); }
+
+void relight(const Transfer& t, std::span<const Vec3> light, Relit& out, const BlockRuns* only) {
   out.rows = t.rows;
   out.values.resize(t.blocks() * size_t(t.rows) * 3 * transfer_block);
-  for_blocks(t, light, [&](size_t begin, size_t end, const float* planar) {
+  for_blocks(t, light, only, [&](size_t begin, size_t end, const float* planar) {
     HWY_DYNAMIC_DISPATCH(RelightToRelit)(t, begin, end, planar, out.values.data());
   });
 }
@@ -177,7 +179,7 @@ void relight(const Transfer& t, std::span<const Vec3> light, Relit& out) {
 void relight(const Transfer& t, std::span<const Vec3> light, std::span<float> out, size_t stride) {
   const size_t each = 3 * size_t(t.rows);
   LAMBENT_CHECK(stride >= each && (t.receivers == 0 || out.size() >= (t.receivers - 1) * stride + each));
-  for_blocks(t, light, [&](size_t begin, size_t end, const float* planar) {
+  for_blocks(t, light, nullptr, [&](size_t begin, size_t end, const float* planar) {
     HWY_DYNAMIC_DISPATCH(RelightToMemory)(t, begin, end, planar, out.data(), stride);
   });
 }

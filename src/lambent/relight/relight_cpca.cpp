@@ -3,7 +3,7 @@
 #include <lambent/core/check.h>
 #include <lambent/core/half.h>
 #include <lambent/core/parallel.h>
-#include <lambent/relight/relight.h>
+#include <lambent/relight/block_runs.h>
 
 #undef HWY_TARGET_INCLUDE
 #define HWY_TARGET_INCLUDE "lambent/relight/relight_cpca.cpp"
@@ -109,7 +109,9 @@ namespace lambent {
 HWY_EXPORT(RelightBlock);
 HWY_EXPORT(LightVector);
 
-void relight(const CpcaTransfer& t, std::span<const Vec3> light, Relit& out) {
+void relight(const CpcaTransfer& t, std::span<const Vec3> light, Relit& out) { relight(t, light, out, nullptr); }
+
+void relight(const CpcaTransfer& t, std::span<const Vec3> light, Relit& out, const BlockRuns* only) {
   const size_t C = t.light.count(), rows = size_t(t.rows), rank = size_t(t.rank), channels = size_t(t.channels);
   LAMBENT_CHECK(light.size() >= C && C <= max_columns && t.cluster_of.size() == t.receivers &&
                 t.weights.size() == t.receivers * rank);
@@ -126,7 +128,7 @@ void relight(const CpcaTransfer& t, std::span<const Vec3> light, Relit& out) {
     for (size_t v = begin; v < end; ++v) HWY_DYNAMIC_DISPATCH(LightVector)
     (t.vectors.data() + v * rows * channels * C, rows, channels, C, by_channel, out.scratch.data() + v * padded);
   });
-  parallel_for(blocks, 64, [&](size_t begin, size_t end) {
+  parallel_blocks(blocks, 64, only, [&](size_t begin, size_t end) {
     for (size_t b = begin; b < end; ++b) HWY_DYNAMIC_DISPATCH(RelightBlock)
     (t, out.scratch.data(), padded, b * transfer_block, std::min(transfer_block, t.receivers - b * transfer_block),
      out.values.data() + b * rows * 3 * transfer_block);

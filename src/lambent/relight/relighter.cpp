@@ -1,4 +1,5 @@
 #include <lambent/basis/sh.h>
+#include <lambent/relight/block_runs.h>
 #include <lambent/relight/factors.h>
 #include <lambent/relight/relighter.h>
 
@@ -23,6 +24,21 @@ Result<void> at_rest(const RelightFrame& frame) {
   return {};
 }
 
+Result<void> check_seen(const RelightFrame& frame, size_t receivers) {
+  for (uint32_t r : frame.seen.value_or(std::span<const uint32_t>()))
+    if (r >= receivers) return wrong("receiver " + std::to_string(r) + " is out of range");
+  return {};
+}
+// Calls run(the runs of blocks that are seen), or run(null) where all are.
+template <class Run>
+Result<void> of_seen(const RelightFrame& frame, size_t receivers, Relit& out, const Run& run) {
+  if (!frame.seen) return run(nullptr), Result<void>();
+  if (auto ok = check_seen(frame, receivers); !ok) return ok;
+  const BlockRuns runs = block_runs(*frame.seen, receivers);
+  if (!frame.keep) std::fill(out.values.begin(), out.values.end(), 0.0f);
+  return run(&runs), Result<void>();
+}
+
 // Dense or in clusters.
 template <class Store>
 struct OfColumns : Columns {
@@ -30,8 +46,8 @@ struct OfColumns : Columns {
   explicit OfColumns(const Store& s) : store(s) {}
   Result<void> relight(const RelightFrame& frame, Relit& out) {
     if (auto ok = at_rest(frame); !ok) return ok;
-    lambent::relight(store, light, out);
-    return {};
+    return of_seen(frame, store.receivers, out,
+                   [&](const BlockRuns* runs) { lambent::relight(store, light, out, runs); });
   }
   // Dense transfer needs nothing between.
   Result<void> relight(const RelightFrame& frame, std::span<float> out,
@@ -59,7 +75,9 @@ struct OfLobes : Columns {
       return wrong("the light field has other receivers, or fewer bands than the lobes");
     if (frame.light) relight_zonal(store, frame.frames, *frame.light, out);
     else if (direct) relight_zonal(store, frame.frames, light, out);
-    else relight_zonal(store, frame.frames, table, out);
+    else
+      return of_seen(frame, store.receivers, out,
+                     [&](const BlockRuns* runs) { relight_zonal(store, frame.frames, table, out, runs); });
     return {};
   }
 };
@@ -142,8 +160,7 @@ struct OfBlocks {
     if (auto ok = at_rest(frame); !ok) return ok;
     if (!frame.seen && all.empty()) all.resize(store.receivers), std::iota(all.begin(), all.end(), 0u);
     const std::span<const uint32_t> seen = frame.seen ? *frame.seen : all;
-    for (uint32_t r : seen)
-      if (r >= store.receivers) return wrong("receiver " + std::to_string(r) + " is out of range");
+    if (auto ok = check_seen(frame, store.receivers); !ok) return ok;
     shade_receivers(options.product, light, haar ? &*haar : nullptr, store, options.receivers, seen, frame.eye, out,
                     frame.breakdown, &scratch, frame.keep);
     return {};
@@ -253,13 +270,11 @@ Result<void> Relighter::relight(const RelightFrame& frame, std::span<float> out,
   return std::visit(
       [&](auto& s) -> Result<void> {
         if (!s.ready && !frame.light) return wrong("no light was set");
-        if constexpr (requires { s.relight(frame, out, stride); }) {
-          return s.relight(frame, out, stride);
-        } else {
-          auto done = s.relight(frame, state_->between);
-          if (done) interleave(state_->between, n, out, stride);
-          return done;
-        }
+        if constexpr (requires { s.relight(frame, out, stride); })
+          if (!frame.seen) return s.relight(frame, out, stride);
+        auto done = s.relight(frame, state_->between);
+        if (done) interleave(state_->between, n, out, stride);
+        return done;
       },
       state_->store);
 }

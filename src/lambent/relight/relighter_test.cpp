@@ -65,6 +65,29 @@ Field dense_field(int channels, Precision precision) {
   return {vertices(), w.transfer, DirectionalRows{DirectionalKind::sh2}};
 }
 
+// Receivers of some blocks alone: those to the bit, others 0, or kept. The middle one of three blocks is not seen.
+void expect_in_part(Relighter& relighter) {
+  Relit all, part;
+  ASSERT_EQ(message(relighter.relight({}, all)), "");
+  const std::vector<uint32_t> seen{3, 36}, none_seen, beyond{uint32_t(count)};
+  ASSERT_EQ(message(relighter.relight({.seen = seen}, part)), "");
+  for (uint32_t r = 0; r < count; ++r)
+    for (int row = 0; row < relighter.rows(); ++row)
+      EXPECT_EQ(part.at(r, row), r / 16 == 1 ? Vec3(0) : all.at(r, row)) << "receiver " << r;
+  part = all;
+  part.set(20, 0, Vec3(7)), part.set(36, 0, Vec3(7));
+  ASSERT_EQ(message(relighter.relight({.keep = true, .seen = seen}, part)), "");
+  EXPECT_EQ(part.at(20), Vec3(7));
+  EXPECT_EQ(part.at(36), all.at(36));
+  ASSERT_EQ(message(relighter.relight({.seen = none_seen}, part)), "");
+  EXPECT_EQ(part.at(36), Vec3(0));
+  EXPECT_NE(message(relighter.relight({.seen = beyond}, part)), "");
+  std::vector<float> memory(count * 3 * size_t(relighter.rows()));
+  ASSERT_EQ(message(relighter.relight({.seen = seen}, memory, 3 * size_t(relighter.rows()))), "");
+  EXPECT_EQ(memory[3 * 3 * size_t(relighter.rows())], all.at(3).x);
+  EXPECT_EQ(memory[20 * 3 * size_t(relighter.rows())], 0);
+}
+
 TEST(Relighter, OfDenseTransfer) {
   for (int channels : {1, 3})
     for (Precision precision : {Precision::half, Precision::single}) {
@@ -99,6 +122,7 @@ TEST(Relighter, OfClusters) {
   relight(t, light, direct);
   EXPECT_EQ(out.values, direct.values);
   for (size_t r = 0; r < count; ++r) expect_near(out, r, product(load_receiver(t, r), 4, 3, light), 5e-6f);
+  expect_in_part(relighter);
 }
 
 // Lobes as baked, turned, and under a light of each receiver's own; by the table and directly.
@@ -169,6 +193,8 @@ TEST(Relighter, OfLobes) {
   EXPECT_NE(message(relighter.relight({.frames = &few, .light = &local}, out)), "");
   const LightField coarse = make_light_field({std::vector<Vec3>(16), {}, {}}, places);
   EXPECT_NE(message(relighter.relight({.light = &coarse}, out)), "");
+  ASSERT_EQ(message(relighter.set_light(light)), "");
+  expect_in_part(relighter);
 }
 
 // Against the sum over directions: X_j = 1/pi sum of z_j L V cos, V cos / pi as the store has it.
@@ -296,6 +322,15 @@ TEST(Relighter, OfBlocks) {
   ASSERT_EQ(message(relighter.set_light(b.light)), "");
   const std::vector<uint32_t> beyond{uint32_t(count)};
   EXPECT_NE(message(relighter.relight({.eye = eye, .seen = beyond}, out)), "");
+}
+
+TEST(Relighter, OfDenseTransferInPart) {
+  for (int channels : {1, 3}) {
+    const Field field = dense_field(channels, channels == 1 ? Precision::half : Precision::single);
+    Relighter relighter = make(field);
+    ASSERT_EQ(message(relighter.set_light(random_light(11))), "");
+    expect_in_part(relighter);
+  }
 }
 
 TEST(Relighter, RefusesWhatAStoreCannotUse) {

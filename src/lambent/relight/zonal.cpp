@@ -4,7 +4,7 @@
 #include <lambent/basis/sh_tables.h>
 #include <lambent/core/check.h>
 #include <lambent/core/parallel.h>
-#include <lambent/relight/zonal.h>
+#include <lambent/relight/block_runs.h>
 
 #include <cstring>
 
@@ -338,25 +338,29 @@ DirectLight direct_light(const ZonalTransfer& t) {
 }
 
 template <class Shade>
-void for_blocks(const ZonalTransfer& t, const ReceiverFrames* frames, Relit& out, const Shade& shade) {
+void for_blocks(const ZonalTransfer& t, const ReceiverFrames* frames, const BlockRuns* only, Relit& out,
+                const Shade& shade) {
   LAMBENT_CHECK(t.data.size() == t.bytes() && (!frames || frames->receivers == t.receivers));
   const size_t rows = size_t(t.rows);
   out.rows = t.rows;
   out.values.resize(t.blocks() * rows * 3 * block);
   const size_t block_bytes = t.receiver_values() * block * t.value_bytes();
-  parallel_for(t.blocks(), std::max<size_t>(1, (size_t{1} << 18) / block_bytes), [&](size_t begin, size_t end) {
+  const size_t grain = std::max<size_t>(1, (size_t{1} << 18) / block_bytes);
+  parallel_blocks(t.blocks(), grain, only, [&](size_t begin, size_t end) {
     shade(begin, t.data.data() + begin * block_bytes, frames ? frames->values.data() + begin * 9 * block : nullptr,
           end - begin, out.values.data() + begin * rows * 3 * block);
   });
 }
 
 void shade_directly(const ZonalTransfer& t, const ReceiverFrames* frames, const DirectLight& light, Relit& out) {
-  for_blocks(t, frames, out, [&](size_t first, const uint8_t* data, const float* turned, size_t blocks, float* values) {
-    DirectLight here = light;
-    if (here.field) here.field += first * here.field_coefficients * 3 * block;
-    if (t.precision == Precision::half) HWY_DYNAMIC_DISPATCH(DirectHalf)(t, data, turned, blocks, here, values);
-    else HWY_DYNAMIC_DISPATCH(DirectSingle)(t, data, turned, blocks, here, values);
-  });
+  for_blocks(t, frames, nullptr, out,
+             [&](size_t first, const uint8_t* data, const float* turned, size_t blocks, float* values) {
+               DirectLight here = light;
+               if (here.field) here.field += first * here.field_coefficients * 3 * block;
+               if (t.precision == Precision::half)
+                 HWY_DYNAMIC_DISPATCH(DirectHalf)(t, data, turned, blocks, here, values);
+               else HWY_DYNAMIC_DISPATCH(DirectSingle)(t, data, turned, blocks, here, values);
+             });
 }
 
 }  // namespace
@@ -414,11 +418,16 @@ void specialise_light(const ZonalTransfer& t, std::span<const Vec3> light, Zonal
 }
 
 void relight_zonal(const ZonalTransfer& t, const ReceiverFrames* frames, const ZonalLight& light, Relit& out) {
+  relight_zonal(t, frames, light, out, nullptr);
+}
+
+void relight_zonal(const ZonalTransfer& t, const ReceiverFrames* frames, const ZonalLight& light, Relit& out,
+                   const BlockRuns* only) {
   LAMBENT_CHECK(light.order == t.order && light.exact_bands == t.exact_bands());
   float exact[4][3];
   for (int k = 0; k < 4; ++k)
     for (int c = 0; c < 3; ++c) exact[k][c] = light.exact[size_t(k)][c];
-  for_blocks(t, frames, out, [&](size_t, const uint8_t* data, const float* turned, size_t blocks, float* values) {
+  for_blocks(t, frames, only, out, [&](size_t, const uint8_t* data, const float* turned, size_t blocks, float* values) {
     if (t.precision == Precision::half)
       HWY_DYNAMIC_DISPATCH(SpecialisedHalf)(t, data, turned, blocks, light.texels.data(), exact, values);
     else HWY_DYNAMIC_DISPATCH(SpecialisedSingle)(t, data, turned, blocks, light.texels.data(), exact, values);
