@@ -123,8 +123,7 @@ struct Baker {
   }
   // Of all receivers. `guide`: the solution.
   Transfer store_all(const float* x, const float* guide, const std::vector<uint8_t>& buried) const {
-    return stand_ins.thinned.all() ? store(x)
-                                   : spread_transfer(all, stand_ins, buried, guide, x, width(), channels(), options);
+    return stand_ins.all() ? store(x) : spread_transfer(all, stand_ins, buried, guide, x, width(), channels(), options);
   }
 
   Result<Transfer> direct() {
@@ -169,6 +168,7 @@ struct Baker {
         setup,
         {.sky = {T0.data(), nullptr, W, &lobes, nullptr},
          .more = [&](size_t first, size_t count, const GatherSky& sky) { trace_sharp_lobes(first, count, sky); },
+         .hits = options.bounces > 0,
          .memory = options.memory > fixed ? options.memory - fixed : 0},
         progress);
     if (!B) return B.error();
@@ -203,6 +203,8 @@ struct Baker {
     report.bounce_seconds = seconds_since(start);
     const std::vector<uint8_t> buried = B->buried();
     B = Error{}, T0 = {};  // what comes has need of their memory
+    // Without bounces surfaces are black.
+    if (options.bounces == 0) return finish({std::move(solution->x), {}}, buried, std::move(terms));
     return finish({std::move(last), std::move(solution->x)}, buried, std::move(terms));
   }
 
@@ -240,7 +242,7 @@ struct Baker {
     if (options.certify) {
       const auto start = std::chrono::steady_clock::now();
       const FieldRow field = [&](uint32_t r, float* row) {
-        if (stand_ins.thinned.all()) std::copy_n(solved.x.data() + size_t(r) * width(), width(), row);
+        if (stand_ins.all()) std::copy_n(solved.x.data() + size_t(r) * width(), width(), row);
         else load_row(result, r, row);
       };
       const ReflectedErrors reflected{*other, solved.met.empty() ? 0 : options.bounces};
@@ -344,7 +346,10 @@ Result<void> check_options(const BakeOptions& o) {
     return Error{"error", "must lie between 0 and 1, not " + std::to_string(o.error)};
   if (o.bounces < 0 || o.bounces > 64)
     return Error{"bounces", "must lie between 0 and 64, not " + std::to_string(o.bounces)};
-  return {};
+  if (o.projection == Projection::collocation) return {};
+  if (!o.lobes.empty() || o.denoise || o.error > 0 || !o.shadows || o.meshless)
+    return Error{"projection", "least squares are of harmonics, with samples, and neither denoised nor meshless"};
+  return check_projection_ranks();
 }
 
 }  // namespace
@@ -373,21 +378,19 @@ namespace {
 Result<Transfer> bake_with_samples(const Scene& scene, const Tracer& tracer, const Receivers& all,
                                    const StandIns& stand_ins, const BakeOptions& options, BakeReport& r,
                                    Progress* progress) {
-  const Receivers& receivers = stand_ins.thinned.all() ? all : stand_ins.own;
-  Baker baker{scene,
-              all,
-              stand_ins,
-              receivers,
-              options,
-              make_gather_setup(scene, tracer, receivers, options.order, options.shadows ? options.samples : 1,
-                                options.seed, square_to_cosine_hemisphere, progress),
-              progress,
-              r};
+  const Receivers& receivers = stand_ins.all() ? all : stand_ins.own;
+  const std::optional<LeastSquares> projection =
+      least_squares_of(scene, receivers, options.projection, options.samples, options.seed);
+  GatherSetup setup = make_gather_setup(scene, tracer, receivers, options.order, options.shadows ? options.samples : 1,
+                                        options.seed, square_to_cosine_hemisphere, progress);
+  setup.projection = projection ? &*projection : nullptr;
+  Baker baker{scene, all, stand_ins, receivers, options, std::move(setup), progress, r};
   const size_t least = least_memory(receivers.count(), baker.setup.channels == 3, options);
   if (options.memory < least)
     return Error{scene.path, "baking needs at least " + std::to_string(least) +
                                  " bytes of working memory, and was allowed " + std::to_string(options.memory)};
-  auto result = !options.shadows ? baker.unshadowed() : options.bounces > 0 ? baker.bounced() : baker.direct();
+  const bool by_operator = options.bounces > 0 || projection;
+  auto result = !options.shadows ? baker.unshadowed() : by_operator ? baker.bounced() : baker.direct();
   if (!result) return result;
   if (options.keep_terms && r.terms.empty()) r.terms = {*result};
   r.receivers = all.count(), r.traced = receivers.count(), r.bytes = result->bytes(), r.samples = options.samples;
@@ -427,6 +430,18 @@ Result<Transfer> bake_to_error(const Scene& scene, const Tracer& tracer, const R
   }
 }
 
+// With so many samples as the options say.
+Result<Transfer> bake_on_receivers(const Scene& scene, const Tracer& tracer, const Receivers& receivers,
+                                   const BakeOptions& options, BakeReport& r, Progress* progress) {
+  StandIns stand_ins{keep_all(receivers.count()), {}};
+  if (options.meshless) {
+    auto points = choose_stand_ins(scene, tracer, receivers, options, progress);
+    if (!points) return points.error();
+    stand_ins = std::move(*points);
+  }
+  return bake_with_samples(scene, tracer, receivers, stand_ins, options, r, progress);
+}
+
 }  // namespace
 
 Result<Transfer> bake(const Scene& scene, const Tracer& tracer, const Receivers& receivers, const BakeOptions& options,
@@ -436,9 +451,8 @@ Result<Transfer> bake(const Scene& scene, const Tracer& tracer, const Receivers&
   BakeReport unwanted;
   BakeReport& r = report ? *report : unwanted;
   r = {};
-  return options.error > 0 && options.shadows
-           ? bake_to_error(scene, tracer, receivers, options, r, progress)
-           : bake_with_samples(scene, tracer, receivers, {keep_all(receivers.count()), {}}, options, r, progress);
+  return options.error > 0 && options.shadows ? bake_to_error(scene, tracer, receivers, options, r, progress)
+                                              : bake_on_receivers(scene, tracer, receivers, options, r, progress);
 }
 
 }  // namespace lambent

@@ -2,12 +2,13 @@
 // Scene -> Transfer: diffuse light transport, direct and bounced.
 #include <lambent/bake/certify.h>
 #include <lambent/core/progress.h>
-#include <lambent/receivers/receivers.h>
+#include <lambent/receivers/project.h>
 #include <lambent/scene/scene.h>
 #include <lambent/trace/tracer.h>
 #include <lambent/transfer/transfer.h>
 
 #include <cstdint>
+#include <optional>
 #include <vector>
 
 namespace lambent {
@@ -34,6 +35,12 @@ struct BakeOptions {
   // Where > 0, of at least twice so many receivers, baked to an error, those that light does not tell apart are not
   // traced: others stand for them (stand_in.h).
   size_t thin = 0;
+  // What a receiver has: the value where it is, or coefficients of least squares by rays from places all over its basis
+  // function (receivers/project.h); of harmonics, with `samples`, on one rank, without denoising.
+  Projection projection = Projection::collocation;
+  // Others than the receivers are traced, surfels, about so many (0: as SurfelOptions has it): they bounce light, and
+  // receivers, at vertices, read them by kernels (meshless.h).
+  std::optional<size_t> meshless = std::nullopt;
 
   LightBasis light() const { return {order, lobe_kind, lobes, {}}; }
 };

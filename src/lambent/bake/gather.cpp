@@ -9,6 +9,8 @@
 #include <lambent/core/random.h>
 
 #include <algorithm>
+#include <array>
+#include <span>
 
 namespace lambent {
 namespace {
@@ -26,7 +28,7 @@ struct Fan {
   ShZyzRotator rotator;
   AlignedVector<float> x, y, z, lobe;
   std::vector<AlignedVector<float>> visible;  // of each sky channel
-  std::vector<float> half, rest;
+  std::vector<float> half, rest, part;
   DirectionChoice choice{};
 
   Fan(const DirectionSets& s, int sky_channels)
@@ -86,9 +88,27 @@ struct Fan {
     }
   }
 
+  // What the rays of each place see, every places-th of the fan, by the way that its fan is turned.
+  void project_places(const GatherSky& sky, size_t first, size_t receiver, std::span<const DirectionChoice> turned) {
+    const size_t width = sky.stride;
+    float *row = sky.rows + (receiver - first) * width, *half_row = checked_row(sky, first, receiver);
+    std::fill_n(row, width, 0.0f);
+    if (half_row) std::fill_n(half_row, width, 0.0f);
+    std::vector<AlignedVector<float>> all = visible;
+    for (size_t place = 0; place < turned.size(); ++place) {
+      choice = turned[place];
+      for (size_t c = 0; c < visible.size(); ++c)
+        for (size_t j = 0; j < size_t(sets.samples); ++j) visible[c][j] = j % turned.size() == place ? all[c][j] : 0.0f;
+      part.assign(2 * width, 0.0f);
+      project_into(sky, part.data(), half_row ? part.data() + width : nullptr);
+      for (size_t k = 0; k < width; ++k) row[k] += part[k];
+      for (size_t k = 0; half_row && k < width; ++k) half_row[k] += part[width + k];
+    }
+  }
   void project(const GatherSky& sky, size_t first, size_t receiver) {
-    float* row = sky.rows + (receiver - first) * sky.stride;
-    float* half_row = checked_row(sky, first, receiver);
+    project_into(sky, sky.rows + (receiver - first) * sky.stride, checked_row(sky, first, receiver));
+  }
+  void project_into(const GatherSky& sky, float* row, float* half_row) {
     for (const AlignedVector<float>& seen : visible) {
       project(seen.data(), row, half_row);
       if (sky.lobes)
@@ -141,6 +161,10 @@ struct GatherScratch {
   std::vector<Passage> passages;  // of the hits; empty where all surfaces are solid
   BlockBuilder rows, half_rows;
   std::vector<LampLight> lights;
+  // Of least squares: a place's own rays and what they met, and all of the fan's as they were aimed.
+  AlignedVector<float> own[3], aimed[3];
+  std::vector<Hit> own_hits;
+  std::vector<Passage> own_passages;
   explicit GatherScratch(const GatherSetup& setup)
       : fan(setup.sets, setup.sky_channels),
         hits(size_t(setup.sets.samples)),
@@ -202,92 +226,163 @@ void prefetch_places(const CornerReceivers& basis, const Hit& h, const BlockBuil
   for (uint32_t receiver : at->receiver) rows.prefetch(receiver);
 }
 
-// What lamps send to one receiver, by samples towards them and by what the fan's rays meet.
+// What lamps send to one receiver, by samples towards them from each of its places and by what the fan's rays meet.
 struct LampSum {
   const GatherSetup& setup;
   const GatherDirect* direct;  // null: nothing
   float* row;
-  Vec3 normal;
-  size_t rays = size_t(setup.sets.samples);
+  size_t places = 1;
+  size_t rays = std::max<size_t>(size_t(setup.sets.samples) / places, 1);  // from a place
+  int samples = direct ? std::max(direct->samples / int(places), 1) : 0;   // a group, from a place
 
   void add(const LampLight& light, float share) {
     for (int c = 0; c < 3; ++c) row[size_t(light.group) * 3 + size_t(c)] += share * light.value[c];
   }
-  void sample(std::vector<LampLight>& lights, Vec3 origin, size_t key) {
+  void sample(std::vector<LampLight>& lights, Vec3 origin, Vec3 normal, size_t key) {
     if (!direct) return;
     lights.clear();
-    sample_lamps(setup.scene, setup.tracer, direct->lamps, origin, normal, direct->samples, rays, setup.seed, key,
-                 lights, setup.progress);
-    for (const LampLight& light : lights) add(light, 1);
+    sample_lamps(setup.scene, setup.tracer, direct->lamps, origin, normal, samples, rays, setup.seed, key, lights,
+                 setup.progress);
+    for (const LampLight& light : lights) add(light, 1 / float(places));
   }
-  void meet(const Hit& h, Vec3 direction, Vec3 open, Vec3 passed, float share) {
+  void meet(const Hit& h, Vec3 direction, Vec3 normal, Vec3 open, Vec3 passed, float share) {
     const Lamps& lamps = direct->lamps;
+    share /= float(places);
     if (lamps.sky && open != Vec3(0)) {
-      LampLight light = met_sky(lamps, direction, dot(normal, direction), direct->samples, rays);
+      LampLight light = met_sky(lamps, direction, dot(normal, direction), samples, rays);
       light.value *= open;
       add(light, share);
     }
     if (h.triangle == none || lamps.of_triangle.empty()) return;
     const uint32_t lamp = lamps.of_triangle[h.triangle];
     if (lamp == none || !emits(setup.scene, setup.scene.triangles[h.triangle], h.front)) return;
-    LampLight light = met_lamp(setup.scene, lamps, lamp, h, direction, dot(normal, direction), direct->samples, rays);
+    LampLight light = met_lamp(setup.scene, lamps, lamp, h, direction, dot(normal, direction), samples, rays);
     light.value *= passed;
     add(light, share);
   }
 };
 
+// Where the rays of a receiver start, ray j at place j % places; and how the fan is turned there.
+struct Starts {
+  std::array<Vec3, most_places> origin, normal;
+  std::array<DirectionChoice, most_places> turned;
+  size_t places = 1;
+};
+
+// Of a fan's rays from one place, most met backs.
 template <class Basis>
-void trace_gather_on(const GatherSetup& setup, const Basis& basis, GatherScratch& scratch, size_t first, size_t count,
-                     GatherBlock* block, const GatherSky* sky, const GatherDirect* direct) {
+bool sees_backs(const GatherSetup& setup, const Basis& basis, const std::vector<Hit>& hits) {
+  size_t backs = 0;
+  for (const Hit& h : hits)
+    backs += h.triangle != none && !basis.find(h.triangle, h.front) && !setup.tracer.lets_pass(h.triangle);
+  return 2 * backs > hits.size();
+}
+
+// The fan's rays as they are shared out to a receiver's places, those inside something passed over for others.
+template <class Basis>
+void trace_places(const GatherSetup& setup, const Basis& basis, GatherScratch& s, size_t r, Starts& starts) {
+  const SpreadPlaces& all = setup.projection->places;
+  const size_t places = starts.places = all.each, rays = size_t(setup.sets.samples);
+  for (auto& lane : s.aimed) lane.resize(s.fan.x.size(), 0.0f);
+  for (size_t place = 0; place < places && !is_cancelled(setup.progress); ++place) {
+    const size_t own = (rays - place + places - 1) / places;
+    for (auto& lane : s.own) lane.assign(pad_lanes(own), 0.0f);
+    s.own_hits.resize(own), s.own_passages.resize(s.passages.empty() ? 0 : own);
+    for (size_t tried = 0; tried < places; ++tried) {
+      const size_t at = r * places + (place + tried) % places;
+      starts.origin[place] = all.origins[at], starts.normal[place] = all.normals[at];
+      s.fan.aim(all.normals[at], setup.seed, r);
+      starts.turned[place] = s.fan.choice;
+      for (size_t i = 0, j = place; j < rays; ++i, j += places)
+        s.own[0][i] = s.fan.x[j], s.own[1][i] = s.fan.y[j], s.own[2][i] = s.fan.z[j];
+      trace_hits(setup.tracer, all.origins[at], {s.own[0].data(), s.own[1].data(), s.own[2].data(), own},
+                 s.own_hits.data(), s.own_passages, setup.progress);
+      if (is_cancelled(setup.progress) || !sees_backs(setup, basis, s.own_hits)) break;
+    }
+    for (size_t i = 0, j = place; j < rays; ++i, j += places) {
+      for (size_t c = 0; c < 3; ++c) s.aimed[c][j] = s.own[c][i];
+      s.hits[j] = s.own_hits[i];
+      if (!s.passages.empty()) s.passages[j] = s.own_passages[i];
+    }
+  }
+  s.fan.x.swap(s.aimed[0]), s.fan.y.swap(s.aimed[1]), s.fan.z.swap(s.aimed[2]);
+}
+
+template <class Basis>
+Starts trace_receiver(const GatherSetup& setup, const Basis& basis, GatherScratch& scratch, size_t r) {
+  Starts starts;
+  starts.origin[0] = setup.receivers.origins[r], starts.normal[0] = setup.receivers.normals[r];
+  if (setup.projection) {
+    trace_places(setup, basis, scratch, r, starts);
+  } else {
+    const Directions directions = scratch.fan.aim(starts.normal[0], setup.seed, r);
+    trace_hits(setup.tracer, starts.origin[0], directions, scratch.hits.data(), scratch.passages, setup.progress);
+  }
+  return starts;
+}
+
+// What the fan's rays met, into the rows that have begun. How many met backs.
+template <class Basis>
+size_t add_hits(const GatherSetup& setup, const Basis& basis, GatherScratch& scratch, size_t r, const Starts& starts,
+                bool rows, const GatherDirect* direct, float* lamp_row) {
   const DirectionSets& sets = setup.sets;
   const size_t rays = size_t(sets.samples), half = std::min(sets.half, rays);
+  const bool checked = rows && r % check_every == 0;
   Fan& fan = scratch.fan;
   const std::vector<Hit>& hits = scratch.hits;
   std::vector<Passage>& passages = scratch.passages;
   const bool passes = !passages.empty();
+  size_t backs = 0;
+  auto direction = [&](size_t j) { return Vec3(fan.x[j], fan.y[j], fan.z[j]); };
+  LampSum lamps{setup, direct, lamp_row, starts.places};
+  for (size_t place = 0; place < starts.places; ++place)
+    lamps.sample(scratch.lights, starts.origin[place], starts.normal[place], r * starts.places + place);
+  for (size_t j = 0; j < rays; ++j) {
+    if (ends_fan(j, setup.progress)) break;
+    if (j + lookahead < rays) basis.prefetch(hits[j + lookahead].triangle, hits[j + lookahead].front);
+    if (rows && j + lookahead / 2 < rays) prefetch_places(basis, hits[j + lookahead / 2], scratch.rows);
+    const Hit& h = hits[j];
+    const float share = sets.weights.empty() ? 1.0f : sets.weights[j];
+    const Vec3 open = passes ? passages[j].sky : Vec3(h.triangle == none ? 1.0f : 0.0f);
+    for (size_t c = 0; c < fan.visible.size(); ++c) fan.visible[c][j] = share * open[int(c)];
+    if (direct)
+      lamps.meet(h, direction(j), starts.normal[j % starts.places], open, passes ? passages[j].hit : Vec3(1), share);
+    if (h.triangle == none) continue;
+    const auto* at = basis.find(h.triangle, h.front);
+    if (!at) {
+      backs += !setup.tracer.lets_pass(h.triangle);
+      continue;
+    }
+    if (!rows) continue;
+    Vec3 rho = setup.albedo_at(at->part, h);
+    if (passes) rho *= passages[j].hit;
+    scatter(basis, *at, h, r * rays + j,
+            [&](uint32_t receiver, float weight) { scratch.rows.add(receiver, rho * (weight * share)); });
+    if (checked && j < half)
+      scatter(basis, *at, h, r * rays + j,
+              [&](uint32_t receiver, float weight) { scratch.half_rows.add(receiver, rho * (weight * share)); });
+  }
+  return backs;
+}
+
+template <class Basis>
+void trace_gather_on(const GatherSetup& setup, const Basis& basis, GatherScratch& scratch, size_t first, size_t count,
+                     GatherBlock* block, const GatherSky* sky, const GatherDirect* direct) {
   scratch.rows.begin_block(), scratch.half_rows.begin_block();
   for (size_t i = 0; i < count && !is_cancelled(setup.progress); ++i) {
     const size_t r = first + i;
-    const bool checked = block && r % check_every == 0;
-    const Directions directions = fan.aim(setup.receivers.normals[r], setup.seed, r);
-    trace_hits(setup.tracer, setup.receivers.origins[r], directions, scratch.hits.data(), passages, setup.progress);
+    const Starts starts = trace_receiver(setup, basis, scratch, r);
     if (is_cancelled(setup.progress)) break;
     scratch.rows.begin_row(), scratch.half_rows.begin_row();  // the second ends where it is checked
-    size_t backs = 0;
-    const Vec3 normal = setup.receivers.normals[r];
-    auto direction = [&](size_t j) { return Vec3(fan.x[j], fan.y[j], fan.z[j]); };
-    LampSum lamps{setup, direct, direct ? direct->rows + i * direct->width : nullptr, normal};
-    lamps.sample(scratch.lights, setup.receivers.origins[r], r);
-    for (size_t j = 0; j < rays; ++j) {
-      if (ends_fan(j, setup.progress)) break;
-      if (j + lookahead < rays) basis.prefetch(hits[j + lookahead].triangle, hits[j + lookahead].front);
-      if (block && j + lookahead / 2 < rays) prefetch_places(basis, hits[j + lookahead / 2], scratch.rows);
-      const Hit& h = hits[j];
-      const float share = sets.weights.empty() ? 1.0f : sets.weights[j];
-      const Vec3 open = passes ? passages[j].sky : Vec3(h.triangle == none ? 1.0f : 0.0f);
-      for (size_t c = 0; c < fan.visible.size(); ++c) fan.visible[c][j] = share * open[int(c)];
-      if (direct) lamps.meet(h, direction(j), open, passes ? passages[j].hit : Vec3(1), share);
-      if (h.triangle == none) continue;
-      const auto* at = basis.find(h.triangle, h.front);
-      if (!at) {
-        backs += !setup.tracer.lets_pass(h.triangle);
-        continue;
-      }
-      if (!block) continue;
-      Vec3 rho = setup.albedo_at(at->part, h);
-      if (passes) rho *= passages[j].hit;
-      scatter(basis, *at, h, r * rays + j,
-              [&](uint32_t receiver, float weight) { scratch.rows.add(receiver, rho * (weight * share)); });
-      if (checked && j < half)
-        scatter(basis, *at, h, r * rays + j,
-                [&](uint32_t receiver, float weight) { scratch.half_rows.add(receiver, rho * (weight * share)); });
-    }
+    const size_t backs = add_hits(setup, basis, scratch, r, starts, block != nullptr, direct,
+                                  direct ? direct->rows + i * direct->width : nullptr);
     scratch.rows.end_row();
-    if (checked) scratch.half_rows.end_row();
-    if (sky) {
-      fan.project(*sky, first, r);
-      sky->buried[i] = is_buried(setup.tracer, setup.receivers, r, backs, rays);
-    }
+    if (block && r % check_every == 0) scratch.half_rows.end_row();
+    if (!sky) continue;
+    if (setup.projection) scratch.fan.project_places(*sky, first, r, {starts.turned.data(), starts.places});
+    else scratch.fan.project(*sky, first, r);
+    const size_t rays = size_t(setup.sets.samples);
+    sky->buried[i] = setup.projection ? 2 * backs > rays : is_buried(setup.tracer, setup.receivers, r, backs, rays);
   }
   if (block) {
     scratch.rows.finish(setup.channels, setup.weight_unit, block->rows);
@@ -314,8 +409,8 @@ bool gather_point(const GatherSetup& setup, GatherScratch& scratch, Vec3 origin,
   trace_hits(setup.tracer, origin, directions, scratch.hits.data(), scratch.passages, setup.progress);
   std::fill_n(reflected, width, 0.0f);
   size_t backs = 0;
-  LampSum lamps{setup, direct, direct ? direct->rows : nullptr, normal};
-  lamps.sample(scratch.lights, origin, size_t(key));
+  LampSum lamps{setup, direct, direct ? direct->rows : nullptr};
+  lamps.sample(scratch.lights, origin, normal, size_t(key));
   std::visit(
       [&](const auto& basis) {
         for (size_t j = 0; j < rays; ++j) {
@@ -323,7 +418,8 @@ bool gather_point(const GatherSetup& setup, GatherScratch& scratch, Vec3 origin,
           const Vec3 open = passes ? scratch.passages[j].sky : Vec3(h.triangle == none ? 1.0f : 0.0f);
           for (size_t c = 0; c < fan.visible.size(); ++c) fan.visible[c][j] = open[int(c)];
           if (direct)
-            lamps.meet(h, Vec3(fan.x[j], fan.y[j], fan.z[j]), open, passes ? scratch.passages[j].hit : Vec3(1), 1);
+            lamps.meet(h, Vec3(fan.x[j], fan.y[j], fan.z[j]), normal, open, passes ? scratch.passages[j].hit : Vec3(1),
+                       1);
           if (h.triangle == none) continue;
           const auto* at = basis.find(h.triangle, h.front);
           if (!at) backs += !setup.tracer.lets_pass(h.triangle);
@@ -360,37 +456,6 @@ void trace_sky(const GatherSetup& setup, GatherScratch& scratch, size_t first, s
     size_t seen = 0;
     for (size_t j = 0; j < rays; ++j) seen += v[0][j] > 0 || (v.size() == 3 && v[1][j] + v[2][j] > 0);
     sky.buried[i] = 2 * seen < rays && is_buried(setup.tracer, setup.receivers, r);
-  }
-}
-
-std::vector<FillStep> make_fill_steps(const Scene& scene, const SpatialBasis& basis,
-                                      const std::vector<uint8_t>& buried) {
-  const auto edges = neighbours_of(scene, basis, buried);  // (buried receiver, neighbour)
-  std::vector<FillStep> steps;
-  std::vector<uint8_t> waiting = buried;
-  for (bool grew = true; grew;) {  // layer by layer from the receivers that are clear
-    grew = false;
-    const size_t layer = steps.size();
-    for (size_t begin = 0; begin < edges.size();) {
-      size_t end = begin;
-      const uint32_t r = edges[begin].first;
-      FillStep step{r, {}};
-      for (; end < edges.size() && edges[end].first == r; ++end)
-        if (!waiting[edges[end].second]) step.sources.push_back(edges[end].second);
-      if (waiting[r] && !step.sources.empty()) steps.push_back(std::move(step)), grew = true;
-      begin = end;
-    }
-    for (size_t i = layer; i < steps.size(); ++i) waiting[steps[i].receiver] = 0;
-  }
-  return steps;
-}
-
-void fill_buried(const std::vector<FillStep>& steps, float* values, size_t stride, size_t width) {
-  for (const FillStep& step : steps) {
-    float* out = values + size_t(step.receiver) * stride;
-    std::fill(out, out + width, 0.0f);
-    for (uint32_t s : step.sources)
-      for (size_t j = 0; j < width; ++j) out[j] += values[size_t(s) * stride + j] / float(step.sources.size());
   }
 }
 

@@ -10,10 +10,11 @@
 #include <lambent/bake/lamps.h>
 #include <lambent/bake/lobes.h>
 #include <lambent/core/aligned.h>
-#include <lambent/receivers/receivers.h>
+#include <lambent/receivers/project.h>
 #include <lambent/trace/tracer.h>
 
 #include <memory>
+#include <optional>
 #include <vector>
 
 namespace lambent {
@@ -54,6 +55,9 @@ struct GatherSetup {
   std::vector<Vec3> part_albedo;  // of parts with one albedo all over
   std::vector<uint8_t> part_varies;
   Progress* progress = nullptr;  // tracing looks at it receiver by receiver, and ends early when cancelled
+  // Not null: receivers have means over the places of their basis functions, which share their rays, and
+  // GatherOperator::fill() makes coefficients of means. trace_sky() and gather_point() know nothing of it.
+  const LeastSquares* projection = nullptr;
 
   size_t coefficients() const { return size_t(sh_count(sets.order)); }
   size_t sky_width() const { return coefficients() * size_t(sky_channels); }
@@ -68,6 +72,13 @@ struct GatherSetup {
 
 // Whether light that is reflected has to be kept for each colour.
 bool has_coloured_albedo(const Scene& scene);
+
+inline constexpr size_t most_places = 16;
+// With places for each receiver to send so many rays from, 16, but for fewer than four rays each. None: collocation.
+std::optional<LeastSquares> least_squares_of(const Scene& scene, const Receivers& receivers, Projection projection,
+                                             int samples, uint32_t seed);
+// Means become coefficients where all of them are known. Errors: more ranks than one.
+Result<void> check_projection_ranks();
 
 // `sets` of the setup may be replaced by make_hemicube_set(): its rows then are those of a hemicube ray cast at its
 // pixels' centres, which stand for the integral over the cosine that random rays estimate.

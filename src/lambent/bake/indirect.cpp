@@ -1,6 +1,7 @@
 #include <lambent/bake/indirect.h>
 
 #include <lambent/bake/directions.h>
+#include <lambent/bake/meshless.h>
 #include <lambent/core/check.h>
 #include <lambent/core/checkpoint.h>
 #include <lambent/core/half.h>
@@ -12,6 +13,7 @@
 #include <atomic>
 #include <chrono>
 #include <cmath>
+#include <memory>
 
 namespace lambent {
 namespace {
@@ -299,45 +301,64 @@ Result<void> gather_lattice(IndirectTransfer& t, const Gathering& g, IndirectRep
   return {};
 }
 
-// Receivers that see no surfel, inside something, read what a neighbour along the mesh reads, layer by layer.
-size_t fill_readers(IndirectTransfer& t, const Scene& scene, const SpatialBasis& basis) {
-  std::vector<uint8_t> unread(t.receivers);
-  for (size_t r = 0; r < t.receivers; ++r) unread[r] = t.reader_weights[r * kernel_slots] == 0;
-  const auto pairs = neighbours_of(scene, basis, unread);
-  size_t left = size_t(std::count(unread.begin(), unread.end(), uint8_t(1)));
-  for (std::vector<std::pair<uint32_t, uint32_t>> step{{}}; !step.empty();) {
-    step.clear();
-    for (const auto& [r, neighbour] : pairs)
-      if (unread[r] && !unread[neighbour] && (step.empty() || step.back().first != r)) step.emplace_back(r, neighbour);
-    for (const auto& [r, neighbour] : step) {
-      const size_t to = r * kernel_slots, from = neighbour * kernel_slots;
-      std::copy_n(t.reader_surfels.begin() + ptrdiff_t(from), kernel_slots, t.reader_surfels.begin() + ptrdiff_t(to));
-      std::copy_n(t.reader_weights.begin() + ptrdiff_t(from), kernel_slots, t.reader_weights.begin() + ptrdiff_t(to));
-      unread[r] = 0, --left;
-    }
+void set_reader(IndirectTransfer& t, size_t r, Kernels k) {
+  round_kernels(k);
+  for (size_t i = 0; i < k.count; ++i) {
+    t.reader_surfels[r * kernel_slots + i] = k.surfel[i];
+    t.reader_weights[r * kernel_slots + i] = float_to_half(k.weight[i]);
   }
-  return left;
 }
 
 void set_readers(IndirectTransfer& t, const Scene& scene, const SurfelSearch& search, const Receivers& receivers,
                  IndirectReport& report) {
   t.receivers = receivers.count();
   t.reader_surfels.assign(t.receivers * kernel_slots, 0), t.reader_weights.assign(t.receivers * kernel_slots, 0);
-  parallel_for(t.receivers, 64, [&](size_t begin, size_t end) {
-    for (size_t r = begin; r < end; ++r) {
-      Kernels k = search.kernels({receivers.origins[r], receivers.normals[r]});
-      round_kernels(k);
-      for (size_t i = 0; i < k.count; ++i) {
-        t.reader_surfels[r * kernel_slots + i] = k.surfel[i];
-        t.reader_weights[r * kernel_slots + i] = float_to_half(k.weight[i]);
-      }
-    }
-  });
-  for (size_t r = 0; r < t.receivers; ++r) report.buried += t.reader_weights[r * kernel_slots] == 0;
-  report.unread = fill_readers(t, scene, receivers.basis);
+  const ReadKernels read = read_kernels(scene, search, receivers);
+  for (size_t r = 0; r < t.receivers; ++r) set_reader(t, r, read.kernels[r]);
+  report.buried = read.buried, report.unread = read.unread;
   // In the order in which a file has them.
   const auto ok = unpack_kernels(pack_kernels(t), t, "");
   LAMBENT_CHECK(ok);
+}
+
+// Surfels, and what gathers over them.
+struct Begun {
+  IndirectTransfer t;
+  std::unique_ptr<const SurfelSearch> search;
+  DirectionSets sets;
+  std::vector<std::array<float, test_lamps>> test;
+  std::vector<std::atomic<uint32_t>> hits;
+
+  Gathering gathering(const Scene& scene, const Tracer& tracer, const IndirectOptions& options) {
+    return {scene, tracer, t.surfels, *search, options, sets, test, bounds(scene).diagonal(), hits};
+  }
+};
+
+Result<std::unique_ptr<Begun>> begin(const Scene& scene, const Tracer& tracer, const IndirectOptions& options,
+                                     IndirectReport& told, Progress* progress) {
+  const auto start = Clock::now();
+  auto surfels = make_surfels(scene, tracer, {options.surfels, options.seed}, progress);
+  if (!surfels) return surfels.error();
+  auto b = std::make_unique<Begun>();
+  Surfels& s = b->t.surfels = std::move(*surfels);
+  for (const Material& m : scene.materials) s.names.push_back(m.name);
+  round_surfels(s);
+  const size_t leaves = s.levels() - 1;
+  b->t.gather_level = uint32_t(options.all_gather || leaves == 0 ? leaves : leaves - 1);
+  b->search = std::make_unique<const SurfelSearch>(s, tracer, b->t.gather_level);
+  told.surfel_seconds = seconds_since(start);
+  b->sets =
+      make_direction_sets(1, options.samples, direction_sets, options.seed, square_to_cosine_hemisphere, progress);
+  b->test = test_light(s, tracer, bounds(scene).diagonal(), options.seed);
+  b->hits = std::vector<std::atomic<uint32_t>>(s.count());
+  return b;
+}
+
+// Runs of `run` out of `count`, evenly apart, `most` in all: f(index).
+void each_of_runs(size_t count, size_t run, size_t most, auto f) {
+  const size_t pieces = (count + run - 1) / run, taken = std::min(pieces, most / run);
+  for (size_t k = 0; k < taken; ++k)
+    for (size_t i = k * pieces / taken * run; i < std::min(count, (k * pieces / taken + 1) * run); ++i) f(i);
 }
 
 }  // namespace
@@ -347,31 +368,62 @@ Result<IndirectTransfer> bake_indirect(const Scene& scene, const Tracer& tracer,
   IndirectReport unasked;
   IndirectReport& told = report ? *report : unasked;
   told = {};
+  auto begun = begin(scene, tracer, options, told, progress);
+  if (!begun) return begun.error();
   auto start = Clock::now();
-  auto surfels = make_surfels(scene, tracer, {options.surfels, options.seed}, progress);
-  if (!surfels) return surfels.error();
-  IndirectTransfer t;
-  t.surfels = std::move(*surfels);
-  for (const Material& m : scene.materials) t.surfels.names.push_back(m.name);
-  round_surfels(t.surfels);
-  const size_t leaves = t.surfels.levels() - 1;
-  t.gather_level = uint32_t(options.all_gather || leaves == 0 ? leaves : leaves - 1);
-  const SurfelSearch search(t.surfels, tracer, t.gather_level);
-  told.surfel_seconds = seconds_since(start), start = Clock::now();
-  const float diagonal = bounds(scene).diagonal();
-  const DirectionSets sets =
-      make_direction_sets(1, options.samples, direction_sets, options.seed, square_to_cosine_hemisphere, progress);
-  const auto test = test_light(t.surfels, tracer, diagonal, options.seed);
-  std::vector<std::atomic<uint32_t>> hits(t.surfels.count());
-  const Gathering g{scene, tracer, t.surfels, search, options, sets, test, diagonal, hits};
+  IndirectTransfer& t = (*begun)->t;
+  const Gathering g = (*begun)->gathering(scene, tracer, options);
   if (auto ok = gather_rows(t, g, told, progress); !ok) return ok.error();
   if (options.lattice)
     if (auto ok = gather_lattice(t, g, told, progress); !ok) return ok.error();
   t.rows = directional_rows(options.directional);
   told.trace_seconds = seconds_since(start), start = Clock::now();
-  set_readers(t, scene, search, receivers, told);
+  set_readers(t, scene, g.search, receivers, told);
   told.reader_seconds = seconds_since(start);
-  return t;
+  return std::move(t);
+}
+
+Result<IndirectExpected> expect_indirect(const Scene& scene, const Tracer& tracer, const Receivers& receivers,
+                                         const IndirectOptions& options, Progress* progress) {
+  constexpr size_t most_rows = 512, most_readers = 4096, most_points = 4;
+  IndirectReport told;
+  auto begun = begin(scene, tracer, options, told, progress);
+  if (!begun) return begun.error();
+  const auto start = Clock::now();
+  IndirectTransfer& t = (*begun)->t;
+  const Gathering g = (*begun)->gathering(scene, tracer, options);
+  std::vector<uint32_t> which;
+  each_of_runs(t.gathering(), rows_a_piece, most_rows, [&](size_t i) { which.push_back(uint32_t(i)); });
+  std::vector<Row> rows(which.size());
+  parallel_for(which.size(), rows_a_piece, [&](size_t begin, size_t end) {
+    std::vector<Met> met;
+    for (size_t i = begin; i < end && !is_cancelled(progress); ++i)
+      g.meet(which[i], met, rows[i]), g.compress(met, rows[i]);
+  });
+  t.gather = rows_of(rows);
+  const double rows_of_all = double(t.gathering()) / double(std::max<size_t>(which.size(), 1));
+  double points_of_all = 0;
+  if (options.lattice) {
+    IndirectOptions few = options;
+    Lattice& l = *few.lattice;
+    for (int* n : {&l.nx, &l.ny, &l.nz}) *n = std::min(*n, int(most_points));
+    if (auto ok = gather_lattice(t, (*begun)->gathering(scene, tracer, few), told, progress); !ok) return ok.error();
+    points_of_all = double(options.lattice->count()) / double(l.count());
+  }
+  which.clear();
+  each_of_runs(receivers.count(), 1024, most_readers, [&](size_t r) { which.push_back(uint32_t(r)); });
+  t.receivers = which.size();
+  t.reader_surfels.assign(t.receivers * kernel_slots, 0), t.reader_weights.assign(t.receivers * kernel_slots, 0);
+  for (size_t i = 0; i < which.size(); ++i)
+    set_reader(t, i, g.search.kernels({receivers.origins[which[i]], receivers.normals[which[i]]}));
+  if (is_cancelled(progress)) return Error{"", "cancelled"};
+  IndirectExpected out{t.bytes_of_parts(), told.surfel_seconds};
+  out.seconds += seconds_since(start) * std::max(rows_of_all, points_of_all);
+  out.bytes.gather = size_t(double(out.bytes.gather) * rows_of_all);
+  out.bytes.lattice = size_t(double(out.bytes.lattice) * points_of_all);
+  out.bytes.kernels =
+      size_t(double(out.bytes.kernels) * double(receivers.count()) / double(std::max<size_t>(which.size(), 1)));
+  return out;
 }
 
 }  // namespace lambent

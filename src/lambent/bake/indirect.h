@@ -36,4 +36,13 @@ Result<IndirectTransfer> bake_indirect(const Scene& scene, const Tracer& tracer,
                                        const IndirectOptions& options, IndirectReport* report = nullptr,
                                        Progress* progress = nullptr);
 
+// What such a bake would take, from its surfels and a little of the rest: bytes in a file, and seconds. Errors: the
+// same.
+struct IndirectExpected {
+  IndirectTransfer::Bytes bytes;
+  double seconds = 0;
+};
+Result<IndirectExpected> expect_indirect(const Scene& scene, const Tracer& tracer, const Receivers& receivers,
+                                         const IndirectOptions& options, Progress* progress = nullptr);
+
 }  // namespace lambent

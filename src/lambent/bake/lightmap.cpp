@@ -159,6 +159,12 @@ Result<void> check_lightmap(const Scene& scene, const Lamps& lamps, const Lightm
     return Error{"error", "must lie between 0 and 1, not " + std::to_string(o.error)};
   if (o.error > 0 && (o.order > 0 || o.directional != DirectionalKind::none || o.gather != GatherKind::rays))
     return Error{"error", "is of lamps alone, without directions and by rays"};
+  if (o.projection != Projection::collocation) {
+    const bool by_rows = o.converge > 0 && o.solver != Solver::jacobi && o.solver != Solver::gmres;
+    if (o.error > 0 || o.directional != DirectionalKind::none || o.gather != GatherKind::rays || by_rows)
+      return Error{"projection", "least squares are of samples by rays, without directions, by jacobi or gmres"};
+    if (auto ok = check_projection_ranks(); !ok) return ok;
+  }
   if (o.keep_terms && (o.converge > 0 || o.directional != DirectionalKind::none))
     return Error{"terms", "are kept of counted bounces, and not of directional lightmaps"};
   for (const AreaLamp& lamp : lamps.area)
@@ -200,8 +206,10 @@ Result<Lightmap> bake_lightmap(const Scene& scene, const Tracer& tracer, const R
                width = pad_lanes(3 * (harmonics + lamps.groups()));
   const int order = std::max(o.order, 1);
   DirectionSets cube = o.gather == GatherKind::hemicube ? make_hemicube_set(order, o.samples) : DirectionSets{};
+  const std::optional<LeastSquares> projection = least_squares_of(scene, receivers, o.projection, o.samples, o.seed);
   GatherSetup setup = make_gather_setup(scene, tracer, receivers, order, cube.samples ? cube.samples : o.samples,
                                         o.seed, square_to_cosine_hemisphere, progress);
+  setup.projection = projection ? &*projection : nullptr;
   if (cube.samples) setup.sets = std::move(cube);
   const LightBasis light{.order = o.order, .groups = lamps.names};
 
@@ -243,6 +251,7 @@ Result<Lightmap> bake_lightmap(const Scene& scene, const Tracer& tracer, const R
       return ok.error();
   }
   if (direct_apart) {
+    if (projection) op->fill(e.data(), width);
     op->shares().gather(e.data(), width);
     if (auto ok = storing.add_direct(e, map); !ok) return ok.error();
   }

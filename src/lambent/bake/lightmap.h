@@ -34,6 +34,8 @@ struct LightmapOptions {
   // no limit.
   double error = 0, seconds = -1;
   bool denoise = true;  // then: takes away noise that neighbours do not share (denoise.h)
+  // As BakeOptions has it; without `error` and `directional`, by rays, with a solver that needs no rows one by one.
+  Projection projection = Projection::collocation;
 };
 
 struct Lightmap {

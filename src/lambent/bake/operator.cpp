@@ -67,6 +67,11 @@ std::vector<uint8_t> sources_of(const Shares& shares, const std::vector<FillStep
 }  // namespace
 
 void GatherOperator::fill(float* x, size_t stride, size_t width) const {
+  fill_means(x, stride, width);
+  if (setup_->projection) solve_mass(setup_->projection->mass, x, stride, width);
+}
+
+void GatherOperator::fill_means(float* x, size_t stride, size_t width) const {
   if (fill_.empty()) return;
   sources_.fetch(x, [&](size_t row) { return std::pair(row * stride, width); });
   fill_buried(fill_, x, stride, width);
@@ -141,8 +146,8 @@ Result<GatherOperator> GatherOperator::trace(const GatherSetup& setup, const Gat
   shares.gather(op.buried_.data());
   op.fill_ = make_fill_steps(setup.scene, setup.receivers.basis, op.buried_);
   if (!op.fill_.empty()) op.sources_ = AskedRows(shares, sources_of(shares, op.fill_, n));
-  if (const GatherDirect* d = wanted.direct) op.fill(d->rows, d->width, 3 * d->lamps.groups());
-  if (wanted.sky.rows) op.fill(wanted.sky.rows, wanted.sky.stride, wanted.sky.stride);
+  if (const GatherDirect* d = wanted.direct) op.fill_means(d->rows, d->width, 3 * d->lamps.groups());
+  if (wanted.sky.rows) op.fill_means(wanted.sky.rows, wanted.sky.stride, wanted.sky.stride);
   if (!asked.empty()) op.asked_ = AskedRows(shares, asked);
   for (uint8_t b : op.buried_) op.report_.buried += b;
   op.report_.rays = n * size_t(setup.sets.samples), op.report_.bytes = shares.ranks().sum(op.traced_->kept.bytes());
@@ -197,7 +202,7 @@ void GatherOperator::add_rows(size_t first, size_t count, const float* x, size_t
 }
 
 std::optional<TransposedRows> GatherOperator::transposed() const {
-  if (!shares_.alone()) return std::nullopt;
+  if (!shares_.alone() || setup_->projection) return std::nullopt;
   TransposedRows push;
   push.channels = setup_->channels;
   push.first.assign(rows() + 1, 0);

@@ -52,11 +52,13 @@ class GatherOperator final : public LinearOperator {
   Shares shares() const override { return shares_; }
   void fetch(float* x, size_t width) const override { ++shares_.ranks().asks, asked_.fetch(x, width); }
   void fill(float* x, size_t width) const override { fill(x, width, width); }
-  // The same of rows that lie `stride` floats apart.
+  // The same of rows that lie `stride` floats apart. With a projection F makes coefficients of means, too: what x
+  // begins with (Source) are means.
   void fill(float* x, size_t stride, size_t width) const;
   std::optional<TransposedRows> transposed() const override;
 
  private:
+  void fill_means(float* x, size_t stride, size_t width) const;
   struct Traced {
     KeptRows kept;
     Pool<GatherBlock> blocks;

@@ -153,6 +153,8 @@ Receivers thinned_receivers(const Receivers& receivers, const Thinned& thinned) 
         for (uint32_t& r : c.receiver) moved(r);
   } else if (auto* texels = std::get_if<TexelReceivers>(&out.basis)) {
     for (uint32_t& r : texels->texels) moved(r);
+  } else if (auto* points = std::get_if<PointReceivers>(&out.basis)) {
+    for (uint32_t& r : points->points) moved(r);
   } else {
     auto& patches = std::get<PatchReceivers>(out.basis);
     for (auto* side : {&patches.front, &patches.back})

@@ -1,5 +1,6 @@
 #include <lambent/bake/columns.h>
 #include <lambent/bake/gather.h>
+#include <lambent/bake/meshless.h>
 #include <lambent/bake/stand_in.h>
 #include <lambent/core/aligned.h>
 #include <lambent/core/pool.h>
@@ -17,11 +18,24 @@ constexpr double lost_part = 0.3;     // of the error, between those that are tr
 constexpr double pilot_worth = 0.5;   // what is looked at is traced again
 constexpr size_t pilot_piece = 16;
 
+// Sums of surfels' rows by kernels.
+void read_points(const PointReceivers& points, size_t vertex, const float* rows, size_t width, float* out) {
+  std::fill_n(out, width, 0.0f);
+  for (size_t k = points.first[vertex]; k < points.first[vertex + 1]; ++k)
+    for (size_t j = 0; j < width; ++j) out[j] += points.weights[k] * rows[size_t(points.points[k]) * width + j];
+}
+
 }  // namespace
 
 Result<StandIns> choose_stand_ins(const Scene& scene, const Tracer& tracer, const Receivers& receivers,
                                   const BakeOptions& options, Progress* progress) {
   StandIns out;
+  if (options.meshless) {
+    auto points = make_point_receivers(scene, tracer, receivers, *options.meshless, options.seed, progress);
+    if (!points) return points.error();
+    out.own = std::move(*points);
+    return out;
+  }
   const size_t n = receivers.count();
   if (options.thin == 0 || n < 2 * options.thin || !options.lobes.empty() || !(options.error >= least_error)) {
     out.thinned = keep_all(n);
@@ -66,7 +80,9 @@ Result<StandIns> choose_stand_ins(const Scene& scene, const Tracer& tracer, cons
 Transfer spread_transfer(const Receivers& receivers, const StandIns& stand_ins, std::span<const uint8_t> buried,
                          const float* guide, const float* rows, size_t width, int channels,
                          const BakeOptions& options) {
-  const Spread of(receivers, stand_ins.thinned, buried, guide, width);
+  const auto* points = std::get_if<PointReceivers>(&stand_ins.own.basis);
+  std::optional<Spread> of;
+  if (!points) of.emplace(receivers, stand_ins.thinned, buried, guide, width);
   const LightBasis light = options.light();
   const size_t columns = light.count(), n = size_t(channels);
   WritableTransfer out = make_transfer(light, 1, channels, receivers.count(), options.precision);
@@ -75,7 +91,8 @@ Transfer spread_transfer(const Receivers& receivers, const StandIns& stand_ins, 
     AlignedVector<float> row(width);
     std::vector<float> values(n * columns);
     for (size_t r = begin; r < end; ++r) {
-      of.row(r, rows, width, row.data());
+      if (points) read_points(*points, r, rows, width, row.data());
+      else of->row(r, rows, width, row.data());
       for (size_t k = 0; k < columns; ++k)
         for (size_t c = 0; c < n; ++c) values[c * columns + k] = row[n * k + c];
       store_receiver(out, r, values);

@@ -1,6 +1,6 @@
 #pragma once
-// Receivers of a diffuse bake that stand for others (thin.h): they alone are traced and bounce light, and all have
-// rows.
+// Receivers of a diffuse bake that stand for others, some of them (thin.h) or surfels (meshless.h): they alone are
+// traced and bounce light, and all have rows.
 #include <lambent/bake/bake.h>
 #include <lambent/bake/thin.h>
 
@@ -13,11 +13,12 @@ struct StandIns {
   Thinned thinned;
   Receivers own;    // those that are traced, as receivers of their own; empty where all are
   size_t rays = 0;  // that choosing them took
+  bool all() const { return own.count() == 0; }
 };
 
-// By direct transfer in up to 4 bands, of the options' light, to a part of the options' error. With lobes, whose
-// shadows harmonics do not tell of, and with fewer than twice options.thin receivers, all are traced. Errors:
-// cancelled.
+// Surfels where the options say so. Else by direct transfer in up to 4 bands, of the options' light, to a part of the
+// options' error. With lobes, whose shadows harmonics do not tell of, and with fewer than twice options.thin receivers,
+// all are traced. Errors: those of make_point_receivers(); cancelled.
 Result<StandIns> choose_stand_ins(const Scene& scene, const Tracer& tracer, const Receivers& receivers,
                                   const BakeOptions& options, Progress* progress = nullptr);
 

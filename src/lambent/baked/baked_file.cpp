@@ -107,7 +107,9 @@ Placement placement_of(const Scene& scene, const Receivers& receivers) {
           },
           [&](const PatchReceivers& p) -> Placement {
             return PatchPlacement{receivers_of_patches(p.front), receivers_of_patches(p.back)};
-          }},
+          },
+          // Points are baked with, and their values kept at vertices.
+          [&](const PointReceivers&) -> Placement { return {}; }},
       receivers.basis);
 }
 

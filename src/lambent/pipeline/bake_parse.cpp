@@ -193,7 +193,7 @@ LightmapOptions lightmap_options(const BakeRequest& r, const BakeOptions& bake, 
   o.order = r.order, o.samples = std::max(r.samples, 1), o.lamp_samples = r.lamp_samples, o.bounces = bake.bounces;
   o.converge = converge, o.solver = solver_names.at(r.solver), o.directional = *directional_kind(r.directional);
   o.memory = r.memory, o.gather = r.gather == "hemicube" ? GatherKind::hemicube : GatherKind::rays;
-  o.seed = r.seed, o.precision = bake.precision, o.keep_terms = r.terms;
+  o.seed = r.seed, o.precision = bake.precision, o.keep_terms = r.terms, o.projection = bake.projection;
   o.error = r.samples == 0 ? bake.error : 0, o.seconds = r.time, o.denoise = r.denoise == "on";
   return o;
 }
@@ -242,7 +242,9 @@ Result<BakePlan> plan_of(const BakeRequest& r, const Job& job) {
   plan.kind = kind_of(r);
   BakeOptions& b = plan.bake;
   b.samples = std::max(r.samples, 1), b.memory = r.memory, b.seed = r.seed, b.shadows = r.shadows == "on";
-  b.keep_terms = r.terms, b.denoise = r.denoise == "on";
+  b.projection = r.projection == "least-squares" ? Projection::least_squares : Projection::collocation;
+  if (r.receivers == "meshless") b.meshless = size_t(r.surfels);
+  b.keep_terms = r.terms, b.denoise = r.denoise == "on" && b.projection == Projection::collocation;
   if (auto ok = plan_error(r, plan); !ok) return ok.error();
   const Precision precision = r.precision == "half" ? Precision::half : Precision::single;
   const bool lobes = plan.kind == BakeKind::zonal || plan.kind == BakeKind::glossy_zonal;

@@ -53,9 +53,14 @@ const Option<R> table[] = {
      0, 0, nullptr, nullptr, true, true},
     {"precision", &R::precision, "What is baked", every & ~(K | I | W), "Of the stored transfer", 0, 0, "half|single"},
     {"receivers", &R::receivers, "What is baked", every,
-     "Where light is received: vertices, texels of an atlas, or patches (triangles); texels for lightmaps, else "
+     "Where light is received, the basis of what is baked: vertices (hats), texels of an atlas (tents), patches "
+     "(triangles, boxes), or meshless, kernels about --surfels, looked up at vertices; texels for lightmaps, else "
      "vertices",
-     0, 0, "vertices|texels|patches"},
+     0, 0, "vertices|texels|patches|meshless"},
+    {"projection", &R::projection, "What is baked", D | L,
+     "What receivers hold: the light where they are (collocation), or coefficients that come nearest to it over all "
+     "surfaces (least-squares), by rays from all over their areas",
+     0, 0, "collocation|least-squares"},
     {"texels-per-unit", &R::texels_per_unit, "What is baked", D | L | W | I,
      "Texels along one scene unit; the atlas is as large as that needs", 1e-12, 1e12, nullptr, "receivers=texels"},
     {"atlas", &R::atlas, "What is baked", D | L | W | I,
@@ -162,10 +167,9 @@ const Option<R> table[] = {
     {"visibility", &R::visibility, "Blocks (--transfer blocks)", K | W,
      "binary, or bits:N, shares of texels in 2^N levels, for harsh light; of wavelets bits:4, of blocks binary"},
 
-    {"surfels", &R::surfels, "Direct to indirect light (--transfer indirect)", I,
-     "Points on surfaces that direct light is taken at, about; a quarter of them gather; 0: 16,384 to 65,536, by how "
-     "far "
-     "surfaces see",
+    {"surfels", &R::surfels, "Direct to indirect light (--transfer indirect)", D | I,
+     "Points on surfaces that direct light is taken at, about, and that gather, or a quarter of them (--gatherers); of "
+     "--receivers meshless, those that receive; 0: 16,384 to 65,536, by how far surfaces see",
      0, 1 << 20},
 
     {"gatherers", &R::gatherers, "Direct to indirect light (--transfer indirect)", I,
@@ -243,6 +247,23 @@ constexpr Conflict conflicts[] = {
     {"rooms", "time", "is baked with --samples: leave --time out"},
     {"rooms", "adapt=on|auto", "keeps the mesh as it is: leave --adapt out"},
     {"rooms", "denoise=on", "is not denoised: leave --denoise out"},
+    {"subsurface", "receivers=meshless", "does not know surfels: leave --receivers out"},
+    {"shadows=off", "receivers=meshless", "off leaves nothing to gather at surfels: leave --receivers out"},
+    {"adapt", "receivers=meshless", "splits what receives, and surfels know no mesh: leave --adapt out"},
+    {"projection", "receivers=meshless", "is of vertices, texels and patches: kernels are fitted to surfels"},
+    {"error", "projection=least-squares", "is not baked to by least squares: leave --error out, and say --samples"},
+    {"quality", "projection=least-squares", "is not baked to by least squares: leave it out, and say --samples"},
+    {"time", "projection=least-squares", "ends what --error asks for, which least squares do not: leave it out"},
+    {"adapt", "projection=least-squares", "is of light at points: leave --adapt out, or --projection"},
+    {"denoise", "projection=least-squares", "takes receivers for points: leave --denoise out, or --projection"},
+    {"rooms", "projection=least-squares", "joins light at points: leave --projection out"},
+    {"subsurface", "projection=least-squares", "does not know least squares: leave --projection out"},
+    {"shadows=off", "projection=least-squares", "off traces no rays that least squares would spread: leave one out"},
+    {"light", "projection=least-squares", "would gather lobes at points: say --order in place of it"},
+    {"directional", "projection=least-squares", "gathers directions at points: leave --projection out"},
+    {"gather", "projection=least-squares", "looks from one point: leave --projection out"},
+    {"projection=least-squares", "solver=gauss-seidel|southwell",
+     "are solved for all rows at once: --solver jacobi or gmres"},
 };
 
 // Given options that conflict; a default conflicts with nothing.
@@ -253,14 +274,17 @@ Result<void> check_conflicts(const BakeRequest& r) {
   };
   for (const Conflict& c : conflicts) {
     if (std::string(c.option) == "directional" && r.directional == "none") continue;
-    if (said(c.option) && said(c.other)) return Error{std::string("--") + c.option, c.why, true};
+    const std::string option = c.option;
+    if (said(option) && said(c.other)) return Error{"--" + option.substr(0, option.find('=')), c.why, true};
   }
   return {};
 }
 
+bool is_least_squares(const BakeRequest& r) { return r.projection == "least-squares"; }
+
 // So many rays on the mesh as it is; of lightmaps, what is not baked to an error.
 bool is_plain_lightmap(const BakeRequest& r) {
-  return r.samples > 0 || r.order > 0 || r.directional != "none" || r.gather != "rays";
+  return r.samples > 0 || r.order > 0 || r.directional != "none" || r.gather != "rays" || is_least_squares(r);
 }
 bool has_no_quality(const BakeRequest& r) {
   return r.transfer == "lightmap" ? is_plain_lightmap(r) : r.samples > 0 && r.adapt != "on";
@@ -272,6 +296,14 @@ Result<void> check_kind(const BakeRequest& r, BakeKind kind) {
   if (kind != BakeKind::diffuse && kind != BakeKind::lightmap && kind != BakeKind::wavelets &&
       kind != BakeKind::indirect && r.receivers != "vertices")
     return Error{"--receivers", std::string(bake_kind_names[int(kind)]) + " are received at vertices", true};
+  if (kind != BakeKind::diffuse && r.receivers == "meshless")
+    return Error{"--receivers",
+                 kind == BakeKind::indirect
+                     ? "direct to indirect light is over surfels whatever reads it: vertices, texels or patches"
+                     : "meshless is of diffuse transfer",
+                 true};
+  if (kind == BakeKind::diffuse && r.given.contains("surfels") && r.receivers != "meshless")
+    return Error{"--surfels", "needs --receivers meshless, or --transfer indirect", true};
   if (kind == BakeKind::indirect && r.directional == "hl2")
     return Error{"--directional", "of direct to indirect light is sh:2, sh:3 or vector", true};
   if (!r.lattice.empty() && r.receivers != "vertices" && kind != BakeKind::indirect)
@@ -341,9 +373,9 @@ Result<BakeRequest> resolved(BakeRequest r) {
   if (r.order == 0 && r.light.empty() && kind != BakeKind::lightmap && kind != BakeKind::blocks &&
       kind != BakeKind::indirect)
     r.order = 6;
-  const bool to_error = kind == BakeKind::lightmap
-                          ? !is_plain_lightmap(r)
-                          : kind == BakeKind::diffuse && r.subsurface.empty() && r.shadows == "on" && r.rooms.empty();
+  const bool to_error = kind == BakeKind::lightmap ? !is_plain_lightmap(r)
+                                                   : kind == BakeKind::diffuse && r.subsurface.empty() &&
+                                                         r.shadows == "on" && r.rooms.empty() && !is_least_squares(r);
   if (!to_error && r.samples == 0) r.samples = 1024;
   if (r.receivers == "texels" && r.atlas.empty() && !(r.texels_per_unit > 0) &&
       !(kind == BakeKind::lightmap && r.samples == 0))
@@ -357,6 +389,9 @@ nlohmann::json to_json(const BakeRequest& request) {
   nlohmann::json out = request_json(bake_options(), request, int(kind));
   if (request.shadows == "off") out.erase("bounces");
   if (has_no_quality(request)) out.erase("quality");
+  if (is_least_squares(request))
+    for (const char* without : {"denoise", "adapt", "quality", "error", "time"}) out.erase(without);
+  if (request.receivers != "meshless" && kind == BakeKind::diffuse) out.erase("surfels");
   if (!request.rooms.empty())
     for (const char* without : {"bounces", "denoise", "adapt", "quality", "error", "time"}) out.erase(without);
   if (kind == BakeKind::lightmap && is_plain_lightmap(request))

@@ -127,6 +127,7 @@ const std::map<std::string, Change> changes{
     {"order", {2}},
     {"light", {"sh:2"}},
     {"precision", {"single"}},
+    {"projection", {"least-squares"}},
     {"texels_per_unit", {5.0, {{"receivers", "texels"}}}},
     {"atlas", {"32x32", {{"receivers", "texels"}, {"atlas", "24x24"}}}},
     {"quality", {"preview", {{"adapt", "on"}}}},
@@ -195,6 +196,8 @@ TEST_F(Requests, EveryOptionHasAnEffectOrIsRefusedByName) {
       if (name == "light")
         before.erase("order"), before.erase("visibility");  // of diffuse transfer, which it turns into
       if (name == "light_units") before["scene"] = at("lit.glb");
+      if (name == "surfels" && BakeKind(k) == BakeKind::diffuse)
+        before["receivers"] = "meshless", before["surfels"] = 256;
       for (const auto& [key, value] : change.with.items())  // null: without it
         if (!value.is_null()) before[key] = value;
         else if (o.kinds >> k & 1) before.erase(key);
@@ -356,6 +359,70 @@ TEST_F(Requests, PlansSayReceiversAndBytesBeforeTheWork) {
     EXPECT_EQ(plan->json["receivers"], baked->summary.json["receivers"]);
     EXPECT_GE(plan->json["bytes"].get<double>() + 16 * 3 * 9 * 4 * 25, baked->summary.json["bytes"].get<double>());
     EXPECT_EQ(must_read(plan->json["request"]).transfer, request.transfer);
+  }
+}
+
+TEST_F(Requests, PlansOfIndirectLightAreWithinThreeTenths) {
+  nlohmann::json object = least(BakeKind::indirect);
+  object.update({{"scene", at("fine.obj")}, {"surfels", 2048}, {"max_edge", 0.05}});
+  {  // two walls and a floor
+    std::ofstream out(at("fine.obj"));
+    out << "v 0 0 0\nv 1 0 0\nv 0 1 0\nv 0 0 1\nv 1 1 0\nv 1 0 1\nv 0 1 1\n"
+           "f 1 2 5 3\nf 1 3 7 4\nf 1 4 6 2\n";
+  }
+  for (const char* lattice : {"", "6,6,6"})
+    for (const char* gatherers : {"quarter", "all"}) {
+      object["gatherers"] = gatherers;
+      if (*lattice) object["lattice"] = lattice;
+      const BakeRequest request = must_read(object);
+      const auto plan = plan_bake(request);
+      const auto baked = bake_with_summary(request);
+      ASSERT_TRUE(plan && baked) << plan.error().text();
+      EXPECT_NEAR(plan->json["bytes"].get<double>() / baked->summary.json["bytes"].get<double>(), 1, 0.3)
+          << gatherers << lattice;
+    }
+}
+
+TEST_F(Requests, MeshlessAndLeastSquaresAreRefusedByNameElsewhere) {
+  const auto refused = [&](BakeKind kind, const nlohmann::json& more) {
+    nlohmann::json object = least(kind);
+    object.update(more);
+    auto request = resolved(must_read(object));
+    return request ? std::string("taken") : request.error().where;
+  };
+  for (int k = 0; k < int(std::size(bake_kind_names)); ++k) {
+    nlohmann::json object = least(BakeKind(k));
+    object["receivers"] = "meshless", object.erase("atlas");
+    const auto request = resolved(must_read(object));
+    EXPECT_EQ(request ? "taken" : request.error().where, BakeKind(k) == BakeKind::diffuse ? "taken" : "--receivers")
+        << bake_kind_names[k];
+  }
+  EXPECT_EQ(refused(BakeKind::diffuse, {{"surfels", 300}}), "--surfels");
+  for (const auto& [option, value] : std::initializer_list<std::pair<const char*, nlohmann::json>>{
+           {"adapt", "on"}, {"denoise", "on"}, {"rooms", "auto"}, {"subsurface", "marble"}, {"light", "sh:3"}}) {
+    nlohmann::json more{{"projection", "least-squares"}, {option, value}};
+    if (std::string(option) == "light") more["order"] = nullptr;
+    nlohmann::json object = least(BakeKind::diffuse);
+    object.update(more);
+    if (std::string(option) == "light") object.erase("order");
+    auto request = resolved(must_read(object));
+    ASSERT_FALSE(request) << option;
+    EXPECT_EQ(request.error().where, std::string("--") + option);
+  }
+  EXPECT_EQ(refused(BakeKind::diffuse, {{"projection", "least-squares"}, {"receivers", "meshless"}}), "--projection");
+  EXPECT_EQ(refused(BakeKind::lightmap, {{"projection", "least-squares"}, {"directional", "vector"}}), "--directional");
+  EXPECT_EQ(refused(BakeKind::lightmap,
+                    {{"projection", "least-squares"}, {"bounces", "converge:0.1"}, {"solver", "southwell"}}),
+            "--projection");
+  // The request that a file keeps is one that can be baked again.
+  for (const char* projection : {"least-squares", "collocation"}) {
+    nlohmann::json object = least(BakeKind::diffuse);
+    object["projection"] = projection;
+    const auto once = resolved(must_read(object));
+    ASSERT_TRUE(once);
+    const auto again = resolved(must_read(to_json(*once)));
+    ASSERT_TRUE(again) << again.error().text();
+    EXPECT_EQ(to_json(*once), to_json(*again));
   }
 }
 

@@ -26,17 +26,22 @@ void tell_lattice(const IndirectTransfer& t, const IndirectReport& report, Summa
 
 }  // namespace
 
+Result<IndirectOptions> indirect_options(const BakeRequest& request, const BakePlan& plan, const Scene& scene) {
+  IndirectOptions options = plan.indirect;
+  if (request.lattice.empty()) return options;
+  auto lattice = lattice_of_request(request, scene);
+  if (!lattice) return lattice.error();
+  options.lattice = *lattice, options.lattice_order = request.lattice_order;
+  return options;
+}
+
 Result<IndirectTransfer> bake_indirect_of_request(const BakeRequest& request, const BakePlan& plan, const Scene& scene,
                                                   const Tracer& tracer, const Receivers& receivers, const Job& job,
                                                   BakeReport& told, Summary& summary) {
-  IndirectOptions options = plan.indirect;
-  if (!request.lattice.empty()) {
-    auto lattice = lattice_of_request(request, scene);
-    if (!lattice) return lattice.error();
-    options.lattice = *lattice, options.lattice_order = request.lattice_order;
-  }
+  auto options = indirect_options(request, plan, scene);
+  if (!options) return options.error();
   IndirectReport report;
-  auto baked = bake_indirect(scene, tracer, receivers, options, &report, job.progress);
+  auto baked = bake_indirect(scene, tracer, receivers, *options, &report, job.progress);
   if (!baked) return baked;
   if (tracer.colours()) job.warn("bounces know no coloured glass: its light is kept grey");
   if (report.strays > report.rays / 50)

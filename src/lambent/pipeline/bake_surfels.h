@@ -6,6 +6,9 @@
 
 namespace lambent {
 
+// The plan's, with the lattice that the request asks for. Errors: those of --lattice and --lattice-box.
+Result<IndirectOptions> indirect_options(const BakeRequest& request, const BakePlan& plan, const Scene& scene);
+
 // Errors: those of bake_indirect(), of --lattice and --lattice-box.
 Result<IndirectTransfer> bake_indirect_of_request(const BakeRequest& request, const BakePlan& plan, const Scene& scene,
                                                   const Tracer& tracer, const Receivers& receivers, const Job& job,

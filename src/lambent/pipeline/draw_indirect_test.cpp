@@ -205,6 +205,40 @@ TEST(IndirectDrawing, LampsThatMovedAloneAreLitAnew) {
   EXPECT_GT(difference(settled->frames.front(), frames->frames.at(0)), 5e-3);
 }
 
+TEST(IndirectDrawing, LampsInsideWallsHugeOrManyAreTaken) {
+  // Within what is solid, or about all of the scene: a warning, and no light.
+  for (const char* lamp : {"point@0.5,-0.5,0.5=3", "sphere@1,1,1,1000=3", "point@1e8,1e8,1e8=3"}) {
+    DrawRequest r = request();
+    r.lamp = {lamp}, r.show = "indirect", r.spp = 1;
+    for (Vec3 v : drawn(room(), r).rgb) ASSERT_TRUE(is_finite(v) && largest(v) < 1e-3f) << lamp;
+  }
+  // A thousand are one that is a thousand times as bright.
+  DrawRequest r = request();
+  r.show = "indirect", r.spp = 1, r.lamp = {"point@0.6,0.8,1.2=3"};
+  const Image one = drawn(room(), r);
+  r.lamp.assign(1000, "point@0.6,0.8,1.2=0.003");
+  EXPECT_LT(difference(drawn(room(), r), one), 1e-3);
+}
+
+TEST(IndirectDrawing, BlackWallsGiveNothingBack) {
+  DrawRequest r = request();
+  r.lamp = {"point@0.6,0.8,1.2=3"}, r.show = "indirect", r.spp = 1;
+  Baked baked = room();
+  for (const Material& m : baked.scene.materials) r.albedo.push_back(m.name + "=0,0,0");
+  for (Vec3 v : drawn(baked, r).rgb) ASSERT_EQ(v, Vec3(0));
+}
+
+TEST(IndirectDrawing, TreesWithCyclesOrChildrenOutOfRangeAreRefused) {
+  const auto seeds = std::filesystem::path(__FILE__).parent_path() / "../../../fuzz/corpus_baked";
+  for (const auto& [name, what] : {std::pair("indirect_cycle.glb", "is not its own parent on level 0"),
+                                   std::pair("indirect_child.glb", "parent 92 does not exist on level 0")}) {
+    const auto refused = load_baked((seeds / name).string());
+    ASSERT_FALSE(refused) << name;
+    EXPECT_NE(refused.error().text().find(what), std::string::npos) << refused.error().text();
+  }
+  EXPECT_TRUE(load_baked((seeds / "indirect.glb").string()));
+}
+
 TEST(IndirectDrawing, NothingThatShinesIsRefused) {
   const auto refused = draw(room(), request());
   ASSERT_FALSE(refused);

@@ -11,7 +11,8 @@
 namespace lambent {
 
 Result<PlacedReceivers> place_receivers(Scene& scene, const BakeRequest& request, const Job& job) {
-  if (request.receivers == "vertices") return PlacedReceivers{make_vertex_receivers(scene), std::nullopt};
+  if (request.receivers == "vertices" || request.receivers == "meshless")
+    return PlacedReceivers{make_vertex_receivers(scene), std::nullopt};
   if (request.receivers == "patches") return PlacedReceivers{make_patch_receivers(scene), std::nullopt};
   AtlasOptions options{.texels_per_unit = request.texels_per_unit};
   if (!request.atlas.empty()) {

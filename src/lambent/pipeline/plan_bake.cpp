@@ -3,6 +3,7 @@
 #include <lambent/core/parallel.h>
 #include <lambent/pipeline/bake_lightmap.h>
 #include <lambent/pipeline/bake_parse.h>
+#include <lambent/pipeline/bake_surfels.h>
 #include <lambent/pipeline/place_receivers.h>
 #include <lambent/pipeline/text.h>
 
@@ -40,9 +41,8 @@ size_t stored_bytes(const BakePlan& plan, const BakeRequest& r, size_t receivers
     case BakeKind::glossy_zonal:
       return receivers * (4 + size_t(r.lobes) * (3 + channels * size_t(plan.bake.order))) * value;
     case BakeKind::membrane: return receivers * size_t(4 + plan.bake.order) * value;
-    // A quarter of the surfels gather some 200 entries of two bytes each.
     case BakeKind::indirect:
-      return std::max<size_t>(plan.indirect.surfels, 16384) * (44 + 100) + receivers * kernel_slots * 4;
+      return 0;  // expect_indirect() tells
     // Where hardly any coefficient is 0.
     case BakeKind::wavelets: return receivers * cube_texels(plan.visibility.size);
     case BakeKind::blocks: return expected_visibility_bytes(receivers, plan.visibility);
@@ -124,14 +124,24 @@ Result<Summary> plan_bake(const BakeRequest& asked, const Job& job) {
   if (!placed) return placed.error();
   auto tracer = Tracer::build(*scene, job.progress);
   if (!tracer) return tracer.error();
-  const size_t receivers = placed->receivers.count(), bytes = stored_bytes(*plan, *request, receivers, groups, 3);
+  const size_t receivers = placed->receivers.count();
+  size_t bytes = stored_bytes(*plan, *request, receivers, groups, 3);
+  double seconds = 0;
   const bool traced = request->shadows == "on" && plan->kind != BakeKind::membrane && receivers > 0;
-  const double seconds = traced ? expected_seconds(*scene, *tracer, placed->receivers, *plan, *request) : 0;
+  if (plan->kind == BakeKind::indirect) {
+    auto options = indirect_options(*request, *plan, *scene);
+    if (!options) return options.error();
+    auto expected = expect_indirect(*scene, *tracer, placed->receivers, *options, job.progress);
+    if (!expected) return expected.error();
+    bytes = expected->bytes.all(), seconds = expected->seconds;
+  } else if (traced) {
+    seconds = expected_seconds(*scene, *tracer, placed->receivers, *plan, *request);
+  }
   Summary s;
   s.json = {{"request", to_json(*request)}, {"receivers", receivers}, {"bytes", bytes}, {"seconds", seconds}};
   s.lines = {{"request", to_text(*request)},
              {"receivers", human_count(receivers)},
-             {"size", "at most about " + human_bytes(double(bytes))},
+             {"size", (plan->kind == BakeKind::indirect ? "about " : "at most about ") + human_bytes(double(bytes))},
              {"time", fmt::format("about {} of tracing on {} threads", human_seconds(seconds), thread_count())}};
   return s;
 }

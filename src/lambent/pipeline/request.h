@@ -22,6 +22,7 @@ struct BakeRequest {
   std::string light;
   std::string precision = "half";
   std::string receivers;  // "": texels for lightmaps, else vertices
+  std::string projection = "collocation";
   float texels_per_unit = 0;
   std::string atlas;
   // Scene

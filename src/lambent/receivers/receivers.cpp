@@ -284,6 +284,13 @@ void add_neighbours(const Scene& scene, const PatchReceivers& patches, const std
   }
 }
 
+void add_neighbours(const Scene&, const PointReceivers& p, const std::vector<uint8_t>& marked, Pairs& pairs) {
+  for (size_t v = 0; v + 1 < p.first.size(); ++v)
+    for (size_t a = p.first[v]; a < p.first[v + 1]; ++a)
+      for (size_t b = p.first[v]; b < p.first[v + 1]; ++b)
+        if (a != b && marked[p.points[a]]) pairs.push_back({p.points[a], p.points[b]});
+}
+
 }  // namespace
 
 std::vector<std::pair<uint32_t, uint32_t>> neighbours_of(const Scene& scene, const SpatialBasis& basis,

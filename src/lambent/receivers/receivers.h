@@ -5,6 +5,7 @@
 //              share it, so that UV seams and part borders cost nothing.
 //   texels     of a lightmap over an atlas (atlas.h): bilinear.
 //   patches    boxes: one side of one triangle, constant over it.
+//   points     kernels about points of surfaces that know nothing of the mesh (bake/meshless.h), looked up at vertices.
 // Source: radiosity, "Piecewise Linear Basis Functions", "Texture Maps", "Unweighted Basis Functions".
 #include <lambent/scene/scene.h>
 
@@ -104,8 +105,24 @@ struct PatchReceivers {
   }
 };
 
+// Kernels about points: what they sum to at each side of each welded vertex, and hats between.
+struct PointReceivers {
+  CornerReceivers corners;  // of vertices' own receivers
+  // Of receiver v of a vertex, [first[v], first[v + 1]): points, and their weights, which sum to 1.
+  std::vector<uint32_t> first{0}, points;
+  std::vector<float> weights;
+  const Corners* find(uint32_t triangle, bool front_side) const { return corners.find(triangle, front_side); }
+  void prefetch(uint32_t triangle, bool front_side) const { corners.prefetch(triangle, front_side); }
+  template <class Add>
+  void spread(const Corners& at, float u, float v, Add add) const {
+    corners.spread(at, u, v, [&](uint32_t vertex, float hat) {
+      for (size_t k = first[vertex]; k < first[vertex + 1]; ++k) add(points[k], hat * weights[k]);
+    });
+  }
+};
+
 // How values at receivers make a function on surfaces.
-using SpatialBasis = std::variant<CornerReceivers, TexelReceivers, PatchReceivers>;
+using SpatialBasis = std::variant<CornerReceivers, TexelReceivers, PatchReceivers, PointReceivers>;
 
 // The point of a triangle's side that a texel stands for.
 struct TexelPlace {
@@ -142,7 +159,7 @@ TexelReceivers texel_receivers(const Scene& scene, int width, int height, const 
                                const std::vector<Vec2>& back, std::vector<uint32_t> texels);
 
 // Pairs (r, neighbour) for every marked receiver r, sorted, without repetition: receivers that share a triangle (hats),
-// touch in the atlas (texels) or share an edge (boxes).
+// touch in the atlas (texels), share an edge (boxes) or a vertex (points).
 std::vector<std::pair<uint32_t, uint32_t>> neighbours_of(const Scene& scene, const SpatialBasis& basis,
                                                          const std::vector<uint8_t>& marked);
 

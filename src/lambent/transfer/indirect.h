@@ -92,12 +92,10 @@ struct IndirectTransfer {
   // As stored in a file, about.
   struct Bytes {
     size_t surfels = 0, gather = 0, kernels = 0, lattice = 0;
+    size_t all() const { return surfels + gather + kernels + lattice; }
   };
   Bytes bytes_of_parts() const;
-  size_t bytes() const {
-    const Bytes b = bytes_of_parts();
-    return b.surfels + b.gather + b.kernels + b.lattice;
-  }
+  size_t bytes() const { return bytes_of_parts().all(); }
 };
 
 // Weights of kernels are multiples of this.
