@@ -9,7 +9,8 @@ if(LAMBENT_TOGETHER)
   target_compile_definitions(lambent-tests PRIVATE LAMBENT_GOLDEN="${lambent_golden}")
 else()
   set_property(SOURCE src/lambent/c/lambent_test.cpp src/lambent/pipeline/draw_test.cpp
-    src/lambent/pipeline/golden_test.cpp src/lambent/pipeline/live_test.cpp src/lambent/pipeline/draw_indirect_test.cpp
+    src/lambent/pipeline/golden_test.cpp src/lambent/pipeline/golden_indirect_test.cpp
+    src/lambent/pipeline/live_test.cpp src/lambent/pipeline/draw_indirect_test.cpp
     src/lambent/pipeline/live_kinds_test.cpp src/lambent/pipeline/live_look_test.cpp
     APPEND PROPERTY COMPILE_DEFINITIONS LAMBENT_GOLDEN="${lambent_golden}")
 endif()
