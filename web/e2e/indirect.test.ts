@@ -30,18 +30,56 @@ const stateOf = async (page: Page): Promise<URLSearchParams> => {
 };
 const placeOf = (text: string | null): number[] => (/@([^=]*)=/.exec(text ?? '')?.[1] ?? '').split(',').map(Number);
 
+/** writeScene's scene as a glTF whose sail glows and that has a point lamp, "bulb". */
+function writeOwnLamps(folder: string): string {
+  lambent('bake', join(folder, 'scene.obj'), '--order', '1', '--samples', '1', '-o', join(folder, 'plain.glb'));
+  const glb = readFileSync(join(folder, 'plain.glb')),
+    length = glb.readUInt32LE(12);
+  interface Plain {
+    extensions: Record<string, unknown>;
+    extensionsUsed: string[];
+    meshes: { primitives: { extensions?: unknown }[] }[];
+    materials: { name: string; emissiveFactor?: number[]; extensions?: unknown }[];
+    nodes: unknown[];
+    scenes: { nodes: number[] }[];
+  }
+  const document = JSON.parse(glb.subarray(20, 20 + length).toString()) as Plain;
+  document.extensions = { KHR_lights_punctual: { lights: [{ type: 'point', intensity: 3, name: 'bulb' }] } };
+  document.extensionsUsed = ['KHR_lights_punctual'];
+  for (const mesh of document.meshes) for (const primitive of mesh.primitives) delete primitive.extensions;
+  for (const material of document.materials) if (material.name === 'white') material.emissiveFactor = [1, 0.8, 0.5];
+  document.scenes[0]!.nodes.push(document.nodes.length);
+  document.nodes.push({ translation: [-1.2, 1.6, 1], extensions: { KHR_lights_punctual: { light: 0 } } });
+  const text = Buffer.from(JSON.stringify(document)),
+    json = Buffer.concat([text, Buffer.alloc((4 - (text.length % 4)) % 4, ' ')]),
+    rest = glb.subarray(20 + length),
+    head = Buffer.alloc(20);
+  [0x46546c67, 2, 20 + json.length + rest.length, json.length, 0x4e4f534a].forEach((n, i) =>
+    head.writeUInt32LE(n, 4 * i),
+  );
+  const path = join(folder, 'own_lamps.glb');
+  writeFileSync(path, Buffer.concat([head, json, rest]));
+  return path;
+}
+
 describe.skipIf(!haveTool || !haveBrowser)('lamps that move', () => {
   const folder = makeFolder(),
     at = (name: string): string => join(folder, name);
-  let browser: Browser, server: Server, texels: Server, fixture: { page: Page; server: ViteDevServer };
+  let browser: Browser, server: Server, texels: Server, own: Server, fixture: { page: Page; server: ViteDevServer };
 
   beforeAll(async () => {
     const scene = writeScene(folder),
       few = ['--transfer', 'indirect', '--surfels', '2048', '--samples', '128'];
     lambent('bake', scene, ...few, '-o', at('vertices.glb'));
+    // A sail that glows, and a point of the scene's own.
+    lambent('bake', writeOwnLamps(folder), ...few, '-o', at('own.glb'));
     lambent('bake', scene, ...few, '--receivers', 'texels', '--atlas', '256x256', '-o', at('texels.glb'));
     browser = await launch();
-    [server, texels] = [await serve(at('vertices.glb')), await serve(at('texels.glb'))];
+    [server, texels, own] = [
+      await serve(at('vertices.glb')),
+      await serve(at('texels.glb')),
+      await serve(at('own.glb')),
+    ];
     fixture = await openFixture(browser, folder, 'webgpu.html'); // for its measure inside outlines
   });
   afterAll(async () => {
@@ -50,6 +88,7 @@ describe.skipIf(!haveTool || !haveBrowser)('lamps that move', () => {
     await browser?.close();
     expect(await server?.stop()).toBe(0);
     expect(await texels?.stop()).toBe(0);
+    expect(await own?.stop()).toBe(0);
   });
 
   const fragment = (view: string, of = lamps): string =>
@@ -120,7 +159,7 @@ describe.skipIf(!haveTool || !haveBrowser)('lamps that move', () => {
         ...given([lamp]),
       ]);
       // What is sharp at a shadow's edge there is a texel of the map here; a sphere's shadow is that of its middle.
-      expect(inside).toBeGreaterThan(lamps[i]!.startsWith('sphere') ? 24 : 28);
+      expect(inside).toBeGreaterThan(lamps[i]!.startsWith('sphere') ? 38 : 50);
       await page.close();
     }
     const page = await open(browser, server.address, fragment('baked'), size.width, size.height);
@@ -128,6 +167,29 @@ describe.skipIf(!haveTool || !haveBrowser)('lamps that move', () => {
       28,
     );
     await page.close();
+  });
+
+  it("shine beside the scene's own, which are scaled and turned off by name", async () => {
+    const page = await open(browser, own.address, fragment('indirect', ['']), size.width, size.height);
+    const { inside } = await compare('own', page, 'own.glb', ['--show', 'indirect', '--at', 'receivers']);
+    expect(inside).toBeGreaterThan(40); // glowing surfaces are sampled, here as there
+    await page.close();
+    const scaled = await open(
+      browser,
+      own.address,
+      fragment('indirect', ['white=0', 'bulb=0.2,1,3']),
+      size.width,
+      size.height,
+    );
+    const more = ['--show', 'indirect', '--at', 'receivers', '--lamp', 'white=0', '--lamp', 'bulb=0.2,1,3'];
+    expect((await compare('own_scaled', scaled, 'own.glb', more)).inside).toBeGreaterThan(45);
+    await scaled.close();
+    // Straight from what glows, as soft as surfels are.
+    const direct = await open(browser, own.address, fragment('direct', ['bulb=0']), size.width, size.height);
+    expect(
+      (await compare('own_direct', direct, 'own.glb', ['--show', 'direct', '--lamp', 'bulb=0'])).inside,
+    ).toBeGreaterThan(24);
+    await direct.close();
   });
 
   it('are carried by a hand over their level, with Shift up and down, and by keys; the link keeps it', async () => {
@@ -213,6 +275,49 @@ describe.skipIf(!haveTool || !haveBrowser)('lamps that move', () => {
     for (let i = 0; i < 6; ++i) await page.getByRole('button', { name: 'Add a lamp: point' }).click();
     expect(await page.getByRole('button', { name: 'Add a lamp: sphere' }).isDisabled()).toBe(true); // eight
     await page.close();
+  });
+
+  it('light an element by its attributes, and WebGPURenderer refuses them in a sentence', async () => {
+    const page = await browser.newPage({ viewport: size });
+    await page.goto(server.address);
+    await ready(page);
+    await page.addScriptTag({ url: '/lambent-viewer.js', type: 'module' });
+    const show = (name: string, lamps: string): Promise<string> =>
+      page
+        .evaluate(
+          async ([lamps, camera]) => {
+            document.body.replaceChildren();
+            const element = document.createElement('lambent-viewer');
+            for (const [key, value] of Object.entries({
+              src: 'data/scene.glb',
+              lamps,
+              camera,
+              exposure: '0',
+              tone: 'none',
+            }))
+              element.setAttribute(key, value);
+            const done = new Promise((resolve) =>
+              ['load', 'error'].forEach((e) => element.addEventListener(e, resolve)),
+            );
+            document.body.append(element);
+            await done;
+            return element.shadowRoot!.querySelector('p')!.textContent;
+          },
+          [lamps, camera] as const,
+        )
+        .then(async (text) => {
+          await page.waitForTimeout(3000);
+          await page.locator('lambent-viewer').screenshot({ path: at(`${name}.png`) });
+          return text;
+        });
+    expect(await show('element', `${lamps[0]!}; ${lamps[3]!}`)).toBe('');
+    expect(await show('element_other', lamps[1]!)).toBe('');
+    expect(psnr(at('element.png'), at('element_other.png'))).toBeLessThan(25);
+    expect(await show('element_none', 'point@1=2')).toMatch(/lamp "point@1=2" is no point of 3 numbers/);
+    await page.close();
+    const [check, draw] = await fixture.page.evaluate(() => window.gpu.refusal('/files/vertices.glb', true));
+    expect(check).toMatch(/direct-to-indirect light, which WebGPURenderer does not draw/);
+    expect(draw).toMatch(/direct-to-indirect light, which WebGPURenderer does not draw/);
   });
 
   it('are refused in a sentence where they cannot be, in the address as in a broken file', async () => {

@@ -202,8 +202,7 @@ export class LampPanel {
     const on = document.createElement('input');
     Object.assign(on, { type: 'checkbox', checked: !given.off });
     on.addEventListener('change', () => {
-      const { off: _, ...lamp } = now();
-      this.set(index, on.checked ? lamp : { ...lamp, off: true });
+      this.set(index, { ...now(), off: !on.checked });
     });
     const { center, radius } = scene.bounds,
       middle = [center.x, center.y, center.z];

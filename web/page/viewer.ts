@@ -81,7 +81,7 @@ export class Viewer {
   private fineSoon = 0;
   private meterTarget: WebGLRenderTarget | undefined;
   private request = 0;
-  private isDue = false; // a picture, and not light alone
+  private isDue = false; // a picture, not light alone
   private lastFrame = 0;
 
   constructor(
@@ -170,7 +170,6 @@ export class Viewer {
   get bakedScene(): BakedScene | undefined {
     return this.baked?.baked;
   }
-  /** Lamps and paint, where the file has direct to indirect light. */
   get indirect(): IndirectControls | undefined {
     return this.baked?.baked.transfer.indirect;
   }

@@ -14,7 +14,6 @@ import {
   Sphere,
   type Mesh,
   type Object3D,
-  type Texture,
 } from 'three';
 import { LambentError } from './errors.js';
 import { isIndex } from './glb.js';
@@ -101,11 +100,7 @@ class IndirectTransfer implements BakedTransfer, IndirectControls {
     const scene = sceneTriangles(meshes, owns, operator.surfels.names);
     this.checkPlaces(scene.positions);
     this.light = new IndirectLight(operator, scene, this.own, glowsOf(meshes, owns, scene), readOff);
-    this.uniforms = {
-      prtLight: { value: picture.texture as Texture },
-      prtDirect: { value: 1 },
-      prtIndirect: { value: 1 },
-    };
+    this.uniforms = { prtLight: { value: picture.texture }, prtDirect: { value: 1 } };
     this.lights = new LampLights(this.bounds, this.uniforms.prtDirect);
     this.refusal = source.nodes ? onlyGlsl('direct-to-indirect light') : withoutNodes;
     const atlas = picture.map !== undefined;
@@ -128,8 +123,8 @@ class IndirectTransfer implements BakedTransfer, IndirectControls {
 
   /** Surfels lie on the scene; not so where it was moved to be baked, since its numbers are too large for floats. */
   private checkPlaces(positions: Float32Array): void {
-    const box = new Box3().setFromArray(positions as unknown as number[]),
-      surfels = new Box3().setFromArray(this.operator.surfels.positions as unknown as number[]);
+    const box = new Box3().setFromArray(positions),
+      surfels = new Box3().setFromArray(this.operator.surfels.positions);
     box.getBoundingSphere(this.bounds);
     if (
       !box
@@ -213,9 +208,11 @@ class IndirectTransfer implements BakedTransfer, IndirectControls {
     return this.showing;
   }
   set show(what: IndirectControls['show']) {
+    if (what === this.showing) return;
     this.showing = what;
     this.uniforms.prtDirect.value = what === 'indirect' ? 0 : 1;
-    this.uniforms.prtIndirect.value = what === 'direct' ? 0 : 1;
+    this.light.show({ bounced: what !== 'direct', soft: what !== 'indirect' });
+    this.take();
     this.lights.show();
   }
 

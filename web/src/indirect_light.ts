@@ -30,8 +30,14 @@ export interface IndirectTimes {
   count: number;
 }
 
+/** Light that has bounced; direct light that is read off surfels. */
+export interface LightParts {
+  bounced: boolean;
+  soft: boolean;
+}
+
 export class IndirectLight {
-  /** Indirect light at receivers, [receiver][4], the fourth not used; exit radiance of white. */
+  /** Light at receivers, [receiver][4], the fourth not used; exit radiance of white. */
   readonly values: Float32Array;
   /** Counts up whenever `values` are others. */
   version = 0;
@@ -50,6 +56,7 @@ export class IndirectLight {
   private isDirectDue = true;
   private isPaintDue = false;
   private isRead = false;
+  private parts: LightParts = { bounced: true, soft: true };
   private lastChange = -Infinity;
 
   /** `sharp`: of `own`, those that are drawn by pixels; what others send straight is read off surfels, as of `glows`. */
@@ -160,12 +167,27 @@ export class IndirectLight {
     const reading = performance.now();
     times.bounces = reading - bouncing;
     if (times.count > 0 || !this.isRead) {
-      solve.read(this.values, this.soft);
-      this.isRead = true;
-      ++this.version;
+      this.read();
     }
     times.reading = performance.now() - reading;
     return !isLit || (solve.residual > tolerance && solve.bounces < mostBounces);
+  }
+
+  /** What receivers are to have. */
+  show(parts: LightParts): void {
+    const { bounced, soft } = this.parts;
+    if (bounced === parts.bounced && soft === parts.soft) return;
+    this.parts = parts;
+    if (this.isRead) this.read();
+  }
+  private read(): void {
+    const { parts, solve, soft } = this;
+    let light = solve.x;
+    if (!parts.bounced) light = soft && parts.soft ? soft : new Float32Array(solve.x.length);
+    else if (soft && parts.soft) light = light.map((v, i) => v + soft[i]!);
+    solve.read(this.values, light);
+    this.isRead = true;
+    ++this.version;
   }
 
   /** All that there is to do. */

@@ -19,9 +19,8 @@ export const pictureColumns = 2048;
 /** What all materials of a file share. */
 export interface IndirectUniforms extends Record<string, IUniform> {
   prtLight: IUniform<Texture>;
-  /** 1 or 0: what is shown of direct light and of what surfaces send out by themselves, and of the rest. */
+  /** 1 or 0: what is shown of lamps and of what surfaces send out by themselves. */
   prtDirect: IUniform<number>;
-  prtIndirect: IUniform<number>;
 }
 
 const vertexDeclarations = /* glsl */ `
@@ -61,7 +60,6 @@ const vertexBody = /* glsl */ `
 `;
 const fragmentDeclarations = /* glsl */ `
 uniform float prtDirect;
-uniform float prtIndirect;
 #ifdef PRT_ATLAS
   uniform highp sampler2D prtLight;
   varying vec2 vPrtFront;
@@ -98,7 +96,7 @@ uniform float prtIndirect;
 const fragmentBody = /* glsl */ `
   reflectedLight.directDiffuse *= prtDirect;
   totalEmissiveRadiance *= prtDirect;
-  reflectedLight.indirectDiffuse += prtIndirect * diffuseColor.rgb * max( prtExitRadiance(), vec3( 0.0 ) );
+  reflectedLight.indirectDiffuse += diffuseColor.rgb * max( prtExitRadiance(), vec3( 0.0 ) );
 `;
 
 /** three's lights, falling off as KHR_lights_punctual has spots and without a limit near lamps, as lambent has both. */

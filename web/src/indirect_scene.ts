@@ -130,11 +130,11 @@ export function ownLamps(root: Object3D, generator: string): OwnLamp[] {
       scale = light.intensity / lampUnits(generator, kind === 'sun');
     const placed: PlacedLamp = {
       kind,
-      place: new Vector3().setFromMatrixPosition(light.matrixWorld).toArray() as Rgb,
+      place: new Vector3().setFromMatrixPosition(light.matrixWorld).toArray(),
       direction: new Vector3(0, 0, -1)
         .applyMatrix4(new Matrix4().extractRotation(light.matrixWorld))
         .normalize()
-        .toArray() as Rgb,
+        .toArray(),
       radius: 0,
       cosOuter: Math.cos(angle),
       cosInner: Math.cos(angle * (1 - (light.penumbra ?? 0))),

@@ -189,9 +189,9 @@ export class IndirectSolve {
     }
   }
 
-  /** Reconstruction at every receiver by its kernels, into `out`, [receiver][4]. `more`: added to x, [surfel][3]. */
-  read(out: Float32Array, more?: Float32Array): void {
-    const { operator, x } = this,
+  /** Reconstruction at every receiver by its kernels, into `out`, [receiver][4], of `light`, [surfel][3]. */
+  read(out: Float32Array, light = this.x): void {
+    const { operator } = this,
       { readSurfels, readWeights } = operator;
     for (let r = 0; r < operator.receivers; ++r) {
       let red = 0,
@@ -201,13 +201,9 @@ export class IndirectSolve {
         const w = readWeights[k]!;
         if (w === 0) continue;
         const at = 3 * readSurfels[k]!;
-        red += w * x[at]!;
-        green += w * x[at + 1]!;
-        blue += w * x[at + 2]!;
-        if (!more) continue;
-        red += w * more[at]!;
-        green += w * more[at + 1]!;
-        blue += w * more[at + 2]!;
+        red += w * light[at]!;
+        green += w * light[at + 1]!;
+        blue += w * light[at + 2]!;
       }
       out[4 * r] = red > 0 ? red : 0;
       out[4 * r + 1] = green > 0 ? green : 0;

@@ -41,10 +41,10 @@ class LampLightObject {
     light.color.setRGB(...(color.map((c) => c / (most || 1)) as Rgb));
     this.ball?.material.color.setRGB(...color).multiplyScalar(this.share.value);
     if (moved) this.place(placed);
-    if (moved || !shone) light.shadow!.needsUpdate = true;
+    if (moved || !shone) light.shadow.needsUpdate = true;
   }
   refresh(): void {
-    if (this.light) this.light.shadow!.needsUpdate = true;
+    if (this.light) this.light.shadow.needsUpdate = true;
   }
   /** Whether the eye sees balls. */
   show(): void {
@@ -56,7 +56,7 @@ class LampLightObject {
     const { radius } = this.bounds;
     const light = kind === 'sun' ? new DirectionalLight() : kind === 'spot' ? new SpotLight() : new PointLight();
     light.castShadow = true;
-    const shadow = light.shadow!;
+    const shadow = light.shadow;
     shadow.autoUpdate = false;
     const side = kind === 'point' || kind === 'sphere' ? mapSize.cube : mapSize.flat;
     shadow.mapSize.set(side, side);

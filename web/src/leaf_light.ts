@@ -213,9 +213,9 @@ export class LeafLight {
       at = 6 * placesOfLeaf * leaf;
     if (counts[leaf] === 0) {
       counts[leaf] = this.places.find(leaf, placesOfLeaf, found);
-      for (let i = 0; i < 6 * counts[leaf]!; ++i)
+      for (let i = 0; i < 6 * counts[leaf]; ++i)
         kept[at + i] = i % 6 < 3 ? found[i]! - positions[3 * leaf + (i % 6)]! : found[i]!;
-      return counts[leaf]!;
+      return counts[leaf];
     }
     for (let i = 0; i < 6 * counts[leaf]!; ++i)
       found[i] = kept[at + i]! + (i % 6 < 3 ? positions[3 * leaf + (i % 6)]! : 0);

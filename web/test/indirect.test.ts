@@ -43,7 +43,7 @@ async function open(glb: Buffer): Promise<IndirectControls> {
   const gltf = await new GLTFLoader()
     .register((parser) => new LambentTransferPlugin(parser))
     .parseAsync(Uint8Array.from(glb).buffer, '');
-  return bakedScene(gltf as never)!.transfer.indirect!;
+  return bakedScene(gltf)!.transfer.indirect!;
 }
 
 describe('numbers that are keyed', () => {

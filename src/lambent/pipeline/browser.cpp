@@ -69,10 +69,13 @@ Result<void> check_for_browser(const Field& field, const Scene& scene, const std
                                    "`lambent render`",
                                    why)};
   };
-  if (!see_through_materials(scene).empty()) return refuse("of surfaces that are seen through");
   if (scene.origin != Vec3d(0)) return refuse("far from the origin");
-  for (const Material& m : scene.materials)
+  for (const Material& m : scene.materials) {
+    // The page looks into no picture for what of it is solid after all.
+    if (m.alpha_mode != AlphaMode::opaque || is_see_through(scene, m))
+      return refuse("of surfaces that are seen through");
     if (m.emissive_texture >= 0 && largest(m.emissive) > 0) return refuse("of lamps that glow by a picture");
+  }
   return {};
 }
 

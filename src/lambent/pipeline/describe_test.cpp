@@ -12,6 +12,16 @@
 namespace lambent {
 namespace {
 
+// Seven receivers that read nothing of it.
+IndirectTransfer one_surfel() {
+  IndirectTransfer t;
+  t.surfels = {.counts = {1}, .spacings = {1}, .positions = {Vec3(0)}, .normals = {Vec3(0, 1, 0)}, .areas = {1}};
+  t.surfels.albedos = {Vec3(0.5f)}, t.surfels.materials = {0}, t.surfels.names = {"wall"};
+  t.gather.first = {0, 0}, t.gather.scales = {0}, t.receivers = 7;
+  t.reader_surfels.assign(7 * kernel_slots, 0), t.reader_weights.assign(7 * kernel_slots, 0);
+  return t;
+}
+
 // One field of every store with every meaning and placement that there are names for; only their headers count here.
 std::vector<Field> all_fields() {
   const Store stores[] = {Transfer{{.order = 3}, 1, 3, 7},
@@ -19,7 +29,7 @@ std::vector<Field> all_fields() {
                           ZonalTransfer{.order = 3, .lobes = 2, .receivers = 7},
                           FactoredTransfer{Transfer{{.order = 5}, 1, 1, 7}, 2},
                           Visibility{.size = 16, .bits = 1, .receivers = 0, .begin = {0}},
-                          IndirectTransfer{.receivers = 7}};
+                          one_surfel()};
   const Rows rows[] = {DiffuseRows{},        DirectionalRows{DirectionalKind::sh2},
                        Outgoing{.order = 1}, IncidentRows{2},
                        PixelRows{},          SightRows{}};
@@ -88,7 +98,7 @@ TEST(Browser, DrawsWhatThePageSaysThatItDraws) {
 TEST(Browser, RefusesScenesThatLampsDoNotLightThere) {
   Scene scene;
   scene.materials.resize(1), scene.textures.resize(1);
-  const Field field{VertexPlacement{}, IndirectTransfer{.receivers = 7}, DiffuseRows{}};
+  const Field field{VertexPlacement{}, one_surfel(), DiffuseRows{}};
   const auto why = [&](const Scene& s) {
     const auto ok = check_for_browser(field, s, "f");
     return ok ? std::string() : ok.error().message;
@@ -101,7 +111,7 @@ TEST(Browser, RefusesScenesThatLampsDoNotLightThere) {
   EXPECT_NE(why(glows).find("glow by a picture"), std::string::npos);
   far.origin = Vec3d(1e6, 0, 0);
   EXPECT_NE(why(far).find("far from the origin"), std::string::npos);
-  glass.materials[0].transmission = 0.5f;
+  glass.materials[0].transmission = 0.5f, glass.materials[0].metallic = 0;
   EXPECT_NE(why(glass).find("seen through"), std::string::npos);
   EXPECT_TRUE(check_for_browser({VertexPlacement{}, Transfer{{.order = 2}, 1, 1, 7}, DiffuseRows{}}, glass, "f"));
 }
