@@ -17,9 +17,10 @@ else()
     target_compile_definitions(lambent-test-objects PRIVATE LAMBENT_GOLDEN="${lambent_golden}")
   else()
     set_property(SOURCE src/lambent/c/lambent_test.cpp src/lambent/pipeline/draw_test.cpp
-      src/lambent/pipeline/golden_test.cpp src/lambent/pipeline/live_test.cpp
-      src/lambent/pipeline/draw_indirect_test.cpp src/lambent/pipeline/live_kinds_test.cpp
-      src/lambent/pipeline/live_look_test.cpp APPEND PROPERTY COMPILE_DEFINITIONS LAMBENT_GOLDEN="${lambent_golden}")
+      src/lambent/pipeline/golden_test.cpp src/lambent/pipeline/golden_indirect_test.cpp
+      src/lambent/pipeline/live_test.cpp src/lambent/pipeline/draw_indirect_test.cpp
+      src/lambent/pipeline/live_kinds_test.cpp src/lambent/pipeline/live_look_test.cpp
+      APPEND PROPERTY COMPILE_DEFINITIONS LAMBENT_GOLDEN="${lambent_golden}")
   endif()
   target_include_directories(lambent-test-objects PRIVATE ${CMAKE_CURRENT_SOURCE_DIR}/tests)
   target_compile_options(lambent-test-objects PRIVATE -Wall -Wextra -Wno-missing-field-initializers)

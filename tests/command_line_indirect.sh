@@ -44,7 +44,7 @@ expect 1 'has no light in free space' render indirect.glb $seen --lamp point@0.4
 expect 2 'directional: of direct to indirect light is sh:2' bake corner.obj --transfer indirect --directional hl2 \
   -o x.glb
 expect 2 'frame-bounces: needs --frames' render indirect.glb $seen --lamp point@0,1,0=1 --frame-bounces 1 -o x.png
-expect 1 'which the web page does not draw' export indirect.glb --web site_indirect
+expect 1 'directional, at texels, which the web page does not draw' export texels.glb --web site_indirect
 expect 2 'surfels: does not go with diffuse transfer' bake corner.obj --surfels 512 -o x.glb
 expect 2 'order: does not go with direct to indirect light' bake corner.obj --transfer indirect --order 3 -o x.glb
 expect 0 'paths a pixel' reference corner.obj --lamp point@0.4,0.6,0.5=3 --no-direct --spp 4 --size 16x16 \

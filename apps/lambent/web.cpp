@@ -80,23 +80,38 @@ Result<void> add_named_files(WebFiles& files, nlohmann::json& document, const st
   return {};
 }
 
-// Under data/STEM.glb or data/STEM.gltf; the name.
-Result<std::string> add_baked(WebFiles& files, const std::string& path, const std::string& stem) {
+struct AddedFile {
+  std::string name;  // data/STEM.glb or data/STEM.gltf
+  bool by_lamps;     // direct-to-indirect transport, which lamps light and no environment
+};
+Result<AddedFile> add_baked(WebFiles& files, const std::string& path, const std::string& stem) {
   auto file = MappedFile::open(path);
   if (!file) return file.error();
   auto whole = load_baked(*file, path);
   if (!whole) return whole.error();
-  if (auto ok = check_for_browser(whole->surface, path); !ok) return ok.error();
+  if (auto ok = check_for_browser(whole->surface, whole->scene, path); !ok) return ok.error();
+  const bool by_lamps = std::holds_alternative<IndirectTransfer>(whole->surface.store);
   auto chunks = split_gltf(file->bytes(), path);
   if (!chunks) return chunks.error();
   const std::string ending = chunks->binary.data() ? "glb" : "gltf", name = "data/" + stem + "." + ending;
   if (ending == "glb") {
     files[name] = {media_type("glb"), std::move(*file)};
-    return name;
+    return AddedFile{name, by_lamps};
   }
   if (auto ok = add_named_files(files, chunks->json, path, stem); !ok) return ok.error();
   files[name] = {media_type("gltf"), chunks->json.dump(-1, ' ', false, nlohmann::json::error_handler_t::replace)};
-  return name;
+  return AddedFile{name, by_lamps};
+}
+
+// What the page has no use for where lamps alone light the scene, by name.
+Result<void> check_lamps_alone(const WebOptions& o) {
+  const char* const option = !o.env.empty() ? "--env" : !o.rotate.empty() ? "--env-rotate" : nullptr;
+  if (option)
+    return Error{option,
+                 "has no use in the page, where lamps alone light a file of direct-to-indirect transport: see "
+                 "`lambent render`",
+                 true};
+  return {};
 }
 
 Result<void> add_map(WebFiles& files, const Image& image, const std::string& path, const std::string& name) {
@@ -145,11 +160,14 @@ Result<WebFiles> web_files(const WebOptions& options) {
   WebFiles files;
   auto baked = add_baked(files, options.baked, "scene");
   if (!baked) return baked.error();
-  manifest["baked"] = *baked;
+  if (auto ok = baked->by_lamps ? check_lamps_alone(options) : Result<void>(); !ok) return ok.error();
+  manifest["baked"] = baked->name;
   if (!options.compare.empty()) {
     auto compare = add_baked(files, options.compare, "compare");
     if (!compare) return compare.error();
-    manifest["compare"] = *compare;
+    if (baked->by_lamps || compare->by_lamps)
+      return Error{"--compare", "does not go with direct-to-indirect transport in the page", true};
+    manifest["compare"] = compare->name;
   }
   if (auto ok = add_page(files); !ok) return ok.error();
   if (!options.reference.empty()) {
@@ -162,8 +180,8 @@ Result<WebFiles> web_files(const WebOptions& options) {
     manifest["reference"] = "data/reference.exr";
   }
   manifest["environments"] = nlohmann::json::array();
-  const std::vector<std::string> specs = options.env.empty() ? std::vector<std::string>{"sky:elevation=35,azimuth=45"}
-                                                             : options.env;
+  std::vector<std::string> specs = options.env;
+  if (specs.empty() && !baked->by_lamps) specs.emplace_back("sky:elevation=35,azimuth=45");
   for (size_t i = 0; i < specs.size(); ++i) {
     auto env = load_light({specs[i], ""});
     if (!env) return env.error();

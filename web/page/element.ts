@@ -2,6 +2,7 @@
 // no other (docs/web.md). Attributes are spelt as the options of `lambent view`.
 import { Euler, MathUtils, Vector3 } from 'three';
 import { LambentError } from '../src/index.js';
+import { takeLamps } from './lamps.js';
 import { fetchFile, makeEnvironment, makeSky, readBaked, readMap, type EnvironmentFile } from './loading.js';
 import { defaultState, parseState, type State } from './state.js';
 import { parseSky } from './sky.js';
@@ -18,9 +19,11 @@ p:empty { display: none; }`;
 
 /** What the address of the page may hold, an element has as attributes. */
 const ofState = ['camera', 'rotate', 'exposure', 'tone', 'spin', 'background', 'order', 'window', 'brdf'] as const;
+/** Several, apart by semicolons: each of the address's. */
+const lists = { lamps: 'lamp', albedos: 'albedo' } as const;
 
 export class LambentViewer extends HTMLElement {
-  static readonly observedAttributes = ['src', 'env', 'alt', ...ofState];
+  static readonly observedAttributes = ['src', 'env', 'alt', ...ofState, ...Object.keys(lists)];
   private readonly canvas = document.createElement('canvas');
   private readonly words = document.createElement('p');
   private viewer: Viewer | undefined;
@@ -104,6 +107,7 @@ export class LambentViewer extends HTMLElement {
       if (scene) viewer.setModel('baked', scene);
       const transfer = viewer.bakedScene?.transfer;
       if (transfer?.reflection) transfer.reflection = state.brdf ?? { model: 'diffuse' };
+      if (viewer.indirect) takeLamps(viewer.indirect, state);
       const [yaw, pitch, roll] = state.rotate.map((d) => MathUtils.degToRad(d)) as [number, number, number];
       viewer.orbit.light.setFromEuler(new Euler(pitch, yaw, roll, 'YXZ'));
       if (state.camera) {
@@ -126,6 +130,11 @@ export class LambentViewer extends HTMLElement {
     for (const name of ofState) {
       const value = this.getAttribute(name);
       if (value !== null) from.set(name, value);
+    }
+    for (const [attribute, name] of Object.entries(lists)) {
+      const texts = this.getAttribute(attribute);
+      if (texts === null) continue;
+      for (const text of texts.split(';')) from.append(name, text.trim());
     }
     return parseState(from.toString(), defaultState());
   }

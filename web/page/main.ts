@@ -24,22 +24,15 @@ import {
 } from './loading.js';
 import { get, degrees, hideProblem, input, megabytes, select, sentence, showLoading, showProblem } from './dom.js';
 import { connectLobes, connectWipe } from './hands.js';
+import { LampControls } from './lamp_controls.js';
 import { connectSharing } from './sharing.js';
 import { highestSun, lowestSun, parseSky, type Sky } from './sky.js';
-import { defaultState, formatState, parseState, type State, type View } from './state.js';
+import { defaultState, formatState, parseState, viewNames as names, type State, type View } from './state.js';
 import { showSurface, takeReflection } from './surface.js';
 import { showFrameTime, showStatistics } from './statistics.js';
 import { tones, type Tone } from './tone.js';
-import { falseColorEnd, falseColorGain, fitErrorEnd, Viewer } from './viewer.js';
-
-const names: Record<View, string> = {
-  baked: 'Baked',
-  compare: 'Second file',
-  unshadowed: 'Unshadowed',
-  coefficient: 'One coefficient',
-  error: 'Error of the fit',
-  reference: 'Reference',
-};
+import { falseColorEnd, falseColorGain, fitErrorEnd } from './false_color.js';
+import { Viewer } from './viewer.js';
 
 const usualSpin = 12; // degrees a second
 
@@ -53,6 +46,7 @@ class Page {
   private isServed = false; // the scene, and not opened from a file
   private savedSoon = 0;
   private opened = false;
+  private readonly lamps: LampControls;
 
   constructor(private readonly manifest: Manifest | undefined) {
     const { base } = this;
@@ -69,6 +63,13 @@ class Page {
       onProblem: showProblem,
       onRecovered: hideProblem,
       onMeter: () => this.showExposure(),
+      onDraw: () => this.lamps.place(),
+      onSettled: (isSettled) => this.lamps.settled(isSettled),
+    });
+    this.lamps = new LampControls(this.viewer, (to) => {
+      for (const key of ['lamps', 'dark', 'albedos'] as const) delete this.state[key];
+      Object.assign(this.state, to);
+      this.saveSoon();
     });
     this.connect();
   }
@@ -102,8 +103,8 @@ class Page {
   /** All of the state to controls and viewer. */
   private show(): void {
     const { state, viewer } = this;
-    const possible: View[] = ['baked', 'unshadowed'],
-      transfer = viewer.bakedScene?.transfer;
+    const transfer = viewer.bakedScene?.transfer,
+      possible: View[] = transfer?.indirect ? ['baked', 'direct', 'indirect'] : ['baked', 'unshadowed'];
     if (!transfer || transfer.coefficientMaterials) possible.push('coefficient');
     if (transfer?.fitErrorMaterials) possible.push('error');
     if (this.manifest?.compare) possible.splice(1, 0, 'compare');
@@ -129,6 +130,7 @@ class Page {
     input('free').checked = state.free;
     // Sight has no bands to leave out, and surfaces that are free.
     get('order-row').hidden = get('window-row').hidden = transfer?.reflection !== undefined;
+    this.lamps.show();
     const makeSurfaces = (brdf: Reflection): void => {
       state.brdf = takeReflection(transfer!, brdf, viewer.renderer, (error) =>
         showProblem(sentence(document.title, error)),
@@ -338,6 +340,7 @@ class Page {
         await this.openBaked(file.name, bytes, files);
         this.show();
       } else {
+        if (this.viewer.indirect) throw new LambentError('is no scene, and lamps alone light this one');
         const environment = makeEnvironment(file.name, readMap(bytes));
         this.environments.push({
           name: file.name,
@@ -364,6 +367,7 @@ class Page {
     this.setCamera(first ? this.state.camera : undefined);
     if (first && this.state.time !== undefined) viewer.pose(this.state.time);
     get('loading').hidden = true;
+    this.lamps.take(this.isServed && first ? this.state : {});
     viewer.measure();
     if (problem) return this.showPlain(problem);
     showStatistics(viewer.bakedScene);

@@ -10,7 +10,7 @@ import {
   type Lighting,
 } from '../src/index.js';
 
-export type Look = 'baked' | 'unshadowed' | 'coefficient' | 'error';
+export type Look = 'baked' | 'direct' | 'indirect' | 'unshadowed' | 'coefficient' | 'error';
 
 export class Model {
   readonly root: Object3D;
@@ -47,6 +47,8 @@ export class Model {
     errorGain: { value: number },
   ): void {
     let materials = this.own;
+    const { indirect } = this.baked.transfer;
+    if (indirect) indirect.show = look === 'direct' || look === 'indirect' ? look : 'all';
     if (look === 'unshadowed') {
       if (!this.unshadowed) {
         const made = new Map<Material, UnshadowedMaterial>();

@@ -1,14 +1,34 @@
 // What is on show, as the address's fragment: a link or a reload gives the same picture.
 // Numbers are separated by commas; `camera` and `rotate` are spelt as --camera and --env-rotate of the command line.
 import { shWindows, type Reflection, type ShWindow } from '../src/index.js';
+import type { LampState } from './lamps.js';
 import { highestSun, lowestSun } from './sky.js';
 import { formatReflection, parseReflection } from './surface.js';
 import { tones, type Tone } from './tone.js';
 
-export const views = ['baked', 'compare', 'unshadowed', 'coefficient', 'error', 'reference'] as const;
+export const views = [
+  'baked',
+  'compare',
+  'direct',
+  'indirect',
+  'unshadowed',
+  'coefficient',
+  'error',
+  'reference',
+] as const;
 export type View = (typeof views)[number];
+export const viewNames: Record<View, string> = {
+  baked: 'Baked',
+  compare: 'Second file',
+  direct: 'Direct light',
+  indirect: 'Indirect light',
+  unshadowed: 'Unshadowed',
+  coefficient: 'One coefficient',
+  error: 'Error of the fit',
+  reference: 'Reference',
+};
 
-export interface State {
+export interface State extends LampState {
   camera?: number[]; // eye, target, vertical field of view in degrees
   rotate: number[]; // yaw, pitch, roll in degrees
   env: number;
@@ -80,6 +100,9 @@ export function parseState(fragment: string, base: State): State {
   if (time !== undefined) state.time = time;
   const brdf = parseReflection(from.get('brdf') ?? '');
   if (brdf) state.brdf = brdf;
+  if (from.has('lamp')) state.lamps = from.getAll('lamp').filter((text) => text !== '');
+  if (from.has('dark')) state.dark = (from.get('dark') ?? '').split(',').map(Number);
+  if (from.has('albedo')) state.albedos = from.getAll('albedo');
   if (from.has('background')) state.background = from.get('background') !== 'none';
   if (from.has('ui')) state.ui = from.get('ui') !== 'off';
   return state;
@@ -109,6 +132,11 @@ export function formatState(state: State, base: State = defaultState()): string 
   if (state.coefficient !== base.coefficient) put('coefficient', String(state.coefficient));
   if (state.time !== undefined) put('time', short(state.time));
   if (state.brdf && state.brdf.model !== 'diffuse') put('brdf', formatReflection(state.brdf));
+  const encoded = (text: string): string => encodeURIComponent(text).replace(/%(2C|3D|40)/g, decodeURIComponent);
+  // None at all is said as well: the page would begin with one.
+  for (const text of state.lamps?.length === 0 ? [''] : (state.lamps ?? [])) put('lamp', encoded(text));
+  if (state.dark) put('dark', state.dark.join(','));
+  for (const text of state.albedos ?? []) put('albedo', encoded(text));
   if (!state.background) put('background', 'none');
   if (!state.ui) put('ui', 'off');
   return '#' + parts.join('&');

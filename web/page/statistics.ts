@@ -1,5 +1,5 @@
 // What a file holds, and what a frame takes: shown where they are asked for.
-import type { BakedScene } from '../src/index.js';
+import type { BakedScene, IndirectTimes } from '../src/index.js';
 import { get, megabytes } from './dom.js';
 
 /** Of the file; of none, nothing. */
@@ -21,12 +21,22 @@ function rowsOf({ transfer: t, provenance }: BakedScene): [string, string][] {
   const rows: [string, string][] = [
     [
       'Transfer',
-      t.reflection ? 'visibility in blocks' : `${t.kind}, order ${t.order}, ${t.channels === 3 ? 'colour' : 'grey'}`,
+      t.indirect
+        ? 'direct to indirect light'
+        : t.reflection
+          ? 'visibility in blocks'
+          : `${t.kind}, order ${t.order}, ${t.channels === 3 ? 'colour' : 'grey'}`,
     ],
     ['Receivers', t.receivers.toLocaleString('en')],
     ['Vertices', t.meshes.reduce((n, m) => n + m.geometry.getAttribute('position').count, 0).toLocaleString('en')],
     ['In the file', megabytes(t.fileBytes)],
     ['On the graphics card', megabytes(t.gpuBytes)],
+    ...(t.indirect
+      ? [
+          ['Surfels', t.indirect.leaves.toLocaleString('en')] as [string, string],
+          ['Entries', t.indirect.entries.toLocaleString('en')] as [string, string],
+        ]
+      : []),
     ...(t.lamps?.size ? [['Lamps', [...t.lamps.keys()].join(', ')] as [string, string]] : []),
     ['A receiver', `${Math.round(t.fileBytes / t.receivers)} bytes`],
   ];
@@ -37,6 +47,12 @@ function rowsOf({ transfer: t, provenance }: BakedScene): [string, string][] {
 }
 
 let frameTime = 0;
+/** What of a frame lamps took: rays, bounces and reading, in milliseconds. */
+export function showLightTime({ rays, bounces, reading }: IndirectTimes): void {
+  get('light-time').textContent =
+    `${rays.toFixed(1)} ms of rays, ${bounces.toFixed(1)} of bounces, ${reading.toFixed(1)} of reading`;
+}
+
 /** A frame followed the one before it after so many milliseconds. */
 export function showFrameTime(milliseconds: number): void {
   frameTime = frameTime ? 0.9 * frameTime + 0.1 * milliseconds : milliseconds;

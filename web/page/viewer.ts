@@ -24,7 +24,7 @@ import {
 } from 'three';
 import type { GLTF } from 'three/addons/loaders/GLTFLoader.js';
 import { FullScreenQuad } from 'three/addons/postprocessing/Pass.js';
-import { anySeeThrough, LambentError, type BakedScene, type ShWindow } from '../src/index.js';
+import { anySeeThrough, LambentError, type BakedScene, type IndirectControls, type ShWindow } from '../src/index.js';
 import type { EnvironmentFile } from './loading.js';
 import { framed, framedFov } from './framing.js';
 import { LobeGlyphs, pickVertex } from './lobes.js';
@@ -32,29 +32,15 @@ import { Model } from './model.js';
 import { Orbit } from './orbit.js';
 import { DevelopMaterial, PictureMaterial, SkyMaterial } from './screen.js';
 import type { View } from './state.js';
+import type { ViewerCallbacks } from './viewer_callbacks.js';
+import { falseColorEnd, falseColorGain, fitErrorEnd } from './false_color.js';
 import { autoExposure, clampBeforeTone, toneMappings, type Tone } from './tone.js';
 
-export interface ViewerCallbacks {
-  /** A frame followed the one before it after so many milliseconds, without a pause between. */
-  onFrame(milliseconds: number): void;
-  onChange(): void;
-  /** As of an orbit (orbit.ts). */
-  onLift(degrees: number): boolean;
-  onUse(what: 'orbit' | 'light'): void;
-  onProblem(message: string): void;
-  onRecovered(): void;
-  /** The exposure was measured anew: so many stops. */
-  onMeter(stops: number): void;
-}
-
-/** Transfer at the ends of the false-colour scale, at exposure 0: those of open surfaces stay below 0.33. */
-export const falseColorEnd = 0.25;
-/** Of errors of a fit, relative. */
-export const fitErrorEnd = 0.1;
 const pause = 250; // milliseconds without a frame
 const finePause = 250; // after the light has stood still, what is sharp is drawn from all of its texels
 const meterPause = 300; // between two measures of the exposure while the light turns
 const meterWidth = 128; // pixels
+const lightTime = { drawn: 10, alone: 25 }; // milliseconds a frame for lamps that move: beside a picture, or without one
 
 export class Viewer {
   readonly renderer: WebGLRenderer;
@@ -95,6 +81,7 @@ export class Viewer {
   private fineSoon = 0;
   private meterTarget: WebGLRenderTarget | undefined;
   private request = 0;
+  private isDue = false; // a picture, not light alone
   private lastFrame = 0;
 
   constructor(
@@ -117,7 +104,11 @@ export class Viewer {
       callbacks.onProblem('The graphics card was taken away from this page. The picture returns with it.'),
     );
     // What was drawn into textures is gone.
-    canvas.addEventListener('webglcontextrestored', () => (callbacks.onRecovered(), this.changeLight()));
+    canvas.addEventListener('webglcontextrestored', () => {
+      this.indirect?.refresh();
+      callbacks.onRecovered();
+      this.changeLight();
+    });
     this.orbit = new Orbit(this.camera, canvas, {
       onCamera: () => (this.invalidate(), callbacks.onChange()),
       onLight: () => (this.changeLight(), callbacks.onChange()),
@@ -141,6 +132,11 @@ export class Viewer {
     }
     this[role] = model;
     this.scene.add(model.root);
+    const { indirect } = model.baked.transfer;
+    if (indirect) {
+      this.renderer.shadowMap.enabled = true;
+      this.scene.add(indirect.lights);
+    }
     if (role === 'baked') this.takeScene(gltf);
     this.changeLight();
   }
@@ -173,6 +169,9 @@ export class Viewer {
 
   get bakedScene(): BakedScene | undefined {
     return this.baked?.baked;
+  }
+  get indirect(): IndirectControls | undefined {
+    return this.baked?.baked.transfer.indirect;
   }
   get hasAnimation(): boolean {
     return this.animation !== undefined;
@@ -283,6 +282,10 @@ export class Viewer {
   }
 
   invalidate(): void {
+    this.isDue = true;
+    this.askFrame();
+  }
+  private askFrame(): void {
     if (!this.request) this.request = requestAnimationFrame((now) => this.onFrame(now));
   }
 
@@ -317,11 +320,25 @@ export class Viewer {
       this.orbit.light.premultiply(new Quaternion().setFromAxisAngle(new Vector3(0, 1, 0), angle)).normalize();
       this.changeLight();
     }
+    this.findLight();
+    if (!this.isDue) return;
+    this.isDue = false;
     this.draw();
     if (apart < pause) this.callbacks.onFrame(apart);
   }
 
+  /** What lamps send on, as far as a frame has time for it. */
+  private findLight(): void {
+    const { indirect } = this;
+    if (!indirect) return;
+    const more = indirect.update(this.isDue ? lightTime.drawn : lightTime.alone);
+    if (indirect.times.count > 0) this.isDue = this.meterDue = true;
+    if (more) this.askFrame();
+    this.callbacks.onSettled?.(!more);
+  }
+
   private draw(): void {
+    this.callbacks.onDraw?.();
     const { renderer, camera, sky } = this;
     this.fitToCanvas();
     if (this.lightChanged) this.relight();
@@ -418,7 +435,7 @@ export class Viewer {
     renderer.clear();
     if (this.dress('baked') ?? this.plain) renderer.render(this.scene, this.camera);
     let pixels = read();
-    if (this.showBackground && !pixels.some((v, i) => i % 4 === 3 && v >= 0.5)) {
+    if (this.showBackground && !this.indirect && !pixels.some((v, i) => i % 4 === 3 && v >= 0.5)) {
       screen.material = this.sky;
       screen.render(renderer);
       pixels = read();
@@ -449,7 +466,7 @@ export class Viewer {
       renderer.setRenderTarget(this.linear);
       renderer.clear();
     }
-    if (this.showBackground && this.environment && view !== 'coefficient' && view !== 'error') {
+    if (this.showBackground && this.environment && !this.indirect && view !== 'coefficient' && view !== 'error') {
       screen.material = this.sky;
       screen.render(renderer);
     }
@@ -481,6 +498,3 @@ export class Viewer {
     return shown;
   }
 }
-
-/** False colours show transfer, which no automatic exposure is measured from. */
-export const falseColorGain = (exposure: number | 'auto'): number => (exposure === 'auto' ? 1 : 2 ** exposure);

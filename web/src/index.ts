@@ -1,5 +1,6 @@
 import { blocksKind } from './blocks.js';
 import { diffuseKind } from './diffuse.js';
+import { indirectKind } from './indirect.js';
 import { registerTransferKind } from './kinds.js';
 import { matrixKind } from './matrix.js';
 import { zonalKind } from './zonal.js';
@@ -8,13 +9,17 @@ registerTransferKind(diffuseKind);
 registerTransferKind(zonalKind);
 registerTransferKind(matrixKind);
 registerTransferKind(blocksKind);
+registerTransferKind(indirectKind);
 
 export type { Reflection } from './block_reflection.js';
 export { cubeLight, type CubeLight } from './cube.js';
 export { LambentError, NoTransferError } from './errors.js';
 export { checkBakedFile, extensionName } from './glb.js';
+export type { IndirectControls } from './indirect.js';
+export type { IndirectTimes } from './indirect_light.js';
 export {
   knownKinds,
+  limits,
   registerTransferKind,
   type BakedTransfer,
   type TransferKind,
@@ -23,6 +28,18 @@ export {
 export { Lattice, type LatticeHeader, type ProbeGrid, type ProbeGridClass } from './lattice.js';
 export { latLongMap, Lighting, type LightParts } from './lighting.js';
 export { lobeValue, type Lobe } from './lobes.js';
+export {
+  formatColor,
+  formatLamp,
+  lampKinds,
+  lampNumbers,
+  namesLamp,
+  parseLamp,
+  parseNamedColor,
+  type Lamp,
+  type LampKind,
+  type Rgb,
+} from './moving_lamps.js';
 export type { NodeEdition, NodeRenderer, Renderer } from './node_edition.js';
 export { bakedScene, LambentTransferPlugin, type BakedScene } from './plugin.js';
 export { withoutPeaks } from './peaks.js';

@@ -2,6 +2,7 @@
 import type { Color, Material, Mesh } from 'three';
 import type { Reflection } from './block_reflection.js';
 import type { TransferExtension, Views } from './glb.js';
+import type { IndirectControls } from './indirect.js';
 import type { Lighting } from './lighting.js';
 import type { Lobe } from './lobes.js';
 import type { NodeEdition, Renderer } from './node_edition.js';
@@ -17,6 +18,8 @@ export interface TransferSource {
    * The scene's own material of a part whose mesh wears one for other viewers; its mesh's material where it does not.
    */
   ownMaterial(part: TransferExtension['parts'][number]): Promise<Material>;
+  /** asset.generator of the document. */
+  generator?: string | undefined;
   /** For WebGPURenderer. */
   nodes?: NodeEdition | undefined;
 }
@@ -47,6 +50,8 @@ export interface BakedTransfer {
   readonly coefficientMaterials?: (index: number, gain: { value: number }) => Material[];
   /** Visibility in blocks: what all surfaces are made of. Counts at the next frame. */
   reflection?: Reflection;
+  /** Direct to indirect light: lamps that move, and paint. */
+  readonly indirect?: IndirectControls;
   /**
    * Where the file has the errors of a fit: materials that show them in false colour, as coefficientMaterials() does.
    */
@@ -71,14 +76,19 @@ export const drawn = [
   ['lobes', 'diffuse', 'vertices'],
   ['lobes', 'outgoing', 'vertices'],
   ['blocks', 'sight', 'vertices'],
+  ['surfels', 'diffuse', 'vertices'],
+  ['surfels', 'diffuse', 'texels'],
 ] as const;
 
-/** Of what is drawn: columns of an atlas's light; lobes of all rows of a receiver; of a matrix, texels a receiver. */
-export const limits = { columns: 256, lobes: 64, texels: 2048 } as const;
+/**
+ * Of what is drawn: columns of an atlas's light; lobes of all rows of a receiver; of a matrix, texels a receiver; lamps
+ * that move, each with a shadow map.
+ */
+export const limits = { columns: 256, lobes: 64, texels: 2048, lamps: 8 } as const;
 
 /** Store, meaning and placement of a file's transfer, as the table has them. */
 export function axesOf({ transfer, surface, view }: TransferExtension): [store: string, rows: string, where: string] {
-  const stores: Record<string, string> = { zonal: 'lobes', factors: 'factors', blocks: 'blocks' };
+  const stores: Record<string, string> = { zonal: 'lobes', factors: 'factors', blocks: 'blocks', indirect: 'surfels' };
   const isDirectional = transfer['directional'] !== undefined && transfer['directional'] !== 'none';
   return [
     transfer['cpca'] !== undefined ? 'clusters' : (stores[transfer.kind] ?? 'dense'),

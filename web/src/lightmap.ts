@@ -333,7 +333,11 @@ uint prtPick( const in ivec2 texel, out int row ) {
 }
 
 /** Two floats a vertex, in texels. */
-async function readPlaces(source: TransferSource, view: unknown, vertices: number): Promise<Float32BufferAttribute> {
+export async function readPlaces(
+  source: TransferSource,
+  view: unknown,
+  vertices: number,
+): Promise<Float32BufferAttribute> {
   if (!isViews(view)) throw new LambentError('a part has no buffer view of places in the atlas');
   const bytes = await source.bufferView(view);
   if (bytes.byteLength !== 8 * vertices) throw new LambentError('a part does not have one place in the atlas a vertex');

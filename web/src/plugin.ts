@@ -74,6 +74,7 @@ export const viewReader =
   };
 
 interface Document {
+  asset?: { generator?: string };
   extensions?: Record<string, unknown>;
   bufferViews?: unknown[];
   materials?: unknown[];
@@ -105,6 +106,7 @@ export class LambentTransferPlugin implements GLTFLoaderPlugin {
     const meshes = findMeshes(gltf, this.parser);
     const source: TransferSource = {
       extension,
+      generator: document.asset?.generator,
       nodes: this.nodes,
       bufferView: viewReader(this.parser),
       mesh: ({ node, primitive }: TransferExtension['parts'][number]) => {

@@ -1,6 +1,7 @@
 #include <lambent/pipeline/browser.h>
 
 #include <lambent/pipeline/describe.h>
+#include <lambent/scene/see_through.h>
 
 #include <fmt/format.h>
 
@@ -11,9 +12,9 @@ namespace lambent {
 namespace {
 
 constexpr DrawnKind kinds[] = {
-    {"dense", "diffuse", "vertices"},  {"dense", "diffuse", "texels"},   {"dense", "directional", "texels"},
-    {"dense", "outgoing", "vertices"}, {"lobes", "diffuse", "vertices"}, {"lobes", "outgoing", "vertices"},
-    {"blocks", "sight", "vertices"},
+    {"dense", "diffuse", "vertices"},  {"dense", "diffuse", "texels"},     {"dense", "directional", "texels"},
+    {"dense", "outgoing", "vertices"}, {"lobes", "diffuse", "vertices"},   {"lobes", "outgoing", "vertices"},
+    {"blocks", "sight", "vertices"},   {"surfels", "diffuse", "vertices"}, {"surfels", "diffuse", "texels"},
 };
 
 // What a kind that is not drawn is, for those who made it.
@@ -21,7 +22,8 @@ std::string why_not(const Field& field) {
   using std::string;
   if (std::holds_alternative<FixedView>(field.where)) return "is of a fixed view, a picture without surfaces";
   if (std::holds_alternative<HaarTransfer>(field.store)) return "holds transfer in wavelets";
-  if (std::holds_alternative<IndirectTransfer>(field.store)) return "holds direct-to-indirect transport";
+  if (std::holds_alternative<IndirectTransfer>(field.store))
+    return string("holds direct-to-indirect transport that is ") + name_of(field.rows) + ", at " + name_of(field.where);
   if (std::holds_alternative<CpcaTransfer>(field.store)) return "holds clusters";
   if (std::holds_alternative<FactoredTransfer>(field.store)) return "holds factors";
   if (std::holds_alternative<DirectionalRows>(field.rows))
@@ -55,6 +57,24 @@ Result<void> check_for_browser(const Field& field, const std::string& path) {
     const size_t texels_needed = size_t(dense->rows) * size_t(dense->channels) * ((dense->columns() + 3) / 4);
     if (texels_needed > max_drawn_texels)
       return refuse(fmt::format("has {} rows of {} columns, more than a texture holds", dense->rows, dense->columns()));
+  }
+  return {};
+}
+
+Result<void> check_for_browser(const Field& field, const Scene& scene, const std::string& path) {
+  if (auto ok = check_for_browser(field, path); !ok || !std::holds_alternative<IndirectTransfer>(field.store))
+    return ok;
+  const auto refuse = [&](const char* why) {
+    return Error{path, fmt::format("holds direct-to-indirect transport {}, which the web page does not draw: see "
+                                   "`lambent render`",
+                                   why)};
+  };
+  if (scene.origin != Vec3d(0)) return refuse("far from the origin");
+  for (const Material& m : scene.materials) {
+    // The page looks into no picture for what of it is solid after all.
+    if (m.alpha_mode != AlphaMode::opaque || is_see_through(scene, m))
+      return refuse("of surfaces that are seen through");
+    if (m.emissive_texture >= 0 && largest(m.emissive) > 0) return refuse("of lamps that glow by a picture");
   }
   return {};
 }

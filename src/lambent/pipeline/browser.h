@@ -1,6 +1,7 @@
 #pragma once
 // What the web page draws. web/src/kinds.ts holds the same table and limits, and a test compares the two.
 #include <lambent/core/result.h>
+#include <lambent/scene/scene.h>
 #include <lambent/transfer/field.h>
 
 #include <span>
@@ -13,10 +14,13 @@ struct DrawnKind {
 };
 std::span<const DrawnKind> drawn_kinds();
 
-// Of an atlas's light, harmonics and groups; of all rows of a receiver; of a matrix, texels a receiver.
-inline constexpr size_t max_drawn_columns = 256, max_drawn_lobes = 64, max_drawn_texels = 2048;
+// Of an atlas's light, harmonics and groups; of all rows of a receiver; of a matrix, texels a receiver; lamps that
+// move.
+inline constexpr size_t max_drawn_columns = 256, max_drawn_lobes = 64, max_drawn_texels = 2048, max_drawn_lamps = 8;
 
 // Why the page would refuse the surface's field; nothing where it draws it. The error names `path`.
 Result<void> check_for_browser(const Field& surface, const std::string& path);
+// The same with what of its scene the page does not draw.
+Result<void> check_for_browser(const Field& surface, const Scene& scene, const std::string& path);
 
 }  // namespace lambent

@@ -12,12 +12,24 @@
 namespace lambent {
 namespace {
 
+// Seven receivers that read nothing of it.
+IndirectTransfer one_surfel() {
+  IndirectTransfer t;
+  t.surfels = {.counts = {1}, .spacings = {1}, .positions = {Vec3(0)}, .normals = {Vec3(0, 1, 0)}, .areas = {1}};
+  t.surfels.albedos = {Vec3(0.5f)}, t.surfels.materials = {0}, t.surfels.names = {"wall"};
+  t.gather.first = {0, 0}, t.gather.scales = {0}, t.receivers = 7;
+  t.reader_surfels.assign(7 * kernel_slots, 0), t.reader_weights.assign(7 * kernel_slots, 0);
+  return t;
+}
+
 // One field of every store with every meaning and placement that there are names for; only their headers count here.
 std::vector<Field> all_fields() {
-  const Store stores[] = {Transfer{{.order = 3}, 1, 3, 7}, CpcaTransfer{.light = {.order = 2}, .receivers = 7},
+  const Store stores[] = {Transfer{{.order = 3}, 1, 3, 7},
+                          CpcaTransfer{.light = {.order = 2}, .receivers = 7},
                           ZonalTransfer{.order = 3, .lobes = 2, .receivers = 7},
                           FactoredTransfer{Transfer{{.order = 5}, 1, 1, 7}, 2},
-                          Visibility{.size = 16, .bits = 1, .receivers = 0, .begin = {0}}};
+                          Visibility{.size = 16, .bits = 1, .receivers = 0, .begin = {0}},
+                          one_surfel()};
   const Rows rows[] = {DiffuseRows{},        DirectionalRows{DirectionalKind::sh2},
                        Outgoing{.order = 1}, IncidentRows{2},
                        PixelRows{},          SightRows{}};
@@ -42,7 +54,7 @@ TEST(Describe, NamesEveryAxis) {
     EXPECT_NE(describe_in_words(field).find(" receivers, "), std::string::npos);
     words.insert(d["store"].get<std::string>() + d["where"].get<std::string>() + d["meaning"].get<std::string>());
   }
-  EXPECT_EQ(words.size(), 5u * 6u * 5u);
+  EXPECT_EQ(words.size(), 6u * 6u * 5u);
 }
 
 TEST(Describe, SaysWhatAFieldIs) {
@@ -74,12 +86,34 @@ TEST(Browser, DrawsWhatThePageSaysThatItDraws) {
   EXPECT_EQ(page, ours);
   EXPECT_EQ(page.size(), drawn_kinds().size());
   for (const auto& [name, value] : {std::pair("columns", max_drawn_columns), std::pair("lobes", max_drawn_lobes),
-                                    std::pair("texels", max_drawn_texels)}) {
+                                    std::pair("texels", max_drawn_texels), std::pair("lamps", max_drawn_lamps)}) {
     std::smatch found;
     ASSERT_TRUE(std::regex_search(source, found, std::regex("limits = \\{[^}]*\\b" + std::string(name) + ": (\\d+)")))
         << name;
     EXPECT_EQ(size_t(std::stoul(found[1].str())), value);
   }
+}
+
+// Rays of the page pass no surface, know no picture that glows, and are where the file says that the scene is.
+TEST(Browser, RefusesScenesThatLampsDoNotLightThere) {
+  Scene scene;
+  scene.materials.resize(1), scene.textures.resize(1);
+  const Field field{VertexPlacement{}, one_surfel(), DiffuseRows{}};
+  const auto why = [&](const Scene& s) {
+    const auto ok = check_for_browser(field, s, "f");
+    return ok ? std::string() : ok.error().message;
+  };
+  EXPECT_EQ(why(scene), "");
+  Scene glows = scene, far = scene, glass = scene;
+  glows.materials[0].emissive = Vec3(1);
+  EXPECT_EQ(why(glows), "");
+  glows.materials[0].emissive_texture = 0;
+  EXPECT_NE(why(glows).find("glow by a picture"), std::string::npos);
+  far.origin = Vec3d(1e6, 0, 0);
+  EXPECT_NE(why(far).find("far from the origin"), std::string::npos);
+  glass.materials[0].transmission = 0.5f, glass.materials[0].metallic = 0;
+  EXPECT_NE(why(glass).find("seen through"), std::string::npos);
+  EXPECT_TRUE(check_for_browser({VertexPlacement{}, Transfer{{.order = 2}, 1, 1, 7}, DiffuseRows{}}, glass, "f"));
 }
 
 TEST(Browser, RefusesAllElseByName) {
@@ -100,6 +134,8 @@ TEST(Browser, RefusesAllElseByName) {
   EXPECT_TRUE(has(why(FixedView{}, Transfer{}, PixelRows{}), "fixed view"));
   EXPECT_TRUE(has(why(VertexPlacement{}, HaarTransfer{}, DiffuseRows{}), "wavelets"));
   EXPECT_EQ(why(VertexPlacement{}, Visibility{}, SightRows{}), "");
+  EXPECT_TRUE(has(why(PatchPlacement{}, IndirectTransfer{}, DiffuseRows{}),
+                  "direct-to-indirect transport that is diffuse, at patches"));
   EXPECT_TRUE(has(why(VertexPlacement{}, FactoredTransfer{}, Outgoing{}), "factors"));
   EXPECT_TRUE(has(why(VertexPlacement{}, Transfer{{.lobes = {{}}}}, DiffuseRows{}), "lobes of light"));
   EXPECT_TRUE(has(why(VertexPlacement{}, Transfer{{.groups = {"a"}}}, DiffuseRows{}), "lamps"));
