@@ -99,7 +99,12 @@ class IndirectTransfer implements BakedTransfer, IndirectControls {
     this.own = ownLamps(root, source.generator ?? '');
     const scene = sceneTriangles(meshes, owns, operator.surfels.names);
     this.checkPlaces(scene.positions);
-    this.light = new IndirectLight(operator, scene, this.own, glowsOf(meshes, owns, scene), readOff);
+    const glows = glowsOf(meshes, owns, scene);
+    if (this.own.length + glows.length > limits.ownLamps)
+      throw new LambentError(
+        `has more than ${limits.ownLamps} lamps of its own, which this version does not draw; "lambent render" does`,
+      );
+    this.light = new IndirectLight(operator, scene, this.own, glows, readOff);
     this.uniforms = { prtLight: { value: picture.texture }, prtDirect: { value: 1 } };
     this.lights = new LampLights(this.bounds, this.uniforms.prtDirect);
     this.refusal = source.nodes ? onlyGlsl('direct-to-indirect light') : withoutNodes;
