@@ -22,7 +22,7 @@ it.skipIf(!haveTool)('a lamp that moves', async () => {
   const gltf = await new GLTFLoader()
     .register((parser) => new LambentTransferPlugin(parser))
     .parseAsync(glb.buffer, '');
-  const controls = bakedScene(gltf as never)!.transfer.indirect!;
+  const controls = bakedScene(gltf)!.transfer.indirect!;
   const load = performance.now() - loading;
   const place = (k: number): string => `${0.5 + 0.02 * k},3.5,0.7`,
     lamp = (k: number): void => void (controls.movingLamps = [parseLamp(`point@${place(k)}=100`)]);

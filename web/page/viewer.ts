@@ -40,7 +40,7 @@ const pause = 250; // milliseconds without a frame
 const finePause = 250; // after the light has stood still, what is sharp is drawn from all of its texels
 const meterPause = 300; // between two measures of the exposure while the light turns
 const meterWidth = 128; // pixels
-const lightTime = { drawn: 10, alone: 25 }; // milliseconds a frame for lamps that move: beside a picture, or without one
+const lightTime = { drawn: 10, alone: 25 }; // milliseconds for lamps that move: beside a picture, without
 
 export class Viewer {
   readonly renderer: WebGLRenderer;

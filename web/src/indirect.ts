@@ -2,8 +2,8 @@
 // and the bounces follow. Direct light is drawn by three's lights; what bounces is found by the processor
 // (indirect_light.ts), a texel a receiver, which meshes look up.
 //
-// Budget: 16 bytes a receiver (over an atlas, a texel) on the graphics card and 4 a vertex; in memory the operator, 8 an
-// entry, and the scene's triangles, some 200 each.
+// Budget: 16 bytes a receiver (over an atlas, a texel) on the graphics card and 4 a vertex; in memory 8 bytes an entry
+// of the operator, and some 200 a triangle.
 import {
   Box3,
   Color,
@@ -43,7 +43,7 @@ export interface IndirectControls {
   /** Repaints one; undefined: as it was. */
   paint(name: string, color: Rgb | undefined): void;
   show: 'all' | 'direct' | 'indirect';
-  /** Works for about so many milliseconds; whether there is more to do. To be called before each frame until there is not. */
+  /** Works for about so many milliseconds; whether there is more to do. To be called before each frame until then. */
   update(milliseconds: number): boolean;
   /** All that there is to do. */
   settle(): void;
@@ -99,7 +99,12 @@ class IndirectTransfer implements BakedTransfer, IndirectControls {
     this.own = ownLamps(root, source.generator ?? '');
     const scene = sceneTriangles(meshes, owns, operator.surfels.names);
     this.checkPlaces(scene.positions);
-    this.light = new IndirectLight(operator, scene, this.own, glowsOf(meshes, owns, scene), readOff);
+    const glows = glowsOf(meshes, owns, scene);
+    if (this.own.length + glows.length > limits.ownLamps)
+      throw new LambentError(
+        `has more than ${limits.ownLamps} lamps of its own, which this version does not draw; "lambent render" does`,
+      );
+    this.light = new IndirectLight(operator, scene, this.own, glows, readOff);
     this.uniforms = { prtLight: { value: picture.texture }, prtDirect: { value: 1 } };
     this.lights = new LampLights(this.bounds, this.uniforms.prtDirect);
     this.refusal = source.nodes ? onlyGlsl('direct-to-indirect light') : withoutNodes;
@@ -289,8 +294,8 @@ async function load(source: TransferSource): Promise<BakedTransfer> {
     { surface } = extension;
   if (!isDrawn(extension))
     throw new LambentError(
-      `holds direct-to-indirect light that is ${axesOf(extension)[1]}, at ${axesOf(extension)[2]}, which this version ` +
-        'does not draw; "lambent render" does',
+      `holds direct-to-indirect light that is ${axesOf(extension).slice(1).join(', at ')}, which this version does ` +
+        'not draw; "lambent render" does',
     );
   const owns = (await Promise.all(extension.parts.map((part) => source.ownMaterial(part)))) as OwnMaterial[];
   checkSolid(owns);

@@ -59,7 +59,7 @@ export class IndirectLight {
   private parts: LightParts = { bounced: true, soft: true };
   private lastChange = -Infinity;
 
-  /** `sharp`: of `own`, those that are drawn by pixels; what others send straight is read off surfels, as of `glows`. */
+  /** `sharp`: of `own`, those that pixels draw; what others send straight is read off surfels, as that of `glows`. */
   constructor(
     readonly operator: IndirectOperator,
     scene: SceneTriangles,

@@ -41,7 +41,8 @@ const vertexDeclarations = /* glsl */ `
   uniform highp sampler2D prtLight;
   vec3 prtLookUp( const in uint receiver ) {
     if ( receiver == 0xffffffffu ) return vec3( 0.0 );
-    return texelFetch( prtLight, ivec2( int( receiver ) % ${pictureColumns}, int( receiver ) / ${pictureColumns} ), 0 ).rgb;
+    int r = int( receiver );
+    return texelFetch( prtLight, ivec2( r % ${pictureColumns}, r / ${pictureColumns} ), 0 ).rgb;
   }
 #endif
 `;

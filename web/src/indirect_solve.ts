@@ -91,7 +91,7 @@ export class IndirectSolve {
     this.omega = [2, 2, 2];
   }
 
-  /** One bounce more, of direct light at leaves, [leaf][3]. Source: G. Golub and R. Varga, 1961 (relight/indirect.h). */
+  /** One bounce more, of direct light at leaves, [leaf][3]. Source: Golub and Varga 1961 (relight/indirect.h). */
   step(direct: Float32Array): void {
     const { next, radius, omega } = this;
     this.bounce(this.x, direct, next);

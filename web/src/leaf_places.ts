@@ -27,6 +27,7 @@ export type Places = Float64Array;
 export class LeafPlaces {
   readonly leaves: number;
   readonly spacing: number;
+  private readonly side: number; // of a cell; not so small that neighbours cannot be told apart
   private readonly heads: Int32Array;
   private readonly nexts: Int32Array;
   private readonly surfelDiagonal: number;
@@ -41,6 +42,7 @@ export class LeafPlaces {
   ) {
     const n = (this.leaves = surfels.areas.length);
     this.spacing = surfels.spacings.at(-1)!;
+    this.side = Math.max(this.spacing, surfels.positions.reduce((most, x) => Math.max(most, Math.abs(x)), 0) * 1e-9);
     let size = 64;
     while (size < 2 * n) size *= 2;
     this.heads = new Int32Array(size).fill(-1);
@@ -61,7 +63,8 @@ export class LeafPlaces {
   }
 
   private cell(x: number): number {
-    return Math.floor(x / this.spacing);
+    // Places far away have no surfel near them.
+    return Math.floor(Math.min(Math.max(x / this.side, -1e12), 1e12));
   }
   private headOf(x: number, y: number, z: number): number {
     return (Math.imul(x, 73856093) ^ Math.imul(y, 19349663) ^ Math.imul(z, 83492791)) & (this.heads.length - 1);

@@ -328,6 +328,22 @@ describe('a scene under lamps', () => {
     expect(() => scene.paint('none', [1, 1, 1])).toThrow(LambentError);
     expect(() => scene.scaleOwn('none', [1, 1, 1])).toThrow(LambentError);
   });
+  it('is lit where spacings are as small as a file can say', async () => {
+    const glb = golden('indirect.glb'),
+      text = glb.subarray(20, 20 + glb.readUInt32LE(12)).toString(),
+      tiny = text.replace(/"spacings":\[([^\]]*)\]/, (all, list: string) =>
+        `"spacings":[${list
+          .split(',')
+          .map(() => '1e-30')
+          .join(',')}]`.padEnd(all.length),
+      );
+    expect(tiny.length).toBe(text.length);
+    glb.write(tiny, 20);
+    const scene = await open(glb);
+    scene.movingLamps = [parseLamp('point@1,1.2,1=10')];
+    scene.settle();
+    expect(scene.times.count).toBeGreaterThan(0);
+  });
   it('is refused by name where it has what the page does not draw', async () => {
     await expect(open(golden('indirect_texels.glb'))).rejects.toThrow(/directional, at texels/);
   });

@@ -69,12 +69,16 @@ Result<void> check_for_browser(const Field& field, const Scene& scene, const std
                                    "`lambent render`",
                                    why)};
   };
+  const auto glows = [](const Material& m) { return largest(m.emissive) > 0; };
+  if (scene.lights.size() + size_t(std::count_if(scene.materials.begin(), scene.materials.end(), glows)) >
+      max_drawn_own_lamps)
+    return refuse("of more than 64 lamps of the scene's own");
   if (scene.origin != Vec3d(0)) return refuse("far from the origin");
   for (const Material& m : scene.materials) {
     // The page looks into no picture for what of it is solid after all.
     if (m.alpha_mode != AlphaMode::opaque || is_see_through(scene, m))
       return refuse("of surfaces that are seen through");
-    if (m.emissive_texture >= 0 && largest(m.emissive) > 0) return refuse("of lamps that glow by a picture");
+    if (m.emissive_texture >= 0 && glows(m)) return refuse("of lamps that glow by a picture");
   }
   return {};
 }

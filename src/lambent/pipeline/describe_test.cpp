@@ -86,7 +86,8 @@ TEST(Browser, DrawsWhatThePageSaysThatItDraws) {
   EXPECT_EQ(page, ours);
   EXPECT_EQ(page.size(), drawn_kinds().size());
   for (const auto& [name, value] : {std::pair("columns", max_drawn_columns), std::pair("lobes", max_drawn_lobes),
-                                    std::pair("texels", max_drawn_texels), std::pair("lamps", max_drawn_lamps)}) {
+                                    std::pair("texels", max_drawn_texels), std::pair("lamps", max_drawn_lamps),
+                                    std::pair("ownLamps", max_drawn_own_lamps)}) {
     std::smatch found;
     ASSERT_TRUE(std::regex_search(source, found, std::regex("limits = \\{[^}]*\\b" + std::string(name) + ": (\\d+)")))
         << name;
@@ -109,6 +110,9 @@ TEST(Browser, RefusesScenesThatLampsDoNotLightThere) {
   EXPECT_EQ(why(glows), "");
   glows.materials[0].emissive_texture = 0;
   EXPECT_NE(why(glows).find("glow by a picture"), std::string::npos);
+  Scene many = scene;
+  many.lights.resize(65);
+  EXPECT_NE(why(many).find("more than 64 lamps"), std::string::npos);
   far.origin = Vec3d(1e6, 0, 0);
   EXPECT_NE(why(far).find("far from the origin"), std::string::npos);
   glass.materials[0].transmission = 0.5f, glass.materials[0].metallic = 0;
