@@ -2,7 +2,8 @@
 # How direct to indirect light converges: a picture's error against the path tracer's as surfels grow, the reference's
 # noise taken off by two of them; and what the equation does not hold by, bounce by bounce as they are summed, beside
 # the iteration that is used. One JSON object a line; bench/plot_convergence.py draws them.
-#   SCENES="room cornell" SPP=256 SIZE=48x36 SURFELS="512 1024 2048 4096 8192 16384 32768" scripts/bench indirect-convergence
+#   SCENES="room cornell" SPP=256 SIZE=48x36 SURFELS="512 1024 2048 4096 8192 16384 32768" \
+#     scripts/bench indirect-convergence
 source "$(dirname "$0")/common.sh"
 out=out/convergence
 mkdir -p $out
