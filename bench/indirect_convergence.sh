@@ -2,12 +2,13 @@
 # How direct to indirect light converges: a picture's error against the path tracer's as surfels grow, the reference's
 # noise taken off by two of them; and what the equation does not hold by, bounce by bounce as they are summed, beside
 # the iteration that is used. One JSON object a line; bench/plot_convergence.py draws them.
-#   SPP=256 SIZE=48x36 SURFELS="512 1024 2048 4096 8192 16384 32768" scripts/bench indirect-convergence
+#   SCENES="room cornell" SPP=256 SIZE=48x36 SURFELS="512 1024 2048 4096 8192 16384 32768" \
+#     scripts/bench indirect-convergence
 source "$(dirname "$0")/common.sh"
 out=out/convergence
 mkdir -p $out
 size=${SIZE:-48x36} spp=${SPP:-256}
-for scene in room cornell; do
+for scene in ${SCENES:-room cornell}; do
   case $scene in
     room) file=$data/meshes/room.glb shot="--camera 4.5,3,4.5,0,1.5,0,70" at=0.5,3.5,0.7 flux=100 ;;
     cornell)

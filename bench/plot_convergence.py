@@ -70,7 +70,7 @@ for scene, color in colors.items():
 for i, (scene, color) in enumerate(colors.items()):
     text(left + 90 * i + 14, top + high + 62, scene, "start")
     out.append(f'<circle cx="{left + 90 * i + 4}" cy="{top + high + 58}" r="4" fill="{color}"/>')
-text(left, top + high + 82, "error of a picture over its mean; all surfels gather, dashed: a quarter", "start")
+text(left, top + high + 82, "error of a picture; all surfels gather, dashed: a quarter", "start")
 text(start, top + high + 62, "what the equation does not hold by, bounces summed;", "start")
 text(start, top + high + 82, "squares: the iteration that is used, where it ends", "start")
 out.append("</svg>")

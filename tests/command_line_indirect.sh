@@ -45,7 +45,15 @@ expect 2 'directional: of direct to indirect light is sh:2' bake corner.obj --tr
   -o x.glb
 expect 2 'frame-bounces: needs --frames' render indirect.glb $seen --lamp point@0,1,0=1 --frame-bounces 1 -o x.png
 expect 1 'directional, at texels, which the web page does not draw' export texels.glb --web site_indirect
-expect 2 'surfels: does not go with diffuse transfer' bake corner.obj --surfels 512 -o x.glb
+expect 2 'surfels: needs --receivers meshless' bake corner.obj --surfels 512 -o x.glb
+expect 0 'receivers' bake corner.obj --max-edge 0.2 --receivers meshless --surfels 256 --samples 64 -o meshless.glb
+expect 2 'receivers: direct to indirect light is over surfels' bake corner.obj --transfer indirect \
+  --receivers meshless -o x.glb
+expect 0 'receivers' bake corner.obj --receivers patches --projection least-squares --samples 64 -o least.glb
+expect 2 'denoise: takes receivers for points' bake corner.obj --projection least-squares --denoise on -o x.glb
+expect 2 'projection: does not go with direct to indirect light' bake corner.obj --transfer indirect \
+  --projection least-squares -o x.glb
+expect 0 '"bytes"' bake corner.obj --transfer indirect --surfels 256 --samples 64 --dry-run --json
 expect 2 'order: does not go with direct to indirect light' bake corner.obj --transfer indirect --order 3 -o x.glb
 expect 0 'paths a pixel' reference corner.obj --lamp point@0.4,0.6,0.5=3 --no-direct --spp 4 --size 16x16 \
   -o moved_truth.exr

@@ -410,6 +410,7 @@ TEST_F(Requests, MeshlessAndLeastSquaresAreRefusedByNameElsewhere) {
     EXPECT_EQ(request.error().where, std::string("--") + option);
   }
   EXPECT_EQ(refused(BakeKind::diffuse, {{"projection", "least-squares"}, {"receivers", "meshless"}}), "--projection");
+  EXPECT_EQ(refused(BakeKind::diffuse, {{"projection", "collocation"}, {"receivers", "meshless"}}), "taken");
   EXPECT_EQ(refused(BakeKind::lightmap, {{"projection", "least-squares"}, {"directional", "vector"}}), "--directional");
   EXPECT_EQ(refused(BakeKind::lightmap,
                     {{"projection", "least-squares"}, {"bounces", "converge:0.1"}, {"solver", "southwell"}}),

@@ -13,6 +13,8 @@
 namespace lambent {
 namespace {
 
+// A tent of which the surface has less has so little to tell its value by that noise would grow in it.
+constexpr double least_covered = 0.7;
 // Of an error, by solve_mass().
 constexpr float left_over = 3e-5f;
 
@@ -29,6 +31,13 @@ struct Piece {
 struct Pieces {
   std::vector<Piece> all;
   std::vector<size_t> first;
+  std::vector<double> whole;  // of tents alone: the integral of all of each one, on the surface and beyond it
+  double integral(size_t r) const {
+    double sum = 0;
+    for (size_t k = first[r]; k < first[r + 1]; ++k) sum += all[k].share;
+    return sum;
+  }
+  bool stays(size_t r) const { return !(integral(r) > (whole.empty() ? 0 : least_covered * whole[r])); }
 };
 
 void put_in_order(Pieces& p, size_t receivers) {
@@ -77,11 +86,14 @@ void collect(const Scene& scene, const CornerReceivers& basis, Pieces& pieces, s
 // Four points a texel and axis.
 void collect(const Scene& scene, const TexelReceivers& basis, Pieces& pieces, std::vector<Entry>& mass) {
   constexpr int fine = 4;
+  for (uint32_t r : basis.texels)
+    if (r != none) pieces.whole.resize(std::max(pieces.whole.size(), size_t(r) + 1), 0.0);
   each_side(scene, basis, [&](uint32_t t, bool back, const TexelTriangle& at, double area) {
     const Vec2d a(at.at[0]), ab = Vec2d(at.at[1]) - a, ac = Vec2d(at.at[2]) - a;
     const double twice = ab.x * ac.y - ab.y * ac.x;
     if (twice == 0) return;
     const double each = area / (0.5 * std::abs(twice)) / (fine * fine);
+    const auto is_seen = [&](uint32_t r) { pieces.whole[r] = std::max(pieces.whole[r], each * fine * fine); };
     const float scale = float(fine);
     each_texel({scale * at.at[0], scale * at.at[1], scale * at.at[2]}, 0, fine * basis.width, fine * basis.height,
                [&](int i, int j) {
@@ -93,7 +105,7 @@ void collect(const Scene& scene, const TexelReceivers& basis, Pieces& pieces, st
                  size_t count = 0;
                  basis.spread_at(p, [&](uint32_t r, float w) { met[count++] = {r, double(w)}; });
                  for (size_t k = 0; k < count; ++k) {
-                   pieces.all.push_back({met[k].first, t, back, 0, u, v, each * met[k].second});
+                   pieces.all.push_back({met[k].first, t, back, 0, u, v, each * met[k].second}), is_seen(met[k].first);
                    for (size_t l = 0; l < count; ++l)
                      mass.push_back({met[k].first, met[l].first, each * met[k].second * met[l].second});
                  }
@@ -104,7 +116,7 @@ void collect(const Scene& scene, const TexelReceivers& basis, Pieces& pieces, st
 // Kernels are fitted to points, and have no places but those.
 void collect(const Scene&, const PointReceivers&, Pieces&, std::vector<Entry>&) {}
 
-MassMatrix rows_of(std::vector<Entry>& entries, size_t receivers) {
+MassMatrix rows_of(std::vector<Entry>& entries, const Pieces& pieces, size_t receivers) {
   std::stable_sort(entries.begin(), entries.end(),
                    [](const Entry& a, const Entry& b) { return a.row != b.row ? a.row < b.row : a.column < b.column; });
   MassMatrix m;
@@ -118,9 +130,9 @@ MassMatrix rows_of(std::vector<Entry>& entries, size_t receivers) {
         m.columns.push_back(entries[e].column), values.push_back(0);
       values.back() += entries[e].value;
     }
+    if (pieces.stays(r)) m.columns.resize(begin), m.columns.push_back(r), values = {1};
     const double sum = std::accumulate(values.begin(), values.end(), 0.0);
-    if (!(sum > 0)) m.columns.resize(begin), m.columns.push_back(r), values = {1};
-    for (double v : values) m.weights.push_back(float(v / (sum > 0 ? sum : 1)));
+    for (double v : values) m.weights.push_back(float(v / sum));
     m.first.push_back(m.columns.size());
   }
   return m;
@@ -161,7 +173,7 @@ LeastSquares make_on(const Scene& scene, const Receivers& receivers, const Basis
     std::vector<Entry> mass;
     collect(scene, basis, pieces, mass);
     put_in_order(pieces, receivers.count());
-    out.mass = rows_of(mass, receivers.count());
+    out.mass = rows_of(mass, pieces, receivers.count());
     if (std::is_same_v<Basis, CornerReceivers>) out.mass.least = 0.5f, out.mass.most = 2;
     if (std::is_same_v<Basis, TexelReceivers>) out.mass.least = 0.25f, out.mass.most = 4;
   }
@@ -171,13 +183,14 @@ LeastSquares make_on(const Scene& scene, const Receivers& receivers, const Basis
   parallel_for(receivers.count(), 64, [&](size_t begin, size_t end) {
     for (size_t r = begin; r < end; ++r) {
       const std::span<const Piece> own(pieces.all.data() + pieces.first[r], pieces.first[r + 1] - pieces.first[r]);
-      double all = 0, below = 0;
-      for (const Piece& p : own) all += p.share;
+      double below = 0;
+      const double all = pieces.integral(r);
+      const bool stays = pieces.stays(r);
       Random random(seed, r);
       for (size_t k = 0, piece = 0; k < each; ++k) {
         const size_t at = r * each + k;
         out.places.origins[at] = receivers.origins[r], out.places.normals[at] = receivers.normals[r];
-        if (!(all > 0)) continue;
+        if (stays) continue;
         const double wanted = (double(k) + double(random.next())) / double(each) * all;
         while (piece + 1 < own.size() && below + own[piece].share <= wanted) below += own[piece++].share;
         const Vec2 square = sobol_owen(uint32_t(k), uint32_t(hash64(seed, r)));

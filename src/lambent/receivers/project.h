@@ -23,7 +23,7 @@ struct MassMatrix {
   std::vector<float> weights;
   // Eigenvalues of M over its diagonal, at least and at most. Sources: A. Wathen, "Realistic eigenvalue bounds for the
   // Galerkin mass matrix", 1987: [1/2, 2] for hats, [1/4, 9/4] for whole tents; at most 4 for tents that a chart's
-  // border cuts, four of which meet at a point.
+  // border cuts a little, four of which meet at a point.
   float least = 1, most = 1;
   bool is_diagonal() const { return columns.size() + 1 == first.size(); }
 };
@@ -33,13 +33,13 @@ struct LeastSquares {
   MassMatrix mass;
 };
 
-// Of hats and boxes exact; of tents by 16 points a texel; of kernels about points none. A receiver whose function no
-// point finds, as of a texel that hardly reaches the surface, stays where it is, and has a row of its own alone.
+// Of hats and boxes exact; of tents by 16 points a texel; of kernels about points none. A tent that the surface has
+// less than 0.7 of, at a chart's border, stays where it is, by collocation, and has a row of its own alone.
 LeastSquares make_least_squares(const Scene& scene, const Receivers& receivers, size_t places, uint32_t seed);
 
 // Solves N x = b for all columns, in place; x is [row][stride], of which `width` are solved for. By as many steps of
-// Chebyshev's iteration (Golub and Varga 1961) as leave 3e-5 of it: 11 for hats, 22 for tents. What surfaces hardly
-// tell of, as of a tent at a chart's border, stays near b. All cores; sums in a fixed order.
+// Chebyshev's iteration (Golub and Varga 1961) as leave 3e-5 of it: 11 for hats, 22 for tents. All cores; sums in a
+// fixed order.
 void solve_mass(const MassMatrix& mass, float* x, size_t stride, size_t width);
 
 }  // namespace lambent

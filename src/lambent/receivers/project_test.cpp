@@ -69,15 +69,21 @@ TEST(Projection, MassMatricesAreTheirQuadrature) {
       double sum = 0;
       for (size_t e = m.first[i]; e < m.first[i + 1]; ++e) sum += double(m.weights[e]);
       EXPECT_NEAR(sum, 1, 1e-6);
-      if (by_cells.of_one[i] < 1e-3) continue;  // of a texel that hardly reaches the surface
+      // A texel that has not most of its tent on the surface stays where it is.
+      const bool partial = !exact && by_cells.of_one[i] < 0.72 / (7.7 * 7.7);
+      if (partial) {
+        EXPECT_TRUE(by_cells.of_one[i] > 0.68 / (7.7 * 7.7) || m.first[i + 1] == m.first[i] + 1);
+        continue;
+      }
       for (size_t e = m.first[i]; e < m.first[i + 1]; ++e)
         EXPECT_NEAR(double(m.weights[e]), by_cells.products.at({i, m.columns[e]}) / by_cells.of_one[i],
                     exact ? 2e-4 : 0.03);
     }
     // Symmetric, times the functions' integrals.
     for (const auto& [pair, product] : by_cells.products)
-      EXPECT_NEAR(weight_of(m, pair.first, pair.second) * by_cells.of_one[pair.first], product,
-                  (exact ? 5e-4 : 0.04) * by_cells.of_one[pair.first] + 1e-6);
+      if (exact || by_cells.of_one[pair.first] > 0.72 / (7.7 * 7.7))
+        EXPECT_NEAR(weight_of(m, pair.first, pair.second) * by_cells.of_one[pair.first], product,
+                    (exact ? 5e-4 : 0.04) * by_cells.of_one[pair.first] + 1e-6);
   }
 }
 
@@ -150,7 +156,8 @@ TEST(Projection, PlacesAreAsDenseAsFunctionsAreHigh) {
     const SpreadPlaces places = make_least_squares(scene, r, 256, 5).places;
     ASSERT_EQ(places.origins.size(), 256 * r.count());
     for (size_t i = 0; i < r.count(); ++i) {
-      if (by_cells.of_one[i] < 1e-3) continue;
+      const bool texel = std::holds_alternative<TexelReceivers>(r.basis);
+      if (texel && by_cells.of_one[i] < 0.72 / (7.7 * 7.7)) continue;
       double mean = 0;
       for (size_t k = 0; k < 256; ++k) {
         mean += linear(places.origins[256 * i + k]) / 256;
