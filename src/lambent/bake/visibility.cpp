@@ -1,4 +1,5 @@
 // Follows: locally-adaptive-products, section 4.2.
+#include <lambent/bake/open_sky.h>
 #include <lambent/bake/visibility.h>
 #include <lambent/core/check.h>
 #include <lambent/core/checkpoint.h>
@@ -19,33 +20,74 @@ struct Scratch {
   std::vector<uint8_t> levels;
   std::vector<size_t> texels;  // above the horizon
   AlignedVector<float> x, y, z, seen;
+  TileMask open;
+};
+
+// Texels a side of a tile: whole tiles a block, and no more a face than a mask holds.
+int tile_side(int size) {
+  int side = 1;
+  while (size / side > most_tiles) side *= 2;
+  return side;
+}
+
+struct RayCount {
+  size_t all = 0, certain = 0;
 };
 
 struct VisibilityTracer {
   const Tracer& tracer;
   const VisibilityOptions& options;
   Cube cube = make_cube(options.size);
+  int tile = tile_side(options.size);
+  OpenSky sky = OpenSky(options.scene ? *options.scene : Scene{}, options.size / tile);
 
   float top() const { return float((1 << options.bits) - 1); }
+  bool is_open(const Scratch& s, int face, int column, int row) const {
+    return s.open[size_t(face)][size_t(row / tile)] >> (column / tile) & 1;
+  }
 
-  // Levels at the centres, rounded; returns rays.
-  size_t trace_centres(Vec3 origin, Vec3 n, Scratch& s) const {
-    s.levels.assign(cube.count(), 0), s.texels.clear(), s.x.clear(), s.y.clear(), s.z.clear();
+  // Levels at the centres, rounded. Tile by tile, block by block: rays that follow one another point alike.
+  RayCount trace_centres(Vec3 origin, Vec3 n, Scratch& s) const {
+    s.levels.assign(cube.count(), 0), s.texels.resize(cube.count());
+    s.x.resize(cube.count()), s.y.resize(cube.count()), s.z.resize(cube.count());
     const DirectionArray& d = cube.texels;
-    for (size_t t = 0; t < cube.count(); ++t)
-      if (n.x * d.x[t] + n.y * d.y[t] + n.z * d.z[t] > 0)
-        s.texels.push_back(t), s.x.push_back(d.x[t]), s.y.push_back(d.y[t]), s.z.push_back(d.z[t]);
-    s.seen.resize(s.texels.size());
-    tracer.visible_fan(origin, {s.x.data(), s.y.data(), s.z.data(), s.texels.size()}, s.seen.data());
-    for (size_t i = 0; i < s.texels.size(); ++i) s.levels[s.texels[i]] = uint8_t(s.seen[i] * top() + 0.5f);
-    return s.texels.size();
+    const TileMask above = sky.above(n);
+    s.open = options.scene ? above : TileMask{};
+    sky.close(origin, n, s.open);
+    RayCount rays;
+    size_t count = 0;
+    const auto clear = uint8_t(top());
+    const int side = tile, each = block_side / side, blocks = options.size / block_side;
+    for (int face = 0; face < 6; ++face)
+      for (int k = 0; k < each * each * blocks * blocks; ++k) {
+        const int block = k / (each * each), within = k % (each * each), column = block % blocks * each + within % each,
+                  row = block / blocks * each + within / each;
+        if (!(above[size_t(face)][size_t(row)] >> column & 1)) continue;
+        const bool open = s.open[size_t(face)][size_t(row)] >> column & 1;
+        for (int j = 0; j < side; ++j) {
+          const size_t first = cube_texel(options.size, face, column * side, row * side + j);
+          for (size_t t = first; t < first + size_t(side); ++t) {
+            const bool seen = n.x * d.x[t] + n.y * d.y[t] + n.z * d.z[t] > 0;
+            if (open) {
+              s.levels[t] = seen ? clear : uint8_t(0), rays.certain += seen;
+            } else {
+              s.texels[count] = t, s.x[count] = d.x[t], s.y[count] = d.y[t], s.z[count] = d.z[t], count += seen;
+            }
+          }
+        }
+      }
+    s.seen.resize(cube.count());
+    tracer.visible_fan(origin, {s.x.data(), s.y.data(), s.z.data(), count}, s.seen.data());
+    for (size_t i = 0; i < count; ++i) s.levels[s.texels[i]] = uint8_t(s.seen[i] * top() + 0.5f);
+    rays.all = rays.certain + count;
+    return rays;
   }
 
   // Shares in place of those at the centres.
-  size_t refine(Vec3 origin, Vec3 n, Scratch& s) const {
+  RayCount refine(Vec3 origin, Vec3 n, Scratch& s) const {
     const int size = cube.size;
     const std::vector<uint8_t> centres = s.levels;
-    size_t rays = 0;
+    RayCount rays;
     for (int face = 0; face < 6; ++face)
       for (int row = 0; row < size; ++row)
         for (int column = 0; column < size; ++column) {
@@ -63,12 +105,12 @@ struct VisibilityTracer {
             const Vec3 d = normalize(cube_point(face, 2 * u / float(size) - 1, 2 * v / float(size) - 1));
             if (dot(n, d) > 0) s.x.push_back(d.x), s.y.push_back(d.y), s.z.push_back(d.z);
           }
-          s.seen.resize(s.x.size());
-          tracer.visible_fan(origin, {s.x.data(), s.y.data(), s.z.data(), s.x.size()}, s.seen.data());
+          s.seen.assign(s.x.size(), 1.0f), rays.all += s.x.size();
+          if (is_open(s, face, column, row)) rays.certain += s.x.size();
+          else tracer.visible_fan(origin, {s.x.data(), s.y.data(), s.z.data(), s.x.size()}, s.seen.data());
           float sum = 0;
           for (float seen : s.seen) sum += seen;
           s.levels[texel] = uint8_t(sum / float(fine * fine) * top() + 0.5f);
-          rays += s.x.size();
         }
     return rays;
   }
@@ -120,7 +162,7 @@ Result<Visibility> bake_visibility(const Tracer& tracer, const Receivers& receiv
   Pool<Scratch> pool([] { return std::make_unique<Scratch>(); });
   std::vector<std::vector<uint8_t>> pieces((receivers.count() + piece_receivers - 1) / piece_receivers);
   std::vector<uint32_t> lengths(receivers.count());
-  std::atomic<size_t> rays{0};
+  std::atomic<size_t> rays{0}, certain{0};
   {
     const Shares shares(receivers.count(), piece_receivers);
     ProgressStage stage(progress, "tracing", shares.own());
@@ -130,28 +172,30 @@ Result<Visibility> bake_visibility(const Tracer& tracer, const Receivers& receiv
       const auto s = pool.borrow();
       std::vector<uint8_t>& out = pieces[begin / piece_receivers];
       const std::span<uint32_t> own_lengths(lengths.data() + begin, end - begin);
-      size_t traced = 0;
+      size_t traced = 0, untraced = 0;
       const bool loaded = kept.load(begin / piece_receivers, out, own_lengths, traced);
       for (size_t r = begin; r < end && !loaded && !stage.cancelled(); ++r) {
-        traced += work.trace_centres(receivers.origins[r], receivers.normals[r], *s);
-        if (options.bits > 1) traced += work.refine(receivers.origins[r], receivers.normals[r], *s);
+        auto count = [&](RayCount c) { traced += c.all, untraced += c.certain; };
+        count(work.trace_centres(receivers.origins[r], receivers.normals[r], *s));
+        if (options.bits > 1) count(work.refine(receivers.origins[r], receivers.normals[r], *s));
         const size_t before = out.size();
         encode_visibility(options.size, options.bits, s->levels, out);
         lengths[r] = uint32_t(out.size() - before);
       }
       out.shrink_to_fit();
       if (!loaded) kept.save(begin / piece_receivers, out, own_lengths, traced);
-      rays += traced;
+      rays += traced, certain += untraced;
       stage.advance(end - begin);
     });
     if (!none_cancelled(progress)) return Error{"", "cancelled"};
-    rays = shares.ranks().sum(rays);
+    rays = shares.ranks().sum(rays), certain = shares.ranks().sum(certain);
     shares.gather(lengths.data());
     gather_pieces(shares, pieces, lengths);
   }
   Visibility v = make_visibility(options.size, options.bits, std::move(pieces), lengths);
   if (report)
-    *report = {rays, v.bytes(), std::chrono::duration<double>(std::chrono::steady_clock::now() - start).count()};
+    *report = {rays, certain, v.bytes(),
+               std::chrono::duration<double>(std::chrono::steady_clock::now() - start).count()};
   return v;
 }
 

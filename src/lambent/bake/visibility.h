@@ -16,11 +16,14 @@ struct VisibilityOptions {
   // their share, grey, rounded to a level.
   int bits = 1;
   size_t memory = size_t{4} << 30;  // bytes that the result may take, by an estimate made before it starts
+  // The tracer's scene: with it, rays in directions where it certainly has nothing are not traced; the result is the
+  // same. Null: all are.
+  const Scene* scene = nullptr;
 };
 
 // What it says of itself.
 struct VisibilityReport {
-  size_t rays = 0, bytes = 0;
+  size_t rays = 0, certain = 0, bytes = 0;  // certain: of the rays, those that were not traced
   double seconds = 0;
 };
 

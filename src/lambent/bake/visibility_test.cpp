@@ -1,4 +1,5 @@
 #include <lambent/bake/visibility.h>
+#include <lambent/core/random.h>
 #include <lambent/scene/procedural.h>
 
 #include <gtest/gtest.h>
@@ -76,6 +77,37 @@ TEST(BakeVisibility, SharesAreMeansOfAFinerMap) {
   }
   EXPECT_GT(parts, 500u);
   EXPECT_LT(difference / double(count), 1e-3);
+}
+
+// Rays that are certain are not traced, and nothing is lost: on a floor, under a table, within a bowl, among small
+// things.
+TEST(BakeVisibility, IsTheSameWhereCertainRaysAreNotTraced) {
+  Scene clutter;
+  const uint32_t m = add_material(clutter, "grey", Vec3(0.5f));
+  add_quad(clutter, m, "floor", Vec3(-2, 0, 2), Vec3(4, 0, 0), Vec3(0, 0, -4), 9, 9);
+  add_quad(clutter, m, "roof", Vec3(-1, 1.1f, 1), Vec3(1.3f, 0.2f, 0), Vec3(0, 0.1f, -2), 2, 2);
+  Random random(5);
+  for (int i = 0; i < 30; ++i) {
+    const Vec3 at(random.next() * 3 - 1.5f, random.next() * 0.8f, random.next() * 3 - 1.5f);
+    const float size = 0.01f + 0.3f * random.next() * random.next();
+    add_box(clutter, m, "box", at, at + Vec3(size, 0.7f * size, 2 * size), 1 + i % 2);
+  }
+  Scene bowl = make_sphere(1, 3, Vec3(1));
+  std::erase_if(bowl.triangles, [&](const Triangle& t) { return bowl.positions[t.v[0]].y > 0.2f; });
+  for (Scene* scene : {&clutter, &bowl}) {
+    const Receivers receivers = make_vertex_receivers(*scene);
+    const Tracer tracer = *Tracer::build(*scene);
+    for (const auto& [size, bits] : {std::pair{64, 1}, {48, 1}, {32, 4}}) {
+      VisibilityReport all, some;
+      const Visibility truth = *bake_visibility(tracer, receivers, {.size = size, .bits = bits}, &all);
+      const Visibility v = *bake_visibility(tracer, receivers, {.size = size, .bits = bits, .scene = scene}, &some);
+      EXPECT_TRUE(std::ranges::equal(v.data, truth.data)) << size << " " << bits;
+      EXPECT_EQ(v.begin, truth.begin);
+      EXPECT_EQ(some.rays, all.rays);
+      EXPECT_EQ(all.certain, 0u);
+      EXPECT_GT(double(some.certain), 0.2 * double(some.rays));
+    }
+  }
 }
 
 TEST(BakeVisibility, SaysThatItIsTooLarge) {

@@ -35,8 +35,8 @@ void PlaceCorners(int size, size_t padded, CornerRow& c) {
     const V along = hn::IfThenElse(on_x, x, hn::IfThenElse(on_y, y, z));
     const auto ahead = hn::Gt(along, zero);
     // cube_point() the other way round: u and v by face.
-    const V u = hn::IfThenElse(on_x, hn::IfThenElse(ahead, hn::Neg(z), z),
-                               hn::IfThenElse(hn::Or(on_y, ahead), x, hn::Neg(x)));
+    const V u =
+        hn::IfThenElse(on_x, hn::IfThenElse(ahead, hn::Neg(z), z), hn::IfThenElse(hn::Or(on_y, ahead), x, hn::Neg(x)));
     const V v = hn::IfThenElse(on_y, hn::IfThenElse(ahead, z, hn::Neg(z)), hn::Neg(y));
     const V pu = hn::Mul(hn::Add(hn::Div(u, most), one), half), pv = hn::Mul(hn::Add(hn::Div(v, most), one), half);
     const V face = hn::Add(hn::IfThenElse(on_x, zero, hn::IfThenElse(on_y, Fill(2.0f), Fill(4.0f))),
@@ -78,8 +78,10 @@ HWY_INLINE void CutQuads(const V (&x)[4], const V (&y)[4], Moments (&part)[4]) {
     const V t1 = hn::Min(tx, ty), t2 = hn::Max(tx, ty);
     const V x1 = hn::MulAdd(t1, dx, x[i]), y1 = hn::MulAdd(t1, dy, y[i]), x2 = hn::MulAdd(t2, dx, x[i]),
             y2 = hn::MulAdd(t2, dy, y[i]);
-    const V at_x[4] = {x[i], hn::IfThenElse(hn::Lt(t1, one), x1, x[j]), hn::IfThenElse(hn::Lt(t2, one), x2, x[j]), x[j]};
-    const V at_y[4] = {y[i], hn::IfThenElse(hn::Lt(t1, one), y1, y[j]), hn::IfThenElse(hn::Lt(t2, one), y2, y[j]), y[j]};
+    const V at_x[4] = {x[i], hn::IfThenElse(hn::Lt(t1, one), x1, x[j]), hn::IfThenElse(hn::Lt(t2, one), x2, x[j]),
+                       x[j]};
+    const V at_y[4] = {y[i], hn::IfThenElse(hn::Lt(t1, one), y1, y[j]), hn::IfThenElse(hn::Lt(t2, one), y2, y[j]),
+                       y[j]};
     AddSide(all, x[i], y[i], x[j], y[j]);
     for (size_t k = 0; k < 3; ++k) {
       const V xa = at_x[k], ya = at_y[k], xb = at_x[k + 1], yb = at_y[k + 1];
@@ -98,7 +100,8 @@ struct Cut {
 
 HWY_INLINE VI CubeTexel(int size, VI face, VI column, VI row) {
   const VI side = FillI(size / block_side), low = FillI(block_side - 1);
-  const VI block = hn::Add(hn::Mul(hn::Add(hn::Mul(face, side), hn::ShiftRight<4>(row)), side), hn::ShiftRight<4>(column));
+  const VI block =
+      hn::Add(hn::Mul(hn::Add(hn::Mul(face, side), hn::ShiftRight<4>(row)), side), hn::ShiftRight<4>(column));
   return hn::Add(hn::ShiftLeft<8>(block), hn::Add(hn::ShiftLeft<4>(hn::And(row, low)), hn::And(column, low)));
 }
 
@@ -144,7 +147,10 @@ void CutLanes(int size, const CornerRow& above, const CornerRow& below, size_t i
     const V a = hn::Mul(pu, inverse), b = hn::Mul(pv, inverse), na = hn::Neg(a), nb = hn::Neg(b), nc = hn::Neg(inverse);
     const V x = hn::IfThenElse(is(0), inverse, hn::IfThenElse(is(1), nc, hn::IfThenElse(is(5), na, a)));
     const V y = hn::IfThenElse(is(2), inverse, hn::IfThenElse(is(3), nc, nb));
-    const V z = hn::IfThenElse(is(0), na, hn::IfThenElse(is(1), a, hn::IfThenElse(is(2), b, hn::IfThenElse(is(3), nb, hn::IfThenElse(is(4), inverse, nc)))));
+    const V z = hn::IfThenElse(
+        is(0), na,
+        hn::IfThenElse(is(1), a,
+                       hn::IfThenElse(is(2), b, hn::IfThenElse(is(3), nb, hn::IfThenElse(is(4), inverse, nc)))));
     hn::Store(x, d, out.x[k]), hn::Store(y, d, out.y[k]), hn::Store(z, d, out.z[k]);
     const VI column = hn::Sub(c1, FillI(k % 2 ? 0 : 1)), row = hn::Sub(r1, FillI(k < 2 ? 1 : 0));
     hn::Store(CubeTexel(size, face, column, row), di, out.texel[k]);

@@ -15,8 +15,8 @@ struct CubeSum {
 
 // Corners of the map's texels along a parallel; with room for 16 more, copies of the last.
 struct CornerRow {
-  AlignedVector<float> x, y, z;        // direction
-  AlignedVector<float> u, v;           // on its face, in texels
+  AlignedVector<float> x, y, z;  // direction
+  AlignedVector<float> u, v;     // on its face, in texels
   AlignedVector<int32_t> face, column, row;
   void resize(size_t n) {
     for (AlignedVector<float>* a : {&x, &y, &z, &u, &v}) a->resize(n);

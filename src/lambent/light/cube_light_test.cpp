@@ -97,8 +97,9 @@ TEST(CubeLight, IsThatOfTexelsCutOneByOne) {
         }
       const double texel = 2.0 / size;
       for (size_t t = 0; t < energy.size(); ++t) {
-        // A texel a hair across a border counts for less than a thousandth of what it has. Where one lies within a texel of
-        // the cube, its middle is that of its area, and not the mean of its corners, which at the poles are three.
+        // A texel a hair across a border counts for less than a thousandth of what it has. Where one lies within a
+        // texel of the cube, its middle is that of its area, and not the mean of its corners, which at the poles are
+        // three.
         for (int c = 0; c < 3; ++c) EXPECT_NEAR(light.energy[t][c] / energy[t][c], 1, 1e-3);
         EXPECT_LT(length(Vec3d(light.direction[t]) - normalize(moment[t])), 0.03 * texel);
       }

@@ -174,7 +174,7 @@ Result<void> make_membrane(Bake& b) {
 
 Result<void> bake_over_cube(Bake& b) {
   const bool wavelets = b.plan.kind == BakeKind::wavelets;
-  auto seen = bake_visibility_of_plan(b.plan, b.tracer, b.receivers(), b.job, b.report, b.summary);
+  auto seen = bake_visibility_of_plan(b.plan, b.scene, b.tracer, b.receivers(), b.job, b.report, b.summary);
   if (!seen) return seen.error();
   if (!wavelets) return b.store = std::move(*seen), b.rows = SightRows{}, Result<void>();
   auto transfer = fit_haar_of_plan(b.plan, *seen, b.receivers(), b.job, b.summary, b.told);

@@ -6,18 +6,24 @@
 
 namespace lambent {
 
-Result<Visibility> bake_visibility_of_plan(const BakePlan& plan, const Tracer& tracer, const Receivers& receivers,
-                                           const Job& job, BakeReport& report, Summary& summary) {
+Result<Visibility> bake_visibility_of_plan(const BakePlan& plan, const Scene& scene, const Tracer& tracer,
+                                           const Receivers& receivers, const Job& job, BakeReport& report,
+                                           Summary& summary) {
   VisibilityReport seen;
-  auto visibility = bake_visibility(tracer, receivers, plan.visibility, &seen, job.progress);
+  VisibilityOptions options = plan.visibility;
+  options.scene = &scene;
+  auto visibility = bake_visibility(tracer, receivers, options, &seen, job.progress);
   if (!visibility) return visibility;
   if (tracer.lets_pass() && visibility->bits == 1)
     job.warn("binary visibility holds what lets light pass as seen or not (--visibility bits:N holds shares)");
   if (tracer.colours()) job.warn("visibility has no colour: coloured glass is kept grey");
   report.receivers = receivers.count(), report.rays = seen.rays, report.trace_seconds = seen.seconds;
   const VisibilityStatistics s = visibility_statistics(*visibility);
-  summary.json.update(
-      {{"blocked", s.blocked}, {"clear", s.clear}, {"mixed", s.mixed}, {"changes_per_mixed_block", s.changes}});
+  summary.json.update({{"blocked", s.blocked},
+                       {"clear", s.clear},
+                       {"mixed", s.mixed},
+                       {"changes_per_mixed_block", s.changes},
+                       {"certain_rays", seen.certain}});
   summary.lines.emplace_back(
       "blocks", fmt::format("{:.1f} % blocked, {:.1f} % clear, {:.1f} % mixed with {:.1f} changes each; cube {}, {} "
                             "bit{}",

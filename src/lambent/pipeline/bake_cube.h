@@ -7,8 +7,9 @@ namespace lambent {
 
 // What the receivers see; what it says of itself goes to the report and the summary. Warns of glass that it cannot
 // hold. Errors: those of bake_visibility().
-Result<Visibility> bake_visibility_of_plan(const BakePlan& plan, const Tracer& tracer, const Receivers& receivers,
-                                           const Job& job, BakeReport& report, Summary& summary);
+Result<Visibility> bake_visibility_of_plan(const BakePlan& plan, const Scene& scene, const Tracer& tracer,
+                                           const Receivers& receivers, const Job& job, BakeReport& report,
+                                           Summary& summary);
 
 // That times the cosine, in wavelets. Errors: cancelled.
 Result<HaarTransfer> fit_haar_of_plan(const BakePlan& plan, const Visibility& seen, const Receivers& receivers,

@@ -14,6 +14,7 @@ constexpr double worth_a_part = 0.8;  // of all receivers
 constexpr int coarse_sky = 256;       // texels around, of light that turns
 constexpr double a_piece = 0.1;       // seconds of shading at a time, of a picture that is at rest
 constexpr int rows_a_piece = 8;       // at least
+constexpr int hurried_samples = 16;   // of BRDFs in a block, while something moves
 
 LiveLight live_light(const Environment& env, const DrawRequest& request, const LightBasis& basis) {
   LiveLight out{env, nullptr};
@@ -196,9 +197,12 @@ Result<void> LivePicture::State::shade_blocks_seen(bool hurry, double budget) {
   for (size_t i = 0; i < all.size(); ++i)
     if (i % parts == turn || !has_value[all[i]]) part.push_back(all[i]), has_value[all[i]] = 1;
   draft_values = true, times.shaded = part.size();
-  auto ok = s.relighter.relight(
-      {.eye = view.camera.eye, .keep = true, .seen = std::span<const uint32_t>(part), .breakdown = &s.breakdown},
-      s.relit);
+  auto ok = s.relighter.relight({.eye = view.camera.eye,
+                                 .keep = true,
+                                 .most_samples = hurried_samples,
+                                 .seen = std::span<const uint32_t>(part),
+                                 .breakdown = &s.breakdown},
+                                s.relit);
   if (!part.empty()) receiver_cost = 0.5 * (receiver_cost + seconds_from(start) / double(part.size()));
   return ok;
 }

@@ -29,6 +29,8 @@ Result<Summary> summary_of(const BlockShading& s, const LoopRequest& request, in
   const double frames = double(std::max(done, 1));
   const double each = s.seen ? 1e9 * s.shade_seconds / double(s.seen) : 0.0;
   const size_t receivers = receivers_of(s.baked->surface.store);
+  const VisibilityStatistics stored = visibility_statistics(std::get<Visibility>(s.baked->surface.store));
+  const double bytes = double(std::get<Visibility>(s.baked->surface.store).bytes());
   Summary out;
   out.json = {{"frames", done},
               {"seconds", seconds},
@@ -36,6 +38,8 @@ Result<Summary> summary_of(const BlockShading& s, const LoopRequest& request, in
               {"receivers", receivers},
               {"seen", double(s.seen) / frames},
               {"ns_per_vertex", each},
+              {"changes_per_block", stored.changes * stored.mixed},
+              {"bytes", bytes},
               {"ms",
                {{"project", 1e3 * s.project_seconds / frames},
                 {"forms", 1e3 * s.forms_seconds / frames},
@@ -49,7 +53,28 @@ Result<Summary> summary_of(const BlockShading& s, const LoopRequest& request, in
                          fmt::format("project {:.2f}, forms {:.2f}, cull {:.2f}, shade {:.2f} ({:.0f} ns a receiver)",
                                      1e3 * s.project_seconds / frames, 1e3 * s.forms_seconds / frames,
                                      1e3 * s.cull_seconds / frames, 1e3 * s.shade_seconds / frames, each));
-  if (request.draw.method == "blocks") out.lines.emplace_back("blocks", describe(s.breakdown).dump());
+  // As the paper's Table 3; and its Tables 1 and 2.
+  out.lines.emplace_back(
+      "table", fmt::format("{:>8} {:>10} {:>10} {:>8} {:>9}", "FPS", "vertices", "seen", "changes", "database"));
+  out.lines.emplace_back("",
+                         fmt::format("{:>8.1f} {:>10} {:>10} {:>8.1f} {:>9}", frames / seconds, human_count(receivers),
+                                     human_count(size_t(double(s.seen) / frames)), stored.changes, human_bytes(bytes)));
+  if (request.draw.method != "blocks") return out;
+  const Breakdown& b = s.breakdown;
+  const double all = double(std::max<size_t>(1, b.light_brdf + b.light_visibility + b.triple)) / 100;
+  const auto& n = b.samples;
+  const double samples = double(std::max<size_t>(1, n[0] + n[1] + n[2] + n[3])) / 100;
+  out.lines.emplace_back(
+      "blocks", fmt::format("{:.1f} % light x BRDF, {:.1f} % light x visibility, {:.1f} % all three",
+                            double(b.light_brdf) / all, double(b.light_visibility) / all, double(b.triple) / all));
+  out.lines.emplace_back("samples",
+                         fmt::format("1: {:.1f} %, 4: {:.1f} %, 16: {:.1f} %, 256: {:.1f} %", double(n[0]) / samples,
+                                     double(n[1]) / samples, double(n[2]) / samples, double(n[3]) / samples));
+  if (const StageTimes& t = b.times; t.receivers > 0) {
+    const double of = double(t.receivers);
+    out.lines.emplace_back("ns a receiver", fmt::format("visibility {:.0f}, BRDF {:.0f}, integral {:.0f}",
+                                                        t.visibility / of, t.brdf / of, t.integral / of));
+  }
   return out;
 }
 

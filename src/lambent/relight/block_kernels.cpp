@@ -9,46 +9,13 @@
 #define HWY_TARGET_INCLUDE "lambent/relight/block_kernels.cpp"
 #include <hwy/foreach_target.h>
 #include <hwy/highway.h>
+#include <lambent/relight/block_rows-inl.h>
 #include <lambent/relight/product_lobes-inl.h>
 
 HWY_BEFORE_NAMESPACE();
 namespace lambent {
 namespace {
 namespace HWY_NAMESPACE {
-
-constexpr size_t lanes = hn::MaxLanes(F());
-// A row of sums: one vector where there are 16 lanes, of which the last four are 0.
-using R = hn::CappedTag<float, lanes == 16 ? 16 : 4>;
-constexpr size_t row_lanes = hn::MaxLanes(R()), row_parts = (12 + row_lanes - 1) / row_lanes;
-
-struct Row {
-  hn::Vec<R> v[row_parts];
-};
-HWY_INLINE Row ZeroRow() {
-  Row r;
-  for (auto& v : r.v) v = hn::Zero(R());
-  return r;
-}
-HWY_INLINE Row LoadRow(const float* p) {
-  Row r;
-  for (size_t i = 0; i < row_parts; ++i) r.v[i] = hn::LoadU(R(), p + i * row_lanes);
-  return r;
-}
-HWY_INLINE void AddRow(Row& to, const Row& a) {
-  for (size_t i = 0; i < row_parts; ++i) to.v[i] = hn::Add(to.v[i], a.v[i]);
-}
-HWY_INLINE void AddDifference(Row& to, const float* a, const float* b) {
-  for (size_t i = 0; i < row_parts; ++i)
-    to.v[i] = hn::Add(to.v[i], hn::Sub(hn::LoadU(R(), a + i * row_lanes), hn::LoadU(R(), b + i * row_lanes)));
-}
-HWY_INLINE void AddTimes(Row& to, float scale, const Row& a) {
-  for (size_t i = 0; i < row_parts; ++i) to.v[i] = hn::MulAdd(hn::Set(R(), scale), a.v[i], to.v[i]);
-}
-HWY_INLINE Vec3 Contract(const Row& row, Vec3 n) {
-  alignas(64) float m[row_parts * row_lanes];
-  for (size_t i = 0; i < row_parts; ++i) hn::Store(row.v[i], R(), m + i * row_lanes);
-  return n.x * Vec3(m[0], m[1], m[2]) + n.y * Vec3(m[4], m[5], m[6]) + n.z * Vec3(m[8], m[9], m[10]);
-}
 
 // The low bit of each pair, of 32 pairs.
 HWY_INLINE uint32_t EvenBits(uint64_t x) {
@@ -58,8 +25,8 @@ HWY_INLINE uint32_t EvenBits(uint64_t x) {
   return uint32_t(x | x >> 16);
 }
 
-// Which blocks are seen, and of mixed ones that no lobe reaches the rows of the sums that are begins and ends of what is
-// seen, so that summing them is one loop.
+// Which blocks are seen, and of mixed ones that no lobe reaches the rows of the sums that are begins and ends of what
+// is seen, so that summing them is one loop.
 template <bool binary>
 void ReadSight(BlockScratch& s, const Visibility& visibility, size_t receiver, bool want_rows) {
   using U = hn::CappedTag<uint32_t, 16>;
@@ -88,17 +55,14 @@ void ReadSight(BlockScratch& s, const Visibility& visibility, size_t receiver, b
       if (!want_rows) continue;
       const auto base = (uint32_t(w) * 32 + bit) * uint32_t(block_texels);
       uint32_t* to = s.rows.data() + s.row_count;
-      // By whole lanes, 32 at least, past the end of the block's, but not past the end of all.
+      // By whole lanes, past the end of the block's, but not past the end of all.
       int i = 0;
-      if (last - c.where >= block_texels + 32) {
-        do
-          for (const int end = i + 32; i < end; i += int(hn::Lanes(du)))
-            hn::StoreU(hn::Add(hn::PromoteTo(du, hn::LoadU(B(), c.where + i)), hn::Set(du, base)), du, to + i);
-        while (i < count);
-      }
+      if (last - c.where >= count + int(hn::Lanes(du)))
+        for (; i < count; i += int(hn::Lanes(du)))
+          hn::StoreU(hn::Add(hn::PromoteTo(du, hn::LoadU(B(), c.where + i)), hn::Set(du, base)), du, to + i);
       for (; i < count; ++i) to[i] = base + c.where[i];
       if constexpr (binary) {
-        to[count] = uint32_t(blocks) * uint32_t(block_texels), count += count & 1;  // a row of nothing
+        if (count % 2) to[count++] = uint32_t(blocks) * uint32_t(block_texels);  // a row of nothing
       } else {
         for (int k = 0, before = 0; k < count; ++k) {
           s.steps[s.row_count + size_t(k)] = float(int(c.level[k]) - before) * scale, before = c.level[k];
@@ -112,23 +76,19 @@ void ReadSight(BlockScratch& s, const Visibility& visibility, size_t receiver, b
 // Light of the runs that ReadSight() found, and of clear blocks.
 template <bool binary>
 Row SumSeen(const BlockScratch& s, const BlockLight& light, size_t words) {
-  Row even = ZeroRow(), odd = even, third = even, fourth = even;
+  Row even = ZeroRow(), odd = even;
   const float* sums = light.sums.data();
   const uint32_t* at = s.rows.data();
-  auto row = [&](size_t i) { return sums + sum_width * at[i]; };
   size_t i = 0;
   if constexpr (binary) {
-    for (; i + 8 <= s.row_count; i += 8) {
-      AddDifference(even, row(i), row(i + 1)), AddDifference(odd, row(i + 2), row(i + 3));
-      AddDifference(third, row(i + 4), row(i + 5)), AddDifference(fourth, row(i + 6), row(i + 7));
+    for (; i + 4 <= s.row_count; i += 4) {
+      AddDifference(even, sums + sum_width * at[i], sums + sum_width * at[i + 1]);
+      AddDifference(odd, sums + sum_width * at[i + 2], sums + sum_width * at[i + 3]);
     }
-    for (; i < s.row_count; i += 2) AddDifference(even, row(i), row(i + 1));
+    if (i < s.row_count) AddDifference(even, sums + sum_width * at[i], sums + sum_width * at[i + 1]);
   } else {
-    for (; i + 2 <= s.row_count; i += 2)
-      AddTimes(even, s.steps[i], LoadRow(row(i))), AddTimes(odd, s.steps[i + 1], LoadRow(row(i + 1)));
-    if (i < s.row_count) AddTimes(even, s.steps[i], LoadRow(row(i)));
+    for (; i < s.row_count; ++i) AddTimes(i % 2 ? odd : even, s.steps[i], LoadRow(sums + sum_width * at[i]));
   }
-  AddRow(even, third), AddRow(odd, fourth);
   for (size_t w = 0; w < words; ++w) {
     const float* whole = light.whole.data() + w * 32 * sum_width;
     uint32_t bits = s.clear[w];
@@ -254,8 +214,8 @@ HWY_INLINE void AtBlockNodes(const Lobe& lobe, const Cube& cube, int samples, si
 // How many samples a lobe of which values alone are known wants of a block (1: one, 3: 16, 4: 256), from those at 16
 // nodes and at its middle: one where they are alike, 16 where those give the middle's value back.
 template <int count>
-int ClassByValues(const Terms& t, const ProductMaterial& m, const BlockLight& light, const float* nodes, const float* middle,
-                  size_t stride) {
+int ClassByValues(const Terms& t, const ProductMaterial& m, const BlockLight& light, const float* nodes,
+                  const float* middle, size_t stride) {
   const F d;
   V least = Fill(INFINITY), most = hn::Zero(d), back = hn::Zero(d);
   for (size_t i = 0; i < 16; i += lanes) {
@@ -338,7 +298,7 @@ HWY_INLINE int ClassOf(const Lobe& lobe, BlockScratch& s, const BlockLight& ligh
   if (!std::is_same_v<Lobe, PhongLobe> && !clear && samples < 4) {
     // Nodes below the horizon say nothing about the block's part above it.
     const float height = dot(n, cube.nodes[0].at(b));
-    if (height <= 0 || (height < light.rise[b] && samples > 1)) return 4;
+    if (height <= 0 || (height < light.rise[b] && samples > 1)) return s.most_class;
   }
   if (m.by_values && samples < 4) {
     const DirectionArray& nodes = cube.nodes[2];
@@ -347,6 +307,7 @@ HWY_INLINE int ClassOf(const Lobe& lobe, BlockScratch& s, const BlockLight& ligh
     if (!std::is_same_v<Lobe, PhongLobe> && !clear && samples > 1 && dot(n, cube.nodes[0].at(b)) < light.rise[b])
       samples = 4;
   }
+  if (samples > s.most_class) samples = s.most_class, known &= samples == 3;
   return samples;
 }
 

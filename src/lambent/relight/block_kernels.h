@@ -9,12 +9,13 @@ namespace lambent {
 struct BlockScratch {
   // Of the blocks that are seen, 32 a word: those that are clear, and those that are seen in part.
   AlignedVector<uint32_t> clear, mixed, lit;
-  std::vector<BlockChanges> changes;   // of mixed blocks in which the lobe has samples, in order
-  AlignedVector<uint32_t> rows;        // of the sums: begins and ends of runs, in turn, of all other mixed blocks
-  AlignedVector<float> steps;          // what of each is counted, where blocks are seen by shares
+  std::vector<BlockChanges> changes;  // of mixed blocks in which the lobe has samples, in order
+  AlignedVector<uint32_t> rows;       // of the sums: begins and ends of runs, in turn, of all other mixed blocks
+  AlignedVector<float> steps;         // what of each is counted, where blocks are seen by shares
   size_t row_count = 0;
-  AlignedVector<float> cosines;        // of blocks' middles to the mirror image of the view
-  AlignedVector<float> middles;        // lobes there
+  int most_class = 4;            // 1 to 4: 1, 4, 16 or 256 samples a block at most
+  AlignedVector<float> cosines;  // of blocks' middles to the mirror image of the view
+  AlignedVector<float> middles;  // lobes there
   alignas(64) float weights[block_texels], nodes[3 * 16], along[3 * 4 * 16];
 };
 

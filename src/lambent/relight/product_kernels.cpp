@@ -113,8 +113,7 @@ Terms make_terms(const Brdf& brdf, const Mat3& frame, Vec3 wo_world) {
     const float f90 = std::lerp(b->dielectric_f90, 1.0f, b->metallic);
     t.lambert = diffuse * (1 - f90);
     t.colour[0] = f0, t.colour[1] = Vec3(f90), t.colour[2] = diffuse * (Vec3(f90) - f0);
-    t.alpha = widths(Vec2(b->roughness * b->roughness)),
-    t.kind = Terms::Kind::ggx, t.count = 3;
+    t.alpha = widths(Vec2(b->roughness * b->roughness)), t.kind = Terms::Kind::ggx, t.count = 3;
   } else if (const auto* b = std::get_if<CookTorrance>(&brdf)) {
     t.lambert = b->diffuse / pi, t.alpha = widths(Vec2(b->m)), t.kind = Terms::Kind::cook_torrance;
     for (int c = 0; c < 3; ++c) {
@@ -122,7 +121,8 @@ Terms make_terms(const Brdf& brdf, const Mat3& frame, Vec3 wo_world) {
       t.index[c] = root > 0.9999f ? 0 : (1 + root) / (1 - root);
     }
     if (t.index == Vec3(t.index.x)) t.count = 1, t.colour[0] = b->specular;
-    else for (t.count = 0; t.count < 3; ++t.count) t.colour[t.count][t.count] = b->specular[t.count];
+    else
+      for (t.count = 0; t.count < 3; ++t.count) t.colour[t.count][t.count] = b->specular[t.count];
   } else if (const auto* b = std::get_if<Measured>(&brdf)) {
     // A number a channel.
     for (int k = 0; k < 3; ++k) t.colour[k][k] = 1;

@@ -27,7 +27,7 @@ HWY_INLINE V Along(Vec3 a, V x, V y, V z) {
   return hn::MulAdd(Fill(a.x), x, hn::MulAdd(Fill(a.y), y, hn::Mul(Fill(a.z), z)));
 }
 
-// 2^x for x in [-126, 0].
+// 2^x for x in [-90, 0].
 HWY_INLINE V Exp2(V x) {
   const hn::RebindToSigned<F> di;
   const V whole = hn::Round(x), r = hn::Sub(x, whole);
@@ -36,35 +36,40 @@ HWY_INLINE V Exp2(V x) {
     p = hn::MulAdd(p, r, Fill(c));
   return hn::BitCast(F(), hn::Add(hn::BitCast(di, p), hn::ShiftLeft<23>(hn::ConvertTo(di, whole))));
 }
-HWY_INLINE V ExpOfNegative(V x) {
-  return Exp2(hn::Max(hn::Mul(x, Fill(std::numbers::log2e_v<float>)), Fill(-126.0f)));
-}
-
-// x^n for x in [0, 1]: whole n by squares.
-HWY_INLINE V Power(V x, float n) {
-  const F d;
-  if (n == float(int(n))) {
-    V result = Fill(1.0f), square = x;
-    for (int bits = int(n); bits; bits >>= 1) {
-      if (bits & 1) result = hn::Mul(result, square);
-      square = hn::Mul(square, square);
-    }
-    return result;
-  }
-  const V least = Fill(1e-30f), log = hn::Log(d, hn::Max(x, least));
-  return hn::IfThenZeroElse(hn::Le(x, least), ExpOfNegative(hn::Mul(Fill(n), log)));
-}
+HWY_INLINE V ExpOfNegative(V x) { return Exp2(hn::Max(hn::Mul(x, Fill(std::numbers::log2e_v<float>)), Fill(-90.0f))); }
 
 // Each lobe gives s_k(wi), `count` of them, for unit wi of the world. Above the horizon alone, but for Phong's, which
-// visibility ends there.
+// visibility ends there. What does not depend on wi is made once.
 struct PhongLobe {
   static constexpr int count = 1;
   const Terms& t;
+  float exponent, scale, least;  // of the cosine: its power is 2^-90 there, and smaller numbers are slow
+  int whole;                     // the exponent, where it is, to be taken by squares
+  explicit PhongLobe(const Terms& terms)
+      : t(terms),
+        exponent(t.exponent),
+        scale((t.exponent + 2) / (2 * pi)),
+        least(std::exp2(-90 / std::max(t.exponent, 1.0f))),
+        whole(t.exponent == float(int(t.exponent)) ? int(t.exponent) : -1) {}
   HWY_INLINE void operator()(V x, V y, V z, V* s) const {
-    const V c = hn::Min(hn::Max(Along(t.mirror, x, y, z), hn::Zero(F())), Fill(1.0f));
-    s[0] = hn::Mul(Fill((t.exponent + 2) / (2 * pi)), Power(c, t.exponent));
+    V square = hn::Min(hn::Max(Along(t.mirror, x, y, z), Fill(least)), Fill(1.0f)), power = Fill(1.0f);
+    if (whole < 0) power = ExpOfNegative(hn::Mul(Fill(exponent), hn::Log(F(), square)));
+    for (int bits = whole; bits > 0;) {
+      if (bits & 1) power = hn::Mul(power, square);
+      if (bits >>= 1) square = hn::Mul(square, square);
+    }
+    s[0] = hn::Mul(Fill(scale), power);
   }
 };
+
+HWY_INLINE V AlongPlus(Vec3 a, float plus, V x, V y, V z) {
+  return hn::MulAdd(Fill(a.x), x, hn::MulAdd(Fill(a.y), y, hn::MulAdd(Fill(a.z), z, Fill(plus))));
+}
+// To all digits but the last.
+HWY_INLINE V Reciprocal(V x) {
+  const V r = hn::ApproximateReciprocal(x);
+  return hn::Mul(r, hn::NegMulAdd(x, r, Fill(2.0f)));
+}
 
 // wi in the frame, and wi + wo there.
 struct Halfway {
@@ -81,17 +86,29 @@ struct Halfway {
         above(hn::Gt(wz, Fill(least_cosine))) {}
 };
 
+// All that is wanted of wi + wo are its slopes and its length: these straight from wi.
 struct WardLobe {
   static constexpr int count = 1;
   const Terms& t;
+  Vec3 along, across, up, twice;
+  float plus_x, plus_y, plus_z, scale;
+  explicit WardLobe(const Terms& terms)
+      : t(terms),
+        along(t.frame[0] / t.alpha.x),
+        across(t.frame[1] / t.alpha.y),
+        up(t.frame[2]),
+        twice(2 * (t.frame * t.wo)),
+        plus_x(t.wo.x / t.alpha.x),
+        plus_y(t.wo.y / t.alpha.y),
+        plus_z(t.wo.z),
+        scale(1 / (pi * t.alpha.x * t.alpha.y)) {}
   HWY_INLINE void operator()(V x, V y, V z, V* s) const {
-    const Halfway h(t, x, y, z);
-    const V ax = hn::Mul(h.hx, Fill(1 / t.alpha.x)), ay = hn::Mul(h.hy, Fill(1 / t.alpha.y));
-    const V inverse = hn::Div(Fill(1.0f), hn::Mul(h.hz, h.hz));
-    const V slopes = hn::Mul(hn::MulAdd(ax, ax, hn::Mul(ay, ay)), inverse);
-    const V bell = ExpOfNegative(hn::Neg(slopes));
-    const V scale = hn::Mul(hn::Mul(h.square, Fill(1 / (pi * t.alpha.x * t.alpha.y))), hn::Mul(inverse, inverse));
-    s[0] = hn::IfThenElseZero(h.above, hn::Mul(bell, scale));
+    const V hx = AlongPlus(along, plus_x, x, y, z), hy = AlongPlus(across, plus_y, x, y, z),
+            hz = hn::Max(AlongPlus(up, plus_z, x, y, z), Fill(1e-6f)), square = AlongPlus(twice, 2, x, y, z);
+    const V inverse = Reciprocal(hn::Mul(hz, hz));
+    const V bell = ExpOfNegative(hn::Neg(hn::Mul(hn::MulAdd(hx, hx, hn::Mul(hy, hy)), inverse)));
+    const V over = hn::Mul(hn::Mul(square, Fill(scale)), hn::Mul(inverse, inverse));
+    s[0] = hn::IfThenElseZero(hn::Gt(hz, Fill(plus_z + least_cosine)), hn::Mul(bell, over));
   }
 };
 
@@ -100,20 +117,24 @@ template <bool layered>
 struct GgxLobe {
   static constexpr int count = layered ? 3 : 2;
   const Terms& t;
+  float narrow_x, narrow_y, scale, root_o;
+  explicit GgxLobe(const Terms& terms)
+      : t(terms),
+        narrow_x(1 / t.alpha.x),
+        narrow_y(1 / t.alpha.y),
+        scale(1 / (4 * pi * t.alpha.x * t.alpha.y)),
+        root_o(0.5f * length(Vec3(t.alpha.x * t.wo.x, t.alpha.y * t.wo.y, t.wo.z))) {}
   HWY_INLINE V HalfRoot(V x, V y, V z) const {
     const V sx = hn::Mul(x, Fill(t.alpha.x)), sy = hn::Mul(y, Fill(t.alpha.y));
     return hn::Mul(Fill(0.5f), hn::Sqrt(hn::MulAdd(sx, sx, hn::MulAdd(sy, sy, hn::Mul(z, z)))));
   }
   HWY_INLINE void operator()(V x, V y, V z, V* s) const {
     const Halfway h(t, x, y, z);
-    const V one = Fill(1.0f), ax = hn::Mul(h.hx, Fill(1 / t.alpha.x)), ay = hn::Mul(h.hy, Fill(1 / t.alpha.y));
+    const V one = Fill(1.0f), ax = hn::Mul(h.hx, Fill(narrow_x)), ay = hn::Mul(h.hy, Fill(narrow_y));
     const V slopes = hn::MulAdd(ax, ax, hn::MulAdd(ay, ay, hn::Mul(h.hz, h.hz)));  // times the squared length
-    const V root_i = HalfRoot(h.wx, h.wy, h.wz), root_o = HalfRoot(Fill(t.wo.x), Fill(t.wo.y), Fill(t.wo.z));
-    const V masking = hn::MulAdd(Fill(t.wo.z), root_i, hn::Mul(h.wz, root_o));
+    const V masking = hn::MulAdd(Fill(t.wo.z), HalfRoot(h.wx, h.wy, h.wz), hn::Mul(h.wz, Fill(root_o)));
     const V share = hn::Div(h.square, slopes);
-    const V lobe = hn::IfThenElseZero(h.above, hn::Div(hn::Mul(Fill(1 / (4 * pi * t.alpha.x * t.alpha.y)),
-                                                               hn::Mul(share, share)),
-                                                       masking));
+    const V lobe = hn::IfThenElseZero(h.above, hn::Div(hn::Mul(Fill(scale), hn::Mul(share, share)), masking));
     const V q = hn::Max(hn::NegMulAdd(Fill(0.5f), hn::Sqrt(h.square), one), hn::Zero(F())), q2 = hn::Mul(q, q);
     const V schlick = hn::Mul(hn::Mul(q2, q2), q);
     s[0] = hn::Mul(lobe, hn::Sub(one, schlick)), s[1] = hn::Mul(lobe, schlick);
@@ -126,6 +147,9 @@ template <int channels>
 struct CookTorranceLobe {
   static constexpr int count = channels;
   const Terms& t;
+  float narrow, scale;
+  explicit CookTorranceLobe(const Terms& terms)
+      : t(terms), narrow(1 / (t.alpha.x * t.alpha.x)), scale(4 * pi * t.alpha.x * t.alpha.x * t.wo.z) {}
   HWY_INLINE V Fresnel(float index, V c) const {
     if (!(index > 0)) return Fill(1.0f);  // that of an f0 of 1
     const V one = Fill(1.0f), g = hn::Sqrt(hn::MulAdd(c, c, Fill(index * index - 1)));
@@ -137,14 +161,13 @@ struct CookTorranceLobe {
     const Halfway h(t, x, y, z);
     const V one = Fill(1.0f), length = hn::Sqrt(h.square), cosine = hn::Mul(Fill(0.5f), length);
     const V hz = hn::Div(h.hz, length), inverse = hn::Div(one, hn::Mul(h.hz, h.hz));
-    const V slopes = hn::Mul(hn::MulAdd(h.hx, h.hx, hn::Mul(h.hy, h.hy)), hn::Mul(inverse, Fill(1 / (t.alpha.x * t.alpha.x))));
+    const V slopes = hn::Mul(hn::MulAdd(h.hx, h.hx, hn::Mul(h.hy, h.hy)), hn::Mul(inverse, Fill(narrow)));
     const V bell = ExpOfNegative(hn::Neg(slopes));
     const V wz = hn::Max(h.wz, Fill(least_cosine));
     const V masking = hn::Min(one, hn::Div(hn::Mul(hn::Add(hz, hz), hn::Min(wz, Fill(t.wo.z))), cosine));
     const V hz2 = hn::Mul(hz, hz);
     const V lobe = hn::IfThenElseZero(
-        h.above, hn::Div(hn::Mul(bell, masking), hn::Mul(hn::Mul(Fill(4 * pi * t.alpha.x * t.alpha.x * t.wo.z), wz),
-                                                         hn::Mul(hz2, hz2))));
+        h.above, hn::Div(hn::Mul(bell, masking), hn::Mul(hn::Mul(Fill(scale), wz), hn::Mul(hz2, hz2))));
     for (int k = 0; k < channels; ++k) s[k] = hn::Mul(lobe, Fresnel(t.index[k], cosine));
   }
 };
@@ -169,8 +192,8 @@ struct MeasuredLobe {
   static HWY_INLINE Tap TapOf(V fraction, int cells, bool periodic) {
     const I di;
     const V at = hn::MulAdd(fraction, Fill(float(cells)), Fill(-0.5f)), whole = hn::Floor(at);
-    const VI i = hn::ConvertTo(di, whole), j = hn::Add(i, hn::Set(di, 1)), zero = hn::Zero(di), all = hn::Set(di, cells),
-             last = hn::Set(di, cells - 1);
+    const VI i = hn::ConvertTo(di, whole), j = hn::Add(i, hn::Set(di, 1)), zero = hn::Zero(di),
+             all = hn::Set(di, cells), last = hn::Set(di, cells - 1);
     const V share = hn::Sub(at, whole);
     if (periodic)
       return {hn::IfThenElse(hn::Lt(i, zero), hn::Add(i, all), i), hn::IfThenElse(hn::Gt(j, last), hn::Sub(j, all), j),
@@ -204,10 +227,11 @@ struct MeasuredLobe {
     for (int corner = 0; corner < 8; ++corner) {
       const VI ih = corner & 4 ? th.second : th.first, id = corner & 2 ? td.second : td.first,
                ip = corner & 1 ? tp.second : tp.first;
-      const V w = hn::Mul(hn::Mul(corner & 4 ? th.share : hn::Sub(one, th.share),
-                                  corner & 2 ? td.share : hn::Sub(one, td.share)),
-                          corner & 1 ? tp.share : hn::Sub(one, tp.share));
-      const VI cell = hn::Add(hn::Mul(hn::Add(hn::Mul(ih, hn::Set(di, table.theta_d)), id), hn::Set(di, table.phi_d)), ip);
+      const V w = hn::Mul(
+          hn::Mul(corner & 4 ? th.share : hn::Sub(one, th.share), corner & 2 ? td.share : hn::Sub(one, td.share)),
+          corner & 1 ? tp.share : hn::Sub(one, tp.share));
+      const VI cell =
+          hn::Add(hn::Mul(hn::Add(hn::Mul(ih, hn::Set(di, table.theta_d)), id), hn::Set(di, table.phi_d)), ip);
       const VI at = hn::Mul(cell, hn::Set(di, 3));
       for (int k = 0; k < 3; ++k) s[k] = hn::MulAdd(w, hn::GatherIndex(d, values + k, at), s[k]);
     }
@@ -219,12 +243,12 @@ struct MeasuredLobe {
 template <class Use>
 HWY_INLINE void WithLobe(const Terms& t, Use use) {
   using K = Terms::Kind;
-  if (t.kind == K::phong) use(PhongLobe{t});
-  else if (t.kind == K::ward) use(WardLobe{t});
-  else if (t.kind == K::ggx && t.count == 3) use(GgxLobe<true>{t});
-  else if (t.kind == K::ggx) use(GgxLobe<false>{t});
-  else if (t.kind == K::cook_torrance && t.count == 3) use(CookTorranceLobe<3>{t});
-  else if (t.kind == K::cook_torrance) use(CookTorranceLobe<1>{t});
+  if (t.kind == K::phong) use(PhongLobe(t));
+  else if (t.kind == K::ward) use(WardLobe(t));
+  else if (t.kind == K::ggx && t.count == 3) use(GgxLobe<true>(t));
+  else if (t.kind == K::ggx) use(GgxLobe<false>(t));
+  else if (t.kind == K::cook_torrance && t.count == 3) use(CookTorranceLobe<3>(t));
+  else if (t.kind == K::cook_torrance) use(CookTorranceLobe<1>(t));
   else if (t.kind == K::measured) use(MeasuredLobe{t});
 }
 

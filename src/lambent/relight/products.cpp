@@ -204,6 +204,7 @@ void Breakdown::add(const Breakdown& b) {
   for (size_t k = 0; k < 4; ++k) samples[k] += b.samples[k];
   times.visibility += b.times.visibility, times.brdf += b.times.brdf, times.integral += b.times.integral,
       times.receivers += b.times.receivers;
+  largest_off = std::max(largest_off, b.largest_off), squares_off += b.squares_off, squares += b.squares;
 }
 
 Vec3 shade_blocks(const BlockLight& light, const Visibility& visibility, size_t receiver,
@@ -296,23 +297,72 @@ Vec3 multiply_haar(const HaarLight& light, const HaarScratch& s, size_t* visited
 struct ProductScratch::Pools {
   Pool<Scratch> products{[] { return std::make_unique<Scratch>(); }};
   Pool<HaarScratch> haar{[] { return std::make_unique<HaarScratch>(); }};
+  // What of the last output may not be 0, and where that is; null: nobody knows.
+  std::vector<uint32_t> lit;
+  const float* output = nullptr;
 };
+
+namespace {
+
+// All that is not in `seen` to 0, or to what it was.
+void clear_output(ProductScratch::Pools& pools, std::span<const uint32_t> seen, size_t receivers, bool keep,
+                  Relit& out) {
+  const size_t values = (receivers + transfer_block - 1) / transfer_block * 3 * transfer_block;
+  const bool known = out.values.size() == values && out.values.data() == pools.output;
+  if (out.values.size() != values || (!keep && !known)) {
+    out.values.assign(values, 0.0f);
+  } else if (!keep) {
+    for (uint32_t r : pools.lit) out.set(r, 0, Vec3(0));
+  } else if (!known || pools.lit.size() + seen.size() > 2 * receivers) {
+    pools.output = nullptr;  // there is more than a list of it
+    return;
+  }
+  if (!keep || !known) pools.lit.clear();
+  pools.lit.reserve(2 * receivers);  // once: later frames allocate nothing
+  pools.lit.insert(pools.lit.end(), seen.begin(), seen.end());
+  pools.output = out.values.data();
+}
+
+// A receiver's blocks; of one in 64 what its stages take, and what fewer samples make of it.
+Vec3 shade_one(BlockScratch& s, const BlockLight& light, const Visibility& visibility, size_t r,
+               const ProductMaterial& material, const Terms& terms, int most_class, bool look, Breakdown& tally) {
+  s.most_class = most_class;
+  Breakdown other;
+  StageTimes times;
+  const Vec3 value = shade_blocks_in_simd(s, light, visibility, r, material, terms, tally, look ? &times : nullptr);
+  if (!look) return value;
+  constexpr double interrupted = 2e5;  // another process had the core
+  if (times.visibility + times.brdf + times.integral < interrupted) {
+    tally.times.visibility += times.visibility, tally.times.brdf += times.brdf, tally.times.integral += times.integral;
+    ++tally.times.receivers;
+  }
+  if (most_class < 4) {
+    s.most_class = 4;
+    const Vec3 whole = shade_blocks_in_simd(s, light, visibility, r, material, terms, other);
+    const double off = double(largest(abs(value - whole)));
+    tally.largest_off = std::max(tally.largest_off, off), tally.squares_off += off * off;
+    tally.squares += double(largest(whole)) * double(largest(whole));
+  }
+  return value;
+}
+
+}  // namespace
 ProductScratch::ProductScratch() : pools_(std::make_unique<Pools>()) {}
 ProductScratch::ProductScratch(ProductScratch&&) noexcept = default;
 ProductScratch::~ProductScratch() = default;
 
 void shade_receivers(Product product, const BlockLight& light, const HaarLight* haar, const Visibility& visibility,
                      const ProductReceivers& receivers, std::span<const uint32_t> seen, Vec3 eye, Relit& out,
-                     Breakdown* breakdown, ProductScratch* scratch, bool keep) {
+                     Breakdown* breakdown, ProductScratch* scratch, bool keep, int most_samples) {
   LAMBENT_CHECK(light.cube && light.cube->size == visibility.size && (product != Product::haar || haar) &&
                 receivers.positions.size() == visibility.receivers);
   out.rows = 1;
-  const size_t values = (visibility.receivers + transfer_block - 1) / transfer_block * 3 * transfer_block;
-  if (!keep || out.values.size() != values) out.values.assign(values, 0.0f);
   std::mutex mutex;
   std::optional<ProductScratch> own;
   if (!scratch) scratch = &own.emplace();
   ProductScratch::Pools& pools = scratch->pools();
+  clear_output(pools, seen, visibility.receivers, keep, out);
+  const int most_class = most_samples >= 256 ? 4 : most_samples >= 16 ? 3 : most_samples >= 4 ? 2 : 1;
   parallel_for(seen.size(), 64, [&](size_t begin, size_t end) {
     const auto s = pools.products.borrow();
     Breakdown tally;
@@ -323,8 +373,8 @@ void shade_receivers(Product product, const BlockLight& light, const HaarLight* 
       const Vec3 wo = normalize_or(eye - receivers.positions[r], frame[2]);
       Vec3 value(0);
       if (product == Product::blocks) {
-        value = shade_blocks_in_simd(s->blocks, light, visibility, r, material, make_terms(material.brdf, frame, wo),
-                                     tally, breakdown && i % 64 == 0 ? &tally.times : nullptr);
+        value = shade_one(s->blocks, light, visibility, r, material, make_terms(material.brdf, frame, wo), most_class,
+                          breakdown && i % 64 == 0, tally);
       } else if (product == Product::standard) {
         value = shade_standard_with(*s, light, visibility, r, material, frame, wo);
       } else {

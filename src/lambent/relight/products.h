@@ -62,11 +62,14 @@ struct StageTimes {
   size_t receivers = 0;
 };
 
-// Blocks by what was done with them (Table 1) and by BRDF samples (Table 2); of one receiver in 64 what its stages took.
+// Blocks by what was done with them (Table 1) and by BRDF samples (Table 2). Of one receiver in 64: what its stages
+// took; and where samples are limited, how far that is from none being so, and how bright it is then.
 struct Breakdown {
   size_t blocked = 0, light_brdf = 0, light_visibility = 0, triple = 0;
   std::array<size_t, 4> samples{0, 0, 0, 0};  // 1, 4, 16, 256
   StageTimes times = {};
+  double largest_off = 0, squares_off = 0, squares = 0;  // of radiance, the largest channel
+  double error() const { return squares > 0 ? std::sqrt(squares_off / squares) : 0; }
   void add(const Breakdown& b);
 };
 
@@ -126,9 +129,12 @@ class ProductScratch {
 };
 
 // Exit radiance of the receivers in `seen` towards the eye, row 0 of `out`; others are 0 or, where `keep`, what they
-// were (0 at first). All cores. Sizes `out` and `scratch` on first use and allocates nothing after that.
+// were (0 at first). All cores. Sizes `out` and `scratch` on first use and allocates nothing after that. With `scratch`
+// only those that it shaded in the last frames are set to 0 again, as long as `out` stays where it is. `most_samples`:
+// of a block, 1, 4, 16 or 256; blocks only.
 void shade_receivers(Product product, const BlockLight& light, const HaarLight* haar, const Visibility& visibility,
                      const ProductReceivers& receivers, std::span<const uint32_t> seen, Vec3 eye, Relit& out,
-                     Breakdown* breakdown = nullptr, ProductScratch* scratch = nullptr, bool keep = false);
+                     Breakdown* breakdown = nullptr, ProductScratch* scratch = nullptr, bool keep = false,
+                     int most_samples = 256);
 
 }  // namespace lambent

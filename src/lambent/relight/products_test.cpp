@@ -1,7 +1,7 @@
 #include <lambent/brdf/measured.h>
 #include <lambent/core/random.h>
 #include <lambent/core/sampling.h>
-#include <lambent/relight/products.h>
+#include <lambent/relight/product_kernels.h>
 
 #include <gtest/gtest.h>
 
@@ -120,6 +120,106 @@ TEST(Products, BlocksSampledFullyAreTheStandardBasis) {
         }
       }
     }
+}
+
+// Each lobe in SIMD lanes against evaluate() of brdf.h, direction by direction. The rounding of a cosine counts a
+// thousand times in its power of 1,000.
+TEST(Products, LobesInSimdAreTheirModels) {
+  Random random(19);
+  DirectionArray d;
+  for (int i = 0; i < 1024; ++i) d.push(square_to_sphere(random.next2()));
+  std::vector<Brdf> all(std::begin(models), std::end(models));
+  all.push_back(CookTorrance{Vec3(0.1f), Vec3(0.8f), Vec3(0.6f), 0.1f});
+  all.push_back(CookTorrance{Vec3(0), Vec3(0.8f), Vec3(1, 0.2f, 0), 0.5f});
+  all.push_back(Phong{Vec3(0), Vec3(1), 33.3f});
+  for (const Brdf& brdf : all)
+    for (int view = 0; view < 20; ++view) {
+      const Point p = random_point(random);
+      const Terms t = make_terms(brdf, p.frame, p.wo);
+      std::vector<float> values(3 * d.x.size(), 0.0f);
+      evaluate_terms(t, d.x.data(), d.y.data(), d.z.data(), d.x.size(), values.data(), d.x.size());
+      for (size_t i = 0; i < d.x.size(); ++i) {
+        const Vec3 w = d.at(i), wi(dot(p.frame[0], w), dot(p.frame[1], w), dot(p.frame[2], w));
+        if (wi.z < 1e-3f) continue;
+        Vec3 f = t.lambert;
+        for (int k = 0; k < t.count; ++k) f += t.colour[k] * values[size_t(k) * d.x.size() + i];
+        const Vec3 truth = evaluate(brdf, wi, t.wo);
+        EXPECT_LT(length(f - truth), 1e-6f + 5e-4f * length(truth)) << "model " << brdf.index() << " at " << wi.z;
+      }
+    }
+}
+
+// Fewer samples than are needed cost what is said of them, and none is lost where there are enough.
+TEST(Products, LimitedSamplesSayWhatTheyCost) {
+  const Setting s = make_setting(64, 1, 640, 20);
+  ProductReceivers receivers;
+  for (const Point& p : s.points)
+    receivers.frames.push_back(p.frame), receivers.positions.push_back(Vec3(1, 0, 0) - p.wo);
+  receivers.material_of.assign(s.points.size(), 0);
+  std::vector<uint32_t> all(s.points.size());
+  for (size_t i = 0; i < all.size(); ++i) all[i] = uint32_t(i);
+  for (const Brdf& brdf : {models[0], models[2], models[4]}) {
+    receivers.materials = {make_product_material(brdf, *s.light.cube, {})};
+    auto shade = [&](int samples, Breakdown& tally) {
+      Relit out;
+      shade_receivers(Product::blocks, s.light, nullptr, s.visibility, receivers, all, Vec3(1, 0, 0), out, &tally,
+                      nullptr, false, samples);
+      return out;
+    };
+    Breakdown whole, few;
+    const Relit truth = shade(256, whole), coarse = shade(16, few);
+    EXPECT_EQ(whole.error(), 0);
+    EXPECT_EQ(few.samples[3], 0u);
+    double largest_off = 0, looked_at = 0;
+    for (size_t r = 0; r < all.size(); ++r) {
+      const double off = double(largest(abs(coarse.at(r) - truth.at(r))));
+      largest_off = std::max(largest_off, off);
+      if (r % 64 == 0) looked_at = std::max(looked_at, off);
+    }
+    EXPECT_NEAR(few.largest_off, looked_at, 1e-6 * (1 + looked_at));
+    EXPECT_LE(few.largest_off, largest_off + 1e-6);
+    if (brdf.index() == 0) EXPECT_EQ(largest_off, 0);
+    else EXPECT_GT(few.error(), 0);
+  }
+}
+
+// Receivers that are not seen any more are 0 again, in memory that is not cleared, unless they are to be kept.
+TEST(Products, WhatIsNotSeenIsNothing) {
+  const Setting s = make_setting(32, 1, 40, 21);
+  ProductReceivers receivers;
+  for (const Point& p : s.points)
+    receivers.frames.push_back(p.frame), receivers.positions.push_back(Vec3(1, 0, 0) - p.wo);
+  receivers.material_of.assign(s.points.size(), 0);
+  receivers.materials = {make_product_material(models[0], *s.light.cube, {})};
+  ProductScratch scratch;
+  Relit out, other;
+  auto shade = [&](std::vector<uint32_t> seen, bool keep, Relit& to) {
+    shade_receivers(Product::blocks, s.light, nullptr, s.visibility, receivers, seen, Vec3(1, 0, 0), to, nullptr,
+                    &scratch, keep);
+  };
+  auto lit = [&](const Relit& of) {
+    std::vector<uint32_t> is;
+    for (uint32_t r = 0; r < s.points.size(); ++r)
+      if (of.at(r) != Vec3(0)) is.push_back(r);
+    return is;
+  };
+  using List = std::vector<uint32_t>;
+  shade({1, 5, 9}, false, out);
+  EXPECT_EQ(lit(out), (List{1, 5, 9}));
+  shade({5, 7}, false, out);
+  EXPECT_EQ(lit(out), (List{5, 7}));
+  shade({2}, true, out);
+  EXPECT_EQ(lit(out), (List{2, 5, 7}));
+  shade({3}, false, out);
+  EXPECT_EQ(lit(out), (List{3}));
+  shade({4}, true, other);  // of which nothing is known
+  shade({6}, false, out);
+  EXPECT_EQ(lit(out), (List{6}));
+  shade({8}, false, other);
+  EXPECT_EQ(lit(other), (List{8}));
+  for (uint32_t i = 0; i < 200; ++i) shade({i % 40}, true, out);
+  shade({11}, false, out);
+  EXPECT_EQ(lit(out), (List{11}));
 }
 
 // Lambert's law takes one sample a block and has no error at all.

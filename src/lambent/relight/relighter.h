@@ -35,8 +35,11 @@ struct RelightFrame {
   // Visibility in blocks, where radiance depends on the view: the eye, and the receivers to shade (none given: all);
   // others get 0, or where `keep` stay as they are in `out`. All other stores relight every receiver for every eye at
   // once, so these make no difference to them.
+  // `most_samples`: of BRDFs in a block, 1, 4, 16 or 256: fewer are faster, for what moves, and `breakdown` says what
+  // they cost.
   Vec3 eye{0.0f};
   bool keep = false;
+  int most_samples = 256;
   std::optional<std::span<const uint32_t>> seen = std::nullopt;
   Breakdown* breakdown = nullptr;  // of blocks; added to
   HaarReading* reading = nullptr;  // of wavelets; set
