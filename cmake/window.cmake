@@ -11,8 +11,8 @@ if(LAMBENT_WINDOW)
   endif()
 endif()
 if(window_libraries)
-  list(APPEND tool_sources apps/lambent/window/window.cpp apps/lambent/window/panel.cpp
-    apps/lambent/window/panel_scene.cpp)
+  list(APPEND tool_sources apps/lambent/window/film.cpp apps/lambent/window/panel.cpp
+    apps/lambent/window/panel_scene.cpp apps/lambent/window/upload.cpp apps/lambent/window/window.cpp)
 else()
   list(APPEND tool_sources apps/lambent/window/no_window.cpp)
 endif()

@@ -3,31 +3,14 @@
 # settled, is the picture that `lambent render` writes, byte for byte, of every kind of file (tests/golden).
 #   tests/window.sh LAMBENT
 set -euo pipefail
-tool=$(readlink -f "$1") golden=$(dirname "$(readlink -f "$0")")/golden
-for program in Xvfb xdotool; do
-  command -v $program >/dev/null || { echo "window: left out: $program is not installed"; exit 0; }
-done
-if [[ $("$tool" view --window "$golden/diffuse.glb" 2>&1 </dev/null) == *"this build has no windows"* ]]; then
-  echo "window: left out: this build has none"
-  exit 0
-fi
-folder=$(mktemp -d)
-trap 'kill $(jobs -pr) 2>/dev/null || true; wait 2>/dev/null || true; rm -rf "$folder"' EXIT
-cd "$folder"
-passed=0
-failed() { echo "window: FAILED: $1"; exit 1; }
-pass() { passed=$((passed + 1)); }
+source "$(dirname "$(readlink -f "$0")")/xvfb.sh"
 
 # Without a display: one line.
 env -u DISPLAY -u WAYLAND_DISPLAY "$tool" view --window "$golden/diffuse.glb" 2>error && failed "a window on no display"
 grep -q "there is no display" error && [ "$(wc -l <error)" = 1 ] || failed "no display: $(cat error)"
 pass
 
-Xvfb -displayfd 3 -screen 0 900x700x24 -nolisten tcp -noreset 3>display >xvfb.log 2>&1 &
-for _ in $(seq 100); do [ -s display ] && break; sleep 0.1; done
-[ -s display ] || failed "Xvfb did not start: $(cat xvfb.log)"
-export DISPLAY=:$(cat display) LIBGL_ALWAYS_SOFTWARE=1
-show() { "$tool" view --window "$@"; }
+begin_screen
 
 sky=sky:elevation=40,azimuth=20,turbidity=4 camera=3,2,4,1,0.5,1,40
 for file in "$golden"/*.glb; do
@@ -162,6 +145,47 @@ show "$golden/diffuse.glb" "$golden/diffuse_grey_single.glb" --env $sky --camera
   --script script 2>log || failed "a script: $(cat log)"
 for picture in wipe.png difference.png film000.png film002.png; do [ -s $picture ] || failed "$picture is missing"; done
 pass
+# Films through ffmpeg, where it is; without it a line.
+if command -v ffmpeg >/dev/null && command -v ffprobe >/dev/null; then
+  printf '%s\n' 'panel off' 'size 97x72' 'film light 12 out.mp4' 'film camera 5 out.webm' >script
+  show "$golden/diffuse.glb" --env $sky --camera $camera --spp 1 --script script 2>log || failed "a film: $(cat log)"
+  probed=$(ffprobe -v error -count_frames -select_streams v \
+    -show_entries stream=codec_type,width,height,nb_read_frames -of csv=p=0 out.mp4)
+  [ "$probed" = video,96,72,12 ] || failed "a film has \"$probed\""
+  [ -s out.webm ] || failed "out.webm is missing"
+  printf '%s\n' 'film light 3 no_folder/out.mp4' >script
+  show "$golden/diffuse.glb" --env $sky --script script 2>log && failed "a film into no folder went through"
+  grep -q "line 1.*ffmpeg" log || failed "a film into no folder: $(cat log)"
+  pass
+else
+  echo "window: films are left out: ffmpeg is not installed"
+fi
+mkdir programs
+for program in sh rm; do ln -s "$(command -v $program)" programs/; done
+printf '%s\n' 'film light 3 out.avi' >script
+PATH=$PWD/programs show "$golden/diffuse.glb" --env $sky --script script 2>log && failed "a film without ffmpeg"
+grep -q "line 1.*ffmpeg, which is not installed" log && [ "$(wc -l <log)" = 1 ] || failed "no ffmpeg: $(cat log)"
+[ ! -e out.avi ] || failed "a film without ffmpeg left a file"
+pass
+
+# Where buffers cannot be mapped for good the picture is copied, and the same.
+printf '%s\n' 'panel off' 'size 200x150' 'frames 2' 'settle' 'screenshot SHOT' >script
+for way in mapped copied; do
+  sed "s/SHOT/$way.png/" script >script.$way
+  extension=
+  [ $way = mapped ] || extension=-GL_ARB_buffer_storage
+  MESA_EXTENSION_OVERRIDE=$extension show "$golden/diffuse.glb" --env $sky --camera $camera --spp 1 \
+    --script script.$way 2>log || failed "$way: $(cat log)"
+done
+for tone in none neutral agx; do  # what is on the screen is what is saved
+  printf '%s\n' 'panel off' 'size 200x150' 'frames 2' 'settle' "screenshot screen.png" 'save saved.png' >script
+  show "$golden/diffuse.glb" --env $sky --camera $camera --spp 4 --tone $tone --exposure 1 --script script 2>log ||
+    failed "$tone: $(cat log)"
+  cmp -s screen.png saved.png || failed "the screen shows other bytes than are saved, with --tone $tone"
+done
+cmp -s mapped.png copied.png || failed "a picture that is copied to the screen is another than one that is mapped"
+pass
+
 while IFS='|' read -r action message; do
   printf '%s\n' "$action" >script
   show "$golden/diffuse.glb" --env $sky --script script 2>error && failed "\"$action\" went through"

@@ -164,10 +164,11 @@ void comparison_controls(PanelState& panel, Session& s) {
   if (s.distance.known) ImGui::Text("PSNR %.1f dB, FLIP %.3f", s.distance.psnr, s.distance.flip);
 }
 
-void statistics(Session& s) {
+void statistics(const PanelState& panel, Session& s) {
   const LiveTimes& t = s.times;
   ImGui::Text("ms: light %.1f, product %.1f,", t.project, t.relight);
-  ImGui::Text("    rays %.1f, draw %.1f", t.trace, t.shade);
+  ImGui::Text("    rays %.1f, draw %.1f, screen %.1f", t.trace, t.shade, panel.screen.all);
+  ImGui::Text("    of that %s %.2f", panel.screen.mapped ? "mapped buffer" : "copied", panel.screen.upload);
   if (const Breakdown* b = s.live->breakdown()) {
     const double all = double(std::max<size_t>(1, b->blocked + b->light_visibility + b->light_brdf + b->triple));
     ImGui::Text("blocks: %.0f %% dark, light x visibility %.0f,", 100 * double(b->blocked) / all,
@@ -191,7 +192,7 @@ Result<void> PanelState::save(Session& session) {
   do path = fmt::format("lambent_{:03}.png", saved++);
   while (std::filesystem::exists(path));
   if (auto ok = session.save(path); !ok) return ok;
-  notice = path + " is written", notice_until = 1e300;
+  notice = path + " is written", notice_until = -1;
   return {};
 }
 
@@ -209,7 +210,7 @@ void draw_panel(PanelState& panel, Session& s, float x, float width, float heigh
   if (ImGui::CollapsingHeader("Materials and looks", ImGuiTreeNodeFlags_DefaultOpen))
     material_controls(panel, s), texture_controls(panel, s), object_controls(panel, s), look_controls(panel, s);
   if (ImGui::CollapsingHeader("Beside it", ImGuiTreeNodeFlags_DefaultOpen)) comparison_controls(panel, s);
-  if (ImGui::CollapsingHeader("Frame", ImGuiTreeNodeFlags_DefaultOpen)) statistics(s);
+  if (ImGui::CollapsingHeader("Frame", ImGuiTreeNodeFlags_DefaultOpen)) statistics(panel, s);
   if (ImGui::Button("save picture (S)"))
     if (auto ok = panel.save(s); !ok) tell(panel, ok);
   ImGui::SameLine();
@@ -221,9 +222,11 @@ void draw_panel(PanelState& panel, Session& s, float x, float width, float heigh
 }
 
 void draw_notices(PanelState& panel, double now) {
+  if (panel.notice_until < 0) panel.notice_until = now + 6;
   if (!panel.notice.empty() && now < panel.notice_until) {
     ImGui::SetNextWindowPos(ImVec2(12, 12));
-    ImGui::Begin("notice", nullptr, ImGuiWindowFlags_NoDecoration | ImGuiWindowFlags_AlwaysAutoResize);
+    ImGui::Begin("notice", nullptr,
+                 ImGuiWindowFlags_NoDecoration | ImGuiWindowFlags_AlwaysAutoResize | ImGuiWindowFlags_NoInputs);
     ImGui::TextUnformatted(panel.notice.c_str());
     ImGui::End();
   }

@@ -6,13 +6,18 @@ namespace lambent::tool {
 // The panel at the window's right.
 struct PanelState {
   bool open = true, help = false;
-  std::string notice;  // of what failed or was done, for a while
-  double notice_until = 0;
+  std::string notice;       // of what failed or was done, for a while
+  double notice_until = 0;  // below 0: for a while from when it is drawn
   // Texts being edited.
   char env[512] = "", brdf[256] = "";
   std::string material;  // that is edited
   int number = 0;        // of a coefficient or a row
   int saved = 0;
+  // Milliseconds of the latest picture's way to the screen, colours and upload; and of that the upload.
+  struct {
+    double all = 0, upload = 0;
+    bool mapped = false;
+  } screen = {};
   Result<void> save(Session& session);  // under the first free name
 };
 

@@ -1,6 +1,7 @@
 #include "session.h"
 
 #include "hold.h"
+#include "srgb_bytes.h"
 
 #include <lambent/core/file.h>
 #include <lambent/core/parallel.h>
@@ -67,9 +68,10 @@ const Vec3& at_same_place(const Image& image, int x, int y, int width, int heigh
                   std::min(y * image.height / height, image.height - 1));
 }
 
-void put(std::vector<uint8_t>& rgba, size_t pixel, Vec3 linear) {
-  for (int c = 0; c < 3; ++c) rgba[4 * pixel + size_t(c)] = uint8_t(std::lround(255 * srgb_encode(linear[c])));
-  rgba[4 * pixel + 3] = 255;
+void put(uint8_t* rgba, size_t pixel, Vec3 linear) {
+  static const SrgbBytes bytes;
+  const uint8_t four[4] = {bytes(linear.x), bytes(linear.y), bytes(linear.z), 255};
+  std::copy_n(four, 4, rgba + 4 * pixel);
 }
 
 }  // namespace
@@ -236,9 +238,10 @@ Result<void> Session::dolly(float factor) {
 
 Result<void> Session::resize(int width, int height) {
   const View& v = live->view();
+  width = std::clamp(width, 1, 8192), height = std::clamp(height, 1, 8192);
   if (width == v.width && height == v.height) return {};
   if (std::holds_alternative<FixedView>(bakes[shown_bake]->surface.where)) return {};
-  return set("size", fmt::format("{}x{}", std::clamp(width, 1, 8192), std::clamp(height, 1, 8192)));
+  return set("size", fmt::format("{}x{}", width, height));
 }
 
 Result<void> Session::look_as(Look next, int number) {
@@ -360,8 +363,7 @@ void Session::measure(bool done) {
   if (done) light_changed_ = false;
 }
 
-const Shown& Session::shown() {
-  if (!fresh_ || live->samples() == 0) return shown_;
+void Session::paint(uint8_t* rgba) {
   fresh_ = false;
   measure(settled());
   const View& view = live->view();
@@ -371,8 +373,6 @@ const Shown& Session::shown() {
   if (against == Against::bake && other && other->samples() > 0) right = &other->image();
   if (against == Against::file) right = &file;
   if (against == Against::reference && (traced = reference.seen(), traced.paths > 0)) right = &traced.image;
-  shown_.width = view.width, shown_.height = view.height;
-  shown_.rgba.resize(4 * size_t(view.width) * size_t(view.height));
   const int cut = right && !difference ? int(std::lround(wipe * float(view.width))) : view.width;
   parallel_for(size_t(view.height), 8, [&](size_t begin, size_t end) {
     for (int y = int(begin); y < int(end); ++y)
@@ -385,9 +385,9 @@ const Shown& Session::shown() {
           const Vec3 a = look(image), b = look(*right);
           float most = 0;
           for (int c = 0; c < 3; ++c) most = std::max(most, std::abs(srgb_encode(a[c]) - srgb_encode(b[c])));
-          put(shown_.rgba, pixel, false_color(10 * most));
+          put(rgba, pixel, false_color(10 * most));
         } else {
-          put(shown_.rgba, pixel, x == cut ? Vec3(1.0f) : look(x < cut ? image : *right));
+          put(rgba, pixel, x == cut ? Vec3(1.0f) : look(x < cut ? image : *right));
         }
       }
   });
@@ -396,7 +396,6 @@ const Shown& Session::shown() {
     if (auto apart = compare_images(image, *right, display, against != Against::reference))
       distance = {apart->psnr, apart->flip, true};
   }
-  return shown_;
 }
 
 Result<void> Session::save(const std::string& path) const {

@@ -25,12 +25,6 @@ struct SessionOptions {
   DrawRequest draw;                // how it begins, but for `baked` and `env`
 };
 
-// Eight bits a channel and as the screen takes them, RGBA from the top.
-struct Shown {
-  int width = 0, height = 0;
-  std::vector<uint8_t> rgba;
-};
-
 // How far the picture is from what it is compared with; as compare_images().
 struct Distance {
   double psnr = 0, flip = -1;  // flip < 0: not measured, while either is still changing
@@ -87,15 +81,18 @@ class Session {
 
   void move_wipe(float at) { wipe = std::min(std::max(at, 0.0f), 1.0f), fresh_ = true; }
   void show_difference(bool on) { difference = on, fresh_ = true; }
-  bool is_fresh() const { return fresh_; }  // shown() has something new
+  void show_again() { fresh_ = true; }
+  bool is_fresh() const { return fresh_ && live->samples() > 0; }  // paint() has something new
 
   // A piece of work; false: there is nothing to do but what the path tracer does. `hurry`: hands are at it.
   Result<bool> work(bool hurry);
   bool is_measuring() const { return live->is_measuring(); }  // what a look is made of
   bool settled() const;                                       // nothing but the path tracer goes on
 
-  // The picture as shown, left of the wipe; what it is compared with right of it, or how far both are apart.
-  const Shown& shown();
+  // The picture as shown, left of the wipe; what it is compared with right of it, or how far both are apart. Into
+  // memory for a view's pixels, which is written once and not read: eight bits a channel as the screen takes them, RGBA
+  // from the top. There must be a picture.
+  void paint(uint8_t* rgba);
   Image picture() const { return live->image(); }
   // Files by their endings. Errors: the disk's.
   Result<void> save(const std::string& path) const;
@@ -138,7 +135,6 @@ class Session {
   Job job_;
   std::filesystem::file_time_type written_ = {};
   double looked_ = 0;  // at the disk
-  Shown shown_;
   bool fresh_ = true, measured_ = false, light_changed_ = true;
   int seen_paths_ = 0;
   double last_exposure_ = 0;

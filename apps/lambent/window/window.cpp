@@ -2,7 +2,9 @@
 // the session; nothing of the picture depends on the graphics card.
 #include "window.h"
 
+#include "film.h"
 #include "panel.h"
+#include "upload.h"
 
 #include <lambent/core/file.h>
 
@@ -17,7 +19,6 @@
 #include <algorithm>
 #include <chrono>
 #include <cmath>
-#include <cstdio>
 
 namespace lambent::tool {
 namespace {
@@ -34,9 +35,10 @@ struct Window {
   const WindowOptions& options;
   const Job& job;
   GLFWwindow* handle = nullptr;
-  GLuint texture = 0;
+  PictureUpload upload = {};
   PanelState panel = {};
   std::vector<std::string> dropped = {};
+  std::vector<int> pressed = {};  // keys, since the last frame
   // Of a drag under way.
   enum class Drag { none, look, light, pan, wipe, object } drag = Drag::none;
   double x = 0, y = 0, last_input = 0;
@@ -127,6 +129,7 @@ void on_scroll(GLFWwindow* handle, double, double dy) {
 void on_key(GLFWwindow* handle, int key, int, int action, int mods) {
   Window& w = of(handle);
   w.frames_due = 3;
+  if (action == GLFW_PRESS && key >= 0) w.pressed.push_back(key);
   if (action == GLFW_RELEASE || ImGui::GetIO().WantTextInput) return;
   const bool light = mods & GLFW_MOD_SHIFT;
   auto turn = [&](float yaw, float pitch) {
@@ -193,21 +196,19 @@ Result<void> make_window(Window& w) {
   ImGui::GetIO().IniFilename = nullptr;  // nothing is left behind
   if (!ImGui_ImplGlfw_InitForOpenGL(w.handle, true) || !ImGui_ImplOpenGL3_Init("#version 330 core"))
     return Error{"--window", "OpenGL 3.3 is not to be had here"};
-  glGenTextures(1, &w.texture);
-  glBindTexture(GL_TEXTURE_2D, w.texture);
-  glTexParameteri(GL_TEXTURE_2D, GL_TEXTURE_MIN_FILTER, GL_LINEAR);
-  glTexParameteri(GL_TEXTURE_2D, GL_TEXTURE_MAG_FILTER, GL_NEAREST);
+  w.upload.open(), w.session.show_again();
   return {};
 }
 
 void close_window(Window& w) {
+  if (w.upload.texture()) w.upload.close();
   if (ImGui::GetCurrentContext()) {
     if (ImGui::GetIO().BackendRendererUserData) ImGui_ImplOpenGL3_Shutdown();
     if (ImGui::GetIO().BackendPlatformUserData) ImGui_ImplGlfw_Shutdown();
     ImGui::DestroyContext();
   }
   if (w.handle) glfwDestroyWindow(w.handle);
-  w.handle = nullptr, w.texture = 0;
+  w.handle = nullptr;
   glfwTerminate();
 }
 
@@ -244,19 +245,21 @@ void draw_lamps(const Window& w, float height) {
 }
 
 void present(Window& w) {
-  const Shown& shown = w.session.shown();
   int width = 0, height = 0;
   glfwGetFramebufferSize(w.handle, &width, &height);
-  if (shown.width > 0) {
-    glBindTexture(GL_TEXTURE_2D, w.texture);
-    glTexImage2D(GL_TEXTURE_2D, 0, GL_RGBA8, shown.width, shown.height, 0, GL_RGBA, GL_UNSIGNED_BYTE,
-                 shown.rgba.data());
+  if (w.session.is_fresh()) {
+    const double start = window_clock();
+    const View& view = w.session.live->view();
+    w.session.paint(w.upload.begin(view.width, view.height)), w.upload.end();
+    w.panel.screen = {1e3 * (window_clock() - start), w.upload.milliseconds(), w.upload.is_mapped()};
   }
   ImGui_ImplOpenGL3_NewFrame();
   ImGui_ImplGlfw_NewFrame();
+  for (int key : w.pressed) ImGui::GetIO().KeysDown[key] = true;  // also what was let go since
   ImGui::NewFrame();
-  if (shown.width > 0)
-    ImGui::GetBackgroundDrawList()->AddImage(reinterpret_cast<void*>(uintptr_t(w.texture)), ImVec2(0, 0),
+  for (int key : std::exchange(w.pressed, {})) ImGui::GetIO().KeysDown[key] = glfwGetKey(w.handle, key) == GLFW_PRESS;
+  if (w.panel.screen.all > 0)
+    ImGui::GetBackgroundDrawList()->AddImage(reinterpret_cast<void*>(uintptr_t(w.upload.texture())), ImVec2(0, 0),
                                              ImVec2(float(w.picture_width()), float(height)));
   if (w.panel.open) draw_lamps(w, float(height));
   if (w.panel.open) draw_panel(w.panel, w.session, float(w.picture_width()), panel_width, float(height));
@@ -283,52 +286,6 @@ Result<void> screenshot(Window& w, const std::string& path) {
             srgb_decode(float(pixels[3 * (size_t(y) * size_t(width) + size_t(x)) + size_t(c)]) / 255);
   if (auto ok = check_output(path, {"png"}); !ok) return ok;
   return save_image(path, image);
-}
-
-Result<void> settle(Window& w) {
-  for (;;) {
-    if (is_cancelled(w.job.progress)) return Error{"", "cancelled"};
-    auto more = w.session.work(false);
-    if (!more) return more.error();
-    if (!*more) return {};
-  }
-}
-
-// COUNT pictures of the light's or the camera's way around, settled each: NAME%03d.png, or a film through ffmpeg.
-Result<void> film(Window& w, const std::string& what, int count, const std::string& path) {
-  const bool pictures = path.find('%') != std::string::npos;
-  FILE* pipe = nullptr;
-  const View view = w.session.live->view();
-  if (!pictures) {
-    if (path.find_first_of("'\\") != std::string::npos) return Error{path, "has a quote in its name"};
-    const std::string order = fmt::format(
-        "ffmpeg -loglevel error -y -f rawvideo -pixel_format rgba -video_size {}x{} -framerate 30 -i - -pix_fmt "
-        "yuv420p "
-        "-vf 'crop=trunc(iw/2)*2:trunc(ih/2)*2' 'file:{}'",
-        view.width, view.height, path);
-    pipe = popen(order.c_str(), "w");
-    if (!pipe) return Error{path, "ffmpeg could not be started"};
-  }
-  auto shoot = [&](int i) -> Result<void> {
-    if (auto ok = settle(w); !ok) return ok;
-    if (pictures) {
-      const size_t at = path.find('%'), end = path.find_first_of("d", at);
-      return w.session.save(path.substr(0, at) + fmt::format("{:03}", i) +
-                            (end == std::string::npos ? ".png" : path.substr(end + 1)));
-    }
-    const Shown& shown = w.session.shown();
-    if (fwrite(shown.rgba.data(), 1, shown.rgba.size(), pipe) != shown.rgba.size())
-      return Error{path, "ffmpeg ended early"};
-    return {};
-  };
-  Result<void> result;
-  for (int i = 0; i < count && result; ++i) {
-    result = shoot(i);
-    const float step = 360.0f / float(count);
-    if (result) result = what == "light" ? w.session.turn_light(step, 0) : w.session.orbit(step, 0);
-  }
-  if (pipe && pclose(pipe) != 0 && result) return Error{path, "ffmpeg failed, or is not installed"};
-  return result;
 }
 
 Result<float> number(const std::string& text, const char* verb) {
@@ -380,7 +337,7 @@ Result<void> act(Window& w, const Action& a) {
       if (!(k >= 1)) return Result<void>(Error{"lamp", "counts from 1", true});
       return s.set_lamp(size_t(k) - 1, a.words.size() > 1 ? a.words[1] : "");
     });
-  if (a.verb == "settle") return settle(w);
+  if (a.verb == "settle") return settle(s, w.job);
   if (a.verb == "wait")
     return two_numbers(a, [&](float x, float) { return w.wait_until = window_clock() + double(x), Result<void>(); });
   if (a.verb == "frames") return two_numbers(a, [&](float x, float) { return w.frames_left = int(x), Result<void>(); });
@@ -389,8 +346,7 @@ Result<void> act(Window& w, const Action& a) {
   if (a.verb == "film") {
     auto count = number(a.words[1], "film");
     if (!count || !(*count >= 1 && *count <= 10000)) return Error{"film", "wants 1 to 10000 pictures", true};
-    if (word != "light" && word != "camera") return Error{"film", "turns the light or the camera", true};
-    return film(w, word, int(*count), a.words[2]);
+    return film(s, word, int(*count), a.words[2], w.job);
   }
   if (a.verb == "size") {
     auto size = parse_size(word, "size");
@@ -428,6 +384,8 @@ Result<void> loop(Window& w) {
     if (width > 0 && height > 0) (void)w.session.resize(w.picture_width(), height);
     if (w.session.is_replaced())
       w.say(Error{w.session.names[w.session.shown_bake], "has been replaced on the disk: F5 shows it anew"});
+    if (w.panel.notice_until > 0 && window_clock() >= w.panel.notice_until)  // it goes without an event, too
+      w.panel.notice.clear(), w.panel.notice_until = 0, w.frames_due = 3;
     if (is_lost()) {
       if (auto ok = reopen(w); !ok) return ok;
       w.say(Error{"OpenGL", "its context was lost, and made anew"});
@@ -441,8 +399,9 @@ Result<void> loop(Window& w) {
     }
     const bool hurry = window_clock() - w.last_input < rest;
     auto worked = w.session.work(hurry);
-    if (!worked) return worked.error();
-    busy = *worked || !w.session.settled();
+    if (!worked && (is_cancelled(w.job.progress) || !w.script.empty())) return worked.error();
+    if (!worked && w.panel.notice != worked.error().text()) w.say(worked.error());  // tried again, at leisure
+    busy = worked && (*worked || !w.session.settled());
     const bool fresh = w.session.is_fresh();
     if (!fresh && w.frames_due == 0) continue;
     w.frames_due = std::max(0, w.frames_due - 1);

@@ -191,6 +191,42 @@ TEST_F(LiveTexture, OverABakeIsInTheLightThatArrives) {
   expect_same(picture->image(), drawn(baked, relief));
 }
 
+// What each kind has of its own to be changed by hand: meshes that bend, lamps, materials, bands, terms.
+struct Edits {
+  std::string name;
+  std::vector<std::function<void(DrawRequest&)>> changes;
+};
+class LiveEdits : public testing::TestWithParam<Edits> {};
+
+TEST_P(LiveEdits, AreDrawnAsRenderDoes) {
+  const auto [baked, request] = open_golden(GetParam().name);
+  std::vector<DrawRequest> requests{request};
+  for (const auto& change : GetParam().changes) change(requests.emplace_back(request));
+  requests.push_back(request);
+  expect_each_drawn(baked, requests);
+}
+
+const auto bent = [](DrawRequest& r) { r.deform = "bend:60,x"; };
+const auto twisted = [](DrawRequest& r) { r.deform = "twist:50,y", r.env_rotate = "80,0,0"; };
+const auto two_bands = [](DrawRequest& r) { r.light_order = 2; };
+const auto turned_light = [](DrawRequest& r) { r.env_rotate = "80,20,0"; };
+const auto green_lamp = [](DrawRequest& r) { r.lamp = {"lamp=0,1,0", "sky=0.5,1,2"}; };
+const auto lamp_alone = [](DrawRequest& r) { r.lamp = {"sky=0"}; };
+const auto phong = [](DrawRequest& r) { r.brdf = "phong:exponent=30,diffuse=0.2,specular=0.5"; };
+const auto ggx = [](DrawRequest& r) { r.brdf = "ggx:roughness=0.5", r.env_rotate = "80,0,0"; };
+
+INSTANTIATE_TEST_SUITE_P(Kinds, LiveEdits,
+                         testing::Values(Edits{"zonal", {bent, twisted, two_bands}},
+                                         Edits{"zonal_glossy", {bent, twisted}},
+                                         Edits{"lightmap", {green_lamp, lamp_alone}},
+                                         Edits{"diffuse_clusters", {two_bands, turned_light}},
+                                         Edits{"compressed_cpca", {two_bands, turned_light}},
+                                         Edits{"matrix_map", {phong, ggx}}, Edits{"factors", {phong, ggx}},
+                                         Edits{"wavelets", {[](DrawRequest& r) { r.terms = 8; }, turned_light}},
+                                         Edits{"diffuse_fixed_view", {two_bands, turned_light}},
+                                         Edits{"diffuse_lobes", {turned_light}}, Edits{"lightmap_prt", {turned_light}}),
+                         [](const auto& info) { return info.param.name; });
+
 // A model by name is what --brdf is for all; named for one, the other stays.
 TEST(LiveBlocks, MaterialsByName) {
   auto [baked, request] = open_golden("blocks");

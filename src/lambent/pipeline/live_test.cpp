@@ -134,7 +134,11 @@ TEST(LivePicture, BlocksThatComeIntoViewHaveAValueAtOnce) {
       moved.camera = camera, coarse.camera = camera, coarse.size = "16x12";
       ASSERT_EQ(error_of(picture->ask(moved)), "");
       ASSERT_TRUE(*picture->work(true, 1e-6));
-      expect_same(picture->image(), drawn(baked, coarse));
+      const Image whole = drawn(baked, coarse);
+      ASSERT_EQ(picture->image().rgb.size(), whole.rgb.size());
+      for (size_t i = 0; i < whole.rgb.size(); ++i)  // coarse at most
+        EXPECT_LE(length(picture->image().rgb[i] - whole.rgb[i]), 0.1f * length(whole.rgb[i]) + 1e-4f)
+            << camera << ' ' << i;
     }
   }
 }

@@ -32,13 +32,13 @@ struct RelightFrame {
   // place of set_light()'s (null: that).
   const ReceiverFrames* frames = nullptr;
   const LightField* light = nullptr;
-  // Visibility in blocks, where radiance depends on the view: the eye, and the receivers to shade (none given: all);
-  // others get 0, or where `keep` stay as they are in `out`. All other stores relight every receiver for every eye at
-  // once, so these make no difference to them.
-  // `most_samples`: of BRDFs in a block, 1, 4, 16 or 256: fewer are faster, for what moves, and `breakdown` says what
-  // they cost.
+  // Visibility in blocks, where radiance depends on the view: the eye. Other stores relight for every eye at once.
   Vec3 eye{0.0f};
+  // The receivers to relight (none given: all); others get 0, or where `keep` stay as they are in `out`. Of dense
+  // transfer, clusters and lobes their neighbours in the store are relit with them; factors, wavelets and surfels, and
+  // lobes under a light each, relight all.
   bool keep = false;
+  // Of BRDFs in a block, 1, 4, 16 or 256: fewer are faster, for what moves, and `breakdown` says what they cost.
   int most_samples = 256;
   std::optional<std::span<const uint32_t>> seen = std::nullopt;
   Breakdown* breakdown = nullptr;  // of blocks; added to
