@@ -9,6 +9,7 @@ import { haveTool, lambent, makeFolder, renderLinear } from '../test/tool.ts';
 import { drawn, haveBrowser, launch, open, openFixture, psnr, ready, serve, type Server } from './browser.ts';
 import { writeScene } from './scenes.ts';
 
+const patience = { timeout: 60_000, interval: 100 }; // beside a build on two cores
 const camera = '3.1,2.6,4.3,-0.3,0.8,0,38',
   size = { width: 640, height: 480 },
   lamps = [
@@ -24,10 +25,14 @@ async function settled(page: Page): Promise<void> {
   await page.waitForSelector('body[data-light=settled]', { state: 'attached' });
   await drawn(page);
 }
-const stateOf = async (page: Page): Promise<URLSearchParams> => {
-  await page.waitForTimeout(500);
-  return new URLSearchParams(new URL(page.url()).hash.slice(1));
-};
+const stateNow = (page: Page): URLSearchParams => new URLSearchParams(new URL(page.url()).hash.slice(1));
+/** The address once it is another than `before`, and stays. */
+async function stateAfter(page: Page, before: URLSearchParams): Promise<URLSearchParams> {
+  await expect.poll(() => stateNow(page).toString(), patience).not.toBe(before.toString());
+  for (let last = ''; last !== stateNow(page).toString(); await page.waitForTimeout(1000))
+    last = stateNow(page).toString();
+  return stateNow(page);
+}
 const placeOf = (text: string | null): number[] => (/@([^=]*)=/.exec(text ?? '')?.[1] ?? '').split(',').map(Number);
 
 /** writeScene's scene as a glTF whose sail glows and that has a point lamp, "bulb". */
@@ -218,19 +223,22 @@ describe.skipIf(!haveTool || !haveBrowser)('lamps that move', () => {
       await settled(page);
     };
     await page.screenshot({ path: at('hand_before.png') });
+    let state = stateNow(page);
     await drag(-160, -30);
-    const [x, y, z] = placeOf((await stateOf(page)).get('lamp'));
+    state = await stateAfter(page, state);
+    const [x, y, z] = placeOf(state.get('lamp'));
     expect(y).toBe(1.2);
     expect(Math.hypot(x! - 0.9, z! - 1.1)).toBeGreaterThan(0.5);
     await drag(0, -60, ['Shift']);
-    const [x2, y2, z2] = placeOf((await stateOf(page)).get('lamp'));
+    state = await stateAfter(page, state);
+    const [x2, y2, z2] = placeOf(state.get('lamp'));
     expect([x2, z2]).toEqual([x, z]);
     expect(y2).toBeGreaterThan(1.4);
     await handle.focus();
     await page.keyboard.press('PageDown');
     await page.keyboard.press('ArrowRight');
-    const state = await stateOf(page),
-      [x3, y3] = placeOf(state.get('lamp'));
+    state = await stateAfter(page, state);
+    const [x3, y3] = placeOf(state.get('lamp'));
     expect(y3).toBeLessThan(y2!);
     expect(x3).not.toBe(x2);
     await settled(page);
@@ -249,29 +257,31 @@ describe.skipIf(!haveTool || !haveBrowser)('lamps that move', () => {
   it('are added, switched, coloured and taken away in the list; walls are painted', async () => {
     const page = await open(browser, server.address, `camera=${camera}`, size.width, size.height);
     await page.click('#lamps > summary');
-    const texts = async (): Promise<string[]> => (await stateOf(page)).getAll('lamp');
-    expect((await texts()).map((t) => t.split('@')[0])).toEqual(['point']); // one to begin with
+    const texts = (): string[] => stateNow(page).getAll('lamp'),
+      kinds = (): string[] => texts().map((t) => t.split('@')[0]!),
+      soon = <T>(value: () => T) => expect.poll(value, patience);
+    await soon(kinds).toEqual(['point']); // one to begin with
     await page.getByRole('button', { name: 'Add a lamp: spot' }).click();
     await page.getByRole('button', { name: 'Add a lamp: sun' }).click();
-    expect((await texts()).map((t) => t.split('@')[0])).toEqual(['point', 'spot', 'sun']);
+    await soon(kinds).toEqual(['point', 'spot', 'sun']);
     expect(await page.locator('#handles button').count()).toBe(3); // the spot's target has one, the sun none
     const sun = page.locator('#lamp-list > details').nth(2);
     await sun.getByLabel('elevation').focus();
     await page.keyboard.press('End');
-    expect(placeOf((await texts())[2]!)[1]).toBe(90);
+    await soon(() => placeOf(texts()[2]!)[1]).toBe(90);
     await sun.getByLabel('Colour').fill('#ff0000');
-    expect((await texts())[2]).toMatch(/=[\d.]+,0,0$/);
+    await soon(() => texts()[2]).toMatch(/=[\d.]+,0,0$/);
     await sun.getByLabel('On', { exact: true }).uncheck();
-    expect((await stateOf(page)).get('dark')).toBe('3');
+    await soon(() => stateNow(page).get('dark')).toBe('3');
     await page.getByRole('button', { name: 'Remove lamp 3, sun' }).click();
-    expect((await texts()).map((t) => t.split('@')[0])).toEqual(['point', 'spot']);
+    await soon(kinds).toEqual(['point', 'spot']);
     await page.click('#lamps details:has(#paint-list) > summary');
     await page.getByLabel('red', { exact: true }).fill('#0000ff');
-    expect((await stateOf(page)).get('albedo')).toBe('red=0,0,1');
+    await soon(() => stateNow(page).get('albedo')).toBe('red=0,0,1');
     await settled(page);
     await page.screenshot({ path: at('list.png') });
     await page.getByRole('button', { name: 'red as it was' }).click();
-    expect((await stateOf(page)).has('albedo')).toBe(false);
+    await soon(() => stateNow(page).has('albedo')).toBe(false);
     for (let i = 0; i < 6; ++i) await page.getByRole('button', { name: 'Add a lamp: point' }).click();
     expect(await page.getByRole('button', { name: 'Add a lamp: sphere' }).isDisabled()).toBe(true); // eight
     await page.close();
