@@ -103,7 +103,7 @@ void vertex_case(const std::string& name, const Baked& baked, const std::string&
   auto ours = make_block_shading(baked, request);
   request.method = "standard";
   auto standard = make_block_shading(baked, request);
-  auto view = parse_view("", request.size, baked.scene);
+  auto view = parse_view(request.camera, request.size, baked.scene);
   auto env = load_environment("sky:elevation=35,azimuth=45,turbidity=3");
   auto skip = [](const auto& result) {
     if (!result) fmt::print(stderr, "skipped: {}\n", result.error().text());
