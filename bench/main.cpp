@@ -7,6 +7,8 @@
 
 #include <fmt/format.h>
 
+#include <time.h>
+
 #include <cstdlib>
 #include <cstring>
 #include <filesystem>
@@ -21,6 +23,12 @@ void report(const std::string& name, double ours, double limit, const std::strin
   for (auto& [key, value] : more.items()) line[key] = value;
   fmt::print("{}\n", line.dump());
   std::fflush(stdout);
+}
+
+double thread_seconds() {
+  timespec now;
+  clock_gettime(CLOCK_THREAD_CPUTIME_ID, &now);
+  return double(now.tv_sec) + 1e-9 * double(now.tv_nsec);
 }
 
 std::optional<Scene> data_scene(const std::string& name, bool ground) {

@@ -39,9 +39,9 @@ table("New environment", ["cube", "light", "project, ms", "three forms, ms", "ai
       [(str(j["cube"]), j["light"], j["project_ms"], j["forms_ms"], j["limit"]) for j in lights])
 for title, sampling in (("bounded", "bounded"), ("appendix A", "appendix_a")):
     table(f"Tables 1 and 2, {title}: % of blocks that are not blocked, by line of Algorithm 1 and by samples",
-          ["scene", "material", "line 6", "line 9", "line 11", "1", "4", "16", "256"],
+          ["scene", "material", "line 6", "line 9", "line 11", "1", "4", "16", "64", "256"],
           [(s, m, j[sampling]["line_6"], j[sampling]["line_9"], j[sampling]["line_11"],
-            *j[sampling]["samples_1_4_16_256"])
+            *j[sampling]["samples_1_4_16_64_256"])
            for s, m, j in of("table_1_2")])
 bakes = {s: j for s, _, j in of("bake")}
 table("Table 3: database and bake", ["scene", "vertices", "MB", "bytes a vertex", "changes a mixed block", "bake, s",

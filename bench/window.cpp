@@ -14,8 +14,6 @@
 
 #include <fmt/format.h>
 
-#include <time.h>
-
 #include <chrono>
 
 namespace lambent::bench {
@@ -49,7 +47,9 @@ Frames play(LivePicture& picture, int count, bool light, bool hurry) {
   return out;
 }
 
+// On two cores, as the aims are.
 void window_case(const std::string& name, const Baked& baked, const std::string& brdf, double wanted) {
+  const ThreadLimit two(2);
   DrawRequest request{.baked = name, .env = "sky:elevation=35,azimuth=45,turbidity=3", .size = "640x480"};
   request.brdf = brdf;
   auto picture = LivePicture::make(baked, request);
@@ -69,10 +69,15 @@ void window_case(const std::string& name, const Baked& baked, const std::string&
   }
 }
 
-double thread_seconds() {
-  timespec now;
-  clock_gettime(CLOCK_THREAD_CPUTIME_ID, &now);
-  return double(now.tv_sec) + 1e-9 * double(now.tv_nsec);
+// Bytes a second of a thread that reads memory which no cache holds, once through.
+double read_bandwidth() {
+  const std::vector<uint64_t> memory(size_t{1} << 25, 1);  // 256 MB
+  uint64_t sum = 0;
+  const double seconds = least_thread_seconds(4, [&] {
+    for (uint64_t v : memory) sum += v;
+  });
+  if (sum == 1) fmt::print(stderr, "\n");  // it is wanted
+  return double(memory.size() * sizeof(uint64_t)) / seconds;
 }
 
 // Nanoseconds of one thread for each receiver of `seen`, least of `runs`.
@@ -82,6 +87,7 @@ double vertex_ns(Relighter& relighter, std::span<const uint32_t> seen, Vec3 eye,
   Relit out;
   double least = 1e300;
   for (int run = 0; run < runs; ++run) {
+    if (breakdown) *breakdown = {};
     const double start = thread_seconds();
     if (!relighter.relight({.eye = eye, .most_samples = samples, .seen = seen, .breakdown = breakdown}, out)) return 0;
     least = std::min(least, thread_seconds() - start);
@@ -90,23 +96,30 @@ double vertex_ns(Relighter& relighter, std::span<const uint32_t> seen, Vec3 eye,
 }
 
 // A vertex of blocks: against the aim and our standard basis, with what of memory is read for it at least.
-void vertex_case(const std::string& name, const Baked& baked, const std::string& brdf, double aim, double times_aim) {
+void vertex_case(const std::string& name, const Baked& baked, const std::string& brdf, double aim, double times_aim,
+                 double bandwidth) {
   DrawRequest request{.baked = name, .size = "640x480"};
   request.brdf = brdf;
   auto ours = make_block_shading(baked, request);
   request.method = "standard";
   auto standard = make_block_shading(baked, request);
-  auto view = parse_view("", request.size, baked.scene);
+  auto view = parse_view(request.camera, request.size, baked.scene);
   auto env = load_environment("sky:elevation=35,azimuth=45,turbidity=3");
-  if (!ours || !standard || !view || !env) return;
+  auto skip = [](const auto& result) {
+    if (!result) fmt::print(stderr, "skipped: {}\n", result.error().text());
+    return !result;
+  };
+  if (skip(ours) || skip(standard) || skip(view) || skip(env)) return;
   const Environment light = reduced(*env, 512);
-  if (!set_environment(*ours, light, Mat3(1.0f)) || !set_environment(*standard, light, Mat3(1.0f))) return;
+  if (skip(set_environment(*ours, light, Mat3(1.0f))) || skip(set_environment(*standard, light, Mat3(1.0f)))) return;
   const VertexPlacement& at = std::get<VertexPlacement>(baked.surface.where);
   const auto& visibility = std::get<Visibility>(baked.surface.store);
   std::vector<uint32_t> all = seen_receivers(baked.scene, at.front, at.back, visibility.receivers, view->camera,
                                              view->width, view->height),
                         some;
   for (size_t i = 0; i < all.size(); i += 16) some.push_back(all[i]);
+  double bytes = 0;
+  for (uint32_t r : all) bytes += double(visibility.begin[r + 1] - visibility.begin[r]);
   Breakdown breakdown, coarse;
   const Vec3 eye = view->camera.eye;
   const double ns = vertex_ns(ours->relighter, all, eye, 256, 5, &breakdown),
@@ -117,7 +130,9 @@ void vertex_case(const std::string& name, const Baked& baked, const std::string&
           {"standard_simd_ns", simd},
           {"times_faster", simd / ns},
           {"times_faster_aim", times_aim},
-          {"bytes_of_visibility", double(visibility.bytes()) / double(visibility.receivers)},
+          {"bytes_of_visibility", bytes / double(all.size())},
+          {"visibility_gigabytes_a_second", bytes / double(all.size()) / ns},
+          {"of_read_bandwidth", 1e9 * bytes / double(all.size()) / ns / bandwidth},
           {"sixteen_samples_ns", hurried},
           {"sixteen_samples_error", coarse.error()},
           {"sixteen_samples_largest_off", coarse.largest_off},
@@ -155,12 +170,14 @@ void bench_window() {
     BakeRequest request{.transfer = "blocks"};
     request.loaded = std::make_shared<const Scene>(std::move(*bunny));
     if (auto baked = bake(request)) {
+      const double bandwidth = read_bandwidth();
+      report("window, memory read by a thread", 1e-9 * bandwidth, 1e-9 * bandwidth, "GB a second", "itself");
       const std::string on = "bunny with floor, blocks, ", ward = "ward:ax=0.2,ay=0.2,diffuse=0.5,specular=0.5";
-      vertex_case(on + "diffuse", *baked, "", 250, 15);
-      vertex_case(on + "Phong 10", *baked, "phong:exponent=10,diffuse=0.3,specular=0.4", 1500, 12);
-      vertex_case(on + "Phong 50", *baked, "phong:exponent=50,diffuse=0.5,specular=0.5", 1500, 12);
-      vertex_case(on + "Phong 200", *baked, "phong:exponent=200,diffuse=0.3,specular=0.4", 1500, 12);
-      vertex_case(on + "Ward", *baked, ward, 3000, 12);
+      vertex_case(on + "diffuse", *baked, "", 250, 15, bandwidth);
+      vertex_case(on + "Phong 10", *baked, "phong:exponent=10,diffuse=0.3,specular=0.4", 1500, 12, bandwidth);
+      vertex_case(on + "Phong 50", *baked, "phong:exponent=50,diffuse=0.5,specular=0.5", 1500, 12, bandwidth);
+      vertex_case(on + "Phong 200", *baked, "phong:exponent=200,diffuse=0.3,specular=0.4", 1500, 12, bandwidth);
+      vertex_case(on + "Ward", *baked, ward, 3000, 12, bandwidth);
       window_case(on + "diffuse", *baked, "", 15);
       window_case(on + "Phong 50", *baked, "phong:exponent=50,diffuse=0.5,specular=0.5", 8);
       window_case(on + "Ward", *baked, ward, 4);

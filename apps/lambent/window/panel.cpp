@@ -175,6 +175,12 @@ void statistics(const PanelState& panel, Session& s) {
                 100 * double(b->light_visibility) / all);
     ImGui::Text("    light x BRDF %.0f, all three %.0f", 100 * double(b->light_brdf) / all,
                 100 * double(b->triple) / all);
+    if (const StageTimes& each = b->times; each.receivers > 0) {
+      const double n = 1e3 * double(each.receivers);
+      ImGui::Text("us a receiver: visibility %.2f,", each.visibility / n);
+      ImGui::Text("    BRDF %.2f, integral %.2f", each.brdf / n, each.integral / n);
+    }
+    if (b->squares > 0) ImGui::Text("16 samples a block: %.2g %% off", 100 * b->error());
   }
   ImGui::Text("%zu receivers, %d of %d samples", t.shaded, s.live->samples(), s.live->request().spp);
   if (s.dropped_pixels > 1) ImGui::Text("in a hurry: 1 pixel of %d", s.dropped_pixels * s.dropped_pixels);

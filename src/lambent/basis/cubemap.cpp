@@ -33,6 +33,19 @@ double cube_solid_angle(int size, int column, int row) {
   return corner(u1, v1) - corner(u0, v1) - corner(u1, v0) + corner(u0, v0);
 }
 
+double node_place(int nodes, int node) {
+  if (nodes < node_sides[3]) return (node + 0.5) * block_side / nodes;
+  return 0.5 * block_side * (1 - std::cos(std::numbers::pi * (node + 0.5) / nodes));
+}
+
+double fine_cardinal(int node, double x) {
+  constexpr int n = node_sides[3];
+  double out = 1;
+  for (int i = 0; i < n; ++i)
+    if (i != node) out *= (x - node_place(n, i)) / (node_place(n, node) - node_place(n, i));
+  return out;
+}
+
 Cube make_cube(int size) {
   LAMBENT_CHECK(is_cube_size(size));
   Cube cube;
@@ -47,11 +60,10 @@ Cube make_cube(int size) {
       };
       for (int t = 0; t < block_texels; ++t)
         cube.texels.push(direction(float(t % block_side) + 0.5f, float(t / block_side) + 0.5f));
-      for (int k = 0; k < 3; ++k) {
+      for (int k = 0; k < 4; ++k) {
         const int n = node_sides[k];
-        const float step = float(block_side) / float(n);
         for (int i = 0; i < n * n; ++i)
-          cube.nodes[size_t(k)].push(direction((float(i % n) + 0.5f) * step, (float(i / n) + 0.5f) * step));
+          cube.nodes[size_t(k)].push(direction(float(node_place(n, i % n)), float(node_place(n, i / n))));
       }
       const Vec3 middle = cube.nodes[0].at(cube.reach.size());
       float least = 1;
@@ -74,6 +86,8 @@ Cube make_cube(int size) {
     for (int i = 0; i < n; ++i)
       for (int x = 0; x < block_side; ++x) cube.cardinal[size_t(k)].push_back(float(cardinal(x, i)));
   }
+  for (int i = 0; i < node_sides[3]; ++i)
+    for (int x = 0; x < block_side; ++x) cube.cardinal[3].push_back(float(fine_cardinal(i, x + 0.5)));
   return cube;
 }
 

@@ -46,19 +46,25 @@ struct DirectionArray {
   Vec3 at(size_t i) const { return {x[i], y[i], z[i]}; }
 };
 
-// Points a side at which a function on a block is sampled for 1, 4 or 16 values, and what interpolates between them.
-inline constexpr int node_sides[3] = {1, 2, 4};
+// Points a side at which a function on a block is sampled for 1, 4, 16 or 64 values, and what interpolates between
+// them.
+inline constexpr int node_sides[4] = {1, 2, 4, 8};
+// Where along a side, in texels, the node of so many is: in the middle of equal parts; of 8 at Chebyshev's points.
+double node_place(int nodes, int node);
+// The polynomial of degree 7 that is 1 at that node of 8 and 0 at others, at x texels.
+double fine_cardinal(int node, double x);
 
 // What is known of a cube of so many texels a side, whatever lies on it.
 struct Cube {
   int size = 0;
   DirectionArray texels;                // centres
-  std::array<DirectionArray, 3> nodes;  // [block][row][column] for 1, 2 and 4 a side
+  std::array<DirectionArray, 4> nodes;  // [block][row][column] for 1, 2, 4 and 8 a side
   std::vector<float> reach;             // by block: angle from its middle to its farthest corner, radians
   float widest = 0;                     // of these
   // Cardinal functions of the nodes along one side, [node][texel]: 1 at their own node, 0 at others, sums of as many
-  // cosines cos(pi k (x + 1/2) / 16) (the DCT's) as there are nodes. eq. 4, solved once.
-  std::array<std::vector<float>, 3> cardinal;
+  // cosines cos(pi k (x + 1/2) / 16) (the DCT's) as there are nodes. eq. 4, solved once. Of 8 nodes polynomials:
+  // cosines are level at a block's border, which a lobe is not.
+  std::array<std::vector<float>, 4> cardinal;
 
   int blocks() const { return cube_blocks(size); }
   size_t count() const { return cube_texels(size); }

@@ -79,5 +79,17 @@ TEST(Cubemap, CardinalFunctionsInterpolateCosines) {
   }
 }
 
+TEST(Cubemap, EightNodesInterpolatePolynomials) {
+  const Cube cube = make_cube(16);
+  constexpr int n = node_sides[3];
+  for (int power = 0; power < n; ++power)
+    for (int x = 0; x < block_side; ++x) {
+      double sum = 0;
+      for (int i = 0; i < n; ++i)
+        sum += std::pow(node_place(n, i) / 8 - 1, power) * double(cube.cardinal[3][size_t(i * block_side + x)]);
+      EXPECT_NEAR(sum, std::pow((x + 0.5) / 8 - 1, power), 1e-6);
+    }
+}
+
 }  // namespace
 }  // namespace lambent

@@ -118,13 +118,13 @@ Result<void> add_indirect(BlockShading& s, const Tracer& tracer, const Surroundi
 
 nlohmann::json describe(const Breakdown& b) {
   const double all = double(std::max<size_t>(1, b.light_brdf + b.light_visibility + b.triple));
-  const double samples = double(std::max<size_t>(1, b.samples[0] + b.samples[1] + b.samples[2] + b.samples[3]));
+  const double samples = double(std::max<size_t>(1, b.all_samples()));
   nlohmann::json shares = nlohmann::json::array();
   for (size_t n : b.samples) shares.push_back(100 * double(n) / samples);
   nlohmann::json out = {{"light_brdf", 100 * double(b.light_brdf) / all},
                         {"light_visibility", 100 * double(b.light_visibility) / all},
                         {"triple", 100 * double(b.triple) / all},
-                        {"samples_1_4_16_256", shares}};
+                        {"samples_1_4_16_64_256", shares}};
   if (const StageTimes& t = b.times; t.receivers > 0) {
     const double n = double(t.receivers);
     out["ns_a_receiver"] = {{"visibility", t.visibility / n}, {"brdf", t.brdf / n}, {"integral", t.integral / n}};

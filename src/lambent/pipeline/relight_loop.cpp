@@ -63,13 +63,13 @@ Result<Summary> summary_of(const BlockShading& s, const LoopRequest& request, in
   const Breakdown& b = s.breakdown;
   const double all = double(std::max<size_t>(1, b.light_brdf + b.light_visibility + b.triple)) / 100;
   const auto& n = b.samples;
-  const double samples = double(std::max<size_t>(1, n[0] + n[1] + n[2] + n[3])) / 100;
+  const double samples = double(std::max<size_t>(1, b.all_samples())) / 100;
   out.lines.emplace_back(
       "blocks", fmt::format("{:.1f} % light x BRDF, {:.1f} % light x visibility, {:.1f} % all three",
                             double(b.light_brdf) / all, double(b.light_visibility) / all, double(b.triple) / all));
-  out.lines.emplace_back("samples",
-                         fmt::format("1: {:.1f} %, 4: {:.1f} %, 16: {:.1f} %, 256: {:.1f} %", double(n[0]) / samples,
-                                     double(n[1]) / samples, double(n[2]) / samples, double(n[3]) / samples));
+  out.lines.emplace_back("samples", fmt::format("1: {:.1f} %, 4: {:.1f} %, 16: {:.1f} %, 64: {:.1f} %, 256: {:.1f} %",
+                                                double(n[0]) / samples, double(n[1]) / samples, double(n[2]) / samples,
+                                                double(n[3]) / samples, double(n[4]) / samples));
   if (const StageTimes& t = b.times; t.receivers > 0) {
     const double of = double(t.receivers);
     out.lines.emplace_back("ns a receiver", fmt::format("visibility {:.0f}, BRDF {:.0f}, integral {:.0f}",

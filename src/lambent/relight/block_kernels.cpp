@@ -1,6 +1,8 @@
 // Follows: locally-adaptive-products, section 4 (Algorithm 1).
 #include <lambent/relight/block_kernels.h>
 
+#include <hwy/cache_control.h>
+
 #include <bit>
 #include <chrono>
 #include <cstring>
@@ -9,6 +11,7 @@
 #define HWY_TARGET_INCLUDE "lambent/relight/block_kernels.cpp"
 #include <hwy/foreach_target.h>
 #include <hwy/highway.h>
+#include <lambent/relight/block_nodes-inl.h>
 #include <lambent/relight/block_rows-inl.h>
 #include <lambent/relight/product_lobes-inl.h>
 
@@ -28,7 +31,7 @@ HWY_INLINE uint32_t EvenBits(uint64_t x) {
 // Which blocks are seen, and of mixed ones that no lobe reaches the rows of the sums that are begins and ends of what
 // is seen, so that summing them is one loop.
 template <bool binary>
-void ReadSight(BlockScratch& s, const Visibility& visibility, size_t receiver, bool want_rows) {
+void ReadSight(BlockScratch& s, const float* sums, const Visibility& visibility, size_t receiver, bool want_rows) {
   using U = hn::CappedTag<uint32_t, 16>;
   using B = hn::Rebind<uint8_t, U>;
   const U du;
@@ -50,6 +53,8 @@ void ReadSight(BlockScratch& s, const Visibility& visibility, size_t receiver, b
       at += binary ? count : 2 * count;
       if (s.lit[w] >> bit & 1) {
         s.changes.push_back(c);
+        const float* block = sums + (w * 32 + bit) * block_texels * sum_width;
+        for (int i = 0; i < c.count; ++i) hwy::Prefetch(block + sum_width * c.where[i]);
         continue;
       }
       if (!want_rows) continue;
@@ -106,12 +111,21 @@ Row SumSeen(const BlockScratch& s, const BlockLight& light, size_t words) {
 
 // Light of what is seen of one mixed block.
 HWY_INLINE Row SumChanges(const float* sums, const BlockChanges& c, float scale) {
-  Row out = ZeroRow();
-  int before = 0;
-  for (int i = 0; i < c.count; ++i) {
-    const int after = c.level_after(i);
-    AddTimes(out, float(after - before) * scale, LoadRow(sums + sum_width * c.where[i]));
-    before = after;
+  Row out = ZeroRow(), odd = out;
+  int i = 0;
+  if (!c.level) {
+    for (; i + 4 <= c.count; i += 4) {
+      AddDifference(out, sums + sum_width * c.where[i], sums + sum_width * c.where[i + 1]);
+      AddDifference(odd, sums + sum_width * c.where[i + 2], sums + sum_width * c.where[i + 3]);
+    }
+    if (i + 2 <= c.count) AddDifference(out, sums + sum_width * c.where[i], sums + sum_width * c.where[i + 1]), i += 2;
+    if (i < c.count) AddRow(odd, LoadRow(sums + sum_width * c.where[i]));
+    AddRow(out, odd);
+    return out;
+  }
+  for (int before = 0; i < c.count; ++i) {
+    AddTimes(out, float(int(c.level[i]) - before) * scale, LoadRow(sums + sum_width * c.where[i]));
+    before = c.level[i];
   }
   return out;
 }
@@ -187,81 +201,6 @@ HWY_INLINE void AddTexels(TexelSums<count>& sums, const float* light, const Seen
   }
 }
 
-// s_k at 16 nodes of a block, [k][16].
-template <class Lobe>
-HWY_INLINE void AtNodes(const Lobe& lobe, const float* x, const float* y, const float* z, float* out) {
-  const F d;
-  for (size_t i = 0; i < 16; i += lanes) {
-    V s[Lobe::count];
-    lobe(hn::LoadU(d, x + i), hn::LoadU(d, y + i), hn::LoadU(d, z + i), s);
-    for (int k = 0; k < Lobe::count; ++k) hn::Store(s[k], d, out + 16 * k + i);
-  }
-}
-
-// The same of the 4 or 16 nodes of a block's class, those of 4 and others.
-template <class Lobe>
-HWY_INLINE void AtBlockNodes(const Lobe& lobe, const Cube& cube, int samples, size_t b, float* out) {
-  const DirectionArray& nodes = cube.nodes[size_t(samples - 1)];
-  if (samples == 3) return AtNodes(lobe, &nodes.x[16 * b], &nodes.y[16 * b], &nodes.z[16 * b], out);
-  alignas(64) float at[3][16];
-  for (size_t i = 0; i < 16; ++i) {
-    const size_t j = 4 * b + std::min<size_t>(i, 3);
-    at[0][i] = nodes.x[j], at[1][i] = nodes.y[j], at[2][i] = nodes.z[j];
-  }
-  AtNodes(lobe, at[0], at[1], at[2], out);
-}
-
-// How many samples a lobe of which values alone are known wants of a block (1: one, 3: 16, 4: 256), from those at 16
-// nodes and at its middle: one where they are alike, 16 where those give the middle's value back.
-template <int count>
-int ClassByValues(const Terms& t, const ProductMaterial& m, const BlockLight& light, const float* nodes,
-                  const float* middle, size_t stride) {
-  const F d;
-  V least = Fill(INFINITY), most = hn::Zero(d), back = hn::Zero(d);
-  for (size_t i = 0; i < 16; i += lanes) {
-    V value = hn::Zero(d);
-    for (int k = 0; k < count; ++k)
-      value = hn::MulAdd(Fill(largest(t.colour[k])), hn::Load(d, nodes + 16 * k + i), value);
-    least = hn::Min(least, value), most = hn::Max(most, value);
-    back = hn::MulAdd(value, hn::LoadU(d, light.middle_weights.data() + i), back);
-  }
-  float centre = 0;
-  for (int k = 0; k < count; ++k) centre += largest(t.colour[k]) * middle[size_t(k) * stride];
-  const float low = std::min(hn::GetLane(hn::MinOfLanes(d, least)), centre),
-              high = std::max(hn::GetLane(hn::MaxOfLanes(d, most)), centre);
-  if (pi * (high - low) < m.tolerance) return 1;
-  const float off = std::abs(hn::GetLane(hn::SumOfLanes(d, back)) - centre);
-  return pi * off < 0.25f * m.tolerance && high < 2 * low ? 3 : 4;
-}
-
-// s_k of a block by interpolation between its nodes.
-template <int count>
-struct Interpolated {
-  const float *along, *cardinal;  // [k][node column][row], [node column][column]
-  int side;
-  HWY_INLINE void operator()(size_t row, size_t column, V, V, V, V* s) const {
-    const F d;
-    for (int k = 0; k < count; ++k) {
-      const float* a = along + 64 * k + row;
-      s[k] = hn::Mul(Fill(a[0]), hn::LoadU(d, cardinal + column));
-      for (int i = 1; i < side; ++i) s[k] = hn::MulAdd(Fill(a[16 * i]), hn::LoadU(d, cardinal + 16 * i + column), s[k]);
-    }
-  }
-};
-template <int count>
-Interpolated<count> Interpolate(const float* nodes, const float* cardinal, int side, float* along) {
-  const F d;
-  for (int k = 0; k < count; ++k)
-    for (int i = 0; i < side; ++i)
-      for (size_t row = 0; row < size_t(block_side); row += lanes) {
-        V sum = hn::Zero(d);
-        for (int j = 0; j < side; ++j)
-          sum = hn::MulAdd(Fill(nodes[16 * k + j * side + i]), hn::LoadU(d, cardinal + 16 * size_t(j) + row), sum);
-        hn::Store(sum, d, along + 64 * k + 16 * i + row);
-      }
-  return {along, cardinal, side};
-}
-
 // Blocks that the lobe reaches, of those that are seen; and the lobe at their middles.
 template <class Lobe>
 void FindLit(const Lobe& lobe, BlockScratch& s, const Cube& cube, const ProductMaterial& m) {
@@ -287,28 +226,43 @@ void FindLit(const Lobe& lobe, BlockScratch& s, const Cube& cube, const ProductM
   }
 }
 
-// Samples by class of a block that is lit, 1 to 4, with the lobe at its nodes where values were asked.
+// Samples by class of a block that is lit, 1 to 5, with the lobe at its nodes where values were asked.
 template <class Lobe>
 HWY_INLINE int ClassOf(const Lobe& lobe, BlockScratch& s, const BlockLight& light, const ProductMaterial& m, Vec3 n,
-                       size_t b, bool clear, bool& known) {
+                       size_t b, bool clear, Known& known) {
+  constexpr bool phong = std::is_same_v<Lobe, PhongLobe>;
   const Cube& cube = *light.cube;
   const size_t stride = cube.nodes[0].x.size();
   int samples = 1;
-  while (samples < 4 && s.cosines[b] > m.cosines[size_t(samples)]) ++samples;
-  if (!std::is_same_v<Lobe, PhongLobe> && !clear && samples < 4) {
-    // Nodes below the horizon say nothing about the block's part above it.
-    const float height = dot(n, cube.nodes[0].at(b));
-    if (height <= 0 || (height < light.rise[b] && samples > 1)) return s.most_class;
+  while (samples < all_classes && s.cosines[b] > m.cosines[size_t(samples)]) ++samples;
+  const float height = phong || clear ? 1 : dot(n, cube.nodes[0].at(b));
+  const bool cut = !phong && !clear && height < light.rise[b];
+  // Nodes below the horizon say nothing about the block's part above it.
+  if (height <= 0 || (cut && samples > 1)) return s.most_class;
+  if (m.by_values && samples < all_classes) {
+    AtNodes<16>(lobe, cube.nodes[2], b, s.nodes), known.nodes = true;
+    if (samples < 4) samples = ClassByValues<Lobe::count>(s.colour_weights, m, light, s.nodes, &s.middles[b], stride);
+    if (cut && samples > 1) samples = all_classes;
+    if (samples == 4 && !light.sharp[b] && s.most_class >= 4) {
+      AtNodes<64>(lobe, cube.nodes[3], b, s.fine), known.fine = true;
+      if (!IsFineEnough<Lobe::count>(s.colour_weights, m, light, s.fine, s.nodes)) samples = all_classes;
+    }
   }
-  if (m.by_values && samples < 4) {
-    const DirectionArray& nodes = cube.nodes[2];
-    AtNodes(lobe, &nodes.x[16 * b], &nodes.y[16 * b], &nodes.z[16 * b], s.nodes);
-    samples = ClassByValues<Lobe::count>(lobe.t, m, light, s.nodes, &s.middles[b], stride), known = true;
-    if (!std::is_same_v<Lobe, PhongLobe> && !clear && samples > 1 && dot(n, cube.nodes[0].at(b)) < light.rise[b])
-      samples = 4;
+  // Phong's lobe at a texel is no dearer than what interpolates it there.
+  if (samples == 4 && (light.sharp[b] || (phong && !clear))) samples = all_classes;
+  return std::min(samples, s.most_class);
+}
+
+// Light in a block times the lobe at its nodes, in four sums, which do not wait for one another.
+HWY_INLINE Row SumCoarse(const float* coarse, const float* nodes, size_t count) {
+  Row first = ZeroRow(), second = first, third = first, fourth = first;
+  for (size_t i = 0; i < count; i += 4, coarse += 4 * sum_width) {
+    AddTimes(first, nodes[i], LoadRow(coarse)), AddTimes(second, nodes[i + 1], LoadRow(coarse + sum_width));
+    AddTimes(third, nodes[i + 2], LoadRow(coarse + 2 * sum_width));
+    AddTimes(fourth, nodes[i + 3], LoadRow(coarse + 3 * sum_width));
   }
-  if (samples > s.most_class) samples = s.most_class, known &= samples == 3;
-  return samples;
+  AddRow(first, second), AddRow(third, fourth), AddRow(first, third);
+  return first;
 }
 
 // What a receiver's lobe makes of it.
@@ -328,7 +282,7 @@ void AddLitBlock(const Lobe& lobe, BlockScratch& s, const BlockLight& light, con
   constexpr int count = Lobe::count;
   const Cube& cube = *light.cube;
   const size_t stride = cube.nodes[0].x.size();
-  bool known = false;
+  Known known;
   const int samples = ClassOf(lobe, s, light, m, n, b, !changes, known);
   ++tally.samples[size_t(samples - 1)];
   ++(!changes ? tally.light_brdf : samples == 1 ? tally.light_visibility : tally.triple);
@@ -340,26 +294,32 @@ void AddLitBlock(const Lobe& lobe, BlockScratch& s, const BlockLight& light, con
       for (int k = 0; k < count; ++k) AddTimes(sums.rows[k + 1], s.middles[size_t(k) * stride + b], seen);
   }
   if (samples == 1) return;
-  const size_t grid = size_t(samples - 1), each = samples < 4 ? nodes_each[grid] : 0;
-  if (samples < 4 && !known) AtBlockNodes(lobe, cube, samples, b, s.nodes);
-  if (samples < 4 && !changes) {
-    const float* row = light.coarse.data() + (b * coarse_each + (samples == 2 ? 0 : 4)) * sum_width;
-    for (size_t i = 0; i < each; ++i, row += sum_width) {
-      const Row cardinal = LoadRow(row);
-      for (size_t k = 0; k < size_t(count); ++k) AddTimes(sums.rows[k + 1], s.nodes[16 * k + i], cardinal);
+  AtKnownNodes(lobe, s, cube, samples, b, known);
+  const size_t grid = size_t(samples - 1);
+  const float* nodes = samples == 4 ? s.fine : s.nodes;
+  if (samples < all_classes && !changes) {
+    const float* row = light.coarse.data() + (b * coarse_each + coarse_begin[grid]) * sum_width;
+    const size_t apart = samples == 4 ? 64 : 16;
+    for (size_t k = 0; k < size_t(count); ++k, nodes += apart) {
+      const Row part = SumCoarse(row, nodes, nodes_each[grid]);
+      AddRow(sums.rows[k + 1], part);
     }
     return;
   }
   Seen seen;
   if (changes) ReadTexels(*changes, scale, s.weights, seen);
   const float* texels = light.texels.data() + b * 6 * block_texels;
-  if (samples < 4) {
-    AddTexels(sums.texels, texels, &seen, n,
-              Interpolate<count>(s.nodes, cube.cardinal[grid].data(), node_sides[grid], s.along));
-  } else {
+  auto interpolate = [&](auto side) HWY_ATTR {
+    AddTexels(
+        sums.texels, texels, &seen, n,
+        Interpolate<count, decltype(side)::value>(nodes, samples == 4 ? 64 : 16, cube.cardinal[grid].data(), s.along));
+  };
+  if (samples == 2) interpolate(std::integral_constant<int, 2>());
+  else if (samples == 3) interpolate(std::integral_constant<int, 4>());
+  else if (samples == 4) interpolate(std::integral_constant<int, 8>());
+  else
     AddTexels(sums.texels, texels, changes ? &seen : nullptr, n,
               [&](size_t, size_t, V x, V y, V z, V* out) HWY_ATTR { lobe(x, y, z, out); });
-  }
 }
 
 // What BRDFs took of that, done once more.
@@ -372,11 +332,11 @@ void EvaluateLit(const Lobe& lobe, BlockScratch& s, const BlockLight& light, con
     for (uint32_t bits = (s.clear[w] | s.mixed[w]) & s.lit[w]; bits; bits &= bits - 1) {
       const auto bit = uint32_t(std::countr_zero(bits));
       const size_t b = w * 32 + bit;
-      bool known = false;
+      Known known;
       const int samples = ClassOf(lobe, s, light, m, n, b, s.clear[w] >> bit & 1, known);
-      if (samples > 1 && samples < 4 && !known) AtBlockNodes(lobe, cube, samples, b, s.nodes);
+      AtKnownNodes(lobe, s, cube, samples, b, known);
       const float* l = light.texels.data() + b * 6 * block_texels;
-      for (size_t i = 0; i < size_t(block_texels) && samples == 4; i += lanes) {
+      for (size_t i = 0; i < size_t(block_texels) && samples == all_classes; i += lanes) {
         V values[Lobe::count];
         lobe(hn::Load(d, l + i), hn::Load(d, l + 256 + i), hn::Load(d, l + 512 + i), values);
         for (V v : values) sink = hn::Add(sink, v);
@@ -419,10 +379,11 @@ Vec3 ShadeBlocks(BlockScratch& s, const BlockLight& light, const Visibility& vis
   const bool diffuse = t.lambert != Vec3(0);
   Clock clock(times);
   std::fill(s.lit.begin(), s.lit.end(), 0u);
+  for (size_t k = 0; k < 3; ++k) s.colour_weights[k] = largest(t.colour[k]);
   WithLobe(t, [&](auto lobe) HWY_ATTR { FindLit(lobe, s, cube, material); });
   clock.Stage(&StageTimes::brdf);
-  if (binary) ReadSight<true>(s, visibility, receiver, diffuse);
-  else ReadSight<false>(s, visibility, receiver, diffuse);
+  if (binary) ReadSight<true>(s, light.sums.data(), visibility, receiver, diffuse);
+  else ReadSight<false>(s, light.sums.data(), visibility, receiver, diffuse);
   TallyDiffuse(s, blocks, words, tally);
   clock.Stage(&StageTimes::visibility);
   Vec3 out(0);

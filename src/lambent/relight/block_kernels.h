@@ -13,10 +13,11 @@ struct BlockScratch {
   AlignedVector<uint32_t> rows;       // of the sums: begins and ends of runs, in turn, of all other mixed blocks
   AlignedVector<float> steps;         // what of each is counted, where blocks are seen by shares
   size_t row_count = 0;
-  int most_class = 4;            // 1 to 4: 1, 4, 16 or 256 samples a block at most
+  int most_class = all_classes;  // 1 to 5: 1, 4, 16, 64 or 256 samples a block at most
   AlignedVector<float> cosines;  // of blocks' middles to the mirror image of the view
   AlignedVector<float> middles;  // lobes there
-  alignas(64) float weights[block_texels], nodes[3 * 16], along[3 * 4 * 16];
+  float colour_weights[3] = {};  // what a term counts, the largest channel
+  alignas(64) float weights[block_texels], nodes[3 * 16], fine[3 * 64], along[3 * 8 * 16];
 };
 
 // As shade_blocks() of products.h. `times`: what its parts took is added there.

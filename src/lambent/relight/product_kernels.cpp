@@ -76,6 +76,34 @@ void IntegrateTexels(const float* light, const float* weight, Vec3 n, const floa
   else IntegrateCount<3>(light, weight, n, terms, plain, rows, sums);
 }
 
+// Along rows first.
+void FoldMoments(const float* const* cardinal, const float* moments, float* coarse) {
+  const F d;
+  for (size_t k = 1; k < 4; ++k) {
+    const auto side = size_t(node_sides[k]);
+    const float* c = cardinal[k];
+    for (size_t l = 0; l < sum_width; l += hn::Lanes(d))
+      for (size_t i = 0; i < side; ++i) {
+        V along[block_side];
+        for (size_t row = 0; row < size_t(block_side); ++row) {
+          const float* m = moments + row * block_side * sum_width + l;
+          V even = hn::Zero(d), odd = even;
+          for (size_t x = 0; x < size_t(block_side); x += 2) {
+            even = hn::MulAdd(Fill(c[i * block_side + x]), hn::Load(d, m + x * sum_width), even);
+            odd = hn::MulAdd(Fill(c[i * block_side + x + 1]), hn::Load(d, m + (x + 1) * sum_width), odd);
+          }
+          along[row] = hn::Add(even, odd);
+        }
+        for (size_t j = 0; j < side; ++j) {
+          V sum = hn::Zero(d);
+          for (size_t row = 0; row < size_t(block_side); ++row)
+            sum = hn::MulAdd(Fill(c[j * block_side + row]), along[row], sum);
+          hn::StoreU(sum, d, coarse + (coarse_begin[k] + j * side + i) * sum_width + l);
+        }
+      }
+  }
+}
+
 }  // namespace HWY_NAMESPACE
 }  // namespace
 }  // namespace lambent
@@ -87,6 +115,7 @@ namespace {
 
 HWY_EXPORT(EvaluateTerms);
 HWY_EXPORT(IntegrateTexels);
+HWY_EXPORT(FoldMoments);
 }  // namespace
 
 Terms make_terms(const Brdf& brdf, const Mat3& frame, Vec3 wo_world) {
@@ -139,6 +168,12 @@ void evaluate_terms(const Terms& t, const float* x, const float* y, const float*
 void integrate_texels(const float* light, const float* weight, Vec3 n, const float* terms, int count, bool plain,
                       uint32_t rows, Vec3* sums) {
   HWY_DYNAMIC_DISPATCH(IntegrateTexels)(light, weight, n, terms, count, plain, rows, sums);
+}
+
+void fold_moments(const Cube& cube, const float* moments, float* coarse) {
+  const float* cardinal[4];
+  for (size_t k = 0; k < 4; ++k) cardinal[k] = cube.cardinal[k].data();
+  HWY_DYNAMIC_DISPATCH(FoldMoments)(cardinal, moments, coarse);
 }
 
 }  // namespace lambent

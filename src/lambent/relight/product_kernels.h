@@ -20,7 +20,9 @@ struct Terms {
 
 // A row of the light's sums has twelve numbers, and begins on a cache line.
 inline constexpr size_t sum_width = 16;
-inline constexpr size_t nodes_each[3] = {1, 4, 16}, coarse_each = 20;
+// Of 4, 16 and 64 samples the coarse light's rows begin at 0, 4 and 20.
+inline constexpr size_t nodes_each[4] = {1, 4, 16, 64}, coarse_begin[4] = {0, 0, 4, 20}, coarse_each = 84;
+inline constexpr int all_classes = 5;  // of so many samples, and of all
 
 // Roughness as it is evaluated.
 inline Vec2 widths(Vec2 alpha) { return max(alpha, Vec2(min_alpha)); }
@@ -35,5 +37,8 @@ void evaluate_terms(const Terms& t, const float* x, const float* y, const float*
 // with n; or, `plain`, as they are.
 void integrate_texels(const float* light, const float* weight, Vec3 n, const float* terms, int count, bool plain,
                       uint32_t rows, Vec3* sums);
+
+// Rows of M, [texel][16], of a block, to those times the cardinal functions of 4, 16 and 64 nodes, [84][16].
+void fold_moments(const Cube& cube, const float* moments, float* coarse);
 
 }  // namespace lambent

@@ -24,10 +24,10 @@ float equivalent_exponent(const Brdf& brdf) {
   return 0;
 }
 
-// Largest error over a block, whose middle is `angle` from a Phong lobe's axis, of no sample, 1, 4 and 16: numerically,
-// on a flat block.
-std::array<float, 4> phong_errors(float exponent, float angle, float half_width, const Cube& cube) {
-  std::array<float, 4> errors{};
+// Largest error over a block, whose middle is `angle` from a Phong lobe's axis, of no sample, 1, 4, 16 and 64:
+// numerically, on a flat block.
+std::array<float, 5> phong_errors(float exponent, float angle, float half_width, const Cube& cube) {
+  std::array<float, 5> errors{};
   for (float turn : {0.0f, pi / 4}) {
     auto lobe = [&](float x, float y) {
       const float u = x * std::cos(turn) - y * std::sin(turn) + angle, v = x * std::sin(turn) + y * std::cos(turn),
@@ -35,18 +35,17 @@ std::array<float, 4> phong_errors(float exponent, float angle, float half_width,
       return theta < pi / 2 ? std::pow(std::cos(theta), exponent) * (exponent + 2) / (2 * pi) : 0.0f;
     };
     auto place = [&](float texel) { return (texel / 8 - 1) * half_width; };
-    float nodes[3][16];
-    for (int k = 0; k < 3; ++k)
+    float nodes[4][64];
+    for (int k = 0; k < 4; ++k)
       for (int i = 0; i < node_sides[k] * node_sides[k]; ++i) {
-        const float step = 16.0f / float(node_sides[k]);
-        nodes[k][i] =
-            lobe(place((float(i % node_sides[k]) + 0.5f) * step), place((float(i / node_sides[k]) + 0.5f) * step));
+        const int n = node_sides[k];
+        nodes[k][i] = lobe(place(float(node_place(n, i % n))), place(float(node_place(n, i / n))));
       }
     for (int y = 0; y < 16; ++y)
       for (int x = 0; x < 16; ++x) {
         const float truth = lobe(place(float(x) + 0.5f), place(float(y) + 0.5f));
         errors[0] = std::max(errors[0], truth);
-        for (int k = 0; k < 3; ++k) {
+        for (int k = 0; k < 4; ++k) {
           float sum = 0;
           const int n = node_sides[k];
           for (int i = 0; i < n * n; ++i)
@@ -113,6 +112,12 @@ void set_cube(BlockLight& out, int size) {
   const std::vector<float>& c = out.cube->cardinal[2];
   auto half_way = [&](size_t i) { return 0.5f * (c[i * 16 + 7] + c[i * 16 + 8]); };
   for (size_t i = 0; i < 16; ++i) out.middle_weights[i] = half_way(i % 4) * half_way(i / 4);
+  auto between = [](int node, int at) { return fine_cardinal(node, node_place(4, at)); };
+  out.between.resize(64 * 16);
+  for (int i = 0; i < 64 * 16; ++i) {
+    const int node = i / 16, at = i % 16;
+    out.between[size_t(i)] = float(between(node % 8, at % 4) * between(node / 8, at / 4));
+  }
 }
 
 }  // namespace
@@ -124,32 +129,30 @@ void set_light(BlockLight& out, const CubeLight& light) {
   // Rows are read by sixteen numbers.
   out.texels.resize(blocks * 6 * block_texels), out.sums.resize((blocks * block_texels + 2) * sum_width),
       out.whole.resize((blocks + 1) * sum_width), out.coarse.resize((blocks * coarse_each + 1) * sum_width);
+  out.sharp.resize(blocks);
+  double all = 0;
+  for (const Vec3& e : light.energy) all += double(largest(e));
+  const auto much = float(1e-3 * all);
   parallel_for(blocks, 8, [&](size_t begin, size_t end) {
     for (size_t b = begin; b < end; ++b) {
+      out.sharp[b] = 0;
       float* texels = out.texels.data() + b * 6 * block_texels;
       float* coarse = out.coarse.data() + b * coarse_each * sum_width;
-      std::fill(coarse, coarse + coarse_each * sum_width, 0.0f);
       double sum[sum_width] = {};
+      alignas(64) float moments[block_texels * sum_width];
       for (size_t t = block_texels; t-- > 0;) {
         const Vec3 d = light.direction[b * block_texels + t], e = light.energy[b * block_texels + t];
-        float m[sum_width] = {};
+        out.sharp[b] |= largest(e) > much;
+        float* m = moments + t * sum_width;
+        std::fill(m, m + sum_width, 0.0f);
         for (size_t k = 0; k < 3; ++k) {
           texels[k * block_texels + t] = d[int(k)], texels[(3 + k) * block_texels + t] = e[int(k)];
           for (size_t c = 0; c < 3; ++c) m[4 * k + c] = d[int(k)] * e[int(c)];
         }
         float* sums = out.sums.data() + (b * block_texels + t) * sum_width;
         for (size_t i = 0; i < sum_width; ++i) sum[i] += double(m[i]), sums[i] = float(sum[i]);
-        const size_t x = t % block_side, y = t / block_side;
-        float* at = coarse;
-        for (size_t k = 1; k < 3; ++k) {
-          const size_t side = size_t(node_sides[k]);
-          for (size_t j = 0; j < side; ++j)
-            for (size_t i = 0; i < side; ++i, at += sum_width) {
-              const float w = cube.cardinal[k][i * block_side + x] * cube.cardinal[k][j * block_side + y];
-              for (size_t l = 0; l < sum_width; ++l) at[l] += w * m[l];
-            }
-        }
       }
+      fold_moments(cube, moments, coarse);
       std::copy_n(out.sums.data() + b * block_texels * sum_width, sum_width, out.whole.data() + b * sum_width);
     }
   });
@@ -161,31 +164,33 @@ ProductMaterial make_product_material(const Brdf& brdf, const Cube& cube, const 
   const float exponent = equivalent_exponent(brdf);
   const auto* phong = std::get_if<Phong>(&brdf);
   if (sampling.rule == SamplingRule::full) {
-    m.cosines = {-2, -2, -2, -2};
+    m.cosines = {-2, -2, -2, -2, -2};
   } else if (sampling.rule == SamplingRule::appendix_a) {
     const float wide = std::cos(pi / 4), narrow = std::cos(pi / 8);
-    if (exponent < 30) m.cosines = {-2, exponent > 0 ? wide : 2, 2, 2};
-    else m.cosines = {-2, wide, narrow, exponent > 250 ? narrow : 2};
+    const float most = exponent > 250 ? narrow : 2;
+    if (exponent < 30) m.cosines = {-2, exponent > 0 ? wide : 2, 2, 2, 2};
+    else m.cosines = {-2, wide, narrow, most, most};
   } else if (phong) {
     // From the far side on, the first angle at which the error is too large; twice the tolerance, since this is the
     // worst of the block.
     constexpr int steps = 90;
-    m.cosines = {2, 2, 2, 2};
+    m.cosines = {2, 2, 2, 2, 2};
     const float half_width = cube.widest / std::sqrt(2.0f), weight = pi * largest(phong->specular);
     for (int i = steps; i >= 0; --i) {
       const float angle = float(i) * pi / steps;
-      const std::array<float, 4> errors = phong_errors(phong->exponent, angle, half_width, cube);
-      for (size_t k = 0; k < 4; ++k)
-        if (m.cosines[k] > 1 && weight * errors[k] > 2 * sampling.tolerance)
+      const std::array<float, 5> errors = phong_errors(phong->exponent, angle, half_width, cube);
+      for (size_t k = 0; k < 5; ++k)
+        if (m.cosines[k] > 1 && weight * errors[k] > (k < 4 ? 2 : 0.1f) * sampling.tolerance)
           m.cosines[k] = std::cos(std::min(pi, angle + pi / steps)) - 1e-6f;
     }
     // More samples are never wrong: the classes are nested.
-    for (size_t k = 3; k > 0; --k) m.cosines[k - 1] = std::min(m.cosines[k - 1], m.cosines[k]);
+    for (size_t k = 4; k > 0; --k) m.cosines[k - 1] = std::min(m.cosines[k - 1], m.cosines[k]);
   } else {
-    // Near a lobe narrower than the nodes' spacing, values at nodes say nothing.
+    // Near a lobe narrower than the nodes' spacing, values at 16 nodes say nothing; nor, of a narrower one, at 64.
     m.by_values = true;
     const float deviation = exponent > 0 ? 1 / std::sqrt(exponent) : 1;
-    m.cosines = {-2, 2, 2, deviation < cube.widest ? std::cos(std::min(pi, cube.widest + 3 * deviation)) : 2};
+    const float near = std::cos(std::min(pi, cube.widest + 3 * deviation));
+    m.cosines = {-2, 2, 2, deviation < cube.widest / 2 ? near : 2, deviation < cube.widest / 4 ? near : 2};
   }
   return m;
 }
@@ -201,7 +206,7 @@ Vec3 diffuse_albedo(const Brdf& brdf) {
 
 void Breakdown::add(const Breakdown& b) {
   blocked += b.blocked, light_brdf += b.light_brdf, light_visibility += b.light_visibility, triple += b.triple;
-  for (size_t k = 0; k < 4; ++k) samples[k] += b.samples[k];
+  for (size_t k = 0; k < samples.size(); ++k) samples[k] += b.samples[k];
   times.visibility += b.times.visibility, times.brdf += b.times.brdf, times.integral += b.times.integral,
       times.receivers += b.times.receivers;
   largest_off = std::max(largest_off, b.largest_off), squares_off += b.squares_off, squares += b.squares;
@@ -336,8 +341,8 @@ Vec3 shade_one(BlockScratch& s, const BlockLight& light, const Visibility& visib
     tally.times.visibility += times.visibility, tally.times.brdf += times.brdf, tally.times.integral += times.integral;
     ++tally.times.receivers;
   }
-  if (most_class < 4) {
-    s.most_class = 4;
+  if (most_class < all_classes) {
+    s.most_class = all_classes;
     const Vec3 whole = shade_blocks_in_simd(s, light, visibility, r, material, terms, other);
     const double off = double(largest(abs(value - whole)));
     tally.largest_off = std::max(tally.largest_off, off), tally.squares_off += off * off;
@@ -362,7 +367,11 @@ void shade_receivers(Product product, const BlockLight& light, const HaarLight* 
   if (!scratch) scratch = &own.emplace();
   ProductScratch::Pools& pools = scratch->pools();
   clear_output(pools, seen, visibility.receivers, keep, out);
-  const int most_class = most_samples >= 256 ? 4 : most_samples >= 16 ? 3 : most_samples >= 4 ? 2 : 1;
+  const int most_class = most_samples >= 256 ? all_classes
+                       : most_samples >= 64  ? 4
+                       : most_samples >= 16  ? 3
+                       : most_samples >= 4   ? 2
+                                             : 1;
   parallel_for(seen.size(), 64, [&](size_t begin, size_t end) {
     const auto s = pools.products.borrow();
     Breakdown tally;

@@ -25,14 +25,18 @@ struct BlockLight {
   AlignedVector<float> texels;  // standard: [block][direction x, y, z, energy r, g, b][256]
   AlignedVector<float> sums;    // eq. 6: [block][texel][12], M summed from the texel to the block's end; and a 0
   AlignedVector<float> whole;   // [block][12], M summed over the block
-  AlignedVector<float> coarse;  // [block][4 + 16][12], M times the cardinal functions of 4 and 16 samples
+  AlignedVector<float> coarse;  // [block][4 + 16 + 64][12], M times the cardinal functions of so many samples
   std::vector<float> rise;      // by block, sine of its reach: its part of the horizon
+  // By block, whether one of its texels has a thousandth of all light or more: where in the texel that comes from is
+  // seen, and samples are taken there.
+  std::vector<uint8_t> sharp;
   std::array<float, 16> middle_weights{};  // of the values at 16 nodes, in what they interpolate at a block's middle
+  AlignedVector<float> between;            // [64][16], of those at 64 nodes, in what they interpolate at the 16
 };
 // Rebuilds all three. Allocates the first time only.
 void set_light(BlockLight& out, const CubeLight& light);
 
-// How many samples of a BRDF a block gets: 1, 4, 16 or 256.
+// How many samples of a BRDF a block gets: 1, 4, 16, 64 or 256.
 enum class SamplingRule {
   bounded,     // as few as keep the error of BRDF x pi, times the lobe's colour, under a tolerance
   appendix_a,  // the paper's angles and exponents; other models than Phong's by the exponent of a lobe as wide
@@ -44,11 +48,11 @@ struct Sampling {
 };
 
 // A BRDF, and how near to the mirror image of the view a block has to be to get more samples: cosines of the angle
-// between that and the block's middle, for 1 sample (below it the lobe is left out), 4, 16 and 256.
+// between that and the block's middle, for 1 sample (below it the lobe is left out), 4, 16, 64 and 256.
 struct ProductMaterial {
   Brdf brdf;
-  std::array<float, 4> cosines{-2, 2, 2, 2};
-  bool by_values = false;  // bounded, for other models than Phong's: 16 samples tell whether 1, 16 or 256 do
+  std::array<float, 5> cosines{-2, 2, 2, 2, 2};
+  bool by_values = false;  // bounded, for other models than Phong's: samples tell whether 1, 16, 64 or 256 do
   float tolerance = 0;
 };
 ProductMaterial make_product_material(const Brdf& brdf, const Cube& cube, const Sampling& sampling);
@@ -66,9 +70,10 @@ struct StageTimes {
 // took; and where samples are limited, how far that is from none being so, and how bright it is then.
 struct Breakdown {
   size_t blocked = 0, light_brdf = 0, light_visibility = 0, triple = 0;
-  std::array<size_t, 4> samples{0, 0, 0, 0};  // 1, 4, 16, 256
+  std::array<size_t, 5> samples{0, 0, 0, 0, 0};  // 1, 4, 16, 64, 256
   StageTimes times = {};
   double largest_off = 0, squares_off = 0, squares = 0;  // of radiance, the largest channel
+  size_t all_samples() const { return samples[0] + samples[1] + samples[2] + samples[3] + samples[4]; }
   double error() const { return squares > 0 ? std::sqrt(squares_off / squares) : 0; }
   void add(const Breakdown& b);
 };
@@ -131,7 +136,7 @@ class ProductScratch {
 // Exit radiance of the receivers in `seen` towards the eye, row 0 of `out`; others are 0 or, where `keep`, what they
 // were (0 at first). All cores. Sizes `out` and `scratch` on first use and allocates nothing after that. With `scratch`
 // only those that it shaded in the last frames are set to 0 again, as long as `out` stays where it is. `most_samples`:
-// of a block, 1, 4, 16 or 256; blocks only.
+// of a block, 1, 4, 16, 64 or 256; blocks only.
 void shade_receivers(Product product, const BlockLight& light, const HaarLight* haar, const Visibility& visibility,
                      const ProductReceivers& receivers, std::span<const uint32_t> seen, Vec3 eye, Relit& out,
                      Breakdown* breakdown = nullptr, ProductScratch* scratch = nullptr, bool keep = false,

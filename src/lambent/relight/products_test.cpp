@@ -116,7 +116,7 @@ TEST(Products, BlocksSampledFullyAreTheStandardBasis) {
         EXPECT_EQ(tally.blocked + tally.light_brdf + tally.light_visibility + tally.triple,
                   s.points.size() * size_t(s.light.cube->blocks()));
         if (brdf.index() > 0) {
-          EXPECT_EQ(tally.samples[0] + tally.samples[1] + tally.samples[2], 0u);
+          EXPECT_EQ(tally.all_samples(), tally.samples[4]);
         }
       }
     }
@@ -169,7 +169,7 @@ TEST(Products, LimitedSamplesSayWhatTheyCost) {
     Breakdown whole, few;
     const Relit truth = shade(256, whole), coarse = shade(16, few);
     EXPECT_EQ(whole.error(), 0);
-    EXPECT_EQ(few.samples[3], 0u);
+    EXPECT_EQ(few.samples[3] + few.samples[4], 0u);
     double largest_off = 0, looked_at = 0;
     for (size_t r = 0; r < all.size(); ++r) {
       const double off = double(largest(abs(coarse.at(r) - truth.at(r))));
@@ -231,7 +231,7 @@ TEST(Products, DiffuseLightIsExact) {
     EXPECT_LT(largest_error(shade_blocks(s.light, s.visibility, r, m, s.points[r].frame, s.points[r].wo, &tally),
                             shade_standard_scalar(s.light, s.visibility, r, m, s.points[r].frame, s.points[r].wo)),
               1e-4);
-  EXPECT_EQ(tally.samples[1] + tally.samples[2] + tally.samples[3], 0u);
+  EXPECT_EQ(tally.all_samples(), tally.samples[0]);
 }
 
 double psnr(std::span<const Vec3> values, std::span<const Vec3> truth) {
@@ -241,6 +241,23 @@ double psnr(std::span<const Vec3> values, std::span<const Vec3> truth) {
       peak = std::max(peak, double(truth[i][c])),
       sum += (double(values[i][c]) - double(truth[i][c])) * (double(values[i][c]) - double(truth[i][c]));
   return 10 * std::log10(peak * peak * 3 * double(truth.size()) / std::max(sum, 1e-30));
+}
+
+// Sixty-four samples of a block give what all of them do, but where a texel has a sun, whose place within it they miss;
+// and of wide lobes they save most of those.
+TEST(Products, SixtyFourSamplesAreAsGoodAsAll) {
+  const Setting s = make_setting(64, 1, 150, 23);
+  for (const Brdf& brdf : {models[4], models[5], models[6], models[7]}) {
+    const ProductMaterial m = make_product_material(brdf, *s.light.cube, {.tolerance = 0.02f});
+    std::vector<Vec3> ours, full;
+    Breakdown tally;
+    for (size_t r = 0; r < s.points.size(); ++r) {
+      ours.push_back(shade_blocks(s.light, s.visibility, r, m, s.points[r].frame, s.points[r].wo, &tally));
+      full.push_back(shade_standard(s.light, s.visibility, r, m, s.points[r].frame, s.points[r].wo));
+    }
+    EXPECT_GT(psnr(ours, full), 65) << "model " << brdf.index();
+    EXPECT_GT(tally.samples[3], tally.all_samples() / 20) << "model " << brdf.index();
+  }
 }
 
 TEST(Products, FewSamplesAreNearTheStandardBasis) {
@@ -255,14 +272,15 @@ TEST(Products, FewSamplesAreNearTheStandardBasis) {
       theirs.push_back(shade_blocks(s.light, s.visibility, r, paper, s.points[r].frame, s.points[r].wo, &paper_tally));
       truth.push_back(shade_standard(s.light, s.visibility, r, m, s.points[r].frame, s.points[r].wo));
     }
-    const double all = double(tally.samples[0] + tally.samples[1] + tally.samples[2] + tally.samples[3]);
+    const double all = double(tally.all_samples());
     std::printf(
-        "model %zu: %.1f dB (samples 1, 4, 16, 256: %.1f %.1f %.1f %.1f %%), appendix A %.1f dB (256: %.1f %%)\n",
+        "model %zu: %.1f dB (samples 1, 4, 16, 64, 256: %.1f %.1f %.1f %.1f %.1f %%), appendix A %.1f dB (256: "
+        "%.1f %%)\n",
         brdf.index(), psnr(ours, truth), 100 * double(tally.samples[0]) / all, 100 * double(tally.samples[1]) / all,
-        100 * double(tally.samples[2]) / all, 100 * double(tally.samples[3]) / all, psnr(theirs, truth),
-        100 * double(paper_tally.samples[3]) / all);
+        100 * double(tally.samples[2]) / all, 100 * double(tally.samples[3]) / all,
+        100 * double(tally.samples[4]) / all, psnr(theirs, truth), 100 * double(paper_tally.samples[4]) / all);
     EXPECT_GT(psnr(ours, truth), 50) << "model " << brdf.index();
-    EXPECT_LT(double(tally.samples[3]), 0.6 * all) << "model " << brdf.index();
+    EXPECT_LT(double(tally.samples[4]), 0.4 * all) << "model " << brdf.index();
   }
 }
 

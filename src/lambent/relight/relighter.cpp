@@ -158,8 +158,8 @@ struct OfBlocks {
   }
   Result<void> relight(const RelightFrame& frame, Relit& out) {
     if (auto ok = at_rest(frame); !ok) return ok;
-    if (const int n = frame.most_samples; n != 1 && n != 4 && n != 16 && n != 256)
-      return wrong("a block has 1, 4, 16 or 256 samples at most, not " + std::to_string(n));
+    if (const int n = frame.most_samples; n != 1 && n != 4 && n != 16 && n != 64 && n != 256)
+      return wrong("a block has 1, 4, 16, 64 or 256 samples at most, not " + std::to_string(n));
     if (!frame.seen && all.empty()) all.resize(store.receivers), std::iota(all.begin(), all.end(), 0u);
     const std::span<const uint32_t> seen = frame.seen ? *frame.seen : all;
     if (auto ok = check_seen(frame, store.receivers); !ok) return ok;

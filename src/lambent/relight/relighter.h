@@ -38,7 +38,7 @@ struct RelightFrame {
   // transfer, clusters and lobes their neighbours in the store are relit with them; factors, wavelets and surfels, and
   // lobes under a light each, relight all.
   bool keep = false;
-  // Of BRDFs in a block, 1, 4, 16 or 256: fewer are faster, for what moves, and `breakdown` says what they cost.
+  // Of BRDFs in a block, 1, 4, 16, 64 or 256: fewer are faster, for what moves, and `breakdown` says what they cost.
   int most_samples = 256;
   std::optional<std::span<const uint32_t>> seen = std::nullopt;
   Breakdown* breakdown = nullptr;  // of blocks; added to
