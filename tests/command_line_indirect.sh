@@ -44,6 +44,9 @@ expect 1 'has no light in free space' render indirect.glb $seen --lamp point@0.4
 expect 2 'directional: of direct to indirect light is sh:2' bake corner.obj --transfer indirect --directional hl2 \
   -o x.glb
 expect 2 'frame-bounces: needs --frames' render indirect.glb $seen --lamp point@0,1,0=1 --frame-bounces 1 -o x.png
+expect 0 '"leaves_lit": 20' render texels.glb $seen --lamp point@0.4,0.6,0.5=3 --move '1@0:0.4,0.6,0.5;1:0.6,0.6,0.5' \
+  --frames 0:1 --frame-leaves 20 --json -o few_leaves.png
+expect 2 'frame-leaves: needs --frames' render indirect.glb $seen --lamp point@0,1,0=1 --frame-leaves 9 -o x.png
 expect 1 'directional, at texels, which the web page does not draw' export texels.glb --web site_indirect
 expect 2 'surfels: needs --receivers meshless' bake corner.obj --surfels 512 -o x.glb
 expect 0 'receivers' bake corner.obj --max-edge 0.2 --receivers meshless --surfels 256 --samples 64 -o meshless.glb

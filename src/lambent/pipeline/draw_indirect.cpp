@@ -22,9 +22,6 @@ namespace {
 using Clock = std::chrono::steady_clock;
 double seconds_since(Clock::time_point start) { return std::chrono::duration<double>(Clock::now() - start).count(); }
 
-constexpr float near_a_lamp = 3;  // spacings
-constexpr uint32_t still_seed = 0x57111;
-
 }  // namespace
 
 bool StillLight::shines() const {
@@ -52,67 +49,13 @@ Result<void> repaint(const DrawRequest& request, Scene& scene, const Surfels& su
   return {};
 }
 
-namespace {
-
-// Exit radiance of a white surface, by what stands still: what arrives, sample by sample.
-std::vector<LampLight>& still_light(const IndirectDrawing& d, const Scene& scene, const Tracer& tracer, Vec3 origin,
-                                    Vec3 normal, int samples, uint64_t key) {
-  const StillLight& still = d.still;
-  thread_local std::vector<LampLight> arrived;
-  arrived.clear();
-  if (!still.shines()) return arrived;
-  const bool spreads = still.lamps.sky || !still.lamps.area.empty();
-  const size_t rays = spreads ? size_t(samples) : 0;
-  sample_lamps(scene, tracer, still.lamps, origin, normal, samples, rays, still_seed, key, arrived);
-  const Mat3 frame = frame_about(normal);
-  for (size_t i = 0; i < rays; ++i) {
-    const Vec3 local = square_to_cosine_hemisphere(sobol_owen(uint32_t(i), uint32_t(hash64(key, still_seed))));
-    const Vec3 direction = frame * local;
-    const Hit hit = tracer.closest(origin, direction);
-    if (hit.triangle == none && still.lamps.sky)
-      arrived.push_back(met_sky(still.lamps, direction, local.z, samples, rays));
-    if (hit.triangle == none || still.lamps.of_triangle.empty()) continue;
-    const uint32_t lamp = still.lamps.of_triangle[hit.triangle];
-    if (lamp != none && emits(scene, scene.triangles[hit.triangle], hit.front))
-      arrived.push_back(met_lamp(scene, still.lamps, lamp, hit, direction, local.z, samples, rays));
-  }
-  return arrived;
-}
-
-Vec3 scaled_sum(const StillLight& still, const std::vector<LampLight>& arrived) {
-  Vec3 sum(0.0f);
-  for (const LampLight& l : arrived) sum += still.scales[l.group] * l.value;
-  return sum;
-}
-
-bool is_near(const IndirectDrawing& d, size_t leaf, Vec3 lamp) {
-  return length(d.transfer.surfels.positions[leaf] - lamp) < near_a_lamp * d.transfer.surfels.spacings.back();
-}
-
-// Calls light(place's lifted origin, its normal, number of places, key) for the places of a leaf.
-size_t over_leaf(const IndirectDrawing& d, size_t leaf, bool near, const IndirectQuality& quality, auto light) {
-  std::vector<SurfacePlace> many;
-  near = near && quality.places_near > quality.places;
-  if (near)
-    many = places_of_leaf(d.scene, d.tracer, d.transfer.surfels, *d.search, uint32_t(leaf), quality.places_near);
-  const std::vector<SurfacePlace>& places = near ? many : d.places[leaf];
-  const size_t count = near ? places.size() : std::min(places.size(), quality.places);
-  for (size_t k = 0; k < count; ++k) {
-    const Vec3 p = places[k].position, n = places[k].normal;
-    light(p + n * receiver_lift(p, 0, d.diagonal), n, count, hash64(leaf, k));
-  }
-  return count;
-}
-
-}  // namespace
-
 Result<void> make_places(IndirectDrawing& d) {
   auto tracer = Tracer::build(d.scene, d.job.progress);
   if (!tracer) return tracer.error();
   d.tracer = std::move(*tracer), d.diagonal = bounds(d.scene).diagonal();
   d.search = std::make_unique<const SurfelSearch>(d.transfer.surfels, d.tracer, d.transfer.gather_level);
   const size_t leaves = d.transfer.surfels.count();
-  d.places.resize(leaves), d.direct.assign(leaves, Vec3(0.0f));
+  d.places.resize(leaves), d.near_places.assign(leaves, {}), d.direct.assign(leaves, Vec3(0.0f));
   ProgressStage stage(d.job.progress, "places", leaves);
   parallel_for(leaves, 64, [&](size_t begin, size_t end) {
     for (size_t i = begin; i < end && !stage.cancelled(); ++i, stage.advance())
@@ -121,65 +64,6 @@ Result<void> make_places(IndirectDrawing& d) {
   });
   if (stage.cancelled()) return Error{"", "cancelled"};
   return {};
-}
-
-void light_leaves(IndirectDrawing& d, size_t first, size_t count, const IndirectQuality& quality,
-                  ProgressStage* stage) {
-  d.still.at_leaves.resize(d.transfer.surfels.count());
-  if (!d.still.shines()) return;
-  parallel_for(count, 64, [&](size_t begin, size_t end) {
-    for (size_t i = first + begin; i < first + end; ++i) {
-      if (stage && stage->cancelled()) return;
-      const bool near = std::any_of(d.scene.lights.begin(), d.scene.lights.end(), [&](const PunctualLight& l) {
-        return l.kind != PunctualLight::Kind::directional && is_near(d, i, l.position);
-      });
-      std::vector<LampLight>& sums = d.still.at_leaves[i];
-      sums.clear();
-      const size_t places = over_leaf(d, i, near, quality, [&](Vec3 origin, Vec3 normal, size_t, uint64_t key) {
-        for (const LampLight& l : still_light(d, d.scene, d.tracer, origin, normal, quality.still_samples, key)) {
-          auto sum = std::find_if(sums.begin(), sums.end(), [&](const LampLight& s) { return s.group == l.group; });
-          if (sum == sums.end()) sums.push_back({l.group, normal, l.value});
-          else sum->value += l.value;
-        }
-      });
-      for (LampLight& sum : sums) sum.value /= float(places);
-      if (stage) stage->advance();
-    }
-  });
-}
-
-namespace {
-
-// Direct light of a leaf by a lamp that moves.
-Vec3 direct_at_leaf(const IndirectDrawing& d, const MovingLamp& lamp, size_t leaf, const IndirectQuality& quality) {
-  const bool near = lamp.kind != MovingLamp::Kind::sun && is_near(d, leaf, lamp.light.position);
-  Vec3 sum(0.0f);
-  const size_t count = over_leaf(d, leaf, near, quality, [&](Vec3 origin, Vec3 normal, size_t places, uint64_t key) {
-    sum += direct_light(d.tracer, {&lamp, 1}, origin, normal, std::max(quality.lamp_samples / int(places), 1), key);
-  });
-  return sum / float(count);
-}
-
-Vec3 still_at_leaf(const IndirectDrawing& d, size_t leaf) {
-  return d.still.at_leaves.empty() ? Vec3(0.0f) : scaled_sum(d.still, d.still.at_leaves[leaf]);
-}
-
-}  // namespace
-
-void light_lamp(IndirectDrawing& d, size_t k, size_t first, size_t count, const IndirectQuality& quality) {
-  parallel_for(count, 128, [&](size_t begin, size_t end) {
-    for (size_t i = first + begin; i < first + end; ++i)
-      d.lit[k].at_leaves[i] = direct_at_leaf(d, d.lit[k].lamp, i, quality);
-  });
-}
-
-void sum_direct(IndirectDrawing& d) {
-  parallel_for(d.direct.size(), 4096, [&](size_t begin, size_t end) {
-    for (size_t i = begin; i < end; ++i) {
-      d.direct[i] = still_at_leaf(d, i);
-      for (const LitLamp& lit : d.lit) d.direct[i] += lit.at_leaves[i];
-    }
-  });
 }
 
 void read_receivers(IndirectDrawing& d, DirectionalKind directional) {
@@ -193,12 +77,19 @@ namespace {
 
 // All direct light at leaves: of lamps that stand where they stood it is known, and their lights add up.
 void light_lamps(IndirectDrawing& d) {
-  d.lit.resize(d.lamps.size()), d.evaluated = 0;
+  const size_t leaves = d.direct.size(), most = size_t(d.request.frame_leaves);
+  d.lit.resize(d.lamps.size()), d.evaluated = d.leaves_lit = 0;
   for (size_t k = 0; k < d.lamps.size(); ++k) {
     LitLamp& lit = d.lit[k];
-    if (!lit.at_leaves.empty() && is_same(lit.lamp, d.lamps[k])) continue;
-    lit.lamp = d.lamps[k], lit.at_leaves.resize(d.direct.size()), ++d.evaluated;
-    light_lamp(d, k, 0, d.direct.size(), {});
+    const bool first = lit.at_leaves.empty();
+    if (!first && lit.behind == 0 && is_same(lit.lamp, d.lamps[k])) continue;
+    lit.lamp = d.lamps[k], ++d.evaluated;
+    if (first || most == 0) {
+      lit.at_leaves.resize(leaves), light_lamp(d, k, 0, leaves, {}), d.leaves_lit += leaves;
+      if (most > 0) lit.found = lit.at_leaves, lit.from.assign(leaves, lit.lamp.light.position);
+    } else {
+      d.leaves_lit += follow_lamp(d, k, most);
+    }
   }
   sum_direct(d);
 }
@@ -472,6 +363,7 @@ Result<Drawing> draw_indirect(const Baked& baked, const DrawRequest& request, co
                           {"frames", drawing.frames.size()},
                           {"bounces", d.solve.bounces},
                           {"lamps_evaluated", d.evaluated},
+                          {"leaves_lit", d.leaves_lit},
                           {"residual", d.solve.residual},
                           {"shadow_ray_seconds", d.ray_seconds},
                           {"solve_seconds", d.solve_seconds},

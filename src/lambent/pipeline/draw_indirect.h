@@ -40,6 +40,10 @@ struct StillLight {
 struct LitLamp {
   MovingLamp lamp;
   std::vector<Vec3> at_leaves{};
+  // Where not all leaves are lit anew each frame: what rays found last, where the lamp stood then, and how many leaves
+  // have not seen it where it stands.
+  std::vector<Vec3> found{}, from{};
+  size_t behind = 0;
 };
 
 // Objects put into the scene, over light in free space.
@@ -66,12 +70,14 @@ struct IndirectDrawing {
   std::vector<LampPath> paths{};
   std::unique_ptr<const SurfelSearch> search{};
   std::vector<std::vector<SurfacePlace>> places{};  // of leaves
+  // Those of leaves that a lamp has come near to: found once, as they take hundreds of rays a leaf.
+  std::vector<std::vector<SurfacePlace>> near_places{};
   IndirectSolve solve{};
   std::vector<LitLamp> lit{};  // the lamps
   std::vector<Vec3> direct{};  // at surfels
   Relit relit{};               // at receivers, where they are read
   ObjectsInScene objects{};
-  size_t evaluated = 0;  // lamps, in the last frame
+  size_t evaluated = 0, leaves_lit = 0;  // lamps, and leaves by all of them, in the last frame
   double ray_seconds = 1e9, solve_seconds = 1e9, read_seconds = 1e9;
 
   // What is seen.
@@ -89,11 +95,21 @@ Result<void> repaint(const DrawRequest& request, Scene& scene, const Surfels& su
 // Tracer, search, and the places of leaves, for d.scene. Errors: those of Tracer::build(); cancelled.
 Result<void> make_places(IndirectDrawing& d);
 
+// Exit radiance of a white surface by what stands still, sample by sample: the thread's own until it asks again.
+std::vector<LampLight>& still_light(const IndirectDrawing& d, const Scene& scene, const Tracer& tracer, Vec3 origin,
+                                    Vec3 normal, int samples, uint64_t key);
+// Their sum, each times its group's scale.
+Vec3 scaled_sum(const StillLight& still, const std::vector<LampLight>& arrived);
 // What stands still, at leaves [first, first + count): kept by group, so that lamps are scaled without a ray.
 void light_leaves(IndirectDrawing& d, size_t first, size_t count, const IndirectQuality& quality,
                   ProgressStage* stage = nullptr);
 // Light of lamp k alone at leaves [first, first + count), into d.lit[k], which has room for all.
 void light_lamp(IndirectDrawing& d, size_t k, size_t first, size_t count, const IndirectQuality& quality);
+// Light of lamp k at all leaves, which d.lit[k] knows of another place of it, by rays at `most` of them: those whose
+// shadow is likeliest to matter, by how bright the lamp would be there, what the leaf weighs, and the angle that the
+// lamp has moved by since it was looked at. The others keep their shadow, and have the light that is without one
+// change. Of a lamp that stands still all come to what light_lamp() finds, `most` a call. How many were lit.
+size_t follow_lamp(IndirectDrawing& d, size_t k, size_t most);
 // All direct light at leaves, of what stands still and of d.lit one after the other, into d.direct.
 void sum_direct(IndirectDrawing& d);
 

@@ -205,6 +205,30 @@ TEST(IndirectDrawing, LampsThatMovedAloneAreLitAnew) {
   EXPECT_GT(difference(settled->frames.front(), frames->frames.at(0)), 5e-3);
 }
 
+TEST(IndirectDrawing, FewLeavesAFrameFollowALampAndComeToTheSame) {
+  DrawRequest r = request();
+  r.show = "indirect", r.lamp = {"point@0.6,0.8,1.2=3"}, r.move = {"1@0:0.6,0.8,1.2;1:1.3,0.9,1.1"};
+  const auto pictures = [&](const char* frames, int leaves) {
+    r.frames = frames, r.frame_leaves = leaves;
+    auto drawing = draw(room(), r);
+    EXPECT_TRUE(drawing) << drawing.error().text();
+    return std::move(*drawing);
+  };
+  const Drawing all = pictures("0:1:0.25", 0), few = pictures("0:1:0.25", 60);
+  EXPECT_GT(all.summary.json["leaves_lit"], 240);
+  EXPECT_EQ(few.summary.json["leaves_lit"], 60);
+  // On the way, far nearer to what it is to be than the light that they began with.
+  const double start = difference(all.frames[0], all.frames[4]), behind = difference(few.frames[4], all.frames[4]);
+  EXPECT_GT(start, 0.05);
+  EXPECT_GT(behind, 0);
+  EXPECT_LT(behind, 0.25 * start);
+  // Where it stands still they all come to see it, and no more rays are sent.
+  const Drawing settled = pictures("0:4:0.25", 60);
+  EXPECT_EQ(settled.summary.json["leaves_lit"], 0);
+  EXPECT_EQ(settled.summary.json["lamps_evaluated"], 0);
+  EXPECT_LT(difference(settled.frames.back(), all.frames.back()), 2e-3);
+}
+
 TEST(IndirectDrawing, LampsInsideWallsHugeOrManyAreTaken) {
   // Within what is solid, or about all of the scene: a warning, and no light.
   for (const char* lamp : {"point@0.5,-0.5,0.5=3", "sphere@1,1,1,1000=3", "point@1e8,1e8,1e8=3"}) {

@@ -89,6 +89,10 @@ const Option<R> table[] = {
      "Bounces a frame, from the light of the frame before, so that what changes settles over the frames; 0: as many as "
      "it takes",
      0, 64, nullptr, "frames"},
+    {"frame-leaves", &R::frame_leaves, "Motion", I,
+     "Leaves that a lamp that moves lights anew a frame, those whose shadows may change most first; others keep their "
+     "shadow, and settle over the frames; 0: all",
+     0, 1 << 20, nullptr, "frames"},
     {"deform", &R::deform, "Motion", distant & ~(K | V),
      "bend:ANGLE[,along[,towards]] or twist:ANGLE[,along]: degrees from end to end, axes x, y or z"},
 
@@ -140,6 +144,7 @@ constexpr Conflict conflicts[] = {
     {"tolerance", "method=standard|haar", "needs --method blocks"},
     {"at", "show=direct|albedo", "reads light that --show leaves out"},
     {"frame-bounces", "show=direct|albedo", "are of light that --show leaves out"},
+    {"frame-leaves", "show=direct|albedo", "are of light that --show leaves out"},
     {"lamp", "show=albedo", "lights what --show albedo shows no light of"},
     {"sphere-lamp", "show=albedo|emission", "lights what --show leaves out"},
     {"window", "show=albedo|emission", "shapes light that --show leaves out"},

@@ -27,6 +27,7 @@ struct DrawRequest {
   std::string animation, frames, deform;
   double time = 0;
   int frame_bounces = 0;  // 0: as many as it takes
+  int frame_leaves = 0;   // 0: all
   // Blocks
   std::string method = "blocks", brdf_samples = "bounded", indirect = "none";
   float tolerance = 0;  // 0: 0.2 of Phong's lobes, 0.02 of other models

@@ -190,6 +190,7 @@ class LiveIndirect : public LiveKind {
   Result<void> check() const {
     const char* const option = !request_.insert.empty()   ? "--insert"
                              : request_.frame_bounces > 0 ? "--frame-bounces"
+                             : request_.frame_leaves > 0  ? "--frame-leaves"
                                                           : nullptr;
     if (option) return Error{option, "is of `render` where light is direct to indirect: no window draws it", true};
     return {};

@@ -200,14 +200,32 @@ Vec3 from_sphere(const Tracer& tracer, const MovingLamp& lamp, Vec3 origin, Vec3
   return lamp.radiance * sum * (2 * depth / float(samples));  // 2 pi depth, over pi
 }
 
+// Of a lamp without a size, with nothing in the way; and where it is from there.
+Vec3 from_point(const MovingLamp& lamp, Vec3 origin, Vec3 normal, LampArrival& a) {
+  a = arriving(lamp.light, origin);
+  const float facing = dot(normal, a.direction);
+  if (facing <= 0 || !(mean(a.irradiance) > 0) || !is_finite(a.irradiance)) return Vec3(0.0f);
+  return facing / pi * a.irradiance;
+}
+
 }  // namespace
+
+Vec3 clear_light(const MovingLamp& lamp, Vec3 origin, Vec3 normal) {
+  LampArrival a;
+  if (lamp.kind != MovingLamp::Kind::sphere) return from_point(lamp, origin, normal, a);
+  const Vec3 way = lamp.centre - origin;
+  const float far2 = dot(way, way), far = std::sqrt(far2);
+  if (!(far > lamp.radius)) return Vec3(0.0f);
+  // As of its middle; half of what may stand over the horizon where that does not.
+  const float facing = std::max(dot(normal, way), 0.5f * (dot(normal, way) + lamp.radius)) / far;
+  return facing > 0 ? lamp.radiance * (facing * lamp.radius * lamp.radius / far2) : Vec3(0.0f);
+}
 
 Vec3 direct_light(const Tracer& tracer, const MovingLamp& lamp, Vec3 origin, Vec3 normal, int samples, uint64_t key) {
   if (lamp.kind == MovingLamp::Kind::sphere) return from_sphere(tracer, lamp, origin, normal, samples, key);
-  const LampArrival a = arriving(lamp.light, origin);
-  const float facing = dot(normal, a.direction);
-  if (facing <= 0 || !(mean(a.irradiance) > 0) || !is_finite(a.irradiance)) return Vec3(0.0f);
-  return facing / pi * a.irradiance * reaching(tracer, origin, a.direction, a.distance);
+  LampArrival a;
+  const Vec3 clear = from_point(lamp, origin, normal, a);
+  return largest(clear) > 0 ? clear * reaching(tracer, origin, a.direction, a.distance) : Vec3(0.0f);
 }
 
 Vec3 direct_light(const Tracer& tracer, std::span<const MovingLamp> lamps, Vec3 origin, Vec3 normal, int samples,

@@ -66,6 +66,9 @@ Vec3 direct_light(const Tracer& tracer, std::span<const MovingLamp> lamps, Vec3 
 // That of lamp k of them is of hash64(key, k) alone.
 Vec3 direct_light(const Tracer& tracer, const MovingLamp& lamp, Vec3 origin, Vec3 normal, int samples, uint64_t key);
 
+// The same with nothing in the way; of a sphere, about.
+Vec3 clear_light(const MovingLamp& lamp, Vec3 origin, Vec3 normal);
+
 // The same lamps as the scene's own: punctual lights, and spheres as surfaces that glow and reflect nothing.
 void add_lamps(Scene& scene, const std::vector<MovingLamp>& lamps);
 

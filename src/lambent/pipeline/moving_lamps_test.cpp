@@ -1,3 +1,4 @@
+#include <lambent/core/random.h>
 #include <lambent/pipeline/moving_lamps.h>
 #include <lambent/scene/procedural.h>
 
@@ -106,6 +107,31 @@ TEST(MovingLamps, StandInASceneAsItsOwn) {
   for (const Triangle& t : scene.triangles)
     if (emits(scene, t, true)) area += double(area_length(area_normal(scene, t))) / 2;
   EXPECT_NEAR(area, double(pi), 0.01);
+}
+
+TEST(MovingLamps, ClearLightIsWhatArrivesWhereNothingIsInTheWay) {
+  Scene scene;
+  add_quad(scene, add_material(scene, "grey", Vec3(0.5f)), "floor", Vec3(0, -1, 0), Vec3(0, 0, 4), Vec3(4, 0, 0), 2, 2);
+  auto tracer = Tracer::build(scene);
+  ASSERT_TRUE(tracer);
+  for (const char* text : {"point@1.2,2.1,1.7=3,2,1", "spot@1.2,2.1,1.7,2,0,2,60=3,2,1", "sphere@1.2,2.1,1.7,0.2=3,2,1",
+                           "sun@40,50=3,2,1"}) {
+    const MovingLamp lamp = must(text);
+    Random random(5);
+    size_t bright = 0;
+    for (uint64_t i = 0; i < 1000; ++i) {
+      const Vec3 n = normalize(Vec3(random.next() - 0.5f, random.next(), random.next() - 0.5f));
+      const Vec3 p(4 * random.next(), 0, 4 * random.next());
+      const Vec3 clear = clear_light(lamp, p, n), lit = direct_light(*tracer, lamp, p, n, 64, i);
+      const bool sphere = lamp.kind == MovingLamp::Kind::sphere;
+      const bool over = dot(n, lamp.centre - p) > 0.25f;  // the whole sphere is over the horizon
+      if (!sphere || over)
+        ASSERT_LT(length(lit - clear), (sphere ? 0.03f : 1e-5f) * length(clear) + 1e-9f) << text << i;
+      else ASSERT_LE(largest(lit), 1.5f * largest(clear) + 1e-6f) << text << i;
+      bright += largest(clear) > 0;
+    }
+    EXPECT_GT(bright, 300u) << text;
+  }
 }
 
 }  // namespace
