@@ -108,7 +108,7 @@ void light_by(IndirectDrawing& d, const MovingLamp& lamp, size_t count, auto lea
       const bool near = lamp.kind != MovingLamp::Kind::sun && is_near(d, leaf, lamp.light.position);
       Vec3 sum(0.0f);
       const size_t places = over_leaf(d, leaf, near, quality, [&](Vec3 origin, Vec3 normal, size_t of, uint64_t key) {
-        sum += direct_light(d.tracer, lamp, origin, normal, std::max(quality.lamp_samples / int(of), 1), key);
+        sum += direct_light(d.tracer, {&lamp, 1}, origin, normal, std::max(quality.lamp_samples / int(of), 1), key);
       });
       at_leaves[leaf] = sum / float(places);
     }
