@@ -2,7 +2,7 @@
 // Scene -> Transfer: diffuse light transport, direct and bounced.
 #include <lambent/bake/certify.h>
 #include <lambent/core/progress.h>
-#include <lambent/receivers/project.h>
+#include <lambent/receivers/receivers.h>
 #include <lambent/scene/scene.h>
 #include <lambent/trace/tracer.h>
 #include <lambent/transfer/transfer.h>
@@ -36,7 +36,7 @@ struct BakeOptions {
   // traced: others stand for them (stand_in.h).
   size_t thin = 0;
   // What a receiver has: the value where it is, or coefficients of least squares by rays from places all over its basis
-  // function (receivers/project.h); of harmonics, with `samples`, on one rank, without denoising.
+  // function (receivers/receivers.h); of harmonics, with `samples`, on one rank, without denoising.
   Projection projection = Projection::collocation;
   // Others than the receivers are traced, surfels, about so many (0: as SurfelOptions has it): they bounce light, and
   // receivers, at vertices, read them by kernels (meshless.h).

@@ -7,8 +7,6 @@
 
 namespace lambent {
 
-enum class Projection { collocation, least_squares };
-
 // Places over each receiver's basis function, as dense as it is high: the mean of f over them is about the integral of
 // B_i f over that of B_i. Stratified; places start off their surfaces as receivers do.
 struct SpreadPlaces {

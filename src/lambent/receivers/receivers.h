@@ -15,6 +15,10 @@
 
 namespace lambent {
 
+// How a function on surfaces becomes numbers at receivers: its value where each is, or the coefficients that come
+// nearest to it over all surfaces (receivers/project.h).
+enum class Projection { collocation, least_squares };
+
 // The receivers at the corners of every triangle, and its part, together, since both are wanted at every hit.
 struct Corners {
   std::array<uint32_t, 3> receiver{none, none, none};
