@@ -17,14 +17,14 @@ import {
 } from 'three';
 import { LambentError } from './errors.js';
 import { isIndex } from './glb.js';
-import { noReceiver, readReceivers, shareGeometry } from './header.js';
+import { noReceiver, readReceivers } from './header.js';
 import { IndirectLight, type IndirectTimes } from './indirect_light.js';
 import { IndirectMaterial, pictureColumns, type IndirectUniforms } from './indirect_material.js';
 import { readOperator, type IndirectOperator } from './indirect_file.js';
 import { checkSolid, glowsOf, ownLamps, sceneTriangles, type OwnMaterial } from './indirect_scene.js';
 import { axesOf, isDrawn, limits, type BakedTransfer, type TransferKind, type TransferSource } from './kinds.js';
 import { LampLights } from './lamp_lights.js';
-import { readPlaces } from './lightmap.js';
+import { readPlacedMeshes } from './lightmap.js';
 import { placeLamp, type Lamp, type Rgb } from './moving_lamps.js';
 import { checkNodes, isNodeRenderer, onlyGlsl, setNodes, withoutNodes, type Renderer } from './node_edition.js';
 import { bindPart } from './vertex_transfer.js';
@@ -317,17 +317,7 @@ async function load(source: TransferSource): Promise<BakedTransfer> {
     receivers,
     'the atlas does not have one receiver a texel',
   );
-  const meshes: Mesh[] = [];
-  for (const part of extension.parts) {
-    const mesh = source.mesh(part),
-      geometry = shareGeometry(mesh.geometry),
-      vertices = geometry.getAttribute('position').count;
-    geometry.setAttribute('lambentPlace', await readPlaces(source, part.front, vertices));
-    if (part.back !== undefined)
-      geometry.setAttribute('lambentPlaceBack', await readPlaces(source, part.back, vertices));
-    mesh.geometry = geometry;
-    meshes.push(mesh);
-  }
+  const meshes = await readPlacedMeshes(source);
   return new IndirectTransfer(operator, makePicture(width, height, map), meshes, owns, source);
 }
 

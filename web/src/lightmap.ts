@@ -333,11 +333,7 @@ uint prtPick( const in ivec2 texel, out int row ) {
 }
 
 /** Two floats a vertex, in texels. */
-export async function readPlaces(
-  source: TransferSource,
-  view: unknown,
-  vertices: number,
-): Promise<Float32BufferAttribute> {
+async function readPlaces(source: TransferSource, view: unknown, vertices: number): Promise<Float32BufferAttribute> {
   if (!isViews(view)) throw new LambentError('a part has no buffer view of places in the atlas');
   const bytes = await source.bufferView(view);
   if (bytes.byteLength !== 8 * vertices) throw new LambentError('a part does not have one place in the atlas a vertex');
@@ -345,6 +341,22 @@ export async function readPlaces(
   for (const x of places)
     if (!Number.isFinite(x)) throw new LambentError('a place in the atlas is not a finite number');
   return new Float32BufferAttribute(places, 2);
+}
+
+/** Meshes of parts over an atlas, with a place in it at each vertex, on one side or both. */
+export async function readPlacedMeshes(source: TransferSource): Promise<Mesh[]> {
+  const meshes: Mesh[] = [];
+  for (const part of source.extension.parts) {
+    const mesh = source.mesh(part),
+      geometry = shareGeometry(mesh.geometry),
+      vertices = geometry.getAttribute('position').count;
+    geometry.setAttribute('lambentPlace', await readPlaces(source, part.front, vertices));
+    if (part.back !== undefined)
+      geometry.setAttribute('lambentPlaceBack', await readPlaces(source, part.back, vertices));
+    mesh.geometry = geometry;
+    meshes.push(mesh);
+  }
+  return meshes;
 }
 
 export async function loadLightmap(source: TransferSource): Promise<BakedTransfer> {
@@ -371,18 +383,8 @@ export async function loadLightmap(source: TransferSource): Promise<BakedTransfe
   receivers.minFilter = receivers.magFilter = NearestFilter;
   receivers.needsUpdate = true;
   const values = await source.bufferView(header.bufferView),
-    meshes: Mesh[] = [],
+    meshes = await readPlacedMeshes(source),
     owns: Material[] = [];
-  for (const part of extension.parts) {
-    const mesh = source.mesh(part),
-      geometry = shareGeometry(mesh.geometry),
-      vertices = geometry.getAttribute('position').count;
-    geometry.setAttribute('lambentPlace', await readPlaces(source, part.front, vertices));
-    if (part.back !== undefined)
-      geometry.setAttribute('lambentPlaceBack', await readPlaces(source, part.back, vertices));
-    mesh.geometry = geometry;
-    meshes.push(mesh);
-    owns.push(await source.ownMaterial(part));
-  }
+  for (const part of extension.parts) owns.push(await source.ownMaterial(part));
   return new LightmapTransfer(header, groups, values, receivers, meshes, owns, source.nodes);
 }
