@@ -359,7 +359,8 @@ void summarize(Bake& b) {
                      fmt::format("{} ({} vertices, {} triangles{})", human_count(r.receivers),
                                  human_count(b.scene.positions.size()), human_count(b.scene.triangles.size()),
                                  r.buried ? "; " + human_count(r.buried) + " buried, filled from neighbours" : ""));
-  if (r.traced > 0 && r.traced < r.receivers)
+  if (b.plan.bake.meshless) lines.emplace_back("", human_count(r.traced) + " surfels traced, which they read");
+  else if (r.traced > 0 && r.traced < r.receivers)
     lines.emplace_back("", human_count(r.traced) + " of them traced, which stand for the others");
   if (r.rays > 0)
     lines.emplace_back("rays", fmt::format("{} ({:.1f} million a second)", human_count(r.rays), rate / 1e6));
