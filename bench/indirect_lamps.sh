@@ -1,8 +1,8 @@
 #!/usr/bin/env bash
 # Lamps at random places, over direct-to-indirect transport: pictures of their indirect light against the path tracer's,
 # the reference's own noise taken off by two of them, in dB of four times the mean. A lamp stands over a random surfel
-# that faces up, the eye over another, near it, and looks at the lamp; where nothing is lit, another place is taken. One
-# JSON object a line: of each lamp, then of each scene.
+# that faces up, the eye over another, near it, and looks at the lamp; where nothing is lit, or the eye is inside
+# something, another place is taken. One JSON object a line: of each lamp, then of each scene.
 #   LAMPS=20 SPP=64 SIZE=32x24 SURFELS=0 SCENES="room level courtyard cornell" scripts/bench indirect-lamps
 #   BAKE="...;..." RENDER="..."   more options of either; several bakes, with ; between them, are seen at the same
 #                                 places, which the first of them chooses; SEED=1 of the places
@@ -135,13 +135,15 @@ def errors(name):
             continue
         text = lambda *v: ",".join("%.6g" % x for x in v)
         shot = ["--camera", text(*eye, *lamp, 80), "--size", size, "--background", "none"]
-        light = ["--lamp", f"point@{text(*lamp)}={tall * tall:.6g}"]
+        lamp_at = lambda where: ["--lamp", f"point@{text(*where)}={tall * tall:.6g}"]
+        light = lamp_at(lamp)
 
-        def draw(baked):
+        def draw(baked, light=light):
             look = ["--show", "indirect", "--spp", 16, *shot, "-o", f"{out}/ours.exr"]
             return run("render", baked, *light, *look, *of_render)[1]
 
-        if "lights no surface" in draw(bakes[0]["file"]):
+        # Neither lamp nor eye stands inside something.
+        if any("lights no surface" in draw(bakes[0]["file"], lamp_at(where)) for where in (eye, lamp)):
             continue
         for half in (1, 2):
             paths = ["--no-direct", "--bounces", 16, "--spp", spp, "--seed", half]

@@ -31,8 +31,8 @@ struct SurfelOptions {
 };
 
 // Levels of half the spacing, each four times as many, from about 64 surfels up; a leaf for each material that is
-// there. Places where most rays meet backs of one-sided surfaces are left out. Errors: no surface; too many surfels;
-// cancelled.
+// there, and for what rays from other surfels meet, however small. Places where most rays meet backs of one-sided
+// surfaces are left out. Errors: no surface; too many surfels; cancelled.
 Result<Surfels> make_surfels(const Scene& scene, const Tracer& tracer, const SurfelOptions& options,
                              Progress* progress = nullptr);
 
@@ -41,10 +41,12 @@ class SurfelSearch {
  public:
   SurfelSearch(const Surfels& surfels, const Tracer& tracer, uint32_t kernel_level);
   ~SurfelSearch();
-  // The leaf that stands for a place: the nearest that can, of the place's material where there is one; none.
+  // The leaf that stands for a place: the nearest that can, of the place's material where there is one; where none can,
+  // the nearest around an edge; none.
   uint32_t leaf(SurfacePlace at) const;
   // Kernels over the surfels of the kernel level: they sum to 1, and where the surfels around lie in a plane they keep
-  // linear functions over it, but for where that would take weights below -1/4. No surfel near: none.
+  // linear functions over it, but for where that would take weights below -1/4. Where none can stand for it, the
+  // nearest around an edge alone. No surfel near: none.
   Kernels kernels(SurfacePlace at) const;
   float diagonal() const;  // of the surfels' box
 

@@ -1,6 +1,7 @@
 #include <lambent/bake/surfels.h>
 #include <lambent/core/parallel.h>
 #include <lambent/core/random.h>
+#include <lambent/core/sampling.h>
 #include <lambent/scene/procedural.h>
 
 #include <gtest/gtest.h>
@@ -114,6 +115,52 @@ TEST(Surfels, NothingReachesThroughAThinWall) {
     for (size_t j = 0; j < k.count; ++j) ASSERT_EQ(room(s.positions[k.surfel[j]]), side > 0);
   }
   EXPECT_GT(near, 3900u);
+}
+
+TEST(Surfels, EveryPlaceOfABallHasSeveralKernels) {
+  // Surfels that gather are 0.36 radii apart: their kernels reach 50 degrees.
+  const auto p = place(make_sphere(1, 5, Vec3(0.5f)), 272);
+  const Surfels& s = p->surfels;
+  const uint32_t level = uint32_t(s.levels() - 2);
+  ASSERT_NEAR(double(s.spacings[level]), 0.36, 0.02);
+  const SurfelSearch search(s, p->tracer, level);
+  Random random(11);
+  for (int i = 0; i < 1000; ++i) {
+    const Vec3 n = square_to_sphere(random.next2());
+    ASSERT_GE(search.kernels({n, n}).count, 4u) << "at " << n.x << " " << n.y << " " << n.z;
+  }
+}
+
+TEST(Surfels, WhatRaysMeetHasALeafAndKernelsHoweverSmall) {
+  Scene scene;
+  const uint32_t grey = add_material(scene, "grey", Vec3(0.6f));
+  add_box(scene, grey, "shell", Vec3(-4, 0, -4), Vec3(4, 4, 4), 1, true);
+  for (int i = 0; i < 400; ++i) {  // posts as thick as a twelfth of a spacing
+    const Vec3 foot(0.37f * float(i % 20) - 3.5f, 0, 0.37f * float(i / 20) - 3.5f);
+    add_box(scene, grey, "post", foot, foot + Vec3(0.03f, 0.2f, 0.03f), 1);
+  }
+  const auto p = place(std::move(scene), 1024);
+  const Surfels& s = p->surfels;
+  ASSERT_GT(s.spacings.back(), 0.36f);
+  const uint32_t level = uint32_t(s.levels() - 2);
+  const SurfelSearch search(s, p->tracer, level);
+  Random random(11);
+  size_t met = 0, without = 0, far = 0;
+  for (size_t i = 0; i < s.count(); ++i)
+    for (int k = 0; k < 64; ++k) {
+      const Mat3 frame = frame_about(s.normals[i]);
+      const Hit hit =
+          p->tracer.closest(s.positions[i] + s.normals[i] * 1e-4f, frame * square_to_cosine_hemisphere(random.next2()));
+      if (hit.triangle == none || !hit.front) continue;
+      const SurfacePlace at = surface_place(p->scene, hit);
+      const uint32_t leaf = search.leaf(at);
+      ++met, without += leaf == none || search.kernels(at).count == 0;
+      far += leaf != none &&
+             (length(s.positions[leaf] - at.position) > s.spacings.back() || dot(s.normals[leaf], at.normal) < 0.5f);
+    }
+  EXPECT_GT(met, 50000u);
+  EXPECT_LT(double(without), 1e-4 * double(met));
+  EXPECT_LT(double(far), 0.01 * double(met));
 }
 
 TEST(Surfels, DoNotDependOnThreads) {
