@@ -312,8 +312,8 @@ Result<Drawing> draw_indirect(const Baked& baked, const DrawRequest& request, co
   d.scene = baked.scene;
   auto around = surroundings_of(request, job);
   if (!around) return around.error();
-  std::optional<Environment> sky = around->env;
-  if (sky && !request.env_rotate.empty()) sky = rotated(*sky, around->rotation);
+  std::optional<Environment> sky;
+  if (around->env) sky = request.env_rotate.empty() ? *around->env : rotated(*around->env, around->rotation);
   set_sky(d, std::move(sky));
   if (auto ok = read_lamps(d); !ok) return ok.error();
   std::vector<double> times{request.time};

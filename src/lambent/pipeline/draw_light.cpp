@@ -2,6 +2,7 @@
 
 #include <lambent/light/lamps.h>
 #include <lambent/light/peaks.h>
+#include <lambent/light/project.h>
 
 #include <fmt/format.h>
 #include <fmt/ranges.h>
@@ -18,7 +19,7 @@ Result<Surroundings> surroundings_of(const DrawRequest& request, const Job& job)
   auto env = request.environment ? Result<Environment>(*request.environment) : load_environment(request.env);
   if (!env) return env.error();
   for (const std::string& warning : env->warnings) job.warn(warning);
-  around.env = std::move(*env);
+  around.env = std::make_shared<const Environment>(std::move(*env));
   if (around.seen && !request.env_rotate.empty()) around.turned = rotated(*around.env, around.rotation);
   return around;
 }
@@ -45,22 +46,35 @@ Result<std::vector<Vec3>> lamps_of(const DrawRequest& request, const LightBasis&
 // With less of all light in them, peaks ring too little to be seen.
 constexpr double least_sharp = 0.05;
 
+// What is known of the environment's first `order` bands; null: nothing.
+const KnownHarmonics* harmonics_for(const Surroundings& around, int order) {
+  return around.known && around.known->order == order ? around.known.get() : nullptr;
+}
+
 // --window auto. Lobes in the basis hold the lamps already.
 void find_peaks(const DrawRequest& request, const Surroundings& around, const LightBasis& basis, ColumnLight& out) {
   if (!basis.lobes.empty() || basis.order == 0) return;
   const int order = request.light_order ? std::min(request.light_order, basis.order) : basis.order;
   const std::vector<Vec3>& all = out.projection.light;
-  const bool known = around.known && around.known->order == order;
-  const std::vector<Vec3> rest = project_light(known ? around.known->rest : without_peaks(*around.env, order), basis,
-                                               around.rotation, request.light_order)
-                                     .light;
+  const KnownHarmonics* known = harmonics_for(around, order);
+  if (known && known->rest.empty()) known = nullptr;
+  const std::vector<Vec3> rest =
+      known ? project_light(known->rest, basis, around.rotation).light
+            : project_light(without_peaks(*around.env, order), basis, around.rotation, order).light;
   const double light = luminance(all[0]), sharp = luminance(all[0] - rest[0]);
   if (!(sharp > least_sharp * light)) return;
-  out.sharp = sharp / light, out.lamps_found = known ? around.known->lamps : int(find_lamps(*around.env, 8).size());
+  out.sharp = sharp / light, out.lamps_found = known ? known->lamps : int(find_lamps(*around.env, 8).size());
   for (size_t k = 0; k < all.size(); ++k) out.peaks.push_back(all[k] - rest[k]);
 }
 
 }  // namespace
+
+KnownHarmonics know_harmonics(const Environment& env, int order, bool peaks) {
+  KnownHarmonics out{order, project_environment(env, order), {}, 0};
+  if (peaks) out.rest = project_environment(without_peaks(env, order), order);
+  if (peaks) out.lamps = int(find_lamps(env, 8).size());
+  return out;
+}
 
 void soften_peaks(ColumnLight& light) {
   const std::vector<float> w = sh_window(ShWindow::lanczos, int(light.projection.window.size()));
@@ -82,8 +96,11 @@ Result<ColumnLight> column_light(const DrawRequest& request, const Surroundings&
   ColumnLight out{std::move(*lamps), {}, std::move(*near)};
   if (around.env) {
     knows_shadows = knows_shadows && *window == ShWindow::automatic;
-    out.projection = project_light(*around.env, basis, around.rotation, request.light_order,
-                                   knows_shadows ? ShWindow::none : *window);
+    const ShWindow applied = knows_shadows ? ShWindow::none : *window;
+    const int order = request.light_order ? std::min(request.light_order, basis.order) : basis.order;
+    const KnownHarmonics* known = basis.lobes.empty() ? harmonics_for(around, order) : nullptr;
+    out.projection = known ? project_light(known->all, basis, around.rotation, applied)
+                           : project_light(*around.env, basis, around.rotation, order, applied);
     if (knows_shadows) find_peaks(request, around, basis, out);
   } else {
     out.projection.light.assign(basis.count(), Vec3(0.0f));

@@ -9,20 +9,22 @@
 
 namespace lambent {
 
-// What `--window auto` asks of an environment, whichever way it is turned.
-struct Peakless {
-  int order = 0;     // bands that it is for
-  Environment rest;  // without_peaks()
-  int lamps = 0;     // that lobes of their own could stand for
+// Harmonics of an environment, whichever way it is turned: they turn as coefficients.
+struct KnownHarmonics {
+  int order = 0;           // bands
+  std::vector<Vec3> all;   // project_environment()
+  std::vector<Vec3> rest;  // of without_peaks(); empty where `--window auto` does not ask
+  int lamps = 0;           // that lobes of their own could stand for
 };
+KnownHarmonics know_harmonics(const Environment& env, int order, bool peaks);
 
 // The environment, turned, and whether it is seen behind the scene.
 struct Surroundings {
-  std::optional<Environment> env;  // as loaded; none: nothing shines from afar
+  std::shared_ptr<const Environment> env;  // as loaded; none: nothing shines from afar
   Mat3 rotation{1.0f};
   std::optional<Environment> turned = std::nullopt;  // where it is seen and turned
   bool seen = false;
-  std::shared_ptr<const Peakless> known = nullptr;  // of `env`, where many turns share it
+  std::shared_ptr<const KnownHarmonics> known = nullptr;  // of `env`, where many turns share it
   const Environment* background() const { return !seen || !env ? nullptr : turned ? &*turned : &*env; }
 };
 Result<Surroundings> surroundings_of(const DrawRequest& request, const Job& job);

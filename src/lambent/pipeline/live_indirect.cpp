@@ -141,7 +141,7 @@ class LiveIndirect : public LiveKind {
 
  private:
   std::optional<Environment> turned(bool coarse) const {
-    const Environment* env = skies_.env[coarse ? 1 : 0];
+    const Environment* env = skies_.env[coarse ? 1 : 0].get();
     if (!env) return std::nullopt;
     return request_.env_rotate.empty() ? *env : rotated(*env, skies_.turn);
   }

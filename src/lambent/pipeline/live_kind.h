@@ -11,8 +11,8 @@ namespace lambent {
 
 // The environment as it is and coarse, of light that turns; null: none.
 struct LiveSkies {
-  std::array<const Environment*, 2> env{nullptr, nullptr};
-  std::array<std::shared_ptr<const Peakless>, 2> known = {};
+  std::array<std::shared_ptr<const Environment>, 2> env = {};
+  std::array<std::shared_ptr<const KnownHarmonics>, 2> known = {};
   Mat3 turn{1.0f};
 };
 

@@ -16,12 +16,11 @@ constexpr double a_piece = 0.1;       // seconds of shading at a time, of a pict
 constexpr int rows_a_piece = 8;       // at least
 constexpr int hurried_samples = 16;   // of BRDFs in a block, while something moves
 
-LiveLight live_light(const Environment& env, const DrawRequest& request, const LightBasis& basis) {
-  LiveLight out{env, nullptr};
+LiveLight live_light(Environment env, const DrawRequest& request, const LightBasis& basis) {
+  LiveLight out{std::make_shared<const Environment>(std::move(env)), nullptr};
   const int order = request.light_order ? std::min(request.light_order, basis.order) : basis.order;
-  if (order > 0 && request.window == "auto")
-    out.known =
-        std::make_shared<const Peakless>(Peakless{order, without_peaks(env, order), int(find_lamps(env, 8).size())});
+  if (order > 0 && basis.lobes.empty())
+    out.known = std::make_shared<const KnownHarmonics>(know_harmonics(*out.env, order, request.window == "auto"));
   return out;
 }
 
@@ -29,8 +28,7 @@ LiveLight live_light(const Environment& env, const DrawRequest& request, const L
 
 LiveSkies LivePicture::State::skies() const {
   LiveSkies out{.turn = turn};
-  for (size_t k = 0; k < 2; ++k)
-    if (light[k].env) out.env[k] = &*light[k].env, out.known[k] = light[k].known;
+  for (size_t k = 0; k < 2; ++k) out.env[k] = light[k].env, out.known[k] = light[k].known;
   return out;
 }
 
@@ -41,7 +39,7 @@ Result<void> LivePicture::State::make_environment_due() {
   if (!env) return env.error();
   for (const std::string& warning : env->warnings) job.warn(warning);
   light[1] = live_light(reduced(*env, coarse_sky), asked, light_basis());
-  light[0] = live_light(*env, asked, light_basis());
+  light[0] = live_light(std::move(*env), asked, light_basis());
   return {};
 }
 
@@ -242,7 +240,7 @@ std::function<RayShade()> LivePicture::State::shade_maker(RenderOptions& options
 }
 
 std::function<Vec3(Vec3)> LivePicture::State::background() const {
-  const std::optional<Environment>& env = light[0].env;
+  const std::shared_ptr<const Environment>& env = light[0].env;
   if (asked.background != "env" || !env || look != Look::picture) return nullptr;
   return [&env, back = transpose(turn)](Vec3 d) { return radiance_bilinear(*env, back * d); };
 }

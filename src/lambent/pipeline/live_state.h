@@ -20,8 +20,8 @@ inline double seconds_from(LiveClock::time_point start) {
 
 // A light to draw by, and what --window auto asks of it.
 struct LiveLight {
-  std::optional<Environment> env;
-  std::shared_ptr<const Peakless> known;
+  std::shared_ptr<const Environment> env;
+  std::shared_ptr<const KnownHarmonics> known;
 };
 
 // The scene with objects in it that were not baked with it.

@@ -34,10 +34,11 @@ class LiveTexture : public LiveKind {
 
   Result<Light> light(bool hurry, double, LiveTimes& times) override {
     const auto start = LiveClock::now();
-    const Environment *env = skies_.env[hurry ? 1 : 0], *whole = skies_.env[0];
-    Surroundings around{
-        .env = {}, .rotation = skies_.turn, .seen = request_.background == "env", .known = skies_.known[hurry ? 1 : 0]};
-    if (env) around.env = *env;
+    const auto &env = skies_.env[hurry ? 1 : 0], &whole = skies_.env[0];
+    const Surroundings around{.env = env,
+                              .rotation = skies_.turn,
+                              .seen = request_.background == "env",
+                              .known = skies_.known[hurry ? 1 : 0]};
     auto light = column_light(request_, around, LightBasis{.order = texture_.transfer.order}, scene().origin, false);
     if (!light) return light.error();
     local_ = light->local();

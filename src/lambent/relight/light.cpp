@@ -1,22 +1,43 @@
+#include <lambent/basis/sh.h>
+#include <lambent/core/check.h>
 #include <lambent/light/project.h>
 #include <lambent/relight/light.h>
 
 namespace lambent {
 
-LightProjection project_light(const Environment& env, const LightBasis& columns, const Mat3& rotation, int order,
-                              ShWindow window) {
+namespace {
+
+// Of integrals against the basis' functions solved for coefficients: harmonics first, those beyond them left 0.
+LightProjection of_coefficients(std::vector<Vec3> light, DirectionalBasis basis, const LightBasis& columns,
+                                ShWindow window) {
   LightProjection result;
-  result.light.assign(columns.count(), Vec3(0.0f));
-  if (order == 0 || order > columns.order) order = columns.order;
-  if (order == 0 && columns.lobes.empty()) return result;
-  result.basis = make_directional_basis(order, columns.lobe_kind, columns.lobes);
-  std::vector<Vec3> light = project_environment(env, result.basis, rotation);
+  result.light.assign(columns.count(), Vec3(0.0f)), result.basis = std::move(basis);
+  const int order = result.basis.sh_order;
   const size_t harmonics = size_t(sh_count(order));
   if (order > 0) result.window = apply_sh_window(window, std::span(light).first(harmonics));
   std::copy_n(light.begin(), harmonics, result.light.begin());
   std::copy(light.begin() + ptrdiff_t(harmonics), light.end(), result.light.begin() + sh_count(columns.order));
   if (order < columns.order) result.basis = make_directional_basis(columns.order, columns.lobe_kind, columns.lobes);
   return result;
+}
+
+}  // namespace
+
+LightProjection project_light(const Environment& env, const LightBasis& columns, const Mat3& rotation, int order,
+                              ShWindow window) {
+  if (order == 0 || order > columns.order) order = columns.order;
+  if (order == 0 && columns.lobes.empty()) return {std::vector<Vec3>(columns.count(), Vec3(0.0f)), {}, {}};
+  DirectionalBasis basis = make_directional_basis(order, columns.lobe_kind, columns.lobes);
+  std::vector<Vec3> light = project_environment(env, basis, rotation);
+  return of_coefficients(std::move(light), std::move(basis), columns, window);
+}
+
+LightProjection project_light(std::span<const Vec3> harmonics, const LightBasis& columns, const Mat3& rotation,
+                              ShWindow window) {
+  const int order = sh_order(harmonics.size());
+  LAMBENT_CHECK(columns.lobes.empty() && order > 0 && order <= columns.order);
+  return of_coefficients(rotate_sh(make_sh_rotation(order, rotation), harmonics),
+                         make_directional_basis(order, columns.lobe_kind, {}), columns, window);
 }
 
 }  // namespace lambent

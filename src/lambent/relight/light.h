@@ -3,6 +3,8 @@
 #include <lambent/light/environment.h>
 #include <lambent/transfer/transfer.h>
 
+#include <span>
+
 namespace lambent {
 
 // A light as coefficients, and the functions that they belong to.
@@ -17,5 +19,8 @@ struct LightProjection {
 // on are left out of the basis: their coefficients are 0 and the others those that fit best without them.
 LightProjection project_light(const Environment& env, const LightBasis& basis, const Mat3& rotation = Mat3(1.0f),
                               int order = 0, ShWindow window = ShWindow::none);
+// The same of the environment's first harmonics, as many as there are, unturned, for a basis without lobes.
+LightProjection project_light(std::span<const Vec3> harmonics, const LightBasis& basis, const Mat3& rotation,
+                              ShWindow window = ShWindow::none);
 
 }  // namespace lambent

@@ -24,6 +24,18 @@ TEST(ProjectLight, HarmonicsAloneAreWhatTheyAlwaysWere) {
   EXPECT_EQ(project_light(lit(), {.order = 5}, Mat3(1.0f), 9).light.size(), 25u);  // no more bands than there are
 }
 
+TEST(ProjectLight, OfKnownHarmonicsIsThatOfTheEnvironment) {
+  const Mat3 R = rotation_from_yaw_pitch_roll({30, -20, 10});
+  const LightBasis basis{.order = 5, .groups = {"desk"}};
+  for (const int order : {3, 5}) {
+    const LightProjection known = project_light(project_environment(lit(), order), basis, R, ShWindow::lanczos),
+                          whole = project_light(lit(), basis, R, order, ShWindow::lanczos);
+    EXPECT_EQ(known.light, whole.light);
+    EXPECT_EQ(known.window, whole.window);
+    EXPECT_EQ(known.basis.count(), whole.basis.count());
+  }
+}
+
 TEST(ProjectLight, FillsEveryColumn) {
   const LightProjection p = project_light(lit(), columns);
   ASSERT_EQ(p.light.size(), 19u);
