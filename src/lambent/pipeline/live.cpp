@@ -30,8 +30,9 @@ struct Parsed {
   Mat3 turn{1.0f};
 };
 
-// All of a request that can be wrong but for its files.
-Result<Parsed> parse_live(const Baked& baked, const DrawRequest& request) {
+// All of a request that can be wrong but for its files. `known`: its view, if that is what it was; a camera about the
+// whole looks at every vertex.
+Result<Parsed> parse_live(const Baked& baked, const DrawRequest& request, const View* known = nullptr) {
   for (const char* option : {"frames", "indirect"})
     if (is_given(request, json_name(option)))
       return Error{std::string("--") + option, "is not shown live: `lambent render` draws it", true};
@@ -41,7 +42,7 @@ Result<Parsed> parse_live(const Baked& baked, const DrawRequest& request) {
   if (!turn) return turn.error();
   if (const auto* fixed = std::get_if<FixedView>(&baked.surface.where); fixed && !textured)
     return Parsed{View{fixed->camera, fixed->width, fixed->height}, *turn};
-  auto view = parse_view(request.camera, request.size, baked.scene);
+  auto view = known ? Result<View>(*known) : parse_view(request.camera, request.size, baked.scene);
   if (!view) return view.error();
   return Parsed{*view, *turn};
 }
@@ -110,7 +111,7 @@ Result<void> LivePicture::State::ask_parts(const DrawRequest& request, const Dra
 
 Result<void> LivePicture::ask(const DrawRequest& request) {
   State& s = *state_;
-  auto parsed = parse_live(s.baked, request);
+  auto parsed = parse_live(s.baked, request, is_same(s.asked, request, {"camera", "size"}) ? &s.view : nullptr);
   if (!parsed) return parsed.error();
   const DrawRequest before = s.asked;
   if (before.transfer_texture.empty() != request.transfer_texture.empty()) {  // another kind
