@@ -112,7 +112,7 @@ TEST(Ranks, RoomsAreAlike) {
                                                  {"far", {Vec3(-0.4f, -1, 0), Vec3(0.2f, 1, 1.5f)}},
                                                  {"right", {Vec3(0.2f, -1, -1), Vec3(1, 1, 1.5f)}}});
   ASSERT_TRUE(rooms);
-  BakeOptions options{.order = 2, .samples = 64};
+  BakeOptions options{.order = 2, .samples = under_sanitizers() ? 16 : 64};
   RoomsOptions how{.residual = 1e-3, .places = 6, .directions = 4};
   const auto work = [&](Progress* progress) {
     auto t = bake_rooms(p.scene, p.receivers, *rooms, options, how, nullptr, nullptr, progress);

@@ -183,7 +183,7 @@ const std::map<std::string, Change> changes{
 // Every option with every kind: refused by name, or baked, and then it has an effect.
 TEST_F(Requests, EveryOptionHasAnEffectOrIsRefusedByName) {
   std::map<std::string, std::string> known;           // fingerprints by request: many options change the same one
-  const size_t of_each = under_sanitizers() ? 3 : 1;  // every option with some kinds, every kind with some options
+  const size_t of_each = under_sanitizers() ? 6 : 1;  // every option with some kinds, every kind with some options
   for (int k = 0; k < int(std::size(bake_kind_names)); ++k) {
     size_t index = size_t(k);
     for (const Option<BakeRequest>& o : bake_options()) {
