@@ -62,6 +62,7 @@ void bench_rooms();
 void bench_scale();
 void bench_scaling();
 void bench_window();
+void bench_wobble();
 void bench_zonal();
 
 }  // namespace lambent::bench

@@ -77,14 +77,14 @@ int main(int argc, char** argv) {
       {"radiosity", bench_radiosity}, {"lightmaps", bench_lightmaps}, {"load", bench_load},
       {"moving", bench_moving},       {"relight", bench_relight},     {"rooms", bench_rooms, true},
       {"scale", bench_scale, true},   {"scaling", bench_scaling},     {"zonal", bench_zonal},
-      {"window", bench_window}};
+      {"window", bench_window},       {"wobble", bench_wobble, true}};
   bool known = argc == 1;
   for (int i = 1; i < argc; ++i)
     for (const Bench& bench : all) known |= !std::strcmp(argv[i], bench.name);
   if (!known)
     return fmt::print(stderr,
                       "usage: lambent-bench [bake] [basis] [certificate] [error] [products] [radiosity] [lightmaps] "
-                      "[haar] [load] [moving] [relight] [rooms] [scale] [scaling] [zonal] [window]\n"),
+                      "[haar] [load] [moving] [relight] [rooms] [scale] [scaling] [zonal] [window] [wobble]\n"),
            2;
   for (auto [name, run, asked] : all) {
     bool wanted = argc == 1 && !asked;

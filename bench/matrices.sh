@@ -3,6 +3,7 @@
 # light, direct light, one JSON object a line. First by outgoing basis, then by order and roughness; exposed so that the
 # picture's mean is a fifth. Needs the data folder (LAMBENT_DATA, or ../shared/data) for all but spheres.
 #   SAMPLES=4096 SPP=2048 SIZE=96x96 SCENES="sphere shaderball" ORDERS="3 5 8" BASES=yes scripts/bench matrices
+# Some outgoing bases alone: OUTGOING="map directional:64" SCENES= scripts/bench matrices
 # Pictures go to out/matrices/. A ship of order 8 takes 9 kB at each of 104k receivers.
 source "$(dirname "$0")/common.sh"
 out=out/matrices samples=${SAMPLES:-4096} spp=${SPP:-2048} size=${SIZE:-96x96}
@@ -77,9 +78,12 @@ P
 rm -f $out/*.json $out/*.exr
 scenes=${SCENES-sphere shaderball dutch_ship}
 if [ "${BASES:-yes}" = yes ]; then
-  for outgoing in map svd:4 svd:6 svd:12 svd:16 sh:5 hemisphere:5 hsh:5; do
+  all="map svd:4 svd:6 svd:12 svd:16 sh:5 hemisphere:5 hsh:5 directional:25 directional:64"
+  for outgoing in ${OUTGOING:-$all}; do
     measure shaderball ggx:roughness=0.6 5 "$outgoing" --incident-order 5 --outgoing "$outgoing"
   done
+fi
+if [ "${BASES:-yes}" = yes ] && [ -z "${OUTGOING:-}" ]; then
   measure shaderball ggx:roughness=0.6 5 factors --incident-order 5 --factors
   measure shaderball ggx:roughness=0.6 5 cpca:128,8 --incident-order 5 --compress cpca:128,8
   for outgoing in map phong; do

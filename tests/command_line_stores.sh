@@ -8,15 +8,37 @@ expect 0 'receivers' bake corner.obj --max-edge 0.2 --samples 64 -o corner.glb
 # light.
 sun=sky:elevation=55,azimuth=120,width=256
 shot="--camera 3,2,4,1,0.5,1,40 --size 48x32 --background none"
-for light in "sh:5+lamps:2@$sun" directional:16; do
+for light in "sh:5+lamps:2@$sun" directional:16 compact:16 steerable:4; do
   expect 0 'lobe' bake corner.obj --max-edge 0.1 --samples 1024 --light "$light" -o lamps.glb
-  expect 0 'sharpness' inspect lamps.glb
+  expect 0 '(sharpness|turned copy about)' inspect lamps.glb
   # shellcheck disable=SC2086
   expect 0 'relit' render lamps.glb --env $sun --env-rotate 20,0,0 $shot --spp 256 -o lamps_lit.exr
   # shellcheck disable=SC2086
   expect 0 'paths' reference corner.obj --max-edge 0.1 --env $sun --env-rotate 20,0,0 --light-basis lamps.glb $shot \
     --spp 256 -o lamps_truth.exr
   alike 40 "baked and path-traced corners under $light" lamps_lit.exr lamps_truth.exr --exposure -3
+done
+# Turned copies of one lobe are harmonics in other words, and turn as they do; lobes that stand still do not.
+for light in sh:4 steerable:4 compact:16; do
+  none=()
+  [ $light = sh:4 ] && none=(--window none)
+  expect 0 'receivers' bake corner.obj --max-edge 0.2 --samples 256 --denoise off --precision single --light $light \
+    -o ${light%:*}.glb
+  # shellcheck disable=SC2086
+  expect 0 'relit' render ${light%:*}.glb --env $sun --env-rotate 75,20,-40 "${none[@]}" $shot -o ${light%:*}_turned.exr
+done
+alike 90 "steerable lobes and harmonics" steerable_turned.exr sh_turned.exr --exposure -3
+expect 0 '16 compact lobes' inspect compact.glb
+expect 0 '"lobe_kind": "band_limited"' inspect steerable.glb --json
+expect 0 'of 4 bands' inspect steerable.glb
+expect 2 'window: shapes harmonics' render steerable.glb --env $sun --window hann -o x.png
+expect 2 'light-order: counts bands' render compact.glb --env $sun --light-order 2 -o x.png
+expect 1 'holds lobes of light, which the web page does not draw' export compact.glb --web site_lobes
+expect 2 'lattice: is lit by harmonics alone' bake corner.obj --light compact:16 --lattice 2,2,2 -o x.glb
+expect 2 'subsurface: is of harmonics alone' bake corner.obj --light steerable:3 --subsurface marble -o x.glb
+expect 2 'light: lobes without harmonics' bake corner.obj --light steerable:3 --transfer matrix -o x.glb
+for light in compact: compact:9 compact:257 compact:x steerable steerable:0 steerable:17 steerable:2.5; do
+  expect 2 '^lambent: --light: ' bake corner.obj --light $light -o x.glb
 done
 expect 2 'env: is needed' render lamps.glb -o x.png
 expect 0 'lamps? that stands? out, not 64' bake corner.obj --samples 64 --bounces 0 --light sh:5+lamps:64@$sun \
@@ -39,6 +61,19 @@ expect 0 'outgoing phong' inspect phong.glb
 expect 0 'relit' render phong.glb --env sky:elevation=30 --size 16x16 -o phong.png
 expect 1 'phong' bake corner.obj --samples 64 --transfer matrix --brdf ggx:roughness=0.5 --outgoing phong --order 3 \
   -o x.glb
+# Outgoing light in compact lobes: near what the map draws, which is what they are fitted to, and the nearer the more.
+expect 0 'rows' bake corner.obj --max-edge 0.5 --samples 64 --transfer matrix --brdf ggx:roughness=0.5 --order 3 \
+  --incident-order 3 --bounces 0 --outgoing directional:64 -o lobes_out.glb
+expect 0 'outgoing directional, 64 lobes' inspect lobes_out.glb
+expect 0 'relit' render lobes_out.glb --env sky:elevation=30 --size 24x18 --background none -o lobes_out.exr
+expect 0 'relit' render whole.glb --env sky:elevation=30 --size 24x18 --background none -o whole_out.exr
+alike 35 "a last reflection in compact lobes and by the map" lobes_out.exr whole_out.exr --exposure -3
+expect 1 'last reflection of compact lobes, which the web page' export lobes_out.glb --web site_out
+expect 1 'brdf needs a bake that kept incident light' render lobes_out.glb --env sky:elevation=30 \
+  --brdf ggx:roughness=0.2 -o x.png
+for outgoing in directional:3 directional:129 directional:8.5 directional:x; do
+  expect 2 '^lambent: --outgoing: ' bake corner.obj --transfer matrix --outgoing $outgoing -o x.glb
+done
 expect 1 'plain transfer' compress factors.glb --cpca 4,3 -o x.glb
 expect 2 'bounces: does not go with factors' bake corner.obj --transfer matrix --factors --bounces 2 -o x.glb
 expect 2 'factors' bake corner.obj --factors -o x.glb

@@ -442,6 +442,31 @@ Result<Transfer> bake_on_receivers(const Scene& scene, const Tracer& tracer, con
   return bake_with_samples(scene, tracer, receivers, stand_ins, options, r, progress);
 }
 
+// Columns of harmonics added up to those of band-limited lobes, which are sums of harmonics.
+Transfer add_up_lobes(const Transfer& t, const LightBasis& light, Precision precision) {
+  const DirectionalBasis basis = make_directional_basis(0, light.lobe_kind, light.lobes);
+  const size_t harmonics = t.columns(), lobes = light.lobes.size();
+  std::vector<std::vector<double>> sums;  // by lobe
+  for (size_t k = 0; k < lobes; ++k) {
+    std::vector<double> one(lobes, 0.0);
+    one[k] = 1, sums.push_back(directional_to_sh(basis, one, t.light.order));
+  }
+  const WritableTransfer out = make_transfer(light, t.rows, t.channels, t.receivers, precision);
+  parallel_for(t.receivers, transfer_block, [&](size_t begin, size_t end) {
+    std::vector<float> values(out.transfer.receiver_values());
+    for (size_t r = begin; r < end; ++r) {
+      const std::vector<float> x = load_receiver(t, r);
+      for (size_t i = 0; i < values.size(); ++i) {
+        double sum = 0;
+        for (size_t j = 0; j < harmonics; ++j) sum += sums[i % lobes][j] * double(x[i / lobes * harmonics + j]);
+        values[i] = float(sum);
+      }
+      store_receiver(out, r, values);
+    }
+  });
+  return out.transfer;
+}
+
 }  // namespace
 
 Result<Transfer> bake(const Scene& scene, const Tracer& tracer, const Receivers& receivers, const BakeOptions& options,
@@ -451,6 +476,17 @@ Result<Transfer> bake(const Scene& scene, const Tracer& tracer, const Receivers&
   BakeReport unwanted;
   BakeReport& r = report ? *report : unwanted;
   r = {};
+  if (options.order == 0 && options.lobe_kind == LobeKind::band_limited) {
+    BakeOptions harmonics = options;
+    harmonics.lobes.clear(), harmonics.precision = Precision::single;
+    for (const Lobe& lobe : options.lobes) harmonics.order = std::max(harmonics.order, int(lobe.sharpness));
+    auto baked = bake(scene, tracer, receivers, harmonics, &r, progress);
+    if (!baked) return baked;
+    for (Transfer& term : r.terms) term = add_up_lobes(term, options.light(), options.precision);
+    Transfer result = add_up_lobes(*baked, options.light(), options.precision);
+    r.bytes = result.bytes();
+    return result;
+  }
   return options.error > 0 && options.shadows ? bake_to_error(scene, tracer, receivers, options, r, progress)
                                               : bake_on_receivers(scene, tracer, receivers, options, r, progress);
 }

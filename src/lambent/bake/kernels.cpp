@@ -164,18 +164,42 @@ void FloatsToHalves(const float* floats, size_t count, uint16_t* halves) {
   for (; i < count; ++i) halves[i] = float_to_half(floats[i]);
 }
 
-void LobeValues(bool cosine_power, const float* axis, float sharpness, float scale, const float* x, const float* y,
+// The shape of a lobe at cosines c.
+template <class V>
+V LobeShape(LobeKind kind, float sharpness, V c) {
+  const F d;
+  const auto s = hn::Set(d, sharpness), one = hn::Set(d, 1.0f);
+  switch (kind) {
+    case LobeKind::cosine_power:
+      // The logarithm needs a positive number, and anything to the power of 1 or more that small is as good as 0.
+      return hn::Exp(d, hn::Mul(s, hn::Log(d, hn::Max(c, hn::Set(d, 1e-30f)))));
+    case LobeKind::von_mises_fisher: return hn::Exp(d, hn::Mul(s, hn::Sub(c, one)));
+    case LobeKind::compact: {
+      const auto inside = hn::Max(hn::Zero(d), hn::MulAdd(hn::Set(d, sharpness / 3), hn::Sub(c, one), one));
+      return hn::Mul(inside, hn::Mul(inside, inside));
+    }
+    case LobeKind::band_limited: break;
+  }
+  auto before = one, at = c, sum = one;
+  const float peak = sharpness * sharpness;
+  for (int l = 1; l < int(sharpness); ++l) {
+    sum = hn::MulAdd(hn::Set(d, float(2 * l + 1)), at, sum);
+    const float k = float(l);
+    const auto next =
+        hn::NegMulAdd(hn::Set(d, k / (k + 1)), before, hn::Mul(hn::Set(d, (2 * k + 1) / (k + 1)), hn::Mul(c, at)));
+    before = at, at = next;
+  }
+  return hn::Mul(sum, hn::Set(d, 1 / peak));
+}
+
+void LobeValues(LobeKind kind, const float* axis, float sharpness, float scale, const float* x, const float* y,
                 const float* z, size_t count, float* out) {
   const F d;
-  const auto ax = hn::Set(d, axis[0]), ay = hn::Set(d, axis[1]), az = hn::Set(d, axis[2]), s = hn::Set(d, sharpness),
-             peak = hn::Set(d, scale);
+  const auto ax = hn::Set(d, axis[0]), ay = hn::Set(d, axis[1]), az = hn::Set(d, axis[2]), peak = hn::Set(d, scale);
   for (size_t i = 0; i < count; i += hn::Lanes(d)) {
     const auto c =
         hn::MulAdd(ax, hn::LoadU(d, x + i), hn::MulAdd(ay, hn::LoadU(d, y + i), hn::Mul(az, hn::LoadU(d, z + i))));
-    // The logarithm needs a positive number, and anything to the power of 1 or more that small is as good as 0.
-    const auto exponent = cosine_power ? hn::Mul(s, hn::Log(d, hn::Max(c, hn::Set(d, 1e-30f))))
-                                       : hn::Mul(s, hn::Sub(c, hn::Set(d, 1.0f)));
-    hn::StoreU(hn::Mul(peak, hn::Exp(d, exponent)), d, out + i);
+    hn::StoreU(hn::Mul(peak, LobeShape(kind, sharpness, c)), d, out + i);
   }
 }
 
@@ -210,10 +234,10 @@ void weighted_rows(const float* table, size_t rows, size_t stride, const float* 
   HWY_DYNAMIC_DISPATCH(WeightedRows)(table, rows, stride, weights, count, out);
 }
 
-void lobe_values(bool cosine_power, Vec3 axis, float sharpness, float scale, const float* x, const float* y,
-                 const float* z, size_t count, float* out) {
+void lobe_values(LobeKind kind, Vec3 axis, float sharpness, float scale, const float* x, const float* y, const float* z,
+                 size_t count, float* out) {
   LAMBENT_CHECK(count % lane_multiple == 0);
-  HWY_DYNAMIC_DISPATCH(LobeValues)(cosine_power, &axis[0], sharpness, scale, x, y, z, count, out);
+  HWY_DYNAMIC_DISPATCH(LobeValues)(kind, &axis[0], sharpness, scale, x, y, z, count, out);
 }
 
 void multiply_values(const float* a, const float* b, size_t count, float* out) {

@@ -1,7 +1,7 @@
 #pragma once
 // The inner loops of baking, compiled for several instruction sets and chosen at run time. Float arrays are padded with
 // zeros to multiples of `lane_multiple`.
-#include <lambent/core/vec.h>
+#include <lambent/basis/directional.h>
 
 #include <cstddef>
 #include <cstdint>
@@ -19,10 +19,9 @@ void rotate_directions(const Mat3& R, const float* x, const float* y, const floa
 // lane_multiple.
 void weighted_rows(const float* table, size_t rows, size_t stride, const float* weights, size_t count, float* out);
 
-// out[i] = scale * exp(sharpness * (axis . (x, y, z)[i] - 1)) or, with cosine_power, scale * max(0, axis . (x, y,
-// z)[i])^sharpness; count a multiple of lane_multiple.
-void lobe_values(bool cosine_power, Vec3 axis, float sharpness, float scale, const float* x, const float* y,
-                 const float* z, size_t count, float* out);
+// out[i] = scale * the lobe's value (basis/directional.h) at axis . (x, y, z)[i]; count a multiple of lane_multiple.
+void lobe_values(LobeKind kind, Vec3 axis, float sharpness, float scale, const float* x, const float* y, const float* z,
+                 size_t count, float* out);
 
 // out[i] = a[i] * b[i]; count a multiple of lane_multiple.
 void multiply_values(const float* a, const float* b, size_t count, float* out);

@@ -86,9 +86,10 @@ TEST(Kernels, LobeValuesAreTheLobe) {
   }
   const Vec3 axis = normalize(Vec3(0.3f, -0.6f, 0.5f));
   x[0] = axis.x, y[0] = axis.y, z[0] = axis.z, x[1] = -axis.x, y[1] = -axis.y, z[1] = -axis.z;
-  for (LobeKind kind : {LobeKind::von_mises_fisher, LobeKind::cosine_power})
-    for (float s : {1.0f, 7.0f, 300.0f, 40000.0f}) {
-      lobe_values(kind == LobeKind::cosine_power, axis, s, 2.5f, x.data(), y.data(), z.data(), n, out.data());
+  for (LobeKind kind : {LobeKind::von_mises_fisher, LobeKind::cosine_power, LobeKind::compact, LobeKind::band_limited})
+    for (float s : {1.0f, 7.0f, 16.0f, 300.0f, 40000.0f}) {
+      if (!is_lobe(kind, {axis, s})) continue;
+      lobe_values(kind, axis, s, 2.5f, x.data(), y.data(), z.data(), n, out.data());
       // A cosine's rounding, times the sharpness.
       for (size_t i = 0; i < n; ++i)
         EXPECT_NEAR(out[i], 2.5 * lobe_value(kind, s, dot(Vec3d(axis), Vec3d(x[i], y[i], z[i]))), 1e-6 + 5e-7 * s)

@@ -65,7 +65,7 @@ Result<void> keep_projections(LastReflection& last, const std::vector<ViewMap>& 
   Outgoing& o = last.outgoing;
   std::vector<std::array<std::vector<float>, 4>> parts(responses.size());
   auto ok = each_material(responses.size(), progress,
-                          [&](size_t m) { parts[m] = project_response(responses[m], o.kind, o.order); });
+                          [&](size_t m) { parts[m] = project_response(responses[m], o.kind, o.order, o.lobes); });
   if (!ok) return ok;
   bool coloured = false;
   o.has_b = false;
@@ -97,6 +97,10 @@ Result<LastReflection> make_last_reflection(const std::vector<ViewMap>& response
     case OutgoingKind::map: keep_maps(last, responses, J); break;
     case OutgoingKind::svd: ok = keep_factors(last, responses, matrix.svd_rows, J, progress); break;
     case OutgoingKind::phong: keep_phong(last, materials, basis, J); break;
+    case OutgoingKind::directional:
+      o.lobes = outgoing_lobes(matrix.outgoing_lobes);
+      ok = keep_projections(last, responses, progress);
+      break;
     default: o.order = matrix.outgoing_order; ok = keep_projections(last, responses, progress);
   }
   if (!ok) return ok.error();

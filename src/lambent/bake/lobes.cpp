@@ -14,7 +14,10 @@ constexpr int set_count = 8, least_rays = 64;
 }  // namespace
 
 // The integral of an unscaled lobe is 2 pi / s, and around its normal a fan has samples / pi rays a steradian.
-bool is_sharp(const Lobe& lobe, int samples) { return lobe.sharpness > float(samples) / 16; }
+// Band-limited ones are all over the sphere.
+bool is_sharp(LobeKind kind, const Lobe& lobe, int samples) {
+  return kind != LobeKind::band_limited && lobe.sharpness > float(samples) / 16;
+}
 
 int rays_per_lobe(int samples, size_t lobes) { return lobes == 0 ? 0 : std::max(least_rays, samples / int(lobes)); }
 
@@ -29,7 +32,7 @@ LobeSets make_lobe_sets(LobeKind kind, const std::vector<Lobe>& lobes, int sampl
     s.scales.push_back(float(lobe_scale(kind, lobes[k].sharpness))),
         s.integrals.push_back(float(lobe_integral(kind, lobes[k].sharpness)));
     s.frames.push_back(frame_about(normalize_or(lobes[k].axis, Vec3(0, 0, 1))));
-    (is_sharp(lobes[k], samples) ? s.sharp : s.broad).push_back(uint32_t(k));
+    (is_sharp(kind, lobes[k], samples) ? s.sharp : s.broad).push_back(uint32_t(k));
   }
   s.rays = rays_per_lobe(samples, s.sharp.size());
   s.stride = pad_lanes(size_t(s.rays)), s.half = pad_lanes(size_t(s.rays) / 2);
@@ -56,8 +59,7 @@ LobeRays make_lobe_rays(const LobeSets& sets, int sky_channels) {
 
 void evaluate_on_fan(const LobeSets& sets, size_t k, const float* x, const float* y, const float* z, size_t count,
                      float* out) {
-  lobe_values(sets.kind == LobeKind::cosine_power, sets.frames[k][2], sets.lobes[k].sharpness, sets.scales[k], x, y, z,
-              count, out);
+  lobe_values(sets.kind, sets.frames[k][2], sets.lobes[k].sharpness, sets.scales[k], x, y, z, count, out);
 }
 
 void trace_lobe(const LobeSets& sets, const Tracer& tracer, Vec3 origin, Vec3 normal, size_t receiver, size_t lobe,

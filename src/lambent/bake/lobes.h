@@ -26,7 +26,7 @@ struct LobeSets {
 };
 
 // Is a lobe so sharp that fewer than some 32 rays of a fan of `samples` would be found in it?
-bool is_sharp(const Lobe& lobe, int samples);
+bool is_sharp(LobeKind kind, const Lobe& lobe, int samples);
 // As many rays as the fan's are shared out among the sharp lobes, but each gets 64 at least.
 int rays_per_lobe(int samples, size_t sharp_lobes);
 LobeSets make_lobe_sets(LobeKind kind, const std::vector<Lobe>& lobes, int samples, uint32_t seed);

@@ -187,6 +187,7 @@ Result<void> check_options(const BakeOptions& o, const MatrixOptions& m, const R
        {check_light_basis(o, 1), within("samples", o.samples, 1, 1 << 20), within("bounces", o.bounces, 0, 64),
         within("incident-order", m.incident_order, 1, max_incident_order),
         within("outgoing-order", m.outgoing_order, 1, max_incident_order),
+        within("outgoing lobes", m.outgoing_lobes, 4, max_outgoing_lobes),
         within("order and incident-order together", o.order + m.incident_order, 2, max_sh_order + 1),
         within("svd rows", m.svd_rows, 1, sh_count(m.incident_order)), within("grid", m.grid, 8, 256)})
     if (!ok) return ok.error();

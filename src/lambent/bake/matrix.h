@@ -11,11 +11,15 @@
 
 namespace lambent {
 
+// More make files that are larger than maps, and no sharper.
+inline constexpr int max_outgoing_lobes = 128;
+
 struct MatrixOptions {
   int incident_order =
       5;  // bands of the incident basis, [1, max_incident_order]; order + incident_order <= max_sh_order + 1
   OutgoingKind outgoing = OutgoingKind::svd;
   int outgoing_order = 5;       // sh, hemisphere, hsh: bands
+  int outgoing_lobes = 64;      // directional: how many, [4, max_outgoing_lobes]
   int svd_rows = 6;             // svd: rows a material, [1, incident_order^2]
   int grid = 64;                // nodes a side of the view maps, [8, 256]
   int response_samples = 2048;  // directions a view when a BRDF is projected

@@ -244,33 +244,54 @@ FactoredResponse factor_response(const ViewMap& response, int max_rows, double t
   return f;
 }
 
-std::array<std::vector<float>, 4> project_response(const ViewMap& response, OutgoingKind kind, int order) {
-  LAMBENT_CHECK(kind == OutgoingKind::sh || kind == OutgoingKind::hemisphere || kind == OutgoingKind::hsh);
-  const size_t rows = size_t(sh_count(order)), n = size_t(response.rows), nodes = size_t(response.grid);
+namespace {
+
+std::vector<double> multiply(std::span<const double> square, std::span<const double> x) {
+  std::vector<double> out(x.size());
+  for (size_t i = 0; i < x.size(); ++i)
+    for (size_t j = 0; j < x.size(); ++j) out[i] += square[i * x.size() + j] * x[j];
+  return out;
+}
+
+}  // namespace
+
+std::array<std::vector<float>, 4> project_response(const ViewMap& response, OutgoingKind kind, int order,
+                                                   std::span<const Lobe> lobes) {
+  const bool of_lobes = kind == OutgoingKind::directional, hemisphere = kind == OutgoingKind::hemisphere;
+  LAMBENT_CHECK(kind == OutgoingKind::sh || hemisphere || kind == OutgoingKind::hsh || of_lobes);
+  const size_t rows = of_lobes ? lobes.size() : size_t(sh_count(order)), n = size_t(response.rows),
+               nodes = size_t(response.grid);
   // The map has equal areas: a node stands for 2 pi / (grid - 1)^2 of solid angle, half of it on an edge, a quarter in
   // a corner.
   std::vector<std::vector<double>> sums(4, std::vector<double>(rows * n, 0.0));
   std::vector<float> y(rows);
+  std::vector<double> gram(of_lobes ? rows * rows : 0, 0.0);
   for (size_t row = 0; row < nodes; ++row)
     for (size_t column = 0; column < nodes; ++column) {
       auto share = [&](size_t i) { return i == 0 || i == nodes - 1 ? 0.5 : 1.0; };
       const double w = share(row) * share(column) * 2 * std::numbers::pi / double((nodes - 1) * (nodes - 1));
       const Vec3 wo = view_map_direction(response.grid, int(column), int(row));
-      if (kind == OutgoingKind::hsh) evaluate_hsh(order, wo, y);
+      if (of_lobes)
+        for (size_t q = 0; q < rows; ++q)
+          y[q] = float(lobe_value(LobeKind::compact, lobes[q].sharpness, double(dot(lobes[q].axis, wo))));
+      else if (kind == OutgoingKind::hsh) evaluate_hsh(order, wo, y);
       else evaluate_sh(order, wo, y);
+      for (size_t q = 0; q < gram.size(); ++q) gram[q] += w * double(y[q / rows]) * double(y[q % rows]);
       const ViewWeights* O = response.values.data() + (row * nodes + column) * n;
       for (size_t q = 0; q < rows; ++q)
         for (size_t j = 0; j < n; ++j)
           for (size_t c = 0; c < 4; ++c) sums[c][q * n + j] += w * y[q] * O[j][int(c)];
     }
   std::array<std::vector<float>, 4> out;
-  const HemisphereFit fit = kind == OutgoingKind::hemisphere ? make_hemisphere_fit(order, 1e-4) : HemisphereFit{};
+  const HemisphereFit fit = hemisphere ? make_hemisphere_fit(order, 1e-4) : HemisphereFit{};
+  const PseudoInverse dual = of_lobes ? pseudo_inverse(gram, int(rows), 1e-4) : PseudoInverse{};
   for (size_t c = 0; c < 4; ++c) {
     out[c].resize(rows * n);
     for (size_t j = 0; j < n; ++j) {
       std::vector<double> column(rows);
       for (size_t q = 0; q < rows; ++q) column[q] = sums[c][q * n + j];
-      if (kind == OutgoingKind::hemisphere) column = fit_hemisphere(fit, column);
+      if (hemisphere) column = fit_hemisphere(fit, column);
+      if (of_lobes) column = multiply(dual.values, column);
       for (size_t q = 0; q < rows; ++q) out[c][q * n + j] = float(column[q]);
     }
   }

@@ -49,7 +49,9 @@ std::vector<float> convolve_phong(const LinearMaterial& material, const CosineBa
 std::vector<double> phong_convolution(float exponent, int order);
 
 // The matrix C of outgoing bases: coefficients over wo of each component (a.r, a.g, a.b, b) of O_j, order^2 x
-// order_in^2 for each. `kind` is sh, hemisphere or hsh.
-std::array<std::vector<float>, 4> project_response(const ViewMap& response, OutgoingKind kind, int order);
+// order_in^2 for each. `kind` is sh, hemisphere or hsh; or lobes are given, and there are as many as those, fitted by
+// least squares over the hemisphere.
+std::array<std::vector<float>, 4> project_response(const ViewMap& response, OutgoingKind kind, int order,
+                                                   std::span<const Lobe> lobes = {});
 
 }  // namespace lambent

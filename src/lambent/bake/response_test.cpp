@@ -98,5 +98,55 @@ TEST(Response, WhatTheBandsDoNotHoldIsTheIntegral) {
   EXPECT_GT(energy_beyond(Ggx{Vec3(1), Vec2(0.01f)}, six), 0.99);
 }
 
+// Against the responses themselves, view by view.
+double misfit_of_lobes(const ViewMap& response, int count) {
+  const std::vector<Lobe> lobes = outgoing_lobes(count);
+  const auto parts = project_response(response, OutgoingKind::directional, 0, lobes);
+  const Outgoing outgoing{
+      .kind = OutgoingKind::directional, .order = 1, .has_b = false, .frames = {Mat3(1.0f)}, .lobes = lobes};
+  std::vector<ViewWeights> weights(lobes.size());
+  double off = 0, all = 0;
+  for (int y = 0; y < response.grid; ++y)
+    for (int x = 0; x < response.grid; ++x) {
+      const Vec3 wo = view_map_direction(response.grid, x, y);
+      evaluate_outgoing(outgoing, 0, wo, weights);
+      for (size_t j = 0; j < size_t(response.rows); ++j) {
+        const double O = double(response.values[size_t(y * response.grid + x) * size_t(response.rows) + j].x);
+        double sum = 0;
+        for (size_t k = 0; k < lobes.size(); ++k)
+          sum += double(weights[k].x) * double(parts[0][k * size_t(response.rows) + j]);
+        off += double(wo.z) * (sum - O) * (sum - O), all += double(wo.z) * O * O;
+      }
+    }
+  return std::sqrt(off / all);
+}
+
+TEST(Response, CompactLobesHoldReflectionAndAViewMeetsAFew) {
+  const LinearMaterial material = same(Ggx{Vec3(0.9f), Vec2(0.36f)});
+  auto maps = make_responses({&material, 1}, make_cosine_basis(5), 32, 1024);
+  ASSERT_TRUE(maps);
+  const double few = misfit_of_lobes((*maps)[0], 25), some = misfit_of_lobes((*maps)[0], 64),
+               many = misfit_of_lobes((*maps)[0], 128);
+  EXPECT_LT(few, 0.08);
+  EXPECT_LT(some, 0.03);
+  EXPECT_LT(many, 0.02);
+  EXPECT_LT(many, some);
+  EXPECT_LT(some, few);
+  for (int count : {4, 25, 64, 128}) {
+    const std::vector<Lobe> lobes = outgoing_lobes(count);
+    ASSERT_EQ(lobes.size(), size_t(count));
+    for (Vec3 v : even_directions(200)) {
+      if (v.z < 0) continue;
+      int met = 0;
+      for (const Lobe& lobe : lobes) {
+        EXPECT_TRUE(is_lobe(LobeKind::compact, lobe));
+        met += lobe_value(LobeKind::compact, lobe.sharpness, double(dot(lobe.axis, v))) > 0;
+      }
+      EXPECT_GE(met, 2) << count;
+      EXPECT_LE(met, 14) << count;
+    }
+  }
+}
+
 }  // namespace
 }  // namespace lambent

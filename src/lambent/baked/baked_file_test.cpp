@@ -34,9 +34,11 @@ TEST(BakedFile, MatricesComeBackWithTheirLastReflection) {
   Small s = small_bake(1, Precision::half);
   const size_t n = s.receivers.count();
   Random random(8);
-  for (OutgoingKind kind : {OutgoingKind::map, OutgoingKind::svd, OutgoingKind::sh, OutgoingKind::hsh}) {
+  for (OutgoingKind kind :
+       {OutgoingKind::map, OutgoingKind::svd, OutgoingKind::sh, OutgoingKind::hsh, OutgoingKind::directional}) {
     Outgoing o;
-    o.kind = kind, o.order = 2, o.has_b = kind == OutgoingKind::sh;
+    o.kind = kind, o.order = 2, o.has_b = kind == OutgoingKind::sh || kind == OutgoingKind::directional;
+    if (kind == OutgoingKind::directional) o.lobes = outgoing_lobes(12);
     const bool mapped = kind == OutgoingKind::map || kind == OutgoingKind::svd;
     if (mapped)
       for (int m = 0; m < 3; ++m) {

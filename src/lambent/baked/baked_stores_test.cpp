@@ -286,7 +286,10 @@ TEST(BakedFile, LobesComeBackAndTheirHeadersMayNotLie) {
     EXPECT_EQ(got.lobes[k].sharpness, light.lobes[k].sharpness);
   }
   const std::vector<uint8_t> bytes = *read_file(file.path);
-  const std::pair<std::string, std::string> lies[] = {{"cosine_power", "cosine_tower"},
+  // Both lobes are out of range of the other kinds: no whole number, or too sharp.
+  const std::pair<std::string, std::string> lies[] = {{"\"cosine_power\"", "\"compact\"     "},
+                                                      {"cosine_power", "band_limited"},
+                                                      {"cosine_power", "cosine_tower"},
                                                       {"lobeKind", "lobeKine"},
                                                       {"[0.0,1.0,0.0,50.0]", "[0.0,1.0,0.0,-5.0]"},
                                                       {"[0.0,1.0,0.0,50.0]", "[0.0,1.0,0.0,5e99]"},
@@ -303,6 +306,25 @@ TEST(BakedFile, LobesComeBackAndTheirHeadersMayNotLie) {
     auto result = load_baked(lying.path);
     ASSERT_FALSE(result) << to;
     EXPECT_NE(result.error().text().find(lying.path), std::string::npos);
+  }
+}
+
+TEST(BakedFile, CompactAndSteerableLobesComeBack) {
+  Small s = small_bake(1, Precision::half);
+  for (const LightBasis& light : {LightBasis{0, LobeKind::compact, even_lobes(12, LobeKind::compact), {}},
+                                  LightBasis{0, LobeKind::band_limited, steerable_lobes(3), {}}}) {
+    const WritableTransfer w = make_transfer(light, 1, 1, s.receivers.count(), Precision::half);
+    const TemporaryFile file("lobes_of_a_kind.glb");
+    ASSERT_TRUE(save_baked(file.path, make_baked(s.scene, s.receivers, w.transfer, DiffuseRows{})));
+    auto back = load_baked(file.path);
+    ASSERT_TRUE(back) << back.error().text();
+    const LightBasis& got = std::get<Transfer>(back->surface.store).light;
+    EXPECT_EQ(got.lobe_kind, light.lobe_kind);
+    ASSERT_EQ(got.lobes.size(), light.lobes.size());
+    for (size_t k = 0; k < got.lobes.size(); ++k) {
+      EXPECT_EQ(got.lobes[k].axis, light.lobes[k].axis);
+      EXPECT_EQ(got.lobes[k].sharpness, light.lobes[k].sharpness);
+    }
   }
 }
 

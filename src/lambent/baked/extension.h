@@ -100,6 +100,9 @@ Result<Field> decode_indirect(const BlobReader& in, const nlohmann::json& object
 Result<DirectionalKind> decode_directional(const nlohmann::json& transfer, const std::string& where);
 
 nlohmann::json encode_outgoing(const Outgoing& o, BlobWriter& out);
+// The list "lobes" of an object, `most` at most.
+Result<std::vector<Lobe>> decode_lobes(const nlohmann::json& object, LobeKind kind, size_t most,
+                                       const std::string& where);
 Result<Outgoing> decode_outgoing(const BlobReader& in, const nlohmann::json& object, int rows, size_t receivers,
                                  const std::string& where);
 

@@ -14,6 +14,10 @@ json encode_outgoing(const Outgoing& o, BlobWriter& out) {
   std::vector<Vec3> frames;
   for (const Mat3& f : o.frames) frames.push_back(f[0]), frames.push_back(f[2]);
   json object{{"kind", outgoing_names[int(o.kind)]}, {"order", o.order}, {"frames", out.add_copy(frames)}};
+  if (o.kind == OutgoingKind::directional) {
+    object["lobes"] = json::array();
+    for (const Lobe& l : o.lobes) object["lobes"].push_back({l.axis.x, l.axis.y, l.axis.z, l.sharpness});
+  }
   if (o.maps.empty()) {
     object["hasB"] = o.has_b;
     return object;
@@ -74,6 +78,11 @@ Result<Outgoing> decode_outgoing(const BlobReader& in, const json& object, int r
   if (o.order < 1) return Error{where, "the outgoing order is 0"};
   if (o.kind == OutgoingKind::map || o.kind == OutgoingKind::svd)
     if (auto ok = decode_maps(in, object, rows, receivers, o, where); !ok) return ok.error();
+  if (o.kind == OutgoingKind::directional) {
+    auto lobes = decode_lobes(object, LobeKind::compact, size_t(rows), where);
+    if (!lobes) return lobes.error();
+    o.lobes = std::move(*lobes);
+  }
   auto frames = read_values<Vec3>(in, object, "frames", 2 * receivers, where);
   if (!frames) return frames.error();
   for (size_t r = 0; r < receivers; ++r) {

@@ -12,6 +12,21 @@ namespace lambent {
 
 using nlohmann::json;
 
+Result<std::vector<Lobe>> decode_lobes(const json& object, LobeKind kind, size_t most, const std::string& where) {
+  const auto lobes = object.find("lobes");
+  if (lobes == object.end() || !lobes->is_array() || lobes->size() > most)
+    return Error{where, "\"lobes\" is not a list, or too long a one"};
+  std::vector<Lobe> out;
+  for (const json& l : *lobes) {
+    if (!l.is_array() || l.size() != 4 || !std::all_of(l.begin(), l.end(), [](const json& x) { return x.is_number(); }))
+      return Error{where, "a lobe is not four numbers"};
+    const Lobe lobe{{l[0].get<float>(), l[1].get<float>(), l[2].get<float>()}, l[3].get<float>()};
+    if (!is_lobe(kind, lobe)) return Error{where, "a lobe has no unit axis, or a sharpness out of range"};
+    out.push_back(lobe);
+  }
+  return out;
+}
+
 namespace {
 
 template <class T>
@@ -19,37 +34,26 @@ std::span<const uint8_t> bytes_of(const std::vector<T>& values) {
   return {reinterpret_cast<const uint8_t*>(values.data()), values.size() * sizeof(T)};
 }
 
-const std::array<std::pair<LobeKind, std::string>, 2> lobe_names{
-    {{LobeKind::cosine_power, "cosine_power"}, {LobeKind::von_mises_fisher, "von_mises_fisher"}}};
-
 void encode_light(json& object, const LightBasis& light) {
   object["basis"] = "sh", object["order"] = light.order;
   if (!light.lobes.empty()) {
     json lobes = json::array();
     for (const Lobe& l : light.lobes) lobes.push_back({l.axis.x, l.axis.y, l.axis.z, l.sharpness});
-    object["lobeKind"] = std::find_if(lobe_names.begin(), lobe_names.end(), [&](const auto& k) {
-                           return k.first == light.lobe_kind;
-                         })->second;
+    object["lobeKind"] = lobe_names[int(light.lobe_kind)];
     object["lobes"] = std::move(lobes);
   }
   if (!light.groups.empty()) object["groups"] = light.groups;
 }
 
-Result<void> decode_lobes(const json& object, const json& lobes, LightBasis& light, const std::string& where) {
-  if (!lobes.is_array() || lobes.size() > max_columns)
-    return Error{where, "\"lobes\" is not a list, or too long a one"};
-  const auto kind = std::find_if(lobe_names.begin(), lobe_names.end(), [&](const auto& k) {
-    return object.contains("lobeKind") && object["lobeKind"] == k.second;
-  });
-  if (kind == lobe_names.end()) return Error{where, "the kind of lobes is not known to this program"};
-  light.lobe_kind = kind->first;
-  for (const json& l : lobes) {
-    if (!l.is_array() || l.size() != 4 || !std::all_of(l.begin(), l.end(), [](const json& x) { return x.is_number(); }))
-      return Error{where, "a lobe is not four numbers"};
-    const Lobe lobe{{l[0].get<float>(), l[1].get<float>(), l[2].get<float>()}, l[3].get<float>()};
-    if (!is_lobe(light.lobe_kind, lobe)) return Error{where, "a lobe has no unit axis, or a sharpness out of range"};
-    light.lobes.push_back(lobe);
-  }
+// Those of the light.
+Result<void> decode_lobes(const json& object, LightBasis& light, const std::string& where) {
+  const auto name = std::find_if(std::begin(lobe_names), std::end(lobe_names),
+                                 [&](const char* n) { return object.contains("lobeKind") && object["lobeKind"] == n; });
+  if (name == std::end(lobe_names)) return Error{where, "the kind of lobes is not known to this program"};
+  const LobeKind kind = LobeKind(name - std::begin(lobe_names));
+  auto lobes = decode_lobes(object, kind, max_columns, where);
+  if (!lobes) return lobes.error();
+  light.lobe_kind = kind, light.lobes = std::move(*lobes);
   return {};
 }
 
@@ -60,8 +64,8 @@ Result<LightBasis> decode_light(const json& object, const std::string& where) {
   auto order = read_count(object, "order", size_t(max_sh_order), where);
   if (!order) return order.error();
   light.order = int(*order);
-  if (const auto lobes = object.find("lobes"); lobes != object.end())
-    if (auto ok = decode_lobes(object, *lobes, light, where); !ok) return ok.error();
+  if (object.contains("lobes"))
+    if (auto ok = decode_lobes(object, light, where); !ok) return ok.error();
   if (const auto groups = object.find("groups"); groups != object.end()) {
     if (!groups->is_array() || groups->size() > max_columns ||
         !std::all_of(groups->begin(), groups->end(), [](const json& x) { return x.is_string(); }))

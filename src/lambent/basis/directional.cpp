@@ -2,32 +2,72 @@
 // of g P_l; then (Funk-Hecke) the integral of y_lm against the lobe about a is 2 pi I_l y_lm(a), and that of two lobes
 // at an angle c is pi sum_l (2l+1) I_l I'_l P_l(cos c).
 #include <lambent/basis/directional.h>
-#include <lambent/basis/symmetric.h>
 #include <lambent/basis/quadrature.h>
+#include <lambent/basis/symmetric.h>
 #include <lambent/core/check.h>
 
 namespace lambent {
 
+const char* const lobe_names[4] = {"cosine_power", "von_mises_fisher", "compact", "band_limited"};
+
 bool is_lobe(LobeKind kind, const Lobe& lobe) {
-  return std::abs(length(lobe.axis) - 1) < 1e-4f && lobe.sharpness >= min_sharpness(kind) &&
-         lobe.sharpness <= max_sharpness;
+  const float s = lobe.sharpness;
+  const bool unit = std::abs(length(lobe.axis) - 1) < 1e-4f;
+  switch (kind) {
+    case LobeKind::cosine_power: return unit && s >= 1 && s <= max_sharpness;
+    case LobeKind::von_mises_fisher: return unit && s >= 1e-3f && s <= max_sharpness;
+    case LobeKind::compact: return unit && s >= 1.5f && s <= 1024;
+    case LobeKind::band_limited: return unit && s >= 1 && s <= float(max_sh_order) && s == std::floor(s);
+  }
+  return false;
 }
 
 double lobe_value(LobeKind kind, double s, double cosine) {
-  return kind == LobeKind::cosine_power ? (cosine > 0 ? std::pow(cosine, s) : 0) : std::exp(s * (cosine - 1));
+  switch (kind) {
+    case LobeKind::cosine_power: return cosine > 0 ? std::pow(cosine, s) : 0;
+    case LobeKind::von_mises_fisher: return std::exp(s * (cosine - 1));
+    case LobeKind::compact: {
+      const double inside = std::max(0.0, 1 - s * (1 - cosine) / 3);
+      return inside * inside * inside;
+    }
+    case LobeKind::band_limited: {
+      double series[max_sh_order];
+      for (int l = 0; l < int(s); ++l) series[l] = (2 * l + 1) / (s * s);
+      return evaluate_legendre(std::span(series, size_t(s)), cosine);
+    }
+  }
+  return 0;
 }
 
 double lobe_scale(LobeKind kind, double s) {
   const double two_pi = 2 * std::numbers::pi;
-  return kind == LobeKind::cosine_power ? std::sqrt((2 * s + 1) / two_pi)
-                                        : std::sqrt(2 * s / (two_pi * -std::expm1(-4 * s)));
+  switch (kind) {
+    case LobeKind::cosine_power: return std::sqrt((2 * s + 1) / two_pi);
+    case LobeKind::von_mises_fisher: return std::sqrt(2 * s / (two_pi * -std::expm1(-4 * s)));
+    case LobeKind::compact: return std::sqrt(7 * s / (3 * two_pi));
+    case LobeKind::band_limited: return s / std::sqrt(2 * two_pi);
+  }
+  return 0;
+}
+
+double lobe_reach(LobeKind kind, double s) {
+  switch (kind) {
+    case LobeKind::cosine_power: return std::acos(std::exp(-30 / s));
+    case LobeKind::von_mises_fisher: return std::acos(std::max(-1.0, 1 - 30 / s));
+    case LobeKind::compact: return std::acos(std::max(-1.0, 1 - 3 / s));
+    case LobeKind::band_limited: break;
+  }
+  return std::numbers::pi;
 }
 
 namespace {
 
-// Terms of the sum over l for two cosine lobes. Those of the broadest, s = 1, fall as l^-4 and leave 1e-9; those of
-// sharp ones fall as exp(-l^2 / s).
-int moments_needed(float sharpest) { return 640 + int(6 * std::sqrt(sharpest)); }
+// Terms of the sum over l for two lobes. Those of the broadest cosine, s = 1, fall as l^-4 and leave 1e-9; those of
+// sharp ones fall as exp(-l^2 / s). Compact ones bend at their edge, and terms fall as (l^2 / s)^-4.
+int moments_needed(LobeKind kind, double sharpest) {
+  if (kind == LobeKind::band_limited) return max_sh_order;
+  return 640 + int((kind == LobeKind::compact ? 30 : 6) * std::sqrt(sharpest));
+}
 
 // A float's rounding of a unit axis would show in sharp lobes.
 Vec3d axis_of(const Lobe& lobe) { return normalize(Vec3d(lobe.axis)); }
@@ -35,6 +75,22 @@ Vec3d axis_of(const Lobe& lobe) { return normalize(Vec3d(lobe.axis)); }
 // I_l of the unscaled lobe, l < count.
 std::vector<double> moments(LobeKind kind, double s, int count) {
   std::vector<double> I(size_t(count), 0.0);
+  if (kind == LobeKind::band_limited) {
+    std::fill_n(I.begin(), std::min(count, int(s)), 2 / (s * s));
+    return I;
+  }
+  if (kind == LobeKind::compact) {
+    for (const QuadratureNode& node : gauss_legendre(count / 2 + 2, 1 - 3 / s, 1)) {  // exact
+      const double value = node.weight * lobe_value(kind, s, node.x);
+      double p0 = 1, p1 = node.x;
+      for (int l = 0; l < count; ++l) {
+        I[size_t(l)] += value * p0;
+        const double next = ((2 * l + 3) * node.x * p1 - (l + 1) * p0) / (l + 2);
+        p0 = p1, p1 = next;
+      }
+    }
+    return I;
+  }
   if (kind == LobeKind::cosine_power) {
     // The integral over [0, 1] of t^s P_l.
     I[0] = 1 / (s + 1);
@@ -69,6 +125,8 @@ double lobe_product(LobeKind kind, const Lobe& p, const Lobe& q, std::span<const
                     : 2 * std::numbers::pi * std::exp(k - sum) * -std::expm1(-2 * k) / k;
   }
   const double x = std::clamp(dot(a, b), -1.0, 1.0);
+  if (kind == LobeKind::compact && std::acos(x) >= lobe_reach(kind, p.sharpness) + lobe_reach(kind, q.sharpness))
+    return 0;
   double p0 = 1, p1 = x, result = Ip[0] * Iq[0] + 3 * Ip[1] * Iq[1] * x;
   for (size_t l = 2; l < Ip.size(); ++l) {
     const double k = double(l), next = ((2 * k - 1) * x * p1 - (k - 1) * p0) / k;
@@ -76,6 +134,19 @@ double lobe_product(LobeKind kind, const Lobe& p, const Lobe& q, std::span<const
     result += (2 * k + 1) * Ip[l] * Iq[l] * next;
   }
   return std::numbers::pi * result;
+}
+
+// The moments of each; lobes of one sharpness, side by side, share them. None of those that need none.
+std::vector<std::vector<double>> moments_of(LobeKind kind, std::span<const Lobe> lobes) {
+  std::vector<std::vector<double>> I(lobes.size());
+  if (kind == LobeKind::von_mises_fisher) return I;
+  float sharpest = 1;
+  for (const Lobe& lobe : lobes) sharpest = std::max(sharpest, lobe.sharpness);
+  for (size_t k = 0; k < lobes.size(); ++k)
+    I[k] = k > 0 && lobes[k].sharpness == lobes[k - 1].sharpness
+             ? I[k - 1]
+             : moments(kind, lobes[k].sharpness, moments_needed(kind, double(sharpest)));
+  return I;
 }
 
 // Coefficients of the scaled lobe in spherical harmonics.
@@ -89,14 +160,20 @@ void lobe_to_sh(LobeKind kind, const Lobe& lobe, int order, std::span<double> ou
 }  // namespace
 
 double lobe_integral(LobeKind kind, double s) {
-  const double unscaled = kind == LobeKind::cosine_power ? 1 / (s + 1) : -std::expm1(-2 * s) / s;
-  return 2 * std::numbers::pi * lobe_scale(kind, s) * unscaled;
+  const double scale = 2 * std::numbers::pi * lobe_scale(kind, s);
+  switch (kind) {
+    case LobeKind::cosine_power: return scale / (s + 1);
+    case LobeKind::von_mises_fisher: return scale * -std::expm1(-2 * s) / s;
+    case LobeKind::compact: return scale * 0.75 / s;
+    case LobeKind::band_limited: return scale * 2 / (s * s);
+  }
+  return 0;
 }
 
 double lobe_overlap(LobeKind kind, const Lobe& a, const Lobe& b) {
   std::vector<double> I, J;
-  if (kind == LobeKind::cosine_power) {
-    const int count = moments_needed(std::max(a.sharpness, b.sharpness));
+  if (kind != LobeKind::von_mises_fisher) {
+    const int count = moments_needed(kind, double(std::max(a.sharpness, b.sharpness)));
     I = moments(kind, a.sharpness, count), J = moments(kind, b.sharpness, count);
   }
   return lobe_scale(kind, a.sharpness) * lobe_scale(kind, b.sharpness) * lobe_product(kind, a, b, I, J);
@@ -104,15 +181,17 @@ double lobe_overlap(LobeKind kind, const Lobe& a, const Lobe& b) {
 
 Vec3 sample_lobe(LobeKind kind, float sharpness, Vec2 u) {
   // By inversion; v = 1 - cos t keeps its digits in sharp lobes.
+  LAMBENT_CHECK(kind != LobeKind::band_limited);
   const double s = sharpness, x = 1 - double(u.x);
   const double v = kind == LobeKind::cosine_power ? -std::expm1(std::log(x) / (s + 1))
+                 : kind == LobeKind::compact      ? 3 * -std::expm1(std::log(x) / 4) / s
                                                   : -std::log(x + (1 - x) * std::exp(-2 * s)) / s;
   const double r = std::sqrt(std::max(0.0, v * (2 - v))), phi = 2 * std::numbers::pi * double(u.y);
   return Vec3(r * std::cos(phi), r * std::sin(phi), 1 - v);
 }
 
 std::vector<double> lobe_irradiance(LobeKind kind, double s) {
-  const int count = moments_needed(float(s));
+  const int count = moments_needed(kind, s);
   std::vector<double> series = moments(kind, s, count);
   const std::vector<double> cosine = moments(LobeKind::cosine_power, 1, count);
   for (size_t l = 0; l < series.size(); ++l)
@@ -141,28 +220,64 @@ std::vector<Vec3> even_directions(int count) {
   return directions;
 }
 
-std::vector<Lobe> even_lobes(int count) {
+std::vector<Lobe> even_lobes(int count, LobeKind kind) {
+  LAMBENT_CHECK(kind == LobeKind::von_mises_fisher || kind == LobeKind::compact);
   std::vector<Lobe> lobes;
   for (Vec3 axis : even_directions(count)) lobes.push_back({axis, 0.15f * float(count)});
   return lobes;
 }
 
+std::vector<Lobe> steerable_lobes(int bands) {
+  LAMBENT_CHECK(bands >= 1 && bands <= max_sh_order);
+  constexpr int steps = 20;  // leave a condition of at most 25; twice as many, 20
+  const size_t count = size_t(sh_count(bands));
+  std::vector<Vec3d> axes;
+  for (Vec3 axis : even_directions(int(count))) axes.push_back(normalize(Vec3d(axis)));
+  // The lobe K, its slope by the cosine, and the greatest slope, K'(1): the sum of (2 l + 1) l (l + 1) / 2.
+  std::vector<double> gram(count * count), slope(count * count);
+  double steepest = 0;
+  for (int l = 0; l < bands; ++l) steepest += (2 * l + 1) * l * (l + 1) / 2.0 / double(count);
+  for (int step = 0; step < steps && bands > 1; ++step) {
+    for (size_t i = 0; i < count; ++i)
+      for (size_t j = 0; j < count; ++j) {
+        const double x = dot(axes[i], axes[j]);
+        double p0 = 1, p1 = x, q0 = 0, q1 = 1, value = 0, rise = 0;
+        for (int l = 0; l < bands; ++l) {
+          value += (2 * l + 1) * p0, rise += (2 * l + 1) * q0;
+          const double p = ((2 * l + 3) * x * p1 - (l + 1) * p0) / (l + 2),
+                       q = ((2 * l + 3) * (p1 + x * q1) - (l + 1) * q0) / (l + 2);
+          p0 = p1, p1 = p, q0 = q1, q1 = q;
+        }
+        gram[i * count + j] = value / double(count), slope[i * count + j] = rise / double(count);
+      }
+    const PseudoInverse inverse = pseudo_inverse(gram, int(count), 1e-14);
+    std::vector<Vec3d> moved = axes;
+    for (size_t i = 0; i < count; ++i) {
+      // Half of the gradient of log det G by axis i, along the sphere; a step of at most a small part of the spacing.
+      Vec3d uphill(0);
+      for (size_t j = 0; j < count; ++j)
+        if (j != i)
+          uphill += inverse.values[i * count + j] * slope[i * count + j] * (axes[j] - dot(axes[j], axes[i]) * axes[i]) /
+                    (2 * steepest);
+      const double most = 0.15 / bands, far = length(uphill);
+      moved[i] = normalize(axes[i] + (far > most ? most / far : 1.0) * uphill);
+    }
+    axes = std::move(moved);
+  }
+  std::vector<Lobe> lobes;
+  for (const Vec3d& axis : axes) lobes.push_back({normalize(Vec3(axis)), float(bands)});
+  return lobes;
+}
+
 DirectionalBasis make_directional_basis(int sh_order, LobeKind kind, std::vector<Lobe> lobes, double cutoff) {
   LAMBENT_CHECK(sh_order >= 0 && sh_order <= max_sh_order && (sh_order > 0 || !lobes.empty()));
-  float sharpest = 0;
-  for (const Lobe& lobe : lobes) {
-    sharpest = std::max(sharpest, lobe.sharpness);
-    LAMBENT_CHECK(is_lobe(kind, lobe));
-  }
+  for (const Lobe& lobe : lobes) LAMBENT_CHECK(is_lobe(kind, lobe));
   DirectionalBasis basis{sh_order, kind, std::move(lobes), {}, {}, 0, 1};
   const size_t n = basis.count(), harmonics = size_t(sh_count(sh_order));
   basis.gram.assign(n * n, 0.0);
   auto set = [&](size_t i, size_t j, double value) { basis.gram[i * n + j] = basis.gram[j * n + i] = value; };
   for (size_t i = 0; i < harmonics; ++i) set(i, i, 1);
-  std::vector<std::vector<double>> I;
-  if (kind == LobeKind::cosine_power)
-    for (const Lobe& lobe : basis.lobes) I.push_back(moments(kind, lobe.sharpness, moments_needed(sharpest)));
-  else I.resize(basis.lobes.size());
+  const std::vector<std::vector<double>> I = moments_of(kind, basis.lobes);
   std::vector<double> projected(harmonics);
   for (size_t p = 0; p < basis.lobes.size(); ++p) {
     const Lobe& lobe = basis.lobes[p];
@@ -236,6 +351,41 @@ std::vector<double> directional_to_sh(const DirectionalBasis& basis, std::span<c
     for (size_t i = 0; i < result.size(); ++i) result[i] += coefficients[harmonics + p] * projected[i];
   }
   return result;
+}
+
+TurnedCoefficients turn_directional(const DirectionalBasis& basis, std::span<const double> c, const Mat3& rotation) {
+  const size_t n = basis.count(), harmonics = size_t(sh_count(basis.sh_order)), lobes = basis.lobes.size();
+  LAMBENT_CHECK(c.size() == n);
+  std::vector<Lobe> turned = basis.lobes;
+  for (Lobe& lobe : turned) lobe.axis = normalize(rotation * lobe.axis);
+  // The turned function against each of the basis: its harmonics, then its lobes.
+  std::vector<double> integrals(n, 0.0), projected(harmonics);
+  if (basis.sh_order > 0) {
+    const std::vector<float> still(c.begin(), c.begin() + ptrdiff_t(harmonics));
+    std::vector<float> sh(harmonics);
+    rotate_sh(make_sh_rotation(basis.sh_order, rotation), still, sh);
+    for (size_t i = 0; i < n; ++i)
+      for (size_t j = 0; j < harmonics; ++j) integrals[i] += basis.gram[i * n + j] * double(sh[j]);
+  }
+  const std::vector<std::vector<double>> I = moments_of(basis.kind, basis.lobes);
+  for (size_t p = 0; p < lobes; ++p) {
+    const double strength = c[harmonics + p], scale = lobe_scale(basis.kind, turned[p].sharpness);
+    if (strength == 0) continue;
+    if (basis.sh_order > 0) {
+      lobe_to_sh(basis.kind, turned[p], basis.sh_order, projected);
+      for (size_t i = 0; i < harmonics; ++i) integrals[i] += strength * projected[i];
+    }
+    for (size_t q = 0; q < lobes; ++q)
+      integrals[harmonics + q] += strength * scale * lobe_scale(basis.kind, basis.lobes[q].sharpness) *
+                                  lobe_product(basis.kind, turned[p], basis.lobes[q], I[p], I[q]);
+  }
+  TurnedCoefficients out{apply_directional_dual(basis, integrals), 0};
+  for (size_t i = 0; i < n; ++i) {
+    out.lost -= out.coefficients[i] * integrals[i];
+    for (size_t j = 0; j < n; ++j) out.lost += c[i] * basis.gram[i * n + j] * c[j];
+  }
+  out.lost = std::max(out.lost, 0.0);
+  return out;
 }
 
 }  // namespace lambent

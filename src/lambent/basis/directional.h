@@ -1,8 +1,8 @@
 #pragma once
 // Bases of lobes, functions of the angle to an axis, alone or together with spherical harmonics: "order n and K lamps".
 // They are not orthonormal, so a function f = sum_i c_i b_i has coefficients c_i = integral of f b~_i with the DUAL
-// functions b~_i = sum_j (G^-1)_ij b_j, G_ij = integral of b_i b_j. Source: general-prt (directional and custom light
-// bases).
+// functions b~_i = sum_j (G^-1)_ij b_j, G_ij = integral of b_i b_j. Source: general-prt (directional, compact,
+// steerable and custom light bases).
 #include <lambent/basis/sh.h>
 
 namespace lambent {
@@ -11,7 +11,10 @@ namespace lambent {
 enum class LobeKind {
   cosine_power,      // max(0, cos t)^s, s >= 1: nothing beyond 90 degrees
   von_mises_fisher,  // exp(s (cos t - 1)), s > 0: smooth everywhere
+  compact,       // max(0, 1 - s (1 - cos t) / 3)^3, s in [1.5, 1024]: nothing beyond cos t = 1 - 3 / s, twice smooth
+  band_limited,  // sum over l < s of (2 l + 1) P_l(cos t) / s^2, s whole, in [1, max_sh_order]: within s bands
 };
+extern const char* const lobe_names[4];  // by kind
 
 // A function of the angle to an axis.
 struct Lobe {
@@ -21,8 +24,7 @@ struct Lobe {
 
 // Sharpness that the functions below take; the sharpest lobe is 0.2 degrees across, less than the sun.
 inline constexpr float max_sharpness = 1e5f;
-constexpr float min_sharpness(LobeKind kind) { return kind == LobeKind::cosine_power ? 1.0f : 1e-3f; }
-// Is the axis of unit length, and the sharpness within these limits? False for numbers that are not finite.
+// Is the axis of unit length, and the sharpness within the limits of its kind? False for numbers that are not finite.
 bool is_lobe(LobeKind kind, const Lobe& lobe);
 
 // A lobe's value at an angle of this cosine to its axis, at most 1; the factor that makes the integral of its square 1.
@@ -31,8 +33,11 @@ double lobe_value(LobeKind kind, double sharpness, double cosine);
 double lobe_scale(LobeKind kind, double sharpness);
 double lobe_integral(LobeKind kind, double sharpness);
 double lobe_overlap(LobeKind kind, const Lobe& a, const Lobe& b);
+// The angle beyond which there is nothing of it, or less than a part in 10^12 of its peak.
+double lobe_reach(LobeKind kind, double sharpness);
 
-// A direction about the axis +z with density lobe / integral, from u in [0, 1)^2.
+// A direction about the axis +z with density lobe / integral, from u in [0, 1)^2. Not of band-limited ones, which are
+// negative in places.
 Vec3 sample_lobe(LobeKind kind, float sharpness, Vec2 u);
 
 // Irradiance from a scaled lobe, the integral of it times max(0, n . d), as Legendre coefficients of the function of n
@@ -43,8 +48,13 @@ double evaluate_legendre(std::span<const double> coefficients, double x);
 // `count` directions spread evenly over the sphere (a Fibonacci lattice), no two alike.
 std::vector<Vec3> even_directions(int count);
 // von Mises-Fisher lobes about them. Broader ones hold smooth functions better, but their duals grow; these have fallen
-// to a third at a neighbour's axis, and the dual functions are up to 5 times as large as they are (in norm).
-std::vector<Lobe> even_lobes(int count);
+// to a third at a neighbour's axis, and the dual functions are up to 5 times as large as they are (in norm). Or compact
+// ones, `count` at least 10, each over ten times its share of the sphere.
+std::vector<Lobe> even_lobes(int count, LobeKind kind = LobeKind::von_mises_fisher);
+// bands^2 turned copies of the one band-limited lobe, about directions where they span the bands: moved uphill from
+// even ones until the determinant of their Gram matrix hardly grows ("extremal points", Sloan and Womersley 2004). They
+// are steerable: what they make up turns into what they make up.
+std::vector<Lobe> steerable_lobes(int bands);
 
 // Order n of spherical harmonics (0 for none), then the lobes, each scaled so that the integral of its square is 1.
 struct DirectionalBasis {
@@ -70,6 +80,15 @@ std::vector<double> project_directional(const DirectionalBasis& basis, const std
 // The same from the integrals of f b_i.
 std::vector<double> apply_directional_dual(const DirectionalBasis& basis, std::span<const double> integrals);
 double reconstruct_directional(const DirectionalBasis& basis, std::span<const double> coefficients, Vec3d d);
+
+// The function turned by `rotation`, as coefficients: those that fit best, and the integral of the square of what they
+// lose. Harmonics alone and steerable lobes lose nothing; others wobble.
+struct TurnedCoefficients {
+  std::vector<double> coefficients;
+  double lost = 0;
+};
+TurnedCoefficients turn_directional(const DirectionalBasis& basis, std::span<const double> coefficients,
+                                    const Mat3& rotation);
 
 // The part of the function that spherical harmonics of `order` can hold: order^2 coefficients, in closed form
 // (Funk-Hecke). With it lamps light what was baked for harmonics.

@@ -128,12 +128,23 @@ TEST(ProjectLobes, ReturnsTheCoefficientsOfWhatLiesInTheSpan) {
     for (int c = 0; c < 3; ++c) EXPECT_NEAR(again[i][c], light[i][c], 5e-4f) << i;
 }
 
+TEST(ProjectLobes, ReturnsTheCoefficientsOfCompactAndSteerableLobes) {
+  for (const auto& basis : {make_directional_basis(0, LobeKind::compact, even_lobes(40, LobeKind::compact)),
+                            make_directional_basis(0, LobeKind::band_limited, steerable_lobes(5))}) {
+    const auto light = uneven(basis.count());
+    const auto again = project_environment(reconstruct_environment(basis, light, 1024), basis);
+    for (size_t i = 0; i < light.size(); ++i)
+      for (int c = 0; c < 3; ++c) EXPECT_NEAR(again[i][c], light[i][c], 2e-3f) << int(basis.kind) << " " << i;
+  }
+}
+
 TEST(ProjectLobes, IntegratesLobesOfAnySharpnessOverTexels) {
   SKIP_UNDER_SANITIZERS();
   // One bright texel on black, beside the axis; the lobe's integral over it by brute force.
   const int w = 64, h = 32, x = 40, y = 7;
-  for (LobeKind kind : {LobeKind::cosine_power, LobeKind::von_mises_fisher})
-    for (float s : {2.0f, 40.0f, 1500.0f, 1e5f}) {
+  for (LobeKind kind : {LobeKind::cosine_power, LobeKind::von_mises_fisher, LobeKind::compact})
+    for (float s : {2.0f, 40.0f, 800.0f, 1e5f}) {
+      if (!is_lobe(kind, {Vec3(0, 1, 0), s})) continue;
       // Within half a standard deviation of the texel's corner or edge if sharp.
       const Vec3 axis =
           normalize(latlong_direction(Vec2((float(x) + 0.02f / std::sqrt(s)) / w, (float(y) + 0.3f) / h)));

@@ -11,17 +11,15 @@ namespace {
 
 constexpr double pi_d = std::numbers::pi;
 
-// Beyond `reach` a lobe has fallen below exp(-30) of its peak, less than a part in 10^12.
 struct PlacedLobe {
   Vec3d axis;
   double sharpness, reach;
 };
 
 PlacedLobe place(LobeKind kind, const Lobe& lobe, const Mat3& rotation) {
-  const double s = lobe.sharpness,
-               cosine = kind == LobeKind::cosine_power ? std::exp(-30 / s) : std::max(-1.0, 1 - 30 / s);
+  const double s = lobe.sharpness;
   // The environment turned by R meets the lobe about a as the environment itself meets the lobe about R^-1 a.
-  return {normalize(transpose(Mat3d(rotation)) * Vec3d(lobe.axis)), s, std::acos(cosine)};
+  return {normalize(transpose(Mat3d(rotation)) * Vec3d(lobe.axis)), s, lobe_reach(kind, s)};
 }
 
 // Gauss nodes across `width` radians about 0, so many that a lobe of this sharpness is integrated to one part in 10^5
@@ -67,6 +65,52 @@ void integrate_lobe_over_row(LobeKind kind, const PlacedLobe& lobe, int y, int w
   }
 }
 
+// The integrals of the turned environment against the lobes, by texels.
+std::vector<Vec3d> over_texels(const Environment& env, const DirectionalBasis& basis, const Mat3& rotation) {
+  const int w = env.image.width, h = env.image.height;
+  const size_t lobes = basis.lobes.size();
+  std::vector<PlacedLobe> placed;
+  for (const Lobe& lobe : basis.lobes) placed.push_back(place(basis.kind, lobe, rotation));
+  // One partial sum a row of texels, added in order afterwards.
+  std::vector<Vec3d> rows(lobes * size_t(h), Vec3d(0));
+  parallel_for(size_t(h), 4, [&](size_t begin, size_t end) {
+    for (size_t y = begin; y < end; ++y)
+      for (size_t k = 0; k < lobes; ++k)
+        integrate_lobe_over_row(basis.kind, placed[k], int(y), w, h, [&](int x, double integral) {
+          rows[y * lobes + k] += Vec3d(env.image.at(x, int(y))) * integral;
+        });
+  });
+  std::vector<Vec3d> out(lobes, Vec3d(0));
+  for (size_t k = 0; k < lobes; ++k) {
+    for (size_t y = 0; y < size_t(h); ++y) out[k] += rows[y * lobes + k];
+    out[k] *= lobe_scale(basis.kind, basis.lobes[k].sharpness);
+  }
+  return out;
+}
+
+// Those against band-limited lobes, from the harmonics of the turned environment: a lobe's integral over the sphere
+// times the value at its axis of the bands that it has.
+std::vector<Vec3d> over_bands(const DirectionalBasis& basis, std::span<const Vec3> sh) {
+  std::vector<Vec3d> out;
+  std::vector<double> y(sh.size());
+  for (const Lobe& lobe : basis.lobes) {
+    const int bands = int(lobe.sharpness);
+    evaluate_sh(bands, normalize(Vec3d(lobe.axis)), y);
+    Vec3d value(0);
+    for (size_t i = 0; i < size_t(sh_count(bands)); ++i) value += Vec3d(sh[i]) * y[i];
+    out.push_back(value * lobe_integral(basis.kind, lobe.sharpness));
+  }
+  return out;
+}
+
+// Bands of harmonics that the projection needs.
+int bands_of(const DirectionalBasis& basis) {
+  int bands = basis.sh_order;
+  if (basis.kind == LobeKind::band_limited)
+    for (const Lobe& lobe : basis.lobes) bands = std::max(bands, int(lobe.sharpness));
+  return bands;
+}
+
 }  // namespace
 
 std::vector<Vec3> project_environment(const Environment& env, int order) {
@@ -101,31 +145,18 @@ std::vector<Vec3> project_environment(const Environment& env, int order) {
 }
 
 std::vector<Vec3> project_environment(const Environment& env, const DirectionalBasis& basis, const Mat3& rotation) {
-  const int w = env.image.width, h = env.image.height;
   const size_t lobes = basis.lobes.size(), harmonics = size_t(sh_count(basis.sh_order));
+  const int order = bands_of(basis);
   std::vector<Vec3> sh;
-  if (basis.sh_order > 0)
-    sh = rotate_sh(make_sh_rotation(basis.sh_order, rotation), project_environment(env, basis.sh_order));
+  if (order > 0) sh = rotate_sh(make_sh_rotation(order, rotation), project_environment(env, order));
   if (lobes == 0) return sh;
-  std::vector<PlacedLobe> placed;
-  for (const Lobe& lobe : basis.lobes) placed.push_back(place(basis.kind, lobe, rotation));
-  // One partial sum a row of texels, added in order afterwards.
-  std::vector<Vec3d> rows(lobes * size_t(h), Vec3d(0));
-  parallel_for(size_t(h), 4, [&](size_t begin, size_t end) {
-    for (size_t y = begin; y < end; ++y)
-      for (size_t k = 0; k < lobes; ++k)
-        integrate_lobe_over_row(basis.kind, placed[k], int(y), w, h, [&](int x, double integral) {
-          rows[y * lobes + k] += Vec3d(env.image.at(x, int(y))) * integral;
-        });
-  });
+  const std::vector<Vec3d> of_lobes = basis.kind == LobeKind::band_limited ? over_bands(basis, sh)
+                                                                           : over_texels(env, basis, rotation);
   std::vector<Vec3> light(basis.count());
   for (int c = 0; c < 3; ++c) {
     std::vector<double> integrals(basis.count(), 0.0);
     for (size_t i = 0; i < harmonics; ++i) integrals[i] = double(sh[i][c]);
-    for (size_t k = 0; k < lobes; ++k) {
-      for (size_t y = 0; y < size_t(h); ++y) integrals[harmonics + k] += rows[y * lobes + k][c];
-      integrals[harmonics + k] *= lobe_scale(basis.kind, basis.lobes[k].sharpness);
-    }
+    for (size_t k = 0; k < lobes; ++k) integrals[harmonics + k] = of_lobes[k][c];
     const std::vector<double> coefficients = apply_directional_dual(basis, integrals);
     for (size_t i = 0; i < light.size(); ++i) light[i][c] = float(coefficients[i]);
   }
@@ -139,6 +170,17 @@ Environment reconstruct_environment(std::span<const Vec3> light, int width) {
 
 Environment reconstruct_environment(const DirectionalBasis& basis, std::span<const Vec3> light, int width) {
   LAMBENT_CHECK(light.size() >= basis.count());
+  if (basis.kind == LobeKind::band_limited && !basis.lobes.empty()) {
+    const int order = bands_of(basis);
+    std::vector<Vec3> sh(size_t(sh_count(order)));
+    std::vector<double> channel(basis.count());
+    for (int c = 0; c < 3; ++c) {
+      for (size_t i = 0; i < channel.size(); ++i) channel[i] = double(light[i][c]);
+      const std::vector<double> bands = directional_to_sh(basis, channel, order);
+      for (size_t i = 0; i < sh.size(); ++i) sh[i][c] = float(bands[i]);
+    }
+    return reconstruct_environment(sh, width ? width : 1024);
+  }
   if (width == 0) {
     float sharpest = 0;
     for (const Lobe& lobe : basis.lobes) sharpest = std::max(sharpest, lobe.sharpness);

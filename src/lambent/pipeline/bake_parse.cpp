@@ -24,16 +24,19 @@ constexpr double least_error = 1e-4;
 
 constexpr int max_lamps = 64, max_directional = 256;
 constexpr const char* light_syntax =
-    "sh:BANDS, sh:BANDS+lamps:COUNT@ENV, directional:COUNT, or haar:SIZE[,error=ERROR|,keep=FRACTION]";
+    "sh:BANDS, sh:BANDS+lamps:COUNT@ENV, directional:COUNT, compact:COUNT, steerable:BANDS, or "
+    "haar:SIZE[,error=ERROR|,keep=FRACTION]";
 
-// KIND or KIND:N, where N is the number of rows (svd) or bands (sh, hemisphere, hsh).
+// KIND or KIND:N, where N is the number of rows (svd), bands (sh, hemisphere, hsh) or lobes (directional).
 Result<void> parse_outgoing(const std::string& text, MatrixOptions& matrix) {
   const size_t colon = text.find(':');
   const std::string name = text.substr(0, colon);
   const auto kind = std::find(std::begin(outgoing_names), std::end(outgoing_names), name);
   if (kind == std::end(outgoing_names))
     return Error{"--outgoing",
-                 "must be map, phong, svd:ROWS, sh:BANDS, hemisphere:BANDS or hsh:BANDS, not \"" + text + "\"", true};
+                 "must be map, phong, svd:ROWS, sh:BANDS, hemisphere:BANDS, hsh:BANDS or directional:COUNT, not \"" +
+                     text + "\"",
+                 true};
   matrix.outgoing = OutgoingKind(kind - std::begin(outgoing_names));
   // Fewer rows than the default where incident light has no more.
   matrix.svd_rows = std::min(matrix.svd_rows, sh_count(matrix.incident_order));
@@ -43,6 +46,15 @@ Result<void> parse_outgoing(const std::string& text, MatrixOptions& matrix) {
   auto number = parse_numbers(text.substr(colon + 1), 1, "--outgoing");
   if (!number) return number.error();
   const float n = (*number)[0];
+  if (matrix.outgoing == OutgoingKind::directional) {
+    if (n != std::floor(n) || n < 4 || n > float(max_outgoing_lobes))
+      return Error{
+          "--outgoing",
+          fmt::format("expects a whole number from 4 to {} after directional:, not \"{}\"", max_outgoing_lobes, text),
+          true};
+    matrix.outgoing_lobes = int(n);
+    return {};
+  }
   if (n != std::floor(n) || n < 1 || n > 64)
     return Error{"--outgoing", "expects a whole number from 1 to 64 after the colon, not \"" + text + "\"", true};
   (matrix.outgoing == OutgoingKind::svd ? matrix.svd_rows : matrix.outgoing_order) = int(n);
@@ -60,10 +72,20 @@ Result<int> parse_whole(const std::string& text, int least, int most, const std:
 
 // Sets the columns of light that `text` asks for; loads the environment it names, if any.
 Result<void> parse_light(const std::string& text, BakeOptions& bake, const Job& job) {
-  if (text.starts_with("directional:")) {
-    auto count = parse_whole(text.substr(12), 4, max_directional, "the count after directional:");
+  const std::string name = text.substr(0, text.find(':'));
+  if (name == "directional" || name == "compact" || name == "steerable") {
+    if (name.size() == text.size()) return Error{"--light", "expects a number after " + name + ":", true};
+    const bool bands = name == "steerable", compact = name == "compact";
+    auto count = parse_whole(text.substr(name.size() + 1),
+                             bands     ? 1
+                             : compact ? 10
+                                       : 4,
+                             bands ? max_sh_order : max_directional,
+                             std::string(bands ? "the bands" : "the count") + " after " + name + ":");
     if (!count) return count.error();
-    bake.order = 0, bake.lobes = even_lobes(*count);
+    bake.order = 0;
+    bake.lobe_kind = bands ? LobeKind::band_limited : compact ? LobeKind::compact : LobeKind::von_mises_fisher;
+    bake.lobes = bands ? steerable_lobes(*count) : even_lobes(*count, bake.lobe_kind);
     return {};
   }
   if (text.starts_with("haar:")) return Error{"--light", "haar is of diffuse transfer: leave --transfer out", true};
@@ -81,13 +103,13 @@ Result<void> parse_light(const std::string& text, BakeOptions& bake, const Job& 
     return Error{"--light", "expects lamps:COUNT@ENV after the plus sign, not \"" + lamps + "\"", true};
   auto count = parse_whole(lamps.substr(6, at - 6), 1, max_lamps, "the count after lamps:");
   if (!count) return count.error();
-  const std::string name = lamps.substr(at + 1);
-  auto env = load_environment(name);
+  const std::string path = lamps.substr(at + 1);
+  auto env = load_environment(path);
   if (!env) return env.error();
   for (const std::string& w : env->warnings) job.warn(w);
   bake.lobes = find_lamps(*env, *count);
   if (const size_t found = bake.lobes.size(); found < size_t(*count))
-    job.warn(fmt::format("{}: has {}{} out, not {}", name, found,
+    job.warn(fmt::format("{}: has {}{} out, not {}", path, found,
                          found == 1 ? " lamp that stands" : " lamps that stand", *count));
   return {};
 }
@@ -216,7 +238,8 @@ Result<void> check_orders(const BakePlan& plan, const BakeRequest& r) {
                  fmt::format("svd:{} is more rows than the {} that --incident-order {} has", plan.matrix.svd_rows,
                              sh_count(r.incident_order), r.incident_order),
                  true};
-  if (glossy && order == 0) return Error{"--light", "directional light cannot be baked with --transfer matrix", true};
+  if (glossy && order == 0)
+    return Error{"--light", "lobes without harmonics cannot be baked with --transfer matrix", true};
   if (glossy && order + r.incident_order > max_sh_order + 1)
     return Error{"--incident-order", fmt::format("and the bands of the light may be {} together", max_sh_order + 1),
                  true};

@@ -47,7 +47,8 @@ const Option<R> table[] = {
     {"order", &R::order, "What is baked", every & ~(K | I | W),
      "Bands of the light's spherical harmonics; 6 if nothing is said, of lightmaps none", 1, max_sh_order},
     {"light", &R::light, "What is baked", D | M | F | W,
-     "What light is made of, in place of --order: sh:BANDS, sh:BANDS+lamps:COUNT@ENV, directional:COUNT, or "
+     "What light is made of, in place of --order: sh:BANDS, sh:BANDS+lamps:COUNT@ENV, directional:COUNT, "
+     "compact:COUNT (lobes of finite reach), steerable:BANDS (turned copies of one lobe), or "
      "haar:SIZE[,error=ERROR|,keep=FRACTION] (wavelets on a cube of so many texels a side, as few as leave that error "
      "of a receiver's transfer, 0.02, or that share of all)",
      0, 0, nullptr, nullptr, true, true},
@@ -123,7 +124,8 @@ const Option<R> table[] = {
      "`render --brdf` takes it",
      0, 0, nullptr, nullptr, true, true},
     {"outgoing", &R::outgoing, "Glossy transfer (--transfer matrix, and zonal)", M | G,
-     "Rows for the last reflection: map, phong, svd:ROWS, sh:BANDS, hemisphere:BANDS, hsh:BANDS"},
+     "Rows for the last reflection: map, phong, svd:ROWS, sh:BANDS, hemisphere:BANDS, hsh:BANDS, "
+     "directional:COUNT"},
     {"incident-order", &R::incident_order, "Glossy transfer (--transfer matrix, and zonal)", glossy,
      "Bands of incident light", 1, max_incident_order},
     {"view-map", &R::view_map, "Glossy transfer (--transfer matrix, and zonal)", glossy,
@@ -208,9 +210,9 @@ constexpr Conflict conflicts[] = {
     {"lattice", "fix-light", "is lit by any distant light, and --fix-light leaves one: give one"},
     {"lattice", "shadows=off", "is always baked with shadows"},
     {"lattice", "subsurface", "does not know media: --subsurface is for surfaces alone"},
-    {"lattice", "light=directional", "is lit by harmonics alone: leave --light directional out"},
+    {"lattice", "light=directional|compact|steerable", "is lit by harmonics alone: leave --light out, or say sh:BANDS"},
     {"subsurface", "shadows=off", "is always baked with shadows"},
-    {"subsurface", "light=directional", "is of harmonics alone"},
+    {"subsurface", "light=directional|compact|steerable", "is of harmonics alone"},
     {"directional", "direct=separate", "leaves no direct light apart: --direct separate goes with --directional none"},
     {"directional", "order", "holds lamps alone: leave --order out"},
     {"terms", "compress", "are kept of plain transfer: leave --compress out"},

@@ -45,6 +45,8 @@ Result<void> check_for_browser(const Field& field, const std::string& path) {
     return refuse(why_not(field));
   const LightBasis light = light_of(field.store);
   if (!light.lobes.empty()) return refuse("holds lobes of light");
+  if (const Outgoing* outgoing = outgoing_of(field); outgoing && outgoing->kind == OutgoingKind::directional)
+    return refuse("holds a last reflection of compact lobes");
   const bool texels = std::holds_alternative<TexelPlacement>(field.where);
   if (!light.groups.empty() && !texels) return refuse("holds the light of lamps at vertices");
   if (texels && light.count() > max_drawn_columns)

@@ -26,17 +26,28 @@ std::string some(size_t count, const char* what) {
 }
 const char* name_of(Precision precision) { return precision == Precision::half ? "half" : "single"; }
 
+const char* lobe_word(LobeKind kind) {
+  return kind == LobeKind::compact ? "compact lobe" : kind == LobeKind::band_limited ? "turned copy" : "lobe";
+}
+std::string width_of(LobeKind kind, double s) {
+  if (kind == LobeKind::band_limited) return fmt::format("of {} bands", s);
+  const std::string sharp = fmt::format("sharpness {:.4g}: ", s);
+  if (kind == LobeKind::compact)
+    return sharp + fmt::format("nothing beyond {:.3g} degrees", degrees(lobe_reach(kind, s)));
+  return sharp + fmt::format("{:.2g} degrees across", std::min(180.0, double(degrees(2 / std::sqrt(s)))));
+}
+
 Said say_light(const LightBasis& light) {
   json lobes = json::array();
   std::string lines;
   for (const Lobe& l : light.lobes) {
     lobes.push_back({{"axis", vector_json(l.axis)}, {"sharpness", l.sharpness}});
-    lines += fmt::format("\n  lobe about ({:.4f}, {:.4f}, {:.4f}), sharpness {:.4g}: {:.2g} degrees across", l.axis.x,
-                         l.axis.y, l.axis.z, l.sharpness, std::min(180.0, double(degrees(2 / std::sqrt(l.sharpness)))));
+    lines += fmt::format("\n  {} about ({:.4f}, {:.4f}, {:.4f}), {}", lobe_word(light.lobe_kind), l.axis.x, l.axis.y,
+                         l.axis.z, width_of(light.lobe_kind, l.sharpness));
   }
-  return {{{"order", light.order}, {"lobes", lobes}, {"groups", light.groups}, {"columns", light.count()}},
-          describe_light(light) + ", " + some(light.count(), "column"),
-          lines};
+  json columns{{"order", light.order}, {"lobes", lobes}, {"groups", light.groups}, {"columns", light.count()}};
+  if (!light.lobes.empty()) columns["lobe_kind"] = lobe_names[int(light.lobe_kind)];
+  return {std::move(columns), describe_light(light) + ", " + some(light.count(), "column"), lines};
 }
 
 Said say(const Transfer& t) {
@@ -127,7 +138,10 @@ Said say(const Rows& rows) {
                  },
                  [](const Outgoing& o) -> Said {
                    const char* name = outgoing_names[int(o.kind)];
-                   return {{{"outgoing", name}}, std::string("outgoing ") + name};
+                   Said s{{{"outgoing", name}}, std::string("outgoing ") + name};
+                   if (!o.lobes.empty()) s.members["outgoing_lobes"] = o.lobes.size();
+                   if (!o.lobes.empty()) s.words += fmt::format(", {} lobes", o.lobes.size());
+                   return s;
                  },
                  [](const IncidentRows& r) -> Said {
                    return {{{"incident_order", r.order}}, fmt::format("incident light of order {}", r.order)};

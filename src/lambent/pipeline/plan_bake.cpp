@@ -32,9 +32,10 @@ size_t stored_bytes(const BakePlan& plan, const BakeRequest& r, size_t receivers
     case BakeKind::factors: return receivers * size_t(sh_count(plan.bake.order + r.incident_order - 1)) * value;
     case BakeKind::matrix: {
       const OutgoingKind kind = plan.matrix.outgoing;
-      const size_t rows = kind == OutgoingKind::map ? incident
-                        : kind == OutgoingKind::svd ? size_t(plan.matrix.svd_rows)
-                                                    : 2 * size_t(sh_count(plan.matrix.outgoing_order));
+      const size_t rows = kind == OutgoingKind::map         ? incident
+                        : kind == OutgoingKind::svd         ? size_t(plan.matrix.svd_rows)
+                        : kind == OutgoingKind::directional ? 2 * size_t(plan.matrix.outgoing_lobes)
+                                                            : 2 * size_t(sh_count(plan.matrix.outgoing_order));
       return receivers * rows * columns * channels * value;
     }
     case BakeKind::zonal:

@@ -29,7 +29,9 @@ std::string describe_light(const LightBasis& light) {
   auto add = [&](size_t count, const std::string& what) {
     if (count > 0) text += (text.empty() ? "" : " and ") + std::to_string(count) + " " + what + (count == 1 ? "" : "s");
   };
-  add(light.lobes.size(), "lobe"), add(light.groups.size(), "lamp group");
+  const bool compact = light.lobe_kind == LobeKind::compact, copies = light.lobe_kind == LobeKind::band_limited;
+  add(light.lobes.size(), compact ? "compact lobe" : copies ? "steerable lobe" : "lobe");
+  add(light.groups.size(), "lamp group");
   return text;
 }
 

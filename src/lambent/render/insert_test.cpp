@@ -140,8 +140,8 @@ TEST(Insert, DrawsADiffuseObjectAmongGlossyRows) {
   const Relit before = relit_scene(room, *diffuse).relit;
   for (size_t r = 0; r < first; ++r) EXPECT_EQ(plain.relit.at(r), before.at(r));
 
-  for (OutgoingKind kind :
-       {OutgoingKind::map, OutgoingKind::svd, OutgoingKind::sh, OutgoingKind::hemisphere, OutgoingKind::hsh}) {
+  for (OutgoingKind kind : {OutgoingKind::map, OutgoingKind::svd, OutgoingKind::sh, OutgoingKind::hemisphere,
+                            OutgoingKind::hsh, OutgoingKind::directional}) {
     auto glossy = bake_matrix(room.scene, room.tracer, room.receivers, materials, options,
                               {.incident_order = 3, .outgoing = kind, .outgoing_order = 3, .grid = 8});
     ASSERT_TRUE(glossy);

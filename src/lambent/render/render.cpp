@@ -101,7 +101,8 @@ void reflect_at(const Scene& scene, const SpatialBasis& basis, const RenderOptio
           evaluate_outgoing(*options.outgoing, receiver, -direction,
                             weights);  // each receiver reflects in its own frame
           for (size_t row = 0; row < weights.size(); ++row)
-            add(receiver, int(row), weight * (Vec3(weights[row]) + colour * weights[row].w));
+            if (weights[row] != ViewWeights(0.0f))  // of compact lobes a view meets a few
+              add(receiver, int(row), weight * (Vec3(weights[row]) + colour * weights[row].w));
         });
       },
       basis);

@@ -68,7 +68,7 @@ TEST(Render, FixedViewIsThePictureForAnyLight) {
   auto grey = bake(scene, *tracer, receivers, options);
   ASSERT_EQ(grey->channels, 1);
   expect_same_pictures(scene, *tracer, receivers, *grey, nullptr);
-  for (OutgoingKind kind : {OutgoingKind::map, OutgoingKind::sh}) {
+  for (OutgoingKind kind : {OutgoingKind::map, OutgoingKind::sh, OutgoingKind::directional}) {
     auto glossy = bake_matrix(
         scene, *tracer, receivers, make_receiver_materials(scene, receivers, {.everywhere = Ggx{.alpha = Vec2(0.2f)}}),
         options, {.incident_order = 3, .outgoing = kind, .outgoing_order = 3, .grid = 8, .response_samples = 64});

@@ -7,7 +7,7 @@
 
 namespace lambent {
 
-const char* const outgoing_names[6] = {"map", "svd", "sh", "hemisphere", "hsh", "phong"};
+const char* const outgoing_names[7] = {"map", "svd", "sh", "hemisphere", "hsh", "phong", "directional"};
 
 Vec3 view_map_direction(int grid, int x, int y) {
   const Vec2 disk = square_to_disk({float(x) / float(grid - 1), float(y) / float(grid - 1)});
@@ -32,9 +32,22 @@ void look_up(const ViewMap& map, Vec3 wo, std::span<ViewWeights> out) {
     out[size_t(r)] = w00 * p[r] + w10 * p[map.rows + r] + w01 * q[r] + w11 * q[map.rows + r];
 }
 
+std::vector<Lobe> outgoing_lobes(int count) {
+  LAMBENT_CHECK(count >= 4);
+  // The first of even ones from the pole on, to nearly a spacing below the horizon, without which the fit there is half
+  // as good.
+  const double below = std::min(1.0, 0.8 * std::sqrt(2 * std::numbers::pi / count));
+  const int all = int(std::lround(2 * count / (1 + below)));
+  std::vector<Lobe> lobes;
+  for (Vec3 axis : even_directions(all)) lobes.push_back({axis, std::max(1.5f, 0.15f * float(all))});
+  lobes.resize(size_t(count));
+  return lobes;
+}
+
 int Outgoing::rows() const {
   if (kind == OutgoingKind::map || kind == OutgoingKind::svd) return maps.empty() ? 0 : maps[0].rows;
   if (kind == OutgoingKind::phong) return sh_count(order) + 1 + has_b;
+  if (kind == OutgoingKind::directional) return int(lobes.size()) * (has_b ? 2 : 1);
   return sh_count(order) * (has_b ? 2 : 1);
 }
 
@@ -42,6 +55,14 @@ void evaluate_outgoing(const Outgoing& o, size_t receiver, Vec3 view, std::span<
   Vec3 wo = view * o.frames[receiver];
   if (wo.z < 0) wo = normalize_or(Vec3(wo.x, wo.y, 0), Vec3(0, 0, 1));
   if (o.kind == OutgoingKind::map || o.kind == OutgoingKind::svd) return look_up(o.maps[o.map_of[receiver]], wo, out);
+  if (o.kind == OutgoingKind::directional) {
+    for (size_t k = 0; k < o.lobes.size(); ++k) {
+      const float y = float(lobe_value(LobeKind::compact, o.lobes[k].sharpness, double(dot(o.lobes[k].axis, wo))));
+      out[k] = ViewWeights(y, y, y, 0);
+      if (o.has_b) out[o.lobes.size() + k] = ViewWeights(0, 0, 0, y);
+    }
+    return;
+  }
   float y[sh_count(max_sh_order)];
   const size_t n = size_t(sh_count(o.order));
   if (o.kind == OutgoingKind::phong) {
@@ -61,6 +82,11 @@ void evaluate_outgoing(const Outgoing& o, size_t receiver, Vec3 view, std::span<
 
 std::vector<float> row_weights(const Outgoing& o) {
   std::vector<float> weights(size_t(o.rows()), 1.0f);
+  for (size_t k = 0; k < o.lobes.size(); ++k) {  // its square over the sphere
+    const double s = o.lobes[k].sharpness, scale = lobe_scale(LobeKind::compact, s);
+    weights[k] = float(1 / (scale * scale));
+    if (o.has_b) weights[o.lobes.size() + k] = weights[k];
+  }
   if (o.maps.empty()) return weights;
   std::vector<double> sum(weights.size());
   double total = 0;

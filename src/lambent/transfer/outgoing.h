@@ -5,7 +5,7 @@
 // wo in the receiver's tangent frame, colour the base colour at the pixel. The part a does not depend on base colour (a
 // dielectric's highlight), b is proportional to it (diffuse reflection, a metal's highlight); textures so stay as sharp
 // as they are. Diffuse transfer is the one-row case a = 0, b = 1. Source: general-prt, "Final reflection" (a) and (b).
-#include <lambent/core/vec.h>
+#include <lambent/basis/directional.h>
 
 #include <cstdint>
 #include <span>
@@ -20,11 +20,12 @@ enum class OutgoingKind {
         // changed
   svd,  // rows: the leading singular vectors of each material's O
   sh,   // rows: outgoing radiance in spherical harmonics, zero below the horizon
-  hemisphere,  // the same, fitted by least squares on the hemisphere alone
-  hsh,         // rows: outgoing radiance in hemispherical harmonics
-  phong,       // rows: light convolved with Phong's lobe, in harmonics of the mirrored view; then diffuse radiance
+  hemisphere,   // the same, fitted by least squares on the hemisphere alone
+  hsh,          // rows: outgoing radiance in hemispherical harmonics
+  phong,        // rows: light convolved with Phong's lobe, in harmonics of the mirrored view; then diffuse radiance
+  directional,  // rows: outgoing radiance in compact lobes over the hemisphere, of which a view meets a few
 };
-extern const char* const outgoing_names[6];  // by kind
+extern const char* const outgoing_names[7];  // by kind
 
 // a and b as (a.r, a.g, a.b, b).
 using ViewWeights = Vec4;
@@ -43,15 +44,19 @@ void look_up(const ViewMap& map, Vec3 wo, std::span<ViewWeights> out);
 // The last reflection at every receiver: how rows become radiance towards the eye.
 struct Outgoing {
   OutgoingKind kind = OutgoingKind::map;
-  int order = 0;  // of the rows' basis (map, phong: incident; sh, hemisphere, hsh: outgoing)
-  // sh, hemisphere, hsh: order^2 rows of a, then order^2 of b; without b, those of a alone. phong: order^2 rows of a, a
-  // diffuse one of a, and one of b.
+  int order = 0;  // of the rows' basis (map, phong, directional: incident; sh, hemisphere, hsh: outgoing)
+  // sh, hemisphere, hsh: order^2 rows of a, then order^2 of b; without b, those of a alone; directional: the same by
+  // lobes. phong: order^2 rows of a, a diffuse one of a, and one of b.
   bool has_b = true;
   std::vector<ViewMap> maps;     // map, svd: one a material
   std::vector<uint16_t> map_of;  // map, svd: by receiver
   std::vector<Mat3> frames;      // by receiver: tangent, bitangent, normal
+  std::vector<Lobe> lobes = {};  // directional: compact ones, unscaled, in the receiver's frame
   int rows() const;              // that the transfer must have
 };
+
+// Compact lobes for `count` >= 4 outgoing directions, about even ones of the upper hemisphere; a view meets some ten.
+std::vector<Lobe> outgoing_lobes(int count);
 
 // The weights of all rows at a receiver, for the unit direction `view` towards the eye in world space. Below the
 // receiver's horizon it is lifted to it.
