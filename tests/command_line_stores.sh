@@ -168,7 +168,24 @@ expect 0 'wavelets of the light' render haar_texels.glb "${view[@]}" -o haar_tex
 expect 2 'a cube of 16, 32' bake corner.obj --light haar:48 -o x.glb
 expect 2 'keep=FRACTION below 1' bake corner.obj --light haar:32,keep=2 -o x.glb
 expect 2 'haar is of diffuse transfer' bake corner.obj --light haar:32 --transfer matrix -o x.glb
-expect 2 'bounces: does not go with wavelets' bake corner.obj --light haar:32 --bounces 1 -o x.glb
+# With bounces, against the path tracer: a floor under a red wall.
+printf '%s\n' 'newmtl red' 'Kd 0.8 0.15 0.1' 'newmtl grey' 'Kd 0.6 0.6 0.6' >red.mtl
+{
+  echo 'mtllib red.mtl'
+  grep '^v ' corner.obj
+  printf '%s\n' 'usemtl grey' 'f 4 3 2 1' 'usemtl red' 'f 1 2 6 5'
+} >red.obj
+sky=sky:elevation=40,azimuth=60,width=256
+expect 0 'wavelets' bake red.obj --max-edge 0.2 --light haar:32 --bounces 2 --samples 512 -o haar_bounced.glb
+expect 0 '3 channels' inspect haar_bounced.glb
+# shellcheck disable=SC2086
+expect 0 'wavelets of the light' render haar_bounced.glb --env $sky $shot --spp 16 -o haar_bounced.exr
+# shellcheck disable=SC2086
+expect 0 'paths' reference red.obj --max-edge 0.2 --env $sky --bounces 2 $shot --spp 256 -o haar_truth.exr
+alike 36 "wavelets that bounced and the path tracer" haar_bounced.exr haar_truth.exr --exposure -2
+expect 2 'samples: is of the rays that bounce' bake corner.obj --light haar:32 --samples 64 -o x.glb
+expect 2 'seed: is of the rays that bounce' bake corner.obj --light haar:32 --bounces 0 --seed 2 -o x.glb
+expect 2 'fix-view' bake corner.obj --light haar:32 --fix-view auto -o x.glb
 expect 2 'window: does not go with wavelets' render haar.glb --env uniform:1 --window hann -o x.png
 expect 2 'env: is needed' render haar.glb -o x.png
 expect 1 'holds transfer in wavelets' compress haar.glb --zonal 2 -o x.glb

@@ -316,5 +316,53 @@ TEST(BakedFile, RefusesSurfacesThatLie) {
   }
 }
 
+TEST(BakedFile, CompactAndSteerableLobesComeBack) {
+  Small s = small_bake(1, Precision::half);
+  for (const LightBasis& light : {LightBasis{0, LobeKind::compact, even_lobes(12, LobeKind::compact), {}},
+                                  LightBasis{0, LobeKind::band_limited, steerable_lobes(3), {}}}) {
+    const WritableTransfer w = make_transfer(light, 1, 1, s.receivers.count(), Precision::half);
+    const TemporaryFile file("lobes_of_a_kind.glb");
+    ASSERT_TRUE(save_baked(file.path, make_baked(s.scene, s.receivers, w.transfer, DiffuseRows{})));
+    auto back = load_baked(file.path);
+    ASSERT_TRUE(back) << back.error().text();
+    const LightBasis& got = std::get<Transfer>(back->surface.store).light;
+    EXPECT_EQ(got.lobe_kind, light.lobe_kind);
+    ASSERT_EQ(got.lobes.size(), light.lobes.size());
+    for (size_t k = 0; k < got.lobes.size(); ++k) {
+      EXPECT_EQ(got.lobes[k].axis, light.lobes[k].axis);
+      EXPECT_EQ(got.lobes[k].sharpness, light.lobes[k].sharpness);
+    }
+  }
+}
+
+TEST(BakedFile, WaveletsOfThreeChannelsComeBackAndMayNotLie) {
+  const TemporaryFile file("wavelets_rgb.glb");
+  const Small s = small_bake(1, Precision::half);
+  Random random(3);
+  std::vector<std::vector<HaarEntry>> rows(s.receivers.count());
+  for (auto& row : rows)
+    for (uint32_t c = 5; c < 3 * 1536; c += 700) row.push_back({c, random.next()});
+  HaarWriter writer(16, std::vector<float>(3 * 1536, 1.0f));
+  writer.add(rows);
+  const HaarTransfer t = writer.finish(0.1);
+  ASSERT_EQ(t.channels, 3);
+  ASSERT_TRUE(save_baked(file.path, make_baked(s.scene, s.receivers, t, DiffuseRows{})));
+  auto back = load_baked(file.path);
+  ASSERT_TRUE(back) << back.error().text();
+  const auto& kept = std::get<HaarTransfer>(back->surface.store);
+  EXPECT_EQ(kept.channels, 3);
+  EXPECT_EQ(kept.begin, t.begin);
+  for (size_t r = 0; r < rows.size(); ++r) EXPECT_EQ(load_receiver(kept, r), load_receiver(t, r));
+  const std::vector<uint8_t> bytes = *read_file(file.path);
+  for (const char* to : {"\"channels\":1", "\"channels\":2", "\"channels\":0"}) {
+    std::string text(bytes.begin(), bytes.end());
+    const size_t at = text.find("\"channels\":3");
+    ASSERT_NE(at, std::string::npos);
+    text.replace(at, 12, to);
+    ASSERT_TRUE(write_file_atomically(file.path, text));
+    EXPECT_FALSE(load_baked(file.path)) << to;
+  }
+}
+
 }  // namespace
 }  // namespace lambent

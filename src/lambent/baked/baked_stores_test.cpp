@@ -309,25 +309,6 @@ TEST(BakedFile, LobesComeBackAndTheirHeadersMayNotLie) {
   }
 }
 
-TEST(BakedFile, CompactAndSteerableLobesComeBack) {
-  Small s = small_bake(1, Precision::half);
-  for (const LightBasis& light : {LightBasis{0, LobeKind::compact, even_lobes(12, LobeKind::compact), {}},
-                                  LightBasis{0, LobeKind::band_limited, steerable_lobes(3), {}}}) {
-    const WritableTransfer w = make_transfer(light, 1, 1, s.receivers.count(), Precision::half);
-    const TemporaryFile file("lobes_of_a_kind.glb");
-    ASSERT_TRUE(save_baked(file.path, make_baked(s.scene, s.receivers, w.transfer, DiffuseRows{})));
-    auto back = load_baked(file.path);
-    ASSERT_TRUE(back) << back.error().text();
-    const LightBasis& got = std::get<Transfer>(back->surface.store).light;
-    EXPECT_EQ(got.lobe_kind, light.lobe_kind);
-    ASSERT_EQ(got.lobes.size(), light.lobes.size());
-    for (size_t k = 0; k < got.lobes.size(); ++k) {
-      EXPECT_EQ(got.lobes[k].axis, light.lobes[k].axis);
-      EXPECT_EQ(got.lobes[k].sharpness, light.lobes[k].sharpness);
-    }
-  }
-}
-
 TEST(BakedFile, RefusesOtherThings) {
   EXPECT_FALSE(load_baked("/nonexistent/x.glb"));
   EXPECT_FALSE(load_baked("/tmp"));

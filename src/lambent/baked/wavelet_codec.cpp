@@ -12,11 +12,13 @@ json encode_wavelets(const HaarTransfer& t, BlobWriter& out) {
   std::vector<uint8_t> lengths;
   for (size_t chunk = 0; chunk < t.chunks(); ++chunk)
     for (size_t c = 0; c < columns; ++c) append_varint(lengths, t.column(chunk, c).size());
-  return {{"cube", t.size},
-          {"error", t.error},
-          {"bufferView", out.add(t.data, 64)},
-          {"lengths", out.add_copy(lengths)},
-          {"steps", out.add_copy(t.steps)}};
+  json object{{"cube", t.size},
+              {"error", t.error},
+              {"bufferView", out.add(t.data, 64)},
+              {"lengths", out.add_copy(lengths)},
+              {"steps", out.add_copy(t.steps)}};
+  if (t.channels != 1) object["channels"] = t.channels;
+  return object;
 }
 
 Result<HaarTransfer> decode_wavelets(const BlobReader& in, const json& object, size_t receivers,
@@ -27,6 +29,12 @@ Result<HaarTransfer> decode_wavelets(const BlobReader& in, const json& object, s
     return Error{where, "\"cube\" must be 16, 32, 64, 128 or 256"};
   HaarTransfer t;
   t.size = int(*size), t.receivers = receivers;
+  if (object.contains("channels")) {
+    auto channels = read_count(object, "channels", 3, where);
+    if (!channels) return channels.error();
+    if (*channels != 1 && *channels != 3) return Error{where, "\"channels\" must be 1 or 3"};
+    t.channels = int(*channels);
+  }
   const size_t columns = t.columns(), chunks = t.chunks();
   auto steps = read_values<float>(in, object, "steps", columns, where);
   if (!steps) return steps.error();

@@ -1,4 +1,5 @@
 #include <lambent/compress/haar_fit.h>
+#include <lambent/compress/haar_rows.h>
 
 #include <lambent/basis/haar.h>
 #include <lambent/core/parallel.h>
@@ -41,36 +42,80 @@ void transform_row(const Visibility& v, const Cube& cube, size_t receiver, Vec3 
   }
 }
 
-// The largest coefficients of a row, by rising column.
 std::vector<HaarEntry> largest_of(const std::vector<float>& row, const HaarFitOptions& o) {
-  std::vector<uint32_t> order;
-  double all = 0;
+  std::vector<HaarEntry> entries;
   for (uint32_t c = 0; c < row.size(); ++c)
-    if (row[c] != 0) order.push_back(c), all += double(row[c]) * double(row[c]);
-  std::sort(order.begin(), order.end(), [&](uint32_t a, uint32_t b) {
-    const float x = std::abs(row[a]), y = std::abs(row[b]);
-    return x != y ? x > y : a < b;
+    if (row[c] != 0) entries.push_back({c, row[c]});
+  return largest_entries(entries, o, row.size());
+}
+
+Result<void> check_fit(const Visibility& v, std::span<const Vec3> normals, const HaarFitOptions& o) {
+  if (!std::has_single_bit(unsigned(v.size))) return Error{"", "Haar wavelets want a cube of 2^k texels a side"};
+  if (normals.size() != v.receivers) return Error{"", "there is not a normal for each receiver"};
+  if (!(o.keep >= 0 && o.keep <= 1) || !(o.error >= 0 && o.error < 1))
+    return Error{"", "the share or the error of Haar coefficients is out of range"};
+  return {};
+}
+
+}  // namespace
+
+std::vector<HaarEntry> largest_entries(std::span<const HaarEntry> row, const HaarFitOptions& o, size_t columns) {
+  std::vector<HaarEntry> out(row.begin(), row.end());
+  std::sort(out.begin(), out.end(), [&](const HaarEntry& a, const HaarEntry& b) {
+    const float x = std::abs(a.value), y = std::abs(b.value);
+    return x != y ? x > y : a.column < b.column;
   });
-  size_t keep = order.size();
+  size_t keep = out.size();
   if (o.keep > 0) {
-    keep = std::min(keep, size_t(std::ceil(o.keep * double(row.size()))));
+    keep = std::min(keep, size_t(std::ceil(o.keep * double(columns))));
   } else {
-    double left = 0;
+    double all = 0, left = 0;
+    for (const HaarEntry& e : row) all += double(e.value) * double(e.value);
     const double allowed = o.error * o.error * all;
     while (keep > 0) {
-      const double square = double(row[order[keep - 1]]) * double(row[order[keep - 1]]);
+      const double square = double(out[keep - 1].value) * double(out[keep - 1].value);
       if (left + square > allowed) break;
       left += square, --keep;
     }
   }
-  order.resize(keep);
-  std::sort(order.begin(), order.end());
-  std::vector<HaarEntry> out;
-  for (uint32_t c : order) out.push_back({c, row[c]});
+  out.resize(keep);
+  std::sort(out.begin(), out.end(), [](const HaarEntry& a, const HaarEntry& b) { return a.column < b.column; });
   return out;
 }
 
-}  // namespace
+Result<std::vector<std::vector<HaarEntry>>> haar_rows(const Visibility& v, std::span<const Vec3> normals,
+                                                      const HaarFitOptions& o, Progress* progress) {
+  if (auto ok = check_fit(v, normals, o); !ok) return ok.error();
+  const Cube cube = make_cube(v.size);
+  ProgressStage stage(progress, "wavelets", v.receivers);
+  std::vector<std::vector<HaarEntry>> rows(v.receivers);
+  parallel_for(v.receivers, 16, [&](size_t begin, size_t end) {
+    thread_local HaarScratchRow scratch;
+    for (size_t r = begin; r < end && !stage.cancelled(); ++r) {
+      transform_row(v, cube, r, normals[r], scratch);
+      rows[r] = largest_of(scratch.row, o);
+    }
+    stage.advance(end - begin);
+  });
+  if (stage.cancelled()) return Error{"", "cancelled"};
+  return rows;
+}
+
+HaarTransfer store_haar_rows(int size, int channels, std::span<const std::vector<HaarEntry>> rows, double all,
+                             double left, HaarFitReport* report) {
+  std::vector<float> largest(size_t(channels) * cube_texels(size));
+  size_t entries = 0;
+  for (const auto& row : rows) {
+    entries += row.size();
+    for (const HaarEntry& e : row) largest[e.column] = std::max(largest[e.column], std::abs(e.value));
+  }
+  HaarWriter writer(size, largest);
+  for (size_t first = 0; first < rows.size(); first += haar_chunk)
+    writer.add(rows.subspan(first, std::min(haar_chunk, rows.size() - first)));
+  const double error = all > 0 ? std::sqrt((left + writer.lost()) / all) : 0.0;
+  if (report) *report = {error, double(entries) / double(std::max<size_t>(rows.size(), 1))};
+  return writer.finish(error);
+}
 
 std::vector<float> haar_row(const Visibility& v, size_t receiver, Vec3 normal) {
   HaarScratchRow s;
@@ -80,10 +125,7 @@ std::vector<float> haar_row(const Visibility& v, size_t receiver, Vec3 normal) {
 
 Result<HaarTransfer> fit_haar(const Visibility& v, std::span<const Vec3> normals, const HaarFitOptions& o,
                               HaarFitReport* report, Progress* progress) {
-  if (!std::has_single_bit(unsigned(v.size))) return Error{"", "Haar wavelets want a cube of 2^k texels a side"};
-  if (normals.size() != v.receivers) return Error{"", "there is not a normal for each receiver"};
-  if (!(o.keep >= 0 && o.keep <= 1) || !(o.error >= 0 && o.error < 1))
-    return Error{"", "the share or the error of Haar coefficients is out of range"};
+  if (auto ok = check_fit(v, normals, o); !ok) return ok.error();
   const Cube cube = make_cube(v.size);
   ProgressStage stage(progress, "wavelets", 2 * v.receivers);
   // Twice over all: the columns' steps first, then the chunks, of which one is in memory at a time.

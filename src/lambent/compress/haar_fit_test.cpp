@@ -1,6 +1,9 @@
 // Transfer in Haar wavelets against sums over texels.
 #include <lambent/bake/visibility.h>
+#include <lambent/basis/haar.h>
 #include <lambent/compress/haar_fit.h>
+#include <lambent/compress/haar_rows.h>
+#include <lambent/core/random.h>
 #include <lambent/light/cube_light.h>
 #include <lambent/light/sky.h>
 #include <lambent/relight/relight_haar.h>
@@ -157,6 +160,54 @@ TEST(HaarTransfer, SparseAndWholeTilesOfManyChunksKeepTheirPlaces) {
   }
   for (size_t r : {size_t(700), 2 * haar_chunk + 4})
     for (const HaarEntry& e : rows[r]) EXPECT_NEAR(load_receiver(t, r)[e.column], e.value, 0.03f);
+}
+
+// Each channel against its own columns of a light that has another in each colour.
+TEST(HaarTransfer, ThreeChannelsAreLitEachByItsColour) {
+  const BallOverFloor s;
+  const size_t columns = cube_texels(16);
+  Random random(5);
+  std::vector<std::vector<HaarEntry>> rows(300);
+  double all = 0;
+  for (auto& row : rows)
+    for (uint32_t c = 0; c < 3 * columns; c += 1 + uint32_t(40 * random.next())) {
+      row.push_back({c, (random.next() - 0.3f) * (c < columns ? 1.0f : 0.4f)});
+      all += double(row.back().value) * double(row.back().value);
+    }
+  HaarFitReport report;
+  const HaarTransfer t = store_haar_rows(16, 3, rows, all, 0, &report);
+  ASSERT_TRUE(check_haar(t, "it"));
+  EXPECT_EQ(t.channels, 3);
+  EXPECT_EQ(t.columns(), 3 * columns);
+  EXPECT_LT(report.error, 0.01);
+  CubeLight light = s.light;
+  for (size_t k = 0; k < light.energy.size(); ++k) light.energy[k] *= Vec3(1, 0.5f + float(k % 5), float(k % 3));
+  Relit relit;
+  HaarReading reading;
+  relight(t, haar_terms(t, haar_column_norms(t), light, 0), relit, &reading);
+  EXPECT_LE(reading.terms, columns);
+  std::vector<float> face(256);
+  HaarTree tree;
+  std::vector<Vec3> terms(columns);
+  for (int f = 0; f < 6; ++f)
+    for (int c = 0; c < 3; ++c) {
+      for (int row = 0; row < 16; ++row)
+        for (int column = 0; column < 16; ++column)
+          face[size_t(row * 16 + column)] = light.energy[cube_texel(16, f, column, row)][c];
+      haar_transform(4, face, tree);
+      for (size_t k = 0; k < 256; ++k) terms[size_t(f) * 256 + k][c] = 256 * tree.coefficients[k];
+    }
+  for (size_t r = 0; r < rows.size(); r += 37) {
+    const std::vector<float> row = load_receiver(t, r);
+    for (int c = 0; c < 3; ++c) {
+      double sum = 0, size = 0;
+      for (size_t k = 0; k < columns; ++k) {
+        const double term = double(row[size_t(c) * columns + k]) * double(terms[k][c]);
+        sum += term, size += std::abs(term);
+      }
+      EXPECT_NEAR(relit.at(r)[c], sum, 1e-5 * size) << r << " " << c;
+    }
+  }
 }
 
 TEST(HaarTransfer, ColumnsThatLieAreRefused) {

@@ -177,7 +177,7 @@ Result<void> bake_over_cube(Bake& b) {
   auto seen = bake_visibility_of_plan(b.plan, b.scene, b.tracer, b.receivers(), b.job, b.report, b.summary);
   if (!seen) return seen.error();
   if (!wavelets) return b.store = std::move(*seen), b.rows = SightRows{}, Result<void>();
-  auto transfer = fit_haar_of_plan(b.plan, *seen, b.receivers(), b.job, b.summary, b.told);
+  auto transfer = fit_haar_of_plan(b.plan, *seen, b.scene, b.tracer, b.receivers(), b.job, b.report, b.summary, b.told);
   if (!transfer) return transfer.error();
   b.store = std::move(*transfer);
   return {};

@@ -11,8 +11,10 @@ Result<Visibility> bake_visibility_of_plan(const BakePlan& plan, const Scene& sc
                                            const Receivers& receivers, const Job& job, BakeReport& report,
                                            Summary& summary);
 
-// That times the cosine, in wavelets. Errors: cancelled.
-Result<HaarTransfer> fit_haar_of_plan(const BakePlan& plan, const Visibility& seen, const Receivers& receivers,
-                                      const Job& job, Summary& summary, nlohmann::json& told);
+// That times the cosine, in wavelets; with bounces the Neumann series of those rows, X = T0 + B X, some columns at a
+// time. Errors: cancelled; memory.
+Result<HaarTransfer> fit_haar_of_plan(const BakePlan& plan, const Visibility& seen, const Scene& scene,
+                                      const Tracer& tracer, const Receivers& receivers, const Job& job,
+                                      BakeReport& report, Summary& summary, nlohmann::json& told);
 
 }  // namespace lambent

@@ -85,11 +85,12 @@ const Option<R> table[] = {
      0, 0, "auto|on|off", "receivers=vertices"},
     {"denoise", &R::denoise, "How well", D | Z | F | L, "Take away noise that neighbours on a surface do not share", 0,
      0, "on|off"},
-    {"samples", &R::samples, "How well", traced | I,
+    {"samples", &R::samples, "How well", traced | I | W,
      "Rays a receiver; without, diffuse transfer and lightmaps of lamps are baked to an error, other kinds with 1024",
      1, 1 << 20},
-    {"bounces", &R::bounces, "How well", D | M | Z | G | L,
-     "Reflections between surfaces, 0 to 64; lightmaps also converge:EPS, as many as leave that residual"},
+    {"bounces", &R::bounces, "How well", D | M | Z | G | L | W,
+     "Reflections between surfaces, 0 to 64 (3; of wavelets 0); lightmaps also converge:EPS, as many as leave that "
+     "residual"},
     {"shadows", &R::shadows, "How well", D | Z, "off: open light everywhere, no shadows and no bounces", 0, 0,
      "on|off"},
     {"terms", &R::terms, "How well", D | M | L,
@@ -97,7 +98,7 @@ const Option<R> table[] = {
     {"memory", &R::memory, "How well", traced | K | W,
      "Working memory beyond scene and result, bytes; e.g. 500MB, 2GiB (4GiB); less means rays traced again", 0, 0,
      nullptr, nullptr, false},
-    {"seed", &R::seed, "How well", traced | I, "Of the ray directions"},
+    {"seed", &R::seed, "How well", traced | I | W, "Of the ray directions"},
 
     {"ground", &R::ground, "Scene", every, "Add a tessellated floor under the scene"},
     {"max-edge", &R::max_edge, "Scene", every, "Split edges longer than this many scene units", 1e-12, 1e12},
@@ -315,6 +316,10 @@ Result<void> check_kind(const BakeRequest& r, BakeKind kind) {
     return Error{"--shadows", "off has no bounces: leave --bounces out, or set it to 0", true};
   if (!r.rooms.empty() && r.receivers != "vertices")
     return Error{"--rooms", "joins receivers at vertices: leave --receivers out", true};
+  if (kind == BakeKind::wavelets && (!r.given.contains("bounces") || r.bounces == "0"))
+    for (const char* name : {"samples", "seed"})
+      if (r.given.contains(name))
+        return Error{std::string("--") + name, "is of the rays that bounce: give --bounces, or leave it out", true};
   if (kind != BakeKind::lightmap && r.bounces.starts_with("converge:"))
     return Error{"--bounces", "converge:EPS is for lightmaps", true};
   if (kind == BakeKind::lightmap && is_plain_lightmap(r))
@@ -373,6 +378,7 @@ Result<BakeRequest> resolved(BakeRequest r) {
   if (auto ok = check_kind(r, kind); !ok) return ok.error();
   if (kind == BakeKind::wavelets && !r.given.contains("visibility")) r.visibility = "bits:4";
   if (kind == BakeKind::factors || r.shadows == "off") r.bounces = "0";
+  if (kind == BakeKind::wavelets && !r.given.contains("bounces")) r.bounces = "0";
   if (r.order == 0 && r.light.empty() && kind != BakeKind::lightmap && kind != BakeKind::blocks &&
       kind != BakeKind::indirect)
     r.order = 6;
@@ -391,6 +397,8 @@ nlohmann::json to_json(const BakeRequest& request) {
   const BakeKind kind = kind_of(request);
   nlohmann::json out = request_json(bake_options(), request, int(kind));
   if (request.shadows == "off") out.erase("bounces");
+  if (kind == BakeKind::wavelets && request.bounces == "0")
+    for (const char* without : {"bounces", "samples", "seed"}) out.erase(without);
   if (has_no_quality(request)) out.erase("quality");
   if (is_least_squares(request))
     for (const char* without : {"denoise", "adapt", "quality", "error", "time"}) out.erase(without);

@@ -83,10 +83,12 @@ class Requests : public testing::Test {
       case BakeKind::lightmap: r.update({{"transfer", "lightmap"}, {"atlas", "24x24"}, {"lamp_samples", 4}}); break;
       case BakeKind::blocks: r.update({{"transfer", "blocks"}, {"cube", 16}}); break;
       case BakeKind::indirect: r.update({{"transfer", "indirect"}, {"surfels", 256}}); break;
-      case BakeKind::wavelets: r.update({{"light", "haar:16,keep=0.2"}, {"visibility", "binary"}}); break;
+      case BakeKind::wavelets:
+        r.update({{"light", "haar:16,keep=0.2"}, {"visibility", "binary"}, {"bounces", "2"}});
+        break;
     }
     const bool on_cube = kind == BakeKind::blocks || kind == BakeKind::wavelets;
-    if (kind != BakeKind::membrane && !on_cube) r["samples"] = 32;
+    if (kind != BakeKind::membrane && kind != BakeKind::blocks) r["samples"] = 32;
     if (!on_cube && kind != BakeKind::lightmap && kind != BakeKind::indirect) r["order"] = 3;
     return r;
   }

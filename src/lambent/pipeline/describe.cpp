@@ -123,8 +123,8 @@ Said say(const HaarTransfer& t) {
            {"channels", t.channels},
            {"wavelets_per_receiver", each},
            {"compression_error", t.error}},
-          fmt::format("Haar wavelets of a cube of {} by column, {:.0f} of {} a receiver, to {:.2g} % RMS", t.size, each,
-                      human_count(t.columns()), 100 * t.error)};
+          fmt::format("Haar wavelets of a cube of {} by column, {:.0f} of {} a receiver, to {:.2g} % RMS, {}", t.size,
+                      each, human_count(t.columns()), 100 * t.error, some(size_t(t.channels), "channel"))};
 }
 
 Said say(const Rows& rows) {

@@ -16,8 +16,9 @@ using test::golden_names;
 DrawRequest golden_request(const std::string& name) {
   DrawRequest request = test::golden_request(name);
   // What they drew was not kept from ringing.
-  if (!request.env.empty() && !name.starts_with("blocks") && name != "wavelets" && name != "diffuse_directional" &&
-      name != "diffuse_compact" && name != "diffuse_steerable" && name.find("fixed_light") == std::string::npos)
+  if (!request.env.empty() && !name.starts_with("blocks") && !name.starts_with("wavelets") &&
+      name != "diffuse_directional" && name != "diffuse_compact" && name != "diffuse_steerable" &&
+      name.find("fixed_light") == std::string::npos)
     request.window = "none";
   return request;
 }

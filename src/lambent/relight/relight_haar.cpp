@@ -89,6 +89,7 @@ HWY_EXPORT(AddColumns);
 
 HaarTerms haar_terms(const HaarTransfer& t, std::span<const float> norms, const CubeLight& light, size_t count) {
   LAMBENT_CHECK(light.size == t.size && norms.size() == t.columns());
+  const size_t channels = size_t(t.channels), width = t.light_columns();
   const size_t area = size_t(t.size) * size_t(t.size);
   std::vector<Vec3> all(6 * area);
   std::vector<float> face(area);
@@ -105,7 +106,9 @@ HaarTerms haar_terms(const HaarTransfer& t, std::span<const float> norms, const 
   std::vector<uint32_t> order;
   std::vector<float> weight(all.size());
   for (uint32_t k = 0; k < all.size(); ++k) {
-    weight[k] = length(all[k]) * norms[k];
+    Vec3 change(0.0f);
+    for (size_t c = 0; c < 3; ++c) change[int(c)] = all[k][int(c)] * norms[std::min(c, channels - 1) * width + k];
+    weight[k] = length(change);
     if (weight[k] > 0) order.push_back(k);
   }
   if (count > 0 && count < order.size()) {
@@ -115,7 +118,19 @@ HaarTerms haar_terms(const HaarTransfer& t, std::span<const float> norms, const 
     std::sort(order.begin(), order.end());
   }
   HaarTerms out{std::move(order), {}};
-  for (uint32_t k : out.columns) out.values.push_back(all[k] * t.steps[k]);
+  if (channels == 1) {
+    for (uint32_t k : out.columns) out.values.push_back(all[k] * t.steps[k]);
+    return out;
+  }
+  const std::vector<uint32_t> of_light = std::move(out.columns);
+  out.columns.clear();
+  for (size_t c = 0; c < channels; ++c)
+    for (uint32_t k : of_light) {
+      const size_t column = c * width + k;
+      Vec3 value(0.0f);
+      value[int(c)] = all[k][int(c)] * t.steps[column];
+      out.columns.push_back(uint32_t(column)), out.values.push_back(value);
+    }
   return out;
 }
 
@@ -146,7 +161,7 @@ void relight(const HaarTransfer& t, const HaarTerms& light, Relit& out, HaarRead
     }
   });
   if (!reading) return;
-  *reading = {light.columns.size(), 0};
+  *reading = {light.columns.size() / size_t(t.channels), 0};
   for (size_t chunk = 0; chunk < t.chunks(); ++chunk)
     for (uint32_t c : light.columns) reading->bytes += t.column(chunk, c).size();
 }

@@ -7,7 +7,8 @@
 
 namespace lambent {
 
-// Light in wavelets, as many terms as are kept, by rising column.
+// Light in wavelets, as many terms as are kept, by rising column of the transfer: of three channels each its own, with
+// the light of its colour.
 struct HaarTerms {
   std::vector<uint32_t> columns;
   std::vector<Vec3> values;

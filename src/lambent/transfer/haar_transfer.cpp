@@ -96,6 +96,7 @@ size_t HaarTransfer::entries() const {
 HaarWriter::HaarWriter(int size, std::span<const float> largest) {
   LAMBENT_CHECK(std::has_single_bit(unsigned(size)) && size >= 2 && size <= max_haar_size);
   out_.size = size;
+  if (largest.size() > out_.light_columns()) out_.channels = 3;
   LAMBENT_CHECK(largest.size() == out_.columns());
   for (float v : largest) out_.steps.push_back(v / haar_steps);
 }
@@ -150,6 +151,7 @@ HaarTransfer make_haar_transfer(int size, std::span<const std::vector<HaarEntry>
 Result<void> check_haar(const HaarTransfer& t, const std::string& where) {
   if (t.size < 2 || t.size > max_haar_size || !std::has_single_bit(unsigned(t.size)))
     return Error{where, "the cube's side is no power of two from 2 to 256"};
+  if (t.channels != 1 && t.channels != 3) return Error{where, "has neither one channel nor three"};
   const size_t columns = t.columns(), chunks = t.chunks();
   if (t.steps.size() != columns || t.starts.size() != chunks + 1 || t.begin.size() != chunks * (columns + 1))
     return Error{where, "has other numbers of columns than its cube"};

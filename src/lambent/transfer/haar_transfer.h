@@ -3,7 +3,8 @@
 // kept by COLUMN, so that relighting reads those columns alone that the light wakes. Source: Ng, Ramamoorthi, Hanrahan,
 // "All-Frequency Shadows Using Non-linear Wavelet Lighting Approximation" (2003), as general-prt cites it.
 //
-// Columns are [face][coefficient], coefficients as in basis/haar.h. Light is what the texels of a cube receive
+// Columns are [face][coefficient], coefficients as in basis/haar.h; where bounces between coloured surfaces make three
+// channels of them, [channel][face][coefficient]. Light is what the texels of a cube receive
 // (light/cube_light.h: energy), transformed face by face; the transfer of a texel is what is seen of it times the
 // cosine over pi, transformed alike. The transform is orthonormal but for a factor that goes into the light, so sums
 // over columns are sums over texels.
@@ -30,6 +31,7 @@ struct HaarTransfer {
   int size = 0;  // of the cube, texels a side of a face: 2^k
   size_t receivers = 0;
   double error = 0;  // of all receivers together: relative RMS of what was left out and rounded; told, not looked at
+  int channels = 1;  // or 3: r, g and b, each with its columns
   std::vector<float> steps;      // by column: what 1 stands for
   std::vector<uint64_t> starts;  // by chunk, and the end: places in `data`
   std::vector<uint32_t> begin;   // [chunk][column], and an end a chunk: places after the chunk's start
@@ -40,8 +42,9 @@ struct HaarTransfer {
   std::span<const uint8_t> data;
   std::shared_ptr<const void> storage;  // keeps `data` alive: memory of ours or a mapped file
 
-  static constexpr int rows = 1, channels = 1;
-  size_t columns() const { return 6 * size_t(size) * size_t(size); }
+  static constexpr int rows = 1;
+  size_t light_columns() const { return 6 * size_t(size) * size_t(size); }
+  size_t columns() const { return size_t(channels) * light_columns(); }
   size_t chunks() const { return (receivers + haar_chunk - 1) / haar_chunk; }
   size_t receiver_values() const { return columns(); }
   size_t bytes() const;    // of all
@@ -61,7 +64,7 @@ struct HaarEntry {
 // Takes receivers chunk after chunk (haar_chunk of them but for the last), rounded to 8 bits by steps of their columns.
 class HaarWriter {
  public:
-  // largest: by column, what no entry exceeds.
+  // largest: by column, of one channel or three, what no entry exceeds.
   HaarWriter(int size, std::span<const float> largest);
   // rows[r]: entries of receiver r of the chunk, columns rising.
   void add(std::span<const std::vector<HaarEntry>> rows);
