@@ -268,7 +268,7 @@ TEST(Directional, CompactLobesThatDoNotMeetAreOrthogonal) {
   for (float s : {0.0f, 2.5f, 17.0f, NAN}) EXPECT_FALSE(is_lobe(LobeKind::band_limited, {Vec3(0, 0, 1), s})) << s;
 }
 
-std::vector<double> random_coefficients(size_t count) {
+std::vector<double> uneven_coefficients(size_t count) {
   Random random(11);
   std::vector<double> c(count);
   for (double& x : c) x = 2 * random.next() - 1;
@@ -281,7 +281,7 @@ TEST(Directional, SteerableLobesSpanTheirBands) {
     EXPECT_EQ(basis.rank, sh_count(bands));
     EXPECT_LT(basis.condition, 26) << bands;
     // Any function of the bands comes back, from its integrals against the lobes.
-    const std::vector<double> sh = random_coefficients(size_t(sh_count(bands)));
+    const std::vector<double> sh = uneven_coefficients(size_t(sh_count(bands)));
     std::vector<double> integrals;
     for (size_t k = 0; k < basis.count(); ++k) {
       std::vector<double> unit(basis.count(), 0.0);
@@ -310,7 +310,7 @@ double lost_by_quadrature(const DirectionalBasis& basis, std::span<const double>
 TEST(Directional, SteerableLobesTurnExactlyAndOthersTellWhatTheyLose) {
   const Mat3 R = rotation_from_yaw_pitch_roll({40, 25, -70});
   for (const DirectionalBasis& basis : bases()) {
-    const std::vector<double> c = random_coefficients(basis.count());
+    const std::vector<double> c = uneven_coefficients(basis.count());
     const TurnedCoefficients turned = turn_directional(basis, c, R);
     const bool exact = basis.lobes.empty() || (basis.kind == LobeKind::band_limited && basis.sh_order == 0);
     double all = 0;
