@@ -1,12 +1,46 @@
-// Objects that move over a baked scene: nanoseconds a receiver and object beyond the relight, all receivers near them.
+// Objects that move over a baked scene: nanoseconds a receiver and object beyond the relight, all receivers near them,
+// for what they hide and for what they reflect.
 #include "bench.h"
 
+#include <lambent/bake/bake.h>
 #include <lambent/bake/shells.h>
 #include <lambent/core/parallel.h>
-#include <lambent/relight/moving.h>
+#include <lambent/relight/reflecting.h>
 #include <lambent/scene/procedural.h>
 
 namespace lambent::bench {
+namespace {
+
+// A ball whose light is that of a lamp, made anew each frame.
+void bench_reflections(const MovingReceivers& receivers, const Scene& ball, const Tracer& tracer, const Shells& shells,
+                       const ShellOptions& options) {
+  const Receivers at = make_vertex_receivers(ball);
+  auto own = bake(ball, tracer, at, {.order = 3, .samples = 64, .bounces = 0});
+  if (!own) return;
+  auto field = bake_reflecting(ball, tracer, std::get<CornerReceivers>(at.basis), *own, shells, options);
+  if (!field) return;
+  const ReflectingLight reflecting = reflecting_light(*field);
+  const std::vector<Vec3> arriving(size_t(sh_count(reflecting.incident_order)), Vec3(0.1f));
+  const RigidPlace place{Vec3(0, 0.1f, 0), rotation_from_yaw_pitch_roll({10, 0, 0}), 1};
+  ShiningLight light;
+  PlacedLamp lamp;
+  const double made = least_thread_seconds(5, [&] {
+    light = reflected_light(reflecting, arriving, place.rotation);
+    lamp = place_lamp(light, place);
+  });
+  LampShader shader;
+  Relit relit;
+  relit.values.assign((receivers.count + transfer_block - 1) / transfer_block * 3 * transfer_block, 0.0f);
+  const SeenLamp seen[] = {{&lamp, nullptr}};
+  MovingCount done;
+  const double seconds =
+      least_thread_seconds(5, [&] { done = shader.add(receivers, seen, {}, LampResponse::cosine, relit); });
+  report("moving, 1 object that reflects", 1e9 * seconds / double(done.pairs), 12, "ns",
+         "the aim of what an object hides, a receiver and object",
+         {{"pairs", done.pairs}, {"made_anew_ms", 1e3 * made}});
+}
+
+}  // namespace
 
 void bench_moving() {
   const ThreadLimit one(1);
@@ -32,7 +66,7 @@ void bench_moving() {
   const std::vector<Vec3> light(size_t(sh_count(order)), Vec3(0.1f));
   Relit relit;
   relight(t.transfer, light, relit);
-  const double alone = least_seconds(9, [&] { relight(t.transfer, light, relit); });
+  const double alone = least_thread_seconds(9, [&] { relight(t.transfer, light, relit); });
   for (int count : {1, 2, 10}) {
     std::vector<PlacedObject> placed;
     std::vector<const PlacedObject*> objects;
@@ -44,11 +78,12 @@ void bench_moving() {
     MovingCount done;
     const MovingLight lights[] = {{light, false, &relit}};
     const double seconds =
-        least_seconds(9, [&] { done = shader.shade(receivers, objects, {.light_order = order}, lights); });
+        least_thread_seconds(9, [&] { done = shader.shade(receivers, objects, {.light_order = order}, lights); });
     report("moving, " + std::to_string(count) + " objects", 1e9 * seconds / double(done.pairs), aim, "ns",
            "the aim, a receiver and object beyond the relight",
            {{"pairs", done.pairs}, {"relight_ns", 1e9 * alone / double(places.size())}});
   }
+  bench_reflections(receivers, ball, *tracer, *shells, options);
 }
 
 }  // namespace lambent::bench

@@ -66,10 +66,12 @@ for bounces in ${BOUNCES:-0 1}; do
   # Light in free space has met surfaces once more than they have met each other: direct light alone is that of a scene
   # that is all but black.
   [ "$bounces" = 0 ] && terms=() dark=(--max-albedo 0.02) || terms=(--terms) dark=()
+  # Objects reflect where light bounces at all.
+  [ "$bounces" = 0 ] && reflect=() || reflect=(${REFLECT---transfer})
   for name in ball box; do
     $tool bake $out/$name.obj --max-edge 0.1 --order 8 --samples 512 --bounces 0 "${dark[@]}" -o $out/$name.glb \
       >/dev/null
-    $tool field $out/$name.glb --order 8 -o $out/$name.field.glb >/dev/null
+    $tool field $out/$name.glb --order 8 "${reflect[@]}" -o $out/$name.field.glb >/dev/null
   done
   yard=$out/yard_$bounces.glb
   $tool bake $out/yard.obj --max-edge "$edge" --order 8 --samples 1024 --bounces "$bounces" "${terms[@]}" "${dark[@]}" \

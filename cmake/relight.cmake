@@ -59,6 +59,7 @@ set(lambent_relight_sources
   src/lambent/relight/moving_kernels.cpp
   src/lambent/relight/product_kernels.cpp
   src/lambent/relight/products.cpp
+  src/lambent/relight/reflecting.cpp
   src/lambent/relight/relight.cpp
   src/lambent/relight/relight_cpca.cpp
   src/lambent/relight/relight_haar.cpp

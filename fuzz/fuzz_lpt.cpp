@@ -12,9 +12,9 @@ extern "C" int LLVMFuzzerTestOneInput(const uint8_t* data, size_t size) {
   if (!file) return 0;
   auto texture = lambent::load_zonal_texture(*file, "fuzz.lpt");
   if (!texture) return 0;
-  std::vector<float> values(texture->transfer.receiver_values());
+  std::vector<float> values(texture->transfer.row_values());
   for (lambent::Vec2 uv : {lambent::Vec2(0), lambent::Vec2(0.99f), lambent::Vec2(-3.2f, 1e30f)}) {
-    lambent::sample_zonal_texture(*texture, uv, values);
+    lambent::sample_zonal_texture(*texture, uv, values, size_t(texture->transfer.rows) - 1);
     (void)lambent::zonal_harmonics(texture->transfer, values);
     if (texture->groove_depth > 0) lambent::sample_groove(*texture, uv.x, uv.y, values);
   }

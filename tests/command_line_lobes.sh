@@ -44,6 +44,16 @@ printf 'v 0 0 0\nv 1 0 0\nv 1 1 0\nv 0 1 0\nv 0.5 0.5 0.3\nf 1 2 5\nf 2 3 5\nf 3
 expect 0 'RMS' patch pyramid.obj --size 8 --samples 64 --lobes 3 -o pyramid.lpt
 expect 0 'RMS' patch pyramid.obj --size 8 --samples 16 --subsurface sigma_s=9,8,7,sigma_a=1 -o wax.lpt
 printf 'v 0 0 0\nv 1 0 0\nv 0 2 0\nf 1 2 3\n' >oblong.obj
+expect 0 'RMS' patch sky.png --size 6 --order 2 --samples 16 --lobes 1 --views 2x2 -o views.lpt
+expect 0 'RMS' patch pyramid.obj --size 6 --order 2 --samples 16 --lobes 1 --views 2x2 -o views_mesh.lpt
+expect 0 'RMS' patch sky.png --size 6 --order 2 --samples 16 --lobes 1 --views 2x2 --brdf ggx:roughness=0.7 -o wet.lpt
+expect 0 'RMS' patch sky.png --size 6 --order 2 --samples 16 --lobes 1 --floor marble:20 -o floor.lpt
+expect 2 'views' patch sky.png --views 3x4 -o x.lpt
+expect 2 'views' patch sky.png --views 99x99 -o x.lpt
+expect 2 'brdf' patch pyramid.obj --brdf phong:exponent=5 -o x.lpt
+expect 2 'brdf' patch sky.png --brdf phong:exponent=5 --floor marble -o x.lpt
+expect 2 'bottom' patch sky.png --subsurface marble --floor marble -o x.lpt
+expect 2 'views' patch --groove 1 --views 4x4 -o x.lpt
 expect 1 'as wide as' patch oblong.obj -o x.lpt
 expect 2 'depth' patch pyramid.obj --depth 0.2 -o x.lpt
 expect 2 'subsurface' bake corner.obj --subsurface jelly -o x.glb

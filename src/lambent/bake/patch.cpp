@@ -1,6 +1,7 @@
 // Follows: local-deformable-prt, section 6 (local patches from height fields and meshes).
 #include <lambent/bake/patch.h>
 #include <lambent/core/check.h>
+#include <lambent/core/parallel.h>
 #include <lambent/receivers/atlas.h>
 
 namespace lambent {
@@ -94,6 +95,84 @@ PatchScene make_patch(const HeightField& field, Vec3 albedo) {
     for (int i = 0; i <= side; ++i) r.front[size_t(j * (side + 1) + i)] = uint32_t(j % n * n + i % n);
   r.basis = corner_receivers(s, r.front, {});
   return patch;
+}
+
+void add_floor(PatchScene& patch, float thickness) {
+  Scene& s = patch.scene;
+  const Bounds box = bounds(s);
+  const float z = box.min.z - thickness;
+  Part part;
+  part.name = "floor", part.material = s.parts.front().material;
+  part.first_vertex = uint32_t(s.positions.size()), part.vertex_count = 4;
+  part.first_triangle = uint32_t(s.triangles.size()), part.triangle_count = 2;
+  const uint32_t a = part.first_vertex, of = uint32_t(s.parts.size());
+  // Beyond the walls, whatever they are.
+  const Vec2 low = Vec2(box.min) - 1.0f, high = Vec2(box.max) + 1.0f;
+  for (Vec2 p : {low, Vec2(low.x, high.y), high, Vec2(high.x, low.y)})
+    s.positions.push_back({p, z}), s.normals.push_back({0, 0, -1});
+  if (!s.colors.empty()) s.colors.resize(s.positions.size(), decltype(s.colors)::value_type(1.0f));
+  for (auto& set : s.texcoords)
+    if (!set.empty()) set.resize(s.positions.size());
+  s.triangles.push_back({{a, a + 1, a + 2}, of, false}), s.triangles.push_back({{a, a + 2, a + 3}, of, false});
+  s.parts.push_back(part);
+  if (!patch.receivers.front.empty()) patch.receivers.front.resize(s.positions.size(), none);
+  if (auto* corners = std::get_if<CornerReceivers>(&patch.receivers.basis))
+    *corners = corner_receivers(s, patch.receivers.front, {});
+  else {
+    auto& texels = std::get<TexelReceivers>(patch.receivers.basis);
+    texels.front.resize(s.triangles.size());
+    if (!texels.back.empty()) texels.back.resize(s.triangles.size());
+  }
+}
+
+Transfer view_patch(const PatchScene& patch, const Tracer& tracer, const Transfer& own, const Outgoing* outgoing,
+                    int size, int views) {
+  const Scene& s = patch.scene;
+  const Bounds box = bounds(s);
+  const float above = std::max(box.max.z, 0.0f), deep = std::max(std::abs(box.max.z), std::abs(box.min.z));
+  // Sideways a ray goes one side at most.
+  const float lowest = std::max(deep / std::sqrt(1 + deep * deep), 0.02f);
+  const size_t rows = size_t(views) * size_t(views), n = own.columns(), channels = size_t(own.channels);
+  const bool coloured = channels == 3 || outgoing;
+  const size_t kept = coloured ? 3 : 1;
+  WritableTransfer out = make_transfer(own.light, int(rows), int(kept), size_t(size) * size_t(size), Precision::single);
+  parallel_for(out.transfer.receivers, transfer_block, [&](size_t begin, size_t end) {
+    std::vector<float> values(rows * kept * n);
+    std::vector<ViewWeights> weights(size_t(own.rows), ViewWeights(0, 0, 0, 1));
+    for (size_t k = begin; k < end; ++k) {
+      std::fill(values.begin(), values.end(), 0.0f);
+      const Vec3 place((float(k % size_t(size)) + 0.5f) / float(size), -(float(k / size_t(size)) + 0.5f) / float(size),
+                       0);
+      for (size_t view = 0; view < rows; ++view) {
+        Vec3 w = view_map_direction(views, int(view) % views, int(view) / views);
+        if (w.z < lowest)
+          w = Vec3(normalize_or(Vec3(w.x, w.y, 0), Vec3(1, 0, 0)) * std::sqrt(1 - lowest * lowest)) +
+              Vec3(0, 0, lowest);
+        const Hit hit = tracer.closest(place + w * ((above + 0.01f) / w.z), -w);
+        if (hit.triangle == none) continue;
+        float* row = values.data() + view * kept * n;
+        const Vec3 colour = outgoing ? albedo(s, s.triangles[hit.triangle], hit.u, hit.v) : Vec3(1.0f);
+        std::visit(
+            [&](const auto& basis) {
+              const auto* at = basis.find(hit.triangle, hit.front);
+              if (!at) return;
+              basis.spread(*at, hit.u, hit.v, [&](uint32_t r, float share) {
+                if (outgoing) evaluate_outgoing(*outgoing, r, w, weights);
+                const std::vector<float> from = load_receiver(own, r);
+                for (size_t j = 0; j < weights.size(); ++j)
+                  for (size_t c = 0; c < kept; ++c) {
+                    const float weight = share * (weights[j][int(c)] + colour[int(c)] * weights[j].w);
+                    const float* t = from.data() + (j * channels + std::min(c, channels - 1)) * n;
+                    for (size_t i = 0; i < n; ++i) row[c * n + i] += weight * t[i];
+                  }
+              });
+            },
+            patch.receivers.basis);
+      }
+      store_receiver(out, k, values);
+    }
+  });
+  return out.transfer;
 }
 
 Result<PatchScene> make_mesh_patch(const Scene& tile, int size, HeightField* heights) {

@@ -2,6 +2,7 @@
 // Transfer of a small piece of relief that repeats, for use as a texture on other surfaces. Source:
 // local-deformable-prt, section 6.
 #include <lambent/bake/bake.h>
+#include <lambent/transfer/outgoing.h>
 
 namespace lambent {
 
@@ -30,6 +31,16 @@ struct PatchScene {
   Receivers receivers;
 };
 PatchScene make_patch(const HeightField& field, Vec3 albedo);
+// Closes it from below: a plane so far under its lowest place (in sides) that faces down and receives nothing, so that
+// what scatters in between comes out on either side.
+void add_floor(PatchScene& patch, float thickness);
+
+// The relief as it is seen through each texel of its plane (z = 0) from views x views directions, the nodes of a view
+// map (transfer/outgoing.h): [texel][view] rows of transfer, those of where a ray along the view meets it. Near the
+// horizon views are lifted, so that rays stay within the repetitions. `own` is the relief's transfer at its receivers:
+// diffuse, or incident light that `outgoing` reflects; what meets nothing that receives is black.
+Transfer view_patch(const PatchScene& patch, const Tracer& tracer, const Transfer& own, const Outgoing* outgoing,
+                    int size, int views);
 
 // The same of a mesh that repeats along x and y with the extents of its box, which have to be alike to 1%, seen as a
 // picture from +z: u along +x, v along -y. It is scaled to a side of 1. Receivers lie where rays from above through the

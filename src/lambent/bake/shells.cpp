@@ -35,18 +35,20 @@ Cone cone_towards(const Shells& shells, Vec3 point) {
   return {frame_about(to / distance), 2 * pi * (1 - std::sqrt(1 - sine * sine)), false};
 }
 
-// Integrals over the sphere of value(directions, values) times each harmonic, a channel after the other: at every
-// point. `value` is given up to 64 directions, and fills as many numbers a channel, 64 apart.
+// Integrals over the sphere of value(directions, values) times each of order^2 harmonics, at every point. `value` is
+// given up to 64 directions, and fills `functions` numbers a direction, 64 apart. Of one row they are channels and the
+// harmonics are columns; of more, the harmonics are rows, and they channels, and columns within.
 template <class Value>
-Result<Transfer> integrate(const Shells& shells, const ShellOptions& o, LightBasis light, int rows, int channels,
-                           Precision precision, const char* stage_name, Progress* progress, Value value) {
-  const size_t n = size_t(sh_count(o.order)), count = shells.count();
-  WritableTransfer out = make_transfer(std::move(light), rows, channels, count, precision);
+Result<Transfer> integrate(const Shells& shells, const ShellOptions& o, int order, WritableTransfer out,
+                           const char* stage_name, Progress* progress, Value value) {
+  const size_t n = size_t(sh_count(order)), count = shells.count();
+  const size_t functions = out.transfer.receiver_values() / n;
+  const bool one_row = out.transfer.rows == 1;
   ProgressStage stage(progress, stage_name, count);
   parallel_for(count, transfer_block, [&](size_t begin, size_t end) {
-    alignas(64) float x[rays_at_once], y[rays_at_once], z[rays_at_once], values[3 * rays_at_once];
-    AlignedVector<float> table(n * rays_at_once);
-    std::vector<double> sums(size_t(channels) * n), ones(n);
+    alignas(64) float x[rays_at_once], y[rays_at_once], z[rays_at_once];
+    AlignedVector<float> table(n * rays_at_once), values(functions * rays_at_once);
+    std::vector<double> sums(functions * n), ones(n);
     std::vector<float> row(sums.size());
     for (size_t p = begin; p < end && !stage.cancelled(); ++p) {
       const Vec3 point = shell_point(shells, p);
@@ -59,24 +61,22 @@ Result<Transfer> integrate(const Shells& shells, const ShellOptions& o, LightBas
           const Vec3 d = cone.direction(sobol_owen(uint32_t(first + i), key));
           x[i] = d.x, y[i] = d.y, z[i] = d.z;
         }
-        value(point, Directions{x, y, z, rays}, values);
-        evaluate_sh(o.order, std::span(x, rays), std::span(y, rays), std::span(z, rays), rays_at_once, table);
-        for (size_t c = 0; c < size_t(channels); ++c)
+        value(point, Directions{x, y, z, rays}, values.data());
+        evaluate_sh(order, std::span(x, rays), std::span(y, rays), std::span(z, rays), rays_at_once, table);
+        for (size_t f = 0; f < functions; ++f)
           for (size_t k = 0; k < n; ++k)
             for (size_t i = 0; i < rays; ++i)
-              sums[c * n + k] += double(values[c * rays_at_once + i] * table[k * rays_at_once + i]);
+              sums[f * n + k] += double(values[f * rays_at_once + i] * table[k * rays_at_once + i]);
         for (size_t k = 0; k < n; ++k)
           for (size_t i = 0; i < rays; ++i) ones[k] += double(table[k * rays_at_once + i]);
       }
       // Over the whole sphere the mean is integrated exactly: it has no harmonics but the first. So what is surrounded
       // is hidden without noise.
-      for (size_t c = 0; cone.whole && c < size_t(channels); ++c)
-        for (size_t k = 1; k < n; ++k) sums[c * n + k] -= sums[c * n] / ones[0] * ones[k];
-      // Diffuse rows are [channel][column]; rows of incident light [row][channel] of one column.
-      for (size_t c = 0; c < size_t(channels); ++c)
+      for (size_t f = 0; cone.whole && f < functions; ++f)
+        for (size_t k = 1; k < n; ++k) sums[f * n + k] -= sums[f * n] / ones[0] * ones[k];
+      for (size_t f = 0; f < functions; ++f)
         for (size_t k = 0; k < n; ++k)
-          row[rows == 1 ? c * n + k : k * size_t(channels) + c] =
-              float(sums[c * n + k] * double(cone.solid_angle) / o.samples);
+          row[one_row ? f * n + k : k * functions + f] = float(sums[f * n + k] * double(cone.solid_angle) / o.samples);
       store_receiver(out, p, row);
     }
     stage.advance(end - begin);
@@ -116,8 +116,8 @@ Result<Shells> make_shells(const Scene& scene, const ShellOptions& o) {
 Result<Field> bake_hidden(const Tracer& tracer, const Shells& shells, const ShellOptions& o, ShellReport* report,
                           Progress* progress) {
   const auto start = std::chrono::steady_clock::now();
-  auto t = integrate(shells, o, {.order = o.order}, 1, 1, Precision::half, "shells", progress,
-                     [&](Vec3 point, const Directions& d, float* values) {
+  auto t = integrate(shells, o, o.order, make_transfer({.order = o.order}, 1, 1, shells.count(), Precision::half),
+                     "shells", progress, [&](Vec3 point, const Directions& d, float* values) {
                        tracer.visible_fan(point, d, values);
                        for (size_t i = 0; i < d.count; ++i) values[i] = 1 - values[i];
                      });
@@ -138,8 +138,8 @@ Result<Field> bake_shining(const Scene& scene, const Tracer& tracer, const Shell
   // 4 pi of the brightest times a harmonic is beyond what half a float holds.
   const Precision precision = brightest > 500 ? Precision::single : Precision::half;
   auto t =
-      integrate(shells, o, {.groups = {"all"}}, sh_count(o.order), 3, precision, "shining", progress,
-                [&](Vec3 point, const Directions& d, float* values) {
+      integrate(shells, o, o.order, make_transfer({.groups = {"all"}}, sh_count(o.order), 3, shells.count(), precision),
+                "shining", progress, [&](Vec3 point, const Directions& d, float* values) {
                   Hit hits[rays_at_once];
                   tracer.closest_fan(point, d, hits);
                   for (size_t i = 0; i < d.count; ++i) {
@@ -154,6 +154,40 @@ Result<Field> bake_shining(const Scene& scene, const Tracer& tracer, const Shell
                 });
   if (!t) return t.error();
   return Field{ShellPlacement{shells}, std::move(*t), IncidentRows{o.order}};
+}
+
+Result<Field> bake_reflecting(const Scene& scene, const Tracer& tracer, const CornerReceivers& receivers,
+                              const Transfer& own, const Shells& shells, const ShellOptions& o, Progress* progress) {
+  const int incident = std::min(own.light.order, reflected_incident_order), order = std::min(o.order, reflected_order);
+  const size_t n = size_t(sh_count(incident)), width = 3 * n, channels = size_t(own.channels);
+  std::vector<float> exit(own.receivers * width);  // [receiver][channel][column]
+  parallel_for(own.receivers, 256, [&](size_t begin, size_t end) {
+    for (size_t r = begin; r < end; ++r) {
+      const std::vector<float> row = load_receiver(own, r);
+      for (size_t c = 0; c < 3; ++c)
+        std::copy_n(row.begin() + ptrdiff_t(std::min(c, channels - 1) * own.columns()), n,
+                    exit.begin() + ptrdiff_t(r * width + c * n));
+    }
+  });
+  auto t = integrate(
+      shells, o, order, make_transfer({.order = incident}, sh_count(order), 3, shells.count(), Precision::half),
+      "reflecting", progress, [&](Vec3 point, const Directions& d, float* values) {
+        Hit hits[rays_at_once];
+        tracer.closest_fan(point, d, hits);
+        std::fill_n(values, width * rays_at_once, 0.0f);
+        for (size_t i = 0; i < d.count; ++i) {
+          const Hit& hit = hits[i];
+          const Corners* corners = hit.triangle == none ? nullptr : receivers.find(hit.triangle, hit.front);
+          if (!corners) continue;
+          const Vec3 colour = albedo(scene, scene.triangles[hit.triangle], hit.u, hit.v);
+          receivers.spread(*corners, hit.u, hit.v, [&](uint32_t r, float weight) {
+            const float* from = exit.data() + size_t(r) * width;
+            for (size_t f = 0; f < width; ++f) values[f * rays_at_once + i] += weight * colour[int(f / n)] * from[f];
+          });
+        }
+      });
+  if (!t) return t.error();
+  return Field{ShellPlacement{shells}, std::move(*t), IncidentRows{order}};
 }
 
 }  // namespace lambent

@@ -1,7 +1,9 @@
 #pragma once
-// What an object does to the light around it, at points on shells: what it hides, as a function of direction, and what
-// it shines with, both in harmonics. Source: Zhou, Hu, Lin, Guo, Shum, "Precomputed Shadow Fields" (2005).
+// What an object does to the light around it, at points on shells: what it hides, as a function of direction, what it
+// shines with, and what it makes of the light that arrives at it, in harmonics. Source: Zhou, Hu, Lin, Guo, Shum,
+// "Precomputed Shadow Fields" (2005).
 #include <lambent/core/progress.h>
+#include <lambent/receivers/receivers.h>
 #include <lambent/trace/tracer.h>
 #include <lambent/transfer/field.h>
 
@@ -36,5 +38,15 @@ Result<Field> bake_hidden(const Tracer& tracer, const Shells& shells, const Shel
 // cancelled.
 Result<Field> bake_shining(const Scene& scene, const Tracer& tracer, const Shells& shells, const ShellOptions& options,
                            Progress* progress = nullptr);
+
+// Bands of the light that an object reflects, at most, and of what of it arrives at a point.
+inline constexpr int reflected_incident_order = 3, reflected_order = 4;
+
+// Of IncidentRows under harmonics, up to those bands: light that arrives at the object, the same all over it, and
+// leaves it towards the point, by `own`, its diffuse transfer at `receivers`, bounces within it included, and its base
+// colours. Errors: cancelled.
+Result<Field> bake_reflecting(const Scene& scene, const Tracer& tracer, const CornerReceivers& receivers,
+                              const Transfer& own, const Shells& shells, const ShellOptions& options,
+                              Progress* progress = nullptr);
 
 }  // namespace lambent

@@ -62,6 +62,40 @@ std::vector<double> half_space_reflectance(double albedo, const std::vector<Quad
   return H;
 }
 
+// M. A. Heaslet, R. F. Warming, Int. J. Heat Mass Transfer 8, 1965: of even light on one side, a slab that scatters
+// evenly and absorbs nothing lets so much through.
+TEST(Subsurface, AFloorLetsThroughWhatHeasletAndWarmingFound) {
+  SKIP_UNDER_SANITIZERS();
+  constexpr int order = 16;
+  double behind[order];  // integrals of the zonal harmonics over z < 0
+  for (int l = 0; l < order; ++l) {
+    behind[l] = 0;
+    for (const QuadratureNode& node : gauss_legendre(64, -1, 0))
+      behind[l] += 2 * std::numbers::pi * node.weight * std::sqrt((2 * l + 1) / (4 * std::numbers::pi)) *
+                   std::legendre(unsigned(l), node.x);
+  }
+  for (const auto& [depth, through] : {std::pair(0.5f, 0.7040), std::pair(1.0f, 0.5534), std::pair(2.0f, 0.3900)}) {
+    PatchScene patch = make_patch({8, std::vector<float>(64, 0.3f)}, Vec3(1));
+    add_floor(patch, depth / 40);
+    auto tracer = Tracer::build(patch.scene);
+    ASSERT_TRUE(tracer);
+    SubsurfaceReport walks;
+    auto t = bake_subsurface(patch.scene, *tracer, patch.receivers,
+                             {.order = order, .samples = 4096, .bounces = 0, .precision = Precision::single},
+                             {{Vec3(40), Vec3(0), 0, 1}, 1}, nullptr, &walks);
+    ASSERT_TRUE(t) << t.error().text();
+    double all = 0, below = 0;
+    for (size_t r = 0; r < t->receivers; ++r) {
+      const std::vector<float> row = load_receiver(*t, r);
+      all += double(row[0]) * std::sqrt(4 * std::numbers::pi) / double(t->receivers);
+      for (int l = 0; l < order; ++l) below += double(row[size_t(l * l + l)]) * behind[l] / double(t->receivers);
+    }
+    RecordProperty("through_" + std::to_string(depth), std::to_string(below));
+    EXPECT_NEAR(all, 1, 1e-3);
+    EXPECT_NEAR(below, through, 0.01) << depth;  // 262,144 walks, and 16 bands of half a sphere
+  }
+}
+
 TEST(Subsurface, HalfSpaceReflectsWhatChandrasekharFound) {
   SKIP_UNDER_SANITIZERS();
   const auto nodes = gauss_legendre(64, 0, 1);

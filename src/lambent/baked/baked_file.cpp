@@ -158,12 +158,21 @@ const Field* hiding_of(const Baked& baked) {
   return nullptr;
 }
 
-const Field* shining_of(const Baked& baked) {
+namespace {
+
+// Light that arrives around an object, by harmonics or by its own lamps.
+const Field* arriving_around(const Baked& baked, bool by_harmonics) {
   for (const Field& field : baked.more)
-    if (std::holds_alternative<ShellPlacement>(field.where) && std::holds_alternative<IncidentRows>(field.rows))
+    if (std::holds_alternative<ShellPlacement>(field.where) && std::holds_alternative<IncidentRows>(field.rows) &&
+        (light_of(field.store).order > 0) == by_harmonics)
       return &field;
   return nullptr;
 }
+
+}  // namespace
+
+const Field* shining_of(const Baked& baked) { return arriving_around(baked, false); }
+const Field* reflecting_of(const Baked& baked) { return arriving_around(baked, true); }
 
 Result<void> save_baked(const std::string& path, const Baked& baked, const ViewerLook* look, size_t bin_limit) {
   BlobWriter bulk;

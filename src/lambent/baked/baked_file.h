@@ -32,9 +32,11 @@ inline const VertexPlacement* vertices_of(const Baked& baked) {
 }
 // Light in free space; null where there is none.
 const Field* lattice_of(const Baked& baked);
-// What the scene, as an object, hides around it, and what it shines with; null where that is not known.
+// What the scene, as an object, hides around it, what it shines with, and how it reflects; null where that is not
+// known.
 const Field* hiding_of(const Baked& baked);
 const Field* shining_of(const Baked& baked);
+const Field* reflecting_of(const Baked& baked);
 
 // What viewers without our extension are to show of a bake over texels. emission: every surface glows with one picture
 // over the atlas, the light that leaves it, as an emissive texture of a black material; lamps keep their own emission.

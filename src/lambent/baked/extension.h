@@ -119,8 +119,9 @@ nlohmann::json encode_lattice(const Field& field, BlobWriter& out);
 Result<Field> decode_lattice(const BlobReader& in, const nlohmann::json& object, const LightBasis& light,
                              const std::string& where);
 
-// What an object does to light around it, the extension's "shells": where, what it hides, and what it shines with.
-nlohmann::json encode_shells(const Field& hidden, const Field* shining, BlobWriter& out);
+// What an object does to light around it, the extension's "shells": where, what it hides, what it shines with, and how
+// it reflects; the last two may be null.
+nlohmann::json encode_shells(const Field& hidden, const Field* shining, const Field* reflecting, BlobWriter& out);
 Result<std::vector<Field>> decode_shells(const BlobReader& in, const nlohmann::json& object, const std::string& where);
 
 // The extension's JSON, with references to `out`'s blobs for bulk data; parts are to get their nodes and primitives.

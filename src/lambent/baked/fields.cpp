@@ -165,18 +165,20 @@ json encode_fields(const BakedFields& fields, BlobWriter& out) {
   LAMBENT_CHECK(is_consistent(fields.surface));
   json extension{{"version", baked_file_version}, {"transfer", encode_transfer(fields.surface, out)}};
   encode_placement(fields.surface.where, fields.parts, extension, out);
-  const Field *hidden = nullptr, *shining = nullptr;
+  const Field *hidden = nullptr, *shining = nullptr, *reflecting = nullptr;
   for (const Field& field : fields.more) {
     LAMBENT_CHECK(is_consistent(field));
     if (std::holds_alternative<ShellPlacement>(field.where)) {
-      (std::holds_alternative<HiddenRows>(field.rows) ? hidden : shining) = &field;
+      (std::holds_alternative<HiddenRows>(field.rows) ? hidden
+       : light_of(field.store).order > 0              ? reflecting
+                                                      : shining) = &field;
       continue;
     }
     LAMBENT_CHECK(light_of(field.store).count() == light_of(fields.surface.store).count());
     extension["lattice"] = encode_lattice(field, out);
   }
-  LAMBENT_CHECK(hidden || !shining);
-  if (hidden) extension["shells"] = encode_shells(*hidden, shining, out);
+  LAMBENT_CHECK(hidden || (!shining && !reflecting));
+  if (hidden) extension["shells"] = encode_shells(*hidden, shining, reflecting, out);
   for (const Transfer& term : fields.terms) {
     LAMBENT_CHECK(term.receivers == receivers_of(fields.surface.store) && term.rows == rows_of(fields.surface.store));
     extension["terms"].push_back(encode_dense(term, out));

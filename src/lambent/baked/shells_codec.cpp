@@ -26,15 +26,30 @@ Result<Shells> decode_places(const json& object, const std::string& where) {
 Result<Field> decode_dense_field(const BlobReader& in, const json& object, const Shells& shells, Transfer t, Rows rows,
                                  const std::string& where) {
   if (!object.is_object()) return Error{where, "is not an object"};
+  const int channels = t.channels;
   if (auto ok = decode_dense(in, object, t, where); !ok) return ok.error();
+  if (t.channels != channels) return Error{where, "must have " + std::to_string(channels) + " channels"};
   Field field{ShellPlacement{shells}, std::move(t), std::move(rows)};
   if (!is_consistent(field)) return Error{where, "its rows do not fit"};
   return field;
 }
 
+Result<Field> decode_reflecting(const BlobReader& in, const json& object, const Shells& shells,
+                                const std::string& where) {
+  if (!object.is_object()) return Error{where, "is not an object"};
+  auto incident = read_count(object, "incidentOrder", size_t(max_sh_order), where);
+  if (!incident) return incident.error();
+  auto order = read_count(object, "order", size_t(max_sh_order), where);
+  if (!order) return order.error();
+  if (*incident < 1 || *order < 1) return Error{where, "an order is 0"};
+  return decode_dense_field(in, object, shells,
+                            Transfer{{.order = int(*incident)}, sh_count(int(*order)), 3, shells.count()},
+                            IncidentRows{int(*order)}, where);
+}
+
 }  // namespace
 
-json encode_shells(const Field& hidden, const Field* shining, BlobWriter& out) {
+json encode_shells(const Field& hidden, const Field* shining, const Field* reflecting, BlobWriter& out) {
   const Shells& s = std::get<ShellPlacement>(hidden.where).shells;
   json object{{"center", {s.center.x, s.center.y, s.center.z}},
               {"radius", s.radius},
@@ -43,6 +58,11 @@ json encode_shells(const Field& hidden, const Field* shining, BlobWriter& out) {
               {"order", light_of(hidden.store).order},
               {"hidden", encode_dense(std::get<Transfer>(hidden.store), out)}};
   if (shining) object["shining"] = encode_dense(std::get<Transfer>(shining->store), out);
+  if (reflecting) {
+    json& said = object["reflecting"] = encode_dense(std::get<Transfer>(reflecting->store), out);
+    said["incidentOrder"] = light_of(reflecting->store).order;
+    said["order"] = std::get<IncidentRows>(reflecting->rows).order;
+  }
   return object;
 }
 
@@ -66,6 +86,11 @@ Result<std::vector<Field>> decode_shells(const BlobReader& in, const json& objec
                                       IncidentRows{int(*order)}, where + ": shining");
     if (!shining) return shining.error();
     fields.push_back(std::move(*shining));
+  }
+  if (object.contains("reflecting")) {
+    auto reflecting = decode_reflecting(in, object["reflecting"], *shells, where + ": reflecting");
+    if (!reflecting) return reflecting.error();
+    fields.push_back(std::move(*reflecting));
   }
   return fields;
 }

@@ -1,96 +1,18 @@
 #include <lambent/pipeline/draw_moving.h>
 
-#include <lambent/pipeline/lamp_sight.h>
-#include <lambent/pipeline/place.h>
+#include <lambent/pipeline/moving_light.h>
 #include <lambent/pipeline/text.h>
 #include <lambent/relight/dering.h>
 #include <lambent/relight/lattice.h>
-#include <lambent/relight/moving.h>
-#include <lambent/scene/append.h>
 
 #include <fmt/format.h>
 
 #include <algorithm>
 #include <chrono>
-#include <map>
 #include <set>
 
 namespace lambent {
 namespace {
-
-// What was read of a field file, once for all objects that are of it.
-struct Model {
-  Baked baked;
-  HiddenLight hidden;
-  std::optional<ShiningLight> shining;
-  std::vector<ShiningPoint> points;      // of what shines
-  std::vector<Vec3> positions, normals;  // of receivers
-  const Transfer& transfer() const { return std::get<Transfer>(baked.surface.store); }
-};
-
-struct Mover {
-  PlacedFile file;
-  const Model* model = nullptr;
-  PlacedObject placed = {};
-  MovingReceivers receivers = {};
-  PlacedLamp lamp = {};  // of a model that shines
-};
-
-// Points of a lamp towards which a receiver looks past the scene.
-constexpr int lamp_sight_points = 32;
-
-// Normals of receivers at vertices, towards their side.
-std::vector<Vec3> receiver_normals(const Scene& scene, const VertexPlacement& at, size_t receivers) {
-  std::vector<Vec3> normals(receivers, Vec3(0, 1, 0));
-  for (size_t v = 0; v < at.back.size(); ++v)
-    if (at.back[v] != no_receiver) normals[at.back[v]] = -scene.normals[v];
-  for (size_t v = 0; v < at.front.size(); ++v)
-    if (at.front[v] != no_receiver) normals[at.front[v]] = scene.normals[v];
-  return normals;
-}
-
-Result<std::unique_ptr<Model>> load_model(const std::string& path) {
-  auto object = load_baked(path);
-  if (!object) return object.error();
-  const Field* hidden = hiding_of(*object);
-  if (!hidden) return Error{path, "does not say what it hides around it: `lambent field` makes files that do"};
-  const auto* t = std::get_if<Transfer>(&object->surface.store);
-  const VertexPlacement* at = vertices_of(*object);
-  if (!t || !at || !std::holds_alternative<DiffuseRows>(object->surface.rows) ||
-      t->columns() != size_t(sh_count(t->light.order)))
-    return Error{path, "is no diffuse bake at vertices by harmonics alone, as an object that moves is"};
-  HiddenLight light = hidden_light(*hidden, max_sh_order);
-  auto model = std::make_unique<Model>(Model{std::move(*object), std::move(light), {}, {}, {}, {}});
-  if (const Field* shining = shining_of(model->baked)) {
-    model->shining = shining_light(*shining, max_sh_order);
-    model->points = shining_points(model->baked.scene, lamp_sight_points);
-    if (model->points.empty()) return Error{path, "shines, and has no material that does"};
-  }
-  const auto& where = std::get<VertexPlacement>(model->baked.surface.where);
-  const size_t count = receivers_of(model->baked.surface.store);
-  model->positions = receiver_positions(model->baked.scene.positions, where, count);
-  model->normals = receiver_normals(model->baked.scene, where, count);
-  return model;
-}
-
-// Of the lattice, relit: what arrives at an object's receivers.
-struct FreeSpace {
-  Lattice lattice;
-  std::vector<uint8_t> valid;
-  int order = 0;
-  Relit all, peaks;
-};
-
-// All that does not move, and its light: of the whole, and of the light's peaks where it has any.
-struct MovingScene {
-  MovingReceivers receivers;
-  int order = 0;  // bands of the light straight from the sky
-  Relit all = {}, peaks = {};
-  FreeSpace space = {};
-  int light_order = 0;
-  std::optional<Tracer> tracer = std::nullopt;  // of the scene alone, where lamps move
-  float diagonal = 0;
-};
 
 bool has_peaks(const ColumnDrawing& d) { return !d.light.peaks.empty(); }
 
@@ -120,7 +42,7 @@ Result<MovingScene> make_moving_scene(const Baked& baked, const DrawRequest& req
              "alike; `lambent bake --terms` keeps them apart");
   const size_t receivers = receivers_of(baked.surface.store);
   return MovingScene{moving_receivers(direct, receiver_positions(baked.scene.positions, baked.surface.where, receivers),
-                                      receiver_normals(baked.scene, *vertices_of(baked), receivers)),
+                                      receiver_normals(baked.scene.normals, *vertices_of(baked), receivers)),
                      direct.light.order};
 }
 
@@ -164,26 +86,6 @@ std::vector<Vec3> arriving_at(const MovingReceivers& r, const Lattice& lattice, 
   return out;
 }
 
-// What the lamps among the objects add to receivers: the scene's (`self` null), or an object's, which does not light
-// itself.
-MovingCount add_lamp_light(const MovingScene& s, const MovingReceivers& receivers, const Mover* self,
-                           const std::vector<Mover>& movers, LampShader& shader, Relit& values) {
-  std::vector<std::vector<float>> open;
-  std::vector<SeenLamp> lamps;
-  std::vector<const PlacedObject*> objects;
-  for (const Mover& m : movers)
-    if (&m != self) objects.push_back(&m.placed);
-  for (const Mover& m : movers) {
-    if (!m.model->shining || &m == self) continue;
-    open.push_back(lamp_in_sight(*s.tracer, s.diagonal, receivers, m.model->points, m.model->hidden.shells.center,
-                                 m.placed.place));
-    lamps.push_back({&m.lamp, &m.placed});
-  }
-  for (size_t i = 0; i < lamps.size(); ++i) lamps[i].open = open[i];
-  if (lamps.empty()) return {};
-  return shader.add(receivers, lamps, objects, self ? LampResponse::transfer : LampResponse::cosine, values);
-}
-
 // One object's receivers under the others.
 Relit relight_object(const MovingScene& s, bool with_peaks, const Mover& m, std::span<const PlacedObject* const> others,
                      MovingShader& shader) {
@@ -200,44 +102,16 @@ Relit relight_object(const MovingScene& s, bool with_peaks, const Mover& m, std:
   return all;
 }
 
-void append_object(RelitScene& into, const Mover& m, const Relit& relit, std::vector<Vec3>& emission) {
-  const auto& at = std::get<VertexPlacement>(m.model->baked.surface.where);
-  const size_t first = into.receivers, vertices = into.scene.positions.size(), added = at.front.size();
-  Scene moved = m.model->baked.scene;
-  const RigidPlace& place = m.placed.place;
-  const Vec3 center = m.model->hidden.shells.center;
-  for (Vec3& p : moved.positions) p = place.position + place.scale * (place.rotation * (p - center));
-  for (Vec3& n : moved.normals) n = place.rotation * n;
-  if (m.model->shining || !emission.empty()) emission.resize(into.scene.materials.size(), Vec3(0.0f));
-  append_scene(into.scene, moved);
-  if (m.model->shining)
-    for (const Material& material : moved.materials) emission.push_back(material.emissive);
-  for (const auto& [side, more] : {std::pair(&into.front, &at.front), std::pair(&into.back, &at.back)}) {
-    if (side->empty() && more->empty()) continue;
-    side->resize(vertices, none);
-    for (uint32_t r : *more) side->push_back(r == none ? none : r + uint32_t(first));
-    side->resize(vertices + added, none);
-  }
-  into.receivers += m.receivers.count;
-  into.relit.values.resize((into.receivers + transfer_block - 1) / transfer_block * 3 * transfer_block, 0.0f);
-  for (size_t r = 0; r < m.receivers.count; ++r) into.relit.set(first + r, 0, relit.at(r));
-}
-
-Result<std::vector<Mover>> load_movers(const DrawRequest& request,
-                                       std::map<std::string, std::unique_ptr<Model>>& models) {
-  auto files = parse_places(request.place, request.move);
-  if (!files) return files.error();
-  std::vector<Mover> movers;
-  for (PlacedFile& file : *files) {
-    auto& model = models[file.path];
-    if (!model) {
-      auto loaded = load_model(file.path);
-      if (!loaded) return loaded.error();
-      model = std::move(*loaded);
-    }
-    movers.push_back({std::move(file), model.get()});
-  }
-  return movers;
+// The same of one whose transfer is no factor of a product: glossy, or of lobes, or both.
+Relit relight_rows(const MovingScene& s, bool with_peaks, const Mover& m, const LightAmongMovers& among) {
+  const int order = m.model->light_order();
+  Relit all = relight_each(m, among.arriving_at_each(m, s.space.all, order));
+  if (with_peaks && !outgoing_of(m.model->baked.surface))
+    dering(all, relight_each(m, among.arriving_at_each(m, s.space.peaks, order)));
+  if (!among.sends_to(m)) return all;
+  const Relit sent = relight_each(m, among.sent_to_each(m, order));
+  for (size_t i = 0; i < all.values.size(); ++i) all.values[i] += sent.values[i];
+  return all;
 }
 
 }  // namespace
@@ -246,11 +120,12 @@ struct MovingDrawing::State {
   const Baked& baked;
   const Job& job;
   MovingScene scene;
-  std::map<std::string, std::unique_ptr<Model>> models = {};
+  MoverModels models = {};
   std::vector<Mover> movers = {};
   // Kept from frame to frame.
   MovingShader sky = {};
   LampShader lamps = {};
+  int lamp_bounces = 1;
   std::set<std::string> warned = {};
   std::vector<std::pair<std::string, size_t>> parts = {};
   MovingCount done = {};
@@ -269,7 +144,7 @@ double MovingDrawing::seconds() const { return state_->seconds; }
 int MovingDrawing::light_order() const { return state_->scene.light_order; }
 
 Result<MovingDrawing> MovingDrawing::make(const Baked& baked, const DrawRequest& request, const Job& job) {
-  std::map<std::string, std::unique_ptr<Model>> models;
+  MoverModels models;
   auto movers = load_movers(request, models);
   if (!movers) return movers.error();
   auto scene = make_moving_scene(baked, request, job);
@@ -284,31 +159,32 @@ Result<void> MovingDrawing::change(const DrawRequest& request) {
   State& s = *state_;
   auto movers = load_movers(request, s.models);
   if (!movers) return movers.error();
-  const bool shines = std::any_of(movers->begin(), movers->end(), [](const Mover& m) { return m.model->shining; });
-  if (shines && !s.scene.tracer) {
+  const auto any = [&](auto has) { return std::any_of(movers->begin(), movers->end(), has); };
+  const bool shines = any([](const Mover& m) { return m.model->shining.has_value(); });
+  if ((shines || any([](const Mover& m) { return m.model->reflecting.has_value(); })) && !s.scene.tracer) {
     auto tracer = Tracer::build(s.baked.scene, s.job.progress);
     if (!tracer) return tracer.error();
     const Bounds box = bounds(s.baked.scene);
     s.scene.tracer = std::move(*tracer), s.scene.diagonal = length(box.max - box.min);
   }
+  s.lamp_bounces = request.lamp_bounces;
+  if (shines && s.lamp_bounces > 0 && !s.scene.bounces)
+    if (auto ok = add_bounces(s.scene, s.baked, s.job); !ok) return ok.error();
   s.movers = std::move(*movers);
   return {};
 }
 
 Result<void> MovingDrawing::set_light(ColumnDrawing& d) { return light_scene(state_->scene, d); }
 
-void MovingDrawing::move_to(double time) {
+Result<void> MovingDrawing::move_to(double time) {
   State& s = *state_;
   const auto start = std::chrono::steady_clock::now();
   for (Mover& m : s.movers) {
-    const Model& model = *m.model;
-    m.placed = place_object(model.hidden, place_at(m.file, time, s.baked.scene.origin));
-    m.receivers =
-        moving_receivers(model.transfer(), model.positions, model.normals, model.hidden.shells.center, m.placed.place);
-    if (model.shining) m.lamp = place_lamp(*model.shining, m.placed.place);
+    if (auto ok = lambent::move_to(m, time, s.baked.scene.origin); !ok) return ok;
     check_place(s.scene, m, s.job, s.warned);
   }
   s.seconds += std::chrono::duration<double>(std::chrono::steady_clock::now() - start).count();
+  return {};
 }
 
 RelitScene MovingDrawing::lit(const ColumnDrawing& d, std::vector<Vec3>& emission) {
@@ -324,17 +200,20 @@ RelitScene MovingDrawing::lit(const ColumnDrawing& d, std::vector<Vec3>& emissio
   const MovingCount done = s.sky.shade(s.scene.receivers, objects,
                                        {.light_order = s.scene.light_order, .bounced = !s.baked.terms.empty()}, lights);
   if (has_peaks(d)) dering(drawn.relit, peaks);
-  add_lamp_light(s.scene, s.scene.receivers, nullptr, s.movers, s.lamps, drawn.relit);
+  LightAmongMovers among(s.scene, s.baked, s.movers, s.lamps, s.sky, s.lamp_bounces);
+  among.light_scene(drawn.relit);
   s.done.pairs += done.pairs, s.done.tiles += done.tiles;
   emission = d.emission;
   s.parts.clear();
   for (size_t i = 0; i < s.movers.size(); ++i) {
     std::vector<const PlacedObject*> others = objects;
     others.erase(others.begin() + ptrdiff_t(i));
-    Relit relit = relight_object(s.scene, has_peaks(d), s.movers[i], others, s.sky);
-    add_lamp_light(s.scene, s.movers[i].receivers, &s.movers[i], s.movers, s.lamps, relit);
+    const bool diffuse = s.movers[i].model->is_diffuse();
+    Relit relit = diffuse ? relight_object(s.scene, has_peaks(d), s.movers[i], others, s.sky)
+                          : relight_rows(s.scene, has_peaks(d), s.movers[i], among);
+    if (diffuse) among.light_object(s.movers[i], relit);
     s.parts.emplace_back(s.movers[i].file.name, drawn.scene.triangles.size());
-    append_object(drawn, s.movers[i], relit, emission);
+    append_mover(drawn, s.movers[i], relit, emission);
   }
   if (!emission.empty()) emission.resize(drawn.scene.materials.size(), Vec3(0.0f));
   s.seconds += std::chrono::duration<double>(std::chrono::steady_clock::now() - start).count();
@@ -363,9 +242,10 @@ Result<Drawing> draw_moving(const Baked& baked, const DrawRequest& request, cons
   if (auto ok = moving->set_light(d); !ok) return ok.error();
   Drawing drawing;
   for (double time : times) {
-    moving->move_to(time);
+    if (auto ok = moving->move_to(time); !ok) return ok.error();
     RenderOptions options{view->width, view->height, request.spp, d.around.background(), d.show.colour};
     const RelitScene drawn = moving->lit(d, options.emission);
+    options.outgoing = drawn.outgoing ? &*drawn.outgoing : nullptr;
     auto tracer = Tracer::build(drawn.scene);
     if (!tracer) return tracer.error();
     auto image = render(drawn.scene, *tracer, corner_receivers(drawn.scene, drawn.front, drawn.back), drawn.relit,

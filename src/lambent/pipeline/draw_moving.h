@@ -10,8 +10,8 @@ namespace lambent {
 
 class MovingDrawing {
  public:
-  // Reads what request.place and request.move name. `baked` and `job` must outlive it. Errors: of both options and of
-  // files; a bake over which objects cannot move.
+  // Reads what request.place, request.move and request.pose name. `baked` and `job` must outlive it. Errors: of both
+  // options and of files; a bake over which objects cannot move.
   static Result<MovingDrawing> make(const Baked& baked, const DrawRequest& request, const Job& job);
   MovingDrawing(MovingDrawing&&) noexcept;
   MovingDrawing& operator=(MovingDrawing&&) noexcept;
@@ -21,8 +21,8 @@ class MovingDrawing {
   Result<void> change(const DrawRequest& request);
   // The light without the objects: to be called once the light of `d`, a drawing of the same bake, has changed.
   Result<void> set_light(ColumnDrawing& d);
-  // Puts the objects where they are at that time.
-  void move_to(double time);
+  // Puts the objects where they are at that time. Errors: of their animations.
+  Result<void> move_to(double time);
   // The scene with the objects, under that light; and what is seen to shine, by material, where anything does.
   RelitScene lit(const ColumnDrawing& d, std::vector<Vec3>& emission);
 

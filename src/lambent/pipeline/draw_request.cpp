@@ -43,6 +43,9 @@ const Option<R> table[] = {
     {"move", &R::move, "Light", D | I,
      "N@T:X,Y,Z;T:X,Y,Z;...: where lamp N is at these times, straight from one to the next (files of direct to "
      "indirect light); or NAME=PATH.json: the path of an object of --place; may be given again"},
+    {"lamp-bounces", &R::lamp_bounces, "Light", D,
+     "How often the light of lamps among the objects of --place goes on from surface to surface of the scene", 0, 16,
+     nullptr, "place"},
     {"sphere-lamp", &R::sphere_lamp, "Light", Z | T,
      "X,Y,Z,RADIUS,R,G,B: a near lamp, a sphere of that radiance; may be given again"},
 
@@ -79,6 +82,10 @@ const Option<R> table[] = {
     {"place", &R::place, "What is shown", D,
      "NAME=FIELD@X,Y,Z[,YAW,PITCH,ROLL[,SCALE]]: put the object of a file of `lambent field` there, the middle of its "
      "box, turned; it casts shadows on the scene and on others, and is lit by the scene's lattice; may be given again"},
+    {"pose", &R::pose, "What is shown", D,
+     "NAME=ANIMATION: that object of --place moves by a glTF animation of its own, by name or number, at the time of "
+     "--time or --frames (files of lobes); may be given again",
+     0, 0, nullptr, "place"},
 
     {"animation", &R::animation, "Motion", distant & ~(K | V),
      "Pose the scene by this glTF animation, by name or number"},
@@ -139,6 +146,7 @@ constexpr Conflict conflicts[] = {
     {"place", "deform", "moves objects over a scene at rest: leave --deform out"},
     {"place", "show=emission|bounce:|sum:", "is lit by all light at once: no --show of a part of it"},
     {"place", "insert", "and --insert both put objects in: give --place for all"},
+    {"pose", "animation", "moves objects over a scene at rest: leave the animation out"},
     {"move", "animation", "moves objects over a scene at rest: leave the animation out"},
     {"insert", "show=emission|bounce:|sum:", "is lit by all light at once: no --show of a part of it"},
     {"tolerance", "method=standard|haar", "needs --method blocks"},
@@ -251,10 +259,10 @@ Result<void> check_draw(const DrawRequest& request, DrawKind kind) {
     return Error{"--show", "of direct to indirect light is product, radiosity, albedo, direct or indirect", true};
   const bool by_paths = kind == DrawKind::indirect || !request.place.empty();
   if (said.contains("move") && !by_paths) return Error{"--move", "needs --place", true};
-  if (said.contains("time") && request.animation.empty() && request.move.empty())
-    return Error{"--time", "needs --animation, or --move", true};
-  if (said.contains("frames") && (by_paths ? request.move.empty() : request.animation.empty()))
-    return Error{"--frames", by_paths ? "needs --move" : "needs --animation", true};
+  if (said.contains("time") && request.animation.empty() && request.move.empty() && request.pose.empty())
+    return Error{"--time", "needs --animation, --move or --pose", true};
+  if (said.contains("frames") && (by_paths ? request.move.empty() && request.pose.empty() : request.animation.empty()))
+    return Error{"--frames", by_paths ? "needs --move, or --pose" : "needs --animation", true};
   const bool from_afar = kind == DrawKind::texture || kind == DrawKind::blocks;
   if (from_afar && show->colour != RenderOptions::Show::albedo && request.env.empty() && request.sphere_lamp.empty())
     return Error{"--env", "is needed: an environment to light the scene by", true};

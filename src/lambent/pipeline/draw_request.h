@@ -14,6 +14,7 @@ struct DrawRequest {
   std::string env, env_rotate, window = "auto";
   int light_order = 0;  // bands; 0: all that there are
   std::vector<std::string> lamp, sphere_lamp, move;
+  int lamp_bounces = 1;
   // View
   std::string camera = "auto", size = "512x512", background = "env";
   int spp = 64;
@@ -21,7 +22,7 @@ struct DrawRequest {
   // What is shown
   std::string show = "product";
   std::string brdf;  // "": as baked; of blocks, which know none, diffuse
-  std::vector<std::string> insert, albedo, place, material;
+  std::vector<std::string> insert, albedo, place, pose, material;
   std::string at = "pixels";
   // Motion
   std::string animation, frames, deform;

@@ -1,6 +1,7 @@
 #include <lambent/pipeline/field_request.h>
 
 #include <lambent/bake/shells.h>
+#include <lambent/pipeline/movers.h>
 #include <lambent/pipeline/parse.h>
 #include <lambent/pipeline/text.h>
 
@@ -31,16 +32,17 @@ const Option<R> table[] = {
     {"bounces", &R::bounces, "Rays", raw, "Reflections within the object, as `lambent bake` takes them"},
     {"radiance", &R::radiance, "Field", raw | baked,
      "Also how its emissive materials shine: a lamp that moves, and lights the scene and other objects"},
+    {"transfer", &R::transfer, "Field", raw | baked,
+     "Also how it reflects what arrives at it: light on the scene and other objects, in its colours"},
 };
 
 Result<Baked> bake_object(const R& request, const Job& job) {
   if (is_baked(request.object)) {
     auto object = load_baked(request.object);
     if (!object) return object;
-    const auto* t = std::get_if<Transfer>(&object->surface.store);
-    if (!t || !std::holds_alternative<DiffuseRows>(object->surface.rows) || !vertices_of(*object) ||
-        t->columns() != size_t(sh_count(t->light.order)))
-      return Error{request.object, "is no diffuse bake at vertices by harmonics alone, as an object that moves is"};
+    if (auto ok = check_mover(*object, request.object); !ok) return ok.error();
+    if (request.transfer && (!std::holds_alternative<Transfer>(object->surface.store) || outgoing_of(object->surface)))
+      return Error{"--transfer", "is how diffuse objects reflect, and this one is glossy, or of lobes", true};
     std::erase_if(object->more, [](const Field& f) { return std::holds_alternative<ShellPlacement>(f.where); });
     return object;
   }
@@ -79,6 +81,13 @@ Result<Summary> field_to_file(const FieldRequest& request, const Job& job) {
     if (!shining) return shining.error();
     object->more.push_back(std::move(*shining));
   }
+  if (request.transfer) {
+    auto reflecting = bake_reflecting(object->scene, *tracer, std::get<CornerReceivers>(object->basis),
+                                      std::get<Transfer>(object->surface.store), *shells, options, job.progress);
+    if (!reflecting) return reflecting.error();
+    report.bytes += bytes_of(reflecting->store);
+    object->more.push_back(std::move(*reflecting));
+  }
   auto provenance = nlohmann::json::parse(object->provenance, nullptr, false);
   if (provenance.is_object()) {
     provenance["field"] = request_json(field_options(), request, is_baked(request.object) ? 1 : 0);
@@ -90,7 +99,8 @@ Result<Summary> field_to_file(const FieldRequest& request, const Job& job) {
                   {"order", request.order},       {"radius", shells->radius},
                   {"rays", report.rays},          {"bytes", report.bytes},
                   {"seconds", report.seconds},    {"receivers", receivers_of(object->surface.store)},
-                  {"radiance", request.radiance}, {"radii", shells->radii}};
+                  {"radiance", request.radiance}, {"transfer", request.transfer},
+                  {"radii", shells->radii}};
   summary.lines.emplace_back("field",
                              fmt::format("{} shells of {} points, order {}, {}; {} rays in {}", request.shells,
                                          request.side * request.side, request.order, human_bytes(double(report.bytes)),

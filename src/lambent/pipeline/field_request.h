@@ -10,7 +10,7 @@ struct FieldRequest {
   std::string object, output;
   int order = 4, shells = 24, side = 16, samples = 1024;
   float inner = 0.3f, outer = 12;
-  bool radiance = false;
+  bool radiance = false, transfer = false;
   std::string bounces = "1";
   uint32_t seed = 1;
   GivenOptions given;

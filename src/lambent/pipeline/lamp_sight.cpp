@@ -11,14 +11,17 @@
 
 namespace lambent {
 
-std::vector<ShiningPoint> shining_points(const Scene& object, int count) {
+namespace {
+
+// By area times weight(triangle).
+template <class Weight>
+std::vector<ShiningPoint> points_over(const Scene& object, int count, Weight weight) {
   std::vector<double> until;
   std::vector<uint32_t> triangles;
   double sum = 0;
   for (size_t t = 0; t < object.triangles.size(); ++t) {
     const Triangle& triangle = object.triangles[t];
-    if (!emits(object, triangle, true)) continue;
-    const Vec3 e = emission(object, triangle, 1.0f / 3, 1.0f / 3), a = object.positions[triangle.v[0]];
+    const Vec3 e = weight(triangle), a = object.positions[triangle.v[0]];
     const Vec3 area = cross(object.positions[triangle.v[1]] - a, object.positions[triangle.v[2]] - a);
     const double power = double(length(area)) * double(e.x + e.y + e.z);
     if (!(power > 0)) continue;
@@ -38,8 +41,21 @@ std::vector<ShiningPoint> shining_points(const Scene& object, int count) {
   return out;
 }
 
+}  // namespace
+
+std::vector<ShiningPoint> shining_points(const Scene& object, int count) {
+  return points_over(object, count, [&](const Triangle& t) {
+    return emits(object, t, true) ? emission(object, t, 1.0f / 3, 1.0f / 3) : Vec3(0.0f);
+  });
+}
+
+std::vector<ShiningPoint> surface_points(const Scene& object, int count) {
+  return points_over(object, count, [&](const Triangle& t) { return albedo(object, t, 1.0f / 3, 1.0f / 3); });
+}
+
 std::vector<float> lamp_in_sight(const Tracer& scene, float diagonal, const MovingReceivers& r,
-                                 std::span<const ShiningPoint> points, Vec3 center, const RigidPlace& place) {
+                                 std::span<const ShiningPoint> points, Vec3 center, const RigidPlace& place,
+                                 float reach) {
   std::vector<ShiningPoint> there(points.begin(), points.end());
   for (ShiningPoint& p : there) {
     p.position = place.position + place.scale * (place.rotation * (p.position - center));
@@ -48,6 +64,7 @@ std::vector<float> lamp_in_sight(const Tracer& scene, float diagonal, const Movi
   std::vector<float> out(r.count);
   parallel_for(r.count, sh_tile, [&](size_t begin, size_t end) {
     for (size_t i = begin; i < end; ++i) {
+      if (length(r.positions[i] - place.position) > reach) continue;
       const Vec3 origin = r.positions[i] + r.normals[i] * receiver_lift(r.positions[i], 0, diagonal);
       double all = 0, seen = 0;
       for (const ShiningPoint& p : there) {

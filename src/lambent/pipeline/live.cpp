@@ -78,9 +78,10 @@ Result<void> LivePicture::State::ask_kind(const DrawRequest& request, const Draw
 Result<void> LivePicture::State::ask_parts(const DrawRequest& request, const DrawRequest& before, bool sky) {
   const bool materials =
       !is_same(before, request, {"brdf", "material", "show", "method", "brdf-samples", "tolerance", "terms", "insert"});
-  const bool places = !is_same(before, request, {"place", "move"});
+  const bool places = !is_same(before, request, {"place", "move", "pose", "lamp-bounces"});
   const bool time = before.time != request.time;
-  const bool objects = places || !is_same(before, request, {"insert"}) || (time && !request.move.empty());
+  const bool objects = places || !is_same(before, request, {"insert"}) ||
+                       (time && (!request.move.empty() || !request.pose.empty()));
   const bool left_alone = has_objects() && request.place.empty() && request.insert.empty();
   const bool posed_anew = left_alone || !is_same(before, request, {"animation", "deform"}) ||
                           (time && !request.animation.empty());

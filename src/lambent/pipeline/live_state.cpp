@@ -124,7 +124,8 @@ Result<void> LivePicture::State::project(bool hurry) {
 // The scene with its objects, and all of its light in `relit`. Where they stand is looked at only if it has changed:
 // who holds the scene meanwhile has let go of it then.
 Result<void> LivePicture::State::join_objects() {
-  if (moving && due.objects) moving->move_to(asked.time);
+  if (moving && due.objects)
+    if (auto ok = moving->move_to(asked.time); !ok) return ok;
   std::vector<Vec3> emission = columns->emission;
   auto drawn = moving ? moving->lit(*columns, emission) : with_insertions(*columns, std::move(relit));
   if (!drawn) return drawn.error();

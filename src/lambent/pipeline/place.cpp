@@ -93,7 +93,8 @@ Result<std::vector<PlaceKey>> load_path(const std::string& path) {
 }
 
 Result<std::vector<PlacedFile>> parse_places(const std::vector<std::string>& places,
-                                             const std::vector<std::string>& moves) {
+                                             const std::vector<std::string>& moves,
+                                             const std::vector<std::string>& poses) {
   if (places.size() > max_placed_objects)
     return Error{"--place", fmt::format("{} objects are more than {}", places.size(), max_placed_objects), true};
   std::vector<PlacedFile> out;
@@ -116,6 +117,15 @@ Result<std::vector<PlacedFile>> parse_places(const std::vector<std::string>& pla
     auto keys = load_path(text.substr(equals + 1));
     if (!keys) return keys.error();
     object->keys = std::move(*keys);
+  }
+  for (const std::string& text : poses) {
+    const size_t equals = text.find('=');
+    if (equals == std::string::npos || equals == 0 || equals + 1 == text.size())
+      return Error{"--pose", "expects NAME=ANIMATION, not \"" + text + "\"", true};
+    const auto object = named(text.substr(0, equals));
+    if (object == out.end()) return Error{"--pose", "no --place is named " + text.substr(0, equals), true};
+    if (!object->animation.empty()) return Error{"--pose", object->name + " has an animation already", true};
+    object->animation = text.substr(equals + 1);
   }
   return out;
 }

@@ -23,6 +23,7 @@ struct PlacedFile {
   PlaceKey at;
   float scale = 1;
   std::vector<PlaceKey> keys = {};  // of its path; none: it stays
+  std::string animation = "";       // of its own, by name or number; "": it is rigid
 };
 Result<PlacedFile> parse_place(const std::string& text);
 std::string place_text(const PlacedFile& object);  // the same text again, without its path
@@ -31,10 +32,11 @@ std::string place_text(const PlacedFile& object);  // the same text again, witho
 // Errors name the file.
 Result<std::vector<PlaceKey>> load_path(const std::string& path);
 
-// All of --place, and --move (NAME=PATH.json), which gives one of them a path. Errors: those above; a name that is
-// there twice, or not; more objects than max_placed_objects.
+// All of --place, --move (NAME=PATH.json), which gives one of them a path, and --pose (NAME=ANIMATION). Errors: those
+// above; a name that is there twice, or not; more objects than max_placed_objects.
 Result<std::vector<PlacedFile>> parse_places(const std::vector<std::string>& places,
-                                             const std::vector<std::string>& moves);
+                                             const std::vector<std::string>& moves,
+                                             const std::vector<std::string>& poses = {});
 
 // Straight from one key to the next, angles too, so that 720 degrees are two turns; before the first and after the last
 // at rest. `origin` is the scene's.

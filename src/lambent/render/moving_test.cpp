@@ -2,9 +2,10 @@
 #include <lambent/bake/bake.h>
 #include <lambent/bake/shells.h>
 #include <lambent/core/random.h>
+#include <lambent/core/sampling.h>
 #include <lambent/light/project.h>
 #include <lambent/reference/path_tracer.h>
-#include <lambent/relight/moving.h>
+#include <lambent/relight/reflecting.h>
 #include <lambent/scene/append.h>
 #include <lambent/scene/procedural.h>
 
@@ -112,6 +113,108 @@ TEST(Moving, TwoObjectsShadowASceneAsThePathTracerSays) {
   RecordProperty("decibels_without_shadows", std::to_string(before));
   EXPECT_GT(with, 35);
   EXPECT_GT(with, before + 8);
+}
+
+// How a Thing reflects.
+ReflectingLight reflects(const Thing& thing, int order, int samples) {
+  const ShellOptions options{.order = order, .samples = samples};
+  auto tracer = Tracer::build(thing.scene);
+  return reflecting_light(*bake_reflecting(thing.scene, *tracer, std::get<CornerReceivers>(thing.receivers.basis),
+                                           thing.transfer, thing.light.shells, options));
+}
+
+TEST(Reflecting, AWhiteBallInEvenLightReflectsAllThatItHides) {
+  const Thing ball(make_sphere(1, 3, Vec3(1)), 4, 4, 256);
+  const ReflectingLight light = reflects(ball, 4, 256);
+  const std::vector<Vec3> even{
+      Vec3(3.5449077f, 0, 7.0898154f), Vec3(0), Vec3(0), Vec3(0), Vec3(0), Vec3(0), Vec3(0), Vec3(0), Vec3(0)};
+  const RigidPlace place{Vec3(1, 2, 3), rotation_from_yaw_pitch_roll({30, 40, 50}), 0.5f};
+  const ShiningLight reflected = reflected_light(light, even, place.rotation);
+  const PlacedLamp lamp = place_lamp(reflected, place);
+  const PlacedObject object = place_object(ball.light, place);
+  std::vector<Vec3> ours(16);
+  std::vector<float> hidden(16);
+  for (float distance : {0.51f, 0.6f, 1.0f, 3.0f, 20.0f})
+    for (Vec3 way : {Vec3(0, 1, 0), Vec3(0.6f, 0, 0.8f), Vec3(-0.48f, -0.6f, 0.64f)}) {
+      arriving_from(lamp, place.position + distance * way, ours);
+      hidden_from(object, place.position + distance * way, hidden);
+      for (size_t k = 0; k < 16; ++k) {
+        EXPECT_NEAR(ours[k].x, hidden[k], 0.02f * hidden[0] + 1e-4f) << distance << " " << k;
+        EXPECT_NEAR(ours[k].y, 0, 1e-5f);
+        EXPECT_NEAR(ours[k].z, 2 * ours[k].x, 1e-4f);
+      }
+    }
+}
+
+// Of a light, what arrives at a place past a scene that sends nothing back.
+std::vector<Vec3> arrives(const Tracer& tracer, std::span<const Vec3> light, Vec3 place) {
+  std::vector<Vec3> out(light.size(), Vec3(0));
+  std::vector<float> y(light.size());
+  constexpr int rays = 4096;
+  for (int i = 0; i < rays; ++i) {
+    const Vec3 d = square_to_sphere(sobol_owen(uint32_t(i), 5));
+    if (tracer.closest(place, d).triangle != none) continue;
+    evaluate_sh(int(std::lround(std::sqrt(double(light.size())))), d, y);
+    Vec3 radiance(0);
+    for (size_t k = 0; k < light.size(); ++k) radiance += y[k] * light[k];
+    for (size_t k = 0; k < light.size(); ++k) out[k] += (4 * pi / rays * y[k]) * radiance;
+  }
+  return out;
+}
+
+TEST(Reflecting, TwoObjectsLightASceneAsThePathTracerSays) {
+  SKIP_UNDER_SANITIZERS();
+  constexpr int light_order = 4, order = 6;
+  Scene scene = yard();
+  for (Material& m : scene.materials) m.base_color = Vec3(0);  // so that one bounce is that of the objects
+  auto tracer = Tracer::build(scene);
+  const Receivers receivers = make_vertex_receivers(scene);
+  auto transfer = bake(scene, *tracer, receivers, {.order = order, .samples = 512, .bounces = 0});
+  ASSERT_TRUE(transfer);
+  Scene box;
+  add_box(box, add_material(box, "box", Vec3(0.3f, 0.5f, 0.9f)), "box", Vec3(-0.4f, -0.3f, -0.5f),
+          Vec3(0.4f, 0.3f, 0.5f), 4);
+  const Thing ball(make_sphere(0.5f, 3, Vec3(0.95f, 0.6f, 0.3f)), order, light_order, 256),
+      block(box, order, light_order, 256);
+  const Thing* things[] = {&ball, &block};
+  const RigidPlace places[] = {{Vec3(-0.7f, 0.8f, 0.3f), Mat3(1.0f), 1},
+                               {Vec3(0.8f, 0.7f, -0.6f), rotation_from_yaw_pitch_roll({30, 20, 0}), 1}};
+  const PlacedObject placed[] = {place_object(ball.light, places[0]), place_object(block.light, places[1])};
+  const std::vector<const PlacedObject*> objects{&placed[0], &placed[1]};
+  const std::vector<Vec3> light = uneven_light(light_order);
+  std::vector<Vec3> padded(light);
+  padded.resize(size_t(sh_count(order)), Vec3(0.0f));
+  const MovingReceivers moving = moving_receivers(*transfer, receivers.origins, receivers.normals);
+  Relit relit;
+  relight(*transfer, padded, relit);
+  const MovingLight lights[] = {{light, false, &relit}};
+  MovingShader().shade(moving, objects, {.light_order = light_order}, lights);
+  const Relit dark = relit;
+  ShiningLight reflected[2];
+  PlacedLamp lamps[2];
+  Scene joint = scene;
+  for (int i = 0; i < 2; ++i) {
+    std::vector<Vec3> arriving = arrives(*tracer, light, places[i].position);
+    pass_objects(arriving, places[i].position, {&objects[size_t(1 - i)], 1});
+    reflected[i] = reflected_light(reflects(*things[i], order, 256), arriving, places[i].rotation);
+    lamps[i] = place_lamp(reflected[i], places[i]);
+    append_scene(joint, moved(things[i]->scene, things[i]->light.shells, places[i]));
+  }
+  const SeenLamp seen[] = {{&lamps[0], &placed[0]}, {&lamps[1], &placed[1]}};
+  LampShader().add(moving, seen, objects, LampResponse::cosine, relit);
+  std::vector<Vec3> at, normals, ours, without;
+  for (size_t r = 0; r < receivers.count(); r += 7) {
+    at.push_back(receivers.origins[r]), normals.push_back(receivers.normals[r]);
+    ours.push_back(relit.at(r)), without.push_back(dark.at(r));
+  }
+  std::vector<Vec3> truth;
+  for (const ExitRadiance& e : exit_radiances(joint, reconstruct_environment(light, 128), at, normals, 1, 1024, 7))
+    truth.push_back(e.mean);
+  const double with = decibels(ours, truth), before = decibels(without, truth);
+  RecordProperty("decibels", std::to_string(with));
+  RecordProperty("decibels_without_reflections", std::to_string(before));
+  EXPECT_GT(with, 33);
+  EXPECT_GT(with, before + 3);
 }
 
 TEST(Moving, FarObjectsChangeNothingAndCostNothing) {

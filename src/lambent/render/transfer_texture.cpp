@@ -2,6 +2,7 @@
 #include <lambent/relight/dering.h>
 #include <lambent/relight/zonal.h>
 #include <lambent/render/transfer_texture.h>
+#include <lambent/transfer/view_mix.h>
 
 namespace lambent {
 Mat3 texture_frame(const Scene& scene, const Triangle& t, Vec3 normal) {
@@ -52,13 +53,37 @@ void arriving_here(const ArrivingLight& light, const Corners& corners, const Hit
   std::fill(out.begin() + ptrdiff_t(count), out.end(), Vec3(0.0f));
 }
 
+// What is looked up of a texture at a hit: rows of it, and what each counts for.
+struct ReliefValues {
+  std::vector<float> values;  // [row][value]
+  std::array<float, 4> weights{1, 0, 0, 0};
+  size_t rows = 1;
+  Vec3 shade(const ZonalTransfer& transfer, const Mat3& frame, std::span<const Vec3> light) const {
+    Vec3 sum(0.0f);
+    const size_t n = transfer.row_values();
+    for (size_t k = 0; k < rows; ++k)
+      if (weights[k] > 0) sum += weights[k] * shade_zonal(transfer, std::span(values).subspan(k * n, n), frame, light);
+    return sum;
+  }
+};
+
+// As seen from the unit direction `view`, in the texture's frame.
+void sample_views(const ZonalTexture& texture, Vec2 uv, Vec3 view, ReliefValues& out) {
+  const size_t n = texture.transfer.row_values();
+  if (texture.views == 0) return sample_zonal_texture(texture, uv, std::span(out.values).first(n));
+  const ViewMix mix = mix_views(texture.views, view);
+  out.rows = 4, out.weights = mix.weights;
+  for (size_t k = 0; k < 4; ++k)
+    if (mix.weights[k] > 0) sample_zonal_texture(texture, uv, std::span(out.values).subspan(k * n, n), mix.nodes[k]);
+}
+
 // What leaves the relief, white, at a hit, given its values there; `here` and `near` are scratch.
-Vec3 shade_relief(const ZonalTransfer& transfer, std::span<const float> values, const Mat3& frame, const Hit& hit,
+Vec3 shade_relief(const ZonalTransfer& transfer, const ReliefValues& values, const Mat3& frame, const Hit& hit,
                   Vec3 place, const LocalLight& light, const ArrivingAt* arriving, std::vector<Vec3>& here,
                   std::vector<Vec3>& near) {
   if (!arriving) {
     if (!light.lamps.empty()) light_at(light, place, here);
-    return shade_zonal(transfer, values, frame, here);
+    return values.shade(transfer, frame, here);
   }
   const Corners* corners = arriving->corners.find(hit.triangle, hit.front);
   if (!corners) return Vec3(0.0f);
@@ -68,10 +93,10 @@ Vec3 shade_relief(const ZonalTransfer& transfer, std::span<const float> values, 
     light_at(light, place, near);
     for (size_t k = 0; k < here.size(); ++k) here[k] += near[k] - light.distant[k];
   }
-  const Vec3 white = shade_zonal(transfer, values, frame, here);
+  const Vec3 white = values.shade(transfer, frame, here);
   if (!arriving->peaks) return white;
   arriving_here(*arriving->peaks, *corners, hit, here);
-  return dering(white, shade_zonal(transfer, values, frame, here));
+  return dering(white, values.shade(transfer, frame, here));
 }
 
 }  // namespace
@@ -80,8 +105,8 @@ std::function<SurfaceShade()> transfer_texture_shade(const Scene& scene, const Z
                                                      const TextureUse& use, const LocalLight& light,
                                                      RenderOptions::Show show, const ArrivingAt* arriving) {
   return [&, show, arriving]() -> SurfaceShade {
-    return [&, show, arriving, values = std::vector<float>(texture.transfer.receiver_values()), here = light.distant,
-            near = std::vector<Vec3>()](const Hit& hit, Vec3) mutable {
+    return [&, show, arriving, values = ReliefValues{std::vector<float>(4 * texture.transfer.row_values())},
+            here = light.distant, near = std::vector<Vec3>()](const Hit& hit, Vec3 direction) mutable {
       const Triangle& t = scene.triangles[hit.triangle];
       Vec3 normal = normalize_or(interpolate(scene.normals, t, hit.u, hit.v), {0, 0, 1});
       if (!hit.front) normal = -normal;
@@ -90,11 +115,12 @@ std::function<SurfaceShade()> transfer_texture_shade(const Scene& scene, const Z
       Mat3 frame;
       if (texture.groove_depth > 0) {
         const float phase = dot(uv, use.tile), x = (phase - std::floor(phase) - 0.5f) / use.groove_width;
-        sample_groove(texture, placed ? x : 1, use.groove_depth * (use.groove_map ? use.groove_map(uv) : 1), values);
+        sample_groove(texture, placed ? x : 1, use.groove_depth * (use.groove_map ? use.groove_map(uv) : 1),
+                      std::span(values.values).first(texture.transfer.row_values()));
         frame = groove_frame(scene, t, use.tile, normal);
       } else {
-        sample_zonal_texture(texture, uv * use.tile, values);
         frame = texture_frame(scene, t, normal);
+        sample_views(texture, uv * use.tile, -direction * frame, values);
       }
       const Vec3 white = shade_relief(texture.transfer, values, frame, hit,
                                       interpolate(scene.positions, t, hit.u, hit.v), light, arriving, here, near);

@@ -1,5 +1,7 @@
 // Textured patches against the displaced geometry itself.
+#include <lambent/bake/materials.h>
 #include <lambent/bake/patch.h>
+#include <lambent/brdf/parse_brdf.h>
 #include <lambent/compress/wrinkle.h>
 #include <lambent/compress/zonal_fit.h>
 #include <lambent/light/project.h>
@@ -141,6 +143,73 @@ WavyRelief wavy_relief(int n) {
   auto transfer =
       bake(patch.scene, *tracer, patch.receivers, {.samples = 1024, .bounces = 2, .precision = Precision::single});
   return {field, {n, n, *fit_zonal(*transfer, {.lobes = 4})}};
+}
+
+double decibels(const Image& ours, const Image& truth) {
+  double peak = 0, squares = 0;
+  for (size_t i = 0; i < truth.rgb.size(); ++i)
+    for (int c = 0; c < 3; ++c) {
+      peak = std::max(peak, double(truth.rgb[i][c]));
+      squares += std::pow(double(ours.rgb[i][c] - truth.rgb[i][c]), 2);
+    }
+  return 10 * std::log10(peak * peak * 3 * double(truth.rgb.size()) / squares);
+}
+
+// A relief seen at a slant, diffuse and glossy, by its views: with the parallax and the highlights of its displaced
+// geometry, which a texture without views has not.
+TEST(TransferTexture, ViewsShowAReliefAtASlantAsItsDisplacedGeometry) {
+  SKIP_UNDER_SANITIZERS();
+  constexpr int n = 24, views = 8;
+  const WavyRelief wavy = wavy_relief(n);
+  const PatchScene patch = make_patch(wavy.field, Vec3(0.5f));
+  auto patch_tracer = Tracer::build(patch.scene);
+  Scene sheet = tiled_sheet(n * 5);
+  auto tracer = Tracer::build(sheet);
+  Scene relief = sheet;
+  ASSERT_TRUE(displace(
+      relief, [&](Vec2 uv) { return wavy.at(uv); }, Vec2(5)));
+  Camera camera;
+  camera.target = Vec3(0.1f, 0, 0.05f), camera.eye = camera.target + 200.0f * normalize(Vec3(0.3f, 1, 0.9f));
+  camera.fov = 2 * degrees(std::atan(0.5f / 200));
+  RenderOptions options;
+  options.width = options.height = 48, options.samples = 64;
+  const std::vector<Vec3> light = project_environment(*make_sky(*parse_sky("elevation=35,azimuth=60,turbidity=3")), 6);
+  const Environment env = reconstruct_environment(light, 256);
+  const BakeOptions bake_options{.samples = 1024, .bounces = 2, .precision = Precision::single};
+  for (const bool glossy : {false, true}) {
+    Transfer seen;
+    Reflection reflection;
+    if (glossy) {
+      reflection.everywhere = *parse_brdf("ggx:roughness=0.7");
+      auto baked = bake_matrix(patch.scene, *patch_tracer, patch.receivers,
+                               make_receiver_materials(patch.scene, patch.receivers, reflection), bake_options,
+                               {.incident_order = 6, .outgoing = OutgoingKind::map});
+      ASSERT_TRUE(baked) << baked.error().text();
+      seen = view_patch(patch, *patch_tracer, baked->transfer, &baked->outgoing, n, views);
+    } else {
+      auto baked = bake(patch.scene, *patch_tracer, patch.receivers, bake_options);
+      ASSERT_TRUE(baked);
+      seen = view_patch(patch, *patch_tracer, *baked, nullptr, n, views);
+    }
+    const ZonalTexture texture{n, n, *fit_zonal(seen, {.lobes = 4}), 0, views};
+    auto ours = render_transfer_texture(sheet, *tracer, texture, {.tile = Vec2(5)}, {light, {}, {}}, camera, options);
+    auto flat =
+        render_transfer_texture(sheet, *tracer, wavy.texture, {.tile = Vec2(5)}, {light, {}, {}}, camera, options);
+    ASSERT_TRUE(ours && flat);
+    // The model is all of a glossy relief's colour; of a diffuse one it is the sheet's.
+    if (glossy)
+      for (Image* image : {&*ours, &*flat})
+        for (Vec3& v : image->rgb) v = 2.0f * v;
+    ReferenceOptions traced;
+    traced.width = traced.height = 48, traced.spp = 512, traced.bounces = 2, traced.reflection = reflection;
+    auto truth = path_trace(relief, env, camera, traced);
+    ASSERT_TRUE(truth);
+    const double with = decibels(*ours, truth->image), without = decibels(*flat, truth->image);
+    const std::string name = glossy ? "glossy" : "diffuse";
+    RecordProperty(name, std::to_string(with)), RecordProperty(name + "_without", std::to_string(without));
+    EXPECT_GT(with, 30) << name;
+    EXPECT_GT(with, without + 2) << name;
+  }
 }
 
 // Sheets of relief for real, flat and bent, path-traced: other geometry, other rays, other reconstruction of the same

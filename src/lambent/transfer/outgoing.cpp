@@ -2,8 +2,8 @@
 // outgoing radiance.
 #include <lambent/basis/hemispherical.h>
 #include <lambent/core/check.h>
-#include <lambent/core/sampling.h>
 #include <lambent/transfer/outgoing.h>
+#include <lambent/transfer/view_mix.h>
 
 namespace lambent {
 
@@ -19,17 +19,12 @@ Vec3 view_map_direction(int grid, int x, int y) {
 
 void look_up(const ViewMap& map, Vec3 wo, std::span<ViewWeights> out) {
   LAMBENT_CHECK(map.grid >= 2 && out.size() >= size_t(map.rows));
-  const float z = std::clamp(wo.z, 0.0f, 1.0f);
-  const Vec2 flat(normalize_or(Vec3(wo.x, wo.y, 0), Vec3(0)));
-  const Vec2 square = disk_to_square(flat * std::sqrt(1 - z));
-  const float last = float(map.grid - 1), sx = square.x * last, sy = square.y * last;
-  const int x = std::min(int(sx), map.grid - 2), y = std::min(int(sy), map.grid - 2);
-  const float fx = sx - float(x), fy = sy - float(y);
-  const ViewWeights* p = map.values.data() + size_t(y * map.grid + x) * size_t(map.rows);
-  const ViewWeights* q = p + size_t(map.grid) * size_t(map.rows);
-  const float w00 = (1 - fx) * (1 - fy), w10 = fx * (1 - fy), w01 = (1 - fx) * fy, w11 = fx * fy;
+  const ViewMix mix = mix_views(map.grid, wo);
+  const auto& w = mix.weights;
+  const ViewWeights* p = map.values.data() + mix.nodes[0] * size_t(map.rows);
+  const ViewWeights* q = map.values.data() + mix.nodes[2] * size_t(map.rows);
   for (int r = 0; r < map.rows; ++r)
-    out[size_t(r)] = w00 * p[r] + w10 * p[map.rows + r] + w01 * q[r] + w11 * q[map.rows + r];
+    out[size_t(r)] = w[0] * p[r] + w[1] * p[map.rows + r] + w[2] * q[r] + w[3] * q[map.rows + r];
 }
 
 std::vector<Lobe> outgoing_lobes(int count) {

@@ -9,6 +9,7 @@ namespace lambent {
 namespace {
 
 constexpr char magic[8] = {'L', 'M', 'B', 'T', 'L', 'P', 'T', '1'};
+constexpr uint8_t version_of_views = '2';
 constexpr size_t header_size = 64;
 
 // One value of one receiver.
@@ -31,16 +32,18 @@ Result<void> save_zonal_texture(const std::string& path, const ZonalTexture& tex
   const ZonalTransfer& t = texture.transfer;
   LAMBENT_CHECK(t.receivers == size_t(texture.width) * size_t(texture.height) && t.data.size() == t.bytes());
   std::array<uint8_t, header_size> header{};
-  LAMBENT_CHECK(t.rows == 1);
-  const uint32_t fields[8] = {uint32_t(texture.width),
+  LAMBENT_CHECK(t.rows == (texture.views ? texture.views * texture.views : 1));
+  const uint32_t fields[9] = {uint32_t(texture.width),
                               uint32_t(texture.height),
                               uint32_t(t.order),
                               uint32_t(t.lobes),
                               uint32_t(t.channels),
                               uint32_t(t.value_bytes()),
                               uint32_t(texture.groove_depth > 0),
-                              std::bit_cast<uint32_t>(texture.groove_depth)};
+                              std::bit_cast<uint32_t>(texture.groove_depth),
+                              uint32_t(texture.views)};
   std::memcpy(header.data(), magic, 8);
+  if (texture.views) header[7] = version_of_views;
   std::memcpy(header.data() + 8, fields, sizeof fields);
   const std::span<const uint8_t> pieces[2] = {header, t.data};
   return write_file_atomically(path, pieces);
@@ -56,10 +59,11 @@ Result<ZonalTexture> load_zonal_texture(const MappedFile& file, const std::strin
   const std::span<const uint8_t> bytes = file.bytes();
   if (bytes.size() < header_size || std::memcmp(bytes.data(), magic, 7) != 0)
     return Error{path, "is not a texture of zonal lobes (make one with `lambent patch`)"};
-  if (bytes[7] != uint8_t(magic[7])) return Error{path, "is a texture of zonal lobes of another version"};
-  uint32_t fields[8];
+  const bool seen = bytes[7] == version_of_views;
+  if (!seen && bytes[7] != uint8_t(magic[7])) return Error{path, "is a texture of zonal lobes of another version"};
+  uint32_t fields[9];
   std::memcpy(fields, bytes.data() + 8, sizeof fields);
-  const auto [width, height, order, lobes, channels, value_bytes, kind, depth_bits] = std::to_array(fields);
+  const auto [width, height, order, lobes, channels, value_bytes, kind, depth_bits, views] = std::to_array(fields);
   const float depth = std::bit_cast<float>(depth_bits);
   auto within = [](uint32_t x, uint32_t most) { return x >= 1 && x <= most; };
   if (!within(width, max_zonal_texture_size) || !within(height, max_zonal_texture_size))
@@ -70,7 +74,10 @@ Result<ZonalTexture> load_zonal_texture(const MappedFile& file, const std::strin
   if (kind > 1) return Error{path, "is of a kind that is not known to this program"};
   if (kind == 1 && !(depth > 0 && depth <= 10 && width >= 2 && height >= 2))
     return Error{path, "its grooves have no depth, or too few places"};
+  if (seen && (kind != 0 || views < 2 || views > uint32_t(max_texture_views)))
+    return Error{path, "is seen from no number of views that is possible"};
   ZonalTexture texture;
+  if (seen) texture.views = int(views), texture.transfer.rows = int(views * views);
   if (kind == 1) texture.groove_depth = depth;
   texture.width = int(width), texture.height = int(height);
   ZonalTransfer& t = texture.transfer;
@@ -84,9 +91,10 @@ Result<ZonalTexture> load_zonal_texture(const MappedFile& file, const std::strin
   return texture;
 }
 
-void sample_zonal_texture(const ZonalTexture& texture, Vec2 uv, std::span<float> values) {
+void sample_zonal_texture(const ZonalTexture& texture, Vec2 uv, std::span<float> values, size_t row) {
   const ZonalTransfer& t = texture.transfer;
-  LAMBENT_CHECK(values.size() == t.receiver_values());
+  LAMBENT_CHECK(values.size() == t.row_values() && row < size_t(t.rows));
+  const size_t first = row * t.row_values();
   if (!std::isfinite(uv.x) || !std::isfinite(uv.y)) uv = Vec2(0.0f);
   uv -= floor(uv);
   const float x = uv.x * float(texture.width), y = uv.y * float(texture.height);
@@ -97,10 +105,12 @@ void sample_zonal_texture(const ZonalTexture& texture, Vec2 uv, std::span<float>
   const int i = int(std::floor(x - 0.5f)), j = int(std::floor(y - 0.5f));
   const float fx = x - 0.5f - float(i), fy = y - 0.5f - float(j);
   for (size_t k = 0; k < t.exact_values(); ++k)
-    values[k] = (1 - fy) * ((1 - fx) * load_value(t, texel(i, j), k) + fx * load_value(t, texel(i + 1, j), k)) +
-                fy * ((1 - fx) * load_value(t, texel(i, j + 1), k) + fx * load_value(t, texel(i + 1, j + 1), k));
+    values[k] =
+        (1 - fy) * ((1 - fx) * load_value(t, texel(i, j), first + k) + fx * load_value(t, texel(i + 1, j), first + k)) +
+        fy *
+            ((1 - fx) * load_value(t, texel(i, j + 1), first + k) + fx * load_value(t, texel(i + 1, j + 1), first + k));
   const size_t nearest = texel(std::min(int(x), texture.width - 1), std::min(int(y), texture.height - 1));
-  for (size_t k = t.exact_values(); k < values.size(); ++k) values[k] = load_value(t, nearest, k);
+  for (size_t k = t.exact_values(); k < values.size(); ++k) values[k] = load_value(t, nearest, first + k);
 }
 
 void sample_groove(const ZonalTexture& table, float x, float depth, std::span<float> values) {

@@ -61,6 +61,38 @@ TEST(ZonalTexture, ComesBackAndRefusesLies) {
   }
 }
 
+TEST(ZonalTexture, ViewsComeBackRowByRow) {
+  const Temporary file("lambent-texture-views.lpt"), other("lambent-texture-views-lie.lpt");
+  const WritableZonalTransfer w = make_zonal_transfer(3, 2, 3, 6, Precision::half, 4);
+  for (size_t r = 0; r < 6; ++r) {
+    Random random(9, r);
+    std::vector<float> v(w.transfer.receiver_values());
+    for (float& x : v) x = random.next();
+    store_receiver(w, r, v);
+  }
+  ASSERT_TRUE(save_zonal_texture(file.path, {3, 2, w.transfer, 0, 2}));
+  auto back = load_zonal_texture(file.path);
+  ASSERT_TRUE(back) << back.error().text();
+  EXPECT_EQ(back->views, 2);
+  EXPECT_EQ(back->transfer.rows, 4);
+  std::vector<float> values(w.transfer.row_values());
+  const std::vector<float> texel = load_receiver(w.transfer, 4);
+  for (size_t row = 0; row < 4; ++row) {
+    sample_zonal_texture(*back, {0.5f, 0.75f}, values, row);
+    for (size_t k = 0; k < values.size(); ++k)
+      EXPECT_NEAR(values[k], texel[row * values.size() + k], 1e-5) << row << " " << k;
+  }
+  std::vector<uint8_t> bytes = *read_file(file.path);
+  for (auto [at, value] :
+       {std::pair<size_t, uint8_t>{7, '1'}, {7, '3'}, {32, 1}, {40, 0}, {40, 1}, {40, 3}, {40, 33}}) {
+    std::vector<uint8_t> changed = bytes;
+    changed[at] = value;
+    const std::span<const uint8_t> piece(changed);
+    ASSERT_TRUE(write_file_atomically(other.path, {&piece, 1}));
+    EXPECT_FALSE(load_zonal_texture(other.path)) << at << " " << int(value);
+  }
+}
+
 TEST(ZonalTexture, InterpolatesWhatIsExactAndRepeats) {
   const WritableZonalTransfer w = random_texture(5, 4);
   const ZonalTexture texture{5, 4, w.transfer};
