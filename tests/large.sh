@@ -64,6 +64,21 @@ expect 2 'scratch: is no folder' bake corner.obj --samples 16 --scratch nowhere 
 expect 0 'joined' bake corner.obj --max-edge 0.3 --samples 64 --rooms auto -o rooms.glb
 expect 0 'joined' bake --again rooms.glb corner.obj -o again.glb
 cmp -s rooms.glb again.glb && ok || bad "--again of rooms has other bytes"
+# A building of many rooms takes less memory by rooms than as a whole.
+python3 "$source_dir/bench/made_building.py" 6 building.obj
+peak() {  # the most resident KiB of a bake
+  python3 - "$@" <<'P'
+import resource, subprocess, sys
+subprocess.run(sys.argv[1:], stdout=subprocess.DEVNULL, stderr=subprocess.DEVNULL, check=True)
+print(resource.getrusage(resource.RUSAGE_CHILDREN).ru_maxrss)
+P
+}
+if [ -z "${LAMBENT_COARSE:-}" ]; then
+  building=("$tool" bake building.obj --max-edge 0.2 --order 3 --samples 64 --checkpoint off -o building.glb)
+  whole=$(peak "${building[@]}" --denoise off --bounces 8)
+  rooms=$(peak "${building[@]}" --rooms auto)
+  [ "$rooms" -lt "$whole" ] && ok || bad "a bake by rooms takes $rooms KiB, one of the whole $whole"
+fi
 cat >rooms.json <<'J'
 {"rooms": [{"name": "left", "min": [0, 0, 0], "max": [1, 2, 2]}, {"name": "right", "min": [1, 0, 0], "max": [2, 2, 2]}]}
 J

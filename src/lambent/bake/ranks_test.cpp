@@ -1,4 +1,5 @@
 // Ranks that are threads here: whatever is baked has the bytes of one process, on each of them.
+#include "temporary_folder.h"
 #include "thread_ranks.h"
 
 #include <lambent/bake/bake.h>
@@ -11,6 +12,7 @@
 #include <lambent/bake/visibility.h>
 #include <lambent/compress/cpca.h>
 #include <lambent/compress/zonal_fit.h>
+#include <lambent/core/file.h>
 #include <lambent/scene/procedural.h>
 
 #include <gtest/gtest.h>
@@ -132,6 +134,69 @@ TEST(Ranks, RoomsAreAlike) {
     if (loss == 0) options.memory = size_t{4} << 30;
     expect_alike("rooms", work);
   }
+}
+
+// Those but the first find no file by the name that they are told, as on machines that share no folder.
+class BlindRanks final : public Ranks {
+ public:
+  explicit BlindRanks(Ranks& inner) : inner_(inner) {}
+  int rank() const override { return inner_.rank(); }
+  int count() const override { return inner_.count(); }
+  bool all(bool mine) override { return inner_.all(mine); }
+  void broadcast(std::span<uint8_t> bytes) override {
+    inner_.broadcast(bytes);
+    if (rank() > 0 && bytes.size() > sizeof(uint64_t)) bytes[bytes.size() / 2] ^= 1;
+  }
+  void exchange(std::span<const std::span<const uint8_t>> give, std::span<const std::span<uint8_t>> take) override {
+    inner_.exchange(give, take);
+  }
+
+ private:
+  Ranks& inner_;
+};
+
+// No rank has all of the result, and the file is whole, whether all write it or the first one does for them.
+TEST(Ranks, EachHasAPartOfTheResultUpToTheFile) {
+  const test::TemporaryFolder folder;
+  const Place p;
+  auto rooms = part_rooms(room_bounds(p.scene), {{"left", {Vec3(-1), Vec3(-0.4f, 1, 1.5f)}},
+                                                 {"near", {Vec3(-0.4f, -1, -1), Vec3(1, 1, 0)}},
+                                                 {"far", {Vec3(-0.4f, -1, 0), Vec3(1, 1, 1.5f)}}});
+  ASSERT_TRUE(rooms);
+  const BakeOptions options{.order = 2, .samples = 16};
+  const RoomsOptions how{.residual = 1e-2, .loss = 0, .own_part = true};
+  const auto baked = [&](Progress* progress) {
+    return bake_rooms(p.scene, p.receivers, *rooms, options, how, nullptr, nullptr, progress);
+  };
+  auto whole = baked(nullptr);
+  ASSERT_TRUE(whole);
+  const Bytes head{1, 2, 3, 4, 5}, expected = bytes(*whole);
+  for (const bool blind : {false, true})
+    for (const int count : {2, 3, 5}) {
+      const std::string path = folder.file("x" + std::to_string(count));
+      const auto set = by_ranks(count, [&](Progress* progress) {
+        auto t = baked(progress);
+        EXPECT_TRUE(t);
+        BlindRanks none_sees(this_ranks());
+        const WriteTogether together(blind ? none_sees : this_ranks());
+        // As files of a set have them, in two pieces.
+        const std::span<const uint8_t> pieces[] = {head, t->data.first(1000), t->data.subspan(1000), head};
+        EXPECT_TRUE(write_file_atomically(path, pieces));
+        return std::count_if(t->data.begin(), t->data.end(), [](uint8_t b) { return b != 0; });
+      });
+      auto written = read_file(path);
+      ASSERT_TRUE(written);
+      Bytes all = head;
+      all.insert(all.end(), expected.begin(), expected.end()), all.insert(all.end(), head.begin(), head.end());
+      EXPECT_TRUE(Bytes(written->begin(), written->end()) == all) << count << " ranks, " << blind;
+      const auto of_all = std::count_if(expected.begin(), expected.end(), [](uint8_t b) { return b != 0; });
+      ptrdiff_t sum = 0;
+      for (const auto& mine : set) {
+        EXPECT_LT(*mine, 2 * of_all / count);
+        sum += *mine;
+      }
+      EXPECT_EQ(sum, of_all);
+    }
 }
 
 TEST(Ranks, OneThatIsCancelledCancelsAll) {

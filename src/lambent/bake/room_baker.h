@@ -41,13 +41,20 @@ class ZeroPages {
   std::unique_ptr<float, Free> data_;
 };
 
+inline constexpr size_t least_at_once = size_t{1} << 17;  // rays that are followed at once
+
+// What rays on their way and rooms' trees had lies between what stays, where malloc keeps it for more of its kind.
+void give_back_memory();
+
 struct RowScratch {
   BlockBuilder rows;
   AlignedVector<float> x, y, z;
   std::vector<Hit> hits;
   std::vector<float> harmonics, sky, excess;
   ShZyzRotator rotator;
-  size_t open = 0;  // rays of the row at hand that leave the scene
+  std::array<NodeRay, most_node_rays> of_node{};
+  float weight = 1;  // of a ray of the row at hand
+  size_t open = 0;   // rays of it that leave the scene
 };
 
 // What a block of rows is beside its rows: its sky, [row][coefficient], and counts of its rays.
@@ -120,6 +127,7 @@ struct RoomBaker {
   };
   void assign_receivers();
   void share_rooms();
+  FieldSize cheapest_fields(double handed_on) const;
   Result<void> find_all_nodes();
   void number_rows();
   void arrange_filling();
@@ -134,6 +142,7 @@ struct RoomBaker {
   double residual_of(const std::vector<Change>& met) const;
   Result<void> solve();
   Transfer transfer() const;
+  Transfer own_part() const;
   Result<Transfer> bake();
 
   // room_rows.cpp: rows by rays.
@@ -141,7 +150,7 @@ struct RoomBaker {
   void each_ray(size_t room, const RoomGeometry& geometry, size_t block, size_t i, RowScratch& s, F f) const;
   void add_surface(size_t room, const std::array<uint32_t, 3>& receiver, float u, float v, Vec3 reflected,
                    RowScratch& s) const;
-  void begin_row(RowScratch& s) const;
+  void begin_row(size_t room, size_t block, size_t i, RowScratch& s) const;
   void add_sky(Vec3 direction, RowScratch& s) const;
   void end_row(size_t room, size_t block, size_t i, RowScratch& s, BlockFacts& facts) const;
   void trace_block(size_t room, const RoomGeometry& geometry, size_t block, RowScratch& s, SparseBlock& out,

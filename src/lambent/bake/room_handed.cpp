@@ -9,7 +9,9 @@
 namespace lambent {
 namespace {
 
-constexpr size_t least_at_once = size_t{1} << 16, most_at_once = size_t{1} << 23;  // rays
+// Rays that leave at once: each batch builds the trees of the rooms that they come into, and takes no more than what
+// the rows will.
+constexpr size_t batches = 12;
 
 }  // namespace
 
@@ -34,12 +36,15 @@ Result<std::vector<Traveller>> RoomBaker::leave(std::span<const HandedBlock> blo
           const Exit exit = space.exit(room, origin, direction, hit);
           if (exit.opening == none || !space.openings[exit.opening].handed) return;
           of_block[at].push_back({(at * gather_block + i) * stride + j, exit.at, direction,
-                                  space.openings[exit.opening].beyond, 1, ranks.rank()});
+                                  uint16_t(space.openings[exit.opening].beyond), 1, uint16_t(ranks.rank())});
         });
     });
   }
   if (auto well = agreed(std::move(ok)); !well) return well.error();
   std::vector<Traveller> all;
+  size_t count = 0;
+  for (const auto& of : of_block) count += of.size();
+  all.reserve(count);
   for (auto& of : of_block) all.insert(all.end(), of.begin(), of.end()), of = {};
   handed_rays += all.size();
   return follow(space, work, surfaces, std::move(all), false, progress);
@@ -54,18 +59,19 @@ void RoomBaker::pack_handed(const HandedBlock& at, std::span<const Traveller> en
   s->rows.begin_block();
   size_t next = 0;
   for (size_t i = 0; i < gather_block; ++i) {
-    begin_row(*s);
+    begin_row(at.room, at.block, i, *s);
     for (; next < ends.size() && ends[next].tag / stride % gather_block == i; ++next) {
       const Traveller& t = ends[next];
       if (t.end == Traveller::End::outside) add_sky(t.direction, *s);
-      else if (t.end == Traveller::End::surface) add_surface(at.room, t.receiver, t.u, t.v, t.at, *s);
+      else if (t.end == Traveller::End::surface)
+        add_surface(at.room, t.receiver, t.direction.x, t.direction.y, t.at, *s);
       else if (t.end == Traveller::End::back) ++facts.backs[i];
       else {
         const Exit exit{t.receiver[0], false, t.receiver[1], t.at, t.direction};
         const uint32_t node = t.end == Traveller::End::field ? space.find_node(exit) : none;
         ++facts.fields[i];
         if (node == none) ++facts.lost;
-        else s->rows.add(uint32_t(node_row[space.openings[exit.opening].beyond] + node), Vec3(1));
+        else s->rows.add(uint32_t(node_row[space.openings[exit.opening].beyond] + node), Vec3(s->weight));
       }
     }
     end_row(at.room, at.block, i, *s, facts);
@@ -125,7 +131,9 @@ Result<void> RoomBaker::hand_rays() {
       else if (lost += facts.lost; !take_handed({room, b}, packed, facts)) ok = no_room;
     }
   }
-  const size_t rays = std::clamp(options.memory / 8 / sizeof(Traveller), least_at_once, most_at_once),
+  const size_t all_rays = (rows_of(ranks.rank()) + 1) * size_t(options.samples),
+               rays = std::clamp(all_rays / batches, least_at_once,
+                                 std::max(least_at_once, options.memory / 8 / sizeof(Traveller))),
                at_once = std::max<size_t>(rays / gather_block / size_t(options.samples), 1),
                stride = std::max(size_t(options.samples), size_t(most_node_rays)) * gather_block;
   ProgressStage stage(progress, "handing rays on", missing.size() * gather_block);

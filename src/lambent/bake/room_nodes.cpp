@@ -10,6 +10,7 @@
 #include <algorithm>
 #include <atomic>
 #include <cstring>
+#include <mutex>
 #include <tuple>
 
 namespace lambent {
@@ -19,80 +20,30 @@ constexpr int first_rays = 256;      // a receiver, which find the nodes
 constexpr int most_generations = 6;  // of nodes that rays of nodes find
 constexpr size_t grain = 64;
 
-using Found = std::vector<std::vector<Crossing>>;  // of each block of receivers or nodes
-using NodesOfRooms = std::vector<std::vector<uint32_t>>;
+constexpr size_t least_sorted = 1 << 19;  // crossings, at once
 
-Found cross_from_receivers(const RoomSpace& space, size_t room, const Tracer& tracer, const Receivers& receivers,
-                           const std::vector<uint32_t>& own, const DirectionSets& few, uint32_t seed) {
-  Found found((own.size() + grain - 1) / grain);
-  parallel_for(own.size(), grain, [&](size_t begin, size_t end) {
-    AlignedVector<float> dx(few.stride), dy(few.stride), dz(few.stride);
-    std::vector<Hit> hits(first_rays);
-    for (size_t i = begin; i < end; ++i) {
-      const uint32_t r = own[i];
-      const DirectionChoice c = choose_directions(few, receivers.normals[r], seed, r);
-      const size_t base = size_t(c.set) * few.stride;
-      rotate_directions(c.rotation, few.x.data() + base, few.y.data() + base, few.z.data() + base, few.stride,
-                        dx.data(), dy.data(), dz.data());
-      tracer.closest_fan(receivers.origins[r], {dx.data(), dy.data(), dz.data(), first_rays}, hits.data());
-      for (size_t j = 0; j < first_rays; ++j) {
-        const Exit exit = space.exit(room, receivers.origins[r], {dx[j], dy[j], dz[j]}, hits[j]);
-        if (exit.opening != none) found[begin / grain].push_back({exit, uint32_t(hash64(r, j))});
-      }
+// Crossings of a room's rays, of which those of each cell that are least stay.
+struct Found {
+  std::vector<Crossing> kept;
+  size_t most = SIZE_MAX;  // beyond these, there are too many
+  size_t sorted = 0;
+  std::atomic<bool> too_many{false};
+  std::mutex mutex;
+
+  void add(const std::vector<Crossing>& more) {
+    const std::lock_guard lock(mutex);
+    if (too_many) return;
+    if (kept.size() + more.size() > kept.capacity()) {
+      if (kept.size() > sorted) finish();
+      kept.reserve(std::max(least_sorted, sorted + sorted / 2) + more.size());
     }
-  });
-  return found;
-}
-
-Found cross_from_nodes(const RoomSpace& space, size_t room, const Tracer& tracer, const std::vector<uint32_t>& nodes) {
-  Found found((nodes.size() + grain - 1) / grain);
-  parallel_for(nodes.size(), grain, [&](size_t begin, size_t end) {
-    for (size_t i = begin; i < end; ++i)
-      for (const NodeRay& ray : space.rays_of(nodes[i])) {
-        const Exit exit = space.exit(room, ray.origin, ray.direction, tracer.closest(ray.origin, ray.direction));
-        if (exit.opening != none) found[begin / grain].push_back({exit, uint32_t(hash64(nodes[i], ray.key))});
-      }
-  });
-  return found;
-}
-
-// Of those at each cell the ones that its node would keep.
-std::vector<Crossing> least_crossings(const Found& found) {
-  std::vector<Crossing> all;
-  for (const auto& block : found) all.insert(all.end(), block.begin(), block.end());
-  std::sort(all.begin(), all.end(), [](const Crossing& a, const Crossing& b) {
-    return std::tie(a.exit.opening, a.exit.cell, a.key, a.exit.at.x, a.exit.at.y, a.exit.at.z) <
-           std::tie(b.exit.opening, b.exit.cell, b.key, b.exit.at.x, b.exit.at.y, b.exit.at.z);
-  });
-  size_t count = 0, of_cell = 0;
-  for (size_t i = 0; i < all.size(); ++i) {
-    const bool same = i > 0 && all[i].exit.opening == all[i - 1].exit.opening &&
-                      all[i].exit.cell == all[i - 1].exit.cell;
-    of_cell = same ? of_cell + 1 : 0;
-    if (of_cell < size_t(most_node_rays)) all[count++] = all[i];
+    kept.insert(kept.end(), more.begin(), more.end());
   }
-  all.resize(count);
-  return all;
-}
-
-// Each rank has found those of its rooms, and gets the others'.
-void share(Found& found, const RoomWork& work) {
-  Ranks& ranks = this_ranks();
-  if (ranks.count() == 1) return;
-  std::vector<uint8_t> mine;
-  for (size_t room = 0; room < found.size(); ++room)
-    if (work.owner[room] == ranks.rank()) checkpoint_detail::put(mine, checkpoint_detail::bytes_of(found[room]));
-  const auto all = ranks.gather(std::move(mine));
-  std::vector<size_t> at(all.size(), 0);
-  for (size_t room = 0; room < found.size(); ++room) {
-    const size_t from = size_t(work.owner[room]);
-    if (int(from) == ranks.rank()) continue;
-    std::span<const uint8_t> part;
-    checkpoint_detail::get(all[from], at[from], part);
-    found[room].resize(part.size() / sizeof(Crossing));
-    std::copy(part.begin(), part.end(), checkpoint_detail::bytes_of(found[room]).begin());
+  void finish() {
+    keep_least(kept), sorted = kept.size();
+    if (sorted > most) too_many = true, kept = {};
   }
-}
+};
 
 }  // namespace
 
@@ -123,25 +74,46 @@ std::vector<std::vector<uint32_t>> lent_receivers(const RoomSpace& space, const 
 
 namespace {
 
-// Of each room, those whose openings' nodes its rays may end at, or the other way round: beyond its openings, and
-// beyond those of rooms that rays are handed on through.
-std::vector<std::vector<uint32_t>> rooms_beside(const RoomSpace& space) {
+// Of each room, itself and those that its rays are handed on into.
+std::vector<std::vector<uint32_t>> rooms_reached(const RoomSpace& space) {
   const size_t count = space.rooms.size();
-  std::vector<std::vector<uint32_t>> beside(count), on(count);
+  std::vector<std::vector<uint32_t>> on(count), reached(count);
   for (const Opening& o : space.openings)
     if (o.handed) on[o.room].push_back(o.beyond);
   for (uint32_t room = 0; room < count; ++room) {
-    std::vector<uint32_t> reached{room};
+    reached[room] = {room};
     std::vector<bool> is_reached(count);
     is_reached[room] = true;
-    for (size_t k = 0; k < reached.size(); ++k)
-      for (const uint32_t next : on[reached[k]])
-        if (!is_reached[next]) is_reached[next] = true, reached.push_back(next);
-    for (const Opening& o : space.openings)
-      if (is_reached[o.room] && o.beyond != room && (o.room == room || !o.handed))
-        beside[room].push_back(o.beyond), beside[o.beyond].push_back(room);
+    for (size_t k = 0; k < reached[room].size(); ++k)
+      for (const uint32_t next : on[reached[room][k]])
+        if (!is_reached[next]) is_reached[next] = true, reached[room].push_back(next);
   }
+  return reached;
+}
+
+// Of each room, those whose openings' nodes its rays may end at, or the other way round: beyond its openings, and
+// beyond those of rooms that rays are handed on through.
+std::vector<std::vector<uint32_t>> rooms_beside(const RoomSpace& space) {
+  const auto reached = rooms_reached(space);
+  std::vector<std::vector<uint32_t>> beside(space.rooms.size());
+  for (uint32_t room = 0; room < beside.size(); ++room)
+    for (const Opening& o : space.openings) {
+      const bool is_reached = std::find(reached[room].begin(), reached[room].end(), o.room) != reached[room].end();
+      if (is_reached && o.beyond != room && (o.room == room || !o.handed))
+        beside[room].push_back(o.beyond), beside[o.beyond].push_back(room);
+    }
   return beside;
+}
+
+// Of openings, whether rays of this rank's rooms may end there.
+std::vector<uint8_t> openings_asked(const RoomSpace& space, const RoomWork& work) {
+  const auto reached = rooms_reached(space);
+  std::vector<uint8_t> from(space.rooms.size(), 0), asked(space.openings.size(), 0);
+  for (size_t room = 0; room < from.size(); ++room)
+    for (const uint32_t r : reached[room])
+      if (work.owner[room] == this_ranks().rank()) from[r] = 1;
+  for (size_t i = 0; i < asked.size(); ++i) asked[i] = from[space.openings[i].room] && !space.openings[i].handed;
+  return asked;
 }
 
 }  // namespace
@@ -208,84 +180,162 @@ struct NodeSearch {
   const Receivers& receivers;
   const std::vector<std::vector<uint32_t>>& receivers_of;
   uint32_t seed;
+  const FieldSize& most;
   Progress* progress;
   const KeptPieces& pieces;
   const DirectionSets few = make_direction_sets(1, first_rays, 8, uint32_t(hash64(seed, 0x726f6f6d)));
   Ranks& ranks = this_ranks();
 
-  // Where rays of a room cross; those that go on beyond it are added to `on`.
-  Result<std::vector<Crossing>> cross(size_t generation, uint32_t room, const std::vector<uint32_t>& nodes,
-                                      std::vector<Traveller>& on) const {
-    auto geometry = space.geometry(room, surfaces.scene);
-    if (!geometry) return geometry.error();
-    Found found = generation == 0
-                    ? cross_from_receivers(space, room, geometry->tracer, receivers, receivers_of[room], few, seed)
-                    : cross_from_nodes(space, room, geometry->tracer, nodes);
-    for (auto& block : found)
-      std::erase_if(block, [&](const Crossing& c) {
-        if (!space.openings[c.exit.opening].handed) return false;
-        const uint32_t beyond = space.openings[c.exit.opening].beyond;
-        on.push_back({uint64_t(c.key) << 32 | on.size(), c.exit.at, c.exit.direction, beyond, 1, ranks.rank()});
-        return true;
+  // A ray to where it leaves the room: to `found`, or to `on`, where it goes on beyond.
+  void note(const Exit& exit, uint64_t key, std::vector<Crossing>& found, std::vector<Traveller>& on) const {
+    if (exit.opening == none) return;
+    const Opening& o = space.openings[exit.opening];
+    if (!o.handed) return found.push_back(space.crossing(exit, key));
+    on.push_back({key, exit.at, exit.direction, uint16_t(o.beyond), 1, uint16_t(ranks.rank())});
+  }
+
+  void cross_from_receivers(uint32_t room, const Tracer& tracer, Found& all, std::vector<Traveller>& on) const {
+    const std::vector<uint32_t>& own = receivers_of[room];
+    parallel_for(own.size(), grain, [&](size_t begin, size_t end) {
+      AlignedVector<float> dx(few.stride), dy(few.stride), dz(few.stride);
+      std::vector<Hit> hits(first_rays);
+      std::vector<Crossing> found;
+      std::vector<Traveller> beyond;
+      for (size_t i = begin; i < end && !all.too_many; ++i) {
+        const uint32_t r = own[i];
+        const DirectionChoice c = choose_directions(few, receivers.normals[r], seed, r);
+        const size_t base = size_t(c.set) * few.stride;
+        rotate_directions(c.rotation, few.x.data() + base, few.y.data() + base, few.z.data() + base, few.stride,
+                          dx.data(), dy.data(), dz.data());
+        tracer.closest_fan(receivers.origins[r], {dx.data(), dy.data(), dz.data(), first_rays}, hits.data());
+        for (size_t j = 0; j < first_rays; ++j)
+          note(space.exit(room, receivers.origins[r], {dx[j], dy[j], dz[j]}, hits[j]), hash64(r, j), found, beyond);
+      }
+      add(found, beyond, all, on);
+    });
+  }
+
+  // From cells that the search before this has met.
+  void cross_from_nodes(uint32_t room, uint8_t generation, const Tracer& tracer, Found& all,
+                        std::vector<Traveller>& on) const {
+    for (uint32_t k = 0; k < space.openings.size(); ++k) {
+      const Opening& o = space.openings[k];
+      if (o.beyond != room) continue;
+      parallel_for(o.rays.cells.size(), grain, [&](size_t begin, size_t end) {
+        std::vector<Crossing> found;
+        std::vector<Traveller> beyond;
+        for (size_t i = begin; i < end && !all.too_many; ++i) {
+          if (o.rays.generation[i] + 1 != generation) continue;
+          const uint64_t cell = uint64_t(k) << 32 | o.rays.cells[i];
+          for (const CellRay r : o.rays.of(i)) {
+            const NodeRay ray = space.ray(o, o.rays.cells[i], r);
+            note(space.exit(room, ray.origin, ray.direction, tracer.closest(ray.origin, ray.direction)),
+                 hash64(cell, r), found, beyond);
+          }
+        }
+        add(found, beyond, all, on);
       });
-    return least_crossings(found);
+    }
+  }
+
+  void add(const std::vector<Crossing>& found, const std::vector<Traveller>& beyond, Found& all,
+           std::vector<Traveller>& on) const {
+    if (!found.empty()) all.add(found);
+    if (beyond.empty()) return;
+    const std::lock_guard lock(all.mutex);
+    on.insert(on.end(), beyond.begin(), beyond.end());
+  }
+
+  bool has_rays(uint32_t room, uint8_t generation) const {
+    if (generation == 0) return true;
+    return std::any_of(space.openings.begin(), space.openings.end(), [&](const Opening& o) {
+      const auto& g = o.rays.generation;
+      return o.beyond == room && std::find(g.begin(), g.end(), generation - 1) != g.end();
+    });
   }
 
   // Of one of each rank's rooms, `none` if it has no more; ranks do theirs side by side, since rays go on from one's
-  // rooms to another's.
-  Result<void> search(size_t generation, uint32_t room, const NodesOfRooms& nodes, Found& found) const {
+  // rooms to another's. What was found there, to the rank of the room beyond.
+  Result<std::vector<Crossing>> search(uint8_t generation, uint32_t room, bool& too_many) const {
     std::vector<Traveller> on;
+    Found found{.most = most.rays};
     const size_t piece = generation * space.rooms.size() + room;
-    const bool there = room == none || (generation > 0 && nodes[room].empty()) || pieces.load(piece, found[room]);
+    const bool there = room == none || !has_rays(room, generation) || pieces.load(piece, found.kept);
     Result<void> ok;
     if (!there && !is_cancelled(progress)) {
-      auto crossed = cross(generation, room, nodes[room], on);
-      if (crossed) found[room] = std::move(*crossed);
-      else ok = crossed.error();
+      auto geometry = space.geometry(room, surfaces.scene);
+      if (!geometry) ok = geometry.error();
+      else if (generation == 0) cross_from_receivers(room, geometry->tracer, found, on);
+      else cross_from_nodes(room, generation, geometry->tracer, found, on);
     }
     if (!none_cancelled(progress)) return Error{"", "cancelled"};
-    if (!ranks.all(bool(ok))) return ok ? Error{surfaces.scene.path, "another rank has no tree of a room"} : ok;
+    if (!ranks.all(bool(ok))) return ok ? Error{surfaces.scene.path, "another rank has no tree of a room"} : ok.error();
     auto ends = follow(space, work, surfaces, std::move(on), false, progress);
     if (!ends) return ends.error();
-    if (there) return {};
-    Found further(1);
-    for (const Traveller& t : *ends)
-      if (t.end == Traveller::End::field)
-        further[0].push_back({{t.receiver[0], false, t.receiver[1], t.at, t.direction}, uint32_t(t.tag >> 32)});
-    further.push_back(std::move(found[room]));
-    found[room] = least_crossings(further);
-    pieces.save(piece, found[room]);
-    return {};
+    if (!there && !found.too_many) {
+      for (const Traveller& t : *ends)
+        if (t.end == Traveller::End::field)
+          found.kept.push_back(space.crossing({t.receiver[0], false, t.receiver[1], t.at, t.direction}, t.tag));
+      found.finish();
+      if (!found.too_many) pieces.save(piece, found.kept);
+    }
+    too_many = !ranks.all(!found.too_many);
+    if (too_many) return std::vector<Crossing>();
+    std::vector<std::vector<Crossing>> give(size_t(ranks.count()));
+    for (const Crossing& c : found.kept) give[size_t(work.owner[space.openings[c.opening].beyond])].push_back(c);
+    found.kept = {};
+    return hand_over(std::move(give));
+  }
+
+  // Of this rank's rooms.
+  FieldSize size() const {
+    FieldSize sum;
+    for (const Opening& o : space.openings) sum.nodes += o.rays.cells.size(), sum.rays += o.rays.rays.size();
+    return sum;
+  }
+
+  // In which crossings come does not matter: of each cell the least stay.
+  void take(std::vector<Crossing> crossings, uint8_t generation) const {
+    keep_least(crossings);
+    for (size_t begin = 0, end; begin < crossings.size(); begin = end) {
+      const uint32_t o = crossings[begin].opening;
+      for (end = begin; end < crossings.size() && crossings[end].opening == o;) ++end;
+      space.openings[o].rays.merge(std::span(crossings).subspan(begin, end - begin), generation);
+    }
   }
 };
 
 }  // namespace
 
-Result<void> find_nodes(RoomSpace& space, const RoomWork& work, const RoomSurfaces& surfaces,
+Result<bool> find_nodes(RoomSpace& space, const RoomWork& work, const RoomSurfaces& surfaces,
                         const Receivers& receivers, const std::vector<std::vector<uint32_t>>& receivers_of,
-                        uint32_t seed, Progress* progress) {
+                        uint32_t seed, const FieldSize& most, Progress* progress) {
   const size_t rooms = space.rooms.size();
   const KeptPieces pieces(progress, "openings", (most_generations + 1) * rooms);
-  const NodeSearch search{space, work, surfaces, receivers, receivers_of, seed, progress, pieces};
+  const NodeSearch search{space, work, surfaces, receivers, receivers_of, seed, most, progress, pieces};
   std::vector<std::vector<uint32_t>> rooms_of(size_t(search.ranks.count()));
   for (uint32_t room = 0; room < rooms; ++room) rooms_of[size_t(work.owner[room])].push_back(room);
-  size_t most = 0;
-  for (const auto& own : rooms_of) most = std::max(most, own.size());
-  ProgressStage stage(progress, "finding openings", (most_generations + 1) * most);
-  NodesOfRooms fresh(rooms);  // nodes whose rays have not been followed
-  for (size_t generation = 0; generation <= most_generations; ++generation) {
-    NodesOfRooms now(rooms);
-    now.swap(fresh);
-    Found found(rooms);
+  size_t steps = 0;
+  for (const auto& own : rooms_of) steps = std::max(steps, own.size());
+  ProgressStage stage(progress, "finding openings", (most_generations + 1) * steps);
+  for (uint8_t generation = 0; generation <= most_generations; ++generation) {
     const auto& own = rooms_of[size_t(search.ranks.rank())];
-    for (size_t k = 0; k < most; ++k, stage.advance())
-      if (auto ok = search.search(generation, k < own.size() ? own[k] : none, now, found); !ok) return ok;
-    share(found, work);
-    for (const auto& of_room : found)
-      for (const Crossing& c : of_room) space.take(c, fresh);
+    std::vector<Crossing> later;  // those whose rays are being followed stay what they are
+    for (size_t k = 0; k < steps; ++k, stage.advance()) {
+      bool too_many = false;
+      auto found = search.search(generation, k < own.size() ? own[k] : none, too_many);
+      if (!found) return found.error();
+      if (too_many) return false;
+      if (generation == 0) search.take(std::move(*found), generation);
+      else later.insert(later.end(), found->begin(), found->end());
+      const FieldSize size = search.size();
+      if (search.ranks.sum(size.nodes) > most.nodes || search.ranks.sum(size.rays) > most.rays) return false;
+    }
+    search.take(std::move(later), generation);
   }
-  space.number_nodes();
-  return {};
+  space.number_nodes(openings_asked(space, work));
+  const FieldSize size = search.size();
+  return search.ranks.sum(size.nodes) <= most.nodes && search.ranks.sum(size.rays) <= most.rays;
 }
 
 }  // namespace lambent

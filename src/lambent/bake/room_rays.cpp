@@ -15,35 +15,8 @@
 namespace lambent {
 namespace {
 
-constexpr uint32_t most_passed = 4096;  // openings of a ray; more than there can be, but for rounding
+constexpr uint16_t most_passed = 4096;  // openings of a ray; more than there can be, but for rounding
 constexpr size_t grain = 1024;
-
-// give[k] goes to rank k; what comes from all.
-std::vector<Traveller> hand_over(std::vector<std::vector<Traveller>> give) {
-  Ranks& ranks = this_ranks();
-  const size_t n = size_t(ranks.count());
-  std::vector<Traveller> out = std::move(give[size_t(ranks.rank())]);
-  if (n == 1) return out;
-  give[size_t(ranks.rank())] = {};
-  std::vector<uint64_t> mine(n), theirs(n, 0);
-  std::vector<std::span<const uint8_t>> from(n);
-  std::vector<std::span<uint8_t>> to(n);
-  for (size_t k = 0; k < n; ++k) {
-    mine[k] = give[k].size();
-    from[k] = {reinterpret_cast<const uint8_t*>(&mine[k]), sizeof(uint64_t)};
-    to[k] = {reinterpret_cast<uint8_t*>(&theirs[k]), sizeof(uint64_t)};
-  }
-  ranks.exchange(from, to);
-  std::vector<std::vector<Traveller>> take(n);
-  for (size_t k = 0; k < n; ++k) {
-    if (int(k) != ranks.rank()) take[k].resize(theirs[k]);
-    from[k] = {reinterpret_cast<const uint8_t*>(give[k].data()), give[k].size() * sizeof(Traveller)};
-    to[k] = {reinterpret_cast<uint8_t*>(take[k].data()), take[k].size() * sizeof(Traveller)};
-  }
-  ranks.exchange(from, to);
-  for (const auto& t : take) out.insert(out.end(), t.begin(), t.end()), ranks.asked_bytes += t.size() * sizeof(t[0]);
-  return out;
-}
 
 struct Journey {
   const RoomSpace& space;
@@ -62,6 +35,15 @@ struct Journey {
     else leaving[size_t(owner)].push_back(t);
   }
 
+  // In memory for as many as there are: they are most of what handing on takes.
+  void put_all(std::vector<Traveller> these) {
+    std::vector<size_t> into(in_room.size(), 0);
+    for (const Traveller& t : these) into[t.room] += t.end == Traveller::End::none;
+    for (size_t room = 0; room < into.size(); ++room)
+      if (work.owner[room] == ranks.rank()) in_room[room].reserve(in_room[room].size() + into[room]);
+    for (const Traveller& t : these) put(t);
+  }
+
   // Through its room.
   void step(const RoomGeometry& geometry, Traveller& t) const {
     const Hit hit = geometry.tracer.closest(t.at, t.direction);
@@ -71,13 +53,13 @@ struct Journey {
     } else if (exit.opening != none) {
       const Opening& o = space.openings[exit.opening];
       t.at = exit.at;
-      if (all || o.handed) t.room = o.beyond, t.end = ++t.passed > most_passed ? Traveller::End::lost : t.end;
+      if (all || o.handed) t.room = uint16_t(o.beyond), t.end = ++t.passed > most_passed ? Traveller::End::lost : t.end;
       else t.end = Traveller::End::field, t.receiver = {exit.opening, exit.cell, 0};
     } else {
       const uint32_t triangle = geometry.triangles[hit.triangle];
       const Corners* at = surfaces.basis.find(triangle, hit.front);
       t.end = at ? Traveller::End::surface : Traveller::End::back;
-      if (at) t.at = surfaces.reflected(triangle, *at, hit), t.receiver = at->receiver, t.u = hit.u, t.v = hit.v;
+      if (at) t.at = surfaces.reflected(triangle, *at, hit), t.receiver = at->receiver, t.direction = {hit.u, hit.v, 0};
     }
   }
 
@@ -95,7 +77,7 @@ struct Journey {
         parallel_for(here.size(), grain, [&](size_t begin, size_t end) {
           for (size_t i = begin; i < end; ++i) step(*geometry, here[i]);
         });
-        for (const Traveller& t : here) put(t);
+        put_all(std::move(here));
       }
     }
     return {};
@@ -170,7 +152,7 @@ struct LossMeter {
       const Exit exit = space.exit(room, origin, d, hits[j]);
       if (exit.opening != none) {
         const uint32_t beyond = space.openings[exit.opening].beyond;
-        travellers.push_back({rays.size(), exit.at, d, beyond, 1, this_ranks().rank()});
+        travellers.push_back({rays.size(), exit.at, d, uint16_t(beyond), 1, uint16_t(this_ranks().rank())});
         rays.push_back({uint32_t(samples.size()), exit.opening, space.find_node(exit), j % 2 == 1});
       } else if (exit.outside) {
         sample.all = add(sample.all, of_sky(d), 1);
@@ -223,20 +205,23 @@ struct LossMeter {
     }
     std::sort(own.begin(), own.end());
     own.erase(std::unique(own.begin(), own.end()), own.end());
-    const auto rays_of = [&](size_t i) { return space.rays_of(space.nodes_of[own[i].first][own[i].second]); };
+    std::array<NodeRay, most_node_rays> buffer;
+    std::vector<size_t> counts;
     std::vector<Traveller> sent;
-    for (size_t i = 0; i < own.size(); ++i)
-      for (size_t k = 0; k < rays_of(i).size(); ++k) {
-        const NodeRay& ray = rays_of(i)[k];
-        sent.push_back({i * most_node_rays + k, ray.origin, ray.direction, own[i].first, 1, ranks.rank()});
-      }
+    for (size_t i = 0; i < own.size(); ++i) {
+      const auto rays_of = space.rays_of(own[i].first, own[i].second, buffer);
+      for (size_t k = 0; k < rays_of.size(); ++k)
+        sent.push_back({i * most_node_rays + k, rays_of[k].origin, rays_of[k].direction, uint16_t(own[i].first), 1,
+                        uint16_t(ranks.rank())});
+      counts.push_back(rays_of.size());
+    }
     auto ends = follow(space, work, surfaces, std::move(sent), true, progress);
     if (!ends) return ends.error();
     std::vector<Mean> made(own.size());
     for (size_t i = 0; i < own.size(); ++i) made[i] = {own[i], {}};
     for (const Traveller& t : *ends) {
       const size_t i = t.tag / most_node_rays;
-      made[i].value = add(made[i].value, end_of(t), 1.0 / double(rays_of(i).size()));
+      made[i].value = add(made[i].value, end_of(t), 1.0 / double(counts[i]));
     }
     std::vector<Stand> out(asked.size(), Stand{});
     bytes = reinterpret_cast<const uint8_t*>(made.data());
@@ -308,8 +293,7 @@ Vec3 RoomSurfaces::reflected(uint32_t triangle, const Corners& at, const Hit& hi
 Result<std::vector<Traveller>> follow(const RoomSpace& space, const RoomWork& work, const RoomSurfaces& surfaces,
                                       std::vector<Traveller> mine, bool all, Progress* progress) {
   Journey journey{space, work, surfaces, all, progress};
-  for (const Traveller& t : mine) journey.put(t);
-  mine = {};
+  journey.put_all(std::move(mine));
   Ranks& ranks = journey.ranks;
   for (;;) {
     Result<void> ok = journey.through_own_rooms();
@@ -320,11 +304,23 @@ Result<std::vector<Traveller>> follow(const RoomSpace& space, const RoomWork& wo
     if (ranks.sum(left) == 0) break;
     std::vector<std::vector<Traveller>> leaving(journey.leaving.size());
     leaving.swap(journey.leaving);
-    for (const Traveller& t : hand_over(std::move(leaving))) journey.put(t);
+    journey.put_all(hand_over(std::move(leaving)));
   }
   std::vector<Traveller> out = hand_over(std::move(journey.done));
   std::sort(out.begin(), out.end(), [](const Traveller& a, const Traveller& b) { return a.tag < b.tag; });
   return out;
+}
+
+Result<double> share_that_crosses(RoomSpace& space, const RoomWork& work, const RoomSurfaces& surfaces,
+                                  const Receivers& receivers, const std::vector<std::vector<uint32_t>>& receivers_of,
+                                  uint32_t seed, Progress* progress) {
+  LossMeter meter{space, work, surfaces, receivers, progress};
+  Result<void> ok = meter.send_all(receivers_of, seed);
+  if (!none_cancelled(progress)) return Error{"", "cancelled"};
+  if (!this_ranks().all(bool(ok)))
+    return ok ? Error{surfaces.scene.path, "another rank has no tree of a room"} : ok.error();
+  const uint64_t sent = this_ranks().sum(meter.samples.size() * rays_of_each);
+  return double(this_ranks().sum(meter.rays.size())) / double(std::max<uint64_t>(sent, 1));
 }
 
 Result<FieldLoss> hand_on_what_fields_lose(RoomSpace& space, const RoomWork& work, const RoomSurfaces& surfaces,
@@ -347,8 +343,6 @@ Result<FieldLoss> hand_on_what_fields_lose(RoomSpace& space, const RoomWork& wor
   double left = 0;
   for (double& l : lost) l = all > 0 ? std::max(l, 0.0) / all : 0.0, left += l;
   FieldLoss out{std::sqrt(left)};
-  const uint64_t sent = this_ranks().sum(meter.samples.size() * rays_of_each);
-  out.crossing = double(this_ranks().sum(meter.rays.size())) / double(std::max<uint64_t>(sent, 1));
   std::vector<uint32_t> order(lost.size());
   std::iota(order.begin(), order.end(), 0u);
   std::stable_sort(order.begin(), order.end(), [&](uint32_t a, uint32_t b) { return lost[a] > lost[b]; });

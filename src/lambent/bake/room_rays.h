@@ -17,16 +17,15 @@ struct RoomSurfaces {
 };
 
 struct Traveller {
-  enum class End : uint32_t { none, surface, back, outside, field, lost };
+  enum class End : uint16_t { none, surface, back, outside, field, lost };
 
   uint64_t tag = 0;     // the sender's own; no two of its rays have the same
-  Vec3 at, direction;   // at: of a surface, in the end, what it reflects
-  uint32_t room = 0;    // that it is in
-  uint32_t passed = 0;  // openings
-  int32_t home = 0;     // the rank that sent it
+  Vec3 at, direction;   // of a surface, in the end, what it reflects, and where it was met (u, v, 0)
+  uint16_t room = 0;    // that it is in
+  uint16_t passed = 0;  // openings
+  uint16_t home = 0;    // the rank that sent it
   End end = End::none;
   std::array<uint32_t, 3> receiver{};  // of a surface at its corners; of a field: opening, cell, 0
-  float u = 0, v = 0;
 };
 
 // Rays to their ends, in the order of their tags: through openings that are handed on, or through `all`. All ranks.
@@ -34,10 +33,14 @@ struct Traveller {
 Result<std::vector<Traveller>> follow(const RoomSpace& space, const RoomWork& work, const RoomSurfaces& surfaces,
                                       std::vector<Traveller> mine, bool all, Progress* progress);
 
+// Of receivers' rays, the share that leaves their room, by those that are held out. All ranks. Errors: as follow().
+Result<double> share_that_crosses(RoomSpace& space, const RoomWork& work, const RoomSurfaces& surfaces,
+                                  const Receivers& receivers, const std::vector<std::vector<uint32_t>>& receivers_of,
+                                  uint32_t seed, Progress* progress);
+
 struct FieldLoss {
   double all = 0, left = 0;  // relative RMS over receivers: of all openings' light fields; of those that stay
   size_t handed = 0;         // openings whose rays are handed on
-  double crossing = 0;       // of receivers' rays, those that leave their room
 };
 
 // What light fields lose, measured once their nodes are found: at receivers held out, each opening's rays end at nodes,

@@ -10,13 +10,10 @@ void RoomBaker::each_ray(size_t room, const RoomGeometry& geometry, size_t block
   const size_t rays = rays_in(room, block);
   if (block >= receiver_blocks(room)) {
     const size_t node = (block - receiver_blocks(room)) * gather_block + i;
-    if (node >= space.nodes_of[room].size()) return;
-    const std::span<const NodeRay> own = space.rays_of(space.nodes_of[room][node]);
-    // As if all nodes had as many rays.
-    for (size_t j = 0; j < rays && !own.empty(); ++j) {
-      const NodeRay& ray = own[j % own.size()];
-      f(j, ray.origin, ray.direction, geometry.tracer.closest(ray.origin, ray.direction));
-    }
+    if (node >= space.nodes_in[room]) return;
+    const std::span<const NodeRay> own = space.rays_of(room, node, s.of_node);
+    for (size_t j = 0; j < own.size(); ++j)
+      f(j, own[j].origin, own[j].direction, geometry.tracer.closest(own[j].origin, own[j].direction));
     return;
   }
   if (block * gather_block + i >= receivers_of[room].size()) return;

@@ -2,6 +2,8 @@
 
 #include <lambent/core/parallel.h>
 
+#include <malloc.h>
+
 #include <algorithm>
 #include <chrono>
 #include <cstring>
@@ -19,16 +21,19 @@ std::unique_ptr<RowScratch> RoomBaker::make_scratch() const {
 void RoomBaker::add_surface(size_t room, const std::array<uint32_t, 3>& receiver, float u, float v, Vec3 reflected,
                             RowScratch& s) const {
   const Corners at{receiver};
-  basis.spread(at, u, v, [&](uint32_t r, float weight) { s.rows.add(column(room, r), weight * reflected); });
+  basis.spread(at, u, v, [&](uint32_t r, float weight) { s.rows.add(column(room, r), s.weight * weight * reflected); });
 }
 
 void RoomBaker::add_sky(Vec3 direction, RowScratch& s) const {
   evaluate_sh(options.order, direction, s.harmonics);
-  for (size_t k = 0; k < coefficients; ++k) s.sky[k] += s.harmonics[k];
+  for (size_t k = 0; k < coefficients; ++k) s.sky[k] += s.weight * s.harmonics[k];
   ++s.open;
 }
 
-void RoomBaker::begin_row(RowScratch& s) const {
+// A node's rays count as if all nodes had as many.
+void RoomBaker::begin_row(size_t room, size_t block, size_t i, RowScratch& s) const {
+  const size_t node = block >= receiver_blocks(room) ? (block - receiver_blocks(room)) * gather_block + i : SIZE_MAX;
+  s.weight = node < space.nodes_in[room] ? float(most_node_rays) / float(space.ray_count(room, node)) : 1.0f;
   s.rows.begin_row();
   std::fill(s.sky.begin(), s.sky.end(), 0.0f), s.open = 0;
 }
@@ -52,7 +57,7 @@ void RoomBaker::trace_block(size_t room, const RoomGeometry& geometry, size_t bl
   facts.e.assign(gather_block * coefficients, 0.0f);
   s.rows.begin_block();
   for (size_t i = 0; i < gather_block; ++i) {
-    begin_row(s);
+    begin_row(room, block, i, s);
     each_ray(room, geometry, block, i, s, [&](size_t, Vec3 origin, Vec3 direction, const Hit& hit) {
       const Exit exit = space.exit(room, origin, direction, hit);
       if (exit.outside) return add_sky(direction, s);
@@ -63,7 +68,7 @@ void RoomBaker::trace_block(size_t room, const RoomGeometry& geometry, size_t bl
         const uint32_t node = space.find_node(exit);
         ++facts.fields[i];
         if (node == none) ++facts.lost;
-        else s.rows.add(uint32_t(node_row[o.beyond] + node), Vec3(1));
+        else s.rows.add(uint32_t(node_row[o.beyond] + node), Vec3(s.weight));
         return;
       }
       const uint32_t triangle = geometry.triangles[hit.triangle];
@@ -93,9 +98,15 @@ size_t RoomBaker::most_of_ranks(size_t mine) const {
 size_t RoomBaker::fixed_bytes() const {
   size_t most = 0, nodes = 0;
   for (int k = 0; k < ranks.count(); ++k) most = std::max(most, rows_of(k));
-  for (const auto& own : space.nodes_of) nodes += padded_rows(own.size());
+  for (const size_t own : space.nodes_in) nodes += padded_rows(own);
   const size_t of_x = std::min(columns, most + nodes + columns - rows);
-  return 4 * coefficients * most + 4 * width * (of_x + n()) + most_of_ranks(space.bytes());
+  return 4 * coefficients * most + 4 * width * of_x + most_of_ranks(space.bytes());
+}
+
+void give_back_memory() {
+#ifdef __GLIBC__
+  ::malloc_trim(0);
+#endif
 }
 
 // A room's blocks, but for those that have been kept before.
@@ -144,24 +155,32 @@ Result<void> RoomBaker::trace_room(size_t room, const KeptPieces& pieces, Progre
 // As is_buried() does of a scene that is whole: who is in doubt sends a fan of its own, to all ends.
 Result<void> RoomBaker::decide_buried() {
   std::vector<uint32_t> in_doubt;
-  std::vector<Traveller> rays;
   const size_t all = size_t(options.samples), count = FixedFan::count;
   for (uint32_t room = 0; room < room_count(); ++room)
     for (size_t i = 0; is_own(room) && i < receivers_of[room].size(); ++i) {
       const uint32_t r = receivers_of[room][i];
       const size_t met = backs[row_of[r]], most = met + fields[row_of[r]];
       buried[r] = 4 * met > 3 * all;
-      if (met == 0 || buried[r] || 4 * most < all) continue;
-      const FixedFan fan(receivers.normals[r]);
-      for (size_t k = 0; k < count; ++k)
-        rays.push_back({in_doubt.size() * count + k, receivers.origins[r], fan[k], room, 0, ranks.rank()});
-      in_doubt.push_back(r);
+      if (met > 0 && !buried[r] && 4 * most >= all) in_doubt.push_back(r);
     }
-  auto ends = follow(space, work, surfaces, std::move(rays), true, progress);
-  if (!ends) return ends.error();
-  std::vector<size_t> met(in_doubt.size(), 0);
-  for (const Traveller& t : *ends) met[t.tag / count] += t.end == Traveller::End::back;
-  for (size_t k = 0; k < in_doubt.size(); ++k) buried[in_doubt[k]] = 2 * met[k] > count;
+  const size_t at_once = std::max(least_at_once, n()) / count;
+  for (size_t begin = 0; !ranks.all(begin == in_doubt.size());) {
+    const std::span<const uint32_t> now(in_doubt.data() + begin, std::min(at_once, in_doubt.size() - begin));
+    std::vector<Traveller> rays;
+    rays.reserve(now.size() * count);
+    for (size_t i = 0; i < now.size(); ++i) {
+      const FixedFan fan(receivers.normals[now[i]]);
+      for (size_t k = 0; k < count; ++k)
+        rays.push_back(
+            {i * count + k, receivers.origins[now[i]], fan[k], uint16_t(room_of[now[i]]), 0, uint16_t(ranks.rank())});
+    }
+    auto ends = follow(space, work, surfaces, std::move(rays), true, progress);
+    if (!ends) return ends.error();
+    std::vector<size_t> met(now.size(), 0);
+    for (const Traveller& t : *ends) met[t.tag / count] += t.end == Traveller::End::back;
+    for (size_t i = 0; i < now.size(); ++i) buried[now[i]] = 2 * met[i] > count;
+    begin += now.size();
+  }
   for (const auto& theirs : ranks.gather(buried))
     for (size_t r = 0; r < n(); ++r) buried[r] |= theirs[r];
   return {};
@@ -173,6 +192,7 @@ Result<void> RoomBaker::trace() {
   for (size_t room = 0; room < room_count(); ++room)
     if (is_own(room)) e[room].assign(rows_in(room) * coefficients, 0.0f);
   if (auto ok = hand_rays(); !ok) return ok;
+  give_back_memory();
   const size_t fixed = fixed_bytes();
   // All of what was handed on where there is no file for it.
   const size_t most = most_of_ranks(handed_bytes);
@@ -189,6 +209,8 @@ Result<void> RoomBaker::trace() {
     if (is_own(room)) ok = trace_room(room, pieces, stage);
   if (auto well = agreed(std::move(ok)); !well) return well;
   if (auto well = decide_buried(); !well) return well;
+  backs = {}, fields = {};
+  give_back_memory();
   crossed = ranks.sum(crossed), lost = ranks.sum(lost);
   arrange_filling();
   report.trace_seconds = std::chrono::duration<double>(std::chrono::steady_clock::now() - start).count();

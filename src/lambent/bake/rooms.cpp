@@ -3,6 +3,7 @@
 #include <lambent/bake/rooms.h>
 
 #include <lambent/bake/room_rows-inl.h>
+#include <lambent/core/own_part.h>
 #include <lambent/core/parallel.h>
 #include <lambent/scene/see_through.h>
 
@@ -46,33 +47,50 @@ void RoomBaker::share_rooms() {
   std::vector<size_t> cost;
   for (const auto& own : receivers_of) cost.push_back(own.size());
   work = RoomWork(space, cost);
-  std::vector<uint8_t> own(room_count());
-  for (size_t room = 0; room < room_count(); ++room) own[room] = is_own(room);
-  space.clear_nodes(std::move(own));
+  space.clear_nodes();
+}
+
+// The most that light fields may be, for less memory than so many rays that are handed on take, and less work: such a
+// ray has up to three entries of rows, a node a row of x and e of its own, and its rays are kept beside their entries.
+FieldSize RoomBaker::cheapest_fields(double handed_on) const {
+  constexpr double bytes_a_ray = 9;
+  return {size_t(bytes_a_ray * handed_on / double(4 * (width + coefficients))), size_t(handed_on / 3)};
 }
 
 // Fields at all openings at first; then, where some lose more than they may, those alone that stay.
 Result<void> RoomBaker::find_all_nodes() {
-  const auto find = [&] { return find_nodes(space, work, surfaces, receivers, receivers_of, options.seed, progress); };
+  FieldSize most{SIZE_MAX, SIZE_MAX};
   bool all = how.loss <= 0;  // are handed on
-  if (how.loss > 0)
+  if (!all && how.cheapest) {
+    auto share = share_that_crosses(space, work, surfaces, receivers, receivers_of, options.seed, progress);
+    if (!share) return share.error();
+    most = cheapest_fields(*share * double(n()) * double(options.samples));
+  }
+  const auto find = [&]() -> Result<void> {
+    auto few = find_nodes(space, work, surfaces, receivers, receivers_of, options.seed, most, progress);
+    if (!few) return few.error();
+    all = !*few;
+    return {};
+  };
+  if (!all)
     if (auto ok = find(); !ok) return ok;
-  if (how.loss > 0 && std::isfinite(how.loss)) {
+  if (!all && std::isfinite(how.loss)) {
     auto loss =
         hand_on_what_fields_lose(space, work, surfaces, receivers, receivers_of, options.seed, how.loss, progress);
     if (!loss) return loss.error();
     told.loss = loss->left, told.loss_of_all = loss->all, told.handed = loss->handed;
-    const double on = loss->crossing * double(n()) * double(options.samples);
-    all = how.cheapest && on <= double(space.node_count()) * double(most_node_rays);
+    all = told.handed == space.openings.size();
+    if (!all && told.handed > 0) {
+      share_rooms();
+      if (auto ok = find(); !ok) return ok;
+    }
   }
-  if (all) {
-    told.loss = 0;
-    for (Opening& o : space.openings) o.handed = true;
-    told.handed = space.openings.size();
-  }
-  if (told.handed == 0) return {};
+  if (!all) return {};
+  told.loss = 0;
+  for (Opening& o : space.openings) o.handed = true;
+  told.handed = space.openings.size();
   share_rooms();
-  return told.handed == space.openings.size() ? Result<void>() : find();
+  return {};
 }
 
 void RoomBaker::number_rows() {
@@ -83,7 +101,7 @@ void RoomBaker::number_rows() {
     for (size_t i = 0; i < receivers_of[room].size(); ++i) row_of[receivers_of[room][i]] = uint32_t(rows + i);
     rows += padded_rows(receivers_of[room].size());
     node_row[room] = rows;
-    rows += padded_rows(space.nodes_of[room].size());
+    rows += padded_rows(space.nodes_in[room]);
   }
   lent = lent_receivers(space, scene, basis, room_of), copy_of.assign(n(), none), is_near.assign(n(), 0);
   for (const auto& own : lent)
@@ -267,22 +285,75 @@ Result<void> RoomBaker::solve() {
 
 // Of all receivers, once all ranks know them.
 Transfer RoomBaker::transfer() const {
-  AlignedVector<float> all(n() * width);
-  for (size_t r = 0; r < n(); ++r) std::copy_n(x.data() + size_t(row_of[r]) * width, width, all.data() + r * width);
-  return store_columns(options.light(), all.data(), 1, channels, n(), width, options.precision);
+  return store_columns(options.light(), x.data(), 1, channels, n(), width, options.precision, row_of);
+}
+
+namespace {
+
+// Memory for all of a result, of which a rank sets its own part.
+struct PartedMemory {
+  ZeroPages values;
+  OwnPart part;
+  PartedMemory(size_t bytes, std::vector<size_t> ends)
+      : values((bytes + 3) / 4), part({reinterpret_cast<const uint8_t*>(values.data()), bytes}, std::move(ends)) {}
+};
+
+}  // namespace
+
+// Blocks of storage are divided among ranks as they lie in the file; each takes what it has not of its part, a slice
+// after the other.
+Transfer RoomBaker::own_part() const {
+  WritableTransfer out;
+  Transfer& t = out.transfer;
+  t.light = options.light(), t.channels = channels, t.receivers = n(), t.precision = options.precision;
+  const size_t count = size_t(ranks.count()), self = size_t(ranks.rank()), slices = 16 * count;
+  const auto first_of = [&](size_t slice) { return std::min(n(), t.blocks() * slice / slices * transfer_block); };
+  std::vector<size_t> ends;
+  for (size_t k = 1; k <= count; ++k) ends.push_back(t.blocks() * k / count * (t.bytes() / t.blocks()));
+  const auto memory = std::make_shared<PartedMemory>(t.bytes(), ends);
+  out.values = reinterpret_cast<uint8_t*>(memory->values.data());
+  t.data = memory->part.all, t.storage = memory;
+  for (size_t i = 0; i < 16; ++i) {
+    std::vector<std::vector<float>> give(count), take(count);
+    for (size_t k = 0; k < count; ++k)
+      for (size_t r = first_of(16 * k + i); r < first_of(16 * k + i + 1); ++r) {
+        const size_t owner = size_t(work.owner[room_of[r]]);
+        if (k == self && owner != self) take[owner].resize(take[owner].size() + width);
+        if (k == self || owner != self) continue;
+        const float* row = x.data() + size_t(row_of[r]) * width;
+        give[k].insert(give[k].end(), row, row + width);
+      }
+    std::vector<std::span<const uint8_t>> from;
+    std::vector<std::span<uint8_t>> to;
+    for (auto& rows_given : give) from.push_back(checkpoint_detail::bytes_of(rows_given));
+    for (auto& rows_taken : take) to.push_back(checkpoint_detail::bytes_of(rows_taken));
+    ranks.exchange(from, to);
+    std::vector<size_t> next(count, 0);
+    std::vector<float> values;
+    for (size_t r = first_of(16 * self + i); r < first_of(16 * self + i + 1); ++r) {
+      const size_t owner = size_t(work.owner[room_of[r]]);
+      const float* row = owner == self ? x.data() + size_t(row_of[r]) * width : take[owner].data() + next[owner];
+      if (owner != self) next[owner] += width;
+      store_columns_of(out, r, row, width, values);
+    }
+  }
+  return t;
 }
 
 Result<Transfer> RoomBaker::bake() {
+  give_back_memory();
   assign_receivers();
   if (auto ok = find_all_nodes(); !ok) return ok.error();
+  give_back_memory();
   number_rows();
   if (auto ok = trace(); !ok) return ok.error();
   if (auto ok = solve(); !ok) return ok.error();
   kept.reset(), handed.reset(), e = {};
   std::vector<uint32_t> every(room_count());
   std::iota(every.begin(), every.end(), 0u);
-  hand_on(every, true);
-  Transfer out = transfer();
+  const bool parted = how.own_part && ranks.count() > 1;
+  if (!parted) hand_on(every, true);
+  Transfer out = parted ? own_part() : transfer();
   x = {};
   for (uint8_t b : buried) report.buried += b;
   told.lost = crossed > 0 ? double(lost) / double(crossed) : 0.0;

@@ -21,7 +21,12 @@ struct RoomsOptions {
   int directions = 16;     // and of direction along each side of the square that maps onto the half space
   // Of what receivers have, the most that light fields may lose (FieldLoss); 0: there are none, infinite: as they are.
   double loss = 0.01;
-  bool cheapest = false;     // no light fields at all where their nodes would send more rays than are handed on
+  // No light fields at all where their nodes would take more memory than rays that are handed on, or send more of them:
+  // the search for nodes ends as soon as that is known.
+  bool cheapest = false;
+  // Of more ranks than one each has a part of the result alone, as the file is written (core/own_part.h): for whom does
+  // nothing else with it.
+  bool own_part = false;
   bool keep_sweeps = false;  // what all receivers have after each sweep, in the report
   std::string scratch;       // a folder for rows that memory has no room for; "": they are traced again
 };
@@ -32,7 +37,8 @@ struct RoomsReport {
   std::vector<Transfer> sweeps;                            // after each, where they are kept
   bool converged = false;
   size_t handed = 0, handed_rays = 0;  // openings whose rays are handed on, and rays that were
-  double loss = 0, loss_of_all = 0;    // what light fields lose, as measured; what they would at all openings
+  double loss = 0;                     // what light fields lose, as measured
+  double loss_of_all = -1;             // what they would at all openings; < 0: not measured, there being none
   double lost = 0;                     // share of the rays through openings that met no node, and count as dark
 };
 

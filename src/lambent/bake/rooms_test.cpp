@@ -1,13 +1,16 @@
 // Rooms that are joined, against the same scene baked whole.
 #include "sanitizers.h"
 
+#include <lambent/bake/room_space.h>
 #include <lambent/bake/rooms.h>
 #include <lambent/core/parallel.h>
+#include <lambent/core/random.h>
 #include <lambent/scene/procedural.h>
 
 #include <gtest/gtest.h>
 
-#include "sanitizers.h"
+#include <map>
+#include <set>
 
 namespace lambent {
 namespace {
@@ -70,6 +73,68 @@ TEST(Rooms, ThatAreAskedForArePartedByPlanes) {
   auto overlap = part_rooms(whole, {{"a", {Vec3(0), Vec3(6, 3, 10)}}, {"b", {Vec3(3, 0, 0), Vec3(10, 3, 10)}}});
   ASSERT_FALSE(overlap);
   EXPECT_NE(overlap.error().text().find("\"a\""), std::string::npos);
+}
+
+// Of each cell those that are least, in whatever parts and order they come; and a number for each cell that was met.
+TEST(Rooms, CellsKeepTheRaysThatAreLeast) {
+  Random random(3);
+  std::vector<Crossing> all;
+  for (int i = 0; i < 20000; ++i)
+    all.push_back({0, uint32_t(std::pow(random.next(), 3) * 2000), random.next64() % 5000});
+  std::map<uint32_t, std::multiset<CellRay>> expected;
+  for (const Crossing& c : all) expected[c.cell].insert(c.ray);
+  for (const size_t part : {size_t{1700}, all.size()}) {
+    CellRays rays;
+    for (size_t begin = 0; begin < all.size(); begin += part) {
+      std::vector<Crossing> some(all.begin() + ptrdiff_t(begin),
+                                 all.begin() + ptrdiff_t(std::min(all.size(), begin + part)));
+      keep_least(some);
+      rays.merge(some, 0);
+    }
+    const CellSet met(2000, rays.cells);
+    ASSERT_EQ(rays.cells.size(), expected.size());
+    size_t number = 0, most = 0;
+    for (const auto& [cell, own] : expected) {
+      ASSERT_EQ(rays.cells[number], cell);
+      ASSERT_TRUE(met.has(cell));
+      ASSERT_EQ(met.number(cell), number);
+      std::vector<CellRay> least(own.begin(), own.end());
+      least.resize(std::min(least.size(), size_t(most_node_rays)));
+      most = std::max(most, own.size());
+      const auto kept = rays.of(number++);
+      ASSERT_EQ(std::vector<CellRay>(kept.begin(), kept.end()), least);
+    }
+    for (uint32_t cell = 0; cell < 2000; ++cell) ASSERT_EQ(met.has(cell), expected.contains(cell));
+    EXPECT_GT(most, size_t(most_node_rays));
+  }
+}
+
+// A ray is kept in 48 bits: it stays in its cell, and where it was but for a few thousandths of the cell.
+TEST(Rooms, RaysOfNodesAreWhatWasMet) {
+  const Scene scene = make_building(1, 0.5f);
+  const Bounds all = room_bounds(scene);
+  Bounds left = all, right = all;
+  left.max.x = right.min.x = 0.4f * all.min.x + 0.6f * all.max.x;
+  const RoomSpace space(scene, {{"left", left}, {"right", right}}, 8, 6);
+  Random random(5);
+  size_t crossed = 0;
+  for (int i = 0; i < 2000; ++i) {
+    const size_t room = i % 2;
+    const Bounds& box = space.rooms[room].box;
+    const Vec3 p(random.next(), random.next(), random.next()), origin = box.min + p * (box.max - box.min);
+    const Vec3 d = normalize(Vec3(random.next(), random.next(), random.next()) - Vec3(0.5f));
+    const Exit exit = space.exit(room, origin, d, {});
+    if (exit.opening == none) continue;
+    ++crossed;
+    const Crossing crossing = space.crossing(exit, random.next64());
+    const NodeRay ray = space.ray(space.openings[exit.opening], crossing.cell, crossing.ray);
+    const Exit again = space.exit(room, ray.origin - 0.001f * ray.direction, ray.direction, {});
+    EXPECT_EQ(again.opening, exit.opening);
+    EXPECT_LT(length(ray.origin - exit.at), 2e-3f * length(box.max - box.min) / 8);
+    EXPECT_LT(length(ray.direction - d), 5e-3f);
+    EXPECT_NEAR(length(ray.direction), 1.0f, 1e-5f);
+  }
+  EXPECT_GT(crossed, 300u);
 }
 
 TEST(Rooms, OneRoomIsTheSceneItself) {
@@ -165,6 +230,7 @@ TEST(Rooms, InTheOpenRaysAreHandedOn) {
                       {.residual = 1e-4, .places = 8, .directions = 6, .cheapest = true}, nullptr, &cheapest);
   ASSERT_TRUE(t);
   EXPECT_EQ(cheapest.handed, cheapest.openings);
+  EXPECT_LT(cheapest.loss_of_all, 0);  // the search for nodes was given up
   EXPECT_LT(by_both, std::hypot(noise, 0.015));
   EXPECT_GT(by_fields, std::hypot(noise, 0.02));
 }

@@ -1,4 +1,5 @@
 #include <lambent/core/file.h>
+#include <lambent/core/own_part.h>
 #include <lambent/core/ranks.h>
 
 #include <fcntl.h>
@@ -66,7 +67,45 @@ void sync_folder(const std::string& path) {
   ::close(fd);
 }
 
+thread_local std::vector<const OwnPart*> own_parts;
+
+// Bytes that go to a place in the file.
+struct Run {
+  size_t at = 0;
+  std::span<const uint8_t> bytes;
+};
+
+// Of pieces one after the other, what rank k of `count` writes: of those that are in parts its own, of all others so
+// much of the file.
+std::vector<Run> runs_of(std::span<const std::span<const uint8_t>> pieces, size_t k, size_t count) {
+  size_t bytes = 0, at = 0;
+  for (const auto piece : pieces) bytes += piece.size();
+  std::vector<Run> runs;
+  for (const auto piece : pieces) {
+    size_t first = bytes * k / count, end = bytes * (k + 1) / count;  // in the file
+    for (const OwnPart* part : own_parts) {
+      const uint8_t *begin = part->all.data(), *from = piece.data();
+      if (from < begin || from + piece.size() > begin + part->all.size() || part->ends.size() != count) continue;
+      const size_t skipped = size_t(from - begin);  // pieces may be some of them, where a set has several files
+      const auto place = [&](size_t end_of) {
+        return at + std::clamp(end_of, skipped, skipped + piece.size()) - skipped;
+      };
+      first = place(k == 0 ? 0 : part->ends[k - 1]), end = place(part->ends[k]);
+    }
+    first = std::clamp(first, at, at + piece.size()), end = std::clamp(end, first, at + piece.size());
+    if (end > first) runs.push_back({first, piece.subspan(first - at, end - first)});
+    at += piece.size();
+  }
+  return runs;
+}
+
 }  // namespace
+
+OwnPart::OwnPart(std::span<const uint8_t> bytes, std::vector<size_t> ends_of_ranks)
+    : all(bytes), ends(std::move(ends_of_ranks)) {
+  own_parts.push_back(this);
+}
+OwnPart::~OwnPart() { std::erase(own_parts, this); }
 
 // A whole file under its temporary name. The lock says that somebody still writes it, until the descriptor is closed.
 struct WrittenFile {
@@ -106,22 +145,42 @@ struct WrittenFile {
     return {};
   }
 
-  // Of the pieces, one after the other, bytes [first, end).
-  Result<void> write(std::span<const std::span<const uint8_t>> pieces, size_t first, size_t end) {
-    size_t at = 0;  // of the piece
-    for (auto piece : pieces) {
-      const size_t last = std::clamp(end, at, at + piece.size()) - at;
-      for (size_t done = std::clamp(first, at, at + piece.size()) - at; done < last;) {
-        const ssize_t put =
-            ::pwrite(fd, piece.data() + done, std::min<size_t>(last - done, size_t{1} << 26), off_t(at + done));
+  Result<void> write(std::span<const Run> runs) {
+    for (const Run& run : runs)
+      for (size_t done = 0; done < run.bytes.size();) {
+        const ssize_t put = ::pwrite(fd, run.bytes.data() + done,
+                                     std::min<size_t>(run.bytes.size() - done, size_t{1} << 26), off_t(run.at + done));
         if (put < 0 && errno == EINTR) continue;
         if (put <= 0) return error(system_message());
         done += size_t(put);
       }
-      at += piece.size();
-    }
+    return {};
+  }
+  Result<void> sync() {
     if (::fsync(fd) != 0 && errno != EINVAL) return error(system_message());
     return {};
+  }
+
+  // The first rank writes what it is handed by the others, which do not see the file.
+  Result<void> write_for_all(Ranks& ranks, std::span<const std::span<const uint8_t>> pieces) {
+    const size_t count = size_t(ranks.count());
+    Result<void> ok;
+    for (size_t k = 0; k < count; ++k)
+      for (const Run& run : runs_of(pieces, k, count)) {
+        constexpr size_t most = size_t{1} << 26;
+        for (size_t done = 0; done < run.bytes.size(); done += most) {
+          const auto bytes = run.bytes.subspan(done, std::min(most, run.bytes.size() - done));
+          std::vector<std::span<const uint8_t>> give(count);
+          std::vector<std::span<uint8_t>> take(count);
+          std::vector<uint8_t> taken(k > 0 && ranks.rank() == 0 ? bytes.size() : 0);
+          if (k > 0 && ranks.rank() == int(k)) give[0] = bytes;
+          take[k] = taken;
+          if (k > 0) ranks.exchange(give, take);
+          const Run now{run.at + done, k > 0 ? std::span<const uint8_t>(taken) : bytes};
+          if (ranks.rank() == 0 && ok) ok = write({&now, 1});
+        }
+      }
+    return ok;
   }
 
   // As open() and write(), of all ranks; all fail where one does. Where a rank does not
@@ -141,9 +200,11 @@ struct WrittenFile {
     const bool alike = ranks.from_first(bytes) == bytes;
     if (!leads && alike) fd = ::open(name.c_str(), O_WRONLY | O_CLOEXEC | O_NOFOLLOW);
     const bool seen = leads || (fd >= 0 && ::fstat(fd, &info) == 0 && info.st_ino == inode);
-    const size_t rank = size_t(ranks.rank()), count = size_t(ranks.count());
-    if (ranks.all(alike && seen)) ok = write(pieces, bytes * rank / count, bytes * (rank + 1) / count);
-    else if (leads) ok = write(pieces, 0, bytes);
+    const bool all_see = ranks.all(alike && seen);
+    if (all_see) ok = write(runs_of(pieces, size_t(ranks.rank()), size_t(ranks.count())));
+    else if (ranks.all(alike)) ok = write_for_all(ranks, pieces);
+    else if (leads) ok = write(runs_of(pieces, 0, 1));
+    if (ok && (all_see || leads)) ok = sync();
     if (!ok && !leads) ranks.say(ok.error().text());
     if (!ranks.all(bool(ok))) return ok ? error("by another rank") : ok;
     return {};
@@ -222,7 +283,8 @@ Result<void> write_file_atomically(const std::string& path, std::span<const std:
     if (together->rank() > 0) return own ? own->commit() : Result<void>();
   } else {
     if (auto ok = file->open(); !ok) return ok;
-    if (auto ok = file->write(pieces, 0, SIZE_MAX); !ok) return ok;
+    if (auto ok = file->write(runs_of(pieces, 0, 1)); !ok) return ok;
+    if (auto ok = file->sync(); !ok) return ok;
   }
   current_set->files_.push_back(std::move(file));
   return own ? own->commit() : Result<void>();

@@ -89,6 +89,7 @@ Result<Transfer> bake_rooms_of_request(const BakeRequest& request, const BakeOpt
   if (!rooms) return rooms.error();
   RoomsOptions how;
   how.residual = how.loss = request.rooms_error, how.cheapest = true;
+  how.own_part = request.compress.empty() && request.fix_light.empty();
   if (job.progress) how.scratch = job.progress->scratch;
   RoomsReport found;
   auto transfer = bake_rooms(scene, receivers, *rooms, options, how, &report, &found, job.progress);
@@ -96,19 +97,19 @@ Result<Transfer> bake_rooms_of_request(const BakeRequest& request, const BakeOpt
   if (!found.converged)
     job.warn(fmt::format("the rooms are not joined to {:.3g}%: {:.3g}% after {} sweeps", 100 * how.residual,
                          100 * found.residuals.back(), found.residuals.size()));
-  summary.json["rooms"] = {{"rooms", found.rooms},         {"openings", found.openings},
-                           {"nodes", found.nodes},         {"largest", found.largest},
-                           {"residuals", found.residuals}, {"lost", found.lost},
-                           {"handed", found.handed},       {"handed_rays", found.handed_rays},
-                           {"loss", found.loss},           {"loss_of_all", found.loss_of_all}};
+  summary.json["rooms"] = {{"rooms", found.rooms},     {"openings", found.openings},       {"nodes", found.nodes},
+                           {"largest", found.largest}, {"residuals", found.residuals},     {"lost", found.lost},
+                           {"handed", found.handed},   {"handed_rays", found.handed_rays}, {"loss", found.loss}};
+  if (found.loss_of_all >= 0) summary.json["rooms"]["loss_of_all"] = found.loss_of_all;
   told["rooms"] = {{"rooms", found.rooms}, {"residual", found.residuals.empty() ? 0.0 : found.residuals.back()}};
   summary.lines.emplace_back("rooms",
                              fmt::format("{}, the largest of {} receivers; {} nodes in {} openings", found.rooms,
                                          human_count(found.largest), human_count(found.nodes), found.openings));
   if (found.handed > 0)
     summary.lines.emplace_back(
-        "", fmt::format("rays of {} openings are handed on, {} in all: light fields there would lose {:.2g}%",
-                        found.handed, human_count(found.handed_rays), 100 * found.loss_of_all));
+        "", fmt::format("rays of {} openings are handed on, {} in all: light fields there would {}", found.handed,
+                        human_count(found.handed_rays),
+                        found.loss_of_all < 0 ? "be more work" : fmt::format("lose {:.2g}%", 100 * found.loss_of_all)));
   if (!found.residuals.empty())
     summary.lines.emplace_back(
         "joined", fmt::format("to {:.2g}% in {} sweeps", 100 * found.residuals.back(), found.residuals.size()));
