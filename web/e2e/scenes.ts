@@ -358,7 +358,10 @@ export function writeBumpy(path: string): void {
   );
 }
 
-/** A floor, a wall and panes: half there, stained, and half reflecting; one mesh and material each, as a .gltf of one file. */
+/**
+ * A floor, a wall and panes: half there, stained, and half reflecting; one mesh and material each, as a .gltf of one
+ * file.
+ */
 export function writeGlass(path: string): void {
   type V = [number, number, number];
   const quads: { corner: V; a: V; b: V; n: number; material: object }[] = [

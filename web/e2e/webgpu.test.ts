@@ -1,6 +1,6 @@
 // The package on WebGPURenderer, with WebGPU (of a software device) and with its WebGL 2 backend, against
 // `lambent render`, and against WebGLRenderer.
-import { existsSync, readFileSync, writeFileSync } from 'node:fs';
+import { existsSync, readFileSync, statSync, writeFileSync } from 'node:fs';
 import { join } from 'node:path';
 import type { Browser, Page } from 'playwright-core';
 import type { ViteDevServer } from 'vite';
@@ -96,6 +96,21 @@ describe.skipIf(!haveTool || !haveBrowser)('on WebGPURenderer', () => {
       renderLinear(at(`${name}.glb`), ...lit, ...view(camera), '-o', truth);
       await compare(name, { path: `/files/${name}.glb`, light: lightOf(order), camera: cameraOf(camera) }, truth);
     });
+
+  it('draws a file that is packed for browsers as render draws it whole', async () => {
+    for (const [name, order] of [
+      ['vertices', 5],
+      ['atlas', 4],
+    ] as const) {
+      const truth = at(`${name}_whole.png`);
+      renderLinear(at(`${name}.glb`), ...lit, ...view(camera), '-o', truth);
+      lambent('export', at(`${name}.glb`), '--web', at(`${name}_site`), '--pack', 'auto');
+      const [before, after] = [`${name}.glb`, `${name}_site/data/scene.glb`].map((file) => statSync(at(file)).size);
+      console.log(`${name}: ${before} bytes, packed ${after}`);
+      const path = `/files/${name}_site~data~scene.glb`;
+      await compare(`${name}_packed`, { path, light: lightOf(order), camera: cameraOf(camera) }, truth);
+    }
+  });
 
   for (const kind of ['sh:2', 'sh:3', 'hl2', 'vector'])
     it(`draws a directional lightmap, bumps and a glowing texture: ${kind}`, async () => {
