@@ -77,7 +77,7 @@ Result<void> write_folder(const fs::path& target, const WebFiles& files, const P
 // What the page alone shows says nothing of other files.
 Result<void> check_options(const ExportCommand& o, const CLI::App& command) {
   const bool web = !o.folder.empty(), lightmap = !web && o.npy.empty() && o.three_probes.empty();
-  for (const char* name : {"--compare", "--reference", "--camera", "--exposure", "--tone"})
+  for (const char* name : {"--compare", "--reference", "--camera", "--exposure", "--tone", "--pack"})
     if (!web && command.count(name) > 0) return Error{name, "goes with --web alone", true};
   for (const char* name : {"--env", "--env-rotate"})
     if (!o.npy.empty() && command.count(name) > 0) return Error{name, "does not go with --npy", true};
@@ -143,6 +143,10 @@ void add_export(CLI::App& app, Run& run) {
                      "PREFIX for Unity: colours and, of sh:2 or sh:3, directions; the scene with UV2 and scripts");
   auto* npy = target->add_option(
       "--npy", o->npy, "Folder for NumPy: transfer by the input's vertices, for PRT data sets, and the faces");
+  c->add_option(
+      "--pack", o->web.pack,
+      "With --web: baked files a third or less as large, for the page and the three.js package alone. Relative "
+      "RMS error that transfer is rounded to, or auto: a quarter of the bake's own, 0.005 at most");
   c->add_option("--convention", o->convention,
                 "With --npy: whose light it goes with, and whose file names: pifu, icon, lambent, three, unity, godot, "
                 "gltf-ibl, filament, directx")

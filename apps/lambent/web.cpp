@@ -3,6 +3,7 @@
 #include "options.h"
 
 #include <lambent/baked/baked_file.h>
+#include <lambent/baked/packed.h>
 #include <lambent/core/glb.h>
 #include <lambent/core/uri.h>
 #include <lambent/image/image.h>
@@ -84,7 +85,16 @@ struct AddedFile {
   std::string name;  // data/STEM.glb or data/STEM.gltf
   bool by_lamps;     // direct-to-indirect transport, which lamps light and no environment
 };
-Result<AddedFile> add_baked(WebFiles& files, const std::string& path, const std::string& stem) {
+Result<float> packing_error(const std::string& text, std::span<const uint8_t> bytes, const std::string& path) {
+  if (text == "auto") return default_packing_error(bytes, path);
+  auto given = parse_numbers(text, 1, "--pack");
+  if (!given) return given.error();
+  if (!((*given)[0] >= 1e-5 && (*given)[0] <= 0.1)) return Error{"--pack", "must be auto or from 0.00001 to 0.1", true};
+  return float((*given)[0]);
+}
+
+Result<AddedFile> add_baked(WebFiles& files, const std::string& path, const std::string& stem,
+                            const std::string& pack) {
   auto file = MappedFile::open(path);
   if (!file) return file.error();
   auto whole = load_baked(*file, path);
@@ -94,6 +104,14 @@ Result<AddedFile> add_baked(WebFiles& files, const std::string& path, const std:
   auto chunks = split_gltf(file->bytes(), path);
   if (!chunks) return chunks.error();
   const std::string ending = chunks->binary.data() ? "glb" : "gltf", name = "data/" + stem + "." + ending;
+  if (!pack.empty()) {
+    auto error = packing_error(pack, file->bytes(), path);
+    if (!error) return error.error();
+    auto packed = pack_baked(file->bytes(), *error, path);
+    if (!packed) return packed.error();
+    files[name] = {media_type("glb"), std::move(packed->bytes)};
+    return AddedFile{name, by_lamps};
+  }
   if (ending == "glb") {
     files[name] = {media_type("glb"), std::move(*file)};
     return AddedFile{name, by_lamps};
@@ -158,12 +176,12 @@ Result<WebFiles> web_files(const WebOptions& options) {
     manifest["rotate"] = *turn;
   }
   WebFiles files;
-  auto baked = add_baked(files, options.baked, "scene");
+  auto baked = add_baked(files, options.baked, "scene", options.pack);
   if (!baked) return baked.error();
   if (auto ok = baked->by_lamps ? check_lamps_alone(options) : Result<void>(); !ok) return ok.error();
   manifest["baked"] = baked->name;
   if (!options.compare.empty()) {
-    auto compare = add_baked(files, options.compare, "compare");
+    auto compare = add_baked(files, options.compare, "compare", options.pack);
     if (!compare) return compare.error();
     if (baked->by_lamps || compare->by_lamps)
       return Error{"--compare", "does not go with direct-to-indirect transport in the page", true};

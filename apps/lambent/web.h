@@ -17,6 +17,7 @@ struct WebOptions {
   std::string baked, compare, reference;
   std::vector<std::string> env;
   std::string camera = "auto", rotate, exposure = "auto", tone = "neutral";
+  std::string pack;  // auto, or the relative RMS error that transfer is rounded to; empty: files as they are
   void add_to(CLI::App& command);
 };
 

@@ -399,7 +399,16 @@ describe.skipIf(!haveTool || !haveBrowser)('an exported folder', () => {
   beforeAll(async () => {
     writeBall(join(folder, 'ball.obj'));
     lambent('bake', join(folder, 'ball.obj'), '--samples', '64', '-o', join(folder, 'ball.glb'));
-    lambent('export', join(folder, 'ball.glb'), '--env', 'sky:elevation=20,azimuth=70', '--web', join(folder, 'site'));
+    lambent(
+      'export',
+      join(folder, 'ball.glb'),
+      '--env',
+      'sky:elevation=20,azimuth=70',
+      '--web',
+      join(folder, 'site'),
+      '--pack',
+      'auto',
+    );
     await new Promise<void>((resolve) => host.listen(0, '127.0.0.1', resolve));
     address = `http://127.0.0.1:${(host.address() as AddressInfo).port}/site/`;
     browser = await launch();

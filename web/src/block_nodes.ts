@@ -20,7 +20,6 @@ import {
   If,
   int,
   ivec2,
-  Loop,
   materialColor,
   mix,
   rtt,
@@ -40,6 +39,7 @@ import { blockTolerance } from './block_reflection.js';
 import { pictureColumns, receiverColumns, wordColumns } from './block_shader.js';
 import { cubeBlocks } from './cube.js';
 import type { NodeBlocks, NodeBlockOptions } from './node_edition.js';
+import { loop } from './node_loop.js';
 
 type Int = Node<'int'>;
 type Uint = Node<'uint'>;
@@ -50,11 +50,6 @@ interface Changes {
   count: Uint;
   where: Uint;
 }
-
-// Loops within loops take names, which the types do not know.
-const namedLoop = Loop as unknown as (range: object, body: (index: Record<string, Int>) => void) => void;
-const loop = (count: Int, name: string, body: (i: Int) => void): void =>
-  namedLoop({ start: int(0), end: count, type: 'int', condition: '<', name }, (index) => body(index[name]!));
 
 /** Records, receivers and the light, as nodes. */
 class Reader {

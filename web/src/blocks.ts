@@ -37,16 +37,17 @@ import type { Lighting } from './lighting.js';
 import { DrawnPicture } from './light_sum.js';
 import {
   checkNodes,
-  glassRefusal,
+  copyNodes,
   isNodeRenderer,
   setNodes,
+  throughGlass,
   withoutNodes,
   type NodeBlocks,
   type NodeEdition,
   type Renderer,
 } from './node_edition.js';
 import { glossFragmentDeclarations, glossVaryings } from './outgoing.js';
-import { chainHooks, copyNodes, diffuseParameters, replaceOnce, useExitRadiance } from './prt_material.js';
+import { chainHooks, diffuseParameters, replaceOnce, useExitRadiance } from './prt_material.js';
 import { drawFilter, type Drawn } from './see_through.js';
 import { bindPart } from './vertex_transfer.js';
 
@@ -228,7 +229,7 @@ class BlocksTransfer implements BakedTransfer {
 
   private readonly nodes: NodeBlocks | undefined; // for WebGPURenderer
   /** Why WebGPURenderer does not draw this. */
-  private refusal: string | undefined;
+  private readonly refusal: string | undefined;
 
   constructor(
     { cube, bits, receivers }: Header,
@@ -291,10 +292,9 @@ class BlocksTransfer implements BakedTransfer {
       vertexBytes += mesh.geometry.getAttribute('position').count * (twoSided ? 8 : 4);
       const material = this.materials.get(key) ?? new BlocksMaterial(this.shared, twoSided, diffuseParameters(source));
       this.materials.set(key, material);
-      this.refusal ??= glassRefusal(material);
       setNodes(
         material,
-        this.refusal === undefined ? this.nodes!.atVertices(twoSided) : undefined,
+        nodes && throughGlass(nodes, material, { colorNode: this.nodes!.atVertices(twoSided) }),
         `The baked scene ${this.refusal}.`,
       );
       mesh.material = material;

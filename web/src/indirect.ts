@@ -26,7 +26,7 @@ import { axesOf, isDrawn, limits, type BakedTransfer, type TransferKind, type Tr
 import { LampLights } from './lamp_lights.js';
 import { readPlacedMeshes } from './lightmap.js';
 import { placeLamp, type Lamp, type Rgb } from './moving_lamps.js';
-import { checkNodes, isNodeRenderer, onlyGlsl, setNodes, withoutNodes, type Renderer } from './node_edition.js';
+import { checkNodes, isNodeRenderer, setNodes, withoutNodes, type Renderer } from './node_edition.js';
 import { bindPart } from './vertex_transfer.js';
 
 /** What a program does with lamps and paint; `lights` goes into its scene, and shadow maps have to be on. */
@@ -80,7 +80,7 @@ class IndirectTransfer implements BakedTransfer, IndirectControls {
   private readonly own: ReturnType<typeof ownLamps>;
   private readonly uniforms: IndirectUniforms;
   private readonly worn: IndirectMaterial[] = [];
-  private readonly refusal: string;
+  private readonly refusal: string | undefined;
   private given: readonly Lamp[] = [];
   private shown = -1;
   private showing: IndirectControls['show'] = 'all';
@@ -106,8 +106,10 @@ class IndirectTransfer implements BakedTransfer, IndirectControls {
       );
     this.light = new IndirectLight(operator, scene, this.own, glows, readOff);
     this.uniforms = { prtLight: { value: picture.texture }, prtDirect: { value: 1 } };
-    this.lights = new LampLights(this.bounds, this.uniforms.prtDirect);
-    this.refusal = source.nodes ? onlyGlsl('direct-to-indirect light') : withoutNodes;
+    const { nodes } = source,
+      direct = this.uniforms.prtDirect;
+    this.lights = new LampLights(this.bounds, direct, nodes?.lights);
+    this.refusal = nodes ? undefined : withoutNodes;
     const atlas = picture.map !== undefined;
     let vertexBytes = 0;
     meshes.forEach((mesh, i) => {
@@ -116,7 +118,11 @@ class IndirectTransfer implements BakedTransfer, IndirectControls {
       vertexBytes += geometry.getAttribute('position').count * (atlas ? 8 : 4) * (twoSided ? 2 : 1);
       const material = new IndirectMaterial(this.uniforms, { atlas, twoSided }, owns[i]!);
       if (geometry.hasAttribute('color')) material.vertexColors = true;
-      setNodes(material, undefined, `The baked scene ${this.refusal}.`);
+      setNodes(
+        material,
+        nodes?.bounced({ picture: picture.texture, atlas, twoSided, direct }),
+        `The baked scene ${withoutNodes}.`,
+      );
       this.worn.push(material);
       mesh.material = material;
       mesh.castShadow = mesh.receiveShadow = true;

@@ -11,6 +11,7 @@ import {
   type Texture,
   type WebGLProgramParametersWithUniforms,
 } from 'three';
+import { copyNodes } from './node_edition.js';
 import { chainHooks, diffuseParameters, replaceOnce } from './prt_material.js';
 
 /** Receivers a row of the picture. */
@@ -139,7 +140,9 @@ export class IndirectMaterial extends MeshLambertMaterial {
   }
 
   override clone(): this {
-    return new IndirectMaterial(this.shared, this.over, this).copy(this) as this;
+    const made = new IndirectMaterial(this.shared, this.over, this).copy(this);
+    copyNodes(this, made);
+    return made as this;
   }
 
   private patch(shader: WebGLProgramParametersWithUniforms): void {

@@ -10,11 +10,13 @@ import {
   Vector3,
   type Sphere,
 } from 'three';
+import type { LampMakers } from './node_edition.js';
 import { isSamePlace, type PlacedLamp, type Rgb } from './moving_lamps.js';
 
 const mapSize = { cube: 1024, flat: 2048 };
 
 type Light = PointLight | SpotLight | DirectionalLight;
+const classic: LampMakers = { point: () => new PointLight(), spot: () => new SpotLight() };
 
 class LampLightObject {
   readonly object = new Object3D();
@@ -25,10 +27,11 @@ class LampLightObject {
   constructor(
     private readonly bounds: Sphere,
     private readonly share: { value: number },
+    private readonly make: LampMakers,
   ) {}
 
   set(placed: PlacedLamp, color: Rgb): void {
-    if (this.placed?.kind !== placed.kind) this.make(placed);
+    if (this.placed?.kind !== placed.kind) this.begin(placed);
     const moved = !this.placed || !isSamePlace(this.placed, placed),
       shone = this.object.visible;
     this.placed = placed;
@@ -51,10 +54,10 @@ class LampLightObject {
     if (this.ball) this.ball.visible = this.share.value > 0;
   }
 
-  private make({ kind }: PlacedLamp): void {
+  private begin({ kind }: PlacedLamp): void {
     this.dispose();
-    const { radius } = this.bounds;
-    const light = kind === 'sun' ? new DirectionalLight() : kind === 'spot' ? new SpotLight() : new PointLight();
+    const { radius } = this.bounds,
+      light = kind === 'sun' ? new DirectionalLight() : kind === 'spot' ? this.make.spot() : this.make.point();
     light.castShadow = true;
     const shadow = light.shadow;
     shadow.autoUpdate = false;
@@ -120,6 +123,7 @@ export class LampLights extends Object3D {
   constructor(
     private readonly bounds: Sphere,
     private readonly share: { value: number },
+    private readonly make = classic,
   ) {
     super();
     this.name = 'lambent lamps';
@@ -132,7 +136,7 @@ export class LampLights extends Object3D {
       this.remove(gone.object);
     }
     while (this.lamps.length < lamps.length) {
-      const made = new LampLightObject(this.bounds, this.share);
+      const made = new LampLightObject(this.bounds, this.share, this.make);
       this.lamps.push(made);
       this.add(made.object);
     }

@@ -38,16 +38,16 @@ import { fragmentDeclarations, vertexBody, vertexDeclarations } from './lightmap
 import { afterAll, LightSum, LightSums, maxColumns, setPeaks } from './light_sum.js';
 import {
   checkNodes,
-  glassRefusal,
+  copyNodes,
   isNodeRenderer,
-  onlyGlsl,
   setNodes,
+  throughGlass,
   withoutNodes,
   type NodeEdition,
   type NodeSum,
   type Renderer,
 } from './node_edition.js';
-import { chainHooks, copyNodes, diffuseParameters, replaceOnce, useExitRadiance } from './prt_material.js';
+import { chainHooks, diffuseParameters, replaceOnce, useExitRadiance } from './prt_material.js';
 import { drawFilter, type Drawn } from './see_through.js';
 import { shCount } from './sh.js';
 import { RestPose, TurnedSums } from './turned.js';
@@ -70,6 +70,7 @@ function placed(texture: Texture | null | undefined, geometry: BufferGeometry): 
 interface Surface {
   twoSided: boolean;
   emission: { value: Color };
+  directional: Directional;
   normals?: Placed & { scale: number; tangents: boolean };
   emissive?: Placed;
 }
@@ -82,6 +83,7 @@ function readSurface(
   const surface: Surface = {
     twoSided: geometry.hasAttribute('lambentPlaceBack'),
     emission: { value: new Color(0, 0, 0) },
+    directional,
   };
   const normals = directional === 'none' ? undefined : placed(own.normalMap, geometry),
     emissive = placed(own.emissiveMap, geometry);
@@ -185,7 +187,7 @@ class LightmapTransfer implements BakedTransfer {
   private readonly materials: LightmapMaterial[] = [];
   private readonly ofCoefficients = new Set<TurnedSums<LightSums>>();
   private readonly sum: NodeSum | undefined; // for WebGPURenderer
-  private refusal: string | undefined; // why that does not draw this
+  private readonly refusal: string | undefined; // why that does not draw this
   private readonly glow: { emission: { value: Color }; own: Color; lamp: string }[] = [];
 
   constructor(
@@ -211,19 +213,16 @@ class LightmapTransfer implements BakedTransfer {
     // Rows of normals are in the axes of the bake: they are as they were.
     this.atlas = this.makeAtlases(header.directional === 'none' ? new RestPose(meshes) : undefined);
     const { width, height } = receiversOf.image;
-    this.refusal = !nodes
-      ? withoutNodes
-      : header.directional !== 'none'
-        ? onlyGlsl('a directional lightmap')
-        : undefined;
-    if (!this.refusal)
-      this.sum = nodes!.sum({
-        layout,
-        transfer: this.transfer,
-        channels: header.channels,
-        receivers: header.receivers,
-        receiversOf,
-      });
+    this.refusal = nodes ? undefined : withoutNodes;
+    this.sum = nodes?.sum({
+      layout,
+      transfer: this.transfer,
+      channels: header.channels,
+      receivers: header.receivers,
+      rows,
+      apart: !this.eachIsLight,
+      receiversOf,
+    });
     let gpuBytes = data.byteLength + this.atlas.main.rest.bytes + 4 * width * height + (this.sum?.bytes ?? 0);
     meshes.forEach((mesh, i) => {
       const own = owns[i]! as Material & Partial<MeshStandardMaterial>,
@@ -237,15 +236,10 @@ class LightmapTransfer implements BakedTransfer {
       const material = new LightmapMaterial(this.atlas, header.directional, surface, own);
       material.vertexColors = mesh.geometry.hasAttribute('color');
       this.materials.push(material);
-      this.refusal ??=
-        glassRefusal(material) ??
-        (material.vertexColors && own.emissive?.getHex()
-          ? onlyGlsl('glowing beside colours of its vertices')
-          : undefined);
       setNodes(
         material,
-        this.refusal === undefined ? nodes!.overAtlas(this.sum!, surface) : undefined,
-        `The baked scene ${this.refusal}.`,
+        nodes && throughGlass(nodes, material, nodes.overAtlas(this.sum!, surface)),
+        `The baked scene ${withoutNodes}.`,
       );
       mesh.material = material;
       gpuBytes += mesh.geometry.getAttribute('position').count * (surface.twoSided ? 16 : 8);
@@ -254,8 +248,10 @@ class LightmapTransfer implements BakedTransfer {
   }
 
   private makeAtlases(pose?: RestPose): TurnedSums<LightSums> {
-    const eachIsLight = this.directional === 'none' || this.directional === 'hl2';
-    return new TurnedSums(() => new LightSums(() => this.makeAtlas(), eachIsLight), this.order, pose);
+    return new TurnedSums(() => new LightSums(() => this.makeAtlas(), this.eachIsLight), this.order, pose);
+  }
+  private get eachIsLight(): boolean {
+    return this.directional === 'none' || this.directional === 'hl2';
   }
 
   /** Exit radiance of white at every texel, under one light. */
@@ -292,7 +288,7 @@ uint prtPick( const in ivec2 texel, out int row ) {
     const light = [...rest, ...lamps.flatMap(([, color]) => color.toArray())],
       sharp = peaks && [...peaks, ...new Array<number>(3 * lamps.length).fill(0)];
     this.atlas.set(light, sharp);
-    this.sum?.set(light, sharp, true);
+    this.sum?.set(light, sharp, this.eachIsLight);
     // One column is of all lamps together; else materials that glow have one of their name.
     for (const { emission, own, lamp } of this.glow) {
       const scale = lamps.length === 1 ? lamps[0]![1] : this.lamps.get(lamp);

@@ -35,7 +35,16 @@ import {
   rowWidth,
   type LastReflection,
 } from './outgoing.js';
-import { checkNodes, isNodeRenderer, onlyGlsl, setNodes, type Renderer } from './node_edition.js';
+import {
+  checkNodes,
+  isNodeRenderer,
+  setNodes,
+  throughGlass,
+  withoutNodes,
+  type NodeEdition,
+  type NodeSum,
+  type Renderer,
+} from './node_edition.js';
 import { diffuseParameters, replaceOnce, useExitRadiance } from './prt_material.js';
 import { drawFilter, type Drawn } from './see_through.js';
 import { shCount } from './sh.js';
@@ -66,8 +75,6 @@ vec3 prtRow( const in int r, const in int row ) {
 #endif
 ${glslReflect(shared.outgoing, false)}`;
 
-const matrixRefusal = onlyGlsl('a transfer matrix');
-
 class MatrixMaterial extends MeshBasicMaterial {
   constructor(
     readonly sums: TurnedSums<LightSums>,
@@ -83,7 +90,6 @@ class MatrixMaterial extends MeshBasicMaterial {
       ...(gain && { PRT_FALSE_COLOR: '' }),
     };
     if (gain) this.toneMapped = false;
-    setNodes(this, undefined, `The baked scene ${matrixRefusal}.`);
   }
 
   override onBeforeRender(...drawn: Drawn): void {
@@ -126,12 +132,15 @@ class MatrixTransfer implements BakedTransfer {
   private readonly sums: TurnedSums<LightSums>;
   private readonly materials = new Map<string, MatrixMaterial>();
   private readonly ofCoefficients = new Set<TurnedSums<LightSums>>();
+  private readonly sum: NodeSum | undefined; // for WebGPURenderer
+  private readonly refusal: string | undefined; // why that does not draw this
 
   constructor(
     header: TransferHeader,
     private readonly shared: LastReflection,
     values: ArrayBuffer,
     readonly meshes: Mesh[],
+    nodes?: NodeEdition,
   ) {
     this.order = header.order;
     this.channels = header.channels;
@@ -144,7 +153,16 @@ class MatrixTransfer implements BakedTransfer {
     this.layout = layout;
     this.transfer = blockTexture(layout, data);
     this.sums = this.makeSums(new RestPose(meshes));
-    let gpuBytes = data.byteLength + this.sums.main.rest.bytes + reflectionBytes(shared);
+    this.refusal = nodes ? undefined : withoutNodes;
+    this.sum = nodes?.sum({
+      layout,
+      transfer: this.transfer,
+      channels: header.channels,
+      receivers: header.receivers,
+      rows: shared.rows,
+      apart: true,
+    });
+    let gpuBytes = data.byteLength + this.sums.main.rest.bytes + reflectionBytes(shared) + (this.sum?.bytes ?? 0);
     for (const mesh of meshes) {
       const twoSided = mesh.geometry.hasAttribute('lambentReceiverBack'),
         source = mesh.material as Material,
@@ -152,6 +170,11 @@ class MatrixTransfer implements BakedTransfer {
       gpuBytes += mesh.geometry.getAttribute('position').count * (twoSided ? 8 : 4);
       const material = this.materials.get(key) ?? new MatrixMaterial(this.sums, shared, twoSided, source);
       this.materials.set(key, material);
+      setNodes(
+        material,
+        nodes && throughGlass(nodes, material, nodes.reflection(this.sum!, shared, twoSided)),
+        `The baked scene ${withoutNodes}.`,
+      );
       mesh.material = material;
     }
     this.gpuBytes = gpuBytes;
@@ -185,7 +208,7 @@ uint prtPick( const in ivec2 texel, out int row ) {
   }
 
   check(renderer: Renderer): void {
-    if (isNodeRenderer(renderer)) return checkNodes(renderer, matrixRefusal);
+    if (isNodeRenderer(renderer)) return checkNodes(renderer, this.refusal);
     this.sums.main.rest.check(renderer);
     checkReflection(this.shared, renderer);
     const { maxVertexTextures } = renderer.capabilities;
@@ -204,6 +227,7 @@ uint prtPick( const in ivec2 texel, out int row ) {
   relight(lighting: Lighting): void {
     const { rest, peaks } = lighting.parts(this.order, true);
     this.sums.set(rest, peaks);
+    this.sum?.set(rest, peaks, false);
     for (const material of this.materials.values()) setPeaks(material, peaks !== undefined);
   }
 
@@ -228,6 +252,7 @@ uint prtPick( const in ivec2 texel, out int row ) {
   dispose(): void {
     for (const sums of [this.sums, ...this.ofCoefficients]) sums.dispose();
     this.transfer.dispose();
+    this.sum?.dispose();
     this.shared.frames.dispose();
     this.shared.maps.dispose();
     for (const material of this.materials.values()) material.dispose();
@@ -246,7 +271,7 @@ async function load(source: TransferSource): Promise<BakedTransfer> {
   const shared = await loadLastReflection(source, receivers);
   const values = await source.bufferView(header.bufferView);
   const meshes = await Promise.all(source.extension.parts.map((part) => bindPart(source, part, receivers)));
-  return new MatrixTransfer(header, shared, values, meshes);
+  return new MatrixTransfer(header, shared, values, meshes, source.nodes);
 }
 
 export const matrixKind: TransferKind = { name: 'matrix', load };

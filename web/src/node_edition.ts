@@ -1,8 +1,21 @@
 // What WebGPURenderer draws: nodes in the place of GLSL. The package's root knows only what they are asked for, so that
 // programs on WebGLRenderer do without three's node system; lambent-three/webgpu makes them.
-import type { Color, DataArrayTexture, DataTexture, Material, Texture, Vector3, WebGLRenderer } from 'three';
+import type {
+  Color,
+  DataArrayTexture,
+  DataTexture,
+  Material,
+  Matrix3,
+  PointLight,
+  SpotLight,
+  Texture,
+  Vector3,
+  WebGLRenderer,
+} from 'three';
 import type { BlockLayout } from './block_texture.js';
 import { LambentError } from './errors.js';
+import type { Directional } from './header.js';
+import type { LastReflection } from './outgoing.js';
 
 /** WebGPURenderer, with either of its backends, as far as it is asked what it can do. */
 export interface NodeRenderer {
@@ -20,19 +33,60 @@ export interface NodeSum {
   readonly bytes: number;
   dispose(): void;
 }
-/** Values of receivers, and which texel is whose: receiver number i at texel i, or as a texture says. */
+/**
+ * Values of receivers, and which texel is whose: row i of all rows at texel i, or as a texture says for the first row,
+ * with the others below.
+ */
 export interface NodeSumOptions {
   layout: BlockLayout;
   transfer: DataArrayTexture;
   channels: 1 | 3;
   receivers: number;
+  /** A receiver; 1 where it is not said. */
+  rows?: number;
+  /** Peaks are no light by themselves, row by row: they have a picture of their own, which what looks up adds. */
+  apart?: boolean;
   receiversOf?: DataTexture;
 }
 /** What an atlas's surface shows beside its light. */
 export interface NodeSurface {
   twoSided: boolean;
   emission: { value: Color };
+  directional: Directional;
+  normals?: { texture: Texture; scale: number; tangents: boolean };
   emissive?: { texture: Texture };
+}
+/** Zonal lobes, of each of a last reflection's rows where there is one. */
+export interface NodeLobeOptions {
+  layout: BlockLayout;
+  transfer: DataArrayTexture;
+  order: number;
+  channels: 1 | 3;
+  lobes: number;
+  last?: LastReflection;
+}
+/** The pose that was baked: bones, as in three's own bone texture, or the inverse of the mesh's. */
+export type NodeRest = { bones: DataTexture; count: number } | { inverse: Matrix3 };
+export interface NodeLobes {
+  /** [coefficient][3] */
+  set(light: ArrayLike<number>, peaks: ArrayLike<number> | undefined): void;
+  material(twoSided: boolean, rest: NodeRest): MaterialNodes;
+}
+/** Nodes of a classic material, by the properties that WebGPURenderer takes them from. */
+export interface MaterialNodes {
+  colorNode?: { uuid: string };
+  emissiveNode?: { uuid: string };
+  /** Of materials that lights light. */
+  setupLightingModel?: () => object;
+  /** In place of all lighting. */
+  setupLighting?: () => { uuid: string };
+}
+/** Light that has bounced, a texel a receiver or over an atlas (indirect.ts). */
+export interface NodeBounced {
+  picture: DataTexture;
+  atlas: boolean;
+  twoSided: boolean;
+  direct: { value: number };
 }
 
 /** Visibility in blocks: records, receivers, and the light (blocks.ts). */
@@ -65,26 +119,56 @@ export interface NodeEdition {
   /** For `colorNode` of a MeshBasicMaterial: its colour times the exit radiance of its vertices' receivers. */
   atVertices(sum: NodeSum, twoSided: boolean): { uuid: string };
   blocks(options: NodeBlockOptions): NodeBlocks;
+  lobes(options: NodeLobeOptions): NodeLobes;
+  /** Of rows that are summed, weighed by the view. */
+  reflection(sum: NodeSum, last: LastReflection, twoSided: boolean): MaterialNodes;
   /** The same of places in an atlas, and what glows. */
-  overAtlas(sum: NodeSum, surface: NodeSurface): { uuid: string };
+  overAtlas(sum: NodeSum, surface: NodeSurface): MaterialNodes;
+  /** Of a MeshLambertMaterial. */
+  bounced(light: NodeBounced): MaterialNodes;
+  /** Lights that fall off as lambent's do. */
+  lights: LampMakers;
+  /** `colour`, before which what is behind passes through the glass. */
+  glass(colour: { uuid: string }): { uuid: string };
+}
+export interface LampMakers {
+  point(): PointLight;
+  spot(): SpotLight;
 }
 
 /**
  * WebGPURenderer takes the nodes of a classic material from properties of their names. Without nodes it would draw a
  * plain white surface: where it asks, `message` says why not. It tells such materials' programs, and the values they
- * read, apart by plain values alone: the node's number is one.
+ * read, apart by plain values alone: the nodes' numbers are one.
  */
-export function setNodes(material: Material, node: { uuid: string } | undefined, message: string): void {
+export function setNodes(material: Material, nodes: MaterialNodes | undefined, message: string): void {
   const define = (name: string, descriptor: PropertyDescriptor): void =>
     void Object.defineProperty(material, name, { configurable: true, enumerable: true, ...descriptor });
-  if (!node)
+  if (!nodes)
     return define('colorNode', {
       get: () => {
         throw new LambentError(message);
       },
     });
-  define('colorNode', { value: node, writable: true });
-  define('colorNodeKey', { value: node.uuid, writable: true });
+  for (const [name, value] of Object.entries(nodes) as [string, unknown][]) define(name, { value, writable: true });
+  const key = [nodes.colorNode, nodes.emissiveNode, nodes.setupLighting?.()].map((node) => node?.uuid ?? '').join(' ');
+  define('nodesKey', { value: key, writable: true });
+}
+
+/** The nodes of a material for its clone. */
+export function copyNodes(from: Material, to: Material): void {
+  for (const name of ['colorNode', 'emissiveNode', 'setupLightingModel', 'setupLighting', 'nodesKey']) {
+    const property = Object.getOwnPropertyDescriptor(from, name);
+    if (property) Object.defineProperty(to, name, property);
+  }
+}
+
+/** Nodes of a MeshBasicMaterial, which may be of glass. */
+export function throughGlass(edition: NodeEdition, material: Material, nodes: MaterialNodes): MaterialNodes {
+  const { colorNode } = nodes;
+  return colorNode && material.userData['lambentGlass'] !== undefined
+    ? { ...nodes, colorNode: edition.glass(colorNode) }
+    : nodes;
 }
 
 export const withoutNodes =
@@ -92,9 +176,6 @@ export const withoutNodes =
   'new LambentTransferPlugin(parser, nodes)';
 export const onlyGlsl = (what: string): string =>
   `is ${what}, which WebGPURenderer does not draw in this version; WebGLRenderer does`;
-/** Glass takes a draw of its own, which hooks of WebGLRenderer make. */
-export const glassRefusal = (material: Material): string | undefined =>
-  material.userData['lambentGlass'] === undefined ? undefined : onlyGlsl('seen through coloured glass');
 
 /** Throws LambentError where WebGPURenderer does not draw what it is given; asks it once it has begun. */
 export function checkNodes({ backend }: NodeRenderer, refusal: string | undefined): void {

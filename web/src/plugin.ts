@@ -8,6 +8,7 @@ import { transferKind, type BakedTransfer, type TransferSource } from './kinds.j
 import { loadLattice, type Lattice } from './lattice.js';
 import type { Lighting } from './lighting.js';
 import type { NodeEdition } from './node_edition.js';
+import { unpackView } from './packed_views.js';
 
 export interface BakedScene {
   transfer: BakedTransfer;
@@ -73,10 +74,16 @@ export const viewReader =
     return pieces.length === 1 ? pieces[0]! : joined(pieces);
   };
 
+interface BufferView {
+  buffer: number;
+  byteOffset?: number;
+  byteLength: number;
+  extensions?: Record<string, unknown>;
+}
 interface Document {
   asset?: { generator?: string };
   extensions?: Record<string, unknown>;
-  bufferViews?: unknown[];
+  bufferViews?: BufferView[];
   materials?: unknown[];
   nodes?: { mesh?: number }[];
   meshes?: { primitives?: { extensions?: Record<string, unknown> }[] }[];
@@ -98,6 +105,18 @@ export class LambentTransferPlugin implements GLTFLoaderPlugin {
     private readonly parser: GLTFParser,
     private readonly nodes?: NodeEdition,
   ) {}
+
+  /** Packed ones as glTF has them; null of others, which three reads. */
+  loadBufferView(index: number): Promise<ArrayBuffer> | null {
+    const view = (this.parser.json as Document).bufferViews?.[index],
+      packed = view?.extensions?.[extensionName];
+    if (!view || packed === undefined) return null;
+    return (async () => {
+      const buffer = (await this.parser.getDependency('buffer', view.buffer)) as ArrayBuffer,
+        begin = view.byteOffset ?? 0;
+      return unpackView(buffer.slice(begin, begin + view.byteLength), packed);
+    })();
+  }
 
   async afterRoot(gltf: GLTF): Promise<void> {
     const document = this.parser.json as Document;

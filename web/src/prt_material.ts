@@ -11,6 +11,7 @@ import {
 } from 'three';
 import type { BlockLayout } from './block_texture.js';
 import { setPeaks } from './light_sum.js';
+import { copyNodes } from './node_edition.js';
 import { drawFilter, glassParameters, type Drawn } from './see_through.js';
 import { glossFragmentDeclarations, glossVaryings, glossVertexBody } from './outgoing.js';
 import type { TurnedSums } from './turned.js';
@@ -261,14 +262,6 @@ export function chainHooks(
       set: (hook: () => string) => (cacheKey = hook),
     },
   });
-}
-
-/** The nodes of a material for its clone (node_edition.ts). */
-export function copyNodes(from: Material, to: Material): void {
-  for (const name of ['colorNode', 'colorNodeKey']) {
-    const property = Object.getOwnPropertyDescriptor(from, name);
-    if (property) Object.defineProperty(to, name, property);
-  }
 }
 
 export class PrtMaterial extends MeshBasicMaterial {

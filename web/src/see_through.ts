@@ -28,16 +28,7 @@ class FilterMaterial extends MeshBasicMaterial {
     private readonly share: number,
     parameters: MeshBasicMaterialParameters,
   ) {
-    super({
-      ...parameters,
-      transparent: true,
-      depthWrite: false,
-      fog: false,
-      toneMapped: false,
-      blending: CustomBlending,
-      blendSrc: ZeroFactor,
-      blendDst: SrcColorFactor,
-    });
+    super({ ...parameters, ...filterBlending });
   }
 
   override onBeforeCompile(shader: WebGLProgramParametersWithUniforms): void {
@@ -84,20 +75,39 @@ export function glassParameters(source: Material, own: MeshBasicMaterialParamete
   };
 }
 
+/** Of a glass material: its own without what makes it glass, and the share of light that passes. */
+export function filterParameters(
+  material: Material,
+): { share: number; parameters: MeshBasicMaterialParameters } | undefined {
+  const glass = glassOf(material);
+  if (!glass) return undefined;
+  const { side, map, alphaMap, alphaTest, opacity, vertexColors, depthTest } = material as MeshBasicMaterial;
+  return {
+    share: glass.share,
+    parameters: { side, map, alphaMap, alphaTest, opacity, vertexColors, depthTest, color: glass.color.clone() },
+  };
+}
+/** How a filter is blended: it multiplies what is there. */
+export const filterBlending = {
+  transparent: true,
+  depthWrite: false,
+  fog: false,
+  toneMapped: false,
+  blending: CustomBlending,
+  blendSrc: ZeroFactor,
+  blendDst: SrcColorFactor,
+} as const;
+
 /** What three tells a material of what it is about to draw. */
 export type Drawn = Parameters<Material['onBeforeRender']>;
 
 /** To be called before `material` is drawn: lets glass pass what is behind. */
 export function drawFilter(material: MeshBasicMaterial, ...[renderer, scene, camera, geometry, object]: Drawn): void {
-  const glass = glassOf(material);
-  if (!glass) return;
   let filter = filters.get(material);
   if (!filter) {
-    const { side, map, alphaMap, alphaTest, opacity, vertexColors, depthTest } = material;
-    const made = new FilterMaterial(glass.share, { side, alphaTest, opacity, vertexColors, depthTest });
-    made.color.copy(glass.color);
-    made.map = map;
-    made.alphaMap = alphaMap;
+    const found = filterParameters(material);
+    if (!found) return;
+    const made = new FilterMaterial(found.share, found.parameters);
     material.addEventListener('dispose', () => made.dispose());
     filters.set(material, (filter = made));
   }

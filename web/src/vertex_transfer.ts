@@ -22,12 +22,14 @@ import type { BakedTransfer, TransferSource } from './kinds.js';
 import type { Lighting } from './lighting.js';
 import {
   checkNodes,
-  glassRefusal,
   isNodeRenderer,
-  onlyGlsl,
   setNodes,
+  throughGlass,
   withoutNodes,
+  type MaterialNodes,
   type NodeEdition,
+  type NodeLobes,
+  type NodeRest,
   type NodeSum,
   type Renderer,
 } from './node_edition.js';
@@ -111,6 +113,8 @@ export interface VertexKind {
   fitErrors?: Float32Array;
   /** With a shader that is glossy. */
   last?: LastReflection;
+  /** Where values are lobes: how many, of a receiver or of each of its rows. */
+  lobeCount?: number;
   /** Where the values of a receiver are lobes. */
   readLobes?: (values: ArrayLike<number>) => Lobe[];
 }
@@ -136,12 +140,13 @@ export class VertexTransfer implements BakedTransfer {
   private readonly sums: TurnedSums<VertexSums> | undefined; // for WebGLRenderer
   private readonly ofCoefficients = new Set<TurnedSums<VertexSums>>();
   private readonly sum: NodeSum | undefined; // for WebGPURenderer
+  private readonly lobes: NodeLobes | undefined;
   /** Why WebGPURenderer does not draw this. */
-  private refusal: string | undefined;
+  private readonly refusal: string | undefined;
 
   private constructor(
     header: TransferHeader,
-    { kind, count, valueChannels, shader, readLobes, fitErrors, last }: VertexKind,
+    { kind, count, valueChannels, shader, readLobes, fitErrors, last, lobeCount }: VertexKind,
     values: ArrayBuffer,
     readonly meshes: Mesh[],
     nodes?: NodeEdition,
@@ -165,17 +170,18 @@ export class VertexTransfer implements BakedTransfer {
       prtHasPeaks: { value: false },
       ...(last && reflectionUniforms(last)),
     };
-    this.refusal = !nodes
-      ? withoutNodes
-      : shader.summed
-        ? undefined
-        : onlyGlsl(kind === 'zonal' ? 'made of zonal lobes' : 'a transfer matrix');
+    this.refusal = nodes ? undefined : withoutNodes;
     const summing = { layout, transfer: this.texture, channels: header.channels, receivers: header.receivers };
     if (shader.summed) {
       this.summing = summing;
       this.sums = new TurnedSums(() => new VertexSums(summing), header.order, new RestPose(meshes));
     }
-    if (!this.refusal) this.sum = nodes!.sum(summing);
+    if (nodes && shader.summed) this.sum = nodes.sum(summing);
+    else if (lobeCount !== undefined)
+      this.lobes = nodes?.lobes({
+        ...{ layout, transfer: this.texture, order: header.order, channels: header.channels, lobes: lobeCount },
+        ...(last && { last }),
+      });
     let gpuBytes =
       data.byteLength + (last ? reflectionBytes(last) : 0) + (this.sums?.main.bytes ?? 0) + (this.sum?.bytes ?? 0);
     for (const mesh of meshes) {
@@ -198,10 +204,9 @@ export class VertexTransfer implements BakedTransfer {
         key = `${source.uuid} ${twoSided} ${rest ? mesh.uuid : ''}`;
       const material = this.materials.get(key) ?? new PrtMaterial(this.uniforms, options, diffuseParameters(source));
       this.materials.set(key, material);
-      this.refusal ??= glassRefusal(material);
       setNodes(
         material,
-        this.refusal === undefined ? nodes!.atVertices(this.sum!, twoSided) : undefined,
+        nodes && throughGlass(nodes, material, this.nodesFor(nodes, mesh, twoSided, rest)),
         `The baked scene ${this.refusal}.`,
       );
       mesh.material = material;
@@ -236,6 +241,13 @@ export class VertexTransfer implements BakedTransfer {
         for (const lobe of lobes) lobe.axis.applyMatrix3(frame);
         return lobes;
       };
+  }
+
+  private nodesFor(nodes: NodeEdition, mesh: Mesh, twoSided: boolean, rest: PrtOptions['rest']): MaterialNodes {
+    if (this.sum) return { colorNode: nodes.atVertices(this.sum, twoSided) };
+    const pose: NodeRest =
+      'bones' in rest! ? { bones: rest.bones, count: (mesh as SkinnedMesh).skeleton.bones.length } : rest!;
+    return this.lobes!.material(twoSided, pose);
   }
 
   private restOf(mesh: Mesh): NonNullable<PrtOptions['rest']> {
@@ -292,6 +304,7 @@ export class VertexTransfer implements BakedTransfer {
     this.uniforms.prtHasPeaks.value = peaks !== undefined; // materials take it when they are drawn
     this.sums?.set(rest, peaks);
     this.sum?.set(rest, peaks, true);
+    this.lobes?.set(rest, peaks);
   }
 
   coefficientMaterials(index: number, gain: { value: number }): Material[] {

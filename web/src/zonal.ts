@@ -167,6 +167,7 @@ export const zonalKind: TransferKind = {
         count: zonalValues(order, lobes, channels),
         valueChannels: last.rows,
         last,
+        lobeCount: lobes,
         shader: glossyShader(order, lobes, channels, last),
         ...(fitErrors && { fitErrors }),
       });
@@ -175,6 +176,7 @@ export const zonalKind: TransferKind = {
       kind: 'zonal',
       count: zonalValues(order, lobes, channels),
       valueChannels: 1,
+      lobeCount: lobes,
       shader: zonalShader(order, lobes, channels),
       ...(fitErrors && { fitErrors }),
       readLobes: (values) => readLobes(values, order, exactZonalBands(order, lobes), lobes, channels),

@@ -124,6 +124,8 @@ Result<BakedFields> read_fields(const GltfBuffers& buffers, const std::string& p
   if (*version != size_t(baked_file_version))
     return Error{path, "was baked with file version " + std::to_string(*version) + "; this program reads version " +
                            std::to_string(baked_file_version)};
+  if (extension.contains("packed"))
+    return Error{path, "is packed for browsers (`lambent export --web --pack`): read the file that it was made from"};
   const auto t = extension.find("transfer");
   if (t == extension.end() || !t->is_object()) return Error{where, "\"transfer\" is missing"};
   const BlobReader in{buffers};

@@ -84,6 +84,7 @@ function shownNodes(root: Root): Node[] {
 export class LambentTransfer extends Extension {
   static override readonly EXTENSION_NAME = extensionName;
   override readonly extensionName = extensionName;
+  override readonly prereadTypes = [PropertyType.BUFFER];
   override readonly prewriteTypes = [PropertyType.BUFFER];
   // Installed before anything is laid out: the attributes leave the document then, before other extensions see them.
   override readonly writeDependencies = ['lambent.parts'];
@@ -91,6 +92,14 @@ export class LambentTransfer extends Extension {
   private readonly detached = new Map<Primitive, Held[]>();
   private written: WrittenPart[] = [];
   private readonly views = new Map<Uint8Array, Uint8Array>(); // as they are, and padded
+
+  /** Before accessors are read, whose bytes are others in such a file. */
+  override preread(context: ReaderContext): this {
+    const extension = (context.jsonDoc.json as Extensions).extensions?.[extensionName];
+    if (isObject(extension) && extension['packed'] !== undefined)
+      return fail('is packed for browsers (lambent export --web --pack): read the file that it was made from');
+    return this;
+  }
 
   override read(context: ReaderContext): this {
     const json = context.jsonDoc.json as Extensions,

@@ -1,0 +1,178 @@
+// T . light in nodes, for WebGPURenderer: a float picture, a texel a row of each receiver, drawn when the light changes
+// and only looked up until then.
+import {
+  DataTexture,
+  FloatType,
+  HalfFloatType,
+  LinearFilter,
+  NearestFilter,
+  RedIntegerFormat,
+  UnsignedIntType,
+  Vector4,
+  type Node,
+} from 'three/webgpu';
+import {
+  attribute,
+  Fn,
+  int,
+  ivec2,
+  rtt,
+  screenCoordinate,
+  select,
+  texture,
+  textureLoad,
+  uint,
+  uniform,
+  uniformArray,
+  vec3,
+  vec4,
+} from 'three/tsl';
+import { loop } from './node_loop.js';
+import type { NodeSum, NodeSumOptions } from './node_edition.js';
+
+/** Rows of receivers a row of the picture. */
+export const sumColumns = 2048;
+
+export type Picture = ReturnType<typeof rtt>;
+type Vectors = ReturnType<typeof uniformArray<'vec4'>>;
+
+const vectors = (quads: number): Vector4[] => Array.from({ length: 3 * quads }, () => new Vector4(0, 0, 0, 0));
+
+/** [column][3] to red, green and blue in whole vectors; zero where there are no more. */
+export function pack(out: Vector4[], light: ArrayLike<number>): void {
+  const quads = out.length / 3;
+  for (let c = 0; c < 3; ++c)
+    for (let k = 0; k < 4 * quads; ++k) out[c * quads + (k >> 2)]!.setComponent(k & 3, light[3 * k + c] ?? 0);
+}
+
+/** WebGPU has names of its own for what WebGL's texture is. */
+function namedAnew(of: DataTexture | undefined): DataTexture | undefined {
+  if (!of) return undefined;
+  const whose = new DataTexture(of.image.data, of.image.width, of.image.height);
+  whose.format = RedIntegerFormat;
+  whose.type = UnsignedIntType;
+  whose.needsUpdate = true;
+  return whose;
+}
+
+/** The receiver of the texel that is drawn (-1: none) and its row. */
+function pick({ receiversOf, rows = 1 }: NodeSumOptions, whose: DataTexture | undefined): [Node<'int'>, Node<'int'>] {
+  const texel = ivec2(screenCoordinate).toVar();
+  if (whose && receiversOf) {
+    const { height } = receiversOf.image;
+    return [
+      int(textureLoad(texture(whose), ivec2(texel.x, texel.y.mod(int(height)))).r).toVar(),
+      texel.y.div(int(height)).toVar(),
+    ];
+  }
+  // What is drawn beyond the last receiver is not looked up.
+  const i = texel.y.mul(sumColumns).add(texel.x).toVar();
+  return [i.div(int(rows)).toVar(), i.mod(int(rows)).toVar()];
+}
+
+export class Sum implements NodeSum {
+  readonly picture: Picture;
+  /** Where peaks are apart; one texel until there are any. */
+  readonly peakPicture: Picture | undefined;
+  /** 1 where they count. */
+  readonly hasPeaks = uniform(0);
+  /** Nodes that look it up, by whether surfaces have two sides. */
+  readonly made = new Map<boolean, Node<'vec4'>>();
+  private readonly light: Vector4[];
+  private readonly peaks: Vector4[];
+  private readonly whose: DataTexture | undefined;
+  private readonly holds = uniform(0);
+  private readonly width: number;
+  private readonly height: number;
+
+  constructor(readonly options: NodeSumOptions) {
+    const { layout, receivers, receiversOf, rows = 1, apart = false } = options,
+      { quads } = layout;
+    this.light = vectors(quads);
+    this.peaks = vectors(quads);
+    this.whose = namedAnew(receiversOf);
+    const light = uniformArray<'vec4'>(this.light, 'vec4'),
+      peaks = uniformArray<'vec4'>(this.peaks, 'vec4');
+    [this.width, this.height] = receiversOf
+      ? [receiversOf.image.width, rows * receiversOf.image.height]
+      : [Math.min(sumColumns, rows * receivers), Math.ceil((rows * receivers) / sumColumns)];
+    this.picture = this.draw(apart ? [light] : [light, peaks], 'lambent sum');
+    if (apart) this.peakPicture = this.draw([peaks], 'lambent peaks');
+  }
+
+  get bytes(): number {
+    const { receiversOf, rows = 1 } = this.options;
+    return (receiversOf || rows > 1 ? 8 : 16) * this.width * this.height;
+  }
+
+  /** A picture of transfer times each of these lights; of two, each is held at 0 or above where `holds` says. */
+  private draw(lights: Vectors[], name: string): Picture {
+    const { options, whose, holds } = this,
+      { layout, transfer, channels, receiversOf, rows = 1 } = options,
+      { quads } = layout;
+    const exit = Fn(() => {
+      const [r, row] = pick(options, whose);
+      const x = r.bitAnd(layout.columns - 1).mul(layout.texels),
+        line = r.div(layout.columns);
+      const at = ivec2(x.add(row.mul(channels * quads)), line.bitAnd(layout.rows - 1)).toVar(),
+        slice = line.div(layout.rows).toVar(),
+        sums = lights.map(() => vec3(0).toVar());
+      loop(int(quads), 'i', (i) => {
+        const read = (c: number): Node<'vec4'> =>
+          textureLoad(texture(transfer), at.add(ivec2(i.add(c * quads), 0))).depth(slice);
+        const red = read(0).toVar(),
+          green = channels === 3 ? read(1).toVar() : red,
+          blue = channels === 3 ? read(2).toVar() : red;
+        lights.forEach((of, k) =>
+          sums[k]!.addAssign(
+            vec3(red.dot(of.element(i)), green.dot(of.element(i.add(quads))), blue.dot(of.element(i.add(2 * quads)))),
+          ),
+        );
+      });
+      const [rest, peak] = sums as unknown as [Node<'vec3'>, Node<'vec3'>?],
+        sum = peak ? select(holds.greaterThan(0.5), rest.max(0).add(peak.max(0)), rest.add(peak)) : rest;
+      return vec4(select(r.lessThan(0), vec3(0), sum), 1);
+    });
+    const filter = receiversOf ? LinearFilter : NearestFilter,
+      [width, height] = name === 'lambent peaks' ? [1, 1] : [this.width, this.height];
+    const made = rtt(exit(), width, height, {
+      // Half floats where pixels look between texels, which not every device does with single ones.
+      type: receiversOf || rows > 1 ? HalfFloatType : FloatType,
+      minFilter: filter,
+      magFilter: filter,
+      depthBuffer: false,
+      generateMipmaps: false,
+      autoUpdate: false,
+    });
+    // For every picture that is asked for, not only once between two of the screen's.
+    made.updateBeforeType = 'render';
+    made.name = name;
+    return made;
+  }
+
+  set(light: ArrayLike<number>, peaks: ArrayLike<number> | undefined, holds: boolean): void {
+    const { peakPicture } = this;
+    pack(this.light, light);
+    pack(this.peaks, peaks ?? []);
+    this.holds.value = peaks && holds ? 1 : 0;
+    this.hasPeaks.value = peaks ? 1 : 0;
+    this.picture.textureNeedsUpdate = true;
+    if (!peakPicture || !peaks) return;
+    if (peakPicture.renderTarget!.width !== this.width || peakPicture.renderTarget!.height !== this.height)
+      peakPicture.setSize(this.width, this.height);
+    peakPicture.textureNeedsUpdate = true;
+  }
+
+  dispose(): void {
+    this.picture.dispose();
+    this.peakPicture?.dispose();
+    this.whose?.dispose();
+  }
+}
+
+/** The receiver of a vertex: its number, 0 where it has none, and whether it has none. */
+export function receiverAt(name: string): { r: Node<'int'>; none: Node<'bool'> } {
+  const receiver = attribute<'uint'>(name, 'uint'),
+    none = receiver.equal(uint(0xffffffff));
+  return { r: int(select(none, uint(0), receiver)), none };
+}
