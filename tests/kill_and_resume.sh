@@ -75,7 +75,7 @@ declare -A kinds=(
   [lightmap]="--transfer lightmap --atlas 128x128 --samples 256 --light-groups --sky uniform:0.3 --bounces 3"
   [converge]="--transfer lightmap --atlas 96x96 --samples 256 --bounces converge:1e-4"
   [rooms]="--max-edge 0.15 --samples 128 --rooms rooms.json --rooms-error 0.0005"
-  [fields]="--max-edge 0.15 --samples 128 --rooms rooms.json --rooms-error 0.1"
+  [fields]="--max-edge 0.2 --samples 4096 --order 2 --rooms rooms.json --rooms-error 0.1"
   [haar]="--light haar:16,keep=0.1 --max-edge 0.16"
   [indirect]="--transfer indirect --max-edge 0.15 --surfels 1024"
   [directional]="--transfer lightmap --atlas 96x96 --samples 128 --directional sh:2 --bounces 2"

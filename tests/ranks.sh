@@ -92,7 +92,7 @@ declare -A kinds=(
   [directional]="--transfer lightmap --atlas 64x64 --samples 32 --directional sh:2 --bounces 2"
   [view]="--max-edge 0.2 --samples 32 --fix-view auto --size 48x32 --spp 4"
   [rooms]="--max-edge 0.2 --samples 64 --rooms rooms.json --rooms-error 0.001"
-  [fields]="--max-edge 0.2 --samples 64 --rooms rooms.json --rooms-error 0.1"
+  [fields]="--max-edge 0.2 --samples 4096 --order 2 --rooms rooms.json --rooms-error 0.1"
   [alone]="--transfer lightmap --atlas 32x32 --samples 32 --bounces converge:1e-2 --solver southwell"
 )
 echo '{"rooms": [{"name": "a", "min": [0,-1,0], "max": [0.7,2,2]}, {"name": "b", "min": [0.7,-1,0], "max": [1.3,2,0.7]},
