@@ -23,7 +23,7 @@ expect 0 'shadow rays' render indirect.glb $seen --lamp point@0.4,0.6,0.5=3 --mo
   --time 1 -o there.exr
 expect 0 'shadow rays' render indirect.glb $seen --lamp point@0.8,0.5,0.5=3 -o same.exr
 alike 100 "a lamp that has moved there, and one that stands there" there.exr same.exr
-expect 2 'time: needs --animation, or --move' render indirect.glb $seen --lamp point@0,1,0=1 --time 1 -o x.png
+expect 2 'time: needs --animation, --move or --pose' render indirect.glb $seen --lamp point@0,1,0=1 --time 1 -o x.png
 expect 2 'frames: needs --move' render indirect.glb $seen --lamp point@0,1,0=1 --frames 0:1 -o x.png
 expect 2 'albedo: the file has no material' render indirect.glb $seen --lamp point@0,1,0=1 --albedo none=1 \
   -o x.png

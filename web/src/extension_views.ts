@@ -40,6 +40,7 @@ export const plainKeys: readonly string[] = [
   'gatherLevel',
   'grid',
   'height',
+  'incidentOrder',
   'lobeCount',
   'mapCount',
   'order',
