@@ -9,10 +9,12 @@ expect 0 'receivers' bake corner.obj --max-edge 0.2 --samples 64 -o corner.glb
 sun=sky:elevation=55,azimuth=120,width=256
 shot="--camera 3,2,4,1,0.5,1,40 --size 48x32 --background none"
 for light in "sh:5+lamps:2@$sun" directional:16 compact:16 steerable:4; do
+  none=()
+  [ $light = steerable:4 ] && none=(--window none)
   expect 0 'lobe' bake corner.obj --max-edge 0.1 --samples 1024 --light "$light" -o lamps.glb
   expect 0 '(sharpness|turned copy about)' inspect lamps.glb
   # shellcheck disable=SC2086
-  expect 0 'relit' render lamps.glb --env $sun --env-rotate 20,0,0 $shot --spp 256 -o lamps_lit.exr
+  expect 0 'relit' render lamps.glb --env $sun --env-rotate 20,0,0 "${none[@]}" $shot --spp 256 -o lamps_lit.exr
   # shellcheck disable=SC2086
   expect 0 'paths' reference corner.obj --max-edge 0.1 --env $sun --env-rotate 20,0,0 --light-basis lamps.glb $shot \
     --spp 256 -o lamps_truth.exr
@@ -20,18 +22,26 @@ for light in "sh:5+lamps:2@$sun" directional:16 compact:16 steerable:4; do
 done
 # Turned copies of one lobe are harmonics in other words, and turn as they do; lobes that stand still do not.
 for light in sh:4 steerable:4 compact:16; do
-  none=()
-  [ $light = sh:4 ] && none=(--window none)
+  none=(--window none)
+  [ $light = compact:16 ] && none=()
   expect 0 'receivers' bake corner.obj --max-edge 0.2 --samples 256 --denoise off --precision single --light $light \
     -o ${light%:*}.glb
   # shellcheck disable=SC2086
   expect 0 'relit' render ${light%:*}.glb --env $sun --env-rotate 75,20,-40 "${none[@]}" $shot -o ${light%:*}_turned.exr
 done
 alike 90 "steerable lobes and harmonics" steerable_turned.exr sh_turned.exr --exposure -3
+for light in sh steerable; do  # neither rings if nothing is said
+  # shellcheck disable=SC2086
+  expect 0 'relit' render $light.glb --env $sun --env-rotate 75,20,-40 $shot -o ${light}_held.exr
+done
+alike 90 "steerable lobes and harmonics without ringing" steerable_held.exr sh_held.exr --exposure -3
+# shellcheck disable=SC2086
+expect 0 ' 0\.0 % darker than black' render steerable.glb --env $sun --env-rotate 75,20,-40 $shot -o steerable_held.png
 expect 0 '16 compact lobes' inspect compact.glb
 expect 0 '"lobe_kind": "band_limited"' inspect steerable.glb --json
 expect 0 'of 4 bands' inspect steerable.glb
-expect 2 'window: shapes harmonics' render steerable.glb --env $sun --window hann -o x.png
+expect 2 'window: of steerable lobes is auto or none' render steerable.glb --env $sun --window hann -o x.png
+expect 2 'window: shapes harmonics' render compact.glb --env $sun --window none -o x.png
 expect 2 'light-order: counts bands' render compact.glb --env $sun --light-order 2 -o x.png
 expect 1 'holds lobes of light, which the web page does not draw' export compact.glb --web site_lobes
 expect 2 'lattice: is lit by harmonics alone' bake corner.obj --light compact:16 --lattice 2,2,2 -o x.glb

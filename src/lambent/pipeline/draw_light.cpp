@@ -8,6 +8,7 @@
 #include <fmt/ranges.h>
 
 #include <algorithm>
+#include <numeric>
 
 namespace lambent {
 
@@ -51,17 +52,25 @@ const KnownHarmonics* harmonics_for(const Surroundings& around, int order) {
   return around.known && around.known->order == order ? around.known.get() : nullptr;
 }
 
-// --window auto. Lobes in the basis hold the lamps already.
+// --window auto. Lobes that stand still hold the lamps already; turned copies of one ring as the bands do that they
+// span.
 void find_peaks(const DrawRequest& request, const Surroundings& around, const LightBasis& basis, ColumnLight& out) {
-  if (!basis.lobes.empty() || basis.order == 0) return;
-  const int order = request.light_order ? std::min(request.light_order, basis.order) : basis.order;
+  const bool copies = basis.order == 0 && !basis.lobes.empty() && basis.lobe_kind == LobeKind::band_limited;
+  if (!copies && (!basis.lobes.empty() || basis.order == 0)) return;
+  const int bands = copies ? int(basis.lobes[0].sharpness) : basis.order;
+  const int order = request.light_order ? std::min(request.light_order, bands) : bands;
   const std::vector<Vec3>& all = out.projection.light;
-  const KnownHarmonics* known = harmonics_for(around, order);
+  const KnownHarmonics* known = copies ? nullptr : harmonics_for(around, order);
   if (known && known->rest.empty()) known = nullptr;
   const std::vector<Vec3> rest =
       known ? project_light(known->rest, basis, around.rotation).light
-            : project_light(without_peaks(*around.env, order), basis, around.rotation, order).light;
-  const double light = luminance(all[0]), sharp = luminance(all[0] - rest[0]);
+            : project_light(without_peaks(*around.env, order), basis, around.rotation, copies ? 0 : order).light;
+  // As much as is proportional to all light: that of the first harmonic, or of all copies, which are of one integral.
+  const auto luminance_of = [&](const std::vector<Vec3>& light) {
+    return luminance(
+        std::accumulate(light.begin(), light.begin() + (copies ? ptrdiff_t(basis.lobes.size()) : 1), Vec3(0.0f)));
+  };
+  const double light = luminance_of(all), sharp = light - luminance_of(rest);
   if (!(sharp > least_sharp * light)) return;
   out.sharp = sharp / light, out.lamps_found = known ? known->lamps : int(find_lamps(*around.env, 8).size());
   for (size_t k = 0; k < all.size(); ++k) out.peaks.push_back(all[k] - rest[k]);

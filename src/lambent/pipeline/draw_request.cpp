@@ -281,8 +281,12 @@ Result<void> check_draw(const DrawRequest& request, const Baked& baked) {
   if (lit && (light.order > 0 || !light.lobes.empty() || kind == DrawKind::wavelets) && request.env.empty() &&
       request.sphere_lamp.empty())
     return Error{"--env", "is needed: the file is baked for distant light", true};
-  if (light.order == 0 && is_given(request, "window"))
-    return Error{"--window", "shapes harmonics, and the file is baked for none", true};
+  const bool copies = !light.lobes.empty() && light.lobe_kind == LobeKind::band_limited;
+  if (light.order == 0 && is_given(request, "window")) {
+    if (!copies) return Error{"--window", "shapes harmonics, and the file is baked for none", true};
+    if (request.window != "auto" && request.window != "none")
+      return Error{"--window", "of steerable lobes is auto or none: others shape harmonics", true};
+  }
   if (light.order == 0 && request.light_order > 0)
     return Error{"--light-order", "counts bands of harmonics, and the file is baked for none", true};
   const Outgoing* outgoing = outgoing_of(baked.surface);
