@@ -237,7 +237,7 @@ std::function<RayShade()> LivePicture::State::shade_maker(RenderOptions& options
   if (!peaks.values.empty()) options.peaks = &peaks;
   if (const auto* directional = std::get_if<DirectionalRows>(&rows)) options.directional = directional->kind;
   options.outgoing = !company ? std::get_if<Outgoing>(&rows) : company->outgoing ? &*company->outgoing : nullptr;
-  return by_number(pass, relit_shade(scene(), basis(), relit, options));
+  return relit_shade(pass, scene(), basis(), relit, options);
 }
 
 std::function<Vec3(Vec3)> LivePicture::State::background() const {
@@ -281,6 +281,10 @@ Result<void> LivePicture::State::add_sample(bool hurry) {
   if (!pass) return pass.error();
   if (due.values && seen.empty() && hurry && can_shade_what_is_seen()) return {};  // shaded first, now that rays tell
   const auto start = LiveClock::now();
+  auto& kept = rays[size_t(scale)];
+  if (columns && !kind && look == Look::picture && size_t(sums.samples) < kept.size() &&
+      kept[size_t(sums.samples)].colours.empty())
+    find_colours(scene(), kept[size_t(sums.samples)]);
   if (is_overlay(look)) {
     image = paint_look({look, number, scene(), basis(), relit, measured}, baked, *rays_of(), **pass, view);
     sums.samples = asked.spp, shade_cost = seconds_from(start) / double((*pass)->begin.size());

@@ -89,9 +89,8 @@ Vec3 shown_colour(const Scene& scene, const RenderOptions& options, const Hit& h
 // O(view) at a hit, as what it is, a row of numbers: radiance is the sum over all add(receiver, row, weight) of weight
 // times that row of T . light. `weights` is scratch, a value a row.
 template <class Add>
-void reflect_at(const Scene& scene, const SpatialBasis& basis, const RenderOptions& options, const Hit& hit,
-                Vec3 direction, std::span<ViewWeights> weights, Add add) {
-  const Vec3 colour = shown_colour(scene, options, hit);
+void reflect_at(const SpatialBasis& basis, const RenderOptions& options, const Hit& hit, Vec3 direction, Vec3 colour,
+                std::span<ViewWeights> weights, Add add) {
   std::visit(
       [&](const auto& b) {
         const auto* at = b.find(hit.triangle, hit.front);
@@ -174,27 +173,65 @@ Vec3 directional_light(const Scene& scene, const SpatialBasis& basis, const Reli
 
 }  // namespace
 
-std::function<SurfaceShade()> relit_shade(const Scene& scene, const SpatialBasis& basis, const Relit& relit,
-                                          const RenderOptions& options) {
+namespace {
+
+// Radiance at a hit; colour(): what the light there is multiplied by. `weights` is scratch, a value a row.
+template <class Colour>
+Vec3 relit_at(const Scene& scene, const SpatialBasis& basis, const Relit& relit, const RenderOptions& options,
+              const Hit& hit, Vec3 direction, std::span<ViewWeights> weights, Colour colour) {
+  const Triangle& triangle = scene.triangles[hit.triangle];
+  if (options.show == RenderOptions::Show::albedo) return albedo(scene, triangle, hit.u, hit.v);
+  Vec3 sum(0.0f);
+  if (!options.emission.empty() && emits(scene, triangle, hit.front))
+    sum += options.emission[scene.parts[triangle.part].material] * emission_texel(scene, triangle, hit.u, hit.v);
+  if (options.directional != DirectionalKind::none)
+    return sum + colour() * directional_light(scene, basis, relit, options, hit);
+  Vec3 whole(0.0f), peaks(0.0f);
+  reflect_at(basis, options, hit, direction, colour(), weights, [&](uint32_t receiver, int row, Vec3 weight) {
+    whole += weight * relit.at(receiver, row);
+    if (options.peaks) peaks += weight * options.peaks->at(receiver, row);
+  });
+  return sum + (options.peaks ? dering(whole, peaks) : whole);
+}
+
+void check_rows(const Relit& relit, const RenderOptions& options) {
   LAMBENT_CHECK(options.outgoing ? relit.rows == options.outgoing->rows()
                                  : relit.rows == directional_rows(options.directional));
+}
+
+}  // namespace
+
+std::function<SurfaceShade()> relit_shade(const Scene& scene, const SpatialBasis& basis, const Relit& relit,
+                                          const RenderOptions& options) {
+  check_rows(relit, options);
   return [&]() -> SurfaceShade {
     return [&, weights = std::vector<ViewWeights>(size_t(relit.rows))](const Hit& hit, Vec3 direction) mutable {
-      const Triangle& triangle = scene.triangles[hit.triangle];
-      if (options.show == RenderOptions::Show::albedo) return albedo(scene, triangle, hit.u, hit.v);
-      Vec3 sum(0.0f);
-      if (!options.emission.empty() && emits(scene, triangle, hit.front))
-        sum += options.emission[scene.parts[triangle.part].material] * emission_texel(scene, triangle, hit.u, hit.v);
-      if (options.directional != DirectionalKind::none)
-        return sum + shown_colour(scene, options, hit) * directional_light(scene, basis, relit, options, hit);
-      Vec3 whole(0.0f), peaks(0.0f);
-      reflect_at(scene, basis, options, hit, direction, weights, [&](uint32_t receiver, int row, Vec3 weight) {
-        whole += weight * relit.at(receiver, row);
-        if (options.peaks) peaks += weight * options.peaks->at(receiver, row);
-      });
-      return sum + (options.peaks ? dering(whole, peaks) : whole);
+      return relit_at(scene, basis, relit, options, hit, direction, weights,
+                      [&] { return shown_colour(scene, options, hit); });
     };
   };
+}
+
+std::function<RayShade()> relit_shade(const ViewRays& view, const Scene& scene, const SpatialBasis& basis,
+                                      const Relit& relit, const RenderOptions& options) {
+  if (view.colours.empty() || options.show != RenderOptions::Show::product)
+    return by_number(view, relit_shade(scene, basis, relit, options));
+  check_rows(relit, options);
+  return [&]() -> RayShade {
+    return [&, weights = std::vector<ViewWeights>(size_t(relit.rows))](size_t ray) mutable {
+      const ViewRay& r = view.rays[ray];
+      return relit_at(scene, basis, relit, options, r.hit, r.direction, weights, [&] { return view.colours[ray]; });
+    };
+  };
+}
+
+void find_colours(const Scene& scene, ViewRays& view) {
+  view.colours.assign(view.rays.size(), Vec3(0.0f));
+  parallel_for(view.rays.size(), 4096, [&](size_t begin, size_t end) {
+    for (size_t i = begin; i < end; ++i)
+      if (const Hit& hit = view.rays[i].hit; hit.triangle != none)
+        view.colours[i] = albedo(scene, scene.triangles[hit.triangle], hit.u, hit.v);
+  });
 }
 
 Result<Image> render(const Scene& scene, const Tracer& tracer, const SpatialBasis& basis, const Relit& relit,
@@ -297,7 +334,8 @@ Result<FixedViewTransfer> fix_view(const Scene& scene, const Tracer& tracer, con
               continue;
             }
             reflect_at(
-                scene, basis, options, ray.hit, ray.direction, weights, [&](uint32_t receiver, int r, Vec3 weight) {
+                basis, options, ray.hit, ray.direction, shown_colour(scene, options, ray.hit), weights,
+                [&](uint32_t receiver, int r, Vec3 weight) {
                   auto place =
                       std::find_if(asked.begin(), asked.end(), [&](const Asked& a) { return a.first == receiver; });
                   if (place == asked.end())

@@ -74,7 +74,10 @@ struct ViewRays {
   int width = 0, height = 0, samples = 0;
   std::vector<ViewRay> rays;
   std::vector<uint32_t> begin;
+  std::vector<Vec3> colours = {};  // of what each ray met, where find_colours() has looked
 };
+// Base colours, which do not change with the light, at what the rays met.
+void find_colours(const Scene& scene, ViewRays& view);
 // Samples [first, first + count) of those that render() takes. Errors: cancelled.
 Result<ViewRays> trace_view(const Scene& scene, const Tracer& tracer, const Camera& camera, int width, int height,
                             int first, int count, Progress* progress = nullptr);
@@ -97,6 +100,10 @@ void shade_rays(const ViewRays& view, const std::function<SurfaceShade()>& make_
                 const std::function<Vec3(Vec3)>& background, ViewSums& sums);
 // The one as the other; `view` must outlive it.
 std::function<RayShade()> by_number(const ViewRays& view, std::function<SurfaceShade()> make_shade);
+// As relit_shade() of what was met, by the rays' colours where they are known. All but the function itself must outlive
+// it.
+std::function<RayShade()> relit_shade(const ViewRays& view, const Scene& scene, const SpatialBasis& basis,
+                                      const Relit& relit, const RenderOptions& options);
 Image mean_of(const ViewSums& sums, int width, int height);
 
 }  // namespace lambent
