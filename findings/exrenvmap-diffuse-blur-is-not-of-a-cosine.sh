@@ -14,7 +14,8 @@ trap 'rm -rf "$folder"' EXIT
 cd "$folder"
 apt-get download -qq openexr=3.1.5-5 libopenexr-3-1-30=3.1.5-5 libimath-3-1-29=3.1.6-1 >/dev/null 2>&1
 for package in *.deb; do dpkg -x "$package" root; done
-export LD_LIBRARY_PATH=$folder/root/usr/lib/x86_64-linux-gnu
+LD_LIBRARY_PATH=$(dirname "$(find "$folder/root" -name 'libOpenEXR-*.so*' | head -n 1)")
+export LD_LIBRARY_PATH
 cat >maps.py <<'P'
 import math, struct, subprocess, zlib
 

@@ -55,14 +55,16 @@ struct Gathering {
       leaf = surfels.parents[surfels.first_parent(level) + leaf];
     return uint32_t(surfels.first_node(level)) + leaf;
   }
-  // Sends a fan of `set`, turned as for `key` about the pole. The share of rays that met backs of one-sided surfaces.
-  double send(const DirectionSets& fans, Vec3 origin, Vec3 pole, uint64_t key, bool counts, std::vector<Met>& met,
-              Row& row) const;
+  // Sends a fan of `set`, turned as for `key` about the pole, but for rays that go below the plane of `above` (0: none
+  // do). The share of rays that met backs of one-sided surfaces.
+  double send(const DirectionSets& fans, Vec3 origin, Vec3 pole, Vec3 above, uint64_t key, bool counts,
+              std::vector<Met>& met, Row& row) const;
+  Vec3 true_normal(Vec3 origin, Vec3 n, float lift) const;
   void meet(uint32_t surfel, std::vector<Met>& met, Row& row) const;
   void compress(std::vector<Met>& met, Row& row) const;
 };
 
-double Gathering::send(const DirectionSets& fans, Vec3 origin, Vec3 pole, uint64_t key, bool counts,
+double Gathering::send(const DirectionSets& fans, Vec3 origin, Vec3 pole, Vec3 above, uint64_t key, bool counts,
                        std::vector<Met>& met, Row& row) const {
   const DirectionChoice choice = choose_directions(fans, pole, options.seed, key);
   const size_t at = size_t(choice.set) * fans.stride;
@@ -70,6 +72,7 @@ double Gathering::send(const DirectionSets& fans, Vec3 origin, Vec3 pole, uint64
   met.clear();
   for (size_t i = 0; i < size_t(fans.samples); ++i) {
     const Vec3 d = choice.rotation * Vec3(fans.x[at + i], fans.y[at + i], fans.z[at + i]);
+    if (dot(d, above) < 0) continue;
     Passage passage;
     const Hit hit = tracer.lets_pass() ? tracer.closest(origin, d, passage) : tracer.closest(origin, d);
     if (hit.triangle == none) continue;
@@ -89,11 +92,19 @@ double Gathering::send(const DirectionSets& fans, Vec3 origin, Vec3 pole, uint64
   return double(backs) / double(fans.samples);
 }
 
+// Of the face that a surfel lies on, whose own normal is interpolated: what lies below the face is the face itself.
+Vec3 Gathering::true_normal(Vec3 origin, Vec3 n, float lift) const {
+  const Hit under = tracer.closest(origin, -n, 0, 4 * lift);
+  if (under.triangle == none) return n;
+  const Vec3 face = unit_normal(scene, scene.triangles[under.triangle], n);
+  return dot(face, n) < 0 ? -face : face;
+}
+
 void Gathering::meet(uint32_t surfel, std::vector<Met>& met, Row& row) const {
   const Vec3 n = surfels.normals[surfel];
-  const Vec3 origin = surfels.positions[surfel] +
-                      n * receiver_lift(surfels.positions[surfel], surfels.spacings.back(), diagonal);
-  send(sets, origin, n, surfel, true, met, row);
+  const float lift = receiver_lift(surfels.positions[surfel], surfels.spacings.back(), diagonal);
+  const Vec3 origin = surfels.positions[surfel] + n * lift;
+  send(sets, origin, n, true_normal(origin, n, lift), surfel, true, met, row);
 }
 
 // Merges by node, leaves the smallest out, rounds to bytes.
@@ -289,7 +300,7 @@ Result<void> gather_lattice(IndirectTransfer& t, const Gathering& g, IndirectRep
       // A pole of its own and a spin about it: every point's directions are turned at random.
       const uint64_t bits = hash64(hash64(g.options.seed, 0x1a771ce), p);
       const Vec3 pole = square_to_sphere({to_unit_float(uint32_t(bits >> 32)), to_unit_float(uint32_t(bits))});
-      f.valid[p] = g.send(sets, f.lattice.position(p), pole, p, false, met, rows[p]) <= 0.5;
+      f.valid[p] = g.send(sets, f.lattice.position(p), pole, Vec3(0.0f), p, false, met, rows[p]) <= 0.5;
       if (f.valid[p]) g.compress(met, rows[p]);
     }
   });

@@ -66,6 +66,13 @@ std::vector<Vec3> lit_by(const Made& m, Vec3 lamp, Vec3 intensity) {
   return direct;
 }
 
+TEST(Indirect, AConvexBodyAloneGathersNothing) {
+  // Faces of a coarse ball, with normals interpolated: by up to 20 degrees others than theirs.
+  const auto m = make(make_sphere(1, 1, Vec3(0.9f)), 512, 256);
+  EXPECT_GT(m->transfer.gathering(), 50u);
+  EXPECT_EQ(m->transfer.gather.nodes.size(), 0u);
+}
+
 TEST(Indirect, ClosedBoxGivesOneOverOneLessAlbedo) {
   const auto m = make(closed_box(0.5f), 1024, 256);
   IndirectSolve s = make_indirect_solve(m->transfer);

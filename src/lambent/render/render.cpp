@@ -171,10 +171,6 @@ Vec3 directional_light(const Scene& scene, const SpatialBasis& basis, const Reli
   return light(rows) + light(peak_rows);  // each is held at 0 by what evaluates it
 }
 
-}  // namespace
-
-namespace {
-
 // Radiance at a hit; colour(): what the light there is multiplied by. `weights` is scratch, a value a row.
 template <class Colour>
 Vec3 relit_at(const Scene& scene, const SpatialBasis& basis, const Relit& relit, const RenderOptions& options,
