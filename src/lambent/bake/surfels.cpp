@@ -117,6 +117,7 @@ struct Throwing {
   const std::vector<Candidate>& candidates;
   float diagonal, gap;  // gap: the leaves' spacing
   Surfels out{};
+  std::vector<uint8_t> known{};          // of the first candidates: what level_of() said before
   std::vector<uint32_t> of_candidate{};  // surfel of each, or none yet
   std::vector<SurfacePlace> places{};    // of surfels
 
@@ -142,6 +143,15 @@ struct Throwing {
     places.push_back(at), grid.insert(at.position);
   }
   void throw_level(float spacing, bool leaves, Progress* progress);
+  // The level that each candidate is a surfel from; 255: none.
+  std::vector<uint8_t> level_of() const {
+    std::vector<uint8_t> levels(candidates.size(), 255);
+    for (size_t c = 0; c < candidates.size(); ++c)
+      if (of_candidate[c] != none)
+        levels[c] =
+            uint8_t(std::upper_bound(out.counts.begin(), out.counts.end(), of_candidate[c]) - out.counts.begin());
+    return levels;
+  }
   void tend_leaves(const PointGrid& grid);
 };
 
@@ -151,7 +161,9 @@ void Throwing::throw_level(float spacing, bool leaves, Progress* progress) {
   const size_t before = out.count(), level = out.levels();
   std::vector<NearSurfel> found;
   for (size_t c = 0; c < candidates.size() && !is_cancelled(progress); ++c)
-    if (of_candidate[c] == none && nearest(grid, candidates[c].at, spacing, leaves, found) == none) add(c, grid);
+    if (c < known.size() ? known[c] == level
+                         : of_candidate[c] == none && nearest(grid, candidates[c].at, spacing, leaves, found) == none)
+      add(c, grid);
   // Parents: those of the level above are their own; every other was refused there, so that one stands for it.
   if (level > 0) {
     PointGrid above(out.spacings.back(), before);
@@ -185,10 +197,12 @@ void Throwing::tend_leaves(const PointGrid& grid) {
   for (size_t i = 0; i < out.count(); ++i) out.albedos[i] /= out.areas[i];
 }
 
-// Levels from the coarsest to leaves that are `spacing` apart.
+// Levels from the coarsest to leaves that are `spacing` apart; `known`: of the first candidates, which are not tried
+// again.
 Throwing throw_levels(const Scene& scene, const Tracer& tracer, const std::vector<Candidate>& candidates,
-                      float diagonal, float spacing, int levels, ProgressStage& stage, Progress* progress) {
-  Throwing t{scene, tracer, candidates, diagonal, spacing};
+                      float diagonal, float spacing, int levels, std::vector<uint8_t> known, ProgressStage& stage,
+                      Progress* progress) {
+  Throwing t{scene, tracer, candidates, diagonal, spacing, {}, std::move(known)};
   t.of_candidate.assign(candidates.size(), none);
   for (int l = levels - 1; l >= 0 && !stage.cancelled(); --l, stage.advance())
     t.throw_level(std::ldexp(spacing, l), l == 0, progress);
@@ -271,14 +285,16 @@ Result<Surfels> make_surfels(const Scene& scene, const Tracer& tracer, const Sur
                                         double(candidates_a_leaf * count) / double(count));
   int levels = 1;
   while (levels < int(max_surfel_levels) && count >> (2 * levels) >= coarsest) ++levels;
-  const auto thrown = [&] {
-    return throw_levels(scene, tracer, candidates, diagonal, float(leaf_spacing), levels, stage, progress);
+  const auto thrown = [&](std::vector<uint8_t> known) {
+    return throw_levels(scene, tracer, candidates, diagonal, float(leaf_spacing), levels, std::move(known), stage,
+                        progress);
   };
-  std::optional<Throwing> t(thrown());
+  std::optional<Throwing> t(thrown({}));
   if (stage.cancelled()) return Error{"", "cancelled"};
   if (const std::vector<Candidate> seen = seen_without_leaf(*t); !seen.empty()) {
+    std::vector<uint8_t> known = t->level_of();
     candidates.insert(candidates.end(), seen.begin(), seen.end());
-    t.emplace(thrown());
+    t.emplace(thrown(std::move(known)));
     if (stage.cancelled()) return Error{"", "cancelled"};
   }
   if (t->out.count() > max_surfels) return Error{scene.path, "takes too many surfels"};
