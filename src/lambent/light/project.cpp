@@ -111,6 +111,21 @@ int bands_of(const DirectionalBasis& basis) {
   return bands;
 }
 
+// From the integrals against the harmonics and the lobes.
+std::vector<Vec3> coefficients_of(const DirectionalBasis& basis, std::span<const Vec3> sh,
+                                  std::span<const Vec3d> of_lobes) {
+  const size_t harmonics = size_t(sh_count(basis.sh_order));
+  std::vector<Vec3> light(basis.count());
+  for (int c = 0; c < 3; ++c) {
+    std::vector<double> integrals(basis.count(), 0.0);
+    for (size_t i = 0; i < harmonics; ++i) integrals[i] = double(sh[i][c]);
+    for (size_t k = 0; k < of_lobes.size(); ++k) integrals[harmonics + k] = of_lobes[k][c];
+    const std::vector<double> coefficients = apply_directional_dual(basis, integrals);
+    for (size_t i = 0; i < light.size(); ++i) light[i][c] = float(coefficients[i]);
+  }
+  return light;
+}
+
 }  // namespace
 
 std::vector<Vec3> project_environment(const Environment& env, int order) {
@@ -145,22 +160,18 @@ std::vector<Vec3> project_environment(const Environment& env, int order) {
 }
 
 std::vector<Vec3> project_environment(const Environment& env, const DirectionalBasis& basis, const Mat3& rotation) {
-  const size_t lobes = basis.lobes.size(), harmonics = size_t(sh_count(basis.sh_order));
   const int order = bands_of(basis);
   std::vector<Vec3> sh;
   if (order > 0) sh = rotate_sh(make_sh_rotation(order, rotation), project_environment(env, order));
-  if (lobes == 0) return sh;
-  const std::vector<Vec3d> of_lobes = basis.kind == LobeKind::band_limited ? over_bands(basis, sh)
-                                                                           : over_texels(env, basis, rotation);
-  std::vector<Vec3> light(basis.count());
-  for (int c = 0; c < 3; ++c) {
-    std::vector<double> integrals(basis.count(), 0.0);
-    for (size_t i = 0; i < harmonics; ++i) integrals[i] = double(sh[i][c]);
-    for (size_t k = 0; k < lobes; ++k) integrals[harmonics + k] = of_lobes[k][c];
-    const std::vector<double> coefficients = apply_directional_dual(basis, integrals);
-    for (size_t i = 0; i < light.size(); ++i) light[i][c] = float(coefficients[i]);
-  }
-  return light;
+  if (basis.lobes.empty() || basis.kind == LobeKind::band_limited) return project_harmonics(sh, basis);
+  return coefficients_of(basis, sh, over_texels(env, basis, rotation));
+}
+
+std::vector<Vec3> project_harmonics(std::span<const Vec3> sh, const DirectionalBasis& basis) {
+  LAMBENT_CHECK(sh.size() >= size_t(sh_count(bands_of(basis))));
+  if (basis.lobes.empty()) return {sh.begin(), sh.begin() + sh_count(basis.sh_order)};
+  LAMBENT_CHECK(basis.kind == LobeKind::band_limited);
+  return coefficients_of(basis, sh, over_bands(basis, sh));
 }
 
 Environment reconstruct_environment(std::span<const Vec3> light, int width) {

@@ -18,6 +18,9 @@ std::vector<Vec3> project_environment(const Environment& env, int order);
 std::vector<Vec3> project_environment(const Environment& env, const DirectionalBasis& basis,
                                       const Mat3& rotation = Mat3(1.0f));
 
+// The same of the environment's harmonics, turned already, for a basis of harmonics and band-limited lobes within them.
+std::vector<Vec3> project_harmonics(std::span<const Vec3> sh, const DirectionalBasis& basis);
+
 // The band-limited environment with these coefficients as a map; it may be negative in places.
 Environment reconstruct_environment(std::span<const Vec3> light, int width = 1024);
 

@@ -8,7 +8,6 @@
 #include <fmt/ranges.h>
 
 #include <algorithm>
-#include <numeric>
 
 namespace lambent {
 
@@ -47,42 +46,36 @@ Result<std::vector<Vec3>> lamps_of(const DrawRequest& request, const LightBasis&
 // With less of all light in them, peaks ring too little to be seen.
 constexpr double least_sharp = 0.05;
 
-// What is known of the environment's first `order` bands; null: nothing.
-const KnownHarmonics* harmonics_for(const Surroundings& around, int order) {
-  return around.known && around.known->order == order ? around.known.get() : nullptr;
+// Bands that all columns of distant light lie in, but for those that are left out; 0: lobes that hold more are there.
+int bands_of(const DrawRequest& request, const LightBasis& basis) {
+  if (!is_within_bands(basis)) return 0;
+  const int bands = basis.lobes.empty() ? basis.order : int(basis.lobes[0].sharpness);
+  return request.light_order ? std::min(request.light_order, bands) : bands;
 }
 
-// --window auto. Lobes that stand still hold the lamps already; turned copies of one ring as the bands do that they
-// span.
-void find_peaks(const DrawRequest& request, const Surroundings& around, const LightBasis& basis, ColumnLight& out) {
-  const bool copies = basis.order == 0 && !basis.lobes.empty() && basis.lobe_kind == LobeKind::band_limited;
-  if (!copies && (!basis.lobes.empty() || basis.order == 0)) return;
-  const int bands = copies ? int(basis.lobes[0].sharpness) : basis.order;
-  const int order = request.light_order ? std::min(request.light_order, bands) : bands;
-  const std::vector<Vec3>& all = out.projection.light;
-  const KnownHarmonics* known = copies ? nullptr : harmonics_for(around, order);
-  if (known && known->rest.empty()) known = nullptr;
-  const std::vector<Vec3> rest =
-      known ? project_light(known->rest, basis, around.rotation).light
-            : project_light(without_peaks(*around.env, order), basis, around.rotation, copies ? 0 : order).light;
-  // As much as is proportional to all light: that of the first harmonic, or of all copies, which are of one integral.
-  const auto luminance_of = [&](const std::vector<Vec3>& light) {
-    return luminance(
-        std::accumulate(light.begin(), light.begin() + (copies ? ptrdiff_t(basis.lobes.size()) : 1), Vec3(0.0f)));
-  };
-  const double light = luminance_of(all), sharp = light - luminance_of(rest);
-  if (!(sharp > least_sharp * light)) return;
-  out.sharp = sharp / light, out.lamps_found = known ? known->lamps : int(find_lamps(*around.env, 8).size());
-  for (size_t k = 0; k < all.size(); ++k) out.peaks.push_back(all[k] - rest[k]);
+double sharp_share(const KnownHarmonics& known) {
+  const double light = luminance(known.all[0]);
+  return light > 0 ? luminance(known.all[0] - known.rest[0]) / light : 0;
+}
+
+// --window auto. Lobes that stand still hold the lamps already.
+void find_peaks(const KnownHarmonics& known, const Surroundings& around, const LightBasis& basis, ColumnLight& out) {
+  out.sharp = sharp_share(known), out.lamps_found = known.lamps;
+  if (!(out.sharp > least_sharp)) return void(out.sharp = 0);
+  const std::vector<Vec3> rest = project_light(known.rest, basis, around.rotation).light;
+  for (size_t k = 0; k < rest.size(); ++k) out.peaks.push_back(out.projection.light[k] - rest[k]);
 }
 
 }  // namespace
 
-KnownHarmonics know_harmonics(const Environment& env, int order, bool peaks) {
+std::shared_ptr<const KnownHarmonics> know_harmonics(const Environment& env, const DrawRequest& request,
+                                                     const LightBasis& basis, bool peaks) {
+  const int order = bands_of(request, basis);
+  if (order == 0) return nullptr;
   KnownHarmonics out{order, project_environment(env, order), {}, 0};
   if (peaks) out.rest = project_environment(without_peaks(env, order), order);
-  if (peaks) out.lamps = int(find_lamps(env, 8).size());
-  return out;
+  if (peaks && sharp_share(out) > least_sharp) out.lamps = int(find_lamps(env, 8).size());
+  return std::make_shared<const KnownHarmonics>(std::move(out));
 }
 
 void soften_peaks(ColumnLight& light) {
@@ -106,11 +99,12 @@ Result<ColumnLight> column_light(const DrawRequest& request, const Surroundings&
   if (around.env) {
     knows_shadows = knows_shadows && *window == ShWindow::automatic;
     const ShWindow applied = knows_shadows ? ShWindow::none : *window;
-    const int order = request.light_order ? std::min(request.light_order, basis.order) : basis.order;
-    const KnownHarmonics* known = basis.lobes.empty() ? harmonics_for(around, order) : nullptr;
+    auto known = around.known;
+    if (!known || known->order != bands_of(request, basis) || (knows_shadows && known->rest.empty()))
+      known = know_harmonics(*around.env, request, basis, knows_shadows);
     out.projection = known ? project_light(known->all, basis, around.rotation, applied)
-                           : project_light(*around.env, basis, around.rotation, order, applied);
-    if (knows_shadows) find_peaks(request, around, basis, out);
+                           : project_light(*around.env, basis, around.rotation, request.light_order, applied);
+    if (known && knows_shadows) find_peaks(*known, around, basis, out);
   } else {
     out.projection.light.assign(basis.count(), Vec3(0.0f));
     const int order = request.light_order ? std::min(request.light_order, basis.order) : basis.order;

@@ -14,9 +14,11 @@ struct KnownHarmonics {
   int order = 0;           // bands
   std::vector<Vec3> all;   // project_environment()
   std::vector<Vec3> rest;  // of without_peaks(); empty where `--window auto` does not ask
-  int lamps = 0;           // that lobes of their own could stand for
+  int lamps = 0;           // that lobes of their own could stand for, where much of the light is sharp
 };
-KnownHarmonics know_harmonics(const Environment& env, int order, bool peaks);
+// Null where the file's light is not within bands. `peaks`: --window auto asks.
+std::shared_ptr<const KnownHarmonics> know_harmonics(const Environment& env, const DrawRequest& request,
+                                                     const LightBasis& basis, bool peaks);
 
 // The environment, turned, and whether it is seen behind the scene.
 struct Surroundings {

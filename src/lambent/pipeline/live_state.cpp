@@ -18,9 +18,7 @@ constexpr int hurried_samples = 16;   // of BRDFs in a block, while something mo
 
 LiveLight live_light(Environment env, const DrawRequest& request, const LightBasis& basis) {
   LiveLight out{std::make_shared<const Environment>(std::move(env)), nullptr};
-  const int order = request.light_order ? std::min(request.light_order, basis.order) : basis.order;
-  if (order > 0 && basis.lobes.empty())
-    out.known = std::make_shared<const KnownHarmonics>(know_harmonics(*out.env, order, request.window == "auto"));
+  out.known = know_harmonics(*out.env, request, basis, request.window == "auto");
   return out;
 }
 

@@ -23,6 +23,10 @@ LightProjection of_coefficients(std::vector<Vec3> light, DirectionalBasis basis,
 
 }  // namespace
 
+bool is_within_bands(const LightBasis& basis) {
+  return basis.lobes.empty() ? basis.order > 0 : basis.order == 0 && basis.lobe_kind == LobeKind::band_limited;
+}
+
 LightProjection project_light(const Environment& env, const LightBasis& columns, const Mat3& rotation, int order,
                               ShWindow window) {
   if (order == 0 || order > columns.order) order = columns.order;
@@ -35,9 +39,10 @@ LightProjection project_light(const Environment& env, const LightBasis& columns,
 LightProjection project_light(std::span<const Vec3> harmonics, const LightBasis& columns, const Mat3& rotation,
                               ShWindow window) {
   const int order = sh_order(harmonics.size());
-  LAMBENT_CHECK(columns.lobes.empty() && order > 0 && order <= columns.order);
-  return of_coefficients(rotate_sh(make_sh_rotation(order, rotation), harmonics),
-                         make_directional_basis(order, columns.lobe_kind, {}), columns, window);
+  LAMBENT_CHECK(is_within_bands(columns) && order > 0 && (!columns.lobes.empty() || order <= columns.order));
+  DirectionalBasis basis = make_directional_basis(columns.lobes.empty() ? order : 0, columns.lobe_kind, columns.lobes);
+  std::vector<Vec3> light = project_harmonics(rotate_sh(make_sh_rotation(order, rotation), harmonics), basis);
+  return of_coefficients(std::move(light), std::move(basis), columns, window);
 }
 
 }  // namespace lambent

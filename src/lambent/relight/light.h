@@ -19,7 +19,10 @@ struct LightProjection {
 // on are left out of the basis: their coefficients are 0 and the others those that fit best without them.
 LightProjection project_light(const Environment& env, const LightBasis& basis, const Mat3& rotation = Mat3(1.0f),
                               int order = 0, ShWindow window = ShWindow::none);
-// The same of the environment's first harmonics, as many as there are, unturned, for a basis without lobes.
+// Whether all its functions are harmonics, or within bands of them: steerable lobes.
+bool is_within_bands(const LightBasis& basis);
+// project_light() of the environment's first harmonics, unturned, for a basis within bands: as many bands as it has,
+// or, of harmonics alone, fewer.
 LightProjection project_light(std::span<const Vec3> harmonics, const LightBasis& basis, const Mat3& rotation,
                               ShWindow window = ShWindow::none);
 

@@ -36,6 +36,13 @@ TEST(ProjectLight, OfKnownHarmonicsIsThatOfTheEnvironment) {
   }
 }
 
+TEST(ProjectLight, SteerableLobesTakeKnownHarmonicsToo) {
+  const Mat3 R = rotation_from_yaw_pitch_roll({30, -20, 10});
+  const LightBasis basis{0, LobeKind::band_limited, steerable_lobes(4), {"desk"}};
+  EXPECT_EQ(project_light(project_environment(lit(), 4), basis, R).light, project_light(lit(), basis, R).light);
+  EXPECT_TRUE(is_within_bands(basis) && !is_within_bands(columns));
+}
+
 TEST(ProjectLight, FillsEveryColumn) {
   const LightProjection p = project_light(lit(), columns);
   ASSERT_EQ(p.light.size(), 19u);
