@@ -44,7 +44,9 @@ double least_thread_seconds(int runs, F&& f) {
 
 // A shared mesh on a floor, if the data folder (LAMBENT_DATA, or ../shared/data beside the repository) is there.
 std::optional<Scene> data_scene(const std::string& name, bool ground);
-// The same of an environment, by its name without .hdr.
+// Made finer until it has at least so many vertices.
+std::optional<Scene> refined(std::optional<Scene> scene, size_t vertices);
+// A shared environment, by its name without .hdr, if it is there.
 std::optional<Environment> data_environment(const std::string& name);
 
 void bench_bake();

@@ -45,6 +45,13 @@ std::optional<Scene> data_scene(const std::string& name, bool ground) {
   return std::move(*scene);
 }
 
+std::optional<Scene> refined(std::optional<Scene> scene, size_t vertices) {
+  if (!scene) return scene;
+  for (float edge = bounds(*scene).diagonal() / 30; scene->positions.size() < vertices; edge *= 0.85f)
+    if (!split_long_edges(*scene, edge)) return std::nullopt;
+  return scene;
+}
+
 std::optional<Environment> data_environment(const std::string& name) {
   const char* given = std::getenv("LAMBENT_DATA");
   const std::filesystem::path repository = std::filesystem::path(__FILE__).parent_path().parent_path();

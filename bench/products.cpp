@@ -185,14 +185,6 @@ Scene make_hall(float detail) {
   return scene;
 }
 
-// Made finer until it has at least so many vertices.
-std::optional<Scene> refined(std::optional<Scene> scene, size_t vertices) {
-  if (!scene) return scene;
-  for (float edge = bounds(*scene).diagonal() / 30; scene->positions.size() < vertices; edge *= 0.85f)
-    if (!split_long_edges(*scene, edge)) return std::nullopt;
-  return scene;
-}
-
 Environment harsh_light(std::string& name) {
   const char* given = std::getenv("LAMBENT_DATA");
   const std::filesystem::path folder =

@@ -183,6 +183,15 @@ void bench_window() {
       window_case(on + "Ward", *baked, ward, 4);
     }
   }
+  if (auto bunny = refined(data_scene("bunny.obj", true), 130000)) {
+    BakeRequest request{.transfer = "blocks"};
+    request.loaded = std::make_shared<const Scene>(std::move(*bunny));
+    if (auto baked = bake(request)) {
+      const std::string on = "bunny with floor, finer, blocks, ";
+      window_case(on + "diffuse", *baked, "", 15);
+      window_case(on + "Phong 50", *baked, "phong:exponent=50,diffuse=0.5,specular=0.5", 8);
+    }
+  }
   BakeRequest request{.bounces = "0"};
   request.samples = 16, request.denoise = "off";
   Scene scene = make_courtyard();

@@ -51,7 +51,7 @@ drawn() {
   "$tool" render "${words[@]}" "${materials[@]}" --size ${width}x$height -o drawn.png >render.log 2>&1 ||
     failed "$(cat render.log)"
 }
-psnr() { "$tool" --json compare "$1" "$2" | sed -n 's/.*"psnr": *\([0-9.a-z]*\).*/\1/p'; }
+psnr() { "$tool" --json compare "$1" "$2" 2>/dev/null | sed -n 's/.*"psnr": *\([0-9.a-z]*\).*/\1/p'; }
 is_like() { local apart; apart=$(psnr "$1" "$2") && { [ "$apart" = null ] || awk "BEGIN { exit !(0$apart >= 45) }"; }; }
 # The window comes to show what render draws with these arguments, and what it showed before was something else.
 becomes() {
@@ -150,6 +150,55 @@ if cc -O1 -o drop "$here/drop.c" -lX11 2>cc.log; then
   becomes "a bake that is dropped" "$golden/matrix_phong.glb" --env other.exr "${plain[@]}"
 else
   echo "window: drops are left out: $(tail -1 cc.log)"
+fi
+close
+pass
+
+# Keys of the window itself. Without the panel the picture is as wide as the window.
+open "$file" --env $sky
+for _ in $(seq 30); do shoot before.png; cmp -s before.png first.png && break; sleep 0.3; done
+cmp -s before.png first.png || failed "the window opens with something else"
+xdotool mousemove --window $id 20 20 key Tab
+width=$((width + panel))
+becomes "Tab: no panel" "$file" --env $sky "${plain[@]}"
+width=$((width - panel))
+xdotool key Tab
+for _ in $(seq 30); do shoot before.png; cmp -s before.png first.png && break; sleep 0.3; done
+cmp -s before.png first.png || failed "Tab: the panel does not come back"
+pass
+if cc -O1 -o grab "$here/grab.c" -lX11 2>cc.log; then
+  # What it shows left and right of the wipe's line, in numbers.
+  left() { ./grab $id 0 0 $((width / 2 - 8)) $height || failed "the window's picture cannot be read"; }
+  right() { ./grab $id $((width / 2 + 8)) 0 $((width / 2 - 8)) $height || failed "the window's picture cannot be read"; }
+  # Waits until left and right are (=) or are not (!) as they were.
+  sides() {
+    local what=$1 l r
+    for _ in $(seq 100); do
+      alive "$what"
+      l=! r=!
+      [ "$(left)" != "$was_left" ] || l==
+      [ "$(right)" != "$was_right" ] || r==
+      [ "$l$r" != "$2" ] || { pass && return; }
+      sleep 0.2
+    done
+    failed "$what: left and right of the wipe are $l$r as before, not $2"
+  }
+  sleep 0.5
+  was_left=$(left) was_right=$(right)
+  xdotool key r
+  sides "R: the path tracer at the right" "=!"
+  xdotool key d
+  sides "D: the difference in place of the wipe" "!!"
+  xdotool key d
+  sides "D again" "=!"
+  xdotool key r
+  sides "R again" "=="
+  xdotool key F1
+  sides "F1: keys" "!!"
+  xdotool key Escape
+  sides "Escape: none" "=="
+else
+  echo "window: keys that draw beside the picture are left out: $(tail -1 cc.log)"
 fi
 close
 pass
