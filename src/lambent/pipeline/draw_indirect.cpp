@@ -19,6 +19,8 @@
 namespace lambent {
 namespace {
 
+constexpr uint64_t near_seed = 0x6ea7;
+
 using Clock = std::chrono::steady_clock;
 double seconds_since(Clock::time_point start) { return std::chrono::duration<double>(Clock::now() - start).count(); }
 
@@ -26,6 +28,12 @@ double seconds_since(Clock::time_point start) { return std::chrono::duration<dou
 
 bool StillLight::shines() const {
   return std::any_of(scales.begin(), scales.end(), [](Vec3 s) { return largest(s) > 0; });
+}
+
+IndirectQuality quality_of(const DrawRequest& request) {
+  IndirectQuality quality;
+  quality.near_samples = request.near_rays;
+  return quality;
 }
 
 Result<void> repaint(const DrawRequest& request, Scene& scene, const Surfels& surfels, std::vector<Vec3>& albedos) {
@@ -102,6 +110,7 @@ void light_surfels(IndirectDrawing& d, DirectionalKind directional, bool first) 
   if (d.request.frame_bounces == 0) solve_indirect(d.transfer, d.solve, d.direct, 1e-3, 64, !first);
   else if (first) std::fill(d.solve.x.begin(), d.solve.x.end(), Vec3(0.0f));
   for (int k = 0; k < d.request.frame_bounces; ++k) step_indirect(d.transfer, d.solve, d.direct);
+  part_near_light(d);
   d.solve_seconds = std::min(d.solve_seconds, seconds_since(start)), start = Clock::now();
   read_receivers(d, directional);
   d.read_seconds = std::min(d.read_seconds, seconds_since(start));
@@ -152,7 +161,7 @@ Result<void> light_objects(IndirectDrawing& d) {
 Vec3 read_surfels(const IndirectDrawing& d, const Kernels& k) {
   Vec3 light(0.0f);
   for (size_t i = 0; i < k.count; ++i) light += k.weight[i] * d.solve.x[k.surfel[i]];
-  return max(light, Vec3(0.0f));
+  return light;
 }
 
 // A lamp that the eye sees before anything else: its radiance.
@@ -215,19 +224,20 @@ Vec3 shade_indirect(const IndirectDrawing& d, Vec3 eye, const IndirectQuality& q
   if (shows_direct)
     if (const auto lamp = seen_lamp(d, eye, direction, hit.distance)) return *lamp;
   const SurfacePlace at = surface_place(scene, hit);
+  const Vec3 face = (hit.front ? 1.0f : -1.0f) * unit_normal(scene, triangle, at.normal);
+  const Vec3 origin = at.position + face * receiver_lift(at.position, 0, d.diagonal);
+  const uint64_t key =
+      hash64(uint64_t(std::bit_cast<uint32_t>(hit.u)) << 32 | std::bit_cast<uint32_t>(hit.v), hit.triangle);
   Vec3 light(0.0f);
   if (shows_indirect && bounced) {
     light += bounced(hit, direction, at);
   } else if (shows_indirect) {
-    light = read_surfels(d, known.kernels ? *known.kernels : d.search->kernels(at));
+    const Kernels kernels = known.kernels ? *known.kernels : d.search->kernels(at);
+    light = read_surfels(d, kernels) +
+            near_bounce(d, origin, at.normal, face, kernels, quality.near_samples, hash64(key, near_seed));
+    light = max(light, Vec3(0.0f));
   }
-  if (shows_direct) {
-    const Vec3 face = unit_normal(scene, triangle, at.normal);
-    const Vec3 origin = at.position + (hit.front ? face : -face) * receiver_lift(at.position, 0, d.diagonal);
-    const uint64_t key =
-        hash64(uint64_t(std::bit_cast<uint32_t>(hit.u)) << 32 | std::bit_cast<uint32_t>(hit.v), hit.triangle);
-    light += direct_at_pixel(d, quality, origin, at.normal, key, known.lights);
-  }
+  if (shows_direct) light += direct_at_pixel(d, quality, origin, at.normal, key, known.lights);
   if (d.show.colour != Colour::product) return light;
   const Vec3 sent = shows_direct ? glow(d, hit) : Vec3(0.0f);
   return albedo(scene, triangle, hit.u, hit.v) * light + sent;
@@ -247,7 +257,7 @@ IndirectShade bounced_light(const IndirectDrawing& d, const Baked& baked, const 
       own.triangle -= uint32_t(d.objects.first);
       return at_objects(own, direction);
     }
-    return at_receivers ? at_receivers(hit, direction) : read_surfels(d, d.search->kernels(at));
+    return at_receivers ? at_receivers(hit, direction) : max(read_surfels(d, d.search->kernels(at)), Vec3(0.0f));
   };
 }
 
@@ -350,7 +360,7 @@ Result<Drawing> draw_indirect(const Baked& baked, const DrawRequest& request, co
         d.drawn(), d.sight(), view->camera, options,
         [&]() -> SurfaceShade {
           return [&, bounced = bounced_light(d, baked, on_objects, in_file)](const Hit& hit, Vec3 direction) {
-            return shade_indirect(d, view->camera.eye, {}, hit, direction, {}, bounced);
+            return shade_indirect(d, view->camera.eye, quality_of(request), hit, direction, {}, bounced);
           };
         },
         job.progress);

@@ -23,9 +23,12 @@ struct IndirectQuality {
   // Rays towards what stands still, the scene's own lamps by group and the sky, and as many all around: at each place
   // of a leaf; at a ray of a pixel.
   int still_samples = 16, still_pixel_samples = 4;
+  // Rays of a pixel towards what a lamp lights near it, and as many all around; 0: all bounces are read off surfels.
+  int near_samples = 8;
 };
+IndirectQuality quality_of(const DrawRequest& request);
 // Of a picture that moves.
-inline constexpr IndirectQuality hurried_indirect{1, 1, 1, 1, 2, 1};
+inline constexpr IndirectQuality hurried_indirect{1, 1, 1, 1, 2, 1, 0};
 
 // Light that does not move: of the scene's own lamps, and of the environment as it is turned.
 struct StillLight {
@@ -44,6 +47,20 @@ struct LitLamp {
   // have not seen it where it stands.
   std::vector<Vec3> found{}, from{};
   size_t behind = 0;
+};
+
+// A lamp whose first bounce pixels gather themselves, where that comes from within a few spacings of it.
+struct NearLamp {
+  MovingLamp lamp;
+  // Places that its rays met: exit radiance by it, and how many of the rays an area's unit has, times 1 / scale.
+  struct Sent {
+    Vec3 position, face, light;
+    float density;
+  };
+  std::vector<Sent> sent{};
+  float scale = 1;
+  std::vector<Vec3> smooth{};  // what gathering surfels have of that part of the bounce
+  size_t behind = 0;           // as of its leaves
 };
 
 // Objects put into the scene, over light in free space.
@@ -74,6 +91,7 @@ struct IndirectDrawing {
   std::vector<std::vector<SurfacePlace>> near_places{};
   IndirectSolve solve{};
   std::vector<LitLamp> lit{};  // the lamps
+  std::vector<NearLamp> near{};
   std::vector<Vec3> direct{};  // at surfels
   Relit relit{};               // at receivers, where they are read
   ObjectsInScene objects{};
@@ -105,6 +123,9 @@ void light_leaves(IndirectDrawing& d, size_t first, size_t count, const Indirect
                   ProgressStage* stage = nullptr);
 // Light of lamp k alone at leaves [first, first + count), into d.lit[k], which has room for all.
 void light_lamp(IndirectDrawing& d, size_t k, size_t first, size_t count, const IndirectQuality& quality);
+// Light of a lamp at some leaves.
+void light_some_leaves(IndirectDrawing& d, const MovingLamp& lamp, std::span<const uint32_t> leaves,
+                       std::vector<Vec3>& at_leaves);
 // Light of lamp k at all leaves, which d.lit[k] knows of another place of it, by rays at `most` of them: those whose
 // shadow is likeliest to matter, by how bright the lamp would be there, what the leaf weighs, and the angle that the
 // lamp has moved by since it was looked at. The others keep their shadow, and have the light that is without one
@@ -112,6 +133,13 @@ void light_lamp(IndirectDrawing& d, size_t k, size_t first, size_t count, const 
 size_t follow_lamp(IndirectDrawing& d, size_t k, size_t most);
 // All direct light at leaves, of what stands still and of d.lit one after the other, into d.direct.
 void sum_direct(IndirectDrawing& d);
+// Parts the first bounce near lamps from the rest, into d.near: of d.lit, as far as it is known. Uses d.solve's room,
+// whose s.sent is another then. Nothing where surfaces let light pass.
+void part_near_light(IndirectDrawing& d);
+// What a place has of the bounces near lamps beyond what its kernels read of them, by `samples` rays of each kind from
+// `origin`, which is clear of its surface; `above`: the normal of its face.
+Vec3 near_bounce(const IndirectDrawing& d, Vec3 origin, Vec3 normal, Vec3 above, const Kernels& kernels, int samples,
+                 uint64_t key);
 
 // Light that has bounced, as if what was hit were white.
 using IndirectShade = std::function<Vec3(const Hit&, Vec3 direction, const SurfacePlace&)>;

@@ -2,6 +2,7 @@
 #include <lambent/pipeline/bake.h>
 #include <lambent/pipeline/draw.h>
 #include <lambent/pipeline/golden_test-inl.h>
+#include <lambent/pipeline/moving_lamps.h>
 #include <lambent/pipeline/parse.h>
 #include <lambent/reference/path_tracer.h>
 #include <lambent/scene/append.h>
@@ -238,10 +239,45 @@ TEST(IndirectDrawing, LampsInsideWallsHugeOrManyAreTaken) {
   }
   // A thousand are one that is a thousand times as bright.
   DrawRequest r = request();
-  r.show = "indirect", r.spp = 1, r.lamp = {"point@0.6,0.8,1.2=3"};
+  r.show = "indirect", r.spp = 1, r.near_rays = 0, r.lamp = {"point@0.6,0.8,1.2=3"};
   const Image one = drawn(room(), r);
   r.lamp.assign(1000, "point@0.6,0.8,1.2=0.003");
   EXPECT_LT(difference(drawn(room(), r), one), 1e-3);
+}
+
+// Its bounced light is smaller than what surfels can tell apart, and brighter than their means.
+TEST(IndirectDrawing, BesideAWallTheFirstBounceIsGatheredAtThePixel) {
+  const Baked baked = room();
+  DrawRequest r = request();
+  r.lamp = {"point@0.1,1,1=100"}, r.show = "indirect", r.spp = 64;
+  const Image gathered = drawn(baked, r);
+  r.near_rays = 0;
+  const Image read = drawn(baked, r);
+  const auto lamp = parse_moving_lamps(r.lamp);
+  ASSERT_TRUE(lamp);
+  Scene scene = baked.scene;
+  add_lamps(scene, *lamp);
+  const auto view = parse_view(r.camera, r.size, scene);
+  const auto paths = path_trace(scene, *load_environment("uniform:0"), view->camera,
+                                {.width = view->width,
+                                 .height = view->height,
+                                 .spp = 2048,
+                                 .bounces = 16,
+                                 .background = false,
+                                 .lamps = true,
+                                 .direct = false});
+  ASSERT_TRUE(paths);
+  const auto squared = [&](const Image& image) {
+    double sum = 0;
+    for (size_t i = 0; i < image.rgb.size(); ++i) {
+      const Vec3 off = image.rgb[i] - paths->image.rgb[i];
+      sum += double(dot(off, off));
+    }
+    return sum;
+  };
+  // A tenth of the error, by enough paths; these have noise of their own.
+  EXPECT_LT(squared(gathered), 0.25 * squared(read));
+  EXPECT_NEAR(mean(gathered), mean(paths->image), 0.02 * mean(paths->image));
 }
 
 TEST(IndirectDrawing, BlackWallsGiveNothingBack) {

@@ -69,6 +69,10 @@ const Option<R> table[] = {
      "Where indirect light is read: pixels, whatever the mesh; or the file's receivers, as an engine reads them, and "
      "where those have directions, for the normal that a normal map gives",
      0, 0, "pixels|receivers"},
+    {"near-rays", &R::near_rays, "What is shown", I,
+     "Rays of a pixel towards what a lamp lights within a few spacings of surfels, and as many all around: its first "
+     "bounce is gathered there; 0: read off surfels, as all else",
+     0, 64, nullptr, "at=pixels"},
     {"brdf", &R::brdf, "What is shown", C | Z | M | F | K,
      "Other materials than were baked, or those of blocks: diffuse (by base colour), materials (glTF's "
      "metallic-roughness), or one model for all, as `bake --brdf` takes it; for bakes that kept incident light, and "
@@ -153,6 +157,7 @@ constexpr Conflict conflicts[] = {
     {"at", "show=direct|albedo", "reads light that --show leaves out"},
     {"frame-bounces", "show=direct|albedo", "are of light that --show leaves out"},
     {"frame-leaves", "show=direct|albedo", "are of light that --show leaves out"},
+    {"near-rays", "show=direct|albedo", "are of light that --show leaves out"},
     {"lamp", "show=albedo", "lights what --show albedo shows no light of"},
     {"sphere-lamp", "show=albedo|emission", "lights what --show leaves out"},
     {"window", "show=albedo|emission", "shapes light that --show leaves out"},

@@ -24,6 +24,7 @@ struct DrawRequest {
   std::string brdf;  // "": as baked; of blocks, which know none, diffuse
   std::vector<std::string> insert, albedo, place, pose, material;
   std::string at = "pixels";
+  int near_rays = 8;
   // Motion
   std::string animation, frames, deform;
   double time = 0;

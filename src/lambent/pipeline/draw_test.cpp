@@ -178,7 +178,7 @@ const std::map<std::string, std::string> other_texts{{"env", "sky:elevation=20,a
 const std::map<std::string, double> other_numbers{{"light-order", 1},    {"spp", 9},           {"time", 1},
                                                   {"tolerance", 4},      {"terms", 20},        {"groove-depth", 0.2},
                                                   {"groove-width", 0.4}, {"frame-bounces", 1}, {"frame-leaves", 1},
-                                                  {"lamp-bounces", 2}};
+                                                  {"near-rays", 1},      {"lamp-bounces", 2}};
 
 // Every option of the table, said of a file of every kind: it changes the picture, or is refused or warned of by name.
 TEST_F(Drawings, NoOptionIsLeftAsideInSilence) {

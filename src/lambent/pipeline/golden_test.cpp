@@ -20,6 +20,7 @@ DrawRequest golden_request(const std::string& name) {
       name != "diffuse_directional" && name != "diffuse_compact" && name != "diffuse_steerable" &&
       name.find("fixed_light") == std::string::npos)
     request.window = "none";
+  if (name == "indirect") request.near_rays = 0;  // they read all bounces off surfels
   return request;
 }
 

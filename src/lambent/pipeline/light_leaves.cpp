@@ -126,6 +126,12 @@ void light_lamp(IndirectDrawing& d, size_t k, size_t first, size_t count, const 
       d, d.lit[k].lamp, count, [first](size_t i) { return first + i; }, quality, d.lit[k].at_leaves);
 }
 
+void light_some_leaves(IndirectDrawing& d, const MovingLamp& lamp, std::span<const uint32_t> leaves,
+                       std::vector<Vec3>& at_leaves) {
+  light_by(
+      d, lamp, leaves.size(), [&](size_t i) { return leaves[i]; }, {}, at_leaves);
+}
+
 size_t follow_lamp(IndirectDrawing& d, size_t k, size_t most) {
   constexpr float brighter = 4;  // than what was found, at most
   LitLamp& lit = d.lit[k];
@@ -155,8 +161,7 @@ size_t follow_lamp(IndirectDrawing& d, size_t k, size_t most) {
                      [&](uint32_t a, uint32_t b) { return due[a] != due[b] ? due[a] > due[b] : a < b; });
     leaves.resize(count), std::sort(leaves.begin(), leaves.end());  // rays side by side
   }
-  light_by(
-      d, lit.lamp, count, [&](size_t i) { return leaves[i]; }, {}, lit.at_leaves);
+  light_some_leaves(d, lit.lamp, leaves, lit.at_leaves);
   for (const uint32_t i : leaves) lit.found[i] = lit.at_leaves[i], lit.from[i] = place;
   return count;
 }

@@ -106,6 +106,7 @@ class LiveIndirect : public LiveKind {
     if (solve_due_) d_.solve = make_indirect_solve(d_.transfer, albedos_), solve_due_ = false;
     if (hurry) solve_indirect(d_.transfer, d_.solve, d_.direct, coarse_tolerance, coarse_bounces);
     else solve_indirect(d_.transfer, d_.solve, d_.direct);
+    if (!hurry) part_near_light(d_);
     if (request_.at == "receivers") read_receivers(d_, directional_of(baked_.surface));
     times.relight = 1e3 * since(start);
     return more ? Light::partial : hurry ? Light::draft : Light::whole;
@@ -123,7 +124,7 @@ class LiveIndirect : public LiveKind {
     if (keeps && kept.size() != count) kept.assign(count, Kernels{.count = SIZE_MAX});
     const bool lit = pass.sample == 0 && d_.show.part != Show::Part::indirect && count * each <= kept_lights;
     if (lit) lights.begin(count, each);
-    const IndirectQuality quality = pass.hurry ? hurried_indirect : IndirectQuality();
+    const IndirectQuality quality = pass.hurry ? hurried_indirect : quality_of(request_);
     return [this, &kept, keeps, &lights, lit, quality, &rays = pass.rays.rays, eye = pass.eye]() -> RayShade {
       const IndirectShade bounced = bounced_light(d_, baked_, at_receivers_, at_receivers_);
       return [this, &kept, keeps, &lights, lit, quality, &rays, eye, bounced](size_t ray) {
@@ -183,7 +184,7 @@ class LiveIndirect : public LiveKind {
   }
   Result<void> paint() {
     d_.scene.materials = baked_.scene.materials, d_.scene.colors = baked_.scene.colors;
-    albedos_ = d_.transfer.surfels.albedos, solve_due_ = true;
+    albedos_ = d_.transfer.surfels.albedos, solve_due_ = true, d_.near.clear();
     return repaint(request_, d_.scene, d_.transfer.surfels, albedos_);
   }
   // What pictures one by one have alone.
@@ -215,7 +216,7 @@ class LiveIndirect : public LiveKind {
     if (scales != d_.still.scales) forget_still();
     move_lamps();
     due.light |= before.lamp != request_.lamp || before.move != request_.move || before.time != request_.time ||
-                 before.at != request_.at || before.albedo != request_.albedo;
+                 before.at != request_.at || before.near_rays != request_.near_rays || before.albedo != request_.albedo;
     if (!shone && d_.still.shines()) still_due_ = true;
     if (before.albedo == request_.albedo) return {};
     if (auto ok = paint(); !ok) return ok;
