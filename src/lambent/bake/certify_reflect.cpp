@@ -12,8 +12,10 @@
 namespace lambent {
 namespace {
 
-constexpr size_t rays = 32;                      // of a place, to the surfaces that it sees
-constexpr size_t averaged = 12, looked_at = 32;  // places around one; of these those that face as it does
+constexpr size_t rays = 32;  // of a place, to the surfaces that it sees
+// Places around one; of these those that face as it does. More than two blur errors that come back from close by, as
+// in a gap or at a box's foot: of 12, the certificate of boxes of albedo 0.8 said 0.83 to 0.89 of the error.
+constexpr size_t averaged = 2, looked_at = 32;
 constexpr float facing_cosine = 0.7f;
 constexpr int most_bounces = 8;
 constexpr size_t piece = 16;
