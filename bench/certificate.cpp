@@ -28,7 +28,8 @@
 namespace lambent::bench {
 namespace {
 
-constexpr int true_samples = 1024;
+// Of each of the two: with 1,024, true errors were the same to four digits.
+constexpr int true_samples = 256;
 
 // Receivers of a truth, their rows twice, and the area of each.
 struct Truth {
@@ -305,8 +306,9 @@ void bench_certificate() {
     if (auto scene = data_scene("room.glb", false)) of_lightmaps("room", *scene, 5, said);
   if (said.over_true.empty()) return;
   const auto [least, most] = std::minmax_element(said.over_true.begin(), said.over_true.end());
+  // The true one within a fifth of what was said.
   const auto off = std::count_if(said.over_true.begin(), said.over_true.end(),
-                                 [](double ratio) { return ratio < 0.8 || ratio > 1.25; });
+                                 [](double ratio) { return ratio < 1 / 1.2 || ratio > 1 / 0.8; });
   report("certificate, all", *most, *least, "said over true, greatest", "the least",
          {{"bakes", said.over_true.size()}, {"beyond_a_fifth", off}});
 }

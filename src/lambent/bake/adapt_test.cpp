@@ -1,5 +1,7 @@
 #include <lambent/bake/adapt.h>
 #include <lambent/bake/bake.h>
+#include <lambent/core/random.h>
+#include <lambent/core/sampling.h>
 #include <lambent/scene/procedural.h>
 #include <lambent/scene/refine.h>
 
@@ -78,6 +80,20 @@ TEST(Adapt, LeavesNoCracks) {
   }
 }
 
+// Slivers in a heap: light changes everywhere.
+Scene heap_of_needles(int count) {
+  Scene scene;
+  const uint32_t grey = add_material(scene, "grey", Vec3(0.5f));
+  Random random(1, 2);
+  for (int i = 0; i < count; ++i) {
+    const Vec3 along = 0.3f * square_to_sphere(random.next2()),
+               across = 0.01f * normalize_or(cross(along, Vec3(0.1f, 1, 0.3f)), Vec3(1, 0, 0));
+    const Vec3 at(random.next(), random.next(), random.next());
+    add_quad(scene, grey, "needle", at, along, across, 1, 1);
+  }
+  return scene;
+}
+
 TEST(Adapt, EndsOnWhatCannotBeMet) {
   for (const double error : {1e-9, 1.0}) {
     Scene scene = shadowed_floor();
@@ -96,6 +112,22 @@ TEST(Adapt, EndsOnWhatCannotBeMet) {
   progress.cancel();
   Scene scene = shadowed_floor();
   EXPECT_FALSE(adapt(scene, {}, &progress));
+}
+
+TEST(Adapt, SliversInAHeapEndWithACertificateThatSaysWhatTheyLose) {
+  Scene heap = heap_of_needles(1000);
+  auto split = adapt(heap, {.error = 0.02, .longest = 1, .more = 0.5, .triangles = 500, .samples = 16});
+  ASSERT_TRUE(split);
+  EXPECT_TRUE(split->limited);
+  EXPECT_GT(split->last, 0.05);
+  EXPECT_LE(heap.triangles.size(), 3000u);
+  auto tracer = Tracer::build(heap);
+  BakeReport report;
+  auto baked = bake(heap, *tracer, make_vertex_receivers(heap),
+                    {.order = 3, .bounces = 1, .error = 0.025, .seconds = 0, .thin = 200}, &report);
+  ASSERT_TRUE(baked) << baked.error().text();
+  EXPECT_GT(report.certificate.error, 0.05);
+  EXPECT_LT(report.certificate.uncertain, report.certificate.error);
 }
 
 }  // namespace

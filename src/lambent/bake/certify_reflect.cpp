@@ -12,8 +12,12 @@
 namespace lambent {
 namespace {
 
-constexpr size_t rays = 32;                      // of a place, to the surfaces that it sees
-constexpr size_t averaged = 12, looked_at = 32;  // places around one; of these those that face as it does
+constexpr size_t rays = 32;  // of a place, to the surfaces that it sees
+// Places around one; of those that are looked at these that face as it does. Where vertices receive, errors are as
+// large as triangles: more places than two blur what comes back from close by, as in a gap or at a box's foot (of 12,
+// the certificate of boxes of albedo 0.8 said 0.83 to 0.89 of the error). Where texels do, errors are smaller than
+// places are apart: so few give single ones too much to say.
+constexpr size_t averaged_vertices = 2, averaged_others = 12, looked_at = 32;
 constexpr float facing_cosine = 0.7f;
 constexpr int most_bounces = 8;
 constexpr size_t piece = 16;
@@ -35,7 +39,7 @@ struct Seen {
   Vec3 share{0};
 };
 struct Around {
-  std::array<uint32_t, averaged> place{};
+  std::array<uint32_t, averaged_others> place{};
   uint32_t count = 0;
 };
 
@@ -44,6 +48,8 @@ struct Reflector {
   const ResidualPlaces& places;
   Cloud cloud{places.at};
   Tree tree{3, cloud, {16}};
+  size_t averaged = std::holds_alternative<CornerReceivers>(of.setup.receivers.basis) ? averaged_vertices
+                                                                                      : averaged_others;
   size_t n = places.at.size();
   std::vector<Around> around = std::vector<Around>(n);
   std::vector<std::array<Seen, rays>> seen = std::vector<std::array<Seen, rays>>(n);

@@ -79,5 +79,23 @@ TEST(Certificate, IsHonest) {
     }
 }
 
+// Boxes just above a floor, of a high albedo: errors that come back from close by.
+TEST(Certificate, OfBoxesThatSendMuchBackIsHonest) {
+  SKIP_UNDER_SANITIZERS();
+  Scene scene = make_quad(Vec3(-2, 0, -2), Vec3(0, 0, 4), Vec3(4, 0, 0), 16, 16, Vec3(0.85f));
+  add_box(scene, 0, "low", Vec3(-0.9f, 0.025f, -0.8f), Vec3(0.1f, 0.5f, 0.3f), 5);
+  add_box(scene, 0, "high", Vec3(0.5f, 0.025f, 0.2f), Vec3(1.1f, 1.4f, 0.7f), 5);
+  auto tracer = Tracer::build(scene);
+  const Receivers receivers = make_vertex_receivers(scene);
+  for (const uint32_t seed : {1u, 2u}) {
+    const BakeOptions options{.order = 3, .samples = 128, .bounces = 2, .seed = seed};
+    BakeReport report;
+    auto stored = bake(scene, *tracer, receivers, options, &report);
+    ASSERT_TRUE(stored);
+    const double truth = test::true_error(scene, receivers, *stored, options, 512);
+    EXPECT_NEAR(report.certificate.error / truth, 1, 0.07) << "seed " << seed << ", truth " << truth;
+  }
+}
+
 }  // namespace
 }  // namespace lambent
