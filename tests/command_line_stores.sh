@@ -195,7 +195,24 @@ expect 0 'paths' reference red.obj --max-edge 0.2 --env $sky --bounces 2 $shot -
 alike 36 "wavelets that bounced and the path tracer" haar_bounced.exr haar_truth.exr --exposure -2
 expect 2 'samples: is of the rays that bounce' bake corner.obj --light haar:32 --samples 64 -o x.glb
 expect 2 'seed: is of the rays that bounce' bake corner.obj --light haar:32 --bounces 0 --seed 2 -o x.glb
-expect 2 'fix-view' bake corner.obj --light haar:32 --fix-view auto -o x.glb
+# Pixels in wavelets: the picture that the receivers' make, few terms too, and with bounces.
+expect 0 'a pixel' bake corner.obj --max-edge 0.1 --light haar:32,error=0.001 --visibility binary \
+  --fix-view 3,2,4,1,0.5,1,40 --size 48x32 --spp 16 -o haar_view.glb
+expect 0 'fixed view of 48 x 32' inspect haar_view.glb
+expect 0 'bytes_read' render haar_view.glb --env sky:elevation=50,azimuth=20,sun=on --background none \
+  -o haar_view.exr --json
+expect 0 'shaded' render blocks.glb "${view[@]}" --brdf diffuse --method standard --spp 16 -o by_texels.exr
+alike 45 "pixels' wavelets and the standard basis" haar_view.exr by_texels.exr
+expect 0 '50 wavelets of the light' render haar_view.glb --env sky:elevation=50,azimuth=20,sun=on \
+  --background none --terms 50 -o haar_view_few.exr
+alike 25 "few wavelets of pixels and all" haar_view_few.exr haar_view.exr
+expect 0 'a pixel' bake red.obj --max-edge 0.2 --light haar:32 --bounces 2 --samples 512 --memory 20MB \
+  --fix-view 3,2,4,1,0.5,1,40 --size 48x32 --spp 16 -o haar_view_bounced.glb
+# shellcheck disable=SC2086
+expect 0 'wavelets of the light' render haar_view_bounced.glb --env $sky --background none -o haar_view_bounced.exr
+alike 36 "pixels' wavelets that bounced and the path tracer" haar_view_bounced.exr haar_truth.exr --exposure -2
+expect 2 'terms: counts wavelets' render view.glb --env uniform:1 --terms 5 -o x.png
+expect 2 'light-order' render haar_view.glb --env uniform:1 --light-order 2 -o x.png
 expect 2 'window: does not go with wavelets' render haar.glb --env uniform:1 --window hann -o x.png
 expect 2 'env: is needed' render haar.glb -o x.png
 expect 1 'holds transfer in wavelets' compress haar.glb --zonal 2 -o x.glb

@@ -24,8 +24,6 @@ Result<void> check_placement(Field& field, const std::string& where) {
     return Error{where, "visibility in blocks is baked at vertices"};
   if (std::holds_alternative<IndirectTransfer>(field.store) && !is_surface(field.where))
     return Error{where, "direct-to-indirect transport is baked on surfaces"};
-  if (std::holds_alternative<HaarTransfer>(field.store) && !is_surface(field.where))
-    return Error{where, "transfer in wavelets is baked on surfaces"};
   if (!is_surface(field.where)) {
     if (!std::holds_alternative<DiffuseRows>(field.rows)) return Error{where, "a fixed view has one row a pixel"};
     field.rows = PixelRows{};

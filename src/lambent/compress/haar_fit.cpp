@@ -2,12 +2,15 @@
 #include <lambent/compress/haar_rows.h>
 
 #include <lambent/basis/haar.h>
+#include <lambent/core/check.h>
 #include <lambent/core/parallel.h>
 
 #include <algorithm>
 #include <bit>
 #include <cmath>
+#include <mutex>
 #include <numbers>
+#include <optional>
 
 namespace lambent {
 namespace {
@@ -42,23 +45,7 @@ void transform_row(const Visibility& v, const Cube& cube, size_t receiver, Vec3 
   }
 }
 
-std::vector<HaarEntry> largest_of(const std::vector<float>& row, const HaarFitOptions& o) {
-  std::vector<HaarEntry> entries;
-  for (uint32_t c = 0; c < row.size(); ++c)
-    if (row[c] != 0) entries.push_back({c, row[c]});
-  return largest_entries(entries, o, row.size());
-}
-
-Result<void> check_fit(const Visibility& v, std::span<const Vec3> normals, const HaarFitOptions& o) {
-  if (!std::has_single_bit(unsigned(v.size))) return Error{"", "Haar wavelets want a cube of 2^k texels a side"};
-  if (normals.size() != v.receivers) return Error{"", "there is not a normal for each receiver"};
-  if (!(o.keep >= 0 && o.keep <= 1) || !(o.error >= 0 && o.error < 1))
-    return Error{"", "the share or the error of Haar coefficients is out of range"};
-  return {};
-}
-
-}  // namespace
-
+// What the options leave of a row of `columns`, which has its entries by rising column.
 std::vector<HaarEntry> largest_entries(std::span<const HaarEntry> row, const HaarFitOptions& o, size_t columns) {
   std::vector<HaarEntry> out(row.begin(), row.end());
   std::sort(out.begin(), out.end(), [&](const HaarEntry& a, const HaarEntry& b) {
@@ -83,38 +70,133 @@ std::vector<HaarEntry> largest_entries(std::span<const HaarEntry> row, const Haa
   return out;
 }
 
-Result<std::vector<std::vector<HaarEntry>>> haar_rows(const Visibility& v, std::span<const Vec3> normals,
-                                                      const HaarFitOptions& o, Progress* progress) {
-  if (auto ok = check_fit(v, normals, o); !ok) return ok.error();
-  const Cube cube = make_cube(v.size);
-  ProgressStage stage(progress, "wavelets", v.receivers);
-  std::vector<std::vector<HaarEntry>> rows(v.receivers);
-  parallel_for(v.receivers, 16, [&](size_t begin, size_t end) {
-    thread_local HaarScratchRow scratch;
-    for (size_t r = begin; r < end && !stage.cancelled(); ++r) {
-      transform_row(v, cube, r, normals[r], scratch);
-      rows[r] = largest_of(scratch.row, o);
-    }
-    stage.advance(end - begin);
-  });
-  if (stage.cancelled()) return Error{"", "cancelled"};
-  return rows;
+std::vector<HaarEntry> largest_of(const std::vector<float>& row, const HaarFitOptions& o) {
+  std::vector<HaarEntry> entries;
+  for (uint32_t c = 0; c < row.size(); ++c)
+    if (row[c] != 0) entries.push_back({c, row[c]});
+  return largest_entries(entries, o, row.size());
 }
 
-HaarTransfer store_haar_rows(int size, int channels, std::span<const std::vector<HaarEntry>> rows, double all,
-                             double left, HaarFitReport* report) {
-  std::vector<float> largest(size_t(channels) * cube_texels(size));
-  size_t entries = 0;
-  for (const auto& row : rows) {
-    entries += row.size();
-    for (const HaarEntry& e : row) largest[e.column] = std::max(largest[e.column], std::abs(e.value));
+Result<void> check_fit(const Visibility& v, std::span<const Vec3> normals, const HaarFitOptions& o) {
+  if (!std::has_single_bit(unsigned(v.size))) return Error{"", "Haar wavelets want a cube of 2^k texels a side"};
+  if (normals.size() != v.receivers) return Error{"", "there is not a normal for each receiver"};
+  if (!(o.keep >= 0 && o.keep <= 1) || !(o.error >= 0 && o.error < 1))
+    return Error{"", "the share or the error of Haar coefficients is out of range"};
+  return {};
+}
+
+using HaarRows = std::vector<std::vector<HaarEntry>>;
+
+// What of a row may be left out one by one, so that all of it is an eighth of what the options leave out.
+std::vector<float> least_entries(const HaarColumnsMaker& m, const HaarFitOptions& o) {
+  double mean = 0;
+  for (double s : m.squares) mean += s / double(m.rows);
+  const double error = o.keep > 0 ? 1e-3 : o.error, columns = double(size_t(m.channels) * cube_texels(m.size));
+  std::vector<float> least;
+  for (double s : m.squares) least.push_back(float(error * std::sqrt(std::max(s, 1e-3 * mean) / (8 * columns))));
+  return least;
+}
+
+// Rows [first, first + rows.size()) on their way.
+struct HaarPass {
+  size_t first = 0;
+  HaarRows rows;
+  std::vector<double> all, left;  // sums of squares, by row: of all of it, and of what is not in `rows`
+
+  size_t bytes() const {
+    size_t sum = 0;
+    for (const auto& row : rows) sum += row.capacity() * sizeof(HaarEntry);
+    return sum;
   }
-  HaarWriter writer(size, largest);
-  for (size_t first = 0; first < rows.size(); first += haar_chunk)
-    writer.add(rows.subspan(first, std::min(haar_chunk, rows.size() - first)));
-  const double error = all > 0 ? std::sqrt((left + writer.lost()) / all) : 0.0;
-  if (report) *report = {error, double(entries) / double(std::max<size_t>(rows.size(), 1))};
-  return writer.finish(error);
+  // The last rows are dropped, for a pass of their own.
+  void shed(size_t memory) {
+    while (rows.size() > haar_chunk && bytes() > memory)
+      rows.resize(std::max<size_t>(rows.size() / 2 / haar_chunk, 1) * haar_chunk);
+  }
+};
+
+// largest: of each column, what no entry exceeds; set by the first pass, which looks at all rows.
+Result<void> run_pass(const HaarColumnsMaker& m, const HaarFitOptions& o, std::span<const float> least, size_t memory,
+                      ProgressStage& stage, HaarPass& pass, std::vector<float>& largest) {
+  const size_t columns = cube_texels(m.size), channels = size_t(m.channels), stride = m.together * channels;
+  std::mutex mutex;
+  for (size_t first = 0; first < columns && !stage.cancelled(); first += m.together) {
+    const size_t count = std::min(m.together, columns - first);
+    auto made = m.make(first, count);
+    if (!made) return made.error();
+    stage.advance(count);
+    if (made->empty()) continue;
+    parallel_for(pass.first ? pass.rows.size() : m.rows, 64, [&](size_t begin, size_t end) {
+      std::vector<float> most(count * channels);
+      for (size_t i = begin; i < end; ++i) {
+        const size_t r = pass.first + i;
+        const float* values = made->data() + r * stride;
+        for (size_t k = 0; k < count; ++k)
+          for (size_t c = 0; c < channels; ++c) {
+            const float value = values[k * channels + c];
+            const bool kept = std::abs(value) > least[r];
+            if (kept) most[c * count + k] = std::max(most[c * count + k], std::abs(value));
+            if (i >= pass.rows.size()) continue;
+            const double square = double(value) * double(value);
+            pass.all[i] += square;
+            if (kept) pass.rows[i].push_back({uint32_t(c * columns + first + k), value});
+            else pass.left[i] += square;
+          }
+      }
+      if (pass.first) return;
+      const std::lock_guard lock(mutex);
+      for (size_t c = 0; c < channels; ++c)
+        for (size_t k = 0; k < count; ++k) {
+          float& l = largest[c * columns + first + k];
+          l = std::max(l, most[c * count + k]);
+        }
+    });
+    pass.shed(memory);
+  }
+  if (stage.cancelled()) return Error{"", "cancelled"};
+  parallel_for(pass.rows.size(), 64, [&](size_t begin, size_t end) {
+    for (size_t i = begin; i < end; ++i) {
+      std::vector<HaarEntry>& row = pass.rows[i];
+      std::sort(row.begin(), row.end(), [](const HaarEntry& a, const HaarEntry& b) { return a.column < b.column; });
+      std::vector<HaarEntry> kept = largest_entries(row, o, channels * columns);
+      for (const HaarEntry& e : row) pass.left[i] += double(e.value) * double(e.value);
+      for (const HaarEntry& e : kept) pass.left[i] -= double(e.value) * double(e.value);
+      row = std::move(kept);
+    }
+  });
+  return {};
+}
+
+}  // namespace
+
+Result<HaarTransfer> store_haar_columns(const HaarColumnsMaker& m, const HaarFitOptions& o, size_t memory,
+                                        HaarFitReport* report, Progress* progress, const std::string& name,
+                                        int* passes) {
+  LAMBENT_CHECK(m.squares.size() == m.rows && m.together > 0);
+  const std::vector<float> least = least_entries(m, o);
+  std::vector<float> largest(size_t(m.channels) * cube_texels(m.size));
+  std::optional<HaarWriter> writer;
+  double all = 0, left = 0;
+  size_t entries = 0;
+  int count = 0;
+  for (size_t first = 0; first < m.rows; ++count) {
+    HaarPass pass{first, HaarRows(m.rows - first), std::vector<double>(m.rows - first),
+                  std::vector<double>(m.rows - first)};
+    ProgressStage stage(progress, name, cube_texels(m.size));
+    if (auto ok = run_pass(m, o, least, memory, stage, pass, largest); !ok) return ok.error();
+    if (!writer) writer.emplace(m.size, largest);
+    const std::span<const std::vector<HaarEntry>> rows = pass.rows;
+    for (size_t r = 0; r < rows.size(); r += haar_chunk)
+      writer->add(rows.subspan(r, std::min(haar_chunk, rows.size() - r)));
+    for (size_t r = 0; r < rows.size(); ++r)
+      all += pass.all[r], left += std::max(pass.left[r], 0.0), entries += rows[r].size();
+    first += rows.size();
+  }
+  if (!writer) writer.emplace(m.size, largest);
+  const double lost = all > 0 ? (left + writer->lost()) / all : 0.0, error = std::sqrt(lost + m.error * m.error);
+  if (report) *report = {error, double(entries) / double(std::max<size_t>(m.rows, 1))};
+  if (passes) *passes = count;
+  return writer->finish(error);
 }
 
 std::vector<float> haar_row(const Visibility& v, size_t receiver, Vec3 normal) {

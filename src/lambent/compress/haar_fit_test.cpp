@@ -162,20 +162,77 @@ TEST(HaarTransfer, SparseAndWholeTilesOfManyChunksKeepTheirPlaces) {
     for (const HaarEntry& e : rows[r]) EXPECT_NEAR(load_receiver(t, r)[e.column], e.value, 0.03f);
 }
 
+// Rows of three channels, made `together` columns at a time, and how often they were made.
+struct MadeOfRows {
+  const std::vector<std::vector<HaarEntry>>& rows;
+  size_t together, calls = 0;
+  std::vector<float> made = {};
+
+  HaarColumnsMaker maker() {
+    const size_t columns = cube_texels(16);
+    HaarColumnsMaker m{16, 3, rows.size(), together, std::vector<double>(rows.size()), 0, {}};
+    for (size_t r = 0; r < rows.size(); ++r)
+      for (const HaarEntry& e : rows[r]) m.squares[r] += double(e.value) * double(e.value);
+    m.make = [this, columns](size_t first, size_t count) -> Result<std::span<const float>> {
+      ++calls;
+      made.assign(rows.size() * together * 3, 0.0f);
+      for (size_t r = 0; r < rows.size(); ++r)
+        for (const HaarEntry& e : rows[r])
+          if (const size_t k = e.column % columns; k >= first && k < first + count)
+            made[(r * together + k - first) * 3 + e.column / columns] = e.value;
+      return std::span<const float>(made);
+    };
+    return m;
+  }
+};
+std::vector<std::vector<HaarEntry>> random_rows(size_t count, uint32_t sparse) {
+  Random random(5);
+  std::vector<std::vector<HaarEntry>> rows(count);
+  for (auto& row : rows)
+    for (uint32_t c = 0; c < 3 * cube_texels(16); c += 1 + uint32_t(float(sparse) * random.next()))
+      row.push_back({c, (random.next() - 0.3f) * (c < cube_texels(16) ? 1.0f : 0.4f)});
+  return rows;
+}
+
+// What has no room is made again, and nothing of it shows in the result.
+TEST(HaarTransfer, MemoryBoundsRowsAndChangesNoByte) {
+  const auto rows = random_rows(2 * haar_chunk + 100, 600);
+  const auto store = [&](size_t memory, size_t together, double error, int& passes) {
+    MadeOfRows of{rows, together};
+    HaarFitReport report;
+    auto t = store_haar_columns(of.maker(), {.error = error}, memory, &report, nullptr, "wavelets", &passes);
+    EXPECT_TRUE(t);
+    EXPECT_EQ(of.calls, size_t(passes) * ((cube_texels(16) + together - 1) / together));
+    EXPECT_EQ(t->error, report.error);
+    return std::move(*t);
+  };
+  int once = 0, often = 0;
+  for (double error : {0.0, 0.2}) {
+    const HaarTransfer whole = store(size_t{1} << 30, 48, error, once), tight = store(1000, 17, error, often);
+    EXPECT_EQ(once, 1);
+    EXPECT_EQ(often, 3);
+    EXPECT_TRUE(check_haar(tight, "it"));
+    EXPECT_TRUE(std::equal(whole.data.begin(), whole.data.end(), tight.data.begin(), tight.data.end()));
+    EXPECT_EQ(whole.steps, tight.steps);
+    EXPECT_EQ(whole.error, tight.error);
+    if (error > 0) {
+      EXPECT_GT(whole.error, 0.1);
+      EXPECT_LT(whole.error, 0.22);
+      continue;
+    }
+    for (size_t r = 0; r < rows.size(); r += 997)
+      for (const HaarEntry& e : rows[r]) EXPECT_NEAR(load_receiver(tight, r)[e.column], e.value, 0.004f);
+  }
+}
+
 // Each channel against its own columns of a light that has another in each colour.
 TEST(HaarTransfer, ThreeChannelsAreLitEachByItsColour) {
   const BallOverFloor s;
   const size_t columns = cube_texels(16);
-  Random random(5);
-  std::vector<std::vector<HaarEntry>> rows(300);
-  double all = 0;
-  for (auto& row : rows)
-    for (uint32_t c = 0; c < 3 * columns; c += 1 + uint32_t(40 * random.next())) {
-      row.push_back({c, (random.next() - 0.3f) * (c < columns ? 1.0f : 0.4f)});
-      all += double(row.back().value) * double(row.back().value);
-    }
+  const auto rows = random_rows(300, 40);
+  MadeOfRows of{rows, 48};
   HaarFitReport report;
-  const HaarTransfer t = store_haar_rows(16, 3, rows, all, 0, &report);
+  const HaarTransfer t = *store_haar_columns(of.maker(), {.error = 0}, size_t{1} << 30, &report);
   ASSERT_TRUE(check_haar(t, "it"));
   EXPECT_EQ(t.channels, 3);
   EXPECT_EQ(t.columns(), 3 * columns);

@@ -177,8 +177,12 @@ Result<void> bake_over_cube(Bake& b) {
   auto seen = bake_visibility_of_plan(b.plan, b.scene, b.tracer, b.receivers(), b.job, b.report, b.summary);
   if (!seen) return seen.error();
   if (!wavelets) return b.store = std::move(*seen), b.rows = SightRows{}, Result<void>();
-  auto transfer = fit_haar_of_plan(b.plan, *seen, b.scene, b.tracer, b.receivers(), b.job, b.report, b.summary, b.told);
+  b.summary.json["wavelets"] = {{"blocks_bytes", seen->bytes()}};
+  const bool for_view = !b.request.fix_view.empty();
+  HaarFitReport fit;
+  auto transfer = fit_haar_of_plan(b.plan, for_view, *seen, b.scene, b.tracer, b.receivers(), b.job, b.report, fit);
   if (!transfer) return transfer.error();
+  if (!for_view) tell_wavelets(*transfer, fit, "receiver", b.summary, b.told);
   b.store = std::move(*transfer);
   return {};
 }
@@ -249,6 +253,17 @@ Result<void> fix_the_view(Bake& b, const View& view) {
   RenderOptions options;
   options.width = view.width, options.height = view.height, options.samples = b.request.spp;
   options.outgoing = b.outgoing();
+  if (const auto* receivers = std::get_if<HaarTransfer>(&b.store)) {
+    auto mix = mix_of_view(b.scene, b.tracer, b.receivers().basis, view.camera, options, b.job.progress);
+    if (!mix) return mix.error();
+    HaarFitReport fit;
+    auto pixels = haar_of_view(*receivers, *mix, b.plan.haar, b.plan.bake.memory, fit, b.job.progress);
+    if (!pixels) return pixels.error();
+    tell_wavelets(*pixels, fit, "pixel", b.summary, b.told);
+    b.view = FixedView{view.camera, view.width, view.height, std::move(mix->coverage)};
+    b.store = std::move(*pixels), b.rows = DiffuseRows{};
+    return {};
+  }
   auto pixels = fix_view(b.scene, b.tracer, b.receivers().basis, b.dense(), view.camera, options, b.job.progress);
   if (!pixels) return pixels.error();
   b.view = FixedView{view.camera, view.width, view.height, std::move(pixels->coverage)};

@@ -7,124 +7,126 @@
 #include <lambent/core/parallel.h>
 #include <lambent/core/sampling.h>
 #include <lambent/pipeline/text.h>
+#include <lambent/transfer/haar_columns.h>
 
 #include <fmt/format.h>
 
+#include <algorithm>
 #include <chrono>
-#include <cmath>
 
 namespace lambent {
 namespace {
 
-using HaarRows = std::vector<std::vector<HaarEntry>>;
-
 // Columns of the light that bounce together: widths are multiples of lane_multiple for one channel and three.
 constexpr size_t columns_together = 48;
 
-// Rows by column: entries of column c from first[c] on.
-struct HaarColumns {
-  std::vector<size_t> first;
-  std::vector<uint32_t> receiver;
-  std::vector<float> value;
-};
-HaarColumns by_column(const HaarRows& rows, size_t columns) {
-  HaarColumns out{std::vector<size_t>(columns + 1), {}, {}};
-  for (const auto& row : rows)
-    for (const HaarEntry& e : row) ++out.first[e.column + 1];
-  for (size_t c = 0; c < columns; ++c) out.first[c + 1] += out.first[c];
-  out.receiver.resize(out.first[columns]), out.value.resize(out.first[columns]);
-  std::vector<size_t> at(out.first.begin(), out.first.end() - 1);
-  for (uint32_t r = 0; r < rows.size(); ++r)
-    for (const HaarEntry& e : rows[r]) out.receiver[at[e.column]] = r, out.value[at[e.column]++] = e.value;
-  return out;
-}
+// What rows are made of, so that what they leave out is little beside what the rows made of them leave out.
+HaarFitOptions finer(const HaarFitOptions& o) { return {.error = o.keep > 0 ? 0.005 : o.error / 4}; }
 
-struct BouncedRows {
-  HaarRows rows;             // columns are [channel][column]
-  double all = 0, left = 0;  // sums of squares: of the whole rows, and of what is not in them
+struct HaarOutcome {
+  HaarTransfer transfer;
+  HaarFitReport fit;
 };
 
-// What of a receiver's row may be left out one by one, so that all of it is an eighth of what the options leave out.
-std::vector<float> least_entries(const HaarRows& direct, size_t columns, const HaarFitOptions& o) {
-  std::vector<double> squares(direct.size());
-  double mean = 0;
-  for (size_t r = 0; r < direct.size(); ++r) {
-    for (const HaarEntry& e : direct[r]) squares[r] += double(e.value) * double(e.value);
-    mean += squares[r] / double(direct.size());
-  }
-  const double error = o.keep > 0 ? 1e-3 : o.error;
-  std::vector<float> least;
-  for (double s : squares) least.push_back(float(error * std::sqrt(std::max(s, 1e-3 * mean) / (8 * double(columns)))));
-  return least;
-}
-
-// X = T0 + B X after so many bounces, a few columns at a time. No bounce makes light of a column that direct light has
-// not. Errors: cancelled.
-Result<BouncedRows> bounce_rows(const LinearOperator& op, int bounces, size_t channels, const HaarRows& direct,
-                                size_t columns, const HaarFitOptions& fit, Progress* progress) {
-  const size_t n = direct.size(), width = columns_together * channels;
-  const HaarColumns of_light = by_column(direct, columns);
-  const std::vector<float> least = least_entries(direct, columns, fit);
-  BouncedRows out{HaarRows(n), 0, 0};
-  std::vector<double> all(n), left(n);
-  AlignedVector<float> x0(n * width);
-  ProgressStage stage(progress, "bouncing wavelets", columns);
-  for (size_t first = 0; first < columns && !stage.cancelled(); first += columns_together) {
-    const size_t count = std::min(columns_together, columns - first);
-    stage.advance(count);
-    if (of_light.first[first] == of_light.first[first + count]) continue;
+// X = T0 + B X after so many bounces. No bounce makes light of a column that direct light has not.
+Result<HaarOutcome> bounce_rows(const LinearOperator& op, int bounces, size_t channels, const HaarTransfer& direct,
+                                double error, const HaarFitOptions& fit, size_t memory, Progress* progress) {
+  const size_t n = direct.receivers, width = columns_together * channels;
+  AlignedVector<float> x0(n * width), x;
+  const Source source{[&](size_t r, float* y) { std::copy_n(x0.data() + r * width, width, y); }};
+  HaarColumnsMaker maker{direct.size, int(channels), n, columns_together, haar_squares(direct), error, {}};
+  for (double& s : maker.squares) s *= double(channels);
+  maker.make = [&](size_t first, size_t count) -> Result<std::span<const float>> {
     std::fill(x0.begin(), x0.end(), 0.0f);
-    for (size_t k = 0; k < count; ++k)
-      for (size_t i = of_light.first[first + k]; i < of_light.first[first + k + 1]; ++i)
-        std::fill_n(x0.data() + of_light.receiver[i] * width + k * channels, channels, of_light.value[i]);
-    const Source source{[&](size_t r, float* y) { std::copy_n(x0.data() + r * width, width, y); }};
+    if (!load_columns(direct, first, count, width, channels, x0.data())) return std::span<const float>();
+    for (size_t i = 0; i < x0.size() && channels > 1; i += channels) x0[i + 1] = x0[i + 2] = x0[i];
     auto solved = bounce(op, source, width, bounces);
     if (!solved) return solved.error();
     op.shares().gather(solved->x.data(), width);
-    parallel_for(n, 64, [&](size_t begin, size_t end) {
-      for (size_t r = begin; r < end; ++r)
-        for (size_t c = 0; c < channels; ++c)
-          for (size_t k = 0; k < count; ++k) {
-            const float value = solved->x[r * width + k * channels + c];
-            const double square = double(value) * double(value);
-            all[r] += square;
-            if (std::abs(value) > least[r]) out.rows[r].push_back({uint32_t(c * columns + first + k), value});
-            else left[r] += square;
-          }
-    });
-  }
-  if (stage.cancelled()) return Error{"", "cancelled"};
-  parallel_for(n, 64, [&](size_t begin, size_t end) {
-    for (size_t r = begin; r < end; ++r) {
-      std::vector<HaarEntry> kept = largest_entries(out.rows[r], fit, channels * columns);
-      for (const HaarEntry& e : out.rows[r]) left[r] += double(e.value) * double(e.value);
-      for (const HaarEntry& e : kept) left[r] -= double(e.value) * double(e.value);
-      out.rows[r] = std::move(kept);
-    }
-  });
-  for (size_t r = 0; r < n; ++r) out.all += all[r], out.left += std::max(left[r], 0.0);
-  return out;
+    x = std::move(solved->x);
+    return std::span<const float>(x);
+  };
+  HaarFitReport report;
+  auto stored = store_haar_columns(maker, fit, memory, &report, progress, "bouncing wavelets");
+  if (!stored) return stored.error();
+  return HaarOutcome{std::move(*stored), report};
 }
 
-Result<HaarTransfer> bounce_haar(const BakePlan& plan, const Visibility& seen, const Scene& scene, const Tracer& tracer,
-                                 const Receivers& receivers, const Job& job, BakeReport& report, HaarFitReport& fit) {
-  auto direct = haar_rows(seen, receivers.normals, plan.haar, job.progress);
+Result<HaarOutcome> bounce_haar(const BakePlan& plan, const HaarFitOptions& options, const Visibility& seen,
+                                const Scene& scene, const Tracer& tracer, const Receivers& receivers, const Job& job,
+                                BakeReport& report) {
+  HaarFitReport fit;
+  auto direct = fit_haar(seen, receivers.normals, finer(options), &fit, job.progress);
   if (!direct) return direct.error();
   const GatherSetup setup = make_gather_setup(scene, tracer, receivers, 1, plan.bake.samples, plan.bake.seed,
                                               square_to_cosine_hemisphere, job.progress);
-  auto B = GatherOperator::trace(setup, nullptr, nullptr, true, plan.bake.memory, job.progress);
+  const size_t half = plan.bake.memory / 2;  // rows of the operator, and rows in wavelets
+  auto B = GatherOperator::trace(setup, nullptr, nullptr, true, half, job.progress);
   if (!B) return B.error();
   report.rays += B->report().rays, report.trace_seconds += B->report().seconds, report.buried = B->report().buried;
   report.operator_bytes = B->report().bytes, report.operator_kept = B->report().kept;
   const auto start = std::chrono::steady_clock::now();
-  const size_t columns = cube_texels(seen.size), channels = size_t(setup.channels);
-  auto bounced = bounce_rows(*B, plan.bake.bounces, channels, *direct, columns, plan.haar, job.progress);
-  if (!bounced) return bounced.error();
+  auto bounced =
+      bounce_rows(*B, plan.bake.bounces, size_t(setup.channels), *direct, fit.error, options, half, job.progress);
   report.bounce_seconds = std::chrono::duration<double>(std::chrono::steady_clock::now() - start).count();
-  return store_haar_rows(seen.size, int(channels), bounced->rows, bounced->all, bounced->left, &fit);
+  return bounced;
+}
+
+// Of each pixel, no more than its row's sum of squares: rows are shares of light, and none takes from another.
+std::vector<double> least_squares_of(const PixelMix& mix, const HaarTransfer& t, bool coloured) {
+  const std::vector<double> of_receivers = haar_squares(t);
+  std::vector<double> squares(mix.coverage.size());
+  for (size_t p = 0; p < squares.size(); ++p)
+    for (size_t i = mix.begin[p]; i < mix.begin[p + 1]; ++i) {
+      const Vec3d w(mix.weights[i]);
+      const double least = std::min({w.x * w.x, w.y * w.y, w.z * w.z});
+      squares[p] += of_receivers[mix.receivers[i]] * (t.channels == 3 ? least : coloured ? dot(w, w) : w.x * w.x);
+    }
+  return squares;
+}
+
+bool is_coloured(const PixelMix& mix) {
+  return std::any_of(mix.weights.begin(), mix.weights.end(), [](Vec3 w) { return w.x != w.y || w.y != w.z; });
+}
+
+// Receivers' values [receiver][column][channel of those] to pixels' [pixel][column][channel].
+void mix_columns(const PixelMix& mix, const std::vector<float>& x, size_t from, size_t channels, size_t columns,
+                 std::vector<float>& y) {
+  parallel_for(mix.coverage.size(), 64, [&](size_t begin, size_t end) {
+    for (size_t p = begin; p < end; ++p) {
+      float* out = y.data() + p * columns * channels;
+      std::fill_n(out, columns * channels, 0.0f);
+      for (size_t i = mix.begin[p]; i < mix.begin[p + 1]; ++i) {
+        const float* v = x.data() + mix.receivers[i] * columns * from;
+        const Vec3 w = mix.weights[i];
+        for (size_t k = 0; k < columns; ++k)
+          for (size_t c = 0; c < channels; ++c) out[k * channels + c] += w[int(c)] * v[k * from + (from == 3 ? c : 0)];
+      }
+    }
+  });
 }
 
 }  // namespace
+
+Result<HaarTransfer> haar_of_view(const HaarTransfer& t, const PixelMix& mix, const HaarFitOptions& options,
+                                  size_t memory, HaarFitReport& report, Progress* progress) {
+  const bool coloured = t.channels == 3 || is_coloured(mix);
+  const size_t pixels = mix.coverage.size(), from = size_t(t.channels), channels = coloured ? 3 : 1;
+  const size_t each = sizeof(float) * (t.receivers * from + pixels * channels);  // a column of the light
+  const size_t together = std::clamp<size_t>(memory / 2 / std::max<size_t>(each, 1), 1, columns_together);
+  std::vector<float> x(t.receivers * together * from), y(pixels * together * channels);
+  HaarColumnsMaker maker{t.size, int(channels), pixels, together, least_squares_of(mix, t, coloured), t.error, {}};
+  maker.make = [&](size_t first, size_t count) -> Result<std::span<const float>> {
+    std::fill(x.begin(), x.end(), 0.0f);
+    size_t entries = 0;
+    for (size_t c = 0; c < from; ++c)
+      entries += load_columns(t, c * t.light_columns() + first, count, together * from, from, x.data() + c);
+    if (entries == 0) return std::span<const float>();
+    mix_columns(mix, x, from, channels, together, y);
+    return std::span<const float>(y);
+  };
+  return store_haar_columns(maker, options, memory / 2, &report, progress, "pixels' wavelets");
+}
 
 Result<Visibility> bake_visibility_of_plan(const BakePlan& plan, const Scene& scene, const Tracer& tracer,
                                            const Receivers& receivers, const Job& job, BakeReport& report,
@@ -152,18 +154,23 @@ Result<Visibility> bake_visibility_of_plan(const BakePlan& plan, const Scene& sc
   return visibility;
 }
 
-Result<HaarTransfer> fit_haar_of_plan(const BakePlan& plan, const Visibility& seen, const Scene& scene,
+Result<HaarTransfer> fit_haar_of_plan(const BakePlan& plan, bool for_view, const Visibility& seen, const Scene& scene,
                                       const Tracer& tracer, const Receivers& receivers, const Job& job,
-                                      BakeReport& report, Summary& summary, nlohmann::json& told) {
-  HaarFitReport fit;
-  auto transfer = plan.bake.bounces > 0 ? bounce_haar(plan, seen, scene, tracer, receivers, job, report, fit)
-                                        : fit_haar(seen, receivers.normals, plan.haar, &fit, job.progress);
-  if (!transfer) return transfer;
-  summary.json["wavelets"] = {{"per_receiver", fit.entries}, {"error", fit.error}, {"blocks_bytes", seen.bytes()}};
+                                      BakeReport& report, HaarFitReport& fit) {
+  const HaarFitOptions options = for_view ? finer(plan.haar) : plan.haar;
+  if (plan.bake.bounces == 0) return fit_haar(seen, receivers.normals, options, &fit, job.progress);
+  auto bounced = bounce_haar(plan, options, seen, scene, tracer, receivers, job, report);
+  if (!bounced) return bounced.error();
+  fit = bounced->fit;
+  return std::move(bounced->transfer);
+}
+
+void tell_wavelets(const HaarTransfer& transfer, const HaarFitReport& fit, const char* of, Summary& summary,
+                   nlohmann::json& told) {
   told["wavelets"] = {{"per_receiver", fit.entries}, {"error", fit.error}};
-  summary.lines.emplace_back("wavelets", fmt::format("{:.0f} of {} a receiver, with an error of {:.2f}% RMS",
-                                                     fit.entries, human_count(transfer->columns()), 100 * fit.error));
-  return transfer;
+  summary.json["wavelets"].update(told["wavelets"]);
+  summary.lines.emplace_back("wavelets", fmt::format("{:.0f} of {} a {}, with an error of {:.2f}% RMS", fit.entries,
+                                                     human_count(transfer.columns()), of, 100 * fit.error));
 }
 
 }  // namespace lambent

@@ -1,9 +1,13 @@
 // What a bake makes of a file's lamps, and of parts that are around everything.
+#include <lambent/light/sky.h>
 #include <lambent/pipeline/bake.h>
+#include <lambent/pipeline/bake_cube.h>
 #include <lambent/pipeline/bake_parse.h>
 #include <lambent/reference/path_tracer.h>
 #include <lambent/relight/relight.h>
+#include <lambent/relight/relight_haar.h>
 #include <lambent/scene/gltf_test-inl.h>
+#include <lambent/scene/procedural.h>
 
 #include "sanitizers.h"
 
@@ -267,6 +271,62 @@ TEST(Domes, NoWordWhereAReceiverSeesOut) {
   refused = bake(request);
   ASSERT_FALSE(refused);
   EXPECT_EQ(refused.error().text(), "--exclude: leaves no triangle");
+}
+
+// Pixels' wavelets against the picture that every texel of the light makes at the receivers (the standard basis): to
+// rounding with all terms and coefficients, whatever the memory; and to the error that is told with few.
+TEST(BakeScene, PixelsOfWaveletsAreThePictureOfEveryTexel) {
+  for (Vec3 colour : {Vec3(0.8f, 0.3f, 0.1f), Vec3(0.5f)}) {
+    Scene scene;
+    add_quad(scene, add_material(scene, "floor", colour), "floor", Vec3(-1, 0, -1), Vec3(0, 0, 2), Vec3(2, 0, 0), 9, 9);
+    add_sphere(scene, add_material(scene, "ball", Vec3(0.5f)), "ball", Vec3(0.1f, 0.7f, 0), 0.4f, 1);
+    auto tracer = Tracer::build(scene);
+    const Receivers receivers = make_vertex_receivers(scene);
+    const Visibility seen = *bake_visibility(*tracer, receivers, {.size = 16});
+    const CubeLight light = cube_light(*make_sky(*parse_sky("elevation=40,azimuth=30,turbidity=3")), 16);
+    const Cube cube = make_cube(16);
+    std::vector<uint8_t> levels(cube.count());
+    Relit exact;
+    exact.rows = 1;
+    exact.values.resize((receivers.count() + transfer_block - 1) / transfer_block * 3 * transfer_block);
+    for (size_t r = 0; r < receivers.count(); ++r) {
+      decode_visibility(seen, r, levels);
+      Vec3 sum(0.0f);
+      for (size_t t = 0; t < cube.count(); ++t)
+        if (levels[t]) sum += light.energy[t] * (std::max(0.0f, dot(receivers.normals[r], cube.texels.at(t))) / pi);
+      exact.set(r, 0, sum);
+    }
+    const Camera camera{Vec3(1.5f, 1.8f, 2.2f), Vec3(0, 0.2f, 0), Vec3(0, 1, 0), 50};
+    const RenderOptions options{24, 18, 9};
+    const Image truth = *render(scene, *tracer, receivers.basis, exact, camera, options);
+    const PixelMix mix = *mix_of_view(scene, *tracer, receivers.basis, camera, options);
+    const HaarTransfer of_receivers = *fit_haar(seen, receivers.normals, {.error = 0});
+    const auto error_of = [&](const HaarFitOptions& fit, size_t memory, HaarFitReport& report) {
+      auto pixels = haar_of_view(of_receivers, mix, fit, memory, report);
+      EXPECT_TRUE(pixels) << pixels.error().text();
+      EXPECT_EQ(pixels->channels, colour.x == colour.y ? 1 : 3);
+      EXPECT_EQ(pixels->receivers, size_t(24 * 18));
+      Relit relit;
+      relight(*pixels, haar_terms(*pixels, haar_column_norms(*pixels), light, 0), relit);
+      const Image image = pixels_image(relit, mix.coverage, camera, 24, 18, nullptr);
+      EXPECT_EQ(image.alpha, truth.alpha);
+      double error = 0, all = 0;
+      for (size_t i = 0; i < image.rgb.size(); ++i) {
+        const Vec3 d = image.rgb[i] - truth.rgb[i];
+        error += double(dot(d, d)), all += double(dot(truth.rgb[i], truth.rgb[i]));
+      }
+      return std::sqrt(error / all);
+    };
+    HaarFitReport all, tight, few;
+    EXPECT_LT(error_of({.error = 0}, size_t{1} << 30, all), 0.01);
+    EXPECT_LT(error_of({.error = 0}, 1000, tight), 0.01);
+    EXPECT_EQ(all.error, tight.error);
+    EXPECT_LT(all.error, 0.015);
+    EXPECT_LT(error_of({.error = 0.1}, size_t{1} << 30, few), 0.2);
+    EXPECT_LT(few.entries, 0.5 * all.entries);
+    EXPECT_GT(few.error, 0.05);
+    EXPECT_LT(few.error, 0.115);
+  }
 }
 
 }  // namespace

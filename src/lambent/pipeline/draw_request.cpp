@@ -118,8 +118,8 @@ const Option<R> table[] = {
     {"indirect", &R::indirect, "Blocks", K, "sh adds light that has bounced, by a diffuse bake in harmonics", 0, 0,
      "none|sh"},
 
-    {"terms", &R::terms, "Wavelets", W, "How many wavelets of the light are used, those that change most; 0: all", 0,
-     1 << 20},
+    {"terms", &R::terms, "Wavelets", W | V, "How many wavelets of the light are used, those that change most; 0: all",
+     0, 1 << 20},
 
     {"transfer-texture", &R::transfer_texture, "Transfer textures", T,
      "Shade the scene by this texture of zonal lobes, from `lambent patch`; over a bake that kept incident light, in "
@@ -282,8 +282,11 @@ Result<void> check_draw(const DrawRequest& request, const Baked& baked) {
   if (!show) return show.error();
   if (auto ok = check_show(request, *show, baked); !ok) return ok;
   const LightBasis light = light_of(baked.surface.store);
+  const bool wavelets = std::holds_alternative<HaarTransfer>(baked.surface.store);
+  if (!wavelets && is_given(request, "terms"))
+    return Error{"--terms", "counts wavelets, and the file is baked for none: bake --light haar:SIZE", true};
   const bool lit = show->part != Show::Part::emission && show->colour != RenderOptions::Show::albedo;
-  if (lit && (light.order > 0 || !light.lobes.empty() || kind == DrawKind::wavelets) && request.env.empty() &&
+  if (lit && (light.order > 0 || !light.lobes.empty() || wavelets) && request.env.empty() &&
       request.sphere_lamp.empty())
     return Error{"--env", "is needed: the file is baked for distant light", true};
   const bool copies = !light.lobes.empty() && light.lobe_kind == LobeKind::band_limited;

@@ -11,7 +11,8 @@ namespace lambent::test {
 // some kinds do not take.
 inline DrawRequest golden_request(const std::string& name) {
   DrawRequest request{.baked = std::string(LAMBENT_GOLDEN) + "/" + name + ".glb", .background = "none"};
-  if (name != "diffuse_fixed_view") request.camera = "3,2,4,1,0.5,1,40", request.size = "16x12", request.spp = 4;
+  if (name.find("fixed_view") == std::string::npos)
+    request.camera = "3,2,4,1,0.5,1,40", request.size = "16x12", request.spp = 4;
   if (name == "indirect_texels") request.at = "receivers";
   if (name.starts_with("indirect")) request.background = "env", request.lamp = {"sphere@1,1.2,1,0.1=30,20,10"};
   else if (name == "lightmap") request.lamp = {"lamp=1,0.5,0.25", "sky=0.5,1,2"};

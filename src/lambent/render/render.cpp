@@ -305,6 +305,46 @@ Image mean_of(const ViewSums& sums, int width, int height) {
   return image;
 }
 
+namespace {
+
+// What a pixel's rays ask of a receiver, row by row.
+using Asked = std::pair<uint32_t, std::vector<Vec3>>;
+using TakeAsked = std::function<void(size_t pixel, std::span<const Asked> asked, float coverage)>;
+
+// Calls a taker with every pixel; many of its rays meet the same receivers. `make_take` as of trace_pixels().
+Result<void> ask_pixels(const Scene& scene, const Tracer& tracer, const SpatialBasis& basis, const Camera& camera,
+                        const RenderOptions& options, size_t rows, const std::function<TakeAsked()>& make_take,
+                        Progress* progress) {
+  return trace_pixels(
+      scene, tracer, camera, options,
+      [&]() -> VisitPixel {
+        return [&, rows, take = make_take(), asked = std::vector<Asked>(), weights = std::vector<ViewWeights>(rows)](
+                   size_t pixel, std::span<const ViewRay> rays) mutable {
+          asked.clear();
+          const float samples = float(options.samples);
+          float open = 0;
+          for (const ViewRay& ray : rays) {
+            if (ray.hit.triangle == none) {
+              open += mean(ray.weight);
+              continue;
+            }
+            reflect_at(basis, options, ray.hit, ray.direction, shown_colour(scene, options, ray.hit), weights,
+                       [&](uint32_t receiver, int r, Vec3 weight) {
+                         auto place = std::find_if(asked.begin(), asked.end(),
+                                                   [&](const Asked& a) { return a.first == receiver; });
+                         if (place == asked.end())
+                           place = asked.insert(asked.end(), {receiver, std::vector<Vec3>(rows, Vec3(0.0f))});
+                         place->second[size_t(r)] += ray.weight * weight / samples;
+                       });
+          }
+          take(pixel, asked, std::max(samples - open, 0.0f) / samples);
+        };
+      },
+      progress);
+}
+
+}  // namespace
+
 Result<FixedViewTransfer> fix_view(const Scene& scene, const Tracer& tracer, const SpatialBasis& basis,
                                    const Transfer& transfer, const Camera& camera, const RenderOptions& options,
                                    Progress* progress) {
@@ -314,47 +354,50 @@ Result<FixedViewTransfer> fix_view(const Scene& scene, const Tracer& tracer, con
   FixedViewTransfer out;
   out.coverage.assign(pixels, 0.0f);
   const WritableTransfer fixed = make_transfer(transfer.light, 1, 3, pixels, transfer.precision);
-  auto traced = trace_pixels(
-      scene, tracer, camera, options,
-      [&]() -> VisitPixel {
-        // What a pixel's rays ask of the receivers, row by row, is gathered first: many meet the same ones.
-        using Asked = std::pair<uint32_t, std::vector<Vec3>>;
-        return [&, asked = std::vector<Asked>(), weights = std::vector<ViewWeights>(size_t(transfer.rows)),
-                row = std::vector<float>(3 * C)](size_t pixel, std::span<const ViewRay> rays) mutable {
-          asked.clear();
-          const float samples = float(options.samples);
-          float open = 0;
-          for (const ViewRay& ray : rays) {
-            if (ray.hit.triangle == none) {
-              open += mean(ray.weight);
-              continue;
-            }
-            reflect_at(
-                basis, options, ray.hit, ray.direction, shown_colour(scene, options, ray.hit), weights,
-                [&](uint32_t receiver, int r, Vec3 weight) {
-                  auto place =
-                      std::find_if(asked.begin(), asked.end(), [&](const Asked& a) { return a.first == receiver; });
-                  if (place == asked.end())
-                    place = asked.insert(asked.end(), {receiver, std::vector<Vec3>(size_t(transfer.rows), Vec3(0.0f))});
-                  place->second[size_t(r)] += ray.weight * weight / samples;
-                });
-          }
-          std::fill(row.begin(), row.end(), 0.0f);
-          for (const auto& [receiver, of_rows] : asked) {
-            const std::vector<float> values = load_receiver(transfer, receiver);  // [row][channel][column]
-            for (size_t r = 0; r < of_rows.size(); ++r)
-              for (size_t c = 0; c < 3; ++c) {
-                const float* v = values.data() + (r * channels + std::min(c, channels - 1)) * C;
-                for (size_t k = 0; k < C; ++k) row[c * C + k] += of_rows[r][int(c)] * v[k];
+  auto traced = ask_pixels(
+      scene, tracer, basis, camera, options, size_t(transfer.rows),
+      [&]() -> TakeAsked {
+        return
+            [&, row = std::vector<float>(3 * C)](size_t pixel, std::span<const Asked> asked, float coverage) mutable {
+              std::fill(row.begin(), row.end(), 0.0f);
+              for (const auto& [receiver, of_rows] : asked) {
+                const std::vector<float> values = load_receiver(transfer, receiver);  // [row][channel][column]
+                for (size_t r = 0; r < of_rows.size(); ++r)
+                  for (size_t c = 0; c < 3; ++c) {
+                    const float* v = values.data() + (r * channels + std::min(c, channels - 1)) * C;
+                    for (size_t k = 0; k < C; ++k) row[c * C + k] += of_rows[r][int(c)] * v[k];
+                  }
               }
-          }
-          store_receiver(fixed, pixel, row);
-          out.coverage[pixel] = std::max(samples - open, 0.0f) / samples;
-        };
+              store_receiver(fixed, pixel, row);
+              out.coverage[pixel] = coverage;
+            };
       },
       progress);
   if (!traced) return traced.error();
   out.transfer = fixed.transfer;
+  return out;
+}
+
+Result<PixelMix> mix_of_view(const Scene& scene, const Tracer& tracer, const SpatialBasis& basis, const Camera& camera,
+                             const RenderOptions& options, Progress* progress) {
+  LAMBENT_CHECK(!options.outgoing);
+  const size_t pixels = size_t(options.width) * size_t(options.height);
+  PixelMix out{std::vector<size_t>(pixels + 1), {}, {}, std::vector<float>(pixels)};
+  std::vector<std::vector<std::pair<uint32_t, Vec3>>> of_pixels(pixels);
+  auto traced = ask_pixels(
+      scene, tracer, basis, camera, options, 1,
+      [&]() -> TakeAsked {
+        return [&](size_t pixel, std::span<const Asked> asked, float coverage) {
+          for (const auto& [receiver, of_rows] : asked) of_pixels[pixel].emplace_back(receiver, of_rows[0]);
+          out.begin[pixel + 1] = asked.size(), out.coverage[pixel] = coverage;
+        };
+      },
+      progress);
+  if (!traced) return traced.error();
+  for (size_t p = 0; p < pixels; ++p) out.begin[p + 1] += out.begin[p];
+  out.receivers.reserve(out.begin[pixels]), out.weights.reserve(out.begin[pixels]);
+  for (const auto& of_pixel : of_pixels)
+    for (const auto& [receiver, weight] : of_pixel) out.receivers.push_back(receiver), out.weights.push_back(weight);
   return out;
 }
 

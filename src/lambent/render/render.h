@@ -47,6 +47,17 @@ Result<FixedViewTransfer> fix_view(const Scene& scene, const Tracer& tracer, con
                                    const Transfer& transfer, const Camera& camera, const RenderOptions& options,
                                    Progress* progress = nullptr);
 
+// The same of diffuse receivers without their transfer: what each pixel shows of whom, so that any store can be mixed.
+// Those of pixel p are [begin[p], begin[p + 1]). Errors: cancelled.
+struct PixelMix {
+  std::vector<size_t> begin;
+  std::vector<uint32_t> receivers;
+  std::vector<Vec3> weights;  // of a receiver's exit radiance as if it were white
+  std::vector<float> coverage;
+};
+Result<PixelMix> mix_of_view(const Scene& scene, const Tracer& tracer, const SpatialBasis& basis, const Camera& camera,
+                             const RenderOptions& options, Progress* progress = nullptr);
+
 // The picture of such a transfer, relit.
 Image pixels_image(const Relit& relit, const std::vector<float>& coverage, const Camera& camera, int width, int height,
                    const Environment* background);

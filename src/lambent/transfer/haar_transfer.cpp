@@ -1,4 +1,4 @@
-#include <lambent/transfer/haar_transfer.h>
+#include <lambent/transfer/haar_columns.h>
 
 #include <lambent/core/check.h>
 
@@ -181,6 +181,28 @@ std::vector<float> haar_column_norms(const HaarTransfer& t) {
   std::vector<float> norms(sums.size());
   for (size_t c = 0; c < sums.size(); ++c) norms[c] = float(std::sqrt(double(sums[c]))) * t.steps[c];
   return norms;
+}
+
+size_t load_columns(const HaarTransfer& t, size_t first, size_t count, size_t stride, size_t step, float* out) {
+  size_t entries = 0;
+  for (size_t chunk = 0; chunk < t.chunks(); ++chunk)
+    for (size_t c = first; c < first + count; ++c) {
+      float* at = out + chunk * haar_chunk * stride + (c - first) * step;
+      each_entry(t.column(chunk, c),
+                 [&](size_t r, int value) { at[r * stride] = float(value) * t.steps[c], ++entries; });
+    }
+  return entries;
+}
+
+std::vector<double> haar_squares(const HaarTransfer& t) {
+  std::vector<double> squares(t.chunks() * haar_chunk);
+  for (size_t chunk = 0; chunk < t.chunks(); ++chunk)
+    for (size_t c = 0; c < t.columns(); ++c)
+      each_entry(t.column(chunk, c), [&](size_t r, int value) {
+        squares[chunk * haar_chunk + r] += double(value * value) * double(t.steps[c]) * double(t.steps[c]);
+      });
+  squares.resize(t.receivers);
+  return squares;
 }
 
 std::vector<float> load_receiver(const HaarTransfer& t, size_t receiver) {
