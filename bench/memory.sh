@@ -41,12 +41,14 @@ if [ "${KINDS:-}" != rooms ] && [ -n "$launcher" ]; then
   for edge in 0.4 "${EDGE:-0.2}"; do
     for ranks in 1 2 4; do
       bytes=$(peak "$out/result.json" "$launcher" "${flags[@]}" -np $ranks "$tool" --threads 1 bake \
-        "$out/building.obj" --max-edge "$edge" --order 6 --samples "${SAMPLES:-64}" --checkpoint off -o "$out/r.glb" --json)
+        "$out/building.obj" --max-edge "$edge" --order 6 --samples "${SAMPLES:-64}" --checkpoint off \
+        -o "$out/r.glb" --json)
       python3 - "$bytes" $ranks "$out/result.json" <<'P'
 import json, sys
 r, ranks = json.load(open(sys.argv[3])), int(sys.argv[2])
-print(json.dumps({"name": "ranks_memory_peak", "ranks": ranks, "ours": int(sys.argv[1]), "unit": "bytes of any process",
-                  "receivers": r["receivers"], "operator": r["operator_bytes"] / ranks, "result": r["bytes"]}))
+print(json.dumps({"name": "ranks_memory_peak", "ranks": ranks, "ours": int(sys.argv[1]),
+                  "unit": "bytes of any process", "receivers": r["receivers"],
+                  "operator": r["operator_bytes"] / ranks, "result": r["bytes"]}))
 P
     done
   done
