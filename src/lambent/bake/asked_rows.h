@@ -1,6 +1,7 @@
 #pragma once
 // Rows of x that other ranks own (core/ranks.h) and that this one's rows of A ask for: nothing else of x is exchanged
 // between bounces. Source: radiosity, "Discussion" (vertices over a cluster's nodes, synchronised at each bounce).
+#include <lambent/core/own_part.h>
 #include <lambent/core/ranks.h>
 
 #include <functional>
@@ -25,7 +26,11 @@ class AskedRows {
 
  private:
   Shares shares_;
+  size_t parts_ = 1;                                // of an exchange
   std::vector<std::vector<uint32_t>> take_, give_;  // rows, by rank
 };
+
+// Rows of other ranks are asked for no more. x: [row][width].
+void forget_others(const Shares& shares, ZeroPages& x, size_t width);
 
 }  // namespace lambent

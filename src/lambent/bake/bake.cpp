@@ -1,9 +1,11 @@
 // Follows: general-prt. T0 holds direct light with shadows; X_{k+1} = T0 + B X_k sums the Neumann series term by term,
 // so X_k is the transfer of up to k bounces. It is also the radiosity equation's Jacobi step.
+#include <lambent/bake/asked_rows.h>
 #include <lambent/bake/bake.h>
 #include <lambent/bake/certify_field.h>
 #include <lambent/bake/columns.h>
 #include <lambent/bake/denoise.h>
+#include <lambent/bake/gather_ahead.h>
 #include <lambent/bake/lobes.h>
 #include <lambent/bake/operator.h>
 #include <lambent/bake/solve.h>
@@ -27,20 +29,7 @@ double seconds_since(std::chrono::steady_clock::time_point start) {
 
 // Some 4 % of the error, where it is spread as in our scenes.
 constexpr size_t certified_places = 1024;
-
 constexpr double least_noise_left = 0.2;  // 1 / sqrt of denoise()'s neighbours
-
-size_t row_width(size_t coefficients, int channels) { return pad_lanes(coefficients * size_t(channels)); }
-
-// Solution vectors: T0, X, the next X and that denoised, with its neighbours; copies of rows without their lobes; the
-// terms, and one of them before it was denoised.
-size_t solution_bytes(size_t receivers, size_t coefficients, int channels, int sky_channels, const BakeOptions& o) {
-  const size_t width = row_width(coefficients, channels), terms = o.keep_terms && o.denoise ? size_t(o.bounces) + 1 : 0;
-  const size_t denoised = o.denoise ? width + (o.lobes.empty() ? 0 : (2 + terms) * width) + (terms ? width : 0) : 0;
-  return receivers * (4 * (coefficients * size_t(sky_channels) + (o.bounces > 0 ? 2 : 1) * width + width / check_every +
-                           terms * width + denoised) +
-                      (o.denoise ? denoise_bytes : 0));
-}
 
 // Direction tables, corner maps and the scratch of every thread; an upper estimate.
 size_t table_bytes(size_t receivers, size_t triangles, size_t coefficients, size_t samples) {
@@ -68,7 +57,19 @@ struct Baker {
   size_t sky_width() const { return coefficients() * size_t(setup.sky_channels); }
   // Of the result: without bounces, surfaces' colours tell nothing.
   int channels() const { return options.bounces > 0 ? setup.channels : setup.sky_channels; }
-  size_t width() const { return row_width(coefficients(), channels()); }
+  size_t width() const { return pad_lanes(coefficients() * size_t(channels())); }
+  // Ranks have rows of solutions that are their own, and others as they ask for them.
+  bool is_parted() const {
+    return this_ranks().count() > 1 && stand_ins.all() && options.shadows && options.bounces > 0 &&
+           lobes.count() == 0 && !options.keep_terms && std::holds_alternative<CornerReceivers>(receivers.basis);
+  }
+  size_t vector_ranks() const { return is_parted() ? size_t(this_ranks().count()) : 1; }
+  Shares shares() const { return Shares(n(), gather_block); }
+  void ask(const std::vector<uint8_t>& asked, ZeroPages& x) const {
+    const uint64_t by_bounces = this_ranks().asked_bytes;
+    AskedRows(shares(), asked).fetch(x.data(), width());
+    this_ranks().asked_bytes = by_bounces;
+  }
   size_t rays_each() const { return size_t(options.samples) + size_t(lobes.rays) * lobes.sharp.size(); }
 
   // The columns of the sharp lobes, beside those that the fan has filled.
@@ -82,25 +83,8 @@ struct Baker {
   }
 
   Result<Transfer> unshadowed() {
-    WritableTransfer out = make_transfer(options.light(), 1, 1, n(), options.precision);
-    std::vector<std::vector<double>> irradiance;
-    for (const Lobe& lobe : options.lobes) irradiance.push_back(lobe_irradiance(options.lobe_kind, lobe.sharpness));
-    parallel_for(n(), gather_block, [&](size_t begin, size_t end) {
-      std::vector<float> row(coefficients());
-      for (size_t r = begin; r < end; ++r) {
-        // An open plane: the clamped cosine, convolved (pi, 2 pi/3, pi/4, ...), over pi.
-        evaluate_sh(options.order, receivers.normals[r], row);
-        for (size_t k = 0; k < harmonics(); ++k) row[k] *= float(clamped_cosine(sh_band(int(k))) / std::numbers::pi);
-        for (size_t k = 0; k < irradiance.size(); ++k) {
-          const Vec3d axis = normalize(Vec3d(options.lobes[k].axis));
-          row[harmonics() + k] =
-              float(evaluate_legendre(irradiance[k], dot(axis, Vec3d(receivers.normals[r]))) / std::numbers::pi);
-        }
-        store_receiver(out, r, row);
-      }
-    });
     report.error = 0;
-    return std::move(out.transfer);
+    return unshadowed_transfer(options.light(), receivers.normals, options.precision);
   }
 
   // A row of T0, the same in every channel but for coloured glass, as one of X: [coefficient][channel].
@@ -112,6 +96,9 @@ struct Baker {
   }
   Transfer store(const float* x) const {
     return store_columns(options.light(), x, 1, channels(), n(), width(), options.precision);
+  }
+  Transfer store_own(const float* x) const {
+    return store_own_columns(shares(), options.light(), x, channels(), n(), width(), options.precision);
   }
   // A stored row as one of X.
   void load_row(const Transfer& stored, size_t r, float* x) const {
@@ -129,7 +116,7 @@ struct Baker {
   Result<Transfer> direct() {
     const auto start = std::chrono::steady_clock::now();
     const size_t W = sky_width();
-    AlignedVector<float> x(n() * width());
+    ZeroPages x(n() * width());
     std::vector<uint8_t> buried(n());
     const Shares shares(n(), gather_block);
     {
@@ -160,10 +147,12 @@ struct Baker {
 
   Result<Transfer> bounced() {
     const size_t W = sky_width();
-    std::vector<float> T0(n() * W);
-    const size_t fixed = solution_bytes(n(), coefficients(), setup.channels, setup.sky_channels, options) +
-                         table_bytes(n(), scene.triangles.size(), coefficients(), size_t(options.samples)) +
-                         lobe_set_bytes(options.samples, lobes.count());
+    const bool parted = is_parted();
+    ZeroPages T0(n() * W);
+    const size_t fixed =
+        solution_bytes(n(), coefficients(), setup.channels, setup.sky_channels, options, vector_ranks()) +
+        table_bytes(n(), scene.triangles.size(), coefficients(), size_t(options.samples)) +
+        lobe_set_bytes(options.samples, lobes.count());
     auto B = GatherOperator::trace(
         setup,
         {.sky = {T0.data(), nullptr, W, &lobes, nullptr},
@@ -180,21 +169,23 @@ struct Baker {
     const auto start = std::chrono::steady_clock::now();
     const Source source{[&](size_t r, float* x) { expand(T0.data() + r * W, x); }};
     // The last step beside the one before it, which is what measuring gathers find on the surfaces that they meet.
-    AlignedVector<float> last(n() * width());
-    auto solution =
-        bounce(*B, source, width(), options.bounces, progress, [&](size_t first, size_t count, const float* y) {
-          std::copy_n(y, count * width(), last.data() + first * width());
-        });
-    if (!solution) return solution.error();
+    ZeroPages last(n() * width()), now(n() * width()), next(options.bounces > 1 ? n() * width() : 0);
+    auto before = bounce_in(now, next, *B, source, width(), options.bounces, progress,
+                            [&](size_t first, size_t count, const float* y) {
+                              std::copy_n(y, count * width(), last.data() + first * width());
+                            });
+    if (!before) return before.error();
+    ZeroPages met = std::move(**before);
+    now = {}, next = {};
     B->fill(last.data(), width());
     const Shares shares = B->shares();
-    shares.gather(last.data(), width()), shares.gather(solution->x.data(), width());
+    if (!parted) shares.gather(last.data(), width()), shares.gather(met.data(), width());
     std::vector<AlignedVector<float>> terms;
     if (options.keep_terms) {
       auto ok = bounce_terms(*B, source, width(), options.bounces, progress, [&](int, auto& x) -> Result<void> {
         shares.gather(x.data(), width());
         if (options.denoise) terms.push_back(x);
-        else report.terms.push_back(store_all(x.data(), solution->x.data(), B->buried()));
+        else report.terms.push_back(store_all(x.data(), met.data(), B->buried()));
         return {};
       });
       if (!ok) return ok.error();
@@ -204,17 +195,17 @@ struct Baker {
     const std::vector<uint8_t> buried = B->buried();
     B = Error{}, T0 = {};  // what comes has need of their memory
     // Without bounces surfaces are black.
-    if (options.bounces == 0) return finish({std::move(solution->x), {}}, buried, std::move(terms));
-    return finish({std::move(last), std::move(solution->x)}, buried, std::move(terms));
+    if (options.bounces == 0) return finish({std::move(met), {}}, buried, std::move(terms));
+    return finish({std::move(last), std::move(met)}, buried, std::move(terms));
   }
 
   struct Solved {
-    AlignedVector<float> x, met;  // `met`: of one bounce less, on the surfaces that rays meet; empty: black
+    ZeroPages x, met;  // `met`: of one bounce less, on the surfaces that rays meet; empty: black
   };
 
   // Rows by rays of their own, at any place.
   Result<Transfer> finish(Solved solved, const std::vector<uint8_t>& buried, std::vector<AlignedVector<float>> terms) {
-    const bool measures = options.denoise || options.certify;
+    const bool measures = options.denoise || options.certify, parted = is_parted();
     const uint32_t seed = uint32_t(hash64(options.seed, 0x6e6f6973));
     std::optional<GatherSetup> other;
     if (measures)
@@ -222,21 +213,34 @@ struct Baker {
                                       square_to_cosine_hemisphere, progress));
     if (is_cancelled(progress)) return Error{"", "cancelled"};
     Pool<GatherScratch, DeleteScratch> others([&] { return make_gather_scratch(*other); });
+    GathersAhead ahead(parted ? n() : 0);
     const GatherAt gather = [&](Vec3 origin, Vec3 normal, uint64_t key, float* row) {
-      std::vector<float> sky_row(sky_width()), met(width());
-      const GatherSky sky{sky_row.data(), nullptr, sky_width(), &lobes, nullptr};
-      const bool clear = gather_point(*other, *others.borrow(), origin, normal, key, sky,
-                                      solved.met.empty() ? nullptr : solved.met.data(), width(), met.data());
-      if (!lobes.sharp.empty())
-        trace_lobes(lobes, setup.tracer, origin, normal, size_t(key), *lobe_rays.borrow(), sky_row.data() + harmonics(),
-                    nullptr, coefficients());
-      expand(sky_row.data(), row);
+      std::optional<GathersAhead::Traced> at;
+      if (parted) at = ahead.take(key);
+      if (!at) {
+        at.emplace().row.resize(sky_width());
+        const GatherSky sky{at->row.data(), nullptr, sky_width(), &lobes, nullptr};
+        at->clear =
+            trace_point(*other, *others.borrow(), origin, normal, key, sky, solved.met.empty() ? nullptr : &at->met);
+        if (!lobes.sharp.empty())
+          trace_lobes(lobes, setup.tracer, origin, normal, size_t(key), *lobe_rays.borrow(),
+                      at->row.data() + harmonics(), nullptr, coefficients());
+        if (parted) return ahead.put(key, std::move(*at));
+      }
+      std::vector<float> met(width());
+      add_up(at->met, size_t(setup.channels), solved.met.data(), width(), met.data());
+      expand(at->row.data(), row);
       for (size_t k = 0; k < width(); ++k) row[k] += met[k];
-      return clear;
+      return at->clear;
     };
+    const AskForRows asks{[&](const auto& asked) { ask(asked, solved.x); }, [&] { ask(ahead.asked(), solved.met); }};
+    if (parted) forget_others(shares(), solved.met, width());
     if (measures)
-      if (auto ok = measure_noise(solved.x, buried, terms, gather); !ok) return ok.error();
-    Transfer result = store_all(solved.x.data(), solved.x.data(), buried);
+      if (auto ok = measure_noise(solved.x, buried, terms, gather, parted ? &asks : nullptr); !ok) return ok.error();
+    if (parted && !options.own_part) shares().gather(solved.x.data(), width());
+    Transfer result = parted && options.own_part ? store_own_columns(shares(), options.light(), solved.x.data(),
+                                                                     channels(), n(), width(), options.precision)
+                                                 : store_all(solved.x.data(), solved.x.data(), buried);
     for (AlignedVector<float>& term : terms)
       report.terms.push_back(store_all(term.data(), solved.x.data(), buried)), term = {};
     if (options.certify) {
@@ -246,8 +250,8 @@ struct Baker {
         else load_row(result, r, row);
       };
       const ReflectedErrors reflected{*other, solved.met.empty() ? 0 : options.bounces};
-      auto certificate =
-          certify_field(scene, all, field, width(), gather, certified_places, seed, progress, &reflected);
+      auto certificate = certify_field(scene, all, field, width(), gather, certified_places, seed, progress, &reflected,
+                                       nullptr, nullptr, parted ? &asks : nullptr);
       if (!certificate) return certificate.error();
       report.certificate = std::move(*certificate), report.error = report.certificate.error;
       // As much less by denoising as at the receivers, but no less than a mean of neighbours can have.
@@ -261,43 +265,66 @@ struct Baker {
   }
 
   // Second gathers at one receiver in 16 tell the noise; with it, it is taken away, and they tell what is left.
-  Result<void> measure_noise(AlignedVector<float>& x, const std::vector<uint8_t>& buried,
-                             std::vector<AlignedVector<float>>& terms, const GatherAt& gather) {
+  Result<void> measure_noise(ZeroPages& x, const std::vector<uint8_t>& buried, std::vector<AlignedVector<float>>& terms,
+                             const GatherAt& gather, const AskForRows* asks) {
     const auto start = std::chrono::steady_clock::now();
-    std::vector<uint32_t> measured;
-    for (size_t r = 0; r < n(); r += check_every)
-      if (!buried[r]) measured.push_back(uint32_t(r));
-    AlignedVector<float> again(measured.size() * width());
-    std::vector<float> variance(measured.size());
+    std::vector<uint32_t> measured, own;
+    const Shares of = shares();
+    for (uint32_t r = 0; r < n(); r += check_every)
+      if (!buried[r]) measured.push_back(r);
+    for (uint32_t r : measured)
+      if (of.owner(r) == of.ranks().rank()) own.push_back(r);
+    AlignedVector<float> again(own.size() * width());
+    struct Told {
+      float variance = 0;
+      double left = 0, total = 0;
+    };
+    std::vector<Told> told(checked_count(n()));  // of receivers that are measured
     {
-      const Shares shares(measured.size(), 4);
-      ProgressStage stage(progress, "measuring the noise", shares.own());
-      shares.for_own([&](size_t begin, size_t end) {
-        for (size_t i = begin; i < end && !stage.cancelled(); ++i) {
-          const uint32_t r = measured[i];
-          float* row = again.data() + i * width();
-          gather(receivers.origins[r], receivers.normals[r], r, row);
-          variance[i] = float(0.5 * squared_difference(row, x.data() + size_t(r) * width()));
-        }
-        if (!stage.cancelled()) stage.advance(end - begin);
-      });
-      if (!none_cancelled(progress)) return Error{"", "cancelled"};
-      shares.gather(again.data(), width()), shares.gather(variance.data());
+      // As many at a time as what their rays met has room for.
+      const size_t each = asks ? size_t(options.samples) * 3 * sizeof(MetRow) : 1,
+                   room = std::max(options.memory / 4, size_t{1} << 24),
+                   batches = std::max<size_t>(measured.size() / size_t(of.ranks().count()) * each / room, 1);
+      ProgressStage stage(progress, "measuring the noise", own.size());
+      for (size_t b = 0; b < batches; ++b) {
+        const size_t first = own.size() * b / batches, count = own.size() * (b + 1) / batches - first;
+        const auto gather_all = [&](auto take) {
+          parallel_for(count, 4, [&](size_t begin, size_t end) {
+            for (size_t i = first + begin; i < first + end && !stage.cancelled(); ++i) {
+              const uint32_t r = own[i];
+              gather(receivers.origins[r], receivers.normals[r], r, again.data() + i * width());
+              take(r, again.data() + i * width());
+            }
+          });
+        };
+        if (asks) gather_all([](uint32_t, const float*) {}), asks->met();
+        gather_all([&](uint32_t r, const float* row) {
+          told[r / check_every].variance = float(0.5 * squared_difference(row, x.data() + size_t(r) * width()));
+          if (!stage.cancelled()) stage.advance(1);
+        });
+        if (!none_cancelled(progress)) return Error{"", "cancelled"};
+      }
     }
-    AlignedVector<float> out;
+    of.gather_each(check_every, told.data());
+    std::vector<float> variance;
+    for (uint32_t r : measured) variance.push_back(told[r / check_every].variance);
+    ZeroPages out(options.denoise ? n() * width() : 0);
     if (options.denoise) {
-      out = x;
-      auto ok = denoise_harmonics({receivers.origins, receivers.normals, buried, measured, variance}, x, out, terms);
-      if (!ok) return ok;
+      NoisyPlaces noisy{receivers.origins, receivers.normals, buried, measured, variance};
+      if (asks) noisy.ask = asks->field;
+      if (auto ok = denoise_harmonics(noisy, x, out, terms); !ok) return ok;
     }
+    for (size_t i = 0; i < own.size(); ++i) {
+      const size_t at = size_t(own[i]) * width();
+      const float* row = again.data() + i * width();
+      Told& t = told[own[i] / check_every];
+      if (options.denoise) t.left = squared_difference(row, out.data() + at) - double(t.variance);
+      for (size_t k = 0; k < harmonics() * size_t(channels()); ++k)
+        t.total += double(row[k]) * double(x.data()[at + k]);
+    }
+    of.gather_each(check_every, told.data());
     double noise = 0, left = 0, total = 0;
-    for (size_t i = 0; i < measured.size(); ++i) {
-      const float *row = again.data() + i * width(), *first = x.data() + size_t(measured[i]) * width();
-      noise += double(variance[i]);
-      if (options.denoise)
-        left += squared_difference(row, out.data() + size_t(measured[i]) * width()) - double(variance[i]);
-      for (size_t k = 0; k < harmonics() * size_t(channels()); ++k) total += double(row[k]) * double(first[k]);
-    }
+    for (const Told& t : told) noise += double(t.variance), left += t.left, total += t.total;
     if (total > 0) report.noise_of_rays = std::sqrt(noise / total);
     if (options.denoise) {
       if (total > 0) report.denoised = std::sqrt(std::max(0.0, left) / total);
@@ -308,11 +335,10 @@ struct Baker {
   }
   // All by the weights of x's noise. Lobes are left alone: sharp ones have rays of their own, and shadows that
   // harmonics do not tell of.
-  Result<void> denoise_harmonics(const NoisyPlaces& noisy, const AlignedVector<float>& x, AlignedVector<float>& out,
+  Result<void> denoise_harmonics(const NoisyPlaces& noisy, const ZeroPages& x, ZeroPages& out,
                                  std::vector<AlignedVector<float>>& terms) {
     const size_t values = harmonics() * size_t(channels()), w = lobes.count() ? pad_lanes(values) : width();
-    auto copy_values = [&](const AlignedVector<float>& from, size_t from_width, AlignedVector<float>& to,
-                           size_t to_width) {
+    auto copy_values = [&](const auto& from, size_t from_width, auto& to, size_t to_width) {
       for (size_t r = 0; r < n(); ++r) std::copy_n(from.data() + r * from_width, values, to.data() + r * to_width);
     };
     std::vector<AlignedVector<float>> apart;  // where rows hold lobes, too: the harmonics of x, of out, of each term
@@ -326,6 +352,7 @@ struct Baker {
     auto ok = denoise(noisy, apart.empty() ? x.data() : apart[0].data(), w,
                       apart.empty() ? out.data() : apart[1].data(), more, progress);
     if (!ok || apart.empty()) return ok;
+    std::copy_n(x.data(), n() * width(), out.data());
     copy_values(apart[1], w, out, width());
     for (size_t t = 0; t < terms.size(); ++t) copy_values(apart[2 + t], w, terms[t], width());
     return {};
@@ -337,6 +364,14 @@ struct Baker {
     return sum;
   }
 };
+
+size_t least_memory_of(size_t receivers, bool coloured, const BakeOptions& options, size_t ranks) {
+  const size_t coefficients = options.light().count();
+  const size_t tables = table_bytes(options.bounces > 0 ? receivers : 0, 0, coefficients, size_t(options.samples)) +
+                        lobe_set_bytes(options.samples, options.lobes.size());
+  if (!options.shadows) return 0;
+  return tables + solution_bytes(receivers, coefficients, coloured && options.bounces > 0 ? 3 : 1, 1, options, ranks);
+}
 
 Result<void> check_options(const BakeOptions& o) {
   if (auto ok = check_light_basis(o, o.lobes.empty() ? 1 : 0); !ok) return ok;
@@ -366,11 +401,7 @@ Result<void> check_light_basis(const BakeOptions& o, int least_order) {
 }
 
 size_t least_memory(size_t receivers, bool coloured, const BakeOptions& options) {
-  const size_t coefficients = options.light().count();
-  const size_t tables = table_bytes(options.bounces > 0 ? receivers : 0, 0, coefficients, size_t(options.samples)) +
-                        lobe_set_bytes(options.samples, options.lobes.size());
-  if (!options.shadows) return 0;
-  return tables + solution_bytes(receivers, coefficients, coloured && options.bounces > 0 ? 3 : 1, 1, options);
+  return least_memory_of(receivers, coloured, options, 1);
 }
 
 namespace {
@@ -385,7 +416,7 @@ Result<Transfer> bake_with_samples(const Scene& scene, const Tracer& tracer, con
                                         options.seed, square_to_cosine_hemisphere, progress);
   setup.projection = projection ? &*projection : nullptr;
   Baker baker{scene, all, stand_ins, receivers, options, std::move(setup), progress, r};
-  const size_t least = least_memory(receivers.count(), baker.setup.channels == 3, options);
+  const size_t least = least_memory_of(receivers.count(), baker.setup.channels == 3, options, baker.vector_ranks());
   if (options.memory < least)
     return Error{scene.path, "baking needs at least " + std::to_string(least) +
                                  " bytes of working memory, and was allowed " + std::to_string(options.memory)};
@@ -440,31 +471,6 @@ Result<Transfer> bake_on_receivers(const Scene& scene, const Tracer& tracer, con
     stand_ins = std::move(*points);
   }
   return bake_with_samples(scene, tracer, receivers, stand_ins, options, r, progress);
-}
-
-// Columns of harmonics added up to those of band-limited lobes, which are sums of harmonics.
-Transfer add_up_lobes(const Transfer& t, const LightBasis& light, Precision precision) {
-  const DirectionalBasis basis = make_directional_basis(0, light.lobe_kind, light.lobes);
-  const size_t harmonics = t.columns(), lobes = light.lobes.size();
-  std::vector<std::vector<double>> sums;  // by lobe
-  for (size_t k = 0; k < lobes; ++k) {
-    std::vector<double> one(lobes, 0.0);
-    one[k] = 1, sums.push_back(directional_to_sh(basis, one, t.light.order));
-  }
-  const WritableTransfer out = make_transfer(light, t.rows, t.channels, t.receivers, precision);
-  parallel_for(t.receivers, transfer_block, [&](size_t begin, size_t end) {
-    std::vector<float> values(out.transfer.receiver_values());
-    for (size_t r = begin; r < end; ++r) {
-      const std::vector<float> x = load_receiver(t, r);
-      for (size_t i = 0; i < values.size(); ++i) {
-        double sum = 0;
-        for (size_t j = 0; j < harmonics; ++j) sum += sums[i % lobes][j] * double(x[i / lobes * harmonics + j]);
-        values[i] = float(sum);
-      }
-      store_receiver(out, r, values);
-    }
-  });
-  return out.transfer;
 }
 
 }  // namespace

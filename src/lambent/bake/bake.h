@@ -38,6 +38,9 @@ struct BakeOptions {
   // What a receiver has: the value where it is, or coefficients of least squares by rays from places all over its basis
   // function (receivers/receivers.h); of harmonics, with `samples`, on one rank, without denoising.
   Projection projection = Projection::collocation;
+  // Of more ranks than one each has a part of the result alone, as the file is written (core/own_part.h), where it can:
+  // for whom does nothing with the result but write it.
+  bool own_part = false;
   // Others than the receivers are traced, surfels, about so many (0: as SurfelOptions has it): they bounce light, and
   // receivers, at vertices, read them by kernels (meshless.h).
   std::optional<size_t> meshless = std::nullopt;

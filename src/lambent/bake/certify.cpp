@@ -5,7 +5,9 @@
 #include <lambent/core/ranks.h>
 
 #include <algorithm>
+#include <atomic>
 #include <cmath>
+#include <utility>
 
 namespace lambent {
 namespace {
@@ -43,18 +45,38 @@ void look_up(const Receivers& receivers, const FieldRow& field, uint32_t triangl
       receivers.basis);
 }
 
+// The receivers that look_up() reads.
+void note(const Receivers& receivers, uint32_t triangle, bool front, float u, float v, std::vector<uint8_t>& asked) {
+  std::visit(
+      [&](const auto& basis) {
+        basis.spread(*basis.find(triangle, front), u, v, [&](uint32_t receiver, float) {
+          std::atomic_ref(asked[receiver]).store(1, std::memory_order_relaxed);
+        });
+      },
+      receivers.basis);
+}
+
 // A side that receives.
 struct Side {
   uint32_t triangle;
   bool front;
   double area, varies;  // how much the field differs over it, squared
 };
-std::vector<Side> find_sides(const Scene& scene, const Receivers& receivers, const FieldRow& field, size_t width) {
+std::vector<Side> find_sides(const Scene& scene, const Receivers& receivers, const FieldRow& field, size_t width,
+                             const AskForRows* ask) {
   std::vector<Side> sides;
   for (uint32_t t = 0; t < scene.triangles.size(); ++t)
     for (const bool front : {true, false})
       if (receives(receivers, t, front)) sides.push_back({t, front, area_of(scene, scene.triangles[t]), 0});
   const Shares shares(sides.size(), 64);
+  if (ask) {
+    std::vector<uint8_t> asked(receivers.count());
+    shares.for_own([&](size_t begin, size_t end) {
+      for (size_t i = begin; i < end; ++i)
+        for (int c = 0; c < 3; ++c) note(receivers, sides[i].triangle, sides[i].front, c == 1, c == 2, asked);
+    });
+    ask->field(asked);
+  }
   shares.for_own([&](size_t begin, size_t end) {
     AlignedVector<float> corner[3], row(width);
     for (auto& c : corner) c.resize(width);
@@ -120,8 +142,8 @@ std::vector<ErrorPlace> choose_places(const Receivers& receivers, const FieldRow
 // One place in each of `count` equal shares, in the order of triangles: half of them by area alone, half by how much
 // the field differs over a triangle as well. Errors gather where it does, in few places, which area alone seldom meets.
 std::vector<ErrorPlace> draw_places(const Scene& scene, const Receivers& receivers, const FieldRow& field, size_t width,
-                                    size_t count, uint32_t seed) {
-  std::vector<Side> sides = find_sides(scene, receivers, field, width);
+                                    size_t count, uint32_t seed, const AskForRows* ask) {
+  std::vector<Side> sides = find_sides(scene, receivers, field, width, ask);
   double area = 0, varies = 0;
   for (const Side& s : sides) area += s.area, varies += s.area * s.varies;
   std::vector<ErrorPlace> places;
@@ -137,6 +159,38 @@ std::vector<ErrorPlace> draw_places(const Scene& scene, const Receivers& receive
       next = area / double(count) * (double(places.size()) + double(random.next()));
     }
   return places;
+}
+
+// Where rays of a place start, and its normal.
+std::pair<Vec3, Vec3> start_of(const Scene& scene, const ErrorPlace& at, float diagonal) {
+  const Triangle& t = scene.triangles[at.triangle];
+  const Vec3 weight(1 - at.u - at.v, at.u, at.v);
+  Vec3 p(0), n(0);
+  for (int k = 0; k < 3; ++k) p += weight[k] * scene.positions[t.v[k]], n += weight[k] * scene.normals[t.v[k]];
+  Vec3 face = normalize(
+      cross(scene.positions[t.v[1]] - scene.positions[t.v[0]], scene.positions[t.v[2]] - scene.positions[t.v[0]]));
+  n = normalize_or(n, face);
+  if (dot(n, face) < 0) n = -n;
+  if (!at.front) n = -n, face = -face;
+  return {p + face * receiver_lift(p, float(std::sqrt(area_of(scene, t))), diagonal), n};
+}
+
+// Both gathers of each own place, once ahead, and what they and the place itself read.
+void ask_for_places(const Scene& scene, const Receivers& receivers, const std::vector<ErrorPlace>& places,
+                    const GatherAt& gather, size_t width, uint32_t seed, const Shares& shares, const AskForRows& ask,
+                    const Progress* progress) {
+  const float diagonal = bounds(scene).diagonal();
+  std::vector<uint8_t> asked(receivers.count());
+  shares.for_own([&](size_t begin, size_t end) {
+    std::vector<float> row(width);
+    for (size_t i = begin; i < end && !is_cancelled(progress); ++i) {
+      const ErrorPlace& at = places[i];
+      const auto [origin, normal] = start_of(scene, at, diagonal);
+      for (uint32_t k = 0; k < 2; ++k) gather(origin, normal, hash64(seed, 2 * i + k), row.data());
+      note(receivers, at.triangle, at.front, at.u, at.v, asked);
+    }
+  });
+  ask.field(asked), ask.met();
 }
 
 struct PlaceError {
@@ -210,10 +264,10 @@ Certificate sum_up(const Scene& scene, const std::vector<ErrorPlace>& places, co
 Result<Certificate> certify_field(const Scene& scene, const Receivers& receivers, const FieldRow& field, size_t width,
                                   const GatherAt& gather, size_t count, uint32_t seed, Progress* progress,
                                   const ReflectedErrors* reflected, const FieldRow* again,
-                                  std::vector<MeasuredPlace>* kept) {
+                                  std::vector<MeasuredPlace>* kept, const AskForRows* ask) {
   const bool texels = std::holds_alternative<TexelReceivers>(receivers.basis);
   std::vector<ErrorPlace> places =
-      draw_places(scene, receivers, field, width, texels ? looked_at * count : count, seed);
+      draw_places(scene, receivers, field, width, texels ? looked_at * count : count, seed, ask);
   if (texels) places = choose_places(receivers, field, width, count, seed, places);
   const float diagonal = bounds(scene).diagonal();
   std::vector<PlaceError> measured(places.size());
@@ -221,24 +275,16 @@ Result<Certificate> certify_field(const Scene& scene, const Receivers& receivers
   for (auto& rows : residuals) rows.resize(places.size() * width);
   // e = (truth - read) + (read - field), of which the gathers' residuals and what comes back make the first.
   const FieldRow* read = reflected ? reflected->read : nullptr;
-  LAMBENT_CHECK(!read || !again);
+  LAMBENT_CHECK((!read || !again) && (!ask || !(read || again || texels)));
   std::vector<float> beside(read ? places.size() * width : 0);
   const Shares shares(places.size(), piece);
   ProgressStage stage(progress, "measuring the error", shares.own());
+  if (ask) ask_for_places(scene, receivers, places, gather, width, seed, shares, *ask, progress);
   shares.for_own([&](size_t begin, size_t end) {
     AlignedVector<float> a(width), b(width), s(width), s2(width), row(width);
     for (size_t i = begin; i < end && !stage.cancelled(); ++i) {
       const ErrorPlace& at = places[i];
-      const Triangle& t = scene.triangles[at.triangle];
-      const Vec3 weight(1 - at.u - at.v, at.u, at.v);
-      Vec3 p(0), n(0);
-      for (int k = 0; k < 3; ++k) p += weight[k] * scene.positions[t.v[k]], n += weight[k] * scene.normals[t.v[k]];
-      Vec3 face = normalize(
-          cross(scene.positions[t.v[1]] - scene.positions[t.v[0]], scene.positions[t.v[2]] - scene.positions[t.v[0]]));
-      n = normalize_or(n, face);
-      if (dot(n, face) < 0) n = -n;
-      if (!at.front) n = -n, face = -face;
-      const Vec3 origin = p + face * receiver_lift(p, float(std::sqrt(area_of(scene, t))), diagonal);
+      const auto [origin, n] = start_of(scene, at, diagonal);
       if (!gather(origin, n, hash64(seed, 2 * i), a.data()) || !gather(origin, n, hash64(seed, 2 * i + 1), b.data()))
         continue;
       look_up(receivers, field, at.triangle, at.front, at.u, at.v, row, s);

@@ -11,7 +11,9 @@
 
 #include <algorithm>
 #include <array>
+#include <atomic>
 #include <cmath>
+#include <memory>
 
 namespace lambent {
 namespace {
@@ -22,7 +24,6 @@ constexpr size_t judges = 8;                              // neighbours whose ri
 constexpr size_t variances = 6;                           // measured places that tell a place's variance
 constexpr float alike_cosine = 0.8f, most_slope = 0.35f;  // of a neighbour on the same surface
 constexpr float strengths[] = {4, 16};                    // differences beyond the noise count less, the larger
-constexpr size_t piece = 256;
 
 struct Cloud {
   std::span<const Vec3> points;
@@ -50,8 +51,7 @@ float difference2(const float* a, const float* b, size_t width) {
 
 struct Neighbours {
   std::array<uint32_t, most_neighbours> index;  // itself first, nearest first
-  uint32_t count = 0;
-  float variance = 0;
+  uint32_t count;
 };
 
 // The value at a place as a weighted mean of its neighbours'.
@@ -69,13 +69,15 @@ struct Filter {
 };
 constexpr size_t filters = std::size(strengths);
 
-static_assert(sizeof(Neighbours) + filters * sizeof(float) <= denoise_bytes);
+static_assert(sizeof(Neighbours) + (1 + filters) * sizeof(float) <= denoise_bytes);
 
 struct Denoiser {
   const NoisyPlaces& noisy;
   const float* rows;
   size_t width;
-  std::vector<Neighbours> neighbours = std::vector<Neighbours>(noisy.places.size());
+  // Of own places; those of others are not touched, and take no memory.
+  std::unique_ptr<Neighbours[]> neighbours = std::make_unique_for_overwrite<Neighbours[]>(noisy.places.size());
+  std::vector<float> variance = std::vector<float>(noisy.places.size());
   std::vector<std::array<float, filters>> risks = std::vector<std::array<float, filters>>(noisy.places.size());
 
   bool is_left_out(size_t i) const { return !noisy.left_out.empty() && noisy.left_out[i]; }
@@ -94,7 +96,7 @@ struct Denoiser {
     const Vec3 p = noisy.places[i];
     const float query[3] = {p.x, p.y, p.z};
     const size_t found = tree.knnSearch(query, looked_at, index, distance2);
-    at.index[at.count++] = uint32_t(i);
+    at.count = 0, at.index[at.count++] = uint32_t(i);
     for (size_t q = 0; q < found && at.count < most_neighbours; ++q)
       if (index[q] != i && on_one_surface(i, index[q])) at.index[at.count++] = index[q];
     const size_t near = measured.knnSearch(query, 3 * variances, index, distance2);
@@ -108,7 +110,7 @@ struct Denoiser {
         sum += noisy.variance[index[q]], ++used;
       }
       if (used > 0) {
-        at.variance = sum / float(used);
+        variance[i] = sum / float(used);
         break;
       }
     }
@@ -160,7 +162,7 @@ struct Denoiser {
       const size_t j = at.index[q];
       const float d = length(noisy.places[j] - noisy.places[i]) / std::max(reach, 1e-30f);
       near[q] = (1 - d * d) * (1 - d * d);
-      noise[q] = at.variance + neighbours[j].variance;
+      noise[q] = variance[i] + variance[j];
       beyond[q] = q == 0 ? 0 : std::max(0.0f, difference2(rows + i * width, rows + j * width, width) - noise[q]);
     }
     for (size_t f = 0; f < filters; ++f) {
@@ -178,7 +180,7 @@ struct Denoiser {
     const std::array<Filter, filters> all = filters_of(i);
     for (size_t f = 0; f < filters; ++f) {
       all[f].apply(neighbours[i], rows, width, sums, filtered);
-      risks[i][f] = difference2(filtered, rows + i * width, width) - 2 * neighbours[i].variance * (1 - all[f].share[0]);
+      risks[i][f] = difference2(filtered, rows + i * width, width) - 2 * variance[i] * (1 - all[f].share[0]);
     }
   }
   // The filter of the least risk, or none.
@@ -201,9 +203,14 @@ Result<void> denoise(const NoisyPlaces& noisy, const float* rows, size_t width, 
                      std::span<float* const> more, Progress* progress) {
   const size_t n = noisy.places.size();
   LAMBENT_CHECK(noisy.measured.size() == noisy.variance.size() && width % lane_multiple == 0);
-  std::copy_n(rows, n * width, out);
+  const Shares shares(n, denoise_grain);
+  LAMBENT_CHECK(!noisy.ask || more.empty());
+  if (!noisy.ask) std::copy_n(rows, n * width, out);
+  else
+    shares.each_stripe(shares.ranks().rank(), [&](size_t begin, size_t end) {
+      std::copy(rows + begin * width, rows + end * width, out + begin * width);
+    });
   if (noisy.measured.empty()) return {};
-  const Shares shares(n, piece);
   ProgressStage stage(progress, "denoising", (3 + more.size()) * shares.own());
   std::vector<Vec3> measured_places;
   for (uint32_t r : noisy.measured) measured_places.push_back(noisy.places[r]);
@@ -220,7 +227,16 @@ Result<void> denoise(const NoisyPlaces& noisy, const float* rows, size_t width, 
     return none_cancelled(progress);
   };
   const bool found = each([&](size_t i, double*, float*) { d.find(tree, measured_tree, i); });
-  shares.gather(d.neighbours.data());
+  shares.gather(d.variance.data());
+  if (noisy.ask) {
+    std::vector<uint8_t> asked(n);
+    shares.for_own([&](size_t begin, size_t end) {
+      for (size_t i = begin; i < end && found; ++i)
+        for (size_t q = 0; q < d.neighbours[i].count; ++q)
+          std::atomic_ref(asked[d.neighbours[i].index[q]]).store(1, std::memory_order_relaxed);
+    });
+    noisy.ask(asked);
+  }
   const bool judged = found && each([&](size_t i, double* sums, float* scratch) {
                         if (d.is_filtered(i)) d.judge(i, sums, scratch);
                       });
@@ -232,7 +248,7 @@ Result<void> denoise(const NoisyPlaces& noisy, const float* rows, size_t width, 
       if (const Filter* best = d.choose(i, filters_here))
         best->apply(d.neighbours[i], from, width, sums, to + i * width);
     });
-    shares.gather(to, width);
+    if (!noisy.ask) shares.gather(to, width);
     return all;
   };
   bool done = judged && apply(rows, out);

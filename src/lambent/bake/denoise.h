@@ -7,6 +7,7 @@
 #include <lambent/core/vec.h>
 
 #include <cstdint>
+#include <functional>
 #include <span>
 #include <vector>
 
@@ -18,7 +19,11 @@ struct NoisyPlaces {
   std::span<const uint8_t> left_out;      // 1: tells nothing (buried) and is left as it is; empty: none
   std::span<const uint32_t> measured;     // some of the places, ascending,
   std::span<const float> variance;        // and the squared error expected of their rows there
+  // Where a rank (core/ranks.h) has rows of its own alone, those of Shares(places, denoise_grain): brings those that
+  // `asked` says; called by all ranks. Of `out` each then has its own, and there are no more rows.
+  std::function<void(const std::vector<uint8_t>& asked)> ask{};
 };
+inline constexpr size_t denoise_grain = 64;
 
 // Working memory a place, beside rows.
 inline constexpr size_t denoise_bytes = 128;

@@ -2,7 +2,7 @@
 // operator).
 #include <lambent/bake/block_builder.h>
 #include <lambent/bake/fan.h>
-#include <lambent/bake/gather.h>
+#include <lambent/bake/gather_ahead.h>
 #include <lambent/bake/kernels.h>
 #include <lambent/core/check.h>
 #include <lambent/core/half.h>
@@ -165,6 +165,7 @@ struct GatherScratch {
   AlignedVector<float> own[3], aimed[3];
   std::vector<Hit> own_hits;
   std::vector<Passage> own_passages;
+  std::vector<MetRow> met;  // by gather_point()
   explicit GatherScratch(const GatherSetup& setup)
       : fan(setup.sets, setup.sky_channels),
         hits(size_t(setup.sets.samples)),
@@ -400,14 +401,14 @@ void trace_gather(const GatherSetup& setup, GatherScratch& scratch, size_t first
              setup.receivers.basis);
 }
 
-bool gather_point(const GatherSetup& setup, GatherScratch& scratch, Vec3 origin, Vec3 normal, uint64_t key,
-                  const GatherSky& sky, const float* x, size_t width, float* reflected, const GatherDirect* direct) {
-  const size_t rays = size_t(setup.sets.samples), channels = size_t(setup.channels);
+bool trace_point(const GatherSetup& setup, GatherScratch& scratch, Vec3 origin, Vec3 normal, uint64_t key,
+                 const GatherSky& sky, std::vector<MetRow>* met, const GatherDirect* direct) {
+  const size_t rays = size_t(setup.sets.samples);
   Fan& fan = scratch.fan;
   const bool passes = !scratch.passages.empty();
   const Directions directions = fan.aim(normal, setup.seed, key);
   trace_hits(setup.tracer, origin, directions, scratch.hits.data(), scratch.passages, setup.progress);
-  std::fill_n(reflected, width, 0.0f);
+  if (met) met->clear();
   size_t backs = 0;
   LampSum lamps{setup, direct, direct ? direct->rows : nullptr};
   lamps.sample(scratch.lights, origin, normal, size_t(key));
@@ -423,22 +424,37 @@ bool gather_point(const GatherSetup& setup, GatherScratch& scratch, Vec3 origin,
           if (h.triangle == none) continue;
           const auto* at = basis.find(h.triangle, h.front);
           if (!at) backs += !setup.tracer.lets_pass(h.triangle);
-          if (!at || !x) continue;
+          if (!at || !met) continue;
           Vec3 rho = setup.albedo_at(at->part, h) / float(rays);
           if (passes) rho *= scratch.passages[j].hit;
           scatter(basis, *at, h, hash64(key, j), [&](uint32_t receiver, float weight) {
-            const float* from = x + size_t(receiver) * width;
-            if (channels == 1)
-              for (size_t k = 0; k < width; ++k) reflected[k] += rho.x * weight * from[k];
-            else
-              for (size_t k = 0; k + 2 < width; k += 3)
-                for (int c = 0; c < 3; ++c) reflected[k + size_t(c)] += rho[c] * weight * from[k + size_t(c)];
+            met->push_back({receiver, rho * weight});
           });
         }
       },
       setup.receivers.basis);
   fan.project(sky, 0, 0);
   return 2 * backs <= rays;
+}
+
+void add_up(const std::vector<MetRow>& met, size_t channels, const float* x, size_t width, float* reflected) {
+  std::fill_n(reflected, width, 0.0f);
+  for (const MetRow& m : met) {
+    const float* from = x + size_t(m.receiver) * width;
+    if (channels == 1)
+      for (size_t k = 0; k < width; ++k) reflected[k] += m.weight.x * from[k];
+    else
+      for (size_t k = 0; k + 2 < width; k += 3)
+        for (int c = 0; c < 3; ++c) reflected[k + size_t(c)] += m.weight[c] * from[k + size_t(c)];
+  }
+}
+
+bool gather_point(const GatherSetup& setup, GatherScratch& scratch, Vec3 origin, Vec3 normal, uint64_t key,
+                  const GatherSky& sky, const float* x, size_t width, float* reflected, const GatherDirect* direct) {
+  const bool clear = trace_point(setup, scratch, origin, normal, key, sky, x ? &scratch.met : nullptr, direct);
+  if (!x) scratch.met.clear();
+  add_up(scratch.met, size_t(setup.channels), x, width, reflected);
+  return clear;
 }
 
 void trace_sky(const GatherSetup& setup, GatherScratch& scratch, size_t first, size_t count, const GatherSky& sky) {

@@ -52,15 +52,17 @@ void note_asked(const GatherBlock& block, std::vector<uint8_t>& asked) {
     for (uint32_t column : rows->columns) std::atomic_ref(asked[column]).store(1, std::memory_order_relaxed);
 }
 
-// Rows that these are filled from, and which are not filled themselves.
-std::vector<uint8_t> sources_of(const Shares& shares, const std::vector<FillStep>& steps, size_t rows) {
+// Rows that own ones are filled from, and which are not filled themselves. Of the steps those that it takes are left.
+std::vector<uint8_t> sources_of(const Shares& shares, std::vector<FillStep>& steps, size_t rows) {
   std::vector<uint8_t> wanted(rows);
   for (size_t i = steps.size(); i-- > 0;) {  // later ones are filled from earlier ones
     const uint32_t r = steps[i].receiver;
     if (wanted[r] || shares.owner(r) == shares.ranks().rank())
       for (uint32_t source : steps[i].sources) wanted[source] = 1;
+    else steps[i].sources.clear();
     wanted[r] = 0;
   }
+  std::erase_if(steps, [](const FillStep& step) { return step.sources.empty(); });
   return wanted;
 }
 
@@ -72,7 +74,6 @@ void GatherOperator::fill(float* x, size_t stride, size_t width) const {
 }
 
 void GatherOperator::fill_means(float* x, size_t stride, size_t width) const {
-  if (fill_.empty()) return;
   sources_.fetch(x, [&](size_t row) { return std::pair(row * stride, width); });
   fill_buried(fill_, x, stride, width);
 }

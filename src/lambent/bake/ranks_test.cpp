@@ -156,18 +156,8 @@ class BlindRanks final : public Ranks {
 };
 
 // No rank has all of the result, and the file is whole, whether all write it or the first one does for them.
-TEST(Ranks, EachHasAPartOfTheResultUpToTheFile) {
+void expect_parts_of(const std::function<Result<Transfer>(Progress*)>& baked) {
   const test::TemporaryFolder folder;
-  const Place p;
-  auto rooms = part_rooms(room_bounds(p.scene), {{"left", {Vec3(-1), Vec3(-0.4f, 1, 1.5f)}},
-                                                 {"near", {Vec3(-0.4f, -1, -1), Vec3(1, 1, 0)}},
-                                                 {"far", {Vec3(-0.4f, -1, 0), Vec3(1, 1, 1.5f)}}});
-  ASSERT_TRUE(rooms);
-  const BakeOptions options{.order = 2, .samples = 16};
-  const RoomsOptions how{.residual = 1e-2, .loss = 0, .own_part = true};
-  const auto baked = [&](Progress* progress) {
-    return bake_rooms(p.scene, p.receivers, *rooms, options, how, nullptr, nullptr, progress);
-  };
   auto whole = baked(nullptr);
   ASSERT_TRUE(whole);
   const Bytes head{1, 2, 3, 4, 5}, expected = bytes(*whole);
@@ -197,6 +187,21 @@ TEST(Ranks, EachHasAPartOfTheResultUpToTheFile) {
       }
       EXPECT_EQ(sum, of_all);
     }
+}
+
+TEST(Ranks, EachHasAPartOfTheResultUpToTheFile) {
+  const Place p;
+  auto rooms = part_rooms(room_bounds(p.scene), {{"left", {Vec3(-1), Vec3(-0.4f, 1, 1.5f)}},
+                                                 {"near", {Vec3(-0.4f, -1, -1), Vec3(1, 1, 0)}},
+                                                 {"far", {Vec3(-0.4f, -1, 0), Vec3(1, 1, 1.5f)}}});
+  ASSERT_TRUE(rooms);
+  BakeOptions options{.order = 2, .samples = 16};
+  const RoomsOptions how{.residual = 1e-2, .loss = 0, .own_part = true};
+  expect_parts_of([&](Progress* progress) {
+    return bake_rooms(p.scene, p.receivers, *rooms, options, how, nullptr, nullptr, progress);
+  });
+  options.own_part = true, options.bounces = 2;
+  expect_parts_of([&](Progress* progress) { return bake(p.scene, p.tracer, p.receivers, options, nullptr, progress); });
 }
 
 TEST(Ranks, OneThatIsCancelledCancelsAll) {

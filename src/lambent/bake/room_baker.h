@@ -8,38 +8,17 @@
 #include <lambent/bake/room_rays.h>
 #include <lambent/bake/rooms.h>
 #include <lambent/core/checkpoint.h>
+#include <lambent/core/own_part.h>
 #include <lambent/core/pool.h>
 #include <lambent/core/ranks.h>
 
 #include <array>
-#include <cstdlib>
 #include <memory>
-#include <new>
 #include <optional>
 
 namespace lambent {
 
 constexpr size_t padded_rows(size_t n) { return (n + gather_block - 1) / gather_block * gather_block; }
-
-// Floats that are 0 until they are written to, and take memory from then on: rows of other ranks' rooms take none.
-class ZeroPages {
- public:
-  ZeroPages() = default;
-  explicit ZeroPages(size_t count) : data_(static_cast<float*>(std::calloc(count + 64, sizeof(float)))) {
-    if (!data_) throw std::bad_alloc();
-  }
-  float* data() { return aligned(); }
-  const float* data() const { return aligned(); }
-
- private:
-  struct Free {
-    void operator()(float* p) const { std::free(p); }
-  };
-  float* aligned() const {
-    return data_ ? reinterpret_cast<float*>((reinterpret_cast<uintptr_t>(data_.get()) + 63) / 64 * 64) : nullptr;
-  }
-  std::unique_ptr<float, Free> data_;
-};
 
 inline constexpr size_t least_at_once = size_t{1} << 17;  // rays that are followed at once
 

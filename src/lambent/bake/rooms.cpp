@@ -288,31 +288,16 @@ Transfer RoomBaker::transfer() const {
   return store_columns(options.light(), x.data(), 1, channels, n(), width, options.precision, row_of);
 }
 
-namespace {
-
-// Memory for all of a result, of which a rank sets its own part.
-struct PartedMemory {
-  ZeroPages values;
-  OwnPart part;
-  PartedMemory(size_t bytes, std::vector<size_t> ends)
-      : values((bytes + 3) / 4), part({reinterpret_cast<const uint8_t*>(values.data()), bytes}, std::move(ends)) {}
-};
-
-}  // namespace
-
 // Blocks of storage are divided among ranks as they lie in the file; each takes what it has not of its part, a slice
 // after the other.
 Transfer RoomBaker::own_part() const {
-  WritableTransfer out;
-  Transfer& t = out.transfer;
-  t.light = options.light(), t.channels = channels, t.receivers = n(), t.precision = options.precision;
-  const size_t count = size_t(ranks.count()), self = size_t(ranks.rank()), slices = 16 * count;
-  const auto first_of = [&](size_t slice) { return std::min(n(), t.blocks() * slice / slices * transfer_block); };
+  const size_t count = size_t(ranks.count()), self = size_t(ranks.rank()), slices = 16 * count,
+               blocks = (n() + transfer_block - 1) / transfer_block;
+  const auto first_of = [&](size_t slice) { return std::min(n(), blocks * slice / slices * transfer_block); };
   std::vector<size_t> ends;
-  for (size_t k = 1; k <= count; ++k) ends.push_back(t.blocks() * k / count * (t.bytes() / t.blocks()));
-  const auto memory = std::make_shared<PartedMemory>(t.bytes(), ends);
-  out.values = reinterpret_cast<uint8_t*>(memory->values.data());
-  t.data = memory->part.all, t.storage = memory;
+  for (size_t k = 1; k <= count; ++k) ends.push_back(first_of(16 * k));
+  const WritableTransfer out =
+      make_parted_transfer(options.light(), channels, n(), options.precision, std::move(ends), count);
   for (size_t i = 0; i < 16; ++i) {
     std::vector<std::vector<float>> give(count), take(count);
     for (size_t k = 0; k < count; ++k)
@@ -337,7 +322,7 @@ Transfer RoomBaker::own_part() const {
       store_columns_of(out, r, row, width, values);
     }
   }
-  return t;
+  return out.transfer;
 }
 
 Result<Transfer> RoomBaker::bake() {

@@ -1,5 +1,6 @@
 // Follows: radiosity ("Jacobi, Gauss-Seidel, Southwell", "Krylov subspace methods"); Saad and Schultz, "GMRES", 1986;
 // Cohen, Chen, Wallace and Greenberg, "A progressive refinement approach", 1988 (Southwell's relaxation as shooting).
+#include <lambent/bake/asked_rows.h>
 #include <lambent/bake/kept_operator.h>
 #include <lambent/bake/kernels.h>
 #include <lambent/bake/solve.h>
@@ -81,6 +82,10 @@ struct Step {
   }
 
   void run(const float* x, float* next) const {
+    run_own(x, next);
+    if (next) op.fill(next, width), op.fetch(next, width);
+  }
+  void run_own(const float* x, float* next) const {
     Pool<AlignedVector<float>> buffers([] { return std::make_unique<AlignedVector<float>>(); });
     op.shares().for_own([&](size_t begin, size_t end) {
       const size_t most = std::min(op.piece(), end - begin);
@@ -92,18 +97,20 @@ struct Step {
       }
       if (stage) stage->advance(end - begin);
     });
-    if (next) op.fill(next, width), op.fetch(next, width);
   }
 };
 
 // x = F e
-AlignedVector<float> first_iterate(const LinearOperator& op, const Source& e, size_t width) {
-  AlignedVector<float> x(op.size(width), 0.0f);
+void set_first(const LinearOperator& op, const Source& e, size_t width, float* x) {
   op.shares().for_own([&](size_t begin, size_t end) {
     AlignedVector<float> y(width);
-    for (size_t r = begin; r < end; ++r) e.set(r, y.data()), op.keep(r, 1, y.data(), width, x.data());
+    for (size_t r = begin; r < end; ++r) e.set(r, y.data()), op.keep(r, 1, y.data(), width, x);
   });
-  op.fill(x.data(), width), op.fetch(x.data(), width);
+  op.fill(x, width), op.fetch(x, width);
+}
+AlignedVector<float> first_iterate(const LinearOperator& op, const Source& e, size_t width) {
+  AlignedVector<float> x(op.size(width), 0.0f);
+  set_first(op, e, width, x.data());
   return x;
 }
 
@@ -444,6 +451,26 @@ Result<Bounced> bounce(const LinearOperator& op, const Source& e, size_t width, 
   errors.gather(op.shares());
   if (e.set_half && bounces > 0) out.error = errors.relative();
   return out;
+}
+
+Result<ZeroPages*> bounce_in(ZeroPages& x, ZeroPages& next, const LinearOperator& op, const Source& e, size_t width,
+                             int bounces, Progress* progress, const TakeRows& last) {
+  ZeroPages *now = &x, *then = &next;
+  set_first(op, e, width, now->data());
+  const KeptOperator kept(op, progress, "bounces", bounces);
+  for (int k = 1; k <= bounces; ++k) {
+    ProgressStage stage(progress, "bounce " + std::to_string(k), op.shares().own());
+    Step step{kept, &e, width, progress, &stage};
+    if (k == bounces) step.last = &last;
+    const bool goes_on = k < bounces || !last;
+    step.run_own(now->data(), goes_on ? then->data() : nullptr);
+    if (!none_cancelled(progress)) return Error{"", "cancelled"};
+    if (!goes_on) break;
+    if (op.size(width) == op.rows() * width) forget_others(op.shares(), *now, width);
+    op.fill(then->data(), width), op.fetch(then->data(), width);
+    std::swap(now, then);
+  }
+  return now;
 }
 
 Result<void> bounce_terms(const LinearOperator& op, const Source& e, size_t width, int bounces, Progress* progress,

@@ -2,6 +2,7 @@
 // Solvers of x = e + A x (linear.h), for many columns at once: counted bounces, their terms one by one, and solutions
 // of the discrete radiosity equation. Source: radiosity, "Discrete Radiosity Equation", "Iterative Linear Solver".
 #include <lambent/bake/linear.h>
+#include <lambent/core/own_part.h>
 #include <lambent/core/result.h>
 
 #include <functional>
@@ -80,6 +81,11 @@ using TakeRows = std::function<void(size_t first, size_t count, const float* y)>
 // The sum of the first terms: x_0 = F e, x_{k+1} = F (e + A x_k), `bounces` times. Errors: cancelled.
 Result<Bounced> bounce(const LinearOperator& op, const Source& e, size_t width, int bounces,
                        Progress* progress = nullptr, const TakeRows& last = {});
+
+// The same in memory that is given, which other ranks' rows take as they are fetched: x and next hold op.size(width)
+// zeros each; the one with the sum is returned, the other is of no use.
+Result<ZeroPages*> bounce_in(ZeroPages& x, ZeroPages& next, const LinearOperator& op, const Source& e, size_t width,
+                             int bounces, Progress* progress, const TakeRows& last);
 
 // The terms themselves: take(k, (F A)^k F e) for k = 0 ... bounces, in order; it may complete other ranks' rows, and
 // change nothing else. Where x are other than the rows that it is made of (LinearOperator::keep), taker_of(k) takes

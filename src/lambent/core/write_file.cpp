@@ -4,6 +4,7 @@
 
 #include <fcntl.h>
 #include <sys/file.h>
+#include <sys/mman.h>
 #include <sys/stat.h>
 #include <sys/wait.h>
 #include <unistd.h>
@@ -82,18 +83,23 @@ std::vector<Run> runs_of(std::span<const std::span<const uint8_t>> pieces, size_
   for (const auto piece : pieces) bytes += piece.size();
   std::vector<Run> runs;
   for (const auto piece : pieces) {
-    size_t first = bytes * k / count, end = bytes * (k + 1) / count;  // in the file
+    const auto add = [&](size_t first, size_t end) {  // in the file
+      first = std::clamp(first, at, at + piece.size()), end = std::clamp(end, first, at + piece.size());
+      if (end > first) runs.push_back({first, piece.subspan(first - at, end - first)});
+    };
+    bool parted = false;
     for (const OwnPart* part : own_parts) {
       const uint8_t *begin = part->all.data(), *from = piece.data();
-      if (from < begin || from + piece.size() > begin + part->all.size() || part->ends.size() != count) continue;
+      if (from < begin || from + piece.size() > begin + part->all.size() || part->ranks != count) continue;
       const size_t skipped = size_t(from - begin);  // pieces may be some of them, where a set has several files
       const auto place = [&](size_t end_of) {
         return at + std::clamp(end_of, skipped, skipped + piece.size()) - skipped;
       };
-      first = place(k == 0 ? 0 : part->ends[k - 1]), end = place(part->ends[k]);
+      for (size_t i = k; i < part->ends.size(); i += count)
+        add(place(i == 0 ? 0 : part->ends[i - 1]), place(part->ends[i]));
+      parted = true;
     }
-    first = std::clamp(first, at, at + piece.size()), end = std::clamp(end, first, at + piece.size());
-    if (end > first) runs.push_back({first, piece.subspan(first - at, end - first)});
+    if (!parted) add(bytes * k / count, bytes * (k + 1) / count);
     at += piece.size();
   }
   return runs;
@@ -101,8 +107,16 @@ std::vector<Run> runs_of(std::span<const std::span<const uint8_t>> pieces, size_
 
 }  // namespace
 
-OwnPart::OwnPart(std::span<const uint8_t> bytes, std::vector<size_t> ends_of_ranks)
-    : all(bytes), ends(std::move(ends_of_ranks)) {
+void ZeroPages::forget(size_t begin, size_t end) {
+  const size_t page = size_t(::sysconf(_SC_PAGESIZE));
+  const auto at = reinterpret_cast<uintptr_t>(data());
+  const uintptr_t from = (at + begin * sizeof(float) + page - 1) / page * page,
+                  to = (at + end * sizeof(float)) / page * page;
+  if (to > from) (void)::madvise(reinterpret_cast<void*>(from), to - from, MADV_DONTNEED);
+}
+
+OwnPart::OwnPart(std::span<const uint8_t> bytes, std::vector<size_t> stretch_ends, size_t count)
+    : all(bytes), ends(std::move(stretch_ends)), ranks(count) {
   own_parts.push_back(this);
 }
 OwnPart::~OwnPart() { std::erase(own_parts, this); }

@@ -69,7 +69,11 @@ Result<void> bake_by_rooms(Bake& b) {
 Result<void> bake_diffuse(Bake& b) {
   if (!b.request.rooms.empty()) return bake_by_rooms(b);
   if (b.request.subsurface.empty()) {
-    auto transfer = bake(b.scene, b.tracer, b.receivers(), b.plan.bake, &b.report, b.job.progress);
+    BakeOptions options = b.plan.bake;
+    const BakeRequest& r = b.request;
+    options.own_part = b.plan.kind == BakeKind::diffuse && r.compress.empty() && r.fix_light.empty() &&
+                       r.fix_view.empty() && r.lattice.empty();
+    auto transfer = bake(b.scene, b.tracer, b.receivers(), options, &b.report, b.job.progress);
     if (!transfer) return transfer.error();
     b.store = std::move(*transfer), b.terms = std::move(b.report.terms);
     return {};
