@@ -183,7 +183,7 @@ void bench_window() {
       window_case(on + "Ward", *baked, ward, 4);
     }
   }
-  if (auto bunny = refined(data_scene("bunny.obj", true), 130000)) {
+  if (auto bunny = refined(data_scene("bunny.obj", true), 140000)) {
     BakeRequest request{.transfer = "blocks"};
     request.loaded = std::make_shared<const Scene>(std::move(*bunny));
     if (auto baked = bake(request)) {

@@ -18,7 +18,7 @@ for file in "$golden"/*.glb; do
   light=(--env $sky) view=(--camera $camera --spp 2) size=(--size 96x72)
   case $name in
     indirect) light=(--lamp sphere@1,1.2,1,0.1=30,20,10 --albedo red=0.2,0.3,0.8) ;;
-    diffuse_fixed_view) view=() size=() ;;
+    *_fixed_view) view=() size=() ;;
     lightmap | lightmap_directional) light=() ;;
   esac
   printf '%s\n' 'panel off' 'size 96x72' 'frames 2' 'settle' "save $name.window.exr" >script
