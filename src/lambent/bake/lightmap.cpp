@@ -234,6 +234,7 @@ Result<Lightmap> bake_lightmap(const Scene& scene, const Tracer& tracer, const R
     if (!wide) return wide.error();
     *x = std::move(*wide);
     op->fill(x->data(), rows * width);
+    op->shares().gather(x->data(), rows * width);  // each rank has filled its own
   }
   r.bounce_seconds = seconds_since(start);
 
