@@ -155,7 +155,8 @@ expect 2 'baked: is needed' relight --env uniform:1
 expect 1 'lambent bake --transfer blocks' relight corner.glb --env uniform:1
 expect 2 'method: does not go with diffuse transfer: it is for blocks' render corner.glb --env uniform:1 \
   --method haar -o x.png
-expect 2 'terms: does not go with blocks: it is for fixed views and wavelets' render blocks.glb --env uniform:1 --terms 50 -o x.png
+expect 2 'terms: does not go with blocks: it is for fixed views and wavelets' \
+  render blocks.glb --env uniform:1 --terms 50 -o x.png
 expect 2 'tolerance: needs --method blocks' render blocks.glb --env uniform:1 --method haar --tolerance 0.1 -o x.png
 expect 2 'window: does not go with blocks' render blocks.glb --env uniform:1 --window hann -o x.png
 expect 2 '\-\-method' render blocks.glb --env uniform:1 --method wavelets -o x.png

@@ -169,7 +169,7 @@ pass
 if cc -O1 -o grab "$here/grab.c" -lX11 2>cc.log; then
   # What it shows left and right of the wipe's line, in numbers.
   left() { ./grab $id 0 0 $((width / 2 - 8)) $height || failed "the window's picture cannot be read"; }
-  right() { ./grab $id $((width / 2 + 8)) 0 $((width / 2 - 8)) $height || failed "the window's picture cannot be read"; }
+  right() { ./grab $id $((width / 2 + 8)) 0 $((width / 2 - 8)) $height || failed "its picture cannot be read"; }
   # Waits until left and right are (=) or are not (!) as they were.
   sides() {
     local what=$1 l r
