@@ -8,6 +8,7 @@
 
 #include <algorithm>
 #include <chrono>
+#include <functional>
 #include <optional>
 #include <string>
 
@@ -46,6 +47,9 @@ double least_thread_seconds(int runs, F&& f) {
 std::optional<Scene> data_scene(const std::string& name, bool ground);
 // Made finer until it has at least so many vertices.
 std::optional<Scene> refined(std::optional<Scene> scene, size_t vertices);
+// The eight scenes of `products` whose names are wanted, the made ones with so much of their vertices.
+void each_product_scene(float detail, const std::function<bool(const std::string&)>& wanted,
+                        const std::function<void(const std::string&, const Scene&)>& use);
 // A shared environment, by its name without .hdr, if it is there.
 std::optional<Environment> data_environment(const std::string& name);
 

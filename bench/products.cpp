@@ -413,25 +413,32 @@ void light_case(int size, double aim) {
 
 }  // namespace
 
+void each_product_scene(float detail, const std::function<bool(const std::string&)>& wanted,
+                        const std::function<void(const std::string&, const Scene&)>& use) {
+  if (wanted("round table")) use("round table", make_table(detail));
+  if (wanted("relief")) use("relief", make_relief(detail));
+  if (wanted("wheels")) use("wheels", make_wheels(detail));
+  if (wanted("hall")) use("hall", make_hall(detail));
+  if (wanted("courtyard")) use("courtyard", make_courtyard(1.5f * std::sqrt(detail)));
+  for (const char* name : {"bunny.obj", "armadillo.obj", "scorpion_loop1_200k.ply"}) {
+    if (!wanted(name)) continue;
+    if (auto scene = refined(data_scene(name, true), size_t(120'000 * detail))) use(name, *scene);
+  }
+}
+
 void bench_products() {
   const char* given = std::getenv("LAMBENT_PRODUCTS_DETAIL");
   const float detail = given ? std::clamp(std::strtof(given, nullptr), 0.001f, 1.0f) : 1.0f;
   light_case(64, 5);
   light_case(128, 20);
   const char* named = std::getenv("LAMBENT_PRODUCTS_SCENES");
-  auto wanted = [&](const std::string& name) {
-    return !named || ("," + std::string(named) + ",").find("," + name + ",") != std::string::npos;
-  };
-  if (wanted("round table")) product_scene("round table", make_table(detail));
-  if (wanted("relief")) product_scene("relief", make_relief(detail));
-  if (wanted("wheels")) product_scene("wheels", make_wheels(detail));
-  if (wanted("hall")) product_scene("hall", make_hall(detail));
-  if (detail < 1 && !named) return;
-  if (wanted("courtyard")) product_scene("courtyard", make_courtyard(1.5f * std::sqrt(detail)));
-  for (const char* name : {"bunny.obj", "armadillo.obj", "scorpion_loop1_200k.ply"}) {
-    if (!wanted(name)) continue;
-    if (auto scene = refined(data_scene(name, true), size_t(120'000 * detail))) product_scene(name, *scene);
-  }
+  const std::string names = named ? named : detail < 1 ? "round table,relief,wheels,hall" : "";
+  each_product_scene(
+      detail,
+      [&](const std::string& name) {
+        return names.empty() || ("," + names + ",").find("," + name + ",") != std::string::npos;
+      },
+      product_scene);
 }
 
 }  // namespace lambent::bench

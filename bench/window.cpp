@@ -192,6 +192,18 @@ void bench_window() {
       window_case(on + "Phong 50", *baked, "phong:exponent=50,diffuse=0.5,specular=0.5", 8);
     }
   }
+  each_product_scene(
+      0.3f, [](const std::string&) { return true; },
+      [](const std::string& name, const Scene& scene) {
+        BakeRequest request{.transfer = "blocks"};
+        request.loaded = std::make_shared<const Scene>(scene);
+        const auto baked = bake(request);
+        if (!baked) return;
+        const double bandwidth = read_bandwidth();
+        vertex_case(name + ", diffuse", *baked, "", 250, 15, bandwidth);
+        vertex_case(name + ", Phong 10", *baked, "phong:exponent=10,diffuse=0.3,specular=0.4", 1500, 12, bandwidth);
+        vertex_case(name + ", Phong 200", *baked, "phong:exponent=200,diffuse=0.3,specular=0.4", 1500, 12, bandwidth);
+      });
   BakeRequest request{.bounces = "0"};
   request.samples = 16, request.denoise = "off";
   Scene scene = make_courtyard();
