@@ -16,6 +16,7 @@ import type { BlockLayout } from './block_texture.js';
 import { LambentError } from './errors.js';
 import type { Directional } from './header.js';
 import type { LastReflection } from './outgoing.js';
+import type { RestPose } from './turned.js';
 
 /** WebGPURenderer, with either of its backends, as far as it is asked what it can do. */
 export interface NodeRenderer {
@@ -42,6 +43,10 @@ export interface NodeSumOptions {
   transfer: DataArrayTexture;
   channels: 1 | 3;
   receivers: number;
+  /** Of the light's harmonics, which come before lamps. */
+  order: number;
+  /** How meshes stood when they were baked: those that were turned have pictures of their own. */
+  pose: RestPose;
   /** A receiver; 1 where it is not said. */
   rows?: number;
   /** Peaks are no light by themselves, row by row: they have a picture of their own, which what looks up adds. */
