@@ -6,6 +6,8 @@ import type {
   DataTexture,
   Material,
   Matrix3,
+  Matrix4,
+  Object3D,
   PointLight,
   SpotLight,
   Texture,
@@ -98,15 +100,21 @@ export interface NodeBounced {
 export interface NodeBlockOptions {
   sight: DataArrayTexture;
   places: DataTexture;
-  light: Record<'sums' | 'coarse' | 'texels', { value: DataTexture }>;
+  /** What a mesh is lit by as it stands; of none, what those that stand as they were baked are. */
+  standing(object?: Object3D): BlockStanding;
   cube: number;
   bits: number;
   receivers: number;
 }
+export interface BlockStanding {
+  readonly light: Record<'sums' | 'coarse' | 'texels', { value: DataTexture }>;
+  /** Another number where the light is another. */
+  readonly version: number;
+  /** From the world to where it was baked. */
+  readonly place: Matrix4;
+}
 /** Its pictures, drawn when the light, the eye or the lobe has changed. */
 export interface NodeBlocks {
-  /** The light is another. */
-  refresh(): void;
   /** `model`: 0 none, 1 Phong, 2 GGX; `share`: of what is scattered evenly. */
   setLobe(
     model: number,

@@ -33,7 +33,7 @@ import {
 } from 'three/tsl';
 import { loop } from './node_loop.js';
 import type { NodeSum, NodeSumOptions } from './node_edition.js';
-import { lightFor } from './turned.js';
+import { Alike, lightFor } from './turned.js';
 
 /** Rows of receivers a row of the picture. */
 export const sumColumns = 2048;
@@ -82,8 +82,8 @@ interface Light {
 }
 /** Of a mesh that was turned: the light as it stands in the axes of the bake. */
 interface Turned {
-  turn: Matrix3;
-  of: Light;
+  how: readonly number[];
+  of: Light | undefined;
   light: Light;
   targets: Map<Picture, RenderTarget>;
 }
@@ -102,7 +102,12 @@ export class Sum implements NodeSum {
   readonly turn: Node<'mat3'>;
   readonly turnBack: Node<'mat3'>;
   private light: Light = { rest: [], peaks: undefined };
-  private readonly turned = new Map<Object3D, Turned>();
+  private readonly turned = new Alike<Turned>(() => ({
+    how: [],
+    of: undefined,
+    light: this.light,
+    targets: new Map(),
+  }));
   /** The light that a picture shows. */
   private readonly shown = new WeakMap<RenderTarget, Light>();
   private readonly mains: RenderTarget[] = [];
@@ -122,10 +127,8 @@ export class Sum implements NodeSum {
     if (apart) this.peakPicture = this.draw(['peaks'], quads, 'lambent peaks');
     const turn = ({ object }: NodeFrame): Matrix3 => options.pose.turnOf(object!) ?? upright,
       back = new Matrix3();
-    this.turn = uniform(new Matrix3()).onObjectUpdate(turn) as unknown as Node<'mat3'>;
-    this.turnBack = uniform(new Matrix3()).onObjectUpdate((frame: NodeFrame) =>
-      back.copy(turn(frame)).transpose(),
-    ) as unknown as Node<'mat3'>;
+    this.turn = uniform(new Matrix3()).onObjectUpdate(turn);
+    this.turnBack = uniform(new Matrix3()).onObjectUpdate((frame: NodeFrame) => back.copy(turn(frame)).transpose());
   }
 
   get bytes(): number {
@@ -201,17 +204,13 @@ export class Sum implements NodeSum {
     const { light, options } = this,
       turn = options.pose.turnOf(object);
     if (!turn) return undefined;
-    let entry = this.turned.get(object);
-    if (entry?.of === light && entry.turn.equals(turn)) return entry;
-    const by = (of: ArrayLike<number>): Float64Array => lightFor(turn, of, options.order);
-    entry = {
-      turn: turn.clone(),
-      of: light,
-      light: { rest: by(light.rest), peaks: light.peaks && by(light.peaks) },
-      targets: entry?.targets ?? new Map<Picture, RenderTarget>(),
-    };
-    this.turned.set(object, entry);
-    return entry;
+    const { how, made } = this.turned.get(object, turn.elements),
+      by = (of: ArrayLike<number>): Float64Array => lightFor(turn, of, options.order);
+    if (made.of === light && made.how === how) return made;
+    made.light = { rest: by(light.rest), peaks: light.peaks && by(light.peaks) };
+    made.how = how;
+    made.of = light;
+    return made;
   }
 
   set(light: ArrayLike<number>, peaks: ArrayLike<number> | undefined, holds: boolean): void {
@@ -223,7 +222,7 @@ export class Sum implements NodeSum {
 
   dispose(): void {
     for (const main of this.mains) main.dispose();
-    for (const { targets } of this.turned.values()) for (const target of targets.values()) target.dispose();
+    for (const { targets } of this.turned.all) for (const target of targets.values()) target.dispose();
     this.turned.clear();
     this.picture.dispose();
     this.peakPicture?.dispose();
