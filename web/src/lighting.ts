@@ -168,7 +168,7 @@ export class Lighting {
     return this.cubes(size)();
   }
 
-  /** The same of the light as it is now, at any later time; in the axes of what was turned, by `turn` from the world. */
+  /** The same of the light as it is now, at any later time; of what was turned by `turn`, in its own axes. */
   cubes(size: number): (turn?: Matrix3) => CubeLight {
     const most = this.quick ? 4 * size : widestOnCube,
       key = `${size} ${most} ${this.rotation.toArray().join(' ')} ${this.intensity}`;
