@@ -4,6 +4,7 @@ import { existsSync, readFileSync, statSync, writeFileSync } from 'node:fs';
 import { join } from 'node:path';
 import type { Browser, Page } from 'playwright-core';
 import type { ViteDevServer } from 'vite';
+import { Quaternion, Vector3 } from 'three';
 import { afterAll, beforeAll, describe, expect, it } from 'vitest';
 import { haveTool, lambent, lambentJson, makeFolder, renderLinear, writeLopsidedHdr } from '../test/tool.ts';
 import type { Backend, Shot } from './fixture/webgpu.ts';
@@ -190,6 +191,91 @@ describe.skipIf(!haveTool || !haveBrowser)('on WebGPURenderer', () => {
       const shot = { path: `/files/${name}.glb`, light: sun, camera: cameraOf(camera) };
       await compare(`${name}_sun`, { ...shot, exposure: -2, peaks: true }, truth, 45, 40);
     }
+  });
+
+  const turnAbout = (axis: number[]): Quaternion => new Quaternion().setFromAxisAngle(new Vector3(...axis), 1.1);
+  /** The camera of somebody who was turned as well, about where the scene's origin is. */
+  function along(camera: string, turn: Quaternion): number[] {
+    const numbers = cameraOf(camera);
+    return [0, 3]
+      .flatMap((from) =>
+        new Vector3()
+          .fromArray(numbers.slice(from, from + 3))
+          .applyQuaternion(turn)
+          .toArray(),
+      )
+      .concat(numbers[6]!);
+  }
+  const turning: [string, string[], string?][] = [
+    ['vertices', ['--order', '4', '--samples', '256', '--bounces', '1']],
+    [
+      'atlas',
+      ['--transfer', 'lightmap', '--texels-per-unit', '8', '--order', '4', '--samples', '256', '--bounces', '1'],
+    ],
+    [
+      'matrix',
+      [
+        ...['--transfer', 'matrix', '--brdf', 'ggx:roughness=0.6,f0=0.6', '--outgoing', 'map'],
+        ...['--order', '4', '--incident-order', '3', '--samples', '256', '--bounces', '1'],
+      ],
+    ],
+    ['blocks', ['--transfer', 'blocks', '--cube', '32', '--visibility', 'bits:3'], 'diffuse'],
+    ['shiny', ['--transfer', 'blocks', '--cube', '32', '--visibility', 'bits:3'], 'ggx:roughness=0.4,f0=0.6'],
+  ];
+  for (const [name, args, brdf] of turning)
+    it(`draws a scene that was turned since as render draws it where it was baked so: ${name}`, async () => {
+      const turn = turnAbout([0.48, -0.6, 0.64]),
+        text = readFileSync(at('scene.obj'), 'utf8'),
+        v = new Vector3();
+      writeFileSync(
+        at('other.obj'),
+        text.replace(/^(vn?) (\S+) (\S+) (\S+)/gm, (_, key: string, ...xyz: string[]) => {
+          v.fromArray(xyz.slice(0, 3).map(Number)).applyQuaternion(turn);
+          return `${key} ${v.toArray().join(' ')}`;
+        }),
+      );
+      const kind = brdf ? 'blocks' : name,
+        files = ['scene', 'other'].map((file) => `${kind}_of_${file}.glb`) as [string, string];
+      for (const file of files)
+        if (!existsSync(at(file)))
+          lambent('bake', at(file.replace(/.*_of_|glb/g, '') + 'obj'), ...args, '-o', at(file));
+      const seen = along(camera, turn),
+        truth = at(`${name}_turned_render.png`),
+        sky = 'sky:elevation=35,azimuth=60',
+        light = brdf ? ['--env', sky, '--brdf', brdf, '--exposure', '-1'] : lit;
+      renderLinear(at(files[1]), ...light, ...view(seen.join(',')), '-o', truth);
+      const shot = { path: `/files/${files[0]}`, camera: seen, turn: turn.toArray() };
+      await compare(
+        `${name}_turned`,
+        brdf ? { ...shot, light: sky, brdf, exposure: -1 } : { ...shot, light: lightOf(4) },
+        truth,
+        45,
+        brdf ? 36 : 40, // render's vertices that look away from the eye are black
+      );
+    });
+
+  it('sees lobes of visibility in blocks from where the eye is, of a scene that was moved', async () => {
+    const move = [0.9, -0.6, 1.4],
+      truth = at('moved_render.png'),
+      sky = 'sky:elevation=35,azimuth=60',
+      brdf = 'ggx:roughness=0.4,f0=0.6';
+    renderLinear(at('blocks.glb'), '--env', sky, '--brdf', brdf, '--exposure', '-1', ...view(camera), '-o', truth);
+    const seen = cameraOf(camera).map((x, i) => x + move[i % 3]! * (i < 6 ? 1 : 0));
+    const shot = { path: '/files/blocks.glb', light: sky, brdf, exposure: -1, camera: seen, move };
+    await compare('moved', shot, truth, 45, 36);
+  });
+
+  it('draws bumps of a scene that was turned with the lamps that it was baked under', async () => {
+    const turn = turnAbout([0, 1, 0]),
+      near = '1.6,1.5,2.2,-0.1,0.4,-0.2,40',
+      truth = at('bumps_turned_render.png');
+    lambent(
+      ...['bake', at('bumpy.gltf'), '--transfer', 'lightmap', '--texels-per-unit', '16', '--samples', '64'],
+      ...['--directional', 'sh:3', '--sky', 'sky:elevation=30,azimuth=60', '-o', at('bumps.glb')],
+    );
+    renderLinear(at('bumps.glb'), ...view(near), '--exposure', '-2', '-o', truth);
+    const shot = { path: '/files/bumps.glb', light: [0, 0, 0], camera: along(near, turn), turn: turn.toArray() };
+    await compare('bumps_turned', { ...shot, exposure: -2 }, truth);
   });
 
   const lamps = [

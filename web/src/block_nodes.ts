@@ -6,6 +6,7 @@ import {
   Vector3,
   type Node,
   type NodeFrame,
+  type RenderTarget,
   type Texture,
   type TextureNode,
 } from 'three/webgpu';
@@ -38,7 +39,7 @@ import { cardinalFunctions } from './block_light.js';
 import { blockTolerance } from './block_reflection.js';
 import { pictureColumns, receiverColumns, wordColumns } from './block_shader.js';
 import { cubeBlocks } from './cube.js';
-import type { NodeBlocks, NodeBlockOptions } from './node_edition.js';
+import type { BlockStanding, NodeBlocks, NodeBlockOptions } from './node_edition.js';
 import { loop } from './node_loop.js';
 
 type Int = Node<'int'>;
@@ -60,7 +61,8 @@ class Reader {
   readonly texels: Texels;
 
   constructor(readonly options: NodeBlockOptions) {
-    const { sight, places, light } = options,
+    const { sight, places } = options,
+      { light } = options.standing(),
       node = (of: Texture): Texels => texture(of);
     this.sight = node(sight);
     this.places = node(places);
@@ -69,9 +71,9 @@ class Reader {
     this.texels = node(light.texels.value);
   }
 
-  /** The light's textures are others where surfaces have begun to shine. */
-  follow(): void {
-    const { coarse, texels } = this.options.light;
+  /** The light's textures are others for what stands elsewhere, and where surfaces have begun to shine. */
+  follow({ light: { sums, coarse, texels } }: BlockStanding): void {
+    this.sums.value = sums.value;
     this.coarse.value = coarse.value;
     this.texels.value = texels.value;
   }
@@ -347,9 +349,17 @@ function picture(of: Node<'vec4'>, receivers: number, name: string): Picture {
     generateMipmaps: false,
     autoUpdate: false,
   });
-  made.updateBeforeType = 'render';
+  made.updateBeforeType = 'object'; // what stands elsewhere has pictures of its own
   made.name = name;
   return made;
+}
+
+/** Pictures for what stands alike, and what they show. */
+interface Drawn {
+  even: RenderTarget;
+  shine: RenderTarget;
+  evenOf: number;
+  shineOf: string;
 }
 
 /** Pictures of receivers, and what meshes look up in them. */
@@ -358,7 +368,9 @@ export class BlockNodes implements NodeBlocks {
   private readonly even: Picture;
   private readonly shine: Picture;
   private readonly made = new Map<boolean, Node<'vec4'>>();
-  private readonly eye = new Vector3(Infinity, 0, 0);
+  private readonly eye = new Vector3();
+  private readonly drawn = new Map<BlockStanding, Drawn>();
+  private lobes = 0;
   private readonly share = uniform(1);
   private readonly model = uniform(0, 'int');
   private readonly shines = uniform(0);
@@ -370,39 +382,63 @@ export class BlockNodes implements NodeBlocks {
     this.even = picture(evenNode(reader)(), receivers, 'lambent even');
     const eye = uniform(this.eye) as unknown as Vec3;
     this.shine = picture(shineNode(reader, eye, this.model, this.lobe)(), receivers, 'lambent shine');
-    // Before a frame that looks it up, from where that frame is seen; of surfaces that do not shine never.
-    const { shine } = this,
-      draw = shine.updateBefore.bind(shine);
-    shine.updateBefore = (frame: NodeFrame) => {
-      if (this.shines.value === 0) return undefined;
-      const now = new Vector3().setFromMatrixPosition(frame.camera!.matrixWorld);
-      if (!now.equals(this.eye)) {
-        this.eye.copy(now);
-        shine.textureNeedsUpdate = true;
-      }
-      return draw(frame);
+    this.drawn.set(options.standing(), {
+      even: this.even.renderTarget!,
+      shine: this.shine.renderTarget!,
+      evenOf: -1,
+      shineOf: '',
+    });
+    const begin = (made: Picture, draw: (frame: NodeFrame, stands: BlockStanding, drawn: Drawn) => boolean): void => {
+      const drawNow = made.updateBefore.bind(made);
+      made.updateBefore = (frame: NodeFrame): undefined => {
+        const stands = options.standing(frame.object!),
+          drawn = this.drawnOf(stands);
+        if (!draw(frame, stands, drawn)) return;
+        reader.follow(stands);
+        made.textureNeedsUpdate = true;
+        drawNow(frame);
+      };
     };
+    begin(this.even, (_, { version }, drawn) => {
+      this.even.renderTarget = drawn.even;
+      const is = drawn.evenOf !== version;
+      drawn.evenOf = version;
+      return is;
+    });
+    // Before a frame that looks it up, from where that frame is seen; of surfaces that do not shine never.
+    begin(this.shine, (frame, { version, place }, drawn) => {
+      this.shine.renderTarget = drawn.shine;
+      if (this.shines.value === 0) return false;
+      this.eye.setFromMatrixPosition(frame.camera!.matrixWorld).applyMatrix4(place);
+      const of = `${version} ${this.lobes} ${this.eye.toArray().join(' ')}`,
+        is = drawn.shineOf !== of;
+      drawn.shineOf = of;
+      return is;
+    });
+  }
+
+  private drawnOf(stands: BlockStanding): Drawn {
+    let drawn = this.drawn.get(stands);
+    if (!drawn) {
+      const { even, shine } = this.drawn.get(this.reader.options.standing())!;
+      this.drawn.set(stands, (drawn = { even: even.clone(), shine: shine.clone(), evenOf: -1, shineOf: '' }));
+    }
+    return drawn;
   }
 
   get bytes(): number {
-    const { width, height } = this.even.renderTarget!;
+    const { width, height } = this.drawn.get(this.reader.options.standing())!.even;
     return 32 * width * height;
   }
 
-  refresh(): void {
-    this.reader.follow();
-    this.even.textureNeedsUpdate = this.shine.textureNeedsUpdate = true;
-  }
-
   setLobe(model: number, share: number, lobe: Lobe): void {
-    this.reader.follow();
     this.model.value = model;
     this.share.value = share;
     this.shines.value = model === 0 ? 0 : 1;
     this.lobe.colour.value = lobe.colour.value;
     this.lobe.width.value = lobe.width.value;
     this.lobe.samples.value.copy(lobe.samples.value);
-    this.shine.textureNeedsUpdate = true;
+    ++this.lobes;
   }
 
   atVertices(twoSided: boolean): Node<'vec4'> {
@@ -427,6 +463,7 @@ export class BlockNodes implements NodeBlocks {
   }
 
   dispose(): void {
+    for (const { even, shine } of this.drawn.values()) for (const target of [even, shine]) target.dispose();
     this.even.dispose();
     this.shine.dispose();
   }

@@ -8,25 +8,20 @@
 import {
   DataArrayTexture,
   DataTexture,
-  FloatType,
   MeshBasicMaterial,
   NearestFilter,
   RedIntegerFormat,
-  RGBAFormat,
   UnsignedIntType,
   Vector3,
-  type IUniform,
   type Material,
   type Mesh,
-  type Texture,
-  type WebGLRenderer,
   type WebGLProgramParametersWithUniforms,
 } from 'three';
-import { isSoftware, sumBlocks, type BlockSumOptions } from './block_sum.js';
-import { BlockLight, widestBlock } from './block_light.js';
+import { widestBlock } from './block_light.js';
 import { placeReceivers } from './block_places.js';
-import { blockTolerance, diffuseOf, lobeOf, samplesOf, type Reflection } from './block_reflection.js';
-import { wordColumns, diffuseShader, glossShader, pictureColumns } from './block_shader.js';
+import { diffuseOf, lobeOf, samplesOf, type Reflection } from './block_reflection.js';
+import { BlockShading, type BlocksHeader } from './block_shading.js';
+import { wordColumns, pictureColumns } from './block_shader.js';
 import { checkRecords, recordBegins } from './block_records.js';
 import { blockSide, cubeBlocks, maxCube } from './cube.js';
 import { LambentError } from './errors.js';
@@ -34,7 +29,6 @@ import { isIndex, isViews } from './glb.js';
 import { noReceiver } from './header.js';
 import type { BakedTransfer, TransferKind, TransferSource } from './kinds.js';
 import type { Lighting } from './lighting.js';
-import { DrawnPicture } from './light_sum.js';
 import {
   checkNodes,
   copyNodes,
@@ -53,11 +47,8 @@ import { bindPart } from './vertex_transfer.js';
 
 /** What all meshes of one file share. */
 interface Shared {
-  even: EvenPicture;
-  gloss: DrawnPicture;
-  light: BlockLight;
+  shading: BlockShading;
   reflection: { value: Reflection };
-  eye: Vector3;
   share: { value: number };
 }
 
@@ -111,18 +102,10 @@ class BlocksMaterial extends MeshBasicMaterial {
   }
 
   override onBeforeRender(...drawn: Drawn): void {
-    const [renderer, , camera] = drawn,
-      { even, gloss, reflection, eye } = this.shared,
+    const [renderer, , camera, , object] = drawn,
+      { shading, reflection } = this.shared,
       shines = reflection.value.model !== 'diffuse';
-    even.update(renderer);
-    if (shines) {
-      const now = new Vector3().setFromMatrixPosition(camera.matrixWorld);
-      if (!now.equals(eye)) {
-        eye.copy(now);
-        gloss.refresh();
-      }
-      gloss.update(renderer);
-    }
+    shading.update(renderer, camera, object);
     const defines = (this.defines ??= {});
     if ('PRT_SHINES' in defines !== shines) {
       if (shines) defines['PRT_SHINES'] = '';
@@ -133,82 +116,13 @@ class BlocksMaterial extends MeshBasicMaterial {
   }
 
   private patch(shader: WebGLProgramParametersWithUniforms): void {
-    const { even, gloss, share } = this.shared;
-    Object.assign(shader.uniforms, { prtEven: even.shown, prtShine: { value: gloss.target.texture }, prtShare: share });
+    const { shading, share } = this.shared;
+    Object.assign(shader.uniforms, { prtEven: shading.even, prtShine: shading.shine, prtShare: share });
     shader.vertexShader =
       vertexDeclarations +
       replaceOnce(shader.vertexShader, '#include <fog_vertex>', '#include <fog_vertex>' + vertexBody);
     shader.fragmentShader = useExitRadiance(shader.fragmentShader, glossFragmentDeclarations, false, true);
   }
-}
-
-/** A picture of receivers. */
-class ReceiverPicture extends DrawnPicture {
-  constructor(
-    receivers: number,
-    fragmentShader: string,
-    defines: Record<string, number>,
-    uniforms: Record<string, IUniform>,
-  ) {
-    super(
-      Math.min(pictureColumns, receivers),
-      Math.ceil(receivers / pictureColumns),
-      NearestFilter,
-      { size: `has ${receivers.toLocaleString('en')} receivers, which take a texture`, use: 'is shaded' },
-      { fragmentShader, defines, uniforms },
-      true,
-    );
-  }
-  /** Compiles it with others. */
-  define(defines: Record<string, number>): void {
-    Object.assign((this.material.defines ??= {}), defines);
-    this.material.needsUpdate = true;
-  }
-}
-
-/** Exit radiance of white: drawn by the graphics card, or summed by the processor. */
-class EvenPicture {
-  /** What there is now. */
-  readonly shown: { value: Texture };
-  private table: DataTexture | undefined;
-  private isStale = true;
-
-  constructor(
-    readonly drawn: ReceiverPicture,
-    private readonly options: BlockSumOptions,
-  ) {
-    this.shown = { value: drawn.target.texture };
-  }
-
-  get bytes(): number {
-    return this.drawn.bytes;
-  }
-  refresh(): void {
-    this.isStale = true;
-    this.drawn.refresh();
-  }
-  update(renderer: WebGLRenderer): void {
-    if (!isSoftware(renderer) && this.drawn.isDrawnBy(renderer)) return this.drawn.update(renderer);
-    const { width, height } = this.drawn.target;
-    if (!this.table) {
-      this.table = new DataTexture(new Float32Array(4 * width * height), width, height, RGBAFormat, FloatType);
-      this.shown.value = this.table;
-    }
-    if (!this.isStale) return;
-    this.isStale = false;
-    sumBlocks(this.options, this.table.image.data as Float32Array);
-    this.table.needsUpdate = true;
-  }
-  dispose(): void {
-    this.drawn.dispose();
-    this.table?.dispose();
-  }
-}
-
-interface Header {
-  cube: number;
-  bits: number;
-  receivers: number;
 }
 
 class BlocksTransfer implements BakedTransfer {
@@ -219,8 +133,7 @@ class BlocksTransfer implements BakedTransfer {
   readonly fileBytes: number;
   private readonly sight: DataArrayTexture;
   private readonly places: DataTexture;
-  private readonly light: BlockLight;
-  private readonly gloss: ReceiverPicture;
+  private readonly shading: BlockShading;
   private readonly shared: Shared;
   private readonly widest: number;
   private readonly lobe = { colour: { value: 0 }, width: { value: 1 }, samples: { value: new Vector3() } };
@@ -232,7 +145,7 @@ class BlocksTransfer implements BakedTransfer {
   private readonly refusal: string | undefined;
 
   constructor(
-    { cube, bits, receivers }: Header,
+    { cube, bits, receivers }: BlocksHeader,
     records: Uint8Array,
     begins: Float64Array,
     readonly meshes: Mesh[],
@@ -242,47 +155,12 @@ class BlocksTransfer implements BakedTransfer {
     this.fileBytes = records.byteLength;
     this.sight = recordTexture(records);
     this.places = placeReceivers(meshes, receivers, begins);
-    this.light = new BlockLight(cube);
     this.widest = widestBlock(cube);
-    const defines = {
-      PRT_BITS: bits,
-      PRT_CUBE: cube,
-      PRT_BLOCKS: cubeBlocks(cube),
-      PRT_FLAG_BYTES: flagBytes(cube),
-      PRT_RECEIVERS: receivers,
-      PRT_MODEL: 0,
-      PRT_TOLERANCE: blockTolerance,
-    };
-    const { sums, coarse, texels } = this.light,
-      uniforms = { prtSight: { value: this.sight }, prtReceivers: { value: this.places }, prtBlockSums: sums },
-      eye = new Vector3(Infinity, 0, 0);
-    const diffuse = new ReceiverPicture(receivers, diffuseShader, defines, uniforms);
-    this.gloss = new ReceiverPicture(
-      receivers,
-      glossShader,
-      { ...defines },
-      {
-        ...uniforms,
-        prtCoarse: coarse,
-        prtBlockTexels: texels,
-        prtEye: { value: eye },
-        prtColour: this.lobe.colour,
-        prtWidth: this.lobe.width,
-        prtSamples: this.lobe.samples,
-      },
-    );
-    const reflection: Shared['reflection'] = { value: { model: 'diffuse' } };
-    const even = new EvenPicture(diffuse, {
-      records,
-      places: this.places.image.data as Float32Array,
-      begins,
-      sums: sums.value.image.data as Float32Array,
-      cube,
-      bits,
-    });
-    this.shared = { even, gloss: this.gloss, light: this.light, reflection, eye, share: { value: 1 } };
-    const { sight, places, light } = this;
-    this.nodes = nodes?.blocks({ sight, places, light, cube, bits, receivers });
+    const { sight, places, lobe } = this,
+      header = { cube, bits, receivers };
+    this.shading = new BlockShading({ header, records, begins, sight, places, lobe }, meshes);
+    this.shared = { shading: this.shading, reflection: { value: { model: 'diffuse' } }, share: { value: 1 } };
+    this.nodes = nodes?.blocks({ sight, places, standing: (o) => this.shading.standing(o), ...header });
     this.refusal = nodes ? undefined : withoutNodes;
     let vertexBytes = 0;
     for (const mesh of meshes) {
@@ -303,13 +181,14 @@ class BlocksTransfer implements BakedTransfer {
   }
 
   get gpuBytes(): number {
-    const { sight, places, light, shared, gloss } = this,
+    const { sight, places } = this,
+      { light, even, gloss } = this.shading.main,
       bytes = (of: DataArrayTexture | DataTexture): number => (of.image.data as Uint8Array | Float32Array).byteLength;
     return (
       bytes(sight) +
       bytes(places) +
       light.bytes +
-      shared.even.bytes +
+      even.bytes +
       (this.reflection.model === 'diffuse' ? 0 : gloss.bytes) +
       (this.nodes?.bytes ?? 0) +
       this.vertexBytes
@@ -320,31 +199,31 @@ class BlocksTransfer implements BakedTransfer {
     return this.shared.reflection.value;
   }
   set reflection(value: Reflection) {
-    const { shared, lobe, gloss } = this;
+    const { shared, lobe } = this;
     shared.reflection.value = value;
     shared.share.value = diffuseOf(value);
     if (value.model === 'diffuse') {
+      this.shading.setModel(0);
       this.nodes?.setLobe(0, 1, lobe);
       return;
     }
-    this.light.gloss();
     const { colour, width } = lobeOf(value),
       { one, nodes, all } = samplesOf(value, this.widest);
     lobe.colour.value = colour;
     lobe.width.value = width;
     lobe.samples.value.set(one, nodes, all);
     const model = value.model === 'phong' ? 1 : 2;
-    gloss.define({ PRT_MODEL: model });
-    gloss.refresh();
+    this.shading.setModel(model);
     this.nodes?.setLobe(model, shared.share.value, lobe);
   }
 
   check(renderer: Renderer): void {
     if (isNodeRenderer(renderer)) return checkNodes(renderer, this.refusal);
-    this.shared.even.drawn.checkSize(renderer);
-    if (this.reflection.model !== 'diffuse') this.gloss.check(renderer);
+    const { light, even, gloss } = this.shading.main;
+    even.drawn.checkSize(renderer);
+    if (this.reflection.model !== 'diffuse') gloss.check(renderer);
     const { maxTextureSize, maxVertexTextures } = renderer.capabilities,
-      { width, height } = this.light.sums.value.image,
+      { width, height } = light.sums.value.image,
       most = Math.max(width, height, wordColumns, this.places.image.height);
     if (maxTextureSize < most)
       throw new LambentError(`takes textures of ${most} texels a side; this graphics card has ${maxTextureSize}`);
@@ -361,25 +240,18 @@ class BlocksTransfer implements BakedTransfer {
   }
 
   relight(lighting: Lighting): void {
-    this.light.set(lighting.onCube(this.light.size));
-    this.shared.even.refresh();
-    this.gloss.refresh();
-    this.nodes?.refresh();
+    this.shading.set(lighting.cubes(this.shading.main.light.size));
   }
 
   dispose(): void {
     this.nodes?.dispose();
     this.sight.dispose();
     this.places.dispose();
-    this.light.dispose();
-    this.shared.even.dispose();
-    this.gloss.dispose();
+    this.shading.dispose();
     for (const material of this.materials.values()) material.dispose();
     for (const mesh of this.meshes) mesh.geometry.dispose();
   }
 }
-
-const flagBytes = (cube: number): number => Math.ceil(cubeBlocks(cube) / 4);
 
 /** Records as they are in the file, four bytes a word. */
 function recordTexture(records: Uint8Array): DataArrayTexture {

@@ -1,5 +1,5 @@
 // Distant light as coefficients of radiance, that can be turned without another projection.
-import { DataUtils, FloatType, HalfFloatType, LightProbe, Matrix4, Quaternion, type Texture } from 'three';
+import { DataUtils, FloatType, HalfFloatType, LightProbe, Matrix3, Matrix4, Quaternion, type Texture } from 'three';
 import { cubeLight, reducedMap, type CubeLight } from './cube.js';
 import { LambentError } from './errors.js';
 import { withoutPeaks } from './peaks.js';
@@ -165,15 +165,26 @@ export class Lighting {
    * Maps wider than 2048 texels are reduced to that.
    */
   onCube(size: number): CubeLight {
+    return this.cubes(size)();
+  }
+
+  /** The same of the light as it is now, at any later time; of what was turned by `turn`, in its own axes. */
+  cubes(size: number): (turn?: Matrix3) => CubeLight {
     const most = this.quick ? 4 * size : widestOnCube,
       key = `${size} ${most} ${this.rotation.toArray().join(' ')} ${this.intensity}`;
-    if (this.cube?.key === key) return this.cube.light;
     if (this.narrow?.most !== most)
       this.narrow = { most, map: reducedMap(this.map ?? mapOf(this.radiance, this.order), most) };
-    const light = cubeLight(this.narrow.map, size, this.matrix());
-    for (let i = 0; i < light.energy.length; ++i) light.energy[i]! *= this.intensity;
-    this.cube = { key, light };
-    return light;
+    const { map } = this.narrow,
+      { intensity } = this,
+      rotation = this.matrix();
+    return (turn) => {
+      if (!turn && this.cube?.key === key) return this.cube.light;
+      const now = new Matrix3().fromArray(rotation).transpose(), // fromArray is column-major
+        light = cubeLight(map, size, turn ? now.premultiply(turn.clone().transpose()).transpose().toArray() : rotation);
+      for (let i = 0; i < light.energy.length; ++i) light.energy[i]! *= intensity;
+      if (!turn) this.cube = { key, light };
+      return light;
+    };
   }
 
   private bandsOf(order: number): number {

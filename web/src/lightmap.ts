@@ -143,7 +143,12 @@ class LightmapMaterial extends MeshBasicMaterial {
     const { emission, normals, emissive } = this.surface;
     Object.assign(
       shader.uniforms,
-      { prtAtlas: this.atlas.rest, prtPeakAtlas: this.atlas.peaks, prtEmission: emission },
+      {
+        prtAtlas: this.atlas.rest,
+        prtPeakAtlas: this.atlas.peaks,
+        prtTurnBack: this.atlas.turnBack,
+        prtEmission: emission,
+      },
       this.gain && { prtGain: this.gain },
       normals && {
         prtNormalMap: { value: normals.texture },
@@ -210,8 +215,8 @@ class LightmapTransfer implements BakedTransfer {
     const { layout, data } = packBlocks({ ...header, count, channels: rows * header.channels }, values);
     this.layout = layout;
     this.transfer = blockTexture(layout, data);
-    // Rows of normals are in the axes of the bake: they are as they were.
-    this.atlas = this.makeAtlases(header.directional === 'none' ? new RestPose(meshes) : undefined);
+    const pose = new RestPose(meshes);
+    this.atlas = this.makeAtlases(pose);
     const { width, height } = receiversOf.image;
     this.refusal = nodes ? undefined : withoutNodes;
     this.sum = nodes?.sum({
@@ -219,6 +224,8 @@ class LightmapTransfer implements BakedTransfer {
       transfer: this.transfer,
       channels: header.channels,
       receivers: header.receivers,
+      order: header.order,
+      pose,
       rows,
       apart: !this.eachIsLight,
       receiversOf,

@@ -109,6 +109,7 @@ vec3 prtRowAt( highp sampler2D atlas, const in vec2 place, const in int row ) {
   return texture( atlas, ( place + vec2( 0.0, size.y / float( PRT_ATLAS_ROWS ) * float( row ) ) ) / size ).rgb;
 }
 #ifdef PRT_DIRECTIONAL
+  uniform mat3 prtTurnBack;
   vec3 prtEvaluate( highp sampler2D atlas, const in vec2 place, const in vec3 N, const in vec3 n ) {
     ${evaluation(kind)}
   }
@@ -155,9 +156,10 @@ vec3 prtExitRadiance() {
         bent = normalize( t * texel.x + cross( n, t ) * ( along.w > 0.0 ? texel.y : - texel.y ) + n * texel.z );
       }
     #endif
-    vec3 sum = prtEvaluate( prtAtlas, place, side * n, side * bent );
+    n = prtTurnBack * ( side * n ), bent = prtTurnBack * ( side * bent ); // rows are in the axes of the bake
+    vec3 sum = prtEvaluate( prtAtlas, place, n, bent );
     #ifdef PRT_PEAKS
-      sum += prtEvaluate( prtPeakAtlas, place, side * n, side * bent );
+      sum += prtEvaluate( prtPeakAtlas, place, n, bent );
     #endif
     return sum;
   #endif

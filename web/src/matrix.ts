@@ -152,13 +152,16 @@ class MatrixTransfer implements BakedTransfer {
     );
     this.layout = layout;
     this.transfer = blockTexture(layout, data);
-    this.sums = this.makeSums(new RestPose(meshes));
+    const pose = new RestPose(meshes);
+    this.sums = this.makeSums(pose);
     this.refusal = nodes ? undefined : withoutNodes;
     this.sum = nodes?.sum({
       layout,
       transfer: this.transfer,
       channels: header.channels,
       receivers: header.receivers,
+      order: header.order,
+      pose,
       rows: shared.rows,
       apart: true,
     });

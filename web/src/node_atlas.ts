@@ -115,7 +115,7 @@ function normals(surface: NodeSurface, side: Node<'float'>): { n: Vec3; bent: Ve
 }
 
 /** Exit radiance of white. */
-export function atlasRadiance({ picture, peakPicture, hasPeaks, options }: Sum, surface: NodeSurface): Vec3 {
+export function atlasRadiance({ picture, peakPicture, hasPeaks, options, turnBack }: Sum, surface: NodeSurface): Vec3 {
   const { directional, twoSided } = surface,
     rows = directionalRows[directional],
     { width, height } = options.receiversOf!.image;
@@ -136,8 +136,9 @@ export function atlasRadiance({ picture, peakPicture, hasPeaks, options }: Sum, 
     if (directional === 'none') return read(picture)(0);
     const side = select(frontFacing, float(1), float(-1)).toVar(),
       { n, bent } = normals(surface, side),
-      N = n.mul(side).toVar(),
-      towards = bent.mul(side).toVar();
+      // Rows are in the axes of the bake.
+      N = turnBack.mul(n.mul(side)).toVar(),
+      towards = turnBack.mul(bent.mul(side)).toVar();
     const sum = evaluate(directional, read(picture), N, towards).toVar();
     if (peakPicture)
       If(hasPeaks.greaterThan(0.5), () => void sum.addAssign(evaluate(directional, read(peakPicture), N, towards)));

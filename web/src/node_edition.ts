@@ -6,6 +6,8 @@ import type {
   DataTexture,
   Material,
   Matrix3,
+  Matrix4,
+  Object3D,
   PointLight,
   SpotLight,
   Texture,
@@ -16,6 +18,7 @@ import type { BlockLayout } from './block_texture.js';
 import { LambentError } from './errors.js';
 import type { Directional } from './header.js';
 import type { LastReflection } from './outgoing.js';
+import type { RestPose } from './turned.js';
 
 /** WebGPURenderer, with either of its backends, as far as it is asked what it can do. */
 export interface NodeRenderer {
@@ -42,6 +45,10 @@ export interface NodeSumOptions {
   transfer: DataArrayTexture;
   channels: 1 | 3;
   receivers: number;
+  /** Of the light's harmonics, which come before lamps. */
+  order: number;
+  /** How meshes stood when they were baked: those that were turned have pictures of their own. */
+  pose: RestPose;
   /** A receiver; 1 where it is not said. */
   rows?: number;
   /** Peaks are no light by themselves, row by row: they have a picture of their own, which what looks up adds. */
@@ -93,15 +100,21 @@ export interface NodeBounced {
 export interface NodeBlockOptions {
   sight: DataArrayTexture;
   places: DataTexture;
-  light: Record<'sums' | 'coarse' | 'texels', { value: DataTexture }>;
+  /** What a mesh is lit by as it stands; of none, what those that stand as they were baked are. */
+  standing(object?: Object3D): BlockStanding;
   cube: number;
   bits: number;
   receivers: number;
 }
+export interface BlockStanding {
+  readonly light: Record<'sums' | 'coarse' | 'texels', { value: DataTexture }>;
+  /** Another number where the light is another. */
+  readonly version: number;
+  /** From the world to where it was baked. */
+  readonly place: Matrix4;
+}
 /** Its pictures, drawn when the light, the eye or the lobe has changed. */
 export interface NodeBlocks {
-  /** The light is another. */
-  refresh(): void;
   /** `model`: 0 none, 1 Phong, 2 GGX; `share`: of what is scattered evenly. */
   setLobe(
     model: number,

@@ -1,6 +1,7 @@
 // T . light in nodes, for WebGPURenderer: a float picture, a texel a row of each receiver, drawn when the light changes
 // and only looked up until then.
 import {
+  Matrix3,
   DataTexture,
   FloatType,
   HalfFloatType,
@@ -10,6 +11,9 @@ import {
   UnsignedIntType,
   Vector4,
   type Node,
+  type NodeFrame,
+  type Object3D,
+  type RenderTarget,
 } from 'three/webgpu';
 import {
   attribute,
@@ -29,6 +33,7 @@ import {
 } from 'three/tsl';
 import { loop } from './node_loop.js';
 import type { NodeSum, NodeSumOptions } from './node_edition.js';
+import { Alike, lightFor } from './turned.js';
 
 /** Rows of receivers a row of the picture. */
 export const sumColumns = 2048;
@@ -70,6 +75,21 @@ function pick({ receiversOf, rows = 1 }: NodeSumOptions, whose: DataTexture | un
   return [i.div(int(rows)).toVar(), i.mod(int(rows)).toVar()];
 }
 
+/** [column][3] */
+interface Light {
+  rest: ArrayLike<number>;
+  peaks: ArrayLike<number> | undefined;
+}
+/** Of a mesh that was turned: the light as it stands in the axes of the bake. */
+interface Turned {
+  how: readonly number[];
+  of: Light | undefined;
+  light: Light;
+  targets: Map<Picture, RenderTarget>;
+}
+
+const upright = new Matrix3();
+
 export class Sum implements NodeSum {
   readonly picture: Picture;
   /** Where peaks are apart; one texel until there are any. */
@@ -78,8 +98,19 @@ export class Sum implements NodeSum {
   readonly hasPeaks = uniform(0);
   /** Nodes that look it up, by whether surfaces have two sides. */
   readonly made = new Map<boolean, Node<'vec4'>>();
-  private readonly light: Vector4[];
-  private readonly peaks: Vector4[];
+  /** Of the mesh that is drawn, from the axes of the bake into the world, and back. */
+  readonly turn: Node<'mat3'>;
+  readonly turnBack: Node<'mat3'>;
+  private light: Light = { rest: [], peaks: undefined };
+  private readonly turned = new Alike<Turned>(() => ({
+    how: [],
+    of: undefined,
+    light: this.light,
+    targets: new Map(),
+  }));
+  /** The light that a picture shows. */
+  private readonly shown = new WeakMap<RenderTarget, Light>();
+  private readonly mains: RenderTarget[] = [];
   private readonly whose: DataTexture | undefined;
   private readonly holds = uniform(0);
   private readonly width: number;
@@ -88,16 +119,16 @@ export class Sum implements NodeSum {
   constructor(readonly options: NodeSumOptions) {
     const { layout, receivers, receiversOf, rows = 1, apart = false } = options,
       { quads } = layout;
-    this.light = vectors(quads);
-    this.peaks = vectors(quads);
     this.whose = namedAnew(receiversOf);
-    const light = uniformArray<'vec4'>(this.light, 'vec4'),
-      peaks = uniformArray<'vec4'>(this.peaks, 'vec4');
     [this.width, this.height] = receiversOf
       ? [receiversOf.image.width, rows * receiversOf.image.height]
       : [Math.min(sumColumns, rows * receivers), Math.ceil((rows * receivers) / sumColumns)];
-    this.picture = this.draw(apart ? [light] : [light, peaks], 'lambent sum');
-    if (apart) this.peakPicture = this.draw([peaks], 'lambent peaks');
+    this.picture = this.draw(apart ? ['rest'] : ['rest', 'peaks'], quads, 'lambent sum');
+    if (apart) this.peakPicture = this.draw(['peaks'], quads, 'lambent peaks');
+    const turn = ({ object }: NodeFrame): Matrix3 => options.pose.turnOf(object!) ?? upright,
+      back = new Matrix3();
+    this.turn = uniform(new Matrix3()).onObjectUpdate(turn);
+    this.turnBack = uniform(new Matrix3()).onObjectUpdate((frame: NodeFrame) => back.copy(turn(frame)).transpose());
   }
 
   get bytes(): number {
@@ -106,10 +137,11 @@ export class Sum implements NodeSum {
   }
 
   /** A picture of transfer times each of these lights; of two, each is held at 0 or above where `holds` says. */
-  private draw(lights: Vectors[], name: string): Picture {
+  private draw(parts: (keyof Light)[], quads: number, name: string): Picture {
     const { options, whose, holds } = this,
       { layout, transfer, channels, receiversOf, rows = 1 } = options,
-      { quads } = layout;
+      values = parts.map(() => vectors(quads)),
+      lights = values.map((of): Vectors => uniformArray<'vec4'>(of, 'vec4'));
     const exit = Fn(() => {
       const [r, row] = pick(options, whose);
       const x = r.bitAnd(layout.columns - 1).mul(layout.texels),
@@ -144,26 +176,54 @@ export class Sum implements NodeSum {
       generateMipmaps: false,
       autoUpdate: false,
     });
-    // For every picture that is asked for, not only once between two of the screen's.
-    made.updateBeforeType = 'render';
     made.name = name;
+    const main = made.renderTarget!,
+      draw = made.updateBefore.bind(made);
+    this.mains.push(main);
+    // For every mesh: one that was turned looks at a picture of its own.
+    made.updateBeforeType = 'object';
+    made.updateBefore = (frame: NodeFrame): undefined => {
+      const turned = this.turnedOf(frame.object!),
+        light = turned?.light ?? this.light;
+      made.renderTarget = main;
+      if (parts.every((part) => light[part] === undefined)) return;
+      if (turned) {
+        made.renderTarget = turned.targets.get(made) ?? main.clone();
+        turned.targets.set(made, made.renderTarget);
+      }
+      if (this.shown.get(made.renderTarget) === light) return;
+      this.shown.set(made.renderTarget, light);
+      parts.forEach((part, i) => pack(values[i]!, light[part] ?? []));
+      made.textureNeedsUpdate = true;
+      draw(frame);
+    };
+    return made;
+  }
+
+  private turnedOf(object: Object3D): Turned | undefined {
+    const { light, options } = this,
+      turn = options.pose.turnOf(object);
+    if (!turn) return undefined;
+    const { how, made } = this.turned.get(object, turn.elements),
+      by = (of: ArrayLike<number>): Float64Array => lightFor(turn, of, options.order);
+    if (made.of === light && made.how === how) return made;
+    made.light = { rest: by(light.rest), peaks: light.peaks && by(light.peaks) };
+    made.how = how;
+    made.of = light;
     return made;
   }
 
   set(light: ArrayLike<number>, peaks: ArrayLike<number> | undefined, holds: boolean): void {
-    const { peakPicture } = this;
-    pack(this.light, light);
-    pack(this.peaks, peaks ?? []);
+    this.light = { rest: light, peaks };
     this.holds.value = peaks && holds ? 1 : 0;
     this.hasPeaks.value = peaks ? 1 : 0;
-    this.picture.textureNeedsUpdate = true;
-    if (!peakPicture || !peaks) return;
-    if (peakPicture.renderTarget!.width !== this.width || peakPicture.renderTarget!.height !== this.height)
-      peakPicture.setSize(this.width, this.height);
-    peakPicture.textureNeedsUpdate = true;
+    if (peaks) for (const main of this.mains) main.setSize(this.width, this.height);
   }
 
   dispose(): void {
+    for (const main of this.mains) main.dispose();
+    for (const { targets } of this.turned.all) for (const target of targets.values()) target.dispose();
+    this.turned.clear();
     this.picture.dispose();
     this.peakPicture?.dispose();
     this.whose?.dispose();

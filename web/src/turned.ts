@@ -1,6 +1,14 @@
 // Nodes that were turned since the bake: transfer is in the axes of the scene as it was baked, so that such a mesh
 // takes the light as it stands in its own. It has a sum of its own, of all receivers of the file.
-import { Matrix3, type BufferGeometry, type Mesh, type Object3D, type Texture, type WebGLRenderer } from 'three';
+import {
+  Matrix3,
+  Matrix4,
+  type BufferGeometry,
+  type Mesh,
+  type Object3D,
+  type Texture,
+  type WebGLRenderer,
+} from 'three';
 import { orthogonalPart } from './lobes.js';
 import { makeShRotation, rotateSh } from './sh_rotation.js';
 import { shCount } from './sh.js';
@@ -8,6 +16,7 @@ import { shCount } from './sh.js';
 /** How meshes stood when they were baked: as they do on loading. Skins are not known. */
 export class RestPose {
   private readonly inverse = new WeakMap<BufferGeometry, Matrix3>();
+  private readonly whole = new WeakMap<BufferGeometry, Matrix4>();
   private readonly linear = new Matrix3();
 
   constructor(meshes: readonly Mesh[]) {
@@ -15,7 +24,9 @@ export class RestPose {
       if ('isSkinnedMesh' in mesh) continue;
       mesh.updateWorldMatrix(true, false);
       const rest = new Matrix3().setFromMatrix4(mesh.matrixWorld);
-      if (rest.determinant() !== 0) this.inverse.set(mesh.geometry, rest.invert());
+      if (rest.determinant() === 0) continue;
+      this.inverse.set(mesh.geometry, rest.invert());
+      this.whole.set(mesh.geometry, mesh.matrixWorld.clone());
     }
   }
 
@@ -26,6 +37,52 @@ export class RestPose {
     const turn = orthogonalPart(this.linear.setFromMatrix4(object.matrixWorld).multiply(rest));
     const isTurned = turn.elements.some((v, i) => Math.abs(v - (i % 4 === 0 ? 1 : 0)) > 1e-5);
     return isTurned ? turn : undefined;
+  }
+
+  /** From the world as it is now to where a mesh, or a clone of it, was baked; undefined where it stands there. */
+  placeOf(object: Object3D): Matrix4 | undefined {
+    const rest = this.whole.get((object as Mesh).geometry);
+    if (!rest || object.matrixWorld.equals(rest)) return undefined;
+    return object.matrixWorld.clone().invert().premultiply(rest);
+  }
+}
+
+interface Group<E> {
+  how: readonly number[];
+  made: E;
+  meshes: number;
+}
+
+/** Something for meshes that stand alike: once for all that were turned or moved as one. */
+export class Alike<E> {
+  private readonly groups: Group<E>[] = [];
+  private readonly of = new WeakMap<Object3D, Group<E>>();
+
+  constructor(private readonly make: () => E) {}
+
+  /** That of a mesh which stands as these numbers say; `how` is another array where they are not as they were. */
+  get(object: Object3D, how: readonly number[]): Readonly<Group<E>> {
+    const own = this.of.get(object),
+      isAlike = (group: Group<E>): boolean =>
+        group.how.length === how.length && group.how.every((v, i) => Math.abs(v - how[i]!) < 1e-6);
+    if (own && isAlike(own)) return own;
+    if (own) --own.meshes;
+    let group = this.groups.find((g) => g.meshes > 0 && isAlike(g));
+    if (!group) {
+      group = this.groups.find((g) => g.meshes === 0);
+      if (!group) this.groups.push((group = { how, made: this.make(), meshes: 0 }));
+      group.how = how;
+    }
+    ++group.meshes;
+    this.of.set(object, group);
+    return group;
+  }
+
+  get all(): E[] {
+    return this.groups.map(({ made }) => made);
+  }
+  clear(): void {
+    this.groups.length = 0;
   }
 }
 
@@ -63,15 +120,16 @@ export class TurnedSums<S extends Sums> {
   /** From the world into the axes that were baked. */
   readonly turnBack = { value: new Matrix3() };
   private light: Light | undefined;
-  private readonly turned = new Map<Object3D, { sums: S; turn: Matrix3; of: Light | undefined }>();
+  private readonly turned: Alike<{ sums: S; how: readonly number[]; of: Light | undefined }>;
 
   /** `order` of the light's harmonics. */
   constructor(
-    private readonly make: () => S,
+    make: () => S,
     private readonly order: number,
     private readonly pose?: RestPose,
   ) {
     this.main = make();
+    this.turned = new Alike(() => ({ sums: make(), how: [], of: undefined }));
     this.rest = { value: this.main.pictures.rest };
     this.peaks = { value: this.main.pictures.peaks };
   }
@@ -91,7 +149,7 @@ export class TurnedSums<S extends Sums> {
       sums = turn ? this.sumsFor(object, turn) : this.main;
     sums.update(renderer);
     const { rest, peaks } = sums.pictures,
-      back = turn ? turn.transpose() : upright;
+      back = turn ? turn.clone().transpose() : upright;
     if (this.rest.value === rest && this.peaks.value === peaks && this.turnBack.value.equals(back)) return;
     this.rest.value = rest;
     this.peaks.value = peaks;
@@ -100,20 +158,19 @@ export class TurnedSums<S extends Sums> {
   }
 
   private sumsFor(object: Object3D, turn: Matrix3): S {
-    const { light, order } = this;
-    let entry = this.turned.get(object);
-    if (!entry) this.turned.set(object, (entry = { sums: this.make(), turn: upright, of: undefined }));
-    if (light && (entry.of !== light || !entry.turn.equals(turn))) {
-      entry.sums.set(lightFor(turn, light.rest, order), light.peaks && lightFor(turn, light.peaks, order));
-      entry.turn = turn.clone();
-      entry.of = light;
+    const { light, order } = this,
+      { how, made } = this.turned.get(object, turn.elements);
+    if (light && (made.of !== light || made.how !== how)) {
+      made.sums.set(lightFor(turn, light.rest, order), light.peaks && lightFor(turn, light.peaks, order));
+      made.how = how;
+      made.of = light;
     }
-    return entry.sums;
+    return made.sums;
   }
 
   dispose(): void {
     this.main.dispose();
-    for (const { sums } of this.turned.values()) sums.dispose();
+    for (const { sums } of this.turned.all) sums.dispose();
     this.turned.clear();
   }
 }

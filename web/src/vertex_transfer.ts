@@ -174,10 +174,10 @@ export class VertexTransfer implements BakedTransfer {
     const summing = { layout, transfer: this.texture, channels: header.channels, receivers: header.receivers };
     if (shader.summed) {
       this.summing = summing;
-      this.sums = new TurnedSums(() => new VertexSums(summing), header.order, new RestPose(meshes));
-    }
-    if (nodes && shader.summed) this.sum = nodes.sum(summing);
-    else if (lobeCount !== undefined)
+      const pose = new RestPose(meshes);
+      this.sums = new TurnedSums(() => new VertexSums(summing), header.order, pose);
+      this.sum = nodes?.sum({ ...summing, order: header.order, pose });
+    } else if (lobeCount !== undefined)
       this.lobes = nodes?.lobes({
         ...{ layout, transfer: this.texture, order: header.order, channels: header.channels, lobes: lobeCount },
         ...(last && { last }),

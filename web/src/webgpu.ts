@@ -57,7 +57,7 @@ export const nodes: NodeEdition = {
   sum: (options) => new Sum(options),
   blocks: (options) => new BlockNodes(options),
   lobes: (options) => new LobeNodes(options),
-  reflection: (sum, last, twoSided) => glossy(last, readRows(sum as Sum), twoSided),
+  reflection: (sum, last, twoSided) => glossy(last, readRows(sum as Sum), twoSided, (sum as Sum).turn),
 
   atVertices(sum: NodeSum, twoSided: boolean): Node<'vec4'> {
     const { picture, made } = sum as Sum,

@@ -1,10 +1,11 @@
 import { readFileSync } from 'node:fs';
 import { fileURLToPath } from 'node:url';
+import { Matrix3, Vector3 } from 'three';
 import { describe, expect, it } from 'vitest';
 import { BlockLight, cardinalFunctions, widestBlock } from '../src/block_light.ts';
 import { checkRecords, recordBegins } from '../src/block_records.ts';
 import { samplesOf } from '../src/block_reflection.ts';
-import { cubeBlocks, cubeDirection, cubeLight, cubeTexel, reducedMap } from '../src/cube.ts';
+import { cubeBlocks, cubeDirection, cubeLight, cubeTexel, reducedMap, type CubeLight } from '../src/cube.ts';
 import { Lighting } from '../src/index.ts';
 import { formatReflection, parseReflection } from '../page/surface.ts';
 import { texelSolidAngle } from '../src/projection.ts';
@@ -60,6 +61,25 @@ describe('light on a cube', () => {
       ),
       along = [0, 1, 2].reduce((sum, k) => sum + moment[k]! * sun[k]!, 0);
     expect(1 - along / Math.hypot(...moment)).toBeLessThan(1e-6);
+  });
+
+  it('of what was turned is as it was, turned back', () => {
+    const lighting = new Lighting([1, 1, 1, 0.3, 0.2, 0.1, -0.2, 0.1, 0.3, 0.5, 0.4, 0.2]),
+      turn = new Matrix3().set(...(skew as Parameters<Matrix3['set']>));
+    lighting.rotation.set(0.5, 0.1, -0.7, 0.5);
+    const light = lighting.cubes(32),
+      momentOf = ({ energy, direction }: CubeLight): Vector3[] =>
+        [0, 1, 2].map((c) => {
+          const sum = new Vector3();
+          for (let i = 0; i < energy.length; i += 3)
+            sum.addScaledVector(new Vector3().fromArray(direction, i), energy[i + c]!);
+          return sum;
+        }),
+      now = momentOf(light());
+    momentOf(light(turn)).forEach((m, c) => {
+      expect(m.distanceTo(now[c]!) / m.length()).toBeGreaterThan(0.1);
+      expect(m.applyMatrix3(turn).distanceTo(now[c]!) / m.length()).toBeLessThan(1e-3);
+    });
   });
 
   it('of coefficients is the radiance that they add up to', () => {
