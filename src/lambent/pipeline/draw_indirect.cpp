@@ -110,8 +110,9 @@ void light_surfels(IndirectDrawing& d, DirectionalKind directional, bool first) 
   if (d.request.frame_bounces == 0) solve_indirect(d.transfer, d.solve, d.direct, 1e-3, 64, !first);
   else if (first) std::fill(d.solve.x.begin(), d.solve.x.end(), Vec3(0.0f));
   for (int k = 0; k < d.request.frame_bounces; ++k) step_indirect(d.transfer, d.solve, d.direct);
-  part_near_light(d);
   d.solve_seconds = std::min(d.solve_seconds, seconds_since(start)), start = Clock::now();
+  part_near_light(d);
+  d.near_seconds = std::min(d.near_seconds, seconds_since(start)), start = Clock::now();
   read_receivers(d, directional);
   d.read_seconds = std::min(d.read_seconds, seconds_since(start));
 }
@@ -368,17 +369,13 @@ Result<Drawing> draw_indirect(const Baked& baked, const DrawRequest& request, co
     drawing.frames.push_back(std::move(*image));
   }
   const size_t receivers = d.transfer.receivers;
-  drawing.summary.json = {{"receivers", receivers},
-                          {"surfels", d.transfer.surfels.count()},
-                          {"frames", drawing.frames.size()},
-                          {"bounces", d.solve.bounces},
-                          {"lamps_evaluated", d.evaluated},
-                          {"leaves_lit", d.leaves_lit},
-                          {"residual", d.solve.residual},
-                          {"shadow_ray_seconds", d.ray_seconds},
-                          {"solve_seconds", d.solve_seconds},
-                          {"read_seconds", d.read_seconds},
-                          {"relight_seconds", d.ray_seconds + d.solve_seconds + d.read_seconds}};
+  drawing.summary.json = {
+      {"receivers", receivers},           {"surfels", d.transfer.surfels.count()},
+      {"frames", drawing.frames.size()},  {"bounces", d.solve.bounces},
+      {"lamps_evaluated", d.evaluated},   {"leaves_lit", d.leaves_lit},
+      {"residual", d.solve.residual},     {"shadow_ray_seconds", d.ray_seconds},
+      {"solve_seconds", d.solve_seconds}, {"read_seconds", d.read_seconds},
+      {"near_seconds", d.near_seconds},   {"relight_seconds", d.ray_seconds + d.solve_seconds + d.read_seconds}};
   drawing.summary.lines.emplace_back(
       "relit",
       fmt::format("shadow rays of {} surfels in {:.2f} ms, {} bounces in {:.2f} ms, {} receivers read in {:.2f} "

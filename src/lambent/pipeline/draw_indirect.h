@@ -96,7 +96,7 @@ struct IndirectDrawing {
   Relit relit{};               // at receivers, where they are read
   ObjectsInScene objects{};
   size_t evaluated = 0, leaves_lit = 0;  // lamps, and leaves by all of them, in the last frame
-  double ray_seconds = 1e9, solve_seconds = 1e9, read_seconds = 1e9;
+  double ray_seconds = 1e9, solve_seconds = 1e9, read_seconds = 1e9, near_seconds = 1e9;
 
   // What is seen.
   const Scene& drawn() const { return objects.tracer ? objects.scene : scene; }
