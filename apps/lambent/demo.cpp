@@ -162,7 +162,7 @@ int run_demo(Context& context, const DemoCommand& o) {
   if (!std::filesystem::is_directory(o.folder)) return fail({o.folder, "cannot be made: " + status.message()});
   auto at = [&](const std::string& name) { return o.at(name); };
 
-  constexpr double error = 0.025;  // as --quality good
+  constexpr double error = 0.01;  // as --quality final
   Scene scene = make_courtyard(o.detail);
   if (auto split = adapt(scene, {.error = 0.8 * error}, &context.progress); !split) return fail(split.error());
   auto tracer = Tracer::build(scene);
