@@ -30,6 +30,11 @@ bool StillLight::shines() const {
   return std::any_of(scales.begin(), scales.end(), [](Vec3 s) { return largest(s) > 0; });
 }
 
+Vec3 StillLight::scale_of(const std::string& name) const {
+  const auto group = std::find(lamps.names.begin(), lamps.names.end(), name);
+  return group == lamps.names.end() ? Vec3(1.0f) : scales[size_t(group - lamps.names.begin())];
+}
+
 IndirectQuality quality_of(const DrawRequest& request) {
   IndirectQuality quality;
   quality.near_samples = request.near_rays;
@@ -304,13 +309,8 @@ Result<void> read_lamps(IndirectDrawing& d) {
 
 Scene scene_with_lamps(const IndirectDrawing& d) {
   Scene scene = d.scene;
-  const std::vector<std::string>& names = d.still.lamps.names;
-  const auto scale = [&](const std::string& name) {
-    const auto group = std::find(names.begin(), names.end(), name);
-    return group == names.end() ? Vec3(1.0f) : d.still.scales[size_t(group - names.begin())];
-  };
-  for (Material& m : scene.materials) m.emissive = scale(m.name) * m.emissive;
-  for (PunctualLight& l : scene.lights) l.intensity = scale(l.name) * l.intensity;
+  for (Material& m : scene.materials) m.emissive = d.still.scale_of(m.name) * m.emissive;
+  for (PunctualLight& l : scene.lights) l.intensity = d.still.scale_of(l.name) * l.intensity;
   add_lamps(scene, d.lamps);
   return scene;
 }
@@ -338,6 +338,8 @@ Result<Drawing> draw_indirect(const Baked& baked, const DrawRequest& request, co
   std::vector<Vec3> albedos = d.transfer.surfels.albedos;
   if (auto ok = repaint(request, d.scene, d.transfer.surfels, albedos); !ok) return ok.error();
   if (auto ok = make_places(d); !ok) return ok.error();
+  if (d.tracer.lets_pass() && request.near_rays != DrawRequest().near_rays)
+    job.warn("--near-rays is left aside: the scene lets light pass, and all bounces are read off surfels");
   const size_t leaves = d.transfer.surfels.count();
   {
     ProgressStage stage(job.progress, "lighting", leaves);

@@ -37,6 +37,7 @@ struct StillLight {
   std::vector<Vec3> scales{};                       // by group
   std::vector<std::vector<LampLight>> at_leaves{};  // direct, a sum for each group that arrives
   bool shines() const;
+  Vec3 scale_of(const std::string& name) const;  // of the group of that name; 1 if there is none
 };
 
 // A lamp that moves, and what it gave leaves where it stood last.

@@ -11,7 +11,6 @@
 #include <algorithm>
 #include <array>
 #include <cmath>
-#include <string>
 #include <utility>
 #include <vector>
 
@@ -157,21 +156,14 @@ Vec3 gather(const IndirectDrawing& d, const NearLamp& near, Vec3 origin, Vec3 no
   return sum;
 }
 
-}  // namespace
-
-namespace {
-
 // The scene's own lights that stand somewhere, as they are scaled.
 std::vector<MovingLamp> own_lamps(const IndirectDrawing& d) {
   std::vector<MovingLamp> out;
-  const std::vector<std::string>& names = d.still.lamps.names;
   for (const PunctualLight& light : d.scene.lights) {
     if (light.kind == PunctualLight::Kind::directional) continue;
-    const auto group = std::find(names.begin(), names.end(), light.name);
-    const Vec3 scale = group == names.end() ? Vec3(1.0f) : d.still.scales[size_t(group - names.begin())];
     MovingLamp lamp;
     lamp.kind = light.kind == PunctualLight::Kind::spot ? MovingLamp::Kind::spot : MovingLamp::Kind::point;
-    lamp.light = light, lamp.light.intensity = scale * light.intensity;
+    lamp.light = light, lamp.light.intensity = d.still.scale_of(light.name) * light.intensity;
     if (largest(lamp.light.intensity) > 0) out.push_back(lamp);
   }
   return out;
