@@ -5,6 +5,8 @@
 #include <CLI/CLI.hpp>
 
 #include <functional>
+#include <map>
+#include <string>
 
 namespace lambent::tool {
 
@@ -46,6 +48,12 @@ void add_table(CLI::App& command, std::span<const Option<R>> table, R& request, 
         o.member);
     option->each([&given, key = json_name(o.name)](const std::string&) { given.insert(key); });
   }
+}
+
+// An option of the command in seconds may be said with a unit: 90, 90s, 1.5min, 2h.
+inline void takes_units_of_time(CLI::App& command, const std::string& name) {
+  const std::map<std::string, double> units{{"s", 1}, {"min", 60}, {"m", 60}, {"h", 3600}};
+  command.get_option(name)->transform(CLI::AsNumberWithUnit(units, CLI::AsNumberWithUnit::CASE_INSENSITIVE, "TIME"));
 }
 
 }  // namespace lambent::tool

@@ -18,6 +18,9 @@
 namespace lambent {
 namespace {
 
+using Clock = std::chrono::steady_clock;
+double seconds_since(Clock::time_point start) { return std::chrono::duration<double>(Clock::now() - start).count(); }
+
 constexpr int most_levels = 10;
 constexpr size_t pilot = 16;  // one edge in so many says whether the rest is worth a look
 constexpr size_t noise_places = 256;
@@ -66,6 +69,13 @@ struct Adapter {
   std::vector<float> rows{};                       // [place][width]
   std::unordered_map<uint64_t, float> settled{};   // edge and side -> squared difference
   double noise = 0;                                // squared, of a row
+  const Clock::time_point start = Clock::now();
+
+  // Whether what takes so many seconds more would end too late. As the first of the ranks sees it.
+  bool late(double more) {
+    report.late = this_ranks().from_first(options.seconds >= 0 && seconds_since(start) + more > options.seconds);
+    return report.late;
+  }
 
   struct Place {
     Vec3 origin, normal;
@@ -220,7 +230,9 @@ struct Adapter {
     if (edges.empty()) return wanted;
     std::vector<Edge> some;
     for (size_t i = 0; i < edges.size(); i += pilot) some.push_back(edges[i]);
+    const auto look = Clock::now();
     if (auto ok = test(receivers, some); !ok) return ok.error();
+    const double took = seconds_since(look);
     auto relative = [&](const std::vector<Edge>& of) -> Result<double> {
       auto row = rows_of(receivers, of);
       if (!row) return row.error();
@@ -231,6 +243,11 @@ struct Adapter {
     };
     auto error = relative(some);
     if (!error) return error.error();
+    if (*error > 0.7 * options.error && late(took * (pilot - 1))) {
+      if (report.first < 0) report.first = *error;
+      report.last = *error;
+      return wanted;
+    }
     if (*error > 0.7 * options.error) {
       if (auto ok = test(receivers, edges); !ok) return ok.error();
       error = relative(edges);
@@ -294,6 +311,7 @@ struct Adapter {
     if (!built) return built.error();
     tracer = std::move(*built), first = make_vertex_receivers(original);
     for (; report.levels < most_levels; ++report.levels) {
+      if (report.levels > 0 && late(0)) return {};
       const Receivers receivers = make_vertex_receivers(scene);
       auto wanted = choose(receivers);
       if (!wanted) return wanted.error();
@@ -312,13 +330,13 @@ struct Adapter {
 }  // namespace
 
 Result<AdaptReport> adapt(Scene& scene, const AdaptOptions& options, Progress* progress) {
-  const auto start = std::chrono::steady_clock::now();
+  const auto start = Clock::now();
   AdaptReport report;
   report.before = scene.triangles.size();
   Adapter adapter{scene, options, progress, report};
   if (auto ok = adapter.run(); !ok) return ok.error();
   report.after = scene.triangles.size();
-  report.seconds = std::chrono::duration<double>(std::chrono::steady_clock::now() - start).count();
+  report.seconds = seconds_since(start);
   return report;
 }
 

@@ -17,6 +17,7 @@ struct AdaptOptions {
   int order = 4;               // of the harmonics that are looked at: bands above have more noise and less light
   int samples = 128;           // rays a place
   uint32_t seed = 1;
+  double seconds = -1;  // no look is begun that would end later; negative: no limit
 };
 // What it says of itself.
 struct AdaptReport {
@@ -24,13 +25,14 @@ struct AdaptReport {
   size_t rays = 0;
   int levels = 0;
   bool limited = false;          // more triangles were wanted than the options allow
+  bool late = false;             // or more time
   double first = -1, last = -1;  // relative RMS error of interpolation at the edges' middles, before and after
   double seconds = 0;
 };
 
 // Splits edges at their middle, in both triangles alike, level by level: those whose middle differs most from the mean
-// of its ends, in direct transfer, weighed by area, until what is left is below the error or no edge is long enough.
-// Normals, colours and coordinates are interpolated. Errors: cancelled; out of memory.
+// of its ends, in direct transfer, weighed by area, until what is left is below the error, no edge is long enough or
+// time is up. Normals, colours and coordinates are interpolated. Errors: cancelled; out of memory.
 Result<AdaptReport> adapt(Scene& scene, const AdaptOptions& options, Progress* progress = nullptr);
 
 }  // namespace lambent

@@ -108,6 +108,15 @@ TEST(Adapt, EndsOnWhatCannotBeMet) {
   Scene slivers = make_quad(Vec3(0), Vec3(0, 0, 1e-3f), Vec3(100, 0, 0), 1, 4000, Vec3(0.5f));
   EXPECT_TRUE(adapt(slivers, {.samples = 16}));
   EXPECT_LE(slivers.triangles.size(), 160'000u);
+  // Where time is up, a look at a sixteenth of the edges is all.
+  Scene heap = heap_of_needles(500), same = heap;
+  auto late = adapt(heap, {.samples = 16, .seconds = 0}), whole = adapt(same, {.samples = 16});
+  ASSERT_TRUE(late && whole);
+  EXPECT_TRUE(late->late);
+  EXPECT_EQ(late->levels, 0);
+  EXPECT_GT(late->first, 0.05);
+  EXPECT_LT(4 * late->rays, whole->rays);
+  EXPECT_FALSE(whole->late);
   Progress progress;
   progress.cancel();
   Scene scene = shadowed_floor();

@@ -70,6 +70,7 @@ Result<void> bake_diffuse(Bake& b) {
   if (!b.request.rooms.empty()) return bake_by_rooms(b);
   if (b.request.subsurface.empty()) {
     BakeOptions options = b.plan.bake;
+    if (b.adapted && options.seconds >= 0) options.seconds = std::max(0.0, options.seconds - b.adapted->seconds);
     const BakeRequest& r = b.request;
     options.own_part = b.plan.kind == BakeKind::diffuse && r.compress.empty() && r.fix_light.empty() &&
                        r.fix_view.empty() && r.lattice.empty();
@@ -310,11 +311,13 @@ void summarize_error(Bake& b) {
                                {"rays", a.rays},
                                {"first", a.first},
                                {"last", a.last},
-                               {"limited", a.limited}};
+                               {"limited", a.limited},
+                               {"late", a.late}};
     b.summary.json["seconds"]["adapt"] = a.seconds;
-    if (a.after > a.before)
+    const char* ended = a.limited ? ", as many as --quality allows" : a.late ? ", as long as --time allows" : "";
+    if (a.after > a.before || a.late)
       b.line("mesh", fmt::format("{} triangles from {}, split where light changes{}", human_count(a.after),
-                                 human_count(a.before), a.limited ? ", as many as --quality allows" : ""));
+                                 human_count(a.before), ended));
   }
   if (c.error < 0) {
     if (r.error >= 0) b.line("error", fmt::format("{:.2f}% RMS, estimated from half-sample gathers", 100 * r.error));

@@ -192,6 +192,7 @@ Result<void> plan_error(const BakeRequest& r, BakePlan& plan) {
       r.adapt != "off")
     plan.bake.thin = fewest_traced;
   plan.adapt.error = 0.8 * error, plan.adapt.shortest = q.shortest, plan.adapt.seed = r.seed;
+  if (r.time >= 0) plan.adapt.seconds = 0.4 * r.time;  // the rest is for the bake
   plan.most_texels = q.texels;
   plan.adapt.more = q.triangles_more, plan.adapt.triangles = q.triangles;
   return {};

@@ -77,8 +77,9 @@ const Option<R> table[] = {
     {"error", &R::error, "How well", D | L,
      "Bake to this relative RMS error, e.g. 2%, measured on rays and places of their own; says what it reached"},
     {"time", &R::time, "How well", D | L,
-     "Seconds after which no more rays are asked for, whatever the error; the result then depends on the machine", 0,
-     1e6},
+     "Seconds (or 90s, 2min, 1h) after which no more rays are asked for, whatever the error; the result then depends "
+     "on the machine",
+     0, 1e6},
     {"adapt", &R::adapt, "How well", D,
      "Receivers where light changes: split edges, and, in a bake to an error, trace no receivers that others can stand "
      "for; auto splits scenes without bones, where neither --samples nor --max-edge is given",

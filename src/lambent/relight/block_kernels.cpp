@@ -201,6 +201,14 @@ HWY_INLINE void AddTexels(TexelSums<count>& sums, const float* light, const Seen
   }
 }
 
+// The same of s_k between its values at side x side nodes, those of a term `stride` apart.
+template <int side, int count>
+HWY_NOINLINE void AddBetween(TexelSums<count>& sums, const float* light, const Seen& seen, Vec3 n, const float* nodes,
+                             int stride, const Cube& cube, float* along) {
+  constexpr size_t grid = side == 2 ? 1 : side == 4 ? 2 : 3;
+  AddTexels(sums, light, &seen, n, Interpolate<count, side>(nodes, stride, cube.cardinal[grid].data(), along));
+}
+
 // Blocks that the lobe reaches, of those that are seen; and the lobe at their middles.
 template <class Lobe>
 void FindLit(const Lobe& lobe, BlockScratch& s, const Cube& cube, const ProductMaterial& m) {
@@ -228,8 +236,8 @@ void FindLit(const Lobe& lobe, BlockScratch& s, const Cube& cube, const ProductM
 
 // Samples by class of a block that is lit, 1 to 5, with the lobe at its nodes where values were asked.
 template <class Lobe>
-HWY_INLINE int ClassOf(const Lobe& lobe, BlockScratch& s, const BlockLight& light, const ProductMaterial& m, Vec3 n,
-                       size_t b, bool clear, Known& known) {
+HWY_NOINLINE int ClassOf(const Lobe& lobe, BlockScratch& s, const BlockLight& light, const ProductMaterial& m, Vec3 n,
+                         size_t b, bool clear, Known& known) {
   constexpr bool phong = std::is_same_v<Lobe, PhongLobe>;
   const Cube& cube = *light.cube;
   const size_t stride = cube.nodes[0].x.size();
@@ -240,11 +248,11 @@ HWY_INLINE int ClassOf(const Lobe& lobe, BlockScratch& s, const BlockLight& ligh
   // Nodes below the horizon say nothing about the block's part above it.
   if (height <= 0 || (cut && samples > 1)) return s.most_class;
   if (m.by_values && samples < all_classes) {
-    AtNodes<16>(lobe, cube.nodes[2], b, s.nodes), known.nodes = true;
+    AtNodes(lobe, 16, cube.nodes[2], b, s.nodes), known.nodes = true;
     if (samples < 4) samples = ClassByValues<Lobe::count>(s.colour_weights, m, light, s.nodes, &s.middles[b], stride);
     if (cut && samples > 1) samples = all_classes;
     if (samples == 4 && !light.sharp[b] && s.most_class >= 4) {
-      AtNodes<64>(lobe, cube.nodes[3], b, s.fine), known.fine = true;
+      AtNodes(lobe, 64, cube.nodes[3], b, s.fine), known.fine = true;
       if (!IsFineEnough<Lobe::count>(s.colour_weights, m, light, s.fine, s.nodes)) samples = all_classes;
     }
   }
@@ -309,17 +317,12 @@ void AddLitBlock(const Lobe& lobe, BlockScratch& s, const BlockLight& light, con
   Seen seen;
   if (changes) ReadTexels(*changes, scale, s.weights, seen);
   const float* texels = light.texels.data() + b * 6 * block_texels;
-  auto interpolate = [&](auto side) HWY_ATTR {
-    AddTexels(
-        sums.texels, texels, &seen, n,
-        Interpolate<count, decltype(side)::value>(nodes, samples == 4 ? 64 : 16, cube.cardinal[grid].data(), s.along));
-  };
-  if (samples == 2) interpolate(std::integral_constant<int, 2>());
-  else if (samples == 3) interpolate(std::integral_constant<int, 4>());
-  else if (samples == 4) interpolate(std::integral_constant<int, 8>());
-  else
+  if (samples == all_classes)
     AddTexels(sums.texels, texels, changes ? &seen : nullptr, n,
               [&](size_t, size_t, V x, V y, V z, V* out) HWY_ATTR { lobe(x, y, z, out); });
+  else if (samples == 2) AddBetween<2>(sums.texels, texels, seen, n, nodes, 16, cube, s.along);
+  else if (samples == 3) AddBetween<4>(sums.texels, texels, seen, n, nodes, 16, cube, s.along);
+  else AddBetween<8>(sums.texels, texels, seen, n, nodes, 64, cube, s.along);
 }
 
 // What BRDFs took of that, done once more.

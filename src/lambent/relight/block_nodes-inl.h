@@ -18,9 +18,12 @@ namespace HWY_NAMESPACE {
 // Of the tolerance, what values at 64 nodes may miss at the places that are looked at.
 constexpr float fine_share = 0.5f;
 
-// s_k at 16 or 64 nodes of a block, [k][nodes].
-template <size_t nodes, class Lobe>
-HWY_INLINE void AtNodes(const Lobe& lobe, const float* x, const float* y, const float* z, float* out) {
+// What follows is called and not inlined: a block takes hundreds of nanoseconds, and the copies of eight lobes, five
+// targets and as many callers take the compiler minutes.
+
+// s_k at `nodes` (16 or 64) nodes of a block, [k][nodes].
+template <class Lobe>
+HWY_NOINLINE void AtNodes(const Lobe& lobe, size_t nodes, const float* x, const float* y, const float* z, float* out) {
   const F d;
   for (size_t i = 0; i < nodes; i += lanes) {
     V s[Lobe::count];
@@ -28,22 +31,22 @@ HWY_INLINE void AtNodes(const Lobe& lobe, const float* x, const float* y, const 
     for (size_t k = 0; k < size_t(Lobe::count); ++k) hn::Store(s[k], d, out + nodes * k + i);
   }
 }
-template <size_t nodes, class Lobe>
-HWY_INLINE void AtNodes(const Lobe& lobe, const DirectionArray& at, size_t b, float* out) {
-  AtNodes<nodes>(lobe, &at.x[nodes * b], &at.y[nodes * b], &at.z[nodes * b], out);
+template <class Lobe>
+void AtNodes(const Lobe& lobe, size_t nodes, const DirectionArray& at, size_t b, float* out) {
+  AtNodes(lobe, nodes, &at.x[nodes * b], &at.y[nodes * b], &at.z[nodes * b], out);
 }
 
 // The same of the 4 or 16 nodes of a block's class, those of 4 and others.
 template <class Lobe>
-HWY_INLINE void AtBlockNodes(const Lobe& lobe, const Cube& cube, int samples, size_t b, float* out) {
+void AtBlockNodes(const Lobe& lobe, const Cube& cube, int samples, size_t b, float* out) {
   const DirectionArray& nodes = cube.nodes[size_t(samples - 1)];
-  if (samples == 3) return AtNodes<16>(lobe, nodes, b, out);
+  if (samples == 3) return AtNodes(lobe, 16, nodes, b, out);
   alignas(64) float at[3][16];
   for (size_t i = 0; i < 16; ++i) {
     const size_t j = 4 * b + std::min<size_t>(i, 3);
     at[0][i] = nodes.x[j], at[1][i] = nodes.y[j], at[2][i] = nodes.z[j];
   }
-  AtNodes<16>(lobe, at[0], at[1], at[2], out);
+  AtNodes(lobe, 16, at[0], at[1], at[2], out);
 }
 
 // Nodes of a block at which the lobe is known.
@@ -53,16 +56,16 @@ struct Known {
 
 // The lobe at the nodes of a block's class, where that has any and they are not known.
 template <class Lobe>
-HWY_INLINE void AtKnownNodes(const Lobe& lobe, BlockScratch& s, const Cube& cube, int samples, size_t b, Known known) {
-  if (samples == 4 && !known.fine) AtNodes<64>(lobe, cube.nodes[3], b, s.fine);
+void AtKnownNodes(const Lobe& lobe, BlockScratch& s, const Cube& cube, int samples, size_t b, Known known) {
+  if (samples == 4 && !known.fine) AtNodes(lobe, 64, cube.nodes[3], b, s.fine);
   if ((samples == 2 || samples == 3) && !(known.nodes && samples == 3)) AtBlockNodes(lobe, cube, samples, b, s.nodes);
 }
 
 // How many samples a lobe of which values alone are known wants of a block (1: one, 3: 16, 4: more), from those at 16
 // nodes and at its middle: one where they are alike, 16 where those give the middle's value back.
 template <int count>
-HWY_INLINE int ClassByValues(const float* weights, const ProductMaterial& m, const BlockLight& light,
-                             const float* nodes, const float* middle, size_t stride) {
+HWY_NOINLINE int ClassByValues(const float* weights, const ProductMaterial& m, const BlockLight& light,
+                               const float* nodes, const float* middle, size_t stride) {
   const F d;
   auto value_at = [&](size_t i) HWY_ATTR {
     V value = hn::Mul(Fill(weights[0]), hn::Load(d, nodes + i));
@@ -89,8 +92,8 @@ HWY_INLINE int ClassByValues(const float* weights, const ProductMaterial& m, con
 
 // Whether values at 64 nodes give back those at the 16, which lie between them.
 template <int count>
-HWY_INLINE bool IsFineEnough(const float* weights, const ProductMaterial& m, const BlockLight& light, const float* fine,
-                             const float* nodes) {
+HWY_NOINLINE bool IsFineEnough(const float* weights, const ProductMaterial& m, const BlockLight& light,
+                               const float* fine, const float* nodes) {
   const F d;
   V most = hn::Zero(d);
   for (size_t i = 0; i < 16; i += lanes) {
