@@ -111,7 +111,7 @@ interface Description {
 }
 
 function readDescription(given: unknown): Description {
-  const of = given as Record<string, unknown>,
+  const of = (typeof given === 'object' && given !== null ? given : {}) as Record<string, unknown>,
     { form, byteLength, rows = 0, groups = 1, columns = 1, step = 1 } = of;
   if (typeof form !== 'string' || typeof step !== 'number' || !Number.isFinite(step)) fail();
   if (!isIndex(byteLength, most) || !isIndex(rows, most) || !isIndex(groups, 4096) || !isIndex(columns, 1024))

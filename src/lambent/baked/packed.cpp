@@ -7,6 +7,7 @@
 #include <lambent/core/huffman.h>
 
 #include <algorithm>
+#include <cfloat>
 #include <cmath>
 #include <cstring>
 #include <optional>
@@ -160,7 +161,8 @@ struct Layout {
 struct PackedTransfer : PackedView {
   float error = 0;
 };
-PackedTransfer pack_transfer(std::span<const uint8_t> bytes, const Layout& l, float error) {
+// None where a value is no number.
+std::optional<PackedTransfer> pack_transfer(std::span<const uint8_t> bytes, const Layout& l, float error) {
   const size_t width = l.groups * l.columns;
   std::vector<float> values(l.receivers * width);
   double squares = 0;
@@ -173,12 +175,13 @@ PackedTransfer pack_transfer(std::span<const uint8_t> bytes, const Layout& l, fl
         std::memcpy(&bits, bytes.data() + 2 * at, 2);
         value = half_to_float(bits);
       } else std::memcpy(&value, bytes.data() + 4 * at, 4);
+      if (!std::isfinite(value)) return std::nullopt;
       values[r * width + k] = value;
       squares += double(value) * value;
     }
   // What is rounded to a step is off by its square root of a twelfth.
   const double rms = std::sqrt(squares / double(std::max<size_t>(values.size(), 1)));
-  const float step = rms > 0 ? float(error * std::sqrt(12.0) * rms) : 1;
+  const float step = rms > 0 ? std::max(float(error * std::sqrt(12.0) * rms), FLT_MIN) : 1;
   std::vector<int32_t> steps(values.size());
   double off = 0;
   for (size_t i = 0; i < values.size(); ++i) {
@@ -312,6 +315,7 @@ float default_packing_error(std::span<const uint8_t> bytes, const std::string& p
 }
 
 Result<PackedFile> pack_baked(std::span<const uint8_t> bytes, float error, const std::string& path) {
+  if (!(error >= 1e-5f && error <= 0.1f)) return Error{path, "--pack takes an error from 0.00001 to 0.1"};
   auto chunks = split_gltf(bytes, path);
   if (!chunks) return chunks.error();
   if (chunks->binary.empty()) return Error{path, "--pack takes a .glb"};
@@ -333,13 +337,19 @@ Result<PackedFile> pack_baked(std::span<const uint8_t> bytes, float error, const
   Bytes binary;
   for (size_t i = 0; i < held.size(); ++i) {
     json& view = document["bufferViews"][i];
-    const auto own = chunks->binary.subspan(view.value("byteOffset", size_t{0}), view["byteLength"].get<size_t>());
+    const size_t begin = view.value("byteOffset", size_t{0}), length = view["byteLength"].get<size_t>(),
+                 there = chunks->binary.size();
+    if (view.value("buffer", size_t{0}) != 0 || view.contains("extensions") || begin > there || length > there - begin)
+      return Error{path,
+                   "--pack takes a .glb whose buffer views lie in it as they are, and one is compressed or elsewhere"};
+    const auto own = chunks->binary.subspan(begin, length);
     std::optional<PackedView> packed;
     if (i == transfer_view) {
       if (own.size() != layout->size()) return Error{path, "holds transfer of another length than its header makes"};
-      PackedTransfer whole = pack_transfer(own, *layout, error);
-      out.error = whole.error;
-      packed = std::move(whole);
+      auto whole = pack_transfer(own, *layout, error);
+      if (!whole) return Error{path, "holds transfer that is not a finite number"};
+      if (whole->bytes.size() < own.size()) out.error = whole->error;
+      packed = std::move(*whole);
     } else packed = pack_view(own, held[i], step);
     binary.resize((binary.size() + 3) / 4 * 4);
     view["byteOffset"] = binary.size();
