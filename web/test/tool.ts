@@ -83,7 +83,7 @@ export function writeLopsidedHdr(path: string, width = 96, height = 48, seed = 5
 interface PackedView {
   byteOffset?: number;
   byteLength: number;
-  extensions?: { LAMBENT_transfer?: { form: string; byteLength: number; step?: number } };
+  extensions?: { LAMBENT_transfer?: { form: string; byteLength: number; step?: number; first?: object } };
 }
 export interface PackedDocument {
   bufferViews: PackedView[];

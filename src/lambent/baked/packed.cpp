@@ -99,29 +99,40 @@ Bytes find_parents(std::span<const int32_t> values, size_t columns) {
   return parents;
 }
 
-// [row][group][column]: parents, then column after column, in each the groups. Way 1: less the parent's; 2: less the
-// first group's, of both; 3: both.
-Bytes pack_rows(std::span<const int32_t> values, size_t groups, size_t columns) {
-  const size_t width = groups * columns, rows = values.size() / width;
+// [row][group][column]: parents, then column after column in the order that is given, in each the groups. Way 1: less
+// the parent's; 2: less the first group's, of both; 3: both. `lengths`: of all bytes after each column.
+struct PackedRows {
+  Bytes bytes;
+  std::vector<size_t> lengths;
+};
+PackedRows pack_rows(std::span<const int32_t> values, size_t groups, const std::vector<size_t>& columns) {
+  const size_t width = groups * columns.size(), rows = values.size() / width;
   const Bytes parents = find_parents(values, width);
-  Bytes out;
-  put_coded(out, parents);
-  for (size_t c = 0; c < columns; ++c)
+  PackedRows out;
+  put_coded(out.bytes, parents);
+  for (size_t c : columns) {
     for (size_t g = 0; g < groups; ++g) {
       const auto residuals = [&](int way) {
         std::vector<int32_t> found(rows);
         for (size_t r = 0; r < rows; ++r) {
           const auto value = [&](size_t row) {
             const int32_t* at = values.data() + row * width + c;
-            return (way & 2) != 0 ? minus(at[g * columns], at[0]) : at[g * columns];
+            return (way & 2) != 0 ? minus(at[g * columns.size()], at[0]) : at[g * columns.size()];
           };
           found[r] = (way & 1) != 0 && parents[r] > 0 ? minus(value(r), value(r - parents[r])) : value(r);
         }
         return found;
       };
-      if (g == 0) put_column(out, {0, 1}, residuals);
-      else put_column(out, {0, 1, 2, 3}, residuals);
+      if (g == 0) put_column(out.bytes, {0, 1}, residuals);
+      else put_column(out.bytes, {0, 1, 2, 3}, residuals);
     }
+    out.lengths.push_back(out.bytes.size());
+  }
+  return out;
+}
+std::vector<size_t> rising(size_t count) {
+  std::vector<size_t> out(count);
+  for (size_t i = 0; i < count; ++i) out[i] = i;
   return out;
 }
 
@@ -142,7 +153,8 @@ std::optional<PackedView> pack_floats(std::span<const uint8_t> bytes, size_t com
     if (!std::isfinite(value) || std::abs(value / step) > 1e6f) return std::nullopt;
     values[i] = rounded(value, step);
   }
-  return PackedView{{{"form", "floats"}, {"columns", components}, {"step", step}}, pack_rows(values, 1, components)};
+  return PackedView{{{"form", "floats"}, {"columns", components}, {"step", step}},
+                    pack_rows(values, 1, rising(components)).bytes};
 }
 
 PackedView pack_indices(std::span<const uint8_t> bytes, size_t size) {
@@ -151,12 +163,23 @@ PackedView pack_indices(std::span<const uint8_t> bytes, size_t size) {
   return {{{"form", size == 2 ? "u16" : "u32"}}, pack_integers(values)};
 }
 
-// [block][group][column][16] as the transfer of a file has them.
+// A first picture is of so many bands: nine columns have most of what is diffuse.
+constexpr size_t first_order = 3;
+
+// [block][group][column][16] as the transfer of a file has them; columns are harmonics, then lamps.
 struct Layout {
-  size_t receivers, groups, columns;
+  size_t receivers, groups, columns, lamps;
   bool half;
+  bool has_first() const { return columns - lamps > first_order * first_order; }
   size_t size() const { return (receivers + 15) / 16 * 16 * groups * columns * (half ? 2 : 4); }
 };
+
+// The first bands, lamps, and all else.
+std::vector<size_t> column_order(const Layout& l) {
+  std::vector<size_t> out = rising(l.columns);
+  if (l.has_first()) std::rotate(out.begin() + first_order * first_order, out.end() - ptrdiff_t(l.lamps), out.end());
+  return out;
+}
 
 struct PackedTransfer : PackedView {
   float error = 0;
@@ -196,7 +219,12 @@ std::optional<PackedTransfer> pack_transfer(std::span<const uint8_t> bytes, cons
                         {"groups", l.groups},
                         {"columns", l.columns},
                         {"step", step}};
-  packed.bytes = pack_rows(steps, l.groups, l.columns);
+  PackedRows rows = pack_rows(steps, l.groups, column_order(l));
+  packed.bytes = std::move(rows.bytes);
+  if (l.has_first()) {
+    const size_t length = rows.lengths[first_order * first_order + l.lamps - 1];
+    packed.description["first"] = {{"order", first_order}, {"lamps", l.lamps}, {"byteLength", length}};
+  }
   packed.error = squares > 0 ? float(std::sqrt(off / squares)) : 0;
   return packed;
 }
@@ -218,7 +246,7 @@ Result<Layout> layout_of(const json& transfer, const std::string& path) {
                order = transfer["order"].get<size_t>(),
                groups = transfer.contains("groups") ? transfer["groups"].size() : 0;
   return Layout{transfer["receivers"].get<size_t>(), rows * transfer["channels"].get<size_t>(), order * order + groups,
-                transfer["precision"] == "half"};
+                groups, transfer["precision"] == "half"};
 }
 
 // What a view holds, by the one accessor that has all of it.
@@ -325,6 +353,7 @@ Result<PackedFile> pack_baked(std::span<const uint8_t> bytes, float error, const
   auto layout = layout_of(transfer, path);
   if (!layout) return layout.error();
   const size_t transfer_view = transfer["bufferView"].get<size_t>();
+  if (transfer_view >= document["bufferViews"].size()) return Error{path, "holds no transfer"};
   const bool vertices = !extension.contains("surface");
   std::vector<Held> held = held_by(document);
   // Receivers of vertices, and which of the input's they are.
@@ -335,7 +364,10 @@ Result<PackedFile> pack_baked(std::span<const uint8_t> bytes, float error, const
   const float step = position_step(document);
   PackedFile out;
   Bytes binary;
-  for (size_t i = 0; i < held.size(); ++i) {
+  // Transfer comes last, so that a picture can be drawn before all of it is there.
+  std::vector<size_t> order = rising(held.size());
+  std::rotate(order.begin() + ptrdiff_t(transfer_view), order.begin() + ptrdiff_t(transfer_view) + 1, order.end());
+  for (size_t i : order) {
     json& view = document["bufferViews"][i];
     const size_t begin = view.value("byteOffset", size_t{0}), length = view["byteLength"].get<size_t>(),
                  there = chunks->binary.size();

@@ -53,9 +53,10 @@ struct Unpacked {
         {{"bufferView", view}, {"type", type}, {"componentType", component}, {"count", count}});
     return document["accessors"].size() - 1;
   }
-  // `values` is [receiver][channel][column].
-  void add_transfer(size_t receivers, size_t channels, size_t order, bool half, const std::vector<float>& values) {
-    const size_t width = channels * order * order;
+  // `values` is [receiver][channel][column]; lamps are the last columns.
+  void add_transfer(size_t receivers, size_t channels, size_t order, bool half, const std::vector<float>& values,
+                    size_t lamps = 0) {
+    const size_t width = channels * (order * order + lamps);
     std::vector<float> blocks((receivers + 15) / 16 * 16 * width);
     for (size_t r = 0; r < receivers; ++r)
       for (size_t k = 0; k < width; ++k) blocks[(r / 16 * width + k) * 16 + r % 16] = values[r * width + k];
@@ -72,6 +73,8 @@ struct Unpacked {
                                                     {"receivers", receivers},
                                                     {"precision", half ? "half" : "single"},
                                                     {"bufferView", view}}}};
+    if (lamps > 0)
+      document["extensions"]["LAMBENT_transfer"]["transfer"]["groups"] = std::vector<std::string>(lamps, "lamp");
   }
   PackBytes glb() const {
     PackJson whole = document;
@@ -124,13 +127,13 @@ struct Unpacker {
     out.resize(count);
     return out;
   }
-  // [row][group][column]
-  std::vector<int32_t> rows(size_t count, size_t groups, size_t columns) {
+  // [row][group][column], zero in columns that are not in `order`.
+  std::vector<int32_t> rows(size_t count, size_t groups, size_t columns, const std::vector<size_t>& order) {
     const PackBytes parents = coded();
     EXPECT_EQ(parents.size(), count);
     std::vector<int32_t> out(count * groups * columns);
     std::vector<uint32_t> first;
-    for (size_t c = 0; c < columns; ++c)
+    for (size_t c : order)
       for (size_t g = 0; g < groups; ++g) {
         const uint8_t way = byte();
         std::vector<uint32_t> values = numbers(count);
@@ -145,7 +148,20 @@ struct Unpacker {
   }
 };
 
-PackBytes unpacked(std::span<const uint8_t> bytes, const PackJson& packed) {
+// The order that columns come in; of the first bands and lamps, where those are asked for.
+std::vector<size_t> columns_of(const PackJson& packed, bool first_alone) {
+  const size_t columns = packed["columns"];
+  std::vector<size_t> out;
+  const PackJson first = packed.value("first", PackJson{{"order", 100}, {"lamps", 0}});
+  const size_t bands = std::min(columns, first["order"].get<size_t>() * first["order"].get<size_t>()),
+               lamps = first["lamps"];
+  for (size_t c = 0; c < bands; ++c) out.push_back(c);
+  for (size_t c = columns - lamps; c < columns; ++c) out.push_back(c);
+  for (size_t c = bands; c < columns - lamps && !first_alone; ++c) out.push_back(c);
+  return out;
+}
+
+PackBytes unpacked(std::span<const uint8_t> bytes, const PackJson& packed, bool first_alone = false) {
   Unpacker from{bytes};
   const std::string form = packed["form"];
   const size_t length = packed["byteLength"];
@@ -160,12 +176,13 @@ PackBytes unpacked(std::span<const uint8_t> bytes, const PackJson& packed) {
   } else if (form == "floats") {
     const size_t columns = number("columns");
     std::vector<float> values;
-    for (int32_t v : from.rows(length / 4 / columns, 1, columns))
+    for (int32_t v : from.rows(length / 4 / columns, 1, columns, columns_of(packed, false)))
       values.push_back(float(v) * packed["step"].get<float>());
     out = bytes_of_numbers(values);
   } else {
     const size_t rows = number("rows"), width = number("groups") * number("columns");
-    const std::vector<int32_t> steps = from.rows(rows, number("groups"), number("columns"));
+    const std::vector<int32_t> steps =
+        from.rows(rows, number("groups"), number("columns"), columns_of(packed, first_alone));
     std::vector<float> values((rows + 15) / 16 * 16 * width);
     for (size_t r = 0; r < rows; ++r)
       for (size_t k = 0; k < width; ++k)
@@ -228,7 +245,7 @@ std::vector<float> made_up(size_t receivers, size_t channels, size_t columns) {
 }
 
 // A grid of vertices with transfer, receivers and indices.
-Unpacked grid_file(size_t side, size_t channels, bool half) {
+Unpacked grid_file(size_t side, size_t channels, bool half, size_t order = 4, size_t lamps = 2) {
   const size_t count = side * side;
   Unpacked file;
   std::vector<float> places, normals, coordinates;
@@ -240,7 +257,7 @@ Unpacked grid_file(size_t side, size_t channels, bool half) {
     receivers.push_back(i % 7 == 3 ? 0xffffffffu : uint32_t(count - 1 - i));
   }
   for (uint32_t i = 0; i + side + 1 < count; ++i) corners.insert(corners.end(), {i, i + uint32_t(side), i + 1});
-  file.add_transfer(count, channels, 3, half, made_up(count, channels, 9));
+  file.add_transfer(count, channels, order, half, made_up(count, channels, order * order + lamps), lamps);
   const auto attribute = [&](const std::vector<float>& values, const char* type, size_t components) {
     return file.add_accessor(file.add_view(bytes_of_numbers(values)), type, 5126, values.size() / components);
   };
@@ -275,7 +292,7 @@ TEST(Packed, TransferIsWithinHalfAStepInEveryColumnAndAsFarOffAsIsStated) {
       for (const float asked : {0.001f, 0.01f, 0.05f}) {
         const Unpacked file = grid_file(30, channels, half);
         const Packed packed = packed_of(file, asked);
-        const size_t view = packed.transfer(), width = 9 * channels;
+        const size_t view = packed.transfer(), width = 18 * channels;
         ASSERT_TRUE(packed.is_packed(view));
         const auto before = floats_of(view_before(file, view), half), after = floats_of(packed.views[view], half);
         ASSERT_EQ(before.size(), after.size());
@@ -294,6 +311,37 @@ TEST(Packed, TransferIsWithinHalfAStepInEveryColumnAndAsFarOffAsIsStated) {
         for (size_t i = before.size() / 16 / width * 16 * width - 16 * width; i < before.size(); ++i)
           if (const size_t r = i / 16 / width * 16 + i % 16; r >= 900) EXPECT_EQ(after[i], 0);  // beyond the last
       }
+}
+
+TEST(Packed, TheFirstBandsAndLampsComeBeforeTheOtherBandsAndAllElseBeforeThem) {
+  const Unpacked file = grid_file(30, 3, true);
+  auto bytes = pack_baked(file.glb(), 0.01f, "bake.glb");
+  ASSERT_TRUE(bytes);
+  const Packed packed(bytes->bytes);
+  const PackJson& views = packed.document["bufferViews"];
+  const size_t view = packed.transfer(), begin = views[view]["byteOffset"];
+  for (size_t i = 0; i < views.size(); ++i)
+    if (i != view) EXPECT_LE(views[i]["byteOffset"].get<size_t>() + views[i]["byteLength"].get<size_t>(), begin) << i;
+  const PackJson first = packed.description(view)["first"];
+  EXPECT_EQ(first["order"], 3);
+  EXPECT_EQ(first["lamps"], 2);
+  const size_t length = first["byteLength"], whole = views[view]["byteLength"];
+  EXPECT_LT(length, whole * 4 / 5);
+  // Those bytes alone make the same numbers, with zeros for what is to come.
+  const auto chunks = split_gltf({reinterpret_cast<const uint8_t*>(bytes->bytes.data()), bytes->bytes.size()}, "");
+  const auto alone =
+      numbers_of_bytes<uint16_t>(unpacked(chunks->binary.subspan(begin, length), packed.description(view), true));
+  const auto all = numbers_of_bytes<uint16_t>(packed.views[view]);
+  for (size_t i = 0; i < all.size(); ++i) {
+    const size_t column = i / 16 % 18;
+    ASSERT_EQ(alone[i], column < 9 || column >= 16 ? all[i] : 0) << i;
+  }
+  // Of three bands there is nothing to come.
+  for (const size_t lamps : {0, 2}) {
+    const Packed few = packed_of(grid_file(30, 3, true, 3, lamps), 0.01f);
+    EXPECT_TRUE(few.is_packed(few.transfer()));
+    EXPECT_FALSE(few.description(few.transfer()).contains("first"));
+  }
 }
 
 TEST(Packed, VerticesAreWithinTheirStepsAndAllElseIsTheSame) {
@@ -414,16 +462,23 @@ TEST(Packed, WritesTheBytesThatThePageIsTestedWith) {
   const std::string now = testing::TempDir() + "/lambent_packed_grid.glb";
   if (!same) std::ofstream(now, std::ios::binary) << packed->bytes;
   EXPECT_TRUE(same) << "what is written now is in " << now;
-  // FNV-1a of each view.
-  const auto values = MappedFile::open(folder + "/grid.json");
-  ASSERT_TRUE(values);
-  std::vector<uint32_t> hashes;
-  for (const PackBytes& view : Packed(packed->bytes).views) {
+  // FNV-1a of each view, and of transfer of which the first bands alone are there.
+  const auto hash_of = [](const PackBytes& view) {
     uint32_t hash = 2166136261u;
     for (uint8_t b : view) hash = (hash ^ b) * 16777619u;
-    hashes.push_back(hash);
-  }
-  EXPECT_EQ(PackJson(hashes), PackJson::parse(values->bytes().begin(), values->bytes().end()));
+    return hash;
+  };
+  PackJson hashes;
+  const Packed file(packed->bytes);
+  for (const PackBytes& view : file.views) hashes["views"].push_back(hash_of(view));
+  const PackJson& description = file.description(file.transfer());
+  const auto chunks = split_gltf({reinterpret_cast<const uint8_t*>(packed->bytes.data()), packed->bytes.size()}, "");
+  const auto first = chunks->binary.subspan(file.document["bufferViews"][file.transfer()]["byteOffset"],
+                                            description["first"]["byteLength"]);
+  hashes["first"] = hash_of(unpacked(first, description, true));
+  const auto values = MappedFile::open(folder + "/grid.json");
+  ASSERT_TRUE(values);
+  EXPECT_EQ(hashes, PackJson::parse(values->bytes().begin(), values->bytes().end()));
 }
 
 }  // namespace
