@@ -20,6 +20,7 @@ else()
       src/lambent/pipeline/golden_test.cpp src/lambent/pipeline/golden_indirect_test.cpp
       src/lambent/pipeline/live_test.cpp src/lambent/pipeline/draw_indirect_test.cpp
       src/lambent/pipeline/live_kinds_test.cpp src/lambent/pipeline/live_look_test.cpp
+      src/lambent/baked/packed_test.cpp
       APPEND PROPERTY COMPILE_DEFINITIONS LAMBENT_GOLDEN="${lambent_golden}")
   endif()
   target_include_directories(lambent-test-objects PRIVATE ${CMAKE_CURRENT_SOURCE_DIR}/tests)

@@ -86,10 +86,22 @@ describe.skipIf(!haveTool || !haveBrowser)('visibility in blocks', () => {
     expect(await compare('other', 'white.glb', `brdf=${brdf}`, ['--brdf', other])).toBeLessThan(45);
   });
   it('looks as render draws it: GGX, by the tolerance of the page', async () => {
-    const brdf = 'ggx:roughness=0.4,f0=0.6';
-    expect(await compare('ggx', 'white.glb', `brdf=${brdf}`, ['--brdf', brdf, '--tolerance', '0.02'])).toBeGreaterThan(
-      50,
-    );
+    for (const roughness of [0.6, 0.4, 0.25]) {
+      const brdf = `ggx:roughness=${roughness},f0=0.6`,
+        blocks = ['--brdf', brdf, '--method', 'blocks', '--tolerance', '0.02'];
+      expect(await compare(`ggx_${roughness}`, 'white.glb', `brdf=${brdf}`, blocks)).toBeGreaterThan(50);
+    }
+  });
+  it('looks as render draws it: lobes of which blocks take 64 samples, by all texels, too', async () => {
+    for (const brdf of ['phong:diffuse=0.1,specular=0.8,exponent=20', 'ggx:roughness=0.4,f0=0.6'])
+      expect(
+        await compare(`standard_${brdf.slice(0, 3)}`, 'white.glb', `brdf=${brdf}`, [
+          '--brdf',
+          brdf,
+          '--method',
+          'standard',
+        ]),
+      ).toBeGreaterThan(50);
   });
 
   it('changes with its sliders, and keeps them in the address', async () => {

@@ -2,8 +2,17 @@
 // no other (docs/web.md). Attributes are spelt as the options of `lambent view`.
 import { Euler, MathUtils, Vector3 } from 'three';
 import { LambentError } from '../src/index.js';
+import type { FirstPart, Progress } from '../src/progressive.js';
 import { takeLamps } from './lamps.js';
-import { fetchFile, makeEnvironment, makeSky, readBaked, readMap, type EnvironmentFile } from './loading.js';
+import {
+  fetchFile,
+  firstAlone,
+  makeEnvironment,
+  makeSky,
+  readBaked,
+  readMap,
+  type EnvironmentFile,
+} from './loading.js';
 import { defaultState, parseState, type State } from './state.js';
 import { parseSky } from './sky.js';
 import { Viewer } from './viewer.js';
@@ -88,8 +97,8 @@ export class LambentViewer extends HTMLElement {
       this.shown = { src, env };
       const [scene, light] = await Promise.all([
         isNewScene
-          ? this.fetch(src)
-              .then((bytes) => readBaked(bytes, src))
+          ? this.fetch(src, false)
+              .then(async ({ bytes, ...more }) => ({ ...more, gltf: await readBaked(bytes, src) }))
               .catch(named(src))
           : undefined,
         isNewLight ? this.environment(env).catch(named(env)) : undefined,
@@ -104,7 +113,7 @@ export class LambentViewer extends HTMLElement {
         showBackground: state.background,
       });
       if (light) viewer.setEnvironment(light);
-      if (scene) viewer.setModel('baked', scene);
+      if (scene) viewer.setModel('baked', scene.gltf);
       const transfer = viewer.bakedScene?.transfer;
       if (transfer?.reflection) transfer.reflection = state.brdf ?? { model: 'diffuse' };
       if (viewer.indirect) takeLamps(viewer.indirect, state);
@@ -116,6 +125,7 @@ export class LambentViewer extends HTMLElement {
       } else if (scene) viewer.frameAll();
       viewer.changeLight();
       viewer.measure();
+      if (scene?.rest && !(await this.refine(viewer, src, scene))) return;
       this.say('');
       this.dispatchEvent(new Event('load'));
     } catch (error) {
@@ -153,8 +163,27 @@ export class LambentViewer extends HTMLElement {
     return viewer;
   }
 
-  private fetch(path: string): Promise<ArrayBuffer> {
-    return fetchFile(path, (share) => this.say(share > 0 ? `Loading: ${Math.round(100 * share)} %` : 'Loading'));
+  private fetch(path: string, whole = true): Promise<FirstPart> {
+    const say: Progress = (_, share) => this.say(share > 0 ? `Loading: ${Math.round(100 * share)} %` : 'Loading');
+    return fetchFile(path, say, whole);
+  }
+
+  /** The bands that come after the first picture; whether it is still what is shown. */
+  private async refine(viewer: Viewer, src: string, { bands, rest }: Omit<FirstPart, 'bytes'>): Promise<boolean> {
+    const scene = viewer.bakedScene!;
+    this.dispatchEvent(new Event('first'));
+    const isShown = (): boolean => viewer === this.viewer && viewer.bakedScene === scene;
+    try {
+      const values = await rest!;
+      if (!isShown()) return false;
+      scene.refine(values);
+    } catch (error) {
+      if (!isShown()) return false;
+      throw new LambentError(`${src} ${firstAlone(error, bands!, scene.transfer.order).message}`);
+    }
+    viewer.changeLight();
+    viewer.measure();
+    return true;
   }
 
   private async environment(env: string): Promise<EnvironmentFile> {
@@ -162,7 +191,7 @@ export class LambentViewer extends HTMLElement {
     if (sky) return makeSky(env, sky);
     if (env === 'sky' || env.startsWith('sky:'))
       throw new LambentError('is no sky: elevation, azimuth, turbidity, ground and sun are its keys');
-    return makeEnvironment(env, readMap(await this.fetch(env)));
+    return makeEnvironment(env, readMap((await this.fetch(env)).bytes));
   }
 }
 

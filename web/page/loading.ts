@@ -23,7 +23,7 @@ import {
   Lighting,
   type LatLongMap,
 } from '../src/index.js';
-
+import { readProgressive, type FirstPart, type Progress } from '../src/progressive.js';
 import { skyMap, sunDirection, type Sky } from './sky.js';
 
 /** lambent.json beside the page, as `lambent view` and `lambent export` write it; paths are relative to it. */
@@ -57,38 +57,20 @@ export async function loadManifest(): Promise<Manifest | undefined> {
   }
 }
 
-/** A whole file, telling the share that has come. */
-export async function fetchFile(
-  path: string,
-  onProgress: (share: number, bytes: number) => void,
-): Promise<ArrayBuffer> {
+/** A file, or what of it can be drawn first, telling how much has come; with `whole` all of it. */
+export async function fetchFile(path: string, onProgress: Progress, whole = true): Promise<FirstPart> {
   const answer = await fetch(path).catch(() => {
     throw new LambentError('cannot be reached: is "lambent view" still running?');
   });
   if (!answer.ok || !answer.body) throw new LambentError(`cannot be had: the server says ${answer.status}`);
-  const total = Number(answer.headers.get('content-length') ?? 0),
-    reader = answer.body.getReader(),
-    pieces: Uint8Array[] = [];
-  let done = 0;
-  for (;;) {
-    const piece = await reader.read().catch(() => {
-      throw new LambentError(`broke off after ${done.toLocaleString('en')} bytes`);
-    });
-    if (piece.done) break;
-    pieces.push(piece.value);
-    done += piece.value.length;
-    onProgress(total > 0 ? done / total : 0, done);
-  }
-  if (total > 0 && done < total)
-    throw new LambentError(`broke off after ${done.toLocaleString('en')} of ${total.toLocaleString('en')} bytes`);
-  const bytes = new Uint8Array(done);
-  let at = 0;
-  for (const piece of pieces) {
-    bytes.set(piece, at);
-    at += piece.length;
-  }
-  return bytes.buffer;
+  return readProgressive(answer, onProgress, whole);
 }
+
+/** Says what is shown of a file whose rest did not come. */
+export const firstAlone = (error: unknown, bands: number, of: number): LambentError =>
+  new LambentError(
+    `${error instanceof Error ? error.message : String(error)}: what is shown are its first ${bands} bands of ${of}`,
+  );
 
 /** Where the files are that a .gltf names: beside a file of the server's, by its address, or opened with it. */
 export type Beside = string | readonly File[];

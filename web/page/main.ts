@@ -10,7 +10,6 @@ import {
   type ShWindow,
 } from '../src/index.js';
 import {
-  fetchFile,
   loadManifest,
   makeEnvironment,
   mapTexture,
@@ -22,8 +21,9 @@ import {
   type EnvironmentFile,
   type Manifest,
 } from './loading.js';
-import { get, degrees, hideProblem, input, megabytes, select, sentence, showLoading, showProblem } from './dom.js';
+import { get, degrees, hideProblem, input, select, sentence, showLoading, showProblem } from './dom.js';
 import { connectLobes, connectWipe } from './hands.js';
+import { fetchWhole, openAsItComes } from './incoming.js';
 import { LampControls } from './lamp_controls.js';
 import { connectSharing } from './sharing.js';
 import { highestSun, lowestSun, parseSky, type Sky } from './sky.js';
@@ -77,7 +77,7 @@ class Page {
   async start(): Promise<void> {
     const { manifest, state, viewer } = this;
     for (const { name, file } of manifest?.environments ?? [])
-      this.environments.push({ name, load: async () => makeEnvironment(name, readMap(await this.fetch(name, file))) });
+      this.environments.push({ name, load: async () => makeEnvironment(name, readMap(await fetchWhole(name, file))) });
     if (!this.environments.some(({ name }) => parseSky(name)))
       this.environments.push({ name: 'sky', load: () => Promise.resolve(makeSky('sky', parseSky('sky')!)) });
     this.listEnvironments();
@@ -91,11 +91,14 @@ class Page {
     }
     const { name, baked, compare } = manifest;
     this.isServed = true;
-    await this.openBaked(name, await this.fetch(name, baked), baked);
+    await openAsItComes(viewer, name, baked, async (bytes, isAll) => {
+      await this.openBaked(name, bytes, baked);
+      if (!isAll) this.show();
+    });
     if (compare)
-      await this.useModel('compare', 'the second file', await this.fetch('the second file', compare), compare);
+      await this.useModel('compare', 'the second file', await fetchWhole('the second file', compare), compare);
     if (manifest.reference)
-      viewer.setReference(mapTexture(readMap(await this.fetch('the reference', manifest.reference))));
+      viewer.setReference(mapTexture(readMap(await fetchWhole('the reference', manifest.reference))));
     get('loading').hidden = true;
     this.show();
   }
@@ -399,15 +402,6 @@ class Page {
   private showPlain(problem: NoTransferError): void {
     showStatistics();
     showProblem(problem.message);
-  }
-
-  private fetch(name: string, file: string): Promise<ArrayBuffer> {
-    showLoading(`Loading ${name}`);
-    return fetchFile(file, (share, bytes) => showLoading(`Loading ${name}: ${megabytes(bytes)}`, share)).catch(
-      (error: unknown) => {
-        throw new LambentError(sentence(name, error));
-      },
-    );
   }
 
   private listEnvironments(): void {

@@ -18,7 +18,7 @@ export class Model {
   private readonly own: Material[]; // by mesh, as all lists here
   private unshadowed: UnshadowedMaterial[] | undefined;
   private errors: Material[] | undefined;
-  private coefficient: { index: number; materials: Material[] } | undefined;
+  private coefficient: { index: number; bands: number | undefined; materials: Material[] } | undefined;
 
   constructor(gltf: GLTF) {
     const baked = bakedScene(gltf);
@@ -59,9 +59,12 @@ export class Model {
       }
       materials = this.unshadowed;
     } else if (look === 'coefficient') {
-      if (this.coefficient?.index !== index) {
+      const { transfer } = this.baked,
+        bands = transfer.firstBands;
+      if (this.coefficient?.index !== index || this.coefficient.bands !== bands) {
         this.disposeCoefficient();
-        this.coefficient = { index, materials: this.baked.transfer.coefficientMaterials?.(index, gain) ?? this.own };
+        const materials = transfer.coefficientMaterials?.(index, gain) ?? this.own;
+        this.coefficient = { index, bands, materials };
       }
       materials = this.coefficient.materials;
     } else if (look === 'error') {

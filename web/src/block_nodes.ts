@@ -4,6 +4,7 @@ import {
   FloatType,
   NearestFilter,
   Vector3,
+  Vector4,
   type Node,
   type NodeFrame,
   type RenderTarget,
@@ -13,7 +14,6 @@ import {
 import {
   attribute,
   bool,
-  cross,
   dot,
   float,
   Fn,
@@ -22,7 +22,6 @@ import {
   int,
   ivec2,
   materialColor,
-  mix,
   rtt,
   screenCoordinate,
   select,
@@ -30,14 +29,16 @@ import {
   textureLoad,
   uint,
   uniform,
+  uniformArray,
   varying,
   vec2,
   vec3,
   vec4,
 } from 'three/tsl';
 import { cardinalFunctions } from './block_light.js';
+import { directionOf, fineDirection, lobeValue, nodeDirection } from './block_lobe_nodes.js';
 import { blockTolerance } from './block_reflection.js';
-import { pictureColumns, receiverColumns, wordColumns } from './block_shader.js';
+import { fineBetween, fineShare, pictureColumns, receiverColumns, wordColumns } from './block_shader.js';
 import { cubeBlocks } from './cube.js';
 import type { BlockStanding, NodeBlocks, NodeBlockOptions } from './node_edition.js';
 import { loop } from './node_loop.js';
@@ -58,6 +59,7 @@ class Reader {
   private readonly places: Texels;
   readonly sums: Texels;
   readonly coarse: Texels;
+  readonly fine: Texels;
   readonly texels: Texels;
 
   constructor(readonly options: NodeBlockOptions) {
@@ -68,13 +70,15 @@ class Reader {
     this.places = node(places);
     this.sums = node(light.sums.value);
     this.coarse = node(light.coarse.value);
+    this.fine = node(light.fine.value);
     this.texels = node(light.texels.value);
   }
 
   /** The light's textures are others for what stands elsewhere, and where surfaces have begun to shine. */
-  follow({ light: { sums, coarse, texels } }: BlockStanding): void {
+  follow({ light: { sums, coarse, fine, texels } }: BlockStanding): void {
     this.sums.value = sums.value;
     this.coarse.value = coarse.value;
+    this.fine.value = fine.value;
     this.texels.value = texels.value;
   }
 
@@ -183,94 +187,34 @@ const evenNode = (from: Reader): (() => Node<'vec4'>) =>
     return vec4(sum.mul(1 / Math.PI), 1);
   });
 
-/** The unit direction of a place in a block, in its texels. */
-function directionOf(cube: number, b: Int, place: Node<'vec2'>): Vec3 {
-  const side = cube / 16,
-    face = b.div(int(side * side)),
-    row = b.div(int(side)).mod(int(side)),
-    column = b.mod(int(side)),
-    corner = vec2(float(column.mul(int(16))), float(row.mul(int(16)))),
-    uv = corner
-      .add(place)
-      .mul(2 / cube)
-      .sub(1),
-    u = uv.x,
-    v = uv.y,
-    one = float(1);
-  const on = [
-    vec3(one, v.negate(), u.negate()),
-    vec3(one.negate(), v.negate(), u),
-    vec3(u, one, v),
-    vec3(u, one.negate(), v.negate()),
-    vec3(u, v.negate(), one),
-    vec3(u.negate(), v.negate(), one.negate()),
-  ] as Vec3[];
-  return on.reduceRight((rest, d, i) => select(face.equal(int(i)), d, rest)).normalize();
-}
-
 /** What the lobe is; of `model` 1 Phong's, of 2 GGX. */
 interface Lobe {
   colour: { value: number };
   width: { value: number };
-  samples: { value: Vector3 };
+  samples: { value: Vector4 };
 }
 
 /** Exit radiance towards the eye by the lobe alone. */
 function shineNode(from: Reader, eye: Node<'vec3'>, model: Int, lobe: Record<keyof Lobe, Node>): () => Node<'vec4'> {
   const colour = lobe.colour as unknown as Node<'float'>,
     width = lobe.width as unknown as Node<'float'>,
-    samplesAt = lobe.samples as unknown as Vec3,
+    samplesAt = lobe.samples as unknown as Node<'vec4'>,
     { cube } = from.options,
     cardinal = cardinalFunctions(4),
-    atMiddle = [0, 1, 2, 3].map((i) => (cardinal[16 * i + 7]! + cardinal[16 * i + 8]!) / 2);
+    atMiddle = [0, 1, 2, 3].map((i) => (cardinal[16 * i + 7]! + cardinal[16 * i + 8]!) / 2),
+    between = uniformArray<'vec4'>(
+      fineBetween.map((of) => new Vector4().fromArray([...of])),
+      'vec4',
+    );
   return Fn(() => {
     const { p, n, begin } = from.receiver(),
       wo = eye.sub(p).normalize().toVar(),
       cosO = dot(n, wo).toVar(),
       mirror = n.mul(cosO.mul(2)).sub(wo).toVar(),
       sum = vec3(0).toVar();
-    const valueOf = (wi: Vec3): Node<'float'> => {
-      const value = float(0).toVar();
-      If(model.equal(int(1)), () => {
-        const c = dot(mirror, wi).clamp(0, 1).toVar();
-        If(c.greaterThan(1e-30), () => {
-          value.assign(
-            colour
-              .mul(width.add(2))
-              .mul(1 / (2 * Math.PI))
-              .mul(c.pow(width)),
-          );
-        });
-      }).Else(() => {
-        const cosI = dot(n, wi).toVar();
-        If(cosI.greaterThan(1e-6), () => {
-          const sumOf = wi.add(wo).toVar(),
-            across = dot(sumOf, sumOf).max(1e-12).sqrt().toVar(),
-            h = sumOf.div(across).toVar(),
-            a2 = width.mul(width).toVar(),
-            hz = dot(n, h).max(1e-6).toVar(),
-            slope = cross(n, h).toVar(),
-            s = dot(slope, slope).div(a2).add(hz.mul(hz)).toVar();
-          const root = (c: Node<'float'>): Node<'float'> =>
-            a2
-              .mul(float(1).sub(c.mul(c)))
-              .add(c.mul(c))
-              .sqrt()
-              .mul(0.5);
-          const masking = cosO.mul(root(cosI)).add(cosI.mul(root(cosO))),
-            shape = float(1 / (4 * Math.PI)).div(a2.mul(s).mul(s).mul(masking)),
-            q = float(1).sub(across.mul(0.5)).max(0).toVar();
-          value.assign(shape.mul(mix(colour, float(1), q.mul(q).mul(q).mul(q).mul(q))));
-        });
-      });
-      return value;
-    };
-    const node = (b: Int, i: Int): Vec3 =>
-      directionOf(
-        cube,
-        b,
-        vec2(float(i.bitAnd(int(3)).mul(int(4)).add(int(2))), float(i.shiftRight(int(2)).mul(int(4)).add(int(2)))),
-      );
+    const valueOf = (wi: Vec3): Node<'float'> => lobeValue({ model, colour, width, n, wo, cosO, mirror }, wi);
+    const node = (b: Int, i: Int): Vec3 => nodeDirection(cube, b, i),
+      fineNode = (b: Int, i: Int): Vec3 => fineDirection(cube, b, i);
     // Light times lobe over texels first .. first + count - 1 of a block.
     const addRun = (b: Int, first: Int, count: Int, share: Node<'float'>): void =>
       loop(count, 't', (t) => {
@@ -287,11 +231,21 @@ function shineNode(from: Reader, eye: Node<'vec3'>, model: Int, lobe: Record<key
           along = dot(mirror, towards).toVar(),
           samples = int(0).toVar(),
           middle = float(0).toVar();
-        If(along.greaterThan(samplesAt.z), () => void samples.assign(int(3)))
+        If(along.greaterThan(samplesAt.w), () => void samples.assign(int(4)))
+          .ElseIf(along.greaterThan(samplesAt.z), () => void samples.assign(int(3)))
           .ElseIf(along.greaterThan(samplesAt.y), () => void samples.assign(int(2)))
           .ElseIf(along.greaterThan(samplesAt.x), () => void samples.assign(int(1)));
-        If(samples.equal(int(1)), () => void middle.assign(valueOf(towards)));
-        If(bool(model.equal(int(2)).and(samples.equal(int(1)))), () => {
+        If(samples.greaterThan(int(0)).and(samples.lessThan(int(4))), () => void middle.assign(valueOf(towards)));
+        If(samples.greaterThan(int(1)).and(clear.not()), () => void samples.assign(int(4)));
+        // How far values at 64 nodes are from those at the 16, by rows: less these first.
+        const off = [0, 1, 2, 3].map(() => vec4(0).toVar()),
+          isAsked = bool(
+            model
+              .equal(int(2))
+              .and(samples.greaterThan(int(0)))
+              .and(samples.lessThan(int(4))),
+          );
+        If(isAsked, () => {
           const least = middle.toVar(),
             most = middle.toVar(),
             back = float(0).toVar();
@@ -303,6 +257,10 @@ function shineNode(from: Reader, eye: Node<'vec3'>, model: Int, lobe: Record<key
             least.assign(least.min(value));
             most.assign(most.max(value));
             back.addAssign(value.mul(weight(j.bitAnd(int(3)))).mul(weight(j.shiftRight(int(2)))));
+            const column = j.bitAnd(int(3)),
+              at = (k: number): Node<'float'> => select(column.equal(int(k)), value, float(0)),
+              row = vec4(at(0), at(1), at(2), at(3)).toVar();
+            off.forEach((of, k) => of.subAssign(select(j.shiftRight(int(2)).equal(int(k)), row, vec4(0))));
           });
           If(most.sub(least).mul(Math.PI).greaterThanEqual(blockTolerance), () => {
             const near = back
@@ -310,8 +268,35 @@ function shineNode(from: Reader, eye: Node<'vec3'>, model: Int, lobe: Record<key
               .abs()
               .mul(Math.PI)
               .lessThan(0.25 * blockTolerance);
-            samples.assign(select(near.and(most.lessThan(least.mul(2))), int(2), int(3)));
-          }).ElseIf(clear.not().and(dot(n, towards).lessThanEqual(0)), () => void samples.assign(int(3)));
+            If(samples.lessThan(int(3)), () => {
+              samples.assign(select(near.and(most.lessThan(least.mul(2))), int(2), int(3)));
+            });
+          }).ElseIf(clear.not().and(dot(n, towards).lessThanEqual(0)), () => void samples.assign(int(4)));
+        });
+        If(samples.equal(int(3)).and(clear), () => {
+          // A texel that has much of the light is told by all samples alone.
+          const first = textureLoad(from.fine, ivec2(int(0), b)) as unknown as Node<'vec4'>;
+          If(first.w.greaterThan(0.5), () => void samples.assign(int(4))).ElseIf(model.equal(int(2)), () => {
+            loop(int(64), 'j', (j) => {
+              const value = valueOf(fineNode(b, j)).toVar(),
+                across = between
+                  .element(j.bitAnd(int(7)))
+                  .mul(value)
+                  .toVar(),
+                down = between.element(j.shiftRight(int(3))).toVar();
+              [down.x, down.y, down.z, down.w].forEach((by, k) => off[k]!.addAssign(across.mul(by)));
+            });
+            const most = off.reduce((all: Node<'vec4'>, of) => all.max(of.abs()), vec4(0)).toVar();
+            If(
+              most.x
+                .max(most.y)
+                .max(most.z)
+                .max(most.w)
+                .mul(Math.PI)
+                .greaterThanEqual(fineShare * blockTolerance),
+              () => void samples.assign(int(4)),
+            );
+          });
         });
         If(samples.equal(int(1)), () => from.addSeen(sum, middle, b, clear, c, n))
           .ElseIf(samples.greaterThan(int(1)).and(clear.not()), () =>
@@ -327,7 +312,12 @@ function shineNode(from: Reader, eye: Node<'vec3'>, model: Int, lobe: Record<key
               });
             }),
           )
-          .ElseIf(samples.equal(int(3)), () => addRun(b, int(0), int(256), float(1)))
+          .ElseIf(samples.equal(int(4)), () => addRun(b, int(0), int(256), float(1)))
+          .ElseIf(samples.equal(int(3)), () =>
+            loop(int(64), 'j', (j) => {
+              sum.addAssign(from.meet(from.fine, j.mul(int(3)), b, n).mul(valueOf(fineNode(b, j))));
+            }),
+          )
           .ElseIf(samples.equal(int(2)), () =>
             loop(int(16), 'j', (j) => {
               sum.addAssign(from.meet(from.coarse, j.mul(int(3)), b, n).mul(valueOf(node(b, j))));
@@ -374,7 +364,7 @@ export class BlockNodes implements NodeBlocks {
   private readonly share = uniform(1);
   private readonly model = uniform(0, 'int');
   private readonly shines = uniform(0);
-  private readonly lobe = { colour: uniform(0), width: uniform(1), samples: uniform(new Vector3()) };
+  private readonly lobe = { colour: uniform(0), width: uniform(1), samples: uniform(new Vector4()) };
 
   constructor(options: NodeBlockOptions) {
     const reader = (this.reader = new Reader(options)),

@@ -1,6 +1,6 @@
 // Visibility in blocks times light (times a lobe), a texel a receiver, in GLSL. Source: locally-adaptive-products,
 // Algorithm 1; the light as block_light.ts has it, records as docs/file-format.md has them.
-import { cardinalFunctions } from './block_light.js';
+import { cardinalFunctions, fineCardinal, fineNodes, finePlace } from './block_light.js';
 
 export const receiverColumns = 1024; // of the texture of receivers, two texels each
 export const wordColumns = 2048; // of the texture of records, four bytes a word
@@ -86,15 +86,23 @@ void main() {
 const cardinal = cardinalFunctions(4);
 const atMiddle = [0, 1, 2, 3].map((i) => (cardinal[16 * i + 7]! + cardinal[16 * i + 8]!) / 2);
 
+/** Of each of the eight fine nodes along a side, how much of the lobe at the four others it makes. */
+export const fineBetween: readonly (readonly number[])[] = Array.from({ length: fineNodes }, (_, node) =>
+  [2, 6, 10, 14].map((x) => fineCardinal(node, x)),
+);
+/** Of the tolerance, what values at 64 nodes may miss at the 16. */
+export const fineShare = 0.5;
+
 /** Exit radiance towards the eye by the lobe alone. */
 export const glossShader = /* glsl */ `
 ${reading}
 uniform highp sampler2D prtCoarse;
+uniform highp sampler2D prtFine;
 uniform highp sampler2D prtBlockTexels;
 uniform vec3 prtEye;
 uniform float prtColour; // Phong's specular, or f0
 uniform float prtWidth; // exponent, or alpha
-uniform vec3 prtSamples; // cosines: one, nodes, all
+uniform vec4 prtSamples; // cosines: one, nodes, fine, all
 
 vec3 prtWo, prtMirror, prtNormal;
 float prtCosO;
@@ -110,6 +118,11 @@ vec3 prtDirection( const in int b, const in vec2 place ) {
 }
 vec3 prtNode( const in int b, const in int i ) {
   return prtDirection( b, vec2( float( 4 * ( i & 3 ) + 2 ), float( 4 * ( i >> 2 ) + 2 ) ) );
+}
+
+const float prtFinePlaces[ 8 ] = float[ 8 ]( ${Array.from({ length: fineNodes }, (_, i) => finePlace(i)).join(', ')} );
+vec3 prtFineNode( const in int b, const in int i ) {
+  return prtDirection( b, vec2( prtFinePlaces[ i & 7 ], prtFinePlaces[ i >> 3 ] ) );
 }
 
 // The lobe's BRDF.
@@ -159,19 +172,32 @@ vec3 prtRuns( const in Changes c, const in int b ) {
   return sum;
 }
 
-// 1, 16 or 256 samples (1, 2, 3) for models of which nothing is known but values: 1 where they are alike, 16 where
+mat4 prtValues; // at 16 nodes, [row][column]
+// 1, 16 or more samples (1, 2, 3) for models of which nothing is known but values: 1 where they are alike, 16 where
 // those give the middle's value back.
 int prtByValues( const in int b, const in float middle ) {
   const float w[ 4 ] = float[ 4 ]( ${atMiddle.join(', ')} );
   float least = middle, most = middle, back = 0.0;
   for ( int i = 0; i < 16; ++ i ) {
     float value = prtLobe( prtNode( b, i ) );
+    prtValues[ i >> 2 ][ i & 3 ] = value;
     least = min( least, value );
     most = max( most, value );
     back += value * w[ i & 3 ] * w[ i >> 2 ];
   }
   if ( ${Math.PI} * ( most - least ) < PRT_TOLERANCE ) return 1;
   return ${Math.PI} * abs( back - middle ) < 0.25 * PRT_TOLERANCE && most < 2.0 * least ? 2 : 3;
+}
+
+// Whether values at 64 nodes give back those at the 16, which lie between them.
+bool prtIsFine( const in int b ) {
+  const vec4 between[ 8 ] = vec4[ 8 ]( ${fineBetween.map((v) => `vec4( ${v.join(', ')} )`).join(', ')} );
+  mat4 off = - prtValues;
+  for ( int i = 0; i < 64; ++ i )
+    off += prtLobe( prtFineNode( b, i ) ) * outerProduct( between[ i & 7 ], between[ i >> 3 ] );
+  float most = 0.0;
+  for ( int i = 0; i < 16; ++ i ) most = max( most, abs( off[ i >> 2 ][ i & 3 ] ) );
+  return ${Math.PI} * most < ${fineShare} * PRT_TOLERANCE;
 }
 
 void main() {
@@ -188,20 +214,31 @@ void main() {
     if ( ! clear ) c = prtChanges( at );
     vec3 towards = prtDirection( b, vec2( 8.0 ) );
     float along = dot( prtMirror, towards ), middle = 0.0;
-    int samples = along > prtSamples.z ? 3 : along > prtSamples.y ? 2 : along > prtSamples.x ? 1 : 0;
+    int samples = along > prtSamples.w ? 4 : along > prtSamples.z ? 3 : along > prtSamples.y ? 2
+                : along > prtSamples.x ? 1 : 0;
     if ( samples == 0 ) continue;
-    if ( samples < 3 ) middle = prtLobe( towards );
+    if ( samples < 4 ) middle = prtLobe( towards );
+    if ( samples > 1 && ! clear ) samples = 4;
     #if PRT_MODEL == 2
-      if ( samples < 3 ) samples = prtByValues( b, middle );
+      if ( samples < 4 ) samples = max( samples, prtByValues( b, middle ) );
       // Samples below the horizon say nothing about the block's part above it.
-      if ( ! clear && samples == 1 && dot( prtNormal, towards ) <= 0.0 ) samples = 3;
+      if ( ! clear && samples == 1 && dot( prtNormal, towards ) <= 0.0 ) samples = 4;
     #endif
+    if ( samples == 3 && clear ) {
+      // A texel that has much of the light is told by all samples alone.
+      if ( texelFetch( prtFine, ivec2( 0, b ), 0 ).w > 0.5 ) samples = 4;
+      #if PRT_MODEL == 2
+        else if ( ! prtIsFine( b ) ) samples = 4;
+      #endif
+    }
     if ( samples == 1 ) {
       sum += middle * ( clear ? prtMeet( prtBlockSums, 0, b, prtNormal ) : prtSeen( c, b, prtNormal ) );
     } else if ( ! clear ) {
       sum += prtRuns( c, b );
-    } else if ( samples == 3 ) {
+    } else if ( samples == 4 ) {
       sum += prtRun( b, 0, 256 );
+    } else if ( samples == 3 ) {
+      for ( int i = 0; i < 64; ++ i ) sum += prtLobe( prtFineNode( b, i ) ) * prtMeet( prtFine, 3 * i, b, prtNormal );
     } else {
       for ( int i = 0; i < 16; ++ i ) sum += prtLobe( prtNode( b, i ) ) * prtMeet( prtCoarse, 3 * i, b, prtNormal );
     }

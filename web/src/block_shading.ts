@@ -8,6 +8,7 @@ import {
   NearestFilter,
   RGBAFormat,
   Vector3,
+  Vector4,
   type Camera,
   type DataArrayTexture,
   type IUniform,
@@ -120,7 +121,7 @@ class Standing implements BlockStanding {
       PRT_MODEL: 0,
       PRT_TOLERANCE: blockTolerance,
     };
-    const { sums, coarse, texels } = this.light,
+    const { sums, coarse, fine, texels } = this.light,
       uniforms = { prtSight: { value: sight }, prtReceivers: { value: places }, prtBlockSums: sums };
     const diffuse = new ReceiverPicture(receivers, diffuseShader, defines, uniforms);
     this.gloss = new ReceiverPicture(
@@ -130,6 +131,7 @@ class Standing implements BlockStanding {
       {
         ...uniforms,
         prtCoarse: coarse,
+        prtFine: fine,
         prtBlockTexels: texels,
         prtEye: { value: this.eye },
         prtColour: lobe.colour,
@@ -171,7 +173,7 @@ interface ShadingOptions {
   begins: Float64Array;
   sight: DataArrayTexture;
   places: DataTexture;
-  lobe: { colour: { value: number }; width: { value: number }; samples: { value: Vector3 } };
+  lobe: { colour: { value: number }; width: { value: number }; samples: { value: Vector4 } };
 }
 
 /** Light on meshes as they were baked, and on those that were turned since. */

@@ -87,3 +87,30 @@ export function blockTexture(layout: BlockLayout, data: Uint16Array | Float32Arr
   texture.needsUpdate = true;
   return texture;
 }
+
+/** Transfer as a texture, of which at first some bands may be there and the others zero. */
+export class TransferValues {
+  readonly layout: BlockLayout;
+  readonly texture: DataArrayTexture;
+
+  constructor(
+    private readonly header: BlockHeader,
+    values: ArrayBuffer,
+    /** How many are there; undefined once all are. */
+    public firstBands: number | undefined,
+  ) {
+    const { layout, data } = packBlocks(header, values);
+    this.layout = layout;
+    this.texture = blockTexture(layout, data);
+  }
+
+  get data(): Uint16Array | Float32Array {
+    return this.texture.image.data as Uint16Array | Float32Array;
+  }
+
+  refine(values: ArrayBuffer): void {
+    this.data.set(packBlocks(this.header, values).data);
+    this.texture.needsUpdate = true;
+    this.firstBands = undefined;
+  }
+}

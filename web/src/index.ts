@@ -43,6 +43,7 @@ export {
 export type { NodeEdition, NodeRenderer, Renderer } from './node_edition.js';
 export { bakedScene, LambentTransferPlugin, type BakedScene } from './plugin.js';
 export { withoutPeaks } from './peaks.js';
+export { loadProgressive, type ProgressiveOptions } from './progressive.js';
 export { projectLatLong, texelSolidAngle, type LatLongMap } from './projection.js';
 export { diffuseParameters, PrtMaterial } from './prt_material.js';
 export { anySeeThrough } from './see_through.js';

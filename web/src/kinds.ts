@@ -22,6 +22,8 @@ export interface TransferSource {
   generator?: string | undefined;
   /** For WebGPURenderer. */
   nodes?: NodeEdition | undefined;
+  /** Dense transfer: so many bands (and the scene's lamps) are there, the others are zero and are to come. */
+  firstBands?: number;
 }
 
 /** The transfer of one file, bound to its meshes. */
@@ -39,6 +41,13 @@ export interface BakedTransfer {
   check(renderer: Renderer): void;
   /** Shows the meshes under this light. Writes a few hundred bytes of uniforms and nothing else. */
   relight(lighting: Lighting): void;
+  /** Of transfer whose other bands are to come: how many are there. */
+  readonly firstBands?: number | undefined;
+  /**
+   * Dense transfer: all values, in place of those of its first bands; counts at the next relight(). Materials that show
+   * a coefficient are to be made anew.
+   */
+  refine?(values: ArrayBuffer): void;
   /**
    * The scene's own lamps, where the file has them: a colour that scales each, by name. Counts at the next relight().
    */

@@ -127,18 +127,19 @@ export class Lighting {
    * order^2 RGB coefficients, turned, windowed and scaled; zero beyond the bands in use. For open surfaces: `auto`
    * is as weak a window as keeps those from going dark.
    */
-  coefficients(order: number): Float64Array {
-    const n = this.bandsOf(order);
+  coefficients(order: number, most = order): Float64Array {
+    const n = this.bandsOf(Math.min(order, most));
     return this.turned(this.radiance, this.rotationOf(n), this.factors(n), order);
   }
 
   /**
    * The same for what knows its shadows: `auto` takes peaks apart where there are any. `glossy`, of surfaces that
-   * reflect a part of the sky at a time: those peaks get a Lanczos window.
+   * reflect a part of the sky at a time: those peaks get a Lanczos window. `most` bands of transfer are there: beyond
+   * them light is zero.
    */
-  parts(order: number, glossy = false): LightParts {
-    const n = this.bandsOf(order);
-    if (this.window !== 'auto' || !this.map || n < 2) return { rest: this.coefficients(order), peaks: undefined };
+  parts(order: number, glossy = false, most = order): LightParts {
+    const n = this.bandsOf(Math.min(order, most));
+    if (this.window !== 'auto' || !this.map || n < 2) return { rest: this.coefficients(order, most), peaks: undefined };
     const whole = new Array<number>(n).fill(1),
       rotation = this.rotationOf(n),
       rest = this.rest(n);

@@ -21,7 +21,7 @@ import {
   type Texture,
   type WebGLProgramParametersWithUniforms,
 } from 'three';
-import { blockTexture, packBlocks, type BlockLayout } from './block_texture.js';
+import { TransferValues, type BlockLayout } from './block_texture.js';
 import { LambentError } from './errors.js';
 import { isIndex, isViews } from './glb.js';
 import {
@@ -186,6 +186,7 @@ class LightmapTransfer implements BakedTransfer {
   readonly gpuBytes: number;
   readonly lamps = new Map<string, Color>();
   private readonly directional: Directional;
+  private readonly values: TransferValues;
   private readonly layout: BlockLayout;
   private readonly transfer: DataArrayTexture;
   private readonly atlas: TurnedSums<LightSums>;
@@ -203,6 +204,7 @@ class LightmapTransfer implements BakedTransfer {
     readonly meshes: Mesh[],
     owns: Material[],
     nodes?: NodeEdition,
+    firstBands?: number,
   ) {
     this.order = header.order;
     this.channels = header.channels;
@@ -212,9 +214,10 @@ class LightmapTransfer implements BakedTransfer {
     this.directional = header.directional;
     const count = shCount(header.order) + groups.length,
       rows = directionalRows[header.directional];
-    const { layout, data } = packBlocks({ ...header, count, channels: rows * header.channels }, values);
+    this.values = new TransferValues({ ...header, count, channels: rows * header.channels }, values, firstBands);
+    const { layout, data, texture } = this.values;
     this.layout = layout;
-    this.transfer = blockTexture(layout, data);
+    this.transfer = texture;
     const pose = new RestPose(meshes);
     this.atlas = this.makeAtlases(pose);
     const { width, height } = receiversOf.image;
@@ -291,7 +294,7 @@ uint prtPick( const in ivec2 texel, out int row ) {
   relight(lighting: Lighting): void {
     const lamps = [...this.lamps];
     // The scene's own lamps are in none of the peaks.
-    const { rest, peaks } = lighting.parts(this.order);
+    const { rest, peaks } = lighting.parts(this.order, false, this.firstBands);
     const light = [...rest, ...lamps.flatMap(([, color]) => color.toArray())],
       sharp = peaks && [...peaks, ...new Array<number>(3 * lamps.length).fill(0)];
     this.atlas.set(light, sharp);
@@ -302,6 +305,13 @@ uint prtPick( const in ivec2 texel, out int row ) {
       if (scale) emission.value.copy(own).multiply(scale);
       else emission.value.setRGB(0, 0, 0);
     }
+  }
+
+  get firstBands(): number | undefined {
+    return this.values.firstBands;
+  }
+  refine(values: ArrayBuffer): void {
+    this.values.refine(values);
   }
 
   coefficientMaterials(index: number, gain: { value: number }): Material[] {
@@ -389,5 +399,5 @@ export async function loadLightmap(source: TransferSource): Promise<BakedTransfe
     meshes = await readPlacedMeshes(source),
     owns: Material[] = [];
   for (const part of extension.parts) owns.push(await source.ownMaterial(part));
-  return new LightmapTransfer(header, groups, values, receivers, meshes, owns, source.nodes);
+  return new LightmapTransfer(header, groups, values, receivers, meshes, owns, source.nodes, source.firstBands);
 }

@@ -14,7 +14,7 @@ import {
   type Mesh,
   type WebGLProgramParametersWithUniforms,
 } from 'three';
-import { blockTexture, packBlocks, type BlockLayout } from './block_texture.js';
+import { TransferValues, type BlockLayout } from './block_texture.js';
 import { LambentError } from './errors.js';
 import { readHeader, type TransferHeader } from './header.js';
 import { limits, type BakedTransfer, type TransferKind, type TransferSource } from './kinds.js';
@@ -127,6 +127,7 @@ class MatrixTransfer implements BakedTransfer {
   readonly receivers: number;
   readonly fileBytes: number;
   readonly gpuBytes: number;
+  private readonly values: TransferValues;
   private readonly layout: BlockLayout;
   private readonly transfer: DataArrayTexture;
   private readonly sums: TurnedSums<LightSums>;
@@ -141,17 +142,20 @@ class MatrixTransfer implements BakedTransfer {
     values: ArrayBuffer,
     readonly meshes: Mesh[],
     nodes?: NodeEdition,
+    firstBands?: number,
   ) {
     this.order = header.order;
     this.channels = header.channels;
     this.receivers = header.receivers;
     this.fileBytes = values.byteLength;
-    const { layout, data } = packBlocks(
+    this.values = new TransferValues(
       { ...header, count: shCount(header.order), channels: shared.rows * header.channels },
       values,
+      firstBands,
     );
+    const { layout, data, texture } = this.values;
     this.layout = layout;
-    this.transfer = blockTexture(layout, data);
+    this.transfer = texture;
     const pose = new RestPose(meshes);
     this.sums = this.makeSums(pose);
     this.refusal = nodes ? undefined : withoutNodes;
@@ -228,10 +232,17 @@ uint prtPick( const in ivec2 texel, out int row ) {
   }
 
   relight(lighting: Lighting): void {
-    const { rest, peaks } = lighting.parts(this.order, true);
+    const { rest, peaks } = lighting.parts(this.order, true, this.firstBands);
     this.sums.set(rest, peaks);
     this.sum?.set(rest, peaks, false);
     for (const material of this.materials.values()) setPeaks(material, peaks !== undefined);
+  }
+
+  get firstBands(): number | undefined {
+    return this.values.firstBands;
+  }
+  refine(values: ArrayBuffer): void {
+    this.values.refine(values);
   }
 
   coefficientMaterials(index: number, gain: { value: number }): Material[] {
@@ -274,7 +285,7 @@ async function load(source: TransferSource): Promise<BakedTransfer> {
   const shared = await loadLastReflection(source, receivers);
   const values = await source.bufferView(header.bufferView);
   const meshes = await Promise.all(source.extension.parts.map((part) => bindPart(source, part, receivers)));
-  return new MatrixTransfer(header, shared, values, meshes, source.nodes);
+  return new MatrixTransfer(header, shared, values, meshes, source.nodes, source.firstBands);
 }
 
 export const matrixKind: TransferKind = { name: 'matrix', load };

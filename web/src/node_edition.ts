@@ -11,7 +11,7 @@ import type {
   PointLight,
   SpotLight,
   Texture,
-  Vector3,
+  Vector4,
   WebGLRenderer,
 } from 'three';
 import type { BlockLayout } from './block_texture.js';
@@ -107,7 +107,7 @@ export interface NodeBlockOptions {
   receivers: number;
 }
 export interface BlockStanding {
-  readonly light: Record<'sums' | 'coarse' | 'texels', { value: DataTexture }>;
+  readonly light: Record<'sums' | 'coarse' | 'fine' | 'texels', { value: DataTexture }>;
   /** Another number where the light is another. */
   readonly version: number;
   /** From the world to where it was baked. */
@@ -119,7 +119,7 @@ export interface NodeBlocks {
   setLobe(
     model: number,
     share: number,
-    lobe: { colour: { value: number }; width: { value: number }; samples: { value: Vector3 } },
+    lobe: { colour: { value: number }; width: { value: number }; samples: { value: Vector4 } },
   ): void;
   /** For `colorNode`. */
   atVertices(twoSided: boolean): { uuid: string };

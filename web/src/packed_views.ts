@@ -66,12 +66,12 @@ function readIntegers(stream: Stream, count: number): Int32Array {
   return out;
 }
 
-/** [row][group][column] as in the file's stream; `use` is given each column of a group, in its order. */
+/** [row][group][column] as in the file's stream, columns in their order; `use` is given each column of a group. */
 function readRows(
   stream: Stream,
   rows: number,
   groups: number,
-  columns: number,
+  order: readonly number[],
   use: (group: number, column: number, values: Int32Array) => void,
 ): void {
   const parents = stream.coded();
@@ -79,7 +79,7 @@ function readRows(
   for (let r = 0; r < rows; ++r) if (parents[r]! > r) fail();
   const first = new Int32Array(rows),
     values = new Int32Array(rows);
-  for (let c = 0; c < columns; ++c)
+  for (const c of order)
     for (let g = 0; g < groups; ++g) {
       const way = stream.byte();
       if (way > 3 || (g === 0 && way > 1)) fail();
@@ -101,6 +101,16 @@ function nearestHalf(value: number): number {
   return DataUtils.toHalfFloat(float[0]);
 }
 
+/** Of transfer: its first bands and its lamps make a picture before the other columns are there. */
+export interface FirstColumns {
+  order: number;
+  lamps: number;
+  /** Of the packed view. */
+  byteLength: number;
+  /** There is no more than these. */
+  alone: boolean;
+}
+
 interface Description {
   form: string;
   byteLength: number;
@@ -108,21 +118,47 @@ interface Description {
   groups: number;
   columns: number;
   step: number;
+  first: FirstColumns | undefined;
+}
+
+function readFirst(given: unknown, columns: number): FirstColumns | undefined {
+  if (given === undefined) return undefined;
+  const { order, lamps, byteLength, alone = false } = (given ?? {}) as Record<string, unknown>;
+  if (!isIndex(order, 32) || order < 1 || !isIndex(lamps, columns) || order * order + lamps >= columns) return fail();
+  if (!isIndex(byteLength, most) || typeof alone !== 'boolean') return fail();
+  return { order, lamps, byteLength, alone };
+}
+
+/** The columns that are there, as they come. */
+function columnOrder(columns: number, first: FirstColumns | undefined): number[] {
+  const rising = Array.from({ length: columns }, (_, c) => c);
+  if (!first) return rising;
+  const bands = first.order ** 2,
+    lamps = columns - first.lamps;
+  return [...rising.slice(0, bands), ...rising.slice(lamps), ...(first.alone ? [] : rising.slice(bands, lamps))];
 }
 
 function readDescription(given: unknown): Description {
-  const of = given as Record<string, unknown>,
+  const of = (typeof given === 'object' && given !== null ? given : {}) as Record<string, unknown>,
     { form, byteLength, rows = 0, groups = 1, columns = 1, step = 1 } = of;
   if (typeof form !== 'string' || typeof step !== 'number' || !Number.isFinite(step)) fail();
   if (!isIndex(byteLength, most) || !isIndex(rows, most) || !isIndex(groups, 4096) || !isIndex(columns, 1024))
     return fail();
   if (groups < 1 || columns < 1) fail();
-  return { form: form as string, byteLength, rows, groups, columns, step: step as number };
+  const first = readFirst(of['first'], columns);
+  return { form: form as string, byteLength, rows, groups, columns, step: step as number, first };
 }
 
-/** The bytes that glTF knows of a packed view; `given` is what the view says of it. */
+/** What of a view comes first, where it says so; throws LambentError where that is nonsense. */
+export const firstColumns = (given: unknown): FirstColumns | undefined => readDescription(given).first;
+
+/**
+ * The bytes that glTF knows of a packed view; `given` is what the view says of it. Columns that are not there yet are
+ * zero.
+ */
 export function unpackView(bytes: ArrayBuffer, given: unknown): ArrayBuffer {
-  const { form, byteLength, rows, groups, columns, step } = readDescription(given),
+  const { form, byteLength, rows, groups, columns, step, first } = readDescription(given),
+    order = columnOrder(columns, first),
     stream = new Stream(new Uint8Array(bytes));
   // A number takes a bit at least.
   const expects = (numbers: number): void => void (numbers > 8 * bytes.byteLength && fail());
@@ -137,7 +173,7 @@ export function unpackView(bytes: ArrayBuffer, given: unknown): ArrayBuffer {
     if (!Number.isInteger(count)) fail();
     expects(count * columns);
     const floats = (out = new Float32Array(count * columns));
-    readRows(stream, count, 1, columns, (_, c, values) => {
+    readRows(stream, count, 1, order, (_, c, values) => {
       for (let r = 0; r < count; ++r) floats[r * columns + c] = values[r]! * step;
     });
   } else if (form === 'half blocks' || form === 'single blocks') {
@@ -145,9 +181,9 @@ export function unpackView(bytes: ArrayBuffer, given: unknown): ArrayBuffer {
       length = Math.ceil(rows / 16) * 16 * width,
       half = form === 'half blocks';
     if (byteLength !== length * (half ? 2 : 4)) fail();
-    expects(rows * width);
+    expects(rows * groups * order.length);
     const blocks = (out = half ? new Uint16Array(length) : new Float32Array(length));
-    readRows(stream, rows, groups, columns, (g, c, values) => {
+    readRows(stream, rows, groups, order, (g, c, values) => {
       for (let r = 0; r < rows; ++r) {
         const value = values[r]! * step;
         blocks[((r >> 4) * width + g * columns + c) * 16 + (r & 15)] = half ? nearestHalf(value) : value;

@@ -8,7 +8,7 @@ import { transferKind, type BakedTransfer, type TransferSource } from './kinds.j
 import { loadLattice, type Lattice } from './lattice.js';
 import type { Lighting } from './lighting.js';
 import type { NodeEdition } from './node_edition.js';
-import { unpackView } from './packed_views.js';
+import { firstColumns, unpackView } from './packed_views.js';
 
 export interface BakedScene {
   transfer: BakedTransfer;
@@ -17,6 +17,11 @@ export interface BakedScene {
   /** Light in free space, where the file was baked with a lattice; relight() sees to it, too. */
   lattice: Lattice | undefined;
   relight(lighting: Lighting): void;
+  /**
+   * All values of a transfer of which the first bands are there (loadProgressive()); takes the light of the last
+   * relight() anew.
+   */
+  refine(values: ArrayBuffer): void;
   dispose(): void;
 }
 
@@ -97,6 +102,13 @@ function primitiveOf(document: Document, key: string): Record<string, unknown> {
   return typeof extension === 'object' && extension !== null ? (extension as Record<string, unknown>) : {};
 }
 
+/** Of how many bands the transfer is, where the others are to come. */
+function firstBandsOf(document: Document, { transfer }: TransferExtension): number | undefined {
+  const packed = document.bufferViews?.[Number(transfer['bufferView'])]?.extensions?.[extensionName],
+    first = packed === undefined ? undefined : firstColumns(packed);
+  return first?.alone ? first.order : undefined;
+}
+
 export class LambentTransferPlugin implements GLTFLoaderPlugin {
   readonly name = extensionName;
 
@@ -123,8 +135,10 @@ export class LambentTransferPlugin implements GLTFLoaderPlugin {
     if (document.extensions?.[extensionName] === undefined) return;
     const extension = transferExtension(document);
     const meshes = findMeshes(gltf, this.parser);
+    const first = firstBandsOf(document, extension);
     const source: TransferSource = {
       extension,
+      ...(first !== undefined && { firstBands: first }),
       generator: document.asset?.generator,
       nodes: this.nodes,
       bufferView: viewReader(this.parser),
@@ -145,13 +159,20 @@ export class LambentTransferPlugin implements GLTFLoaderPlugin {
     for (const [key, mesh] of meshes) if (primitiveOf(document, key)['viewerOnly'] === true) mesh.visible = false;
     const transfer = await transferKind(extension.transfer.kind)!.load(source);
     const lattice = await loadLattice(source);
+    let last: Lighting | undefined;
     const baked: BakedScene = {
       transfer,
       lattice,
       provenance: extension.provenance,
       relight: (lighting) => {
+        last = lighting;
         transfer.relight(lighting);
         lattice?.relight(lighting, transfer.lamps?.values());
+      },
+      refine: (values) => {
+        if (!transfer.refine) throw new LambentError(`holds transfer of kind ${transfer.kind}, which comes whole`);
+        transfer.refine(values);
+        if (last) baked.relight(last);
       },
       dispose: () => {
         transfer.dispose();

@@ -14,7 +14,7 @@ import {
   type Object3D,
   type SkinnedMesh,
 } from 'three';
-import { blockTexture, packBlocks } from './block_texture.js';
+import { TransferValues } from './block_texture.js';
 import { LambentError } from './errors.js';
 import type { TransferExtension } from './glb.js';
 import { noReceiver, readReceivers, shareGeometry, type TransferHeader } from './header.js';
@@ -130,6 +130,7 @@ export class VertexTransfer implements BakedTransfer {
   readonly fitErrorMaterials?: NonNullable<BakedTransfer['fitErrorMaterials']>;
   private readonly last: LastReflection | undefined;
   private errors: DataTexture | undefined;
+  private readonly values: TransferValues;
   private readonly texture: DataArrayTexture;
   private readonly bones = new Map<string, DataTexture>(); // by skeleton
   private readonly uniforms: PrtUniforms;
@@ -150,19 +151,22 @@ export class VertexTransfer implements BakedTransfer {
     values: ArrayBuffer,
     readonly meshes: Mesh[],
     nodes?: NodeEdition,
+    firstBands?: number,
   ) {
     this.kind = kind;
     this.order = header.order;
     this.channels = header.channels;
     this.receivers = header.receivers;
     this.fileBytes = values.byteLength;
-    const { layout, data } = packBlocks(
+    this.values = new TransferValues(
       { count, channels: valueChannels, precision: header.precision, receivers: header.receivers },
       values,
+      firstBands,
     );
+    const { layout, data, texture } = this.values;
     this.last = last;
     this.quads = Math.ceil(shCount(header.order) / 4);
-    this.texture = blockTexture(layout, data);
+    this.texture = texture;
     this.uniforms = {
       prtTransfer: { value: this.texture },
       prtLight: { value: new Float32Array(12 * this.quads) },
@@ -265,7 +269,7 @@ export class VertexTransfer implements BakedTransfer {
   static async load(source: TransferSource, header: TransferHeader, kind: VertexKind): Promise<VertexTransfer> {
     const values = await source.bufferView(header.bufferView);
     const meshes = await Promise.all(source.extension.parts.map((part) => bindPart(source, part, header.receivers)));
-    return new VertexTransfer(header, kind, values, meshes, source.nodes);
+    return new VertexTransfer(header, kind, values, meshes, source.nodes, source.firstBands);
   }
 
   check(renderer: Renderer): void {
@@ -298,13 +302,20 @@ export class VertexTransfer implements BakedTransfer {
   }
 
   relight(lighting: Lighting): void {
-    const { rest, peaks } = lighting.parts(this.order, this.last !== undefined);
+    const { rest, peaks } = lighting.parts(this.order, this.last !== undefined, this.firstBands);
     packLight(this.uniforms.prtLight.value, rest);
     if (peaks) packLight(this.uniforms.prtPeaks.value, peaks);
     this.uniforms.prtHasPeaks.value = peaks !== undefined; // materials take it when they are drawn
     this.sums?.set(rest, peaks);
     this.sum?.set(rest, peaks, true);
     this.lobes?.set(rest, peaks);
+  }
+
+  get firstBands(): number | undefined {
+    return this.values.firstBands;
+  }
+  refine(values: ArrayBuffer): void {
+    this.values.refine(values);
   }
 
   coefficientMaterials(index: number, gain: { value: number }): Material[] {

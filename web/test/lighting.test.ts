@@ -240,4 +240,17 @@ describe('peaks', () => {
     expect(Lighting.fromMap(map(0.03), 6).parts(6).peaks).toBeDefined();
     expect(new Lighting(projectLatLong(map(1), 6)).parts(6).peaks).toBeUndefined(); // which a map alone tells
   });
+
+  it('are, of transfer whose first bands alone are there, those of as many bands in use', () => {
+    for (const window of ['auto', 'hann', 'none'] as const)
+      for (const glossy of [false, true]) {
+        const light = Lighting.fromMap(map(1), 6);
+        light.window = window;
+        const first = light.parts(6, glossy, 3),
+          all = light.parts(6, glossy);
+        light.bands = 3;
+        expect(first).toEqual(light.parts(6, glossy));
+        expect(first).not.toEqual(all);
+      }
+  });
 });

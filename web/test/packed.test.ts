@@ -1,39 +1,14 @@
 // What `lambent export --web --pack` writes comes back: integers to the bit, transfer and vertices within what is
 // stated; and what was spoilt on its way is refused in a sentence.
 import { execFileSync } from 'node:child_process';
-import { readFileSync, statSync, writeFileSync } from 'node:fs';
+import { statSync, writeFileSync } from 'node:fs';
 import { join } from 'node:path';
 import { NodeIO } from '@gltf-transform/core';
 import { DataUtils } from 'three';
 import { describe, expect, it } from 'vitest';
 import { LambentTransfer } from '../src/gltf_transform/index.ts';
 import { unpackView } from '../src/packed_views.ts';
-import { haveTool, lambent, makeFolder, toolPath } from './tool.ts';
-
-interface View {
-  byteOffset?: number;
-  byteLength: number;
-  extensions?: { LAMBENT_transfer?: { form: string; byteLength: number; step?: number } };
-}
-interface Document {
-  bufferViews: View[];
-  accessors: { bufferView: number; componentType: number }[];
-  extensionsRequired?: string[];
-  extensions: {
-    LAMBENT_transfer: { transfer: { bufferView: number }; packed?: { error: number }; written: { byteLength: number } };
-  };
-}
-function read(path: string): { document: Document; view: (index: number) => ArrayBuffer } {
-  const glb = readFileSync(path),
-    length = glb.readUInt32LE(12),
-    document = JSON.parse(glb.subarray(20, 20 + length).toString()) as Document;
-  const view = (index: number): ArrayBuffer => {
-    const { byteOffset = 0, byteLength } = document.bufferViews[index]!,
-      begin = 28 + length + byteOffset;
-    return Uint8Array.from(glb.subarray(begin, begin + byteLength)).buffer;
-  };
-  return { document, view };
-}
+import { haveTool, lambent, makeFolder, readPacked as read, toolPath } from './tool.ts';
 
 /** A hilly grid, with a quarter of its vertices above a lid. */
 function writeHills(path: string): void {

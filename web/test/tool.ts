@@ -1,7 +1,7 @@
 // The command-line tool, where it is built (LAMBENT_TOOL, or build/release/bin/lambent): the other half of every truth
 // test.
 import { execFileSync } from 'node:child_process';
-import { existsSync, mkdirSync, mkdtempSync, writeFileSync } from 'node:fs';
+import { existsSync, mkdirSync, mkdtempSync, readFileSync, writeFileSync } from 'node:fs';
 import { join } from 'node:path';
 import { fileURLToPath } from 'node:url';
 
@@ -78,4 +78,30 @@ export function writeLopsidedHdr(path: string, width = 96, height = 48, seed = 5
     const mantissa = c.map((k) => Math.max(1, Math.min(255, Math.floor(k * 2 ** (8 - exponent)))));
     return [mantissa[0]!, mantissa[1]!, mantissa[2]!, exponent + 128];
   });
+}
+
+interface PackedView {
+  byteOffset?: number;
+  byteLength: number;
+  extensions?: { LAMBENT_transfer?: { form: string; byteLength: number; step?: number; first?: object } };
+}
+export interface PackedDocument {
+  bufferViews: PackedView[];
+  accessors: { bufferView: number; componentType: number }[];
+  extensionsRequired?: string[];
+  extensions: {
+    LAMBENT_transfer: { transfer: { bufferView: number }; packed?: { error: number }; written: { byteLength: number } };
+  };
+}
+/** Document and views of a .glb, packed or not. */
+export function readPacked(path: string): { document: PackedDocument; view: (index: number) => ArrayBuffer } {
+  const glb = readFileSync(path),
+    length = glb.readUInt32LE(12),
+    document = JSON.parse(glb.subarray(20, 20 + length).toString()) as PackedDocument;
+  const view = (index: number): ArrayBuffer => {
+    const { byteOffset = 0, byteLength } = document.bufferViews[index]!,
+      begin = 28 + length + byteOffset;
+    return Uint8Array.from(glb.subarray(begin, begin + byteLength)).buffer;
+  };
+  return { document, view };
 }

@@ -7,6 +7,7 @@
 #include <lambent/core/huffman.h>
 
 #include <algorithm>
+#include <cfloat>
 #include <cmath>
 #include <cstring>
 #include <optional>
@@ -98,29 +99,40 @@ Bytes find_parents(std::span<const int32_t> values, size_t columns) {
   return parents;
 }
 
-// [row][group][column]: parents, then column after column, in each the groups. Way 1: less the parent's; 2: less the
-// first group's, of both; 3: both.
-Bytes pack_rows(std::span<const int32_t> values, size_t groups, size_t columns) {
-  const size_t width = groups * columns, rows = values.size() / width;
+// [row][group][column]: parents, then column after column in the order that is given, in each the groups. Way 1: less
+// the parent's; 2: less the first group's, of both; 3: both. `lengths`: of all bytes after each column.
+struct PackedRows {
+  Bytes bytes;
+  std::vector<size_t> lengths;
+};
+PackedRows pack_rows(std::span<const int32_t> values, size_t groups, const std::vector<size_t>& columns) {
+  const size_t width = groups * columns.size(), rows = values.size() / width;
   const Bytes parents = find_parents(values, width);
-  Bytes out;
-  put_coded(out, parents);
-  for (size_t c = 0; c < columns; ++c)
+  PackedRows out;
+  put_coded(out.bytes, parents);
+  for (size_t c : columns) {
     for (size_t g = 0; g < groups; ++g) {
       const auto residuals = [&](int way) {
         std::vector<int32_t> found(rows);
         for (size_t r = 0; r < rows; ++r) {
           const auto value = [&](size_t row) {
             const int32_t* at = values.data() + row * width + c;
-            return (way & 2) != 0 ? minus(at[g * columns], at[0]) : at[g * columns];
+            return (way & 2) != 0 ? minus(at[g * columns.size()], at[0]) : at[g * columns.size()];
           };
           found[r] = (way & 1) != 0 && parents[r] > 0 ? minus(value(r), value(r - parents[r])) : value(r);
         }
         return found;
       };
-      if (g == 0) put_column(out, {0, 1}, residuals);
-      else put_column(out, {0, 1, 2, 3}, residuals);
+      if (g == 0) put_column(out.bytes, {0, 1}, residuals);
+      else put_column(out.bytes, {0, 1, 2, 3}, residuals);
     }
+    out.lengths.push_back(out.bytes.size());
+  }
+  return out;
+}
+std::vector<size_t> rising(size_t count) {
+  std::vector<size_t> out(count);
+  for (size_t i = 0; i < count; ++i) out[i] = i;
   return out;
 }
 
@@ -141,7 +153,8 @@ std::optional<PackedView> pack_floats(std::span<const uint8_t> bytes, size_t com
     if (!std::isfinite(value) || std::abs(value / step) > 1e6f) return std::nullopt;
     values[i] = rounded(value, step);
   }
-  return PackedView{{{"form", "floats"}, {"columns", components}, {"step", step}}, pack_rows(values, 1, components)};
+  return PackedView{{{"form", "floats"}, {"columns", components}, {"step", step}},
+                    pack_rows(values, 1, rising(components)).bytes};
 }
 
 PackedView pack_indices(std::span<const uint8_t> bytes, size_t size) {
@@ -150,17 +163,29 @@ PackedView pack_indices(std::span<const uint8_t> bytes, size_t size) {
   return {{{"form", size == 2 ? "u16" : "u32"}}, pack_integers(values)};
 }
 
-// [block][group][column][16] as the transfer of a file has them.
+// A first picture is of so many bands: nine columns have most of what is diffuse.
+constexpr size_t first_order = 3;
+
+// [block][group][column][16] as the transfer of a file has them; columns are harmonics, then lamps.
 struct Layout {
-  size_t receivers, groups, columns;
+  size_t receivers, groups, columns, lamps;
   bool half;
+  bool has_first() const { return columns - lamps > first_order * first_order; }
   size_t size() const { return (receivers + 15) / 16 * 16 * groups * columns * (half ? 2 : 4); }
 };
+
+// The first bands, lamps, and all else.
+std::vector<size_t> column_order(const Layout& l) {
+  std::vector<size_t> out = rising(l.columns);
+  if (l.has_first()) std::rotate(out.begin() + first_order * first_order, out.end() - ptrdiff_t(l.lamps), out.end());
+  return out;
+}
 
 struct PackedTransfer : PackedView {
   float error = 0;
 };
-PackedTransfer pack_transfer(std::span<const uint8_t> bytes, const Layout& l, float error) {
+// None where a value is no number.
+std::optional<PackedTransfer> pack_transfer(std::span<const uint8_t> bytes, const Layout& l, float error) {
   const size_t width = l.groups * l.columns;
   std::vector<float> values(l.receivers * width);
   double squares = 0;
@@ -173,12 +198,13 @@ PackedTransfer pack_transfer(std::span<const uint8_t> bytes, const Layout& l, fl
         std::memcpy(&bits, bytes.data() + 2 * at, 2);
         value = half_to_float(bits);
       } else std::memcpy(&value, bytes.data() + 4 * at, 4);
+      if (!std::isfinite(value)) return std::nullopt;
       values[r * width + k] = value;
       squares += double(value) * value;
     }
   // What is rounded to a step is off by its square root of a twelfth.
   const double rms = std::sqrt(squares / double(std::max<size_t>(values.size(), 1)));
-  const float step = rms > 0 ? float(error * std::sqrt(12.0) * rms) : 1;
+  const float step = rms > 0 ? std::max(float(error * std::sqrt(12.0) * rms), FLT_MIN) : 1;
   std::vector<int32_t> steps(values.size());
   double off = 0;
   for (size_t i = 0; i < values.size(); ++i) {
@@ -193,7 +219,12 @@ PackedTransfer pack_transfer(std::span<const uint8_t> bytes, const Layout& l, fl
                         {"groups", l.groups},
                         {"columns", l.columns},
                         {"step", step}};
-  packed.bytes = pack_rows(steps, l.groups, l.columns);
+  PackedRows rows = pack_rows(steps, l.groups, column_order(l));
+  packed.bytes = std::move(rows.bytes);
+  if (l.has_first()) {
+    const size_t length = rows.lengths[first_order * first_order + l.lamps - 1];
+    packed.description["first"] = {{"order", first_order}, {"lamps", l.lamps}, {"byteLength", length}};
+  }
   packed.error = squares > 0 ? float(std::sqrt(off / squares)) : 0;
   return packed;
 }
@@ -215,7 +246,7 @@ Result<Layout> layout_of(const json& transfer, const std::string& path) {
                order = transfer["order"].get<size_t>(),
                groups = transfer.contains("groups") ? transfer["groups"].size() : 0;
   return Layout{transfer["receivers"].get<size_t>(), rows * transfer["channels"].get<size_t>(), order * order + groups,
-                transfer["precision"] == "half"};
+                groups, transfer["precision"] == "half"};
 }
 
 // What a view holds, by the one accessor that has all of it.
@@ -312,6 +343,7 @@ float default_packing_error(std::span<const uint8_t> bytes, const std::string& p
 }
 
 Result<PackedFile> pack_baked(std::span<const uint8_t> bytes, float error, const std::string& path) {
+  if (!(error >= 1e-5f && error <= 0.1f)) return Error{path, "--pack takes an error from 0.00001 to 0.1"};
   auto chunks = split_gltf(bytes, path);
   if (!chunks) return chunks.error();
   if (chunks->binary.empty()) return Error{path, "--pack takes a .glb"};
@@ -321,6 +353,7 @@ Result<PackedFile> pack_baked(std::span<const uint8_t> bytes, float error, const
   auto layout = layout_of(transfer, path);
   if (!layout) return layout.error();
   const size_t transfer_view = transfer["bufferView"].get<size_t>();
+  if (transfer_view >= document["bufferViews"].size()) return Error{path, "holds no transfer"};
   const bool vertices = !extension.contains("surface");
   std::vector<Held> held = held_by(document);
   // Receivers of vertices, and which of the input's they are.
@@ -331,15 +364,24 @@ Result<PackedFile> pack_baked(std::span<const uint8_t> bytes, float error, const
   const float step = position_step(document);
   PackedFile out;
   Bytes binary;
-  for (size_t i = 0; i < held.size(); ++i) {
+  // Transfer comes last, so that a picture can be drawn before all of it is there.
+  std::vector<size_t> order = rising(held.size());
+  std::rotate(order.begin() + ptrdiff_t(transfer_view), order.begin() + ptrdiff_t(transfer_view) + 1, order.end());
+  for (size_t i : order) {
     json& view = document["bufferViews"][i];
-    const auto own = chunks->binary.subspan(view.value("byteOffset", size_t{0}), view["byteLength"].get<size_t>());
+    const size_t begin = view.value("byteOffset", size_t{0}), length = view["byteLength"].get<size_t>(),
+                 there = chunks->binary.size();
+    if (view.value("buffer", size_t{0}) != 0 || view.contains("extensions") || begin > there || length > there - begin)
+      return Error{path,
+                   "--pack takes a .glb whose buffer views lie in it as they are, and one is compressed or elsewhere"};
+    const auto own = chunks->binary.subspan(begin, length);
     std::optional<PackedView> packed;
     if (i == transfer_view) {
       if (own.size() != layout->size()) return Error{path, "holds transfer of another length than its header makes"};
-      PackedTransfer whole = pack_transfer(own, *layout, error);
-      out.error = whole.error;
-      packed = std::move(whole);
+      auto whole = pack_transfer(own, *layout, error);
+      if (!whole) return Error{path, "holds transfer that is not a finite number"};
+      if (whole->bytes.size() < own.size()) out.error = whole->error;
+      packed = std::move(*whole);
     } else packed = pack_view(own, held[i], step);
     binary.resize((binary.size() + 3) / 4 * 4);
     view["byteOffset"] = binary.size();
