@@ -9,6 +9,7 @@ import { loadLattice, type Lattice } from './lattice.js';
 import type { Lighting } from './lighting.js';
 import type { NodeEdition } from './node_edition.js';
 import { unpackView } from './packed_views.js';
+import { takeLights } from './under_lights.js';
 
 export interface BakedScene {
   transfer: BakedTransfer;
@@ -17,6 +18,11 @@ export interface BakedScene {
   /** Light in free space, where the file was baked with a lattice; relight() sees to it, too. */
   lattice: Lattice | undefined;
   relight(lighting: Lighting): void;
+  /**
+   * Whether the program's directional lights, points and spots light the surfaces, too, with their shadow maps; what
+   * they send is not in the bake, and does not bounce. Throws LambentError where surfaces are not diffuse.
+   */
+  takeLights(on?: boolean): void;
   dispose(): void;
 }
 
@@ -153,6 +159,7 @@ export class LambentTransferPlugin implements GLTFLoaderPlugin {
         transfer.relight(lighting);
         lattice?.relight(lighting, transfer.lamps?.values());
       },
+      takeLights: (on = true) => takeLights(transfer, this.nodes, on),
       dispose: () => {
         transfer.dispose();
         lattice?.dispose();
