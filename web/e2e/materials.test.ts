@@ -169,6 +169,27 @@ describe.skipIf(!haveTool || !haveBrowser)('materials in a program', () => {
       }
     });
 
+  for (const [name, args] of [
+    ['vertices', ['--order', '3']],
+    ['zonal', ['--order', '3', '--transfer', 'zonal', '--lobes', '2']],
+    ['flat', ['--order', '3', '--transfer', 'lightmap', '--texels-per-unit', '8']],
+    ['directional', ['--transfer', 'lightmap', '--texels-per-unit', '8', '--directional', 'sh:2', '--sky', sun]],
+  ] as const)
+    it(`takes what a lamp sends by normal maps: ${name}`, async () => {
+      writeBumpy(at('bumpy.gltf'));
+      lambent('bake', at('bumpy.gltf'), ...args, '--samples', '16', '-o', at(`bumps_${name}.glb`));
+      const shot = { path: `/files/bumps_${name}.glb`, light: [], camera: cameraOf('1.6,1.5,2.2,-0.1,0.4,-0.2,40') };
+      for (const backend of backends) {
+        const { maps, flat } = await page.evaluate(([b, s]) => window.gpu.straight(b, s), [
+          backend,
+          { ...shot, size },
+        ] as const);
+        console.log(`${name} by ${backend}: ${maps.toFixed(1)} dB with normal maps, ${flat.toFixed(1)} without`);
+        expect(maps).toBeGreaterThan(50);
+        expect(flat).toBeLessThan(35);
+      }
+    });
+
   it('says where lights of the program cannot count', async () => {
     const shot = { path: '/files/glossy.glb', light: lightOf(3), camera: cameraOf(camera), size };
     await expect(page.evaluate((s) => window.gpu.underSun('webgl', s, []), shot)).rejects.toThrow(

@@ -47,6 +47,7 @@ import {
   type NodeSum,
   type Renderer,
 } from './node_edition.js';
+import { keepNormals } from './own_normals.js';
 import { chainHooks, diffuseParameters, replaceOnce, useExitRadiance } from './prt_material.js';
 import { drawFilter, type Drawn } from './see_through.js';
 import { shCount } from './sh.js';
@@ -232,6 +233,7 @@ class LightmapTransfer implements BakedTransfer {
           lamp: own.name,
         });
       const material = new LightmapMaterial(this.atlas, header.directional, surface, own);
+      keepNormals(own, material, own !== mesh.material && !mesh.geometry.hasAttribute('tangent'));
       material.vertexColors = mesh.geometry.hasAttribute('color');
       this.materials.push(material);
       setNodes(

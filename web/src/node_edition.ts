@@ -19,6 +19,7 @@ import type { BlockLayout } from './block_texture.js';
 import { LambentError } from './errors.js';
 import type { Directional } from './header.js';
 import type { LastReflection } from './outgoing.js';
+import { keepNormals } from './own_normals.js';
 import type { TransferTexture } from './transfer_texture.js';
 import type { RestPose } from './turned.js';
 
@@ -201,9 +202,14 @@ export function setNodes(material: Material, nodes: MaterialNodes | undefined, m
 
 export const nodeNames = ['colorNode', 'emissiveNode', 'setupLightingModel', 'setupLighting', 'nodesKey'] as const;
 
-/** The nodes of a material for its clone, and whether it takes lights (under_lights.ts). */
+/** What of a material says whether it takes lights, and with which normals (under_lights.ts). */
+const lightNames = ['type', 'isMeshBasicMaterial', 'isMeshLambertMaterial', 'flatShading'],
+  normalNames = ['normalMap', 'normalScale', 'normalMapType'];
+
+/** The nodes of a material for its clone, and what it has of lights. */
 export function copyNodes(from: Material, to: Material): void {
-  for (const name of [...nodeNames, 'type', 'isMeshBasicMaterial', 'isMeshLambertMaterial', 'flatShading']) {
+  keepNormals(from, to);
+  for (const name of [...nodeNames, ...lightNames, ...normalNames]) {
     const property = Object.getOwnPropertyDescriptor(from, name);
     if (property) Object.defineProperty(to, name, property);
   }

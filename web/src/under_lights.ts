@@ -4,6 +4,7 @@
 import type { Material, Mesh } from 'three';
 import { LambentError } from './errors.js';
 import type { BakedTransfer } from './kinds.js';
+import { normalsOf } from './own_normals.js';
 import { nodeNames, setNodes, type MaterialNodes, type NodeEdition } from './node_edition.js';
 
 /** What a material was drawn with before it took lights. */
@@ -50,6 +51,8 @@ function give(mesh: Mesh, material: Material, edition: NodeEdition | undefined, 
   kind.isMeshBasicMaterial = !on;
   kind.isMeshLambertMaterial = on;
   kind.flatShading = on && !mesh.geometry.hasAttribute('normal');
+  const normals = normalsOf(material);
+  if (normals) Object.assign(material, { ...normals, ...(!on && { normalMap: null }) });
   material.needsUpdate = true;
   const nodes = nodesOf(material);
   if (!edition || !nodes) return;

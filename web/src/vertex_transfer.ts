@@ -35,6 +35,7 @@ import {
 } from './node_edition.js';
 import { afterAll, packLight } from './light_sum.js';
 import { surfaceFrame, type Lobe } from './lobes.js';
+import { keepNormals } from './own_normals.js';
 import { checkReflection, reflectionBytes, reflectionUniforms, type LastReflection } from './outgoing.js';
 import { diffuseParameters, PrtMaterial, type PrtOptions, type PrtShader, type PrtUniforms } from './prt_material.js';
 import { shCount } from './sh.js';
@@ -216,6 +217,7 @@ export class VertexTransfer implements BakedTransfer {
         key = `${source.uuid} ${twoSided} ${rest ? mesh.uuid : ''}`;
       const material = this.materials.get(key) ?? new PrtMaterial(this.uniforms, options, diffuseParameters(source));
       this.materials.set(key, material);
+      keepNormals(source, material);
       setNodes(
         material,
         nodes && throughGlass(nodes, material, this.nodesFor(nodes, mesh, options)),
