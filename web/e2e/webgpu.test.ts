@@ -244,7 +244,8 @@ describe.skipIf(!haveTool || !haveBrowser)('on WebGPURenderer', () => {
         sky = 'sky:elevation=35,azimuth=60',
         light = brdf ? ['--env', sky, '--brdf', brdf, '--exposure', '-1'] : lit;
       renderLinear(at(files[1]), ...light, ...view(seen.join(',')), '-o', truth);
-      const shot = { path: `/files/${files[0]}`, camera: seen, turn: turn.toArray() };
+      const path = `/files/${files[0]}`,
+        shot = { path, camera: seen, turn: turn.toArray() };
       await compare(
         `${name}_turned`,
         brdf ? { ...shot, light: sky, brdf, exposure: -1 } : { ...shot, light: lightOf(4) },
@@ -252,6 +253,9 @@ describe.skipIf(!haveTool || !haveBrowser)('on WebGPURenderer', () => {
         45,
         brdf ? 36 : 40, // render's vertices that look away from the eye are black
       );
+      if (brdf || name === 'atlas') return;
+      const instance = { path, camera: seen, copies: [[...turn.toArray(), 0, 0, 0, 1]], instanced: true };
+      await compare(`${name}_instance`, { ...instance, light: lightOf(4) }, truth);
     });
 
   it('sees lobes of visibility in blocks from where the eye is, of a scene that was moved', async () => {

@@ -37,6 +37,8 @@ export interface BakedTransfer {
   readonly gpuBytes: number;
   /** Meshes whose material is ours now. */
   readonly meshes: Mesh[];
+  /** Whether surfaces scatter evenly, so that lights of the program may count beside what was baked. */
+  readonly isDiffuse?: boolean;
   /** Throws LambentError where the graphics card lacks what this is drawn with. */
   check(renderer: Renderer): void;
   /** Shows the meshes under this light. Writes a few hundred bytes of uniforms and nothing else. */

@@ -47,6 +47,7 @@ import {
   type NodeSum,
   type Renderer,
 } from './node_edition.js';
+import { keepNormals } from './own_normals.js';
 import { chainHooks, diffuseParameters, replaceOnce, useExitRadiance } from './prt_material.js';
 import { drawFilter, type Drawn } from './see_through.js';
 import { shCount } from './sh.js';
@@ -179,8 +180,9 @@ class LightmapMaterial extends MeshBasicMaterial {
 
 class LightmapTransfer implements BakedTransfer {
   readonly kind = 'diffuse';
+  readonly isDiffuse = true;
   readonly order: number;
-  readonly channels: number;
+  readonly channels: 1 | 3;
   readonly receivers: number;
   readonly fileBytes: number;
   readonly gpuBytes: number;
@@ -203,7 +205,7 @@ class LightmapTransfer implements BakedTransfer {
     private readonly receiversOf: DataTexture,
     readonly meshes: Mesh[],
     owns: Material[],
-    nodes?: NodeEdition,
+    private readonly nodes?: NodeEdition,
     firstBands?: number,
   ) {
     this.order = header.order;
@@ -222,17 +224,7 @@ class LightmapTransfer implements BakedTransfer {
     this.atlas = this.makeAtlases(pose);
     const { width, height } = receiversOf.image;
     this.refusal = nodes ? undefined : withoutNodes;
-    this.sum = nodes?.sum({
-      layout,
-      transfer: this.transfer,
-      channels: header.channels,
-      receivers: header.receivers,
-      order: header.order,
-      pose,
-      rows,
-      apart: !this.eachIsLight,
-      receiversOf,
-    });
+    this.sum = this.makeNodes(pose);
     let gpuBytes = data.byteLength + this.atlas.main.rest.bytes + 4 * width * height + (this.sum?.bytes ?? 0);
     meshes.forEach((mesh, i) => {
       const own = owns[i]! as Material & Partial<MeshStandardMaterial>,
@@ -244,6 +236,7 @@ class LightmapTransfer implements BakedTransfer {
           lamp: own.name,
         });
       const material = new LightmapMaterial(this.atlas, header.directional, surface, own);
+      keepNormals(own, material, own !== mesh.material && !mesh.geometry.hasAttribute('tangent'));
       material.vertexColors = mesh.geometry.hasAttribute('color');
       this.materials.push(material);
       setNodes(
@@ -257,6 +250,14 @@ class LightmapTransfer implements BakedTransfer {
     this.gpuBytes = gpuBytes;
   }
 
+  private makeNodes(pose: RestPose): NodeSum | undefined {
+    const { layout, transfer, channels, receivers, order, receiversOf } = this,
+      rows = directionalRows[this.directional];
+    return this.nodes?.sum({
+      ...{ layout, transfer, channels, receivers, order, pose, rows, receiversOf },
+      apart: !this.eachIsLight,
+    });
+  }
   private makeAtlases(pose?: RestPose): TurnedSums<LightSums> {
     return new TurnedSums(() => new LightSums(() => this.makeAtlas(), this.eachIsLight), this.order, pose);
   }
@@ -315,11 +316,12 @@ uint prtPick( const in ivec2 texel, out int row ) {
   }
 
   coefficientMaterials(index: number, gain: { value: number }): Material[] {
-    const atlas = this.makeAtlases();
-    atlas.set(
-      new Float64Array(3 * (shCount(this.order) + this.lamps.size)).fill(1, 3 * index, 3 * index + 3),
-      undefined,
-    );
+    const atlas = this.makeAtlases(),
+      light = new Float64Array(3 * (shCount(this.order) + this.lamps.size)).fill(1, 3 * index, 3 * index + 3),
+      { nodes } = this,
+      sum = this.makeNodes(new RestPose([]));
+    atlas.set(light, undefined);
+    sum?.set(light, undefined, false);
     this.ofCoefficients.add(atlas);
     const made = this.meshes.map(
       (_, i) =>
@@ -331,7 +333,10 @@ uint prtPick( const in ivec2 texel, out int row ) {
           gain,
         ),
     );
-    afterAll(made, () => (this.ofCoefficients.delete(atlas), atlas.dispose()));
+    made.forEach((material) =>
+      setNodes(material, nodes?.falseColor(nodes.overAtlas(sum!, material.surface), gain), `The view ${withoutNodes}.`),
+    );
+    afterAll(made, () => (this.ofCoefficients.delete(atlas), atlas.dispose(), sum?.dispose()));
     return made;
   }
 

@@ -51,9 +51,11 @@ export function readLobes(
   });
 }
 
-/** prtOrthogonal() of the shader: the orthogonal part of a gradient, the identity where it is flat. */
+/** prtOrthogonal() of the shader: the orthogonal part of a gradient of any size, the identity where it is flat. */
 export function orthogonalPart(gradient: Matrix3): Matrix3 {
-  const q = gradient.clone();
+  const q = gradient.clone(),
+    size = Math.hypot(...q.elements) / Math.sqrt(3);
+  if (size > 0) q.multiplyScalar(1 / size);
   for (let i = 0; i < 6; ++i) {
     if (Math.abs(q.determinant()) < 1e-6) return new Matrix3();
     const other = q.clone().invert().transpose();

@@ -17,6 +17,7 @@ import {
 import { TransferValues, type BlockLayout } from './block_texture.js';
 import { LambentError } from './errors.js';
 import { readHeader, type TransferHeader } from './header.js';
+import { glslInstances } from './instanced.js';
 import { limits, type BakedTransfer, type TransferKind, type TransferSource } from './kinds.js';
 import type { Lighting } from './lighting.js';
 import { afterAll, LightSum, LightSums, setPeaks } from './light_sum.js';
@@ -59,33 +60,50 @@ varying vec3 vPrtFront;
   varying vec3 vPrtBack;
 #endif
 ${glossVaryings}
+${glslInstances}
 uniform highp sampler2D prtRows;
 uniform mat3 prtTurnBack;
 #define PRT_TURN_BACK
 vec3 prtRow( const in int r, const in int row ) {
+  #ifdef USE_INSTANCING
+    return prtInstanceSum( r, row, 0 );
+  #endif
   int i = r * PRT_SUM_ROWS + row;
   return texelFetch( prtRows, ivec2( i % ${rowWidth}, i / ${rowWidth} ), 0 ).rgb;
 }
 #ifdef PRT_PEAKS
   uniform highp sampler2D prtPeakRows;
   vec3 prtPeakRow( const in int r, const in int row ) {
+    #ifdef USE_INSTANCING
+      return prtInstanceSum( r, row, 1 );
+    #endif
     int i = r * PRT_SUM_ROWS + row;
     return texelFetch( prtPeakRows, ivec2( i % ${rowWidth}, i / ${rowWidth} ), 0 ).rgb;
   }
 #endif
 ${glslReflect(shared.outgoing, false)}`;
 
+interface MatrixValues {
+  layout: BlockLayout;
+  channels: 1 | 3;
+  transfer: DataArrayTexture;
+}
+
 class MatrixMaterial extends MeshBasicMaterial {
   constructor(
     readonly sums: TurnedSums<LightSums>,
     readonly shared: LastReflection,
+    readonly values: MatrixValues,
     twoSided: boolean,
     source: Material,
     readonly gain?: { value: number },
   ) {
     super(gain ? { side: source.side } : diffuseParameters(source));
+    const { layout, channels } = values;
     this.defines = {
       ...reflectionDefines(shared),
+      ...{ PRT_QUADS: layout.quads, PRT_TEXELS: layout.texels, PRT_COLUMNS: layout.columns, PRT_ROWS: layout.rows },
+      PRT_CHANNELS: channels,
       ...(twoSided && { PRT_TWO_SIDED: '' }),
       ...(gain && { PRT_FALSE_COLOR: '' }),
     };
@@ -101,6 +119,7 @@ class MatrixMaterial extends MeshBasicMaterial {
     Object.assign(
       shader.uniforms,
       { prtRows: this.sums.rest, prtPeakRows: this.sums.peaks, prtTurnBack: this.sums.turnBack },
+      this.sums.instances?.uniforms(this.values.transfer),
       reflectionUniforms(this.shared),
       this.gain && { prtGain: this.gain },
     );
@@ -123,13 +142,13 @@ class MatrixMaterial extends MeshBasicMaterial {
 class MatrixTransfer implements BakedTransfer {
   readonly kind = 'matrix';
   readonly order: number;
-  readonly channels: number;
+  readonly channels: 1 | 3;
   readonly receivers: number;
   readonly fileBytes: number;
   readonly gpuBytes: number;
   private readonly values: TransferValues;
-  private readonly layout: BlockLayout;
-  private readonly transfer: DataArrayTexture;
+  readonly layout: BlockLayout;
+  readonly transfer: DataArrayTexture;
   private readonly sums: TurnedSums<LightSums>;
   private readonly materials = new Map<string, MatrixMaterial>();
   private readonly ofCoefficients = new Set<TurnedSums<LightSums>>();
@@ -141,7 +160,7 @@ class MatrixTransfer implements BakedTransfer {
     private readonly shared: LastReflection,
     values: ArrayBuffer,
     readonly meshes: Mesh[],
-    nodes?: NodeEdition,
+    private readonly nodes?: NodeEdition,
     firstBands?: number,
   ) {
     this.order = header.order;
@@ -156,26 +175,17 @@ class MatrixTransfer implements BakedTransfer {
     const { layout, data, texture } = this.values;
     this.layout = layout;
     this.transfer = texture;
-    const pose = new RestPose(meshes);
+    const pose = new RestPose(meshes, true);
     this.sums = this.makeSums(pose);
     this.refusal = nodes ? undefined : withoutNodes;
-    this.sum = nodes?.sum({
-      layout,
-      transfer: this.transfer,
-      channels: header.channels,
-      receivers: header.receivers,
-      order: header.order,
-      pose,
-      rows: shared.rows,
-      apart: true,
-    });
+    this.sum = this.makeNodes(pose);
     let gpuBytes = data.byteLength + this.sums.main.rest.bytes + reflectionBytes(shared) + (this.sum?.bytes ?? 0);
     for (const mesh of meshes) {
       const twoSided = mesh.geometry.hasAttribute('lambentReceiverBack'),
         source = mesh.material as Material,
         key = `${source.uuid} ${twoSided}`;
       gpuBytes += mesh.geometry.getAttribute('position').count * (twoSided ? 8 : 4);
-      const material = this.materials.get(key) ?? new MatrixMaterial(this.sums, shared, twoSided, source);
+      const material = this.materials.get(key) ?? new MatrixMaterial(this.sums, shared, this, twoSided, source);
       this.materials.set(key, material);
       setNodes(
         material,
@@ -187,8 +197,13 @@ class MatrixTransfer implements BakedTransfer {
     this.gpuBytes = gpuBytes;
   }
 
+  private makeNodes(pose: RestPose): NodeSum | undefined {
+    const { layout, transfer, channels, receivers, order, shared } = this;
+    return this.nodes?.sum({ layout, transfer, channels, receivers, order, pose, rows: shared.rows, apart: true });
+  }
+
   private makeSums(pose?: RestPose): TurnedSums<LightSums> {
-    return new TurnedSums(() => new LightSums(() => this.makeSum(), false), this.order, pose);
+    return new TurnedSums(() => new LightSums(() => this.makeSum(), false), this.order, pose, this.layout.quads);
   }
 
   private makeSum(): LightSum {
@@ -246,20 +261,33 @@ uint prtPick( const in ivec2 texel, out int row ) {
   }
 
   coefficientMaterials(index: number, gain: { value: number }): Material[] {
-    const sums = this.makeSums();
-    sums.set(new Float64Array(3 * shCount(this.order)).fill(1, 3 * index, 3 * index + 3), undefined);
+    const sums = this.makeSums(),
+      light = new Float64Array(3 * shCount(this.order)).fill(1, 3 * index, 3 * index + 3),
+      { nodes, shared } = this,
+      sum = this.makeNodes(new RestPose([], true));
+    sums.set(light, undefined);
+    sum?.set(light, undefined, false);
     this.ofCoefficients.add(sums);
     const made = this.meshes.map(
       (mesh) =>
         new MatrixMaterial(
           sums,
           this.shared,
+          this,
           mesh.geometry.hasAttribute('lambentReceiverBack'),
           mesh.material as Material,
           gain,
         ),
     );
-    afterAll(made, () => (this.ofCoefficients.delete(sums), sums.dispose()));
+    made.forEach((material, i) => {
+      const twoSided = this.meshes[i]!.geometry.hasAttribute('lambentReceiverBack');
+      setNodes(
+        material,
+        nodes?.falseColor(nodes.reflection(sum!, shared, twoSided), gain),
+        `The view ${withoutNodes}.`,
+      );
+    });
+    afterAll(made, () => (this.ofCoefficients.delete(sums), sums.dispose(), sum?.dispose()));
     return made;
   }
 

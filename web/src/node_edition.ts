@@ -11,6 +11,7 @@ import type {
   PointLight,
   SpotLight,
   Texture,
+  Vector2,
   Vector4,
   WebGLRenderer,
 } from 'three';
@@ -18,6 +19,8 @@ import type { BlockLayout } from './block_texture.js';
 import { LambentError } from './errors.js';
 import type { Directional } from './header.js';
 import type { LastReflection } from './outgoing.js';
+import { keepNormals } from './own_normals.js';
+import type { TransferTexture } from './transfer_texture.js';
 import type { RestPose } from './turned.js';
 
 /** WebGPURenderer, with either of its backends, as far as it is asked what it can do. */
@@ -78,6 +81,7 @@ export interface NodeLobes {
   /** [coefficient][3] */
   set(light: ArrayLike<number>, peaks: ArrayLike<number> | undefined): void;
   material(twoSided: boolean, rest: NodeRest): MaterialNodes;
+  dispose(): void;
 }
 /** Nodes of a classic material, by the properties that WebGPURenderer takes them from. */
 export interface MaterialNodes {
@@ -127,6 +131,26 @@ export interface NodeBlocks {
   dispose(): void;
 }
 
+/** A surface with nothing in its light's way (unshadowed_material.ts). */
+export interface NodeUnshadowed {
+  readonly nodes: MaterialNodes;
+  /** [harmonic that counts][3] */
+  set(light: ArrayLike<number>, peaks: ArrayLike<number> | undefined): void;
+}
+/** A texture of zonal lobes, and its table of the light's bands by direction, `width` by `height` a band. */
+export interface NodeReliefOptions {
+  transfer: TransferTexture;
+  tile: Vector2;
+  width: number;
+  height: number;
+}
+export interface NodeRelief {
+  readonly nodes: MaterialNodes;
+  /** [coefficient][3] */
+  set(light: ArrayLike<number>): void;
+  dispose(): void;
+}
+
 export interface NodeEdition {
   sum(options: NodeSumOptions): NodeSum;
   /** For `colorNode` of a MeshBasicMaterial: its colour times the exit radiance of its vertices' receivers. */
@@ -137,6 +161,14 @@ export interface NodeEdition {
   reflection(sum: NodeSum, last: LastReflection, twoSided: boolean): MaterialNodes;
   /** The same of places in an atlas, and what glows. */
   overAtlas(sum: NodeSum, surface: NodeSurface): MaterialNodes;
+  /** A number a receiver, as exit radiance. */
+  numbers(of: DataTexture, twoSided: boolean): MaterialNodes;
+  /** Exit radiance, signed, in false colour; +-1 / gain are the ends of the scale. */
+  falseColor(nodes: MaterialNodes, gain: { value: number }): MaterialNodes;
+  unshadowed(order: number, indices: readonly number[]): NodeUnshadowed;
+  relief(options: NodeReliefOptions): NodeRelief;
+  /** Of one that takes the program's lights, from those of one that does not. */
+  underLights(nodes: MaterialNodes): MaterialNodes;
   /** Of a MeshLambertMaterial. */
   bounced(light: NodeBounced): MaterialNodes;
   /** Lights that fall off as lambent's do. */
@@ -168,9 +200,16 @@ export function setNodes(material: Material, nodes: MaterialNodes | undefined, m
   define('nodesKey', { value: key, writable: true });
 }
 
-/** The nodes of a material for its clone. */
+export const nodeNames = ['colorNode', 'emissiveNode', 'setupLightingModel', 'setupLighting', 'nodesKey'] as const;
+
+/** What of a material says whether it takes lights, and with which normals (under_lights.ts). */
+const lightNames = ['type', 'isMeshBasicMaterial', 'isMeshLambertMaterial', 'flatShading'],
+  normalNames = ['normalMap', 'normalScale', 'normalMapType'];
+
+/** The nodes of a material for its clone, and what it has of lights. */
 export function copyNodes(from: Material, to: Material): void {
-  for (const name of ['colorNode', 'emissiveNode', 'setupLightingModel', 'setupLighting', 'nodesKey']) {
+  keepNormals(from, to);
+  for (const name of [...nodeNames, ...lightNames, ...normalNames]) {
     const property = Object.getOwnPropertyDescriptor(from, name);
     if (property) Object.defineProperty(to, name, property);
   }
@@ -187,8 +226,9 @@ export function throughGlass(edition: NodeEdition, material: Material, nodes: Ma
 export const withoutNodes =
   'was loaded for WebGLRenderer, and this is WebGPURenderer: give the plugin the nodes of lambent-three/webgpu, ' +
   'new LambentTransferPlugin(parser, nodes)';
-export const onlyGlsl = (what: string): string =>
-  `is ${what}, which WebGPURenderer does not draw in this version; WebGLRenderer does`;
+/** The same of a material that a program makes. */
+export const withoutEdition =
+  'was made for WebGLRenderer, and this is WebGPURenderer: give its constructor the nodes of lambent-three/webgpu, too';
 
 /** Throws LambentError where WebGPURenderer does not draw what it is given; asks it once it has begun. */
 export function checkNodes({ backend }: NodeRenderer, refusal: string | undefined): void {

@@ -12,7 +12,6 @@ import {
   ivec2,
   ivec3,
   mat3,
-  materialColor,
   referenceBuffer,
   select,
   texture,
@@ -22,11 +21,12 @@ import {
   uniformArray,
   varying,
   vec3,
-  vec4,
 } from 'three/tsl';
 import { orthogonalPart } from './lobes.js';
 import type { MaterialNodes, NodeLobeOptions, NodeLobes, NodeRest } from './node_edition.js';
 import { nodeHarmonics } from './node_harmonics.js';
+import { InstanceNodes } from './node_instances.js';
+import { lit } from './node_lit.js';
 import { loop } from './node_loop.js';
 import { glossy, type RowReader } from './node_reflection.js';
 import { pack, receiverAt } from './node_sum.js';
@@ -138,7 +138,14 @@ function skinTurn({ bones, count }: Extract<NodeRest, { bones: unknown }>): Mat3
         .reduce((sum, m) => sum.add(m) as Mat3);
     const now = blend((i) => mat3(pose.element(i))),
       q = now.mul(inverse(blend(then)) as unknown as Mat3).toVar() as ReturnType<Mat3['toVar']>,
-      flat = int(0).toVar();
+      flat = int(0).toVar(),
+      columns = [0, 1, 2].map((k) => (q as unknown as { element(i: Int): Vec3 }).element(int(k))),
+      scale = columns
+        .map((v): Float => dot(v, v))
+        .reduce((sum, v) => sum.add(v))
+        .div(3)
+        .sqrt();
+    q.assign(q.mul(scale.max(1e-30).reciprocal()));
     // The orthogonal part of a gradient: Higham's iteration, whose error squares at each step.
     loop(int(6), 'step', () => {
       If(determinant(q).abs().lessThan(1e-6), () => {
@@ -156,6 +163,7 @@ export class LobeNodes implements NodeLobes {
   private readonly peaks: Vector4[];
   private readonly hasPeaks = uniform(0);
   private readonly reader: RowReader;
+  private readonly instances: InstanceNodes[] = [];
 
   constructor(private readonly options: NodeLobeOptions) {
     const quads = Math.ceil(shCount(options.order) / 4),
@@ -178,13 +186,25 @@ export class LobeNodes implements NodeLobes {
   }
 
   material(twoSided: boolean, rest: NodeRest): MaterialNodes {
-    const frame = 'bones' in rest ? skinTurn(rest) : turnOf(rest.inverse),
+    const frame = 'bones' in rest ? skinTurn(rest) : this.turnOf(rest.inverse),
       { last } = this.options;
     if (last) return glossy(last, this.reader, twoSided, frame);
     const front = this.at('lambentReceiver', frame),
-      radiance = twoSided ? select(frontFacing, front, this.at('lambentReceiverBack', frame)) : front,
-      color = vec4(materialColor as unknown as Node<'vec4'>);
-    return { colorNode: vec4(color.rgb.mul(radiance.max(0)), color.a) };
+      radiance = twoSided ? select(frontFacing, front, this.at('lambentReceiverBack', frame)) : front;
+    return { colorNode: lit(radiance) };
+  }
+
+  dispose(): void {
+    for (const { lights } of this.instances) lights.dispose();
+  }
+
+  private turnOf(inverse: Matrix3): Mat3 {
+    const instances = new InstanceNodes(0, 0, { inverseOf: () => inverse });
+    this.instances.push(instances);
+    return instances.choose(
+      () => instances.turn(),
+      () => turnOf(inverse),
+    );
   }
 
   private at(name: string, frame: Mat3): Vec3 {

@@ -26,6 +26,7 @@ import {
   vec4,
 } from 'three/tsl';
 import { nodeHarmonics } from './node_harmonics.js';
+import { showAs } from './node_lit.js';
 import { loop } from './node_loop.js';
 import type { MaterialNodes } from './node_edition.js';
 import { receiverAt } from './node_sum.js';
@@ -171,5 +172,7 @@ export function glossy(last: LastReflection, reader: RowReader, twoSided: boolea
     ) as [Vec3, Vec3, Vec3, Vec3],
     tint = (diffuseColor as unknown as Node<'vec4'>).rgb,
     light = tint.mul(coloured).add(gloss).max(0).add(tint.mul(peakColoured).add(peakGloss).max(0));
-  return { colorNode: vec4(materialColor as unknown as Node<'vec4'>), setupLighting: () => light };
+  const colorNode = vec4(materialColor as unknown as Node<'vec4'>);
+  showAs(colorNode, coloured.add(gloss));
+  return { colorNode, setupLighting: () => light };
 }

@@ -31,8 +31,10 @@ import {
   vec3,
   vec4,
 } from 'three/tsl';
+import { InstanceNodes } from './node_instances.js';
 import { loop } from './node_loop.js';
 import type { NodeSum, NodeSumOptions } from './node_edition.js';
+import { isInstanced } from './instanced.js';
 import { Alike, lightFor } from './turned.js';
 
 /** Rows of receivers a row of the picture. */
@@ -101,6 +103,8 @@ export class Sum implements NodeSum {
   /** Of the mesh that is drawn, from the axes of the bake into the world, and back. */
   readonly turn: Node<'mat3'>;
   readonly turnBack: Node<'mat3'>;
+  /** Of instances, whose light their vertices sum. */
+  readonly instances: InstanceNodes | undefined;
   private light: Light = { rest: [], peaks: undefined };
   private readonly turned = new Alike<Turned>(() => ({
     how: [],
@@ -125,6 +129,7 @@ export class Sum implements NodeSum {
       : [Math.min(sumColumns, rows * receivers), Math.ceil((rows * receivers) / sumColumns)];
     this.picture = this.draw(apart ? ['rest'] : ['rest', 'peaks'], quads, 'lambent sum');
     if (apart) this.peakPicture = this.draw(['peaks'], quads, 'lambent peaks');
+    if (!receiversOf) this.instances = new InstanceNodes(options.order, quads, options.pose);
     const turn = ({ object }: NodeFrame): Matrix3 => options.pose.turnOf(object!) ?? upright,
       back = new Matrix3();
     this.turn = uniform(new Matrix3()).onObjectUpdate(turn);
@@ -183,6 +188,7 @@ export class Sum implements NodeSum {
     // For every mesh: one that was turned looks at a picture of its own.
     made.updateBeforeType = 'object';
     made.updateBefore = (frame: NodeFrame): undefined => {
+      if (this.instances && isInstanced(frame.object!)) return;
       const turned = this.turnedOf(frame.object!),
         light = turned?.light ?? this.light;
       made.renderTarget = main;
@@ -215,6 +221,7 @@ export class Sum implements NodeSum {
 
   set(light: ArrayLike<number>, peaks: ArrayLike<number> | undefined, holds: boolean): void {
     this.light = { rest: light, peaks };
+    this.instances?.set(light, peaks);
     this.holds.value = peaks && holds ? 1 : 0;
     this.hasPeaks.value = peaks ? 1 : 0;
     if (peaks) for (const main of this.mains) main.setSize(this.width, this.height);
@@ -224,6 +231,7 @@ export class Sum implements NodeSum {
     for (const main of this.mains) main.dispose();
     for (const { targets } of this.turned.all) for (const target of targets.values()) target.dispose();
     this.turned.clear();
+    this.instances?.dispose();
     this.picture.dispose();
     this.peakPicture?.dispose();
     this.whose?.dispose();

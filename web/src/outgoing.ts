@@ -142,10 +142,18 @@ varying vec3 vPrtGloss;
 `;
 
 export const glossVertexBody = /* glsl */ `
+  vec4 prtPlace = vec4( transformed, 1.0 );
+  #ifdef USE_INSTANCING
+    prtPlace = instanceMatrix * prtPlace;
+  #endif
   vec3 prtView = isOrthographic ? vec3( viewMatrix[ 0 ][ 2 ], viewMatrix[ 1 ][ 2 ], viewMatrix[ 2 ][ 2 ] )
-                                : normalize( cameraPosition - ( modelMatrix * vec4( transformed, 1.0 ) ).xyz );
+                                : normalize( cameraPosition - ( modelMatrix * prtPlace ).xyz );
   #ifdef PRT_TURN_BACK
-    prtView = prtTurnBack * prtView;
+    #ifdef USE_INSTANCING
+      prtView = transpose( prtInstanceTurn() ) * prtView;
+    #else
+      prtView = prtTurnBack * prtView;
+    #endif
   #endif
   prtReflect( lambentReceiver, prtView, vPrtGloss, vPrtFront );
   #ifdef PRT_TWO_SIDED

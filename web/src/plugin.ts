@@ -9,6 +9,7 @@ import { loadLattice, type Lattice } from './lattice.js';
 import type { Lighting } from './lighting.js';
 import type { NodeEdition } from './node_edition.js';
 import { firstColumns, unpackView } from './packed_views.js';
+import { takeLights } from './under_lights.js';
 
 export interface BakedScene {
   transfer: BakedTransfer;
@@ -22,6 +23,11 @@ export interface BakedScene {
    * relight() anew.
    */
   refine(values: ArrayBuffer): void;
+  /**
+   * Whether the program's directional lights, points and spots light the surfaces, too, with their shadow maps; what
+   * they send is not in the bake, and does not bounce. Throws LambentError where surfaces are not diffuse.
+   */
+  takeLights(on?: boolean): void;
   dispose(): void;
 }
 
@@ -174,6 +180,7 @@ export class LambentTransferPlugin implements GLTFLoaderPlugin {
         transfer.refine(values);
         if (last) baked.relight(last);
       },
+      takeLights: (on = true) => takeLights(transfer, this.nodes, on),
       dispose: () => {
         transfer.dispose();
         lattice?.dispose();

@@ -10,6 +10,7 @@ import {
   type WebGLProgramParametersWithUniforms,
 } from 'three';
 import type { BlockLayout } from './block_texture.js';
+import { checkInstances, isInstanced } from './instanced.js';
 import { setPeaks } from './light_sum.js';
 import { copyNodes } from './node_edition.js';
 import { drawFilter, glassParameters, type Drawn } from './see_through.js';
@@ -138,10 +139,12 @@ vec4 prtValues( const in uint receiver, const in int k ) {
   #else
     uniform mat3 prtRestInverse;
   #endif
-  // The orthogonal part of a gradient: Higham's iteration, whose error squares at each step. Flat gradients keep the
-  // axes.
+  // The orthogonal part of a gradient of any size: Higham's iteration, whose error squares at each step. Flat gradients
+  // keep the axes.
   mat3 prtOrthogonal( const in mat3 gradient ) {
-    mat3 q = gradient;
+    float size = sqrt( ( dot( gradient[ 0 ], gradient[ 0 ] ) + dot( gradient[ 1 ], gradient[ 1 ] ) +
+                         dot( gradient[ 2 ], gradient[ 2 ] ) ) / 3.0 );
+    mat3 q = gradient / max( size, 1e-30 );
     for ( int i = 0; i < 6; ++ i ) {
       if ( abs( determinant( q ) ) < 1e-6 ) return mat3( 1.0 );
       q = 0.5 * ( q + transpose( inverse( q ) ) );
@@ -160,7 +163,11 @@ const turnBody = /* glsl */ `
                    + skinWeight.z * prtRestBone( skinIndex.z ) + skinWeight.w * prtRestBone( skinIndex.w );
       prtFrame = prtOrthogonal( prtNow * inverse( prtThen ) );
     #else
-      prtFrame = prtOrthogonal( mat3( modelMatrix ) * prtRestInverse );
+      mat3 prtNow = mat3( modelMatrix );
+      #ifdef USE_INSTANCING
+        prtNow = prtNow * mat3( instanceMatrix );
+      #endif
+      prtFrame = prtOrthogonal( prtNow * prtRestInverse );
     #endif
   #endif
 `;
@@ -209,10 +216,18 @@ export function useExitRadiance(
   addsGloss = false,
 ): string {
   const radiance = addsGloss ? 'prtExitRadiance()' : 'max( prtExitRadiance(), vec3( 0.0 ) )';
+  // Under the program's lights (under_lights.ts), of which what is sent straight counts and nothing else.
+  const takesLights = !fragmentShader.includes(whiteLine) && fragmentShader.includes('#define LAMBERT'),
+    direct = `#include <lights_fragment_end>
+  vec3 prtDirect = reflectedLight.directDiffuse;
+  reflectedLight.directDiffuse = vec3( 0.0 );
+  reflectedLight.indirectDiffuse = diffuseColor.rgb * ${radiance};`;
   const lit =
     falseColorScale +
     declarations +
-    replaceOnce(fragmentShader, whiteLine, `reflectedLight.indirectDiffuse += ${radiance};`);
+    (takesLights
+      ? replaceOnce(fragmentShader, '#include <lights_fragment_end>', direct)
+      : replaceOnce(fragmentShader, whiteLine, `reflectedLight.indirectDiffuse += ${radiance};`));
   const gloss = `#ifdef PRT_PEAKS
     outgoingLight = max( outgoingLight + prtGloss(), vec3( 0.0 ) ) +
                     max( diffuseColor.rgb * prtPeakExitRadiance() + prtPeakGloss(), vec3( 0.0 ) );
@@ -223,7 +238,9 @@ export function useExitRadiance(
     ? `outgoingLight = prtScale( prtGain * luminance( prtExitRadiance()${addsGloss ? ' + prtGloss()' : ''} ) );`
     : addsGloss
       ? gloss
-      : '';
+      : takesLights
+        ? 'outgoingLight += prtDirect;'
+        : '';
   return last ? replaceOnce(lit, '#include <opaque_fragment>', `${last}\n#include <opaque_fragment>`) : lit;
 }
 
@@ -301,8 +318,10 @@ export class PrtMaterial extends MeshBasicMaterial {
   }
 
   override onBeforeRender(...drawn: Drawn): void {
-    const { sums } = this.options;
-    sums?.update(drawn[0], drawn[4]);
+    const { sums, rest } = this.options,
+      object = drawn[4];
+    sums?.update(drawn[0], object);
+    if (rest && 'inverse' in rest && isInstanced(object)) checkInstances(object, rest.inverse);
     setPeaks(this, sums ? sums.hasPeaks : this.prtUniforms.prtHasPeaks.value);
     drawFilter(this, ...drawn);
   }
@@ -312,6 +331,7 @@ export class PrtMaterial extends MeshBasicMaterial {
     Object.assign(
       shader.uniforms,
       sums ? { prtSums: sums.rest, prtPeakSums: sums.peaks } : this.prtUniforms,
+      sums?.instances?.uniforms(this.prtUniforms.prtTransfer.value),
       falseColor && { prtGain: falseColor.gain },
       rest && ('bones' in rest ? { prtRestBones: { value: rest.bones } } : { prtRestInverse: { value: rest.inverse } }),
     );

@@ -15,7 +15,15 @@ import {
   type WebGLProgramParametersWithUniforms,
   type WebGLRenderer,
 } from 'three';
-import { checkNodes, isNodeRenderer, onlyGlsl, setNodes, type Renderer } from './node_edition.js';
+import {
+  checkNodes,
+  isNodeRenderer,
+  setNodes,
+  withoutEdition,
+  type NodeEdition,
+  type NodeRelief,
+  type Renderer,
+} from './node_edition.js';
 import { blockTexture, packBlocks, type BlockLayout } from './block_texture.js';
 import { LambentError } from './errors.js';
 import { glslHarmonics } from './glsl_harmonics.js';
@@ -169,8 +177,6 @@ vec3 prtExitRadiance() {
 `;
 };
 
-const textureRefusal = onlyGlsl('shaded by a transfer texture');
-
 /**
  * What shows a transfer texture: white is its exit radiance, and all else a MeshBasicMaterial's own. Meshes need
  * texture coordinates and normals.
@@ -180,13 +186,17 @@ export class TransferTextureMaterial extends MeshBasicMaterial {
   readonly tile = new Vector2(1, 1);
   private readonly light: Float32Array;
   private readonly table: DrawnPicture;
+  private readonly relief: NodeRelief | undefined; // for WebGPURenderer
 
+  /** `nodes`, of lambent-three/webgpu: WebGPURenderer draws it, too. */
   constructor(
     readonly transfer: TransferTexture,
     parameters: MeshBasicMaterialParameters = {},
+    nodes?: NodeEdition,
   ) {
     super(parameters);
-    setNodes(this, undefined, `This surface ${textureRefusal}.`);
+    this.relief = nodes?.relief({ transfer, tile: this.tile, width: tableWidth, height: tableHeight });
+    setNodes(this, this.relief?.nodes, `This surface ${withoutEdition}.`);
     const { order, lobes } = transfer,
       exact = exactZonalBands(order, lobes),
       quads = Math.ceil(shCount(order) / 4);
@@ -208,13 +218,15 @@ export class TransferTextureMaterial extends MeshBasicMaterial {
 
   /** Shows it under this light. A few hundred bytes of uniforms; the table is drawn before the next frame. */
   relight(lighting: Lighting): void {
-    packLight(this.light, lighting.coefficients(this.transfer.order));
+    const light = lighting.coefficients(this.transfer.order);
+    packLight(this.light, light);
+    this.relief?.set(light);
     this.table.refresh();
   }
 
   /** Throws LambentError where the graphics card lacks what this is drawn with. */
   check(renderer: Renderer): void {
-    if (isNodeRenderer(renderer)) return checkNodes(renderer, textureRefusal);
+    if (isNodeRenderer(renderer)) return checkNodes(renderer, this.relief ? undefined : withoutEdition);
     this.table.check(renderer);
   }
 
@@ -242,6 +254,7 @@ export class TransferTextureMaterial extends MeshBasicMaterial {
 
   override dispose(): void {
     this.table.dispose();
+    this.relief?.dispose();
     super.dispose();
   }
 }

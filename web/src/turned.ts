@@ -9,6 +9,7 @@ import {
   type Texture,
   type WebGLRenderer,
 } from 'three';
+import { InstancedLights, isInstanced, refuseInstances } from './instanced.js';
 import { orthogonalPart } from './lobes.js';
 import { makeShRotation, rotateSh } from './sh_rotation.js';
 import { shCount } from './sh.js';
@@ -19,7 +20,11 @@ export class RestPose {
   private readonly whole = new WeakMap<BufferGeometry, Matrix4>();
   private readonly linear = new Matrix3();
 
-  constructor(meshes: readonly Mesh[]) {
+  /** `followsInstances`: of an InstancedMesh each, by who uses this. */
+  constructor(
+    meshes: readonly Mesh[],
+    private readonly followsInstances = false,
+  ) {
     for (const mesh of meshes) {
       if ('isSkinnedMesh' in mesh) continue;
       mesh.updateWorldMatrix(true, false);
@@ -30,10 +35,15 @@ export class RestPose {
     }
   }
 
+  inverseOf(object: Object3D): Matrix3 | undefined {
+    return this.inverse.get((object as Mesh).geometry);
+  }
+
   /** The turn of a mesh, or of a clone of it, since then; undefined where there is none. */
   turnOf(object: Object3D): Matrix3 | undefined {
-    const rest = this.inverse.get((object as Mesh).geometry);
+    const rest = this.inverseOf(object);
     if (!rest) return undefined;
+    if (!this.followsInstances && isInstanced(object)) refuseInstances(object, rest);
     const turn = orthogonalPart(this.linear.setFromMatrix4(object.matrixWorld).multiply(rest));
     const isTurned = turn.elements.some((v, i) => Math.abs(v - (i % 4 === 0 ? 1 : 0)) > 1e-5);
     return isTurned ? turn : undefined;
@@ -119,16 +129,20 @@ export class TurnedSums<S extends Sums> {
   readonly peaks: { value: Texture };
   /** From the world into the axes that were baked. */
   readonly turnBack = { value: new Matrix3() };
+  /** Of what follows each instance of an InstancedMesh. */
+  readonly instances: InstancedLights | undefined;
   private light: Light | undefined;
   private readonly turned: Alike<{ sums: S; how: readonly number[]; of: Light | undefined }>;
 
-  /** `order` of the light's harmonics. */
+  /** `order` of the light's harmonics; `quads` of it a channel, where shaders sum up for each instance. */
   constructor(
     make: () => S,
     private readonly order: number,
     private readonly pose?: RestPose,
+    quads = 0,
   ) {
     this.main = make();
+    if (quads > 0) this.instances = new InstancedLights(order, quads, pose);
     this.turned = new Alike(() => ({ sums: make(), how: [], of: undefined }));
     this.rest = { value: this.main.pictures.rest };
     this.peaks = { value: this.main.pictures.peaks };
@@ -141,10 +155,16 @@ export class TurnedSums<S extends Sums> {
   set(rest: ArrayLike<number>, peaks: ArrayLike<number> | undefined): void {
     this.light = { rest, peaks };
     this.main.set(rest, peaks);
+    this.instances?.set(rest, peaks);
   }
 
   /** Before `object` is drawn. */
   update(renderer: WebGLRenderer, object: Object3D): void {
+    if (this.instances && isInstanced(object)) {
+      this.instances.instances.value = this.instances.of(object);
+      renderer.state.useProgram(null!);
+      return;
+    }
     const turn = this.pose?.turnOf(object),
       sums = turn ? this.sumsFor(object, turn) : this.main;
     sums.update(renderer);
@@ -170,6 +190,7 @@ export class TurnedSums<S extends Sums> {
 
   dispose(): void {
     this.main.dispose();
+    this.instances?.dispose();
     for (const { sums } of this.turned.all) sums.dispose();
     this.turned.clear();
   }

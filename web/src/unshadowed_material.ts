@@ -4,7 +4,7 @@
 import { MeshBasicMaterial, type WebGLProgramParametersWithUniforms, type MeshBasicMaterialParameters } from 'three';
 import { glslHarmonics } from './glsl_harmonics.js';
 import type { Lighting } from './lighting.js';
-import { onlyGlsl, setNodes } from './node_edition.js';
+import { setNodes, throughGlass, withoutEdition, type NodeEdition, type NodeUnshadowed } from './node_edition.js';
 import { setPeaks } from './light_sum.js';
 import { replaceOnce, whiteLine } from './prt_material.js';
 import { drawFilter, type Drawn } from './see_through.js';
@@ -27,12 +27,17 @@ export class UnshadowedMaterial extends MeshBasicMaterial {
   private readonly light: { value: Float32Array };
   private readonly peaks: { value: Float32Array };
 
+  private readonly unshadowed: NodeUnshadowed | undefined;
+
+  /** `nodes`, of lambent-three/webgpu: WebGPURenderer draws it, too. */
   constructor(
     readonly order: number,
     parameters: MeshBasicMaterialParameters = {},
+    nodes?: NodeEdition,
   ) {
     super(parameters);
-    setNodes(this, undefined, `This surface ${onlyGlsl('drawn without shadows')}.`);
+    this.unshadowed = nodes?.unshadowed(order, irradianceIndices(order));
+    setNodes(this, nodes && throughGlass(nodes, this, this.unshadowed!.nodes), `This surface ${withoutEdition}.`);
     this.light = { value: new Float32Array(3 * irradianceIndices(order).length) };
     this.peaks = { value: new Float32Array(this.light.value.length) };
   }
@@ -46,6 +51,7 @@ export class UnshadowedMaterial extends MeshBasicMaterial {
     pack(this.light.value, rest);
     if (peaks) pack(this.peaks.value, peaks);
     setPeaks(this, peaks !== undefined);
+    this.unshadowed?.set(this.light.value, peaks && this.peaks.value);
   }
 
   override onBeforeRender(...drawn: Drawn): void {

@@ -10,14 +10,24 @@ import {
   type Texture,
   type WebGLRenderer,
 } from 'three';
+import { glslInstances } from './instanced.js';
 import type { BlockLayout } from './block_texture.js';
 import { LightSum, LightSums } from './light_sum.js';
 import type { Sums } from './turned.js';
 
 const columns = 2048; // receivers a row of the picture
 
-/** GLSL: vec3 prtRadiance( uint receiver ), what there is in prtSums. */
+/** GLSL: vec3 prtRadiance( uint receiver ), what there is in prtSums; of an instance, which has none, its sum. */
 export const lookUpSums = /* glsl */ `
+${glslInstances}
+#ifdef USE_INSTANCING
+vec3 prtRadiance( const in uint receiver ) {
+  if ( receiver == 0xffffffffu ) return vec3( 0.0 );
+  vec3 rest = prtInstanceSum( int( receiver ), 0, 0 );
+  if ( ! prtInstancePeaks ) return rest;
+  return max( rest, vec3( 0.0 ) ) + max( prtInstanceSum( int( receiver ), 0, 1 ), vec3( 0.0 ) );
+}
+#else
 uniform highp sampler2D prtSums;
 #ifdef PRT_PEAKS
   uniform highp sampler2D prtPeakSums;
@@ -31,6 +41,7 @@ vec3 prtRadiance( const in uint receiver ) {
   #endif
   return sum;
 }
+#endif
 `;
 
 export interface VertexSumOptions {

@@ -35,6 +35,7 @@ import {
 } from './node_edition.js';
 import { afterAll, packLight } from './light_sum.js';
 import { surfaceFrame, type Lobe } from './lobes.js';
+import { keepNormals } from './own_normals.js';
 import { checkReflection, reflectionBytes, reflectionUniforms, type LastReflection } from './outgoing.js';
 import { diffuseParameters, PrtMaterial, type PrtOptions, type PrtShader, type PrtUniforms } from './prt_material.js';
 import { shCount } from './sh.js';
@@ -74,6 +75,12 @@ function restBones(mesh: SkinnedMesh): DataTexture {
   const texture = new DataTexture(data, size, size, RGBAFormat, FloatType);
   texture.needsUpdate = true;
   return texture;
+}
+
+/** What kinds are drawn from by WebGPURenderer. */
+interface NodeValues {
+  sum?: NodeSum | undefined;
+  lobes?: NodeLobes | undefined;
 }
 
 const errorWidth = 2048;
@@ -121,6 +128,7 @@ export interface VertexKind {
 
 export class VertexTransfer implements BakedTransfer {
   readonly kind: string;
+  readonly isDiffuse: boolean;
   readonly order: number;
   readonly channels: number;
   readonly receivers: number;
@@ -140,7 +148,8 @@ export class VertexTransfer implements BakedTransfer {
   private readonly summing: VertexSumOptions | undefined; // of a shader that is summed
   private readonly sums: TurnedSums<VertexSums> | undefined; // for WebGLRenderer
   private readonly ofCoefficients = new Set<TurnedSums<VertexSums>>();
-  private readonly sum: NodeSum | undefined; // for WebGPURenderer
+  private readonly makeNodes: ((pose?: RestPose) => NodeValues) | undefined; // for WebGPURenderer
+  private readonly sum: NodeSum | undefined;
   private readonly lobes: NodeLobes | undefined;
   /** Why WebGPURenderer does not draw this. */
   private readonly refusal: string | undefined;
@@ -150,10 +159,11 @@ export class VertexTransfer implements BakedTransfer {
     { kind, count, valueChannels, shader, readLobes, fitErrors, last, lobeCount }: VertexKind,
     values: ArrayBuffer,
     readonly meshes: Mesh[],
-    nodes?: NodeEdition,
+    private readonly nodes?: NodeEdition,
     firstBands?: number,
   ) {
     this.kind = kind;
+    this.isDiffuse = last === undefined;
     this.order = header.order;
     this.channels = header.channels;
     this.receivers = header.receivers;
@@ -178,14 +188,17 @@ export class VertexTransfer implements BakedTransfer {
     const summing = { layout, transfer: this.texture, channels: header.channels, receivers: header.receivers };
     if (shader.summed) {
       this.summing = summing;
-      const pose = new RestPose(meshes);
-      this.sums = new TurnedSums(() => new VertexSums(summing), header.order, pose);
-      this.sum = nodes?.sum({ ...summing, order: header.order, pose });
+      const pose = new RestPose(meshes, true);
+      this.sums = new TurnedSums(() => new VertexSums(summing), header.order, pose, layout.quads);
+      this.makeNodes = (of = pose): NodeValues => ({ sum: nodes?.sum({ ...summing, order: header.order, pose: of }) });
     } else if (lobeCount !== undefined)
-      this.lobes = nodes?.lobes({
-        ...{ layout, transfer: this.texture, order: header.order, channels: header.channels, lobes: lobeCount },
-        ...(last && { last }),
+      this.makeNodes = (): NodeValues => ({
+        lobes: nodes?.lobes({
+          ...{ layout, transfer: this.texture, order: header.order, channels: header.channels, lobes: lobeCount },
+          ...(last && { last }),
+        }),
       });
+    ({ sum: this.sum, lobes: this.lobes } = this.makeNodes?.() ?? {});
     let gpuBytes =
       data.byteLength + (last ? reflectionBytes(last) : 0) + (this.sums?.main.bytes ?? 0) + (this.sum?.bytes ?? 0);
     for (const mesh of meshes) {
@@ -208,9 +221,10 @@ export class VertexTransfer implements BakedTransfer {
         key = `${source.uuid} ${twoSided} ${rest ? mesh.uuid : ''}`;
       const material = this.materials.get(key) ?? new PrtMaterial(this.uniforms, options, diffuseParameters(source));
       this.materials.set(key, material);
+      keepNormals(source, material);
       setNodes(
         material,
-        nodes && throughGlass(nodes, material, this.nodesFor(nodes, mesh, twoSided, rest)),
+        nodes && throughGlass(nodes, material, this.nodesFor(nodes, mesh, options)),
         `The baked scene ${this.refusal}.`,
       );
       mesh.material = material;
@@ -223,7 +237,7 @@ export class VertexTransfer implements BakedTransfer {
           prtHasPeaks: { value: false },
           prtErrors: { value: (this.errors ??= errorTexture(fitErrors)) },
         };
-        return meshes.map(
+        const made = meshes.map(
           (mesh, i) =>
             new PrtMaterial(
               uniforms,
@@ -231,6 +245,8 @@ export class VertexTransfer implements BakedTransfer {
               { side: (mesh.material as Material).side },
             ),
         );
+        this.inFalseColor(made, gain, (i) => nodes!.numbers(this.errors!, this.optionsOf[i]!.twoSided));
+        return made;
       };
     if (readLobes)
       this.lobesAt = (mesh, vertex, back) => {
@@ -247,11 +263,22 @@ export class VertexTransfer implements BakedTransfer {
       };
   }
 
-  private nodesFor(nodes: NodeEdition, mesh: Mesh, twoSided: boolean, rest: PrtOptions['rest']): MaterialNodes {
-    if (this.sum) return { colorNode: nodes.atVertices(this.sum, twoSided) };
+  private nodesFor(
+    nodes: NodeEdition,
+    mesh: Mesh,
+    { twoSided, rest }: Pick<PrtOptions, 'twoSided' | 'rest'>,
+    { sum, lobes }: NodeValues = { sum: this.sum, lobes: this.lobes },
+  ): MaterialNodes {
+    if (sum) return { colorNode: nodes.atVertices(sum, twoSided) };
     const pose: NodeRest =
       'bones' in rest! ? { bones: rest.bones, count: (mesh as SkinnedMesh).skeleton.bones.length } : rest!;
-    return this.lobes!.material(twoSided, pose);
+    return lobes!.material(twoSided, pose);
+  }
+
+  /** Dresses materials for WebGPURenderer. */
+  private inFalseColor(made: Material[], gain: { value: number }, of: (i: number) => MaterialNodes): void {
+    const { nodes } = this;
+    made.forEach((material, i) => setNodes(material, nodes?.falseColor(of(i), gain), `The view ${withoutNodes}.`));
   }
 
   private restOf(mesh: Mesh): NonNullable<PrtOptions['rest']> {
@@ -321,7 +348,7 @@ export class VertexTransfer implements BakedTransfer {
   coefficientMaterials(index: number, gain: { value: number }): Material[] {
     const light = new Float64Array(3 * shCount(this.order)).fill(1, 3 * index, 3 * index + 3);
     const { summing } = this,
-      sums = summing && new TurnedSums(() => new VertexSums(summing), this.order);
+      sums = summing && new TurnedSums(() => new VertexSums(summing), this.order, undefined, summing.layout.quads);
     sums?.set(light, undefined);
     if (sums) this.ofCoefficients.add(sums);
     const uniforms = {
@@ -339,12 +366,18 @@ export class VertexTransfer implements BakedTransfer {
         ),
     );
     if (sums) afterAll(made, () => (this.ofCoefficients.delete(sums), sums.dispose()));
+    const values = this.nodes ? (this.makeNodes?.(new RestPose([], true)) ?? {}) : {};
+    values.sum?.set(light, undefined, false);
+    values.lobes?.set(light, undefined);
+    afterAll(made, () => (values.sum ?? values.lobes)?.dispose());
+    this.inFalseColor(made, gain, (i) => this.nodesFor(this.nodes!, this.meshes[i]!, this.optionsOf[i]!, values));
     return made;
   }
 
   dispose(): void {
     this.texture.dispose();
     this.sum?.dispose();
+    this.lobes?.dispose();
     this.sums?.dispose();
     for (const sums of this.ofCoefficients) sums.dispose();
     this.errors?.dispose();

@@ -100,6 +100,9 @@ describe('the frame of a surface', () => {
   it('is the rotation of a stretched one, and the identity of a flat one', () => {
     const stretch = new Matrix3().set(2, 0.3, 0, 0.3, 1, 0.2, 0, 0.2, 0.5);
     near(orthogonalPart(rotation.clone().multiply(stretch)), rotation);
+    // In units of any size.
+    for (const size of [1e-4, 0.01, 300])
+      near(orthogonalPart(rotation.clone().multiply(stretch).multiplyScalar(size)), rotation);
     near(orthogonalPart(new Matrix3().set(1, 0, 0, 0, 1, 0, 0, 0, 0)), new Matrix3());
   });
 
