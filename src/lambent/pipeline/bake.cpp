@@ -442,7 +442,7 @@ Result<BakeOutcome> bake_plain(const BakeRequest& request, const BakePlan& plan,
   if (!request.lattice.empty() && plan.kind != BakeKind::indirect) {
     auto parsed = lattice_of_request(request, b.scene);
     if (!parsed) return parsed.error();
-    if (auto ok = check_lattice(*parsed, plan.bake.order, plan.lattice); !ok) return ok.error();
+    if (auto ok = check_lattice(*parsed, plan.bake.light(), plan.lattice); !ok) return ok.error();
     lattice = *parsed;
   }
   std::optional<View> view;
