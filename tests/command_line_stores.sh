@@ -211,6 +211,11 @@ expect 2 'seed: is of the rays that bounce' bake corner.obj --light haar:32 --bo
 expect 0 'a pixel' bake corner.obj --max-edge 0.1 --light haar:32,error=0.001 --visibility binary \
   --fix-view 3,2,4,1,0.5,1,40 --size 48x32 --spp 16 -o haar_view.glb
 expect 0 'fixed view of 48 x 32' inspect haar_view.glb
+# Said before they are traced, by what a few receivers keep.
+expect 2 'size: 4000x4000 pixels in wavelets would take about' bake corner.obj --max-edge 0.1 --light haar:64,keep=0.1 \
+  --fix-view 3,2,4,1,0.5,1,20 --size 4000x4000 -o x.glb
+absent x.glb
+expect 0 ' a pixel, .* 1,536 pixels' inspect haar_view.glb
 expect 0 'bytes_read' render haar_view.glb --env sky:elevation=50,azimuth=20,sun=on --background none \
   -o haar_view.exr --json
 expect 0 'shaded' render blocks.glb "${view[@]}" --brdf diffuse --method standard --spp 16 -o by_texels.exr
