@@ -1,6 +1,6 @@
 #!/usr/bin/env python3
-# Panels of 8-bit RGB pictures side by side: beside.py OUT.png WIDTHxHEIGHT FILE.png:PANEL/COUNT ..., panel PANEL (from 0)
-# of COUNT of equal width. `lambent compare -o` writes three: a picture, the truth, their difference, below a line of
+# Panels of 8-bit RGB pictures side by side: beside.py OUT.png WIDTHxHEIGHT FILE.png:PANEL/COUNT ..., panel PANEL (from
+# 0) of COUNT of equal width. `lambent compare -o` writes three: a picture, the truth, their difference, below a line of
 # names, which is left out.
 import struct, sys, zlib
 

@@ -1,7 +1,7 @@
 #!/usr/bin/env bash
-# The strip of a brick wall half in shadow in docs/zonal.md, into out/relief-strip/strip.png: the bake without relief, the relief
-# in the light that arrives, and its displaced geometry path-traced under the same six bands of light; then one JSON
-# line, decibels of the second (and of the first) against the last, without its noise. Some three minutes.
+# The strip of a brick wall half in shadow in docs/zonal.md, into out/relief-strip/strip.png: the bake without relief,
+# the relief in the light that arrives, and its displaced geometry path-traced under the same six bands of light; then
+# one JSON line, decibels of the second (and of the first) against the last, without its noise. Some three minutes.
 #   SPP=512 SIZE=288x216 scripts/bench relief-strip
 source "$(dirname "$0")/common.sh"
 out=out/relief-strip size=${SIZE:-192x144} spp=${SPP:-160}
@@ -15,8 +15,8 @@ def png(path, rows, depth, colour):  # rows of bytes
     def chunk(kind, data):
         return struct.pack(">I", len(data)) + kind + data + struct.pack(">I", zlib.crc32(kind + data))
     data = zlib.compress(b"".join(b"\0" + bytes(row) for row in rows), 9)
-    open(path, "wb").write(b"\x89PNG\r\n\x1a\n" + chunk(b"IHDR", struct.pack(">IIBBBBB", n, n, depth, colour, 0, 0, 0)) +
-                           chunk(b"IDAT", data) + chunk(b"IEND", b""))
+    header = struct.pack(">IIBBBBB", n, n, depth, colour, 0, 0, 0)
+    open(path, "wb").write(b"\x89PNG\r\n\x1a\n" + chunk(b"IHDR", header) + chunk(b"IDAT", data) + chunk(b"IEND", b""))
 random.seed(7)
 bricks = {(c, b): [random.uniform(-1, 1) for _ in range(5)] for c in range(4) for b in range(2)}
 waves = [(random.randint(-9, 9), random.randint(-9, 9), random.uniform(0, 6.3)) for _ in range(24)]
@@ -86,5 +86,6 @@ for name in flat relief; do
     -o $out/$name.png --json >$out/$name.json
 done
 python3 bench/beside.py $out/strip.png "$size" $out/flat.png:0/3 $out/relief.png:0/3 $out/relief.png:1/3
-echo "{\"name\": \"relief_strip\", \"ours\": $(number sloped $out/relief.json), \"without\": $(number sloped $out/flat.json)," \
+echo "{\"name\": \"relief_strip\", \"ours\": $(number sloped $out/relief.json)," \
+  "\"without\": $(number sloped $out/flat.json)," \
   "\"limit\": 30, \"unit\": \"dB\", \"limit_is\": \"what we ask for\", \"exposure\": $exposure}"

@@ -58,9 +58,10 @@ expect 0 'order 3,' bake corner.obj --samples 64 --light sh:3+lamps:4@uniform:1 
 expect 0 'order 3 and 2 lobes' bake corner.obj --samples 64 --lattice 2,2,2 \
   --light sh:3+lamps:1@$sun+lamps:1@$sun+lamps:1@sky:elevation=55,azimuth=150,width=256 -o lamps.glb
 expect 0 'held +[0-9.]+ % of the light' render lamps.glb --env $sun --size 8x8 -o moved.png
-expect 0 'lamp 1 by [0-9.]+ degrees, .* of its energy held: [0-9.]+ % of the light is lost' render lamps.glb --env $sun \
-  --move 1@150,55 --size 8x8 -o moved.png
-expect 0 '"lost"' render lamps.glb --env $sun --move '1@0:120,55;1:150,55' --frames 0:1:0.5 --size 8x8 -o moved.png --json
+expect 0 'lamp 1 by [0-9.]+ degrees, .* of its energy held: [0-9.]+ % of the light is lost' render lamps.glb \
+  --env $sun --move 1@150,55 --size 8x8 -o moved.png
+expect 0 '"lost"' render lamps.glb --env $sun --move '1@0:120,55;1:150,55' --frames 0:1:0.5 --size 8x8 \
+  -o moved.png --json
 expect 0 'relit' render lamps.glb --env $sun --insert corner.obj@1,0.1,1,0.2 --size 8x8 -o moved.png
 expect 2 'move: there is no lamp 3 but 2' render lamps.glb --env $sun --move 3@150,55 -o x.png
 expect 2 'move: needs lamps beside harmonics' render compact.glb --env $sun --move 1@150,55 -o x.png
