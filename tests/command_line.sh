@@ -202,6 +202,8 @@ expect 2 'lattice: is lit by harmonics alone' bake corner.obj --light directiona
 expect 2 'together' bake corner.obj --light sh:12 --lattice 2,2,2 --lattice-order 6 -o x.glb
 expect 2 'simulate paths' bake corner.obj --transfer matrix --simulate paths --light sh:3+lamps:1@sky:elevation=55 \
   -o x.glb
+expect 2 'light: does not go with lightmaps.* --receivers texels' bake corner.obj --transfer lightmap \
+  --light sh:3+lamps:1@sky:elevation=55 -o x.glb
 expect 2 'light: does not go with zonal transfer' bake corner.obj --transfer zonal --light directional:9 -o x.glb
 expect 2 'scene: is needed' bake
 expect 2 'subcommand is required' nonsense

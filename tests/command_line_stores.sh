@@ -54,6 +54,18 @@ expect 2 'env: is needed' render lamps.glb -o x.png
 expect 0 'lamps? that stands? out, not 64' bake corner.obj --samples 64 --bounces 0 --light sh:5+lamps:64@$sun \
   -o lamps.glb
 expect 0 'order 3,' bake corner.obj --samples 64 --light sh:3+lamps:4@uniform:1 -o lamps.glb
+# Lamps that move, and what is lost; lobes along their way; in free space.
+expect 0 'order 3 and 2 lobes' bake corner.obj --samples 64 --lattice 2,2,2 \
+  --light sh:3+lamps:1@$sun+lamps:1@$sun+lamps:1@sky:elevation=55,azimuth=150,width=256 -o lamps.glb
+expect 0 'held +[0-9.]+ % of the light' render lamps.glb --env $sun --size 8x8 -o moved.png
+expect 0 'lamp 1 by [0-9.]+ degrees, .* of its energy held: [0-9.]+ % of the light is lost' render lamps.glb \
+  --env $sun --move 1@150,55 --size 8x8 -o moved.png
+expect 0 '"lost"' render lamps.glb --env $sun --move '1@0:120,55;1:150,55' --frames 0:1:0.5 --size 8x8 \
+  -o moved.png --json
+expect 0 'relit' render lamps.glb --env $sun --insert corner.obj@1,0.1,1,0.2 --size 8x8 -o moved.png
+expect 2 'move: there is no lamp 3 but 2' render lamps.glb --env $sun --move 3@150,55 -o x.png
+expect 2 'move: needs lamps beside harmonics' render compact.glb --env $sun --move 1@150,55 -o x.png
+expect 2 'move: .*lamps:COUNT@ENV' render sh.glb --env $sun --move 1@150,55 -o x.png
 # Factors: the pictures of a matrix bake of direct light, in fewer bytes; the material is still free. Phong's lobe by
 # convolution.
 "$tool" bake corner.obj --max-edge 0.5 --samples 64 --transfer matrix --brdf ggx:roughness=0.5 --order 3 \
@@ -200,6 +212,11 @@ expect 2 'seed: is of the rays that bounce' bake corner.obj --light haar:32 --bo
 expect 0 'a pixel' bake corner.obj --max-edge 0.1 --light haar:32,error=0.001 --visibility binary \
   --fix-view 3,2,4,1,0.5,1,40 --size 48x32 --spp 16 -o haar_view.glb
 expect 0 'fixed view of 48 x 32' inspect haar_view.glb
+# Said before they are traced, by what a few receivers keep.
+expect 2 'size: 4000x4000 pixels in wavelets would take about' bake corner.obj --max-edge 0.1 --light haar:64,keep=0.1 \
+  --fix-view 3,2,4,1,0.5,1,20 --size 4000x4000 -o x.glb
+absent x.glb
+expect 0 ' a pixel, .* 1,536 pixels' inspect haar_view.glb
 expect 0 'bytes_read' render haar_view.glb --env sky:elevation=50,azimuth=20,sun=on --background none \
   -o haar_view.exr --json
 expect 0 'shaded' render blocks.glb "${view[@]}" --brdf diffuse --method standard --spp 16 -o by_texels.exr

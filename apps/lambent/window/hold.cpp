@@ -105,6 +105,8 @@ double end_of_motion(const DrawRequest& request, const Scene& scene) {
   for (const std::string& text : request.lamp)
     if (auto lamp = parse_moving_lamp(text, scene.origin); lamp && names_moving_lamp(text)) lamps->push_back(*lamp);
   for (const std::string& text : request.move)
+    if (auto arc = parse_lamp_arc(text, SIZE_MAX)) end = std::max(end, arc->places.back().first);
+  for (const std::string& text : request.move)
     if (auto path = parse_lamp_path(text, *lamps, scene.origin)) end = std::max(end, path->places.back().first);
   return end;
 }

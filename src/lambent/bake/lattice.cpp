@@ -4,6 +4,7 @@
 #include <lambent/bake/fan.h>
 #include <lambent/bake/gather.h>
 #include <lambent/bake/lattice.h>
+#include <lambent/bake/lobes.h>
 #include <lambent/bake/matrix_kernels.h>
 #include <lambent/basis/sh_product.h>
 #include <lambent/core/check.h>
@@ -27,6 +28,9 @@ struct LatticeScratch {
   std::vector<Passage> passages;
   std::vector<float> V, scalars, out;
   std::vector<ViewWeights> weights;
+  LobeRays lobe_rays;
+  AlignedVector<float> lobe;
+  std::vector<double> open;  // a broad lobe's rows with nothing in the way, less their sums over the rays
 };
 
 struct LatticeBaker {
@@ -42,9 +46,14 @@ struct LatticeBaker {
   ShZyzRotator rotator{setup.sets.order};
   AlignedVector<float> Y = unpack_surface();        // [receiver][row][channel][width]
   std::vector<float> shortfall = make_shortfall();  // [set][k]
+  // The rays of a point are spread over the sphere: as dense as a fan of a fourth of them about its axis.
+  LobeSets lobes =
+      make_lobe_sets(surface.light.lobe_kind, surface.light.lobes, std::max(1, options.samples / 4), options.seed);
+  std::vector<double> lobe_rows = make_lobe_rows();  // [lobe][j], of an open sky
   Pool<LatticeScratch> scratch{[this] { return make_scratch(); }};
 
   size_t C() const { return surface.columns(); }
+  size_t harmonics() const { return size_t(sh_count(surface.light.order)); }
   size_t J() const { return size_t(sh_count(options.order)); }
   size_t channels() const { return size_t(channel_count); }
   size_t rows() const { return size_t(surface.rows); }
@@ -85,6 +94,15 @@ struct LatticeBaker {
     return out;
   }
 
+  std::vector<double> make_lobe_rows() const {
+    if (lobes.count() == 0) return {};
+    const DirectionalBasis basis = make_directional_basis(options.order, surface.light.lobe_kind, surface.light.lobes);
+    std::vector<double> out(lobes.count() * J());
+    for (size_t k = 0; k < lobes.count(); ++k)
+      for (size_t j = 0; j < J(); ++j) out[k * J() + j] = basis.gram[(J() + k) * basis.count() + j];
+    return out;
+  }
+
   std::unique_ptr<LatticeScratch> make_scratch() const {
     auto s = std::make_unique<LatticeScratch>();
     const size_t stride = setup.sets.stride;
@@ -94,6 +112,7 @@ struct LatticeBaker {
     s->sum.resize(J() * wc()), s->v.resize(hit_batch * wc()), s->yb.resize(hit_batch * J());
     s->V.resize(V_count()), s->scalars.resize(rows() * channels()), s->out.resize(J() * channels() * C()),
         s->weights.resize(rows());
+    if (lobes.count()) s->lobe_rays = make_lobe_rays(lobes, setup.sky_channels), s->lobe.resize(stride);
     return s;
   }
 
@@ -110,6 +129,56 @@ struct LatticeBaker {
         for (size_t c = 0; c < channels(); ++c) s.scalars[row * channels() + c] = weight[int(c)];
       }
       add_weighted_rows(Y.data() + r * rows() * wc(), rows(), channels(), width(), s.scalars.data(), v);
+    }
+  }
+
+  // What a lobe sends here by the sky: out of `count` rays with a weight each, in its column.
+  void add_lobe_rays(LatticeScratch& s, size_t k, const Directions& d, size_t count, const float* weight,
+                     const std::vector<AlignedVector<float>>& visible) const {
+    float y[max_sh_order * max_sh_order];
+    for (size_t i = 0; i < count; ++i) {
+      evaluate_sh(options.order, Vec3(d.x[i], d.y[i], d.z[i]), {y, J()});
+      for (size_t c = 0; c < channels(); ++c) {
+        const float w = weight[i] * visible[visible.size() == 1 ? 0 : c][i];
+        if (w == 0) continue;
+        for (size_t j = 0; j < J(); ++j) s.out[(j * channels() + c) * C() + harmonics() + k] += w * y[j];
+      }
+    }
+  }
+
+  // Sharp lobes by rays of their own; broad ones by those of the point, and, as far as it sees the sky, what these lack
+  // of the whole lobe.
+  void add_lobes(LatticeScratch& s, size_t point, const std::array<float, 3>& seen) const {
+    for (size_t i = 0; i < lobes.sharp.size(); ++i) {
+      const size_t k = lobes.sharp[i];
+      LobeRays& r = s.lobe_rays;
+      const uint64_t bits = hash64(hash64(lobes.seed, k), point);
+      const size_t sets = lobes.x.size() / (lobes.sharp.size() * lobes.stride);
+      const size_t base = (i * sets + size_t(bits % sets)) * lobes.stride;
+      const float spin = 2 * pi * to_unit_float(uint32_t(bits >> 32)), cosine = std::cos(spin), sine = std::sin(spin);
+      const Mat3 turn = lobes.frames[k] * Mat3(Vec3(cosine, sine, 0), Vec3(-sine, cosine, 0), Vec3(0, 0, 1));
+      rotate_directions(turn, lobes.x.data() + base, lobes.y.data() + base, lobes.z.data() + base, lobes.stride,
+                        r.x.data(), r.y.data(), r.z.data());
+      const Directions d{r.x.data(), r.y.data(), r.z.data(), size_t(lobes.rays)};
+      trace_visible(setup.tracer, lattice.position(point), d, std::span(r.visible), nullptr);
+      std::fill(r.cosine.begin(), r.cosine.end(), lobes.integrals[k] / float(lobes.rays));
+      add_lobe_rays(s, k, d, d.count, r.cosine.data(), r.visible);
+    }
+    const Directions d{s.x.data(), s.y.data(), s.z.data(), rays()};
+    float y[max_sh_order * max_sh_order];
+    for (uint32_t k : lobes.broad) {
+      evaluate_on_fan(lobes, k, d.x, d.y, d.z, setup.sets.stride, s.lobe.data());
+      s.open.assign(lobe_rows.begin() + ptrdiff_t(k * J()), lobe_rows.begin() + ptrdiff_t((k + 1) * J()));
+      for (size_t i = 0; i < rays(); ++i) {
+        s.lobe[i] *= ray_angle();
+        evaluate_sh(options.order, Vec3(d.x[i], d.y[i], d.z[i]), {y, J()});
+        for (size_t j = 0; j < J(); ++j) s.open[j] -= double(s.lobe[i] * y[j]);
+      }
+      add_lobe_rays(s, k, d, rays(), s.lobe.data(), s.visible);
+      for (size_t j = 0; j < J(); ++j)
+        for (size_t c = 0; c < channels(); ++c)
+          s.out[(j * channels() + c) * C() + harmonics() + k] += float(s.open[j]) *
+                                                                 seen[s.visible.size() == 1 ? 0 : c] / float(rays());
     }
   }
 
@@ -173,6 +242,7 @@ struct LatticeBaker {
           for (size_t c = sky; c < (skies == 1 ? channels() : sky + 1); ++c)
             s.out[(tensor.j[e] * channels() + c) * C() + tensor.i[e]] += tensor.single[e] * s.V[k];
     }
+    if (lobes.count()) add_lobes(s, point, seen);
     store_receiver(out, point, s.out);
     return 2 * backs <= rays();
   }
@@ -238,8 +308,9 @@ bool is_coloured(const Outgoing& o) {
 }
 
 // The direction tables: eight sets (gather.cpp), harmonics and direction of each ray.
-size_t table_bytes(int light_order, const LatticeOptions& o) {
-  return 4 * 8 * pad_lanes(size_t(o.samples)) * size_t(sh_count(light_order + o.order - 1) + 3);
+size_t table_bytes(const LightBasis& light, const LatticeOptions& o) {
+  return 4 * 8 * pad_lanes(size_t(o.samples)) * size_t(sh_count(light.order + o.order - 1) + 3) +
+         lobe_set_bytes(o.samples, light.lobes.size());
 }
 
 Error too_little_memory(size_t needed, size_t allowed) {
@@ -255,14 +326,14 @@ Bounds default_lattice_box(const Scene& scene, int nx, int ny, int nz) {
   return {box.min + inset, box.max - inset};
 }
 
-size_t lattice_bytes(const Lattice& lattice, int light_order, int order, int channels, Precision precision) {
+size_t lattice_bytes(const Lattice& lattice, const LightBasis& light, int order, int channels, Precision precision) {
   Transfer t;
-  t.light.order = light_order, t.rows = sh_count(order), t.channels = channels, t.receivers = lattice.count(),
+  t.light = light, t.rows = sh_count(order), t.channels = channels, t.receivers = lattice.count(),
   t.precision = precision;
   return t.bytes();
 }
 
-Result<void> check_lattice(const Lattice& lattice, int light_order, const LatticeOptions& o) {
+Result<void> check_lattice(const Lattice& lattice, const LightBasis& light, const LatticeOptions& o) {
   auto within = [](const char* name, int value, int least, int most) -> Result<void> {
     if (value >= least && value <= most) return {};
     return Error{name, "must lie between " + std::to_string(least) + " and " + std::to_string(most) + ", not " +
@@ -271,14 +342,14 @@ Result<void> check_lattice(const Lattice& lattice, int light_order, const Lattic
   for (auto& ok : {within("lattice points along x", lattice.nx, 1, max_lattice_points),
                    within("lattice points along y", lattice.ny, 1, max_lattice_points),
                    within("lattice points along z", lattice.nz, 1, max_lattice_points),
-                   within("order", light_order, 1, max_sh_order), within("lattice order", o.order, 1, max_sh_order),
-                   within("order and lattice order together", light_order + o.order, 2, max_sh_order + 1),
+                   within("order", light.order, 1, max_sh_order), within("lattice order", o.order, 1, max_sh_order),
+                   within("order and lattice order together", light.order + o.order, 2, max_sh_order + 1),
                    within("lattice samples", o.samples, 1, 1 << 20)})
     if (!ok) return ok.error();
   for (int k = 0; k < 3; ++k)
     if (!std::isfinite(lattice.min[k]) || !std::isfinite(lattice.max[k]) || !(lattice.min[k] <= lattice.max[k]))
       return Error{"lattice", "its box is empty or not finite"};
-  const size_t least = lattice_bytes(lattice, light_order, o.order, 1, o.precision) + table_bytes(light_order, o);
+  const size_t least = lattice_bytes(lattice, light, o.order, 1, o.precision) + table_bytes(light, o);
   if (o.memory < least) return too_little_memory(least, o.memory);
   return {};
 }
@@ -286,9 +357,9 @@ Result<void> check_lattice(const Lattice& lattice, int light_order, const Lattic
 Result<LatticeTransfer> bake_lattice(const Scene& scene, const Tracer& tracer, const Receivers& receivers,
                                      const Transfer& surface, const Outgoing* outgoing, const Lattice& lattice,
                                      const LatticeOptions& options, LatticeReport* report, Progress* progress) {
-  LAMBENT_CHECK(surface.receivers == receivers.count() && surface.columns() == size_t(sh_count(surface.light.order)));
+  LAMBENT_CHECK(surface.receivers == receivers.count() && surface.light.groups.empty());
   LAMBENT_CHECK(surface.rows == (outgoing ? outgoing->rows() : 1));
-  if (auto ok = check_lattice(lattice, surface.light.order, options); !ok) return ok.error();
+  if (auto ok = check_lattice(lattice, surface.light, options); !ok) return ok.error();
   const auto start = std::chrono::steady_clock::now();
   const GatherSetup setup = make_gather_setup(scene, tracer, receivers, surface.light.order + options.order - 1,
                                               options.samples, options.seed, square_to_sphere, progress);
@@ -298,14 +369,12 @@ Result<LatticeTransfer> bake_lattice(const Scene& scene, const Tracer& tracer, c
                stride = setup.sets.stride;
   const size_t unpacked = 4 * surface.receivers * size_t(surface.rows) * wc;
   const size_t each_thread = stride * (16 + sizeof(Hit)) + 8 * (J + hit_batch) * wc;
-  const size_t bytes = lattice_bytes(lattice, surface.light.order, options.order, channels, options.precision);
-  const size_t needed = bytes + table_bytes(surface.light.order, options) + unpacked +
-                        size_t(thread_count()) * each_thread;
+  const size_t bytes = lattice_bytes(lattice, surface.light, options.order, channels, options.precision);
+  const size_t needed = bytes + table_bytes(surface.light, options) + unpacked + size_t(thread_count()) * each_thread;
   if (needed > options.memory) return too_little_memory(needed, options.memory);
 
   LatticeBaker baker{scene, surface, outgoing, lattice, options, setup, channels};
-  WritableTransfer out =
-      make_transfer({.order = surface.light.order}, int(J), channels, lattice.count(), options.precision);
+  WritableTransfer out = make_transfer(surface.light, int(J), channels, lattice.count(), options.precision);
   LatticeTransfer result{lattice, options.order, {}, std::vector<uint8_t>(lattice.count())};
   {
     const Shares shares(lattice.count(), transfer_block);
@@ -333,7 +402,7 @@ Result<LatticeTransfer> bake_lattice(const Scene& scene, const Tracer& tracer, c
     const auto [pairs, walled] = count_walled(tracer, lattice, result.valid);
     *report = {lattice.count(),
                lattice.count() - valid,
-               lattice.count() * size_t(options.samples),
+               lattice.count() * (size_t(options.samples) + size_t(baker.lobes.rays) * baker.lobes.sharp.size()),
                bytes,
                std::chrono::duration<double>(std::chrono::steady_clock::now() - start).count(),
                pairs,

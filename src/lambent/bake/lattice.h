@@ -37,12 +37,13 @@ struct LatticeReport {
 Bounds default_lattice_box(const Scene& scene, int nx, int ny, int nz);
 
 // Bytes that the lattice itself takes.
-size_t lattice_bytes(const Lattice& lattice, int light_order, int order, int channels, Precision precision);
+size_t lattice_bytes(const Lattice& lattice, const LightBasis& light, int order, int channels, Precision precision);
 
 // What can be told before the surfaces are baked. Errors: options out of range; a box that is none; memory too small.
-Result<void> check_lattice(const Lattice& lattice, int light_order, const LatticeOptions& options);
+Result<void> check_lattice(const Lattice& lattice, const LightBasis& light, const LatticeOptions& options);
 
-// `surface` is the scene's bake, of harmonics alone, and `outgoing` its last reflection, null for a diffuse one. The
+// `surface` is the scene's bake, of harmonics and perhaps lobes: sharp ones get rays of their own at every point, as at
+// surfaces (lobes.h). And `outgoing` its last reflection, null for a diffuse one. The
 // lattice's light has been reflected once more than the surfaces'. Points most of whose rays meet backs of one-sided
 // surfaces are invalid. Errors: as above; every point invalid; cancelled.
 Result<LatticeTransfer> bake_lattice(const Scene& scene, const Tracer& tracer, const Receivers& receivers,

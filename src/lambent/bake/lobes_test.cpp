@@ -6,7 +6,7 @@
 #include <lambent/light/project.h>
 #include <lambent/light/sky.h>
 #include <lambent/reference/path_tracer.h>
-#include <lambent/relight/light.h>
+#include <lambent/relight/moved_light.h>
 #include <lambent/relight/relight.h>
 #include <lambent/scene/procedural.h>
 
@@ -188,6 +188,78 @@ TEST(BakeLobes, AgreesWithThePathTracerUnderSunAndSky) {
       for (int c = 0; c < 3; ++c)
         EXPECT_NEAR(lit.at(chosen[k])[c], truth[k].mean[c], 0.02f * brightest)
             << directional << " receiver " << k << " channel " << c;
+  }
+}
+
+// A lamp that has moved, fitted to the columns of where it was, against a bake of where it is. What is lost of the
+// light bounds what is lost at every receiver (Cauchy-Schwarz, with V cos / pi, whose norm is sqrt(2 pi / 3) / pi at
+// most).
+TEST(BakeLobes, ALampThatMovedLosesNoMoreThanItsLightDoes) {
+  const Lobe was{normalize(Vec3(0.6f, 0.7f, 0.3f)), 60}, other{normalize(Vec3(-0.5f, 0.6f, 0.5f)), 40};
+  const BakeOptions options{.order = 4,
+                            .lobes = {was, other},
+                            .samples = 2048,
+                            .bounces = 0,
+                            .precision = Precision::single,
+                            .denoise = false};
+  const Baking before = bake_scene(court(), options);
+  std::vector<Vec3> light(18, Vec3(0.0f));
+  light[0] = Vec3(1, 1.2f, 1.5f), light[2] = Vec3(0.3f), light[16] = Vec3(3, 2, 1), light[17] = Vec3(0.5f);
+  double last = -1;
+  for (float angle : {0.0f, 3.0f, 10.0f, 40.0f}) {
+    const float t = radians(angle);
+    const Vec3 across = normalize(Vec3(-0.7f, 0.6f, 0));
+    const Vec3 there = normalize(std::cos(t) * was.axis + std::sin(t) * across);
+    BakeOptions at_place = options;
+    at_place.lobes[0].axis = there;
+    const Baking after = bake_scene(court(), at_place);
+    const Vec3 axes[2] = {there, other.axis};
+    const MovedLight moved = move_light({.light = light}, before.transfer.light, Mat3(1.0f), axes);
+    Relit fitted, truth;
+    relight(before.transfer, moved.projection.light, fitted), relight(after.transfer, light, truth);
+    double worst = 0;
+    for (size_t r = 0; r < before.receivers.count(); ++r)
+      worst = std::max(worst, double(length(fitted.at(r) - truth.at(r))));
+    const double bound = std::sqrt(moved.lost) * std::sqrt(2 * std::numbers::pi / 3) / std::numbers::pi;
+    std::printf("%2.0f degrees: %.1f %% of the light is lost, the worst receiver is off by %.3f of at most %.3f\n",
+                angle, 100 * std::sqrt(moved.lost / moved.whole), worst, bound);
+    EXPECT_LE(worst, bound + 0.01) << angle;  // both are traced
+    EXPECT_GT(worst, last) << angle;
+    if (angle == 0) EXPECT_LT(worst, 1e-4);
+    else EXPECT_GT(worst, 0.05 * bound) << angle;  // and what the bound speaks of is there
+    last = worst;
+  }
+}
+
+// By texels: a map of the moved light, projected as any environment is.
+TEST(BakeLobes, MovedLightIsTheProjectionOfItsMap) {
+  SKIP_UNDER_SANITIZERS();
+  LightBasis columns{.order = 4, .lobes = {{normalize(Vec3(0.6f, 0.7f, 0.3f)), 150}, {Vec3(0, 0, 1), 40}}};
+  std::vector<Vec3> light(18);
+  for (size_t i = 0; i < 18; ++i) light[i] = Vec3(0.3f + 0.1f * float(i % 5), 0.5f, float(i % 3) - 0.7f);
+  const Mat3 R = rotation_from_yaw_pitch_roll({40, 25, -70});
+  const Vec3 axes[2] = {normalize(Vec3(0.7f, 0.6f, 0.35f)), normalize(Vec3(0.1f, 0.1f, 1))};
+  const auto sky = rotate_sh(make_sh_rotation(4, R), std::span<const Vec3>(light).first(16));
+  std::vector<Vec3> there(sky.begin(), sky.end());
+  there.push_back(light[16]), there.push_back(light[17]);
+  const auto elsewhere = make_directional_basis(4, LobeKind::von_mises_fisher, {{axes[0], 150}, {axes[1], 40}});
+  const Environment map = reconstruct_environment(elsewhere, there, 2048);
+  for (int order : {0, 3}) {  // all bands, three of them
+    std::vector<Vec3> of_bands = light;
+    if (order)
+      for (size_t i = 9; i < 16; ++i) of_bands[i] = Vec3(0.0f);
+    std::vector<Vec3> in_place = there;
+    if (order)
+      for (size_t i = 9; i < 16; ++i) in_place[i] = Vec3(0.0f);
+    const LightProjection expected =
+        project_light(order ? reconstruct_environment(elsewhere, in_place, 2048) : map, columns, Mat3(1.0f), order);
+    const MovedLight moved = move_light({.light = of_bands}, columns, R, axes, order);
+    for (size_t i = 0; i < 18; ++i) EXPECT_LT(length(moved.projection.light[i] - expected.light[i]), 2e-3f) << i;
+    EXPECT_NEAR(squared_radiance(moved.projection), moved.whole - moved.lost, 1e-4 * moved.whole);
+    EXPECT_NEAR(squared_radiance(expected), moved.whole - moved.lost, 2e-3 * moved.whole);
+    EXPECT_NEAR(squared_radiance(order ? reconstruct_environment(elsewhere, in_place, 2048) : map), moved.whole,
+                2e-3 * moved.whole);
+    EXPECT_GT(moved.lost, 0.02 * moved.whole);
   }
 }
 

@@ -1,7 +1,7 @@
 // Follows: general-prt (directional and custom bases). A lobe g(cos t) has Legendre moments I_l = integral over [-1, 1]
 // of g P_l; then (Funk-Hecke) the integral of y_lm against the lobe about a is 2 pi I_l y_lm(a), and that of two lobes
 // at an angle c is pi sum_l (2l+1) I_l I'_l P_l(cos c).
-#include <lambent/basis/directional.h>
+#include <lambent/basis/moved.h>
 #include <lambent/basis/quadrature.h>
 #include <lambent/basis/symmetric.h>
 #include <lambent/core/check.h>
@@ -269,29 +269,44 @@ std::vector<Lobe> steerable_lobes(int bands) {
   return lobes;
 }
 
-DirectionalBasis make_directional_basis(int sh_order, LobeKind kind, std::vector<Lobe> lobes, double cutoff) {
-  LAMBENT_CHECK(sh_order >= 0 && sh_order <= max_sh_order && (sh_order > 0 || !lobes.empty()));
-  for (const Lobe& lobe : lobes) LAMBENT_CHECK(is_lobe(kind, lobe));
-  DirectionalBasis basis{sh_order, kind, std::move(lobes), {}, {}, 0, 1};
-  const size_t n = basis.count(), harmonics = size_t(sh_count(sh_order));
-  basis.gram.assign(n * n, 0.0);
-  auto set = [&](size_t i, size_t j, double value) { basis.gram[i * n + j] = basis.gram[j * n + i] = value; };
+namespace {
+
+// G of harmonics and scaled lobes.
+std::vector<double> gram_matrix(int sh_order, LobeKind kind, std::span<const Lobe> lobes,
+                                std::span<const std::vector<double>> I) {
+  const size_t harmonics = size_t(sh_count(sh_order)), n = harmonics + lobes.size();
+  std::vector<double> gram(n * n, 0.0), projected(harmonics);
+  auto set = [&](size_t i, size_t j, double value) { gram[i * n + j] = gram[j * n + i] = value; };
   for (size_t i = 0; i < harmonics; ++i) set(i, i, 1);
-  const std::vector<std::vector<double>> I = moments_of(kind, basis.lobes);
-  std::vector<double> projected(harmonics);
-  for (size_t p = 0; p < basis.lobes.size(); ++p) {
-    const Lobe& lobe = basis.lobes[p];
+  for (size_t p = 0; p < lobes.size(); ++p) {
     if (sh_order > 0) {
-      lobe_to_sh(kind, lobe, sh_order, projected);
+      lobe_to_sh(kind, lobes[p], sh_order, projected);
       for (size_t i = 0; i < harmonics; ++i) set(i, harmonics + p, projected[i]);
     }
     set(harmonics + p, harmonics + p, 1);
     for (size_t q = 0; q < p; ++q) {
-      const double scale = lobe_scale(kind, lobe.sharpness) * lobe_scale(kind, basis.lobes[q].sharpness);
-      set(harmonics + p, harmonics + q, scale * lobe_product(kind, lobe, basis.lobes[q], I[p], I[q]));
+      const double scale = lobe_scale(kind, lobes[p].sharpness) * lobe_scale(kind, lobes[q].sharpness);
+      set(harmonics + p, harmonics + q, scale * lobe_product(kind, lobes[p], lobes[q], I[p], I[q]));
     }
   }
-  PseudoInverse inverse = pseudo_inverse(basis.gram, int(n), cutoff);
+  return gram;
+}
+
+double squared_norm(std::span<const double> gram, std::span<const double> c) {
+  double sum = 0;
+  for (size_t i = 0; i < c.size(); ++i)
+    for (size_t j = 0; j < c.size(); ++j) sum += c[i] * gram[i * c.size() + j] * c[j];
+  return sum;
+}
+
+}  // namespace
+
+DirectionalBasis make_directional_basis(int sh_order, LobeKind kind, std::vector<Lobe> lobes, double cutoff) {
+  LAMBENT_CHECK(sh_order >= 0 && sh_order <= max_sh_order && (sh_order > 0 || !lobes.empty()));
+  for (const Lobe& lobe : lobes) LAMBENT_CHECK(is_lobe(kind, lobe));
+  DirectionalBasis basis{sh_order, kind, std::move(lobes), {}, {}, 0, 1};
+  basis.gram = gram_matrix(sh_order, kind, basis.lobes, moments_of(kind, basis.lobes));
+  PseudoInverse inverse = pseudo_inverse(basis.gram, int(basis.count()), cutoff);
   basis.dual = std::move(inverse.values), basis.rank = inverse.rank, basis.condition = inverse.condition;
   return basis;
 }
@@ -354,36 +369,44 @@ std::vector<double> directional_to_sh(const DirectionalBasis& basis, std::span<c
 }
 
 TurnedCoefficients turn_directional(const DirectionalBasis& basis, std::span<const double> c, const Mat3& rotation) {
+  std::vector<Vec3> axes;
+  for (const Lobe& lobe : basis.lobes) axes.push_back(normalize(rotation * lobe.axis));
+  MovedCoefficients moved = move_directional(basis, c, rotation, axes);
+  return {std::move(moved.coefficients), moved.lost};
+}
+
+MovedCoefficients move_directional(const DirectionalBasis& basis, std::span<const double> c, const Mat3& rotation,
+                                   std::span<const Vec3> axes) {
   const size_t n = basis.count(), harmonics = size_t(sh_count(basis.sh_order)), lobes = basis.lobes.size();
-  LAMBENT_CHECK(c.size() == n);
-  std::vector<Lobe> turned = basis.lobes;
-  for (Lobe& lobe : turned) lobe.axis = normalize(rotation * lobe.axis);
-  // The turned function against each of the basis: its harmonics, then its lobes.
-  std::vector<double> integrals(n, 0.0), projected(harmonics);
+  LAMBENT_CHECK(c.size() == n && axes.size() == lobes);
+  std::vector<Lobe> moved = basis.lobes;
+  for (size_t p = 0; p < lobes; ++p) moved[p].axis = axes[p];
+  // The moved function against each of the basis: its harmonics, then its lobes.
+  std::vector<double> integrals(n, 0.0), projected(harmonics), there(c.begin(), c.end());
   if (basis.sh_order > 0) {
     const std::vector<float> still(c.begin(), c.begin() + ptrdiff_t(harmonics));
     std::vector<float> sh(harmonics);
     rotate_sh(make_sh_rotation(basis.sh_order, rotation), still, sh);
+    std::copy(sh.begin(), sh.end(), there.begin());
     for (size_t i = 0; i < n; ++i)
-      for (size_t j = 0; j < harmonics; ++j) integrals[i] += basis.gram[i * n + j] * double(sh[j]);
+      for (size_t j = 0; j < harmonics; ++j) integrals[i] += basis.gram[i * n + j] * there[j];
   }
   const std::vector<std::vector<double>> I = moments_of(basis.kind, basis.lobes);
   for (size_t p = 0; p < lobes; ++p) {
-    const double strength = c[harmonics + p], scale = lobe_scale(basis.kind, turned[p].sharpness);
+    const double strength = c[harmonics + p], scale = lobe_scale(basis.kind, moved[p].sharpness);
     if (strength == 0) continue;
     if (basis.sh_order > 0) {
-      lobe_to_sh(basis.kind, turned[p], basis.sh_order, projected);
+      lobe_to_sh(basis.kind, moved[p], basis.sh_order, projected);
       for (size_t i = 0; i < harmonics; ++i) integrals[i] += strength * projected[i];
     }
     for (size_t q = 0; q < lobes; ++q)
       integrals[harmonics + q] += strength * scale * lobe_scale(basis.kind, basis.lobes[q].sharpness) *
-                                  lobe_product(basis.kind, turned[p], basis.lobes[q], I[p], I[q]);
+                                  lobe_product(basis.kind, moved[p], basis.lobes[q], I[p], I[q]);
   }
-  TurnedCoefficients out{apply_directional_dual(basis, integrals), 0};
-  for (size_t i = 0; i < n; ++i) {
-    out.lost -= out.coefficients[i] * integrals[i];
-    for (size_t j = 0; j < n; ++j) out.lost += c[i] * basis.gram[i * n + j] * c[j];
-  }
+  MovedCoefficients out{apply_directional_dual(basis, integrals), 0,
+                        squared_norm(gram_matrix(basis.sh_order, basis.kind, moved, I), there)};
+  out.lost = out.whole;
+  for (size_t i = 0; i < n; ++i) out.lost -= out.coefficients[i] * integrals[i];
   out.lost = std::max(out.lost, 0.0);
   return out;
 }

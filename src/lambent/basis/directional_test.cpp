@@ -1,4 +1,4 @@
-#include <lambent/basis/directional.h>
+#include <lambent/basis/moved.h>
 #include <lambent/basis/quadrature.h>
 #include <lambent/core/random.h>
 #include <lambent/core/sampling.h>
@@ -320,6 +320,63 @@ TEST(Directional, SteerableLobesTurnExactlyAndOthersTellWhatTheyLose) {
     if (exact) EXPECT_LT(turned.lost, 1e-6 * all);
     else EXPECT_GT(turned.lost, 1e-3 * all);
     EXPECT_NEAR(turned.lost, lost_by_quadrature(basis, c, turned, R), 1e-5 * all) << int(basis.kind);
+  }
+}
+
+// Of one lobe beside harmonics: h are its harmonics about z, o what the moved lobe and the one that stands have in
+// common. Fitting takes the harmonics' part whole, and of the rest what lies along the rest of the lobe that stands.
+TEST(Directional, ALampThatMovesLosesWhatTheClosedFormSays) {
+  const Vec3 still(0, 1, 0);
+  for (int order : {2, 5})
+    for (double s : {6.0, 80.0, 3000.0})
+      for (double angle : {0.0, 0.02, 0.15, 0.7, 2.5}) {
+        const auto basis = make_directional_basis(order, LobeKind::von_mises_fisher, {{still, float(s)}});
+        std::vector<double> lamp(basis.count());
+        lamp.back() = 1;
+        const Vec3 there(float(std::sin(angle)), float(std::cos(angle)), 0);
+        const MovedCoefficients moved = move_directional(basis, lamp, Mat3(1.0f), {&there, 1});
+        const double c = std::cos(angle), scale2 = 2 * s / (2 * std::numbers::pi * -std::expm1(-4 * s));
+        double all = 0, apart = 0;
+        for (int l = 0; l < order; ++l) {
+          double I = 0;
+          for (const QuadratureNode& node : gauss_legendre(400, -1, 1))
+            I += node.weight * std::exp(s * (node.x - 1)) * std::legendre(unsigned(l), node.x);
+          const double power = scale2 * std::numbers::pi * (2 * l + 1) * I * I;
+          all += power, apart += power * std::legendre(unsigned(l), c);
+        }
+        const double k = s * std::sqrt(2 + 2 * c),
+                     common = scale2 * 2 * std::numbers::pi * (std::exp(k - 2 * s) - std::exp(-k - 2 * s)) / k;
+        const double held = all + (common - apart) * (common - apart) / (1 - all);
+        EXPECT_NEAR(moved.whole, 1, 1e-9);
+        EXPECT_NEAR(moved.lost, 1 - held, 2e-5) << order << " " << s << " " << angle;  // axes are floats
+      }
+}
+
+// Harmonics turned, each lobe elsewhere.
+TEST(Directional, LampsThatMoveApartTellWhatTheyLose) {
+  const Mat3 R = rotation_from_yaw_pitch_roll({40, 25, -70});
+  for (const DirectionalBasis& basis : bases()) {
+    if (basis.lobes.empty() || basis.kind == LobeKind::band_limited) continue;
+    const std::vector<double> c = uneven_coefficients(basis.count());
+    std::vector<Vec3> axes;
+    std::vector<Lobe> there = basis.lobes;
+    for (size_t k = 0; k < there.size(); ++k)
+      axes.push_back(there[k].axis = normalize(there[k].axis + 0.2f * Vec3(float(k % 3) - 1, 0.4f, float(k % 2))));
+    const MovedCoefficients moved = move_directional(basis, c, R, axes);
+    const DirectionalBasis elsewhere = make_directional_basis(basis.sh_order, basis.kind, there);
+    const size_t harmonics = size_t(sh_count(basis.sh_order));
+    std::vector<double> sky(c), lamps(c);
+    std::fill(sky.begin() + ptrdiff_t(harmonics), sky.end(), 0), std::fill_n(lamps.begin(), harmonics, 0);
+    double lost = 0, whole = 0;
+    for (const DirectionNode& node : direction_quadrature(96)) {
+      const double is = reconstruct_directional(elsewhere, lamps, node.direction) +
+                        reconstruct_directional(basis, sky, transpose(Mat3d(R)) * node.direction),
+                   fit = reconstruct_directional(basis, moved.coefficients, node.direction);
+      lost += node.weight * (is - fit) * (is - fit), whole += node.weight * is * is;
+    }
+    EXPECT_NEAR(moved.lost, lost, 1e-5 * whole) << int(basis.kind);
+    EXPECT_NEAR(moved.whole, whole, 1e-5 * whole) << int(basis.kind);
+    EXPECT_GT(lost, 1e-3 * whole);
   }
 }
 

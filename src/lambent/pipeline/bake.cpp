@@ -244,10 +244,13 @@ Result<void> bake_free_space(Bake& b, const Lattice& lattice) {
 
 // What a GLB cannot hold is told before the work.
 Result<void> check_picture_bytes(const Bake& b, const View& view) {
+  if (file_extension(b.request.output) != "glb") return {};
+  if (b.plan.kind == BakeKind::wavelets)
+    return check_haar_of_view(b.plan, b.request.size, b.scene, b.tracer, b.receivers(), view);
   const size_t columns = b.plan.bake.light().count();
   const size_t bytes = 3 * size_t(view.width) * size_t(view.height) * columns *
                        (b.plan.bake.precision == Precision::half ? 2 : 4);
-  if (bytes < size_t{1} << 32 || file_extension(b.request.output) != "glb") return {};
+  if (bytes < size_t{1} << 32) return {};
   return Error{"--size",
                fmt::format("{} pixels of {} columns take {} bytes, and a .glb holds 4 GiB: write a .gltf",
                            b.request.size, columns, bytes),
@@ -445,7 +448,7 @@ Result<BakeOutcome> bake_plain(const BakeRequest& request, const BakePlan& plan,
   if (!request.lattice.empty() && plan.kind != BakeKind::indirect) {
     auto parsed = lattice_of_request(request, b.scene);
     if (!parsed) return parsed.error();
-    if (auto ok = check_lattice(*parsed, plan.bake.order, plan.lattice); !ok) return ok.error();
+    if (auto ok = check_lattice(*parsed, plan.bake.light(), plan.lattice); !ok) return ok.error();
     lattice = *parsed;
   }
   std::optional<View> view;

@@ -165,6 +165,40 @@ Result<HaarTransfer> fit_haar_of_plan(const BakePlan& plan, bool for_view, const
   return std::move(bounced->transfer);
 }
 
+Result<void> check_haar_of_view(const BakePlan& plan, const std::string& size, const Scene& scene, const Tracer& tracer,
+                                const Receivers& receivers, const View& view) {
+  constexpr double most = double(size_t{1} << 32);
+  constexpr size_t sampled = 64;
+  constexpr int side = 64;
+  const double pixels = double(view.width) * double(view.height);
+  // At most, of three channels and two bytes an entry.
+  if (6 * pixels * double(cube_texels(plan.visibility.size)) < most || receivers.count() == 0) return {};
+  Receivers few;
+  const size_t step = std::max<size_t>(1, receivers.count() / sampled);
+  for (size_t r = step / 2; r < receivers.count(); r += step)
+    few.origins.push_back(receivers.origins[r]), few.normals.push_back(receivers.normals[r]);
+  VisibilityOptions options = plan.visibility;
+  options.scene = &scene;
+  auto seen = bake_visibility(tracer, few, options);
+  if (!seen) return seen.error();
+  HaarFitReport report;
+  if (auto fit = fit_haar(*seen, few.normals, plan.haar, &report); !fit) return fit.error();
+  const CameraRays rays(view.camera, view.width, view.height);
+  size_t met = 0;
+  for (int y = 0; y < side; ++y)
+    for (int x = 0; x < side; ++x)
+      met += tracer
+                 .closest(rays.eye, rays.direction((float(x) + 0.5f) / side * float(view.width),
+                                                   (float(y) + 0.5f) / side * float(view.height)))
+                 .triangle != none;
+  const double bytes = report.entries * pixels * double(met) / (side * side);
+  if (bytes < most) return {};
+  return Error{"--size",
+               fmt::format("{} pixels in wavelets would take about {}, and a .glb holds 4 GiB: write a .gltf", size,
+                           human_bytes(bytes)),
+               true};
+}
+
 void tell_wavelets(const HaarTransfer& transfer, const HaarFitReport& fit, const char* of, Summary& summary,
                    nlohmann::json& told) {
   told["wavelets"] = {{"per_receiver", fit.entries}, {"error", fit.error}};

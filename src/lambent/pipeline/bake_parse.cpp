@@ -70,6 +70,29 @@ Result<int> parse_whole(const std::string& text, int least, int most, const std:
   return value;
 }
 
+// lamps:COUNT@ENV, added to the lobes; a lamp that has a lobe already is left out.
+Result<void> parse_lamps(const std::string& term, BakeOptions& bake, const Job& job) {
+  constexpr double nearly_one = 0.99;
+  const size_t at = term.find('@');
+  if (!term.starts_with("lamps:") || at == std::string::npos || at + 1 == term.size())
+    return Error{"--light", "expects lamps:COUNT@ENV after the plus sign, not \"" + term + "\"", true};
+  auto count = parse_whole(term.substr(6, at - 6), 1, max_lamps, "the count after lamps:");
+  if (!count) return count.error();
+  const std::string path = term.substr(at + 1);
+  auto env = load_environment(path);
+  if (!env) return env.error();
+  for (const std::string& w : env->warnings) job.warn(w);
+  const std::vector<Lobe> found = find_lamps(*env, *count);
+  if (found.size() < size_t(*count))
+    job.warn(fmt::format("{}: has {}{} out, not {}", path, found.size(),
+                         found.size() == 1 ? " lamp that stands" : " lamps that stand", *count));
+  for (const Lobe& lamp : found)
+    if (std::none_of(bake.lobes.begin(), bake.lobes.end(),
+                     [&](const Lobe& known) { return lobe_overlap(bake.lobe_kind, known, lamp) > nearly_one; }))
+      bake.lobes.push_back(lamp);
+  return {};
+}
+
 // Sets the columns of light that `text` asks for; loads the environment it names, if any.
 Result<void> parse_light(const std::string& text, BakeOptions& bake, const Job& job) {
   const std::string name = text.substr(0, text.find(':'));
@@ -97,20 +120,14 @@ Result<void> parse_light(const std::string& text, BakeOptions& bake, const Job& 
   if (!order) return order.error();
   bake.order = *order;
   if (plus == std::string::npos) return {};
-  const std::string lamps = text.substr(plus + 1);
-  const size_t at = lamps.find('@');
-  if (!lamps.starts_with("lamps:") || at == std::string::npos || at + 1 == lamps.size())
-    return Error{"--light", "expects lamps:COUNT@ENV after the plus sign, not \"" + lamps + "\"", true};
-  auto count = parse_whole(lamps.substr(6, at - 6), 1, max_lamps, "the count after lamps:");
-  if (!count) return count.error();
-  const std::string path = lamps.substr(at + 1);
-  auto env = load_environment(path);
-  if (!env) return env.error();
-  for (const std::string& w : env->warnings) job.warn(w);
-  bake.lobes = find_lamps(*env, *count);
-  if (const size_t found = bake.lobes.size(); found < size_t(*count))
-    job.warn(fmt::format("{}: has {}{} out, not {}", path, found,
-                         found == 1 ? " lamp that stands" : " lamps that stand", *count));
+  for (size_t from = plus + 1; from != std::string::npos;) {
+    const size_t next = text.find("+lamps:", from);
+    const std::string term = text.substr(from, next == std::string::npos ? next : next - from);
+    if (auto ok = parse_lamps(term, bake, job); !ok) return ok;
+    from = next == std::string::npos ? next : next + 1;
+  }
+  if (bake.lobes.size() > size_t(max_lamps))
+    return Error{"--light", fmt::format("has {} lamps in all, more than {}", bake.lobes.size(), max_lamps), true};
   return {};
 }
 
@@ -244,8 +261,6 @@ Result<void> check_orders(const BakePlan& plan, const BakeRequest& r) {
   if (glossy && order + r.incident_order > max_sh_order + 1)
     return Error{"--incident-order", fmt::format("and the bands of the light may be {} together", max_sh_order + 1),
                  true};
-  if (!plan.bake.lobes.empty() && !r.lattice.empty())
-    return Error{"--light", "lobes do not light free space: leave --lattice out", true};
   if (!plan.bake.lobes.empty() && plan.matrix.simulate_paths && plan.bake.bounces > 0)
     return Error{"--light", "lobes do not bounce along --simulate paths: leave it out, or bake with --bounces 0", true};
   if (!r.lattice.empty() && order + r.lattice_order > max_sh_order + 1)

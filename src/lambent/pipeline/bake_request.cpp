@@ -373,6 +373,11 @@ Result<BakeRequest> resolved(BakeRequest r) {
   if (auto ok = check_values(bake_options(), r, r.given); !ok) return ok.error();
   const BakeKind kind = kind_of(r);
   if (r.receivers.empty()) r.receivers = kind == BakeKind::lightmap ? "texels" : "vertices";
+  if (kind == BakeKind::lightmap && r.given.contains("light"))
+    return Error{"--light",
+                 "does not go with lightmaps, which hold the scene's own lamps: --receivers texels, without --transfer "
+                 "lightmap, keeps such light over an atlas",
+                 true};
   if (auto ok = check_given(bake_options(), r, r.given, int(kind), bake_kind_names); !ok) return ok.error();
   if (auto ok = check_conflicts(r); !ok) return ok.error();
   if (auto ok = check_kind(r, kind); !ok) return ok.error();

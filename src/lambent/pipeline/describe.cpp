@@ -116,15 +116,18 @@ Said say(const IndirectTransfer& t) {
                                 : "")};
 }
 
-Said say(const HaarTransfer& t) {
+// What the rows of a store are of.
+const char* row_word(const Placement& where) { return std::holds_alternative<FixedView>(where) ? "pixel" : "receiver"; }
+
+Said say(const HaarTransfer& t, const Placement& where) {
   const double each = double(t.entries()) / double(std::max<size_t>(t.receivers, 1));
   return {{{"cube", t.size},
            {"rows", t.rows},
            {"channels", t.channels},
-           {"wavelets_per_receiver", each},
+           {fmt::format("wavelets_per_{}", row_word(where)), each},
            {"compression_error", t.error}},
-          fmt::format("Haar wavelets of a cube of {} by column, {:.0f} of {} a receiver, to {:.2g} % RMS, {}", t.size,
-                      each, human_count(t.columns()), 100 * t.error, some(size_t(t.channels), "channel"))};
+          fmt::format("Haar wavelets of a cube of {} by column, {:.0f} of {} a {}, to {:.2g} % RMS, {}", t.size, each,
+                      human_count(t.columns()), row_word(where), 100 * t.error, some(size_t(t.channels), "channel"))};
 }
 
 Said say(const Rows& rows) {
@@ -202,8 +205,10 @@ Said say(const Placement& where) {
       where);
 }
 
-Said say(const Store& store) {
-  return std::visit([](const auto& s) { return say(s); }, store);
+Said say_store(const Field& field) {
+  return std::visit(
+      Overloaded{[&](const HaarTransfer& t) { return say(t, field.where); }, [](const auto& s) { return say(s); }},
+      field.store);
 }
 
 const char* kind_name(const Field& field) {
@@ -233,12 +238,12 @@ const char* name_of(const Rows& rows) {
 json describe(const Field& field) {
   json d{{"kind", kind_name(field)},       {"store", name_of(field.store)},          {"where", name_of(field.where)},
          {"meaning", name_of(field.rows)}, {"receivers", receivers_of(field.store)}, {"bytes", bytes_of(field.store)}};
-  for (const Said& said : {say(field.store), say(field.rows), say(field.where)}) d.update(said.members);
+  for (const Said& said : {say_store(field), say(field.rows), say(field.where)}) d.update(said.members);
   return d;
 }
 
 std::string describe_in_words(const Field& field) {
-  const Said store = say(field.store), rows = say(field.rows), where = say(field.where);
+  const Said store = say_store(field), rows = say(field.rows), where = say(field.where);
   std::vector<std::string> words;
   // The kind goes first, unless the store says it; then what rows there are beyond one diffuse.
   const std::string kind = kind_name(field);
@@ -247,7 +252,7 @@ std::string describe_in_words(const Field& field) {
     words.push_back(kind);
   if (kind == "diffuse" || (kind != "factors" && outgoing_of(field))) words.push_back(rows.words);
   words.push_back(store.words);
-  words.push_back(some(receivers_of(field.store), "receiver"));
+  words.push_back(some(receivers_of(field.store), row_word(field.where)));
   const std::string precision = store.members.value("precision", std::string());
   return fmt::format("{}, {}{}{}{}", fmt::join(words, ", "), human_bytes(double(bytes_of(field.store))),
                      precision.empty() ? "" : " (" + precision + ")", where.more, store.more);

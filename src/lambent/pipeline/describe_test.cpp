@@ -51,7 +51,8 @@ TEST(Describe, NamesEveryAxis) {
     EXPECT_EQ(d["meaning"], name_of(field.rows));
     EXPECT_EQ(d["receivers"], receivers_of(field.store));
     EXPECT_EQ(d["bytes"], bytes_of(field.store));
-    EXPECT_NE(describe_in_words(field).find(" receivers, "), std::string::npos);
+    const char* rows = std::holds_alternative<FixedView>(field.where) ? " pixels, " : " receivers, ";
+    EXPECT_NE(describe_in_words(field).find(rows), std::string::npos);
     words.insert(d["store"].get<std::string>() + d["where"].get<std::string>() + d["meaning"].get<std::string>());
   }
   EXPECT_EQ(words.size(), 6u * 6u * 5u);
@@ -118,6 +119,19 @@ TEST(Browser, RefusesScenesThatLampsDoNotLightThere) {
   glass.materials[0].transmission = 0.5f, glass.materials[0].metallic = 0;
   EXPECT_NE(why(glass).find("seen through"), std::string::npos);
   EXPECT_TRUE(check_for_browser({VertexPlacement{}, Transfer{{.order = 2}, 1, 1, 7}, DiffuseRows{}}, glass, "f"));
+}
+
+TEST(Describe, RowsOfAFixedViewAreOfPixels) {
+  HaarTransfer t;
+  t.size = 16, t.receivers = 7, t.steps.assign(t.columns(), 0), t.starts = {0, 0}, t.begin.assign(t.columns() + 1, 0);
+  const Field fixed{FixedView{{}, 7, 1}, t, PixelRows{}}, at_vertices{VertexPlacement{}, t, DiffuseRows{}};
+  EXPECT_NE(describe_in_words(fixed).find("1,536 a pixel"), std::string::npos) << describe_in_words(fixed);
+  EXPECT_NE(describe_in_words(fixed).find("7 pixels"), std::string::npos);
+  EXPECT_EQ(describe_in_words(fixed).find("receiver"), std::string::npos);
+  EXPECT_NE(describe_in_words(at_vertices).find("1,536 a receiver"), std::string::npos);
+  EXPECT_NE(describe_in_words(at_vertices).find("7 receivers"), std::string::npos);
+  EXPECT_TRUE(describe(fixed).contains("wavelets_per_pixel"));
+  EXPECT_TRUE(describe(at_vertices).contains("wavelets_per_receiver"));
 }
 
 TEST(Browser, RefusesAllElseByName) {

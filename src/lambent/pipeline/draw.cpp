@@ -34,6 +34,26 @@ Result<View> view_of(const ColumnDrawing& d, const std::optional<Pose>& first) {
   return parse_view(d.request.camera, d.request.size, first ? posed(d.scene(), *first) : d.scene());
 }
 
+// What the columns have of a light with lamps of its own, and what of it lamps lose that have moved.
+void tell_lamps(const ColumnLight& light, double time, Summary& summary) {
+  nlohmann::json lamps = nlohmann::json::array();
+  std::string line;
+  for (const auto& m : light.moved) {
+    lamps.push_back({{"lamp", m.lamp + 1}, {"degrees", m.degrees}, {"held", m.held}});
+    line += fmt::format("{}lamp {} by {:.1f} degrees, {:.1f} % of its energy held", line.empty() ? "" : "; ",
+                        m.lamp + 1, m.degrees, 100 * m.held);
+  }
+  summary.json["moved"].push_back({{"time", time}, {"lamps", lamps}, {"lost", light.lost}});
+  summary.lines.emplace_back("moved", fmt::format("{}: {:.1f} % of the light is lost (relative L2)",
+                                                  line.empty() ? "nothing" : line, 100 * light.lost));
+}
+
+// When, of --frames without an animation.
+Result<std::vector<double>> times_of(const DrawRequest& request) {
+  if (request.frames.empty() || !request.animation.empty()) return std::vector<double>{request.time};
+  return parse_frames(request.frames);
+}
+
 Result<Drawing> draw_columns(const Baked& baked, const DrawRequest& request, const Job& job) {
   auto begun = begin_columns(baked, request, job);
   if (!begun) return begun.error();
@@ -53,20 +73,37 @@ Result<Drawing> draw_columns(const Baked& baked, const DrawRequest& request, con
              ": its transfer cannot turn with the surface (`lambent compress --zonal` makes one that can); it is used "
              "as baked");
   if (auto ok = make_relighters(d); !ok) return ok.error();
+  auto times = times_of(request);
+  if (!times) return times.error();
   Drawing drawing;
-  for (const std::optional<Pose>& pose : *poses) {
+  for (size_t k = 0; k < std::max(poses->size(), times->size()); ++k) {
+    const std::optional<Pose>& pose = (*poses)[poses->size() > 1 ? k : 0];
+    if (times->size() > 1) {
+      if (auto ok = choose_time(d, (*times)[k]); !ok) return ok.error();
+      if (auto ok = set_lights(d); !ok) return ok.error();
+    }
     Relit relit, peaks;
     if (auto ok = relight(d, pose, relit, peaks); !ok) return ok.error();
     auto image = shade(d, pose, std::move(relit), peaks, *view);
     if (!image) return image.error();
     drawing.frames.push_back(std::move(*image));
+    if (!d.light.still.light.empty()) tell_lamps(d.light, d.time, drawing.summary);
   }
   const LightProjection& light = d.light.projection;
-  drawing.summary.json = {{"receivers", d.receivers()},   {"frames", drawing.frames.size()},
-                          {"order", light.window.size()}, {"lobes", light_of(baked.surface.store).lobes.size()},
-                          {"window", light.window},       {"relight_seconds", d.relight_seconds}};
+  drawing.summary.json.update({{"receivers", d.receivers()},
+                               {"frames", drawing.frames.size()},
+                               {"order", light.window.size()},
+                               {"lobes", light_of(baked.surface.store).lobes.size()},
+                               {"window", light.window},
+                               {"relight_seconds", d.relight_seconds}});
   drawing.summary.lines.emplace_back(
       "relit", fmt::format("{} receivers in {:.2f} ms", human_count(d.receivers()), 1e3 * d.relight_seconds));
+  if (d.light.held >= 0 && d.light.still.light.empty()) {
+    drawing.summary.json["held"] = d.light.held;
+    drawing.summary.lines.emplace_back(
+        "held", fmt::format("{:.1f} % of the light's energy (squared radiance) by the file's harmonics and lobes",
+                            100 * d.light.held));
+  }
   if (d.light.cube.size) {
     drawing.summary.json.update({{"terms", d.reading.terms}, {"bytes_read", d.reading.bytes}});
     drawing.summary.lines.emplace_back(

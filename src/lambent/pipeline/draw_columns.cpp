@@ -62,6 +62,7 @@ Result<void> choose_light(ColumnDrawing& d) {
   auto light = column_light(d.request, d.around, basis, d.scene().origin);
   if (!light) return light.error();
   d.light = std::move(*light);
+  if (auto ok = choose_time(d, d.time); !ok) return ok;
   if (const int size = cube_of(d.baked.surface.store)) {
     const bool dark = !d.around.env || d.show.part == Show::Part::emission;
     const Environment none{"", Image(2, 1), {}};
@@ -74,6 +75,13 @@ Result<void> choose_light(ColumnDrawing& d) {
   if (!d.request.env.empty() && basis.order == 0 && basis.lobes.empty() && d.light.cube.size == 0 && !d.around.seen)
     d.job.warn(d.request.baked + ": holds lamps alone, so that --env neither lights it nor, unseen, shows");
   return {};
+}
+
+Result<void> choose_time(ColumnDrawing& d, double time) {
+  d.time = time;
+  const LightBasis basis = light_of(d.baked.surface.store);
+  if (!d.around.env || d.show.part == Show::Part::emission || !moves_lobes(d.request, basis)) return {};
+  return move_lamps(d.request, d.around.rotation, basis, time, d.light);
 }
 
 Result<void> set_lights(ColumnDrawing& d) {

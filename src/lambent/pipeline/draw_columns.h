@@ -21,6 +21,7 @@ struct ColumnDrawing {
   std::vector<std::shared_ptr<const InsertedObject>> inserted = {};  // one for each, once they are made
   Surroundings around;
   ColumnLight light;
+  double time = request.time;              // of lamps of the light that move
   Rows rows = {};                          // the surface's, or those of other materials
   std::deque<Field> terms = {};            // of the Neumann series, where they are drawn one by one
   std::vector<Relighter> relighters = {};  // what they give is summed
@@ -41,6 +42,8 @@ struct ColumnDrawing {
 Result<ColumnDrawing> begin_columns(const Baked& baked, const DrawRequest& request, const Job& job);
 // From `around`: the light, and what lamps are seen to emit.
 Result<void> choose_light(ColumnDrawing& d);
+// After another time: lamps of the light that move. Needs set_lights() then.
+Result<void> choose_time(ColumnDrawing& d, double time);
 // Needs the light, and sets it.
 Result<void> make_relighters(ColumnDrawing& d);
 // Again, after the light has changed.

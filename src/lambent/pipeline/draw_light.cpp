@@ -3,6 +3,8 @@
 #include <lambent/light/lamps.h>
 #include <lambent/light/peaks.h>
 #include <lambent/light/project.h>
+#include <lambent/pipeline/moving_lamps.h>
+#include <lambent/relight/moved_light.h>
 
 #include <fmt/format.h>
 #include <fmt/ranges.h>
@@ -66,6 +68,18 @@ void find_peaks(const KnownHarmonics& known, const Surroundings& around, const L
   for (size_t k = 0; k < rest.size(); ++k) out.peaks.push_back(out.projection.light[k] - rest[k]);
 }
 
+// Onto lobes that stand, and harmonics beside them: what they hold of the light is counted before the window.
+void project_on_lobes(const DrawRequest& request, const Surroundings& around, const LightBasis& basis, ShWindow window,
+                      ColumnLight& out) {
+  const bool moves = moves_lobes(request, basis);
+  out.projection = project_light(*around.env, basis, moves ? Mat3(1.0f) : around.rotation, request.light_order);
+  if (moves) out.still = out.projection;
+  if (const double all = squared_radiance(*around.env); all > 0)
+    out.held = std::min(squared_radiance(out.projection) / all, 1.0);
+  const size_t bands = out.projection.window.size();
+  if (bands > 0) out.projection.window = apply_sh_window(window, std::span(out.projection.light).first(bands * bands));
+}
+
 }  // namespace
 
 std::shared_ptr<const KnownHarmonics> know_harmonics(const Environment& env, const DrawRequest& request,
@@ -102,8 +116,10 @@ Result<ColumnLight> column_light(const DrawRequest& request, const Surroundings&
     auto known = around.known;
     if (!known || known->order != bands_of(request, basis) || (knows_shadows && known->rest.empty()))
       known = know_harmonics(*around.env, request, basis, knows_shadows);
-    out.projection = known ? project_light(known->all, basis, around.rotation, applied)
-                           : project_light(*around.env, basis, around.rotation, request.light_order, applied);
+    if (!basis.lobes.empty() && !known) project_on_lobes(request, around, basis, applied, out);
+    else
+      out.projection = known ? project_light(known->all, basis, around.rotation, applied)
+                             : project_light(*around.env, basis, around.rotation, request.light_order, applied);
     if (known && knows_shadows) find_peaks(*known, around, basis, out);
   } else {
     out.projection.light.assign(basis.count(), Vec3(0.0f));
@@ -112,6 +128,41 @@ Result<ColumnLight> column_light(const DrawRequest& request, const Surroundings&
   }
   std::copy(out.lamps.begin(), out.lamps.end(), out.projection.light.end() - ptrdiff_t(out.lamps.size()));
   return out;
+}
+
+bool moves_lobes(const DrawRequest& request, const LightBasis& basis) {
+  return !request.move.empty() && request.place.empty() && basis.order > 0 && !basis.lobes.empty();
+}
+
+Result<void> move_lamps(const DrawRequest& request, const Mat3& rotation, const LightBasis& basis, double time,
+                        ColumnLight& light) {
+  auto window = parse_window(request.window);
+  if (!window) return window.error();
+  const size_t first = size_t(sh_count(basis.order));
+  std::vector<Vec3> axes;
+  for (const Lobe& lobe : basis.lobes) axes.push_back(normalize(rotation * lobe.axis));
+  light.moved.clear();
+  for (const std::string& text : request.move) {
+    auto arc = parse_lamp_arc(text, axes.size());
+    if (!arc) return arc.error();
+    axes[arc->lamp] = direction_at(*arc, time);
+  }
+  const ShWindow applied = *window == ShWindow::automatic ? ShWindow::none : *window;
+  auto moved = move_light(light.still, basis, rotation, axes, request.light_order, applied);
+  for (size_t k = 0; k < axes.size(); ++k) {
+    const Vec3d was = normalize(Vec3d(basis.lobes[k].axis)), is(axes[k]);
+    const double angle = std::atan2(length(cross(was, is)), dot(was, is)) * 180 / std::numbers::pi;
+    if (angle < 1e-3) continue;
+    LightProjection alone;
+    alone.light.assign(basis.count(), Vec3(0.0f)), alone.light[first + k] = Vec3(1.0f);
+    const MovedLight one = move_light(alone, basis, rotation, axes, request.light_order);
+    light.moved.push_back({k, angle, 1 - one.lost / one.whole});
+  }
+  light.lost = moved.whole > 0 ? std::sqrt(moved.lost / moved.whole) : 0;
+  std::copy(light.projection.light.end() - ptrdiff_t(light.lamps.size()), light.projection.light.end(),
+            moved.projection.light.end() - ptrdiff_t(light.lamps.size()));
+  light.projection = std::move(moved.projection);
+  return {};
 }
 
 std::vector<Vec3> seen_emission(const Scene& scene, const LightBasis& basis, const std::vector<Vec3>& lamps) {

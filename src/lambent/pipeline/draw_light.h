@@ -42,11 +42,26 @@ struct ColumnLight {
   std::vector<Vec3> peaks = {};
   double sharp = 0;  // the peaks' share of all light, where they are not empty
   int lamps_found = 0;
+  double held = -1;            // of lobes that stand: the share of the environment's squared radiance in the columns
+  LightProjection still = {};  // where lamps of the light move: before they did, not turned and without a window
+  // Those, as they now stand, in degrees from where they were baked; and what of the whole light is lost.
+  struct MovedLamp {
+    size_t lamp;
+    double degrees, held;  // held: the share of its own squared radiance that the columns hold where it is
+  };
+  std::vector<MovedLamp> moved = {};
+  double lost = 0;  // relative L2
   // Of each place its own, distant light included.
   LocalLight local() const { return {projection.light, near, projection.window}; }
 };
 Result<ColumnLight> column_light(const DrawRequest& request, const Surroundings& around, const LightBasis& basis,
                                  Vec3d origin, bool knows_shadows = true);
+// Lamps among the lobes of light stand where request.move has them at that time; needs column_light()'s. Errors name
+// --move.
+Result<void> move_lamps(const DrawRequest& request, const Mat3& rotation, const LightBasis& basis, double time,
+                        ColumnLight& light);
+// Whether request.move is of such lamps.
+bool moves_lobes(const DrawRequest& request, const LightBasis& basis);
 // Windows the peaks (Lanczos), the whole with them: for surfaces that reflect a part of the sky at a time.
 void soften_peaks(ColumnLight& light);
 

@@ -2,6 +2,7 @@
 
 #include <lambent/core/file.h>
 #include <lambent/pipeline/draw_light.h>
+#include <lambent/pipeline/moving_lamps.h>
 
 #include <algorithm>
 #include <charconv>
@@ -40,9 +41,11 @@ const Option<R> table[] = {
      "light); or a lamp that stands anywhere (the latter): sphere@X,Y,Z,RADIUS=R,G,B (radiance), point@X,Y,Z=R,G,B "
      "(flux per steradian), spot@X,Y,Z,TX,TY,TZ,ANGLE=R,G,B (towards T, within so many degrees) or "
      "sun@AZIMUTH,ELEVATION=R,G,B (irradiance); may be given again"},
-    {"move", &R::move, "Light", D | I,
+    {"move", &R::move, "Light", D | C | M | V | I,
      "N@T:X,Y,Z;T:X,Y,Z;...: where lamp N is at these times, straight from one to the next (files of direct to "
-     "indirect light); or NAME=PATH.json: the path of an object of --place; may be given again"},
+     "indirect light); N@AZIMUTH,ELEVATION or N@T:AZIMUTH,ELEVATION;...: where lamp N of the light stands (files baked "
+     "with --light sh:BANDS+lamps:COUNT@ENV, lamps as `inspect` lists them), and what of it is lost is said; or "
+     "NAME=PATH.json: the path of an object of --place; may be given again"},
     {"lamp-bounces", &R::lamp_bounces, "Light", D,
      "How often the light of lamps among the objects of --place goes on from surface to surface of the scene", 0, 16,
      nullptr, "place"},
@@ -163,7 +166,7 @@ constexpr Conflict conflicts[] = {
     {"window", "show=albedo|emission", "shapes light that --show leaves out"},
     {"light-order", "show=albedo|emission", "shapes light that --show leaves out"},
     {"brdf", "show=albedo|emission", "reflects light that --show leaves out"},
-    {"move", "show=albedo", "moves light that --show leaves out"},
+    {"move", "show=albedo|emission", "moves light that --show leaves out"},
 };
 
 GivenOptions said_in(const R& request) {
@@ -238,6 +241,29 @@ Result<void> check_show(const DrawRequest& request, const Show& show, const Bake
   return {};
 }
 
+// Lamps of the light that move; those of --place and of direct to indirect light are looked at where they are drawn.
+Result<void> check_moves(const DrawRequest& request, DrawKind kind, const LightBasis& light) {
+  if (request.move.empty() || kind == DrawKind::indirect || !request.place.empty()) return {};
+  if (light.lobes.empty())
+    return Error{
+        "--move",
+        "moves objects of --place, lamps of direct to indirect light, and lamps of a light that has some: bake "
+        "--light sh:BANDS+lamps:COUNT@ENV",
+        true};
+  if (light.order == 0)
+    return Error{"--move", "needs lamps beside harmonics; the file's lobes are spread evenly, and none is a lamp",
+                 true};
+  std::vector<bool> moved(light.lobes.size(), false);
+  for (const std::string& text : request.move) {
+    auto arc = parse_lamp_arc(text, moved.size());
+    if (!arc) return arc.error();
+    if (moved[arc->lamp])
+      return Error{"--move", "says twice where lamp " + std::to_string(arc->lamp + 1) + " is", true};
+    moved[arc->lamp] = true;
+  }
+  return {};
+}
+
 }  // namespace
 
 Result<void> check_draw(const DrawRequest& request, DrawKind kind) {
@@ -262,12 +288,11 @@ Result<void> check_draw(const DrawRequest& request, DrawKind kind) {
                  true};
   if (kind == DrawKind::indirect && !two_sorts && show->part != Show::Part::all)
     return Error{"--show", "of direct to indirect light is product, radiosity, albedo, direct or indirect", true};
-  const bool by_paths = kind == DrawKind::indirect || !request.place.empty();
-  if (said.contains("move") && !by_paths) return Error{"--move", "needs --place", true};
+  const bool by_paths = kind == DrawKind::indirect || !request.place.empty() || !request.move.empty();
   if (said.contains("time") && request.animation.empty() && request.move.empty() && request.pose.empty())
     return Error{"--time", "needs --animation, --move or --pose", true};
   if (said.contains("frames") && (by_paths ? request.move.empty() && request.pose.empty() : request.animation.empty()))
-    return Error{"--frames", by_paths ? "needs --move, or --pose" : "needs --animation", true};
+    return Error{"--frames", by_paths ? "needs --move, or --pose" : "needs --animation, or --move", true};
   const bool from_afar = kind == DrawKind::texture || kind == DrawKind::blocks;
   if (from_afar && show->colour != RenderOptions::Show::albedo && request.env.empty() && request.sphere_lamp.empty())
     return Error{"--env", "is needed: an environment to light the scene by", true};
@@ -289,6 +314,7 @@ Result<void> check_draw(const DrawRequest& request, const Baked& baked) {
   if (lit && (light.order > 0 || !light.lobes.empty() || wavelets) && request.env.empty() &&
       request.sphere_lamp.empty())
     return Error{"--env", "is needed: the file is baked for distant light", true};
+  if (auto ok = check_moves(request, kind, light); !ok) return ok;
   const bool copies = !light.lobes.empty() && light.lobe_kind == LobeKind::band_limited;
   if (light.order == 0 && is_given(request, "window")) {
     if (!copies) return Error{"--window", "shapes harmonics, and the file is baked for none", true};

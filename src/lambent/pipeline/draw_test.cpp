@@ -3,6 +3,7 @@
 #include <lambent/pipeline/draw.h>
 #include <lambent/transfer/zonal_texture.h>
 
+#include <fmt/format.h>
 #include <gtest/gtest.h>
 #include <unistd.h>
 
@@ -70,6 +71,13 @@ Image picture(const Baked& baked, DrawRequest request, const std::string& show) 
 
 void add(Image& sum, const Image& image) {
   for (size_t i = 0; i < sum.rgb.size(); ++i) sum.rgb[i] += image.rgb[i];
+}
+
+double mean_difference(const Image& a, const Image& b) {  // of their mean
+  double difference = 0, all = 0;
+  for (size_t i = 0; i < a.rgb.size(); ++i)
+    difference += double(length(a.rgb[i] - b.rgb[i])), all += double(length(b.rgb[i]));
+  return difference / all;
 }
 
 void expect_equal(const Image& a, const Image& b) {
@@ -179,6 +187,76 @@ const std::map<std::string, double> other_numbers{{"light-order", 1},    {"spp",
                                                   {"tolerance", 4},      {"terms", 20},        {"groove-depth", 0.2},
                                                   {"groove-width", 0.4}, {"frame-bounces", 1}, {"frame-leaves", 1},
                                                   {"near-rays", 1},      {"lamp-bounces", 2}};
+
+// Lamps of the light, moved: where they were nothing changes; elsewhere the picture and its loss are those of
+// move_light; over times, pictures one by one; turned with the sky, as --env-rotate turns them.
+TEST_F(Drawings, LampsOfTheLightMove) {
+  const std::string sun = "sky:elevation=40,azimuth=20,turbidity=4,width=256";
+  const auto baked = bake_with_summary({.scene = at("room.obj"),
+                                        .light = "sh:4+lamps:2@" + sun,
+                                        .samples = 256,
+                                        .bounces = "1",
+                                        .given = {"light", "samples", "bounces"}});
+  ASSERT_TRUE(baked) << baked.error().text();
+  const LightBasis light = light_of(baked->baked.surface.store);
+  ASSERT_EQ(light.lobes.size(), 1u);
+  const Vec3 axis = light.lobes[0].axis;
+  const double elevation = double(degrees(std::asin(axis.y))), azimuth = double(degrees(std::atan2(axis.z, axis.x)));
+  const DrawRequest base{.env = sun, .camera = "3,2,4,1,0.8,0.8,40", .size = "24x18", .background = "none", .spp = 4};
+  const auto drawn = [&](const std::string& move, const std::string& frames = "", const std::string& rotate = "") {
+    DrawRequest r = base;
+    if (!move.empty()) r.move = {move};
+    r.frames = frames, r.env_rotate = rotate;
+    auto drawing = draw(baked->baked, r);
+    EXPECT_TRUE(drawing) << drawing.error().text();
+    return std::move(*drawing);
+  };
+  const auto place = [&](double more) { return fmt::format("{},{}", azimuth + more, elevation); };
+  const Drawing still = drawn(""), stays = drawn("1@" + place(0)), moved = drawn("1@" + place(30));
+  expect_equal(still.frames[0], stays.frames[0]);
+  EXPECT_GT(still.summary.json["held"].get<double>(), 0.7);
+  EXPECT_LT(stays.summary.json["moved"][0]["lost"].get<double>(), 1e-3);
+  EXPECT_NE(still.frames[0].rgb, moved.frames[0].rgb);
+  const auto& told = moved.summary.json["moved"][0];
+  EXPECT_EQ(told["lamps"][0]["lamp"], 1);
+  EXPECT_NEAR(told["lamps"][0]["degrees"].get<double>(), 30 * std::cos(elevation * std::numbers::pi / 180), 1.0);
+  EXPECT_LT(told["lamps"][0]["held"].get<double>(), 0.1);  // a sun, far from its lobe
+  EXPECT_GT(told["lost"].get<double>(), 0.8);
+  const Drawing film = drawn("1@0:" + place(0) + ";2:" + place(60), "0:1:1");
+  ASSERT_EQ(film.frames.size(), 2u);
+  expect_equal(film.frames[0], stays.frames[0]);
+  EXPECT_GT(film.summary.json["moved"][1]["lost"].get<double>(), 0.8);
+  // The whole sky turned is its harmonics turned and its lamp carried along.
+  expect_equal(drawn("1@" + place(0), "", "0,0,0").frames[0], still.frames[0]);
+  const Vec3 turned = rotation_from_yaw_pitch_roll({25, 0, 0}) * axis;
+  const std::string along = fmt::format("{},{}", degrees(std::atan2(turned.z, turned.x)), elevation);
+  const Drawing by_hand = drawn("1@" + along, "", "25,0,0");
+  EXPECT_LT(mean_difference(by_hand.frames[0], drawn("", "", "25,0,0").frames[0]), 0.02);
+  EXPECT_GT(mean_difference(by_hand.frames[0], still.frames[0]), 0.05);
+}
+
+TEST_F(Drawings, LampsThatCannotMoveAreRefusedByName) {
+  const auto refused = [&](const std::string& light, std::vector<std::string> move) {
+    const auto baked = bake_with_summary({.scene = at("room.obj"),
+                                          .light = light,
+                                          .samples = 16,
+                                          .bounces = "0",
+                                          .given = {"light", "samples", "bounces"}});
+    EXPECT_TRUE(baked) << baked.error().text();
+    DrawRequest r{.env = sky, .size = "8x8", .spp = 1};
+    r.move = std::move(move);
+    auto drawing = draw(baked->baked, r);
+    EXPECT_FALSE(drawing);
+    EXPECT_EQ(drawing.error().where, "--move");
+    return drawing.error().message;
+  };
+  const std::string lamp = "sh:3+lamps:1@" + std::string(sky);
+  EXPECT_NE(refused("sh:3", {"1@20,30"}).find("lamps:COUNT@ENV"), std::string::npos);
+  EXPECT_NE(refused("directional:9", {"1@20,30"}).find("none is a lamp"), std::string::npos);
+  EXPECT_NE(refused(lamp, {"2@20,30"}).find("no lamp 2"), std::string::npos);
+  EXPECT_NE(refused(lamp, {"1@20,130"}).find("elevation"), std::string::npos);
+  EXPECT_NE(refused(lamp, {"1@20,30", "1@20,40"}).find("twice"), std::string::npos);
+}
 
 // Every option of the table, said of a file of every kind: it changes the picture, or is refused or warned of by name.
 TEST_F(Drawings, NoOptionIsLeftAsideInSilence) {

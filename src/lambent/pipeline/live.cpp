@@ -81,7 +81,7 @@ Result<void> LivePicture::State::ask_parts(const DrawRequest& request, const Dra
   const bool places = !is_same(before, request, {"place", "move", "pose", "lamp-bounces"});
   const bool time = before.time != request.time;
   const bool objects = places || !is_same(before, request, {"insert"}) ||
-                       (time && (!request.move.empty() || !request.pose.empty()));
+                       (time && !request.place.empty() && (!request.move.empty() || !request.pose.empty()));
   const bool left_alone = has_objects() && request.place.empty() && request.insert.empty();
   const bool posed_anew = left_alone || !is_same(before, request, {"animation", "deform"}) ||
                           (time && !request.animation.empty());
@@ -105,7 +105,8 @@ Result<void> LivePicture::State::ask_parts(const DrawRequest& request, const Dra
     if (materials || sky) due.light = true;
     return made;
   }
-  due.light |= sky || materials || !is_same(before, request, {"env-rotate", "lamp", "sphere-lamp"});
+  due.light |= sky || materials || !is_same(before, request, {"env-rotate", "lamp", "sphere-lamp", "move"}) ||
+               (time && asked.place.empty() && !request.move.empty());
   due.values |= posed_anew || objects, due.rays |= posed_anew, due.objects |= objects;
   return {};
 }

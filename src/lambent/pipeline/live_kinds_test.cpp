@@ -212,6 +212,8 @@ const auto two_bands = [](DrawRequest& r) { r.light_order = 2; };
 const auto turned_light = [](DrawRequest& r) { r.env_rotate = "80,20,0"; };
 const auto green_lamp = [](DrawRequest& r) { r.lamp = {"lamp=0,1,0", "sky=0.5,1,2"}; };
 const auto lamp_alone = [](DrawRequest& r) { r.lamp = {"sky=0"}; };
+const auto lamp_moved = [](DrawRequest& r) { r.move = {"1@70,20"}; };
+const auto lamp_later = [](DrawRequest& r) { r.move = {"1@0:70,20;2:10,60"}, r.time = 1.2; };
 const auto phong = [](DrawRequest& r) { r.brdf = "phong:exponent=30,diffuse=0.2,specular=0.5"; };
 const auto ggx = [](DrawRequest& r) { r.brdf = "ggx:roughness=0.5", r.env_rotate = "80,0,0"; };
 
@@ -224,7 +226,8 @@ INSTANTIATE_TEST_SUITE_P(Kinds, LiveEdits,
                                          Edits{"matrix_map", {phong, ggx}}, Edits{"factors", {phong, ggx}},
                                          Edits{"wavelets", {[](DrawRequest& r) { r.terms = 8; }, turned_light}},
                                          Edits{"diffuse_fixed_view", {two_bands, turned_light}},
-                                         Edits{"diffuse_lobes", {turned_light}}, Edits{"lightmap_prt", {turned_light}}),
+                                         Edits{"diffuse_lobes", {turned_light, lamp_moved, lamp_later}},
+                                         Edits{"lightmap_prt", {turned_light}}),
                          [](const auto& info) { return info.param.name; });
 
 // A model by name is what --brdf is for all; named for one, the other stays.

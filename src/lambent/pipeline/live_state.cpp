@@ -109,6 +109,7 @@ Result<void> LivePicture::State::project(bool hurry) {
   }
   ColumnDrawing& d = *columns;
   d.around = {.env = by.env, .rotation = turn, .seen = asked.background == "env", .known = by.known};
+  d.time = asked.time;
   if (auto ok = choose_light(d); !ok) return ok;
   if (look == Look::coefficient) {
     std::vector<Vec3>& of = d.light.projection.light;

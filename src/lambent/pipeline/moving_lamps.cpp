@@ -47,6 +47,61 @@ Vec3 place_at(const std::vector<double>& n, size_t first, Vec3d origin) {
   return Vec3(Vec3d(n[first], n[first + 1], n[first + 2]) - origin);
 }
 
+// Degrees.
+Vec3 direction_of(double azimuth, double elevation) {
+  const double a = azimuth * std::numbers::pi / 180, e = elevation * std::numbers::pi / 180;
+  return Vec3(float(std::cos(e) * std::cos(a)), float(std::sin(e)), float(std::cos(e) * std::sin(a)));
+}
+
+// N of N@..., from 1, and the rest.
+Result<std::pair<size_t, std::string>> read_lamp_number(const std::string& text, size_t lamps,
+                                                        const std::string& expected) {
+  const size_t at = text.find('@');
+  size_t lamp = 0;
+  const char* end = text.data() + std::min(at, text.size());
+  const auto [stop, status] = std::from_chars(text.data(), end, lamp);
+  if (at == std::string::npos || status != std::errc() || stop != end)
+    return wrong("--move", expected + ", not \"" + text + "\"");
+  if (lamp < 1 || lamp > lamps)
+    return wrong("--move", "there is no lamp " + std::to_string(lamp) + " but " + std::to_string(lamps));
+  return std::pair(lamp - 1, text.substr(at + 1));
+}
+
+// T:NUMBERS;T:NUMBERS;..., times that rise.
+Result<std::vector<std::pair<double, std::vector<double>>>> read_keys(const std::string& text, size_t count,
+                                                                      const std::string& expected) {
+  std::vector<std::pair<double, std::vector<double>>> keys;
+  for (size_t from = 0; from <= text.size();) {
+    const size_t until = std::min(text.find(';', from), text.size());
+    const std::string key = text.substr(from, until - from);
+    const size_t colon = key.find(':');
+    if (colon == std::string::npos) return wrong("--move", expected + ", not \"" + text + "\"");
+    auto time = read_numbers(key.substr(0, colon), 1, "--move");
+    if (!time) return time.error();
+    auto numbers = read_numbers(key.substr(colon + 1), count, "--move");
+    if (!numbers) return numbers.error();
+    if (!keys.empty() && !((*time)[0] > keys.back().first)) return wrong("--move", expected);
+    keys.emplace_back((*time)[0], std::move(*numbers));
+    from = until + 1;
+  }
+  return keys;
+}
+
+// Which two of the places it is between, and how far on it is from the first.
+struct Between {
+  size_t from, to;
+  float share;
+};
+Between between(const std::vector<std::pair<double, Vec3>>& places, double time) {
+  for (size_t k = 0; k < places.size(); ++k)
+    if (time < places[k].first) {
+      if (k == 0) return {0, 0, 0};
+      const double before = places[k - 1].first;
+      return {k - 1, k, float((time - before) / (places[k].first - before))};
+    }
+  return {places.size() - 1, places.size() - 1, 0};
+}
+
 }  // namespace
 
 bool names_moving_lamp(const std::string& text) {
@@ -90,10 +145,8 @@ Result<MovingLamp> parse_moving_lamp(const std::string& text, Vec3d origin) {
   lamp.kind = read->kind, lamp.light.intensity = read->color;
   if (lamp.kind == MovingLamp::Kind::sun) {
     if (std::abs((*n)[1]) > 90) return wrong("--lamp", "a sun's elevation lies from -90 to 90 degrees");
-    const double azimuth = (*n)[0] * std::numbers::pi / 180, elevation = (*n)[1] * std::numbers::pi / 180;
     lamp.light.kind = PunctualLight::Kind::directional;
-    lamp.light.direction = -Vec3(float(std::cos(elevation) * std::cos(azimuth)), float(std::sin(elevation)),
-                                 float(std::cos(elevation) * std::sin(azimuth)));
+    lamp.light.direction = -direction_of((*n)[0], (*n)[1]);
     return lamp;
   }
   lamp.light.position = lamp.centre = place_at(*n, 0, origin);
@@ -124,45 +177,46 @@ Result<std::vector<MovingLamp>> parse_moving_lamps(const std::vector<std::string
 
 Result<LampPath> parse_lamp_path(const std::string& text, const std::vector<MovingLamp>& lamps, Vec3d origin) {
   const std::string expected = "expects N@T:X,Y,Z;T:X,Y,Z;..., with N the number of a --lamp and times that rise";
-  const size_t at = text.find('@');
-  LampPath path;
-  const char* end = text.data() + std::min(at, text.size());
-  const auto [stop, status] = std::from_chars(text.data(), end, path.lamp);
-  if (at == std::string::npos || status != std::errc() || stop != end)
-    return wrong("--move", expected + ", not \"" + text + "\"");
-  if (path.lamp < 1 || path.lamp > lamps.size())
-    return wrong("--move", "there is no lamp " + std::to_string(path.lamp) + " but " + std::to_string(lamps.size()));
-  if (lamps[--path.lamp].kind == MovingLamp::Kind::sun) return wrong("--move", "a sun has no place to be moved");
-  for (size_t from = at + 1; from <= text.size();) {
-    const size_t until = std::min(text.find(';', from), text.size());
-    const std::string key = text.substr(from, until - from);
-    const size_t colon = key.find(':');
-    if (colon == std::string::npos) return wrong("--move", expected + ", not \"" + text + "\"");
-    auto time = read_numbers(key.substr(0, colon), 1, "--move");
-    if (!time) return time.error();
-    auto place = read_numbers(key.substr(colon + 1), 3, "--move");
-    if (!place) return place.error();
-    if (!path.places.empty() && !((*time)[0] > path.places.back().first)) return wrong("--move", expected);
-    path.places.emplace_back((*time)[0], place_at(*place, 0, origin));
-    from = until + 1;
-  }
+  auto numbered = read_lamp_number(text, lamps.size(), expected);
+  if (!numbered) return numbered.error();
+  LampPath path{numbered->first, {}};
+  if (lamps[path.lamp].kind == MovingLamp::Kind::sun) return wrong("--move", "a sun has no place to be moved");
+  auto keys = read_keys(numbered->second, 3, expected);
+  if (!keys) return keys.error();
+  for (const auto& [time, place] : *keys) path.places.emplace_back(time, place_at(place, 0, origin));
   return path;
 }
 
 void move_lamp(std::vector<MovingLamp>& lamps, const LampPath& path, double time) {
-  Vec3 at = path.places.front().second;
-  for (size_t k = 0; k < path.places.size(); ++k) {
-    const auto& [then, place] = path.places[k];
-    if (time < then) {
-      if (k > 0) {
-        const auto& [before, start] = path.places[k - 1];
-        at = start + float((time - before) / (then - before)) * (place - start);
-      }
-      break;
-    }
-    at = place;
-  }
+  const Between b = between(path.places, time);
+  const Vec3 from = path.places[b.from].second, at = from + b.share * (path.places[b.to].second - from);
   lamps[path.lamp].centre = lamps[path.lamp].light.position = at;
+}
+
+Result<LampArc> parse_lamp_arc(const std::string& text, size_t lamps) {
+  const std::string expected =
+      "expects N@AZIMUTH,ELEVATION or N@T:AZIMUTH,ELEVATION;..., with N the number of a lamp and times that rise";
+  auto numbered = read_lamp_number(text, lamps, expected);
+  if (!numbered) return numbered.error();
+  const bool stands = numbered->second.find(':') == std::string::npos;
+  auto keys = read_keys((stands ? "0:" : "") + numbered->second, 2, expected);
+  if (!keys) return keys.error();
+  LampArc arc{numbered->first, {}};
+  for (const auto& [time, n] : *keys) {
+    if (std::abs(n[1]) > 90) return wrong("--move", "a lamp's elevation lies from -90 to 90 degrees");
+    arc.places.emplace_back(time, direction_of(n[0], n[1]));
+    if (arc.places.size() > 1 && dot(arc.places.end()[-2].second, arc.places.back().second) < -0.9999f)
+      return wrong("--move", "from a place to the opposite one there is no shorter arc: give one between");
+  }
+  return arc;
+}
+
+Vec3 direction_at(const LampArc& arc, double time) {
+  const Between b = between(arc.places, time);
+  const Vec3d from(arc.places[b.from].second), to(arc.places[b.to].second);
+  const double angle = std::atan2(length(cross(from, to)), dot(from, to)), share = double(b.share);
+  if (angle < 1e-9) return Vec3(from);
+  return normalize(Vec3(std::sin((1 - share) * angle) * from + std::sin(share * angle) * to));
 }
 
 namespace {

@@ -59,6 +59,15 @@ Result<LampPath> parse_lamp_path(const std::string& text, const std::vector<Movi
                                  Vec3d origin = Vec3d(0));
 void move_lamp(std::vector<MovingLamp>& lamps, const LampPath& path, double time);
 
+// The same of a lamp of distant light, which stands in a direction: N@AZIMUTH,ELEVATION (degrees, as of suns), or
+// N@T:AZIMUTH,ELEVATION;..., along the shorter arc from one to the next. `lamps`: how many there are.
+struct LampArc {
+  size_t lamp = 0;
+  std::vector<std::pair<double, Vec3>> places;
+};
+Result<LampArc> parse_lamp_arc(const std::string& text, size_t lamps);
+Vec3 direction_at(const LampArc& arc, double time);
+
 // Exit radiance of a white surface at `origin`, which is clear of it, by direct light of the lamps. Spheres are sampled
 // by solid angle, `samples` times each, by numbers keyed by `key`; a place within a sphere has no light of it.
 Vec3 direct_light(const Tracer& tracer, std::span<const MovingLamp> lamps, Vec3 origin, Vec3 normal, int samples,

@@ -98,6 +98,25 @@ TEST(MovingLamps, GoStraightFromPlaceToPlace) {
   }
 }
 
+TEST(MovingLamps, OfDistantLightGoAlongArcs) {
+  auto standing = parse_lamp_arc("2@90,30", 2);
+  ASSERT_TRUE(standing) << standing.error().text();
+  EXPECT_EQ(standing->lamp, 1u);
+  EXPECT_LT(length(direction_at(*standing, 7) - Vec3(0, 0.5f, std::sqrt(0.75f))), 1e-6f);
+  auto arc = parse_lamp_arc("1@1:0,10;3:180,70", 2);  // over the top: 100 degrees
+  ASSERT_TRUE(arc) << arc.error().text();
+  for (const auto& [time, degrees] : {std::pair(0.0, 10.0f), {1.0, 10.0f}, {1.5, 35.0f}, {2.0, 60.0f}, {9.0, 110.0f}}) {
+    const float t = radians(degrees);
+    EXPECT_LT(length(direction_at(*arc, time) - Vec3(std::cos(t), std::sin(t), 0)), 1e-6f) << time;
+  }
+  for (const char* text : {"", "1", "1@", "0@1,2", "3@1,2", "x@1,2", "1@1,2,3", "1@0,91", "1@0:0,0;0:1,1", "1@0:0",
+                           "1@0:1,2;", "1@0:0,0;1:180,0", "1@nan,0"}) {
+    auto path = parse_lamp_arc(text, 2);
+    ASSERT_FALSE(path) << text;
+    EXPECT_EQ(path.error().where, "--move") << text;
+  }
+}
+
 TEST(MovingLamps, StandInASceneAsItsOwn) {
   Scene scene = make_quad(Vec3(0), Vec3(1, 0, 0), Vec3(0, 0, -1), 1, 1, Vec3(0.5f));
   add_lamps(scene, {must("sphere@0,2,0,0.5=3"), must("point@1,2,3=4")});

@@ -1,7 +1,8 @@
 #include <lambent/basis/sh.h>
 #include <lambent/core/check.h>
 #include <lambent/light/project.h>
-#include <lambent/relight/light.h>
+#include <lambent/basis/moved.h>
+#include <lambent/relight/moved_light.h>
 
 namespace lambent {
 
@@ -43,6 +44,33 @@ LightProjection project_light(std::span<const Vec3> harmonics, const LightBasis&
   DirectionalBasis basis = make_directional_basis(columns.lobes.empty() ? order : 0, columns.lobe_kind, columns.lobes);
   std::vector<Vec3> light = project_harmonics(rotate_sh(make_sh_rotation(order, rotation), harmonics), basis);
   return of_coefficients(std::move(light), std::move(basis), columns, window);
+}
+
+double squared_radiance(const LightProjection& projection) {
+  const DirectionalBasis& basis = projection.basis;
+  double sum = 0;
+  for (size_t i = 0; i < basis.count(); ++i)
+    for (size_t j = 0; j < basis.count(); ++j)
+      sum += basis.gram[i * basis.count() + j] * dot(Vec3d(projection.light[i]), Vec3d(projection.light[j]));
+  return sum;
+}
+
+MovedLight move_light(const LightProjection& still, const LightBasis& columns, const Mat3& rotation,
+                      std::span<const Vec3> axes, int order, ShWindow window) {
+  if (order == 0 || order > columns.order) order = columns.order;
+  DirectionalBasis basis = make_directional_basis(order, columns.lobe_kind, columns.lobes);
+  const size_t harmonics = size_t(sh_count(order)), before = size_t(sh_count(columns.order)) - harmonics;
+  std::vector<Vec3> light(basis.count());
+  MovedLight out;
+  for (int c = 0; c < 3; ++c) {
+    std::vector<double> channel(light.size());
+    for (size_t i = 0; i < light.size(); ++i) channel[i] = double(still.light[i < harmonics ? i : i + before][c]);
+    const MovedCoefficients moved = move_directional(basis, channel, rotation, axes);
+    for (size_t i = 0; i < light.size(); ++i) light[i][c] = float(moved.coefficients[i]);
+    out.lost += moved.lost, out.whole += moved.whole;
+  }
+  out.projection = of_coefficients(std::move(light), std::move(basis), columns, window);
+  return out;
 }
 
 }  // namespace lambent

@@ -2,7 +2,7 @@
 #include <lambent/relight/dering.h>
 #include <lambent/relight/zonal.h>
 #include <lambent/render/transfer_texture.h>
-#include <lambent/transfer/view_mix.h>
+#include <lambent/core/sampling.h>
 
 namespace lambent {
 Mat3 texture_frame(const Scene& scene, const Triangle& t, Vec3 normal) {
@@ -53,28 +53,57 @@ void arriving_here(const ArrivingLight& light, const Corners& corners, const Hit
   std::fill(out.begin() + ptrdiff_t(count), out.end(), Vec3(0.0f));
 }
 
+constexpr size_t most_views = 16;
+
 // What is looked up of a texture at a hit: rows of it, and what each counts for.
 struct ReliefValues {
   std::vector<float> values;  // [row][value]
-  std::array<float, 4> weights{1, 0, 0, 0};
+  std::array<float, most_views> weights{1};
   size_t rows = 1;
   Vec3 shade(const ZonalTransfer& transfer, const Mat3& frame, std::span<const Vec3> light) const {
     Vec3 sum(0.0f);
     const size_t n = transfer.row_values();
     for (size_t k = 0; k < rows; ++k)
-      if (weights[k] > 0) sum += weights[k] * shade_zonal(transfer, std::span(values).subspan(k * n, n), frame, light);
-    return sum;
+      if (weights[k] != 0) sum += weights[k] * shade_zonal(transfer, std::span(values).subspan(k * n, n), frame, light);
+    // Of few views the cubic overshoots beside a bright one.
+    return rows == 1 ? sum : max(sum, Vec3(0.0f));
   }
 };
+
+// The nodes of a grid of views that a direction is made of, and their weights: Catmull and Rom's cubic each way, since
+// a highlight is bent between views, and straight lines between them lie above it (docs/zonal.md).
+struct SmoothViewMix {
+  std::array<size_t, most_views> nodes;
+  std::array<float, most_views> weights;
+};
+SmoothViewMix mix_views_smoothly(int grid, Vec3 wo) {
+  const float z = std::clamp(wo.z, 0.0f, 1.0f);
+  const Vec2 flat(normalize_or(Vec3(wo.x, wo.y, 0), Vec3(0)));
+  const Vec2 square = disk_to_square(flat * std::sqrt(1 - z)) * float(grid - 1);
+  int node[2][4];
+  float weight[2][4];
+  for (int axis = 0; axis < 2; ++axis) {
+    const int first = std::min(int(square[axis]), grid - 2);
+    const float f = square[axis] - float(first), f2 = f * f, f3 = f2 * f;
+    const float w[4] = {(-f + 2 * f2 - f3) / 2, (2 - 5 * f2 + 3 * f3) / 2, (f + 4 * f2 - 3 * f3) / 2, (f3 - f2) / 2};
+    for (int k = 0; k < 4; ++k) node[axis][k] = std::clamp(first + k - 1, 0, grid - 1), weight[axis][k] = w[k];
+  }
+  SmoothViewMix mix;
+  for (size_t k = 0; k < most_views; ++k) {
+    const size_t x = k % 4, y = k / 4;
+    mix.nodes[k] = size_t(node[1][y]) * size_t(grid) + size_t(node[0][x]), mix.weights[k] = weight[0][x] * weight[1][y];
+  }
+  return mix;
+}
 
 // As seen from the unit direction `view`, in the texture's frame.
 void sample_views(const ZonalTexture& texture, Vec2 uv, Vec3 view, ReliefValues& out) {
   const size_t n = texture.transfer.row_values();
   if (texture.views == 0) return sample_zonal_texture(texture, uv, std::span(out.values).first(n));
-  const ViewMix mix = mix_views(texture.views, view);
-  out.rows = 4, out.weights = mix.weights;
-  for (size_t k = 0; k < 4; ++k)
-    if (mix.weights[k] > 0) sample_zonal_texture(texture, uv, std::span(out.values).subspan(k * n, n), mix.nodes[k]);
+  const SmoothViewMix mix = mix_views_smoothly(texture.views, view);
+  out.rows = most_views, out.weights = mix.weights;
+  for (size_t k = 0; k < most_views; ++k)
+    if (mix.weights[k] != 0) sample_zonal_texture(texture, uv, std::span(out.values).subspan(k * n, n), mix.nodes[k]);
 }
 
 // What leaves the relief, white, at a hit, given its values there; `here` and `near` are scratch.
@@ -105,7 +134,7 @@ std::function<SurfaceShade()> transfer_texture_shade(const Scene& scene, const Z
                                                      const TextureUse& use, const LocalLight& light,
                                                      RenderOptions::Show show, const ArrivingAt* arriving) {
   return [&, show, arriving]() -> SurfaceShade {
-    return [&, show, arriving, values = ReliefValues{std::vector<float>(4 * texture.transfer.row_values())},
+    return [&, show, arriving, values = ReliefValues{std::vector<float>(most_views * texture.transfer.row_values())},
             here = light.distant, near = std::vector<Vec3>()](const Hit& hit, Vec3 direction) mutable {
       const Triangle& t = scene.triangles[hit.triangle];
       Vec3 normal = normalize_or(interpolate(scene.normals, t, hit.u, hit.v), {0, 0, 1});

@@ -207,7 +207,8 @@ TEST(TransferTexture, ViewsShowAReliefAtASlantAsItsDisplacedGeometry) {
     const double with = decibels(*ours, truth->image), without = decibels(*flat, truth->image);
     const std::string name = glossy ? "glossy" : "diffuse";
     RecordProperty(name, std::to_string(with)), RecordProperty(name + "_without", std::to_string(without));
-    EXPECT_GT(with, 30) << name;
+    // 37.9 and 36.1; of the four nearest views alone 36.7 and 32.9.
+    EXPECT_GT(with, glossy ? 34 : 37) << name;
     EXPECT_GT(with, without + 2) << name;
   }
 }
