@@ -134,7 +134,9 @@ by 2 inspect box.obj >stdout 2>stderr
 options=(--max-edge 0.06 --bounces 3)
 samples=1024
 kept() { [ "$(find part.checkpoint -name '*.pieces' -size +0 2>/dev/null | wc -l)" -ge 3 ]; }
-whole() { "$tool" bake box.obj "${options[@]}" --samples $samples -o whole.glb >/dev/null 2>stderr || bad "$(cat stderr)"; }
+whole() {
+  "$tool" bake box.obj "${options[@]}" --samples $samples -o whole.glb >/dev/null 2>stderr || bad "$(cat stderr)"
+}
 whole
 resumed=0
 for ((i = 0; i < moments; ++i)); do

@@ -6,7 +6,7 @@
 #include <lambent/light/project.h>
 #include <lambent/light/sky.h>
 #include <lambent/reference/path_tracer.h>
-#include <lambent/relight/moved_light.h>
+#include <lambent/relight/light.h>
 #include <lambent/relight/relight.h>
 #include <lambent/scene/procedural.h>
 

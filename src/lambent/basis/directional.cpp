@@ -1,7 +1,7 @@
 // Follows: general-prt (directional and custom bases). A lobe g(cos t) has Legendre moments I_l = integral over [-1, 1]
 // of g P_l; then (Funk-Hecke) the integral of y_lm against the lobe about a is 2 pi I_l y_lm(a), and that of two lobes
 // at an angle c is pi sum_l (2l+1) I_l I'_l P_l(cos c).
-#include <lambent/basis/moved.h>
+#include <lambent/basis/directional.h>
 #include <lambent/basis/quadrature.h>
 #include <lambent/basis/symmetric.h>
 #include <lambent/core/check.h>

@@ -90,6 +90,15 @@ struct TurnedCoefficients {
 TurnedCoefficients turn_directional(const DirectionalBasis& basis, std::span<const double> coefficients,
                                     const Mat3& rotation);
 
+// The function with its harmonics turned, and its lobes about `axes`, one a lobe: lamps that move while the rest stays.
+struct MovedCoefficients {
+  std::vector<double> coefficients;
+  double lost = 0, whole = 0;  // integrals of squares: of what the basis does not hold, of the moved function
+};
+// Those that fit best. Closed form.
+MovedCoefficients move_directional(const DirectionalBasis& basis, std::span<const double> coefficients,
+                                   const Mat3& rotation, std::span<const Vec3> axes);
+
 // The part of the function that spherical harmonics of `order` can hold: order^2 coefficients, in closed form
 // (Funk-Hecke). With it lamps light what was baked for harmonics.
 std::vector<double> directional_to_sh(const DirectionalBasis& basis, std::span<const double> coefficients, int order);

@@ -1,4 +1,4 @@
-#include <lambent/basis/moved.h>
+#include <lambent/basis/directional.h>
 #include <lambent/basis/quadrature.h>
 #include <lambent/core/random.h>
 #include <lambent/core/sampling.h>

@@ -4,7 +4,7 @@
 #include <lambent/light/peaks.h>
 #include <lambent/light/project.h>
 #include <lambent/pipeline/moving_lamps.h>
-#include <lambent/relight/moved_light.h>
+#include <lambent/relight/light.h>
 
 #include <fmt/format.h>
 #include <fmt/ranges.h>

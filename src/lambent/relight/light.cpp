@@ -1,8 +1,7 @@
 #include <lambent/basis/sh.h>
 #include <lambent/core/check.h>
 #include <lambent/light/project.h>
-#include <lambent/basis/moved.h>
-#include <lambent/relight/moved_light.h>
+#include <lambent/relight/light.h>
 
 namespace lambent {
 
