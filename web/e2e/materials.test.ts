@@ -35,6 +35,12 @@ describe.skipIf(!haveTool || !haveBrowser)('materials in a program', () => {
     );
     lambent('compress', at('vertices.glb'), '--zonal', '2', '-o', at('lobes.glb'));
     lambent('bake', scene, ...glossy, '-o', at('glossy.glb'));
+    lambent('bake', scene, '--transfer', 'blocks', '--cube', '16', '-o', at('blocks.glb'));
+    writeBumpy(at('bumpy.gltf'));
+    lambent(
+      ...['bake', at('bumpy.gltf'), '--transfer', 'lightmap', '--texels-per-unit', '16', '--samples', '64'],
+      ...['--directional', 'sh:2', '--sky', sun, '-o', at('bumps.glb')],
+    );
     browser = await launch();
     ({ page, server } = await openFixture(browser, folder, 'webgpu.html'));
   });
@@ -94,6 +100,9 @@ describe.skipIf(!haveTool || !haveBrowser)('materials in a program', () => {
     ['vertices', 5],
     ['vertices', sun],
     ['lobes', 5],
+    ['atlas', 4],
+    ['atlas', sun],
+    ['bumps', 1],
     ['glossy', 3],
     ['glossy', sun],
   ] as const)
@@ -176,7 +185,6 @@ describe.skipIf(!haveTool || !haveBrowser)('materials in a program', () => {
     ['directional', ['--transfer', 'lightmap', '--texels-per-unit', '8', '--directional', 'sh:2', '--sky', sun]],
   ] as const)
     it(`takes what a lamp sends by normal maps: ${name}`, async () => {
-      writeBumpy(at('bumpy.gltf'));
       lambent('bake', at('bumpy.gltf'), ...args, '--samples', '16', '-o', at(`bumps_${name}.glb`));
       const shot = { path: `/files/bumps_${name}.glb`, light: [], camera: cameraOf('1.6,1.5,2.2,-0.1,0.4,-0.2,40') };
       for (const backend of backends) {
@@ -203,7 +211,7 @@ describe.skipIf(!haveTool || !haveBrowser)('materials in a program', () => {
     expect(mirrored).toMatch(/"copies": mirrored.*: 1$/);
     expect(foreign).toMatch(/"copies": of no mesh as it was loaded/);
     expect(more).toEqual([]);
-    const other = await page.evaluate(() => window.gpu.said('/files/atlas.glb'));
+    const other = await page.evaluate(() => window.gpu.said('/files/blocks.glb'));
     expect(other).toHaveLength(2);
     expect(other[0]).toMatch(/"copies": turned differently, which this kind/);
   });

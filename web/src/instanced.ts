@@ -27,8 +27,11 @@ export const instanceLayout = (quads: number): { texels: number; across: number 
   return { texels, across: Math.floor(width / texels) };
 };
 
-/** GLSL: prtInstanceSum( receiver, row, part ) and prtInstanceTurn(), by the defines of the transfer's layout. */
-export const glslInstances = /* glsl */ `
+/**
+ * GLSL: prtInstanceSum( receiver, row, part ) and prtInstanceTurn(), by the defines of the transfer's layout, of instance
+ * `id`.
+ */
+export const glslInstances = (id = 'gl_InstanceID'): string => /* glsl */ `
 #ifdef USE_INSTANCING
 #define PRT_INSTANCE_TEXELS ( 6 * PRT_QUADS + 3 )
 #define PRT_INSTANCES_ACROSS ( ${width} / PRT_INSTANCE_TEXELS )
@@ -36,8 +39,8 @@ uniform highp sampler2DArray prtTransfer;
 uniform highp sampler2D prtInstances;
 uniform bool prtInstancePeaks;
 vec4 prtInstance( const in int k ) {
-  return texelFetch( prtInstances, ivec2( ( gl_InstanceID % PRT_INSTANCES_ACROSS ) * PRT_INSTANCE_TEXELS + k,
-                                          gl_InstanceID / PRT_INSTANCES_ACROSS ), 0 );
+  return texelFetch( prtInstances, ivec2( ( ${id} % PRT_INSTANCES_ACROSS ) * PRT_INSTANCE_TEXELS + k,
+                                          ${id} / PRT_INSTANCES_ACROSS ), 0 );
 }
 mat3 prtInstanceTurn() {
   return mat3( prtInstance( 6 * PRT_QUADS ).xyz, prtInstance( 6 * PRT_QUADS + 1 ).xyz,
@@ -148,7 +151,7 @@ interface Made {
   light: Light | undefined;
 }
 
-/** Light of the instances of each mesh, of harmonics and no lamps. */
+/** Light of the instances of each mesh, of harmonics and then lamps. */
 export class InstancedLights {
   /** For shaders: of what is drawn next. */
   readonly instances: { value: DataTexture };
@@ -158,7 +161,7 @@ export class InstancedLights {
   private readonly known = new Map<InstancedMesh, Made>();
   private light: Light | undefined;
 
-  /** `order` 0: turns alone. */
+  /** `quads` 0: turns alone. */
   constructor(
     private readonly order: number,
     private readonly quads: number,
@@ -222,7 +225,7 @@ export class InstancedLights {
       const turn = orthogonalPart(gradient),
         before = known.turns[i];
       known.turns[i] = turn;
-      if (this.order === 0 || before?.elements.every((v, k) => Math.abs(v - turn.elements[k]!) < 1e-6)) return;
+      if (before?.elements.every((v, k) => Math.abs(v - turn.elements[k]!) < 1e-6)) return;
       known.rotations[i] = makeShRotation(this.order, turn.elements); // column-major: of the inverse
     });
     const data = known.texture.image.data as Float32Array;
@@ -237,14 +240,15 @@ export class InstancedLights {
   private write({ texture, rotations }: Made): void {
     const { light, order, quads } = this,
       { texels, across } = instanceLayout(quads),
-      data = texture.image.data as Float32Array,
-      turned = new Float64Array(3 * shCount(order));
-    if (!light || order === 0) return;
+      data = texture.image.data as Float32Array;
+    if (!light || quads === 0) return;
+    const turned = new Float64Array(light.rest.length);
     rotations.forEach((rotation, i) => {
       const at = 4 * (Math.floor(i / across) * width + (i % across) * texels);
       [light.rest, light.peaks].forEach((part, p) => {
         if (!part) return;
-        rotateSh(rotation, part, turned);
+        turned.set(part); // lamps stay
+        if (order > 0) rotateSh(rotation, Float64Array.from(part).subarray(0, 3 * shCount(order)), turned);
         for (let k = 0; k < turned.length; ++k)
           data[at + 4 * quads * (3 * p + (k % 3)) + Math.floor(k / 3)] = turned[k]!;
       });

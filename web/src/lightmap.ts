@@ -101,17 +101,29 @@ function readSurface(
   return surface;
 }
 
+/** What is summed, and which texel is whose. */
+interface AtlasValues {
+  layout: BlockLayout;
+  channels: 1 | 3;
+  transfer: DataArrayTexture;
+  receiversOf: DataTexture;
+}
+
 class LightmapMaterial extends MeshBasicMaterial {
   constructor(
     readonly atlas: TurnedSums<LightSums>,
+    readonly values: AtlasValues,
     readonly directional: Directional,
     readonly surface: Surface,
     source: Material,
     readonly gain?: { value: number },
   ) {
     super(gain ? { side: source.side } : diffuseParameters(source));
-    const { twoSided, normals, emissive } = surface;
+    const { twoSided, normals, emissive } = surface,
+      { layout, channels } = values;
     this.defines = {
+      ...{ PRT_QUADS: layout.quads, PRT_TEXELS: layout.texels, PRT_COLUMNS: layout.columns, PRT_ROWS: layout.rows },
+      PRT_CHANNELS: channels,
       PRT_ATLAS_ROWS: directionalRows[directional],
       ...(twoSided && { PRT_TWO_SIDED: '' }),
       ...(gain && { PRT_FALSE_COLOR: '' }),
@@ -129,7 +141,9 @@ class LightmapMaterial extends MeshBasicMaterial {
   }
 
   override clone(): this {
-    const made = new LightmapMaterial(this.atlas, this.directional, this.surface, this, this.gain).copy(this);
+    const made = new LightmapMaterial(this.atlas, this.values, this.directional, this.surface, this, this.gain).copy(
+      this,
+    );
     copyNodes(this, made);
     return made as this;
   }
@@ -149,7 +163,9 @@ class LightmapMaterial extends MeshBasicMaterial {
         prtPeakAtlas: this.atlas.peaks,
         prtTurnBack: this.atlas.turnBack,
         prtEmission: emission,
+        prtReceivers: { value: this.values.receiversOf },
       },
+      this.atlas.instances?.uniforms(this.values.transfer),
       this.gain && { prtGain: this.gain },
       normals && {
         prtNormalMap: { value: normals.texture },
@@ -164,9 +180,10 @@ class LightmapMaterial extends MeshBasicMaterial {
     shader.vertexShader =
       vertexDeclarations +
       replaceOnce(shader.vertexShader, '#include <fog_vertex>', '#include <fog_vertex>' + vertexBody);
+    const isInstanced = (shader as { instancing?: boolean }).instancing === true;
     shader.fragmentShader = useExitRadiance(
       shader.fragmentShader,
-      fragmentDeclarations(this.directional),
+      (isInstanced ? '#define USE_INSTANCING\n' : '') + fragmentDeclarations(this.directional),
       this.gain !== undefined,
     );
     if (!this.gain)
@@ -189,8 +206,8 @@ class LightmapTransfer implements BakedTransfer {
   readonly lamps = new Map<string, Color>();
   private readonly directional: Directional;
   private readonly values: TransferValues;
-  private readonly layout: BlockLayout;
-  private readonly transfer: DataArrayTexture;
+  readonly layout: BlockLayout;
+  readonly transfer: DataArrayTexture;
   private readonly atlas: TurnedSums<LightSums>;
   private readonly materials: LightmapMaterial[] = [];
   private readonly ofCoefficients = new Set<TurnedSums<LightSums>>();
@@ -202,7 +219,7 @@ class LightmapTransfer implements BakedTransfer {
     header: TransferHeader,
     groups: string[],
     values: ArrayBuffer,
-    private readonly receiversOf: DataTexture,
+    readonly receiversOf: DataTexture,
     readonly meshes: Mesh[],
     owns: Material[],
     private readonly nodes?: NodeEdition,
@@ -220,7 +237,7 @@ class LightmapTransfer implements BakedTransfer {
     const { layout, data, texture } = this.values;
     this.layout = layout;
     this.transfer = texture;
-    const pose = new RestPose(meshes);
+    const pose = new RestPose(meshes, true);
     this.atlas = this.makeAtlases(pose);
     const { width, height } = receiversOf.image;
     this.refusal = nodes ? undefined : withoutNodes;
@@ -235,7 +252,7 @@ class LightmapTransfer implements BakedTransfer {
           own: own.emissive.clone().multiplyScalar(own.emissiveIntensity ?? 1),
           lamp: own.name,
         });
-      const material = new LightmapMaterial(this.atlas, header.directional, surface, own);
+      const material = new LightmapMaterial(this.atlas, this, header.directional, surface, own);
       keepNormals(own, material, own !== mesh.material && !mesh.geometry.hasAttribute('tangent'));
       material.vertexColors = mesh.geometry.hasAttribute('color');
       this.materials.push(material);
@@ -259,7 +276,12 @@ class LightmapTransfer implements BakedTransfer {
     });
   }
   private makeAtlases(pose?: RestPose): TurnedSums<LightSums> {
-    return new TurnedSums(() => new LightSums(() => this.makeAtlas(), this.eachIsLight), this.order, pose);
+    return new TurnedSums(
+      () => new LightSums(() => this.makeAtlas(), this.eachIsLight),
+      this.order,
+      pose,
+      this.layout.quads,
+    );
   }
   private get eachIsLight(): boolean {
     return this.directional === 'none' || this.directional === 'hl2';
@@ -327,6 +349,7 @@ uint prtPick( const in ivec2 texel, out int row ) {
       (_, i) =>
         new LightmapMaterial(
           atlas,
+          this,
           this.directional,
           { ...this.materials[i]!.surface, emission: { value: new Color(0, 0, 0) } },
           this.materials[i]!,

@@ -1,8 +1,12 @@
 // What a lightmap's material adds to three's shaders: places in the atlas, rows by the normal map's normal, emission.
 import { glslHarmonics } from './glsl_harmonics.js';
 import { type Directional } from './header.js';
+import { glslInstances } from './instanced.js';
 
 export const vertexDeclarations = /* glsl */ `
+#ifdef USE_INSTANCING
+  flat varying highp int vPrtInstance;
+#endif
 attribute vec2 lambentPlace;
 varying vec2 vPrtFront;
 #ifdef PRT_TWO_SIDED
@@ -28,18 +32,23 @@ varying vec2 vPrtFront;
 #endif
 `;
 export const vertexBody = /* glsl */ `
+  mat4 prtWorld = modelMatrix;
+  #ifdef USE_INSTANCING
+    vPrtInstance = gl_InstanceID;
+    prtWorld = modelMatrix * instanceMatrix;
+  #endif
   vPrtFront = lambentPlace;
   #ifdef PRT_TWO_SIDED
     vPrtBack = lambentPlaceBack;
   #endif
   #ifdef PRT_DIRECTIONAL
-    vPrtNormal = transpose( inverse( mat3( modelMatrix ) ) ) * normal;
-    vPrtPosition = ( modelMatrix * vec4( position, 1.0 ) ).xyz;
+    vPrtNormal = transpose( inverse( mat3( prtWorld ) ) ) * normal;
+    vPrtPosition = ( prtWorld * vec4( position, 1.0 ) ).xyz;
   #endif
   #ifdef PRT_NORMAL_MAP
     vPrtNormalPlace = ( prtNormalTransform * vec3( lambentNormalPlace, 1.0 ) ).xy;
     #ifdef PRT_TANGENTS
-      vPrtTangent = vec4( mat3( modelMatrix ) * lambentTangent.xyz, lambentTangent.w );
+      vPrtTangent = vec4( mat3( prtWorld ) * lambentTangent.xyz, lambentTangent.w );
     #endif
   #endif
   #ifdef PRT_EMISSIVE_MAP
@@ -78,7 +87,36 @@ const evaluation = (kind: Directional): string =>
   ${glslHarmonics(Number(kind[3]), (i, y) => `sum += ( ${y} ) * prtRowAt( atlas, place, ${i} );`)}
   return max( sum, vec3( 0.0 ) );`;
 
+/** Rows of an instance, each of whose texels is summed where it is looked up. */
+const ofInstances = (kind: Directional): string => /* glsl */ `
+#ifdef USE_INSTANCING
+flat varying highp int vPrtInstance;
+${glslInstances('vPrtInstance')}
+uniform highp usampler2D prtReceivers;
+vec3 prtInstanceTexel( const in ivec2 at, const in int row, const in int part ) {
+  uint receiver = texelFetch( prtReceivers, clamp( at, ivec2( 0 ), textureSize( prtReceivers, 0 ) - 1 ), 0 ).r;
+  if ( receiver == 0xffffffffu ) return vec3( 0.0 );
+  vec3 sum = prtInstanceSum( int( receiver ), row, part );
+  ${kind === 'none' || kind === 'hl2' ? 'if ( prtInstancePeaks ) sum = max( sum, vec3( 0.0 ) );' : ''}
+  return sum;
+}
+vec3 prtInstanceRow( const in vec2 place, const in int row, const in int part ) {
+  vec2 low = floor( place - 0.5 ), share = place - 0.5 - low;
+  ivec2 at = ivec2( low );
+  return mix( mix( prtInstanceTexel( at, row, part ), prtInstanceTexel( at + ivec2( 1, 0 ), row, part ), share.x ),
+              mix( prtInstanceTexel( at + ivec2( 0, 1 ), row, part ),
+                   prtInstanceTexel( at + ivec2( 1, 1 ), row, part ), share.x ), share.y );
+}
+#ifdef PRT_DIRECTIONAL
+  vec3 prtEvaluateInstance( const in int part, const in vec2 place, const in vec3 N, const in vec3 n ) {
+    ${evaluation(kind).replaceAll(/prtRowAt\( atlas, place, (\d+) \)/g, 'prtInstanceRow( place, $1, part )')}
+  }
+#endif
+#endif
+`;
+
 export const fragmentDeclarations = (kind: Directional): string => /* glsl */ `
+${ofInstances(kind)}
 uniform highp sampler2D prtAtlas;
 #ifdef PRT_PEAKS
   uniform highp sampler2D prtPeakAtlas;
@@ -126,7 +164,11 @@ vec3 prtExitRadiance() {
   #ifdef PRT_TWO_SIDED
     if ( ! gl_FrontFacing ) place = vPrtBack;
   #endif
-  #ifndef PRT_DIRECTIONAL
+  #if defined( USE_INSTANCING ) && ! defined( PRT_DIRECTIONAL )
+    vec3 sum = prtInstanceRow( place, 0, 0 );
+    if ( prtInstancePeaks ) sum += prtInstanceRow( place, 0, 1 );
+    return sum;
+  #elif ! defined( PRT_DIRECTIONAL )
     vec3 sum = prtRowAt( prtAtlas, place, 0 );
     #ifdef PRT_PEAKS
       sum += prtRowAt( prtPeakAtlas, place, 0 );
@@ -155,6 +197,13 @@ vec3 prtExitRadiance() {
         texel.xy *= prtNormalScale;
         bent = normalize( t * texel.x + cross( n, t ) * ( along.w > 0.0 ? texel.y : - texel.y ) + n * texel.z );
       }
+    #endif
+    #ifdef USE_INSTANCING
+      mat3 back = transpose( prtInstanceTurn() );
+      n = back * ( side * n ), bent = back * ( side * bent );
+      vec3 total = prtEvaluateInstance( 0, place, n, bent );
+      if ( prtInstancePeaks ) total += prtEvaluateInstance( 1, place, n, bent );
+      return total;
     #endif
     n = prtTurnBack * ( side * n ), bent = prtTurnBack * ( side * bent ); // rows are in the axes of the bake
     vec3 sum = prtEvaluate( prtAtlas, place, n, bent );

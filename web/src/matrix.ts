@@ -60,7 +60,7 @@ varying vec3 vPrtFront;
   varying vec3 vPrtBack;
 #endif
 ${glossVaryings}
-${glslInstances}
+${glslInstances()}
 uniform highp sampler2D prtRows;
 uniform mat3 prtTurnBack;
 #define PRT_TURN_BACK

@@ -9,15 +9,21 @@ import {
   Fn,
   frontFacing,
   If,
+  int,
+  ivec2,
   length,
+  mix,
   modelNormalMatrix,
   modelWorldMatrix,
   normalGeometry,
   normalize,
+  normalLocal,
   positionWorld,
   select,
   sign,
   texture,
+  textureLoad,
+  transpose,
   uniform,
   varying,
   vec2,
@@ -78,14 +84,31 @@ function squareTo(v: Vec3, n: Vec3): Vec3 {
   return select(length(t).greaterThan(0.01), normalize(t), vec3(0));
 }
 
+/** From a mesh into the world. */
+interface Frame {
+  normal: Vec3;
+  tangent: (of: Vec3) => Vec3;
+}
+const ofMesh = (): Frame => ({
+  normal: (modelNormalMatrix as unknown as Node<'mat3'>).mul(normalGeometry as unknown as Vec3),
+  tangent: (of) => (modelWorldMatrix as unknown as Node<'mat4'>).mul(vec4(of, 0)).xyz,
+});
+/** three has turned an instance's local normal, and not what we call a tangent. */
+const ofInstance = ({ instances }: Sum): Frame => ({
+  normal: (modelNormalMatrix as unknown as Node<'mat3'>).mul(normalLocal as unknown as Vec3),
+  tangent: (of) => instances.turn().mul(instances.rest.mul(of)),
+});
+
 /** The normal of the front turned to its face's side, and what the normal map makes of it (scene/reflection.cpp). */
-function normals(surface: NodeSurface, side: Node<'float'>): { n: Vec3; bent: Vec3 } {
+function normals(
+  surface: NodeSurface,
+  side: Node<'float'>,
+  { normal, tangent }: Frame = ofMesh(),
+): { n: Vec3; bent: Vec3 } {
   const position = positionWorld as unknown as Vec3,
     px = dFdx(position).toVar(),
     py = dFdy(position).toVar(),
-    own = varying((modelNormalMatrix as unknown as Node<'mat3'>).mul(normalGeometry as unknown as Vec3))
-      .normalize()
-      .toVar(),
+    own = varying(normal).normalize().toVar(),
     n = select(side.mul(own.dot(cross(px, py))).lessThan(0), own.negate(), own).toVar();
   if (!surface.normals) return { n, bent: n };
   const { texture: map, scale, tangents } = surface.normals,
@@ -100,7 +123,7 @@ function normals(surface: NodeSurface, side: Node<'float'>): { n: Vec3; bent: Ve
     hand: Node<'float'> = drawn.w;
   if (tangents) {
     const given = attribute<'vec4'>('lambentTangent', 'vec4'),
-      turned = varying((modelWorldMatrix as unknown as Node<'mat4'>).mul(vec4(given.xyz, 0)).xyz),
+      turned = varying(tangent(given.xyz)),
       known = squareTo(turned, n).toVar(),
       w = varying(given.w).toVar(),
       bad = length(known).equal(0).or(w.equal(0));
@@ -115,15 +138,66 @@ function normals(surface: NodeSurface, side: Node<'float'>): { n: Vec3; bent: Ve
 }
 
 /** Exit radiance of white. */
-export function atlasRadiance({ picture, peakPicture, hasPeaks, options, turnBack }: Sum, surface: NodeSurface): Vec3 {
-  const { directional, twoSided } = surface,
+export function atlasRadiance(sum: Sum, surface: NodeSurface): Vec3 {
+  return sum.instances.choose(
+    () => ofInstances(sum, surface),
+    () => ofPicture(sum, surface),
+  );
+}
+
+/** Where the surface's light lies in the atlas, on the side that is seen. */
+function placeOf({ twoSided }: NodeSurface): Vec2 {
+  const of = (name: string): Vec2 => varying(attribute<'vec2'>(name, 'vec2')),
+    front = of('lambentPlace');
+  return twoSided ? select(frontFacing, front, of('lambentPlaceBack')) : front;
+}
+
+/** Rows of an instance, each of whose texels is summed where it is looked up. */
+function ofInstances(of: Sum, surface: NodeSurface): Vec3 {
+  const { instances, options, whose, hasPeaks } = of,
+    { directional } = surface,
+    { width, height } = options.receiversOf!.image,
+    isLight = directional === 'none' || directional === 'hl2',
+    at = placeOf(surface);
+  return Fn(() => {
+    const place = at.toVar(),
+      low = place.sub(0.5).floor().toVar(),
+      share = place.sub(0.5).sub(low).toVar();
+    const texel = (x: number, y: number, row: number, part: 0 | 1): Vec3 => {
+      const where = ivec2(low.add(vec2(x, y)).clamp(vec2(0, 0), vec2(width - 1, height - 1))),
+        r = int(textureLoad(texture(whose), where).r).toVar(),
+        known = select(r.lessThan(int(0)), int(0), r).toVar(),
+        value = isLight
+          ? instances.part(options, known, int(row), part)
+          : instances.sum(options, known, int(row), part);
+      return select(r.lessThan(int(0)), vec3(0), value);
+    };
+    const rows =
+      (part: 0 | 1): Rows =>
+      (row) =>
+        mix(
+          mix(texel(0, 0, row, part), texel(1, 0, row, part), share.x),
+          mix(texel(0, 1, row, part), texel(1, 1, row, part), share.x),
+          share.y,
+        ).toVar();
+    const side = select(frontFacing, float(1), float(-1)).toVar(),
+      { n, bent } = directional === 'none' ? { n: vec3(0), bent: vec3(0) } : normals(surface, side, ofInstance(of)),
+      back = transpose(instances.turn()),
+      N = back.mul(n.mul(side)).toVar(),
+      towards = back.mul(bent.mul(side)).toVar(),
+      sum = evaluate(directional, rows(0), N, towards).toVar();
+    If(hasPeaks.greaterThan(0.5), () => void sum.addAssign(evaluate(directional, rows(1), N, towards)));
+    return sum;
+  })();
+}
+
+function ofPicture({ picture, peakPicture, hasPeaks, options, turnBack }: Sum, surface: NodeSurface): Vec3 {
+  const { directional } = surface,
     rows = directionalRows[directional],
     { width, height } = options.receiversOf!.image;
-  const of = (name: string): Vec2 => varying(attribute<'vec2'>(name, 'vec2')),
-    front = of('lambentPlace'),
-    back = twoSided ? of('lambentPlaceBack') : front;
+  const at = placeOf(surface);
   const radiance = Fn(() => {
-    const place = (twoSided ? select(frontFacing, front, back) : front).toVar();
+    const place = at.toVar();
     // Rows lie below each other.
     const read =
       (from: Picture): Rows =>

@@ -1,5 +1,12 @@
 // What instanced.ts has in GLSL, in nodes for WebGPURenderer: instances of an InstancedMesh, each in light of its own.
-import type { DataArrayTexture, Matrix3, Node, NodeBuilder, NodeFrame, Object3D } from 'three/webgpu';
+import {
+  Matrix3,
+  type DataArrayTexture,
+  type Node,
+  type NodeBuilder,
+  type NodeFrame,
+  type Object3D,
+} from 'three/webgpu';
 import { Fn, instanceIndex, int, ivec2, mat3, select, texture, textureLoad, uniform, vec3 } from 'three/tsl';
 import type { BlockLayout } from './block_texture.js';
 import { InstancedLights, instanceLayout, isInstanced } from './instanced.js';
@@ -18,6 +25,8 @@ export function ofObject<T extends 'vec3' | 'mat3'>(make: (object: Object3D) => 
 export class InstanceNodes {
   readonly lights: InstancedLights;
   private readonly values: Parameters<typeof textureLoad>[0];
+  /** From the mesh that was baked into the world, without its place. */
+  readonly rest: Mat3;
   private readonly hasPeaks = uniform(0);
 
   /** `quads` 0: turns alone. */
@@ -27,6 +36,9 @@ export class InstanceNodes {
     pose: { inverseOf(object: Object3D): Matrix3 | undefined },
   ) {
     this.lights = new InstancedLights(order, quads, pose);
+    this.rest = uniform(new Matrix3()).onObjectUpdate(
+      ({ object }: NodeFrame) => pose.inverseOf(object!)?.clone().invert() ?? new Matrix3(),
+    );
     this.values = texture(this.lights.instances.value).onObjectUpdate(({ object }: NodeFrame) =>
       this.lights.of(object!),
     );
@@ -72,6 +84,12 @@ export class InstanceNodes {
       sum.addAssign(vec3(red.dot(light(0)), green.dot(light(1)), blue.dot(light(2))));
     });
     return sum;
+  }
+
+  /** The same of light that is held at 0 or above, where it has peaks. */
+  part(values: Values, r: Int, row: Int, part: 0 | 1): Vec3 {
+    const sum = this.sum(values, r, row, part);
+    return select(this.hasPeaks.greaterThan(0.5), sum.max(0), sum);
   }
 
   /** The same of light that has peaks or none, each part held at 0 or above where there are some. */

@@ -104,7 +104,7 @@ export class Sum implements NodeSum {
   readonly turn: Node<'mat3'>;
   readonly turnBack: Node<'mat3'>;
   /** Of instances, whose light their vertices sum. */
-  readonly instances: InstanceNodes | undefined;
+  readonly instances: InstanceNodes;
   private light: Light = { rest: [], peaks: undefined };
   private readonly turned = new Alike<Turned>(() => ({
     how: [],
@@ -115,7 +115,8 @@ export class Sum implements NodeSum {
   /** The light that a picture shows. */
   private readonly shown = new WeakMap<RenderTarget, Light>();
   private readonly mains: RenderTarget[] = [];
-  private readonly whose: DataTexture | undefined;
+  /** Of an atlas. */
+  readonly whose: DataTexture | undefined;
   private readonly holds = uniform(0);
   private readonly width: number;
   private readonly height: number;
@@ -129,7 +130,7 @@ export class Sum implements NodeSum {
       : [Math.min(sumColumns, rows * receivers), Math.ceil((rows * receivers) / sumColumns)];
     this.picture = this.draw(apart ? ['rest'] : ['rest', 'peaks'], quads, 'lambent sum');
     if (apart) this.peakPicture = this.draw(['peaks'], quads, 'lambent peaks');
-    if (!receiversOf) this.instances = new InstanceNodes(options.order, quads, options.pose);
+    this.instances = new InstanceNodes(options.order, quads, options.pose);
     const turn = ({ object }: NodeFrame): Matrix3 => options.pose.turnOf(object!) ?? upright,
       back = new Matrix3();
     this.turn = uniform(new Matrix3()).onObjectUpdate(turn);
@@ -188,7 +189,7 @@ export class Sum implements NodeSum {
     // For every mesh: one that was turned looks at a picture of its own.
     made.updateBeforeType = 'object';
     made.updateBefore = (frame: NodeFrame): undefined => {
-      if (this.instances && isInstanced(frame.object!)) return;
+      if (isInstanced(frame.object!)) return;
       const turned = this.turnedOf(frame.object!),
         light = turned?.light ?? this.light;
       made.renderTarget = main;
@@ -221,7 +222,7 @@ export class Sum implements NodeSum {
 
   set(light: ArrayLike<number>, peaks: ArrayLike<number> | undefined, holds: boolean): void {
     this.light = { rest: light, peaks };
-    this.instances?.set(light, peaks);
+    this.instances.set(light, peaks);
     this.holds.value = peaks && holds ? 1 : 0;
     this.hasPeaks.value = peaks ? 1 : 0;
     if (peaks) for (const main of this.mains) main.setSize(this.width, this.height);
@@ -231,7 +232,7 @@ export class Sum implements NodeSum {
     for (const main of this.mains) main.dispose();
     for (const { targets } of this.turned.all) for (const target of targets.values()) target.dispose();
     this.turned.clear();
-    this.instances?.dispose();
+    this.instances.dispose();
     this.picture.dispose();
     this.peakPicture?.dispose();
     this.whose?.dispose();

@@ -19,7 +19,7 @@ const columns = 2048; // receivers a row of the picture
 
 /** GLSL: vec3 prtRadiance( uint receiver ), what there is in prtSums; of an instance, which has none, its sum. */
 export const lookUpSums = /* glsl */ `
-${glslInstances}
+${glslInstances()}
 #ifdef USE_INSTANCING
 vec3 prtRadiance( const in uint receiver ) {
   if ( receiver == 0xffffffffu ) return vec3( 0.0 );

@@ -32,8 +32,8 @@ function readRows({ picture, peakPicture, hasPeaks, options, instances }: Sum): 
     (r, row) => {
       const i = r.mul(int(options.rows ?? 1)).add(row),
         texel = ivec2(i.mod(int(sumColumns)), i.div(int(sumColumns)));
-      return instances!.choose(
-        () => instances!.sum(options, r, row, part),
+      return instances.choose(
+        () => instances.sum(options, r, row, part),
         () => (textureLoad(of, texel) as unknown as Node<'vec4'>).rgb,
       );
     };
@@ -46,7 +46,7 @@ export const nodes: NodeEdition = {
   lobes: (options) => new LobeNodes(options),
   reflection(given, last, twoSided): MaterialNodes {
     const sum = given as Sum,
-      instances = sum.instances!;
+      instances = sum.instances;
     return glossy(
       last,
       readRows(sum),
@@ -65,8 +65,8 @@ export const nodes: NodeEdition = {
     const of = (name: string): Node<'vec3'> => {
       const { r, none } = receiverAt(name),
         texel = ivec2(r.mod(sumColumns), r.div(sumColumns));
-      const value = instances!.choose(
-        () => instances!.held(options, r),
+      const value = instances.choose(
+        () => instances.held(options, r),
         () => (textureLoad(picture, texel) as unknown as Node<'vec4'>).rgb,
       );
       return varying(select(none, vec3(0), value));
