@@ -28,8 +28,8 @@ export const instanceLayout = (quads: number): { texels: number; across: number 
 };
 
 /**
- * GLSL: prtInstanceSum( receiver, row, part ) and prtInstanceTurn(), by the defines of the transfer's layout, of instance
- * `id`.
+ * GLSL: prtInstanceSum( receiver, row, part ) and prtInstanceTurn(), by the defines of the transfer's layout, of
+ * instance `id`.
  */
 export const glslInstances = (id = 'gl_InstanceID'): string => /* glsl */ `
 #ifdef USE_INSTANCING
