@@ -5,6 +5,9 @@ source "$(dirname "$0")/expect.sh"
 
 expect 0 'receivers' bake corner.obj --max-edge 0.2 --samples 256 -o corner.glb
 expect 0 '"error"' bake corner.obj --max-edge 0.2 --samples 256 --json -o corner.glb
+expect 0 '"time": 90' bake corner.obj --time 1.5min --dry-run --json
+expect 2 'parsecs unit not recognized' bake corner.obj --time 5parsecs -o x.glb
+expect 2 'parsecs unit not recognized' check corner.obj --time 5parsecs --env uniform:1 -o x.html
 expect 0 '"order": 6' inspect corner.glb --json
 expect 0 'vertices' inspect corner.obj
 expect 0 '"scale"' inspect corner.glb --view-error view_error.png --camera 3,2,4,1,0.5,1,40 --size 64x48 --json

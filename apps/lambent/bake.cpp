@@ -59,7 +59,6 @@ void add_bake(CLI::App& app, Run& run) {
   c->add_option("--again", o->again, "Bake as this baked file was: the same bytes")->excludes(from);
   c->add_flag("--dry-run", o->plan, "Say the request, receivers, bytes and the time it would take, and bake nothing");
   add_table(*c, bake_options(), o->request, o->request.given, [](const std::string& name) { return name != "scene"; });
-  takes_units_of_time(*c, "--time");
   c->callback([o, &run] { run = [o](Context& context) { return run_bake(context, *o); }; });
 }
 

@@ -10,6 +10,12 @@
 
 namespace lambent::tool {
 
+// Seconds may be said with a unit: 90, 90s, 1.5min, 2h.
+inline CLI::AsNumberWithUnit as_seconds() {
+  const std::map<std::string, double> units{{"s", 1}, {"min", 60}, {"m", 60}, {"h", 3600}};
+  return CLI::AsNumberWithUnit(units, CLI::AsNumberWithUnit::CASE_INSENSITIVE, "TIME");
+}
+
 // Adds the options of the table that `takes` to the command, in the table's groups; what is said goes into `request`,
 // and its name into `given` once the command line has been read.
 template <class R>
@@ -35,6 +41,7 @@ void add_table(CLI::App& command, std::span<const Option<R>> table, R& request, 
         },
         o.member);
     option->group(o.group);
+    if (name == "--time") option->transform(as_seconds());
     // What most people leave as it is, said once.
     std::visit(
         [&](auto member) {
@@ -48,12 +55,6 @@ void add_table(CLI::App& command, std::span<const Option<R>> table, R& request, 
         o.member);
     option->each([&given, key = json_name(o.name)](const std::string&) { given.insert(key); });
   }
-}
-
-// An option of the command in seconds may be said with a unit: 90, 90s, 1.5min, 2h.
-inline void takes_units_of_time(CLI::App& command, const std::string& name) {
-  const std::map<std::string, double> units{{"s", 1}, {"min", 60}, {"m", 60}, {"h", 3600}};
-  command.get_option(name)->transform(CLI::AsNumberWithUnit(units, CLI::AsNumberWithUnit::CASE_INSENSITIVE, "TIME"));
 }
 
 }  // namespace lambent::tool
