@@ -1,5 +1,5 @@
 #!/usr/bin/env python3
-"""Prints SOURCE;GROUP;... of sources to compile together, some BYTES of them: the longest first, each where least is.
+"""Prints SOURCE;GROUP;... of sources to compile together, up to BYTES of them: the longest first, each where most is.
 No two of a group give the same name to a helper of their own (in namespace {}), an alias or a macro, nor one to such a
 helper and another, in a header that it includes, to what it declares. Sources of Highway, which includes them once a
 target, are left out, and stay on their own. Usage: groups.py FILE..."""
@@ -8,7 +8,8 @@ import pathlib
 import re
 import sys
 
-BYTES = 120_000  # beyond, headers are a small part of what is compiled, and the last groups wait for one core
+BYTES = 250_000  # beyond, headers are a small part of what is compiled, and the last groups wait for one core
+NOT_DECLARED = (" ", "TEST", "using", "namespace", "static_assert")  # aliases are looked at by what they stand for
 DECLARED = re.compile(r"(?:struct|class|enum class|enum) (\w+)|(?:[\w:<>,&*\[\] ]+[ &*>])?(\w+)\s*(?:\(|=|\{|\[|;)")
 
 
@@ -21,7 +22,7 @@ def helpers(source, text):
     for start in re.finditer(r"^namespace \{$", text, re.M):
         depth = 1
         for line in text[start.end() + 1 :].split("\n"):
-            if depth == 1 and not line.startswith("TEST") and (found := DECLARED.match(line)):
+            if depth == 1 and not line.startswith(NOT_DECLARED) and (found := DECLARED.match(line)):
                 yield found[1] or found[2], source
                 if line.startswith(("const", "static")):  # the others of one declaration
                     yield from ((name, source) for name in re.findall(r", (\w+)(?= =|;|,)", line))
@@ -56,7 +57,7 @@ for source, text in sorted(texts.items(), key=lambda item: (-len(item[1]), item[
             and all(group[1].get(name, meaning) == meaning for name, meaning in names.items())]
     if not fits:
         groups.append([[], {}, 0])
-    group = min(fits, key=lambda group: group[2], default=groups[-1])
+    group = max(fits, key=lambda group: group[2], default=groups[-1])
     group[0].append(source)
     group[1].update(names)
     group[2] += len(text)

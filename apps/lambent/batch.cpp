@@ -2,6 +2,7 @@
 #include "commands.h"
 
 #include <lambent/baked/fields.h>
+#include <lambent/core/clock.h>
 #include <lambent/core/parallel.h>
 #include <lambent/pipeline/durable.h>
 #include <lambent/pipeline/parse.h>
@@ -23,7 +24,6 @@ namespace lambent::tool {
 namespace {
 
 namespace fs = std::filesystem;
-using Clock = std::chrono::steady_clock;
 
 struct BatchCommand {
   std::string manifest;

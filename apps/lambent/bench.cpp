@@ -3,13 +3,12 @@
 #include "table.h"
 
 #include <lambent/bake/kernels.h>
+#include <lambent/core/clock.h>
 #include <lambent/pipeline/bake_lightmap.h>
 #include <lambent/pipeline/place_receivers.h>
 #include <lambent/scene/procedural.h>
 
 #include <fmt/format.h>
-
-#include <chrono>
 
 namespace lambent::tool {
 namespace {
@@ -72,10 +71,10 @@ int run_solvers(Context& context, const SolversCommand& o) {
                                   fmt::format("to {:g}", o.fine));
   for (const auto& [name, solver] : solver_names) {
     SolveReport report, fine;
-    const auto start = std::chrono::steady_clock::now();
+    const auto start = Clock::now();
     if (auto x = solve(*op, e.data(), width, {solver, o.tolerance, o.most}, &report, &context.progress); !x)
       return fail(x.error());
-    const double seconds = std::chrono::duration<double>(std::chrono::steady_clock::now() - start).count();
+    const double seconds = seconds_since(start);
     if (auto x = solve(*op, e.data(), width, {solver, o.fine, o.most}, &fine, &context.progress); !x)
       return fail(x.error());
     const auto coarse_count = applications_to(report, o.tolerance), fine_count = applications_to(fine, o.fine);

@@ -5,6 +5,7 @@
 #include "truth.h"
 
 #include <lambent/core/file.h>
+#include <lambent/core/clock.h>
 #include <lambent/light/project.h>
 #include <lambent/pipeline/draw.h>
 #include <lambent/pipeline/text.h>
@@ -13,7 +14,6 @@
 #include <fmt/format.h>
 
 #include <algorithm>
-#include <chrono>
 #include <set>
 
 namespace lambent::tool {
@@ -50,10 +50,6 @@ struct Report {
   std::vector<Panel> panels;
   std::vector<std::string> advice;
 };
-
-double seconds_since(std::chrono::steady_clock::time_point start) {
-  return std::chrono::duration<double>(std::chrono::steady_clock::now() - start).count();
-}
 
 std::string base64(std::span<const uint8_t> bytes) {
   static constexpr char digits[] = "ABCDEFGHIJKLMNOPQRSTUVWXYZabcdefghijklmnopqrstuvwxyz0123456789+/";
@@ -178,7 +174,7 @@ Result<Report> check(const CheckCommand& o, const Job& job) {
   if (!env) return env.error();
   auto rotation = light_rotation(o.light);
   if (!rotation) return rotation.error();
-  auto start = std::chrono::steady_clock::now();
+  auto start = Clock::now();
   auto outcome = bake_with_summary(o.request, job);
   if (!outcome) return outcome.error();
   r.bake_seconds = seconds_since(start), r.bake = outcome->summary;
@@ -209,7 +205,7 @@ Result<Report> check(const CheckCommand& o, const Job& job) {
     if (!reflection) return reflection.error();
     options.reflection = std::move(*reflection);
   }
-  start = std::chrono::steady_clock::now();
+  start = Clock::now();
   const Environment turned = o.light.rotate.empty() ? *env : rotated(*env, *rotation);
   if (basis.count() > 0) {
     const LightProjection projection = project_light(*env, basis, *rotation);

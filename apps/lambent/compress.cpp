@@ -4,11 +4,10 @@
 #include <lambent/baked/baked_file.h>
 #include <lambent/compress/cpca.h>
 #include <lambent/compress/zonal_fit.h>
+#include <lambent/core/clock.h>
 #include <lambent/render/render.h>
 
 #include <fmt/format.h>
-
-#include <chrono>
 
 namespace lambent::tool {
 namespace {
@@ -85,10 +84,10 @@ int compress_to_clusters(Context& context, const CompressCommand& o, Baked& bake
   if (!dense || std::holds_alternative<FixedView>(baked.surface.where))
     return fail({o.baked, "holds no plain transfer at receivers on surfaces, which is what clusters are made of"});
   double error = 0;
-  const auto start = std::chrono::steady_clock::now();
+  const auto start = Clock::now();
   auto clusters = compress_cpca(*dense, options, &error, &context.progress);
   if (!clusters) return fail({o.baked, clusters.error().text()});
-  const double seconds = std::chrono::duration<double>(std::chrono::steady_clock::now() - start).count();
+  const double seconds = seconds_since(start);
   const size_t receivers = clusters->receivers;
   const int count = clusters->clusters, rank = clusters->rank;
   nlohmann::json provenance = provenance_of(baked);

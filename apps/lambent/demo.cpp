@@ -5,6 +5,7 @@
 #include <lambent/bake/adapt.h>
 #include <lambent/bake/bake.h>
 #include <lambent/baked/baked_file.h>
+#include <lambent/core/clock.h>
 #include <lambent/core/file.h>
 #include <lambent/light/peaks.h>
 #include <lambent/light/project.h>
@@ -17,14 +18,10 @@
 
 #include <fmt/format.h>
 
-#include <chrono>
 #include <filesystem>
 
 namespace lambent::tool {
 namespace {
-
-using Clock = std::chrono::steady_clock;
-double seconds_since(Clock::time_point start) { return std::chrono::duration<double>(Clock::now() - start).count(); }
 
 struct DemoCommand {
   std::string folder = "out";

@@ -4,6 +4,7 @@
 #include "relief.h"
 
 #include <lambent/baked/baked_file.h>
+#include <lambent/core/clock.h>
 #include <lambent/light/project.h>
 #include <lambent/pipeline/moving_lamps.h>
 #include <lambent/reference/path_tracer.h>
@@ -11,8 +12,6 @@
 #include <lambent/scene/refine.h>
 
 #include <fmt/format.h>
-
-#include <chrono>
 
 namespace lambent::tool {
 namespace {
@@ -96,10 +95,10 @@ int run_reference(Context& context, ReferenceCommand o, const CLI::App& command)
     *env = rotated(*env, *rotation);
   }
   o.options.width = view->width, o.options.height = view->height, o.options.background = o.view.background == "env";
-  const auto start = std::chrono::steady_clock::now();
+  const auto start = Clock::now();
   auto result = path_trace(*scene, *env, view->camera, o.options, &context.progress);
   if (!result) return fail(result.error());
-  const double seconds = std::chrono::duration<double>(std::chrono::steady_clock::now() - start).count();
+  const double seconds = seconds_since(start);
   if (auto ok = save_shown(o.view.output, result->image, o.view.display); !ok) return fail(ok.error());
 
   double variance = 0;

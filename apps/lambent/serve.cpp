@@ -1,5 +1,7 @@
 #include "serve.h"
 
+#include <lambent/core/clock.h>
+
 #include <fmt/format.h>
 
 #include <arpa/inet.h>
@@ -16,8 +18,6 @@
 
 namespace lambent::tool {
 namespace {
-
-using Clock = std::chrono::steady_clock;
 
 constexpr size_t piece = size_t{1} << 18;  // of an answer, before others have their turn
 

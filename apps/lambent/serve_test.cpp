@@ -1,5 +1,7 @@
 #include "serve.h"
 
+#include <lambent/core/clock.h>
+
 #include <gtest/gtest.h>
 
 #include <arpa/inet.h>
@@ -225,8 +227,8 @@ TEST_F(Serve, TwoHundredAtOnceAreAllAnswered) {
 }
 
 TEST_F(Serve, SlowSendersAreCutOffAndKeepNobodyWaiting) {
-  const auto start = std::chrono::steady_clock::now();
-  auto since = [&] { return std::chrono::duration<double>(std::chrono::steady_clock::now() - start).count(); };
+  const auto start = Clock::now();
+  auto since = [&] { return seconds_since(start); };
   std::vector<int> slow;
   for (int i = 0; i < 100; ++i) say(slow.emplace_back(connected(port_)), "GET /one HT");
   std::vector<int> silent;

@@ -1,6 +1,7 @@
 #include "terminal.h"
 
 #include <lambent/core/file.h>
+#include <lambent/core/clock.h>
 
 #include <fmt/format.h>
 #include <unistd.h>
@@ -14,8 +15,6 @@
 
 namespace lambent::tool {
 namespace {
-
-using Clock = std::chrono::steady_clock;
 
 bool colour_allowed() {
   const char* no = std::getenv("NO_COLOR");

@@ -1,5 +1,7 @@
 #include "together.h"
 
+#include <lambent/core/clock.h>
+
 #include <algorithm>
 #include <cstdlib>
 #include <utility>
@@ -14,7 +16,6 @@
 #include <unistd.h>
 
 #include <cerrno>
-#include <chrono>
 #include <csignal>
 #include <cstdio>
 #include <cstring>
@@ -40,7 +41,6 @@ bool has_ranks() { return true; }
 
 namespace {
 
-using Clock = std::chrono::steady_clock;
 constexpr size_t most_at_once = size_t{1} << 28;  // MPI counts in int
 constexpr int patient = 2000;                     // looks before it sleeps between them
 constexpr double seconds_for_others = 5;
@@ -137,7 +137,7 @@ class MpiRanks final : public Together {
     const auto start = Clock::now();
     while (MPI_Test(&request, &done, MPI_STATUS_IGNORE), !done) {
       ::usleep(1000);
-      if (code == 0 || std::chrono::duration<double>(Clock::now() - start).count() < seconds_for_others) continue;
+      if (code == 0 || seconds_since(start) < seconds_for_others) continue;
       failed_alone();
       MPI_Abort(MPI_COMM_WORLD, code);
     }

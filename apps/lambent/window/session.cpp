@@ -4,6 +4,7 @@
 #include "srgb_bytes.h"
 
 #include <lambent/core/file.h>
+#include <lambent/core/clock.h>
 #include <lambent/core/parallel.h>
 #include <lambent/pipeline/parse.h>
 #include <lambent/pipeline/place.h>
@@ -42,9 +43,7 @@ float wrapped(float degrees) {
   return r > 180 ? r - 360 : r <= -180 ? r + 360 : r;
 }
 
-double seconds_now() {
-  return std::chrono::duration<double>(std::chrono::steady_clock::now().time_since_epoch()).count();
-}
+double seconds_now() { return std::chrono::duration<double>(Clock::now().time_since_epoch()).count(); }
 
 // Where the name ends in a value of an option that is given again.
 size_t name_end(const std::string& option, const std::string& value) {

@@ -1,19 +1,16 @@
 #include "upload.h"
 
+#include <lambent/core/clock.h>
+
 // clang-format off
 #include <GLFW/glfw3.h>
 #include <GL/glext.h>
 // clang-format on
 
-#include <chrono>
-
 namespace lambent::tool {
 namespace {
 
-using Clock = std::chrono::steady_clock;
-double ms_since(Clock::time_point start) {
-  return std::chrono::duration<double, std::milli>(Clock::now() - start).count();
-}
+double ms_since(Clock::time_point start) { return 1e3 * seconds_since(start); }
 
 // What OpenGL 3.3's header need not declare, of the current context.
 struct Functions {

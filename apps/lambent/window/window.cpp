@@ -7,6 +7,7 @@
 #include "upload.h"
 
 #include <lambent/core/file.h>
+#include <lambent/core/clock.h>
 
 // clang-format off
 #include <GLFW/glfw3.h>
@@ -23,9 +24,7 @@
 namespace lambent::tool {
 namespace {
 
-double window_clock() {
-  return std::chrono::duration<double>(std::chrono::steady_clock::now().time_since_epoch()).count();
-}
+double window_clock() { return std::chrono::duration<double>(Clock::now().time_since_epoch()).count(); }
 
 constexpr float panel_width = 320;
 constexpr double rest = 0.15;  // seconds after which hands are thought to rest

@@ -2,6 +2,7 @@
 // the difference, since rays are few.
 #include <lambent/bake/adapt.h>
 #include <lambent/bake/gather.h>
+#include <lambent/core/clock.h>
 #include <lambent/core/pool.h>
 #include <lambent/core/random.h>
 #include <lambent/core/ranks.h>
@@ -10,16 +11,12 @@
 
 #include <algorithm>
 #include <bit>
-#include <chrono>
 #include <cmath>
 #include <unordered_map>
 #include <unordered_set>
 
 namespace lambent {
 namespace {
-
-using Clock = std::chrono::steady_clock;
-double seconds_since(Clock::time_point start) { return std::chrono::duration<double>(Clock::now() - start).count(); }
 
 constexpr int most_levels = 10;
 constexpr size_t pilot = 16;  // one edge in so many says whether the rest is worth a look

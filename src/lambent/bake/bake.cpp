@@ -11,21 +11,17 @@
 #include <lambent/bake/solve.h>
 #include <lambent/bake/stand_in.h>
 #include <lambent/core/checkpoint.h>
+#include <lambent/core/clock.h>
 #include <lambent/core/parallel.h>
 #include <lambent/core/pool.h>
 #include <lambent/core/random.h>
 
 #include <algorithm>
-#include <chrono>
 #include <cmath>
 #include <optional>
 
 namespace lambent {
 namespace {
-
-double seconds_since(std::chrono::steady_clock::time_point start) {
-  return std::chrono::duration<double>(std::chrono::steady_clock::now() - start).count();
-}
 
 // Some 4 % of the error, where it is spread as in our scenes.
 constexpr size_t certified_places = 1024;
@@ -114,7 +110,7 @@ struct Baker {
   }
 
   Result<Transfer> direct() {
-    const auto start = std::chrono::steady_clock::now();
+    const auto start = Clock::now();
     const size_t W = sky_width();
     ZeroPages x(n() * width());
     std::vector<uint8_t> buried(n());
@@ -166,7 +162,7 @@ struct Baker {
     report.operator_file_bytes = B->report().file_bytes;
     report.working_memory = fixed + report.operator_bytes;
 
-    const auto start = std::chrono::steady_clock::now();
+    const auto start = Clock::now();
     const Source source{[&](size_t r, float* x) { expand(T0.data() + r * W, x); }};
     // The last step beside the one before it, which is what measuring gathers find on the surfaces that they meet.
     ZeroPages last(n() * width()), now(n() * width()), next(options.bounces > 1 ? n() * width() : 0);
@@ -244,7 +240,7 @@ struct Baker {
     for (AlignedVector<float>& term : terms)
       report.terms.push_back(store_all(term.data(), solved.x.data(), buried)), term = {};
     if (options.certify) {
-      const auto start = std::chrono::steady_clock::now();
+      const auto start = Clock::now();
       const FieldRow field = [&](uint32_t r, float* row) {
         if (stand_ins.all()) std::copy_n(solved.x.data() + size_t(r) * width(), width(), row);
         else load_row(result, r, row);
@@ -267,7 +263,7 @@ struct Baker {
   // Second gathers at one receiver in 16 tell the noise; with it, it is taken away, and they tell what is left.
   Result<void> measure_noise(ZeroPages& x, const std::vector<uint8_t>& buried, std::vector<AlignedVector<float>>& terms,
                              const GatherAt& gather, const AskForRows* asks) {
-    const auto start = std::chrono::steady_clock::now();
+    const auto start = Clock::now();
     std::vector<uint32_t> measured, own;
     const Shares of = shares();
     for (uint32_t r = 0; r < n(); r += check_every)
@@ -433,7 +429,7 @@ Result<Transfer> bake_to_error(const Scene& scene, const Tracer& tracer, const R
                                const BakeOptions& asked, BakeReport& r, Progress* progress) {
   constexpr int first = 128, most = 1 << 16;
   constexpr double slope = 0.75;  // denoised noise falls as rays to about this power
-  const auto start = std::chrono::steady_clock::now();
+  const auto start = Clock::now();
   BakeOptions options = asked;
   options.certify = true, options.samples = first;
   auto stand_ins = choose_stand_ins(scene, tracer, receivers, options, progress);
@@ -441,7 +437,7 @@ Result<Transfer> bake_to_error(const Scene& scene, const Tracer& tracer, const R
   size_t rays = stand_ins->rays;
   double traced = seconds_since(start), bounced = 0;
   for (;;) {
-    const auto round = std::chrono::steady_clock::now();
+    const auto round = Clock::now();
     r = {};
     auto transfer = bake_with_samples(scene, tracer, receivers, *stand_ins, options, r, progress);
     if (!transfer) return transfer;

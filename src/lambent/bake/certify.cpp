@@ -32,8 +32,8 @@ double area_of(const Scene& scene, const Triangle& t) {
   return 0.5 * length(cross(b - a, c - a));
 }
 
-void look_up(const Receivers& receivers, const FieldRow& field, uint32_t triangle, bool front, float u, float v,
-             AlignedVector<float>& row, AlignedVector<float>& sum) {
+void read_row(const Receivers& receivers, const FieldRow& field, uint32_t triangle, bool front, float u, float v,
+              AlignedVector<float>& row, AlignedVector<float>& sum) {
   std::fill(sum.begin(), sum.end(), 0.0f);
   std::visit(
       [&](const auto& basis) {
@@ -45,7 +45,7 @@ void look_up(const Receivers& receivers, const FieldRow& field, uint32_t triangl
       receivers.basis);
 }
 
-// The receivers that look_up() reads.
+// The receivers that read_row() reads.
 void note(const Receivers& receivers, uint32_t triangle, bool front, float u, float v, std::vector<uint8_t>& asked) {
   std::visit(
       [&](const auto& basis) {
@@ -82,7 +82,7 @@ std::vector<Side> find_sides(const Scene& scene, const Receivers& receivers, con
     for (auto& c : corner) c.resize(width);
     for (size_t i = begin; i < end; ++i) {
       Side& side = sides[i];
-      for (int c = 0; c < 3; ++c) look_up(receivers, field, side.triangle, side.front, c == 1, c == 2, row, corner[c]);
+      for (int c = 0; c < 3; ++c) read_row(receivers, field, side.triangle, side.front, c == 1, c == 2, row, corner[c]);
       for (size_t k = 0; k < width; ++k)
         for (int c = 0; c < 3; ++c) {
           const double d = double(corner[c][k]) - double(corner[(c + 1) % 3][k]);
@@ -287,10 +287,10 @@ Result<Certificate> certify_field(const Scene& scene, const Receivers& receivers
       const auto [origin, n] = start_of(scene, at, diagonal);
       if (!gather(origin, n, hash64(seed, 2 * i), a.data()) || !gather(origin, n, hash64(seed, 2 * i + 1), b.data()))
         continue;
-      look_up(receivers, field, at.triangle, at.front, at.u, at.v, row, s);
-      if (again) look_up(receivers, *again, at.triangle, at.front, at.u, at.v, row, s2);
+      read_row(receivers, field, at.triangle, at.front, at.u, at.v, row, s);
+      if (again) read_row(receivers, *again, at.triangle, at.front, at.u, at.v, row, s2);
       if (read) {
-        look_up(receivers, *read, at.triangle, at.front, at.u, at.v, row, s2);
+        read_row(receivers, *read, at.triangle, at.front, at.u, at.v, row, s2);
         for (size_t k = 0; k < width; ++k) beside[i * width + k] = s2[k] - s[k];
         s = s2;
       }

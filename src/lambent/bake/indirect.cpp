@@ -4,6 +4,7 @@
 #include <lambent/bake/meshless.h>
 #include <lambent/core/check.h>
 #include <lambent/core/checkpoint.h>
+#include <lambent/core/clock.h>
 #include <lambent/core/half.h>
 #include <lambent/core/parallel.h>
 #include <lambent/core/random.h>
@@ -11,15 +12,11 @@
 
 #include <algorithm>
 #include <atomic>
-#include <chrono>
 #include <cmath>
 #include <memory>
 
 namespace lambent {
 namespace {
-
-using Clock = std::chrono::steady_clock;
-double seconds_since(Clock::time_point start) { return std::chrono::duration<double>(Clock::now() - start).count(); }
 
 constexpr size_t rows_a_piece = 16;
 constexpr int test_lamps = 4, direction_sets = 8;

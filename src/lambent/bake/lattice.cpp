@@ -9,13 +9,13 @@
 #include <lambent/basis/sh_product.h>
 #include <lambent/core/check.h>
 #include <lambent/core/checkpoint.h>
+#include <lambent/core/clock.h>
 #include <lambent/core/parallel.h>
 #include <lambent/core/pool.h>
 #include <lambent/core/random.h>
 #include <lambent/core/sampling.h>
 
 #include <atomic>
-#include <chrono>
 
 namespace lambent {
 namespace {
@@ -360,7 +360,7 @@ Result<LatticeTransfer> bake_lattice(const Scene& scene, const Tracer& tracer, c
   LAMBENT_CHECK(surface.receivers == receivers.count() && surface.light.groups.empty());
   LAMBENT_CHECK(surface.rows == (outgoing ? outgoing->rows() : 1));
   if (auto ok = check_lattice(lattice, surface.light, options); !ok) return ok.error();
-  const auto start = std::chrono::steady_clock::now();
+  const auto start = Clock::now();
   const GatherSetup setup = make_gather_setup(scene, tracer, receivers, surface.light.order + options.order - 1,
                                               options.samples, options.seed, square_to_sphere, progress);
   const int channels = setup.channels == 3 || surface.channels == 3 || (outgoing && is_coloured(*outgoing)) ? 3 : 1;
@@ -404,7 +404,7 @@ Result<LatticeTransfer> bake_lattice(const Scene& scene, const Tracer& tracer, c
                lattice.count() - valid,
                lattice.count() * (size_t(options.samples) + size_t(baker.lobes.rays) * baker.lobes.sharp.size()),
                bytes,
-               std::chrono::duration<double>(std::chrono::steady_clock::now() - start).count(),
+               seconds_since(start),
                pairs,
                walled};
   }

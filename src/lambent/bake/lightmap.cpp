@@ -3,12 +3,12 @@
 #include <lambent/bake/kernels.h>
 #include <lambent/bake/lightmap.h>
 #include <lambent/bake/lightmap_error.h>
+#include <lambent/core/clock.h>
 #include <lambent/core/parallel.h>
 #include <lambent/receivers/seams.h>
 
 #include <fmt/format.h>
 
-#include <chrono>
 #include <algorithm>
 
 namespace lambent {
@@ -121,10 +121,6 @@ struct Storing {
   }
 };
 
-double seconds_since(std::chrono::steady_clock::time_point start) {
-  return std::chrono::duration<double>(std::chrono::steady_clock::now() - start).count();
-}
-
 Result<Lightmap> bake_to_error(const Scene& scene, const Tracer& tracer, const Receivers& receivers, const Lamps& lamps,
                                const LightmapOptions& o, bool direct_apart, LightmapReport& r, Progress* progress) {
   auto solved = solve_lightmap_to_error(scene, tracer, receivers, lamps, o, r, progress);
@@ -224,7 +220,7 @@ Result<Lightmap> bake_lightmap(const Scene& scene, const Tracer& tracer, const R
   if (harmonics) add_sky(setup, sky, width, e);
   r.trace_seconds = op->report().seconds;
 
-  const auto start = std::chrono::steady_clock::now();
+  const auto start = Clock::now();
   // A directional lightmap's last bounce is gathered with its directions.
   auto x = solution(*op, e, width, o, r.solve, progress);
   if (!x) return x.error();

@@ -4,6 +4,7 @@
 #include <lambent/bake/lightmap_error.h>
 #include <lambent/bake/thin.h>
 #include <lambent/bake/unbury.h>
+#include <lambent/core/clock.h>
 #include <lambent/core/parallel.h>
 #include <lambent/core/pool.h>
 #include <lambent/core/random.h>
@@ -12,7 +13,6 @@
 #include <fmt/format.h>
 
 #include <algorithm>
-#include <chrono>
 #include <cmath>
 #include <numeric>
 #include <optional>
@@ -27,9 +27,6 @@ constexpr double noise_part = 0.5;   // and noise of each
 constexpr int most_samples = 1 << 13, pilot_samples = 24, first_bounced = 96;
 constexpr int most_reflected = 8;  // bounces of which certificates look for errors
 constexpr size_t piece = 16;
-
-using Clock = std::chrono::steady_clock;
-double seconds_since(Clock::time_point start) { return std::chrono::duration<double>(Clock::now() - start).count(); }
 
 double squares(const float* a, const float* b, size_t width) {
   double sum = 0;

@@ -5,17 +5,14 @@
 #include <lambent/bake/matrix_rows.h>
 #include <lambent/bake/solve.h>
 #include <lambent/core/check.h>
+#include <lambent/core/clock.h>
 #include <lambent/core/parallel.h>
 #include <lambent/core/sampling.h>
 
-#include <chrono>
 #include <variant>
 
 namespace lambent {
 namespace {
-
-using Clock = std::chrono::steady_clock;
-double seconds_since(Clock::time_point start) { return std::chrono::duration<double>(Clock::now() - start).count(); }
 
 struct MatrixBaker : MatrixGather {
   Progress* progress;

@@ -1,10 +1,9 @@
 // Follows: radiosity, "Computing the Product", "Important Point" (the matrix is never formed densely).
 #include <lambent/bake/operator.h>
 #include <lambent/core/check.h>
+#include <lambent/core/clock.h>
 #include <lambent/core/half.h>
 #include <lambent/core/parallel.h>
-
-#include <chrono>
 
 namespace lambent {
 
@@ -122,7 +121,7 @@ void GatherOperator::trace_block(const GatherWanted& wanted, size_t begin, size_
 }
 
 Result<GatherOperator> GatherOperator::trace(const GatherSetup& setup, const GatherWanted& wanted, Progress* progress) {
-  const auto start = std::chrono::steady_clock::now();
+  const auto start = Clock::now();
   GatherOperator op;
   op.setup_ = &setup;
   const size_t n = setup.receivers.count();
@@ -154,7 +153,7 @@ Result<GatherOperator> GatherOperator::trace(const GatherSetup& setup, const Gat
   op.report_.rays = n * size_t(setup.sets.samples), op.report_.bytes = shares.ranks().sum(op.traced_->kept.bytes());
   op.report_.file_bytes = shares.ranks().sum(op.traced_->kept.file_bytes());
   op.report_.kept = double(shares.ranks().sum(op.traced_->kept.count())) / double(op.blocks());
-  op.report_.seconds = std::chrono::duration<double>(std::chrono::steady_clock::now() - start).count();
+  op.report_.seconds = seconds_since(start);
   return op;
 }
 

@@ -1,11 +1,11 @@
 #include <lambent/bake/room_rows-inl.h>
 
+#include <lambent/core/clock.h>
 #include <lambent/core/parallel.h>
 
 #include <malloc.h>
 
 #include <algorithm>
-#include <chrono>
 #include <cstring>
 
 namespace lambent {
@@ -187,7 +187,7 @@ Result<void> RoomBaker::decide_buried() {
 }
 
 Result<void> RoomBaker::trace() {
-  const auto start = std::chrono::steady_clock::now();
+  const auto start = Clock::now();
   e.assign(room_count(), {}), buried.assign(n(), 0), is_kept.assign(room_count(), 0);
   for (size_t room = 0; room < room_count(); ++room)
     if (is_own(room)) e[room].assign(rows_in(room) * coefficients, 0.0f);
@@ -213,7 +213,7 @@ Result<void> RoomBaker::trace() {
   give_back_memory();
   crossed = ranks.sum(crossed), lost = ranks.sum(lost);
   arrange_filling();
-  report.trace_seconds = std::chrono::duration<double>(std::chrono::steady_clock::now() - start).count();
+  report.trace_seconds = seconds_since(start);
   report.working_memory = fixed + kept->bytes() + handed->bytes();
   report.operator_bytes = ranks.sum(kept->bytes() + handed->bytes());
   report.operator_file_bytes = ranks.sum(kept->file_bytes() + handed->file_bytes());

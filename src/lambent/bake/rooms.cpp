@@ -3,12 +3,12 @@
 #include <lambent/bake/rooms.h>
 
 #include <lambent/bake/room_rows-inl.h>
+#include <lambent/core/clock.h>
 #include <lambent/core/own_part.h>
 #include <lambent/core/parallel.h>
 #include <lambent/scene/see_through.h>
 
 #include <algorithm>
-#include <chrono>
 #include <cmath>
 #include <cstring>
 #include <numeric>
@@ -251,7 +251,7 @@ double RoomBaker::residual_of(const std::vector<Change>& met) const {
 }
 
 Result<void> RoomBaker::solve() {
-  const auto start = std::chrono::steady_clock::now();
+  const auto start = Clock::now();
   x = ZeroPages(columns * width);
   std::vector<uint32_t> every(room_count());
   std::iota(every.begin(), every.end(), 0u);
@@ -279,7 +279,7 @@ Result<void> RoomBaker::solve() {
     told.converged = told.residuals.back() <= how.residual;
     if (how.keep_sweeps) hand_on(every, true), told.sweeps.push_back(transfer());
   }
-  report.bounce_seconds = std::chrono::duration<double>(std::chrono::steady_clock::now() - start).count();
+  report.bounce_seconds = seconds_since(start);
   return {};
 }
 

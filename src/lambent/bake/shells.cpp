@@ -1,6 +1,7 @@
 #include <lambent/bake/shells.h>
 
 #include <lambent/basis/sh.h>
+#include <lambent/core/clock.h>
 #include <lambent/core/parallel.h>
 #include <lambent/core/random.h>
 #include <lambent/core/sampling.h>
@@ -8,7 +9,6 @@
 
 #include <algorithm>
 #include <atomic>
-#include <chrono>
 #include <cmath>
 
 namespace lambent {
@@ -115,16 +115,14 @@ Result<Shells> make_shells(const Scene& scene, const ShellOptions& o) {
 
 Result<Field> bake_hidden(const Tracer& tracer, const Shells& shells, const ShellOptions& o, ShellReport* report,
                           Progress* progress) {
-  const auto start = std::chrono::steady_clock::now();
+  const auto start = Clock::now();
   auto t = integrate(shells, o, o.order, make_transfer({.order = o.order}, 1, 1, shells.count(), Precision::half),
                      "shells", progress, [&](Vec3 point, const Directions& d, float* values) {
                        tracer.visible_fan(point, d, values);
                        for (size_t i = 0; i < d.count; ++i) values[i] = 1 - values[i];
                      });
   if (!t) return t.error();
-  if (report)
-    *report = {shells.count(), shells.count() * size_t(o.samples), t->bytes(),
-               std::chrono::duration<double>(std::chrono::steady_clock::now() - start).count()};
+  if (report) *report = {shells.count(), shells.count() * size_t(o.samples), t->bytes(), seconds_since(start)};
   return Field{ShellPlacement{shells}, std::move(*t), HiddenRows{}};
 }
 

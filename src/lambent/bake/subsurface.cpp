@@ -6,19 +6,16 @@
 #include <lambent/bake/walk.h>
 #include <lambent/core/check.h>
 #include <lambent/core/checkpoint.h>
+#include <lambent/core/clock.h>
 #include <lambent/core/parallel.h>
 #include <lambent/core/sampling.h>
 
 #include <atomic>
-#include <chrono>
 
 namespace lambent {
 namespace {
 
 constexpr size_t walk_grain = 4;  // receivers: walks are long
-
-using Clock = std::chrono::steady_clock;
-double seconds_since(Clock::time_point start) { return std::chrono::duration<double>(Clock::now() - start).count(); }
 
 struct HitEntry {
   uint32_t receiver;

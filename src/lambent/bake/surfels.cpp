@@ -43,7 +43,7 @@ SideAreas side_areas(const Scene& scene) {
 }
 
 // Most rays meet backs of one-sided surfaces.
-bool is_buried(const Scene& scene, const Tracer& tracer, const SurfacePlace& at, float smallest) {
+bool lies_within(const Scene& scene, const Tracer& tracer, const SurfacePlace& at, float smallest) {
   constexpr size_t rays = 8;
   const FixedFan fan(at.normal);
   size_t backs = 0;
@@ -73,7 +73,7 @@ std::vector<Candidate> make_candidates(const Scene& scene, const Tracer& tracer,
       all[i] = {surface_place(scene, hit), albedo(scene, scene.triangles[triangle], hit.u, hit.v)};
       const Vec3 p = all[i].at.position;
       const float smallest = receiver_lift(p, 0, diagonal);
-      wanted[i] = is_finite(p) && !(has_backs && is_buried(scene, tracer, all[i].at, smallest));
+      wanted[i] = is_finite(p) && !(has_backs && lies_within(scene, tracer, all[i].at, smallest));
       all[i].at.headroom = headroom_above(tracer, p, all[i].at.normal, smallest, diagonal);
     }
   });
@@ -230,7 +230,7 @@ std::vector<Candidate> seen_without_leaf(const Throwing& t) {
         SurfacePlace at = surface_place(t.scene, hit);
         const float smallest = receiver_lift(at.position, 0, t.diagonal);
         at.headroom = headroom_above(t.tracer, at.position, at.normal, smallest, t.diagonal);
-        if (t.nearest(grid, at, spacing, true, around) == none && !is_buried(t.scene, t.tracer, at, smallest))
+        if (t.nearest(grid, at, spacing, true, around) == none && !lies_within(t.scene, t.tracer, at, smallest))
           found[i].push_back({at, albedo(t.scene, triangle, hit.u, hit.v), 1e-3f});
       }
     }

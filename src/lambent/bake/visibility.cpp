@@ -3,11 +3,11 @@
 #include <lambent/bake/visibility.h>
 #include <lambent/core/check.h>
 #include <lambent/core/checkpoint.h>
+#include <lambent/core/clock.h>
 #include <lambent/core/pool.h>
 #include <lambent/core/ranks.h>
 
 #include <atomic>
-#include <chrono>
 #include <numeric>
 
 namespace lambent {
@@ -158,7 +158,7 @@ Result<Visibility> bake_visibility(const Tracer& tracer, const Receivers& receiv
     return Error{"", "the visibility of " + std::to_string(receivers.count()) + " receivers may take " +
                          std::to_string(expected >> 20) +
                          " MiB, more than --memory allows; take a smaller --cube or fewer vertices"};
-  const auto start = std::chrono::steady_clock::now();
+  const auto start = Clock::now();
   const VisibilityTracer work{tracer, options};
   Pool<Scratch> pool([] { return std::make_unique<Scratch>(); });
   std::vector<std::vector<uint8_t>> pieces((receivers.count() + piece_receivers - 1) / piece_receivers);
@@ -198,9 +198,7 @@ Result<Visibility> bake_visibility(const Tracer& tracer, const Receivers& receiv
     gather_pieces(shares, pieces, lengths);
   }
   Visibility v = make_visibility(options.size, options.bits, std::move(pieces), lengths);
-  if (report)
-    *report = {rays, certain, v.bytes(),
-               std::chrono::duration<double>(std::chrono::steady_clock::now() - start).count()};
+  if (report) *report = {rays, certain, v.bytes(), seconds_since(start)};
   return v;
 }
 

@@ -16,6 +16,12 @@ static_assert(std::endian::native == std::endian::little, "the file and its in-p
 
 inline constexpr const char* extension_name = "LAMBENT_transfer";
 
+// Of values that outlive what reads them.
+template <class T>
+std::span<const uint8_t> bytes_of(const std::vector<T>& values) {
+  return {reinterpret_cast<const uint8_t*>(values.data()), values.size() * sizeof(T)};
+}
+
 // Bulk data on its way into a file. add() gives what stands for the data's buffer view in JSON until the views have
 // their numbers, which resolve_views() puts in: of data that were written in pieces, a list of them.
 class BlobWriter {

@@ -12,11 +12,6 @@ using nlohmann::json;
 
 namespace {
 
-template <class T>
-std::span<const uint8_t> bytes_of(const std::vector<T>& values) {
-  return {reinterpret_cast<const uint8_t*>(values.data()), values.size() * sizeof(T)};
-}
-
 // Indices of one byte, two or four, as they need.
 constexpr size_t index_bytes(size_t limit) { return limit <= 256 ? 1 : limit <= 65536 ? 2 : 4; }
 json add_indices(const std::vector<uint32_t>& values, size_t limit, BlobWriter& out) {

@@ -29,11 +29,6 @@ Result<std::vector<Lobe>> decode_lobes(const json& object, LobeKind kind, size_t
 
 namespace {
 
-template <class T>
-std::span<const uint8_t> bytes_of(const std::vector<T>& values) {
-  return {reinterpret_cast<const uint8_t*>(values.data()), values.size() * sizeof(T)};
-}
-
 void encode_light(json& object, const LightBasis& light) {
   object["basis"] = "sh", object["order"] = light.order;
   if (!light.lobes.empty()) {

@@ -43,11 +43,6 @@ void forget(json& document) {
     }
 }
 
-template <class T>
-std::span<const uint8_t> bytes_of(const std::vector<T>& v) {
-  return {reinterpret_cast<const uint8_t*>(v.data()), v.size() * sizeof(T)};
-}
-
 }  // namespace
 
 LookWriter::LookWriter(const Scene& scene, const SpatialBasis& basis, const ViewerLook* look)

@@ -14,7 +14,7 @@
 namespace lambent {
 namespace {
 
-constexpr double largest = 1e9;  // per steradian: a mirror measured to a hundredth of a degree stays far below
+constexpr double most_reflectance = 1e9;  // per steradian: a mirror measured to a hundredth of a degree stays far below
 
 // --- MERL
 
@@ -72,7 +72,7 @@ Result<MeasuredTable> load_merl(std::span<const uint8_t> bytes, const std::strin
       std::memcpy(&x, bytes.data() + header_bytes + (c * cells + i) * sizeof x, sizeof x);
       if (!std::isfinite(x))
         return Error{where, "number " + std::to_string(c * cells + i) + " of the table is not finite"};
-      if (x * scale[c] > largest)
+      if (x * scale[c] > most_reflectance)
         return Error{where, "number " + std::to_string(c * cells + i) + " of the table is too large"};
       if (x < 0) measured[i] = false;
       t.f[i][int(c)] = float(std::max(x, 0.0) * scale[c]);
@@ -177,7 +177,7 @@ Result<MeasuredTable> load_cornell(std::span<const uint8_t> bytes, const std::st
     for (size_t i = 0; i < nm.size(); ++i) {
       const double f = row[4 + i];
       if (f < 0) return wrong("a reflectance is negative");
-      if (f > largest) return wrong("a reflectance is too large");
+      if (f > most_reflectance) return wrong("a reflectance is too large");
       rgb += f * weights[i];
     }
     auto direction = [](double theta, double phi) {

@@ -27,7 +27,7 @@ Tap tap(float fraction, int cells, bool periodic) {
   return {i, j, x - whole};
 }
 
-Vec3 look_up(const MeasuredTable& t, const HalfDifference& a) {
+Vec3 read_table(const MeasuredTable& t, const HalfDifference& a) {
   const Tap h = tap(half_fraction(a.theta_h), t.theta_h, false),
             d = tap(std::min(a.theta_d * (2 / pi), 1.0f), t.theta_d, false);
   const Tap p = tap(std::min(a.phi_d / pi, 1.0f), t.phi_d, true);
@@ -110,7 +110,7 @@ BrdfValue value_above(const Measured& b, Vec3 wi, Vec3 wo) {
   const MeasuredTable& t = *b.table;
   const HalfDifference a = half_difference(wi, wo);
   const float lobe = t.lobe[size_t(half_cell(t, a.theta_h))] / (2 * length(wi + wo));  // |wi + wo| = 2 cos(theta_d)
-  return {look_up(t, a), cosine_share * wi.z / pi + (1 - cosine_share) * lobe};
+  return {read_table(t, a), cosine_share * wi.z / pi + (1 - cosine_share) * lobe};
 }
 
 Vec3 draw(const Measured& b, Vec3 wo, Vec2 u) {

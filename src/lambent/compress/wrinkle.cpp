@@ -154,7 +154,7 @@ class TableFit {
   std::vector<float> targets_;
 };
 
-double dot(const std::vector<double>& a, const std::vector<double>& b) {
+double dot_product(const std::vector<double>& a, const std::vector<double>& b) {
   double sum = 0;
   for (size_t i = 0; i < a.size(); ++i) sum += a[i] * b[i];
   return sum;
@@ -175,17 +175,17 @@ void minimise(const TableFit& f, std::vector<double>& p, int iterations, Progres
     stage.advance();
     std::vector<double> q = g, alpha(steps.size());
     for (size_t k = steps.size(); k-- > 0;) {
-      alpha[k] = steps[k].rho * dot(steps[k].s, q);
+      alpha[k] = steps[k].rho * dot_product(steps[k].s, q);
       for (size_t j = 0; j < q.size(); ++j) q[j] -= alpha[k] * steps[k].y[j];
     }
-    const double scale = steps.empty() ? 0.1 / std::sqrt(dot(g, g) + 1e-30)
-                                       : 1 / (steps.back().rho * dot(steps.back().y, steps.back().y));
+    const double scale = steps.empty() ? 0.1 / std::sqrt(dot_product(g, g) + 1e-30)
+                                       : 1 / (steps.back().rho * dot_product(steps.back().y, steps.back().y));
     for (double& v : q) v *= scale;
     for (size_t k = 0; k < steps.size(); ++k) {
-      const double beta = steps[k].rho * dot(steps[k].y, q);
+      const double beta = steps[k].rho * dot_product(steps[k].y, q);
       for (size_t j = 0; j < q.size(); ++j) q[j] += (alpha[k] - beta) * steps[k].s[j];
     }
-    const double slope = dot(g, q);
+    const double slope = dot_product(g, q);
     double length = 1, next_psi = psi;
     for (int halving = 0; halving < 30 && !stage.cancelled(); ++halving, length *= 0.5) {
       for (size_t j = 0; j < p.size(); ++j) next[j] = p[j] - length * q[j];
@@ -195,7 +195,7 @@ void minimise(const TableFit& f, std::vector<double>& p, int iterations, Progres
     if (!(next_psi < psi)) break;
     Step step{std::vector<double>(p.size()), std::vector<double>(p.size()), 0};
     for (size_t j = 0; j < p.size(); ++j) step.s[j] = next[j] - p[j], step.y[j] = next_g[j] - g[j];
-    const double curvature = dot(step.s, step.y);
+    const double curvature = dot_product(step.s, step.y);
     const bool settled = psi - next_psi < 1e-5 * psi;
     p.swap(next), g.swap(next_g), psi = next_psi;
     if (settled) break;

@@ -5,6 +5,7 @@
 #include <lambent/compress/zonal_kernel.h>
 #include <lambent/core/check.h>
 #include <lambent/core/checkpoint.h>
+#include <lambent/core/clock.h>
 #include <lambent/core/half.h>
 #include <lambent/core/pool.h>
 #include <lambent/core/random.h>
@@ -12,7 +13,6 @@
 
 #include <array>
 #include <atomic>
-#include <chrono>
 #include <cstring>
 
 namespace lambent {
@@ -266,7 +266,7 @@ void put_row(const WritableZonalTransfer& out, int row, const ZonalTransfer& fro
 
 Result<ZonalTransfer> fit_zonal(const Transfer& t, const ZonalFitOptions& options, ZonalFitReport* report,
                                 Progress* progress) {
-  const auto start = std::chrono::steady_clock::now();
+  const auto start = Clock::now();
   if (auto ok = check(t, options); !ok) return ok.error();
   const int order = t.light.order, exact = exact_zonal_bands(order, options.lobes);
   WritableZonalTransfer out =
@@ -324,7 +324,7 @@ Result<ZonalTransfer> fit_zonal(const Transfer& t, const ZonalFitOptions& option
     }
     report->rms = total > 0 ? std::sqrt(sum / total) : 0;
     report->retried = this_ranks().sum(retried);
-    report->seconds = std::chrono::duration<double>(std::chrono::steady_clock::now() - start).count();
+    report->seconds = seconds_since(start);
   }
   return std::move(out.transfer);
 }

@@ -1,4 +1,5 @@
 #include <lambent/core/checkpoint.h>
+#include <lambent/core/clock.h>
 #include <lambent/core/file.h>
 
 #include <fcntl.h>
@@ -11,7 +12,6 @@
 #include <algorithm>
 #include <atomic>
 #include <cerrno>
-#include <chrono>
 #include <filesystem>
 #include <map>
 #include <unordered_map>
@@ -20,7 +20,6 @@ namespace lambent {
 namespace {
 
 namespace fs = std::filesystem;
-using Clock = std::chrono::steady_clock;
 
 constexpr uint32_t record_magic = 0x4b50434c;  // "LCPK"
 constexpr size_t buffered = size_t{1} << 20;
@@ -28,7 +27,6 @@ constexpr size_t small_piece = size_t{1} << 16;  // larger ones are written from
 constexpr double seconds_buffered = 0.25, seconds_unsynced = 30;
 constexpr const char *lock_file = "lock", *pieces_ending = ".pieces";
 
-double seconds_since(Clock::time_point start) { return std::chrono::duration<double>(Clock::now() - start).count(); }
 std::string system_message() { return std::strerror(errno); }
 
 // Before each piece; both are padded to eight bytes.

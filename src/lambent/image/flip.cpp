@@ -74,14 +74,12 @@ Kernel make_kernel(int radius, F f) {
 
 // --- Colour spaces
 
-using Matrix = Mat3d;
-
 // Rec. 709 to XYZ, rows X, Y, Z.
-const Matrix xyz_from_rgb = transpose(
-    Matrix(0.41239080, 0.35758434, 0.18048079, 0.21263901, 0.71516868, 0.07219232, 0.01933082, 0.11919478, 0.95053215));
+const Mat3d xyz_from_rgb = transpose(
+    Mat3d(0.41239080, 0.35758434, 0.18048079, 0.21263901, 0.71516868, 0.07219232, 0.01933082, 0.11919478, 0.95053215));
 const Mat3 relative_xyz_from_rgb = [] {  // white is (1, 1, 1)
   Vec3d white = xyz_from_rgb * Vec3d(1);
-  return Mat3(Matrix(1 / white.x, 0, 0, 0, 1 / white.y, 0, 0, 0, 1 / white.z) * xyz_from_rgb);
+  return Mat3(Mat3d(1 / white.x, 0, 0, 0, 1 / white.y, 0, 0, 0, 1 / white.z) * xyz_from_rgb);
 }();
 const Mat3 rgb_from_relative_xyz = Mat3(inverse(Mat3d(relative_xyz_from_rgb)));
 

@@ -15,11 +15,6 @@ Vec3 times(const float (&m)[9], Vec3 v) {
           m[6] * v.x + m[7] * v.y + m[8] * v.z};
 }
 
-template <class F>
-Vec3 each(Vec3 v, F f) {
-  return {f(v.x), f(v.y), f(v.z)};
-}
-
 Vec3 clamped(Vec3 v) { return min(max(v, Vec3(0.0f)), Vec3(1.0f)); }
 
 Vec3 aces(Vec3 c) {

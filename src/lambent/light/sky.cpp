@@ -15,7 +15,7 @@ constexpr double pi_d = std::numbers::pi;
 constexpr double sun_radius = 0.5 * 0.533 * pi_d / 180;  // angular, radians
 constexpr double unit = 10000;                           // cd/m^2
 
-double radians(double degrees) { return degrees * pi_d / 180; }
+double in_radians(double degrees) { return degrees * pi_d / 180; }
 
 // --- The sun
 
@@ -54,7 +54,7 @@ double transmittance(const SpectrumRow& row, double um, double m, double turbidi
 
 double air_mass(double elevation) {
   double zenith = std::min(90 - elevation, 90.0);
-  return 1 / (std::cos(radians(zenith)) + 0.15 * std::pow(93.885 - zenith, -1.253));
+  return 1 / (std::cos(in_radians(zenith)) + 0.15 * std::pow(93.885 - zenith, -1.253));
 }
 
 // --- The sky
@@ -73,7 +73,7 @@ double perez(const Quintet& c, double theta, double gamma) {
 SkyModel make_model(double elevation, double turbidity) {
   double T = std::max(turbidity, 2.0);
   SkyModel m;
-  const double theta_s = radians(90 - std::max(elevation, 0.0));
+  const double theta_s = in_radians(90 - std::max(elevation, 0.0));
   m.perez_Y = {0.1787 * T - 1.4630, -0.3554 * T + 0.4275, -0.0227 * T + 5.3251, 0.1206 * T - 2.5771,
                -0.0670 * T + 0.3703};
   m.perez_x = {-0.0193 * T - 0.2592, -0.0665 * T + 0.0008, -0.0004 * T + 0.2125, -0.0641 * T - 0.8989,
@@ -159,7 +159,7 @@ Result<Environment> make_sky(const SkyOptions& o) {
     if (!(o.ground[k] >= 0 && o.ground[k] <= 1)) return Error{"sky", "ground must lie in [0, 1]"};
   if (o.width < 8 || o.width > 16384 || o.width % 2) return Error{"sky", "width must be even and lie in [8, 16384]"};
 
-  double e = radians(double(o.elevation)), a = radians(std::fmod(double(o.azimuth), 360.0));
+  double e = in_radians(double(o.elevation)), a = in_radians(std::fmod(double(o.azimuth), 360.0));
   Vec3d sun(std::cos(e) * std::cos(a), std::sin(e), std::cos(e) * std::sin(a));
   // A sun below the horizon leaves the sky that of one on it.
   double seen = std::max(e, 0.0);

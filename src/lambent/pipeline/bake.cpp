@@ -4,6 +4,7 @@
 #include <lambent/bake/materials.h>
 #include <lambent/bake/unbury.h>
 #include <lambent/compress/parametric.h>
+#include <lambent/core/clock.h>
 #include <lambent/core/ranks.h>
 #include <lambent/light/environment.h>
 #include <lambent/pipeline/bake_cube.h>
@@ -21,15 +22,11 @@
 
 #include <fmt/format.h>
 
-#include <chrono>
 #include <cmath>
 #include <filesystem>
 
 namespace lambent {
 namespace {
-
-using Clock = std::chrono::steady_clock;
-double seconds_since(Clock::time_point start) { return std::chrono::duration<double>(Clock::now() - start).count(); }
 
 // A bake under way.
 struct Bake {

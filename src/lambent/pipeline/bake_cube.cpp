@@ -4,6 +4,7 @@
 #include <lambent/bake/operator.h>
 #include <lambent/bake/solve.h>
 #include <lambent/compress/haar_rows.h>
+#include <lambent/core/clock.h>
 #include <lambent/core/parallel.h>
 #include <lambent/core/sampling.h>
 #include <lambent/pipeline/text.h>
@@ -12,7 +13,6 @@
 #include <fmt/format.h>
 
 #include <algorithm>
-#include <chrono>
 
 namespace lambent {
 namespace {
@@ -65,10 +65,10 @@ Result<HaarOutcome> bounce_haar(const BakePlan& plan, const HaarFitOptions& opti
   if (!B) return B.error();
   report.rays += B->report().rays, report.trace_seconds += B->report().seconds, report.buried = B->report().buried;
   report.operator_bytes = B->report().bytes, report.operator_kept = B->report().kept;
-  const auto start = std::chrono::steady_clock::now();
+  const auto start = Clock::now();
   auto bounced =
       bounce_rows(*B, plan.bake.bounces, size_t(setup.channels), *direct, fit.error, options, half, job.progress);
-  report.bounce_seconds = std::chrono::duration<double>(std::chrono::steady_clock::now() - start).count();
+  report.bounce_seconds = seconds_since(start);
   return bounced;
 }
 

@@ -2,6 +2,7 @@
 
 #include <lambent/bake/lightmap_error.h>
 #include <lambent/bake/unbury.h>
+#include <lambent/core/clock.h>
 #include <lambent/pipeline/lightmap_pictures.h>
 #include <lambent/pipeline/parse.h>
 #include <lambent/pipeline/place_receivers.h>
@@ -10,13 +11,9 @@
 #include <fmt/format.h>
 
 #include <algorithm>
-#include <chrono>
 
 namespace lambent {
 namespace {
-
-using Clock = std::chrono::steady_clock;
-double seconds_since(Clock::time_point start) { return std::chrono::duration<double>(Clock::now() - start).count(); }
 
 struct Seconds {
   double load = 0, build = 0;

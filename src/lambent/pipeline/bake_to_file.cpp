@@ -1,4 +1,5 @@
 #include <lambent/core/ranks.h>
+#include <lambent/core/clock.h>
 #include <lambent/image/image.h>
 #include <lambent/pipeline/bake.h>
 #include <lambent/pipeline/durable.h>
@@ -6,8 +7,6 @@
 #include <lambent/pipeline/text.h>
 
 #include <fmt/format.h>
-
-#include <chrono>
 
 namespace lambent {
 namespace {
@@ -76,7 +75,7 @@ Result<Summary> bake_to_file(const BakeRequest& asked, const Job& job) {
   DurableBake durable(*request, job);
   auto outcome = bake_with_summary(asked, durable.job());
   if (!outcome) return durable.explained(outcome.error());
-  const auto start = std::chrono::steady_clock::now();
+  const auto start = Clock::now();
   const WriteTogether together(ranks);
   Summary& summary = outcome->summary;
   auto pictures = write_outputs(request->output, *outcome, request->bin_limit, &*request, &durable);
@@ -84,7 +83,7 @@ Result<Summary> bake_to_file(const BakeRequest& asked, const Job& job) {
   if (!pictures->empty()) summary.json["pictures"] = *pictures;
   durable.finish();
   summary.json["output"] = request->output;
-  summary.json["seconds"]["save"] = std::chrono::duration<double>(std::chrono::steady_clock::now() - start).count();
+  summary.json["seconds"]["save"] = seconds_since(start);
   if (const size_t taken = durable.taken()) {
     summary.json["resumed"] = taken;
     summary.lines.emplace_back("resumed", fmt::format("{} pieces of work were there already", human_count(taken)));

@@ -1,19 +1,15 @@
 #include <lambent/pipeline/draw_blocks.h>
 
 #include <lambent/bake/bake.h>
+#include <lambent/core/clock.h>
 #include <lambent/light/cube_light.h>
 #include <lambent/pipeline/text.h>
 #include <lambent/render/products.h>
 
 #include <fmt/format.h>
 
-#include <chrono>
-
 namespace lambent {
 namespace {
-
-using Clock = std::chrono::steady_clock;
-double seconds_since(Clock::time_point start) { return std::chrono::duration<double>(Clock::now() - start).count(); }
 
 const Visibility& visibility_of(const Baked& baked) { return std::get<Visibility>(baked.surface.store); }
 

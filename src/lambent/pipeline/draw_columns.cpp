@@ -1,11 +1,11 @@
 #include <lambent/pipeline/draw_columns.h>
 
+#include <lambent/core/clock.h>
 #include <lambent/core/overloaded.h>
 #include <lambent/relight/block_runs.h>
 #include <lambent/relight/dering.h>
 
 #include <algorithm>
-#include <chrono>
 
 namespace lambent {
 namespace {
@@ -135,7 +135,7 @@ Result<void> relight(ColumnDrawing& d, const std::optional<Pose>& pose, Relit& o
     frame.light = &field;
   }
   frame.reading = &d.reading;
-  const auto start = std::chrono::steady_clock::now();
+  const auto start = Clock::now();
   if (auto ok = sum_relit(d.relighters, frame, out); !ok) return Error{d.request.baked, ok.error().message};
   if (d.light.cube.size)  // few terms ring
     for (float& v : out.values) v = std::max(v, 0.0f);
@@ -150,8 +150,7 @@ Result<void> relight(ColumnDrawing& d, const std::optional<Pose>& pose, Relit& o
       hold_above_zero(out, relit, seen ? &runs : nullptr), peaks = {};
     }
   }
-  d.relight_seconds =
-      std::min(d.relight_seconds, std::chrono::duration<double>(std::chrono::steady_clock::now() - start).count());
+  d.relight_seconds = std::min(d.relight_seconds, seconds_since(start));
   return {};
 }
 

@@ -1,5 +1,6 @@
 #include <lambent/pipeline/draw_indirect.h>
 
+#include <lambent/core/clock.h>
 #include <lambent/core/parallel.h>
 #include <lambent/core/random.h>
 #include <lambent/core/sampling.h>
@@ -13,16 +14,12 @@
 #include <algorithm>
 #include <atomic>
 #include <bit>
-#include <chrono>
 #include <cmath>
 
 namespace lambent {
 namespace {
 
 constexpr uint64_t near_seed = 0x6ea7;
-
-using Clock = std::chrono::steady_clock;
-double seconds_since(Clock::time_point start) { return std::chrono::duration<double>(Clock::now() - start).count(); }
 
 }  // namespace
 

@@ -1,5 +1,6 @@
 #include <lambent/pipeline/draw_moving.h>
 
+#include <lambent/core/clock.h>
 #include <lambent/pipeline/moving_light.h>
 #include <lambent/pipeline/text.h>
 #include <lambent/relight/dering.h>
@@ -8,7 +9,6 @@
 #include <fmt/format.h>
 
 #include <algorithm>
-#include <chrono>
 #include <set>
 
 namespace lambent {
@@ -178,18 +178,18 @@ Result<void> MovingDrawing::set_light(ColumnDrawing& d) { return light_scene(sta
 
 Result<void> MovingDrawing::move_to(double time) {
   State& s = *state_;
-  const auto start = std::chrono::steady_clock::now();
+  const auto start = Clock::now();
   for (Mover& m : s.movers) {
     if (auto ok = lambent::move_to(m, time, s.baked.scene.origin); !ok) return ok;
     check_place(s.scene, m, s.job, s.warned);
   }
-  s.seconds += std::chrono::duration<double>(std::chrono::steady_clock::now() - start).count();
+  s.seconds += seconds_since(start);
   return {};
 }
 
 RelitScene MovingDrawing::lit(const ColumnDrawing& d, std::vector<Vec3>& emission) {
   State& s = *state_;
-  const auto start = std::chrono::steady_clock::now();
+  const auto start = Clock::now();
   std::vector<const PlacedObject*> objects;
   for (const Mover& m : s.movers) objects.push_back(&m.placed);
   const VertexPlacement& at = *vertices_of(s.baked);
@@ -216,7 +216,7 @@ RelitScene MovingDrawing::lit(const ColumnDrawing& d, std::vector<Vec3>& emissio
     append_mover(drawn, s.movers[i], relit, emission);
   }
   if (!emission.empty()) emission.resize(drawn.scene.materials.size(), Vec3(0.0f));
-  s.seconds += std::chrono::duration<double>(std::chrono::steady_clock::now() - start).count();
+  s.seconds += seconds_since(start);
   return drawn;
 }
 

@@ -1,5 +1,6 @@
 #include <lambent/pipeline/live.h>
 
+#include <lambent/core/clock.h>
 #include <lambent/pipeline/live_state.h>
 
 #include <algorithm>
@@ -154,7 +155,7 @@ Result<void> LivePicture::look_as(Look look, int number) {
 namespace {
 
 Result<void> timed(double& ms, auto&& run) {
-  const auto start = LiveClock::now();
+  const auto start = Clock::now();
   auto ok = run();
   ms = 1e3 * seconds_from(start);
   return ok;

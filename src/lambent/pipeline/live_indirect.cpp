@@ -1,16 +1,15 @@
 // Lamps under the hand: leaves are lit part by part, the bounces follow, and pixels send shadow rays of their own.
 #include <lambent/pipeline/draw_indirect.h>
+#include <lambent/core/clock.h>
 #include <lambent/pipeline/live_kind.h>
 
 #include <algorithm>
-#include <chrono>
 #include <cmath>
 
 namespace lambent {
 namespace {
 
-using LiveClock = std::chrono::steady_clock;
-double since(LiveClock::time_point start) { return std::chrono::duration<double>(LiveClock::now() - start).count(); }
+double since(Clock::time_point start) { return seconds_since(start); }
 
 constexpr size_t leaves_a_piece = 2048;
 constexpr size_t kept_kernels = size_t(2) << 20;
@@ -26,7 +25,7 @@ struct Sweep {
   void begin(size_t count) { left = count, coarse = false; }
   // Calls run(first, count) until all was done or `seconds` have gone. How many leaves that were.
   size_t go_on(size_t leaves, bool coarsely, double seconds, auto run) {
-    const auto start = LiveClock::now();
+    const auto start = Clock::now();
     const size_t before = left;
     coarse |= coarsely && left > 0;
     while (left > 0) {
@@ -83,12 +82,12 @@ class LiveIndirect : public LiveKind {
 
   Result<Light> light(bool hurry, double budget, LiveTimes& times) override {
     const size_t leaves = d_.transfer.surfels.count();
-    auto start = LiveClock::now();
+    auto start = Clock::now();
     if (sky_due_ || (sky_coarse_ && !hurry)) {
       turn_sky(hurry), sky_due_ = false, still_due_ = true;
       sky_coarse_ = hurry && skies_.env[0] && skies_.env[0]->image.width > skies_.env[1]->image.width;
     }
-    times.project = 1e3 * since(start), start = LiveClock::now();
+    times.project = 1e3 * since(start), start = Clock::now();
     const IndirectQuality quality = hurry ? hurried_indirect : IndirectQuality();
     if (d_.still.shines() && (still_due_ || (still_.coarse && !hurry))) still_.begin(leaves), still_due_ = false;
     still_.go_on(leaves, hurry, budget / 2,

@@ -1,5 +1,6 @@
 #include <lambent/pipeline/live_state.h>
 
+#include <lambent/core/clock.h>
 #include <lambent/light/cube_light.h>
 
 #include <algorithm>
@@ -177,7 +178,7 @@ const std::vector<uint32_t>& LivePicture::State::receivers_in_view() {
 Result<void> LivePicture::State::shade_blocks_seen(bool hurry, double budget) {
   BlockShading& s = *blocks;
   s.breakdown = {};
-  const auto start = LiveClock::now();
+  const auto start = Clock::now();
   if (!hurry) {
     s.seen = 0;
     auto ok = shade_view(s, view);
@@ -264,7 +265,7 @@ Result<const ViewRays*> LivePicture::State::trace_pass() {
   const int sample = sums.samples;
   if (size_t(sample) < kept.size()) return &kept[size_t(sample)];
   if (extra) return &*extra;
-  const auto start = LiveClock::now();
+  const auto start = Clock::now();
   auto traced = trace_view(scene(), *rays_of(), view.camera, width(), height(), sample, 1, nullptr);
   if (!traced) return traced.error();
   times.trace = 1e3 * seconds_from(start), trace_cost = seconds_from(start) / (double(width()) * double(height()));
@@ -279,7 +280,7 @@ Result<void> LivePicture::State::add_sample(bool hurry) {
   auto pass = trace_pass();
   if (!pass) return pass.error();
   if (due.values && seen.empty() && hurry && can_shade_what_is_seen()) return {};  // shaded first, now that rays tell
-  const auto start = LiveClock::now();
+  const auto start = Clock::now();
   auto& kept = rays[size_t(scale)];
   if (columns && !kind && look == Look::picture && size_t(sums.samples) < kept.size() &&
       kept[size_t(sums.samples)].colours.empty())

@@ -1,6 +1,7 @@
 #pragma once
 // What a live picture holds, and the steps that its work is made of.
 #include <lambent/light/lamps.h>
+#include <lambent/core/clock.h>
 #include <lambent/light/peaks.h>
 #include <lambent/pipeline/draw_blocks.h>
 #include <lambent/pipeline/draw_columns.h>
@@ -9,14 +10,10 @@
 #include <lambent/pipeline/live_look.h>
 
 #include <array>
-#include <chrono>
 
 namespace lambent {
 
-using LiveClock = std::chrono::steady_clock;
-inline double seconds_from(LiveClock::time_point start) {
-  return std::chrono::duration<double>(LiveClock::now() - start).count();
-}
+inline double seconds_from(Clock::time_point start) { return seconds_since(start); }
 
 // A light to draw by, and what --window auto asks of it.
 struct LiveLight {

@@ -1,5 +1,6 @@
 // A transfer texture under the hand: over any scene, moving or not, baked or not.
 #include <lambent/light/lamps.h>
+#include <lambent/core/clock.h>
 #include <lambent/pipeline/draw_texture.h>
 #include <lambent/pipeline/live_kind.h>
 #include <lambent/pipeline/motion.h>
@@ -9,8 +10,6 @@
 
 namespace lambent {
 namespace {
-
-using LiveClock = std::chrono::steady_clock;
 
 class LiveTexture : public LiveKind {
  public:
@@ -33,7 +32,7 @@ class LiveTexture : public LiveKind {
   const Tracer& tracer() const override { return *tracer_; }
 
   Result<Light> light(bool hurry, double, LiveTimes& times) override {
-    const auto start = LiveClock::now();
+    const auto start = Clock::now();
     const auto &env = skies_.env[hurry ? 1 : 0], &whole = skies_.env[0];
     const Surroundings around{.env = env,
                               .rotation = skies_.turn,
@@ -42,7 +41,7 @@ class LiveTexture : public LiveKind {
     auto light = column_light(request_, around, LightBasis{.order = texture_.transfer.order}, scene().origin, false);
     if (!light) return light.error();
     local_ = light->local();
-    const auto then = LiveClock::now();
+    const auto then = Clock::now();
     arriving_ = {};
     const bool lights = receivers_of(baked_.surface.store) > 0 && cannot_light(baked_, request_).empty();
     if (lights && !relighter_) {
@@ -57,7 +56,7 @@ class LiveTexture : public LiveKind {
     }
     using Milliseconds = std::chrono::duration<double, std::milli>;
     times.project = Milliseconds(then - start).count();
-    times.relight = Milliseconds(LiveClock::now() - then).count();
+    times.relight = Milliseconds(Clock::now() - then).count();
     return hurry && env && env->image.width < whole->image.width ? Light::draft : Light::whole;
   }
 

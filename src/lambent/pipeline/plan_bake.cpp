@@ -1,5 +1,6 @@
 // What a bake would take, from a little of it.
 #include <lambent/bake/gather.h>
+#include <lambent/core/clock.h>
 #include <lambent/core/parallel.h>
 #include <lambent/pipeline/bake_lightmap.h>
 #include <lambent/pipeline/bake_parse.h>
@@ -10,16 +11,12 @@
 #include <fmt/format.h>
 
 #include <atomic>
-#include <chrono>
 
 namespace lambent {
 namespace {
 
 // That most scenes need for the default error, all rounds together.
 constexpr int expected_samples = 512;
-
-using Clock = std::chrono::steady_clock;
-double seconds_since(Clock::time_point start) { return std::chrono::duration<double>(Clock::now() - start).count(); }
 
 // Rows and columns that will be stored, of so many channels where the kind leaves it open.
 size_t stored_bytes(const BakePlan& plan, const BakeRequest& r, size_t receivers, size_t groups, size_t channels) {

@@ -1,5 +1,6 @@
 #include <lambent/pipeline/relight_loop.h>
 
+#include <lambent/core/clock.h>
 #include <lambent/light/cube_light.h>
 #include <lambent/pipeline/draw_blocks.h>
 #include <lambent/pipeline/text.h>
@@ -7,7 +8,6 @@
 #include <fmt/format.h>
 
 #include <algorithm>
-#include <chrono>
 
 namespace lambent {
 namespace {
@@ -102,7 +102,7 @@ Result<Summary> relight_loop(const LoopRequest& request, const Job& job) {
   if (auto ok = set_environment(*shading, env, around->rotation, &job); !ok) return ok.error();
   shading->project_seconds = shading->forms_seconds = 0;
   const View first = *view;
-  const auto start = std::chrono::steady_clock::now();
+  const auto start = Clock::now();
   int done = 0;
   for (; done < request.frames && !is_cancelled(job.progress); ++done) {
     const Mat3 turn = rotation_from_yaw_pitch_roll({360.0f * float(done) / float(request.frames), 0, 0});
@@ -111,7 +111,7 @@ Result<Summary> relight_loop(const LoopRequest& request, const Job& job) {
     if (request.turntable) view->camera.eye = first.camera.target + turn * (first.camera.eye - first.camera.target);
     if (auto ok = shade_view(*shading, *view); !ok) return ok.error();
   }
-  const double seconds = std::chrono::duration<double>(std::chrono::steady_clock::now() - start).count();
+  const double seconds = seconds_since(start);
   return summary_of(*shading, request, done, seconds);
 }
 

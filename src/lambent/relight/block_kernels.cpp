@@ -11,6 +11,7 @@
 #define HWY_TARGET_INCLUDE "lambent/relight/block_kernels.cpp"
 #include <hwy/foreach_target.h>
 #include <hwy/highway.h>
+#include <lambent/core/clock.h>
 #include <lambent/relight/block_nodes-inl.h>
 #include <lambent/relight/block_rows-inl.h>
 #include <lambent/relight/product_lobes-inl.h>
@@ -351,13 +352,13 @@ void EvaluateLit(const Lobe& lobe, BlockScratch& s, const BlockLight& light, con
 // What a stage took, where it is asked for.
 struct Clock {
   StageTimes* times;
-  std::chrono::steady_clock::time_point at = {};
+  Clock::time_point at = {};
   explicit Clock(StageTimes* t) : times(t) {
-    if (times) at = std::chrono::steady_clock::now(), ++times->receivers;
+    if (times) at = Clock::now(), ++times->receivers;
   }
   void Stage(double StageTimes::*of) {
     if (!times) return;
-    const auto now = std::chrono::steady_clock::now();
+    const auto now = Clock::now();
     times->*of += std::chrono::duration<double, std::nano>(now - at).count(), at = now;
   }
 };

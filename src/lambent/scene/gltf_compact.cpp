@@ -70,7 +70,7 @@ void visit_all(Json* object, const Visit& visit) {
   if (!object || !object->is_object()) return;
   for (Json& value : *object) visit(Target::accessor, value);
 }
-void each(Json& parent, const char* key, const std::function<void(Json&)>& work) {
+void each_of(Json& parent, const char* key, const std::function<void(Json&)>& work) {
   Json* items = gltf_member(parent, {key});
   if (!items || !items->is_array()) return;
   for (Json& item : *items) work(item);
@@ -78,23 +78,23 @@ void each(Json& parent, const char* key, const std::function<void(Json&)>& work)
 
 // Every number of an accessor or of a buffer view in the document.
 void visit_references(Json& document, const Visit& visit) {
-  each(document, "meshes", [&](Json& mesh) {
-    each(mesh, "primitives", [&](Json& primitive) {
+  each_of(document, "meshes", [&](Json& mesh) {
+    each_of(mesh, "primitives", [&](Json& primitive) {
       visit_all(gltf_member(primitive, {"attributes"}), visit);
       visit_one(primitive, {"indices"}, Target::accessor, visit);
-      each(primitive, "targets", [&](Json& target) { visit_all(&target, visit); });
+      each_of(primitive, "targets", [&](Json& target) { visit_all(&target, visit); });
     });
   });
-  each(document, "nodes", [&](Json& node) {
+  each_of(document, "nodes", [&](Json& node) {
     visit_all(gltf_member(node, {"extensions", "EXT_mesh_gpu_instancing", "attributes"}), visit);
   });
-  each(document, "skins", [&](Json& skin) { visit_one(skin, {"inverseBindMatrices"}, Target::accessor, visit); });
-  each(document, "animations", [&](Json& animation) {
-    each(animation, "samplers", [&](Json& sampler) {
+  each_of(document, "skins", [&](Json& skin) { visit_one(skin, {"inverseBindMatrices"}, Target::accessor, visit); });
+  each_of(document, "animations", [&](Json& animation) {
+    each_of(animation, "samplers", [&](Json& sampler) {
       visit_one(sampler, {"input"}, Target::accessor, visit), visit_one(sampler, {"output"}, Target::accessor, visit);
     });
   });
-  each(document, "images", [&](Json& image) { visit_one(image, {"bufferView"}, Target::view, visit); });
+  each_of(document, "images", [&](Json& image) { visit_one(image, {"bufferView"}, Target::view, visit); });
 }
 void visit_accessor(Json& accessor, const Visit& visit) {
   visit_one(accessor, {"bufferView"}, Target::view, visit);
@@ -156,7 +156,7 @@ void GltfWriter::compact() {
     return Range{*at, *at + *size};
   };
   bool sound = true;
-  each(json, "bufferViews", [&](Json& holder) { sound = sound && range_of(holder); });
+  each_of(json, "bufferViews", [&](Json& holder) { sound = sound && range_of(holder); });
   if (!sound) return;
 
   const std::vector<size_t> accessors = shrink(json, "accessors", used->accessors),
@@ -167,12 +167,12 @@ void GltfWriter::compact() {
     if (value != now) value = now;
   };
   visit_references(json, renumber);
-  each(json, "accessors", [&](Json& accessor) { visit_accessor(accessor, renumber); });
+  each_of(json, "accessors", [&](Json& accessor) { visit_accessor(accessor, renumber); });
   std::vector<Range> ranges;
-  each(json, "bufferViews", [&](Json& holder) { ranges.push_back(*range_of(holder)); });
+  each_of(json, "bufferViews", [&](Json& holder) { ranges.push_back(*range_of(holder)); });
   const std::vector<Move> moves = keep_bytes(std::move(ranges));
   compacted_ = true;
-  each(json, "bufferViews", [&](Json& holder) {
+  each_of(json, "bufferViews", [&](Json& holder) {
     const size_t at = range_of(holder)->begin;
     const auto next = std::upper_bound(moves.begin(), moves.end(), at, [](size_t x, Move m) { return x < m.from; });
     const Move move = *std::prev(next);

@@ -41,7 +41,7 @@ namespace {
 
 // Zero stands for broken: repair_normals() finds it. What is unit but for rounding stays as it is, so that a saved
 // normal comes back with the same bits.
-Vec3 unit_normal(Vec3d n) {
+Vec3 unit_of(Vec3d n) {
   constexpr double rounding = 1e-6;
   double length = lambent::length(n);
   if (!(length > 0) || !std::isfinite(length)) return Vec3(0.0f);
@@ -71,7 +71,7 @@ bool read_vertices(GltfCheck& check, const GltfDocument& document, const Json& a
       return check.fail(where, "vertex " + std::to_string(i) + " is not at a finite position or beyond 1e9");
     n = turn * n;
     out_positions.push_back(position);
-    out_normals.push_back(unit_normal(n));
+    out_normals.push_back(unit_of(n));
   }
   return true;
 }
