@@ -11,6 +11,7 @@
 #include <fmt/format.h>
 
 #include <algorithm>
+#include <map>
 
 namespace lambent {
 
@@ -48,6 +49,19 @@ void tell_lamps(const ColumnLight& light, double time, Summary& summary) {
                                                   line.empty() ? "nothing" : line, 100 * light.lost));
 }
 
+// Below this share of a lamp's energy, what is shown of it is no longer that lamp.
+constexpr double least_held = 0.5;
+
+// Lamps that went where the file holds little of them, by how little at the worst of all times.
+void warn_of_lost_lamps(const std::map<size_t, double>& least, const std::string& baked, const Job& job) {
+  for (const auto& [lamp, held] : least)
+    if (held < least_held)
+      job.warn(
+          fmt::format("{}: lamp {} is moved to where {:.1f} % of its energy is held, and is as much darker; a bake "
+                      "with lamps along its way holds it (another +lamps:COUNT@ENV for each place)",
+                      baked, lamp + 1, 100 * held));
+}
+
 // When, of --frames without an animation.
 Result<std::vector<double>> times_of(const DrawRequest& request) {
   if (request.frames.empty() || !request.animation.empty()) return std::vector<double>{request.time};
@@ -76,6 +90,7 @@ Result<Drawing> draw_columns(const Baked& baked, const DrawRequest& request, con
   auto times = times_of(request);
   if (!times) return times.error();
   Drawing drawing;
+  std::map<size_t, double> least_of;
   for (size_t k = 0; k < std::max(poses->size(), times->size()); ++k) {
     const std::optional<Pose>& pose = (*poses)[poses->size() > 1 ? k : 0];
     if (times->size() > 1) {
@@ -88,7 +103,12 @@ Result<Drawing> draw_columns(const Baked& baked, const DrawRequest& request, con
     if (!image) return image.error();
     drawing.frames.push_back(std::move(*image));
     if (!d.light.still.light.empty()) tell_lamps(d.light, d.time, drawing.summary);
+    for (const auto& m : d.light.moved) {
+      double& held = least_of.emplace(m.lamp, 1).first->second;
+      held = std::min(held, m.held);
+    }
   }
+  warn_of_lost_lamps(least_of, request.baked, job);
   const LightProjection& light = d.light.projection;
   drawing.summary.json.update({{"receivers", d.receivers()},
                                {"frames", drawing.frames.size()},

@@ -203,16 +203,22 @@ TEST_F(Drawings, LampsOfTheLightMove) {
   const Vec3 axis = light.lobes[0].axis;
   const double elevation = double(degrees(std::asin(axis.y))), azimuth = double(degrees(std::atan2(axis.z, axis.x)));
   const DrawRequest base{.env = sun, .camera = "3,2,4,1,0.8,0.8,40", .size = "24x18", .background = "none", .spp = 4};
+  std::vector<std::string> warnings;
   const auto drawn = [&](const std::string& move, const std::string& frames = "", const std::string& rotate = "") {
     DrawRequest r = base;
     if (!move.empty()) r.move = {move};
     r.frames = frames, r.env_rotate = rotate;
-    auto drawing = draw(baked->baked, r);
+    warnings.clear();
+    auto drawing = draw(baked->baked, r, {nullptr, [&](const std::string& w) { warnings.push_back(w); }});
     EXPECT_TRUE(drawing) << drawing.error().text();
     return std::move(*drawing);
   };
   const auto place = [&](double more) { return fmt::format("{},{}", azimuth + more, elevation); };
-  const Drawing still = drawn(""), stays = drawn("1@" + place(0)), moved = drawn("1@" + place(30));
+  const Drawing still = drawn(""), stays = drawn("1@" + place(0));
+  EXPECT_TRUE(warnings.empty()) << warnings[0];
+  const Drawing moved = drawn("1@" + place(30));
+  ASSERT_EQ(warnings.size(), 1u);
+  EXPECT_NE(warnings[0].find("lamp 1 is moved to where"), std::string::npos) << warnings[0];
   expect_equal(still.frames[0], stays.frames[0]);
   EXPECT_GT(still.summary.json["held"].get<double>(), 0.7);
   EXPECT_LT(stays.summary.json["moved"][0]["lost"].get<double>(), 1e-3);
@@ -224,6 +230,7 @@ TEST_F(Drawings, LampsOfTheLightMove) {
   EXPECT_GT(told["lost"].get<double>(), 0.8);
   const Drawing film = drawn("1@0:" + place(0) + ";2:" + place(60), "0:1:1");
   ASSERT_EQ(film.frames.size(), 2u);
+  EXPECT_EQ(warnings.size(), 1u);  // a lamp, not a frame
   expect_equal(film.frames[0], stays.frames[0]);
   EXPECT_GT(film.summary.json["moved"][1]["lost"].get<double>(), 0.8);
   // The whole sky turned is its harmonics turned and its lamp carried along.
