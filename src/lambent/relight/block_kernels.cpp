@@ -350,10 +350,10 @@ void EvaluateLit(const Lobe& lobe, BlockScratch& s, const BlockLight& light, con
 }
 
 // What a stage took, where it is asked for.
-struct Clock {
+struct StageClock {
   StageTimes* times;
   Clock::time_point at = {};
-  explicit Clock(StageTimes* t) : times(t) {
+  explicit StageClock(StageTimes* t) : times(t) {
     if (times) at = Clock::now(), ++times->receivers;
   }
   void Stage(double StageTimes::*of) {
@@ -381,7 +381,7 @@ Vec3 ShadeBlocks(BlockScratch& s, const BlockLight& light, const Visibility& vis
   const bool binary = visibility.bits == 1;
   const Vec3 n = t.frame[2];
   const bool diffuse = t.lambert != Vec3(0);
-  Clock clock(times);
+  StageClock clock(times);
   std::fill(s.lit.begin(), s.lit.end(), 0u);
   for (size_t k = 0; k < 3; ++k) s.colour_weights[k] = largest(t.colour[k]);
   WithLobe(t, [&](auto lobe) HWY_ATTR { FindLit(lobe, s, cube, material); });
