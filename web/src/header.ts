@@ -28,7 +28,7 @@ export function readHeader(
   surfaceKind: 'vertices' | 'texels' = 'vertices',
 ): TransferHeader {
   const { transfer, surface, view } = extension;
-  const { basis, order, channels, precision, receivers, bufferView, lobes, groups, directional, cpca } = transfer;
+  const { basis, order, channels, precision, receivers, bufferView, lobes, groups, directional } = transfer;
   const text = (value: unknown): string => (typeof value === 'string' ? value : 'something else'),
     where = text(surface?.kind ?? 'vertices');
   const isMore = (list: unknown): boolean => list !== undefined && !(Array.isArray(list) && list.length === 0);
@@ -45,8 +45,6 @@ export function readHeader(
     );
   if (view !== undefined)
     throw new LambentError('holds a fixed view (--fix-view), a picture and no surfaces; "lambent render" draws it');
-  if (cpca !== undefined)
-    throw new LambentError('holds clusters (--compress cpca), which this version does not draw; "lambent render" does');
   if (directional !== undefined && (surfaceKind === 'vertices' || !isDirectional(directional)))
     throw new LambentError(
       `holds directional light ("${text(directional)}"), which this version does not draw ` +

@@ -84,6 +84,10 @@ export const drawn = [
   ['dense', 'diffuse', 'texels'],
   ['dense', 'directional', 'texels'],
   ['dense', 'outgoing', 'vertices'],
+  ['clusters', 'diffuse', 'vertices'],
+  ['clusters', 'diffuse', 'texels'],
+  ['clusters', 'directional', 'texels'],
+  ['clusters', 'outgoing', 'vertices'],
   ['lobes', 'diffuse', 'vertices'],
   ['lobes', 'outgoing', 'vertices'],
   ['blocks', 'sight', 'vertices'],
@@ -93,9 +97,10 @@ export const drawn = [
 
 /**
  * Of what is drawn: columns of an atlas's light; lobes of all rows of a receiver; of a matrix, texels a receiver; lamps
- * that move, each with a shadow map, and lights and glowing materials of the scene's own beside them.
+ * that move, each with a shadow map, and lights and glowing materials of the scene's own beside them; bytes that
+ * clusters are unfolded to.
  */
-export const limits = { columns: 256, lobes: 64, texels: 2048, lamps: 8, ownLamps: 64 } as const;
+export const limits = { columns: 256, lobes: 64, texels: 2048, lamps: 8, ownLamps: 64, unfolded: 536870912 } as const;
 
 /** Store, meaning and placement of a file's transfer, as the table has them. */
 export function axesOf({ transfer, surface, view }: TransferExtension): [store: string, rows: string, where: string] {

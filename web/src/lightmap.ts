@@ -22,6 +22,7 @@ import {
   type WebGLProgramParametersWithUniforms,
 } from 'three';
 import { TransferValues, type BlockLayout } from './block_texture.js';
+import { readStored, type StoredValues } from './clusters.js';
 import { LambentError } from './errors.js';
 import { isIndex, isViews } from './glb.js';
 import {
@@ -218,7 +219,7 @@ class LightmapTransfer implements BakedTransfer {
   constructor(
     header: TransferHeader,
     groups: string[],
-    values: ArrayBuffer,
+    { values, fileBytes }: StoredValues,
     readonly receiversOf: DataTexture,
     readonly meshes: Mesh[],
     owns: Material[],
@@ -228,7 +229,7 @@ class LightmapTransfer implements BakedTransfer {
     this.order = header.order;
     this.channels = header.channels;
     this.receivers = header.receivers;
-    this.fileBytes = values.byteLength;
+    this.fileBytes = fileBytes;
     for (const name of groups) this.lamps.set(name, new Color(1, 1, 1));
     this.directional = header.directional;
     const count = shCount(header.order) + groups.length,
@@ -423,7 +424,8 @@ export async function loadLightmap(source: TransferSource): Promise<BakedTransfe
   receivers.internalFormat = 'R32UI';
   receivers.minFilter = receivers.magFilter = NearestFilter;
   receivers.needsUpdate = true;
-  const values = await source.bufferView(header.bufferView),
+  const rows = directionalRows[header.directional],
+    values = await readStored(source, header, rows * header.channels * columns),
     meshes = await readPlacedMeshes(source),
     owns: Material[] = [];
   for (const part of extension.parts) owns.push(await source.ownMaterial(part));

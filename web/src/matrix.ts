@@ -15,6 +15,7 @@ import {
   type WebGLProgramParametersWithUniforms,
 } from 'three';
 import { TransferValues, type BlockLayout } from './block_texture.js';
+import { readStored, type StoredValues } from './clusters.js';
 import { LambentError } from './errors.js';
 import { readHeader, type TransferHeader } from './header.js';
 import { glslInstances } from './instanced.js';
@@ -158,7 +159,7 @@ class MatrixTransfer implements BakedTransfer {
   constructor(
     header: TransferHeader,
     private readonly shared: LastReflection,
-    values: ArrayBuffer,
+    { values, fileBytes }: StoredValues,
     readonly meshes: Mesh[],
     private readonly nodes?: NodeEdition,
     firstBands?: number,
@@ -166,7 +167,7 @@ class MatrixTransfer implements BakedTransfer {
     this.order = header.order;
     this.channels = header.channels;
     this.receivers = header.receivers;
-    this.fileBytes = values.byteLength;
+    this.fileBytes = fileBytes;
     this.values = new TransferValues(
       { ...header, count: shCount(header.order), channels: shared.rows * header.channels },
       values,
@@ -311,7 +312,7 @@ async function load(source: TransferSource): Promise<BakedTransfer> {
       `has ${rows} rows of order ${header.order}, more than textures hold; "lambent render" draws it`,
     );
   const shared = await loadLastReflection(source, receivers);
-  const values = await source.bufferView(header.bufferView);
+  const values = await readStored(source, header, rows * header.channels * shCount(header.order));
   const meshes = await Promise.all(source.extension.parts.map((part) => bindPart(source, part, receivers)));
   return new MatrixTransfer(header, shared, values, meshes, source.nodes, source.firstBands);
 }

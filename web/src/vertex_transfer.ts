@@ -15,6 +15,7 @@ import {
   type SkinnedMesh,
 } from 'three';
 import { TransferValues } from './block_texture.js';
+import { readStored, type StoredValues } from './clusters.js';
 import { LambentError } from './errors.js';
 import type { TransferExtension } from './glb.js';
 import { noReceiver, readReceivers, shareGeometry, type TransferHeader } from './header.js';
@@ -157,7 +158,7 @@ export class VertexTransfer implements BakedTransfer {
   private constructor(
     header: TransferHeader,
     { kind, count, valueChannels, shader, readLobes, fitErrors, last, lobeCount }: VertexKind,
-    values: ArrayBuffer,
+    { values, fileBytes }: StoredValues,
     readonly meshes: Mesh[],
     private readonly nodes?: NodeEdition,
     firstBands?: number,
@@ -167,7 +168,7 @@ export class VertexTransfer implements BakedTransfer {
     this.order = header.order;
     this.channels = header.channels;
     this.receivers = header.receivers;
-    this.fileBytes = values.byteLength;
+    this.fileBytes = fileBytes;
     this.values = new TransferValues(
       { count, channels: valueChannels, precision: header.precision, receivers: header.receivers },
       values,
@@ -294,7 +295,7 @@ export class VertexTransfer implements BakedTransfer {
 
   /** Reads values and receivers, and dresses the meshes. */
   static async load(source: TransferSource, header: TransferHeader, kind: VertexKind): Promise<VertexTransfer> {
-    const values = await source.bufferView(header.bufferView);
+    const values = await readStored(source, header, kind.valueChannels * kind.count);
     const meshes = await Promise.all(source.extension.parts.map((part) => bindPart(source, part, header.receivers)));
     return new VertexTransfer(header, kind, values, meshes, source.nodes, source.firstBands);
   }

@@ -222,7 +222,6 @@ describe('files that are not what they should be', () => {
     expect(read({ lobes: [[0, 0, 1, 50]] })).toThrow(/lobes of light/);
     expect(read({ groups: ['all'] })).toThrow(/own lamps/);
     expect(read({ directional: 'hl2' })).toThrow(/directional light \("hl2"\)/);
-    expect(read({ cpca: { clusters: 4 } })).toThrow(/clusters \(--compress cpca\)/);
     expect(read({}, { kind: 'patches' })).toThrow(/over patches/);
     expect(read({ order: 0 })).toThrow(/"order"/);
   });

@@ -88,7 +88,8 @@ TEST(Browser, DrawsWhatThePageSaysThatItDraws) {
   EXPECT_EQ(page.size(), drawn_kinds().size());
   for (const auto& [name, value] : {std::pair("columns", max_drawn_columns), std::pair("lobes", max_drawn_lobes),
                                     std::pair("texels", max_drawn_texels), std::pair("lamps", max_drawn_lamps),
-                                    std::pair("ownLamps", max_drawn_own_lamps)}) {
+                                    std::pair("ownLamps", max_drawn_own_lamps),
+                                    std::pair("unfolded", max_drawn_unfolded)}) {
     std::smatch found;
     ASSERT_TRUE(std::regex_search(source, found, std::regex("limits = \\{[^}]*\\b" + std::string(name) + ": (\\d+)")))
         << name;
@@ -148,7 +149,12 @@ TEST(Browser, RefusesAllElseByName) {
     return ok ? std::string() : ok.error().message;
   };
   const auto has = [](const std::string& text, const char* part) { return text.find(part) != std::string::npos; };
-  EXPECT_TRUE(has(why(VertexPlacement{}, CpcaTransfer{}, DiffuseRows{}), "clusters"));
+  EXPECT_TRUE(has(why(PatchPlacement{}, CpcaTransfer{}, DiffuseRows{}), "clusters transfer, diffuse, at patches"));
+  const CpcaTransfer many{.light = {.order = 4}, .rows = 16, .receivers = size_t(1) << 20};
+  EXPECT_EQ(why(VertexPlacement{}, many, Outgoing{}), "");
+  CpcaTransfer more = many;
+  ++more.receivers;
+  EXPECT_TRUE(has(why(VertexPlacement{}, more, Outgoing{}), "more than 512 MiB once unfolded"));
   EXPECT_TRUE(has(why(FixedView{}, Transfer{}, PixelRows{}), "fixed view"));
   EXPECT_TRUE(has(why(VertexPlacement{}, HaarTransfer{}, DiffuseRows{}), "wavelets"));
   EXPECT_EQ(why(VertexPlacement{}, Visibility{}, SightRows{}), "");
