@@ -13,7 +13,7 @@ const camera = '3.1,2.6,4.3,-0.3,0.8,0,38',
   rotate = '40,-25,70',
   clusters = ['--compress', 'cpca:24,6'];
 
-describe.skipIf(!haveTool || !haveBrowser)('a file of clusters', () => {
+describe.skipIf(!haveTool || !haveBrowser)('a file of clusters or factors', () => {
   const folder = makeFolder(),
     at = (name: string): string => join(folder, name);
   let browser: Browser, server: ViteDevServer, page: Page;
@@ -68,6 +68,20 @@ describe.skipIf(!haveTool || !haveBrowser)('a file of clusters', () => {
       renderLinear(at(`${name}.glb`), '--env', at('light.hdr'), '--window', 'none', ...view(from), '-o', at('o.png'));
       expect(psnr(at(`${name}_webgl.png`), at('o.png'))).toBeLessThan(35); // the comparison can fail
     });
+
+  it('is drawn where the light and the material are factors of it', async () => {
+    const truth = at('factors_render.png'),
+      parts = ['--transfer', 'matrix', '--factors', '--order', '4', '--incident-order', '4'];
+    lambent('bake', at('scene.obj'), ...parts, '--samples', '128', '-o', at('factors.glb'));
+    renderLinear(at('factors.glb'), ...lit, ...view(camera), '-o', truth);
+    const shot = { path: '/files/factors.glb', light: lightOf(4), camera: cameraOf(camera) };
+    await compareEditions(page, folder, 'factors', shot, truth);
+    renderLinear(at('factors.glb'), '--env', at('light.hdr'), '--window', 'none', ...view(camera), '-o', at('o.png'));
+    expect(psnr(at('factors_webgl.png'), at('o.png'))).toBeLessThan(35); // the comparison can fail
+    const sun = 'sky:elevation=35,azimuth=60';
+    renderLinear(at('factors.glb'), '--env', sun, ...view(camera, ['--exposure', '-2']), '-o', truth);
+    await compareEditions(page, folder, 'factors_sun', { ...shot, light: sun, exposure: -2, peaks: true }, truth);
+  });
 
   it('has directions for normal maps, too', async () => {
     const sky = ['--sky', 'sky:elevation=30,azimuth=60', '--directional', 'sh:3'],

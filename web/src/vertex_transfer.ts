@@ -18,7 +18,7 @@ import { TransferValues } from './block_texture.js';
 import { readStored, type StoredValues } from './clusters.js';
 import { LambentError } from './errors.js';
 import type { TransferExtension } from './glb.js';
-import { noReceiver, readReceivers, shareGeometry, type TransferHeader } from './header.js';
+import { bandsOfLight, columnsOf, noReceiver, readReceivers, shareGeometry, type TransferHeader } from './header.js';
 import type { BakedTransfer, TransferSource } from './kinds.js';
 import type { Lighting } from './lighting.js';
 import {
@@ -131,12 +131,14 @@ export class VertexTransfer implements BakedTransfer {
   readonly kind: string;
   readonly isDiffuse: boolean;
   readonly order: number;
+  readonly columns: BakedTransfer['columns'];
   readonly channels: number;
   readonly receivers: number;
   readonly fileBytes: number;
   readonly gpuBytes: number;
   readonly lobesAt?: NonNullable<BakedTransfer['lobesAt']>;
   readonly fitErrorMaterials?: NonNullable<BakedTransfer['fitErrorMaterials']>;
+  private readonly light: TransferHeader;
   private readonly last: LastReflection | undefined;
   private errors: DataTexture | undefined;
   private readonly values: TransferValues;
@@ -165,7 +167,9 @@ export class VertexTransfer implements BakedTransfer {
   ) {
     this.kind = kind;
     this.isDiffuse = last === undefined;
-    this.order = header.order;
+    this.order = bandsOfLight(header);
+    this.columns = columnsOf(header);
+    this.light = header;
     this.channels = header.channels;
     this.receivers = header.receivers;
     this.fileBytes = fileBytes;
@@ -176,7 +180,7 @@ export class VertexTransfer implements BakedTransfer {
     );
     const { layout, data, texture } = this.values;
     this.last = last;
-    this.quads = Math.ceil(shCount(header.order) / 4);
+    this.quads = shader.summed ? layout.quads : Math.ceil(shCount(header.order) / 4);
     this.texture = texture;
     this.uniforms = {
       prtTransfer: { value: this.texture },
@@ -330,12 +334,12 @@ export class VertexTransfer implements BakedTransfer {
   }
 
   relight(lighting: Lighting): void {
-    const { rest, peaks } = lighting.parts(this.order, this.last !== undefined, this.firstBands);
+    const { rest, peaks, turned } = lighting.of(this.light, this.last !== undefined, this.firstBands);
     packLight(this.uniforms.prtLight.value, rest);
     if (peaks) packLight(this.uniforms.prtPeaks.value, peaks);
     this.uniforms.prtHasPeaks.value = peaks !== undefined; // materials take it when they are drawn
-    this.sums?.set(rest, peaks);
-    this.sum?.set(rest, peaks, true);
+    this.sums?.set(rest, peaks, turned);
+    this.sum?.set(rest, peaks, true, turned);
     this.lobes?.set(rest, peaks);
   }
 
@@ -347,9 +351,10 @@ export class VertexTransfer implements BakedTransfer {
   }
 
   coefficientMaterials(index: number, gain: { value: number }): Material[] {
-    const light = new Float64Array(3 * shCount(this.order)).fill(1, 3 * index, 3 * index + 3);
+    const light = new Float64Array(3 * this.light.columns).fill(1, 3 * index, 3 * index + 3);
     const { summing } = this,
-      sums = summing && new TurnedSums(() => new VertexSums(summing), this.order, undefined, summing.layout.quads);
+      sums =
+        summing && new TurnedSums(() => new VertexSums(summing), this.light.order, undefined, summing.layout.quads);
     sums?.set(light, undefined);
     if (sums) this.ofCoefficients.add(sums);
     const uniforms = {
