@@ -7,7 +7,8 @@ import { Quaternion, Vector3 } from 'three';
 import { afterAll, beforeAll, describe, expect, it } from 'vitest';
 import { haveTool, lambent, makeFolder, renderLinear, writeLopsidedHdr } from '../test/tool.ts';
 import { haveBrowser, launch, open, openFixture, psnr, serve } from './browser.ts';
-import { cameraOf, compareEditions, view } from './editions.ts';
+import { cameraOf, compareEditions, size, view } from './editions.ts';
+import type { Backend } from './fixture/webgpu.ts';
 import { writeBumpy, writeScene } from './scenes.ts';
 
 const camera = '3.1,2.6,4.3,-0.3,0.8,0,38',
@@ -58,6 +59,21 @@ describe.skipIf(!haveTool || !haveBrowser)('lobes of light', () => {
       expect(psnr(at(`${name}_webgl.png`), at(`${name}_still_render.png`))).toBeLessThan(35);
       await compareEditions(page, folder, `${name}_still`, shot, at(`${name}_still_render.png`));
     });
+
+  it('have coefficients in false colour that both editions show alike', async () => {
+    const shoot = async (backend: Backend, wears: number): Promise<string> =>
+        (
+          await page.evaluate(([b, s]) => window.gpu.shoot(b, s), [
+            backend,
+            { path: '/files/lamps.glb', light: [1, 1, 1], camera: cameraOf(camera), wears, size },
+          ] as const)
+        ).png,
+      inside = (a: string, b: string): Promise<number> =>
+        page.evaluate(([a, b]) => window.gpu.inside(a, b), [a, b] as const);
+    const lobe = await shoot('webgl', 16);
+    expect(await inside(lobe, await shoot('fallback', 16))).toBeGreaterThan(50);
+    expect(await inside(lobe, await shoot('webgl', 15))).toBeLessThan(35);
+  });
 
   it('that are bands in other words do not ring under a sun', async () => {
     const truth = at('sun_render.png'),

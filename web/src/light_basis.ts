@@ -47,13 +47,13 @@ export function lobeScale(kind: LobeKind, s: number): number {
   }
 }
 
-/** The angle beyond which there is nothing of it, or less than a part in 10^12 of its peak. */
+/** The angle beyond which there is nothing of it, or less than a part in 10^6 of its peak and of its integral. */
 export function lobeReach(kind: LobeKind, s: number): number {
   switch (kind) {
     case 'cosine_power':
-      return Math.acos(Math.exp(-30 / s));
+      return Math.acos(Math.exp(-14 / s));
     case 'von_mises_fisher':
-      return Math.acos(Math.max(-1, 1 - 30 / s));
+      return Math.acos(Math.max(-1, 1 - 14 / s));
     case 'compact':
       return Math.acos(Math.max(-1, 1 - 3 / s));
     case 'band_limited':

@@ -2,6 +2,7 @@
 // Of a broad lobe by the map's harmonics, which are summed once: 2 pi I_l times the band's value at its axis
 // (Funk-Hecke), so that a light that turns costs as many products as harmonics count. Of a sharp one, which would take
 // too many bands, by the texels that it reaches, Gauss nodes in each.
+import { reducedMap } from './cube.js';
 import {
   gaussLegendre,
   lobeAt,
@@ -14,14 +15,16 @@ import {
 import { projectAboutPole, type LatLongMap } from './projection.js';
 import { evaluateSh, shBand, shCount, tabledOrder } from './sh.js';
 
-/** What of a lobe's squared norm bands may leave out. */
-const left = 1e-9;
+/** What of a lobe's squared norm bands are to leave out, and may: compact ones fall off slowly. */
+const [enough, most] = [1e-9, 2e-6];
+/** Texels around the equator of a map whose harmonics are summed. */
+const widest = 2048;
 
-/** Gauss nodes across `width` radians about 0: as many as a lobe of this sharpness takes to a part in 10^5. */
+/** Gauss nodes across `width` radians about 0: as many as a lobe of this sharpness takes to a part in 10^4. */
 function nodesAcross(width: number, sharpness: number): { x: number; weight: number }[] {
   const ratio = width * Math.sqrt(sharpness),
     pieces = Math.max(1, Math.ceil(ratio)),
-    count = ratio < 1 / 64 ? 1 : ratio < 0.25 ? 2 : 4;
+    count = ratio < 1 / 32 ? 1 : ratio < 0.25 ? 2 : 4;
   return Array.from({ length: pieces }, (_, i) =>
     gaussLegendre(count, width * (i / pieces - 0.5), width * ((i + 1) / pieces - 0.5)),
   ).flat();
@@ -33,9 +36,9 @@ function shares(basis: LobeBasis, sharpness: number): Float64Array | undefined {
     scale = lobeScale(basis.kind, sharpness);
   let rest = 1,
     bands = 0;
-  for (; bands < tabledOrder && rest > left; ++bands)
+  for (; bands < tabledOrder && rest > enough; ++bands)
     rest -= Math.PI * (2 * bands + 1) * (scale * (I[bands] ?? 0)) ** 2;
-  return rest > left ? undefined : I.slice(0, bands).map((v) => 2 * Math.PI * scale * v);
+  return rest > most ? undefined : I.slice(0, bands).map((v) => 2 * Math.PI * scale * v);
 }
 
 export class LobeIntegrals {
@@ -55,7 +58,7 @@ export class LobeIntegrals {
     const out = new Float64Array(3 * axes.length),
       bands = Math.max(0, ...[...this.sharesOf.values()].map((share) => share?.length ?? 0)),
       y = new Float64Array(shCount(bands));
-    if (bands > 0) this.harmonics ??= projectAboutPole(this.map, bands);
+    if (bands > 0) this.harmonics ??= projectAboutPole(reducedMap(this.map, widest), bands);
     axes.forEach(([x, up, z], k) => {
       const { sharpness } = this.basis.lobes[k]!,
         share = this.sharesOf.get(sharpness),
@@ -85,7 +88,11 @@ export function overTexels(
     azimuth = Math.atan2(axis[2], axis[0]),
     equatorial = Math.hypot(axis[0], axis[2]),
     inRow = nodesAcross(row, s),
-    scale = lobeScale(kind, s);
+    scale = lobeScale(kind, s),
+    value =
+      kind === 'von_mises_fisher'
+        ? (cosine: number): number => Math.exp(s * (cosine - 1))
+        : (cosine: number): number => lobeAt(kind, s, cosine);
   const first = Math.max(0, Math.floor((toPole - reach) / row - 1)),
     last = Math.min(height - 1, Math.ceil((toPole + reach) / row + 1));
   for (let y = first; y <= last; ++y) {
@@ -112,12 +119,12 @@ export function overTexels(
       for (const a of across) {
         const c = equatorial * Math.cos(phi + a.x / widest);
         let inner = 0;
-        for (const t of latitudes) inner += t.weight * lobeAt(kind, s, t.cos + c * t.sin);
+        for (const t of latitudes) inner += t.weight * value(t.cos + c * t.sin);
         sum += (a.weight / widest) * inner;
       }
       for (let c = 0; c < 3; ++c) {
-        const value = data[(y * width + x) * channels + c]!;
-        if (value > 0 && value < Infinity) out[c]! += value * sum;
+        const radiance = data[(y * width + x) * channels + c]!;
+        if (radiance > 0 && radiance < Infinity) out[c]! += radiance * sum;
       }
     }
   }

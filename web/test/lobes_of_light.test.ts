@@ -118,12 +118,13 @@ describe('light on lobes', () => {
       ['von_mises_fisher', 12],
       ['compact', 9],
       ['cosine_power', 12],
+      ['compact', 38.4],
     ] as const) {
       const bands = new LobeIntegrals(map, new LobeBasis(0, kind, [{ axis, sharpness }])).about([axis]),
         texels = new Float64Array(3);
       overTexels(map, kind, { axis, sharpness }, texels);
-      // The harmonics of a map this coarse are sums over 11 x 11 points of each texel.
-      expect(difference(bands, texels)).toBeLessThan(2e-4 * largest(texels));
+      // The harmonics of a map this coarse are sums over 11 x 11 points of each texel; 48 bands leave 1e-3 of the last.
+      expect(difference(bands, texels)).toBeLessThan((sharpness > 12 ? 1e-3 : 2e-4) * largest(texels));
     }
   });
 
