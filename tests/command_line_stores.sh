@@ -43,7 +43,10 @@ expect 0 'of 4 bands' inspect steerable.glb
 expect 2 'window: of steerable lobes is auto or none' render steerable.glb --env $sun --window hann -o x.png
 expect 2 'window: shapes harmonics' render compact.glb --env $sun --window none -o x.png
 expect 2 'light-order: counts bands' render compact.glb --env $sun --light-order 2 -o x.png
-expect 1 'holds lobes of light, which the web page does not draw' export compact.glb --web site_lobes
+# The page draws them, where it has been built.
+if "$tool" export compact.glb --web site_lobes >/dev/null 2>stderr || grep -q 'scripts/web' stderr; then ok; else
+  bad "the page refuses lobes of light: $(cat stderr)"
+fi
 expect 2 'lattice: is lit by harmonics alone' bake corner.obj --light compact:16 --lattice 2,2,2 -o x.glb
 expect 2 'subsurface: is of harmonics alone' bake corner.obj --light steerable:3 --subsurface marble -o x.glb
 expect 2 'light: lobes without harmonics' bake corner.obj --light steerable:3 --transfer matrix -o x.glb

@@ -81,7 +81,7 @@ export async function openFixture(
     configFile: false,
     logLevel: 'error',
     cacheDir: fileURLToPath(new URL('../../build/web-tests/fixture-cache', import.meta.url)), // of all folders
-    server: { host: '127.0.0.1', port: 0, fs: { allow: [web] } },
+    server: { host: '127.0.0.1', port: 0, fs: { allow: [web] }, watch: null, hmr: false },
   });
   await server.listen();
   const page = await browser.newPage();

@@ -8,11 +8,11 @@ import { Quaternion, Vector3 } from 'three';
 import { afterAll, beforeAll, describe, expect, it } from 'vitest';
 import { haveTool, lambent, lambentJson, makeFolder, renderLinear, writeLopsidedHdr } from '../test/tool.ts';
 import type { Backend, Shot } from './fixture/webgpu.ts';
-import { haveBrowser, launch, openFixture, psnr } from './browser.ts';
+import { haveBrowser, launch, openFixture } from './browser.ts';
+import { cameraOf, compareEditions, size, view } from './editions.ts';
 import { writeBumpy, writeGlass, writeScene, writeSkin } from './scenes.ts';
 
 const camera = '3.1,2.6,4.3,-0.3,0.8,0,38',
-  size = [320, 240],
   rotate = '40,-25,70';
 
 describe.skipIf(!haveTool || !haveBrowser)('on WebGPURenderer', () => {
@@ -41,45 +41,8 @@ describe.skipIf(!haveTool || !haveBrowser)('on WebGPURenderer', () => {
     await server?.close();
   });
 
-  const cameraOf = (camera: string): number[] => camera.split(',').map(Number);
-  const url = (path: string): string => `data:image/png;base64,${readFileSync(path).toString('base64')}`,
-    inside = (a: string, b: string): Promise<number> =>
-      page.evaluate(([a, b]) => window.gpu.inside(a, b), [url(a), url(b)] as const),
-    view = (camera: string, more: string[] = []): string[] => [
-      ...['--camera', camera, '--size', size.join('x'), '--spp', '16', '--background', 'none'],
-      ...more,
-    ];
-  /** What each renderer draws, against `truth`, a picture by `render`, and against WebGLRenderer. */
-  async function compare(name: string, shot: Omit<Shot, 'size'>, truth: string, least = 45, all = 40): Promise<void> {
-    const picture = async (backend: Backend): Promise<string> => {
-      const { png, milliseconds } = await page.evaluate(([b, s]) => window.gpu.shoot(b, s), [
-          backend,
-          { ...shot, size },
-        ] as const),
-        path = at(`${name}_${backend}.png`);
-      writeFileSync(path, Buffer.from(png.replace(/.*,/, ''), 'base64'));
-      const within = await inside(truth, path),
-        over = psnr(path, truth);
-      console.log(
-        `${name} by ${await page.evaluate((b) => window.gpu.backendName(b), backend)}: ${within.toFixed(1)} dB ` +
-          `against render inside outlines, ${over.toFixed(1)} over all; frames of ` +
-          `${milliseconds.map((t) => t.toFixed(0)).join(', ')} ms (${folder})`,
-      );
-      expect(within).toBeGreaterThan(least);
-      expect(over).toBeGreaterThan(all);
-      return path;
-    };
-    const webgl = await picture('webgl'),
-      hasWebGpu = await page.evaluate(async () =>
-        Boolean(await (navigator as { gpu?: { requestAdapter(): Promise<unknown> } }).gpu?.requestAdapter()),
-      );
-    if (!hasWebGpu) console.warn('this browser has no WebGPU here: its WebGL 2 backend alone is tried');
-    for (const backend of hasWebGpu ? (['webgpu', 'fallback'] as const) : (['fallback'] as const)) {
-      const between = await inside(webgl, await picture(backend));
-      console.log(`${name}: ${between.toFixed(1)} dB against WebGLRenderer inside outlines`);
-      expect(between).toBeGreaterThan(50);
-    }
-  }
+  const compare = (name: string, shot: Omit<Shot, 'size'>, truth: string, least = 45, all = 40): Promise<void> =>
+    compareEditions(page, folder, name, shot, truth, least, all);
   const lightOf = (order: number): number[] =>
     (
       lambentJson('env', at('light.hdr'), '--env-rotate', rotate, '--order', String(order)) as {

@@ -21,6 +21,7 @@ import {
   type EnvironmentFile,
   type Manifest,
 } from './loading.js';
+import { bandsOf } from './model.js';
 import { get, degrees, hideProblem, input, select, sentence, showLoading, showProblem } from './dom.js';
 import { connectLobes, connectWipe } from './hands.js';
 import { fetchWhole, openAsItComes } from './incoming.js';
@@ -121,18 +122,21 @@ class Page {
     select('view').value = state.view;
     select('against').value = state.against ?? '';
     select('window').value = state.window;
-    const all = Math.max(1, transfer?.order ?? 1); // none where there are lamps alone
-    if (transfer?.coefficientMaterials) state.coefficient = Math.min(state.coefficient, all * all - 1);
+    const all = bandsOf(transfer),
+      columns = transfer?.columns,
+      last = (columns ? columns.harmonics + columns.lobes : all * all) - 1;
+    if (transfer?.coefficientMaterials) state.coefficient = Math.min(state.coefficient, last);
     input('order').max = String(all);
     input('order').value = String(state.order || all);
-    input('coefficient').max = String(all * all - 1);
+    input('coefficient').max = String(last);
     input('coefficient').value = String(state.coefficient);
     select('tone').replaceChildren(...tones.map((tone) => option(tone, tone)));
     select('tone').value = state.tone;
     input('background').checked = state.background;
     input('free').checked = state.free;
-    // Sight has no bands to leave out, and surfaces that are free.
-    get('order-row').hidden = get('window-row').hidden = transfer?.reflection !== undefined;
+    // Sight has no bands to leave out, and surfaces that are free; nor have lobes of light alone.
+    get('order-row').hidden = get('window-row').hidden =
+      transfer?.reflection !== undefined || (columns !== undefined && transfer?.order === 0);
     this.lamps.show();
     const makeSurfaces = (brdf: Reflection): void => {
       state.brdf = takeReflection(transfer!, brdf, viewer.renderer, (error) =>
@@ -164,14 +168,16 @@ class Page {
     if (isOtherLight) viewer.changeLight();
     else viewer.invalidate();
     this.showExposure();
-    get('order-value').textContent = `${viewer.bands} of ${viewer.bakedScene?.transfer.order ?? 1}`;
+    get('order-value').textContent = `${viewer.bands} of ${bandsOf(viewer.bakedScene?.transfer)}`;
     const usesCoefficient = [state.view, state.against].includes('coefficient');
     const l = shBand(state.coefficient),
       m = state.coefficient - shIndex(l, 0);
     const usesError = [state.view, state.against].includes('error');
     get('coefficient-row').hidden = !usesCoefficient;
     get('scale').hidden = !usesCoefficient && !usesError;
-    get('coefficient-name').textContent = `l ${l}, m ${m}`;
+    const { harmonics = Infinity } = viewer.bakedScene?.transfer.columns ?? {};
+    get('coefficient-name').textContent =
+      state.coefficient < harmonics ? `l ${l}, m ${m}` : `lobe ${state.coefficient - harmonics + 1}`;
     const end = falseColorEnd / falseColorGain(state.exposure);
     get('scale-low').textContent = `−${end.toPrecision(2)}`;
     get('scale-high').textContent = `+${end.toPrecision(2)}`;

@@ -7,10 +7,14 @@ import {
   LambentError,
   UnshadowedMaterial,
   type BakedScene,
+  type BakedTransfer,
   type Lighting,
 } from '../src/index.js';
 
 export type Look = 'baked' | 'direct' | 'indirect' | 'unshadowed' | 'coefficient' | 'error';
+
+/** Bands of light that count, at least 1. Lobes of light take none; for what is drawn without shadows a few do. */
+export const bandsOf = (transfer: BakedTransfer | undefined): number => transfer?.order || (transfer?.columns ? 6 : 1);
 
 export class Model {
   readonly root: Object3D;
@@ -30,8 +34,8 @@ export class Model {
 
   /** Of what is drawn without shadows: as many as are baked. Sight has none, and diffuse surfaces ask for few. */
   private get bands(): number {
-    const { order, reflection } = this.baked.transfer;
-    return reflection ? 6 : Math.max(1, order);
+    const { transfer } = this.baked;
+    return transfer.reflection ? 6 : bandsOf(transfer);
   }
 
   get meshes(): Mesh[] {

@@ -28,7 +28,7 @@ import { anySeeThrough, LambentError, type BakedScene, type IndirectControls, ty
 import type { EnvironmentFile } from './loading.js';
 import { framed, framedFov } from './framing.js';
 import { LobeGlyphs, pickVertex } from './lobes.js';
-import { Model } from './model.js';
+import { bandsOf, Model } from './model.js';
 import { Orbit } from './orbit.js';
 import { DevelopMaterial, PictureMaterial, SkyMaterial } from './screen.js';
 import type { View } from './state.js';
@@ -177,7 +177,7 @@ export class Viewer {
     return this.animation !== undefined;
   }
   get bands(): number {
-    const all = Math.max(1, this.baked?.baked.transfer.order ?? 1);
+    const all = bandsOf(this.baked?.baked.transfer);
     return this.order > 0 ? Math.min(this.order, all) : all;
   }
 

@@ -4,7 +4,6 @@ import { readHeader } from './header.js';
 import type { TransferKind } from './kinds.js';
 import { loadLightmap } from './lightmap.js';
 import type { PrtShader } from './prt_material.js';
-import { shCount } from './sh.js';
 import { lookUpSums } from './vertex_sum.js';
 import { VertexTransfer } from './vertex_transfer.js';
 
@@ -17,7 +16,7 @@ export const diffuseKind: TransferKind = {
     const header = readHeader(source.extension);
     return VertexTransfer.load(source, header, {
       kind: 'diffuse',
-      count: shCount(header.order),
+      count: header.columns,
       valueChannels: header.channels,
       shader,
     });

@@ -2,8 +2,9 @@
 import { BufferGeometry } from 'three';
 import { LambentError } from './errors.js';
 import { isIndex, isViews, type TransferExtension, type Views } from './glb.js';
-import { axesOf, isDrawn, type TransferSource } from './kinds.js';
-import { maxShOrder } from './sh.js';
+import { axesOf, isDrawn, limits, type BakedTransfer, type TransferSource } from './kinds.js';
+import { readLobes, type LobeBasis } from './light_basis.js';
+import { maxShOrder, shCount } from './sh.js';
 
 export const noReceiver = 0xffffffff;
 
@@ -14,6 +15,12 @@ export interface TransferHeader {
   receivers: number;
   bufferView: Views;
   directional: Directional;
+  /** Harmonics of `order` and lobes of light, where there are any. */
+  lobes: LobeBasis | undefined;
+  /** Names of the scene's own lamps. */
+  groups: string[];
+  /** Of the light: harmonics, lobes and lamps. */
+  columns: number;
 }
 
 /** Rows of a lightmap for the normals of a normal map (docs/lightmaps.md). */
@@ -28,16 +35,14 @@ export function readHeader(
   surfaceKind: 'vertices' | 'texels' = 'vertices',
 ): TransferHeader {
   const { transfer, surface, view } = extension;
-  const { basis, order, channels, precision, receivers, bufferView, lobes, groups, directional, cpca } = transfer;
+  const { basis, order, channels, precision, receivers, bufferView, groups = [], directional } = transfer;
   const text = (value: unknown): string => (typeof value === 'string' ? value : 'something else'),
     where = text(surface?.kind ?? 'vertices');
   const isMore = (list: unknown): boolean => list !== undefined && !(Array.isArray(list) && list.length === 0);
   if (basis !== 'sh')
     throw new LambentError(`holds light in the basis "${String(basis)}", which this version does not know`);
-  if (isMore(lobes))
-    throw new LambentError(
-      'holds lobes of light (lamps, or --light directional), which this version does not draw; "lambent render" does',
-    );
+  if (!Array.isArray(groups) || !groups.every((name) => typeof name === 'string'))
+    throw new LambentError('"groups" is no list of names');
   if (isMore(groups) && surfaceKind === 'vertices')
     throw new LambentError(
       "holds the light of the scene's own lamps at vertices, where this version draws it over an atlas; " +
@@ -45,8 +50,6 @@ export function readHeader(
     );
   if (view !== undefined)
     throw new LambentError('holds a fixed view (--fix-view), a picture and no surfaces; "lambent render" draws it');
-  if (cpca !== undefined)
-    throw new LambentError('holds clusters (--compress cpca), which this version does not draw; "lambent render" does');
   if (directional !== undefined && (surfaceKind === 'vertices' || !isDirectional(directional)))
     throw new LambentError(
       `holds directional light ("${text(directional)}"), which this version does not draw ` +
@@ -62,10 +65,15 @@ export function readHeader(
       `holds ${axesOf(extension).join(', ')}, which this version does not draw; "lambent render" does`,
     );
   if (precision !== 'half' && precision !== 'single') throw new LambentError('"precision" must be half or single');
-  if (!isIndex(order, maxShOrder) || (order < 1 && !isMore(groups))) throw new LambentError('"order" is out of range');
+  if (!isIndex(order, maxShOrder) || (order < 1 && !isMore(groups) && !isMore(transfer['lobes'])))
+    throw new LambentError('"order" is out of range');
   if (channels !== 1 && channels !== 3) throw new LambentError('"channels" is out of range');
   if (!isIndex(receivers, noReceiver - 1) || receivers < 1) throw new LambentError('"receivers" is out of range');
   if (!isViews(bufferView)) throw new LambentError('"bufferView" is missing');
+  const lobes = readLobes(transfer, order),
+    columns = shCount(order) + (lobes?.lobes.length ?? 0) + groups.length;
+  if (columns > limits.columns)
+    throw new LambentError(`has ${columns} columns of light, where this version draws ${limits.columns}`);
   return {
     order,
     channels,
@@ -73,8 +81,17 @@ export function readHeader(
     receivers,
     bufferView,
     directional: isDirectional(directional) ? directional : 'none',
+    lobes,
+    groups,
+    columns,
   };
 }
+
+/** Bands of light that count: those of harmonics, or that lobes are in other words. */
+export const bandsOfLight = ({ order, lobes }: TransferHeader): number => order || (lobes?.bands ?? 0);
+/** What BakedTransfer says of columns. */
+export const columnsOf = ({ order, lobes }: TransferHeader): BakedTransfer['columns'] =>
+  lobes && { harmonics: shCount(order), lobes: lobes.lobes.length };
 
 /** `count` of u32, all of them receivers or none; `message` where there are not so many. */
 export async function readReceivers(

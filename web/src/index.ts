@@ -1,5 +1,6 @@
 import { blocksKind } from './blocks.js';
 import { diffuseKind } from './diffuse.js';
+import { factorsKind } from './factors.js';
 import { indirectKind } from './indirect.js';
 import { registerTransferKind } from './kinds.js';
 import { matrixKind } from './matrix.js';
@@ -8,6 +9,7 @@ import { zonalKind } from './zonal.js';
 registerTransferKind(diffuseKind);
 registerTransferKind(zonalKind);
 registerTransferKind(matrixKind);
+registerTransferKind(factorsKind);
 registerTransferKind(blocksKind);
 registerTransferKind(indirectKind);
 

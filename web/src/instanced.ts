@@ -137,9 +137,11 @@ interface Poses {
   inverseOf(object: Object3D): Matrix3 | undefined;
 }
 
+/** As TurnableLight (turned.ts). */
 interface Light {
   rest: ArrayLike<number>;
   peaks: ArrayLike<number> | undefined;
+  turned?: ((turn: Matrix3) => Omit<Light, 'turned'>) | undefined;
 }
 interface Made {
   texture: DataTexture;
@@ -171,8 +173,8 @@ export class InstancedLights {
   }
 
   /** [coefficient][3] */
-  set(rest: ArrayLike<number>, peaks: ArrayLike<number> | undefined): void {
-    this.light = { rest, peaks };
+  set(rest: ArrayLike<number>, peaks: ArrayLike<number> | undefined, turned?: Light['turned']): void {
+    this.light = { rest, peaks, turned };
     this.hasPeaks.value = peaks !== undefined;
   }
 
@@ -237,7 +239,7 @@ export class InstancedLights {
     return known;
   }
 
-  private write({ texture, rotations }: Made): void {
+  private write({ texture, rotations, turns }: Made): void {
     const { light, order, quads } = this,
       { texels, across } = instanceLayout(quads),
       data = texture.image.data as Float32Array;
@@ -245,10 +247,12 @@ export class InstancedLights {
     const turned = new Float64Array(light.rest.length);
     rotations.forEach((rotation, i) => {
       const at = 4 * (Math.floor(i / across) * width + (i % across) * texels);
-      [light.rest, light.peaks].forEach((part, p) => {
+      const own = light.turned?.(turns[i]!) ?? light;
+      [own.rest, own.peaks].forEach((part, p) => {
         if (!part) return;
         turned.set(part); // lamps stay
-        if (order > 0) rotateSh(rotation, Float64Array.from(part).subarray(0, 3 * shCount(order)), turned);
+        if (order > 0 && !light.turned)
+          rotateSh(rotation, Float64Array.from(part).subarray(0, 3 * shCount(order)), turned);
         for (let k = 0; k < turned.length; ++k)
           data[at + 4 * quads * (3 * p + (k % 3)) + Math.floor(k / 3)] = turned[k]!;
       });

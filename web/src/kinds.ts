@@ -29,9 +29,12 @@ export interface TransferSource {
 /** The transfer of one file, bound to its meshes. */
 export interface BakedTransfer {
   readonly kind: string;
+  /** Bands of the light that count; 0 where it is lamps, or lobes that are not of bands, alone. */
   readonly order: number;
   readonly channels: number;
   readonly receivers: number;
+  /** Columns of the light before the scene's own lamps, where some are lobes: `order`^2 harmonics, else. */
+  readonly columns?: { harmonics: number; lobes: number } | undefined;
   /** In the file, and what the same takes on the graphics card, receiver indices included. */
   readonly fileBytes: number;
   readonly gpuBytes: number;
@@ -84,6 +87,11 @@ export const drawn = [
   ['dense', 'diffuse', 'texels'],
   ['dense', 'directional', 'texels'],
   ['dense', 'outgoing', 'vertices'],
+  ['clusters', 'diffuse', 'vertices'],
+  ['clusters', 'diffuse', 'texels'],
+  ['clusters', 'directional', 'texels'],
+  ['clusters', 'outgoing', 'vertices'],
+  ['factors', 'outgoing', 'vertices'],
   ['lobes', 'diffuse', 'vertices'],
   ['lobes', 'outgoing', 'vertices'],
   ['blocks', 'sight', 'vertices'],
@@ -92,10 +100,11 @@ export const drawn = [
 ] as const;
 
 /**
- * Of what is drawn: columns of an atlas's light; lobes of all rows of a receiver; of a matrix, texels a receiver; lamps
- * that move, each with a shadow map, and lights and glowing materials of the scene's own beside them.
+ * Of what is drawn: columns of light; lobes of all rows of a receiver; of a matrix, texels a receiver; lamps
+ * that move, each with a shadow map, and lights and glowing materials of the scene's own beside them; bytes that
+ * clusters and factors are unfolded to.
  */
-export const limits = { columns: 256, lobes: 64, texels: 2048, lamps: 8, ownLamps: 64 } as const;
+export const limits = { columns: 256, lobes: 64, texels: 2048, lamps: 8, ownLamps: 64, unfolded: 536870912 } as const;
 
 /** Store, meaning and placement of a file's transfer, as the table has them. */
 export function axesOf({ transfer, surface, view }: TransferExtension): [store: string, rows: string, where: string] {

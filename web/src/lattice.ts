@@ -16,6 +16,7 @@ import { block } from './block_texture.js';
 import { LambentError } from './errors.js';
 import { isIndex, isViews } from './glb.js';
 import type { TransferSource } from './kinds.js';
+import { readLobes, type LobeBasis } from './light_basis.js';
 import type { Lighting } from './lighting.js';
 import { clampedCosine, evaluateSh, maxShOrder, shBand, shCount, shIndex } from './sh.js';
 
@@ -64,7 +65,7 @@ export class Lattice {
   private readonly grids = new Map<ProbeGrid, Data3DTexture>();
 
   /**
-   * `values` are the file's; `columns` those of the light: harmonics of `lightOrder` bands, then the scene's own lamps.
+   * `values` are the file's; `columns` those of the light: harmonics of `lightOrder` bands, lobes, the scene's lamps.
    * `valid`: 0 where a point lies inside something, and has its neighbours' light.
    */
   constructor(
@@ -73,6 +74,7 @@ export class Lattice {
     readonly columns: number,
     values: ArrayBuffer,
     readonly valid: Uint8Array,
+    private readonly lobes?: LobeBasis,
   ) {
     const [nx, ny, nz] = header.points as [number, number, number],
       blocks = Math.ceil((nx * ny * nz) / block),
@@ -108,10 +110,10 @@ export class Lattice {
     const { channels } = this.header,
       { columns, coefficients, values } = this,
       rows = shCount(this.order);
-    const { rest, peaks } = lighting.parts(this.lightOrder),
+    const { rest, peaks } = lighting.of({ order: this.lightOrder, lobes: this.lobes }),
       light = new Float32Array(3 * columns);
     rest.forEach((v, i) => (light[i] = v + (peaks ? peaks[i]! : 0)));
-    let lamp = shCount(this.lightOrder);
+    let lamp = rest.length / 3;
     for (const color of lamps) light.set(color.toArray(), 3 * lamp++);
     const sums = new Float32Array(block);
     for (let point = 0, at = 0; point < this.count; point += block) {
@@ -256,11 +258,13 @@ export async function loadLattice(source: TransferSource): Promise<Lattice | und
   if (!isIndex(order, maxShOrder) || order < 1 || !isIndex(lightOrder, maxShOrder)) return wrong();
   if ((channels !== 1 && channels !== 3) || (precision !== 'half' && precision !== 'single')) return wrong();
   if (!isViews(bufferView) || !isViews(valid) || !Array.isArray(groups)) return wrong();
+  const lobes = readLobes(transfer, lightOrder);
   return new Lattice(
     { min, max, points, order, channels, precision },
     lightOrder,
-    shCount(lightOrder) + groups.length,
+    shCount(lightOrder) + (lobes?.lobes.length ?? 0) + groups.length,
     await source.bufferView(bufferView),
     new Uint8Array(await source.bufferView(valid)),
+    lobes,
   );
 }

@@ -21,7 +21,6 @@ import {
 } from 'three';
 import type { BlockLayout } from './block_texture.js';
 import { LambentError } from './errors.js';
-import { limits } from './kinds.js';
 import type { Sums } from './turned.js';
 
 /** Compiles a material for light with peaks, or for light without. */
@@ -34,9 +33,7 @@ export function setPeaks(material: Material, on: boolean): void {
 }
 
 /** vec4 of uniforms in fragment shaders that WebGL 2 promises. */
-const promised = 224;
-/** Columns of light at most: uniforms of 192 vec4. */
-export const maxColumns = limits.columns;
+const promised = 224; // limits.columns take 192
 
 const vertexShader = 'in vec3 position;\nvoid main() { gl_Position = vec4( position, 1.0 ); }';
 const fragmentShader = (pick: string): string => /* glsl */ `

@@ -2,6 +2,8 @@
 import { DataUtils, FloatType, HalfFloatType, LightProbe, Matrix3, Matrix4, Quaternion, type Texture } from 'three';
 import { cubeLight, reducedMap, type CubeLight } from './cube.js';
 import { LambentError } from './errors.js';
+import type { LobeBasis } from './light_basis.js';
+import { LobeIntegrals } from './lobe_integrals.js';
 import { withoutPeaks } from './peaks.js';
 import { projectLatLong, type LatLongMap } from './projection.js';
 import { evaluateSh, luminance, maxShOrder, shBand, shCount, shIndex, shOrder } from './sh.js';
@@ -42,6 +44,11 @@ export function latLongMap(texture: Texture): LatLongMap {
 /** With less of all light in them, peaks ring too little to be seen. */
 const leastSharp = 0.05;
 
+const upright = [1, 0, 0, 0, 1, 0, 0, 0, 1];
+/** A product of matrices, row-major. */
+const times = (a: ArrayLike<number>, b: ArrayLike<number>): number[] =>
+  upright.map((_, i) => [0, 1, 2].reduce((sum, k) => sum + a[i - (i % 3) + k]! * b[3 * k + (i % 3)]!, 0));
+
 /** Texels around the equator of a map that is put on a cube, at most. */
 const widestOnCube = 2048;
 
@@ -69,6 +76,11 @@ export interface LightParts {
   /** What is too sharp for the bands, and rings; undefined where that is left as it is, or is little. */
   peaks: Float64Array | undefined;
 }
+/** Light of columns that stand still where light turns, as well. */
+export interface TurnableParts extends LightParts {
+  /** The same light in axes that were turned so. Not of harmonics alone, which are turned as they are. */
+  turned?: (turn: Matrix3) => LightParts;
+}
 
 export class Lighting {
   /** Turns the light: radiance from d becomes that from rotation * d. */
@@ -87,6 +99,7 @@ export class Lighting {
   private narrow: { most: number; map: LatLongMap } | undefined;
   private cube: { key: string; light: CubeLight } | undefined;
   private readonly restOf = new Map<number, Float64Array | undefined>();
+  private readonly integralsOf = new WeakMap<LobeBasis, LobeIntegrals>();
 
   /**
    * `radiance`: order^2 RGB coefficients, [coefficient][3], in lambent's convention (docs/conventions.md). `map`: what
@@ -138,10 +151,64 @@ export class Lighting {
    * them light is zero.
    */
   parts(order: number, glossy = false, most = order): LightParts {
+    return this.partsIn(this.matrix(), order, glossy, most);
+  }
+
+  /**
+   * The same for columns that are harmonics and lobes: [column][3]. A window is of the harmonics, and `auto` none, but
+   * for lobes that are harmonics in other words: those are lit as they would be.
+   */
+  partsOf(columns: LobeBasis): TurnableParts {
+    const rotation = this.matrix(),
+      { intensity, window } = this,
+      { order, bands, lobes } = columns;
+    let at: (R: number[]) => LightParts;
+    if (bands > 0) {
+      const parts = this.partsIn(rotation, bands, false, bands);
+      at = (R) => ({ rest: columns.ofBands(parts.rest, R), peaks: parts.peaks && columns.ofBands(parts.peaks, R) });
+      return { ...at(upright), turned: (turn) => at(turn.elements) }; // column-major: of its inverse
+    }
+    const n = order > 0 ? this.bandsOf(order) : 0,
+      integrals =
+        this.integralsOf.get(columns) ?? new LobeIntegrals(this.map ?? mapOf(this.radiance, this.order), columns),
+      factors = n > 0 && window !== 'auto' ? this.factors(n) : new Array<number>(n).fill(1);
+    this.integralsOf.set(columns, integrals);
+    at = (R) => {
+      const q = new Float64Array(3 * (shCount(n) + lobes.length)),
+        light = new Float64Array(3 * columns.count);
+      if (n > 0) rotateSh(makeShRotation(n, R), this.radiance, q);
+      // The light turned by R meets a lobe as the light itself meets the lobe turned back.
+      const back = lobes.map(({ axis: [x, y, z] }) => {
+        const to = (c: number): number => R[c]! * x + R[3 + c]! * y + R[6 + c]! * z;
+        return [to(0), to(1), to(2)] as const;
+      });
+      q.set(integrals.about(back), 3 * shCount(n));
+      for (let c = 0; c < 3; ++c)
+        columns
+          .solve(
+            n,
+            q.filter((_, i) => i % 3 === c),
+          )
+          .forEach((v, i) => {
+            const isHarmonic = i < shCount(n),
+              to = isHarmonic ? i : i - shCount(n) + shCount(order);
+            light[3 * to + c] = v * intensity * (isHarmonic ? factors[shBand(i)]! : 1);
+          });
+      return { rest: light, peaks: undefined };
+    };
+    return { ...at(rotation), turned: (turn) => at(times(turn.elements, rotation)) };
+  }
+
+  /** Of either: lobes where there are any. */
+  of(columns: { order: number; lobes: LobeBasis | undefined }, glossy = false, most = columns.order): TurnableParts {
+    return columns.lobes ? this.partsOf(columns.lobes) : this.parts(columns.order, glossy, most);
+  }
+
+  private partsIn(R: number[], order: number, glossy: boolean, most: number): LightParts {
     const n = this.bandsOf(Math.min(order, most));
     if (this.window !== 'auto' || !this.map || n < 2) return { rest: this.coefficients(order, most), peaks: undefined };
     const whole = new Array<number>(n).fill(1),
-      rotation = this.rotationOf(n),
+      rotation = makeShRotation(n, R),
       rest = this.rest(n);
     if (!rest) return { rest: this.turned(this.radiance, rotation, whole, order), peaks: undefined };
     const peaks = rest.map((v, i) => this.radiance[i]! - v);

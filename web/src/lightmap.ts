@@ -17,14 +17,18 @@ import {
   type InterleavedBufferAttribute,
   type Material,
   type Mesh,
+  type Matrix3,
   type MeshStandardMaterial,
   type Texture,
   type WebGLProgramParametersWithUniforms,
 } from 'three';
 import { TransferValues, type BlockLayout } from './block_texture.js';
+import { readStored, type StoredValues } from './clusters.js';
 import { LambentError } from './errors.js';
 import { isIndex, isViews } from './glb.js';
 import {
+  bandsOfLight,
+  columnsOf,
   directionalRows,
   readHeader,
   readReceivers,
@@ -33,9 +37,9 @@ import {
   type TransferHeader,
 } from './header.js';
 import type { BakedTransfer, TransferSource } from './kinds.js';
-import type { Lighting } from './lighting.js';
+import type { Lighting, LightParts } from './lighting.js';
 import { fragmentDeclarations, vertexBody, vertexDeclarations } from './lightmap_glsl.js';
-import { afterAll, LightSum, LightSums, maxColumns, setPeaks } from './light_sum.js';
+import { afterAll, LightSum, LightSums, setPeaks } from './light_sum.js';
 import {
   checkNodes,
   copyNodes,
@@ -50,8 +54,7 @@ import {
 import { keepNormals } from './own_normals.js';
 import { chainHooks, diffuseParameters, replaceOnce, useExitRadiance } from './prt_material.js';
 import { drawFilter, type Drawn } from './see_through.js';
-import { shCount } from './sh.js';
-import { RestPose, TurnedSums } from './turned.js';
+import { RestPose, TurnedSums, type TurnableLight } from './turned.js';
 
 const maxSide = 16384; // of an atlas; what a graphics card takes is less, mostly, and asked of it
 
@@ -199,6 +202,7 @@ class LightmapTransfer implements BakedTransfer {
   readonly kind = 'diffuse';
   readonly isDiffuse = true;
   readonly order: number;
+  readonly columns: BakedTransfer['columns'];
   readonly channels: 1 | 3;
   readonly receivers: number;
   readonly fileBytes: number;
@@ -216,24 +220,27 @@ class LightmapTransfer implements BakedTransfer {
   private readonly glow: { emission: { value: Color }; own: Color; lamp: string }[] = [];
 
   constructor(
-    header: TransferHeader,
-    groups: string[],
-    values: ArrayBuffer,
+    private readonly header: TransferHeader,
+    { values, fileBytes }: StoredValues,
     readonly receiversOf: DataTexture,
     readonly meshes: Mesh[],
     owns: Material[],
     private readonly nodes?: NodeEdition,
     firstBands?: number,
   ) {
-    this.order = header.order;
+    this.order = bandsOfLight(header);
+    this.columns = columnsOf(header);
     this.channels = header.channels;
     this.receivers = header.receivers;
-    this.fileBytes = values.byteLength;
-    for (const name of groups) this.lamps.set(name, new Color(1, 1, 1));
+    this.fileBytes = fileBytes;
+    for (const name of header.groups) this.lamps.set(name, new Color(1, 1, 1));
     this.directional = header.directional;
-    const count = shCount(header.order) + groups.length,
-      rows = directionalRows[header.directional];
-    this.values = new TransferValues({ ...header, count, channels: rows * header.channels }, values, firstBands);
+    const rows = directionalRows[header.directional];
+    this.values = new TransferValues(
+      { ...header, count: header.columns, channels: rows * header.channels },
+      values,
+      firstBands,
+    );
     const { layout, data, texture } = this.values;
     this.layout = layout;
     this.transfer = texture;
@@ -268,7 +275,8 @@ class LightmapTransfer implements BakedTransfer {
   }
 
   private makeNodes(pose: RestPose): NodeSum | undefined {
-    const { layout, transfer, channels, receivers, order, receiversOf } = this,
+    const { layout, transfer, channels, receivers, receiversOf, header } = this,
+      { order } = header,
       rows = directionalRows[this.directional];
     return this.nodes?.sum({
       ...{ layout, transfer, channels, receivers, order, pose, rows, receiversOf },
@@ -278,7 +286,7 @@ class LightmapTransfer implements BakedTransfer {
   private makeAtlases(pose?: RestPose): TurnedSums<LightSums> {
     return new TurnedSums(
       () => new LightSums(() => this.makeAtlas(), this.eachIsLight),
-      this.order,
+      this.header.order,
       pose,
       this.layout.quads,
     );
@@ -317,11 +325,16 @@ uint prtPick( const in ivec2 texel, out int row ) {
   relight(lighting: Lighting): void {
     const lamps = [...this.lamps];
     // The scene's own lamps are in none of the peaks.
-    const { rest, peaks } = lighting.parts(this.order, false, this.firstBands);
-    const light = [...rest, ...lamps.flatMap(([, color]) => color.toArray())],
-      sharp = peaks && [...peaks, ...new Array<number>(3 * lamps.length).fill(0)];
-    this.atlas.set(light, sharp);
-    this.sum?.set(light, sharp, this.eachIsLight);
+    const own = lamps.flatMap(([, color]) => color.toArray()),
+      withOwn = ({ rest, peaks }: LightParts): { rest: number[]; peaks: number[] | undefined } => ({
+        rest: [...rest, ...own],
+        peaks: peaks && [...peaks, ...own.map(() => 0)],
+      });
+    const parts = lighting.of(this.header, false, this.firstBands),
+      { rest, peaks } = withOwn(parts),
+      turned = parts.turned && ((turn: Matrix3): TurnableLight => withOwn(parts.turned!(turn)));
+    this.atlas.set(rest, peaks, turned);
+    this.sum?.set(rest, peaks, this.eachIsLight, turned);
     // One column is of all lamps together; else materials that glow have one of their name.
     for (const { emission, own, lamp } of this.glow) {
       const scale = lamps.length === 1 ? lamps[0]![1] : this.lamps.get(lamp);
@@ -339,7 +352,7 @@ uint prtPick( const in ivec2 texel, out int row ) {
 
   coefficientMaterials(index: number, gain: { value: number }): Material[] {
     const atlas = this.makeAtlases(),
-      light = new Float64Array(3 * (shCount(this.order) + this.lamps.size)).fill(1, 3 * index, 3 * index + 3),
+      light = new Float64Array(3 * this.header.columns).fill(1, 3 * index, 3 * index + 3),
       { nodes } = this,
       sum = this.makeNodes(new RestPose([]));
     atlas.set(light, undefined);
@@ -403,13 +416,7 @@ export async function readPlacedMeshes(source: TransferSource): Promise<Mesh[]> 
 export async function loadLightmap(source: TransferSource): Promise<BakedTransfer> {
   const { extension } = source,
     header = readHeader(extension, 'texels');
-  const groups = extension.transfer['groups'] ?? [],
-    { width, height, texels } = extension.surface!;
-  if (!Array.isArray(groups) || !groups.every((name) => typeof name === 'string'))
-    throw new LambentError('"groups" is no list of names');
-  const columns = shCount(header.order) + groups.length;
-  if (columns > maxColumns)
-    throw new LambentError(`has ${columns} columns of light over an atlas, where this version draws ${maxColumns}`);
+  const { width, height, texels } = extension.surface!;
   if (!isIndex(width, maxSide) || !isIndex(height, maxSide) || width < 1 || height < 1)
     throw new LambentError('the size of the atlas is out of range');
   const map = await readReceivers(
@@ -423,9 +430,10 @@ export async function loadLightmap(source: TransferSource): Promise<BakedTransfe
   receivers.internalFormat = 'R32UI';
   receivers.minFilter = receivers.magFilter = NearestFilter;
   receivers.needsUpdate = true;
-  const values = await source.bufferView(header.bufferView),
+  const rows = directionalRows[header.directional],
+    values = await readStored(source, header, rows * header.channels * header.columns),
     meshes = await readPlacedMeshes(source),
     owns: Material[] = [];
   for (const part of extension.parts) owns.push(await source.ownMaterial(part));
-  return new LightmapTransfer(header, groups, values, receivers, meshes, owns, source.nodes, source.firstBands);
+  return new LightmapTransfer(header, values, receivers, meshes, owns, source.nodes, source.firstBands);
 }

@@ -15,8 +15,9 @@ import {
   type WebGLProgramParametersWithUniforms,
 } from 'three';
 import { TransferValues, type BlockLayout } from './block_texture.js';
+import { readStored, type StoredValues } from './clusters.js';
 import { LambentError } from './errors.js';
-import { readHeader, type TransferHeader } from './header.js';
+import { bandsOfLight, columnsOf, readHeader, type TransferHeader } from './header.js';
 import { glslInstances } from './instanced.js';
 import { limits, type BakedTransfer, type TransferKind, type TransferSource } from './kinds.js';
 import type { Lighting } from './lighting.js';
@@ -48,7 +49,6 @@ import {
 } from './node_edition.js';
 import { diffuseParameters, replaceOnce, useExitRadiance } from './prt_material.js';
 import { drawFilter, type Drawn } from './see_through.js';
-import { shCount } from './sh.js';
 import { RestPose, TurnedSums } from './turned.js';
 import { bindPart } from './vertex_transfer.js';
 
@@ -140,8 +140,8 @@ class MatrixMaterial extends MeshBasicMaterial {
 }
 
 class MatrixTransfer implements BakedTransfer {
-  readonly kind = 'matrix';
   readonly order: number;
+  readonly columns: BakedTransfer['columns'];
   readonly channels: 1 | 3;
   readonly receivers: number;
   readonly fileBytes: number;
@@ -156,19 +156,21 @@ class MatrixTransfer implements BakedTransfer {
   private readonly refusal: string | undefined; // why that does not draw this
 
   constructor(
-    header: TransferHeader,
+    readonly kind: string,
+    private readonly header: TransferHeader,
     private readonly shared: LastReflection,
-    values: ArrayBuffer,
+    { values, fileBytes }: StoredValues,
     readonly meshes: Mesh[],
     private readonly nodes?: NodeEdition,
     firstBands?: number,
   ) {
-    this.order = header.order;
+    this.order = bandsOfLight(header);
+    this.columns = columnsOf(header);
     this.channels = header.channels;
     this.receivers = header.receivers;
-    this.fileBytes = values.byteLength;
+    this.fileBytes = fileBytes;
     this.values = new TransferValues(
-      { ...header, count: shCount(header.order), channels: shared.rows * header.channels },
+      { ...header, count: header.columns, channels: shared.rows * header.channels },
       values,
       firstBands,
     );
@@ -198,12 +200,13 @@ class MatrixTransfer implements BakedTransfer {
   }
 
   private makeNodes(pose: RestPose): NodeSum | undefined {
-    const { layout, transfer, channels, receivers, order, shared } = this;
+    const { layout, transfer, channels, receivers, header, shared } = this,
+      { order } = header;
     return this.nodes?.sum({ layout, transfer, channels, receivers, order, pose, rows: shared.rows, apart: true });
   }
 
   private makeSums(pose?: RestPose): TurnedSums<LightSums> {
-    return new TurnedSums(() => new LightSums(() => this.makeSum(), false), this.order, pose, this.layout.quads);
+    return new TurnedSums(() => new LightSums(() => this.makeSum(), false), this.header.order, pose, this.layout.quads);
   }
 
   private makeSum(): LightSum {
@@ -247,9 +250,9 @@ uint prtPick( const in ivec2 texel, out int row ) {
   }
 
   relight(lighting: Lighting): void {
-    const { rest, peaks } = lighting.parts(this.order, true, this.firstBands);
-    this.sums.set(rest, peaks);
-    this.sum?.set(rest, peaks, false);
+    const { rest, peaks, turned } = lighting.of(this.header, true, this.firstBands);
+    this.sums.set(rest, peaks, turned);
+    this.sum?.set(rest, peaks, false, turned);
     for (const material of this.materials.values()) setPeaks(material, peaks !== undefined);
   }
 
@@ -262,7 +265,7 @@ uint prtPick( const in ivec2 texel, out int row ) {
 
   coefficientMaterials(index: number, gain: { value: number }): Material[] {
     const sums = this.makeSums(),
-      light = new Float64Array(3 * shCount(this.order)).fill(1, 3 * index, 3 * index + 3),
+      light = new Float64Array(3 * this.header.columns).fill(1, 3 * index, 3 * index + 3),
       { nodes, shared } = this,
       sum = this.makeNodes(new RestPose([], true));
     sums.set(light, undefined);
@@ -302,18 +305,34 @@ uint prtPick( const in ivec2 texel, out int row ) {
   }
 }
 
+/** Throws LambentError where so many rows are more than a texture holds. */
+export function checkRows({ channels, columns }: TransferHeader, rows: number): void {
+  if (rows * channels * Math.ceil(columns / 4) > limits.texels)
+    throw new LambentError(
+      `has ${rows} rows of ${columns} columns, more than textures hold; "lambent render" draws it`,
+    );
+}
+
+/** Of a header that says what is drawn; `read` has its values, of a last reflection that was read before. */
+export async function loadMatrix(
+  source: TransferSource,
+  header: TransferHeader,
+  kind: string,
+  read: (shared: LastReflection) => Promise<StoredValues>,
+): Promise<BakedTransfer> {
+  const shared = await loadLastReflection(source, header.receivers),
+    values = await read(shared),
+    meshes = await Promise.all(source.extension.parts.map((part) => bindPart(source, part, header.receivers)));
+  return new MatrixTransfer(kind, header, shared, values, meshes, source.nodes, source.firstBands);
+}
+
 async function load(source: TransferSource): Promise<BakedTransfer> {
   const header = readHeader(source.extension),
-    { rows } = readOutgoing(source.extension.transfer),
-    { receivers } = header;
-  if (rows * header.channels * Math.ceil(shCount(header.order) / 4) > limits.texels)
-    throw new LambentError(
-      `has ${rows} rows of order ${header.order}, more than textures hold; "lambent render" draws it`,
-    );
-  const shared = await loadLastReflection(source, receivers);
-  const values = await source.bufferView(header.bufferView);
-  const meshes = await Promise.all(source.extension.parts.map((part) => bindPart(source, part, receivers)));
-  return new MatrixTransfer(header, shared, values, meshes, source.nodes, source.firstBands);
+    { rows } = readOutgoing(source.extension.transfer);
+  checkRows(header, rows);
+  return loadMatrix(source, header, 'matrix', () =>
+    readStored(source, header, rows * header.channels * header.columns),
+  );
 }
 
 export const matrixKind: TransferKind = { name: 'matrix', load };

@@ -21,7 +21,7 @@ import type { Directional } from './header.js';
 import type { LastReflection } from './outgoing.js';
 import { keepNormals } from './own_normals.js';
 import type { TransferTexture } from './transfer_texture.js';
-import type { RestPose } from './turned.js';
+import type { RestPose, TurnableLight } from './turned.js';
 
 /** WebGPURenderer, with either of its backends, as far as it is asked what it can do. */
 export interface NodeRenderer {
@@ -34,8 +34,16 @@ export const isNodeRenderer = (renderer: Renderer): renderer is NodeRenderer =>
 
 /** T . light as a picture, drawn once for each light. */
 export interface NodeSum {
-  /** [column][3]; without peaks all of the light. With peaks both parts are held at 0 or above, where `holds`. */
-  set(light: ArrayLike<number>, peaks: ArrayLike<number> | undefined, holds: boolean): void;
+  /**
+   * [column][3]; without peaks all of the light. With peaks both parts are held at 0 or above, where `holds`. `turned`
+   * of light that is more than harmonics: TurnableLight's.
+   */
+  set(
+    light: ArrayLike<number>,
+    peaks: ArrayLike<number> | undefined,
+    holds: boolean,
+    turned?: TurnableLight['turned'],
+  ): void;
   readonly bytes: number;
   dispose(): void;
 }

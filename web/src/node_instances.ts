@@ -44,8 +44,8 @@ export class InstanceNodes {
     );
   }
 
-  set(light: ArrayLike<number>, peaks: ArrayLike<number> | undefined): void {
-    this.lights.set(light, peaks);
+  set(...[light, peaks, turned]: Parameters<InstancedLights['set']>): void {
+    this.lights.set(light, peaks, turned);
     this.hasPeaks.value = peaks ? 1 : 0;
   }
 

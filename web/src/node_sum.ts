@@ -35,7 +35,7 @@ import { InstanceNodes } from './node_instances.js';
 import { loop } from './node_loop.js';
 import type { NodeSum, NodeSumOptions } from './node_edition.js';
 import { isInstanced } from './instanced.js';
-import { Alike, lightFor } from './turned.js';
+import { Alike, lightIn, type TurnableLight } from './turned.js';
 
 /** Rows of receivers a row of the picture. */
 export const sumColumns = 2048;
@@ -77,11 +77,7 @@ function pick({ receiversOf, rows = 1 }: NodeSumOptions, whose: DataTexture | un
   return [i.div(int(rows)).toVar(), i.mod(int(rows)).toVar()];
 }
 
-/** [column][3] */
-interface Light {
-  rest: ArrayLike<number>;
-  peaks: ArrayLike<number> | undefined;
-}
+type Light = Omit<TurnableLight, 'turned'>;
 /** Of a mesh that was turned: the light as it stands in the axes of the bake. */
 interface Turned {
   how: readonly number[];
@@ -105,7 +101,7 @@ export class Sum implements NodeSum {
   readonly turnBack: Node<'mat3'>;
   /** Of instances, whose light their vertices sum. */
   readonly instances: InstanceNodes;
-  private light: Light = { rest: [], peaks: undefined };
+  private light: TurnableLight = { rest: [], peaks: undefined };
   private readonly turned = new Alike<Turned>(() => ({
     how: [],
     of: undefined,
@@ -211,18 +207,17 @@ export class Sum implements NodeSum {
     const { light, options } = this,
       turn = options.pose.turnOf(object);
     if (!turn) return undefined;
-    const { how, made } = this.turned.get(object, turn.elements),
-      by = (of: ArrayLike<number>): Float64Array => lightFor(turn, of, options.order);
+    const { how, made } = this.turned.get(object, turn.elements);
     if (made.of === light && made.how === how) return made;
-    made.light = { rest: by(light.rest), peaks: light.peaks && by(light.peaks) };
+    made.light = lightIn(turn, light, options.order);
     made.how = how;
     made.of = light;
     return made;
   }
 
-  set(light: ArrayLike<number>, peaks: ArrayLike<number> | undefined, holds: boolean): void {
-    this.light = { rest: light, peaks };
-    this.instances.set(light, peaks);
+  set(...[light, peaks, holds, turned]: Parameters<NodeSum['set']>): void {
+    this.light = { rest: light, peaks, turned };
+    this.instances.set(light, peaks, turned);
     this.holds.value = peaks && holds ? 1 : 0;
     this.hasPeaks.value = peaks ? 1 : 0;
     if (peaks) for (const main of this.mains) main.setSize(this.width, this.height);

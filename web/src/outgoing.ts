@@ -231,10 +231,12 @@ export function readOutgoing(transfer: TransferSource['extension']['transfer']):
   rows: number;
   views: Record<string, unknown>;
 } {
-  const { rows, outgoing: given } = transfer;
+  const given = transfer['outgoing'];
   if (typeof given !== 'object' || given === null) throw new LambentError('holds a matrix and no "outgoing"');
   const views = given as Record<string, unknown>,
-    { kind, order, hasB, grid, mapCount } = views;
+    { kind, order, hasB, grid, mapCount } = views,
+    // Factors are multiplied by the light, to rows of the map's basis.
+    rows = transfer.kind === 'factors' ? Number(order) ** 2 : transfer['rows'];
   if (!isKind(kind))
     throw new LambentError(`holds the outgoing basis "${String(kind)}", which this version does not know`);
   if (!isIndex(order, maxShOrder) || order < 1) throw new LambentError('the outgoing "order" is out of range');

@@ -45,6 +45,14 @@ function columnFactors(order: number, width: number, split: number): Float64Arra
  * command-line tool.
  */
 export function projectLatLong(map: LatLongMap, order: number): Float64Array {
+  const own = projectAboutPole(map, order),
+    light = new Float64Array(own.length);
+  rotateSh(makeShRotation(order, poleToZ), own, light);
+  return light;
+}
+
+/** The same with +Y as the pole: of harmonics at (z, x, y). */
+export function projectAboutPole(map: LatLongMap, order: number): Float64Array {
   const { data, width, height, channels } = map;
   const split = Math.max(1, Math.ceil(1024 / width));
   const columns = columnFactors(order, width, split);
@@ -96,7 +104,5 @@ export function projectLatLong(map: LatLongMap, order: number): Float64Array {
       }
     }
   }
-  const light = new Float64Array(own.length);
-  rotateSh(makeShRotation(order, poleToZ), own, light);
-  return light;
+  return own;
 }

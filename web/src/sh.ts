@@ -4,6 +4,8 @@
 // from powers of (x + iy), so that no angle is computed.
 
 export const maxShOrder = 16;
+/** Bands that the recurrences are tabled for: of light that lobes are cut out of. */
+export const tabledOrder = 48;
 
 export const shCount = (order: number): number => order * order;
 export const shIndex = (l: number, m: number): number => l * (l + 1) + m;
@@ -30,7 +32,7 @@ export interface LegendreFactors {
 export const legendre: LegendreFactors = (() => {
   const diagonal: number[] = [];
   let q = Math.sqrt(1 / (4 * Math.PI));
-  for (let m = 0; m < maxShOrder; ++m) {
+  for (let m = 0; m < tabledOrder; ++m) {
     diagonal.push(q * (m > 0 ? Math.SQRT2 : 1) * (m % 2 ? -1 : 1));
     q *= Math.sqrt((2 * m + 3) / (2 * m + 2));
   }
@@ -38,13 +40,13 @@ export const legendre: LegendreFactors = (() => {
   const b = (l: number, m: number): number =>
     l > m + 1 ? -Math.sqrt(((2 * l + 1) * ((l - 1) ** 2 - m * m)) / ((2 * l - 3) * (l * l - m * m))) : 0;
   const table = (f: (l: number, m: number) => number): Float64Array => {
-    const values = new Float64Array(maxShOrder * maxShOrder);
-    for (let l = 1; l < maxShOrder; ++l) for (let m = 0; m < l; ++m) values[l * maxShOrder + m] = f(l, m);
+    const values = new Float64Array(tabledOrder * tabledOrder);
+    for (let l = 1; l < tabledOrder; ++l) for (let m = 0; m < l; ++m) values[l * tabledOrder + m] = f(l, m);
     return values;
   };
   const tableA = table(a),
     tableB = table(b);
-  return { diagonal, a: (l, m) => tableA[l * maxShOrder + m]!, b: (l, m) => tableB[l * maxShOrder + m]! };
+  return { diagonal, a: (l, m) => tableA[l * tabledOrder + m]!, b: (l, m) => tableB[l * tabledOrder + m]! };
 })();
 
 /** Values of the first order^2 harmonics at the unit direction (x, y, z), into out. */

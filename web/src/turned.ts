@@ -96,6 +96,21 @@ export class Alike<E> {
   }
 }
 
+/** [column][3] of light, and of its peaks where those count apart. */
+export interface TurnableLight {
+  rest: ArrayLike<number>;
+  peaks: ArrayLike<number> | undefined;
+  /** In axes that were turned so; harmonics are turned as they are, lamps stay. */
+  turned?: ((turn: Matrix3) => Omit<TurnableLight, 'turned'>) | undefined;
+}
+
+/** A light in the axes of what was turned. */
+export const lightIn = (turn: Matrix3, light: TurnableLight, order: number): Omit<TurnableLight, 'turned'> =>
+  light.turned?.(turn) ?? {
+    rest: lightFor(turn, light.rest, order),
+    peaks: light.peaks && lightFor(turn, light.peaks, order),
+  };
+
 /** [column][3]: harmonics of the world, as many as there are, in the axes of what was turned; lamps stay. */
 export function lightFor(turn: Matrix3, light: ArrayLike<number>, order: number): Float64Array {
   const out = Float64Array.from(light);
@@ -116,11 +131,6 @@ export interface Sums {
 
 const upright = new Matrix3();
 
-interface Light {
-  rest: ArrayLike<number>;
-  peaks: ArrayLike<number> | undefined;
-}
-
 /** Sums of a light, and of the same light for each mesh that was turned. */
 export class TurnedSums<S extends Sums> {
   readonly main: S;
@@ -131,8 +141,8 @@ export class TurnedSums<S extends Sums> {
   readonly turnBack = { value: new Matrix3() };
   /** Of what follows each instance of an InstancedMesh. */
   readonly instances: InstancedLights | undefined;
-  private light: Light | undefined;
-  private readonly turned: Alike<{ sums: S; how: readonly number[]; of: Light | undefined }>;
+  private light: TurnableLight | undefined;
+  private readonly turned: Alike<{ sums: S; how: readonly number[]; of: TurnableLight | undefined }>;
 
   /** `order` of the light's harmonics; `quads` of it a channel, where shaders sum up for each instance. */
   constructor(
@@ -152,10 +162,10 @@ export class TurnedSums<S extends Sums> {
     return this.main.hasPeaks;
   }
 
-  set(rest: ArrayLike<number>, peaks: ArrayLike<number> | undefined): void {
-    this.light = { rest, peaks };
+  set(rest: ArrayLike<number>, peaks: ArrayLike<number> | undefined, turned?: TurnableLight['turned']): void {
+    this.light = { rest, peaks, turned };
     this.main.set(rest, peaks);
-    this.instances?.set(rest, peaks);
+    this.instances?.set(rest, peaks, turned);
   }
 
   /** Before `object` is drawn. */
@@ -181,7 +191,8 @@ export class TurnedSums<S extends Sums> {
     const { light, order } = this,
       { how, made } = this.turned.get(object, turn.elements);
     if (light && (made.of !== light || made.how !== how)) {
-      made.sums.set(lightFor(turn, light.rest, order), light.peaks && lightFor(turn, light.peaks, order));
+      const { rest, peaks } = lightIn(turn, light, order);
+      made.sums.set(rest, peaks);
       made.how = how;
       made.of = light;
     }

@@ -15,9 +15,10 @@ import {
   type SkinnedMesh,
 } from 'three';
 import { TransferValues } from './block_texture.js';
+import { readStored, type StoredValues } from './clusters.js';
 import { LambentError } from './errors.js';
 import type { TransferExtension } from './glb.js';
-import { noReceiver, readReceivers, shareGeometry, type TransferHeader } from './header.js';
+import { bandsOfLight, columnsOf, noReceiver, readReceivers, shareGeometry, type TransferHeader } from './header.js';
 import type { BakedTransfer, TransferSource } from './kinds.js';
 import type { Lighting } from './lighting.js';
 import {
@@ -130,12 +131,14 @@ export class VertexTransfer implements BakedTransfer {
   readonly kind: string;
   readonly isDiffuse: boolean;
   readonly order: number;
+  readonly columns: BakedTransfer['columns'];
   readonly channels: number;
   readonly receivers: number;
   readonly fileBytes: number;
   readonly gpuBytes: number;
   readonly lobesAt?: NonNullable<BakedTransfer['lobesAt']>;
   readonly fitErrorMaterials?: NonNullable<BakedTransfer['fitErrorMaterials']>;
+  private readonly light: TransferHeader;
   private readonly last: LastReflection | undefined;
   private errors: DataTexture | undefined;
   private readonly values: TransferValues;
@@ -157,17 +160,19 @@ export class VertexTransfer implements BakedTransfer {
   private constructor(
     header: TransferHeader,
     { kind, count, valueChannels, shader, readLobes, fitErrors, last, lobeCount }: VertexKind,
-    values: ArrayBuffer,
+    { values, fileBytes }: StoredValues,
     readonly meshes: Mesh[],
     private readonly nodes?: NodeEdition,
     firstBands?: number,
   ) {
     this.kind = kind;
     this.isDiffuse = last === undefined;
-    this.order = header.order;
+    this.order = bandsOfLight(header);
+    this.columns = columnsOf(header);
+    this.light = header;
     this.channels = header.channels;
     this.receivers = header.receivers;
-    this.fileBytes = values.byteLength;
+    this.fileBytes = fileBytes;
     this.values = new TransferValues(
       { count, channels: valueChannels, precision: header.precision, receivers: header.receivers },
       values,
@@ -175,7 +180,7 @@ export class VertexTransfer implements BakedTransfer {
     );
     const { layout, data, texture } = this.values;
     this.last = last;
-    this.quads = Math.ceil(shCount(header.order) / 4);
+    this.quads = shader.summed ? layout.quads : Math.ceil(shCount(header.order) / 4);
     this.texture = texture;
     this.uniforms = {
       prtTransfer: { value: this.texture },
@@ -294,7 +299,7 @@ export class VertexTransfer implements BakedTransfer {
 
   /** Reads values and receivers, and dresses the meshes. */
   static async load(source: TransferSource, header: TransferHeader, kind: VertexKind): Promise<VertexTransfer> {
-    const values = await source.bufferView(header.bufferView);
+    const values = await readStored(source, header, kind.valueChannels * kind.count);
     const meshes = await Promise.all(source.extension.parts.map((part) => bindPart(source, part, header.receivers)));
     return new VertexTransfer(header, kind, values, meshes, source.nodes, source.firstBands);
   }
@@ -329,12 +334,12 @@ export class VertexTransfer implements BakedTransfer {
   }
 
   relight(lighting: Lighting): void {
-    const { rest, peaks } = lighting.parts(this.order, this.last !== undefined, this.firstBands);
+    const { rest, peaks, turned } = lighting.of(this.light, this.last !== undefined, this.firstBands);
     packLight(this.uniforms.prtLight.value, rest);
     if (peaks) packLight(this.uniforms.prtPeaks.value, peaks);
     this.uniforms.prtHasPeaks.value = peaks !== undefined; // materials take it when they are drawn
-    this.sums?.set(rest, peaks);
-    this.sum?.set(rest, peaks, true);
+    this.sums?.set(rest, peaks, turned);
+    this.sum?.set(rest, peaks, true, turned);
     this.lobes?.set(rest, peaks);
   }
 
@@ -346,9 +351,10 @@ export class VertexTransfer implements BakedTransfer {
   }
 
   coefficientMaterials(index: number, gain: { value: number }): Material[] {
-    const light = new Float64Array(3 * shCount(this.order)).fill(1, 3 * index, 3 * index + 3);
+    const light = new Float64Array(3 * this.light.columns).fill(1, 3 * index, 3 * index + 3);
     const { summing } = this,
-      sums = summing && new TurnedSums(() => new VertexSums(summing), this.order, undefined, summing.layout.quads);
+      sums =
+        summing && new TurnedSums(() => new VertexSums(summing), this.light.order, undefined, summing.layout.quads);
     sums?.set(light, undefined);
     if (sums) this.ofCoefficients.add(sums);
     const uniforms = {

@@ -143,6 +143,7 @@ export const zonalKind: TransferKind = {
   load: async (source) => {
     const header = readHeader(source.extension),
       lobes = source.extension.transfer['lobeCount'];
+    if (header.lobes) throw new LambentError('holds zonal transfer of light that is more than harmonics');
     if (!isIndex(lobes, maxLobes) || lobes < 1) throw new LambentError('"lobeCount" is out of range');
     const { order, channels } = header,
       errors = source.extension.transfer['fitErrors'];

@@ -219,10 +219,9 @@ describe('files that are not what they should be', () => {
     const read = (more: object, surface?: { kind: string }) => () =>
       readHeader({ version: 1, transfer: { ...header, ...more }, parts: [], ...(surface && { surface }) });
     expect(read({})()).toMatchObject({ order: 3, channels: 1, receivers: 5 });
-    expect(read({ lobes: [[0, 0, 1, 50]] })).toThrow(/lobes of light/);
+    expect(read({ order: 16, lobes: [[0, 0, 1, 50]], lobeKind: 'compact' })).toThrow(/257 columns of light/);
     expect(read({ groups: ['all'] })).toThrow(/own lamps/);
     expect(read({ directional: 'hl2' })).toThrow(/directional light \("hl2"\)/);
-    expect(read({ cpca: { clusters: 4 } })).toThrow(/clusters \(--compress cpca\)/);
     expect(read({}, { kind: 'patches' })).toThrow(/over patches/);
     expect(read({ order: 0 })).toThrow(/"order"/);
   });

@@ -149,12 +149,24 @@ describe('a lattice', () => {
 });
 
 describe.skipIf(!haveTool)("a file's lattice", () => {
-  it('is lit as the command-line tool lights its probes for three.js', async () => {
+  const light = (folder: string, lamps: boolean): string[] =>
+    lamps ? ['--light', `sh:3+lamps:2@${join(folder, 'light.hdr')}`] : ['--order', '4'];
+  it.each([false, true])('is lit as the command-line tool lights its probes for three.js; lamps: %s', async (lamps) => {
     const folder = makeFolder(),
       at = (name: string): string => join(folder, name);
     writeLopsidedHdr(at('light.hdr'));
     const room = writeRoom(folder);
-    const bake = ['--samples', '16', '--bounces', '1', '--order', '4', '--lattice', '4,3,5', '--lattice-order', '3'];
+    const bake = [
+      '--samples',
+      '16',
+      '--bounces',
+      '1',
+      ...light(folder, lamps),
+      '--lattice',
+      '4,3,5',
+      '--lattice-order',
+      '3',
+    ];
     lambent('bake', room, ...bake, '-o', at('free.glb'));
     lambent('bake', room, '--receivers', 'texels', '--texels-per-unit', '1', '--samples', '4', '-o', at('flat.glb'));
     lambent(

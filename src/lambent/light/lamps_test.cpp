@@ -2,10 +2,15 @@
 #include <lambent/light/lamps.h>
 #include <lambent/light/project.h>
 #include <lambent/light/sky.h>
+#include <lambent/relight/light.h>
 
 #include "sanitizers.h"
 
 #include <gtest/gtest.h>
+#include <nlohmann/json.hpp>
+
+#include <filesystem>
+#include <fstream>
 
 namespace lambent {
 namespace {
@@ -200,6 +205,34 @@ TEST(ProjectLobes, ReconstructsEnergyAtAnyWidth) {
       EXPECT_NEAR(sum / lobe_integral(LobeKind::von_mises_fisher, max_sharpness), 1, 1e-5) << width;
       EXPECT_EQ(env.image.width, width ? width : 4096);
     }
+  }
+}
+
+// What the page is held against (web/test/lobes_of_light.test.ts): a map by a formula, turned, on bases of each kind.
+TEST(ProjectLobes, AreThoseThatThePageIsHeldAgainst) {
+  Environment env = make_environment("formula", 96, 48, [](Vec3) { return Vec3(0); });
+  for (int y = 0; y < 48; ++y)
+    for (int x = 0; x < 96; ++x) {
+      const float v = float((7 * x + 13 * y) % 17) / 17;
+      env.image.at(x, y) = Vec3(0.2f + v, 0.3f + 0.5f * v, 0.1f + float((5 * x + 3 * y) % 11) / 11);
+      if (x >= 70 && x < 73 && y >= 12 && y < 14) env.image.at(x, y) = Vec3(40, 30, 20);
+    }
+  const auto path = std::filesystem::path(__FILE__).parent_path() / "../../../tests/golden/lobes_of_light.json";
+  nlohmann::json golden;
+  if (std::ifstream in(path); in) golden = nlohmann::json::parse(in);
+  ASSERT_EQ(golden["cases"].size(), 7u);
+  for (auto& item : golden["cases"]) {
+    const auto kind = LobeKind(std::find(std::begin(lobe_names), std::end(lobe_names), item["lobeKind"]) - lobe_names);
+    LightBasis columns{.order = item["order"], .lobe_kind = kind};
+    for (const auto& l : item["lobes"]) columns.lobes.push_back({Vec3(l[0], l[1], l[2]), l[3]});
+    const auto light =
+        project_light(env, columns, rotation_from_yaw_pitch_roll({40, -25, 70}), 0, ShWindow::none).light;
+    nlohmann::json found = nlohmann::json::array();
+    for (const Vec3& c : light) found.push_back({c.x, c.y, c.z});
+    const auto& kept = item["coefficients"];
+    EXPECT_EQ(kept.size(), light.size()) << found.dump();
+    for (size_t i = 0; i < std::min(kept.size(), light.size()); ++i)
+      for (int c = 0; c < 3; ++c) EXPECT_NEAR(kept[i][size_t(c)].get<float>(), light[i][c], 1e-4f) << i;
   }
 }
 

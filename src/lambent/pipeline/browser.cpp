@@ -12,9 +12,11 @@ namespace lambent {
 namespace {
 
 constexpr DrawnKind kinds[] = {
-    {"dense", "diffuse", "vertices"},  {"dense", "diffuse", "texels"},     {"dense", "directional", "texels"},
-    {"dense", "outgoing", "vertices"}, {"lobes", "diffuse", "vertices"},   {"lobes", "outgoing", "vertices"},
-    {"blocks", "sight", "vertices"},   {"surfels", "diffuse", "vertices"}, {"surfels", "diffuse", "texels"},
+    {"dense", "diffuse", "vertices"},      {"dense", "diffuse", "texels"},       {"dense", "directional", "texels"},
+    {"dense", "outgoing", "vertices"},     {"clusters", "diffuse", "vertices"},  {"clusters", "diffuse", "texels"},
+    {"clusters", "directional", "texels"}, {"clusters", "outgoing", "vertices"}, {"factors", "outgoing", "vertices"},
+    {"lobes", "diffuse", "vertices"},      {"lobes", "outgoing", "vertices"},    {"blocks", "sight", "vertices"},
+    {"surfels", "diffuse", "vertices"},    {"surfels", "diffuse", "texels"},
 };
 
 // What a kind that is not drawn is, for those who made it.
@@ -24,8 +26,6 @@ std::string why_not(const Field& field) {
   if (std::holds_alternative<HaarTransfer>(field.store)) return "holds transfer in wavelets";
   if (std::holds_alternative<IndirectTransfer>(field.store))
     return string("holds direct-to-indirect transport that is ") + name_of(field.rows) + ", at " + name_of(field.where);
-  if (std::holds_alternative<CpcaTransfer>(field.store)) return "holds clusters";
-  if (std::holds_alternative<FactoredTransfer>(field.store)) return "holds factors";
   if (std::holds_alternative<DirectionalRows>(field.rows))
     return string("holds directional rows at ") + name_of(field.where);
   return string("holds ") + name_of(field.store) + " transfer, " + name_of(field.rows) + ", at " + name_of(field.where);
@@ -44,22 +44,26 @@ Result<void> check_for_browser(const Field& field, const std::string& path) {
                    [&](const DrawnKind& k) { return store == k.store && rows == k.rows && where == k.where; }))
     return refuse(why_not(field));
   const LightBasis light = light_of(field.store);
-  if (!light.lobes.empty()) return refuse("holds lobes of light");
   if (const Outgoing* outgoing = outgoing_of(field); outgoing && outgoing->kind == OutgoingKind::directional)
     return refuse("holds a last reflection of compact lobes");
   const bool texels = std::holds_alternative<TexelPlacement>(field.where);
   if (!light.groups.empty() && !texels) return refuse("holds the light of lamps at vertices");
-  if (texels && light.count() > max_drawn_columns)
+  if (light.count() > max_drawn_columns)
     return refuse(fmt::format("has {} columns of light, more than {}", light.count(), max_drawn_columns));
   if (const auto* lobes = std::get_if<ZonalTransfer>(&field.store);
       lobes && outgoing_of(field) && size_t(lobes->rows) * size_t(lobes->lobes) > max_drawn_lobes)
     return refuse(
         fmt::format("has {} rows of {} lobes, more than {} in all", lobes->rows, lobes->lobes, max_drawn_lobes));
-  if (const auto* dense = std::get_if<Transfer>(&field.store); dense && outgoing_of(field)) {
-    const size_t texels_needed = size_t(dense->rows) * size_t(dense->channels) * ((dense->columns() + 3) / 4);
-    if (texels_needed > max_drawn_texels)
-      return refuse(fmt::format("has {} rows of {} columns, more than a texture holds", dense->rows, dense->columns()));
-  }
+  const size_t rows_drawn = size_t(rows_relit(field.store)), channels = size_t(channels_of(field.store)),
+               columns = light.count();
+  if (outgoing_of(field) && !std::holds_alternative<ZonalTransfer>(field.store) &&
+      rows_drawn * channels * ((columns + 3) / 4) > max_drawn_texels)
+    return refuse(fmt::format("has {} rows of {} columns, more than a texture holds", rows_drawn, columns));
+  const size_t receivers = receivers_of(field.store), values = rows_drawn * channels * columns;
+  if ((std::holds_alternative<CpcaTransfer>(field.store) || std::holds_alternative<FactoredTransfer>(field.store)) &&
+      receivers > max_drawn_unfolded / 2 / std::max<size_t>(values, 1))
+    return refuse(fmt::format("has {} receivers of {} values, more than {} MiB once unfolded", receivers, values,
+                              max_drawn_unfolded >> 20));
   return {};
 }
 

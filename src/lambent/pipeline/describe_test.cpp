@@ -86,9 +86,10 @@ TEST(Browser, DrawsWhatThePageSaysThatItDraws) {
   for (const DrawnKind& kind : drawn_kinds()) ours.insert(std::string(kind.store) + " " + kind.rows + " " + kind.where);
   EXPECT_EQ(page, ours);
   EXPECT_EQ(page.size(), drawn_kinds().size());
-  for (const auto& [name, value] : {std::pair("columns", max_drawn_columns), std::pair("lobes", max_drawn_lobes),
-                                    std::pair("texels", max_drawn_texels), std::pair("lamps", max_drawn_lamps),
-                                    std::pair("ownLamps", max_drawn_own_lamps)}) {
+  for (const auto& [name, value] :
+       {std::pair("columns", max_drawn_columns), std::pair("lobes", max_drawn_lobes),
+        std::pair("texels", max_drawn_texels), std::pair("lamps", max_drawn_lamps),
+        std::pair("ownLamps", max_drawn_own_lamps), std::pair("unfolded", max_drawn_unfolded)}) {
     std::smatch found;
     ASSERT_TRUE(std::regex_search(source, found, std::regex("limits = \\{[^}]*\\b" + std::string(name) + ": (\\d+)")))
         << name;
@@ -148,14 +149,26 @@ TEST(Browser, RefusesAllElseByName) {
     return ok ? std::string() : ok.error().message;
   };
   const auto has = [](const std::string& text, const char* part) { return text.find(part) != std::string::npos; };
-  EXPECT_TRUE(has(why(VertexPlacement{}, CpcaTransfer{}, DiffuseRows{}), "clusters"));
+  EXPECT_TRUE(has(why(PatchPlacement{}, CpcaTransfer{}, DiffuseRows{}), "clusters transfer, diffuse, at patches"));
+  const CpcaTransfer many{.light = {.order = 4}, .rows = 16, .receivers = size_t(1) << 20};
+  EXPECT_EQ(why(VertexPlacement{}, many, Outgoing{}), "");
+  CpcaTransfer more = many;
+  ++more.receivers;
+  EXPECT_TRUE(has(why(VertexPlacement{}, more, Outgoing{}), "more than 512 MiB once unfolded"));
   EXPECT_TRUE(has(why(FixedView{}, Transfer{}, PixelRows{}), "fixed view"));
   EXPECT_TRUE(has(why(VertexPlacement{}, HaarTransfer{}, DiffuseRows{}), "wavelets"));
   EXPECT_EQ(why(VertexPlacement{}, Visibility{}, SightRows{}), "");
   EXPECT_TRUE(has(why(PatchPlacement{}, IndirectTransfer{}, DiffuseRows{}),
                   "direct-to-indirect transport that is diffuse, at patches"));
-  EXPECT_TRUE(has(why(VertexPlacement{}, FactoredTransfer{}, Outgoing{}), "factors"));
-  EXPECT_TRUE(has(why(VertexPlacement{}, Transfer{{.lobes = {{}}}}, DiffuseRows{}), "lobes of light"));
+  const FactoredTransfer factors{Transfer{{.order = 9}, 1, 1, size_t(1) << 20}, 5};  // 25 rows of 25 columns
+  EXPECT_TRUE(has(why(VertexPlacement{}, factors, Outgoing{}), "625 values, more than 512 MiB once unfolded"));
+  EXPECT_TRUE(has(why(VertexPlacement{}, FactoredTransfer{Transfer{{.order = 16}, 1, 1, 1}, 8}, DiffuseRows{}),
+                  "factors transfer, diffuse"));
+  LightBasis lobes{.order = 15, .lobes = std::vector<Lobe>(31)};
+  EXPECT_EQ(why(VertexPlacement{}, Transfer{lobes}, DiffuseRows{}), "");
+  EXPECT_EQ(why(TexelPlacement{}, CpcaTransfer{.light = lobes}, DiffuseRows{}), "");
+  lobes.lobes.emplace_back();
+  EXPECT_TRUE(has(why(VertexPlacement{}, Transfer{lobes}, DiffuseRows{}), "257 columns"));
   EXPECT_TRUE(has(why(VertexPlacement{}, Transfer{{.groups = {"a"}}}, DiffuseRows{}), "lamps"));
   EXPECT_EQ(why(TexelPlacement{}, Transfer{{.groups = {"a"}}}, DiffuseRows{}), "");
   EXPECT_TRUE(has(why(TexelPlacement{}, Transfer{{.order = 16, .groups = {"a"}}}, DiffuseRows{}), "257 columns"));
