@@ -25,7 +25,9 @@ function rowsOf({ transfer: t, provenance }: BakedScene): [string, string][] {
         ? 'direct to indirect light'
         : t.reflection
           ? 'visibility in blocks'
-          : `${t.kind}, order ${t.order}, ${t.channels === 3 ? 'colour' : 'grey'}`,
+          : t.terms !== undefined
+            ? 'wavelets on a cube'
+            : `${t.kind}, order ${t.order}, ${t.channels === 3 ? 'colour' : 'grey'}`,
     ],
     ['Receivers', t.receivers.toLocaleString('en')],
     ['Vertices', t.meshes.reduce((n, m) => n + m.geometry.getAttribute('position').count, 0).toLocaleString('en')],

@@ -53,7 +53,7 @@ import { drawFilter, type Drawn } from './see_through.js';
 import { shCount } from './sh.js';
 import { RestPose, TurnedSums } from './turned.js';
 
-const maxSide = 16384; // of an atlas; what a graphics card takes is less, mostly, and asked of it
+export const maxSide = 16384; // of an atlas; what a graphics card takes is less, mostly, and asked of it
 
 /** A texture of the scene's own material, with the coordinates that it reads. */
 interface Placed {
