@@ -118,6 +118,10 @@ describe.skipIf(!haveTool || !haveBrowser)('wavelets and fixed views', () => {
         truth('view', 'view.glb', '--env-rotate', rotate, '--window', 'none'),
       ),
     ).toBeGreaterThan(45);
+    // Packed for browsers, and read in two pieces.
+    lambent('export', at('view.glb'), '--web', at('view_site'), '--pack', 'auto');
+    const packed = { path: '/files/view_site~data~scene.glb', rotate: numbers(rotate) };
+    expect(await compare('view_packed', packed, at('view_render.png'))).toBeGreaterThan(45);
     expect(await compare('view_peaks', { path, peaks: true }, truth('view_peaks', 'view.glb'))).toBeGreaterThan(45);
   });
 

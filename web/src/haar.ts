@@ -147,7 +147,7 @@ export class HaarColumns {
     return this.channels * this.width;
   }
 
-  /** Throws where a column's tiles do not end where it does, or name other receivers; the sum of its values' squares. */
+  /** Throws where a column's tiles do not end where it does, or name other receivers; its values' squares. */
   private check(k: number, column: number): number {
     const { data, signed, begins, columns } = this,
       end = begins[k * columns + column + 1]!,

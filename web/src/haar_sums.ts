@@ -1,5 +1,5 @@
-// T . light of wavelets, by the processor, when the light changes: a texture that meshes look up, and one more for those
-// that were turned as one since the bake.
+// T . light of wavelets, by the processor, when the light changes: a texture that meshes look up, and one more for
+// those that were turned as one since the bake.
 import {
   DataTexture,
   FloatType,

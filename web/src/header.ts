@@ -40,7 +40,8 @@ export function readHeader(
     );
   if (isMore(groups) && surfaceKind !== 'texels')
     throw new LambentError(
-      `holds the light of the scene's own lamps at ${surfaceKind === 'view' ? 'pixels' : 'vertices'}, where this version draws it over an atlas; ` +
+      `holds the light of the scene's own lamps at ${surfaceKind === 'view' ? 'pixels' : 'vertices'}, ` +
+        'where this version draws it over an atlas; ' +
         '"lambent render" draws it',
     );
   if (cpca !== undefined)

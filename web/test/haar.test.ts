@@ -65,9 +65,15 @@ interface Parts {
 function parts(): Parts {
   const first = column([[0, Array.from({ length: 64 }, (_, i) => i)]]),
     both = column([
-      [0, [[3, 7], [63, 253]]], // prettier-ignore
+      [
+        0,
+        [
+          [3, 7],
+          [63, 253],
+        ],
+      ],
       [1, [[5, 2]]],
-    ]), // prettier-ignore
+    ]),
     lengths = new Array<number>(width).fill(0),
     steps = new Float32Array(width);
   lengths[1] = first.length;
@@ -111,7 +117,11 @@ describe('columns of wavelets', () => {
     ['lengths without an end', /fewer lengths than columns/, ({ lengths }) => (lengths[width - 1] = 128)],
     ['more lengths than columns', /more lengths than columns/, ({ lengths }) => lengths.push(0)],
     ['a length beyond the data', /longer than what is there/, ({ lengths }) => (lengths[9] = 127)],
-    ['a length beyond numbers', /longer than what is there/, ({ lengths }) => lengths.splice(9, 1, ...[255, 255, 255, 255, 255, 127])], // prettier-ignore
+    [
+      'a length beyond numbers',
+      /longer than what is there/,
+      ({ lengths }) => lengths.splice(9, 1, 255, 255, 255, 255, 255, 127),
+    ],
     ['data beyond the lengths', /lengths make 89/, ({ data }) => data.push(0)],
     ['receivers by the thousand million', /fewer lengths than columns/, ({ header }) => (header.receivers = 4e9)],
     ['a tile beyond the receivers', /column 1 .*goes beyond/, ({ data }) => ((data[0] = 0), (data[1] = 1))],

@@ -12,9 +12,9 @@ namespace lambent {
 namespace {
 
 constexpr DrawnKind kinds[] = {
-    {"dense", "diffuse", "vertices"},  {"dense", "diffuse", "texels"},     {"dense", "directional", "texels"},
-    {"dense", "outgoing", "vertices"}, {"lobes", "diffuse", "vertices"},   {"lobes", "outgoing", "vertices"},
-    {"blocks", "sight", "vertices"},   {"surfels", "diffuse", "vertices"}, {"surfels", "diffuse", "texels"},
+    {"dense", "diffuse", "vertices"},  {"dense", "diffuse", "texels"},      {"dense", "directional", "texels"},
+    {"dense", "outgoing", "vertices"}, {"lobes", "diffuse", "vertices"},    {"lobes", "outgoing", "vertices"},
+    {"blocks", "sight", "vertices"},   {"surfels", "diffuse", "vertices"},  {"surfels", "diffuse", "texels"},
     {"dense", "pixels", "view"},       {"wavelets", "diffuse", "vertices"}, {"wavelets", "diffuse", "texels"},
     {"wavelets", "pixels", "view"},
 };
@@ -50,7 +50,8 @@ Result<void> check_for_browser(const Field& field, const std::string& path) {
   if (const Outgoing* outgoing = outgoing_of(field); outgoing && outgoing->kind == OutgoingKind::directional)
     return refuse("holds a last reflection of compact lobes");
   const bool texels = std::holds_alternative<TexelPlacement>(field.where);
-  if (!light.groups.empty() && !texels) return refuse(std::string("holds the light of lamps at ") + name_of(field.where));
+  if (!light.groups.empty() && !texels)
+    return refuse(std::string("holds the light of lamps at ") + name_of(field.where));
   if (texels && light.count() > max_drawn_columns)
     return refuse(fmt::format("has {} columns of light, more than {}", light.count(), max_drawn_columns));
   if (const auto* lobes = std::get_if<ZonalTransfer>(&field.store);
