@@ -125,6 +125,28 @@ describe.skipIf(!haveTool || !haveBrowser)('wavelets and fixed views', () => {
     expect(await compare('view_peaks', { path, peaks: true }, truth('view_peaks', 'view.glb'))).toBeGreaterThan(45);
   });
 
+  it('takes lights of the program beside wavelets, at vertices and texels', async () => {
+    const points: [number, number, number][] = [[0.5, 0, 0.9]],
+      cosine = 5 / Math.hypot(1, 5, 0.5);
+    for (const kind of ['coloured', 'texels'])
+      for (const backend of ['webgl', 'fallback'] as const) {
+        const shot = { path: `/files/${kind}.glb`, light: [1, 1, 1], camera: numbers(camera), size },
+          { values } = await page.evaluate(([b, s, p]) => window.gpu.underSun(b, s, p), [
+            backend,
+            shot,
+            points,
+          ] as const),
+          [alone, lit, again] = values.map(([at]) => at!);
+        expect(again).toEqual(alone);
+        expect(alone![0]).toBeGreaterThan(0.01);
+        // Of a lamp of 3 straight from above: albedo / pi, by the cosine (half floats, filtered shadows: 1 %).
+        [0.6, 0.58, 0.55].forEach((albedo, c) => {
+          const added = (lit![c]! - alone![c]!) / ((3 * cosine * albedo) / Math.PI);
+          expect(Math.abs(added - 1)).toBeLessThan(0.01);
+        });
+      }
+  });
+
   it('fills the page, where hands turn the light alone; wavelets are counted in the address', async () => {
     const served: Server = await serve(at('pixels.glb'), '--env', sky),
       [width, height] = small as [number, number],
