@@ -2,9 +2,9 @@
 # The strip of a sun in the README, into out/haar-strip/strip.png: a gate and a fence by harmonics of order 16, by the
 # 200 largest wavelets of the light, and path-traced; then one JSON line each, decibels against the last, bytes a
 # receiver, and milliseconds of relighting. Some five minutes.
-#   SPP=512 SIZE=288x216 CUBE=128 scripts/bench haar-strip
+#   SPP=512 SIZE=288x216 HAAR=haar:128 scripts/bench haar-strip
 source "$(dirname "$0")/common.sh"
-out=out/haar-strip size=${SIZE:-256x192} spp=${SPP:-256} cube=${CUBE:-64}
+out=out/haar-strip size=${SIZE:-256x192} spp=${SPP:-256} haar=${HAAR:-haar:64}
 mkdir -p $out
 python3 - $out/gate.obj <<'P'
 import sys
@@ -29,7 +29,7 @@ mesh="--max-edge ${EDGE:-0.03}"
 # shellcheck disable=SC2086
 {
   $tool bake $out/gate.obj $mesh --order 16 --samples 4096 --bounces 0 -o $out/harmonics.glb
-  $tool bake $out/gate.obj $mesh --light haar:$cube --bounces 0 -o $out/wavelets.glb
+  $tool bake $out/gate.obj $mesh --light $haar --bounces 0 -o $out/wavelets.glb
   $tool render $out/harmonics.glb $light "${view[@]}" --spp 16 -o $out/harmonics.exr --json >$out/harmonics_drawn.json
   $tool render $out/wavelets.glb $light --terms 200 "${view[@]}" --spp 16 -o $out/wavelets.exr --json \
     >$out/wavelets_drawn.json
@@ -47,7 +47,7 @@ for name in harmonics wavelets; do
 done
 python3 bench/beside.py $out/strip.png "$size" $out/harmonics.png:0/3 $out/wavelets.png:0/3 $out/wavelets.png:1/3
 for name in harmonics wavelets; do
-  echo "{\"name\": \"haar_strip_$name\", \"ours\": $(number without_noise $out/$name.json), \"unit\": \"dB\"," \
-    "\"bytes\": $(number bytes $out/${name}_inspected.json), \"receivers\": $(number receivers $out/${name}_drawn.json)," \
-    "\"relight_ms\": $(python3 -c "print(1e3 * $(number relight_seconds $out/${name}_drawn.json))")}"
+  bytes=$(number bytes $out/${name}_inspected.json) receivers=$(number receivers $out/${name}_drawn.json)
+  echo "{\"name\": \"haar_strip_$name\", \"ours\": $(number sloped $out/$name.json), \"unit\": \"dB\"," \
+    "\"bytes_a_receiver\": $((bytes / receivers)), \"relight_seconds\": $(number relight_seconds $out/${name}_drawn.json)}"
 done

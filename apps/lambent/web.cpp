@@ -12,6 +12,7 @@
 
 #include <algorithm>
 #include <filesystem>
+#include <optional>
 
 namespace lambent::tool {
 namespace {
@@ -84,6 +85,7 @@ Result<void> add_named_files(WebFiles& files, nlohmann::json& document, const st
 struct AddedFile {
   std::string name;  // data/STEM.glb or data/STEM.gltf
   bool by_lamps;     // direct-to-indirect transport, which lamps light and no environment
+  std::optional<FixedView> view;
 };
 Result<float> packing_error(const std::string& text, std::span<const uint8_t> bytes, const std::string& path) {
   if (text == "auto") return default_packing_error(bytes, path);
@@ -101,6 +103,8 @@ Result<AddedFile> add_baked(WebFiles& files, const std::string& path, const std:
   if (!whole) return whole.error();
   if (auto ok = check_for_browser(whole->surface, whole->scene, path); !ok) return ok.error();
   const bool by_lamps = std::holds_alternative<IndirectTransfer>(whole->surface.store);
+  std::optional<FixedView> view;
+  if (const auto* fixed = std::get_if<FixedView>(&whole->surface.where)) view = *fixed;
   auto chunks = split_gltf(file->bytes(), path);
   if (!chunks) return chunks.error();
   const std::string ending = chunks->binary.data() ? "glb" : "gltf", name = "data/" + stem + "." + ending;
@@ -110,15 +114,15 @@ Result<AddedFile> add_baked(WebFiles& files, const std::string& path, const std:
     auto packed = pack_baked(file->bytes(), *error, path);
     if (!packed) return packed.error();
     files[name] = {media_type("glb"), std::move(packed->bytes)};
-    return AddedFile{name, by_lamps};
+    return AddedFile{name, by_lamps, view};
   }
   if (ending == "glb") {
     files[name] = {media_type("glb"), std::move(*file)};
-    return AddedFile{name, by_lamps};
+    return AddedFile{name, by_lamps, view};
   }
   if (auto ok = add_named_files(files, chunks->json, path, stem); !ok) return ok.error();
   files[name] = {media_type("gltf"), chunks->json.dump(-1, ' ', false, nlohmann::json::error_handler_t::replace)};
-  return AddedFile{name, by_lamps};
+  return AddedFile{name, by_lamps, view};
 }
 
 // What the page has no use for where lamps alone light the scene, by name.
@@ -130,6 +134,18 @@ Result<void> check_lamps_alone(const WebOptions& o) {
                  "`lambent render`",
                  true};
   return {};
+}
+
+// Two files are drawn by one camera, which of a fixed view is the one that was baked in.
+Result<void> check_views(const WebOptions& o, const AddedFile& baked, const AddedFile* compare) {
+  if (baked.view && o.camera != "auto")
+    return Error{"--camera", "has no use in the page for a fixed view, whose camera is baked in", true};
+  if (!compare || (!baked.view && !compare->view)) return {};
+  const FixedView *a = baked.view ? &*baked.view : nullptr, *b = compare->view ? &*compare->view : nullptr;
+  if (a && b && a->width == b->width && a->height == b->height && a->camera.eye == b->camera.eye &&
+      a->camera.target == b->camera.target && a->camera.fov == b->camera.fov)
+    return {};
+  return Error{"--compare", "is of another camera: of two fixed views both have one", true};
 }
 
 Result<void> add_map(WebFiles& files, const Image& image, const std::string& path, const std::string& name) {
@@ -179,12 +195,14 @@ Result<WebFiles> web_files(const WebOptions& options) {
   auto baked = add_baked(files, options.baked, "scene", options.pack);
   if (!baked) return baked.error();
   if (auto ok = baked->by_lamps ? check_lamps_alone(options) : Result<void>(); !ok) return ok.error();
+  if (auto ok = check_views(options, *baked, nullptr); !ok) return ok.error();
   manifest["baked"] = baked->name;
   if (!options.compare.empty()) {
     auto compare = add_baked(files, options.compare, "compare", options.pack);
     if (!compare) return compare.error();
     if (baked->by_lamps || compare->by_lamps)
       return Error{"--compare", "does not go with direct-to-indirect transport in the page", true};
+    if (auto ok = check_views(options, *baked, &*compare); !ok) return ok.error();
     manifest["compare"] = compare->name;
   }
   if (auto ok = add_page(files); !ok) return ok.error();

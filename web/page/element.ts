@@ -27,7 +27,18 @@ p { position: absolute; inset: auto 0 0 0; margin: 0; padding: 0.4em 0.8em; font
 p:empty { display: none; }`;
 
 /** What the address of the page may hold, an element has as attributes. */
-const ofState = ['camera', 'rotate', 'exposure', 'tone', 'spin', 'background', 'order', 'window', 'brdf'] as const;
+const ofState = [
+  'camera',
+  'rotate',
+  'exposure',
+  'tone',
+  'spin',
+  'background',
+  'order',
+  'window',
+  'brdf',
+  'terms',
+] as const;
 /** Several, apart by semicolons: each of the address's. */
 const lists = { lamps: 'lamp', albedos: 'albedo' } as const;
 
@@ -109,6 +120,7 @@ export class LambentViewer extends HTMLElement {
         tone: state.tone,
         order: state.order,
         window: state.window,
+        terms: state.terms,
         spin: state.spin,
         showBackground: state.background,
       });
@@ -119,7 +131,7 @@ export class LambentViewer extends HTMLElement {
       if (viewer.indirect) takeLamps(viewer.indirect, state);
       const [yaw, pitch, roll] = state.rotate.map((d) => MathUtils.degToRad(d)) as [number, number, number];
       viewer.orbit.light.setFromEuler(new Euler(pitch, yaw, roll, 'YXZ'));
-      if (state.camera) {
+      if (state.camera && !viewer.fixedView) {
         viewer.camera.fov = state.camera[6]!;
         viewer.orbit.look(new Vector3().fromArray(state.camera), new Vector3().fromArray(state.camera, 3));
       } else if (scene) viewer.frameAll();

@@ -30,6 +30,7 @@ import { connectSharing } from './sharing.js';
 import { highestSun, lowestSun, parseSky, type Sky } from './sky.js';
 import { defaultState, formatState, parseState, viewNames as names, type State, type View } from './state.js';
 import { showSurface, takeReflection } from './surface.js';
+import { possibleViews, showBands, showFixed, showTerms, takeTerms } from './kind_controls.js';
 import { showFrameTime, showStatistics } from './statistics.js';
 import { tones, type Tone } from './tone.js';
 import { falseColorEnd, falseColorGain, fitErrorEnd } from './false_color.js';
@@ -108,11 +109,7 @@ class Page {
   private show(): void {
     const { state, viewer } = this;
     const transfer = viewer.bakedScene?.transfer,
-      possible: View[] = transfer?.indirect ? ['baked', 'direct', 'indirect'] : ['baked', 'unshadowed'];
-    if (!transfer || transfer.coefficientMaterials) possible.push('coefficient');
-    if (transfer?.fitErrorMaterials) possible.push('error');
-    if (this.manifest?.compare) possible.splice(1, 0, 'compare');
-    if (this.manifest?.reference) possible.push('reference');
+      possible = possibleViews(transfer, this.manifest);
     if (!possible.includes(state.view)) state.view = 'baked';
     if (state.against && !possible.includes(state.against)) delete state.against;
     const option = (value: string, text: string): HTMLOptionElement => new Option(text, value);
@@ -134,10 +131,10 @@ class Page {
     select('tone').value = state.tone;
     input('background').checked = state.background;
     input('free').checked = state.free;
-    // Sight has no bands to leave out, and surfaces that are free; nor have lobes of light alone.
-    get('order-row').hidden = get('window-row').hidden =
-      transfer?.reflection !== undefined || (columns !== undefined && transfer?.order === 0);
+    showBands(transfer);
+    showTerms(transfer?.terms === undefined ? undefined : state.terms);
     this.lamps.show();
+    showFixed(transfer?.view !== undefined);
     const makeSurfaces = (brdf: Reflection): void => {
       state.brdf = takeReflection(transfer!, brdf, viewer.renderer, (error) =>
         showProblem(sentence(document.title, error)),
@@ -157,8 +154,9 @@ class Page {
     viewer.wipe = state.wipe;
     viewer.exposure = state.exposure;
     viewer.tone = state.tone;
-    const isOtherLight = viewer.order !== state.order || viewer.window !== state.window;
+    const isOtherLight = viewer.order !== state.order || viewer.window !== state.window || viewer.terms !== state.terms;
     viewer.order = state.order;
+    viewer.terms = state.terms;
     viewer.window = state.window;
     viewer.coefficient = state.coefficient;
     viewer.showBackground = state.background;
@@ -247,6 +245,7 @@ class Page {
       'input',
       () => (state.order = input('order').value === input('order').max ? 0 : Number(input('order').value)),
     );
+    on('terms', 'input', () => showTerms((state.terms = takeTerms())));
     on('window', 'change', () => (state.window = select('window').value as ShWindow));
     on('view', 'change', () => (state.view = select('view').value as View));
     on('against', 'change', () => {
@@ -441,7 +440,7 @@ class Page {
   }
 
   private setCamera(camera: number[] | undefined): void {
-    if (!camera) return this.viewer.frameAll();
+    if (!camera || this.viewer.fixedView) return this.viewer.frameAll();
     this.viewer.camera.fov = camera[6]!;
     this.viewer.orbit.look(new Vector3().fromArray(camera), new Vector3().fromArray(camera, 3));
   }
@@ -458,11 +457,10 @@ class Page {
   private current(): State {
     const { camera, orbit } = this.viewer,
       turn = new Euler().setFromQuaternion(orbit.light, 'YXZ');
-    return {
-      ...this.state,
-      camera: [...camera.position.toArray(), ...orbit.target.toArray(), camera.fov],
-      rotate: [turn.y, turn.x, turn.z].map((a) => MathUtils.radToDeg(a)),
-    };
+    const state = { ...this.state, rotate: [turn.y, turn.x, turn.z].map((a) => MathUtils.radToDeg(a)) };
+    if (this.viewer.fixedView) delete state.camera;
+    else state.camera = [...camera.position.toArray(), ...orbit.target.toArray(), camera.fov];
+    return state;
   }
 
   private address(): string {

@@ -32,10 +32,14 @@ export class Model {
     this.own = this.meshes.map((mesh) => mesh.material as Material);
   }
 
-  /** Of what is drawn without shadows: as many as are baked. Sight has none, and diffuse surfaces ask for few. */
+  /** Light is taken on a cube: there are none to leave out. */
+  get hasNoBands(): boolean {
+    const { reflection, terms } = this.baked.transfer;
+    return reflection !== undefined || terms !== undefined;
+  }
+  /** Of what is drawn without shadows: as many as are baked. On a cube there are none; diffuse surfaces ask for few. */
   private get bands(): number {
-    const { transfer } = this.baked;
-    return transfer.reflection ? 6 : bandsOf(transfer);
+    return this.hasNoBands ? 6 : bandsOf(this.baked.transfer);
   }
 
   get meshes(): Mesh[] {

@@ -22,6 +22,8 @@ export class Orbit {
   lightFirst = false;
   /** Sideways the light turns about the picture's own upright, and not about +Y. */
   free = false;
+  /** The camera stays where it is: all that a hand does turns the light. */
+  isFixed = false;
   /** Otherwise with Ctrl alone, as where two fingers part on a touch pad. */
   wheelZooms = true;
   private readonly pointers = new Map<number, { x: number; y: number }>();
@@ -38,7 +40,7 @@ export class Orbit {
     canvas.addEventListener(
       'wheel',
       (e) => {
-        if (!this.wheelZooms && !e.ctrlKey) return;
+        if (this.isFixed || (!this.wheelZooms && !e.ctrlKey)) return;
         e.preventDefault();
         this.zoom(Math.exp(MathUtils.clamp(e.deltaY, -120, 120) * 0.0015));
       },
@@ -87,18 +89,21 @@ export class Orbit {
   }
 
   zoom(factor: number): void {
+    if (this.isFixed) return;
     const offset = this.camera.position.clone().sub(this.target);
     this.look(offset.multiplyScalar(MathUtils.clamp(factor, 0.2, 5)).add(this.target), this.target.clone());
   }
 
   shift(x: number, y: number): void {
+    if (this.isFixed) return;
     const height = 2 * Math.tan(MathUtils.degToRad(this.camera.fov) / 2) * this.camera.position.distanceTo(this.target);
     const move = new Vector3().setFromMatrixColumn(this.camera.matrixWorld, 0).multiplyScalar(-x * height);
     move.addScaledVector(new Vector3().setFromMatrixColumn(this.camera.matrixWorld, 1), y * height);
     this.look(this.camera.position.clone().add(move), this.target.clone().add(move));
   }
 
-  private turn(x: number, y: number, light: boolean): void {
+  private turn(x: number, y: number, asked: boolean): void {
+    const light = asked || this.isFixed;
     this.callbacks.onUse(light ? 'light' : 'orbit');
     if (light) this.turnLight(x, y);
     else this.turnCamera(x, y);

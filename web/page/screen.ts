@@ -1,5 +1,5 @@
 // What fills the screen behind or instead of the scene: the environment, and a reference picture.
-import { Matrix3, Matrix4, ShaderMaterial, type DataTexture, type IUniform, type Texture } from 'three';
+import { Matrix3, Matrix4, ShaderMaterial, Vector2, type DataTexture, type IUniform, type Texture } from 'three';
 
 const uniform = <T>(value: T): IUniform<T> => ({ value });
 
@@ -33,19 +33,24 @@ export class SkyMaterial extends ShaderMaterial {
   readonly unproject = uniform(new Matrix4());
   /** From the world into the environment as it was before it was turned. */
   readonly turnBack = uniform(new Matrix3());
+  /** As far from the middle as it is shown; black beyond. */
+  readonly within = uniform(new Vector2(1, 1));
 
   constructor() {
     super(
       fillScreen(
-        'uniform sampler2D map;\nuniform mat4 unproject;\nuniform mat3 turnBack;',
+        'uniform sampler2D map;\nuniform mat4 unproject;\nuniform mat3 turnBack;\nuniform vec2 within;',
         /* glsl */ `
   vec4 far = unproject * vec4( place, 1.0, 1.0 ), near = unproject * vec4( place, - 1.0, 1.0 );
   vec3 d = turnBack * normalize( far.xyz / far.w - near.xyz / near.w );
-  vec2 place = vec2( atan( d.z, d.x ) / PI2 + 0.5, atan( length( d.xz ), d.y ) / PI );
-  gl_FragColor = vec4( texture2D( map, place ).rgb, 1.0 );`,
+  vec2 at = vec2( atan( d.z, d.x ) / PI2 + 0.5, atan( length( d.xz ), d.y ) / PI );
+  bool isShown = all( lessThanEqual( abs( place ), within + 1e-5 ) );
+  gl_FragColor = vec4( isShown ? texture2D( map, at ).rgb : vec3( 0.0 ), 1.0 );`,
       ),
     );
-    Object.assign(this.uniforms, { map: this.map, unproject: this.unproject, turnBack: this.turnBack });
+    Object.assign(this.uniforms, {
+      ...{ map: this.map, unproject: this.unproject, turnBack: this.turnBack, within: this.within },
+    });
   }
 }
 

@@ -39,6 +39,7 @@ export interface State extends LampState {
   tone: Tone;
   order: number; // bands; 0: all that are baked
   window: ShWindow;
+  terms: number; // of wavelets; 0: all
   view: View;
   against?: View; // right of the wipe
   wipe: number; // share of the width left of the wipe
@@ -58,6 +59,7 @@ export const defaultState = (): State => ({
   tone: 'neutral',
   order: 0,
   window: 'auto',
+  terms: 0,
   view: 'baked',
   wipe: 0.5,
   coefficient: 3,
@@ -91,6 +93,7 @@ export function parseState(fragment: string, base: State): State {
   state.tone = tones.find((t) => t === from.get('tone')) ?? state.tone;
   state.order = Math.floor(one('order', 0, 16) ?? state.order);
   state.window = shWindows.find((w) => w === from.get('window')) ?? state.window;
+  state.terms = Math.floor(one('terms', 0, 1048576) ?? state.terms);
   state.view = views.find((v) => v === from.get('view')) ?? state.view;
   const against = views.find((v) => v === from.get('against'));
   if (against) state.against = against;
@@ -124,6 +127,7 @@ export function formatState(state: State, base: State = defaultState()): string 
   if (state.tone !== base.tone) put('tone', state.tone);
   if (state.order !== base.order) put('order', String(state.order));
   if (state.window !== base.window) put('window', state.window);
+  if (state.terms !== base.terms) put('terms', String(state.terms));
   if (state.view !== base.view) put('view', state.view);
   if (state.against) {
     put('against', state.against);

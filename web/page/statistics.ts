@@ -25,11 +25,13 @@ function rowsOf({ transfer: t, provenance }: BakedScene): [string, string][] {
         ? 'direct to indirect light'
         : t.reflection
           ? 'visibility in blocks'
-          : [
-              `${t.kind}, order ${t.order}`,
-              ...(t.columns ? [`${t.columns.lobes} lobes of light`] : []),
-              t.channels === 3 ? 'colour' : 'grey',
-            ].join(', '),
+          : t.terms !== undefined
+            ? 'wavelets on a cube'
+            : [
+                `${t.kind}, order ${t.order}`,
+                ...(t.columns ? [`${t.columns.lobes} lobes of light`] : []),
+                t.channels === 3 ? 'colour' : 'grey',
+              ].join(', '),
     ],
     ['Receivers', t.receivers.toLocaleString('en')],
     ['Vertices', t.meshes.reduce((n, m) => n + m.geometry.getAttribute('position').count, 0).toLocaleString('en')],

@@ -2,9 +2,6 @@
 import {
   AnimationMixer,
   Box3,
-  DataUtils,
-  EquirectangularReflectionMapping,
-  FloatType,
   HalfFloatType,
   MathUtils,
   Matrix4,
@@ -24,12 +21,22 @@ import {
 } from 'three';
 import type { GLTF } from 'three/addons/loaders/GLTFLoader.js';
 import { FullScreenQuad } from 'three/addons/postprocessing/Pass.js';
-import { anySeeThrough, LambentError, type BakedScene, type IndirectControls, type ShWindow } from '../src/index.js';
+import {
+  anySeeThrough,
+  LambentError,
+  type BakedScene,
+  type FixedView,
+  type IndirectControls,
+  type ShWindow,
+} from '../src/index.js';
 import type { EnvironmentFile } from './loading.js';
 import { framed, framedFov } from './framing.js';
 import { LobeGlyphs, pickVertex } from './lobes.js';
 import { bandsOf, Model } from './model.js';
+import { fitFixed } from './fixed.js';
+import { lightPlain } from './plain.js';
 import { Orbit } from './orbit.js';
+import { floatType, readFloats } from './read_back.js';
 import { DevelopMaterial, PictureMaterial, SkyMaterial } from './screen.js';
 import type { View } from './state.js';
 import type { ViewerCallbacks } from './viewer_callbacks.js';
@@ -51,6 +58,7 @@ export class Viewer {
   wipe = 0.5;
   order = 0; // bands in use; 0: all
   window: ShWindow = 'auto';
+  terms = 0; // of wavelets; 0: all
   exposure: number | 'auto' = 'auto';
   tone: Tone = 'neutral';
   showBackground = true;
@@ -164,6 +172,7 @@ export class Viewer {
       const mixer = new AnimationMixer(gltf.scene);
       this.animation = { mixer, action: mixer.clipAction(gltf.animations[0]) };
     }
+    this.orbit.isFixed = this.fixedView !== undefined;
     new Box3().setFromObject(gltf.scene, true).getBoundingSphere(this.bounds);
   }
 
@@ -172,6 +181,9 @@ export class Viewer {
   }
   get indirect(): IndirectControls | undefined {
     return this.baked?.baked.transfer.indirect;
+  }
+  get fixedView(): FixedView | undefined {
+    return this.baked?.baked.transfer.view;
   }
   get hasAnimation(): boolean {
     return this.animation !== undefined;
@@ -195,6 +207,7 @@ export class Viewer {
 
   /** The camera of `lambent render --camera auto`, in the canvas as it is now. */
   frameAll(): void {
+    if (this.fixedView) return this.orbit.look(this.fixedView.eye, this.fixedView.target);
     const root = this.baked?.root ?? this.plain,
       { clientWidth, clientHeight } = this.canvas;
     this.camera.fov = framedFov;
@@ -375,6 +388,7 @@ export class Viewer {
     const distance = camera.position.distanceTo(bounds.center),
       reach = 1.1 * bounds.radius; // a little more, for what is animated
     camera.aspect = width / height;
+    fitFixed(this.fixedView, camera, this.sky);
     camera.far = distance + reach;
     camera.near = Math.max(distance - reach, 5e-4 * camera.far);
     camera.updateProjectionMatrix();
@@ -387,7 +401,10 @@ export class Viewer {
     lighting.rotation.copy(this.orbit.light);
     lighting.bands = this.bands;
     lighting.window = this.window;
-    if (this.baked?.baked.transfer.reflection) {
+    for (const of of [this.baked, this.compare])
+      if (of?.baked.transfer.terms !== undefined) of.baked.transfer.terms = this.terms;
+    // What is put on a cube.
+    if ([this.baked, this.compare].some((of) => of && !of.baked.transfer.indirect && of.hasNoBands)) {
       const now = performance.now();
       lighting.quick = now - this.lastLight < finePause;
       this.lastLight = now;
@@ -396,18 +413,7 @@ export class Viewer {
     }
     this.baked?.relight(lighting);
     this.compare?.relight(lighting);
-    if (this.plain) this.lightPlain(this.environment!.background);
-  }
-
-  private lightPlain(background: DataTexture): void {
-    if (this.scene.environment?.source !== background.source) {
-      this.scene.environment?.dispose();
-      this.scene.environment = background.clone(); // with the first row at the top, as three.js has environments
-      this.scene.environment.mapping = EquirectangularReflectionMapping;
-      this.scene.environment.flipY = true;
-      this.scene.environment.needsUpdate = true;
-    }
-    this.scene.environmentRotation.setFromQuaternion(this.orbit.light);
+    if (this.plain) lightPlain(this.scene, this.environment!.background, this.orbit.light);
   }
 
   /** A small picture of the surfaces says how bright they are; while the light turns, a few times a second. */
@@ -416,20 +422,12 @@ export class Viewer {
       wait = this.lastMeter + meterPause - performance.now();
     clearTimeout(this.meterSoon);
     if (wait > 0) return void (this.meterSoon = window.setTimeout(() => this.invalidate(), wait));
-    const type = renderer.extensions.has('EXT_color_buffer_float')
-      ? FloatType
-      : renderer.extensions.has('EXT_color_buffer_half_float')
-        ? HalfFloatType
-        : undefined;
+    const type = floatType(renderer);
     if (type === undefined || !this.environment) return;
     const height = Math.min(4 * meterWidth, Math.max(1, Math.round(meterWidth / this.camera.aspect))),
       target = (this.meterTarget ??= new WebGLRenderTarget(meterWidth, height, { type }));
     target.setSize(meterWidth, height);
-    const read = (): number[] => {
-      const pixels = new (type === FloatType ? Float32Array : Uint16Array)(4 * meterWidth * height);
-      renderer.readRenderTargetPixels(target, 0, 0, meterWidth, height, pixels);
-      return Array.from(pixels, (v) => (type === FloatType ? v : DataUtils.fromHalfFloat(v)));
-    };
+    const read = (): number[] => readFloats(renderer, target);
     renderer.setRenderTarget(target);
     renderer.setClearColor(0x000000, 0);
     renderer.clear();

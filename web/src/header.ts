@@ -32,25 +32,24 @@ const isDirectional = (value: unknown): value is Directional =>
 /** What every kind has in its header; refuses by name what this version does not draw. */
 export function readHeader(
   extension: TransferExtension,
-  surfaceKind: 'vertices' | 'texels' = 'vertices',
+  surfaceKind: 'vertices' | 'texels' | 'view' = 'vertices',
 ): TransferHeader {
   const { transfer, surface, view } = extension;
   const { basis, order, channels, precision, receivers, bufferView, groups = [], directional } = transfer;
   const text = (value: unknown): string => (typeof value === 'string' ? value : 'something else'),
-    where = text(surface?.kind ?? 'vertices');
+    where = view !== undefined ? 'view' : text(surface?.kind ?? 'vertices');
   const isMore = (list: unknown): boolean => list !== undefined && !(Array.isArray(list) && list.length === 0);
   if (basis !== 'sh')
     throw new LambentError(`holds light in the basis "${String(basis)}", which this version does not know`);
   if (!Array.isArray(groups) || !groups.every((name) => typeof name === 'string'))
     throw new LambentError('"groups" is no list of names');
-  if (isMore(groups) && surfaceKind === 'vertices')
+  if (isMore(groups) && surfaceKind !== 'texels')
     throw new LambentError(
-      "holds the light of the scene's own lamps at vertices, where this version draws it over an atlas; " +
+      `holds the light of the scene's own lamps at ${surfaceKind === 'view' ? 'pixels' : 'vertices'}, ` +
+        'where this version draws it over an atlas; ' +
         '"lambent render" draws it',
     );
-  if (view !== undefined)
-    throw new LambentError('holds a fixed view (--fix-view), a picture and no surfaces; "lambent render" draws it');
-  if (directional !== undefined && (surfaceKind === 'vertices' || !isDirectional(directional)))
+  if (directional !== undefined && (surfaceKind !== 'texels' || !isDirectional(directional)))
     throw new LambentError(
       `holds directional light ("${text(directional)}"), which this version does not draw ` +
         `${isDirectional(directional) ? 'but over an atlas' : 'at all'}; "lambent render" does`,

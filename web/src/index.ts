@@ -4,6 +4,7 @@ import { factorsKind } from './factors.js';
 import { indirectKind } from './indirect.js';
 import { registerTransferKind } from './kinds.js';
 import { matrixKind } from './matrix.js';
+import { waveletsKind } from './wavelets.js';
 import { zonalKind } from './zonal.js';
 
 registerTransferKind(diffuseKind);
@@ -12,10 +13,12 @@ registerTransferKind(matrixKind);
 registerTransferKind(factorsKind);
 registerTransferKind(blocksKind);
 registerTransferKind(indirectKind);
+registerTransferKind(waveletsKind);
 
 export type { Reflection } from './block_reflection.js';
 export { cubeLight, type CubeLight } from './cube.js';
 export { LambentError, NoTransferError } from './errors.js';
+export type { FixedView } from './fixed_view.js';
 export { checkBakedFile, extensionName } from './glb.js';
 export type { IndirectControls } from './indirect.js';
 export type { IndirectTimes } from './indirect_light.js';

@@ -1,6 +1,7 @@
 // The kinds of transfer that a file may hold. A new one is one entry here and one module.
 import type { Color, Material, Mesh } from 'three';
 import type { Reflection } from './block_reflection.js';
+import type { FixedView } from './fixed_view.js';
 import type { TransferExtension, Views } from './glb.js';
 import type { IndirectControls } from './indirect.js';
 import type { Lighting } from './lighting.js';
@@ -12,6 +13,8 @@ export interface TransferSource {
   extension: TransferExtension;
   /** Bytes of a buffer view, or of several one after another; rejects where there is none. */
   bufferView(views: Views): Promise<ArrayBuffer>;
+  /** Draws this in place of the document's scene. */
+  showInstead(mesh: Mesh): void;
   /** The mesh that draws a part. Throws LambentError where the file has none. */
   mesh(part: TransferExtension['parts'][number]): Mesh;
   /**
@@ -64,6 +67,10 @@ export interface BakedTransfer {
   readonly coefficientMaterials?: (index: number, gain: { value: number }) => Material[];
   /** Visibility in blocks: what all surfaces are made of. Counts at the next frame. */
   reflection?: Reflection;
+  /** Of wavelets: how many of the light's are used, those that change most; 0: all. Counts at the next relight(). */
+  terms?: number;
+  /** Of a fixed view: the camera that was baked in, whose picture the only mesh is. */
+  readonly view?: FixedView | undefined;
   /** Direct to indirect light: lamps that move, and paint. */
   readonly indirect?: IndirectControls;
   /**
@@ -97,6 +104,10 @@ export const drawn = [
   ['blocks', 'sight', 'vertices'],
   ['surfels', 'diffuse', 'vertices'],
   ['surfels', 'diffuse', 'texels'],
+  ['dense', 'pixels', 'view'],
+  ['wavelets', 'diffuse', 'vertices'],
+  ['wavelets', 'diffuse', 'texels'],
+  ['wavelets', 'pixels', 'view'],
 ] as const;
 
 /**
@@ -108,7 +119,13 @@ export const limits = { columns: 256, lobes: 64, texels: 2048, lamps: 8, ownLamp
 
 /** Store, meaning and placement of a file's transfer, as the table has them. */
 export function axesOf({ transfer, surface, view }: TransferExtension): [store: string, rows: string, where: string] {
-  const stores: Record<string, string> = { zonal: 'lobes', factors: 'factors', blocks: 'blocks', indirect: 'surfels' };
+  const stores: Record<string, string> = {
+    zonal: 'lobes',
+    factors: 'factors',
+    blocks: 'blocks',
+    indirect: 'surfels',
+    wavelets: 'wavelets',
+  };
   const isDirectional = transfer['directional'] !== undefined && transfer['directional'] !== 'none';
   return [
     transfer['cpca'] !== undefined ? 'clusters' : (stores[transfer.kind] ?? 'dense'),

@@ -56,7 +56,7 @@ import { chainHooks, diffuseParameters, replaceOnce, useExitRadiance } from './p
 import { drawFilter, type Drawn } from './see_through.js';
 import { RestPose, TurnedSums, type TurnableLight } from './turned.js';
 
-const maxSide = 16384; // of an atlas; what a graphics card takes is less, mostly, and asked of it
+export const maxSide = 16384; // of an atlas; what a graphics card takes is less, mostly, and asked of it
 
 /** A texture of the scene's own material, with the coordinates that it reads. */
 interface Placed {

@@ -20,6 +20,7 @@ import { LambentError } from './errors.js';
 import type { Directional } from './header.js';
 import type { LastReflection } from './outgoing.js';
 import { keepNormals } from './own_normals.js';
+import type { ShownOver } from './shown_material.js';
 import type { TransferTexture } from './transfer_texture.js';
 import type { RestPose, TurnableLight } from './turned.js';
 
@@ -159,6 +160,12 @@ export interface NodeRelief {
   dispose(): void;
 }
 
+/** What the processor summed: of an object, as it stands when it is drawn. */
+export interface NodeTable {
+  first: DataTexture;
+  of(object: Object3D): DataTexture;
+}
+
 export interface NodeEdition {
   sum(options: NodeSumOptions): NodeSum;
   /** For `colorNode` of a MeshBasicMaterial: its colour times the exit radiance of its vertices' receivers. */
@@ -169,6 +176,8 @@ export interface NodeEdition {
   reflection(sum: NodeSum, last: LastReflection, twoSided: boolean): MaterialNodes;
   /** The same of places in an atlas, and what glows. */
   overAtlas(sum: NodeSum, surface: NodeSurface): MaterialNodes;
+  /** Of sums in a picture, or in tables, for a MeshBasicMaterial. */
+  shown(of: NodeSum | NodeTable, over: ShownOver): MaterialNodes;
   /** A number a receiver, as exit radiance. */
   numbers(of: DataTexture, twoSided: boolean): MaterialNodes;
   /** Exit radiance, signed, in false colour; +-1 / gain are the ends of the scale. */

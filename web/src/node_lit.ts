@@ -6,10 +6,10 @@ import type { MaterialNodes } from './node_edition.js';
 /** What colours were made of. */
 const radiances = new WeakMap<object, Node<'vec3'>>();
 
-/** With the alpha of a texture, where there is one. */
-export function lit(radiance: Node<'vec3'>): Node<'vec4'> {
+/** With the alpha of a texture, where there is one; `share`: how much of a pixel that is. */
+export function lit(radiance: Node<'vec3'>, share?: Node<'float'>): Node<'vec4'> {
   const color = vec4(materialColor as unknown as Node<'vec4'>),
-    made = vec4(color.rgb.mul(radiance.max(0)), color.a);
+    made = vec4(color.rgb.mul(radiance.max(0)), share ? color.a.mul(share) : color.a);
   radiances.set(made, radiance);
   return made;
 }

@@ -35,10 +35,8 @@ import { InstanceNodes } from './node_instances.js';
 import { loop } from './node_loop.js';
 import type { NodeSum, NodeSumOptions } from './node_edition.js';
 import { isInstanced } from './instanced.js';
+import { sumColumns } from './shown_sums.js';
 import { Alike, lightIn, type TurnableLight } from './turned.js';
-
-/** Rows of receivers a row of the picture. */
-export const sumColumns = 2048;
 
 export type Picture = ReturnType<typeof rtt>;
 type Vectors = ReturnType<typeof uniformArray<'vec4'>>;

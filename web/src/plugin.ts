@@ -148,6 +148,11 @@ export class LambentTransferPlugin implements GLTFLoaderPlugin {
       generator: document.asset?.generator,
       nodes: this.nodes,
       bufferView: viewReader(this.parser),
+      showInstead: (mesh) => {
+        gltf.scene.clear();
+        gltf.scene.add(mesh);
+        gltf.animations.length = 0;
+      },
       mesh: ({ node, primitive }: TransferExtension['parts'][number]) => {
         const mesh = meshes.get(`${node} ${primitive}`);
         if (!mesh) throw new LambentError(`node ${node}, primitive ${primitive} has transfer but no mesh`);

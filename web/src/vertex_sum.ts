@@ -13,9 +13,8 @@ import {
 import { glslInstances } from './instanced.js';
 import type { BlockLayout } from './block_texture.js';
 import { LightSum, LightSums } from './light_sum.js';
+import { sumColumns as columns } from './shown_sums.js';
 import type { Sums } from './turned.js';
-
-const columns = 2048; // receivers a row of the picture
 
 /** GLSL: vec3 prtRadiance( uint receiver ), what there is in prtSums; of an instance, which has none, its sum. */
 export const lookUpSums = /* glsl */ `

@@ -8,14 +8,16 @@ import { attribute, frontFacing, int, ivec2, select, texture, textureLoad, unifo
 import { BlockNodes } from './block_nodes.js';
 import { atlasRadiance } from './node_atlas.js';
 import { bounced, lights } from './node_bounced.js';
-import type { MaterialNodes, NodeEdition, NodeSum, NodeSurface } from './node_edition.js';
+import type { MaterialNodes, NodeEdition, NodeSum, NodeSurface, NodeTable } from './node_edition.js';
 import { GlassNode } from './node_glass.js';
 import { falseColor, lit, underLights } from './node_lit.js';
 import { LobeNodes } from './node_lobes.js';
 import { glossy, type RowReader } from './node_reflection.js';
-import { receiverAt, Sum, sumColumns, type Picture } from './node_sum.js';
+import { shown } from './node_shown.js';
+import { receiverAt, Sum, type Picture } from './node_sum.js';
 import { ReliefNodes } from './node_transfer_texture.js';
 import { UnshadowedNodes } from './node_unshadowed.js';
+import { sumColumns } from './shown_sums.js';
 
 function emitted({ emission, emissive }: NodeSurface): Node<'vec3'> {
   const color = uniform(emission.value) as unknown as Node<'vec3'>;
@@ -81,6 +83,7 @@ export const nodes: NodeEdition = {
     colorNode: lit(atlasRadiance(sum as Sum, surface)),
     emissiveNode: emitted(surface),
   }),
+  shown: (of, over) => shown(of as Sum | NodeTable, over),
   numbers(of: DataTexture, twoSided: boolean): MaterialNodes {
     const at = (name: string): Node<'vec3'> => {
         const { r, none } = receiverAt(name),

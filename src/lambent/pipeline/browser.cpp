@@ -12,18 +12,19 @@ namespace lambent {
 namespace {
 
 constexpr DrawnKind kinds[] = {
-    {"dense", "diffuse", "vertices"},      {"dense", "diffuse", "texels"},       {"dense", "directional", "texels"},
-    {"dense", "outgoing", "vertices"},     {"clusters", "diffuse", "vertices"},  {"clusters", "diffuse", "texels"},
-    {"clusters", "directional", "texels"}, {"clusters", "outgoing", "vertices"}, {"factors", "outgoing", "vertices"},
-    {"lobes", "diffuse", "vertices"},      {"lobes", "outgoing", "vertices"},    {"blocks", "sight", "vertices"},
-    {"surfels", "diffuse", "vertices"},    {"surfels", "diffuse", "texels"},
+    {"dense", "diffuse", "vertices"},    {"dense", "diffuse", "texels"},        {"dense", "directional", "texels"},
+    {"dense", "outgoing", "vertices"},   {"dense", "pixels", "view"},           {"clusters", "diffuse", "vertices"},
+    {"clusters", "diffuse", "texels"},   {"clusters", "directional", "texels"}, {"clusters", "outgoing", "vertices"},
+    {"factors", "outgoing", "vertices"}, {"lobes", "diffuse", "vertices"},      {"lobes", "outgoing", "vertices"},
+    {"blocks", "sight", "vertices"},     {"surfels", "diffuse", "vertices"},    {"surfels", "diffuse", "texels"},
+    {"wavelets", "diffuse", "vertices"}, {"wavelets", "diffuse", "texels"},     {"wavelets", "pixels", "view"},
 };
 
 // What a kind that is not drawn is, for those who made it.
 std::string why_not(const Field& field) {
   using std::string;
-  if (std::holds_alternative<FixedView>(field.where)) return "is of a fixed view, a picture without surfaces";
-  if (std::holds_alternative<HaarTransfer>(field.store)) return "holds transfer in wavelets";
+  if (std::holds_alternative<HaarTransfer>(field.store))
+    return string("holds transfer in wavelets at ") + name_of(field.where);
   if (std::holds_alternative<IndirectTransfer>(field.store))
     return string("holds direct-to-indirect transport that is ") + name_of(field.rows) + ", at " + name_of(field.where);
   if (std::holds_alternative<DirectionalRows>(field.rows))
@@ -47,7 +48,8 @@ Result<void> check_for_browser(const Field& field, const std::string& path) {
   if (const Outgoing* outgoing = outgoing_of(field); outgoing && outgoing->kind == OutgoingKind::directional)
     return refuse("holds a last reflection of compact lobes");
   const bool texels = std::holds_alternative<TexelPlacement>(field.where);
-  if (!light.groups.empty() && !texels) return refuse("holds the light of lamps at vertices");
+  if (!light.groups.empty() && !texels)
+    return refuse(std::string("holds the light of lamps at ") + name_of(field.where));
   if (light.count() > max_drawn_columns)
     return refuse(fmt::format("has {} columns of light, more than {}", light.count(), max_drawn_columns));
   if (const auto* lobes = std::get_if<ZonalTransfer>(&field.store);

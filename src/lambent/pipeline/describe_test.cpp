@@ -22,6 +22,12 @@ IndirectTransfer one_surfel() {
   return t;
 }
 
+HaarTransfer no_wavelets() {
+  HaarTransfer t;
+  t.size = 16, t.receivers = 7, t.steps.assign(t.columns(), 0), t.starts = {0, 0}, t.begin.assign(t.columns() + 1, 0);
+  return t;
+}
+
 // One field of every store with every meaning and placement that there are names for; only their headers count here.
 std::vector<Field> all_fields() {
   const Store stores[] = {Transfer{{.order = 3}, 1, 3, 7},
@@ -29,7 +35,8 @@ std::vector<Field> all_fields() {
                           ZonalTransfer{.order = 3, .lobes = 2, .receivers = 7},
                           FactoredTransfer{Transfer{{.order = 5}, 1, 1, 7}, 2},
                           Visibility{.size = 16, .bits = 1, .receivers = 0, .begin = {0}},
-                          one_surfel()};
+                          one_surfel(),
+                          no_wavelets()};
   const Rows rows[] = {DiffuseRows{},        DirectionalRows{DirectionalKind::sh2},
                        Outgoing{.order = 1}, IncidentRows{2},
                        PixelRows{},          SightRows{}};
@@ -55,7 +62,7 @@ TEST(Describe, NamesEveryAxis) {
     EXPECT_NE(describe_in_words(field).find(rows), std::string::npos);
     words.insert(d["store"].get<std::string>() + d["where"].get<std::string>() + d["meaning"].get<std::string>());
   }
-  EXPECT_EQ(words.size(), 6u * 6u * 5u);
+  EXPECT_EQ(words.size(), 7u * 6u * 5u);
 }
 
 TEST(Describe, SaysWhatAFieldIs) {
@@ -123,8 +130,7 @@ TEST(Browser, RefusesScenesThatLampsDoNotLightThere) {
 }
 
 TEST(Describe, RowsOfAFixedViewAreOfPixels) {
-  HaarTransfer t;
-  t.size = 16, t.receivers = 7, t.steps.assign(t.columns(), 0), t.starts = {0, 0}, t.begin.assign(t.columns() + 1, 0);
+  const HaarTransfer t = no_wavelets();
   const Field fixed{FixedView{{}, 7, 1}, t, PixelRows{}}, at_vertices{VertexPlacement{}, t, DiffuseRows{}};
   EXPECT_NE(describe_in_words(fixed).find("1,536 a pixel"), std::string::npos) << describe_in_words(fixed);
   EXPECT_NE(describe_in_words(fixed).find("7 pixels"), std::string::npos);
@@ -155,8 +161,12 @@ TEST(Browser, RefusesAllElseByName) {
   CpcaTransfer more = many;
   ++more.receivers;
   EXPECT_TRUE(has(why(VertexPlacement{}, more, Outgoing{}), "more than 512 MiB once unfolded"));
-  EXPECT_TRUE(has(why(FixedView{}, Transfer{}, PixelRows{}), "fixed view"));
-  EXPECT_TRUE(has(why(VertexPlacement{}, HaarTransfer{}, DiffuseRows{}), "wavelets"));
+  EXPECT_EQ(why(FixedView{}, Transfer{}, PixelRows{}), "");
+  EXPECT_TRUE(has(why(FixedView{}, Transfer{{.groups = {"a"}}}, PixelRows{}), "lamps at"));
+  EXPECT_EQ(why(FixedView{}, Transfer{{.lobes = {{{0, 1, 0}, 2}}}}, PixelRows{}), "");
+  EXPECT_EQ(why(FixedView{}, HaarTransfer{}, PixelRows{}), "");
+  EXPECT_EQ(why(VertexPlacement{}, HaarTransfer{}, DiffuseRows{}), "");
+  EXPECT_TRUE(has(why(PatchPlacement{}, HaarTransfer{}, DiffuseRows{}), "wavelets at patches"));
   EXPECT_EQ(why(VertexPlacement{}, Visibility{}, SightRows{}), "");
   EXPECT_TRUE(has(why(PatchPlacement{}, IndirectTransfer{}, DiffuseRows{}),
                   "direct-to-indirect transport that is diffuse, at patches"));
