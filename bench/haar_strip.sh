@@ -49,5 +49,6 @@ python3 bench/beside.py $out/strip.png "$size" $out/harmonics.png:0/3 $out/wavel
 for name in harmonics wavelets; do
   bytes=$(number bytes $out/${name}_inspected.json) receivers=$(number receivers $out/${name}_drawn.json)
   echo "{\"name\": \"haar_strip_$name\", \"ours\": $(number sloped $out/$name.json), \"unit\": \"dB\"," \
-    "\"bytes_a_receiver\": $((bytes / receivers)), \"relight_seconds\": $(number relight_seconds $out/${name}_drawn.json)}"
+    "\"bytes_a_receiver\": $((bytes / receivers))," \
+    "\"relight_seconds\": $(number relight_seconds $out/${name}_drawn.json)}"
 done
