@@ -235,46 +235,45 @@ describe.skipIf(!haveTool || !haveBrowser)('materials in a program', () => {
     await alike('unshadowed_sun', (backend) => shoot(backend, { ...open, light: sun, exposure: -2, peaks: true }));
   });
 
-  for (const [lobes, order] of [
-    [2, 5],
-    [4, 6],
-  ] as const)
-    it(`shades a mesh by a texture of lobes: ${lobes} of order ${order}`, async () => {
+  const few = ['--depth', '0.25', '--size', '32', '--samples', '128'],
+    groove = { depth: 0.6, width: 0.8 };
+  for (const { name, order, patch, worn, grooves } of [
+    { name: 'relief_2', order: 5, patch: [...few, '--lobes', '2', '--order', '5'], worn: [] },
+    { name: 'relief_4', order: 6, patch: [...few, '--lobes', '4', '--order', '6'], worn: [] },
+    {
+      ...{ name: 'grooves', order: 6, patch: ['--groove', '1', '--size', '16'], grooves: groove },
+      worn: ['--groove-depth', String(groove.depth), '--groove-width', String(groove.width)],
+    },
+  ])
+    it(`shades a mesh by a texture of lobes: ${name}`, async () => {
       const near = '1.6,1.5,2.2,-0.1,0.4,-0.2,40',
         tile = [2, 1.5],
-        truth = at(`relief_${lobes}.png`),
+        truth = at(`${name}.png`),
         wave = (x: number, y: number): number =>
-          0.5 + 0.25 * Math.sin((2 * Math.PI * x) / 32) + 0.2 * Math.cos((2 * Math.PI * (x + 2 * y)) / 32 + 0.7),
-        few = ['--depth', '0.25', '--size', '32', '--samples', '128'];
+          0.5 + 0.25 * Math.sin((2 * Math.PI * x) / 32) + 0.2 * Math.cos((2 * Math.PI * (x + 2 * y)) / 32 + 0.7);
       writeBumpy(at('mesh.gltf'));
       writeFileSync(
         at('heights.png'),
         png(32, 32, (x, y) => [wave(x, y), wave(x, y), wave(x, y)]),
       );
-      lambent(
-        ...['patch', at('heights.png'), ...few, '--lobes', String(lobes), '--order', String(order)],
-        ...['-o', at(`relief_${lobes}.lpt`)],
-      );
-      renderLinear(
-        ...[at('mesh.gltf'), '--transfer-texture', at(`relief_${lobes}.lpt`), '--tile', tile.join()],
+      lambent('patch', ...(grooves ? [] : [at('heights.png')]), ...patch, '-o', at(`${name}.lpt`));
+      const wearing = (...more: string[]): string[] => [
+        ...[at('mesh.gltf'), '--transfer-texture', at(`${name}.lpt`), '--tile', tile.join()],
         ...['--env', at('light.hdr'), '--env-rotate', rotate, '--camera', near, '--size', size.join('x')],
-        ...['--spp', '16', '--background', 'none', '--exposure=1', '-o', truth],
-      );
-      const shot = { path: '/files/mesh.gltf', light: lightOf(order), camera: cameraOf(near), size };
-      await alike(
-        `relief_${lobes}`,
-        async (backend) =>
+        ...['--spp', '16', '--background', 'none', '--exposure=1', ...more],
+      ];
+      renderLinear(...wearing(...worn), '-o', truth);
+      const shot = { path: '/files/mesh.gltf', light: lightOf(order), camera: cameraOf(near), size },
+        shown = async (backend: Backend): Promise<string> =>
           (
-            await page.evaluate(([b, s, r, t]) => window.gpu.textured(b, s, r, t, 1), [
-              backend,
-              shot,
-              `/files/relief_${lobes}.lpt`,
-              tile,
+            await page.evaluate(([b, s, r, t, g]) => window.gpu.textured(b, s, r, t, 1, g), [
+              ...([backend, shot, `/files/${name}.lpt`, tile, grooves] as const),
             ] as const)
-          ).png,
-        truth,
-        42,
-        40,
-      );
+          ).png;
+      await alike(name, shown, truth, 42, 40);
+      if (!grooves) return;
+      // The comparison can fail.
+      renderLinear(...wearing('--groove-depth', '0.3'), '-o', at('shallow.png'));
+      expect(psnr(at('shallow.png'), truth)).toBeLessThan(35);
     });
 });

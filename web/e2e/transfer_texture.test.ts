@@ -6,7 +6,7 @@ import type { ViteDevServer } from 'vite';
 import { afterAll, beforeAll, describe, expect, it } from 'vitest';
 import { readTransferTexture } from '../src/transfer_texture.ts';
 import { haveTool, lambent, lambentJson, makeFolder, renderLinear, writeLopsidedHdr } from '../test/tool.ts';
-import { haveBrowser, launch, openFixture, psnr } from './browser.ts';
+import { drawn, haveBrowser, launch, open, openFixture, psnr, serve } from './browser.ts';
 import { png, writeBumpy } from './scenes.ts';
 
 const camera = '1.6,1.5,2.2,-0.1,0.4,-0.2,40',
@@ -98,6 +98,60 @@ describe.skipIf(!haveTool || !haveBrowser)('a transfer texture', () => {
       expect(db).toBeGreaterThan(40);
     });
 
+  it('is worn by the scene in the page, which opens it, with sliders for how it is laid', async () => {
+    lambent('patch', '--groove', '1', '--size', '16', '-o', at('grooves.lpt'));
+    lambent('bake', at('mesh.gltf'), '--samples', '64', '--order', '6', '-o', at('worn.glb'));
+    const site = await serve(at('worn.glb'), '--env', at('light.hdr')),
+      view = `ui=off&background=none&camera=${camera}&rotate=${rotate}&window=none&exposure=1`,
+      shown = await open(browser, site.address, view, 640, 480);
+    const truth = (name: string, ...worn: string[]): string => {
+      renderLinear(
+        ...[at('mesh.gltf'), '--transfer-texture', at(`${name}.lpt`), ...worn, '--env', at('light.hdr')],
+        ...['--env-rotate', rotate, '--camera', camera, '--size', size.join('x'), '--spp', '16'],
+        ...['--background', 'none', '--exposure=1', '-o', at(`${name}_page_render.png`)],
+      );
+      return at(`${name}_page_render.png`);
+    };
+    const wear = async (name: string, values: Record<string, number>): Promise<string> => {
+      await shown.setInputFiles('#file', at(`${name}.lpt`));
+      await shown.waitForFunction(() => location.hash.includes('view=relief'));
+      for (const [id, value] of Object.entries(values))
+        await shown.$eval(
+          `#${id}`,
+          (slider, value) => {
+            (slider as HTMLInputElement).value = String(value);
+            slider.dispatchEvent(new Event('input', { bubbles: true }));
+          },
+          value,
+        );
+      await drawn(shown);
+      await shown.screenshot({ path: at(`${name}_page.png`) });
+      return at(`${name}_page.png`);
+    };
+    const relief = psnr(await wear('bumps_4', { 'tile-u': 2, 'tile-v': 1.5 }), truth('bumps_4', '--tile', '2,1.5'));
+    const laid = ['--tile', '2,6', '--groove-depth', '0.6', '--groove-width', '0.8'],
+      sliders = { 'tile-u': 2, 'tile-v': 6, 'groove-depth': 0.6, 'groove-width': 0.8 },
+      grooves = psnr(await wear('grooves', sliders), truth('grooves', ...laid));
+    console.log(`the page: relief ${relief.toFixed(1)}, grooves ${grooves.toFixed(1)} dB (${folder})`);
+    expect(Math.min(relief, grooves)).toBeGreaterThan(40);
+    await shown.close();
+
+    const page = await open(browser, site.address, '', 900, 700);
+    await page.click('#more summary');
+    expect(await page.isVisible('#relief')).toBe(false);
+    await page.setInputFiles('#file', at('bumps_4.lpt'));
+    await page.waitForSelector('#relief:not([hidden])');
+    expect(await page.isVisible('#groove-depth')).toBe(false);
+    expect(await page.inputValue('#view')).toBe('relief');
+    await page.screenshot({ path: at('relief_controls.png') });
+    writeFileSync(at('broken.lpt'), readFileSync(at('bumps_4.lpt')).subarray(0, 1000));
+    await page.setInputFiles('#file', at('broken.lpt'));
+    await page.waitForSelector('#problem:not([hidden])');
+    expect(await page.textContent('#problem-text')).toMatch(/broken\.lpt.*bytes/);
+    await page.close();
+    expect(await site.stop()).toBe(0);
+  });
+
   it('is refused in a sentence where it is none', () => {
     const file = new Uint8Array(readFileSync(at('bumps_4.lpt'))),
       read = (change: (bytes: Uint8Array) => Uint8Array | void) => () => {
@@ -106,8 +160,10 @@ describe.skipIf(!haveTool || !haveBrowser)('a transfer texture', () => {
       };
     expect(read(() => new Uint8Array(0))).toThrow(/is not a texture/);
     expect(read((b) => b.subarray(0, 100))).toThrow(/36 bytes/);
-    expect(read((b) => b.set([50], 7))).toThrow(/another version/);
-    expect(read((b) => b.set([1], 32))).toThrow(/grooves/);
+    expect(read((b) => b.set([51], 7))).toThrow(/another version/);
+    expect(read((b) => b.set([1], 32))).toThrow(/grooves have no depth/);
+    expect(read((b) => b.set([2], 32))).toThrow(/kind that is not known/);
+    expect(read((b) => b.set([50], 7))).toThrow(/seen from views/);
     expect(read((b) => b.set([0, 0, 0, 0], 8))).toThrow(/width or height/);
     expect(read((b) => b.set([99], 16))).toThrow(/order, lobes/);
     expect(read((b) => b.set([3], 28))).toThrow(/precision/);

@@ -18,6 +18,16 @@ export function connectWipe(share: () => number, move: (share: number) => void):
   });
 }
 
+/** The sheet of hands and keys, by its button and the key ?. */
+export function connectHelp(): void {
+  const help = get<HTMLDialogElement>('help');
+  get('help-open').addEventListener('click', () => help.showModal());
+  get('help-close').addEventListener('click', () => help.close());
+  addEventListener('keydown', (e) => {
+    if (e.key === '?' && !help.open) help.showModal();
+  });
+}
+
 /** A double click, or the key L under the pointer, in the picture's middle where there is none. */
 export function connectLobes(viewer: Viewer): void {
   const picture = get('picture');

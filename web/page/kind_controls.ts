@@ -1,14 +1,20 @@
 // Controls that some kinds of transfer have, and what is said of hands where a view is fixed.
-import type { BakedTransfer } from '../src/index.js';
+import { shBand, shIndex, type BakedTransfer } from '../src/index.js';
 import { get, input } from './dom.js';
+import { falseColorEnd, falseColorGain, fitErrorEnd } from './false_color.js';
 import type { Manifest } from './loading.js';
-import type { View } from './state.js';
+import type { State, View } from './state.js';
 
-export function possibleViews(transfer: BakedTransfer | undefined, manifest: Manifest | undefined): View[] {
+export function possibleViews(
+  transfer: BakedTransfer | undefined,
+  manifest: Manifest | undefined,
+  hasRelief: boolean,
+): View[] {
   const possible: View[] = ['baked'];
   if (manifest?.compare) possible.push('compare');
   if (transfer?.indirect) possible.push('direct', 'indirect');
   else if (!transfer?.view) possible.push('unshadowed');
+  if (hasRelief) possible.push('relief');
   if (!transfer || transfer.coefficientMaterials) possible.push('coefficient');
   if (transfer?.fitErrorMaterials) possible.push('error');
   if (manifest?.reference) possible.push('reference');
@@ -20,6 +26,28 @@ export function showBands(transfer: BakedTransfer | undefined): void {
   const { reflection, terms, columns, order } = transfer ?? {};
   get('order-row').hidden = get('window-row').hidden =
     reflection !== undefined || terms !== undefined || (columns !== undefined && order === 0);
+}
+
+/** What false colours stand for, and which coefficient they show. */
+export function showScale(
+  { view, against, coefficient, exposure }: State,
+  { harmonics = Infinity }: Partial<NonNullable<BakedTransfer['columns']>> = {},
+): void {
+  const usesCoefficient = [view, against].includes('coefficient'),
+    usesError = [view, against].includes('error'),
+    l = shBand(coefficient),
+    m = coefficient - shIndex(l, 0);
+  get('coefficient-row').hidden = !usesCoefficient;
+  get('scale').hidden = !usesCoefficient && !usesError;
+  get('coefficient-name').textContent =
+    coefficient < harmonics ? `l ${l}, m ${m}` : `lobe ${coefficient - harmonics + 1}`;
+  const gain = falseColorGain(exposure),
+    end = falseColorEnd / gain;
+  get('scale-low').textContent = `−${end.toPrecision(2)}`;
+  get('scale-high').textContent = `+${end.toPrecision(2)}`;
+  if (!usesError || usesCoefficient) return;
+  get('scale-low').textContent = 'grey: 0 %'; // the scale's dark half is not used
+  get('scale-high').textContent = `${((100 * fitErrorEnd) / gain).toPrecision(2)} %`;
 }
 
 /** What the slider goes through; 0: all. */

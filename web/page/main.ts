@@ -1,14 +1,6 @@
 // The page: controls, the wipe, files that are opened or dropped, and every message a user may see.
 import { Euler, MathUtils, Vector3 } from 'three';
-import {
-  LambentError,
-  NoTransferError,
-  shBand,
-  shIndex,
-  shWindows,
-  type Reflection,
-  type ShWindow,
-} from '../src/index.js';
+import { LambentError, NoTransferError, shWindows, type Reflection, type ShWindow } from '../src/index.js';
 import {
   loadManifest,
   makeEnvironment,
@@ -23,17 +15,17 @@ import {
 } from './loading.js';
 import { bandsOf } from './model.js';
 import { get, degrees, hideProblem, input, select, sentence, showLoading, showProblem } from './dom.js';
-import { connectLobes, connectWipe } from './hands.js';
+import { connectHelp, connectLobes, connectWipe } from './hands.js';
 import { fetchWhole, openAsItComes } from './incoming.js';
 import { LampControls } from './lamp_controls.js';
 import { connectSharing } from './sharing.js';
 import { highestSun, lowestSun, parseSky, type Sky } from './sky.js';
 import { defaultState, formatState, parseState, viewNames as names, type State, type View } from './state.js';
+import { connectRelief, showRelief, wearRelief } from './relief.js';
 import { showSurface, takeReflection } from './surface.js';
-import { possibleViews, showBands, showFixed, showTerms, takeTerms } from './kind_controls.js';
+import { possibleViews, showBands, showFixed, showScale, showTerms, takeTerms } from './kind_controls.js';
 import { showFrameTime, showStatistics } from './statistics.js';
 import { tones, type Tone } from './tone.js';
-import { falseColorEnd, falseColorGain, fitErrorEnd } from './false_color.js';
 import { Viewer } from './viewer.js';
 
 const usualSpin = 12; // degrees a second
@@ -109,7 +101,7 @@ class Page {
   private show(): void {
     const { state, viewer } = this;
     const transfer = viewer.bakedScene?.transfer,
-      possible = possibleViews(transfer, this.manifest);
+      possible = possibleViews(transfer, this.manifest, viewer.baked?.relief !== undefined);
     if (!possible.includes(state.view)) state.view = 'baked';
     if (state.against && !possible.includes(state.against)) delete state.against;
     const option = (value: string, text: string): HTMLOptionElement => new Option(text, value);
@@ -167,23 +159,8 @@ class Page {
     else viewer.invalidate();
     this.showExposure();
     get('order-value').textContent = `${viewer.bands} of ${bandsOf(viewer.bakedScene?.transfer)}`;
-    const usesCoefficient = [state.view, state.against].includes('coefficient');
-    const l = shBand(state.coefficient),
-      m = state.coefficient - shIndex(l, 0);
-    const usesError = [state.view, state.against].includes('error');
-    get('coefficient-row').hidden = !usesCoefficient;
-    get('scale').hidden = !usesCoefficient && !usesError;
-    const { harmonics = Infinity } = viewer.bakedScene?.transfer.columns ?? {};
-    get('coefficient-name').textContent =
-      state.coefficient < harmonics ? `l ${l}, m ${m}` : `lobe ${state.coefficient - harmonics + 1}`;
-    const end = falseColorEnd / falseColorGain(state.exposure);
-    get('scale-low').textContent = `−${end.toPrecision(2)}`;
-    get('scale-high').textContent = `+${end.toPrecision(2)}`;
-    if (usesError && !usesCoefficient) // the scale's dark half is not used
-    {
-      get('scale-low').textContent = 'grey: 0 %';
-      get('scale-high').textContent = `${((100 * fitErrorEnd) / falseColorGain(state.exposure)).toPrecision(2)} %`;
-    }
+    showScale(state, viewer.bakedScene?.transfer.columns);
+    showRelief([state.view, state.against].includes('relief') ? viewer.baked?.relief : undefined);
     const wipe = get('wipe');
     wipe.hidden = !state.against;
     wipe.style.left = `${100 * state.wipe}%`;
@@ -314,14 +291,13 @@ class Page {
     connectSharing(viewer, () => ({
       name: document.title,
       address: this.saveNow(),
-      whole: this.isServed && this.environments.findIndex((e) => e.opened) < 0,
+      whole: this.isServed && !viewer.baked?.relief && this.environments.findIndex((e) => e.opened) < 0,
     }));
-    const showHelp = (): void => get<HTMLDialogElement>('help').showModal();
-    get('help-open').addEventListener('click', showHelp);
-    get('help-close').addEventListener('click', () => get<HTMLDialogElement>('help').close());
-    addEventListener('keydown', (e) => {
-      if (e.key === '?' && !get<HTMLDialogElement>('help').open) showHelp();
-    });
+    connectHelp();
+    connectRelief(
+      () => viewer.baked?.relief,
+      () => this.apply(),
+    );
     // How much of the page's foot the controls cover; later, since what depends on it is observed as well.
     const cover = (): void => {
       const { top } = get('controls').getBoundingClientRect();
@@ -346,6 +322,10 @@ class Page {
       if (isScene) {
         this.isServed = false;
         await this.openBaked(file.name, bytes, files);
+        this.show();
+      } else if (/\.lpt$/i.test(file.name)) {
+        wearRelief(this.viewer, bytes);
+        this.state.view = 'relief';
         this.show();
       } else {
         if (this.viewer.indirect) throw new LambentError('is no scene, and lamps alone light this one');

@@ -9,9 +9,11 @@ import {
   type BakedScene,
   type BakedTransfer,
   type Lighting,
+  type TransferTexture,
 } from '../src/index.js';
+import { Relief } from './relief.js';
 
-export type Look = 'baked' | 'direct' | 'indirect' | 'unshadowed' | 'coefficient' | 'error';
+export type Look = 'baked' | 'direct' | 'indirect' | 'unshadowed' | 'relief' | 'coefficient' | 'error';
 
 /** Bands of light that count, at least 1. Lobes of light take none; for what is drawn without shadows a few do. */
 export const bandsOf = (transfer: BakedTransfer | undefined): number => transfer?.order || (transfer?.columns ? 6 : 1);
@@ -20,6 +22,7 @@ export class Model {
   readonly root: Object3D;
   readonly baked: BakedScene;
   private readonly own: Material[]; // by mesh, as all lists here
+  relief: Relief | undefined;
   private unshadowed: UnshadowedMaterial[] | undefined;
   private errors: Material[] | undefined;
   private coefficient: { index: number; bands: number | undefined; materials: Material[] } | undefined;
@@ -46,6 +49,15 @@ export class Model {
     return this.baked.transfer.meshes;
   }
 
+  /** In place of one before it. Throws LambentError where there is no sky to light it. */
+  setRelief(transfer: TransferTexture): void {
+    const { indirect, view } = this.baked.transfer;
+    if (indirect) throw new LambentError("is relief in the sky's light, and lamps alone light this scene");
+    if (view) throw new LambentError('is relief for surfaces, of which a fixed view has none');
+    this.relief?.dispose();
+    this.relief = new Relief(transfer, this.own);
+  }
+
   /** Gains scale false colour; `index` says which coefficient. */
   wear(
     look: Look,
@@ -66,6 +78,8 @@ export class Model {
         if (lighting) this.relight(lighting);
       }
       materials = this.unshadowed;
+    } else if (look === 'relief') {
+      materials = this.relief?.materials ?? this.own;
     } else if (look === 'coefficient') {
       const { transfer } = this.baked,
         bands = transfer.firstBands;
@@ -87,11 +101,13 @@ export class Model {
 
   relight(lighting: Lighting): void {
     this.baked.relight(lighting);
+    this.relief?.relight(lighting);
     for (const material of new Set(this.unshadowed ?? [])) material.relight(lighting);
   }
 
   dispose(): void {
     this.unshadowed?.forEach((m) => m.dispose());
+    this.relief?.dispose();
     this.disposeCoefficient();
     if (this.errors !== this.own) this.errors?.forEach((m) => m.dispose());
     this.baked.dispose();

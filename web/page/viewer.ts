@@ -75,7 +75,7 @@ export class Viewer {
   private readonly errorGain = { value: 1 };
   private readonly glyphs = new LobeGlyphs();
   private readonly bounds = new Sphere(new Vector3(), 1);
-  private baked: Model | undefined;
+  baked: Model | undefined;
   private compare: Model | undefined;
   private plain: Object3D | undefined; // a scene without transfer, in place of `baked`
   private environment: EnvironmentFile | undefined;

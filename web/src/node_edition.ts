@@ -150,6 +150,8 @@ export interface NodeUnshadowed {
 export interface NodeReliefOptions {
   transfer: TransferTexture;
   tile: Vector2;
+  /** Of a table of grooves; may change at any time. */
+  groove: { readonly depth: number; readonly width: number };
   width: number;
   height: number;
 }

@@ -43,6 +43,11 @@ export interface TransferTexture {
   order: number;
   lobes: number;
   channels: 1 | 3;
+  /**
+   * 0: a texture. Above: a table of grooves, columns places across one from border to border, rows depths from none to
+   * this one, in widths of the groove.
+   */
+  grooveDepth: number;
   layout: BlockLayout;
   texture: DataArrayTexture;
 }
@@ -53,17 +58,23 @@ export function readTransferTexture(bytes: ArrayBuffer): TransferTexture {
     magic = bytes.byteLength >= 64 ? new TextDecoder('latin1').decode(new Uint8Array(bytes, 0, 8)) : '';
   if (!magic.startsWith('LMBTLPT'))
     throw new LambentError('is not a texture of zonal lobes (make one with "lambent patch")');
+  if (magic === 'LMBTLPT2')
+    throw new LambentError('is seen from views (`patch --views`), which "lambent render" alone draws');
   if (magic !== 'LMBTLPT1') throw new LambentError('is a texture of zonal lobes of another version');
   const [width, height, order, lobes, channels, valueBytes] = [0, 1, 2, 3, 4, 5].map((k) =>
     view.getUint32(8 + 4 * k, true),
   ) as [number, number, number, number, number, number];
-  if (view.getUint32(32, true) !== 0) throw new LambentError('is a table of grooves, which this viewer does not draw');
+  const isTable = view.getUint32(32, true),
+    grooveDepth = isTable === 1 ? view.getFloat32(36, true) : 0;
+  if (isTable > 1) throw new LambentError('is of a kind that is not known to this program');
   const within = (x: number, most: number): boolean => x >= 1 && x <= most;
   if (!within(width, maxSide) || !within(height, maxSide))
     throw new LambentError('its width or height is out of range');
   if (!within(order, maxShOrder) || !within(lobes, maxLobes) || (channels !== 1 && channels !== 3))
     throw new LambentError('its order, lobes or channels are out of range');
   if (valueBytes !== 2 && valueBytes !== 4) throw new LambentError('its precision is not known to this program');
+  if (isTable && !(grooveDepth > 0 && grooveDepth <= 10 && width > 1 && height > 1))
+    throw new LambentError('its grooves have no depth, or too few places');
   const header = {
     count: zonalValues(order, lobes, channels),
     channels: 1,
@@ -71,7 +82,7 @@ export function readTransferTexture(bytes: ArrayBuffer): TransferTexture {
     receivers: width * height,
   } as const;
   const { layout, data } = packBlocks(header, bytes.slice(64));
-  return { width, height, order, lobes, channels, layout, texture: blockTexture(layout, data) };
+  return { width, height, order, lobes, channels, grooveDepth, layout, texture: blockTexture(layout, data) };
 }
 
 const vertexDeclarations = /* glsl */ `
@@ -110,16 +121,63 @@ void main() {
   band = vec4( sum, 1.0 );
 }`;
 
-const fragmentDeclarations = ({ order, lobes, channels, layout, width, height }: TransferTexture): string => {
-  const exact = exactZonalBands(order, lobes),
-    bands = order - exact,
-    exactQuads = Math.ceil((channels * shCount(exact)) / 4),
-    exactValues = channels * shCount(exact);
+/** GLSL: prtFrame and v[], of a texture. */
+const textureBody = ({ order, lobes, channels, width, height }: TransferTexture): string => {
+  const exactValues = channels * shCount(exactZonalBands(order, lobes));
+  return /* glsl */ `
+  // The frame of the texture's directions: along +u, along -v, outward; left-handed where the texture is mirrored.
+  vec2 ux = dFdx( vPrtPlace ), uy = dFdy( vPrtPlace );
+  float area = ux.x * uy.y - ux.y * uy.x;
+  vec3 along = px * uy.y - py * ux.y, down = py * ux.x - px * uy.x;
+  if ( area < 0.0 ) along = - along, down = - down;
+  along -= n * dot( n, along );
+  if ( area != 0.0 && dot( along, along ) > 0.0 ) {
+    along = normalize( along );
+    vec3 up = cross( n, along );
+    prtFrame = mat3( along, dot( up, down ) > 0.0 ? - up : up, n );
+  } else prtFrame = prtFrameAbout( n );
+  vec2 place = fract( vPrtPlace * prtTile ) * vec2( ${width}.0, ${height}.0 );
+  vec2 corner = floor( place - 0.5 ), f = place - 0.5 - corner;
+  ivec2 c = ivec2( corner ), nearest = ivec2( place );
+  for ( int k = 0; k < PRT_QUADS; ++ k ) v[ k ] = prtTexel( nearest, k );
+  for ( int k = 0; k < ${Math.ceil(exactValues / 4)}; ++ k ) {
+    vec4 mean = prtMean( c, f, k );
+    ${
+      exactValues % 4 === 0
+        ? 'v[ k ] = mean;'
+        : `bvec4 exact = lessThan( ivec4( 4 * k ) + ivec4( 0, 1, 2, 3 ), ivec4( ${exactValues} ) );
+    v[ k ] = mix( v[ k ], mean, vec4( exact ) );`
+    }
+  }`;
+};
+
+/** The same of a table of grooves, which lie side by side across the direction of the tile (section 4.2). */
+const grooveBody = ({ width, height }: TransferTexture): string => /* glsl */ `
+  // Right-handed: across the groove, in the plane of the normal, the way its place grows.
+  float phase = dot( vPrtPlace, prtTile ), x = ( fract( phase ) - 0.5 ) / prtGroove.x, depth = prtGroove.y;
+  vec3 area = cross( px, py ), across = dFdx( phase ) * cross( py, area ) + dFdy( phase ) * cross( area, px );
+  across -= n * dot( n, across );
+  float size = length( across );
+  prtFrame = prtFrameAbout( n );
+  if ( size > 0.0 ) {
+    across /= size;
+    prtFrame = mat3( across, cross( n, across ), n );
+  }
+  if ( ! ( abs( x ) < 0.5 ) ) x = 0.5, depth = 0.0; // the plane between grooves
+  vec2 place = clamp( vec2( x + 0.5, depth ), 0.0, 1.0 ) * vec2( ${width - 1}.0, ${height - 1}.0 );
+  ivec2 c = min( ivec2( place ), ivec2( ${width - 2}, ${height - 2} ) );
+  // All numbers: lobes correspond over the table.
+  for ( int k = 0; k < PRT_QUADS; ++ k ) v[ k ] = prtMean( c, place - vec2( c ), k );`;
+
+const fragmentDeclarations = (transfer: TransferTexture): string => {
+  const { order, lobes, channels, layout, width, height } = transfer,
+    bands = order - exactZonalBands(order, lobes);
   return /* glsl */ `
 #define PRT_QUADS ${layout.quads}
 uniform highp sampler2DArray prtTransfer;
 uniform highp sampler2D prtTable;
 uniform vec2 prtTile;
+uniform vec2 prtGroove; // width, of a repetition; depth, of the table's deepest
 uniform vec4 prtLight[ 3 * ${Math.ceil(shCount(order) / 4)} ];
 varying vec3 vPrtPosition, vPrtNormal;
 varying vec2 vPrtPlace;
@@ -138,40 +196,21 @@ vec4 prtTexel( const in ivec2 place, const in int k ) {
                     r / ${layout.columns * layout.rows} );
   return texelFetch( prtTransfer, at + ivec3( k, 0, 0 ), 0 );
 }
+vec4 prtMean( const in ivec2 c, const in vec2 f, const in int k ) {
+  return mix( mix( prtTexel( c, k ), prtTexel( c + ivec2( 1, 0 ), k ), f.x ),
+              mix( prtTexel( c + ivec2( 0, 1 ), k ), prtTexel( c + ivec2( 1, 1 ), k ), f.x ), f.y );
+}
+// The normal's frame where texture coordinates do not tell: frame_about() of the C++ library.
+mat3 prtFrameAbout( const in vec3 n ) {
+  float side = n.z < 0.0 ? - 1.0 : 1.0, a = - 1.0 / ( side + n.z ), b = n.x * n.y * a;
+  return mat3( vec3( 1.0 + side * n.x * n.x * a, side * b, - side * n.x ),
+               vec3( b, side + n.y * n.y * a, - n.y ), n );
+}
 vec3 prtExitRadiance() {
-  // The frame of the texture's directions: along +u, along -v, outward; left-handed where the texture is mirrored.
   vec3 px = dFdx( vPrtPosition ), py = dFdy( vPrtPosition ), n = normalize( vPrtNormal );
   if ( ! gl_FrontFacing ) n = - n;
-  vec2 ux = dFdx( vPrtPlace ), uy = dFdy( vPrtPlace );
-  float area = ux.x * uy.y - ux.y * uy.x;
-  vec3 along = px * uy.y - py * ux.y, down = py * ux.x - px * uy.x;
-  if ( area < 0.0 ) along = - along, down = - down;
-  along -= n * dot( n, along );
-  if ( area != 0.0 && dot( along, along ) > 0.0 ) {
-    along = normalize( along );
-    vec3 up = cross( n, along );
-    prtFrame = mat3( along, dot( up, down ) > 0.0 ? - up : up, n );
-  } else {
-    float side = n.z < 0.0 ? - 1.0 : 1.0, a = - 1.0 / ( side + n.z ), b = n.x * n.y * a;
-    prtFrame = mat3( vec3( 1.0 + side * n.x * n.x * a, side * b, - side * n.x ),
-                     vec3( b, side + n.y * n.y * a, - n.y ), n );
-  }
-  vec2 place = fract( vPrtPlace * prtTile ) * vec2( ${width}.0, ${height}.0 );
-  vec2 corner = floor( place - 0.5 ), f = place - 0.5 - corner;
-  ivec2 c = ivec2( corner ), nearest = ivec2( place );
   vec4 v[ PRT_QUADS ];
-  for ( int k = 0; k < PRT_QUADS; ++ k ) v[ k ] = prtTexel( nearest, k );
-  for ( int k = 0; k < ${exactQuads}; ++ k ) {
-    vec4 low = mix( prtTexel( c, k ), prtTexel( c + ivec2( 1, 0 ), k ), f.x );
-    vec4 high = mix( prtTexel( c + ivec2( 0, 1 ), k ), prtTexel( c + ivec2( 1, 1 ), k ), f.x );
-    vec4 mean = mix( low, high, f.y );
-    ${
-      exactValues % 4 === 0
-        ? 'v[ k ] = mean;'
-        : `bvec4 exact = lessThan( ivec4( 4 * k ) + ivec4( 0, 1, 2, 3 ), ivec4( ${exactValues} ) );
-    v[ k ] = mix( v[ k ], mean, vec4( exact ) );`
-    }
-  }
+  ${transfer.grooveDepth > 0 ? grooveBody(transfer) : textureBody(transfer)}
   return prtSum( v );
 }
 `;
@@ -182,8 +221,14 @@ vec3 prtExitRadiance() {
  * texture coordinates and normals.
  */
 export class TransferTextureMaterial extends MeshBasicMaterial {
-  /** Repetitions of the texture over the unit of texture coordinates. */
+  /**
+   * Repetitions of the texture over the unit of texture coordinates. Grooves run where its product with those is
+   * constant.
+   */
   readonly tile = new Vector2(1, 1);
+  /** Of a table of grooves: depth in widths of a groove, up to the table's; width in repetitions, (0, 1]. */
+  readonly groove: { depth: number; width: number };
+  private readonly grooveNow = new Vector2(1, 1);
   private readonly light: Float32Array;
   private readonly table: DrawnPicture;
   private readonly relief: NodeRelief | undefined; // for WebGPURenderer
@@ -195,7 +240,14 @@ export class TransferTextureMaterial extends MeshBasicMaterial {
     nodes?: NodeEdition,
   ) {
     super(parameters);
-    this.relief = nodes?.relief({ transfer, tile: this.tile, width: tableWidth, height: tableHeight });
+    this.groove = { depth: transfer.grooveDepth, width: 1 };
+    this.relief = nodes?.relief({
+      transfer,
+      tile: this.tile,
+      groove: this.groove,
+      width: tableWidth,
+      height: tableHeight,
+    });
     setNodes(this, this.relief?.nodes, `This surface ${withoutEdition}.`);
     const { order, lobes } = transfer,
       exact = exactZonalBands(order, lobes),
@@ -231,6 +283,7 @@ export class TransferTextureMaterial extends MeshBasicMaterial {
   }
 
   override onBeforeRender(renderer: WebGLRenderer): void {
+    this.grooveNow.set(this.groove.width, this.groove.depth / (this.transfer.grooveDepth || 1));
     this.table.update(renderer);
   }
 
@@ -239,6 +292,7 @@ export class TransferTextureMaterial extends MeshBasicMaterial {
       prtTransfer: { value: this.transfer.texture },
       prtTable: { value: this.table.target.texture },
       prtTile: { value: this.tile },
+      prtGroove: { value: this.grooveNow },
       prtLight: { value: this.light },
     });
     shader.vertexShader =
@@ -248,8 +302,8 @@ export class TransferTextureMaterial extends MeshBasicMaterial {
   }
 
   override customProgramCacheKey(): string {
-    const { order, lobes, channels, width, height } = this.transfer;
-    return `lambent transfer texture ${order} ${lobes} ${channels} ${width} ${height}`;
+    const { order, lobes, channels, width, height, grooveDepth } = this.transfer;
+    return `lambent transfer texture ${order} ${lobes} ${channels} ${width} ${height} ${grooveDepth > 0}`;
   }
 
   override dispose(): void {
