@@ -1,4 +1,4 @@
-// Relief that the scene wears in the light of the open sky: a transfer texture (.lpt) that was opened, and its controls.
+// Relief that the scene wears in the light of the open sky: a transfer texture (.lpt) that was opened; its controls.
 import type { Material } from 'three';
 import {
   diffuseParameters,
