@@ -32,13 +32,14 @@ def load(path):
     return rows
 
 
-out, joined, names = sys.argv[1], None, 11
+out, joined = sys.argv[1], None
 height = int(sys.argv[2].split("x")[1])
 for text in sys.argv[3:]:
     path, part = text.rsplit(":", 1)
     panel, count = map(int, part.split("/"))
     rows = load(path)
     width = len(rows[0]) // count
+    names = 11 if width < 256 else 22  # larger letters
     cut = [row[panel * width : (panel + 1) * width] for row in rows[names : names + height]]
     joined = cut if joined is None else [a + b for a, b in zip(joined, cut)]
 
