@@ -144,7 +144,11 @@ std::vector<Vec3> project_environment(const Environment& env, int order) {
           const Vec3d energy = Vec3d(env.image.at(x, int(row))) * solid_angle;
           for (int i = 0; i < split; ++i) {
             evaluate_sh(order, texel_direction(x * split + i, fine_row, w * split, h * split), y);
-            for (size_t k = 0; k < coefficients; ++k) sum[k] += energy * double(y[k]);
+            // By components: with vectors' operators it is most of what a picture takes in a build with checks.
+            for (size_t k = 0; k < coefficients; ++k) {
+              const double value = double(y[k]);
+              sum[k].x += energy.x * value, sum[k].y += energy.y * value, sum[k].z += energy.z * value;
+            }
           }
         }
       }
