@@ -123,6 +123,11 @@ Result<Drawing> draw_columns(const Baked& baked, const DrawRequest& request, con
     drawing.summary.lines.emplace_back(
         "held", fmt::format("{:.1f} % of the light's energy (squared radiance) by the file's harmonics and lobes",
                             100 * d.light.held));
+    if (d.light.held < least_held)
+      job.warn(
+          fmt::format("{}: holds {:.1f} % of the light's energy: its lobes stand where they were baked, and what is "
+                      "sharper between them rings; a bake with lamps where this light has its own holds them",
+                      request.baked, 100 * d.light.held));
   }
   if (d.light.cube.size) {
     drawing.summary.json.update({{"terms", d.reading.terms}, {"bytes_read", d.reading.bytes}});

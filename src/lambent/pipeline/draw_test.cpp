@@ -238,6 +238,11 @@ TEST_F(Drawings, LampsOfTheLightMove) {
   const Vec3 turned = rotation_from_yaw_pitch_roll({25, 0, 0}) * axis;
   const std::string along = fmt::format("{},{}", degrees(std::atan2(turned.z, turned.x)), elevation);
   const Drawing by_hand = drawn("1@" + along, "", "25,0,0");
+  // A lamp that the whole sky took away from its lobe is warned of, too.
+  const Drawing away = drawn("", "", "60,0,0");
+  EXPECT_LT(away.summary.json["held"].get<double>(), 0.5);
+  ASSERT_EQ(warnings.size(), 1u);
+  EXPECT_NE(warnings[0].find("of the light's energy"), std::string::npos) << warnings[0];
   EXPECT_LT(mean_difference(by_hand.frames[0], drawn("", "", "25,0,0").frames[0]), 0.02);
   EXPECT_GT(mean_difference(by_hand.frames[0], still.frames[0]), 0.05);
 }
