@@ -8,7 +8,7 @@ import { afterAll, beforeAll, describe, expect, it } from 'vitest';
 import { haveTool, lambent, makeFolder, renderLinear, writeLopsidedHdr } from '../test/tool.ts';
 import { haveBrowser, launch, open, openFixture, psnr, serve } from './browser.ts';
 import { cameraOf, compareEditions, size, view } from './editions.ts';
-import type { Backend } from './fixture/webgpu.ts';
+import type { Backend, Shot } from './fixture/webgpu.ts';
 import { writeBumpy, writeScene } from './scenes.ts';
 
 const camera = '3.1,2.6,4.3,-0.3,0.8,0,38',
@@ -66,7 +66,7 @@ describe.skipIf(!haveTool || !haveBrowser)('lobes of light', () => {
           await page.evaluate(([b, s]) => window.gpu.shoot(b, s), [
             backend,
             { path: '/files/lamps.glb', light: [1, 1, 1], camera: cameraOf(camera), wears, size },
-          ] as const)
+          ] satisfies [Backend, Shot])
         ).png,
       inside = (a: string, b: string): Promise<number> =>
         page.evaluate(([a, b]) => window.gpu.inside(a, b), [a, b] as const);
