@@ -10,8 +10,8 @@ passed=0
 ok() { passed=$((passed + 1)); }
 bad() { echo "FAILED: $*"; failures=$((failures + 1)); }
 
-# Where LAMBENT_COARSE says so, for tools that are slow, as under sanitizers, commands are what they are with fewer rays
-# and smaller skies; how far pictures agree is for the tool that is quick.
+# Where LAMBENT_COARSE says so, for tools that are slow, as under sanitizers, commands are what they are with fewer rays,
+# smaller skies and coarser wavelets; how far pictures agree is for the tool that is quick.
 coarse() {
   local previous="" word
   words=()
@@ -21,6 +21,7 @@ coarse() {
       --spp) [[ $word =~ ^[0-9]+$ ]] && [ "$word" -gt 8 ] && word=8 ;;
     esac
     case $word in
+      haar:32*) word=haar:16${word#haar:32} ;;
       *width=* | sky) ;;
       sky:*) word+=,width=128 ;;
     esac

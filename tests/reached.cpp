@@ -1,30 +1,29 @@
 // What each test reaches: where $LAMBENT_REACHED names a file, a test adds a line to it, with its name, the
 // microseconds that it took, and the ranges of edges in the libraries that it passed, counted from the first (FROM-TO,
-// or one). For clang's inline counters of edges, which the sanitizers' build has for the fuzz targets; tests/reached.py
+// or one). For clang's inline flags of edges, which the sanitizers' build has for the fuzz targets; tests/reached.py
 // reads it.
 #include <gtest/gtest.h>
 
 #include <algorithm>
 #include <chrono>
-#include <cstdint>
 #include <cstdlib>
 #include <fstream>
 #include <vector>
 
 namespace {
 
-struct Counters {
-  uint8_t *begin, *end;
+struct Flags {
+  bool *begin, *end;
 };
-// Not a global of its own: counters are told of by constructors, in whatever order.
-std::vector<Counters>& counters() {
-  static std::vector<Counters> all;
+// Not a global of its own: flags are told of by constructors, in whatever order.
+std::vector<Flags>& flags() {
+  static std::vector<Flags> all;
   return all;
 }
 
 class Reached : public testing::EmptyTestEventListener {
   void OnTestStart(const testing::TestInfo&) override {
-    for (const Counters& c : counters()) std::fill(c.begin, c.end, 0);
+    for (const Flags& f : flags()) std::fill(f.begin, f.end, false);
     begun_ = std::chrono::steady_clock::now();
   }
   void OnTestEnd(const testing::TestInfo& test) override {
@@ -33,15 +32,14 @@ class Reached : public testing::EmptyTestEventListener {
     out << test.test_suite_name() << '.' << test.name() << ' '
         << std::chrono::duration_cast<std::chrono::microseconds>(took).count();
     size_t first = 0;
-    for (const Counters& c : counters()) {
-      for (const uint8_t* at = c.begin;
-           (at = std::find_if(at, (const uint8_t*)c.end, [](uint8_t n) { return n; })) < c.end;) {
-        const uint8_t* end = std::find(at, (const uint8_t*)c.end, 0);
-        out << ' ' << first + (at - c.begin);
-        if (end - at > 1) out << '-' << first + (end - c.begin) - 1;
+    for (const Flags& f : flags()) {
+      for (const bool* at = f.begin; (at = std::find(at, (const bool*)f.end, true)) < f.end;) {
+        const bool* end = std::find(at, (const bool*)f.end, false);
+        out << ' ' << first + (at - f.begin);
+        if (end - at > 1) out << '-' << first + (end - f.begin) - 1;
         at = end;
       }
-      first += c.end - c.begin;
+      first += f.end - f.begin;
     }
     out << '\n';
   }
@@ -55,4 +53,4 @@ const bool listening = [] {
 
 }  // namespace
 
-extern "C" void __sanitizer_cov_8bit_counters_init(uint8_t* begin, uint8_t* end) { counters().push_back({begin, end}); }
+extern "C" void __sanitizer_cov_bool_flag_init(bool* begin, bool* end) { flags().push_back({begin, end}); }

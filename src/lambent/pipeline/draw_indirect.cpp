@@ -113,7 +113,11 @@ void light_surfels(IndirectDrawing& d, DirectionalKind directional, bool first) 
   else if (first) std::fill(d.solve.x.begin(), d.solve.x.end(), Vec3(0.0f));
   for (int k = 0; k < d.request.frame_bounces; ++k) step_indirect(d.transfer, d.solve, d.direct);
   d.solve_seconds = std::min(d.solve_seconds, seconds_since(start)), start = Clock::now();
-  part_near_light(d);
+  if (const size_t left = part_near_light(d); left > 0 && first)
+    d.job.warn(
+        fmt::format("what {} lamps light near themselves is read off surfels, as softly as those lie apart: the "
+                    "first 64 alone are looked at more closely",
+                    left));
   d.near_seconds = std::min(d.near_seconds, seconds_since(start)), start = Clock::now();
   read_receivers(d, directional);
   d.read_seconds = std::min(d.read_seconds, seconds_since(start));

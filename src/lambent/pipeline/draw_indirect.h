@@ -135,8 +135,9 @@ size_t follow_lamp(IndirectDrawing& d, size_t k, size_t most);
 // All direct light at leaves, of what stands still and of d.lit one after the other, into d.direct.
 void sum_direct(IndirectDrawing& d);
 // Parts the first bounce near lamps from the rest, into d.near: of d.lit, as far as it is known. Uses d.solve's room,
-// whose s.sent is another then. Nothing where surfaces let light pass.
-void part_near_light(IndirectDrawing& d);
+// whose s.sent is another then. Nothing where surfaces let light pass. Returns how many lamps it left, after the first
+// 64.
+size_t part_near_light(IndirectDrawing& d);
 // What a place has of the bounces near lamps beyond what its kernels read of them, by `samples` rays of each kind from
 // `origin`, which is clear of its surface; `above`: the normal of its face.
 Vec3 near_bounce(const IndirectDrawing& d, Vec3 origin, Vec3 normal, Vec3 above, const Kernels& kernels, int samples,

@@ -245,6 +245,21 @@ TEST(IndirectDrawing, LampsInsideWallsHugeOrManyAreTaken) {
   EXPECT_LT(difference(drawn(room(), r), one), 1e-3);
 }
 
+TEST(IndirectDrawing, SaysHowManyLampsAreBeyondThoseThatItLooksAtClosely) {
+  DrawRequest r = request();
+  r.spp = 1, r.size = "4x4";
+  for (const size_t count : {64, 67}) {
+    std::vector<std::string> said;
+    r.lamp.assign(count, "point@0.6,0.8,1.2=0.003");
+    const Job job{nullptr, [&](const std::string& line) { said.push_back(line); }};
+    ASSERT_TRUE(draw(room(), r, job));
+    ASSERT_EQ(said.size(), count == 64 ? 0u : 1u);
+    if (count > 64) {
+      EXPECT_NE(said[0].find("what 3 lamps light near"), std::string::npos) << said[0];
+    }
+  }
+}
+
 // Its bounced light is smaller than what surfels can tell apart, and brighter than their means.
 TEST(IndirectDrawing, BesideAWallTheFirstBounceIsGatheredAtThePixel) {
   const Baked baked = room();

@@ -198,13 +198,17 @@ void part(IndirectDrawing& d, const MovingLamp& lamp, const LitLamp* lit, std::v
 
 }  // namespace
 
-void part_near_light(IndirectDrawing& d) {
+size_t part_near_light(IndirectDrawing& d) {
   std::vector<NearLamp> known = std::exchange(d.near, {});
-  if (d.tracer.lets_pass() || d.request.at == "receivers" || d.request.near_rays == 0) return;
+  if (d.tracer.lets_pass() || d.request.at == "receivers" || d.request.near_rays == 0) return 0;
+  size_t left = 0;
+  const auto take = [&](const MovingLamp& lamp, const LitLamp* lit) {
+    d.near.size() < most_near_lamps ? part(d, lamp, lit, known) : void(++left);
+  };
   for (const LitLamp& lit : d.lit)
-    if (lit.lamp.kind != MovingLamp::Kind::sun && d.near.size() < most_near_lamps) part(d, lit.lamp, &lit, known);
-  for (const MovingLamp& lamp : own_lamps(d))
-    if (d.near.size() < most_near_lamps) part(d, lamp, nullptr, known);
+    if (lit.lamp.kind != MovingLamp::Kind::sun) take(lit.lamp, &lit);
+  for (const MovingLamp& lamp : own_lamps(d)) take(lamp, nullptr);
+  return left;
 }
 
 Vec3 near_bounce(const IndirectDrawing& d, Vec3 origin, Vec3 normal, Vec3 above, const Kernels& kernels, int samples,
