@@ -77,7 +77,7 @@ Result<void> write_folder(const fs::path& target, const WebFiles& files, const P
 // What the page alone shows says nothing of other files.
 Result<void> check_options(const ExportCommand& o, const CLI::App& command) {
   const bool web = !o.folder.empty(), lightmap = !web && o.npy.empty() && o.three_probes.empty();
-  for (const char* name : {"--compare", "--reference", "--camera", "--exposure", "--tone", "--pack"})
+  for (const char* name : {"--compare", "--reference", "--camera", "--exposure", "--tone", "--pack", "--insert"})
     if (!web && command.count(name) > 0) return Error{name, "goes with --web alone", true};
   for (const char* name : {"--env", "--env-rotate"})
     if (!o.npy.empty() && command.count(name) > 0) return Error{name, "does not go with --npy", true};
@@ -108,7 +108,7 @@ int run_export(Context& context, const ExportCommand& o, const CLI::App& command
   fs::path target = fs::path(o.folder).lexically_normal();
   if (!target.has_filename()) target = target.parent_path();  // "site/"
   if (auto ok = check_target(target); !ok) return fail(ok.error());
-  auto files = web_files(o.web);
+  auto files = web_files(o.web, {&context.progress, [](const std::string& message) { warn(message); }});
   if (!files) return fail(files.error());
   if (auto ok = write_folder(target, *files, context.progress); !ok) return fail(ok.error());
   size_t bytes = 0;
@@ -147,6 +147,11 @@ void add_export(CLI::App& app, Run& run) {
       "--pack", o->web.pack,
       "With --web: baked files a third or less as large, for the page and the three.js package alone. Relative "
       "RMS error that transfer is rounded to, or auto: a quarter of the bake's own, 0.005 at most");
+  c->add_option("--insert", o->web.insert,
+                "With --web: FILE@X,Y,Z[,SCALE]: put a small diffuse object there, lit by the scene's lattice; may be "
+                "given again")
+      ->allow_extra_args(false)
+      ->take_all();
   c->add_option("--convention", o->convention,
                 "With --npy: whose light it goes with, and whose file names: pifu, icon, lambent, three, unity, godot, "
                 "gltf-ibl, filament, directx")

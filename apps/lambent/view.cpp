@@ -50,7 +50,8 @@ Result<void> check_view(const CLI::App& command, bool window) {
       return Error{option, "is of the page that a browser shows, not of --window", true};
   std::vector<std::string> of_window{"more", "--script", "--size"};
   for (const Option<DrawRequest>& o : draw_options())
-    if (WindowOptions::takes(o.name)) of_window.push_back(std::string("--") + o.name);
+    if (WindowOptions::takes(o.name) && o.name != std::string_view("insert"))
+      of_window.push_back(std::string("--") + o.name);
   for (const std::string& option : of_window)
     if (!window && command.count(option)) return Error{option, "is for --window", true};
   return {};
@@ -60,7 +61,9 @@ int run_view(Context& context, const ViewCommand& o, const CLI::App& command) {
   if (auto ok = check_view(command, o.window.window); !ok) return fail(ok.error());
   context.cleans_up = true;
   if (o.window.window) return run_window(context, o);
-  auto files = web_files(o.web);
+  WebOptions web = o.web;
+  web.insert = o.window.draw.insert;  // one option, of both
+  auto files = web_files(web, {&context.progress, [](const std::string& message) { warn(message); }});
   if (!files) return fail(files.error());
   auto listener = listen_on(o.port);
   if (!listener) return fail(listener.error());

@@ -9,8 +9,14 @@
 #include <lambent/image/image.h>
 #include <lambent/image/tone.h>
 #include <lambent/pipeline/browser.h>
+#include <lambent/pipeline/draw_insert.h>
+#include <lambent/scene/append.h>
+#include <lambent/scene/load.h>
+
+#include <stdlib.h>
 
 #include <algorithm>
+#include <cerrno>
 #include <filesystem>
 #include <optional>
 
@@ -83,9 +89,13 @@ Result<void> add_named_files(WebFiles& files, nlohmann::json& document, const st
 }
 
 struct AddedFile {
-  std::string name;  // data/STEM.glb or data/STEM.gltf
-  bool by_lamps;     // direct-to-indirect transport, which lamps light and no environment
+  std::string name;       // data/STEM.glb or data/STEM.gltf
+  bool by_lamps = false;  // direct-to-indirect transport, which lamps light and no environment
   std::optional<FixedView> view;
+  // Light in free space, where objects may be put; 0 where there is none.
+  Lattice lattice;
+  int lattice_order = 0;
+  Vec3d origin;
 };
 Result<float> packing_error(const std::string& text, std::span<const uint8_t> bytes, const std::string& path) {
   if (text == "auto") return default_packing_error(bytes, path);
@@ -101,28 +111,97 @@ Result<AddedFile> add_baked(WebFiles& files, const std::string& path, const std:
   if (!file) return file.error();
   auto whole = load_baked(*file, path);
   if (!whole) return whole.error();
-  if (auto ok = check_for_browser(whole->surface, whole->scene, path); !ok) return ok.error();
-  const bool by_lamps = std::holds_alternative<IndirectTransfer>(whole->surface.store);
-  std::optional<FixedView> view;
-  if (const auto* fixed = std::get_if<FixedView>(&whole->surface.where)) view = *fixed;
+  if (auto ok = check_file_for_browser(*whole, path); !ok) return ok.error();
+  AddedFile added;
+  added.by_lamps = std::holds_alternative<IndirectTransfer>(whole->surface.store);
+  if (const auto* fixed = std::get_if<FixedView>(&whole->surface.where)) added.view = *fixed;
+  if (const Field* free_space = lattice_of(*whole)) {
+    added.lattice = std::get<LatticePlacement>(free_space->where).lattice;
+    added.lattice_order = std::get<IncidentRows>(free_space->rows).order;
+  }
+  added.origin = whole->scene.origin;
   auto chunks = split_gltf(file->bytes(), path);
   if (!chunks) return chunks.error();
   const std::string ending = chunks->binary.data() ? "glb" : "gltf", name = "data/" + stem + "." + ending;
+  added.name = name;
   if (!pack.empty()) {
     auto error = packing_error(pack, file->bytes(), path);
     if (!error) return error.error();
     auto packed = pack_baked(file->bytes(), *error, path);
     if (!packed) return packed.error();
     files[name] = {media_type("glb"), std::move(packed->bytes)};
-    return AddedFile{name, by_lamps, view};
+    return added;
   }
   if (ending == "glb") {
     files[name] = {media_type("glb"), std::move(*file)};
-    return AddedFile{name, by_lamps, view};
+    return added;
   }
   if (auto ok = add_named_files(files, chunks->json, path, stem); !ok) return ok.error();
   files[name] = {media_type("gltf"), chunks->json.dump(-1, ' ', false, nlohmann::json::error_handler_t::replace)};
-  return AddedFile{name, by_lamps, view};
+  return added;
+}
+
+// A scene as a .glb in memory.
+Result<MappedFile> as_file(const Baked& baked) {
+  std::string folder = (fs::temp_directory_path() / "lambent-XXXXXX").string();
+  if (!::mkdtemp(folder.data())) return Error{folder, "cannot be made: " + std::generic_category().message(errno)};
+  const std::string path = folder + "/object.glb";
+  auto saved = save_baked(path, baked);
+  auto file = saved ? MappedFile::open(path) : Result<MappedFile>(saved.error());
+  std::error_code status;
+  fs::remove_all(folder, status);  // what is mapped stays
+  return file;
+}
+
+// Objects to be put into the scene, each file baked alone and once, and in the manifest where they stand.
+Result<void> add_inserts(WebFiles& files, nlohmann::json& manifest, const WebOptions& o, const AddedFile& baked,
+                         const Job& job) {
+  if (o.insert.empty()) return {};
+  const auto refuse = [](const std::string& why) { return Error{"--insert", why, true}; };
+  if (baked.by_lamps) return refuse("does not go with direct-to-indirect transport in the page: see `lambent render`");
+  if (baked.view) return refuse("puts objects among surfaces, and a fixed view has none");
+  if (baked.lattice_order == 0)
+    return Error{o.baked, "has no light in free space for --insert: bake it with --lattice"};
+  if (baked.origin != Vec3d(0)) return refuse("does not go with scenes far from the origin in the page");
+  if (o.insert.size() > max_drawn_inserts)
+    return refuse(fmt::format("puts {} objects at most into a scene of the page", max_drawn_inserts));
+  std::map<std::string, std::string> names;  // by path
+  manifest["inserts"] = manifest["insert"] = nlohmann::json::array();
+  for (const std::string& text : o.insert) {
+    auto insertion = parse_insertion(text);
+    if (!insertion) return insertion.error();
+    auto placed = place_object(*insertion, baked.lattice, job);
+    if (!placed) return placed.error();
+    std::string name = names[insertion->path];
+    if (name.empty()) {
+      const std::string own = fs::path(insertion->path).filename().string();
+      const auto taken = [&](const std::string& n) {
+        return n == "ball" ||
+               std::any_of(names.begin(), names.end(), [&](const auto& known) { return known.second == n; });
+      };
+      name = own;
+      for (int i = 2; taken(name); ++i) name = fmt::format("{} ({})", own, i);
+      names[insertion->path] = name;
+      if (placed->positions.size() > max_drawn_insert_vertices)
+        return Error{insertion->path, fmt::format("has {} vertices, and an object in the page {} at most",
+                                                  placed->positions.size(), max_drawn_insert_vertices)};
+      auto object = load_scene(insertion->path);
+      if (!object) return object.error();
+      place_scene(*object, Vec3(0), 1), object->origin = Vec3d(0);
+      auto made = bake_object(*insertion, std::move(*object), baked.lattice_order, job);
+      if (!made) return made.error();
+      auto file =
+          as_file(make_baked(std::move(made->scene), made->receivers, std::move(made->transfer), DiffuseRows{}));
+      if (!file) return file.error();
+      const std::string path = fmt::format("data/object-{}.glb", manifest["inserts"].size());
+      files[path] = {media_type("glb"), std::move(*file)};
+      manifest["inserts"].push_back({{"name", name}, {"file", path}});
+    }
+    const Vec3 p = insertion->foot;
+    manifest["insert"].push_back(name + fmt::format("@{},{},{}", p.x, p.y, p.z) +
+                                 (insertion->scale == 1 ? "" : fmt::format(",{}", insertion->scale)));
+  }
+  return {};
 }
 
 // What the page has no use for where lamps alone light the scene, by name.
@@ -174,7 +253,7 @@ void WebOptions::add_to(CLI::App& command) {
       ->capture_default_str();
 }
 
-Result<WebFiles> web_files(const WebOptions& options) {
+Result<WebFiles> web_files(const WebOptions& options, const Job& job) {
   auto display = parse_display(options.exposure, options.tone, {});
   if (!display) return display.error();
   nlohmann::json manifest{
@@ -205,6 +284,7 @@ Result<WebFiles> web_files(const WebOptions& options) {
     if (auto ok = check_views(options, *baked, &*compare); !ok) return ok.error();
     manifest["compare"] = compare->name;
   }
+  if (auto ok = add_inserts(files, manifest, options, *baked, job); !ok) return ok.error();
   if (auto ok = add_page(files); !ok) return ok.error();
   if (!options.reference.empty()) {
     std::vector<std::string> warnings;

@@ -32,6 +32,8 @@ describe.skipIf(!haveTool || !haveBrowser)('what axe-core finds', () => {
   beforeAll(async () => {
     const scene = writeScene(folder);
     lambent('bake', scene, '--order', '2', '--samples', '16', '-o', at('diffuse.glb'));
+    const lattice = ['--lattice', '3,2,3', '--lattice-order', '2'];
+    lambent('bake', scene, '--order', '2', '--samples', '16', ...lattice, '-o', at('lattice.glb'));
     lambent('bake', scene, '--transfer', 'blocks', '--cube', '16', '-o', at('blocks.glb'));
     lambent('bake', scene, '--transfer', 'indirect', '--surfels', '512', '--samples', '32', '-o', at('indirect.glb'));
     browser = await launch();
@@ -44,6 +46,7 @@ describe.skipIf(!haveTool || !haveBrowser)('what axe-core finds', () => {
   it.each([
     ['diffuse', ''],
     ['blocks', ''],
+    ['lattice', '&insert=ball@0.9,0,1.1,0.6&show=lattice,receivers'],
     ['indirect', '&lamp=point@0.9,1.9,1.1=6,5,4'],
   ])('of %s is nothing', async (kind, more) => {
     const server = await serve(at(`${kind}.glb`));
@@ -55,11 +58,12 @@ describe.skipIf(!haveTool || !haveBrowser)('what axe-core finds', () => {
       const page = await open(browser, server.address, `camera=3.1,2.6,4.3,-0.3,0.8,0,38${more}`, width, height);
       await page.emulateMedia({ colorScheme: scheme });
       expect(await faults(page)).toEqual([]);
-      for (const sheet of ['#lamps', '#more']) {
+      for (const sheet of ['#lamps', '#objects', '#more']) {
         if (!(await page.isVisible(sheet))) continue;
         await page.click(`${sheet} > summary`);
         expect(await faults(page), sheet).toEqual([]);
       }
+      await page.screenshot({ path: at(`${kind}_${width}.png`) });
       await page.keyboard.press('Escape');
       await page.click('#help-open');
       expect(await faults(page), 'help').toEqual([]);

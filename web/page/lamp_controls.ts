@@ -1,7 +1,9 @@
 // Lamps that move in the page: their list, their handles, and what else the page shows or leaves out where they alone
 // light the scene.
+import type { Lamp } from '../src/index.js';
 import { get } from './dom.js';
-import { LampHandles } from './lamp_handles.js';
+import { Handles } from './handles.js';
+import { lampHandles } from './lamp_handles.js';
 import { LampPanel, stateOfLamps, takeLamps, type LampState } from './lamps.js';
 import { showLightTime } from './statistics.js';
 import type { Viewer } from './viewer.js';
@@ -15,7 +17,7 @@ const ofLamps = ['lamp-hint', 'lamp-keys', 'lamp-keys-what'];
 
 export class LampControls {
   private readonly panel: LampPanel;
-  private readonly handles: LampHandles;
+  private readonly handles: Handles;
 
   /** `changed` is told whenever a hand has changed lamps or paint. */
   constructor(
@@ -26,14 +28,15 @@ export class LampControls {
       () => viewer.indirect,
       () => this.change(),
     );
-    this.handles = new LampHandles({
+    const lamps = (): readonly Lamp[] => viewer.indirect?.movingLamps ?? [];
+    this.handles = new Handles({
       camera: viewer.camera,
-      lamps: () => viewer.indirect?.movingLamps ?? [],
       radius: () => viewer.indirect?.bounds.radius ?? 1,
-      move: (index, lamp) => {
-        this.panel.set(index, lamp);
-        this.panel.follow(index, lamp);
-      },
+      wanted: () =>
+        lampHandles(lamps, (index, lamp) => {
+          this.panel.set(index, lamp);
+          this.panel.follow(index, lamp);
+        }),
     });
   }
 

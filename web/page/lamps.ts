@@ -16,6 +16,7 @@ import {
   type Rgb,
 } from '../src/index.js';
 import { get } from './dom.js';
+import { button, row, say, slider } from './rows.js';
 
 /** As the address has them: texts of --lamp, numbers of those that are off (from 1), texts of --albedo. */
 export interface LampState {
@@ -90,45 +91,12 @@ const hexOf = (color: Rgb): string => '#' + color.map((c) => toScreen(c).toStrin
 const colorOf = (hex: string): Rgb =>
   [1, 3, 5].map((i) => Number(toLinear(parseInt(hex.slice(i, i + 2), 16) / 255).toPrecision(6))) as Rgb;
 
-function row(text: string, control: HTMLElement, value?: HTMLOutputElement): HTMLLabelElement {
-  const label = document.createElement('label');
-  label.append(text, ' ', control);
-  if (value) label.append(' ', value);
-  return label;
-}
-function slider(
-  text: string,
-  [low, high]: readonly [number, number],
-  now: number,
-  say: (value: number) => string,
-  change: (value: number) => void,
-): HTMLLabelElement {
-  const range = document.createElement('input'),
-    value = document.createElement('output');
-  Object.assign(range, { type: 'range', min: String(low), max: String(high), step: 'any', value: String(now) });
-  range.name = text;
-  value.textContent = say(now);
-  range.addEventListener('input', () => {
-    value.textContent = say(Number(range.value));
-    range.setAttribute('aria-valuetext', value.textContent);
-    change(Number(range.value));
-  });
-  return row(text, range, value);
-}
 function colour(text: string, color: Rgb, change: (color: Rgb) => void): HTMLLabelElement {
   const picker = document.createElement('input');
   Object.assign(picker, { type: 'color', value: hexOf(color), name: text });
   picker.addEventListener('input', () => change(colorOf(picker.value)));
   return row(text, picker);
 }
-function button(text: string, click: () => void, label = text): HTMLButtonElement {
-  const made = document.createElement('button');
-  Object.assign(made, { type: 'button', textContent: text });
-  if (label !== text) made.setAttribute('aria-label', label);
-  made.addEventListener('click', click);
-  return made;
-}
-
 /** The controls. `change` is told of whatever a hand has changed. */
 export class LampPanel {
   /** Which one has its handle's mark, and is moved by the sliders that are open. */
@@ -290,8 +258,6 @@ export class LampPanel {
     return group;
   }
 }
-
-const say = (value: number): string => String(Number(value.toPrecision(3))).replace('-', '−');
 
 /** Colour and brightness: the colour is of the brightest channel 1. */
 function lightRows(given: Rgb, now: () => Rgb, change: (color: Rgb) => void): HTMLElement[] {

@@ -17,6 +17,7 @@ import { GLTFLoader, type GLTF } from 'three/addons/loaders/GLTFLoader.js';
 import { HDRLoader } from 'three/addons/loaders/HDRLoader.js';
 import {
   checkBakedFile,
+  extensionName,
   LambentError,
   LambentTransferPlugin,
   latLongMap,
@@ -33,6 +34,9 @@ export interface Manifest {
   compare?: string;
   reference?: string;
   environments: { name: string; file: string }[];
+  /** Objects that may be put into the scene, and those that stand in it to begin with, as the address has them. */
+  inserts?: { name: string; file: string }[];
+  insert?: string[];
   camera?: number[];
   rotate?: number[];
   exposure?: number | 'auto';
@@ -100,9 +104,19 @@ async function read(bytes: ArrayBuffer, beside: Beside, plugin: boolean): Promis
   }
 }
 
+/** Refuses what src/lambent/pipeline/browser.cpp refuses of whole files, in the same words. */
+function checkForPage(document: unknown): void {
+  const extension = (document as { extensions: Record<string, { shells?: unknown }> }).extensions[extensionName];
+  if (extension?.shells !== undefined)
+    throw new LambentError(
+      'holds the shadow field of an object, which the web page does not draw: `lambent render --place` and ' +
+        '`lambent view --window --place` put it over a baked scene',
+    );
+}
+
 /** A baked scene; its BakedScene is in gltf.userData.lambent. */
 export async function readBaked(bytes: ArrayBuffer, beside: Beside = ''): Promise<GLTF> {
-  checkBakedFile(bytes);
+  checkForPage(checkBakedFile(bytes));
   try {
     return await read(bytes, beside, true);
   } catch (error) {

@@ -27,6 +27,13 @@ export interface Picked {
   back: boolean;
 }
 
+/** Through a place of the canvas, in pixels. */
+export function rayAt(x: number, y: number, canvas: HTMLCanvasElement, camera: PerspectiveCamera): Raycaster {
+  const ray = new Raycaster();
+  ray.setFromCamera(new Vector2((2 * x) / canvas.clientWidth - 1, 1 - (2 * y) / canvas.clientHeight), camera);
+  return ray;
+}
+
 /** The vertex nearest to where the ray first meets a mesh. */
 export function pickVertex(meshes: readonly Mesh[], ray: Raycaster): Picked | undefined {
   // Bounds of skins are those of the pose in which they were last asked for.

@@ -17,9 +17,11 @@ import { bandsOf } from './model.js';
 import { get, degrees, hideProblem, input, select, sentence, showLoading, showProblem } from './dom.js';
 import { connectHelp, connectLobes, connectWipe } from './hands.js';
 import { fetchWhole, openAsItComes } from './incoming.js';
+import { InsertControls } from './insert_controls.js';
 import { LampControls } from './lamp_controls.js';
 import { connectSharing } from './sharing.js';
 import { highestSun, lowestSun, parseSky, type Sky } from './sky.js';
+import { OverlayControls } from './overlay_controls.js';
 import { defaultState, formatState, parseState, viewNames as names, type State, type View } from './state.js';
 import { connectRelief, showRelief, wearRelief } from './relief.js';
 import { showSurface, takeReflection } from './surface.js';
@@ -41,6 +43,8 @@ class Page {
   private savedSoon = 0;
   private opened = false;
   private readonly lamps: LampControls;
+  private readonly inserts: InsertControls;
+  private readonly overlays: OverlayControls;
 
   constructor(private readonly manifest: Manifest | undefined) {
     const { base } = this;
@@ -57,7 +61,7 @@ class Page {
       onProblem: showProblem,
       onRecovered: hideProblem,
       onMeter: () => this.showExposure(),
-      onDraw: () => this.lamps.place(),
+      onDraw: () => (this.lamps.place(), this.inserts.place()),
       onSettled: (isSettled) => this.lamps.settled(isSettled),
     });
     this.lamps = new LampControls(this.viewer, (to) => {
@@ -65,6 +69,11 @@ class Page {
       Object.assign(this.state, to);
       this.saveSoon();
     });
+    this.inserts = new InsertControls(this.viewer, manifest, (to) => {
+      this.state.inserts = to;
+      this.saveSoon();
+    });
+    this.overlays = new OverlayControls(this.viewer, (to) => ((this.state.show = to), this.saveSoon()));
     this.connect();
   }
 
@@ -126,6 +135,8 @@ class Page {
     showBands(transfer);
     showTerms(transfer?.terms === undefined ? undefined : state.terms);
     this.lamps.show();
+    this.inserts.show();
+    this.overlays.show(state.show);
     showFixed(transfer?.view !== undefined);
     const makeSurfaces = (brdf: Reflection): void => {
       state.brdf = takeReflection(transfer!, brdf, viewer.renderer, (error) =>
@@ -291,7 +302,11 @@ class Page {
     connectSharing(viewer, () => ({
       name: document.title,
       address: this.saveNow(),
-      whole: this.isServed && !viewer.baked?.relief && this.environments.findIndex((e) => e.opened) < 0,
+      whole:
+        this.isServed &&
+        this.inserts.isWhole &&
+        !viewer.baked?.relief &&
+        this.environments.findIndex((e) => e.opened) < 0,
     }));
     connectHelp();
     connectRelief(
@@ -319,7 +334,9 @@ class Page {
     void this.attempt(isScene ? '' : file.name, async () => {
       showLoading(`Reading ${file.name}`);
       const bytes = await file.arrayBuffer();
-      if (isScene) {
+      if (isScene && (await this.inserts.opened(file.name, bytes, files))) {
+        this.saveSoon();
+      } else if (isScene) {
         this.isServed = false;
         await this.openBaked(file.name, bytes, files);
         this.show();
@@ -356,6 +373,7 @@ class Page {
     if (first && this.state.time !== undefined) viewer.pose(this.state.time);
     get('loading').hidden = true;
     this.lamps.take(this.isServed && first ? this.state : {});
+    await this.inserts.take(this.isServed ? (first ? this.state.inserts : undefined) : []);
     viewer.measure();
     if (problem) return this.showPlain(problem);
     showStatistics(viewer.bakedScene);

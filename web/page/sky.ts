@@ -2,6 +2,7 @@
 // and by its numbers). Preetham, Shirley and Smits 1999, "A practical analytic model for daylight": the sky's
 // distribution (appendix A.2) in the form of Perez et al. 1993, the sun's attenuation (appendix A.1) with Iqbal's
 // absorption data. Relative air mass: Kasten 1966.
+import { Quaternion, Vector3 } from 'three';
 import { texelSolidAngle, type LatLongMap } from '../src/index.js';
 
 export interface Sky {
@@ -195,4 +196,11 @@ function addSun({ data, width, height }: LatLongMap & { data: Float32Array }, su
       share = 1 / count / texelSolidAngle(j, width, height);
     for (let c = 0; c < 3; ++c) data[3 * (j * width + i) + c]! += irradiance[c]! * share;
   }
+}
+
+/** Lifts what stands towards `sun` by an angle, about what is level beside it; about `side` where it stands upright. */
+export function turnToHeight(sun: Vector3, angle: number, side: Vector3): Quaternion {
+  const axis = sun.clone().cross(new Vector3(0, 1, 0));
+  if (axis.length() < 1e-6) axis.copy(side);
+  return new Quaternion().setFromAxisAngle(axis.normalize(), angle);
 }

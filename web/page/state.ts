@@ -30,6 +30,9 @@ export const viewNames: Record<View, string> = {
   reference: 'Reference',
 };
 
+export const overlays = ['lattice', 'receivers'] as const;
+export type Overlay = (typeof overlays)[number];
+
 export interface State extends LampState {
   camera?: number[]; // eye, target, vertical field of view in degrees
   rotate: number[]; // yaw, pitch, roll in degrees
@@ -48,6 +51,8 @@ export interface State extends LampState {
   coefficient: number;
   time?: number; // seconds into the animation, standing still
   brdf?: Reflection; // where surfaces are free, other than diffuse
+  inserts?: string[]; // texts of --insert; undefined: what the server says
+  show: Overlay[]; // over the scene
   background: boolean;
   ui: boolean;
 }
@@ -65,6 +70,7 @@ export const defaultState = (): State => ({
   view: 'baked',
   wipe: 0.5,
   coefficient: 3,
+  show: [],
   background: true,
   ui: true,
 });
@@ -108,6 +114,8 @@ export function parseState(fragment: string, base: State): State {
   if (from.has('lamp')) state.lamps = from.getAll('lamp').filter((text) => text !== '');
   if (from.has('dark')) state.dark = (from.get('dark') ?? '').split(',').map(Number);
   if (from.has('albedo')) state.albedos = from.getAll('albedo');
+  if (from.has('insert')) state.inserts = from.getAll('insert').filter((text) => text !== '');
+  if (from.has('show')) state.show = overlays.filter((one) => from.get('show')!.split(',').includes(one));
   if (from.has('background')) state.background = from.get('background') !== 'none';
   if (from.has('ui')) state.ui = from.get('ui') !== 'off';
   return state;
@@ -143,6 +151,8 @@ export function formatState(state: State, base: State = defaultState()): string 
   for (const text of state.lamps?.length === 0 ? [''] : (state.lamps ?? [])) put('lamp', encoded(text));
   if (state.dark) put('dark', state.dark.join(','));
   for (const text of state.albedos ?? []) put('albedo', encoded(text));
+  for (const text of state.inserts?.length === 0 ? [''] : (state.inserts ?? [])) put('insert', encoded(text));
+  if (state.show.length > 0) put('show', state.show.join(','));
   if (!state.background) put('background', 'none');
   if (!state.ui) put('ui', 'off');
   return '#' + parts.join('&');

@@ -7,10 +7,8 @@ import {
   Matrix4,
   PerspectiveCamera,
   Quaternion,
-  Raycaster,
   Scene,
   Sphere,
-  Vector2,
   Vector3,
   WebGLRenderer,
   WebGLRenderTarget,
@@ -31,16 +29,18 @@ import {
 } from '../src/index.js';
 import type { EnvironmentFile } from './loading.js';
 import { framed, framedFov } from './framing.js';
-import { LobeGlyphs, pickVertex } from './lobes.js';
+import { LobeGlyphs, pickVertex, rayAt } from './lobes.js';
 import { bandsOf, Model } from './model.js';
 import { fitFixed } from './fixed.js';
 import { lightPlain } from './plain.js';
 import { Orbit } from './orbit.js';
 import { floatType, readFloats } from './read_back.js';
 import { DevelopMaterial, PictureMaterial, SkyMaterial } from './screen.js';
+import { turnToHeight } from './sky.js';
 import type { View } from './state.js';
 import type { ViewerCallbacks } from './viewer_callbacks.js';
 import { falseColorEnd, falseColorGain, fitErrorEnd } from './false_color.js';
+import { Companions } from './companions.js';
 import { autoExposure, clampBeforeTone, toneMappings, type Tone } from './tone.js';
 
 const pause = 250; // milliseconds without a frame
@@ -74,7 +74,9 @@ export class Viewer {
   private readonly gain = { value: 1 }; // of false colour
   private readonly errorGain = { value: 1 };
   private readonly glyphs = new LobeGlyphs();
-  private readonly bounds = new Sphere(new Vector3(), 1);
+  /** Of the scene. */
+  readonly bounds = new Sphere(new Vector3(), 1);
+  readonly companions = new Companions();
   baked: Model | undefined;
   private compare: Model | undefined;
   private plain: Object3D | undefined; // a scene without transfer, in place of `baked`
@@ -97,6 +99,7 @@ export class Viewer {
     private readonly callbacks: ViewerCallbacks,
   ) {
     clampBeforeTone();
+    this.scene.add(this.companions.root);
     try {
       this.renderer = new WebGLRenderer({ canvas, antialias: true, powerPreference: 'high-performance' });
     } catch {
@@ -231,10 +234,8 @@ export class Viewer {
     return MathUtils.radToDeg(Math.asin(MathUtils.clamp(this.sun.y, -1, 1)));
   }
   set lightHeight(degrees: number) {
-    const { sun } = this,
-      axis = sun.clone().cross(new Vector3(0, 1, 0));
-    if (axis.length() < 1e-6) axis.setFromMatrixColumn(this.camera.matrixWorld, 0);
-    const turn = new Quaternion().setFromAxisAngle(axis.normalize(), MathUtils.degToRad(degrees - this.lightHeight));
+    const side = new Vector3().setFromMatrixColumn(this.camera.matrixWorld, 0),
+      turn = turnToHeight(this.sun, MathUtils.degToRad(degrees - this.lightHeight), side);
     this.orbit.light.premultiply(turn).normalize();
     this.changeLight();
   }
@@ -278,12 +279,10 @@ export class Viewer {
    * none.
    */
   pickLobes(x: number, y: number): string | undefined {
-    const { canvas, baked } = this,
-      ray = new Raycaster();
+    const { baked } = this;
     if (!baked) return undefined;
-    ray.setFromCamera(new Vector2((2 * x) / canvas.clientWidth - 1, 1 - (2 * y) / canvas.clientHeight), this.camera);
     this.invalidate();
-    return this.glyphs.pick(baked.baked.transfer, pickVertex(baked.meshes, ray));
+    return this.glyphs.pick(baked.baked.transfer, pickVertex(baked.meshes, rayAt(x, y, this.canvas, this.camera)));
   }
   clearLobes(): void {
     this.glyphs.clear();
@@ -386,7 +385,8 @@ export class Viewer {
       this.renderer.setSize(width, height, false);
     }
     const distance = camera.position.distanceTo(bounds.center),
-      reach = 1.1 * bounds.radius; // a little more, for what is animated
+      // A little more, for what is animated.
+      reach = Math.max(1.1 * bounds.radius, this.companions.reach(bounds.center));
     camera.aspect = width / height;
     fitFixed(this.fixedView, camera, this.sky);
     camera.far = distance + reach;
@@ -413,6 +413,7 @@ export class Viewer {
     }
     this.baked?.relight(lighting);
     this.compare?.relight(lighting);
+    this.companions.relight();
     if (this.plain) lightPlain(this.scene, this.environment!.background, this.orbit.light);
   }
 
@@ -431,7 +432,7 @@ export class Viewer {
     renderer.setRenderTarget(target);
     renderer.setClearColor(0x000000, 0);
     renderer.clear();
-    if (this.dress('baked') ?? this.plain) renderer.render(this.scene, this.camera);
+    if (this.dress('baked', true) ?? this.plain) renderer.render(this.scene, this.camera);
     let pixels = read();
     if (this.showBackground && !this.indirect && !pixels.some((v, i) => i % 4 === 3 && v >= 0.5)) {
       screen.material = this.sky;
@@ -458,7 +459,7 @@ export class Viewer {
     }
     const shown = this.dress(view);
     // What shows through surfaces adds up as light does, before the screen's curves.
-    const blends = shown !== undefined && anySeeThrough(shown.meshes);
+    const blends = shown !== undefined && (anySeeThrough(shown.meshes) || this.companions.isSeenThrough);
     if (blends) {
       this.linear.setSize(this.canvas.width, this.canvas.height);
       renderer.setRenderTarget(this.linear);
@@ -482,10 +483,11 @@ export class Viewer {
   }
 
   /** Makes the model that a view shows visible, in that view's materials. */
-  private dress(view: Exclude<View, 'reference'>): Model | undefined {
+  private dress(view: Exclude<View, 'reference'>, isMeasure = false): Model | undefined {
     const shown = view === 'compare' ? this.compare : this.baked;
     for (const model of [this.baked, this.compare]) if (model) model.root.visible = model === shown;
     if (this.plain) this.plain.visible = !shown;
+    this.companions.dress(view, isMeasure);
     shown?.wear(
       view === 'compare' ? 'baked' : view,
       this.environment?.lighting,

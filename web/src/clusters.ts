@@ -108,6 +108,8 @@ export async function readStored(
     weights: new Uint16Array(await view('weights', weights, 2 * header.receivers * rank)),
   };
   for (const v of read.vectors) if (!Number.isFinite(v)) throw new LambentError("a cluster's vector is not finite");
+  // Unfolded it would be the greatest half float.
+  if (read.weights.some((w) => (w & 0x7c00) === 0x7c00)) throw new LambentError("a cluster's weight is not finite");
   for (const k of read.clusterOf) if (k >= clusters) throw new LambentError(`cluster ${k} does not exist`);
   return {
     values: unfoldClusters({ rank, values, ...read }).buffer as ArrayBuffer,

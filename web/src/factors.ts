@@ -198,6 +198,8 @@ async function load(source: TransferSource): Promise<BakedTransfer> {
     const visibility = isHalf
       ? Float32Array.from(new Uint16Array(bytes), (bits) => DataUtils.fromHalfFloat(bits))
       : new Float32Array(bytes);
+    // Unfolded it would be the greatest half float.
+    if (visibility.some((v) => !Number.isFinite(v))) throw new LambentError('holds factors that are not finite');
     const frames = last.frames.image.data as Float32Array,
       values = unfoldFactors({ light, incident, receivers, visibility, frames });
     return { values: values.buffer as ArrayBuffer, fileBytes: bytes.byteLength };

@@ -21,6 +21,7 @@ export { LambentError, NoTransferError } from './errors.js';
 export type { FixedView } from './fixed_view.js';
 export { checkBakedFile, extensionName } from './glb.js';
 export type { IndirectControls } from './indirect.js';
+export { Insert } from './insert.js';
 export type { IndirectTimes } from './indirect_light.js';
 export {
   knownKinds,

@@ -82,6 +82,11 @@ export interface BakedTransfer {
    * receiver.
    */
   readonly lobesAt?: (mesh: Mesh, vertex: number, back: boolean) => Lobe[] | undefined;
+  /**
+   * Diffuse transfer at vertices by harmonics alone: what a receiver makes of the light, [channel][order^2], once all
+   * bands are there.
+   */
+  readonly coefficientsOf?: (receiver: number, out: Float64Array) => void;
   dispose(): void;
 }
 
@@ -113,9 +118,18 @@ export const drawn = [
 /**
  * Of what is drawn: columns of light; lobes of all rows of a receiver; of a matrix, texels a receiver; lamps
  * that move, each with a shadow map, and lights and glowing materials of the scene's own beside them; bytes that
- * clusters and factors are unfolded to.
+ * clusters and factors are unfolded to; objects that are put into a scene, and vertices of one of them.
  */
-export const limits = { columns: 256, lobes: 64, texels: 2048, lamps: 8, ownLamps: 64, unfolded: 536870912 } as const;
+export const limits = {
+  columns: 256,
+  lobes: 64,
+  texels: 2048,
+  lamps: 8,
+  ownLamps: 64,
+  unfolded: 536870912,
+  inserts: 8,
+  insertVertices: 262144,
+} as const;
 
 /** Store, meaning and placement of a file's transfer, as the table has them. */
 export function axesOf({ transfer, surface, view }: TransferExtension): [store: string, rows: string, where: string] {

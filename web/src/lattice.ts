@@ -133,29 +133,32 @@ export class Lattice {
   }
 
   /** Incident radiance at a place of the baked scene, [coefficient][3]; beyond the box that of its face. */
-  radianceAt(position: Vector3, out = new Float64Array(3 * shCount(this.order))): Float64Array {
-    const { min, max } = this.header,
-      [nx, ny] = this.points,
-      size = out.length;
-    const cell = [0, 0, 0],
-      share = [0, 0, 0];
-    position.toArray().forEach((p, k) => {
-      const n = this.points[k]!,
-        extent = max[k]! - min[k]!,
-        t = extent > 0 ? Math.min(1, Math.max(0, (p - min[k]!) / extent)) * (n - 1) : 0;
-      cell[k] = Math.min(Math.floor(t), Math.max(0, n - 2));
-      share[k] = t - cell[k];
-    });
+  radianceAt({ x, y, z }: Vector3, out = new Float64Array(3 * shCount(this.order))): Float64Array {
+    const [nx, ny] = this.points,
+      { coefficients } = this,
+      size = out.length,
+      tx = this.along(x, 0),
+      ty = this.along(y, 1),
+      tz = this.along(z, 2);
     out.fill(0);
     for (let corner = 0; corner < 8; ++corner) {
-      const up = [corner & 1, (corner >> 1) & 1, corner >> 2];
-      const weight = up.reduce((w, u, k) => w * (u ? share[k]! : 1 - share[k]!), 1);
+      const i = Math.floor(tx) + (corner & 1),
+        j = Math.floor(ty) + ((corner >> 1) & 1),
+        k = Math.floor(tz) + (corner >> 2);
+      // No corner of weight 0 is looked at: beyond the last point there is none.
+      const weight = (1 - Math.abs(tx - i)) * (1 - Math.abs(ty - j)) * (1 - Math.abs(tz - k));
       if (weight === 0) continue;
-      const [x, y, z] = up.map((u, k) => cell[k]! + u) as [number, number, number],
-        from = size * ((z * ny + y) * nx + x);
-      for (let i = 0; i < size; ++i) out[i]! += weight * this.coefficients[from + i]!;
+      const from = size * ((k * ny + j) * nx + i);
+      for (let n = 0; n < size; ++n) out[n]! += weight * coefficients[from + n]!;
     }
     return out;
+  }
+
+  /** Where a coordinate lies between the points of an axis, which are the whole numbers. */
+  private along(p: number, axis: 0 | 1 | 2): number {
+    const { min, max } = this.header,
+      extent = max[axis]! - min[axis]!;
+    return extent > 0 ? Math.min(1, Math.max(0, (p - min[axis]!) / extent)) * (this.points[axis] - 1) : 0;
   }
 
   /** Irradiance of a surface there towards `normal`; exit radiance of a diffuse one is albedo / pi times it. */

@@ -138,6 +138,7 @@ export class VertexTransfer implements BakedTransfer {
   readonly gpuBytes: number;
   readonly lobesAt?: NonNullable<BakedTransfer['lobesAt']>;
   readonly fitErrorMaterials?: NonNullable<BakedTransfer['fitErrorMaterials']>;
+  readonly coefficientsOf?: NonNullable<BakedTransfer['coefficientsOf']>;
   private readonly light: TransferHeader;
   private readonly last: LastReflection | undefined;
   private errors: DataTexture | undefined;
@@ -252,6 +253,14 @@ export class VertexTransfer implements BakedTransfer {
         );
         this.inFalseColor(made, gain, (i) => nodes!.numbers(this.errors!, this.optionsOf[i]!.twoSided));
         return made;
+      };
+    if (kind === 'diffuse' && !header.lobes)
+      this.coefficientsOf = (receiver, out) => {
+        for (let c = 0, to = 0; c < valueChannels; ++c)
+          for (let k = 0; k < count; ++k, ++to) {
+            const value = data[4 * (layout.texels * receiver + c * layout.quads) + k]!; // block_texture.ts
+            out[to] = data instanceof Uint16Array ? DataUtils.fromHalfFloat(value) : value;
+          }
       };
     if (readLobes)
       this.lobesAt = (mesh, vertex, back) => {

@@ -74,6 +74,13 @@ describe('clusters', () => {
     ['too few clusters of receivers', {}, [good[0]!, Uint16Array.of(0).buffer, good[2]!], /"clusterOf" holds 2/],
     ['too few vectors', {}, [Float32Array.of(1).buffer, good[1]!, good[2]!], /"bufferView" holds 4 .* makes 16/],
     ['a vector of no number', {}, [Float32Array.of(1, NaN, 3, 4).buffer, good[1]!, good[2]!], /not finite/],
+    [
+      'a weight of no number',
+      {},
+      [good[0]!, good[1]!, Uint16Array.of(0, 0x7e00, 0x3c00).buffer],
+      /weight is not finite/,
+    ],
+    ['an endless weight', {}, [good[0]!, good[1]!, Uint16Array.of(0, 0, 0xfc00).buffer], /weight is not fin/],
     ['no clusters', { cpca: { ...header.cpca, clusters: 0 } }, good, /"clusters" is out of range/],
     ['a rank of no number', { cpca: { ...header.cpca, rank: '1' } }, good, /"rank" is out of range/],
     ['no weights', { cpca: { ...header.cpca, weights: undefined } }, good, /no "weights"/],

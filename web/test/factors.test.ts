@@ -77,6 +77,12 @@ describe('factors', () => {
     ['no last reflection', { outgoing: undefined }, /factors, diffuse, vertices/],
   ] as const)
     it(`of ${what} are refused`, () => expect(load(more)).rejects.toThrow(sentence));
+
+  it('that are no finite numbers are refused', () => {
+    const endless = new Uint16Array(25 * 16);
+    endless[3] = 0x7c00;
+    return expect(load({}, [endless.buffer, ...views.slice(1)])).rejects.toThrow(/factors that are not finite/);
+  });
 });
 
 describe.skipIf(!haveTool)('factors of the tool', () => {

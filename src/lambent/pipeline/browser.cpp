@@ -91,4 +91,12 @@ Result<void> check_for_browser(const Field& field, const Scene& scene, const std
   return {};
 }
 
+Result<void> check_file_for_browser(const Baked& baked, const std::string& path) {
+  if (hiding_of(baked))
+    return Error{path,
+                 "holds the shadow field of an object, which the web page does not draw: `lambent render --place` and "
+                 "`lambent view --window --place` put it over a baked scene"};
+  return check_for_browser(baked.surface, baked.scene, path);
+}
+
 }  // namespace lambent

@@ -96,7 +96,8 @@ TEST(Browser, DrawsWhatThePageSaysThatItDraws) {
   for (const auto& [name, value] :
        {std::pair("columns", max_drawn_columns), std::pair("lobes", max_drawn_lobes),
         std::pair("texels", max_drawn_texels), std::pair("lamps", max_drawn_lamps),
-        std::pair("ownLamps", max_drawn_own_lamps), std::pair("unfolded", max_drawn_unfolded)}) {
+        std::pair("ownLamps", max_drawn_own_lamps), std::pair("unfolded", max_drawn_unfolded),
+        std::pair("inserts", max_drawn_inserts), std::pair("insertVertices", max_drawn_insert_vertices)}) {
     std::smatch found;
     ASSERT_TRUE(std::regex_search(source, found, std::regex("limits = \\{[^}]*\\b" + std::string(name) + ": (\\d+)")))
         << name;

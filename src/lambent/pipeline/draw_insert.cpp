@@ -8,8 +8,7 @@
 
 namespace lambent {
 
-Result<std::shared_ptr<const InsertedObject>> make_inserted(const Insertion& insertion, const Lattice& lattice,
-                                                            int order, const Job& job) {
+Result<Scene> place_object(const Insertion& insertion, const Lattice& lattice, const Job& job) {
   auto object = load_scene(insertion.path);
   if (!object) return object.error();
   for (const std::string& warning : object->warnings) job.warn(warning);
@@ -24,15 +23,27 @@ Result<std::shared_ptr<const InsertedObject>> make_inserted(const Insertion& ins
     slack[k] = points[k] > 1 ? 0.51f * (lattice.max[k] - lattice.min[k]) / float(points[k] - 1) : INFINITY;
   if (!all_at_most(lattice.min - slack, box.min) || !all_at_most(box.max, lattice.max + slack))
     job.warn(insertion.path + ": reaches out of the lattice's box; light there is that of the box's border");
-  auto tracer = Tracer::build(*object);
+  return object;
+}
+
+Result<InsertedObject> bake_object(const Insertion& insertion, Scene object, int order, const Job& job) {
+  auto tracer = Tracer::build(object);
   if (!tracer) return tracer.error();
-  Receivers receivers = make_vertex_receivers(*object);
-  auto transfer = bake(*object, *tracer, receivers,
+  Receivers receivers = make_vertex_receivers(object);
+  auto transfer = bake(object, *tracer, receivers,
                        {.order = order, .samples = 512, .bounces = 1, .precision = Precision::single}, nullptr,
                        job.progress);
   if (!transfer) return transfer.error();
-  return std::make_shared<const InsertedObject>(
-      InsertedObject{insertion, std::move(*object), std::move(receivers), std::move(*transfer)});
+  return InsertedObject{insertion, std::move(object), std::move(receivers), std::move(*transfer)};
+}
+
+Result<std::shared_ptr<const InsertedObject>> make_inserted(const Insertion& insertion, const Lattice& lattice,
+                                                            int order, const Job& job) {
+  auto object = place_object(insertion, lattice, job);
+  if (!object) return object.error();
+  auto made = bake_object(insertion, std::move(*object), order, job);
+  if (!made) return made.error();
+  return std::make_shared<const InsertedObject>(std::move(*made));
 }
 
 }  // namespace lambent
