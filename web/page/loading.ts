@@ -1,7 +1,6 @@
 // Everything that comes from files: the manifest beside the page, baked scenes, environments. Errors are sentences.
 import {
   DataTexture,
-  DataUtils,
   FloatType,
   HalfFloatType,
   LinearFilter,
@@ -24,6 +23,7 @@ import {
   Lighting,
   type LatLongMap,
 } from '../src/index.js';
+import { toHalf } from '../src/half.js';
 import { readProgressive, type FirstPart, type Progress } from '../src/progressive.js';
 import { skyMap, sunDirection, type Sky } from './sky.js';
 
@@ -155,7 +155,7 @@ export function mapTexture(map: LatLongMap): DataTexture {
   for (let i = 0; i < map.width * map.height; ++i)
     for (let c = 0; c < 4; ++c) {
       const value = c < map.channels ? map.data[i * map.channels + c]! : 1;
-      data[4 * i + c] = DataUtils.toHalfFloat(value > 0 ? Math.min(value, 65504) : 0);
+      data[4 * i + c] = toHalf(value > 0 ? value : 0);
     }
   const texture = new DataTexture(data, map.width, map.height, RGBAFormat, HalfFloatType);
   texture.minFilter = texture.magFilter = LinearFilter;

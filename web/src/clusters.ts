@@ -7,6 +7,7 @@ import { DataUtils } from 'three';
 import { block } from './block_texture.js';
 import { LambentError } from './errors.js';
 import { isIndex, isViews } from './glb.js';
+import { toHalf } from './half.js';
 import type { TransferHeader } from './header.js';
 import { limits, type TransferSource } from './kinds.js';
 
@@ -49,19 +50,6 @@ export function unfoldClusters({ rank, values, vectors, clusterOf, weights }: Cl
     storeHalves(sum, out, r);
   }
   return out;
-}
-
-const lane = new Float32Array(1),
-  bits = new Uint32Array(lane.buffer);
-/** The nearest half float, which three's own cuts off; what is beyond the greatest is that. */
-function toHalf(value: number): number {
-  lane[0] = value;
-  const all = bits[0]!,
-    size = all & 0x7fffffff,
-    sign = (all >>> 16) & 0x8000;
-  if (size >= 0x477fe000) return sign | 0x7bff;
-  if (size < 0x38800000) return sign | Math.round(Math.abs(value) * 2 ** 24);
-  return sign | ((size - 0x38000000 + 0xfff + ((size >>> 13) & 1)) >>> 13);
 }
 
 /** Values of receiver `r` into blocks. */

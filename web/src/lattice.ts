@@ -15,6 +15,7 @@ import {
 import { block } from './block_texture.js';
 import { LambentError } from './errors.js';
 import { isIndex, isViews } from './glb.js';
+import { toHalf } from './half.js';
 import type { TransferSource } from './kinds.js';
 import { readLobes, type LobeBasis } from './light_basis.js';
 import type { Lighting } from './lighting.js';
@@ -226,7 +227,7 @@ export class Lattice {
             const number = 4 * t + k;
             if (number >= known) continue;
             const value = this.coefficients[3 * rows * (z * nx * ny + i) + number]!;
-            data[to + 4 * i + k] = DataUtils.toHalfFloat(sign(Math.floor(number / 3)) * value);
+            data[to + 4 * i + k] = toHalf(sign(Math.floor(number / 3)) * value);
           }
       }
     texture.needsUpdate = true;

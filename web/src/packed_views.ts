@@ -1,9 +1,9 @@
 // Buffer views that `lambent export --web --pack` has packed (docs/file-format.md, "Packed for a browser"): numbers
 // rounded to steps, told from what is near them, and coded by how often they are there. They come back as glTF has
 // them.
-import { DataUtils } from 'three';
 import { LambentError } from './errors.js';
 import { isIndex } from './glb.js';
+import { toHalf } from './half.js';
 import { huffmanDecode } from './huffman.js';
 
 const most = 2 ** 31; // bytes of a view; what browsers take as one array is little more
@@ -92,15 +92,6 @@ function readRows(
     }
 }
 
-const float = new Float32Array(1),
-  bits = new Uint32Array(float.buffer);
-/** The nearest half float; three's function takes the next one towards zero. */
-function nearestHalf(value: number): number {
-  float[0] = value;
-  bits[0]! += 0x1000; // half of the last place that it keeps
-  return DataUtils.toHalfFloat(float[0]);
-}
-
 /** Of transfer: its first bands and its lamps make a picture before the other columns are there. */
 export interface FirstColumns {
   order: number;
@@ -186,7 +177,7 @@ export function unpackView(bytes: ArrayBuffer, given: unknown): ArrayBuffer {
     readRows(stream, rows, groups, order, (g, c, values) => {
       for (let r = 0; r < rows; ++r) {
         const value = values[r]! * step;
-        blocks[((r >> 4) * width + g * columns + c) * 16 + (r & 15)] = half ? nearestHalf(value) : value;
+        blocks[((r >> 4) * width + g * columns + c) * 16 + (r & 15)] = half ? toHalf(value) : value;
       }
     });
   } else return fail();

@@ -145,6 +145,8 @@ Result<void> decode_clusters(const BlobReader& in, const json& transfer, CpcaTra
     if (k >= c.clusters) return Error{where, "cluster " + std::to_string(k) + " does not exist"};
   auto weights = read_values<uint16_t>(in, object, "weights", c.receivers * size_t(c.rank), where);
   if (!weights) return weights.error();
+  for (uint16_t w : *weights)
+    if (!std::isfinite(half_to_float(w))) return Error{where, "a cluster's weight is not finite"};
   c.vectors = std::move(*vectors), c.cluster_of = std::move(*cluster_of), c.weights = std::move(*weights);
   return {};
 }
