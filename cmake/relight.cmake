@@ -52,6 +52,7 @@ set(lambent_relight_sources
   src/lambent/relight/block_kernels.cpp
   src/lambent/relight/factors.cpp
   src/lambent/relight/fix_light.cpp
+  src/lambent/relight/hidden_table.cpp
   src/lambent/relight/indirect.cpp
   src/lambent/relight/light.cpp
   src/lambent/relight/local_light.cpp

@@ -49,6 +49,37 @@ const upright = [1, 0, 0, 0, 1, 0, 0, 0, 1];
 const times = (a: ArrayLike<number>, b: ArrayLike<number>): number[] =>
   upright.map((_, i) => [0, 1, 2].reduce((sum, k) => sum + a[i - (i % 3) + k]! * b[3 * k + (i % 3)]!, 0));
 
+/**
+ * Least-squares coefficients, [column][3], of a light that was turned by R, row-major: by its harmonics, of which n
+ * bands are used, and its integrals against lobes.
+ */
+function fitted(
+  columns: LobeBasis,
+  radiance: ArrayLike<number>,
+  integrals: LobeIntegrals,
+  n: number,
+  R: number[],
+): Float64Array {
+  const { order, lobes } = columns,
+    q = new Float64Array(3 * (shCount(n) + lobes.length)),
+    light = new Float64Array(3 * columns.count);
+  if (n > 0) rotateSh(makeShRotation(n, R), radiance, q);
+  // The light turned by R meets a lobe as the light itself meets the lobe turned back.
+  const back = lobes.map(({ axis: [x, y, z] }) => {
+    const to = (c: number): number => R[c]! * x + R[3 + c]! * y + R[6 + c]! * z;
+    return [to(0), to(1), to(2)] as const;
+  });
+  q.set(integrals.about(back), 3 * shCount(n));
+  for (let c = 0; c < 3; ++c)
+    columns
+      .solve(
+        n,
+        q.filter((_, i) => i % 3 === c),
+      )
+      .forEach((v, i) => (light[3 * (i < shCount(n) ? i : i - shCount(n) + shCount(order)) + c] = v));
+  return light;
+}
+
 /** Texels around the equator of a map that is put on a cube, at most. */
 const widestOnCube = 2048;
 
@@ -100,6 +131,8 @@ export class Lighting {
   private cube: { key: string; light: CubeLight } | undefined;
   private readonly restOf = new Map<number, Float64Array | undefined>();
   private readonly integralsOf = new WeakMap<LobeBasis, LobeIntegrals>();
+  /** Of the map's peaks in so many bands. */
+  private readonly sharpOf = new WeakMap<LobeBasis, { bands: number; integrals: LobeIntegrals }>();
 
   /**
    * `radiance`: order^2 RGB coefficients, [coefficient][3], in lambent's convention (docs/conventions.md). `map`: what
@@ -155,13 +188,14 @@ export class Lighting {
   }
 
   /**
-   * The same for columns that are harmonics and lobes: [column][3]. A window is of the harmonics, and `auto` none, but
-   * for lobes that are harmonics in other words: those are lit as they would be.
+   * The same for columns that are harmonics and lobes: [column][3]. A window is of the harmonics. `auto` takes peaks
+   * apart where lobes leave much of them to the harmonics, as where a lamp has left its lobe; lobes that are harmonics
+   * in other words are lit as those would be.
    */
-  partsOf(columns: LobeBasis): TurnableParts {
+  partsOf(columns: LobeBasis, glossy = false): TurnableParts {
     const rotation = this.matrix(),
       { intensity, window } = this,
-      { order, bands, lobes } = columns;
+      { order, bands } = columns;
     let at: (R: number[]) => LightParts;
     if (bands > 0) {
       const parts = this.partsIn(rotation, bands, false, bands);
@@ -169,39 +203,57 @@ export class Lighting {
       return { ...at(upright), turned: (turn) => at(turn.elements) }; // column-major: of its inverse
     }
     const n = order > 0 ? this.bandsOf(order) : 0,
+      harmonics = 3 * shCount(n),
       integrals =
         this.integralsOf.get(columns) ?? new LobeIntegrals(this.map ?? mapOf(this.radiance, this.order), columns),
-      factors = n > 0 && window !== 'auto' ? this.factors(n) : new Array<number>(n).fill(1);
+      factors = n > 0 && window !== 'auto' ? this.factors(n) : new Array<number>(n).fill(1),
+      rest = window === 'auto' && this.map && n > 1 ? this.rest(n) : undefined,
+      light = (of: ArrayLike<number>): number => luminance(of[0]!, of[1]!, of[2]!);
     this.integralsOf.set(columns, integrals);
+    const peaksAt = rest && ((R: number[]) => this.sharpAt(columns, rest, n, R)),
+      first = peaksAt?.(rotation),
+      left = first ? Math.abs(light(first)) : 0,
+      holds = left > leastSharp * light(this.radiance),
+      // Of a lamp that has left its lobe, as of peaks without lobes.
+      softens = glossy && rest !== undefined && left >= 0.5 * (light(this.radiance) - light(rest));
     at = (R) => {
-      const q = new Float64Array(3 * (shCount(n) + lobes.length)),
-        light = new Float64Array(3 * columns.count);
-      if (n > 0) rotateSh(makeShRotation(n, R), this.radiance, q);
-      // The light turned by R meets a lobe as the light itself meets the lobe turned back.
-      const back = lobes.map(({ axis: [x, y, z] }) => {
-        const to = (c: number): number => R[c]! * x + R[3 + c]! * y + R[6 + c]! * z;
-        return [to(0), to(1), to(2)] as const;
-      });
-      q.set(integrals.about(back), 3 * shCount(n));
-      for (let c = 0; c < 3; ++c)
-        columns
-          .solve(
-            n,
-            q.filter((_, i) => i % 3 === c),
-          )
-          .forEach((v, i) => {
-            const isHarmonic = i < shCount(n),
-              to = isHarmonic ? i : i - shCount(n) + shCount(order);
-            light[3 * to + c] = v * intensity * (isHarmonic ? factors[shBand(i)]! : 1);
-          });
-      return { rest: light, peaks: undefined };
+      const all = fitted(columns, this.radiance, integrals, n, R),
+        sharp = holds ? peaksAt?.(R) : undefined;
+      for (let i = 0; i < harmonics; ++i) all[i]! *= factors[shBand(Math.floor(i / 3))]!;
+      if (sharp) all.forEach((v, i) => (all[i] = v - sharp[i]!));
+      if (sharp && softens) {
+        const soft = shWindow('lanczos', sharp.slice(0, harmonics));
+        for (let i = 0; i < harmonics; ++i) sharp[i]! *= soft[shBand(Math.floor(i / 3))]!;
+      }
+      return { rest: all.map((v) => v * intensity), peaks: sharp?.map((v) => v * intensity) };
     };
     return { ...at(rotation), turned: (turn) => at(times(turn.elements, rotation)) };
   }
 
+  /** The map's peaks in n bands as all columns hold them, turned by R; `rest` is what they leave of the harmonics. */
+  private sharpAt(columns: LobeBasis, rest: Float64Array, n: number, R: number[]): Float64Array {
+    const peaks = rest.map((v, i) => this.radiance[i]! - v);
+    return fitted(columns, peaks, this.sharp(columns, n), n, R);
+  }
+
+  /** Integrals of the map's peaks in n bands. */
+  private sharp(columns: LobeBasis, n: number): LobeIntegrals {
+    const known = this.sharpOf.get(columns);
+    if (known?.bands === n) return known.integrals;
+    const { data, width, height } = withoutPeaks(this.map!, n),
+      { data: all, channels } = this.map!,
+      left = Float64Array.from(data, (v, i) => {
+        const value = all[Math.floor(i / 3) * channels + (i % 3)]!;
+        return value > 0 && value < Infinity ? value - v : 0;
+      }),
+      integrals = new LobeIntegrals({ data: left, width, height, channels: 3 }, columns);
+    this.sharpOf.set(columns, { bands: n, integrals });
+    return integrals;
+  }
+
   /** Of either: lobes where there are any. */
   of(columns: { order: number; lobes: LobeBasis | undefined }, glossy = false, most = columns.order): TurnableParts {
-    return columns.lobes ? this.partsOf(columns.lobes) : this.parts(columns.order, glossy, most);
+    return columns.lobes ? this.partsOf(columns.lobes, glossy) : this.parts(columns.order, glossy, most);
   }
 
   private partsIn(R: number[], order: number, glossy: boolean, most: number): LightParts {

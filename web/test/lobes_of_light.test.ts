@@ -80,6 +80,47 @@ describe('light on lobes', () => {
     }
   });
 
+  it('has peaks beside harmonics, most of all where a lamp has left its lobe', () => {
+    const map = formula(),
+      sun = map.data as Float32Array;
+    for (let i = 0; i < sun.length; ++i) if (sun[i]! >= 20) sun[i]! *= 20;
+    // About the middle of the texels that are bright.
+    const theta = (Math.PI * 13) / 48,
+      phi = 2 * Math.PI * (71.5 / 96 - 0.5),
+      axis = [Math.sin(theta) * Math.cos(phi), Math.cos(theta), Math.sin(theta) * Math.sin(phi)] as const,
+      basis = new LobeBasis(4, 'von_mises_fisher', [{ axis, sharpness: 300 }]),
+      lighting = Lighting.fromMap(map);
+    // In its lobe the sun leaves little to the harmonics, which no window softens.
+    const stands = lighting.partsOf(basis).peaks!,
+      glossy = lighting.partsOf(basis, true).peaks!;
+    expect(difference(stands, glossy)).toBe(0);
+    const inHarmonics = stands[0]!;
+    lighting.rotation.setFromAxisAngle(new Vector3(0, 1, 0), 1.5);
+    const { rest, peaks, turned } = lighting.partsOf(basis);
+    expect(peaks).toBeDefined();
+    expect(inHarmonics).toBeLessThan(0.4 * peaks![0]!);
+    lighting.window = 'none';
+    const all = lighting.partsOf(basis).rest;
+    expect(
+      difference(
+        rest.map((v, i) => v + peaks![i]!),
+        all,
+      ),
+    ).toBeLessThan(1e-9 * largest(all));
+    // The peaks are the sun's: its light in harmonics, next to nothing of the lobe.
+    const sh = lighting.parts(4).rest;
+    lighting.window = 'auto';
+    const bands = lighting.parts(4).peaks!;
+    expect(difference(peaks!.subarray(0, 48), bands)).toBeLessThan(0.02 * largest(bands));
+    expect(largest(sh)).toBeGreaterThan(0);
+    // In axes turned back to where the lobe is they are still told apart, as all that is drawn at once must be.
+    const back = new Matrix3().setFromMatrix4(new Matrix4().makeRotationY(1.5));
+    expect(turned!(back).peaks).toBeDefined();
+    const soft = lighting.partsOf(basis, true).peaks!;
+    expect(Math.abs(soft[45]!)).toBeLessThan(0.6 * Math.abs(peaks![45]!));
+    expect(soft[48]).toBeCloseTo(peaks![48]!, 9);
+  });
+
   it('in axes that were turned is the light turned back', () => {
     const turn = new Matrix3().setFromMatrix4(
         new Matrix4().makeRotationFromQuaternion(new Quaternion().setFromAxisAngle(new Vector3(0.48, -0.6, 0.64), 1.1)),

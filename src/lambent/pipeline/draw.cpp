@@ -136,7 +136,12 @@ Result<Drawing> draw_columns(const Baked& baked, const DrawRequest& request, con
                             human_bytes(double(d.reading.bytes)), human_bytes(double(bytes_of(baked.surface.store)))));
   }
   drawing.summary.json["sharp_light"] = d.light.sharp;
-  if (!d.light.peaks.empty())
+  if (!d.light.peaks.empty() && d.light.held >= 0)
+    drawing.summary.lines.emplace_back(
+        "sharp",
+        fmt::format("{:.0f} % of the light is sharper than {} bands where no lobe stands, and kept from ringing",
+                    100 * d.light.sharp, light.window.size()));
+  else if (!d.light.peaks.empty())
     drawing.summary.lines.emplace_back(
         "sharp",
         fmt::format("{:.0f} % of the light is sharper than {} bands, and kept from ringing: its shadows are "

@@ -68,7 +68,7 @@ Result<void> choose_light(ColumnDrawing& d) {
     const Environment none{"", Image(2, 1), {}};
     d.light.cube = cube_light(dark ? none : *d.around.env, size, d.around.rotation);
   }
-  if (std::holds_alternative<Outgoing>(d.rows)) soften_peaks(d.light);
+  if (std::holds_alternative<Outgoing>(d.rows) && d.light.still.light.empty()) soften_peaks(d.light);
   if (d.show.part != Show::Part::bounce) d.emission = seen_emission(d.scene(), basis, d.light.lamps);
   if (d.show.part == Show::Part::emission)
     std::fill(d.light.projection.light.begin(), d.light.projection.light.end(), Vec3(0.0f)), d.light.peaks.clear();
@@ -81,7 +81,9 @@ Result<void> choose_time(ColumnDrawing& d, double time) {
   d.time = time;
   const LightBasis basis = light_of(d.baked.surface.store);
   if (!d.around.env || d.show.part == Show::Part::emission || !moves_lobes(d.request, basis)) return {};
-  return move_lamps(d.request, d.around.rotation, basis, time, d.light);
+  if (auto ok = move_lamps(d.request, d.around.rotation, basis, time, d.light); !ok) return ok;
+  if (std::holds_alternative<Outgoing>(d.rows)) soften_peaks(d.light);
+  return {};
 }
 
 Result<void> set_lights(ColumnDrawing& d) {

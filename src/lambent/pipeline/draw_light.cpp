@@ -55,12 +55,18 @@ int bands_of(const DrawRequest& request, const LightBasis& basis) {
   return request.light_order ? std::min(request.light_order, bands) : bands;
 }
 
+// Bands of harmonics that lobes stand beside; else 0.
+int bands_beside_lobes(const DrawRequest& request, const LightBasis& basis) {
+  if (basis.lobes.empty() || basis.order == 0) return 0;
+  return request.light_order ? std::min(request.light_order, basis.order) : basis.order;
+}
+
 double sharp_share(const KnownHarmonics& known) {
   const double light = luminance(known.all[0]);
   return light > 0 ? luminance(known.all[0] - known.rest[0]) / light : 0;
 }
 
-// --window auto. Lobes that stand still hold the lamps already.
+// --window auto.
 void find_peaks(const KnownHarmonics& known, const Surroundings& around, const LightBasis& basis, ColumnLight& out) {
   out.sharp = sharp_share(known), out.lamps_found = known.lamps;
   if (!(out.sharp > least_sharp)) return void(out.sharp = 0);
@@ -68,12 +74,36 @@ void find_peaks(const KnownHarmonics& known, const Surroundings& around, const L
   for (size_t k = 0; k < rest.size(); ++k) out.peaks.push_back(out.projection.light[k] - rest[k]);
 }
 
+// The integral of a light over the sphere, as band 0 has it: of its harmonics and lobes.
+double whole_light(const LightProjection& all) {
+  double light = luminance(all.light[0]);
+  for (size_t k = size_t(sh_count(all.basis.sh_order)); k < all.basis.count(); ++k)
+    light += all.basis.gram[k] * luminance(all.light[k]);
+  return light;
+}
+
+// The same of lobes beside harmonics, `peaks` as all columns hold them: lobes do not ring, but what of the peaks they
+// leave to the harmonics does.
+void keep_peaks(LightProjection peaks, ColumnLight& out) {
+  const double all = whole_light(out.projection), left = std::abs(luminance(peaks.light[0]));
+  out.sharp = all > 0 ? left / all : 0;
+  if (!(out.sharp > least_sharp)) return void(out.sharp = 0), out.peaks.clear();
+  out.in_lobes = left < 0.5 * whole_light(peaks);
+  out.peaks = std::move(peaks.light);
+}
+
 // Onto lobes that stand, and harmonics beside them: what they hold of the light is counted before the window.
+// `sharp`: its peaks, or null where nobody asks.
 void project_on_lobes(const DrawRequest& request, const Surroundings& around, const LightBasis& basis, ShWindow window,
-                      ColumnLight& out) {
+                      const Environment* sharp, ColumnLight& out) {
   const bool moves = moves_lobes(request, basis);
   out.projection = project_light(*around.env, basis, moves ? Mat3(1.0f) : around.rotation, request.light_order);
   if (moves) out.still = out.projection;
+  if (sharp) {
+    LightProjection peaks = project_light(*sharp, basis, moves ? Mat3(1.0f) : around.rotation, request.light_order);
+    if (moves) out.still_peaks = peaks;
+    keep_peaks(std::move(peaks), out);
+  }
   if (const double all = squared_radiance(*around.env); all > 0)
     out.held = std::min(squared_radiance(out.projection) / all, 1.0);
   const size_t bands = out.projection.window.size();
@@ -85,6 +115,12 @@ void project_on_lobes(const DrawRequest& request, const Surroundings& around, co
 std::shared_ptr<const KnownHarmonics> know_harmonics(const Environment& env, const DrawRequest& request,
                                                      const LightBasis& basis, bool peaks) {
   const int order = bands_of(request, basis);
+  if (const int beside = bands_beside_lobes(request, basis); beside > 0 && peaks) {
+    Environment sharp = without_peaks(env, beside);
+    for (size_t i = 0; i < sharp.image.rgb.size(); ++i) sharp.image.rgb[i] = env.image.rgb[i] - sharp.image.rgb[i];
+    return std::make_shared<const KnownHarmonics>(
+        KnownHarmonics{beside, {}, {}, 0, std::make_shared<const Environment>(std::move(sharp))});
+  }
   if (order == 0) return nullptr;
   KnownHarmonics out{order, project_environment(env, order), {}, 0};
   if (peaks) out.rest = project_environment(without_peaks(env, order), order);
@@ -93,8 +129,11 @@ std::shared_ptr<const KnownHarmonics> know_harmonics(const Environment& env, con
 }
 
 void soften_peaks(ColumnLight& light) {
+  if (light.in_lobes) return;
   const std::vector<float> w = sh_window(ShWindow::lanczos, int(light.projection.window.size()));
-  for (size_t k = 0; k < light.peaks.size(); ++k) {
+  const int order = light.projection.basis.sh_order;  // lobes beside harmonics do not ring
+  for (size_t k = 0; k < (order > 0 ? std::min(light.peaks.size(), size_t(sh_count(order))) : light.peaks.size());
+       ++k) {
     const size_t l = size_t(sh_band(int(k)));
     const Vec3 softened = light.peaks[k] * (l < w.size() ? w[l] : 0.0f);
     light.projection.light[k] += softened - light.peaks[k], light.peaks[k] = softened;
@@ -113,14 +152,16 @@ Result<ColumnLight> column_light(const DrawRequest& request, const Surroundings&
   if (around.env) {
     knows_shadows = knows_shadows && *window == ShWindow::automatic;
     const ShWindow applied = knows_shadows ? ShWindow::none : *window;
+    const int bands = bands_of(request, basis), beside = bands_beside_lobes(request, basis);
     auto known = around.known;
-    if (!known || known->order != bands_of(request, basis) || (knows_shadows && known->rest.empty()))
+    if (!known || known->order != std::max(bands, beside) || (knows_shadows && known->rest.empty() && !known->sharp))
       known = know_harmonics(*around.env, request, basis, knows_shadows);
-    if (!basis.lobes.empty() && !known) project_on_lobes(request, around, basis, applied, out);
+    if (!basis.lobes.empty() && bands == 0)
+      project_on_lobes(request, around, basis, applied, known ? known->sharp.get() : nullptr, out);
     else
       out.projection = known ? project_light(known->all, basis, around.rotation, applied)
                              : project_light(*around.env, basis, around.rotation, request.light_order, applied);
-    if (known && knows_shadows) find_peaks(*known, around, basis, out);
+    if (known && bands > 0 && knows_shadows) find_peaks(*known, around, basis, out);
   } else {
     out.projection.light.assign(basis.count(), Vec3(0.0f));
     const int order = request.light_order ? std::min(request.light_order, basis.order) : basis.order;
@@ -162,6 +203,8 @@ Result<void> move_lamps(const DrawRequest& request, const Mat3& rotation, const 
   std::copy(light.projection.light.end() - ptrdiff_t(light.lamps.size()), light.projection.light.end(),
             moved.projection.light.end() - ptrdiff_t(light.lamps.size()));
   light.projection = std::move(moved.projection);
+  if (!light.still_peaks.light.empty())
+    keep_peaks(move_light(light.still_peaks, basis, rotation, axes, request.light_order).projection, light);
   return {};
 }
 

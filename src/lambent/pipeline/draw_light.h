@@ -9,14 +9,16 @@
 
 namespace lambent {
 
-// Harmonics of an environment, whichever way it is turned: they turn as coefficients.
+// Of an environment, whichever way it is turned: its harmonics, which turn as coefficients; or, where lobes stand
+// beside harmonics, its peaks.
 struct KnownHarmonics {
   int order = 0;           // bands
   std::vector<Vec3> all;   // project_environment()
   std::vector<Vec3> rest;  // of without_peaks(); empty where `--window auto` does not ask
   int lamps = 0;           // that lobes of their own could stand for, where much of the light is sharp
+  std::shared_ptr<const Environment> sharp = nullptr;  // beside lobes: env - without_peaks(); nothing else is there
 };
-// Null where the file's light is not within bands. `peaks`: --window auto asks.
+// Null where the file's light is not within bands, nor of lobes beside them and `peaks`. `peaks`: --window auto asks.
 std::shared_ptr<const KnownHarmonics> know_harmonics(const Environment& env, const DrawRequest& request,
                                                      const LightBasis& basis, bool peaks);
 
@@ -40,10 +42,12 @@ struct ColumnLight {
   CubeLight cube = {};  // the environment, for a store that takes light on one
   // What of the light is too sharp for its bands and rings, by column; empty where --window leaves it or there is none.
   std::vector<Vec3> peaks = {};
-  double sharp = 0;  // the peaks' share of all light, where they are not empty
+  double sharp = 0;  // the share of all light that the peaks have in the harmonics, where they are not empty
   int lamps_found = 0;
+  bool in_lobes = false;       // lobes beside the harmonics hold most of them
   double held = -1;            // of lobes that stand: the share of the environment's squared radiance in the columns
   LightProjection still = {};  // where lamps of the light move: before they did, not turned and without a window
+  LightProjection still_peaks = {};  // of --window auto, likewise
   // Those, as they now stand, in degrees from where they were baked; and what of the whole light is lost.
   struct MovedLamp {
     size_t lamp;
@@ -62,7 +66,8 @@ Result<void> move_lamps(const DrawRequest& request, const Mat3& rotation, const 
                         ColumnLight& light);
 // Whether request.move is of such lamps.
 bool moves_lobes(const DrawRequest& request, const LightBasis& basis);
-// Windows the peaks (Lanczos), the whole with them: for surfaces that reflect a part of the sky at a time.
+// Windows the peaks (Lanczos), the whole with them: for surfaces that reflect a part of the sky at a time. Not where
+// lobes hold most of them.
 void soften_peaks(ColumnLight& light);
 
 // What each material's surfaces emit, as they are seen; empty without groups.

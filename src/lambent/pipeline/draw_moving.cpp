@@ -22,8 +22,12 @@ Result<FreeSpace> relight_lattice(const ColumnDrawing& d) {
   FreeSpace space{place.lattice, place.valid, std::get<IncidentRows>(field.rows).order, {}, {}};
   auto relighter = Relighter::make(field);
   if (!relighter) return relighter.error();
+  ColumnLight softened;
+  if (has_peaks(d)) softened = d.light, soften_peaks(softened);
+  const ColumnLight& soft = softened;
   for (const auto& [light, out] :
-       {std::pair(&d.light.projection.light, &space.all), std::pair(&d.light.peaks, &space.peaks)}) {
+       {std::pair(&d.light.projection.light, &space.all), std::pair(&d.light.peaks, &space.peaks),
+        std::pair(&soft.projection.light, &space.soft), std::pair(&soft.peaks, &space.soft_peaks)}) {
     if (light->empty()) continue;
     if (auto ok = relighter->set_light(*light); !ok) return ok.error();
     if (auto ok = relighter->relight({}, *out); !ok) return ok.error();
@@ -41,9 +45,11 @@ Result<MovingScene> make_moving_scene(const Baked& baked, const DrawRequest& req
              ": holds light that has bounced together with the sky's, so that objects shadow both "
              "alike; `lambent bake --terms` keeps them apart");
   const size_t receivers = receivers_of(baked.surface.store);
-  return MovingScene{moving_receivers(direct, receiver_positions(baked.scene.positions, baked.surface.where, receivers),
-                                      receiver_normals(baked.scene.normals, *vertices_of(baked), receivers)),
-                     direct.light.order};
+  MovingScene scene{moving_receivers(direct, receiver_positions(baked.scene.positions, baked.surface.where, receivers),
+                                     receiver_normals(baked.scene.normals, *vertices_of(baked), receivers)),
+                    direct.light.order};
+  arrange_rows(scene.receivers);
+  return scene;
 }
 
 Result<void> light_scene(MovingScene& s, ColumnDrawing& d) {
@@ -102,12 +108,15 @@ Relit relight_object(const MovingScene& s, bool with_peaks, const Mover& m, std:
   return all;
 }
 
-// The same of one whose transfer is no factor of a product: glossy, or of lobes, or both.
-Relit relight_rows(const MovingScene& s, bool with_peaks, const Mover& m, const LightAmongMovers& among) {
+// The same of one whose transfer is no factor of a product: glossy, or of lobes, or both. `peaks`, of glossy ones, are
+// held above 0 at the pixel, where it is known what is seen of them.
+Relit relight_rows(const MovingScene& s, bool with_peaks, const Mover& m, const LightAmongMovers& among, Relit& peaks) {
   const int order = m.model->light_order();
-  Relit all = relight_each(m, among.arriving_at_each(m, s.space.all, order));
-  if (with_peaks && !outgoing_of(m.model->baked.surface))
-    dering(all, relight_each(m, among.arriving_at_each(m, s.space.peaks, order)));
+  const bool glossy = outgoing_of(m.model->baked.surface) != nullptr;
+  const auto under = [&](const Relit& space) { return relight_each(m, among.arriving_at_each(m, space, order)); };
+  Relit all = under(with_peaks && glossy ? s.space.soft : s.space.all);
+  if (with_peaks && glossy) peaks = under(s.space.soft_peaks);
+  else if (with_peaks) dering(all, under(s.space.peaks));
   if (!among.sends_to(m)) return all;
   const Relit sent = relight_each(m, among.sent_to_each(m, order));
   for (size_t i = 0; i < all.values.size(); ++i) all.values[i] += sent.values[i];
@@ -209,11 +218,12 @@ RelitScene MovingDrawing::lit(const ColumnDrawing& d, std::vector<Vec3>& emissio
     std::vector<const PlacedObject*> others = objects;
     others.erase(others.begin() + ptrdiff_t(i));
     const bool diffuse = s.movers[i].model->is_diffuse();
+    Relit held;
     Relit relit = diffuse ? relight_object(s.scene, has_peaks(d), s.movers[i], others, s.sky)
-                          : relight_rows(s.scene, has_peaks(d), s.movers[i], among);
+                          : relight_rows(s.scene, has_peaks(d), s.movers[i], among, held);
     if (diffuse) among.light_object(s.movers[i], relit);
     s.parts.emplace_back(s.movers[i].file.name, drawn.scene.triangles.size());
-    append_mover(drawn, s.movers[i], relit, emission);
+    append_mover(drawn, s.movers[i], relit, held, emission);
   }
   if (!emission.empty()) emission.resize(drawn.scene.materials.size(), Vec3(0.0f));
   s.seconds += seconds_since(start);
@@ -246,6 +256,7 @@ Result<Drawing> draw_moving(const Baked& baked, const DrawRequest& request, cons
     RenderOptions options{view->width, view->height, request.spp, d.around.background(), d.show.colour};
     const RelitScene drawn = moving->lit(d, options.emission);
     options.outgoing = drawn.outgoing ? &*drawn.outgoing : nullptr;
+    if (!drawn.peaks.values.empty()) options.peaks = &drawn.peaks;
     auto tracer = Tracer::build(drawn.scene);
     if (!tracer) return tracer.error();
     auto image = render(drawn.scene, *tracer, corner_receivers(drawn.scene, drawn.front, drawn.back), drawn.relit,

@@ -129,7 +129,7 @@ Result<void> LivePicture::State::join_objects() {
   std::vector<Vec3> emission = columns->emission;
   auto drawn = moving ? moving->lit(*columns, emission) : with_insertions(*columns, std::move(relit));
   if (!drawn) return drawn.error();
-  relit = std::move(drawn->relit), peaks = {};
+  relit = std::move(drawn->relit), peaks = std::move(drawn->peaks);
   if (!emission.empty()) emission.resize(drawn->scene.materials.size(), Vec3(0.0f));
   if (!due.objects) return company->outgoing = std::move(drawn->outgoing), company->emission = emission, Result<void>();
   SpatialBasis corners = corner_receivers(drawn->scene, drawn->front, drawn->back);

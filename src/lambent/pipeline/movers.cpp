@@ -157,17 +157,33 @@ ViewMap widened(const ViewMap& map, int rows) {
   return out;
 }
 
+size_t blocks_of(size_t receivers) { return (receivers + transfer_block - 1) / transfer_block; }
+
+Relit black(size_t receivers, int rows) {
+  Relit out;
+  out.rows = rows, out.values.assign(blocks_of(receivers) * size_t(rows) * 3 * transfer_block, 0.0f);
+  return out;
+}
+
 // Makes room for that many rows.
 void widen(RelitScene& s, int rows) {
   if (s.outgoing)
     for (ViewMap& map : s.outgoing->maps) map = widened(map, rows);
-  if (s.relit.rows == rows) return;
-  Relit wide;
-  wide.rows = rows;
-  wide.values.assign((s.receivers + transfer_block - 1) / transfer_block * size_t(rows) * 3 * transfer_block, 0.0f);
-  for (size_t r = 0; r < s.receivers; ++r)
-    for (int row = 0; row < s.relit.rows; ++row) wide.set(r, row, s.relit.at(r, row));
-  s.relit = std::move(wide);
+  for (Relit* relit : {&s.relit, &s.peaks}) {
+    if (relit->values.empty() || relit->rows == rows) continue;
+    Relit wide = black(s.receivers, rows);
+    for (size_t r = 0; r < s.receivers; ++r)
+      for (int row = 0; row < relit->rows; ++row) wide.set(r, row, relit->at(r, row));
+    *relit = std::move(wide);
+  }
+}
+
+// Behind `receivers` that are there.
+void append_relit(Relit& into, size_t receivers, const Relit& relit, size_t count) {
+  into.values.resize(blocks_of(receivers + count) * size_t(into.rows) * 3 * transfer_block, 0.0f);
+  for (size_t r = 0; r < count; ++r)
+    for (int row = 0; row < into.rows; ++row)
+      into.set(receivers + r, row, row < relit.rows && !relit.values.empty() ? relit.at(r, row) : Vec3(0.0f));
 }
 
 // The last reflection of a diffuse scene, and of an object in it, as one; `own` is null where that is diffuse too.
@@ -218,7 +234,8 @@ Relit relight_each(const Mover& m, std::span<const Vec3> light) {
   return out;
 }
 
-void append_mover(RelitScene& into, const Mover& m, const Relit& relit, std::vector<Vec3>& emission) {
+void append_mover(RelitScene& into, const Mover& m, const Relit& relit, const Relit& peaks,
+                  std::vector<Vec3>& emission) {
   const auto& at = std::get<VertexPlacement>(m.model->baked.surface.where);
   const size_t first = into.receivers, vertices = into.scene.positions.size(), added = at.front.size();
   const Outgoing* own = outgoing_of(m.model->baked.surface);
@@ -238,12 +255,10 @@ void append_mover(RelitScene& into, const Mover& m, const Relit& relit, std::vec
     for (uint32_t r : *more) side->push_back(r == none ? none : r + uint32_t(first));
     side->resize(vertices + added, none);
   }
+  if (!peaks.values.empty() && into.peaks.values.empty()) into.peaks = black(first, into.relit.rows);
+  append_relit(into.relit, first, relit, m.receivers.count);
+  if (!into.peaks.values.empty()) append_relit(into.peaks, first, peaks, m.receivers.count);
   into.receivers += m.receivers.count;
-  into.relit.values.resize(
-      (into.receivers + transfer_block - 1) / transfer_block * size_t(into.relit.rows) * 3 * transfer_block, 0.0f);
-  for (size_t r = 0; r < m.receivers.count; ++r)
-    for (int row = 0; row < into.relit.rows; ++row)
-      into.relit.set(first + r, row, row < relit.rows ? relit.at(r, row) : Vec3(0.0f));
 }
 
 }  // namespace lambent

@@ -59,7 +59,9 @@ Relit relight_each(const Mover& mover, std::span<const Vec3> light);
 // Normals of receivers at vertices, towards their side, from those of the vertices.
 std::vector<Vec3> receiver_normals(std::span<const Vec3> normals, const VertexPlacement& at, size_t receivers);
 
-// The object, relit, beside what is there; `emission` is that of materials, empty where nothing shines yet.
-void append_mover(RelitScene& into, const Mover& mover, const Relit& relit, std::vector<Vec3>& emission);
+// The object, relit, beside what is there; `peaks`, without values where there are none, is what of it is held above 0
+// by itself at the pixel; `emission` is that of materials, empty where nothing shines yet.
+void append_mover(RelitScene& into, const Mover& mover, const Relit& relit, const Relit& peaks,
+                  std::vector<Vec3>& emission);
 
 }  // namespace lambent

@@ -14,6 +14,8 @@ struct FreeSpace {
   std::vector<uint8_t> valid;
   int order = 0;
   Relit all, peaks;
+  // For objects that reflect a part of the sky at a time: where there are peaks, both with those under a window.
+  Relit soft = {}, soft_peaks = {};
 };
 
 // How light goes from surface to surface of the scene alone.

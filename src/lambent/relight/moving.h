@@ -46,6 +46,10 @@ struct MovingReceivers {
   std::vector<Vec3> positions, normals;  // normals are unit
   AlignedVector<float> transfer;         // [tile][channel][coefficient][receiver in tile]
   AlignedVector<float> lobes;            // [tile][9][receiver in tile]: the cosine about the normal, over pi
+  AlignedVector<float> lanes;            // [tile][position x, y, z, normal x, y, z][receiver in tile]
+  // The same once more by receiver, where arrange_rows() was asked.
+  AlignedVector<uint16_t> rows;       // halves, [receiver][channel][coefficient, padded to a multiple of 16]
+  AlignedVector<uint16_t> lobe_rows;  // [receiver][9, padded to 16]
   // Receivers that are multiplied together: a sphere about them.
   struct Tile {
     Vec3 center{0.0f};
@@ -56,6 +60,10 @@ struct MovingReceivers {
 // Turned and moved from where it was baked, about `center`; harmonics alone, one row.
 MovingReceivers moving_receivers(const Transfer& transfer, std::span<const Vec3> positions,
                                  std::span<const Vec3> normals, Vec3 center = Vec3(0.0f), const RigidPlace& place = {});
+
+// So that a light that all of them share is shaded by tables of what objects hide of it (hidden_table.h) where that is
+// quicker. Takes as much memory as the transfer once more.
+void arrange_rows(MovingReceivers& receivers);
 
 // A light, and what of it leaves each receiver; `values` holds what does without the objects.
 struct MovingLight {
@@ -77,18 +85,29 @@ void light_receivers(const MovingReceivers& receivers, int light_order, const Mo
 // How much was done: pairs of a receiver and an object that were looked at, and tiles that were multiplied.
 struct MovingCount {
   size_t pairs = 0, tiles = 0;
+  size_t tables = 0;  // objects that have one (hidden_table.h)
 };
+
+struct HiddenTable;
 
 // Keeps tables from frame to frame; not for two threads at a time.
 class MovingShader {
  public:
+  MovingShader();
+  MovingShader(MovingShader&&) noexcept;
+  MovingShader& operator=(MovingShader&&) noexcept;
+  ~MovingShader();
   // Light that comes straight from the sky (`receivers`) is multiplied by what the objects leave open, direction by
   // direction. The rest of `values`, where there is any, is dimmed by what they leave open of the cosine.
   MovingCount shade(const MovingReceivers& receivers, std::span<const PlacedObject* const> objects,
                     const MovingOptions& options, std::span<const MovingLight> lights);
 
  private:
+  void make_tables(const MovingReceivers& receivers, std::span<const PlacedObject* const> objects,
+                   const MovingOptions& options, std::span<const MovingLight> lights);
+
   ShTileProducts products_;
+  std::vector<HiddenTable> tables_;  // [object]
 };
 
 }  // namespace lambent

@@ -79,6 +79,48 @@ void HiddenOfTile(const TileMix& m, const uint8_t* wanted, size_t side, const fl
   }
 }
 
+// Four by four numbers, their rows for their columns.
+using Q = hn::CappedTag<float, 4>;
+HWY_INLINE void Transpose4(const float* HWY_RESTRICT from, size_t from_step, float* HWY_RESTRICT to, size_t to_step) {
+#if HWY_TARGET == HWY_SCALAR
+  for (size_t i = 0; i < 4; ++i)
+    for (size_t k = 0; k < 4; ++k) to[k * to_step + i] = from[i * from_step + k];
+#else
+  const Q d;
+  const hn::Repartition<double, Q> pairs;
+  const auto a = hn::LoadU(d, from), b = hn::LoadU(d, from + from_step), c = hn::LoadU(d, from + 2 * from_step),
+             e = hn::LoadU(d, from + 3 * from_step);
+  const auto ab = hn::BitCast(pairs, hn::InterleaveLower(d, a, b)),
+             ce = hn::BitCast(pairs, hn::InterleaveLower(d, c, e)),
+             AB = hn::BitCast(pairs, hn::InterleaveUpper(d, a, b)),
+             CE = hn::BitCast(pairs, hn::InterleaveUpper(d, c, e));
+  hn::StoreU(hn::BitCast(d, hn::InterleaveLower(pairs, ab, ce)), d, to);
+  hn::StoreU(hn::BitCast(d, hn::InterleaveUpper(pairs, ab, ce)), d, to + to_step);
+  hn::StoreU(hn::BitCast(d, hn::InterleaveLower(pairs, AB, CE)), d, to + 2 * to_step);
+  hn::StoreU(hn::BitCast(d, hn::InterleaveUpper(pairs, AB, CE)), d, to + 3 * to_step);
+#endif
+}
+
+void FactorOfTile(const float* rows, size_t stride, size_t coefficients, float all, float* HWY_RESTRICT factor) {
+  const F d;
+  size_t k = 0;
+  for (; k + 4 <= coefficients; k += 4)
+    for (size_t i = 0; i < sh_tile; i += 4)
+      Transpose4(rows + i * stride + k, stride, factor + k * sh_tile + i, sh_tile);
+  for (; k < coefficients; ++k)
+    for (size_t i = 0; i < sh_tile; ++i) factor[k * sh_tile + i] = rows[i * stride + k];
+  for (size_t at = 0; at < coefficients * sh_tile; at += hn::Lanes(d))
+    hn::Store(hn::Sub(hn::Set(d, at < sh_tile ? all : 0.0f), hn::Load(d, factor + at)), d, factor + at);
+}
+
+void RowsFromTile(const float* tile, size_t coefficients, size_t stride, float* HWY_RESTRICT rows) {
+  size_t k = 0;
+  for (; k + 4 <= coefficients; k += 4)
+    for (size_t i = 0; i < sh_tile; i += 4) Transpose4(tile + k * sh_tile + i, sh_tile, rows + i * stride + k, stride);
+  for (; k < stride; ++k)
+    for (size_t i = 0; i < sh_tile; ++i) rows[i * stride + k] = k < coefficients ? tile[k * sh_tile + i] : 0.0f;
+}
+
 void OpenOfTile(const float* lobe, const float* factor, size_t count, float* open) {
   const F d;
   for (size_t i = 0; i < sh_tile; i += hn::Lanes(d)) {
@@ -100,6 +142,8 @@ namespace lambent {
 namespace {
 HWY_EXPORT(MixTile);
 HWY_EXPORT(HiddenOfTile);
+HWY_EXPORT(FactorOfTile);
+HWY_EXPORT(RowsFromTile);
 HWY_EXPORT(OpenOfTile);
 }  // namespace
 
@@ -114,10 +158,11 @@ void hidden_of_tile(const TileMix& mix, const uint8_t* wanted, size_t side, cons
 }
 
 void factor_of_tile(const float* rows, size_t stride, size_t coefficients, float all, float* factor) {
-  // Gathers are slower than this on many CPUs.
-  for (size_t i = 0; i < sh_tile; ++i)
-    for (size_t k = 0; k < coefficients; ++k) factor[k * sh_tile + i] = -rows[i * stride + k];
-  for (size_t i = 0; i < sh_tile; ++i) factor[i] += all;
+  HWY_DYNAMIC_DISPATCH(FactorOfTile)(rows, stride, coefficients, all, factor);
+}
+
+void rows_from_tile(const float* tile, size_t coefficients, size_t stride, float* rows) {
+  HWY_DYNAMIC_DISPATCH(RowsFromTile)(tile, coefficients, stride, rows);
 }
 
 void open_of_tile(const float* lobe, const float* factor, size_t count, float* open) {

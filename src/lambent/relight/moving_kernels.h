@@ -27,6 +27,9 @@ void rows_of_tile(const Shells& shells, const std::vector<float>& log_radii, con
 // factor[k * sh_tile + i] = (k = 0 ? all : 0) - rows[i * stride + k].
 void factor_of_tile(const float* rows, size_t stride, size_t coefficients, float all, float* factor);
 
+// rows[i * stride + k] = tile[k * sh_tile + i]; 0 from k = coefficients to stride, a multiple of 16.
+void rows_from_tile(const float* tile, size_t coefficients, size_t stride, float* rows);
+
 // open[i] *= sum over k < count of lobe[k * sh_tile + i] factor[k * sh_tile + i], within [0, 1].
 void open_of_tile(const float* lobe, const float* factor, size_t count, float* open);
 

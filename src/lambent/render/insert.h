@@ -16,6 +16,7 @@ struct RelitScene {
   size_t receivers = 0;
   Relit relit;
   std::optional<Outgoing> outgoing;  // none: diffuse
+  Relit peaks = {};                  // as RenderOptions::peaks; without values: none
 };
 
 // Whether a diffuse object can be put among surfaces of that last reflection. Errors name `path`: it has no rows to

@@ -115,6 +115,71 @@ TEST(Moving, TwoObjectsShadowASceneAsThePathTracerSays) {
   EXPECT_GT(with, before + 8);
 }
 
+// Tables of what objects hide of the light (hidden_table.h), where they are made, against products one by one.
+TEST(Moving, TablesAreAsProducts) {
+  constexpr int order = 4, side = 160;
+  const Thing ball(make_sphere(0.5f, 2, Vec3(0.5f)), 3, 3);
+  Random random(5);
+  std::vector<Vec3> places, normals;
+  for (int i = 0; i < side * side - 7; ++i) {
+    places.emplace_back(float(i % side) / side * 4 - 2, -0.6f + 0.2f * random.next(), float(i / side) / side * 4 - 2);
+    normals.push_back(normalize(Vec3(random.next() - 0.5f, 1, random.next() - 0.5f)));
+  }
+  const std::vector<Vec3> light = uneven_light(order), peaks(light.rbegin(), light.rend());
+  for (int channels : {1, 3})
+    for (int light_order : {order, 2})
+      for (bool bounced : {false, true}) {
+        const WritableTransfer t = make_transfer({.order = order}, 1, channels, places.size(), Precision::half);
+        std::vector<float> row(size_t(channels * sh_count(order)));
+        for (size_t r = 0; r < places.size(); ++r) {
+          for (float& v : row) v = random.next() - 0.5f;
+          store_receiver(t, r, row);
+        }
+        MovingReceivers receivers = moving_receivers(t.transfer, places, normals);
+        for (int count : {1, 3}) {
+          std::vector<PlacedObject> placed;
+          for (int i = 0; i < count; ++i)
+            placed.push_back(place_object(
+                ball.light, {Vec3(0.4f * float(i) - 0.3f, 0.1f * float(i), 0.2f),
+                             rotation_from_yaw_pitch_roll({20.0f * float(i), 10, 5}), 0.6f + 0.2f * float(i)}));
+          std::vector<const PlacedObject*> objects;
+          for (const PlacedObject& p : placed) objects.push_back(&p);
+          Relit all[2], of_peaks[2];
+          size_t pairs[2];
+          bool made = false;
+          for (int tables : {0, 1}) {
+            MovingReceivers used = receivers;
+            if (tables) arrange_rows(used);
+            const MovingLight lights[] = {{light, false, &all[tables]}, {peaks, false, &of_peaks[tables]}};
+            for (const MovingLight& l : lights) {
+              light_receivers(used, light_order, l);
+              if (bounced)
+                for (float& v : l.values->values) v += 0.3f;
+            }
+            MovingShader shader;
+            const MovingCount done =
+                shader.shade(used, objects, {.light_order = light_order, .bounced = bounced}, lights);
+            pairs[tables] = done.pairs;
+            made = done.tables > 0;
+            if (!tables) EXPECT_FALSE(made);
+            else if (light_order == order) EXPECT_TRUE(made);  // of fewer bands products may take less
+          }
+          EXPECT_EQ(pairs[0], pairs[1]);
+          for (const auto& [plain, quick] : {std::pair(&all[0], &all[1]), std::pair(&of_peaks[0], &of_peaks[1])}) {
+            float most = 0, off = 0;
+            for (size_t r = 0; r < places.size(); ++r)
+              for (int c = 0; c < 3; ++c) {
+                most = std::max(most, std::abs(plain->at(r)[c]));
+                off = std::max(off, std::abs(plain->at(r)[c] - quick->at(r)[c]));
+              }
+            // 16 bits a value and weight, and rows are halves as the file's.
+            EXPECT_LT(off, 2e-4f * most) << channels << " " << light_order << " " << bounced << " " << count;
+            EXPECT_EQ(off > 0, made);
+          }
+        }
+      }
+}
+
 // How a Thing reflects.
 ReflectingLight reflects(const Thing& thing, int order, int samples) {
   const ShellOptions options{.order = order, .samples = samples};
