@@ -104,6 +104,9 @@ TEST(BakedFile, ClustersComeBack) {
   c.cluster_of[1] = 3, c.vectors[5] = NAN;
   ASSERT_TRUE(save_baked(file.path, make_baked(s.scene, s.receivers, c, DiffuseRows{})));
   EXPECT_FALSE(load_baked(file.path));
+  c.vectors[5] = 1, c.weights[1] = 0x7c00;
+  ASSERT_TRUE(save_baked(file.path, make_baked(s.scene, s.receivers, c, DiffuseRows{})));
+  EXPECT_FALSE(load_baked(file.path));
 }
 
 TEST(BakedFile, FixedViewsComeBack) {
