@@ -10,8 +10,8 @@ passed=0
 ok() { passed=$((passed + 1)); }
 bad() { echo "FAILED: $*"; failures=$((failures + 1)); }
 
-# Where LAMBENT_COARSE says so, for tools that are slow, as under sanitizers, commands are what they are with fewer rays,
-# smaller skies and coarser wavelets; how far pictures agree is for the tool that is quick.
+# Where LAMBENT_COARSE says so, for tools that are slow, as under sanitizers, commands are what they are with fewer
+# rays, smaller skies and coarser wavelets; how far pictures agree is for the tool that is quick.
 coarse() {
   local previous="" word
   words=()

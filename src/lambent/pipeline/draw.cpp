@@ -68,6 +68,22 @@ Result<std::vector<double>> times_of(const DrawRequest& request) {
   return parse_frames(request.frames);
 }
 
+// What of the light the bands of the file are too few for.
+void tell_sharp_light(const ColumnLight& light, Summary& summary) {
+  summary.json["sharp_light"] = light.sharp;
+  if (!light.peaks.empty() && light.held >= 0)
+    summary.lines.emplace_back(
+        "sharp",
+        fmt::format("{:.0f} % of the light is sharper than {} bands where no lobe stands, and kept from ringing",
+                    100 * light.sharp, light.projection.window.size()));
+  else if (!light.peaks.empty())
+    summary.lines.emplace_back(
+        "sharp", fmt::format("{:.0f} % of the light is sharper than {} bands, and kept from ringing: its shadows are "
+                             "sharp with `lambent bake --light sh:{}+lamps:{}@ENV` or `--transfer blocks`",
+                             100 * light.sharp, light.projection.window.size(), light.projection.window.size(),
+                             std::max(1, light.lamps_found)));
+}
+
 Result<Drawing> draw_columns(const Baked& baked, const DrawRequest& request, const Job& job) {
   auto begun = begin_columns(baked, request, job);
   if (!begun) return begun.error();
@@ -135,18 +151,7 @@ Result<Drawing> draw_columns(const Baked& baked, const DrawRequest& request, con
         "read", fmt::format("{} wavelets of the light, {} of {}", human_count(d.reading.terms),
                             human_bytes(double(d.reading.bytes)), human_bytes(double(bytes_of(baked.surface.store)))));
   }
-  drawing.summary.json["sharp_light"] = d.light.sharp;
-  if (!d.light.peaks.empty() && d.light.held >= 0)
-    drawing.summary.lines.emplace_back(
-        "sharp",
-        fmt::format("{:.0f} % of the light is sharper than {} bands where no lobe stands, and kept from ringing",
-                    100 * d.light.sharp, light.window.size()));
-  else if (!d.light.peaks.empty())
-    drawing.summary.lines.emplace_back(
-        "sharp",
-        fmt::format("{:.0f} % of the light is sharper than {} bands, and kept from ringing: its shadows are "
-                    "sharp with `lambent bake --light sh:{}+lamps:{}@ENV` or `--transfer blocks`",
-                    100 * d.light.sharp, light.window.size(), light.window.size(), std::max(1, d.light.lamps_found)));
+  tell_sharp_light(d.light, drawing.summary);
   return drawing;
 }
 

@@ -56,17 +56,16 @@ uint64_t NearOfTile(const float* lanes, size_t count, Vec3 position, float radiu
   return count < sh_tile ? near & ((uint64_t(1) << count) - 1) : near;
 }
 
-void MixTable(const PlacedObject& object, const HiddenTable& t, const float* lanes, uint64_t wanted, TableMix& m) {
+// Receivers of a tile as the object sees them, and how far they are at least and at most.
+struct Seen {
+  alignas(64) float own[3][sh_tile], away[sh_tile];
+  float least, most;
+};
+void SeeTile(const PlacedObject& object, const float* lanes, Seen& seen) {
   const F d;
-  const I di;
-  const Shells& s = object.light->shells;
-  const float *log_radii = object.light->log_radii.data(), *radii = s.radii.data();
   const Mat3 back = transpose(object.place.rotation) * (1 / object.place.scale);
   const Vec3 at = object.place.position;
-  const auto one = hn::Set(d, 1.0f), zero = hn::Zero(d), tiny = hn::Set(d, 1e-30f);
-  const auto scale = hn::Set(d, 0.5f * float(s.side - 1)), last = hn::Set(d, float(s.side - 2));
-  alignas(64) float own[3][sh_tile], away[sh_tile];
-  auto least = hn::Set(d, 1e36f), most = zero;
+  auto least = hn::Set(d, 1e36f), most = hn::Zero(d);
   for (size_t i = 0; i < sh_tile; i += hn::Lanes(d)) {
     const auto px = hn::Sub(hn::Load(d, lanes + i), hn::Set(d, at.x)),
                py = hn::Sub(hn::Load(d, lanes + sh_tile + i), hn::Set(d, at.y)),
@@ -75,21 +74,32 @@ void MixTable(const PlacedObject& object, const HiddenTable& t, const float* lan
     for (size_t row = 0; row < 3; ++row) {
       const auto x = hn::MulAdd(hn::Set(d, back[0][row]), px,
                                 hn::MulAdd(hn::Set(d, back[1][row]), py, hn::Mul(hn::Set(d, back[2][row]), pz)));
-      hn::Store(x, d, own[row] + i), squared = hn::MulAdd(x, x, squared);
+      hn::Store(x, d, seen.own[row] + i), squared = hn::MulAdd(x, x, squared);
     }
     const auto distance = hn::Sqrt(squared);
-    hn::Store(distance, d, away + i);
+    hn::Store(distance, d, seen.away + i);
     least = hn::Min(least, distance), most = hn::Max(most, distance);
   }
+  seen.least = hn::GetLane(hn::MinOfLanes(d, least)), seen.most = hn::GetLane(hn::MaxOfLanes(d, most));
+}
+
+void MixTable(const PlacedObject& object, const HiddenTable& t, const float* lanes, uint64_t wanted, TableMix& m) {
+  const F d;
+  const I di;
+  const Shells& s = object.light->shells;
+  const float *log_radii = object.light->log_radii.data(), *radii = s.radii.data();
+  const auto one = hn::Set(d, 1.0f), zero = hn::Zero(d), tiny = hn::Set(d, 1e-30f);
+  const auto scale = hn::Set(d, 0.5f * float(s.side - 1)), last = hn::Set(d, float(s.side - 2));
+  Seen seen;
+  SeeTile(object, lanes, seen);
   const auto shell_of = [&](float distance) {  // the last one that is no larger, of those that the table has
     const float* end = radii + t.first_shell + t.shells;
     return std::max(int(std::upper_bound(radii + t.first_shell, end, distance) - radii) - 1, t.first_shell);
   };
-  const int nearest = shell_of(hn::GetLane(hn::MinOfLanes(d, least))),
-            farthest = shell_of(hn::GetLane(hn::MaxOfLanes(d, most)));
+  const int nearest = shell_of(seen.least), farthest = shell_of(seen.most);
   for (size_t i = 0; i < sh_tile; i += hn::Lanes(d)) {
-    const auto x = hn::Load(d, own[0] + i), y = hn::Load(d, own[1] + i), z = hn::Load(d, own[2] + i);
-    const auto distance = hn::Load(d, away + i);
+    const auto x = hn::Load(d, seen.own[0] + i), y = hn::Load(d, seen.own[1] + i), z = hn::Load(d, seen.own[2] + i);
+    const auto distance = hn::Load(d, seen.away + i);
     // As fold_octahedron().
     const auto inverse = hn::Div(one, hn::Max(hn::Add(hn::Add(hn::Abs(x), hn::Abs(y)), hn::Abs(z)), tiny));
     const auto fx = hn::Mul(x, inverse), fy = hn::Mul(y, inverse);
@@ -177,8 +187,8 @@ HWY_INLINE V LoadRow(const uint16_t* row) {
 }
 
 // `fixed` is the stride, where it is known; else 0.
-template <bool with_light, size_t fixed, class Row>
-void DotTableBy(const HiddenTable& t, size_t group, const TableMix& m, uint64_t asked, const Row* HWY_RESTRICT rows,
+template <bool with_light, size_t fixed, class Stored>
+void DotTableBy(const HiddenTable& t, size_t group, const TableMix& m, uint64_t asked, const Stored* HWY_RESTRICT rows,
                 size_t row_stride, size_t channel_stride, const TableLight& l, float* HWY_RESTRICT out) {
   const F d;
   const I di;
@@ -191,7 +201,7 @@ void DotTableBy(const HiddenTable& t, size_t group, const TableMix& m, uint64_t 
     const int32_t *p = values + m.low[i], *q = values + m.high[i], *p1 = p + next_row, *q1 = q + next_row;
     const auto w0 = hn::Set(di, m.weights[0][i]), w1 = hn::Set(di, m.weights[1][i]), w2 = hn::Set(di, m.weights[2][i]),
                w3 = hn::Set(di, m.weights[3][i]);
-    const Row* a = rows + i * row_stride;
+    const Stored* a = rows + i * row_stride;
     auto r = hn::Zero(d), g = r, b = r;
     for (size_t k = 0; k < stride; k += lanes) {
       const auto hidden = [&](size_t at) {
@@ -221,13 +231,13 @@ void DotTableBy(const HiddenTable& t, size_t group, const TableMix& m, uint64_t 
   }
 }
 
-template <class Row>
-void DotTableOf(const HiddenTable& t, size_t group, const TableMix& m, uint64_t asked, const Row* rows,
+template <class Stored>
+void DotTableOf(const HiddenTable& t, size_t group, const TableMix& m, uint64_t asked, const Stored* rows,
                 size_t row_stride, size_t channel_stride, const TableLight& l, float* out) {
   const bool small = t.stride == 16;
-  (l.light ? small ? DotTableBy<true, 16, Row> : DotTableBy<true, 0, Row>
-   : small ? DotTableBy<false, 16, Row>
-           : DotTableBy<false, 0, Row>)(t, group, m, asked, rows, row_stride, channel_stride, l, out);
+  (l.light ? small ? DotTableBy<true, 16, Stored> : DotTableBy<true, 0, Stored>
+   : small ? DotTableBy<false, 16, Stored>
+           : DotTableBy<false, 0, Stored>)(t, group, m, asked, rows, row_stride, channel_stride, l, out);
 }
 void DotTable(const HiddenTable& t, size_t group, const TableMix& m, uint64_t asked, const TableRows& rows,
               const TableLight& l, float* out) {
