@@ -138,6 +138,9 @@ const Option<R> table[] = {
     {"groove-map", &R::groove_map, "Transfer textures", T,
      "A picture over the texture coordinates, white where grooves have their full depth", 0, 0, nullptr, nullptr, true,
      true},
+    {"wrinkle", &R::wrinkle, "Transfer textures", T,
+     "strain[,LIMIT]: grooves are as deep as a pose presses the surface together, up to LIMIT of their widths, and lie "
+     "across where it presses most, as many over the unit as --tile is long"},
 };
 
 // Pairs that leave one without effect, beyond what the table says; conditions as Option::needs.
@@ -156,6 +159,7 @@ constexpr Conflict conflicts[] = {
     {"pose", "animation", "moves objects over a scene at rest: leave the animation out"},
     {"move", "animation", "moves objects over a scene at rest: leave the animation out"},
     {"insert", "show=emission|bounce:|sum:", "is lit by all light at once: no --show of a part of it"},
+    {"groove-depth", "wrinkle", "is what --wrinkle finds: say at most how deep by strain,LIMIT"},
     {"tolerance", "method=standard|haar", "needs --method blocks"},
     {"at", "show=direct|albedo", "reads light that --show leaves out"},
     {"frame-bounces", "show=direct|albedo", "are of light that --show leaves out"},

@@ -36,7 +36,7 @@ struct DrawRequest {
   // Wavelets
   int terms = 0;  // of the light's; 0: all
   // Transfer textures
-  std::string transfer_texture, tile = "1,1", groove_map;
+  std::string transfer_texture, tile = "1,1", groove_map, wrinkle;
   float groove_depth = 0, groove_width = 1;  // depth 0: the table's deepest
 
   // The environment itself, in place of what `env` names, which is said all the same.

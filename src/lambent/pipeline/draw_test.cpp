@@ -182,7 +182,8 @@ const std::map<std::string, std::string> other_texts{{"env", "sky:elevation=20,a
                                                      {"brdf-samples", "full"},
                                                      {"indirect", "sh"},
                                                      {"at", "receivers"},
-                                                     {"tile", "3,1"}};
+                                                     {"tile", "3,1"},
+                                                     {"wrinkle", "strain"}};
 const std::map<std::string, double> other_numbers{{"light-order", 1},    {"spp", 9},           {"time", 1},
                                                   {"tolerance", 4},      {"terms", 20},        {"groove-depth", 0.2},
                                                   {"groove-width", 0.4}, {"frame-bounces", 1}, {"frame-leaves", 1},

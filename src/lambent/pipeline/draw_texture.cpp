@@ -4,9 +4,11 @@
 #include <lambent/pipeline/relief.h>
 #include <lambent/scene/displace.h>
 #include <lambent/scene/load.h>
+#include <lambent/scene/strain.h>
 
 #include <fmt/format.h>
 
+#include <cmath>
 #include <memory>
 
 namespace lambent {
@@ -14,8 +16,8 @@ namespace lambent {
 Result<TextureUse> texture_use(const DrawRequest& request, const ZonalTexture& texture, const Job& job) {
   auto tile = parse_numbers(request.tile, 2, "--tile");
   if (!tile) return tile.error();
-  const bool grooves = texture.groove_depth > 0,
-             asked = request.groove_depth > 0 || request.groove_width != 1 || !request.groove_map.empty();
+  const bool grooves = texture.groove_depth > 0, asked = request.groove_depth > 0 || request.groove_width != 1 ||
+                                                         !request.groove_map.empty() || !request.wrinkle.empty();
   if (!grooves && asked)
     return Error{request.transfer_texture, "has no grooves (`lambent patch --groove` makes a table of them)"};
   TextureUse use{{(*tile)[0], (*tile)[1]},
@@ -32,6 +34,52 @@ Result<TextureUse> texture_use(const DrawRequest& request, const ZonalTexture& t
     return float(sample_heights(map->values, map->width, map->height, uv));
   };
   return use;
+}
+
+Result<Wrinkles> Wrinkles::make(const DrawRequest& request, const TextureUse& use, const Scene& scene, const Job& job) {
+  Wrinkles out;
+  if (request.wrinkle.empty()) return out;
+  out.limit_ = use.groove_depth;
+  if (request.wrinkle.starts_with("strain,")) {
+    auto limit = parse_numbers(request.wrinkle.substr(7), 1, "--wrinkle");
+    if (!limit) return limit.error();
+    out.limit_ = (*limit)[0];
+  } else if (request.wrinkle != "strain") {
+    return Error{"--wrinkle", "expects strain or strain,LIMIT, not \"" + request.wrinkle + "\"", true};
+  }
+  if (!(out.limit_ > 0 && out.limit_ <= 10))
+    return Error{"--wrinkle", "a limit is of 0 to 10 widths of the groove", true};
+  if (out.limit_ > use.groove_depth)
+    job.warn(fmt::format("{}: its deepest groove is {:.3g} wide ones deep; deeper ones look like it",
+                         request.transfer_texture, use.groove_depth));
+  if (request.animation.empty() && request.deform.empty())
+    return Error{"--wrinkle", "needs what presses the surface: --animation or --deform", true};
+  std::vector<std::vector<Vec3>> pressed;
+  if (!request.animation.empty()) {
+    auto which = find_animation(scene, request.animation);
+    if (!which) return which.error();
+    auto animations = list_animations(scene);
+    if (!animations) return animations.error();
+    const AnimationInfo& all = (*animations)[*which];
+    constexpr int times = 9;
+    for (int k = 0; k < times; ++k) {
+      auto pose = pose_scene(scene, *which, all.from + (all.to - all.from) * k / (times - 1));
+      if (!pose) return pose.error();
+      pressed.push_back(std::move(pose->positions));
+    }
+  } else {
+    auto poses = make_poses({"", "", request.deform}, scene);
+    if (!poses) return poses.error();
+    pressed.push_back(std::move(poses->front()->positions));
+  }
+  out.tile_ = pressed_directions(scene, pressed, std::hypot(use.tile.x, use.tile.y), use.tile);
+  return out;
+}
+
+void Wrinkles::press(const Scene& scene, const std::optional<Pose>& pose, TextureUse& use) const {
+  if (tile_.empty()) return;
+  use.pressed_tile = tile_;
+  use.pressed_depth = pressed_depths(scene, pose ? pose->positions : scene.positions, tile_, use.groove_width, limit_);
 }
 
 std::string cannot_light(const Baked& baked, const DrawRequest& request) {
@@ -115,6 +163,8 @@ Result<Drawing> draw_texture(const DrawRequest& request, const Job& job) {
   const Scene& scene = loaded->scene;
   auto poses = make_poses({request.animation, request.frames, request.deform, request.time}, scene);
   if (!poses) return poses.error();
+  auto wrinkles = Wrinkles::make(request, *use, scene, job);
+  if (!wrinkles) return wrinkles.error();
   auto light = column_light(request, *around, LightBasis{.order = texture->transfer.order}, scene.origin, false);
   if (!light) return light.error();
   const LocalLight local = light->local();
@@ -125,6 +175,7 @@ Result<Drawing> draw_texture(const DrawRequest& request, const Job& job) {
   Result<View> view = Error{};
   for (const std::optional<Pose>& pose : *poses) {
     const Scene moved = pose ? posed(scene, *pose) : scene;
+    wrinkles->press(scene, pose, *use);
     if (drawing.frames.empty()) view = parse_view(request.camera, request.size, moved);
     if (!view) return view.error();
     auto tracer = Tracer::build(moved);

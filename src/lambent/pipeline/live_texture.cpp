@@ -95,15 +95,27 @@ class LiveTexture : public LiveKind {
     if (!poses) return poses.error();
     pose_ = std::move(poses->front());
     if (pose_) moved_ = posed(baked_.scene, *pose_);
+    if (auto ok = press(); !ok) return ok;
     auto built = Tracer::build(scene(), job_.progress);
     if (!built) return built.error();
     tracer_.emplace(std::move(*built));
     return {};
   }
+  Result<void> press() {
+    const DrawRequest& r = request_;
+    std::vector<std::string> of{r.transfer_texture, r.wrinkle, r.tile, r.animation, r.deform};
+    if (of != pressed_of_) {
+      auto wrinkles = Wrinkles::make(r, use_, baked_.scene, job_);
+      if (!wrinkles) return wrinkles.error();
+      wrinkles_ = std::move(*wrinkles), pressed_of_ = std::move(of);
+    }
+    wrinkles_.press(baked_.scene, pose_, use_);
+    return {};
+  }
   Result<void> change(const DrawRequest& was, Due& due) override {
     const DrawRequest& is = request_;
     const auto use = [](const DrawRequest& r) {
-      return std::tie(r.tile, r.groove_map, r.groove_depth, r.groove_width);
+      return std::tie(r.tile, r.groove_map, r.groove_depth, r.groove_width, r.wrinkle);
     };
     const auto pose = [](const DrawRequest& r) { return std::tie(r.animation, r.deform, r.time); };
     const auto sky = [](const DrawRequest& r) {
@@ -113,8 +125,11 @@ class LiveTexture : public LiveKind {
     const bool other = was.transfer_texture != is.transfer_texture;
     if (other)
       if (auto ok = load_texture(); !ok) return ok;
-    if (other || use(was) != use(is))
+    if (other || use(was) != use(is)) {
       if (auto ok = load_use(); !ok) return ok;
+      if (pose(was) == pose(is))
+        if (auto ok = press(); !ok) return ok;
+    }
     due.light = other || sky(was) != sky(is) || (pose(was) != pose(is));
     due.shades = other || use(was) != use(is) || was.show != is.show;
     due.rays = pose(was) != pose(is);
@@ -124,6 +139,8 @@ class LiveTexture : public LiveKind {
   Show show_ = {};
   ZonalTexture texture_ = {};
   TextureUse use_ = {};
+  Wrinkles wrinkles_ = {};
+  std::vector<std::string> pressed_of_ = {};  // what they are made of
   LocalLight local_ = {};
   std::optional<Relighter> relighter_ = std::nullopt;
   ArrivingParts arriving_ = {};

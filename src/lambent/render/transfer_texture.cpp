@@ -143,10 +143,13 @@ std::function<SurfaceShade()> transfer_texture_shade(const Scene& scene, const Z
       const Vec2 uv = placed ? interpolate(scene.texcoords[0], t, hit.u, hit.v) : Vec2(0.0f);
       Mat3 frame;
       if (texture.groove_depth > 0) {
-        const float phase = dot(uv, use.tile), x = (phase - std::floor(phase) - 0.5f) / use.groove_width;
-        sample_groove(texture, placed ? x : 1, use.groove_depth * (use.groove_map ? use.groove_map(uv) : 1),
+        const Vec2 tile = use.pressed_tile.empty() ? use.tile : use.pressed_tile[hit.triangle];
+        const float phase = dot(uv, tile), x = (phase - std::floor(phase) - 0.5f) / use.groove_width,
+                    depth = use.pressed_depth.empty() ? use.groove_depth
+                                                      : interpolate(use.pressed_depth, t, hit.u, hit.v);
+        sample_groove(texture, placed ? x : 1, depth * (use.groove_map ? use.groove_map(uv) : 1),
                       std::span(values.values).first(texture.transfer.row_values()));
-        frame = groove_frame(scene, t, use.tile, normal);
+        frame = groove_frame(scene, t, tile, normal);
       } else {
         frame = texture_frame(scene, t, normal);
         sample_views(texture, uv * use.tile, -direction * frame, values);

@@ -25,6 +25,9 @@ struct TextureUse {
   float groove_width = 1;                 // of a repetition, (0, 1]
   float groove_depth = 1;                 // in widths
   std::function<float(Vec2)> groove_map;  // optional: what the depth is multiplied by, at uv
+  // Of a pose (scene/strain.h), in the place of `tile`, [triangle], and of the depth, [vertex]; empty: as they are.
+  std::vector<Vec2> pressed_tile{};
+  std::vector<float> pressed_depth{};
 };
 
 // The light that arrives at a mesh, by receiver, and where those are. `peaks`: what of it comes from the light's peaks,

@@ -11,6 +11,7 @@
 #include <lambent/scene/displace.h>
 #include <lambent/scene/pose.h>
 #include <lambent/scene/procedural.h>
+#include <lambent/scene/strain.h>
 
 #include "sanitizers.h"
 
@@ -289,6 +290,67 @@ TEST(TransferTexture, GroovesAreThoseOfDisplacedGeometry) {
                 relative_rms(*ours, truth->image));
     EXPECT_LT(relative_rms(*ours, truth->image), 0.08);  // the table itself is off by 5.6%
   }
+}
+
+// A sheet that is pressed together by a fifth and bent, and folds as a skin of its length does, against the same folds
+// of triangles, path-traced.
+TEST(TransferTexture, APressedSheetFoldsAsItsDisplacedGeometry) {
+  SKIP_UNDER_SANITIZERS();
+  auto table = make_wrinkle_table({});
+  ASSERT_TRUE(table);
+  const std::vector<Vec3> light = project_environment(*make_sky(*parse_sky("elevation=35,azimuth=60,turbidity=3")), 6);
+  const Environment env = reconstruct_environment(light, 256);
+  constexpr float pressed = 0.8f;
+  // How deep folds are whose outline is as long as they were wide, by halving.
+  double low = 0, high = 2;
+  for (int k = 0; k < 40; ++k) {
+    const double depth = (low + high) / 2;
+    double length = 0;
+    constexpr int n = 2000;
+    for (int i = 0; i < n; ++i) {
+      const auto at = [&](int j) { return depth * std::pow(std::sin(double(pi) * j / n), 2); };
+      length += std::hypot(1.0 / n, at(i + 1) - at(i));
+    }
+    (length < 1 / double(pressed) ? low : high) = depth;
+  }
+  const float depth = float(low);
+  const Scene sheet = tiled_sheet(240);
+  Scene narrow = sheet;
+  for (Vec3& p : narrow.positions) p.x *= pressed;
+  const Scene bent = posed(narrow, deform_scene(narrow, *parse_deformation("bend:-100,x,y")));
+  TextureUse use{{3, 4}, 1, 1, {}};  // whose direction is not that of what is pressed
+  const std::vector<std::vector<Vec3>> poses{bent.positions};
+  use.pressed_tile = pressed_directions(sheet, poses, 5, use.tile);
+  use.pressed_depth = pressed_depths(sheet, bent.positions, use.pressed_tile, 1, 1);
+  EXPECT_NEAR(use.pressed_depth[use.pressed_depth.size() / 2], depth, 0.01);
+  auto tracer = Tracer::build(bent);
+  const Hit middle = tracer->closest({0.01f, 100, 0.02f}, {0, -1, 0});
+  const Camera camera = from_above(100 - middle.distance);
+  RenderOptions options;
+  options.width = options.height = 48, options.samples = 64;
+  auto ours = render_transfer_texture(bent, *tracer, table->texture, use, {light, {}, {}}, camera, options);
+  ASSERT_TRUE(ours);
+  auto smooth =
+      render_transfer_texture(bent, *tracer, table->texture, {{5, 0}, 1, 1e-4f, {}}, {light, {}, {}}, camera, options);
+  ASSERT_TRUE(smooth);
+  Scene relief = bent;
+  // displace() measures heights by the root of the area that a repetition has, which is pressed one way.
+  ASSERT_TRUE(displace(
+      relief,
+      [&](Vec2 uv) {
+        const float x = uv.x - std::floor(uv.x) - 0.5f;
+        return -depth * std::sqrt(pressed) * std::pow(std::cos(pi * x), 2.0f);
+      },
+      Vec2(5)));
+  ReferenceOptions traced;
+  traced.width = traced.height = 48, traced.spp = 256, traced.bounces = 6;
+  auto truth = path_trace(relief, env, camera, traced);
+  ASSERT_TRUE(truth);
+  const double folded = relative_rms(*ours, truth->image), plain = relative_rms(*smooth, truth->image);
+  RecordProperty("folded", std::to_string(folded)), RecordProperty("smooth", std::to_string(plain));
+  std::printf("depth %.4f folded %.4f, smooth %.4f\n", depth, folded, plain);
+  EXPECT_LT(folded, 0.08);  // as above
+  EXPECT_GT(plain, 2 * folded);
 }
 
 // A glowing ball near the relief, against the path tracer's: a mesh of triangles that it samples.
