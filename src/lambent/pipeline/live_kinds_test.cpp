@@ -173,7 +173,12 @@ TEST_F(LiveTexture, OfASceneThatWasNotBakedIsDrawnAsRenderDoes) {
   wider.tile = "3,1", wider.groove_depth = 0.2f, wider.groove_width = 0.5f;
   near.sphere_lamp = {"1,1,1,0.3,9,8,7"};
   bent.deform = "bend:60,x";
-  expect_each_drawn(plain, {request, turned, wider, near, bent, request});
+  DrawRequest pressed = bent, twisted = bent;
+  twisted.deform = "twist:70,x";
+  DrawRequest folded = twisted;
+  pressed.wrinkle = "strain", folded.wrinkle = "strain,0.3";
+  EXPECT_NE(drawn(plain, folded).rgb, drawn(plain, twisted).rgb);
+  expect_each_drawn(plain, {request, turned, wider, near, bent, pressed, twisted, folded, pressed, request});
 }
 
 TEST_F(LiveTexture, OverABakeIsInTheLightThatArrives) {
