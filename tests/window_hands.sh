@@ -145,8 +145,8 @@ if cc -O1 -o drop "$here/drop.c" -lX11 2>cc.log; then
   drop "$PWD/other.exr"
   becomes "an environment that is dropped" "$file" --env other.exr "${plain[@]}"
   for _ in $(seq 30); do  # like that, and then at rest
-    cp before.png first.png && sleep 0.3 && shoot before.png
-    cmp -s before.png first.png && break
+    cp before.png rested.png && sleep 0.3 && shoot before.png
+    cmp -s before.png rested.png && break
   done
   echo "no picture" >wrong.hdr
   drop "$PWD/wrong.hdr"
