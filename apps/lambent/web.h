@@ -37,8 +37,8 @@ struct WebFile {
 using WebFiles = std::map<std::string, WebFile>;
 
 // Environments, files and skies alike, become .exr files of single floats, read as every other command reads them. The
-// default is a sky. Objects are baked alone,
-// each file once. Errors: the page is not built; anything wrong with a file or an option; cancelled.
+// default is a sky. Objects are baked alone, each file once. Errors: the page is not built; anything wrong with a file
+// or an option; cancelled.
 Result<WebFiles> web_files(const WebOptions& options, const Job& job);
 
 }  // namespace lambent::tool
